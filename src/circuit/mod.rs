@@ -1,0 +1,234 @@
+//! The flattened circuit: nodes, elements with evaluated values, sources, initial conditions, what to print.
+//!
+//! [`elaborate`](crate::netlist) fills it from a netlist; nothing here knows SPICE text or matrices.
+
+pub mod source;
+
+use crate::algebra::Value;
+use crate::diagnostic::Span;
+use crate::law::Law;
+pub use source::Source;
+
+/// A node; 0 is ground.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct NodeId(pub u32);
+
+impl NodeId {
+    /// Node `0`.
+    pub const GROUND: Self = Self(0);
+
+    /// As an index into [`Circuit::nodes`].
+    #[must_use]
+    pub const fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// An element, as an index into [`Circuit::elements`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ElementId(pub u32);
+
+impl ElementId {
+    /// As an index into [`Circuit::elements`].
+    #[must_use]
+    pub const fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// A circuit ready for analysis. Names are lower case; inside subcircuits `x1.r1`, node `x1.n`.
+#[derive(Debug, Clone, Default)]
+pub struct Circuit {
+    /// The title line.
+    pub title: String,
+    /// Node names by [`NodeId`]; `nodes[0]` is `"0"`.
+    pub nodes: Vec<String>,
+    /// Elements in file order, subcircuits expanded in place.
+    pub elements: Vec<Element>,
+    /// Coupled inductors, pair by pair.
+    pub couplings: Vec<Coupling>,
+    /// The transient analysis asked for.
+    pub tran: Option<Tran>,
+    /// What `.save`, `.print`, `.probe`, `.plot tran` ask for; empty means the default set.
+    pub probes: Vec<Probe>,
+    /// `.ic v(n)=…` (and differences `v(a,b)=…`): nodes and volts.
+    pub initial_voltages: Vec<(NodeId, NodeId, f64)>,
+}
+
+/// One branch of the circuit (or a controlled output), from node `p` to node `n`.
+///
+/// Its voltage is v(p) − v(n); its current is positive from `p` through the element to `n`.
+#[derive(Debug, Clone)]
+pub struct Element {
+    /// Canonical lower-case name, unique.
+    pub name: String,
+    /// First node (anode of a diode).
+    pub p: NodeId,
+    /// Second node.
+    pub n: NodeId,
+    /// What it is.
+    pub kind: Kind,
+    /// `IC=` on the card: volts for a capacitor, amperes for an inductor.
+    pub ic: Option<f64>,
+    /// The card it comes from.
+    pub span: Option<Span>,
+}
+
+/// What an element is, with its values in SI units.
+#[derive(Debug, Clone)]
+pub enum Kind {
+    /// Ω; zero is a short, negative is allowed.
+    Resistor(Value),
+    /// F.
+    Capacitor(Value),
+    /// H.
+    Inductor(Value),
+    /// V.
+    VoltageSource(Source),
+    /// A, flowing from `p` through the source to `n`.
+    CurrentSource(Source),
+    /// E, F, G, H and affine behavioural sources: the output is an affine function of circuit quantities.
+    Controlled {
+        /// Whether the output is a voltage or a current.
+        output: Output,
+        /// Its value, V or A.
+        control: Affine,
+    },
+    /// Comparator, saturation, hinge: the output is a monotone function of one affine input (the port
+    /// y = input, λ = output of the complementarity system).
+    Function {
+        /// Whether the output is a voltage or a current.
+        output: Output,
+        /// The input y.
+        input: Affine,
+        /// The curve (input, output), e.g. a relay or saturation.
+        law: Law,
+    },
+    /// A two-terminal device with a law between its voltage and current.
+    Device(Law),
+    /// S or W.
+    Switch(Switch),
+}
+
+/// The sort of a controlled output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Output {
+    /// A voltage source from `p` to `n`.
+    Voltage,
+    /// A current from `p` through the element to `n`.
+    Current,
+}
+
+/// A quantity of the circuit that something may depend on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// v(node) against its reference.
+    Voltage(NodeId),
+    /// The current through an element.
+    Current(ElementId),
+}
+
+/// `constant + Σ gain · quantity`.
+#[derive(Debug, Clone, Default)]
+pub struct Affine {
+    /// Gains and quantities.
+    pub terms: Vec<(Value, Quantity)>,
+    /// The constant term; `Value::binary(0.0)` for none.
+    pub constant: f64,
+}
+
+/// A switch with hysteresis: on when the control rises above `on_above`, off when it falls below `off_below`.
+#[derive(Debug, Clone)]
+pub struct Switch {
+    /// The control, V or A.
+    pub control: Affine,
+    /// Ω when on; zero is a short.
+    pub ron: Value,
+    /// Ω when off; `None` is open.
+    pub roff: Option<Value>,
+    /// Turns on when the control exceeds this.
+    pub on_above: f64,
+    /// Turns off when the control is below this (≤ `on_above`; equal for no hysteresis).
+    pub off_below: f64,
+    /// `ON`/`OFF` on the card.
+    pub initial: Option<bool>,
+}
+
+/// `K`: two inductors and their coupling coefficient.
+#[derive(Debug, Clone)]
+pub struct Coupling {
+    /// Name of the card.
+    pub name: String,
+    /// First inductor.
+    pub a: ElementId,
+    /// Second inductor.
+    pub b: ElementId,
+    /// −1 ≤ k ≤ 1.
+    pub k: Value,
+    /// The card.
+    pub span: Option<Span>,
+}
+
+/// `.tran tstep tstop [tstart [tmax]] [uic]`, in seconds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tran {
+    /// Distance of output times; (tstop − tstart)/1000 where the card names none.
+    pub tstep: f64,
+    /// Last time.
+    pub tstop: f64,
+    /// First time written.
+    pub tstart: f64,
+    /// Largest internal step.
+    pub tmax: Option<f64>,
+    /// Start from initial conditions instead of the operating point.
+    pub uic: bool,
+}
+
+/// A column of the output.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Probe {
+    /// Canonical name: `v(out)`, `v(a,b)`, `i(d1)`.
+    pub name: String,
+    /// What it is.
+    pub what: Probed,
+}
+
+/// What a probe shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Probed {
+    /// v(a) − v(b); b = ground for a single node.
+    Voltage(NodeId, NodeId),
+    /// The current of an element.
+    Current(ElementId),
+}
+
+impl Circuit {
+    /// The element with this canonical name.
+    #[must_use]
+    pub fn element(&self, name: &str) -> Option<ElementId> {
+        self.elements.iter().position(|e| e.name == name).map(|i| ElementId(i as u32))
+    }
+
+    /// The node with this canonical name.
+    #[must_use]
+    pub fn node(&self, name: &str) -> Option<NodeId> {
+        self.nodes.iter().position(|n| n == name).map(|i| NodeId(i as u32))
+    }
+
+    /// What to print: the probes asked for, else all node voltages, then voltage-source and inductor currents.
+    #[must_use]
+    pub fn probes(&self) -> Vec<Probe> {
+        if !self.probes.is_empty() {
+            return self.probes.clone();
+        }
+        let nodes = self.nodes.iter().enumerate().skip(1).map(|(i, name)| Probe {
+            name: format!("v({name})"),
+            what: Probed::Voltage(NodeId(i as u32), NodeId::GROUND),
+        });
+        let currents = self.elements.iter().enumerate().filter_map(|(i, e)| {
+            matches!(e.kind, Kind::VoltageSource(_) | Kind::Inductor(_))
+                .then(|| Probe { name: format!("i({})", e.name), what: Probed::Current(ElementId(i as u32)) })
+        });
+        nodes.chain(currents).collect()
+    }
+}

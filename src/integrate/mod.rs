@@ -1,0 +1,5 @@
+//! From a complementarity system to waveforms.
+
+pub mod stats;
+
+pub use stats::{Energy, Impulse, Run, Stats};

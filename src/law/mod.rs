@@ -1,0 +1,40 @@
+//! Device laws: maximal monotone curves in the (v, i) plane, −λ ∈ ∂φ(y).
+
+use crate::algebra::Value;
+
+/// A law between the two quantities of a port.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Law {
+    /// Diode: v ≤ vfwd blocks (i = v/roff, 0 where `roff` is `None`), else i = (v − vfwd)/ron, a vertical line for ron = 0.
+    Diode {
+        /// Forward drop, V.
+        vfwd: Value,
+        /// On-resistance, Ω.
+        ron: Value,
+        /// Off-resistance, Ω; `None` is infinite.
+        roff: Option<Value>,
+    },
+    /// Any other piecewise-linear monotone curve.
+    Curve(Curve),
+}
+
+/// A piecewise-linear maximal monotone curve: a ray into `vertices[0]`, segments, a ray out of the last vertex.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    /// `ideal_diode`, `zener`, `table`, `relay`, `saturation`, `dead_zone`: the name shown to the user.
+    pub kind: &'static str,
+    /// Corner points (v, i), both coordinates nondecreasing; at least one.
+    pub vertices: Vec<(Value, Value)>,
+    /// Direction (dv, di) ≥ 0 of the first ray, traversed towards the first vertex.
+    pub first: (Value, Value),
+    /// Direction (dv, di) ≥ 0 of the last ray, leaving the last vertex.
+    pub last: (Value, Value),
+}
+
+impl Law {
+    /// The ideal diode: 0 ≤ i ⟂ −v ≥ 0.
+    #[must_use]
+    pub const fn ideal_diode() -> Self {
+        Self::Diode { vfwd: Value::decimal(0.0, 0, 0), ron: Value::decimal(0.0, 0, 0), roff: None }
+    }
+}

@@ -1,0 +1,22 @@
+//! Every tolerance and limit, once: name, default, unit, scale, and what either direction costs.
+
+/// Numerical settings of a simulation. Nothing else in the crate holds a tolerance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Target of the error-controlled steppers: local error relative to each signal's amplitude so far
+    /// (dimensionless, default 1e-4). Smaller: more steps; larger: visible error.
+    pub tol: f64,
+    /// Complementarity residual `‖min(λ, y)‖∞` at which an LCP solution is accepted, in the circuit's own scales
+    /// (dimensionless, default 1e-9). Smaller: correct solutions refused for rounding; larger: wrong modes accepted.
+    pub lcp_residual: f64,
+    /// Smallest step of the error-controlled steppers relative to the simulated span (default 1e-12).
+    pub min_step: f64,
+    /// Limit of steps in one run (default 200 million); reaching it is an error that names the time.
+    pub max_steps: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { tol: 1e-4, lcp_residual: 1e-9, min_step: 1e-12, max_steps: 200_000_000 }
+    }
+}
