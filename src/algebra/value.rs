@@ -21,10 +21,7 @@ impl Value {
     /// The decimal rational `mantissa · 10^exponent`; `f64` must be its nearest double.
     #[must_use]
     pub const fn decimal(f64: f64, mantissa: i128, exponent: i32) -> Self {
-        Self {
-            f64,
-            decimal: Some((mantissa, exponent)),
-        }
+        Self { f64, decimal: Some((mantissa, exponent)) }
     }
 }
 

@@ -252,11 +252,14 @@ impl<'a> Curve<'a> {
     }
 }
 
+/// A column of the first side and the reference's curve of that name.
+type Pair<'a> = (usize, Curve<'a>);
+
 /// Columns of `waves` with their partners, and the names without one.
 fn paired<'a>(
     waves: &Waveforms,
     reference: &'a Waveforms,
-) -> Result<(Vec<(usize, Curve<'a>)>, Vec<String>), CompareError> {
+) -> Result<(Vec<Pair<'a>>, Vec<String>), CompareError> {
     let (mut pairs, mut missing) = (Vec::new(), Vec::new());
     for (j, name) in waves.names.iter().enumerate() {
         match partner(name, reference) {
@@ -447,7 +450,7 @@ mod tests {
         let flat = waves("v(a)", &[0.0, 1.0], &[1.0, 1.0]);
         let spike = waves(
             "v(a)",
-            &[0.0, 0.5, 0.5, 0.5, 1.0],
+            &[0.0, 0.49, 0.5, 0.51, 1.0],
             &[1.0, 1.0, 3.0, 1.0, 1.0],
         );
         assert_eq!(

@@ -139,10 +139,10 @@ pub fn canonical_name(name: &str) -> String {
         .strip_prefix("i(")
         .and_then(|n| n.strip_suffix(')'))
         .unwrap_or(&name);
-    if let Some((device, quantity)) = inner.strip_prefix('@').and_then(|n| n.split_once('[')) {
-        if matches!(quantity, "i]" | "id]" | "current]") {
-            return format!("i({})", without_letter(device));
-        }
+    if let Some((device, quantity)) = inner.strip_prefix('@').and_then(|n| n.split_once('['))
+        && matches!(quantity, "i]" | "id]" | "current]")
+    {
+        return format!("i({})", without_letter(device));
     }
     if let Some(element) = inner.strip_suffix("#branch") {
         return format!("i({})", without_letter(element));
