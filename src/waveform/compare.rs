@@ -11,6 +11,16 @@ use super::{Waveforms, canonical_name};
 /// is the rounding or leakage of its neighbours.
 const AMPLITUDE_FLOOR: f64 = 1e-9;
 
+/// Where two sides are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum At {
+    /// At every row of either side; between rows both are straight lines.
+    AllRows,
+    /// At the rows of the reference only: right when the first side's rows are dense and the reference's are the steps of
+    /// another program, between which it claims nothing.
+    ReferenceRows,
+}
+
 /// Errors of one signal, relative to its amplitude.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct SignalError {
@@ -97,22 +107,26 @@ pub enum CompareError {
 ///
 /// # Example
 /// ```
-/// use circ::waveform::{Waveforms, compare::compare};
+/// use circ::waveform::{Waveforms, compare::{At, compare}};
 /// let ramp = |time: Vec<f64>, slope: f64| Waveforms {
 ///     names: vec!["v(a)".into()], units: vec!["V"], values: time.iter().map(|t| slope * t).collect(), time, ..Default::default()
 /// };
-/// let found = compare(&ramp(vec![0.0, 1.0], 1.1), &ramp(vec![0.0, 0.3, 1.0], 1.0), 0.0).unwrap();
+/// let found = compare(&ramp(vec![0.0, 1.0], 1.1), &ramp(vec![0.0, 0.3, 1.0], 1.0), At::AllRows, 0.0).unwrap();
 /// assert!((found.signals[0].max - 0.1).abs() < 1e-15);
 /// assert!((found.signals[0].rms - 0.1 / 3f64.sqrt()).abs() < 1e-15);
 /// ```
 pub fn compare(
     waves: &Waveforms,
     reference: &Waveforms,
+    at: At,
     shift: f64,
 ) -> Result<Comparison, CompareError> {
     let (pairs, missing) = paired(waves, reference)?;
     let (from, to) = common_span(waves, reference)?;
-    let grid = union_grid(&waves.time, &reference.time, from, to);
+    let grid = match at {
+        At::AllRows => grid(waves.time.iter().chain(&reference.time), from, to),
+        At::ReferenceRows => grid(reference.time.iter(), from, to),
+    };
     let amplitudes: Vec<f64> = pairs.iter().map(|(_, b)| b.amplitude(&grid)).collect();
     let floor = |unit: &str| {
         let same_unit = pairs
@@ -183,7 +197,7 @@ pub fn difference(waves: &Waveforms, reference: &Waveforms) -> Result<Waveforms,
         units: curves.iter().map(|(j, ..)| waves.units[*j]).collect(),
         ..Waveforms::default()
     };
-    for &t in &union_grid(&waves.time, &reference.time, from, to) {
+    for &t in &grid(waves.time.iter().chain(&reference.time), from, to) {
         let before: Vec<f64> = curves
             .iter()
             .map(|(_, a, b)| a.before(t) - b.before(t))
@@ -315,13 +329,9 @@ fn common_span(waves: &Waveforms, reference: &Waveforms) -> Result<(f64, f64), C
         })
 }
 
-/// The times of both sides within the span, increasing, with the span's ends.
-fn union_grid(a: &[f64], b: &[f64], from: f64, to: f64) -> Vec<f64> {
-    let inside = a
-        .iter()
-        .chain(b)
-        .copied()
-        .filter(|t| (from..=to).contains(t));
+/// The times within the span, increasing, with the span's ends.
+fn grid<'a>(times: impl Iterator<Item = &'a f64>, from: f64, to: f64) -> Vec<f64> {
+    let inside = times.copied().filter(|t| (from..=to).contains(t));
     let mut grid: Vec<f64> = inside.chain([from, to]).collect();
     grid.sort_by(f64::total_cmp);
     grid.dedup();
@@ -427,7 +437,7 @@ mod tests {
             &[0.0, 0.5, 1.0, 1.0, 1.25, 2.0],
             &[0.0, 1.0, 2.0, -2.0, -1.5, 0.0],
         );
-        let found = compare(&coarse, &fine, 0.0).unwrap();
+        let found = compare(&coarse, &fine, At::AllRows, 0.0).unwrap();
         let s = &found.signals[0];
         assert_eq!((s.max, s.rms, s.shifted, s.amplitude), (0.0, 0.0, 0.0, 2.0));
     }
@@ -436,12 +446,12 @@ mod tests {
     fn a_late_edge_is_a_large_error_that_a_shift_forgives() {
         let reference = waves("v(a)", &[0.0, 1.0, 1.0, 3.0], &[0.0, 0.0, 4.0, 4.0]);
         let late = waves("v(a)", &[0.0, 1.1, 1.1, 3.0], &[0.0, 0.0, 4.0, 4.0]);
-        let found = compare(&late, &reference, 0.2).unwrap();
+        let found = compare(&late, &reference, At::AllRows, 0.2).unwrap();
         let s = &found.signals[0];
         assert_eq!((s.max, s.max_time, s.shifted), (1.0, 1.0, 0.0));
         // |a − b| = 4 for 0.1 s of 3 s.
         assert!((s.rms - (0.1f64 / 3.0).sqrt()).abs() < 1e-12);
-        let strict = compare(&late, &reference, 0.05).unwrap();
+        let strict = compare(&late, &reference, At::AllRows, 0.05).unwrap();
         assert_eq!(strict.signals[0].shifted, 1.0);
     }
 
@@ -454,10 +464,10 @@ mod tests {
             &[1.0, 1.0, 3.0, 1.0, 1.0],
         );
         assert_eq!(
-            compare(&flat, &spike, 0.1).unwrap().signals[0].shifted,
+            compare(&flat, &spike, At::AllRows, 0.1).unwrap().signals[0].shifted,
             2.0 / 3.0
         );
-        let found = compare(&spike, &flat, 0.1).unwrap();
+        let found = compare(&spike, &flat, At::AllRows, 0.1).unwrap();
         assert_eq!(
             (found.signals[0].shifted, found.signals[0].shifted_time),
             (2.0, 0.5)
@@ -474,7 +484,7 @@ mod tests {
             values: vec![3.0, 2.0, 4.0, 2.5],
             ..Waveforms::default()
         };
-        let found = compare(&ours, &reference, 0.0).unwrap();
+        let found = compare(&ours, &reference, At::AllRows, 0.0).unwrap();
         assert_eq!(
             (found.signals[0].amplitude, found.signals[0].max_time),
             (1.5, 1.0)
@@ -492,26 +502,53 @@ mod tests {
             values: vec![small, 2.0, small, 2.0],
             ..Waveforms::default()
         };
-        let found = compare(&both(0.0), &both(1e-12), 0.0).unwrap();
+        let found = compare(&both(0.0), &both(1e-12), At::AllRows, 0.0).unwrap();
         assert_eq!(found.signals[0].amplitude, 2e-9);
         assert!((found.signals[0].max - 5e-4).abs() < 1e-15);
         // A signal that should vanish and does not is not excused.
-        assert!(compare(&both(1.0), &both(0.0), 0.0).unwrap().signals[0].max > 1e8);
+        assert!(
+            compare(&both(1.0), &both(0.0), At::AllRows, 0.0)
+                .unwrap()
+                .signals[0]
+                .max
+                > 1e8
+        );
+    }
+
+    #[test]
+    fn between_the_rows_of_another_program_nothing_is_claimed() {
+        let parabola = |n: u32| {
+            let time: Vec<f64> = (0..=n).map(|k| f64::from(k) / f64::from(n)).collect();
+            let values: Vec<f64> = time.iter().map(|t| t * t).collect();
+            waves("v(a)", &time, &values)
+        };
+        let error = |at| {
+            compare(&parabola(64), &parabola(4), at, 0.0)
+                .unwrap()
+                .signals[0]
+                .max
+        };
+        assert_eq!(
+            (error(At::ReferenceRows), error(At::AllRows)),
+            (0.0, 1.0 / 64.0)
+        );
     }
 
     #[test]
     fn nothing_in_common_is_an_error() {
         let a = waves("v(a)", &[0.0, 1.0], &[0.0, 0.0]);
         assert!(matches!(
-            compare(&a, &waves("v(b)", &[0.0], &[0.0]), 0.0),
+            compare(&a, &waves("v(b)", &[0.0], &[0.0]), At::AllRows, 0.0),
             Err(CompareError::NoSignal { .. })
         ));
         let later = waves("v(a)", &[2.0, 3.0], &[0.0, 0.0]);
-        let error = compare(&a, &later, 0.0).unwrap_err().to_string();
+        let error = compare(&a, &later, At::AllRows, 0.0)
+            .unwrap_err()
+            .to_string();
         assert_eq!(
             error,
             "no common span of time: 0e0 s to 1e0 s and 2e0 s to 3e0 s"
         );
-        assert!(compare(&a, &waves("v(a)", &[], &[]), 0.0).is_err());
+        assert!(compare(&a, &waves("v(a)", &[], &[]), At::AllRows, 0.0).is_err());
     }
 }
