@@ -27,6 +27,7 @@ pub mod law;
 pub mod lcs;
 pub mod mna;
 pub mod netlist;
+pub mod passivity;
 pub mod report;
 pub mod settings;
 pub mod solve;
