@@ -18,6 +18,7 @@
 pub mod barrier;
 pub mod energy;
 pub mod facial;
+pub mod gradient;
 pub mod lmi;
 mod scale;
 #[cfg(feature = "sdp")]
