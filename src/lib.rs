@@ -20,6 +20,7 @@
 //! ```
 
 pub mod algebra;
+pub mod check;
 pub mod circuit;
 pub mod diagnostic;
 pub mod integrate;

@@ -25,29 +25,53 @@ impl Excitation {
         };
         match &source.wave {
             Wave::Dc(value) => range(&[*value], false),
-            Wave::Sin { offset, amplitude, damping, .. } => {
+            Wave::Sin {
+                offset,
+                amplitude,
+                damping,
+                ..
+            } => {
                 // A negative damping grows without bound.
-                let size = if *damping < 0.0 { f64::INFINITY } else { amplitude.abs() };
+                let size = if *damping < 0.0 {
+                    f64::INFINITY
+                } else {
+                    amplitude.abs()
+                };
                 if *amplitude == 0.0 {
                     range(&[*offset], false)
                 } else {
                     range(&[offset - size, offset + size], false)
                 }
             }
-            Wave::Pulse { v1, v2, rise, fall, .. } => range(&[*v1, *v2], v1 != v2 && (*rise == 0.0 || *fall == 0.0)),
+            Wave::Pulse {
+                v1, v2, rise, fall, ..
+            } => range(&[*v1, *v2], v1 != v2 && (*rise == 0.0 || *fall == 0.0)),
             Wave::Pwl { points, repeat, .. } => {
                 let values: Vec<f64> = points.iter().map(|p| p.1).collect();
-                let edge = points.windows(2).any(|w| w[0].0 == w[1].0 && w[0].1 != w[1].1);
+                let edge = points
+                    .windows(2)
+                    .any(|w| w[0].0 == w[1].0 && w[0].1 != w[1].1);
                 let wraps = repeat.is_some_and(|start| {
                     let last = points.last().map(|p| p.1);
                     let first = points.iter().find(|p| p.0 >= start).map(|p| p.1);
                     last != first
                 });
-                if values.is_empty() { range(&[0.0], false) } else { range(&values, edge || wraps) }
+                if values.is_empty() {
+                    range(&[0.0], false)
+                } else {
+                    range(&values, edge || wraps)
+                }
             }
-            Wave::Exp { v1, v2, rise_tau, fall_tau, .. } => {
-                range(&[*v1, *v2], v1 != v2 && (*rise_tau == 0.0 || *fall_tau == 0.0))
-            }
+            Wave::Exp {
+                v1,
+                v2,
+                rise_tau,
+                fall_tau,
+                ..
+            } => range(
+                &[*v1, *v2],
+                v1 != v2 && (*rise_tau == 0.0 || *fall_tau == 0.0),
+            ),
         }
     }
 

@@ -66,7 +66,11 @@ impl Swap {
         if self.ports.is_empty() {
             return String::new();
         }
-        let names: Vec<&str> = self.ports.iter().map(|&j| self.laws[j].device.as_str()).collect();
+        let names: Vec<&str> = self
+            .ports
+            .iter()
+            .map(|&j| self.laws[j].device.as_str())
+            .collect();
         format!(" (with λ and y exchanged at {})", names.join(", "))
     }
 }
@@ -107,8 +111,16 @@ impl Graph {
         match law {
             Law::Diode { vfwd, ron, roff } => {
                 let g = roff.map_or(0.0, |r| 1.0 / r.f64);
-                let last = if ron.f64 == 0.0 { (0.0, 1.0) } else { (ron.f64, 1.0) };
-                Self { first: (1.0, g), vertices: vec![(vfwd.f64, vfwd.f64 * g)], last }
+                let last = if ron.f64 == 0.0 {
+                    (0.0, 1.0)
+                } else {
+                    (ron.f64, 1.0)
+                };
+                Self {
+                    first: (1.0, g),
+                    vertices: vec![(vfwd.f64, vfwd.f64 * g)],
+                    last,
+                }
             }
             Law::Curve(curve) => Self {
                 first: (curve.first.0.f64, curve.first.1.f64),
@@ -119,20 +131,41 @@ impl Graph {
     }
 
     fn v(&self) -> Interval {
-        let low = if self.first.0 > 0.0 { f64::NEG_INFINITY } else { self.vertices[0].0 };
-        let high = if self.last.0 > 0.0 { f64::INFINITY } else { self.vertices[self.vertices.len() - 1].0 };
+        let low = if self.first.0 > 0.0 {
+            f64::NEG_INFINITY
+        } else {
+            self.vertices[0].0
+        };
+        let high = if self.last.0 > 0.0 {
+            f64::INFINITY
+        } else {
+            self.vertices[self.vertices.len() - 1].0
+        };
         (low, high)
     }
 
     fn i(&self) -> Interval {
-        let low = if self.first.1 > 0.0 { f64::NEG_INFINITY } else { self.vertices[0].1 };
-        let high = if self.last.1 > 0.0 { f64::INFINITY } else { self.vertices[self.vertices.len() - 1].1 };
+        let low = if self.first.1 > 0.0 {
+            f64::NEG_INFINITY
+        } else {
+            self.vertices[0].1
+        };
+        let high = if self.last.1 > 0.0 {
+            f64::INFINITY
+        } else {
+            self.vertices[self.vertices.len() - 1].1
+        };
         (low, high)
     }
 
     /// The pieces as pairs of end points, rays cut far out.
     fn pieces(&self) -> Vec<((f64, f64), (f64, f64))> {
-        let far = 1e3 * self.vertices.iter().map(|p| p.0.abs().max(p.1.abs())).fold(1.0, f64::max);
+        let far = 1e3
+            * self
+                .vertices
+                .iter()
+                .map(|p| p.0.abs().max(p.1.abs()))
+                .fold(1.0, f64::max);
         let unit = |d: (f64, f64)| {
             let size = d.0.abs().max(d.1.abs()).max(f64::MIN_POSITIVE);
             (d.0 / size * far, d.1 / size * far)
@@ -146,7 +179,11 @@ impl Graph {
     }
 
     /// The interval of `value` where `zero` vanishes, over all pieces; `None` if it never does.
-    fn zeros(&self, zero: impl Fn((f64, f64)) -> f64, value: impl Fn((f64, f64)) -> f64) -> Option<Interval> {
+    fn zeros(
+        &self,
+        zero: impl Fn((f64, f64)) -> f64,
+        value: impl Fn((f64, f64)) -> f64,
+    ) -> Option<Interval> {
         let mut found: Option<Interval> = None;
         for (a, b) in self.pieces() {
             let (za, zb) = (zero(a), zero(b));
@@ -169,7 +206,8 @@ impl Graph {
 
 fn port_law(device: &str, role: Role, law: &Law) -> PortLaw {
     let graph = Graph::of(law);
-    let contains_zero = |interval: Option<Interval>| interval.is_some_and(|(low, high)| low <= 0.0 && high >= 0.0);
+    let contains_zero =
+        |interval: Option<Interval>| interval.is_some_and(|(low, high)| low <= 0.0 && high >= 0.0);
     let only_zero = |interval: Option<Interval>| interval == Some((0.0, 0.0));
     let negated = |(low, high): Interval| (-high, -low);
     // Current: λ = i, y = −v. Voltage: λ = −v, y = i. A function block's (input, output) is read as (v, i) with y = v
@@ -177,8 +215,18 @@ fn port_law(device: &str, role: Role, law: &Law) -> PortLaw {
     let i_where_v_vanishes = graph.zeros(|p| p.0, |p| p.1);
     let v_where_i_vanishes = graph.zeros(|p| p.1, |p| p.0);
     let (lambda, y, zero_set, swapped) = match role {
-        Role::Current => (graph.i(), negated(graph.v()), i_where_v_vanishes, v_where_i_vanishes),
-        Role::Voltage => (negated(graph.v()), graph.i(), v_where_i_vanishes, i_where_v_vanishes),
+        Role::Current => (
+            graph.i(),
+            negated(graph.v()),
+            i_where_v_vanishes,
+            v_where_i_vanishes,
+        ),
+        Role::Voltage => (
+            negated(graph.v()),
+            graph.i(),
+            v_where_i_vanishes,
+            i_where_v_vanishes,
+        ),
         Role::Function => (graph.i(), graph.v(), i_where_v_vanishes, v_where_i_vanishes),
     };
     PortLaw {
@@ -201,7 +249,15 @@ impl Facts {
         let mut laws = Vec::with_capacity(m);
         for (j, port) in lcs.ports.iter().enumerate() {
             let mut law = port_law(&port.device, port.role, &port.law);
-            if let (Law::Diode { vfwd, ron, roff: None }, Role::Current | Role::Voltage) = (&port.law, port.role) {
+            if let (
+                Law::Diode {
+                    vfwd,
+                    ron,
+                    roff: None,
+                },
+                Role::Current | Role::Voltage,
+            ) = (&port.law, port.role)
+            {
                 let offset = vfwd.f64;
                 match port.role {
                     // y + vfwd + ron λ ≥ 0 ⟂ λ ≥ 0.
@@ -239,7 +295,9 @@ impl Facts {
             }
         }
         let verdict = passivity::decide(&system, Some(&lcs.energy));
-        let strict = verdict.certificate().map(|c| strict::maximise(&system, &c.p, c.from));
+        let strict = verdict
+            .certificate()
+            .map(|c| strict::maximise(&system, &c.p, c.from));
         let g_driven = lcs.g.select_columns(&columns);
         let mut facts = Self {
             e_driven: lcs.e.select_columns(&columns),
@@ -291,8 +349,10 @@ impl Facts {
     pub(super) fn storage(&self, swap: &Swap, ports: &[usize]) -> Option<DMatrix<f64>> {
         let b = swap.system.b.select_columns(ports);
         let c = swap.system.c.select_rows(ports);
-        gradient::storage(&b, &c, Some(&self.energy))
-            .or_else(|| self.certificate().and_then(|p| gradient::storage(&b, &c, Some(&p.p))))
+        gradient::storage(&b, &c, Some(&self.energy)).or_else(|| {
+            self.certificate()
+                .and_then(|p| gradient::storage(&b, &c, Some(&p.p)))
+        })
     }
 
     fn all_swaps(&self) -> Vec<Swap> {
@@ -300,11 +360,18 @@ impl Facts {
         let sets: Vec<Vec<usize>> = if m <= ALL_SWAPS {
             let mut masks: Vec<usize> = (0..1_usize << m).collect();
             masks.sort_by_key(|mask| mask.count_ones());
-            masks.iter().map(|mask| (0..m).filter(|j| mask >> j & 1 == 1).collect()).collect()
+            masks
+                .iter()
+                .map(|mask| (0..m).filter(|j| mask >> j & 1 == 1).collect())
+                .collect()
         } else {
-            std::iter::once(Vec::new()).chain((0..m).map(|j| vec![j])).collect()
+            std::iter::once(Vec::new())
+                .chain((0..m).map(|j| vec![j]))
+                .collect()
         };
-        sets.into_iter().filter_map(|ports| self.swap(ports)).collect()
+        sets.into_iter()
+            .filter_map(|ports| self.swap(ports))
+            .collect()
     }
 
     /// Exchanges λ and y at some ports.

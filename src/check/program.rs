@@ -2,8 +2,8 @@
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
-    DefaultSettings, DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus, SupportedConeT,
-    ZeroConeT,
+    DefaultSettings, DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT,
+    SolverStatus, SupportedConeT, ZeroConeT,
 };
 use nalgebra::{DMatrix, DVector};
 
@@ -24,8 +24,15 @@ pub fn minimise(
     equalities: usize,
 ) -> Option<DVector<f64>> {
     let rows = a.nrows();
-    let upper = DMatrix::from_fn(p.nrows(), p.ncols(), |i, j| if i <= j { 0.5 * (p[(i, j)] + p[(j, i)]) } else { 0.0 });
-    let cones: Vec<SupportedConeT<f64>> = vec![ZeroConeT(equalities), NonnegativeConeT(rows - equalities)];
+    let upper = DMatrix::from_fn(p.nrows(), p.ncols(), |i, j| {
+        if i <= j {
+            0.5 * (p[(i, j)] + p[(j, i)])
+        } else {
+            0.0
+        }
+    });
+    let cones: Vec<SupportedConeT<f64>> =
+        vec![ZeroConeT(equalities), NonnegativeConeT(rows - equalities)];
     let settings: DefaultSettings<f64> = DefaultSettingsBuilder::default()
         .verbose(false)
         .tol_feas(ACCURACY)
@@ -33,8 +40,15 @@ pub fn minimise(
         .tol_gap_rel(ACCURACY)
         .build()
         .ok()?;
-    let mut solver =
-        DefaultSolver::new(&sparse(&upper), q.as_slice(), &sparse(&-a), b.as_slice(), &cones, settings).ok()?;
+    let mut solver = DefaultSolver::new(
+        &sparse(&upper),
+        q.as_slice(),
+        &sparse(&-a),
+        b.as_slice(),
+        &cones,
+        settings,
+    )
+    .ok()?;
     solver.solve();
     match solver.solution.status {
         SolverStatus::Solved | SolverStatus::AlmostSolved => {
@@ -106,7 +120,8 @@ impl Inequalities {
         for i in 0..rows {
             let size = self.g.row(i).amax().max(self.h[i].abs());
             let f = if size > 0.0 { 1.0 / size } else { 1.0 };
-            a.view_mut((i, 0), (1, variables)).copy_from(&(self.g.row(i) * f));
+            a.view_mut((i, 0), (1, variables))
+                .copy_from(&(self.g.row(i) * f));
             a[(i, variables)] = if self.strict[i] { -1.0 } else { 0.0 };
             b[i] = self.h[i] * f;
         }
@@ -116,7 +131,10 @@ impl Inequalities {
         q[variables] = -1.0;
         let p = DMatrix::zeros(variables + 1, variables + 1);
         let x = minimise(&p, &q, &a, &b, 0)?;
-        Some(Point { slack: x[variables], z: x.rows(0, variables).into_owned() })
+        Some(Point {
+            slack: x[variables],
+            z: x.rows(0, variables).into_owned(),
+        })
     }
 }
 
@@ -132,7 +150,11 @@ mod tests {
             strict: vec![true, true],
         };
         assert!(halfplanes(1.0).widest().is_some_and(|p| p.is_strict()));
-        assert!(halfplanes(0.0).widest().is_some_and(|p| p.is_feasible() && !p.is_strict()));
+        assert!(
+            halfplanes(0.0)
+                .widest()
+                .is_some_and(|p| p.is_feasible() && !p.is_strict())
+        );
         assert!(halfplanes(-1.0).widest().is_some_and(|p| !p.is_feasible()));
     }
 }

@@ -54,7 +54,12 @@ impl Hypotheses {
             .filter(|(h, _)| *h == holds || holds.is_none() && h.is_none())
             .map(|(_, text)| text.as_str())
             .collect();
-        Theorem { statement: statement.into(), holds, because: texts.join("; "), gives: gives.into() }
+        Theorem {
+            statement: statement.into(),
+            holds,
+            because: texts.join("; "),
+            gives: gives.into(),
+        }
     }
 }
 
@@ -87,25 +92,43 @@ pub(super) fn all(facts: &Facts) -> Vec<Theorem> {
             p_matrix(facts),
             leading_markov(facts),
         ]);
-        let well_posed = [0, 1, 2, 3].iter().any(|&k: &usize| list[k].holds == Some(true));
+        let well_posed = [0, 1, 2, 3]
+            .iter()
+            .any(|&k: &usize| list[k].holds == Some(true));
         list.push(order(facts, well_posed));
     }
-    list.extend([stability(facts), lipschitz(facts), invariance(facts), dissipation(facts)]);
+    list.extend([
+        stability(facts),
+        lipschitz(facts),
+        invariance(facts),
+        dissipation(facts),
+    ]);
     list
 }
 
 fn linear() -> Theorem {
     Hypotheses::default()
         .need(true, "no devices: x' = Ax + Eu + e is linear")
-        .theorem("Linear system (no devices)", "unique solution for every initial state and every integrable source")
+        .theorem(
+            "Linear system (no devices)",
+            "unique solution for every initial state and every integrable source",
+        )
 }
 
 fn half_lines(swap: &Swap, h: &mut Hypotheses) {
-    let other: Vec<&str> = swap.laws.iter().filter(|l| !l.half_line).map(|l| l.device.as_str()).collect();
+    let other: Vec<&str> = swap
+        .laws
+        .iter()
+        .filter(|l| !l.half_line)
+        .map(|l| l.device.as_str())
+        .collect();
     if other.is_empty() {
         h.need(true, "all devices are complementary pairs 0 ≤ λ ⟂ y ≥ 0");
     } else {
-        h.need(false, format!("not a complementary pair: {}", other.join(", ")));
+        h.need(
+            false,
+            format!("not a complementary pair: {}", other.join(", ")),
+        );
     }
 }
 
@@ -135,36 +158,70 @@ fn input_output(facts: &Facts, swap: &Swap, ports: &[usize], h: &mut Hypotheses)
 fn nonempty(facts: &Facts, swap: &Swap, ports: &[usize], h: &mut Hypotheses) {
     let c = swap.system.c.select_rows(ports);
     let all = vec![true; ports.len()];
-    let qualified = Inequalities { g: c.clone(), h: DVector::zeros(ports.len()), strict: all.clone() }.widest();
+    let qualified = Inequalities {
+        g: c.clone(),
+        h: DVector::zeros(ports.len()),
+        strict: all.clone(),
+    }
+    .widest();
     if let Some(point) = qualified.filter(|p| p.is_strict()) {
-        h.need(true, format!("S(t) is never empty: (22) holds, some x has Cx > 0 (slack {:.2})", point.slack));
+        h.need(
+            true,
+            format!(
+                "S(t) is never empty: (22) holds, some x has Cx > 0 (slack {:.2})",
+                point.slack
+            ),
+        );
         return;
     }
     let f = swap.f.select_rows(ports);
     let g = swap.g.select_rows(ports);
-    let moving: Vec<usize> = (0..g.ncols()).filter(|&k| g.column(k).amax() > 0.0).collect();
+    let moving: Vec<usize> = (0..g.ncols())
+        .filter(|&k| g.column(k).amax() > 0.0)
+        .collect();
     if moving.len() >= usize::BITS as usize || 1_usize << moving.len() > MAX_CORNERS {
-        h.need(None, "(22) fails, and there are too many sources to check that S(t) is never empty");
+        h.need(
+            None,
+            "(22) fails, and there are too many sources to check that S(t) is never empty",
+        );
         return;
     }
     for corner in 0..1_usize << moving.len() {
         let mut offset = f.clone();
         for (bit, &k) in moving.iter().enumerate() {
             let excitation = facts.driven[k].1;
-            let value = if corner >> bit & 1 == 1 { excitation.high } else { excitation.low };
+            let value = if corner >> bit & 1 == 1 {
+                excitation.high
+            } else {
+                excitation.low
+            };
             if !value.is_finite() {
-                h.need(None, format!("(22) fails and {} is unbounded", facts.driven[k].0));
+                h.need(
+                    None,
+                    format!("(22) fails and {} is unbounded", facts.driven[k].0),
+                );
                 return;
             }
             offset += g.column(k) * value;
         }
-        let point = Inequalities { g: c.clone(), h: offset, strict: all.clone() }.widest();
+        let point = Inequalities {
+            g: c.clone(),
+            h: offset,
+            strict: all.clone(),
+        }
+        .widest();
         if !point.is_some_and(|p| p.is_feasible()) {
-            h.need(false, "(22) fails and S(t) is empty for some values of the sources");
+            h.need(
+                false,
+                "(22) fails and S(t) is empty for some values of the sources",
+            );
             return;
         }
     }
-    h.need(true, "S(t) is nonempty at every corner of the range of the sources (though (22) fails)");
+    h.need(
+        true,
+        "S(t) is nonempty at every corner of the range of the sources (though (22) fails)",
+    );
 }
 
 fn regularity(facts: &Facts, h: &mut Hypotheses) -> &'static str {
@@ -173,7 +230,13 @@ fn regularity(facts: &Facts, h: &mut Hypotheses) -> &'static str {
         h.need(true, "Gu is locally absolutely continuous");
         "a unique locally absolutely continuous solution; its state jumps only at t = 0 from an inadmissible start"
     } else {
-        h.need(true, format!("Gu is right-continuous of bounded variation (edges of {})", edges.join(", ")));
+        h.need(
+            true,
+            format!(
+                "Gu is right-continuous of bounded variation (edges of {})",
+                edges.join(", ")
+            ),
+        );
         "a unique right-continuous solution of bounded variation; at a jump x⁺ is the projection of x⁻ in the metric P"
     }
 }
@@ -188,7 +251,14 @@ fn sweeping(facts: &Facts) -> Theorem {
     over_swaps(facts, |swap, h| {
         half_lines(swap, h);
         let zero = swap.system.d.amax() <= ZERO * (1.0 + swap.system.b.amax().min(1.0));
-        h.need(zero, if zero { "D = 0".into() } else { format!("D ≠ 0 (largest entry {:.2e})", swap.system.d.amax()) });
+        h.need(
+            zero,
+            if zero {
+                "D = 0".into()
+            } else {
+                format!("D ≠ 0 (largest entry {:.2e})", swap.system.d.amax())
+            },
+        );
         if zero {
             input_output(facts, swap, &everything(swap), h);
             nonempty(facts, swap, &everything(swap), h);
@@ -213,17 +283,31 @@ fn block_sweeping(facts: &Facts) -> Theorem {
         let d1 = swap.system.d.select_rows(&fed).select_columns(&fed);
         let class = Feedthrough::of(&d1);
         h.need(
-            if fed.is_empty() { Some(false) } else { class.p_matrix },
+            if fed.is_empty() {
+                Some(false)
+            } else {
+                class.p_matrix
+            },
             match class.p_matrix {
                 _ if fed.is_empty() => "D = 0: this is Theorem 3.5".into(),
-                Some(true) => format!("D = diag(D₁, 0) with D₁ ({0}×{0}) a P-matrix{1}", fed.len(), swap.note()),
+                Some(true) => format!(
+                    "D = diag(D₁, 0) with D₁ ({0}×{0}) a P-matrix{1}",
+                    fed.len(),
+                    swap.note()
+                ),
                 Some(false) => format!("D₁ ({0}×{0}) is not a P-matrix", fed.len()),
-                None => format!("whether D₁ ({0}×{0}) is a P-matrix is not decided", fed.len()),
+                None => format!(
+                    "whether D₁ ({0}×{0}) is a P-matrix is not decided",
+                    fed.len()
+                ),
             },
         );
         if class.p_matrix == Some(true) && !fed.is_empty() {
             if free.is_empty() {
-                h.need(true, "no port without feedthrough: the system is a Lipschitz differential equation");
+                h.need(
+                    true,
+                    "no port without feedthrough: the system is a Lipschitz differential equation",
+                );
             } else {
                 input_output(facts, swap, &free, h);
                 nonempty(facts, swap, &free, h);
@@ -240,16 +324,27 @@ fn undriven_output(facts: &Facts, h: &mut Hypotheses) {
             .filter(|&k| facts.g_driven.column(k).amax() > 0.0)
             .map(|k| facts.driven[k].0.as_str())
             .collect();
-        h.need(false, format!("y depends on time through {}", names.join(", ")));
+        h.need(
+            false,
+            format!("y depends on time through {}", names.join(", ")),
+        );
     } else {
         h.need(true, "y does not depend explicitly on time");
     }
 }
 
 fn continuous_forcing(facts: &Facts, h: &mut Hypotheses) {
-    let edges: Vec<&str> = facts.driven.iter().filter(|(_, x)| x.jumps).map(|(n, _)| n.as_str()).collect();
+    let edges: Vec<&str> = facts
+        .driven
+        .iter()
+        .filter(|(_, x)| x.jumps)
+        .map(|(n, _)| n.as_str())
+        .collect();
     if edges.is_empty() {
-        h.need(true, "f = Eu is continuous with locally integrable derivative");
+        h.need(
+            true,
+            "f = Eu is continuous with locally integrable derivative",
+        );
     } else {
         h.need(false, format!("f = Eu jumps ({})", edges.join(", ")));
     }
@@ -257,21 +352,38 @@ fn continuous_forcing(facts: &Facts, h: &mut Hypotheses) {
 
 /// Assumption 1: every φ_j^{*,−} is continuous somewhere, i.e. λ_j ranges over an interval.
 fn assumption_1(swap: &Swap, h: &mut Hypotheses) {
-    let points: Vec<&str> =
-        swap.laws.iter().filter(|l| l.lambda.0 >= l.lambda.1).map(|l| l.device.as_str()).collect();
+    let points: Vec<&str> = swap
+        .laws
+        .iter()
+        .filter(|l| l.lambda.0 >= l.lambda.1)
+        .map(|l| l.device.as_str())
+        .collect();
     if points.is_empty() {
-        h.need(true, "Assumption 1: every conjugate is finite on an interval");
+        h.need(
+            true,
+            "Assumption 1: every conjugate is finite on an interval",
+        );
     } else {
-        h.need(false, format!("Assumption 1 fails at {}", points.join(", ")));
+        h.need(
+            false,
+            format!("Assumption 1 fails at {}", points.join(", ")),
+        );
     }
 }
 
 /// Largest angle by which range(inner) leaves range(outer): ‖(I − QQᵀ)inner‖ relative to ‖inner‖, column-scaled.
 fn leaves(inner: &DMatrix<f64>, outer: &DMatrix<f64>) -> f64 {
     let unit = |m: &DMatrix<f64>| {
-        let columns: Vec<DVector<f64>> =
-            m.column_iter().filter(|c| c.amax() > 0.0).map(|c| c.normalize()).collect();
-        if columns.is_empty() { DMatrix::zeros(m.nrows(), 0) } else { DMatrix::from_columns(&columns) }
+        let columns: Vec<DVector<f64>> = m
+            .column_iter()
+            .filter(|c| c.amax() > 0.0)
+            .map(|c| c.normalize())
+            .collect();
+        if columns.is_empty() {
+            DMatrix::zeros(m.nrows(), 0)
+        } else {
+            DMatrix::from_columns(&columns)
+        }
     };
     let (inner, outer) = (unit(inner), unit(outer));
     if inner.ncols() == 0 {
@@ -283,9 +395,14 @@ fn leaves(inner: &DMatrix<f64>, outer: &DMatrix<f64>) -> f64 {
     let svd = outer.clone().svd(true, false);
     let Some(u) = svd.u else { return 1.0 };
     let top = svd.singular_values.max();
-    let basis: Vec<usize> = (0..svd.singular_values.len()).filter(|&k| svd.singular_values[k] > ZERO * top).collect();
+    let basis: Vec<usize> = (0..svd.singular_values.len())
+        .filter(|&k| svd.singular_values[k] > ZERO * top)
+        .collect();
     let q = u.select_columns(&basis);
-    (&inner - &q * (q.transpose() * &inner)).column_iter().map(|c| c.norm()).fold(0.0, f64::max)
+    (&inner - &q * (q.transpose() * &inner))
+        .column_iter()
+        .map(|c| c.norm())
+        .fold(0.0, f64::max)
 }
 
 /// An orthonormal basis of ker(D + Dᵀ).
@@ -295,8 +412,9 @@ fn lossless(d: &DMatrix<f64>) -> DMatrix<f64> {
     }
     let eigen = (d + d.transpose()).symmetric_eigen();
     let size = d.amax();
-    let kernel: Vec<usize> =
-        (0..d.nrows()).filter(|&k| eigen.eigenvalues[k].abs() <= ZERO * size).collect();
+    let kernel: Vec<usize> = (0..d.nrows())
+        .filter(|&k| eigen.eigenvalues[k].abs() <= ZERO * size)
+        .collect();
     eigen.eigenvectors.select_columns(&kernel)
 }
 
@@ -310,12 +428,22 @@ fn assumption_4(swap: &Swap, fed: &[usize], h: &mut Hypotheses) {
         return;
     }
     if cones && class.p_matrix == Some(true) {
-        h.need(true, format!("Proposition 2: D_II is a P-matrix and λ, y are complementary{}", swap.note()));
+        h.need(
+            true,
+            format!(
+                "Proposition 2: D_II is a P-matrix and λ, y are complementary{}",
+                swap.note()
+            ),
+        );
         return;
     }
     if !class.psd {
         h.need(
-            if cones && class.p_matrix.is_none() { None } else { Some(false) },
+            if cones && class.p_matrix.is_none() {
+                None
+            } else {
+                Some(false)
+            },
             "Assumption 4: D_II is neither positive semidefinite nor known to be a P-matrix",
         );
         return;
@@ -331,7 +459,13 @@ fn assumption_4(swap: &Swap, fed: &[usize], h: &mut Hypotheses) {
         g.view_mut((2 * fed.len(), 0), sum.shape()).copy_from(&sum);
         let mut strict = vec![false; rows];
         strict[2 * fed.len()] = true;
-        Inequalities { g, h: DVector::zeros(rows), strict }.widest().is_some_and(|p| p.is_strict())
+        Inequalities {
+            g,
+            h: DVector::zeros(rows),
+            strict,
+        }
+        .widest()
+        .is_some_and(|p| p.is_strict())
     };
     let c = swap.system.c.select_rows(fed);
     let b = swap.system.b.select_columns(fed);
@@ -340,9 +474,19 @@ fn assumption_4(swap: &Swap, fed: &[usize], h: &mut Hypotheses) {
     let size = b.amax().max(f64::MIN_POSITIVE);
     let kernel = (&b * &n).amax() / size;
     if !cones {
-        h.need(None, "Proposition 3: (20) is checked for complementary pairs only");
+        h.need(
+            None,
+            "Proposition 3: (20) is checked for complementary pairs only",
+        );
     }
-    h.need(!unbounded, if unbounded { "Proposition 3: (20) fails" } else { "Proposition 3: D_II ⪰ 0 and (20)" });
+    h.need(
+        !unbounded,
+        if unbounded {
+            "Proposition 3: (20) fails"
+        } else {
+            "Proposition 3: D_II ⪰ 0 and (20)"
+        },
+    );
     h.need(
         range <= ZERO.sqrt() && kernel <= ZERO.sqrt(),
         format!("(21) R(C_II) ⊂ R(D_II + D_IIᵀ) ⊂ ker(B_II)⊥ up to {range:.1e} and {kernel:.1e}"),
@@ -373,15 +517,30 @@ fn kato(facts: &Facts) -> Theorem {
 /// Assumption 3: some x has C_I x + F in the interior of dom Φ_I.
 fn slater(swap: &Swap, free: &[usize], h: &mut Hypotheses) {
     let c = swap.system.c.select_rows(free);
-    let point = interior(&c, &DMatrix::zeros(free.len(), 0), &swap.f.select_rows(free), swap, free);
+    let point = interior(
+        &c,
+        &DMatrix::zeros(free.len(), 0),
+        &swap.f.select_rows(free),
+        swap,
+        free,
+    );
     match point {
-        Some(slack) => h.need(true, format!("Assumption 3: Cx is interior to dom Φ for some x (slack {slack:.2})")),
+        Some(slack) => h.need(
+            true,
+            format!("Assumption 3: Cx is interior to dom Φ for some x (slack {slack:.2})"),
+        ),
         None => h.need(false, "Assumption 3: no x has Cx in the interior of dom Φ"),
     };
 }
 
 /// The slack with which y = Cx + Dλ + F lies inside dom Φ for some x and some λ in the closure of dom Φ^{*,−}.
-fn interior(c: &DMatrix<f64>, d: &DMatrix<f64>, f: &DVector<f64>, swap: &Swap, ports: &[usize]) -> Option<f64> {
+fn interior(
+    c: &DMatrix<f64>,
+    d: &DMatrix<f64>,
+    f: &DVector<f64>,
+    swap: &Swap,
+    ports: &[usize],
+) -> Option<f64> {
     let (n, m) = (c.ncols(), d.ncols());
     let (mut rows, mut offsets, mut strict) = (Vec::new(), Vec::new(), Vec::new());
     for (k, &j) in ports.iter().enumerate() {
@@ -418,7 +577,12 @@ fn interior(c: &DMatrix<f64>, d: &DMatrix<f64>, f: &DVector<f64>, swap: &Swap, p
         return Some(1.0);
     }
     let g = DMatrix::from_columns(&rows).transpose();
-    let point = Inequalities { g, h: DVector::from_vec(offsets), strict }.widest()?;
+    let point = Inequalities {
+        g,
+        h: DVector::from_vec(offsets),
+        strict,
+    }
+    .widest()?;
     point.is_strict().then_some(point.slack)
 }
 
@@ -457,7 +621,11 @@ fn inputs(facts: &Facts) -> Theorem {
             row /= size;
         }
     }
-    let values = if bn.is_empty() { DVector::zeros(0) } else { bn.clone().singular_values() };
+    let values = if bn.is_empty() {
+        DVector::zeros(0)
+    } else {
+        bn.clone().singular_values()
+    };
     let rank = values.iter().filter(|&&s| s > ZERO * values.max()).count();
     let full = rank == n.ncols();
     h.need(
@@ -465,10 +633,16 @@ fn inputs(facts: &Facts) -> Theorem {
         if full {
             "[B; D + Dᵀ] has full column rank".into()
         } else {
-            format!("[B; D + Dᵀ] lacks {} of full column rank: λ is not unique", n.ncols() - rank)
+            format!(
+                "[B; D + Dᵀ] lacks {} of full column rank: λ is not unique",
+                n.ncols() - rank
+            )
         },
     );
-    h.need(true, "the sources are piecewise sums of polynomials, exponentials and sinusoids");
+    h.need(
+        true,
+        "the sources are piecewise sums of polynomials, exponentials and sinusoids",
+    );
     h.theorem(
         "Camlibel-Heemels-Schumacher 2002 Theorem 7.5 (passive systems with inputs)",
         "a unique solution (x, λ, y) for every initial state and input; impulses only at t = 0 and at edges of the sources",
@@ -523,8 +697,22 @@ fn leading_markov(facts: &Facts) -> Theorem {
 fn order(facts: &Facts, well_posed: bool) -> Theorem {
     let mut h = Hypotheses::default();
     let cones = facts.laws.iter().all(|l| l.half_line);
-    h.need(well_posed, if well_posed { "the system is well posed by one of the above" } else { "none of the above applies" });
-    h.need(true, if cones { "all φ are indicator functions" } else { "some φ is not an indicator function" });
+    h.need(
+        well_posed,
+        if well_posed {
+            "the system is well posed by one of the above"
+        } else {
+            "none of the above applies"
+        },
+    );
+    h.need(
+        true,
+        if cones {
+            "all φ are indicator functions"
+        } else {
+            "some φ is not an indicator function"
+        },
+    );
     h.theorem(
         "RR-7158 Remark 7",
         if cones {
@@ -539,9 +727,16 @@ fn passive(facts: &Facts, h: &mut Hypotheses) {
     match facts.certificate() {
         Some(c) => h.need(
             true,
-            format!("passive: (45) with P from the {}, eigenvalue {:.1e}", c.from.name(), c.residuals.lmi_max_eigenvalue),
+            format!(
+                "passive: (45) with P from the {}, eigenvalue {:.1e}",
+                c.from.name(),
+                c.residuals.lmi_max_eigenvalue
+            ),
         ),
-        None => h.need(facts.verdict.answer(), "not passive, or not decided (see above)"),
+        None => h.need(
+            facts.verdict.answer(),
+            "not passive, or not decided (see above)",
+        ),
     };
 }
 
@@ -551,11 +746,18 @@ fn rests_at_zero(facts: &Facts, h: &mut Hypotheses) {
         h.need(true, "autonomous");
     } else {
         let names: Vec<&str> = facts.driven.iter().map(|(n, _)| n.as_str()).collect();
-        h.need(false, format!("not autonomous: driven by {}", names.join(", ")));
+        h.need(
+            false,
+            format!("not autonomous: driven by {}", names.join(", ")),
+        );
     }
     let rests = facts.e.amax() == 0.0
         && facts.laws.iter().zip(facts.f.iter()).all(|(law, &f)| {
-            if law.half_line { f >= 0.0 } else { law.through_origin && f == 0.0 }
+            if law.half_line {
+                f >= 0.0
+            } else {
+                law.through_origin && f == 0.0
+            }
         });
     h.need(
         rests,
@@ -574,7 +776,13 @@ fn stability(facts: &Facts) -> Theorem {
     passive(facts, &mut h);
     let gives = match &facts.strict {
         Some(s) if s.decay_rate > 0.0 => {
-            h.need(true, format!("strictly passive: (46) with ε/2 = {:.6e} 1/s (limit {:.6e})", s.decay_rate, s.limit));
+            h.need(
+                true,
+                format!(
+                    "strictly passive: (46) with ε/2 = {:.6e} 1/s (limit {:.6e})",
+                    s.decay_rate, s.limit
+                ),
+            );
             format!("‖x(t)‖ ≤ {:.4}·‖x₀‖·exp(−{:.6e} t)", s.bound, s.decay_rate)
         }
         Some(s) => format!("‖x(t)‖ ≤ {:.4}·‖x₀‖", s.bound),
@@ -590,7 +798,12 @@ fn lipschitz(facts: &Facts) -> Theorem {
     passive(facts, &mut h);
     let gives = facts.certificate().map_or_else(
         || "Lipschitz dependence on the initial state".into(),
-        |c| format!("‖x₁(t) − x₂(t)‖ ≤ {:.4}·‖x₁(0) − x₂(0)‖", strict::overshoot(&c.p)),
+        |c| {
+            format!(
+                "‖x₁(t) − x₂(t)‖ ≤ {:.4}·‖x₁(0) − x₂(0)‖",
+                strict::overshoot(&c.p)
+            )
+        },
     );
     h.theorem("RR-7158 Theorem 4", gives)
 }
@@ -601,7 +814,13 @@ fn invariance(facts: &Facts) -> Theorem {
     rests_at_zero(facts, &mut h);
     passive(facts, &mut h);
     let strictly = |swap: &Swap| {
-        swap.laws.iter().zip(swap.f.iter()).all(|(law, &f)| if law.half_line { f > 0.0 } else { law.strictly && f == 0.0 })
+        swap.laws.iter().zip(swap.f.iter()).all(|(law, &f)| {
+            if law.half_line {
+                f > 0.0
+            } else {
+                law.strictly && f == 0.0
+            }
+        })
     };
     let found = facts.swaps.iter().find(|swap| strictly(swap));
     match found {
@@ -637,11 +856,18 @@ fn dissipation(facts: &Facts) -> Theorem {
             let dimension = kernel_dimension(&q, &size);
             format!(
                 "along limit solutions (x, λ) stays in ker Q(P), of dimension {dimension}: no energy is dissipated there{}",
-                if dimension == 0 { ", so every orbit tends to 0" } else { "" }
+                if dimension == 0 {
+                    ", so every orbit tends to 0"
+                } else {
+                    ""
+                }
             )
         }
     };
-    h.theorem("Dissipation argument (LaSalle, any Φ^{*,−} ≥ Φ^{*,−}(0))", gives)
+    h.theorem(
+        "Dissipation argument (LaSalle, any Φ^{*,−} ≥ Φ^{*,−}(0))",
+        gives,
+    )
 }
 
 /// Dimension of the kernel of a symmetric matrix, relative to the sizes of its terms.
@@ -655,5 +881,8 @@ fn kernel_dimension(q: &DMatrix<f64>, size: &DMatrix<f64>) -> usize {
     });
     let unit = DMatrix::from_fn(q.nrows(), q.ncols(), |i, j| d[i] * q[(i, j)] * d[j]);
     let values = unit.symmetric_eigenvalues();
-    values.iter().filter(|v| v.abs() <= ZERO * values.amax().max(1.0)).count()
+    values
+        .iter()
+        .filter(|v| v.abs() <= ZERO * values.amax().max(1.0))
+        .count()
 }

@@ -111,8 +111,16 @@ pub fn maximise(face: &Face) -> Outcome {
     let (q, n) = (f0.nrows(), p0.nrows());
     let rho = RADIUS * p0.amax().max(1.0) * n.max(1) as f64;
     let blocks = [
-        Block { constant: f0, linear: f, t: -1.0 },
-        Block { constant: p0.clone(), linear: basis.to_vec(), t: -1.0 },
+        Block {
+            constant: f0,
+            linear: f,
+            t: -1.0,
+        },
+        Block {
+            constant: p0.clone(),
+            linear: basis.to_vec(),
+            t: -1.0,
+        },
         Block {
             constant: DMatrix::identity(n, n) * rho - p0,
             linear: basis.iter().map(|e| -e).collect(),
@@ -124,7 +132,10 @@ pub fn maximise(face: &Face) -> Outcome {
     while blocks.iter().any(|b| b.factor(&z, t).is_none()) {
         t *= 4.0;
         if t < -1e30 {
-            return Outcome::Stalled { z, reason: "the barrier found no starting point" };
+            return Outcome::Stalled {
+                z,
+                reason: "the barrier found no starting point",
+            };
         }
     }
     let weight = (q + 2 * n + 1) as f64;
@@ -157,8 +168,15 @@ fn judge(blocks: &[Block; 3], z: DVector<f64>, t: f64, mu: f64, weight: f64) -> 
         return Outcome::Infeasible { z, margin: t };
     }
     match blocks[0].factor(&z, t) {
-        Some(factor) => Outcome::Boundary { dual: factor.inverse() * mu, z, margin: t },
-        None => Outcome::Stalled { z, reason: "the barrier lost its interior point" },
+        Some(factor) => Outcome::Boundary {
+            dual: factor.inverse() * mu,
+            z,
+            margin: t,
+        },
+        None => Outcome::Stalled {
+            z,
+            reason: "the barrier lost its interior point",
+        },
     }
 }
 
@@ -172,7 +190,9 @@ fn centre(blocks: &[Block; 3], z: &mut DVector<f64>, t: &mut f64, mu: f64) -> bo
             if block.constant.is_empty() {
                 continue;
             }
-            let Some(factor) = block.factor(z, *t) else { return false };
+            let Some(factor) = block.factor(z, *t) else {
+                return false;
+            };
             let inverse = factor.inverse();
             // Columns vec(L⁻¹SₖL⁻ᵀ): the Hessian is their Gram matrix.
             let lower = factor.l();
@@ -189,21 +209,31 @@ fn centre(blocks: &[Block; 3], z: &mut DVector<f64>, t: &mut f64, mu: f64) -> bo
             }
             if block.t != 0.0 {
                 gradient[unknowns] -= block.t * inverse.trace();
-                let Some(white) = whiten(&(DMatrix::identity(inverse.nrows(), inverse.nrows()) * block.t)) else {
+                let Some(white) =
+                    whiten(&(DMatrix::identity(inverse.nrows(), inverse.nrows()) * block.t))
+                else {
                     return false;
                 };
-                columns.column_mut(unknowns).copy_from_slice(white.as_slice());
+                columns
+                    .column_mut(unknowns)
+                    .copy_from_slice(white.as_slice());
             }
             hessian += columns.tr_mul(&columns);
         }
         gradient[unknowns] += 1.0 / (1.0 - *t) - 1.0 / mu;
         hessian[(unknowns, unknowns)] += (1.0 - *t).powi(-2);
-        let Some(step) = solve(&hessian, &-&gradient) else { return false };
+        let Some(step) = solve(&hessian, &-&gradient) else {
+            return false;
+        };
         let decrement = (-gradient.dot(&step)).max(0.0).sqrt();
         if !decrement.is_finite() {
             return false;
         }
-        let mut length = if decrement > 0.25 { 1.0 / (1.0 + decrement) } else { 1.0 };
+        let mut length = if decrement > 0.25 {
+            1.0 / (1.0 + decrement)
+        } else {
+            1.0
+        };
         loop {
             let next = &*z + step.rows(0, unknowns) * length;
             let t_next = *t + step[unknowns] * length;
@@ -225,14 +255,20 @@ fn centre(blocks: &[Block; 3], z: &mut DVector<f64>, t: &mut f64, mu: f64) -> bo
 
 /// Solves Hx = r for H ⪰ 0 after scaling to unit diagonal, with the least ridge that makes it definite.
 fn solve(h: &DMatrix<f64>, r: &DVector<f64>) -> Option<DVector<f64>> {
-    let d = h.diagonal().map(|v| if v > 0.0 { 1.0 / v.sqrt() } else { 1.0 });
+    let d = h
+        .diagonal()
+        .map(|v| if v > 0.0 { 1.0 / v.sqrt() } else { 1.0 });
     let mut unit = DMatrix::from_fn(h.nrows(), h.ncols(), |i, j| d[i] * h[(i, j)] * d[j]);
     let mut ridge = 0.0;
     for _ in 0..6 {
         if let Some(factor) = unit.clone().cholesky() {
             return Some(factor.solve(&r.component_mul(&d)).component_mul(&d));
         }
-        let next = if ridge == 0.0 { f64::EPSILON } else { ridge * 100.0 };
+        let next = if ridge == 0.0 {
+            f64::EPSILON
+        } else {
+            ridge * 100.0
+        };
         for i in 0..unit.nrows() {
             unit[(i, i)] += next - ridge;
         }

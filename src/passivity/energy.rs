@@ -9,5 +9,9 @@ use super::{Certificate, Origin, System, verify};
 #[must_use]
 pub fn certificate(system: &System, p: &DMatrix<f64>) -> Option<Certificate> {
     let residuals = verify::check(system, p).ok()?;
-    Some(Certificate { p: p.clone(), from: Origin::StoredEnergy, residuals })
+    Some(Certificate {
+        p: p.clone(),
+        from: Origin::StoredEnergy,
+        residuals,
+    })
 }

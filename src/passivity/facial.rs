@@ -60,14 +60,24 @@ impl Face {
         let (n, m) = (system.n(), system.m());
         let (values, vectors) = scale::eigen(&(&system.d + system.d.transpose()));
         let size = system.d.amax().max(f64::MIN_POSITIVE);
-        let kernel: Vec<usize> = (0..m).filter(|&i| values[i].abs() <= scale::RANK * size).collect();
-        let rest: Vec<usize> = (0..m).filter(|&i| values[i].abs() > scale::RANK * size).collect();
+        let kernel: Vec<usize> = (0..m)
+            .filter(|&i| values[i].abs() <= scale::RANK * size)
+            .collect();
+        let rest: Vec<usize> = (0..m)
+            .filter(|&i| values[i].abs() > scale::RANK * size)
+            .collect();
         let null = vectors.select_columns(&kernel);
         let (p0, u2) = equalities(&(&system.b * &null), &(system.c.transpose() * &null), &null)?;
         let mut w = DMatrix::zeros(n + m, n + rest.len());
         w.view_mut((0, 0), (n, n)).fill_with_identity();
-        w.view_mut((n, n), (m, rest.len())).copy_from(&vectors.select_columns(&rest));
-        Ok(Self { system: system.clone(), p0, basis: symmetric_basis(&u2), w })
+        w.view_mut((n, n), (m, rest.len()))
+            .copy_from(&vectors.select_columns(&rest));
+        Ok(Self {
+            system: system.clone(),
+            p0,
+            basis: symmetric_basis(&u2),
+            w,
+        })
     }
 
     /// Number of free unknowns z.
@@ -79,7 +89,10 @@ impl Face {
     /// P(z) = P₀ + Σ zₖEₖ.
     #[must_use]
     pub fn p(&self, z: &DVector<f64>) -> DMatrix<f64> {
-        self.basis.iter().zip(z.iter()).fold(self.p0.clone(), |p, (e, &z)| p + e * z)
+        self.basis
+            .iter()
+            .zip(z.iter())
+            .fold(self.p0.clone(), |p, (e, &z)| p + e * z)
     }
 
     /// The constant and linear parts of P.
@@ -91,7 +104,10 @@ impl Face {
     pub(super) fn f_parts(&self) -> (DMatrix<f64>, Vec<DMatrix<f64>>) {
         let at = |p: &DMatrix<f64>| -(self.w.transpose() * lmi::matrix(&self.system, p) * &self.w);
         let zero = at(&DMatrix::zeros(self.p0.nrows(), self.p0.nrows()));
-        (at(&self.p0), self.basis.iter().map(|e| at(e) - &zero).collect())
+        (
+            at(&self.p0),
+            self.basis.iter().map(|e| at(e) - &zero).collect(),
+        )
     }
 
     /// The projector onto the eigenvectors of −WᵀQ(P)W that nearly vanish: a sharper exposing matrix than the dual.
@@ -99,7 +115,9 @@ impl Face {
         let f = -(self.w.transpose() * lmi::matrix(&self.system, p) * &self.w);
         let (values, vectors) = scale::eigen(&f);
         let top = values.amax();
-        let null: Vec<usize> = (0..values.len()).filter(|&i| values[i] < NEARLY_NULL * top).collect();
+        let null: Vec<usize> = (0..values.len())
+            .filter(|&i| values[i] < NEARLY_NULL * top)
+            .collect();
         let v = vectors.select_columns(&null);
         &v * v.transpose()
     }
@@ -109,8 +127,12 @@ impl Face {
     pub(super) fn expose(&self, dual: &DMatrix<f64>) -> Option<Self> {
         let (values, vectors) = scale::eigen(dual);
         let top = values.iter().copied().last().filter(|&v| v > 0.0)?;
-        let exposed: Vec<usize> = (0..values.len()).filter(|&i| values[i] > EXPOSED * top).collect();
-        let kept: Vec<usize> = (0..values.len()).filter(|&i| values[i] <= EXPOSED * top).collect();
+        let exposed: Vec<usize> = (0..values.len())
+            .filter(|&i| values[i] > EXPOSED * top)
+            .collect();
+        let kept: Vec<usize> = (0..values.len())
+            .filter(|&i| values[i] <= EXPOSED * top)
+            .collect();
         let v = vectors.select_columns(&exposed);
         let (f0, f) = self.f_parts();
         let rhs = -(f0 * &v);
@@ -128,7 +150,10 @@ impl Face {
         let basis = (0..parts.kernel.ncols())
             .map(|k| {
                 let zero = DMatrix::zeros(self.p0.nrows(), self.p0.nrows());
-                self.basis.iter().zip(parts.kernel.column(k).iter()).fold(zero, |p, (e, &z)| p + e * z)
+                self.basis
+                    .iter()
+                    .zip(parts.kernel.column(k).iter())
+                    .fold(zero, |p, (e, &z)| p + e * z)
             })
             .collect();
         Some(Self {
@@ -155,25 +180,33 @@ pub(super) fn equalities(
     let unseen = r * &parts.kernel;
     if unseen.amax() > INCONSISTENT * size {
         let port = null * &parts.kernel;
-        let worst = (0..unseen.ncols()).max_by(|&i, &j| unseen.column(i).norm().total_cmp(&unseen.column(j).norm()));
+        let worst = (0..unseen.ncols())
+            .max_by(|&i, &j| unseen.column(i).norm().total_cmp(&unseen.column(j).norm()));
         let direction = port.column(worst.unwrap_or(0)).into_owned();
-        return Err(Inconsistent::Witness(Witness::Unreached { direction: direction.as_slice().to_vec() }));
+        return Err(Inconsistent::Witness(Witness::Unreached {
+            direction: direction.as_slice().to_vec(),
+        }));
     }
     let gram = m.transpose() * r;
     if (&gram - gram.transpose()).amax() > INCONSISTENT * size * size {
-        return Err(Inconsistent::Witness(Witness::Asymmetric { ports: null.clone() }));
+        return Err(Inconsistent::Witness(Witness::Asymmetric {
+            ports: null.clone(),
+        }));
     }
     let (values, vectors) = scale::eigen(&gram);
     if values[0] < -INCONSISTENT * size * size {
         let direction = null * vectors.column(0);
-        return Err(Inconsistent::Witness(Witness::Markov { direction: direction.as_slice().to_vec() }));
+        return Err(Inconsistent::Witness(Witness::Markov {
+            direction: direction.as_slice().to_vec(),
+        }));
     }
     let inverse = DMatrix::from_diagonal(&parts.values.map(f64::recip));
     let known = r * &parts.row_space * inverse;
     let p11 = scale::symmetric(&(parts.range.transpose() * &known));
     if !p11.is_empty() && p11.clone().cholesky().is_none() {
         return Err(Inconsistent::Rounding(
-            "P B N = CᵀN on ker(D + Dᵀ) leaves P semidefinite at best: some state stores no energy".into(),
+            "P B N = CᵀN on ker(D + Dᵀ) leaves P semidefinite at best: some state stores no energy"
+                .into(),
         ));
     }
     let p12 = parts.left_kernel.transpose() * &known;

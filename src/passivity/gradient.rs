@@ -16,20 +16,35 @@ pub fn residual(p: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> f64 {
     difference
         .iter()
         .zip(size.iter())
-        .map(|(d, s)| if *s > scale::RANK * largest { d.abs() / s } else { 0.0 })
+        .map(|(d, s)| {
+            if *s > scale::RANK * largest {
+                d.abs() / s
+            } else {
+                0.0
+            }
+        })
         .fold(0.0, f64::max)
 }
 
 /// Some P = Pᵀ ≻ 0 with PB = Cᵀ, the candidate first; `None` if there is none (to rounding).
 #[must_use]
-pub fn storage(b: &DMatrix<f64>, c: &DMatrix<f64>, candidate: Option<&DMatrix<f64>>) -> Option<DMatrix<f64>> {
+pub fn storage(
+    b: &DMatrix<f64>,
+    c: &DMatrix<f64>,
+    candidate: Option<&DMatrix<f64>>,
+) -> Option<DMatrix<f64>> {
     let fits = |p: &DMatrix<f64>| verify::definite(p).is_ok() && residual(p, b, c) <= RESIDUAL;
     if let Some(p) = candidate.filter(|p| p.shape() == (b.nrows(), b.nrows()) && fits(p)) {
         return Some(p.clone());
     }
     // A has no say here: balance B against C alone.
     let (n, m) = b.shape();
-    let system = System { a: DMatrix::zeros(n, n), b: b.clone(), c: c.clone(), d: DMatrix::zeros(m, m) };
+    let system = System {
+        a: DMatrix::zeros(n, n),
+        b: b.clone(),
+        c: c.clone(),
+        d: DMatrix::zeros(m, m),
+    };
     let balanced = scale::balance(&system);
     let (p0, _) = facial::equalities(
         &balanced.system.b,

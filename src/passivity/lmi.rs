@@ -18,7 +18,11 @@ const ROUNDS: usize = 4;
 pub fn matrix(system: &System, p: &DMatrix<f64>) -> DMatrix<f64> {
     let pa = p * &system.a;
     let coupling = p * &system.b - system.c.transpose();
-    assemble(&(&pa + pa.transpose()), &coupling, &-(&system.d + system.d.transpose()))
+    assemble(
+        &(&pa + pa.transpose()),
+        &coupling,
+        &-(&system.d + system.d.transpose()),
+    )
 }
 
 /// The sizes of the terms that [`matrix`] adds up: |A|ᵀ|P| + |P||A| and so on.
@@ -72,7 +76,10 @@ pub(super) fn solve_with(
             return Err(if witness.verify(system) {
                 Unsolved::Witness(witness)
             } else {
-                Unsolved::Open("the equalities P B N = CᵀN on ker(D + Dᵀ) are inconsistent only to rounding".into())
+                Unsolved::Open(
+                    "the equalities P B N = CᵀN on ker(D + Dᵀ) are inconsistent only to rounding"
+                        .into(),
+                )
             });
         }
         Err(Inconsistent::Rounding(reason)) => return Err(Unsolved::Open(reason)),
@@ -92,7 +99,13 @@ pub(super) fn solve_with(
             &balanced.states.map(f64::recip),
         );
         let failure = match verify::check(system, &p) {
-            Ok(residuals) => return Ok(Certificate { p, from: Origin::Lmi, residuals }),
+            Ok(residuals) => {
+                return Ok(Certificate {
+                    p,
+                    from: Origin::Lmi,
+                    residuals,
+                });
+            }
             Err(failure) => failure,
         };
         match outcome {
@@ -107,7 +120,10 @@ pub(super) fn solve_with(
             }
             Outcome::Interior { z, .. } => {
                 // The exposed face is known to the accuracy of the dual only: sharpen it by what F vanishes on.
-                if let Some(sharper) = kernel.expose(&kernel.nearly_null(&face.p(&z))).filter(|_| round < ROUNDS) {
+                if let Some(sharper) = kernel
+                    .expose(&kernel.nearly_null(&face.p(&z)))
+                    .filter(|_| round < ROUNDS)
+                {
                     face = sharper;
                     continue;
                 }
@@ -124,5 +140,7 @@ pub(super) fn solve_with(
             Outcome::Stalled { reason, .. } => return Err(Unsolved::Open(reason.into())),
         }
     }
-    Err(Unsolved::Open(format!("the passivity inequality is still not strictly feasible after {ROUNDS} exposing rounds")))
+    Err(Unsolved::Open(format!(
+        "the passivity inequality is still not strictly feasible after {ROUNDS} exposing rounds"
+    )))
 }

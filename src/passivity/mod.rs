@@ -20,9 +20,7 @@ pub mod energy;
 pub mod facial;
 pub mod gradient;
 pub mod lmi;
-mod scale;
-#[cfg(feature = "sdp")]
-pub mod sdp;
+pub(crate) mod scale;
 pub mod strict;
 pub mod verify;
 pub mod witness;
@@ -139,7 +137,12 @@ impl System {
     /// The linear part of a complementarity system.
     #[must_use]
     pub fn of(lcs: &Lcs) -> Self {
-        Self { a: lcs.a.clone(), b: lcs.b.clone(), c: lcs.c.clone(), d: lcs.d.clone() }
+        Self {
+            a: lcs.a.clone(),
+            b: lcs.b.clone(),
+            c: lcs.c.clone(),
+            d: lcs.d.clone(),
+        }
     }
 
     /// Number of states.

@@ -41,19 +41,35 @@ pub fn overshoot(p: &DMatrix<f64>) -> f64 {
 /// About 25 verifications for the given P and as many solutions of the matrix inequality.
 #[must_use]
 pub fn maximise(system: &System, p: &DMatrix<f64>, from: Origin) -> Strict {
-    let limit = -witness::eigenvalues(&system.a).iter().map(|s| s.re).fold(f64::NEG_INFINITY, f64::max);
-    let mut best = Strict { decay_rate: 0.0, bound: overshoot(p), p: p.clone(), from, limit };
+    let limit = -witness::eigenvalues(&system.a)
+        .iter()
+        .map(|s| s.re)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let mut best = Strict {
+        decay_rate: 0.0,
+        bound: overshoot(p),
+        p: p.clone(),
+        from,
+        limit,
+    };
     if system.n() == 0 || !(limit.is_finite() && limit > 0.0) {
         return best;
     }
-    best.decay_rate = bisect(0.0, limit, limit, |alpha| verify::check(&system.shifted(alpha), p).is_ok().then_some(()))
-        .map_or(0.0, |(alpha, ())| alpha);
+    best.decay_rate = bisect(0.0, limit, limit, |alpha| {
+        verify::check(&system.shifted(alpha), p)
+            .is_ok()
+            .then_some(())
+    })
+    .map_or(0.0, |(alpha, ())| alpha);
     // Only what the equalities on ker(D + Dᵀ) leave free can give a larger rate.
-    let free = facial::Face::kernel(&scale::balance(system).system).map_or(0, |face| face.unknowns());
+    let free =
+        facial::Face::kernel(&scale::balance(system).system).map_or(0, |face| face.unknowns());
     if free == 0 || free > MAX_UNKNOWNS {
         return best;
     }
-    let solved = bisect(best.decay_rate, limit, limit, |alpha| lmi::solve(&system.shifted(alpha)).ok());
+    let solved = bisect(best.decay_rate, limit, limit, |alpha| {
+        lmi::solve(&system.shifted(alpha)).ok()
+    });
     if let Some((alpha, certificate)) = solved
         && alpha > best.decay_rate * (1.0 + WIDTH)
     {
@@ -69,7 +85,12 @@ pub fn maximise(system: &System, p: &DMatrix<f64>, from: Origin) -> Strict {
 }
 
 /// The largest α in (low, high] that `certify` accepts, to relative width of `scale`, with what it returned.
-fn bisect<T>(mut low: f64, mut high: f64, scale: f64, certify: impl Fn(f64) -> Option<T>) -> Option<(f64, T)> {
+fn bisect<T>(
+    mut low: f64,
+    mut high: f64,
+    scale: f64,
+    certify: impl Fn(f64) -> Option<T>,
+) -> Option<(f64, T)> {
     let mut best = None;
     // The limit itself is attained by symmetric networks (RC): try just below it first.
     let first = high * (1.0 - WIDTH);

@@ -59,7 +59,9 @@ impl Random {
 /// A random passive system by construction: x' = (J − R)Hx + (G − K)λ, y = (G + K)ᵀHx + (S + T)λ with J, T skew,
 /// H ≻ 0 diagonal over six decades and [[R, K], [Kᵀ, S]] ⪰ 0 of low rank. Returned with its energy H.
 fn passive(random: &mut Random, n: usize, m: usize) -> (System, DMatrix<f64>) {
-    let h = DMatrix::from_diagonal(&nalgebra::DVector::from_fn(n, |_, _| 10_f64.powf(3.0 * random.next())));
+    let h = DMatrix::from_diagonal(&nalgebra::DVector::from_fn(n, |_, _| {
+        10_f64.powf(3.0 * random.next())
+    }));
     let rank = random.below(n + m + 1);
     let factor = random.matrix(n + m, rank);
     let loss = &factor * factor.transpose();
@@ -87,19 +89,37 @@ fn stored_energy_certifies_the_bridge_of_37() {
 #[test]
 fn the_inequality_alone_finds_the_energy_of_the_bridge() {
     // The feasible set is the single point diag(C, L): DESIGN, misprints of (36).
-    let certificate = decide(&bridge(), None).certificate().cloned().expect("passive");
+    let certificate = decide(&bridge(), None)
+        .certificate()
+        .cloned()
+        .expect("passive");
     assert_eq!(certificate.from, Origin::Lmi);
-    assert!((certificate.p[(0, 0)] / C - 1.0).abs() < 1e-9, "{}", certificate.p);
-    assert!((certificate.p[(1, 1)] / L - 1.0).abs() < 1e-9, "{}", certificate.p);
+    assert!(
+        (certificate.p[(0, 0)] / C - 1.0).abs() < 1e-9,
+        "{}",
+        certificate.p
+    );
+    assert!(
+        (certificate.p[(1, 1)] / L - 1.0).abs() < 1e-9,
+        "{}",
+        certificate.p
+    );
     assert!(certificate.p[(0, 1)].abs() < 1e-9 * (C * L).sqrt());
 }
 
 #[test]
 fn the_skew_bridge_of_38_has_p_equal_to_c() {
-    let certificate = decide(&skew(), None).certificate().cloned().expect("passive");
+    let certificate = decide(&skew(), None)
+        .certificate()
+        .cloned()
+        .expect("passive");
     assert!((certificate.p[(0, 0)] / C - 1.0).abs() < 1e-12);
     let strict = strict::maximise(&skew(), &certificate.p, certificate.from);
-    assert!((strict.decay_rate * R * C - 1.0).abs() < 1e-5, "{}", strict.decay_rate);
+    assert!(
+        (strict.decay_rate * R * C - 1.0).abs() < 1e-5,
+        "{}",
+        strict.decay_rate
+    );
 }
 
 #[test]
@@ -129,10 +149,19 @@ fn a_negative_resistor_across_a_capacitor_grows() {
         c: dmatrix![1.0],
         d: dmatrix![R],
     };
-    let Verdict::NotPassive(witness) = decide(&system, Some(&dmatrix![C])) else { panic!() };
+    let Verdict::NotPassive(witness) = decide(&system, Some(&dmatrix![C])) else {
+        panic!()
+    };
     assert!(witness.verify(&system));
-    assert!(!witness.verify(&System { a: dmatrix![-1.0 / (R * C)], ..system.clone() }));
-    assert!(witness.describe().contains("grows"), "{}", witness.describe());
+    assert!(!witness.verify(&System {
+        a: dmatrix![-1.0 / (R * C)],
+        ..system.clone()
+    }));
+    assert!(
+        witness.describe().contains("grows"),
+        "{}",
+        witness.describe()
+    );
 }
 
 #[test]
@@ -146,7 +175,10 @@ fn role_swaps_keep_verdict_and_certificate() {
         for set in 0..1_usize << m {
             let ports: Vec<usize> = (0..m).filter(|j| set >> j & 1 == 1).collect();
             if let Some(pivoted) = system.pivot(&ports) {
-                assert!(energy::certificate(&pivoted, &h).is_some(), "{ports:?} {pivoted:?}");
+                assert!(
+                    energy::certificate(&pivoted, &h).is_some(),
+                    "{ports:?} {pivoted:?}"
+                );
                 let back = pivoted.pivot(&ports).expect("invertible");
                 assert!((back.d - &system.d).amax() < 1e-9 * (1.0 + pivoted.d.amax().powi(2)));
             }
@@ -164,7 +196,10 @@ fn a_thousand_passive_networks_are_passive() {
     for k in 0..1000 {
         let (n, m) = (random.below(4), 1 + random.below(3));
         let (system, h) = passive(&mut random, n, m);
-        assert!(energy::certificate(&system, &h).is_some(), "energy, network {k}: {system:?}");
+        assert!(
+            energy::certificate(&system, &h).is_some(),
+            "energy, network {k}: {system:?}"
+        );
         if k % 4 == 0 {
             // Without the energy: the matrix inequality must find a certificate, or say that it did not decide.
             match decide(&system, None) {
@@ -192,7 +227,10 @@ fn a_thousand_active_networks_are_not_passive() {
         match k % 3 {
             0 => system.d -= DMatrix::identity(m, m) * (1.05 * system.d.amax() * m as f64 + 0.1),
             1 => {
-                let growth = witness::eigenvalues(&system.a).iter().map(|s| s.re).fold(f64::NEG_INFINITY, f64::max);
+                let growth = witness::eigenvalues(&system.a)
+                    .iter()
+                    .map(|s| s.re)
+                    .fold(f64::NEG_INFINITY, f64::max);
                 for i in 0..n {
                     system.a[(i, i)] += 0.1 * system.a.amax() + 0.1 - growth;
                 }
@@ -217,7 +255,9 @@ fn sweep_fails(system: &System) -> bool {
     let n = system.n();
     (0..200).any(|k| {
         let w = 10_f64.powf(-6.0 + 12.0 * f64::from(k) / 199.0);
-        let Some(inverse) = (&system.a * &system.a + DMatrix::identity(n, n) * (w * w)).try_inverse() else {
+        let Some(inverse) =
+            (&system.a * &system.a + DMatrix::identity(n, n) * (w * w)).try_inverse()
+        else {
             return false;
         };
         let re = &system.d - &system.c * &inverse * &system.a * &system.b;

@@ -74,7 +74,11 @@ pub fn check(system: &System, p: &DMatrix<f64>) -> Result<Residuals, Failure> {
     if on_ports.max(on_states) > KERNEL {
         return Err(Failure::Kernel(on_ports.max(on_states)));
     }
-    Ok(Residuals { lmi_max_eigenvalue, pb_minus_ct: on_ports, p_min_eigenvalue })
+    Ok(Residuals {
+        lmi_max_eigenvalue,
+        pb_minus_ct: on_ports,
+        p_min_eigenvalue,
+    })
 }
 
 /// P = Pᵀ ≻ 0: a Cholesky factor and the smallest eigenvalue at unit diagonal, which is returned.
@@ -105,6 +109,8 @@ pub fn definite(p: &DMatrix<f64>) -> Result<f64, Failure> {
 /// The kernel of a (nearly) negative semidefinite block at relative accuracy of the equilibrated scale.
 fn null_space(block: &DMatrix<f64>) -> DMatrix<f64> {
     let (values, vectors) = scale::eigen(block);
-    let kernel: Vec<usize> = (0..values.len()).filter(|&i| values[i].abs() <= scale::RANK).collect();
+    let kernel: Vec<usize> = (0..values.len())
+        .filter(|&i| values[i].abs() <= scale::RANK)
+        .collect();
     vectors.select_columns(&kernel)
 }

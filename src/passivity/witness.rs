@@ -92,8 +92,12 @@ impl Witness {
                 let size = v.abs().dot(&(system.d.abs() * v.abs()));
                 shape(v.len()) && v.dot(&(&system.d * &v)) < -ENTRIES * size
             }
-            Self::Motion { s, state, input, .. } => {
-                shape(input.len()) && state.len() == system.n() && verify_motion(system, *s, state, input)
+            Self::Motion {
+                s, state, input, ..
+            } => {
+                shape(input.len())
+                    && state.len() == system.n()
+                    && verify_motion(system, *s, state, input)
             }
             Self::Unreached { direction } => {
                 let v = DVector::from_column_slice(direction);
@@ -103,18 +107,25 @@ impl Witness {
                     let seen = system.c.transpose() * &v;
                     let seen_size = system.c.abs().transpose() * v.abs();
                     (0..reached.len()).all(|i| reached[i].abs() <= verify::KERNEL * size[i])
-                        && (0..seen.len()).any(|i| seen[i].abs() > verify::KERNEL.sqrt() * seen_size[i] && seen[i] != 0.0)
+                        && (0..seen.len()).any(|i| {
+                            seen[i].abs() > verify::KERNEL.sqrt() * seen_size[i] && seen[i] != 0.0
+                        })
                 }
             }
             Self::Asymmetric { ports } => {
-                let gram = |b: &DMatrix<f64>, c: &DMatrix<f64>, n: &DMatrix<f64>| n.transpose() * c * b * n;
+                let gram = |b: &DMatrix<f64>, c: &DMatrix<f64>, n: &DMatrix<f64>| {
+                    n.transpose() * c * b * n
+                };
                 let value = gram(&system.b, &system.c, ports);
                 let size = gram(&system.b.abs(), &system.c.abs(), &ports.abs());
                 let difference = &value - value.transpose();
                 let bound = (&size + size.transpose()) * verify::KERNEL;
                 shape(ports.nrows())
                     && (0..ports.ncols()).all(|j| lossless(system, &ports.column(j).into_owned()))
-                    && difference.iter().zip(bound.iter()).any(|(d, b)| d.abs() > *b && d.abs() > 0.0)
+                    && difference
+                        .iter()
+                        .zip(bound.iter())
+                        .any(|(d, b)| d.abs() > *b && d.abs() > 0.0)
             }
             Self::Markov { direction } => {
                 let v = DVector::from_column_slice(direction);
@@ -127,20 +138,45 @@ impl Witness {
 
     /// The witness of the original system from one of the balanced system.
     pub(super) fn unbalanced(self, balanced: &Balanced) -> Self {
-        let port = |v: Vec<f64>| v.iter().zip(balanced.ports.iter()).map(|(v, s)| v * s).collect();
+        let port = |v: Vec<f64>| {
+            v.iter()
+                .zip(balanced.ports.iter())
+                .map(|(v, s)| v * s)
+                .collect()
+        };
         match self {
-            Self::Feedthrough { direction, power } => {
-                Self::Feedthrough { direction: port(direction), power: power * balanced.omega }
-            }
-            Self::Motion { s, state, input, supply } => Self::Motion {
+            Self::Feedthrough { direction, power } => Self::Feedthrough {
+                direction: port(direction),
+                power: power * balanced.omega,
+            },
+            Self::Motion {
+                s,
+                state,
+                input,
+                supply,
+            } => Self::Motion {
                 s: s * balanced.omega,
-                state: state.iter().zip(balanced.states.iter()).map(|(x, t)| x * t).collect(),
-                input: input.iter().zip(balanced.ports.iter()).map(|(v, s)| v * s).collect(),
+                state: state
+                    .iter()
+                    .zip(balanced.states.iter())
+                    .map(|(x, t)| x * t)
+                    .collect(),
+                input: input
+                    .iter()
+                    .zip(balanced.ports.iter())
+                    .map(|(v, s)| v * s)
+                    .collect(),
                 supply: supply * balanced.omega,
             },
-            Self::Unreached { direction } => Self::Unreached { direction: port(direction) },
-            Self::Asymmetric { ports } => Self::Asymmetric { ports: DMatrix::from_diagonal(&balanced.ports) * ports },
-            Self::Markov { direction } => Self::Markov { direction: port(direction) },
+            Self::Unreached { direction } => Self::Unreached {
+                direction: port(direction),
+            },
+            Self::Asymmetric { ports } => Self::Asymmetric {
+                ports: DMatrix::from_diagonal(&balanced.ports) * ports,
+            },
+            Self::Markov { direction } => Self::Markov {
+                direction: port(direction),
+            },
         }
     }
 }
@@ -167,7 +203,12 @@ fn resolvent(a: &DMatrix<f64>, s: C) -> DMatrix<C> {
 /// The supply (or growth) must stay negative (positive) under relative errors [`ENTRIES`] of all entries, by first-order
 /// perturbation with the adjoint.
 fn verify_motion(system: &System, s: C, state: &[C], input: &[C]) -> bool {
-    if !(s.re >= 0.0) || state.iter().chain(input).any(|v| !v.re.is_finite() || !v.im.is_finite()) {
+    if s.re.is_nan() || s.re < 0.0
+        || state
+            .iter()
+            .chain(input)
+            .any(|v| !v.re.is_finite() || !v.im.is_finite())
+    {
         return false;
     }
     let x = DVector::from_column_slice(state);
@@ -181,13 +222,23 @@ fn verify_motion(system: &System, s: C, state: &[C], input: &[C]) -> bool {
         if ax.amax() == 0.0 || s.re <= 0.0 {
             return false;
         }
-        let Some(w) = inverse_iteration(&shift.adjoint(), system.a.amax()) else { return false };
+        let Some(w) = inverse_iteration(&shift.adjoint(), system.a.amax()) else {
+            return false;
+        };
         let overlap = w.dotc(&x).norm();
         let error = w.map(|z| z.norm()).dot(&(terms * ENTRIES + residual));
         return s.re * overlap > error;
     }
-    let supply = v.dotc(&(complex(&system.c) * &x + complex(&system.d) * &v)).re;
-    let Some(adjoint) = shift.adjoint().lu().solve(&(complex(&system.c).transpose() * &v)) else { return false };
+    let supply = v
+        .dotc(&(complex(&system.c) * &x + complex(&system.d) * &v))
+        .re;
+    let Some(adjoint) = shift
+        .adjoint()
+        .lu()
+        .solve(&(complex(&system.c).transpose() * &v))
+    else {
+        return false;
+    };
     let error = adjoint.map(|z| z.norm()).dot(&(terms * ENTRIES + residual))
         + ENTRIES * av.dot(&(system.c.abs() * &ax + system.d.abs() * &av));
     supply.is_finite() && supply < -error
@@ -201,7 +252,9 @@ fn inverse_iteration(m: &DMatrix<C>, size: f64) -> Option<DVector<C>> {
         nudged[(i, i)] += C::new(f64::EPSILON * size, 0.0);
     }
     let lu = nudged.lu();
-    let mut x = DVector::from_fn(n, |i, _| C::new(1.0 + 0.1 * i as f64, 0.3 - 0.05 * i as f64));
+    let mut x = DVector::from_fn(n, |i, _| {
+        C::new(1.0 + 0.1 * i as f64, 0.3 - 0.05 * i as f64)
+    });
     for _ in 0..3 {
         x = lu.solve(&x)?;
         let norm = x.norm();
@@ -231,7 +284,10 @@ pub fn search(system: &System) -> Option<Witness> {
 fn feedthrough(system: &System) -> Option<Witness> {
     let (values, vectors) = scale::eigen(&(&system.d + system.d.transpose()));
     let power = values.iter().copied().next().filter(|&v| v < 0.0)? / 2.0;
-    Some(Witness::Feedthrough { direction: vectors.column(0).as_slice().to_vec(), power })
+    Some(Witness::Feedthrough {
+        direction: vectors.column(0).as_slice().to_vec(),
+        power,
+    })
 }
 
 /// Free motions with Re s > 0.
@@ -296,11 +352,16 @@ fn sweep(system: &System, accept: impl Fn(Witness) -> Option<Witness>) -> Option
     let low = sizes().fold(1.0, f64::min) * 1e-3;
     let high = sizes().fold(1.0, f64::max) * 1e3;
     let count = ((high / low).log10() * PER_DECADE as f64).ceil() as usize + 1;
-    let mut grid: Vec<f64> =
-        (0..count).map(|k| low * (high / low).powf(k as f64 / (count - 1).max(1) as f64)).collect();
+    let mut grid: Vec<f64> = (0..count)
+        .map(|k| low * (high / low).powf(k as f64 / (count - 1).max(1) as f64))
+        .collect();
     for p in &poles {
         for f in [0.9, 0.99, 0.999, 1.0, 1.001, 1.01, 1.1] {
-            grid.extend([p.im.abs() * f, p.norm() * f].into_iter().filter(|&v| v > 0.0));
+            grid.extend(
+                [p.im.abs() * f, p.norm() * f]
+                    .into_iter()
+                    .filter(|&v| v > 0.0),
+            );
         }
     }
     grid.sort_by(f64::total_cmp);
@@ -319,7 +380,7 @@ fn sweep(system: &System, accept: impl Fn(Witness) -> Option<Witness>) -> Option
         let left = k.saturating_sub(1);
         let right = (k + 1).min(grid.len() - 1);
         if values[k].is_finite() && values[k] <= values[left] && values[k] <= values[right] {
-            found.extend(refine(&on_axis, grid[left].ln(), grid[right].ln()));
+            found.extend(refine(on_axis, grid[left].ln(), grid[right].ln()));
         }
     }
     for &w in grid.iter().step_by(3) {
@@ -332,11 +393,18 @@ fn sweep(system: &System, accept: impl Fn(Witness) -> Option<Witness>) -> Option
     }
     found.retain(|(value, _)| *value < 0.0);
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    found.into_iter().take(40).find_map(|(_, witness)| accept(witness))
+    found
+        .into_iter()
+        .take(40)
+        .find_map(|(_, witness)| accept(witness))
 }
 
 /// Golden-section search for the minimum over ω = exp(l), l in [a, b].
-fn refine(value: impl Fn(f64) -> Option<(f64, Witness)>, mut a: f64, mut b: f64) -> Option<(f64, Witness)> {
+fn refine(
+    value: impl Fn(f64) -> Option<(f64, Witness)>,
+    mut a: f64,
+    mut b: f64,
+) -> Option<(f64, Witness)> {
     let ratio = (5.0_f64.sqrt() - 1.0) / 2.0;
     let at = |l: f64| value(l.exp()).map_or(f64::INFINITY, |(v, _)| v);
     let (mut c, mut d) = (b - ratio * (b - a), a + ratio * (b - a));
