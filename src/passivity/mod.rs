@@ -21,6 +21,8 @@ pub mod facial;
 pub mod gradient;
 pub mod lmi;
 pub(crate) mod scale;
+#[cfg(feature = "sdp")]
+pub mod sdp;
 pub mod strict;
 pub mod verify;
 pub mod witness;

@@ -273,3 +273,37 @@ fn sweep_fails(system: &System) -> bool {
         form.symmetric_eigenvalues().min() < -1e-6 * (re.amax() + im.amax())
     })
 }
+
+#[cfg(feature = "sdp")]
+mod second_opinion {
+    use super::*;
+
+    #[test]
+    fn cone_solver_and_barrier_agree() {
+        for system in [bridge(), skew()] {
+            let barrier = lmi::solve(&system).expect("barrier");
+            let cone = sdp::solve(&system).expect("cone");
+            let scale = barrier.p.diagonal().map(f64::sqrt);
+            for i in 0..system.n() {
+                for j in 0..system.n() {
+                    let difference = (barrier.p[(i, j)] - cone.p[(i, j)]) / (scale[i] * scale[j]);
+                    assert!(difference.abs() < 1e-6, "{} {}", barrier.p, cone.p);
+                }
+            }
+        }
+        let mut random = Random(11);
+        let mut confirmed = 0;
+        for _ in 0..60 {
+            let (n, m) = (1 + random.below(4), 1 + random.below(3));
+            let (system, _) = passive(&mut random, n, m);
+            // Neither may refute; both certificates are verified by the same test.
+            let found = sdp::solve(&system);
+            assert!(!matches!(found, Err(lmi::Unsolved::Witness(_))));
+            confirmed += usize::from(found.is_ok() && lmi::solve(&system).is_ok());
+            let mut active = system.clone();
+            active.d -= DMatrix::identity(m, m) * (1.05 * active.d.amax() * m as f64 + 0.1);
+            assert!(sdp::solve(&active).is_err() && lmi::solve(&active).is_err());
+        }
+        assert!(confirmed >= 50, "{confirmed} of 60");
+    }
+}

@@ -203,7 +203,8 @@ fn resolvent(a: &DMatrix<f64>, s: C) -> DMatrix<C> {
 /// The supply (or growth) must stay negative (positive) under relative errors [`ENTRIES`] of all entries, by first-order
 /// perturbation with the adjoint.
 fn verify_motion(system: &System, s: C, state: &[C], input: &[C]) -> bool {
-    if s.re.is_nan() || s.re < 0.0
+    if s.re.is_nan()
+        || s.re < 0.0
         || state
             .iter()
             .chain(input)
