@@ -20,6 +20,7 @@
 //! ```
 
 pub mod algebra;
+pub mod check;
 pub mod circuit;
 pub mod diagnostic;
 pub mod integrate;
@@ -27,6 +28,7 @@ pub mod law;
 pub mod lcs;
 pub mod mna;
 pub mod netlist;
+pub mod passivity;
 pub mod report;
 pub mod settings;
 pub mod solve;
