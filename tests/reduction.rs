@@ -101,3 +101,25 @@ fn bridge_with_capacitor() {
         );
     }
 }
+
+#[test]
+fn a_system_file_reads_back_and_reduces_to_itself() {
+    let c = circuit(
+        3,
+        &[
+            ("c1", 1, 0, Kind::Capacitor(Value::decimal(1e-6, 1, -6))),
+            ("l1", 1, 0, Kind::Inductor(Value::decimal(1e-2, 1, -2))),
+            ("r1", 1, 2, Kind::Resistor(Value::decimal(1e3, 1, 3))),
+            ("d1", 2, 0, Kind::Device(Law::ideal_diode())),
+        ],
+    );
+    let b = behaviour(&c).unwrap();
+    let lcs = reduce(&b, &Position::free(&b, vec![])).unwrap();
+    let text = circ::lcs::json::write(&lcs, &lcs.storage.initial, None);
+    let file = circ::lcs::json::read(&text).unwrap();
+    assert_eq!((&file.lcs.a, &file.lcs.b, &file.lcs.c, &file.lcs.d), (&lcs.a, &lcs.b, &lcs.c, &lcs.d));
+    let again = circ::mna::Behaviour::from_lcs(&file.lcs);
+    let same = reduce(&again, &Position::free(&again, vec![])).unwrap();
+    assert_eq!((&same.a, &same.b, &same.c, &same.d), (&lcs.a, &lcs.b, &lcs.c, &lcs.d));
+    assert_eq!(same.outputs.rows.x, lcs.outputs.rows.x);
+}
