@@ -1,7 +1,13 @@
 //! From a complementarity system to waveforms.
 
+pub mod energy;
+#[cfg(test)]
+pub(crate) mod fixtures;
+pub mod jump;
+pub mod reading;
 pub mod run;
 pub mod stats;
+pub mod step;
 
 pub use run::{Frame, Grid, Log, Outcome, Reason, SimError, Stepper};
 pub use stats::{Energy, Impulse, Run, Stats};
