@@ -206,6 +206,12 @@ impl Balance {
         }
     }
 
+    /// Stored energy at the start, J.
+    #[must_use]
+    pub fn first(&self) -> f64 {
+        self.first
+    }
+
     /// Adds energy from sources and dissipated energy, J.
     #[inline]
     pub fn add(&mut self, (source, dissipated): (f64, f64)) {

@@ -12,7 +12,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::lcs::Lcs;
-use crate::solve::lcp::{Lcp, Scaling};
+use crate::solve::lcp::Scaling;
 use crate::solve::{Driver, Status, norm};
 
 /// Prepared jump problem of one system.
