@@ -35,6 +35,10 @@ impl Law {
     /// The ideal diode: 0 ≤ i ⟂ −v ≥ 0.
     #[must_use]
     pub const fn ideal_diode() -> Self {
-        Self::Diode { vfwd: Value::decimal(0.0, 0, 0), ron: Value::decimal(0.0, 0, 0), roff: None }
+        Self::Diode {
+            vfwd: Value::decimal(0.0, 0, 0),
+            ron: Value::decimal(0.0, 0, 0),
+            roff: None,
+        }
     }
 }

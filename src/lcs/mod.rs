@@ -1,5 +1,9 @@
 //! The complementarity system of a circuit, with names and units for every row and column.
 
+pub mod reduce;
+
+pub use reduce::{Position, ReduceError, StorageHold, reduce};
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::circuit::Source;
