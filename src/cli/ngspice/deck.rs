@@ -391,6 +391,12 @@ fn waveform(wave: &Wave, edge: f64) -> (String, bool) {
             }
             text
         }
+        Wave::Sffm { offset, amplitude, carrier, index, signal, carrier_phase, signal_phase } => format!(
+            "sffm({offset:e} {amplitude:e} {carrier:e} {index:e} {signal:e} {carrier_phase:e} {signal_phase:e})"
+        ),
+        Wave::Am { amplitude, offset, modulation, carrier, delay } => {
+            format!("am({amplitude:e} {offset:e} {modulation:e} {carrier:e} {delay:e})")
+        }
         Wave::Exp { v1, v2, rise_delay, rise_tau, fall_delay, fall_tau } => {
             format!("exp({v1:e} {v2:e} {rise_delay:e} {rise_tau:e} {fall_delay:e} {fall_tau:e})")
         }
