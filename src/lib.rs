@@ -31,6 +31,7 @@ pub mod law;
 pub mod lcs;
 pub mod mna;
 pub mod netlist;
+pub mod plan;
 pub mod report;
 pub mod settings;
 pub mod solve;

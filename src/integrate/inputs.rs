@@ -46,7 +46,7 @@ impl Inputs {
     /// Writes left limits of the varying inputs.
     pub fn left(&self, t: f64, u: &mut [f64]) {
         for &j in &self.varying {
-            u[j] = self.sources[j].value_before(t);
+            u[j] = self.sources[j].value_left(t);
         }
     }
 
@@ -54,7 +54,7 @@ impl Inputs {
     pub fn slopes(&self, t: f64, du: &mut [f64]) {
         du.fill(0.0);
         for &j in &self.varying {
-            du[j] = self.sources[j].slope(t);
+            du[j] = self.sources[j].derivative(t);
         }
     }
 
@@ -92,10 +92,10 @@ fn is_constant(wave: &Wave) -> bool {
 }
 
 /// TEMPORARY until `circuit::source` evaluates itself.
-trait Evaluate {
+pub(crate) trait Evaluate {
     fn value(&self, t: f64) -> f64;
-    fn value_before(&self, t: f64) -> f64;
-    fn slope(&self, t: f64) -> f64;
+    fn value_left(&self, t: f64) -> f64;
+    fn derivative(&self, t: f64) -> f64;
     fn next_breakpoint(&self, t: f64) -> Option<f64>;
 }
 
@@ -122,7 +122,7 @@ impl Evaluate for crate::circuit::Source {
             _ => self.dc,
         }
     }
-    fn value_before(&self, t: f64) -> f64 {
+    fn value_left(&self, t: f64) -> f64 {
         match &self.wave {
             Wave::Pwl { points, .. } => points
                 .iter()
@@ -132,7 +132,7 @@ impl Evaluate for crate::circuit::Source {
             _ => self.value(t),
         }
     }
-    fn slope(&self, t: f64) -> f64 {
+    fn derivative(&self, t: f64) -> f64 {
         match &self.wave {
             Wave::Sin {
                 amplitude,
