@@ -24,6 +24,7 @@
 extern crate self as circ;
 
 pub mod algebra;
+pub mod check;
 pub mod circuit;
 pub mod diagnostic;
 pub mod integrate;
@@ -32,6 +33,7 @@ pub mod lcs;
 pub mod mna;
 pub mod netlist;
 pub mod plan;
+pub mod passivity;
 pub mod report;
 pub mod settings;
 pub mod solve;

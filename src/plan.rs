@@ -1,6 +1,5 @@
 //! What a circuit needs and what is left out, in words, before anything runs.
 
-use crate::circuit::source::Wave;
 use crate::integrate::step::Scheme;
 use crate::integrate::{Method, SimOptions};
 use crate::law::Law;
@@ -80,15 +79,4 @@ fn is_positive_definite(lcs: &Lcs) -> bool {
     let scaled = &d * &lcs.d * &d;
     let symmetric = &scaled + scaled.transpose();
     crate::solve::norm::kernel(&symmetric).ncols() == 0 && symmetric.cholesky().is_some()
-}
-
-/// Whether a source is constant in time.
-#[must_use]
-pub fn is_constant(wave: &Wave) -> bool {
-    match wave {
-        Wave::Dc(_) => true,
-        Wave::Sin { amplitude, .. } => *amplitude == 0.0,
-        Wave::Pulse { v1, v2, .. } | Wave::Exp { v1, v2, .. } => v1 == v2,
-        Wave::Pwl { points, .. } => points.windows(2).all(|w| w[0].1 == w[1].1),
-    }
 }

@@ -2,9 +2,7 @@
 
 use nalgebra::DVector;
 
-use crate::algebra::Value;
 use crate::circuit::{Circuit, Element, Kind, NodeId, Probe, Probed, Source, source::Wave};
-use crate::integrate::inputs::Evaluate as _;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Reason, SimError};
 use crate::lcs::{Hold, Lcs, Position, ReduceError, StorageHold, reduce};

@@ -7,6 +7,7 @@
 mod assemble;
 mod couple;
 mod standard;
+mod system;
 
 use std::sync::OnceLock;
 
