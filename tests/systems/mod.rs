@@ -57,6 +57,7 @@ pub fn system(
         storage: Storage {
             names: states.iter().map(|(s, _)| (*s).into()).collect(),
             x: DMatrix::identity(n, n),
+            lambda: DMatrix::zeros(n, m),
             u: DMatrix::zeros(n, 0),
             one: DVector::zeros(n),
             metric,
