@@ -1,0 +1,4 @@
+//! The exact integrator: within a mode the circuit is a linear system driven by an exosystem, and its solution is a
+//! matrix exponential; between modes stands a complementarity problem.
+
+mod expm;
