@@ -2,3 +2,5 @@
 //! matrix exponential; between modes stands a complementarity problem.
 
 mod expm;
+mod kernel;
+mod polynomial;
