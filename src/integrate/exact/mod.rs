@@ -2,5 +2,7 @@
 //! matrix exponential; between modes stands a complementarity problem.
 
 mod expm;
+mod flow;
 mod kernel;
 mod polynomial;
+mod spectrum;
