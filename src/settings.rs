@@ -17,6 +17,11 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { tol: 1e-4, lcp_residual: 1e-9, min_step: 1e-12, max_steps: 200_000_000 }
+        Self {
+            tol: 1e-4,
+            lcp_residual: 1e-9,
+            min_step: 1e-12,
+            max_steps: 200_000_000,
+        }
     }
 }

@@ -1,0 +1,414 @@
+//! The time loop, shared by all methods: a [`Stepper`] moves, the loop writes rows.
+
+use crate::integrate::{Energy, Impulse, Run, Stats};
+use crate::waveform::Waveforms;
+
+/// A simulation that ended early: when, at which device, and why, with everything computed so far.
+#[derive(Debug, thiserror::Error)]
+#[error("{}{}{reason}", at(*.t), device.as_ref().map_or(String::new(), |d| format!("{d}: ")))]
+pub struct SimError {
+    /// Time, s; `None` before the run started.
+    pub t: Option<f64>,
+    /// The element or switch concerned.
+    pub device: Option<String>,
+    /// Why.
+    pub reason: Reason,
+    /// The run up to the failure.
+    pub partial: Option<Box<Run>>,
+}
+
+fn at(t: Option<f64>) -> String {
+    t.map_or(String::new(), |t| format!("at t = {t:e} s: "))
+}
+
+/// Why a simulation cannot go on.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Reason {
+    /// The one-step problem has no solution.
+    #[error(
+        "the one-step complementarity problem has no solution (no state of the devices satisfies the circuit equations)"
+    )]
+    Infeasible,
+    /// No solver reached the residual.
+    #[error("no solver met the complementarity residual {tolerance:e} (best {residual:e})")]
+    Residual {
+        /// Best scaled residual.
+        residual: f64,
+        /// Required.
+        tolerance: f64,
+    },
+    /// I − hθA or a mode's system is singular.
+    #[error("the step matrix is singular for h = {h:e} s")]
+    Singular {
+        /// Step, s.
+        h: f64,
+    },
+    /// The error-controlled step became too small.
+    #[error("the step fell below {limit:e} s without meeting the tolerance")]
+    StepTooSmall {
+        /// Smallest step allowed, s.
+        limit: f64,
+    },
+    /// `Settings::max_steps`.
+    #[error("more than {limit} steps")]
+    TooManySteps {
+        /// The limit.
+        limit: u64,
+    },
+    /// Switch positions contradict each other at one instant.
+    #[error("switch positions do not settle")]
+    SwitchesDoNotSettle,
+    /// The circuit has no operating point.
+    #[error("no operating point: {0}; `uic` starts from initial conditions instead")]
+    NoOperatingPoint(String),
+    /// The circuit in this switch position is not a system.
+    #[error("{0}")]
+    Circuit(String),
+    /// The state left the range of doubles.
+    #[error("the solution grows beyond the range of numbers")]
+    Overflow,
+    /// The method asked for does not cover the circuit.
+    #[error("{0}")]
+    Unsupported(String),
+}
+
+impl SimError {
+    /// A failure before the run.
+    #[must_use]
+    pub fn before(reason: Reason) -> Self {
+        Self {
+            t: None,
+            device: None,
+            reason,
+            partial: None,
+        }
+    }
+
+    /// A failure at a time.
+    #[must_use]
+    pub fn at(t: f64, reason: Reason) -> Self {
+        Self {
+            t: Some(t),
+            device: None,
+            reason,
+            partial: None,
+        }
+    }
+
+    /// Names the device concerned.
+    #[must_use]
+    pub fn device(mut self, name: impl Into<String>) -> Self {
+        self.device = Some(name.into());
+        self
+    }
+}
+
+/// One integration method on one circuit.
+pub trait Stepper {
+    /// Current time, s.
+    fn time(&self) -> f64;
+    /// Advances to exactly `t` (≥ the current time); afterwards the state is the right limit at `t`. Every event and jump
+    /// on the way, one at `t` itself included, goes into `log`.
+    ///
+    /// # Errors
+    /// See [`Reason`]; the stepper stays at the last time it reached.
+    fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), SimError>;
+    /// Probe values at the current time (right limit), one per output name.
+    fn read(&mut self, row: &mut [f64]);
+    /// Counters, energy, notes.
+    fn finish(&mut self) -> Outcome;
+}
+
+/// What a stepper knows at the end.
+#[derive(Debug, Clone, Default)]
+pub struct Outcome {
+    /// Counters.
+    pub stats: Stats,
+    /// Energy balance.
+    pub energy: Energy,
+    /// Things the user should know.
+    pub notes: Vec<String>,
+}
+
+/// Collects what happens between output times.
+#[derive(Debug, Default)]
+pub struct Log {
+    /// Event times, s, with what changed.
+    pub events: Vec<(f64, String)>,
+    /// Impulses at jumps.
+    pub impulses: Vec<Impulse>,
+    wants_rows: bool,
+    from: f64,
+    columns: usize,
+    time: Vec<f64>,
+    values: Vec<f64>,
+    last_is_event: bool,
+}
+
+impl Log {
+    /// A log for rows of `columns` values from time `from` on; event rows only if `wants_rows`.
+    #[must_use]
+    pub fn new(columns: usize, from: f64, wants_rows: bool) -> Self {
+        Self {
+            columns,
+            from,
+            wants_rows,
+            ..Self::default()
+        }
+    }
+
+    /// An event: a device or switch changed its state at `t`.
+    pub fn event(&mut self, t: f64, what: impl Into<String>) {
+        self.events.push((t, what.into()));
+    }
+
+    /// An impulse of this area at `t`.
+    pub fn impulse(&mut self, t: f64, name: impl Into<String>, area: f64) {
+        self.impulses.push(Impulse {
+            t,
+            name: name.into(),
+            area,
+        });
+    }
+
+    /// Whether rows at event times were asked for.
+    #[must_use]
+    pub fn wants_rows(&self) -> bool {
+        self.wants_rows
+    }
+
+    /// A row at an event: once at a continuous event, twice (left limit, right limit) at a jump. Ignored unless
+    /// [`Self::wants_rows`].
+    pub fn row(&mut self, t: f64, row: &[f64]) {
+        debug_assert_eq!(row.len(), self.columns);
+        if self.wants_rows && t >= self.from {
+            self.time.push(t);
+            self.values.extend_from_slice(row);
+            self.last_is_event = true;
+        }
+    }
+
+    /// A row of the output grid; it replaces an event row for the same right limit.
+    fn grid_row(&mut self, t: f64, row: &[f64]) {
+        if self.last_is_event && self.time.last() == Some(&t) {
+            self.time.pop();
+            self.values.truncate(self.values.len() - self.columns);
+        }
+        self.time.push(t);
+        self.values.extend_from_slice(row);
+        self.last_is_event = false;
+    }
+}
+
+/// Output times `tstart + k·tstep`, the last exactly `tstop`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grid {
+    /// First output time, s.
+    pub tstart: f64,
+    /// Distance of output times, s.
+    pub tstep: f64,
+    /// Last output time, s.
+    pub tstop: f64,
+}
+
+/// Relative to one step: a grid point this close before `tstop` is `tstop` itself (decimal steps do not divide spans
+/// exactly in binary).
+const GRID_CLOSE: f64 = 1e-6;
+
+impl Grid {
+    /// Number of output times.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        let span = self.tstop - self.tstart;
+        if !(span > 0.0 && self.tstep > 0.0) {
+            return 1;
+        }
+        (span / self.tstep - GRID_CLOSE).ceil().max(1.0) as usize + 1
+    }
+
+    /// Never: `tstop` is always there.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        false
+    }
+
+    /// Output time k < [`Self::len`], s.
+    #[must_use]
+    pub fn time(&self, k: usize) -> f64 {
+        if k + 1 >= self.len() {
+            self.tstop
+        } else {
+            self.tstart + k as f64 * self.tstep
+        }
+    }
+}
+
+/// What every run needs besides its stepper.
+pub struct Frame<'a> {
+    /// Title for the waveforms.
+    pub title: String,
+    /// Column names.
+    pub names: Vec<String>,
+    /// Column units.
+    pub units: Vec<&'static str>,
+    /// Output times.
+    pub grid: Grid,
+    /// `exact`, `theta`, `euler`.
+    pub method: String,
+    /// What the plan decided.
+    pub plan: Vec<String>,
+    /// Notes from before the run.
+    pub notes: Vec<String>,
+    /// Called with the time reached, s, after every output row.
+    pub progress: Option<&'a mut dyn FnMut(f64)>,
+}
+
+/// Runs a stepper over the output grid.
+///
+/// # Errors
+/// The stepper's, with the run so far in [`SimError::partial`].
+pub fn run(stepper: &mut dyn Stepper, frame: Frame<'_>, mut log: Log) -> Result<Run, SimError> {
+    let Frame {
+        title,
+        names,
+        units,
+        grid,
+        method,
+        plan,
+        notes,
+        mut progress,
+    } = frame;
+    let mut row = vec![0.0; names.len()];
+    let mut failure = None;
+    for k in 0..grid.len() {
+        let t = grid.time(k);
+        if let Err(error) = stepper.advance(t, &mut log) {
+            failure = Some(error);
+            break;
+        }
+        stepper.read(&mut row);
+        if row.iter().any(|v| !v.is_finite()) {
+            failure = Some(SimError::at(t, Reason::Overflow));
+            break;
+        }
+        log.grid_row(t, &row);
+        if let Some(report) = progress.as_mut() {
+            report(t);
+        }
+    }
+    let mut outcome = stepper.finish();
+    let mut all_notes = notes;
+    all_notes.append(&mut outcome.notes);
+    let run = Run {
+        waveforms: Waveforms {
+            title,
+            names,
+            units,
+            time: log.time,
+            values: log.values,
+        },
+        method,
+        plan,
+        stats: outcome.stats,
+        energy: outcome.energy,
+        impulses: log.impulses,
+        events: log.events,
+        notes: all_notes,
+    };
+    match failure {
+        None => Ok(run),
+        Some(mut error) => {
+            error.partial = Some(Box::new(run));
+            Err(error)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grid_ends_exactly_at_tstop() {
+        let grid = Grid {
+            tstart: 0.0,
+            tstep: 1e-6,
+            tstop: 5e-3,
+        };
+        assert_eq!(grid.len(), 5001);
+        assert_eq!(grid.time(5000), 5e-3);
+        let uneven = Grid {
+            tstart: 1.0,
+            tstep: 0.4,
+            tstop: 2.0,
+        };
+        let times: Vec<f64> = (0..uneven.len()).map(|k| uneven.time(k)).collect();
+        assert_eq!(times, [1.0, 1.4, 1.8, 2.0]);
+    }
+
+    /// x = t, one "event" with a jump row pair at t = 1 and a failure after 2.
+    struct Ramp(f64);
+    impl Stepper for Ramp {
+        fn time(&self) -> f64 {
+            self.0
+        }
+        fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), SimError> {
+            if t > 2.0 {
+                return Err(SimError::at(2.5, Reason::Infeasible).device("d1"));
+            }
+            if self.0 < 1.0 && t >= 1.0 {
+                log.event(1.0, "d1");
+                log.row(1.0, &[-1.0]);
+                log.row(1.0, &[1.0]);
+            }
+            self.0 = t;
+            Ok(())
+        }
+        fn read(&mut self, row: &mut [f64]) {
+            row[0] = self.0;
+        }
+        fn finish(&mut self) -> Outcome {
+            Outcome::default()
+        }
+    }
+
+    fn ramp(events: bool) -> SimError {
+        let grid = Grid {
+            tstart: 0.0,
+            tstep: 1.0,
+            tstop: 3.0,
+        };
+        let frame = Frame {
+            title: String::new(),
+            names: vec!["v(1)".into()],
+            units: vec!["V"],
+            grid,
+            method: "ramp".into(),
+            plan: vec![],
+            notes: vec![],
+            progress: None,
+        };
+        run(&mut Ramp(0.0), frame, Log::new(1, 0.0, events)).unwrap_err()
+    }
+
+    #[test]
+    fn failure_keeps_the_waveform_and_names_time_and_device() {
+        let error = ramp(false);
+        assert!(
+            error
+                .to_string()
+                .starts_with("at t = 2.5e0 s: d1: the one-step"),
+            "{error}"
+        );
+        let kept = error.partial.unwrap().waveforms;
+        assert_eq!(kept.time, [0.0, 1.0, 2.0]);
+        assert_eq!(kept.values, [0.0, 1.0, 2.0]);
+    }
+
+    #[test]
+    fn event_rows_do_not_repeat_the_grid_row() {
+        let kept = ramp(true).partial.unwrap().waveforms;
+        assert_eq!(kept.time, [0.0, 1.0, 1.0, 2.0]);
+        assert_eq!(kept.values, [0.0, -1.0, 1.0, 2.0]);
+    }
+}

@@ -1,0 +1,251 @@
+//! The chain warm active set → block pivoting → Lemke → clarabel, with one test on every way out.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::active::ActiveSolve;
+use super::lcp::{Answered, Lcp, Scaling, Solution, Status};
+use super::lemke::{self, Lemke};
+use super::{convex, norm, pivot};
+
+/// Factored active sets kept per matrix; the oldest goes first.
+const KEPT_SETS: usize = 64;
+
+/// A solver for many right-hand sides of one matrix M.
+#[derive(Debug, Clone)]
+pub struct Driver {
+    /// M equilibrated, q unused.
+    scaled: Lcp,
+    scaling: Scaling,
+    tolerance: f64,
+    monotone: bool,
+    warm: Vec<bool>,
+    sets: Vec<(Vec<bool>, ActiveSolve)>,
+    /// Factorisations computed so far.
+    pub factorisations: u64,
+}
+
+/// Violations below this multiple of the problem's size count as zero inside the pivoting methods (rounding of one solve).
+const SLACK: f64 = 1e-14;
+
+impl Driver {
+    /// Prepares M; `tolerance` is the scaled residual at which a solution is accepted.
+    #[must_use]
+    pub fn new(m: DMatrix<f64>, tolerance: f64) -> Self {
+        let scaling = Scaling::of(&m);
+        let size = m.nrows();
+        let scaled = scaling.apply(&Lcp {
+            m,
+            q: DVector::zeros(size),
+        });
+        let monotone = is_monotone(&scaled.m);
+        Self {
+            scaled,
+            scaling,
+            tolerance,
+            monotone,
+            warm: vec![false; size],
+            sets: Vec::new(),
+            factorisations: 0,
+        }
+    }
+
+    /// Whether M + Mᵀ ⪰ 0 (to rounding).
+    #[must_use]
+    pub fn is_monotone(&self) -> bool {
+        self.monotone
+    }
+
+    /// Proposes the active set to try first.
+    pub fn suggest(&mut self, active: &[bool]) {
+        self.warm.copy_from_slice(active);
+    }
+
+    /// Solves for one q.
+    pub fn solve(&mut self, q: &DVector<f64>) -> Solution {
+        self.scaled.q = q.component_mul(&self.scaling.d);
+        let size = self.scaled.size();
+        let slack = SLACK * self.scaled.q.amax();
+        let mut best = self.candidate(DVector::zeros(size), Answered::Warm);
+        if best.residual <= self.tolerance {
+            return self.accept(best);
+        }
+        let chain: [fn(&mut Self, f64) -> Option<(DVector<f64>, Answered)>; 4] = [
+            Self::try_warm,
+            Self::try_block,
+            Self::try_lemke,
+            Self::try_convex,
+        ];
+        for (k, method) in chain.iter().enumerate() {
+            if let Some((lambda, by)) = method(self, slack) {
+                let found = self.candidate(lambda, by);
+                if found.residual <= self.tolerance {
+                    return self.accept(found);
+                }
+                if found.residual < best.residual {
+                    best = found;
+                }
+            }
+            // Lemke's ray ends the search where it is a verified proof.
+            if k == 2
+                && let Some(ray) = self.infeasible()
+            {
+                best.status = Status::Infeasible(ray);
+                best.by = Answered::Lemke;
+                return best;
+            }
+        }
+        best.by = Answered::Nobody;
+        best
+    }
+
+    /// The least-norm member of the solution set that `solution` belongs to, and whether the set is a single point. For
+    /// matrices that are not monotone the solution is returned as it is, and counted as unique where M_aa is regular.
+    #[must_use]
+    pub fn least_norm(&mut self, q: &DVector<f64>, solution: &Solution) -> (DVector<f64>, bool) {
+        self.scaled.q = q.component_mul(&self.scaling.d);
+        let scaled = solution.lambda.component_div(&self.scaling.d);
+        let y = self.scaled.y(&scaled);
+        let scale = scaled.amax().max(self.scaled.q.amax());
+        let strict = scaled
+            .iter()
+            .zip(y.iter())
+            .all(|(l, w)| l.max(*w) > self.tolerance * scale);
+        let regular = self.on_set(&solution.active).regular;
+        if !self.monotone || (strict && regular) {
+            return (solution.lambda.clone(), regular);
+        }
+        let (lambda, unique) = norm::least(&self.scaled, &scaled);
+        let lambda = self.scaling.unscale(&lambda);
+        let found = self.candidate(lambda.component_div(&self.scaling.d), solution.by);
+        if found.residual <= self.tolerance {
+            (found.lambda, unique)
+        } else {
+            (solution.lambda.clone(), unique)
+        }
+    }
+
+    /// The solve on one active set, cached.
+    fn on_set(&mut self, active: &[bool]) -> &ActiveSolve {
+        let at = if let Some(at) = self.sets.iter().position(|(set, _)| set == active) {
+            at
+        } else {
+            if self.sets.len() == KEPT_SETS {
+                self.sets.remove(0);
+            }
+            self.factorisations += 1;
+            self.sets
+                .push((active.to_vec(), ActiveSolve::new(&self.scaled.m, active)));
+            self.sets.len() - 1
+        };
+        &self.sets[at].1
+    }
+
+    fn refined_on(&mut self, active: &[bool]) -> DVector<f64> {
+        self.on_set(active);
+        let at = self
+            .sets
+            .iter()
+            .position(|(set, _)| set == active)
+            .unwrap_or(0);
+        self.sets[at].1.refined(&self.scaled)
+    }
+
+    fn try_warm(&mut self, _: f64) -> Option<(DVector<f64>, Answered)> {
+        let warm = self.warm.clone();
+        Some((self.refined_on(&warm), Answered::Warm))
+    }
+
+    fn try_block(&mut self, slack: f64) -> Option<(DVector<f64>, Answered)> {
+        pivot::solve(&self.scaled, &self.warm, slack).map(|l| (l, Answered::Block))
+    }
+
+    fn try_lemke(&mut self, _: f64) -> Option<(DVector<f64>, Answered)> {
+        let mut last = None;
+        for cover in covers(self.scaled.size()) {
+            if let Lemke::Basis(active) = lemke::solve(&self.scaled, &cover) {
+                let lambda = self.refined_on(&active);
+                let y = self.scaled.y(&lambda);
+                let one = Scaling {
+                    d: DVector::from_element(lambda.len(), 1.0),
+                };
+                let good = one.residual(&self.scaled, &lambda, &y) <= self.tolerance;
+                last = Some((lambda, Answered::Lemke));
+                if good {
+                    break;
+                }
+            }
+        }
+        last
+    }
+
+    fn try_convex(&mut self, _: f64) -> Option<(DVector<f64>, Answered)> {
+        if !self.monotone {
+            return None;
+        }
+        let rough = convex::solve(&self.scaled)?;
+        let y = self.scaled.y(&rough);
+        let active: Vec<bool> = (0..rough.len()).map(|j| rough[j] > y[j]).collect();
+        Some((self.refined_on(&active), Answered::Convex))
+    }
+
+    /// A verified Farkas certificate v ≥ 0, Mᵀv ≤ 0, qᵀv < 0 from Lemke's rays, in the units of q: v scaled to qᵀv = −1.
+    fn infeasible(&self) -> Option<DVector<f64>> {
+        let size = self.scaled.size();
+        covers(size).iter().find_map(|cover| {
+            let Lemke::Ray(ray) = lemke::solve(&self.scaled, cover) else {
+                return None;
+            };
+            let gain = self.scaled.q.dot(&ray);
+            let columns = self.scaled.m.transpose() * &ray;
+            let certain = gain < -self.tolerance * self.scaled.q.amax() * ray.amax()
+                && columns.max() <= self.tolerance * ray.amax();
+            certain.then(|| self.scaling.unscale(&(ray / -gain)))
+        })
+    }
+
+    /// λ' clipped to λ' ≥ 0 where it is negative by rounding, with its residual in scaled variables.
+    fn candidate(&self, scaled: DVector<f64>, by: Answered) -> Solution {
+        let size = scaled.len();
+        let one = Scaling {
+            d: DVector::from_element(size, 1.0),
+        };
+        let clipped = scaled.map(|v| v.max(0.0));
+        let y = self.scaled.y(&clipped);
+        let residual = one.residual(&self.scaled, &clipped, &y);
+        let active = one.active(&clipped, &y);
+        Solution {
+            status: Status::Failed,
+            lambda: self.scaling.unscale(&clipped),
+            y: y.component_div(&self.scaling.d),
+            residual,
+            active,
+            by,
+        }
+    }
+
+    fn accept(&mut self, mut found: Solution) -> Solution {
+        found.status = Status::Solved;
+        self.warm.copy_from_slice(&found.active);
+        found
+    }
+}
+
+/// Covering vectors for Lemke: ones, then two deterministic others for the rare run that rounding leads astray.
+fn covers(size: usize) -> [DVector<f64>; 3] {
+    let varied = |step: f64| DVector::from_fn(size, |i, _| 1.0 + (i as f64 * step).fract());
+    [
+        DVector::from_element(size, 1.0),
+        varied(0.618_033_988_749_894_9),
+        varied(0.414_213_562_373_095_1),
+    ]
+}
+
+/// Whether M + Mᵀ has no eigenvalue below −`ROUNDING` times its largest.
+fn is_monotone(m: &DMatrix<f64>) -> bool {
+    const ROUNDING: f64 = 1e-12;
+    if m.is_empty() {
+        return true;
+    }
+    let eigenvalues = (m + m.transpose()).symmetric_eigenvalues();
+    eigenvalues.min() >= -ROUNDING * m.amax().max(eigenvalues.amax())
+}
