@@ -1,8 +1,21 @@
 //! From a complementarity system to waveforms.
 
 pub mod exact;
+pub mod control;
+pub mod energy;
+#[cfg(test)]
+pub(crate) mod fixtures;
+pub mod inputs;
+pub mod jump;
+pub mod reading;
 pub mod run;
 pub mod stats;
+pub mod step;
+pub mod switching;
+pub mod system;
+pub mod theta;
+#[cfg(test)]
+mod theta_tests;
 
 pub use run::{Frame, Grid, Log, Outcome, Reason, SimError, Stepper};
 pub use stats::{Energy, Impulse, Run, Stats};
