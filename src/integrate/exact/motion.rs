@@ -47,14 +47,23 @@ pub(crate) struct Motion {
     polynomials: Vec<f64>,
     amplitude: Vec<f64>,
     floors: Vec<f64>,
+    /// How far below zero each guard was on entry, by rounding of the time or of simultaneous events.
+    slack: Vec<f64>,
     steady: bool,
     since_refresh: u32,
     degree: usize,
 }
 
 impl Motion {
-    /// Enters a mode at `t` with state `x`, exosystem values from their closed form.
-    pub(crate) fn enter(&mut self, flow: &Flow, exosystem: &Exosystem, t: f64, x: &[f64]) {
+    /// Enters a mode at `t` with state `x` of amplitudes `amplitude`, exosystem values from their closed form.
+    pub(crate) fn enter(
+        &mut self,
+        flow: &Flow,
+        exosystem: &Exosystem,
+        t: f64,
+        x: &[f64],
+        amplitude: &[f64],
+    ) {
         let length = flow.dim() + 2 * flow.guards();
         self.t = t;
         self.entered = t;
@@ -66,18 +75,12 @@ impl Motion {
         exosystem.write(t, &mut self.now[x.len()..flow.dim()]);
         flow.read_guards(&mut self.now);
         self.amplitude.clear();
-        self.amplitude.extend(self.now[..flow.dim()].iter().map(|v| v.abs()));
+        self.amplitude.extend_from_slice(amplitude);
+        self.amplitude.resize(flow.dim(), 0.0);
         self.steady = flow.guards() == 0;
-        self.refresh_noise(flow);
-    }
-
-    /// The sources changed at the current time: the exosystem is set anew, transients may start.
-    pub(crate) fn change_sources(&mut self, flow: &Flow, exosystem: &Exosystem) {
-        let n = flow.dim() - exosystem.dim();
-        exosystem.write(self.t, &mut self.now[n..flow.dim()]);
-        flow.read_guards(&mut self.now);
-        self.entered = self.t;
-        self.steady = flow.guards() == 0;
+        let guards = &self.now[flow.dim()..flow.dim() + flow.guards()];
+        self.slack.clear();
+        self.slack.extend(guards.iter().map(|g| (-g).max(0.0)));
         self.refresh_noise(flow);
     }
 
@@ -86,16 +89,14 @@ impl Motion {
         &self.now[..n]
     }
 
-    /// Rounding noise of guard i at the current amplitudes.
-    pub(crate) fn floor(&self, i: usize) -> f64 {
-        self.floors[i]
-    }
-
     fn refresh_noise(&mut self, flow: &Flow) {
         for (a, v) in self.amplitude.iter_mut().zip(&self.now) {
             *a = a.max(v.abs());
         }
         flow.noise(&self.amplitude, &mut self.floors);
+        for (floor, slack) in self.floors.iter_mut().zip(&self.slack) {
+            *floor += slack;
+        }
         self.since_refresh = 0;
     }
 
@@ -153,9 +154,6 @@ impl Motion {
             loop {
                 let span = 1_u64 << (bottom - level);
                 let end = if units == span { stop } else { stop - (units - span) as f64 * unit };
-                if level == bottom && flow.guards() > 0 && flow.step(level) > 0.5 * limit {
-                    // Taylor's step looks at the guards closely anyway
-                }
                 if !flow.leap(level, &self.now, &mut self.next) {
                     return Arrival::Overflow;
                 }
