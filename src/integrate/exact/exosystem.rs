@@ -3,54 +3,14 @@
 use nalgebra::DMatrix;
 
 use super::spectrum::Rate;
+use crate::circuit::Source;
+use crate::circuit::source::{Oscillation, Piece};
 
-/// A source between two breakpoints:
-/// u(t) = value + slope (t − from) + Σ amplitude·e^{−damping (t − from)}·sin(omega (t − from) + phase).
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Piece {
-    /// Start, s.
-    pub(crate) from: f64,
-    /// End, s; infinite for the last piece.
-    pub(crate) to: f64,
-    /// Constant term.
-    pub(crate) value: f64,
-    /// 1/s.
-    pub(crate) slope: f64,
-    /// Damped sinusoids.
-    pub(crate) waves: Vec<Term>,
-}
-
-/// amplitude·e^{−damping τ}·sin(omega τ + phase).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Term {
-    pub(crate) amplitude: f64,
-    pub(crate) damping: f64,
-    pub(crate) omega: f64,
-    pub(crate) phase: f64,
-}
-
-impl Piece {
-    /// Value and slope of the source at t.
-    pub(crate) fn at(&self, t: f64) -> (f64, f64) {
-        let tau = t - self.from;
-        let mut value = self.value + self.slope * tau;
-        let mut slope = self.slope;
-        for term in &self.waves {
-            let (s, c) = term.pair(tau);
-            value += s;
-            slope += term.omega * c - term.damping * s;
-        }
-        (value, slope)
-    }
-}
-
-impl Term {
-    /// (sine part, cosine part) after τ seconds; for omega = 0 the first alone is the term.
-    fn pair(&self, tau: f64) -> (f64, f64) {
-        let envelope = self.amplitude * (-self.damping * tau).exp();
-        let (s, c) = (self.omega * tau + self.phase).sin_cos();
-        (envelope * s, envelope * c)
-    }
+/// (sine part, cosine part) of a term τ seconds after its origin; for frequency 0 the first alone is the term.
+fn pair(term: &Oscillation, tau: f64) -> (f64, f64) {
+    let envelope = term.amplitude * (-term.decay * tau).exp();
+    let (s, c) = (term.frequency * tau + term.phase).sin_cos();
+    (envelope * s, envelope * c)
 }
 
 /// What a column of z carries.
@@ -58,7 +18,7 @@ impl Term {
 enum Column {
     /// The constant 1.
     One,
-    /// value + slope (t − from) of an input; its slope follows.
+    /// constant + slope (t − origin) of an input; its slope follows.
     Line { input: usize },
     /// A value that is constant between breakpoints.
     Step { input: usize },
@@ -101,8 +61,8 @@ impl Shape {
         for (k, piece) in pieces.into_iter().enumerate() {
             shape.changes |= k > 0;
             shape.sloped |= piece.slope != 0.0;
-            for term in &piece.waves {
-                let key = (term.damping, term.omega);
+            for term in piece.terms() {
+                let key = (term.decay, term.frequency);
                 if !shape.waves.contains(&key) {
                     shape.waves.push(key);
                 }
@@ -113,6 +73,27 @@ impl Shape {
 }
 
 impl Exosystem {
+    /// The exosystem of these sources over [from, until]; `None` if one has no closed form.
+    pub(crate) fn of(sources: &[Source], from: f64, until: f64) -> Option<Self> {
+        let mut shapes = Vec::new();
+        let mut first = Vec::new();
+        for source in sources {
+            let mut t = from;
+            let mut pieces = Vec::new();
+            loop {
+                let piece = source.piece(t)?;
+                pieces.push(piece);
+                if piece.end >= until {
+                    break;
+                }
+                t = piece.end;
+            }
+            shapes.push(Shape::of(&pieces));
+            first.push(pieces[0]);
+        }
+        Some(Self::new(&shapes, first))
+    }
+
     /// The structure for inputs of these shapes, standing on their first pieces.
     pub(crate) fn new(shapes: &[Shape], first: Vec<Piece>) -> Self {
         let mut columns = vec![Column::One];
@@ -126,8 +107,8 @@ impl Exosystem {
                 } else {
                     columns.push(Column::Step { input });
                 }
-            } else if piece.value != 0.0 {
-                output.push((input, 0, piece.value));
+            } else if piece.constant != 0.0 {
+                output.push((input, 0, piece.constant));
             }
             for &(damping, omega) in &shape.waves {
                 if shape.changes || damping != 0.0 {
@@ -144,8 +125,8 @@ impl Exosystem {
                     columns.push(Column::Quadrature);
                     columns.len() - 2
                 });
-                for term in piece.waves.iter().filter(|t| (t.damping, t.omega) == (damping, omega)) {
-                    let (s, c) = (term.phase - omega * piece.from).sin_cos();
+                for term in piece.terms().filter(|t| (t.decay, t.frequency) == (damping, omega)) {
+                    let (s, c) = (term.phase - omega * piece.origin).sin_cos();
                     output.push((input, at, term.amplitude * c));
                     output.push((input, at + 1, term.amplitude * s));
                 }
@@ -208,7 +189,7 @@ impl Exosystem {
 
     /// The next breakpoint, s.
     pub(crate) fn next_breakpoint(&self) -> f64 {
-        self.pieces.iter().map(|p| p.to).fold(f64::INFINITY, f64::min)
+        self.pieces.iter().map(|p| p.end).fold(f64::INFINITY, f64::min)
     }
 
     /// z(t) on the current pieces, from closed forms.
@@ -218,15 +199,15 @@ impl Exosystem {
                 Column::One => z[k] = 1.0,
                 Column::Line { input } => {
                     let piece = &self.pieces[input];
-                    z[k] = piece.value + piece.slope * (t - piece.from);
+                    z[k] = piece.constant + piece.slope * (t - piece.origin);
                 }
-                Column::Step { input } => z[k] = self.pieces[input].value,
+                Column::Step { input } => z[k] = self.pieces[input].constant,
                 Column::Slope { input } => z[k] = self.pieces[input].slope,
                 Column::Wave { input, damping, omega } => {
                     let piece = &self.pieces[input];
                     let (mut sine, mut cosine) = (0.0, 0.0);
-                    for term in piece.waves.iter().filter(|w| (w.damping, w.omega) == (damping, omega)) {
-                        let (s, c) = term.pair(t - piece.from);
+                    for term in piece.terms().filter(|w| (w.decay, w.frequency) == (damping, omega)) {
+                        let (s, c) = pair(term, t - piece.origin);
                         sine += s;
                         cosine += c;
                     }
@@ -250,47 +231,56 @@ impl Exosystem {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::circuit::source::Wave;
     use nalgebra::DVector;
 
-    fn sine(amplitude: f64, damping: f64, omega: f64, phase: f64, from: f64) -> Piece {
-        Piece {
-            from,
-            to: f64::INFINITY,
-            value: 0.5,
-            slope: 0.0,
-            waves: vec![Term { amplitude, damping, omega, phase }],
-        }
+    fn source(wave: Wave) -> Source {
+        Source { dc: 0.0, wave }
     }
 
-    /// H z(t) is the source and H S z(t) its derivative, for every kind of column.
+    fn sine(amplitude: f64, damping: f64, phase: f64, delay: f64) -> Source {
+        source(Wave::Sin { offset: 0.5, amplitude, frequency: 3.0, delay, damping, phase })
+    }
+
+    /// H z(t) is the source and H S z(t) its derivative, for every kind of column, across breakpoints.
     #[test]
     fn reproduces_sources_and_their_derivatives() {
-        let line = Piece { from: 1.0, to: 2.0, value: 3.0, slope: -4.0, waves: vec![] };
-        let step = Piece { from: 0.0, to: 2.0, value: 7.0, slope: 0.0, waves: vec![] };
-        let pieces = vec![
-            line.clone(),
-            step.clone(),
-            sine(2.0, 0.0, 10.0, 0.3, 0.0),
-            sine(3.0, 0.0, 10.0, -1.0, 0.0),
-            sine(1.5, 2.0, 7.0, 0.2, 0.25),
-            sine(1.5, 3.0, 0.0, std::f64::consts::FRAC_PI_2, 0.5),
+        let sources = vec![
+            source(Wave::Pwl { points: vec![(0.0, 1.0), (1.0, 3.0), (2.0, -1.0)], repeat: None, delay: 0.0 }),
+            source(Wave::Pwl {
+                points: vec![(0.0, 1.0), (0.5, 1.0), (0.5, 4.0)],
+                repeat: None,
+                delay: 0.0,
+            }),
+            sine(2.0, 0.0, 30.0, 0.0),
+            sine(3.0, 0.0, -60.0, 0.0),
+            sine(1.5, 2.0, 10.0, 0.25),
+            source(Wave::Exp {
+                v1: 1.0,
+                v2: 2.0,
+                rise_delay: 0.1,
+                rise_tau: 0.3,
+                fall_delay: 0.7,
+                fall_tau: 0.2,
+            }),
+            source(Wave::Dc(4.0)),
         ];
-        let mut shapes: Vec<Shape> = pieces.iter().map(|p| Shape::of([p])).collect();
-        shapes[1].changes = true;
-        let exosystem = Exosystem::new(&shapes, pieces.clone());
-        // one, line 2, step 1, one shared pair, a damped pair, a decay
-        assert_eq!(exosystem.dim(), 1 + 2 + 1 + 2 + 2 + 1);
+        let mut exosystem = Exosystem::of(&sources, 0.0, 3.0).unwrap();
+        // one, a line 2, a step 1, one shared pair, a damped pair, two decays
+        assert_eq!(exosystem.dim(), 1 + 2 + 1 + 2 + 2 + 2);
         let mut z = DVector::zeros(exosystem.dim());
-        for t in [1.0, 1.1, 1.7] {
+        for t in [0.0, 0.05, 0.2, 0.3, 0.5, 0.71, 1.0, 1.7, 2.5] {
+            for (i, source) in sources.iter().enumerate() {
+                exosystem.set_piece(i, source.piece(t).unwrap());
+            }
             exosystem.write(t, z.as_mut_slice());
             let u = exosystem.output() * &z;
             let du = exosystem.output() * (exosystem.generator() * &z);
-            for (i, piece) in pieces.iter().enumerate() {
-                let (value, slope) = piece.at(t);
-                assert!((u[i] - value).abs() < 1e-14, "input {i}");
-                assert!((du[i] - slope).abs() < 1e-13, "input {i}");
+            for (i, source) in sources.iter().enumerate() {
+                assert!((u[i] - source.value(t)).abs() < 1e-14 * 8.0, "input {i} at {t}");
+                assert!((du[i] - source.derivative(t)).abs() < 1e-12, "input {i} at {t}");
             }
         }
-        assert_eq!(exosystem.next_breakpoint(), 2.0);
+        assert_eq!(exosystem.next_breakpoint(), f64::INFINITY);
     }
 }

@@ -4,8 +4,16 @@
 mod exosystem;
 mod expm;
 mod flow;
+mod free;
+mod inspect;
 mod kernel;
+mod mode;
 mod motion;
+mod plant;
 mod polynomial;
 mod rays;
 mod spectrum;
+mod stepper;
+
+pub use plant::Assemble;
+pub use stepper::{Exact, Setup};
