@@ -19,7 +19,7 @@ pub enum Severity {
 pub struct FileId(pub u32);
 
 /// A byte range in one file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Span {
     /// The file.
     pub file: FileId,
@@ -27,6 +27,27 @@ pub struct Span {
     pub start: usize,
     /// One past the last byte.
     pub end: usize,
+}
+
+impl Span {
+    /// From the start of this span to the end of another one in the same file.
+    #[must_use]
+    pub fn to(self, other: Self) -> Self {
+        if self.file == other.file {
+            Self {
+                end: other.end.max(self.end),
+                ..self
+            }
+        } else {
+            self
+        }
+    }
+}
+
+impl fmt::Debug for Span {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}..{}", self.file.0, self.start, self.end)
+    }
 }
 
 /// One file as read: its name for messages and its text (already UTF-8).
@@ -48,23 +69,37 @@ pub struct SourceMap {
 impl SourceMap {
     /// Adds a file.
     pub fn add(&mut self, path: impl Into<String>, text: impl Into<String>) -> FileId {
-        self.files.push(SourceFile { path: path.into(), text: text.into() });
+        self.files.push(SourceFile {
+            path: path.into(),
+            text: text.into(),
+        });
         FileId(u32::try_from(self.files.len() - 1).unwrap_or(u32::MAX))
     }
 
     /// The text a span covers.
     #[must_use]
     pub fn text(&self, span: Span) -> &str {
-        self.files.get(span.file.0 as usize).and_then(|f| f.text.get(span.start..span.end)).unwrap_or("")
+        self.files
+            .get(span.file.0 as usize)
+            .and_then(|f| f.text.get(span.start..span.end))
+            .unwrap_or("")
     }
 
     /// The 1-based line and column (in characters) where a span starts.
     #[must_use]
     pub fn line_column(&self, span: Span) -> (usize, usize) {
-        let Some(file) = self.files.get(span.file.0 as usize) else { return (0, 0) };
-        let before = file.text.get(..span.start.min(file.text.len())).unwrap_or("");
+        let Some(file) = self.files.get(span.file.0 as usize) else {
+            return (0, 0);
+        };
+        let before = file
+            .text
+            .get(..span.start.min(file.text.len()))
+            .unwrap_or("");
         let line_start = before.rfind('\n').map_or(0, |i| i + 1);
-        (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
+        (
+            before.matches('\n').count() + 1,
+            before[line_start..].chars().count() + 1,
+        )
     }
 }
 
@@ -87,22 +122,46 @@ pub struct Diagnostic {
 
 impl Diagnostic {
     /// A finding at a place.
-    pub fn new(code: &'static str, severity: Severity, span: impl Into<Option<Span>>, message: impl Into<String>) -> Self {
-        Self { code, severity, message: message.into(), span: span.into(), label: String::new(), help: None }
+    pub fn new(
+        code: &'static str,
+        severity: Severity,
+        span: impl Into<Option<Span>>,
+        message: impl Into<String>,
+    ) -> Self {
+        Self {
+            code,
+            severity,
+            message: message.into(),
+            span: span.into(),
+            label: String::new(),
+            help: None,
+        }
     }
 
     /// An error at a place.
-    pub fn error(code: &'static str, span: impl Into<Option<Span>>, message: impl Into<String>) -> Self {
+    pub fn error(
+        code: &'static str,
+        span: impl Into<Option<Span>>,
+        message: impl Into<String>,
+    ) -> Self {
         Self::new(code, Severity::Error, span, message)
     }
 
     /// A warning at a place.
-    pub fn warning(code: &'static str, span: impl Into<Option<Span>>, message: impl Into<String>) -> Self {
+    pub fn warning(
+        code: &'static str,
+        span: impl Into<Option<Span>>,
+        message: impl Into<String>,
+    ) -> Self {
         Self::new(code, Severity::Warning, span, message)
     }
 
     /// A note at a place.
-    pub fn note(code: &'static str, span: impl Into<Option<Span>>, message: impl Into<String>) -> Self {
+    pub fn note(
+        code: &'static str,
+        span: impl Into<Option<Span>>,
+        message: impl Into<String>,
+    ) -> Self {
         Self::new(code, Severity::Note, span, message)
     }
 

@@ -19,7 +19,12 @@
 //! netlist → circuit → mna → lcs → plan → integrate (with solve) → waveform → report
 //! ```
 
+// Lets the systems under tests/ be used by the library's own tests as well.
+#[cfg(test)]
+extern crate self as circ;
+
 pub mod algebra;
+pub mod check;
 pub mod circuit;
 pub mod diagnostic;
 pub mod integrate;
@@ -27,6 +32,7 @@ pub mod law;
 pub mod lcs;
 pub mod mna;
 pub mod netlist;
+pub mod passivity;
 pub mod report;
 pub mod settings;
 pub mod solve;

@@ -21,7 +21,10 @@ impl Value {
     /// The decimal rational `mantissa · 10^exponent`; `f64` must be its nearest double.
     #[must_use]
     pub const fn decimal(f64: f64, mantissa: i128, exponent: i32) -> Self {
-        Self { f64, decimal: Some((mantissa, exponent)) }
+        Self {
+            f64,
+            decimal: Some((mantissa, exponent)),
+        }
     }
 }
 

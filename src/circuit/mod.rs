@@ -1,12 +1,25 @@
 //! The flattened circuit: nodes, elements with evaluated values, sources, initial conditions, what to print.
 //!
-//! [`elaborate`](crate::netlist) fills it from a netlist; nothing here knows SPICE text or matrices.
+//! [`elaborate`] fills it from a netlist; nothing here knows SPICE text or matrices.
 
+mod builder;
+mod controlled;
+mod device;
+mod drive;
+mod elaborate;
+mod eval;
+mod functions;
+pub(crate) mod load;
+mod names;
+mod passive;
+mod probe;
+mod scope;
 pub mod source;
 
 use crate::algebra::Value;
 use crate::diagnostic::Span;
 use crate::law::Law;
+pub use elaborate::{Diodes, ElaborateOptions, elaborate};
 pub use source::Source;
 
 /// A node; 0 is ground.
@@ -206,13 +219,19 @@ impl Circuit {
     /// The element with this canonical name.
     #[must_use]
     pub fn element(&self, name: &str) -> Option<ElementId> {
-        self.elements.iter().position(|e| e.name == name).map(|i| ElementId(i as u32))
+        self.elements
+            .iter()
+            .position(|e| e.name == name)
+            .map(|i| ElementId(i as u32))
     }
 
     /// The node with this canonical name.
     #[must_use]
     pub fn node(&self, name: &str) -> Option<NodeId> {
-        self.nodes.iter().position(|n| n == name).map(|i| NodeId(i as u32))
+        self.nodes
+            .iter()
+            .position(|n| n == name)
+            .map(|i| NodeId(i as u32))
     }
 
     /// What to print: the probes asked for, else all node voltages, then voltage-source and inductor currents.
@@ -221,13 +240,20 @@ impl Circuit {
         if !self.probes.is_empty() {
             return self.probes.clone();
         }
-        let nodes = self.nodes.iter().enumerate().skip(1).map(|(i, name)| Probe {
-            name: format!("v({name})"),
-            what: Probed::Voltage(NodeId(i as u32), NodeId::GROUND),
-        });
+        let nodes = self
+            .nodes
+            .iter()
+            .enumerate()
+            .skip(1)
+            .map(|(i, name)| Probe {
+                name: format!("v({name})"),
+                what: Probed::Voltage(NodeId(i as u32), NodeId::GROUND),
+            });
         let currents = self.elements.iter().enumerate().filter_map(|(i, e)| {
-            matches!(e.kind, Kind::VoltageSource(_) | Kind::Inductor(_))
-                .then(|| Probe { name: format!("i({})", e.name), what: Probed::Current(ElementId(i as u32)) })
+            matches!(e.kind, Kind::VoltageSource(_) | Kind::Inductor(_)).then(|| Probe {
+                name: format!("i({})", e.name),
+                what: Probed::Current(ElementId(i as u32)),
+            })
         });
         nodes.chain(currents).collect()
     }

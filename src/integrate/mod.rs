@@ -4,6 +4,7 @@ pub mod exact;
 pub mod control;
 pub mod energy;
 #[cfg(test)]
+#[path = "../../tests/systems/mod.rs"]
 pub(crate) mod fixtures;
 pub mod inputs;
 pub mod jump;
@@ -14,8 +15,6 @@ pub mod step;
 pub mod switching;
 pub mod system;
 pub mod theta;
-#[cfg(test)]
-mod theta_tests;
 
 pub use run::{Frame, Grid, Log, Outcome, Reason, SimError, Stepper};
 pub use stats::{Energy, Impulse, Run, Stats};

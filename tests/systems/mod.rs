@@ -1,18 +1,21 @@
-//! Systems of CIRCUITS written down by hand, for tests of the steppers.
+//! Published circuits as systems written down by hand, for tests and benches of the steppers.
+//!
+//! Used from integration tests and, by path, from the library's own tests.
+#![allow(dead_code, missing_docs, reason = "every user takes its part")]
 
 use nalgebra::{DMatrix, DVector, dmatrix};
 
-use crate::law::Law;
-use crate::lcs::{Lcs, Outputs, Port, Role, Rows, State, Storage};
+use circ::law::Law;
+use circ::lcs::{Lcs, Outputs, Port, PowerKind, PowerTerm, Role, Rows, State, Storage};
 
-pub(crate) const R: f64 = 1e3;
-pub(crate) const C: f64 = 1e-6;
-pub(crate) const L: f64 = 1e-2;
-pub(crate) const CF: f64 = 300e-9;
+pub const R: f64 = 1e3;
+pub const C: f64 = 1e-6;
+pub const L: f64 = 1e-2;
+pub const CF: f64 = 300e-9;
 
 /// A system without inputs; states are voltages and currents by `units`, ports are named with their roles, probes are the
 /// states themselves.
-pub(crate) fn system(
+pub fn system(
     states: &[(&str, &'static str)],
     ports: &[(&str, Role)],
     [a, b, c, d]: [DMatrix<f64>; 4],
@@ -81,9 +84,27 @@ fn port(name: &str, role: Role) -> Port {
     }
 }
 
+/// Adds a resistor to the energy balance whose voltage is `weights`·λ.
+fn resistor(mut lcs: Lcs, ohms: f64, weights: &[f64], x: &[f64]) -> Lcs {
+    let row = |scale: f64| Rows {
+        x: DMatrix::from_row_slice(1, x.len(), x) * scale,
+        lambda: DMatrix::from_row_slice(1, weights.len(), weights) * scale,
+        u: DMatrix::zeros(1, 0),
+        du: DMatrix::zeros(1, 0),
+        one: DVector::zeros(1),
+    };
+    lcs.outputs.power = vec![PowerTerm {
+        element: "r1".into(),
+        kind: PowerKind::Dissipated,
+    }];
+    lcs.outputs.power_v = row(1.0);
+    lcs.outputs.power_i = row(1.0 / ohms);
+    lcs
+}
+
 /// Half-wave rectifier RLCD: x = (v_C, i_L), λ = i_D.
-pub(crate) fn rlcd() -> Lcs {
-    system(
+pub fn rlcd() -> Lcs {
+    let lcs = system(
         &[("v(c1)", "V"), ("i(l1)", "A")],
         &[("d1", Role::Current)],
         [
@@ -93,13 +114,14 @@ pub(crate) fn rlcd() -> Lcs {
             dmatrix![R],
         ],
         &[C, L],
-    )
+    );
+    resistor(lcs, R, &[R], &[0.0, 0.0])
 }
 
 /// Diode bridge with a resistor: x = (v_C, i_L), λ = (−v_DR1, −v_DF2, i_DF1, i_DR2).
-pub(crate) fn bridge() -> Lcs {
+pub fn bridge() -> Lcs {
     let g = 1.0 / R;
-    system(
+    let lcs = system(
         &[("v(c1)", "V"), ("i(l1)", "A")],
         &[
             ("dr1", Role::Voltage),
@@ -114,14 +136,15 @@ pub(crate) fn bridge() -> Lcs {
             dmatrix![g, g, -1.0, 0.0; g, g, 0.0, -1.0; 1.0, 0.0, 0.0, 0.0; 0.0, 1.0, 0.0, 0.0],
         ],
         &[C, L],
-    )
+    );
+    resistor(lcs, R, &[1.0, 1.0, 0.0, 0.0], &[0.0, 0.0])
 }
 
 /// Bridge with capacitor filter: x = (v_C, i_L, v_f), λ = (i_DR1, −v_DF2, i_DF1, i_DR2); D is skew.
-pub(crate) fn bridge_cap_filter() -> Lcs {
+pub fn bridge_cap_filter() -> Lcs {
     let c = 1.0 / C;
     let f = 1.0 / CF;
-    system(
+    let lcs = system(
         &[("v(c1)", "V"), ("i(l1)", "A"), ("v(cf)", "V")],
         &[
             ("dr1", Role::Current),
@@ -138,11 +161,12 @@ pub(crate) fn bridge_cap_filter() -> Lcs {
             ],
         ],
         &[C, L, CF],
-    )
+    );
+    resistor(lcs, R, &[0.0; 4], &[0.0, 0.0, 1.0])
 }
 
 /// A diode across a capacitor of 1 µF: x = v_C, λ = i_D, y = −v_C.
-pub(crate) fn clamped_capacitor() -> Lcs {
+pub fn clamped_capacitor() -> Lcs {
     system(
         &[("v(c1)", "V")],
         &[("d1", Role::Current)],

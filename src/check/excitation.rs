@@ -1,0 +1,83 @@
+//! What the hypotheses of the theorems ask of the sources: constant, continuous, bounded by what.
+
+use crate::circuit::Source;
+use crate::circuit::source::Wave;
+
+/// A source's waveform as a theorem sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Excitation {
+    /// Least value over all times.
+    pub low: f64,
+    /// Greatest value over all times.
+    pub high: f64,
+    /// Whether it has edges: then it is right-continuous of locally bounded variation, else locally absolutely continuous.
+    pub jumps: bool,
+}
+
+impl Excitation {
+    /// The facts about a source.
+    #[must_use]
+    pub fn of(source: &Source) -> Self {
+        let range = |values: &[f64], jumps: bool| Self {
+            low: values.iter().copied().fold(f64::INFINITY, f64::min),
+            high: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            jumps,
+        };
+        match &source.wave {
+            Wave::Dc(value) => range(&[*value], false),
+            Wave::Sin {
+                offset,
+                amplitude,
+                damping,
+                ..
+            } => {
+                // A negative damping grows without bound.
+                let size = if *damping < 0.0 {
+                    f64::INFINITY
+                } else {
+                    amplitude.abs()
+                };
+                if *amplitude == 0.0 {
+                    range(&[*offset], false)
+                } else {
+                    range(&[offset - size, offset + size], false)
+                }
+            }
+            Wave::Pulse {
+                v1, v2, rise, fall, ..
+            } => range(&[*v1, *v2], v1 != v2 && (*rise == 0.0 || *fall == 0.0)),
+            Wave::Pwl { points, repeat, .. } => {
+                let values: Vec<f64> = points.iter().map(|p| p.1).collect();
+                let edge = points
+                    .windows(2)
+                    .any(|w| w[0].0 == w[1].0 && w[0].1 != w[1].1);
+                let wraps = repeat.is_some_and(|start| {
+                    let last = points.last().map(|p| p.1);
+                    let first = points.iter().find(|p| p.0 >= start).map(|p| p.1);
+                    last != first
+                });
+                if values.is_empty() {
+                    range(&[0.0], false)
+                } else {
+                    range(&values, edge || wraps)
+                }
+            }
+            Wave::Exp {
+                v1,
+                v2,
+                rise_tau,
+                fall_tau,
+                ..
+            } => range(
+                &[*v1, *v2],
+                v1 != v2 && (*rise_tau == 0.0 || *fall_tau == 0.0),
+            ),
+        }
+    }
+
+    /// Whether it never changes.
+    #[must_use]
+    pub fn is_constant(&self) -> bool {
+        self.low == self.high
+    }
+}

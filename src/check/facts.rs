@@ -1,0 +1,408 @@
+//! What the theorems ask about, computed once: the normal form of the ports, constants apart from driven terms, the
+//! verdict on passivity, and the role swaps under which a hypothesis may be tried.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::excitation::Excitation;
+use super::feedthrough::Feedthrough;
+use crate::law::Law;
+use crate::lcs::{Lcs, Role};
+use crate::passivity::{self, Certificate, Strict, System, Verdict, gradient, strict};
+
+/// Ports up to which every set of role swaps is tried; beyond it none and single ones.
+const ALL_SWAPS: usize = 8;
+
+/// A closed interval, possibly unbounded.
+pub(super) type Interval = (f64, f64);
+
+/// What a theorem needs of a port's law −λ ∈ ∂φ(y).
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct PortLaw {
+    /// The device, for messages.
+    pub(super) device: String,
+    /// 0 ≤ λ ⟂ y ≥ 0 after the offsets of the normal form: φ is the indicator of [0, ∞).
+    pub(super) half_line: bool,
+    /// Closure of dom φ^{*,−}: the values of λ.
+    pub(super) lambda: Interval,
+    /// Closure of dom φ: the values of y.
+    pub(super) y: Interval,
+    /// φ^{*,−}(z) ≥ φ^{*,−}(0): the law passes through λ = 0, y = 0.
+    pub(super) through_origin: bool,
+    /// φ^{*,−}(z) > φ^{*,−}(0) for z ≠ 0: y = 0 only at λ = 0.
+    pub(super) strictly: bool,
+    /// The same with λ and y exchanged: λ = 0 only at y = 0.
+    pub(super) strictly_swapped: bool,
+}
+
+impl PortLaw {
+    /// The law with λ and y exchanged.
+    fn swapped(&self) -> Self {
+        Self {
+            lambda: self.y,
+            y: self.lambda,
+            strictly: self.strictly_swapped,
+            strictly_swapped: self.strictly,
+            ..self.clone()
+        }
+    }
+}
+
+/// A system with λ and y exchanged at some ports, and the laws to go with it.
+#[derive(Debug, Clone)]
+pub(super) struct Swap {
+    /// The exchanged ports.
+    pub(super) ports: Vec<usize>,
+    pub(super) system: System,
+    /// Constant part of y.
+    pub(super) f: DVector<f64>,
+    /// Driven part of y: columns for the sources that change.
+    pub(super) g: DMatrix<f64>,
+    pub(super) laws: Vec<PortLaw>,
+}
+
+impl Swap {
+    /// "" or " (λ and y exchanged at d1, d3)".
+    pub(super) fn note(&self) -> String {
+        if self.ports.is_empty() {
+            return String::new();
+        }
+        let names: Vec<&str> = self
+            .ports
+            .iter()
+            .map(|&j| self.laws[j].device.as_str())
+            .collect();
+        format!(" (with λ and y exchanged at {})", names.join(", "))
+    }
+}
+
+/// Everything the theorems are checked against.
+#[derive(Debug, Clone)]
+pub(super) struct Facts {
+    /// Normal form: constant offsets of diodes moved into F and e, on-resistances into D.
+    pub(super) system: System,
+    /// n: constant term of x', constant sources included.
+    pub(super) e: DVector<f64>,
+    /// m: constant term of y, constant sources and forward drops included.
+    pub(super) f: DVector<f64>,
+    /// n×q and m×q: columns of the sources that change in time.
+    pub(super) e_driven: DMatrix<f64>,
+    pub(super) g_driven: DMatrix<f64>,
+    /// Names and ranges of those sources.
+    pub(super) driven: Vec<(String, Excitation)>,
+    pub(super) laws: Vec<PortLaw>,
+    pub(super) energy: DMatrix<f64>,
+    pub(super) verdict: Verdict,
+    pub(super) strict: Option<Strict>,
+    pub(super) feedthrough: Feedthrough,
+    pub(super) state_names: Vec<String>,
+    /// [`Swap`]s to try, the given roles first.
+    pub(super) swaps: Vec<Swap>,
+}
+
+/// The corner points and rays of a law in the (v, i) plane.
+struct Graph {
+    first: (f64, f64),
+    vertices: Vec<(f64, f64)>,
+    last: (f64, f64),
+}
+
+impl Graph {
+    fn of(law: &Law) -> Self {
+        match law {
+            Law::Diode { vfwd, ron, roff } => {
+                let g = roff.map_or(0.0, |r| 1.0 / r.f64);
+                let last = if ron.f64 == 0.0 {
+                    (0.0, 1.0)
+                } else {
+                    (ron.f64, 1.0)
+                };
+                Self {
+                    first: (1.0, g),
+                    vertices: vec![(vfwd.f64, vfwd.f64 * g)],
+                    last,
+                }
+            }
+            Law::Curve(curve) => Self {
+                first: (curve.first.0.f64, curve.first.1.f64),
+                vertices: curve.vertices.iter().map(|(v, i)| (v.f64, i.f64)).collect(),
+                last: (curve.last.0.f64, curve.last.1.f64),
+            },
+        }
+    }
+
+    fn v(&self) -> Interval {
+        let low = if self.first.0 > 0.0 {
+            f64::NEG_INFINITY
+        } else {
+            self.vertices[0].0
+        };
+        let high = if self.last.0 > 0.0 {
+            f64::INFINITY
+        } else {
+            self.vertices[self.vertices.len() - 1].0
+        };
+        (low, high)
+    }
+
+    fn i(&self) -> Interval {
+        let low = if self.first.1 > 0.0 {
+            f64::NEG_INFINITY
+        } else {
+            self.vertices[0].1
+        };
+        let high = if self.last.1 > 0.0 {
+            f64::INFINITY
+        } else {
+            self.vertices[self.vertices.len() - 1].1
+        };
+        (low, high)
+    }
+
+    /// The pieces as pairs of end points, rays cut far out.
+    fn pieces(&self) -> Vec<((f64, f64), (f64, f64))> {
+        let far = 1e3
+            * self
+                .vertices
+                .iter()
+                .map(|p| p.0.abs().max(p.1.abs()))
+                .fold(1.0, f64::max);
+        let unit = |d: (f64, f64)| {
+            let size = d.0.abs().max(d.1.abs()).max(f64::MIN_POSITIVE);
+            (d.0 / size * far, d.1 / size * far)
+        };
+        let (first, last) = (unit(self.first), unit(self.last));
+        let (start, end) = (self.vertices[0], self.vertices[self.vertices.len() - 1]);
+        let mut points = vec![(start.0 - first.0, start.1 - first.1)];
+        points.extend(&self.vertices);
+        points.push((end.0 + last.0, end.1 + last.1));
+        points.windows(2).map(|w| (w[0], w[1])).collect()
+    }
+
+    /// The interval of `value` where `zero` vanishes, over all pieces; `None` if it never does.
+    fn zeros(
+        &self,
+        zero: impl Fn((f64, f64)) -> f64,
+        value: impl Fn((f64, f64)) -> f64,
+    ) -> Option<Interval> {
+        let mut found: Option<Interval> = None;
+        for (a, b) in self.pieces() {
+            let (za, zb) = (zero(a), zero(b));
+            let at = |s: f64| value(a) + s * (value(b) - value(a));
+            let hits: Vec<f64> = match (za == 0.0, zb == 0.0) {
+                (true, true) => vec![value(a), value(b)],
+                (true, false) => vec![value(a)],
+                (false, true) => vec![value(b)],
+                _ if za < 0.0 && zb > 0.0 => vec![at(za / (za - zb))],
+                _ => vec![],
+            };
+            for hit in hits {
+                let (low, high) = found.unwrap_or((hit, hit));
+                found = Some((low.min(hit), high.max(hit)));
+            }
+        }
+        found
+    }
+}
+
+fn port_law(device: &str, role: Role, law: &Law) -> PortLaw {
+    let graph = Graph::of(law);
+    let contains_zero =
+        |interval: Option<Interval>| interval.is_some_and(|(low, high)| low <= 0.0 && high >= 0.0);
+    let only_zero = |interval: Option<Interval>| interval == Some((0.0, 0.0));
+    let negated = |(low, high): Interval| (-high, -low);
+    // Current: λ = i, y = −v. Voltage: λ = −v, y = i. A function block's (input, output) is read as (v, i) with y = v
+    // and λ = output; −λ ∈ ∂φ(y) then holds for φ concave, so nothing is claimed about it.
+    let i_where_v_vanishes = graph.zeros(|p| p.0, |p| p.1);
+    let v_where_i_vanishes = graph.zeros(|p| p.1, |p| p.0);
+    let (lambda, y, zero_set, swapped) = match role {
+        Role::Current => (
+            graph.i(),
+            negated(graph.v()),
+            i_where_v_vanishes,
+            v_where_i_vanishes,
+        ),
+        Role::Voltage => (
+            negated(graph.v()),
+            graph.i(),
+            v_where_i_vanishes,
+            i_where_v_vanishes,
+        ),
+        Role::Function => (graph.i(), graph.v(), i_where_v_vanishes, v_where_i_vanishes),
+    };
+    PortLaw {
+        device: device.to_string(),
+        half_line: false,
+        lambda,
+        y,
+        through_origin: role != Role::Function && contains_zero(zero_set),
+        strictly: role != Role::Function && only_zero(zero_set),
+        strictly_swapped: role != Role::Function && only_zero(swapped),
+    }
+}
+
+impl Facts {
+    /// Collects the facts; decides passivity.
+    pub(super) fn collect(lcs: &Lcs) -> Self {
+        let (n, m) = (lcs.n(), lcs.m());
+        let mut system = System::of(lcs);
+        let (mut e, mut f) = (lcs.e0.clone(), lcs.f.clone());
+        let mut laws = Vec::with_capacity(m);
+        for (j, port) in lcs.ports.iter().enumerate() {
+            let mut law = port_law(&port.device, port.role, &port.law);
+            if let (
+                Law::Diode {
+                    vfwd,
+                    ron,
+                    roff: None,
+                },
+                Role::Current | Role::Voltage,
+            ) = (&port.law, port.role)
+            {
+                let offset = vfwd.f64;
+                match port.role {
+                    // y + vfwd + ron λ ≥ 0 ⟂ λ ≥ 0.
+                    Role::Current => {
+                        system.d[(j, j)] += ron.f64;
+                        f[j] += offset;
+                        law.half_line = true;
+                    }
+                    // λ + vfwd ≥ 0 ⟂ y ≥ 0; an on-resistance would mix y into λ and stays a law.
+                    _ if ron.f64 == 0.0 => {
+                        f -= system.d.column(j) * offset;
+                        e -= system.b.column(j) * offset;
+                        law.half_line = true;
+                    }
+                    _ => {}
+                }
+                if law.half_line {
+                    (law.lambda, law.y) = ((0.0, f64::INFINITY), (0.0, f64::INFINITY));
+                    // φ^{*,−}(z) = Fz on z ≥ 0 once the offset F is counted in: the theorems look at F.
+                    (law.through_origin, law.strictly, law.strictly_swapped) = (true, false, false);
+                }
+            }
+            laws.push(law);
+        }
+        let mut driven = Vec::new();
+        let mut columns = Vec::new();
+        for (k, input) in lcs.inputs.iter().enumerate() {
+            let excitation = Excitation::of(&input.source);
+            if excitation.is_constant() {
+                e += lcs.e.column(k) * excitation.low;
+                f += lcs.g.column(k) * excitation.low;
+            } else {
+                driven.push((input.name.clone(), excitation));
+                columns.push(k);
+            }
+        }
+        let verdict = passivity::decide(&system, Some(&lcs.energy));
+        let strict = verdict
+            .certificate()
+            .map(|c| strict::maximise(&system, &c.p, c.from));
+        let g_driven = lcs.g.select_columns(&columns);
+        let mut facts = Self {
+            e_driven: lcs.e.select_columns(&columns),
+            feedthrough: Feedthrough::of(&lcs.d),
+            swaps: Vec::new(),
+            energy: lcs.energy.clone(),
+            state_names: lcs.states.iter().map(|s| s.name.clone()).collect(),
+            system,
+            e,
+            f,
+            g_driven,
+            driven,
+            laws,
+            verdict,
+            strict,
+        };
+        debug_assert_eq!(facts.energy.shape(), (n, n));
+        facts.swaps = facts.all_swaps();
+        facts
+    }
+
+    /// The certificate, if the system is passive.
+    pub(super) fn certificate(&self) -> Option<&Certificate> {
+        self.verdict.certificate()
+    }
+
+    /// Whether nothing moves by itself: no source changes in time.
+    pub(super) fn is_autonomous(&self) -> bool {
+        self.e_driven.amax() == 0.0 && self.g_driven.amax() == 0.0
+    }
+
+    /// Whether a changing source enters y.
+    pub(super) fn drives_y(&self) -> bool {
+        !self.g_driven.is_empty() && self.g_driven.amax() > 0.0
+    }
+
+    /// The sources that enter y and have edges.
+    pub(super) fn edges(&self) -> Vec<&str> {
+        self.driven
+            .iter()
+            .enumerate()
+            .filter(|(k, (_, x))| x.jumps && self.g_driven.column(*k).amax() > 0.0)
+            .map(|(_, (name, _))| name.as_str())
+            .collect()
+    }
+
+    /// Some P ≻ 0 with PB = Cᵀ for the given ports of a swap: the stored energy if it fits, then the certificate's P, then
+    /// any.
+    pub(super) fn storage(&self, swap: &Swap, ports: &[usize]) -> Option<DMatrix<f64>> {
+        let b = swap.system.b.select_columns(ports);
+        let c = swap.system.c.select_rows(ports);
+        gradient::storage(&b, &c, Some(&self.energy)).or_else(|| {
+            self.certificate()
+                .and_then(|p| gradient::storage(&b, &c, Some(&p.p)))
+        })
+    }
+
+    fn all_swaps(&self) -> Vec<Swap> {
+        let m = self.system.m();
+        let sets: Vec<Vec<usize>> = if m <= ALL_SWAPS {
+            let mut masks: Vec<usize> = (0..1_usize << m).collect();
+            masks.sort_by_key(|mask| mask.count_ones());
+            masks
+                .iter()
+                .map(|mask| (0..m).filter(|j| mask >> j & 1 == 1).collect())
+                .collect()
+        } else {
+            std::iter::once(Vec::new())
+                .chain((0..m).map(|j| vec![j]))
+                .collect()
+        };
+        sets.into_iter()
+            .filter_map(|ports| self.swap(ports))
+            .collect()
+    }
+
+    /// Exchanges λ and y at some ports.
+    fn swap(&self, ports: Vec<usize>) -> Option<Swap> {
+        // The terms of y besides Cx and Dλ pivot like further columns of C.
+        let (n, m) = (self.system.n(), self.system.m());
+        let extra = 1 + self.g_driven.ncols();
+        let mut wide = self.system.clone();
+        wide.a = wide.a.resize(n + extra, n + extra, 0.0);
+        wide.b = wide.b.resize_vertically(n + extra, 0.0);
+        wide.c = wide.c.resize_horizontally(n + extra, 0.0);
+        wide.c.set_column(n, &self.f);
+        for k in 0..self.g_driven.ncols() {
+            wide.c.set_column(n + 1 + k, &self.g_driven.column(k));
+        }
+        let pivoted = wide.pivot(&ports)?;
+        let mut laws = self.laws.clone();
+        for &j in &ports {
+            laws[j] = laws[j].swapped();
+        }
+        Some(Swap {
+            ports,
+            f: pivoted.c.column(n).into_owned(),
+            g: pivoted.c.columns(n + 1, extra - 1).into_owned(),
+            system: System {
+                a: pivoted.a.view((0, 0), (n, n)).into_owned(),
+                b: pivoted.b.rows(0, n).into_owned(),
+                c: pivoted.c.columns(0, n).into_owned(),
+                d: pivoted.d.view((0, 0), (m, m)).into_owned(),
+            },
+            laws,
+        })
+    }
+}

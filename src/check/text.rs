@@ -1,0 +1,160 @@
+//! The report in words, for a terminal.
+
+use std::fmt;
+
+use super::Report;
+
+fn answer(value: Option<bool>) -> &'static str {
+    match value {
+        Some(true) => "yes",
+        Some(false) => "no",
+        None => "not decided",
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.title.is_empty() {
+            writeln!(f, "{}", self.title)?;
+        }
+        for fault in &self.faults {
+            let place = match (&fault.file, fault.line, fault.column) {
+                (Some(file), Some(line), Some(column)) => format!("{file}:{line}:{column}: "),
+                _ => String::new(),
+            };
+            writeln!(f, "{place}{:?}: {}", fault.severity, fault.message)?;
+        }
+        let Some(class) = &self.feedthrough else {
+            return Ok(());
+        };
+        writeln!(
+            f,
+            "size          {} states, {} ports, {} inputs",
+            self.size.n, self.size.m, self.size.p
+        )?;
+        for island in &self.islands {
+            writeln!(
+                f,
+                "island        {} (reference {})",
+                island.join(" "),
+                island.first().map_or("", |s| s)
+            )?;
+        }
+        if !self.normal_tree.tree.is_empty() {
+            writeln!(f, "normal tree   {}", self.normal_tree.tree.join(" "))?;
+            writeln!(f, "links         {}", self.normal_tree.links.join(" "))?;
+        }
+        let kind = if class.zero {
+            "zero"
+        } else if class.skew {
+            "skew-symmetric"
+        } else if class.pd {
+            "positive definite"
+        } else if class.psd {
+            "positive semidefinite"
+        } else {
+            "indefinite"
+        };
+        writeln!(
+            f,
+            "feedthrough   D {kind}, rank {}; P-matrix: {}, P0: {}",
+            class.rank,
+            answer(class.p_matrix),
+            answer(class.p0_matrix)
+        )?;
+        writeln!(
+            f,
+            "passive       {}{}",
+            answer(self.passive),
+            match (self.p_from, &self.passive_because) {
+                (Some(from), _) => format!(", P from the {from}"),
+                (None, Some(because)) => format!(": {because}"),
+                _ => String::new(),
+            }
+        )?;
+        if let Some(r) = &self.residuals {
+            writeln!(
+                f,
+                "              largest eigenvalue {:.1e}, P B - C' {:.1e} on the lossless ports",
+                r.lmi_max_eigenvalue, r.pb_minus_ct
+            )?;
+        }
+        if self.passive == Some(true) {
+            match self.strictly_passive {
+                Some(true) => writeln!(
+                    f,
+                    "strictly      yes, decay rate {:.6e} 1/s",
+                    self.decay_rate
+                )?,
+                _ => writeln!(f, "strictly      not certified")?,
+            }
+        }
+        for theorem in &self.theorems {
+            let mark = match theorem.holds {
+                Some(true) => "holds",
+                Some(false) => "fails",
+                None => "open ",
+            };
+            writeln!(f, "{mark}  {}: {}", theorem.statement, theorem.because)?;
+            if theorem.holds == Some(true) {
+                writeln!(f, "       gives {}", theorem.gives)?;
+            }
+        }
+        for equilibrium in &self.equilibria {
+            let values: Vec<String> = self
+                .states
+                .iter()
+                .zip(&equilibrium.x)
+                .map(|(name, x)| format!("{name} = {x:.6e}"))
+                .collect();
+            let only = if equilibrium.unique == Some(true) {
+                " (the only one)"
+            } else {
+                ""
+            };
+            writeln!(
+                f,
+                "equilibrium   {}{only}",
+                if values.is_empty() {
+                    "-".into()
+                } else {
+                    values.join(", ")
+                }
+            )?;
+        }
+        if self.jumps.states.is_empty() {
+            writeln!(
+                f,
+                "jumps         {}",
+                if self.jumps.analysed {
+                    "none possible"
+                } else {
+                    "not analysed"
+                }
+            )?;
+        } else {
+            writeln!(
+                f,
+                "jumps         {} through {} (metric: {}; edges of: {})",
+                self.jumps.states.join(" "),
+                self.jumps.devices.join(" "),
+                self.jumps.metric,
+                if self.jumps.sources.is_empty() {
+                    "none".into()
+                } else {
+                    self.jumps.sources.join(" ")
+                }
+            )?;
+        }
+        if let Some(s) = &self.stiffness
+            && let (Some(fast), Some(slow)) = (s.fastest_s, s.slowest_s)
+        {
+            writeln!(
+                f,
+                "time scales   {fast:.3e} s to {slow:.3e} s over {} modes",
+                s.modes
+            )?;
+        }
+        Ok(())
+    }
+}

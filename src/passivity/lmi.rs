@@ -1,0 +1,146 @@
+//! The passivity matrix (45), its sign convention, and its solution by facial reduction and a barrier.
+
+use nalgebra::DMatrix;
+
+use super::barrier::{self, Outcome};
+use super::facial::{Face, Inconsistent};
+use super::{Certificate, Origin, System, Witness, scale, verify};
+
+/// Unknowns of the barrier beyond which the matrix inequality is not attempted: its cost grows with their cube
+/// (NUMERICS C: 500 unknowns take seconds).
+pub const MAX_UNKNOWNS: usize = 500;
+
+/// Rounds of exposing vectors after the kernel equalities.
+const ROUNDS: usize = 4;
+
+/// Q(P) = [[AᵀP + PA, PB − Cᵀ], [BᵀP − C, −(D + Dᵀ)]] (RR-7158 (45)), (n+m)×(n+m); passive means Q(P) ⪯ 0.
+#[must_use]
+pub fn matrix(system: &System, p: &DMatrix<f64>) -> DMatrix<f64> {
+    let pa = p * &system.a;
+    let coupling = p * &system.b - system.c.transpose();
+    assemble(
+        &(&pa + pa.transpose()),
+        &coupling,
+        &-(&system.d + system.d.transpose()),
+    )
+}
+
+/// The sizes of the terms that [`matrix`] adds up: |A|ᵀ|P| + |P||A| and so on.
+#[must_use]
+pub fn magnitude(system: &System, p: &DMatrix<f64>) -> DMatrix<f64> {
+    let pa = p.abs() * system.a.abs();
+    let coupling = p.abs() * system.b.abs() + system.c.abs().transpose();
+    let d = system.d.abs();
+    assemble(&(&pa + pa.transpose()), &coupling, &(&d + d.transpose()))
+}
+
+/// [[states, coupling], [couplingᵀ, ports]].
+fn assemble(states: &DMatrix<f64>, coupling: &DMatrix<f64>, ports: &DMatrix<f64>) -> DMatrix<f64> {
+    let (n, m) = coupling.shape();
+    let mut q = DMatrix::zeros(n + m, n + m);
+    q.view_mut((0, 0), (n, n)).copy_from(states);
+    q.view_mut((0, n), (n, m)).copy_from(coupling);
+    q.view_mut((n, 0), (m, n)).copy_from(&coupling.transpose());
+    q.view_mut((n, n), (m, m)).copy_from(ports);
+    q
+}
+
+/// Why no P came out.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Unsolved {
+    /// There is none, verified.
+    Witness(Witness),
+    /// Not decided, with the reason.
+    Open(String),
+}
+
+/// Solves (45): balance, impose PBN = CᵀN on N = ker(D + Dᵀ), maximise the margin t by a barrier, expose a further face
+/// where the margin is zero, and accept what [`verify`] accepts.
+///
+/// # Errors
+/// A verified witness, or the reason why the question stays open.
+pub fn solve(system: &System) -> Result<Certificate, Unsolved> {
+    solve_with(system, barrier::maximise)
+}
+
+/// [`solve`] with the margin problem handed to any solver (the barrier, or a cone solver as a second opinion).
+pub(super) fn solve_with(
+    system: &System,
+    maximise: impl Fn(&Face) -> Outcome,
+) -> Result<Certificate, Unsolved> {
+    let balanced = scale::balance(system);
+    let mut face = match Face::kernel(&balanced.system) {
+        Ok(face) => face,
+        Err(Inconsistent::Witness(witness)) => {
+            let witness = witness.unbalanced(&balanced);
+            return Err(if witness.verify(system) {
+                Unsolved::Witness(witness)
+            } else {
+                Unsolved::Open(
+                    "the equalities P B N = CᵀN on ker(D + Dᵀ) are inconsistent only to rounding"
+                        .into(),
+                )
+            });
+        }
+        Err(Inconsistent::Rounding(reason)) => return Err(Unsolved::Open(reason)),
+    };
+    let kernel = face.clone();
+    for round in 0..=ROUNDS {
+        if face.unknowns() > MAX_UNKNOWNS {
+            return Err(Unsolved::Open(format!(
+                "the passivity inequality has {} unknowns, more than the {MAX_UNKNOWNS} attempted",
+                face.unknowns()
+            )));
+        }
+        let outcome = maximise(&face);
+        let p = scale::scaled(
+            &face.p(outcome.unknowns()),
+            &balanced.states.map(f64::recip),
+            &balanced.states.map(f64::recip),
+        );
+        let failure = match verify::check(system, &p) {
+            Ok(residuals) => {
+                return Ok(Certificate {
+                    p,
+                    from: Origin::Lmi,
+                    residuals,
+                });
+            }
+            Err(failure) => failure,
+        };
+        match outcome {
+            Outcome::Boundary { dual, margin, .. } => {
+                let Some(smaller) = face.expose(&dual) else {
+                    return Err(Unsolved::Open(format!(
+                        "the passivity inequality is feasible at best with margin {margin:.1e}, and its solution \
+                         is not confirmed: {failure}"
+                    )));
+                };
+                face = smaller;
+            }
+            Outcome::Interior { z, .. } => {
+                // The exposed face is known to the accuracy of the dual only: sharpen it by what F vanishes on.
+                if let Some(sharper) = kernel
+                    .expose(&kernel.nearly_null(&face.p(&z)))
+                    .filter(|_| round < ROUNDS)
+                {
+                    face = sharper;
+                    continue;
+                }
+                return Err(Unsolved::Open(format!(
+                    "the solution found for the passivity inequality is not confirmed: {failure}"
+                )));
+            }
+            Outcome::Infeasible { margin, .. } => {
+                return Err(Unsolved::Open(format!(
+                    "the passivity inequality has margin {margin:.1e} < 0 after {round} rounds of facial reduction, \
+                     but no violation was confirmed"
+                )));
+            }
+            Outcome::Stalled { reason, .. } => return Err(Unsolved::Open(reason.into())),
+        }
+    }
+    Err(Unsolved::Open(format!(
+        "the passivity inequality is still not strictly feasible after {ROUNDS} exposing rounds"
+    )))
+}

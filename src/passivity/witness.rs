@@ -1,0 +1,425 @@
+//! Verified reasons why a system is *not* passive.
+//!
+//! For a storage function ½ xᵀPx, P ≻ 0, every complex (s, x, v) with sx = Ax + Bv and Re s ≥ 0 satisfies
+//! `Re(s) x*Px ≤ Re(v*(Cx + Dv))`: the input λ(t) = Re(v eˢᵗ) from x(0) = Re x drives a motion that grows (or stays), so
+//! it must be paid for. A motion that supplies energy instead refutes every P at once.
+
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::scale::{self, Balanced};
+use super::{System, verify};
+
+type C = Complex<f64>;
+
+/// Relative error assumed in every entry of A, B, C, D when a witness is verified: it must stand for all matrices within
+/// it. Larger: weakly active networks are not recognised; smaller: rounding is taken for activity.
+const ENTRIES: f64 = 1e-11;
+
+/// Points of the frequency sweep per decade.
+const PER_DECADE: usize = 6;
+
+/// Steps of the golden-section refinement at a local minimum of the sweep.
+const REFINE: usize = 40;
+
+/// Why no storage function exists. Vectors are in the units of the system they were found for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Witness {
+    /// vᵀDv < 0: a port current (voltage) pattern that gains energy through the resistive part alone.
+    Feedthrough {
+        /// v.
+        direction: Vec<f64>,
+        /// vᵀDv.
+        power: f64,
+    },
+    /// sx = Ax + Bv with Re s ≥ 0 and Re(v*(Cx + Dv)) < 0, or = 0 with Re s > 0 and v = 0 (an unstable free motion).
+    Motion {
+        /// s, 1/s (rad/s in the imaginary part).
+        s: C,
+        /// x.
+        state: Vec<C>,
+        /// v.
+        input: Vec<C>,
+        /// Re(v*(Cx + Dv)).
+        supply: f64,
+    },
+    /// v ∈ ker(D + Dᵀ) with Bv = 0 but Cᵀv ≠ 0: the input cv, c → ±∞, moves no state and draws unlimited energy.
+    Unreached {
+        /// v.
+        direction: Vec<f64>,
+    },
+    /// NᵀCBN is not symmetric on N = ker(D + Dᵀ): PBN = CᵀN has no symmetric solution.
+    Asymmetric {
+        /// N, m×k.
+        ports: DMatrix<f64>,
+    },
+    /// v ∈ ker(D + Dᵀ) with vᵀCBv < 0: PBN = CᵀN has no positive semidefinite solution.
+    Markov {
+        /// v.
+        direction: Vec<f64>,
+    },
+}
+
+impl Witness {
+    /// In words, one sentence.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        match self {
+            Self::Feedthrough { power, .. } => {
+                format!("the resistive part supplies power: vᵀDv = {power:.3e} for some port pattern v")
+            }
+            Self::Motion { s, input, .. } if input.iter().all(|v| v.norm() == 0.0) => {
+                format!("a free motion grows like exp({:.6e} t) without any supply", s.re)
+            }
+            Self::Motion { s, supply, .. } => format!(
+                "the ports gain energy at s = {:.6e} {:+.6e}j: Re v*H(s)v = {supply:.3e} < 0 (positive-realness fails)",
+                s.re, s.im
+            ),
+            Self::Unreached { .. } => {
+                "a lossless port pattern that reaches no state sees one: it can draw unlimited energy".into()
+            }
+            Self::Asymmetric { .. } => "C B is not symmetric on the lossless ports: P B = Cᵀ has no solution".into(),
+            Self::Markov { .. } => "C B is not positive semidefinite on the lossless ports: P B = Cᵀ has no P ≻ 0".into(),
+        }
+    }
+
+    /// Whether it holds for this system and every system whose entries differ by rounding.
+    #[must_use]
+    pub fn verify(&self, system: &System) -> bool {
+        let shape = |len: usize| len == system.m();
+        match self {
+            Self::Feedthrough { direction, .. } => {
+                let v = DVector::from_column_slice(direction);
+                let size = v.abs().dot(&(system.d.abs() * v.abs()));
+                shape(v.len()) && v.dot(&(&system.d * &v)) < -ENTRIES * size
+            }
+            Self::Motion {
+                s, state, input, ..
+            } => {
+                shape(input.len())
+                    && state.len() == system.n()
+                    && verify_motion(system, *s, state, input)
+            }
+            Self::Unreached { direction } => {
+                let v = DVector::from_column_slice(direction);
+                shape(v.len()) && lossless(system, &v) && {
+                    let reached = &system.b * &v;
+                    let size = system.b.abs() * v.abs();
+                    let seen = system.c.transpose() * &v;
+                    let seen_size = system.c.abs().transpose() * v.abs();
+                    (0..reached.len()).all(|i| reached[i].abs() <= verify::KERNEL * size[i])
+                        && (0..seen.len()).any(|i| {
+                            seen[i].abs() > verify::KERNEL.sqrt() * seen_size[i] && seen[i] != 0.0
+                        })
+                }
+            }
+            Self::Asymmetric { ports } => {
+                let gram = |b: &DMatrix<f64>, c: &DMatrix<f64>, n: &DMatrix<f64>| {
+                    n.transpose() * c * b * n
+                };
+                let value = gram(&system.b, &system.c, ports);
+                let size = gram(&system.b.abs(), &system.c.abs(), &ports.abs());
+                let difference = &value - value.transpose();
+                let bound = (&size + size.transpose()) * verify::KERNEL;
+                shape(ports.nrows())
+                    && (0..ports.ncols()).all(|j| lossless(system, &ports.column(j).into_owned()))
+                    && difference
+                        .iter()
+                        .zip(bound.iter())
+                        .any(|(d, b)| d.abs() > *b && d.abs() > 0.0)
+            }
+            Self::Markov { direction } => {
+                let v = DVector::from_column_slice(direction);
+                let value = v.dot(&(&system.c * (&system.b * &v)));
+                let size = v.abs().dot(&(system.c.abs() * (system.b.abs() * v.abs())));
+                shape(v.len()) && lossless(system, &v) && value < -verify::KERNEL * size
+            }
+        }
+    }
+
+    /// The witness of the original system from one of the balanced system.
+    pub(super) fn unbalanced(self, balanced: &Balanced) -> Self {
+        let port = |v: Vec<f64>| {
+            v.iter()
+                .zip(balanced.ports.iter())
+                .map(|(v, s)| v * s)
+                .collect()
+        };
+        match self {
+            Self::Feedthrough { direction, power } => Self::Feedthrough {
+                direction: port(direction),
+                power: power * balanced.omega,
+            },
+            Self::Motion {
+                s,
+                state,
+                input,
+                supply,
+            } => Self::Motion {
+                s: s * balanced.omega,
+                state: state
+                    .iter()
+                    .zip(balanced.states.iter())
+                    .map(|(x, t)| x * t)
+                    .collect(),
+                input: input
+                    .iter()
+                    .zip(balanced.ports.iter())
+                    .map(|(v, s)| v * s)
+                    .collect(),
+                supply: supply * balanced.omega,
+            },
+            Self::Unreached { direction } => Self::Unreached {
+                direction: port(direction),
+            },
+            Self::Asymmetric { ports } => Self::Asymmetric {
+                ports: DMatrix::from_diagonal(&balanced.ports) * ports,
+            },
+            Self::Markov { direction } => Self::Markov {
+                direction: port(direction),
+            },
+        }
+    }
+}
+
+/// vᵀ(D + Dᵀ)v = 0 to rounding.
+fn lossless(system: &System, v: &DVector<f64>) -> bool {
+    let loss = (&system.d * v).dot(v).abs();
+    loss <= verify::KERNEL * v.abs().dot(&(system.d.abs() * v.abs()))
+}
+
+fn complex(m: &DMatrix<f64>) -> DMatrix<C> {
+    m.map(|v| C::new(v, 0.0))
+}
+
+/// sI − A.
+fn resolvent(a: &DMatrix<f64>, s: C) -> DMatrix<C> {
+    let mut r = complex(&-a);
+    for i in 0..a.nrows() {
+        r[(i, i)] += s;
+    }
+    r
+}
+
+/// The supply (or growth) must stay negative (positive) under relative errors [`ENTRIES`] of all entries, by first-order
+/// perturbation with the adjoint.
+fn verify_motion(system: &System, s: C, state: &[C], input: &[C]) -> bool {
+    if s.re.is_nan()
+        || s.re < 0.0
+        || state
+            .iter()
+            .chain(input)
+            .any(|v| !v.re.is_finite() || !v.im.is_finite())
+    {
+        return false;
+    }
+    let x = DVector::from_column_slice(state);
+    let v = DVector::from_column_slice(input);
+    let (ax, av) = (x.map(|z| z.norm()), v.map(|z| z.norm()));
+    let shift = resolvent(&system.a, s);
+    let terms = system.a.abs() * &ax + system.b.abs() * &av + &ax * s.norm();
+    let residual = (&shift * &x - complex(&system.b) * &v).map(|z| z.norm());
+    if av.amax() == 0.0 {
+        // A free motion: the eigenvalue's first-order error is |w|ᵀ(ε|A||x| + |r|)/|w*x| with the left eigenvector w.
+        if ax.amax() == 0.0 || s.re <= 0.0 {
+            return false;
+        }
+        let Some(w) = inverse_iteration(&shift.adjoint(), system.a.amax()) else {
+            return false;
+        };
+        let overlap = w.dotc(&x).norm();
+        let error = w.map(|z| z.norm()).dot(&(terms * ENTRIES + residual));
+        return s.re * overlap > error;
+    }
+    let supply = v
+        .dotc(&(complex(&system.c) * &x + complex(&system.d) * &v))
+        .re;
+    let Some(adjoint) = shift
+        .adjoint()
+        .lu()
+        .solve(&(complex(&system.c).transpose() * &v))
+    else {
+        return false;
+    };
+    let error = adjoint.map(|z| z.norm()).dot(&(terms * ENTRIES + residual))
+        + ENTRIES * av.dot(&(system.c.abs() * &ax + system.d.abs() * &av));
+    supply.is_finite() && supply < -error
+}
+
+/// A vector that the (nearly singular) sI − A maps to (nearly) zero; `size` is the size of A's entries.
+fn inverse_iteration(m: &DMatrix<C>, size: f64) -> Option<DVector<C>> {
+    let n = m.nrows();
+    let mut nudged = m.clone();
+    for i in 0..n {
+        nudged[(i, i)] += C::new(f64::EPSILON * size, 0.0);
+    }
+    let lu = nudged.lu();
+    let mut x = DVector::from_fn(n, |i, _| {
+        C::new(1.0 + 0.1 * i as f64, 0.3 - 0.05 * i as f64)
+    });
+    for _ in 0..3 {
+        x = lu.solve(&x)?;
+        let norm = x.norm();
+        if !(norm.is_finite() && norm > 0.0) {
+            return None;
+        }
+        x /= C::new(norm, 0.0);
+    }
+    Some(x)
+}
+
+/// Looks for a violation: in the feedthrough, in the free motion, in the transfer matrix over Re s ≥ 0.
+#[must_use]
+pub fn search(system: &System) -> Option<Witness> {
+    let balanced = scale::balance(system);
+    let accept = |witness: Witness| {
+        let witness = witness.unbalanced(&balanced);
+        witness.verify(system).then_some(witness)
+    };
+    feedthrough(&balanced.system)
+        .and_then(accept)
+        .or_else(|| unstable(&balanced.system).into_iter().find_map(accept))
+        .or_else(|| sweep(&balanced.system, accept))
+}
+
+/// The direction of the smallest eigenvalue of D + Dᵀ.
+fn feedthrough(system: &System) -> Option<Witness> {
+    let (values, vectors) = scale::eigen(&(&system.d + system.d.transpose()));
+    let power = values.iter().copied().next().filter(|&v| v < 0.0)? / 2.0;
+    Some(Witness::Feedthrough {
+        direction: vectors.column(0).as_slice().to_vec(),
+        power,
+    })
+}
+
+/// Free motions with Re s > 0.
+fn unstable(system: &System) -> Vec<Witness> {
+    let n = system.n();
+    eigenvalues(&system.a)
+        .into_iter()
+        .filter(|s| s.re > 0.0 && s.im >= 0.0)
+        .filter_map(|s| {
+            let x = inverse_iteration(&resolvent(&system.a, s), system.a.amax())?;
+            // Rayleigh quotient: the eigenvalue to the accuracy of the vector.
+            let s = x.dotc(&(complex(&system.a) * &x));
+            Some(Witness::Motion {
+                s,
+                state: x.as_slice().to_vec(),
+                input: vec![C::new(0.0, 0.0); system.m()],
+                supply: 0.0,
+            })
+        })
+        .filter(|_| n > 0)
+        .collect()
+}
+
+/// Eigenvalues of a real matrix; empty for 0×0.
+pub(crate) fn eigenvalues(a: &DMatrix<f64>) -> Vec<C> {
+    if a.is_empty() || !a.iter().all(|v| v.is_finite()) {
+        return Vec::new();
+    }
+    a.complex_eigenvalues().iter().copied().collect()
+}
+
+/// The smallest eigenvalue of H(s) + H(s)* relative to ‖H(s)‖, with its motion.
+fn violation(system: &System, s: C) -> Option<(f64, Witness)> {
+    let b = complex(&system.b);
+    let x = resolvent(&system.a, s).lu().solve(&b)?;
+    let h = complex(&system.c) * &x + complex(&system.d);
+    let size = h.iter().map(|z| z.norm()).fold(0.0, f64::max);
+    if !(size.is_finite() && size > 0.0) {
+        return None;
+    }
+    let hermitian = (&h + h.adjoint()) * C::new(0.5, 0.0);
+    let eigen = hermitian.symmetric_eigen();
+    let k = eigen.eigenvalues.imin();
+    let v = eigen.eigenvectors.column(k).into_owned();
+    let supply = eigen.eigenvalues[k];
+    let witness = Witness::Motion {
+        s,
+        state: (x * &v).as_slice().to_vec(),
+        input: v.as_slice().to_vec(),
+        supply,
+    };
+    Some((supply / size, witness))
+}
+
+/// Sweeps the imaginary axis, the real axis and the neighbourhood of the poles, refining local minima on the axis.
+fn sweep(system: &System, accept: impl Fn(Witness) -> Option<Witness>) -> Option<Witness> {
+    if system.m() == 0 || system.n() == 0 {
+        return None;
+    }
+    let poles = eigenvalues(&system.a);
+    let sizes = || poles.iter().map(|p| p.norm()).filter(|&v| v > 1e-12);
+    let low = sizes().fold(1.0, f64::min) * 1e-3;
+    let high = sizes().fold(1.0, f64::max) * 1e3;
+    let count = ((high / low).log10() * PER_DECADE as f64).ceil() as usize + 1;
+    let mut grid: Vec<f64> = (0..count)
+        .map(|k| low * (high / low).powf(k as f64 / (count - 1).max(1) as f64))
+        .collect();
+    for p in &poles {
+        for f in [0.9, 0.99, 0.999, 1.0, 1.001, 1.01, 1.1] {
+            grid.extend(
+                [p.im.abs() * f, p.norm() * f]
+                    .into_iter()
+                    .filter(|&v| v > 0.0),
+            );
+        }
+    }
+    grid.sort_by(f64::total_cmp);
+    let on_axis = |w: f64| violation(system, C::new(0.0, w));
+    let mut found = Vec::new();
+    let values: Vec<f64> = grid
+        .iter()
+        .map(|&w| {
+            on_axis(w).map_or(f64::INFINITY, |(value, witness)| {
+                found.push((value, witness));
+                value
+            })
+        })
+        .collect();
+    for k in 0..grid.len() {
+        let left = k.saturating_sub(1);
+        let right = (k + 1).min(grid.len() - 1);
+        if values[k].is_finite() && values[k] <= values[left] && values[k] <= values[right] {
+            found.extend(refine(on_axis, grid[left].ln(), grid[right].ln()));
+        }
+    }
+    for &w in grid.iter().step_by(3) {
+        found.extend(violation(system, C::new(w, 0.0)));
+    }
+    for p in &poles {
+        for radius in [1e-4, 1e-2, 1.0] {
+            found.extend(violation(system, C::new(radius * p.norm().max(low), p.im)));
+        }
+    }
+    found.retain(|(value, _)| *value < 0.0);
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found
+        .into_iter()
+        .take(40)
+        .find_map(|(_, witness)| accept(witness))
+}
+
+/// Golden-section search for the minimum over ω = exp(l), l in [a, b].
+fn refine(
+    value: impl Fn(f64) -> Option<(f64, Witness)>,
+    mut a: f64,
+    mut b: f64,
+) -> Option<(f64, Witness)> {
+    let ratio = (5.0_f64.sqrt() - 1.0) / 2.0;
+    let at = |l: f64| value(l.exp()).map_or(f64::INFINITY, |(v, _)| v);
+    let (mut c, mut d) = (b - ratio * (b - a), a + ratio * (b - a));
+    let (mut fc, mut fd) = (at(c), at(d));
+    for _ in 0..REFINE {
+        if fc < fd {
+            (b, d, fd) = (d, c, fc);
+            c = b - ratio * (b - a);
+            fc = at(c);
+        } else {
+            (a, c, fc) = (c, d, fd);
+            d = a + ratio * (b - a);
+            fd = at(d);
+        }
+    }
+    value((0.5 * (a + b)).exp())
+}
