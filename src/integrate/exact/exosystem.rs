@@ -266,8 +266,8 @@ mod tests {
             source(Wave::Dc(4.0)),
         ];
         let mut exosystem = Exosystem::of(&sources, 0.0, 3.0).unwrap();
-        // one, a line 2, a step 1, one shared pair, a damped pair, two decays
-        assert_eq!(exosystem.dim(), 1 + 2 + 1 + 2 + 2 + 2);
+        // one, a line 2, a step 1, one shared pair, a step and a damped pair, a step and two decays
+        assert_eq!(exosystem.dim(), 1 + 2 + 1 + 2 + 3 + 3);
         let mut z = DVector::zeros(exosystem.dim());
         for t in [0.0, 0.05, 0.2, 0.3, 0.5, 0.71, 1.0, 1.7, 2.5] {
             for (i, source) in sources.iter().enumerate() {

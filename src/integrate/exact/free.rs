@@ -15,6 +15,15 @@ struct Step {
     driver: Driver,
 }
 
+/// What becomes of pairs whose current and voltage are both zero.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Degenerate<'a> {
+    /// They block.
+    Open,
+    /// They stay as they are here.
+    As(&'a [bool]),
+}
+
 /// The system with every pair free.
 #[derive(Debug, Clone)]
 pub(crate) struct Free {
@@ -51,7 +60,14 @@ impl Free {
     }
 
     /// Which pairs conduct during one implicit step of length `h` from x to inputs `u`: the candidate for the next mode.
-    pub(crate) fn propose(&mut self, x: &DVector<f64>, u: &DVector<f64>, h: f64) -> Option<Vec<bool>> {
+    /// Pairs that are zero on both sides come as `degenerate` says.
+    pub(crate) fn propose(
+        &mut self,
+        x: &DVector<f64>,
+        u: &DVector<f64>,
+        h: f64,
+        degenerate: Degenerate<'_>,
+    ) -> Option<Vec<bool>> {
         let at = match self.steps.iter().position(|s| s.h == h) {
             Some(at) => at,
             None => {
@@ -82,7 +98,12 @@ impl Free {
             lcs.ports
                 .iter()
                 .zip(&solution.active)
-                .map(|(port, &active)| active == (port.role != Role::Voltage))
+                .enumerate()
+                .map(|(j, (port, active))| match (active, degenerate) {
+                    (Some(active), _) => *active == (port.role != Role::Voltage),
+                    (None, Degenerate::Open) => false,
+                    (None, Degenerate::As(before)) => before[j],
+                })
                 .collect(),
         )
     }

@@ -15,5 +15,8 @@ mod rays;
 mod spectrum;
 mod stepper;
 
+#[cfg(test)]
+mod tests;
+
 pub use plant::Assemble;
 pub use stepper::{Exact, Setup};

@@ -55,6 +55,11 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
+    /// A motion that stands at `t` in no mode yet.
+    pub(crate) fn at(t: f64) -> Self {
+        Self { t, entered: t, ..Self::default() }
+    }
+
     /// Enters a mode at `t` with state `x` of amplitudes `amplitude`, exosystem values from their closed form.
     pub(crate) fn enter(
         &mut self,

@@ -3,6 +3,7 @@
 use nalgebra::DVector;
 
 use super::exosystem::Exosystem;
+use super::free::Degenerate;
 use super::inspect::{Finding, Inspector};
 use super::mode::{Key, Owner};
 use super::motion::{Arrival, Motion};
@@ -105,7 +106,7 @@ impl<'a> Exact<'a> {
             plant,
             sources,
             exosystem,
-            motion: Motion { t, ..Motion::default() },
+            motion: Motion::at(t),
             inspector: Inspector::default(),
             mode: None,
             key: Key { closed: vec![false; pairs], switches: position },
@@ -380,14 +381,14 @@ impl<'a> Exact<'a> {
             let h = part / fastest;
             let u = self.inputs(t + h);
             self.lcp_solves += 1;
-            let Some(closed) = self.plant.free(&key.switches)?.propose(&x, &u, h) else { continue };
-            if tried.contains(&closed) {
-                continue;
-            }
-            tried.push(closed.clone());
-            let candidate = Key { closed, switches: key.switches.clone() };
-            if let Some(found) = self.try_key(&candidate, &barred) {
-                return Ok(Some(found));
+            for degenerate in [Degenerate::Open, Degenerate::As(&key.closed)] {
+                let proposal = self.plant.free(&key.switches)?.propose(&x, &u, h, degenerate);
+                let Some(closed) = proposal.filter(|c| !tried.contains(c)) else { continue };
+                tried.push(closed.clone());
+                let candidate = Key { closed, switches: key.switches.clone() };
+                if let Some(found) = self.try_key(&candidate, &barred) {
+                    return Ok(Some(found));
+                }
             }
         }
         // Neighbours, nearest first.
