@@ -6,12 +6,21 @@ use super::expm::{self, Exponential};
 use super::kernel::Kernel;
 use super::polynomial::MAX_DEGREE;
 use super::spectrum::{Rate, Spectrum};
+use super::work::{self, Form};
 
 /// Halvings of the output step that a table may hold; below it Taylor's series takes over in any case.
 const DEEPEST: u32 = 62;
 
 /// Rounding of a computed guard, in units of 2⁻⁵³ Σ |row| |w|.
 const NOISE: f64 = 16.0;
+
+/// Power out of sources and into what dissipates, and their integrals over steps.
+#[derive(Debug, Clone)]
+struct Power {
+    matrices: [DMatrix<f64>; 2],
+    instant: [Form; 2],
+    levels: Vec<Option<[Form; 2]>>,
+}
 
 /// exp(𝒜 h/2^k) for the levels k that were needed, Taylor's series below, and guard rows with their derivative.
 ///
@@ -30,6 +39,7 @@ pub(crate) struct Flow {
     bottom: u32,
     levels: Vec<Option<Kernel>>,
     spectrum: Spectrum,
+    power: Option<Power>,
     /// Largest loss that an exponential reported.
     pub(crate) loss: f64,
 }
@@ -69,6 +79,7 @@ impl Flow {
             bottom,
             levels: vec![None; bottom as usize + 1],
             spectrum,
+            power: None,
             loss: 0.0,
         })
     }
@@ -126,6 +137,62 @@ impl Flow {
         fused.rows_mut(0, self.dim).copy_from(&matrix);
         self.levels[level as usize] = Some(Kernel::new(&fused));
         true
+    }
+
+    /// Adds the quadratic forms (power out of sources, power dissipated) whose integrals [`Self::energy`] gives.
+    pub(crate) fn set_power(&mut self, matrices: [DMatrix<f64>; 2]) {
+        let instant = [Form::new(&matrices[0]), Form::new(&matrices[1])];
+        self.power = Some(Power { matrices, instant, levels: vec![None; self.levels.len()] });
+    }
+
+    /// (from sources, dissipated) over the step h/2^level from w, J.
+    #[inline]
+    pub(crate) fn energy(&mut self, level: u32, w: &[f64]) -> [f64; 2] {
+        let Some(power) = &self.power else { return [0.0; 2] };
+        if let Some(forms) = &power.levels[level as usize] {
+            return [forms[0].value(w), forms[1].value(w)];
+        }
+        self.integrate_forms(level);
+        self.energy(level, w)
+    }
+
+    /// Gramians from the deepest level up: 𝒢(2h) = 𝒢(h) + Φ(h)ᵀ 𝒢(h) Φ(h).
+    #[cold]
+    fn integrate_forms(&mut self, level: u32) {
+        let Some(power) = &mut self.power else { return };
+        let mut grams =
+            power.matrices.each_ref().map(|q| work::gramian(&self.generator, q, self.h * (-f64::from(self.bottom)).exp2()));
+        let mut at = self.bottom;
+        loop {
+            if power.levels[at as usize].is_none() {
+                power.levels[at as usize] = Some(grams.each_ref().map(Form::new));
+            }
+            if at <= level {
+                break;
+            }
+            let step = self.h * (-f64::from(at)).exp2();
+            if let Some(Exponential { matrix, .. }) = expm::exponential(&self.generator, step) {
+                for gram in &mut grams {
+                    let moved = matrix.transpose() * &*gram * &matrix;
+                    *gram += moved;
+                }
+            }
+            at -= 1;
+        }
+    }
+
+    /// (from sources, dissipated) over the fraction `part` of a Taylor step dt, J; `w` is work space of length dim.
+    pub(crate) fn energy_of_taylor(
+        &self,
+        terms: &[f64],
+        degree: usize,
+        dt: f64,
+        part: f64,
+        w: &mut [f64],
+    ) -> [f64; 2] {
+        self.power.as_ref().map_or([0.0; 2], |power| {
+            work::along_taylor(&power.instant, terms, degree, dt, part, w)
+        })
     }
 
     /// Fills g and g' behind w.

@@ -14,6 +14,7 @@ mod polynomial;
 mod rays;
 mod spectrum;
 mod stepper;
+mod work;
 
 #[cfg(test)]
 mod tests;

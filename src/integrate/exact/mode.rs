@@ -54,8 +54,6 @@ pub(crate) struct Mode {
     pub(crate) outputs: Kernel,
     /// Whether devices share currents or voltages that the ideal model does not determine.
     pub(crate) shared: bool,
-    /// ½(V Iᵀ + I Vᵀ) summed over sources (power out of them) and over what dissipates; empty without power terms.
-    pub(crate) power: Option<[DMatrix<f64>; 2]>,
 }
 
 /// Rows over [x | u | u' | 1] as rows over w, with u = H z and u' = H S z.
@@ -89,6 +87,7 @@ impl Mode {
         thresholds: &[Threshold],
         watched: &[bool],
         h: f64,
+        energy: bool,
     ) -> Option<Self> {
         let (n, dz) = (lcs.n(), exosystem.dim());
         let dim = n + dz;
@@ -122,7 +121,10 @@ impl Mode {
         let first = &guards * &generator;
         let second = &first * &generator;
         let third = &second * &generator;
-        let flow = Flow::new(generator, n, &guards, h, exosystem.rates())?;
+        let mut flow = Flow::new(generator, n, &guards, h, exosystem.rates())?;
+        if let Some(forms) = power_forms(lcs, n, exosystem).filter(|_| energy) {
+            flow.set_power(forms);
+        }
 
         let c0 = over_w(&lcs.held.constraints, n, exosystem);
         let c1 = &c0 * flow.generator();
@@ -152,7 +154,6 @@ impl Mode {
             inject_one: map.inject_one.clone(),
             outputs: Kernel::new(&over_w(&lcs.outputs.rows, n, exosystem)),
             shared,
-            power: power_forms(lcs, n, exosystem),
             flow,
         })
     }

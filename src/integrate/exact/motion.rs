@@ -42,6 +42,8 @@ pub(crate) struct Motion {
     pub(crate) entered: f64,
     /// Steps taken.
     pub(crate) steps: u64,
+    /// Energy from sources and energy dissipated since last taken, J.
+    pub(crate) energy: [f64; 2],
     next: Vec<f64>,
     terms: Vec<f64>,
     polynomials: Vec<f64>,
@@ -115,7 +117,7 @@ impl Motion {
                     return Arrival::Overflow;
                 }
                 if self.judge(flow, flow.step(0)) == Verdict::Clear {
-                    self.accept(flow, exosystem, stop);
+                    self.accept(flow, exosystem, 0, stop);
                     return Arrival::Reached;
                 }
             }
@@ -163,7 +165,7 @@ impl Motion {
                     return Arrival::Overflow;
                 }
                 if self.judge(flow, flow.step(level)) == Verdict::Clear {
-                    self.accept(flow, exosystem, end);
+                    self.accept(flow, exosystem, level, end);
                     units -= span;
                     break;
                 }
@@ -209,6 +211,10 @@ impl Motion {
         }
         let (s, fired) = first;
         let t = if fired.is_some() { self.t + s * dt } else { end };
+        let [source, dissipated] =
+            flow.energy_of_taylor(&self.terms, self.degree, dt, s, &mut self.next[..dim]);
+        self.energy[0] += source;
+        self.energy[1] += dissipated;
         flow.sum(&self.terms, self.degree, s, &mut self.next);
         self.next[dim..].copy_from_slice(&self.now[dim..]);
         std::mem::swap(&mut self.now, &mut self.next);
@@ -243,7 +249,10 @@ impl Motion {
     }
 
     #[inline]
-    fn accept(&mut self, flow: &Flow, exosystem: &Exosystem, t: f64) {
+    fn accept(&mut self, flow: &mut Flow, exosystem: &Exosystem, level: u32, t: f64) {
+        let [source, dissipated] = flow.energy(level, &self.now);
+        self.energy[0] += source;
+        self.energy[1] += dissipated;
         std::mem::swap(&mut self.now, &mut self.next);
         self.t = t;
         self.steps += 1;

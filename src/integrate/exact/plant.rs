@@ -21,6 +21,7 @@ pub(crate) struct Plant<'a> {
     /// Switches whose control is a combination of sources alone, with its row over w in the start position.
     pub(crate) driven: Vec<bool>,
     h: f64,
+    energy: bool,
     tolerance: f64,
     frees: Vec<(Vec<bool>, Free)>,
     index: BTreeMap<Key, Option<usize>>,
@@ -28,12 +29,13 @@ pub(crate) struct Plant<'a> {
 }
 
 impl<'a> Plant<'a> {
-    /// A plant without modes; `h` is the output step, `tolerance` that of complementarity residuals.
+    /// A plant without modes; `h` is the output step, `energy` asks for the balance, `tolerance` that of complementarity residuals.
     pub(crate) fn new(
         assemble: Assemble<'a>,
         pairs: usize,
         thresholds: Vec<Threshold>,
         h: f64,
+        energy: bool,
         tolerance: f64,
     ) -> Self {
         Self {
@@ -42,6 +44,7 @@ impl<'a> Plant<'a> {
             driven: vec![false; thresholds.len()],
             thresholds,
             h,
+            energy,
             tolerance,
             frees: Vec::new(),
             index: BTreeMap::new(),
@@ -71,7 +74,7 @@ impl<'a> Plant<'a> {
             key.closed.iter().map(|&c| if c { Hold::Closed } else { Hold::Open }).collect();
         let watched: Vec<bool> = self.driven.iter().map(|d| !d).collect();
         let mode = (self.assemble)(&holds, &key.switches).ok().and_then(|lcs| {
-            Mode::new(key.clone(), &lcs, exosystem, &self.thresholds, &watched, self.h)
+            Mode::new(key.clone(), &lcs, exosystem, &self.thresholds, &watched, self.h, self.energy)
         });
         let at = mode.map(|mode| {
             self.modes.push(mode);

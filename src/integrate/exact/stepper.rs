@@ -72,7 +72,6 @@ pub struct Exact<'a> {
     metric: nalgebra::DMatrix<f64>,
     started: bool,
     settings: Settings,
-    energy: bool,
     balance: Balance,
     events: u64,
     jumps: u64,
@@ -88,7 +87,7 @@ impl<'a> Exact<'a> {
     /// The reduction's for the start position; sources that no finite linear system generates.
     pub fn new(setup: Setup<'a>) -> Result<Self, SimError> {
         let Setup { assemble, pairs, position, thresholds, t, until, start, h, energy, settings } = setup;
-        let mut plant = Plant::new(assemble, pairs, thresholds, h, settings.lcp_residual);
+        let mut plant = Plant::new(assemble, pairs, thresholds, h, energy, settings.lcp_residual);
         let lcs = plant.free(&position)?.lcs.clone();
         let sources: Vec<Source> = lcs.inputs.iter().map(|i| i.source.clone()).collect();
         let exosystem = Exosystem::of(&sources, t, until).ok_or_else(|| {
@@ -121,7 +120,6 @@ impl<'a> Exact<'a> {
             metric,
             started: false,
             settings,
-            energy,
             balance: Balance::new(stored),
             events: 0,
             jumps: 0,
@@ -173,6 +171,10 @@ impl<'a> Exact<'a> {
         if let Some(at) = self.mode {
             self.plant.modes[at].storage_at(&self.motion.now, &mut self.storage);
             self.rescale();
+            let [source, dissipated] = std::mem::take(&mut self.motion.energy);
+            self.balance.add((source, dissipated));
+            let s = DVector::from_column_slice(&self.storage);
+            self.balance.note(0.5 * s.dot(&(&self.metric * &s)));
         }
     }
 
@@ -555,7 +557,7 @@ impl Stepper for Exact<'_> {
         outcome.stats.modes = self.plant.modes.len() as u64;
         outcome.stats.lcp_solves = self.lcp_solves;
         outcome.stats.factorisations = self.plant.factorisations();
-        let _ = self.energy;
+        self.take_storage();
         outcome.energy = self.balance.energy();
         outcome
     }

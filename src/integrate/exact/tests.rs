@@ -69,7 +69,9 @@ fn try_simulate(text: &str) -> Result<Run, SimError> {
 }
 
 fn simulate(text: &str) -> Run {
-    try_simulate(text).unwrap_or_else(|e| panic!("{e}"))
+    let run = try_simulate(text).unwrap_or_else(|e| panic!("{e}"));
+    assert!(run.energy.residual_relative < 1e-11, "{:?}", run.energy);
+    run
 }
 
 fn at(run: &Run, t: f64, name: &str) -> f64 {
