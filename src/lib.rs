@@ -19,6 +19,10 @@
 //! netlist → circuit → mna → lcs → plan → integrate (with solve) → waveform → report
 //! ```
 
+// Lets the systems under tests/ be used by the library's own tests as well.
+#[cfg(test)]
+extern crate self as circ;
+
 pub mod algebra;
 pub mod check;
 pub mod circuit;

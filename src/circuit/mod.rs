@@ -1,12 +1,25 @@
 //! The flattened circuit: nodes, elements with evaluated values, sources, initial conditions, what to print.
 //!
-//! [`elaborate`](crate::netlist) fills it from a netlist; nothing here knows SPICE text or matrices.
+//! [`elaborate`] fills it from a netlist; nothing here knows SPICE text or matrices.
 
+mod builder;
+mod controlled;
+mod device;
+mod drive;
+mod elaborate;
+mod eval;
+mod functions;
+pub(crate) mod load;
+mod names;
+mod passive;
+mod probe;
+mod scope;
 pub mod source;
 
 use crate::algebra::Value;
 use crate::diagnostic::Span;
 use crate::law::Law;
+pub use elaborate::{Diodes, ElaborateOptions, elaborate};
 pub use source::Source;
 
 /// A node; 0 is ground.

@@ -1,4 +1,20 @@
-//! Independent sources as functions of time.
+//! Independent sources as functions of time, with the exact closed form of every piece.
+//!
+//! Waveforms are right-continuous: [`Source::value`] at an edge is the value after it, [`Source::value_left`] the one
+//! before. Breakpoints are computed as delay + k·period + corner, never accumulated, by one function that the values, the
+//! pieces and [`Source::next_breakpoint`] share, so that they agree to the last bit.
+
+mod crossings;
+mod piece;
+mod polyline;
+mod spice;
+
+pub use crossings::{Crossing, crossings};
+pub use piece::{Oscillation, Piece};
+pub use spice::{Form, WaveError};
+
+use piece::Segment;
+use polyline::Polyline;
 
 /// A source: its value for the operating point and its waveform for a transient.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,7 +46,7 @@ pub enum Wave {
         /// Phase, degrees.
         phase: f64,
     },
-    /// Trapezoids; a zero `rise` or `fall` is a true edge.
+    /// Trapezoids; a zero `rise` or `fall` is a true edge. A pulse longer than its period is cut by the next one.
     Pulse {
         /// Initial value.
         v1: f64,
@@ -73,4 +89,266 @@ pub enum Wave {
         /// Fall time constant, s.
         fall_tau: f64,
     },
+    /// Frequency modulation, offset + amplitude·sin(2π carrier t + carrier_phase + index·sin(2π signal t + signal_phase)).
+    Sffm {
+        /// Offset.
+        offset: f64,
+        /// Amplitude.
+        amplitude: f64,
+        /// Carrier frequency, Hz.
+        carrier: f64,
+        /// Modulation index.
+        index: f64,
+        /// Signal frequency, Hz.
+        signal: f64,
+        /// Phase of the carrier, degrees.
+        carrier_phase: f64,
+        /// Phase of the signal, degrees.
+        signal_phase: f64,
+    },
+    /// Amplitude modulation, amplitude·(offset + sin(2π modulation s))·sin(2π carrier s) with s = t − delay ≥ 0, before it 0.
+    Am {
+        /// Amplitude.
+        amplitude: f64,
+        /// Offset of the modulation.
+        offset: f64,
+        /// Modulating frequency, Hz.
+        modulation: f64,
+        /// Carrier frequency, Hz.
+        carrier: f64,
+        /// Delay, s.
+        delay: f64,
+    },
 }
+
+impl Source {
+    /// A constant source.
+    #[must_use]
+    pub const fn constant(value: f64) -> Self {
+        Self {
+            dc: value,
+            wave: Wave::Dc(value),
+        }
+    }
+
+    /// The value at `t`, V or A; at an edge the value after it. See [`Wave::value`].
+    #[must_use]
+    pub fn value(&self, t: f64) -> f64 {
+        self.wave.value(t)
+    }
+
+    /// The limit from the left at `t`.
+    #[must_use]
+    pub fn value_left(&self, t: f64) -> f64 {
+        self.wave.value_left(t)
+    }
+
+    /// The derivative to the right of `t`, V/s or A/s.
+    #[must_use]
+    pub fn derivative(&self, t: f64) -> f64 {
+        self.wave.derivative(t)
+    }
+
+    /// The first breakpoint strictly after `after`. See [`Wave::next_breakpoint`].
+    #[must_use]
+    pub fn next_breakpoint(&self, after: f64) -> Option<f64> {
+        self.wave.next_breakpoint(after)
+    }
+
+    /// Whether the value jumps at `t`. See [`Wave::is_edge`].
+    #[must_use]
+    pub fn is_edge(&self, t: f64) -> bool {
+        self.wave.is_edge(t)
+    }
+
+    /// The closed form from `t` to the next breakpoint. See [`Wave::piece`].
+    #[must_use]
+    pub fn piece(&self, t: f64) -> Option<Piece> {
+        self.wave.piece(t)
+    }
+}
+
+impl Wave {
+    /// The value at `t`; at an edge the value after it.
+    #[must_use]
+    pub fn value(&self, t: f64) -> f64 {
+        self.tone().map_or_else(
+            || self.segment(t, Side::Right).piece.value(t),
+            |tone| tone.value(t),
+        )
+    }
+
+    /// The limit from the left at `t`; the same as [`Wave::value`], to the last bit, where there is no edge.
+    #[must_use]
+    pub fn value_left(&self, t: f64) -> f64 {
+        match self.edge(t) {
+            Some((before, _)) => before,
+            None => self.value(t),
+        }
+    }
+
+    /// The derivative to the right of `t`.
+    #[must_use]
+    pub fn derivative(&self, t: f64) -> f64 {
+        self.tone().map_or_else(
+            || self.segment(t, Side::Right).piece.derivative(t),
+            |tone| tone.derivative(t),
+        )
+    }
+
+    /// The first time strictly after `after` where the value or its slope changes abruptly; `None` if there is none.
+    #[must_use]
+    pub fn next_breakpoint(&self, after: f64) -> Option<f64> {
+        Some(self.segment(after, Side::Right).piece.end).filter(|end| end.is_finite())
+    }
+
+    /// Whether the value jumps at `t`. Decided on the waveform's parameters, not on rounded values.
+    #[must_use]
+    pub fn is_edge(&self, t: f64) -> bool {
+        self.edge(t).is_some()
+    }
+
+    /// The closed form on [start, end) around `t`, where start and end are breakpoints (or ∓∞). It is the same object for
+    /// every `t` of the interval. `None` for frequency modulation, which no finite linear system generates.
+    #[must_use]
+    pub fn piece(&self, t: f64) -> Option<Piece> {
+        match self {
+            Self::Sffm { .. } => None,
+            _ => Some(self.segment(t, Side::Right).piece),
+        }
+    }
+
+    /// The values (before, after) of the edge at `t`.
+    fn edge(&self, t: f64) -> Option<(f64, f64)> {
+        let before = self.segment(t, Side::Left);
+        let after = self.segment(t, Side::Right);
+        (before.piece.end <= t && before.last != after.first).then_some((before.last, after.first))
+    }
+
+    /// The segment around `t`; at a breakpoint the one on the given side.
+    fn segment(&self, t: f64, side: Side) -> Segment {
+        match *self {
+            Self::Dc(value) => Segment::constant(value, f64::NEG_INFINITY, f64::INFINITY),
+            Self::Sin {
+                offset,
+                amplitude,
+                frequency,
+                delay,
+                damping,
+                phase,
+            } => {
+                let oscillation = Oscillation {
+                    amplitude,
+                    decay: damping,
+                    frequency: std::f64::consts::TAU * frequency,
+                    phase: phase.to_radians(),
+                };
+                let start = offset + oscillation.value(0.0);
+                if side.before(t, delay) {
+                    Segment::constant(start, f64::NEG_INFINITY, delay)
+                } else {
+                    let piece = Piece::with_terms(delay, f64::INFINITY, offset, [oscillation]);
+                    Segment {
+                        piece,
+                        first: start,
+                        last: f64::NAN,
+                    }
+                }
+            }
+            Self::Pulse {
+                v1,
+                v2,
+                delay,
+                rise,
+                fall,
+                width,
+                period,
+                count,
+            } => {
+                let corners = polyline::pulse_corners(v1, v2, rise, fall, width, period);
+                Polyline::pulse(&corners, delay, period, count).segment(t, side)
+            }
+            Self::Pwl {
+                ref points,
+                repeat,
+                delay,
+            } => Polyline::pwl(points, repeat, delay).segment(t, side),
+            Self::Exp {
+                v1,
+                v2,
+                rise_delay,
+                rise_tau,
+                fall_delay,
+                fall_tau,
+            } => piece::exponentials(
+                (v1, v2),
+                (rise_delay, rise_tau),
+                (fall_delay, fall_tau),
+                t,
+                side,
+            ),
+            Self::Sffm { .. } => Segment::constant(f64::NAN, f64::NEG_INFINITY, f64::INFINITY),
+            Self::Am {
+                amplitude,
+                offset,
+                modulation,
+                carrier,
+                delay,
+            } => {
+                if side.before(t, delay) {
+                    Segment::constant(0.0, f64::NEG_INFINITY, delay)
+                } else {
+                    let piece =
+                        piece::amplitude_modulation(amplitude, offset, modulation, carrier, delay);
+                    Segment {
+                        piece,
+                        first: 0.0,
+                        last: f64::NAN,
+                    }
+                }
+            }
+        }
+    }
+
+    /// The frequency-modulated tone, if it is one.
+    fn tone(&self) -> Option<piece::Tone> {
+        match *self {
+            Self::Sffm {
+                offset,
+                amplitude,
+                carrier,
+                index,
+                signal,
+                carrier_phase,
+                signal_phase,
+            } => Some(piece::Tone {
+                offset,
+                amplitude,
+                carrier: (std::f64::consts::TAU * carrier, carrier_phase.to_radians()),
+                index,
+                signal: (std::f64::consts::TAU * signal, signal_phase.to_radians()),
+            }),
+            _ => None,
+        }
+    }
+}
+
+/// Which one-sided limit is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Side {
+    Left,
+    Right,
+}
+
+impl Side {
+    /// Whether `t`, approached from this side, lies before the breakpoint `at`.
+    fn before(self, t: f64, at: f64) -> bool {
+        match self {
+            Self::Left => t <= at,
+            Self::Right => t < at,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

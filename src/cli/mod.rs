@@ -1,1 +1,5 @@
 //! The command line.
+
+mod render;
+
+pub use render::render;

@@ -1,7 +1,19 @@
 //! From a complementarity system to waveforms.
 
+pub mod control;
+pub mod energy;
+#[cfg(test)]
+#[path = "../../tests/systems/mod.rs"]
+pub(crate) mod fixtures;
+pub mod inputs;
+pub mod jump;
+pub mod reading;
 pub mod run;
 pub mod stats;
+pub mod step;
+pub mod switching;
+pub mod system;
+pub mod theta;
 
 pub use run::{Frame, Grid, Log, Outcome, Reason, SimError, Stepper};
 pub use stats::{Energy, Impulse, Run, Stats};

@@ -32,6 +32,15 @@ pub struct Curve {
 }
 
 impl Law {
+    /// The name shown to the user and written to files.
+    #[must_use]
+    pub const fn kind(&self) -> &'static str {
+        match self {
+            Self::Diode { .. } => "ideal_diode",
+            Self::Curve(curve) => curve.kind,
+        }
+    }
+
     /// The ideal diode: 0 ≤ i ⟂ −v ≥ 0.
     #[must_use]
     pub const fn ideal_diode() -> Self {

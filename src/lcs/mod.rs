@@ -1,5 +1,11 @@
 //! The complementarity system of a circuit, with names and units for every row and column.
 
+pub mod format;
+pub mod json;
+pub mod reduce;
+
+pub use reduce::{Position, ReduceError, StorageHold, reduce};
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::circuit::Source;

@@ -1,1 +1,21 @@
-//! netlist
+//! Text to a [`Netlist`]: what the cards say, with the place of every piece.
+//!
+//! The reader never stops at the first fault. It knows the dialects of SPICE3, ngspice, LTspice and PSpice; the
+//! accepted language is listed in `docs/netlist.md`. Nothing is evaluated here:
+//! [`elaborate`](crate::circuit::elaborate) does that.
+
+pub mod ast;
+pub(crate) mod card;
+mod decode;
+mod dot;
+mod expr;
+mod lex;
+mod read;
+pub(crate) mod suggest;
+pub mod value;
+
+pub use ast::Netlist;
+pub use decode::decode;
+pub use read::parse;
+
+pub use crate::circuit::load::{Loaded, load};

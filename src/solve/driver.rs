@@ -24,6 +24,9 @@ pub struct Driver {
     pub factorisations: u64,
 }
 
+/// λ', the index set it was computed on, and the method.
+type Found = (DVector<f64>, Vec<bool>, Answered);
+
 /// Violations below this multiple of the problem's size count as zero inside the pivoting methods (rounding of one solve).
 const SLACK: f64 = 1e-14;
 
@@ -65,19 +68,19 @@ impl Driver {
         self.scaled.q = q.component_mul(&self.scaling.d);
         let size = self.scaled.size();
         let slack = SLACK * self.scaled.q.amax();
-        let mut best = self.candidate(DVector::zeros(size), Answered::Warm);
+        let mut best = self.candidate(DVector::zeros(size), vec![false; size], Answered::Warm);
         if best.residual <= self.tolerance {
             return self.accept(best);
         }
-        let chain: [fn(&mut Self, f64) -> Option<(DVector<f64>, Answered)>; 4] = [
+        let chain: [fn(&mut Self, f64) -> Option<Found>; 4] = [
             Self::try_warm,
             Self::try_block,
             Self::try_lemke,
             Self::try_convex,
         ];
         for (k, method) in chain.iter().enumerate() {
-            if let Some((lambda, by)) = method(self, slack) {
-                let found = self.candidate(lambda, by);
+            if let Some((lambda, basis, by)) = method(self, slack) {
+                let found = self.candidate(lambda, basis, by);
                 if found.residual <= self.tolerance {
                     return self.accept(found);
                 }
@@ -110,13 +113,14 @@ impl Driver {
             .iter()
             .zip(y.iter())
             .all(|(l, w)| l.max(*w) > self.tolerance * scale);
-        let regular = self.on_set(&solution.active).regular;
+        let regular = self.on_set(&solution.basis).regular;
         if !self.monotone || (strict && regular) {
             return (solution.lambda.clone(), regular);
         }
         let (lambda, unique) = norm::least(&self.scaled, &scaled);
         let lambda = self.scaling.unscale(&lambda);
-        let found = self.candidate(lambda.component_div(&self.scaling.d), solution.by);
+        let basis = solution.basis.clone();
+        let found = self.candidate(lambda.component_div(&self.scaling.d), basis, solution.by);
         if found.residual <= self.tolerance {
             (found.lambda, unique)
         } else {
@@ -150,16 +154,16 @@ impl Driver {
         self.sets[at].1.refined(&self.scaled)
     }
 
-    fn try_warm(&mut self, _: f64) -> Option<(DVector<f64>, Answered)> {
+    fn try_warm(&mut self, _: f64) -> Option<Found> {
         let warm = self.warm.clone();
-        Some((self.refined_on(&warm), Answered::Warm))
+        Some((self.refined_on(&warm), warm, Answered::Warm))
     }
 
-    fn try_block(&mut self, slack: f64) -> Option<(DVector<f64>, Answered)> {
-        pivot::solve(&self.scaled, &self.warm, slack).map(|l| (l, Answered::Block))
+    fn try_block(&mut self, slack: f64) -> Option<Found> {
+        pivot::solve(&self.scaled, &self.warm, slack).map(|(l, set)| (l, set, Answered::Block))
     }
 
-    fn try_lemke(&mut self, _: f64) -> Option<(DVector<f64>, Answered)> {
+    fn try_lemke(&mut self, _: f64) -> Option<Found> {
         let mut last = None;
         for cover in covers(self.scaled.size()) {
             if let Lemke::Basis(active) = lemke::solve(&self.scaled, &cover) {
@@ -169,7 +173,7 @@ impl Driver {
                     d: DVector::from_element(lambda.len(), 1.0),
                 };
                 let good = one.residual(&self.scaled, &lambda, &y) <= self.tolerance;
-                last = Some((lambda, Answered::Lemke));
+                last = Some((lambda, active, Answered::Lemke));
                 if good {
                     break;
                 }
@@ -178,14 +182,14 @@ impl Driver {
         last
     }
 
-    fn try_convex(&mut self, _: f64) -> Option<(DVector<f64>, Answered)> {
+    fn try_convex(&mut self, _: f64) -> Option<Found> {
         if !self.monotone {
             return None;
         }
         let rough = convex::solve(&self.scaled)?;
         let y = self.scaled.y(&rough);
         let active: Vec<bool> = (0..rough.len()).map(|j| rough[j] > y[j]).collect();
-        Some((self.refined_on(&active), Answered::Convex))
+        Some((self.refined_on(&active), active, Answered::Convex))
     }
 
     /// A verified Farkas certificate v ≥ 0, Mᵀv ≤ 0, qᵀv < 0 from Lemke's rays, in the units of q: v scaled to qᵀv = −1.
@@ -204,28 +208,30 @@ impl Driver {
     }
 
     /// λ' clipped to λ' ≥ 0 where it is negative by rounding, with its residual in scaled variables.
-    fn candidate(&self, scaled: DVector<f64>, by: Answered) -> Solution {
+    fn candidate(&self, scaled: DVector<f64>, basis: Vec<bool>, by: Answered) -> Solution {
         let size = scaled.len();
         let one = Scaling {
             d: DVector::from_element(size, 1.0),
         };
-        let clipped = scaled.map(|v| v.max(0.0));
+        let rounding = self.tolerance * scaled.amax().max(self.scaled.q.amax());
+        let clipped = scaled.map(|v| if v.abs() <= rounding { v.max(0.0) } else { v });
         let y = self.scaled.y(&clipped);
         let residual = one.residual(&self.scaled, &clipped, &y);
-        let active = one.active(&clipped, &y);
+        let active = one.active(&clipped, &y, self.tolerance);
         Solution {
             status: Status::Failed,
             lambda: self.scaling.unscale(&clipped),
             y: y.component_div(&self.scaling.d),
             residual,
             active,
+            basis,
             by,
         }
     }
 
     fn accept(&mut self, mut found: Solution) -> Solution {
         found.status = Status::Solved;
-        self.warm.copy_from_slice(&found.active);
+        self.warm.copy_from_slice(&found.basis);
         found
     }
 }

@@ -67,8 +67,10 @@ pub struct Solution {
     pub y: DVector<f64>,
     /// Scaled natural residual, see [`Scaling::residual`].
     pub residual: f64,
-    /// Ports with λ_j > y_j in scaled variables, the active set.
-    pub active: Vec<bool>,
+    /// What the devices do: `true` for λ_j > 0, `false` for y_j > 0, `None` where both vanish to the tolerance.
+    pub active: Vec<Option<bool>>,
+    /// The index set that gave the solution, the one to start the next problem from.
+    pub basis: Vec<bool>,
     /// Who answered.
     pub by: Answered,
 }
@@ -187,12 +189,19 @@ impl Scaling {
         if worst == 0.0 { 0.0 } else { worst / scale }
     }
 
-    /// Ports with λ'_j > y'_j.
+    /// What the devices do, see [`Solution::active`]; quantities below `tolerance` times the largest vanish.
     #[must_use]
-    pub fn active(&self, lambda: &DVector<f64>, y: &DVector<f64>) -> Vec<bool> {
-        (0..lambda.len())
-            .map(|j| lambda[j] / self.d[j] > y[j] * self.d[j])
-            .collect()
+    pub fn active(
+        &self,
+        lambda: &DVector<f64>,
+        y: &DVector<f64>,
+        tolerance: f64,
+    ) -> Vec<Option<bool>> {
+        let l = lambda.component_div(&self.d);
+        let w = y.component_mul(&self.d);
+        let zero = tolerance * l.amax().max(w.amax());
+        let state = |l: f64, w: f64| (l.max(w) > zero).then_some(l > w);
+        l.iter().zip(w.iter()).map(|(&l, &w)| state(l, w)).collect()
     }
 }
 

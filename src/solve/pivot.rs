@@ -14,10 +14,10 @@ const PATIENCE: usize = 10;
 /// Exchanges before giving up, per port.
 const EXCHANGES_PER_PORT: usize = 20;
 
-/// The active set at which all signs hold, starting from `active`; `None` at the first singular M_aa or after too many
+/// λ and the active set at which all signs hold, starting from `active`; `None` at the first singular M_aa or after too many
 /// exchanges. `lcp` is equilibrated; `slack` is the violation that counts as zero.
 #[must_use]
-pub fn solve(lcp: &Lcp, active: &[bool], slack: f64) -> Option<DVector<f64>> {
+pub fn solve(lcp: &Lcp, active: &[bool], slack: f64) -> Option<(DVector<f64>, Vec<bool>)> {
     let size = lcp.size();
     let mut set = active.to_vec();
     let mut best = size + 1;
@@ -46,7 +46,7 @@ pub fn solve(lcp: &Lcp, active: &[bool], slack: f64) -> Option<DVector<f64>> {
             })
             .collect();
         let Some(&last) = violated.last() else {
-            return Some(lambda);
+            return Some((lambda, set));
         };
         let single = if violated.len() < best {
             best = violated.len();
@@ -80,7 +80,8 @@ mod tests {
             m: dmatrix![2.0, 1.0; 1.0, 2.0],
             q: dvector![-5.0, -6.0],
         };
-        let lambda = solve(&lcp, &[true, true], 0.0).unwrap();
+        let (lambda, set) = solve(&lcp, &[true, true], 0.0).unwrap();
+        assert_eq!(set, [true, true]);
         assert!((lambda - dvector![4.0 / 3.0, 7.0 / 3.0]).norm() < 1e-14);
     }
 

@@ -1,0 +1,714 @@
+//! The walk over the cards: definitions first, then elements in file order, then what refers to them.
+
+use std::collections::{HashSet, VecDeque};
+
+use super::elaborate::ElaborateOptions;
+use super::names::Names;
+use super::scope::{ScopeId, Scopes};
+use super::{Circuit, Element, ElementId, Kind, NodeId, Tran};
+use crate::algebra::Value;
+use crate::diagnostic::{Diagnostic, Severity, Span};
+use crate::netlist::Netlist;
+use crate::netlist::ast::{
+    self, Assign, Block, Control, Device, Expr, Name, Signal, Statement, Subckt, Wanted,
+};
+use crate::netlist::suggest::nearest;
+
+/// Most elements of a circuit.
+const MAX_ELEMENTS: usize = 1_000_000;
+/// Most subcircuit instances.
+const MAX_INSTANCES: usize = 200_000;
+/// Deepest nesting of subcircuits.
+const MAX_NESTING: usize = 50;
+
+/// A control that is resolved when all elements are known.
+pub(super) struct Pending<'n> {
+    pub(super) element: ElementId,
+    pub(super) scope: ScopeId,
+    pub(super) control: &'n Control,
+    pub(super) span: Span,
+}
+
+/// A coupling that is resolved when all elements are known.
+pub(super) struct PendingCoupling<'n> {
+    pub(super) name: String,
+    pub(super) scope: ScopeId,
+    pub(super) inductors: &'n [Name],
+    pub(super) k: &'n Expr,
+    pub(super) span: Span,
+}
+
+/// The circuit being built.
+pub(super) struct Builder<'n, 'o> {
+    pub(super) options: &'o ElaborateOptions,
+    pub(super) scopes: Scopes<'n>,
+    pub(super) circuit: Circuit,
+    pub(super) names: Names<'n>,
+    pub(super) pending: Vec<Pending<'n>>,
+    pub(super) couplings: Vec<PendingCoupling<'n>>,
+    trans: Vec<&'n ast::Tran>,
+    other_analysis: bool,
+    ics: Vec<(ScopeId, &'n [(Signal, Expr)])>,
+    saves: Vec<(ScopeId, &'n [Wanted])>,
+    /// Which branch of each `.if` was taken, in the order of the walk.
+    choices: VecDeque<Option<usize>>,
+    /// The subcircuits being expanded, from the outside in.
+    nesting: Vec<&'n Subckt>,
+    used: HashSet<Span>,
+    instances: usize,
+    /// Model parameters that had no effect, by model.
+    pub(super) unused_parameters: Vec<(String, Span)>,
+}
+
+impl<'n, 'o> Builder<'n, 'o> {
+    pub(super) fn new(options: &'o ElaborateOptions) -> Self {
+        let mut circuit = Circuit::default();
+        circuit.nodes.push("0".into());
+        Self {
+            options,
+            scopes: Scopes::new(),
+            circuit,
+            names: Names::new(),
+            pending: Vec::new(),
+            couplings: Vec::new(),
+            trans: Vec::new(),
+            other_analysis: false,
+            ics: Vec::new(),
+            saves: Vec::new(),
+            choices: VecDeque::new(),
+            nesting: Vec::new(),
+            used: HashSet::new(),
+            instances: 0,
+            unused_parameters: Vec::new(),
+        }
+    }
+
+    /// Builds the circuit and gives it with everything found.
+    pub(super) fn build(mut self, netlist: &'n Netlist) -> (Circuit, Vec<Diagnostic>) {
+        self.circuit.title.clone_from(&netlist.title);
+        let read = netlist
+            .body
+            .faults
+            .iter()
+            .all(|d| d.severity < Severity::Error);
+        for (name, value) in &self.options.params {
+            self.scopes.fix(
+                ScopeId::ROOT,
+                &name.to_lowercase(),
+                Some(Value::binary(*value)),
+            );
+        }
+        self.define(&netlist.body, ScopeId::ROOT);
+        self.check_overrides();
+        self.circuit.tran = self.tran();
+        self.elements(&netlist.body, ScopeId::ROOT);
+        if self.circuit.elements.is_empty() && read && !self.failed() {
+            self.tell(
+                Diagnostic::error("no-elements", netlist.end, "the netlist has no elements")
+                    .label("nothing up to here"),
+            );
+        }
+        self.resolve();
+        self.report_unused(&netlist.body);
+        if !self.circuit.elements.is_empty() && read && !self.failed() {
+            self.check_ground(netlist.end);
+            self.note_oddities();
+        }
+        if read && self.trans.is_empty() && !self.other_analysis {
+            self.tell(
+                Diagnostic::note(
+                    "no-analysis",
+                    netlist.end,
+                    "the netlist asks for no analysis",
+                )
+                .label("no `.tran` up to here")
+                .help("add `.tran tstep tstop` to simulate it"),
+            );
+        }
+        (self.circuit, self.scopes.findings.into_list())
+    }
+
+    pub(super) fn tell(&mut self, finding: Diagnostic) {
+        self.scopes.findings.tell(finding);
+    }
+
+    fn tell_all(&mut self, findings: &[Diagnostic]) {
+        for finding in findings {
+            self.tell(finding.clone());
+        }
+    }
+
+    fn failed(&self) -> bool {
+        self.scopes.findings.any_error()
+    }
+
+    /// Takes in the definitions of a block and of the branches of its conditionals.
+    fn define(&mut self, block: &'n Block, scope: ScopeId) {
+        for statement in &block.statements {
+            self.define_one(statement, scope);
+        }
+        for statement in &block.statements {
+            let Statement::If(branches) = statement else {
+                continue;
+            };
+            let taken = branches.iter().position(|branch| match &branch.condition {
+                None => true,
+                Some(condition) => self
+                    .scopes
+                    .number(condition, scope)
+                    .is_some_and(|v| super::functions::truth(v.f64)),
+            });
+            self.choices.push_back(taken);
+            if let Some(index) = taken {
+                self.tell_all(&branches[index].body.faults);
+                self.define(&branches[index].body, scope);
+            }
+        }
+    }
+
+    fn define_one(&mut self, statement: &'n Statement, scope: ScopeId) {
+        match statement {
+            Statement::Param(params) => {
+                for Assign { name, value } in params {
+                    if let Some(value) = value
+                        && !self.scopes.define(scope, name, value)
+                    {
+                        let message = format!("parameter `{}` is defined again", name.text);
+                        self.tell(
+                            Diagnostic::warning("duplicate-parameter", name.span, message)
+                                .label("this one counts"),
+                        );
+                    }
+                }
+            }
+            Statement::Func(func) => {
+                self.scopes
+                    .get_mut(scope)
+                    .funcs
+                    .insert(&func.name.text, func);
+            }
+            Statement::Model(model) => {
+                let models = &mut self.scopes.get_mut(scope).models;
+                if models.contains_key(model.name.text.as_str()) {
+                    let message = format!("model `{}` is defined again", model.name.text);
+                    self.tell(
+                        Diagnostic::warning("duplicate-model", model.name.span, message)
+                            .label("ignored: the first one counts"),
+                    );
+                } else {
+                    models.insert(&model.name.text, model);
+                }
+            }
+            Statement::Subckt(subckt) => {
+                let subckts = &mut self.scopes.get_mut(scope).subckts;
+                if subckts.contains_key(subckt.name.text.as_str()) {
+                    let message = format!("subcircuit `{}` is defined again", subckt.name.text);
+                    self.tell(
+                        Diagnostic::warning("duplicate-subcircuit", subckt.name.span, message)
+                            .label("ignored: the first one counts"),
+                    );
+                } else {
+                    subckts.insert(&subckt.name.text, subckt);
+                }
+            }
+            Statement::Global(names) => self
+                .names
+                .globals
+                .extend(names.iter().map(|n| n.text.as_str())),
+            Statement::Tran(tran) => self.trans.push(tran),
+            Statement::Analysis(_) => self.other_analysis = true,
+            Statement::Ic(list) => self.ics.push((scope, list)),
+            Statement::Save(list) => self.saves.push((scope, list)),
+            Statement::Element(_) | Statement::If(_) => {}
+        }
+    }
+
+    fn check_overrides(&mut self) {
+        for (name, _) in &self.options.params {
+            let name = name.to_lowercase();
+            let declared = &self.scopes.get(ScopeId::ROOT).declared;
+            if !declared.contains(name.as_str()) {
+                let fault = Diagnostic::error(
+                    "unknown-parameter",
+                    None,
+                    format!("the netlist has no parameter `{name}` to set"),
+                );
+                let near = nearest(&name, declared.iter().copied());
+                self.tell(match near {
+                    Some(near) => fault.help(format!("did you mean `{near}`?")),
+                    None => fault,
+                });
+            }
+        }
+    }
+
+    /// The transient analysis: the last card, or else the command inside `.control`.
+    fn tran(&mut self) -> Option<Tran> {
+        let cards: Vec<&ast::Tran> = self.trans.iter().copied().filter(|t| !t.command).collect();
+        let tran = *cards.last().or(self.trans.last())?;
+        if cards.len() > 1 {
+            self.tell(
+                Diagnostic::warning("duplicate-tran", tran.span, "more than one `.tran`")
+                    .label("this one counts"),
+            );
+        }
+        let mut times = Vec::with_capacity(4);
+        for arg in &tran.args {
+            times.push(self.scopes.finite(arg, ScopeId::ROOT)?.f64);
+        }
+        let (step, tstop) = if times.len() == 1 {
+            (0.0, times[0])
+        } else {
+            (times[0], times[1])
+        };
+        let tstart = times.get(2).copied().unwrap_or(0.0);
+        if times.iter().any(|t| *t < 0.0) {
+            self.tell(
+                Diagnostic::error("bad-tran", tran.span, "`.tran` has a negative time")
+                    .label("times must not be negative"),
+            );
+            return None;
+        }
+        if tstop <= tstart {
+            let message = format!("`.tran` ends at {tstop} s, not after its start at {tstart} s");
+            let fault =
+                Diagnostic::error("bad-tran", tran.span, message).label("nothing to simulate");
+            self.tell(fault.help("write `.tran tstep tstop`"));
+            return None;
+        }
+        if step > tstop - tstart {
+            let message = "the print step of `.tran` is longer than the run";
+            self.tell(
+                Diagnostic::warning("bad-tran", tran.span, message)
+                    .label("only the first and last point will be written"),
+            );
+        }
+        let tstep = if step > 0.0 {
+            step
+        } else {
+            (tstop - tstart) / 1000.0
+        };
+        let tmax = times.get(3).copied().filter(|t| *t > 0.0);
+        Some(Tran {
+            tstep,
+            tstop,
+            tstart,
+            tmax,
+            uic: tran.uic,
+        })
+    }
+
+    /// Whether `.tran … startup` asks for supplies that ramp up.
+    pub(super) fn startup(&self) -> bool {
+        self.trans.iter().any(|t| t.startup)
+    }
+
+    /// Adds the elements of a block, in order.
+    fn elements(&mut self, block: &'n Block, scope: ScopeId) {
+        let mut choices = Vec::new();
+        for statement in &block.statements {
+            if let Statement::If(_) = statement {
+                choices.push(self.choices.pop_front().flatten());
+            }
+        }
+        let mut choices = choices.into_iter();
+        for statement in &block.statements {
+            match statement {
+                Statement::Element(element) => self.element(element, scope),
+                Statement::If(branches) => {
+                    if let Some(branch) = choices.next().flatten().and_then(|i| branches.get(i)) {
+                        self.elements(&branch.body, scope);
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn element(&mut self, card: &'n ast::Element, scope: ScopeId) {
+        if self.circuit.elements.len() >= MAX_ELEMENTS {
+            let message = format!("the circuit has more than {MAX_ELEMENTS} elements");
+            self.tell(Diagnostic::error("too-large", None, message));
+            return;
+        }
+        match &card.device {
+            Device::Passive { values, args } => self.passive(card, values, args, scope),
+            Device::Source { dc, wave, args } => {
+                self.source(card, dc.as_ref(), wave.as_ref(), args, scope)
+            }
+            Device::Coupling { inductors, k } => self.couplings.push(PendingCoupling {
+                name: self.full_name(&card.name, scope),
+                scope,
+                inductors,
+                k,
+                span: card.span,
+            }),
+            Device::Controlled {
+                voltage,
+                control,
+                args,
+            } => self.controlled(card, *voltage, control, args, scope),
+            Device::Diode { model, area, args } => {
+                self.diode(card, model, area.as_ref(), args, scope)
+            }
+            Device::Switch {
+                control,
+                model,
+                initial,
+            } => self.switch(card, control, model, *initial, scope),
+            Device::Call { subckt, args } => self.call(card, subckt, args, scope),
+            Device::Unsupported { what } => {
+                let message = format!(
+                    "`{}` is {what}, which is recognised but not supported yet",
+                    card.name.text
+                );
+                self.tell(
+                    Diagnostic::error("unsupported-element", card.span, message)
+                        .label("not supported yet")
+                        .help("supported elements are R C L K V I E F G H B D S W X"),
+                );
+            }
+        }
+    }
+
+    /// Expands a subcircuit.
+    fn call(&mut self, card: &'n ast::Element, name: &'n Name, args: &'n [Assign], scope: ScopeId) {
+        let Some(subckt) = self.scopes.subckt(scope, &name.text) else {
+            let message = format!(
+                "`{}` calls unknown subcircuit `{}`",
+                card.name.text, name.text
+            );
+            let fault =
+                Diagnostic::error("unknown-subcircuit", name.span, message).label("not defined");
+            let near = self
+                .scopes
+                .near(scope, &name.text, |s| s.subckts.keys().copied());
+            self.tell(match near {
+                Some(near) => fault.help(format!("did you mean `{near}`?")),
+                None => fault.help("define it with `.subckt`, or include the file that does"),
+            });
+            return;
+        };
+        self.used.insert(subckt.name.span);
+        if subckt.nodes.len() != card.nodes.len() {
+            let plural = |n: usize| {
+                if n == 1 {
+                    "1 node".to_string()
+                } else {
+                    format!("{n} nodes")
+                }
+            };
+            let message = format!(
+                "`{}` connects {}, subcircuit `{}` has {}",
+                card.name.text,
+                plural(card.nodes.len()),
+                subckt.name.text,
+                plural(subckt.nodes.len())
+            );
+            let ports: Vec<&str> = subckt.nodes.iter().map(|n| n.text.as_str()).collect();
+            let help = format!(
+                "the nodes of `{}` are: {}",
+                subckt.name.text,
+                ports.join(" ")
+            );
+            self.tell(
+                Diagnostic::error("wrong-arity", card.span, message)
+                    .label("wrong number of nodes")
+                    .help(help),
+            );
+            return;
+        }
+        self.instances += 1;
+        let recursive = self.nesting.iter().any(|open| std::ptr::eq(*open, subckt));
+        if recursive || self.nesting.len() >= MAX_NESTING || self.instances > MAX_INSTANCES {
+            let message = if recursive {
+                format!("subcircuit `{}` contains itself", subckt.name.text)
+            } else {
+                format!(
+                    "subcircuits are nested more than {MAX_NESTING} deep, or more than {MAX_INSTANCES} in all"
+                )
+            };
+            self.tell(
+                Diagnostic::error("recursive-subcircuit", name.span, message)
+                    .label("expanded without end"),
+            );
+            return;
+        }
+        let inner = self.scopes.open(scope, &card.name.text);
+        for (port, node) in subckt.nodes.iter().zip(&card.nodes) {
+            let id = self.node(node, scope);
+            self.scopes.get_mut(inner).ports.insert(&port.text, id);
+        }
+        for Assign { name, value } in &subckt.params {
+            if let Some(value) = value {
+                self.scopes.define(inner, name, value);
+            }
+        }
+        self.scopes.get_mut(inner).declared.clear();
+        for Assign { name, value } in args {
+            let Some(value) = value else { continue };
+            let number = self.scopes.number(value, scope);
+            if name.text == "m"
+                && !subckt.params.iter().any(|p| p.name.text == "m")
+                && number.is_some_and(|v| v.f64 != 1.0)
+            {
+                let message = "the multiplier `m` of a subcircuit is not supported yet";
+                self.tell(
+                    Diagnostic::error("unsupported", name.span, message).label("recognised only"),
+                );
+            }
+            self.scopes.fix(inner, &name.text, number);
+        }
+        self.nesting.push(subckt);
+        // The choices of this instance come before those that wait outside it.
+        let waiting = std::mem::take(&mut self.choices);
+        self.tell_all(&subckt.body.faults);
+        self.define(&subckt.body, inner);
+        self.elements(&subckt.body, inner);
+        self.choices = waiting;
+        self.nesting.pop();
+    }
+
+    /// Faults inside subcircuits that nobody uses are worth a warning only.
+    fn report_unused(&mut self, block: &'n Block) {
+        for statement in &block.statements {
+            let Statement::Subckt(subckt) = statement else {
+                continue;
+            };
+            let errors = subckt
+                .body
+                .faults
+                .iter()
+                .filter(|d| d.severity == Severity::Error)
+                .count();
+            if errors > 0 && !self.used.contains(&subckt.name.span) {
+                let first = &subckt.body.faults[0];
+                let message = format!(
+                    "subcircuit `{}`, which is not used, has faults: {}",
+                    subckt.name.text, first.message
+                );
+                let span = first.span.unwrap_or(subckt.name.span);
+                self.tell(
+                    Diagnostic::warning("unused-subcircuit", span, message)
+                        .label(first.label.clone()),
+                );
+            }
+        }
+    }
+
+    /// The canonical name of an element.
+    pub(super) fn full_name(&self, name: &Name, scope: ScopeId) -> String {
+        format!("{}{}", self.scopes.get(scope).prefix, name.text)
+    }
+
+    /// The node a name means here, new if need be.
+    pub(super) fn node(&mut self, name: &Name, scope: ScopeId) -> NodeId {
+        match self.names.node(&name.text, &self.scopes, scope) {
+            Some(id) => id,
+            None => self.new_node(self.names.full_node_name(&name.text, &self.scopes, scope)),
+        }
+    }
+
+    /// A node with a canonical name.
+    pub(super) fn new_node(&mut self, name: String) -> NodeId {
+        let next = NodeId(u32::try_from(self.circuit.nodes.len()).unwrap_or(u32::MAX));
+        let nodes = &mut self.circuit.nodes;
+        *self.names.nodes.entry(name).or_insert_with_key(|name| {
+            nodes.push(name.clone());
+            next
+        })
+    }
+
+    /// Adds an element; a second one with the same name is an error.
+    pub(super) fn add(&mut self, element: Element) -> Option<ElementId> {
+        let id = ElementId(u32::try_from(self.circuit.elements.len()).unwrap_or(u32::MAX));
+        if self.names.elements.contains_key(&element.name) {
+            let message = format!("element `{}` is defined again", element.name);
+            self.tell(
+                Diagnostic::error("duplicate-element", element.span, message)
+                    .label("the name is taken already"),
+            );
+            return None;
+        }
+        self.names.elements.insert(element.name.clone(), id);
+        self.circuit.elements.push(element);
+        Some(id)
+    }
+
+    /// The element a card refers to; reports if there is none.
+    pub(super) fn expect_element(
+        &mut self,
+        name: &Name,
+        scope: ScopeId,
+        what: &str,
+    ) -> Option<ElementId> {
+        let found = self.names.expect_element(name, &self.scopes, scope, what);
+        found.map_err(|fault| self.tell(fault)).ok()
+    }
+
+    /// The node a card refers to; reports if there is none.
+    pub(super) fn expect_node(&mut self, name: &Name, scope: ScopeId) -> Option<NodeId> {
+        let found = self.names.expect_node(name, &self.scopes, scope);
+        found.map_err(|fault| self.tell(fault)).ok()
+    }
+
+    /// Everything that refers to elements and nodes by name.
+    fn resolve(&mut self) {
+        for pending in std::mem::take(&mut self.pending) {
+            if let Some(control) = self.control(&pending) {
+                match &mut self.circuit.elements[pending.element.index()].kind {
+                    Kind::Controlled { control: own, .. } => *own = control,
+                    Kind::Switch(switch) => switch.follow(control),
+                    _ => {}
+                }
+            }
+        }
+        self.couple();
+        for (scope, list) in std::mem::take(&mut self.ics) {
+            self.initial(list, scope);
+        }
+        for (scope, list) in std::mem::take(&mut self.saves) {
+            self.save(list, scope);
+        }
+    }
+
+    /// `.ic`: what it cannot set is ignored with a warning.
+    fn initial(&mut self, list: &'n [(Signal, Expr)], scope: ScopeId) {
+        for (signal, value) in list {
+            let Some(value) = self.scopes.finite(value, scope).map(|v| v.f64) else {
+                continue;
+            };
+            if let Err(fault) = self.initial_one(signal, value, scope) {
+                let message = format!("{}: `.ic` is ignored", fault.message);
+                self.tell(Diagnostic {
+                    severity: Severity::Warning,
+                    message,
+                    ..fault
+                });
+            }
+        }
+    }
+
+    fn initial_one(
+        &mut self,
+        signal: &Signal,
+        value: f64,
+        scope: ScopeId,
+    ) -> Result<(), Diagnostic> {
+        let node = |name| self.names.expect_node(name, &self.scopes, scope);
+        match signal {
+            Signal::Voltage(a, b) => {
+                let a = node(a)?;
+                let b = b.as_ref().map_or(Ok(NodeId::GROUND), node)?;
+                self.circuit.initial_voltages.push((a, b, value));
+            }
+            Signal::Current(name) => {
+                let id = self
+                    .names
+                    .expect_element(name, &self.scopes, scope, "inductor")?;
+                let element = &mut self.circuit.elements[id.index()];
+                if !matches!(element.kind, Kind::Inductor(_)) {
+                    let message = format!("`{}` is not an inductor", name.text);
+                    return Err(
+                        Diagnostic::error("ignored", name.span, message).label("has no state")
+                    );
+                }
+                element.ic = Some(value);
+            }
+        }
+        Ok(())
+    }
+
+    /// A ground node must exist.
+    fn check_ground(&mut self, end: Span) {
+        let grounded = self
+            .circuit
+            .elements
+            .iter()
+            .any(|e| e.p == NodeId::GROUND || e.n == NodeId::GROUND);
+        if !grounded {
+            self.tell(
+                Diagnostic::error("no-ground", end, "the circuit has no ground")
+                    .label("no element is connected to node `0` up to here")
+                    .help("call one node `0` (or `gnd`)"),
+            );
+        }
+    }
+
+    /// Notes on things that are legal and odd.
+    fn note_oddities(&mut self) {
+        let mut terminals = vec![0_usize; self.circuit.nodes.len()];
+        let mut notes = Vec::new();
+        for element in &self.circuit.elements {
+            terminals[element.p.index()] += 1;
+            terminals[element.n.index()] += 1;
+            if element.p == element.n {
+                let message = format!(
+                    "both ends of `{}` are at node `{}`",
+                    element.name,
+                    self.circuit.nodes[element.p.index()]
+                );
+                notes.push(
+                    Diagnostic::note("self-loop", element.span, message)
+                        .label("no current flows through it from outside"),
+                );
+            }
+        }
+        let dangling: Vec<&str> = terminals
+            .iter()
+            .zip(&self.circuit.nodes)
+            .skip(1)
+            .filter_map(|(count, name)| (*count == 1).then_some(name.as_str()))
+            .collect();
+        if !dangling.is_empty() {
+            let shown = dangling
+                .iter()
+                .take(5)
+                .copied()
+                .collect::<Vec<_>>()
+                .join(", ");
+            let more = if dangling.len() > 5 {
+                format!(" and {} more", dangling.len() - 5)
+            } else {
+                String::new()
+            };
+            notes.push(Diagnostic::note(
+                "dangling",
+                None,
+                format!("connected at one end only: node {shown}{more}"),
+            ));
+        }
+        let uic = self.circuit.tran.is_some_and(|t| t.uic);
+        let ignored = self
+            .circuit
+            .elements
+            .iter()
+            .find(|e| e.ic.is_some_and(|ic| ic != 0.0));
+        if let (false, Some(_), Some(element)) = (uic, self.circuit.tran, ignored) {
+            let message = format!(
+                "`IC=` of `{}` has no effect: the run starts from the operating point",
+                element.name
+            );
+            notes.push(
+                Diagnostic::warning("ic-without-uic", element.span, message)
+                    .label("ignored without `uic`")
+                    .help("add `uic` to `.tran`, or set node voltages with `.ic`"),
+            );
+        }
+        for note in notes {
+            self.tell(note);
+        }
+        if !self.unused_parameters.is_empty() {
+            let (_, span) = self.unused_parameters[0];
+            let names: Vec<String> = self
+                .unused_parameters
+                .drain(..)
+                .map(|(name, _)| name)
+                .collect();
+            let message = format!("parameters without effect here: {}", names.join(", "));
+            self.tell(
+                Diagnostic::note("unused-parameters", span, message).label("the first of them"),
+            );
+        }
+    }
+}

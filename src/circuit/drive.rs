@@ -1,0 +1,327 @@
+//! V and I: waveforms with the defaults that ngspice gives to omitted parameters.
+
+use super::builder::Builder;
+use super::passive::Args;
+use super::scope::ScopeId;
+use super::source::{Source, Wave};
+use super::{Element, Kind};
+use crate::diagnostic::Diagnostic;
+use crate::netlist::ast::{self, Assign, Expr, WaveCall};
+
+/// LTspice's `startup`: supplies reach their value after this time, s.
+const STARTUP: f64 = 20e-6;
+
+impl<'n> Builder<'n, '_> {
+    pub(super) fn source(
+        &mut self,
+        card: &'n ast::Element,
+        dc: Option<&'n Expr>,
+        wave: Option<&'n WaveCall>,
+        args: &'n [Assign],
+        scope: ScopeId,
+    ) {
+        let known = [
+            "rser", "cpar", "rpar", "r", "td", "repeat", "distof1", "distof2", "tfall", "dc",
+        ];
+        if let Some(load) = args.iter().find(|a| a.name.text == "load") {
+            let message = format!(
+                "`load` of `{}` is ignored: the source also delivers power",
+                card.name.text
+            );
+            self.tell(
+                Diagnostic::warning("ignored", load.name.span, message).label("not supported yet"),
+            );
+        }
+        self.check_args(card, args, &[known.as_slice(), &["load"]].concat());
+        let args = Args(args);
+        let dc = dc.or(args.get(&["dc"]));
+        let dc_value = match dc {
+            Some(dc) => match self.scopes.finite(dc, scope) {
+                Some(value) => Some(value.f64),
+                None => return,
+            },
+            None => None,
+        };
+        let wave = match wave {
+            Some(call) => match self.wave(card, call, args, scope) {
+                Some(wave) => wave,
+                None => return,
+            },
+            None => {
+                if dc_value.is_none() {
+                    let message = format!("`{}` has no value: 0 is assumed", card.name.text);
+                    self.tell(
+                        Diagnostic::note("no-value", card.span, message)
+                            .label("an ammeter, if it is a voltage source"),
+                    );
+                }
+                self.constant(dc_value.unwrap_or(0.0))
+            }
+        };
+        let source = Source {
+            dc: dc_value.unwrap_or_else(|| initial(&wave)),
+            wave,
+        };
+        let (p, n) = (
+            self.node(&card.nodes[0], scope),
+            self.node(&card.nodes[1], scope),
+        );
+        let voltage = card.name.text.starts_with('v');
+        let kind = if voltage {
+            Kind::VoltageSource(source)
+        } else {
+            Kind::CurrentSource(source)
+        };
+        let name = self.full_name(&card.name, scope);
+        self.with_parasitics(
+            Element {
+                name,
+                p,
+                n,
+                kind,
+                ic: None,
+                span: Some(card.span),
+            },
+            args,
+            scope,
+        );
+    }
+
+    /// A DC source, which ramps up under LTspice's `startup`.
+    fn constant(&self, value: f64) -> Wave {
+        if self.startup() && value != 0.0 {
+            Wave::Pwl {
+                points: vec![(0.0, 0.0), (STARTUP, value)],
+                repeat: None,
+                delay: 0.0,
+            }
+        } else {
+            Wave::Dc(value)
+        }
+    }
+
+    fn wave(
+        &mut self,
+        card: &'n ast::Element,
+        call: &'n WaveCall,
+        args: Args<'n>,
+        scope: ScopeId,
+    ) -> Option<Wave> {
+        let mut x = Vec::with_capacity(call.args.len());
+        for arg in &call.args {
+            x.push(self.scopes.finite(&arg.value, scope)?.f64);
+        }
+        let most = match call.name.text.as_str() {
+            "sin" | "sine" => 7,
+            "pulse" => 8,
+            "exp" => 6,
+            _ => usize::MAX,
+        };
+        if let Some(extra) = call.args.get(most) {
+            let message = format!(
+                "{} takes at most {most} values",
+                call.name.text.to_uppercase()
+            );
+            self.tell(
+                Diagnostic::error("unexpected", extra.value.span, message).label("one too many"),
+            );
+            return None;
+        }
+        match call.name.text.as_str() {
+            "sin" | "sine" => self.sine(call, &x),
+            "pulse" => self.pulse(call, &x),
+            "exp" => Some(self.exponential(&x)),
+            "pwl" => self.pwl(call, &x, args, scope),
+            name => {
+                let message = format!(
+                    "{} of `{}` is recognised but not supported yet",
+                    name.to_uppercase(),
+                    card.name.text
+                );
+                let fault = Diagnostic::error("unsupported", call.name.span, message)
+                    .label("not supported yet");
+                self.tell(fault.help("supported waveforms are SIN, PULSE, PWL, EXP"));
+                None
+            }
+        }
+    }
+
+    /// Print step and stop time, from which ngspice takes defaults.
+    fn defaults(&self) -> (f64, f64) {
+        self.circuit.tran.map_or((0.0, 1.0), |t| (t.tstep, t.tstop))
+    }
+
+    fn sine(&mut self, call: &WaveCall, x: &[f64]) -> Option<Wave> {
+        let at = |k: usize| x.get(k).copied().unwrap_or(0.0);
+        if at(6) != 0.0 {
+            let message = "the number of cycles of SIN is recognised but not supported yet";
+            self.tell(
+                Diagnostic::error("unsupported", call.args[6].value.span, message)
+                    .label("not supported yet"),
+            );
+            return None;
+        }
+        Some(Wave::Sin {
+            offset: at(0),
+            amplitude: at(1),
+            frequency: x.get(2).copied().unwrap_or(1.0 / self.defaults().1),
+            delay: at(3),
+            damping: at(4),
+            phase: at(5),
+        })
+    }
+
+    fn pulse(&mut self, call: &WaveCall, x: &[f64]) -> Option<Wave> {
+        let (tstep, tstop) = self.defaults();
+        let at = |k: usize| x.get(k).copied().unwrap_or(0.0);
+        let or = |k: usize, default: f64| x.get(k).copied().unwrap_or(default);
+        let (rise, fall, width) = (or(3, tstep), or(4, tstep), or(5, tstop));
+        let period = or(6, tstop);
+        let period = if period == 0.0 { tstop } else { period };
+        for (k, value) in [(3, rise), (4, fall), (5, width), (6, period)] {
+            if value < 0.0 {
+                let message = format!(
+                    "PULSE has a negative {}",
+                    ["rise time", "fall time", "width", "period"][k - 3]
+                );
+                let span = call.args.get(k).map_or(call.name.span, |a| a.value.span);
+                self.tell(
+                    Diagnostic::error("bad-value", span, message).label("must not be negative"),
+                );
+                return None;
+            }
+        }
+        // Defaults of omitted values may overlap; only what was written is worth a warning.
+        if x.len() > 6 && rise + width + fall > period * (1.0 + 4.0 * f64::EPSILON) {
+            let message = format!(
+                "the pulse lasts {:e} s, longer than its period {period:e} s",
+                rise + width + fall
+            );
+            self.tell(
+                Diagnostic::warning("pulse-overfull", call.name.span, message)
+                    .label("cut off by the next period"),
+            );
+        }
+        let count = x.get(7).copied().filter(|n| *n > 0.0);
+        Some(Wave::Pulse {
+            v1: at(0),
+            v2: at(1),
+            delay: at(2),
+            rise,
+            fall,
+            width,
+            period,
+            count,
+        })
+    }
+
+    fn exponential(&self, x: &[f64]) -> Wave {
+        let (tstep, _) = self.defaults();
+        let at = |k: usize| x.get(k).copied().unwrap_or(0.0);
+        let or =
+            |k: usize, default: f64| x.get(k).copied().filter(|v| *v != 0.0).unwrap_or(default);
+        let rise_delay = at(2);
+        Wave::Exp {
+            v1: at(0),
+            v2: at(1),
+            rise_delay,
+            rise_tau: or(3, tstep),
+            fall_delay: x.get(4).copied().unwrap_or(rise_delay + tstep),
+            fall_tau: or(5, tstep),
+        }
+    }
+
+    fn pwl(
+        &mut self,
+        call: &'n WaveCall,
+        x: &[f64],
+        args: Args<'n>,
+        scope: ScopeId,
+    ) -> Option<Wave> {
+        if x.is_empty() || x.len() % 2 == 1 {
+            let message = format!(
+                "PWL needs pairs of time and value, this one has {} numbers",
+                x.len()
+            );
+            let span = call.args.last().map_or(call.name.span, |a| a.value.span);
+            self.tell(Diagnostic::error("pwl-odd", span, message).label("without a partner"));
+            return None;
+        }
+        let mut points: Vec<(f64, f64)> = Vec::with_capacity(x.len() / 2);
+        for (k, pair) in x.chunks_exact(2).enumerate() {
+            let written = &call.args[2 * k];
+            let before = points.last().map_or(0.0, |p| p.0);
+            let time = if written.plus {
+                before + pair[0]
+            } else {
+                pair[0]
+            };
+            if k > 0 && time < before {
+                let message = format!("PWL goes back in time, from {before} s to {time} s");
+                self.tell(
+                    Diagnostic::error("pwl-backwards", written.value.span, message)
+                        .label("earlier than the point before"),
+                );
+                return None;
+            }
+            points.push((time, pair[1]));
+        }
+        let repeat = args
+            .0
+            .iter()
+            .find(|a| matches!(a.name.text.as_str(), "repeat" | "r"));
+        let repeat = match repeat {
+            None => None,
+            Some(Assign { name, value: None }) if name.text == "repeat" => Some(0.0),
+            Some(Assign { name, .. }) if name.text == "repeat" => {
+                let message = "`PWL REPEAT FOR n` is recognised but not supported yet";
+                self.tell(
+                    Diagnostic::error("unsupported", name.span, message)
+                        .label("not supported yet")
+                        .help("`REPEAT FOREVER` is"),
+                );
+                return None;
+            }
+            Some(Assign { value, .. }) => match value {
+                Some(value) => Some(self.scopes.finite(value, scope)?.f64).filter(|r| *r >= 0.0),
+                None => None,
+            },
+        };
+        let last = points.last().map_or(0.0, |p| p.0);
+        if let Some(from) = repeat.filter(|from| *from >= last) {
+            let message =
+                format!("PWL repeats from {from} s, which is not before its end at {last} s");
+            self.tell(
+                Diagnostic::error("bad-value", call.name.span, message).label("nothing to repeat"),
+            );
+            return None;
+        }
+        let delay = self.arg(args, &["td"], scope)?.map_or(0.0, |v| v.f64);
+        Some(Wave::Pwl {
+            points,
+            repeat,
+            delay,
+        })
+    }
+}
+
+/// The value at t = 0, which is the DC value where none is given.
+fn initial(wave: &Wave) -> f64 {
+    match wave {
+        Wave::Dc(value) => *value,
+        Wave::Sin {
+            offset,
+            amplitude,
+            frequency,
+            delay,
+            damping,
+            phase,
+        } => {
+            let late = (-delay).max(0.0);
+            let angle = std::f64::consts::TAU * frequency * late + phase.to_radians();
+            offset + amplitude * (-damping * late).exp() * angle.sin()
+        }
+        Wave::Pulse { v1, .. } | Wave::Exp { v1, .. } => *v1,
+        Wave::Pwl { points, .. } => points.first().map_or(0.0, |p| p.1),
+    }
+}

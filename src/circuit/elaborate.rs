@@ -1,0 +1,48 @@
+//! Netlist to [`Circuit`]: parameters evaluated, subcircuits expanded, models turned into laws.
+
+use super::Circuit;
+use super::builder::Builder;
+use crate::diagnostic::{Diagnostic, Severity};
+use crate::netlist::Netlist;
+
+/// Which law a diode model becomes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Diodes {
+    /// What the model says: `Ron Roff Vfwd`, `N ≤ 0.05` or `ideal` is piecewise linear.
+    #[default]
+    Auto,
+    /// Every exponential model is replaced by the ideal diode in series with its RS.
+    Ideal,
+    /// Every model is exponential.
+    Exp,
+}
+
+/// Choices of the user that change the circuit.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ElaborateOptions {
+    /// How diode models are read.
+    pub diodes: Diodes,
+    /// `--param NAME=VALUE`: replaces the values of `.param` at the top level.
+    pub params: Vec<(String, f64)>,
+}
+
+/// Builds the circuit a netlist describes.
+///
+/// # Returns
+/// The circuit, unless there is an error here or in reading the netlist; the findings here in file order.
+#[must_use]
+pub fn elaborate(
+    netlist: &Netlist,
+    options: &ElaborateOptions,
+) -> (Option<Circuit>, Vec<Diagnostic>) {
+    let (circuit, mut findings) = Builder::new(options).build(netlist);
+    findings.sort_by_key(|d| {
+        d.span
+            .map_or((u32::MAX, usize::MAX), |s| (s.file.0, s.start))
+    });
+    let sound = findings
+        .iter()
+        .chain(&netlist.body.faults)
+        .all(|d| d.severity < Severity::Error);
+    (sound.then_some(circuit), findings)
+}

@@ -1,0 +1,455 @@
+//! Evaluation of expressions: numbers, and affine forms in the circuit's voltages and currents.
+
+use super::functions::{self, CallError, truth};
+use super::scope::{Param, ScopeId, Scopes};
+use super::{Affine, Quantity};
+use crate::algebra::Value;
+use crate::diagnostic::Diagnostic;
+use crate::netlist::ast::{Binary, Expr, ExprKind, Name, Signal, Unary};
+use crate::netlist::suggest::nearest;
+
+/// Deepest nesting of one evaluation, through parameters and functions.
+const MAX_DEPTH: usize = 600;
+/// Most operations of all evaluations of a netlist.
+const MAX_STEPS: usize = 20_000_000;
+
+/// `constant + Σ gain · quantity`, exact where the text was.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Form {
+    pub(super) constant: Value,
+    pub(super) terms: Vec<(Value, Quantity)>,
+}
+
+impl Form {
+    pub(super) fn number(value: impl Into<Value>) -> Self {
+        Self {
+            constant: value.into(),
+            terms: Vec::new(),
+        }
+    }
+
+    pub(super) fn is_constant(&self) -> bool {
+        self.terms.is_empty()
+    }
+
+    pub(super) fn into_affine(self) -> Affine {
+        Affine {
+            terms: self.terms,
+            constant: self.constant.f64,
+        }
+    }
+
+    fn negated(self) -> Self {
+        self.scaled(Value::decimal(-1.0, -1, 0))
+    }
+
+    pub(super) fn scaled(mut self, factor: Value) -> Self {
+        self.constant = product(self.constant, factor);
+        for (gain, _) in &mut self.terms {
+            *gain = product(*gain, factor);
+        }
+        self
+    }
+
+    pub(super) fn plus(mut self, other: Self) -> Self {
+        self.constant = sum(self.constant, other.constant);
+        for (gain, quantity) in other.terms {
+            match self.terms.iter_mut().find(|(_, q)| *q == quantity) {
+                Some((own, _)) => *own = sum(*own, gain),
+                None => self.terms.push((gain, quantity)),
+            }
+        }
+        self.terms.retain(|(gain, _)| gain.f64 != 0.0);
+        self
+    }
+}
+
+/// Keeps the decimal where a factor is ±1.
+fn product(a: Value, b: Value) -> Value {
+    match (a.f64, b.f64) {
+        (1.0, _) => b,
+        (_, 1.0) => a,
+        (-1.0, _) => negative(b),
+        (_, -1.0) => negative(a),
+        (x, y) => Value::binary(x * y),
+    }
+}
+
+fn negative(a: Value) -> Value {
+    Value {
+        f64: -a.f64,
+        decimal: a.decimal.map(|(mantissa, exponent)| (-mantissa, exponent)),
+    }
+}
+
+fn sum(a: Value, b: Value) -> Value {
+    if a.f64 == 0.0 {
+        b
+    } else if b.f64 == 0.0 {
+        a
+    } else {
+        Value::binary(a.f64 + b.f64)
+    }
+}
+
+/// Finds the quantity that `v(…)` or `i(…)` means; `None` where only numbers are allowed.
+pub(super) type Resolve<'r, 'n> =
+    Option<&'r dyn Fn(&Signal, &Scopes<'n>, ScopeId) -> Result<Form, Diagnostic>>;
+
+impl<'n> Scopes<'n> {
+    /// The number an expression stands for; `None` after a reported fault.
+    pub(super) fn number(&mut self, expr: &'n Expr, scope: ScopeId) -> Option<Value> {
+        self.form(expr, scope, None).map(|form| form.constant)
+    }
+
+    /// The same, where infinity makes no sense.
+    pub(super) fn finite(&mut self, expr: &'n Expr, scope: ScopeId) -> Option<Value> {
+        let value = self.number(expr, scope)?;
+        if value.f64.is_finite() {
+            return Some(value);
+        }
+        self.fault(
+            "bad-value",
+            expr,
+            format!("`{expr}` is not finite"),
+            "a finite number is needed here",
+        )
+    }
+
+    /// The affine form an expression stands for; `None` after a reported fault.
+    pub(super) fn form(
+        &mut self,
+        expr: &'n Expr,
+        scope: ScopeId,
+        resolve: Resolve<'_, 'n>,
+    ) -> Option<Form> {
+        self.evaluate(expr, scope, resolve, &[])
+    }
+
+    fn fault<T>(
+        &mut self,
+        code: &'static str,
+        at: &Expr,
+        message: String,
+        label: &str,
+    ) -> Option<T> {
+        self.findings
+            .tell(Diagnostic::error(code, at.span, message).label(label));
+        None
+    }
+
+    fn evaluate(
+        &mut self,
+        expr: &'n Expr,
+        scope: ScopeId,
+        resolve: Resolve<'_, 'n>,
+        locals: &[(&'n str, Form)],
+    ) -> Option<Form> {
+        self.steps += 1;
+        if self.depth >= MAX_DEPTH || self.steps > MAX_STEPS {
+            let message = "this expression never ends, or is far too large".to_string();
+            return self.fault(
+                "too-deep",
+                expr,
+                message,
+                "parameters or functions go in circles",
+            );
+        }
+        self.depth += 1;
+        let form = self.kind(expr, scope, resolve, locals);
+        self.depth -= 1;
+        form
+    }
+
+    fn kind(
+        &mut self,
+        expr: &'n Expr,
+        scope: ScopeId,
+        resolve: Resolve<'_, 'n>,
+        locals: &[(&'n str, Form)],
+    ) -> Option<Form> {
+        match &expr.kind {
+            ExprKind::Number(value) => Some(Form::number(*value)),
+            ExprKind::Name(name) => match locals.iter().find(|(local, _)| local == name) {
+                Some((_, form)) => Some(form.clone()),
+                None => self.named(expr, name, scope).map(Form::number),
+            },
+            ExprKind::Text(text) => self.fault(
+                "bad-number",
+                expr,
+                format!("`{text}` is not a number"),
+                "expected a number",
+            ),
+            ExprKind::Signal(signal) => match resolve.map(|resolve| resolve(signal, self, scope)) {
+                Some(Ok(form)) => Some(form),
+                Some(Err(fault)) => {
+                    self.findings.tell(fault);
+                    None
+                }
+                None => self.fault(
+                    "bad-expression",
+                    expr,
+                    format!("`{signal}` is not known here"),
+                    "a number is needed",
+                ),
+            },
+            ExprKind::Unary(Unary::Minus, x) => {
+                Some(self.evaluate(x, scope, resolve, locals)?.negated())
+            }
+            ExprKind::Unary(Unary::Not, x) => {
+                let x = self.constant(expr, x, scope, resolve, locals)?;
+                Some(Form::number(f64::from(!truth(x))))
+            }
+            ExprKind::If(parts) => {
+                let [condition, then, otherwise] = &**parts;
+                let condition = self.constant(expr, condition, scope, resolve, locals)?;
+                self.evaluate(
+                    if truth(condition) { then } else { otherwise },
+                    scope,
+                    resolve,
+                    locals,
+                )
+            }
+            ExprKind::Binary(op, x, y) => {
+                let x = self.evaluate(x, scope, resolve, locals);
+                let y = self.evaluate(y, scope, resolve, locals);
+                self.binary(expr, *op, x?, y?)
+            }
+            ExprKind::Call(name, args) => self.call(expr, name, args, scope, resolve, locals),
+        }
+    }
+
+    /// A part that must be a number; the message names the expression that is not linear.
+    fn constant(
+        &mut self,
+        whole: &'n Expr,
+        part: &'n Expr,
+        scope: ScopeId,
+        resolve: Resolve<'_, 'n>,
+        locals: &[(&'n str, Form)],
+    ) -> Option<f64> {
+        let form = self.evaluate(part, scope, resolve, locals)?;
+        if form.is_constant() {
+            Some(form.constant.f64)
+        } else {
+            self.not_linear(whole)
+        }
+    }
+
+    fn not_linear<T>(&mut self, expr: &Expr) -> Option<T> {
+        let message = format!("`{expr}` is not linear in the voltages and currents");
+        self.findings.tell(
+            Diagnostic::error("not-linear", expr.span, message)
+                .label("recognised, but not supported yet")
+                .help("sums of voltages and currents with constant factors are supported"),
+        );
+        None
+    }
+
+    fn binary(&mut self, expr: &Expr, op: Binary, x: Form, y: Form) -> Option<Form> {
+        match op {
+            Binary::Add => return self.checked(expr, x.plus(y)),
+            Binary::Sub => return self.checked(expr, x.plus(y.negated())),
+            Binary::Mul if x.is_constant() => return self.checked(expr, y.scaled(x.constant)),
+            Binary::Mul if y.is_constant() => return self.checked(expr, x.scaled(y.constant)),
+            Binary::Div if y.is_constant() => {
+                if y.constant.f64 == 0.0 {
+                    return self.fault(
+                        "bad-value",
+                        expr,
+                        format!("`{expr}` divides by zero"),
+                        "division by zero",
+                    );
+                }
+                if y.constant.f64 == 1.0 {
+                    return Some(x);
+                }
+                let quotient = |a: Value| Value::binary(a.f64 / y.constant.f64);
+                let terms = x
+                    .terms
+                    .iter()
+                    .map(|&(gain, q)| (quotient(gain), q))
+                    .collect();
+                return self.checked(
+                    expr,
+                    Form {
+                        constant: quotient(x.constant),
+                        terms,
+                    },
+                );
+            }
+            _ => {}
+        }
+        if !(x.is_constant() && y.is_constant()) {
+            return self.not_linear(expr);
+        }
+        let (x, y) = (x.constant.f64, y.constant.f64);
+        let value = match op {
+            Binary::Rem => x % y,
+            Binary::Pow => x.powf(y),
+            Binary::Less => f64::from(x < y),
+            Binary::LessEqual => f64::from(x <= y),
+            Binary::Greater => f64::from(x > y),
+            Binary::GreaterEqual => f64::from(x >= y),
+            Binary::Equal => f64::from(x == y),
+            Binary::NotEqual => f64::from(x != y),
+            Binary::And => f64::from(truth(x) && truth(y)),
+            Binary::Or => f64::from(truth(x) || truth(y)),
+            Binary::Add | Binary::Sub | Binary::Mul | Binary::Div => return self.not_linear(expr),
+        };
+        self.checked(expr, Form::number(value))
+    }
+
+    fn checked(&mut self, expr: &Expr, form: Form) -> Option<Form> {
+        let sound =
+            !form.constant.f64.is_nan() && form.terms.iter().all(|(gain, _)| gain.f64.is_finite());
+        if sound && (form.constant.f64.is_finite() || mentions_infinity(expr)) {
+            return Some(form);
+        }
+        self.fault(
+            "bad-value",
+            expr,
+            format!("`{expr}` has no finite value"),
+            "overflow, or outside the domain",
+        )
+    }
+
+    fn call(
+        &mut self,
+        expr: &'n Expr,
+        name: &'n Name,
+        args: &'n [Expr],
+        scope: ScopeId,
+        resolve: Resolve<'_, 'n>,
+        locals: &[(&'n str, Form)],
+    ) -> Option<Form> {
+        if let Some(func) = self.func(scope, &name.text) {
+            if func.args.len() != args.len() {
+                let message = format!(
+                    "`{}` takes {} arguments, not {}",
+                    name.text,
+                    func.args.len(),
+                    args.len()
+                );
+                return self.fault("bad-call", expr, message, "wrong number of arguments");
+            }
+            let mut inner = Vec::with_capacity(args.len());
+            for (formal, arg) in func.args.iter().zip(args) {
+                inner.push((
+                    formal.text.as_str(),
+                    self.evaluate(arg, scope, resolve, locals)?,
+                ));
+            }
+            return self.evaluate(&func.body, scope, resolve, &inner);
+        }
+        if let ("if", [condition, then, otherwise]) = (name.text.as_str(), args) {
+            let condition = self.constant(expr, condition, scope, resolve, locals)?;
+            return self.evaluate(
+                if truth(condition) { then } else { otherwise },
+                scope,
+                resolve,
+                locals,
+            );
+        }
+        let mut values = Vec::with_capacity(args.len());
+        for arg in args {
+            values.push(self.constant(expr, arg, scope, resolve, locals)?);
+        }
+        match functions::call(&name.text, &values) {
+            Ok(value) => Some(Form::number(value)),
+            Err(CallError::Arity(what)) => self.fault(
+                "bad-call",
+                expr,
+                format!("`{}` takes {what}", name.text),
+                "wrong number of arguments",
+            ),
+            Err(CallError::Domain) => self.fault(
+                "bad-value",
+                expr,
+                format!("`{expr}` has no finite value"),
+                "outside the domain of the function",
+            ),
+            Err(CallError::Unknown) => {
+                let fault = Diagnostic::error(
+                    "unknown-function",
+                    name.span,
+                    format!("unknown function `{}`", name.text),
+                )
+                .label("not a function");
+                self.findings
+                    .tell(match nearest(&name.text, functions::NAMES) {
+                        Some(near) => fault.help(format!("did you mean `{near}`?")),
+                        None => fault,
+                    });
+                None
+            }
+        }
+    }
+
+    /// The value of a parameter or constant.
+    fn named(&mut self, expr: &Expr, name: &str, scope: ScopeId) -> Option<Value> {
+        match self.param(scope, name) {
+            Some((_, Param::Known(value))) => Some(value),
+            Some((_, Param::Failed)) => None,
+            Some((_, Param::Busy)) => {
+                let from = self.evaluating.iter().position(|n| n == name).unwrap_or(0);
+                let circle = self.evaluating[from..].join(" → ");
+                self.fault(
+                    "circular",
+                    expr,
+                    format!("circular parameters: {circle} → {name}"),
+                    "comes back to itself here",
+                )
+            }
+            Some((home, Param::Unevaluated(definition))) => {
+                self.set(home, name, Param::Busy);
+                self.evaluating.push(name.to_string());
+                let value = self.number(definition, home);
+                self.evaluating.pop();
+                self.set(home, name, value.map_or(Param::Failed, Param::Known));
+                value
+            }
+            None => match name {
+                "pi" => Some(Value::binary(std::f64::consts::PI)),
+                "e" => Some(Value::binary(std::f64::consts::E)),
+                "true" => Some(Value::decimal(1.0, 1, 0)),
+                "false" => Some(Value::decimal(0.0, 0, 0)),
+                "inf" | "infinity" | "infinite" => Some(Value::binary(f64::INFINITY)),
+                "temp" | "temper" => Some(Value::decimal(27.0, 27, 0)),
+                "boltz" => Some(Value::decimal(1.380_649e-23, 1_380_649, -29)),
+                "echarge" => Some(Value::decimal(1.602_176_634e-19, 1_602_176_634, -28)),
+                "kelvin" => Some(Value::decimal(-273.15, -27315, -2)),
+                "time" => self.fault(
+                    "time",
+                    expr,
+                    "functions of `time` are not supported yet".into(),
+                    "recognised only",
+                ),
+                _ => {
+                    let fault = Diagnostic::error(
+                        "unknown-parameter",
+                        expr.span,
+                        format!("unknown parameter `{name}`"),
+                    )
+                    .label("not defined");
+                    let near = self.near_param(scope, name);
+                    self.findings.tell(match near {
+                        Some(near) => fault.help(format!("did you mean `{near}`?")),
+                        None => fault.help(format!("define it with `.param {name}=…`")),
+                    });
+                    None
+                }
+            },
+        }
+    }
+}
+
+/// Whether `inf` stands in the expression itself.
+fn mentions_infinity(expr: &Expr) -> bool {
+    match &expr.kind {
+        ExprKind::Name(name) => name.starts_with("inf"),
+        ExprKind::Unary(_, x) => mentions_infinity(x),
+        ExprKind::Binary(_, x, y) => mentions_infinity(x) || mentions_infinity(y),
+        _ => false,
+    }
+}

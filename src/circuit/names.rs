@@ -1,0 +1,172 @@
+//! Names of nodes and elements of the flattened circuit, and what they mean inside a subcircuit.
+
+use std::collections::{HashMap, HashSet};
+
+use super::eval::Form;
+use super::scope::{ScopeId, Scopes};
+use super::{ElementId, NodeId, Quantity};
+use crate::algebra::Value;
+use crate::diagnostic::Diagnostic;
+use crate::netlist::ast::{Name, Signal};
+use crate::netlist::suggest::nearest;
+
+/// All nodes and elements by canonical name.
+#[derive(Debug)]
+pub(super) struct Names<'n> {
+    pub(super) nodes: HashMap<String, NodeId>,
+    pub(super) elements: HashMap<String, ElementId>,
+    /// Nodes of `.global`.
+    pub(super) globals: HashSet<&'n str>,
+}
+
+impl<'n> Names<'n> {
+    pub(super) fn new() -> Self {
+        let ground = [("0".into(), NodeId::GROUND), ("gnd".into(), NodeId::GROUND)];
+        Self {
+            nodes: HashMap::from(ground),
+            elements: HashMap::new(),
+            globals: HashSet::new(),
+        }
+    }
+
+    /// The node a name means in a scope, if it exists.
+    pub(super) fn node(&self, name: &str, scopes: &Scopes<'n>, scope: ScopeId) -> Option<NodeId> {
+        if matches!(name, "0" | "gnd") {
+            return Some(NodeId::GROUND);
+        }
+        let here = scopes.get(scope);
+        here.ports.get(name).copied().or_else(|| {
+            self.nodes
+                .get(&self.full_node_name(name, scopes, scope))
+                .copied()
+        })
+    }
+
+    /// The canonical name of a node that is no terminal.
+    pub(super) fn full_node_name(&self, name: &str, scopes: &Scopes<'n>, scope: ScopeId) -> String {
+        if self.globals.contains(name) {
+            name.to_string()
+        } else {
+            format!("{}{name}", scopes.get(scope).prefix)
+        }
+    }
+
+    /// The node a reference means: of this instance, else by its full name (`x1.n`, also `x1:n`).
+    pub(super) fn expect_node(
+        &self,
+        name: &Name,
+        scopes: &Scopes<'n>,
+        scope: ScopeId,
+    ) -> Result<NodeId, Diagnostic> {
+        let text = name.text.as_str();
+        let found = self
+            .node(text, scopes, scope)
+            .or_else(|| self.nodes.get(text).copied());
+        found
+            .or_else(|| self.nodes.get(&text.replace(':', ".")).copied())
+            .ok_or_else(|| {
+                let fault = Diagnostic::error(
+                    "unknown-node",
+                    name.span,
+                    format!("there is no node `{text}`"),
+                )
+                .label("no element is connected to it");
+                let prefix = scopes.get(scope).prefix.as_str();
+                match nearest(
+                    text,
+                    self.nodes.keys().filter_map(|n| n.strip_prefix(prefix)),
+                ) {
+                    Some(near) => fault.help(format!("did you mean `{near}`?")),
+                    None => fault,
+                }
+            })
+    }
+
+    /// The element a reference means: of this instance, else by its full name (`x1.d1`, also ngspice's `d.x1.d1`).
+    pub(super) fn expect_element(
+        &self,
+        name: &Name,
+        scopes: &Scopes<'n>,
+        scope: ScopeId,
+        what: &str,
+    ) -> Result<ElementId, Diagnostic> {
+        let text = name.text.as_str();
+        let prefix = scopes.get(scope).prefix.as_str();
+        let found = self
+            .elements
+            .get(&format!("{prefix}{text}"))
+            .or_else(|| self.elements.get(text));
+        found
+            .or_else(|| self.elements.get(&without_letter(text)?))
+            .copied()
+            .ok_or_else(|| {
+                let fault = Diagnostic::error(
+                    "unknown-element",
+                    name.span,
+                    format!("there is no {what} `{text}`"),
+                )
+                .label("not in the circuit");
+                match nearest(
+                    text,
+                    self.elements.keys().filter_map(|n| n.strip_prefix(prefix)),
+                ) {
+                    Some(near) => fault.help(format!("did you mean `{near}`?")),
+                    None => fault,
+                }
+            })
+    }
+
+    /// What `v(…)` or `i(…)` means.
+    pub(super) fn signal(
+        &self,
+        signal: &Signal,
+        scopes: &Scopes<'n>,
+        scope: ScopeId,
+    ) -> Result<Form, Diagnostic> {
+        match signal {
+            Signal::Voltage(a, b) => {
+                let a = self.expect_node(a, scopes, scope)?;
+                let b = b
+                    .as_ref()
+                    .map_or(Ok(NodeId::GROUND), |b| self.expect_node(b, scopes, scope))?;
+                Ok(difference(a, b))
+            }
+            Signal::Current(name) => Ok(current(
+                self.expect_element(name, scopes, scope, "element")?,
+            )),
+        }
+    }
+}
+
+/// `x1.d1` of ngspice's `d.x1.d1`, whose first letter repeats the one of the element.
+pub(super) fn without_letter(name: &str) -> Option<String> {
+    let rest = name.get(2..).filter(|_| name.get(1..2) == Some("."))?;
+    let last = rest.rsplit('.').next()?;
+    (last.get(..1) == name.get(..1) && rest.contains('.')).then(|| rest.to_string())
+}
+
+/// v(a) − v(b) as a form.
+pub(super) fn difference(a: NodeId, b: NodeId) -> Form {
+    let terms = [(1, a), (-1, b)]
+        .into_iter()
+        .filter(|(_, node)| *node != NodeId::GROUND && a != b)
+        .map(|(sign, node)| {
+            (
+                Value::decimal(f64::from(sign), i128::from(sign), 0),
+                Quantity::Voltage(node),
+            )
+        })
+        .collect();
+    Form {
+        constant: Value::decimal(0.0, 0, 0),
+        terms,
+    }
+}
+
+/// The current of an element as a form.
+pub(super) fn current(id: ElementId) -> Form {
+    Form {
+        constant: Value::decimal(0.0, 0, 0),
+        terms: vec![(Value::decimal(1.0, 1, 0), Quantity::Current(id))],
+    }
+}

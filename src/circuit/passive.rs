@@ -1,0 +1,337 @@
+//! R, C and L with LTspice's parasitics, and the `name=value` arguments of all elements.
+
+use super::builder::Builder;
+use super::scope::ScopeId;
+use super::{Affine, Element, Kind, NodeId, Output};
+use crate::algebra::Value;
+use crate::diagnostic::{Diagnostic, Span};
+use crate::netlist::ast::{self, Assign, Expr, ExprKind};
+
+/// Ratings and temperature coefficients: they change nothing at the nominal temperature.
+const WITHOUT_EFFECT: [&str; 27] = [
+    "v",
+    "irms",
+    "vrms",
+    "ipk",
+    "mfg",
+    "type",
+    "pn",
+    "tol",
+    "pwr",
+    "tc",
+    "tc1",
+    "tc2",
+    "tce",
+    "temp",
+    "dtemp",
+    "trise",
+    "noisy",
+    "noiseless",
+    "ac",
+    "lot",
+    "dev",
+    "description",
+    "bv_max",
+    "vpk",
+    "off",
+    "iave",
+    "rating",
+];
+
+/// The arguments of a card.
+#[derive(Clone, Copy)]
+pub(super) struct Args<'n>(pub(super) &'n [Assign]);
+
+impl<'n> Args<'n> {
+    /// The value of the first argument with one of these names.
+    pub(super) fn get(self, names: &[&str]) -> Option<&'n Expr> {
+        self.0
+            .iter()
+            .find(|a| names.contains(&a.name.text.as_str()))
+            .and_then(|a| a.value.as_ref())
+    }
+}
+
+impl<'n> Builder<'n, '_> {
+    /// An argument as a finite number; `Some(None)` if it is not given.
+    #[expect(clippy::option_option, reason = "absent and faulty are different")]
+    pub(super) fn arg(
+        &mut self,
+        args: Args<'n>,
+        names: &[&str],
+        scope: ScopeId,
+    ) -> Option<Option<Value>> {
+        match args.get(names) {
+            None => Some(None),
+            Some(expr) => self.scopes.finite(expr, scope).map(Some),
+        }
+    }
+
+    /// Reports arguments that the card does not know.
+    pub(super) fn check_args(&mut self, card: &ast::Element, args: &[Assign], known: &[&str]) {
+        for Assign { name, value } in args {
+            if known.contains(&name.text.as_str()) || WITHOUT_EFFECT.contains(&name.text.as_str()) {
+                continue;
+            }
+            self.tell(match value {
+                Some(_) => {
+                    let message = format!(
+                        "`{}` of `{}` is not known and ignored",
+                        name.text, card.name.text
+                    );
+                    Diagnostic::warning("ignored", name.span, message).label("ignored")
+                }
+                None => Diagnostic::error(
+                    "unexpected",
+                    name.span,
+                    format!("unexpected `{}`", name.text),
+                )
+                .label("nothing should stand here"),
+            });
+        }
+    }
+
+    pub(super) fn passive(
+        &mut self,
+        card: &'n ast::Element,
+        values: &'n [Expr],
+        args: &'n [Assign],
+        scope: ScopeId,
+    ) {
+        let letter = card.name.text.chars().next().unwrap_or('r');
+        let own = letter.to_string();
+        let parasitics = ["rser", "lser", "rpar", "cpar", "rlshunt"];
+        let mut known = vec![own.as_str(), "value", "m", "scale", "ic"];
+        if letter != 'r' {
+            known.extend(parasitics);
+        }
+        self.check_args(card, args, &known);
+        let args = Args(args);
+
+        let Some(value) = self.passive_value(card, values, args, letter, scope) else {
+            return;
+        };
+        let multiplier = match (
+            self.arg(args, &["m"], scope),
+            self.arg(args, &["scale"], scope),
+        ) {
+            (Some(m), Some(scale)) => m.map_or(1.0, |m| m.f64) * scale.map_or(1.0, |s| s.f64),
+            _ => return,
+        };
+        let value = if multiplier == 1.0 {
+            value
+        } else if letter == 'c' {
+            Value::binary(value.f64 * multiplier)
+        } else {
+            Value::binary(value.f64 / multiplier)
+        };
+        let Some(ic) = self.arg(args, &["ic"], scope) else {
+            return;
+        };
+        let zero_current = Affine {
+            terms: Vec::new(),
+            constant: 0.0,
+        };
+        let kind = match letter {
+            'r' => Kind::Resistor(value),
+            'c' if value.f64 == 0.0 => Kind::Controlled {
+                output: Output::Current,
+                control: zero_current,
+            },
+            'c' => Kind::Capacitor(value),
+            _ if value.f64 == 0.0 => Kind::Resistor(value),
+            _ => Kind::Inductor(value),
+        };
+        let (p, n) = (
+            self.node(&card.nodes[0], scope),
+            self.node(&card.nodes[1], scope),
+        );
+        let name = self.full_name(&card.name, scope);
+        let ic = ic.map(|v| v.f64).filter(|_| letter != 'r');
+        self.with_parasitics(
+            Element {
+                name,
+                p,
+                n,
+                kind,
+                ic,
+                span: Some(card.span),
+            },
+            args,
+            scope,
+        );
+    }
+
+    /// The value of a card: from `R=`, from a number or expression, through a model.
+    fn passive_value(
+        &mut self,
+        card: &'n ast::Element,
+        values: &'n [Expr],
+        args: Args<'n>,
+        letter: char,
+        scope: ScopeId,
+    ) -> Option<Value> {
+        let mut value = args.get(&[letter.to_string().as_str(), "value"]);
+        let mut model = None;
+        for given in values {
+            match &given.kind {
+                ExprKind::Name(name)
+                    if self.scopes.param(scope, name).is_none()
+                        && self.scopes.model(scope, name).is_some() =>
+                {
+                    model = self.scopes.model(scope, name);
+                }
+                ExprKind::Name(name) if value.is_some() => {
+                    let fault =
+                        Diagnostic::error("unexpected", given.span, format!("unexpected `{name}`"))
+                            .label("neither a model nor part of the value");
+                    let unit = [
+                        "ohm", "ohms", "f", "h", "uf", "nf", "pf", "mh", "uh", "k", "meg",
+                    ];
+                    self.tell(if unit.contains(&name.as_str()) {
+                        fault.help(format!(
+                            "write the unit directly after the number, as in `10{name}`"
+                        ))
+                    } else {
+                        fault
+                    });
+                    return None;
+                }
+                _ if value.is_some() => {
+                    let message = format!("`{}` has a second value", card.name.text);
+                    self.tell(
+                        Diagnostic::error("unexpected", given.span, message).label("unexpected"),
+                    );
+                    return None;
+                }
+                _ => value = Some(given),
+            }
+        }
+        let factor = match model {
+            None => None,
+            Some(model) => {
+                let keys: [&str; 2] = match letter {
+                    'r' => ["r", "res"],
+                    'c' => ["c", "cap"],
+                    _ => ["l", "ind"],
+                };
+                if !keys.contains(&model.kind.text.as_str()) {
+                    let message = format!(
+                        "`{}` uses model `{}` of type `{}`",
+                        card.name.text, model.name.text, model.kind.text
+                    );
+                    let fault = Diagnostic::error("wrong-model", card.span, message)
+                        .label("the model is of another kind");
+                    self.tell(fault.help(format!("a model of type `{}` is needed", keys[0])));
+                    return None;
+                }
+                Args(&model.params).get(&[keys[0]])
+            }
+        };
+        match (value, factor, model) {
+            (Some(value), None, _) => self.scopes.finite(value, scope),
+            (Some(value), Some(factor), _) => {
+                let value = self.scopes.finite(value, scope)?;
+                let factor = self.scopes.finite(factor, scope)?;
+                Some(if factor.f64 == 1.0 {
+                    value
+                } else {
+                    Value::binary(value.f64 * factor.f64)
+                })
+            }
+            (None, Some(factor), _) => self.scopes.finite(factor, scope),
+            (None, None, Some(model)) => {
+                let message = format!(
+                    "`{}` has no value: models by geometry (`{}`) are not supported",
+                    card.name.text, model.name.text
+                );
+                self.tell(
+                    Diagnostic::error("unsupported", card.span, message)
+                        .label("give the value on the card"),
+                );
+                None
+            }
+            (None, None, None) => {
+                let message = format!("`{}` has no value", card.name.text);
+                let fault =
+                    Diagnostic::error("missing", card.span, message).label("a value is missing");
+                let behavioural = args.get(&["q", "flux"]).is_some();
+                self.tell(if behavioural {
+                    fault.help("charge and flux expressions are not supported")
+                } else {
+                    fault
+                });
+                None
+            }
+        }
+    }
+
+    /// Adds an element with LTspice's `Rser Lser` in series and `Rpar Cpar` across the whole.
+    pub(super) fn with_parasitics(&mut self, mut element: Element, args: Args<'n>, scope: ScopeId) {
+        let (p, n, span) = (element.p, element.n, element.span);
+        let base = element.name.clone();
+        let mut parts: Vec<(&str, Value)> = Vec::new();
+        for part in ["rser", "lser", "rpar", "cpar", "rlshunt"] {
+            match self.arg(args, &[part], scope) {
+                Some(Some(value)) if value.f64 != 0.0 => parts.push((part, value)),
+                Some(_) => {}
+                None => return,
+            }
+        }
+        let mut inner = n;
+        let mut series: Vec<Element> = Vec::new();
+        for &(part, value) in parts
+            .iter()
+            .filter(|(part, _)| matches!(*part, "rser" | "lser"))
+        {
+            let from = self.new_node(format!("{base}.{part}"));
+            let kind = if part == "rser" {
+                Kind::Resistor(value)
+            } else {
+                Kind::Inductor(value)
+            };
+            series.push(part_of(&base, part, from, inner, kind, span));
+            inner = from;
+        }
+        element.n = inner;
+        if self.add(element).is_none() {
+            return;
+        }
+        for &(part, value) in &parts {
+            let across = match part {
+                "rpar" => Some((p, n, Kind::Resistor(value))),
+                "cpar" => Some((p, n, Kind::Capacitor(value))),
+                "rlshunt" => series
+                    .iter()
+                    .find(|e| matches!(e.kind, Kind::Inductor(_)))
+                    .map(|e| (e.p, e.n, Kind::Resistor(value))),
+                _ => None,
+            };
+            if let Some((p, n, kind)) = across {
+                series.push(part_of(&base, part, p, n, kind, span));
+            }
+        }
+        for part in series {
+            self.add(part);
+        }
+    }
+}
+
+/// A parasitic part of an element: `c1.rser`.
+fn part_of(
+    base: &str,
+    part: &str,
+    p: NodeId,
+    n: NodeId,
+    kind: Kind,
+    span: Option<Span>,
+) -> Element {
+    Element {
+        name: format!("{base}.{part}"),
+        p,
+        n,
+        kind,
+        ic: None,
+        span,
+    }
+}

@@ -1,0 +1,128 @@
+//! What to print: `.save`, `.print`, `.probe`, `.plot`, and names given by the user.
+
+use super::builder::Builder;
+use super::names::without_letter;
+use super::scope::ScopeId;
+use super::{Circuit, ElementId, NodeId, Probe, Probed};
+use crate::diagnostic::Diagnostic;
+use crate::netlist::ast::{Name, Signal, Wanted};
+
+impl<'n> Builder<'n, '_> {
+    pub(super) fn save(&mut self, list: &'n [Wanted], scope: ScopeId) {
+        for wanted in list {
+            let (text, span) = match wanted {
+                Wanted::All(_) => {
+                    let all = Circuit {
+                        probes: Vec::new(),
+                        ..self.circuit.clone()
+                    }
+                    .probes();
+                    for probe in all {
+                        self.print(probe);
+                    }
+                    continue;
+                }
+                Wanted::Other(Name { text, span }) => {
+                    let message = format!("`{text}` cannot be printed yet");
+                    let fault = Diagnostic::warning("ignored", *span, message).label("ignored");
+                    self.tell(fault.help("voltages `v(a)`, `v(a,b)` and currents `i(r1)` can"));
+                    continue;
+                }
+                Wanted::Signal(signal) => (signal.to_string(), signal.span()),
+                Wanted::Bare(name) => (name.text.clone(), name.span),
+            };
+            let prefixed = match wanted {
+                Wanted::Signal(Signal::Voltage(a, None)) => {
+                    format!("v({}{})", self.scopes.get(scope).prefix, a.text)
+                }
+                Wanted::Signal(Signal::Current(a)) => {
+                    format!("i({}{})", self.scopes.get(scope).prefix, a.text)
+                }
+                _ => text.clone(),
+            };
+            match self
+                .circuit
+                .probe(&prefixed)
+                .or_else(|| self.circuit.probe(&text))
+            {
+                Some(probe) => self.print(probe),
+                None => {
+                    let message = format!("`{text}` is not in the circuit and cannot be printed");
+                    self.tell(Diagnostic::warning("unknown-probe", span, message).label("ignored"));
+                }
+            }
+        }
+    }
+
+    fn print(&mut self, probe: Probe) {
+        if !self.circuit.probes.contains(&probe) {
+            self.circuit.probes.push(probe);
+        }
+    }
+}
+
+impl Circuit {
+    /// The probe a user's name means: `v(a)`, `v(a,b)`, `i(d1)`, `@d1[i]`, `v1#branch`, or a bare node.
+    ///
+    /// Names are compared without case; `x1:n` is `x1.n` and ngspice's `d.x1.d1` is `x1.d1`. `None` if there is no such
+    /// node or element.
+    #[must_use]
+    pub fn probe(&self, text: &str) -> Option<Probe> {
+        let text: String = text.to_lowercase().split_whitespace().collect();
+        let inside = |prefix: &str, suffix: &str| {
+            text.strip_prefix(prefix)
+                .and_then(|t| t.strip_suffix(suffix))
+        };
+        if let Some(nodes) = inside("v(", ")") {
+            if let Some(node) = self.node_like(nodes) {
+                return Some(self.voltage(node, NodeId::GROUND));
+            }
+            let (a, b) = nodes.split_once(',')?;
+            return Some(self.voltage(self.node_like(a)?, self.node_like(b)?));
+        }
+        let current = inside("i(", ")")
+            .or(inside("@", "[i]"))
+            .or(inside("@", "[id]"))
+            .or(inside("", "#branch"));
+        match current {
+            Some(name) => self.element_like(name).map(|id| self.current(id)),
+            None => self
+                .node_like(&text)
+                .map(|node| self.voltage(node, NodeId::GROUND)),
+        }
+    }
+
+    fn voltage(&self, a: NodeId, b: NodeId) -> Probe {
+        let name = |node: NodeId| &self.nodes[node.index()];
+        let name = if b == NodeId::GROUND {
+            format!("v({})", name(a))
+        } else {
+            format!("v({},{})", name(a), name(b))
+        };
+        Probe {
+            name,
+            what: Probed::Voltage(a, b),
+        }
+    }
+
+    fn current(&self, id: ElementId) -> Probe {
+        Probe {
+            name: format!("i({})", self.elements[id.index()].name),
+            what: Probed::Current(id),
+        }
+    }
+
+    fn node_like(&self, name: &str) -> Option<NodeId> {
+        if matches!(name, "0" | "gnd") {
+            return Some(NodeId::GROUND);
+        }
+        self.node(name)
+            .or_else(|| self.node(&name.replace(':', ".")))
+    }
+
+    fn element_like(&self, name: &str) -> Option<ElementId> {
+        self.element(name)
+            .or_else(|| self.element(&without_letter(name)?))
+            .or_else(|| self.element(&name.replace(':', ".")))
+    }
+}

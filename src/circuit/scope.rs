@@ -1,0 +1,190 @@
+//! Scopes: the parameters, functions, models and subcircuits that a name may mean at a place.
+//!
+//! A subcircuit instance sees its own definitions, then those of the instance that calls it, up to the top level.
+
+use std::collections::{HashMap, HashSet};
+
+use super::NodeId;
+use crate::algebra::Value;
+use crate::diagnostic::Diagnostic;
+use crate::netlist::ast::{Expr, Func, Model, Name, Subckt};
+use crate::netlist::suggest::nearest;
+
+/// Everything found so far, each finding once.
+#[derive(Debug, Default)]
+pub(super) struct Findings {
+    list: Vec<Diagnostic>,
+    seen: HashSet<(&'static str, Option<crate::diagnostic::Span>, String)>,
+}
+
+impl Findings {
+    pub(super) fn tell(&mut self, finding: Diagnostic) {
+        if self
+            .seen
+            .insert((finding.code, finding.span, finding.message.clone()))
+        {
+            self.list.push(finding);
+        }
+    }
+
+    pub(super) fn any_error(&self) -> bool {
+        self.list
+            .iter()
+            .any(|d| d.severity == crate::diagnostic::Severity::Error)
+    }
+
+    pub(super) fn into_list(self) -> Vec<Diagnostic> {
+        self.list
+    }
+}
+
+/// A scope, as an index.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct ScopeId(usize);
+
+impl ScopeId {
+    /// The top level.
+    pub(super) const ROOT: Self = Self(0);
+}
+
+/// A parameter.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Param<'n> {
+    /// Not needed so far.
+    Unevaluated(&'n Expr),
+    /// Being evaluated: meeting it again is a circle.
+    Busy,
+    /// Its value.
+    Known(Value),
+    /// Reported already.
+    Failed,
+}
+
+/// What is defined at one level.
+#[derive(Debug, Default)]
+pub(super) struct Scope<'n> {
+    parent: Option<ScopeId>,
+    /// `x1.` in front of names.
+    pub(super) prefix: String,
+    /// Nodes of the caller by the names they have here.
+    pub(super) ports: HashMap<&'n str, NodeId>,
+    params: HashMap<String, Param<'n>>,
+    /// Parameters that definitions here may not replace: `--param` and those of a call.
+    fixed: HashSet<String>,
+    /// Parameters that `.param` or `.subckt` define here.
+    pub(super) declared: HashSet<&'n str>,
+    pub(super) funcs: HashMap<&'n str, &'n Func>,
+    pub(super) models: HashMap<&'n str, &'n Model>,
+    pub(super) subckts: HashMap<&'n str, &'n Subckt>,
+}
+
+/// All scopes and what was found while evaluating in them.
+#[derive(Debug)]
+pub(super) struct Scopes<'n> {
+    list: Vec<Scope<'n>>,
+    pub(super) findings: Findings,
+    /// Parameters being evaluated, for messages about circles.
+    pub(super) evaluating: Vec<String>,
+    /// Depth of the evaluation.
+    pub(super) depth: usize,
+    /// Operations evaluated so far.
+    pub(super) steps: usize,
+}
+
+impl<'n> Scopes<'n> {
+    pub(super) fn new() -> Self {
+        Self {
+            list: vec![Scope::default()],
+            findings: Findings::default(),
+            evaluating: Vec::new(),
+            depth: 0,
+            steps: 0,
+        }
+    }
+
+    pub(super) fn open(&mut self, parent: ScopeId, name: &str) -> ScopeId {
+        let prefix = format!("{}{name}.", self.get(parent).prefix);
+        self.list.push(Scope {
+            parent: Some(parent),
+            prefix,
+            ..Scope::default()
+        });
+        ScopeId(self.list.len() - 1)
+    }
+
+    pub(super) fn get(&self, id: ScopeId) -> &Scope<'n> {
+        &self.list[id.0]
+    }
+
+    pub(super) fn get_mut(&mut self, id: ScopeId) -> &mut Scope<'n> {
+        &mut self.list[id.0]
+    }
+
+    /// A scope and those around it.
+    pub(super) fn chain(&self, id: ScopeId) -> impl Iterator<Item = (ScopeId, &Scope<'n>)> {
+        std::iter::successors(Some(id), |id| self.get(*id).parent).map(|id| (id, self.get(id)))
+    }
+
+    /// Gives a parameter a value that definitions in the scope do not replace.
+    pub(super) fn fix(&mut self, id: ScopeId, name: &str, value: Option<Value>) {
+        let scope = self.get_mut(id);
+        scope.fixed.insert(name.to_string());
+        scope
+            .params
+            .insert(name.to_string(), value.map_or(Param::Failed, Param::Known));
+    }
+
+    /// Defines a parameter here; false if this scope had a definition of its own already.
+    pub(super) fn define(&mut self, id: ScopeId, name: &'n Name, value: &'n Expr) -> bool {
+        let scope = self.get_mut(id);
+        if !scope.fixed.contains(&name.text) {
+            scope
+                .params
+                .insert(name.text.clone(), Param::Unevaluated(value));
+        }
+        scope.declared.insert(&name.text)
+    }
+
+    pub(super) fn set(&mut self, id: ScopeId, name: &str, param: Param<'n>) {
+        self.get_mut(id).params.insert(name.to_string(), param);
+    }
+
+    /// The parameter a name means, and where it is defined.
+    pub(super) fn param(&self, id: ScopeId, name: &str) -> Option<(ScopeId, Param<'n>)> {
+        self.chain(id)
+            .find_map(|(id, scope)| scope.params.get(name).map(|p| (id, *p)))
+    }
+
+    pub(super) fn func(&self, id: ScopeId, name: &str) -> Option<&'n Func> {
+        self.chain(id)
+            .find_map(|(_, scope)| scope.funcs.get(name).copied())
+    }
+
+    pub(super) fn model(&self, id: ScopeId, name: &str) -> Option<&'n Model> {
+        self.chain(id)
+            .find_map(|(_, scope)| scope.models.get(name).copied())
+    }
+
+    pub(super) fn subckt(&self, id: ScopeId, name: &str) -> Option<&'n Subckt> {
+        self.chain(id)
+            .find_map(|(_, scope)| scope.subckts.get(name).copied())
+    }
+
+    /// A visible name like this one.
+    pub(super) fn near<'s, I>(
+        &'s self,
+        id: ScopeId,
+        name: &str,
+        names: impl Fn(&'s Scope<'n>) -> I,
+    ) -> Option<String>
+    where
+        I: Iterator<Item = &'s str>,
+    {
+        nearest(name, self.chain(id).flat_map(|(_, scope)| names(scope)))
+    }
+
+    /// A visible parameter with a similar name.
+    pub(super) fn near_param(&self, id: ScopeId, name: &str) -> Option<String> {
+        self.near(id, name, |scope| scope.params.keys().map(String::as_str))
+    }
+}

@@ -1,0 +1,538 @@
+use proptest::prelude::*;
+
+use super::*;
+
+const MS: f64 = 1e-3;
+
+fn source(kind: &str, args: &[f64]) -> Source {
+    repeating(kind, args, None)
+}
+
+fn repeating(kind: &str, args: &[f64], repeat: Option<f64>) -> Source {
+    let form = Form {
+        kind: kind.into(),
+        args: args.into(),
+        repeat,
+        delay: None,
+    };
+    Source {
+        dc: 0.0,
+        wave: form.wave(0.1 * MS, 6.0 * MS).unwrap(),
+    }
+}
+
+/// The sources of tests/reference/sources.cir, in order.
+fn sources() -> Vec<Source> {
+    vec![
+        source("sin", &[0.5, 2.0, 1e3, 0.7e-3, 200.0, 30.0]),
+        source("sin", &[0.5, 2.0, 1.3e3, -0.4e-3, 100.0, -90.0]),
+        source(
+            "pulse",
+            &[-1.0, 3.0, 0.33e-3, 0.1e-3, 0.2e-3, 0.3e-3, 0.9e-3],
+        ),
+        source(
+            "pulse",
+            &[0.0, 1.0, 1e-3, 0.1e-3, 0.2e-3, 0.5e-3, 1e-3, 2.0],
+        ),
+        source("pulse", &[0.0, 1.0, 1e-3, 0.5e-3, 0.5e-3, 0.5e-3, 1e-3]),
+        source(
+            "pulse",
+            &[2.0, -1.0, -0.25e-3, 0.1e-3, 0.3e-3, 0.1e-3, 0.7e-3],
+        ),
+        source("pwl", &[0.5e-3, 1.0, 1e-3, 2.0, 1.7e-3, -1.0, 3e-3, 0.5]),
+        repeating(
+            "pwl",
+            &[0.0, 0.0, 1e-3, 2.0, 1.7e-3, -1.0, 2.2e-3, 0.5],
+            Some(1e-3),
+        ),
+        source("exp", &[1.0, 4.0, 0.3e-3, 0.2e-3, 2.1e-3, 0.5e-3]),
+        source("sffm", &[0.5, 2.0, 1e3, 3.0, 100.0, 30.0, 60.0]),
+        source("am", &[0.5, 2.0, 100.0, 1e3, 1e-3]),
+    ]
+}
+
+#[test]
+fn values_are_those_of_ngspice() {
+    let text = include_str!("../../../tests/reference/sources.csv");
+    let rows = text.lines().filter(|line| !line.starts_with('#')).skip(1);
+    let mut compared = 0;
+    for row in rows {
+        let row: Vec<f64> = row.split(',').map(|field| field.parse().unwrap()).collect();
+        for (k, source) in sources().iter().enumerate() {
+            let (found, expected) = (source.value(row[0]), row[k + 1]);
+            assert!(
+                (found - expected).abs() < 1e-11,
+                "v{} at {}: {found}, ngspice {expected}",
+                k + 1,
+                row[0]
+            );
+            compared += 1;
+        }
+    }
+    assert_eq!(compared, 11 * 83);
+}
+
+#[test]
+fn negative_delay_does_not_restart_a_sinusoid() {
+    let wave = source("sin", &[1.0, 2.0, 1e3, -0.25e-3, 0.0, 0.0]);
+    assert!((wave.value(0.0) - 3.0).abs() < 1e-15);
+    assert_eq!(wave.next_breakpoint(0.0), None);
+}
+
+#[test]
+fn before_its_delay_a_sinusoid_has_the_value_of_its_phase() {
+    let wave = source("sin", &[1.0, 2.0, 1e3, 1e-3, 50.0, 90.0]);
+    assert_eq!(wave.value(0.0), 3.0);
+    assert_eq!(wave.derivative(0.5e-3), 0.0);
+    assert_eq!(wave.next_breakpoint(0.0), Some(1e-3));
+    assert!(!wave.is_edge(1e-3));
+    // d/ds 2 e^{−50 s} cos ωs at 0 = −100
+    assert!((wave.derivative(1e-3) + 100.0).abs() < 1e-9);
+}
+
+#[test]
+fn zero_rise_is_an_edge_with_both_limits() {
+    let wave = source("pulse", &[-1.0, 2.0, 1e-3, 0.0, 0.0, 0.5e-3, 1e-3]);
+    for k in 0..1000 {
+        let rise = 1e-3 + f64::from(k) * 1e-3;
+        assert!(wave.is_edge(rise));
+        assert_eq!((wave.value_left(rise), wave.value(rise)), (-1.0, 2.0));
+        let fall = wave.next_breakpoint(rise).unwrap();
+        assert!((fall - rise - 0.5e-3).abs() < 1e-12);
+        assert_eq!((wave.value_left(fall), wave.value(fall)), (2.0, -1.0));
+        assert_eq!(
+            wave.next_breakpoint(fall),
+            Some(1e-3 + f64::from(k + 1) * 1e-3)
+        );
+    }
+}
+
+#[test]
+fn breakpoints_do_not_drift() {
+    // 20 us is not a binary fraction; after a million periods the breakpoint is still the nearest product.
+    let wave = source("pulse", &[0.0, 1.0, 0.0, 1e-6, 1e-6, 5e-6, 20e-6]);
+    let mut t = 1e6 * 20e-6;
+    assert_eq!(wave.next_breakpoint(t - 1e-6), Some(t));
+    for corner in [1e-6, 6e-6, 7e-6, 20e-6] {
+        let next = wave.next_breakpoint(t).unwrap();
+        assert!(next > t && (next - (20.0 + corner)).abs() < 1e-14, "{next}");
+        t = next;
+    }
+}
+
+#[test]
+fn a_pulse_as_long_as_its_period_in_decimals_has_no_sliver() {
+    // 0.1 + 0.2 + 0.4 is not 0.7 in doubles.
+    let wave = source("pulse", &[0.0, 1.0, 0.0, 0.1, 0.4, 0.2, 0.7]);
+    let mut t = 0.0;
+    for k in 0..300 {
+        assert!(!wave.is_edge(t), "{t}");
+        for corner in [0.1, 0.3, 0.7] {
+            t = wave.next_breakpoint(t).unwrap();
+            assert!(
+                (t - 0.7 * f64::from(k) - corner).abs() < 1e-12,
+                "lap {k}: {t}"
+            );
+        }
+    }
+}
+
+#[test]
+fn an_overfull_pulse_is_cut_by_the_next() {
+    let wave = source("pulse", &[0.0, 1.0, 0.0, 0.5, 0.5, 0.25, 1.0]);
+    assert!(wave.is_edge(1.0));
+    assert!((wave.value_left(1.0) - 0.5).abs() < 1e-15);
+    assert_eq!(wave.value(1.0), 0.0);
+    assert_eq!(wave.value(1.25), 0.5);
+}
+
+#[test]
+fn counted_pulses_end() {
+    let wave = source("pulse", &[0.0, 1.0, 1.0, 0.0, 0.0, 0.5, 1.0, 2.0]);
+    let edges: Vec<f64> =
+        std::iter::successors(wave.next_breakpoint(-1.0), |&t| wave.next_breakpoint(t))
+            .filter(|&t| wave.is_edge(t))
+            .collect();
+    assert_eq!(edges, [1.0, 1.5, 2.0, 2.5]);
+    assert_eq!(wave.value(3.25), 0.0);
+}
+
+#[test]
+fn pwl_edges_and_repetition() {
+    let wave = repeating(
+        "pwl",
+        &[0.0, 1.0, 1.0, 3.0, 1.0, 0.0, 2.0, 0.0, 3.0, 5.0],
+        Some(1.0),
+    );
+    assert_eq!((wave.value_left(1.0), wave.value(1.0)), (3.0, 0.0));
+    assert!(wave.is_edge(1.0));
+    // repeats from the first point at 1, so that 3 is an edge 5 → 3 → 0
+    assert_eq!((wave.value_left(3.0), wave.value(3.0)), (5.0, 0.0));
+    assert_eq!(wave.value(4.5), 2.5);
+    assert_eq!((wave.value_left(2001.0), wave.value(2001.0)), (5.0, 0.0));
+    let last = source("pwl", &[0.0, 1.0, 1.0, 3.0]);
+    assert_eq!(
+        (last.value(-1.0), last.value(7.0), last.next_breakpoint(1.0)),
+        (1.0, 3.0, None)
+    );
+}
+
+#[test]
+fn exponentials_with_zero_time_constant_are_edges() {
+    let wave = source("exp", &[0.0, 1.0, 1.0, 0.0, 2.0, 0.5]);
+    assert_eq!(
+        (wave.value_left(1.0), wave.value(1.0), wave.value(1.5)),
+        (0.0, 1.0, 1.0)
+    );
+    assert!(wave.is_edge(1.0) && !wave.is_edge(2.0));
+    assert!((wave.value(2.5) - (-1.0_f64).exp()).abs() < 1e-15);
+    let wave = source("exp", &[0.0, 1.0, 1.0, 0.5, 2.0, 0.0]);
+    assert!(wave.is_edge(2.0));
+    assert!((wave.value(2.0) + (-2.0_f64).exp()).abs() < 1e-15);
+}
+
+#[test]
+fn pieces_carry_the_exosystem() {
+    let wave = source("sin", &[0.5, 2.0, 1e3, 0.7e-3, 200.0, 30.0]);
+    let piece = wave.piece(1e-3).unwrap();
+    assert_eq!(
+        (piece.start, piece.end, piece.origin),
+        (0.7e-3, f64::INFINITY, 0.7e-3)
+    );
+    let terms: Vec<_> = piece.terms().copied().collect();
+    let expected = Oscillation {
+        amplitude: 2.0,
+        decay: 200.0,
+        frequency: 2e3 * std::f64::consts::PI,
+        phase: 30_f64.to_radians(),
+    };
+    assert_eq!(terms, [expected]);
+    assert_eq!((piece.constant, piece.slope), (0.5, 0.0));
+    assert_eq!(source("sffm", &[0.0, 1.0, 1e3, 1.0, 10.0]).piece(0.0), None);
+    // all t of an interval see the same piece
+    let ramp = source("pulse", &[0.0, 1.0, 0.0, 1.0, 1.0, 1.0, 5.0]);
+    assert_eq!(ramp.piece(5.25), ramp.piece(5.75));
+    assert_eq!(ramp.piece(5.25).unwrap().slope, 1.0);
+}
+
+fn times(found: &[Crossing]) -> Vec<f64> {
+    found.iter().map(|crossing| crossing.time).collect()
+}
+
+#[test]
+fn crossings_of_ramps_and_edges_are_exact() {
+    let wave = source("pulse", &[0.0, 1.0, 0.0, 0.25, 0.5, 0.25, 2.0]);
+    let found = crossings(&[(1.0, &wave)], 0.0, 0.5, 0.0, 4.0);
+    assert_eq!(times(&found), [0.125, 0.75, 2.125, 2.75]);
+    assert_eq!(
+        found.iter().map(|c| c.rising).collect::<Vec<_>>(),
+        [true, false, true, false]
+    );
+    let edge = source("pulse", &[0.0, 1.0, 0.3, 0.0, 0.0, 0.25, 2.0]);
+    assert_eq!(
+        times(&crossings(&[(1.0, &edge)], 0.0, 0.5, 0.0, 2.0)),
+        [0.3, 0.3 + 0.25]
+    );
+    // reached but not passed
+    assert_eq!(crossings(&[(1.0, &edge)], 0.0, 1.0, 0.0, 2.0), []);
+    assert_eq!(
+        times(&crossings(&[(1.0, &edge)], 0.0, 0.0, 0.0, 2.0)),
+        [0.3]
+    );
+}
+
+#[test]
+fn crossings_of_sinusoids_are_all_found_to_rounding() {
+    let wave = source("sin", &[0.0, 1.0, 1e3, 0.0, 0.0, 0.0]);
+    let found = crossings(&[(1.0, &wave)], 0.0, 0.5, 0.0, 20e-3);
+    assert_eq!(found.len(), 40);
+    for (k, crossing) in found.iter().enumerate() {
+        let angle = if k % 2 == 0 { 30.0 } else { 150.0 };
+        let expected = ((k / 2) as f64 + angle / 360.0) / 1e3;
+        assert!(
+            (crossing.time - expected).abs() < 1e-17,
+            "{} {expected}",
+            crossing.time
+        );
+        assert_eq!(crossing.rising, k % 2 == 0);
+    }
+    assert_eq!(crossings(&[(1.0, &wave)], 0.0, 1.0 + 1e-9, 0.0, 20e-3), []);
+    // two crossings 2·acos(1 − 1e-9)/ω = 0.0142 us apart around each crest
+    let close = crossings(&[(1.0, &wave)], 0.0, 1.0 - 1e-9, 0.0, 20e-3);
+    assert_eq!(close.len(), 40);
+    assert!(
+        (close[1].time
+            - close[0].time
+            - 2.0 * (1.0_f64 - 1e-9).acos() / (2e3 * std::f64::consts::PI))
+            .abs()
+            < 1e-14
+    );
+}
+
+#[test]
+fn crossings_of_a_reference_against_a_carrier() {
+    // PWM: 0.8 sin(2π 50 t) against a 1 kHz triangle from −1 to 1 crosses twice a period.
+    let reference = source("sin", &[0.0, 0.8, 50.0, 0.0, 0.0, 0.0]);
+    let carrier = source("pulse", &[-1.0, 1.0, 0.0, 0.5e-3, 0.5e-3, 0.0, 1e-3]);
+    let terms = [(1.0, &reference), (-1.0, &carrier)];
+    let found = crossings(&terms, 0.0, 0.0, 0.0, 20e-3);
+    assert_eq!(found.len(), 40);
+    for pair in found.windows(2) {
+        assert_ne!(pair[0].rising, pair[1].rising);
+    }
+    for crossing in found {
+        let gap = reference.value(crossing.time) - carrier.value(crossing.time);
+        assert!(gap.abs() < 1e-12, "{gap}");
+    }
+}
+
+#[test]
+fn crossings_of_a_modulated_tone() {
+    let wave = source("sffm", &[0.0, 1.0, 1e3, 3.0, 100.0]);
+    let found = crossings(&[(1.0, &wave)], 0.0, 0.0, 0.0, 10e-3);
+    // the phase runs over 10 turns in one signal period and is monotone (index·signal < carrier)
+    assert_eq!(found.len(), 19);
+    assert!(
+        found
+            .iter()
+            .all(|crossing| wave.value(crossing.time).abs() < 1e-11)
+    );
+}
+
+#[test]
+fn arguments_are_checked_and_defaults_filled() {
+    let wave = |kind: &str, args: &[f64]| {
+        Form {
+            kind: kind.into(),
+            args: args.into(),
+            repeat: None,
+            delay: None,
+        }
+        .wave(1e-6, 1e-3)
+    };
+    let Wave::Pulse {
+        rise,
+        fall,
+        width,
+        period,
+        count,
+        ..
+    } = wave("PULSE", &[0.0, 1.0, 0.0, 0.0]).unwrap()
+    else {
+        panic!("not a pulse");
+    };
+    assert_eq!(
+        (rise, fall, width, period, count),
+        (0.0, 1e-6, 1e-3, 1e-3, None)
+    );
+    assert_eq!(
+        wave("sin", &[1.0]).unwrap_err().to_string(),
+        "`sin` takes 2 to 6 arguments, found 1"
+    );
+    assert_eq!(
+        wave("pulse", &[0.0, 1.0, 0.0, -1e-9])
+            .unwrap_err()
+            .to_string(),
+        "`pulse`: rise cannot be -0.000000001"
+    );
+    assert!(matches!(
+        wave("pwl", &[0.0, 1.0, -1.0, 2.0]),
+        Err(WaveError::Order { .. })
+    ));
+    assert!(matches!(
+        wave("pwl", &[0.0, 1.0, f64::NAN, 2.0]),
+        Err(WaveError::Argument { .. })
+    ));
+    assert!(matches!(
+        wave("pwl", &[0.0, 1.0, 1.0]),
+        Err(WaveError::Count { .. })
+    ));
+    assert!(matches!(wave("noise", &[]), Err(WaveError::Kind(_))));
+}
+
+/// Times that put breakpoints both apart and together.
+fn duration() -> impl Strategy<Value = f64> {
+    prop_oneof![Just(0.0), 1e-9..1e-3, Just(1e-4)]
+}
+
+fn waves() -> impl Strategy<Value = Wave> {
+    let level = -5.0..5.0;
+    prop_oneof![
+        (
+            level.clone(),
+            level.clone(),
+            1.0..1e5,
+            -1e-3..1e-3,
+            -500.0..500.0,
+            -180.0..180.0
+        )
+            .prop_map(
+                |(offset, amplitude, frequency, delay, damping, phase)| Wave::Sin {
+                    offset,
+                    amplitude,
+                    frequency,
+                    delay,
+                    damping,
+                    phase
+                }
+            ),
+        (
+            level.clone(),
+            level.clone(),
+            -1e-3..1e-3,
+            duration(),
+            duration(),
+            duration(),
+            duration(),
+            proptest::option::of(0.0..20.0)
+        )
+            .prop_map(
+                |(v1, v2, delay, rise, fall, width, period, count)| Wave::Pulse {
+                    v1,
+                    v2,
+                    delay,
+                    rise,
+                    fall,
+                    width,
+                    period,
+                    count
+                }
+            ),
+        (
+            proptest::collection::vec((duration(), level.clone()), 1..8),
+            proptest::option::of(0.0..2e-3),
+            -1e-3..1e-3
+        )
+            .prop_map(|(steps, repeat, delay)| {
+                let mut t = 0.0;
+                let points = steps
+                    .into_iter()
+                    .map(|(step, value)| {
+                        t += step;
+                        (t, value)
+                    })
+                    .collect();
+                Wave::Pwl {
+                    points,
+                    repeat,
+                    delay,
+                }
+            }),
+        (
+            level.clone(),
+            level.clone(),
+            -1e-3..1e-3,
+            duration(),
+            -1e-3..2e-3,
+            duration()
+        )
+            .prop_map(
+                |(v1, v2, rise_delay, rise_tau, fall_delay, fall_tau)| Wave::Exp {
+                    v1,
+                    v2,
+                    rise_delay,
+                    rise_tau,
+                    fall_delay,
+                    fall_tau
+                }
+            ),
+        (
+            level.clone(),
+            level.clone(),
+            1.0..1e4,
+            1.0..1e5,
+            -1e-3..1e-3
+        )
+            .prop_map(|(amplitude, offset, modulation, carrier, delay)| Wave::Am {
+                amplitude,
+                offset,
+                modulation,
+                carrier,
+                delay
+            }),
+        (level.clone(), level, 1.0..1e5, 0.0..5.0, 1.0..1e4).prop_map(
+            |(offset, amplitude, carrier, index, signal)| Wave::Sffm {
+                offset,
+                amplitude,
+                carrier,
+                index,
+                signal,
+                carrier_phase: 10.0,
+                signal_phase: 20.0
+            }
+        ),
+    ]
+}
+
+/// Values of a damped sinusoid grow as e^{500·5 ms}; rounding of ω t near 1e5·2π·5 ms is 1e-12.
+const CLOSE: f64 = 1e-8;
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(512) })]
+
+    #[test]
+    fn breakpoints_increase_and_pieces_join(wave in waves(), start in -2e-3..4e-3) {
+        let mut t = start;
+        for _ in 0..40 {
+            let next = wave.next_breakpoint(t);
+            let end = next.unwrap_or(t + 1e-3);
+            prop_assert!(end > t);
+            if let Some(piece) = wave.piece(t) {
+                prop_assert_eq!(piece.end, next.unwrap_or(f64::INFINITY));
+                prop_assert!(piece.start <= t && piece.origin.is_finite());
+                for s in [0.0, 0.25, 0.5, 0.75] {
+                    let at = t + s * (end - t);
+                    if at < end {
+                        prop_assert_eq!(wave.value(at), piece.value(at));
+                        prop_assert_eq!(wave.piece(at), Some(piece));
+                        prop_assert!(wave.value(at).is_finite() && wave.derivative(at).is_finite());
+                        prop_assert!(!wave.is_edge(at) || at == piece.start);
+                    }
+                }
+                prop_assert!((piece.value(end) - wave.value_left(end)).abs() < CLOSE);
+            }
+            let jump = (wave.value(end) - wave.value_left(end)).abs();
+            prop_assert!(wave.is_edge(end) || jump == 0.0);
+            t = end;
+        }
+    }
+
+    #[test]
+    fn the_derivative_is_that_of_the_value(wave in waves(), t in -2e-3..4e-3) {
+        let h = 1e-9;
+        if wave.next_breakpoint(t).is_none_or(|next| next > t + 2.0 * h) {
+            let slope = (-3.0 * wave.value(t) + 4.0 * wave.value(t + h) - wave.value(t + 2.0 * h)) / (2.0 * h);
+            let scale = 1e6 + wave.derivative(t).abs();
+            prop_assert!((slope - wave.derivative(t)).abs() < 2e-3 * scale, "{} {}", slope, wave.derivative(t));
+        }
+    }
+
+    #[test]
+    fn json_keeps_every_bit(wave in waves()) {
+        let text = serde_json::to_string(&Form::from(&wave)).unwrap();
+        let form: Form = serde_json::from_str(&text).unwrap();
+        prop_assert_eq!(form.wave(1e-6, 1e-3).unwrap(), wave);
+    }
+
+    #[test]
+    fn crossings_agree_with_sampling(a in waves(), b in waves(), gain in -2.0..2.0, level in -3.0..3.0) {
+        let (a, b) = (Source { dc: 0.0, wave: a }, Source { dc: 0.0, wave: b });
+        let value = |t: f64| a.value(t) + gain * b.value(t) - level;
+        let found = crossings(&[(1.0, &a), (gain, &b)], 0.0, level, 0.0, 1e-3);
+        prop_assert!(found.windows(2).all(|w| w[0].time <= w[1].time && w[0].rising != w[1].rising));
+        // Between passages the sampled sign is the one the last passage left.
+        let mut above = None;
+        let mut next = 0;
+        for k in 0..=2000 {
+            let t = f64::from(k) * 0.5e-6;
+            while next < found.len() && found[next].time <= t {
+                above = Some(found[next].rising);
+                next += 1;
+            }
+            if value(t).abs() > CLOSE {
+                let sampled = value(t) > 0.0;
+                prop_assert_eq!(*above.get_or_insert(sampled), sampled, "at {}", t);
+            }
+        }
+    }
+}

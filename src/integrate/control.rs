@@ -1,0 +1,175 @@
+//! Error control: how large a step may be.
+//!
+//! A step h is done once whole and once in two halves; for a method of order p the halves' error is the difference divided
+//! by 2^p − 1. It may use up the part h/span of the tolerance: the flow of a passive circuit with ideal diodes is a contraction, so
+//! the errors of all steps together stay below the tolerance. Step sizes change by factors of two only.
+
+use crate::integrate::inputs::Inputs;
+use crate::integrate::step::Scheme;
+use crate::lcs::Lcs;
+use crate::settings::Settings;
+
+/// Accepts or halves steps.
+#[derive(Debug, Clone)]
+pub struct Control {
+    order: i32,
+    tol: f64,
+    span: f64,
+    smallest: f64,
+}
+
+/// What to do with a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Verdict {
+    /// Whether the error is small enough.
+    pub accept: bool,
+    /// The step to try next, s.
+    pub next: f64,
+}
+
+/// A step is doubled where the error of the doubled one would still leave this factor of room.
+const ROOM: f64 = 2.0;
+
+/// Steps shorter than this part of the span are granted its part of the tolerance: corners of the solution (a diode that turns
+/// on) are few, and shorter steps only there would not pay.
+const CORNER: f64 = 1e-5;
+
+impl Control {
+    /// Control over a span, s.
+    #[must_use]
+    pub fn new(scheme: Scheme, settings: &Settings, span: f64) -> Self {
+        let order = scheme.order();
+        Self {
+            order,
+            tol: settings.tol,
+            span,
+            smallest: settings.min_step * span,
+        }
+    }
+
+    /// Steps this short are not halved again, s.
+    #[must_use]
+    pub fn smallest(&self) -> f64 {
+        self.smallest
+    }
+
+    /// Judges a step of length h whose halves differ from it by `difference`, relative to the amplitude.
+    #[must_use]
+    pub fn judge(&self, h: f64, difference: f64) -> Verdict {
+        let error = difference / (2_f64.powi(self.order) - 1.0);
+        let allowed = self.tol * (h / self.span).max(CORNER);
+        let accept = error <= allowed;
+        let next = if !accept {
+            0.5 * h
+        } else if error * ROOM * 2_f64.powi(self.order) <= allowed {
+            2.0 * h
+        } else {
+            h
+        };
+        Verdict { accept, next }
+    }
+}
+
+/// The size of each storage element's voltage or current so far, for relative errors.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Amplitudes {
+    names: Vec<String>,
+    units: Vec<&'static str>,
+    values: Vec<f64>,
+    /// Largest source, by unit: (V, A).
+    sources: (f64, f64),
+}
+
+/// A quantity smaller than this part of the largest one of its unit is judged by that part.
+const FLOOR: f64 = 1e-3;
+
+impl Amplitudes {
+    /// Nothing seen yet but the inputs at t = 0.
+    #[must_use]
+    pub fn new(lcs: &Lcs, inputs: &Inputs) -> Self {
+        let mut sources = (0.0_f64, 0.0_f64);
+        for (input, value) in lcs.inputs.iter().zip(inputs.all(0.0)) {
+            let side = if input.unit == "V" {
+                &mut sources.0
+            } else {
+                &mut sources.1
+            };
+            *side = side.max(value.abs());
+        }
+        let mut new = Self {
+            sources,
+            ..Self::default()
+        };
+        new.see(lcs, &vec![0.0; lcs.n()]);
+        new
+    }
+
+    /// Takes note of a state.
+    pub fn see(&mut self, lcs: &Lcs, x: &[f64]) {
+        // States come in the same order for one system, so position k is nearly always right.
+        for (k, state) in lcs.states.iter().enumerate() {
+            let at = self.position(k, &state.name).unwrap_or_else(|| {
+                self.names.push(state.name.clone());
+                self.units.push(state.unit);
+                self.values.push(0.0);
+                self.names.len() - 1
+            });
+            self.values[at] = self.values[at].max(x[k].abs());
+        }
+    }
+
+    fn position(&self, guess: usize, name: &str) -> Option<usize> {
+        if self.names.get(guess).is_some_and(|other| other == name) {
+            return Some(guess);
+        }
+        self.names.iter().position(|other| other == name)
+    }
+
+    /// max_k |a_k − b_k| / amplitude_k.
+    #[must_use]
+    pub fn error(&self, lcs: &Lcs, a: &[f64], b: &[f64]) -> f64 {
+        let largest = |unit: &str| {
+            let seen = self
+                .values
+                .iter()
+                .zip(&self.units)
+                .filter(|(_, u)| **u == unit);
+            let source = if unit == "V" {
+                self.sources.0
+            } else {
+                self.sources.1
+            };
+            seen.map(|(v, _)| *v).fold(source, f64::max)
+        };
+        let (volts, amperes) = (largest("V"), largest("A"));
+        let mut worst = 0.0_f64;
+        for (k, state) in lcs.states.iter().enumerate() {
+            let seen = self
+                .position(k, &state.name)
+                .map_or(0.0, |at| self.values[at]);
+            let floor = FLOOR * if state.unit == "V" { volts } else { amperes };
+            let scale = seen.max(floor).max(b[k].abs());
+            let difference = (a[k] - b[k]).abs();
+            if difference > 0.0 {
+                worst = worst.max(difference / scale);
+            }
+        }
+        worst
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn order_decides_the_growth() {
+        let control = Control::new(Scheme::MIDPOINT, &Settings::default(), 1.0);
+        let h = 0.01;
+        // tol·h = 1e-6; the estimate is a third of the difference.
+        assert!(!control.judge(h, 4e-6).accept);
+        let fair = control.judge(h, 2e-6);
+        assert!(fair.accept && fair.next == h);
+        assert_eq!(control.judge(h, 1e-7).next, 2.0 * h);
+    }
+}

@@ -1,0 +1,155 @@
+//! The sources of a system, evaluated together.
+
+use crate::circuit::source::Wave;
+use crate::lcs::Input;
+
+/// All inputs u(t) with their one-sided limits and breakpoints.
+#[derive(Debug, Clone)]
+pub struct Inputs {
+    sources: Vec<crate::circuit::Source>,
+    varying: Vec<usize>,
+}
+
+/// Steps of the error-controlled steppers per period of the fastest sine: an error estimate must not alias.
+const STEPS_PER_PERIOD: f64 = 8.0;
+
+impl Inputs {
+    /// The inputs of a system.
+    #[must_use]
+    pub fn new(inputs: &[Input]) -> Self {
+        let sources: Vec<_> = inputs.iter().map(|i| i.source.clone()).collect();
+        let varying = (0..sources.len())
+            .filter(|&j| !is_constant(&sources[j].wave))
+            .collect();
+        Self { sources, varying }
+    }
+
+    /// Indices of the inputs that are not constant.
+    #[must_use]
+    pub fn varying(&self) -> &[usize] {
+        &self.varying
+    }
+
+    /// Right limits u(t⁺) of all inputs.
+    #[must_use]
+    pub fn all(&self, t: f64) -> Vec<f64> {
+        self.sources.iter().map(|s| s.value(t)).collect()
+    }
+
+    /// Writes right limits of the varying inputs.
+    pub fn right(&self, t: f64, u: &mut [f64]) {
+        for &j in &self.varying {
+            u[j] = self.sources[j].value(t);
+        }
+    }
+
+    /// Writes left limits of the varying inputs.
+    pub fn left(&self, t: f64, u: &mut [f64]) {
+        for &j in &self.varying {
+            u[j] = self.sources[j].value_before(t);
+        }
+    }
+
+    /// Writes right-hand slopes of all inputs.
+    pub fn slopes(&self, t: f64, du: &mut [f64]) {
+        du.fill(0.0);
+        for &j in &self.varying {
+            du[j] = self.sources[j].slope(t);
+        }
+    }
+
+    /// The first time after `t` at which an input has an edge or a kink; infinite if none.
+    #[must_use]
+    pub fn next_breakpoint(&self, t: f64) -> f64 {
+        self.varying
+            .iter()
+            .filter_map(|&j| self.sources[j].next_breakpoint(t))
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Largest step that does not alias the fastest sine, s.
+    #[must_use]
+    pub fn largest_step(&self) -> f64 {
+        self.sources
+            .iter()
+            .filter_map(|s| match s.wave {
+                Wave::Sin { frequency, .. } if frequency > 0.0 => {
+                    Some(1.0 / (STEPS_PER_PERIOD * frequency))
+                }
+                _ => None,
+            })
+            .fold(f64::INFINITY, f64::min)
+    }
+}
+
+fn is_constant(wave: &Wave) -> bool {
+    match wave {
+        Wave::Dc(_) => true,
+        Wave::Sin { amplitude, .. } => *amplitude == 0.0,
+        Wave::Pulse { v1, v2, .. } | Wave::Exp { v1, v2, .. } => v1 == v2,
+        Wave::Pwl { points, .. } => points.windows(2).all(|w| w[0].1 == w[1].1),
+    }
+}
+
+/// TEMPORARY until `circuit::source` evaluates itself.
+trait Evaluate {
+    fn value(&self, t: f64) -> f64;
+    fn value_before(&self, t: f64) -> f64;
+    fn slope(&self, t: f64) -> f64;
+    fn next_breakpoint(&self, t: f64) -> Option<f64>;
+}
+
+impl Evaluate for crate::circuit::Source {
+    fn value(&self, t: f64) -> f64 {
+        match &self.wave {
+            Wave::Dc(v) => *v,
+            Wave::Sin {
+                offset,
+                amplitude,
+                frequency,
+                phase,
+                ..
+            } => {
+                offset
+                    + amplitude
+                        * (2.0 * std::f64::consts::PI * frequency * t + phase.to_radians()).sin()
+            }
+            Wave::Pwl { points, .. } => points
+                .iter()
+                .rev()
+                .find(|p| p.0 <= t)
+                .map_or(points[0].1, |p| p.1),
+            _ => self.dc,
+        }
+    }
+    fn value_before(&self, t: f64) -> f64 {
+        match &self.wave {
+            Wave::Pwl { points, .. } => points
+                .iter()
+                .rev()
+                .find(|p| p.0 < t)
+                .map_or(points[0].1, |p| p.1),
+            _ => self.value(t),
+        }
+    }
+    fn slope(&self, t: f64) -> f64 {
+        match &self.wave {
+            Wave::Sin {
+                amplitude,
+                frequency,
+                phase,
+                ..
+            } => {
+                let w = 2.0 * std::f64::consts::PI * frequency;
+                amplitude * w * (w * t + phase.to_radians()).cos()
+            }
+            _ => 0.0,
+        }
+    }
+    fn next_breakpoint(&self, t: f64) -> Option<f64> {
+        match &self.wave {
+            Wave::Pwl { points, .. } => points.iter().map(|p| p.0).find(|&p| p > t),
+            _ => None,
+        }
+    }
+}

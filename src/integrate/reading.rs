@@ -1,0 +1,53 @@
+//! Rows over [x | λ | u | u' | 1] evaluated without allocation.
+
+use crate::lcs::Rows;
+
+/// Where the quantities of a circuit stand at one instant.
+#[derive(Debug, Clone, Copy)]
+pub struct Point<'a> {
+    /// n states.
+    pub x: &'a [f64],
+    /// m port variables.
+    pub lambda: &'a [f64],
+    /// p inputs.
+    pub u: &'a [f64],
+    /// p slopes of the inputs.
+    pub du: &'a [f64],
+}
+
+/// Row `i` of `rows` at a point. Blocks without columns (a system without devices, rows without u') count as zero.
+#[must_use]
+pub fn value(rows: &Rows, i: usize, at: Point<'_>) -> f64 {
+    let mut sum = if i < rows.one.len() { rows.one[i] } else { 0.0 };
+    for (block, values) in [
+        (&rows.x, at.x),
+        (&rows.lambda, at.lambda),
+        (&rows.u, at.u),
+        (&rows.du, at.du),
+    ] {
+        if i < block.nrows() {
+            let columns = block.ncols().min(values.len());
+            for (j, &v) in values.iter().enumerate().take(columns) {
+                let weight = block[(i, j)];
+                if weight != 0.0 {
+                    sum += weight * v;
+                }
+            }
+        }
+    }
+    sum
+}
+
+/// The impulse (area) of row `i` for port impulses p and steps Δu of the inputs.
+#[must_use]
+pub fn impulse(rows: &Rows, i: usize, p: &[f64], step_of_u: &[f64]) -> f64 {
+    let mut sum = 0.0;
+    for (block, values) in [(&rows.lambda, p), (&rows.du, step_of_u)] {
+        if i < block.nrows() {
+            sum += (0..block.ncols().min(values.len()))
+                .map(|j| block[(i, j)] * values[j])
+                .sum::<f64>();
+        }
+    }
+    sum
+}

@@ -1,0 +1,344 @@
+//! One (θ, γ) step as one matrix–vector product.
+//!
+//! ```text
+//! x⁺ = x + h A (θx⁺ + (1−θ)x) + h B λ + h E (θu⁺ + (1−θ)u) + h e
+//! y  = C (γx⁺ + (1−γ)x) + D λ + G (γu⁺ + (1−γ)u) + F,      0 ≤ λ ⟂ y ≥ 0
+//! ```
+//!
+//! with u the right limit at the start of the step and u⁺ the left limit at its end: for θ = γ = 1 Moreau's scheme, for
+//! θ = ½, γ = 1 Siconos', for θ = γ = ½ the midpoint rule, which keeps the energy balance exactly (S. Greenhalgh, V. Acary,
+//! B. Brogliato, "On preserving dissipativity properties of linear complementarity dynamical systems with the θ-method",
+//! Numerische Mathematik 125, 2013). With W = I − hθA the one-step problem is LCP(M, q), M = D + hγ C W⁻¹ B.
+//!
+//! For one active set everything is affine in z = [x; u⁺; u; 1] (only inputs that vary have columns), so the step and its
+//! sign test are [x⁺; λ_a; y_ā] = K z with a matrix K that is computed once.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::integrate::energy::PowerForms;
+use crate::lcs::Lcs;
+use crate::solve::Driver;
+use crate::solve::active::{ActiveSolve, refined_inverse};
+use crate::solve::lcp::{Lcp, Scaling};
+
+/// θ for the state, γ for λ.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scheme {
+    /// Implicitness of the state, ½ … 1.
+    pub theta: f64,
+    /// Implicitness of the complementarity, ½ … 1.
+    pub gamma: f64,
+}
+
+impl Scheme {
+    /// Implicit Euler in both, Moreau's time-stepping.
+    pub const MOREAU: Self = Self {
+        theta: 1.0,
+        gamma: 1.0,
+    };
+    /// The midpoint rule.
+    pub const MIDPOINT: Self = Self {
+        theta: 0.5,
+        gamma: 0.5,
+    };
+
+    /// The same θ with γ = 1, for steps in which the active set changes.
+    #[must_use]
+    pub const fn implicit_in_lambda(self) -> Self {
+        Self {
+            theta: self.theta,
+            gamma: 1.0,
+        }
+    }
+
+    /// Order of the global error between events.
+    #[must_use]
+    pub fn order(self) -> i32 {
+        if self.theta == 0.5 && self.gamma == 0.5 {
+            2
+        } else {
+            1
+        }
+    }
+}
+
+/// A guard this far below zero, relative to the sum of the magnitudes it was computed from, is zero: rounding of K.
+const GUARD_ROUNDING: f64 = 1e-12;
+
+/// Columns of z.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Columns {
+    /// Number of states.
+    pub n: usize,
+    /// Inputs that vary, as indices into u.
+    pub varying: Vec<usize>,
+    /// Values of all inputs at the start; those of the constant ones never change.
+    pub constant: Vec<f64>,
+}
+
+impl Columns {
+    /// Length of z.
+    pub(crate) fn len(&self) -> usize {
+        self.n + 2 * self.varying.len() + 1
+    }
+
+    /// z from its parts.
+    pub(crate) fn fill(&self, x: &[f64], u_next: &[f64], u: &[f64], z: &mut [f64]) {
+        let p = self.varying.len();
+        z[..self.n].copy_from_slice(x);
+        for (k, &j) in self.varying.iter().enumerate() {
+            z[self.n + k] = u_next[j];
+            z[self.n + p + k] = u[j];
+        }
+        z[self.n + 2 * p] = 1.0;
+    }
+
+    /// `x_part·x + u_part·(weight·u⁺ + (1 − weight)·u) + one` as rows over z.
+    pub(crate) fn rows(
+        &self,
+        x_part: &DMatrix<f64>,
+        u_part: &DMatrix<f64>,
+        weight: f64,
+        one: &DVector<f64>,
+    ) -> DMatrix<f64> {
+        let p = self.varying.len();
+        let mut rows = DMatrix::zeros(one.len(), self.len());
+        rows.columns_mut(0, self.n).copy_from(x_part);
+        let mut last = one.clone();
+        for j in 0..u_part.ncols() {
+            if let Some(k) = self.varying.iter().position(|&v| v == j) {
+                rows.set_column(self.n + k, &(u_part.column(j) * weight));
+                rows.set_column(self.n + p + k, &(u_part.column(j) * (1.0 - weight)));
+            } else {
+                last += u_part.column(j) * self.constant[j];
+            }
+        }
+        rows.set_column(self.n + 2 * p, &last);
+        rows
+    }
+}
+
+/// Everything about one step length and scheme of one system.
+#[derive(Debug, Clone)]
+pub(crate) struct StepMatrices {
+    /// Step, s.
+    pub h: f64,
+    /// θ and γ.
+    pub scheme: Scheme,
+    /// For eviction: when this was used last.
+    pub used: u64,
+    /// n×len(z): x⁺ for λ = 0.
+    phi: DMatrix<f64>,
+    /// n×m: h W⁻¹ B.
+    response: DMatrix<f64>,
+    /// m×len(z): q.
+    q: DMatrix<f64>,
+    /// M equilibrated, and its scaling.
+    scaled: DMatrix<f64>,
+    scaling: Scaling,
+    m: DMatrix<f64>,
+    /// The solvers for M.
+    pub driver: Driver,
+    modes: Vec<FusedMode>,
+}
+
+/// K for one active set.
+#[derive(Debug, Clone)]
+pub(crate) struct FusedMode {
+    active: Vec<bool>,
+    /// Row-major; n rows x⁺, m rows of guards, then rows that must vanish (only where M_aa is singular).
+    k: Vec<f64>,
+    width: usize,
+    /// Whether M_aa is regular; if not λ_a is the least-norm choice.
+    pub regular: bool,
+    /// Power as quadratic forms of z.
+    pub power: PowerForms,
+}
+
+/// Fused modes kept per step length.
+const KEPT_MODES: usize = 256;
+
+impl StepMatrices {
+    /// Factors one step; `None` where W is singular.
+    pub(crate) fn new(
+        lcs: &Lcs,
+        columns: &Columns,
+        h: f64,
+        scheme: Scheme,
+        tolerance: f64,
+    ) -> Option<Self> {
+        let n = lcs.n();
+        let Scheme { theta, gamma } = scheme;
+        let identity = DMatrix::identity(n, n);
+        let w_inverse = if n == 0 {
+            identity.clone()
+        } else {
+            refined_inverse(&(&identity - &lcs.a * (h * theta)))?
+        };
+        let explicit = &identity + &lcs.a * (h * (1.0 - theta));
+        let phi = &w_inverse * columns.rows(&explicit, &(&lcs.e * h), theta, &(&lcs.e0 * h));
+        let response = &w_inverse * &lcs.b * h;
+        let direct = columns.rows(&(&lcs.c * (1.0 - gamma)), &lcs.g, gamma, &lcs.f);
+        let q = &lcs.c * gamma * &phi + direct;
+        let m = &lcs.d + &lcs.c * gamma * &response;
+        if !(m
+            .iter()
+            .chain(q.iter())
+            .chain(phi.iter())
+            .all(|v| v.is_finite()))
+        {
+            return None;
+        }
+        let scaling = Scaling::of(&m);
+        let scaled = scaling
+            .apply(&Lcp {
+                m: m.clone(),
+                q: DVector::zeros(m.nrows()),
+            })
+            .m;
+        let driver = Driver::new(m.clone(), tolerance);
+        Some(Self {
+            h,
+            scheme,
+            used: 0,
+            phi,
+            response,
+            q,
+            scaled,
+            scaling,
+            m,
+            driver,
+            modes: Vec::new(),
+        })
+    }
+
+    /// The index of the fused mode of an active set, computed at its first use; and whether it was computed now.
+    pub(crate) fn mode(&mut self, lcs: &Lcs, columns: &Columns, active: &[bool]) -> (usize, bool) {
+        if let Some(at) = self.modes.iter().position(|mode| mode.active == active) {
+            return (at, false);
+        }
+        if self.modes.len() == KEPT_MODES {
+            self.modes.clear();
+        }
+        self.modes.push(self.fuse(lcs, columns, active));
+        (self.modes.len() - 1, true)
+    }
+
+    /// A fused mode by index.
+    pub(crate) fn fused(&self, index: usize) -> &FusedMode {
+        &self.modes[index]
+    }
+
+    fn fuse(&self, lcs: &Lcs, columns: &Columns, active: &[bool]) -> FusedMode {
+        let (n, m, width) = (lcs.n(), lcs.m(), columns.len());
+        let solve = ActiveSolve::new(&self.scaled, active);
+        let d = &self.scaling.d;
+        let mut scaled_q = self.q.select_rows(&solve.indices);
+        for (mut row, &j) in scaled_q.row_iter_mut().zip(&solve.indices) {
+            row *= d[j];
+        }
+        let mut lambda = DMatrix::zeros(m, width);
+        for (row, &j) in (-(&solve.inverse * scaled_q))
+            .row_iter()
+            .zip(&solve.indices)
+        {
+            lambda.set_row(j, &(row * d[j]));
+        }
+        if solve.regular {
+            // One step of refinement: the residual M_aa λ_a + q_a through the same inverse.
+            let mut residual = (&self.m * &lambda + &self.q).select_rows(&solve.indices);
+            for (mut row, &j) in residual.row_iter_mut().zip(&solve.indices) {
+                row *= d[j];
+            }
+            for (row, &j) in (&solve.inverse * residual).row_iter().zip(&solve.indices) {
+                let better = lambda.row(j) - row * d[j];
+                lambda.set_row(j, &better);
+            }
+        }
+        let x_next = &self.phi + &self.response * &lambda;
+        // Blocking ports are tested at the end of the step, conducting ones by their λ.
+        let zero = DMatrix::zeros(m, n);
+        let y_end = &lcs.c * &x_next + &lcs.d * &lambda + columns.rows(&zero, &lcs.g, 1.0, &lcs.f);
+        let y = &self.m * &lambda + &self.q;
+        let extra = if solve.regular {
+            0
+        } else {
+            solve.indices.len()
+        };
+        let mut k = Vec::with_capacity((n + m + extra) * width);
+        (0..n).for_each(|i| k.extend(x_next.row(i).iter()));
+        (0..m).for_each(|j| {
+            k.extend(
+                if active[j] {
+                    lambda.row(j)
+                } else {
+                    y_end.row(j)
+                }
+                .iter(),
+            )
+        });
+        if !solve.regular {
+            solve
+                .indices
+                .iter()
+                .for_each(|&j| k.extend(y.row(j).iter()));
+        }
+        let power = PowerForms::new(lcs, columns, self.h, self.scheme, &x_next, &lambda);
+        FusedMode {
+            active: active.to_vec(),
+            k,
+            width,
+            regular: solve.regular,
+            power,
+        }
+    }
+
+    /// q for the solvers.
+    pub(crate) fn q(&self, z: &[f64]) -> DVector<f64> {
+        &self.q * DVector::from_column_slice(z)
+    }
+
+    /// x⁺ for a given λ.
+    pub(crate) fn x_next(&self, z: &[f64], lambda: &DVector<f64>) -> DVector<f64> {
+        &self.phi * DVector::from_column_slice(z) + &self.response * lambda
+    }
+}
+
+impl FusedMode {
+    /// `out` = [x⁺; guards]; whether every guard is ≥ 0 up to rounding.
+    #[inline]
+    pub(crate) fn step(&self, z: &[f64], n: usize, out: &mut [f64]) -> bool {
+        debug_assert_eq!(z.len(), self.width);
+        let mut rows = self.k.chunks_exact(self.width);
+        for (value, row) in out.iter_mut().zip(&mut rows) {
+            *value = row.iter().zip(z).map(|(a, b)| a * b).sum();
+        }
+        if out[n..].iter().all(|&guard| guard >= 0.0) && self.regular {
+            return true;
+        }
+        self.holds_to_rounding(z, n, out)
+    }
+
+    #[cold]
+    fn holds_to_rounding(&self, z: &[f64], n: usize, out: &mut [f64]) -> bool {
+        let size = |row: &[f64]| row.iter().zip(z).map(|(a, b)| (a * b).abs()).sum::<f64>();
+        for (i, row) in self.k.chunks_exact(self.width).enumerate().skip(n) {
+            let negative = if i < out.len() {
+                -out[i]
+            } else {
+                row.iter().zip(z).map(|(a, b)| a * b).sum::<f64>().abs()
+            };
+            if negative > GUARD_ROUNDING * size(row) || negative.is_nan() {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// λ of this mode from the guards of a step.
+    pub(crate) fn lambda(&self, guards: &[f64], lambda: &mut [f64]) {
+        for ((l, &guard), &on) in lambda.iter_mut().zip(guards).zip(&self.active) {
+            *l = if on { guard.max(0.0) } else { 0.0 };
+        }
+    }
+}

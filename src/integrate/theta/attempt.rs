@@ -1,0 +1,187 @@
+//! One step: tried with the present active set, else solved, then committed.
+
+use super::*;
+
+impl Theta<'_> {
+    /// Rounding of the difference of two times near `t`.
+    pub(super) fn slack(t: f64) -> f64 {
+        8.0 * f64::EPSILON * t.abs()
+    }
+
+    /// Computes the step from now to t1 = now + h into `out` without committing it.
+    pub(super) fn attempt(&mut self, h: f64, t1: f64) -> Result<(), SimError> {
+        self.inputs.left(t1, &mut self.u_next);
+        self.stats.lcp_solves += 1;
+        let scheme = if self.now.settle {
+            self.scheme.implicit_in_lambda()
+        } else {
+            self.scheme
+        };
+        let Self {
+            plant,
+            now,
+            attempt,
+            settings,
+            ..
+        } = self;
+        let system = &mut plant.systems[now.system].1;
+        system
+            .columns
+            .fill(&now.x, &self.u_next, &now.u, &mut self.z);
+        let same = attempt.h == h && system.step(attempt.step).scheme == scheme;
+        if !same || attempt.solved.is_some() {
+            let tolerance = settings.lcp_residual;
+            let (step, new) = system
+                .matrices(h, Self::slack(t1), scheme, tolerance)
+                .map_err(|reason| SimError::at(now.t, reason))?;
+            let (mode, fused) = system.mode(step, &now.active);
+            self.stats.factorisations += u64::from(new) + u64::from(fused);
+            *attempt = Attempt {
+                step,
+                mode,
+                h,
+                solved: None,
+            };
+        }
+        let n = now.x.len();
+        let fused = system.step(attempt.step).fused(attempt.mode);
+        if fused.step(&self.z, n, &mut self.out) {
+            return Ok(());
+        }
+        self.solve_step(h, t1)
+    }
+
+    /// The step with γ = 1 by the solvers.
+    #[cold]
+    pub(super) fn solve_step(&mut self, h: f64, t1: f64) -> Result<(), SimError> {
+        self.stats.pivotings += 1;
+        let scheme = self.scheme.implicit_in_lambda();
+        let tolerance = self.settings.lcp_residual;
+        let now = &self.now;
+        let system = &mut self.plant.systems[now.system].1;
+        let (step, new) = system
+            .matrices(h, Self::slack(t1), scheme, tolerance)
+            .map_err(|reason| SimError::at(now.t, reason))?;
+        self.stats.factorisations += u64::from(new);
+        let matrices = system.step_mut(step);
+        let q = matrices.q(&self.z);
+        let before = matrices.driver.factorisations;
+        matrices.driver.suggest(&now.active);
+        let solution = matrices.driver.solve(&q);
+        self.stats.factorisations += matrices.driver.factorisations - before;
+        let x = matrices.x_next(&self.z, &solution.lambda);
+        if x.iter().any(|v| !v.is_finite()) {
+            return Err(SimError::at(now.t, Reason::Overflow));
+        }
+        let device = |active: &[Option<bool>], at: Option<usize>| {
+            let changed = |j: &usize| active[*j].is_some_and(|on| on != now.active[*j]);
+            let j = at.or_else(|| (0..active.len()).find(changed));
+            j.map(|j| system.lcs.ports[j].device.clone())
+        };
+        let failure = match solution.status {
+            Status::Solved => None,
+            Status::Infeasible(ref ray) => Some((Reason::Infeasible, Some(ray.imax()))),
+            Status::Failed => Some((
+                Reason::Residual {
+                    residual: solution.residual,
+                    tolerance,
+                },
+                None,
+            )),
+        };
+        if let Some((reason, at)) = failure {
+            let mut error = SimError::at(now.t, reason);
+            error.device = device(&solution.active, at);
+            return Err(error);
+        }
+        let n = now.x.len();
+        self.out[..n].copy_from_slice(x.as_slice());
+        for j in 0..solution.active.len() {
+            self.out[n + j] = if solution.basis[j] {
+                solution.lambda[j]
+            } else {
+                solution.y[j]
+            };
+        }
+        self.lambda.copy_from_slice(solution.lambda.as_slice());
+        self.attempt = Attempt {
+            step,
+            mode: 0,
+            h,
+            solved: Some((solution.basis, solution.active)),
+        };
+        Ok(())
+    }
+
+    /// Makes the attempt the present.
+    pub(super) fn commit(&mut self, t1: f64) -> Result<(), SimError> {
+        let n = self.now.x.len();
+        self.stats.steps += 1;
+        if self.stats.steps > self.settings.max_steps {
+            let reason = Reason::TooManySteps {
+                limit: self.settings.max_steps,
+            };
+            return Err(SimError::at(self.now.t, reason));
+        }
+        if let Some((basis, pattern)) = self.attempt.solved.take() {
+            self.commit_solved(basis, pattern, t1);
+        } else {
+            let system = &self.plant.systems[self.now.system].1;
+            let fused = system.step(self.attempt.step).fused(self.attempt.mode);
+            self.now.balance.add(fused.power.over_step(&self.z));
+        }
+        self.now.settle = false;
+        self.now.x.copy_from_slice(&self.out[..n]);
+        self.now.u.copy_from_slice(&self.u_next);
+        self.now.t = t1;
+        self.last_h = self.attempt.h;
+        Ok(())
+    }
+
+    #[cold]
+    pub(super) fn commit_solved(&mut self, basis: Vec<bool>, pattern: Vec<Option<bool>>, t1: f64) {
+        let n = self.now.x.len();
+        let h = self.attempt.h;
+        // Energy at the end of the step (γ = 1) from the solution itself.
+        for (du, (a, b)) in self.du.iter_mut().zip(self.u_next.iter().zip(&self.now.u)) {
+            *du = (a - b) / h;
+        }
+        let at = Point {
+            x: &self.out[..n],
+            lambda: &self.lambda,
+            u: &self.u_next,
+            du: &self.du,
+        };
+        let (source, dissipated) = energy::power(&self.system().lcs, at);
+        self.now.balance.add((source * h, dissipated * h));
+        self.take_pattern(basis, &pattern, t1);
+        self.attempt.h = f64::NAN;
+    }
+
+    /// Takes over what the devices do; a change between conducting (a current flows) and blocking is an event.
+    pub(super) fn take_pattern(&mut self, basis: Vec<bool>, seen: &[Option<bool>], t: f64) {
+        let ports = &self.system().lcs.ports;
+        let before = &self.now.pattern;
+        let on =
+            |(&lambda, port): (&Option<bool>, &Port)| lambda == Some(port.role != Role::Voltage);
+        let pattern: Vec<bool> = seen.iter().zip(ports).map(on).collect();
+        if pattern != *before && self.started {
+            let changed = (0..pattern.len()).filter(|&j| pattern[j] != before[j]);
+            let names: Vec<&str> = changed.map(|j| ports[j].device.as_str()).collect();
+            self.pending.push((t, names.join(" ")));
+        }
+        self.modes.insert((self.now.system, pattern.clone()));
+        self.now.active = basis;
+        self.now.pattern = pattern;
+    }
+
+    /// The active set and the devices' states at the right limit of now, after a start, an edge or a switching.
+    pub(super) fn find_mode(&mut self) -> Result<(), SimError> {
+        if self.now.active.is_empty() {
+            return Ok(());
+        }
+        let found = self.right_limit()?;
+        self.take_pattern(found.basis, &found.active, self.now.t);
+        Ok(())
+    }
+}

@@ -1,0 +1,216 @@
+//! What happens in no time: the start, edges of sources, switches.
+
+use super::*;
+
+impl Theta<'_> {
+    /// The first jump, from inconsistent initial values.
+    pub(super) fn begin(&mut self, log: &mut Log) -> Result<(), SimError> {
+        // Folding the storage vector into a state is part of the start: what it loses is dissipated.
+        let u = self.now.u.clone();
+        let folded = energy::stored(&self.system().lcs, &self.now.x, &u);
+        let lost = self.now.balance.first() - folded;
+        self.now.balance.add((0.0, lost));
+        self.jump(&u, log)?;
+        self.note_energy();
+        self.find_mode()?;
+        self.started = true;
+        let Self {
+            amplitudes,
+            plant,
+            now,
+            ..
+        } = self;
+        amplitudes.see(&plant.systems[now.system].1.lcs, &now.x);
+        Ok(())
+    }
+
+    /// At a breakpoint: inputs take their right limits, the state jumps if it must.
+    pub(super) fn edge(&mut self, t: f64, log: &mut Log) -> Result<(), SimError> {
+        let mut u = self.now.u.clone();
+        self.inputs.right(t, &mut u);
+        if u == self.now.u {
+            return Ok(());
+        }
+        let rows = log.wants_rows();
+        let before = if rows {
+            let mut row = vec![0.0; self.system().lcs.outputs.names.len()];
+            self.read_point(&mut row);
+            Some(row)
+        } else {
+            None
+        };
+        let old = std::mem::replace(&mut self.now.u, u);
+        if let Some(row) = &before {
+            log.row(self.now.t, row);
+        }
+        self.jump(&old, log)?;
+        self.find_mode()?;
+        self.report_quietly(log);
+        if rows {
+            self.log_row(log);
+        }
+        Ok(())
+    }
+
+    /// The jump from inputs `old` to the present ones at the present time.
+    pub(super) fn jump(&mut self, old: &[f64], log: &mut Log) -> Result<(), SimError> {
+        self.now.settle = true;
+        self.attempt.h = f64::NAN;
+        let t = self.now.t;
+        let x = DVector::from_column_slice(&self.now.x);
+        let u = DVector::from_column_slice(&self.now.u);
+        let System { lcs, jump, .. } = &mut self.plant.systems[self.now.system].1;
+        let found = match jump {
+            Some(problem) if problem.monotone => problem
+                .solve(lcs, &x, &u)
+                .map_err(|_| SimError::at(t, Reason::Infeasible))?,
+            _ => None,
+        };
+        let (after, p) = match found {
+            Some(jump) => (jump.x, jump.p.as_slice().to_vec()),
+            None => (x.clone(), vec![0.0; lcs.m()]),
+        };
+        let source =
+            energy::source_work_of_jump(lcs, x.as_slice(), after.as_slice(), old, u.as_slice(), &p);
+        let gain = energy::stored(lcs, after.as_slice(), u.as_slice())
+            - energy::stored(lcs, x.as_slice(), old);
+        self.now.balance.add((source, source - gain));
+        let step: Vec<f64> = u.iter().zip(old).map(|(a, b)| a - b).collect();
+        if p.iter().any(|&p| p != 0.0) {
+            self.stats.jumps += 1;
+            log.event(t, "jump");
+        }
+        self.now.x.copy_from_slice(after.as_slice());
+        self.log_impulses(t, &p, &step, log);
+        Ok(())
+    }
+
+    /// Impulses of the ports and of the outputs, by name, once each.
+    pub(super) fn log_impulses(&self, t: f64, p: &[f64], step: &[f64], log: &mut Log) {
+        let lcs = &self.system().lcs;
+        let mut named: Vec<(String, f64)> = Vec::new();
+        let mut add = |name: String, area: f64, scale: f64| {
+            if area.abs() > 1e-12 * scale && !named.iter().any(|(other, _)| *other == name) {
+                named.push((name, area));
+            }
+        };
+        let through = &lcs.d * DVector::from_column_slice(p);
+        for kind in [Role::Current, Role::Voltage] {
+            // λ and y of the ports as currents first, then as voltages; scales are those of all ports together.
+            let scale = |values: &[f64]| values.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+            for (j, port) in lcs.ports.iter().enumerate() {
+                let current = format!("i({})", port.device);
+                let voltage = format!("v({})", port.device);
+                match (port.role, kind) {
+                    (Role::Current, Role::Current) => add(current, p[j], scale(p)),
+                    (Role::Voltage, Role::Current) => {
+                        add(current, through[j], scale(through.as_slice()));
+                    }
+                    (Role::Voltage, _) => add(voltage, -p[j], scale(p)),
+                    (Role::Current, _) => {
+                        add(voltage, -through[j], scale(through.as_slice()));
+                    }
+                    (Role::Function, _) => add(port.lambda.clone(), p[j], scale(p)),
+                }
+            }
+        }
+        let outputs = &lcs.outputs;
+        for (i, name) in outputs.names.iter().enumerate() {
+            let area = reading::impulse(&outputs.rows, i, p, step);
+            let size = (0..p.len())
+                .map(|j| {
+                    if i < outputs.rows.lambda.nrows() && j < outputs.rows.lambda.ncols() {
+                        (outputs.rows.lambda[(i, j)] * p[j]).abs()
+                    } else {
+                        0.0
+                    }
+                })
+                .fold(0.0, f64::max);
+            add(name.clone(), area, size);
+        }
+        for (name, area) in named {
+            log.impulse(t, name, area);
+        }
+    }
+
+    /// Whether a switch's control is beyond its threshold now.
+    pub(super) fn crossed(&mut self) -> Result<bool, SimError> {
+        if self.switches.needs_lambda() {
+            self.read_lambda()?;
+        }
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        let at = Point {
+            x: &self.now.x,
+            lambda: &self.lambda,
+            u: &self.now.u,
+            du: &self.du,
+        };
+        Ok(self.switches.update(lcs, at, false))
+    }
+
+    /// Flips the switches whose controls ask for it until none does, with the jumps this causes.
+    pub(super) fn switch(&mut self, log: &mut Log) -> Result<(), SimError> {
+        if log.wants_rows() {
+            self.log_row(log);
+        }
+        for _ in 0..2 + 2 * self.switches.len() {
+            if self.switches.needs_lambda() {
+                self.read_lambda()?;
+            }
+            let lcs = &self.plant.systems[self.now.system].1.lcs;
+            let at = Point {
+                x: &self.now.x,
+                lambda: &self.lambda,
+                u: &self.now.u,
+                du: &self.du,
+            };
+            let before = self.switches.position().to_vec();
+            if !self.switches.update(lcs, at, true) {
+                if log.wants_rows() {
+                    self.log_row(log);
+                }
+                return Ok(());
+            }
+            let names = self.switches.flipped(&before);
+            self.stats.events += 1;
+            log.event(self.now.t, names);
+            self.change_position(log)?;
+        }
+        Err(SimError::at(self.now.t, Reason::SwitchesDoNotSettle)
+            .device(self.switches.flipped(&[])))
+    }
+
+    /// Takes the storage over into the system of the present switch position.
+    pub(super) fn change_position(&mut self, log: &mut Log) -> Result<(), SimError> {
+        let old = self.system();
+        let s = old.storage(&self.now.x, &self.now.u);
+        let stored = energy::stored(&old.lcs, &self.now.x, &self.now.u);
+        let position = self.switches.position().to_vec();
+        let at = self
+            .plant
+            .system(&position, &self.inputs, self.now.t)
+            .map_err(|mut error| {
+                error.t = error.t.or(Some(self.now.t));
+                error
+            })?;
+        self.now.system = at;
+        let system = &self.plant.systems[at].1;
+        let x = system.state_from(&s);
+        self.now.x.clear();
+        self.now.x.extend(x.iter());
+        if self.now.active.len() != system.lcs.m() {
+            self.now.active = vec![false; system.lcs.m()];
+            self.now.pattern = vec![false; system.lcs.m()];
+        }
+        // What the instant of switching loses (net of what sources deliver in it) is dissipated.
+        let gain = energy::stored(&system.lcs, &self.now.x, &self.now.u) - stored;
+        self.now.balance.add((0.0, -gain));
+        self.resize();
+        self.switches.rebuild(&self.plant.systems[at].1.lcs);
+        let u = self.now.u.clone();
+        self.jump(&u, log)?;
+        self.find_mode()?;
+        self.pending.clear();
+        Ok(())
+    }
+}

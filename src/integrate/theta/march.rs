@@ -1,0 +1,236 @@
+//! From stop to stop in base steps, halved where the error or a switch asks for it.
+
+use super::*;
+
+impl Theta<'_> {
+    /// Advances to `stop`, which no breakpoint lies before; u is the left limit there.
+    pub(super) fn interval(&mut self, stop: f64, log: &mut Log) -> Result<(), SimError> {
+        let (t0, span) = (self.now.t, stop - self.now.t);
+        let longest = match self.stepping {
+            Stepping::Fixed(h) => h.min(self.longest),
+            Stepping::Controlled { .. } => self.longest.min(self.inputs.largest_step()),
+        };
+        // A quotient within rounding of an integer is that integer.
+        let count = (span / longest * (1.0 - 1e-9)).ceil().max(1.0);
+        let h = span / count;
+        let simple = self.control.is_none() && !self.switches.watch();
+        for k in 1..=count as u64 {
+            let t1 = if k as f64 == count {
+                stop
+            } else {
+                t0 + span * (k as f64 / count)
+            };
+            if simple {
+                self.attempt(h, t1)?;
+                let changed = self.attempt.solved.is_some();
+                let impulse = changed && self.impulsive(h)?;
+                self.finish_step(t1, impulse, log)?;
+            } else {
+                self.divided_step(h, t1, log)?;
+            }
+        }
+        self.switches.forget_chatter();
+        Ok(())
+    }
+
+    pub(super) fn finish_step(
+        &mut self,
+        t1: f64,
+        impulse: bool,
+        log: &mut Log,
+    ) -> Result<(), SimError> {
+        if impulse {
+            self.log_spontaneous(t1, log);
+        }
+        self.commit(t1)?;
+        if impulse {
+            self.now.settle = true;
+        }
+        if !self.pending.is_empty() {
+            self.report(log);
+        }
+        Ok(())
+    }
+
+    /// A base step with halving: for the error and to locate state-driven switchings.
+    pub(super) fn divided_step(
+        &mut self,
+        base: f64,
+        end: f64,
+        log: &mut Log,
+    ) -> Result<(), SimError> {
+        const WHOLE: u64 = 1 << FINEST;
+        let start = self.now.t;
+        let mut done = 0;
+        while done < WHOLE {
+            let wanted = (base / self.preferred)
+                .log2()
+                .ceil()
+                .clamp(0.0, f64::from(FINEST) - 1.0);
+            let aligned = if done == 0 {
+                0
+            } else {
+                FINEST - done.trailing_zeros()
+            };
+            let mut level = (wanted as u32).max(aligned);
+            loop {
+                let size = WHOLE >> level;
+                let h = base / 2_f64.powi(level as i32);
+                let t1 = if done + size == WHOLE {
+                    end
+                } else {
+                    start + base * ((done + size) as f64 / WHOLE as f64)
+                };
+                if self.tentative(h, t1, level, log)? {
+                    done += size;
+                    break;
+                }
+                self.stats.rejected += 1;
+                level += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// One step of a divided base step: `false` to have it halved, else it is done, with all its consequences.
+    pub(super) fn tentative(
+        &mut self,
+        h: f64,
+        t1: f64,
+        level: u32,
+        log: &mut Log,
+    ) -> Result<bool, SimError> {
+        self.kept.copy_from(&self.now);
+        let steps = self.stats.steps;
+        let mut last_chance = level + 2 >= FINEST;
+        if let Some(control) = &self.control {
+            last_chance |= h <= control.smallest();
+        }
+        let mut impulse = false;
+        if self.control.is_some() {
+            self.attempt(h, t1)?;
+            let n = self.now.x.len();
+            self.coarse.copy_from_slice(&self.out[..n]);
+            let middle = self.now.t + 0.5 * (t1 - self.now.t);
+            self.attempt(0.5 * h, middle)?;
+            self.commit(middle)?;
+            self.attempt(0.5 * h, t1)?;
+            if last_chance && self.attempt.solved.is_some() {
+                impulse = self.impulsive(0.5 * h)?;
+            }
+            self.commit(t1)?;
+            let error = self
+                .amplitudes
+                .error(&self.system().lcs, &self.coarse, &self.now.x);
+            let Some(control) = &self.control else {
+                return Ok(true);
+            };
+            let verdict = control.judge(h, error);
+            self.preferred = verdict.next;
+            if !verdict.accept && !last_chance {
+                self.back(steps);
+                return Ok(false);
+            }
+        } else {
+            self.preferred = f64::INFINITY;
+            self.attempt(h, t1)?;
+            self.commit(t1)?;
+        }
+        if self.switches.watch() && self.crossed()? {
+            if level < LOCATE && !last_chance && !self.switches.chattering(CHATTER) {
+                self.back(steps);
+                self.preferred = f64::INFINITY;
+                return Ok(false);
+            }
+            self.preferred = h;
+            self.report(log);
+            self.switch(log)?;
+        }
+        if impulse {
+            self.now.settle = true;
+        }
+        if self.control.is_some() {
+            let Self {
+                amplitudes,
+                plant,
+                now,
+                ..
+            } = self;
+            amplitudes.see(&plant.systems[now.system].1.lcs, &now.x);
+        }
+        self.report(log);
+        Ok(true)
+    }
+
+    pub(super) fn back(&mut self, steps: u64) {
+        self.now.copy_from(&self.kept);
+        self.stats.steps = steps;
+        self.pending.clear();
+        self.attempt.h = f64::NAN;
+    }
+
+    /// Moves pending mode changes into the log, with their rows.
+    pub(super) fn report(&mut self, log: &mut Log) {
+        for (t, what) in std::mem::take(&mut self.pending) {
+            self.stats.events += 1;
+            log.event(t, what);
+            if log.wants_rows() && t == self.now.t {
+                self.log_row(log);
+            }
+        }
+    }
+
+    /// Moves pending mode changes into the log where rows are written by the caller.
+    pub(super) fn report_quietly(&mut self, log: &mut Log) {
+        for (t, what) in self.pending.drain(..) {
+            self.stats.events += 1;
+            log.event(t, what);
+        }
+    }
+
+    pub(super) fn log_row(&mut self, log: &mut Log) {
+        let mut row = vec![0.0; self.system().lcs.outputs.names.len()];
+        self.read(&mut row);
+        log.row(self.now.t, &row);
+    }
+
+    /// Whether the attempted step of a network that may jump by itself contains an impulse: p = hλ is compared with that
+    /// of half the step from the same state. Passive networks jump only where sources or switches do.
+    pub(super) fn impulsive(&mut self, h: f64) -> Result<bool, SimError> {
+        let may = self
+            .system()
+            .jump
+            .as_ref()
+            .is_some_and(|jump| !jump.monotone);
+        if !may {
+            return Ok(false);
+        }
+        let whole: Vec<f64> = self.lambda.iter().map(|l| l * h).collect();
+        let (out, lambda, attempt) = (self.out.clone(), self.lambda.clone(), self.attempt.clone());
+        let middle = self.now.t + 0.5 * h;
+        let half = self.attempt(0.5 * h, middle);
+        let solved = self.attempt.solved.is_some();
+        let size = |p: &[f64]| p.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+        let part = if solved {
+            0.5 * h * size(&self.lambda)
+        } else {
+            0.0
+        };
+        self.out = out;
+        self.lambda = lambda;
+        self.attempt = attempt;
+        self.inputs.left(self.now.t + h, &mut self.u_next);
+        let system = &self.plant.systems[self.now.system].1;
+        system
+            .columns
+            .fill(&self.now.x, &self.u_next, &self.now.u, &mut self.z);
+        Ok(half.is_ok() && part > IMPULSE_RATIO * size(&whole))
+    }
+
+    pub(super) fn log_spontaneous(&mut self, t: f64, log: &mut Log) {
+        self.stats.jumps += 1;
+        let p: Vec<f64> = self.lambda.iter().map(|l| l * self.attempt.h).collect();
+        let still = vec![0.0; self.now.u.len()];
+        self.log_impulses(t, &p, &still, log);
+    }
+}

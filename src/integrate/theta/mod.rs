@@ -1,0 +1,354 @@
+//! The (θ, γ) stepper: Moreau's scheme, Siconos' θ-scheme, the midpoint rule; fixed or error-controlled steps.
+//!
+//! Between two stops (output times, edges and kinks of sources, switching times known in advance) the span is divided into
+//! equal base steps; a base step may be halved again and again, always at multiples of its halves, so that few step lengths
+//! occur and every one of them keeps its factorisations. A step first tries the active set of the last one: one fused product
+//! and a sign test. Where that fails, the step is solved with γ = 1 by the [`Driver`](crate::solve::Driver).
+
+mod attempt;
+mod jumps;
+mod march;
+mod right_limit;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeSet;
+
+use nalgebra::DVector;
+
+use crate::integrate::control::{Amplitudes, Control};
+use crate::integrate::energy::{self, Balance};
+use crate::integrate::inputs::Inputs;
+use crate::integrate::reading::{self, Point};
+use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
+use crate::integrate::stats::Stats;
+use crate::integrate::step::Scheme;
+use crate::integrate::switching::{Switches, Threshold};
+use crate::integrate::system::{Plant, Reduce, System};
+use crate::lcs::{Port, Role};
+use crate::settings::Settings;
+use crate::solve::{Solution, Status};
+
+/// How steps are chosen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Stepping {
+    /// Steps of this length, s (shortened so that they land on stops).
+    Fixed(f64),
+    /// Steps that keep the error over the span, s, within `Settings::tol`; the first is tried at `first` s.
+    Controlled {
+        /// The simulated span, s.
+        span: f64,
+        /// First step, s.
+        first: f64,
+    },
+}
+
+/// What a run of the stepper starts from.
+pub struct Setup<'a> {
+    /// Reduces the circuit for a switch position.
+    pub reduce: Reduce<'a>,
+    /// Start position of every switch.
+    pub position: Vec<bool>,
+    /// Thresholds of every switch.
+    pub thresholds: Vec<Threshold>,
+    /// Start time, s.
+    pub t: f64,
+    /// Where the run starts.
+    pub start: Start,
+    /// θ and γ.
+    pub scheme: Scheme,
+    /// Step choice.
+    pub stepping: Stepping,
+    /// No step is longer than this, s.
+    pub longest: f64,
+    /// Tolerances.
+    pub settings: Settings,
+}
+
+/// The state before t = 0+.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Start {
+    /// All capacitor voltages and inductor currents, s⁻.
+    Storage(DVector<f64>),
+    /// The state x of the first system.
+    State(DVector<f64>),
+}
+
+/// Sub-steps of a base step are multiples of 2^−FINEST of it.
+const FINEST: u32 = 40;
+/// State-driven switching times are located to 2^−LOCATE of a base step.
+const LOCATE: u32 = 24;
+/// Switchings in one base step after which they are no longer located but taken at the ends of whole base steps
+/// (chattering: the base step then decides how fast a sliding switch switches).
+const CHATTER: u32 = 32;
+/// λ at an output time is that of one implicit step shorter than the last one by 2^READ: its error is 2^−READ of the step's,
+/// the amplified rounding of the state 2^READ ε.
+const READ: i32 = 12;
+/// A spontaneous impulse is recognised by p = hλ that does not shrink with h: p(h/2) above this part of p(h), where
+/// a finite λ gives at most one half.
+const IMPULSE_RATIO: f64 = 0.75;
+
+/// See the [module](self).
+pub struct Theta<'a> {
+    plant: Plant<'a>,
+    inputs: Inputs,
+    switches: Switches,
+    scheme: Scheme,
+    stepping: Stepping,
+    longest: f64,
+    settings: Settings,
+    now: Now,
+    kept: Now,
+    started: bool,
+    preferred: f64,
+    last_h: f64,
+    u_next: Vec<f64>,
+    du: Vec<f64>,
+    z: Vec<f64>,
+    out: Vec<f64>,
+    lambda: Vec<f64>,
+    attempt: Attempt,
+    coarse: Vec<f64>,
+    control: Option<Control>,
+    stats: Stats,
+    modes: BTreeSet<(usize, Vec<bool>)>,
+    not_unique: BTreeSet<String>,
+    notes: Vec<String>,
+    pending: Vec<(f64, String)>,
+    /// Largest |s| so far, by storage element: what the error control calls the amplitude.
+    amplitudes: Amplitudes,
+}
+
+/// Everything a rejected step has to give back.
+#[derive(Debug, Clone, Default)]
+struct Now {
+    t: f64,
+    x: Vec<f64>,
+    /// Right limit of u at t.
+    u: Vec<f64>,
+    /// The index set the next step tries first.
+    active: Vec<bool>,
+    /// Which devices conducted at the last solve.
+    pattern: Vec<bool>,
+    /// The next step must have γ = 1: the constraints may not hold at t.
+    settle: bool,
+    system: usize,
+    balance: Balance,
+}
+
+impl Now {
+    fn copy_from(&mut self, other: &Self) {
+        self.x.clone_from(&other.x);
+        self.u.clone_from(&other.u);
+        self.active.clone_from(&other.active);
+        self.pattern.clone_from(&other.pattern);
+        self.t = other.t;
+        self.settle = other.settle;
+        self.system = other.system;
+        self.balance = other.balance;
+    }
+}
+
+/// How the present attempt was made.
+#[derive(Debug, Clone, Default)]
+struct Attempt {
+    step: usize,
+    mode: usize,
+    h: f64,
+    /// Basis and pattern after the step, where the solvers ran.
+    solved: Option<(Vec<bool>, Vec<Option<bool>>)>,
+}
+
+impl<'a> Theta<'a> {
+    /// A stepper at its start, before the jump at t = 0+.
+    ///
+    /// # Errors
+    /// The reduction's for the start position.
+    pub fn new(setup: Setup<'a>) -> Result<Self, SimError> {
+        let Setup {
+            mut reduce,
+            position,
+            thresholds,
+            t,
+            start,
+            scheme,
+            stepping,
+            longest,
+            settings,
+        } = setup;
+        let first = reduce(&position)?;
+        let inputs = Inputs::new(&first.inputs);
+        let mut plant = Plant::new(reduce, settings.lcp_residual);
+        let at = plant.system(&position, &inputs, t)?;
+        let u = inputs.all(t);
+        let system = &plant.systems[at].1;
+        let (x, storage) = match start {
+            Start::Storage(s) => (system.state_from(&s), s),
+            Start::State(x) => {
+                let s = system.storage(x.as_slice(), &u);
+                (x, s)
+            }
+        };
+        let metric = &system.lcs.storage.metric;
+        let stored = if metric.nrows() == storage.len() {
+            0.5 * storage.dot(&(metric * &storage))
+        } else {
+            energy::stored(&system.lcs, x.as_slice(), &u)
+        };
+        let now = Now {
+            t,
+            x: x.as_slice().to_vec(),
+            u: u.clone(),
+            active: vec![false; system.lcs.m()],
+            pattern: vec![false; system.lcs.m()],
+            settle: true,
+            system: at,
+            balance: Balance::new(stored),
+        };
+        let amplitudes = Amplitudes::new(&system.lcs, &inputs);
+        let switches = Switches::new(position, thresholds, &system.lcs);
+        let (control, preferred) = match stepping {
+            Stepping::Fixed(_) => (None, f64::INFINITY),
+            Stepping::Controlled { span, first } => {
+                (Some(Control::new(scheme, &settings, span)), first)
+            }
+        };
+        let mut theta = Self {
+            plant,
+            u_next: u.clone(),
+            du: vec![0.0; u.len()],
+            inputs,
+            switches,
+            scheme,
+            stepping,
+            longest,
+            settings,
+            kept: now.clone(),
+            now,
+            started: false,
+            preferred,
+            last_h: 0.0,
+            z: Vec::new(),
+            out: Vec::new(),
+            lambda: Vec::new(),
+            attempt: Attempt::default(),
+            coarse: Vec::new(),
+            control,
+            stats: Stats::default(),
+            modes: BTreeSet::new(),
+            not_unique: BTreeSet::new(),
+            notes: Vec::new(),
+            pending: Vec::new(),
+            amplitudes,
+        };
+        theta.resize();
+        Ok(theta)
+    }
+
+    /// Sets the amplitudes known beforehand, by storage element.
+    pub fn expect_amplitudes(&mut self, amplitudes: Amplitudes) {
+        self.amplitudes = amplitudes;
+    }
+
+    /// The amplitudes seen so far.
+    #[must_use]
+    pub fn amplitudes(&self) -> &Amplitudes {
+        &self.amplitudes
+    }
+
+    /// The state x of the present system.
+    #[must_use]
+    pub fn state(&self) -> &[f64] {
+        &self.now.x
+    }
+
+    /// The counters so far.
+    #[must_use]
+    pub fn stats(&self) -> &Stats {
+        &self.stats
+    }
+
+    fn system(&self) -> &System {
+        &self.plant.systems[self.now.system].1
+    }
+
+    /// Buffers for the present system.
+    fn resize(&mut self) {
+        let (n, m, width) = {
+            let system = self.system();
+            (system.lcs.n(), system.lcs.m(), system.columns.len())
+        };
+        self.z.resize(width, 0.0);
+        self.out.resize(n + m, 0.0);
+        self.lambda.clear();
+        self.lambda.resize(m, 0.0);
+        self.coarse.resize(n, 0.0);
+        self.attempt.h = f64::NAN;
+    }
+}
+
+impl Stepper for Theta<'_> {
+    fn time(&self) -> f64 {
+        self.now.t
+    }
+
+    fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), SimError> {
+        if !self.started {
+            self.begin(log)?;
+        }
+        while self.now.t < t {
+            let now = self.now.t;
+            let mut after = now;
+            let breakpoint = loop {
+                let next = self.inputs.next_breakpoint(after);
+                if next - now > Self::slack(next) || !next.is_finite() {
+                    break next;
+                }
+                after = next;
+            };
+            let known =
+                self.switches
+                    .next_known(&self.system().lcs, &self.inputs, now, breakpoint.min(t));
+            let mut stop = t.min(breakpoint);
+            if (t - breakpoint).abs() <= Self::slack(t) {
+                stop = t;
+            }
+            let switching = known.is_some_and(|k| k < stop - Self::slack(stop));
+            if switching && let Some(known) = known {
+                stop = known;
+            }
+            self.interval(stop, log)?;
+            let at_breakpoint = !switching && (breakpoint - stop).abs() <= Self::slack(stop);
+            if at_breakpoint {
+                self.edge(breakpoint.max(stop), log)?;
+            }
+            if !self.switches.is_empty() && (at_breakpoint || known.is_some()) && self.crossed()? {
+                self.switch(log)?;
+            }
+        }
+        self.note_energy();
+        Ok(())
+    }
+
+    fn read(&mut self, row: &mut [f64]) {
+        self.read_point(row);
+    }
+
+    fn finish(&mut self) -> Outcome {
+        self.note_energy();
+        self.stats.modes = self.modes.len().max(1) as u64;
+        let mut notes = self.notes.clone();
+        if !self.not_unique.is_empty() {
+            let names: Vec<&str> = self.not_unique.iter().map(String::as_str).collect();
+            notes.push(format!(
+                "currents through {} are not determined by the ideal model; the least-norm choice is shown",
+                names.join(", ")
+            ));
+        }
+        Outcome {
+            stats: self.stats.clone(),
+            energy: self.now.balance.energy(),
+            notes,
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! λ, probes and devices at the right limit of the present time.
+
+use super::*;
+
+impl Theta<'_> {
+    /// The step by which λ at the right limit is found, s.
+    pub(super) fn read_step(&self) -> f64 {
+        let base = match self.stepping {
+            _ if self.last_h > 0.0 => self.last_h,
+            Stepping::Fixed(h) => h.min(self.longest),
+            Stepping::Controlled { first, .. } => first,
+        };
+        base * 2_f64.powi(-READ)
+    }
+
+    /// z and the matrices of the short implicit step from now; slopes of the inputs go into `du`.
+    pub(super) fn prepare_read(&mut self) -> Result<usize, SimError> {
+        let h = self.read_step();
+        self.inputs.slopes(self.now.t, &mut self.du);
+        for ((next, u), du) in self.u_next.iter_mut().zip(&self.now.u).zip(&self.du) {
+            *next = u + h * du;
+        }
+        let Self {
+            plant,
+            now,
+            settings,
+            z,
+            ..
+        } = self;
+        let system = &mut plant.systems[now.system].1;
+        system.columns.fill(&now.x, &self.u_next, &now.u, z);
+        let (step, _) = system
+            .matrices(h, h * f64::EPSILON, Scheme::MOREAU, settings.lcp_residual)
+            .map_err(|reason| SimError::at(now.t, reason))?;
+        Ok(step)
+    }
+
+    /// The complementarity problem of the right limit of now, solved.
+    pub(super) fn right_limit(&mut self) -> Result<Solution, SimError> {
+        let step = self.prepare_read()?;
+        let Self {
+            plant,
+            now,
+            settings,
+            z,
+            ..
+        } = self;
+        let matrices = plant.systems[now.system].1.step_mut(step);
+        let q = matrices.q(z);
+        matrices.driver.suggest(&now.active);
+        let mut solution = matrices.driver.solve(&q);
+        if solution.status != Status::Solved {
+            let tolerance = settings.lcp_residual;
+            let reason = match solution.status {
+                Status::Infeasible(_) => Reason::Infeasible,
+                _ => Reason::Residual {
+                    residual: solution.residual,
+                    tolerance,
+                },
+            };
+            return Err(SimError::at(now.t, reason));
+        }
+        let (least, unique) = matrices.driver.least_norm(&q, &solution);
+        if !unique {
+            let lcs = &plant.systems[now.system].1.lcs;
+            let differs = (0..lcs.m()).filter(|&j| least[j] > 0.0 || solution.lambda[j] > 0.0);
+            self.not_unique
+                .extend(differs.map(|j| lcs.ports[j].device.clone()));
+            solution.lambda = least;
+        }
+        Ok(solution)
+    }
+
+    /// λ at the right limit of now, by one implicit step much shorter than the last.
+    pub(super) fn read_lambda(&mut self) -> Result<(), SimError> {
+        let m = self.lambda.len();
+        let step = self.prepare_read()?;
+        if m == 0 {
+            return Ok(());
+        }
+        let Self {
+            plant,
+            now,
+            z,
+            out,
+            lambda,
+            ..
+        } = self;
+        let system = &mut plant.systems[now.system].1;
+        let (mode, _) = system.mode(step, &now.active);
+        let n = now.x.len();
+        let fused = system.step(step).fused(mode);
+        if fused.regular && fused.step(z, n, out) {
+            fused.lambda(&out[n..], lambda);
+            return Ok(());
+        }
+        let solution = self.right_limit()?;
+        self.lambda.copy_from_slice(solution.lambda.as_slice());
+        Ok(())
+    }
+
+    pub(super) fn read_point(&mut self, row: &mut [f64]) {
+        // A circuit whose right limit has no solution fails in its next step, with its message; until then the last λ.
+        if self.read_lambda().is_err() {
+            self.lambda.fill(0.0);
+        }
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        let at = Point {
+            x: &self.now.x,
+            lambda: &self.lambda,
+            u: &self.now.u,
+            du: &self.du,
+        };
+        for (i, value) in row.iter_mut().enumerate() {
+            *value = reading::value(&lcs.outputs.rows, i, at);
+        }
+    }
+
+    pub(super) fn note_energy(&mut self) {
+        let stored = energy::stored(&self.system().lcs, &self.now.x, &self.now.u);
+        self.now.balance.note(stored);
+    }
+}

@@ -1,0 +1,580 @@
+//! From the circuit to the equations of its static multiport.
+
+use petgraph::unionfind::UnionFind;
+
+use super::couple::{self, Winding};
+use super::{
+    Behaviour, Coefficient, Column, Equation, Observed, Pair, Power, SourcePort, StoragePort,
+    SwitchPort,
+};
+use crate::algebra::Value;
+use crate::circuit::{Affine, Circuit, ElementId, Kind, NodeId, Output, Probed, Quantity};
+use crate::diagnostic::{Diagnostic, Severity};
+use crate::lcs::{Input, Port, PowerKind, Role};
+
+/// What is known of an element's two quantities while assembling.
+#[derive(Clone)]
+struct Branch {
+    /// Its current as a combination of columns.
+    current: Equation,
+}
+
+struct Assembly<'a> {
+    circuit: &'a Circuit,
+    out: Behaviour,
+    potential: Vec<Option<Column>>,
+    branches: Vec<Branch>,
+    kcl: Vec<Equation>,
+}
+
+/// The behaviour of a circuit's static multiport.
+///
+/// # Errors
+///
+/// Every fault of the circuit that needs no reduction to see: no ground, impossible couplings.
+pub fn behaviour(circuit: &Circuit) -> Result<Behaviour, Vec<Diagnostic>> {
+    let mut faults = Vec::new();
+    let mut out = Behaviour {
+        title: circuit.title.clone(),
+        ..Behaviour::default()
+    };
+    out.column("1");
+    let reference = references(circuit, &mut out.notes);
+    let potential: Vec<Option<Column>> = circuit
+        .nodes
+        .iter()
+        .enumerate()
+        .map(|(n, name)| {
+            (!reference[n]).then(|| {
+                let column = out.column(format!("v({name})"));
+                out.internal.push(column);
+                column
+            })
+        })
+        .collect();
+    let mut assembly = Assembly {
+        circuit,
+        out,
+        potential,
+        branches: Vec::new(),
+        kcl: vec![Vec::new(); circuit.nodes.len()],
+    };
+    let windings = match couple::couple(circuit) {
+        Ok(windings) => windings,
+        Err(found) => {
+            faults.extend(found);
+            Vec::new()
+        }
+    };
+    if faults
+        .iter()
+        .any(|f: &Diagnostic| f.severity == Severity::Error)
+    {
+        return Err(faults);
+    }
+    assembly.branches(&windings);
+    assembly.outputs();
+    for (n, equation) in std::mem::take(&mut assembly.kcl).into_iter().enumerate() {
+        if assembly.potential[n].is_some() && !equation.is_empty() {
+            assembly.out.equations.push(equation);
+        }
+    }
+    assembly.observe();
+    Ok(assembly.out)
+}
+
+/// Which nodes are references: ground and the first node of each island. Terminals are joined by every element; a
+/// controlled source joins its output terminals only.
+fn references(circuit: &Circuit, notes: &mut Vec<Diagnostic>) -> Vec<bool> {
+    let mut sets = UnionFind::<usize>::new(circuit.nodes.len());
+    for element in &circuit.elements {
+        sets.union(element.p.index(), element.n.index());
+    }
+    let mut reference = vec![false; circuit.nodes.len()];
+    let mut seen = vec![false; circuit.nodes.len()];
+    for n in 0..circuit.nodes.len() {
+        let root = sets.find(n);
+        if !seen[root] {
+            seen[root] = true;
+            reference[n] = true;
+            if n > 0 {
+                let members: Vec<&str> = (n..circuit.nodes.len())
+                    .filter(|&k| sets.find(k) == root)
+                    .map(|k| circuit.nodes[k].as_str())
+                    .collect();
+                notes.push(Diagnostic::note(
+                    "island",
+                    None,
+                    format!(
+                        "no path from ground to {}: potentials there are relative to node `{}`",
+                        list("node", &members),
+                        circuit.nodes[n]
+                    ),
+                ));
+            }
+        }
+    }
+    reference
+}
+
+fn list(noun: &str, names: &[&str]) -> String {
+    let shown: Vec<String> = names.iter().take(4).map(|n| format!("`{n}`")).collect();
+    let more = names.len().saturating_sub(4);
+    let plural = if names.len() == 1 { "" } else { "s" };
+    let tail = if more > 0 {
+        format!(" and {more} more")
+    } else {
+        String::new()
+    };
+    format!("{noun}{plural} {}{tail}", shown.join(", "))
+}
+
+impl Assembly<'_> {
+    fn voltage(&self, p: NodeId, n: NodeId) -> Equation {
+        let mut terms = Vec::with_capacity(2);
+        if p != n {
+            terms.extend(self.potential[p.index()].map(|c| (Coefficient::ONE, c)));
+            terms.extend(self.potential[n.index()].map(|c| (Coefficient::MINUS_ONE, c)));
+        }
+        terms
+    }
+
+    fn internal(&mut self, name: String) -> Column {
+        let column = self.out.column(name);
+        self.out.internal.push(column);
+        column
+    }
+
+    /// The current enters the element at `p` and leaves it at `n`.
+    fn through(&mut self, p: NodeId, n: NodeId, current: &Equation) {
+        for &(coefficient, column) in current {
+            self.kcl[p.index()].push((coefficient, column));
+            self.kcl[n.index()].push((coefficient.negated(), column));
+        }
+    }
+
+    /// States `column = v(p) − v(n)`.
+    fn branch_voltage(&mut self, column: Column, p: NodeId, n: NodeId) {
+        let mut equation = self.voltage(p, n);
+        equation.push((Coefficient::MINUS_ONE, column));
+        self.out.equations.push(equation);
+    }
+
+    fn branches(&mut self, windings: &[Winding]) {
+        for index in 0..self.circuit.elements.len() {
+            let circuit = self.circuit;
+            let element = &circuit.elements[index];
+            let (name, p, n) = (&element.name, element.p, element.n);
+            let current: Equation = match &element.kind {
+                Kind::Resistor(ohms) if ohms.f64 == 0.0 => {
+                    let i = self.internal(format!("i({name})"));
+                    let short = self.voltage(p, n);
+                    if short.is_empty() {
+                        self.out.equations.push(vec![(Coefficient::ONE, i)]);
+                    } else {
+                        self.out.equations.push(short);
+                    }
+                    vec![(Coefficient::ONE, i)]
+                }
+                Kind::Resistor(ohms) => self
+                    .voltage(p, n)
+                    .into_iter()
+                    .map(|(c, col)| {
+                        let minus = c == Coefficient::MINUS_ONE;
+                        (
+                            if minus {
+                                Coefficient::MinusInverse(*ohms)
+                            } else {
+                                Coefficient::Inverse(*ohms)
+                            },
+                            col,
+                        )
+                    })
+                    .collect(),
+                Kind::Capacitor(farads) => {
+                    let (v, i) = (
+                        self.out.column(format!("v({name})")),
+                        self.out.column(format!("i({name})")),
+                    );
+                    self.branch_voltage(v, p, n);
+                    if farads.f64 == 0.0 {
+                        self.out.internal.push(v);
+                        self.out.internal.push(i);
+                        self.out.equations.push(vec![(Coefficient::ONE, i)]);
+                    } else {
+                        let k = self.out.storage.len();
+                        self.out.metric.push((k, k, Coefficient::Plus(*farads)));
+                        self.out.storage.push(StoragePort {
+                            name: format!("v({name})"),
+                            element: name.clone(),
+                            capacitor: true,
+                            state: v,
+                            flow: i,
+                            initial: element.ic,
+                        });
+                    }
+                    vec![(Coefficient::ONE, i)]
+                }
+                Kind::Inductor(henries) => {
+                    let i = self.internal(format!("i({name})"));
+                    if henries.f64 == 0.0 {
+                        let short = self.voltage(p, n);
+                        self.out.equations.push(if short.is_empty() {
+                            vec![(Coefficient::ONE, i)]
+                        } else {
+                            short
+                        });
+                    }
+                    vec![(Coefficient::ONE, i)]
+                }
+                Kind::VoltageSource(source) | Kind::CurrentSource(source) => {
+                    let (v, i) = (
+                        self.out.column(format!("v({name})")),
+                        self.out.column(format!("i({name})")),
+                    );
+                    self.branch_voltage(v, p, n);
+                    let is_voltage = matches!(element.kind, Kind::VoltageSource(_));
+                    self.out.sources.push(SourcePort {
+                        input: Input {
+                            name: name.clone(),
+                            unit: if is_voltage { "V" } else { "A" },
+                            source: source.clone(),
+                        },
+                        value: if is_voltage { v } else { i },
+                        other: if is_voltage { i } else { v },
+                    });
+                    vec![(Coefficient::ONE, i)]
+                }
+                Kind::Device(law) => {
+                    // The reverse voltage −v and the forward current i.
+                    let reverse = self.out.column(format!("-v({name})"));
+                    let i = self.out.column(format!("i({name})"));
+                    self.branch_voltage(reverse, n, p);
+                    self.out.pairs.push(Pair {
+                        port: Port {
+                            device: name.clone(),
+                            role: Role::Current,
+                            lambda: format!("i({name})"),
+                            y: format!("-v({name})"),
+                            law: law.clone(),
+                        },
+                        reverse,
+                        forward: i,
+                        fixed_role: false,
+                        reverse_name: format!("-v({name})"),
+                        forward_name: format!("i({name})"),
+                        units: ("V", "A"),
+                    });
+                    vec![(Coefficient::ONE, i)]
+                }
+                Kind::Switch(switch) => {
+                    let (v, i) = (
+                        self.out.column(format!("v({name})")),
+                        self.out.column(format!("i({name})")),
+                    );
+                    self.branch_voltage(v, p, n);
+                    self.out.switches.push(SwitchPort {
+                        name: name.clone(),
+                        v,
+                        i,
+                        ron: switch.ron,
+                        roff: switch.roff,
+                        on_above: switch.on_above,
+                        off_below: switch.off_below,
+                        initial: switch.initial,
+                        control: usize::MAX,
+                    });
+                    vec![(Coefficient::ONE, i)]
+                }
+                Kind::Controlled { .. } => {
+                    let i = self.internal(format!("i({name})"));
+                    vec![(Coefficient::ONE, i)]
+                }
+                Kind::Function { output, .. } => {
+                    let (y, out) = (
+                        self.out.column(format!("{name}.in")),
+                        self.out.column(format!("{name}.out")),
+                    );
+                    self.out.pairs.push(Pair {
+                        port: Port {
+                            device: name.clone(),
+                            role: Role::Function,
+                            lambda: format!("{name}.out"),
+                            y: self.input_name(element),
+                            law: self.law(element),
+                        },
+                        reverse: y,
+                        forward: out,
+                        fixed_role: true,
+                        reverse_name: self.input_name(element),
+                        forward_name: format!("{name}.out"),
+                        units: ("V", if *output == Output::Voltage { "V" } else { "A" }),
+                    });
+                    let current = match output {
+                        Output::Voltage => {
+                            self.branch_voltage(out, p, n);
+                            self.internal(format!("i({name})"))
+                        }
+                        Output::Current => out,
+                    };
+                    vec![(Coefficient::ONE, current)]
+                }
+            };
+            self.through(p, n, &current);
+            self.branches.push(Branch { current });
+        }
+        self.windings(windings);
+    }
+
+    /// Inductor ports: for the basis windings of a coupled group the flux-state current, for the dependent ones an
+    /// ideal transformer.
+    fn windings(&mut self, windings: &[Winding]) {
+        for winding in windings {
+            let element = &self.circuit.elements[winding.element.index()];
+            let own: Equation = self.branches[winding.element.index()].current.clone();
+            if let Some(ratios) = &winding.transformer {
+                // v_d − Σ t_dj v_j = 0
+                let mut equation = self.voltage(element.p, element.n);
+                for &(ratio, j) in ratios {
+                    let other = &self.circuit.elements[windings[j].element.index()];
+                    for (c, column) in self.voltage(other.p, other.n) {
+                        equation.push((
+                            if c == Coefficient::ONE {
+                                ratio.negated()
+                            } else {
+                                ratio
+                            },
+                            column,
+                        ));
+                    }
+                }
+                self.out.equations.push(equation);
+                continue;
+            }
+            let name = &element.name;
+            let (v, i) = (
+                self.out.column(format!("v({name})")),
+                self.out.column(format!("i({name}).flux")),
+            );
+            self.branch_voltage(v, element.p, element.n);
+            // i_m = i + Σ_d t_dj i_d
+            let mut equation = own;
+            for &(ratio, d) in &winding.carries {
+                for &(_, column) in &self.branches[windings[d].element.index()].current {
+                    equation.push((ratio, column));
+                }
+            }
+            equation.push((Coefficient::MINUS_ONE, i));
+            self.out.equations.push(equation);
+            self.out.storage.push(StoragePort {
+                name: format!("i({name})"),
+                element: name.clone(),
+                capacitor: false,
+                state: i,
+                flow: v,
+                initial: winding.initial,
+            });
+        }
+        // The metric of the inductors, in the order in which the basis windings were pushed.
+        let first =
+            self.out.storage.len() - windings.iter().filter(|w| w.transformer.is_none()).count();
+        let basis: Vec<&Winding> = windings
+            .iter()
+            .filter(|w| w.transformer.is_none())
+            .collect();
+        for (a, winding) in basis.iter().enumerate() {
+            for &(value, j) in &winding.inductance {
+                let b = basis
+                    .iter()
+                    .position(|w| w.element == windings[j].element)
+                    .unwrap_or(a);
+                self.out.metric.push((first + a, first + b, value));
+            }
+        }
+    }
+
+    fn input_name(&self, element: &crate::circuit::Element) -> String {
+        match &element.kind {
+            Kind::Function { input, .. } => match input.terms.as_slice() {
+                [(g, Quantity::Voltage(a))] if g.f64 == 1.0 => {
+                    format!("v({})", self.circuit.nodes[a.index()])
+                }
+                [(g, Quantity::Voltage(a)), (h, Quantity::Voltage(b))]
+                    if g.f64 == 1.0 && h.f64 == -1.0 =>
+                {
+                    format!(
+                        "v({},{})",
+                        self.circuit.nodes[a.index()],
+                        self.circuit.nodes[b.index()]
+                    )
+                }
+                _ => format!("{}.in", element.name),
+            },
+            _ => String::new(),
+        }
+    }
+
+    fn law(&self, element: &crate::circuit::Element) -> crate::law::Law {
+        match &element.kind {
+            Kind::Function { law, .. } | Kind::Device(law) => law.clone(),
+            _ => crate::law::Law::ideal_diode(),
+        }
+    }
+
+    fn affine(&self, affine: &Affine) -> Equation {
+        let mut equation = Equation::new();
+        let scaled = |gain: Value, c: Coefficient| match c {
+            Coefficient::MINUS_ONE => Coefficient::Minus(gain),
+            _ => Coefficient::Plus(gain),
+        };
+        for &(gain, quantity) in &affine.terms {
+            match quantity {
+                Quantity::Voltage(node) => {
+                    equation
+                        .extend(self.potential[node.index()].map(|c| (Coefficient::Plus(gain), c)));
+                }
+                Quantity::Current(element) => {
+                    for (c, column) in self.current(element) {
+                        equation.push((scaled(gain, c), column));
+                    }
+                }
+            }
+        }
+        if affine.constant != 0.0 {
+            equation.push((
+                Coefficient::Plus(Value::binary(affine.constant)),
+                Behaviour::ONE,
+            ));
+        }
+        equation
+    }
+
+    /// The current of an element as ±1 combination of columns (a resistor's gets its own column in `outputs`).
+    fn current(&self, element: ElementId) -> Equation {
+        self.branches[element.index()].current.clone()
+    }
+
+    /// Gives every resistor whose current controls something a column of its own, then states controlled outputs.
+    fn outputs(&mut self) {
+        let circuit = self.circuit;
+        let affines = circuit.elements.iter().filter_map(|e| match &e.kind {
+            Kind::Controlled { control, .. } => Some(control),
+            Kind::Function { input, .. } => Some(input),
+            Kind::Switch(s) => Some(&s.control),
+            _ => None,
+        });
+        let controls: Vec<ElementId> = affines
+            .flat_map(|a| a.terms.iter())
+            .filter_map(|(_, q)| match q {
+                Quantity::Current(e) => Some(*e),
+                Quantity::Voltage(_) => None,
+            })
+            .collect();
+        for element in controls {
+            let k = element.index();
+            if matches!(circuit.elements[k].kind, Kind::Resistor(v) if v.f64 != 0.0)
+                && self.branches[k].current.len() != 1
+                || self.branches[k]
+                    .current
+                    .iter()
+                    .any(|(c, _)| !matches!(*c, Coefficient::ONE))
+            {
+                let column = self.internal(format!("i({})", circuit.elements[k].name));
+                let mut equation = self.branches[k].current.clone();
+                equation.push((Coefficient::MINUS_ONE, column));
+                self.out.equations.push(equation);
+                self.branches[k].current = vec![(Coefficient::ONE, column)];
+            }
+        }
+        for (k, element) in circuit.elements.iter().enumerate() {
+            match &element.kind {
+                Kind::Controlled { output, control } => {
+                    let mut equation = match output {
+                        Output::Voltage => self.voltage(element.p, element.n),
+                        Output::Current => self.branches[k].current.clone(),
+                    };
+                    equation.extend(
+                        self.affine(control)
+                            .into_iter()
+                            .map(|(c, col)| (c.negated(), col)),
+                    );
+                    self.out.equations.push(equation);
+                }
+                Kind::Function { input, .. } => {
+                    let y = self
+                        .out
+                        .pairs
+                        .iter()
+                        .find(|p| p.port.device == element.name)
+                        .map(|p| p.reverse);
+                    if let Some(y) = y {
+                        let mut equation = self.affine(input);
+                        equation.push((Coefficient::MINUS_ONE, y));
+                        self.out.equations.push(equation);
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn observed(&mut self, name: String, unit: &'static str, mut equation: Equation) -> usize {
+        let column = self.out.column(name.clone());
+        equation.push((Coefficient::MINUS_ONE, column));
+        self.out.equations.push(equation);
+        self.out.observed.push(Observed { name, unit, column });
+        self.out.observed.len() - 1
+    }
+
+    /// Probes, switch controls and the two factors of every power.
+    fn observe(&mut self) {
+        let circuit = self.circuit;
+        for probe in circuit.probes() {
+            let (unit, equation) = match probe.what {
+                Probed::Voltage(a, b) => ("V", self.voltage(a, b)),
+                Probed::Current(e) => ("A", self.current(e)),
+            };
+            self.observed(probe.name, unit, equation);
+        }
+        self.out.probes = self.out.observed.len();
+        for k in 0..self.out.switches.len() {
+            let name = self.out.switches[k].name.clone();
+            let control = circuit
+                .elements
+                .iter()
+                .find(|e| e.name == name)
+                .and_then(|e| match &e.kind {
+                    Kind::Switch(s) => Some(&s.control),
+                    _ => None,
+                });
+            let equation = control.map(|c| self.affine(c)).unwrap_or_default();
+            self.out.switches[k].control = self.observed(format!("{name}.control"), "V", equation);
+        }
+        for (k, element) in circuit.elements.iter().enumerate() {
+            let kind = match &element.kind {
+                Kind::Capacitor(_) | Kind::Inductor(_) => continue,
+                Kind::VoltageSource(_)
+                | Kind::CurrentSource(_)
+                | Kind::Controlled { .. }
+                | Kind::Function { .. } => PowerKind::Source,
+                Kind::Resistor(_) | Kind::Device(_) | Kind::Switch(_) => PowerKind::Dissipated,
+            };
+            let v = self.observed(
+                format!("v({})", element.name),
+                "V",
+                self.voltage(element.p, element.n),
+            );
+            let i = self.observed(
+                format!("i({})", element.name),
+                "A",
+                self.branches[k].current.clone(),
+            );
+            self.out.power.push(Power {
+                element: element.name.clone(),
+                kind,
+                v,
+                i,
+            });
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! D, S, W, X, and the letters that are only recognised.
+
+use nom::Input as _;
+
+use super::{Body, assignment_follows, assigns, describe, expr, nodes};
+use crate::diagnostic::Diagnostic;
+use crate::netlist::ast::{Control, Device, Name};
+use crate::netlist::lex::{
+    Input, Parsed, ahead, at_end, expect_word, missing, node, refuse, separator, symbol, word,
+};
+
+/// `D1 a k model [area] [off] [ic=…]`.
+pub(super) fn diode<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
+    let (at, nodes) = nodes(i, 2, "node")?;
+    let (at, model) = expect_word(at, "the model name")?;
+    let numeric = blank_number(at) && !assignment_follows(at);
+    let (at, area) = if numeric {
+        let (at, value) = expr::value(at)?;
+        (at, Some(value))
+    } else {
+        (at, None)
+    };
+    let (at, args) = assigns(at)?;
+    Ok((at, (nodes, Device::Diode { model, area, args })))
+}
+
+fn blank_number(at: Input<'_>) -> bool {
+    separator(at)
+        .fragment()
+        .starts_with(|c: char| c.is_ascii_digit() || matches!(c, '.' | '{' | '\''))
+}
+
+/// `S1 p n cp cn model [on|off]`.
+pub(super) fn voltage_switch<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
+    let (at, own) = nodes(i, 2, "node")?;
+    let (at, control) = nodes(at, 2, "controlling node")?;
+    let mut control = control.into_iter();
+    let pair = control.next().zip(control.next());
+    switch(
+        at,
+        own,
+        Control::Nodes(pair.into_iter().collect(), Vec::new()),
+    )
+}
+
+/// `W1 p n vsense model [on|off]`.
+pub(super) fn current_switch<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
+    let (at, own) = nodes(i, 2, "node")?;
+    let (at, source) = nodes(at, 1, "controlling voltage source")?;
+    switch(at, own, Control::Currents(source, Vec::new()))
+}
+
+fn switch(at: Input<'_>, own: Vec<Name>, control: Control) -> Parsed<'_, Body> {
+    let (mut at, model) = expect_word(at, "the model name")?;
+    let mut initial = None;
+    if let Ok((rest, name)) = word(at) {
+        match name.text.as_str() {
+            "on" => (at, initial) = (rest, Some(true)),
+            "off" => (at, initial) = (rest, Some(false)),
+            _ => {}
+        }
+    }
+    Ok((
+        at,
+        (
+            own,
+            Device::Switch {
+                control,
+                model,
+                initial,
+            },
+        ),
+    ))
+}
+
+/// `X1 nodes subckt [params:] name=value …`.
+pub(super) fn call<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
+    let mut words: Vec<Name> = Vec::new();
+    let mut at = i;
+    loop {
+        at = separator(at);
+        if at_end(at) || assignment_follows(at) {
+            break;
+        }
+        if let Some(rest) = symbol(at, '(').or_else(|| symbol(at, ')')) {
+            at = rest;
+            continue;
+        }
+        let (rest, one) = node(at).map_err(|_| missing(at, "a node or the subcircuit"))?;
+        at = rest;
+        if matches!(one.text.as_str(), "params:" | "param:") {
+            break;
+        }
+        words.push(one);
+    }
+    let Some(subckt) = words.pop() else {
+        return Err(refuse(
+            Diagnostic::error(
+                "missing",
+                ahead(i, i.fragment().len()),
+                format!("`{}` names no subcircuit", name.text),
+            )
+            .label("nodes and the name of a subcircuit should follow"),
+        ));
+    };
+    let (at, args) = assigns(at)?;
+    if let Some(flag) = args.iter().find(|a| a.value.is_none()) {
+        return Err(refuse(
+            Diagnostic::error(
+                "unexpected",
+                flag.name.span,
+                format!("unexpected `{}`", flag.name.text),
+            )
+            .label("expected `name=value`"),
+        ));
+    }
+    Ok((at, (words, Device::Call { subckt, args })))
+}
+
+/// A card that is recognised but not supported.
+pub(super) fn unsupported<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
+    let what = describe(name.text.chars().next().unwrap_or(' '));
+    let length = i.fragment().len();
+    Ok((
+        i.take_from(length),
+        (Vec::new(), Device::Unsupported { what }),
+    ))
+}

@@ -1,0 +1,124 @@
+//! R, C, L and K.
+
+use nom::Input as _;
+
+use super::{Body, assignment_follows, assigns, expr, nodes};
+use crate::diagnostic::Diagnostic;
+use crate::netlist::ast::{Device, Expr, ExprKind, Name};
+use crate::netlist::lex::{
+    Input, Parsed, ahead, at_end, missing, next_word, refuse, separator, tell,
+};
+
+/// `R1 a b 1k`, `R1 a b R=1k`, `R1 a b {r} model tc1=…`.
+pub(super) fn passive<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
+    let (mut at, nodes) = nodes(i, 2, "node")?;
+    let mut values: Vec<Expr> = Vec::new();
+    while values.len() < 2 && !at_end(at) && !assignment_follows(at) {
+        let (rest, value) = expr::value(at).map_err(|e| match e {
+            nom::Err::Error(_) => missing(at, "a value"),
+            e => e,
+        })?;
+        warn_of_suffix(at, name, &value);
+        values.push(value);
+        at = rest;
+    }
+    if values.is_empty() && at_end(at) {
+        let (a, b) = (&nodes[0].text, &nodes[1].text);
+        return Err(refuse(
+            Diagnostic::error(
+                "missing",
+                next_word(at),
+                format!("`{}` has no value", name.text),
+            )
+            .label("a value should follow")
+            .help(format!(
+                "`{a}` and `{b}` were read as its nodes; write `{} {a} {b} VALUE`",
+                name.text
+            )),
+        ));
+    }
+    let (at, args) = assigns(at)?;
+    Ok((at, (nodes, Device::Passive { values, args })))
+}
+
+/// Capital suffixes that SPICE reads otherwise than people do: 1M Ω is 1 mΩ, 1F is 1 fF.
+fn warn_of_suffix(at: Input<'_>, name: &Name, value: &Expr) {
+    let at = separator(at);
+    let ExprKind::Number(number) = &value.kind else {
+        return;
+    };
+    let written = &at.fragment()[..value.span.end - value.span.start];
+    let Some(last) = written.chars().next_back() else {
+        return;
+    };
+    let digits = &written[..written.len() - last.len_utf8()];
+    if number.f64 == 0.0 || !digits.ends_with(|c: char| c.is_ascii_digit() || c == '.') {
+        return;
+    }
+    let finding = match (name.text.chars().next(), last) {
+        (Some('r'), 'M') => (
+            "suffix-m",
+            "milli",
+            format!("write `{digits}Meg` for {digits} MΩ, `{digits}m` for {digits} mΩ"),
+        ),
+        (Some('c'), 'F') => (
+            "suffix-f",
+            "femto",
+            format!("write `{digits}` for {digits} F, `{digits}f` for {digits} fF"),
+        ),
+        _ => return,
+    };
+    let message = format!("`{written}` is {digits} {}", finding.1);
+    tell(
+        at,
+        Diagnostic::warning(finding.0, value.span, message)
+            .label("SPICE suffixes know no capitals")
+            .help(finding.2),
+    );
+}
+
+/// `K1 L1 L2 0.99`, `K1 (L1 L2 L3) {k}`.
+pub(super) fn coupling<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
+    let mut all: Vec<Expr> = Vec::new();
+    let mut at = i;
+    loop {
+        at = separator(at);
+        if at.fragment().starts_with(['(', ')']) {
+            at = at.take_from(1);
+        } else if at_end(at) {
+            break;
+        } else {
+            let (rest, value) = expr::item(at).map_err(|e| match e {
+                nom::Err::Error(_) => missing(at, "an inductor or the coefficient"),
+                e => e,
+            })?;
+            all.push(value);
+            at = rest;
+        }
+    }
+    let Some(k) = all.pop().filter(|_| all.len() >= 2) else {
+        return Err(refuse(
+            Diagnostic::error(
+                "missing",
+                ahead(i, i.fragment().trim_end().len()),
+                format!("`{}` is incomplete", name.text),
+            )
+            .label("needs two inductors and the coefficient")
+            .help(format!("write `{} L1 L2 0.99`", name.text)),
+        ));
+    };
+    let mut inductors = Vec::with_capacity(all.len());
+    for one in all {
+        let ExprKind::Name(text) = one.kind else {
+            return Err(refuse(
+                Diagnostic::error("bad-name", one.span, "this is not the name of an inductor")
+                    .label("expected an inductor"),
+            ));
+        };
+        inductors.push(Name {
+            text,
+            span: one.span,
+        });
+    }
+    Ok((at, (Vec::new(), Device::Coupling { inductors, k })))
+}

@@ -1,0 +1,620 @@
+//! Files to blocks of cards: includes, libraries, subcircuits, conditionals, `.control`.
+
+use std::io;
+use std::path::{Component, Path, PathBuf};
+
+use super::ast::{Block, Branch, Netlist, Statement, Subckt};
+use super::dot::{self, Dot};
+use super::lex::{Fault, Line, Parsed, State, at_end, input, logical, next_word, title, word};
+use super::{card, decode};
+use crate::diagnostic::{Diagnostic, FileId, Severity, SourceMap, Span};
+
+/// Deepest nesting of includes.
+const MAX_INCLUDES: usize = 32;
+/// Most files in one netlist.
+const MAX_FILES: usize = 512;
+/// Most bytes in one netlist.
+const MAX_BYTES: usize = 256 << 20;
+/// Deepest nesting of `.subckt` and `.if`.
+const MAX_BLOCKS: usize = 64;
+
+/// Reads a netlist: text to cards, includes in place. Never stops at the first fault.
+///
+/// `root` is a file of `sources` already; `loader` gives the bytes of included files, whose paths are relative to the
+/// file that includes them. Faults inside a subcircuit or a branch of `.if` stay with it: they are errors only if it
+/// is used.
+pub fn parse(
+    sources: &mut SourceMap,
+    root: FileId,
+    loader: &dyn Fn(&Path) -> io::Result<Vec<u8>>,
+) -> (Netlist, Vec<Diagnostic>) {
+    let file = &sources.files[root.0 as usize];
+    let (path, text) = (PathBuf::from(&file.path), file.text.clone());
+    let first = title(&text);
+    let end = Span {
+        file: root,
+        start: text.trim_end().len().saturating_sub(1),
+        end: text.trim_end().len(),
+    };
+    let mut netlist = Netlist {
+        title: String::new(),
+        body: Block::default(),
+        end,
+    };
+
+    let title_span = Span {
+        file: root,
+        start: first.start,
+        end: first.end,
+    };
+    if let Some(foreign) = decode::foreign(&text, title_span) {
+        netlist.body.faults.push(foreign.clone());
+        return (netlist, vec![foreign]);
+    }
+    let mut reader = Reader {
+        sources,
+        loader,
+        open: vec![Open {
+            kind: OpenKind::Root,
+            block: Block::default(),
+            span: end,
+        }],
+        files: vec![lexical(&path)],
+        bytes: text.len(),
+        skipped: Vec::new(),
+        title: None,
+    };
+    reader.title_line(&text, title_span);
+    let (lines, orphans) = logical(root, &text, first.end);
+    for span in orphans {
+        reader.tell(
+            Diagnostic::error("unexpected", span, "there is no card to continue")
+                .label("a line that begins with `+` continues the card above"),
+        );
+    }
+    reader.lines(&lines, &path);
+    reader.close_all();
+    reader.note_skipped();
+
+    netlist.title = reader.title.take().unwrap_or_default();
+    netlist.body = reader.open.pop().map(|o| o.block).unwrap_or_default();
+    let findings = netlist.body.faults.clone();
+    (netlist, findings)
+}
+
+/// A block being read.
+struct Open {
+    kind: OpenKind,
+    block: Block,
+    span: Span,
+}
+
+enum OpenKind {
+    Root,
+    Subckt(Box<Subckt>),
+    /// The branches read so far; the current one is in `block`, with its condition last here.
+    If(Vec<Branch>),
+}
+
+struct Reader<'a> {
+    sources: &'a mut SourceMap,
+    loader: &'a dyn Fn(&Path) -> io::Result<Vec<u8>>,
+    open: Vec<Open>,
+    /// The files being read, from the root inwards.
+    files: Vec<PathBuf>,
+    bytes: usize,
+    skipped: Vec<(String, Span)>,
+    title: Option<String>,
+}
+
+impl Reader<'_> {
+    /// Keeps a finding with the block it belongs to.
+    fn tell(&mut self, finding: Diagnostic) {
+        if let Some(open) = self.open.last_mut() {
+            open.block.faults.push(finding);
+        }
+    }
+
+    fn push(&mut self, statement: Statement) {
+        if let Some(open) = self.open.last_mut() {
+            open.block.statements.push(statement);
+        }
+    }
+
+    /// The title line; warns where it looks like a card that is lost this way.
+    fn title_line(&mut self, text: &str, span: Span) {
+        let first = text[span.start..span.end].trim();
+        let lower = first.to_lowercase();
+        if lower.starts_with(".title") {
+            self.title = Some(first[6..].trim().to_string());
+            return;
+        }
+        self.title = Some(first.trim_start_matches(['*', ' ', '\t']).to_string());
+        if first.starts_with(['*', ';', '#', '$', '+']) || first.is_empty() {
+            return;
+        }
+        let line = Line {
+            file: span.file,
+            start: span.start,
+            text: text[span.start..span.end].replace('\t', " "),
+        };
+        let state = State::default();
+        let is_card = if first.starts_with('.') {
+            dot::card(input(&line, &state)).is_ok()
+        } else {
+            let named = first.split([' ', '\t']).next().unwrap_or("");
+            let plausible = named.len() == 1 || named.chars().any(|c| c.is_ascii_digit());
+            plausible
+                && card::element(input(&line, &state)).is_ok_and(|(_, e)| {
+                    !e.nodes.is_empty() || !named.is_empty() && first.split_whitespace().count() > 3
+                })
+        };
+        if is_card {
+            self.tell(
+                Diagnostic::warning(
+                    "title",
+                    line.span(),
+                    "the first line looks like a card, but it is the title",
+                )
+                .label("this is not part of the circuit")
+                .help("put a title line above it"),
+            );
+        }
+    }
+
+    fn lines(&mut self, lines: &[Line], path: &Path) {
+        let sections = library_sections(lines);
+        let mut control = None;
+        let mut in_section = false;
+        for (index, line) in lines.iter().enumerate() {
+            let lower = line.text.trim().to_lowercase();
+            if control.is_some() {
+                if lower.starts_with(".endc") {
+                    control = None;
+                } else {
+                    self.command(line);
+                }
+                continue;
+            }
+            if in_section || sections.contains(&index) {
+                // A section of a library that was not asked for.
+                in_section = !lower.starts_with(".endl");
+                continue;
+            }
+            if lower.starts_with(".control") {
+                control = Some(line.span());
+            }
+            if !self.line(line, path) {
+                return;
+            }
+        }
+        if let Some(span) = control {
+            self.tell(
+                Diagnostic::warning("unterminated", span, "`.control` is never closed")
+                    .label("no `.endc` follows"),
+            );
+        }
+    }
+
+    /// Reads one card; false at `.end`.
+    fn line(&mut self, line: &Line, path: &Path) -> bool {
+        let state = State::default();
+        let start = input(line, &state);
+        if line.text.trim_start().starts_with('.') {
+            let parsed = finish(dot::card(start), line);
+            self.keep_findings(&state);
+            match parsed {
+                Ok(dot) => return self.dot(dot, line, path),
+                Err(fault) => self.tell(fault),
+            }
+        } else {
+            let parsed = finish(card::element(start), line);
+            self.keep_findings(&state);
+            match parsed {
+                Ok(element) => self.push(Statement::Element(element)),
+                Err(fault) => self.tell(fault),
+            }
+        }
+        true
+    }
+
+    fn keep_findings(&mut self, state: &State) {
+        for finding in state.findings.take() {
+            self.tell(finding);
+        }
+    }
+
+    /// A line between `.control` and `.endc`: only `tran` matters.
+    fn command(&mut self, line: &Line) {
+        let state = State::default();
+        let start = input(line, &state);
+        let Ok((rest, name)) = word(start) else {
+            return;
+        };
+        if name.text == "tran" {
+            match finish(dot::tran(start, rest, true), line) {
+                Ok(tran) => self.push(Statement::Tran(tran)),
+                Err(fault) => self.tell(Diagnostic {
+                    severity: Severity::Warning,
+                    ..fault
+                }),
+            }
+        } else if name.text == "op" {
+            self.push(Statement::Analysis(name.span));
+        } else if !self
+            .skipped
+            .iter()
+            .any(|(text, _)| text == ".control commands")
+        {
+            self.skipped.push((".control commands".into(), line.span()));
+        }
+    }
+
+    fn dot(&mut self, dot: Dot, line: &Line, path: &Path) -> bool {
+        let span = line.span();
+        match dot {
+            Dot::Statement(statement) => self.push(statement),
+            Dot::Subckt(name, nodes, params) => {
+                let subckt = Subckt {
+                    name,
+                    nodes,
+                    params,
+                    body: Block::default(),
+                };
+                self.begin(OpenKind::Subckt(Box::new(subckt)), span);
+            }
+            Dot::Ends(name) => self.ends(name.as_ref(), span),
+            Dot::If(condition) => {
+                let first = Branch {
+                    condition: Some(condition),
+                    body: Block::default(),
+                };
+                self.begin(OpenKind::If(vec![first]), span);
+            }
+            Dot::ElseIf(condition) => self.next_branch(Some(condition), span),
+            Dot::Else => self.next_branch(None, span),
+            Dot::EndIf => {
+                if matches!(
+                    self.open.last(),
+                    Some(Open {
+                        kind: OpenKind::If(_),
+                        ..
+                    })
+                ) {
+                    self.close();
+                } else {
+                    self.tell(
+                        Diagnostic::error("unexpected", span, "`.endif` without `.if`")
+                            .label("nothing to close"),
+                    );
+                }
+            }
+            Dot::Include(file) => self.include(&file.whole, None, file.span, path),
+            Dot::Lib(file) => self.lib(&file, path),
+            Dot::EndLib | Dot::Control | Dot::Nothing => {}
+            Dot::End => return false,
+            Dot::Title(text) => self.title = Some(text),
+            Dot::Skipped => {
+                let name = line
+                    .text
+                    .split_whitespace()
+                    .next()
+                    .unwrap_or("")
+                    .to_lowercase();
+                if name == ".step" {
+                    self.tell(
+                        Diagnostic::warning(
+                            "step",
+                            span,
+                            "`.step` is not supported yet: one run with the values as they stand",
+                        )
+                        .label("ignored"),
+                    );
+                } else {
+                    self.skipped.push((name, span));
+                }
+            }
+        }
+        true
+    }
+
+    fn begin(&mut self, kind: OpenKind, span: Span) {
+        if self.open.len() > MAX_BLOCKS {
+            self.tell(
+                Diagnostic::error(
+                    "too-deep",
+                    span,
+                    format!("blocks are nested more than {MAX_BLOCKS} deep"),
+                )
+                .label("too deep here"),
+            );
+            return;
+        }
+        self.open.push(Open {
+            kind,
+            block: Block::default(),
+            span,
+        });
+    }
+
+    fn next_branch(&mut self, condition: Option<super::ast::Expr>, span: Span) {
+        let Some(Open {
+            kind: OpenKind::If(branches),
+            block,
+            ..
+        }) = self.open.last_mut()
+        else {
+            self.tell(
+                Diagnostic::error("unexpected", span, "`.else` without `.if`")
+                    .label("no `.if` is open here"),
+            );
+            return;
+        };
+        let after_else = branches.last().is_some_and(|b| b.condition.is_none());
+        if let Some(last) = branches.last_mut() {
+            last.body = std::mem::take(block);
+        }
+        branches.push(Branch {
+            condition,
+            body: Block::default(),
+        });
+        if after_else {
+            self.tell(
+                Diagnostic::error("unexpected", span, "a branch after `.else`")
+                    .label("`.else` must be the last branch"),
+            );
+        }
+    }
+
+    fn ends(&mut self, name: Option<&super::ast::Name>, span: Span) {
+        match self.open.last() {
+            Some(Open {
+                kind: OpenKind::Subckt(subckt),
+                ..
+            }) => {
+                if let Some(name) = name.filter(|n| n.text != subckt.name.text) {
+                    let message = format!(
+                        "`.ends {}` closes subcircuit `{}`",
+                        name.text, subckt.name.text
+                    );
+                    self.close();
+                    self.tell(
+                        Diagnostic::warning("ends-mismatch", name.span, message)
+                            .label("another name"),
+                    );
+                } else {
+                    self.close();
+                }
+            }
+            _ => self.tell(
+                Diagnostic::error("unexpected", span, "`.ends` without `.subckt`")
+                    .label("no subcircuit is open here"),
+            ),
+        }
+    }
+
+    /// Closes the innermost block into the one around it.
+    fn close(&mut self) {
+        if self.open.len() < 2 {
+            return;
+        }
+        let Some(open) = self.open.pop() else { return };
+        match open.kind {
+            OpenKind::Root => {}
+            OpenKind::Subckt(mut subckt) => {
+                subckt.body = open.block;
+                self.push(Statement::Subckt(*subckt));
+            }
+            OpenKind::If(mut branches) => {
+                if let Some(last) = branches.last_mut() {
+                    last.body = open.block;
+                }
+                self.push(Statement::If(branches));
+            }
+        }
+    }
+
+    /// Closes what the file left open, each with an error.
+    fn close_all(&mut self) {
+        while self.open.len() > 1 {
+            let fault = self.open.last().map(|open| match &open.kind {
+                OpenKind::Subckt(subckt) => Diagnostic::error(
+                    "unterminated",
+                    open.span,
+                    format!("subcircuit `{}` is never closed", subckt.name.text),
+                )
+                .label("no `.ends` follows"),
+                _ => Diagnostic::error("unterminated", open.span, "`.if` is never closed")
+                    .label("no `.endif` follows"),
+            });
+            self.close();
+            if let (Some(fault), Some(root)) = (fault, self.open.first_mut()) {
+                root.block.faults.push(fault);
+            }
+        }
+    }
+
+    fn note_skipped(&mut self) {
+        let Some(&(_, span)) = self.skipped.first() else {
+            return;
+        };
+        let mut names: Vec<&str> = Vec::new();
+        for (name, _) in &self.skipped {
+            if !names.contains(&name.as_str()) {
+                names.push(name);
+            }
+        }
+        let message = format!(
+            "skipped, as they do not change the transient: {}",
+            names.join(", ")
+        );
+        let label = if self.skipped.len() > 1 {
+            "the first of them"
+        } else {
+            ""
+        };
+        self.tell(Diagnostic::note("skipped", span, message).label(label));
+    }
+
+    /// `.lib path`, `.lib path section`; a path may contain blanks.
+    fn lib(&mut self, file: &dot::Path, path: &Path) {
+        match &file.section {
+            Some((short, section))
+                if self.find(&file.whole, path).is_none() && self.find(short, path).is_some() =>
+            {
+                self.include(short, Some(section), file.span, path);
+            }
+            Some((short, section)) if short == &file.whole => {
+                self.include(short, Some(section), file.span, path)
+            }
+            _ => self.include(&file.whole, None, file.span, path),
+        }
+    }
+
+    /// The path and text of an included file, tried relative to the including one, with `\` as `/` too.
+    fn find(&self, written: &str, from: &Path) -> Option<(PathBuf, Vec<u8>)> {
+        let folder = from.parent().unwrap_or(Path::new(""));
+        let slashes = written.replace('\\', "/");
+        [written, slashes.as_str()].into_iter().find_map(|name| {
+            let path = lexical(&folder.join(name));
+            (self.loader)(&path).ok().map(|bytes| (path, bytes))
+        })
+    }
+
+    fn include(&mut self, written: &str, section: Option<&String>, span: Span, from: &Path) {
+        let Some((path, bytes)) = self.find(written, from) else {
+            self.tell(
+                Diagnostic::warning("missing-file", span, format!("cannot read `{written}`"))
+                    .label("left out")
+                    .help("what it defines may be missing further on"),
+            );
+            return;
+        };
+        if self.files.contains(&path) {
+            self.tell(
+                Diagnostic::error("include-loop", span, format!("`{written}` includes itself"))
+                    .label("already being read"),
+            );
+            return;
+        }
+        self.bytes += bytes.len();
+        if self.files.len() > MAX_INCLUDES
+            || self.sources.files.len() > MAX_FILES
+            || self.bytes > MAX_BYTES
+        {
+            let message = format!(
+                "too many included files (more than {MAX_INCLUDES} deep, {MAX_FILES} in all, or {MAX_BYTES} bytes)"
+            );
+            self.tell(Diagnostic::error("too-deep", span, message).label("not read"));
+            return;
+        }
+        let text = decode::decode(&bytes);
+        let file = self.sources.add(path.to_string_lossy(), text.clone());
+        let whole = Span {
+            file,
+            start: 0,
+            end: title(&text).end,
+        };
+        if let Some(foreign) = decode::foreign(&text, whole).filter(|d| d.code != "empty") {
+            self.tell(foreign);
+            return;
+        }
+        let (lines, orphans) = logical(file, &text, 0);
+        for span in orphans {
+            self.tell(Diagnostic::error(
+                "unexpected",
+                span,
+                "there is no card to continue",
+            ));
+        }
+        self.files.push(path.clone());
+        match section {
+            None => self.lines(&lines, &path),
+            Some(section) => match library_section(&lines, section) {
+                Some(part) => self.lines(part, &path),
+                None => self.tell(
+                    Diagnostic::error(
+                        "missing-section",
+                        span,
+                        format!("`{written}` has no section `{section}`"),
+                    )
+                    .label("no `.lib` with this name in the file"),
+                ),
+            },
+        }
+        self.files.pop();
+    }
+}
+
+/// The result of a card's parser as a result with a diagnostic; a card must be read to its end.
+fn finish<T>(parsed: Parsed<'_, T>, line: &Line) -> Result<T, Diagnostic> {
+    match parsed {
+        Ok((rest, value)) if at_end(rest) => Ok(value),
+        Ok((rest, _)) => Err(Diagnostic::error(
+            "unexpected",
+            next_word(rest),
+            "this does not belong to the card",
+        )
+        .label("unexpected")),
+        Err(nom::Err::Failure(Fault::Told(fault)) | nom::Err::Error(Fault::Told(fault))) => {
+            Err(*fault)
+        }
+        Err(_) => Err(
+            Diagnostic::error("bad-card", line.span(), "this is no card")
+                .label("expected an element or a directive"),
+        ),
+    }
+}
+
+/// The name of a `.lib name` line.
+fn section_name(line: &Line) -> Option<String> {
+    let mut words = line.text.split_whitespace();
+    let directive = words.next()?;
+    let name = words.next()?;
+    (directive.eq_ignore_ascii_case(".lib") && words.next().is_none())
+        .then(|| name.trim_matches(['"', '\'']).to_lowercase())
+}
+
+fn is_end_of_section(line: &Line) -> bool {
+    line.text.trim().to_lowercase().starts_with(".endl")
+}
+
+/// Lines that begin a section of a library: `.lib name` with an `.endl` before the next one.
+fn library_sections(lines: &[Line]) -> Vec<usize> {
+    let mut starts = Vec::new();
+    let mut candidate = None;
+    for (index, line) in lines.iter().enumerate() {
+        if is_end_of_section(line) {
+            starts.extend(candidate.take());
+        } else if section_name(line).is_some() {
+            candidate = Some(index);
+        }
+    }
+    starts
+}
+
+/// The lines of one section of a library.
+fn library_section<'l>(lines: &'l [Line], name: &str) -> Option<&'l [Line]> {
+    let start = library_sections(lines)
+        .into_iter()
+        .find(|&i| section_name(&lines[i]).as_deref() == Some(name))?;
+    let length = lines[start + 1..].iter().position(is_end_of_section)?;
+    Some(&lines[start + 1..start + 1 + length])
+}
+
+/// A path without `.` and, where possible, without `..`.
+fn lexical(path: &Path) -> PathBuf {
+    let mut out = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir
+                if matches!(out.components().next_back(), Some(Component::Normal(_))) =>
+            {
+                out.pop();
+            }
+            part => out.push(part),
+        }
+    }
+    out
+}
