@@ -31,7 +31,11 @@ impl ConeComplementarity {
         const STATEMENT: &str = "Brogliato-Thibault Lemma 3.8";
         let m = linear.system.m();
         if v.shape() != (m, m) {
-            return Err(FormError::Shape { what: "V", rows: v.nrows(), columns: v.ncols() });
+            return Err(FormError::Shape {
+                what: "V",
+                rows: v.nrows(),
+                columns: v.ncols(),
+            });
         }
         let v_inverse = v.clone().try_inverse().ok_or(FormError::Hypothesis {
             statement: STATEMENT,
@@ -40,8 +44,11 @@ impl ConeComplementarity {
         })?;
         let mut d_bar = &v_inverse * &linear.system.d * v_inverse.transpose();
         let terms = v_inverse.abs() * linear.system.d.abs() * v_inverse.abs().transpose();
-        let zero = |i: usize, j: usize, d: &DMatrix<f64>| d[(i, j)].abs() <= FACTORED * terms[(i, j)];
-        let rank = (0..m).filter(|&k| !(0..m).all(|i| zero(i, k, &d_bar) && zero(k, i, &d_bar))).count();
+        let zero =
+            |i: usize, j: usize, d: &DMatrix<f64>| d[(i, j)].abs() <= FACTORED * terms[(i, j)];
+        let rank = (0..m)
+            .filter(|&k| !(0..m).all(|i| zero(i, k, &d_bar) && zero(k, i, &d_bar)))
+            .count();
         let mut outside = 0.0_f64;
         for i in 0..m {
             for j in 0..m {
@@ -53,10 +60,26 @@ impl ConeComplementarity {
                 }
             }
         }
-        require(outside == 0.0, STATEMENT, "V⁻¹DV⁻ᵀ is not diag(D₁, 0)", outside)?;
+        require(
+            outside == 0.0,
+            STATEMENT,
+            "V⁻¹DV⁻ᵀ is not diag(D₁, 0)",
+            outside,
+        )?;
         let d1 = d_bar.view((0, 0), (rank, rank)).into_owned();
-        require(rank == 0 || d1.is_invertible(), STATEMENT, "D₁ is singular", if rank == 0 { 0.0 } else { d1.determinant() })?;
-        Ok(Self { linear: linear.clone(), v: v.clone(), v_inverse, d_bar, rank })
+        require(
+            rank == 0 || d1.is_invertible(),
+            STATEMENT,
+            "D₁ is singular",
+            if rank == 0 { 0.0 } else { d1.determinant() },
+        )?;
+        Ok(Self {
+            linear: linear.clone(),
+            v: v.clone(),
+            v_inverse,
+            d_bar,
+            rank,
+        })
     }
 
     /// Lemma 3.8 for D whose kernel is that of Dᵀ (symmetric, skew, or any D ⪰ 0): V is orthogonal, its first columns span
@@ -94,17 +117,32 @@ impl ConeComplementarity {
 
     /// ζ = W⁻¹ζ̄ and w = Vw̄.
     #[must_use]
-    pub fn original(&self, zeta_bar: &DVector<f64>, w_bar: &DVector<f64>) -> (DVector<f64>, DVector<f64>) {
+    pub fn original(
+        &self,
+        zeta_bar: &DVector<f64>,
+        w_bar: &DVector<f64>,
+    ) -> (DVector<f64>, DVector<f64>) {
         (self.v_inverse.transpose() * zeta_bar, &self.v * w_bar)
     }
 
     /// By how much (x, ζ̄, w̄) violates (31) at t: the equation, membership in the cones, orthogonality.
     #[must_use]
-    pub fn violation(&self, t: f64, x: &DVector<f64>, zeta_bar: &DVector<f64>, w_bar: &DVector<f64>) -> f64 {
-        let equation =
-            &self.v_inverse * (&self.linear.system.c * x + (self.linear.f)(t)) + &self.d_bar * zeta_bar - w_bar;
+    pub fn violation(
+        &self,
+        t: f64,
+        x: &DVector<f64>,
+        zeta_bar: &DVector<f64>,
+        w_bar: &DVector<f64>,
+    ) -> f64 {
+        let equation = &self.v_inverse * (&self.linear.system.c * x + (self.linear.f)(t))
+            + &self.d_bar * zeta_bar
+            - w_bar;
         let (zeta, w) = self.original(zeta_bar, w_bar);
         let outside = |v: &DVector<f64>| v.iter().map(|v| (-v).max(0.0)).fold(0.0, f64::max);
-        equation.amax().max(outside(&zeta)).max(outside(&w)).max(zeta_bar.dot(w_bar).abs())
+        equation
+            .amax()
+            .max(outside(&zeta))
+            .max(outside(&w))
+            .max(zeta_bar.dot(w_bar).abs())
     }
 }

@@ -36,9 +36,16 @@ pub struct Feedback {
 
 fn shapes(system: &System, e: &DMatrix<f64>, f: &DMatrix<f64>) -> Result<usize, FormError> {
     let inputs = e.ncols();
-    for (what, matrix, shape) in [("E", e, (system.n(), inputs)), ("F", f, (system.m(), inputs))] {
+    for (what, matrix, shape) in [
+        ("E", e, (system.n(), inputs)),
+        ("F", f, (system.m(), inputs)),
+    ] {
         if matrix.shape() != shape {
-            return Err(FormError::Shape { what, rows: matrix.nrows(), columns: matrix.ncols() });
+            return Err(FormError::Shape {
+                what,
+                rows: matrix.nrows(),
+                columns: matrix.ncols(),
+            });
         }
     }
     Ok(inputs)
@@ -46,7 +53,13 @@ fn shapes(system: &System, e: &DMatrix<f64>, f: &DMatrix<f64>) -> Result<usize, 
 
 /// (A + ES, B + EG, C + FS, D + FG).
 #[must_use]
-pub fn close(system: &System, e: &DMatrix<f64>, f: &DMatrix<f64>, s: &DMatrix<f64>, g: &DMatrix<f64>) -> System {
+pub fn close(
+    system: &System,
+    e: &DMatrix<f64>,
+    f: &DMatrix<f64>,
+    s: &DMatrix<f64>,
+    g: &DMatrix<f64>,
+) -> System {
     System {
         a: &system.a + e * s,
         b: &system.b + e * g,
@@ -85,8 +98,11 @@ pub fn match_output(
         condition: "no S, G with P(B + EG) = (C + FS)ᵀ",
         size,
     };
-    let solution =
-        rows.clone().svd(true, true).solve(&rhs, f64::EPSILON.sqrt() * rows.amax()).map_err(|_| failed(rhs.amax()))?;
+    let solution = rows
+        .clone()
+        .svd(true, true)
+        .solve(&rhs, f64::EPSILON.sqrt() * rows.amax())
+        .map_err(|_| failed(rhs.amax()))?;
     let residual = (&rows * &solution - &rhs).amax();
     if residual > MATCHED * (system.c.amax() + (p * &system.b).amax()) {
         return Err(failed(residual));
@@ -101,16 +117,27 @@ impl Feedback {
     ///
     /// # Errors
     /// Shapes, or that no feedback was found.
-    pub fn design(system: &System, e: &DMatrix<f64>, f: &DMatrix<f64>, rate: f64) -> Result<Self, FormError> {
+    pub fn design(
+        system: &System,
+        e: &DMatrix<f64>,
+        f: &DMatrix<f64>,
+        rate: f64,
+    ) -> Result<Self, FormError> {
         let inputs = shapes(system, e, f)?;
         let (n, m) = (system.n(), system.m());
         // One matrix K = [S̃ G] of all feedback unknowns.
         let at = |x: &DMatrix<f64>, k: &DMatrix<f64>, constant: f64| {
             let (s, g) = (k.columns(0, n).into_owned(), k.columns(n, m).into_owned());
             let states = &system.a * x + e * &s + x * rate;
-            let coupling = &system.b * constant + e * &g - x * system.c.transpose() - s.transpose() * f.transpose();
+            let coupling = &system.b * constant + e * &g
+                - x * system.c.transpose()
+                - s.transpose() * f.transpose();
             let ports = &system.d * constant + f * &g;
-            -blocks(&(&states + states.transpose()), &coupling, &-(&ports + ports.transpose()))
+            -blocks(
+                &(&states + states.transpose()),
+                &coupling,
+                &-(&ports + ports.transpose()),
+            )
         };
         let list = units(n, inputs, n + m);
         let zero = (DMatrix::zeros(n, n), DMatrix::zeros(inputs, n + m));
@@ -140,7 +167,8 @@ impl Feedback {
             let s = k.columns(0, n) * &p;
             let g = k.columns(n, m).into_owned();
             let closed = close(system, e, f, &s, &g);
-            let residuals = verify::check(&closed.shifted(rate), &p).map_err(|failure| failure.to_string())?;
+            let residuals =
+                verify::check(&closed.shifted(rate), &p).map_err(|failure| failure.to_string())?;
             Ok(Self { s, g, p, residuals })
         })
         .map_err(|_| failed)

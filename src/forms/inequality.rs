@@ -40,8 +40,8 @@ impl VariationalInequality {
         let system = &lure.linear.system;
         let n = system.n();
         let d = &system.d;
-        let (multivalued, single): (Vec<usize>, Vec<usize>) =
-            (0..d.nrows()).partition(|&j| d.row(j).amax().max(d.column(j).amax()) <= ZERO * d.amax());
+        let (multivalued, single): (Vec<usize>, Vec<usize>) = (0..d.nrows())
+            .partition(|&j| d.row(j).amax().max(d.column(j).amax()) <= ZERO * d.amax());
         let d_ii = d.select_rows(&single).select_columns(&single);
         let class = Feedthrough::of(&d_ii);
         let pairs = single.iter().all(|&j| lure.phi[j] == Phi::HalfLine);
@@ -49,7 +49,11 @@ impl VariationalInequality {
             class.pd || pairs && class.p_matrix == Some(true),
             STATEMENT,
             "Assumption 4: D_II is neither positive definite nor a P-matrix with complementary pairs",
-            if d_ii.is_empty() { 0.0 } else { (&d_ii + d_ii.transpose()).symmetric_eigenvalues().min() },
+            if d_ii.is_empty() {
+                0.0
+            } else {
+                (&d_ii + d_ii.transpose()).symmetric_eigenvalues().min()
+            },
         )?;
         let b = system.b.select_columns(&multivalued);
         let c = system.c.select_rows(&multivalued);
@@ -67,7 +71,13 @@ impl VariationalInequality {
             condition: "Assumption 2: W is singular",
             size: 0.0,
         })?;
-        Ok(Self { lure: lure.clone(), v, v_inverse, multivalued, single })
+        Ok(Self {
+            lure: lure.clone(),
+            v,
+            v_inverse,
+            multivalued,
+            single,
+        })
     }
 
     /// λ_II = (D_II + ∂Φ_II^{*,−})⁻¹(−C_II x − f_II), complementary pairs.
@@ -76,15 +86,22 @@ impl VariationalInequality {
     /// [`FormError::Step`] if it was not found.
     pub fn lambda(&self, t: f64, x: &DVector<f64>) -> Result<DVector<f64>, FormError> {
         let system = &self.lure.linear.system;
-        let d = system.d.select_rows(&self.single).select_columns(&self.single);
-        let q = system.c.select_rows(&self.single) * x + (self.lure.linear.f)(t).select_rows(&self.single);
+        let d = system
+            .d
+            .select_rows(&self.single)
+            .select_columns(&self.single);
+        let q = system.c.select_rows(&self.single) * x
+            + (self.lure.linear.f)(t).select_rows(&self.single);
         if q.is_empty() {
             return Ok(q);
         }
         let solution = Driver::new(d, Settings::default().lcp_residual).solve(&q);
         match solution.status {
             Status::Solved => Ok(solution.lambda),
-            _ => Err(FormError::Step { t, reason: "Λ_II was not evaluated" }),
+            _ => Err(FormError::Step {
+                t,
+                reason: "Λ_II was not evaluated",
+            }),
         }
     }
 

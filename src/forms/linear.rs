@@ -31,7 +31,9 @@ pub struct Linear {
 
 impl fmt::Debug for Linear {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Linear").field("system", &self.system).finish_non_exhaustive()
+        f.debug_struct("Linear")
+            .field("system", &self.system)
+            .finish_non_exhaustive()
     }
 }
 
@@ -42,7 +44,11 @@ impl Linear {
     /// [`FormError::Shape`].
     pub fn autonomous(system: System) -> Result<Self, FormError> {
         let (n, m) = (system.n(), system.m());
-        Self::new(system, constant(DVector::zeros(n)), constant(DVector::zeros(m)))
+        Self::new(
+            system,
+            constant(DVector::zeros(n)),
+            constant(DVector::zeros(m)),
+        )
     }
 
     /// A system with its driven terms.
@@ -51,15 +57,28 @@ impl Linear {
     /// [`FormError::Shape`].
     pub fn new(system: System, e: Signal, f: Signal) -> Result<Self, FormError> {
         let (n, m) = (system.n(), system.m());
-        let shapes = [("A", &system.a, (n, n)), ("B", &system.b, (n, m)), ("C", &system.c, (m, n)), ("D", &system.d, (m, m))];
+        let shapes = [
+            ("A", &system.a, (n, n)),
+            ("B", &system.b, (n, m)),
+            ("C", &system.c, (m, n)),
+            ("D", &system.d, (m, m)),
+        ];
         for (what, matrix, shape) in shapes {
             if matrix.shape() != shape {
-                return Err(FormError::Shape { what, rows: matrix.nrows(), columns: matrix.ncols() });
+                return Err(FormError::Shape {
+                    what,
+                    rows: matrix.nrows(),
+                    columns: matrix.ncols(),
+                });
             }
         }
         for (what, length, expected) in [("e", e(0.0).len(), n), ("f", f(0.0).len(), m)] {
             if length != expected {
-                return Err(FormError::Shape { what, rows: length, columns: 1 });
+                return Err(FormError::Shape {
+                    what,
+                    rows: length,
+                    columns: 1,
+                });
             }
         }
         Ok(Self { system, e, f })
@@ -69,7 +88,12 @@ impl Linear {
     ///
     /// # Errors
     /// [`FormError::Step`].
-    pub fn integrate(&self, span: (f64, f64), x0: &DVector<f64>, steps: usize) -> Result<Trajectory, FormError> {
+    pub fn integrate(
+        &self,
+        span: (f64, f64),
+        x0: &DVector<f64>,
+        steps: usize,
+    ) -> Result<Trajectory, FormError> {
         integrate(self, span, x0, steps)
     }
 }

@@ -35,8 +35,20 @@ impl Phi {
     #[must_use]
     pub fn value(&self, y: f64) -> f64 {
         match *self {
-            Self::HalfLine => if y >= 0.0 { 0.0 } else { f64::INFINITY },
-            Self::Interval { low, high } => if (low..=high).contains(&y) { 0.0 } else { f64::INFINITY },
+            Self::HalfLine => {
+                if y >= 0.0 {
+                    0.0
+                } else {
+                    f64::INFINITY
+                }
+            }
+            Self::Interval { low, high } => {
+                if (low..=high).contains(&y) {
+                    0.0
+                } else {
+                    f64::INFINITY
+                }
+            }
             Self::Relay { gain } => gain * y.abs(),
             Self::Quadratic { stiffness } => 0.5 * stiffness * y * y,
         }
@@ -46,11 +58,29 @@ impl Phi {
     #[must_use]
     pub fn conjugate(&self, z: f64) -> f64 {
         match *self {
-            Self::HalfLine => if z >= 0.0 { 0.0 } else { f64::INFINITY },
+            Self::HalfLine => {
+                if z >= 0.0 {
+                    0.0
+                } else {
+                    f64::INFINITY
+                }
+            }
             Self::Interval { low, high } => (-z * low).max(-z * high),
-            Self::Relay { gain } => if z.abs() <= gain { 0.0 } else { f64::INFINITY },
+            Self::Relay { gain } => {
+                if z.abs() <= gain {
+                    0.0
+                } else {
+                    f64::INFINITY
+                }
+            }
             Self::Quadratic { stiffness } => {
-                if stiffness > 0.0 { 0.5 * z * z / stiffness } else if z == 0.0 { 0.0 } else { f64::INFINITY }
+                if stiffness > 0.0 {
+                    0.5 * z * z / stiffness
+                } else if z == 0.0 {
+                    0.0
+                } else {
+                    f64::INFINITY
+                }
             }
         }
     }
@@ -60,12 +90,16 @@ impl Phi {
     pub fn relates(&self, lambda: f64, y: f64, tolerance: f64) -> bool {
         // Points off the domain by rounding are moved onto it.
         let (y, lambda) = match *self {
-            Self::HalfLine => (snap(y, 0.0, f64::INFINITY, tolerance), snap(lambda, 0.0, f64::INFINITY, tolerance)),
+            Self::HalfLine => (
+                snap(y, 0.0, f64::INFINITY, tolerance),
+                snap(lambda, 0.0, f64::INFINITY, tolerance),
+            ),
             Self::Interval { low, high } => (snap(y, low, high, tolerance), lambda),
             Self::Relay { gain } => (y, snap(lambda, -gain, gain, tolerance)),
             Self::Quadratic { .. } => (y, lambda),
         };
-        (self.value(y) + self.conjugate(lambda) + lambda * y).abs() <= tolerance * (1.0 + lambda.abs() + y.abs())
+        (self.value(y) + self.conjugate(lambda) + lambda * y).abs()
+            <= tolerance * (1.0 + lambda.abs() + y.abs())
     }
 }
 
@@ -106,7 +140,11 @@ impl Lure {
     /// [`FormError::Shape`] unless there is one φ per port.
     pub fn new(linear: Linear, phi: Vec<Phi>) -> Result<Self, FormError> {
         if phi.len() != linear.system.m() {
-            return Err(FormError::Shape { what: "φ", rows: phi.len(), columns: 1 });
+            return Err(FormError::Shape {
+                what: "φ",
+                rows: phi.len(),
+                columns: 1,
+            });
         }
         Ok(Self { linear, phi })
     }
@@ -122,7 +160,13 @@ impl Lure {
         // λ = Kλ' + … first: λ = λ' − R y for the quadratic ports (R diagonal), y = T(Cx + Dλ' + f).
         let r = DMatrix::from_diagonal(&DVector::from_iterator(
             m,
-            self.phi.iter().map(|phi| if let Phi::Quadratic { stiffness } = phi { *stiffness } else { 0.0 }),
+            self.phi.iter().map(|phi| {
+                if let Phi::Quadratic { stiffness } = phi {
+                    *stiffness
+                } else {
+                    0.0
+                }
+            }),
         ));
         let loops = DMatrix::identity(m, m) + d * &r;
         let t = loops.clone().try_inverse().ok_or(FormError::Hypothesis {
@@ -162,23 +206,38 @@ impl Lure {
             extra[(i, i + 1)] = 1.0;
             extra[(i + 1, i)] = -1.0;
         }
-        let system = System { b: &b * &map, c: &select * &c, d: &select * &d * &map + extra, a };
+        let system = System {
+            b: &b * &map,
+            c: &select * &c,
+            d: &select * &d * &map + extra,
+            a,
+        };
         let (e, f) = (self.linear.e.clone(), self.linear.f.clone());
         let (rt, b_raw, t2) = (&r * &t, self.linear.system.b.clone(), t.clone());
         let shift_x = &b * &offset;
         let shift_y = &select * (&d * &offset) + constant;
         let f_x = f.clone();
-        let signal_e: Signal = std::rc::Rc::new(move |time| e(time) - &b_raw * (&rt * f_x(time)) + &shift_x);
+        let signal_e: Signal =
+            std::rc::Rc::new(move |time| e(time) - &b_raw * (&rt * f_x(time)) + &shift_x);
         let signal_f: Signal = std::rc::Rc::new(move |time| &select * (&t2 * f(time)) + &shift_y);
         debug_assert_eq!(system.n(), n);
-        Ok(Expansion { linear: Linear::new(system, signal_e, signal_f)?, map, offset })
+        Ok(Expansion {
+            linear: Linear::new(system, signal_e, signal_f)?,
+            map,
+            offset,
+        })
     }
 
     /// `steps` implicit steps from x₀; λ and y of the trajectory are those of the Lur'e system's own ports.
     ///
     /// # Errors
     /// Those of [`Lure::expand`] and of the steps.
-    pub fn integrate(&self, span: (f64, f64), x0: &DVector<f64>, steps: usize) -> Result<Trajectory, FormError> {
+    pub fn integrate(
+        &self,
+        span: (f64, f64),
+        x0: &DVector<f64>,
+        steps: usize,
+    ) -> Result<Trajectory, FormError> {
         let expansion = self.expand()?;
         let mut trajectory = expansion.linear.integrate(span, x0, steps)?;
         let system = &self.linear.system;
@@ -190,13 +249,22 @@ impl Lure {
             // The quadratic ports: λ = −r y, y = Cx + Dλ + f.
             let r = DMatrix::from_diagonal(&DVector::from_iterator(
                 m,
-                self.phi.iter().map(|phi| if let Phi::Quadratic { stiffness } = phi { *stiffness } else { 0.0 }),
+                self.phi.iter().map(|phi| {
+                    if let Phi::Quadratic { stiffness } = phi {
+                        *stiffness
+                    } else {
+                        0.0
+                    }
+                }),
             ));
             let loops = DMatrix::identity(m, m) + &system.d * &r;
             let y = loops
                 .lu()
                 .solve(&(&base + &system.d * &free))
-                .ok_or(FormError::Step { t: trajectory.t[k], reason: "1 + DR is singular" })?;
+                .ok_or(FormError::Step {
+                    t: trajectory.t[k],
+                    reason: "1 + DR is singular",
+                })?;
             trajectory.lambda[k] = free - r * &y;
             trajectory.y[k] = y;
         }

@@ -78,5 +78,13 @@ fn require(
     condition: &'static str,
     size: f64,
 ) -> Result<(), FormError> {
-    if holds { Ok(()) } else { Err(FormError::Hypothesis { statement, condition, size }) }
+    if holds {
+        Ok(())
+    } else {
+        Err(FormError::Hypothesis {
+            statement,
+            condition,
+            size,
+        })
+    }
 }

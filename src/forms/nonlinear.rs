@@ -45,7 +45,10 @@ pub struct NonlinearComplementarity {
 
 impl fmt::Debug for NonlinearComplementarity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("NonlinearComplementarity").field("b", &self.b).field("c", &self.c).finish_non_exhaustive()
+        f.debug_struct("NonlinearComplementarity")
+            .field("b", &self.b)
+            .field("c", &self.c)
+            .finish_non_exhaustive()
     }
 }
 
@@ -62,8 +65,18 @@ impl NonlinearComplementarity {
             let found = (self.c.jacobian)(x);
             let size = expected.amax().max(found.amax());
             let residual = (&expected - &found).amax();
-            require(residual <= MATCHED * size, STATEMENT, "∂c/∂x = BᵀV'' fails", residual)?;
-            require(square_root(&hessian).is_some(), STATEMENT, "V'' is not positive definite", hessian.determinant())?;
+            require(
+                residual <= MATCHED * size,
+                STATEMENT,
+                "∂c/∂x = BᵀV'' fails",
+                residual,
+            )?;
+            require(
+                square_root(&hessian).is_some(),
+                STATEMENT,
+                "V'' is not positive definite",
+                hessian.determinant(),
+            )?;
         }
         Ok(())
     }
@@ -101,7 +114,10 @@ impl NonlinearComplementarity {
         let mut least = f64::INFINITY;
         for mask in 1..1_usize << m {
             let set: Vec<usize> = (0..m).filter(|j| mask >> j & 1 == 1).collect();
-            let eigen = gram.select_rows(&set).select_columns(&set).symmetric_eigen();
+            let eigen = gram
+                .select_rows(&set)
+                .select_columns(&set)
+                .symmetric_eigen();
             for (k, &value) in eigen.eigenvalues.iter().enumerate() {
                 let v = eigen.eigenvectors.column(k);
                 let rounding = f64::EPSILON.sqrt();
@@ -118,10 +134,26 @@ impl NonlinearComplementarity {
     ///
     /// # Errors
     /// (38) fails: ρ = 0.
-    pub fn prox_regularity(&self, points: &[DVector<f64>], curvature: f64) -> Result<f64, FormError> {
-        let rho = points.iter().map(|x| self.slope(x).unwrap_or(0.0)).fold(f64::INFINITY, f64::min);
-        require(rho > 0.0, "Brogliato-Thibault Theorem 4.3", "inclusion (38) fails: ρ = 0", rho)?;
-        Ok(if curvature > 0.0 { rho / curvature } else { f64::INFINITY })
+    pub fn prox_regularity(
+        &self,
+        points: &[DVector<f64>],
+        curvature: f64,
+    ) -> Result<f64, FormError> {
+        let rho = points
+            .iter()
+            .map(|x| self.slope(x).unwrap_or(0.0))
+            .fold(f64::INFINITY, f64::min);
+        require(
+            rho > 0.0,
+            "Brogliato-Thibault Theorem 4.3",
+            "inclusion (38) fails: ρ = 0",
+            rho,
+        )?;
+        Ok(if curvature > 0.0 {
+            rho / curvature
+        } else {
+            f64::INFINITY
+        })
     }
 }
 

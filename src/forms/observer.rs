@@ -32,7 +32,11 @@ pub struct Observer {
 }
 
 /// [[states, coupling], [couplingᵀ, ports]].
-pub(super) fn blocks(states: &DMatrix<f64>, coupling: &DMatrix<f64>, ports: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn blocks(
+    states: &DMatrix<f64>,
+    coupling: &DMatrix<f64>,
+    ports: &DMatrix<f64>,
+) -> DMatrix<f64> {
     let (n, m) = coupling.shape();
     let mut q = DMatrix::zeros(n + m, n + m);
     q.view_mut((0, 0), (n, n)).copy_from(states);
@@ -81,9 +85,10 @@ pub(super) fn combine(
     z: &DVector<f64>,
     (n, r, c): (usize, usize, usize),
 ) -> (DMatrix<f64>, DMatrix<f64>) {
-    list.iter().zip(z.iter()).fold((DMatrix::zeros(n, n), DMatrix::zeros(r, c)), |(p, k), ((up, uk), &z)| {
-        (p + up * z, k + uk * z)
-    })
+    list.iter().zip(z.iter()).fold(
+        (DMatrix::zeros(n, n), DMatrix::zeros(r, c)),
+        |(p, k), ((up, uk), &z)| (p + up * z, k + uk * z),
+    )
 }
 
 impl Observer {
@@ -92,11 +97,20 @@ impl Observer {
     ///
     /// # Errors
     /// Shapes, or where the search for a gain ended.
-    pub fn design(system: &System, g: &DMatrix<f64>, f: &DMatrix<f64>, rate: f64) -> Result<Self, FormError> {
+    pub fn design(
+        system: &System,
+        g: &DMatrix<f64>,
+        f: &DMatrix<f64>,
+        rate: f64,
+    ) -> Result<Self, FormError> {
         let (n, m, k) = (system.n(), system.m(), g.nrows());
         for (what, matrix, shape) in [("G", g, (k, n)), ("F", f, (k, m))] {
             if matrix.shape() != shape {
-                return Err(FormError::Shape { what, rows: matrix.nrows(), columns: matrix.ncols() });
+                return Err(FormError::Shape {
+                    what,
+                    rows: matrix.nrows(),
+                    columns: matrix.ncols(),
+                });
             }
         }
         let balanced = scale::balance(system);
@@ -117,7 +131,11 @@ impl Observer {
         let at = |p: &DMatrix<f64>, gain: &DMatrix<f64>, constant: f64| {
             let states = p * &s.a - gain * &g_hat + p * alpha;
             let coupling = p * &s.b - gain * &f_hat - s.c.transpose() * constant;
-            -blocks(&(&states + states.transpose()), &coupling, &(-&ports * constant))
+            -blocks(
+                &(&states + states.transpose()),
+                &coupling,
+                &(-&ports * constant),
+            )
         };
         let list = units(n, n, k);
         let zero = (DMatrix::zeros(n, n), DMatrix::zeros(n, k));
@@ -127,11 +145,13 @@ impl Observer {
             bounded(&zero.0, &zero.1, LARGEST_GAIN),
             list.iter().map(|(p, gain)| bounded(p, gain, 0.0)).collect(),
         );
-        let face = expose_lossless(&whole, &scale::split(&ports, 0.0).kernel, n).ok_or(FormError::Hypothesis {
-            statement: "RR-7158 section 3.2.3",
-            condition: "no P, L fulfil the equalities on ker(D + Dᵀ)",
-            size: 1.0,
-        })?;
+        let face = expose_lossless(&whole, &scale::split(&ports, 0.0).kernel, n).ok_or(
+            FormError::Hypothesis {
+                statement: "RR-7158 section 3.2.3",
+                condition: "no P, L fulfil the equalities on ker(D + Dᵀ)",
+                size: 1.0,
+            },
+        )?;
         lmi::search(&face, barrier::maximise, |z| {
             let (p_hat, gain_hat) = combine(&list, &face.original(z), (n, n, k));
             let l_hat = p_hat.clone().try_inverse().ok_or("P is singular")? * gain_hat;
@@ -151,7 +171,12 @@ impl Observer {
 
     /// (A − LG, B − LF, C, D).
     #[must_use]
-    pub fn error_system(system: &System, g: &DMatrix<f64>, f: &DMatrix<f64>, gain: &DMatrix<f64>) -> System {
+    pub fn error_system(
+        system: &System,
+        g: &DMatrix<f64>,
+        f: &DMatrix<f64>,
+        gain: &DMatrix<f64>,
+    ) -> System {
         System {
             a: &system.a - gain * g,
             b: &system.b - gain * f,
@@ -164,7 +189,12 @@ impl Observer {
     ///
     /// # Errors
     /// [`FormError::Shape`].
-    pub fn with_plant(&self, plant: &Linear, g: &DMatrix<f64>, f: &DMatrix<f64>) -> Result<Linear, FormError> {
+    pub fn with_plant(
+        &self,
+        plant: &Linear,
+        g: &DMatrix<f64>,
+        f: &DMatrix<f64>,
+    ) -> Result<Linear, FormError> {
         let s = &plant.system;
         let (n, m) = (s.n(), s.m());
         let error = Self::error_system(s, g, f, &self.gain);
@@ -175,10 +205,16 @@ impl Observer {
             d: DMatrix::zeros(2 * m, 2 * m),
         };
         joint.a.view_mut((0, 0), (n, n)).copy_from(&s.a);
-        joint.a.view_mut((n, 0), (n, n)).copy_from(&(&self.gain * g));
+        joint
+            .a
+            .view_mut((n, 0), (n, n))
+            .copy_from(&(&self.gain * g));
         joint.a.view_mut((n, n), (n, n)).copy_from(&error.a);
         joint.b.view_mut((0, 0), (n, m)).copy_from(&s.b);
-        joint.b.view_mut((n, 0), (n, m)).copy_from(&(&self.gain * f));
+        joint
+            .b
+            .view_mut((n, 0), (n, m))
+            .copy_from(&(&self.gain * f));
         joint.b.view_mut((n, m), (n, m)).copy_from(&error.b);
         for k in 0..2 {
             joint.c.view_mut((k * m, k * n), (m, n)).copy_from(&s.c);

@@ -29,7 +29,10 @@ impl Polyhedron {
     /// Whether z lies in it, up to a distance `tolerance`.
     #[must_use]
     pub fn contains(&self, z: &DVector<f64>, tolerance: f64) -> bool {
-        self.slack(z).iter().zip(self.g.row_iter()).all(|(s, g)| *s >= -tolerance * g.norm().max(1.0))
+        self.slack(z)
+            .iter()
+            .zip(self.g.row_iter())
+            .all(|(s, g)| *s >= -tolerance * g.norm().max(1.0))
     }
 
     /// The Euclidean projection of z, z + Gᵀμ with 0 ≤ μ ⟂ G(z + Gᵀμ) + h ≥ 0 (Heemels et al. Theorem 5.4), and μ.
@@ -40,12 +43,21 @@ impl Polyhedron {
         if self.h.is_empty() {
             return Ok((z.clone(), DVector::zeros(0)));
         }
-        let mut driver = Driver::new(&self.g * self.g.transpose(), Settings::default().lcp_residual);
+        let mut driver = Driver::new(
+            &self.g * self.g.transpose(),
+            Settings::default().lcp_residual,
+        );
         let solution = driver.solve(&self.slack(z));
         match solution.status {
             Status::Solved => Ok((z + self.g.transpose() * &solution.lambda, solution.lambda)),
-            Status::Infeasible(_) => Err(FormError::Step { t: 0.0, reason: "the set is empty" }),
-            Status::Failed => Err(FormError::Step { t: 0.0, reason: "the projection was not found" }),
+            Status::Infeasible(_) => Err(FormError::Step {
+                t: 0.0,
+                reason: "the set is empty",
+            }),
+            Status::Failed => Err(FormError::Step {
+                t: 0.0,
+                reason: "the projection was not found",
+            }),
         }
     }
 
@@ -55,8 +67,12 @@ impl Polyhedron {
     /// [`FormError::Step`] if the polyhedron is empty.
     pub fn nearest(&self, z: &DVector<f64>) -> Result<DVector<f64>, FormError> {
         let n = z.len();
-        program::minimise(&DMatrix::identity(n, n), &-z, &self.g, &self.h, 0)
-            .ok_or(FormError::Step { t: 0.0, reason: "the set is empty" })
+        program::minimise(&DMatrix::identity(n, n), &-z, &self.g, &self.h, 0).ok_or(
+            FormError::Step {
+                t: 0.0,
+                reason: "the set is empty",
+            },
+        )
     }
 
     /// Indices of the constraints that z meets with equality.
@@ -64,14 +80,19 @@ impl Polyhedron {
     pub fn active(&self, z: &DVector<f64>) -> Vec<usize> {
         let terms = self.g.abs() * z.abs() + self.h.abs();
         let slack = self.slack(z);
-        (0..slack.len()).filter(|&i| slack[i].abs() <= ACTIVE * terms[i].max(self.g.row(i).norm())).collect()
+        (0..slack.len())
+            .filter(|&i| slack[i].abs() <= ACTIVE * terms[i].max(self.g.row(i).norm()))
+            .collect()
     }
 
     /// The tangent cone at z: {w : G_active w ≥ 0}.
     #[must_use]
     pub fn tangent(&self, z: &DVector<f64>) -> Self {
         let active = self.active(z);
-        Self { g: self.g.select_rows(&active), h: DVector::zeros(active.len()) }
+        Self {
+            g: self.g.select_rows(&active),
+            h: DVector::zeros(active.len()),
+        }
     }
 
     /// The distance of v from the (outward) normal cone at z, {−Gᵀ_active μ : μ ≥ 0}: by Moreau, the length of the

@@ -21,7 +21,9 @@ pub struct Map {
 
 impl fmt::Debug for Map {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Map").field("affine", &self.affine).finish_non_exhaustive()
+        f.debug_struct("Map")
+            .field("affine", &self.affine)
+            .finish_non_exhaustive()
     }
 }
 
@@ -42,7 +44,11 @@ impl Map {
         value: impl Fn(&DVector<f64>) -> DVector<f64> + 'static,
         jacobian: impl Fn(&DVector<f64>) -> DMatrix<f64> + 'static,
     ) -> Self {
-        Self { value: Rc::new(value), jacobian: Rc::new(jacobian), affine: false }
+        Self {
+            value: Rc::new(value),
+            jacobian: Rc::new(jacobian),
+            affine: false,
+        }
     }
 }
 
@@ -72,12 +78,20 @@ impl ProjectedSystem {
         let at = DVector::zeros(n);
         let f = (field.value)(&at);
         if f.len() != n {
-            return Err(FormError::Shape { what: "F", rows: f.len(), columns: 1 });
+            return Err(FormError::Shape {
+                what: "F",
+                rows: f.len(),
+                columns: 1,
+            });
         }
         let m = (set.value)(&at).len();
         let h = (set.jacobian)(&at);
         if h.shape() != (m, n) {
-            return Err(FormError::Shape { what: "∂h/∂x", rows: h.nrows(), columns: h.ncols() });
+            return Err(FormError::Shape {
+                what: "∂h/∂x",
+                rows: h.nrows(),
+                columns: h.ncols(),
+            });
         }
         Ok(Self { field, set, n, m })
     }
@@ -86,7 +100,9 @@ impl ProjectedSystem {
     #[must_use]
     pub fn active(&self, x: &DVector<f64>) -> Vec<usize> {
         let h = (self.set.value)(x);
-        (0..self.m).filter(|&i| h[i].abs() <= ACTIVE * (1.0 + x.amax())).collect()
+        (0..self.m)
+            .filter(|&i| h[i].abs() <= ACTIVE * (1.0 + x.amax()))
+            .collect()
     }
 
     /// H_I(x), the gradients of the active constraints.
@@ -104,7 +120,11 @@ impl ProjectedSystem {
         if h.is_empty() {
             return Ok(());
         }
-        let values = if h.nrows() > h.ncols() { DVector::zeros(1) } else { h.singular_values() };
+        let values = if h.nrows() > h.ncols() {
+            DVector::zeros(1)
+        } else {
+            h.singular_values()
+        };
         require(
             values.min() > RANK * values.max(),
             "Heemels et al. Theorem 4.7",
@@ -117,14 +137,21 @@ impl ProjectedSystem {
     #[must_use]
     pub fn admissible(&self, x: &DVector<f64>) -> Polyhedron {
         let g = self.active_gradients(x);
-        Polyhedron { h: DVector::zeros(g.nrows()), g }
+        Polyhedron {
+            h: DVector::zeros(g.nrows()),
+            g,
+        }
     }
 
     /// Π_K(x, v) = v + H_Iᵀu with 0 ≤ u ⟂ H_I v + H_I H_Iᵀu ≥ 0 (23), and u.
     ///
     /// # Errors
     /// [`FormError::Step`] if the problem was not solved.
-    pub fn project_velocity(&self, x: &DVector<f64>, v: &DVector<f64>) -> Result<(DVector<f64>, DVector<f64>), FormError> {
+    pub fn project_velocity(
+        &self,
+        x: &DVector<f64>,
+        v: &DVector<f64>,
+    ) -> Result<(DVector<f64>, DVector<f64>), FormError> {
         self.admissible(x).project(v)
     }
 
@@ -142,7 +169,10 @@ impl ProjectedSystem {
     /// Those of [`step`](super::step()).
     pub fn nearest(&self, x: &DVector<f64>) -> Result<DVector<f64>, FormError> {
         let n = self.n;
-        let still = Self { field: Map::affine(DMatrix::zeros(n, n), DVector::zeros(n)), ..self.clone() };
+        let still = Self {
+            field: Map::affine(DMatrix::zeros(n, n), DVector::zeros(n)),
+            ..self.clone()
+        };
         Ok(super::step(&still, 0.0, x, 1.0)?.x)
     }
 }

@@ -55,7 +55,12 @@ pub struct Step {
 ///
 /// # Errors
 /// [`FormError::Step`] if the complementarity problem has no solution or the linearisation does not settle.
-pub fn step(system: &impl Complementarity, t: f64, x: &DVector<f64>, h: f64) -> Result<Step, FormError> {
+pub fn step(
+    system: &impl Complementarity,
+    t: f64,
+    x: &DVector<f64>,
+    h: f64,
+) -> Result<Step, FormError> {
     let t = t + h;
     let fail = |reason| FormError::Step { t, reason };
     let mut at = x.clone();

@@ -36,22 +36,41 @@ impl SweepingProcess {
     /// Which of the two fails.
     pub fn of(linear: &Linear, energy: Option<&DMatrix<f64>>) -> Result<Self, FormError> {
         const STATEMENT: &str = "Brogliato-Thibault section 3.1";
-        require(linear.system.d.amax() == 0.0, STATEMENT, "D = 0 fails", linear.system.d.amax())?;
-        Self::partitioned(linear, energy, (0..linear.system.m()).collect(), Vec::new(), STATEMENT)
+        require(
+            linear.system.d.amax() == 0.0,
+            STATEMENT,
+            "D = 0 fails",
+            linear.system.d.amax(),
+        )?;
+        Self::partitioned(
+            linear,
+            energy,
+            (0..linear.system.m()).collect(),
+            Vec::new(),
+            STATEMENT,
+        )
     }
 
     /// Section 3.3: D = diag(D₁, 0) up to order, D₁ a P-matrix, P₂B₂ = C₂ᵀ with P₂ ≻ 0.
     ///
     /// # Errors
     /// Which of them fails.
-    pub fn with_feedthrough(linear: &Linear, energy: Option<&DMatrix<f64>>) -> Result<Self, FormError> {
+    pub fn with_feedthrough(
+        linear: &Linear,
+        energy: Option<&DMatrix<f64>>,
+    ) -> Result<Self, FormError> {
         const STATEMENT: &str = "Brogliato-Thibault section 3.3";
         let d = &linear.system.d;
-        let (free, fed): (Vec<usize>, Vec<usize>) =
-            (0..d.nrows()).partition(|&j| d.row(j).amax().max(d.column(j).amax()) <= ZERO * d.amax());
+        let (free, fed): (Vec<usize>, Vec<usize>) = (0..d.nrows())
+            .partition(|&j| d.row(j).amax().max(d.column(j).amax()) <= ZERO * d.amax());
         let d1 = d.select_rows(&fed).select_columns(&fed);
         let p_matrix = Feedthrough::of(&d1).p_matrix;
-        require(p_matrix == Some(true), STATEMENT, "D₁ is not known to be a P-matrix", d1.determinant())?;
+        require(
+            p_matrix == Some(true),
+            STATEMENT,
+            "D₁ is not known to be a P-matrix",
+            d1.determinant(),
+        )?;
         Self::partitioned(linear, energy, free, fed, STATEMENT)
     }
 
@@ -65,7 +84,10 @@ impl SweepingProcess {
         let b = linear.system.b.select_columns(&free);
         let c = linear.system.c.select_rows(&free);
         let n = linear.system.n();
-        let distance = energy.map_or_else(|| (&b - c.transpose()).amax(), |p| gradient::residual(p, &b, &c));
+        let distance = energy.map_or_else(
+            || (&b - c.transpose()).amax(),
+            |p| gradient::residual(p, &b, &c),
+        );
         let p = if free.is_empty() {
             energy.cloned().unwrap_or_else(|| DMatrix::identity(n, n))
         } else {
@@ -80,7 +102,14 @@ impl SweepingProcess {
             condition: "P is not positive definite",
             size: verify::definite(&p).err().map_or(0.0, |_| 1.0),
         })?;
-        Ok(Self { linear: linear.clone(), p, r, r_inverse, free, fed })
+        Ok(Self {
+            linear: linear.clone(),
+            p,
+            r,
+            r_inverse,
+            free,
+            fed,
+        })
     }
 
     /// S(t) in the coordinates z.
@@ -106,7 +135,10 @@ impl SweepingProcess {
         let solution = Driver::new(d, Settings::default().lcp_residual).solve(&q);
         match solution.status {
             Status::Solved => Ok(solution.lambda),
-            _ => Err(FormError::Step { t, reason: "the problem of the ports with feedthrough was not solved" }),
+            _ => Err(FormError::Step {
+                t,
+                reason: "the problem of the ports with feedthrough was not solved",
+            }),
         }
     }
 
@@ -144,7 +176,12 @@ impl SweepingProcess {
     ///
     /// # Errors
     /// Those of the projection.
-    pub fn violation(&self, t: f64, z: &DVector<f64>, velocity: &DVector<f64>) -> Result<f64, FormError> {
+    pub fn violation(
+        &self,
+        t: f64,
+        z: &DVector<f64>,
+        velocity: &DVector<f64>,
+    ) -> Result<f64, FormError> {
         let force = velocity - self.drift(t, z)?;
         Ok((self.jump(t, &(z - force))? - z).norm())
     }

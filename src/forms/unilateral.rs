@@ -22,7 +22,9 @@ pub struct Unilateral {
 
 impl std::fmt::Debug for Unilateral {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Unilateral").field("inner", &self.inner).finish_non_exhaustive()
+        f.debug_struct("Unilateral")
+            .field("inner", &self.inner)
+            .finish_non_exhaustive()
     }
 }
 
@@ -39,9 +41,16 @@ impl Unilateral {
             affine: h.affine,
         };
         if g(0.0).len() != n {
-            return Err(FormError::Shape { what: "g", rows: g(0.0).len(), columns: 1 });
+            return Err(FormError::Shape {
+                what: "g",
+                rows: g(0.0).len(),
+                columns: 1,
+            });
         }
-        Ok(Self { inner: ProjectedSystem::new(f, set, n)?, g })
+        Ok(Self {
+            inner: ProjectedSystem::new(f, set, n)?,
+            g,
+        })
     }
 
     /// v = −f(x) − g(t), the velocity that the constraint set sees.
@@ -76,8 +85,16 @@ impl Unilateral {
     ///
     /// # Errors
     /// Those of the projection.
-    pub fn distance_to_inclusion(&self, t: f64, x: &DVector<f64>, velocity: &DVector<f64>) -> Result<f64, FormError> {
-        self.tangent(x).distance_to_normal(&DVector::zeros(x.len()), &(self.free_velocity(t, x) - velocity))
+    pub fn distance_to_inclusion(
+        &self,
+        t: f64,
+        x: &DVector<f64>,
+        velocity: &DVector<f64>,
+    ) -> Result<f64, FormError> {
+        self.tangent(x).distance_to_normal(
+            &DVector::zeros(x.len()),
+            &(self.free_velocity(t, x) - velocity),
+        )
     }
 
     /// The distance of a velocity from fulfilling (UDI-T_C): v − x' ∈ N_{T_C(x)}(x'), x' ∈ T_C(x).
@@ -92,7 +109,8 @@ impl Unilateral {
     ) -> Result<f64, FormError> {
         let tangent = self.tangent(x);
         let outside = (tangent.project(velocity)?.0 - velocity).norm();
-        let normal = tangent.distance_to_normal(velocity, &(self.free_velocity(t, x) - velocity))?;
+        let normal =
+            tangent.distance_to_normal(velocity, &(self.free_velocity(t, x) - velocity))?;
         Ok(outside.max(normal))
     }
 
@@ -100,9 +118,16 @@ impl Unilateral {
     ///
     /// # Errors
     /// Those of the projection.
-    pub fn multiplier(&self, t: f64, x: &DVector<f64>, velocity: &DVector<f64>) -> Result<DVector<f64>, FormError> {
+    pub fn multiplier(
+        &self,
+        t: f64,
+        x: &DVector<f64>,
+        velocity: &DVector<f64>,
+    ) -> Result<DVector<f64>, FormError> {
         // The polar part of v − x' in Moreau's decomposition, with the multipliers that make it.
-        let (_, mu) = self.tangent(x).project(&(self.free_velocity(t, x) - velocity))?;
+        let (_, mu) = self
+            .tangent(x)
+            .project(&(self.free_velocity(t, x) - velocity))?;
         Ok(mu)
     }
 }
