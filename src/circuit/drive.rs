@@ -59,7 +59,7 @@ impl<'n> Builder<'n, '_> {
             }
         };
         let source = Source {
-            dc: dc_value.unwrap_or_else(|| initial(&wave)),
+            dc: dc_value.unwrap_or_else(|| wave.value(0.0)),
             wave,
         };
         let (p, n) = (
@@ -302,26 +302,5 @@ impl<'n> Builder<'n, '_> {
             repeat,
             delay,
         })
-    }
-}
-
-/// The value at t = 0, which is the DC value where none is given.
-fn initial(wave: &Wave) -> f64 {
-    match wave {
-        Wave::Dc(value) => *value,
-        Wave::Sin {
-            offset,
-            amplitude,
-            frequency,
-            delay,
-            damping,
-            phase,
-        } => {
-            let late = (-delay).max(0.0);
-            let angle = std::f64::consts::TAU * frequency * late + phase.to_radians();
-            offset + amplitude * (-damping * late).exp() * angle.sin()
-        }
-        Wave::Pulse { v1, .. } | Wave::Exp { v1, .. } => *v1,
-        Wave::Pwl { points, .. } => points.first().map_or(0.0, |p| p.1),
     }
 }

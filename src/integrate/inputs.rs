@@ -46,7 +46,7 @@ impl Inputs {
     /// Writes left limits of the varying inputs.
     pub fn left(&self, t: f64, u: &mut [f64]) {
         for &j in &self.varying {
-            u[j] = self.sources[j].value_before(t);
+            u[j] = self.sources[j].value_left(t);
         }
     }
 
@@ -54,7 +54,7 @@ impl Inputs {
     pub fn slopes(&self, t: f64, du: &mut [f64]) {
         du.fill(0.0);
         for &j in &self.varying {
-            du[j] = self.sources[j].slope(t);
+            du[j] = self.sources[j].derivative(t);
         }
     }
 
@@ -76,6 +76,18 @@ impl Inputs {
                 Wave::Sin { frequency, .. } if frequency > 0.0 => {
                     Some(1.0 / (STEPS_PER_PERIOD * frequency))
                 }
+                // The instantaneous frequency of an FM source swings by index · signal.
+                Wave::Sffm {
+                    carrier,
+                    index,
+                    signal,
+                    ..
+                } => Some(1.0 / (STEPS_PER_PERIOD * (carrier.abs() + (index * signal).abs()))),
+                Wave::Am {
+                    modulation,
+                    carrier,
+                    ..
+                } => Some(1.0 / (STEPS_PER_PERIOD * (carrier.abs() + modulation.abs()))),
                 _ => None,
             })
             .fold(f64::INFINITY, f64::min)
@@ -88,68 +100,6 @@ fn is_constant(wave: &Wave) -> bool {
         Wave::Sin { amplitude, .. } => *amplitude == 0.0,
         Wave::Pulse { v1, v2, .. } | Wave::Exp { v1, v2, .. } => v1 == v2,
         Wave::Pwl { points, .. } => points.windows(2).all(|w| w[0].1 == w[1].1),
-    }
-}
-
-/// TEMPORARY until `circuit::source` evaluates itself.
-trait Evaluate {
-    fn value(&self, t: f64) -> f64;
-    fn value_before(&self, t: f64) -> f64;
-    fn slope(&self, t: f64) -> f64;
-    fn next_breakpoint(&self, t: f64) -> Option<f64>;
-}
-
-impl Evaluate for crate::circuit::Source {
-    fn value(&self, t: f64) -> f64 {
-        match &self.wave {
-            Wave::Dc(v) => *v,
-            Wave::Sin {
-                offset,
-                amplitude,
-                frequency,
-                phase,
-                ..
-            } => {
-                offset
-                    + amplitude
-                        * (2.0 * std::f64::consts::PI * frequency * t + phase.to_radians()).sin()
-            }
-            Wave::Pwl { points, .. } => points
-                .iter()
-                .rev()
-                .find(|p| p.0 <= t)
-                .map_or(points[0].1, |p| p.1),
-            _ => self.dc,
-        }
-    }
-    fn value_before(&self, t: f64) -> f64 {
-        match &self.wave {
-            Wave::Pwl { points, .. } => points
-                .iter()
-                .rev()
-                .find(|p| p.0 < t)
-                .map_or(points[0].1, |p| p.1),
-            _ => self.value(t),
-        }
-    }
-    fn slope(&self, t: f64) -> f64 {
-        match &self.wave {
-            Wave::Sin {
-                amplitude,
-                frequency,
-                phase,
-                ..
-            } => {
-                let w = 2.0 * std::f64::consts::PI * frequency;
-                amplitude * w * (w * t + phase.to_radians()).cos()
-            }
-            _ => 0.0,
-        }
-    }
-    fn next_breakpoint(&self, t: f64) -> Option<f64> {
-        match &self.wave {
-            Wave::Pwl { points, .. } => points.iter().map(|p| p.0).find(|&p| p > t),
-            _ => None,
-        }
+        Wave::Sffm { amplitude, .. } | Wave::Am { amplitude, .. } => *amplitude == 0.0,
     }
 }
