@@ -5,6 +5,7 @@
 //! z = h(x), h' = Λ(x) = V''(x)^½ (36):  −z' + … ∈ N(S(t); z),  S(t) = {z : k(z) + g(u(t)) ≥ 0}, k = c ∘ h⁻¹ (40)
 //! ```
 
+use std::cell::RefCell;
 use std::fmt;
 use std::rc::Rc;
 
@@ -25,6 +26,10 @@ const MATCHED: f64 = 1e-9;
 
 /// Ports up to which the constant of (38) is computed exactly, over all faces of the orthant.
 const MAX_PORTS: usize = 12;
+
+/// Newton steps and relative change of the inversion of the state map.
+const NEWTON_STEPS: usize = 50;
+const STILL: f64 = 1e-14;
 
 /// A nonlinear complementarity system with storage function V.
 #[derive(Clone)]
@@ -100,6 +105,31 @@ impl NonlinearComplementarity {
         Some(z)
     }
 
+    /// x = h⁻¹(z), by Newton's method from `near`.
+    #[must_use]
+    pub fn inverse_state_map(&self, z: &DVector<f64>, near: &DVector<f64>) -> Option<DVector<f64>> {
+        let mut x = near.clone();
+        for _ in 0..NEWTON_STEPS {
+            let residual = z - self.state_map(&x)?;
+            let (_, inverse) = square_root(&(self.hessian)(&x))?;
+            let step = inverse * residual;
+            x += &step;
+            if step.amax() <= STILL * (1.0 + x.amax()) {
+                return Some(x);
+            }
+        }
+        None
+    }
+
+    /// The system in the coordinates z (40), in which jumps are projections onto S(t).
+    ///
+    /// # Errors
+    /// [`FormError::Hypothesis`] if V'' is not positive definite at the start.
+    pub fn in_z(&self, x0: &DVector<f64>) -> Result<SweepingForm<'_>, FormError> {
+        self.check_storage(std::slice::from_ref(x0))?;
+        Ok(SweepingForm { original: self, last: RefCell::new(x0.clone()) })
+    }
+
     /// The largest ρ with ρ𝔹 ⊂ BᵀΛ(x)𝔹 − R₊ᵐ (38), which is min ‖ΛBμ‖ over μ ≥ 0, ‖μ‖ = 1. `None` for more ports than
     /// are enumerated.
     #[must_use]
@@ -165,6 +195,67 @@ const GAUSS: [(f64, f64); 5] = [
     (0.865_063_366_688_984_5, 0.149_451_349_150_580_6),
     (0.973_906_528_517_171_7, 0.066_671_344_308_688_14),
 ];
+
+/// The perturbed sweeping process (40) of a nonlinear complementarity system, stepped in z.
+#[derive(Debug)]
+pub struct SweepingForm<'a> {
+    original: &'a NonlinearComplementarity,
+    /// The last x found: where the next inversion of the state map starts.
+    last: RefCell<DVector<f64>>,
+}
+
+impl SweepingForm<'_> {
+    /// x of a z; the last one found if the inversion fails, which the step notices as an iteration that does not settle.
+    fn x(&self, z: &DVector<f64>) -> DVector<f64> {
+        let near = self.last.borrow().clone();
+        let x = self.original.inverse_state_map(z, &near).unwrap_or(near);
+        self.last.replace(x.clone());
+        x
+    }
+
+    fn lambda(&self, x: &DVector<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+        square_root(&(self.original.hessian)(x))
+            .unwrap_or_else(|| (DMatrix::identity(x.len(), x.len()), DMatrix::identity(x.len(), x.len())))
+    }
+}
+
+impl Complementarity for SweepingForm<'_> {
+    fn size(&self) -> (usize, usize) {
+        self.original.b.shape()
+    }
+
+    fn drift(&self, t: f64, z: &DVector<f64>) -> DVector<f64> {
+        let x = self.x(z);
+        self.lambda(&x).0 * (self.original.field)(t, &x)
+    }
+
+    /// ΛJΛ⁻¹: the derivative of Λ itself is left to the iteration.
+    fn drift_jacobian(&self, t: f64, z: &DVector<f64>) -> DMatrix<f64> {
+        let x = self.x(z);
+        let (root, inverse) = self.lambda(&x);
+        root * (self.original.field_jacobian)(t, &x) * inverse
+    }
+
+    fn input(&self, z: &DVector<f64>) -> DMatrix<f64> {
+        self.lambda(&self.x(z)).0 * &self.original.b
+    }
+
+    fn constraint(&self, t: f64, z: &DVector<f64>) -> DVector<f64> {
+        (self.original.c.value)(&self.x(z)) + (self.original.g)(t)
+    }
+
+    fn constraint_jacobian(&self, _: f64, z: &DVector<f64>) -> DMatrix<f64> {
+        self.original.b.transpose() * self.lambda(&self.x(z)).0
+    }
+
+    fn feedthrough(&self) -> DMatrix<f64> {
+        DMatrix::zeros(self.original.b.ncols(), self.original.b.ncols())
+    }
+
+    fn is_affine(&self) -> bool {
+        false
+    }
+}
 
 impl Complementarity for NonlinearComplementarity {
     fn size(&self) -> (usize, usize) {
