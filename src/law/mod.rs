@@ -41,6 +41,12 @@ impl Law {
         }
     }
 
+    /// Whether this is exactly the ideal diode.
+    #[must_use]
+    pub fn is_ideal_diode(&self) -> bool {
+        matches!(self, Self::Diode { vfwd, ron, roff: None } if vfwd.f64 == 0.0 && ron.f64 == 0.0)
+    }
+
     /// The ideal diode: 0 ≤ i ⟂ −v ≥ 0.
     #[must_use]
     pub const fn ideal_diode() -> Self {
