@@ -27,6 +27,7 @@ pub mod algebra;
 pub mod check;
 pub mod circuit;
 pub mod diagnostic;
+pub mod forms;
 pub mod integrate;
 pub mod law;
 pub mod lcs;

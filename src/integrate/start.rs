@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use crate::circuit::{Circuit, Element, Kind, NodeId, Probe, Probed, Source, source::Wave};
+use crate::circuit::{Circuit, Element, ElementId, Kind, NodeId, Probe, Probed, Source, source::Wave};
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Reason, SimError};
 use crate::lcs::{Hold, Lcs, Position, ReduceError, StorageHold, reduce};
@@ -124,13 +124,19 @@ pub fn operating_point(
         if wanted == position {
             notes.extend(point.notes);
             let count = circuit.nodes.len() - 1;
+            let (currents, ties) = point.readings[count..].split_at(circuit.elements.len());
+            let largest = currents.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+            if ties.iter().any(|i| i.abs() > ROUNDING * largest) {
+                let what = "a current flows into a part of the circuit that only capacitors hold";
+                return Err(SimError::before(Reason::NoOperatingPoint(what.into())));
+            }
             let named = |names: &[String], values: &[f64]| -> Vec<(String, f64)> {
                 names.iter().cloned().zip(values.iter().copied()).collect()
             };
             let elements: Vec<String> = circuit.elements.iter().map(|e| e.name.clone()).collect();
             return Ok(OperatingPoint {
                 nodes: named(&circuit.nodes[1..], &point.readings[..count]),
-                currents: named(&elements, &point.readings[count..count + elements.len()]),
+                currents: named(&elements, currents),
                 switches: behaviour
                     .switches
                     .iter()
@@ -159,7 +165,7 @@ fn observed_circuit(circuit: &Circuit) -> Circuit {
     });
     let currents = circuit.elements.iter().enumerate().map(|(i, e)| Probe {
         name: format!("i({})", e.name),
-        what: Probed::Current(crate::circuit::ElementId(i as u32)),
+        what: Probed::Current(ElementId(i as u32)),
     });
     Circuit { probes: nodes.chain(currents).collect(), ..circuit.clone() }
 }
@@ -209,12 +215,12 @@ fn tie_floating(circuit: &Circuit, statics: &mut Circuit, hold_ic: bool, notes: 
             });
         if floats && !held {
             let name = &circuit.nodes[i];
-            statics.elements.push(source(
-                format!("tie:{name}"),
-                NodeId(i as u32),
-                NodeId::GROUND,
-                0.0,
-            ));
+            let tie = source(format!("tie:{name}"), NodeId(i as u32), NodeId::GROUND, 0.0);
+            statics.probes.push(Probe {
+                name: format!("i({})", tie.name),
+                what: Probed::Current(ElementId(statics.elements.len() as u32)),
+            });
+            statics.elements.push(tie);
             notes.push(format!("node {name} is held by capacitors alone and starts at 0 V"));
         }
     }

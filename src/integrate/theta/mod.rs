@@ -25,7 +25,7 @@ use crate::integrate::stats::Stats;
 use crate::integrate::step::Scheme;
 use crate::integrate::switching::{Switches, Threshold};
 use crate::integrate::system::{Plant, Reduce, System};
-use crate::lcs::{Port, Role};
+use crate::lcs::{Lcs, Port, Role};
 use crate::settings::Settings;
 use crate::solve::{Solution, Status};
 
