@@ -3,12 +3,12 @@
 use nalgebra::DVector;
 
 use super::{Exact, Setup};
-use crate::circuit::{Circuit, ElaborateOptions, elaborate};
+use crate::circuit::{Circuit, ElaborateOptions, Tran, elaborate};
 use crate::diagnostic::SourceMap;
-use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, run};
+use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, Stepper, run};
 use crate::integrate::switching::Threshold;
 use crate::integrate::Run;
-use crate::lcs::{Hold, Position, StorageHold, reduce};
+use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
 use crate::mna;
 use crate::settings::Settings;
 
@@ -21,8 +21,8 @@ fn circuit(text: &str) -> Circuit {
     circuit.unwrap_or_else(|| panic!("{findings:?}"))
 }
 
-/// Runs a netlist that starts from `uic` and whose switches start as their cards say.
-fn try_simulate(text: &str) -> Result<Run, SimError> {
+/// A stepper for a netlist that starts from `uic` and whose switches start as their cards say.
+fn prepare(text: &str, energy: bool) -> (Exact<'static>, Lcs, Tran) {
     let circuit = circuit(text);
     let tran = circuit.tran.expect("a .tran card");
     let behaviour = mna::behaviour(&circuit).expect("a sound circuit").standard();
@@ -42,7 +42,7 @@ fn try_simulate(text: &str) -> Result<Run, SimError> {
         reduce(&behaviour, &position).map_err(|e| SimError::before(Reason::Circuit(e.to_string())))
     };
     let lcs = assemble(&vec![Hold::Free; pairs], &position).expect("a system");
-    let mut exact = Exact::new(Setup {
+    let exact = Exact::new(Setup {
         assemble: Box::new(assemble),
         pairs,
         position,
@@ -51,20 +51,26 @@ fn try_simulate(text: &str) -> Result<Run, SimError> {
         until: tran.tstop,
         start: DVector::from_column_slice(lcs.storage.initial.as_slice()),
         h: tran.tstep,
-        energy: true,
+        energy,
         settings: Settings::default(),
-    })?;
+    })
+    .expect("sources with closed forms");
+    (exact, lcs, tran)
+}
+
+fn try_simulate(text: &str) -> Result<Run, SimError> {
+    let (mut exact, lcs, tran) = prepare(text, true);
+    let columns = lcs.outputs.names.len();
     let frame = Frame {
         title: String::new(),
-        names: lcs.outputs.names.clone(),
-        units: lcs.outputs.units.clone(),
+        names: lcs.outputs.names,
+        units: lcs.outputs.units,
         grid: Grid { tstart: tran.tstart, tstep: tran.tstep, tstop: tran.tstop },
         method: "exact".into(),
         plan: vec![],
         notes: vec![],
         progress: None,
     };
-    let columns = lcs.outputs.names.len();
     run(&mut exact, frame, Log::new(columns, tran.tstart, false))
 }
 
@@ -247,5 +253,34 @@ fn flux_is_shared_through_an_opening_switch() {
     for t in [1e-3, 2e-3] {
         assert!((at(&run, t, "i(l1)") - 0.25).abs() < 1e-15, "{}", at(&run, t, "i(l1)"));
         assert!((at(&run, t, "i(l2)") + 0.25).abs() < 1e-15);
+    }
+}
+
+#[test]
+#[ignore = "a measurement"]
+fn speed() {
+    for (name, text) in [
+        ("bridge A", format!("{BRIDGE}.tran 1u 5m uic\n.save v(1) i(L1) v(2,3)")),
+        ("bridge A 0.1us", format!("{BRIDGE}.tran 0.1u 5m uic\n.save v(1) i(L1) v(2,3)")),
+        ("bridge B", format!("{BRIDGE}Cf 2 3 300n IC=0\n.tran 1u 5m uic\n.save v(1) v(2,3) i(L1)")),
+        (
+            "maffezzoni",
+            maffezzoni(".model SWM SW(Vt=0 Vh=0 Ron=1m Roff=1k)\n.model DM D(Ron=1m Roff=1k Vfwd=0)"),
+        ),
+    ] {
+        for _ in 0..3 {
+            let (mut exact, lcs, tran) = prepare(&text, false);
+            let start = std::time::Instant::now();
+            let mut log = Log::new(lcs.outputs.names.len(), 0.0, false);
+            let mut row = vec![0.0; lcs.outputs.names.len()];
+            let grid = Grid { tstart: tran.tstart, tstep: tran.tstep, tstop: tran.tstop };
+            for k in 0..grid.len() {
+                exact.advance(grid.time(k), &mut log).unwrap();
+                exact.read(&mut row);
+            }
+            let seconds = start.elapsed().as_secs_f64();
+            let stats = exact.finish().stats;
+            println!("{name}: {:.3} ms, {} points, {stats:?}", 1e3 * seconds, grid.len());
+        }
     }
 }
