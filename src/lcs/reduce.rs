@@ -765,6 +765,7 @@ impl<F: Field> Solved<F> {
             storage: Storage {
                 names: behaviour.storage.iter().map(|s| s.name.clone()).collect(),
                 x: storage.x,
+                lambda: storage.lambda,
                 u: storage.u,
                 one: storage.one,
                 metric,

@@ -1,0 +1,262 @@
+//! From a circuit, or a system, to a run.
+
+use nalgebra::DVector;
+
+use crate::circuit::{Circuit, Tran};
+use crate::integrate::control::Amplitudes;
+use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, Stepper, run};
+use crate::integrate::start;
+use crate::integrate::step::Scheme;
+use crate::integrate::switching::Threshold;
+use crate::integrate::system::Reduce;
+use crate::integrate::theta::{Setup, Start, Stepping, Theta};
+use crate::integrate::Run;
+use crate::lcs::{Lcs, Position, reduce};
+use crate::mna::Behaviour;
+use crate::plan::{Plan, plan};
+use crate::settings::Settings;
+
+/// Integration methods.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// What the plan finds best.
+    #[default]
+    Auto,
+    /// Event-driven matrix exponentials.
+    Exact,
+    /// Moreau's scheme, θ = γ = 1.
+    Euler,
+    /// (θ, γ), by default ½ and ½.
+    Theta,
+}
+
+impl Method {
+    /// `auto`, `exact`, `euler`, `theta`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Exact => "exact",
+            Self::Euler => "euler",
+            Self::Theta => "theta",
+        }
+    }
+}
+
+/// What a simulation may be asked for.
+#[derive(Default)]
+pub struct SimOptions<'a> {
+    /// The method.
+    pub method: Method,
+    /// θ, default ½ (1 for `euler`).
+    pub theta: Option<f64>,
+    /// γ, default ½ (1 for `euler`).
+    pub gamma: Option<f64>,
+    /// Fixed step, s; error-controlled where absent.
+    pub step: Option<f64>,
+    /// Rows at event times too.
+    pub events: bool,
+    /// Tolerances.
+    pub settings: Settings,
+    /// Called with the time reached, s.
+    pub progress: Option<&'a mut dyn FnMut(f64)>,
+}
+
+/// Simulates a circuit over its `.tran`.
+///
+/// `behaviour` is the circuit's, laws included; piecewise-linear laws are turned into ideal pairs here. Probes are the circuit's.
+///
+/// # Errors
+/// See [`Reason`]; the run so far is in [`SimError::partial`].
+pub fn simulate(
+    circuit: &Circuit,
+    behaviour: &Behaviour,
+    options: SimOptions<'_>,
+) -> Result<Run, SimError> {
+    let tran = circuit.tran.ok_or_else(|| {
+        SimError::before(Reason::Unsupported("the netlist asks for no .tran analysis".into()))
+    })?;
+    let standard = behaviour.standard();
+    let initial = start::initial(circuit, &standard, tran.uic, &options.settings)?;
+    let thresholds: Vec<Threshold> = standard
+        .switches
+        .iter()
+        .map(|s| Threshold {
+            name: s.name.clone(),
+            on_above: s.on_above,
+            off_below: s.off_below,
+        })
+        .collect();
+    let settle: Vec<bool> =
+        standard.switches.iter().map(|s| tran.uic && s.initial.is_none()).collect();
+    let reduce_at = |switches: &[bool]| -> Result<Lcs, SimError> {
+        let position = Position::free(&standard, switches.to_vec());
+        reduce(&standard, &position)
+            .map_err(|error| SimError::before(Reason::Circuit(error.to_string())))
+    };
+    let mut notes: Vec<String> = behaviour.notes.iter().map(|n| n.message.clone()).collect();
+    notes.extend(initial.notes);
+    let problem = Problem {
+        reduce: &reduce_at,
+        position: initial.switches,
+        settle,
+        thresholds,
+        start: Start::Storage(initial.storage),
+        notes,
+    };
+    drive(problem, tran, options)
+}
+
+/// Simulates a system without a circuit behind it (the JSON of `circ lcs`), from state `x`.
+///
+/// # Errors
+/// See [`Reason`].
+pub fn simulate_system(
+    lcs: &Lcs,
+    x: DVector<f64>,
+    tran: Tran,
+    options: SimOptions<'_>,
+) -> Result<Run, SimError> {
+    let reduce_at = |_: &[bool]| Ok(lcs.clone());
+    let problem = Problem {
+        reduce: &reduce_at,
+        position: lcs.switches.iter().map(|(_, on)| *on).collect(),
+        settle: vec![],
+        thresholds: vec![],
+        start: Start::State(x),
+        notes: vec![],
+    };
+    drive(problem, tran, options)
+}
+
+/// What the steppers share.
+struct Problem<'p> {
+    reduce: &'p dyn Fn(&[bool]) -> Result<Lcs, SimError>,
+    position: Vec<bool>,
+    /// Switches whose start position follows from the start state.
+    settle: Vec<bool>,
+    thresholds: Vec<Threshold>,
+    start: Start,
+    notes: Vec<String>,
+}
+
+/// Steps of the run that finds the amplitudes beforehand.
+const SCOUT_STEPS: f64 = 256.0;
+/// The scout gives up after this many steps (trains of many pulses); what it has seen by then is used.
+const SCOUT_LIMIT: u64 = 20_000;
+
+impl Problem<'_> {
+    fn reducer(&self) -> Reduce<'_> {
+        Box::new(move |position: &[bool]| (self.reduce)(position))
+    }
+
+    fn stepper(
+        &self,
+        tran: &Tran,
+        scheme: Scheme,
+        stepping: Stepping,
+        settings: &Settings,
+    ) -> Result<Theta<'_>, SimError> {
+        Theta::new(Setup {
+            reduce: self.reducer(),
+            position: self.position.clone(),
+            thresholds: self.thresholds.clone(),
+            t: 0.0,
+            start: self.start.clone(),
+            scheme,
+            stepping,
+            longest: tran.tmax.unwrap_or(f64::INFINITY),
+            settings: settings.clone(),
+        })
+    }
+
+    /// Positions of switches without `ON`/`OFF` that agree with their controls at the start state.
+    fn settle_switches(&mut self, tran: &Tran, settings: &Settings) -> Result<(), SimError> {
+        let mut seen = Vec::new();
+        while self.settle.contains(&true) {
+            let stepping = Stepping::Fixed(tran.tstep);
+            let mut theta = self.stepper(tran, Scheme::MOREAU, stepping, settings)?;
+            let controls = theta.controls_at_start()?;
+            let wanted: Vec<bool> = (0..controls.len())
+                .map(|k| {
+                    if self.settle[k] {
+                        controls[k] > self.thresholds[k].on_above
+                    } else {
+                        self.position[k]
+                    }
+                })
+                .collect();
+            drop(theta);
+            if wanted == self.position {
+                break;
+            }
+            if seen.contains(&wanted) {
+                return Err(SimError::at(0.0, Reason::SwitchesDoNotSettle));
+            }
+            seen.push(std::mem::replace(&mut self.position, wanted));
+        }
+        Ok(())
+    }
+
+    /// Amplitudes from a coarse run.
+    fn scout(&self, tran: &Tran, settings: &Settings) -> Option<Amplitudes> {
+        let settings = Settings { max_steps: SCOUT_LIMIT, ..settings.clone() };
+        let stepping = Stepping::Fixed(tran.tstop / SCOUT_STEPS);
+        let mut theta = self.stepper(tran, Scheme::MOREAU, stepping, &settings).ok()?;
+        let mut log = Log::new(0, f64::INFINITY, false);
+        for k in 1..=SCOUT_STEPS as u32 {
+            // A failure here will be met, and reported, by the run itself.
+            if theta.advance(tran.tstop * f64::from(k) / SCOUT_STEPS, &mut log).is_err() {
+                break;
+            }
+            theta.see();
+        }
+        Some(theta.amplitudes().clone())
+    }
+}
+
+fn drive(mut problem: Problem<'_>, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
+    check(&tran, &options)?;
+    problem.settle_switches(&tran, &options.settings)?;
+    let lcs = (problem.reduce)(&problem.position)?;
+    let Plan { method, scheme, words } = plan(&lcs, &options);
+    let grid = Grid { tstart: tran.tstart, tstep: tran.tstep, tstop: tran.tstop };
+    let frame = Frame {
+        title: lcs.title.clone(),
+        names: lcs.outputs.names.clone(),
+        units: lcs.outputs.units.clone(),
+        grid,
+        method: method.name().into(),
+        plan: words,
+        notes: problem.notes.clone(),
+        progress: options.progress,
+    };
+    let log = Log::new(frame.names.len(), grid.tstart, options.events);
+    let stepping = match options.step {
+        Some(h) => Stepping::Fixed(h),
+        None => Stepping::Controlled { span: tran.tstop, first: tran.tstep / 64.0 },
+    };
+    let mut theta = problem.stepper(&tran, scheme, stepping, &options.settings)?;
+    if options.step.is_none()
+        && let Some(amplitudes) = problem.scout(&tran, &options.settings)
+    {
+        theta.expect_amplitudes(amplitudes);
+    }
+    run(&mut theta, frame, log)
+}
+
+fn check(tran: &Tran, options: &SimOptions<'_>) -> Result<(), SimError> {
+    let wrong = |what: &str| Err(SimError::before(Reason::Unsupported(what.into())));
+    let between = |v: Option<f64>| v.is_none_or(|v| (0.5..=1.0).contains(&v));
+    if !between(options.theta) || !between(options.gamma) {
+        return wrong("theta and gamma lie between 1/2 and 1");
+    }
+    if options.step.is_some_and(|h| !(h > 0.0 && h.is_finite())) {
+        return wrong("the step must be a positive time");
+    }
+    let times = tran.tstep > 0.0 && tran.tstart >= 0.0 && tran.tstop > tran.tstart;
+    if !times || !tran.tstop.is_finite() {
+        return wrong(".tran needs 0 <= tstart < tstop and a positive tstep");
+    }
+    Ok(())
+}
