@@ -3,11 +3,13 @@
 use nalgebra::DVector;
 
 use super::{Exact, Setup};
-use crate::circuit::{Circuit, ElaborateOptions, Tran, elaborate};
+use crate::algebra::Value;
+use crate::circuit::{Affine, Circuit, ElaborateOptions, Kind, Output, Quantity, Tran, elaborate};
 use crate::diagnostic::SourceMap;
 use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, Stepper, run};
 use crate::integrate::switching::Threshold;
 use crate::integrate::Run;
+use crate::law::{Curve, Law};
 use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
 use crate::mna;
 use crate::settings::Settings;
@@ -23,9 +25,12 @@ fn circuit(text: &str) -> Circuit {
 
 /// A stepper for a netlist that starts from `uic` and whose switches start as their cards say.
 fn prepare(text: &str, energy: bool) -> (Exact<'static>, Lcs, Tran) {
-    let circuit = circuit(text);
+    prepare_circuit(&circuit(text), energy)
+}
+
+fn prepare_circuit(circuit: &Circuit, energy: bool) -> (Exact<'static>, Lcs, Tran) {
     let tran = circuit.tran.expect("a .tran card");
-    let behaviour = mna::behaviour(&circuit).expect("a sound circuit").standard();
+    let behaviour = mna::behaviour(circuit).expect("a sound circuit").standard();
     let thresholds: Vec<Threshold> = behaviour
         .switches
         .iter()
@@ -59,7 +64,11 @@ fn prepare(text: &str, energy: bool) -> (Exact<'static>, Lcs, Tran) {
 }
 
 fn try_simulate(text: &str) -> Result<Run, SimError> {
-    let (mut exact, lcs, tran) = prepare(text, true);
+    simulate_circuit(&circuit(text))
+}
+
+fn simulate_circuit(circuit: &Circuit) -> Result<Run, SimError> {
+    let (mut exact, lcs, tran) = prepare_circuit(circuit, true);
     let columns = lcs.outputs.names.len();
     let frame = Frame {
         title: String::new(),
@@ -283,4 +292,47 @@ fn speed() {
             println!("{name}: {:.3} ms, {} points, {stats:?}", 1e3 * seconds, grid.len());
         }
     }
+}
+
+/// A netlist whose voltage source `name` becomes the relay `low` / `high` of the voltages `gains · v(nodes)`.
+fn with_relays(text: &str, relays: &[(&str, &[(f64, &str)], f64, f64)]) -> Circuit {
+    let mut circuit = circuit(text);
+    for (name, input, low, high) in relays {
+        let terms = input
+            .iter()
+            .map(|(gain, node)| {
+                (Value::binary(*gain), Quantity::Voltage(circuit.node(node).expect("a node")))
+            })
+            .collect();
+        let zero = Value::binary(0.0);
+        let along = (Value::binary(1.0), zero);
+        let law = Law::Curve(Curve {
+            kind: "relay",
+            vertices: vec![(zero, Value::binary(*low)), (zero, Value::binary(*high))],
+            first: along,
+            last: along,
+        });
+        let element = circuit.element(name).expect("an element");
+        circuit.elements[element.index()].kind = Kind::Function {
+            output: Output::Voltage,
+            input: Affine { terms, constant: 0.0 },
+            law,
+        };
+    }
+    circuit
+}
+
+/// x1' = −s1 + 2 s2, x2' = −2 s1 − s2 with s_i in sgn(x_i).
+#[test]
+fn two_relays_pass_their_accumulation_point() {
+    let circuit = with_relays(
+        "C1 1 0 1 IC=1\nC2 2 0 1 IC=0.3\nE1 a 0 x 0 0\nE2 b 0 x 0 0\nVx x 0 0\nVs1 s1 0 0\nVs2 s2 0 0\n\
+         G1 1 0 s1 0 1\nG2 0 1 s2 0 2\nG3 2 0 s1 0 2\nG4 2 0 s2 0 1\n.tran 10m 3 uic\n.save v(1) v(2)",
+        &[("vs1", &[(1.0, "1")], -1.0, 1.0), ("vs2", &[(1.0, "2")], -1.0, 1.0)],
+    );
+    let run = simulate_circuit(&circuit).unwrap_or_else(|e| panic!("{e}"));
+    // x1 + … falls: |x1| + |x2| ≤ decays at least at rate … ; each turn shrinks, the sum of times is finite.
+    println!("{:?} {:?}", run.stats, run.events.iter().map(|e| e.0).collect::<Vec<_>>());
+    assert_eq!(at(&run, 3.0, "v(1)"), 0.0);
+    assert_eq!(at(&run, 3.0, "v(2)"), 0.0);
 }
