@@ -86,7 +86,7 @@ impl<'a> Exact<'a> {
     /// # Errors
     /// The reduction's for the start position; sources that no finite linear system generates.
     pub fn new(setup: Setup<'a>) -> Result<Self, SimError> {
-        let Setup { assemble, pairs, position, thresholds, t, until, start, h, energy, settings } = setup;
+        let Setup { assemble, pairs, mut position, thresholds, t, until, start, h, energy, settings } = setup;
         let mut plant = Plant::new(assemble, pairs, thresholds, h, energy, settings.lcp_residual);
         let lcs = plant.free(&position)?.lcs.clone();
         let sources: Vec<Source> = lcs.inputs.iter().map(|i| i.source.clone()).collect();
@@ -96,6 +96,11 @@ impl<'a> Exact<'a> {
             ))
         })?;
         plant.driven = (0..plant.thresholds.len()).map(|i| is_driven(&lcs, i)).collect();
+        for i in (0..position.len()).filter(|&i| plant.driven[i]) {
+            let values = sources.iter().enumerate().map(|(j, s)| lcs.controls.u[(i, j)] * s.value(t));
+            let control = lcs.controls.one[i] + values.sum::<f64>();
+            position[i] = plant.thresholds[i].position(position[i], control);
+        }
         let schedule = schedule(&lcs, &plant, &sources, &position, t, until);
         let volts = lcs.storage.names.iter().map(|name| name.starts_with('v')).collect();
         let metric = lcs.storage.metric.clone();

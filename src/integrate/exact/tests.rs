@@ -3,12 +3,14 @@
 use nalgebra::DVector;
 
 use super::{Exact, Setup};
-use crate::circuit::{Circuit, ElaborateOptions, elaborate};
+use crate::algebra::Value;
+use crate::circuit::{Affine, Circuit, ElaborateOptions, Kind, Output, Quantity, Tran, elaborate};
 use crate::diagnostic::SourceMap;
-use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, run};
+use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, Stepper, run};
 use crate::integrate::switching::Threshold;
 use crate::integrate::Run;
-use crate::lcs::{Hold, Position, StorageHold, reduce};
+use crate::law::{Curve, Law};
+use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
 use crate::mna;
 use crate::settings::Settings;
 
@@ -21,11 +23,14 @@ fn circuit(text: &str) -> Circuit {
     circuit.unwrap_or_else(|| panic!("{findings:?}"))
 }
 
-/// Runs a netlist that starts from `uic` and whose switches start as their cards say.
-fn try_simulate(text: &str) -> Result<Run, SimError> {
-    let circuit = circuit(text);
+/// A stepper for a netlist that starts from `uic` and whose switches start as their cards say.
+fn prepare(text: &str, energy: bool) -> (Exact<'static>, Lcs, Tran) {
+    prepare_circuit(&circuit(text), energy)
+}
+
+fn prepare_circuit(circuit: &Circuit, energy: bool) -> (Exact<'static>, Lcs, Tran) {
     let tran = circuit.tran.expect("a .tran card");
-    let behaviour = mna::behaviour(&circuit).expect("a sound circuit").standard();
+    let behaviour = mna::behaviour(circuit).expect("a sound circuit").standard();
     let thresholds: Vec<Threshold> = behaviour
         .switches
         .iter()
@@ -42,7 +47,7 @@ fn try_simulate(text: &str) -> Result<Run, SimError> {
         reduce(&behaviour, &position).map_err(|e| SimError::before(Reason::Circuit(e.to_string())))
     };
     let lcs = assemble(&vec![Hold::Free; pairs], &position).expect("a system");
-    let mut exact = Exact::new(Setup {
+    let exact = Exact::new(Setup {
         assemble: Box::new(assemble),
         pairs,
         position,
@@ -51,20 +56,30 @@ fn try_simulate(text: &str) -> Result<Run, SimError> {
         until: tran.tstop,
         start: DVector::from_column_slice(lcs.storage.initial.as_slice()),
         h: tran.tstep,
-        energy: true,
+        energy,
         settings: Settings::default(),
-    })?;
+    })
+    .expect("sources with closed forms");
+    (exact, lcs, tran)
+}
+
+fn try_simulate(text: &str) -> Result<Run, SimError> {
+    simulate_circuit(&circuit(text))
+}
+
+fn simulate_circuit(circuit: &Circuit) -> Result<Run, SimError> {
+    let (mut exact, lcs, tran) = prepare_circuit(circuit, true);
+    let columns = lcs.outputs.names.len();
     let frame = Frame {
         title: String::new(),
-        names: lcs.outputs.names.clone(),
-        units: lcs.outputs.units.clone(),
+        names: lcs.outputs.names,
+        units: lcs.outputs.units,
         grid: Grid { tstart: tran.tstart, tstep: tran.tstep, tstop: tran.tstop },
         method: "exact".into(),
         plan: vec![],
         notes: vec![],
         progress: None,
     };
-    let columns = lcs.outputs.names.len();
     run(&mut exact, frame, Log::new(columns, tran.tstart, false))
 }
 
@@ -248,4 +263,76 @@ fn flux_is_shared_through_an_opening_switch() {
         assert!((at(&run, t, "i(l1)") - 0.25).abs() < 1e-15, "{}", at(&run, t, "i(l1)"));
         assert!((at(&run, t, "i(l2)") + 0.25).abs() < 1e-15);
     }
+}
+
+#[test]
+#[ignore = "a measurement"]
+fn speed() {
+    for (name, text) in [
+        ("bridge A", format!("{BRIDGE}.tran 1u 5m uic\n.save v(1) i(L1) v(2,3)")),
+        ("bridge A 0.1us", format!("{BRIDGE}.tran 0.1u 5m uic\n.save v(1) i(L1) v(2,3)")),
+        ("bridge B", format!("{BRIDGE}Cf 2 3 300n IC=0\n.tran 1u 5m uic\n.save v(1) v(2,3) i(L1)")),
+        (
+            "maffezzoni",
+            maffezzoni(".model SWM SW(Vt=0 Vh=0 Ron=1m Roff=1k)\n.model DM D(Ron=1m Roff=1k Vfwd=0)"),
+        ),
+    ] {
+        for _ in 0..3 {
+            let (mut exact, lcs, tran) = prepare(&text, false);
+            let start = std::time::Instant::now();
+            let mut log = Log::new(lcs.outputs.names.len(), 0.0, false);
+            let mut row = vec![0.0; lcs.outputs.names.len()];
+            let grid = Grid { tstart: tran.tstart, tstep: tran.tstep, tstop: tran.tstop };
+            for k in 0..grid.len() {
+                exact.advance(grid.time(k), &mut log).unwrap();
+                exact.read(&mut row);
+            }
+            let seconds = start.elapsed().as_secs_f64();
+            let stats = exact.finish().stats;
+            println!("{name}: {:.3} ms, {} points, {stats:?}", 1e3 * seconds, grid.len());
+        }
+    }
+}
+
+/// A netlist whose voltage source `name` becomes the relay `low` / `high` of the voltages `gains · v(nodes)`.
+fn with_relays(text: &str, relays: &[(&str, &[(f64, &str)], f64, f64)]) -> Circuit {
+    let mut circuit = circuit(text);
+    for (name, input, low, high) in relays {
+        let terms = input
+            .iter()
+            .map(|(gain, node)| {
+                (Value::binary(*gain), Quantity::Voltage(circuit.node(node).expect("a node")))
+            })
+            .collect();
+        let zero = Value::binary(0.0);
+        let along = (Value::binary(1.0), zero);
+        let law = Law::Curve(Curve {
+            kind: "relay",
+            vertices: vec![(zero, Value::binary(*low)), (zero, Value::binary(*high))],
+            first: along,
+            last: along,
+        });
+        let element = circuit.element(name).expect("an element");
+        circuit.elements[element.index()].kind = Kind::Function {
+            output: Output::Voltage,
+            input: Affine { terms, constant: 0.0 },
+            law,
+        };
+    }
+    circuit
+}
+
+/// x1' = −s1 + 2 s2, x2' = −2 s1 − s2 with s_i in sgn(x_i).
+#[test]
+fn two_relays_pass_their_accumulation_point() {
+    let circuit = with_relays(
+        "C1 1 0 1 IC=1\nC2 2 0 1 IC=0.3\nE1 a 0 x 0 0\nE2 b 0 x 0 0\nVx x 0 0\nVs1 s1 0 0\nVs2 s2 0 0\n\
+         G1 1 0 s1 0 1\nG2 0 1 s2 0 2\nG3 2 0 s1 0 2\nG4 2 0 s2 0 1\n.tran 10m 3 uic\n.save v(1) v(2)",
+        &[("vs1", &[(1.0, "1")], -1.0, 1.0), ("vs2", &[(1.0, "2")], -1.0, 1.0)],
+    );
+    let run = simulate_circuit(&circuit).unwrap_or_else(|e| panic!("{e}"));
+    // x1 + … falls: |x1| + |x2| ≤ decays at least at rate … ; each turn shrinks, the sum of times is finite.
+    println!("{:?} {:?}", run.stats, run.events.iter().map(|e| e.0).collect::<Vec<_>>());
+    assert_eq!(at(&run, 3.0, "v(1)"), 0.0);
+    assert_eq!(at(&run, 3.0, "v(2)"), 0.0);
 }
