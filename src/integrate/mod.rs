@@ -1,5 +1,6 @@
 //! From a complementarity system to waveforms.
 
+pub mod exact;
 pub mod control;
 pub mod energy;
 #[cfg(test)]
