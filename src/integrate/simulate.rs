@@ -5,6 +5,7 @@ use nalgebra::DVector;
 
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::control::Amplitudes;
+use crate::integrate::exact::{self, Exact};
 use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, Stepper, run};
 use crate::integrate::start;
 use crate::integrate::step::Scheme;
@@ -12,7 +13,7 @@ use crate::integrate::switching::Threshold;
 use crate::integrate::system::Reduce;
 use crate::integrate::theta::{Setup, Start, Stepping, Theta};
 use crate::integrate::Run;
-use crate::lcs::{Lcs, Position, reduce};
+use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
 use crate::mna::Behaviour;
 use crate::plan::{Plan, plan};
 use crate::settings::Settings;
@@ -90,8 +91,12 @@ pub fn simulate(
         .collect();
     let settle: Vec<bool> =
         standard.switches.iter().map(|s| tran.uic && s.initial.is_none()).collect();
-    let reduce_at = |switches: &[bool]| -> Result<Lcs, SimError> {
-        let position = Position::free(&standard, switches.to_vec());
+    let reduce_at = |devices: &[Hold], switches: &[bool]| -> Result<Lcs, SimError> {
+        let position = Position {
+            devices: devices.to_vec(),
+            switches: switches.to_vec(),
+            storage: StorageHold::Dynamic,
+        };
         reduce(&standard, &position)
             .map_err(|error| SimError::before(Reason::Circuit(error.to_string())))
     };
@@ -99,6 +104,7 @@ pub fn simulate(
     notes.extend(initial.notes);
     let problem = Problem {
         reduce: &reduce_at,
+        pairs: standard.pairs.len(),
         position: initial.switches,
         settle,
         thresholds,
@@ -118,9 +124,10 @@ pub fn simulate_system(
     tran: Tran,
     options: SimOptions<'_>,
 ) -> Result<Run, SimError> {
-    let reduce_at = |_: &[bool]| Ok(lcs.clone());
+    let reduce_at = |_: &[Hold], _: &[bool]| Ok(lcs.clone());
     let problem = Problem {
         reduce: &reduce_at,
+        pairs: lcs.m(),
         position: lcs.switches.iter().map(|(_, on)| *on).collect(),
         settle: vec![],
         thresholds: vec![],
@@ -132,7 +139,8 @@ pub fn simulate_system(
 
 /// What the steppers share.
 struct Problem<'p> {
-    reduce: &'p dyn Fn(&[bool]) -> Result<Lcs, SimError>,
+    reduce: &'p dyn Fn(&[Hold], &[bool]) -> Result<Lcs, SimError>,
+    pairs: usize,
     position: Vec<bool>,
     /// Switches whose start position follows from the start state.
     settle: Vec<bool>,
@@ -147,8 +155,13 @@ const SCOUT_STEPS: f64 = 256.0;
 const SCOUT_LIMIT: u64 = 20_000;
 
 impl Problem<'_> {
+    /// The system with all devices free.
+    fn system(&self, position: &[bool]) -> Result<Lcs, SimError> {
+        (self.reduce)(&vec![Hold::Free; self.pairs], position)
+    }
+
     fn reducer(&self) -> Reduce<'_> {
-        Box::new(move |position: &[bool]| (self.reduce)(position))
+        Box::new(move |position: &[bool]| self.system(position))
     }
 
     fn stepper(
@@ -236,7 +249,7 @@ fn dispatch(
 ) -> Result<Run, SimError> {
     check(&tran, &options)?;
     problem.settle_switches(&tran, &options.settings)?;
-    let lcs = (problem.reduce)(&problem.position)?;
+    let lcs = problem.system(&problem.position)?;
     let Plan { method, scheme, words } = plan(&lcs, &options);
     let grid = Grid { tstart: tran.tstart, tstep: tran.tstep, tstop: tran.tstop };
     let frame = Frame {
@@ -250,9 +263,29 @@ fn dispatch(
         progress: options.progress,
     };
     let log = Log::new(frame.names.len(), grid.tstart, options.events);
+    if method == Method::Exact {
+        let Start::Storage(start) = problem.start.clone() else {
+            return Err(SimError::before(Reason::Unsupported(NO_MODES.into())));
+        };
+        let mut exact = Exact::new(exact::Setup {
+            assemble: Box::new(|devices: &[Hold], position: &[bool]| {
+                (problem.reduce)(devices, position)
+            }),
+            pairs: problem.pairs,
+            position: problem.position.clone(),
+            thresholds: problem.thresholds.clone(),
+            t: 0.0,
+            until: tran.tstop,
+            start,
+            h: tran.tmax.map_or(tran.tstep, |tmax| tmax.min(tran.tstep)),
+            energy: true,
+            settings: options.settings,
+        })?;
+        return run(&mut exact, frame, log);
+    }
     let stepping = match options.step {
         Some(h) => Stepping::Fixed(h),
-        None => Stepping::Controlled { span: tran.tstop, first: tran.tstep / 64.0 },
+        None => Stepping::Controlled { span: tran.tstop, first: tran.tstep / FIRST_STEP },
     };
     let mut theta = problem.stepper(&tran, scheme, stepping, &options.settings)?;
     if options.step.is_none()
@@ -262,6 +295,12 @@ fn dispatch(
     }
     run(&mut theta, frame, log)
 }
+
+/// A system file has one set of matrices and no circuit to take the modes from.
+const NO_MODES: &str = "exact integration needs the circuit behind the system; use euler or theta";
+
+/// The first step of the error control is the output step divided by this.
+const FIRST_STEP: f64 = 64.0;
 
 fn check(tran: &Tran, options: &SimOptions<'_>) -> Result<(), SimError> {
     let wrong = |what: &str| Err(SimError::before(Reason::Unsupported(what.into())));
