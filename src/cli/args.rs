@@ -273,6 +273,19 @@ pub enum Realisation {
     Sidiode,
 }
 
+impl Realisation {
+    /// As it is typed.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Default => "default",
+            Self::N001 => "n0.01",
+            Self::N0001 => "n0.001",
+            Self::Sidiode => "sidiode",
+        }
+    }
+}
+
 /// `circ graph`.
 #[derive(Debug, Args)]
 pub struct GraphArgs {

@@ -18,7 +18,7 @@ const NEAR_OPEN: f64 = 1e12;
 /// A: saturation current of the diodes written; with N = 0.01 it leaves 7 mV at 1 A.
 const SATURATION_CURRENT: f64 = 1e-12;
 /// Rise time of a true edge, relative to the span: ngspice would stretch a zero to a print step.
-const EDGE: f64 = 1e-7;
+pub const EDGE: f64 = 1e-7;
 /// Width of the steep parts of function blocks, relative to their inputs' size.
 const STEEP: f64 = 1e-6;
 
