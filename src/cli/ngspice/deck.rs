@@ -569,7 +569,7 @@ mod tests {
         let deck = deck(&circuit, &options(Realisation::N001)).unwrap();
         insta::assert_snapshot!(format!("{}{}", deck.text, deck.notes.join("\n")), @r"
         * rectifier with a switch
-        v1 in 0 dc 0e0 pulse(0e0 5e0 0e0 4e-10 4e-10 1e-3 2e-3)
+        v1 in 0 dc 5e0 pulse(0e0 5e0 0e0 4e-10 4e-10 1e-3 2e-3)
         v.d1_drop in d1_drop 7e-1
         d1 d1_drop out m.d1
         .model m.d1 d(is=1e-12 n=0.01 rs=1e-1)
