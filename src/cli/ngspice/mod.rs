@@ -167,7 +167,15 @@ fn words(directory: &Path) -> String {
         "no convergence",
         "can't",
     ];
-    let lines = said.lines().map(str::trim).filter(|line| {
+    // Progress reports stand on the same line as what follows them.
+    let after_progress = |line| {
+        str::trim(str::rfind(line, "Reference value").map_or(line, |at| {
+            line[at..]
+                .find("doAnalyses")
+                .map_or(line, |k| &line[at + k..])
+        }))
+    };
+    let lines = said.lines().map(after_progress).filter(|line| {
         let line = line.to_lowercase();
         telling.iter().any(|word| line.contains(word))
     });
