@@ -151,7 +151,7 @@ pub fn run(
             simulate(&circuit, &both.1, options)
         }
         (Subject::System(system), Some(tran)) => {
-            simulate_system(&system.lcs, system.x0.clone(), tran, options)
+            simulate_system(&system.lcs, &system.x0, tran, options)
         }
         (Subject::System(_), None) => {
             let reason = "the system has no \"tran\": {\"tstep\", \"tstop\"}";

@@ -167,19 +167,19 @@ fn words(directory: &Path) -> String {
         "no convergence",
         "can't",
     ];
-    // Progress reports stand on the same line as what follows them.
-    let after_progress = |line| {
-        str::trim(str::rfind(line, "Reference value").map_or(line, |at| {
-            line[at..]
-                .find("doAnalyses")
-                .map_or(line, |k| &line[at + k..])
-        }))
-    };
     let lines = said.lines().map(after_progress).filter(|line| {
         let line = line.to_lowercase();
         telling.iter().any(|word| line.contains(word))
     });
     lines.take(QUOTED_LINES).collect::<Vec<_>>().join("; ")
+}
+
+/// A line without the progress reports that ngspice writes in front of it.
+fn after_progress(line: &str) -> &str {
+    let at = line
+        .rfind("Reference value")
+        .and_then(|_| line.find("doAnalyses"));
+    at.map_or(line, |at| &line[at..]).trim()
 }
 
 /// The deck's probes, taken or computed from ngspice's vectors.
