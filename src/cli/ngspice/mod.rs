@@ -182,7 +182,8 @@ fn after_progress(line: &str) -> &str {
     at.map_or(line, |at| &line[at..]).trim()
 }
 
-/// The deck's probes, taken or computed from ngspice's vectors.
+/// The deck's probes, taken or computed from ngspice's vectors. The row at t = 0, the operating point before anything that happens
+/// at 0, is left out.
 fn renamed(waves: &Waveforms, deck: &Deck) -> Result<Waveforms, NgspiceError> {
     let column = |vector: &str| -> Result<Vec<f64>, NgspiceError> {
         if vector == "0" {
@@ -210,12 +211,13 @@ fn renamed(waves: &Waveforms, deck: &Deck) -> Result<Waveforms, NgspiceError> {
         });
     }
     let names: Vec<String> = deck.probes.iter().map(|(name, _)| name.clone()).collect();
+    let first = usize::from(waves.time.first() == Some(&0.0));
     Ok(Waveforms {
         title: waves.title.clone(),
         units: names.iter().map(|n| unit_of(n)).collect(),
         names,
-        time: waves.time.clone(),
-        values: (0..waves.len())
+        time: waves.time[first..].to_vec(),
+        values: (first..waves.len())
             .flat_map(|k| columns.iter().map(move |c| c[k]))
             .collect(),
     })
