@@ -60,11 +60,9 @@ pub fn run(deck: &Deck, tstop: f64) -> Result<Outcome, NgspiceError> {
             PATIENCE.as_secs()
         )));
     };
-    let raw = File::open(directory.path().join("run.raw"))
-        .map_err(io::Error::from)
-        .and_then(|file| {
-            raw::read(io::BufReader::new(file)).map_err(|e| io::Error::other(e.to_string()))
-        });
+    let raw = File::open(directory.path().join("run.raw")).and_then(|file| {
+        raw::read(io::BufReader::new(file)).map_err(|e| io::Error::other(e.to_string()))
+    });
     let reached = raw.as_ref().ok().and_then(|w| w.time.last().copied());
     match (raw, reached) {
         (Ok(waves), Some(reached)) if status.success() && reached >= tstop * (1.0 - UNFINISHED) => {
