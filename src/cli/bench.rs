@@ -69,13 +69,22 @@ pub(super) fn bench(args: &BenchArgs, streams: &Streams) -> Result<Exit, Failure
         tran,
         circuit,
         streams,
+        silent: Streams {
+            quiet: true,
+            verbose: false,
+        },
     };
     let reference = bench.reference(None)?;
     streams.say(format!("errors are against {}", reference.name));
     let mut measurements = Vec::new();
-    for rung in rungs(tran).into_iter().filter(|rung| wanted(rung.method)) {
-        measurements.push(bench.measure(&rung, &reference));
+    let mut rungs = rungs(tran);
+    rungs.retain(|rung| wanted(rung.method));
+    let bar = streams.progress(rungs.len() as u64, "measuring");
+    for rung in &rungs {
+        measurements.push(bench.measure(rung, &reference));
+        bar.inc(1);
     }
+    bar.finish_and_clear();
     let against_ngspice = args.against.is_some() || args.methods.iter().any(|m| m == "ngspice");
     if against_ngspice && wanted("ngspice") {
         measurements.extend(bench.ngspice()?);
@@ -172,6 +181,8 @@ struct Bench<'a> {
     tran: Tran,
     circuit: String,
     streams: &'a Streams,
+    /// For the runs themselves: drawing a progress bar would be measured.
+    silent: Streams,
 }
 
 impl Bench<'_> {
@@ -185,7 +196,7 @@ impl Bench<'_> {
             tol: None,
             events: true,
         };
-        if let Ok(run) = sim::run(self.subject, &request, tstep, self.streams) {
+        if let Ok(run) = sim::run(self.subject, &request, tstep, &self.silent) {
             return Ok(Reference {
                 name: "exact".into(),
                 waveforms: run.waveforms,
@@ -196,7 +207,7 @@ impl Bench<'_> {
             tol: Some(REFERENCE_TOL),
             ..request
         };
-        let run = sim::run(self.subject, &request, tstep, self.streams)
+        let run = sim::run(self.subject, &request, tstep, &self.silent)
             .map_err(|e| Failure::Message(format!("there is no reference: {e}")))?;
         Ok(Reference {
             name: format!("theta tol={REFERENCE_TOL:e}"),
@@ -220,7 +231,7 @@ impl Bench<'_> {
         let mut best: Option<Run> = None;
         let mut spent = 0.0;
         for _ in 0..REPETITIONS.0 {
-            match sim::run(self.subject, &rung.request, None, self.streams) {
+            match sim::run(self.subject, &rung.request, None, &self.silent) {
                 Ok(run) => {
                     spent += run.stats.cpu_seconds;
                     if best
