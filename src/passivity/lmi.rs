@@ -113,6 +113,7 @@ pub(crate) fn search<T>(
             whole.unknowns()
         ));
     }
+    let whole = whole.rebased();
     let mut face = whole.clone();
     for round in 0..=ROUNDS {
         let outcome = maximise(&face);
