@@ -33,6 +33,7 @@ pub mod law;
 pub mod lcs;
 pub mod mna;
 pub mod netlist;
+pub mod plan;
 pub mod passivity;
 pub mod report;
 pub mod settings;
