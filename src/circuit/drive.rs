@@ -282,10 +282,10 @@ impl<'n> Builder<'n, '_> {
                 );
                 return None;
             }
-            Some(Assign { value, .. }) => match value {
-                Some(value) => Some(self.scopes.finite(value, scope)?.f64).filter(|r| *r >= 0.0),
-                None => None,
-            },
+            Some(Assign {
+                value: Some(value), ..
+            }) => Some(self.scopes.finite(value, scope)?.f64).filter(|r| *r >= 0.0),
+            Some(Assign { value: None, .. }) => None,
         };
         let last = points.last().map_or(0.0, |p| p.0);
         if let Some(from) = repeat.filter(|from| *from >= last) {

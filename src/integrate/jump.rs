@@ -126,8 +126,16 @@ impl JumpProblem {
             q.rows_mut(k, k).copy_from(&-right);
         }
         let solution = self.driver.solve(&q);
-        if solution.status != Status::Solved {
-            return Err(Infeasible);
+        match &solution.status {
+            Status::Solved => {}
+            Status::Infeasible(ray) => {
+                let mut z = ray.rows(0, k).into_owned();
+                if self.split {
+                    z -= ray.rows(k, k);
+                }
+                return Err(Infeasible { port: (&self.basis * z).iamax() });
+            }
+            Status::Failed => return Err(Infeasible { port: 0 }),
         }
         let mut z = solution.lambda.rows(0, k).into_owned();
         if self.split {
@@ -155,7 +163,10 @@ impl JumpProblem {
 
 /// No admissible state can be reached by an impulse of the devices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Infeasible;
+pub struct Infeasible {
+    /// The port with the largest part in the contradiction.
+    pub port: usize,
+}
 
 fn stack(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let mut all = DMatrix::zeros(a.nrows() + b.nrows(), a.ncols());

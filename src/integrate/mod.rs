@@ -1,5 +1,6 @@
 //! From a complementarity system to waveforms.
 
+pub mod exact;
 pub mod control;
 pub mod energy;
 #[cfg(test)]
@@ -9,11 +10,15 @@ pub mod inputs;
 pub mod jump;
 pub mod reading;
 pub mod run;
+pub mod simulate;
+pub mod start;
 pub mod stats;
 pub mod step;
 pub mod switching;
 pub mod system;
 pub mod theta;
 
+pub use simulate::{Method, SimOptions, simulate, simulate_system};
+pub use start::{OperatingPoint, Values, operating_point};
 pub use run::{Frame, Grid, Log, Outcome, Reason, SimError, Stepper};
 pub use stats::{Energy, Impulse, Run, Stats};

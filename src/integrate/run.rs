@@ -182,6 +182,12 @@ impl Log {
     pub fn row(&mut self, t: f64, row: &[f64]) {
         debug_assert_eq!(row.len(), self.columns);
         if self.wants_rows && t >= self.from {
+            let at = self.time.len();
+            if at >= 2 && self.last_is_event && self.time[at - 2..] == [t, t] {
+                // Several things at one instant: the first row before, the last one after all of them.
+                self.time.pop();
+                self.values.truncate(self.values.len() - self.columns);
+            }
             self.time.push(t);
             self.values.extend_from_slice(row);
             self.last_is_event = true;

@@ -540,6 +540,7 @@ pub fn read(text: &str) -> Result<SystemFile, JsonError> {
         storage: Storage {
             names: states.iter().map(|s| s.name.clone()).collect(),
             x: DMatrix::identity(n, n),
+            lambda: DMatrix::zeros(n, m),
             u: DMatrix::zeros(n, p),
             one: DVector::zeros(n),
             metric: energy.clone(),

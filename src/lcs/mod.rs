@@ -183,8 +183,10 @@ pub struct PowerTerm {
 pub struct Storage {
     /// `v(c1)`, … `i(l1)` for *all* capacitors and inductors (flux states for coupled ones), in circuit order.
     pub names: Vec<String>,
-    /// q×n: s = X x + U u + k.
+    /// q×n: s = X x + Λ λ + U u + k.
     pub x: DMatrix<f64>,
+    /// q×m: zero (or empty) but for operating points, where storage is open or short and devices decide its values.
+    pub lambda: DMatrix<f64>,
     /// q×p.
     pub u: DMatrix<f64>,
     /// q.

@@ -1,7 +1,7 @@
 //! Published circuits as systems written down by hand, for tests and benches of the steppers.
 //!
 //! Used from integration tests and, by path, from the library's own tests.
-#![allow(dead_code, missing_docs, reason = "every user takes its part")]
+#![allow(dead_code, missing_docs, unreachable_pub, reason = "every user takes its part")]
 
 use nalgebra::{DMatrix, DVector, dmatrix};
 
@@ -57,6 +57,7 @@ pub fn system(
         storage: Storage {
             names: states.iter().map(|(s, _)| (*s).into()).collect(),
             x: DMatrix::identity(n, n),
+            lambda: DMatrix::zeros(n, m),
             u: DMatrix::zeros(n, 0),
             one: DVector::zeros(n),
             metric,

@@ -12,7 +12,7 @@ impl Theta<'_> {
     pub(super) fn attempt(&mut self, h: f64, t1: f64) -> Result<(), SimError> {
         self.inputs.left(t1, &mut self.u_next);
         self.stats.lcp_solves += 1;
-        let scheme = if self.now.settle {
+        let scheme = if self.now.settle && !self.lambda.is_empty() {
             self.scheme.implicit_in_lambda()
         } else {
             self.scheme
@@ -73,25 +73,7 @@ impl Theta<'_> {
         if x.iter().any(|v| !v.is_finite()) {
             return Err(SimError::at(now.t, Reason::Overflow));
         }
-        let device = |active: &[Option<bool>], at: Option<usize>| {
-            let changed = |j: &usize| active[*j].is_some_and(|on| on != now.active[*j]);
-            let j = at.or_else(|| (0..active.len()).find(changed));
-            j.map(|j| system.lcs.ports[j].device.clone())
-        };
-        let failure = match solution.status {
-            Status::Solved => None,
-            Status::Infeasible(ref ray) => Some((Reason::Infeasible, Some(ray.imax()))),
-            Status::Failed => Some((
-                Reason::Residual {
-                    residual: solution.residual,
-                    tolerance,
-                },
-                None,
-            )),
-        };
-        if let Some((reason, at)) = failure {
-            let mut error = SimError::at(now.t, reason);
-            error.device = device(&solution.active, at);
+        if let Some(error) = unsolved(&solution, &system.lcs, now.t, tolerance) {
             return Err(error);
         }
         let n = now.x.len();
@@ -184,4 +166,23 @@ impl Theta<'_> {
         self.take_pattern(found.basis, &found.active, self.now.t);
         Ok(())
     }
+}
+
+/// The error of a step problem without a solution; it names the device with the largest part in the contradiction, or
+/// with the largest residual.
+pub(super) fn unsolved(
+    solution: &Solution,
+    lcs: &Lcs,
+    t: f64,
+    tolerance: f64,
+) -> Option<SimError> {
+    let (reason, port) = match &solution.status {
+        Status::Solved => return None,
+        Status::Infeasible(ray) => (Reason::Infeasible, ray.imax()),
+        Status::Failed => {
+            let violation = solution.lambda.zip_map(&solution.y, |l, y| l.min(y).abs());
+            (Reason::Residual { residual: solution.residual, tolerance }, violation.imax())
+        }
+    };
+    Some(SimError::at(t, reason).device(lcs.ports[port].device.clone()))
 }

@@ -63,7 +63,9 @@ impl Theta<'_> {
         let found = match jump {
             Some(problem) if problem.monotone => problem
                 .solve(lcs, &x, &u)
-                .map_err(|_| SimError::at(t, Reason::Infeasible))?,
+                .map_err(|e| {
+                SimError::at(t, Reason::Infeasible).device(lcs.ports[e.port].device.clone())
+            })?,
             _ => None,
         };
         let (after, p) = match found {

@@ -25,7 +25,7 @@ use crate::integrate::stats::Stats;
 use crate::integrate::step::Scheme;
 use crate::integrate::switching::{Switches, Threshold};
 use crate::integrate::system::{Plant, Reduce, System};
-use crate::lcs::{Port, Role};
+use crate::lcs::{Lcs, Port, Role};
 use crate::settings::Settings;
 use crate::solve::{Solution, Status};
 
@@ -256,6 +256,24 @@ impl<'a> Theta<'a> {
         &self.amplitudes
     }
 
+    /// Takes note of the present state's size.
+    pub fn see(&mut self) {
+        let Self { amplitudes, plant, now, .. } = self;
+        amplitudes.see(&plant.systems[now.system].1.lcs, &now.x);
+    }
+
+    /// Control values of the switches at t = 0+, after the first jump in the start position.
+    ///
+    /// # Errors
+    /// As [`Stepper::advance`].
+    pub fn controls_at_start(&mut self) -> Result<Vec<f64>, SimError> {
+        self.begin(&mut Log::new(0, f64::INFINITY, false))?;
+        self.read_lambda()?;
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        let at = Point { x: &self.now.x, lambda: &self.lambda, u: &self.now.u, du: &self.du };
+        Ok((0..self.switches.len()).map(|i| reading::value(&lcs.controls, i, at)).collect())
+    }
+
     /// The state x of the present system.
     #[must_use]
     pub fn state(&self) -> &[f64] {
@@ -295,6 +313,9 @@ impl Stepper for Theta<'_> {
     fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), SimError> {
         if !self.started {
             self.begin(log)?;
+            if !self.switches.is_empty() && self.crossed()? {
+                self.switch(log)?;
+            }
         }
         while self.now.t < t {
             let now = self.now.t;

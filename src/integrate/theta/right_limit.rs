@@ -1,5 +1,6 @@
 //! λ, probes and devices at the right limit of the present time.
 
+use super::attempt::unsolved;
 use super::*;
 
 impl Theta<'_> {
@@ -49,17 +50,11 @@ impl Theta<'_> {
         let q = matrices.q(z);
         matrices.driver.suggest(&now.active);
         let mut solution = matrices.driver.solve(&q);
-        if solution.status != Status::Solved {
-            let tolerance = settings.lcp_residual;
-            let reason = match solution.status {
-                Status::Infeasible(_) => Reason::Infeasible,
-                _ => Reason::Residual {
-                    residual: solution.residual,
-                    tolerance,
-                },
-            };
-            return Err(SimError::at(now.t, reason));
+        let lcs = &plant.systems[now.system].1.lcs;
+        if let Some(error) = unsolved(&solution, lcs, now.t, settings.lcp_residual) {
+            return Err(error);
         }
+        let matrices = plant.systems[now.system].1.step_mut(step);
         let (least, unique) = matrices.driver.least_norm(&q, &solution);
         if !unique {
             let lcs = &plant.systems[now.system].1.lcs;

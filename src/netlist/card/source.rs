@@ -1,11 +1,12 @@
 //! V and I: a DC value, a waveform, an AC specification (ignored) in any order.
 
-use super::{Body, assign, assignment_follows, expect_value, expr, keyword, nodes};
+use super::{Body, assign, assignment_follows, expect_value, keyword, nodes};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Assign, Device, Name, WaveArg, WaveCall};
 use crate::netlist::lex::{
     Input, Parsed, ahead, at_end, missing, next_word, refuse, separator, symbol, tell, word,
 };
+use crate::netlist::operand;
 
 /// Waveforms, supported or only recognised.
 const WAVES: [&str; 12] = [
@@ -89,7 +90,7 @@ fn skip_ac(mut at: Input<'_>) -> Input<'_> {
         {
             break;
         }
-        let Ok((rest, _)) = expr::item(start) else {
+        let Ok((rest, _)) = operand::item(start) else {
             break;
         };
         at = rest;
@@ -204,7 +205,7 @@ fn repeat<'a>(at: Input<'a>, args: &mut Vec<Assign>) -> Parsed<'a, ()> {
 
 fn argument<'a>(at: Input<'a>, list: &mut Vec<WaveArg>) -> Parsed<'a, ()> {
     let plus = at.fragment().starts_with('+');
-    let (rest, value) = expr::item(at).map_err(|e| match e {
+    let (rest, value) = operand::item(at).map_err(|e| match e {
         nom::Err::Error(_) => missing(at, "a number"),
         e => e,
     })?;

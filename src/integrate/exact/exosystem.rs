@@ -1,0 +1,286 @@
+//! The sources as an autonomous linear system: z' = S z, u = H z between breakpoints.
+
+use nalgebra::DMatrix;
+
+use super::spectrum::Rate;
+use crate::circuit::Source;
+use crate::circuit::source::{Oscillation, Piece};
+
+/// (sine part, cosine part) of a term τ seconds after its origin; for frequency 0 the first alone is the term.
+fn pair(term: &Oscillation, tau: f64) -> (f64, f64) {
+    let envelope = term.amplitude * (-term.decay * tau).exp();
+    let (s, c) = (term.frequency * tau + term.phase).sin_cos();
+    (envelope * s, envelope * c)
+}
+
+/// What a column of z carries.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Column {
+    /// The constant 1.
+    One,
+    /// constant + slope (t − origin) of an input; its slope follows.
+    Line { input: usize },
+    /// A value that is constant between breakpoints.
+    Step { input: usize },
+    /// The slope of the column before.
+    Slope { input: usize },
+    /// Sine part of an input's wave; the cosine part follows unless omega is 0.
+    Wave { input: usize, damping: f64, omega: f64 },
+    /// The cosine part of the column before.
+    Quadrature,
+    /// e^{−damping t} sin omega t and cos omega t for all inputs that last the whole run.
+    Shared { damping: f64, omega: f64 },
+}
+
+/// The exosystem of all sources of a circuit. The structure (S, H) stays, the vector z is set at breakpoints.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Exosystem {
+    columns: Vec<Column>,
+    generator: DMatrix<f64>,
+    output: DMatrix<f64>,
+    rates: Vec<Rate>,
+    /// Current pieces by input.
+    pieces: Vec<Piece>,
+}
+
+/// What the pieces of one input over a run are made of.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Shape {
+    /// More than one piece.
+    pub(crate) changes: bool,
+    /// Some piece has a slope.
+    pub(crate) sloped: bool,
+    /// (damping, omega) that occur.
+    pub(crate) waves: Vec<(f64, f64)>,
+}
+
+impl Shape {
+    /// The union over pieces.
+    pub(crate) fn of<'a>(pieces: impl IntoIterator<Item = &'a Piece>) -> Self {
+        let mut shape = Self::default();
+        for (k, piece) in pieces.into_iter().enumerate() {
+            shape.changes |= k > 0;
+            shape.sloped |= piece.slope != 0.0;
+            for term in piece.terms() {
+                let key = (term.decay, term.frequency);
+                if !shape.waves.contains(&key) {
+                    shape.waves.push(key);
+                }
+            }
+        }
+        shape
+    }
+}
+
+impl Exosystem {
+    /// The exosystem of these sources over [from, until]; `None` if one has no closed form.
+    pub(crate) fn of(sources: &[Source], from: f64, until: f64) -> Option<Self> {
+        let mut shapes = Vec::new();
+        let mut first = Vec::new();
+        for source in sources {
+            let mut t = from;
+            let mut pieces = Vec::new();
+            loop {
+                let piece = source.piece(t)?;
+                pieces.push(piece);
+                if piece.end >= until {
+                    break;
+                }
+                t = piece.end;
+            }
+            shapes.push(Shape::of(&pieces));
+            first.push(pieces[0]);
+        }
+        Some(Self::new(&shapes, first))
+    }
+
+    /// The structure for inputs of these shapes, standing on their first pieces.
+    pub(crate) fn new(shapes: &[Shape], first: Vec<Piece>) -> Self {
+        let mut columns = vec![Column::One];
+        let mut output: Vec<(usize, usize, f64)> = Vec::new();
+        for (input, (shape, piece)) in shapes.iter().zip(&first).enumerate() {
+            if shape.changes || shape.sloped {
+                output.push((input, columns.len(), 1.0));
+                if shape.sloped {
+                    columns.push(Column::Line { input });
+                    columns.push(Column::Slope { input });
+                } else {
+                    columns.push(Column::Step { input });
+                }
+            } else if piece.constant != 0.0 {
+                output.push((input, 0, piece.constant));
+            }
+            for &(damping, omega) in &shape.waves {
+                if shape.changes || damping != 0.0 {
+                    output.push((input, columns.len(), 1.0));
+                    columns.push(Column::Wave { input, damping, omega });
+                    if omega != 0.0 {
+                        columns.push(Column::Quadrature);
+                    }
+                    continue;
+                }
+                let shared = Column::Shared { damping, omega };
+                let at = columns.iter().position(|c| *c == shared).unwrap_or_else(|| {
+                    columns.push(shared);
+                    columns.push(Column::Quadrature);
+                    columns.len() - 2
+                });
+                for term in piece.terms().filter(|t| (t.decay, t.frequency) == (damping, omega)) {
+                    let (s, c) = (term.phase - omega * piece.origin).sin_cos();
+                    output.push((input, at, term.amplitude * c));
+                    output.push((input, at + 1, term.amplitude * s));
+                }
+            }
+        }
+        let dim = columns.len();
+        let mut generator = DMatrix::zeros(dim, dim);
+        let mut rates = Vec::new();
+        for (k, column) in columns.iter().enumerate() {
+            match *column {
+                Column::Line { .. } => generator[(k, k + 1)] = 1.0,
+                Column::Wave { damping, omega, .. } | Column::Shared { damping, omega } => {
+                    rates.push(Rate { decay: damping, frequency: omega.abs() });
+                    generator[(k, k)] = -damping;
+                    if omega != 0.0 {
+                        generator[(k, k + 1)] = omega;
+                        generator[(k + 1, k)] = -omega;
+                        generator[(k + 1, k + 1)] = -damping;
+                    }
+                }
+                Column::One | Column::Step { .. } | Column::Slope { .. } | Column::Quadrature => {}
+            }
+        }
+        let mut h = DMatrix::zeros(shapes.len(), dim);
+        for (i, j, value) in output {
+            h[(i, j)] += value;
+        }
+        Self { columns, generator, output: h, rates, pieces: first }
+    }
+
+    /// Length of z; z[0] = 1.
+    pub(crate) fn dim(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// S.
+    pub(crate) fn generator(&self) -> &DMatrix<f64> {
+        &self.generator
+    }
+
+    /// H, p×dim.
+    pub(crate) fn output(&self) -> &DMatrix<f64> {
+        &self.output
+    }
+
+    /// Eigenvalues of S that move.
+    pub(crate) fn rates(&self) -> &[Rate] {
+        &self.rates
+    }
+
+    /// The piece that input i stands on.
+    pub(crate) fn piece(&self, input: usize) -> &Piece {
+        &self.pieces[input]
+    }
+
+    /// Input i goes on along another piece.
+    pub(crate) fn set_piece(&mut self, input: usize, piece: Piece) {
+        self.pieces[input] = piece;
+    }
+
+    /// The next breakpoint, s.
+    pub(crate) fn next_breakpoint(&self) -> f64 {
+        self.pieces.iter().map(|p| p.end).fold(f64::INFINITY, f64::min)
+    }
+
+    /// z(t) on the current pieces, from closed forms.
+    pub(crate) fn write(&self, t: f64, z: &mut [f64]) {
+        for (k, column) in self.columns.iter().enumerate() {
+            match *column {
+                Column::One => z[k] = 1.0,
+                Column::Line { input } => {
+                    let piece = &self.pieces[input];
+                    z[k] = piece.constant + piece.slope * (t - piece.origin);
+                }
+                Column::Step { input } => z[k] = self.pieces[input].constant,
+                Column::Slope { input } => z[k] = self.pieces[input].slope,
+                Column::Wave { input, damping, omega } => {
+                    let piece = &self.pieces[input];
+                    let (mut sine, mut cosine) = (0.0, 0.0);
+                    for term in piece.terms().filter(|w| (w.decay, w.frequency) == (damping, omega)) {
+                        let (s, c) = pair(term, t - piece.origin);
+                        sine += s;
+                        cosine += c;
+                    }
+                    z[k] = sine;
+                    if omega != 0.0 {
+                        z[k + 1] = cosine;
+                    }
+                }
+                Column::Shared { damping, omega } => {
+                    let envelope = (-damping * t).exp();
+                    let (s, c) = (omega * t).sin_cos();
+                    z[k] = envelope * s;
+                    z[k + 1] = envelope * c;
+                }
+                Column::Quadrature => {}
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::circuit::source::Wave;
+    use nalgebra::DVector;
+
+    fn source(wave: Wave) -> Source {
+        Source { dc: 0.0, wave }
+    }
+
+    fn sine(amplitude: f64, damping: f64, phase: f64, delay: f64) -> Source {
+        source(Wave::Sin { offset: 0.5, amplitude, frequency: 3.0, delay, damping, phase })
+    }
+
+    /// H z(t) is the source and H S z(t) its derivative, for every kind of column, across breakpoints.
+    #[test]
+    fn reproduces_sources_and_their_derivatives() {
+        let sources = vec![
+            source(Wave::Pwl { points: vec![(0.0, 1.0), (1.0, 3.0), (2.0, -1.0)], repeat: None, delay: 0.0 }),
+            source(Wave::Pwl {
+                points: vec![(0.0, 1.0), (0.5, 1.0), (0.5, 4.0)],
+                repeat: None,
+                delay: 0.0,
+            }),
+            sine(2.0, 0.0, 30.0, 0.0),
+            sine(3.0, 0.0, -60.0, 0.0),
+            sine(1.5, 2.0, 10.0, 0.25),
+            source(Wave::Exp {
+                v1: 1.0,
+                v2: 2.0,
+                rise_delay: 0.1,
+                rise_tau: 0.3,
+                fall_delay: 0.7,
+                fall_tau: 0.2,
+            }),
+            source(Wave::Dc(4.0)),
+        ];
+        let mut exosystem = Exosystem::of(&sources, 0.0, 3.0).unwrap();
+        // one, a line 2, a step 1, one shared pair, a step and a damped pair, a step and two decays
+        assert_eq!(exosystem.dim(), 1 + 2 + 1 + 2 + 3 + 3);
+        let mut z = DVector::zeros(exosystem.dim());
+        for t in [0.0, 0.05, 0.2, 0.3, 0.5, 0.71, 1.0, 1.7, 2.5] {
+            for (i, source) in sources.iter().enumerate() {
+                exosystem.set_piece(i, source.piece(t).unwrap());
+            }
+            exosystem.write(t, z.as_mut_slice());
+            let u = exosystem.output() * &z;
+            let du = exosystem.output() * (exosystem.generator() * &z);
+            for (i, source) in sources.iter().enumerate() {
+                assert!((u[i] - source.value(t)).abs() < 1e-14 * 8.0, "input {i} at {t}");
+                assert!((du[i] - source.derivative(t)).abs() < 1e-12, "input {i} at {t}");
+            }
+        }
+        assert_eq!(exosystem.next_breakpoint(), f64::INFINITY);
+    }
+}

@@ -1,0 +1,289 @@
+//! The linear flow of one mode, w' = 𝒜 w with w = [x; z] (state and exosystem), and its guards.
+
+use nalgebra::DMatrix;
+
+use super::expm::{self, Exponential};
+use super::kernel::Kernel;
+use super::polynomial::MAX_DEGREE;
+use super::spectrum::{Rate, Spectrum};
+use super::work::{self, Form};
+
+/// Halvings of the output step that a table may hold; below it Taylor's series takes over in any case.
+const DEEPEST: u32 = 62;
+
+/// Rounding of a computed guard, in units of 2⁻⁵³ Σ |row| |w|.
+const NOISE: f64 = 16.0;
+
+/// Power out of sources and into what dissipates, and their integrals over steps.
+#[derive(Debug, Clone)]
+struct Power {
+    matrices: [DMatrix<f64>; 2],
+    instant: [Form; 2],
+    levels: Vec<Option<[Form; 2]>>,
+}
+
+/// exp(𝒜 h/2^k) for the levels k that were needed, Taylor's series below, and guard rows with their derivative.
+///
+/// Vectors are laid out as `[w | g | g']` with `g = 𝒢 w`, `g' = 𝒢 𝒜 w`; `g ≥ 0` keeps the mode.
+#[derive(Debug, Clone)]
+pub(crate) struct Flow {
+    dim: usize,
+    guards: usize,
+    generator: DMatrix<f64>,
+    generator_kernel: Kernel,
+    /// [𝒢; 𝒢𝒜].
+    rows: DMatrix<f64>,
+    rows_kernel: Kernel,
+    guard_kernel: Kernel,
+    h: f64,
+    bottom: u32,
+    levels: Vec<Option<Kernel>>,
+    spectrum: Spectrum,
+    power: Option<Power>,
+    /// Largest loss that an exponential reported.
+    pub(crate) loss: f64,
+}
+
+impl Flow {
+    /// `generator` = [[A, EH],[0, S]] with `n` rows of A first, `guards` its rows over w, `h` the output step, `sources`
+    /// the rates of S. `None` if the entries are not finite.
+    pub(crate) fn new(
+        generator: DMatrix<f64>,
+        n: usize,
+        guards: &DMatrix<f64>,
+        h: f64,
+        sources: &[Rate],
+    ) -> Option<Self> {
+        if !generator.iter().chain(guards.iter()).all(|v| v.is_finite()) {
+            return None;
+        }
+        let dim = generator.nrows();
+        let m = guards.nrows();
+        let mut rows = DMatrix::zeros(2 * m, dim);
+        rows.rows_mut(0, m).copy_from(guards);
+        rows.rows_mut(m, m).copy_from(&(guards * &generator));
+        let d = expm::balance(&generator, h);
+        let balanced = DMatrix::from_fn(dim, dim, |i, j| generator[(i, j)] * d[j] / d[i]);
+        let halvings = (expm::norm_1(&balanced) * h).log2().ceil();
+        let bottom = (halvings.max(0.0) as u32).min(DEEPEST);
+        let spectrum = Spectrum::new(&generator.view((0, 0), (n, n)).into_owned(), sources);
+        Some(Self {
+            dim,
+            guards: m,
+            generator_kernel: Kernel::new(&generator),
+            generator,
+            rows_kernel: Kernel::new(&rows),
+            guard_kernel: Kernel::new(guards),
+            rows,
+            h,
+            bottom,
+            levels: vec![None; bottom as usize + 1],
+            spectrum,
+            power: None,
+            loss: 0.0,
+        })
+    }
+
+    /// Length of w.
+    pub(crate) fn dim(&self) -> usize {
+        self.dim
+    }
+
+    /// Number of guards.
+    pub(crate) fn guards(&self) -> usize {
+        self.guards
+    }
+
+    /// 𝒜.
+    pub(crate) fn generator(&self) -> &DMatrix<f64> {
+        &self.generator
+    }
+
+    /// The deepest level K; Taylor's series converges at once over h/2^K.
+    pub(crate) fn bottom(&self) -> u32 {
+        self.bottom
+    }
+
+    /// h/2^level, s.
+    pub(crate) fn step(&self, level: u32) -> f64 {
+        self.h * (-f64::from(level)).exp2()
+    }
+
+    /// See [`Spectrum::step_limit`]; without guards nothing can hide.
+    pub(crate) fn step_limit(&self, age: f64) -> f64 {
+        if self.guards == 0 { f64::INFINITY } else { self.spectrum.step_limit(age) }
+    }
+
+    /// `next = [w | g | g']` at h/2^level after `w`; `false` if the exponential does not exist in doubles.
+    #[inline]
+    pub(crate) fn leap(&mut self, level: u32, w: &[f64], next: &mut [f64]) -> bool {
+        if self.levels[level as usize].is_none() && !self.tabulate(level) {
+            return false;
+        }
+        if let Some(kernel) = &self.levels[level as usize] {
+            kernel.apply(w, next);
+        }
+        true
+    }
+
+    #[cold]
+    fn tabulate(&mut self, level: u32) -> bool {
+        let Some(Exponential { matrix, loss }) = expm::exponential(&self.generator, self.step(level)) else {
+            return false;
+        };
+        self.loss = self.loss.max(loss.unwrap_or(0.0));
+        let mut fused = DMatrix::zeros(self.dim + self.rows.nrows(), self.dim);
+        fused.rows_mut(self.dim, self.rows.nrows()).copy_from(&(&self.rows * &matrix));
+        fused.rows_mut(0, self.dim).copy_from(&matrix);
+        self.levels[level as usize] = Some(Kernel::new(&fused));
+        true
+    }
+
+    /// Adds the quadratic forms (power out of sources, power dissipated) whose integrals [`Self::energy`] gives.
+    pub(crate) fn set_power(&mut self, matrices: [DMatrix<f64>; 2]) {
+        let instant = [Form::new(&matrices[0]), Form::new(&matrices[1])];
+        self.power = Some(Power { matrices, instant, levels: vec![None; self.levels.len()] });
+    }
+
+    /// (from sources, dissipated) over the step h/2^level from w, J.
+    #[inline]
+    pub(crate) fn energy(&mut self, level: u32, w: &[f64]) -> [f64; 2] {
+        let Some(power) = &self.power else { return [0.0; 2] };
+        if let Some(forms) = &power.levels[level as usize] {
+            return [forms[0].value(w), forms[1].value(w)];
+        }
+        self.integrate_forms(level);
+        self.energy(level, w)
+    }
+
+    /// Gramians from the deepest level up: 𝒢(2h) = 𝒢(h) + Φ(h)ᵀ 𝒢(h) Φ(h).
+    #[cold]
+    fn integrate_forms(&mut self, level: u32) {
+        let Some(power) = &mut self.power else { return };
+        let mut grams =
+            power.matrices.each_ref().map(|q| work::gramian(&self.generator, q, self.h * (-f64::from(self.bottom)).exp2()));
+        let mut at = self.bottom;
+        loop {
+            if power.levels[at as usize].is_none() {
+                power.levels[at as usize] = Some(grams.each_ref().map(Form::new));
+            }
+            if at <= level {
+                break;
+            }
+            let step = self.h * (-f64::from(at)).exp2();
+            if let Some(Exponential { matrix, .. }) = expm::exponential(&self.generator, step) {
+                for gram in &mut grams {
+                    let moved = matrix.transpose() * &*gram * &matrix;
+                    *gram += moved;
+                }
+            }
+            at -= 1;
+        }
+    }
+
+    /// (from sources, dissipated) over the fraction `part` of a Taylor step dt, J; `w` is work space of length dim.
+    pub(crate) fn energy_of_taylor(
+        &self,
+        terms: &[f64],
+        degree: usize,
+        dt: f64,
+        part: f64,
+        w: &mut [f64],
+    ) -> [f64; 2] {
+        self.power.as_ref().map_or([0.0; 2], |power| {
+            work::along_taylor(&power.instant, terms, degree, dt, part, w)
+        })
+    }
+
+    /// Fills g and g' behind w.
+    pub(crate) fn read_guards(&self, state: &mut [f64]) {
+        let (w, g) = state.split_at_mut(self.dim);
+        self.rows_kernel.apply(w, g);
+    }
+
+    /// Rounding noise of g and g' where |w| ≤ `amplitude`.
+    pub(crate) fn noise(&self, amplitude: &[f64], floors: &mut Vec<f64>) {
+        floors.clear();
+        floors.extend(self.rows.row_iter().map(|row| {
+            NOISE * f64::EPSILON * row.iter().zip(amplitude).map(|(r, a)| (r * a).abs()).sum::<f64>()
+        }));
+    }
+
+    /// Taylor terms (𝒜 dt)^k w/k! for k = 0…degree into `terms` (degree + 1 blocks of `dim`); returns the degree.
+    /// `dt` ≤ h/2^K.
+    pub(crate) fn taylor(&self, w: &[f64], dt: f64, terms: &mut Vec<f64>) -> usize {
+        let dim = self.dim;
+        terms.resize((MAX_DEGREE + 1) * dim, 0.0);
+        terms[..dim].copy_from_slice(&w[..dim]);
+        let mut small_before = false;
+        for k in 1..=MAX_DEGREE {
+            let (known, rest) = terms.split_at_mut(k * dim);
+            let term = &mut rest[..dim];
+            self.generator_kernel.apply(&known[(k - 1) * dim..], term);
+            let factor = dt / k as f64;
+            let mut small = true;
+            for (i, value) in term.iter_mut().enumerate() {
+                *value *= factor;
+                let largest = (0..k).map(|j| known[j * dim + i].abs()).fold(0.0, f64::max);
+                small &= value.abs() <= 0.1 * f64::EPSILON * largest;
+            }
+            if small && small_before {
+                return k;
+            }
+            small_before = small;
+        }
+        MAX_DEGREE
+    }
+
+    /// Σ terms s^k: w at the fraction s of Taylor's step.
+    pub(crate) fn sum(&self, terms: &[f64], degree: usize, s: f64, w: &mut [f64]) {
+        let dim = self.dim;
+        for (i, out) in w[..dim].iter_mut().enumerate() {
+            *out = (0..=degree).rev().fold(0.0, |sum, k| sum * s + terms[k * dim + i]);
+        }
+    }
+
+    /// The guards as polynomials in the fraction of Taylor's step: `values[k·guards + i]` is coefficient k of guard i.
+    pub(crate) fn guard_polynomials(&self, terms: &[f64], degree: usize, values: &mut Vec<f64>) {
+        let (dim, m) = (self.dim, self.guards);
+        values.resize((MAX_DEGREE + 1) * m, 0.0);
+        for k in 0..=degree {
+            self.guard_kernel.apply(&terms[k * dim..(k + 1) * dim], &mut values[k * m..(k + 1) * m]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn oscillator(h: f64) -> Flow {
+        // x1' = −ω x2, x2' = ω x1 with ω = 1e4, guard x1
+        let generator = DMatrix::from_row_slice(2, 2, &[0.0, -1e4, 1e4, 0.0]);
+        Flow::new(generator, 2, &DMatrix::from_row_slice(1, 2, &[1.0, 0.0]), h, &[]).unwrap()
+    }
+
+    #[test]
+    fn levels_and_taylor_give_the_same_flow() {
+        let mut flow = oscillator(1e-3);
+        assert_eq!(flow.bottom(), 4);
+        let mut next = vec![0.0; 4];
+        for level in 0..=4 {
+            assert!(flow.leap(level, &[1.0, 0.0], &mut next));
+            let (s, c) = (1e4 * flow.step(level)).sin_cos();
+            let expected = [c, s, c, -1e4 * s];
+            for (a, b) in next.iter().zip(expected) {
+                assert!((a - b).abs() <= 3e-15 * b.abs().max(1.0));
+            }
+        }
+        let mut terms = Vec::new();
+        let degree = flow.taylor(&[1.0, 0.0], flow.step(4), &mut terms);
+        let mut w = vec![0.0; 2];
+        flow.sum(&terms, degree, 1.0, &mut w);
+        assert!((w[0] - next[0]).abs() < 4e-16 && (w[1] - next[1]).abs() < 4e-16, "{w:?} {next:?} {degree}");
+        let mut values = Vec::new();
+        flow.guard_polynomials(&terms, degree, &mut values);
+        assert_eq!(values[0], 1.0);
+        assert!((values[2] + 0.5 * 0.625 * 0.625).abs() < 1e-15);
+    }
+}

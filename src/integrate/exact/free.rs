@@ -1,0 +1,145 @@
+//! The complementarity system of one switch position: jumps, and proposals for the next mode.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::integrate::jump::{Infeasible, Jump, JumpProblem};
+use crate::lcs::{Lcs, Role};
+use crate::solve::{Driver, Status};
+
+/// One implicit step prepared: λ solves LCP(M, q) with M = D + hC W⁻¹B, W = I − hA.
+#[derive(Debug, Clone)]
+struct Step {
+    h: f64,
+    /// C W⁻¹, m×n.
+    reach: DMatrix<f64>,
+    driver: Driver,
+}
+
+/// What becomes of pairs whose current and voltage are both zero.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Degenerate<'a> {
+    /// They block.
+    Open,
+    /// They stay as they are here.
+    As(&'a [bool]),
+}
+
+/// The system with every pair free.
+#[derive(Debug, Clone)]
+pub(crate) struct Free {
+    /// Its matrices.
+    pub(crate) lcs: Lcs,
+    jump: Option<JumpProblem>,
+    steps: Vec<Step>,
+    tolerance: f64,
+}
+
+impl Free {
+    pub(crate) fn new(lcs: Lcs, tolerance: f64) -> Self {
+        let jump = JumpProblem::new(&lcs, tolerance);
+        Self { lcs, jump, steps: Vec::new(), tolerance }
+    }
+
+    /// The state that conserves charge and flux from storage s.
+    pub(crate) fn state_from(&self, s: &[f64]) -> DVector<f64> {
+        &self.lcs.storage.inject * DVector::from_column_slice(s) + &self.lcs.storage.inject_one
+    }
+
+    /// The storage vector of a state.
+    pub(crate) fn storage(&self, x: &DVector<f64>, u: &DVector<f64>) -> DVector<f64> {
+        &self.lcs.storage.x * x + &self.lcs.storage.u * u + &self.lcs.storage.one
+    }
+
+    /// The impulse of the devices at state x, if one is needed. Active networks have no energy to project in; their jump
+    /// is left to the limit of small steps.
+    pub(crate) fn jump(&mut self, x: &DVector<f64>, u: &DVector<f64>) -> Result<Option<Jump>, Infeasible> {
+        match &mut self.jump {
+            Some(problem) if problem.monotone => problem.solve(&self.lcs, x, u),
+            _ => Ok(None),
+        }
+    }
+
+    /// Which pairs conduct during one implicit step of length `h` from x to inputs `u`: the candidate for the next mode.
+    /// Pairs that are zero on both sides come as `degenerate` says.
+    pub(crate) fn propose(
+        &mut self,
+        x: &DVector<f64>,
+        u: &DVector<f64>,
+        h: f64,
+        degenerate: Degenerate<'_>,
+    ) -> Option<Vec<bool>> {
+        let at = match self.steps.iter().position(|s| s.h == h) {
+            Some(at) => at,
+            None => {
+                let n = self.lcs.n();
+                let w = DMatrix::identity(n, n) - &self.lcs.a * h;
+                let inverse = w.lu().try_inverse()?;
+                let reach = &self.lcs.c * inverse;
+                let m = &self.lcs.d + &reach * &self.lcs.b * h;
+                if !m.iter().all(|v| v.is_finite()) {
+                    return None;
+                }
+                self.steps.push(Step { h, reach, driver: Driver::new(m, self.tolerance) });
+                self.steps.len() - 1
+            }
+        };
+        let Step { reach, driver, .. } = &mut self.steps[at];
+        let lcs = &self.lcs;
+        let ahead = x + (&lcs.e * u + &lcs.e0) * h;
+        let q = &*reach * ahead + &lcs.g * u + &lcs.f;
+        if !q.iter().all(|v| v.is_finite()) {
+            return None;
+        }
+        let solution = driver.solve(&q);
+        if solution.status != Status::Solved {
+            return None;
+        }
+        Some(
+            lcs.ports
+                .iter()
+                .zip(&solution.active)
+                .enumerate()
+                .map(|(j, (port, active))| match (active, degenerate) {
+                    (Some(active), _) => *active == (port.role != Role::Voltage),
+                    (None, Degenerate::Open) => false,
+                    (None, Degenerate::As(before)) => before[j],
+                })
+                .collect(),
+        )
+    }
+
+    /// Factorisations spent in proposals.
+    pub(crate) fn factorisations(&self) -> u64 {
+        self.steps.iter().map(|s| s.driver.factorisations).sum()
+    }
+
+    /// Impulses of the ports by the name of their device's quantity, with areas.
+    pub(crate) fn impulses(&self, p: &DVector<f64>) -> Vec<(String, f64)> {
+        /// Areas below this part of the largest of their kind are rounding.
+        const ROUNDING: f64 = 1e-12;
+        let through = &self.lcs.d * p;
+        let (mut currents, mut voltages) = (Vec::new(), Vec::new());
+        for (j, port) in self.lcs.ports.iter().enumerate() {
+            let (current, voltage) = match port.role {
+                Role::Current => (p[j], -through[j]),
+                Role::Voltage => (through[j], -p[j]),
+                Role::Function => {
+                    currents.push((port.lambda.clone(), p[j]));
+                    continue;
+                }
+            };
+            currents.push((format!("i({})", port.device), current));
+            voltages.push((format!("v({})", port.device), voltage));
+        }
+        let mut all: Vec<(String, f64)> = Vec::new();
+        for kind in [currents, voltages] {
+            let largest = kind.iter().fold(0.0_f64, |a, (_, area)| a.max(area.abs()));
+            for (name, area) in kind {
+                if area.abs() > ROUNDING * largest && !all.iter().any(|(n, _)| *n == name) {
+                    all.push((name, area));
+                }
+            }
+        }
+        all
+    }
+}

@@ -1,0 +1,95 @@
+//! Whether a mode can be entered: what it conserves, what must vanish, and on which side of zero its guards leave.
+
+use super::exosystem::Exosystem;
+use super::mode::Mode;
+
+/// A mode may move the storage vector by no more than this part of its amplitude; more is a jump and needs an impulse.
+const CONSISTENT: f64 = 1e-9;
+/// Guards within this many times the rounding noise of one evaluation are taken together as zero: simultaneous events of
+/// symmetric circuits differ by the roundings of a few operations.
+const GROUP: f64 = 128.0;
+/// Event times are known to this many units in the last place.
+const TIME_ULPS: f64 = 8.0;
+/// Derivatives looked at: g, g', g'', g'''.
+const ORDERS: usize = 4;
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Finding {
+    /// The mode does not exist at this state: it would move charge or flux, or a constraint does not hold.
+    Inconsistent,
+    /// A guard of devices leaves downwards: its row.
+    Refused(usize),
+    /// All guards of devices hold on some interval after now; these switches leave at once.
+    Holds(Vec<usize>),
+}
+
+/// Work space of inspections; after one, `x` is the state in the inspected mode.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Inspector {
+    /// State in the inspected mode.
+    pub(crate) x: Vec<f64>,
+    /// Amplitudes of x, from those of the storage.
+    pub(crate) amplitude: Vec<f64>,
+    w: Vec<f64>,
+    s: Vec<f64>,
+}
+
+impl Inspector {
+    /// Inspects `mode` at storage `s`, whose amplitudes so far are `scale`, at time t on the current source pieces.
+    pub(crate) fn inspect(
+        &mut self,
+        mode: &Mode,
+        exosystem: &Exosystem,
+        t: f64,
+        s: &[f64],
+        scale: &[f64],
+    ) -> Finding {
+        mode.state_from(s, &mut self.x);
+        let n = mode.n;
+        self.w.clear();
+        self.w.extend_from_slice(&self.x);
+        self.w.resize(mode.flow.dim(), 0.0);
+        exosystem.write(t, &mut self.w[n..]);
+        mode.storage_at(&self.w, &mut self.s);
+        if self.s.iter().zip(s).zip(scale).any(|((a, b), size)| (a - b).abs() > CONSISTENT * size) {
+            return Finding::Inconsistent;
+        }
+        self.amplitude.clear();
+        self.amplitude.extend(
+            (0..n).map(|i| mode.inject.row(i).iter().zip(scale).map(|(j, s)| (j * s).abs()).sum::<f64>()),
+        );
+        let (w, amplitude) = (&self.w, &self.amplitude);
+        let size = |j: usize| if j < n { amplitude[j].max(w[j].abs()) } else { w[j].abs() };
+        let broken = mode.constraints.row_iter().any(|row| {
+            let value: f64 = row.iter().zip(w).map(|(c, w)| c * w).sum();
+            let whole: f64 = row.iter().enumerate().map(|(j, c)| (c * size(j)).abs()).sum();
+            value.abs() > CONSISTENT * whole
+        });
+        if broken {
+            return Finding::Inconsistent;
+        }
+        let m = mode.flow.guards();
+        let time = TIME_ULPS * f64::EPSILON * t.abs();
+        let mut leaving = Vec::new();
+        for i in 0..m {
+            let (mut value, mut noise) = ([0.0; ORDERS], [0.0; ORDERS]);
+            for k in 0..ORDERS {
+                let row = mode.jets[k].row(i);
+                value[k] = row.iter().zip(w).map(|(r, w)| r * w).sum();
+                noise[k] = GROUP
+                    * f64::EPSILON
+                    * row.iter().enumerate().map(|(j, r)| (r * size(j)).abs()).sum::<f64>();
+            }
+            noise[0] += time * value[1].abs();
+            let first = (0..ORDERS).find(|&k| value[k].abs() > noise[k]);
+            if first.is_some_and(|k| value[k] < 0.0) {
+                match i.checked_sub(mode.device_guards) {
+                    None => return Finding::Refused(i),
+                    Some(k) => leaving.push(mode.guarded_switches[k]),
+                }
+            }
+        }
+        Finding::Holds(leaving)
+    }
+}

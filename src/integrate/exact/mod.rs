@@ -1,0 +1,23 @@
+//! The exact integrator: within a mode the circuit is a linear system driven by an exosystem, and its solution is a
+//! matrix exponential; between modes stands a complementarity problem.
+
+mod exosystem;
+mod expm;
+mod flow;
+mod free;
+mod inspect;
+mod kernel;
+mod mode;
+mod motion;
+mod plant;
+mod polynomial;
+mod rays;
+mod spectrum;
+mod stepper;
+mod work;
+
+#[cfg(test)]
+mod tests;
+
+pub use plant::Assemble;
+pub use stepper::{Exact, Setup};

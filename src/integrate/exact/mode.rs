@@ -1,0 +1,203 @@
+//! A mode: which devices conduct, where the switches stand, and the linear system that holds there.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::exosystem::Exosystem;
+use super::flow::Flow;
+use super::kernel::Kernel;
+use super::rays;
+use crate::integrate::switching::Threshold;
+use crate::lcs::{Lcs, PowerKind, Rows};
+
+/// Which devices conduct and where the switches stand.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub(crate) struct Key {
+    /// By pair: conducting.
+    pub(crate) closed: Vec<bool>,
+    /// By switch: on.
+    pub(crate) switches: Vec<bool>,
+}
+
+/// Who ends the mode when a guard falls through zero.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Owner {
+    /// Device pairs (an extreme ray may join several).
+    Devices,
+    /// A switch.
+    Switch(usize),
+}
+
+/// One mode over w = [x; z].
+#[derive(Debug, Clone)]
+pub(crate) struct Mode {
+    /// Its name.
+    pub(crate) key: Key,
+    /// Number of states.
+    pub(crate) n: usize,
+    /// Its flow and guards: first those of devices, then those of switches.
+    pub(crate) flow: Flow,
+    /// Guard rows over w and their first three derivatives.
+    pub(crate) jets: [DMatrix<f64>; 4],
+    /// Number of guards that belong to devices.
+    pub(crate) device_guards: usize,
+    /// Switch of each further guard.
+    pub(crate) guarded_switches: Vec<usize>,
+    /// What must vanish for the mode to exist, over w; with the first two derivatives below it.
+    pub(crate) constraints: DMatrix<f64>,
+    /// s = storage · w, q×dim.
+    pub(crate) storage: DMatrix<f64>,
+    /// x = inject · s + inject_one, n×q.
+    pub(crate) inject: DMatrix<f64>,
+    /// n.
+    pub(crate) inject_one: DVector<f64>,
+    /// Probe rows over w.
+    pub(crate) outputs: Kernel,
+    /// Whether devices share currents or voltages that the ideal model does not determine.
+    pub(crate) shared: bool,
+}
+
+/// Rows over [x | u | u' | 1] as rows over w, with u = H z and u' = H S z.
+pub(crate) fn over_w(rows: &Rows, n: usize, exosystem: &Exosystem) -> DMatrix<f64> {
+    let count = rows.one.len();
+    let mut out = DMatrix::zeros(count, n + exosystem.dim());
+    if rows.x.nrows() == count && rows.x.ncols() == n {
+        out.columns_mut(0, n).copy_from(&rows.x);
+    }
+    let mut z = out.columns_mut(n, exosystem.dim());
+    let h = exosystem.output();
+    if rows.u.nrows() == count && rows.u.ncols() == h.nrows() {
+        z += &rows.u * h;
+    }
+    if rows.du.nrows() == count && rows.du.ncols() == h.nrows() {
+        z += &rows.du * (h * exosystem.generator());
+    }
+    for i in 0..count {
+        out[(i, n)] += rows.one[i];
+    }
+    out
+}
+
+impl Mode {
+    /// The mode of a system in which every pair is held. `None` if its numbers are not finite or its guards are too many
+    /// to describe.
+    pub(crate) fn new(
+        key: Key,
+        lcs: &Lcs,
+        exosystem: &Exosystem,
+        thresholds: &[Threshold],
+        watched: &[bool],
+        h: f64,
+        energy: bool,
+    ) -> Option<Self> {
+        let (n, dz) = (lcs.n(), exosystem.dim());
+        let dim = n + dz;
+        let mut generator = DMatrix::zeros(dim, dim);
+        generator.view_mut((0, 0), (n, n)).copy_from(&lcs.a);
+        let mut input = &lcs.e * exosystem.output();
+        let mut constant = input.column_mut(0);
+        constant += &lcs.e0;
+        generator.view_mut((0, n), (n, dz)).copy_from(&input);
+        generator.view_mut((n, n), (dz, dz)).copy_from(exosystem.generator());
+
+        let held = over_w(&lcs.held.guard, n, exosystem);
+        let shared = lcs.held.kernel.ncols() > 0;
+        let devices = if shared { rays::extreme_rays(&lcs.held.kernel)? * held } else { held };
+        let controls = over_w(&lcs.controls, n, exosystem);
+        let moved = |i: usize| controls.row(i).columns(0, n).iter().any(|v| *v != 0.0);
+        let guarded_switches: Vec<usize> =
+            (0..thresholds.len()).filter(|&i| watched[i] || moved(i)).collect();
+        let mut guards = DMatrix::zeros(devices.nrows() + guarded_switches.len(), dim);
+        guards.rows_mut(0, devices.nrows()).copy_from(&devices);
+        for (k, &i) in guarded_switches.iter().enumerate() {
+            let (sign, level) = if key.switches[i] {
+                (1.0, thresholds[i].off_below)
+            } else {
+                (-1.0, thresholds[i].on_above)
+            };
+            let mut row = guards.row_mut(devices.nrows() + k);
+            row += controls.row(i) * sign;
+            row[n] -= sign * level;
+        }
+        let first = &guards * &generator;
+        let second = &first * &generator;
+        let third = &second * &generator;
+        let mut flow = Flow::new(generator, n, &guards, h, exosystem.rates())?;
+        if let Some(forms) = power_forms(lcs, n, exosystem).filter(|_| energy) {
+            flow.set_power(forms);
+        }
+
+        let c0 = over_w(&lcs.held.constraints, n, exosystem);
+        let c1 = &c0 * flow.generator();
+        let c2 = &c1 * flow.generator();
+        let rows = c0.nrows();
+        let mut constraints = DMatrix::zeros(3 * rows, dim);
+        for (k, c) in [c0, c1, c2].iter().enumerate() {
+            constraints.rows_mut(k * rows, rows).copy_from(c);
+        }
+
+        let map = &lcs.storage;
+        let mut storage = DMatrix::zeros(map.names.len(), dim);
+        storage.columns_mut(0, n).copy_from(&map.x);
+        storage.columns_mut(n, dz).copy_from(&(&map.u * exosystem.output()));
+        let mut ones = storage.column_mut(n);
+        ones += &map.one;
+
+        Some(Self {
+            key,
+            n,
+            jets: [guards, first, second, third],
+            device_guards: devices.nrows(),
+            guarded_switches,
+            constraints,
+            storage,
+            inject: map.inject.clone(),
+            inject_one: map.inject_one.clone(),
+            outputs: Kernel::new(&over_w(&lcs.outputs.rows, n, exosystem)),
+            shared,
+            flow,
+        })
+    }
+
+    /// Who a guard belongs to.
+    pub(crate) fn owner(&self, guard: usize) -> Owner {
+        match guard.checked_sub(self.device_guards) {
+            None => Owner::Devices,
+            Some(k) => Owner::Switch(self.guarded_switches[k]),
+        }
+    }
+
+    /// The state that conserves charge and flux from storage s.
+    pub(crate) fn state_from(&self, s: &[f64], x: &mut Vec<f64>) {
+        x.clear();
+        x.extend((0..self.n).map(|i| {
+            self.inject_one[i] + self.inject.row(i).iter().zip(s).map(|(j, s)| j * s).sum::<f64>()
+        }));
+    }
+
+    /// The storage vector at w.
+    pub(crate) fn storage_at(&self, w: &[f64], s: &mut Vec<f64>) {
+        s.clear();
+        s.extend(self.storage.row_iter().map(|row| row.iter().zip(w).map(|(m, w)| m * w).sum::<f64>()));
+    }
+}
+
+/// Quadratic forms of the power out of sources and into what dissipates, over w.
+fn power_forms(lcs: &Lcs, n: usize, exosystem: &Exosystem) -> Option<[DMatrix<f64>; 2]> {
+    let terms = &lcs.outputs.power;
+    if terms.is_empty() {
+        return None;
+    }
+    let v = over_w(&lcs.outputs.power_v, n, exosystem);
+    let i = over_w(&lcs.outputs.power_i, n, exosystem);
+    let dim = n + exosystem.dim();
+    let mut forms = [DMatrix::zeros(dim, dim), DMatrix::zeros(dim, dim)];
+    for (k, term) in terms.iter().enumerate() {
+        let product = v.row(k).transpose() * i.row(k);
+        let symmetric = (&product + product.transpose()) * 0.5;
+        match term.kind {
+            PowerKind::Source => forms[0] -= symmetric,
+            PowerKind::Dissipated => forms[1] += symmetric,
+        }
+    }
+    Some(forms)
+}

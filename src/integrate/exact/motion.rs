@@ -1,0 +1,267 @@
+//! Moving along a mode until a time or until a guard falls through zero.
+
+use super::exosystem::Exosystem;
+use super::flow::Flow;
+use super::polynomial;
+
+/// Table steps after which the exosystem is set from its closed form again.
+const REFRESH: u32 = 64;
+/// A step is the output step if it differs by no more than this many units in the last place of the time.
+const GRID_ULPS: f64 = 8.0;
+/// Required distance of a guard's control polygon from zero, relative to its spread: the error of the cubic through
+/// values and slopes, (ωh)²/48 of the spread at ωh = 0.7, is below it.
+const MARGIN: f64 = 0.02;
+
+/// How a stretch ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Arrival {
+    /// At the time asked for.
+    Reached,
+    /// A guard falls through zero here: its row.
+    Fired(usize),
+    /// The flow left the range of doubles.
+    Overflow,
+}
+
+/// What the guards say about a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Verdict {
+    Clear,
+    /// Crossed, or not known without looking closer.
+    Unclear,
+}
+
+/// The state of a run inside a mode: time, `[w | g | g']`, and work space that lives as long as the run.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Motion {
+    /// Current time, s.
+    pub(crate) t: f64,
+    /// `[w | g | g']` at `t`.
+    pub(crate) now: Vec<f64>,
+    /// When the mode was entered, s.
+    pub(crate) entered: f64,
+    /// Steps taken.
+    pub(crate) steps: u64,
+    /// Energy from sources and energy dissipated since last taken, J.
+    pub(crate) energy: [f64; 2],
+    next: Vec<f64>,
+    terms: Vec<f64>,
+    polynomials: Vec<f64>,
+    amplitude: Vec<f64>,
+    floors: Vec<f64>,
+    /// How far below zero each guard was on entry, by rounding of the time or of simultaneous events.
+    slack: Vec<f64>,
+    steady: bool,
+    since_refresh: u32,
+    degree: usize,
+}
+
+impl Motion {
+    /// A motion that stands at `t` in no mode yet.
+    pub(crate) fn at(t: f64) -> Self {
+        Self { t, entered: t, ..Self::default() }
+    }
+
+    /// Enters a mode at `t` with state `x` of amplitudes `amplitude`, exosystem values from their closed form.
+    pub(crate) fn enter(
+        &mut self,
+        flow: &Flow,
+        exosystem: &Exosystem,
+        t: f64,
+        x: &[f64],
+        amplitude: &[f64],
+    ) {
+        let length = flow.dim() + 2 * flow.guards();
+        self.t = t;
+        self.entered = t;
+        self.now.clear();
+        self.now.resize(length, 0.0);
+        self.next.clear();
+        self.next.resize(length, 0.0);
+        self.now[..x.len()].copy_from_slice(x);
+        exosystem.write(t, &mut self.now[x.len()..flow.dim()]);
+        flow.read_guards(&mut self.now);
+        self.amplitude.clear();
+        self.amplitude.extend_from_slice(amplitude);
+        self.amplitude.resize(flow.dim(), 0.0);
+        self.steady = flow.guards() == 0;
+        let guards = &self.now[flow.dim()..flow.dim() + flow.guards()];
+        self.slack.clear();
+        self.slack.extend(guards.iter().map(|g| (-g).max(0.0)));
+        self.refresh_noise(flow);
+    }
+
+    /// x.
+    pub(crate) fn state(&self, n: usize) -> &[f64] {
+        &self.now[..n]
+    }
+
+    fn refresh_noise(&mut self, flow: &Flow) {
+        for (a, v) in self.amplitude.iter_mut().zip(&self.now) {
+            *a = a.max(v.abs());
+        }
+        flow.noise(&self.amplitude, &mut self.floors);
+        for (floor, slack) in self.floors.iter_mut().zip(&self.slack) {
+            *floor += slack;
+        }
+        self.since_refresh = 0;
+    }
+
+    /// Moves to `stop` or to the first guard that falls through zero before it.
+    #[inline]
+    pub(crate) fn travel(&mut self, flow: &mut Flow, exosystem: &Exosystem, stop: f64) -> Arrival {
+        if self.steady {
+            let off = stop - self.t - flow.step(0);
+            if off.abs() <= GRID_ULPS * f64::EPSILON * stop.abs() {
+                if !flow.leap(0, &self.now, &mut self.next) {
+                    return Arrival::Overflow;
+                }
+                if self.judge(flow, flow.step(0)) == Verdict::Clear {
+                    self.accept(flow, exosystem, 0, stop);
+                    return Arrival::Reached;
+                }
+            }
+        }
+        self.crawl(flow, exosystem, stop)
+    }
+
+    /// The general case: Taylor's series for what the table of halved steps does not cover, then table steps that grow from
+    /// small to large, each halved where the guards are not clear.
+    fn crawl(&mut self, flow: &mut Flow, exosystem: &Exosystem, stop: f64) -> Arrival {
+        let bottom = flow.bottom();
+        let unit = flow.step(bottom);
+        let rest = stop - self.t;
+        if rest <= 0.0 {
+            return Arrival::Reached;
+        }
+        let mut units = (rest / unit).floor();
+        let mut fraction = rest - units * unit;
+        let negligible = GRID_ULPS * f64::EPSILON * stop.abs();
+        if unit - fraction <= negligible {
+            units += 1.0;
+            fraction = 0.0;
+        }
+        let mut units = units as u64;
+        if fraction > negligible.min(rest * 0.5) || units == 0 {
+            let end = if units == 0 { stop } else { stop - units as f64 * unit };
+            match self.taylor(flow, exosystem, end) {
+                Arrival::Reached => {}
+                other => return other,
+            }
+        }
+        let mut deepest_next = 0;
+        while units > 0 {
+            let limit = flow.step_limit(self.t - self.entered);
+            let aligned = bottom - units.trailing_zeros().min(bottom);
+            let mut level = aligned.max(deepest_next);
+            while level < bottom && flow.step(level) > limit {
+                level += 1;
+            }
+            deepest_next = level.saturating_sub(1);
+            loop {
+                let span = 1_u64 << (bottom - level);
+                let end = if units == span { stop } else { stop - (units - span) as f64 * unit };
+                if !flow.leap(level, &self.now, &mut self.next) {
+                    return Arrival::Overflow;
+                }
+                if self.judge(flow, flow.step(level)) == Verdict::Clear {
+                    self.accept(flow, exosystem, level, end);
+                    units -= span;
+                    break;
+                }
+                if level == bottom {
+                    match self.taylor(flow, exosystem, end) {
+                        Arrival::Reached => {}
+                        other => return other,
+                    }
+                    units -= span;
+                    break;
+                }
+                level += 1;
+                deepest_next = level;
+            }
+        }
+        if !self.steady && flow.step_limit(self.t - self.entered) >= flow.step(0) {
+            self.steady = true;
+        }
+        Arrival::Reached
+    }
+
+    /// One Taylor step to `end`, at most h/2^K away; every guard is followed as a polynomial, so nothing hides.
+    fn taylor(&mut self, flow: &Flow, exosystem: &Exosystem, end: f64) -> Arrival {
+        let dt = end - self.t;
+        let (dim, m) = (flow.dim(), flow.guards());
+        self.degree = flow.taylor(&self.now, dt, &mut self.terms);
+        if !self.terms[..(self.degree + 1) * dim].iter().all(|v| v.is_finite()) {
+            return Arrival::Overflow;
+        }
+        let mut first = (1.0, None);
+        if m > 0 {
+            flow.guard_polynomials(&self.terms, self.degree, &mut self.polynomials);
+            let mut coefficients = [0.0; polynomial::MAX_DEGREE + 1];
+            for i in 0..m {
+                for (k, c) in coefficients.iter_mut().enumerate().take(self.degree + 1) {
+                    *c = self.polynomials[k * m + i];
+                }
+                let crossing = polynomial::first_crossing(&coefficients[..=self.degree], self.floors[i]);
+                if let Some(s) = crossing.filter(|&s| s < first.0 || first.1.is_none()) {
+                    first = (s, Some(i));
+                }
+            }
+        }
+        let (s, fired) = first;
+        let t = if fired.is_some() { self.t + s * dt } else { end };
+        let [source, dissipated] =
+            flow.energy_of_taylor(&self.terms, self.degree, dt, s, &mut self.next[..dim]);
+        self.energy[0] += source;
+        self.energy[1] += dissipated;
+        flow.sum(&self.terms, self.degree, s, &mut self.next);
+        self.next[dim..].copy_from_slice(&self.now[dim..]);
+        std::mem::swap(&mut self.now, &mut self.next);
+        self.t = t;
+        self.steps += 1;
+        let n = dim - exosystem.dim();
+        exosystem.write(t, &mut self.now[n..dim]);
+        flow.read_guards(&mut self.now);
+        self.refresh_noise(flow);
+        fired.map_or(Arrival::Reached, Arrival::Fired)
+    }
+
+    /// Whether no guard can have been negative on the step from `now` to `next`: Bernstein coefficients of the cubic through
+    /// values and slopes, with a margin for what the cubic does not follow.
+    #[inline]
+    fn judge(&self, flow: &Flow, h: f64) -> Verdict {
+        let (dim, m) = (flow.dim(), flow.guards());
+        let (g0, s0) = self.now[dim..dim + 2 * m].split_at(m);
+        let (g1, s1) = self.next[dim..dim + 2 * m].split_at(m);
+        let (floor, slope_floor) = self.floors[..2 * m].split_at(m);
+        let third = h / 3.0;
+        let mut clear = true;
+        for i in 0..m {
+            let (b0, b3) = (g0[i], g1[i]);
+            let (b1, b2) = (b0 + third * s0[i], b3 - third * s1[i]);
+            let low = b1.min(b2);
+            let spread = b1.max(b2).max(b0).max(b3) - low.min(b0).min(b3);
+            let noise = floor[i] + third * slope_floor[i];
+            clear &= b3 >= -floor[i] && low + noise >= MARGIN * spread;
+        }
+        if clear { Verdict::Clear } else { Verdict::Unclear }
+    }
+
+    #[inline]
+    fn accept(&mut self, flow: &mut Flow, exosystem: &Exosystem, level: u32, t: f64) {
+        let [source, dissipated] = flow.energy(level, &self.now);
+        self.energy[0] += source;
+        self.energy[1] += dissipated;
+        std::mem::swap(&mut self.now, &mut self.next);
+        self.t = t;
+        self.steps += 1;
+        self.since_refresh += 1;
+        if self.since_refresh >= REFRESH {
+            let n = flow.dim() - exosystem.dim();
+            exosystem.write(t, &mut self.now[n..flow.dim()]);
+            flow.read_guards(&mut self.now);
+            self.refresh_noise(flow);
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! How fast a mode's solution can move, and for how long: eigenvalues of A and frequencies of the sources.
+
+use nalgebra::{DMatrix, linalg::Schur};
+
+use super::expm;
+
+/// A transient e^{−at} is below the rounding of what it started from once a·t exceeds −ln(2⁻⁵³).
+const EXTINCT: f64 = 37.0;
+/// ωh up to which a cubic through values and slopes at both ends follows an oscillation to (ωh)⁴/384 of its amplitude.
+const RESOLVED: f64 = 0.7;
+/// First step after a change of mode, relative to the fastest rate.
+const FIRST: f64 = 0.5;
+/// Iterations per eigenvalue of the QR algorithm.
+const QR_SWEEPS: usize = 60;
+
+/// One eigenvalue −decay ± i·frequency.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Rate {
+    /// 1/s; negative where the mode grows.
+    pub(crate) decay: f64,
+    /// rad/s.
+    pub(crate) frequency: f64,
+}
+
+/// All rates of a mode.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Spectrum {
+    rates: Vec<Rate>,
+}
+
+impl Spectrum {
+    /// Eigenvalues of A (n×n) and the rates of the sources. Where the QR algorithm fails, ‖A‖ after balancing stands for
+    /// all of them.
+    pub(crate) fn new(a: &DMatrix<f64>, sources: &[Rate]) -> Self {
+        let n = a.nrows();
+        let mut rates = sources.to_vec();
+        if n > 0 {
+            let d = expm::balance(a, 1.0);
+            let balanced = DMatrix::from_fn(n, n, |i, j| a[(i, j)] * d[j] / d[i]);
+            match Schur::try_new(balanced.clone(), f64::EPSILON, QR_SWEEPS * n) {
+                Some(schur) => rates.extend(
+                    schur.complex_eigenvalues().iter().map(|v| Rate { decay: -v.re, frequency: v.im.abs() }),
+                ),
+                None => {
+                    let norm = expm::norm_1(&balanced);
+                    rates.push(Rate { decay: 0.0, frequency: norm });
+                }
+            }
+        }
+        Self { rates }
+    }
+
+    /// The longest step that hides nothing `age` seconds after the last change of mode: dead transients no longer count,
+    /// decays are followed on steps that double, oscillations are resolved while they last.
+    pub(crate) fn step_limit(&self, age: f64) -> f64 {
+        let mut limit = f64::INFINITY;
+        let mut fastest = 0.0_f64;
+        for rate in self.rates.iter().filter(|r| r.decay * age <= EXTINCT) {
+            fastest = fastest.max(rate.decay.abs()).max(rate.frequency);
+            limit = limit.min(RESOLVED / rate.frequency);
+        }
+        limit.min(age.max(FIRST / fastest))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_grow_with_age_and_stop_at_living_oscillations() {
+        // a fast decay 1e9 1/s beside an undamped oscillation of 1e3 rad/s
+        let mut a = DMatrix::zeros(3, 3);
+        a[(0, 0)] = -1e9;
+        a[(1, 2)] = -1e6;
+        a[(2, 1)] = 1.0;
+        let spectrum = Spectrum::new(&a, &[]);
+        assert!((spectrum.step_limit(0.0) - 0.5e-9).abs() < 1e-15);
+        assert!((spectrum.step_limit(3e-9) - 3e-9).abs() < 1e-15);
+        assert!((spectrum.step_limit(1e-6) / 0.5e-3 - 1.0).abs() < 1e-9, "the decay is extinct");
+        assert!((spectrum.step_limit(1.0) / 0.7e-3 - 1.0).abs() < 1e-9);
+        assert_eq!(Spectrum::default().step_limit(0.0), f64::INFINITY);
+    }
+
+    #[test]
+    fn sources_count() {
+        let source = Rate { decay: 0.0, frequency: 100.0 };
+        assert!((Spectrum::new(&DMatrix::zeros(0, 0), &[source]).step_limit(1.0) - 7e-3).abs() < 1e-12);
+    }
+}

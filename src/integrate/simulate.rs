@@ -1,0 +1,293 @@
+//! From a circuit, or a system, to a run.
+
+use nalgebra::DVector;
+
+use crate::circuit::{Circuit, Tran};
+use crate::integrate::control::Amplitudes;
+use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, Stepper, run};
+use crate::integrate::start;
+use crate::integrate::exact::{self, Exact};
+use crate::integrate::step::Scheme;
+use crate::integrate::switching::Threshold;
+use crate::integrate::theta::{Setup, Start, Stepping, Theta};
+use crate::integrate::Run;
+use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
+use crate::mna::{Behaviour, SwitchPort};
+use crate::plan::{Plan, not_exact, plan};
+use crate::settings::Settings;
+
+/// Integration methods.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// What the plan finds best.
+    #[default]
+    Auto,
+    /// Event-driven matrix exponentials.
+    Exact,
+    /// Moreau's scheme, θ = γ = 1.
+    Euler,
+    /// (θ, γ), by default ½ and ½.
+    Theta,
+}
+
+impl Method {
+    /// `auto`, `exact`, `euler`, `theta`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Exact => "exact",
+            Self::Euler => "euler",
+            Self::Theta => "theta",
+        }
+    }
+}
+
+/// What a simulation may be asked for.
+#[derive(Default)]
+pub struct SimOptions<'a> {
+    /// The method.
+    pub method: Method,
+    /// θ, default ½ (1 for `euler`).
+    pub theta: Option<f64>,
+    /// γ, default ½ (1 for `euler`).
+    pub gamma: Option<f64>,
+    /// Fixed step, s; error-controlled where absent.
+    pub step: Option<f64>,
+    /// Rows at event times too.
+    pub events: bool,
+    /// Tolerances.
+    pub settings: Settings,
+    /// Called with the time reached, s.
+    pub progress: Option<&'a mut dyn FnMut(f64)>,
+}
+
+/// Simulates a circuit over its `.tran`.
+///
+/// `behaviour` is the circuit's, laws included; piecewise-linear laws are turned into ideal pairs here. Probes are the circuit's.
+///
+/// # Errors
+/// See [`Reason`]; the run so far is in [`SimError::partial`].
+pub fn simulate(
+    circuit: &Circuit,
+    behaviour: &Behaviour,
+    options: SimOptions<'_>,
+) -> Result<Run, SimError> {
+    let tran = circuit.tran.ok_or_else(|| {
+        SimError::before(Reason::Unsupported("the netlist asks for no .tran analysis".into()))
+    })?;
+    let standard = behaviour.standard();
+    let initial = start::initial(circuit, &standard, tran.uic, &options.settings)?;
+    let mut notes: Vec<String> = behaviour.notes.iter().map(|n| n.message.clone()).collect();
+    notes.extend(initial.notes);
+    let problem = Problem {
+        position: initial.switches,
+        settle: standard
+            .switches
+            .iter()
+            .map(|s| tran.uic && s.initial.is_none())
+            .collect(),
+        start: initial.storage,
+        notes,
+        behaviour: standard,
+    };
+    drive(problem, tran, options)
+}
+
+/// Simulates a system without a circuit behind it (the JSON of `circ lcs`), from state `x`.
+///
+/// # Errors
+/// See [`Reason`].
+pub fn simulate_system(
+    lcs: &Lcs,
+    x: &DVector<f64>,
+    tran: Tran,
+    options: SimOptions<'_>,
+) -> Result<Run, SimError> {
+    let behaviour = Behaviour::from_lcs(lcs).standard();
+    let mut start = DVector::zeros(behaviour.storage.len());
+    start.rows_mut(0, x.len()).copy_from(x);
+    let problem = Problem {
+        position: vec![],
+        settle: vec![],
+        start,
+        notes: vec![],
+        behaviour,
+    };
+    drive(problem, tran, options)
+}
+
+/// What the steppers share.
+struct Problem {
+    /// All laws as ideal pairs.
+    behaviour: Behaviour,
+    position: Vec<bool>,
+    /// Switches whose start position follows from the start state.
+    settle: Vec<bool>,
+    /// Storage vector s⁻ before the start.
+    start: DVector<f64>,
+    notes: Vec<String>,
+}
+
+/// Steps of the run that finds the amplitudes beforehand.
+const SCOUT_STEPS: f64 = 256.0;
+/// The scout gives up after this many steps (trains of many pulses); what it has seen by then is used.
+const SCOUT_LIMIT: u64 = 20_000;
+
+impl Problem {
+    fn reduce(&self, devices: &[Hold], switches: &[bool]) -> Result<Lcs, SimError> {
+        let position = Position {
+            devices: devices.to_vec(),
+            switches: switches.to_vec(),
+            storage: StorageHold::Dynamic,
+        };
+        reduce(&self.behaviour, &position)
+            .map_err(|error| SimError::before(Reason::Circuit(error.to_string())))
+    }
+
+    fn free(&self, switches: &[bool]) -> Result<Lcs, SimError> {
+        self.reduce(&vec![Hold::Free; self.behaviour.pairs.len()], switches)
+    }
+
+    fn thresholds(&self) -> Vec<Threshold> {
+        let threshold = |s: &SwitchPort| Threshold {
+            name: s.name.clone(),
+            on_above: s.on_above,
+            off_below: s.off_below,
+        };
+        self.behaviour.switches.iter().map(threshold).collect()
+    }
+
+    fn exact(&self, tran: &Tran, settings: &Settings) -> Result<Exact<'_>, SimError> {
+        Exact::new(exact::Setup {
+            assemble: Box::new(|devices, switches| self.reduce(devices, switches)),
+            pairs: self.behaviour.pairs.len(),
+            position: self.position.clone(),
+            thresholds: self.thresholds(),
+            t: 0.0,
+            until: tran.tstop,
+            start: self.start.clone(),
+            h: tran.tstep,
+            energy: true,
+            settings: settings.clone(),
+        })
+    }
+
+    fn stepper(
+        &self,
+        tran: &Tran,
+        scheme: Scheme,
+        stepping: Stepping,
+        settings: &Settings,
+    ) -> Result<Theta<'_>, SimError> {
+        Theta::new(Setup {
+            reduce: Box::new(|position| self.free(position)),
+            position: self.position.clone(),
+            thresholds: self.thresholds(),
+            t: 0.0,
+            start: Start::Storage(self.start.clone()),
+            scheme,
+            stepping,
+            longest: tran.tmax.unwrap_or(f64::INFINITY),
+            settings: settings.clone(),
+        })
+    }
+
+    /// Positions of switches without `ON`/`OFF` that agree with their controls at the start state.
+    fn settle_switches(&mut self, tran: &Tran, settings: &Settings) -> Result<(), SimError> {
+        let mut seen = Vec::new();
+        while self.settle.contains(&true) {
+            let stepping = Stepping::Fixed(tran.tstep);
+            let mut theta = self.stepper(tran, Scheme::MOREAU, stepping, settings)?;
+            let controls = theta.controls_at_start()?;
+            let wanted: Vec<bool> = (0..controls.len())
+                .map(|k| {
+                    if self.settle[k] {
+                        controls[k] > self.behaviour.switches[k].on_above
+                    } else {
+                        self.position[k]
+                    }
+                })
+                .collect();
+            drop(theta);
+            if wanted == self.position {
+                break;
+            }
+            if seen.contains(&wanted) {
+                return Err(SimError::at(0.0, Reason::SwitchesDoNotSettle));
+            }
+            seen.push(std::mem::replace(&mut self.position, wanted));
+        }
+        Ok(())
+    }
+
+    /// Amplitudes from a coarse run.
+    fn scout(&self, tran: &Tran, settings: &Settings) -> Option<Amplitudes> {
+        let settings = Settings { max_steps: SCOUT_LIMIT, ..settings.clone() };
+        let stepping = Stepping::Fixed(tran.tstop / SCOUT_STEPS);
+        let mut theta = self.stepper(tran, Scheme::MOREAU, stepping, &settings).ok()?;
+        let mut log = Log::new(0, f64::INFINITY, false);
+        for k in 1..=SCOUT_STEPS as u32 {
+            // A failure here will be met, and reported, by the run itself.
+            if theta.advance(tran.tstop * f64::from(k) / SCOUT_STEPS, &mut log).is_err() {
+                break;
+            }
+            theta.see();
+        }
+        Some(theta.amplitudes().clone())
+    }
+}
+
+fn drive(mut problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
+    check(&tran, &options)?;
+    problem.settle_switches(&tran, &options.settings)?;
+    let lcs = problem.free(&problem.position)?;
+    let Plan { method, scheme, words } = plan(&lcs, &options);
+    if let (Method::Exact, Some(obstacle)) = (options.method, not_exact(&lcs)) {
+        return Err(SimError::before(Reason::Unsupported(format!(
+            "no exact integration: {obstacle}"
+        ))));
+    }
+    let grid = Grid { tstart: tran.tstart, tstep: tran.tstep, tstop: tran.tstop };
+    let frame = Frame {
+        title: lcs.title.clone(),
+        names: lcs.outputs.names.clone(),
+        units: lcs.outputs.units.clone(),
+        grid,
+        method: method.name().into(),
+        plan: words,
+        notes: problem.notes.clone(),
+        progress: options.progress,
+    };
+    let log = Log::new(frame.names.len(), grid.tstart, options.events);
+    if method == Method::Exact {
+        return run(&mut problem.exact(&tran, &options.settings)?, frame, log);
+    }
+    let stepping = match options.step {
+        Some(h) => Stepping::Fixed(h),
+        None => Stepping::Controlled { span: tran.tstop, first: tran.tstep / 64.0 },
+    };
+    let mut theta = problem.stepper(&tran, scheme, stepping, &options.settings)?;
+    if options.step.is_none()
+        && let Some(amplitudes) = problem.scout(&tran, &options.settings)
+    {
+        theta.expect_amplitudes(amplitudes);
+    }
+    run(&mut theta, frame, log)
+}
+
+fn check(tran: &Tran, options: &SimOptions<'_>) -> Result<(), SimError> {
+    let wrong = |what: &str| Err(SimError::before(Reason::Unsupported(what.into())));
+    let between = |v: Option<f64>| v.is_none_or(|v| (0.5..=1.0).contains(&v));
+    if !between(options.theta) || !between(options.gamma) {
+        return wrong("theta and gamma lie between 1/2 and 1");
+    }
+    if options.step.is_some_and(|h| !(h > 0.0 && h.is_finite())) {
+        return wrong("the step must be a positive time");
+    }
+    let times = tran.tstep > 0.0 && tran.tstart >= 0.0 && tran.tstop > tran.tstart;
+    if !times || !tran.tstop.is_finite() {
+        return wrong(".tran needs 0 <= tstart < tstop and a positive tstep");
+    }
+    Ok(())
+}

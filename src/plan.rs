@@ -1,0 +1,83 @@
+//! What a circuit needs and what is left out, in words, before anything runs.
+
+use crate::integrate::step::Scheme;
+use crate::integrate::{Method, SimOptions};
+use crate::lcs::{Input, Lcs};
+use crate::solve::lcp::Scaling;
+
+/// The machinery chosen for a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// The method, never [`Method::Auto`].
+    pub method: Method,
+    /// θ and γ of the stepper (what the exact integrator falls back to).
+    pub scheme: Scheme,
+    /// The decisions, one sentence each; `circ sim -v` prints them.
+    pub words: Vec<String>,
+}
+
+/// Decides for the system of the start position.
+#[must_use]
+pub fn plan(lcs: &Lcs, options: &SimOptions) -> Plan {
+    let mut words = Vec::new();
+    let (n, m, p) = (lcs.n(), lcs.m(), lcs.p());
+    words.push(format!("{n} states, {m} complementarity pairs, {p} sources"));
+    let obstacle = not_exact(lcs);
+    let method = match (options.method, &obstacle) {
+        (Method::Auto, None) => {
+            words.push("all laws are piecewise linear and all sources exact: exact integration".into());
+            Method::Exact
+        }
+        (Method::Auto, Some(what)) => {
+            words.push(format!("{what}: time-stepping"));
+            Method::Theta
+        }
+        (method, _) => method,
+    };
+    let scheme = match method {
+        Method::Euler => Scheme::MOREAU,
+        _ => Scheme {
+            theta: options.theta.unwrap_or(Scheme::MIDPOINT.theta),
+            gamma: options.gamma.unwrap_or(Scheme::MIDPOINT.gamma),
+        },
+    };
+    if matches!(method, Method::Euler | Method::Theta) {
+        words.push(match options.step {
+            Some(h) => format!("θ = {}, γ = {}, fixed step {h:e} s", scheme.theta, scheme.gamma),
+            None => format!(
+                "θ = {}, γ = {}, steps chosen for a tolerance of {:e}",
+                scheme.theta, scheme.gamma, options.settings.tol
+            ),
+        });
+    }
+    if m == 0 {
+        words.push("no devices: linear propagation, no complementarity problem is built".into());
+    } else if is_positive_definite(lcs) {
+        words.push("D + Dᵀ is positive definite: no jump logic".into());
+    }
+    if lcs.switches.is_empty() {
+        words.push("no switches: one system for the whole run".into());
+    }
+    Plan { method, scheme, words }
+}
+
+/// What keeps a system from exact integration: the element and why.
+#[must_use]
+pub fn not_exact(lcs: &Lcs) -> Option<String> {
+    // Every law so far is piecewise linear; a source may lack a finite exosystem.
+    let endless = |input: &&Input| input.source.piece(0.0).is_none();
+    let source = lcs.inputs.iter().find(endless)?;
+    Some(format!(
+        "the waveform of {} solves no linear equation of finite order",
+        source.name
+    ))
+}
+
+/// Whether no impulse can flow through the devices because each resists it.
+fn is_positive_definite(lcs: &Lcs) -> bool {
+    let scaling = Scaling::of(&lcs.d);
+    let d = nalgebra::DMatrix::from_diagonal(&scaling.d);
+    let scaled = &d * &lcs.d * &d;
+    let symmetric = &scaled + scaled.transpose();
+    crate::solve::norm::kernel(&symmetric).ncols() == 0 && symmetric.cholesky().is_some()
+}
