@@ -2,8 +2,7 @@
 
 use crate::integrate::step::Scheme;
 use crate::integrate::{Method, SimOptions};
-use crate::law::Law;
-use crate::lcs::Lcs;
+use crate::lcs::{Input, Lcs};
 use crate::solve::lcp::Scaling;
 
 /// The machinery chosen for a run.
@@ -62,14 +61,16 @@ pub fn plan(lcs: &Lcs, options: &SimOptions) -> Plan {
     Plan { method, scheme, words }
 }
 
-/// What keeps a system from exact integration.
+/// What keeps a system from exact integration: the element and why.
 #[must_use]
 pub fn not_exact(lcs: &Lcs) -> Option<String> {
-    lcs.ports.iter().find_map(|port| match port.law {
-        Law::Diode { .. } | Law::Curve(_) => None,
-        #[allow(unreachable_patterns, reason = "laws that are not piecewise linear")]
-        _ => Some(format!("{} is not piecewise linear", port.device)),
-    })
+    // Every law so far is piecewise linear; a source may lack a finite exosystem.
+    let endless = |input: &&Input| input.source.piece(0.0).is_none();
+    let source = lcs.inputs.iter().find(endless)?;
+    Some(format!(
+        "the waveform of {} solves no linear equation of finite order",
+        source.name
+    ))
 }
 
 /// Whether no impulse can flow through the devices because each resists it.

@@ -16,10 +16,16 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 )]
 pub struct Cli {
     /// Say nothing but errors
-    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    #[arg(
+        short,
+        long,
+        global = true,
+        conflicts_with = "verbose",
+        display_order = 90
+    )]
     pub quiet: bool,
     /// Explain what is done and why
-    #[arg(short, long, global = true)]
+    #[arg(short, long, global = true, display_order = 91)]
     pub verbose: bool,
     /// What to do
     #[command(subcommand)]
@@ -219,7 +225,11 @@ pub struct CompareArgs {
     #[expect(missing_docs, reason = "documented where it is defined")]
     pub integration: CompareMethodArgs,
     /// `ngspice`, or a csv or raw file of waveforms
-    #[arg(long, value_name = "ngspice|REF.csv|REF.raw", default_value = "ngspice")]
+    #[arg(
+        long,
+        value_name = "ngspice|REF.csv|REF.raw",
+        default_value = "ngspice"
+    )]
     pub against: PathBuf,
     /// Largest error, relative to each signal's amplitude, that counts as equal
     #[arg(long, value_name = "R", default_value = "1e-2", value_parser = positive)]
@@ -269,6 +279,19 @@ pub enum Realisation {
     Sidiode,
 }
 
+impl Realisation {
+    /// As it is typed.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Default => "default",
+            Self::N001 => "n0.01",
+            Self::N0001 => "n0.001",
+            Self::Sidiode => "sidiode",
+        }
+    }
+}
+
 /// `circ graph`.
 #[derive(Debug, Args)]
 pub struct GraphArgs {
@@ -282,19 +305,39 @@ pub struct GraphArgs {
 
 /// A number with SPICE's suffixes: `1u`, `4k7`, `2.2e-6`.
 fn number(text: &str) -> Result<f64, String> {
-    crate::netlist::value::parse(text).map(|v| v.f64).map_err(|e| e.to_string())
+    crate::netlist::value::parse(text)
+        .map(|v| v.f64)
+        .map_err(|e| e.to_string())
 }
 
 fn positive(text: &str) -> Result<f64, String> {
-    number(text).and_then(|x| if x > 0.0 { Ok(x) } else { Err("must be positive".into()) })
+    number(text).and_then(|x| {
+        if x > 0.0 {
+            Ok(x)
+        } else {
+            Err("must be positive".into())
+        }
+    })
 }
 
 fn not_negative(text: &str) -> Result<f64, String> {
-    number(text).and_then(|x| if x >= 0.0 { Ok(x) } else { Err("must not be negative".into()) })
+    number(text).and_then(|x| {
+        if x >= 0.0 {
+            Ok(x)
+        } else {
+            Err("must not be negative".into())
+        }
+    })
 }
 
 fn implicitness(text: &str) -> Result<f64, String> {
-    number(text).and_then(|x| if (0.5..=1.0).contains(&x) { Ok(x) } else { Err("must be in [0.5, 1]".into()) })
+    number(text).and_then(|x| {
+        if (0.5..=1.0).contains(&x) {
+            Ok(x)
+        } else {
+            Err("must be in [0.5, 1]".into())
+        }
+    })
 }
 
 fn assignment(text: &str) -> Result<(String, f64), String> {

@@ -68,7 +68,10 @@ pub enum Failure {
 impl Failure {
     /// A failure of this file.
     pub fn file(path: &Path, error: io::Error) -> Self {
-        Self::File { path: path.to_owned(), error }
+        Self::File {
+            path: path.to_owned(),
+            error,
+        }
     }
 
     /// Whether the reader of our output went away.

@@ -35,7 +35,9 @@ impl Format {
     /// # Errors
     /// A message that lists the known endings.
     pub fn of(path: &Path) -> Result<Self, Failure> {
-        let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        let ending = path
+            .extension()
+            .map(|e| e.to_string_lossy().to_ascii_lowercase());
         Ok(match ending.as_deref() {
             Some("csv") => Self::Csv,
             Some("raw") => Self::Raw,
@@ -44,14 +46,22 @@ impl Format {
             Some("svg") => Self::Svg,
             Some("png") => Self::Png,
             Some("html" | "htm") => Self::Html,
-            _ => return Err(unknown_ending(path, "csv, raw, npz, json, svg, png or html")),
+            _ => {
+                return Err(unknown_ending(
+                    path,
+                    "csv, raw, npz, json, svg, png or html",
+                ));
+            }
         })
     }
 }
 
 /// The failure that a file's ending chooses none of these formats.
 pub(super) fn unknown_ending(path: &Path, known: &str) -> Failure {
-    Failure::Message(format!("{}: the ending chooses the format and must be {known}", path.display()))
+    Failure::Message(format!(
+        "{}: the ending chooses the format and must be {known}",
+        path.display()
+    ))
 }
 
 /// Writes a run to a file.
@@ -81,9 +91,14 @@ pub fn write(run: &Run, format: Format, path: &Path) -> Result<(), Failure> {
 /// # Errors
 /// Those of the file and of rasterising.
 pub fn picture_to_file(path: &Path, drawing: &str) -> Result<(), Failure> {
-    let is_png = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
-    let rasterised: Result<Vec<u8>, PictureError> =
-        if is_png { png::from_svg(drawing) } else { Ok(drawing.as_bytes().to_vec()) };
+    let is_png = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("png"));
+    let rasterised: Result<Vec<u8>, PictureError> = if is_png {
+        png::from_svg(drawing)
+    } else {
+        Ok(drawing.as_bytes().to_vec())
+    };
     bytes_to_file(path, &rasterised?)
 }
 
@@ -95,7 +110,10 @@ pub fn bytes_to_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     to_file(path, |file| file.write_all(bytes))
 }
 
-fn to_file(path: &Path, content: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<(), Failure> {
+fn to_file(
+    path: &Path,
+    content: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> Result<(), Failure> {
     let write = || {
         let mut file = BufWriter::new(File::create(path)?);
         content(&mut file)?;

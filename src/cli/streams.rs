@@ -35,7 +35,9 @@ impl Streams {
     pub fn size(&self) -> (usize, usize) {
         Term::stdout()
             .size_checked()
-            .map_or(DEFAULT_SIZE, |(rows, columns)| (usize::from(rows), usize::from(columns)))
+            .map_or(DEFAULT_SIZE, |(rows, columns)| {
+                (usize::from(rows), usize::from(columns))
+            })
     }
 
     /// Writes data to standard output.
@@ -46,6 +48,12 @@ impl Streams {
         let mut out = io::stdout().lock();
         out.write_all(bytes.as_ref())?;
         out.flush()
+    }
+
+    /// Standard output for a long stream of data; errors of its end are lost on drop, so flush it.
+    #[must_use]
+    pub fn out(&self) -> impl Write + use<> {
+        io::BufWriter::new(io::stdout().lock())
     }
 
     /// Says something unless asked to be quiet. That nobody listens on standard error is no failure.

@@ -1,19 +1,20 @@
 //! From a circuit, or a system, to a run.
 
+use cpu_time::ThreadTime;
 use nalgebra::DVector;
 
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::control::Amplitudes;
 use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, Stepper, run};
 use crate::integrate::start;
+use crate::integrate::exact::{self, Exact};
 use crate::integrate::step::Scheme;
 use crate::integrate::switching::Threshold;
-use crate::integrate::system::Reduce;
 use crate::integrate::theta::{Setup, Start, Stepping, Theta};
 use crate::integrate::Run;
-use crate::lcs::{Lcs, Position, reduce};
-use crate::mna::Behaviour;
-use crate::plan::{Plan, plan};
+use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
+use crate::mna::{Behaviour, SwitchPort};
+use crate::plan::{Plan, not_exact, plan};
 use crate::settings::Settings;
 
 /// Integration methods.
@@ -78,31 +79,18 @@ pub fn simulate(
     })?;
     let standard = behaviour.standard();
     let initial = start::initial(circuit, &standard, tran.uic, &options.settings)?;
-    let thresholds: Vec<Threshold> = standard
-        .switches
-        .iter()
-        .map(|s| Threshold {
-            name: s.name.clone(),
-            on_above: s.on_above,
-            off_below: s.off_below,
-        })
-        .collect();
-    let settle: Vec<bool> =
-        standard.switches.iter().map(|s| tran.uic && s.initial.is_none()).collect();
-    let reduce_at = |switches: &[bool]| -> Result<Lcs, SimError> {
-        let position = Position::free(&standard, switches.to_vec());
-        reduce(&standard, &position)
-            .map_err(|error| SimError::before(Reason::Circuit(error.to_string())))
-    };
     let mut notes: Vec<String> = behaviour.notes.iter().map(|n| n.message.clone()).collect();
     notes.extend(initial.notes);
     let problem = Problem {
-        reduce: &reduce_at,
         position: initial.switches,
-        settle,
-        thresholds,
-        start: Start::Storage(initial.storage),
+        settle: standard
+            .switches
+            .iter()
+            .map(|s| tran.uic && s.initial.is_none())
+            .collect(),
+        start: initial.storage,
         notes,
+        behaviour: standard,
     };
     drive(problem, tran, options)
 }
@@ -113,30 +101,32 @@ pub fn simulate(
 /// See [`Reason`].
 pub fn simulate_system(
     lcs: &Lcs,
-    x: DVector<f64>,
+    x: &DVector<f64>,
     tran: Tran,
     options: SimOptions<'_>,
 ) -> Result<Run, SimError> {
-    let reduce_at = |_: &[bool]| Ok(lcs.clone());
+    let behaviour = Behaviour::from_lcs(lcs).standard();
+    let mut start = DVector::zeros(behaviour.storage.len());
+    start.rows_mut(0, x.len()).copy_from(x);
     let problem = Problem {
-        reduce: &reduce_at,
-        position: lcs.switches.iter().map(|(_, on)| *on).collect(),
+        position: vec![],
         settle: vec![],
-        thresholds: vec![],
-        start: Start::State(x),
+        start,
         notes: vec![],
+        behaviour,
     };
     drive(problem, tran, options)
 }
 
 /// What the steppers share.
-struct Problem<'p> {
-    reduce: &'p dyn Fn(&[bool]) -> Result<Lcs, SimError>,
+struct Problem {
+    /// All laws as ideal pairs.
+    behaviour: Behaviour,
     position: Vec<bool>,
     /// Switches whose start position follows from the start state.
     settle: Vec<bool>,
-    thresholds: Vec<Threshold>,
-    start: Start,
+    /// Storage vector s⁻ before the start.
+    start: DVector<f64>,
     notes: Vec<String>,
 }
 
@@ -145,9 +135,43 @@ const SCOUT_STEPS: f64 = 256.0;
 /// The scout gives up after this many steps (trains of many pulses); what it has seen by then is used.
 const SCOUT_LIMIT: u64 = 20_000;
 
-impl Problem<'_> {
-    fn reducer(&self) -> Reduce<'_> {
-        Box::new(move |position: &[bool]| (self.reduce)(position))
+impl Problem {
+    fn reduce(&self, devices: &[Hold], switches: &[bool]) -> Result<Lcs, SimError> {
+        let position = Position {
+            devices: devices.to_vec(),
+            switches: switches.to_vec(),
+            storage: StorageHold::Dynamic,
+        };
+        reduce(&self.behaviour, &position)
+            .map_err(|error| SimError::before(Reason::Circuit(error.to_string())))
+    }
+
+    fn free(&self, switches: &[bool]) -> Result<Lcs, SimError> {
+        self.reduce(&vec![Hold::Free; self.behaviour.pairs.len()], switches)
+    }
+
+    fn thresholds(&self) -> Vec<Threshold> {
+        let threshold = |s: &SwitchPort| Threshold {
+            name: s.name.clone(),
+            on_above: s.on_above,
+            off_below: s.off_below,
+        };
+        self.behaviour.switches.iter().map(threshold).collect()
+    }
+
+    fn exact(&self, tran: &Tran, settings: &Settings) -> Result<Exact<'_>, SimError> {
+        Exact::new(exact::Setup {
+            assemble: Box::new(|devices, switches| self.reduce(devices, switches)),
+            pairs: self.behaviour.pairs.len(),
+            position: self.position.clone(),
+            thresholds: self.thresholds(),
+            t: 0.0,
+            until: tran.tstop,
+            start: self.start.clone(),
+            h: tran.tstep,
+            energy: true,
+            settings: settings.clone(),
+        })
     }
 
     fn stepper(
@@ -158,11 +182,11 @@ impl Problem<'_> {
         settings: &Settings,
     ) -> Result<Theta<'_>, SimError> {
         Theta::new(Setup {
-            reduce: self.reducer(),
+            reduce: Box::new(|position| self.free(position)),
             position: self.position.clone(),
-            thresholds: self.thresholds.clone(),
+            thresholds: self.thresholds(),
             t: 0.0,
-            start: self.start.clone(),
+            start: Start::Storage(self.start.clone()),
             scheme,
             stepping,
             longest: tran.tmax.unwrap_or(f64::INFINITY),
@@ -179,10 +203,11 @@ impl Problem<'_> {
             let controls = theta.controls_at_start()?;
             let wanted: Vec<bool> = (0..controls.len())
                 .map(|k| {
-                    if self.settle[k] {
-                        controls[k] > self.thresholds[k].on_above
-                    } else {
-                        self.position[k]
+                    let switch = &self.behaviour.switches[k];
+                    match (self.settle[k], self.position[k]) {
+                        (false, on) => on,
+                        (true, true) => controls[k] >= switch.off_below,
+                        (true, false) => controls[k] > switch.on_above,
                     }
                 })
                 .collect();
@@ -215,11 +240,29 @@ impl Problem<'_> {
     }
 }
 
-fn drive(mut problem: Problem<'_>, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
+fn drive(problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
+    let begin = ThreadTime::now();
+    let mut result = dispatch(problem, tran, options);
+    let stats = match &mut result {
+        Ok(run) => Some(&mut run.stats),
+        Err(error) => error.partial.as_mut().map(|run| &mut run.stats),
+    };
+    if let Some(stats) = stats {
+        stats.cpu_seconds = begin.elapsed().as_secs_f64();
+    }
+    result
+}
+
+fn dispatch(mut problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
     check(&tran, &options)?;
     problem.settle_switches(&tran, &options.settings)?;
-    let lcs = (problem.reduce)(&problem.position)?;
+    let lcs = problem.free(&problem.position)?;
     let Plan { method, scheme, words } = plan(&lcs, &options);
+    if let (Method::Exact, Some(obstacle)) = (options.method, not_exact(&lcs)) {
+        return Err(SimError::before(Reason::Unsupported(format!(
+            "no exact integration: {obstacle}"
+        ))));
+    }
     let grid = Grid { tstart: tran.tstart, tstep: tran.tstep, tstop: tran.tstop };
     let frame = Frame {
         title: lcs.title.clone(),
@@ -232,6 +275,9 @@ fn drive(mut problem: Problem<'_>, tran: Tran, options: SimOptions<'_>) -> Resul
         progress: options.progress,
     };
     let log = Log::new(frame.names.len(), grid.tstart, options.events);
+    if method == Method::Exact {
+        return run(&mut problem.exact(&tran, &options.settings)?, frame, log);
+    }
     let stepping = match options.step {
         Some(h) => Stepping::Fixed(h),
         None => Stepping::Controlled { span: tran.tstop, first: tran.tstep / 64.0 },

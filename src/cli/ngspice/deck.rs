@@ -5,7 +5,8 @@ use std::fmt::Write;
 
 use crate::circuit::source::Wave;
 use crate::circuit::{
-    Affine, Circuit, Element, ElementId, Kind, NodeId, Output, Probed, Quantity, Source, Switch, Tran,
+    Affine, Circuit, Element, ElementId, Kind, NodeId, Output, Probed, Quantity, Source, Switch,
+    Tran,
 };
 use crate::cli::args::Realisation;
 use crate::law::Law;
@@ -17,7 +18,7 @@ const NEAR_OPEN: f64 = 1e12;
 /// A: saturation current of the diodes written; with N = 0.01 it leaves 7 mV at 1 A.
 const SATURATION_CURRENT: f64 = 1e-12;
 /// Rise time of a true edge, relative to the span: ngspice would stretch a zero to a print step.
-const EDGE: f64 = 1e-7;
+pub const EDGE: f64 = 1e-7;
 /// Width of the steep parts of function blocks, relative to their inputs' size.
 const STEEP: f64 = 1e-6;
 
@@ -75,7 +76,7 @@ pub fn deck(circuit: &Circuit, options: &Options) -> Result<Deck, DeckError> {
         circuit,
         options,
         tran,
-        sensed: sensed(circuit, options.realisation),
+        sensed: sensed(circuit),
         text: String::new(),
         notes: BTreeSet::new(),
     };
@@ -88,36 +89,48 @@ pub fn deck(circuit: &Circuit, options: &Options) -> Result<Deck, DeckError> {
         let (a, b) = (writer.card('l', k.a), writer.card('l', k.b));
         writer.line(format!("k{} {a} {b} {:e}", k.name, k.k.f64));
     }
-    let probes: Vec<_> = circuit.probes().iter().map(|p| (p.name.clone(), writer.reading(p.what))).collect();
+    let probes: Vec<_> = circuit
+        .probes()
+        .iter()
+        .map(|p| (p.name.clone(), writer.reading(p.what)))
+        .collect();
     writer.controls(&probes);
     let Writer { text, notes, .. } = writer;
-    Ok(Deck { text, probes, notes: notes.into_iter().collect() })
+    Ok(Deck {
+        text,
+        probes,
+        notes: notes.into_iter().collect(),
+    })
 }
 
-/// Elements whose current needs a 0 V source in series: those that control something, and probed code models.
-fn sensed(circuit: &Circuit, realisation: Realisation) -> BTreeSet<ElementId> {
+/// Elements whose current needs a 0 V source in series because it controls something or is probed: ngspice's own readings
+/// of device currents come from the device equations and not from the solution.
+fn sensed(circuit: &Circuit) -> BTreeSet<ElementId> {
     let controls = circuit.elements.iter().filter_map(|e| match &e.kind {
         Kind::Controlled { control, .. } => Some(control),
         Kind::Function { input, .. } => Some(input),
         Kind::Switch(switch) => Some(&switch.control),
         _ => None,
     });
-    let controlling = controls.flat_map(|c| &c.terms).filter_map(|(_, q)| match q {
-        Quantity::Current(id) => Some(*id),
-        Quantity::Voltage(_) => None,
-    });
+    let controlling = controls
+        .flat_map(|c| &c.terms)
+        .filter_map(|(_, q)| match q {
+            Quantity::Current(id) => Some(*id),
+            Quantity::Voltage(_) => None,
+        });
     let probed = circuit.probes().into_iter().filter_map(|p| match p.what {
         Probed::Current(id) => Some(id),
         Probed::Voltage(..) => None,
     });
-    let has_no_current = |id: &ElementId| match &circuit.elements[id.index()].kind {
-        Kind::Device(Law::Diode { .. }) => realisation == Realisation::Sidiode,
-        Kind::VoltageSource(_) | Kind::Inductor(_) => false,
-        _ => true,
+    let is_ammeter = |id: &ElementId| {
+        matches!(
+            circuit.elements[id.index()].kind,
+            Kind::VoltageSource(_) | Kind::Inductor(_)
+        )
     };
     controlling
-        .filter(|id| !matches!(circuit.elements[id.index()].kind, Kind::VoltageSource(_) | Kind::Inductor(_)))
-        .chain(probed.filter(has_no_current))
+        .chain(probed)
+        .filter(|id| !is_ammeter(id))
         .collect()
 }
 
@@ -139,7 +152,11 @@ impl Writer<'_> {
     /// The name of an element's card of this letter: `r1` stays, `x1.r1` becomes `r.x1.r1`.
     fn card(&self, letter: char, id: ElementId) -> String {
         let name = &self.circuit.elements[id.index()].name;
-        if name.starts_with(letter) { name.clone() } else { format!("{letter}.{name}") }
+        if name.starts_with(letter) {
+            name.clone()
+        } else {
+            format!("{letter}.{name}")
+        }
     }
 
     fn node(&self, id: NodeId) -> &str {
@@ -154,7 +171,10 @@ impl Writer<'_> {
             self.line(format!("v.{}_sense {p} {inner} 0", element.name));
             p = inner;
         }
-        let ic = element.ic.filter(|_| self.tran.uic).map_or(String::new(), |ic| format!(" ic={ic:e}"));
+        let ic = element
+            .ic
+            .filter(|_| self.tran.uic)
+            .map_or(String::new(), |ic| format!(" ic={ic:e}"));
         match &element.kind {
             Kind::Resistor(r) if r.f64 == 0.0 => {
                 let card = self.card('v', id);
@@ -187,7 +207,10 @@ impl Writer<'_> {
             Kind::Function { output, input, law } => {
                 let (card, x) = (self.card('b', id), self.affine(input));
                 let curve = self.curve(&element.name, law)?;
-                self.line(format!("{card} {p} {n} {}=pwl({x}, {curve})", letter(*output)));
+                self.line(format!(
+                    "{card} {p} {n} {}=pwl({x}, {curve})",
+                    letter(*output)
+                ));
             }
             Kind::Device(Law::Diode { vfwd, ron, roff }) => {
                 self.diode(id, &p, &n, vfwd.f64, ron.f64, roff.map(|r| r.f64));
@@ -211,13 +234,17 @@ impl Writer<'_> {
             Realisation::N001 => 0.01,
             Realisation::N0001 => 0.001,
             Realisation::Sidiode => {
-                self.notes.insert("ideal diodes are the code model sidiode".into());
+                self.notes
+                    .insert("ideal diodes are the code model sidiode".into());
                 self.line(format!("a.{name} {p} {n} m.{name}"));
                 let ron = ron.max(NEAR_SHORT);
-                return self.line(format!(".model m.{name} sidiode(ron={ron:e} roff={roff:e} vfwd={vfwd:e})"));
+                return self.line(format!(
+                    ".model m.{name} sidiode(ron={ron:e} roff={roff:e} vfwd={vfwd:e})"
+                ));
             }
         };
-        self.notes.insert(format!("ideal diodes are D models with N = {emission}"));
+        self.notes
+            .insert(format!("ideal diodes are D models with N = {emission}"));
         let card = self.card('d', id);
         let mut anode = p.to_owned();
         if vfwd != 0.0 {
@@ -225,7 +252,9 @@ impl Writer<'_> {
             self.line(format!("v.{name}_drop {p} {anode} {vfwd:e}"));
         }
         self.line(format!("{card} {anode} {n} m.{name}"));
-        self.line(format!(".model m.{name} d(is={SATURATION_CURRENT:e} n={emission} rs={ron:e})"));
+        self.line(format!(
+            ".model m.{name} d(is={SATURATION_CURRENT:e} n={emission} rs={ron:e})"
+        ));
         if roff < NEAR_OPEN {
             self.line(format!("r.{name}_off {p} {n} {roff:e}"));
         }
@@ -234,9 +263,14 @@ impl Writer<'_> {
     fn switch(&mut self, id: ElementId, p: &str, n: &str, switch: &Switch) {
         let name = self.circuit.elements[id.index()].name.clone();
         let control = self.affine(&switch.control);
-        let (threshold, half) =
-            (0.5 * (switch.on_above + switch.off_below), 0.5 * (switch.on_above - switch.off_below));
-        let (ron, roff) = (switch.ron.f64.max(NEAR_SHORT), switch.roff.map_or(NEAR_OPEN, |r| r.f64));
+        let (threshold, half) = (
+            0.5 * (switch.on_above + switch.off_below),
+            0.5 * (switch.on_above - switch.off_below),
+        );
+        let (ron, roff) = (
+            switch.ron.f64.max(NEAR_SHORT),
+            switch.roff.map_or(NEAR_OPEN, |r| r.f64),
+        );
         let initial = match switch.initial {
             Some(true) => " on",
             Some(false) => " off",
@@ -245,7 +279,9 @@ impl Writer<'_> {
         self.line(format!("b.{name}_control {name}_control 0 v={control}"));
         let card = self.card('s', id);
         self.line(format!("{card} {p} {n} {name}_control 0 m.{name}{initial}"));
-        self.line(format!(".model m.{name} sw(vt={threshold:e} vh={half:e} ron={ron:e} roff={roff:e})"));
+        self.line(format!(
+            ".model m.{name} sw(vt={threshold:e} vh={half:e} ron={ron:e} roff={roff:e})"
+        ));
     }
 
     /// An affine function as an expression of a B source.
@@ -275,25 +311,43 @@ impl Writer<'_> {
 
     /// The vertices of a law, its rays cut far out, its vertical parts given a width.
     fn curve(&mut self, name: &str, law: &Law) -> Result<String, DeckError> {
-        let Law::Curve(curve) = law else { return Err(DeckError::NoCounterpart(name.into())) };
+        let Law::Curve(curve) = law else {
+            return Err(DeckError::NoCounterpart(name.into()));
+        };
         let points: Vec<(f64, f64)> = curve.vertices.iter().map(|(v, i)| (v.f64, i.f64)).collect();
         let (first, last) = (points[0], points[points.len() - 1]);
         let size = points.iter().map(|p| p.0.abs()).fold(1.0, f64::max);
         let far = |from: (f64, f64), ray: &(_, _), sign: f64| {
             let (dx, dy): (crate::algebra::Value, crate::algebra::Value) = *ray;
-            let length = if dx.f64 > 0.0 { 1e3 * size / dx.f64 } else { 1.0 / NEAR_SHORT / dy.f64.max(NEAR_SHORT) };
-            (from.0 + sign * length * dx.f64, from.1 + sign * length * dy.f64)
+            let length = if dx.f64 > 0.0 {
+                1e3 * size / dx.f64
+            } else {
+                1.0 / NEAR_SHORT / dy.f64.max(NEAR_SHORT)
+            };
+            (
+                from.0 + sign * length * dx.f64,
+                from.1 + sign * length * dy.f64,
+            )
         };
         let mut all = vec![far(first, &curve.first, -1.0)];
         all.extend(points);
         all.push(far(last, &curve.last, 1.0));
-        self.notes.insert(format!("steep parts of {name} are given a width"));
+        self.notes
+            .insert(format!("steep parts of {name} are given a width"));
         let mut text = String::new();
         let mut previous = f64::NEG_INFINITY;
         for (x, y) in all {
-            let x = if x > previous { x } else { previous + STEEP * size };
+            let x = if x > previous {
+                x
+            } else {
+                previous + STEEP * size
+            };
             previous = x;
-            let _ = write!(text, "{}{x:e}, {y:e}", if text.is_empty() { "" } else { ", " });
+            let _ = write!(
+                text,
+                "{}{x:e}, {y:e}",
+                if text.is_empty() { "" } else { ", " }
+            );
         }
         Ok(text)
     }
@@ -302,7 +356,8 @@ impl Writer<'_> {
         let edge = EDGE * self.tran.tstop;
         let (wave, stretched) = waveform(&source.wave, edge);
         if stretched {
-            self.notes.insert(format!("edges of zero width take {edge:e} s"));
+            self.notes
+                .insert(format!("edges of zero width take {edge:e} s"));
         }
         format!("dc {:e} {wave}", source.dc)
     }
@@ -313,12 +368,7 @@ impl Writer<'_> {
             Probed::Voltage(a, NodeId::GROUND) => Reading::Vector(voltage(a)),
             Probed::Voltage(NodeId::GROUND, b) => Reading::Difference("0".into(), voltage(b)),
             Probed::Voltage(a, b) => Reading::Difference(voltage(a), voltage(b)),
-            Probed::Current(id) => match &self.circuit.elements[id.index()].kind {
-                Kind::Device(Law::Diode { .. }) if !self.sensed.contains(&id) => {
-                    Reading::Vector(format!("@{}[id]", self.card('d', id)))
-                }
-                _ => Reading::Vector(format!("i({})", self.ammeter(id))),
-            },
+            Probed::Current(id) => Reading::Vector(format!("i({})", self.ammeter(id))),
         }
     }
 
@@ -337,14 +387,28 @@ impl Writer<'_> {
                 let line = format!(".ic v({})={volts:e}", self.node(*a));
                 self.line(line);
             } else {
-                self.notes.insert("an `.ic` between two nodes is left out".into());
+                self.notes
+                    .insert("an `.ic` between two nodes is left out".into());
             }
         }
-        let Tran { tstep, tstop, tstart, uic, .. } = self.tran;
-        let Options { reltol, max_step, method, .. } = *self.options;
+        let Tran {
+            tstep,
+            tstop,
+            tstart,
+            uic,
+            ..
+        } = self.tran;
+        let Options {
+            reltol,
+            max_step,
+            method,
+            ..
+        } = *self.options;
         self.line(format!(".options reltol={reltol:e} method={method}"));
         let uic = if uic { " uic" } else { "" };
-        self.line(format!(".tran {tstep:e} {tstop:e} {tstart:e} {max_step:e}{uic}"));
+        self.line(format!(
+            ".tran {tstep:e} {tstop:e} {tstart:e} {max_step:e}{uic}"
+        ));
         self.line(format!(".save {saved}"));
         self.line(".end");
     }
@@ -366,19 +430,43 @@ fn waveform(wave: &Wave, edge: f64) -> (String, bool) {
     };
     let text = match wave {
         Wave::Dc(value) => format!("{value:e}"),
-        Wave::Sin { offset, amplitude, frequency, delay, damping, phase } => {
+        Wave::Sin {
+            offset,
+            amplitude,
+            frequency,
+            delay,
+            damping,
+            phase,
+        } => {
             format!("sin({offset:e} {amplitude:e} {frequency:e} {delay:e} {damping:e} {phase:e})")
         }
-        Wave::Pulse { v1, v2, delay, rise, fall, width, period, count } => {
+        Wave::Pulse {
+            v1,
+            v2,
+            delay,
+            rise,
+            fall,
+            width,
+            period,
+            count,
+        } => {
             let (rise, fall) = (widened(*rise), widened(*fall));
             let count = count.map_or(String::new(), |n| format!(" {n:e}"));
             format!("pulse({v1:e} {v2:e} {delay:e} {rise:e} {fall:e} {width:e} {period:e}{count})")
         }
-        Wave::Pwl { points, repeat, delay } => {
+        Wave::Pwl {
+            points,
+            repeat,
+            delay,
+        } => {
             let mut text = String::from("pwl(");
             let mut previous = f64::NEG_INFINITY;
             for &(t, value) in points {
-                let t = if t > previous { t } else { previous + widened(0.0) };
+                let t = if t > previous {
+                    t
+                } else {
+                    previous + widened(0.0)
+                };
                 previous = t;
                 let _ = write!(text, "{t:e} {value:e} ");
             }
@@ -391,13 +479,34 @@ fn waveform(wave: &Wave, edge: f64) -> (String, bool) {
             }
             text
         }
-        Wave::Sffm { offset, amplitude, carrier, index, signal, carrier_phase, signal_phase } => format!(
+        Wave::Sffm {
+            offset,
+            amplitude,
+            carrier,
+            index,
+            signal,
+            carrier_phase,
+            signal_phase,
+        } => format!(
             "sffm({offset:e} {amplitude:e} {carrier:e} {index:e} {signal:e} {carrier_phase:e} {signal_phase:e})"
         ),
-        Wave::Am { amplitude, offset, modulation, carrier, delay } => {
+        Wave::Am {
+            amplitude,
+            offset,
+            modulation,
+            carrier,
+            delay,
+        } => {
             format!("am({amplitude:e} {offset:e} {modulation:e} {carrier:e} {delay:e})")
         }
-        Wave::Exp { v1, v2, rise_delay, rise_tau, fall_delay, fall_tau } => {
+        Wave::Exp {
+            v1,
+            v2,
+            rise_delay,
+            rise_tau,
+            fall_delay,
+            fall_tau,
+        } => {
             format!("exp({v1:e} {v2:e} {rise_delay:e} {rise_tau:e} {fall_delay:e} {fall_tau:e})")
         }
     };
@@ -422,7 +531,12 @@ mod tests {
     }
 
     fn options(realisation: Realisation) -> Options {
-        Options { reltol: 1e-4, max_step: 1e-6, method: "gear", realisation }
+        Options {
+            reltol: 1e-4,
+            max_step: 1e-6,
+            method: "gear",
+            realisation,
+        }
     }
 
     #[test]
@@ -447,11 +561,12 @@ mod tests {
         let deck = deck(&circuit, &options(Realisation::N001)).unwrap();
         insta::assert_snapshot!(format!("{}{}", deck.text, deck.notes.join("\n")), @r"
         * rectifier with a switch
-        v1 in 0 dc 0e0 pulse(0e0 5e0 0e0 4e-10 4e-10 1e-3 2e-3)
-        v.d1_drop in d1_drop 7e-1
+        v1 in 0 dc 5e0 pulse(0e0 5e0 0e0 4e-10 4e-10 1e-3 2e-3)
+        v.d1_sense in d1_sense 0
+        v.d1_drop d1_sense d1_drop 7e-1
         d1 d1_drop out m.d1
         .model m.d1 d(is=1e-12 n=0.01 rs=1e-1)
-        r.d1_off in out 1e6
+        r.d1_off d1_sense out 1e6
         b.s1_control s1_control 0 v=(0e0 + (1e0)*v(c))
         s1 out load s1_control 0 m.s1
         .model m.s1 sw(vt=1e0 vh=5e-1 ron=1e-3 roff=1e9)
@@ -461,7 +576,7 @@ mod tests {
         c.x1.c1 load 0 1e-6 ic=1e0
         .options reltol=1e-4 method=gear
         .tran 1e-6 4e-3 0e0 1e-6 uic
-        .save @d1[id] i(v.x1.r1_sense) v(in) v(load) v(out)
+        .save i(v.d1_sense) i(v.x1.r1_sense) v(in) v(load) v(out)
         .end
         edges of zero width take 4e-10 s
         ideal diodes are D models with N = 0.01
@@ -470,10 +585,19 @@ mod tests {
 
     #[test]
     fn code_model_diodes_are_measured_in_series() {
-        let circuit = circuit("t\nv1 a 0 1\nd1 a 0 di\n.model di d(ideal)\n.tran 1u 1m\n.save i(d1)\n.end\n");
+        let circuit =
+            circuit("t\nv1 a 0 1\nd1 a 0 di\n.model di d(ideal)\n.tran 1u 1m\n.save i(d1)\n.end\n");
         let deck = deck(&circuit, &options(Realisation::Sidiode)).unwrap();
-        assert!(deck.text.contains("v.d1_sense a d1_sense 0\na.d1 d1_sense 0 m.d1\n"), "{}", deck.text);
-        assert_eq!(deck.probes, [("i(d1)".to_owned(), Reading::Vector("i(v.d1_sense)".into()))]);
+        assert!(
+            deck.text
+                .contains("v.d1_sense a d1_sense 0\na.d1 d1_sense 0 m.d1\n"),
+            "{}",
+            deck.text
+        );
+        assert_eq!(
+            deck.probes,
+            [("i(d1)".to_owned(), Reading::Vector("i(v.d1_sense)".into()))]
+        );
     }
 
     #[test]
