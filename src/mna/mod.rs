@@ -10,6 +10,7 @@ mod couple;
 pub(crate) mod fixture;
 mod standard;
 mod system;
+pub mod topology;
 
 use std::sync::OnceLock;
 

@@ -2,7 +2,7 @@
 
 use super::{Behaviour, Coefficient, Equation, Pair};
 use crate::algebra::Value;
-use crate::law::Law;
+use crate::law::{Curve, Law};
 use crate::lcs::Role;
 
 impl Behaviour {
@@ -47,29 +47,14 @@ struct Shape {
 }
 
 fn shape(law: &Law) -> Shape {
-    let zero = Value::decimal(0.0, 0, 0);
     let one = Value::decimal(1.0, 1, 0);
-    let (vertices, first, last) = match law {
-        Law::Diode {
-            vfwd,
-            ron,
-            roff: None,
-        } => (vec![(*vfwd, zero)], (one, zero), (*ron, one)),
-        // Below the corner the line i = v/roff, given by its direction (roff, 1).
-        Law::Diode {
-            vfwd,
-            ron,
-            roff: Some(roff),
-        } => (vec![corner(*vfwd, *ron, *roff)], (*roff, one), (*ron, one)),
-        Law::Curve(curve) => {
-            let vertices = if curve.vertices.is_empty() {
-                vec![(zero, zero)]
-            } else {
-                curve.vertices.clone()
-            };
-            (vertices, curve.first, curve.last)
-        }
-    };
+    let Curve {
+        vertices,
+        first,
+        last,
+        ..
+    } = law.curve();
+    let origin = (Value::decimal(0.0, 0, 0), Value::decimal(0.0, 0, 0));
     let plus =
         |(v, i): (Value, Value), t: Value| (Coefficient::Ratio(v, t), Coefficient::Ratio(i, t));
     let minus = |(v, i), t| {
@@ -96,22 +81,12 @@ fn shape(law: &Law) -> Shape {
         terms.extend(from.map(|from| minus(from, length)));
         pieces.push((terms, length));
     }
-    let (v, i) = vertices[0];
+    let (v, i) = vertices.first().copied().unwrap_or(origin);
     Shape {
         corner: (Coefficient::Plus(v), Coefficient::Plus(i)),
         first: plus(first, unit),
         pieces,
     }
-}
-
-/// Where i = v/roff and i = (v − vfwd)/ron meet; lines that do not meet are one line through the origin.
-fn corner(vfwd: Value, ron: Value, roff: Value) -> (Value, Value) {
-    let zero = Value::decimal(0.0, 0, 0);
-    if vfwd.f64 == 0.0 || roff.f64 == ron.f64 {
-        return (zero, zero);
-    }
-    let i = vfwd.f64 / (roff.f64 - ron.f64);
-    (Value::binary(roff.f64 * i), Value::binary(i))
 }
 
 fn expand(out: &mut Behaviour, pair: &Pair) {

@@ -1,6 +1,7 @@
 //! Hand-derived systems, independent nodal analysis, and invariants.
 
 mod hand;
+mod laws;
 mod nodal;
 mod random;
 
