@@ -304,9 +304,7 @@ fn observed(file: &Fields<'_>) -> Result<Affine, FormError> {
     let y = file.shaped("Y", (z.nrows(), plant.system.m()))?;
     let observer = Observer::design(&plant.system, &z, &y, file.number("rate"))?;
     let joint = observer.with_plant(&Linear::autonomous(plant.system.clone())?, &z, &y)?;
-    let column = |v: &DVector<f64>| {
-        DVector::from_column_slice(twice(&DMatrix::from_columns(&[v.clone()])).as_slice())
-    };
+    let column = |v: &DVector<f64>| DVector::from_fn(2 * v.len(), |i, _| v[i % v.len()]);
     Ok(Affine {
         system: joint.system,
         e: twice(&plant.e),
