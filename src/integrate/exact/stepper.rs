@@ -1,7 +1,10 @@
 //! The event-driven stepper: travel in a mode, find the next one, repeat.
 
-use nalgebra::DVector;
+use std::collections::BTreeMap;
 
+use nalgebra::{DMatrix, DVector};
+
+use super::accumulation::Accumulation;
 use super::exosystem::Exosystem;
 use super::free::Degenerate;
 use super::inspect::{Finding, Inspector};
@@ -23,6 +26,11 @@ const PROPOSALS: [f64; 7] = [1e-6, 1e-4, 1e-8, 1e-2, 1e-10, 1.0, 1e2];
 const MOST_NEIGHBOURS: usize = 400;
 /// Events at one instant after which modes already left there are not entered again.
 const PATIENCE: usize = 2;
+
+/// Movements of the storage below this part of its amplitude are rounding and no jump.
+const ROUNDING: f64 = 1e-12;
+/// Estimated relative loss of an exponential above which it is reported.
+const LOSS: f64 = 1e-10;
 
 /// What a run of the exact integrator starts from.
 pub struct Setup<'a> {
@@ -68,8 +76,8 @@ pub struct Exact<'a> {
     /// Modes left at the present instant.
     left_here: Vec<usize>,
     instant: f64,
-    transitions: std::collections::BTreeMap<(usize, usize), usize>,
-    metric: nalgebra::DMatrix<f64>,
+    transitions: BTreeMap<(usize, usize), usize>,
+    metric: DMatrix<f64>,
     started: bool,
     settings: Settings,
     balance: Balance,
@@ -77,6 +85,8 @@ pub struct Exact<'a> {
     jumps: u64,
     lcp_solves: u64,
     notes: Vec<String>,
+    accumulation: Accumulation,
+    noted_shared: bool,
     row: Vec<f64>,
 }
 
@@ -86,26 +96,8 @@ impl<'a> Exact<'a> {
     /// # Errors
     /// The reduction's for the start position; sources that no finite linear system generates.
     pub fn new(setup: Setup<'a>) -> Result<Self, SimError> {
-        let Setup {
-            assemble,
-            pairs,
-            position,
-            thresholds,
-            t,
-            until,
-            start,
-            h,
-            energy,
-            settings,
-        } = setup;
-        let mut plant = Plant::new(
-            assemble,
-            pairs,
-            thresholds,
-            h,
-            energy,
-            settings.lcp_residual,
-        );
+        let Setup { assemble, pairs, mut position, thresholds, t, until, start, h, energy, settings } = setup;
+        let mut plant = Plant::new(assemble, pairs, thresholds, h, energy, settings.lcp_residual);
         let lcs = plant.free(&position)?.lcs.clone();
         let sources: Vec<Source> = lcs.inputs.iter().map(|i| i.source.clone()).collect();
         let exosystem = Exosystem::of(&sources, t, until).ok_or_else(|| {
@@ -113,16 +105,14 @@ impl<'a> Exact<'a> {
                 "a source has no closed form as a linear system".to_string(),
             ))
         })?;
-        plant.driven = (0..plant.thresholds.len())
-            .map(|i| is_driven(&lcs, i))
-            .collect();
+        plant.driven = (0..plant.thresholds.len()).map(|i| is_driven(&lcs, i)).collect();
+        for i in (0..position.len()).filter(|&i| plant.driven[i]) {
+            let values = sources.iter().enumerate().map(|(j, s)| lcs.controls.u[(i, j)] * s.value(t));
+            let control = lcs.controls.one[i] + values.sum::<f64>();
+            position[i] = plant.thresholds[i].position(position[i], control);
+        }
         let schedule = schedule(&lcs, &plant, &sources, &position, t, until);
-        let volts = lcs
-            .storage
-            .names
-            .iter()
-            .map(|name| name.starts_with('v'))
-            .collect();
+        let volts = lcs.storage.names.iter().map(|name| name.starts_with('v')).collect();
         let metric = lcs.storage.metric.clone();
         let stored = 0.5 * start.dot(&(&metric * &start));
         let columns = lcs.outputs.names.len();
@@ -133,10 +123,7 @@ impl<'a> Exact<'a> {
             motion: Motion::at(t),
             inspector: Inspector::default(),
             mode: None,
-            key: Key {
-                closed: vec![false; pairs],
-                switches: position,
-            },
+            key: Key { closed: vec![false; pairs], switches: position },
             storage: start.as_slice().to_vec(),
             scale: vec![0.0; start.len()],
             volts,
@@ -144,7 +131,7 @@ impl<'a> Exact<'a> {
             scheduled: 0,
             left_here: Vec::new(),
             instant: t,
-            transitions: std::collections::BTreeMap::new(),
+            transitions: BTreeMap::new(),
             metric,
             started: false,
             settings,
@@ -153,6 +140,8 @@ impl<'a> Exact<'a> {
             jumps: 0,
             lcp_solves: 0,
             notes: Vec::new(),
+            accumulation: Accumulation::new(t),
+            noted_shared: false,
             row: vec![0.0; columns],
         };
         exact.rescale();
@@ -179,10 +168,7 @@ impl<'a> Exact<'a> {
 
     /// The next time at which something is known to happen, s.
     fn next_stop(&self) -> f64 {
-        let switching = self
-            .schedule
-            .get(self.scheduled)
-            .map_or(f64::INFINITY, |s| s.0);
+        let switching = self.schedule.get(self.scheduled).map_or(f64::INFINITY, |s| s.0);
         self.exosystem.next_breakpoint().min(switching)
     }
 
@@ -200,7 +186,12 @@ impl<'a> Exact<'a> {
     /// Reads the storage vector at the current state.
     fn take_storage(&mut self) {
         if let Some(at) = self.mode {
-            self.plant.modes[at].storage_at(&self.motion.now, &mut self.storage);
+            let mode = &self.plant.modes[at];
+            mode.storage_at(&self.motion.now, &mut self.storage);
+            // An event often finds a current at zero: its size is what it was on the way.
+            for (i, scale) in self.scale.iter_mut().enumerate() {
+                *scale = scale.max(self.motion.reach(mode.storage.row(i).columns(0, mode.n)));
+            }
             self.rescale();
             let [source, dissipated] = std::mem::take(&mut self.motion.energy);
             self.balance.add((source, dissipated));
@@ -243,21 +234,17 @@ impl<'a> Exact<'a> {
             let end = self.exosystem.piece(i).end;
             if end <= near {
                 let Some(piece) = self.sources[i].piece(end.max(t)) else {
-                    return Err(self.fail(Reason::Unsupported(
-                        "a source lost its closed form".to_string(),
-                    )));
+                    return Err(self.fail(Reason::Unsupported("a source lost its closed form".to_string())));
                 };
                 edge |= self.sources[i].is_edge(end);
                 self.exosystem.set_piece(i, piece);
             }
         }
         let mut key = self.key.clone();
-        while let Some(&(_, switch, on)) = self.schedule.get(self.scheduled).filter(|s| s.0 <= near)
-        {
+        while let Some(&(_, switch, on)) = self.schedule.get(self.scheduled).filter(|s| s.0 <= near) {
             self.scheduled += 1;
-            let watched = self
-                .mode
-                .is_some_and(|at| self.plant.modes[at].guarded_switches.contains(&switch));
+            let watched =
+                self.mode.is_some_and(|at| self.plant.modes[at].guarded_switches.contains(&switch));
             if !watched && key.switches[switch] != on {
                 key.switches[switch] = on;
                 edge = true;
@@ -284,7 +271,6 @@ impl<'a> Exact<'a> {
             self.read_row();
         }
         let left_row = (wants_rows && self.started).then(|| self.row.clone());
-        let storage_before = self.storage.clone();
         let mut jumped = false;
         let mut positions = vec![key.switches.clone()];
         let mut entry = None;
@@ -316,15 +302,8 @@ impl<'a> Exact<'a> {
             discontinuous = true;
         }
         let Some(at) = entry else {
-            let names: Vec<&str> = self
-                .plant
-                .thresholds
-                .iter()
-                .map(|t| t.name.as_str())
-                .collect();
-            return Err(self
-                .fail(Reason::SwitchesDoNotSettle)
-                .device(names.join(", ")));
+            let names: Vec<&str> = self.plant.thresholds.iter().map(|t| t.name.as_str()).collect();
+            return Err(self.fail(Reason::SwitchesDoNotSettle).device(names.join(", ")));
         };
         if let (Some(pair), false) = (fired, jumped) {
             self.transitions.insert(pair, at);
@@ -335,10 +314,8 @@ impl<'a> Exact<'a> {
         self.key.clone_from(&self.plant.modes[at].key);
         let mode = &self.plant.modes[at];
         let Inspector { x, amplitude, .. } = &self.inspector;
-        self.motion
-            .enter(&mode.flow, &self.exosystem, t, x, amplitude);
+        self.motion.enter(&mode.flow, &self.exosystem, t, x, amplitude);
         if jumped {
-            let _ = &storage_before;
             self.jumps += 1;
         }
         if let Some(row) = left_row.filter(|_| !same || jumped) {
@@ -360,10 +337,8 @@ impl<'a> Exact<'a> {
             error
         })?;
         let x = free.state_from(&self.storage);
-        let found = free
-            .jump(&x, &u)
-            .map_err(|_| SimError::at(t, Reason::Infeasible))?;
-        self.lcp_solves += 1;
+        let found = free.jump(&x, &u).map_err(|_| SimError::at(t, Reason::Infeasible))?;
+        self.lcp_solves += u64::from(free.lcs.m() > 0);
         let (after, p) = match found {
             Some(jump) => (jump.x, jump.p),
             None => (x.clone(), DVector::zeros(free.lcs.m())),
@@ -383,13 +358,9 @@ impl<'a> Exact<'a> {
         let old = DVector::from_column_slice(&self.storage);
         let gain = 0.5 * (s.dot(&(&self.metric * &s)) - old.dot(&(&self.metric * &old)));
         self.balance.add((source, source - gain));
-        /// Movements below this part of the amplitude are rounding.
-        const ROUNDING: f64 = 1e-12;
-        let moved = s
-            .iter()
-            .zip(&self.storage)
-            .zip(&self.scale)
-            .any(|((a, b), scale)| (a - b).abs() > ROUNDING * scale.max(a.abs()));
+        let moved = s.iter().zip(&self.storage).zip(&self.scale).any(|((a, b), scale)| {
+            (a - b).abs() > ROUNDING * scale.max(a.abs())
+        });
         self.storage.copy_from_slice(s.as_slice());
         self.rescale();
         Ok(moved)
@@ -403,11 +374,8 @@ impl<'a> Exact<'a> {
         key: &Key,
         fired: Option<(usize, usize)>,
     ) -> Result<Option<(usize, Vec<usize>)>, SimError> {
-        let barred: Vec<usize> = if self.left_here.len() > PATIENCE {
-            self.left_here.clone()
-        } else {
-            Vec::new()
-        };
+        let barred: Vec<usize> =
+            if self.left_here.len() > PATIENCE { self.left_here.clone() } else { Vec::new() };
         if let Some(&at) = fired.and_then(|pair| self.transitions.get(&pair))
             && self.plant.modes[at].key.switches == key.switches
             && !barred.contains(&at)
@@ -434,18 +402,10 @@ impl<'a> Exact<'a> {
             let u = self.inputs(t + h);
             self.lcp_solves += 1;
             for degenerate in [Degenerate::Open, Degenerate::As(&key.closed)] {
-                let proposal = self
-                    .plant
-                    .free(&key.switches)?
-                    .propose(&x, &u, h, degenerate);
-                let Some(closed) = proposal.filter(|c| !tried.contains(c)) else {
-                    continue;
-                };
+                let proposal = self.plant.free(&key.switches)?.propose(&x, &u, h, degenerate);
+                let Some(closed) = proposal.filter(|c| !tried.contains(c)) else { continue };
                 tried.push(closed.clone());
-                let candidate = Key {
-                    closed,
-                    switches: key.switches.clone(),
-                };
+                let candidate = Key { closed, switches: key.switches.clone() };
                 if let Some(found) = self.try_key(&candidate, &barred) {
                     return Ok(Some(found));
                 }
@@ -461,10 +421,7 @@ impl<'a> Exact<'a> {
                     continue;
                 }
                 tried.push(closed.clone());
-                let candidate = Key {
-                    closed,
-                    switches: key.switches.clone(),
-                };
+                let candidate = Key { closed, switches: key.switches.clone() };
                 if let Some(found) = self.try_key(&candidate, &barred) {
                     return Ok(Some(found));
                 }
@@ -475,22 +432,13 @@ impl<'a> Exact<'a> {
     }
 
     fn try_key(&mut self, key: &Key, barred: &[usize]) -> Option<(usize, Vec<usize>)> {
-        let at = self
-            .plant
-            .mode(key, &self.exosystem)
-            .filter(|at| !barred.contains(at))?;
+        let at = self.plant.mode(key, &self.exosystem).filter(|at| !barred.contains(at))?;
         self.try_mode(at).map(|leaving| (at, leaving))
     }
 
     fn try_mode(&mut self, at: usize) -> Option<Vec<usize>> {
         let mode = &self.plant.modes[at];
-        match self.inspector.inspect(
-            mode,
-            &self.exosystem,
-            self.motion.t,
-            &self.storage,
-            &self.scale,
-        ) {
+        match self.inspector.inspect(mode, &self.exosystem, self.motion.t, &self.storage, &self.scale) {
             Finding::Holds(leaving) => Some(leaving),
             Finding::Inconsistent | Finding::Refused(_) => None,
         }
@@ -514,9 +462,18 @@ impl<'a> Exact<'a> {
                 }
             }
             self.events += 1;
+            self.notes.extend(self.accumulation.event(self.motion.t));
         }
         if jumped {
             words.push("jump".to_string());
+        }
+        if self.plant.modes[at].shared && !self.noted_shared {
+            self.noted_shared = true;
+            self.notes.push(format!(
+                "at t = {:e} s the ideal model leaves a current among conducting devices or a voltage among blocking ones \
+                 undetermined: the least-norm choice is shown",
+                self.motion.t
+            ));
         }
         if !words.is_empty() {
             log.event(self.motion.t, words.join(", "));
@@ -543,7 +500,7 @@ impl<'a> Exact<'a> {
 /// Whether a switch's control is a combination of sources alone.
 fn is_driven(lcs: &Lcs, i: usize) -> bool {
     let rows = &lcs.controls;
-    let zero = |m: &nalgebra::DMatrix<f64>| i >= m.nrows() || m.row(i).iter().all(|v| *v == 0.0);
+    let zero = |m: &DMatrix<f64>| i >= m.nrows() || m.row(i).iter().all(|v| *v == 0.0);
     zero(&rows.x) && zero(&rows.lambda) && zero(&rows.du)
 }
 
@@ -572,9 +529,8 @@ fn schedule(
                 .filter(move |c| c.rising == rising)
                 .map(move |c| (c.time, rising))
         };
-        let mut both: Vec<(f64, bool)> = passages(threshold.on_above, true)
-            .chain(passages(threshold.off_below, false))
-            .collect();
+        let mut both: Vec<(f64, bool)> =
+            passages(threshold.on_above, true).chain(passages(threshold.off_below, false)).collect();
         both.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut on = position[i];
         for (time, rising) in both {
@@ -601,22 +557,15 @@ impl Stepper for Exact<'_> {
             let next = self.next_stop();
             let due = next <= t + SAME_TIME_ULPS * f64::EPSILON * t.abs();
             let stop = if due { next.min(t) } else { t };
-            let Some(at) = self.mode else {
-                return Err(self.fail(Reason::Infeasible));
-            };
-            match self
-                .motion
-                .travel(&mut self.plant.modes[at].flow, &self.exosystem, stop)
-            {
+            let Some(at) = self.mode else { return Err(self.fail(Reason::Infeasible)) };
+            match self.motion.travel(&mut self.plant.modes[at].flow, &self.exosystem, stop) {
                 Arrival::Reached if due => self.breakpoint(log)?,
                 Arrival::Reached => return Ok(()),
                 Arrival::Fired(guard) => self.fired(guard, log)?,
                 Arrival::Overflow => return Err(self.fail(Reason::Overflow)),
             }
             if self.motion.steps > self.settings.max_steps {
-                return Err(self.fail(Reason::TooManySteps {
-                    limit: self.settings.max_steps,
-                }));
+                return Err(self.fail(Reason::TooManySteps { limit: self.settings.max_steps }));
             }
         }
     }
@@ -628,17 +577,21 @@ impl Stepper for Exact<'_> {
     }
 
     fn finish(&mut self) -> Outcome {
-        let mut outcome = Outcome {
-            notes: std::mem::take(&mut self.notes),
-            ..Outcome::default()
-        };
+        self.take_storage();
+        self.notes.extend(self.accumulation.end());
+        let loss = self.plant.modes.iter().map(|m| m.flow.loss).fold(0.0, f64::max);
+        if loss > LOSS {
+            self.notes.push(format!(
+                "the circuit is stiff without being graded: the matrix exponential is accurate to about {loss:.0e} a step"
+            ));
+        }
+        let mut outcome = Outcome { notes: std::mem::take(&mut self.notes), ..Outcome::default() };
         outcome.stats.steps = self.motion.steps;
         outcome.stats.events = self.events;
         outcome.stats.jumps = self.jumps;
         outcome.stats.modes = self.plant.modes.len() as u64;
         outcome.stats.lcp_solves = self.lcp_solves;
         outcome.stats.factorisations = self.plant.factorisations();
-        self.take_storage();
         outcome.energy = self.balance.energy();
         outcome
     }
