@@ -147,6 +147,28 @@ fn probes_by_name() {
     }
 }
 
+/// The example of `docs/netlist.md` is read without a word.
+#[test]
+fn the_example_is_read_without_findings() {
+    let page = std::fs::read_to_string("docs/netlist.md").unwrap();
+    let example = page
+        .split("```spice\n")
+        .nth(1)
+        .unwrap()
+        .split("```")
+        .next()
+        .unwrap();
+    let mut sources = SourceMap::default();
+    let root = sources.add("example.cir", example);
+    let (netlist, findings) = parse(&mut sources, root, &|_| {
+        Err(std::io::ErrorKind::NotFound.into())
+    });
+    assert_eq!(findings, []);
+    let (circuit, findings) = elaborate(&netlist, &ElaborateOptions::default());
+    assert_eq!(findings, []);
+    assert_eq!(circuit.unwrap().elements.len(), 7);
+}
+
 /// Each file has one fault; the whole message is the snapshot.
 #[test]
 fn bad_netlists() {

@@ -161,7 +161,7 @@ fn cases() -> ProptestConfig {
     let cases = std::env::var("FUZZ_CASES")
         .ok()
         .and_then(|n| n.parse().ok())
-        .unwrap_or(1000);
+        .unwrap_or(500);
     ProptestConfig {
         cases,
         failure_persistence: None,

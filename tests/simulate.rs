@@ -183,3 +183,40 @@ fn a_failure_names_the_time_and_keeps_the_rows() {
     assert!(error.to_string().contains("d1"), "{error}");
     assert_eq!(error.partial.unwrap().waveforms.time.len(), 10);
 }
+
+#[test]
+fn controlled_methods_agree_within_their_tolerance() {
+    let text = format!(
+        "v1 1 0 sin(0 10 1k)\nl1 1 2 1m\nd1 2 3 di\nd2 0 2 di\nc1 3 0 1u\nr1 3 0 1k\n{IDEAL}\n\
+         .tran 20u 3m uic\n.save v(3) i(l1)"
+    );
+    let run = |method, tol| {
+        let settings = Settings { tol, ..Settings::default() };
+        simulate(&text, SimOptions { method, settings, ..SimOptions::default() })
+    };
+    let fine = run(Method::Theta, 1e-7);
+    for (method, tol) in [(Method::Theta, 1e-4), (Method::Theta, 1e-5), (Method::Euler, 1e-3)] {
+        let other = run(method, tol);
+        for name in ["v(3)", "i(l1)"] {
+            let (a, b) = (column(&fine, name), column(&other, name));
+            let amplitude = a.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+            let worst = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(worst <= 2.0 * tol * amplitude, "{method:?} {name}: {:e}", worst / amplitude);
+        }
+    }
+}
+
+#[test]
+fn exact_and_stepping_agree_on_a_bridge() {
+    let text = format!(
+        "c1 1 0 1u ic=10\nl1 1 0 10m ic=0\ndf1 1 2 di\ndr1 0 2 di\ndr2 3 1 di\ndf2 3 0 di\nr1 2 3 1k\n\
+         {IDEAL}\n.tran 50u 5m uic\n.save v(1)"
+    );
+    let exact = simulate(&text, SimOptions::default());
+    assert_eq!(exact.method, "exact");
+    let other = simulate(&text, theta());
+    let pairs = column(&exact, "v(1)").into_iter().zip(column(&other, "v(1)"));
+    let worst = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(worst < 10.0 * 1e-4, "{worst:e}");
+    close(at(&exact, "v(1)", 5e-3), 0.790322820, 1e-9);
+}

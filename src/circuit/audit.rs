@@ -1,7 +1,7 @@
 //! What is legal and odd, or missing, once the whole circuit is known.
 
-use super::NodeId;
 use super::builder::Builder;
+use super::{Kind, NodeId, Quantity};
 use crate::diagnostic::{Diagnostic, Severity, Span};
 use crate::netlist::ast::{Block, Statement};
 
@@ -56,6 +56,17 @@ impl<'n> Builder<'n, '_> {
         for element in &self.circuit.elements {
             terminals[element.p.index()] += 1;
             terminals[element.n.index()] += 1;
+            let control = match &element.kind {
+                Kind::Controlled { control, .. } => Some(control),
+                Kind::Function { input, .. } => Some(input),
+                Kind::Switch(switch) => Some(&switch.control),
+                _ => None,
+            };
+            for (_, quantity) in control.iter().flat_map(|c| &c.terms) {
+                if let Quantity::Voltage(node) = quantity {
+                    terminals[node.index()] += 1;
+                }
+            }
             if element.p == element.n {
                 let message = format!(
                     "both ends of `{}` are at node `{}`",

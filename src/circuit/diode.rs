@@ -183,3 +183,103 @@ fn scaled(law: Law, factor: f64) -> Law {
         }),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{ElaborateOptions, elaborate};
+    use super::*;
+    use crate::diagnostic::SourceMap;
+    use crate::netlist::parse;
+
+    fn law(card: &str, model: &str, diodes: Diodes) -> Option<Law> {
+        let mut sources = SourceMap::default();
+        let root = sources.add(
+            "test.cir",
+            format!("title\nV1 a 0 5\nR1 a b 1\n{card}\n.model {model}\n"),
+        );
+        let (netlist, _) = parse(&mut sources, root, &|_| {
+            Err(std::io::ErrorKind::NotFound.into())
+        });
+        let options = ElaborateOptions {
+            diodes,
+            ..ElaborateOptions::default()
+        };
+        match elaborate(&netlist, &options).0?.elements.pop()?.kind {
+            Kind::Device(law) => Some(law),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// vfwd, ron, roff.
+    fn diode(card: &str, model: &str, diodes: Diodes) -> Option<(f64, f64, Option<f64>)> {
+        match law(card, model, diodes)? {
+            Law::Diode { vfwd, ron, roff } => Some((vfwd.f64, ron.f64, roff.map(|r| r.f64))),
+            Law::Curve(curve) => panic!("{curve:?}"),
+        }
+    }
+
+    #[test]
+    fn models_to_laws() {
+        let d = "D1 b 0 m";
+        for (card, model, expected) in [
+            (
+                d,
+                "m D(Ron=1m Roff=1Meg Vfwd=0.7)",
+                Some((0.7, 1e-3, Some(1e6))),
+            ),
+            (d, "m D(Vfwd=0.7)", Some((0.7, 1.0, None))),
+            (d, "m D(N=0.01 RS=5m)", Some((0.0, 5e-3, None))),
+            (d, "m D(ideal)", Some((0.0, 0.0, None))),
+            ("D1 b 0 ideal", "ideal D", Some((0.0, 0.0, None))),
+            (
+                "D1 b 0 m 2",
+                "m D(Ron=1 Roff=1k)",
+                Some((0.0, 0.5, Some(500.0))),
+            ),
+            ("D1 b 0 m m=4", "m D(Ron=1)", Some((0.0, 0.25, None))),
+            (d, "m D", None),
+            (d, "m D(IS=1e-14 N=1)", None),
+            ("D1 b 0 ideal", "ideal D(IS=1e-14)", None),
+        ] {
+            assert_eq!(
+                diode(card, model, Diodes::Auto),
+                expected,
+                "{card}, {model}"
+            );
+        }
+    }
+
+    #[test]
+    fn ideal_on_demand() {
+        assert_eq!(
+            diode("D1 b 0 m", "m D(IS=1e-14 RS=0.6 BV=100)", Diodes::Ideal),
+            Some((0.0, 0.6, None))
+        );
+        assert_eq!(
+            diode("D1 b 0 m", "m D(Ron=1m Vfwd=0.7)", Diodes::Ideal),
+            Some((0.7, 1e-3, None))
+        );
+        assert_eq!(
+            diode("D1 b 0 other", "m D", Diodes::Ideal),
+            Some((0.0, 0.0, None))
+        );
+        assert_eq!(diode("D1 b 0 m", "m D(Ron=1m)", Diodes::Exp), None);
+    }
+
+    #[test]
+    fn a_reverse_voltage_makes_a_zener() {
+        let Some(Law::Curve(curve)) = law(
+            "D1 b 0 m",
+            "m D(Ron=1 Roff=1k Vfwd=1 Vrev=10 Rrev=2)",
+            Diodes::Auto,
+        ) else {
+            panic!("no curve")
+        };
+        let points: Vec<(f64, f64)> = curve.vertices.iter().map(|(v, i)| (v.f64, i.f64)).collect();
+        assert_eq!(points, [(-10.0, -0.01), (1.0, 0.001)]);
+        assert_eq!(
+            (curve.first.0.f64, curve.last.0.f64, curve.kind),
+            (2.0, 1.0, "zener")
+        );
+    }
+}

@@ -68,13 +68,13 @@ impl<'n> Scopes<'n> {
     ) -> Option<Form> {
         self.steps += 1;
         if self.depth >= MAX_DEPTH || self.steps > MAX_STEPS {
-            let message = "this expression never ends, or is far too large".to_string();
-            return self.fault(
-                "too-deep",
-                expr,
-                message,
-                "parameters or functions go in circles",
-            );
+            // Every other term of the same circle would say the same.
+            if !std::mem::replace(&mut self.gave_up, true) {
+                let message = "this expression never ends, or is far too large".to_string();
+                let label = "parameters or functions go in circles";
+                self.fault::<()>("too-deep", expr, message, label);
+            }
+            return None;
         }
         self.depth += 1;
         let form = self.kind(expr, scope, resolve, locals);

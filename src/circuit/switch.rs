@@ -175,3 +175,62 @@ impl Switch {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{ElaborateOptions, NodeId, Quantity, elaborate};
+    use super::*;
+    use crate::diagnostic::SourceMap;
+    use crate::netlist::parse;
+
+    fn switch(model: &str) -> Switch {
+        let mut sources = SourceMap::default();
+        let text =
+            format!("title\nV1 a 0 5\nS1 a b c 0 ms\nR1 b 0 1\nR2 c 0 1\n.model ms {model}\n");
+        let root = sources.add("test.cir", text);
+        let (netlist, _) = parse(&mut sources, root, &|_| {
+            Err(std::io::ErrorKind::NotFound.into())
+        });
+        let (circuit, findings) = elaborate(&netlist, &ElaborateOptions::default());
+        let circuit = circuit.unwrap_or_else(|| panic!("{findings:?}"));
+        match &circuit.elements[1].kind {
+            Kind::Switch(switch) => switch.clone(),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// on_above, off_below, ron, roff and the gain of the control, which is v(c), node 3.
+    fn numbers(model: &str) -> (f64, f64, f64, Option<f64>, f64) {
+        let s = switch(model);
+        let [(gain, Quantity::Voltage(NodeId(3)))] = s.control.terms[..] else {
+            panic!("{:?}", s.control)
+        };
+        (
+            s.on_above,
+            s.off_below,
+            s.ron.f64,
+            s.roff.map(|r| r.f64),
+            gain.f64,
+        )
+    }
+
+    #[test]
+    fn models() {
+        for (model, expected) in [
+            ("SW", (0.0, 0.0, 1.0, Some(1e12), 1.0)),
+            (
+                "SW(Vt=5 Vh=0.5 Ron=5m Roff=1Meg)",
+                (5.5, 4.5, 5e-3, Some(1e6), 1.0),
+            ),
+            ("SW Vt=5 Vh=-0.5", (5.5, 4.5, 1.0, Some(1e12), 1.0)),
+            ("SW(Vt=1 Ron=0 Roff=inf)", (1.0, 1.0, 0.0, None, 1.0)),
+            ("SW(ideal Vt=1)", (1.0, 1.0, 0.0, None, 1.0)),
+            ("VSWITCH(Von=4 Voff=1)", (4.0, 1.0, 1.0, Some(1e6), 1.0)),
+            // On below its levels: −v(c) above −1, off below −4.
+            ("VSWITCH(Von=1 Voff=4)", (-1.0, -4.0, 1.0, Some(1e6), -1.0)),
+            ("SW(Von=4 Voff=1 Roff=1k)", (4.0, 1.0, 1.0, Some(1e3), 1.0)),
+        ] {
+            assert_eq!(numbers(model), expected, "{model}");
+        }
+    }
+}

@@ -16,10 +16,16 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 )]
 pub struct Cli {
     /// Say nothing but errors
-    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    #[arg(
+        short,
+        long,
+        global = true,
+        conflicts_with = "verbose",
+        display_order = 90
+    )]
     pub quiet: bool,
     /// Explain what is done and why
-    #[arg(short, long, global = true)]
+    #[arg(short, long, global = true, display_order = 91)]
     pub verbose: bool,
     /// What to do
     #[command(subcommand)]
@@ -271,6 +277,19 @@ pub enum Realisation {
     /// The code model `sidiode`
     #[value(name = "sidiode")]
     Sidiode,
+}
+
+impl Realisation {
+    /// As it is typed.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Default => "default",
+            Self::N001 => "n0.01",
+            Self::N0001 => "n0.001",
+            Self::Sidiode => "sidiode",
+        }
+    }
 }
 
 /// `circ graph`.

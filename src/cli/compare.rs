@@ -218,6 +218,7 @@ fn draw(path: &Path, ours: &Waveforms, theirs: &Theirs, found: &Comparison) -> R
     worst.sort_by(|a, b| b.max.total_cmp(&a.max));
     let names: Vec<String> = worst.iter().take(DRAWN).map(|s| s.name.clone()).collect();
     let delta = difference(ours, &theirs.waveforms)?;
-    let figure = Figure::of_comparison(ours, &theirs.waveforms, &delta, &theirs.name, &names);
+    let label = theirs.name.split(' ').next().unwrap_or("reference");
+    let figure = Figure::of_comparison(ours, &theirs.waveforms, &delta, label, &names);
     output::picture_to_file(path, &svg::draw(&figure)?)
 }

@@ -139,16 +139,8 @@ pub fn start_system(
         streams.say(format!("note: {note}"));
     }
     let mut switches = initial.switches;
-    for (name, on) in wanted {
-        let known: Vec<&str> = behaviour.switches.iter().map(|s| s.name.as_str()).collect();
-        let unknown = || {
-            Failure::Message(format!(
-                "--switch {name}: the circuit has {}",
-                known.join(" ")
-            ))
-        };
-        let k = known.iter().position(|n| n == name).ok_or_else(unknown)?;
-        switches[k] = *on;
+    for (k, on) in positions(behaviour, wanted)? {
+        switches[k] = on;
     }
     let lcs = reduce(behaviour, &Position::free(behaviour, switches))
         .map_err(|e| Failure::Message(e.to_string()))?;
@@ -158,6 +150,31 @@ pub fn start_system(
         x0,
         tran: circuit.tran,
     })
+}
+
+/// Indices and positions of the switches named on the command line.
+///
+/// # Errors
+/// [`Failure::Message`] for an unknown switch.
+pub fn positions(
+    behaviour: &Behaviour,
+    wanted: &[(String, bool)],
+) -> Result<Vec<(usize, bool)>, Failure> {
+    let known: Vec<&str> = behaviour.switches.iter().map(|s| s.name.as_str()).collect();
+    let found = wanted.iter().map(|(name, on)| {
+        let unknown = || match known[..] {
+            [] => Failure::Message(format!("--switch {name}: the circuit has no switch")),
+            _ => Failure::Message(format!(
+                "--switch {name}: the circuit has {}",
+                known.join(" ")
+            )),
+        };
+        Ok((
+            known.iter().position(|n| n == name).ok_or_else(unknown)?,
+            *on,
+        ))
+    });
+    found.collect()
 }
 
 /// Shows findings on standard error: errors always, the rest unless quiet.

@@ -16,6 +16,8 @@ mod render;
 pub mod sim;
 pub mod streams;
 
+use std::panic::{self, AssertUnwindSafe};
+
 use clap::Parser;
 use clap::error::ErrorKind;
 
@@ -49,7 +51,13 @@ pub fn main() -> Exit {
         quiet: cli.quiet,
         verbose: cli.verbose,
     };
-    match run(&cli.command, &streams) {
+    // A fault of the program itself still ends with the status for "could not be done".
+    let outcome = panic::catch_unwind(AssertUnwindSafe(|| run(&cli.command, &streams)));
+    let outcome = outcome.unwrap_or_else(|_| {
+        let message = "a fault in circ itself (see above); please report it with the netlist";
+        Err(Failure::Message(message.into()))
+    });
+    match outcome {
         Ok(exit) => exit,
         Err(failure) if failure.is_closed_pipe() => Exit::Done,
         Err(failure) => {

@@ -8,7 +8,7 @@ use super::exit::{Exit, Failure};
 use super::input::{self, Subject};
 use super::output::{self, Format};
 use super::streams::Streams;
-use crate::circuit::Tran;
+use crate::circuit::{Circuit, Tran};
 use crate::integrate::{Method, Run, SimError, SimOptions, simulate, simulate_system};
 use crate::report::{json, terminal, text};
 use crate::settings::Settings;
@@ -143,15 +143,18 @@ pub fn run(
         settings,
         progress: Some(&mut report),
     };
+    let circuit = match subject {
+        Subject::Circuit(both) => Circuit {
+            tran,
+            ..both.0.clone()
+        },
+        Subject::System(_) => Circuit::default(),
+    };
     let before = cpu::own().unwrap_or_default();
     let mut result = match (subject, tran) {
-        (Subject::Circuit(both), tran) => {
-            let mut circuit = both.0.clone();
-            circuit.tran = tran;
-            simulate(&circuit, &both.1, options)
-        }
+        (Subject::Circuit(both), _) => simulate(&circuit, &both.1, options),
         (Subject::System(system), Some(tran)) => {
-            simulate_system(&system.lcs, system.x0.clone(), tran, options)
+            simulate_system(&system.lcs, &system.x0, tran, options)
         }
         (Subject::System(_), None) => {
             let reason = "the system has no \"tran\": {\"tstep\", \"tstop\"}";

@@ -127,7 +127,10 @@ impl NonlinearComplementarity {
     /// [`FormError::Hypothesis`] if V'' is not positive definite at the start.
     pub fn in_z(&self, x0: &DVector<f64>) -> Result<SweepingForm<'_>, FormError> {
         self.check_storage(std::slice::from_ref(x0))?;
-        Ok(SweepingForm { original: self, last: RefCell::new(x0.clone()) })
+        Ok(SweepingForm {
+            original: self,
+            last: RefCell::new(x0.clone()),
+        })
     }
 
     /// The largest ρ with ρ𝔹 ⊂ BᵀΛ(x)𝔹 − R₊ᵐ (38), which is min ‖ΛBμ‖ over μ ≥ 0, ‖μ‖ = 1. `None` for more ports than
@@ -214,8 +217,12 @@ impl SweepingForm<'_> {
     }
 
     fn lambda(&self, x: &DVector<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
-        square_root(&(self.original.hessian)(x))
-            .unwrap_or_else(|| (DMatrix::identity(x.len(), x.len()), DMatrix::identity(x.len(), x.len())))
+        square_root(&(self.original.hessian)(x)).unwrap_or_else(|| {
+            (
+                DMatrix::identity(x.len(), x.len()),
+                DMatrix::identity(x.len(), x.len()),
+            )
+        })
     }
 }
 

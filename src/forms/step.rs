@@ -79,10 +79,12 @@ pub fn step(
             let reach = solve(&b)? * h;
             let problem = system.feedthrough() + &jacobian * &reach;
             let q = system.constraint(t, &at) + &jacobian * (&free - &at);
+            // Solutions are homogeneous in q: solve at size one, so that a state that dies away stays solvable.
+            let size = if q.amax() > 0.0 { q.amax() } else { 1.0 };
             let mut driver = Driver::new(problem, Settings::default().lcp_residual);
-            let solution = driver.solve(&q);
+            let solution = driver.solve(&(&q / size));
             match solution.status {
-                Status::Solved => solution.lambda,
+                Status::Solved => solution.lambda * size,
                 Status::Infeasible(_) => return Err(fail("the constraints cannot be met")),
                 Status::Failed => return Err(fail("the complementarity problem was not solved")),
             }

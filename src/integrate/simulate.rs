@@ -1,5 +1,6 @@
 //! From a circuit, or a system, to a run.
 
+use cpu_time::ThreadTime;
 use nalgebra::DVector;
 
 use crate::circuit::{Circuit, Tran};
@@ -238,7 +239,20 @@ impl Problem {
     }
 }
 
-fn drive(mut problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
+fn drive(problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
+    let begin = ThreadTime::now();
+    let mut result = dispatch(problem, tran, options);
+    let stats = match &mut result {
+        Ok(run) => Some(&mut run.stats),
+        Err(error) => error.partial.as_mut().map(|run| &mut run.stats),
+    };
+    if let Some(stats) = stats {
+        stats.cpu_seconds = begin.elapsed().as_secs_f64();
+    }
+    result
+}
+
+fn dispatch(mut problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
     check(&tran, &options)?;
     problem.settle_switches(&tran, &options.settings)?;
     let lcs = problem.free(&problem.position)?;

@@ -42,13 +42,11 @@ impl Scheme {
         gamma: 0.5,
     };
 
-    /// The same θ with γ = 1, for steps in which the active set changes.
+    /// The same θ with γ = 1, for steps in which the active set changes or the state may jump. Where γ > θ a stiff part
+    /// (h‖A‖ > 2) can cost M = D + hCW⁻¹B its monotonicity; such a step takes [`Self::MOREAU`].
     #[must_use]
     pub const fn implicit_in_lambda(self) -> Self {
-        Self {
-            theta: self.theta,
-            gamma: 1.0,
-        }
+        Self { theta: self.theta, gamma: 1.0 }
     }
 
     /// Order of the global error between events.

@@ -5,6 +5,7 @@
 //! [`elaborate`](crate::circuit::elaborate) does that.
 
 pub mod ast;
+mod block;
 pub(crate) mod card;
 mod decode;
 mod dot;

@@ -113,6 +113,16 @@ impl Face {
         ))
     }
 
+    /// The same face with its own unknowns as the original ones.
+    pub(super) fn rebased(&self) -> Self {
+        Self::new(
+            self.f0.clone(),
+            self.f.clone(),
+            self.p0.clone(),
+            self.p.clone(),
+        )
+    }
+
     /// Number of free unknowns z.
     #[must_use]
     pub fn unknowns(&self) -> usize {

@@ -7,8 +7,8 @@ use super::facial::{Face, Inconsistent};
 use super::{Certificate, Origin, System, Witness, scale, verify};
 
 /// Unknowns of the barrier beyond which the matrix inequality is not attempted: its cost grows with their cube
-/// (NUMERICS C: 500 unknowns take seconds).
-pub const MAX_UNKNOWNS: usize = 500;
+/// (300 unknowns take seconds).
+pub const MAX_UNKNOWNS: usize = 300;
 
 /// Rounds of exposing vectors after the kernel equalities.
 const ROUNDS: usize = 4;
@@ -113,6 +113,7 @@ pub(crate) fn search<T>(
             whole.unknowns()
         ));
     }
+    let whole = whole.rebased();
     let mut face = whole.clone();
     for round in 0..=ROUNDS {
         let outcome = maximise(&face);

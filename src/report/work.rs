@@ -17,9 +17,11 @@ const SMALLEST: f64 = 1e-17;
 pub struct Measurement {
     /// The netlist.
     pub circuit: String,
-    /// `exact`, `theta`, `euler`, `ngspice`…
+    /// `exact`, `theta`, `euler`, `ngspice:reltol=1e-4`…
     pub method: String,
-    /// The setting on the ladder, `step=1e-6`, `reltol=1e-4,maxstep=1e-7,gear`.
+    /// The ladder that it is a rung of: one line in the picture.
+    pub series: String,
+    /// The setting on the ladder, `step=1e-6`, `tol=1e-4`, `method=gear;diodes=n0.01`.
     pub parameter: String,
     /// Accepted steps.
     pub steps: u64,
@@ -35,9 +37,54 @@ pub struct Measurement {
     pub failure: Option<String>,
 }
 
+/// The observed order of a ladder of steps: the error behaves like h to this power.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Order {
+    /// The ladder.
+    pub series: String,
+    /// Of the maximum error.
+    pub max: f64,
+    /// Of the RMS error.
+    pub rms: f64,
+}
+
+/// Measurements as CSV: `circuit,method,parameter,steps,cpu_seconds,max_error,rms_error,reference`. A failure has no errors, and its
+/// words stand in place of the reference.
+#[must_use]
+pub fn csv(measurements: &[Measurement]) -> String {
+    let mut text =
+        String::from("circuit,method,parameter,steps,cpu_seconds,max_error,rms_error,reference\n");
+    let number = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:e}"));
+    for m in measurements {
+        let failed = m.failure.as_ref().map(|words| format!("failed: {words}"));
+        let reference = failed.as_ref().unwrap_or(&m.reference);
+        let cells = [
+            quoted(&m.circuit),
+            quoted(&m.method),
+            quoted(&m.parameter),
+            m.steps.to_string(),
+            format!("{:e}", m.cpu_seconds),
+            number(m.max_error),
+            number(m.rms_error),
+            quoted(reference),
+        ];
+        text.push_str(&cells.join(","));
+        text.push('\n');
+    }
+    text
+}
+
+fn quoted(cell: &str) -> String {
+    if cell.contains([',', '"', '\n']) {
+        format!("\"{}\"", cell.replace('"', "\"\""))
+    } else {
+        cell.into()
+    }
+}
+
 /// Measurements as the lines of a table, failures with their words.
 #[must_use]
-pub fn text(measurements: &[Measurement]) -> String {
+pub fn text(measurements: &[Measurement], orders: &[Order]) -> String {
     let number = |x: Option<f64>| x.map_or_else(|| "failed".into(), |x| si::plain(x, 3));
     let rows: Vec<Vec<String>> = measurements
         .iter()
@@ -68,10 +115,16 @@ pub fn text(measurements: &[Measurement]) -> String {
             text.push_str(&format!("{} {}: {failure}\n", m.method, m.parameter));
         }
     }
+    for order in orders {
+        text.push_str(&format!(
+            "{}: observed order {:.2} (rms {:.2})\n",
+            order.series, order.max, order.rms
+        ));
+    }
     text
 }
 
-/// The picture: CPU seconds across, largest error down, both logarithmic, one colour per method. Failures have no point.
+/// The picture: CPU seconds across, largest error down, both logarithmic, one colour per series. Failures have no point.
 ///
 /// # Errors
 /// [`PictureError::Empty`] when every run failed, [`PictureError::Draw`] when the drawing library refuses.
@@ -154,6 +207,7 @@ mod tests {
         Measurement {
             circuit: "rectifier.cir".into(),
             method: method.into(),
+            series: method.into(),
             parameter: "step=1e-6".into(),
             steps: 1000,
             cpu_seconds,
@@ -175,7 +229,12 @@ mod tests {
         let svg = draw(&all).unwrap();
         assert_eq!(svg.matches("<circle").count(), 3);
         assert!(svg.contains("user CPU of the solve (s)") && !svg.contains("ngspice"));
-        assert!(text(&all).contains("ngspice step=1e-6: Timestep too small"));
+        assert!(text(&all, &[]).contains("ngspice step=1e-6: Timestep too small"));
+        let csv = csv(&all);
+        assert_eq!(
+            csv.lines().last(),
+            Some("rectifier.cir,ngspice,step=1e-6,1000,2e-1,,,failed: Timestep too small")
+        );
         assert!(matches!(draw(&all[3..]), Err(PictureError::Empty(_))));
     }
 }

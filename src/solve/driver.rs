@@ -24,6 +24,9 @@ pub struct Driver {
     pub factorisations: u64,
 }
 
+/// A residual at which no other method is asked for a better one: a few roundings of a solve.
+const ROUNDING: f64 = 1e-13;
+
 /// λ', the index set it was computed on, and the method.
 type Found = (DVector<f64>, Vec<bool>, Answered);
 
@@ -69,7 +72,7 @@ impl Driver {
         let size = self.scaled.size();
         let slack = SLACK * self.scaled.q.amax();
         let mut best = self.candidate(DVector::zeros(size), vec![false; size], Answered::Warm);
-        if best.residual <= self.tolerance {
+        if best.residual <= ROUNDING {
             return self.accept(best);
         }
         let chain: [fn(&mut Self, f64) -> Option<Found>; 4] = [
@@ -79,9 +82,12 @@ impl Driver {
             Self::try_convex,
         ];
         for (k, method) in chain.iter().enumerate() {
+            if k == 3 && best.residual <= self.tolerance {
+                break;
+            }
             if let Some((lambda, basis, by)) = method(self, slack) {
                 let found = self.candidate(lambda, basis, by);
-                if found.residual <= self.tolerance {
+                if found.residual <= ROUNDING {
                     return self.accept(found);
                 }
                 if found.residual < best.residual {
@@ -90,12 +96,16 @@ impl Driver {
             }
             // Lemke's ray ends the search where it is a verified proof.
             if k == 2
+                && best.residual > self.tolerance
                 && let Some(ray) = self.infeasible()
             {
                 best.status = Status::Infeasible(ray);
                 best.by = Answered::Lemke;
                 return best;
             }
+        }
+        if best.residual <= self.tolerance {
+            return self.accept(best);
         }
         best.by = Answered::Nobody;
         best

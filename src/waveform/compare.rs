@@ -16,8 +16,11 @@ const AMPLITUDE_FLOOR: f64 = 1e-9;
 pub enum At {
     /// At every row of either side; between rows both are straight lines.
     AllRows,
+    /// At the rows of the first side only, the reference's rows being dense. A single row at a jump of the other side may hold
+    /// either limit.
+    FirstRows,
     /// At the rows of the reference only: right when the first side's rows are dense and the reference's are the steps of
-    /// another program, between which it claims nothing.
+    /// another program, between which it claims nothing. A single row at a jump of the other side may hold either limit.
     ReferenceRows,
 }
 
@@ -125,6 +128,7 @@ pub fn compare(
     let (from, to) = common_span(waves, reference)?;
     let grid = match at {
         At::AllRows => grid(waves.time.iter().chain(&reference.time), from, to),
+        At::FirstRows => grid(waves.time.iter(), from, to),
         At::ReferenceRows => grid(reference.time.iter(), from, to),
     };
     let amplitudes: Vec<f64> = pairs.iter().map(|(_, b)| b.amplitude(&grid)).collect();
@@ -152,7 +156,7 @@ pub fn compare(
             } else {
                 1.0
             };
-            let (max, max_time, rms) = difference_norms(&a, b, &grid);
+            let (max, max_time, rms) = difference_norms(&a, b, &grid, at);
             let tube = tube_distance(&a, b, &grid, shift);
             let back = tube_distance(b, &a, &grid, shift);
             let (shifted, shifted_time) = if back.0 > tube.0 { back } else { tube };
@@ -339,13 +343,26 @@ fn grid<'a>(times: impl Iterator<Item = &'a f64>, from: f64, to: f64) -> Vec<f64
 }
 
 /// max |a − b| with its time, and √(∫(a − b)² dt / T).
-fn difference_norms(a: &Curve, b: &Curve, grid: &[f64]) -> (f64, f64, f64) {
+fn difference_norms(a: &Curve, b: &Curve, grid: &[f64], at: At) -> (f64, f64, f64) {
     let (mut max, mut max_time) = (0.0, grid[0]);
     let mut integral = 0.0;
     let mut previous: Option<(f64, f64)> = None;
     for &t in grid {
-        let left = a.before(t) - b.before(t);
-        let right = a.after(t) - b.after(t);
+        let (a, b) = ((a.before(t), a.after(t)), (b.before(t), b.after(t)));
+        let (mut left, mut right) = (a.0 - b.0, a.1 - b.1);
+        let single = match at {
+            At::AllRows => false,
+            At::FirstRows => a.0 == a.1,
+            At::ReferenceRows => b.0 == b.1,
+        };
+        if single {
+            let nearer = if left.abs() < right.abs() {
+                left
+            } else {
+                right
+            };
+            (left, right) = (nearer, nearer);
+        }
         let here = left.abs().max(right.abs());
         if here > max {
             (max, max_time) = (here, t);
@@ -531,6 +548,23 @@ mod tests {
         assert_eq!(
             (error(At::ReferenceRows), error(At::AllRows)),
             (0.0, 1.0 / 64.0)
+        );
+    }
+
+    #[test]
+    fn a_row_at_a_jump_may_hold_either_limit() {
+        let jump = waves("v(a)", &[0.0, 1.0, 1.0, 2.0], &[0.0, 0.0, 3.0, 3.0]);
+        for value in [0.0, 3.0] {
+            let rows = waves("v(a)", &[0.0, 1.0, 2.0], &[0.0, value, 3.0]);
+            let error = |found: Result<Comparison, CompareError>| found.unwrap().signals[0].max;
+            assert_eq!(error(compare(&jump, &rows, At::ReferenceRows, 0.0)), 0.0);
+            assert_eq!(error(compare(&rows, &jump, At::FirstRows, 0.0)), 0.0);
+            assert_eq!(error(compare(&rows, &jump, At::AllRows, 0.0)), 1.0);
+        }
+        let wrong = waves("v(a)", &[0.0, 1.0, 2.0], &[0.0, 1.0, 3.0]);
+        assert_eq!(
+            compare(&wrong, &jump, At::FirstRows, 0.0).unwrap().signals[0].max,
+            1.0 / 3.0
         );
     }
 

@@ -1,18 +1,17 @@
 //! Nanoseconds per step of the fixed-step methods with a cached active set.
 //!
-//! `cargo bench --bench step` prints one line per system and method: median of nine runs.
+//! `cargo bench --bench step` prints one line per system and method: median thread time of nine runs.
 #![allow(clippy::print_stdout, missing_docs, reason = "a bench prints")]
 
 #[path = "../systems/mod.rs"]
 mod systems;
-
-use std::time::Instant;
 
 use circ::integrate::run::{Log, Stepper};
 use circ::integrate::step::Scheme;
 use circ::integrate::theta::{Setup, Start, Stepping, Theta};
 use circ::lcs::Lcs;
 use circ::settings::Settings;
+use cpu_time::ThreadTime;
 use nalgebra::{DVector, dvector};
 
 fn nanoseconds(lcs: &Lcs, start: &DVector<f64>, scheme: Scheme, h: f64) -> (f64, u64) {
@@ -30,7 +29,7 @@ fn nanoseconds(lcs: &Lcs, start: &DVector<f64>, scheme: Scheme, h: f64) -> (f64,
     })
     .expect("a system");
     let mut log = Log::new(lcs.outputs.names.len(), 0.0, false);
-    let begin = Instant::now();
+    let begin = ThreadTime::now();
     theta.advance(5e-3, &mut log).expect("a run");
     let steps = theta.stats().steps;
     (

@@ -21,7 +21,11 @@ fn on_a_cut_disc() -> ProjectedSystem {
 }
 
 /// A polyhedron with a point on `active` of its facets, and the projected system on it.
-fn random_corner(random: &mut Random, n: usize, active: usize) -> (ProjectedSystem, Polyhedron, DVector<f64>) {
+fn random_corner(
+    random: &mut Random,
+    n: usize,
+    active: usize,
+) -> (ProjectedSystem, Polyhedron, DVector<f64>) {
     let g = random.matrix(active + 1, n);
     let x = random.vector(n);
     let mut h = -(&g * &x);
@@ -32,7 +36,12 @@ fn random_corner(random: &mut Random, n: usize, active: usize) -> (ProjectedSyst
 }
 
 /// x' = Π_K(x, −F(x)) by small explicit steps followed by the nearest point, an implementation of its own.
-fn projected_flow(system: &ProjectedSystem, mut x: DVector<f64>, end: f64, steps: usize) -> DVector<f64> {
+fn projected_flow(
+    system: &ProjectedSystem,
+    mut x: DVector<f64>,
+    end: f64,
+    steps: usize,
+) -> DVector<f64> {
     let h = end / steps as f64;
     for _ in 0..steps {
         let free = &x + system.velocity(&x).unwrap() * h;
@@ -55,7 +64,10 @@ fn theorem_4_7_projected_and_gradient_systems_have_the_same_trajectory() {
         assert!(touched(0) && touched(1));
     }
     // Two schemes of first order for one solution: their distance vanishes with the step.
-    assert!(distances[2] < 1e-2 && distances[2] < 0.75 * distances[0] || distances[2] < 1e-6, "{distances:?}");
+    assert!(
+        distances[2] < 1e-2 && distances[2] < 0.75 * distances[0] || distances[2] < 1e-6,
+        "{distances:?}"
+    );
 }
 
 #[test]
@@ -69,7 +81,10 @@ fn theorem_5_1_projection_is_the_nearest_admissible_velocity() {
         let by_definition = definition_3(&polyhedron, &x, &v);
         // (15): the minimiser of ‖w − v‖ over W(x), by an interior point method.
         let nearest = system.admissible(&x).nearest(&v).unwrap();
-        assert!((&by_definition - &nearest).norm() < 1e-5, "{by_definition} {nearest}");
+        assert!(
+            (&by_definition - &nearest).norm() < 1e-5,
+            "{by_definition} {nearest}"
+        );
         assert!((system.project_velocity(&x, &v).unwrap().0 - nearest).norm() < 1e-5);
     }
 }
@@ -80,9 +95,13 @@ fn definition_3(polyhedron: &Polyhedron, x: &DVector<f64>, v: &DVector<f64>) -> 
     let normals = polyhedron.g.select_rows(&polyhedron.active(x));
     let mut best: Option<(f64, DVector<f64>)> = None;
     for mask in 1..1_usize << normals.nrows() {
-        let face: Vec<usize> = (0..normals.nrows()).filter(|i| mask >> i & 1 == 1).collect();
+        let face: Vec<usize> = (0..normals.nrows())
+            .filter(|i| mask >> i & 1 == 1)
+            .collect();
         let span = normals.select_rows(&face).transpose();
-        let Some(gram) = (span.transpose() * &span).try_inverse() else { continue };
+        let Some(gram) = (span.transpose() * &span).try_inverse() else {
+            continue;
+        };
         let weights = -(gram * span.transpose() * v);
         if weights.iter().any(|&w| w < 0.0) {
             continue;
@@ -106,7 +125,10 @@ fn definition_3(polyhedron: &Polyhedron, x: &DVector<f64>, v: &DVector<f64>) -> 
 fn proposition_5_2_and_remark_5_3_moreau_decomposition() {
     let mut random = Random(52);
     for _ in 0..30 {
-        let cone = Polyhedron { g: random.matrix(3, 4), h: DVector::zeros(3) };
+        let cone = Polyhedron {
+            g: random.matrix(3, 4),
+            h: DVector::zeros(3),
+        };
         let v = random.vector(4);
         let w = cone.nearest(&v).unwrap();
         let polar = &v - &w;
@@ -149,7 +171,10 @@ fn equation_5_the_limit_of_projected_quotients_is_the_same_operator() {
         let delta = 1e-6;
         let quotient = (system.nearest(&(&x + &v * delta)).unwrap() - &x) / delta;
         let projected = system.project_velocity(&x, &v).unwrap().0;
-        assert!((&quotient - &projected).norm() < 1e-4, "{quotient} {projected}");
+        assert!(
+            (&quotient - &projected).norm() < 1e-4,
+            "{quotient} {projected}"
+        );
     }
 }
 
@@ -167,9 +192,19 @@ fn corollary_5_5_multipliers_of_the_trajectory_solve_26() {
         let jacobian = system.constraint_jacobian(0.0, &run.x[k]);
         let expected = system.drift(0.0, &run.x[k]) + jacobian.transpose() * u;
         assert!((&velocity - expected).norm() < 1e-8);
-        assert!(u.iter().zip(run.y[k].iter()).all(|(&u, &y)| u >= 0.0 && y > -1e-9 && u * y < 1e-8));
+        assert!(
+            u.iter()
+                .zip(run.y[k].iter())
+                .all(|(&u, &y)| u >= 0.0 && y > -1e-9 && u * y < 1e-8)
+        );
         // (26c) away from the moments of impact: the velocity is Π_K(x, −F(x)).
-        if k > 1 && run.lambda[k - 1].iter().zip(u.iter()).all(|(a, b)| (*a > 0.0) == (*b > 0.0)) && u.amax() > 0.0 {
+        if k > 1
+            && run.lambda[k - 1]
+                .iter()
+                .zip(u.iter())
+                .all(|(a, b)| (*a > 0.0) == (*b > 0.0))
+            && u.amax() > 0.0
+        {
             constrained += 1;
             let projected = system.velocity(&run.x[k]).unwrap();
             assert!((&velocity - projected).norm() < 2e-2, "step {k}");
@@ -187,8 +222,12 @@ fn remark_4_11_stationary_points_solve_the_variational_inequality() {
         let g = random.matrix(4, n);
         let h = DVector::from_element(4, 0.3);
         let skew = random.matrix(n, n);
-        let field = Map::affine(&skew - skew.transpose() + DMatrix::identity(n, n), random.vector(n) * 3.0);
-        let system = ProjectedSystem::new(field.clone(), Map::affine(g.clone(), h.clone()), n).unwrap();
+        let field = Map::affine(
+            &skew - skew.transpose() + DMatrix::identity(n, n),
+            random.vector(n) * 3.0,
+        );
+        let system =
+            ProjectedSystem::new(field.clone(), Map::affine(g.clone(), h.clone()), n).unwrap();
         let run = integrate(&system, (0.0, 60.0), &DVector::zeros(n), 300).unwrap();
         let rest = run.last().unwrap();
         assert!(system.velocity(rest).unwrap().norm() < 1e-6);
@@ -196,7 +235,10 @@ fn remark_4_11_stationary_points_solve_the_variational_inequality() {
         let force = (field.value)(rest);
         let best = minimise(&DMatrix::zeros(n, n), &force, &g, &h, 0);
         let bound = best.map_or(f64::NEG_INFINITY, |x| force.dot(&x));
-        assert!((force.dot(rest) - bound).abs() < 1e-5 * (1.0 + force.norm()), "{bound}");
+        assert!(
+            (force.dot(rest) - bound).abs() < 1e-5 * (1.0 + force.norm()),
+            "{bound}"
+        );
         let u = run.lambda.last().unwrap();
         assert!((g.transpose() * u - force).norm() < 1e-6);
     }
@@ -212,7 +254,15 @@ fn theorem_5_6_gradient_system_starts_uniquely_from_every_qualified_point() {
     let coarse = integrate(&system, (0.0, 0.2), &corner, 200).unwrap();
     assert!((fine.last().unwrap() - coarse.last().unwrap()).norm() < 5e-3);
     // Without Assumption 4.2 the condition is reported: three active constraints in the plane.
-    let doubled = Map::affine(dmatrix![1.0, 0.0; 1.0, 0.0; 0.0, 1.0], dvector![0.0, 0.0, 0.0]);
-    let dependent = ProjectedSystem::new(Map::affine(DMatrix::identity(2, 2), DVector::zeros(2)), doubled, 2).unwrap();
+    let doubled = Map::affine(
+        dmatrix![1.0, 0.0; 1.0, 0.0; 0.0, 1.0],
+        dvector![0.0, 0.0, 0.0],
+    );
+    let dependent = ProjectedSystem::new(
+        Map::affine(DMatrix::identity(2, 2), DVector::zeros(2)),
+        doubled,
+        2,
+    )
+    .unwrap();
     assert!(dependent.qualified(&DVector::zeros(2)).is_err());
 }

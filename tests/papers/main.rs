@@ -36,11 +36,20 @@ impl Random {
 
 /// A random passive system with its storage matrix: x' = (J − R)Hx + (G − K)λ, y = (G + K)ᵀHx + (S + T)λ, J, T skew,
 /// [[R, K], [Kᵀ, S]] = FFᵀ with `rank` columns, plus `damping`·I.
-fn passive(random: &mut Random, (n, m): (usize, usize), rank: usize, damping: f64) -> (System, DMatrix<f64>) {
+fn passive(
+    random: &mut Random,
+    (n, m): (usize, usize),
+    rank: usize,
+    damping: f64,
+) -> (System, DMatrix<f64>) {
     let h = DMatrix::from_diagonal(&random.vector(n).map(|v| 2.0_f64.powf(v)));
     let factor = random.matrix(n + m, rank);
     let loss = &factor * factor.transpose() + DMatrix::identity(n + m, n + m) * damping;
-    let (j, t, g) = (random.matrix(n, n), random.matrix(m, m), random.matrix(n, m));
+    let (j, t, g) = (
+        random.matrix(n, n),
+        random.matrix(m, m),
+        random.matrix(n, m),
+    );
     let k = loss.view((0, n), (n, m)).into_owned();
     let system = System {
         a: (&j - j.transpose() - loss.view((0, 0), (n, n))) * &h,

@@ -19,19 +19,29 @@ fn problem() -> Unilateral {
 
 /// Points of the boundary of C: on the disc, on the line, at the corner.
 fn boundary() -> [DVector<f64>; 3] {
-    [dvector![-0.6, 0.8], dvector![0.5, 0.2], dvector![0.5, 0.75_f64.sqrt()]]
+    [
+        dvector![-0.6, 0.8],
+        dvector![0.5, 0.2],
+        dvector![0.5, 0.75_f64.sqrt()],
+    ]
 }
 
 fn random_cone(random: &mut Random, n: usize) -> Polyhedron {
     let rows = 1 + random.below(n);
-    Polyhedron { g: random.matrix(rows, n), h: DVector::zeros(rows) }
+    Polyhedron {
+        g: random.matrix(rows, n),
+        h: DVector::zeros(rows),
+    }
 }
 
 #[test]
 fn proposition_1_projected_velocity_is_the_limit_of_quotients() {
     let mut random = Random(1);
     for _ in 0..30 {
-        let polyhedron = Polyhedron { g: random.matrix(4, 3), h: random.vector(4).map(f64::abs) };
+        let polyhedron = Polyhedron {
+            g: random.matrix(4, 3),
+            h: random.vector(4).map(f64::abs),
+        };
         let x = polyhedron.project(&(random.vector(3) * 5.0)).unwrap().0;
         let v = random.vector(3);
         let delta = 1e-4;
@@ -73,7 +83,8 @@ fn proposition_2_four_characterisations_of_a_projection() {
         let polar = |w: &DVector<f64>| cone.project(w).unwrap().0.norm();
         let fulfils = |s: &DVector<f64>| {
             let b = cone.contains(s, 1e-9) && cone.distance_to_normal(s, &(&v - s)).unwrap() < 1e-7;
-            let c = cone.contains(s, 1e-9) && polar(&(&v - s)) < 1e-7 && (&v - s).dot(s).abs() < 1e-7;
+            let c =
+                cone.contains(s, 1e-9) && polar(&(&v - s)) < 1e-7 && (&v - s).dot(s).abs() < 1e-7;
             // (4d): ‖s‖² ≤ ⟨s, v − ν⟩ for all ν ∈ K°, whose generators are the rows of −G (and 0).
             let generators = cone.g.row_iter().all(|g| s.dot(&(-g.transpose())) <= 1e-9);
             let d = polar(&(&v - s)) < 1e-7 && generators && s.norm_squared() <= s.dot(&v) + 1e-7;
@@ -94,14 +105,25 @@ fn corollary_2_slow_velocity_is_the_one_of_least_norm() {
     for x in boundary() {
         problem.qualified(&x).unwrap();
         let slow = problem.slow_velocity(0.0, &x).unwrap();
-        assert!(problem.distance_to_tangent_inclusion(0.0, &x, &slow).unwrap() < 1e-8);
+        assert!(
+            problem
+                .distance_to_tangent_inclusion(0.0, &x, &slow)
+                .unwrap()
+                < 1e-8
+        );
         assert!(problem.distance_to_inclusion(0.0, &x, &slow).unwrap() < 1e-8);
         // Other elements of −f − g − N_C(x) fulfil (UDI-C) but not (UDI-T_C), and are longer.
         let gradients = problem.tangent(&x).g;
         for mu in [0.5, 2.0] {
-            let other = &slow + gradients.transpose() * DVector::from_element(gradients.nrows(), mu);
+            let other =
+                &slow + gradients.transpose() * DVector::from_element(gradients.nrows(), mu);
             assert!(problem.distance_to_inclusion(0.0, &x, &other).unwrap() < 1e-8);
-            assert!(problem.distance_to_tangent_inclusion(0.0, &x, &other).unwrap() > 1e-2);
+            assert!(
+                problem
+                    .distance_to_tangent_inclusion(0.0, &x, &other)
+                    .unwrap()
+                    > 1e-2
+            );
             assert!(other.norm() > slow.norm() - 1e-12);
         }
         // (iii)₁: x' = v − proj_N(v).
@@ -145,7 +167,9 @@ fn unqualified_inclusion_has_more_solutions_than_the_complementarity_system() {
     let exact = Unilateral::new(f, constant(dvector![0.0]), &both, 1).unwrap();
     assert!(exact.distance_to_inclusion(0.0, &origin, &origin).unwrap() < 1e-9);
     // … but not (CDS): −0 = f(0) + 0·λ would need f(0) = 0.
-    let distance = squared.distance_to_inclusion(0.0, &origin, &origin).unwrap();
+    let distance = squared
+        .distance_to_inclusion(0.0, &origin, &origin)
+        .unwrap();
     assert!((distance - 1.0).abs() < 1e-9);
 }
 
@@ -158,7 +182,10 @@ fn theorem_1_monotone_problem_has_one_solution_and_it_is_slow() {
     let other = integrate(&problem, (0.0, 4.0), &b, steps).unwrap();
     // Monotone: solutions never move apart, so there is one from each start.
     for k in 1..run.t.len() {
-        let (before, after) = ((&run.x[k - 1] - &other.x[k - 1]).norm(), (&run.x[k] - &other.x[k]).norm());
+        let (before, after) = (
+            (&run.x[k - 1] - &other.x[k - 1]).norm(),
+            (&run.x[k] - &other.x[k]).norm(),
+        );
         assert!(after <= before * (1.0 + 1e-12));
     }
     // Slow: its velocity is the projected one, except in the steps of impact.

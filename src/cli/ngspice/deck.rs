@@ -18,7 +18,7 @@ const NEAR_OPEN: f64 = 1e12;
 /// A: saturation current of the diodes written; with N = 0.01 it leaves 7 mV at 1 A.
 const SATURATION_CURRENT: f64 = 1e-12;
 /// Rise time of a true edge, relative to the span: ngspice would stretch a zero to a print step.
-const EDGE: f64 = 1e-7;
+pub const EDGE: f64 = 1e-7;
 /// Width of the steep parts of function blocks, relative to their inputs' size.
 const STEEP: f64 = 1e-6;
 
@@ -76,7 +76,7 @@ pub fn deck(circuit: &Circuit, options: &Options) -> Result<Deck, DeckError> {
         circuit,
         options,
         tran,
-        sensed: sensed(circuit, options.realisation),
+        sensed: sensed(circuit),
         text: String::new(),
         notes: BTreeSet::new(),
     };
@@ -103,8 +103,9 @@ pub fn deck(circuit: &Circuit, options: &Options) -> Result<Deck, DeckError> {
     })
 }
 
-/// Elements whose current needs a 0 V source in series: those that control something, and probed code models.
-fn sensed(circuit: &Circuit, realisation: Realisation) -> BTreeSet<ElementId> {
+/// Elements whose current needs a 0 V source in series because it controls something or is probed: ngspice's own readings
+/// of device currents come from the device equations and not from the solution.
+fn sensed(circuit: &Circuit) -> BTreeSet<ElementId> {
     let controls = circuit.elements.iter().filter_map(|e| match &e.kind {
         Kind::Controlled { control, .. } => Some(control),
         Kind::Function { input, .. } => Some(input),
@@ -121,19 +122,15 @@ fn sensed(circuit: &Circuit, realisation: Realisation) -> BTreeSet<ElementId> {
         Probed::Current(id) => Some(id),
         Probed::Voltage(..) => None,
     });
-    let has_no_current = |id: &ElementId| match &circuit.elements[id.index()].kind {
-        Kind::Device(Law::Diode { .. }) => realisation == Realisation::Sidiode,
-        Kind::VoltageSource(_) | Kind::Inductor(_) => false,
-        _ => true,
+    let is_ammeter = |id: &ElementId| {
+        matches!(
+            circuit.elements[id.index()].kind,
+            Kind::VoltageSource(_) | Kind::Inductor(_)
+        )
     };
     controlling
-        .filter(|id| {
-            !matches!(
-                circuit.elements[id.index()].kind,
-                Kind::VoltageSource(_) | Kind::Inductor(_)
-            )
-        })
-        .chain(probed.filter(has_no_current))
+        .chain(probed)
+        .filter(|id| !is_ammeter(id))
         .collect()
 }
 
@@ -371,12 +368,7 @@ impl Writer<'_> {
             Probed::Voltage(a, NodeId::GROUND) => Reading::Vector(voltage(a)),
             Probed::Voltage(NodeId::GROUND, b) => Reading::Difference("0".into(), voltage(b)),
             Probed::Voltage(a, b) => Reading::Difference(voltage(a), voltage(b)),
-            Probed::Current(id) => match &self.circuit.elements[id.index()].kind {
-                Kind::Device(Law::Diode { .. }) if !self.sensed.contains(&id) => {
-                    Reading::Vector(format!("@{}[id]", self.card('d', id)))
-                }
-                _ => Reading::Vector(format!("i({})", self.ammeter(id))),
-            },
+            Probed::Current(id) => Reading::Vector(format!("i({})", self.ammeter(id))),
         }
     }
 
@@ -569,11 +561,12 @@ mod tests {
         let deck = deck(&circuit, &options(Realisation::N001)).unwrap();
         insta::assert_snapshot!(format!("{}{}", deck.text, deck.notes.join("\n")), @r"
         * rectifier with a switch
-        v1 in 0 dc 0e0 pulse(0e0 5e0 0e0 4e-10 4e-10 1e-3 2e-3)
-        v.d1_drop in d1_drop 7e-1
+        v1 in 0 dc 5e0 pulse(0e0 5e0 0e0 4e-10 4e-10 1e-3 2e-3)
+        v.d1_sense in d1_sense 0
+        v.d1_drop d1_sense d1_drop 7e-1
         d1 d1_drop out m.d1
         .model m.d1 d(is=1e-12 n=0.01 rs=1e-1)
-        r.d1_off in out 1e6
+        r.d1_off d1_sense out 1e6
         b.s1_control s1_control 0 v=(0e0 + (1e0)*v(c))
         s1 out load s1_control 0 m.s1
         .model m.s1 sw(vt=1e0 vh=5e-1 ron=1e-3 roff=1e9)
@@ -583,7 +576,7 @@ mod tests {
         c.x1.c1 load 0 1e-6 ic=1e0
         .options reltol=1e-4 method=gear
         .tran 1e-6 4e-3 0e0 1e-6 uic
-        .save @d1[id] i(v.x1.r1_sense) v(in) v(load) v(out)
+        .save i(v.d1_sense) i(v.x1.r1_sense) v(in) v(load) v(out)
         .end
         edges of zero width take 4e-10 s
         ideal diodes are D models with N = 0.01

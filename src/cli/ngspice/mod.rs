@@ -60,11 +60,9 @@ pub fn run(deck: &Deck, tstop: f64) -> Result<Outcome, NgspiceError> {
             PATIENCE.as_secs()
         )));
     };
-    let raw = File::open(directory.path().join("run.raw"))
-        .map_err(io::Error::from)
-        .and_then(|file| {
-            raw::read(io::BufReader::new(file)).map_err(|e| io::Error::other(e.to_string()))
-        });
+    let raw = File::open(directory.path().join("run.raw")).and_then(|file| {
+        raw::read(io::BufReader::new(file)).map_err(|e| io::Error::other(e.to_string()))
+    });
     let reached = raw.as_ref().ok().and_then(|w| w.time.last().copied());
     match (raw, reached) {
         (Ok(waves), Some(reached)) if status.success() && reached >= tstop * (1.0 - UNFINISHED) => {
@@ -167,14 +165,23 @@ fn words(directory: &Path) -> String {
         "no convergence",
         "can't",
     ];
-    let lines = said.lines().map(str::trim).filter(|line| {
+    let lines = said.lines().map(after_progress).filter(|line| {
         let line = line.to_lowercase();
         telling.iter().any(|word| line.contains(word))
     });
     lines.take(QUOTED_LINES).collect::<Vec<_>>().join("; ")
 }
 
-/// The deck's probes, taken or computed from ngspice's vectors.
+/// A line without the progress reports that ngspice writes in front of it.
+fn after_progress(line: &str) -> &str {
+    let at = line
+        .rfind("Reference value")
+        .and_then(|_| line.find("doAnalyses"));
+    at.map_or(line, |at| &line[at..]).trim()
+}
+
+/// The deck's probes, taken or computed from ngspice's vectors. The row at t = 0, the operating point before anything that happens
+/// at 0, is left out.
 fn renamed(waves: &Waveforms, deck: &Deck) -> Result<Waveforms, NgspiceError> {
     let column = |vector: &str| -> Result<Vec<f64>, NgspiceError> {
         if vector == "0" {
@@ -202,12 +209,13 @@ fn renamed(waves: &Waveforms, deck: &Deck) -> Result<Waveforms, NgspiceError> {
         });
     }
     let names: Vec<String> = deck.probes.iter().map(|(name, _)| name.clone()).collect();
+    let first = usize::from(waves.time.first() == Some(&0.0));
     Ok(Waveforms {
         title: waves.title.clone(),
         units: names.iter().map(|n| unit_of(n)).collect(),
         names,
-        time: waves.time.clone(),
-        values: (0..waves.len())
+        time: waves.time[first..].to_vec(),
+        values: (first..waves.len())
             .flat_map(|k| columns.iter().map(move |c| c[k]))
             .collect(),
     })

@@ -91,11 +91,6 @@ impl Motion {
         self.refresh_noise(flow);
     }
 
-    /// x.
-    pub(crate) fn state(&self, n: usize) -> &[f64] {
-        &self.now[..n]
-    }
-
     fn refresh_noise(&mut self, flow: &Flow) {
         for (a, v) in self.amplitude.iter_mut().zip(&self.now) {
             *a = a.max(v.abs());

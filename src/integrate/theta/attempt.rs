@@ -12,11 +12,8 @@ impl Theta<'_> {
     pub(super) fn attempt(&mut self, h: f64, t1: f64) -> Result<(), SimError> {
         self.inputs.left(t1, &mut self.u_next);
         self.stats.lcp_solves += 1;
-        let scheme = if self.now.settle && !self.lambda.is_empty() {
-            self.scheme.implicit_in_lambda()
-        } else {
-            self.scheme
-        };
+        let settle = self.now.settle && !self.lambda.is_empty();
+        let scheme = self.scheme;
         let Self {
             plant,
             now,
@@ -28,20 +25,18 @@ impl Theta<'_> {
         system
             .columns
             .fill(&now.x, &self.u_next, &now.u, &mut self.z);
-        let same = attempt.h == h && system.step(attempt.step).scheme == scheme;
-        if !same || attempt.solved.is_some() {
-            let tolerance = settings.lcp_residual;
-            let (step, new) = system
-                .matrices(h, Self::slack(t1), scheme, tolerance)
-                .map_err(|reason| SimError::at(now.t, reason))?;
+        let same = attempt.h == h && attempt.settle == settle && attempt.solved.is_none();
+        if !same {
+            let (slack, tolerance) = (Self::slack(t1), settings.lcp_residual);
+            let found = if settle {
+                change_matrices(system, h, slack, scheme, tolerance)
+            } else {
+                system.matrices(h, slack, scheme, tolerance)
+            };
+            let (step, new) = found.map_err(|reason| SimError::at(now.t, reason))?;
             let (mode, fused) = system.mode(step, &now.active);
             self.stats.factorisations += u64::from(new) + u64::from(fused);
-            *attempt = Attempt {
-                step,
-                mode,
-                h,
-                solved: None,
-            };
+            *attempt = Attempt { step, mode, h, settle, solved: None };
         }
         let n = now.x.len();
         let fused = system.step(attempt.step).fused(attempt.mode);
@@ -51,16 +46,22 @@ impl Theta<'_> {
         self.solve_step(h, t1)
     }
 
-    /// The step with γ = 1 by the solvers.
+    /// The step with γ = 1 by the solvers. Where the user's own γ = 1 > θ leaves a stiff step without solution, θ = 1 has one.
     #[cold]
     pub(super) fn solve_step(&mut self, h: f64, t1: f64) -> Result<(), SimError> {
         self.stats.pivotings += 1;
-        let scheme = self.scheme.implicit_in_lambda();
+        let first = self.solve_with(self.scheme, h, t1);
+        if first.is_err() && self.scheme != Scheme::MOREAU {
+            return self.solve_with(Scheme::MOREAU, h, t1);
+        }
+        first
+    }
+
+    fn solve_with(&mut self, scheme: Scheme, h: f64, t1: f64) -> Result<(), SimError> {
         let tolerance = self.settings.lcp_residual;
         let now = &self.now;
         let system = &mut self.plant.systems[now.system].1;
-        let (step, new) = system
-            .matrices(h, Self::slack(t1), scheme, tolerance)
+        let (step, new) = change_matrices(system, h, Self::slack(t1), scheme, tolerance)
             .map_err(|reason| SimError::at(now.t, reason))?;
         self.stats.factorisations += u64::from(new);
         let matrices = system.step_mut(step);
@@ -86,10 +87,12 @@ impl Theta<'_> {
             };
         }
         self.lambda.copy_from_slice(solution.lambda.as_slice());
+        self.worst_residual = self.worst_residual.max(solution.residual);
         self.attempt = Attempt {
             step,
             mode: 0,
             h,
+            settle: false,
             solved: Some((solution.basis, solution.active)),
         };
         Ok(())
@@ -166,6 +169,22 @@ impl Theta<'_> {
         self.take_pattern(found.basis, &found.active, self.now.t);
         Ok(())
     }
+}
+
+/// Matrices for a step in which the active set changes or the state may jump: the scheme's θ with γ = 1, or Moreau's where
+/// the scheme has γ < 1 and that would cost M its monotonicity.
+fn change_matrices(
+    system: &mut System,
+    h: f64,
+    slack: f64,
+    scheme: Scheme,
+    tolerance: f64,
+) -> Result<(usize, bool), Reason> {
+    let (step, new) = system.matrices(h, slack, scheme.implicit_in_lambda(), tolerance)?;
+    if scheme.gamma == 1.0 || system.step(step).driver.is_monotone() {
+        return Ok((step, new));
+    }
+    system.matrices(h, slack, Scheme::MOREAU, tolerance)
 }
 
 /// The error of a step problem without a solution; it names the device with the largest part in the contradiction, or

@@ -114,6 +114,7 @@ pub struct Theta<'a> {
     modes: BTreeSet<(usize, Vec<bool>)>,
     not_unique: BTreeSet<String>,
     notes: Vec<String>,
+    worst_residual: f64,
     pending: Vec<(f64, String)>,
     /// Largest |s| so far, by storage element: what the error control calls the amplitude.
     amplitudes: Amplitudes,
@@ -155,6 +156,8 @@ struct Attempt {
     step: usize,
     mode: usize,
     h: f64,
+    /// Whether it was made for a settling step.
+    settle: bool,
     /// Basis and pattern after the step, where the solvers ran.
     solved: Option<(Vec<bool>, Vec<Option<bool>>)>,
 }
@@ -238,6 +241,7 @@ impl<'a> Theta<'a> {
             modes: BTreeSet::new(),
             not_unique: BTreeSet::new(),
             notes: Vec::new(),
+            worst_residual: 0.0,
             pending: Vec::new(),
             amplitudes,
         };
@@ -278,6 +282,12 @@ impl<'a> Theta<'a> {
     #[must_use]
     pub fn state(&self) -> &[f64] {
         &self.now.x
+    }
+
+    /// The largest complementarity residual of a step that the solvers solved.
+    #[must_use]
+    pub fn worst_residual(&self) -> f64 {
+        self.worst_residual
     }
 
     /// The counters so far.

@@ -104,7 +104,10 @@ impl Binary {
 impl fmt::Display for Expr {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.kind {
-            ExprKind::Number(value) => write!(f, "{:?}", value.f64),
+            ExprKind::Number(value) => {
+                let text = format!("{:?}", value.f64);
+                f.write_str(text.strip_suffix(".0").unwrap_or(&text))
+            }
             ExprKind::Name(name) => f.write_str(name),
             ExprKind::Text(text) => write!(f, "{text:?}"),
             ExprKind::Signal(signal) => write!(f, "{signal}"),

@@ -43,7 +43,7 @@ pub(super) fn passive<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
 }
 
 /// Capital suffixes that SPICE reads otherwise than people do: 1M Ω is 1 mΩ, 1F is 1 fF.
-fn warn_of_suffix(at: Input<'_>, name: &Name, value: &Expr) {
+pub(super) fn warn_of_suffix(at: Input<'_>, name: &Name, value: &Expr) {
     let at = separator(at);
     let ExprKind::Number(number) = &value.kind else {
         return;
@@ -66,6 +66,11 @@ fn warn_of_suffix(at: Input<'_>, name: &Name, value: &Expr) {
             "suffix-f",
             "femto",
             format!("write `{digits}` for {digits} F, `{digits}f` for {digits} fF"),
+        ),
+        (Some('v' | 'i'), 'A') => (
+            "suffix-a",
+            "atto",
+            format!("write `{digits}` for {digits} A"),
         ),
         _ => return,
     };

@@ -1,0 +1,132 @@
+//! Random passive RLC–diode circuits: no failure, energy in balance, complementarity to rounding, and the same states as a
+//! time-stepping written down in ten lines around the enumerating solver.
+#![allow(missing_docs, reason = "tests")]
+
+use circ::circuit::{Circuit, ElaborateOptions, elaborate};
+use circ::diagnostic::SourceMap;
+use circ::integrate::jump::JumpProblem;
+use circ::integrate::step::Scheme;
+use circ::integrate::theta::{Setup, Start, Stepping, Theta};
+use circ::integrate::{Log, Method, SimOptions, Stepper, simulate};
+use circ::lcs::{Lcs, Position, reduce};
+use circ::mna::behaviour;
+use circ::netlist::parse;
+use circ::settings::Settings;
+use circ::solve::enumerate;
+use circ::solve::lcp::Lcp;
+use nalgebra::{DMatrix, DVector};
+use proptest::prelude::*;
+
+fn circuit(text: &str) -> Option<Circuit> {
+    let mut sources = SourceMap::default();
+    let root = sources.add("random.cir", text);
+    let (netlist, _) = parse(&mut sources, root, &|_| Err(std::io::ErrorKind::NotFound.into()));
+    elaborate(&netlist, &ElaborateOptions::default()).0
+}
+
+/// A driven tree of resistors with capacitors, inductors, diodes and resistors across it, from inconsistent initial values.
+fn netlist() -> impl Strategy<Value = String> {
+    let element = (0..4_u8, 0..5_usize, 0..5_usize, 1..100_u32, -20..20_i32);
+    (2..5_usize, proptest::collection::vec(element, 3..9), 1..4_u32).prop_map(
+        |(nodes, elements, frequency)| {
+            let mut text = format!(
+                "random\n.model di d(ron=0 vfwd=0 n=0.01)\nv1 s 0 sin(0 10 {frequency}k)\nrs s 1 100\n"
+            );
+            for k in 2..=nodes {
+                text += &format!("rt{k} {k} {} {}\n", k - 1, 470 * k);
+            }
+            for (k, (kind, a, b, value, ic)) in elements.into_iter().enumerate() {
+                let (a, b) = (a % (nodes + 1), b % (nodes + 1));
+                if a == b {
+                    continue;
+                }
+                text += &match kind {
+                    0 => format!("c{k} {a} {b} {value}n ic={ic}\n"),
+                    1 => format!("l{k} {a} {b} {value}u ic={}\n", f64::from(ic) * 1e-3),
+                    2 => format!("d{k} {a} {b} di\n"),
+                    _ => format!("r{k} {a} {b} {value}\n"),
+                };
+            }
+            text + ".tran 2u 200u uic\n.end\n"
+        },
+    )
+}
+
+fn system(circuit: &Circuit) -> (Lcs, DVector<f64>) {
+    let behaviour = behaviour(circuit).expect("a behaviour").standard();
+    let lcs = reduce(&behaviour, &Position::free(&behaviour, vec![])).expect("a system");
+    let s = circ::integrate::start::from_initial_conditions(circuit, &behaviour);
+    let x = &lcs.storage.inject * s + &lcs.storage.inject_one;
+    // The oracle knows no jump at t = 0+: it starts after it.
+    let u = DVector::from_iterator(lcs.p(), lcs.inputs.iter().map(|i| i.source.value(0.0)));
+    let jump = JumpProblem::new(&lcs, 1e-9).and_then(|mut j| j.solve(&lcs, &x, &u).expect("a jump"));
+    let x = jump.map_or(x, |j| j.x);
+    (lcs, x)
+}
+
+/// Moreau's scheme from the formula, each step by enumeration of all index sets; `None` where no set gives a solution to
+/// the oracle's tolerance.
+fn oracle(lcs: &Lcs, mut x: DVector<f64>, h: f64, steps: usize) -> Option<DVector<f64>> {
+    let n = lcs.n();
+    let w = (DMatrix::identity(n, n) - &lcs.a * h).try_inverse()?;
+    let m = &lcs.d + &lcs.c * &w * &lcs.b * h;
+    for k in 1..=steps {
+        let t = k as f64 * h;
+        let u = DVector::from_iterator(lcs.p(), lcs.inputs.iter().map(|i| i.source.value_left(t)));
+        let free = &w * (&x + (&lcs.e * &u + &lcs.e0) * h);
+        let q = &lcs.c * &free + &lcs.g * &u + &lcs.f;
+        let lambda = enumerate::solve(&Lcp { m: m.clone(), q }, 1e-9).into_iter().next()?;
+        x = free + &w * &lcs.b * lambda * h;
+    }
+    Some(x)
+}
+
+fn stepped(lcs: &Lcs, x: DVector<f64>, h: f64, steps: usize) -> (DVector<f64>, f64) {
+    let owned = lcs.clone();
+    let mut theta = Theta::new(Setup {
+        reduce: Box::new(move |_| Ok(owned.clone())),
+        position: vec![],
+        thresholds: vec![],
+        t: 0.0,
+        start: Start::State(x),
+        scheme: Scheme::MOREAU,
+        stepping: Stepping::Fixed(h),
+        longest: f64::INFINITY,
+        settings: Settings::default(),
+    })
+    .expect("a stepper");
+    let mut log = Log::new(lcs.outputs.names.len(), 0.0, false);
+    theta.advance(h * steps as f64, &mut log).unwrap_or_else(|e| panic!("{e}"));
+    let worst = theta.worst_residual();
+    (DVector::from_column_slice(theta.state()), worst)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn same_states_as_the_oracle(text in netlist()) {
+        let Some(circuit) = circuit(&text) else { return Err(TestCaseError::fail(text)) };
+        let (lcs, x) = system(&circuit);
+        prop_assume!(lcs.m() <= 5);
+        let (h, steps) = (1e-6, 40);
+        if let Some(expected) = oracle(&lcs, x.clone(), h, steps) {
+            let (state, residual) = stepped(&lcs, x, h, steps);
+            let metric = |v: &DVector<f64>| v.dot(&(&lcs.energy * v)).sqrt();
+            let scale = metric(&expected).max(1e-6);
+            prop_assert!(metric(&(&state - &expected)) <= 1e-7 * scale, "{text}\n{state}{expected}");
+            prop_assert!(residual <= 1e-11, "{text}\n{residual:e}");
+        }
+    }
+
+    #[test]
+    fn midpoint_keeps_the_energy_balance(text in netlist()) {
+        let Some(circuit) = circuit(&text) else { return Err(TestCaseError::fail(text)) };
+        let behaviour = behaviour(&circuit).expect("a behaviour");
+        let options = SimOptions { method: Method::Theta, ..SimOptions::default() };
+        let run = simulate(&circuit, &behaviour, options)
+            .map_err(|e| TestCaseError::fail(format!("{text}{e}")))?;
+        prop_assert!(run.energy.residual_relative < 1e-3, "{text}\n{:?}", run.energy);
+        prop_assert!(run.energy.dissipated >= -1e-9 * run.energy.source.abs());
+    }
+}
