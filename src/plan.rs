@@ -2,8 +2,7 @@
 
 use crate::integrate::step::Scheme;
 use crate::integrate::{Method, SimOptions};
-use crate::law::Law;
-use crate::lcs::Lcs;
+use crate::lcs::{Input, Lcs};
 use crate::solve::lcp::Scaling;
 
 /// The machinery chosen for a run.
@@ -22,11 +21,15 @@ pub struct Plan {
 pub fn plan(lcs: &Lcs, options: &SimOptions) -> Plan {
     let mut words = Vec::new();
     let (n, m, p) = (lcs.n(), lcs.m(), lcs.p());
-    words.push(format!("{n} states, {m} complementarity pairs, {p} sources"));
+    words.push(format!(
+        "{n} states, {m} complementarity pairs, {p} sources"
+    ));
     let obstacle = not_exact(lcs);
     let method = match (options.method, &obstacle) {
         (Method::Auto, None) => {
-            words.push("all laws are piecewise linear and all sources exact: exact integration".into());
+            words.push(
+                "all laws are piecewise linear and all sources exact: exact integration".into(),
+            );
             Method::Exact
         }
         (Method::Auto, Some(what)) => {
@@ -44,7 +47,10 @@ pub fn plan(lcs: &Lcs, options: &SimOptions) -> Plan {
     };
     if matches!(method, Method::Euler | Method::Theta) {
         words.push(match options.step {
-            Some(h) => format!("θ = {}, γ = {}, fixed step {h:e} s", scheme.theta, scheme.gamma),
+            Some(h) => format!(
+                "θ = {}, γ = {}, fixed step {h:e} s",
+                scheme.theta, scheme.gamma
+            ),
             None => format!(
                 "θ = {}, γ = {}, steps chosen for a tolerance of {:e}",
                 scheme.theta, scheme.gamma, options.settings.tol
@@ -59,17 +65,23 @@ pub fn plan(lcs: &Lcs, options: &SimOptions) -> Plan {
     if lcs.switches.is_empty() {
         words.push("no switches: one system for the whole run".into());
     }
-    Plan { method, scheme, words }
+    Plan {
+        method,
+        scheme,
+        words,
+    }
 }
 
-/// What keeps a system from exact integration.
+/// What keeps a system from exact integration: the element and why.
 #[must_use]
 pub fn not_exact(lcs: &Lcs) -> Option<String> {
-    lcs.ports.iter().find_map(|port| match port.law {
-        Law::Diode { .. } | Law::Curve(_) => None,
-        #[allow(unreachable_patterns, reason = "laws that are not piecewise linear")]
-        _ => Some(format!("{} is not piecewise linear", port.device)),
-    })
+    // Every law so far is piecewise linear; a source may lack a finite exosystem.
+    let endless = |input: &&Input| input.source.piece(0.0).is_none();
+    let source = lcs.inputs.iter().find(endless)?;
+    Some(format!(
+        "the waveform of {} solves no linear equation of finite order",
+        source.name
+    ))
 }
 
 /// Whether no impulse can flow through the devices because each resists it.

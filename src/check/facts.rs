@@ -12,6 +12,9 @@ use crate::passivity::{self, Certificate, Strict, System, Verdict, gradient, str
 /// Ports up to which every set of role swaps is tried; beyond it none and single ones.
 const ALL_SWAPS: usize = 8;
 
+/// Numbers held for all swaps together beyond which fewer are tried (160 MB).
+const SWAP_NUMBERS: usize = 20_000_000;
+
 /// A closed interval, possibly unbounded.
 pub(super) type Interval = (f64, f64);
 
@@ -210,8 +213,8 @@ fn port_law(device: &str, role: Role, law: &Law) -> PortLaw {
         |interval: Option<Interval>| interval.is_some_and(|(low, high)| low <= 0.0 && high >= 0.0);
     let only_zero = |interval: Option<Interval>| interval == Some((0.0, 0.0));
     let negated = |(low, high): Interval| (-high, -low);
-    // Current: λ = i, y = −v. Voltage: λ = −v, y = i. A function block's (input, output) is read as (v, i) with y = v
-    // and λ = output; −λ ∈ ∂φ(y) then holds for φ concave, so nothing is claimed about it.
+    // Current: λ = i, y = −v. Voltage: λ = −v, y = i. A function block's output grows with its input: the normal form takes
+    // λ = −output, so that −λ ∈ ∂φ(y).
     let i_where_v_vanishes = graph.zeros(|p| p.0, |p| p.1);
     let v_where_i_vanishes = graph.zeros(|p| p.1, |p| p.0);
     let (lambda, y, zero_set, swapped) = match role {
@@ -227,16 +230,16 @@ fn port_law(device: &str, role: Role, law: &Law) -> PortLaw {
             v_where_i_vanishes,
             i_where_v_vanishes,
         ),
-        Role::Function => (graph.i(), graph.v(), i_where_v_vanishes, v_where_i_vanishes),
+        Role::Function => (negated(graph.i()), graph.v(), i_where_v_vanishes, v_where_i_vanishes),
     };
     PortLaw {
         device: device.to_string(),
         half_line: false,
         lambda,
         y,
-        through_origin: role != Role::Function && contains_zero(zero_set),
-        strictly: role != Role::Function && only_zero(zero_set),
-        strictly_swapped: role != Role::Function && only_zero(swapped),
+        through_origin: contains_zero(zero_set),
+        strictly: only_zero(zero_set),
+        strictly_swapped: only_zero(swapped),
     }
 }
 
@@ -249,6 +252,10 @@ impl Facts {
         let mut laws = Vec::with_capacity(m);
         for (j, port) in lcs.ports.iter().enumerate() {
             let mut law = port_law(&port.device, port.role, &port.law);
+            if port.role == Role::Function {
+                system.b.column_mut(j).neg_mut();
+                system.d.column_mut(j).neg_mut();
+            }
             if let (
                 Law::Diode {
                     vfwd,
@@ -303,7 +310,12 @@ impl Facts {
             e_driven: lcs.e.select_columns(&columns),
             feedthrough: Feedthrough::of(&lcs.d),
             swaps: Vec::new(),
-            energy: lcs.energy.clone(),
+            // A system file need not name its energy.
+            energy: if lcs.energy.shape() == (n, n) {
+                lcs.energy.clone()
+            } else {
+                DMatrix::zeros(n, n)
+            },
             state_names: lcs.states.iter().map(|s| s.name.clone()).collect(),
             system,
             e,
@@ -314,7 +326,6 @@ impl Facts {
             verdict,
             strict,
         };
-        debug_assert_eq!(facts.energy.shape(), (n, n));
         facts.swaps = facts.all_swaps();
         facts
     }
@@ -356,22 +367,17 @@ impl Facts {
     }
 
     fn all_swaps(&self) -> Vec<Swap> {
-        let m = self.system.m();
-        let sets: Vec<Vec<usize>> = if m <= ALL_SWAPS {
+        let (n, m) = (self.system.n(), self.system.m());
+        let each = (n + m) * (n + m);
+        let sets: Vec<Vec<usize>> = if m <= ALL_SWAPS && each << m <= SWAP_NUMBERS {
             let mut masks: Vec<usize> = (0..1_usize << m).collect();
             masks.sort_by_key(|mask| mask.count_ones());
-            masks
-                .iter()
-                .map(|mask| (0..m).filter(|j| mask >> j & 1 == 1).collect())
-                .collect()
+            masks.iter().map(|mask| (0..m).filter(|j| mask >> j & 1 == 1).collect()).collect()
         } else {
-            std::iter::once(Vec::new())
-                .chain((0..m).map(|j| vec![j]))
-                .collect()
+            let singles = if each * m <= SWAP_NUMBERS { m } else { 0 };
+            std::iter::once(Vec::new()).chain((0..singles).map(|j| vec![j])).collect()
         };
-        sets.into_iter()
-            .filter_map(|ports| self.swap(ports))
-            .collect()
+        sets.into_iter().filter_map(|ports| self.swap(ports)).collect()
     }
 
     /// Exchanges λ and y at some ports.

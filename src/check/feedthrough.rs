@@ -7,8 +7,10 @@ use petgraph::graph::DiGraph;
 /// Order up to which all 2ᵐ − 1 principal minors are computed (per strongly connected block).
 const EXACT_ORDER: usize = 14;
 
-/// Principal minors tried at random beyond that, from a fixed seed; they can refute, not prove.
+/// Principal minors tried at random beyond that, from a fixed seed; they can refute, not prove. At most this many, and at
+/// most this many operations (m³ each).
 const RANDOM_MINORS: usize = 4000;
+const OPERATIONS: usize = 200_000_000;
 
 /// Size, relative to the Hadamard bound of the equilibrated matrix, below which a minor or eigenvalue counts as zero.
 /// Entries carry up to 1e-12; larger: regular matrices are called singular; smaller: rounding gets a sign.
@@ -189,7 +191,7 @@ fn sampled_minors(d: &DMatrix<f64>) -> (Option<bool>, Option<bool>) {
     };
     let singles = (0..m).map(|j| vec![j]);
     let pairs = (0..m).flat_map(|i| (0..i).map(move |j| vec![j, i]));
-    let random: Vec<Vec<usize>> = (0..RANDOM_MINORS)
+    let random: Vec<Vec<usize>> = (0..RANDOM_MINORS.min(OPERATIONS / (m * m * m)))
         .map(|_| (0..m).filter(|_| bit()).collect())
         .collect();
     for set in singles

@@ -21,6 +21,9 @@ pub struct Jumps {
     pub analysed: bool,
 }
 
+/// Ports beyond which the cone of impulses is not analysed: it takes one linear program per port.
+const LARGEST: usize = 60;
+
 /// Finds the support of {λ ≥ 0 : Dλ ≥ 0, λᵀDλ = 0} (Brogliato-Thibault (24)-(26) is the case D = 0).
 pub(super) fn find(facts: &Facts) -> Jumps {
     let metric = match facts.certificate() {
@@ -38,7 +41,7 @@ pub(super) fn find(facts: &Facts) -> Jumps {
     if facts.feedthrough.p_matrix == Some(true) || m == 0 {
         return jumps;
     }
-    if !facts.feedthrough.psd || facts.laws.iter().any(|l| !l.half_line) {
+    if m > LARGEST || !facts.feedthrough.psd || facts.laws.iter().any(|l| !l.half_line) {
         jumps.analysed = false;
         return jumps;
     }

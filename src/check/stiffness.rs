@@ -7,6 +7,10 @@ use crate::passivity::{System, scale, witness};
 /// Ports up to which all 2ᵐ modes are looked at; beyond it: all blocking, all conducting, and one at a time.
 const ALL_MODES: usize = 8;
 
+/// Largest n³·modes that is spent, and largest n at all.
+const WORK: usize = 3_000_000_000;
+const LARGEST: usize = 300;
+
 /// Eigenvalues below this times the largest of their mode count as zero (rounding of the eigenvalue computation).
 const ZERO: f64 = 1e-13;
 
@@ -23,14 +27,20 @@ pub struct Stiffness {
 
 /// The time constants of a system, over all modes or a bounded set of them.
 pub(super) fn over_modes(system: &System) -> Stiffness {
-    let m = system.m();
-    let sets: Vec<Vec<usize>> = if m <= ALL_MODES {
+    let (n, m) = (system.n(), system.m());
+    let cost = n * n * n + 1;
+    let sets: Vec<Vec<usize>> = if n > LARGEST {
+        Vec::new()
+    } else if m <= ALL_MODES && cost << m <= WORK {
         (0..1_usize << m)
             .map(|mask| (0..m).filter(|j| mask >> j & 1 == 1).collect())
             .collect()
     } else {
         let ends = [Vec::new(), (0..m).collect()];
-        ends.into_iter().chain((0..m).map(|j| vec![j])).collect()
+        let singles = if cost * m <= WORK { m } else { 0 };
+        ends.into_iter()
+            .chain((0..singles).map(|j| vec![j]))
+            .collect()
     };
     let balanced = scale::balance(system);
     let mut range: Option<(f64, f64)> = None;

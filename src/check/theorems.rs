@@ -778,10 +778,7 @@ fn stability(facts: &Facts) -> Theorem {
         Some(s) if s.decay_rate > 0.0 => {
             h.need(
                 true,
-                format!(
-                    "strictly passive: (46) with ε/2 = {:.6e} 1/s (limit {:.6e})",
-                    s.decay_rate, s.limit
-                ),
+                format!("strictly passive: (46) with ε/2 = {:.6e} 1/s", s.decay_rate),
             );
             format!("‖x(t)‖ ≤ {:.4}·‖x₀‖·exp(−{:.6e} t)", s.bound, s.decay_rate)
         }

@@ -5,14 +5,13 @@ use std::collections::{HashSet, VecDeque};
 use super::elaborate::ElaborateOptions;
 use super::names::Names;
 use super::scope::{ScopeId, Scopes};
-use super::{Circuit, Element, ElementId, Kind, NodeId, Tran};
+use super::{Circuit, Element, ElementId, Kind, NodeId};
 use crate::algebra::Value;
 use crate::diagnostic::{Diagnostic, Severity, Span};
 use crate::netlist::Netlist;
 use crate::netlist::ast::{
     self, Assign, Block, Control, Device, Expr, Name, Signal, Statement, Subckt, Wanted,
 };
-use crate::netlist::suggest::nearest;
 
 /// Most elements of a circuit.
 const MAX_ELEMENTS: usize = 1_000_000;
@@ -46,15 +45,15 @@ pub(super) struct Builder<'n, 'o> {
     pub(super) names: Names<'n>,
     pub(super) pending: Vec<Pending<'n>>,
     pub(super) couplings: Vec<PendingCoupling<'n>>,
-    trans: Vec<&'n ast::Tran>,
-    other_analysis: bool,
-    ics: Vec<(ScopeId, &'n [(Signal, Expr)])>,
-    saves: Vec<(ScopeId, &'n [Wanted])>,
+    pub(super) trans: Vec<&'n ast::Tran>,
+    pub(super) other_analysis: bool,
+    pub(super) ics: Vec<(ScopeId, &'n [(Signal, Expr)])>,
+    pub(super) saves: Vec<(ScopeId, &'n [Wanted])>,
     /// Which branch of each `.if` was taken, in the order of the walk.
-    choices: VecDeque<Option<usize>>,
+    pub(super) choices: VecDeque<Option<usize>>,
     /// The subcircuits being expanded, from the outside in.
     nesting: Vec<&'n Subckt>,
-    used: HashSet<Span>,
+    pub(super) used: HashSet<Span>,
     instances: usize,
     /// Model parameters that had no effect, by model.
     pub(super) unused_parameters: Vec<(String, Span)>,
@@ -100,7 +99,7 @@ impl<'n, 'o> Builder<'n, 'o> {
         }
         self.define(&netlist.body, ScopeId::ROOT);
         self.check_overrides();
-        self.circuit.tran = self.tran();
+        self.circuit.tran = self.transient();
         self.elements(&netlist.body, ScopeId::ROOT);
         if self.circuit.elements.is_empty() && read && !self.failed() {
             self.tell(
@@ -132,7 +131,7 @@ impl<'n, 'o> Builder<'n, 'o> {
         self.scopes.findings.tell(finding);
     }
 
-    fn tell_all(&mut self, findings: &[Diagnostic]) {
+    pub(super) fn tell_all(&mut self, findings: &[Diagnostic]) {
         for finding in findings {
             self.tell(finding.clone());
         }
@@ -142,181 +141,18 @@ impl<'n, 'o> Builder<'n, 'o> {
         self.scopes.findings.any_error()
     }
 
-    /// Takes in the definitions of a block and of the branches of its conditionals.
-    fn define(&mut self, block: &'n Block, scope: ScopeId) {
-        for statement in &block.statements {
-            self.define_one(statement, scope);
-        }
-        for statement in &block.statements {
-            let Statement::If(branches) = statement else {
-                continue;
-            };
-            let taken = branches.iter().position(|branch| match &branch.condition {
-                None => true,
-                Some(condition) => self
-                    .scopes
-                    .number(condition, scope)
-                    .is_some_and(|v| super::functions::truth(v.f64)),
-            });
-            self.choices.push_back(taken);
-            if let Some(index) = taken {
-                self.tell_all(&branches[index].body.faults);
-                self.define(&branches[index].body, scope);
-            }
-        }
-    }
-
-    fn define_one(&mut self, statement: &'n Statement, scope: ScopeId) {
-        match statement {
-            Statement::Param(params) => {
-                for Assign { name, value } in params {
-                    if let Some(value) = value
-                        && !self.scopes.define(scope, name, value)
-                    {
-                        let message = format!("parameter `{}` is defined again", name.text);
-                        self.tell(
-                            Diagnostic::warning("duplicate-parameter", name.span, message)
-                                .label("this one counts"),
-                        );
-                    }
-                }
-            }
-            Statement::Func(func) => {
-                self.scopes
-                    .get_mut(scope)
-                    .funcs
-                    .insert(&func.name.text, func);
-            }
-            Statement::Model(model) => {
-                let models = &mut self.scopes.get_mut(scope).models;
-                if models.contains_key(model.name.text.as_str()) {
-                    let message = format!("model `{}` is defined again", model.name.text);
-                    self.tell(
-                        Diagnostic::warning("duplicate-model", model.name.span, message)
-                            .label("ignored: the first one counts"),
-                    );
-                } else {
-                    models.insert(&model.name.text, model);
-                }
-            }
-            Statement::Subckt(subckt) => {
-                let subckts = &mut self.scopes.get_mut(scope).subckts;
-                if subckts.contains_key(subckt.name.text.as_str()) {
-                    let message = format!("subcircuit `{}` is defined again", subckt.name.text);
-                    self.tell(
-                        Diagnostic::warning("duplicate-subcircuit", subckt.name.span, message)
-                            .label("ignored: the first one counts"),
-                    );
-                } else {
-                    subckts.insert(&subckt.name.text, subckt);
-                }
-            }
-            Statement::Global(names) => self
-                .names
-                .globals
-                .extend(names.iter().map(|n| n.text.as_str())),
-            Statement::Tran(tran) => self.trans.push(tran),
-            Statement::Analysis(_) => self.other_analysis = true,
-            Statement::Ic(list) => self.ics.push((scope, list)),
-            Statement::Save(list) => self.saves.push((scope, list)),
-            Statement::Element(_) | Statement::If(_) => {}
-        }
-    }
-
-    fn check_overrides(&mut self) {
-        for (name, _) in &self.options.params {
-            let name = name.to_lowercase();
-            let declared = &self.scopes.get(ScopeId::ROOT).declared;
-            if !declared.contains(name.as_str()) {
-                let fault = Diagnostic::error(
-                    "unknown-parameter",
-                    None,
-                    format!("the netlist has no parameter `{name}` to set"),
-                );
-                let near = nearest(&name, declared.iter().copied());
-                self.tell(match near {
-                    Some(near) => fault.help(format!("did you mean `{near}`?")),
-                    None => fault,
-                });
-            }
-        }
-    }
-
-    /// The transient analysis: the last card, or else the command inside `.control`.
-    fn tran(&mut self) -> Option<Tran> {
-        let cards: Vec<&ast::Tran> = self.trans.iter().copied().filter(|t| !t.command).collect();
-        let tran = *cards.last().or(self.trans.last())?;
-        if cards.len() > 1 {
-            self.tell(
-                Diagnostic::warning("duplicate-tran", tran.span, "more than one `.tran`")
-                    .label("this one counts"),
-            );
-        }
-        let mut times = Vec::with_capacity(4);
-        for arg in &tran.args {
-            times.push(self.scopes.finite(arg, ScopeId::ROOT)?.f64);
-        }
-        let (step, tstop) = if times.len() == 1 {
-            (0.0, times[0])
-        } else {
-            (times[0], times[1])
-        };
-        let tstart = times.get(2).copied().unwrap_or(0.0);
-        if times.iter().any(|t| *t < 0.0) {
-            self.tell(
-                Diagnostic::error("bad-tran", tran.span, "`.tran` has a negative time")
-                    .label("times must not be negative"),
-            );
-            return None;
-        }
-        if tstop <= tstart {
-            let message = format!("`.tran` ends at {tstop} s, not after its start at {tstart} s");
-            let fault =
-                Diagnostic::error("bad-tran", tran.span, message).label("nothing to simulate");
-            self.tell(fault.help("write `.tran tstep tstop`"));
-            return None;
-        }
-        if step > tstop - tstart {
-            let message = "the print step of `.tran` is longer than the run";
-            self.tell(
-                Diagnostic::warning("bad-tran", tran.span, message)
-                    .label("only the first and last point will be written"),
-            );
-        }
-        let tstep = if step > 0.0 {
-            step
-        } else {
-            (tstop - tstart) / 1000.0
-        };
-        let tmax = times.get(3).copied().filter(|t| *t > 0.0);
-        Some(Tran {
-            tstep,
-            tstop,
-            tstart,
-            tmax,
-            uic: tran.uic,
-        })
-    }
-
-    /// Whether `.tran … startup` asks for supplies that ramp up.
-    pub(super) fn startup(&self) -> bool {
-        self.trans.iter().any(|t| t.startup)
-    }
-
     /// Adds the elements of a block, in order.
     fn elements(&mut self, block: &'n Block, scope: ScopeId) {
-        let mut choices = Vec::new();
-        for statement in &block.statements {
-            if let Statement::If(_) = statement {
-                choices.push(self.choices.pop_front().flatten());
-            }
-        }
-        let mut choices = choices.into_iter();
         for statement in &block.statements {
             match statement {
                 Statement::Element(element) => self.element(element, scope),
                 Statement::If(branches) => {
-                    if let Some(branch) = choices.next().flatten().and_then(|i| branches.get(i)) {
+                    if let Some(branch) = self
+                        .choices
+                        .pop_front()
+                        .flatten()
+                        .and_then(|i| branches.get(i))
+                    {
                         self.elements(&branch.body, scope);
                     }
                 }
@@ -469,33 +305,6 @@ impl<'n, 'o> Builder<'n, 'o> {
         self.nesting.pop();
     }
 
-    /// Faults inside subcircuits that nobody uses are worth a warning only.
-    fn report_unused(&mut self, block: &'n Block) {
-        for statement in &block.statements {
-            let Statement::Subckt(subckt) = statement else {
-                continue;
-            };
-            let errors = subckt
-                .body
-                .faults
-                .iter()
-                .filter(|d| d.severity == Severity::Error)
-                .count();
-            if errors > 0 && !self.used.contains(&subckt.name.span) {
-                let first = &subckt.body.faults[0];
-                let message = format!(
-                    "subcircuit `{}`, which is not used, has faults: {}",
-                    subckt.name.text, first.message
-                );
-                let span = first.span.unwrap_or(subckt.name.span);
-                self.tell(
-                    Diagnostic::warning("unused-subcircuit", span, message)
-                        .label(first.label.clone()),
-                );
-            }
-        }
-    }
-
     /// The canonical name of an element.
     pub(super) fn full_name(&self, name: &Name, scope: ScopeId) -> String {
         format!("{}{}", self.scopes.get(scope).prefix, name.text)
@@ -543,13 +352,13 @@ impl<'n, 'o> Builder<'n, 'o> {
         what: &str,
     ) -> Option<ElementId> {
         let found = self.names.expect_element(name, &self.scopes, scope, what);
-        found.map_err(|fault| self.tell(fault)).ok()
+        found.map_err(|fault| self.tell(*fault)).ok()
     }
 
     /// The node a card refers to; reports if there is none.
     pub(super) fn expect_node(&mut self, name: &Name, scope: ScopeId) -> Option<NodeId> {
         let found = self.names.expect_node(name, &self.scopes, scope);
-        found.map_err(|fault| self.tell(fault)).ok()
+        found.map_err(|fault| self.tell(*fault)).ok()
     }
 
     /// Everything that refers to elements and nodes by name.
@@ -569,146 +378,6 @@ impl<'n, 'o> Builder<'n, 'o> {
         }
         for (scope, list) in std::mem::take(&mut self.saves) {
             self.save(list, scope);
-        }
-    }
-
-    /// `.ic`: what it cannot set is ignored with a warning.
-    fn initial(&mut self, list: &'n [(Signal, Expr)], scope: ScopeId) {
-        for (signal, value) in list {
-            let Some(value) = self.scopes.finite(value, scope).map(|v| v.f64) else {
-                continue;
-            };
-            if let Err(fault) = self.initial_one(signal, value, scope) {
-                let message = format!("{}: `.ic` is ignored", fault.message);
-                self.tell(Diagnostic {
-                    severity: Severity::Warning,
-                    message,
-                    ..fault
-                });
-            }
-        }
-    }
-
-    fn initial_one(
-        &mut self,
-        signal: &Signal,
-        value: f64,
-        scope: ScopeId,
-    ) -> Result<(), Diagnostic> {
-        let node = |name| self.names.expect_node(name, &self.scopes, scope);
-        match signal {
-            Signal::Voltage(a, b) => {
-                let a = node(a)?;
-                let b = b.as_ref().map_or(Ok(NodeId::GROUND), node)?;
-                self.circuit.initial_voltages.push((a, b, value));
-            }
-            Signal::Current(name) => {
-                let id = self
-                    .names
-                    .expect_element(name, &self.scopes, scope, "inductor")?;
-                let element = &mut self.circuit.elements[id.index()];
-                if !matches!(element.kind, Kind::Inductor(_)) {
-                    let message = format!("`{}` is not an inductor", name.text);
-                    return Err(
-                        Diagnostic::error("ignored", name.span, message).label("has no state")
-                    );
-                }
-                element.ic = Some(value);
-            }
-        }
-        Ok(())
-    }
-
-    /// A ground node must exist.
-    fn check_ground(&mut self, end: Span) {
-        let grounded = self
-            .circuit
-            .elements
-            .iter()
-            .any(|e| e.p == NodeId::GROUND || e.n == NodeId::GROUND);
-        if !grounded {
-            self.tell(
-                Diagnostic::error("no-ground", end, "the circuit has no ground")
-                    .label("no element is connected to node `0` up to here")
-                    .help("call one node `0` (or `gnd`)"),
-            );
-        }
-    }
-
-    /// Notes on things that are legal and odd.
-    fn note_oddities(&mut self) {
-        let mut terminals = vec![0_usize; self.circuit.nodes.len()];
-        let mut notes = Vec::new();
-        for element in &self.circuit.elements {
-            terminals[element.p.index()] += 1;
-            terminals[element.n.index()] += 1;
-            if element.p == element.n {
-                let message = format!(
-                    "both ends of `{}` are at node `{}`",
-                    element.name,
-                    self.circuit.nodes[element.p.index()]
-                );
-                notes.push(
-                    Diagnostic::note("self-loop", element.span, message)
-                        .label("no current flows through it from outside"),
-                );
-            }
-        }
-        let dangling: Vec<&str> = terminals
-            .iter()
-            .zip(&self.circuit.nodes)
-            .skip(1)
-            .filter_map(|(count, name)| (*count == 1).then_some(name.as_str()))
-            .collect();
-        if !dangling.is_empty() {
-            let shown = dangling
-                .iter()
-                .take(5)
-                .copied()
-                .collect::<Vec<_>>()
-                .join(", ");
-            let more = if dangling.len() > 5 {
-                format!(" and {} more", dangling.len() - 5)
-            } else {
-                String::new()
-            };
-            notes.push(Diagnostic::note(
-                "dangling",
-                None,
-                format!("connected at one end only: node {shown}{more}"),
-            ));
-        }
-        let uic = self.circuit.tran.is_some_and(|t| t.uic);
-        let ignored = self
-            .circuit
-            .elements
-            .iter()
-            .find(|e| e.ic.is_some_and(|ic| ic != 0.0));
-        if let (false, Some(_), Some(element)) = (uic, self.circuit.tran, ignored) {
-            let message = format!(
-                "`IC=` of `{}` has no effect: the run starts from the operating point",
-                element.name
-            );
-            notes.push(
-                Diagnostic::warning("ic-without-uic", element.span, message)
-                    .label("ignored without `uic`")
-                    .help("add `uic` to `.tran`, or set node voltages with `.ic`"),
-            );
-        }
-        for note in notes {
-            self.tell(note);
-        }
-        if !self.unused_parameters.is_empty() {
-            let (_, span) = self.unused_parameters[0];
-            let names: Vec<String> = self
-                .unused_parameters
-                .drain(..)
-                .map(|(name, _)| name)
-                .collect();
-            let message = format!("parameters without effect here: {}", names.join(", "));
-            self.tell(
-                Diagnostic::note("unused-parameters", span, message).label("the first of them"),
-            );
         }
     }
 }

@@ -1,7 +1,7 @@
 //! E, F, G, H, B: controls as affine functions of voltages and currents; K: couplings.
 
 use super::builder::{Builder, Pending};
-use super::eval::Form;
+use super::form::Form;
 use super::names::{current, difference};
 use super::scope::ScopeId;
 use super::{Affine, Coupling, Element, ElementId, Kind, Output};

@@ -8,6 +8,9 @@ use super::{Element, Kind};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{self, Assign, Expr, WaveCall};
 
+#[cfg(test)]
+mod tests;
+
 /// LTspice's `startup`: supplies reach their value after this time, s.
 const STARTUP: f64 = 20e-6;
 
@@ -193,10 +196,7 @@ impl<'n> Builder<'n, '_> {
         }
         // Defaults of omitted values may overlap; only what was written is worth a warning.
         if x.len() > 6 && rise + width + fall > period * (1.0 + 4.0 * f64::EPSILON) {
-            let message = format!(
-                "the pulse lasts {:e} s, longer than its period {period:e} s",
-                rise + width + fall
-            );
+            let message = "rise time, width and fall time add up to more than the period";
             self.tell(
                 Diagnostic::warning("pulse-overfull", call.name.span, message)
                     .label("cut off by the next period"),
@@ -282,10 +282,10 @@ impl<'n> Builder<'n, '_> {
                 );
                 return None;
             }
-            Some(Assign { value, .. }) => match value {
-                Some(value) => Some(self.scopes.finite(value, scope)?.f64).filter(|r| *r >= 0.0),
-                None => None,
-            },
+            Some(Assign {
+                value: Some(value), ..
+            }) => Some(self.scopes.finite(value, scope)?.f64).filter(|r| *r >= 0.0),
+            Some(Assign { value: None, .. }) => None,
         };
         let last = points.last().map_or(0.0, |p| p.0);
         if let Some(from) = repeat.filter(|from| *from >= last) {

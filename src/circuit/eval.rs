@@ -1,100 +1,21 @@
 //! Evaluation of expressions: numbers, and affine forms in the circuit's voltages and currents.
 
+use super::form::Form;
 use super::functions::{self, CallError, truth};
 use super::scope::{Param, ScopeId, Scopes};
-use super::{Affine, Quantity};
 use crate::algebra::Value;
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Binary, Expr, ExprKind, Name, Signal, Unary};
 use crate::netlist::suggest::nearest;
 
 /// Deepest nesting of one evaluation, through parameters and functions.
-const MAX_DEPTH: usize = 600;
+const MAX_DEPTH: usize = 128;
 /// Most operations of all evaluations of a netlist.
 const MAX_STEPS: usize = 20_000_000;
 
-/// `constant + Σ gain · quantity`, exact where the text was.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Form {
-    pub(super) constant: Value,
-    pub(super) terms: Vec<(Value, Quantity)>,
-}
-
-impl Form {
-    pub(super) fn number(value: impl Into<Value>) -> Self {
-        Self {
-            constant: value.into(),
-            terms: Vec::new(),
-        }
-    }
-
-    pub(super) fn is_constant(&self) -> bool {
-        self.terms.is_empty()
-    }
-
-    pub(super) fn into_affine(self) -> Affine {
-        Affine {
-            terms: self.terms,
-            constant: self.constant.f64,
-        }
-    }
-
-    fn negated(self) -> Self {
-        self.scaled(Value::decimal(-1.0, -1, 0))
-    }
-
-    pub(super) fn scaled(mut self, factor: Value) -> Self {
-        self.constant = product(self.constant, factor);
-        for (gain, _) in &mut self.terms {
-            *gain = product(*gain, factor);
-        }
-        self
-    }
-
-    pub(super) fn plus(mut self, other: Self) -> Self {
-        self.constant = sum(self.constant, other.constant);
-        for (gain, quantity) in other.terms {
-            match self.terms.iter_mut().find(|(_, q)| *q == quantity) {
-                Some((own, _)) => *own = sum(*own, gain),
-                None => self.terms.push((gain, quantity)),
-            }
-        }
-        self.terms.retain(|(gain, _)| gain.f64 != 0.0);
-        self
-    }
-}
-
-/// Keeps the decimal where a factor is ±1.
-fn product(a: Value, b: Value) -> Value {
-    match (a.f64, b.f64) {
-        (1.0, _) => b,
-        (_, 1.0) => a,
-        (-1.0, _) => negative(b),
-        (_, -1.0) => negative(a),
-        (x, y) => Value::binary(x * y),
-    }
-}
-
-fn negative(a: Value) -> Value {
-    Value {
-        f64: -a.f64,
-        decimal: a.decimal.map(|(mantissa, exponent)| (-mantissa, exponent)),
-    }
-}
-
-fn sum(a: Value, b: Value) -> Value {
-    if a.f64 == 0.0 {
-        b
-    } else if b.f64 == 0.0 {
-        a
-    } else {
-        Value::binary(a.f64 + b.f64)
-    }
-}
-
 /// Finds the quantity that `v(…)` or `i(…)` means; `None` where only numbers are allowed.
 pub(super) type Resolve<'r, 'n> =
-    Option<&'r dyn Fn(&Signal, &Scopes<'n>, ScopeId) -> Result<Form, Diagnostic>>;
+    Option<&'r dyn Fn(&Signal, &Scopes<'n>, ScopeId) -> Result<Form, Box<Diagnostic>>>;
 
 impl<'n> Scopes<'n> {
     /// The number an expression stands for; `None` after a reported fault.
@@ -147,13 +68,13 @@ impl<'n> Scopes<'n> {
     ) -> Option<Form> {
         self.steps += 1;
         if self.depth >= MAX_DEPTH || self.steps > MAX_STEPS {
-            let message = "this expression never ends, or is far too large".to_string();
-            return self.fault(
-                "too-deep",
-                expr,
-                message,
-                "parameters or functions go in circles",
-            );
+            // Every other term of the same circle would say the same.
+            if !std::mem::replace(&mut self.gave_up, true) {
+                let message = "this expression never ends, or is far too large".to_string();
+                let label = "parameters or functions go in circles";
+                self.fault::<()>("too-deep", expr, message, label);
+            }
+            return None;
         }
         self.depth += 1;
         let form = self.kind(expr, scope, resolve, locals);
@@ -183,7 +104,7 @@ impl<'n> Scopes<'n> {
             ExprKind::Signal(signal) => match resolve.map(|resolve| resolve(signal, self, scope)) {
                 Some(Ok(form)) => Some(form),
                 Some(Err(fault)) => {
-                    self.findings.tell(fault);
+                    self.findings.tell(*fault);
                     None
                 }
                 None => self.fault(
@@ -210,13 +131,33 @@ impl<'n> Scopes<'n> {
                     locals,
                 )
             }
-            ExprKind::Binary(op, x, y) => {
-                let x = self.evaluate(x, scope, resolve, locals);
-                let y = self.evaluate(y, scope, resolve, locals);
-                self.binary(expr, *op, x?, y?)
-            }
+            ExprKind::Binary(..) => self.chain_of_operators(expr, scope, resolve, locals),
             ExprKind::Call(name, args) => self.call(expr, name, args, scope, resolve, locals),
         }
+    }
+
+    /// a + b + c + …: from the left without recursion, as such sums may be long.
+    fn chain_of_operators(
+        &mut self,
+        expr: &'n Expr,
+        scope: ScopeId,
+        resolve: Resolve<'_, 'n>,
+        locals: &[(&'n str, Form)],
+    ) -> Option<Form> {
+        let mut pending = Vec::new();
+        let mut first = expr;
+        while let ExprKind::Binary(op, x, y) = &first.kind {
+            pending.push((first, *op, &**y));
+            first = x;
+        }
+        let mut left = self.evaluate(first, scope, resolve, locals);
+        for (whole, op, y) in pending.into_iter().rev() {
+            let right = self.evaluate(y, scope, resolve, locals);
+            left = left
+                .zip(right)
+                .and_then(|(x, y)| self.binary(whole, op, x, y));
+        }
+        left
     }
 
     /// A part that must be a number; the message names the expression that is not linear.

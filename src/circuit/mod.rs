@@ -2,19 +2,25 @@
 //!
 //! [`elaborate`] fills it from a netlist; nothing here knows SPICE text or matrices.
 
+mod analysis;
+mod audit;
 mod builder;
 mod controlled;
-mod device;
+mod define;
+mod diode;
 mod drive;
 mod elaborate;
 mod eval;
+mod form;
 mod functions;
 pub(crate) mod load;
+mod model;
 mod names;
 mod passive;
 mod probe;
 mod scope;
 pub mod source;
+mod switch;
 
 use crate::algebra::Value;
 use crate::diagnostic::Span;
@@ -249,12 +255,16 @@ impl Circuit {
                 name: format!("v({name})"),
                 what: Probed::Voltage(NodeId(i as u32), NodeId::GROUND),
             });
-        let currents = self.elements.iter().enumerate().filter_map(|(i, e)| {
-            matches!(e.kind, Kind::VoltageSource(_) | Kind::Inductor(_)).then(|| Probe {
+        let shown = |e: &Element| matches!(e.kind, Kind::VoltageSource(_) | Kind::Inductor(_));
+        let currents = self
+            .elements
+            .iter()
+            .enumerate()
+            .filter(|(_, e)| shown(e))
+            .map(|(i, e)| Probe {
                 name: format!("i({})", e.name),
                 what: Probed::Current(ElementId(i as u32)),
-            })
-        });
+            });
         nodes.chain(currents).collect()
     }
 }

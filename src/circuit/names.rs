@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::eval::Form;
+use super::form::Form;
 use super::scope::{ScopeId, Scopes};
 use super::{ElementId, NodeId, Quantity};
 use crate::algebra::Value;
@@ -57,7 +57,7 @@ impl<'n> Names<'n> {
         name: &Name,
         scopes: &Scopes<'n>,
         scope: ScopeId,
-    ) -> Result<NodeId, Diagnostic> {
+    ) -> Result<NodeId, Box<Diagnostic>> {
         let text = name.text.as_str();
         let found = self
             .node(text, scopes, scope)
@@ -76,8 +76,8 @@ impl<'n> Names<'n> {
                     text,
                     self.nodes.keys().filter_map(|n| n.strip_prefix(prefix)),
                 ) {
-                    Some(near) => fault.help(format!("did you mean `{near}`?")),
-                    None => fault,
+                    Some(near) => Box::new(fault.help(format!("did you mean `{near}`?"))),
+                    None => Box::new(fault),
                 }
             })
     }
@@ -89,7 +89,7 @@ impl<'n> Names<'n> {
         scopes: &Scopes<'n>,
         scope: ScopeId,
         what: &str,
-    ) -> Result<ElementId, Diagnostic> {
+    ) -> Result<ElementId, Box<Diagnostic>> {
         let text = name.text.as_str();
         let prefix = scopes.get(scope).prefix.as_str();
         let found = self
@@ -110,8 +110,8 @@ impl<'n> Names<'n> {
                     text,
                     self.elements.keys().filter_map(|n| n.strip_prefix(prefix)),
                 ) {
-                    Some(near) => fault.help(format!("did you mean `{near}`?")),
-                    None => fault,
+                    Some(near) => Box::new(fault.help(format!("did you mean `{near}`?"))),
+                    None => Box::new(fault),
                 }
             })
     }
@@ -122,7 +122,7 @@ impl<'n> Names<'n> {
         signal: &Signal,
         scopes: &Scopes<'n>,
         scope: ScopeId,
-    ) -> Result<Form, Diagnostic> {
+    ) -> Result<Form, Box<Diagnostic>> {
         match signal {
             Signal::Voltage(a, b) => {
                 let a = self.expect_node(a, scopes, scope)?;

@@ -89,6 +89,8 @@ pub(super) struct Scopes<'n> {
     pub(super) depth: usize,
     /// Operations evaluated so far.
     pub(super) steps: usize,
+    /// Whether an evaluation without end was reported.
+    pub(super) gave_up: bool,
 }
 
 impl<'n> Scopes<'n> {
@@ -99,6 +101,7 @@ impl<'n> Scopes<'n> {
             evaluating: Vec::new(),
             depth: 0,
             steps: 0,
+            gave_up: false,
         }
     }
 

@@ -1,5 +1,80 @@
-//! The command line.
+//! The command line: the only code that prints or opens files of results.
 
+pub mod args;
+mod bench;
+mod check;
+mod compare;
+mod cpu;
+pub mod exit;
+mod graph;
+pub mod input;
+mod lcs;
+pub mod ngspice;
+mod op;
+pub mod output;
 mod render;
+pub mod sim;
+pub mod streams;
+
+use std::panic::{self, AssertUnwindSafe};
+
+use clap::Parser;
+use clap::error::ErrorKind;
+
+use args::{Cli, Command};
+use exit::{Exit, Failure};
+use streams::Streams;
 
 pub use render::render;
+
+/// Carries out the command line of this process.
+#[must_use]
+pub fn main() -> Exit {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version go to standard output, usage errors to standard error.
+            let printed = error.print();
+            let asked = matches!(
+                error.kind(),
+                ErrorKind::DisplayHelp | ErrorKind::DisplayVersion
+            );
+            return if asked && printed.map_or_else(|e| Failure::from(e).is_closed_pipe(), |()| true)
+            {
+                Exit::Done
+            } else {
+                Exit::Failed
+            };
+        }
+    };
+    let streams = Streams {
+        quiet: cli.quiet,
+        verbose: cli.verbose,
+    };
+    // A fault of the program itself still ends with the status for "could not be done".
+    let outcome = panic::catch_unwind(AssertUnwindSafe(|| run(&cli.command, &streams)));
+    let outcome = outcome.unwrap_or_else(|_| {
+        let message = "a fault in circ itself (see above); please report it with the netlist";
+        Err(Failure::Message(message.into()))
+    });
+    match outcome {
+        Ok(exit) => exit,
+        Err(failure) if failure.is_closed_pipe() => Exit::Done,
+        Err(failure) => {
+            streams.error(format!("error: {failure}"));
+            Exit::Failed
+        }
+    }
+}
+
+fn run(command: &Command, streams: &Streams) -> Result<Exit, Failure> {
+    match command {
+        Command::Sim(args) => sim::sim(args, streams),
+        Command::Lcs(args) => lcs::lcs(args, streams),
+        Command::Check(args) => check::check(args, streams),
+        Command::Op(args) => op::op(args, streams),
+        Command::Bench(args) => bench::bench(args, streams),
+        Command::Compare(args) => compare::compare(args, streams),
+        Command::Graph(args) => graph::graph(args, streams),
+    }
+}

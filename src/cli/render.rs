@@ -3,8 +3,8 @@
 use std::fmt;
 
 use miette::{
-    GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteError, NamedSource, SourceCode,
-    SourceSpan, SpanContents,
+    GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteError, MietteSpanContents,
+    SourceCode, SourceSpan, SpanContents,
 };
 
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
@@ -49,8 +49,8 @@ impl<'a> Shown<'a> {
             .span
             .and_then(|span| sources.files.get(span.file.0 as usize));
         let source = file.map(|file| WholeLines {
+            path: file.path.clone(),
             text: file.text.clone(),
-            named: NamedSource::new(file.path.clone(), file.text.clone()),
         });
         Self { diagnostic, source }
     }
@@ -102,29 +102,34 @@ impl miette::Diagnostic for Shown<'_> {
 /// A file that shows whole lines around a place, where miette alone would show the place only.
 #[derive(Debug)]
 struct WholeLines {
+    path: String,
     text: String,
-    named: NamedSource<String>,
 }
 
 impl SourceCode for WholeLines {
     fn read_span<'a>(
         &'a self,
         span: &SourceSpan,
-        before: usize,
-        after: usize,
+        _: usize,
+        _: usize,
     ) -> Result<Box<dyn SpanContents<'a> + 'a>, MietteError> {
-        let end = (span.offset() + span.len()).min(self.text.len());
-        let start = self
-            .text
-            .get(..span.offset())
-            .and_then(|t| t.rfind('\n'))
-            .map_or(0, |i| i + 1);
-        let end = self
-            .text
-            .get(end..)
-            .and_then(|t| t.find('\n'))
-            .map_or(self.text.len(), |i| end + i);
-        self.named
-            .read_span(&SourceSpan::from((start, end - start)), before, after)
+        let place = (
+            span.offset(),
+            (span.offset() + span.len()).min(self.text.len()),
+        );
+        let (Some(before), Some(after)) = (self.text.get(..place.0), self.text.get(place.1..))
+        else {
+            return Err(MietteError::OutOfBounds);
+        };
+        let start = before.rfind('\n').map_or(0, |i| i + 1);
+        let end = after.find('\n').map_or(self.text.len(), |i| place.1 + i);
+        Ok(Box::new(MietteSpanContents::new_named(
+            self.path.clone(),
+            &self.text.as_bytes()[start..end],
+            SourceSpan::from((start, end - start)),
+            before.matches('\n').count(),
+            before[start..].chars().count(),
+            self.text.lines().count(),
+        )))
     }
 }

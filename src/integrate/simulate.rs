@@ -5,17 +5,16 @@ use nalgebra::DVector;
 
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::control::Amplitudes;
-use crate::integrate::exact::{self, Exact};
 use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, Stepper, run};
 use crate::integrate::start;
+use crate::integrate::exact::{self, Exact};
 use crate::integrate::step::Scheme;
 use crate::integrate::switching::Threshold;
-use crate::integrate::system::Reduce;
 use crate::integrate::theta::{Setup, Start, Stepping, Theta};
 use crate::integrate::Run;
 use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
-use crate::mna::Behaviour;
-use crate::plan::{Plan, plan};
+use crate::mna::{Behaviour, SwitchPort};
+use crate::plan::{Plan, not_exact, plan};
 use crate::settings::Settings;
 
 /// Integration methods.
@@ -80,36 +79,18 @@ pub fn simulate(
     })?;
     let standard = behaviour.standard();
     let initial = start::initial(circuit, &standard, tran.uic, &options.settings)?;
-    let thresholds: Vec<Threshold> = standard
-        .switches
-        .iter()
-        .map(|s| Threshold {
-            name: s.name.clone(),
-            on_above: s.on_above,
-            off_below: s.off_below,
-        })
-        .collect();
-    let settle: Vec<bool> =
-        standard.switches.iter().map(|s| tran.uic && s.initial.is_none()).collect();
-    let reduce_at = |devices: &[Hold], switches: &[bool]| -> Result<Lcs, SimError> {
-        let position = Position {
-            devices: devices.to_vec(),
-            switches: switches.to_vec(),
-            storage: StorageHold::Dynamic,
-        };
-        reduce(&standard, &position)
-            .map_err(|error| SimError::before(Reason::Circuit(error.to_string())))
-    };
     let mut notes: Vec<String> = behaviour.notes.iter().map(|n| n.message.clone()).collect();
     notes.extend(initial.notes);
     let problem = Problem {
-        reduce: &reduce_at,
-        pairs: standard.pairs.len(),
         position: initial.switches,
-        settle,
-        thresholds,
-        start: Start::Storage(initial.storage),
+        settle: standard
+            .switches
+            .iter()
+            .map(|s| tran.uic && s.initial.is_none())
+            .collect(),
+        start: initial.storage,
         notes,
+        behaviour: standard,
     };
     drive(problem, tran, options)
 }
@@ -120,32 +101,32 @@ pub fn simulate(
 /// See [`Reason`].
 pub fn simulate_system(
     lcs: &Lcs,
-    x: DVector<f64>,
+    x: &DVector<f64>,
     tran: Tran,
     options: SimOptions<'_>,
 ) -> Result<Run, SimError> {
-    let reduce_at = |_: &[Hold], _: &[bool]| Ok(lcs.clone());
+    let behaviour = Behaviour::from_lcs(lcs).standard();
+    let mut start = DVector::zeros(behaviour.storage.len());
+    start.rows_mut(0, x.len()).copy_from(x);
     let problem = Problem {
-        reduce: &reduce_at,
-        pairs: lcs.m(),
-        position: lcs.switches.iter().map(|(_, on)| *on).collect(),
+        position: vec![],
         settle: vec![],
-        thresholds: vec![],
-        start: Start::State(x),
+        start,
         notes: vec![],
+        behaviour,
     };
     drive(problem, tran, options)
 }
 
 /// What the steppers share.
-struct Problem<'p> {
-    reduce: &'p dyn Fn(&[Hold], &[bool]) -> Result<Lcs, SimError>,
-    pairs: usize,
+struct Problem {
+    /// All laws as ideal pairs.
+    behaviour: Behaviour,
     position: Vec<bool>,
     /// Switches whose start position follows from the start state.
     settle: Vec<bool>,
-    thresholds: Vec<Threshold>,
-    start: Start,
+    /// Storage vector s⁻ before the start.
+    start: DVector<f64>,
     notes: Vec<String>,
 }
 
@@ -154,14 +135,43 @@ const SCOUT_STEPS: f64 = 256.0;
 /// The scout gives up after this many steps (trains of many pulses); what it has seen by then is used.
 const SCOUT_LIMIT: u64 = 20_000;
 
-impl Problem<'_> {
-    /// The system with all devices free.
-    fn system(&self, position: &[bool]) -> Result<Lcs, SimError> {
-        (self.reduce)(&vec![Hold::Free; self.pairs], position)
+impl Problem {
+    fn reduce(&self, devices: &[Hold], switches: &[bool]) -> Result<Lcs, SimError> {
+        let position = Position {
+            devices: devices.to_vec(),
+            switches: switches.to_vec(),
+            storage: StorageHold::Dynamic,
+        };
+        reduce(&self.behaviour, &position)
+            .map_err(|error| SimError::before(Reason::Circuit(error.to_string())))
     }
 
-    fn reducer(&self) -> Reduce<'_> {
-        Box::new(move |position: &[bool]| self.system(position))
+    fn free(&self, switches: &[bool]) -> Result<Lcs, SimError> {
+        self.reduce(&vec![Hold::Free; self.behaviour.pairs.len()], switches)
+    }
+
+    fn thresholds(&self) -> Vec<Threshold> {
+        let threshold = |s: &SwitchPort| Threshold {
+            name: s.name.clone(),
+            on_above: s.on_above,
+            off_below: s.off_below,
+        };
+        self.behaviour.switches.iter().map(threshold).collect()
+    }
+
+    fn exact(&self, tran: &Tran, settings: &Settings) -> Result<Exact<'_>, SimError> {
+        Exact::new(exact::Setup {
+            assemble: Box::new(|devices, switches| self.reduce(devices, switches)),
+            pairs: self.behaviour.pairs.len(),
+            position: self.position.clone(),
+            thresholds: self.thresholds(),
+            t: 0.0,
+            until: tran.tstop,
+            start: self.start.clone(),
+            h: tran.tstep,
+            energy: true,
+            settings: settings.clone(),
+        })
     }
 
     fn stepper(
@@ -172,11 +182,11 @@ impl Problem<'_> {
         settings: &Settings,
     ) -> Result<Theta<'_>, SimError> {
         Theta::new(Setup {
-            reduce: self.reducer(),
+            reduce: Box::new(|position| self.free(position)),
             position: self.position.clone(),
-            thresholds: self.thresholds.clone(),
+            thresholds: self.thresholds(),
             t: 0.0,
-            start: self.start.clone(),
+            start: Start::Storage(self.start.clone()),
             scheme,
             stepping,
             longest: tran.tmax.unwrap_or(f64::INFINITY),
@@ -193,10 +203,11 @@ impl Problem<'_> {
             let controls = theta.controls_at_start()?;
             let wanted: Vec<bool> = (0..controls.len())
                 .map(|k| {
-                    if self.settle[k] {
-                        controls[k] > self.thresholds[k].on_above
-                    } else {
-                        self.position[k]
+                    let switch = &self.behaviour.switches[k];
+                    match (self.settle[k], self.position[k]) {
+                        (false, on) => on,
+                        (true, true) => controls[k] >= switch.off_below,
+                        (true, false) => controls[k] > switch.on_above,
                     }
                 })
                 .collect();
@@ -229,7 +240,7 @@ impl Problem<'_> {
     }
 }
 
-fn drive(problem: Problem<'_>, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
+fn drive(problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
     let begin = ThreadTime::now();
     let mut result = dispatch(problem, tran, options);
     let stats = match &mut result {
@@ -242,15 +253,16 @@ fn drive(problem: Problem<'_>, tran: Tran, options: SimOptions<'_>) -> Result<Ru
     result
 }
 
-fn dispatch(
-    mut problem: Problem<'_>,
-    tran: Tran,
-    options: SimOptions<'_>,
-) -> Result<Run, SimError> {
+fn dispatch(mut problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
     check(&tran, &options)?;
     problem.settle_switches(&tran, &options.settings)?;
-    let lcs = problem.system(&problem.position)?;
+    let lcs = problem.free(&problem.position)?;
     let Plan { method, scheme, words } = plan(&lcs, &options);
+    if let (Method::Exact, Some(obstacle)) = (options.method, not_exact(&lcs)) {
+        return Err(SimError::before(Reason::Unsupported(format!(
+            "no exact integration: {obstacle}"
+        ))));
+    }
     let grid = Grid { tstart: tran.tstart, tstep: tran.tstep, tstop: tran.tstop };
     let frame = Frame {
         title: lcs.title.clone(),
@@ -264,28 +276,11 @@ fn dispatch(
     };
     let log = Log::new(frame.names.len(), grid.tstart, options.events);
     if method == Method::Exact {
-        let Start::Storage(start) = problem.start.clone() else {
-            return Err(SimError::before(Reason::Unsupported(NO_MODES.into())));
-        };
-        let mut exact = Exact::new(exact::Setup {
-            assemble: Box::new(|devices: &[Hold], position: &[bool]| {
-                (problem.reduce)(devices, position)
-            }),
-            pairs: problem.pairs,
-            position: problem.position.clone(),
-            thresholds: problem.thresholds.clone(),
-            t: 0.0,
-            until: tran.tstop,
-            start,
-            h: tran.tmax.map_or(tran.tstep, |tmax| tmax.min(tran.tstep)),
-            energy: true,
-            settings: options.settings,
-        })?;
-        return run(&mut exact, frame, log);
+        return run(&mut problem.exact(&tran, &options.settings)?, frame, log);
     }
     let stepping = match options.step {
         Some(h) => Stepping::Fixed(h),
-        None => Stepping::Controlled { span: tran.tstop, first: tran.tstep / FIRST_STEP },
+        None => Stepping::Controlled { span: tran.tstop, first: tran.tstep / 64.0 },
     };
     let mut theta = problem.stepper(&tran, scheme, stepping, &options.settings)?;
     if options.step.is_none()
@@ -295,12 +290,6 @@ fn dispatch(
     }
     run(&mut theta, frame, log)
 }
-
-/// A system file has one set of matrices and no circuit to take the modes from.
-const NO_MODES: &str = "exact integration needs the circuit behind the system; use euler or theta";
-
-/// The first step of the error control is the output step divided by this.
-const FIRST_STEP: f64 = 64.0;
 
 fn check(tran: &Tran, options: &SimOptions<'_>) -> Result<(), SimError> {
     let wrong = |what: &str| Err(SimError::before(Reason::Unsupported(what.into())));

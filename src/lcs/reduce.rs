@@ -630,7 +630,7 @@ impl<F: Field> Solved<F> {
         );
         // x = x_shifted + T u, T the u' columns of x'.
         let t = |i: usize, j: usize| &self.rate[i][n + m + p + j];
-        let mut shifted = |rows: &[Vec<F>], reader: &mut Reader| -> Rows {
+        let shifted = |rows: &[Vec<F>], reader: &mut Reader| -> Rows {
             let count = rows.len();
             let mut out = Rows {
                 x: DMatrix::zeros(count, n),

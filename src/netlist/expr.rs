@@ -6,9 +6,10 @@ use nom::Input as _;
 
 use super::ast::{Binary, Expr, ExprKind, Name, Signal, Unary};
 use super::lex::{
-    Fault, Input, Parsed, ahead, at_end, between, blank, ends_word, mismatch, missing, next_word,
-    refuse, symbol, word,
+    Fault, Input, Parsed, ahead, at_end, between, blank, ends_word, missing, next_word, refuse,
+    symbol,
 };
+use super::operand::{bad_number, braced, quoted};
 use super::value;
 use crate::diagnostic::Diagnostic;
 
@@ -24,185 +25,6 @@ pub(super) fn expr(i: Input<'_>) -> Parsed<'_, Expr> {
         start.extra.state.operators.set(0);
     }
     nested(start, ternary)
-}
-
-/// `{…}` or `'…'`.
-pub(super) fn braced(i: Input<'_>) -> Parsed<'_, Expr> {
-    let start = blank(i);
-    let close = match start.fragment().chars().next() {
-        Some('{') => '}',
-        Some('\'') => '\'',
-        _ => return mismatch(),
-    };
-    let (rest, mut inner) = expr(start.take_from(1))?;
-    let Some(rest) = symbol(rest, close) else {
-        let fault = if at_end(rest) {
-            Diagnostic::error(
-                "unbalanced",
-                ahead(start, 1),
-                format!(
-                    "`{}` is never closed",
-                    start.fragment().chars().next().unwrap_or(close)
-                ),
-            )
-            .label(format!("no `{close}` follows"))
-        } else {
-            Diagnostic::error(
-                "bad-expression",
-                next_word(rest),
-                "this does not continue the expression",
-            )
-            .label("expected an operator here")
-        };
-        return Err(refuse(fault));
-    };
-    inner.span = between(start, rest);
-    Ok((rest, inner))
-}
-
-/// A value on a card: a number, `{…}`, `'…'`, or a bare name.
-pub(super) fn value(i: Input<'_>) -> Parsed<'_, Expr> {
-    let start = blank(i);
-    let (rest, item) = item(start)?;
-    if rest.fragment().starts_with(',')
-        && rest.fragment()[1..].starts_with(|c: char| c.is_ascii_digit())
-    {
-        let (after, _) = word(rest.take_from(1))?;
-        let span = between(start, after);
-        let text = &start.fragment()[..span.end - span.start];
-        return Err(refuse(
-            Diagnostic::error(
-                "decimal-comma",
-                span,
-                format!("`{text}` has a decimal comma"),
-            )
-            .label("not a number")
-            .help(format!("write `{}`", text.replace(',', "."))),
-        ));
-    }
-    Ok((rest, item))
-}
-
-/// The same in a list, where a comma separates.
-pub(super) fn item(i: Input<'_>) -> Parsed<'_, Expr> {
-    let start = blank(i);
-    if start.fragment().starts_with(['{', '\'']) {
-        return braced(start);
-    }
-    if start.fragment().starts_with('"') {
-        return quoted(start);
-    }
-    for sign in ["-", "+"] {
-        if start.fragment().starts_with(sign) && start.fragment()[1..].starts_with(['{', '\'']) {
-            let (rest, inner) = braced(start.take_from(1))?;
-            let span = between(start, rest);
-            let kind = if sign == "-" {
-                ExprKind::Unary(Unary::Minus, Box::new(inner))
-            } else {
-                inner.kind
-            };
-            return Ok((rest, Expr { kind, span }));
-        }
-    }
-    let (rest, name) = word(start)?;
-    let written = &start.fragment()[..name.span.end - name.span.start];
-    if !written.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '+' | '-' | '.')) {
-        return Ok((
-            rest,
-            Expr {
-                kind: ExprKind::Name(name.text),
-                span: name.span,
-            },
-        ));
-    }
-    match value::parse(written) {
-        Ok(value) => Ok((
-            rest,
-            Expr {
-                kind: ExprKind::Number(value),
-                span: name.span,
-            },
-        )),
-        // `-name`: a negated parameter.
-        Err(value::NumberError::NoDigits)
-            if written.len() > 1 && written[1..].starts_with(char::is_alphabetic) =>
-        {
-            let inner = Expr {
-                kind: ExprKind::Name(name.text[1..].to_string()),
-                span: name.span,
-            };
-            let kind = if written.starts_with('-') {
-                ExprKind::Unary(Unary::Minus, Box::new(inner))
-            } else {
-                inner.kind
-            };
-            Ok((
-                rest,
-                Expr {
-                    kind,
-                    span: name.span,
-                },
-            ))
-        }
-        Err(error) => Err(refuse(bad_number(start, written, error))),
-    }
-}
-
-/// A value that may be any text (`mfg=GI`, `type=1N4148x`): what is no number is kept as text.
-pub(super) fn lenient(i: Input<'_>) -> Parsed<'_, Expr> {
-    match value(i) {
-        Err(nom::Err::Failure(Fault::Told(fault)))
-            if fault.code == "bad-number" && !is_braced(i) =>
-        {
-            let (rest, name) = word(i)?;
-            Ok((
-                rest,
-                Expr {
-                    kind: ExprKind::Text(name.text),
-                    span: name.span,
-                },
-            ))
-        }
-        other => other,
-    }
-}
-
-fn is_braced(i: Input<'_>) -> bool {
-    blank(i).fragment().starts_with(['{', '\''])
-}
-
-/// `"…"`: a text.
-pub(super) fn quoted(i: Input<'_>) -> Parsed<'_, Expr> {
-    let start = blank(i);
-    let inner = start.fragment().strip_prefix('"');
-    let Some((inner, length)) = inner.and_then(|text| text.find('"').map(|n| (text, n))) else {
-        return mismatch();
-    };
-    let rest = start.take_from(length + 2);
-    Ok((
-        rest,
-        Expr {
-            kind: ExprKind::Text(inner[..length].to_string()),
-            span: between(start, rest),
-        },
-    ))
-}
-
-fn bad_number(start: Input<'_>, written: &str, error: value::NumberError) -> Diagnostic {
-    let span = ahead(start, written.len());
-    let fault = Diagnostic::error("bad-number", span, format!("`{written}` is not a number"));
-    let value::NumberError::Junk(at) = error else {
-        return fault.label(error.to_string());
-    };
-    let fault = fault.label(format!(
-        "`{}` does not belong to the number",
-        &written[at..]
-    ));
-    if written[at..].starts_with(['*', '/', '+', '-', '^']) {
-        fault.help(format!("put an expression into braces: `{{{written}}}`"))
-    } else {
-        fault.help("write digits, a suffix (t g meg k m u n p f) and a unit: `4.7k`, `4k7`, `10uF`")
-    }
 }
 
 /// Runs a parser one level deeper.
@@ -542,23 +364,20 @@ mod tests {
     #[test]
     fn precedence() {
         for (text, expected) in [
-            ("1+2*3", "(1.0 + (2.0 * 3.0))"),
-            ("2^3+2**2", "((2.0 ^ 3.0) + (2.0 ^ 2.0))"),
-            ("-2^2", "-(2.0 ^ 2.0)"),
-            ("2^-1", "(2.0 ^ -1.0)"),
+            ("1+2*3", "(1 + (2 * 3))"),
+            ("2^3+2**2", "((2 ^ 3) + (2 ^ 2))"),
+            ("-2^2", "-(2 ^ 2)"),
+            ("2^-1", "(2 ^ -1)"),
             ("a - b - c", "((a - b) - c)"),
-            (
-                "a>b ? 1 : c<2 ? 3 : 4",
-                "((a > b) ? 1.0 : ((c < 2.0) ? 3.0 : 4.0))",
-            ),
-            ("a>1 && b<2 || !c", "(((a > 1.0) && (b < 2.0)) || !c)"),
+            ("a>b ? 1 : c<2 ? 3 : 4", "((a > b) ? 1 : ((c < 2) ? 3 : 4))"),
+            ("a>1 && b<2 || !c", "(((a > 1) && (b < 2)) || !c)"),
             (
                 "limit(1k*(V(In+)-V(a,b)), -1, i(X1.R1))",
-                "limit((1000.0 * (v(in+) - v(a,b))), -1.0, i(x1.r1))",
+                "limit((1000 * (v(in+) - v(a,b))), -1, i(x1.r1))",
             ),
-            ("{1/f}*'g'", "((1.0 / f) * g)"),
+            ("{1/f}*'g'", "((1 / f) * g)"),
             ("V(Net-(R1-Pad1), 0)", "v(net-(r1-pad1),0)"),
-            ("1/f b=3", "(1.0 / f) …"),
+            ("1/f b=3", "(1 / f) …"),
         ] {
             assert_eq!(read(text).as_deref(), Ok(expected), "{text}");
         }

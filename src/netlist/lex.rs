@@ -68,8 +68,9 @@ pub(super) fn logical(file: FileId, text: &str, from: usize) -> (Vec<Line>, Vec<
     let mut lines: Vec<Line> = Vec::new();
     let mut orphans = Vec::new();
     for range in physical(text).skip_while(|r| r.start < from) {
-        let kept = &text[range.start..range.start + without_comment(&text[range.clone()])];
-        let indent = kept.len() - kept.trim_start().len();
+        let length = without_comment(&text[range.clone()]);
+        let kept = blanked(&text[range.start..range.start + length]);
+        let indent = kept.len() - kept.trim_start_matches(' ').len();
         if indent == kept.len() {
             continue;
         }
@@ -77,17 +78,18 @@ pub(super) fn logical(file: FileId, text: &str, from: usize) -> (Vec<Line>, Vec<
             lines.push(Line {
                 file,
                 start: range.start,
-                text: blanked(kept),
+                text: kept,
             });
         } else if let Some(line) = lines.last_mut() {
             let gap = range.start - (line.start + line.text.len());
             line.text.extend(std::iter::repeat_n(' ', gap + indent + 1));
-            line.text.push_str(&blanked(&kept[indent + 1..]));
+            line.text.push_str(&kept[indent + 1..]);
         } else {
+            let end = range.start + kept.trim_end_matches(' ').len();
             orphans.push(Span {
                 file,
                 start: range.start + indent,
-                end: range.start + kept.trim_end().len(),
+                end,
             });
         }
     }
@@ -149,6 +151,8 @@ pub(super) struct State {
 pub(super) struct Origin<'a> {
     file: FileId,
     start: usize,
+    /// The whole line.
+    line: &'a str,
     pub(super) state: &'a State,
 }
 
@@ -164,6 +168,7 @@ pub(super) fn input<'a>(line: &'a Line, state: &'a State) -> Input<'a> {
         Origin {
             file: line.file,
             start: line.start,
+            line: &line.text,
             state,
         },
     )
@@ -224,18 +229,21 @@ pub(super) fn ahead(i: Input<'_>, length: usize) -> Span {
     }
 }
 
-/// The place of the word that comes next, or of the end of the line.
+/// The place of the word that comes next; at the end of the card, its last word.
 pub(super) fn next_word(i: Input<'_>) -> Span {
     let i = blank(i);
-    let length = i.fragment().find(' ').unwrap_or(i.fragment().len());
-    let span = ahead(i, length);
-    if length > 0 {
-        span
-    } else {
-        Span {
-            start: span.start.saturating_sub(1),
-            ..span
-        }
+    if !i.fragment().is_empty() {
+        return ahead(i, i.fragment().find(' ').unwrap_or(i.fragment().len()));
+    }
+    let Origin {
+        file, start, line, ..
+    } = i.extra;
+    let used = line.trim_end_matches(' ');
+    let word = used.rfind(' ').map_or(0, |at| at + 1);
+    Span {
+        file,
+        start: start + word,
+        end: start + used.len(),
     }
 }
 

@@ -5,11 +5,14 @@
 //! [`elaborate`](crate::circuit::elaborate) does that.
 
 pub mod ast;
+mod block;
 pub(crate) mod card;
 mod decode;
 mod dot;
 mod expr;
+mod include;
 mod lex;
+mod operand;
 mod read;
 pub(crate) mod suggest;
 pub mod value;

@@ -1,22 +1,15 @@
 //! Files to blocks of cards: includes, libraries, subcircuits, conditionals, `.control`.
 
 use std::io;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 use super::ast::{Block, Branch, Netlist, Statement, Subckt};
+use super::block::{Open, OpenKind};
 use super::dot::{self, Dot};
+use super::include::{lexical, library_sections};
 use super::lex::{Fault, Line, Parsed, State, at_end, input, logical, next_word, title, word};
 use super::{card, decode};
 use crate::diagnostic::{Diagnostic, FileId, Severity, SourceMap, Span};
-
-/// Deepest nesting of includes.
-const MAX_INCLUDES: usize = 32;
-/// Most files in one netlist.
-const MAX_FILES: usize = 512;
-/// Most bytes in one netlist.
-const MAX_BYTES: usize = 256 << 20;
-/// Deepest nesting of `.subckt` and `.if`.
-const MAX_BLOCKS: usize = 64;
 
 /// Reads a netlist: text to cards, includes in place. Never stops at the first fault.
 ///
@@ -31,10 +24,12 @@ pub fn parse(
     let file = &sources.files[root.0 as usize];
     let (path, text) = (PathBuf::from(&file.path), file.text.clone());
     let first = title(&text);
+    let used = text.trim_end();
+    let last_line = used.rfind('\n').map_or(0, |i| i + 1);
     let end = Span {
         file: root,
-        start: text.trim_end().len().saturating_sub(1),
-        end: text.trim_end().len(),
+        start: last_line,
+        end: used.len(),
     };
     let mut netlist = Netlist {
         title: String::new(),
@@ -82,40 +77,26 @@ pub fn parse(
     (netlist, findings)
 }
 
-/// A block being read.
-struct Open {
-    kind: OpenKind,
-    block: Block,
-    span: Span,
-}
-
-enum OpenKind {
-    Root,
-    Subckt(Box<Subckt>),
-    /// The branches read so far; the current one is in `block`, with its condition last here.
-    If(Vec<Branch>),
-}
-
-struct Reader<'a> {
-    sources: &'a mut SourceMap,
-    loader: &'a dyn Fn(&Path) -> io::Result<Vec<u8>>,
-    open: Vec<Open>,
+pub(super) struct Reader<'a> {
+    pub(super) sources: &'a mut SourceMap,
+    pub(super) loader: &'a dyn Fn(&Path) -> io::Result<Vec<u8>>,
+    pub(super) open: Vec<Open>,
     /// The files being read, from the root inwards.
-    files: Vec<PathBuf>,
-    bytes: usize,
+    pub(super) files: Vec<PathBuf>,
+    pub(super) bytes: usize,
     skipped: Vec<(String, Span)>,
     title: Option<String>,
 }
 
 impl Reader<'_> {
     /// Keeps a finding with the block it belongs to.
-    fn tell(&mut self, finding: Diagnostic) {
+    pub(super) fn tell(&mut self, finding: Diagnostic) {
         if let Some(open) = self.open.last_mut() {
             open.block.faults.push(finding);
         }
     }
 
-    fn push(&mut self, statement: Statement) {
+    pub(super) fn push(&mut self, statement: Statement) {
         if let Some(open) = self.open.last_mut() {
             open.block.statements.push(statement);
         }
@@ -162,7 +143,7 @@ impl Reader<'_> {
         }
     }
 
-    fn lines(&mut self, lines: &[Line], path: &Path) {
+    pub(super) fn lines(&mut self, lines: &[Line], path: &Path) {
         let sections = library_sections(lines);
         let mut control = None;
         let mut in_section = false;
@@ -205,14 +186,14 @@ impl Reader<'_> {
             self.keep_findings(&state);
             match parsed {
                 Ok(dot) => return self.dot(dot, line, path),
-                Err(fault) => self.tell(fault),
+                Err(fault) => self.tell(*fault),
             }
         } else {
             let parsed = finish(card::element(start), line);
             self.keep_findings(&state);
             match parsed {
                 Ok(element) => self.push(Statement::Element(element)),
-                Err(fault) => self.tell(fault),
+                Err(fault) => self.tell(*fault),
             }
         }
         true
@@ -236,7 +217,7 @@ impl Reader<'_> {
                 Ok(tran) => self.push(Statement::Tran(tran)),
                 Err(fault) => self.tell(Diagnostic {
                     severity: Severity::Warning,
-                    ..fault
+                    ..*fault
                 }),
             }
         } else if name.text == "op" {
@@ -253,7 +234,7 @@ impl Reader<'_> {
     fn dot(&mut self, dot: Dot, line: &Line, path: &Path) -> bool {
         let span = line.span();
         match dot {
-            Dot::Statement(statement) => self.push(statement),
+            Dot::Statement(statement) => self.push(*statement),
             Dot::Subckt(name, nodes, params) => {
                 let subckt = Subckt {
                     name,
@@ -318,122 +299,6 @@ impl Reader<'_> {
         true
     }
 
-    fn begin(&mut self, kind: OpenKind, span: Span) {
-        if self.open.len() > MAX_BLOCKS {
-            self.tell(
-                Diagnostic::error(
-                    "too-deep",
-                    span,
-                    format!("blocks are nested more than {MAX_BLOCKS} deep"),
-                )
-                .label("too deep here"),
-            );
-            return;
-        }
-        self.open.push(Open {
-            kind,
-            block: Block::default(),
-            span,
-        });
-    }
-
-    fn next_branch(&mut self, condition: Option<super::ast::Expr>, span: Span) {
-        let Some(Open {
-            kind: OpenKind::If(branches),
-            block,
-            ..
-        }) = self.open.last_mut()
-        else {
-            self.tell(
-                Diagnostic::error("unexpected", span, "`.else` without `.if`")
-                    .label("no `.if` is open here"),
-            );
-            return;
-        };
-        let after_else = branches.last().is_some_and(|b| b.condition.is_none());
-        if let Some(last) = branches.last_mut() {
-            last.body = std::mem::take(block);
-        }
-        branches.push(Branch {
-            condition,
-            body: Block::default(),
-        });
-        if after_else {
-            self.tell(
-                Diagnostic::error("unexpected", span, "a branch after `.else`")
-                    .label("`.else` must be the last branch"),
-            );
-        }
-    }
-
-    fn ends(&mut self, name: Option<&super::ast::Name>, span: Span) {
-        match self.open.last() {
-            Some(Open {
-                kind: OpenKind::Subckt(subckt),
-                ..
-            }) => {
-                if let Some(name) = name.filter(|n| n.text != subckt.name.text) {
-                    let message = format!(
-                        "`.ends {}` closes subcircuit `{}`",
-                        name.text, subckt.name.text
-                    );
-                    self.close();
-                    self.tell(
-                        Diagnostic::warning("ends-mismatch", name.span, message)
-                            .label("another name"),
-                    );
-                } else {
-                    self.close();
-                }
-            }
-            _ => self.tell(
-                Diagnostic::error("unexpected", span, "`.ends` without `.subckt`")
-                    .label("no subcircuit is open here"),
-            ),
-        }
-    }
-
-    /// Closes the innermost block into the one around it.
-    fn close(&mut self) {
-        if self.open.len() < 2 {
-            return;
-        }
-        let Some(open) = self.open.pop() else { return };
-        match open.kind {
-            OpenKind::Root => {}
-            OpenKind::Subckt(mut subckt) => {
-                subckt.body = open.block;
-                self.push(Statement::Subckt(*subckt));
-            }
-            OpenKind::If(mut branches) => {
-                if let Some(last) = branches.last_mut() {
-                    last.body = open.block;
-                }
-                self.push(Statement::If(branches));
-            }
-        }
-    }
-
-    /// Closes what the file left open, each with an error.
-    fn close_all(&mut self) {
-        while self.open.len() > 1 {
-            let fault = self.open.last().map(|open| match &open.kind {
-                OpenKind::Subckt(subckt) => Diagnostic::error(
-                    "unterminated",
-                    open.span,
-                    format!("subcircuit `{}` is never closed", subckt.name.text),
-                )
-                .label("no `.ends` follows"),
-                _ => Diagnostic::error("unterminated", open.span, "`.if` is never closed")
-                    .label("no `.endif` follows"),
-            });
-            self.close();
-            if let (Some(fault), Some(root)) = (fault, self.open.first_mut()) {
-                root.block.faults.push(fault);
-            }
-        }
-    }
-
     fn note_skipped(&mut self) {
         let Some(&(_, span)) = self.skipped.first() else {
             return;
@@ -455,166 +320,26 @@ impl Reader<'_> {
         };
         self.tell(Diagnostic::note("skipped", span, message).label(label));
     }
-
-    /// `.lib path`, `.lib path section`; a path may contain blanks.
-    fn lib(&mut self, file: &dot::Path, path: &Path) {
-        match &file.section {
-            Some((short, section))
-                if self.find(&file.whole, path).is_none() && self.find(short, path).is_some() =>
-            {
-                self.include(short, Some(section), file.span, path);
-            }
-            Some((short, section)) if short == &file.whole => {
-                self.include(short, Some(section), file.span, path)
-            }
-            _ => self.include(&file.whole, None, file.span, path),
-        }
-    }
-
-    /// The path and text of an included file, tried relative to the including one, with `\` as `/` too.
-    fn find(&self, written: &str, from: &Path) -> Option<(PathBuf, Vec<u8>)> {
-        let folder = from.parent().unwrap_or(Path::new(""));
-        let slashes = written.replace('\\', "/");
-        [written, slashes.as_str()].into_iter().find_map(|name| {
-            let path = lexical(&folder.join(name));
-            (self.loader)(&path).ok().map(|bytes| (path, bytes))
-        })
-    }
-
-    fn include(&mut self, written: &str, section: Option<&String>, span: Span, from: &Path) {
-        let Some((path, bytes)) = self.find(written, from) else {
-            self.tell(
-                Diagnostic::warning("missing-file", span, format!("cannot read `{written}`"))
-                    .label("left out")
-                    .help("what it defines may be missing further on"),
-            );
-            return;
-        };
-        if self.files.contains(&path) {
-            self.tell(
-                Diagnostic::error("include-loop", span, format!("`{written}` includes itself"))
-                    .label("already being read"),
-            );
-            return;
-        }
-        self.bytes += bytes.len();
-        if self.files.len() > MAX_INCLUDES
-            || self.sources.files.len() > MAX_FILES
-            || self.bytes > MAX_BYTES
-        {
-            let message = format!(
-                "too many included files (more than {MAX_INCLUDES} deep, {MAX_FILES} in all, or {MAX_BYTES} bytes)"
-            );
-            self.tell(Diagnostic::error("too-deep", span, message).label("not read"));
-            return;
-        }
-        let text = decode::decode(&bytes);
-        let file = self.sources.add(path.to_string_lossy(), text.clone());
-        let whole = Span {
-            file,
-            start: 0,
-            end: title(&text).end,
-        };
-        if let Some(foreign) = decode::foreign(&text, whole).filter(|d| d.code != "empty") {
-            self.tell(foreign);
-            return;
-        }
-        let (lines, orphans) = logical(file, &text, 0);
-        for span in orphans {
-            self.tell(Diagnostic::error(
-                "unexpected",
-                span,
-                "there is no card to continue",
-            ));
-        }
-        self.files.push(path.clone());
-        match section {
-            None => self.lines(&lines, &path),
-            Some(section) => match library_section(&lines, section) {
-                Some(part) => self.lines(part, &path),
-                None => self.tell(
-                    Diagnostic::error(
-                        "missing-section",
-                        span,
-                        format!("`{written}` has no section `{section}`"),
-                    )
-                    .label("no `.lib` with this name in the file"),
-                ),
-            },
-        }
-        self.files.pop();
-    }
 }
 
 /// The result of a card's parser as a result with a diagnostic; a card must be read to its end.
-fn finish<T>(parsed: Parsed<'_, T>, line: &Line) -> Result<T, Diagnostic> {
+fn finish<T>(parsed: Parsed<'_, T>, line: &Line) -> Result<T, Box<Diagnostic>> {
     match parsed {
         Ok((rest, value)) if at_end(rest) => Ok(value),
-        Ok((rest, _)) => Err(Diagnostic::error(
-            "unexpected",
-            next_word(rest),
-            "this does not belong to the card",
-        )
-        .label("unexpected")),
+        Ok((rest, _)) => Err(Box::new(
+            Diagnostic::error(
+                "unexpected",
+                next_word(rest),
+                "this does not belong to the card",
+            )
+            .label("unexpected"),
+        )),
         Err(nom::Err::Failure(Fault::Told(fault)) | nom::Err::Error(Fault::Told(fault))) => {
-            Err(*fault)
+            Err(fault)
         }
-        Err(_) => Err(
+        Err(_) => Err(Box::new(
             Diagnostic::error("bad-card", line.span(), "this is no card")
                 .label("expected an element or a directive"),
-        ),
+        )),
     }
-}
-
-/// The name of a `.lib name` line.
-fn section_name(line: &Line) -> Option<String> {
-    let mut words = line.text.split_whitespace();
-    let directive = words.next()?;
-    let name = words.next()?;
-    (directive.eq_ignore_ascii_case(".lib") && words.next().is_none())
-        .then(|| name.trim_matches(['"', '\'']).to_lowercase())
-}
-
-fn is_end_of_section(line: &Line) -> bool {
-    line.text.trim().to_lowercase().starts_with(".endl")
-}
-
-/// Lines that begin a section of a library: `.lib name` with an `.endl` before the next one.
-fn library_sections(lines: &[Line]) -> Vec<usize> {
-    let mut starts = Vec::new();
-    let mut candidate = None;
-    for (index, line) in lines.iter().enumerate() {
-        if is_end_of_section(line) {
-            starts.extend(candidate.take());
-        } else if section_name(line).is_some() {
-            candidate = Some(index);
-        }
-    }
-    starts
-}
-
-/// The lines of one section of a library.
-fn library_section<'l>(lines: &'l [Line], name: &str) -> Option<&'l [Line]> {
-    let start = library_sections(lines)
-        .into_iter()
-        .find(|&i| section_name(&lines[i]).as_deref() == Some(name))?;
-    let length = lines[start + 1..].iter().position(is_end_of_section)?;
-    Some(&lines[start + 1..start + 1 + length])
-}
-
-/// A path without `.` and, where possible, without `..`.
-fn lexical(path: &Path) -> PathBuf {
-    let mut out = PathBuf::new();
-    for part in path.components() {
-        match part {
-            Component::CurDir => {}
-            Component::ParentDir
-                if matches!(out.components().next_back(), Some(Component::Normal(_))) =>
-            {
-                out.pop();
-            }
-            part => out.push(part),
-        }
-    }
-    out
 }

@@ -112,8 +112,8 @@ pub fn maximise(face: &Face) -> Outcome {
     let rho = RADIUS * p0.amax().max(1.0) * n.max(1) as f64;
     let blocks = [
         Block {
-            constant: f0,
-            linear: f,
+            constant: f0.clone(),
+            linear: f.to_vec(),
             t: -1.0,
         },
         Block {

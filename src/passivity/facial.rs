@@ -24,13 +24,17 @@ const EXPOSED: f64 = 1e-5;
 /// Eigenvalues of F at a solution (relative to the largest) that count as zero when the exposed face is sharpened.
 const NEARLY_NULL: f64 = 1e-7;
 
-/// The affine set of P = P₀ + Σ zₖEₖ and the subspace W on which F(z) = −WᵀQ(P)W must still be made positive definite.
+/// A margin problem: F(z) = F₀ + Σ zₖFₖ and P(z) = P₀ + Σ zₖPₖ, both to be made positive definite.
+///
+/// After facial reduction z is a part of the original unknowns: original = `z0` + `directions`·z.
 #[derive(Debug, Clone)]
 pub struct Face {
-    system: System,
+    f0: DMatrix<f64>,
+    f: Vec<DMatrix<f64>>,
     p0: DMatrix<f64>,
-    basis: Vec<DMatrix<f64>>,
-    w: DMatrix<f64>,
+    p: Vec<DMatrix<f64>>,
+    z0: DVector<f64>,
+    directions: DMatrix<f64>,
 }
 
 /// The kernel equalities have no solution.
@@ -54,8 +58,34 @@ fn symmetric_basis(u: &DMatrix<f64>) -> Vec<DMatrix<f64>> {
         .collect()
 }
 
+/// M₀ + Σ zₖMₖ.
+fn affine(m0: &DMatrix<f64>, m: &[DMatrix<f64>], z: &DVector<f64>) -> DMatrix<f64> {
+    m.iter()
+        .zip(z.iter())
+        .fold(m0.clone(), |sum, (mk, &zk)| sum + mk * zk)
+}
+
 impl Face {
-    /// The solutions of PBN = CᵀN, N = ker(D + Dᵀ), of a balanced system.
+    /// The whole problem, nothing reduced yet.
+    #[must_use]
+    pub fn new(
+        f0: DMatrix<f64>,
+        f: Vec<DMatrix<f64>>,
+        p0: DMatrix<f64>,
+        p: Vec<DMatrix<f64>>,
+    ) -> Self {
+        let unknowns = f.len();
+        Self {
+            f0,
+            f,
+            p0,
+            p,
+            z0: DVector::zeros(unknowns),
+            directions: DMatrix::identity(unknowns, unknowns),
+        }
+    }
+
+    /// F = −WᵀQ(P)W over the solutions of PBN = CᵀN, N = ker(D + Dᵀ), W its complement; of a balanced system.
     pub(super) fn kernel(system: &System) -> Result<Self, Inconsistent> {
         let (n, m) = (system.n(), system.m());
         let (values, vectors) = scale::eigen(&(&system.d + system.d.transpose()));
@@ -72,48 +102,65 @@ impl Face {
         w.view_mut((0, 0), (n, n)).fill_with_identity();
         w.view_mut((n, n), (m, rest.len()))
             .copy_from(&vectors.select_columns(&rest));
-        Ok(Self {
-            system: system.clone(),
+        let at = |p: &DMatrix<f64>| -(w.transpose() * lmi::matrix(system, p) * &w);
+        let zero = at(&DMatrix::zeros(n, n));
+        let p = symmetric_basis(&u2);
+        Ok(Self::new(
+            at(&p0),
+            p.iter().map(|e| at(e) - &zero).collect(),
             p0,
-            basis: symmetric_basis(&u2),
-            w,
-        })
+            p,
+        ))
+    }
+
+    /// The same face with its own unknowns as the original ones.
+    pub(super) fn rebased(&self) -> Self {
+        Self::new(
+            self.f0.clone(),
+            self.f.clone(),
+            self.p0.clone(),
+            self.p.clone(),
+        )
     }
 
     /// Number of free unknowns z.
     #[must_use]
     pub fn unknowns(&self) -> usize {
-        self.basis.len()
+        self.f.len()
     }
 
-    /// P(z) = P₀ + Σ zₖEₖ.
+    /// The original unknowns of a z.
+    #[must_use]
+    pub fn original(&self, z: &DVector<f64>) -> DVector<f64> {
+        &self.z0 + &self.directions * z
+    }
+
+    /// P(z).
     #[must_use]
     pub fn p(&self, z: &DVector<f64>) -> DMatrix<f64> {
-        self.basis
-            .iter()
-            .zip(z.iter())
-            .fold(self.p0.clone(), |p, (e, &z)| p + e * z)
+        affine(&self.p0, &self.p, z)
+    }
+
+    /// F(z).
+    #[must_use]
+    pub fn f(&self, z: &DVector<f64>) -> DMatrix<f64> {
+        affine(&self.f0, &self.f, z)
     }
 
     /// The constant and linear parts of P.
     pub(super) fn p_parts(&self) -> (&DMatrix<f64>, &[DMatrix<f64>]) {
-        (&self.p0, &self.basis)
+        (&self.p0, &self.p)
     }
 
-    /// The constant and linear parts of F(z) = −WᵀQ(P(z))W.
-    pub(super) fn f_parts(&self) -> (DMatrix<f64>, Vec<DMatrix<f64>>) {
-        let at = |p: &DMatrix<f64>| -(self.w.transpose() * lmi::matrix(&self.system, p) * &self.w);
-        let zero = at(&DMatrix::zeros(self.p0.nrows(), self.p0.nrows()));
-        (
-            at(&self.p0),
-            self.basis.iter().map(|e| at(e) - &zero).collect(),
-        )
+    /// The constant and linear parts of F.
+    pub(super) fn f_parts(&self) -> (&DMatrix<f64>, &[DMatrix<f64>]) {
+        (&self.f0, &self.f)
     }
 
-    /// The projector onto the eigenvectors of −WᵀQ(P)W that nearly vanish: a sharper exposing matrix than the dual.
-    pub(super) fn nearly_null(&self, p: &DMatrix<f64>) -> DMatrix<f64> {
-        let f = -(self.w.transpose() * lmi::matrix(&self.system, p) * &self.w);
-        let (values, vectors) = scale::eigen(&f);
+    /// The projector onto the eigenvectors of F(z) that nearly vanish: a sharper exposing matrix than the dual.
+    #[must_use]
+    pub fn nearly_null(&self, z: &DVector<f64>) -> DMatrix<f64> {
+        let (values, vectors) = scale::eigen(&self.f(z));
         let top = values.amax();
         let null: Vec<usize> = (0..values.len())
             .filter(|&i| values[i] < NEARLY_NULL * top)
@@ -124,7 +171,8 @@ impl Face {
 
     /// The smaller face that a dual solution X ⪰ 0 with ⟨X, F(z)⟩ = 0 exposes: F(z)V = 0 for V = range X.
     /// `None` if nothing is exposed or the equalities have no solution.
-    pub(super) fn expose(&self, dual: &DMatrix<f64>) -> Option<Self> {
+    #[must_use]
+    pub fn expose(&self, dual: &DMatrix<f64>) -> Option<Self> {
         let (values, vectors) = scale::eigen(dual);
         let top = values.iter().copied().last().filter(|&v| v > 0.0)?;
         let exposed: Vec<usize> = (0..values.len())
@@ -134,10 +182,9 @@ impl Face {
             .filter(|&i| values[i] <= EXPOSED * top)
             .collect();
         let v = vectors.select_columns(&exposed);
-        let (f0, f) = self.f_parts();
-        let rhs = -(f0 * &v);
-        let mut columns = DMatrix::zeros(rhs.len(), f.len());
-        for (k, fk) in f.iter().enumerate() {
+        let rhs = -(&self.f0 * &v);
+        let mut columns = DMatrix::zeros(rhs.len(), self.f.len());
+        for (k, fk) in self.f.iter().enumerate() {
             columns.set_column(k, &DVector::from_column_slice((fk * &v).as_slice()));
         }
         let parts = scale::split(&columns, scale::RANK);
@@ -147,20 +194,23 @@ impl Face {
             return None;
         }
         let z0 = &parts.row_space * along.component_div(&parts.values);
-        let basis = (0..parts.kernel.ncols())
-            .map(|k| {
-                let zero = DMatrix::zeros(self.p0.nrows(), self.p0.nrows());
-                self.basis
-                    .iter()
-                    .zip(parts.kernel.column(k).iter())
-                    .fold(zero, |p, (e, &z)| p + e * z)
-            })
-            .collect();
+        let free = |m: &[DMatrix<f64>]| -> Vec<DMatrix<f64>> {
+            let zero = m.first().map_or_else(|| DMatrix::zeros(0, 0), |m| m * 0.0);
+            parts
+                .kernel
+                .column_iter()
+                .map(|direction| affine(&zero, m, &direction.into_owned()))
+                .collect()
+        };
+        let w = vectors.select_columns(&kept);
+        let restrict = |m: &DMatrix<f64>| w.transpose() * m * &w;
         Some(Self {
-            system: self.system.clone(),
+            f0: restrict(&self.f(&z0)),
+            f: free(&self.f).iter().map(restrict).collect(),
             p0: self.p(&z0),
-            basis,
-            w: &self.w * vectors.select_columns(&kept),
+            p: free(&self.p),
+            z0: self.original(&z0),
+            directions: &self.directions * &parts.kernel,
         })
     }
 }

@@ -7,6 +7,9 @@ use super::{System, facial, scale, verify};
 /// Residual, relative to the terms it is the difference of, at which PB = Cᵀ counts as satisfied.
 pub const RESIDUAL: f64 = 1e-9;
 
+/// States beyond which only the candidate is tried: constructing P takes a full singular value decomposition.
+const LARGEST: usize = 200;
+
 /// max |PB − Cᵀ| relative to |P||B| + |C|ᵀ, entry by entry (0 where both vanish).
 #[must_use]
 pub fn residual(p: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> f64 {
@@ -39,6 +42,9 @@ pub fn storage(
     }
     // A has no say here: balance B against C alone.
     let (n, m) = b.shape();
+    if n > LARGEST {
+        return None;
+    }
     let system = System {
         a: DMatrix::zeros(n, n),
         b: b.clone(),

@@ -1,14 +1,14 @@
 //! The passivity matrix (45), its sign convention, and its solution by facial reduction and a barrier.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::barrier::{self, Outcome};
 use super::facial::{Face, Inconsistent};
 use super::{Certificate, Origin, System, Witness, scale, verify};
 
 /// Unknowns of the barrier beyond which the matrix inequality is not attempted: its cost grows with their cube
-/// (NUMERICS C: 500 unknowns take seconds).
-pub const MAX_UNKNOWNS: usize = 500;
+/// (300 unknowns take seconds).
+pub const MAX_UNKNOWNS: usize = 300;
 
 /// Rounds of exposing vectors after the kernel equalities.
 const ROUNDS: usize = 4;
@@ -69,7 +69,7 @@ pub(super) fn solve_with(
     maximise: impl Fn(&Face) -> Outcome,
 ) -> Result<Certificate, Unsolved> {
     let balanced = scale::balance(system);
-    let mut face = match Face::kernel(&balanced.system) {
+    let face = match Face::kernel(&balanced.system) {
         Ok(face) => face,
         Err(Inconsistent::Witness(witness)) => {
             let witness = witness.unbalanced(&balanced);
@@ -84,63 +84,62 @@ pub(super) fn solve_with(
         }
         Err(Inconsistent::Rounding(reason)) => return Err(Unsolved::Open(reason)),
     };
-    let kernel = face.clone();
+    let units = balanced.states.map(f64::recip);
+    search(&face, maximise, |z| {
+        let p = scale::scaled(&face.p(z), &units, &units);
+        let residuals = verify::check(system, &p).map_err(|failure| failure.to_string())?;
+        Ok(Certificate {
+            p,
+            from: Origin::Lmi,
+            residuals,
+        })
+    })
+    .map_err(Unsolved::Open)
+}
+
+/// Looks for z with F(z) ⪰ 0 and P(z) ≻ 0 that `accept` accepts: the largest margin, then a smaller face where that
+/// margin is zero. `accept` decides on the z of the given face.
+///
+/// # Errors
+/// Where the search ended, in words.
+pub(crate) fn search<T>(
+    whole: &Face,
+    maximise: impl Fn(&Face) -> Outcome,
+    accept: impl Fn(&DVector<f64>) -> Result<T, String>,
+) -> Result<T, String> {
+    if whole.unknowns() > MAX_UNKNOWNS {
+        return Err(format!(
+            "the inequality has {} unknowns, more than the {MAX_UNKNOWNS} attempted",
+            whole.unknowns()
+        ));
+    }
+    let whole = whole.rebased();
+    let mut face = whole.clone();
     for round in 0..=ROUNDS {
-        if face.unknowns() > MAX_UNKNOWNS {
-            return Err(Unsolved::Open(format!(
-                "the passivity inequality has {} unknowns, more than the {MAX_UNKNOWNS} attempted",
-                face.unknowns()
-            )));
-        }
         let outcome = maximise(&face);
-        let p = scale::scaled(
-            &face.p(outcome.unknowns()),
-            &balanced.states.map(f64::recip),
-            &balanced.states.map(f64::recip),
-        );
-        let failure = match verify::check(system, &p) {
-            Ok(residuals) => {
-                return Ok(Certificate {
-                    p,
-                    from: Origin::Lmi,
-                    residuals,
-                });
-            }
+        let z = face.original(outcome.unknowns());
+        let failure = match accept(&z) {
+            Ok(found) => return Ok(found),
             Err(failure) => failure,
         };
-        match outcome {
-            Outcome::Boundary { dual, margin, .. } => {
-                let Some(smaller) = face.expose(&dual) else {
-                    return Err(Unsolved::Open(format!(
-                        "the passivity inequality is feasible at best with margin {margin:.1e}, and its solution \
-                         is not confirmed: {failure}"
-                    )));
-                };
-                face = smaller;
-            }
-            Outcome::Interior { z, .. } => {
-                // The exposed face is known to the accuracy of the dual only: sharpen it by what F vanishes on.
-                if let Some(sharper) = kernel
-                    .expose(&kernel.nearly_null(&face.p(&z)))
-                    .filter(|_| round < ROUNDS)
-                {
-                    face = sharper;
-                    continue;
-                }
-                return Err(Unsolved::Open(format!(
-                    "the solution found for the passivity inequality is not confirmed: {failure}"
-                )));
-            }
+        face = match outcome {
+            Outcome::Boundary { dual, margin, .. } => face.expose(&dual).ok_or_else(|| {
+                format!("the inequality is feasible at best with margin {margin:.1e}, not confirmed: {failure}")
+            })?,
+            // The exposed face is known to the accuracy of the dual only: sharpen it by what F vanishes on.
+            Outcome::Interior { .. } => whole
+                .expose(&whole.nearly_null(&z))
+                .ok_or_else(|| format!("the solution found for the inequality is not confirmed: {failure}"))?,
             Outcome::Infeasible { margin, .. } => {
-                return Err(Unsolved::Open(format!(
-                    "the passivity inequality has margin {margin:.1e} < 0 after {round} rounds of facial reduction, \
-                     but no violation was confirmed"
-                )));
+                return Err(format!(
+                    "the inequality has margin {margin:.1e} < 0 after {round} rounds of facial reduction, but no \
+                     violation was confirmed"
+                ));
             }
-            Outcome::Stalled { reason, .. } => return Err(Unsolved::Open(reason.into())),
-        }
+            Outcome::Stalled { reason, .. } => return Err(reason.into()),
+        };
     }
-    Err(Unsolved::Open(format!(
-        "the passivity inequality is still not strictly feasible after {ROUNDS} exposing rounds"
-    )))
+    Err(format!(
+        "the inequality is still not strictly feasible after {ROUNDS} exposing rounds"
+    ))
 }

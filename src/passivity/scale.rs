@@ -221,6 +221,9 @@ pub(crate) fn complement(q: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// Whether M can be inverted to about ten digits after equilibration of rows and columns.
 pub(crate) fn well_conditioned(m: &DMatrix<f64>) -> bool {
+    if m.is_empty() {
+        return true;
+    }
     let mut m = m.clone();
     for _ in 0..4 {
         for i in 0..m.nrows() {

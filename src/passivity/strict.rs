@@ -7,6 +7,9 @@ use super::{Origin, System, facial, lmi, scale, verify, witness};
 /// Relative width at which the bisection on the rate stops.
 const WIDTH: f64 = 1e-6;
 
+/// States beyond which the rate is only computed for the given P.
+const LARGEST: usize = 30;
+
 /// Unknowns beyond which the rate is only maximised for the given P, not over all P.
 const MAX_UNKNOWNS: usize = 60;
 
@@ -21,8 +24,6 @@ pub struct Strict {
     pub p: DMatrix<f64>,
     /// Where P comes from.
     pub from: Origin,
-    /// An upper bound on every rate: −max Re eig(A).
-    pub limit: f64,
 }
 
 /// √(‖P‖/λ_min(P)), the constant of RR-7158 Theorems 3 and 4.
@@ -38,29 +39,34 @@ pub fn overshoot(p: &DMatrix<f64>) -> f64 {
 /// The largest rate α for which (A + αI, B, C, D) is verified passive, starting from a certificate P of α = 0.
 ///
 /// # Cost
-/// About 25 verifications for the given P and as many solutions of the matrix inequality.
+/// One eigenvalue problem and one verification for the given P; up to 30 states also about 25 solutions of (45).
 #[must_use]
 pub fn maximise(system: &System, p: &DMatrix<f64>, from: Origin) -> Strict {
-    let limit = -witness::eigenvalues(&system.a)
-        .iter()
-        .map(|s| s.re)
-        .fold(f64::NEG_INFINITY, f64::max);
     let mut best = Strict {
         decay_rate: 0.0,
         bound: overshoot(p),
         p: p.clone(),
         from,
-        limit,
     };
-    if system.n() == 0 || !(limit.is_finite() && limit > 0.0) {
+    if system.n() == 0 {
         return best;
     }
-    best.decay_rate = bisect(0.0, limit, limit, |alpha| {
-        verify::check(&system.shifted(alpha), p)
-            .is_ok()
-            .then_some(())
-    })
-    .map_or(0.0, |(alpha, ())| alpha);
+    let certified = |alpha: f64| alpha > 0.0 && verify::check(&system.shifted(alpha), p).is_ok();
+    if let Some(rate) = fixed(system, p)
+        && certified(rate * (1.0 - WIDTH))
+    {
+        best.decay_rate = rate * (1.0 - WIDTH);
+    }
+    if system.n() > LARGEST {
+        return best;
+    }
+    let limit = -witness::eigenvalues(&system.a)
+        .iter()
+        .map(|s| s.re)
+        .fold(f64::NEG_INFINITY, f64::max);
+    if !(limit.is_finite() && limit > 0.0) {
+        return best;
+    }
     // Only what the equalities on ker(D + Dᵀ) leave free can give a larger rate.
     let free =
         facial::Face::kernel(&scale::balance(system).system).map_or(0, |face| face.unknowns());
@@ -78,10 +84,33 @@ pub fn maximise(system: &System, p: &DMatrix<f64>, from: Origin) -> Strict {
             bound: overshoot(&certificate.p),
             p: certificate.p,
             from: Origin::Lmi,
-            limit,
         };
     }
     best
+}
+
+/// The largest α with Q(P) + 2α diag(P, 0) ⪯ 0 for this P: ½ λ_min of −(Q₁₁ − Q₁₂Q₂₂⁺Q₂₁) in the metric P.
+fn fixed(system: &System, p: &DMatrix<f64>) -> Option<f64> {
+    let (n, m) = (system.n(), system.m());
+    let q = lmi::matrix(system, p);
+    let coupling = q.view((0, n), (n, m)).into_owned();
+    let (values, vectors) = scale::eigen(&q.view((n, n), (m, m)).into_owned());
+    let size = values.amax();
+    let lossy: Vec<usize> = (0..values.len())
+        .filter(|&k| values[k].abs() > scale::RANK * size)
+        .collect();
+    let reach = coupling * vectors.select_columns(&lossy);
+    let inverse = DMatrix::from_diagonal(&values.select_rows(&lossy).map(f64::recip));
+    let loss = &reach * inverse * reach.transpose() - q.view((0, 0), (n, n));
+    let lower = p.clone().cholesky()?.l();
+    let half = lower.solve_lower_triangular(&loss)?;
+    let metric = lower.solve_lower_triangular(&half.transpose())?;
+    scale::eigen(&metric)
+        .0
+        .iter()
+        .copied()
+        .next()
+        .map(|v| 0.5 * v)
 }
 
 /// The largest α in (low, high] that `certify` accepts, to relative width of `scale`, with what it returned.

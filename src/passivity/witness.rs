@@ -15,6 +15,9 @@ type C = Complex<f64>;
 /// it. Larger: weakly active networks are not recognised; smaller: rounding is taken for activity.
 const ENTRIES: f64 = 1e-11;
 
+/// States beyond which only the feedthrough is searched: the sweep takes hundreds of factorisations.
+const LARGEST: usize = 150;
+
 /// Points of the frequency sweep per decade.
 const PER_DECADE: usize = 6;
 
@@ -275,9 +278,15 @@ pub fn search(system: &System) -> Option<Witness> {
         let witness = witness.unbalanced(&balanced);
         witness.verify(system).then_some(witness)
     };
-    feedthrough(&balanced.system)
-        .and_then(accept)
-        .or_else(|| unstable(&balanced.system).into_iter().find_map(accept))
+    if let Some(witness) = feedthrough(&balanced.system).and_then(accept) {
+        return Some(witness);
+    }
+    if system.n() > LARGEST {
+        return None;
+    }
+    unstable(&balanced.system)
+        .into_iter()
+        .find_map(accept)
         .or_else(|| sweep(&balanced.system, accept))
 }
 

@@ -21,6 +21,7 @@ import numpy as np
 HERE = pathlib.Path(__file__).resolve().parent
 NETLISTS = HERE.parent.parent / "netlists"
 ROWS = 400
+OPTIONS = "reltol=1e-4 abstol=1n vntol=1u"
 
 
 def version():
@@ -45,20 +46,11 @@ def run(text, folder):
         deck, out = pathlib.Path(tmp) / "deck.cir", pathlib.Path(tmp) / "out.raw"
         deck.write_text(text)
         result = subprocess.run(
-            ["ngspice", "-b", "-r", str(out), str(deck)],
+            ["ngspice", "-n", "-b", "-r", str(out), str(deck)],
             cwd=folder, capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=600)
         if result.returncode != 0 or not out.exists():
             raise SystemExit(f"ngspice: {result.returncode}\n{result.stdout[-2000:]}{result.stderr[-2000:]}")
         return raw(out)
-
-
-def write(path, header, names, rows):
-    with path.open("w", newline="\n") as f:
-        f.writelines(f"# {line}\n" for line in header)
-        f.write(",".join(names) + "\n")
-        for row in rows:
-            f.write(",".join(repr(float(x)) if i == 0 else f"{x:.9g}" for i, x in enumerate(row)) + "\n")
-    print(path.relative_to(HERE.parent.parent), len(rows), "rows")
 
 
 def digest(path):
@@ -84,5 +76,55 @@ def sources():
     print(path.relative_to(HERE.parent.parent), len(rows), "rows")
 
 
+def seconds(word):
+    """A SPICE number."""
+    number, suffix = re.fullmatch(r"([-+0-9.e]+?)(meg|[tgkmunpf])?", word.lower()).groups()
+    return float(number) * {None: 1, "t": 1e12, "g": 1e9, "meg": 1e6, "k": 1e3, "m": 1e-3, "u": 1e-6, "n": 1e-9,
+                            "p": 1e-12, "f": 1e-15}[suffix]
+
+
+def column(names, values, probe):
+    """`v(a)`, `v(a,b)` or `i(l1)` from ngspice's columns."""
+    def one(name):
+        if name == "v(0)":
+            return 0.0
+        alias = re.sub(r"^i\((.*)\)$", r"\1#branch", name)
+        return values[:, names.index(name if name in names else alias if alias in names else f"i({name[2:-1]})")]
+
+    pair = re.fullmatch(r"v\((.*),(.*)\)", probe)
+    return one(f"v({pair[1]})") - one(f"v({pair[2]})") if pair else one(probe)
+
+
+def netlist(name):
+    path = NETLISTS / f"{name}.cir"
+    text = path.read_text()
+    probes = re.findall(r"^\*CIRC compare (\S+)", text, re.M)
+    words = re.search(r"^\.tran (.*)$", text, re.M)[1].split()
+    step, stop = seconds(words[0]), seconds(words[1])
+    count = round(stop / step)
+    stride = -(-count // ROWS)
+    grid = [k * step for k in range(0, count + 1, stride)]
+    deck = re.sub(r"^\.save.*\n", "", text, flags=re.M)
+    deck = re.sub(r"^\.end$", f".options {OPTIONS}\n.end", deck, flags=re.M)
+    names, values = run(deck, NETLISTS)
+    times = values[:, 0]
+    columns = [np.interp(grid, times, column(names, values, probe)) for probe in probes]
+    out = HERE / f"{name}.csv"
+    with out.open("w", newline="\n") as f:
+        f.write(f"# {version()}, .options {OPTIONS}, {len(times)} points, every {stride} print steps by straight lines\n")
+        f.write(f"# netlist {name}.cir sha256 {digest(path)}\n")
+        f.write(f"# tests/reference/make.py {name}\n")
+        f.write("time," + ",".join(f'"{p}"' if "," in p else p for p in probes) + "\n")
+        for k, row in enumerate(zip(*columns)):
+            f.write(f"{grid[k]:.12g}," + ",".join(f"{x:.7g}" for x in row) + "\n")
+    print(f"{out.relative_to(HERE.parent.parent)}: {len(grid)} rows of {len(times)} points")
+
+
+def comparable():
+    return [p.stem for p in sorted(NETLISTS.glob("*.cir")) if "*CIRC compare" in p.read_text()]
+
+
 if __name__ == "__main__":
-    sources()
+    wanted = sys.argv[1:] or sys.exit(__doc__)
+    for what in ["sources", *comparable()] if wanted == ["all"] else wanted:
+        sources() if what == "sources" else netlist(what)

@@ -81,7 +81,9 @@ impl Inspector {
                     * f64::EPSILON
                     * row.iter().enumerate().map(|(j, r)| (r * size(j)).abs()).sum::<f64>();
             }
-            noise[0] += time * value[1].abs();
+            for k in 0..ORDERS - 1 {
+                noise[k] += time * value[k + 1].abs();
+            }
             let first = (0..ORDERS).find(|&k| value[k].abs() > noise[k]);
             if first.is_some_and(|k| value[k] < 0.0) {
                 match i.checked_sub(mode.device_guards) {

@@ -28,11 +28,6 @@ impl Kernel {
         Self { rows, columns, blocks }
     }
 
-    /// Number of rows.
-    pub(crate) fn rows(&self) -> usize {
-        self.rows
-    }
-
     /// y = K w; `w` must have one value per column, `y` one per row.
     #[inline]
     pub(crate) fn apply(&self, w: &[f64], y: &mut [f64]) {

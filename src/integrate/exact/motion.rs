@@ -91,11 +91,6 @@ impl Motion {
         self.refresh_noise(flow);
     }
 
-    /// x.
-    pub(crate) fn state(&self, n: usize) -> &[f64] {
-        &self.now[..n]
-    }
-
     fn refresh_noise(&mut self, flow: &Flow) {
         for (a, v) in self.amplitude.iter_mut().zip(&self.now) {
             *a = a.max(v.abs());
@@ -105,6 +100,11 @@ impl Motion {
             *floor += slack;
         }
         self.since_refresh = 0;
+    }
+
+    /// Largest value a combination of states can have had on the way here.
+    pub(crate) fn reach<'r>(&self, row: impl IntoIterator<Item = &'r f64>) -> f64 {
+        row.into_iter().zip(&self.amplitude).map(|(c, a)| (c * a).abs()).sum()
     }
 
     /// Moves to `stop` or to the first guard that falls through zero before it.

@@ -1,7 +1,10 @@
 //! The event-driven stepper: travel in a mode, find the next one, repeat.
 
-use nalgebra::DVector;
+use std::collections::BTreeMap;
 
+use nalgebra::{DMatrix, DVector};
+
+use super::accumulation::Accumulation;
 use super::exosystem::Exosystem;
 use super::free::Degenerate;
 use super::inspect::{Finding, Inspector};
@@ -23,6 +26,11 @@ const PROPOSALS: [f64; 7] = [1e-6, 1e-4, 1e-8, 1e-2, 1e-10, 1.0, 1e2];
 const MOST_NEIGHBOURS: usize = 400;
 /// Events at one instant after which modes already left there are not entered again.
 const PATIENCE: usize = 2;
+
+/// Movements of the storage below this part of its amplitude are rounding and no jump.
+const ROUNDING: f64 = 1e-12;
+/// Estimated relative loss of an exponential above which it is reported.
+const LOSS: f64 = 1e-10;
 
 /// What a run of the exact integrator starts from.
 pub struct Setup<'a> {
@@ -68,8 +76,8 @@ pub struct Exact<'a> {
     /// Modes left at the present instant.
     left_here: Vec<usize>,
     instant: f64,
-    transitions: std::collections::BTreeMap<(usize, usize), usize>,
-    metric: nalgebra::DMatrix<f64>,
+    transitions: BTreeMap<(usize, usize), usize>,
+    metric: DMatrix<f64>,
     started: bool,
     settings: Settings,
     balance: Balance,
@@ -77,6 +85,8 @@ pub struct Exact<'a> {
     jumps: u64,
     lcp_solves: u64,
     notes: Vec<String>,
+    accumulation: Accumulation,
+    noted_shared: bool,
     row: Vec<f64>,
 }
 
@@ -86,7 +96,7 @@ impl<'a> Exact<'a> {
     /// # Errors
     /// The reduction's for the start position; sources that no finite linear system generates.
     pub fn new(setup: Setup<'a>) -> Result<Self, SimError> {
-        let Setup { assemble, pairs, position, thresholds, t, until, start, h, energy, settings } = setup;
+        let Setup { assemble, pairs, mut position, thresholds, t, until, start, h, energy, settings } = setup;
         let mut plant = Plant::new(assemble, pairs, thresholds, h, energy, settings.lcp_residual);
         let lcs = plant.free(&position)?.lcs.clone();
         let sources: Vec<Source> = lcs.inputs.iter().map(|i| i.source.clone()).collect();
@@ -96,6 +106,11 @@ impl<'a> Exact<'a> {
             ))
         })?;
         plant.driven = (0..plant.thresholds.len()).map(|i| is_driven(&lcs, i)).collect();
+        for i in (0..position.len()).filter(|&i| plant.driven[i]) {
+            let values = sources.iter().enumerate().map(|(j, s)| lcs.controls.u[(i, j)] * s.value(t));
+            let control = lcs.controls.one[i] + values.sum::<f64>();
+            position[i] = plant.thresholds[i].position(position[i], control);
+        }
         let schedule = schedule(&lcs, &plant, &sources, &position, t, until);
         let volts = lcs.storage.names.iter().map(|name| name.starts_with('v')).collect();
         let metric = lcs.storage.metric.clone();
@@ -116,7 +131,7 @@ impl<'a> Exact<'a> {
             scheduled: 0,
             left_here: Vec::new(),
             instant: t,
-            transitions: std::collections::BTreeMap::new(),
+            transitions: BTreeMap::new(),
             metric,
             started: false,
             settings,
@@ -125,6 +140,8 @@ impl<'a> Exact<'a> {
             jumps: 0,
             lcp_solves: 0,
             notes: Vec::new(),
+            accumulation: Accumulation::new(t),
+            noted_shared: false,
             row: vec![0.0; columns],
         };
         exact.rescale();
@@ -169,7 +186,12 @@ impl<'a> Exact<'a> {
     /// Reads the storage vector at the current state.
     fn take_storage(&mut self) {
         if let Some(at) = self.mode {
-            self.plant.modes[at].storage_at(&self.motion.now, &mut self.storage);
+            let mode = &self.plant.modes[at];
+            mode.storage_at(&self.motion.now, &mut self.storage);
+            // An event often finds a current at zero: its size is what it was on the way.
+            for (i, scale) in self.scale.iter_mut().enumerate() {
+                *scale = scale.max(self.motion.reach(mode.storage.row(i).columns(0, mode.n)));
+            }
             self.rescale();
             let [source, dissipated] = std::mem::take(&mut self.motion.energy);
             self.balance.add((source, dissipated));
@@ -249,7 +271,6 @@ impl<'a> Exact<'a> {
             self.read_row();
         }
         let left_row = (wants_rows && self.started).then(|| self.row.clone());
-        let storage_before = self.storage.clone();
         let mut jumped = false;
         let mut positions = vec![key.switches.clone()];
         let mut entry = None;
@@ -295,7 +316,6 @@ impl<'a> Exact<'a> {
         let Inspector { x, amplitude, .. } = &self.inspector;
         self.motion.enter(&mode.flow, &self.exosystem, t, x, amplitude);
         if jumped {
-            let _ = &storage_before;
             self.jumps += 1;
         }
         if let Some(row) = left_row.filter(|_| !same || jumped) {
@@ -318,7 +338,7 @@ impl<'a> Exact<'a> {
         })?;
         let x = free.state_from(&self.storage);
         let found = free.jump(&x, &u).map_err(|_| SimError::at(t, Reason::Infeasible))?;
-        self.lcp_solves += 1;
+        self.lcp_solves += u64::from(free.lcs.m() > 0);
         let (after, p) = match found {
             Some(jump) => (jump.x, jump.p),
             None => (x.clone(), DVector::zeros(free.lcs.m())),
@@ -338,8 +358,6 @@ impl<'a> Exact<'a> {
         let old = DVector::from_column_slice(&self.storage);
         let gain = 0.5 * (s.dot(&(&self.metric * &s)) - old.dot(&(&self.metric * &old)));
         self.balance.add((source, source - gain));
-        /// Movements below this part of the amplitude are rounding.
-        const ROUNDING: f64 = 1e-12;
         let moved = s.iter().zip(&self.storage).zip(&self.scale).any(|((a, b), scale)| {
             (a - b).abs() > ROUNDING * scale.max(a.abs())
         });
@@ -444,9 +462,18 @@ impl<'a> Exact<'a> {
                 }
             }
             self.events += 1;
+            self.notes.extend(self.accumulation.event(self.motion.t));
         }
         if jumped {
             words.push("jump".to_string());
+        }
+        if self.plant.modes[at].shared && !self.noted_shared {
+            self.noted_shared = true;
+            self.notes.push(format!(
+                "at t = {:e} s the ideal model leaves a current among conducting devices or a voltage among blocking ones \
+                 undetermined: the least-norm choice is shown",
+                self.motion.t
+            ));
         }
         if !words.is_empty() {
             log.event(self.motion.t, words.join(", "));
@@ -473,7 +500,7 @@ impl<'a> Exact<'a> {
 /// Whether a switch's control is a combination of sources alone.
 fn is_driven(lcs: &Lcs, i: usize) -> bool {
     let rows = &lcs.controls;
-    let zero = |m: &nalgebra::DMatrix<f64>| i >= m.nrows() || m.row(i).iter().all(|v| *v == 0.0);
+    let zero = |m: &DMatrix<f64>| i >= m.nrows() || m.row(i).iter().all(|v| *v == 0.0);
     zero(&rows.x) && zero(&rows.lambda) && zero(&rows.du)
 }
 
@@ -550,6 +577,14 @@ impl Stepper for Exact<'_> {
     }
 
     fn finish(&mut self) -> Outcome {
+        self.take_storage();
+        self.notes.extend(self.accumulation.end());
+        let loss = self.plant.modes.iter().map(|m| m.flow.loss).fold(0.0, f64::max);
+        if loss > LOSS {
+            self.notes.push(format!(
+                "the circuit is stiff without being graded: the matrix exponential is accurate to about {loss:.0e} a step"
+            ));
+        }
         let mut outcome = Outcome { notes: std::mem::take(&mut self.notes), ..Outcome::default() };
         outcome.stats.steps = self.motion.steps;
         outcome.stats.events = self.events;
@@ -557,7 +592,6 @@ impl Stepper for Exact<'_> {
         outcome.stats.modes = self.plant.modes.len() as u64;
         outcome.stats.lcp_solves = self.lcp_solves;
         outcome.stats.factorisations = self.plant.factorisations();
-        self.take_storage();
         outcome.energy = self.balance.energy();
         outcome
     }

@@ -2,9 +2,10 @@
 
 use nom::Input as _;
 
-use super::{Body, assigns, expect_value, expr, nodes, numbers};
+use super::{Body, assigns, expect_value, nodes, numbers};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Control, Device, Expr, ExprKind, Name};
+use crate::netlist::expr;
 use crate::netlist::lex::{
     Input, Parsed, between, expect_word, missing, refuse, separator, symbol, word,
 };

@@ -2,12 +2,13 @@
 
 use nom::Input as _;
 
-use super::{Body, assignment_follows, assigns, describe, expr, nodes};
+use super::{Body, assignment_follows, assigns, describe, nodes};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Control, Device, Name};
 use crate::netlist::lex::{
     Input, Parsed, ahead, at_end, expect_word, missing, node, refuse, separator, symbol, word,
 };
+use crate::netlist::operand;
 
 /// `D1 a k model [area] [off] [ic=…]`.
 pub(super) fn diode<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
@@ -15,7 +16,7 @@ pub(super) fn diode<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
     let (at, model) = expect_word(at, "the model name")?;
     let numeric = blank_number(at) && !assignment_follows(at);
     let (at, area) = if numeric {
-        let (at, value) = expr::value(at)?;
+        let (at, value) = operand::value(at)?;
         (at, Some(value))
     } else {
         (at, None)

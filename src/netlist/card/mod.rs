@@ -8,10 +8,10 @@ mod source;
 use nom::Input as _;
 
 use super::ast::{Assign, Device, Element, Name};
-use super::expr;
 use super::lex::{
     Fault, Input, Parsed, ahead, at_end, blank, end, missing, node, refuse, separator, symbol, word,
 };
+use super::operand;
 use crate::diagnostic::Diagnostic;
 
 /// What an element letter stands for, as `a resistor`.
@@ -145,9 +145,9 @@ pub(super) fn assign(i: Input<'_>) -> Parsed<'_, Assign> {
     };
     let list = name.text.starts_with("tc");
     let (mut next, value) = if list {
-        expr::item(rest)
+        operand::item(rest)
     } else {
-        expr::lenient(rest)
+        operand::lenient(rest)
     }
     .map_err(|e| {
         if e == nom::Err::Error(Fault::Mismatch) {
@@ -158,7 +158,7 @@ pub(super) fn assign(i: Input<'_>) -> Parsed<'_, Assign> {
     })?;
     while list && let Some(comma) = symbol(next, ',') {
         rest = comma;
-        next = expr::item(rest)?.0;
+        next = operand::item(rest)?.0;
     }
     Ok((
         next,
@@ -197,7 +197,7 @@ fn numbers<'a>(i: Input<'a>, what: &str) -> Parsed<'a, Vec<super::ast::Expr>> {
         } else if at_end(at) || assignment_follows(at) {
             return Ok((at, all));
         } else {
-            let (rest, value) = expr::item(at).map_err(|e| match e {
+            let (rest, value) = operand::item(at).map_err(|e| match e {
                 nom::Err::Error(_) => missing(at, what),
                 e => e,
             })?;
@@ -217,7 +217,7 @@ fn keyword<'a>(i: Input<'a>, text: &str) -> Option<Input<'a>> {
 
 /// A value that is expected; the message says what it should be.
 fn expect_value<'a>(i: Input<'a>, what: &str) -> Parsed<'a, super::ast::Expr> {
-    expr::value(i).map_err(|e| match e {
+    operand::value(i).map_err(|e| match e {
         nom::Err::Error(_) => missing(i, what),
         e => e,
     })

@@ -2,19 +2,20 @@
 
 use nom::Input as _;
 
-use super::{Body, assignment_follows, assigns, expr, nodes};
+use super::{Body, assignment_follows, assigns, nodes};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Device, Expr, ExprKind, Name};
 use crate::netlist::lex::{
     Input, Parsed, ahead, at_end, missing, next_word, refuse, separator, tell,
 };
+use crate::netlist::operand;
 
 /// `R1 a b 1k`, `R1 a b R=1k`, `R1 a b {r} model tc1=…`.
 pub(super) fn passive<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
     let (mut at, nodes) = nodes(i, 2, "node")?;
     let mut values: Vec<Expr> = Vec::new();
     while values.len() < 2 && !at_end(at) && !assignment_follows(at) {
-        let (rest, value) = expr::value(at).map_err(|e| match e {
+        let (rest, value) = operand::value(at).map_err(|e| match e {
             nom::Err::Error(_) => missing(at, "a value"),
             e => e,
         })?;
@@ -42,7 +43,7 @@ pub(super) fn passive<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
 }
 
 /// Capital suffixes that SPICE reads otherwise than people do: 1M Ω is 1 mΩ, 1F is 1 fF.
-fn warn_of_suffix(at: Input<'_>, name: &Name, value: &Expr) {
+pub(super) fn warn_of_suffix(at: Input<'_>, name: &Name, value: &Expr) {
     let at = separator(at);
     let ExprKind::Number(number) = &value.kind else {
         return;
@@ -66,6 +67,11 @@ fn warn_of_suffix(at: Input<'_>, name: &Name, value: &Expr) {
             "femto",
             format!("write `{digits}` for {digits} F, `{digits}f` for {digits} fF"),
         ),
+        (Some('v' | 'i'), 'A') => (
+            "suffix-a",
+            "atto",
+            format!("write `{digits}` for {digits} A"),
+        ),
         _ => return,
     };
     let message = format!("`{written}` is {digits} {}", finding.1);
@@ -88,7 +94,7 @@ pub(super) fn coupling<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
         } else if at_end(at) {
             break;
         } else {
-            let (rest, value) = expr::item(at).map_err(|e| match e {
+            let (rest, value) = operand::item(at).map_err(|e| match e {
                 nom::Err::Error(_) => missing(at, "an inductor or the coefficient"),
                 e => e,
             })?;

@@ -1,11 +1,13 @@
 //! V and I: a DC value, a waveform, an AC specification (ignored) in any order.
 
-use super::{Body, assign, assignment_follows, expect_value, expr, keyword, nodes};
+use super::passive::warn_of_suffix;
+use super::{Body, assign, assignment_follows, expect_value, keyword, nodes};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Assign, Device, Name, WaveArg, WaveCall};
 use crate::netlist::lex::{
     Input, Parsed, ahead, at_end, missing, next_word, refuse, separator, symbol, tell, word,
 };
+use crate::netlist::operand;
 
 /// Waveforms, supported or only recognised.
 const WAVES: [&str; 12] = [
@@ -17,7 +19,7 @@ const WAVES: [&str; 12] = [
 const FLAGS: [&str; 3] = ["load", "distof1", "distof2"];
 
 /// `V1 a b DC 5 AC 1 SIN(0 5 50) Rser=1`.
-pub(super) fn source<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
+pub(super) fn source<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
     let (mut at, nodes) = nodes(i, 2, "node")?;
     let (mut dc, mut wave, mut args) = (None, None, Vec::new());
     loop {
@@ -42,7 +44,9 @@ pub(super) fn source<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
                 at = rest;
                 continue;
             }
-            let (rest, value) = expect_value(rest, "the DC value")?;
+            let before = rest;
+            let (rest, value) = expect_value(before, "the DC value")?;
+            warn_of_suffix(before, name, &value);
             (at, dc) = (rest, Some(value));
         } else if let Some(rest) = keyword(at, "ac") {
             at = skip_ac(symbol(rest, '=').unwrap_or(rest));
@@ -66,6 +70,7 @@ pub(super) fn source<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
                         .help(format!("waveforms are {known}")),
                 ));
             }
+            warn_of_suffix(at, name, &value);
             (at, dc) = (rest, Some(value));
         } else {
             return Ok((at, (nodes, Device::Source { dc, wave, args })));
@@ -89,7 +94,7 @@ fn skip_ac(mut at: Input<'_>) -> Input<'_> {
         {
             break;
         }
-        let Ok((rest, _)) = expr::item(start) else {
+        let Ok((rest, _)) = operand::item(start) else {
             break;
         };
         at = rest;
@@ -204,7 +209,7 @@ fn repeat<'a>(at: Input<'a>, args: &mut Vec<Assign>) -> Parsed<'a, ()> {
 
 fn argument<'a>(at: Input<'a>, list: &mut Vec<WaveArg>) -> Parsed<'a, ()> {
     let plus = at.fragment().starts_with('+');
-    let (rest, value) = expr::item(at).map_err(|e| match e {
+    let (rest, value) = operand::item(at).map_err(|e| match e {
         nom::Err::Error(_) => missing(at, "a number"),
         e => e,
     })?;

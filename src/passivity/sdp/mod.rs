@@ -76,7 +76,7 @@ fn maximise(face: &Face) -> Outcome {
     let rows = fq + fp + 1 + 2 * unknowns;
     // s = b − A(z, t) ∈ K with s = (F − tI, P − tI, 1 − t, ρ ± z).
     let mut a = DMatrix::zeros(rows, unknowns + 1);
-    let mut b = triangle(&f0);
+    let mut b = triangle(f0);
     b.extend(triangle(p0));
     b.push(1.0);
     b.extend(std::iter::repeat_n(

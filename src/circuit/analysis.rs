@@ -1,0 +1,117 @@
+//! `.tran` and `.ic`.
+
+use super::builder::Builder;
+use super::scope::ScopeId;
+use super::{Kind, NodeId, Tran};
+use crate::diagnostic::{Diagnostic, Severity};
+use crate::netlist::ast::{self, Expr, Signal};
+
+impl<'n> Builder<'n, '_> {
+    /// The transient analysis: the last card, or else the command inside `.control`.
+    pub(super) fn transient(&mut self) -> Option<Tran> {
+        let cards: Vec<&ast::Tran> = self.trans.iter().copied().filter(|t| !t.command).collect();
+        let tran = *cards.last().or(self.trans.last())?;
+        if cards.len() > 1 {
+            self.tell(
+                Diagnostic::warning("duplicate-tran", tran.span, "more than one `.tran`")
+                    .label("this one counts"),
+            );
+        }
+        let mut times = Vec::with_capacity(4);
+        for arg in &tran.args {
+            times.push(self.scopes.finite(arg, ScopeId::ROOT)?.f64);
+        }
+        let (step, tstop) = if times.len() == 1 {
+            (0.0, times[0])
+        } else {
+            (times[0], times[1])
+        };
+        let tstart = times.get(2).copied().unwrap_or(0.0);
+        if times.iter().any(|t| *t < 0.0) {
+            self.tell(
+                Diagnostic::error("bad-tran", tran.span, "`.tran` has a negative time")
+                    .label("times must not be negative"),
+            );
+            return None;
+        }
+        if tstop <= tstart {
+            let message = format!("`.tran` ends at {tstop} s, not after its start at {tstart} s");
+            let fault =
+                Diagnostic::error("bad-tran", tran.span, message).label("nothing to simulate");
+            self.tell(fault.help("write `.tran tstep tstop`"));
+            return None;
+        }
+        if step > tstop - tstart {
+            let message = "the print step of `.tran` is longer than the run";
+            self.tell(
+                Diagnostic::warning("bad-tran", tran.span, message)
+                    .label("only the first and last point will be written"),
+            );
+        }
+        let tstep = if step > 0.0 {
+            step
+        } else {
+            (tstop - tstart) / 1000.0
+        };
+        let tmax = times.get(3).copied().filter(|t| *t > 0.0);
+        Some(Tran {
+            tstep,
+            tstop,
+            tstart,
+            tmax,
+            uic: tran.uic,
+        })
+    }
+
+    /// Whether `.tran … startup` asks for supplies that ramp up.
+    pub(super) fn startup(&self) -> bool {
+        self.trans.iter().any(|t| t.startup)
+    }
+
+    /// `.ic`: what it cannot set is ignored with a warning.
+    pub(super) fn initial(&mut self, list: &'n [(Signal, Expr)], scope: ScopeId) {
+        for (signal, value) in list {
+            let Some(value) = self.scopes.finite(value, scope).map(|v| v.f64) else {
+                continue;
+            };
+            if let Err(fault) = self.initial_one(signal, value, scope) {
+                let message = format!("{}: `.ic` is ignored", fault.message);
+                self.tell(Diagnostic {
+                    severity: Severity::Warning,
+                    message,
+                    ..*fault
+                });
+            }
+        }
+    }
+
+    fn initial_one(
+        &mut self,
+        signal: &Signal,
+        value: f64,
+        scope: ScopeId,
+    ) -> Result<(), Box<Diagnostic>> {
+        let node = |name| self.names.expect_node(name, &self.scopes, scope);
+        match signal {
+            Signal::Voltage(a, b) => {
+                let a = node(a)?;
+                let b = b.as_ref().map_or(Ok(NodeId::GROUND), node)?;
+                self.circuit.initial_voltages.push((a, b, value));
+            }
+            Signal::Current(name) => {
+                let id = self
+                    .names
+                    .expect_element(name, &self.scopes, scope, "inductor")?;
+                let element = &mut self.circuit.elements[id.index()];
+                if !matches!(element.kind, Kind::Inductor(_)) {
+                    let message = format!("`{}` is not an inductor", name.text);
+                    return Err(Box::new(
+                        Diagnostic::error("ignored", name.span, message).label("has no state"),
+                    ));
+                }
+                element.ic = Some(value);
+            }
+        }
+        Ok(())
+    }
+}

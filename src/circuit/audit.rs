@@ -1,0 +1,139 @@
+//! What is legal and odd, or missing, once the whole circuit is known.
+
+use super::builder::Builder;
+use super::{Kind, NodeId, Quantity};
+use crate::diagnostic::{Diagnostic, Severity, Span};
+use crate::netlist::ast::{Block, Statement};
+
+impl<'n> Builder<'n, '_> {
+    /// Faults inside subcircuits that nobody uses are worth a warning only.
+    pub(super) fn report_unused(&mut self, block: &'n Block) {
+        for statement in &block.statements {
+            let Statement::Subckt(subckt) = statement else {
+                continue;
+            };
+            let errors = subckt
+                .body
+                .faults
+                .iter()
+                .filter(|d| d.severity == Severity::Error)
+                .count();
+            if errors > 0 && !self.used.contains(&subckt.name.span) {
+                let first = &subckt.body.faults[0];
+                let message = format!(
+                    "subcircuit `{}`, which is not used, has faults: {}",
+                    subckt.name.text, first.message
+                );
+                let span = first.span.unwrap_or(subckt.name.span);
+                self.tell(
+                    Diagnostic::warning("unused-subcircuit", span, message)
+                        .label(first.label.clone()),
+                );
+            }
+        }
+    }
+
+    /// A ground node must exist.
+    pub(super) fn check_ground(&mut self, end: Span) {
+        let grounded = self
+            .circuit
+            .elements
+            .iter()
+            .any(|e| e.p == NodeId::GROUND || e.n == NodeId::GROUND);
+        if !grounded {
+            self.tell(
+                Diagnostic::error("no-ground", end, "the circuit has no ground")
+                    .label("no element up to here is connected to node `0`")
+                    .help("call one node `0` (or `gnd`)"),
+            );
+        }
+    }
+
+    /// Notes on things that are legal and odd.
+    pub(super) fn note_oddities(&mut self) {
+        let mut terminals = vec![0_usize; self.circuit.nodes.len()];
+        let mut notes = Vec::new();
+        for element in &self.circuit.elements {
+            terminals[element.p.index()] += 1;
+            terminals[element.n.index()] += 1;
+            let control = match &element.kind {
+                Kind::Controlled { control, .. } => Some(control),
+                Kind::Function { input, .. } => Some(input),
+                Kind::Switch(switch) => Some(&switch.control),
+                _ => None,
+            };
+            for (_, quantity) in control.iter().flat_map(|c| &c.terms) {
+                if let Quantity::Voltage(node) = quantity {
+                    terminals[node.index()] += 1;
+                }
+            }
+            if element.p == element.n {
+                let message = format!(
+                    "both ends of `{}` are at node `{}`",
+                    element.name,
+                    self.circuit.nodes[element.p.index()]
+                );
+                notes.push(
+                    Diagnostic::note("self-loop", element.span, message)
+                        .label("no current flows through it from outside"),
+                );
+            }
+        }
+        let dangling: Vec<&str> = terminals
+            .iter()
+            .zip(&self.circuit.nodes)
+            .skip(1)
+            .filter_map(|(count, name)| (*count == 1).then_some(name.as_str()))
+            .collect();
+        if !dangling.is_empty() {
+            let shown = dangling
+                .iter()
+                .take(5)
+                .copied()
+                .collect::<Vec<_>>()
+                .join(", ");
+            let more = if dangling.len() > 5 {
+                format!(" and {} more", dangling.len() - 5)
+            } else {
+                String::new()
+            };
+            notes.push(Diagnostic::note(
+                "dangling",
+                None,
+                format!("connected at one end only: node {shown}{more}"),
+            ));
+        }
+        let uic = self.circuit.tran.is_some_and(|t| t.uic);
+        let ignored = self
+            .circuit
+            .elements
+            .iter()
+            .find(|e| e.ic.is_some_and(|ic| ic != 0.0));
+        if let (false, Some(_), Some(element)) = (uic, self.circuit.tran, ignored) {
+            let message = format!(
+                "`IC=` of `{}` has no effect: the run starts from the operating point",
+                element.name
+            );
+            notes.push(
+                Diagnostic::warning("ic-without-uic", element.span, message)
+                    .label("ignored without `uic`")
+                    .help("add `uic` to `.tran`, or set node voltages with `.ic`"),
+            );
+        }
+        for note in notes {
+            self.tell(note);
+        }
+        if !self.unused_parameters.is_empty() {
+            let (_, span) = self.unused_parameters[0];
+            let names: Vec<String> = self
+                .unused_parameters
+                .drain(..)
+                .map(|(name, _)| name)
+                .collect();
+            let message = format!("parameters without effect here: {}", names.join(", "));
+            self.tell(
+                Diagnostic::note("unused-parameters", span, message).label("the first of them"),
+            );
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! Definitions of a block: parameters, functions, models, subcircuits, and the branches of `.if` that count.
+
+use super::builder::Builder;
+use super::functions::truth;
+use super::scope::ScopeId;
+use crate::diagnostic::Diagnostic;
+use crate::netlist::ast::{Assign, Block, Statement};
+use crate::netlist::suggest::nearest;
+
+impl<'n> Builder<'n, '_> {
+    /// Takes in the definitions of a block and of the branches of its conditionals.
+    pub(super) fn define(&mut self, block: &'n Block, scope: ScopeId) {
+        for statement in &block.statements {
+            self.define_one(statement, scope);
+        }
+        for statement in &block.statements {
+            let Statement::If(branches) = statement else {
+                continue;
+            };
+            let taken = branches.iter().position(|branch| match &branch.condition {
+                None => true,
+                Some(condition) => self
+                    .scopes
+                    .number(condition, scope)
+                    .is_some_and(|v| truth(v.f64)),
+            });
+            self.choices.push_back(taken);
+            if let Some(index) = taken {
+                self.tell_all(&branches[index].body.faults);
+                self.define(&branches[index].body, scope);
+            }
+        }
+    }
+
+    fn define_one(&mut self, statement: &'n Statement, scope: ScopeId) {
+        match statement {
+            Statement::Param(params) => {
+                for Assign { name, value } in params {
+                    if let Some(value) = value
+                        && !self.scopes.define(scope, name, value)
+                    {
+                        let message = format!("parameter `{}` is defined again", name.text);
+                        self.tell(
+                            Diagnostic::warning("duplicate-parameter", name.span, message)
+                                .label("this one counts"),
+                        );
+                    }
+                }
+            }
+            Statement::Func(func) => {
+                self.scopes
+                    .get_mut(scope)
+                    .funcs
+                    .insert(&func.name.text, func);
+            }
+            Statement::Model(model) => {
+                let models = &mut self.scopes.get_mut(scope).models;
+                if models.contains_key(model.name.text.as_str()) {
+                    let message = format!("model `{}` is defined again", model.name.text);
+                    self.tell(
+                        Diagnostic::warning("duplicate-model", model.name.span, message)
+                            .label("ignored: the first one counts"),
+                    );
+                } else {
+                    models.insert(&model.name.text, model);
+                }
+            }
+            Statement::Subckt(subckt) => {
+                let subckts = &mut self.scopes.get_mut(scope).subckts;
+                if subckts.contains_key(subckt.name.text.as_str()) {
+                    let message = format!("subcircuit `{}` is defined again", subckt.name.text);
+                    self.tell(
+                        Diagnostic::warning("duplicate-subcircuit", subckt.name.span, message)
+                            .label("ignored: the first one counts"),
+                    );
+                } else {
+                    subckts.insert(&subckt.name.text, subckt);
+                }
+            }
+            Statement::Global(names) => self
+                .names
+                .globals
+                .extend(names.iter().map(|n| n.text.as_str())),
+            Statement::Tran(tran) => self.trans.push(tran),
+            Statement::Analysis(_) => self.other_analysis = true,
+            Statement::Ic(list) => self.ics.push((scope, list)),
+            Statement::Save(list) => self.saves.push((scope, list)),
+            Statement::Element(_) | Statement::If(_) => {}
+        }
+    }
+
+    pub(super) fn check_overrides(&mut self) {
+        for (name, _) in &self.options.params {
+            let name = name.to_lowercase();
+            let declared = &self.scopes.get(ScopeId::ROOT).declared;
+            if !declared.contains(name.as_str()) {
+                let fault = Diagnostic::error(
+                    "unknown-parameter",
+                    None,
+                    format!("the netlist has no parameter `{name}` to set"),
+                );
+                let near = nearest(&name, declared.iter().copied());
+                self.tell(match near {
+                    Some(near) => fault.help(format!("did you mean `{near}`?")),
+                    None => fault,
+                });
+            }
+        }
+    }
+}

@@ -1,0 +1,285 @@
+//! D: models to laws.
+
+use super::builder::Builder;
+use super::elaborate::Diodes;
+use super::model::{ONE, Parameters, ZERO};
+use super::passive::Args;
+use super::scope::ScopeId;
+use super::{Element, Kind};
+use crate::algebra::Value;
+use crate::diagnostic::Diagnostic;
+use crate::law::{Curve, Law};
+use crate::netlist::ast::{self, Assign, Expr, Name};
+
+/// A diode whose emission coefficient is this small is taken as ideal.
+const IDEAL_EMISSION: f64 = 0.05;
+
+impl<'n> Builder<'n, '_> {
+    pub(super) fn diode(
+        &mut self,
+        card: &'n ast::Element,
+        name: &'n Name,
+        area: Option<&'n Expr>,
+        args: &'n [Assign],
+        scope: ScopeId,
+    ) {
+        self.check_args(
+            card,
+            args,
+            &[
+                "area", "m", "ic", "off", "on", "pj", "lm", "lp", "wm", "wp", "thermal",
+            ],
+        );
+        let args = Args(args);
+        let unknown = self.scopes.model(scope, &name.text).is_none();
+        let law = if unknown && self.options.diodes == Diodes::Ideal {
+            let message = format!(
+                "`{}` uses unknown model `{}`: an ideal diode stands for it",
+                card.name.text, name.text
+            );
+            self.tell(
+                Diagnostic::warning("unknown-model", name.span, message).label("not defined"),
+            );
+            Some(Law::ideal_diode())
+        } else {
+            self.model(card, name, scope).and_then(|chain| {
+                if chain.iter().all(|m| m.kind.text != "d") {
+                    self.wrong_model(card, chain[0], name, "D");
+                    return None;
+                }
+                let factor = self.factor(area.or(args.get(&["area"])), args, scope)?;
+                self.diode_law(card, name, &Parameters::new(&chain), scope)
+                    .map(|law| scaled(law, factor))
+            })
+        };
+        // The nodes exist even if the law is at fault, so that one mistake is not reported twice.
+        let (p, n) = (
+            self.node(&card.nodes[0], scope),
+            self.node(&card.nodes[1], scope),
+        );
+        let kind = Kind::Device(law.unwrap_or(Law::ideal_diode()));
+        let name = self.full_name(&card.name, scope);
+        self.add(Element {
+            name,
+            p,
+            n,
+            kind,
+            ic: None,
+            span: Some(card.span),
+        });
+    }
+
+    /// area · m.
+    fn factor(&mut self, area: Option<&'n Expr>, args: Args<'n>, scope: ScopeId) -> Option<f64> {
+        let area = match area {
+            Some(area) => self.scopes.finite(area, scope)?.f64,
+            None => 1.0,
+        };
+        let m = self.arg(args, &["m"], scope)?.map_or(1.0, |m| m.f64);
+        Some(if area * m > 0.0 { area * m } else { 1.0 })
+    }
+
+    fn diode_law(
+        &mut self,
+        card: &ast::Element,
+        name: &Name,
+        params: &Parameters<'n>,
+        scope: ScopeId,
+    ) -> Option<Law> {
+        let piecewise = ["ron", "roff", "vfwd", "vrev", "rrev"]
+            .iter()
+            .any(|p| params.get(p).is_some());
+        let emission = self.parameter(params, "n", scope)?;
+        let is_exponential = params.get("is").is_some() || emission.is_some();
+        let near_ideal = emission.is_some_and(|n| n.f64 <= IDEAL_EMISSION)
+            || params.flag("ideal")
+            || (name.text.contains("ideal") && !is_exponential);
+        let series = self.parameter(params, "rs", scope)?.unwrap_or(ZERO);
+        let exponential = !piecewise && !near_ideal;
+
+        if self.options.diodes == Diodes::Exp
+            || (exponential && self.options.diodes == Diodes::Auto)
+        {
+            let message = format!(
+                "`{}` has the exponential model `{}`, which is not supported yet",
+                card.name.text, name.text
+            );
+            self.tell(
+                Diagnostic::error("exponential-diode", name.span, message)
+                    .label("an exponential diode")
+                    .help("`--diodes ideal` simulates it as an ideal diode in series with its RS"),
+            );
+            return None;
+        }
+        if exponential {
+            if params.get("bv").is_some() {
+                self.unused(format!("bv of {}", name.text), name);
+            }
+            return Some(Law::Diode {
+                vfwd: ZERO,
+                ron: series,
+                roff: None,
+            });
+        }
+        let (vfwd, ron, roff) = if piecewise {
+            for ignored in ["epsilon", "revepsilon", "ilimit", "revilimit"] {
+                if params.get(ignored).is_some() {
+                    self.unused(format!("{ignored} of {}", name.text), name);
+                }
+            }
+            let vfwd = self.parameter(params, "vfwd", scope)?.unwrap_or(ZERO);
+            let ron = self.parameter(params, "ron", scope)?.unwrap_or(ONE);
+            (vfwd, ron, self.off_resistance(params, scope)?)
+        } else {
+            (ZERO, series, None)
+        };
+        let breakdown = if piecewise { "vrev" } else { "bv" };
+        let Some(vrev) = self
+            .parameter(params, breakdown, scope)?
+            .filter(|v| v.f64.is_finite())
+        else {
+            return Some(Law::Diode { vfwd, ron, roff });
+        };
+        let rrev = if piecewise {
+            self.parameter(params, "rrev", scope)?.unwrap_or(ron)
+        } else {
+            ron
+        };
+        let leak = |v: f64| roff.map_or(ZERO, |r| Value::binary(v / r.f64));
+        let minus = Value {
+            f64: -vrev.f64,
+            decimal: vrev.decimal.map(|(m, e)| (-m, e)),
+        };
+        Some(Law::Curve(Curve {
+            kind: "zener",
+            vertices: vec![(minus, leak(-vrev.f64)), (vfwd, leak(vfwd.f64))],
+            first: (rrev, ONE),
+            last: (ron, ONE),
+        }))
+    }
+}
+
+/// A law for `factor` devices in parallel.
+fn scaled(law: Law, factor: f64) -> Law {
+    if factor == 1.0 {
+        return law;
+    }
+    let less = |r: Value| Value::binary(r.f64 / factor);
+    match law {
+        Law::Diode { vfwd, ron, roff } => Law::Diode {
+            vfwd,
+            ron: less(ron),
+            roff: roff.map(less),
+        },
+        Law::Curve(curve) => Law::Curve(Curve {
+            vertices: curve
+                .vertices
+                .iter()
+                .map(|&(v, i)| (v, Value::binary(i.f64 * factor)))
+                .collect(),
+            first: (less(curve.first.0), curve.first.1),
+            last: (less(curve.last.0), curve.last.1),
+            ..curve
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{ElaborateOptions, elaborate};
+    use super::*;
+    use crate::diagnostic::SourceMap;
+    use crate::netlist::parse;
+
+    fn law(card: &str, model: &str, diodes: Diodes) -> Option<Law> {
+        let mut sources = SourceMap::default();
+        let root = sources.add(
+            "test.cir",
+            format!("title\nV1 a 0 5\nR1 a b 1\n{card}\n.model {model}\n"),
+        );
+        let (netlist, _) = parse(&mut sources, root, &|_| {
+            Err(std::io::ErrorKind::NotFound.into())
+        });
+        let options = ElaborateOptions {
+            diodes,
+            ..ElaborateOptions::default()
+        };
+        match elaborate(&netlist, &options).0?.elements.pop()?.kind {
+            Kind::Device(law) => Some(law),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// vfwd, ron, roff.
+    fn diode(card: &str, model: &str, diodes: Diodes) -> Option<(f64, f64, Option<f64>)> {
+        match law(card, model, diodes)? {
+            Law::Diode { vfwd, ron, roff } => Some((vfwd.f64, ron.f64, roff.map(|r| r.f64))),
+            Law::Curve(curve) => panic!("{curve:?}"),
+        }
+    }
+
+    #[test]
+    fn models_to_laws() {
+        let d = "D1 b 0 m";
+        for (card, model, expected) in [
+            (
+                d,
+                "m D(Ron=1m Roff=1Meg Vfwd=0.7)",
+                Some((0.7, 1e-3, Some(1e6))),
+            ),
+            (d, "m D(Vfwd=0.7)", Some((0.7, 1.0, None))),
+            (d, "m D(N=0.01 RS=5m)", Some((0.0, 5e-3, None))),
+            (d, "m D(ideal)", Some((0.0, 0.0, None))),
+            ("D1 b 0 ideal", "ideal D", Some((0.0, 0.0, None))),
+            (
+                "D1 b 0 m 2",
+                "m D(Ron=1 Roff=1k)",
+                Some((0.0, 0.5, Some(500.0))),
+            ),
+            ("D1 b 0 m m=4", "m D(Ron=1)", Some((0.0, 0.25, None))),
+            (d, "m D", None),
+            (d, "m D(IS=1e-14 N=1)", None),
+            ("D1 b 0 ideal", "ideal D(IS=1e-14)", None),
+        ] {
+            assert_eq!(
+                diode(card, model, Diodes::Auto),
+                expected,
+                "{card}, {model}"
+            );
+        }
+    }
+
+    #[test]
+    fn ideal_on_demand() {
+        assert_eq!(
+            diode("D1 b 0 m", "m D(IS=1e-14 RS=0.6 BV=100)", Diodes::Ideal),
+            Some((0.0, 0.6, None))
+        );
+        assert_eq!(
+            diode("D1 b 0 m", "m D(Ron=1m Vfwd=0.7)", Diodes::Ideal),
+            Some((0.7, 1e-3, None))
+        );
+        assert_eq!(
+            diode("D1 b 0 other", "m D", Diodes::Ideal),
+            Some((0.0, 0.0, None))
+        );
+        assert_eq!(diode("D1 b 0 m", "m D(Ron=1m)", Diodes::Exp), None);
+    }
+
+    #[test]
+    fn a_reverse_voltage_makes_a_zener() {
+        let Some(Law::Curve(curve)) = law(
+            "D1 b 0 m",
+            "m D(Ron=1 Roff=1k Vfwd=1 Vrev=10 Rrev=2)",
+            Diodes::Auto,
+        ) else {
+            panic!("no curve")
+        };
+        let points: Vec<(f64, f64)> = curve.vertices.iter().map(|(v, i)| (v.f64, i.f64)).collect();
+        assert_eq!(points, [(-10.0, -0.01), (1.0, 0.001)]);
+        assert_eq!(
+            (curve.first.0.f64, curve.last.0.f64, curve.kind),
+            (2.0, 1.0, "zener")
+        );
+    }
+}

@@ -1,0 +1,151 @@
+//! `.model` cards: looking them up, and their parameters.
+
+use super::builder::Builder;
+use super::scope::ScopeId;
+use crate::algebra::Value;
+use crate::diagnostic::Diagnostic;
+use crate::netlist::ast::{self, Assign, Expr, ExprKind, Model, Name};
+use crate::netlist::card::describe;
+
+/// Zero, exactly.
+pub(super) const ZERO: Value = Value::decimal(0.0, 0, 0);
+/// One, exactly.
+pub(super) const ONE: Value = Value::decimal(1.0, 1, 0);
+
+impl<'n> Builder<'n, '_> {
+    /// The model a card names, with those it extends, the nearest first.
+    pub(super) fn model(
+        &mut self,
+        card: &ast::Element,
+        name: &Name,
+        scope: ScopeId,
+    ) -> Option<Vec<&'n Model>> {
+        let mut chain: Vec<&'n Model> = Vec::new();
+        let mut wanted = name.clone();
+        loop {
+            let Some(model) = self.scopes.model(scope, &wanted.text) else {
+                let message = format!("`{}` uses unknown model `{}`", card.name.text, wanted.text);
+                let fault =
+                    Diagnostic::error("unknown-model", wanted.span, message).label("not defined");
+                let near = self
+                    .scopes
+                    .near(scope, &wanted.text, |s| s.models.keys().copied());
+                self.tell(match near {
+                    Some(near) => fault.help(format!("did you mean `{near}`?")),
+                    None => fault.help(format!(
+                        "add `.model {} …`, or include the file that defines it",
+                        wanted.text
+                    )),
+                });
+                return None;
+            };
+            if chain.iter().any(|m| std::ptr::eq(*m, model)) {
+                let message = format!("model `{}` extends itself", model.name.text);
+                self.tell(
+                    Diagnostic::error("circular", model.name.span, message)
+                        .label("comes back to itself"),
+                );
+                return None;
+            }
+            chain.push(model);
+            match &model.base {
+                Some(base) => wanted = base.clone(),
+                None => return Some(chain),
+            }
+        }
+    }
+
+    pub(super) fn wrong_model(
+        &mut self,
+        card: &ast::Element,
+        model: &Model,
+        name: &Name,
+        needed: &str,
+    ) {
+        let message = format!(
+            "`{}` uses model `{}`, which is of type `{}`",
+            card.name.text, model.name.text, model.kind.text
+        );
+        let fault = Diagnostic::error("wrong-model", name.span, message)
+            .label("the model is of another kind");
+        self.tell(fault.help(format!(
+            "{} needs a model of type {needed}",
+            describe(card.name.text.chars().next().unwrap_or(' '))
+        )));
+    }
+
+    /// `Roff`; infinite or absent is open. `None` after a reported fault.
+    #[expect(clippy::option_option, reason = "open and faulty are different")]
+    pub(super) fn off_resistance(
+        &mut self,
+        params: &Parameters<'n>,
+        scope: ScopeId,
+    ) -> Option<Option<Value>> {
+        let Some(roff) = params.get("roff") else {
+            return Some(None);
+        };
+        let value = self.scopes.number(roff, scope)?;
+        Some(Some(value).filter(|v| v.f64.is_finite()))
+    }
+
+    pub(super) fn unused(&mut self, what: String, name: &Name) {
+        if !self
+            .unused_parameters
+            .iter()
+            .any(|(known, _)| *known == what)
+        {
+            self.unused_parameters.push((what, name.span));
+        }
+    }
+
+    /// A parameter of a model as a finite number; `Some(None)` if it is not given.
+    #[expect(clippy::option_option, reason = "absent and faulty are different")]
+    pub(super) fn parameter(
+        &mut self,
+        params: &Parameters<'n>,
+        name: &str,
+        scope: ScopeId,
+    ) -> Option<Option<Value>> {
+        match params.get(name) {
+            None => Some(None),
+            Some(expr) => self.scopes.finite(expr, scope).map(Some),
+        }
+    }
+}
+
+/// The parameters of a model and of those it extends.
+pub(super) struct Parameters<'n>(Vec<&'n Assign>);
+
+impl<'n> Parameters<'n> {
+    pub(super) fn new(chain: &[&'n Model]) -> Self {
+        // Within a card the last of two equal names counts.
+        Self(
+            chain
+                .iter()
+                .flat_map(|model| model.params.iter().rev())
+                .collect(),
+        )
+    }
+
+    pub(super) fn get(&self, name: &str) -> Option<&'n Expr> {
+        self.0
+            .iter()
+            .find(|a| a.name.text == name)
+            .and_then(|a| a.value.as_ref())
+    }
+
+    /// `ideal`, or `ideal=1`.
+    pub(super) fn flag(&self, name: &str) -> bool {
+        self.0
+            .iter()
+            .find(|a| a.name.text == name)
+            .is_some_and(|a| match &a.value {
+                None => true,
+                Some(Expr {
+                    kind: ExprKind::Number(value),
+                    ..
+                }) => value.f64 != 0.0,
+                Some(_) => true,
+            })
+    }
+}

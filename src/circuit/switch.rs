@@ -1,0 +1,236 @@
+//! S and W: models to switches.
+
+use super::builder::{Builder, Pending};
+use super::model::{ONE, Parameters, ZERO};
+use super::scope::ScopeId;
+use super::{Affine, Element, Kind, Switch};
+use crate::algebra::Value;
+use crate::diagnostic::Diagnostic;
+use crate::netlist::ast::{self, Control, Name};
+
+/// Off-resistance of ngspice's switch model where none is given, Ω.
+const SWITCH_ROFF: Value = Value::decimal(1e12, 1, 12);
+/// Off-resistance of PSpice's switch models where none is given, Ω.
+const VSWITCH_ROFF: Value = Value::decimal(1e6, 1, 6);
+
+impl<'n> Builder<'n, '_> {
+    pub(super) fn switch(
+        &mut self,
+        card: &'n ast::Element,
+        control: &'n Control,
+        name: &'n Name,
+        initial: Option<bool>,
+        scope: ScopeId,
+    ) {
+        let (p, n) = (
+            self.node(&card.nodes[0], scope),
+            self.node(&card.nodes[1], scope),
+        );
+        let Some(mut switch) = self.switch_model(card, name, scope) else {
+            return;
+        };
+        switch.initial = initial;
+        let full = self.full_name(&card.name, scope);
+        let element = Element {
+            name: full,
+            p,
+            n,
+            kind: Kind::Switch(switch),
+            ic: None,
+            span: Some(card.span),
+        };
+        if let Some(element) = self.add(element) {
+            self.pending.push(Pending {
+                element,
+                scope,
+                control,
+                span: card.span,
+            });
+        }
+    }
+
+    /// The resistances and thresholds of a model; a negative `control` gain marks a switch that is on below.
+    fn switch_model(
+        &mut self,
+        card: &'n ast::Element,
+        name: &'n Name,
+        scope: ScopeId,
+    ) -> Option<Switch> {
+        let chain = self.model(card, name, scope)?;
+        let model = chain[0];
+        let kind = chain
+            .iter()
+            .map(|m| m.kind.text.as_str())
+            .find(|k| !k.is_empty())
+            .unwrap_or("");
+        let by_voltage = card.name.text.starts_with('s');
+        let (level, other) = if by_voltage {
+            ("v", "sw, vswitch")
+        } else {
+            ("i", "csw, iswitch")
+        };
+        let fits = if by_voltage {
+            ["sw", "vswitch"]
+        } else {
+            ["csw", "iswitch"]
+        };
+        let sw_by_current = !by_voltage && kind == "sw";
+        if !fits.contains(&kind) && !sw_by_current {
+            self.wrong_model(card, model, name, other);
+            return None;
+        }
+        let params = Parameters::new(&chain);
+        for ignored in ["lser", "vser", "ilimit"] {
+            if params.get(ignored).is_some() {
+                self.unused(format!("{ignored} of {}", name.text), name);
+            }
+        }
+        let ideal = params.flag("ideal");
+        let ron = self
+            .parameter(&params, "ron", scope)?
+            .unwrap_or(if ideal { ZERO } else { ONE });
+        let (t, h) = (format!("{level}t"), format!("{level}h"));
+        let (on, off) = (format!("{level}on"), format!("{level}off"));
+        let with_levels = params.get(&on).is_some() || params.get(&off).is_some();
+        let roff = if params.get("roff").is_some() || ideal {
+            self.off_resistance(&params, scope)?
+        } else {
+            Some(if fits[1] == kind {
+                VSWITCH_ROFF
+            } else {
+                SWITCH_ROFF
+            })
+        };
+        for (what, value) in [("Ron", Some(ron)), ("Roff", roff)] {
+            if value.is_some_and(|v| v.f64 < 0.0) {
+                let message = format!("{what} of switch model `{}` is negative", name.text);
+                self.tell(
+                    Diagnostic::error("bad-value", model.name.span, message)
+                        .label("must not be negative"),
+                );
+                return None;
+            }
+        }
+        if kind == fits[1] || (with_levels && params.get(&t).is_none()) {
+            if kind != fits[1] {
+                let message = format!(
+                    "model `{}` of type `{kind}` has `{on}`/`{off}`: read as in `{}`",
+                    name.text, fits[1]
+                );
+                self.tell(
+                    Diagnostic::warning("switch-levels", model.name.span, message)
+                        .label(format!("`{t}` and `{h}` belong to `{kind}`")),
+                );
+            }
+            let on = self.parameter(&params, &on, scope)?.map_or(1.0, |v| v.f64);
+            let off = self.parameter(&params, &off, scope)?.map_or(0.0, |v| v.f64);
+            return Some(Switch {
+                control: Affine::default(),
+                ron,
+                roff,
+                on_above: on,
+                off_below: off,
+                initial: None,
+            });
+        }
+        let threshold = self.parameter(&params, &t, scope)?.map_or(0.0, |v| v.f64);
+        let hysteresis = self.parameter(&params, &h, scope)?.map_or(0.0, |v| v.f64);
+        if hysteresis < 0.0 {
+            let message = format!(
+                "model `{}` has a negative `{h}` (LTspice's smooth switch): its hysteresis is taken as {}",
+                name.text, -hysteresis
+            );
+            self.tell(
+                Diagnostic::warning("smooth-switch", model.name.span, message)
+                    .label("approximated"),
+            );
+        }
+        let width = hysteresis.abs();
+        let (on_above, off_below) = (threshold + width, threshold - width);
+        Some(Switch {
+            control: Affine::default(),
+            ron,
+            roff,
+            on_above,
+            off_below,
+            initial: None,
+        })
+    }
+}
+
+impl Switch {
+    /// Sets the control; a switch that is on below its levels (`Von < Voff`) follows the negated control.
+    pub(super) fn follow(&mut self, control: Affine) {
+        self.control = control;
+        if self.on_above < self.off_below {
+            for (gain, _) in &mut self.control.terms {
+                *gain = Value {
+                    f64: -gain.f64,
+                    decimal: gain.decimal.map(|(m, e)| (-m, e)),
+                };
+            }
+            self.control.constant = -self.control.constant;
+            self.on_above = -self.on_above;
+            self.off_below = -self.off_below;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{ElaborateOptions, NodeId, Quantity, elaborate};
+    use super::*;
+    use crate::diagnostic::SourceMap;
+    use crate::netlist::parse;
+
+    fn switch(model: &str) -> Switch {
+        let mut sources = SourceMap::default();
+        let text =
+            format!("title\nV1 a 0 5\nS1 a b c 0 ms\nR1 b 0 1\nR2 c 0 1\n.model ms {model}\n");
+        let root = sources.add("test.cir", text);
+        let (netlist, _) = parse(&mut sources, root, &|_| {
+            Err(std::io::ErrorKind::NotFound.into())
+        });
+        let (circuit, findings) = elaborate(&netlist, &ElaborateOptions::default());
+        let circuit = circuit.unwrap_or_else(|| panic!("{findings:?}"));
+        match &circuit.elements[1].kind {
+            Kind::Switch(switch) => switch.clone(),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// on_above, off_below, ron, roff and the gain of the control, which is v(c), node 3.
+    fn numbers(model: &str) -> (f64, f64, f64, Option<f64>, f64) {
+        let s = switch(model);
+        let [(gain, Quantity::Voltage(NodeId(3)))] = s.control.terms[..] else {
+            panic!("{:?}", s.control)
+        };
+        (
+            s.on_above,
+            s.off_below,
+            s.ron.f64,
+            s.roff.map(|r| r.f64),
+            gain.f64,
+        )
+    }
+
+    #[test]
+    fn models() {
+        for (model, expected) in [
+            ("SW", (0.0, 0.0, 1.0, Some(1e12), 1.0)),
+            (
+                "SW(Vt=5 Vh=0.5 Ron=5m Roff=1Meg)",
+                (5.5, 4.5, 5e-3, Some(1e6), 1.0),
+            ),
+            ("SW Vt=5 Vh=-0.5", (5.5, 4.5, 1.0, Some(1e12), 1.0)),
+            ("SW(Vt=1 Ron=0 Roff=inf)", (1.0, 1.0, 0.0, None, 1.0)),
+            ("SW(ideal Vt=1)", (1.0, 1.0, 0.0, None, 1.0)),
+            ("VSWITCH(Von=4 Voff=1)", (4.0, 1.0, 1.0, Some(1e6), 1.0)),
+            // On below its levels: −v(c) above −1, off below −4.
+            ("VSWITCH(Von=1 Voff=4)", (-1.0, -4.0, 1.0, Some(1e6), -1.0)),
+            ("SW(Von=4 Voff=1 Roff=1k)", (4.0, 1.0, 1.0, Some(1e3), 1.0)),
+        ] {
+            assert_eq!(numbers(model), expected, "{model}");
+        }
+    }
+}

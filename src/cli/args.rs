@@ -1,0 +1,380 @@
+//! What may be typed.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Simulates circuits with ideal diodes and switches: netlist to complementarity system to waveforms.
+#[derive(Debug, Parser)]
+#[command(
+    name = "circ",
+    version,
+    arg_required_else_help = true,
+    subcommand_required = true,
+    help_expected = true,
+    after_help = "Exit status: 0 done; 1 the answer is no (outside tolerance, faults found); 2 it could not be done."
+)]
+pub struct Cli {
+    /// Say nothing but errors
+    #[arg(
+        short,
+        long,
+        global = true,
+        conflicts_with = "verbose",
+        display_order = 90
+    )]
+    pub quiet: bool,
+    /// Explain what is done and why
+    #[arg(short, long, global = true, display_order = 91)]
+    pub verbose: bool,
+    /// What to do
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Simulate the transient that `.tran` asks for
+    Sim(SimArgs),
+    /// Print the complementarity system (A, B, C, D, E, F, G) with names and units
+    Lcs(LcsArgs),
+    /// Check topology, passivity and which theorems hold
+    Check(CheckArgs),
+    /// Solve the operating point
+    Op(OpArgs),
+    /// Measure error against run time over a ladder of steps and tolerances
+    Bench(BenchArgs),
+    /// Compare with ngspice or with waveforms from a file
+    Compare(CompareArgs),
+    /// Draw the circuit as a graph
+    Graph(GraphArgs),
+}
+
+/// The circuit and what changes it.
+#[derive(Debug, Args)]
+pub struct Input {
+    /// SPICE netlist, or a system in the JSON of `circ lcs`
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// Replace the value of a top-level `.param` (repeatable)
+    #[arg(long = "param", value_name = "NAME=VALUE", value_parser = assignment)]
+    pub params: Vec<(String, f64)>,
+    /// How diode models are read
+    #[arg(long, value_enum, default_value_t = Diodes::Auto)]
+    pub diodes: Diodes,
+}
+
+/// How diode models are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Diodes {
+    /// As the model says: piecewise linear for Ron/Roff/Vfwd, N ≤ 0.05 or `ideal`
+    Auto,
+    /// Every diode ideal, in series with its RS
+    Ideal,
+    /// Every diode exponential
+    Exp,
+}
+
+/// How time is integrated.
+#[derive(Debug, Args)]
+pub struct MethodArgs {
+    /// Integration method; auto follows the plan
+    #[arg(long, value_enum, default_value_t = Method::Auto)]
+    pub method: Method,
+    /// θ of the state for `--method theta` (0.5 to 1; default 0.5)
+    #[arg(long, value_name = "X", value_parser = implicitness)]
+    pub theta: Option<f64>,
+    /// γ of the device quantities for `--method theta` (0.5 to 1; default 0.5)
+    #[arg(long, value_name = "X", value_parser = implicitness)]
+    pub gamma: Option<f64>,
+    /// Fixed step of euler and theta, s; suffixes as in netlists (`1u`)
+    #[arg(long, value_name = "H", value_parser = positive)]
+    pub step: Option<f64>,
+    /// Relative tolerance of the error-controlled step [default: 1e-4]
+    #[arg(long, value_name = "R", value_parser = positive)]
+    pub tol: Option<f64>,
+}
+
+/// Integration methods.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Method {
+    /// What the plan recommends
+    Auto,
+    /// Event-driven, exact between events
+    Exact,
+    /// Moreau's implicit Euler, θ = γ = 1
+    Euler,
+    /// The (θ, γ) scheme
+    Theta,
+}
+
+/// `circ sim`.
+#[derive(Debug, Args)]
+pub struct SimArgs {
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub input: Input,
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub method: MethodArgs,
+    /// Write results to this file (repeatable); the ending chooses csv, raw, npz, json, svg, png or html
+    #[arg(short, long = "output", value_name = "OUT")]
+    pub outputs: Vec<PathBuf>,
+    /// Show exactly these signals: v(a), v(a,b), i(d1), @d1[i], v1#branch (repeatable)
+    #[arg(long = "probe", value_name = "NAME")]
+    pub probes: Vec<String>,
+    /// Add rows at event times: two with equal time at a jump, before and after
+    #[arg(long)]
+    pub events: bool,
+    /// Print a summary of the run on standard error
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    pub summary: Option<Summary>,
+}
+
+/// Forms of the summary.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Summary {
+    /// One JSON object on one line
+    Json,
+    /// Words
+    Text,
+}
+
+/// `circ lcs`.
+#[derive(Debug, Args)]
+pub struct LcsArgs {
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub input: Input,
+    /// Form of the system
+    #[arg(long, value_enum, default_value_t = SystemFormat::Text)]
+    pub format: SystemFormat,
+    /// Take a switch in this position (repeatable)
+    #[arg(long = "switch", value_name = "NAME=on|off", value_parser = position)]
+    pub switches: Vec<(String, bool)>,
+    /// Write to this file instead of standard output
+    #[arg(short, long, value_name = "OUT")]
+    pub output: Option<PathBuf>,
+}
+
+/// Forms of a system.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SystemFormat {
+    /// Named rows and columns
+    Text,
+    /// circ-lcs/1, which `sim`, `check` and `bench` read
+    Json,
+    /// A Python script with NumPy arrays
+    Numpy,
+    /// A MATLAB or Octave script
+    Matlab,
+    /// LaTeX matrices
+    Latex,
+}
+
+/// `circ check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub input: Input,
+    /// Take a switch in this position (repeatable)
+    #[arg(long = "switch", value_name = "NAME=on|off", value_parser = position)]
+    pub switches: Vec<(String, bool)>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `circ op`.
+#[derive(Debug, Args)]
+pub struct OpArgs {
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub input: Input,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `circ bench`.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub input: Input,
+    /// Measure this program too
+    #[arg(long, value_name = "PROGRAM", value_parser = ["ngspice"])]
+    pub against: Option<String>,
+    /// Only these methods: exact, euler, theta, siconos (θ = ½, γ = 1), ngspice
+    #[arg(long, value_name = "A,B,..", value_delimiter = ',', value_parser = ["exact", "euler", "theta", "siconos", "ngspice"])]
+    pub methods: Vec<String>,
+    /// Write measurements to this file (repeatable); the ending chooses csv, json, svg or png
+    #[arg(short, long = "output", value_name = "OUT")]
+    pub outputs: Vec<PathBuf>,
+}
+
+/// `circ compare`.
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub input: Input,
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub integration: CompareMethodArgs,
+    /// `ngspice`, or a csv or raw file of waveforms
+    #[arg(
+        long,
+        value_name = "ngspice|REF.csv|REF.raw",
+        default_value = "ngspice"
+    )]
+    pub against: PathBuf,
+    /// Largest error, relative to each signal's amplitude, that counts as equal
+    #[arg(long, value_name = "R", default_value = "1e-2", value_parser = positive)]
+    pub tol: f64,
+    /// Forgive edges that stand this much earlier or later, s [default: a tenth of a print step against ngspice, 0 against a file]
+    #[arg(long, value_name = "T", value_parser = not_negative)]
+    pub shift: Option<f64>,
+    /// How ngspice realises the diodes
+    #[arg(long, value_enum, default_value_t = Realisation::N001)]
+    pub realisation: Realisation,
+    /// Keep the ngspice deck in this file
+    #[arg(long, value_name = "DECK")]
+    pub keep: Option<PathBuf>,
+    /// Draw both and their difference to this svg or png file
+    #[arg(short, long, value_name = "OUT")]
+    pub output: Option<PathBuf>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The method of the first side of a comparison (its `--tol` is the comparison's).
+#[derive(Debug, Args)]
+pub struct CompareMethodArgs {
+    /// Integration method; auto follows the plan
+    #[arg(long, value_enum, default_value_t = Method::Auto)]
+    pub method: Method,
+    /// Fixed step of euler and theta, s
+    #[arg(long, value_name = "H", value_parser = positive)]
+    pub step: Option<f64>,
+}
+
+/// How ngspice realises piecewise-linear diodes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Realisation {
+    /// ngspice's default diode, N = 1
+    #[value(name = "default")]
+    Default,
+    /// Emission coefficient 0.01
+    #[value(name = "n0.01")]
+    N001,
+    /// Emission coefficient 0.001
+    #[value(name = "n0.001")]
+    N0001,
+    /// The code model `sidiode`
+    #[value(name = "sidiode")]
+    Sidiode,
+}
+
+impl Realisation {
+    /// As it is typed.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Default => "default",
+            Self::N001 => "n0.01",
+            Self::N0001 => "n0.001",
+            Self::Sidiode => "sidiode",
+        }
+    }
+}
+
+/// `circ graph`.
+#[derive(Debug, Args)]
+pub struct GraphArgs {
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub input: Input,
+    /// Write to this file, dot, svg or png, instead of Graphviz text on standard output
+    #[arg(short, long, value_name = "OUT")]
+    pub output: Option<PathBuf>,
+}
+
+/// A number with SPICE's suffixes: `1u`, `4k7`, `2.2e-6`.
+fn number(text: &str) -> Result<f64, String> {
+    crate::netlist::value::parse(text)
+        .map(|v| v.f64)
+        .map_err(|e| e.to_string())
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    number(text).and_then(|x| {
+        if x > 0.0 {
+            Ok(x)
+        } else {
+            Err("must be positive".into())
+        }
+    })
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    number(text).and_then(|x| {
+        if x >= 0.0 {
+            Ok(x)
+        } else {
+            Err("must not be negative".into())
+        }
+    })
+}
+
+fn implicitness(text: &str) -> Result<f64, String> {
+    number(text).and_then(|x| {
+        if (0.5..=1.0).contains(&x) {
+            Ok(x)
+        } else {
+            Err("must be in [0.5, 1]".into())
+        }
+    })
+}
+
+fn assignment(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
+    Ok((name.trim().to_lowercase(), number(value.trim())?))
+}
+
+fn position(text: &str) -> Result<(String, bool), String> {
+    let (name, position) = text.split_once('=').ok_or("expected NAME=on or NAME=off")?;
+    let on = match position.trim().to_ascii_lowercase().as_str() {
+        "on" | "1" | "closed" => true,
+        "off" | "0" | "open" => false,
+        other => return Err(format!("`{other}` is neither on nor off")),
+    };
+    Ok((name.trim().to_lowercase(), on))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn every_argument_has_help_and_none_contradict() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn numbers_take_suffixes_and_ranges_hold() {
+        assert_eq!(positive("1u"), Ok(1e-6));
+        assert_eq!(assignment("R=4k7"), Ok(("r".into(), 4700.0)));
+        assert_eq!(position("S1=ON"), Ok(("s1".into(), true)));
+        for refused in ["0", "-1u", "x", ""] {
+            assert!(positive(refused).is_err(), "{refused}");
+        }
+        assert!(implicitness("0.4").is_err() && implicitness("1").is_ok());
+        assert!(assignment("r").is_err() && position("s1=half").is_err());
+    }
+}

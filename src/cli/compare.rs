@@ -1,0 +1,224 @@
+//! `circ compare`.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::args::{self, CompareArgs};
+use super::exit::{Exit, Failure};
+use super::input::{self, Subject};
+use super::ngspice::{self, deck};
+use super::output;
+use super::sim::{self, Request};
+use super::streams::Streams;
+use crate::circuit::Tran;
+use crate::integrate::Method;
+use crate::report::figure::Figure;
+use crate::report::{json, svg, text};
+use crate::waveform::compare::{At, Comparison, compare as compare_waveforms, difference};
+use crate::waveform::{Waveforms, csv, raw};
+
+/// Rows of our side at least, so that straight lines between them do not count as error.
+const ROWS: f64 = 20_000.0;
+/// ngspice's `reltol` and `method`, the most accurate first: its own error should not be what is seen, but often only
+/// looser settings bring it through a circuit with ideal devices.
+const SETTINGS: [(f64, &str); 5] = [
+    (1e-5, "gear"),
+    (1e-4, "gear"),
+    (1e-4, "trap"),
+    (1e-3, "gear"),
+    (1e-3, "trap"),
+];
+/// Print steps by which edges may be shifted against ngspice.
+const SHIFT: f64 = 0.1;
+/// Signals drawn, the worst first.
+const DRAWN: usize = 3;
+
+/// Compares a simulation with ngspice's or with a file; status 1 outside the tolerance.
+///
+/// # Errors
+/// See [`Failure`].
+pub(super) fn compare(args: &CompareArgs, streams: &Streams) -> Result<Exit, Failure> {
+    let subject = input::open(&args.input, &[], streams)?;
+    let tran = sim::tran(&subject).ok_or_else(|| {
+        Failure::Message(format!(
+            "{}: there is no `.tran` to compare",
+            args.input.file.display()
+        ))
+    })?;
+    let theirs = match args.against.to_str() {
+        Some("ngspice") => from_ngspice(args, &subject, tran, streams)?,
+        _ => from_file(&args.against)?,
+    };
+    let ours = simulated(args, &subject, tran, streams)?;
+    let shift = args.shift.unwrap_or(theirs.shift);
+    let found = compare_waveforms(&ours, &theirs.waveforms, At::ReferenceRows, shift)?;
+    let within = found.signals.iter().all(|s| s.shifted <= args.tol);
+    if let Some(path) = &args.output {
+        draw(path, &ours, &theirs, &found)?;
+    }
+    for note in &theirs.notes {
+        streams.say(format!("note: {note}"));
+    }
+    if args.json {
+        let document = Document {
+            against: &theirs.name,
+            tol: args.tol,
+            within,
+            notes: &theirs.notes,
+            comparison: &found,
+        };
+        streams.data(json::line(&document) + "\n")?;
+    } else {
+        streams.data(text::comparison(&found))?;
+        let verdict = if within { "within" } else { "outside" };
+        streams.say(format!(
+            "{verdict} the tolerance of {:e}, against {}",
+            args.tol, theirs.name
+        ));
+    }
+    Ok(if within { Exit::Done } else { Exit::No })
+}
+
+#[derive(Serialize)]
+struct Document<'a> {
+    against: &'a str,
+    tol: f64,
+    within: bool,
+    notes: &'a [String],
+    #[serde(flatten)]
+    comparison: &'a Comparison,
+}
+
+/// The other side.
+struct Theirs {
+    name: String,
+    waveforms: Waveforms,
+    shift: f64,
+    notes: Vec<String>,
+}
+
+fn from_ngspice(
+    args: &CompareArgs,
+    subject: &Subject,
+    tran: Tran,
+    streams: &Streams,
+) -> Result<Theirs, Failure> {
+    let Subject::Circuit(both) = subject else {
+        let message = "a system without a circuit has no ngspice deck; compare it with a file";
+        return Err(Failure::Message(format!(
+            "{}: {message}",
+            args.input.file.display()
+        )));
+    };
+    let failed = |e: ngspice::NgspiceError| Failure::Message(e.to_string());
+    let version = ngspice::version().map_err(failed)?;
+    let bar = streams.progress(SETTINGS.len() as u64, &version);
+    let mut first_failure = None;
+    for (reltol, method) in SETTINGS {
+        let options = deck::Options {
+            reltol,
+            max_step: tran.tmax.unwrap_or(f64::INFINITY).min(tran.tstep),
+            method,
+            realisation: args.realisation,
+        };
+        let deck = deck::deck(&both.0, &options).map_err(|e| Failure::Message(e.to_string()))?;
+        if let Some(path) = &args.keep {
+            output::bytes_to_file(path, deck.text.as_bytes())?;
+        }
+        match ngspice::run(&deck, tran.tstop) {
+            Ok(outcome) => {
+                bar.finish_and_clear();
+                let name = format!("{version} reltol={reltol:e} method={method}");
+                let mut notes = deck.notes;
+                notes.extend(first_failure.map(|e| format!("with tighter settings {e}")));
+                return Ok(Theirs {
+                    name,
+                    waveforms: outcome.waveforms,
+                    shift: SHIFT * tran.tstep,
+                    notes,
+                });
+            }
+            Err(error @ ngspice::NgspiceError::Failed(_)) => {
+                first_failure.get_or_insert(error);
+            }
+            Err(error) => return Err(failed(error)),
+        }
+        bar.inc(1);
+    }
+    Err(first_failure.map_or_else(|| Failure::Message("ngspice was not run".into()), failed))
+}
+
+fn from_file(path: &Path) -> Result<Theirs, Failure> {
+    let file = BufReader::new(File::open(path).map_err(|e| Failure::file(path, e))?);
+    let is_raw = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("raw"));
+    let read = if is_raw {
+        raw::read(file)
+    } else {
+        csv::read(file)
+    };
+    let waveforms = read.map_err(|error| Failure::Waveforms {
+        path: path.to_owned(),
+        error,
+    })?;
+    Ok(Theirs {
+        name: path.display().to_string(),
+        waveforms,
+        shift: 0.0,
+        notes: Vec::new(),
+    })
+}
+
+/// Our side on a grid fine enough to be read at any time, with rows at events.
+fn simulated(
+    args: &CompareArgs,
+    subject: &Subject,
+    tran: Tran,
+    streams: &Streams,
+) -> Result<Waveforms, Failure> {
+    let method = match args.integration.method {
+        args::Method::Auto => Method::Auto,
+        args::Method::Exact => Method::Exact,
+        args::Method::Euler => Method::Euler,
+        args::Method::Theta => Method::Theta,
+    };
+    let step = args.integration.step;
+    let request = Request {
+        method,
+        theta: None,
+        gamma: None,
+        step,
+        tol: None,
+        events: true,
+    };
+    let divisions = (ROWS * tran.tstep / (tran.tstop - tran.tstart))
+        .ceil()
+        .max(1.0);
+    let run = sim::run(subject, &request, Some(tran.tstep / divisions), streams)
+        .map_err(|e| Failure::Message(format!("{}: {e}", args.input.file.display())))?;
+    for note in &run.notes {
+        streams.say(format!("note: {note}"));
+    }
+    Ok(run.waveforms)
+}
+
+/// The worst signals on both sides, with their difference.
+fn draw(path: &Path, ours: &Waveforms, theirs: &Theirs, found: &Comparison) -> Result<(), Failure> {
+    if !path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("svg") || e.eq_ignore_ascii_case("png"))
+    {
+        return Err(output::unknown_ending(path, "svg or png"));
+    }
+    let mut worst: Vec<_> = found.signals.iter().collect();
+    worst.sort_by(|a, b| b.max.total_cmp(&a.max));
+    let names: Vec<String> = worst.iter().take(DRAWN).map(|s| s.name.clone()).collect();
+    let delta = difference(ours, &theirs.waveforms)?;
+    let label = theirs.name.split(' ').next().unwrap_or("reference");
+    let figure = Figure::of_comparison(ours, &theirs.waveforms, &delta, label, &names);
+    output::picture_to_file(path, &svg::draw(&figure)?)
+}

@@ -1,0 +1,82 @@
+//! Exit statuses and why a command could not finish.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use crate::report::PictureError;
+use crate::waveform::WaveformError;
+use crate::waveform::compare::CompareError;
+
+/// The status of the process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Exit {
+    /// 0: done.
+    Done,
+    /// 1: done, and the answer is no.
+    No,
+    /// 2: it could not be done.
+    Failed,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(match exit {
+            Exit::Done => 0,
+            Exit::No => 1,
+            Exit::Failed => 2,
+        })
+    }
+}
+
+/// Why a command could not be carried out (status 2).
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// Standard output or standard error broke; a closed pipe is no failure.
+    #[error("writing failed: {0}")]
+    Stream(#[from] io::Error),
+    /// A file could not be read or written.
+    #[error("{}: {error}", path.display())]
+    File {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        error: io::Error,
+    },
+    /// A file of waveforms could not be read.
+    #[error("{}: {error}", path.display())]
+    Waveforms {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        error: WaveformError,
+    },
+    /// The netlist has faults; they have been shown already.
+    #[error("{0}")]
+    Faults(String),
+    /// A picture could not be made.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    /// Two sets of waveforms have nothing in common.
+    #[error(transparent)]
+    Compare(#[from] CompareError),
+    /// Anything else that the user should read.
+    #[error("{0}")]
+    Message(String),
+}
+
+impl Failure {
+    /// A failure of this file.
+    pub fn file(path: &Path, error: io::Error) -> Self {
+        Self::File {
+            path: path.to_owned(),
+            error,
+        }
+    }
+
+    /// Whether the reader of our output went away.
+    #[must_use]
+    pub fn is_closed_pipe(&self) -> bool {
+        matches!(self, Self::Stream(e) | Self::File { error: e, .. } if e.kind() == io::ErrorKind::BrokenPipe)
+    }
+}

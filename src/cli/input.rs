@@ -1,0 +1,236 @@
+//! What a file holds: a circuit from a netlist, or a system in JSON.
+
+use std::fs;
+
+use super::args::{Diodes, Input};
+use super::exit::Failure;
+use super::render;
+use super::streams::Streams;
+use crate::circuit::{self, Circuit, ElaborateOptions};
+use crate::diagnostic::{Diagnostic, Severity, SourceMap};
+use crate::integrate::start;
+use crate::lcs::json::{self, SystemFile};
+use crate::lcs::{Lcs, Position, reduce};
+use crate::mna::{self, Behaviour};
+use crate::netlist::{self, Loaded};
+use crate::settings::Settings;
+use crate::waveform::canonical_name;
+
+/// What there is to simulate.
+pub enum Subject {
+    /// From a netlist.
+    Circuit(Box<(Circuit, Behaviour)>),
+    /// From a file of `circ lcs`.
+    System(Box<SystemFile>),
+}
+
+/// Reads a file whose first character is `{` as a system; `None` for everything else.
+///
+/// # Errors
+/// [`Failure::Message`] when it is JSON but no system.
+pub fn system(input: &Input) -> Result<Option<SystemFile>, Failure> {
+    let Ok(bytes) = fs::read(&input.file) else {
+        return Ok(None);
+    };
+    let text = String::from_utf8_lossy(&bytes);
+    if !text.trim_start().starts_with('{') {
+        return Ok(None);
+    }
+    let system = json::read(&text)
+        .map_err(|e| Failure::Message(format!("{}: {e}", input.file.display())))?;
+    Ok(Some(system))
+}
+
+/// Reads a netlist with the choices made on the command line.
+#[must_use]
+pub fn load(input: &Input) -> Loaded {
+    let diodes = match input.diodes {
+        Diodes::Auto => circuit::Diodes::Auto,
+        Diodes::Ideal => circuit::Diodes::Ideal,
+        Diodes::Exp => circuit::Diodes::Exp,
+    };
+    netlist::load(
+        &input.file,
+        &ElaborateOptions {
+            diodes,
+            params: input.params.clone(),
+        },
+    )
+}
+
+/// Reads a file, shows what was found in it, and keeps the named probes if there are any.
+///
+/// # Errors
+/// [`Failure::Faults`] when the circuit cannot be built, [`Failure::Message`] for an unknown probe.
+pub fn open(input: &Input, probes: &[String], streams: &Streams) -> Result<Subject, Failure> {
+    if let Some(mut system) = system(input)? {
+        keep_outputs(&mut system.lcs, probes)?;
+        return Ok(Subject::System(Box::new(system)));
+    }
+    let Loaded {
+        sources,
+        circuit,
+        diagnostics,
+    } = load(input);
+    show(&diagnostics, &sources, streams);
+    let mut circuit = circuit.ok_or_else(|| faults(input, &diagnostics))?;
+    if !probes.is_empty() {
+        circuit.probes = probes
+            .iter()
+            .map(|name| {
+                let unknown =
+                    || Failure::Message(format!("--probe {name}: no such node or element"));
+                circuit.probe(name).ok_or_else(unknown)
+            })
+            .collect::<Result<_, _>>()?;
+    }
+    let behaviour = mna::behaviour(&circuit).map_err(|diagnostics| {
+        show(&diagnostics, &sources, streams);
+        faults(input, &diagnostics)
+    })?;
+    Ok(Subject::Circuit(Box::new((circuit, behaviour))))
+}
+
+/// The circuit of a netlist.
+///
+/// # Errors
+/// As [`open`]; a system has no circuit.
+pub fn circuit(input: &Input, streams: &Streams) -> Result<(Circuit, Behaviour), Failure> {
+    match open(input, &[], streams)? {
+        Subject::Circuit(both) => Ok(*both),
+        Subject::System(_) => {
+            let message = "is a system without a circuit; this command needs a netlist";
+            Err(Failure::Message(format!(
+                "{} {message}",
+                input.file.display()
+            )))
+        }
+    }
+}
+
+/// The system that a subject starts as: matrices in the start position of its switches (or the one asked for), and x there.
+///
+/// # Errors
+/// [`Failure::Message`] for an unknown switch or a circuit that is no system.
+pub fn start_system(
+    subject: &Subject,
+    wanted: &[(String, bool)],
+    streams: &Streams,
+) -> Result<SystemFile, Failure> {
+    let (circuit, behaviour) = match subject {
+        Subject::Circuit(both) => (&both.0, &both.1),
+        Subject::System(system) if wanted.is_empty() => return Ok((**system).clone()),
+        Subject::System(_) => {
+            return Err(Failure::Message(
+                "--switch: a system file holds one position of its switches".into(),
+            ));
+        }
+    };
+    let uic = circuit.tran.is_some_and(|t| t.uic);
+    let settings = Settings::default();
+    let initial = start::initial(circuit, behaviour, uic, &settings).or_else(|error| {
+        streams.say(format!(
+            "note: {error}; the start state is the initial conditions"
+        ));
+        start::initial(circuit, behaviour, true, &settings)
+    });
+    let initial = initial.map_err(|e| Failure::Message(e.to_string()))?;
+    for note in &initial.notes {
+        streams.say(format!("note: {note}"));
+    }
+    let mut switches = initial.switches;
+    for (k, on) in positions(behaviour, wanted)? {
+        switches[k] = on;
+    }
+    let lcs = reduce(behaviour, &Position::free(behaviour, switches))
+        .map_err(|e| Failure::Message(e.to_string()))?;
+    let x0 = &lcs.storage.inject * &initial.storage + &lcs.storage.inject_one;
+    Ok(SystemFile {
+        lcs,
+        x0,
+        tran: circuit.tran,
+    })
+}
+
+/// Indices and positions of the switches named on the command line.
+///
+/// # Errors
+/// [`Failure::Message`] for an unknown switch.
+pub fn positions(
+    behaviour: &Behaviour,
+    wanted: &[(String, bool)],
+) -> Result<Vec<(usize, bool)>, Failure> {
+    let known: Vec<&str> = behaviour.switches.iter().map(|s| s.name.as_str()).collect();
+    let found = wanted.iter().map(|(name, on)| {
+        let unknown = || match known[..] {
+            [] => Failure::Message(format!("--switch {name}: the circuit has no switch")),
+            _ => Failure::Message(format!(
+                "--switch {name}: the circuit has {}",
+                known.join(" ")
+            )),
+        };
+        Ok((
+            known.iter().position(|n| n == name).ok_or_else(unknown)?,
+            *on,
+        ))
+    });
+    found.collect()
+}
+
+/// Shows findings on standard error: errors always, the rest unless quiet.
+pub fn show(diagnostics: &[Diagnostic], sources: &SourceMap, streams: &Streams) {
+    let shown: Vec<Diagnostic> = diagnostics
+        .iter()
+        .filter(|d| d.severity == Severity::Error || !streams.quiet)
+        .cloned()
+        .collect();
+    if !shown.is_empty() {
+        streams.error(render(&shown, sources, streams.err_is_terminal()));
+    }
+}
+
+fn faults(input: &Input, diagnostics: &[Diagnostic]) -> Failure {
+    let count = diagnostics
+        .iter()
+        .filter(|d| d.severity == Severity::Error)
+        .count();
+    let noun = if count == 1 { "error" } else { "errors" };
+    Failure::Faults(format!("{}: {count} {noun}", input.file.display()))
+}
+
+fn keep_outputs(lcs: &mut Lcs, probes: &[String]) -> Result<(), Failure> {
+    if probes.is_empty() {
+        return Ok(());
+    }
+    let names: Vec<String> = lcs
+        .outputs
+        .names
+        .iter()
+        .map(|n| canonical_name(n))
+        .collect();
+    let kept = probes
+        .iter()
+        .map(|name| {
+            let known = || {
+                Failure::Message(format!(
+                    "--probe {name}: the system has {}",
+                    names.join(" ")
+                ))
+            };
+            names
+                .iter()
+                .position(|n| *n == canonical_name(name))
+                .ok_or_else(known)
+        })
+        .collect::<Result<Vec<usize>, _>>()?;
+    let outputs = &mut lcs.outputs;
+    outputs.names = kept.iter().map(|&k| outputs.names[k].clone()).collect();
+    outputs.units = kept.iter().map(|&k| outputs.units[k]).collect();
+    let rows = &mut outputs.rows;
+    rows.x = rows.x.select_rows(&kept);
+    rows.lambda = rows.lambda.select_rows(&kept);
+    rows.u = rows.u.select_rows(&kept);
+    rows.du = rows.du.select_rows(&kept);
+    rows.one = rows.one.select_rows(&kept);
+    Ok(())
+}

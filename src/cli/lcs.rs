@@ -1,0 +1,35 @@
+//! `circ lcs`.
+
+use super::args::{LcsArgs, SystemFormat};
+use super::exit::{Exit, Failure};
+use super::input;
+use super::output;
+use super::streams::Streams;
+use crate::lcs::format::{Format, format};
+use crate::lcs::json;
+
+/// Prints the complementarity system.
+///
+/// # Errors
+/// See [`Failure`].
+pub(super) fn lcs(args: &LcsArgs, streams: &Streams) -> Result<Exit, Failure> {
+    let subject = input::open(&args.input, &[], streams)?;
+    let system = input::start_system(&subject, &args.switches, streams)?;
+    let text = match args.format {
+        SystemFormat::Json => json::write(&system.lcs, &system.x0, system.tran),
+        SystemFormat::Text => format(&system.lcs, Format::Text),
+        SystemFormat::Numpy => format(&system.lcs, Format::Numpy),
+        SystemFormat::Matlab => format(&system.lcs, Format::Matlab),
+        SystemFormat::Latex => format(&system.lcs, Format::Latex),
+    };
+    let text = if text.ends_with('\n') {
+        text
+    } else {
+        text + "\n"
+    };
+    match &args.output {
+        Some(path) => output::bytes_to_file(path, text.as_bytes())?,
+        None => streams.data(text)?,
+    }
+    Ok(Exit::Done)
+}

@@ -1,0 +1,608 @@
+//! A circuit as a deck for ngspice, ideal devices replaced by what ngspice can do.
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+use crate::circuit::source::Wave;
+use crate::circuit::{
+    Affine, Circuit, Element, ElementId, Kind, NodeId, Output, Probed, Quantity, Source, Switch,
+    Tran,
+};
+use crate::cli::args::Realisation;
+use crate::law::Law;
+
+/// Ω: what a short or an ideal conducting device becomes where ngspice needs a resistance.
+const NEAR_SHORT: f64 = 1e-6;
+/// Ω: what an open or an ideal blocking device becomes.
+const NEAR_OPEN: f64 = 1e12;
+/// A: saturation current of the diodes written; with N = 0.01 it leaves 7 mV at 1 A.
+const SATURATION_CURRENT: f64 = 1e-12;
+/// Rise time of a true edge, relative to the span: ngspice would stretch a zero to a print step.
+pub const EDGE: f64 = 1e-7;
+/// Width of the steep parts of function blocks, relative to their inputs' size.
+const STEEP: f64 = 1e-6;
+
+/// ngspice's settings of one run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// `reltol`.
+    pub reltol: f64,
+    /// Largest step, s.
+    pub max_step: f64,
+    /// `gear` or `trap`.
+    pub method: &'static str,
+    /// What diodes become.
+    pub realisation: Realisation,
+}
+
+/// A deck, where ngspice keeps each probe, and what was changed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Deck {
+    /// The text.
+    pub text: String,
+    /// (our probe, the expression of ngspice vectors that is its value): `a` or `a − b`.
+    pub probes: Vec<(String, Reading)>,
+    /// What ngspice simulates instead of what the netlist says.
+    pub notes: Vec<String>,
+}
+
+/// Where the value of a probe stands in ngspice's results.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Reading {
+    /// One vector.
+    Vector(String),
+    /// The difference of two node voltages.
+    Difference(String, String),
+}
+
+/// Why there is no deck.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum DeckError {
+    /// Nothing to simulate.
+    #[error("there is no `.tran` card to compare")]
+    NoTran,
+    /// An element ngspice has no counterpart for.
+    #[error("{0} has no counterpart in ngspice")]
+    NoCounterpart(String),
+}
+
+/// Writes the deck of a circuit's transient.
+///
+/// # Errors
+/// See [`DeckError`].
+pub fn deck(circuit: &Circuit, options: &Options) -> Result<Deck, DeckError> {
+    let tran = circuit.tran.ok_or(DeckError::NoTran)?;
+    let mut writer = Writer {
+        circuit,
+        options,
+        tran,
+        sensed: sensed(circuit),
+        text: String::new(),
+        notes: BTreeSet::new(),
+    };
+    let title = circuit.title.replace(char::is_control, " ");
+    writer.line(format!("* {title}"));
+    for (k, element) in circuit.elements.iter().enumerate() {
+        writer.element(ElementId(k as u32), element)?;
+    }
+    for k in &circuit.couplings {
+        let (a, b) = (writer.card('l', k.a), writer.card('l', k.b));
+        writer.line(format!("k{} {a} {b} {:e}", k.name, k.k.f64));
+    }
+    let probes: Vec<_> = circuit
+        .probes()
+        .iter()
+        .map(|p| (p.name.clone(), writer.reading(p.what)))
+        .collect();
+    writer.controls(&probes);
+    let Writer { text, notes, .. } = writer;
+    Ok(Deck {
+        text,
+        probes,
+        notes: notes.into_iter().collect(),
+    })
+}
+
+/// Elements whose current needs a 0 V source in series because it controls something or is probed: ngspice's own readings
+/// of device currents come from the device equations and not from the solution.
+fn sensed(circuit: &Circuit) -> BTreeSet<ElementId> {
+    let controls = circuit.elements.iter().filter_map(|e| match &e.kind {
+        Kind::Controlled { control, .. } => Some(control),
+        Kind::Function { input, .. } => Some(input),
+        Kind::Switch(switch) => Some(&switch.control),
+        _ => None,
+    });
+    let controlling = controls
+        .flat_map(|c| &c.terms)
+        .filter_map(|(_, q)| match q {
+            Quantity::Current(id) => Some(*id),
+            Quantity::Voltage(_) => None,
+        });
+    let probed = circuit.probes().into_iter().filter_map(|p| match p.what {
+        Probed::Current(id) => Some(id),
+        Probed::Voltage(..) => None,
+    });
+    let is_ammeter = |id: &ElementId| {
+        matches!(
+            circuit.elements[id.index()].kind,
+            Kind::VoltageSource(_) | Kind::Inductor(_)
+        )
+    };
+    controlling
+        .chain(probed)
+        .filter(|id| !is_ammeter(id))
+        .collect()
+}
+
+struct Writer<'a> {
+    circuit: &'a Circuit,
+    options: &'a Options,
+    tran: Tran,
+    sensed: BTreeSet<ElementId>,
+    text: String,
+    notes: BTreeSet<String>,
+}
+
+impl Writer<'_> {
+    fn line(&mut self, line: impl AsRef<str>) {
+        self.text.push_str(line.as_ref());
+        self.text.push('\n');
+    }
+
+    /// The name of an element's card of this letter: `r1` stays, `x1.r1` becomes `r.x1.r1`.
+    fn card(&self, letter: char, id: ElementId) -> String {
+        let name = &self.circuit.elements[id.index()].name;
+        if name.starts_with(letter) {
+            name.clone()
+        } else {
+            format!("{letter}.{name}")
+        }
+    }
+
+    fn node(&self, id: NodeId) -> &str {
+        &self.circuit.nodes[id.index()]
+    }
+
+    fn element(&mut self, id: ElementId, element: &Element) -> Result<(), DeckError> {
+        let mut p = self.node(element.p).to_owned();
+        let n = self.node(element.n).to_owned();
+        if self.sensed.contains(&id) {
+            let inner = format!("{}_sense", element.name);
+            self.line(format!("v.{}_sense {p} {inner} 0", element.name));
+            p = inner;
+        }
+        let ic = element
+            .ic
+            .filter(|_| self.tran.uic)
+            .map_or(String::new(), |ic| format!(" ic={ic:e}"));
+        match &element.kind {
+            Kind::Resistor(r) if r.f64 == 0.0 => {
+                let card = self.card('v', id);
+                self.line(format!("{card} {p} {n} 0"));
+            }
+            Kind::Resistor(r) => {
+                let card = self.card('r', id);
+                self.line(format!("{card} {p} {n} {:e}", r.f64));
+            }
+            Kind::Capacitor(c) => {
+                let card = self.card('c', id);
+                self.line(format!("{card} {p} {n} {:e}{ic}", c.f64));
+            }
+            Kind::Inductor(l) => {
+                let card = self.card('l', id);
+                self.line(format!("{card} {p} {n} {:e}{ic}", l.f64));
+            }
+            Kind::VoltageSource(source) => {
+                let (card, wave) = (self.card('v', id), self.source(source));
+                self.line(format!("{card} {p} {n} {wave}"));
+            }
+            Kind::CurrentSource(source) => {
+                let (card, wave) = (self.card('i', id), self.source(source));
+                self.line(format!("{card} {p} {n} {wave}"));
+            }
+            Kind::Controlled { output, control } => {
+                let (card, value) = (self.card('b', id), self.affine(control));
+                self.line(format!("{card} {p} {n} {}={value}", letter(*output)));
+            }
+            Kind::Function { output, input, law } => {
+                let (card, x) = (self.card('b', id), self.affine(input));
+                let curve = self.curve(&element.name, law)?;
+                self.line(format!(
+                    "{card} {p} {n} {}=pwl({x}, {curve})",
+                    letter(*output)
+                ));
+            }
+            Kind::Device(Law::Diode { vfwd, ron, roff }) => {
+                self.diode(id, &p, &n, vfwd.f64, ron.f64, roff.map(|r| r.f64));
+            }
+            Kind::Device(law) => {
+                let card = self.card('b', id);
+                let curve = self.curve(&element.name, law)?;
+                self.line(format!("{card} {p} {n} i=pwl(v({p},{n}), {curve})"));
+            }
+            Kind::Switch(switch) => self.switch(id, &p, &n, switch),
+        }
+        Ok(())
+    }
+
+    /// A piecewise-linear diode as a diode model with a source for its drop, or as the code model.
+    fn diode(&mut self, id: ElementId, p: &str, n: &str, vfwd: f64, ron: f64, roff: Option<f64>) {
+        let name = self.circuit.elements[id.index()].name.clone();
+        let roff = roff.unwrap_or(NEAR_OPEN);
+        let emission = match self.options.realisation {
+            Realisation::Default => 1.0,
+            Realisation::N001 => 0.01,
+            Realisation::N0001 => 0.001,
+            Realisation::Sidiode => {
+                self.notes
+                    .insert("ideal diodes are the code model sidiode".into());
+                self.line(format!("a.{name} {p} {n} m.{name}"));
+                let ron = ron.max(NEAR_SHORT);
+                return self.line(format!(
+                    ".model m.{name} sidiode(ron={ron:e} roff={roff:e} vfwd={vfwd:e})"
+                ));
+            }
+        };
+        self.notes
+            .insert(format!("ideal diodes are D models with N = {emission}"));
+        let card = self.card('d', id);
+        let mut anode = p.to_owned();
+        if vfwd != 0.0 {
+            anode = format!("{name}_drop");
+            self.line(format!("v.{name}_drop {p} {anode} {vfwd:e}"));
+        }
+        self.line(format!("{card} {anode} {n} m.{name}"));
+        self.line(format!(
+            ".model m.{name} d(is={SATURATION_CURRENT:e} n={emission} rs={ron:e})"
+        ));
+        if roff < NEAR_OPEN {
+            self.line(format!("r.{name}_off {p} {n} {roff:e}"));
+        }
+    }
+
+    fn switch(&mut self, id: ElementId, p: &str, n: &str, switch: &Switch) {
+        let name = self.circuit.elements[id.index()].name.clone();
+        let control = self.affine(&switch.control);
+        let (threshold, half) = (
+            0.5 * (switch.on_above + switch.off_below),
+            0.5 * (switch.on_above - switch.off_below),
+        );
+        let (ron, roff) = (
+            switch.ron.f64.max(NEAR_SHORT),
+            switch.roff.map_or(NEAR_OPEN, |r| r.f64),
+        );
+        let initial = match switch.initial {
+            Some(true) => " on",
+            Some(false) => " off",
+            None => "",
+        };
+        self.line(format!("b.{name}_control {name}_control 0 v={control}"));
+        let card = self.card('s', id);
+        self.line(format!("{card} {p} {n} {name}_control 0 m.{name}{initial}"));
+        self.line(format!(
+            ".model m.{name} sw(vt={threshold:e} vh={half:e} ron={ron:e} roff={roff:e})"
+        ));
+    }
+
+    /// An affine function as an expression of a B source.
+    fn affine(&self, affine: &Affine) -> String {
+        let mut text = format!("({:e}", affine.constant);
+        for (gain, quantity) in &affine.terms {
+            let vector = match quantity {
+                Quantity::Voltage(NodeId::GROUND) => continue,
+                Quantity::Voltage(node) => format!("v({})", self.node(*node)),
+                Quantity::Current(id) => format!("i({})", self.ammeter(*id)),
+            };
+            // Writing to a string does not fail.
+            let _ = write!(text, " + ({:e})*{vector}", gain.f64);
+        }
+        text + ")"
+    }
+
+    /// The card whose branch current is the current of an element.
+    fn ammeter(&self, id: ElementId) -> String {
+        let element = &self.circuit.elements[id.index()];
+        match &element.kind {
+            _ if self.sensed.contains(&id) => format!("v.{}_sense", element.name),
+            Kind::Inductor(_) => self.card('l', id),
+            _ => self.card('v', id),
+        }
+    }
+
+    /// The vertices of a law, its rays cut far out, its vertical parts given a width.
+    fn curve(&mut self, name: &str, law: &Law) -> Result<String, DeckError> {
+        let Law::Curve(curve) = law else {
+            return Err(DeckError::NoCounterpart(name.into()));
+        };
+        let points: Vec<(f64, f64)> = curve.vertices.iter().map(|(v, i)| (v.f64, i.f64)).collect();
+        let (first, last) = (points[0], points[points.len() - 1]);
+        let size = points.iter().map(|p| p.0.abs()).fold(1.0, f64::max);
+        let far = |from: (f64, f64), ray: &(_, _), sign: f64| {
+            let (dx, dy): (crate::algebra::Value, crate::algebra::Value) = *ray;
+            let length = if dx.f64 > 0.0 {
+                1e3 * size / dx.f64
+            } else {
+                1.0 / NEAR_SHORT / dy.f64.max(NEAR_SHORT)
+            };
+            (
+                from.0 + sign * length * dx.f64,
+                from.1 + sign * length * dy.f64,
+            )
+        };
+        let mut all = vec![far(first, &curve.first, -1.0)];
+        all.extend(points);
+        all.push(far(last, &curve.last, 1.0));
+        self.notes
+            .insert(format!("steep parts of {name} are given a width"));
+        let mut text = String::new();
+        let mut previous = f64::NEG_INFINITY;
+        for (x, y) in all {
+            let x = if x > previous {
+                x
+            } else {
+                previous + STEEP * size
+            };
+            previous = x;
+            let _ = write!(
+                text,
+                "{}{x:e}, {y:e}",
+                if text.is_empty() { "" } else { ", " }
+            );
+        }
+        Ok(text)
+    }
+
+    fn source(&mut self, source: &Source) -> String {
+        let edge = EDGE * self.tran.tstop;
+        let (wave, stretched) = waveform(&source.wave, edge);
+        if stretched {
+            self.notes
+                .insert(format!("edges of zero width take {edge:e} s"));
+        }
+        format!("dc {:e} {wave}", source.dc)
+    }
+
+    fn reading(&self, probed: Probed) -> Reading {
+        let voltage = |node: NodeId| format!("v({})", self.node(node));
+        match probed {
+            Probed::Voltage(a, NodeId::GROUND) => Reading::Vector(voltage(a)),
+            Probed::Voltage(NodeId::GROUND, b) => Reading::Difference("0".into(), voltage(b)),
+            Probed::Voltage(a, b) => Reading::Difference(voltage(a), voltage(b)),
+            Probed::Current(id) => Reading::Vector(format!("i({})", self.ammeter(id))),
+        }
+    }
+
+    fn controls(&mut self, probes: &[(String, Reading)]) {
+        let vectors: BTreeSet<&str> = probes
+            .iter()
+            .flat_map(|(_, reading)| match reading {
+                Reading::Vector(v) => vec![v.as_str()],
+                Reading::Difference(a, b) => vec![a.as_str(), b.as_str()],
+            })
+            .filter(|v| *v != "0")
+            .collect();
+        let saved = vectors.into_iter().collect::<Vec<_>>().join(" ");
+        for (a, b, volts) in &self.circuit.initial_voltages {
+            if *b == NodeId::GROUND {
+                let line = format!(".ic v({})={volts:e}", self.node(*a));
+                self.line(line);
+            } else {
+                self.notes
+                    .insert("an `.ic` between two nodes is left out".into());
+            }
+        }
+        let Tran {
+            tstep,
+            tstop,
+            tstart,
+            uic,
+            ..
+        } = self.tran;
+        let Options {
+            reltol,
+            max_step,
+            method,
+            ..
+        } = *self.options;
+        self.line(format!(".options reltol={reltol:e} method={method}"));
+        let uic = if uic { " uic" } else { "" };
+        self.line(format!(
+            ".tran {tstep:e} {tstop:e} {tstart:e} {max_step:e}{uic}"
+        ));
+        self.line(format!(".save {saved}"));
+        self.line(".end");
+    }
+}
+
+const fn letter(output: Output) -> char {
+    match output {
+        Output::Voltage => 'v',
+        Output::Current => 'i',
+    }
+}
+
+/// A waveform in SPICE's words, and whether an edge had to be given a width.
+fn waveform(wave: &Wave, edge: f64) -> (String, bool) {
+    let mut stretched = false;
+    let mut widened = |duration: f64| {
+        stretched |= duration == 0.0;
+        if duration == 0.0 { edge } else { duration }
+    };
+    let text = match wave {
+        Wave::Dc(value) => format!("{value:e}"),
+        Wave::Sin {
+            offset,
+            amplitude,
+            frequency,
+            delay,
+            damping,
+            phase,
+        } => {
+            format!("sin({offset:e} {amplitude:e} {frequency:e} {delay:e} {damping:e} {phase:e})")
+        }
+        Wave::Pulse {
+            v1,
+            v2,
+            delay,
+            rise,
+            fall,
+            width,
+            period,
+            count,
+        } => {
+            let (rise, fall) = (widened(*rise), widened(*fall));
+            let count = count.map_or(String::new(), |n| format!(" {n:e}"));
+            format!("pulse({v1:e} {v2:e} {delay:e} {rise:e} {fall:e} {width:e} {period:e}{count})")
+        }
+        Wave::Pwl {
+            points,
+            repeat,
+            delay,
+        } => {
+            let mut text = String::from("pwl(");
+            let mut previous = f64::NEG_INFINITY;
+            for &(t, value) in points {
+                let t = if t > previous {
+                    t
+                } else {
+                    previous + widened(0.0)
+                };
+                previous = t;
+                let _ = write!(text, "{t:e} {value:e} ");
+            }
+            text.push(')');
+            if let Some(from) = repeat {
+                let _ = write!(text, " r={from:e}");
+            }
+            if *delay != 0.0 {
+                let _ = write!(text, " td={delay:e}");
+            }
+            text
+        }
+        Wave::Sffm {
+            offset,
+            amplitude,
+            carrier,
+            index,
+            signal,
+            carrier_phase,
+            signal_phase,
+        } => format!(
+            "sffm({offset:e} {amplitude:e} {carrier:e} {index:e} {signal:e} {carrier_phase:e} {signal_phase:e})"
+        ),
+        Wave::Am {
+            amplitude,
+            offset,
+            modulation,
+            carrier,
+            delay,
+        } => {
+            format!("am({amplitude:e} {offset:e} {modulation:e} {carrier:e} {delay:e})")
+        }
+        Wave::Exp {
+            v1,
+            v2,
+            rise_delay,
+            rise_tau,
+            fall_delay,
+            fall_tau,
+        } => {
+            format!("exp({v1:e} {v2:e} {rise_delay:e} {rise_tau:e} {fall_delay:e} {fall_tau:e})")
+        }
+    };
+    (text, stretched)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::circuit::{ElaborateOptions, elaborate};
+    use crate::diagnostic::SourceMap;
+    use crate::netlist;
+
+    fn circuit(text: &str) -> Circuit {
+        let mut sources = SourceMap::default();
+        let root = sources.add("test.cir", text);
+        let missing = |_: &std::path::Path| Err(std::io::ErrorKind::NotFound.into());
+        let (parsed, faults) = netlist::parse(&mut sources, root, &missing);
+        assert!(faults.is_empty(), "{faults:?}");
+        let (circuit, faults) = elaborate(&parsed, &ElaborateOptions::default());
+        circuit.unwrap_or_else(|| panic!("{faults:?}"))
+    }
+
+    fn options(realisation: Realisation) -> Options {
+        Options {
+            reltol: 1e-4,
+            max_step: 1e-6,
+            method: "gear",
+            realisation,
+        }
+    }
+
+    #[test]
+    fn ideal_devices_become_what_ngspice_has() {
+        let circuit = circuit(
+            "rectifier with a switch\n\
+             v1 in 0 pulse(0 5 0 0 0 1m 2m)\n\
+             d1 in out dideal\n\
+             s1 out load c 0 sw1\n\
+             vc c 0 dc 5\n\
+             x1 load 0 filter\n\
+             .subckt filter a b\n\
+             r1 a b 1k\n\
+             c1 a b 1u ic=1\n\
+             .ends\n\
+             .model dideal d(ron=0.1 vfwd=0.7 roff=1meg)\n\
+             .model sw1 sw(vt=1 vh=0.5 ron=1m roff=1g)\n\
+             .tran 1u 4m uic\n\
+             .save v(load) v(in,out) i(d1) i(x1.r1)\n\
+             .end\n",
+        );
+        let deck = deck(&circuit, &options(Realisation::N001)).unwrap();
+        insta::assert_snapshot!(format!("{}{}", deck.text, deck.notes.join("\n")), @r"
+        * rectifier with a switch
+        v1 in 0 dc 5e0 pulse(0e0 5e0 0e0 4e-10 4e-10 1e-3 2e-3)
+        v.d1_sense in d1_sense 0
+        v.d1_drop d1_sense d1_drop 7e-1
+        d1 d1_drop out m.d1
+        .model m.d1 d(is=1e-12 n=0.01 rs=1e-1)
+        r.d1_off d1_sense out 1e6
+        b.s1_control s1_control 0 v=(0e0 + (1e0)*v(c))
+        s1 out load s1_control 0 m.s1
+        .model m.s1 sw(vt=1e0 vh=5e-1 ron=1e-3 roff=1e9)
+        vc c 0 dc 5e0 5e0
+        v.x1.r1_sense load x1.r1_sense 0
+        r.x1.r1 x1.r1_sense 0 1e3
+        c.x1.c1 load 0 1e-6 ic=1e0
+        .options reltol=1e-4 method=gear
+        .tran 1e-6 4e-3 0e0 1e-6 uic
+        .save i(v.d1_sense) i(v.x1.r1_sense) v(in) v(load) v(out)
+        .end
+        edges of zero width take 4e-10 s
+        ideal diodes are D models with N = 0.01
+        ");
+    }
+
+    #[test]
+    fn code_model_diodes_are_measured_in_series() {
+        let circuit =
+            circuit("t\nv1 a 0 1\nd1 a 0 di\n.model di d(ideal)\n.tran 1u 1m\n.save i(d1)\n.end\n");
+        let deck = deck(&circuit, &options(Realisation::Sidiode)).unwrap();
+        assert!(
+            deck.text
+                .contains("v.d1_sense a d1_sense 0\na.d1 d1_sense 0 m.d1\n"),
+            "{}",
+            deck.text
+        );
+        assert_eq!(
+            deck.probes,
+            [("i(d1)".to_owned(), Reading::Vector("i(v.d1_sense)".into()))]
+        );
+    }
+
+    #[test]
+    fn without_a_transient_there_is_no_deck() {
+        let error = deck(&Circuit::default(), &options(Realisation::Default)).unwrap_err();
+        assert_eq!(error, DeckError::NoTran);
+    }
+}

@@ -1,0 +1,211 @@
+//! `circ sim`.
+
+use std::io::Write;
+
+use super::args::{self, MethodArgs, SimArgs, Summary};
+use super::cpu;
+use super::exit::{Exit, Failure};
+use super::input::{self, Subject};
+use super::output::{self, Format};
+use super::streams::Streams;
+use crate::circuit::{Circuit, Tran};
+use crate::integrate::{Method, Run, SimError, SimOptions, simulate, simulate_system};
+use crate::report::{json, terminal, text};
+use crate::settings::Settings;
+use crate::waveform::csv;
+
+/// Divisions of the progress bar.
+const PROGRESS: f64 = 1000.0;
+
+/// Simulates and writes what was asked for; a run that broke off is written as far as it came.
+///
+/// # Errors
+/// See [`Failure`].
+pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
+    let formats = args
+        .outputs
+        .iter()
+        .map(|path| Format::of(path))
+        .collect::<Result<Vec<_>, _>>()?;
+    let subject = input::open(&args.input, &args.probes, streams)?;
+    let request = Request::of(&args.method, args.events)?;
+    let outcome = run(&subject, &request, None, streams);
+    let (finished, error) = match outcome {
+        Ok(run) => (Some(run), None),
+        Err(mut error) => (error.partial.take().map(|run| *run), Some(error)),
+    };
+    if let Some(run) = &finished {
+        if args.method.step.is_some() && run.method == Method::Exact.name() {
+            streams.say("note: --step is of no use to exact integration, which has no steps");
+        }
+        for (path, format) in args.outputs.iter().zip(formats) {
+            match output::write(run, format, path) {
+                // A picture of a run that broke off before its first row.
+                Err(Failure::Picture(_)) if error.is_some() => {}
+                written => written?,
+            }
+        }
+        summarise(run, args, streams);
+        if args.outputs.is_empty() {
+            show(run, streams)?;
+        }
+    }
+    match error {
+        None => Ok(Exit::Done),
+        Some(error) => Err(Failure::Message(format!(
+            "{}: {error}",
+            args.input.file.display()
+        ))),
+    }
+}
+
+/// How a subject is to be integrated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Request {
+    /// The method.
+    pub method: Method,
+    /// θ.
+    pub theta: Option<f64>,
+    /// γ.
+    pub gamma: Option<f64>,
+    /// Fixed step, s.
+    pub step: Option<f64>,
+    /// Relative tolerance.
+    pub tol: Option<f64>,
+    /// Rows at events.
+    pub events: bool,
+}
+
+impl Request {
+    /// What the flags ask for; θ or γ without a method ask for `theta`.
+    ///
+    /// # Errors
+    /// [`Failure::Message`] when θ or γ are given to another method.
+    pub fn of(args: &MethodArgs, events: bool) -> Result<Self, Failure> {
+        let shaped = args.theta.is_some() || args.gamma.is_some();
+        let method = match args.method {
+            args::Method::Auto if shaped => Method::Theta,
+            args::Method::Auto => Method::Auto,
+            args::Method::Exact => Method::Exact,
+            args::Method::Euler => Method::Euler,
+            args::Method::Theta => Method::Theta,
+        };
+        if shaped && method != Method::Theta {
+            return Err(Failure::Message(
+                "--theta and --gamma belong to `--method theta`".into(),
+            ));
+        }
+        let MethodArgs {
+            theta,
+            gamma,
+            step,
+            tol,
+            ..
+        } = *args;
+        Ok(Self {
+            method,
+            theta,
+            gamma,
+            step,
+            tol,
+            events,
+        })
+    }
+}
+
+/// Simulates over the subject's `.tran`, with `tstep` in place of its print step if given.
+///
+/// # Errors
+/// See [`SimError`].
+pub fn run(
+    subject: &Subject,
+    request: &Request,
+    tstep: Option<f64>,
+    streams: &Streams,
+) -> Result<Run, SimError> {
+    let tran = tran(subject).map(|t| Tran {
+        tstep: tstep.unwrap_or(t.tstep),
+        ..t
+    });
+    let bar = streams.progress(PROGRESS as u64, "simulating");
+    let span = tran.map_or(1.0, |t| t.tstop);
+    let mut report = |t: f64| bar.set_position((t / span * PROGRESS) as u64);
+    let mut settings = Settings::default();
+    if let Some(tol) = request.tol {
+        settings.tol = tol;
+    }
+    let options = SimOptions {
+        method: request.method,
+        theta: request.theta,
+        gamma: request.gamma,
+        step: request.step,
+        events: request.events,
+        settings,
+        progress: Some(&mut report),
+    };
+    let circuit = match subject {
+        Subject::Circuit(both) => Circuit {
+            tran,
+            ..both.0.clone()
+        },
+        Subject::System(_) => Circuit::default(),
+    };
+    let before = cpu::own().unwrap_or_default();
+    let mut result = match (subject, tran) {
+        (Subject::Circuit(both), _) => simulate(&circuit, &both.1, options),
+        (Subject::System(system), Some(tran)) => {
+            simulate_system(&system.lcs, &system.x0, tran, options)
+        }
+        (Subject::System(_), None) => {
+            let reason = "the system has no \"tran\": {\"tstep\", \"tstop\"}";
+            Err(SimError::before(crate::integrate::Reason::Unsupported(
+                reason.into(),
+            )))
+        }
+    };
+    bar.finish_and_clear();
+    let reached = match &mut result {
+        Ok(run) => Some(run),
+        Err(error) => error.partial.as_deref_mut(),
+    };
+    if let Some(run) = reached {
+        run.stats.cpu_seconds = (cpu::own().unwrap_or_default() - before).max(0.0);
+    }
+    result
+}
+
+/// The transient that a subject asks for.
+#[must_use]
+pub fn tran(subject: &Subject) -> Option<Tran> {
+    match subject {
+        Subject::Circuit(both) => both.0.tran,
+        Subject::System(system) => system.tran,
+    }
+}
+
+/// On standard error: JSON where asked for; words where asked for, for a person, and with `-v`; else the notes alone.
+fn summarise(run: &Run, args: &SimArgs, streams: &Streams) {
+    match args.summary {
+        Some(Summary::Json) => streams.error(json::summary(run)),
+        Some(Summary::Text) => streams.error(text::summary(run, streams.verbose)),
+        None if streams.verbose || streams.err_is_terminal() => {
+            streams.say(text::summary(run, streams.verbose));
+        }
+        None => {
+            for note in &run.notes {
+                streams.say(format!("note: {note}"));
+            }
+        }
+    }
+}
+
+/// On standard output: a character plot for a person, CSV for a program.
+fn show(run: &Run, streams: &Streams) -> Result<(), Failure> {
+    if streams.out_is_terminal() {
+        let (lines, columns) = streams.size();
+        return Ok(streams.data(terminal::plot(&run.waveforms, columns, lines))?);
+    }
+    let mut out = streams.out();
+    csv::write(&mut out, &run.waveforms)?;
+    Ok(out.flush()?)
+}

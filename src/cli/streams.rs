@@ -1,0 +1,82 @@
+//! Standard output for data, standard error for everything else.
+
+use std::fmt::Display;
+use std::io::{self, IsTerminal, Write};
+
+use console::Term;
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Lines of a terminal when it does not say.
+const DEFAULT_SIZE: (usize, usize) = (24, 80);
+
+/// Where a command writes, and how much it says.
+pub struct Streams {
+    /// Only errors on standard error.
+    pub quiet: bool,
+    /// Explanations on standard error.
+    pub verbose: bool,
+}
+
+impl Streams {
+    /// Whether data goes to a person.
+    #[must_use]
+    pub fn out_is_terminal(&self) -> bool {
+        io::stdout().is_terminal()
+    }
+
+    /// Whether a person reads standard error.
+    #[must_use]
+    pub fn err_is_terminal(&self) -> bool {
+        io::stderr().is_terminal()
+    }
+
+    /// Lines and columns of the terminal on standard output.
+    #[must_use]
+    pub fn size(&self) -> (usize, usize) {
+        Term::stdout()
+            .size_checked()
+            .map_or(DEFAULT_SIZE, |(rows, columns)| {
+                (usize::from(rows), usize::from(columns))
+            })
+    }
+
+    /// Writes data to standard output.
+    ///
+    /// # Errors
+    /// Those of standard output.
+    pub fn data(&self, bytes: impl AsRef<[u8]>) -> io::Result<()> {
+        let mut out = io::stdout().lock();
+        out.write_all(bytes.as_ref())?;
+        out.flush()
+    }
+
+    /// Standard output for a long stream of data; errors of its end are lost on drop, so flush it.
+    #[must_use]
+    pub fn out(&self) -> impl Write + use<> {
+        io::BufWriter::new(io::stdout().lock())
+    }
+
+    /// Says something unless asked to be quiet. That nobody listens on standard error is no failure.
+    pub fn say(&self, text: impl Display) {
+        if !self.quiet {
+            self.error(text);
+        }
+    }
+
+    /// Says something even when quiet.
+    pub fn error(&self, text: impl Display) {
+        let _ = writeln!(io::stderr().lock(), "{}", text.to_string().trim_end());
+    }
+
+    /// A progress bar over `length` units on a terminal; hidden elsewhere and when quiet.
+    #[must_use]
+    pub fn progress(&self, length: u64, what: &str) -> ProgressBar {
+        if self.quiet || !self.err_is_terminal() {
+            return ProgressBar::hidden();
+        }
+        let style = ProgressStyle::with_template("{msg} {wide_bar} {percent}% {eta}");
+        ProgressBar::new(length)
+            .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+            .with_message(what.to_owned())
+    }
+}

@@ -1,0 +1,212 @@
+//! Projected dynamical systems x' = Π_K(x, −F(x)) and gradient-type complementarity systems
+//! x' = −F(x) + H(x)ᵀu, 0 ≤ h(x) ⟂ u ≥ 0, H = ∂h/∂x (Heemels et al. (4), (7)), K = {h ≥ 0}.
+
+use std::fmt;
+use std::rc::Rc;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::{Complementarity, FormError, Polyhedron, require};
+
+/// A differentiable map Rⁿ → Rᵏ.
+#[derive(Clone)]
+pub struct Map {
+    /// Its value.
+    pub value: Rc<dyn Fn(&DVector<f64>) -> DVector<f64>>,
+    /// Its Jacobian, k×n.
+    pub jacobian: Rc<dyn Fn(&DVector<f64>) -> DMatrix<f64>>,
+    /// Whether it is affine.
+    pub affine: bool,
+}
+
+impl fmt::Debug for Map {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Map")
+            .field("affine", &self.affine)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Map {
+    /// x ↦ Mx + c.
+    #[must_use]
+    pub fn affine(m: DMatrix<f64>, c: DVector<f64>) -> Self {
+        let jacobian = m.clone();
+        Self {
+            value: Rc::new(move |x| &m * x + &c),
+            jacobian: Rc::new(move |_| jacobian.clone()),
+            affine: true,
+        }
+    }
+
+    /// Any map with its Jacobian.
+    pub fn new(
+        value: impl Fn(&DVector<f64>) -> DVector<f64> + 'static,
+        jacobian: impl Fn(&DVector<f64>) -> DMatrix<f64> + 'static,
+    ) -> Self {
+        Self {
+            value: Rc::new(value),
+            jacobian: Rc::new(jacobian),
+            affine: false,
+        }
+    }
+}
+
+/// A projected dynamical system PDS(F, K), and with the same data the gradient-type system GTCS(F, h).
+#[derive(Debug, Clone)]
+pub struct ProjectedSystem {
+    /// F.
+    pub field: Map,
+    /// h, concave so that K = {h ≥ 0} is convex.
+    pub set: Map,
+    n: usize,
+    m: usize,
+}
+
+/// A constraint counts as active below this value, relative to 1 + |x|.
+const ACTIVE: f64 = 1e-9;
+
+/// Smallest singular value of the active gradients (relative) that counts as full row rank.
+const RANK: f64 = 1e-10;
+
+impl ProjectedSystem {
+    /// From F and h on Rⁿ.
+    ///
+    /// # Errors
+    /// [`FormError::Shape`].
+    pub fn new(field: Map, set: Map, n: usize) -> Result<Self, FormError> {
+        let at = DVector::zeros(n);
+        let f = (field.value)(&at);
+        if f.len() != n {
+            return Err(FormError::Shape {
+                what: "F",
+                rows: f.len(),
+                columns: 1,
+            });
+        }
+        let m = (set.value)(&at).len();
+        let h = (set.jacobian)(&at);
+        if h.shape() != (m, n) {
+            return Err(FormError::Shape {
+                what: "∂h/∂x",
+                rows: h.nrows(),
+                columns: h.ncols(),
+            });
+        }
+        Ok(Self { field, set, n, m })
+    }
+
+    /// I(x), the constraints that x meets with equality.
+    #[must_use]
+    pub fn active(&self, x: &DVector<f64>) -> Vec<usize> {
+        let h = (self.set.value)(x);
+        (0..self.m)
+            .filter(|&i| h[i].abs() <= ACTIVE * (1.0 + x.amax()))
+            .collect()
+    }
+
+    /// H_I(x), the gradients of the active constraints.
+    #[must_use]
+    pub fn active_gradients(&self, x: &DVector<f64>) -> DMatrix<f64> {
+        (self.set.jacobian)(x).select_rows(&self.active(x))
+    }
+
+    /// Assumption 4.2 at x: the active gradients are linearly independent.
+    ///
+    /// # Errors
+    /// [`FormError::Hypothesis`] with their smallest singular value.
+    pub fn qualified(&self, x: &DVector<f64>) -> Result<(), FormError> {
+        let h = self.active_gradients(x);
+        if h.is_empty() {
+            return Ok(());
+        }
+        let values = if h.nrows() > h.ncols() {
+            DVector::zeros(1)
+        } else {
+            h.singular_values()
+        };
+        require(
+            values.min() > RANK * values.max(),
+            "Heemels et al. Theorem 4.7",
+            "Assumption 4.2: the active gradients are dependent",
+            values.min(),
+        )
+    }
+
+    /// The cone of admissible velocities W(x) (16).
+    #[must_use]
+    pub fn admissible(&self, x: &DVector<f64>) -> Polyhedron {
+        let g = self.active_gradients(x);
+        Polyhedron {
+            h: DVector::zeros(g.nrows()),
+            g,
+        }
+    }
+
+    /// Π_K(x, v) = v + H_Iᵀu with 0 ≤ u ⟂ H_I v + H_I H_Iᵀu ≥ 0 (23), and u.
+    ///
+    /// # Errors
+    /// [`FormError::Step`] if the problem was not solved.
+    pub fn project_velocity(
+        &self,
+        x: &DVector<f64>,
+        v: &DVector<f64>,
+    ) -> Result<(DVector<f64>, DVector<f64>), FormError> {
+        self.admissible(x).project(v)
+    }
+
+    /// x' = Π_K(x, −F(x)).
+    ///
+    /// # Errors
+    /// Those of [`ProjectedSystem::project_velocity`].
+    pub fn velocity(&self, x: &DVector<f64>) -> Result<DVector<f64>, FormError> {
+        Ok(self.project_velocity(x, &-(self.field.value)(x))?.0)
+    }
+
+    /// P_K(x), the nearest point of K: the step of the system without field.
+    ///
+    /// # Errors
+    /// Those of [`step`](super::step()).
+    pub fn nearest(&self, x: &DVector<f64>) -> Result<DVector<f64>, FormError> {
+        let n = self.n;
+        let still = Self {
+            field: Map::affine(DMatrix::zeros(n, n), DVector::zeros(n)),
+            ..self.clone()
+        };
+        Ok(super::step(&still, 0.0, x, 1.0)?.x)
+    }
+}
+
+impl Complementarity for ProjectedSystem {
+    fn size(&self) -> (usize, usize) {
+        (self.n, self.m)
+    }
+
+    fn drift(&self, _: f64, x: &DVector<f64>) -> DVector<f64> {
+        -(self.field.value)(x)
+    }
+
+    fn drift_jacobian(&self, _: f64, x: &DVector<f64>) -> DMatrix<f64> {
+        -(self.field.jacobian)(x)
+    }
+
+    fn input(&self, x: &DVector<f64>) -> DMatrix<f64> {
+        (self.set.jacobian)(x).transpose()
+    }
+
+    fn constraint(&self, _: f64, x: &DVector<f64>) -> DVector<f64> {
+        (self.set.value)(x)
+    }
+
+    fn constraint_jacobian(&self, _: f64, x: &DVector<f64>) -> DMatrix<f64> {
+        (self.set.jacobian)(x)
+    }
+
+    fn feedthrough(&self) -> DMatrix<f64> {
+        DMatrix::zeros(self.m, self.m)
+    }
+
+    fn is_affine(&self) -> bool {
+        self.field.affine && self.set.affine
+    }
+}

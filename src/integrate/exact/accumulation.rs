@@ -1,0 +1,77 @@
+//! Events that accumulate at one time (Zeno): the state reaches the point of accumulation to rounding after finitely many.
+
+/// Shrinking intervals in a row, and their total shrinkage, that count as an accumulation.
+const EVENTS: u32 = 12;
+const SHRINKAGE: f64 = 1e-3;
+
+/// Watches the intervals between events.
+#[derive(Debug, Clone)]
+pub(crate) struct Accumulation {
+    since: f64,
+    last: f64,
+    first_interval: f64,
+    interval: f64,
+    count: u32,
+}
+
+impl Accumulation {
+    /// A watch that starts at t.
+    pub(crate) fn new(t: f64) -> Self {
+        Self { since: t, last: t, first_interval: f64::INFINITY, interval: f64::INFINITY, count: 0 }
+    }
+
+    /// An event at t; returns the note of an accumulation that it ends.
+    pub(crate) fn event(&mut self, t: f64) -> Option<String> {
+        let interval = t - self.last;
+        if interval <= 0.0 {
+            return None;
+        }
+        let mut note = None;
+        if interval < self.interval && self.count > 0 {
+            self.count += 1;
+        } else {
+            note = self.end();
+            self.since = self.last;
+            self.first_interval = interval;
+            self.count = 1;
+        }
+        self.interval = interval;
+        self.last = t;
+        note
+    }
+
+    /// The note of an accumulation in progress, which ends.
+    pub(crate) fn end(&mut self) -> Option<String> {
+        let found = self.count >= EVENTS && self.interval < SHRINKAGE * self.first_interval;
+        let note = found.then(|| {
+            format!(
+                "events accumulate between t = {:e} s and t = {:e} s ({} events in shrinking intervals); the solution goes on \
+                 beyond",
+                self.since, self.last, self.count
+            )
+        });
+        self.count = 0;
+        note
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_geometric_series_is_noted_and_a_clock_is_not() {
+        let mut watch = Accumulation::new(0.0);
+        let (mut t, mut dt) = (0.0, 1.0);
+        for _ in 0..20 {
+            t += dt;
+            dt /= 2.0;
+            assert_eq!(watch.event(t), None);
+        }
+        assert!(watch.event(5.0).is_some_and(|note| note.contains("20 events")));
+        for k in 0..50 {
+            assert_eq!(watch.event(6.0 + f64::from(k)), None);
+        }
+        assert_eq!(watch.end(), None);
+    }
+}

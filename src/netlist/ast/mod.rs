@@ -1,0 +1,303 @@
+//! What a netlist says, card by card: nothing evaluated, nothing derived, every piece with its place in the text.
+
+mod expr;
+
+use std::fmt;
+
+pub use expr::{Binary, Expr, ExprKind, Unary};
+
+use crate::diagnostic::{Diagnostic, Span};
+
+/// A name as SPICE compares it: lower case.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Name {
+    /// Lower-case text.
+    pub text: String,
+    /// Where it stands.
+    pub span: Span,
+}
+
+impl fmt::Debug for Name {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+/// A netlist: its title line and all cards, includes read in place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Netlist {
+    /// The title line without its comment mark.
+    pub title: String,
+    /// Everything at the top level.
+    pub body: Block,
+    /// The last line of the root file, for findings about the whole.
+    pub end: Span,
+}
+
+/// Cards that share a scope: the top level, a subcircuit or a branch of `.if`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Block {
+    /// The cards in file order.
+    pub statements: Vec<Statement>,
+    /// What is wrong here; inside a subcircuit or a branch these are errors only if it is used.
+    pub faults: Vec<Diagnostic>,
+}
+
+/// One card, or a block of cards.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Statement {
+    /// An element card.
+    Element(Element),
+    /// `.model`.
+    Model(Model),
+    /// `.param a=1 b={2*a}`.
+    Param(Vec<Assign>),
+    /// `.func f(x) {…}`.
+    Func(Func),
+    /// `.subckt … .ends`.
+    Subckt(Subckt),
+    /// `.if … .elseif … .else … .endif`.
+    If(Vec<Branch>),
+    /// `.tran`, or a `tran` command inside `.control`.
+    Tran(Tran),
+    /// `.op`, `.ac`, `.dc` …: some analysis other than `.tran`.
+    Analysis(Span),
+    /// `.ic`.
+    Ic(Vec<(Signal, Expr)>),
+    /// `.save`, `.print`, `.probe`, `.plot`.
+    Save(Vec<Wanted>),
+    /// `.global`.
+    Global(Vec<Name>),
+}
+
+/// An element card.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Element {
+    /// Its name; the first letter says what it is.
+    pub name: Name,
+    /// The nodes it connects (not the controlling ones).
+    pub nodes: Vec<Name>,
+    /// The rest of the card.
+    pub device: Device,
+    /// The whole card.
+    pub span: Span,
+}
+
+/// What follows the nodes on an element card.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Device {
+    /// R, C, L: at most two of value and model name, then `name=value`.
+    Passive {
+        /// Value and model name in any order; a bare name may be either.
+        values: Vec<Expr>,
+        /// `R=`, `IC=`, `Rser=`, `tc1=`, …
+        args: Vec<Assign>,
+    },
+    /// V, I.
+    Source {
+        /// The `DC` value.
+        dc: Option<Expr>,
+        /// `SIN(…)`, `PULSE(…)`, …
+        wave: Option<WaveCall>,
+        /// `Rser=`, `Cpar=`, `r=`, `td=`, `load`, …
+        args: Vec<Assign>,
+    },
+    /// K.
+    Coupling {
+        /// Two or more inductors.
+        inductors: Vec<Name>,
+        /// The coefficient.
+        k: Expr,
+    },
+    /// E, G, F, H, B.
+    Controlled {
+        /// Whether the output is a voltage (E, H, `V=`) or a current (G, F, `I=`).
+        voltage: bool,
+        /// What it follows.
+        control: Control,
+        /// `Rpar=`, `tc1=`, …
+        args: Vec<Assign>,
+    },
+    /// D.
+    Diode {
+        /// The model name.
+        model: Name,
+        /// The area factor.
+        area: Option<Expr>,
+        /// `off`, `ic=`, `m=`, …
+        args: Vec<Assign>,
+    },
+    /// S, W.
+    Switch {
+        /// What switches it.
+        control: Control,
+        /// The model name.
+        model: Name,
+        /// `ON`, `OFF`.
+        initial: Option<bool>,
+    },
+    /// X.
+    Call {
+        /// The subcircuit.
+        subckt: Name,
+        /// Its parameters.
+        args: Vec<Assign>,
+    },
+    /// An element that is known to SPICE but not to this program.
+    Unsupported {
+        /// What it is: "a MOSFET", …
+        what: &'static str,
+    },
+}
+
+/// What a controlled element follows.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Control {
+    /// `POLY(n)` or the plain linear form (one pair, one gain): controlling node pairs and coefficients.
+    Nodes(Vec<(Name, Name)>, Vec<Expr>),
+    /// The same with currents of voltage sources.
+    Currents(Vec<Name>, Vec<Expr>),
+    /// `VALUE={…}`, `V=…`, `I=…`.
+    Expression(Expr),
+    /// `TABLE {…} = (x,y) …`.
+    Table(Expr, Vec<(Expr, Expr)>),
+    /// `LAPLACE`, `FREQ`, …: recognised only.
+    Other(Name),
+}
+
+/// `SIN(0 5 50)`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WaveCall {
+    /// `sin`, `pulse`, `pwl`, `exp`, `sffm`, `am`, …
+    pub name: Name,
+    /// Its arguments; in PWL a time written `+1m` counts from the one before.
+    pub args: Vec<WaveArg>,
+}
+
+/// One argument of a waveform.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WaveArg {
+    /// The value.
+    pub value: Expr,
+    /// Whether it was written with a leading `+`.
+    pub plus: bool,
+}
+
+/// `.model name type (…)`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model {
+    /// Its name.
+    pub name: Name,
+    /// `d`, `sw`, `csw`, `vswitch`, …
+    pub kind: Name,
+    /// `ako: other`: the model it extends.
+    pub base: Option<Name>,
+    /// Its parameters; flags have no value.
+    pub params: Vec<Assign>,
+}
+
+/// `name=value`, or a flag alone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assign {
+    /// The name.
+    pub name: Name,
+    /// The value.
+    pub value: Option<Expr>,
+}
+
+/// `.func f(x,y) {…}`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Func {
+    /// Its name.
+    pub name: Name,
+    /// Formal arguments.
+    pub args: Vec<Name>,
+    /// The body.
+    pub body: Expr,
+}
+
+/// `.subckt name nodes params … .ends`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Subckt {
+    /// Its name.
+    pub name: Name,
+    /// Its terminals.
+    pub nodes: Vec<Name>,
+    /// Parameters with defaults.
+    pub params: Vec<Assign>,
+    /// Its cards.
+    pub body: Block,
+}
+
+/// A branch of `.if`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Branch {
+    /// `None` for `.else`.
+    pub condition: Option<Expr>,
+    /// Its cards.
+    pub body: Block,
+}
+
+/// `.tran` as written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tran {
+    /// One to four numbers.
+    pub args: Vec<Expr>,
+    /// `uic`.
+    pub uic: bool,
+    /// LTspice's `startup`.
+    pub startup: bool,
+    /// Written as a command inside `.control`.
+    pub command: bool,
+    /// The whole card.
+    pub span: Span,
+}
+
+/// `v(a)`, `v(a,b)` or `i(d1)`.
+#[derive(Clone, PartialEq, Eq)]
+pub enum Signal {
+    /// v(a) or v(a) − v(b).
+    Voltage(Name, Option<Name>),
+    /// The current of an element.
+    Current(Name),
+}
+
+impl Signal {
+    /// Where it stands.
+    #[must_use]
+    pub fn span(&self) -> Span {
+        match self {
+            Self::Voltage(a, Some(b)) => a.span.to(b.span),
+            Self::Voltage(a, None) | Self::Current(a) => a.span,
+        }
+    }
+}
+
+impl fmt::Display for Signal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Voltage(a, Some(b)) => write!(f, "v({},{})", a.text, b.text),
+            Self::Voltage(a, None) => write!(f, "v({})", a.text),
+            Self::Current(name) => write!(f, "i({})", name.text),
+        }
+    }
+}
+
+impl fmt::Debug for Signal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+/// What an output card asks for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Wanted {
+    /// One signal.
+    Signal(Signal),
+    /// A bare name: a node (`.save out`) or `@d1[i]`, `v1#branch`.
+    Bare(Name),
+    /// `all`, `v(*)`, `alli`: the default set.
+    All(Span),
+    /// An expression or quantity that is not supported.
+    Other(Name),
+}

@@ -1,0 +1,130 @@
+//! What is to be seen in a picture of waveforms, before anyone draws it.
+
+use crate::waveform::Waveforms;
+
+/// Width of a panel's plotting area in drawing units; curves are thinned to it.
+pub const PANEL_WIDTH: usize = 1400;
+
+/// Panels over one time axis, top to bottom.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figure {
+    /// The headline.
+    pub title: String,
+    /// At least one for a picture.
+    pub panels: Vec<Panel>,
+}
+
+/// Curves that share a y axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Panel {
+    /// What the y axis shows: `voltage`, `current`, `difference`.
+    pub quantity: String,
+    /// Its unit, `V` or `A`.
+    pub unit: &'static str,
+    /// The curves, in the order of the legend.
+    pub series: Vec<Series>,
+}
+
+/// A named curve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// For the legend.
+    pub name: String,
+    /// (s, unit of the panel), times nondecreasing.
+    pub points: Vec<(f64, f64)>,
+}
+
+impl Series {
+    /// Column j, thinned to a panel's width.
+    fn column(waves: &Waveforms, j: usize, name: String) -> Self {
+        Self {
+            name,
+            points: waves.thinned(j, PANEL_WIDTH),
+        }
+    }
+}
+
+impl Figure {
+    /// Volts above, amperes below.
+    #[must_use]
+    pub fn of_waveforms(waves: &Waveforms) -> Self {
+        let panel = |quantity: &str, unit: &'static str| Panel {
+            quantity: quantity.into(),
+            unit,
+            series: (0..waves.width())
+                .filter(|&j| waves.units[j] == unit)
+                .map(|j| Series::column(waves, j, waves.names[j].clone()))
+                .collect(),
+        };
+        let panels = [panel("voltage", "V"), panel("current", "A")];
+        Self {
+            title: waves.title.clone(),
+            panels: panels
+                .into_iter()
+                .filter(|p| !p.series.is_empty())
+                .collect(),
+        }
+    }
+
+    /// For each named signal a panel with both curves and one with their difference.
+    #[must_use]
+    pub fn of_comparison(
+        waves: &Waveforms,
+        reference: &Waveforms,
+        difference: &Waveforms,
+        reference_name: &str,
+        signals: &[String],
+    ) -> Self {
+        let mut panels = Vec::new();
+        for name in signals {
+            let Some((ours, delta)) = waves.find(name).zip(difference.find(name)) else {
+                continue;
+            };
+            let mut both = vec![Series::column(waves, ours, format!("{name} circ"))];
+            if let Some(theirs) = reference.find(name) {
+                both.push(Series::column(
+                    reference,
+                    theirs,
+                    format!("{name} {reference_name}"),
+                ));
+            }
+            let (quantity, unit) = match waves.units[ours] {
+                "A" => ("current", "A"),
+                unit => ("voltage", unit),
+            };
+            panels.push(Panel {
+                quantity: quantity.into(),
+                unit,
+                series: both,
+            });
+            let series = vec![Series::column(
+                difference,
+                delta,
+                format!("{name} difference"),
+            )];
+            panels.push(Panel {
+                quantity: "difference".into(),
+                unit,
+                series,
+            });
+        }
+        Self {
+            title: waves.title.clone(),
+            panels,
+        }
+    }
+
+    /// First and last time over all curves; `None` without a point.
+    #[must_use]
+    pub fn span(&self) -> Option<(f64, f64)> {
+        let points = || {
+            self.panels
+                .iter()
+                .flat_map(|p| &p.series)
+                .flat_map(|s| &s.points)
+        };
+        let first = points().map(|p| p.0).min_by(f64::total_cmp)?;
+        let last = points().map(|p| p.0).max_by(f64::total_cmp)?;
+        Some((first, last))
+    }
+}

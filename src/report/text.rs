@@ -1,0 +1,185 @@
+//! Summaries in words.
+
+use super::{si, table};
+use crate::integrate::Run;
+use crate::waveform::compare::Comparison;
+
+/// Impulses listed before the rest is only counted.
+const IMPULSES_SHOWN: usize = 8;
+
+/// What a run did: method, work, energy balance, impulses and notes; with `verbose` the plan and the event times too.
+#[must_use]
+pub fn summary(run: &Run, verbose: bool) -> String {
+    let stats = &run.stats;
+    let mut lines = Vec::new();
+    if !run.waveforms.title.is_empty() {
+        lines.push(run.waveforms.title.clone());
+    }
+    if verbose {
+        lines.extend(run.plan.iter().map(|reason| format!("plan: {reason}")));
+    }
+    let rejected = if stats.rejected > 0 {
+        format!(" ({} rejected)", stats.rejected)
+    } else {
+        String::new()
+    };
+    lines.push(format!(
+        "{}: {} steps{rejected}, {} events, {} jumps, {} modes, {} LCP solves, {} CPU",
+        run.method,
+        stats.steps,
+        stats.events,
+        stats.jumps,
+        stats.modes,
+        stats.lcp_solves,
+        si::quantity(stats.cpu_seconds, "s", 3),
+    ));
+    let energy = &run.energy;
+    lines.push(format!(
+        "energy: source {}, dissipated {}, stored {}, residual {} of the largest",
+        si::quantity(energy.source, "J", 4),
+        si::quantity(energy.dissipated, "J", 4),
+        si::quantity(energy.stored, "J", 4),
+        si::plain(energy.residual_relative, 2),
+    ));
+    for impulse in run.impulses.iter().take(IMPULSES_SHOWN) {
+        let unit = if impulse.name.starts_with("i(") {
+            "A·s"
+        } else {
+            "V·s"
+        };
+        let (time, area) = (
+            si::quantity(impulse.t, "s", 6),
+            si::quantity(impulse.area, unit, 4),
+        );
+        lines.push(format!("impulse: {} at {time}, area {area}", impulse.name));
+    }
+    if run.impulses.len() > IMPULSES_SHOWN {
+        lines.push(format!(
+            "impulse: {} more",
+            run.impulses.len() - IMPULSES_SHOWN
+        ));
+    }
+    if verbose {
+        lines.extend(
+            run.events
+                .iter()
+                .map(|(t, what)| format!("event: {} {what}", si::quantity(*t, "s", 9))),
+        );
+    }
+    lines.extend(run.notes.iter().map(|note| format!("note: {note}")));
+    lines.join("\n") + "\n"
+}
+
+/// One line per signal: amplitude and its errors relative to it, with the instants of the worst points.
+#[must_use]
+pub fn comparison(found: &Comparison) -> String {
+    let rows: Vec<Vec<String>> = found
+        .signals
+        .iter()
+        .map(|s| {
+            vec![
+                s.name.clone(),
+                si::quantity(s.amplitude, s.unit, 4),
+                si::plain(s.max, 3),
+                si::quantity(s.max_time, "s", 6),
+                si::plain(s.rms, 3),
+                si::plain(s.shifted, 3),
+                si::quantity(s.shifted_time, "s", 6),
+            ]
+        })
+        .collect();
+    let shifted = format!("max ±{}", si::quantity(found.shift, "s", 3));
+    let mut text = table::aligned(
+        &["signal", "amplitude", "max", "at", "rms", &shifted, "at"],
+        &rows,
+    );
+    if !found.missing.is_empty() {
+        text.push_str(&format!(
+            "not in the reference: {}\n",
+            found.missing.join(" ")
+        ));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::{Energy, Impulse, Stats};
+    use crate::waveform::compare::SignalError;
+
+    #[test]
+    fn a_run_in_words() {
+        let run = Run {
+            method: "theta".into(),
+            plan: vec!["no devices: linear".into()],
+            stats: Stats {
+                steps: 1200,
+                rejected: 3,
+                events: 4,
+                cpu_seconds: 1.5e-3,
+                ..Stats::default()
+            },
+            energy: Energy {
+                source: 0.0125,
+                dissipated: 0.01,
+                stored: 0.0025,
+                residual_relative: 3.1e-7,
+            },
+            impulses: vec![
+                Impulse {
+                    t: 1e-3,
+                    name: "i(d1)".into(),
+                    area: 2e-6
+                };
+                9
+            ],
+            events: vec![(1e-3, "d1 conducts".into())],
+            notes: vec!["v(x) is relative to node a".into()],
+            ..Run::default()
+        };
+        insta::assert_snapshot!(summary(&run, true), @r"
+        plan: no devices: linear
+        theta: 1200 steps (3 rejected), 4 events, 0 jumps, 0 modes, 0 LCP solves, 1.5 ms CPU
+        energy: source 12.5 mJ, dissipated 10 mJ, stored 2.5 mJ, residual 3.1e-7 of the largest
+        impulse: i(d1) at 1 ms, area 2 µA·s
+        impulse: i(d1) at 1 ms, area 2 µA·s
+        impulse: i(d1) at 1 ms, area 2 µA·s
+        impulse: i(d1) at 1 ms, area 2 µA·s
+        impulse: i(d1) at 1 ms, area 2 µA·s
+        impulse: i(d1) at 1 ms, area 2 µA·s
+        impulse: i(d1) at 1 ms, area 2 µA·s
+        impulse: i(d1) at 1 ms, area 2 µA·s
+        impulse: 1 more
+        event: 1 ms d1 conducts
+        note: v(x) is relative to node a
+        ");
+        assert!(!summary(&run, false).contains("plan:"));
+    }
+
+    #[test]
+    fn a_comparison_in_a_table() {
+        let signal = |name: &str, unit, max| SignalError {
+            name: name.into(),
+            unit,
+            amplitude: 12.0,
+            max,
+            max_time: 1.5e-3,
+            rms: max / 3.0,
+            shifted: max / 10.0,
+            shifted_time: 0.0,
+        };
+        insta::assert_snapshot!(comparison(&Comparison {
+            from: 0.0,
+            to: 1.0,
+            shift: 1e-6,
+            signals: vec![signal("v(out)", "V", 1.234e-3), signal("i(l1)", "A", 0.0)],
+            missing: vec!["i(d1)".into()],
+        }), @r"
+        signal  amplitude      max      at       rms  max ±1 µs   at
+        v(out)       12 V  0.00123  1.5 ms  0.000411   0.000123  0 s
+        i(l1)        12 A        0  1.5 ms         0          0  0 s
+        not in the reference: i(d1)
+        ");
+    }
+}

@@ -1,0 +1,183 @@
+//! Comma-separated values: `time,v(out),…` with 17 significant digits.
+
+use std::io::{Read, Write};
+
+use super::{WaveformError, Waveforms};
+
+const FORMAT: &str = "csv";
+
+/// Writes rows as they come; names that hold a comma, such as `v(a,b)`, are quoted.
+pub struct Writer<W: Write> {
+    to: W,
+}
+
+impl<W: Write> Writer<W> {
+    /// Writes the header `time,` and the names.
+    ///
+    /// # Errors
+    /// Those of `to`.
+    pub fn new(mut to: W, names: &[String]) -> std::io::Result<Self> {
+        to.write_all(b"time")?;
+        for name in names {
+            if name.contains([',', '"', '\n']) {
+                write!(to, ",\"{}\"", name.replace('"', "\"\""))?;
+            } else {
+                write!(to, ",{name}")?;
+            }
+        }
+        to.write_all(b"\n")?;
+        Ok(Self { to })
+    }
+
+    /// Writes one row: time in s, then the values.
+    ///
+    /// # Errors
+    /// Those of the target.
+    pub fn row(&mut self, time: f64, values: &[f64]) -> std::io::Result<()> {
+        write!(self.to, "{time:.16e}")?;
+        for value in values {
+            write!(self.to, ",{value:.16e}")?;
+        }
+        self.to.write_all(b"\n")
+    }
+}
+
+/// Writes all rows.
+///
+/// # Errors
+/// Those of `to`.
+///
+/// # Example
+/// ```
+/// use circ::waveform::{Waveforms, csv};
+/// let waves = Waveforms { names: vec!["v(a)".into()], units: vec!["V"], time: vec![0.5], values: vec![0.1], ..Default::default() };
+/// let mut text = Vec::new();
+/// csv::write(&mut text, &waves).unwrap();
+/// assert_eq!(String::from_utf8(text).unwrap(), "time,v(a)\n5.0000000000000000e-1,1.0000000000000001e-1\n");
+/// ```
+pub fn write(to: impl Write, waves: &Waveforms) -> std::io::Result<()> {
+    let mut writer = Writer::new(to, &waves.names)?;
+    for (k, &time) in waves.time.iter().enumerate() {
+        writer.row(time, waves.row(k))?;
+    }
+    Ok(())
+}
+
+/// Reads a file with a header whose first column is time (s); lines that start with `#` are skipped.
+///
+/// # Errors
+/// [`WaveformError::Malformed`] with the line of the first cell that is not a finite number, of a row of another length, or
+/// of a time that runs backwards.
+pub fn read(from: impl Read) -> Result<Waveforms, WaveformError> {
+    let mut reader = csv::ReaderBuilder::new()
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .flexible(true)
+        .from_reader(from);
+    let header = reader.headers().map_err(unreadable)?.clone();
+    if !header
+        .get(0)
+        .is_some_and(|name| matches!(name.to_ascii_lowercase().as_str(), "time" | "t"))
+    {
+        let found = header.get(0).unwrap_or("");
+        return Err(WaveformError::malformed(
+            FORMAT,
+            format!("the first column must be `time`, found `{found}`"),
+        ));
+    }
+    let names: Vec<String> = header.iter().skip(1).map(str::to_owned).collect();
+    let mut columns = vec![Vec::new(); header.len()];
+    for record in reader.records() {
+        let record = record.map_err(unreadable)?;
+        let line = record.position().map_or(0, csv::Position::line);
+        if record.len() != header.len() {
+            let reason = format!(
+                "line {line}: {} cells where the header has {}",
+                record.len(),
+                header.len()
+            );
+            return Err(WaveformError::malformed(FORMAT, reason));
+        }
+        for (cell, column) in record.iter().zip(&mut columns) {
+            match cell.parse::<f64>() {
+                Ok(value) if value.is_finite() => column.push(value),
+                _ => {
+                    let reason = format!("line {line}: `{cell}` is not a finite number");
+                    return Err(WaveformError::malformed(FORMAT, reason));
+                }
+            }
+        }
+        if let [.., previous, last] = columns[0][..]
+            && last < previous
+        {
+            return Err(WaveformError::malformed(
+                FORMAT,
+                format!("line {line}: time runs backwards"),
+            ));
+        }
+    }
+    let time = columns.remove(0);
+    Ok(Waveforms::from_columns(
+        String::new(),
+        names,
+        time,
+        &columns,
+    ))
+}
+
+fn unreadable(error: csv::Error) -> WaveformError {
+    let reason = error.to_string();
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => WaveformError::Io(error),
+        _ => WaveformError::malformed(FORMAT, reason),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::sample;
+    use super::*;
+
+    #[test]
+    fn what_is_written_reads_back_to_the_same_doubles() {
+        let mut text = Vec::new();
+        write(&mut text, &sample()).unwrap();
+        let back = read(&text[..]).unwrap();
+        assert_eq!(
+            back,
+            Waveforms {
+                title: String::new(),
+                ..sample()
+            }
+        );
+        assert!(
+            String::from_utf8(text)
+                .unwrap()
+                .starts_with("time,\"v(a,b)\",i(v1)\n0.0000000000000000e0,")
+        );
+    }
+
+    #[test]
+    fn faults_are_named_with_their_line() {
+        for (text, reason) in [
+            (
+                "x,v(a)\n0,1\n",
+                "the first column must be `time`, found `x`",
+            ),
+            ("", "the first column must be `time`, found ``"),
+            (
+                "# by hand\ntime,v(a)\n0,1\n1,1v\n",
+                "line 4: `1v` is not a finite number",
+            ),
+            ("time,v(a)\n0,nan\n", "line 2: `nan` is not a finite number"),
+            (
+                "time,v(a)\n0,1,2\n",
+                "line 2: 3 cells where the header has 2",
+            ),
+            ("time,v(a)\n1,1\n0,1\n", "line 3: time runs backwards"),
+        ] {
+            let error = read(text.as_bytes()).unwrap_err().to_string();
+            assert_eq!(error, format!("not a csv file of waveforms: {reason}"));
+        }
+    }
+}

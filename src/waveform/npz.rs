@@ -1,0 +1,125 @@
+//! NumPy's archive: `numpy.load("run.npz")["v(out)"]` is a vector of doubles, `["time"]` the times.
+//!
+//! Members are stored uncompressed with the archive format's earliest date, so that equal runs are equal bytes.
+
+use std::io::{Read, Seek, Write};
+
+use npyz::WriterBuilder;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
+
+use super::{WaveformError, Waveforms};
+
+const FORMAT: &str = "npz";
+
+/// Writes one vector for `time` and one per name.
+///
+/// # Errors
+/// Those of `to`.
+pub fn write(to: impl Write + Seek, waves: &Waveforms) -> std::io::Result<()> {
+    let mut archive = ZipWriter::new(to);
+    member(&mut archive, "time", waves.time.iter().copied())?;
+    for (j, name) in waves.names.iter().enumerate() {
+        member(&mut archive, name, waves.column(j))?;
+    }
+    archive.finish()?.flush()
+}
+
+fn member<W: Write + Seek>(
+    archive: &mut ZipWriter<W>,
+    name: &str,
+    values: impl ExactSizeIterator<Item = f64>,
+) -> std::io::Result<()> {
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Stored)
+        .last_modified_time(DateTime::DEFAULT)
+        .large_file(values.len() > (u32::MAX / 16) as usize);
+    archive.start_file(format!("{name}.npy"), options)?;
+    let mut array = npyz::WriteOptions::new()
+        .default_dtype()
+        .shape(&[values.len() as u64])
+        .writer(archive)
+        .begin_nd()?;
+    array.extend(values)?;
+    array.finish()
+}
+
+/// Reads an archive of vectors of doubles of one length, one of them `time`; columns keep the archive's order.
+///
+/// # Errors
+/// [`WaveformError::Malformed`] when it is no archive, `time` is missing, or a member is not such a vector.
+pub fn read(from: impl Read + Seek) -> Result<Waveforms, WaveformError> {
+    let malformed = |reason: String| WaveformError::malformed(FORMAT, reason);
+    let mut archive = ZipArchive::new(from).map_err(|e| malformed(e.to_string()))?;
+    let mut time = None;
+    let (mut names, mut columns) = (Vec::new(), Vec::new());
+    for k in 0..archive.len() {
+        let file = archive.by_index(k).map_err(|e| malformed(e.to_string()))?;
+        let name = file
+            .name()
+            .map_err(|e| malformed(e.to_string()))?
+            .trim_end_matches(".npy")
+            .to_owned();
+        let values = npyz::NpyFile::new(file)
+            .and_then(npyz::NpyFile::into_vec::<f64>)
+            .map_err(|e| malformed(format!("`{name}`: {e}")))?;
+        if name == "time" {
+            time = Some(values);
+        } else {
+            names.push(name);
+            columns.push(values);
+        }
+    }
+    let time = time.ok_or_else(|| malformed("no member `time`".into()))?;
+    if let Some(j) = columns.iter().position(|c| c.len() != time.len()) {
+        return Err(malformed(format!(
+            "`{}` has {} values for {} times",
+            names[j],
+            columns[j].len(),
+            time.len()
+        )));
+    }
+    Ok(Waveforms::from_columns(
+        String::new(),
+        names,
+        time,
+        &columns,
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use super::super::tests::sample;
+    use super::*;
+
+    #[test]
+    fn what_is_written_reads_back_and_is_the_same_bytes_each_time() {
+        let bytes = || {
+            let mut to = Cursor::new(Vec::new());
+            write(&mut to, &sample()).unwrap();
+            to.into_inner()
+        };
+        let first = bytes();
+        assert_eq!(
+            read(Cursor::new(&first)).unwrap(),
+            Waveforms {
+                title: String::new(),
+                ..sample()
+            }
+        );
+        assert_eq!(first, bytes());
+    }
+
+    #[test]
+    fn something_else_is_refused() {
+        let error = read(Cursor::new(b"time,v(a)\n".as_slice()))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.starts_with("not a npz file of waveforms: "),
+            "{error}"
+        );
+    }
+}

@@ -1,0 +1,66 @@
+//! Fewer points for a picture, without losing a peak.
+
+/// Of the rows that fall on one of `pixels` columns of a picture: the first, the lowest, the highest and the last, in order
+/// of time. Rows are returned as they are when there are at most four a pixel.
+pub(super) fn thinned(
+    time: &[f64],
+    values: impl ExactSizeIterator<Item = f64> + Clone,
+    pixels: usize,
+) -> Vec<(f64, f64)> {
+    let points: Vec<(f64, f64)> = time.iter().copied().zip(values).collect();
+    let pixels = pixels.max(1);
+    if points.len() <= 4 * pixels {
+        return points;
+    }
+    let (first, last) = (time[0], time[time.len() - 1]);
+    let scale = if last > first {
+        pixels as f64 / (last - first)
+    } else {
+        0.0
+    };
+    let pixel = |t: f64| (((t - first) * scale) as usize).min(pixels - 1);
+    let mut kept = Vec::with_capacity(4 * pixels);
+    for bin in points.chunk_by(|a, b| pixel(a.0) == pixel(b.0)) {
+        let by_value = |&a: &usize, &b: &usize| bin[a].1.total_cmp(&bin[b].1);
+        let lowest = (0..bin.len()).min_by(by_value).unwrap_or(0);
+        let highest = (0..bin.len()).max_by(by_value).unwrap_or(0);
+        let mut chosen = [0, lowest, highest, bin.len() - 1];
+        chosen.sort_unstable();
+        let mut previous = None;
+        for k in chosen {
+            if previous != Some(k) {
+                kept.push(bin[k]);
+            }
+            previous = Some(k);
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_single_spike_among_a_million_rows_survives() {
+        let time: Vec<f64> = (0..1_000_000).map(f64::from).collect();
+        let values: Vec<f64> = (0..1_000_000)
+            .map(|k| if k == 345_678 { 9.0 } else { 0.0 })
+            .collect();
+        let points = thinned(&time, values.iter().copied(), 500);
+        assert!(points.len() <= 2000);
+        assert!(points.contains(&(345_678.0, 9.0)));
+        assert_eq!(points.first(), Some(&(0.0, 0.0)));
+        assert_eq!(points.last(), Some(&(999_999.0, 0.0)));
+        assert!(points.windows(2).all(|w| w[0].0 < w[1].0));
+    }
+
+    #[test]
+    fn few_rows_and_no_rows_stay_as_they_are() {
+        assert_eq!(
+            thinned(&[0.0, 1.0], [2.0, 3.0].into_iter(), 10),
+            [(0.0, 2.0), (1.0, 3.0)]
+        );
+        assert!(thinned(&[], [].into_iter(), 10).is_empty());
+    }
+}

@@ -1,0 +1,647 @@
+//! The command `circ` as its users meet it: exit status, standard output, standard error, files.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Cursor, Read};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use circ::waveform::{Waveforms, csv, json, npz, raw};
+use insta::assert_snapshot;
+use tempfile::TempDir;
+
+const DIVIDER: &str = "\
+divider
+.param top=10
+v1 in 0 dc {top}
+r1 in out 1k
+r2 out 0 1k
+.tran 1m 3m
+.end
+";
+
+const RECTIFIER: &str = "\
+half-wave rectifier
+v1 in 0 sin(0 10 50)
+d1 in out di
+c1 out 0 100u
+r1 out 0 100
+.model di d(ideal)
+.tran 1m 40m
+.print tran v(in) v(out) i(d1)
+.end
+";
+
+const CHOPPER: &str = "\
+chopper
+v1 in 0 dc 10
+vc c 0 pulse(0 5 0 0 0 1m 2m)
+s1 in out c 0 sw1
+r1 out 0 10
+rc c 0 1k
+.model sw1 sw(vt=2.5 ron=0 roff=1g)
+.tran 0.5m 4m
+.print tran v(out)
+.end
+";
+
+/// From 1 ms on the source drives a current that the diode blocks.
+const IMPOSSIBLE: &str = "\
+impossible
+i1 0 a pwl(0 -1 2m 1)
+d1 0 a di
+.model di d(ideal)
+.tran 0.5m 2m
+.end
+";
+
+const FAULTY: &str = "\
+faulty
+c1 in 0
+d1 in out d1n4148
+r1 out 0 1k
+.tran 1m 3m
+.end
+";
+
+/// A directory with the netlists above.
+fn place() -> TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    for (name, text) in [
+        ("divider.cir", DIVIDER),
+        ("rectifier.cir", RECTIFIER),
+        ("chopper.cir", CHOPPER),
+        ("impossible.cir", IMPOSSIBLE),
+        ("faulty.cir", FAULTY),
+    ] {
+        fs::write(directory.path().join(name), text).unwrap();
+    }
+    directory
+}
+
+fn circ(directory: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_circ"));
+    command.current_dir(directory).stdin(Stdio::null());
+    command
+}
+
+struct Ran {
+    status: i32,
+    out: String,
+    err: String,
+}
+
+impl std::fmt::Display for Ran {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "status {}\n--- out\n{}--- err\n{}",
+            self.status, self.out, self.err
+        )
+    }
+}
+
+fn run_in(directory: &Path, arguments: &str) -> Ran {
+    let output = circ(directory)
+        .args(arguments.split_whitespace())
+        .output()
+        .unwrap();
+    Ran {
+        status: output.status.code().unwrap(),
+        out: String::from_utf8(output.stdout).unwrap(),
+        err: String::from_utf8(output.stderr).unwrap(),
+    }
+}
+
+/// In a fresh directory with the netlists.
+fn run(arguments: &str) -> Ran {
+    run_in(place().path(), arguments)
+}
+
+fn waves(text: &str) -> Waveforms {
+    csv::read(text.as_bytes()).unwrap()
+}
+
+#[test]
+fn help_names_every_command_and_flag() {
+    assert_snapshot!(run("--help"));
+    for command in ["sim", "lcs", "check", "op", "bench", "compare", "graph"] {
+        let ran = run(&format!("{command} --help"));
+        assert_eq!((ran.status, ran.err.as_str()), (0, ""));
+        assert_snapshot!(format!("help_{command}"), ran.out);
+    }
+}
+
+#[test]
+fn usage_errors_end_with_2() {
+    for arguments in [
+        "",
+        "sim",
+        "simulate divider.cir",
+        "sim divider.cir --method rk4",
+        "sim divider.cir --step 0",
+        "sim divider.cir --step x1",
+        "sim divider.cir --theta 0.3",
+        "sim divider.cir --param top",
+        "sim divider.cir -q -v",
+        "sim divider.cir --summary yaml",
+        "lcs divider.cir --format yaml",
+        "bench divider.cir --methods rk4",
+        "bench divider.cir --against spectre",
+    ] {
+        let ran = run(arguments);
+        assert_eq!(ran.status, 2, "{arguments}: {ran}");
+        assert_eq!(ran.out, "", "{arguments}");
+        assert!(!ran.err.is_empty(), "{arguments}");
+    }
+}
+
+#[test]
+fn sim_into_a_pipe_is_csv() {
+    assert_snapshot!(run("sim divider.cir"));
+}
+
+#[test]
+fn parameters_and_probes_are_replaced() {
+    assert_snapshot!(run(
+        "sim divider.cir --param TOP=4k7 --probe i(r1) --probe v(in,out) --probe V1#branch --probe @r2[i] --probe out"
+    ));
+    assert_snapshot!(run("sim divider.cir --probe v(nowhere)"), @r"
+    status 2
+    --- out
+    --- err
+    error: --probe v(nowhere): no such node or element
+    ");
+}
+
+#[test]
+fn all_files_of_a_run_hold_the_same_numbers() {
+    let directory = place();
+    let at = |name: &str| directory.path().join(name);
+    let ran = run_in(
+        directory.path(),
+        "sim rectifier.cir --method theta -o a.csv -o a.raw -o a.npz -o a.json -o a.svg -o a.png --output a.html",
+    );
+    assert_eq!((ran.status, ran.out.as_str()), (0, ""), "{ran}");
+    let open = |name: &str| fs::File::open(at(name)).unwrap();
+    let from_csv = csv::read(open("a.csv")).unwrap();
+    assert_eq!(from_csv.names, ["v(in)", "v(out)", "i(d1)"]);
+    assert_eq!(from_csv.len(), 41);
+    assert_eq!((from_csv.time[0], from_csv.time[40]), (0.0, 40e-3));
+    let same = |other: Waveforms| {
+        assert_eq!(
+            Waveforms {
+                title: String::new(),
+                ..other
+            },
+            from_csv
+        );
+    };
+    same(raw::read(open("a.raw")).unwrap());
+    same(npz::read(open("a.npz")).unwrap());
+    same(json::read(open("a.json")).unwrap());
+    let svg = fs::read_to_string(at("a.svg")).unwrap();
+    for text in [
+        "half-wave rectifier",
+        "time (ms)",
+        "voltage (V)",
+        "current (",
+        "i(d1)",
+    ] {
+        assert!(svg.contains(text), "{text}");
+    }
+    assert_eq!(&fs::read(at("a.png")).unwrap()[..8], b"\x89PNG\r\n\x1a\n");
+    assert!(fs::read_to_string(at("a.html")).unwrap().contains("<svg "));
+    // The same bytes again, and the same numbers on standard output.
+    let before: Vec<_> = ["a.csv", "a.raw", "a.npz", "a.json", "a.png"]
+        .map(|n| fs::read(at(n)).unwrap())
+        .into();
+    run_in(
+        directory.path(),
+        "sim rectifier.cir --method theta -o a.csv -o a.raw -o a.npz -o a.json -o a.png",
+    );
+    let after: Vec<_> = ["a.csv", "a.raw", "a.npz", "a.json", "a.png"]
+        .map(|n| fs::read(at(n)).unwrap())
+        .into();
+    assert!(before == after);
+    assert_eq!(
+        run_in(directory.path(), "sim rectifier.cir --method theta")
+            .out
+            .as_bytes(),
+        before[0]
+    );
+}
+
+#[test]
+fn files_that_cannot_be_written_are_named_before_or_after_the_run() {
+    assert_snapshot!(run("sim divider.cir -o out.xls"), @r"
+    status 2
+    --- out
+    --- err
+    error: out.xls: the ending chooses the format and must be csv, raw, npz, json, svg, png or html
+    ");
+    assert_snapshot!(run("sim divider.cir -o nowhere/out.csv"), @r"
+    status 2
+    --- out
+    --- err
+    error: nowhere/out.csv: No such file or directory (os error 2)
+    ");
+}
+
+#[test]
+fn the_summary_is_one_json_object_on_standard_error() {
+    let ran = run("sim rectifier.cir --method euler --step 10u --summary json -q");
+    assert_eq!(ran.status, 0);
+    let summary: serde_json::Value = serde_json::from_str(&ran.err).unwrap();
+    assert_eq!(summary["method"], "euler");
+    assert_eq!(summary["steps"], 4000);
+    for key in [
+        "plan",
+        "events",
+        "jumps",
+        "modes",
+        "lcp_solves",
+        "cpu_seconds",
+        "energy",
+        "notes",
+        "impulses",
+    ] {
+        assert!(!summary[key].is_null(), "{key} in {summary}");
+    }
+    for key in ["source", "dissipated", "stored", "residual_relative"] {
+        assert!(summary["energy"][key].is_f64(), "{key} in {summary}");
+    }
+}
+
+#[test]
+fn verbose_explains_and_quiet_is_silent() {
+    let ran = run("sim rectifier.cir --method theta -v -o a.csv");
+    for words in ["plan: ", "energy: source", "event: ", "theta: "] {
+        assert!(ran.err.contains(words), "{words} in {ran}");
+    }
+    assert_eq!(run("sim rectifier.cir --method theta -q -o a.csv").err, "");
+    assert!(
+        run("sim rectifier.cir --method theta --summary text")
+            .err
+            .contains("energy: source")
+    );
+}
+
+#[test]
+fn methods_agree_and_rows_do_not_depend_on_the_step() {
+    let fine = waves(&run("sim rectifier.cir --method theta --tol 1e-8").out);
+    for arguments in [
+        "--method euler --step 0.5u",
+        "--method theta --step 3.3u",
+        "--method theta --theta 0.5 --gamma 1 --step 2u",
+        "--theta 0.7",
+        "--method euler --tol 1e-5",
+    ] {
+        let ran = run(&format!("sim rectifier.cir {arguments}"));
+        assert_eq!(ran.status, 0, "{arguments}: {ran}");
+        let waves = waves(&ran.out);
+        assert_eq!(waves.time, fine.time, "{arguments}");
+        let out = waves.find("v(out)").unwrap();
+        for (a, b) in waves.column(out).zip(fine.column(out)) {
+            assert!((a - b).abs() < 5e-3, "{arguments}: {a} for {b}");
+        }
+    }
+}
+
+#[test]
+fn contradicting_methods_are_refused() {
+    assert_snapshot!(run("sim rectifier.cir --method euler --theta 0.5"), @r"
+    status 2
+    --- out
+    --- err
+    error: --theta and --gamma belong to `--method theta`
+    ");
+}
+
+#[test]
+fn event_rows_stand_in_pairs_at_jumps() {
+    let plain = waves(&run("sim chopper.cir --method theta").out);
+    assert_eq!(plain.len(), 9);
+    let with_events = waves(&run("sim chopper.cir --method theta --events").out);
+    let at_1ms: Vec<f64> = (0..with_events.len())
+        .filter(|&k| with_events.time[k] == 1e-3)
+        .map(|k| with_events.row(k)[0].round())
+        .collect();
+    assert_eq!(at_1ms, [10.0, 0.0]);
+}
+
+#[test]
+fn a_run_that_breaks_off_is_written_as_far_as_it_came() {
+    assert_snapshot!(run("sim impossible.cir --method theta"));
+    let directory = place();
+    let ran = run_in(
+        directory.path(),
+        "sim impossible.cir --method theta -o a.csv -o a.png",
+    );
+    assert_eq!(ran.status, 2);
+    assert_eq!(
+        csv::read(fs::File::open(directory.path().join("a.csv")).unwrap())
+            .unwrap()
+            .len(),
+        3
+    );
+    assert!(directory.path().join("a.png").exists());
+}
+
+#[test]
+fn faults_are_shown_where_they_are() {
+    let ran = run("sim faulty.cir");
+    assert_eq!((ran.status, ran.out.as_str()), (2, ""));
+    for words in [
+        "faulty.cir:2:",
+        "faulty.cir:3:",
+        "unknown-model",
+        "error: faulty.cir: 2 errors",
+    ] {
+        assert!(ran.err.contains(words), "{words} in {ran}");
+    }
+    assert!(!ran.err.contains('\u{1b}'), "colour in a pipe: {ran}");
+    let missing = run("sim missing.cir");
+    assert_eq!(missing.status, 2);
+    assert!(
+        missing.err.contains("cannot read `missing.cir`"),
+        "{missing}"
+    );
+}
+
+#[test]
+fn check_lists_faults_with_status_1_and_certificates_with_0() {
+    let ran = run("check faulty.cir --json");
+    assert_eq!(ran.status, 1, "{ran}");
+    let report: serde_json::Value = serde_json::from_str(&ran.out).unwrap();
+    assert_eq!(report["ok"], false);
+    let faults = report["faults"].as_array().unwrap();
+    assert_eq!(
+        faults.iter().filter(|f| f["severity"] == "error").count(),
+        2,
+        "{ran}"
+    );
+    assert_eq!(
+        (&faults[0]["file"], &faults[0]["line"]),
+        (&"faulty.cir".into(), &2.into())
+    );
+
+    let ran = run("check rectifier.cir --json");
+    assert_eq!(ran.status, 0, "{ran}");
+    let report: serde_json::Value = serde_json::from_str(&ran.out).unwrap();
+    assert_eq!(
+        (&report["ok"], &report["passive"], &report["size"]["n"]),
+        (&true.into(), &true.into(), &1.into())
+    );
+    let words = run("check rectifier.cir");
+    assert!(
+        words.out.contains("passive") && words.status == 0,
+        "{words}"
+    );
+    let unknown = run("check chopper.cir --switch s9=on");
+    assert_eq!(unknown.status, 2, "{unknown}");
+    assert!(unknown.err.contains("the circuit has s1"), "{unknown}");
+    assert_eq!(run("check missing.cir").status, 2);
+}
+
+#[test]
+fn lcs_prints_every_format_and_reads_its_json() {
+    assert_snapshot!(run("lcs rectifier.cir"));
+    for (format, words) in [
+        ("json", "\"schema\":\"circ-lcs/1\""),
+        ("numpy", "np.array"),
+        ("matlab", "];"),
+        ("latex", "\\begin{"),
+    ] {
+        let ran = run(&format!("lcs rectifier.cir --format {format}"));
+        assert_eq!(ran.status, 0, "{ran}");
+        assert!(ran.out.replace(' ', "").contains(words), "{words} in {ran}");
+    }
+    let directory = place();
+    let at = directory.path();
+    assert_eq!(
+        run_in(at, "lcs rectifier.cir --format json -o system.json").out,
+        ""
+    );
+    let from_netlist = waves(&run_in(at, "sim rectifier.cir --method theta --step 10u").out);
+    let from_system = waves(&run_in(at, "sim system.json --method theta --step 10u").out);
+    assert_eq!(from_system.names, from_netlist.names);
+    for (a, b) in from_system.values.iter().zip(&from_netlist.values) {
+        assert!((a - b).abs() <= 1e-9 * b.abs().max(1.0), "{a} for {b}");
+    }
+    assert_eq!(
+        waves(&run_in(at, "sim system.json --method theta --probe out").out).names,
+        ["v(out)"]
+    );
+    assert_eq!(run_in(at, "check system.json").status, 0);
+    assert_eq!(run_in(at, "op system.json").status, 2);
+    fs::write(at.join("broken.json"), "{\"schema\":\"circ-lcs/9\"}").unwrap();
+    assert_eq!(run_in(at, "sim broken.json").status, 2);
+}
+
+#[test]
+fn lcs_takes_switches_in_the_position_asked_for() {
+    let on = run("lcs chopper.cir --format json --switch s1=on");
+    let off = run("lcs chopper.cir --format json --switch S1=off");
+    let position = |ran: &Ran| {
+        serde_json::from_str::<serde_json::Value>(&ran.out).unwrap()["switches"]["s1"].clone()
+    };
+    assert_eq!((position(&on), position(&off)), ("on".into(), "off".into()));
+    assert_snapshot!(run("lcs chopper.cir --switch s9=on"), @r"
+    status 2
+    --- out
+    --- err
+    error: --switch s9: the circuit has s1
+    ");
+}
+
+#[test]
+fn op_prints_voltages_and_currents() {
+    assert_snapshot!(run("op divider.cir"));
+    assert_snapshot!(run("op divider.cir --json --param top=4"));
+}
+
+#[test]
+fn graph_writes_graphviz_and_pictures() {
+    assert_snapshot!(run("graph rectifier.cir"));
+    let directory = place();
+    let ran = run_in(directory.path(), "graph rectifier.cir -o g.svg");
+    assert_eq!((ran.status, ran.out.as_str()), (0, ""), "{ran}");
+    assert!(
+        fs::read_to_string(directory.path().join("g.svg"))
+            .unwrap()
+            .contains("d1 ideal diode")
+    );
+    assert_eq!(
+        run_in(directory.path(), "graph rectifier.cir -o g.dot").status,
+        0
+    );
+    assert!(
+        fs::read_to_string(directory.path().join("g.dot"))
+            .unwrap()
+            .starts_with("graph {")
+    );
+    assert_eq!(run("graph rectifier.cir -o g.pdf").status, 2);
+}
+
+#[test]
+fn compare_with_a_file_says_yes_or_no() {
+    let directory = place();
+    let at = directory.path();
+    run_in(
+        at,
+        "sim rectifier.cir --method theta --tol 1e-6 -o ref.csv -o ref.raw",
+    );
+    for reference in ["ref.csv", "ref.raw"] {
+        let ran = run_in(
+            at,
+            &format!("compare rectifier.cir --method theta --against {reference} --tol 1e-3"),
+        );
+        assert_eq!(ran.status, 0, "{ran}");
+        assert!(
+            ran.out.starts_with("signal") && ran.err.contains("within the tolerance"),
+            "{ran}"
+        );
+    }
+    let mut wrong = csv::read(fs::File::open(at.join("ref.csv")).unwrap()).unwrap();
+    let width = wrong.width();
+    wrong.values[20 * width + 1] += 1.0;
+    let mut text = Cursor::new(Vec::new());
+    csv::write(&mut text, &wrong).unwrap();
+    fs::write(at.join("wrong.csv"), text.into_inner()).unwrap();
+    let ran = run_in(
+        at,
+        "compare rectifier.cir --method theta --against wrong.csv --tol 1e-3 --json -o diff.svg",
+    );
+    assert_eq!(ran.status, 1, "{ran}");
+    let found: serde_json::Value = serde_json::from_str(&ran.out).unwrap();
+    assert_eq!(found["within"], false);
+    let signal = &found["signals"][1];
+    assert_eq!(
+        (&signal["name"], &signal["max_time"]),
+        (&"v(out)".into(), &0.02.into())
+    );
+    let error = signal["max"].as_f64().unwrap() * signal["amplitude"].as_f64().unwrap();
+    assert!((error - 1.0).abs() < 1e-3, "{ran}");
+    assert!(
+        fs::read_to_string(at.join("diff.svg"))
+            .unwrap()
+            .contains("v(out) difference")
+    );
+    assert_eq!(
+        run_in(
+            at,
+            "compare rectifier.cir --method theta --against missing.csv"
+        )
+        .status,
+        2
+    );
+    assert_eq!(
+        run_in(
+            at,
+            "compare rectifier.cir --method theta --against rectifier.cir"
+        )
+        .status,
+        2
+    );
+}
+
+#[test]
+fn compare_says_plainly_that_ngspice_is_missing() {
+    let directory = place();
+    let output = circ(directory.path())
+        .args(["compare", "divider.cir", "--against", "ngspice"])
+        .env("PATH", directory.path())
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(
+        said,
+        "error: ngspice is not installed (no program `ngspice` on the search path)\n"
+    );
+}
+
+/// Live comparison where ngspice is installed; elsewhere the test above is what counts.
+#[test]
+fn compare_agrees_with_ngspice_and_keeps_the_deck() {
+    if Command::new("ngspice").arg("--version").output().is_err() {
+        return;
+    }
+    let directory = place();
+    let ran = run_in(
+        directory.path(),
+        "compare rectifier.cir --method theta --keep deck.cir --realisation n0.001 --shift 10u --tol 0.5 --json",
+    );
+    assert_eq!(ran.status, 0, "{ran}");
+    let found: serde_json::Value = serde_json::from_str(&ran.out).unwrap();
+    assert!(
+        found["against"].as_str().unwrap().starts_with("ngspice-"),
+        "{ran}"
+    );
+    let voltage = &found["signals"][1];
+    assert_eq!(voltage["name"], "v(out)");
+    assert!(voltage["shifted"].as_f64().unwrap() < 5e-3, "{ran}");
+    assert!(
+        fs::read_to_string(directory.path().join("deck.cir"))
+            .unwrap()
+            .contains(".model m.d1 d(")
+    );
+}
+
+#[test]
+fn bench_measures_ladders_in_the_promised_columns() {
+    let directory = place();
+    let ran = run_in(directory.path(), "bench divider.cir --methods euler");
+    assert_eq!(ran.status, 0, "{ran}");
+    let mut lines = ran.out.lines();
+    let header = "circuit,method,parameter,steps,cpu_seconds,max_error,rms_error,reference";
+    assert_eq!(lines.next(), Some(header));
+    assert!(lines.clone().count() > 8, "{ran}");
+    assert!(lines.all(|l| l.starts_with("divider,euler,")), "{ran}");
+    let ran = run_in(
+        directory.path(),
+        "bench divider.cir --methods theta -o b.csv -o b.json -o b.svg -o b.png",
+    );
+    assert_eq!((ran.status, ran.out.as_str()), (0, ""), "{ran}");
+    assert!(
+        fs::read_to_string(directory.path().join("b.csv"))
+            .unwrap()
+            .starts_with(header)
+    );
+    assert!(
+        fs::read_to_string(directory.path().join("b.svg"))
+            .unwrap()
+            .contains("error against run time")
+    );
+    let document: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(directory.path().join("b.json")).unwrap())
+            .unwrap();
+    assert_eq!(document["measurements"][0]["method"], "theta");
+    assert_eq!(run("bench divider.cir -o b.xls").status, 2);
+}
+
+#[test]
+fn a_reader_that_goes_away_is_no_failure() {
+    let directory = place();
+    let long = DIVIDER.replace(".tran 1m 3m", ".tran 1u 100m");
+    fs::write(directory.path().join("long.cir"), long).unwrap();
+    let mut child = circ(directory.path())
+        .args(["sim", "long.cir", "--method", "theta", "--step", "1m"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut reader = BufReader::new(child.stdout.take().unwrap());
+    let mut line = String::new();
+    reader.read_line(&mut line).unwrap();
+    assert!(line.starts_with("time,"));
+    drop(reader);
+    let mut said = String::new();
+    child
+        .stderr
+        .take()
+        .unwrap()
+        .read_to_string(&mut said)
+        .unwrap();
+    assert_eq!((child.wait().unwrap().code(), said.as_str()), (Some(0), ""));
+}
