@@ -384,7 +384,7 @@ impl<'a> Exact<'a> {
             return Ok(Some((at, leaving)));
         }
         let mut tried: Vec<Vec<bool>> = Vec::new();
-        if fired.is_none() {
+        if fired.is_none() || self.plant.pairs == 0 {
             tried.push(key.closed.clone());
             if let Some(found) = self.try_key(key, &barred) {
                 return Ok(Some(found));
