@@ -102,7 +102,7 @@ fn stepped(lcs: &Lcs, x: DVector<f64>, h: f64, steps: usize) -> (DVector<f64>, f
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn same_states_as_the_oracle(text in netlist()) {
@@ -126,6 +126,7 @@ proptest! {
         let options = SimOptions { method: Method::Theta, ..SimOptions::default() };
         let run = simulate(&circuit, &behaviour, options)
             .map_err(|e| TestCaseError::fail(format!("{text}{e}")))?;
+        if run.stats.cpu_seconds > 0.05 { eprintln!("SLOW {} {:?}", text, run.stats); }
         prop_assert!(run.energy.residual_relative < 1e-3, "{text}\n{:?}", run.energy);
         prop_assert!(run.energy.dissipated >= -1e-9 * run.energy.source.abs());
     }

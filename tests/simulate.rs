@@ -220,3 +220,29 @@ fn exact_and_stepping_agree_on_a_bridge() {
     assert!(worst < 10.0 * 1e-4, "{worst:e}");
     close(at(&exact, "v(1)", 5e-3), 0.790322820, 1e-9);
 }
+
+const BUCK: &str = "v1 1 0 20\ns1 1 2 3 0 sw\nd1 0 2 di\nl1 2 4 200u\nc1 4 0 10u\nr1 4 0 5\n\
+    v3 3 0 pulse(0 1 0 0 0 5u 10u)\n.model sw sw(vt=0.5 vh=0 ron=0 roff=1g)\n\
+    .model di d(ron=0 vfwd=0 n=0.01)\n.tran 1u 500u uic\n.save v(4) i(l1)";
+
+#[test]
+fn buck_with_a_source_driven_switch() {
+    let run = simulate(BUCK, fixed(Method::Theta, 0.1e-6));
+    let exact = simulate(BUCK, SimOptions { method: Method::Exact, ..SimOptions::default() });
+    for t in [100e-6, 300e-6, 500e-6] {
+        close(at(&run, "v(4)", t), at(&exact, "v(4)", t), 2e-3);
+        close(at(&run, "i(l1)", t), at(&exact, "i(l1)", t), 2e-3);
+    }
+    // At 5, 10, … 500 µs; the switch starts closed.
+    assert_eq!(run.events.iter().filter(|(_, what)| what.contains("s1")).count(), 100);
+    assert!(run.energy.residual_relative < 1e-4, "{:?}", run.energy);
+}
+
+#[test]
+fn counters_of_a_run() {
+    let run = simulate(BUCK, theta());
+    let mut stats = run.stats;
+    assert!(stats.cpu_seconds > 0.0);
+    stats.cpu_seconds = 0.0;
+    insta::assert_debug_snapshot!((stats, run.plan));
+}

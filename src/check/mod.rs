@@ -5,6 +5,7 @@ mod excitation;
 mod facts;
 mod feedthrough;
 mod jumps;
+mod laws;
 pub mod program;
 mod stiffness;
 mod text;

@@ -203,10 +203,11 @@ impl Problem {
             let controls = theta.controls_at_start()?;
             let wanted: Vec<bool> = (0..controls.len())
                 .map(|k| {
-                    if self.settle[k] {
-                        controls[k] > self.behaviour.switches[k].on_above
-                    } else {
-                        self.position[k]
+                    let switch = &self.behaviour.switches[k];
+                    match (self.settle[k], self.position[k]) {
+                        (false, on) => on,
+                        (true, true) => controls[k] >= switch.off_below,
+                        (true, false) => controls[k] > switch.on_above,
                     }
                 })
                 .collect();

@@ -186,7 +186,12 @@ impl<'a> Exact<'a> {
     /// Reads the storage vector at the current state.
     fn take_storage(&mut self) {
         if let Some(at) = self.mode {
-            self.plant.modes[at].storage_at(&self.motion.now, &mut self.storage);
+            let mode = &self.plant.modes[at];
+            mode.storage_at(&self.motion.now, &mut self.storage);
+            // An event often finds a current at zero: its size is what it was on the way.
+            for (i, scale) in self.scale.iter_mut().enumerate() {
+                *scale = scale.max(self.motion.reach(mode.storage.row(i).columns(0, mode.n)));
+            }
             self.rescale();
             let [source, dissipated] = std::mem::take(&mut self.motion.energy);
             self.balance.add((source, dissipated));
@@ -379,7 +384,7 @@ impl<'a> Exact<'a> {
             return Ok(Some((at, leaving)));
         }
         let mut tried: Vec<Vec<bool>> = Vec::new();
-        if fired.is_none() {
+        if fired.is_none() || self.plant.pairs == 0 {
             tried.push(key.closed.clone());
             if let Some(found) = self.try_key(key, &barred) {
                 return Ok(Some(found));
