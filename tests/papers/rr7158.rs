@@ -235,8 +235,8 @@ fn section_3_1_4_theorem_1_on_the_circuit_of_figure_2() {
                 .unwrap();
             assert!(left >= -20.0 * h, "{left}");
         }
-        for j in 0..2 {
-            active[j] += usize::from(run.lambda[k][j] > 1e-6);
+        for (count, lambda) in active.iter_mut().zip(run.lambda[k].iter()) {
+            *count += usize::from(*lambda > 1e-6);
         }
     }
     assert!(active[0] > 5 && active[1] > 5, "{active:?}");

@@ -61,9 +61,7 @@ impl Theta<'_> {
         let u = DVector::from_column_slice(&self.now.u);
         let System { lcs, jump, .. } = &mut self.plant.systems[self.now.system].1;
         let found = match jump {
-            Some(problem) if problem.monotone => problem
-                .solve(lcs, &x, &u)
-                .map_err(|e| {
+            Some(problem) if problem.monotone => problem.solve(lcs, &x, &u).map_err(|e| {
                 SimError::at(t, Reason::Infeasible).device(lcs.ports[e.port].device.clone())
             })?,
             _ => None,
@@ -150,33 +148,36 @@ impl Theta<'_> {
         Ok(self.switches.update(lcs, at, false))
     }
 
-    /// Flips the switches whose controls ask for it until none does, with the jumps this causes.
-    pub(super) fn switch(&mut self, log: &mut Log) -> Result<(), SimError> {
+    /// Flips the switches `moving`, then those whose controls ask for it until none does, with the jumps this causes.
+    pub(super) fn switch(&mut self, moving: &[usize], log: &mut Log) -> Result<(), SimError> {
         if log.wants_rows() {
             self.log_row(log);
         }
-        for _ in 0..2 + 2 * self.switches.len() {
-            if self.switches.needs_lambda() {
-                self.read_lambda()?;
-            }
-            let lcs = &self.plant.systems[self.now.system].1.lcs;
-            let at = Point {
-                x: &self.now.x,
-                lambda: &self.lambda,
-                u: &self.now.u,
-                du: &self.du,
-            };
-            let before = self.switches.position().to_vec();
-            if !self.switches.update(lcs, at, true) {
-                if log.wants_rows() {
-                    self.log_row(log);
+        let mut before = self.switches.position().to_vec();
+        self.switches.toggle(moving);
+        for _ in 0..2 + 2 * before.len() {
+            if self.switches.position() == before {
+                if self.switches.needs_lambda() {
+                    self.read_lambda()?;
                 }
-                return Ok(());
+                let lcs = &self.plant.systems[self.now.system].1.lcs;
+                let at = Point {
+                    x: &self.now.x,
+                    lambda: &self.lambda,
+                    u: &self.now.u,
+                    du: &self.du,
+                };
+                if !self.switches.update(lcs, at, true) {
+                    if log.wants_rows() {
+                        self.log_row(log);
+                    }
+                    return Ok(());
+                }
             }
-            let names = self.switches.flipped(&before);
             self.stats.events += 1;
-            log.event(self.now.t, names);
+            log.event(self.now.t, self.switches.flipped(&before));
             self.change_position(log)?;
+            before = self.switches.position().to_vec();
         }
         Err(SimError::at(self.now.t, Reason::SwitchesDoNotSettle)
             .device(self.switches.flipped(&[])))

@@ -109,6 +109,8 @@ pub struct Theta<'a> {
     lambda: Vec<f64>,
     attempt: Attempt,
     coarse: Vec<f64>,
+    /// Buffer for s.
+    storage: Vec<f64>,
     control: Option<Control>,
     stats: Stats,
     modes: BTreeSet<(usize, Vec<bool>)>,
@@ -236,6 +238,7 @@ impl<'a> Theta<'a> {
             lambda: Vec::new(),
             attempt: Attempt::default(),
             coarse: Vec::new(),
+            storage: Vec::new(),
             control,
             stats: Stats::default(),
             modes: BTreeSet::new(),
@@ -262,7 +265,12 @@ impl<'a> Theta<'a> {
 
     /// Takes note of the present state's size.
     pub fn see(&mut self) {
-        let Self { amplitudes, plant, now, .. } = self;
+        let Self {
+            amplitudes,
+            plant,
+            now,
+            ..
+        } = self;
         amplitudes.see(&plant.systems[now.system].1.lcs, &now.x);
     }
 
@@ -274,8 +282,15 @@ impl<'a> Theta<'a> {
         self.begin(&mut Log::new(0, f64::INFINITY, false))?;
         self.read_lambda()?;
         let lcs = &self.plant.systems[self.now.system].1.lcs;
-        let at = Point { x: &self.now.x, lambda: &self.lambda, u: &self.now.u, du: &self.du };
-        Ok((0..self.switches.len()).map(|i| reading::value(&lcs.controls, i, at)).collect())
+        let at = Point {
+            x: &self.now.x,
+            lambda: &self.lambda,
+            u: &self.now.u,
+            du: &self.du,
+        };
+        Ok((0..self.switches.len())
+            .map(|i| reading::value(&lcs.controls, i, at))
+            .collect())
     }
 
     /// The state x of the present system.
@@ -323,8 +338,10 @@ impl Stepper for Theta<'_> {
     fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), SimError> {
         if !self.started {
             self.begin(log)?;
-            if !self.switches.is_empty() && self.crossed()? {
-                self.switch(log)?;
+            let lcs = &self.plant.systems[self.now.system].1.lcs;
+            let moving = self.switches.misplaced(lcs, &self.now.u);
+            if !moving.is_empty() || self.switches.watch() && self.crossed()? {
+                self.switch(&moving, log)?;
             }
         }
         while self.now.t < t {
@@ -337,24 +354,27 @@ impl Stepper for Theta<'_> {
                 }
                 after = next;
             };
-            let known =
+            let merged = (t - breakpoint).abs() <= Self::slack(t);
+            let limit = if merged {
+                breakpoint.max(t)
+            } else {
+                breakpoint.min(t)
+            };
+            let (known, moving) =
                 self.switches
-                    .next_known(&self.system().lcs, &self.inputs, now, breakpoint.min(t));
-            let mut stop = t.min(breakpoint);
-            if (t - breakpoint).abs() <= Self::slack(t) {
-                stop = t;
-            }
-            let switching = known.is_some_and(|k| k < stop - Self::slack(stop));
-            if switching && let Some(known) = known {
+                    .next_known(&self.system().lcs, &self.inputs, now, limit);
+            let mut stop = if merged { t } else { limit };
+            let early = known < stop - Self::slack(stop);
+            if early {
                 stop = known;
             }
             self.interval(stop, log)?;
-            let at_breakpoint = !switching && (breakpoint - stop).abs() <= Self::slack(stop);
+            let at_breakpoint = !early && (breakpoint - stop).abs() <= Self::slack(stop);
             if at_breakpoint {
                 self.edge(breakpoint.max(stop), log)?;
             }
-            if !self.switches.is_empty() && (at_breakpoint || known.is_some()) && self.crossed()? {
-                self.switch(log)?;
+            if !moving.is_empty() || at_breakpoint && self.switches.watch() && self.crossed()? {
+                self.switch(&moving, log)?;
             }
         }
         self.note_energy();

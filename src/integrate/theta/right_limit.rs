@@ -112,7 +112,14 @@ impl Theta<'_> {
     }
 
     pub(super) fn note_energy(&mut self) {
-        let stored = energy::stored(&self.system().lcs, &self.now.x, &self.now.u);
-        self.now.balance.note(stored);
+        let Self {
+            plant,
+            now,
+            storage,
+            ..
+        } = self;
+        let lcs = &plant.systems[now.system].1.lcs;
+        now.balance
+            .note(energy::stored_with(lcs, &now.x, &now.u, storage));
     }
 }
