@@ -1,5 +1,9 @@
 //! A step with a cached active set allocates nothing.
-#![allow(missing_docs, unsafe_code, reason = "a counting allocator is unsafe by its trait")]
+#![allow(
+    missing_docs,
+    unsafe_code,
+    reason = "a counting allocator is unsafe by its trait"
+)]
 
 mod systems;
 

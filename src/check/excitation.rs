@@ -62,15 +62,6 @@ impl Excitation {
                     range(&values, edge || wraps)
                 }
             }
-            Wave::Sffm {
-                offset, amplitude, ..
-            } => range(&[offset - amplitude.abs(), offset + amplitude.abs()], false),
-            Wave::Am {
-                amplitude, offset, ..
-            } => {
-                let size = amplitude.abs() * (offset.abs() + 1.0);
-                range(&[-size, size], false)
-            }
             Wave::Exp {
                 v1,
                 v2,

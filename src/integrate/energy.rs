@@ -179,9 +179,15 @@ pub fn stored(lcs: &Lcs, x: &[f64], u: &[f64]) -> f64 {
 pub(crate) fn stored_with(lcs: &Lcs, x: &[f64], u: &[f64], s: &mut Vec<f64>) -> f64 {
     let storage = &lcs.storage;
     let row = |block: &DMatrix<f64>, k: usize, v: &[f64]| -> f64 {
-        (0..block.ncols().min(v.len())).map(|j| block[(k, j)] * v[j]).sum()
+        (0..block.ncols().min(v.len()))
+            .map(|j| block[(k, j)] * v[j])
+            .sum()
     };
-    let metric = if storage.metric.is_empty() { &lcs.energy } else { &storage.metric };
+    let metric = if storage.metric.is_empty() {
+        &lcs.energy
+    } else {
+        &storage.metric
+    };
     s.clear();
     if storage.metric.is_empty() {
         s.extend_from_slice(x);
@@ -194,7 +200,11 @@ pub(crate) fn stored_with(lcs: &Lcs, x: &[f64], u: &[f64], s: &mut Vec<f64>) -> 
     if metric.nrows() != s.len() {
         return 0.0;
     }
-    0.5 * s.iter().enumerate().map(|(k, v)| v * row(metric, k, s)).sum::<f64>()
+    0.5 * s
+        .iter()
+        .enumerate()
+        .map(|(k, v)| v * row(metric, k, s))
+        .sum::<f64>()
 }
 
 /// Sums of a run.

@@ -79,10 +79,17 @@ impl Inputs {
         from: f64,
         to: f64,
     ) -> Option<f64> {
-        let terms: Vec<(f64, &Source)> =
-            gains.iter().copied().zip(&self.sources).filter(|(gain, _)| *gain != 0.0).collect();
+        let terms: Vec<(f64, &Source)> = gains
+            .iter()
+            .copied()
+            .zip(&self.sources)
+            .filter(|(gain, _)| *gain != 0.0)
+            .collect();
         let passages = crossings(&terms, constant, level, from, to);
-        passages.into_iter().find(|c| c.rising == rising).map(|c| c.time)
+        passages
+            .into_iter()
+            .find(|c| c.rising == rising)
+            .map(|c| c.time)
     }
 
     /// The largest value each input takes (a bound, for sinusoids), in the order of u.
@@ -131,10 +138,15 @@ fn is_constant(wave: &Wave) -> bool {
 fn amplitude(wave: &Wave) -> f64 {
     match wave {
         Wave::Dc(value) => value.abs(),
-        Wave::Sin { offset, amplitude, .. } | Wave::Sffm { offset, amplitude, .. } => {
-            offset.abs() + amplitude.abs()
+        Wave::Sin {
+            offset, amplitude, ..
         }
-        Wave::Am { offset, amplitude, .. } => amplitude.abs() * (offset.abs() + 1.0),
+        | Wave::Sffm {
+            offset, amplitude, ..
+        } => offset.abs() + amplitude.abs(),
+        Wave::Am {
+            offset, amplitude, ..
+        } => amplitude.abs() * (offset.abs() + 1.0),
         Wave::Pulse { v1, v2, .. } | Wave::Exp { v1, v2, .. } => v1.abs().max(v2.abs()),
         Wave::Pwl { points, .. } => points.iter().fold(0.0, |a, p| a.max(p.1.abs())),
     }

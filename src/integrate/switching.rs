@@ -89,10 +89,16 @@ impl Switches {
 
     /// Switches driven by sources alone whose controls ask for another position at the start.
     pub(crate) fn misplaced(&self, lcs: &Lcs, u: &[f64]) -> Vec<usize> {
-        let at = Point { x: &[], lambda: &[], u, du: &[] };
+        let at = Point {
+            x: &[],
+            lambda: &[],
+            u,
+            du: &[],
+        };
         let wrong = |&i: &usize| {
             let control = reading::value(&lcs.controls, i, at);
-            self.driven[i] && self.thresholds[i].position(self.position[i], control) != self.position[i]
+            self.driven[i]
+                && self.thresholds[i].position(self.position[i], control) != self.position[i]
         };
         (0..self.thresholds.len()).filter(wrong).collect()
     }
@@ -150,7 +156,11 @@ impl Switches {
         let mut which = Vec::new();
         for i in (0..self.thresholds.len()).filter(|&i| self.driven[i]) {
             let (on, threshold) = (self.position[i], &self.thresholds[i]);
-            let level = if on { threshold.off_below } else { threshold.on_above };
+            let level = if on {
+                threshold.off_below
+            } else {
+                threshold.on_above
+            };
             let gains: Vec<f64> = lcs.controls.u.row(i).iter().copied().collect();
             let until = first.min(limit);
             let passage = inputs.passage(&gains, lcs.controls.one[i], level, !on, t, until);
@@ -171,12 +181,18 @@ mod tests {
 
     #[test]
     fn hysteresis_keeps_the_position_inside_the_band() {
-        let switch = Threshold { name: "s1".into(), on_above: 2.0, off_below: 1.0 };
-        assert_eq!([0.5, 1.0, 1.5, 2.0, 2.5].map(|v| switch.position(false, v)), [
-            false, false, false, false, true
-        ]);
-        assert_eq!([0.5, 1.0, 1.5, 2.0, 2.5].map(|v| switch.position(true, v)), [
-            false, true, true, true, true
-        ]);
+        let switch = Threshold {
+            name: "s1".into(),
+            on_above: 2.0,
+            off_below: 1.0,
+        };
+        assert_eq!(
+            [0.5, 1.0, 1.5, 2.0, 2.5].map(|v| switch.position(false, v)),
+            [false, false, false, false, true]
+        );
+        assert_eq!(
+            [0.5, 1.0, 1.5, 2.0, 2.5].map(|v| switch.position(true, v)),
+            [false, true, true, true, true]
+        );
     }
 }

@@ -265,7 +265,12 @@ impl<'a> Theta<'a> {
 
     /// Takes note of the present state's size.
     pub fn see(&mut self) {
-        let Self { amplitudes, plant, now, .. } = self;
+        let Self {
+            amplitudes,
+            plant,
+            now,
+            ..
+        } = self;
         amplitudes.see(&plant.systems[now.system].1.lcs, &now.x);
     }
 
@@ -277,8 +282,15 @@ impl<'a> Theta<'a> {
         self.begin(&mut Log::new(0, f64::INFINITY, false))?;
         self.read_lambda()?;
         let lcs = &self.plant.systems[self.now.system].1.lcs;
-        let at = Point { x: &self.now.x, lambda: &self.lambda, u: &self.now.u, du: &self.du };
-        Ok((0..self.switches.len()).map(|i| reading::value(&lcs.controls, i, at)).collect())
+        let at = Point {
+            x: &self.now.x,
+            lambda: &self.lambda,
+            u: &self.now.u,
+            du: &self.du,
+        };
+        Ok((0..self.switches.len())
+            .map(|i| reading::value(&lcs.controls, i, at))
+            .collect())
     }
 
     /// The state x of the present system.
@@ -343,9 +355,14 @@ impl Stepper for Theta<'_> {
                 after = next;
             };
             let merged = (t - breakpoint).abs() <= Self::slack(t);
-            let limit = if merged { breakpoint.max(t) } else { breakpoint.min(t) };
+            let limit = if merged {
+                breakpoint.max(t)
+            } else {
+                breakpoint.min(t)
+            };
             let (known, moving) =
-                self.switches.next_known(&self.system().lcs, &self.inputs, now, limit);
+                self.switches
+                    .next_known(&self.system().lcs, &self.inputs, now, limit);
             let mut stop = if merged { t } else { limit };
             let early = known < stop - Self::slack(stop);
             if early {

@@ -112,8 +112,14 @@ impl Theta<'_> {
     }
 
     pub(super) fn note_energy(&mut self) {
-        let Self { plant, now, storage, .. } = self;
+        let Self {
+            plant,
+            now,
+            storage,
+            ..
+        } = self;
         let lcs = &plant.systems[now.system].1.lcs;
-        now.balance.note(energy::stored_with(lcs, &now.x, &now.u, storage));
+        now.balance
+            .note(energy::stored_with(lcs, &now.x, &now.u, storage));
     }
 }
