@@ -365,7 +365,9 @@ impl<'b, F: Field> Eliminated<'b, F> {
             if self.agree(frame, &row) {
                 continue;
             }
-            if self.held.is_empty() {
+            // At an operating point an inductor across a source is a constraint on its value at that instant.
+            let instant = self.position.storage == StorageHold::Static;
+            if self.held.is_empty() && !instant {
                 let of = |c: usize| self.source(c - frame.u().start);
                 let elements = frame.u().filter(|&c| !row[c].is_zero()).map(of).collect();
                 return Err(ReduceError::Sources { elements });
