@@ -230,7 +230,12 @@ fn port_law(device: &str, role: Role, law: &Law) -> PortLaw {
             v_where_i_vanishes,
             i_where_v_vanishes,
         ),
-        Role::Function => (negated(graph.i()), graph.v(), i_where_v_vanishes, v_where_i_vanishes),
+        Role::Function => (
+            negated(graph.i()),
+            graph.v(),
+            i_where_v_vanishes,
+            v_where_i_vanishes,
+        ),
     };
     PortLaw {
         device: device.to_string(),
@@ -372,12 +377,19 @@ impl Facts {
         let sets: Vec<Vec<usize>> = if m <= ALL_SWAPS && each << m <= SWAP_NUMBERS {
             let mut masks: Vec<usize> = (0..1_usize << m).collect();
             masks.sort_by_key(|mask| mask.count_ones());
-            masks.iter().map(|mask| (0..m).filter(|j| mask >> j & 1 == 1).collect()).collect()
+            masks
+                .iter()
+                .map(|mask| (0..m).filter(|j| mask >> j & 1 == 1).collect())
+                .collect()
         } else {
             let singles = if each * m <= SWAP_NUMBERS { m } else { 0 };
-            std::iter::once(Vec::new()).chain((0..singles).map(|j| vec![j])).collect()
+            std::iter::once(Vec::new())
+                .chain((0..singles).map(|j| vec![j]))
+                .collect()
         };
-        sets.into_iter().filter_map(|ports| self.swap(ports)).collect()
+        sets.into_iter()
+            .filter_map(|ports| self.swap(ports))
+            .collect()
     }
 
     /// Exchanges λ and y at some ports.

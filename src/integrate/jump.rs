@@ -133,7 +133,9 @@ impl JumpProblem {
                 if self.split {
                     z -= ray.rows(k, k);
                 }
-                return Err(Infeasible { port: (&self.basis * z).iamax() });
+                return Err(Infeasible {
+                    port: (&self.basis * z).iamax(),
+                });
             }
             Status::Failed => return Err(Infeasible { port: 0 }),
         }

@@ -46,7 +46,10 @@ impl Scheme {
     /// (h‖A‖ > 2) can cost M = D + hCW⁻¹B its monotonicity; such a step takes [`Self::MOREAU`].
     #[must_use]
     pub const fn implicit_in_lambda(self) -> Self {
-        Self { theta: self.theta, gamma: 1.0 }
+        Self {
+            theta: self.theta,
+            gamma: 1.0,
+        }
     }
 
     /// Order of the global error between events.

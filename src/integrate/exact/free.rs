@@ -37,7 +37,12 @@ pub(crate) struct Free {
 impl Free {
     pub(crate) fn new(lcs: Lcs, tolerance: f64) -> Self {
         let jump = JumpProblem::new(&lcs, tolerance);
-        Self { lcs, jump, steps: Vec::new(), tolerance }
+        Self {
+            lcs,
+            jump,
+            steps: Vec::new(),
+            tolerance,
+        }
     }
 
     /// The state that conserves charge and flux from storage s.
@@ -52,7 +57,11 @@ impl Free {
 
     /// The impulse of the devices at state x, if one is needed. Active networks have no energy to project in; their jump
     /// is left to the limit of small steps.
-    pub(crate) fn jump(&mut self, x: &DVector<f64>, u: &DVector<f64>) -> Result<Option<Jump>, Infeasible> {
+    pub(crate) fn jump(
+        &mut self,
+        x: &DVector<f64>,
+        u: &DVector<f64>,
+    ) -> Result<Option<Jump>, Infeasible> {
         match &mut self.jump {
             Some(problem) if problem.monotone => problem.solve(&self.lcs, x, u),
             _ => Ok(None),
@@ -79,7 +88,11 @@ impl Free {
                 if !m.iter().all(|v| v.is_finite()) {
                     return None;
                 }
-                self.steps.push(Step { h, reach, driver: Driver::new(m, self.tolerance) });
+                self.steps.push(Step {
+                    h,
+                    reach,
+                    driver: Driver::new(m, self.tolerance),
+                });
                 self.steps.len() - 1
             }
         };

@@ -52,18 +52,39 @@ impl Inspector {
         self.w.resize(mode.flow.dim(), 0.0);
         exosystem.write(t, &mut self.w[n..]);
         mode.storage_at(&self.w, &mut self.s);
-        if self.s.iter().zip(s).zip(scale).any(|((a, b), size)| (a - b).abs() > CONSISTENT * size) {
+        if self
+            .s
+            .iter()
+            .zip(s)
+            .zip(scale)
+            .any(|((a, b), size)| (a - b).abs() > CONSISTENT * size)
+        {
             return Finding::Inconsistent;
         }
         self.amplitude.clear();
-        self.amplitude.extend(
-            (0..n).map(|i| mode.inject.row(i).iter().zip(scale).map(|(j, s)| (j * s).abs()).sum::<f64>()),
-        );
+        self.amplitude.extend((0..n).map(|i| {
+            mode.inject
+                .row(i)
+                .iter()
+                .zip(scale)
+                .map(|(j, s)| (j * s).abs())
+                .sum::<f64>()
+        }));
         let (w, amplitude) = (&self.w, &self.amplitude);
-        let size = |j: usize| if j < n { amplitude[j].max(w[j].abs()) } else { w[j].abs() };
+        let size = |j: usize| {
+            if j < n {
+                amplitude[j].max(w[j].abs())
+            } else {
+                w[j].abs()
+            }
+        };
         let broken = mode.constraints.row_iter().any(|row| {
             let value: f64 = row.iter().zip(w).map(|(c, w)| c * w).sum();
-            let whole: f64 = row.iter().enumerate().map(|(j, c)| (c * size(j)).abs()).sum();
+            let whole: f64 = row
+                .iter()
+                .enumerate()
+                .map(|(j, c)| (c * size(j)).abs())
+                .sum();
             value.abs() > CONSISTENT * whole
         });
         if broken {
@@ -79,7 +100,11 @@ impl Inspector {
                 value[k] = row.iter().zip(w).map(|(r, w)| r * w).sum();
                 noise[k] = GROUP
                     * f64::EPSILON
-                    * row.iter().enumerate().map(|(j, r)| (r * size(j)).abs()).sum::<f64>();
+                    * row
+                        .iter()
+                        .enumerate()
+                        .map(|(j, r)| (r * size(j)).abs())
+                        .sum::<f64>();
             }
             for k in 0..ORDERS - 1 {
                 noise[k] += time * value[k + 1].abs();

@@ -96,8 +96,26 @@ impl<'a> Exact<'a> {
     /// # Errors
     /// The reduction's for the start position; sources that no finite linear system generates.
     pub fn new(setup: Setup<'a>) -> Result<Self, SimError> {
-        let Setup { assemble, pairs, mut position, thresholds, t, until, start, h, energy, settings } = setup;
-        let mut plant = Plant::new(assemble, pairs, thresholds, h, energy, settings.lcp_residual);
+        let Setup {
+            assemble,
+            pairs,
+            mut position,
+            thresholds,
+            t,
+            until,
+            start,
+            h,
+            energy,
+            settings,
+        } = setup;
+        let mut plant = Plant::new(
+            assemble,
+            pairs,
+            thresholds,
+            h,
+            energy,
+            settings.lcp_residual,
+        );
         let lcs = plant.free(&position)?.lcs.clone();
         let sources: Vec<Source> = lcs.inputs.iter().map(|i| i.source.clone()).collect();
         let exosystem = Exosystem::of(&sources, t, until).ok_or_else(|| {
@@ -105,14 +123,24 @@ impl<'a> Exact<'a> {
                 "a source has no closed form as a linear system".to_string(),
             ))
         })?;
-        plant.driven = (0..plant.thresholds.len()).map(|i| is_driven(&lcs, i)).collect();
+        plant.driven = (0..plant.thresholds.len())
+            .map(|i| is_driven(&lcs, i))
+            .collect();
         for i in (0..position.len()).filter(|&i| plant.driven[i]) {
-            let values = sources.iter().enumerate().map(|(j, s)| lcs.controls.u[(i, j)] * s.value(t));
+            let values = sources
+                .iter()
+                .enumerate()
+                .map(|(j, s)| lcs.controls.u[(i, j)] * s.value(t));
             let control = lcs.controls.one[i] + values.sum::<f64>();
             position[i] = plant.thresholds[i].position(position[i], control);
         }
         let schedule = schedule(&lcs, &plant, &sources, &position, t, until);
-        let volts = lcs.storage.names.iter().map(|name| name.starts_with('v')).collect();
+        let volts = lcs
+            .storage
+            .names
+            .iter()
+            .map(|name| name.starts_with('v'))
+            .collect();
         let metric = lcs.storage.metric.clone();
         let stored = 0.5 * start.dot(&(&metric * &start));
         let columns = lcs.outputs.names.len();
@@ -123,7 +151,10 @@ impl<'a> Exact<'a> {
             motion: Motion::at(t),
             inspector: Inspector::default(),
             mode: None,
-            key: Key { closed: vec![false; pairs], switches: position },
+            key: Key {
+                closed: vec![false; pairs],
+                switches: position,
+            },
             storage: start.as_slice().to_vec(),
             scale: vec![0.0; start.len()],
             volts,
@@ -168,7 +199,10 @@ impl<'a> Exact<'a> {
 
     /// The next time at which something is known to happen, s.
     fn next_stop(&self) -> f64 {
-        let switching = self.schedule.get(self.scheduled).map_or(f64::INFINITY, |s| s.0);
+        let switching = self
+            .schedule
+            .get(self.scheduled)
+            .map_or(f64::INFINITY, |s| s.0);
         self.exosystem.next_breakpoint().min(switching)
     }
 
@@ -234,17 +268,21 @@ impl<'a> Exact<'a> {
             let end = self.exosystem.piece(i).end;
             if end <= near {
                 let Some(piece) = self.sources[i].piece(end.max(t)) else {
-                    return Err(self.fail(Reason::Unsupported("a source lost its closed form".to_string())));
+                    return Err(self.fail(Reason::Unsupported(
+                        "a source lost its closed form".to_string(),
+                    )));
                 };
                 edge |= self.sources[i].is_edge(end);
                 self.exosystem.set_piece(i, piece);
             }
         }
         let mut key = self.key.clone();
-        while let Some(&(_, switch, on)) = self.schedule.get(self.scheduled).filter(|s| s.0 <= near) {
+        while let Some(&(_, switch, on)) = self.schedule.get(self.scheduled).filter(|s| s.0 <= near)
+        {
             self.scheduled += 1;
-            let watched =
-                self.mode.is_some_and(|at| self.plant.modes[at].guarded_switches.contains(&switch));
+            let watched = self
+                .mode
+                .is_some_and(|at| self.plant.modes[at].guarded_switches.contains(&switch));
             if !watched && key.switches[switch] != on {
                 key.switches[switch] = on;
                 edge = true;
@@ -302,8 +340,15 @@ impl<'a> Exact<'a> {
             discontinuous = true;
         }
         let Some(at) = entry else {
-            let names: Vec<&str> = self.plant.thresholds.iter().map(|t| t.name.as_str()).collect();
-            return Err(self.fail(Reason::SwitchesDoNotSettle).device(names.join(", ")));
+            let names: Vec<&str> = self
+                .plant
+                .thresholds
+                .iter()
+                .map(|t| t.name.as_str())
+                .collect();
+            return Err(self
+                .fail(Reason::SwitchesDoNotSettle)
+                .device(names.join(", ")));
         };
         if let (Some(pair), false) = (fired, jumped) {
             self.transitions.insert(pair, at);
@@ -314,7 +359,8 @@ impl<'a> Exact<'a> {
         self.key.clone_from(&self.plant.modes[at].key);
         let mode = &self.plant.modes[at];
         let Inspector { x, amplitude, .. } = &self.inspector;
-        self.motion.enter(&mode.flow, &self.exosystem, t, x, amplitude);
+        self.motion
+            .enter(&mode.flow, &self.exosystem, t, x, amplitude);
         if jumped {
             self.jumps += 1;
         }
@@ -337,7 +383,9 @@ impl<'a> Exact<'a> {
             error
         })?;
         let x = free.state_from(&self.storage);
-        let found = free.jump(&x, &u).map_err(|_| SimError::at(t, Reason::Infeasible))?;
+        let found = free
+            .jump(&x, &u)
+            .map_err(|_| SimError::at(t, Reason::Infeasible))?;
         self.lcp_solves += u64::from(free.lcs.m() > 0);
         let (after, p) = match found {
             Some(jump) => (jump.x, jump.p),
@@ -358,9 +406,11 @@ impl<'a> Exact<'a> {
         let old = DVector::from_column_slice(&self.storage);
         let gain = 0.5 * (s.dot(&(&self.metric * &s)) - old.dot(&(&self.metric * &old)));
         self.balance.add((source, source - gain));
-        let moved = s.iter().zip(&self.storage).zip(&self.scale).any(|((a, b), scale)| {
-            (a - b).abs() > ROUNDING * scale.max(a.abs())
-        });
+        let moved = s
+            .iter()
+            .zip(&self.storage)
+            .zip(&self.scale)
+            .any(|((a, b), scale)| (a - b).abs() > ROUNDING * scale.max(a.abs()));
         self.storage.copy_from_slice(s.as_slice());
         self.rescale();
         Ok(moved)
@@ -374,8 +424,11 @@ impl<'a> Exact<'a> {
         key: &Key,
         fired: Option<(usize, usize)>,
     ) -> Result<Option<(usize, Vec<usize>)>, SimError> {
-        let barred: Vec<usize> =
-            if self.left_here.len() > PATIENCE { self.left_here.clone() } else { Vec::new() };
+        let barred: Vec<usize> = if self.left_here.len() > PATIENCE {
+            self.left_here.clone()
+        } else {
+            Vec::new()
+        };
         if let Some(&at) = fired.and_then(|pair| self.transitions.get(&pair))
             && self.plant.modes[at].key.switches == key.switches
             && !barred.contains(&at)
@@ -402,10 +455,18 @@ impl<'a> Exact<'a> {
             let u = self.inputs(t + h);
             self.lcp_solves += 1;
             for degenerate in [Degenerate::Open, Degenerate::As(&key.closed)] {
-                let proposal = self.plant.free(&key.switches)?.propose(&x, &u, h, degenerate);
-                let Some(closed) = proposal.filter(|c| !tried.contains(c)) else { continue };
+                let proposal = self
+                    .plant
+                    .free(&key.switches)?
+                    .propose(&x, &u, h, degenerate);
+                let Some(closed) = proposal.filter(|c| !tried.contains(c)) else {
+                    continue;
+                };
                 tried.push(closed.clone());
-                let candidate = Key { closed, switches: key.switches.clone() };
+                let candidate = Key {
+                    closed,
+                    switches: key.switches.clone(),
+                };
                 if let Some(found) = self.try_key(&candidate, &barred) {
                     return Ok(Some(found));
                 }
@@ -421,7 +482,10 @@ impl<'a> Exact<'a> {
                     continue;
                 }
                 tried.push(closed.clone());
-                let candidate = Key { closed, switches: key.switches.clone() };
+                let candidate = Key {
+                    closed,
+                    switches: key.switches.clone(),
+                };
                 if let Some(found) = self.try_key(&candidate, &barred) {
                     return Ok(Some(found));
                 }
@@ -432,13 +496,22 @@ impl<'a> Exact<'a> {
     }
 
     fn try_key(&mut self, key: &Key, barred: &[usize]) -> Option<(usize, Vec<usize>)> {
-        let at = self.plant.mode(key, &self.exosystem).filter(|at| !barred.contains(at))?;
+        let at = self
+            .plant
+            .mode(key, &self.exosystem)
+            .filter(|at| !barred.contains(at))?;
         self.try_mode(at).map(|leaving| (at, leaving))
     }
 
     fn try_mode(&mut self, at: usize) -> Option<Vec<usize>> {
         let mode = &self.plant.modes[at];
-        match self.inspector.inspect(mode, &self.exosystem, self.motion.t, &self.storage, &self.scale) {
+        match self.inspector.inspect(
+            mode,
+            &self.exosystem,
+            self.motion.t,
+            &self.storage,
+            &self.scale,
+        ) {
             Finding::Holds(leaving) => Some(leaving),
             Finding::Inconsistent | Finding::Refused(_) => None,
         }
@@ -529,8 +602,9 @@ fn schedule(
                 .filter(move |c| c.rising == rising)
                 .map(move |c| (c.time, rising))
         };
-        let mut both: Vec<(f64, bool)> =
-            passages(threshold.on_above, true).chain(passages(threshold.off_below, false)).collect();
+        let mut both: Vec<(f64, bool)> = passages(threshold.on_above, true)
+            .chain(passages(threshold.off_below, false))
+            .collect();
         both.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut on = position[i];
         for (time, rising) in both {
@@ -557,15 +631,22 @@ impl Stepper for Exact<'_> {
             let next = self.next_stop();
             let due = next <= t + SAME_TIME_ULPS * f64::EPSILON * t.abs();
             let stop = if due { next.min(t) } else { t };
-            let Some(at) = self.mode else { return Err(self.fail(Reason::Infeasible)) };
-            match self.motion.travel(&mut self.plant.modes[at].flow, &self.exosystem, stop) {
+            let Some(at) = self.mode else {
+                return Err(self.fail(Reason::Infeasible));
+            };
+            match self
+                .motion
+                .travel(&mut self.plant.modes[at].flow, &self.exosystem, stop)
+            {
                 Arrival::Reached if due => self.breakpoint(log)?,
                 Arrival::Reached => return Ok(()),
                 Arrival::Fired(guard) => self.fired(guard, log)?,
                 Arrival::Overflow => return Err(self.fail(Reason::Overflow)),
             }
             if self.motion.steps > self.settings.max_steps {
-                return Err(self.fail(Reason::TooManySteps { limit: self.settings.max_steps }));
+                return Err(self.fail(Reason::TooManySteps {
+                    limit: self.settings.max_steps,
+                }));
             }
         }
     }
@@ -579,13 +660,21 @@ impl Stepper for Exact<'_> {
     fn finish(&mut self) -> Outcome {
         self.take_storage();
         self.notes.extend(self.accumulation.end());
-        let loss = self.plant.modes.iter().map(|m| m.flow.loss).fold(0.0, f64::max);
+        let loss = self
+            .plant
+            .modes
+            .iter()
+            .map(|m| m.flow.loss)
+            .fold(0.0, f64::max);
         if loss > LOSS {
             self.notes.push(format!(
                 "the circuit is stiff without being graded: the matrix exponential is accurate to about {loss:.0e} a step"
             ));
         }
-        let mut outcome = Outcome { notes: std::mem::take(&mut self.notes), ..Outcome::default() };
+        let mut outcome = Outcome {
+            notes: std::mem::take(&mut self.notes),
+            ..Outcome::default()
+        };
         outcome.stats.steps = self.motion.steps;
         outcome.stats.events = self.events;
         outcome.stats.jumps = self.jumps;

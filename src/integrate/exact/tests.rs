@@ -18,7 +18,12 @@ fn circuit(text: &str) -> Circuit {
     let mut sources = SourceMap::default();
     let root = sources.add("test.cir", format!("test\n{text}\n.end\n"));
     let (netlist, findings) = crate::netlist::parse(&mut sources, root, &|_| unreachable!());
-    assert!(findings.iter().all(|d| d.severity < crate::diagnostic::Severity::Error), "{findings:?}");
+    assert!(
+        findings
+            .iter()
+            .all(|d| d.severity < crate::diagnostic::Severity::Error),
+        "{findings:?}"
+    );
     let (circuit, findings) = elaborate(&netlist, &ElaborateOptions::default());
     circuit.unwrap_or_else(|| panic!("{findings:?}"))
 }
@@ -34,9 +39,17 @@ fn prepare_circuit(circuit: &Circuit, energy: bool) -> (Exact<'static>, Lcs, Tra
     let thresholds: Vec<Threshold> = behaviour
         .switches
         .iter()
-        .map(|s| Threshold { name: s.name.clone(), on_above: s.on_above, off_below: s.off_below })
+        .map(|s| Threshold {
+            name: s.name.clone(),
+            on_above: s.on_above,
+            off_below: s.off_below,
+        })
         .collect();
-    let position: Vec<bool> = behaviour.switches.iter().map(|s| s.initial.unwrap_or(false)).collect();
+    let position: Vec<bool> = behaviour
+        .switches
+        .iter()
+        .map(|s| s.initial.unwrap_or(false))
+        .collect();
     let pairs = behaviour.pairs.len();
     let mut assemble = move |devices: &[Hold], switches: &[bool]| {
         let position = Position {
@@ -74,7 +87,11 @@ fn simulate_circuit(circuit: &Circuit) -> Result<Run, SimError> {
         title: String::new(),
         names: lcs.outputs.names,
         units: lcs.outputs.units,
-        grid: Grid { tstart: tran.tstart, tstep: tran.tstep, tstop: tran.tstop },
+        grid: Grid {
+            tstart: tran.tstart,
+            tstep: tran.tstep,
+            tstop: tran.tstop,
+        },
         method: "exact".into(),
         plan: vec![],
         notes: vec![],
@@ -90,8 +107,18 @@ fn simulate(text: &str) -> Run {
 }
 
 fn at(run: &Run, t: f64, name: &str) -> f64 {
-    let column = run.waveforms.names.iter().position(|n| n == name).expect("a probe");
-    let k = run.waveforms.time.iter().position(|&s| (s - t).abs() < 1e-12).expect("an output time");
+    let column = run
+        .waveforms
+        .names
+        .iter()
+        .position(|n| n == name)
+        .expect("a probe");
+    let k = run
+        .waveforms
+        .time
+        .iter()
+        .position(|&s| (s - t).abs() < 1e-12)
+        .expect("an output time");
     run.waveforms.values[k * run.waveforms.names.len() + column]
 }
 
@@ -112,7 +139,9 @@ fn bridge_with_resistor_is_a_parallel_rlc() {
         let v = 10.0 * e * ((omega * t).cos() - alpha / omega * (omega * t).sin());
         let i = 10.0 * e * (omega * t).sin() / (l * omega);
         let row = &run.waveforms.values[3 * k..3 * k + 3];
-        worst = worst.max((row[0] - v).abs() / 10.0).max((row[1] - i).abs() / 0.1);
+        worst = worst
+            .max((row[0] - v).abs() / 10.0)
+            .max((row[1] - i).abs() / 0.1);
         worst = worst.max((row[2] - v.abs()).abs() / 10.0);
     }
     assert!(worst < 1e-12, "{worst:e}");
@@ -127,12 +156,26 @@ fn half_wave() {
          .tran 1u 5m uic\n.save v(1)",
     );
     let expected = [
-        4.749127099, -4.257226516, 3.002362663, -6.447263215, 2.208187416, 0.911038067, -2.470584256, 2.800403336,
+        4.749127099,
+        -4.257226516,
+        3.002362663,
+        -6.447263215,
+        2.208187416,
+        0.911038067,
+        -2.470584256,
+        2.800403336,
     ];
     for (t, v) in TIMES.iter().zip(expected) {
         assert!((at(&run, *t, "v(1)") - v).abs() < 1e-9, "{t}");
     }
-    let switching = [152.268001, 466.427266, 780.979969, 1095.139234, 1409.691936, 1723.851202];
+    let switching = [
+        152.268001,
+        466.427266,
+        780.979969,
+        1095.139234,
+        1409.691936,
+        1723.851202,
+    ];
     for ((t, _), expected) in run.events.iter().zip(switching) {
         assert!((t - expected * 1e-6).abs() < 1e-12, "{t} {expected}");
     }
@@ -141,32 +184,64 @@ fn half_wave() {
 
 #[test]
 fn bridge_with_capacitor_filter() {
-    let run = simulate(&format!("{BRIDGE}Cf 2 3 300n IC=0\n.tran 1u 5m uic\n.save v(1) v(2,3) i(L1)"));
+    let run = simulate(&format!(
+        "{BRIDGE}Cf 2 3 300n IC=0\n.tran 1u 5m uic\n.save v(1) v(2,3) i(L1)"
+    ));
     let v1 = [
-        4.096759706, -3.171106268, 1.151156521, -4.437266965, 2.419957461, -1.216047855, 0.541524743, -0.190911385,
+        4.096759706,
+        -3.171106268,
+        1.151156521,
+        -4.437266965,
+        2.419957461,
+        -1.216047855,
+        0.541524743,
+        -0.190911385,
     ];
     let vf = [
-        5.747070623, 4.117956045, 3.780465849, 4.437266965, 2.465263706, 1.366750975, 0.757731606, 0.420089100,
+        5.747070623,
+        4.117956045,
+        3.780465849,
+        4.437266965,
+        2.465263706,
+        1.366750975,
+        0.757731606,
+        0.420089100,
     ];
     for ((t, v1), vf) in TIMES.iter().zip(v1).zip(vf) {
-        assert!((at(&run, *t, "v(1)") - v1).abs() < 1e-9, "{t}: {}", at(&run, *t, "v(1)"));
+        assert!(
+            (at(&run, *t, "v(1)") - v1).abs() < 1e-9,
+            "{t}: {}",
+            at(&run, *t, "v(1)")
+        );
         assert!((at(&run, *t, "v(2,3)") - vf).abs() < 1e-9, "{t}");
     }
     assert!((at(&run, 1e-3, "i(l1)") + 0.01136058723).abs() < 1e-11);
     assert!((at(&run, 0.0, "v(1)") - 10.0 / 1.3).abs() < 1e-14);
-    let switching = [32.0421, 211.7642, 357.0594, 536.7816, 682.0768, 861.7989, 1007.0942, 1186.8163];
-    let times: Vec<f64> = run.events.iter().map(|e| e.0).filter(|&t| t > 0.0).collect();
+    let switching = [
+        32.0421, 211.7642, 357.0594, 536.7816, 682.0768, 861.7989, 1007.0942, 1186.8163,
+    ];
+    let times: Vec<f64> = run
+        .events
+        .iter()
+        .map(|e| e.0)
+        .filter(|&t| t > 0.0)
+        .collect();
     for (t, expected) in times.iter().zip(switching) {
         assert!((t - expected * 1e-6).abs() < 1e-10, "{t} {expected}");
     }
     assert_eq!(times.len(), 31);
-    let charge = run.impulses.iter().find(|i| i.name == "i(df1)").expect("an impulse").area;
+    let charge = run
+        .impulses
+        .iter()
+        .find(|i| i.name == "i(df1)")
+        .expect("an impulse")
+        .area;
     assert!((charge - 3e-6 / 1.3).abs() < 1e-18, "{charge:e}");
 }
 
 const MAFFEZZONI_SWITCHING: [f64; 10] = [
-    12.564487, 30.693306, 49.264901, 68.179976, 87.359148, 106.739990, 126.274023, 145.923954, 165.661302,
-    185.464434,
+    12.564487, 30.693306, 49.264901, 68.179976, 87.359148, 106.739990, 126.274023, 145.923954,
+    165.661302, 185.464434,
 ];
 
 /// Maffezzoni's closed-loop switched circuit; the sawtooth falls without an edge time.
@@ -179,16 +254,39 @@ fn maffezzoni(models: &str) -> String {
 
 #[test]
 fn maffezzoni_without_hysteresis() {
-    let run = simulate(&maffezzoni(".model SWM SW(Vt=0 Vh=0 Ron=1m Roff=1k)\n.model DM D(Ron=1m Roff=1k Vfwd=0)"));
+    let run = simulate(&maffezzoni(
+        ".model SWM SW(Vt=0 Vh=0 Ron=1m Roff=1k)\n.model DM D(Ron=1m Roff=1k Vfwd=0)",
+    ));
     let peaks = [
-        1.217756661, 2.153347057, 2.867549533, 3.410012002, 3.820425992, 4.130004785, 4.362988328, 4.538022829,
-        4.669348767, 4.767783032,
+        1.217756661,
+        2.153347057,
+        2.867549533,
+        3.410012002,
+        3.820425992,
+        4.130004785,
+        4.362988328,
+        4.538022829,
+        4.669348767,
+        4.767783032,
     ];
     let ends = [
-        1.173271783, 2.055345254, 2.717545430, 3.214130750, 3.586205968, 3.864810108, 4.073322606, 4.229319604,
-        4.345995076, 4.433242386,
+        1.173271783,
+        2.055345254,
+        2.717545430,
+        3.214130750,
+        3.586205968,
+        3.864810108,
+        4.073322606,
+        4.229319604,
+        4.345995076,
+        4.433242386,
     ];
-    let off: Vec<f64> = run.events.iter().filter(|e| e.1.contains("off")).map(|e| e.0).collect();
+    let off: Vec<f64> = run
+        .events
+        .iter()
+        .filter(|e| e.1.contains("off"))
+        .map(|e| e.0)
+        .collect();
     assert_eq!(off.len(), 10, "{:?}", run.events);
     for (k, t) in off.iter().enumerate() {
         assert!((t * 1e6 - MAFFEZZONI_SWITCHING[k]).abs() < 1e-6, "{t}");
@@ -201,20 +299,35 @@ fn maffezzoni_without_hysteresis() {
 }
 #[test]
 fn maffezzoni_truly_ideal() {
-    let run = simulate(&maffezzoni(".model SWM SW(Vt=0 Vh=0 ideal)\n.model DM D(ideal)"));
+    let run = simulate(&maffezzoni(
+        ".model SWM SW(Vt=0 Vh=0 ideal)\n.model DM D(ideal)",
+    ));
     // Between switchings i relaxes to 20 A or to 0 with L/R = 200 µs: an independent scalar iteration.
     let tau = 200e-6;
     let (mut i, mut k) = (0.0_f64, 0);
-    let off: Vec<f64> = run.events.iter().filter(|e| e.1.contains("off")).map(|e| e.0).collect();
+    let off: Vec<f64> = run
+        .events
+        .iter()
+        .filter(|e| e.1.contains("off"))
+        .map(|e| e.0)
+        .collect();
     assert_eq!(off.len(), 10, "{:?}", run.events);
     while k < 10 {
         let rise = |s: f64| 20.0 + (i - 20.0) * (-s / tau).exp();
         let (mut low, mut high) = (0.0, 20e-6);
         for _ in 0..100 {
             let mid = 0.5 * (low + high);
-            if 7.5 - 0.5e6 * mid > rise(mid) { low = mid } else { high = mid }
+            if 7.5 - 0.5e6 * mid > rise(mid) {
+                low = mid
+            } else {
+                high = mid
+            }
         }
-        assert!((off[k] - (k as f64 * 20e-6 + low)).abs() < 1e-15, "{}", off[k]);
+        assert!(
+            (off[k] - (k as f64 * 20e-6 + low)).abs() < 1e-15,
+            "{}",
+            off[k]
+        );
         i = rise(low) * (-(20e-6 - low) / tau).exp();
         k += 1;
         assert!((at(&run, k as f64 * 20e-6, "i(l1)") - i).abs() < 1e-12);
@@ -234,7 +347,11 @@ fn charge_is_shared_through_a_closing_switch() {
     }
     // ½ C1 C2/(C1 + C2) V²
     let loss = 0.5 * 1e-6 * 0.3e-6 / 1.3e-6 * 100.0;
-    assert!((run.energy.dissipated - loss).abs() < 1e-12 * loss, "{:?}", run.energy);
+    assert!(
+        (run.energy.dissipated - loss).abs() < 1e-12 * loss,
+        "{:?}",
+        run.energy
+    );
 }
 
 #[test]
@@ -260,7 +377,11 @@ fn flux_is_shared_through_an_opening_switch() {
     );
     assert!((at(&run, 0.0, "i(l1)") - 1.0).abs() < 1e-15);
     for t in [1e-3, 2e-3] {
-        assert!((at(&run, t, "i(l1)") - 0.25).abs() < 1e-15, "{}", at(&run, t, "i(l1)"));
+        assert!(
+            (at(&run, t, "i(l1)") - 0.25).abs() < 1e-15,
+            "{}",
+            at(&run, t, "i(l1)")
+        );
         assert!((at(&run, t, "i(l2)") + 0.25).abs() < 1e-15);
     }
 }
@@ -269,12 +390,23 @@ fn flux_is_shared_through_an_opening_switch() {
 #[ignore = "a measurement"]
 fn speed() {
     for (name, text) in [
-        ("bridge A", format!("{BRIDGE}.tran 1u 5m uic\n.save v(1) i(L1) v(2,3)")),
-        ("bridge A 0.1us", format!("{BRIDGE}.tran 0.1u 5m uic\n.save v(1) i(L1) v(2,3)")),
-        ("bridge B", format!("{BRIDGE}Cf 2 3 300n IC=0\n.tran 1u 5m uic\n.save v(1) v(2,3) i(L1)")),
+        (
+            "bridge A",
+            format!("{BRIDGE}.tran 1u 5m uic\n.save v(1) i(L1) v(2,3)"),
+        ),
+        (
+            "bridge A 0.1us",
+            format!("{BRIDGE}.tran 0.1u 5m uic\n.save v(1) i(L1) v(2,3)"),
+        ),
+        (
+            "bridge B",
+            format!("{BRIDGE}Cf 2 3 300n IC=0\n.tran 1u 5m uic\n.save v(1) v(2,3) i(L1)"),
+        ),
         (
             "maffezzoni",
-            maffezzoni(".model SWM SW(Vt=0 Vh=0 Ron=1m Roff=1k)\n.model DM D(Ron=1m Roff=1k Vfwd=0)"),
+            maffezzoni(
+                ".model SWM SW(Vt=0 Vh=0 Ron=1m Roff=1k)\n.model DM D(Ron=1m Roff=1k Vfwd=0)",
+            ),
         ),
     ] {
         for _ in 0..3 {
@@ -282,14 +414,22 @@ fn speed() {
             let start = std::time::Instant::now();
             let mut log = Log::new(lcs.outputs.names.len(), 0.0, false);
             let mut row = vec![0.0; lcs.outputs.names.len()];
-            let grid = Grid { tstart: tran.tstart, tstep: tran.tstep, tstop: tran.tstop };
+            let grid = Grid {
+                tstart: tran.tstart,
+                tstep: tran.tstep,
+                tstop: tran.tstop,
+            };
             for k in 0..grid.len() {
                 exact.advance(grid.time(k), &mut log).unwrap();
                 exact.read(&mut row);
             }
             let seconds = start.elapsed().as_secs_f64();
             let stats = exact.finish().stats;
-            println!("{name}: {:.3} ms, {} points, {stats:?}", 1e3 * seconds, grid.len());
+            println!(
+                "{name}: {:.3} ms, {} points, {stats:?}",
+                1e3 * seconds,
+                grid.len()
+            );
         }
     }
 }
@@ -301,7 +441,10 @@ fn with_relays(text: &str, relays: &[(&str, &[(f64, &str)], f64, f64)]) -> Circu
         let terms = input
             .iter()
             .map(|(gain, node)| {
-                (Value::binary(*gain), Quantity::Voltage(circuit.node(node).expect("a node")))
+                (
+                    Value::binary(*gain),
+                    Quantity::Voltage(circuit.node(node).expect("a node")),
+                )
             })
             .collect();
         let zero = Value::binary(0.0);
@@ -315,7 +458,10 @@ fn with_relays(text: &str, relays: &[(&str, &[(f64, &str)], f64, f64)]) -> Circu
         let element = circuit.element(name).expect("an element");
         circuit.elements[element.index()].kind = Kind::Function {
             output: Output::Voltage,
-            input: Affine { terms, constant: 0.0 },
+            input: Affine {
+                terms,
+                constant: 0.0,
+            },
             law,
         };
     }
@@ -328,14 +474,21 @@ fn two_relays_pass_their_accumulation_point() {
     let circuit = with_relays(
         "C1 1 0 1 IC=1\nC2 2 0 1 IC=0.3\nE1 a 0 x 0 0\nE2 b 0 x 0 0\nVx x 0 0\nVs1 s1 0 0\nVs2 s2 0 0\n\
          G1 1 0 s1 0 1\nG2 0 1 s2 0 2\nG3 2 0 s1 0 2\nG4 2 0 s2 0 1\n.tran 10m 3 uic\n.save v(1) v(2)",
-        &[("vs1", &[(1.0, "1")], -1.0, 1.0), ("vs2", &[(1.0, "2")], -1.0, 1.0)],
+        &[
+            ("vs1", &[(1.0, "1")], -1.0, 1.0),
+            ("vs2", &[(1.0, "2")], -1.0, 1.0),
+        ],
     );
     let run = simulate_circuit(&circuit).unwrap_or_else(|e| panic!("{e}"));
     // From (1, 0.3): x2 = 0 after 0.1 s, x1 = 0 after another 1.1/3 s, then every interval is a third of the last:
     // the sum is 0.1 + 1.1/3 · 3/2.
     let last = run.events.last().expect("events").0;
     assert!((last - 0.65).abs() < 1e-13, "{last}");
-    assert!(run.notes.iter().any(|n| n.contains("accumulate")), "{:?}", run.notes);
+    assert!(
+        run.notes.iter().any(|n| n.contains("accumulate")),
+        "{:?}",
+        run.notes
+    );
     assert_eq!(at(&run, 3.0, "v(1)"), 0.0);
     assert_eq!(at(&run, 3.0, "v(2)"), 0.0);
 }
@@ -392,23 +545,90 @@ fn bridge_from_a_source() {
         "V1 1 0 SIN(0 10 {1e4/(2*pi)} 0 0 90)\nDF1 1 2 d\nDR1 0 2 d\nDR2 3 1 d\nDF2 3 0 d\nR1 2 3 1k\nCf 2 3 300n IC=0\n\
          .model d D(Vfwd=0.21 Ron=0 ideal)\n.tran 1u 5m uic\n.save v(2,3)",
     );
-    let times: Vec<f64> = run.events.iter().map(|e| e.0).filter(|&t| t > 0.0).collect();
+    let times: Vec<f64> = run
+        .events
+        .iter()
+        .map(|e| e.0)
+        .filter(|&t| t > 0.0)
+        .collect();
     assert_eq!(times.len(), BRIDGE_C_SWITCHING.len());
     for (t, expected) in times.iter().zip(BRIDGE_C_SWITCHING) {
         assert!((t - expected).abs() < 1e-15, "{t} {expected}");
     }
     for (t, v) in TIMES.iter().zip(BRIDGE_C_VALUES) {
-        assert!((at(&run, *t, "v(2,3)") - v).abs() < 1e-12, "{t}: {} {v}", at(&run, *t, "v(2,3)"));
+        assert!(
+            (at(&run, *t, "v(2,3)") - v).abs() < 1e-12,
+            "{t}: {} {v}",
+            at(&run, *t, "v(2,3)")
+        );
     }
     assert!((at(&run, 0.0, "v(2,3)") - 9.58).abs() < 1e-13);
 }
 
 /// Exponent k, capacitors, voltages after 1 s; from `tests/exact/reference.py`.
 const GRADED: [(u32, [&str; 5], [f64; 5]); 4] = [
-    (6, ["1.0", "0.03162277660168379", "0.001", "3.162277660168379e-5", "1.0e-6"], [0.805298660971035952, 0.6475065252107914947, 0.4857022822650686661, 0.3238028696584776361, 0.1619014506909165566]),
-    (9, ["1.0", "0.005623413251903491", "3.162277660168379e-5", "1.778279410038923e-7", "1.0e-9"], [0.8163678347812924934, 0.6536821564642386116, 0.4902639403002551256, 0.3268426345993559413, 0.1634213173159612603]),
-    (12, ["1.0", "0.001", "1.0e-6", "1.0e-9", "1.0e-12"], [0.8183113842308656214, 0.654753859866274582, 0.4910654685451049749, 0.3273769790737032143, 0.1636884895368679655]),
-    (15, ["1.0", "0.0001778279410038923", "3.162277660168379e-8", "5.623413251903491e-12", "1.0e-15"], [0.8186562037043065549, 0.6549435974699571225, 0.4912077004323895051, 0.3274718002885051876, 0.1637359001442526102]),
+    (
+        6,
+        [
+            "1.0",
+            "0.03162277660168379",
+            "0.001",
+            "3.162277660168379e-5",
+            "1.0e-6",
+        ],
+        [
+            0.805298660971035952,
+            0.6475065252107914947,
+            0.4857022822650686661,
+            0.3238028696584776361,
+            0.1619014506909165566,
+        ],
+    ),
+    (
+        9,
+        [
+            "1.0",
+            "0.005623413251903491",
+            "3.162277660168379e-5",
+            "1.778279410038923e-7",
+            "1.0e-9",
+        ],
+        [
+            0.8163678347812924934,
+            0.6536821564642386116,
+            0.4902639403002551256,
+            0.3268426345993559413,
+            0.1634213173159612603,
+        ],
+    ),
+    (
+        12,
+        ["1.0", "0.001", "1.0e-6", "1.0e-9", "1.0e-12"],
+        [
+            0.8183113842308656214,
+            0.654753859866274582,
+            0.4910654685451049749,
+            0.3273769790737032143,
+            0.1636884895368679655,
+        ],
+    ),
+    (
+        15,
+        [
+            "1.0",
+            "0.0001778279410038923",
+            "3.162277660168379e-8",
+            "5.623413251903491e-12",
+            "1.0e-15",
+        ],
+        [
+            0.8186562037043065549,
+            0.6549435974699571225,
+            0.4912077004323895051,
+            0.3274718002885051876,
+            0.1637359001442526102,
+        ],
+    ),
 ];
 
 #[test]
@@ -416,14 +636,27 @@ fn graded_line() {
     for (k, c, v) in GRADED {
         let mut text = String::new();
         for i in 0..5 {
-            text += &format!("C{i} {} 0 {} IC={}\nR{i} {} {} 1\n", i + 1, c[i], if i == 0 { 1 } else { 0 }, i + 1, (i + 2) % 6);
+            text += &format!(
+                "C{i} {} 0 {} IC={}\nR{i} {} {} 1\n",
+                i + 1,
+                c[i],
+                if i == 0 { 1 } else { 0 },
+                i + 1,
+                (i + 2) % 6
+            );
         }
-        let run = simulate(&format!("{text}.tran 0.01 1 uic\n.save v(1) v(2) v(3) v(4) v(5)"));
+        let run = simulate(&format!(
+            "{text}.tran 0.01 1 uic\n.save v(1) v(2) v(3) v(4) v(5)"
+        ));
         for i in 0..5 {
             let found = at(&run, 1.0, &format!("v({})", i + 1));
             assert!((found - v[i]).abs() < 1e-10, "1e{k}: {found} {}", v[i]);
         }
-        assert_eq!((run.stats.lcp_solves, run.stats.events), (0, 0), "a linear circuit needs no complementarity problem");
+        assert_eq!(
+            (run.stats.lcp_solves, run.stats.events),
+            (0, 0),
+            "a linear circuit needs no complementarity problem"
+        );
     }
 }
 
@@ -443,7 +676,11 @@ fn grazing_contacts_within_one_output_step() {
         if events == 2 {
             // 1 − cos t = 2 − δ
             let first = (delta - 1.0).acos();
-            assert!((run.events[0].0 - first).abs() < 1e-11, "{} {first}", run.events[0].0);
+            assert!(
+                (run.events[0].0 - first).abs() < 1e-11,
+                "{} {first}",
+                run.events[0].0
+            );
         }
     }
 }
@@ -454,26 +691,29 @@ use proptest::prelude::*;
 fn passive() -> impl Strategy<Value = String> {
     let value = || (0.3_f64..3.0).prop_map(|v| (v * 100.0).round() / 100.0);
     let branch = (0_usize..5, 0_usize..5, 0_u8..7, value(), -1.0_f64..1.0);
-    (prop::collection::vec(branch, 5..11), value(), 0_u8..2).prop_map(|(branches, omega, square)| {
-        let mut text = if square == 1 {
-            format!("Rs s 1 0.1\nV1 s 0 PULSE(-1 1 0.31 0 0 {omega} 2.7)\n")
-        } else {
-            format!("Rs s 1 0.1\nV1 s 0 SIN(0 2 {omega} 0.1)\n")
-        };
-        for k in 1..5 {
-            text += &format!("Rg{k} {k} 0 10\n");
-        }
-        for (j, (p, n, kind, v, ic)) in branches.iter().enumerate().filter(|(_, b)| b.0 != b.1) {
-            text += &match kind {
-                0 => format!("R{j} {p} {n} {v}\n"),
-                1 => format!("Rc{j} {p} c{j} 0.2\nC{j} c{j} {n} {v} IC={ic:.2}\n"),
-                2 => format!("L{j} {p} {n} {v} IC={ic:.2}\n"),
-                3 => format!("C{j} {p} {n} {v} IC={ic:.2}\n"),
-                _ => format!("D{j} {p} {n} d\n"),
+    (prop::collection::vec(branch, 5..11), value(), 0_u8..2).prop_map(
+        |(branches, omega, square)| {
+            let mut text = if square == 1 {
+                format!("Rs s 1 0.1\nV1 s 0 PULSE(-1 1 0.31 0 0 {omega} 2.7)\n")
+            } else {
+                format!("Rs s 1 0.1\nV1 s 0 SIN(0 2 {omega} 0.1)\n")
             };
-        }
-        text + ".model d D(ideal)\n"
-    })
+            for k in 1..5 {
+                text += &format!("Rg{k} {k} 0 10\n");
+            }
+            for (j, (p, n, kind, v, ic)) in branches.iter().enumerate().filter(|(_, b)| b.0 != b.1)
+            {
+                text += &match kind {
+                    0 => format!("R{j} {p} {n} {v}\n"),
+                    1 => format!("Rc{j} {p} c{j} 0.2\nC{j} c{j} {n} {v} IC={ic:.2}\n"),
+                    2 => format!("L{j} {p} {n} {v} IC={ic:.2}\n"),
+                    3 => format!("C{j} {p} {n} {v} IC={ic:.2}\n"),
+                    _ => format!("D{j} {p} {n} d\n"),
+                };
+            }
+            text + ".model d D(ideal)\n"
+        },
+    )
 }
 
 proptest! {

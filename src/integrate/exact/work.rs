@@ -31,7 +31,13 @@ impl Form {
         let dim = q.nrows();
         let packed = (0..dim)
             .flat_map(|i| (i..dim).map(move |j| (i, j)))
-            .map(|(i, j)| if i == j { q[(i, i)] } else { q[(i, j)] + q[(j, i)] })
+            .map(|(i, j)| {
+                if i == j {
+                    q[(i, i)]
+                } else {
+                    q[(i, j)] + q[(j, i)]
+                }
+            })
             .collect();
         Self { dim, packed }
     }
@@ -77,7 +83,9 @@ pub(crate) fn along_taylor(
     for (node, weight) in GAUSS {
         let s = node * part;
         for (i, out) in w.iter_mut().enumerate() {
-            *out = (0..=degree).rev().fold(0.0, |sum, k| sum * s + terms[k * dim + i]);
+            *out = (0..=degree)
+                .rev()
+                .fold(0.0, |sum, k| sum * s + terms[k * dim + i]);
         }
         for (sum, form) in sums.iter_mut().zip(forms) {
             *sum += weight * h * part * form.value(w);
@@ -95,13 +103,21 @@ mod tests {
     #[test]
     fn both_integrals_of_a_decay() {
         let tau = 2e-3;
-        let (a, q) = (DMatrix::from_element(1, 1, -1.0 / tau), DMatrix::from_element(1, 1, 1.0));
+        let (a, q) = (
+            DMatrix::from_element(1, 1, -1.0 / tau),
+            DMatrix::from_element(1, 1, 1.0),
+        );
         let h = 1.5e-3;
         let exact = |h: f64| -9.0 * tau / 2.0 * (-2.0 * h / tau).exp_m1();
         let form = Form::new(&gramian(&a, &q, h));
         assert!((form.value(&[3.0]) / exact(h) - 1.0).abs() < 1e-15);
-        let terms: Vec<f64> =
-            (0..=20).scan(3.0, |t, k| { let now = *t; *t *= -h / tau / (f64::from(k) + 1.0); Some(now) }).collect();
+        let terms: Vec<f64> = (0..=20)
+            .scan(3.0, |t, k| {
+                let now = *t;
+                *t *= -h / tau / (f64::from(k) + 1.0);
+                Some(now)
+            })
+            .collect();
         let forms = [Form::new(&q), Form::new(&(q * 2.0))];
         let along = along_taylor(&forms, &terms, 20, h, 0.4, &mut [0.0]);
         assert!((along[0] / exact(0.4 * h) - 1.0).abs() < 1e-14);

@@ -61,9 +61,7 @@ impl Theta<'_> {
         let u = DVector::from_column_slice(&self.now.u);
         let System { lcs, jump, .. } = &mut self.plant.systems[self.now.system].1;
         let found = match jump {
-            Some(problem) if problem.monotone => problem
-                .solve(lcs, &x, &u)
-                .map_err(|e| {
+            Some(problem) if problem.monotone => problem.solve(lcs, &x, &u).map_err(|e| {
                 SimError::at(t, Reason::Infeasible).device(lcs.ports[e.port].device.clone())
             })?,
             _ => None,

@@ -262,7 +262,12 @@ impl<'a> Theta<'a> {
 
     /// Takes note of the present state's size.
     pub fn see(&mut self) {
-        let Self { amplitudes, plant, now, .. } = self;
+        let Self {
+            amplitudes,
+            plant,
+            now,
+            ..
+        } = self;
         amplitudes.see(&plant.systems[now.system].1.lcs, &now.x);
     }
 
@@ -274,8 +279,15 @@ impl<'a> Theta<'a> {
         self.begin(&mut Log::new(0, f64::INFINITY, false))?;
         self.read_lambda()?;
         let lcs = &self.plant.systems[self.now.system].1.lcs;
-        let at = Point { x: &self.now.x, lambda: &self.lambda, u: &self.now.u, du: &self.du };
-        Ok((0..self.switches.len()).map(|i| reading::value(&lcs.controls, i, at)).collect())
+        let at = Point {
+            x: &self.now.x,
+            lambda: &self.lambda,
+            u: &self.now.u,
+            du: &self.du,
+        };
+        Ok((0..self.switches.len())
+            .map(|i| reading::value(&lcs.controls, i, at))
+            .collect())
     }
 
     /// The state x of the present system.
