@@ -76,12 +76,17 @@ impl Theta<'_> {
             - energy::stored(lcs, x.as_slice(), old);
         self.now.balance.add((source, source - gain));
         let step: Vec<f64> = u.iter().zip(old).map(|(a, b)| a - b).collect();
-        if p.iter().any(|&p| p != 0.0) {
+        // A jump at the rounding of the amplitudes seen so far corrects the state and is not worth a word.
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        let size = self.amplitudes.error(lcs, x.as_slice(), after.as_slice());
+        self.now.x.copy_from_slice(after.as_slice());
+        if size > JUMP {
             self.stats.jumps += 1;
             log.event(t, "jump");
         }
-        self.now.x.copy_from_slice(after.as_slice());
-        self.log_impulses(t, &p, &step, log);
+        if size > JUMP || step.iter().any(|s| *s != 0.0) {
+            self.log_impulses(t, &p, &step, log);
+        }
         Ok(())
     }
 

@@ -11,7 +11,7 @@ impl Theta<'_> {
             Stepping::Fixed(h) => h.min(self.longest),
             Stepping::Controlled { first, .. } => first,
         };
-        base * 2_f64.powi(-READ)
+        base * SHORT
     }
 
     /// z and the matrices of the short implicit step from now; slopes of the inputs go into `du`.
