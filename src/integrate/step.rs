@@ -99,7 +99,7 @@ impl Columns {
     }
 
     /// z at the end of a step as rows over z at its start, where x⁺ = `x_next` z; both ends of u are u⁺.
-    fn from_end(&self, x_next: &DMatrix<f64>) -> DMatrix<f64> {
+    fn end_rows(&self, x_next: &DMatrix<f64>) -> DMatrix<f64> {
         let p = self.varying.len();
         let mut rows = DMatrix::zeros(self.len(), self.len());
         rows.rows_mut(0, self.n).copy_from(x_next);
@@ -286,7 +286,7 @@ impl StepMatrices {
             None => y.clone(),
             Some(after) => {
                 let (lambda, _) = after.lambda_rows(active);
-                (&after.m * lambda + &after.q) * columns.from_end(&x_next)
+                (&after.m * lambda + &after.q) * columns.end_rows(&x_next)
             }
         };
         let extra = if solve.regular {
