@@ -42,3 +42,8 @@ pub mod waveform;
 
 #[cfg(feature = "cli")]
 pub mod cli;
+
+/// Compiles and runs the README's example.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

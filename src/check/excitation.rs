@@ -43,6 +43,15 @@ impl Excitation {
                     range(&[offset - size, offset + size], false)
                 }
             }
+            Wave::Sffm {
+                offset, amplitude, ..
+            } => range(&[offset - amplitude.abs(), offset + amplitude.abs()], false),
+            Wave::Am {
+                amplitude, offset, ..
+            } => {
+                let size = amplitude.abs() * (offset.abs() + 1.0);
+                range(&[-size, size], false)
+            }
             Wave::Pulse {
                 v1, v2, rise, fall, ..
             } => range(&[*v1, *v2], v1 != v2 && (*rise == 0.0 || *fall == 0.0)),
@@ -61,15 +70,6 @@ impl Excitation {
                 } else {
                     range(&values, edge || wraps)
                 }
-            }
-            Wave::Sffm {
-                offset, amplitude, ..
-            } => range(&[offset - amplitude.abs(), offset + amplitude.abs()], false),
-            Wave::Am {
-                amplitude, offset, ..
-            } => {
-                let size = amplitude.abs() * (offset.abs() + 1.0);
-                range(&[-size, size], false)
             }
             Wave::Exp {
                 v1,

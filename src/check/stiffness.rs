@@ -12,7 +12,7 @@ const WORK: usize = 3_000_000_000;
 const LARGEST: usize = 300;
 
 /// Eigenvalues below this times the largest of their mode count as zero (rounding of the eigenvalue computation).
-const ZERO: f64 = 1e-13;
+const ZERO: f64 = 1e-11;
 
 /// Shortest and longest time constant 1/|s| over the modes looked at.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]

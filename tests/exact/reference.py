@@ -1,4 +1,4 @@
-"""High-precision references for the tests of src/integrate/exact (mpmath, 60 digits). Prints Rust arrays."""
+"""High-precision references for the tests of src/integrate/exact (mpmath, 60 digits). Prints Rust arrays of the nearest doubles."""
 
 from mpmath import cos, diag, exp, expm, findroot, matrix, mp, mpf, pi, sin
 
@@ -40,9 +40,9 @@ def bridge_c():
 
     times = [mpf(k) / 10**4 for k in (1, 2, 5, 10, 20, 30, 40, 50)]
     print("const BRIDGE_C_SWITCHING: [f64; %d] = [" % len(switching))
-    print("".join("    %s,\n" % mp.nstr(x, 19) for x in switching) + "];")
+    print("".join("    %r,\n" % float(x) for x in switching) + "];")
     print("const BRIDGE_C_VALUES: [f64; 8] = [")
-    print("".join("    %s,\n" % mp.nstr(value(x), 19) for x in times) + "];")
+    print("".join("    %r,\n" % float(value(x)) for x in times) + "];")
 
 
 def graded():
@@ -66,7 +66,7 @@ def graded():
         x0 = matrix([half[0], 0, 0, 0, 0])
         y = vectors * diag([exp(v) for v in values]) * (vectors.T * x0)
         print("// capacitors", [mp.nstr(x, 16) for x in c])
-        print("(%d, [%s])," % (k, ", ".join(mp.nstr(y[i] / half[i], 19) for i in range(5))))
+        print("(%d, [%s])," % (k, ", ".join(repr(float(y[i] / half[i])) for i in range(5))))
         mp.dps = 60
 
 

@@ -17,7 +17,13 @@ pub(crate) struct Accumulation {
 impl Accumulation {
     /// A watch that starts at t.
     pub(crate) fn new(t: f64) -> Self {
-        Self { since: t, last: t, first_interval: f64::INFINITY, interval: f64::INFINITY, count: 0 }
+        Self {
+            since: t,
+            last: t,
+            first_interval: f64::INFINITY,
+            interval: f64::INFINITY,
+            count: 0,
+        }
     }
 
     /// An event at t; returns the note of an accumulation that it ends.
@@ -68,7 +74,11 @@ mod tests {
             dt /= 2.0;
             assert_eq!(watch.event(t), None);
         }
-        assert!(watch.event(5.0).is_some_and(|note| note.contains("20 events")));
+        assert!(
+            watch
+                .event(5.0)
+                .is_some_and(|note| note.contains("20 events"))
+        );
         for k in 0..50 {
             assert_eq!(watch.event(6.0 + f64::from(k)), None);
         }

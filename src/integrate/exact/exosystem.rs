@@ -25,7 +25,11 @@ enum Column {
     /// The slope of the column before.
     Slope { input: usize },
     /// Sine part of an input's wave; the cosine part follows unless omega is 0.
-    Wave { input: usize, damping: f64, omega: f64 },
+    Wave {
+        input: usize,
+        damping: f64,
+        omega: f64,
+    },
     /// The cosine part of the column before.
     Quadrature,
     /// e^{−damping t} sin omega t and cos omega t for all inputs that last the whole run.
@@ -113,19 +117,29 @@ impl Exosystem {
             for &(damping, omega) in &shape.waves {
                 if shape.changes || damping != 0.0 {
                     output.push((input, columns.len(), 1.0));
-                    columns.push(Column::Wave { input, damping, omega });
+                    columns.push(Column::Wave {
+                        input,
+                        damping,
+                        omega,
+                    });
                     if omega != 0.0 {
                         columns.push(Column::Quadrature);
                     }
                     continue;
                 }
                 let shared = Column::Shared { damping, omega };
-                let at = columns.iter().position(|c| *c == shared).unwrap_or_else(|| {
-                    columns.push(shared);
-                    columns.push(Column::Quadrature);
-                    columns.len() - 2
-                });
-                for term in piece.terms().filter(|t| (t.decay, t.frequency) == (damping, omega)) {
+                let at = columns
+                    .iter()
+                    .position(|c| *c == shared)
+                    .unwrap_or_else(|| {
+                        columns.push(shared);
+                        columns.push(Column::Quadrature);
+                        columns.len() - 2
+                    });
+                for term in piece
+                    .terms()
+                    .filter(|t| (t.decay, t.frequency) == (damping, omega))
+                {
                     let (s, c) = (term.phase - omega * piece.origin).sin_cos();
                     output.push((input, at, term.amplitude * c));
                     output.push((input, at + 1, term.amplitude * s));
@@ -139,7 +153,10 @@ impl Exosystem {
             match *column {
                 Column::Line { .. } => generator[(k, k + 1)] = 1.0,
                 Column::Wave { damping, omega, .. } | Column::Shared { damping, omega } => {
-                    rates.push(Rate { decay: damping, frequency: omega.abs() });
+                    rates.push(Rate {
+                        decay: damping,
+                        frequency: omega.abs(),
+                    });
                     generator[(k, k)] = -damping;
                     if omega != 0.0 {
                         generator[(k, k + 1)] = omega;
@@ -154,7 +171,13 @@ impl Exosystem {
         for (i, j, value) in output {
             h[(i, j)] += value;
         }
-        Self { columns, generator, output: h, rates, pieces: first }
+        Self {
+            columns,
+            generator,
+            output: h,
+            rates,
+            pieces: first,
+        }
     }
 
     /// Length of z; z[0] = 1.
@@ -189,7 +212,10 @@ impl Exosystem {
 
     /// The next breakpoint, s.
     pub(crate) fn next_breakpoint(&self) -> f64 {
-        self.pieces.iter().map(|p| p.end).fold(f64::INFINITY, f64::min)
+        self.pieces
+            .iter()
+            .map(|p| p.end)
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// z(t) on the current pieces, from closed forms.
@@ -203,10 +229,17 @@ impl Exosystem {
                 }
                 Column::Step { input } => z[k] = self.pieces[input].constant,
                 Column::Slope { input } => z[k] = self.pieces[input].slope,
-                Column::Wave { input, damping, omega } => {
+                Column::Wave {
+                    input,
+                    damping,
+                    omega,
+                } => {
                     let piece = &self.pieces[input];
                     let (mut sine, mut cosine) = (0.0, 0.0);
-                    for term in piece.terms().filter(|w| (w.decay, w.frequency) == (damping, omega)) {
+                    for term in piece
+                        .terms()
+                        .filter(|w| (w.decay, w.frequency) == (damping, omega))
+                    {
                         let (s, c) = pair(term, t - piece.origin);
                         sine += s;
                         cosine += c;
@@ -239,14 +272,25 @@ mod tests {
     }
 
     fn sine(amplitude: f64, damping: f64, phase: f64, delay: f64) -> Source {
-        source(Wave::Sin { offset: 0.5, amplitude, frequency: 3.0, delay, damping, phase })
+        source(Wave::Sin {
+            offset: 0.5,
+            amplitude,
+            frequency: 3.0,
+            delay,
+            damping,
+            phase,
+        })
     }
 
     /// H z(t) is the source and H S z(t) its derivative, for every kind of column, across breakpoints.
     #[test]
     fn reproduces_sources_and_their_derivatives() {
         let sources = vec![
-            source(Wave::Pwl { points: vec![(0.0, 1.0), (1.0, 3.0), (2.0, -1.0)], repeat: None, delay: 0.0 }),
+            source(Wave::Pwl {
+                points: vec![(0.0, 1.0), (1.0, 3.0), (2.0, -1.0)],
+                repeat: None,
+                delay: 0.0,
+            }),
             source(Wave::Pwl {
                 points: vec![(0.0, 1.0), (0.5, 1.0), (0.5, 4.0)],
                 repeat: None,
@@ -277,8 +321,14 @@ mod tests {
             let u = exosystem.output() * &z;
             let du = exosystem.output() * (exosystem.generator() * &z);
             for (i, source) in sources.iter().enumerate() {
-                assert!((u[i] - source.value(t)).abs() < 1e-14 * 8.0, "input {i} at {t}");
-                assert!((du[i] - source.derivative(t)).abs() < 1e-12, "input {i} at {t}");
+                assert!(
+                    (u[i] - source.value(t)).abs() < 1e-14 * 8.0,
+                    "input {i} at {t}"
+                );
+                assert!(
+                    (du[i] - source.derivative(t)).abs() < 1e-12,
+                    "input {i} at {t}"
+                );
             }
         }
         assert_eq!(exosystem.next_breakpoint(), f64::INFINITY);

@@ -45,8 +45,10 @@ const PAIRS: [(Complex<f64>, Complex<f64>); 3] = [
 ];
 
 /// The real zero of the [7/8] approximant and the pole it is paired with.
-const LAST: (f64, Complex<f64>) =
-    (-10.949_006_411_932_347, Complex::new(10.169_446_006_657_515, 1.649_201_796_822_227_7));
+const LAST: (f64, Complex<f64>) = (
+    -10.949_006_411_932_347,
+    Complex::new(10.169_446_006_657_515, 1.649_201_796_822_227_7),
+);
 
 /// Squarings of the [7/8] approximant: with 2³ steps its error on the whole negative axis is below 1e-13.
 const SQUARINGS: u32 = 3;
@@ -67,7 +69,9 @@ pub(crate) struct Exponential {
 /// multiplied by it when A is graded (spread storage elements).
 pub(crate) fn exponential(a: &DMatrix<f64>, h: f64) -> Option<Exponential> {
     let scale = balance(a, h);
-    let z = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] * h * scale[j] / scale[i]);
+    let z = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| {
+        a[(i, j)] * h * scale[j] / scale[i]
+    });
     let norm = norm_1(&z);
     if !norm.is_finite() {
         return None;
@@ -86,7 +90,9 @@ pub(crate) fn exponential(a: &DMatrix<f64>, h: f64) -> Option<Exponential> {
             r[(i, j)] *= scale[i] / scale[j];
         }
     }
-    r.iter().all(|v| v.is_finite()).then_some(Exponential { matrix: r, loss })
+    r.iter()
+        .all(|v| v.is_finite())
+        .then_some(Exponential { matrix: r, loss })
 }
 
 /// Powers of two d such that diag(d)⁻¹ A h diag(d) has rows and columns of like size (Osborne; Parlett and Reinsch,
@@ -105,7 +111,11 @@ pub(crate) fn balance(a: &DMatrix<f64>, h: f64) -> Vec<f64> {
             let factor = if column == 0.0 {
                 1.0
             } else if row == 0.0 {
-                if column > 1.0 { power_of_two(1.0 / column) } else { 1.0 }
+                if column > 1.0 {
+                    power_of_two(1.0 / column)
+                } else {
+                    1.0
+                }
             } else {
                 power_of_two((row / column).sqrt())
             };
@@ -125,17 +135,27 @@ pub(crate) fn balance(a: &DMatrix<f64>, h: f64) -> Vec<f64> {
 /// The power of two nearest to `x` in the logarithm, 1 where that is not finite.
 fn power_of_two(x: f64) -> f64 {
     let exponent = x.log2().round();
-    if exponent.is_finite() { exponent.clamp(-900.0, 900.0).exp2() } else { 1.0 }
+    if exponent.is_finite() {
+        exponent.clamp(-900.0, 900.0).exp2()
+    } else {
+        1.0
+    }
 }
 
 /// Largest absolute column sum.
 pub(crate) fn norm_1(a: &DMatrix<f64>) -> f64 {
-    a.column_iter().map(|c| c.iter().map(|v| v.abs()).sum::<f64>()).fold(0.0, f64::max)
+    a.column_iter()
+        .map(|c| c.iter().map(|v| v.abs()).sum::<f64>())
+        .fold(0.0, f64::max)
 }
 
 /// Padé [13/13] with scaling and squaring (Higham 2005, algorithm 2.3).
 fn diagonal(z: &DMatrix<f64>, norm: f64) -> Option<DMatrix<f64>> {
-    let squarings = if norm > THETA_13 { (norm / THETA_13).log2().ceil() as i32 } else { 0 };
+    let squarings = if norm > THETA_13 {
+        (norm / THETA_13).log2().ceil() as i32
+    } else {
+        0
+    };
     let z = z * (-f64::from(squarings)).exp2();
     let identity = DMatrix::identity(z.nrows(), z.nrows());
     let b = &PADE_13;

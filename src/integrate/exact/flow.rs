@@ -111,7 +111,11 @@ impl Flow {
 
     /// See [`Spectrum::step_limit`]; without guards nothing can hide.
     pub(crate) fn step_limit(&self, age: f64) -> f64 {
-        if self.guards == 0 { f64::INFINITY } else { self.spectrum.step_limit(age) }
+        if self.guards == 0 {
+            f64::INFINITY
+        } else {
+            self.spectrum.step_limit(age)
+        }
     }
 
     /// `next = [w | g | g']` at h/2^level after `w`; `false` if the exponential does not exist in doubles.
@@ -128,12 +132,16 @@ impl Flow {
 
     #[cold]
     fn tabulate(&mut self, level: u32) -> bool {
-        let Some(Exponential { matrix, loss }) = expm::exponential(&self.generator, self.step(level)) else {
+        let Some(Exponential { matrix, loss }) =
+            expm::exponential(&self.generator, self.step(level))
+        else {
             return false;
         };
         self.loss = self.loss.max(loss.unwrap_or(0.0));
         let mut fused = DMatrix::zeros(self.dim + self.rows.nrows(), self.dim);
-        fused.rows_mut(self.dim, self.rows.nrows()).copy_from(&(&self.rows * &matrix));
+        fused
+            .rows_mut(self.dim, self.rows.nrows())
+            .copy_from(&(&self.rows * &matrix));
         fused.rows_mut(0, self.dim).copy_from(&matrix);
         self.levels[level as usize] = Some(Kernel::new(&fused));
         true
@@ -142,13 +150,19 @@ impl Flow {
     /// Adds the quadratic forms (power out of sources, power dissipated) whose integrals [`Self::energy`] gives.
     pub(crate) fn set_power(&mut self, matrices: [DMatrix<f64>; 2]) {
         let instant = [Form::new(&matrices[0]), Form::new(&matrices[1])];
-        self.power = Some(Power { matrices, instant, levels: vec![None; self.levels.len()] });
+        self.power = Some(Power {
+            matrices,
+            instant,
+            levels: vec![None; self.levels.len()],
+        });
     }
 
     /// (from sources, dissipated) over the step h/2^level from w, J.
     #[inline]
     pub(crate) fn energy(&mut self, level: u32, w: &[f64]) -> [f64; 2] {
-        let Some(power) = &self.power else { return [0.0; 2] };
+        let Some(power) = &self.power else {
+            return [0.0; 2];
+        };
         if let Some(forms) = &power.levels[level as usize] {
             return [forms[0].value(w), forms[1].value(w)];
         }
@@ -160,8 +174,13 @@ impl Flow {
     #[cold]
     fn integrate_forms(&mut self, level: u32) {
         let Some(power) = &mut self.power else { return };
-        let mut grams =
-            power.matrices.each_ref().map(|q| work::gramian(&self.generator, q, self.h * (-f64::from(self.bottom)).exp2()));
+        let mut grams = power.matrices.each_ref().map(|q| {
+            work::gramian(
+                &self.generator,
+                q,
+                self.h * (-f64::from(self.bottom)).exp2(),
+            )
+        });
         let mut at = self.bottom;
         loop {
             if power.levels[at as usize].is_none() {
@@ -205,7 +224,13 @@ impl Flow {
     pub(crate) fn noise(&self, amplitude: &[f64], floors: &mut Vec<f64>) {
         floors.clear();
         floors.extend(self.rows.row_iter().map(|row| {
-            NOISE * f64::EPSILON * row.iter().zip(amplitude).map(|(r, a)| (r * a).abs()).sum::<f64>()
+            NOISE
+                * f64::EPSILON
+                * row
+                    .iter()
+                    .zip(amplitude)
+                    .map(|(r, a)| (r * a).abs())
+                    .sum::<f64>()
         }));
     }
 
@@ -239,7 +264,9 @@ impl Flow {
     pub(crate) fn sum(&self, terms: &[f64], degree: usize, s: f64, w: &mut [f64]) {
         let dim = self.dim;
         for (i, out) in w[..dim].iter_mut().enumerate() {
-            *out = (0..=degree).rev().fold(0.0, |sum, k| sum * s + terms[k * dim + i]);
+            *out = (0..=degree)
+                .rev()
+                .fold(0.0, |sum, k| sum * s + terms[k * dim + i]);
         }
     }
 
@@ -248,7 +275,10 @@ impl Flow {
         let (dim, m) = (self.dim, self.guards);
         values.resize((MAX_DEGREE + 1) * m, 0.0);
         for k in 0..=degree {
-            self.guard_kernel.apply(&terms[k * dim..(k + 1) * dim], &mut values[k * m..(k + 1) * m]);
+            self.guard_kernel.apply(
+                &terms[k * dim..(k + 1) * dim],
+                &mut values[k * m..(k + 1) * m],
+            );
         }
     }
 }
@@ -260,7 +290,14 @@ mod tests {
     fn oscillator(h: f64) -> Flow {
         // x1' = −ω x2, x2' = ω x1 with ω = 1e4, guard x1
         let generator = DMatrix::from_row_slice(2, 2, &[0.0, -1e4, 1e4, 0.0]);
-        Flow::new(generator, 2, &DMatrix::from_row_slice(1, 2, &[1.0, 0.0]), h, &[]).unwrap()
+        Flow::new(
+            generator,
+            2,
+            &DMatrix::from_row_slice(1, 2, &[1.0, 0.0]),
+            h,
+            &[],
+        )
+        .unwrap()
     }
 
     #[test]
@@ -280,7 +317,10 @@ mod tests {
         let degree = flow.taylor(&[1.0, 0.0], flow.step(4), &mut terms);
         let mut w = vec![0.0; 2];
         flow.sum(&terms, degree, 1.0, &mut w);
-        assert!((w[0] - next[0]).abs() < 4e-16 && (w[1] - next[1]).abs() < 4e-16, "{w:?} {next:?} {degree}");
+        assert!(
+            (w[0] - next[0]).abs() < 4e-16 && (w[1] - next[1]).abs() < 4e-16,
+            "{w:?} {next:?} {degree}"
+        );
         let mut values = Vec::new();
         flow.guard_polynomials(&terms, degree, &mut values);
         assert_eq!(values[0], 1.0);

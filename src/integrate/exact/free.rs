@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::integrate::jump::{Infeasible, Jump, JumpProblem};
 use crate::lcs::{Lcs, Role};
-use crate::solve::{Driver, Status};
+use crate::solve::{Driver, Status, norm};
 
 /// One implicit step prepared: λ solves LCP(M, q) with M = D + hC W⁻¹B, W = I − hA.
 #[derive(Debug, Clone)]
@@ -37,7 +37,12 @@ pub(crate) struct Free {
 impl Free {
     pub(crate) fn new(lcs: Lcs, tolerance: f64) -> Self {
         let jump = JumpProblem::new(&lcs, tolerance);
-        Self { lcs, jump, steps: Vec::new(), tolerance }
+        Self {
+            lcs,
+            jump,
+            steps: Vec::new(),
+            tolerance,
+        }
     }
 
     /// The state that conserves charge and flux from storage s.
@@ -52,7 +57,11 @@ impl Free {
 
     /// The impulse of the devices at state x, if one is needed. Active networks have no energy to project in; their jump
     /// is left to the limit of small steps.
-    pub(crate) fn jump(&mut self, x: &DVector<f64>, u: &DVector<f64>) -> Result<Option<Jump>, Infeasible> {
+    pub(crate) fn jump(
+        &mut self,
+        x: &DVector<f64>,
+        u: &DVector<f64>,
+    ) -> Result<Option<Jump>, Infeasible> {
         match &mut self.jump {
             Some(problem) if problem.monotone => problem.solve(&self.lcs, x, u),
             _ => Ok(None),
@@ -79,7 +88,11 @@ impl Free {
                 if !m.iter().all(|v| v.is_finite()) {
                     return None;
                 }
-                self.steps.push(Step { h, reach, driver: Driver::new(m, self.tolerance) });
+                self.steps.push(Step {
+                    h,
+                    reach,
+                    driver: Driver::new(m, self.tolerance),
+                });
                 self.steps.len() - 1
             }
         };
@@ -106,6 +119,65 @@ impl Free {
                 })
                 .collect(),
         )
+    }
+
+    /// The impulse that takes state x to state `after` with these pairs conducting, if there is one: p ≥ 0 acts on the
+    /// pairs whose λ is free, B p = after − x, D p vanishes on them and is nonnegative on the others. It proves the jump
+    /// where the projection does not apply (active networks).
+    pub(crate) fn impulse_between(
+        &self,
+        x: &DVector<f64>,
+        after: &DVector<f64>,
+        closed: &[bool],
+    ) -> Option<DVector<f64>> {
+        /// Residual and sign violations below this part of the impulse's size are rounding.
+        const ROUNDING: f64 = 1e-9;
+        let lcs = &self.lcs;
+        let (n, m) = (lcs.n(), lcs.m());
+        let active: Vec<usize> = (0..m)
+            .filter(|&j| closed[j] == (lcs.ports[j].role != Role::Voltage))
+            .collect();
+        // Rows in the metric of stored energy, columns to unit length.
+        let weight = |i: usize| {
+            let stored = if i < lcs.energy.nrows() {
+                lcs.energy[(i, i)]
+            } else {
+                0.0
+            };
+            if stored > 0.0 { stored.sqrt() } else { 1.0 }
+        };
+        let length = |j: usize| {
+            let norm = (0..n)
+                .map(|i| (weight(i) * lcs.b[(i, j)]).powi(2))
+                .sum::<f64>()
+                .sqrt();
+            if norm > 0.0 { norm } else { 1.0 }
+        };
+        let feedthrough = lcs.d.amax().max(f64::MIN_POSITIVE);
+        let mut e = DMatrix::zeros(n + active.len(), active.len());
+        let mut f = DVector::zeros(n + active.len());
+        for (k, &j) in active.iter().enumerate() {
+            for i in 0..n {
+                e[(i, k)] = weight(i) * lcs.b[(i, j)] / length(j);
+            }
+            for (r, &i) in active.iter().enumerate() {
+                e[(n + r, k)] = lcs.d[(i, j)] / feedthrough;
+            }
+        }
+        for i in 0..n {
+            f[i] = weight(i) * (after[i] - x[i]);
+        }
+        let scaled = norm::nonnegative_least_squares(&e, &f);
+        if (&e * &scaled - &f).norm() > ROUNDING * f.norm() {
+            return None;
+        }
+        let mut p = DVector::zeros(m);
+        for (k, &j) in active.iter().enumerate() {
+            p[j] = scaled[k] / length(j);
+        }
+        let through = &lcs.d * &p;
+        let least = -ROUNDING * lcs.d.amax() * p.amax();
+        through.iter().all(|&v| v >= least).then_some(p)
     }
 
     /// Factorisations spent in proposals.

@@ -36,6 +36,23 @@ pub(crate) struct Inspector {
 }
 
 impl Inspector {
+    /// The storage that `mode` would have after taking over storage `s` by conservation of charge and flux.
+    pub(crate) fn project(
+        &mut self,
+        mode: &Mode,
+        exosystem: &Exosystem,
+        t: f64,
+        s: &[f64],
+    ) -> Option<Vec<f64>> {
+        mode.state_from(s, &mut self.x);
+        self.w.clear();
+        self.w.extend_from_slice(&self.x);
+        self.w.resize(mode.flow.dim(), 0.0);
+        exosystem.write(t, &mut self.w[mode.n..]);
+        mode.storage_at(&self.w, &mut self.s);
+        self.s.iter().all(|v| v.is_finite()).then(|| self.s.clone())
+    }
+
     /// Inspects `mode` at storage `s`, whose amplitudes so far are `scale`, at time t on the current source pieces.
     pub(crate) fn inspect(
         &mut self,
@@ -52,18 +69,39 @@ impl Inspector {
         self.w.resize(mode.flow.dim(), 0.0);
         exosystem.write(t, &mut self.w[n..]);
         mode.storage_at(&self.w, &mut self.s);
-        if self.s.iter().zip(s).zip(scale).any(|((a, b), size)| (a - b).abs() > CONSISTENT * size) {
+        if self
+            .s
+            .iter()
+            .zip(s)
+            .zip(scale)
+            .any(|((a, b), size)| (a - b).abs() > CONSISTENT * size)
+        {
             return Finding::Inconsistent;
         }
         self.amplitude.clear();
-        self.amplitude.extend(
-            (0..n).map(|i| mode.inject.row(i).iter().zip(scale).map(|(j, s)| (j * s).abs()).sum::<f64>()),
-        );
+        self.amplitude.extend((0..n).map(|i| {
+            mode.inject
+                .row(i)
+                .iter()
+                .zip(scale)
+                .map(|(j, s)| (j * s).abs())
+                .sum::<f64>()
+        }));
         let (w, amplitude) = (&self.w, &self.amplitude);
-        let size = |j: usize| if j < n { amplitude[j].max(w[j].abs()) } else { w[j].abs() };
+        let size = |j: usize| {
+            if j < n {
+                amplitude[j].max(w[j].abs())
+            } else {
+                w[j].abs()
+            }
+        };
         let broken = mode.constraints.row_iter().any(|row| {
             let value: f64 = row.iter().zip(w).map(|(c, w)| c * w).sum();
-            let whole: f64 = row.iter().enumerate().map(|(j, c)| (c * size(j)).abs()).sum();
+            let whole: f64 = row
+                .iter()
+                .enumerate()
+                .map(|(j, c)| (c * size(j)).abs())
+                .sum();
             value.abs() > CONSISTENT * whole
         });
         if broken {
@@ -79,7 +117,11 @@ impl Inspector {
                 value[k] = row.iter().zip(w).map(|(r, w)| r * w).sum();
                 noise[k] = GROUP
                     * f64::EPSILON
-                    * row.iter().enumerate().map(|(j, r)| (r * size(j)).abs()).sum::<f64>();
+                    * row
+                        .iter()
+                        .enumerate()
+                        .map(|(j, r)| (r * size(j)).abs())
+                        .sum::<f64>();
             }
             for k in 0..ORDERS - 1 {
                 noise[k] += time * value[k + 1].abs();

@@ -21,11 +21,19 @@ impl Kernel {
         for first in (0..rows).step_by(BLOCK) {
             for j in 0..columns {
                 blocks.push(std::array::from_fn(|i| {
-                    if first + i < rows { matrix[(first + i, j)] } else { 0.0 }
+                    if first + i < rows {
+                        matrix[(first + i, j)]
+                    } else {
+                        0.0
+                    }
                 }));
             }
         }
-        Self { rows, columns, blocks }
+        Self {
+            rows,
+            columns,
+            blocks,
+        }
     }
 
     /// y = K w; `w` must have one value per column, `y` one per row.

@@ -7,14 +7,17 @@ mod expm;
 mod flow;
 mod free;
 mod inspect;
+mod jump;
 mod kernel;
 mod mode;
 mod motion;
 mod plant;
 mod polynomial;
 mod rays;
+mod schedule;
 mod spectrum;
 mod stepper;
+mod transition;
 mod work;
 
 #[cfg(test)]

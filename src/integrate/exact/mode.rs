@@ -97,15 +97,22 @@ impl Mode {
         let mut constant = input.column_mut(0);
         constant += &lcs.e0;
         generator.view_mut((0, n), (n, dz)).copy_from(&input);
-        generator.view_mut((n, n), (dz, dz)).copy_from(exosystem.generator());
+        generator
+            .view_mut((n, n), (dz, dz))
+            .copy_from(exosystem.generator());
 
         let held = over_w(&lcs.held.guard, n, exosystem);
         let shared = lcs.held.kernel.ncols() > 0;
-        let devices = if shared { rays::extreme_rays(&lcs.held.kernel)? * held } else { held };
+        let devices = if shared {
+            rays::extreme_rays(&lcs.held.kernel)? * held
+        } else {
+            held
+        };
         let controls = over_w(&lcs.controls, n, exosystem);
         let moved = |i: usize| controls.row(i).columns(0, n).iter().any(|v| *v != 0.0);
-        let guarded_switches: Vec<usize> =
-            (0..thresholds.len()).filter(|&i| watched[i] || moved(i)).collect();
+        let guarded_switches: Vec<usize> = (0..thresholds.len())
+            .filter(|&i| watched[i] || moved(i))
+            .collect();
         let mut guards = DMatrix::zeros(devices.nrows() + guarded_switches.len(), dim);
         guards.rows_mut(0, devices.nrows()).copy_from(&devices);
         for (k, &i) in guarded_switches.iter().enumerate() {
@@ -138,7 +145,9 @@ impl Mode {
         let map = &lcs.storage;
         let mut storage = DMatrix::zeros(map.names.len(), dim);
         storage.columns_mut(0, n).copy_from(&map.x);
-        storage.columns_mut(n, dz).copy_from(&(&map.u * exosystem.output()));
+        storage
+            .columns_mut(n, dz)
+            .copy_from(&(&map.u * exosystem.output()));
         let mut ones = storage.column_mut(n);
         ones += &map.one;
 
@@ -170,14 +179,25 @@ impl Mode {
     pub(crate) fn state_from(&self, s: &[f64], x: &mut Vec<f64>) {
         x.clear();
         x.extend((0..self.n).map(|i| {
-            self.inject_one[i] + self.inject.row(i).iter().zip(s).map(|(j, s)| j * s).sum::<f64>()
+            self.inject_one[i]
+                + self
+                    .inject
+                    .row(i)
+                    .iter()
+                    .zip(s)
+                    .map(|(j, s)| j * s)
+                    .sum::<f64>()
         }));
     }
 
     /// The storage vector at w.
     pub(crate) fn storage_at(&self, w: &[f64], s: &mut Vec<f64>) {
         s.clear();
-        s.extend(self.storage.row_iter().map(|row| row.iter().zip(w).map(|(m, w)| m * w).sum::<f64>()));
+        s.extend(
+            self.storage
+                .row_iter()
+                .map(|row| row.iter().zip(w).map(|(m, w)| m * w).sum::<f64>()),
+        );
     }
 }
 

@@ -59,7 +59,11 @@ pub(crate) struct Motion {
 impl Motion {
     /// A motion that stands at `t` in no mode yet.
     pub(crate) fn at(t: f64) -> Self {
-        Self { t, entered: t, ..Self::default() }
+        Self {
+            t,
+            entered: t,
+            ..Self::default()
+        }
     }
 
     /// Enters a mode at `t` with state `x` of amplitudes `amplitude`, exosystem values from their closed form.
@@ -143,7 +147,11 @@ impl Motion {
         }
         let mut units = units as u64;
         if fraction > negligible.min(rest * 0.5) || units == 0 {
-            let end = if units == 0 { stop } else { stop - units as f64 * unit };
+            let end = if units == 0 {
+                stop
+            } else {
+                stop - units as f64 * unit
+            };
             match self.taylor(flow, exosystem, end) {
                 Arrival::Reached => {}
                 other => return other,
@@ -160,7 +168,11 @@ impl Motion {
             deepest_next = level.saturating_sub(1);
             loop {
                 let span = 1_u64 << (bottom - level);
-                let end = if units == span { stop } else { stop - (units - span) as f64 * unit };
+                let end = if units == span {
+                    stop
+                } else {
+                    stop - (units - span) as f64 * unit
+                };
                 if !flow.leap(level, &self.now, &mut self.next) {
                     return Arrival::Overflow;
                 }
@@ -192,7 +204,10 @@ impl Motion {
         let dt = end - self.t;
         let (dim, m) = (flow.dim(), flow.guards());
         self.degree = flow.taylor(&self.now, dt, &mut self.terms);
-        if !self.terms[..(self.degree + 1) * dim].iter().all(|v| v.is_finite()) {
+        if !self.terms[..(self.degree + 1) * dim]
+            .iter()
+            .all(|v| v.is_finite())
+        {
             return Arrival::Overflow;
         }
         let mut first = (1.0, None);
@@ -203,14 +218,19 @@ impl Motion {
                 for (k, c) in coefficients.iter_mut().enumerate().take(self.degree + 1) {
                     *c = self.polynomials[k * m + i];
                 }
-                let crossing = polynomial::first_crossing(&coefficients[..=self.degree], self.floors[i]);
+                let crossing =
+                    polynomial::first_crossing(&coefficients[..=self.degree], self.floors[i]);
                 if let Some(s) = crossing.filter(|&s| s < first.0 || first.1.is_none()) {
                     first = (s, Some(i));
                 }
             }
         }
         let (s, fired) = first;
-        let t = if fired.is_some() { self.t + s * dt } else { end };
+        let t = if fired.is_some() {
+            self.t + s * dt
+        } else {
+            end
+        };
         let [source, dissipated] =
             flow.energy_of_taylor(&self.terms, self.degree, dt, s, &mut self.next[..dim]);
         self.energy[0] += source;
@@ -245,7 +265,11 @@ impl Motion {
             let noise = floor[i] + third * slope_floor[i];
             clear &= b3 >= -floor[i] && low + noise >= MARGIN * spread;
         }
-        if clear { Verdict::Clear } else { Verdict::Unclear }
+        if clear {
+            Verdict::Clear
+        } else {
+            Verdict::Unclear
+        }
     }
 
     #[inline]

@@ -58,7 +58,8 @@ impl<'a> Plant<'a> {
             Some(at) => at,
             None => {
                 let lcs = (self.assemble)(&vec![Hold::Free; self.pairs], switches)?;
-                self.frees.push((switches.to_vec(), Free::new(lcs, self.tolerance)));
+                self.frees
+                    .push((switches.to_vec(), Free::new(lcs, self.tolerance)));
                 self.frees.len() - 1
             }
         };
@@ -70,11 +71,22 @@ impl<'a> Plant<'a> {
         if let Some(&known) = self.index.get(key) {
             return known;
         }
-        let holds: Vec<Hold> =
-            key.closed.iter().map(|&c| if c { Hold::Closed } else { Hold::Open }).collect();
+        let holds: Vec<Hold> = key
+            .closed
+            .iter()
+            .map(|&c| if c { Hold::Closed } else { Hold::Open })
+            .collect();
         let watched: Vec<bool> = self.driven.iter().map(|d| !d).collect();
         let mode = (self.assemble)(&holds, &key.switches).ok().and_then(|lcs| {
-            Mode::new(key.clone(), &lcs, exosystem, &self.thresholds, &watched, self.h, self.energy)
+            Mode::new(
+                key.clone(),
+                &lcs,
+                exosystem,
+                &self.thresholds,
+                &watched,
+                self.h,
+                self.energy,
+            )
         });
         let at = mode.map(|mode| {
             self.modes.push(mode);
@@ -86,7 +98,10 @@ impl<'a> Plant<'a> {
 
     /// The fastest rate seen, 1/s.
     pub(crate) fn fastest(&self) -> f64 {
-        self.modes.iter().map(|m| 1.0 / m.flow.step(m.flow.bottom())).fold(1.0 / self.h, f64::max)
+        self.modes
+            .iter()
+            .map(|m| 1.0 / m.flow.step(m.flow.bottom()))
+            .fold(1.0 / self.h, f64::max)
     }
 
     /// Factorisations spent in complementarity problems.

@@ -28,7 +28,11 @@ pub(crate) fn value(a: &[f64], s: f64) -> f64 {
 
 /// p'(s).
 fn slope(a: &[f64], s: f64) -> f64 {
-    a.iter().enumerate().skip(1).rev().fold(0.0, |sum, (k, &c)| sum * s + c * k as f64)
+    a.iter()
+        .enumerate()
+        .skip(1)
+        .rev()
+        .fold(0.0, |sum, (k, &c)| sum * s + c * k as f64)
 }
 
 /// b_i = Σ_{k ≤ i} C(i,k)/C(n,k) a_k.
@@ -55,7 +59,10 @@ fn search(a: &[f64], b: &[f64], floor: f64, low: f64, high: f64, depth: u32) -> 
         return Some(low);
     }
     let last = b.len() - 1;
-    let changes = b.windows(2).filter(|w| (w[0] >= 0.0) != (w[1] >= 0.0)).count();
+    let changes = b
+        .windows(2)
+        .filter(|w| (w[0] >= 0.0) != (w[1] >= 0.0))
+        .count();
     if b[0] > 0.0 && b[last] < -floor && changes == 1 {
         return Some(root(a, low, high));
     }
@@ -97,7 +104,11 @@ fn root(a: &[f64], mut low: f64, mut high: f64) -> f64 {
             high = s;
         }
         let newton = s - p / slope(a, s);
-        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        let next = if newton > low && newton < high {
+            newton
+        } else {
+            0.5 * (low + high)
+        };
         if next == s || p == 0.0 {
             break;
         }
@@ -141,7 +152,11 @@ mod tests {
     fn a_contact_is_not_a_crossing() {
         let p = from_roots(&[0.37, 0.37]);
         assert_eq!(first_crossing(&p, 1e-15), None);
-        let lifted: Vec<f64> = p.iter().enumerate().map(|(k, c)| if k == 0 { c + 1e-9 } else { *c }).collect();
+        let lifted: Vec<f64> = p
+            .iter()
+            .enumerate()
+            .map(|(k, c)| if k == 0 { c + 1e-9 } else { *c })
+            .collect();
         assert_eq!(first_crossing(&lifted, 1e-15), None);
     }
 

@@ -13,22 +13,33 @@ const ZERO: f64 = 1e-12;
 /// valid while the *sum* of their currents is positive. `None` where there are more than 256 rays.
 pub(crate) fn extreme_rays(kernel: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let m = kernel.nrows();
-    let mut rays: Vec<DVector<f64>> =
-        (0..m).map(|i| DVector::from_fn(m, |j, _| if i == j { 1.0 } else { 0.0 })).collect();
+    let mut rays: Vec<DVector<f64>> = (0..m)
+        .map(|i| DVector::from_fn(m, |j, _| if i == j { 1.0 } else { 0.0 }))
+        .collect();
     for column in kernel.column_iter() {
         let size = column.amax();
         if size == 0.0 {
             continue;
         }
         let values: Vec<f64> = rays.iter().map(|r| column.dot(r)).collect();
-        let sign = |i: usize| if values[i].abs() <= ZERO * size { 0.0 } else { values[i].signum() };
-        let mut next: Vec<DVector<f64>> =
-            (0..rays.len()).filter(|&i| sign(i) == 0.0).map(|i| rays[i].clone()).collect();
+        let sign = |i: usize| {
+            if values[i].abs() <= ZERO * size {
+                0.0
+            } else {
+                values[i].signum()
+            }
+        };
+        let mut next: Vec<DVector<f64>> = (0..rays.len())
+            .filter(|&i| sign(i) == 0.0)
+            .map(|i| rays[i].clone())
+            .collect();
         for p in (0..rays.len()).filter(|&i| sign(i) > 0.0) {
             for n in (0..rays.len()).filter(|&i| sign(i) < 0.0) {
                 let mut ray = &rays[n] * values[p] - &rays[p] * values[n];
                 ray /= ray.amax();
-                ray.iter_mut().filter(|v| v.abs() <= ZERO).for_each(|v| *v = 0.0);
+                ray.iter_mut()
+                    .filter(|v| v.abs() <= ZERO)
+                    .for_each(|v| *v = 0.0);
                 next.push(ray);
             }
         }
@@ -42,13 +53,19 @@ pub(crate) fn extreme_rays(kernel: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 
 /// The rays whose support contains no other ray's support.
 fn minimal(rays: Vec<DVector<f64>>) -> Vec<DVector<f64>> {
-    let within = |a: &DVector<f64>, b: &DVector<f64>| a.iter().zip(b).all(|(x, y)| *x == 0.0 || *y != 0.0);
+    let within =
+        |a: &DVector<f64>, b: &DVector<f64>| a.iter().zip(b).all(|(x, y)| *x == 0.0 || *y != 0.0);
     let keep: Vec<bool> = (0..rays.len())
         .map(|i| {
-            !(0..rays.len()).any(|j| j != i && within(&rays[j], &rays[i]) && (j < i || !within(&rays[i], &rays[j])))
+            !(0..rays.len()).any(|j| {
+                j != i && within(&rays[j], &rays[i]) && (j < i || !within(&rays[i], &rays[j]))
+            })
         })
         .collect();
-    rays.into_iter().zip(keep).filter_map(|(ray, kept)| kept.then_some(ray)).collect()
+    rays.into_iter()
+        .zip(keep)
+        .filter_map(|(ray, kept)| kept.then_some(ray))
+        .collect()
 }
 
 #[cfg(test)]

@@ -38,12 +38,16 @@ impl Spectrum {
             let d = expm::balance(a, 1.0);
             let balanced = DMatrix::from_fn(n, n, |i, j| a[(i, j)] * d[j] / d[i]);
             match Schur::try_new(balanced.clone(), f64::EPSILON, QR_SWEEPS * n) {
-                Some(schur) => rates.extend(
-                    schur.complex_eigenvalues().iter().map(|v| Rate { decay: -v.re, frequency: v.im.abs() }),
-                ),
+                Some(schur) => rates.extend(schur.complex_eigenvalues().iter().map(|v| Rate {
+                    decay: -v.re,
+                    frequency: v.im.abs(),
+                })),
                 None => {
                     let norm = expm::norm_1(&balanced);
-                    rates.push(Rate { decay: 0.0, frequency: norm });
+                    rates.push(Rate {
+                        decay: 0.0,
+                        frequency: norm,
+                    });
                 }
             }
         }
@@ -77,14 +81,22 @@ mod tests {
         let spectrum = Spectrum::new(&a, &[]);
         assert!((spectrum.step_limit(0.0) - 0.5e-9).abs() < 1e-15);
         assert!((spectrum.step_limit(3e-9) - 3e-9).abs() < 1e-15);
-        assert!((spectrum.step_limit(1e-6) / 0.5e-3 - 1.0).abs() < 1e-9, "the decay is extinct");
+        assert!(
+            (spectrum.step_limit(1e-6) / 0.5e-3 - 1.0).abs() < 1e-9,
+            "the decay is extinct"
+        );
         assert!((spectrum.step_limit(1.0) / 0.7e-3 - 1.0).abs() < 1e-9);
         assert_eq!(Spectrum::default().step_limit(0.0), f64::INFINITY);
     }
 
     #[test]
     fn sources_count() {
-        let source = Rate { decay: 0.0, frequency: 100.0 };
-        assert!((Spectrum::new(&DMatrix::zeros(0, 0), &[source]).step_limit(1.0) - 7e-3).abs() < 1e-12);
+        let source = Rate {
+            decay: 0.0,
+            frequency: 100.0,
+        };
+        assert!(
+            (Spectrum::new(&DMatrix::zeros(0, 0), &[source]).step_limit(1.0) - 7e-3).abs() < 1e-12
+        );
     }
 }

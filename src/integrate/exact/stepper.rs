@@ -6,29 +6,19 @@ use nalgebra::{DMatrix, DVector};
 
 use super::accumulation::Accumulation;
 use super::exosystem::Exosystem;
-use super::free::Degenerate;
-use super::inspect::{Finding, Inspector};
+use super::inspect::Inspector;
 use super::mode::{Key, Owner};
 use super::motion::{Arrival, Motion};
 use super::plant::{Assemble, Plant};
+use super::schedule::{is_driven, schedule};
 use crate::circuit::Source;
-use crate::integrate::energy::{self, Balance};
+use crate::integrate::energy::Balance;
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
 use crate::integrate::switching::Threshold;
-use crate::lcs::Lcs;
 use crate::settings::Settings;
 
 /// Times closer than this many units in the last place are one time.
 const SAME_TIME_ULPS: f64 = 4.0;
-/// Lengths of the implicit step that proposes the next mode, in units of the fastest time constant seen.
-const PROPOSALS: [f64; 7] = [1e-6, 1e-4, 1e-8, 1e-2, 1e-10, 1.0, 1e2];
-/// Modes tried around the proposals before the search ends.
-const MOST_NEIGHBOURS: usize = 400;
-/// Events at one instant after which modes already left there are not entered again.
-const PATIENCE: usize = 2;
-
-/// Movements of the storage below this part of its amplitude are rounding and no jump.
-const ROUNDING: f64 = 1e-12;
 /// Estimated relative loss of an exponential above which it is reported.
 const LOSS: f64 = 1e-10;
 
@@ -58,36 +48,36 @@ pub struct Setup<'a> {
 
 /// See the [module](super).
 pub struct Exact<'a> {
-    plant: Plant<'a>,
-    sources: Vec<Source>,
-    exosystem: Exosystem,
-    motion: Motion,
-    inspector: Inspector,
-    mode: Option<usize>,
-    key: Key,
+    pub(super) plant: Plant<'a>,
+    pub(super) sources: Vec<Source>,
+    pub(super) exosystem: Exosystem,
+    pub(super) motion: Motion,
+    pub(super) inspector: Inspector,
+    pub(super) mode: Option<usize>,
+    pub(super) key: Key,
     /// Storage vector before the start or at the last change.
-    storage: Vec<f64>,
+    pub(super) storage: Vec<f64>,
     /// Largest values of the storage elements so far, levelled by kind.
-    scale: Vec<f64>,
-    volts: Vec<bool>,
+    pub(super) scale: Vec<f64>,
+    pub(super) volts: Vec<bool>,
     /// Times at which source-driven switches move: (time, switch, on), in order.
-    schedule: Vec<(f64, usize, bool)>,
-    scheduled: usize,
+    pub(super) schedule: Vec<(f64, usize, bool)>,
+    pub(super) scheduled: usize,
     /// Modes left at the present instant.
-    left_here: Vec<usize>,
-    instant: f64,
-    transitions: BTreeMap<(usize, usize), usize>,
-    metric: DMatrix<f64>,
-    started: bool,
-    settings: Settings,
-    balance: Balance,
-    events: u64,
-    jumps: u64,
-    lcp_solves: u64,
-    notes: Vec<String>,
-    accumulation: Accumulation,
-    noted_shared: bool,
-    row: Vec<f64>,
+    pub(super) left_here: Vec<usize>,
+    pub(super) instant: f64,
+    pub(super) transitions: BTreeMap<(usize, usize), usize>,
+    pub(super) metric: DMatrix<f64>,
+    pub(super) started: bool,
+    pub(super) settings: Settings,
+    pub(super) balance: Balance,
+    pub(super) events: u64,
+    pub(super) jumps: u64,
+    pub(super) lcp_solves: u64,
+    pub(super) notes: Vec<String>,
+    pub(super) accumulation: Accumulation,
+    pub(super) noted_shared: bool,
+    pub(super) row: Vec<f64>,
 }
 
 impl<'a> Exact<'a> {
@@ -96,8 +86,26 @@ impl<'a> Exact<'a> {
     /// # Errors
     /// The reduction's for the start position; sources that no finite linear system generates.
     pub fn new(setup: Setup<'a>) -> Result<Self, SimError> {
-        let Setup { assemble, pairs, mut position, thresholds, t, until, start, h, energy, settings } = setup;
-        let mut plant = Plant::new(assemble, pairs, thresholds, h, energy, settings.lcp_residual);
+        let Setup {
+            assemble,
+            pairs,
+            mut position,
+            thresholds,
+            t,
+            until,
+            start,
+            h,
+            energy,
+            settings,
+        } = setup;
+        let mut plant = Plant::new(
+            assemble,
+            pairs,
+            thresholds,
+            h,
+            energy,
+            settings.lcp_residual,
+        );
         let lcs = plant.free(&position)?.lcs.clone();
         let sources: Vec<Source> = lcs.inputs.iter().map(|i| i.source.clone()).collect();
         let exosystem = Exosystem::of(&sources, t, until).ok_or_else(|| {
@@ -105,14 +113,32 @@ impl<'a> Exact<'a> {
                 "a source has no closed form as a linear system".to_string(),
             ))
         })?;
-        plant.driven = (0..plant.thresholds.len()).map(|i| is_driven(&lcs, i)).collect();
+        plant.driven = (0..plant.thresholds.len())
+            .map(|i| is_driven(&lcs, i))
+            .collect();
         for i in (0..position.len()).filter(|&i| plant.driven[i]) {
-            let values = sources.iter().enumerate().map(|(j, s)| lcs.controls.u[(i, j)] * s.value(t));
+            let values = sources
+                .iter()
+                .enumerate()
+                .map(|(j, s)| lcs.controls.u[(i, j)] * s.value(t));
             let control = lcs.controls.one[i] + values.sum::<f64>();
             position[i] = plant.thresholds[i].position(position[i], control);
         }
-        let schedule = schedule(&lcs, &plant, &sources, &position, t, until);
-        let volts = lcs.storage.names.iter().map(|name| name.starts_with('v')).collect();
+        let schedule = schedule(
+            &lcs,
+            &plant.thresholds,
+            &plant.driven,
+            &sources,
+            &position,
+            t,
+            until,
+        );
+        let volts = lcs
+            .storage
+            .names
+            .iter()
+            .map(|name| name.starts_with('v'))
+            .collect();
         let metric = lcs.storage.metric.clone();
         let stored = 0.5 * start.dot(&(&metric * &start));
         let columns = lcs.outputs.names.len();
@@ -123,7 +149,10 @@ impl<'a> Exact<'a> {
             motion: Motion::at(t),
             inspector: Inspector::default(),
             mode: None,
-            key: Key { closed: vec![false; pairs], switches: position },
+            key: Key {
+                closed: vec![false; pairs],
+                switches: position,
+            },
             storage: start.as_slice().to_vec(),
             scale: vec![0.0; start.len()],
             volts,
@@ -149,7 +178,7 @@ impl<'a> Exact<'a> {
     }
 
     /// Raises the amplitudes to the present storage; elements of one kind share the largest.
-    fn rescale(&mut self) {
+    pub(super) fn rescale(&mut self) {
         for volts in [true, false] {
             let of_kind = |i: usize| self.volts[i] == volts;
             let largest = (0..self.storage.len())
@@ -168,16 +197,19 @@ impl<'a> Exact<'a> {
 
     /// The next time at which something is known to happen, s.
     fn next_stop(&self) -> f64 {
-        let switching = self.schedule.get(self.scheduled).map_or(f64::INFINITY, |s| s.0);
+        let switching = self
+            .schedule
+            .get(self.scheduled)
+            .map_or(f64::INFINITY, |s| s.0);
         self.exosystem.next_breakpoint().min(switching)
     }
 
-    fn fail(&self, reason: Reason) -> SimError {
+    pub(super) fn fail(&self, reason: Reason) -> SimError {
         SimError::at(self.motion.t, reason)
     }
 
     /// u at the current time on the current pieces.
-    fn inputs(&self, t: f64) -> DVector<f64> {
+    pub(super) fn inputs(&self, t: f64) -> DVector<f64> {
         let mut z = DVector::zeros(self.exosystem.dim());
         self.exosystem.write(t, z.as_mut_slice());
         self.exosystem.output() * z
@@ -234,17 +266,21 @@ impl<'a> Exact<'a> {
             let end = self.exosystem.piece(i).end;
             if end <= near {
                 let Some(piece) = self.sources[i].piece(end.max(t)) else {
-                    return Err(self.fail(Reason::Unsupported("a source lost its closed form".to_string())));
+                    return Err(self.fail(Reason::Unsupported(
+                        "a source lost its closed form".to_string(),
+                    )));
                 };
                 edge |= self.sources[i].is_edge(end);
                 self.exosystem.set_piece(i, piece);
             }
         }
         let mut key = self.key.clone();
-        while let Some(&(_, switch, on)) = self.schedule.get(self.scheduled).filter(|s| s.0 <= near) {
+        while let Some(&(_, switch, on)) = self.schedule.get(self.scheduled).filter(|s| s.0 <= near)
+        {
             self.scheduled += 1;
-            let watched =
-                self.mode.is_some_and(|at| self.plant.modes[at].guarded_switches.contains(&switch));
+            let watched = self
+                .mode
+                .is_some_and(|at| self.plant.modes[at].guarded_switches.contains(&switch));
             if !watched && key.switches[switch] != on {
                 key.switches[switch] = on;
                 edge = true;
@@ -255,197 +291,13 @@ impl<'a> Exact<'a> {
         self.change(key, edge, None, Some(before), log)
     }
 
-    /// Finds the mode from here on: positions of the switches, impulse of the devices, conducting devices.
-    fn change(
+    /// Logs which devices and switches changed.
+    pub(super) fn report(
         &mut self,
-        mut key: Key,
-        mut discontinuous: bool,
-        fired: Option<(usize, usize)>,
-        before: Option<DVector<f64>>,
+        at: usize,
+        jumped: bool,
         log: &mut Log,
     ) -> Result<(), SimError> {
-        let t = self.motion.t;
-        let before = before.unwrap_or_else(|| self.inputs(t));
-        let wants_rows = log.wants_rows();
-        if wants_rows && self.started {
-            self.read_row();
-        }
-        let left_row = (wants_rows && self.started).then(|| self.row.clone());
-        let mut jumped = false;
-        let mut positions = vec![key.switches.clone()];
-        let mut entry = None;
-        for _ in 0..2 + 2 * self.plant.thresholds.len() {
-            // A device event in a convex circuit is continuous; an edge or a switch may need an impulse.
-            let mut found = None;
-            if !discontinuous {
-                found = self.find_mode(&key, fired)?;
-            }
-            if found.is_none() {
-                jumped |= self.jump(&key, &before, log)?;
-                found = self.find_mode(&key, fired)?;
-            }
-            let Some((at, leaving)) = found else {
-                return Err(self.fail(Reason::Infeasible));
-            };
-            key.closed.clone_from(&self.plant.modes[at].key.closed);
-            if leaving.is_empty() {
-                entry = Some(at);
-                break;
-            }
-            for i in leaving {
-                key.switches[i] = !key.switches[i];
-            }
-            if positions.contains(&key.switches) {
-                break;
-            }
-            positions.push(key.switches.clone());
-            discontinuous = true;
-        }
-        let Some(at) = entry else {
-            let names: Vec<&str> = self.plant.thresholds.iter().map(|t| t.name.as_str()).collect();
-            return Err(self.fail(Reason::SwitchesDoNotSettle).device(names.join(", ")));
-        };
-        if let (Some(pair), false) = (fired, jumped) {
-            self.transitions.insert(pair, at);
-        }
-        let same = self.mode == Some(at);
-        self.report(at, jumped, log)?;
-        self.mode = Some(at);
-        self.key.clone_from(&self.plant.modes[at].key);
-        let mode = &self.plant.modes[at];
-        let Inspector { x, amplitude, .. } = &self.inspector;
-        self.motion.enter(&mode.flow, &self.exosystem, t, x, amplitude);
-        if jumped {
-            self.jumps += 1;
-        }
-        if let Some(row) = left_row.filter(|_| !same || jumped) {
-            if jumped {
-                log.row(t, &row);
-            }
-            self.read_row();
-            log.row(t, &self.row);
-        }
-        Ok(())
-    }
-
-    /// The devices' impulse at the present storage in a switch position. Returns whether the storage moved.
-    fn jump(&mut self, key: &Key, before: &DVector<f64>, log: &mut Log) -> Result<bool, SimError> {
-        let t = self.motion.t;
-        let u = self.inputs(t);
-        let free = self.plant.free(&key.switches).map_err(|mut error| {
-            error.t = error.t.or(Some(t));
-            error
-        })?;
-        let x = free.state_from(&self.storage);
-        let found = free.jump(&x, &u).map_err(|_| SimError::at(t, Reason::Infeasible))?;
-        self.lcp_solves += u64::from(free.lcs.m() > 0);
-        let (after, p) = match found {
-            Some(jump) => (jump.x, jump.p),
-            None => (x.clone(), DVector::zeros(free.lcs.m())),
-        };
-        let s = free.storage(&after, &u);
-        for (name, area) in free.impulses(&p) {
-            log.impulse(t, name, area);
-        }
-        let source = energy::source_work_of_jump(
-            &free.lcs,
-            x.as_slice(),
-            after.as_slice(),
-            before.as_slice(),
-            u.as_slice(),
-            p.as_slice(),
-        );
-        let old = DVector::from_column_slice(&self.storage);
-        let gain = 0.5 * (s.dot(&(&self.metric * &s)) - old.dot(&(&self.metric * &old)));
-        self.balance.add((source, source - gain));
-        let moved = s.iter().zip(&self.storage).zip(&self.scale).any(|((a, b), scale)| {
-            (a - b).abs() > ROUNDING * scale.max(a.abs())
-        });
-        self.storage.copy_from_slice(s.as_slice());
-        self.rescale();
-        Ok(moved)
-    }
-
-    /// A mode that holds on some interval after now: from what followed the same event before, from one implicit step of the
-    /// complementarity system at several lengths, from their neighbours. Every candidate is inspected; a mode that passes
-    /// is a solution, whoever proposed it.
-    fn find_mode(
-        &mut self,
-        key: &Key,
-        fired: Option<(usize, usize)>,
-    ) -> Result<Option<(usize, Vec<usize>)>, SimError> {
-        let barred: Vec<usize> =
-            if self.left_here.len() > PATIENCE { self.left_here.clone() } else { Vec::new() };
-        if let Some(&at) = fired.and_then(|pair| self.transitions.get(&pair))
-            && self.plant.modes[at].key.switches == key.switches
-            && !barred.contains(&at)
-            && let Some(leaving) = self.try_mode(at)
-        {
-            return Ok(Some((at, leaving)));
-        }
-        let mut tried: Vec<Vec<bool>> = Vec::new();
-        if fired.is_none() || self.plant.pairs == 0 {
-            tried.push(key.closed.clone());
-            if let Some(found) = self.try_key(key, &barred) {
-                return Ok(Some(found));
-            }
-        }
-        if self.plant.pairs == 0 {
-            return Ok(None);
-        }
-        let t = self.motion.t;
-        let fastest = self.plant.fastest();
-        let free = self.plant.free(&key.switches)?;
-        let x = free.state_from(&self.storage);
-        for part in PROPOSALS {
-            let h = part / fastest;
-            let u = self.inputs(t + h);
-            self.lcp_solves += 1;
-            for degenerate in [Degenerate::Open, Degenerate::As(&key.closed)] {
-                let proposal = self.plant.free(&key.switches)?.propose(&x, &u, h, degenerate);
-                let Some(closed) = proposal.filter(|c| !tried.contains(c)) else { continue };
-                tried.push(closed.clone());
-                let candidate = Key { closed, switches: key.switches.clone() };
-                if let Some(found) = self.try_key(&candidate, &barred) {
-                    return Ok(Some(found));
-                }
-            }
-        }
-        // Neighbours, nearest first.
-        let mut next = 0;
-        while next < tried.len() && tried.len() < MOST_NEIGHBOURS {
-            for j in 0..self.plant.pairs {
-                let mut closed = tried[next].clone();
-                closed[j] = !closed[j];
-                if tried.contains(&closed) {
-                    continue;
-                }
-                tried.push(closed.clone());
-                let candidate = Key { closed, switches: key.switches.clone() };
-                if let Some(found) = self.try_key(&candidate, &barred) {
-                    return Ok(Some(found));
-                }
-            }
-            next += 1;
-        }
-        Ok(None)
-    }
-
-    fn try_key(&mut self, key: &Key, barred: &[usize]) -> Option<(usize, Vec<usize>)> {
-        let at = self.plant.mode(key, &self.exosystem).filter(|at| !barred.contains(at))?;
-        self.try_mode(at).map(|leaving| (at, leaving))
-    }
-
-    fn try_mode(&mut self, at: usize) -> Option<Vec<usize>> {
-        let mode = &self.plant.modes[at];
-        match self.inspector.inspect(mode, &self.exosystem, self.motion.t, &self.storage, &self.scale) {
-            Finding::Holds(leaving) => Some(leaving),
-            Finding::Inconsistent | Finding::Refused(_) => None,
-        }
-    }
-
-    /// Logs which devices and switches changed.
-    fn report(&mut self, at: usize, jumped: bool, log: &mut Log) -> Result<(), SimError> {
         let new = self.plant.modes[at].key.clone();
         let mut words: Vec<String> = Vec::new();
         if self.started && (new != self.key) {
@@ -481,7 +333,7 @@ impl<'a> Exact<'a> {
         Ok(())
     }
 
-    fn read_row(&mut self) {
+    pub(super) fn read_row(&mut self) {
         if let Some(at) = self.mode {
             let mode = &self.plant.modes[at];
             mode.outputs.apply(&self.motion.now, &mut self.row);
@@ -497,53 +349,6 @@ impl<'a> Exact<'a> {
     }
 }
 
-/// Whether a switch's control is a combination of sources alone.
-fn is_driven(lcs: &Lcs, i: usize) -> bool {
-    let rows = &lcs.controls;
-    let zero = |m: &DMatrix<f64>| i >= m.nrows() || m.row(i).iter().all(|v| *v == 0.0);
-    zero(&rows.x) && zero(&rows.lambda) && zero(&rows.du)
-}
-
-/// When source-driven switches move, in order of time.
-fn schedule(
-    lcs: &Lcs,
-    plant: &Plant<'_>,
-    sources: &[Source],
-    position: &[bool],
-    t: f64,
-    until: f64,
-) -> Vec<(f64, usize, bool)> {
-    let mut all = Vec::new();
-    for i in (0..plant.thresholds.len()).filter(|&i| plant.driven[i]) {
-        let gains: Vec<(f64, &Source)> = sources
-            .iter()
-            .enumerate()
-            .map(|(j, source)| (lcs.controls.u[(i, j)], source))
-            .filter(|(gain, _)| *gain != 0.0)
-            .collect();
-        let constant = lcs.controls.one[i];
-        let threshold = &plant.thresholds[i];
-        let passages = |level: f64, rising: bool| {
-            crate::circuit::source::crossings(&gains, constant, level, t, until)
-                .into_iter()
-                .filter(move |c| c.rising == rising)
-                .map(move |c| (c.time, rising))
-        };
-        let mut both: Vec<(f64, bool)> =
-            passages(threshold.on_above, true).chain(passages(threshold.off_below, false)).collect();
-        both.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut on = position[i];
-        for (time, rising) in both {
-            if rising != on {
-                on = rising;
-                all.push((time, i, on));
-            }
-        }
-    }
-    all.sort_by(|a, b| a.0.total_cmp(&b.0));
-    all
-}
-
 impl Stepper for Exact<'_> {
     fn time(&self) -> f64 {
         self.motion.t
@@ -557,15 +362,22 @@ impl Stepper for Exact<'_> {
             let next = self.next_stop();
             let due = next <= t + SAME_TIME_ULPS * f64::EPSILON * t.abs();
             let stop = if due { next.min(t) } else { t };
-            let Some(at) = self.mode else { return Err(self.fail(Reason::Infeasible)) };
-            match self.motion.travel(&mut self.plant.modes[at].flow, &self.exosystem, stop) {
+            let Some(at) = self.mode else {
+                return Err(self.fail(Reason::Infeasible));
+            };
+            match self
+                .motion
+                .travel(&mut self.plant.modes[at].flow, &self.exosystem, stop)
+            {
                 Arrival::Reached if due => self.breakpoint(log)?,
                 Arrival::Reached => return Ok(()),
                 Arrival::Fired(guard) => self.fired(guard, log)?,
                 Arrival::Overflow => return Err(self.fail(Reason::Overflow)),
             }
             if self.motion.steps > self.settings.max_steps {
-                return Err(self.fail(Reason::TooManySteps { limit: self.settings.max_steps }));
+                return Err(self.fail(Reason::TooManySteps {
+                    limit: self.settings.max_steps,
+                }));
             }
         }
     }
@@ -579,13 +391,21 @@ impl Stepper for Exact<'_> {
     fn finish(&mut self) -> Outcome {
         self.take_storage();
         self.notes.extend(self.accumulation.end());
-        let loss = self.plant.modes.iter().map(|m| m.flow.loss).fold(0.0, f64::max);
+        let loss = self
+            .plant
+            .modes
+            .iter()
+            .map(|m| m.flow.loss)
+            .fold(0.0, f64::max);
         if loss > LOSS {
             self.notes.push(format!(
                 "the circuit is stiff without being graded: the matrix exponential is accurate to about {loss:.0e} a step"
             ));
         }
-        let mut outcome = Outcome { notes: std::mem::take(&mut self.notes), ..Outcome::default() };
+        let mut outcome = Outcome {
+            notes: std::mem::take(&mut self.notes),
+            ..Outcome::default()
+        };
         outcome.stats.steps = self.motion.steps;
         outcome.stats.events = self.events;
         outcome.stats.jumps = self.jumps;

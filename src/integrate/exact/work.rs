@@ -8,14 +8,14 @@ const TERMS: usize = 30;
 /// Nodes and weights of Gauss-Legendre's rule with 8 points on [0, 1]; exact to degree 15, and to 1e-18 for products of two
 /// exponentials over one radius of contraction.
 const GAUSS: [(f64, f64); 8] = [
-    (0.019_855_071_751_231_884, 0.050_614_268_145_188_13),
-    (0.101_666_761_293_186_63, 0.111_190_517_226_687_24),
-    (0.237_233_795_041_835_5, 0.156_853_322_938_943_64),
-    (0.408_282_678_752_175_1, 0.181_341_891_689_180_99),
-    (0.591_717_321_247_824_9, 0.181_341_891_689_180_99),
-    (0.762_766_204_958_164_5, 0.156_853_322_938_943_64),
-    (0.898_333_238_706_813_4, 0.111_190_517_226_687_24),
-    (0.980_144_928_248_768_1, 0.050_614_268_145_188_13),
+    (0.019855071751231884, 0.05061426814518813),
+    (0.10166676129318664, 0.11119051722668724),
+    (0.2372337950418355, 0.15685332293894363),
+    (0.4082826787521751, 0.181341891689181),
+    (0.591717321247825, 0.181341891689181),
+    (0.7627662049581645, 0.15685332293894363),
+    (0.8983332387068134, 0.11119051722668724),
+    (0.9801449282487681, 0.05061426814518813),
 ];
 
 /// A quadratic form wᵀ Q w, upper triangle row by row with doubled off-diagonal entries.
@@ -31,7 +31,13 @@ impl Form {
         let dim = q.nrows();
         let packed = (0..dim)
             .flat_map(|i| (i..dim).map(move |j| (i, j)))
-            .map(|(i, j)| if i == j { q[(i, i)] } else { q[(i, j)] + q[(j, i)] })
+            .map(|(i, j)| {
+                if i == j {
+                    q[(i, i)]
+                } else {
+                    q[(i, j)] + q[(j, i)]
+                }
+            })
             .collect();
         Self { dim, packed }
     }
@@ -77,7 +83,9 @@ pub(crate) fn along_taylor(
     for (node, weight) in GAUSS {
         let s = node * part;
         for (i, out) in w.iter_mut().enumerate() {
-            *out = (0..=degree).rev().fold(0.0, |sum, k| sum * s + terms[k * dim + i]);
+            *out = (0..=degree)
+                .rev()
+                .fold(0.0, |sum, k| sum * s + terms[k * dim + i]);
         }
         for (sum, form) in sums.iter_mut().zip(forms) {
             *sum += weight * h * part * form.value(w);
@@ -95,13 +103,21 @@ mod tests {
     #[test]
     fn both_integrals_of_a_decay() {
         let tau = 2e-3;
-        let (a, q) = (DMatrix::from_element(1, 1, -1.0 / tau), DMatrix::from_element(1, 1, 1.0));
+        let (a, q) = (
+            DMatrix::from_element(1, 1, -1.0 / tau),
+            DMatrix::from_element(1, 1, 1.0),
+        );
         let h = 1.5e-3;
         let exact = |h: f64| -9.0 * tau / 2.0 * (-2.0 * h / tau).exp_m1();
         let form = Form::new(&gramian(&a, &q, h));
         assert!((form.value(&[3.0]) / exact(h) - 1.0).abs() < 1e-15);
-        let terms: Vec<f64> =
-            (0..=20).scan(3.0, |t, k| { let now = *t; *t *= -h / tau / (f64::from(k) + 1.0); Some(now) }).collect();
+        let terms: Vec<f64> = (0..=20)
+            .scan(3.0, |t, k| {
+                let now = *t;
+                *t *= -h / tau / (f64::from(k) + 1.0);
+                Some(now)
+            })
+            .collect();
         let forms = [Form::new(&q), Form::new(&(q * 2.0))];
         let along = along_taylor(&forms, &terms, 20, h, 0.4, &mut [0.0]);
         assert!((along[0] / exact(0.4 * h) - 1.0).abs() < 1e-14);

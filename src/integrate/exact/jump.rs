@@ -1,0 +1,127 @@
+//! Jumps of the state: by projection in the energy metric, or into a mode that small steps propose.
+
+use nalgebra::DVector;
+
+use super::free::Degenerate;
+use super::inspect::Finding;
+use super::mode::Key;
+use super::stepper::Exact;
+use super::transition::PROPOSALS;
+use crate::integrate::energy;
+use crate::integrate::run::{Log, SimError};
+
+/// Movements of the storage below this part of its amplitude are rounding and no jump.
+const ROUNDING: f64 = 1e-12;
+
+impl Exact<'_> {
+    /// The devices' impulse at the present storage in a switch position, by projection in the energy metric. Returns
+    /// whether the storage moved.
+    pub(super) fn project(
+        &mut self,
+        key: &Key,
+        before: &DVector<f64>,
+        log: &mut Log,
+    ) -> Result<bool, SimError> {
+        let t = self.motion.t;
+        let u = self.inputs(t);
+        let free = self.plant.free(&key.switches).map_err(|mut error| {
+            error.t = error.t.or(Some(t));
+            error
+        })?;
+        let x = free.state_from(&self.storage);
+        self.lcp_solves += u64::from(free.lcs.m() > 0);
+        // Where the projection finds nothing admissible, jumps into proposed modes are tried.
+        let (after, p) = match free.jump(&x, &u) {
+            Ok(Some(jump)) => (jump.x, jump.p),
+            Ok(None) | Err(_) => (x.clone(), DVector::zeros(free.lcs.m())),
+        };
+        self.leap(key, &x, &after, &p, before, log)
+    }
+
+    /// Carries out a jump of the free state from x to `after` by impulses p, with its impulses and energies.
+    pub(super) fn leap(
+        &mut self,
+        key: &Key,
+        x: &DVector<f64>,
+        after: &DVector<f64>,
+        p: &DVector<f64>,
+        before: &DVector<f64>,
+        log: &mut Log,
+    ) -> Result<bool, SimError> {
+        let t = self.motion.t;
+        let u = self.inputs(t);
+        let free = self.plant.free(&key.switches)?;
+        let s = free.storage(after, &u);
+        for (name, area) in free.impulses(p) {
+            log.impulse(t, name, area);
+        }
+        let source = energy::source_work_of_jump(
+            &free.lcs,
+            x.as_slice(),
+            after.as_slice(),
+            before.as_slice(),
+            u.as_slice(),
+            p.as_slice(),
+        );
+        let old = DVector::from_column_slice(&self.storage);
+        let gain = 0.5 * (s.dot(&(&self.metric * &s)) - old.dot(&(&self.metric * &old)));
+        self.balance.add((source, source - gain));
+        let moved = s
+            .iter()
+            .zip(&self.storage)
+            .zip(&self.scale)
+            .any(|((a, b), scale)| (a - b).abs() > ROUNDING * scale.max(a.abs()));
+        self.storage.copy_from_slice(s.as_slice());
+        self.rescale();
+        Ok(moved)
+    }
+
+    /// A jump into a mode that small implicit steps propose, proved by its impulse.
+    pub(super) fn jump_into(
+        &mut self,
+        key: &Key,
+        before: &DVector<f64>,
+        log: &mut Log,
+    ) -> Result<Option<(usize, Vec<usize>)>, SimError> {
+        let t = self.motion.t;
+        let fastest = self.plant.fastest();
+        let x = self.plant.free(&key.switches)?.state_from(&self.storage);
+        for part in PROPOSALS {
+            let h = part / fastest;
+            let u = self.inputs(t + h);
+            self.lcp_solves += 1;
+            let free = self.plant.free(&key.switches)?;
+            let Some(closed) = free.propose(&x, &u, h, Degenerate::Open) else {
+                continue;
+            };
+            let candidate = Key {
+                closed,
+                switches: key.switches.clone(),
+            };
+            let Some(at) = self.plant.mode(&candidate, &self.exosystem) else {
+                continue;
+            };
+            let mode = &self.plant.modes[at];
+            let Some(s) = self
+                .inspector
+                .project(mode, &self.exosystem, t, &self.storage)
+            else {
+                continue;
+            };
+            let free = self.plant.free(&key.switches)?;
+            let after = free.state_from(&s);
+            let Some(p) = free.impulse_between(&x, &after, &candidate.closed) else {
+                continue;
+            };
+            let mode = &self.plant.modes[at];
+            if let Finding::Holds(leaving) =
+                self.inspector
+                    .inspect(mode, &self.exosystem, t, &s, &self.scale)
+            {
+                self.leap(key, &x, &after, &p, before, log)?;
+                return Ok(Some((at, leaving)));
+            }
+        }
+        Ok(None)
+    }
+}

@@ -1,0 +1,123 @@
+//! The stepper against exact values.
+
+use nalgebra::DVector;
+
+use super::{Exact, Setup};
+use crate::circuit::{Circuit, ElaborateOptions, Tran, elaborate};
+use crate::diagnostic::SourceMap;
+use crate::integrate::Run;
+use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, run};
+use crate::integrate::switching::Threshold;
+use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
+use crate::mna;
+use crate::settings::Settings;
+
+mod bridges;
+mod passive;
+mod relays;
+mod stiff;
+mod switches;
+
+fn circuit(text: &str) -> Circuit {
+    let mut sources = SourceMap::default();
+    let root = sources.add("test.cir", format!("test\n{text}\n.end\n"));
+    let (netlist, findings) = crate::netlist::parse(&mut sources, root, &|_| unreachable!());
+    assert!(
+        findings
+            .iter()
+            .all(|d| d.severity < crate::diagnostic::Severity::Error),
+        "{findings:?}"
+    );
+    let (circuit, findings) = elaborate(&netlist, &ElaborateOptions::default());
+    circuit.unwrap_or_else(|| panic!("{findings:?}"))
+}
+
+/// A stepper for a netlist that starts from `uic` and whose switches start as their cards say.
+fn prepare_circuit(circuit: &Circuit, energy: bool) -> (Exact<'static>, Lcs, Tran) {
+    let tran = circuit.tran.expect("a .tran card");
+    let behaviour = mna::behaviour(circuit).expect("a sound circuit").standard();
+    let thresholds: Vec<Threshold> = behaviour
+        .switches
+        .iter()
+        .map(|s| Threshold {
+            name: s.name.clone(),
+            on_above: s.on_above,
+            off_below: s.off_below,
+        })
+        .collect();
+    let position: Vec<bool> = behaviour
+        .switches
+        .iter()
+        .map(|s| s.initial.unwrap_or(false))
+        .collect();
+    let pairs = behaviour.pairs.len();
+    let assemble = move |devices: &[Hold], switches: &[bool]| {
+        let position = Position {
+            devices: devices.to_vec(),
+            switches: switches.to_vec(),
+            storage: StorageHold::Dynamic,
+        };
+        reduce(&behaviour, &position).map_err(|e| SimError::before(Reason::Circuit(e.to_string())))
+    };
+    let lcs = assemble(&vec![Hold::Free; pairs], &position).expect("a system");
+    let exact = Exact::new(Setup {
+        assemble: Box::new(assemble),
+        pairs,
+        position,
+        thresholds,
+        t: 0.0,
+        until: tran.tstop,
+        start: DVector::from_column_slice(lcs.storage.initial.as_slice()),
+        h: tran.tstep,
+        energy,
+        settings: Settings::default(),
+    })
+    .expect("sources with closed forms");
+    (exact, lcs, tran)
+}
+
+fn try_simulate(text: &str) -> Result<Run, SimError> {
+    simulate_circuit(&circuit(text))
+}
+
+fn simulate_circuit(circuit: &Circuit) -> Result<Run, SimError> {
+    let (mut exact, lcs, tran) = prepare_circuit(circuit, true);
+    let columns = lcs.outputs.names.len();
+    let frame = Frame {
+        title: String::new(),
+        names: lcs.outputs.names,
+        units: lcs.outputs.units,
+        grid: Grid {
+            tstart: tran.tstart,
+            tstep: tran.tstep,
+            tstop: tran.tstop,
+        },
+        method: "exact".into(),
+        plan: vec![],
+        notes: vec![],
+        progress: None,
+    };
+    run(&mut exact, frame, Log::new(columns, tran.tstart, false))
+}
+
+fn simulate(text: &str) -> Run {
+    let run = try_simulate(text).unwrap_or_else(|e| panic!("{e}"));
+    assert!(run.energy.residual_relative < 1e-11, "{:?}", run.energy);
+    run
+}
+
+fn at(run: &Run, t: f64, name: &str) -> f64 {
+    let column = run
+        .waveforms
+        .names
+        .iter()
+        .position(|n| n == name)
+        .expect("a probe");
+    let k = run
+        .waveforms
+        .time
+        .iter()
+        .position(|&s| (s - t).abs() < 1e-12)
+        .expect("an output time");
+    run.waveforms.values[k * run.waveforms.names.len() + column]
+}

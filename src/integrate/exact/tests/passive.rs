@@ -1,0 +1,78 @@
+//! Random passive circuits.
+
+use proptest::prelude::*;
+
+use super::{at, circuit, simulate, simulate_circuit};
+use crate::integrate::{Method, SimOptions};
+use crate::mna;
+
+/// A passive network of a few nodes: every node has a capacitor or an inductor with a resistor to somewhere, diodes between.
+fn passive() -> impl Strategy<Value = String> {
+    let value = || (0.3_f64..3.0).prop_map(|v| (v * 100.0).round() / 100.0);
+    let branch = (0_usize..5, 0_usize..5, 0_u8..7, value(), -1.0_f64..1.0);
+    (prop::collection::vec(branch, 5..11), value(), 0_u8..2).prop_map(
+        |(branches, omega, square)| {
+            let mut text = if square == 1 {
+                format!("Rs s 1 0.1\nV1 s 0 PULSE(-1 1 0.31 0 0 {omega} 2.7)\n")
+            } else {
+                format!("Rs s 1 0.1\nV1 s 0 SIN(0 2 {omega} 0.1)\n")
+            };
+            for k in 1..5 {
+                text += &format!("Rg{k} {k} 0 10\n");
+            }
+            for (j, (p, n, kind, v, ic)) in branches.iter().enumerate().filter(|(_, b)| b.0 != b.1)
+            {
+                text += &match kind {
+                    0 => format!("R{j} {p} {n} {v}\n"),
+                    1 => format!("Rc{j} {p} c{j} 0.2\nC{j} c{j} {n} {v} IC={ic:.2}\n"),
+                    2 => format!("L{j} {p} {n} {v} IC={ic:.2}\n"),
+                    3 => format!("C{j} {p} {n} {v} IC={ic:.2}\n"),
+                    _ => format!("D{j} {p} {n} d\n"),
+                };
+            }
+            text + ".model d D(ideal)\n"
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, cases: 24, ..ProptestConfig::default() })]
+    /// Moreau's scheme converges to the exact solution at first order.
+    #[test]
+    fn random_passive_circuits_agree_with_moreau(text in passive()) {
+        let full = format!("{text}.tran 0.1 3 uic");
+        let circuit = circuit(&full);
+        let exact = match simulate_circuit(&circuit) {
+            Ok(run) => run,
+            Err(e) => return Err(TestCaseError::fail(format!("{e}\n{full}"))),
+        };
+        prop_assert!(exact.energy.residual_relative < 1e-11, "{:?}\n{full}", exact.energy);
+        let behaviour = mna::behaviour(&circuit).expect("a sound circuit");
+        let error = |step: f64| -> Result<f64, TestCaseError> {
+            let options = SimOptions { method: Method::Euler, step: Some(step), ..SimOptions::default() };
+            // A case that the other method cannot do is no comparison.
+            let run = crate::integrate::simulate(&circuit, &behaviour, options)
+                .map_err(|e| TestCaseError::reject(format!("{e}")))?;
+            // nodes only: device currents may jump
+            let columns: Vec<usize> = (0..exact.waveforms.names.len())
+                .filter(|&j| exact.waveforms.names[j].starts_with("i(l"))
+                .collect();
+            let width = exact.waveforms.names.len();
+            Ok((0..exact.waveforms.time.len())
+                .flat_map(|k| columns.iter().map(move |&j| k * width + j))
+                .map(|at| (exact.waveforms.values[at] - run.waveforms.values[at]).abs())
+                .fold(0.0, f64::max))
+        };
+        let (coarse, fine) = (error(4e-3)?, error(1e-3)?);
+        prop_assert!(fine < 2e-2 && fine <= 0.4 * coarse + 1e-6, "{coarse} {fine}\n{full}");
+    }
+}
+
+#[test]
+fn a_capacitor_shorted_by_two_diodes() {
+    let run = simulate(
+        "Rs s 1 0.1\nV1 s 0 SIN(0 2 0.3 0.1)\nRg1 1 0 10\nRg2 2 0 10\nRg3 3 0 10\nRg4 4 0 10\nD0 4 1 d\nD1 1 2 d\n\
+         C2 2 4 0.3 IC=-0.54\nD4 2 0 d\n.model d D(ideal)\n.tran 0.1 3 uic",
+    );
+    assert!(at(&run, 0.0, "v(4)").abs() < 1e-15);
+}

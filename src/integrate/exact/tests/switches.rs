@@ -1,0 +1,150 @@
+//! Switches and jumps.
+
+use super::{at, simulate};
+
+const MAFFEZZONI_SWITCHING: [f64; 10] = [
+    12.564487, 30.693306, 49.264901, 68.179976, 87.359148, 106.739990, 126.274023, 145.923954,
+    165.661302, 185.464434,
+];
+
+/// Maffezzoni's closed-loop switched circuit; the sawtooth falls without an edge time.
+fn maffezzoni(models: &str) -> String {
+    format!(
+        "V4 4 0 20\nS1 4 1 3 2 SWM ON\nD1 0 1 DM\nL1 1 2 200u IC=0\nR1 2 0 1\nV3 3 0 PULSE(7.5 -2.5 0 20u 0 0 20u)\n\
+         {models}\n.tran 0.1u 200u uic\n.save i(L1)"
+    )
+}
+
+#[test]
+fn maffezzoni_without_hysteresis() {
+    let run = simulate(&maffezzoni(
+        ".model SWM SW(Vt=0 Vh=0 Ron=1m Roff=1k)\n.model DM D(Ron=1m Roff=1k Vfwd=0)",
+    ));
+    let peaks = [
+        1.217756661,
+        2.153347057,
+        2.867549533,
+        3.410012002,
+        3.820425992,
+        4.130004785,
+        4.362988328,
+        4.538022829,
+        4.669348767,
+        4.767783032,
+    ];
+    let ends = [
+        1.173271783,
+        2.055345254,
+        2.717545430,
+        3.214130750,
+        3.586205968,
+        3.864810108,
+        4.073322606,
+        4.229319604,
+        4.345995076,
+        4.433242386,
+    ];
+    let off: Vec<f64> = run
+        .events
+        .iter()
+        .filter(|e| e.1.contains("off"))
+        .map(|e| e.0)
+        .collect();
+    assert_eq!(off.len(), 10, "{:?}", run.events);
+    for (k, t) in off.iter().enumerate() {
+        assert!((t * 1e6 - MAFFEZZONI_SWITCHING[k]).abs() < 1e-6, "{t}");
+        // control: e(t) = R i at the switching time
+        let e = 7.5 - 0.5e6 * (t - k as f64 * 20e-6);
+        assert!((e - peaks[k]).abs() < 1e-9, "{e}");
+        let end = at(&run, (k as f64 + 1.0) * 20e-6, "i(l1)");
+        assert!((end - ends[k]).abs() < 1e-9, "{end} {}", ends[k]);
+    }
+}
+#[test]
+fn maffezzoni_truly_ideal() {
+    let run = simulate(&maffezzoni(
+        ".model SWM SW(Vt=0 Vh=0 ideal)\n.model DM D(ideal)",
+    ));
+    // Between switchings i relaxes to 20 A or to 0 with L/R = 200 µs: an independent scalar iteration.
+    let tau = 200e-6;
+    let (mut i, mut k) = (0.0_f64, 0);
+    let off: Vec<f64> = run
+        .events
+        .iter()
+        .filter(|e| e.1.contains("off"))
+        .map(|e| e.0)
+        .collect();
+    assert_eq!(off.len(), 10, "{:?}", run.events);
+    while k < 10 {
+        let rise = |s: f64| 20.0 + (i - 20.0) * (-s / tau).exp();
+        let (mut low, mut high) = (0.0, 20e-6);
+        for _ in 0..100 {
+            let mid = 0.5 * (low + high);
+            if 7.5 - 0.5e6 * mid > rise(mid) {
+                low = mid
+            } else {
+                high = mid
+            }
+        }
+        assert!(
+            (off[k] - (k as f64 * 20e-6 + low)).abs() < 1e-15,
+            "{}",
+            off[k]
+        );
+        i = rise(low) * (-(20e-6 - low) / tau).exp();
+        k += 1;
+        assert!((at(&run, k as f64 * 20e-6, "i(l1)") - i).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn charge_is_shared_through_a_closing_switch() {
+    let run = simulate(
+        "C1 1 0 1u IC=10\nC2 2 0 0.3u IC=0\nS1 1 2 3 0 sw OFF\nV3 3 0 PULSE(0 1 1u 0 0 1 2)\n\
+         .model sw SW(Vt=0.5 Vh=0 ideal)\n.tran 1u 2u uic\n.save v(1) v(2)",
+    );
+    assert_eq!(at(&run, 0.0, "v(2)"), 0.0);
+    for t in [1e-6, 2e-6] {
+        assert!((at(&run, t, "v(1)") - 10.0 / 1.3).abs() < 1e-14);
+        assert!((at(&run, t, "v(2)") - 10.0 / 1.3).abs() < 1e-14);
+    }
+    // ½ C1 C2/(C1 + C2) V²
+    let loss = 0.5 * 1e-6 * 0.3e-6 / 1.3e-6 * 100.0;
+    assert!(
+        (run.energy.dissipated - loss).abs() < 1e-12 * loss,
+        "{:?}",
+        run.energy
+    );
+}
+
+#[test]
+fn freewheeling_diode_takes_over() {
+    let run = simulate(
+        "V1 1 0 5\nS1 1 2 3 0 sw ON\nD1 0 2 d\nL1 2 0 1m IC=2\nV3 3 0 PULSE(1 0 1m 0 0 1 2)\n.model d D(ideal)\n\
+         .model sw SW(Vt=0.5 Vh=0 ideal)\n.tran 0.5m 3m uic\n.save v(2) i(L1) i(D1)",
+    );
+    // 2 A + 5 V/1 mH · 1 ms
+    for t in [1e-3, 1.5e-3, 3e-3] {
+        assert!((at(&run, t, "i(l1)") - 7.0).abs() < 1e-13);
+        assert!(at(&run, t, "v(2)").abs() < 1e-14);
+        assert!((at(&run, t, "i(d1)") - 7.0).abs() < 1e-13);
+    }
+    assert!((at(&run, 0.5e-3, "i(l1)") - 4.5).abs() < 1e-13);
+}
+
+#[test]
+fn flux_is_shared_through_an_opening_switch() {
+    let run = simulate(
+        "L1 1 0 1m IC=1\nL2 1 0 3m IC=0\nS1 1 0 3 0 sw ON\nV3 3 0 PULSE(1 0 1m 0 0 1 2)\n\
+         .model sw SW(Vt=0.5 Vh=0 ideal)\n.tran 1m 2m uic\n.save i(L1) i(L2)",
+    );
+    assert!((at(&run, 0.0, "i(l1)") - 1.0).abs() < 1e-15);
+    for t in [1e-3, 2e-3] {
+        assert!(
+            (at(&run, t, "i(l1)") - 0.25).abs() < 1e-15,
+            "{}",
+            at(&run, t, "i(l1)")
+        );
+        assert!((at(&run, t, "i(l2)") + 0.25).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,204 @@
+//! From one mode to the next: positions of the switches, impulse of the devices, conducting devices.
+
+use nalgebra::DVector;
+
+use super::free::Degenerate;
+use super::inspect::{Finding, Inspector};
+use super::mode::Key;
+use super::stepper::Exact;
+use crate::integrate::run::{Log, Reason, SimError};
+
+/// Lengths of the implicit step that proposes the next mode, in units of the fastest time constant seen.
+pub(super) const PROPOSALS: [f64; 7] = [1e-6, 1e-4, 1e-8, 1e-2, 1e-10, 1.0, 1e2];
+/// Modes tried around the proposals before the search ends.
+const MOST_NEIGHBOURS: usize = 400;
+/// Events at one instant after which modes already left there are not entered again.
+const PATIENCE: usize = 2;
+
+impl Exact<'_> {
+    /// Finds the mode from here on: positions of the switches, impulse of the devices, conducting devices.
+    pub(super) fn change(
+        &mut self,
+        mut key: Key,
+        mut discontinuous: bool,
+        fired: Option<(usize, usize)>,
+        before: Option<DVector<f64>>,
+        log: &mut Log,
+    ) -> Result<(), SimError> {
+        let t = self.motion.t;
+        let before = before.unwrap_or_else(|| self.inputs(t));
+        let wants_rows = log.wants_rows();
+        if wants_rows && self.started {
+            self.read_row();
+        }
+        let left_row = (wants_rows && self.started).then(|| self.row.clone());
+        let mut jumped = false;
+        let mut positions = vec![key.switches.clone()];
+        let mut entry = None;
+        for _ in 0..2 + 2 * self.plant.thresholds.len() {
+            // A device event in a convex circuit is continuous; an edge or a switch may need an impulse.
+            let mut found = None;
+            if !discontinuous {
+                found = self.find_mode(&key, fired)?;
+            }
+            if found.is_none() {
+                jumped |= self.project(&key, &before, log)?;
+                found = self.find_mode(&key, fired)?;
+            }
+            if found.is_none() && self.plant.pairs > 0 {
+                found = self.jump_into(&key, &before, log)?;
+                jumped |= found.is_some();
+            }
+            let Some((at, leaving)) = found else {
+                return Err(self.fail(Reason::Infeasible));
+            };
+            key.closed.clone_from(&self.plant.modes[at].key.closed);
+            if leaving.is_empty() {
+                entry = Some(at);
+                break;
+            }
+            for i in leaving {
+                key.switches[i] = !key.switches[i];
+            }
+            if positions.contains(&key.switches) {
+                break;
+            }
+            positions.push(key.switches.clone());
+            discontinuous = true;
+        }
+        let Some(at) = entry else {
+            let names: Vec<&str> = self
+                .plant
+                .thresholds
+                .iter()
+                .map(|t| t.name.as_str())
+                .collect();
+            return Err(self
+                .fail(Reason::SwitchesDoNotSettle)
+                .device(names.join(", ")));
+        };
+        if let (Some(pair), false) = (fired, jumped) {
+            self.transitions.insert(pair, at);
+        }
+        let same = self.mode == Some(at);
+        self.report(at, jumped, log)?;
+        self.mode = Some(at);
+        self.key.clone_from(&self.plant.modes[at].key);
+        let mode = &self.plant.modes[at];
+        let Inspector { x, amplitude, .. } = &self.inspector;
+        self.motion
+            .enter(&mode.flow, &self.exosystem, t, x, amplitude);
+        if jumped {
+            self.jumps += 1;
+        }
+        if let Some(row) = left_row.filter(|_| !same || jumped) {
+            if jumped {
+                log.row(t, &row);
+            }
+            self.read_row();
+            log.row(t, &self.row);
+        }
+        Ok(())
+    }
+
+    /// A mode that holds on some interval after now: from what followed the same event before, from one implicit step of the
+    /// complementarity system at several lengths, from their neighbours. Every candidate is inspected; a mode that passes
+    /// is a solution, whoever proposed it.
+    pub(super) fn find_mode(
+        &mut self,
+        key: &Key,
+        fired: Option<(usize, usize)>,
+    ) -> Result<Option<(usize, Vec<usize>)>, SimError> {
+        let barred: Vec<usize> = if self.left_here.len() > PATIENCE {
+            self.left_here.clone()
+        } else {
+            Vec::new()
+        };
+        if let Some(&at) = fired.and_then(|pair| self.transitions.get(&pair))
+            && self.plant.modes[at].key.switches == key.switches
+            && !barred.contains(&at)
+            && let Some(leaving) = self.try_mode(at)
+        {
+            return Ok(Some((at, leaving)));
+        }
+        let mut tried: Vec<Vec<bool>> = Vec::new();
+        if fired.is_none() || self.plant.pairs == 0 {
+            tried.push(key.closed.clone());
+            if let Some(found) = self.try_key(key, &barred) {
+                return Ok(Some(found));
+            }
+        }
+        if self.plant.pairs == 0 {
+            return Ok(None);
+        }
+        let t = self.motion.t;
+        let fastest = self.plant.fastest();
+        let free = self.plant.free(&key.switches)?;
+        let x = free.state_from(&self.storage);
+        for part in PROPOSALS {
+            let h = part / fastest;
+            let u = self.inputs(t + h);
+            self.lcp_solves += 1;
+            for degenerate in [Degenerate::Open, Degenerate::As(&key.closed)] {
+                let proposal = self
+                    .plant
+                    .free(&key.switches)?
+                    .propose(&x, &u, h, degenerate);
+                let Some(closed) = proposal.filter(|c| !tried.contains(c)) else {
+                    continue;
+                };
+                tried.push(closed.clone());
+                let candidate = Key {
+                    closed,
+                    switches: key.switches.clone(),
+                };
+                if let Some(found) = self.try_key(&candidate, &barred) {
+                    return Ok(Some(found));
+                }
+            }
+        }
+        // Neighbours, nearest first.
+        let mut next = 0;
+        while next < tried.len() && tried.len() < MOST_NEIGHBOURS {
+            for j in 0..self.plant.pairs {
+                let mut closed = tried[next].clone();
+                closed[j] = !closed[j];
+                if tried.contains(&closed) {
+                    continue;
+                }
+                tried.push(closed.clone());
+                let candidate = Key {
+                    closed,
+                    switches: key.switches.clone(),
+                };
+                if let Some(found) = self.try_key(&candidate, &barred) {
+                    return Ok(Some(found));
+                }
+            }
+            next += 1;
+        }
+        Ok(None)
+    }
+
+    pub(super) fn try_key(&mut self, key: &Key, barred: &[usize]) -> Option<(usize, Vec<usize>)> {
+        let at = self
+            .plant
+            .mode(key, &self.exosystem)
+            .filter(|at| !barred.contains(at))?;
+        self.try_mode(at).map(|leaving| (at, leaving))
+    }
+
+    pub(super) fn try_mode(&mut self, at: usize) -> Option<Vec<usize>> {
+        let mode = &self.plant.modes[at];
+        match self.inspector.inspect(
+            mode,
+            &self.exosystem,
+            self.motion.t,
+            &self.storage,
+            &self.scale,
+        ) {
+            Finding::Holds(leaving) => Some(leaving),
+            Finding::Inconsistent | Finding::Refused(_) => None,
+        }
+    }
+}
