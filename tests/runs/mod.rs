@@ -9,12 +9,12 @@ use circ::mna::behaviour;
 use circ::netlist::load;
 
 /// The repository.
-pub fn root() -> &'static Path {
+pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
 /// Names of all netlists in `netlists/`, sorted.
-pub fn all() -> Vec<String> {
+pub(crate) fn all() -> Vec<String> {
     let entries = std::fs::read_dir(root().join("netlists")).expect("the folder netlists");
     let paths = entries.map(|entry| entry.expect("an entry").path());
     let is_netlist = |path: &PathBuf| path.extension().is_some_and(|e| e == "cir");
@@ -27,26 +27,35 @@ pub fn all() -> Vec<String> {
 }
 
 /// The text of a netlist.
-pub fn text(name: &str) -> String {
+pub(crate) fn text(name: &str) -> String {
     std::fs::read_to_string(root().join(format!("netlists/{name}.cir"))).expect("a netlist")
 }
 
 /// Simulates `netlists/NAME.cir`.
-pub fn run(name: &str, options: SimOptions<'_>) -> Run {
+pub(crate) fn run(name: &str, options: SimOptions<'_>) -> Run {
     let path = root().join(format!("netlists/{name}.cir"));
     let loaded = load(&path, &ElaborateOptions::default());
-    let circuit = loaded.circuit.unwrap_or_else(|| panic!("{name}: {:?}", loaded.diagnostics));
+    let circuit = loaded
+        .circuit
+        .unwrap_or_else(|| panic!("{name}: {:?}", loaded.diagnostics));
     let behaviour = behaviour(&circuit).unwrap_or_else(|e| panic!("{name}: {e:?}"));
     simulate(&circuit, &behaviour, options).unwrap_or_else(|e| panic!("{name}: {e}"))
 }
 
 /// With events as rows, exactly.
-pub fn exact(name: &str) -> Run {
-    run(name, SimOptions { method: Method::Exact, events: true, ..SimOptions::default() })
+pub(crate) fn exact(name: &str) -> Run {
+    run(
+        name,
+        SimOptions {
+            method: Method::Exact,
+            events: true,
+            ..SimOptions::default()
+        },
+    )
 }
 
 /// (θ, γ) with a fixed step.
-pub fn fixed(name: &str, theta: f64, gamma: f64, step: f64) -> Run {
+pub(crate) fn fixed(name: &str, theta: f64, gamma: f64, step: f64) -> Run {
     let options = SimOptions {
         method: Method::Theta,
         theta: Some(theta),
@@ -58,20 +67,28 @@ pub fn fixed(name: &str, theta: f64, gamma: f64, step: f64) -> Run {
 }
 
 /// The column of a probe.
-pub fn column(run: &Run, probe: &str) -> Vec<f64> {
-    let j = run.waveforms.find(probe).unwrap_or_else(|| panic!("no column {probe}"));
+pub(crate) fn column(run: &Run, probe: &str) -> Vec<f64> {
+    let j = run
+        .waveforms
+        .find(probe)
+        .unwrap_or_else(|| panic!("no column {probe}"));
     run.waveforms.column(j).collect()
 }
 
 /// The value in the last row at time `t`.
-pub fn at(run: &Run, probe: &str, t: f64) -> f64 {
+pub(crate) fn at(run: &Run, probe: &str, t: f64) -> f64 {
     let close = |&time: &f64| (time - t).abs() <= 1e-12 * t.abs();
-    let k = run.waveforms.time.iter().rposition(close).unwrap_or_else(|| panic!("no row at {t}"));
+    let k = run
+        .waveforms
+        .time
+        .iter()
+        .rposition(close)
+        .unwrap_or_else(|| panic!("no row at {t}"));
     column(run, probe)[k]
 }
 
 /// The value at `t` on the straight line between rows.
-pub fn interpolate(time: &[f64], values: &[f64], t: f64) -> f64 {
+pub(crate) fn interpolate(time: &[f64], values: &[f64], t: f64) -> f64 {
     let k = time.partition_point(|&x| x <= t).clamp(1, time.len() - 1);
     let (a, b) = (time[k - 1], time[k]);
     if b > a {
