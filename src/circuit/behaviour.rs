@@ -26,7 +26,7 @@ pub(super) const fn auxiliary(index: usize) -> Quantity {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Auxiliary {
     /// A monotone function of a sum of quantities.
-    Curve(Vec<(Value, Quantity)>, Curve),
+    Curve(Vec<(Value, Quantity)>, Box<Curve>),
     /// A function of time.
     Wave(Wave),
 }
@@ -272,7 +272,7 @@ impl Scopes<'_> {
                 affine = affine.plus(sum.scaled(linear.into()));
             }
             for part in parts {
-                let voltage = self.demand(Auxiliary::Curve(along.clone(), part.curve));
+                let voltage = self.demand(Auxiliary::Curve(along.clone(), Box::new(part.curve)));
                 affine = affine.plus(voltage.scaled(part.sign.into()));
             }
         }

@@ -149,7 +149,7 @@ impl<'n> Builder<'n, '_> {
                         terms,
                         constant: 0.0,
                     },
-                    law: Law::Curve(curve),
+                    law: Law::Curve(*curve),
                 },
                 Auxiliary::Wave(wave) => Kind::VoltageSource(Source {
                     dc: wave.value(0.0),

@@ -2,7 +2,7 @@
 //!
 //! A subcircuit instance sees its own definitions, then those of the instance that calls it, up to the top level.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use super::NodeId;
 use super::behaviour::Auxiliary;
@@ -97,7 +97,7 @@ pub(super) struct Scopes<'n> {
     /// Nodes that a DC source holds, with their voltages.
     pub(super) rails: HashMap<NodeId, f64>,
     /// Those of them whose voltage an expression took as a number.
-    pub(super) rails_read: HashSet<NodeId>,
+    pub(super) rails_read: BTreeSet<NodeId>,
     /// The end of the run, s.
     pub(super) tstop: f64,
 }
@@ -113,7 +113,7 @@ impl<'n> Scopes<'n> {
             gave_up: false,
             auxiliaries: Vec::new(),
             rails: HashMap::new(),
-            rails_read: HashSet::new(),
+            rails_read: BTreeSet::new(),
             tstop: 1.0,
         }
     }
