@@ -45,8 +45,9 @@ fn numbers(points: &[(Value, Value)]) -> Vec<(f64, f64)> {
 
 #[test]
 fn one_input_is_one_curve() {
-    type Case<'a> = (&'a str, &'a str, &'a [(f64, f64)], f64, f64);
-    let cases: [Case<'_>; 11] = [
+    // Expression, name of the curve, corners, slope below and above.
+    type Case = (&'static str, &'static str, &'static [(f64, f64)], f64, f64);
+    let cases: [Case; 11] = [
         ("max(V(a), 0)", "table", &[(0.0, 0.0)], 0.0, 1.0),
         (
             "V(a) > 2 ? 5 : 0",
