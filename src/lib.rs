@@ -33,8 +33,8 @@ pub mod law;
 pub mod lcs;
 pub mod mna;
 pub mod netlist;
-pub mod plan;
 pub mod passivity;
+pub mod plan;
 pub mod report;
 pub mod settings;
 pub mod solve;
@@ -42,3 +42,8 @@ pub mod waveform;
 
 #[cfg(feature = "cli")]
 pub mod cli;
+
+/// Compiles and runs the README's example.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

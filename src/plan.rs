@@ -21,11 +21,15 @@ pub struct Plan {
 pub fn plan(lcs: &Lcs, options: &SimOptions) -> Plan {
     let mut words = Vec::new();
     let (n, m, p) = (lcs.n(), lcs.m(), lcs.p());
-    words.push(format!("{n} states, {m} complementarity pairs, {p} sources"));
+    words.push(format!(
+        "{n} states, {m} complementarity pairs, {p} sources"
+    ));
     let obstacle = not_exact(lcs);
     let method = match (options.method, &obstacle) {
         (Method::Auto, None) => {
-            words.push("all laws are piecewise linear and all sources exact: exact integration".into());
+            words.push(
+                "all laws are piecewise linear and all sources exact: exact integration".into(),
+            );
             Method::Exact
         }
         (Method::Auto, Some(what)) => {
@@ -43,7 +47,10 @@ pub fn plan(lcs: &Lcs, options: &SimOptions) -> Plan {
     };
     if matches!(method, Method::Euler | Method::Theta) {
         words.push(match options.step {
-            Some(h) => format!("θ = {}, γ = {}, fixed step {h:e} s", scheme.theta, scheme.gamma),
+            Some(h) => format!(
+                "θ = {}, γ = {}, fixed step {h:e} s",
+                scheme.theta, scheme.gamma
+            ),
             None => format!(
                 "θ = {}, γ = {}, steps chosen for a tolerance of {:e}",
                 scheme.theta, scheme.gamma, options.settings.tol
@@ -58,7 +65,11 @@ pub fn plan(lcs: &Lcs, options: &SimOptions) -> Plan {
     if lcs.switches.is_empty() {
         words.push("no switches: one system for the whole run".into());
     }
-    Plan { method, scheme, words }
+    Plan {
+        method,
+        scheme,
+        words,
+    }
 }
 
 /// What keeps a system from exact integration: the element and why.

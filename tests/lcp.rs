@@ -30,17 +30,39 @@ fn murty(size: usize) -> (DMatrix<f64>, DVector<f64>) {
 fn problems() -> Vec<Problem> {
     const SINGULAR: &str = "the violated pairs alone have a singular M_aa";
     let bridge = dmatrix![1e-3, 1e-3, -1.0, 0.0; 1e-3, 1e-3, 0.0, -1.0; 1.0, 0.0, 0.0, 0.0; 0.0, 1.0, 0.0, 0.0];
-    let filter = dmatrix![0.0, -1.0, 0.0, 0.0; 1.0, 0.0, 1.0, -1.0; 0.0, -1.0, 0.0, 0.0; 0.0, 1.0, 0.0, 0.0];
-    let step = dmatrix![3.3, 0.0, 3.3, 0.0; 0.0, 0.0, 0.0, 0.0; 3.3, 0.0, 4.3, -1.0; 0.0, 0.0, -1.0, 1.0];
+    let filter =
+        dmatrix![0.0, -1.0, 0.0, 0.0; 1.0, 0.0, 1.0, -1.0; 0.0, -1.0, 0.0, 0.0; 0.0, 1.0, 0.0, 0.0];
+    let step =
+        dmatrix![3.3, 0.0, 3.3, 0.0; 0.0, 0.0, 0.0, 0.0; 3.3, 0.0, 4.3, -1.0; 0.0, 0.0, -1.0, 1.0];
     let (m6, q6) = murty(6);
     let scales = DMatrix::from_diagonal(&dvector![1e-6, 3e4, 1.0]);
     let dense = dmatrix![4.0, 1.0, -2.0; -1.0, 3.0, 1.0; 2.0, 0.5, 5.0];
     let problem = |name, m, q, fails| Problem { name, m, q, fails };
     vec![
-        problem("positive definite", dmatrix![4.0, 1.0; 1.0, 3.0], dvector![-5.0, -6.0], &[]),
-        problem("q nonnegative", dmatrix![0.0, -1.0; 1.0, 0.0], dvector![0.0, 2.0], &[]),
-        problem("bridge, D", bridge.clone(), dvector![0.0, 0.0, -10.0, 10.0], &[("block", SINGULAR)]),
-        problem("bridge, D, reversed", bridge, dvector![0.0, 0.0, 3.0, -3.0], &[("block", SINGULAR)]),
+        problem(
+            "positive definite",
+            dmatrix![4.0, 1.0; 1.0, 3.0],
+            dvector![-5.0, -6.0],
+            &[],
+        ),
+        problem(
+            "q nonnegative",
+            dmatrix![0.0, -1.0; 1.0, 0.0],
+            dvector![0.0, 2.0],
+            &[],
+        ),
+        problem(
+            "bridge, D",
+            bridge.clone(),
+            dvector![0.0, 0.0, -10.0, 10.0],
+            &[("block", SINGULAR)],
+        ),
+        problem(
+            "bridge, D, reversed",
+            bridge,
+            dvector![0.0, 0.0, 3.0, -3.0],
+            &[("block", SINGULAR)],
+        ),
         problem(
             "capacitor filter, h·CB = 1e-6",
             &filter + &step * 1e-6,
@@ -91,8 +113,14 @@ fn attempt(method: &str, lcp: &Lcp) -> Option<DVector<f64>> {
             let y = scaled.y(&rough);
             on(&(0..size).map(|j| rough[j] > y[j]).collect::<Vec<_>>())
         }
-        "enumerate" => enumerate::solve(lcp, TOLERANCE).into_iter().next()?.component_div(&scaling.d),
-        _ => Driver::new(lcp.m.clone(), TOLERANCE).solve(&lcp.q).lambda.component_div(&scaling.d),
+        "enumerate" => enumerate::solve(lcp, TOLERANCE)
+            .into_iter()
+            .next()?
+            .component_div(&scaling.d),
+        _ => Driver::new(lcp.m.clone(), TOLERANCE)
+            .solve(&lcp.q)
+            .lambda
+            .component_div(&scaling.d),
     };
     let lambda = scaling.unscale(&lambda);
     (scaling.residual(lcp, &lambda, &lcp.y(&lambda)) < 1e-12).then_some(lambda)
@@ -120,11 +148,16 @@ fn infeasible_problems_carry_a_certificate() {
         (dmatrix![0.0], dvector![-1.0]),
         (dmatrix![0.0, 0.0; 0.0, 1.0], dvector![-1e-3, 3.0]),
         (dmatrix![0.0, 1.0; -1.0, 0.0], dvector![1.0, -1.0]),
-        (dmatrix![1e6, -1e6, 0.0; -1e6, 1e6, 0.0; 0.0, 0.0, 1e-6], dvector![-1.0, -1.0, 1.0]),
+        (
+            dmatrix![1e6, -1e6, 0.0; -1e6, 1e6, 0.0; 0.0, 0.0, 1e-6],
+            dvector![-1.0, -1.0, 1.0],
+        ),
     ];
     for (m, q) in cases {
         let solution = Driver::new(m.clone(), TOLERANCE).solve(&q);
-        let Status::Infeasible(v) = solution.status else { panic!("{m} {q}: {solution:?}") };
+        let Status::Infeasible(v) = solution.status else {
+            panic!("{m} {q}: {solution:?}")
+        };
         assert!(v.iter().all(|v| *v >= 0.0));
         assert!((q.dot(&v) + 1.0).abs() < 1e-12);
         let columns = m.transpose() * &v;
@@ -167,9 +200,19 @@ fn passive(size: usize) -> impl Strategy<Value = (DMatrix<f64>, DVector<f64>, DV
         let d = DMatrix::from_diagonal(&DVector::from_fn(size, |i, _| 2_f64.powi(3 * scales[i])));
         let m = &d * (&f * f.transpose() + k) * &d;
         let lambda = DVector::from_fn(size, |i, _| {
-            if parts[i].0 == 0 { parts[i].1 / d[(i, i)] } else { 0.0 }
+            if parts[i].0 == 0 {
+                parts[i].1 / d[(i, i)]
+            } else {
+                0.0
+            }
         });
-        let y = DVector::from_fn(size, |i, _| if parts[i].0 == 1 { parts[i].1 * d[(i, i)] } else { 0.0 });
+        let y = DVector::from_fn(size, |i, _| {
+            if parts[i].0 == 1 {
+                parts[i].1 * d[(i, i)]
+            } else {
+                0.0
+            }
+        });
         let q = y - &m * &lambda;
         (m, q, lambda)
     })

@@ -20,7 +20,9 @@ use proptest::prelude::*;
 fn circuit(text: &str) -> Option<Circuit> {
     let mut sources = SourceMap::default();
     let root = sources.add("random.cir", text);
-    let (netlist, _) = parse(&mut sources, root, &|_| Err(std::io::ErrorKind::NotFound.into()));
+    let (netlist, _) = parse(&mut sources, root, &|_| {
+        Err(std::io::ErrorKind::NotFound.into())
+    });
     elaborate(&netlist, &ElaborateOptions::default()).0
 }
 
@@ -59,7 +61,8 @@ fn system(circuit: &Circuit) -> (Lcs, DVector<f64>) {
     let x = &lcs.storage.inject * s + &lcs.storage.inject_one;
     // The oracle knows no jump at t = 0+: it starts after it.
     let u = DVector::from_iterator(lcs.p(), lcs.inputs.iter().map(|i| i.source.value(0.0)));
-    let jump = JumpProblem::new(&lcs, 1e-9).and_then(|mut j| j.solve(&lcs, &x, &u).expect("a jump"));
+    let jump =
+        JumpProblem::new(&lcs, 1e-9).and_then(|mut j| j.solve(&lcs, &x, &u).expect("a jump"));
     let x = jump.map_or(x, |j| j.x);
     (lcs, x)
 }
@@ -75,7 +78,9 @@ fn oracle(lcs: &Lcs, mut x: DVector<f64>, h: f64, steps: usize) -> Option<DVecto
         let u = DVector::from_iterator(lcs.p(), lcs.inputs.iter().map(|i| i.source.value_left(t)));
         let free = &w * (&x + (&lcs.e * &u + &lcs.e0) * h);
         let q = &lcs.c * &free + &lcs.g * &u + &lcs.f;
-        let lambda = enumerate::solve(&Lcp { m: m.clone(), q }, 1e-9).into_iter().next()?;
+        let lambda = enumerate::solve(&Lcp { m: m.clone(), q }, 1e-9)
+            .into_iter()
+            .next()?;
         x = free + &w * &lcs.b * lambda * h;
     }
     Some(x)
@@ -96,7 +101,9 @@ fn stepped(lcs: &Lcs, x: DVector<f64>, h: f64, steps: usize) -> (DVector<f64>, f
     })
     .expect("a stepper");
     let mut log = Log::new(lcs.outputs.names.len(), 0.0, false);
-    theta.advance(h * steps as f64, &mut log).unwrap_or_else(|e| panic!("{e}"));
+    theta
+        .advance(h * steps as f64, &mut log)
+        .unwrap_or_else(|e| panic!("{e}"));
     let worst = theta.worst_residual();
     (DVector::from_column_slice(theta.state()), worst)
 }

@@ -13,8 +13,9 @@ use circ::settings::Settings;
 fn circuit(text: &str) -> circ::circuit::Circuit {
     let mut sources = SourceMap::default();
     let root = sources.add("test.cir", format!("test\n{text}\n.end\n"));
-    let (netlist, findings) =
-        parse(&mut sources, root, &|_| Err(std::io::ErrorKind::NotFound.into()));
+    let (netlist, findings) = parse(&mut sources, root, &|_| {
+        Err(std::io::ErrorKind::NotFound.into())
+    });
     let (circuit, more) = elaborate(&netlist, &ElaborateOptions::default());
     circuit.unwrap_or_else(|| panic!("{findings:?} {more:?}"))
 }
@@ -30,27 +31,51 @@ fn simulate(text: &str, options: SimOptions<'_>) -> Run {
 }
 
 fn theta<'a>() -> SimOptions<'a> {
-    SimOptions { method: Method::Theta, ..SimOptions::default() }
+    SimOptions {
+        method: Method::Theta,
+        ..SimOptions::default()
+    }
 }
 
 fn fixed<'a>(method: Method, h: f64) -> SimOptions<'a> {
-    SimOptions { method, step: Some(h), ..SimOptions::default() }
+    SimOptions {
+        method,
+        step: Some(h),
+        ..SimOptions::default()
+    }
 }
 
 /// The column of a probe.
 fn column(run: &Run, name: &str) -> Vec<f64> {
     let names = &run.waveforms.names;
-    let j = names.iter().position(|n| n == name).unwrap_or_else(|| panic!("{name} of {names:?}"));
-    run.waveforms.values.iter().skip(j).step_by(names.len()).copied().collect()
+    let j = names
+        .iter()
+        .position(|n| n == name)
+        .unwrap_or_else(|| panic!("{name} of {names:?}"));
+    run.waveforms
+        .values
+        .iter()
+        .skip(j)
+        .step_by(names.len())
+        .copied()
+        .collect()
 }
 
 fn at(run: &Run, name: &str, t: f64) -> f64 {
-    let k = run.waveforms.time.iter().rposition(|&x| (x - t).abs() <= 1e-9 * t).expect("a row");
+    let k = run
+        .waveforms
+        .time
+        .iter()
+        .rposition(|&x| (x - t).abs() <= 1e-9 * t)
+        .expect("a row");
     column(run, name)[k]
 }
 
 fn close(value: f64, expected: f64, within: f64) {
-    assert!((value - expected).abs() <= within, "{value} is not {expected} within {within}");
+    assert!(
+        (value - expected).abs() <= within,
+        "{value} is not {expected} within {within}"
+    );
 }
 
 const IDEAL: &str = ".model di d(ron=0 vfwd=0 n=0.01)";
@@ -78,14 +103,24 @@ fn maffezzonis_switch_against_the_exact_periods() {
         v3 3 0 pulse(7.5 -2.5 0 20u 0 0 20u)\n\
         .model sw sw(ron=1m roff=1k vt=0 vh=0)\n.model dm d(ron=1m roff=1k vfwd=0)\n\
         .tran 0.1u 200u uic\n.save i(l1)";
-    let exact = [1.173271783, 2.055345254, 2.717545430, 3.214130750, 3.586205968];
+    let exact = [
+        1.173271783,
+        2.055345254,
+        2.717545430,
+        3.214130750,
+        3.586205968,
+    ];
     let run = simulate(text, theta());
     for (k, exact) in exact.iter().enumerate() {
         close(at(&run, "i(l1)", 20e-6 * (k + 1) as f64), *exact, 5e-4);
     }
     let offs = [12.564487, 30.693306, 49.264901, 68.179976];
-    let seen: Vec<f64> =
-        run.events.iter().filter(|(_, w)| w.contains("s1 off")).map(|(t, _)| t * 1e6).collect();
+    let seen: Vec<f64> = run
+        .events
+        .iter()
+        .filter(|(_, w)| w.contains("s1 off"))
+        .map(|(t, _)| t * 1e6)
+        .collect();
     for (seen, exact) in seen.iter().zip(offs) {
         close(*seen, exact, 2e-3);
     }
@@ -95,14 +130,26 @@ fn maffezzonis_switch_against_the_exact_periods() {
 fn source_driven_switch_closes_two_capacitors_together() {
     let text = "c1 1 0 1u ic=10\nc2 2 0 0.3u ic=0\ns1 1 2 3 0 sw\nv3 3 0 pulse(0 1 10u 0 0 1 2)\n\
         r1 1 0 1g\n.model sw sw(vt=0.5 vh=0 ron=0 roff=1t)\n.tran 1u 20u uic\n.save v(1) v(2)";
-    let options = SimOptions { events: true, ..theta() };
+    let options = SimOptions {
+        events: true,
+        ..theta()
+    };
     let run = simulate(text, options);
     close(at(&run, "v(2)", 20e-6), 10.0 / 1.3, 1e-6);
     close(at(&run, "v(1)", 10e-6), 10.0 / 1.3, 1e-6);
     // Rows before and after at the switching time.
-    let rows = run.waveforms.time.iter().filter(|&&t| (t - 10e-6).abs() < 1e-15).count();
+    let rows = run
+        .waveforms
+        .time
+        .iter()
+        .filter(|&&t| (t - 10e-6).abs() < 1e-15)
+        .count();
     assert_eq!(rows, 2, "{:?}", run.events);
-    close(run.energy.dissipated, 0.5 * 1e-4 - 0.5 * 1.3e-6 * (10.0_f64 / 1.3).powi(2), 1e-10);
+    close(
+        run.energy.dissipated,
+        0.5 * 1e-4 - 0.5 * 1.3e-6 * (10.0_f64 / 1.3).powi(2),
+        1e-10,
+    );
 }
 
 #[test]
@@ -114,7 +161,11 @@ fn edge_into_a_bridge_capacitor_jumps_and_reports_its_charge() {
     let run = simulate(&text, theta());
     close(at(&run, "v(2)", 10e-6), 5.0, 1e-12);
     assert_eq!(run.stats.jumps, 1);
-    let impulse = run.impulses.iter().find(|i| i.name == "i(d1)").expect("an impulse");
+    let impulse = run
+        .impulses
+        .iter()
+        .find(|i| i.name == "i(d1)")
+        .expect("an impulse");
     close(impulse.area, 5e-6, 1e-17);
     close(at(&run, "i(d1)", 20e-6), 5e-3, 1e-8);
     assert!(run.energy.residual_relative < 1e-9, "{:?}", run.energy);
@@ -122,9 +173,8 @@ fn edge_into_a_bridge_capacitor_jumps_and_reports_its_charge() {
 
 #[test]
 fn rows_do_not_depend_on_the_step() {
-    let text = format!(
-        "v1 1 0 sin(0 10 1k)\nd1 1 2 di\nc1 2 0 1u\nr1 2 0 1k\n{IDEAL}\n.tran 30u 1m uic"
-    );
+    let text =
+        format!("v1 1 0 sin(0 10 1k)\nd1 1 2 di\nc1 2 0 1u\nr1 2 0 1k\n{IDEAL}\n.tran 30u 1m uic");
     let time = |h| simulate(&text, fixed(Method::Euler, h)).waveforms.time;
     assert_eq!(time(1e-6), time(7.7e-6));
     assert_eq!(time(1e-6).last(), Some(&1e-3));
@@ -147,8 +197,10 @@ fn half_wave_rectifier_follows_the_source_while_conducting() {
 fn operating_points() {
     let settings = Settings::default();
     let op = |text: &str| operating_point(&circuit(text), Values::Dc, false, &settings);
-    let point = op(&format!("v1 1 0 5\nr1 1 2 1k\nd1 2 0 di\nc1 2 0 1u\nl1 1 3 1m\nr2 3 0 10\n{IDEAL}"))
-        .unwrap();
+    let point = op(&format!(
+        "v1 1 0 5\nr1 1 2 1k\nd1 2 0 di\nc1 2 0 1u\nl1 1 3 1m\nr2 3 0 10\n{IDEAL}"
+    ))
+    .unwrap();
     assert_eq!(point.nodes[1], ("2".to_string(), 0.0));
     let currents: std::collections::BTreeMap<_, _> = point.currents.into_iter().collect();
     close(currents["d1"], 5e-3, 1e-15);
@@ -157,7 +209,11 @@ fn operating_points() {
 
     let floating = op("v1 1 0 5\nc2 2 0 1u\nc1 1 2 1u").unwrap();
     assert_eq!(floating.nodes[1], ("2".to_string(), 0.0));
-    assert!(floating.notes[0].contains("capacitors alone"), "{:?}", floating.notes);
+    assert!(
+        floating.notes[0].contains("capacitors alone"),
+        "{:?}",
+        floating.notes
+    );
 
     let shorted = op("v1 1 0 5\nl1 1 0 1m").unwrap_err();
     assert!(shorted.to_string().contains("uic"), "{shorted}");
@@ -191,17 +247,39 @@ fn controlled_methods_agree_within_their_tolerance() {
          .tran 20u 3m uic\n.save v(3) i(l1)"
     );
     let run = |method, tol| {
-        let settings = Settings { tol, ..Settings::default() };
-        simulate(&text, SimOptions { method, settings, ..SimOptions::default() })
+        let settings = Settings {
+            tol,
+            ..Settings::default()
+        };
+        simulate(
+            &text,
+            SimOptions {
+                method,
+                settings,
+                ..SimOptions::default()
+            },
+        )
     };
     let fine = run(Method::Theta, 1e-7);
-    for (method, tol) in [(Method::Theta, 1e-4), (Method::Theta, 1e-5), (Method::Euler, 1e-3)] {
+    for (method, tol) in [
+        (Method::Theta, 1e-4),
+        (Method::Theta, 1e-5),
+        (Method::Euler, 1e-3),
+    ] {
         let other = run(method, tol);
         for name in ["v(3)", "i(l1)"] {
             let (a, b) = (column(&fine, name), column(&other, name));
             let amplitude = a.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-            let worst = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            assert!(worst <= 2.0 * tol * amplitude, "{method:?} {name}: {:e}", worst / amplitude);
+            let worst = a
+                .iter()
+                .zip(&b)
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f64::max);
+            assert!(
+                worst <= 2.0 * tol * amplitude,
+                "{method:?} {name}: {:e}",
+                worst / amplitude
+            );
         }
     }
 }
@@ -215,8 +293,48 @@ fn exact_and_stepping_agree_on_a_bridge() {
     let exact = simulate(&text, SimOptions::default());
     assert_eq!(exact.method, "exact");
     let other = simulate(&text, theta());
-    let pairs = column(&exact, "v(1)").into_iter().zip(column(&other, "v(1)"));
+    let pairs = column(&exact, "v(1)")
+        .into_iter()
+        .zip(column(&other, "v(1)"));
     let worst = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(worst < 10.0 * 1e-4, "{worst:e}");
     close(at(&exact, "v(1)", 5e-3), 0.790322820, 1e-9);
+}
+
+const BUCK: &str = "v1 1 0 20\ns1 1 2 3 0 sw\nd1 0 2 di\nl1 2 4 200u\nc1 4 0 10u\nr1 4 0 5\n\
+    v3 3 0 pulse(0 1 0 0 0 5u 10u)\n.model sw sw(vt=0.5 vh=0 ron=0 roff=1g)\n\
+    .model di d(ron=0 vfwd=0 n=0.01)\n.tran 1u 500u uic\n.save v(4) i(l1)";
+
+#[test]
+fn buck_with_a_source_driven_switch() {
+    let run = simulate(BUCK, fixed(Method::Theta, 0.1e-6));
+    let exact = simulate(
+        BUCK,
+        SimOptions {
+            method: Method::Exact,
+            ..SimOptions::default()
+        },
+    );
+    for t in [100e-6, 300e-6, 500e-6] {
+        close(at(&run, "v(4)", t), at(&exact, "v(4)", t), 2e-3);
+        close(at(&run, "i(l1)", t), at(&exact, "i(l1)", t), 2e-3);
+    }
+    // At 5, 10, … 500 µs; the switch starts closed.
+    assert_eq!(
+        run.events
+            .iter()
+            .filter(|(_, what)| what.contains("s1"))
+            .count(),
+        100
+    );
+    assert!(run.energy.residual_relative < 1e-4, "{:?}", run.energy);
+}
+
+#[test]
+fn counters_of_a_run() {
+    let run = simulate(BUCK, theta());
+    let mut stats = run.stats;
+    assert!(stats.cpu_seconds > 0.0);
+    stats.cpu_seconds = 0.0;
+    insta::assert_debug_snapshot!((stats, run.plan));
 }

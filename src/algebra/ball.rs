@@ -1,252 +1,300 @@
-//! A number known three ways: its residue modulo a prime, a double-double, and a bound on the latter's error.
+//! Numbers with an exact zero test and an error bound: a residue, a double-double and a radius.
 
-use super::{Field, Value};
+use num_bigint::BigInt;
+use num_traits::{Signed, ToPrimitive};
 
-/// 2^61 − 1. A rational whose numerator this prime divides would be taken for zero; values with at most a few dozen
-/// decimal digits meet that with probability about 2^−61 per test, and the choice is the same on every run.
-const PRIME: u64 = (1 << 61) - 1;
-/// Half the spacing of double-double numbers at 1, with room for one more rounding.
-const ROUND: f64 = 1.0 / (1u128 << 101) as f64;
+use super::double::ROUNDING;
+use super::{Double, Field, Rational, Value, rational};
 
-/// See the module.
+/// An element of ℚ known by its residue modulo p = 2⁶¹ − 1 and by an interval.
+///
+/// The residue decides what is 0: a nonzero residue proves the number nonzero, and a number whose residue is 0 is
+/// taken to be exactly 0 (a wrong zero needs a numerator divisible by p: probability about 4·10⁻¹⁹ a test). The interval
+/// `value ± radius` always contains the exact number; where it becomes too wide the computation is repeated over
+/// [`Rational`].
+///
+/// A ball made by [`inexact`](Ball::inexact) stands for a measured double; it has no residue, and counts as 0 as soon as its
+/// interval contains 0.
 #[derive(Debug, Clone, Copy)]
 pub struct Ball {
     residue: u64,
-    hi: f64,
-    lo: f64,
-    /// |hi + lo − exact| ≤ err.
-    err: f64,
+    value: Double,
+    radius: f64,
 }
 
-fn reduce(x: u128) -> u64 {
-    let folded = (x & u128::from(PRIME)) as u64 + (x >> 61) as u64;
-    if folded >= PRIME {
-        folded - PRIME
-    } else {
-        folded
-    }
-}
+/// The Mersenne prime 2⁶¹ − 1.
+const P: u64 = (1 << 61) - 1;
+/// In place of a residue: the number is known by its interval only.
+const INEXACT: u64 = u64::MAX;
+/// Covers the rounding of the radius computations themselves.
+const UP: f64 = 1.0 + 8.0 * f64::EPSILON;
 
 fn mul_mod(a: u64, b: u64) -> u64 {
-    reduce(u128::from(a) * u128::from(b))
+    let x = u128::from(a) * u128::from(b);
+    let s = (x as u64 & P) + (x >> 61) as u64;
+    if s >= P { s - P } else { s }
 }
 
 fn add_mod(a: u64, b: u64) -> u64 {
     let s = a + b;
-    if s >= PRIME { s - PRIME } else { s }
+    if s >= P { s - P } else { s }
 }
 
-fn pow_mod(mut base: u64, mut exponent: u64) -> u64 {
-    let mut power = 1;
+fn neg_mod(a: u64) -> u64 {
+    if a == 0 { 0 } else { P - a }
+}
+
+/// a⁻¹ = a^(p−2).
+fn inv_mod(a: u64) -> u64 {
+    let (mut base, mut exponent, mut result) = (a, P - 2, 1);
     while exponent > 0 {
         if exponent & 1 == 1 {
-            power = mul_mod(power, base);
+            result = mul_mod(result, base);
         }
         base = mul_mod(base, base);
         exponent >>= 1;
     }
-    power
+    result
 }
 
-/// Inverse by Fermat's little theorem.
-fn invert(a: u64) -> u64 {
-    pow_mod(a, PRIME - 2)
+fn residue_of(n: &BigInt) -> u64 {
+    let r = (n.abs() % P).to_u64().unwrap_or(0);
+    if n.is_negative() { neg_mod(r) } else { r }
 }
 
-fn two_sum(a: f64, b: f64) -> (f64, f64) {
-    let s = a + b;
-    let bb = s - a;
-    (s, (a - (s - bb)) + (b - bb))
-}
-
-fn quick_two_sum(a: f64, b: f64) -> (f64, f64) {
-    let s = a + b;
-    (s, b - (s - a))
-}
-
-fn two_prod(a: f64, b: f64) -> (f64, f64) {
-    let p = a * b;
-    (p, a.mul_add(b, -p))
-}
-
-/// Residue of `|m|·base^exponent` with sign.
-fn residue_of(mantissa: i128, base: u64, exponent: i32) -> u64 {
-    let magnitude = reduce_wide(mantissa.unsigned_abs());
-    let mut power = pow_mod(base, u64::from(exponent.unsigned_abs()));
-    if exponent < 0 {
-        power = invert(power);
-    }
-    let r = mul_mod(magnitude, power);
-    if mantissa < 0 && r != 0 { PRIME - r } else { r }
-}
-
-fn reduce_wide(x: u128) -> u64 {
-    reduce(u128::from(reduce(x & ((1 << 122) - 1))) + (x >> 122))
-}
-
-/// The exact `mantissa · 2^exponent` of a finite double.
-pub(super) fn decompose(x: f64) -> (i128, i32) {
-    let bits = x.to_bits();
-    let exponent = ((bits >> 52) & 0x7ff) as i32;
-    let fraction = i128::from(bits & ((1 << 52) - 1));
-    let (mantissa, exponent) = if exponent == 0 {
-        (fraction, -1074)
-    } else {
-        (fraction | (1 << 52), exponent - 1075)
-    };
-    (if x < 0.0 { -mantissa } else { mantissa }, exponent)
-}
+/// Relative radius up to which a ball counts as known.
+const PRECISION: f64 = 1e-14;
 
 impl Ball {
-    const fn new(residue: u64, hi: f64, lo: f64, err: f64) -> Self {
+    const ZERO: Self = Self {
+        residue: 0,
+        value: Double { hi: 0.0, lo: 0.0 },
+        radius: 0.0,
+    };
+
+    /// A double known to half a unit in the last place; integers of up to 2⁵³ are taken as exact.
+    #[must_use]
+    pub fn inexact(x: f64) -> Self {
+        /// Integers from here on may be rounded.
+        const EXACT_INTEGERS: f64 = 9_007_199_254_740_992.0;
+        if x.fract() == 0.0 && x.abs() < EXACT_INTEGERS {
+            return Self::from_rational(&rational(x));
+        }
+        let value = Double { hi: x, lo: 0.0 };
         Self {
-            residue,
-            hi,
-            lo,
-            err,
+            residue: INEXACT,
+            value,
+            radius: x.abs() * f64::EPSILON / 2.0,
         }
     }
 
-    /// The exact sum of two doubles.
+    /// The ball around an exact number.
     #[must_use]
-    pub fn from_pair(hi: f64, lo: f64) -> Self {
-        Self::from_double(hi).add(&Self::from_double(lo))
-    }
-
-    /// The exact binary rational of a double.
-    #[must_use]
-    pub fn from_double(x: f64) -> Self {
-        let (mantissa, exponent) = decompose(x);
-        Self::new(residue_of(mantissa, 2, exponent), x, 0.0, 0.0)
-    }
-
-    /// A double known to half a unit in its last place only: rank decisions treat what cancels to below the bound as zero.
-    #[must_use]
-    pub fn rounded(x: f64) -> Self {
-        let mut ball = Self::from_double(x);
-        ball.err = x.abs() * (f64::EPSILON / 2.0);
-        ball
-    }
-
-    /// The result of an operation; a zero residue is an exact zero.
-    fn settled(residue: u64, hi: f64, lo: f64, err: f64) -> Self {
-        if residue == 0 {
-            return Self::zero();
+    pub fn from_rational(exact: &Rational) -> Self {
+        let hi = Field::to_f64(exact);
+        let lo = Field::to_f64(&(exact - rational(hi)));
+        let denominator = residue_of(exact.denom());
+        Self {
+            residue: mul_mod(residue_of(exact.numer()), inv_mod(denominator)),
+            value: Double::sum(hi, lo),
+            radius: lo.abs() * f64::EPSILON,
         }
-        Self::new(residue, hi, lo, err + hi.abs() * ROUND)
+        .settle()
+    }
+
+    /// 1/self.
+    fn recip(&self) -> Self {
+        let value = self.value.recip();
+        let size = self.value.hi.abs();
+        // |1/x − 1/(x ± r)| ≤ r / (|x| (|x| − r)); an interval that contains 0 has no bound.
+        let spread = if self.radius < size {
+            self.radius / (size * (size - self.radius))
+        } else {
+            f64::INFINITY
+        };
+        Self {
+            residue: if self.residue == INEXACT {
+                INEXACT
+            } else {
+                inv_mod(self.residue)
+            },
+            value,
+            radius: (spread + value.hi.abs() * ROUNDING) * UP,
+        }
+    }
+
+    /// Brings a result into the form in which 0 is [`Self::ZERO`].
+    fn settle(self) -> Self {
+        let zero = match self.residue {
+            0 => true,
+            INEXACT => self.value.hi.abs() <= self.radius,
+            _ => false,
+        };
+        if zero { Self::ZERO } else { self }
+    }
+
+    fn bound(&self) -> f64 {
+        self.value.hi.abs() + self.radius
     }
 }
 
 impl Field for Ball {
     fn zero() -> Self {
-        Self::new(0, 0.0, 0.0, 0.0)
+        Self::ZERO
     }
 
     fn one() -> Self {
-        Self::new(1, 1.0, 0.0, 0.0)
+        Self {
+            residue: 1,
+            value: Double { hi: 1.0, lo: 0.0 },
+            radius: 0.0,
+        }
     }
 
     fn value(value: Value) -> Self {
-        let Some((mantissa, exponent)) = value.decimal else {
-            return Self::from_double(value.f64);
-        };
-        if mantissa == 0 {
-            return Self::zero();
-        }
-        // The mantissa is exact in a double-double up to 106 bits; powers of ten up to 10^22 are exact doubles.
-        let high = mantissa as f64;
-        let low = (mantissa - high as i128) as f64;
-        let mut number = Self::new(residue_of(mantissa, 10, 0), high, low, high.abs() * ROUND);
-        let mut left = exponent;
-        while left != 0 {
-            let step = left.clamp(-22, 22);
-            let ten = Self::new(
-                pow_mod(10, u64::from(step.unsigned_abs())),
-                10f64.powi(step.abs()),
-                0.0,
-                0.0,
-            );
-            number = if step > 0 {
-                number.mul(&ten)
-            } else {
-                number.div(&ten)
-            };
-            left -= step;
-        }
-        number
-    }
-
-    fn add(&self, other: &Self) -> Self {
-        let (s, e) = two_sum(self.hi, other.hi);
-        let (t, f) = two_sum(self.lo, other.lo);
-        let (s, e) = quick_two_sum(s, e + t);
-        let (s, e) = quick_two_sum(s, e + f);
-        // The rounding of a sum is relative to the operands, not to a cancelled result.
-        let rounding = (self.hi.abs() + other.hi.abs()) * ROUND;
-        Self::settled(
-            add_mod(self.residue, other.residue),
-            s,
-            e,
-            self.err + other.err + rounding,
-        )
-    }
-
-    fn sub(&self, other: &Self) -> Self {
-        self.add(&other.neg())
-    }
-
-    fn mul(&self, other: &Self) -> Self {
-        let (p, e) = two_prod(self.hi, other.hi);
-        let (p, e) = quick_two_sum(p, e + (self.hi * other.lo + self.lo * other.hi));
-        let err = self.hi.abs() * other.err + other.hi.abs() * self.err + self.err * other.err;
-        Self::settled(
-            mul_mod(self.residue, other.residue),
-            p,
-            e,
-            err * (1.0 + f64::EPSILON) + 4.0 * p.abs() * ROUND,
-        )
-    }
-
-    fn div(&self, other: &Self) -> Self {
-        let q1 = self.hi / other.hi;
-        let (p, e) = two_prod(q1, other.hi);
-        let (r, f) = two_sum(self.hi, -p);
-        let r = r + (f + self.lo - e - q1 * other.lo);
-        let q2 = r / other.hi;
-        let (q, ql) = quick_two_sum(q1, q2);
-        let (p, e) = two_prod(q, other.hi);
-        let (r, f) = two_sum(self.hi, -p);
-        let r = r + (f + self.lo - e - q * other.lo - ql * other.hi);
-        let (q, ql) = quick_two_sum(q, ql + r / other.hi);
-        let divisor = (other.hi.abs() - other.err).max(f64::MIN_POSITIVE);
-        let err = (self.err + q.abs() * other.err) / divisor;
-        let residue = mul_mod(self.residue, invert(other.residue));
-        Self::settled(
-            residue,
-            q,
-            ql,
-            err * (1.0 + f64::EPSILON) + 8.0 * q.abs() * ROUND,
-        )
-    }
-
-    fn neg(&self) -> Self {
-        let residue = if self.residue == 0 {
-            0
-        } else {
-            PRIME - self.residue
-        };
-        Self::new(residue, -self.hi, -self.lo, self.err)
+        Self::from_rational(&value.exact())
     }
 
     fn is_zero(&self) -> bool {
         self.residue == 0
     }
 
-    fn to_f64(&self) -> f64 {
-        self.hi
+    fn add(&self, other: &Self) -> Self {
+        if self.is_zero() {
+            return *other;
+        }
+        if other.is_zero() {
+            return *self;
+        }
+        let value = self.value.add(other.value);
+        let inexact = self.residue == INEXACT || other.residue == INEXACT;
+        Self {
+            residue: if inexact {
+                INEXACT
+            } else {
+                add_mod(self.residue, other.residue)
+            },
+            value,
+            radius: (self.radius + other.radius + value.hi.abs() * ROUNDING) * UP,
+        }
+        .settle()
     }
 
-    fn error(&self) -> f64 {
-        self.err
+    fn mul(&self, other: &Self) -> Self {
+        if self.is_zero() || other.is_zero() {
+            return Self::ZERO;
+        }
+        let value = self.value.mul(other.value);
+        let inexact = self.residue == INEXACT || other.residue == INEXACT;
+        Self {
+            residue: if inexact {
+                INEXACT
+            } else {
+                mul_mod(self.residue, other.residue)
+            },
+            value,
+            radius: (self.bound() * other.radius
+                + self.radius * other.value.hi.abs()
+                + value.hi.abs() * ROUNDING
+                + f64::MIN_POSITIVE)
+                * UP,
+        }
+        .settle()
+    }
+
+    fn neg(&self) -> Self {
+        let residue = if self.residue == INEXACT {
+            INEXACT
+        } else {
+            neg_mod(self.residue)
+        };
+        Self {
+            residue,
+            value: self.value.neg(),
+            radius: self.radius,
+        }
+    }
+
+    fn sub(&self, other: &Self) -> Self {
+        self.add(&other.neg())
+    }
+
+    fn div(&self, other: &Self) -> Self {
+        self.mul(&other.recip())
+    }
+
+    fn to_f64(&self) -> f64 {
+        self.value.hi
+    }
+
+    fn is_precise(&self) -> bool {
+        let size = self.value.hi.abs();
+        self.residue == INEXACT && size.is_finite() || self.radius <= PRECISION * size
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::algebra::Value as Number;
+
+    fn contains(ball: &Ball, exact: &Rational) -> bool {
+        let error = exact - rational(ball.value.hi) - rational(ball.value.lo);
+        error.abs() <= rational(ball.radius)
+    }
+
+    #[test]
+    fn cancellation_to_nothing_is_exactly_zero() {
+        let third = Ball::from_rational(&Rational::new(1.into(), 3.into()));
+        let mut x = Ball::one();
+        x.sub_mul(&third, &Ball::from_rational(&rational(3.0)));
+        assert!(x.is_zero());
+        assert_eq!(x.to_f64(), 0.0);
+    }
+
+    #[test]
+    fn cancellation_to_something_tiny_is_not_zero_and_not_precise() {
+        // 1/3 · 3 − (1 − 10⁻⁴⁰): nonzero, far below double-double resolution.
+        let third = Ball::from_rational(&Rational::new(1.into(), 3.into()));
+        let tiny = Rational::new(1.into(), BigInt::from(10).pow(40));
+        let mut x = Ball::from_rational(&(rational(1.0) - tiny));
+        x.sub_mul(&third, &Ball::from_rational(&rational(3.0)));
+        assert!(!x.is_zero());
+        assert!(!x.is_precise());
+    }
+
+    #[test]
+    fn inexact_doubles_vanish_within_their_error() {
+        let x = Ball::inexact(0.1)
+            .add(&Ball::inexact(0.2))
+            .add(&Ball::inexact(-0.3));
+        assert!(x.is_zero());
+        assert!(!Ball::inexact(1.0).add(&Ball::inexact(-2.0)).is_zero());
+    }
+
+    fn number() -> impl Strategy<Value = Rational> {
+        (-999i64..1000, 1i64..1000, -15i32..13).prop_map(|(n, d, e)| {
+            Rational::new(n.into(), d.into()) * Number::decimal(0.0, 1, e).exact()
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..Default::default() })]
+        #[test]
+        fn the_interval_contains_the_exact_result(a in number(), b in number(), c in number()) {
+            let (x, y, z) = (Ball::from_rational(&a), Ball::from_rational(&b), Ball::from_rational(&c));
+            let mut w = x;
+            w.sub_mul(&y, &z);
+            let exact = &a - &b * &c;
+            prop_assert!(contains(&w, &exact));
+            prop_assert_eq!(w.is_zero(), exact == rational(0.0));
+            if !w.is_zero() {
+                let inverse = exact.recip();
+                prop_assert!(contains(&w.recip(), &inverse));
+                prop_assert!(w.recip().mul(&w).add(&Ball::one().neg()).is_zero());
+            }
+        }
     }
 }

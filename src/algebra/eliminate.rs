@@ -1,15 +1,36 @@
-//! Gauss–Jordan elimination with pivots taken in the order of columns that the caller names.
+//! Dense matrices and Gauss–Jordan elimination in a given order of columns.
 
 use super::Field;
 
-/// A dense row-major matrix over a field.
+/// A matrix over a field, row by row.
 #[derive(Debug, Clone)]
 pub struct Matrix<F> {
-    /// Number of rows.
-    pub rows: usize,
-    /// Number of columns.
-    pub cols: usize,
+    rows: usize,
+    cols: usize,
     data: Vec<F>,
+}
+
+/// What an elimination has found so far.
+#[derive(Debug, Clone)]
+pub struct Elimination {
+    /// Number of rows that may hold pivots: the first ones; the rows below are only rewritten.
+    pub equations: usize,
+    /// For each column the row of its pivot, if it depends on the others.
+    pub pivot: Vec<Option<usize>>,
+    /// For each equation whether it holds a pivot.
+    pub used: Vec<bool>,
+}
+
+impl Elimination {
+    /// Nothing eliminated yet.
+    #[must_use]
+    pub fn new(equations: usize, columns: usize) -> Self {
+        Self {
+            equations,
+            pivot: vec![None; columns],
+            used: vec![false; equations],
+        }
+    }
 }
 
 impl<F: Field> Matrix<F> {
@@ -23,102 +44,173 @@ impl<F: Field> Matrix<F> {
         }
     }
 
-    /// The entry in row `i`, column `j`.
+    /// Number of rows.
     #[must_use]
-    pub fn at(&self, i: usize, j: usize) -> &F {
-        &self.data[i * self.cols + j]
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of columns.
+    #[must_use]
+    pub fn cols(&self) -> usize {
+        self.cols
+    }
+
+    /// A row.
+    #[must_use]
+    pub fn row(&self, row: usize) -> &[F] {
+        &self.data[row * self.cols..(row + 1) * self.cols]
+    }
+
+    /// A row, to write.
+    pub fn row_mut(&mut self, row: usize) -> &mut [F] {
+        &mut self.data[row * self.cols..(row + 1) * self.cols]
+    }
+
+    /// An entry.
+    #[must_use]
+    pub fn at(&self, row: usize, col: usize) -> &F {
+        &self.data[row * self.cols + col]
+    }
+
+    /// An entry, to write.
+    pub fn at_mut(&mut self, row: usize, col: usize) -> &mut F {
+        &mut self.data[row * self.cols + col]
     }
 
     /// Replaces an entry.
-    pub fn set(&mut self, i: usize, j: usize, value: F) {
-        self.data[i * self.cols + j] = value;
+    pub fn set(&mut self, row: usize, col: usize, value: F) {
+        self.data[row * self.cols + col] = value;
     }
 
-    /// Adds to an entry.
-    pub fn add_to(&mut self, i: usize, j: usize, value: &F) {
-        let k = i * self.cols + j;
-        self.data[k] = self.data[k].add(value);
+    /// Appends a row of the matrix's width.
+    pub fn push_row(&mut self, row: &[F]) {
+        assert_eq!(row.len(), self.cols, "a row of another width");
+        self.data.extend_from_slice(row);
+        self.rows += 1;
     }
 
-    /// Row `i`.
-    #[must_use]
-    pub fn row(&self, i: usize) -> &[F] {
-        &self.data[i * self.cols..(i + 1) * self.cols]
-    }
-}
-
-/// Brings `m` to reduced form: each column of `order`, in turn, gets a pivot if an unused row has a nonzero entry in it.
-///
-/// Returns the pivot row of every column (`None` where the column stayed free or was not in `order`). Afterwards a pivot
-/// column is a unit vector. Among the candidates the row with the entry largest relative to its row is taken, the first
-/// one on ties, so the result depends on the input alone. Only the first `candidates` rows can hold a pivot; the rows
-/// below are carried along.
-pub fn eliminate<F: Field>(
-    m: &mut Matrix<F>,
-    candidates: usize,
-    order: impl IntoIterator<Item = usize>,
-) -> Vec<Option<usize>> {
-    let order: Vec<usize> = order.into_iter().collect();
-    let mut pivot_row = vec![None; m.cols];
-    eliminate_more(
-        m,
-        candidates,
-        &order,
-        &mut pivot_row,
-        &mut vec![false; candidates],
-    );
-    pivot_row
-}
-
-/// Continues an elimination with further columns; `used` marks the rows that hold a pivot already.
-pub fn eliminate_more<F: Field>(
-    m: &mut Matrix<F>,
-    candidates: usize,
-    order: &[usize],
-    pivot_row: &mut [Option<usize>],
-    used: &mut [bool],
-) {
-    let scale: Vec<f64> = (0..m.rows)
-        .map(|i| {
-            m.row(i)
-                .iter()
-                .map(|v| v.to_f64().abs())
-                .fold(f64::MIN_POSITIVE, f64::max)
-        })
-        .collect();
-    for &j in order {
+    /// Gives `column` a pivot if an unused equation has a nonzero entry there, and clears it from all other rows.
+    ///
+    /// Among the candidates the entry largest relative to its row is taken, the first of equals. Returns whether a
+    /// pivot was found. An elimination over columns in class order makes each class depend on later ones as
+    /// far as the equations allow (DESIGN 3.2).
+    pub fn eliminate(&mut self, column: usize, state: &mut Elimination) -> bool {
         let mut best: Option<(usize, f64)> = None;
-        for i in (0..candidates).filter(|&i| !used[i]) {
-            let entry = m.at(i, j);
-            if !entry.is_zero() {
-                let weight = entry.to_f64().abs() / scale[i];
-                if best.is_none_or(|(_, w)| weight > w) {
-                    best = Some((i, weight));
-                }
-            }
-        }
-        let Some((p, _)) = best else { continue };
-        used[p] = true;
-        pivot_row[j] = Some(p);
-        let pivot = m.at(p, j).clone();
-        let row: Vec<(usize, F)> = (0..m.cols)
-            .filter(|&k| k != j && !m.at(p, k).is_zero())
-            .map(|k| (k, m.at(p, k).div(&pivot)))
-            .collect();
-        m.set(p, j, F::one());
-        for (k, v) in &row {
-            m.set(p, *k, v.clone());
-        }
-        for i in (0..m.rows).filter(|&i| i != p) {
-            let factor = m.at(i, j).clone();
-            if factor.is_zero() {
+        for row in 0..state.equations {
+            let entry = self.at(row, column);
+            if state.used[row] || entry.is_zero() {
                 continue;
             }
-            for (k, v) in &row {
-                let value = m.at(i, *k).sub(&factor.mul(v));
-                m.set(i, *k, value);
+            let largest = self
+                .row(row)
+                .iter()
+                .fold(0.0, |m: f64, x| m.max(x.to_f64().abs()));
+            let relative = entry.to_f64().abs() / largest;
+            if best.is_none_or(|(_, size)| relative > size) {
+                best = Some((row, relative));
             }
-            m.set(i, j, F::zero());
+        }
+        let Some((row, _)) = best else { return false };
+        state.used[row] = true;
+        state.pivot[column] = Some(row);
+        self.pivot(row, column);
+        true
+    }
+
+    /// Scales `row` to 1 in `column` and subtracts it from every other row so that they are 0 there.
+    fn pivot(&mut self, row: usize, column: usize) {
+        let inverse = F::one().div(self.at(row, column));
+        let mut pivot_row = Vec::with_capacity(self.cols);
+        for (c, x) in self.row_mut(row).iter_mut().enumerate() {
+            if c == column {
+                *x = F::one();
+            } else if !x.is_zero() {
+                *x = x.mul(&inverse);
+                pivot_row.push((c, x.clone()));
+            }
+        }
+        for r in (0..self.rows).filter(|&r| r != row) {
+            let target = self.row_mut(r);
+            if target[column].is_zero() {
+                continue;
+            }
+            let factor = std::mem::replace(&mut target[column], F::zero());
+            for (c, x) in &pivot_row {
+                target[*c].sub_mul(&factor, x);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::{Ball, Rational, rational};
+    use super::*;
+
+    fn eliminate_all<F: Field>(
+        entries: &[Vec<Rational>],
+        number: impl Fn(&Rational) -> F + Copy,
+    ) -> (Matrix<F>, Elimination) {
+        let cols = entries[0].len();
+        let mut table = Matrix::zeros(0, cols);
+        for row in entries {
+            table.push_row(&row.iter().map(number).collect::<Vec<_>>());
+        }
+        let mut state = Elimination::new(entries.len(), cols);
+        for c in 0..cols {
+            table.eliminate(c, &mut state);
+        }
+        (table, state)
+    }
+
+    #[test]
+    fn a_dependent_row_gets_no_pivot() {
+        let rows = [[1.0, 2.0, 3.0], [0.1, 0.2, 0.3], [0.0, 1.0, 1.0]];
+        let exact: Vec<Vec<Rational>> = vec![
+            rows[0].iter().map(|&x| rational(x)).collect(),
+            rows[0]
+                .iter()
+                .map(|&x| rational(x) * rational(0.1))
+                .collect(),
+            rows[2].iter().map(|&x| rational(x)).collect(),
+        ];
+        let (m, state) = eliminate_all(&exact, Ball::from_rational);
+        assert_eq!(state.pivot.iter().flatten().count(), 2);
+        assert_eq!(state.pivot[2], None);
+        // x0 = −1 x2, x1 = −1 x2
+        assert_eq!(m.at(state.pivot[0].unwrap(), 2).to_f64(), 1.0);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..Default::default() })]
+        #[test]
+        fn balls_find_the_ranks_and_entries_of_rationals(
+            entries in prop::collection::vec((-3i64..4, -15i32..13), 30),
+            copies in prop::collection::vec((0usize..5, 0usize..5, -2i64..3), 2),
+        ) {
+            let number = |&(n, e): &(i64, i32)| super::super::Value::decimal(0.0, n.into(), e).exact();
+            let mut rows: Vec<Vec<Rational>> = entries.chunks(6).map(|r| r.iter().map(number).collect()).collect();
+            for (from, to, k) in copies {
+                rows[to] = rows[from].iter().map(|x| x * Rational::from_integer(k.into())).collect();
+            }
+            let (ball, found) = eliminate_all(&rows, Ball::from_rational);
+            let (exact, truth) = eliminate_all(&rows, Rational::clone);
+            prop_assert_eq!(found.pivot.iter().map(Option::is_some).collect::<Vec<_>>(),
+                            truth.pivot.iter().map(Option::is_some).collect::<Vec<_>>());
+            for c in 0..6 {
+                let (Some(r), Some(s)) = (found.pivot[c], truth.pivot[c]) else { continue };
+                for k in 0..6 {
+                    let (x, y) = (ball.at(r, k), exact.at(s, k));
+                    prop_assert_eq!(x.is_zero(), Field::is_zero(y));
+                    if x.is_precise() && !x.is_zero() {
+                        let y = Field::to_f64(y);
+                        prop_assert!((x.to_f64() - y).abs() <= 2e-14 * y.abs());
+                    }
+                }
+            }
         }
     }
 }

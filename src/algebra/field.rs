@@ -1,9 +1,9 @@
-//! The arithmetic an elimination needs, and its two implementors.
+//! The arithmetic an elimination needs.
 
 use super::Value;
 
-/// Numbers over which [`eliminate`](super::eliminate) runs: zero tests are exact.
-pub trait Field: Clone {
+/// Numbers over which an [`Elimination`](super::Elimination) runs: zero tests are exact.
+pub trait Field: Clone + std::fmt::Debug {
     /// The number zero.
     fn zero() -> Self;
     /// The number one.
@@ -20,10 +20,14 @@ pub trait Field: Clone {
     fn div(&self, other: &Self) -> Self;
     /// `−self`.
     fn neg(&self) -> Self;
+    /// self ← self − a·b.
+    fn sub_mul(&mut self, a: &Self, b: &Self) {
+        *self = self.sub(&a.mul(b));
+    }
     /// Whether the number is exactly zero.
     fn is_zero(&self) -> bool;
     /// The nearest double.
     fn to_f64(&self) -> f64;
-    /// A bound on |`to_f64()` − exact| beyond rounding to the nearest double.
-    fn error(&self) -> f64;
+    /// Whether [`to_f64`](Self::to_f64) is within 1e-14 of the exact number, relative to it.
+    fn is_precise(&self) -> bool;
 }

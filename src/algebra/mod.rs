@@ -1,15 +1,21 @@
 //! Exact numbers and the class-ordered elimination written once over them.
 //!
 //! Which column can be a pivot is decided without a tolerance (DESIGN 3); [`Value`] is a number as the netlist wrote it.
+//! Two fields carry the elimination: [`Ball`], fast, with exact zeros and an error bound, and [`Rational`], exact
+//! throughout, which takes over where a ball is too wide and is the oracle in tests.
 
 mod ball;
+mod double;
 mod eliminate;
 mod field;
 mod rational;
+mod sparse;
 mod value;
 
 pub use ball::Ball;
-pub use eliminate::{Matrix, eliminate, eliminate_more};
+pub use double::Double;
+pub use eliminate::{Elimination, Matrix};
 pub use field::Field;
-pub use rational::Rational;
+pub use rational::{Rational, rational};
+pub use sparse::{SparseRow, eliminate_sparse};
 pub use value::Value;

@@ -18,6 +18,19 @@ impl Value {
         Self { f64, decimal: None }
     }
 
+    /// The negative.
+    #[must_use]
+    pub const fn negated(self) -> Self {
+        let decimal = match self.decimal {
+            Some((mantissa, exponent)) => Some((-mantissa, exponent)),
+            None => None,
+        };
+        Self {
+            f64: -self.f64,
+            decimal,
+        }
+    }
+
     /// The decimal rational `mantissa · 10^exponent`; `f64` must be its nearest double.
     #[must_use]
     pub const fn decimal(f64: f64, mantissa: i128, exponent: i32) -> Self {

@@ -5,10 +5,12 @@ mod excitation;
 mod facts;
 mod feedthrough;
 mod jumps;
+mod laws;
 pub mod program;
 mod stiffness;
 mod text;
 mod theorems;
+pub mod topology;
 
 pub use equilibria::Equilibrium;
 pub use excitation::Excitation;
@@ -19,6 +21,7 @@ pub use theorems::Theorem;
 
 use nalgebra::DMatrix;
 
+use crate::circuit::Circuit;
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 use crate::lcs::Lcs;
 use crate::passivity::{Residuals, Verdict};
@@ -69,6 +72,9 @@ pub struct Report {
     pub stiffness: Option<Stiffness>,
     /// Names of the states, the rows of P.
     pub states: Vec<String>,
+    /// The switch positions that everything above is said for, `{"s1":"off"}`.
+    #[serde(serialize_with = "positions")]
+    pub switches: Vec<(String, bool)>,
 }
 
 /// A finding with its place in the file.
@@ -130,6 +136,16 @@ pub struct Size {
     pub p: usize,
 }
 
+/// The report of a circuit with the system it was reduced to.
+#[must_use]
+pub fn circuit(circuit: &Circuit, lcs: &Lcs) -> Report {
+    Report {
+        islands: topology::islands(circuit),
+        normal_tree: topology::normal_tree(circuit),
+        ..system(lcs)
+    }
+}
+
 /// Everything that can be said about a complementarity system without its circuit.
 #[must_use]
 pub fn system(lcs: &Lcs) -> Report {
@@ -166,6 +182,7 @@ pub fn system(lcs: &Lcs) -> Report {
         jumps: jumps::find(&facts),
         stiffness: Some(stiffness::over_modes(&facts.system)),
         states: facts.state_names.clone(),
+        switches: lcs.switches.clone(),
     }
 }
 
@@ -193,7 +210,16 @@ pub fn faulty(title: &str, faults: Vec<Fault>) -> Report {
         jumps: Jumps::default(),
         stiffness: None,
         states: Vec::new(),
+        switches: Vec::new(),
     }
+}
+
+fn positions<S: serde::Serializer>(switches: &[(String, bool)], out: S) -> Result<S::Ok, S::Error> {
+    out.collect_map(
+        switches
+            .iter()
+            .map(|(name, on)| (name, if *on { "on" } else { "off" })),
+    )
 }
 
 fn rows(m: &DMatrix<f64>) -> Vec<Vec<f64>> {

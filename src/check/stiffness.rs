@@ -12,7 +12,7 @@ const WORK: usize = 3_000_000_000;
 const LARGEST: usize = 300;
 
 /// Eigenvalues below this times the largest of their mode count as zero (rounding of the eigenvalue computation).
-const ZERO: f64 = 1e-13;
+const ZERO: f64 = 1e-11;
 
 /// Shortest and longest time constant 1/|s| over the modes looked at.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -32,11 +32,15 @@ pub(super) fn over_modes(system: &System) -> Stiffness {
     let sets: Vec<Vec<usize>> = if n > LARGEST {
         Vec::new()
     } else if m <= ALL_MODES && cost << m <= WORK {
-        (0..1_usize << m).map(|mask| (0..m).filter(|j| mask >> j & 1 == 1).collect()).collect()
+        (0..1_usize << m)
+            .map(|mask| (0..m).filter(|j| mask >> j & 1 == 1).collect())
+            .collect()
     } else {
         let ends = [Vec::new(), (0..m).collect()];
         let singles = if cost * m <= WORK { m } else { 0 };
-        ends.into_iter().chain((0..singles).map(|j| vec![j])).collect()
+        ends.into_iter()
+            .chain((0..singles).map(|j| vec![j]))
+            .collect()
     };
     let balanced = scale::balance(system);
     let mut range: Option<(f64, f64)> = None;

@@ -395,11 +395,29 @@ fn json_has_the_contracted_keys() {
 #[test]
 fn circuits_without_states_or_ports_are_reported_too() {
     let none = DMatrix::zeros(0, 0);
-    let resistive = lcs("i", none.clone(), DMatrix::zeros(0, 1), DMatrix::zeros(1, 0), dmatrix![R], none.clone());
+    let resistive = lcs(
+        "i",
+        none.clone(),
+        DMatrix::zeros(0, 1),
+        DMatrix::zeros(1, 0),
+        dmatrix![R],
+        none.clone(),
+    );
     let report = system(&resistive);
     assert_eq!((report.passive, report.size.n), (Some(true), 0));
-    assert_eq!(theorem(&report, "Brogliato-Thibault section A.4").holds, Some(true), "{report}");
-    let linear = lcs("", dmatrix![-1.0 / (R * C)], DMatrix::zeros(1, 0), DMatrix::zeros(0, 1), none.clone(), dmatrix![C]);
+    assert_eq!(
+        theorem(&report, "Brogliato-Thibault section A.4").holds,
+        Some(true),
+        "{report}"
+    );
+    let linear = lcs(
+        "",
+        dmatrix![-1.0 / (R * C)],
+        DMatrix::zeros(1, 0),
+        DMatrix::zeros(0, 1),
+        none.clone(),
+        dmatrix![C],
+    );
     let report = system(&linear);
     assert_eq!(theorem(&report, "Linear system").holds, Some(true));
     assert!((report.decay_rate * R * C - 1.0).abs() < 1e-5);
@@ -413,7 +431,11 @@ fn an_energy_that_is_not_given_is_looked_for() {
     circuit.energy = DMatrix::zeros(0, 0);
     let report = system(&circuit);
     assert_eq!((report.passive, report.p_from), (Some(true), Some("lmi")));
-    assert_eq!(theorem(&report, "RR-7158 Theorem 2").holds, Some(true), "{report}");
+    assert_eq!(
+        theorem(&report, "RR-7158 Theorem 2").holds,
+        Some(true),
+        "{report}"
+    );
 }
 
 #[test]
@@ -421,17 +443,34 @@ fn comparators_are_read_with_the_sign_of_their_feedback() {
     // x' = −x + w, w = sgn(−x) as a block with input −x: λ = −w ∈ −∂φ(y) with y = −x makes (−1, −1, −1, 0).
     let curve = crate::law::Curve {
         kind: "relay",
-        vertices: vec![(Value::binary(0.0), Value::binary(-1.0)), (Value::binary(0.0), Value::binary(1.0))],
+        vertices: vec![
+            (Value::binary(0.0), Value::binary(-1.0)),
+            (Value::binary(0.0), Value::binary(1.0)),
+        ],
         first: (Value::binary(1.0), Value::binary(0.0)),
         last: (Value::binary(1.0), Value::binary(0.0)),
     };
-    let mut relay = lcs("i", dmatrix![-1.0], dmatrix![1.0], dmatrix![-1.0], dmatrix![0.0], dmatrix![1.0]);
+    let mut relay = lcs(
+        "i",
+        dmatrix![-1.0],
+        dmatrix![1.0],
+        dmatrix![-1.0],
+        dmatrix![0.0],
+        dmatrix![1.0],
+    );
     relay.ports[0].role = Role::Function;
     relay.ports[0].law = Law::Curve(curve);
     let report = system(&relay);
-    assert_eq!(theorem(&report, "RR-7158 Theorem 2").holds, Some(true), "{report}");
+    assert_eq!(
+        theorem(&report, "RR-7158 Theorem 2").holds,
+        Some(true),
+        "{report}"
+    );
     assert!(theorem(&report, "RR-7158 Remark 7").gives.contains("1/2"));
     // With positive feedback there is no P with PB = Cᵀ.
     relay.c = dmatrix![1.0];
-    assert_eq!(theorem(&system(&relay), "RR-7158 Theorem 2").holds, Some(false));
+    assert_eq!(
+        theorem(&system(&relay), "RR-7158 Theorem 2").holds,
+        Some(false)
+    );
 }

@@ -32,6 +32,18 @@ impl fmt::Display for Report {
             "size          {} states, {} ports, {} inputs",
             self.size.n, self.size.m, self.size.p
         )?;
+        if !self.switches.is_empty() {
+            let positions: Vec<String> = self
+                .switches
+                .iter()
+                .map(|(name, on)| format!("{name} {}", if *on { "on" } else { "off" }))
+                .collect();
+            writeln!(
+                f,
+                "position      {} (what follows is said for it)",
+                positions.join(", ")
+            )?;
+        }
         for island in &self.islands {
             writeln!(
                 f,

@@ -48,11 +48,16 @@ struct Affine {
 /// [`FormError::File`] for what cannot be read, and the failed hypothesis where a gain has to be designed.
 pub fn read(text: &str) -> Result<SystemFile, FormError> {
     let value: Value = serde_json::from_str(text).map_err(|e| FormError::File(e.to_string()))?;
-    let system = |text: &str| crate::lcs::json::read(text).map_err(|e| FormError::File(e.to_string()));
+    let system =
+        |text: &str| crate::lcs::json::read(text).map_err(|e| FormError::File(e.to_string()));
     if value.get("schema").and_then(Value::as_str) != Some(SCHEMA) {
         return system(text);
     }
-    let file = Fields(value.as_object().ok_or_else(|| FormError::File("not an object".into()))?);
+    let file = Fields(
+        value
+            .as_object()
+            .ok_or_else(|| FormError::File("not an object".into()))?,
+    );
     let affine = affine(&file)?;
     system(&document(&file, &affine).to_string())
 }
@@ -62,44 +67,80 @@ struct Fields<'a>(&'a Map<String, Value>);
 
 impl Fields<'_> {
     fn bad(name: &str) -> FormError {
-        FormError::File(format!("`{name}` is not a matrix or vector of finite numbers"))
+        FormError::File(format!(
+            "`{name}` is not a matrix or vector of finite numbers"
+        ))
     }
 
     fn numbers(name: &str, value: &Value) -> Result<Vec<f64>, FormError> {
         let list = value.as_array().ok_or_else(|| Self::bad(name))?;
-        list.iter().map(|v| v.as_f64().filter(|v| v.is_finite()).ok_or_else(|| Self::bad(name))).collect()
+        list.iter()
+            .map(|v| {
+                v.as_f64()
+                    .filter(|v| v.is_finite())
+                    .ok_or_else(|| Self::bad(name))
+            })
+            .collect()
     }
 
     /// A matrix of the given number of columns; `None` if absent.
-    fn matrix(&self, name: &'static str, columns: Option<usize>) -> Result<Option<DMatrix<f64>>, FormError> {
-        let Some(value) = self.0.get(name) else { return Ok(None) };
+    fn matrix(
+        &self,
+        name: &'static str,
+        columns: Option<usize>,
+    ) -> Result<Option<DMatrix<f64>>, FormError> {
+        let Some(value) = self.0.get(name) else {
+            return Ok(None);
+        };
         let rows = value.as_array().ok_or_else(|| Self::bad(name))?;
-        let rows: Vec<Vec<f64>> = rows.iter().map(|row| Self::numbers(name, row)).collect::<Result<_, _>>()?;
+        let rows: Vec<Vec<f64>> = rows
+            .iter()
+            .map(|row| Self::numbers(name, row))
+            .collect::<Result<_, _>>()?;
         let width = columns.or_else(|| rows.first().map(Vec::len)).unwrap_or(0);
         if rows.iter().any(|row| row.len() != width) {
-            return Err(FormError::Shape { what: name, rows: rows.len(), columns: rows.first().map_or(0, Vec::len) });
+            return Err(FormError::Shape {
+                what: name,
+                rows: rows.len(),
+                columns: rows.first().map_or(0, Vec::len),
+            });
         }
         Ok(Some(DMatrix::from_fn(rows.len(), width, |i, j| rows[i][j])))
     }
 
     /// A matrix of the given shape, zero if absent.
-    fn shaped(&self, name: &'static str, (rows, columns): (usize, usize)) -> Result<DMatrix<f64>, FormError> {
+    fn shaped(
+        &self,
+        name: &'static str,
+        (rows, columns): (usize, usize),
+    ) -> Result<DMatrix<f64>, FormError> {
         match self.matrix(name, Some(columns))? {
             Some(m) if m.nrows() == rows => Ok(m),
-            Some(m) => Err(FormError::Shape { what: name, rows: m.nrows(), columns: m.ncols() }),
+            Some(m) => Err(FormError::Shape {
+                what: name,
+                rows: m.nrows(),
+                columns: m.ncols(),
+            }),
             None => Ok(DMatrix::zeros(rows, columns)),
         }
     }
 
     fn needed(&self, name: &'static str) -> Result<DMatrix<f64>, FormError> {
-        self.matrix(name, None)?.ok_or_else(|| FormError::File(format!("`{name}` is missing")))
+        self.matrix(name, None)?
+            .ok_or_else(|| FormError::File(format!("`{name}` is missing")))
     }
 
     fn vector(&self, name: &'static str, length: usize) -> Result<DVector<f64>, FormError> {
-        let Some(value) = self.0.get(name) else { return Ok(DVector::zeros(length)) };
+        let Some(value) = self.0.get(name) else {
+            return Ok(DVector::zeros(length));
+        };
         let numbers = Self::numbers(name, value)?;
         if numbers.len() != length {
-            return Err(FormError::Shape { what: name, rows: numbers.len(), columns: 1 });
+            return Err(FormError::Shape {
+                what: name,
+                rows: numbers.len(),
+                columns: 1,
+            });
         }
         Ok(DVector::from_vec(numbers))
     }
@@ -115,11 +156,22 @@ impl Fields<'_> {
             .cloned()
             .map_or_else(|| Ok(vec![Phi::HalfLine; count]), serde_json::from_value)
             .map_err(|e| FormError::File(format!("`phi`: {e}")))?;
-        if list.len() == count { Ok(list) } else { Err(FormError::Shape { what: "phi", rows: list.len(), columns: 1 }) }
+        if list.len() == count {
+            Ok(list)
+        } else {
+            Err(FormError::Shape {
+                what: "phi",
+                rows: list.len(),
+                columns: 1,
+            })
+        }
     }
 
     fn inputs(&self) -> usize {
-        self.0.get("inputs").and_then(Value::as_array).map_or(0, Vec::len)
+        self.0
+            .get("inputs")
+            .and_then(Value::as_array)
+            .map_or(0, Vec::len)
     }
 
     /// A, B, C, D, E, G, e, F, P under their own names; B, C may be given by H instead (B = Hᵀ, C = H).
@@ -129,7 +181,9 @@ impl Fields<'_> {
         let (b, c) = match self.matrix("H", Some(n))? {
             Some(h) => (h.transpose(), h),
             None => {
-                let c = self.matrix("C", Some(n))?.unwrap_or_else(|| DMatrix::zeros(0, n));
+                let c = self
+                    .matrix("C", Some(n))?
+                    .unwrap_or_else(|| DMatrix::zeros(0, n));
                 (self.shaped("B", (n, c.nrows()))?, c)
             }
         };
@@ -139,8 +193,17 @@ impl Fields<'_> {
             g: self.shaped("G", (m, p))?,
             e0: self.vector("e", n)?,
             f: self.vector("F", m)?,
-            p: if self.0.contains_key("P") { Some(self.shaped("P", (n, n))?) } else { None },
-            system: System { a, b, c, d: self.shaped("D", (m, m))? },
+            p: if self.0.contains_key("P") {
+                Some(self.shaped("P", (n, n))?)
+            } else {
+                None
+            },
+            system: System {
+                a,
+                b,
+                c,
+                d: self.shaped("D", (m, m))?,
+            },
         })
     }
 
@@ -156,7 +219,12 @@ impl Fields<'_> {
             e0: -self.vector("c", n)?,
             f: self.vector("k", ports)? * sign,
             p: Some(DMatrix::identity(n, n)),
-            system: System { a: -m, b: h.transpose(), c: h, d: DMatrix::zeros(ports, ports) },
+            system: System {
+                a: -m,
+                b: h.transpose(),
+                c: h,
+                d: DMatrix::zeros(ports, ports),
+            },
         })
     }
 }
@@ -192,21 +260,37 @@ fn affine(file: &Fields<'_>) -> Result<Affine, FormError> {
 
 /// The expansion of piecewise linear φ, the driven columns by linearity.
 fn expand(plant: &Affine, phi: &[Phi]) -> Result<Affine, FormError> {
-    let at = |e: DVector<f64>, f: DVector<f64>| -> Result<(System, DVector<f64>, DVector<f64>), FormError> {
+    let at = |e: DVector<f64>,
+              f: DVector<f64>|
+     -> Result<(System, DVector<f64>, DVector<f64>), FormError> {
         let linear = Linear::new(plant.system.clone(), constant(e), constant(f))?;
         let expanded = Lure::new(linear, phi.to_vec())?.expand()?.linear;
-        Ok((expanded.system.clone(), (expanded.e)(0.0), (expanded.f)(0.0)))
+        Ok((
+            expanded.system.clone(),
+            (expanded.e)(0.0),
+            (expanded.f)(0.0),
+        ))
     };
     let (system, e0, f) = at(plant.e0.clone(), plant.f.clone())?;
     let (_, zero_e, zero_f) = at(plant.e0.clone() * 0.0, plant.f.clone() * 0.0)?;
     let p = plant.e.ncols();
     let (mut e, mut g) = (DMatrix::zeros(e0.len(), p), DMatrix::zeros(f.len(), p));
     for k in 0..p {
-        let (_, column_e, column_f) = at(plant.e.column(k).into_owned(), plant.g.column(k).into_owned())?;
+        let (_, column_e, column_f) = at(
+            plant.e.column(k).into_owned(),
+            plant.g.column(k).into_owned(),
+        )?;
         e.set_column(k, &(column_e - &zero_e));
         g.set_column(k, &(column_f - &zero_f));
     }
-    Ok(Affine { system, e, g, e0, f, p: plant.p.clone() })
+    Ok(Affine {
+        system,
+        e,
+        g,
+        e0,
+        f,
+        p: plant.p.clone(),
+    })
 }
 
 /// [m; m].
@@ -220,7 +304,7 @@ fn observed(file: &Fields<'_>) -> Result<Affine, FormError> {
     let y = file.shaped("Y", (z.nrows(), plant.system.m()))?;
     let observer = Observer::design(&plant.system, &z, &y, file.number("rate"))?;
     let joint = observer.with_plant(&Linear::autonomous(plant.system.clone())?, &z, &y)?;
-    let column = |v: &DVector<f64>| DVector::from_column_slice(twice(&DMatrix::from_columns(&[v.clone()])).as_slice());
+    let column = |v: &DVector<f64>| DVector::from_fn(2 * v.len(), |i, _| v[i % v.len()]);
     Ok(Affine {
         system: joint.system,
         e: twice(&plant.e),
@@ -243,12 +327,21 @@ fn closed(file: &Fields<'_>) -> Result<Affine, FormError> {
 
 /// The system file that stands for a form.
 fn document(file: &Fields<'_>, affine: &Affine) -> Value {
-    let rows = |m: &DMatrix<f64>| -> Value { m.row_iter().map(|r| r.iter().copied().collect::<Vec<_>>()).collect() };
+    let rows = |m: &DMatrix<f64>| -> Value {
+        m.row_iter()
+            .map(|r| r.iter().copied().collect::<Vec<_>>())
+            .collect()
+    };
     let (n, m) = (affine.system.n(), affine.system.m());
     let fits = |name: &str, length: usize| {
-        file.0.get(name).filter(|v| v.as_array().is_some_and(|list| list.len() == length)).cloned()
+        file.0
+            .get(name)
+            .filter(|v| v.as_array().is_some_and(|list| list.len() == length))
+            .cloned()
     };
-    let states: Vec<Value> = (1..=n).map(|k| json!({"name": format!("x{k}"), "unit": "V"})).collect();
+    let states: Vec<Value> = (1..=n)
+        .map(|k| json!({"name": format!("x{k}"), "unit": "V"}))
+        .collect();
     let port = |k: usize| {
         json!({"device": format!("d{k}"), "lambda": format!("i(d{k})"), "y": format!("-v(d{k})"),
                "law": {"kind": "ideal_diode"}})
@@ -272,8 +365,18 @@ fn document(file: &Fields<'_>, affine: &Affine) -> Value {
         document["P"] = rows(p);
     }
     // The states are what can be seen of a form that names no outputs.
-    let names: Vec<Value> = document["states"].as_array().into_iter().flatten().map(|s| s["name"].clone()).collect();
-    let units: Vec<Value> = document["states"].as_array().into_iter().flatten().map(|s| s["unit"].clone()).collect();
+    let names: Vec<Value> = document["states"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .map(|s| s["name"].clone())
+        .collect();
+    let units: Vec<Value> = document["states"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .map(|s| s["unit"].clone())
+        .collect();
     let inputs = affine.e.ncols();
     document["outputs"] = json!({
         "names": names,
@@ -296,7 +399,8 @@ fn document(file: &Fields<'_>, affine: &Affine) -> Value {
 mod tests {
     use super::*;
 
-    const INPUT: &str = r#""inputs":[{"name":"u1","unit":"V","waveform":{"kind":"sin","args":[0,1,1]}}]"#;
+    const INPUT: &str =
+        r#""inputs":[{"name":"u1","unit":"V","waveform":{"kind":"sin","args":[0,1,1]}}]"#;
 
     fn form(body: &str) -> Result<SystemFile, FormError> {
         read(&format!(r#"{{"schema":"circ-form/1",{body}}}"#))
@@ -308,18 +412,36 @@ mod tests {
             r#""form":"sweeping_process","A":[[-1]],"H":[[2]],"G":[[-1]],"F":[0.5],"x0":[1],{INPUT}"#
         ))
         .unwrap();
-        assert_eq!((file.lcs.b[(0, 0)], file.lcs.c[(0, 0)], file.lcs.d[(0, 0)]), (2.0, 2.0, 0.0));
-        assert_eq!((file.lcs.g[(0, 0)], file.lcs.f[0], file.x0[0]), (-1.0, 0.5, 1.0));
+        assert_eq!(
+            (file.lcs.b[(0, 0)], file.lcs.c[(0, 0)], file.lcs.d[(0, 0)]),
+            (2.0, 2.0, 0.0)
+        );
+        assert_eq!(
+            (file.lcs.g[(0, 0)], file.lcs.f[0], file.x0[0]),
+            (-1.0, 0.5, 1.0)
+        );
         let report = crate::check::system(&file.lcs);
-        let sweeping = report.theorems.iter().find(|t| t.statement.contains("Theorem 3.5")).unwrap();
+        let sweeping = report
+            .theorems
+            .iter()
+            .find(|t| t.statement.contains("Theorem 3.5"))
+            .unwrap();
         assert_eq!(sweeping.holds, Some(true), "{report}");
     }
 
     #[test]
     fn projected_and_unilateral_forms_differ_by_the_sign_of_their_set() {
-        let projected = form(r#""form":"projected","M":[[1]],"c":[2],"H":[[1]],"k":[3]"#).unwrap().lcs;
-        let unilateral = form(r#""form":"complementarity_dynamics","M":[[1]],"c":[2],"H":[[-1]],"k":[-3]"#).unwrap().lcs;
-        assert_eq!((&projected.a, &projected.b, &projected.c), (&unilateral.a, &unilateral.b, &unilateral.c));
+        let projected = form(r#""form":"projected","M":[[1]],"c":[2],"H":[[1]],"k":[3]"#)
+            .unwrap()
+            .lcs;
+        let unilateral =
+            form(r#""form":"complementarity_dynamics","M":[[1]],"c":[2],"H":[[-1]],"k":[-3]"#)
+                .unwrap()
+                .lcs;
+        assert_eq!(
+            (&projected.a, &projected.b, &projected.c),
+            (&unilateral.a, &unilateral.b, &unilateral.c)
+        );
         assert_eq!((projected.e0[0], projected.f[0]), (-2.0, 3.0));
         assert_eq!((unilateral.e0[0], unilateral.f[0]), (-2.0, 3.0));
     }
@@ -346,12 +468,23 @@ mod tests {
         )
         .unwrap()
         .lcs;
-        assert_eq!((cone.d[(0, 0)], cone.d[(0, 1)], cone.d[(1, 1)]), (1.0, 0.0, 0.0));
+        assert_eq!(
+            (cone.d[(0, 0)], cone.d[(0, 1)], cone.d[(1, 1)]),
+            (1.0, 0.0, 0.0)
+        );
         let plant = r#""A":[[-0.2,-1],[1,-0.1]],"B":[[-1],[0]],"C":[[-1,0]],"D":[[0.5]]"#;
-        let observer = form(&format!(r#""form":"observer",{plant},"Z":[[0,1]],"Y":[[0.3]],"rate":0.25"#)).unwrap().lcs;
+        let observer = form(&format!(
+            r#""form":"observer",{plant},"Z":[[0,1]],"Y":[[0.3]],"rate":0.25"#
+        ))
+        .unwrap()
+        .lcs;
         assert_eq!((observer.n(), observer.m()), (4, 2));
         let active = r#""A":[[0.5,-1],[1,-0.2]],"B":[[1],[0]],"C":[[0.4,0.3]],"D":[[0]]"#;
-        let closed = form(&format!(r#""form":"output_feedback",{active},"E_control":[[1],[0.2]]"#)).unwrap().lcs;
+        let closed = form(&format!(
+            r#""form":"output_feedback",{active},"E_control":[[1],[0.2]]"#
+        ))
+        .unwrap()
+        .lcs;
         assert_eq!(crate::check::system(&closed).passive, Some(true));
     }
 

@@ -11,7 +11,7 @@ use std::rc::Rc;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::projected::Map;
+use super::projected::{Map, MatrixField};
 use super::sweeping::square_root;
 use super::{Complementarity, FormError, Signal, require};
 
@@ -45,7 +45,7 @@ pub struct NonlinearComplementarity {
     /// g(u(t)), m.
     pub g: Signal,
     /// V''(x), n×n symmetric positive definite.
-    pub hessian: Rc<dyn Fn(&DVector<f64>) -> DMatrix<f64>>,
+    pub hessian: MatrixField,
 }
 
 impl fmt::Debug for NonlinearComplementarity {

@@ -8,13 +8,19 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{Complementarity, FormError, Polyhedron, require};
 
+/// A vector that depends on the state.
+pub type VectorField = Rc<dyn Fn(&DVector<f64>) -> DVector<f64>>;
+
+/// A matrix that depends on the state.
+pub type MatrixField = Rc<dyn Fn(&DVector<f64>) -> DMatrix<f64>>;
+
 /// A differentiable map Rⁿ → Rᵏ.
 #[derive(Clone)]
 pub struct Map {
     /// Its value.
-    pub value: Rc<dyn Fn(&DVector<f64>) -> DVector<f64>>,
+    pub value: VectorField,
     /// Its Jacobian, k×n.
-    pub jacobian: Rc<dyn Fn(&DVector<f64>) -> DMatrix<f64>>,
+    pub jacobian: MatrixField,
     /// Whether it is affine.
     pub affine: bool,
 }

@@ -84,11 +84,11 @@ pub struct Amplitudes {
 const FLOOR: f64 = 1e-3;
 
 impl Amplitudes {
-    /// Nothing seen yet but the inputs at t = 0.
+    /// Nothing seen yet but what the inputs can reach.
     #[must_use]
     pub fn new(lcs: &Lcs, inputs: &Inputs) -> Self {
         let mut sources = (0.0_f64, 0.0_f64);
-        for (input, value) in lcs.inputs.iter().zip(inputs.all(0.0)) {
+        for (input, value) in lcs.inputs.iter().zip(inputs.amplitudes()) {
             let side = if input.unit == "V" {
                 &mut sources.0
             } else {

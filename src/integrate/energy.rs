@@ -172,16 +172,39 @@ pub fn source_work_of_jump(
 /// Stored energy, J: ½ sᵀ M s of all storage elements, or ½ xᵀ P x where the system does not name them.
 #[must_use]
 pub fn stored(lcs: &Lcs, x: &[f64], u: &[f64]) -> f64 {
-    let x = DVector::from_column_slice(x);
+    stored_with(lcs, x, u, &mut Vec::new())
+}
+
+/// As [`stored`], with a buffer for s.
+pub(crate) fn stored_with(lcs: &Lcs, x: &[f64], u: &[f64], s: &mut Vec<f64>) -> f64 {
     let storage = &lcs.storage;
+    let row = |block: &DMatrix<f64>, k: usize, v: &[f64]| -> f64 {
+        (0..block.ncols().min(v.len()))
+            .map(|j| block[(k, j)] * v[j])
+            .sum()
+    };
+    let metric = if storage.metric.is_empty() {
+        &lcs.energy
+    } else {
+        &storage.metric
+    };
+    s.clear();
     if storage.metric.is_empty() {
-        if lcs.energy.nrows() != x.len() {
-            return 0.0;
-        }
-        return 0.5 * x.dot(&(&lcs.energy * &x));
+        s.extend_from_slice(x);
+    } else {
+        s.extend(
+            (0..storage.one.len())
+                .map(|k| storage.one[k] + row(&storage.x, k, x) + row(&storage.u, k, u)),
+        );
     }
-    let s = &storage.x * x + &storage.u * DVector::from_column_slice(u) + &storage.one;
-    0.5 * s.dot(&(&storage.metric * &s))
+    if metric.nrows() != s.len() {
+        return 0.0;
+    }
+    0.5 * s
+        .iter()
+        .enumerate()
+        .map(|(k, v)| v * row(metric, k, s))
+        .sum::<f64>()
 }
 
 /// Sums of a run.

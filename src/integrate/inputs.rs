@@ -1,12 +1,13 @@
 //! The sources of a system, evaluated together.
 
-use crate::circuit::source::Wave;
+use crate::circuit::Source;
+use crate::circuit::source::{Wave, crossings};
 use crate::lcs::Input;
 
 /// All inputs u(t) with their one-sided limits and breakpoints.
 #[derive(Debug, Clone)]
 pub struct Inputs {
-    sources: Vec<crate::circuit::Source>,
+    sources: Vec<Source>,
     varying: Vec<usize>,
 }
 
@@ -67,6 +68,36 @@ impl Inputs {
             .fold(f64::INFINITY, f64::min)
     }
 
+    /// The first time in (from, to] at which `constant + gains·u` passes `level` upwards (`rising`) or downwards.
+    #[must_use]
+    pub fn passage(
+        &self,
+        gains: &[f64],
+        constant: f64,
+        level: f64,
+        rising: bool,
+        from: f64,
+        to: f64,
+    ) -> Option<f64> {
+        let terms: Vec<(f64, &Source)> = gains
+            .iter()
+            .copied()
+            .zip(&self.sources)
+            .filter(|(gain, _)| *gain != 0.0)
+            .collect();
+        let passages = crossings(&terms, constant, level, from, to);
+        passages
+            .into_iter()
+            .find(|c| c.rising == rising)
+            .map(|c| c.time)
+    }
+
+    /// The largest value each input takes (a bound, for sinusoids), in the order of u.
+    #[must_use]
+    pub fn amplitudes(&self) -> Vec<f64> {
+        self.sources.iter().map(|s| amplitude(&s.wave)).collect()
+    }
+
     /// Largest step that does not alias the fastest sine, s.
     #[must_use]
     pub fn largest_step(&self) -> f64 {
@@ -101,5 +132,22 @@ fn is_constant(wave: &Wave) -> bool {
         Wave::Pulse { v1, v2, .. } | Wave::Exp { v1, v2, .. } => v1 == v2,
         Wave::Pwl { points, .. } => points.windows(2).all(|w| w[0].1 == w[1].1),
         Wave::Sffm { amplitude, .. } | Wave::Am { amplitude, .. } => *amplitude == 0.0,
+    }
+}
+
+fn amplitude(wave: &Wave) -> f64 {
+    match wave {
+        Wave::Dc(value) => value.abs(),
+        Wave::Sin {
+            offset, amplitude, ..
+        }
+        | Wave::Sffm {
+            offset, amplitude, ..
+        } => offset.abs() + amplitude.abs(),
+        Wave::Am {
+            offset, amplitude, ..
+        } => amplitude.abs() * (offset.abs() + 1.0),
+        Wave::Pulse { v1, v2, .. } | Wave::Exp { v1, v2, .. } => v1.abs().max(v2.abs()),
+        Wave::Pwl { points, .. } => points.iter().fold(0.0, |a, p| a.max(p.1.abs())),
     }
 }

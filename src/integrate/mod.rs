@@ -1,8 +1,8 @@
 //! From a complementarity system to waveforms.
 
-pub mod exact;
 pub mod control;
 pub mod energy;
+pub mod exact;
 #[cfg(test)]
 #[path = "../../tests/systems/mod.rs"]
 pub(crate) mod fixtures;
@@ -18,7 +18,7 @@ pub mod switching;
 pub mod system;
 pub mod theta;
 
+pub use run::{Frame, Grid, Log, Outcome, Reason, SimError, Stepper};
 pub use simulate::{Method, SimOptions, simulate, simulate_system};
 pub use start::{OperatingPoint, Values, operating_point};
-pub use run::{Frame, Grid, Log, Outcome, Reason, SimError, Stepper};
 pub use stats::{Energy, Impulse, Run, Stats};

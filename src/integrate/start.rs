@@ -2,7 +2,9 @@
 
 use nalgebra::DVector;
 
-use crate::circuit::{Circuit, Element, ElementId, Kind, NodeId, Probe, Probed, Source, source::Wave};
+use crate::circuit::{
+    Circuit, Element, ElementId, Kind, NodeId, Probe, Probed, Source, source::Wave,
+};
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Reason, SimError};
 use crate::lcs::{Hold, Lcs, Position, ReduceError, StorageHold, reduce};
@@ -54,12 +56,16 @@ pub fn from_initial_conditions(circuit: &Circuit, behaviour: &Behaviour) -> DVec
         if let Some(ic) = storage.initial {
             return ic;
         }
-        let element = circuit.element(&storage.element).map(|id| &circuit.elements[id.index()]);
+        let element = circuit
+            .element(&storage.element)
+            .map(|id| &circuit.elements[id.index()]);
         match element {
             Some(e) if storage.capacitor => {
                 // A capacitor between two nodes of one `.ic v(a,b)=` has that difference.
                 let pair = circuit.initial_voltages.iter().find_map(|&(a, b, v)| {
-                    ((a, b) == (e.p, e.n)).then_some(v).or(((b, a) == (e.p, e.n)).then_some(-v))
+                    ((a, b) == (e.p, e.n))
+                        .then_some(v)
+                        .or(((b, a) == (e.p, e.n)).then_some(-v))
                 });
                 pair.unwrap_or_else(|| {
                     known[e.p.index()].unwrap_or(0.0) - known[e.n.index()].unwrap_or(0.0)
@@ -110,8 +116,11 @@ pub fn operating_point(
         SimError::before(Reason::NoOperatingPoint(words.join("; ")))
     })?;
     let behaviour = behaviour.standard();
-    let mut position: Vec<bool> =
-        behaviour.switches.iter().map(|s| s.initial.unwrap_or(false)).collect();
+    let mut position: Vec<bool> = behaviour
+        .switches
+        .iter()
+        .map(|s| s.initial.unwrap_or(false))
+        .collect();
     let mut seen = Vec::new();
     loop {
         let point = static_solution(&behaviour, &position, values, settings)?;
@@ -149,8 +158,10 @@ pub fn operating_point(
         }
         if seen.contains(&wanted) || seen.len() > 64 {
             let names = behaviour.switches.iter().zip(wanted.iter().zip(&position));
-            let moving: Vec<&str> =
-                names.filter(|(_, (a, b))| a != b).map(|(s, _)| s.name.as_str()).collect();
+            let moving: Vec<&str> = names
+                .filter(|(_, (a, b))| a != b)
+                .map(|(s, _)| s.name.as_str())
+                .collect();
             return Err(SimError::before(Reason::SwitchesDoNotSettle).device(moving.join(" ")));
         }
         seen.push(std::mem::replace(&mut position, wanted));
@@ -159,20 +170,38 @@ pub fn operating_point(
 
 /// The circuit with all node voltages and element currents as probes.
 fn observed_circuit(circuit: &Circuit) -> Circuit {
-    let nodes = circuit.nodes.iter().enumerate().skip(1).map(|(i, name)| Probe {
-        name: format!("v({name})"),
-        what: Probed::Voltage(NodeId(i as u32), NodeId::GROUND),
-    });
+    let nodes = circuit
+        .nodes
+        .iter()
+        .enumerate()
+        .skip(1)
+        .map(|(i, name)| Probe {
+            name: format!("v({name})"),
+            what: Probed::Voltage(NodeId(i as u32), NodeId::GROUND),
+        });
     let currents = circuit.elements.iter().enumerate().map(|(i, e)| Probe {
         name: format!("i({})", e.name),
         what: Probed::Current(ElementId(i as u32)),
     });
-    Circuit { probes: nodes.chain(currents).collect(), ..circuit.clone() }
+    Circuit {
+        probes: nodes.chain(currents).collect(),
+        ..circuit.clone()
+    }
 }
 
 fn source(name: String, p: NodeId, n: NodeId, volts: f64) -> Element {
-    let kind = Kind::VoltageSource(Source { dc: volts, wave: Wave::Dc(volts) });
-    Element { name, p, n, kind, ic: None, span: None }
+    let kind = Kind::VoltageSource(Source {
+        dc: volts,
+        wave: Wave::Dc(volts),
+    });
+    Element {
+        name,
+        p,
+        n,
+        kind,
+        ic: None,
+        span: None,
+    }
 }
 
 /// Nodes joined by anything that carries direct current or fixes a voltage.
@@ -211,7 +240,9 @@ fn tie_floating(circuit: &Circuit, statics: &mut Circuit, hold_ic: bool, notes: 
         let floats = i == root && i != 0 && all[i] != i;
         let held = hold_ic
             && circuit.initial_voltages.iter().any(|(a, b, _)| {
-                [a, b].iter().any(|n| n.index() != 0 && dc[n.index()] == root)
+                [a, b]
+                    .iter()
+                    .any(|n| n.index() != 0 && dc[n.index()] == root)
             });
         if floats && !held {
             let name = &circuit.nodes[i];
@@ -221,7 +252,9 @@ fn tie_floating(circuit: &Circuit, statics: &mut Circuit, hold_ic: bool, notes: 
                 what: Probed::Current(ElementId(statics.elements.len() as u32)),
             });
             statics.elements.push(tie);
-            notes.push(format!("node {name} is held by capacitors alone and starts at 0 V"));
+            notes.push(format!(
+                "node {name} is held by capacitors alone and starts at 0 V"
+            ));
         }
     }
 }
@@ -229,7 +262,9 @@ fn tie_floating(circuit: &Circuit, statics: &mut Circuit, hold_ic: bool, notes: 
 /// Holds `.ic` node voltages by sources; one per node or difference.
 fn hold_initial_voltages(circuit: &Circuit, statics: &mut Circuit) {
     for (k, &(a, b, volts)) in circuit.initial_voltages.iter().enumerate() {
-        statics.elements.push(source(format!("ic:{k}"), a, b, volts));
+        statics
+            .elements
+            .push(source(format!("ic:{k}"), a, b, volts));
     }
 }
 
@@ -267,10 +302,27 @@ fn static_solution(
     let mut notes = Vec::new();
     let lambda = devices(&lcs, &q, settings, &mut notes)?;
     let du = vec![0.0; u.len()];
-    let at = Point { x: &[], lambda: lambda.as_slice(), u: &u, du: &du };
-    check_constraints(&lcs, at)?;
+    let at = Point {
+        x: &[],
+        lambda: lambda.as_slice(),
+        u: &u,
+        du: &du,
+    };
+    check_constraints(&lcs, at).map_err(|error| {
+        // Sources that contradict each other do so without the operating point, too.
+        let moving = Position {
+            storage: StorageHold::Dynamic,
+            ..position
+        };
+        match reduce(behaviour, &moving) {
+            Err(e @ ReduceError::Sources { .. }) => SimError::before(Reason::Circuit(e.to_string())),
+            _ => error,
+        }
+    })?;
     let all = |rows: &crate::lcs::Rows| -> Vec<f64> {
-        (0..rows.one.len()).map(|i| reading::value(rows, i, at)).collect()
+        (0..rows.one.len())
+            .map(|i| reading::value(rows, i, at))
+            .collect()
     };
     let mut storage = &lcs.storage.u * DVector::from_column_slice(&u) + &lcs.storage.one;
     if lcs.storage.lambda.ncols() == lambda.len() {
@@ -330,8 +382,9 @@ fn check_constraints(lcs: &Lcs, at: Point<'_>) -> Result<(), SimError> {
                 .map(|j| lcs.inputs[j].name.as_str())
                 .collect();
             let what = "a voltage source across inductors or a current source into capacitors has no steady state";
-            return Err(SimError::before(Reason::NoOperatingPoint(what.into()))
-                .device(names.join(", ")));
+            return Err(
+                SimError::before(Reason::NoOperatingPoint(what.into())).device(names.join(", "))
+            );
         }
     }
     Ok(())
@@ -355,7 +408,11 @@ pub fn initial(
     if uic {
         return Ok(Initial {
             storage: from_initial_conditions(circuit, behaviour),
-            switches: behaviour.switches.iter().map(|s| s.initial.unwrap_or(false)).collect(),
+            switches: behaviour
+                .switches
+                .iter()
+                .map(|s| s.initial.unwrap_or(false))
+                .collect(),
             notes: Vec::new(),
         });
     }

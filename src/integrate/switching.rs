@@ -38,11 +38,6 @@ pub(crate) struct Switches {
     in_this_step: u32,
 }
 
-/// Intervals in which a control that is not piecewise linear is searched for a crossing.
-const SAMPLES: usize = 32;
-/// Halvings of the bracket of a crossing.
-const HALVINGS: usize = 80;
-
 impl Switches {
     pub(crate) fn new(position: Vec<bool>, thresholds: Vec<Threshold>, lcs: &Lcs) -> Self {
         let mut switches = Self {
@@ -65,10 +60,6 @@ impl Switches {
         let state_free = |i: usize| zero(&rows.x, i) && zero(&rows.lambda, i) && zero(&rows.du, i);
         self.driven = (0..self.thresholds.len()).map(state_free).collect();
         self.needs_lambda = (0..self.thresholds.len()).any(|i| !zero(&rows.lambda, i));
-    }
-
-    pub(crate) fn is_empty(&self) -> bool {
-        self.thresholds.is_empty()
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -96,10 +87,37 @@ impl Switches {
         self.in_this_step >= limit
     }
 
-    /// Whether a control asks for another position; `flip` carries it out.
+    /// Switches driven by sources alone whose controls ask for another position at the start.
+    pub(crate) fn misplaced(&self, lcs: &Lcs, u: &[f64]) -> Vec<usize> {
+        let at = Point {
+            x: &[],
+            lambda: &[],
+            u,
+            du: &[],
+        };
+        let wrong = |&i: &usize| {
+            let control = reading::value(&lcs.controls, i, at);
+            self.driven[i]
+                && self.thresholds[i].position(self.position[i], control) != self.position[i]
+        };
+        (0..self.thresholds.len()).filter(wrong).collect()
+    }
+
+    /// Flips the given switches.
+    pub(crate) fn toggle(&mut self, which: &[usize]) {
+        for &i in which {
+            self.position[i] = !self.position[i];
+        }
+    }
+
+    /// Whether a control that depends on the state asks for another position; `flip` carries it out. Switches that sources
+    /// alone drive move at the times of [`Self::next_known`] only.
     pub(crate) fn update(&mut self, lcs: &Lcs, at: Point<'_>, flip: bool) -> bool {
         let mut any = false;
         for (i, threshold) in self.thresholds.iter().enumerate() {
+            if self.driven[i] {
+                continue;
+            }
             let wanted = threshold.position(self.position[i], reading::value(&lcs.controls, i, at));
             if wanted != self.position[i] {
                 any = true;
@@ -125,60 +143,56 @@ impl Switches {
         words.join(" ")
     }
 
-    /// The first time in (t, limit] at which a control that depends on sources alone passes its threshold. No source has a
-    /// breakpoint in the open interval.
-    pub(crate) fn next_known(&self, lcs: &Lcs, inputs: &Inputs, t: f64, limit: f64) -> Option<f64> {
-        let _ = (SAMPLES, HALVINGS);
-        let mut u = inputs.all(t);
-        let mut first: Option<f64> = None;
+    /// The first time in (t, limit] at which controls that depend on sources alone pass the thresholds of their switches, and
+    /// which ones; an infinite time and none where nothing happens.
+    pub(crate) fn next_known(
+        &self,
+        lcs: &Lcs,
+        inputs: &Inputs,
+        t: f64,
+        limit: f64,
+    ) -> (f64, Vec<usize>) {
+        let mut first = f64::INFINITY;
+        let mut which = Vec::new();
         for i in (0..self.thresholds.len()).filter(|&i| self.driven[i]) {
-            let mut control = |time: f64| {
-                if time >= limit {
-                    inputs.left(time, &mut u);
-                } else {
-                    inputs.right(time, &mut u);
-                }
-                reading::value(
-                    &lcs.controls,
-                    i,
-                    Point {
-                        x: &[],
-                        lambda: &[],
-                        u: &u,
-                        du: &[],
-                    },
-                )
+            let (on, threshold) = (self.position[i], &self.thresholds[i]);
+            let level = if on {
+                threshold.off_below
+            } else {
+                threshold.on_above
             };
-            let on = self.position[i];
-            let threshold = &self.thresholds[i];
-            let asks = |value: f64| threshold.position(on, value) != on;
-            let until = first.unwrap_or(limit);
-            let mut low = t;
-            for k in 1..=SAMPLES {
-                let high = if k == SAMPLES {
-                    until
-                } else {
-                    t + (until - t) * (k as f64 / SAMPLES as f64)
-                };
-                if asks(control(high)) {
-                    let (mut a, mut b) = (low, high);
-                    for _ in 0..HALVINGS {
-                        let middle = a + 0.5 * (b - a);
-                        if middle <= a || middle >= b {
-                            break;
-                        }
-                        if asks(control(middle)) {
-                            b = middle
-                        } else {
-                            a = middle
-                        }
-                    }
-                    first = Some(b);
-                    break;
-                }
-                low = high;
+            let gains: Vec<f64> = lcs.controls.u.row(i).iter().copied().collect();
+            let until = first.min(limit);
+            let passage = inputs.passage(&gains, lcs.controls.one[i], level, !on, t, until);
+            let Some(time) = passage else { continue };
+            if time < first {
+                first = time;
+                which.clear();
             }
+            which.push(i);
         }
-        first
+        (first, which)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hysteresis_keeps_the_position_inside_the_band() {
+        let switch = Threshold {
+            name: "s1".into(),
+            on_above: 2.0,
+            off_below: 1.0,
+        };
+        assert_eq!(
+            [0.5, 1.0, 1.5, 2.0, 2.5].map(|v| switch.position(false, v)),
+            [false, false, false, false, true]
+        );
+        assert_eq!(
+            [0.5, 1.0, 1.5, 2.0, 2.5].map(|v| switch.position(true, v)),
+            [false, true, true, true, true]
+        );
     }
 }

@@ -1,6 +1,18 @@
 //! Device laws: maximal monotone curves in the (v, i) plane, −λ ∈ ∂φ(y).
 
+mod curve;
+mod dead_zone;
+mod diode;
+mod relay;
+mod saturation;
+mod table;
+mod zener;
+
 use crate::algebra::Value;
+pub use curve::CurveError;
+
+const ZERO: Value = Value::decimal(0.0, 0, 0);
+const ONE: Value = Value::decimal(1.0, 1, 0);
 
 /// A law between the two quantities of a port.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,13 +53,12 @@ impl Law {
         }
     }
 
-    /// The ideal diode: 0 ≤ i ⟂ −v ≥ 0.
+    /// The law as a curve of straight pieces.
     #[must_use]
-    pub const fn ideal_diode() -> Self {
-        Self::Diode {
-            vfwd: Value::decimal(0.0, 0, 0),
-            ron: Value::decimal(0.0, 0, 0),
-            roff: None,
+    pub fn curve(&self) -> Curve {
+        match self {
+            Self::Diode { vfwd, ron, roff } => diode::curve(*vfwd, *ron, *roff),
+            Self::Curve(curve) => curve.clone(),
         }
     }
 }

@@ -7,7 +7,7 @@ use super::{Input, Lcs, Outputs, Port, Role, Rows, State, Storage};
 use crate::algebra::Value;
 use crate::circuit::Tran;
 use crate::circuit::source::{Form, Source, WaveError};
-use crate::law::{Curve, Law};
+use crate::law::{Curve, CurveError, Law};
 
 /// The name of the schema.
 pub const SCHEMA: &str = "circ-lcs/1";
@@ -55,6 +55,14 @@ pub enum JsonError {
         device: String,
         /// What the file says.
         kind: String,
+    },
+    /// A law that is not monotone.
+    #[error("port `{device}`: {reason}")]
+    Curve {
+        /// The device.
+        device: String,
+        /// What is wrong with its curve.
+        reason: CurveError,
     },
     /// A waveform.
     #[error("input `{name}`: {source}")]
@@ -382,8 +390,8 @@ fn law(doc: &LawDoc, device: &str) -> Result<Law, JsonError> {
         .into_iter()
         .find(|k| *k == doc.kind);
     match (kind, &doc.vertices, doc.first, doc.last) {
-        (Some(kind), Some(vertices), Some(first), Some(last)) if !vertices.is_empty() => {
-            Ok(Law::Curve(Curve {
+        (Some(kind), Some(vertices), Some(first), Some(last)) => {
+            let curve = Curve {
                 kind,
                 vertices: vertices
                     .iter()
@@ -391,7 +399,13 @@ fn law(doc: &LawDoc, device: &str) -> Result<Law, JsonError> {
                     .collect(),
                 first: (value(first[0]), value(first[1])),
                 last: (value(last[0]), value(last[1])),
-            }))
+            };
+            let wrong = |reason| JsonError::Curve {
+                device: device.to_owned(),
+                reason,
+            };
+            curve.check().map_err(wrong)?;
+            Ok(Law::Curve(curve))
         }
         _ => Err(JsonError::Law {
             device: device.to_owned(),

@@ -3,6 +3,8 @@
 pub mod format;
 pub mod json;
 pub mod reduce;
+#[cfg(test)]
+mod tests;
 
 pub use reduce::{Position, ReduceError, StorageHold, reduce};
 
@@ -55,6 +57,8 @@ pub struct Lcs {
     pub controls: Rows,
     /// What holding devices fixed left behind (empty when every device is a port).
     pub held: Held,
+    /// What the ideal model leaves open and a least-norm choice has settled, in words.
+    pub notes: Vec<String>,
 }
 
 /// A device pair as the reduction sees it.
@@ -80,6 +84,8 @@ pub struct Held {
     pub kernel: DMatrix<f64>,
     /// Rows over [x | u | u' | 1] that must vanish for this position to exist (a conducting diode across a source).
     pub constraints: Rows,
+    /// pairs×q: areas of the guards' impulses when the storage vector changes from s⁻ to s⁺: `impulse · (s⁻ − s⁺)`.
+    pub impulse: DMatrix<f64>,
 }
 
 /// A row of x.
@@ -152,6 +158,8 @@ pub struct Outputs {
     pub units: Vec<&'static str>,
     /// One row per name.
     pub rows: Rows,
+    /// names×q: areas of the outputs' impulses when the storage vector changes from s⁻ to s⁺: `impulse · (s⁻ − s⁺)`.
+    pub impulse: DMatrix<f64>,
     /// Power terms for the energy balance.
     pub power: Vec<PowerTerm>,
     /// Rows of the two factors of each power term: `power_v` row k times `power_i` row k is the power (W) *into* the element.

@@ -242,6 +242,7 @@ impl Assembly<'_> {
                         },
                         value: if is_voltage { v } else { i },
                         other: if is_voltage { i } else { v },
+                        rate: None,
                     });
                     vec![(Coefficient::ONE, i)]
                 }
@@ -253,7 +254,7 @@ impl Assembly<'_> {
                     self.out.pairs.push(Pair {
                         port: Port {
                             device: name.clone(),
-                            role: Role::Current,
+                            role: Role::Voltage,
                             lambda: format!("i({name})"),
                             y: format!("-v({name})"),
                             law: law.clone(),
@@ -367,7 +368,12 @@ impl Assembly<'_> {
             equation.push((Coefficient::MINUS_ONE, i));
             self.out.equations.push(equation);
             self.out.storage.push(StoragePort {
-                name: format!("i({name})"),
+                // With windings at k = 1 the state is their magnetising current, not the current of this one.
+                name: if winding.carries.is_empty() {
+                    format!("i({name})")
+                } else {
+                    format!("im({name})")
+                },
                 element: name.clone(),
                 capacitor: false,
                 state: i,

@@ -7,7 +7,7 @@
 use petgraph::unionfind::UnionFind;
 
 use super::Coefficient;
-use crate::algebra::{Field, Rational};
+use crate::algebra::{Elimination, Field, Matrix, Rational};
 use crate::circuit::{Circuit, ElementId, Kind};
 use crate::diagnostic::Diagnostic;
 
@@ -213,15 +213,20 @@ fn split(
 
 fn solve(k: &[Vec<Rational>], basis: &[usize], m: usize) -> Vec<Rational> {
     let n = basis.len();
-    let mut matrix = crate::algebra::Matrix::zeros(n, n + 1);
+    let mut matrix = Matrix::zeros(n, n + 1);
     for (i, &a) in basis.iter().enumerate() {
         for (j, &b) in basis.iter().enumerate() {
             matrix.set(i, j, k[a][b].clone());
         }
         matrix.set(i, n, k[a][m].clone());
     }
-    let pivots = crate::algebra::eliminate(&mut matrix, n, 0..n);
+    let mut found = Elimination::new(n, n + 1);
+    for column in 0..n {
+        matrix.eliminate(column, &mut found);
+    }
     (0..n)
-        .map(|j| pivots[j].map_or_else(<Rational as Field>::zero, |row| matrix.at(row, n).clone()))
+        .map(|j| {
+            found.pivot[j].map_or_else(<Rational as Field>::zero, |row| matrix.at(row, n).clone())
+        })
         .collect()
 }

@@ -6,14 +6,17 @@
 
 mod assemble;
 mod couple;
+#[cfg(test)]
+pub(crate) mod fixture;
 mod standard;
 mod system;
+pub mod topology;
 
 use std::sync::OnceLock;
 
-use crate::algebra::{Ball, Field, Matrix, Rational, Value, eliminate};
+use crate::algebra::{Ball, Field, Matrix, Rational, SparseRow, Value, eliminate_sparse};
 use crate::diagnostic::Diagnostic;
-use crate::lcs::{Input, Port, PowerKind};
+use crate::lcs::{Input, Port, PowerKind, Role};
 
 pub use assemble::behaviour;
 
@@ -28,6 +31,8 @@ pub enum Coefficient {
     Inverse(Value),
     /// Minus one over the value.
     MinusInverse(Value),
+    /// The first value over the second.
+    Ratio(Value, Value),
     /// The exact sum of two doubles (square roots of coupled inductances).
     Pair(f64, f64),
 }
@@ -46,6 +51,7 @@ impl Coefficient {
             Self::Minus(v) => F::value(v).neg(),
             Self::Inverse(v) => F::one().div(&F::value(v)),
             Self::MinusInverse(v) => F::one().div(&F::value(v)).neg(),
+            Self::Ratio(a, b) => F::value(a).div(&F::value(b)),
             Self::Pair(hi, lo) => F::value(Value::binary(hi)).add(&F::value(Value::binary(lo))),
         }
     }
@@ -58,7 +64,17 @@ impl Coefficient {
             Self::Minus(v) => Self::Plus(v),
             Self::Inverse(v) => Self::MinusInverse(v),
             Self::MinusInverse(v) => Self::Inverse(v),
+            Self::Ratio(a, b) => Self::Ratio(a.negated(), b),
             Self::Pair(hi, lo) => Self::Pair(-hi, -lo),
+        }
+    }
+
+    /// The ball around a coefficient that is a measured double rather than an exact number.
+    fn measured(self) -> Ball {
+        match self {
+            Self::Plus(v) => Ball::inexact(v.f64),
+            Self::Minus(v) => Ball::inexact(-v.f64),
+            other => other.in_field(),
         }
     }
 }
@@ -95,12 +111,14 @@ pub struct SourcePort {
     pub value: Column,
     /// The column of its other quantity.
     pub other: Column,
+    /// The column of its derivative, in a system given as matrices whose outputs contain it.
+    pub rate: Option<Column>,
 }
 
 /// A complementary or lawful pair of columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pair {
-    /// The device and its law; the role is decided by the reduction.
+    /// The device and its law; the role is the one to take where the circuit allows both.
     pub port: Port,
     /// The column of the reverse quantity: −v of a device (of a function block: its input).
     pub reverse: Column,
@@ -114,6 +132,13 @@ pub struct Pair {
     pub forward_name: String,
     /// Units of the two quantities.
     pub units: (&'static str, &'static str),
+}
+
+impl Pair {
+    /// Which quantity is to be y where the circuit allows both; the other is λ.
+    pub(crate) fn prefers_current_as_y(&self) -> bool {
+        self.port.role == Role::Voltage
+    }
 }
 
 /// A switch with its two columns.
@@ -192,6 +217,8 @@ pub struct Behaviour {
     pub power: Vec<Power>,
     /// Things the user should know (references of islands).
     pub notes: Vec<Diagnostic>,
+    /// The coefficients are measured doubles: what cancels to less than their rounding counts as 0.
+    pub inexact: bool,
     ball: OnceLock<Reduced<Ball>>,
     rational: OnceLock<Reduced<Rational>>,
 }
@@ -199,14 +226,18 @@ pub struct Behaviour {
 /// The port equations left after the internal columns are gone.
 #[derive(Debug, Clone)]
 pub(crate) struct Reduced<F> {
-    /// Place of each column in the matrices below; `None` for internal and observed ones.
+    /// Place of each column in the matrix below; `None` for columns that are gone.
     pub(crate) place: Vec<Option<usize>>,
-    /// Port equations, = 0.
-    pub(crate) ports: Matrix<F>,
-    /// One row per observed quantity: its value.
-    pub(crate) observed: Matrix<F>,
-    /// Internal columns that no equation determines (taken as zero).
+    /// First the port equations, = 0; then one row per observed quantity: its value.
+    pub(crate) matrix: Matrix<F>,
+    /// How many of the rows are equations.
+    pub(crate) equations: usize,
+    /// Internal columns that no equation determines; they keep a place.
     pub(crate) free: Vec<Column>,
+    /// Entries of the energy matrix.
+    pub(crate) metric: Vec<(usize, usize, F)>,
+    /// Ron and Roff (`None` is open) of every switch.
+    pub(crate) switches: Vec<(F, Option<F>)>,
 }
 
 impl Behaviour {
@@ -219,7 +250,7 @@ impl Behaviour {
         self.columns.len() - 1
     }
 
-    /// Names of internal columns that the circuit leaves undetermined (they are taken as zero).
+    /// Names of internal columns that the circuit leaves undetermined in every position.
     #[must_use]
     pub fn undetermined(&self) -> Vec<&str> {
         self.ball()
@@ -230,67 +261,105 @@ impl Behaviour {
     }
 
     pub(crate) fn ball(&self) -> &Reduced<Ball> {
-        self.ball.get_or_init(|| self.reduced())
+        self.ball.get_or_init(|| {
+            if self.inexact {
+                self.reduced(Coefficient::measured)
+            } else {
+                self.reduced(Coefficient::in_field)
+            }
+        })
     }
 
     pub(crate) fn rational(&self) -> &Reduced<Rational> {
-        self.rational.get_or_init(|| self.reduced())
+        self.rational
+            .get_or_init(|| self.reduced(Coefficient::in_field))
     }
 
-    fn reduced<F: Field>(&self) -> Reduced<F> {
-        let mut matrix = Matrix::<F>::zeros(self.equations.len(), self.columns.len());
-        for (i, equation) in self.equations.iter().enumerate() {
-            for &(coefficient, column) in equation {
-                matrix.add_to(i, column, &coefficient.in_field());
-            }
-        }
-        let eliminated: Vec<Column> = self
-            .internal
-            .iter()
-            .copied()
-            .chain(self.observed.iter().map(|o| o.column))
-            .collect();
-        let rows = matrix.rows;
-        let pivots = eliminate(&mut matrix, rows, eliminated.iter().copied());
-        let free = self
-            .internal
-            .iter()
-            .copied()
-            .filter(|&c| pivots[c].is_none())
-            .collect();
+    /// Eliminates the internal columns.
+    fn reduced<F: Field>(&self, number: impl Fn(Coefficient) -> F) -> Reduced<F> {
+        let count = self.columns.len();
+        // Internal columns first, then ports, then observed quantities, which occur only in their definitions.
+        let mut sort = vec![1; count];
+        self.internal.iter().for_each(|&c| sort[c] = 0);
+        self.observed.iter().for_each(|o| sort[o.column] = 2);
+        let mut order: Vec<Column> = (0..count).collect();
+        order.sort_by_key(|&c| sort[c]);
+        let mut rank = vec![0; count];
+        order.iter().enumerate().for_each(|(k, &c)| rank[c] = k);
+        let internal = sort.iter().filter(|s| **s == 0).count();
+        let visible = count - self.observed.len();
 
-        let mut is_live = vec![true; matrix.cols];
-        let mut is_port_row = vec![true; matrix.rows];
-        for &c in &eliminated {
-            is_live[c] = false;
-            if let Some(row) = pivots[c] {
-                is_port_row[row] = false;
+        let mut rows = Vec::with_capacity(self.equations.len());
+        let mut readings: Vec<SparseRow<F>> = vec![Vec::new(); self.observed.len()];
+        for equation in &self.equations {
+            let mut row: SparseRow<F> = Vec::with_capacity(equation.len());
+            let mut terms: Vec<(usize, Coefficient)> =
+                equation.iter().map(|&(x, c)| (rank[c], x)).collect();
+            terms.sort_by_key(|term| term.0);
+            for (c, x) in terms {
+                match row.last_mut() {
+                    Some(last) if last.0 == c => last.1 = last.1.add(&number(x)),
+                    _ => row.push((c, number(x))),
+                }
+            }
+            row.retain(|(_, x)| !x.is_zero());
+            match row.last() {
+                // value = Σ terms is written Σ terms − value = 0.
+                Some(last) if last.0 >= visible => {
+                    let name = order[last.0];
+                    let k = self.observed.iter().position(|o| o.column == name);
+                    row.pop();
+                    readings[k.unwrap_or_default()] = row;
+                }
+                _ => rows.push(row),
             }
         }
-        let live: Vec<Column> = (0..matrix.cols).filter(|&c| is_live[c]).collect();
-        let mut place = vec![None; matrix.cols];
-        for (k, &c) in live.iter().enumerate() {
-            place[c] = Some(k);
-        }
-        let port_rows: Vec<usize> = (0..matrix.rows).filter(|&r| is_port_row[r]).collect();
-        let mut ports = Matrix::zeros(port_rows.len(), live.len());
-        for (i, &r) in port_rows.iter().enumerate() {
-            for (k, &c) in live.iter().enumerate() {
-                ports.set(i, k, matrix.at(r, c).clone());
+        let equations = rows.len();
+        rows.append(&mut readings);
+        let equations = eliminate_sparse(&mut rows, equations, internal);
+
+        let mut loose: Vec<usize> = rows
+            .iter()
+            .flatten()
+            .map(|(c, _)| *c)
+            .filter(|&c| c < internal)
+            .collect();
+        loose.sort_unstable();
+        loose.dedup();
+        let width = visible - internal + loose.len();
+        let position = |c: usize| {
+            if c >= internal {
+                Some(c - internal)
+            } else {
+                loose.binary_search(&c).ok().map(|k| visible - internal + k)
+            }
+        };
+        let mut matrix = Matrix::zeros(rows.len(), width);
+        for (r, row) in rows.into_iter().enumerate() {
+            for (c, x) in row {
+                if let Some(k) = position(c) {
+                    matrix.set(r, k, x);
+                }
             }
         }
-        let mut observed = Matrix::zeros(self.observed.len(), live.len());
-        for (i, o) in self.observed.iter().enumerate() {
-            let Some(r) = pivots[o.column] else { continue };
-            for (k, &c) in live.iter().enumerate() {
-                observed.set(i, k, matrix.at(r, c).neg());
-            }
+        let mut place = vec![None; count];
+        for (k, &c) in order.iter().enumerate().take(visible) {
+            place[c] = position(k);
         }
+        let resistance = |r: Value| number(Coefficient::Plus(r));
         Reduced {
             place,
-            ports,
-            observed,
-            free,
+            matrix,
+            equations,
+            free: loose.iter().map(|&c| order[c]).collect(),
+            metric: self
+                .metric
+                .iter()
+                .map(|&(a, b, x)| (a, b, number(x)))
+                .collect(),
+            switches: (self.switches.iter())
+                .map(|s| (resistance(s.ron), s.roff.map(resistance)))
+                .collect(),
         }
     }
 }

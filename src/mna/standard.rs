@@ -1,14 +1,22 @@
 //! Piecewise-linear laws as ideal complementarity pairs, stated on the behaviour itself.
 
-use super::{Behaviour, Coefficient, Column, Equation, Pair};
+use super::{Behaviour, Coefficient, Equation, Pair};
 use crate::algebra::Value;
-use crate::law::Law;
+use crate::law::{Curve, Law};
+use crate::lcs::Role;
 
 impl Behaviour {
     /// The same behaviour with every piecewise-linear law replaced by ideal pairs 0 ≤ p ⟂ q ≥ 0.
     ///
-    /// A curve with corners V_1…V_K, a first ray d_0, segments d_k = V_{k+1} − V_k and a last ray d_K is
-    /// (v, i) = V_1 − d_0 a + Σ d_k t_k with the pairs (a, t_1), (1 − t_1, t_2), …, (1 − t_{K−1}, t_K).
+    /// A curve with corners V_1 … V_K, a first ray d_0, segments V_{k+1} − V_k = T_k d_k and a last ray d_K is
+    ///
+    /// ```text
+    /// (v, i) = V_1 − d_0 a + Σ d_k t_k,    0 ≤ a ⟂ t_1 ≥ 0,  0 ≤ T_k − t_k ⟂ t_{k+1} ≥ 0
+    /// ```
+    ///
+    /// The lengths T_k are chosen so that consecutive directions satisfy dv_{k−1} di_k + di_{k−1} dv_k = 1: then the power
+    /// into the rest of the circuit is Σ λ_k y_k up to what the curve's own slopes dissipate and terms linear in λ, and a
+    /// passive circuit keeps D + Dᵀ ⪰ 0.
     #[must_use]
     pub fn standard(&self) -> Self {
         let mut out = Self {
@@ -18,7 +26,7 @@ impl Behaviour {
             ..self.clone()
         };
         for pair in &self.pairs {
-            if is_ideal(pair) {
+            if !pair.fixed_role && pair.port.law.is_ideal_diode() {
                 out.pairs.push(pair.clone());
             } else {
                 expand(&mut out, pair);
@@ -28,103 +36,94 @@ impl Behaviour {
     }
 }
 
-fn is_ideal(pair: &Pair) -> bool {
-    !pair.fixed_role
-        && matches!(&pair.port.law, Law::Diode { vfwd, ron, roff: None } if vfwd.f64 == 0.0 && ron.f64 == 0.0)
-}
+/// A direction or point with exact coefficients; segments are differences of two points.
+type Term = (Coefficient, Coefficient);
 
-/// A curve with exact coefficients.
+/// A curve as V_1, d_0, and for each further piece its direction (a sum of terms) and length T.
 struct Shape {
-    vertices: Vec<(Value, Value)>,
-    first: (Coefficient, Coefficient),
-    last: (Coefficient, Coefficient),
+    corner: Term,
+    first: Term,
+    pieces: Vec<(Vec<Term>, Value)>,
 }
 
 fn shape(law: &Law) -> Shape {
-    let zero = Coefficient::Plus(Value::decimal(0.0, 0, 0));
-    match law {
-        Law::Diode { vfwd, ron, roff } => {
-            // The two lines i = v/roff and i = (v − vfwd)/ron meet at v = vfwd·roff/(roff − ron).
-            let corner = match roff {
-                Some(r) if vfwd.f64 != 0.0 => {
-                    let v = vfwd.f64 * r.f64 / (r.f64 - ron.f64);
-                    (Value::binary(v), Value::binary(v / r.f64))
-                }
-                _ => (*vfwd, Value::decimal(0.0, 0, 0)),
-            };
-            Shape {
-                vertices: vec![corner],
-                first: (Coefficient::ONE, roff.map_or(zero, Coefficient::Inverse)),
-                last: (Coefficient::Plus(*ron), Coefficient::ONE),
-            }
-        }
-        Law::Curve(curve) => Shape {
-            vertices: curve.vertices.clone(),
-            first: (
-                Coefficient::Plus(curve.first.0),
-                Coefficient::Plus(curve.first.1),
-            ),
-            last: (
-                Coefficient::Plus(curve.last.0),
-                Coefficient::Plus(curve.last.1),
-            ),
-        },
+    let one = Value::decimal(1.0, 1, 0);
+    let Curve {
+        vertices,
+        first,
+        last,
+        ..
+    } = law.curve();
+    let origin = (Value::decimal(0.0, 0, 0), Value::decimal(0.0, 0, 0));
+    let plus =
+        |(v, i): (Value, Value), t: Value| (Coefficient::Ratio(v, t), Coefficient::Ratio(i, t));
+    let minus = |(v, i), t| {
+        let (v, i) = plus((v, i), t);
+        (v.negated(), i.negated())
+    };
+    // The first direction has length 1 in its larger coordinate.
+    let unit = Value::binary(first.0.f64.max(first.1.f64));
+    let unit = if unit.f64 > 0.0 { unit } else { one };
+    let mut before = (first.0.f64 / unit.f64, first.1.f64 / unit.f64);
+    let mut pieces = Vec::new();
+    let segments = vertices.windows(2).map(|w| (w[1], Some(w[0])));
+    for (to, from) in segments.chain(std::iter::once((last, None))) {
+        let from_f64 = from.map_or((0.0, 0.0), |(v, i)| (v.f64, i.f64));
+        let along = (to.0.f64 - from_f64.0, to.1.f64 - from_f64.1);
+        let product = before.0 * along.1 + before.1 * along.0;
+        let length = if product > 0.0 {
+            Value::binary(product)
+        } else {
+            one
+        };
+        before = (along.0 / length.f64, along.1 / length.f64);
+        let mut terms = vec![plus(to, length)];
+        terms.extend(from.map(|from| minus(from, length)));
+        pieces.push((terms, length));
+    }
+    let (v, i) = vertices.first().copied().unwrap_or(origin);
+    Shape {
+        corner: (Coefficient::Plus(v), Coefficient::Plus(i)),
+        first: plus(first, unit),
+        pieces,
     }
 }
 
 fn expand(out: &mut Behaviour, pair: &Pair) {
-    let Shape {
-        vertices,
-        first,
-        last,
-    } = shape(&pair.port.law);
-    let count = vertices.len();
+    let shape = shape(&pair.port.law);
+    let count = shape.pieces.len();
     let device = &pair.port.device;
     out.internal.push(pair.reverse);
     out.internal.push(pair.forward);
-    // Two equations: x = V_1 − d_0 a + Σ d_k t_k for each coordinate. Devices carry −v in their reverse column.
+    // One equation a coordinate; devices carry −v in their reverse column.
     let along_v = if pair.fixed_role {
         Coefficient::MINUS_ONE
     } else {
         Coefficient::ONE
     };
-    let mut v: Equation = vec![(along_v, pair.reverse)];
-    let mut i: Equation = vec![(Coefficient::MINUS_ONE, pair.forward)];
-    let mut add = |dv: Coefficient, di: Coefficient, column: Column| {
-        v.push((dv, column));
-        i.push((di, column));
-    };
-    add(
-        Coefficient::Plus(vertices[0].0),
-        Coefficient::Plus(vertices[0].1),
-        Behaviour::ONE,
-    );
+    let mut v: Equation = vec![(along_v, pair.reverse), (shape.corner.0, Behaviour::ONE)];
+    let mut i: Equation = vec![
+        (Coefficient::MINUS_ONE, pair.forward),
+        (shape.corner.1, Behaviour::ONE),
+    ];
     let mut slack = out.column(format!("{device}.a"));
-    add(first.0.negated(), first.1.negated(), slack);
+    v.push((shape.first.0.negated(), slack));
+    i.push((shape.first.1.negated(), slack));
     let mut pairs = Vec::new();
-    for k in 0..count {
+    for (k, (terms, length)) in shape.pieces.into_iter().enumerate() {
         let t = out.column(format!("{device}.t{}", k + 1));
         pairs.push((slack, t));
-        if k + 1 == count {
-            add(last.0, last.1, t);
-        } else {
-            add(
-                Coefficient::Plus(vertices[k + 1].0),
-                Coefficient::Plus(vertices[k + 1].1),
-                t,
-            );
-            add(
-                Coefficient::Minus(vertices[k].0),
-                Coefficient::Minus(vertices[k].1),
-                t,
-            );
+        for (dv, di) in terms {
+            v.push((dv, t));
+            i.push((di, t));
+        }
+        if k + 1 < count {
+            // s + t = T
             slack = out.column(format!("{device}.s{}", k + 1));
-            // s + t = 1
-            let one = Coefficient::Plus(Value::decimal(1.0, 1, 0));
             out.equations.push(vec![
-                (one, slack),
-                (one, t),
-                (Coefficient::MINUS_ONE, Behaviour::ONE),
+                (Coefficient::ONE, slack),
+                (Coefficient::ONE, t),
+                (Coefficient::Minus(length), Behaviour::ONE),
             ]);
         }
     }
@@ -133,6 +132,7 @@ fn expand(out: &mut Behaviour, pair: &Pair) {
     for (k, (reverse, forward)) in pairs.into_iter().enumerate() {
         let mut port = pair.port.clone();
         port.law = Law::ideal_diode();
+        port.role = Role::Voltage;
         if count > 1 {
             port.device = format!("{device}.{}", k + 1);
         }

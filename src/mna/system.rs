@@ -10,12 +10,13 @@ impl Behaviour {
     /// The behaviour x' = A x + B λ + E u + e, y = C x + D λ + G u + F, with the stored energy as metric where it is
     /// positive definite, else the identity.
     ///
-    /// The doubles count as exact binary rationals.
+    /// The doubles count as rounded: what cancels to less than their rounding is 0.
     #[must_use]
     pub fn from_lcs(lcs: &Lcs) -> Self {
         let (n, m, p) = (lcs.n(), lcs.m(), lcs.p());
         let mut out = Self {
             title: lcs.title.clone(),
+            inexact: true,
             ..Self::default()
         };
         out.column("1");
@@ -123,40 +124,23 @@ impl Behaviour {
                 input: lcs.inputs[j].clone(),
                 value: u[j],
                 other: other[j],
+                rate: None,
             });
         }
         out.readings(lcs, &x, &lambda, &u);
         out
     }
 
-    /// The named outputs; where one contains u', a unit capacitor across the input gives its current.
+    /// The named outputs; where one contains u', the input gets a column for it.
     fn readings(&mut self, lcs: &Lcs, x: &[usize], lambda: &[usize], u: &[usize]) {
         let rows = &lcs.outputs.rows;
-        let mut derivative = vec![None; u.len()];
         for j in 0..rows.du.ncols() {
             if rows.du.column(j).iter().any(|v| *v != 0.0) {
-                let name = &lcs.inputs[j].name;
-                let (state, flow) = (
-                    self.column(format!("{name}.held")),
-                    self.column(format!("{name}'")),
-                );
-                self.equations.push(vec![
-                    (Coefficient::ONE, state),
-                    (Coefficient::MINUS_ONE, u[j]),
-                ]);
-                let k = self.storage.len();
-                self.metric.push((k, k, Coefficient::ONE));
-                self.storage.push(StoragePort {
-                    name: format!("{name}.held"),
-                    element: name.clone(),
-                    capacitor: true,
-                    state,
-                    flow,
-                    initial: None,
-                });
-                derivative[j] = Some(flow);
+                let column = self.column(format!("{}'", lcs.inputs[j].name));
+                self.sources[j].rate = Some(column);
             }
         }
+        let rates: Vec<Option<usize>> = self.sources.iter().map(|s| s.rate).collect();
         for (k, name) in lcs.outputs.names.iter().enumerate() {
             let mut equation = Equation::new();
             let mut add = |value: f64, column: usize| {
@@ -172,8 +156,8 @@ impl Behaviour {
             }
             for (j, &c) in u.iter().enumerate() {
                 add(rows.u[(k, j)], c);
-                if let Some(flow) = derivative[j] {
-                    add(rows.du[(k, j)], flow);
+                if let Some(rate) = rates[j] {
+                    add(rows.du[(k, j)], rate);
                 }
             }
             add(rows.one[k], Self::ONE);

@@ -24,6 +24,7 @@ pub(crate) mod scale;
 #[cfg(feature = "sdp")]
 pub mod sdp;
 pub mod strict;
+mod sweep;
 pub mod verify;
 pub mod witness;
 

@@ -42,7 +42,12 @@ pub fn overshoot(p: &DMatrix<f64>) -> f64 {
 /// One eigenvalue problem and one verification for the given P; up to 30 states also about 25 solutions of (45).
 #[must_use]
 pub fn maximise(system: &System, p: &DMatrix<f64>, from: Origin) -> Strict {
-    let mut best = Strict { decay_rate: 0.0, bound: overshoot(p), p: p.clone(), from };
+    let mut best = Strict {
+        decay_rate: 0.0,
+        bound: overshoot(p),
+        p: p.clone(),
+        from,
+    };
     if system.n() == 0 {
         return best;
     }
@@ -55,7 +60,10 @@ pub fn maximise(system: &System, p: &DMatrix<f64>, from: Origin) -> Strict {
     if system.n() > LARGEST {
         return best;
     }
-    let limit = -witness::eigenvalues(&system.a).iter().map(|s| s.re).fold(f64::NEG_INFINITY, f64::max);
+    let limit = -witness::eigenvalues(&system.a)
+        .iter()
+        .map(|s| s.re)
+        .fold(f64::NEG_INFINITY, f64::max);
     if !(limit.is_finite() && limit > 0.0) {
         return best;
     }
@@ -88,14 +96,21 @@ fn fixed(system: &System, p: &DMatrix<f64>) -> Option<f64> {
     let coupling = q.view((0, n), (n, m)).into_owned();
     let (values, vectors) = scale::eigen(&q.view((n, n), (m, m)).into_owned());
     let size = values.amax();
-    let lossy: Vec<usize> = (0..values.len()).filter(|&k| values[k].abs() > scale::RANK * size).collect();
+    let lossy: Vec<usize> = (0..values.len())
+        .filter(|&k| values[k].abs() > scale::RANK * size)
+        .collect();
     let reach = coupling * vectors.select_columns(&lossy);
     let inverse = DMatrix::from_diagonal(&values.select_rows(&lossy).map(f64::recip));
     let loss = &reach * inverse * reach.transpose() - q.view((0, 0), (n, n));
     let lower = p.clone().cholesky()?.l();
     let half = lower.solve_lower_triangular(&loss)?;
     let metric = lower.solve_lower_triangular(&half.transpose())?;
-    scale::eigen(&metric).0.iter().copied().next().map(|v| 0.5 * v)
+    scale::eigen(&metric)
+        .0
+        .iter()
+        .copied()
+        .next()
+        .map(|v| 0.5 * v)
 }
 
 /// The largest α in (low, high] that `certify` accepts, to relative width of `scale`, with what it returned.

@@ -515,7 +515,13 @@ fn theorem_4_4_small_jumps_of_the_input_are_unique_projections() {
         (&jumped - &z0).norm()
     );
     // The jump is smaller than r/4, as the theorem asks.
-    assert!(nearest < system.prox_regularity(&[x0.clone()], 0.5).unwrap() / 4.0);
+    assert!(
+        nearest
+            < system
+                .prox_regularity(std::slice::from_ref(&x0), 0.5)
+                .unwrap()
+                / 4.0
+    );
     // The jump along B in x is another point: the metric of V'' decides.
     let along_b = step(&system, 0.5 - 1e-9, &x0, 1e-9 + 1e-12).unwrap().x;
     assert!((system.state_map(&along_b).unwrap() - &jumped).norm() > 1e-4);

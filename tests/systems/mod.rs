@@ -1,7 +1,12 @@
 //! Published circuits as systems written down by hand, for tests and benches of the steppers.
 //!
 //! Used from integration tests and, by path, from the library's own tests.
-#![allow(dead_code, missing_docs, unreachable_pub, reason = "every user takes its part")]
+#![allow(
+    dead_code,
+    missing_docs,
+    unreachable_pub,
+    reason = "every user takes its part"
+)]
 
 use nalgebra::{DMatrix, DVector, dmatrix};
 

@@ -359,6 +359,9 @@ impl Writer<'_> {
             self.notes
                 .insert(format!("edges of zero width take {edge:e} s"));
         }
+        if let Wave::Dc(value) = source.wave {
+            return format!("dc {value:e}");
+        }
         format!("dc {:e} {wave}", source.dc)
     }
 
@@ -570,7 +573,7 @@ mod tests {
         b.s1_control s1_control 0 v=(0e0 + (1e0)*v(c))
         s1 out load s1_control 0 m.s1
         .model m.s1 sw(vt=1e0 vh=5e-1 ron=1e-3 roff=1e9)
-        vc c 0 dc 5e0 5e0
+        vc c 0 dc 5e0
         v.x1.r1_sense load x1.r1_sense 0
         r.x1.r1 x1.r1_sense 0 1e3
         c.x1.c1 load 0 1e-6 ic=1e0

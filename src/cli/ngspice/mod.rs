@@ -13,7 +13,7 @@ use super::cpu;
 use crate::waveform::{Waveforms, canonical_name, raw, unit_of};
 
 /// How long one run may take before it is stopped, s of wall clock.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_secs(20);
 /// How often a running ngspice is looked at.
 const GLANCE: Duration = Duration::from_millis(2);
 /// Runs of the trivial netlist whose fastest is the start-up time.

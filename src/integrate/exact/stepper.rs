@@ -216,7 +216,12 @@ impl<'a> Exact<'a> {
     /// Reads the storage vector at the current state.
     fn take_storage(&mut self) {
         if let Some(at) = self.mode {
-            self.plant.modes[at].storage_at(&self.motion.now, &mut self.storage);
+            let mode = &self.plant.modes[at];
+            mode.storage_at(&self.motion.now, &mut self.storage);
+            // An event often finds a current at zero: its size is what it was on the way.
+            for (i, scale) in self.scale.iter_mut().enumerate() {
+                *scale = scale.max(self.motion.reach(mode.storage.row(i).columns(0, mode.n)));
+            }
             self.rescale();
             let [source, dissipated] = std::mem::take(&mut self.motion.energy);
             self.balance.add((source, dissipated));

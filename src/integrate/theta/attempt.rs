@@ -36,7 +36,13 @@ impl Theta<'_> {
             let (step, new) = found.map_err(|reason| SimError::at(now.t, reason))?;
             let (mode, fused) = system.mode(step, &now.active);
             self.stats.factorisations += u64::from(new) + u64::from(fused);
-            *attempt = Attempt { step, mode, h, settle, solved: None };
+            *attempt = Attempt {
+                step,
+                mode,
+                h,
+                settle,
+                solved: None,
+            };
         }
         let n = now.x.len();
         let fused = system.step(attempt.step).fused(attempt.mode);
@@ -189,18 +195,19 @@ fn change_matrices(
 
 /// The error of a step problem without a solution; it names the device with the largest part in the contradiction, or
 /// with the largest residual.
-pub(super) fn unsolved(
-    solution: &Solution,
-    lcs: &Lcs,
-    t: f64,
-    tolerance: f64,
-) -> Option<SimError> {
+pub(super) fn unsolved(solution: &Solution, lcs: &Lcs, t: f64, tolerance: f64) -> Option<SimError> {
     let (reason, port) = match &solution.status {
         Status::Solved => return None,
         Status::Infeasible(ray) => (Reason::Infeasible, ray.imax()),
         Status::Failed => {
             let violation = solution.lambda.zip_map(&solution.y, |l, y| l.min(y).abs());
-            (Reason::Residual { residual: solution.residual, tolerance }, violation.imax())
+            (
+                Reason::Residual {
+                    residual: solution.residual,
+                    tolerance,
+                },
+                violation.imax(),
+            )
         }
     };
     Some(SimError::at(t, reason).device(lcs.ports[port].device.clone()))

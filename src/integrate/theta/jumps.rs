@@ -1,6 +1,7 @@
 //! What happens in no time: the start, edges of sources, switches.
 
 use super::*;
+use crate::integrate::jump::Jump;
 
 impl Theta<'_> {
     /// The first jump, from inconsistent initial values.
@@ -61,13 +62,13 @@ impl Theta<'_> {
         let u = DVector::from_column_slice(&self.now.u);
         let System { lcs, jump, .. } = &mut self.plant.systems[self.now.system].1;
         let found = match jump {
-            Some(problem) if problem.monotone => problem
-                .solve(lcs, &x, &u)
-                .map_err(|e| {
+            Some(problem) if problem.monotone => problem.solve(lcs, &x, &u).map_err(|e| {
                 SimError::at(t, Reason::Infeasible).device(lcs.ports[e.port].device.clone())
             })?,
-            _ => None,
+            Some(_) => self.step_limit()?,
+            None => None,
         };
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
         let (after, p) = match found {
             Some(jump) => (jump.x, jump.p.as_slice().to_vec()),
             None => (x.clone(), vec![0.0; lcs.m()]),
@@ -78,13 +79,35 @@ impl Theta<'_> {
             - energy::stored(lcs, x.as_slice(), old);
         self.now.balance.add((source, source - gain));
         let step: Vec<f64> = u.iter().zip(old).map(|(a, b)| a - b).collect();
-        if p.iter().any(|&p| p != 0.0) {
+        // A jump at the rounding of the amplitudes seen so far corrects the state and is not worth a word.
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        let size = self.amplitudes.error(lcs, x.as_slice(), after.as_slice());
+        self.now.x.copy_from_slice(after.as_slice());
+        if size > JUMP {
             self.stats.jumps += 1;
             log.event(t, "jump");
         }
-        self.now.x.copy_from_slice(after.as_slice());
-        self.log_impulses(t, &p, &step, log);
+        if size > JUMP || step.iter().any(|s| *s != 0.0) {
+            self.log_impulses(t, &p, &step, log);
+        }
         Ok(())
+    }
+
+    /// The jump of a network that is not passive, where no projection exists: the limit of the implicit step, p = hλ at h and
+    /// h/2 extrapolated. `None` where p vanishes with h.
+    fn step_limit(&mut self) -> Result<Option<Jump>, SimError> {
+        let h = self.read_step();
+        let mut p = |h: f64| -> Result<DVector<f64>, SimError> {
+            let step = self.prepare_short(h)?;
+            Ok(self.solve_short(step)?.lambda * h)
+        };
+        let (whole, half) = (p(h)?, p(0.5 * h)?);
+        if half.amax() <= IMPULSE_RATIO * whole.amax() {
+            return Ok(None);
+        }
+        let p = half * 2.0 - whole;
+        let x = DVector::from_column_slice(&self.now.x) + &self.system().lcs.b * &p;
+        Ok(Some(Jump { x, p }))
     }
 
     /// Impulses of the ports and of the outputs, by name, once each.
@@ -150,33 +173,36 @@ impl Theta<'_> {
         Ok(self.switches.update(lcs, at, false))
     }
 
-    /// Flips the switches whose controls ask for it until none does, with the jumps this causes.
-    pub(super) fn switch(&mut self, log: &mut Log) -> Result<(), SimError> {
+    /// Flips the switches `moving`, then those whose controls ask for it until none does, with the jumps this causes.
+    pub(super) fn switch(&mut self, moving: &[usize], log: &mut Log) -> Result<(), SimError> {
         if log.wants_rows() {
             self.log_row(log);
         }
-        for _ in 0..2 + 2 * self.switches.len() {
-            if self.switches.needs_lambda() {
-                self.read_lambda()?;
-            }
-            let lcs = &self.plant.systems[self.now.system].1.lcs;
-            let at = Point {
-                x: &self.now.x,
-                lambda: &self.lambda,
-                u: &self.now.u,
-                du: &self.du,
-            };
-            let before = self.switches.position().to_vec();
-            if !self.switches.update(lcs, at, true) {
-                if log.wants_rows() {
-                    self.log_row(log);
+        let mut before = self.switches.position().to_vec();
+        self.switches.toggle(moving);
+        for _ in 0..2 + 2 * before.len() {
+            if self.switches.position() == before {
+                if self.switches.needs_lambda() {
+                    self.read_lambda()?;
                 }
-                return Ok(());
+                let lcs = &self.plant.systems[self.now.system].1.lcs;
+                let at = Point {
+                    x: &self.now.x,
+                    lambda: &self.lambda,
+                    u: &self.now.u,
+                    du: &self.du,
+                };
+                if !self.switches.update(lcs, at, true) {
+                    if log.wants_rows() {
+                        self.log_row(log);
+                    }
+                    return Ok(());
+                }
             }
-            let names = self.switches.flipped(&before);
             self.stats.events += 1;
-            log.event(self.now.t, names);
+            log.event(self.now.t, self.switches.flipped(&before));
             self.change_position(log)?;
+            before = self.switches.position().to_vec();
         }
         Err(SimError::at(self.now.t, Reason::SwitchesDoNotSettle)
             .device(self.switches.flipped(&[])))

@@ -144,7 +144,7 @@ impl Theta<'_> {
             }
             self.preferred = h;
             self.report(log);
-            self.switch(log)?;
+            self.switch(&[], log)?;
         }
         if impulse {
             self.now.settle = true;

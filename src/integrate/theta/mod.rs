@@ -22,7 +22,7 @@ use crate::integrate::inputs::Inputs;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
 use crate::integrate::stats::Stats;
-use crate::integrate::step::Scheme;
+use crate::integrate::step::{SHORT, Scheme};
 use crate::integrate::switching::{Switches, Threshold};
 use crate::integrate::system::{Plant, Reduce, System};
 use crate::lcs::{Lcs, Port, Role};
@@ -81,9 +81,8 @@ const LOCATE: u32 = 24;
 /// Switchings in one base step after which they are no longer located but taken at the ends of whole base steps
 /// (chattering: the base step then decides how fast a sliding switch switches).
 const CHATTER: u32 = 32;
-/// λ at an output time is that of one implicit step shorter than the last one by 2^READ: its error is 2^−READ of the step's,
-/// the amplified rounding of the state 2^READ ε.
-const READ: i32 = 12;
+/// Jumps below this part of a state's amplitude are rounding.
+const JUMP: f64 = 1e-12;
 /// A spontaneous impulse is recognised by p = hλ that does not shrink with h: p(h/2) above this part of p(h), where
 /// a finite λ gives at most one half.
 const IMPULSE_RATIO: f64 = 0.75;
@@ -109,6 +108,8 @@ pub struct Theta<'a> {
     lambda: Vec<f64>,
     attempt: Attempt,
     coarse: Vec<f64>,
+    /// Buffer for s.
+    storage: Vec<f64>,
     control: Option<Control>,
     stats: Stats,
     modes: BTreeSet<(usize, Vec<bool>)>,
@@ -236,6 +237,7 @@ impl<'a> Theta<'a> {
             lambda: Vec::new(),
             attempt: Attempt::default(),
             coarse: Vec::new(),
+            storage: Vec::new(),
             control,
             stats: Stats::default(),
             modes: BTreeSet::new(),
@@ -262,7 +264,12 @@ impl<'a> Theta<'a> {
 
     /// Takes note of the present state's size.
     pub fn see(&mut self) {
-        let Self { amplitudes, plant, now, .. } = self;
+        let Self {
+            amplitudes,
+            plant,
+            now,
+            ..
+        } = self;
         amplitudes.see(&plant.systems[now.system].1.lcs, &now.x);
     }
 
@@ -274,8 +281,15 @@ impl<'a> Theta<'a> {
         self.begin(&mut Log::new(0, f64::INFINITY, false))?;
         self.read_lambda()?;
         let lcs = &self.plant.systems[self.now.system].1.lcs;
-        let at = Point { x: &self.now.x, lambda: &self.lambda, u: &self.now.u, du: &self.du };
-        Ok((0..self.switches.len()).map(|i| reading::value(&lcs.controls, i, at)).collect())
+        let at = Point {
+            x: &self.now.x,
+            lambda: &self.lambda,
+            u: &self.now.u,
+            du: &self.du,
+        };
+        Ok((0..self.switches.len())
+            .map(|i| reading::value(&lcs.controls, i, at))
+            .collect())
     }
 
     /// The state x of the present system.
@@ -323,8 +337,10 @@ impl Stepper for Theta<'_> {
     fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), SimError> {
         if !self.started {
             self.begin(log)?;
-            if !self.switches.is_empty() && self.crossed()? {
-                self.switch(log)?;
+            let lcs = &self.plant.systems[self.now.system].1.lcs;
+            let moving = self.switches.misplaced(lcs, &self.now.u);
+            if !moving.is_empty() || self.switches.watch() && self.crossed()? {
+                self.switch(&moving, log)?;
             }
         }
         while self.now.t < t {
@@ -337,24 +353,27 @@ impl Stepper for Theta<'_> {
                 }
                 after = next;
             };
-            let known =
+            let merged = (t - breakpoint).abs() <= Self::slack(t);
+            let limit = if merged {
+                breakpoint.max(t)
+            } else {
+                breakpoint.min(t)
+            };
+            let (known, moving) =
                 self.switches
-                    .next_known(&self.system().lcs, &self.inputs, now, breakpoint.min(t));
-            let mut stop = t.min(breakpoint);
-            if (t - breakpoint).abs() <= Self::slack(t) {
-                stop = t;
-            }
-            let switching = known.is_some_and(|k| k < stop - Self::slack(stop));
-            if switching && let Some(known) = known {
+                    .next_known(&self.system().lcs, &self.inputs, now, limit);
+            let mut stop = if merged { t } else { limit };
+            let early = known < stop - Self::slack(stop);
+            if early {
                 stop = known;
             }
             self.interval(stop, log)?;
-            let at_breakpoint = !switching && (breakpoint - stop).abs() <= Self::slack(stop);
+            let at_breakpoint = !early && (breakpoint - stop).abs() <= Self::slack(stop);
             if at_breakpoint {
                 self.edge(breakpoint.max(stop), log)?;
             }
-            if !self.switches.is_empty() && (at_breakpoint || known.is_some()) && self.crossed()? {
-                self.switch(log)?;
+            if !moving.is_empty() || at_breakpoint && self.switches.watch() && self.crossed()? {
+                self.switch(&moving, log)?;
             }
         }
         self.note_energy();
@@ -372,7 +391,7 @@ impl Stepper for Theta<'_> {
         if !self.not_unique.is_empty() {
             let names: Vec<&str> = self.not_unique.iter().map(String::as_str).collect();
             notes.push(format!(
-                "currents through {} are not determined by the ideal model; the least-norm choice is shown",
+                "voltages or currents of {} are not determined by the ideal model; the least-norm choice is shown",
                 names.join(", ")
             ));
         }

@@ -1,0 +1,32 @@
+//! The zener diode: conducts above the forward drop and below the breakdown voltage.
+
+use super::{Curve, Law, ONE, ZERO};
+use crate::algebra::Value;
+
+impl Law {
+    /// i ≥ 0 at v = `vfwd`, i ≤ 0 at v = −`vz`, i = 0 between; both voltages positive.
+    #[must_use]
+    pub fn zener(vz: Value, vfwd: Value) -> Self {
+        Self::Curve(Curve {
+            kind: "zener",
+            vertices: vec![(vz.negated(), ZERO), (vfwd, ZERO)],
+            first: (ZERO, ONE),
+            last: (ZERO, ONE),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_zener_clamps_both_ways() {
+        let curve = Law::zener(5.0.into(), 1.0.into()).curve();
+        assert_eq!(curve.resolvent(1.0, 3.0), (1.0, 2.0));
+        assert_eq!(curve.resolvent(1.0, 0.5), (0.5, 0.0));
+        assert_eq!(curve.resolvent(1.0, -7.0), (-5.0, -2.0));
+        assert_eq!(curve.potential(0.0), 0.0);
+        assert_eq!(curve.potential(-5.1), f64::INFINITY);
+    }
+}

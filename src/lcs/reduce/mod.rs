@@ -1,0 +1,253 @@
+//! From port behaviour to the complementarity system of one position.
+//!
+//! The columns of the behaviour are eliminated in class order (DESIGN 3.2): quantities nobody prescribes, rates of
+//! storage (i_C, v_L), device currents, device voltages of devices not yet used, states. What stays free are the
+//! sources, the states x, one of (v, i) per device = λ, and the undetermined quantities f: rates of storage that
+//! depends on other storage, held quantities that the position pins only through the states. With s = S_x x + S_u u + k all
+//! storage quantities, P their energy matrix and P s' = K_x x + K_f f + K_λ λ + K_u u + k' their rates,
+//!
+//! ```text
+//! [P S_x, −K_f] [x'; f] = K_x x + K_λ λ + K_u u + k' − P S_u u'
+//! [P S_x, −K_f] [x⁺; F] = P s⁻ − P S_u u − P k
+//! ```
+//!
+//! give the flow and, with the same matrix, the state x⁺ after charge and flux are conserved (F = ∫ f are the impulses).
+//! The part of x that follows u' is the shift: x_physical = x + Σ u, so that no derivative appears in x'.
+
+mod eliminated;
+mod flow;
+mod frame;
+mod publish;
+
+use crate::algebra::Field;
+use crate::mna::{Behaviour, Reduced};
+
+use super::{Hold, Lcs, Role};
+use eliminated::Eliminated;
+use publish::publish;
+
+/// What each device and switch is held as.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Position {
+    /// One entry per device pair.
+    pub devices: Vec<Hold>,
+    /// On or off, one entry per switch.
+    pub switches: Vec<bool>,
+    /// Whether capacitors and inductors are storage or, for an operating point, open and short.
+    pub storage: StorageHold,
+}
+
+/// How storage elements enter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum StorageHold {
+    /// C v' = i, L i' = v.
+    Dynamic,
+    /// Capacitors are open (i = 0) and inductors short (v = 0): the operating point. The system has no states; the storage
+    /// vector is read from [`Storage`](super::Storage).
+    Static,
+}
+
+impl Position {
+    /// All devices free, the given switch positions.
+    #[must_use]
+    pub fn free(behaviour: &Behaviour, switches: Vec<bool>) -> Self {
+        Self {
+            devices: vec![Hold::Free; behaviour.pairs.len()],
+            switches,
+            storage: StorageHold::Dynamic,
+        }
+    }
+}
+
+/// Why a position has no system.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ReduceError {
+    /// Numbers of devices or switches differ from the behaviour's.
+    #[error("a position with {given} {what} for a circuit with {expected}")]
+    Position {
+        /// `devices` or `switches`.
+        what: &'static str,
+        /// In the position.
+        given: usize,
+        /// In the circuit.
+        expected: usize,
+    },
+    /// Only ideal pairs can be held conducting or blocking.
+    #[error("{device} is not an ideal pair and cannot be held; standardise its law first")]
+    NotIdeal {
+        /// The device.
+        device: String,
+    },
+    /// A loop of voltage sources or a cut-set of current sources.
+    #[error("{} prescribe each other's voltages or currents (a loop of voltage sources or a cut-set of current sources)", .elements.join(", "))]
+    Sources {
+        /// The sources, and what joins them.
+        elements: Vec<String>,
+    },
+    /// The two quantities of a device are not free of each other.
+    #[error("the circuit prescribes both voltage and current around {}", .elements.join(", "))]
+    Port {
+        /// The devices.
+        elements: Vec<String>,
+    },
+    /// A dependent storage element follows λ, so that the system would contain λ'.
+    #[error("{storage} follows {} without delay, so its {} would be a derivative", .ports.join(", "), if .storage.starts_with('v') { "current" } else { "voltage" })]
+    Feedthrough {
+        /// `v(c1)`.
+        storage: String,
+        /// The devices.
+        ports: Vec<String>,
+    },
+    /// A quantity of a port contains the derivative of a source.
+    #[error("{port} depends on the derivative of {}", .sources.join(", "))]
+    SourceRate {
+        /// The port.
+        port: String,
+        /// The sources.
+        sources: Vec<String>,
+    },
+    /// The rates of these storage elements are not determined.
+    #[error("the rates of {} are not determined: the storage matrix is singular", .elements.join(", "))]
+    Singular {
+        /// Storage labels.
+        elements: Vec<String>,
+    },
+}
+
+/// Reduces a behaviour to the system of one position.
+///
+/// With all devices [`Hold::Free`] this is the complementarity system; with all held it is the linear system of that
+/// mode, whose guards stand in [`Lcs::held`].
+///
+/// # Errors
+/// [`ReduceError`], naming elements, where the position has no such system.
+pub fn reduce(behaviour: &Behaviour, position: &Position) -> Result<Lcs, ReduceError> {
+    check(behaviour, position)?;
+    let balls = in_some_order(behaviour, behaviour.ball(), position)?;
+    let (lcs, precise) = publish(behaviour, position, &balls);
+    if precise || behaviour.inexact {
+        return Ok(lcs);
+    }
+    let exact = in_some_order(behaviour, behaviour.rational(), position)?;
+    Ok(publish(behaviour, position, &exact).0)
+}
+
+fn check(behaviour: &Behaviour, position: &Position) -> Result<(), ReduceError> {
+    let counts = [
+        ("devices", position.devices.len(), behaviour.pairs.len()),
+        (
+            "switches",
+            position.switches.len(),
+            behaviour.switches.len(),
+        ),
+    ];
+    for (what, given, expected) in counts {
+        if given != expected {
+            return Err(ReduceError::Position {
+                what,
+                given,
+                expected,
+            });
+        }
+    }
+    for (pair, hold) in behaviour.pairs.iter().zip(&position.devices) {
+        let ideal = !pair.fixed_role && pair.port.law.is_ideal_diode();
+        if *hold != Hold::Free && !ideal {
+            return Err(ReduceError::NotIdeal {
+                device: pair.port.device.clone(),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// The order of the classes. Greedy order alone can accuse a sound active network, so others are tried before an error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum ClassOrder {
+    /// As in DESIGN 3.2.
+    Standard,
+    /// Of each device first the quantity that is otherwise second choice.
+    OtherRole,
+    /// Devices before the rates of storage.
+    DevicesFirst,
+    /// Both.
+    OtherRoleFirst,
+}
+
+/// The reduction over one field.
+fn in_some_order<F: Field>(
+    behaviour: &Behaviour,
+    reduced: &Reduced<F>,
+    position: &Position,
+) -> Result<Reduction<F>, ReduceError> {
+    let first = Eliminated::new(behaviour, reduced, position, ClassOrder::Standard).system();
+    let Err(error) = first else { return first };
+    if matches!(error, ReduceError::Sources { .. }) || position.storage == StorageHold::Static {
+        return Err(error);
+    }
+    [
+        ClassOrder::OtherRole,
+        ClassOrder::DevicesFirst,
+        ClassOrder::OtherRoleFirst,
+    ]
+    .into_iter()
+    .find_map(|order| {
+        Eliminated::new(behaviour, reduced, position, order)
+            .system()
+            .ok()
+    })
+    .ok_or(error)
+}
+
+/// A system over a field, before it is written as doubles.
+#[derive(Debug)]
+struct Reduction<F> {
+    /// Storage indices of the states.
+    states: Vec<usize>,
+    /// The free pairs and their roles.
+    pairs: Vec<(usize, Role)>,
+    /// Rows over [x | λ | u | u' | 1]: x', one per state.
+    rates: Vec<Vec<F>>,
+    /// y, one per free pair.
+    y: Vec<Vec<F>>,
+    /// s, one per storage quantity.
+    s: Vec<Vec<F>>,
+    /// One per observed quantity, each with its impulse row over s⁻ − s⁺.
+    readings: Vec<(Vec<F>, Vec<F>)>,
+    /// One per held pair, in the same way.
+    guards: Vec<(Vec<F>, Vec<F>)>,
+    /// Guards × undetermined directions.
+    kernel: Vec<Vec<F>>,
+    /// Rows that must vanish.
+    constraints: Vec<Vec<F>>,
+    /// n×p.
+    shift: Vec<Vec<F>>,
+    /// n×(q + 1): J and the constant.
+    inject: Vec<Vec<F>>,
+    /// n×n.
+    energy: Vec<Vec<F>>,
+    /// q×q entries.
+    metric: Vec<(usize, usize, F)>,
+    /// What a least-norm choice has settled.
+    notes: Vec<String>,
+}
+
+#[cfg(test)]
+pub(super) mod oracle {
+    use super::*;
+
+    type Published = Result<(Lcs, bool), ReduceError>;
+
+    /// The system over balls (with whether it is precise) and over rationals.
+    pub(in crate::lcs) fn both(
+        behaviour: &Behaviour,
+        position: &Position,
+    ) -> (Published, Published) {
+        let ball = in_some_order(behaviour, behaviour.ball(), position);
+        let exact = in_some_order(behaviour, behaviour.rational(), position);
+        (
+            ball.map(|r| publish(behaviour, position, &r)),
+            exact.map(|r| publish(behaviour, position, &r)),
+        )
+    }
+}

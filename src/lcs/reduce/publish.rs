@@ -1,0 +1,191 @@
+//! Writes a reduction as matrices of doubles with names and units.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::algebra::Field;
+use crate::lcs::{Held, Hold, Lcs, Outputs, Port, PowerTerm, Role, Rows, State, Storage};
+use crate::mna::Behaviour;
+
+use super::{Position, Reduction};
+
+/// Rounds numbers to doubles and remembers whether all of them were known well enough.
+struct Rounding {
+    precise: bool,
+}
+
+impl Rounding {
+    fn number<F: Field>(&mut self, x: &F) -> f64 {
+        if x.is_zero() {
+            return 0.0;
+        }
+        self.precise &= x.is_precise();
+        x.to_f64()
+    }
+
+    /// Columns `columns` of some rows.
+    fn matrix<F: Field>(&mut self, rows: &[&[F]], columns: std::ops::Range<usize>) -> DMatrix<f64> {
+        let mut matrix = DMatrix::zeros(rows.len(), columns.len());
+        for (r, row) in rows.iter().enumerate() {
+            for (k, x) in row[columns.clone()].iter().enumerate() {
+                matrix[(r, k)] = self.number(x);
+            }
+        }
+        matrix
+    }
+
+    fn vector<F: Field>(&mut self, rows: &[&[F]], column: usize) -> DVector<f64> {
+        DVector::from_iterator(rows.len(), rows.iter().map(|row| self.number(&row[column])))
+    }
+
+    fn rows<F: Field>(&mut self, rows: &[&[F]], n: usize, m: usize, p: usize) -> Rows {
+        Rows {
+            x: self.matrix(rows, 0..n),
+            lambda: self.matrix(rows, n..n + m),
+            u: self.matrix(rows, n + m..n + m + p),
+            du: self.matrix(rows, n + m + p..n + m + 2 * p),
+            one: self.vector(rows, n + m + 2 * p),
+        }
+    }
+}
+
+fn slices<F>(rows: &[Vec<F>]) -> Vec<&[F]> {
+    rows.iter().map(Vec::as_slice).collect()
+}
+
+/// The system as doubles, and whether every entry is within 1e-14 of the exact one.
+pub(super) fn publish<F: Field>(
+    behaviour: &Behaviour,
+    position: &Position,
+    reduction: &Reduction<F>,
+) -> (Lcs, bool) {
+    let r = reduction;
+    let (n, m, p, q) = (
+        r.states.len(),
+        r.pairs.len(),
+        behaviour.sources.len(),
+        behaviour.storage.len(),
+    );
+    let mut round = Rounding { precise: true };
+    let (rates, y, s) = (slices(&r.rates), slices(&r.y), slices(&r.s));
+    let (values, impulses): (Vec<&[F]>, Vec<&[F]>) = r
+        .readings
+        .iter()
+        .map(|(row, impulse)| (row.as_slice(), impulse.as_slice()))
+        .unzip();
+    let pick = |which: &mut dyn Iterator<Item = usize>| -> Vec<&[F]> {
+        which.filter_map(|k| values.get(k).copied()).collect()
+    };
+    let width = |rows: &[&[F]]| rows.first().map_or(0, |row| row.len());
+    let probes = &behaviour.observed[..behaviour.probes];
+    let outputs = Outputs {
+        names: probes.iter().map(|probe| probe.name.clone()).collect(),
+        units: probes.iter().map(|probe| probe.unit).collect(),
+        rows: round.rows(&values[..probes.len()], n, m, p),
+        impulse: round.matrix(&impulses[..probes.len()], 0..width(&impulses)),
+        power: (behaviour.power.iter())
+            .map(|w| PowerTerm {
+                element: w.element.clone(),
+                kind: w.kind,
+            })
+            .collect(),
+        power_v: round.rows(&pick(&mut behaviour.power.iter().map(|w| w.v)), n, m, p),
+        power_i: round.rows(&pick(&mut behaviour.power.iter().map(|w| w.i)), n, m, p),
+    };
+    let controls = pick(&mut behaviour.switches.iter().map(|s| s.control));
+    let guards: Vec<&[F]> = r.guards.iter().map(|g| g.0.as_slice()).collect();
+    let guard_impulses: Vec<&[F]> = r.guards.iter().map(|g| g.1.as_slice()).collect();
+    let kernel = slices(&r.kernel);
+    let held_pairs = (position.devices.iter().enumerate())
+        .filter(|(_, hold)| **hold != Hold::Free)
+        .map(|(k, _)| k)
+        .collect();
+    let held = Held {
+        pairs: held_pairs,
+        guard: round.rows(&guards, n, m, p),
+        kernel: round.matrix(&kernel, 0..width(&kernel)),
+        constraints: round.rows(&slices(&r.constraints), n, m, p),
+        impulse: round.matrix(&guard_impulses, 0..width(&guard_impulses)),
+    };
+    let mut metric = DMatrix::zeros(q, q);
+    for (a, b, x) in &r.metric {
+        metric[(*a, *b)] = round.number(x);
+    }
+    let inject = slices(&r.inject);
+    let has_dynamics = width(&inject) > 0;
+    let storage = Storage {
+        names: behaviour.storage.iter().map(|s| s.name.clone()).collect(),
+        x: round.matrix(&s, 0..n),
+        lambda: round.matrix(&s, n..n + m),
+        u: round.matrix(&s, n + m..n + m + p),
+        one: round.vector(&s, n + m + 2 * p),
+        metric,
+        inject: if has_dynamics {
+            round.matrix(&inject, 0..q)
+        } else {
+            DMatrix::zeros(n, q)
+        },
+        inject_one: if has_dynamics {
+            round.vector(&inject, q)
+        } else {
+            DVector::zeros(n)
+        },
+        initial: DVector::from_iterator(
+            q,
+            behaviour.storage.iter().map(|s| s.initial.unwrap_or(0.0)),
+        ),
+    };
+    let lcs = Lcs {
+        title: behaviour.title.clone(),
+        states: r.states.iter().map(|&k| state(behaviour, k)).collect(),
+        inputs: behaviour.sources.iter().map(|s| s.input.clone()).collect(),
+        ports: r
+            .pairs
+            .iter()
+            .map(|&(k, role)| port(behaviour, k, role))
+            .collect(),
+        a: round.matrix(&rates, 0..n),
+        b: round.matrix(&rates, n..n + m),
+        c: round.matrix(&y, 0..n),
+        d: round.matrix(&y, n..n + m),
+        e: round.matrix(&rates, n + m..n + m + p),
+        g: round.matrix(&y, n + m..n + m + p),
+        e0: round.vector(&rates, n + m + 2 * p),
+        f: round.vector(&y, n + m + 2 * p),
+        shift: round
+            .matrix(&slices(&r.shift), 0..if n > 0 { p } else { 0 })
+            .resize(n, p, 0.0),
+        energy: round.matrix(&slices(&r.energy), 0..n),
+        outputs,
+        storage,
+        switches: (behaviour.switches.iter())
+            .zip(&position.switches)
+            .map(|(switch, on)| (switch.name.clone(), *on))
+            .collect(),
+        controls: round.rows(&controls, n, m, p),
+        held,
+        notes: r.notes.clone(),
+    };
+    (lcs, round.precise)
+}
+
+fn state(behaviour: &Behaviour, k: usize) -> State {
+    let storage = &behaviour.storage[k];
+    State {
+        name: storage.name.clone(),
+        unit: if storage.capacitor { "V" } else { "A" },
+    }
+}
+
+fn port(behaviour: &Behaviour, k: usize, role: Role) -> Port {
+    let pair = &behaviour.pairs[k];
+    let (lambda, y) = match role {
+        Role::Voltage => (&pair.reverse_name, &pair.forward_name),
+        Role::Current | Role::Function => (&pair.forward_name, &pair.reverse_name),
+    };
+    Port {
+        role,
+        lambda: lambda.clone(),
+        y: y.clone(),
+        ..pair.port.clone()
+    }
+}

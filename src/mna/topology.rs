@@ -1,0 +1,421 @@
+//! What the graph of a circuit says before any number is looked at: islands, the normal tree, and the loops and
+//! cut-sets that make a circuit impossible or take a state away.
+
+use std::collections::VecDeque;
+
+use petgraph::unionfind::UnionFind;
+
+use crate::algebra::Field;
+use crate::circuit::source::Wave;
+use crate::circuit::{Circuit, Element, Kind, Output};
+use crate::diagnostic::Diagnostic;
+
+/// The graph's findings, by element and node names.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Topology {
+    /// Parts without a path to ground: their nodes, the reference first.
+    pub islands: Vec<Vec<String>>,
+    /// The elements of the normal tree: voltage sources, then capacitors, then resistors, devices and switches, then
+    /// inductors, then current sources, as long as no loop closes.
+    pub tree: Vec<String>,
+    /// The other elements.
+    pub links: Vec<String>,
+    /// Loops of voltage sources and cut-sets of current sources (errors); capacitor loops, inductor cut-sets and dangling
+    /// nodes (notes).
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// The classes of the normal tree, in its order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Class {
+    Voltage,
+    Capacitor,
+    Middle,
+    Inductor,
+    Current,
+}
+
+fn class(element: &Element) -> Class {
+    match &element.kind {
+        Kind::Resistor(r) if r.f64 == 0.0 => Class::Voltage,
+        Kind::Inductor(l) if l.f64 == 0.0 => Class::Voltage,
+        Kind::Capacitor(c) if c.f64 == 0.0 => Class::Current,
+        Kind::VoltageSource(_) => Class::Voltage,
+        Kind::CurrentSource(_) => Class::Current,
+        Kind::Controlled { output, .. } | Kind::Function { output, .. } => match output {
+            Output::Voltage => Class::Voltage,
+            Output::Current => Class::Current,
+        },
+        Kind::Capacitor(_) => Class::Capacitor,
+        Kind::Inductor(_) => Class::Inductor,
+        Kind::Resistor(_) | Kind::Device(_) | Kind::Switch(_) => Class::Middle,
+    }
+}
+
+/// Reads the graph of a circuit.
+#[must_use]
+pub fn topology(circuit: &Circuit) -> Topology {
+    let mut order: Vec<usize> = (0..circuit.elements.len()).collect();
+    order.sort_by_key(|&k| class(&circuit.elements[k]));
+    let graph = Graph::new(circuit, &order);
+    let names = |which: bool| {
+        let chosen = circuit
+            .elements
+            .iter()
+            .zip(&graph.in_tree)
+            .filter(|(_, t)| **t == which);
+        chosen.map(|(e, _)| e.name.clone()).collect()
+    };
+    let mut diagnostics = Vec::new();
+    for (k, element) in circuit.elements.iter().enumerate() {
+        let class = class(element);
+        let finding = match (class, graph.in_tree[k]) {
+            (Class::Voltage, false) => voltage_loop(circuit, &graph.loop_of(k)),
+            (Class::Current, true) => current_cut(circuit, &graph.cut_of(k)),
+            (Class::Capacitor, false) => capacitor_loop(circuit, &graph.loop_of(k)),
+            (Class::Inductor, true) => inductor_cut(circuit, &graph.cut_of(k)),
+            _ => None,
+        };
+        diagnostics.extend(finding);
+    }
+    diagnostics.extend(dangling(circuit));
+    Topology {
+        islands: islands(circuit),
+        tree: names(true),
+        links: names(false),
+        diagnostics,
+    }
+}
+
+/// A spanning forest grown in a given order of elements.
+struct Graph<'c> {
+    circuit: &'c Circuit,
+    in_tree: Vec<bool>,
+    /// For each node the tree elements at it.
+    at: Vec<Vec<usize>>,
+}
+
+impl<'c> Graph<'c> {
+    fn new(circuit: &'c Circuit, order: &[usize]) -> Self {
+        let mut sets = UnionFind::<usize>::new(circuit.nodes.len());
+        let mut in_tree = vec![false; circuit.elements.len()];
+        let mut at = vec![Vec::new(); circuit.nodes.len()];
+        for &k in order {
+            let (p, n) = ends(circuit, k);
+            if sets.union(p, n) {
+                in_tree[k] = true;
+                at[p].push(k);
+                at[n].push(k);
+            }
+        }
+        Self {
+            circuit,
+            in_tree,
+            at,
+        }
+    }
+
+    /// The elements of the loop that a link closes, the link last, each with the sign of its voltage around the loop.
+    fn loop_of(&self, link: usize) -> Vec<(usize, f64)> {
+        let (p, n) = ends(self.circuit, link);
+        // Breadth-first from p to n through the tree; `via` is the element by which a node was reached.
+        let mut via: Vec<Option<usize>> = vec![None; self.at.len()];
+        let mut queue = VecDeque::from([p]);
+        while let Some(node) = queue.pop_front() {
+            for &k in &self.at[node] {
+                let next = self.far(k, node);
+                if next != p && via[next].is_none() {
+                    via[next] = Some(k);
+                    queue.push_back(next);
+                }
+            }
+        }
+        let mut members = vec![(link, -1.0)];
+        let mut node = n;
+        while let (true, Some(k)) = (node != p, via[node]) {
+            let before = self.far(k, node);
+            members.push((
+                k,
+                if ends(self.circuit, k).0 == before {
+                    1.0
+                } else {
+                    -1.0
+                },
+            ));
+            node = before;
+        }
+        members.reverse();
+        members
+    }
+
+    /// The elements between the two parts that removing a tree element leaves, each with the sign of its current.
+    fn cut_of(&self, branch: usize) -> Vec<(usize, f64)> {
+        let (p, _) = ends(self.circuit, branch);
+        let mut inside = vec![false; self.at.len()];
+        inside[p] = true;
+        let mut queue = VecDeque::from([p]);
+        while let Some(node) = queue.pop_front() {
+            for &k in self.at[node].iter().filter(|&&k| k != branch) {
+                let next = self.far(k, node);
+                if !inside[next] {
+                    inside[next] = true;
+                    queue.push_back(next);
+                }
+            }
+        }
+        (0..self.circuit.elements.len())
+            .filter_map(|k| {
+                let (p, n) = ends(self.circuit, k);
+                (inside[p] != inside[n]).then_some((k, if inside[p] { 1.0 } else { -1.0 }))
+            })
+            .collect()
+    }
+
+    fn far(&self, element: usize, node: usize) -> usize {
+        let (p, n) = ends(self.circuit, element);
+        if p == node { n } else { p }
+    }
+}
+
+fn ends(circuit: &Circuit, k: usize) -> (usize, usize) {
+    (circuit.elements[k].p.index(), circuit.elements[k].n.index())
+}
+
+fn listed(circuit: &Circuit, members: &[(usize, f64)]) -> String {
+    let mut members: Vec<usize> = members.iter().map(|m| m.0).collect();
+    members.sort_unstable();
+    let names: Vec<&str> = members
+        .iter()
+        .map(|&k| circuit.elements[k].name.as_str())
+        .collect();
+    match names.as_slice() {
+        [rest @ .., last] if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
+        _ => names.join(", "),
+    }
+}
+
+/// Whether Σ ± source = 0 for all time, `None` where something other than independent sources and shorts takes part.
+fn cancels(circuit: &Circuit, members: &[(usize, f64)]) -> Option<bool> {
+    let mut constant = <crate::algebra::Rational as Field>::zero();
+    let mut sums: Vec<(&Wave, f64)> = Vec::new();
+    for &(k, sign) in members {
+        match &circuit.elements[k].kind {
+            Kind::VoltageSource(source) | Kind::CurrentSource(source) => match &source.wave {
+                Wave::Dc(value) => constant += crate::algebra::rational(sign * value),
+                wave => match sums.iter_mut().find(|(w, _)| *w == wave) {
+                    Some((_, sum)) => *sum += sign,
+                    None => sums.push((wave, sign)),
+                },
+            },
+            Kind::Resistor(_) | Kind::Inductor(_) | Kind::Capacitor(_) => {}
+            _ => return None,
+        }
+    }
+    Some(Field::is_zero(&constant) && sums.iter().all(|(_, sum)| *sum == 0.0))
+}
+
+fn voltage_loop(circuit: &Circuit, members: &[(usize, f64)]) -> Option<Diagnostic> {
+    if cancels(circuit, members)? {
+        return None;
+    }
+    let span = members.last().and_then(|m| circuit.elements[m.0].span);
+    let what = listed(circuit, members);
+    let message = if let [_] = members {
+        format!("{what} is shorted")
+    } else {
+        format!("{what} form a loop of voltage sources that contradict each other")
+    };
+    Some(
+        Diagnostic::error("voltage-loop", span, message)
+            .help("a small resistor in the loop decides how the sources share"),
+    )
+}
+
+fn current_cut(circuit: &Circuit, members: &[(usize, f64)]) -> Option<Diagnostic> {
+    if cancels(circuit, members)? {
+        return None;
+    }
+    let span = members.first().and_then(|m| circuit.elements[m.0].span);
+    let what = listed(circuit, members);
+    let message = if let [_] = members {
+        format!("the current of {what} has no way back")
+    } else {
+        format!("{what} are a cut-set of current sources that contradict each other")
+    };
+    Some(
+        Diagnostic::error("current-cutset", span, message)
+            .help("a resistor across one of them gives its current a path"),
+    )
+}
+
+fn capacitor_loop(circuit: &Circuit, members: &[(usize, f64)]) -> Option<Diagnostic> {
+    let link = &circuit.elements[members.last()?.0];
+    let what = listed(circuit, members);
+    let message = if let [_] = members {
+        format!("{what} is shorted: its voltage is 0")
+    } else {
+        format!(
+            "{what} form a loop, so v({}) is not a state of its own",
+            link.name
+        )
+    };
+    Some(Diagnostic::note("capacitor-loop", link.span, message))
+}
+
+fn inductor_cut(circuit: &Circuit, members: &[(usize, f64)]) -> Option<Diagnostic> {
+    let mut inductors = members
+        .iter()
+        .filter(|m| class(&circuit.elements[m.0]) == Class::Inductor);
+    let first = &circuit.elements[inductors.next()?.0];
+    let what = listed(circuit, members);
+    let message = if let [_] = members {
+        format!("{what} leads nowhere: its current is 0")
+    } else {
+        format!(
+            "{what} are a cut-set, so i({}) is not a state of its own",
+            first.name
+        )
+    };
+    Some(Diagnostic::note("inductor-cutset", first.span, message))
+}
+
+/// Nodes with a single connection.
+fn dangling(circuit: &Circuit) -> Vec<Diagnostic> {
+    let mut touching: Vec<Vec<usize>> = vec![Vec::new(); circuit.nodes.len()];
+    for k in 0..circuit.elements.len() {
+        let (p, n) = ends(circuit, k);
+        touching[p].push(k);
+        touching[n].push(k);
+    }
+    let lonely = touching
+        .iter()
+        .enumerate()
+        .skip(1)
+        .filter(|(_, list)| list.len() == 1);
+    lonely
+        .map(|(node, list)| {
+            let element = &circuit.elements[list[0]];
+            let message = format!(
+                "nothing but {} is connected to node {}",
+                element.name, circuit.nodes[node]
+            );
+            Diagnostic::note("dangling-node", element.span, message)
+        })
+        .collect()
+}
+
+/// The nodes of every part without ground, the first in file order (its reference) first.
+fn islands(circuit: &Circuit) -> Vec<Vec<String>> {
+    let mut sets = UnionFind::<usize>::new(circuit.nodes.len());
+    for k in 0..circuit.elements.len() {
+        let (p, n) = ends(circuit, k);
+        sets.union(p, n);
+    }
+    let mut islands: Vec<(usize, Vec<String>)> = Vec::new();
+    for (node, name) in circuit.nodes.iter().enumerate().skip(1) {
+        let root = sets.find(node);
+        if root == sets.find(0) {
+            continue;
+        }
+        match islands.iter_mut().find(|i| i.0 == root) {
+            Some(island) => island.1.push(name.clone()),
+            None => islands.push((root, vec![name.clone()])),
+        }
+    }
+    islands.into_iter().map(|i| i.1).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnostic::Severity;
+    use crate::mna::fixture::{circuit, drive};
+
+    fn findings(text: &str) -> Vec<(&'static str, String)> {
+        let topology = topology(&circuit(text));
+        topology
+            .diagnostics
+            .into_iter()
+            .map(|d| (d.code, d.message))
+            .collect()
+    }
+
+    #[test]
+    fn the_normal_tree_takes_capacitors_before_inductors() {
+        let t = topology(&circuit(
+            "l1 1 0 1m\n c1 1 0 1u\n r1 1 2 1\n d1 2 0\n v1 3 0 1\n r2 3 1 1",
+        ));
+        assert_eq!(t.tree, ["c1", "r1", "v1"]);
+        assert_eq!(t.links, ["l1", "d1", "r2"]);
+        assert_eq!(t.diagnostics, []);
+    }
+
+    #[test]
+    fn voltage_sources_in_a_loop_are_named() {
+        let found = findings("v1 1 0 5\n v2 2 1 1\n r1 2 0 1k\n v3 2 0 7");
+        let message = "v1, v2 and v3 form a loop of voltage sources that contradict each other";
+        assert_eq!(found, [("voltage-loop", message.to_string())]);
+        assert_eq!(findings("v1 1 0 5\n v2 2 1 1\n r1 2 0 1k\n v3 2 0 6"), []);
+        assert_eq!(findings("v1 1 1 5\n r1 1 0 1")[0].1, "v1 is shorted");
+    }
+
+    #[test]
+    fn equal_waveforms_agree_only_in_the_same_direction() {
+        let wave = Wave::Exp {
+            v1: 0.0,
+            v2: 1.0,
+            rise_delay: 0.0,
+            rise_tau: 1.0,
+            fall_delay: 2.0,
+            fall_tau: 1.0,
+        };
+        for (second, faults) in [("v2 1 0 0", 0), ("v2 0 1 0", 1)] {
+            let mut c = circuit(&format!("v1 1 0 0\n r1 1 0 1\n {second}"));
+            drive(&mut c, "v1", wave.clone());
+            drive(&mut c, "v2", wave.clone());
+            assert_eq!(topology(&c).diagnostics.len(), faults, "{second}");
+        }
+    }
+
+    #[test]
+    fn current_sources_without_a_way_back_are_named() {
+        let found = findings("i1 0 1 1\n i2 1 2 2\n r1 2 0 1k");
+        let message = "i1 and i2 are a cut-set of current sources that contradict each other";
+        assert_eq!(found, [("current-cutset", message.to_string())]);
+        assert_eq!(findings("i1 0 1 1\n i2 1 2 1\n r1 2 0 1k"), []);
+        let alone = findings("i1 0 1 1\n r1 2 0 1k");
+        assert_eq!(alone[0].1, "the current of i1 has no way back");
+    }
+
+    #[test]
+    fn loops_of_capacitors_and_cut_sets_of_inductors_are_notes() {
+        let t = topology(&circuit("v1 1 0 5\n c1 1 2 1u\n c2 2 0 1u\n r1 2 0 1"));
+        assert_eq!(t.diagnostics.len(), 1);
+        assert_eq!(t.diagnostics[0].severity, Severity::Note);
+        assert_eq!(
+            t.diagnostics[0].message,
+            "v1, c1 and c2 form a loop, so v(c2) is not a state of its own"
+        );
+        let found = findings("v1 1 0 5\n r1 1 2 1\n l1 2 3 1m\n l2 3 0 1m");
+        assert_eq!(
+            found,
+            [(
+                "inductor-cutset",
+                "l1 and l2 are a cut-set, so i(l1) is not a state of its own".to_string()
+            )]
+        );
+    }
+
+    #[test]
+    fn islands_and_dangling_nodes_are_named() {
+        let t = topology(&circuit(
+            "v1 1 0 5\n l1 1 0 1m\n l2 a b 1m\n k1 l1 l2 0.9\n r1 a b 1\n r2 1 9 1",
+        ));
+        assert_eq!(t.islands, [["a", "b"]]);
+        assert_eq!(t.diagnostics.len(), 1);
+        assert_eq!(
+            t.diagnostics[0].message,
+            "nothing but r2 is connected to node 9"
+        );
+    }
+}
