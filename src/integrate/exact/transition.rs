@@ -45,7 +45,6 @@ impl Exact<'_> {
         let mut entry = None;
         for _ in 0..2 + 2 * self.plant.thresholds.len() {
             // A device event in a convex circuit is continuous; an edge or a switch may need an impulse.
-            // A mode that holds without an impulse is the solution in either case.
             let mut found = self.follow(&key, trigger);
             if found.is_none() && !discontinuous {
                 found = self.find_mode(&key, trigger)?;
