@@ -5,6 +5,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::NodeId;
+use super::behaviour::Auxiliary;
 use crate::algebra::Value;
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Expr, Func, Model, Name, Subckt};
@@ -91,6 +92,14 @@ pub(super) struct Scopes<'n> {
     pub(super) steps: usize,
     /// Whether an evaluation without end was reported.
     pub(super) gave_up: bool,
+    /// What piecewise-linear expressions need besides their own element.
+    pub(super) auxiliaries: Vec<Auxiliary>,
+    /// Nodes that a DC source holds, with their voltages.
+    pub(super) rails: HashMap<NodeId, f64>,
+    /// Those of them whose voltage an expression took as a number.
+    pub(super) rails_read: HashSet<NodeId>,
+    /// The end of the run, s.
+    pub(super) tstop: f64,
 }
 
 impl<'n> Scopes<'n> {
@@ -102,6 +111,10 @@ impl<'n> Scopes<'n> {
             depth: 0,
             steps: 0,
             gave_up: false,
+            auxiliaries: Vec::new(),
+            rails: HashMap::new(),
+            rails_read: HashSet::new(),
+            tstop: 1.0,
         }
     }
 
