@@ -315,7 +315,9 @@ fn static_solution(
             ..position
         };
         match reduce(behaviour, &moving) {
-            Err(e @ ReduceError::Sources { .. }) => SimError::before(Reason::Circuit(e.to_string())),
+            Err(e @ ReduceError::Sources { .. }) => {
+                SimError::before(Reason::Circuit(e.to_string()))
+            }
             _ => error,
         }
     })?;
