@@ -166,7 +166,7 @@ impl Field for Ball {
         if other.is_zero() {
             return *self;
         }
-        let value = self.value.add(other.value);
+        let value = self.value.plus(other.value);
         let inexact = self.residue == INEXACT || other.residue == INEXACT;
         Self {
             residue: if inexact {
@@ -184,7 +184,7 @@ impl Field for Ball {
         if self.is_zero() || other.is_zero() {
             return Self::ZERO;
         }
-        let value = self.value.mul(other.value);
+        let value = self.value.times(other.value);
         let inexact = self.residue == INEXACT || other.residue == INEXACT;
         Self {
             residue: if inexact {
@@ -210,7 +210,7 @@ impl Field for Ball {
         };
         Self {
             residue,
-            value: self.value.neg(),
+            value: self.value.negated(),
             radius: self.radius,
         }
     }

@@ -55,7 +55,7 @@ impl Double {
 
     /// self + other.
     #[must_use]
-    pub fn add(self, other: Self) -> Self {
+    pub fn plus(self, other: Self) -> Self {
         let (s, e) = two_sum(self.hi, other.hi);
         let (t, f) = two_sum(self.lo, other.lo);
         let (s, e) = quick_two_sum(s, e + t);
@@ -65,7 +65,7 @@ impl Double {
 
     /// self · other.
     #[must_use]
-    pub fn mul(self, other: Self) -> Self {
+    pub fn times(self, other: Self) -> Self {
         let (p, e) = two_product(self.hi, other.hi);
         let (hi, lo) = quick_two_sum(p, e + (self.hi * other.lo + self.lo * other.hi));
         Self { hi, lo }
@@ -73,7 +73,7 @@ impl Double {
 
     /// −self.
     #[must_use]
-    pub fn neg(self) -> Self {
+    pub fn negated(self) -> Self {
         Self {
             hi: -self.hi,
             lo: -self.lo,
@@ -88,8 +88,8 @@ impl Double {
             lo: 0.0,
         };
         for _ in 0..2 {
-            let residual = Self { hi: 1.0, lo: 0.0 }.add(self.mul(q).neg());
-            q = q.add(q.mul(residual));
+            let residual = Self { hi: 1.0, lo: 0.0 }.plus(self.times(q).negated());
+            q = q.plus(q.times(residual));
         }
         q
     }
@@ -105,9 +105,9 @@ impl Double {
             lo: 0.0,
         };
         for _ in 0..2 {
-            let residual = self.add(r.mul(r).neg());
+            let residual = self.plus(r.times(r).negated());
             let half = Self { hi: 0.5, lo: 0.0 };
-            r = r.add(residual.mul(r.recip()).mul(half));
+            r = r.plus(residual.times(r.recip()).times(half));
         }
         r
     }
@@ -124,10 +124,10 @@ mod tests {
                 hi: x,
                 lo: x * 1e-17,
             };
-            let one = d.mul(d.recip());
+            let one = d.times(d.recip());
             assert!(((one.hi - 1.0) + one.lo).abs() < 1e-30, "{x}");
             let r = d.sqrt();
-            let back = r.mul(r).add(d.neg());
+            let back = r.times(r).plus(d.negated());
             assert!(((back.hi + back.lo) / x).abs() < 1e-30, "{x}");
         }
     }

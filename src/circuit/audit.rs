@@ -79,6 +79,9 @@ impl<'n> Builder<'n, '_> {
                 );
             }
         }
+        for rail in &self.scopes.rails_read {
+            terminals[rail.index()] += 1;
+        }
         let dangling: Vec<&str> = terminals
             .iter()
             .zip(&self.circuit.nodes)

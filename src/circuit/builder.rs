@@ -5,7 +5,7 @@ use std::collections::{HashSet, VecDeque};
 use super::elaborate::ElaborateOptions;
 use super::names::Names;
 use super::scope::{ScopeId, Scopes};
-use super::{Circuit, Element, ElementId, Kind, NodeId};
+use super::{Circuit, Element, ElementId, NodeId};
 use crate::algebra::Value;
 use crate::diagnostic::{Diagnostic, Severity, Span};
 use crate::netlist::Netlist;
@@ -57,6 +57,10 @@ pub(super) struct Builder<'n, 'o> {
     instances: usize,
     /// Model parameters that had no effect, by model.
     pub(super) unused_parameters: Vec<(String, Span)>,
+    /// The nodes of the auxiliary sources that behavioural elements share.
+    pub(super) auxiliary_nodes: Vec<Option<NodeId>>,
+    /// The node whose voltage is the time, if there is one.
+    pub(super) clock: Option<NodeId>,
 }
 
 impl<'n, 'o> Builder<'n, 'o> {
@@ -79,6 +83,8 @@ impl<'n, 'o> Builder<'n, 'o> {
             used: HashSet::new(),
             instances: 0,
             unused_parameters: Vec::new(),
+            auxiliary_nodes: Vec::new(),
+            clock: None,
         }
     }
 
@@ -363,13 +369,10 @@ impl<'n, 'o> Builder<'n, 'o> {
 
     /// Everything that refers to elements and nodes by name.
     fn resolve(&mut self) {
+        self.find_rails();
         for pending in std::mem::take(&mut self.pending) {
-            if let Some(control) = self.control(&pending) {
-                match &mut self.circuit.elements[pending.element.index()].kind {
-                    Kind::Controlled { control: own, .. } => *own = control,
-                    Kind::Switch(switch) => switch.follow(control),
-                    _ => {}
-                }
+            if let Some(form) = self.control(&pending) {
+                self.place(pending.element, form);
             }
         }
         self.couple();

@@ -1,4 +1,4 @@
-//! E, F, G, H, B: controls as affine functions of voltages and currents; K: couplings.
+//! E, F, G, H, B: controls as functions of voltages and currents; K: couplings.
 
 use super::builder::{Builder, Pending};
 use super::form::Form;
@@ -70,8 +70,8 @@ impl<'n> Builder<'n, '_> {
         }
     }
 
-    /// The affine function a control means, all elements being known.
-    pub(super) fn control(&mut self, pending: &Pending<'n>) -> Option<Affine> {
+    /// The function a control means, all elements being known.
+    pub(super) fn control(&mut self, pending: &Pending<'n>) -> Option<Form> {
         let scope = pending.scope;
         let form = match pending.control {
             Control::Nodes(pairs, coefficients) => {
@@ -93,34 +93,54 @@ impl<'n> Builder<'n, '_> {
                 }
                 self.polynomial(inputs, coefficients, scope)?
             }
-            Control::Expression(expr) => self.affine(expr, scope)?,
-            Control::Table(input, _) => {
-                let message = format!("the table of `{input}` is recognised but not supported yet");
-                self.tell(
-                    Diagnostic::error("unsupported", input.span, message).label("piecewise linear"),
-                );
-                return None;
-            }
+            Control::Expression(expr) => self.expression(expr, scope)?,
+            Control::Table(input, points) => self.table(input, points, scope)?,
             Control::Other(_) => return None,
         };
-        if !form.constant.f64.is_finite() {
+        if !form.is_finite() {
             self.tell(
                 Diagnostic::error("bad-value", pending.span, "the control has no finite value")
                     .label("not finite"),
             );
             return None;
         }
-        Some(form.into_affine())
+        Some(form)
     }
 
-    /// An expression in voltages and currents.
-    fn affine(&mut self, expr: &'n Expr, scope: ScopeId) -> Option<Form> {
+    /// An expression in voltages, currents and time.
+    fn expression(&mut self, expr: &'n Expr, scope: ScopeId) -> Option<Form> {
         let names = &self.names;
         self.scopes.form(
             expr,
             scope,
             Some(&|signal, scopes, scope| names.signal(signal, scopes, scope)),
         )
+    }
+
+    /// `TABLE {input} = (x,y) …`: constant outside.
+    fn table(
+        &mut self,
+        input: &'n Expr,
+        points: &'n [(Expr, Expr)],
+        scope: ScopeId,
+    ) -> Option<Form> {
+        let form = self.expression(input, scope)?;
+        let mut numbers = Vec::with_capacity(points.len());
+        for (x, y) in points {
+            let (x, y) = (self.scopes.finite(x, scope), self.scopes.finite(y, scope));
+            numbers.push((x?.f64, y?.f64));
+        }
+        self.scopes
+            .table(&form, &numbers)
+            .map_err(|why| {
+                let at = points
+                    .windows(2)
+                    .zip(numbers.windows(2))
+                    .find(|(_, n)| n[0].0 > n[1].0)
+                    .map_or(input, |(p, _)| &p[1].0);
+                self.scopes.unfit(at, why)
+            })
+            .ok()
     }
 
     /// c0 + c1 x1 + … + cn xn; higher coefficients must be zero. A single coefficient for one input is c1 (SPICE2).

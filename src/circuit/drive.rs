@@ -3,7 +3,7 @@
 use super::builder::Builder;
 use super::passive::Args;
 use super::scope::ScopeId;
-use super::source::{Source, Wave};
+use super::source::{Form, Source, Wave};
 use super::{Element, Kind};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{self, Assign, Expr, WaveCall};
@@ -13,6 +13,9 @@ mod tests;
 
 /// LTspice's `startup`: supplies reach their value after this time, s.
 const STARTUP: f64 = 20e-6;
+
+/// Most points of a PWL that repeats so many times.
+const MAX_POINTS: usize = 1_000_000;
 
 impl<'n> Builder<'n, '_> {
     pub(super) fn source(
@@ -135,6 +138,7 @@ impl<'n> Builder<'n, '_> {
             "pulse" => self.pulse(call, &x),
             "exp" => Some(self.exponential(&x)),
             "pwl" => self.pwl(call, &x, args, scope),
+            "sffm" | "am" => self.modulated(call, x),
             name => {
                 let message = format!(
                     "{} of `{}` is recognised but not supported yet",
@@ -143,7 +147,7 @@ impl<'n> Builder<'n, '_> {
                 );
                 let fault = Diagnostic::error("unsupported", call.name.span, message)
                     .label("not supported yet");
-                self.tell(fault.help("supported waveforms are SIN, PULSE, PWL, EXP"));
+                self.tell(fault.help("supported waveforms are SIN, PULSE, PWL, EXP, SFFM, AM"));
                 None
             }
         }
@@ -215,6 +219,27 @@ impl<'n> Builder<'n, '_> {
         })
     }
 
+    /// SFFM and AM; AM's phases must be zero.
+    fn modulated(&mut self, call: &WaveCall, mut x: Vec<f64>) -> Option<Wave> {
+        let (tstep, tstop) = self.defaults();
+        let plain = if call.name.text == "am" { 5 } else { 7 };
+        if x.iter().skip(plain).all(|phase| *phase == 0.0) {
+            x.truncate(plain);
+        }
+        let form = Form {
+            kind: call.name.text.clone(),
+            args: x,
+            repeat: None,
+            delay: None,
+        };
+        let wave = form.wave(tstep, tstop);
+        wave.map_err(|fault| {
+            let fault = Diagnostic::error("bad-value", call.name.span, fault.to_string());
+            self.tell(fault.label("its values are no such waveform"));
+        })
+        .ok()
+    }
+
     fn exponential(&self, x: &[f64]) -> Wave {
         let (tstep, _) = self.defaults();
         let at = |k: usize| x.get(k).copied().unwrap_or(0.0);
@@ -273,14 +298,13 @@ impl<'n> Builder<'n, '_> {
         let repeat = match repeat {
             None => None,
             Some(Assign { name, value: None }) if name.text == "repeat" => Some(0.0),
-            Some(Assign { name, .. }) if name.text == "repeat" => {
-                let message = "`PWL REPEAT FOR n` is recognised but not supported yet";
-                self.tell(
-                    Diagnostic::error("unsupported", name.span, message)
-                        .label("not supported yet")
-                        .help("`REPEAT FOREVER` is"),
-                );
-                return None;
+            Some(Assign {
+                name,
+                value: Some(value),
+            }) if name.text == "repeat" => {
+                let times = self.scopes.finite(value, scope)?.f64;
+                points = self.repeated(&points, times, value)?;
+                None
             }
             Some(Assign {
                 value: Some(value), ..
@@ -302,5 +326,27 @@ impl<'n> Builder<'n, '_> {
             repeat,
             delay,
         })
+    }
+
+    /// The points `times` over, each round beginning where the last one ended.
+    fn repeated(
+        &mut self,
+        points: &[(f64, f64)],
+        times: f64,
+        written: &Expr,
+    ) -> Option<Vec<(f64, f64)>> {
+        let most = MAX_POINTS / points.len().max(1);
+        if times.fract() != 0.0 || times < 1.0 || times > most as f64 {
+            let message = format!("PWL cannot be repeated {times} times");
+            let label = format!("a whole number from 1 to {most}");
+            self.tell(Diagnostic::error("bad-value", written.span, message).label(label));
+            return None;
+        }
+        let round = points.last().map_or(0.0, |p| p.0);
+        let mut all = Vec::with_capacity(points.len() * times as usize);
+        for k in 0..times as usize {
+            all.extend(points.iter().map(|(t, v)| (k as f64 * round + t, *v)));
+        }
+        Some(all)
     }
 }

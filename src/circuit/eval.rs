@@ -1,5 +1,6 @@
-//! Evaluation of expressions: numbers, and affine forms in the circuit's voltages and currents.
+//! Evaluation of expressions: numbers, and piecewise-linear forms in the circuit's voltages and currents.
 
+use super::behaviour::{TIME, Unfit};
 use super::form::Form;
 use super::functions::{self, CallError, truth};
 use super::scope::{Param, ScopeId, Scopes};
@@ -37,7 +38,7 @@ impl<'n> Scopes<'n> {
         )
     }
 
-    /// The affine form an expression stands for; `None` after a reported fault.
+    /// The form an expression stands for; `None` after a reported fault.
     pub(super) fn form(
         &mut self,
         expr: &'n Expr,
@@ -93,6 +94,12 @@ impl<'n> Scopes<'n> {
             ExprKind::Number(value) => Some(Form::number(*value)),
             ExprKind::Name(name) => match locals.iter().find(|(local, _)| local == name) {
                 Some((_, form)) => Some(form.clone()),
+                None if name == "time"
+                    && resolve.is_some()
+                    && self.param(scope, name).is_none() =>
+                {
+                    Some(Form::quantity(TIME))
+                }
                 None => self.named(expr, name, scope).map(Form::number),
             },
             ExprKind::Text(text) => self.fault(
@@ -118,18 +125,17 @@ impl<'n> Scopes<'n> {
                 Some(self.evaluate(x, scope, resolve, locals)?.negated())
             }
             ExprKind::Unary(Unary::Not, x) => {
-                let x = self.constant(expr, x, scope, resolve, locals)?;
-                Some(Form::number(f64::from(!truth(x))))
+                let x = self.evaluate(x, scope, resolve, locals)?;
+                if x.is_constant() {
+                    return Some(Form::number(f64::from(!truth(x.constant.f64))));
+                }
+                self.behaviour("inv", &[x])
+                    .map_err(|why| self.unfit(expr, why))
+                    .ok()
             }
             ExprKind::If(parts) => {
                 let [condition, then, otherwise] = &**parts;
-                let condition = self.constant(expr, condition, scope, resolve, locals)?;
-                self.evaluate(
-                    if truth(condition) { then } else { otherwise },
-                    scope,
-                    resolve,
-                    locals,
-                )
+                self.conditional(expr, [condition, then, otherwise], scope, resolve, locals)
             }
             ExprKind::Binary(..) => self.chain_of_operators(expr, scope, resolve, locals),
             ExprKind::Call(name, args) => self.call(expr, name, args, scope, resolve, locals),
@@ -160,31 +166,53 @@ impl<'n> Scopes<'n> {
         left
     }
 
-    /// A part that must be a number; the message names the expression that is not linear.
-    fn constant(
+    /// `condition ? then : otherwise`; a number as condition leaves the other branch unread.
+    fn conditional(
         &mut self,
         whole: &'n Expr,
-        part: &'n Expr,
+        [condition, then, otherwise]: [&'n Expr; 3],
         scope: ScopeId,
         resolve: Resolve<'_, 'n>,
         locals: &[(&'n str, Form)],
-    ) -> Option<f64> {
-        let form = self.evaluate(part, scope, resolve, locals)?;
-        if form.is_constant() {
-            Some(form.constant.f64)
-        } else {
-            self.not_linear(whole)
+    ) -> Option<Form> {
+        let condition = self.evaluate(condition, scope, resolve, locals)?;
+        if condition.is_constant() {
+            let taken = if truth(condition.constant.f64) {
+                then
+            } else {
+                otherwise
+            };
+            return self.evaluate(taken, scope, resolve, locals);
         }
+        let then = self.evaluate(then, scope, resolve, locals);
+        let otherwise = self.evaluate(otherwise, scope, resolve, locals)?;
+        self.choice(&condition, then?, otherwise)
+            .map_err(|why| self.unfit(whole, why))
+            .ok()
     }
 
-    fn not_linear<T>(&mut self, expr: &Expr) -> Option<T> {
-        let message = format!("`{expr}` is not linear in the voltages and currents");
-        self.findings.tell(
-            Diagnostic::error("not-linear", expr.span, message)
-                .label("recognised, but not supported yet")
-                .help("sums of voltages and currents with constant factors are supported"),
-        );
-        None
+    /// Reports why an expression cannot be simulated.
+    pub(super) fn unfit(&mut self, expr: &Expr, why: Unfit) {
+        let fault = match why {
+            Unfit::Nonlinear => {
+                let message =
+                    format!("`{expr}` is not piecewise linear in the voltages and currents");
+                Diagnostic::error("not-linear", expr.span, message)
+                    .label("recognised, but cannot be simulated")
+                    .help(
+                        "sums with constant factors, max min abs limit if u uramp sgn table pwl are supported",
+                    )
+            }
+            Unfit::TooLarge => {
+                let message = "this piecewise-linear function has too many pieces";
+                Diagnostic::error("too-large", expr.span, message).label("far too many corners")
+            }
+            Unfit::Order => {
+                let message = "the x values of a table must not decrease";
+                Diagnostic::error("bad-table", expr.span, message).label("out of order")
+            }
+        };
+        self.findings.tell(fault);
     }
 
     fn binary(&mut self, expr: &Expr, op: Binary, x: Form, y: Form) -> Option<Form> {
@@ -206,23 +234,24 @@ impl<'n> Scopes<'n> {
                     return Some(x);
                 }
                 let quotient = |a: Value| Value::binary(a.f64 / y.constant.f64);
-                let terms = x
-                    .terms
-                    .iter()
-                    .map(|&(gain, q)| (quotient(gain), q))
-                    .collect();
-                return self.checked(
-                    expr,
-                    Form {
-                        constant: quotient(x.constant),
-                        terms,
-                    },
-                );
+                let mut form = x;
+                form.constant = quotient(form.constant);
+                for (gain, _) in &mut form.terms {
+                    *gain = quotient(*gain);
+                }
+                for ridge in &mut form.ridges {
+                    ridge.curve = ridge.curve.clone().scaled(1.0 / y.constant.f64);
+                }
+                return self.checked(expr, form);
             }
             _ => {}
         }
         if !(x.is_constant() && y.is_constant()) {
-            return self.not_linear(expr);
+            let form = self
+                .operation(op, x, y)
+                .map_err(|why| self.unfit(expr, why))
+                .ok()?;
+            return self.checked(expr, form);
         }
         let (x, y) = (x.constant.f64, y.constant.f64);
         let value = match op {
@@ -236,7 +265,10 @@ impl<'n> Scopes<'n> {
             Binary::NotEqual => f64::from(x != y),
             Binary::And => f64::from(truth(x) && truth(y)),
             Binary::Or => f64::from(truth(x) || truth(y)),
-            Binary::Add | Binary::Sub | Binary::Mul | Binary::Div => return self.not_linear(expr),
+            Binary::Add => x + y,
+            Binary::Sub => x - y,
+            Binary::Mul => x * y,
+            Binary::Div => x / y,
         };
         self.checked(expr, Form::number(value))
     }
@@ -284,19 +316,21 @@ impl<'n> Scopes<'n> {
             return self.evaluate(&func.body, scope, resolve, &inner);
         }
         if let ("if", [condition, then, otherwise]) = (name.text.as_str(), args) {
-            let condition = self.constant(expr, condition, scope, resolve, locals)?;
-            return self.evaluate(
-                if truth(condition) { then } else { otherwise },
-                scope,
-                resolve,
-                locals,
-            );
+            return self.conditional(expr, [condition, then, otherwise], scope, resolve, locals);
         }
         let mut values = Vec::with_capacity(args.len());
         for arg in args {
-            values.push(self.constant(expr, arg, scope, resolve, locals)?);
+            values.push(self.evaluate(arg, scope, resolve, locals)?);
         }
-        match functions::call(&name.text, &values) {
+        let constant = values.iter().all(Form::is_constant);
+        let numbers: Vec<f64> = values.iter().map(|form| form.constant.f64).collect();
+        match functions::call(&name.text, &numbers) {
+            // A function of quantities: the numbers were for its name and arity only.
+            Ok(_) | Err(CallError::Domain) if !constant => {
+                let form = self.behaviour(&name.text, &values);
+                let form = form.map_err(|why| self.unfit(expr, why)).ok()?;
+                self.checked(expr, form)
+            }
             Ok(value) => Some(Form::number(value)),
             Err(CallError::Arity(what)) => self.fault(
                 "bad-call",

@@ -1,27 +1,66 @@
-//! Affine forms in voltages and currents, exact where the text was.
+//! Affine forms in voltages and currents with piecewise-linear parts, exact where the text was.
 
+use super::model::{ONE, ZERO};
+use super::piecewise::Piecewise;
 use super::{Affine, Quantity};
 use crate::algebra::Value;
 
-/// `constant + Σ gain · quantity`, exact where the text was.
+/// `constant + Σ gain · quantity + Σ f(Σ gain · quantity)`, exact where the text was.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Form {
     pub(super) constant: Value,
     pub(super) terms: Vec<(Value, Quantity)>,
+    /// What is piecewise linear; no two along the same sum.
+    pub(super) ridges: Vec<Ridge>,
 }
+
+/// A piecewise-linear function of one sum of quantities.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Ridge {
+    /// The sum, as [`direction`] states it.
+    pub(super) along: Direction,
+    pub(super) curve: Piecewise,
+}
+
+/// A sum of quantities, the gain of the first being 1.
+pub(super) type Direction = Vec<(Value, Quantity)>;
+
+/// Two gains are one if they differ by less than so many roundings.
+const ROUNDINGS: f64 = 8.0;
 
 impl Form {
     pub(super) fn number(value: impl Into<Value>) -> Self {
         Self {
             constant: value.into(),
             terms: Vec::new(),
+            ridges: Vec::new(),
+        }
+    }
+
+    pub(super) fn quantity(quantity: Quantity) -> Self {
+        Self {
+            terms: vec![(ONE, quantity)],
+            ..Self::number(ZERO)
         }
     }
 
     pub(super) fn is_constant(&self) -> bool {
-        self.terms.is_empty()
+        self.terms.is_empty() && self.ridges.is_empty()
     }
 
+    /// Whether all numbers are finite.
+    pub(super) fn is_finite(&self) -> bool {
+        let finite =
+            |terms: &[(Value, Quantity)]| terms.iter().all(|(gain, _)| gain.f64.is_finite());
+        self.constant.f64.is_finite()
+            && finite(&self.terms)
+            && self
+                .ridges
+                .iter()
+                .all(|r| finite(&r.along) && r.curve.is_finite())
+    }
+
+    /// The affine part.
     pub(super) fn into_affine(self) -> Affine {
         Affine {
             terms: self.terms,
@@ -38,6 +77,13 @@ impl Form {
         for (gain, _) in &mut self.terms {
             *gain = product(*gain, factor);
         }
+        if factor.f64 == 0.0 {
+            self.ridges.clear();
+        }
+        for ridge in &mut self.ridges {
+            ridge.curve =
+                std::mem::replace(&mut ridge.curve, Piecewise::line(0.0, 0.0)).scaled(factor.f64);
+        }
         self
     }
 
@@ -50,8 +96,88 @@ impl Form {
             }
         }
         self.terms.retain(|(gain, _)| gain.f64 != 0.0);
+        for ridge in other.ridges {
+            self = self.plus_ridge(ridge);
+        }
         self
     }
+
+    /// Adds a function of one sum, which may turn out to be affine.
+    pub(super) fn plus_ridge(mut self, ridge: Ridge) -> Self {
+        let Ridge { along, mut curve } = ridge;
+        if let Some(k) = self.ridges.iter().position(|r| parallel(&r.along, &along)) {
+            curve = self.ridges.remove(k).curve.plus(&curve);
+        }
+        let Some((slope, constant)) = curve.as_line() else {
+            self.ridges.push(Ridge { along, curve });
+            return self;
+        };
+        let line = Self {
+            constant: constant.into(),
+            terms: along,
+            ridges: Vec::new(),
+        };
+        let constant = line.constant;
+        self.plus(
+            Self {
+                constant: ZERO,
+                ..line
+            }
+            .scaled(slope.into()),
+        )
+        .plus(Self::number(constant))
+    }
+
+    /// The same as a function of one sum of quantities, if it is one.
+    pub(super) fn one_dimensional(&self) -> Option<Ridge> {
+        let own = direction(&self.terms);
+        let (along, slope) = match (&own, self.ridges.first()) {
+            (Some((along, gain)), _) => (along.clone(), *gain),
+            (None, Some(ridge)) => (ridge.along.clone(), 0.0),
+            (None, None) => return None,
+        };
+        let mut curve = Piecewise::line(slope, self.constant.f64);
+        for ridge in &self.ridges {
+            if !parallel(&ridge.along, &along) {
+                return None;
+            }
+            curve = curve.plus(&ridge.curve);
+        }
+        Some(Ridge { along, curve })
+    }
+}
+
+/// Terms in a fixed order, divided by the first gain, and that gain; `None` if there are none.
+pub(super) fn direction(terms: &[(Value, Quantity)]) -> Option<(Direction, f64)> {
+    let mut along: Direction = terms
+        .iter()
+        .copied()
+        .filter(|(g, _)| g.f64 != 0.0)
+        .collect();
+    along.sort_by_key(|(_, quantity)| match quantity {
+        Quantity::Voltage(node) => (0, node.0),
+        Quantity::Current(element) => (1, element.0),
+    });
+    let first = along.first()?.0;
+    for (gain, _) in &mut along {
+        *gain = if first.f64.abs() == 1.0 {
+            product(*gain, first)
+        } else if *gain == first {
+            ONE
+        } else if gain.f64 == -first.f64 {
+            negative(ONE)
+        } else {
+            Value::binary(gain.f64 / first.f64)
+        };
+    }
+    Some((along, first.f64))
+}
+
+pub(super) fn parallel(a: &[(Value, Quantity)], b: &[(Value, Quantity)]) -> bool {
+    a.len() == b.len()
+        && a.iter().zip(b).all(|((g, q), (h, r))| {
+            q == r && (g.f64 - h.f64).abs() <= ROUNDINGS * f64::EPSILON * g.f64.abs()
+        })
 }
 
 /// Keeps the decimal where a factor is ±1.
@@ -65,7 +191,7 @@ fn product(a: Value, b: Value) -> Value {
     }
 }
 
-fn negative(a: Value) -> Value {
+pub(super) fn negative(a: Value) -> Value {
     Value {
         f64: -a.f64,
         decimal: a.decimal.map(|(mantissa, exponent)| (-mantissa, exponent)),

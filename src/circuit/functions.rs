@@ -17,11 +17,11 @@ pub(super) const fn truth(x: f64) -> bool {
 }
 
 /// All function names, for "did you mean".
-pub(super) const NAMES: [&str; 44] = [
+pub(super) const NAMES: [&str; 45] = [
     "abs", "acos", "acosh", "arccos", "arcsin", "arctan", "asin", "asinh", "atan", "atan2",
     "atanh", "buf", "ceil", "cos", "cosh", "db", "exp", "floor", "hypot", "if", "int", "inv",
-    "limit", "ln", "log", "log10", "max", "min", "nint", "pow", "pwr", "pwrs", "round", "sgn",
-    "sign", "sin", "sinh", "sqrt", "table", "tan", "tanh", "u", "uramp", "ustep",
+    "limit", "ln", "log", "log10", "max", "min", "nint", "pow", "pwl", "pwr", "pwrs", "round",
+    "sgn", "sign", "sin", "sinh", "sqrt", "table", "tan", "tanh", "u", "uramp", "ustep",
 ];
 
 /// The value of a function; `log` is natural, as in ngspice and LTspice.
@@ -73,12 +73,15 @@ pub(super) fn call(name: &str, args: &[f64]) -> Result<f64, CallError> {
         ("table", [x, points @ ..]) if points.len() >= 2 && points.len() % 2 == 0 => {
             table(*x, points)
         }
+        ("pwl", [x, points @ ..]) if points.len() >= 2 && points.len() % 2 == 0 => {
+            extrapolated(*x, points)
+        }
         ("atan2" | "hypot" | "pow" | "pwr" | "pwrs", _) => {
             return Err(CallError::Arity("two arguments"));
         }
         ("limit" | "if", _) => return Err(CallError::Arity("three arguments")),
         ("min" | "max", _) => return Err(CallError::Arity("at least one argument")),
-        ("table", _) => return Err(CallError::Arity("x and pairs of numbers")),
+        ("table" | "pwl", _) => return Err(CallError::Arity("x and pairs of numbers")),
         (name, _) if NAMES.contains(&name) => return Err(CallError::Arity("one argument")),
         _ => return Err(CallError::Unknown),
     };
@@ -106,6 +109,21 @@ fn table(x: f64, points: &[f64]) -> f64 {
         before = (pair[0], pair[1]);
     }
     before.1
+}
+
+/// The same, going on with the outermost slopes as ngspice's `pwl` does.
+fn extrapolated(x: f64, points: &[f64]) -> f64 {
+    let n = points.len();
+    let along = |p: &[f64]| p[1] + (p[3] - p[1]) * ((x - p[0]) / (p[2] - p[0]));
+    if n < 4 {
+        points[1]
+    } else if x < points[0] {
+        along(&points[..4])
+    } else if x > points[n - 2] {
+        along(&points[n - 4..])
+    } else {
+        table(x, points)
+    }
 }
 
 #[cfg(test)]

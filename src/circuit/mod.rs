@@ -4,6 +4,7 @@
 
 mod analysis;
 mod audit;
+mod behaviour;
 mod builder;
 mod controlled;
 mod define;
@@ -17,6 +18,8 @@ pub(crate) mod load;
 mod model;
 mod names;
 mod passive;
+mod piecewise;
+mod place;
 mod probe;
 mod scope;
 pub mod source;

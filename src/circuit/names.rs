@@ -158,15 +158,12 @@ pub(super) fn difference(a: NodeId, b: NodeId) -> Form {
         })
         .collect();
     Form {
-        constant: Value::decimal(0.0, 0, 0),
         terms,
+        ..Form::number(Value::decimal(0.0, 0, 0))
     }
 }
 
 /// The current of an element as a form.
 pub(super) fn current(id: ElementId) -> Form {
-    Form {
-        constant: Value::decimal(0.0, 0, 0),
-        terms: vec![(Value::decimal(1.0, 1, 0), Quantity::Current(id))],
-    }
+    Form::quantity(Quantity::Current(id))
 }

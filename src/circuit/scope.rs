@@ -2,9 +2,10 @@
 //!
 //! A subcircuit instance sees its own definitions, then those of the instance that calls it, up to the top level.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use super::NodeId;
+use super::behaviour::Auxiliary;
 use crate::algebra::Value;
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Expr, Func, Model, Name, Subckt};
@@ -91,6 +92,14 @@ pub(super) struct Scopes<'n> {
     pub(super) steps: usize,
     /// Whether an evaluation without end was reported.
     pub(super) gave_up: bool,
+    /// What piecewise-linear expressions need besides their own element.
+    pub(super) auxiliaries: Vec<Auxiliary>,
+    /// Nodes that a DC source holds, with their voltages.
+    pub(super) rails: HashMap<NodeId, f64>,
+    /// Those of them whose voltage an expression took as a number.
+    pub(super) rails_read: BTreeSet<NodeId>,
+    /// The end of the run, s.
+    pub(super) tstop: f64,
 }
 
 impl<'n> Scopes<'n> {
@@ -102,6 +111,10 @@ impl<'n> Scopes<'n> {
             depth: 0,
             steps: 0,
             gave_up: false,
+            auxiliaries: Vec::new(),
+            rails: HashMap::new(),
+            rails_read: BTreeSet::new(),
+            tstop: 1.0,
         }
     }
 

@@ -56,7 +56,10 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Report, Failure> {
     let subject = Subject::Circuit(Box::new((circuit, behaviour)));
     match input::start_system(&subject, &args.switches, streams) {
         Ok(system) => {
-            let mut report = check::system(&system.lcs);
+            let mut report = match &subject {
+                Subject::Circuit(parts) => check::circuit(&parts.0, &system.lcs),
+                Subject::System(_) => check::system(&system.lcs),
+            };
             report
                 .faults
                 .splice(0..0, diagnostics.iter().map(|d| Fault::of(d, &sources)));

@@ -25,7 +25,8 @@ pub struct JumpProblem {
     driver: Driver,
     /// Whether z had to be split into z⁺ − z⁻ (N is not the identity).
     split: bool,
-    /// Whether the network's jump matrix NᵀCBN is positive semidefinite, as for every passive network.
+    /// Whether D + Dᵀ and the jump matrix NᵀCBN are positive semidefinite, as for every passive network. If not, the jump is
+    /// not given by this problem.
     pub monotone: bool,
 }
 
@@ -57,7 +58,9 @@ impl JumpProblem {
         let feedthrough = &d * &lcs.d * &d;
         let symmetric = &feedthrough + feedthrough.transpose();
         let split = symmetric.amax() > 0.0;
-        let n = if split {
+        // Q_D lies in ker(D + Dᵀ) only for D + Dᵀ ⪰ 0; else the problem below is not used (see `monotone`).
+        let semidefinite = is_semidefinite(&symmetric);
+        let n = if split && semidefinite {
             norm::kernel(&symmetric)
         } else {
             DMatrix::identity(m, m)
@@ -95,7 +98,7 @@ impl JumpProblem {
             big
         };
         let driver = Driver::new(matrix, tolerance);
-        let monotone = driver.is_monotone();
+        let monotone = semidefinite && driver.is_monotone();
         Some(Self {
             basis,
             sigma,
@@ -175,6 +178,11 @@ fn stack(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     all.rows_mut(0, a.nrows()).copy_from(a);
     all.rows_mut(a.nrows(), b.nrows()).copy_from(b);
     all
+}
+
+fn is_semidefinite(symmetric: &DMatrix<f64>) -> bool {
+    let eigenvalues = symmetric.symmetric_eigenvalues();
+    eigenvalues.min() >= -ROUNDING * eigenvalues.amax()
 }
 
 /// |D| with the rows and columns that are zero taken from CB.

@@ -4,14 +4,14 @@ use cpu_time::ThreadTime;
 use nalgebra::DVector;
 
 use crate::circuit::{Circuit, Tran};
+use crate::integrate::Run;
 use crate::integrate::control::Amplitudes;
+use crate::integrate::exact::{self, Exact};
 use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, Stepper, run};
 use crate::integrate::start;
-use crate::integrate::exact::{self, Exact};
 use crate::integrate::step::Scheme;
 use crate::integrate::switching::Threshold;
 use crate::integrate::theta::{Setup, Start, Stepping, Theta};
-use crate::integrate::Run;
 use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
 use crate::mna::{Behaviour, SwitchPort};
 use crate::plan::{Plan, not_exact, plan};
@@ -75,7 +75,9 @@ pub fn simulate(
     options: SimOptions<'_>,
 ) -> Result<Run, SimError> {
     let tran = circuit.tran.ok_or_else(|| {
-        SimError::before(Reason::Unsupported("the netlist asks for no .tran analysis".into()))
+        SimError::before(Reason::Unsupported(
+            "the netlist asks for no .tran analysis".into(),
+        ))
     })?;
     let standard = behaviour.standard();
     let initial = start::initial(circuit, &standard, tran.uic, &options.settings)?;
@@ -225,13 +227,21 @@ impl Problem {
 
     /// Amplitudes from a coarse run.
     fn scout(&self, tran: &Tran, settings: &Settings) -> Option<Amplitudes> {
-        let settings = Settings { max_steps: SCOUT_LIMIT, ..settings.clone() };
+        let settings = Settings {
+            max_steps: SCOUT_LIMIT,
+            ..settings.clone()
+        };
         let stepping = Stepping::Fixed(tran.tstop / SCOUT_STEPS);
-        let mut theta = self.stepper(tran, Scheme::MOREAU, stepping, &settings).ok()?;
+        let mut theta = self
+            .stepper(tran, Scheme::MOREAU, stepping, &settings)
+            .ok()?;
         let mut log = Log::new(0, f64::INFINITY, false);
         for k in 1..=SCOUT_STEPS as u32 {
             // A failure here will be met, and reported, by the run itself.
-            if theta.advance(tran.tstop * f64::from(k) / SCOUT_STEPS, &mut log).is_err() {
+            if theta
+                .advance(tran.tstop * f64::from(k) / SCOUT_STEPS, &mut log)
+                .is_err()
+            {
                 break;
             }
             theta.see();
@@ -257,13 +267,21 @@ fn dispatch(mut problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result
     check(&tran, &options)?;
     problem.settle_switches(&tran, &options.settings)?;
     let lcs = problem.free(&problem.position)?;
-    let Plan { method, scheme, words } = plan(&lcs, &options);
+    let Plan {
+        method,
+        scheme,
+        words,
+    } = plan(&lcs, &options);
     if let (Method::Exact, Some(obstacle)) = (options.method, not_exact(&lcs)) {
         return Err(SimError::before(Reason::Unsupported(format!(
             "no exact integration: {obstacle}"
         ))));
     }
-    let grid = Grid { tstart: tran.tstart, tstep: tran.tstep, tstop: tran.tstop };
+    let grid = Grid {
+        tstart: tran.tstart,
+        tstep: tran.tstep,
+        tstop: tran.tstop,
+    };
     let frame = Frame {
         title: lcs.title.clone(),
         names: lcs.outputs.names.clone(),
@@ -280,7 +298,10 @@ fn dispatch(mut problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result
     }
     let stepping = match options.step {
         Some(h) => Stepping::Fixed(h),
-        None => Stepping::Controlled { span: tran.tstop, first: tran.tstep / 64.0 },
+        None => Stepping::Controlled {
+            span: tran.tstop,
+            first: tran.tstep / 64.0,
+        },
     };
     let mut theta = problem.stepper(&tran, scheme, stepping, &options.settings)?;
     if options.step.is_none()

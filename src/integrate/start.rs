@@ -308,7 +308,19 @@ fn static_solution(
         u: &u,
         du: &du,
     };
-    check_constraints(&lcs, at)?;
+    check_constraints(&lcs, at).map_err(|error| {
+        // Sources that contradict each other do so without the operating point, too.
+        let moving = Position {
+            storage: StorageHold::Dynamic,
+            ..position
+        };
+        match reduce(behaviour, &moving) {
+            Err(e @ ReduceError::Sources { .. }) => {
+                SimError::before(Reason::Circuit(e.to_string()))
+            }
+            _ => error,
+        }
+    })?;
     let all = |rows: &crate::lcs::Rows| -> Vec<f64> {
         (0..rows.one.len())
             .map(|i| reading::value(rows, i, at))

@@ -66,6 +66,10 @@ impl Scheme {
 /// A guard this far below zero, relative to the sum of the magnitudes it was computed from, is zero: rounding of K.
 const GUARD_ROUNDING: f64 = 1e-12;
 
+/// The implicit step that tells y and λ at the right limit of an instant, relative to the last step: 2⁻¹². Its own error is that
+/// part of the step's, the amplified rounding of the state 2¹² ε.
+pub(crate) const SHORT: f64 = 1.0 / 4096.0;
+
 /// Columns of z.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Columns {
@@ -92,6 +96,19 @@ impl Columns {
             z[self.n + p + k] = u[j];
         }
         z[self.n + 2 * p] = 1.0;
+    }
+
+    /// z at the end of a step as rows over z at its start, where x⁺ = `x_next` z; both ends of u are u⁺.
+    fn end_rows(&self, x_next: &DMatrix<f64>) -> DMatrix<f64> {
+        let p = self.varying.len();
+        let mut rows = DMatrix::zeros(self.len(), self.len());
+        rows.rows_mut(0, self.n).copy_from(x_next);
+        for k in self.n..self.n + p {
+            rows[(k, k)] = 1.0;
+            rows[(k + p, k)] = 1.0;
+        }
+        rows[(self.len() - 1, self.len() - 1)] = 1.0;
+        rows
     }
 
     /// `x_part·x + u_part·(weight·u⁺ + (1 − weight)·u) + one` as rows over z.
@@ -138,6 +155,8 @@ pub(crate) struct StepMatrices {
     scaled: DMatrix<f64>,
     scaling: Scaling,
     m: DMatrix<f64>,
+    /// For γ < 1: the short implicit step that tests the end.
+    after: Option<Box<StepMatrices>>,
     /// The solvers for M.
     pub driver: Driver,
     modes: Vec<FusedMode>,
@@ -198,6 +217,12 @@ impl StepMatrices {
             })
             .m;
         let driver = Driver::new(m.clone(), tolerance);
+        let after = if gamma < 1.0 {
+            let short = Self::new(lcs, columns, h * SHORT, Scheme::MOREAU, tolerance)?;
+            Some(Box::new(short))
+        } else {
+            None
+        };
         Some(Self {
             h,
             scheme,
@@ -208,6 +233,7 @@ impl StepMatrices {
             scaled,
             scaling,
             m,
+            after,
             driver,
             modes: Vec::new(),
         })
@@ -230,23 +256,13 @@ impl StepMatrices {
         &self.modes[index]
     }
 
-    fn fuse(&self, lcs: &Lcs, columns: &Columns, active: &[bool]) -> FusedMode {
-        let (n, m, width) = (lcs.n(), lcs.m(), columns.len());
+    /// λ (m×len(z), rows of blocking ports zero) on an active set, with the factorisation it comes from.
+    fn lambda_rows(&self, active: &[bool]) -> (DMatrix<f64>, ActiveSolve) {
         let solve = ActiveSolve::new(&self.scaled, active);
         let d = &self.scaling.d;
-        let mut scaled_q = self.q.select_rows(&solve.indices);
-        for (mut row, &j) in scaled_q.row_iter_mut().zip(&solve.indices) {
-            row *= d[j];
-        }
-        let mut lambda = DMatrix::zeros(m, width);
-        for (row, &j) in (-(&solve.inverse * scaled_q))
-            .row_iter()
-            .zip(&solve.indices)
-        {
-            lambda.set_row(j, &(row * d[j]));
-        }
-        if solve.regular {
-            // One step of refinement: the residual M_aa λ_a + q_a through the same inverse.
+        let mut lambda = DMatrix::zeros(self.m.nrows(), self.q.ncols());
+        // One solve, and where M_aa is regular one step of refinement through the same inverse.
+        for _ in 0..if solve.regular { 2 } else { 1 } {
             let mut residual = (&self.m * &lambda + &self.q).select_rows(&solve.indices);
             for (mut row, &j) in residual.row_iter_mut().zip(&solve.indices) {
                 row *= d[j];
@@ -256,11 +272,23 @@ impl StepMatrices {
                 lambda.set_row(j, &better);
             }
         }
+        (lambda, solve)
+    }
+
+    fn fuse(&self, lcs: &Lcs, columns: &Columns, active: &[bool]) -> FusedMode {
+        let (n, m, width) = (lcs.n(), lcs.m(), columns.len());
+        let (lambda, solve) = self.lambda_rows(active);
         let x_next = &self.phi + &self.response * &lambda;
-        // Blocking ports are tested at the end of the step, conducting ones by their λ.
-        let zero = DMatrix::zeros(m, n);
-        let y_end = &lcs.c * &x_next + &lcs.d * &lambda + columns.rows(&zero, &lcs.g, 1.0, &lcs.f);
         let y = &self.m * &lambda + &self.q;
+        // Blocking ports are tested at the end of the step, conducting ones by their λ. For γ < 1 that is not where y and λ
+        // belong: there y is that of a very short implicit step from the end.
+        let y_end = match &self.after {
+            None => y.clone(),
+            Some(after) => {
+                let (lambda, _) = after.lambda_rows(active);
+                (&after.m * lambda + &after.q) * columns.end_rows(&x_next)
+            }
+        };
         let extra = if solve.regular {
             0
         } else {

@@ -93,11 +93,11 @@ fn references(circuit: &Circuit, notes: &mut Vec<Diagnostic>) -> Vec<bool> {
     }
     let mut reference = vec![false; circuit.nodes.len()];
     let mut seen = vec![false; circuit.nodes.len()];
-    for n in 0..circuit.nodes.len() {
+    for (n, is_reference) in reference.iter_mut().enumerate() {
         let root = sets.find(n);
         if !seen[root] {
             seen[root] = true;
-            reference[n] = true;
+            *is_reference = true;
             if n > 0 {
                 let members: Vec<&str> = (n..circuit.nodes.len())
                     .filter(|&k| sets.find(k) == root)

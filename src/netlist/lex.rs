@@ -74,7 +74,14 @@ pub(super) fn logical(file: FileId, text: &str, from: usize) -> (Vec<Line>, Vec<
         if indent == kept.len() {
             continue;
         }
-        if !kept[indent..].starts_with('+') {
+        if kept.trim() == ")"
+            && let Some(line) = lines.last_mut().filter(|line| is_open(&line.text))
+        {
+            // The end of a `.model` written over several lines.
+            let gap = range.start - (line.start + line.text.len());
+            line.text.extend(std::iter::repeat_n(' ', gap));
+            line.text.push_str(&kept);
+        } else if !kept[indent..].starts_with('+') {
             lines.push(Line {
                 file,
                 start: range.start,
@@ -94,6 +101,12 @@ pub(super) fn logical(file: FileId, text: &str, from: usize) -> (Vec<Line>, Vec<
         }
     }
     (lines, orphans)
+}
+
+/// Whether more parentheses open than close.
+fn is_open(text: &str) -> bool {
+    let count = |c| text.matches(c).count();
+    count('(') > count(')')
 }
 
 /// The length of a physical line without its comment.

@@ -383,6 +383,16 @@ fn remark_7_observed_orders_of_implicit_euler() {
     };
     let (w1, w2) = (worst(130), worst(520));
     assert!(w2 <= 0.55 * w1 + 1e-12, "{w1} {w2}");
+    // From below λ = +2: x' = 3 until t = 1/3.
+    let below = relay.integrate((0.0, 1.0), &dvector![-1.0], 300).unwrap();
+    let exact = |t: f64| (3.0 * t - 1.0).min(0.0);
+    assert!(
+        below
+            .t
+            .iter()
+            .zip(&below.x)
+            .all(|(t, x)| (x[0] - exact(*t)).abs() < 1e-2)
+    );
     let run = relay.integrate((0.0, 2.0), &dvector![1.0], 100).unwrap();
     assert!(
         (run.lambda[100][0] + 1.0).abs() < 1e-9,

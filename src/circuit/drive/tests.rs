@@ -138,3 +138,43 @@ fn supplies_ramp_up_at_startup() {
         }
     );
 }
+
+#[test]
+fn modulated_waves() {
+    assert_eq!(
+        source("V1 a 0 SFFM(0 1 1MEG 5 10K)", ".tran 10n 100u").wave,
+        Wave::Sffm {
+            offset: 0.0,
+            amplitude: 1.0,
+            carrier: 1e6,
+            index: 5.0,
+            signal: 1e4,
+            carrier_phase: 0.0,
+            signal_phase: 0.0,
+        }
+    );
+    assert_eq!(
+        source("V1 a 0 AM(2 1 1k 20k 1m 0)", ".tran 1u 1m").wave,
+        Wave::Am {
+            amplitude: 2.0,
+            offset: 1.0,
+            modulation: 1e3,
+            carrier: 2e4,
+            delay: 1e-3,
+        }
+    );
+}
+
+#[test]
+fn pwl_repeats_a_number_of_times() {
+    let wave = source("V1 a 0 PWL REPEAT FOR 2 (0 0 1 3) ENDREPEAT", ".tran 1m 3").wave;
+    let points = vec![(0.0, 0.0), (1.0, 3.0), (1.0, 0.0), (2.0, 3.0)];
+    assert_eq!(
+        wave,
+        Wave::Pwl {
+            points,
+            repeat: None,
+            delay: 0.0,
+        }
+    );
+}

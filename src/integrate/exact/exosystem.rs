@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::spectrum::Rate;
 use crate::circuit::Source;
-use crate::circuit::source::{Oscillation, Piece};
+use crate::circuit::source::{Oscillation, Piece, Wave};
 
 /// (sine part, cosine part) of a term τ seconds after its origin; for frequency 0 the first alone is the term.
 fn pair(term: &Oscillation, tau: f64) -> (f64, f64) {
@@ -59,6 +59,32 @@ pub(crate) struct Shape {
 }
 
 impl Shape {
+    /// What a source's pieces on [from, until] are made of; `None` if it has no closed form.
+    fn of_source(source: &Source, from: f64, until: f64) -> Option<Self> {
+        let straight = |sloped: bool| Self {
+            changes: true,
+            sloped,
+            waves: Vec::new(),
+        };
+        match &source.wave {
+            Wave::Pulse {
+                v1, v2, rise, fall, ..
+            } if v1 != v2 => Some(straight(*rise > 0.0 || *fall > 0.0)),
+            Wave::Pwl { points, .. } => Some(straight(
+                points
+                    .windows(2)
+                    .any(|w| w[1].0 > w[0].0 && w[1].1 != w[0].1),
+            )),
+            _ => {
+                let mut pieces = vec![source.piece(from)?];
+                while let Some(last) = pieces.last().filter(|p| p.end < until) {
+                    pieces.push(source.piece(last.end)?);
+                }
+                Some(Self::of(&pieces))
+            }
+        }
+    }
+
     /// The union over pieces.
     pub(crate) fn of<'a>(pieces: impl IntoIterator<Item = &'a Piece>) -> Self {
         let mut shape = Self::default();
@@ -82,18 +108,9 @@ impl Exosystem {
         let mut shapes = Vec::new();
         let mut first = Vec::new();
         for source in sources {
-            let mut t = from;
-            let mut pieces = Vec::new();
-            loop {
-                let piece = source.piece(t)?;
-                pieces.push(piece);
-                if piece.end >= until {
-                    break;
-                }
-                t = piece.end;
-            }
-            shapes.push(Shape::of(&pieces));
-            first.push(pieces[0]);
+            let piece = source.piece(from)?;
+            shapes.push(Shape::of_source(source, from, until)?);
+            first.push(piece);
         }
         Some(Self::new(&shapes, first))
     }
@@ -180,6 +197,14 @@ impl Exosystem {
         }
     }
 
+    /// Whether column k of z is a straight line between breakpoints.
+    pub(crate) fn is_straight(&self, k: usize) -> bool {
+        !matches!(
+            self.columns[k],
+            Column::Wave { .. } | Column::Quadrature | Column::Shared { .. }
+        )
+    }
+
     /// Length of z; z[0] = 1.
     pub(crate) fn dim(&self) -> usize {
         self.columns.len()
@@ -264,7 +289,6 @@ impl Exosystem {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::circuit::source::Wave;
     use nalgebra::DVector;
 
     fn source(wave: Wave) -> Source {

@@ -16,12 +16,7 @@ const ROUNDING: f64 = 1e-12;
 impl Exact<'_> {
     /// The devices' impulse at the present storage in a switch position, by projection in the energy metric. Returns
     /// whether the storage moved.
-    pub(super) fn project(
-        &mut self,
-        key: &Key,
-        before: &DVector<f64>,
-        log: &mut Log,
-    ) -> Result<bool, SimError> {
+    pub(super) fn project(&mut self, key: &Key, log: &mut Log) -> Result<bool, SimError> {
         let t = self.motion.t;
         let u = self.inputs(t);
         let free = self.plant.free(&key.switches).map_err(|mut error| {
@@ -35,7 +30,7 @@ impl Exact<'_> {
             Ok(Some(jump)) => (jump.x, jump.p),
             Ok(None) | Err(_) => (x.clone(), DVector::zeros(free.lcs.m())),
         };
-        self.leap(key, &x, &after, &p, before, log)
+        self.leap(key, &x, &after, &p, log)
     }
 
     /// Carries out a jump of the free state from x to `after` by impulses p, with its impulses and energies.
@@ -45,7 +40,6 @@ impl Exact<'_> {
         x: &DVector<f64>,
         after: &DVector<f64>,
         p: &DVector<f64>,
-        before: &DVector<f64>,
         log: &mut Log,
     ) -> Result<bool, SimError> {
         let t = self.motion.t;
@@ -59,7 +53,7 @@ impl Exact<'_> {
             &free.lcs,
             x.as_slice(),
             after.as_slice(),
-            before.as_slice(),
+            self.before.as_slice(),
             u.as_slice(),
             p.as_slice(),
         );
@@ -80,7 +74,6 @@ impl Exact<'_> {
     pub(super) fn jump_into(
         &mut self,
         key: &Key,
-        before: &DVector<f64>,
         log: &mut Log,
     ) -> Result<Option<(usize, Vec<usize>)>, SimError> {
         let t = self.motion.t;
@@ -118,7 +111,7 @@ impl Exact<'_> {
                 self.inspector
                     .inspect(mode, &self.exosystem, t, &s, &self.scale)
             {
-                self.leap(key, &x, &after, &p, before, log)?;
+                self.leap(key, &x, &after, &p, log)?;
                 return Ok(Some((at, leaving)));
             }
         }

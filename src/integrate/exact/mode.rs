@@ -6,6 +6,7 @@ use super::exosystem::Exosystem;
 use super::flow::Flow;
 use super::kernel::Kernel;
 use super::rays;
+use super::schedule::Drive;
 use crate::integrate::switching::Threshold;
 use crate::lcs::{Lcs, PowerKind, Rows};
 
@@ -85,7 +86,7 @@ impl Mode {
         lcs: &Lcs,
         exosystem: &Exosystem,
         thresholds: &[Threshold],
-        watched: &[bool],
+        drives: &[Drive],
         h: f64,
         energy: bool,
     ) -> Option<Self> {
@@ -108,11 +109,17 @@ impl Mode {
         } else {
             held
         };
+        let devices = distinct(&devices);
         let controls = over_w(&lcs.controls, n, exosystem);
-        let moved = |i: usize| controls.row(i).columns(0, n).iter().any(|v| *v != 0.0);
-        let guarded_switches: Vec<usize> = (0..thresholds.len())
-            .filter(|&i| watched[i] || moved(i))
-            .collect();
+        let driven = |i: usize| {
+            drives.iter().any(|drive| {
+                let row = controls.row(i);
+                drive.switch == i
+                    && row.columns(0, n).iter().all(|v| *v == 0.0)
+                    && row.iter().skip(n).eq(drive.row.iter())
+            })
+        };
+        let guarded_switches: Vec<usize> = (0..thresholds.len()).filter(|&i| !driven(i)).collect();
         let mut guards = DMatrix::zeros(devices.nrows() + guarded_switches.len(), dim);
         guards.rows_mut(0, devices.nrows()).copy_from(&devices);
         for (k, &i) in guarded_switches.iter().enumerate() {
@@ -199,6 +206,26 @@ impl Mode {
                 .map(|row| row.iter().zip(w).map(|(m, w)| m * w).sum::<f64>()),
         );
     }
+}
+
+/// The rows that are no positive multiple of an earlier one: equal guards fall together.
+fn distinct(rows: &DMatrix<f64>) -> DMatrix<f64> {
+    /// Entries that agree to this part of a row's largest are equal.
+    const EQUAL: f64 = 1e-14;
+    let mut kept: Vec<(usize, f64)> = Vec::new();
+    for i in 0..rows.nrows() {
+        let size = rows.row(i).amax();
+        let same = |&(j, other): &(usize, f64)| {
+            rows.row(i)
+                .iter()
+                .zip(rows.row(j).iter())
+                .all(|(a, b)| (a / size - b / other).abs() <= EQUAL)
+        };
+        if size > 0.0 && !kept.iter().any(same) {
+            kept.push((i, size));
+        }
+    }
+    DMatrix::from_fn(kept.len(), rows.ncols(), |i, j| rows[(kept[i].0, j)])
 }
 
 /// Quadratic forms of the power out of sources and into what dissipates, over w.

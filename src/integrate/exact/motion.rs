@@ -108,7 +108,10 @@ impl Motion {
 
     /// Largest value a combination of states can have had on the way here.
     pub(crate) fn reach<'r>(&self, row: impl IntoIterator<Item = &'r f64>) -> f64 {
-        row.into_iter().zip(&self.amplitude).map(|(c, a)| (c * a).abs()).sum()
+        row.into_iter()
+            .zip(&self.amplitude)
+            .map(|(c, a)| (c * a).abs())
+            .sum()
     }
 
     /// Moves to `stop` or to the first guard that falls through zero before it.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::exosystem::Exosystem;
 use super::free::Free;
 use super::mode::{Key, Mode};
+use super::schedule::Drive;
 use crate::integrate::run::SimError;
 use crate::integrate::switching::Threshold;
 use crate::lcs::{Hold, Lcs};
@@ -18,8 +19,8 @@ pub(crate) struct Plant<'a> {
     /// Number of device pairs.
     pub(crate) pairs: usize,
     pub(crate) thresholds: Vec<Threshold>,
-    /// Switches whose control is a combination of sources alone, with its row over w in the start position.
-    pub(crate) driven: Vec<bool>,
+    /// Switches that sources alone drive.
+    pub(crate) drives: Vec<Drive>,
     h: f64,
     energy: bool,
     tolerance: f64,
@@ -41,7 +42,7 @@ impl<'a> Plant<'a> {
         Self {
             assemble,
             pairs,
-            driven: vec![false; thresholds.len()],
+            drives: Vec::new(),
             thresholds,
             h,
             energy,
@@ -76,14 +77,13 @@ impl<'a> Plant<'a> {
             .iter()
             .map(|&c| if c { Hold::Closed } else { Hold::Open })
             .collect();
-        let watched: Vec<bool> = self.driven.iter().map(|d| !d).collect();
         let mode = (self.assemble)(&holds, &key.switches).ok().and_then(|lcs| {
             Mode::new(
                 key.clone(),
                 &lcs,
                 exosystem,
                 &self.thresholds,
-                &watched,
+                &self.drives,
                 self.h,
                 self.energy,
             )

@@ -1,57 +1,81 @@
-//! Switches that sources alone control: their times are known beforehand.
+//! Switches that piecewise straight sources alone control: their times need no guard.
 
 use nalgebra::DMatrix;
 
-use crate::circuit::Source;
-use crate::circuit::source::crossings;
+use super::exosystem::Exosystem;
+use super::mode::over_w;
 use crate::integrate::switching::Threshold;
-use crate::lcs::Lcs;
+use crate::lcs::{Lcs, Rows};
 
-/// Whether a switch's control is a combination of sources alone.
-pub(super) fn is_driven(lcs: &Lcs, i: usize) -> bool {
-    let rows = &lcs.controls;
-    let zero = |m: &DMatrix<f64>| i >= m.nrows() || m.row(i).iter().all(|v| *v == 0.0);
-    zero(&rows.x) && zero(&rows.lambda) && zero(&rows.du)
+/// The control of one switch as a combination of straight columns of z, less nothing: c = row · z.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Drive {
+    /// The switch.
+    pub(crate) switch: usize,
+    /// Over z.
+    pub(crate) row: Vec<f64>,
+    /// Its derivative, row · S.
+    slope: Vec<f64>,
+    /// When its control next passes the threshold on the present pieces, s.
+    pub(crate) next: f64,
 }
 
-/// When source-driven switches move, in order of time.
-pub(super) fn schedule(
-    lcs: &Lcs,
-    thresholds: &[Threshold],
-    driven: &[bool],
-    sources: &[Source],
-    position: &[bool],
-    t: f64,
-    until: f64,
-) -> Vec<(f64, usize, bool)> {
-    let mut all = Vec::new();
-    for i in (0..thresholds.len()).filter(|&i| driven[i]) {
-        let gains: Vec<(f64, &Source)> = sources
-            .iter()
-            .enumerate()
-            .map(|(j, source)| (lcs.controls.u[(i, j)], source))
-            .filter(|(gain, _)| *gain != 0.0)
-            .collect();
-        let constant = lcs.controls.one[i];
-        let threshold = &thresholds[i];
-        let passages = |level: f64, rising: bool| {
-            crossings(&gains, constant, level, t, until)
-                .into_iter()
-                .filter(move |c| c.rising == rising)
-                .map(move |c| (c.time, rising))
-        };
-        let mut both: Vec<(f64, bool)> = passages(threshold.on_above, true)
-            .chain(passages(threshold.off_below, false))
-            .collect();
-        both.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut on = position[i];
-        for (time, rising) in both {
-            if rising != on {
-                on = rising;
-                all.push((time, i, on));
-            }
-        }
+/// The drives of a system's switches; switches with another control are guarded instead.
+pub(crate) fn drives(lcs: &Lcs, exosystem: &Exosystem) -> Vec<Drive> {
+    let Rows { x, lambda, .. } = &lcs.controls;
+    let zero = |m: &DMatrix<f64>, i: usize| i >= m.nrows() || m.row(i).iter().all(|v| *v == 0.0);
+    let rows = over_w(&lcs.controls, lcs.n(), exosystem);
+    (0..rows.nrows())
+        .filter(|&i| zero(x, i) && zero(lambda, i))
+        .filter_map(|i| {
+            let row: Vec<f64> = rows.row(i).iter().skip(lcs.n()).copied().collect();
+            let straight = row
+                .iter()
+                .enumerate()
+                .all(|(k, v)| *v == 0.0 || exosystem.is_straight(k));
+            straight.then(|| Drive {
+                switch: i,
+                slope: (0..row.len())
+                    .map(|k| {
+                        (0..row.len())
+                            .map(|j| row[j] * exosystem.generator()[(j, k)])
+                            .sum()
+                    })
+                    .collect(),
+                row,
+                next: f64::INFINITY,
+            })
+        })
+        .collect()
+}
+
+impl Drive {
+    /// c at z.
+    pub(crate) fn control(&self, z: &[f64]) -> f64 {
+        self.row.iter().zip(z).map(|(r, z)| r * z).sum()
     }
-    all.sort_by(|a, b| a.0.total_cmp(&b.0));
-    all
+
+    /// Finds the next passage after t, where the sources stand at z and their pieces last until `end`.
+    pub(crate) fn look_ahead(
+        &mut self,
+        threshold: &Threshold,
+        on: bool,
+        t: f64,
+        z: &[f64],
+        end: f64,
+    ) {
+        let slope: f64 = self.slope.iter().zip(z).map(|(r, z)| r * z).sum();
+        let level = if on {
+            threshold.off_below
+        } else {
+            threshold.on_above
+        };
+        let towards = if on { slope < 0.0 } else { slope > 0.0 };
+        let passage = t + ((level - self.control(z)) / slope).max(0.0);
+        self.next = if towards && passage < end {
+            passage
+        } else {
+            f64::INFINITY
+        };
+    }
 }

@@ -10,7 +10,8 @@ use super::inspect::Inspector;
 use super::mode::{Key, Owner};
 use super::motion::{Arrival, Motion};
 use super::plant::{Assemble, Plant};
-use super::schedule::{is_driven, schedule};
+use super::schedule::drives;
+use super::transition::Trigger;
 use crate::circuit::Source;
 use crate::integrate::energy::Balance;
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
@@ -60,16 +61,21 @@ pub struct Exact<'a> {
     /// Largest values of the storage elements so far, levelled by kind.
     pub(super) scale: Vec<f64>,
     pub(super) volts: Vec<bool>,
-    /// Times at which source-driven switches move: (time, switch, on), in order.
-    pub(super) schedule: Vec<(f64, usize, bool)>,
-    pub(super) scheduled: usize,
+    /// z at the last breakpoint.
+    pub(super) z: Vec<f64>,
+    /// u before the last breakpoint.
+    pub(super) before: DVector<f64>,
+    /// What the log says about a change from one mode to another.
+    pub(super) labels: BTreeMap<(usize, usize), String>,
     /// Modes left at the present instant.
     pub(super) left_here: Vec<usize>,
     pub(super) instant: f64,
-    pub(super) transitions: BTreeMap<(usize, usize), usize>,
+    /// What followed: (mode left, why, mode entered), latest last.
+    pub(super) successors: Vec<(usize, Trigger, usize)>,
     pub(super) metric: DMatrix<f64>,
     pub(super) started: bool,
     pub(super) settings: Settings,
+    pub(super) energy: bool,
     pub(super) balance: Balance,
     pub(super) events: u64,
     pub(super) jumps: u64,
@@ -113,26 +119,14 @@ impl<'a> Exact<'a> {
                 "a source has no closed form as a linear system".to_string(),
             ))
         })?;
-        plant.driven = (0..plant.thresholds.len())
-            .map(|i| is_driven(&lcs, i))
-            .collect();
-        for i in (0..position.len()).filter(|&i| plant.driven[i]) {
-            let values = sources
-                .iter()
-                .enumerate()
-                .map(|(j, s)| lcs.controls.u[(i, j)] * s.value(t));
-            let control = lcs.controls.one[i] + values.sum::<f64>();
-            position[i] = plant.thresholds[i].position(position[i], control);
+        plant.drives = drives(&lcs, &exosystem);
+        let mut z = vec![0.0; exosystem.dim()];
+        exosystem.write(t, &mut z);
+        for drive in &plant.drives {
+            let i = drive.switch;
+            position[i] = plant.thresholds[i].position(position[i], drive.control(&z));
         }
-        let schedule = schedule(
-            &lcs,
-            &plant.thresholds,
-            &plant.driven,
-            &sources,
-            &position,
-            t,
-            until,
-        );
+        let sources_count = sources.len();
         let volts = lcs
             .storage
             .names
@@ -156,14 +150,16 @@ impl<'a> Exact<'a> {
             storage: start.as_slice().to_vec(),
             scale: vec![0.0; start.len()],
             volts,
-            schedule,
-            scheduled: 0,
+            z,
+            before: DVector::zeros(sources_count),
+            labels: BTreeMap::new(),
             left_here: Vec::new(),
             instant: t,
-            transitions: BTreeMap::new(),
+            successors: Vec::new(),
             metric,
             started: false,
             settings,
+            energy,
             balance: Balance::new(stored),
             events: 0,
             jumps: 0,
@@ -198,9 +194,11 @@ impl<'a> Exact<'a> {
     /// The next time at which something is known to happen, s.
     fn next_stop(&self) -> f64 {
         let switching = self
-            .schedule
-            .get(self.scheduled)
-            .map_or(f64::INFINITY, |s| s.0);
+            .plant
+            .drives
+            .iter()
+            .map(|d| d.next)
+            .fold(f64::INFINITY, f64::min);
         self.exosystem.next_breakpoint().min(switching)
     }
 
@@ -227,8 +225,10 @@ impl<'a> Exact<'a> {
             self.rescale();
             let [source, dissipated] = std::mem::take(&mut self.motion.energy);
             self.balance.add((source, dissipated));
-            let s = DVector::from_column_slice(&self.storage);
-            self.balance.note(0.5 * s.dot(&(&self.metric * &s)));
+            if self.energy {
+                let s = DVector::from_column_slice(&self.storage);
+                self.balance.note(0.5 * s.dot(&(&self.metric * &s)));
+            }
         }
     }
 
@@ -243,7 +243,8 @@ impl<'a> Exact<'a> {
             key.switches[i] = !key.switches[i];
             discontinuous = true;
         }
-        self.change(key, discontinuous, Some((from, guard)), None, log)
+        self.remember_inputs();
+        self.change(key, discontinuous, Trigger::Guard(guard), log)
     }
 
     /// Remembers that a mode was left at this instant.
@@ -255,40 +256,66 @@ impl<'a> Exact<'a> {
         self.left_here.push(from);
     }
 
+    /// Keeps u as it is now, for the work of sources in a jump.
+    fn remember_inputs(&mut self) {
+        self.exosystem.write(self.motion.t, &mut self.z);
+        let h = self.exosystem.output();
+        for (u, row) in self.before.iter_mut().zip(h.row_iter()) {
+            *u = row.iter().zip(&self.z).map(|(h, z)| h * z).sum();
+        }
+    }
+
     /// Sources reach breakpoints, driven switches move.
     fn breakpoint(&mut self, log: &mut Log) -> Result<(), SimError> {
         let t = self.motion.t;
         let near = t + self.ulps();
         self.take_storage();
-        let before = self.inputs(t);
+        self.remember_inputs();
         let mut edge = false;
         for i in 0..self.sources.len() {
-            let end = self.exosystem.piece(i).end;
-            if end <= near {
-                let Some(piece) = self.sources[i].piece(end.max(t)) else {
-                    return Err(self.fail(Reason::Unsupported(
-                        "a source lost its closed form".to_string(),
-                    )));
+            let old = *self.exosystem.piece(i);
+            if old.end <= near {
+                let Some(piece) = self.sources[i].piece(old.end.max(t)) else {
+                    return Err(
+                        self.fail(Reason::Unsupported("a source lost its closed form".into()))
+                    );
                 };
-                edge |= self.sources[i].is_edge(end);
+                edge |= old.value(old.end) != piece.value(old.end);
                 self.exosystem.set_piece(i, piece);
             }
         }
         let mut key = self.key.clone();
-        while let Some(&(_, switch, on)) = self.schedule.get(self.scheduled).filter(|s| s.0 <= near)
-        {
-            self.scheduled += 1;
-            let watched = self
+        self.exosystem.write(t, &mut self.z);
+        for drive in &self.plant.drives {
+            let (i, on) = (drive.switch, key.switches[drive.switch]);
+            let due = drive.next <= near;
+            let wanted = if due {
+                !on
+            } else {
+                self.plant.thresholds[i].position(on, drive.control(&self.z))
+            };
+            let guarded = self
                 .mode
-                .is_some_and(|at| self.plant.modes[at].guarded_switches.contains(&switch));
-            if !watched && key.switches[switch] != on {
-                key.switches[switch] = on;
+                .is_some_and(|at| self.plant.modes[at].guarded_switches.contains(&i));
+            if wanted != on && !guarded {
+                key.switches[i] = wanted;
                 edge = true;
             }
         }
         self.left_here.clear();
         self.instant = t;
-        self.change(key, edge, None, Some(before), log)
+        self.change(key, edge, Trigger::Sources, log)
+    }
+
+    /// When the driven switches move next on the present pieces.
+    pub(super) fn look_ahead(&mut self) {
+        let end = self.exosystem.next_breakpoint();
+        self.exosystem.write(self.motion.t, &mut self.z);
+        for drive in &mut self.plant.drives {
+            let i = drive.switch;
+            let threshold = &self.plant.thresholds[i];
+            drive.look_ahead(threshold, self.key.switches[i], self.motion.t, &self.z, end);
+        }
     }
 
     /// Logs which devices and switches changed.
@@ -298,26 +325,20 @@ impl<'a> Exact<'a> {
         jumped: bool,
         log: &mut Log,
     ) -> Result<(), SimError> {
-        let new = self.plant.modes[at].key.clone();
-        let mut words: Vec<String> = Vec::new();
-        if self.started && (new != self.key) {
-            for (i, threshold) in self.plant.thresholds.iter().enumerate() {
-                if new.switches[i] != self.key.switches[i] {
-                    let position = if new.switches[i] { "on" } else { "off" };
-                    words.push(format!("{} {position}", threshold.name));
-                }
+        let changed = self.started && self.plant.modes[at].key != self.key;
+        let mut words = String::new();
+        if changed {
+            let pair = (self.mode.unwrap_or(at), at);
+            if !self.labels.contains_key(&pair) {
+                let label = self.label(at)?;
+                self.labels.insert(pair, label);
             }
-            let free = self.plant.free(&new.switches)?;
-            for (j, port) in free.lcs.ports.iter().enumerate() {
-                if new.closed.get(j) != self.key.closed.get(j) && !words.contains(&port.device) {
-                    words.push(port.device.clone());
-                }
-            }
+            words.clone_from(&self.labels[&pair]);
             self.events += 1;
             self.notes.extend(self.accumulation.event(self.motion.t));
         }
         if jumped {
-            words.push("jump".to_string());
+            words += if words.is_empty() { "jump" } else { ", jump" };
         }
         if self.plant.modes[at].shared && !self.noted_shared {
             self.noted_shared = true;
@@ -328,9 +349,28 @@ impl<'a> Exact<'a> {
             ));
         }
         if !words.is_empty() {
-            log.event(self.motion.t, words.join(", "));
+            log.event(self.motion.t, words);
         }
         Ok(())
+    }
+
+    /// Names of what differs between the present mode and another.
+    fn label(&mut self, at: usize) -> Result<String, SimError> {
+        let new = self.plant.modes[at].key.clone();
+        let mut words: Vec<String> = Vec::new();
+        for (i, threshold) in self.plant.thresholds.iter().enumerate() {
+            if new.switches[i] != self.key.switches[i] {
+                let position = if new.switches[i] { "on" } else { "off" };
+                words.push(format!("{} {position}", threshold.name));
+            }
+        }
+        let free = self.plant.free(&new.switches)?;
+        for (j, port) in free.lcs.ports.iter().enumerate() {
+            if new.closed.get(j) != self.key.closed.get(j) && !words.contains(&port.device) {
+                words.push(port.device.clone());
+            }
+        }
+        Ok(words.join(", "))
     }
 
     pub(super) fn read_row(&mut self) {
@@ -341,9 +381,9 @@ impl<'a> Exact<'a> {
     }
 
     fn start(&mut self, log: &mut Log) -> Result<(), SimError> {
-        let u = self.inputs(self.motion.t);
+        self.remember_inputs();
         let key = self.key.clone();
-        self.change(key, true, None, Some(u), log)?;
+        self.change(key, true, Trigger::Sources, log)?;
         self.started = true;
         Ok(())
     }

@@ -1,7 +1,5 @@
 //! From one mode to the next: positions of the switches, impulse of the devices, conducting devices.
 
-use nalgebra::DVector;
-
 use super::free::Degenerate;
 use super::inspect::{Finding, Inspector};
 use super::mode::Key;
@@ -15,18 +13,28 @@ const MOST_NEIGHBOURS: usize = 400;
 /// Events at one instant after which modes already left there are not entered again.
 const PATIENCE: usize = 2;
 
+/// Transitions remembered; the oldest goes first.
+const MOST_SUCCESSORS: usize = 64;
+
+/// Why a mode is left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Trigger {
+    /// This guard fell through zero.
+    Guard(usize),
+    /// Sources or switches they drive changed.
+    Sources,
+}
+
 impl Exact<'_> {
     /// Finds the mode from here on: positions of the switches, impulse of the devices, conducting devices.
     pub(super) fn change(
         &mut self,
         mut key: Key,
         mut discontinuous: bool,
-        fired: Option<(usize, usize)>,
-        before: Option<DVector<f64>>,
+        trigger: Trigger,
         log: &mut Log,
     ) -> Result<(), SimError> {
         let t = self.motion.t;
-        let before = before.unwrap_or_else(|| self.inputs(t));
         let wants_rows = log.wants_rows();
         if wants_rows && self.started {
             self.read_row();
@@ -37,16 +45,16 @@ impl Exact<'_> {
         let mut entry = None;
         for _ in 0..2 + 2 * self.plant.thresholds.len() {
             // A device event in a convex circuit is continuous; an edge or a switch may need an impulse.
-            let mut found = None;
-            if !discontinuous {
-                found = self.find_mode(&key, fired)?;
+            let mut found = self.follow(&key, trigger);
+            if found.is_none() && !discontinuous {
+                found = self.find_mode(&key, trigger)?;
             }
             if found.is_none() {
-                jumped |= self.project(&key, &before, log)?;
-                found = self.find_mode(&key, fired)?;
+                jumped |= self.project(&key, log)?;
+                found = self.find_mode(&key, trigger)?;
             }
             if found.is_none() && self.plant.pairs > 0 {
-                found = self.jump_into(&key, &before, log)?;
+                found = self.jump_into(&key, log)?;
                 jumped |= found.is_some();
             }
             let Some((at, leaving)) = found else {
@@ -77,8 +85,8 @@ impl Exact<'_> {
                 .fail(Reason::SwitchesDoNotSettle)
                 .device(names.join(", ")));
         };
-        if let (Some(pair), false) = (fired, jumped) {
-            self.transitions.insert(pair, at);
+        if let (Some(from), false) = (self.mode, jumped) {
+            self.remember((from, trigger, at));
         }
         let same = self.mode == Some(at);
         self.report(at, jumped, log)?;
@@ -88,6 +96,7 @@ impl Exact<'_> {
         let Inspector { x, amplitude, .. } = &self.inspector;
         self.motion
             .enter(&mode.flow, &self.exosystem, t, x, amplitude);
+        self.look_ahead();
         if jumped {
             self.jumps += 1;
         }
@@ -101,28 +110,54 @@ impl Exact<'_> {
         Ok(())
     }
 
-    /// A mode that holds on some interval after now: from what followed the same event before, from one implicit step of the
-    /// complementarity system at several lengths, from their neighbours. Every candidate is inspected; a mode that passes
+    /// Remembers what followed.
+    fn remember(&mut self, step: (usize, Trigger, usize)) {
+        if let Some(k) = self.successors.iter().position(|s| *s == step) {
+            self.successors.swap(k, 0);
+        } else {
+            if self.successors.len() == MOST_SUCCESSORS {
+                self.successors.pop();
+            }
+            self.successors.insert(0, step);
+        }
+    }
+
+    /// The mode that followed the same trigger before, if it holds now.
+    fn follow(&mut self, key: &Key, trigger: Trigger) -> Option<(usize, Vec<usize>)> {
+        let from = self.mode?;
+        for k in 0..self.successors.len() {
+            let (left, why, at) = self.successors[k];
+            if (left, why) == (from, trigger)
+                && self.plant.modes[at].key.switches == key.switches
+                && !(self.left_here.len() > PATIENCE && self.left_here.contains(&at))
+                && let Some(leaving) = self.try_mode(at)
+            {
+                return Some((at, leaving));
+            }
+        }
+        None
+    }
+
+    /// Modes that were left at this instant too often to be entered again.
+    fn barred(&self) -> Vec<usize> {
+        if self.left_here.len() > PATIENCE {
+            self.left_here.clone()
+        } else {
+            Vec::new()
+        }
+    }
+
+    /// A mode that holds on some interval after now: from one implicit step of the complementarity system at several
+    /// lengths, from their neighbours. Every candidate is inspected; a mode that passes
     /// is a solution, whoever proposed it.
     pub(super) fn find_mode(
         &mut self,
         key: &Key,
-        fired: Option<(usize, usize)>,
+        trigger: Trigger,
     ) -> Result<Option<(usize, Vec<usize>)>, SimError> {
-        let barred: Vec<usize> = if self.left_here.len() > PATIENCE {
-            self.left_here.clone()
-        } else {
-            Vec::new()
-        };
-        if let Some(&at) = fired.and_then(|pair| self.transitions.get(&pair))
-            && self.plant.modes[at].key.switches == key.switches
-            && !barred.contains(&at)
-            && let Some(leaving) = self.try_mode(at)
-        {
-            return Ok(Some((at, leaving)));
-        }
+        let barred = self.barred();
         let mut tried: Vec<Vec<bool>> = Vec::new();
-        if fired.is_none() || self.plant.pairs == 0 {
+        if trigger == Trigger::Sources || self.plant.pairs == 0 {
             tried.push(key.closed.clone());
             if let Some(found) = self.try_key(key, &barred) {
                 return Ok(Some(found));

@@ -1,6 +1,7 @@
 //! What happens in no time: the start, edges of sources, switches.
 
 use super::*;
+use crate::integrate::jump::Jump;
 
 impl Theta<'_> {
     /// The first jump, from inconsistent initial values.
@@ -64,8 +65,10 @@ impl Theta<'_> {
             Some(problem) if problem.monotone => problem.solve(lcs, &x, &u).map_err(|e| {
                 SimError::at(t, Reason::Infeasible).device(lcs.ports[e.port].device.clone())
             })?,
-            _ => None,
+            Some(_) => self.step_limit()?,
+            None => None,
         };
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
         let (after, p) = match found {
             Some(jump) => (jump.x, jump.p.as_slice().to_vec()),
             None => (x.clone(), vec![0.0; lcs.m()]),
@@ -76,13 +79,35 @@ impl Theta<'_> {
             - energy::stored(lcs, x.as_slice(), old);
         self.now.balance.add((source, source - gain));
         let step: Vec<f64> = u.iter().zip(old).map(|(a, b)| a - b).collect();
-        if p.iter().any(|&p| p != 0.0) {
+        // A jump at the rounding of the amplitudes seen so far corrects the state and is not worth a word.
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        let size = self.amplitudes.error(lcs, x.as_slice(), after.as_slice());
+        self.now.x.copy_from_slice(after.as_slice());
+        if size > JUMP {
             self.stats.jumps += 1;
             log.event(t, "jump");
         }
-        self.now.x.copy_from_slice(after.as_slice());
-        self.log_impulses(t, &p, &step, log);
+        if size > JUMP || step.iter().any(|s| *s != 0.0) {
+            self.log_impulses(t, &p, &step, log);
+        }
         Ok(())
+    }
+
+    /// The jump of a network that is not passive, where no projection exists: the limit of the implicit step, p = hλ at h and
+    /// h/2 extrapolated. `None` where p vanishes with h.
+    fn step_limit(&mut self) -> Result<Option<Jump>, SimError> {
+        let h = self.read_step();
+        let mut p = |h: f64| -> Result<DVector<f64>, SimError> {
+            let step = self.prepare_short(h)?;
+            Ok(self.solve_short(step)?.lambda * h)
+        };
+        let (whole, half) = (p(h)?, p(0.5 * h)?);
+        if half.amax() <= IMPULSE_RATIO * whole.amax() {
+            return Ok(None);
+        }
+        let p = half * 2.0 - whole;
+        let x = DVector::from_column_slice(&self.now.x) + &self.system().lcs.b * &p;
+        Ok(Some(Jump { x, p }))
     }
 
     /// Impulses of the ports and of the outputs, by name, once each.

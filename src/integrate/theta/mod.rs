@@ -22,7 +22,7 @@ use crate::integrate::inputs::Inputs;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
 use crate::integrate::stats::Stats;
-use crate::integrate::step::Scheme;
+use crate::integrate::step::{SHORT, Scheme};
 use crate::integrate::switching::{Switches, Threshold};
 use crate::integrate::system::{Plant, Reduce, System};
 use crate::lcs::{Lcs, Port, Role};
@@ -81,9 +81,8 @@ const LOCATE: u32 = 24;
 /// Switchings in one base step after which they are no longer located but taken at the ends of whole base steps
 /// (chattering: the base step then decides how fast a sliding switch switches).
 const CHATTER: u32 = 32;
-/// λ at an output time is that of one implicit step shorter than the last one by 2^READ: its error is 2^−READ of the step's,
-/// the amplified rounding of the state 2^READ ε.
-const READ: i32 = 12;
+/// Jumps below this part of a state's amplitude are rounding.
+const JUMP: f64 = 1e-12;
 /// A spontaneous impulse is recognised by p = hλ that does not shrink with h: p(h/2) above this part of p(h), where
 /// a finite λ gives at most one half.
 const IMPULSE_RATIO: f64 = 0.75;
@@ -392,7 +391,7 @@ impl Stepper for Theta<'_> {
         if !self.not_unique.is_empty() {
             let names: Vec<&str> = self.not_unique.iter().map(String::as_str).collect();
             notes.push(format!(
-                "currents through {} are not determined by the ideal model; the least-norm choice is shown",
+                "voltages or currents of {} are not determined by the ideal model; the least-norm choice is shown",
                 names.join(", ")
             ));
         }

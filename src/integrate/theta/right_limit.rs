@@ -11,12 +11,11 @@ impl Theta<'_> {
             Stepping::Fixed(h) => h.min(self.longest),
             Stepping::Controlled { first, .. } => first,
         };
-        base * 2_f64.powi(-READ)
+        base * SHORT
     }
 
     /// z and the matrices of the short implicit step from now; slopes of the inputs go into `du`.
-    pub(super) fn prepare_read(&mut self) -> Result<usize, SimError> {
-        let h = self.read_step();
+    pub(super) fn prepare_short(&mut self, h: f64) -> Result<usize, SimError> {
         self.inputs.slopes(self.now.t, &mut self.du);
         for ((next, u), du) in self.u_next.iter_mut().zip(&self.now.u).zip(&self.du) {
             *next = u + h * du;
@@ -38,7 +37,12 @@ impl Theta<'_> {
 
     /// The complementarity problem of the right limit of now, solved.
     pub(super) fn right_limit(&mut self) -> Result<Solution, SimError> {
-        let step = self.prepare_read()?;
+        let step = self.prepare_short(self.read_step())?;
+        self.solve_short(step)
+    }
+
+    /// The step prepared by [`Self::prepare_short`], with the least-norm λ.
+    pub(super) fn solve_short(&mut self, step: usize) -> Result<Solution, SimError> {
         let Self {
             plant,
             now,
@@ -69,7 +73,7 @@ impl Theta<'_> {
     /// λ at the right limit of now, by one implicit step much shorter than the last.
     pub(super) fn read_lambda(&mut self) -> Result<(), SimError> {
         let m = self.lambda.len();
-        let step = self.prepare_read()?;
+        let step = self.prepare_short(self.read_step())?;
         if m == 0 {
             return Ok(());
         }

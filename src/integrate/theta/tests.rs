@@ -266,3 +266,34 @@ fn events_are_those_of_the_circuit() {
         );
     }
 }
+
+#[test]
+fn jump_of_a_network_that_is_not_passive_is_the_limit_of_the_step() {
+    // A diode across 1 µF charged to 3 V, and a second port whose y sees five times the first current: D + Dᵀ is indefinite.
+    let lcs = fixtures::system(
+        &[("v(c1)", "V")],
+        &[
+            ("d1", crate::lcs::Role::Current),
+            ("d2", crate::lcs::Role::Current),
+        ],
+        [
+            nalgebra::dmatrix![-1e3],
+            nalgebra::dmatrix![-1e6, 0.0],
+            nalgebra::dmatrix![-1.0; 0.0],
+            nalgebra::dmatrix![0.0, 0.0; 5.0, 1.0],
+        ],
+        &[1e-6],
+    );
+    let grid = Grid {
+        tstart: 0.0,
+        tstep: 1e-5,
+        tstop: 1e-4,
+    };
+    for scheme in [Scheme::MOREAU, Scheme::MIDPOINT] {
+        let run = simulate(&lcs, dvector![3.0], scheme, Stepping::Fixed(1e-5), grid);
+        close(row(&run, 0)[0], 0.0, 1e-9);
+        assert_eq!(run.stats.jumps, 1);
+        let impulse = run.impulses.iter().find(|i| i.name == "i(d1)").unwrap();
+        close(impulse.area, 3e-6, 1e-13);
+    }
+}

@@ -372,7 +372,9 @@ impl<'b, F: Field> Eliminated<'b, F> {
             if self.agree(frame, &row) {
                 continue;
             }
-            if self.held.is_empty() {
+            // At an operating point an inductor across a source is a constraint on its value at that instant.
+            let instant = self.position.storage == StorageHold::Static;
+            if self.held.is_empty() && !instant {
                 let of = |c: usize| self.source(c - frame.u().start);
                 let named: Vec<String> = frame.u().filter(|&c| !row[c].is_zero()).map(of).collect();
                 let elements = conflict(&self.held_graph(), &named).unwrap_or(named);

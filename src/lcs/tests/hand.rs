@@ -24,7 +24,6 @@ fn half_wave_rectifier() {
 #[test]
 fn bridge_with_resistor() {
     let s = free("c1 1 0 1u\n l1 1 0 10m\n d1 1 2\n d2 0 2\n d3 3 1\n d4 3 0\n r1 2 3 1k");
-    eprintln!("{} {} {} {} {:?}", s.a, s.b, s.c, s.d, s.ports);
     assert_eq!((s.n(), s.m(), s.p()), (2, 4, 0));
     let sym = &s.d + s.d.transpose();
     assert_eq!(sym.rank(1e-12), 1);

@@ -3,7 +3,9 @@
 use super::{at, circuit, simulate_circuit};
 use crate::algebra::Value;
 use crate::circuit::{Affine, Circuit, Kind, Output, Quantity};
+use crate::integrate::{Method, SimOptions};
 use crate::law::{Curve, Law};
+use crate::mna;
 
 /// A voltage source that becomes a relay: its name, its input Σ gain·v(node), its two values.
 type Relay<'a> = (&'a str, &'a [(f64, &'a str)], f64, f64);
@@ -65,4 +67,105 @@ fn two_relays_pass_their_accumulation_point() {
     );
     assert_eq!(at(&run, 3.0, "v(1)"), 0.0);
     assert_eq!(at(&run, 3.0, "v(2)"), 0.0);
+}
+
+/// Three parallel inverters (CIRCUITS 3.10), x = (v0, v0', i2, i3) on capacitors of 1 F, relays λ = −sgn(C x − v_ref).
+#[test]
+fn parallel_inverters_slide() {
+    let (cp, leq, rl, m) = (60e-6, 0.385e-3, 5.0, 3.0);
+    let (l, r, e) = ([1.5e-3, 1.22e-3, 0.9e-3], [94e-3, 116e-3, 100e-3], 70.0);
+    let (k1, k2) = (1.0, 6e-5);
+    let a = [
+        [0.0, 1.0, 0.0, 0.0],
+        [
+            -1.0 / (cp * leq) - r[0] / (cp * l[0] * rl),
+            -r[0] / l[0] - 1.0 / (cp * rl),
+            r[0] / (cp * l[0]) - r[1] / (cp * l[1]),
+            r[0] / (cp * l[0]) - r[2] / (cp * l[2]),
+        ],
+        [-1.0 / l[1], 0.0, -r[1] / l[1], 0.0],
+        [-1.0 / l[2], 0.0, 0.0, -r[2] / l[2]],
+    ];
+    let b = [
+        [0.0, 0.0, 0.0],
+        [e / (cp * l[0]), e / (cp * l[1]), e / (cp * l[2])],
+        [0.0, e / l[1], 0.0],
+        [0.0, 0.0, e / l[2]],
+    ];
+    let kappa = cp * k1 / k2;
+    let c = [
+        [kappa + (m - 1.0) / rl, m * cp, -m, -m],
+        [kappa - 1.0 / rl, 0.0, m, 0.0],
+        [kappa - 1.0 / rl, 0.0, 0.0, m],
+    ];
+    let mut text = String::from("Vref ref 0 SIN(0 55 50)\n");
+    for (k, ic) in [50.0, 7.0, 4.0, 4.0].iter().enumerate() {
+        text += &format!("Cx{k} x{k} 0 1 IC={ic}\n");
+        for (j, a) in a[k].iter().enumerate().filter(|(_, a)| **a != 0.0) {
+            text += &format!("Ga{k}{j} 0 x{k} x{j} 0 {a:e}\n");
+        }
+        for (j, b) in b[k].iter().enumerate().filter(|(_, b)| **b != 0.0) {
+            text += &format!("Gb{k}{j} 0 x{k} s{j} 0 {b:e}\n");
+        }
+    }
+    for j in 0..3 {
+        text += &format!("Vs{j} s{j} 0 0\n");
+    }
+    text += ".tran 10u 5m uic\n.save v(x0) v(x1) v(x2) v(x3)";
+    let nodes = ["x0", "x1", "x2", "x3"];
+    let inputs: Vec<Vec<(f64, &str)>> = c
+        .iter()
+        .map(|row| {
+            row.iter()
+                .zip(nodes)
+                .map(|(c, n)| (-c, n))
+                .chain([(1.0, "ref")])
+                .collect()
+        })
+        .collect();
+    let circuit = with_relays(
+        &text,
+        &[
+            ("vs0", &inputs[0], -1.0, 1.0),
+            ("vs1", &inputs[1], -1.0, 1.0),
+            ("vs2", &inputs[2], -1.0, 1.0),
+        ],
+    );
+    let exact = simulate_circuit(&circuit).unwrap_or_else(|e| panic!("{e}"));
+    // From some time on all three slide: C x = v_ref, with few events.
+    let end = 5e-3;
+    let x: Vec<f64> = nodes
+        .iter()
+        .map(|n| at(&exact, end, &format!("v({n})")))
+        .collect();
+    let reference = 55.0 * (100.0 * std::f64::consts::PI * end).sin();
+    for row in c {
+        let y: f64 = row.iter().zip(&x).map(|(c, x)| c * x).sum();
+        assert!((y - reference).abs() < 1e-9, "{y} {reference}");
+    }
+    let behaviour = mna::behaviour(&circuit).expect("a sound circuit");
+    let error = |step: f64| {
+        let options = SimOptions {
+            method: Method::Euler,
+            step: Some(step),
+            ..SimOptions::default()
+        };
+        let run = crate::integrate::simulate(&circuit, &behaviour, options)
+            .unwrap_or_else(|e| panic!("{e}"));
+        [0, 2, 3].map(|j| {
+            (0..exact.waveforms.time.len())
+                .map(|k| {
+                    (exact.waveforms.values[4 * k + j] - run.waveforms.values[4 * k + j]).abs()
+                })
+                .fold(0.0, f64::max)
+        })
+    };
+    let (coarse, fine) = (error(5e-7), error(2.5e-7));
+    for (coarse, fine) in coarse.iter().zip(fine) {
+        assert!(
+            fine < 0.5 && (1.6..2.6).contains(&(coarse / fine)),
+            "{coarse} {fine} {:?}",
+            exact.stats
+        );
+    }
 }

@@ -1,0 +1,299 @@
+//! Who may import whom: the rooms of docs/architecture.md, checked on the source text.
+#![allow(missing_docs, reason = "tests")]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Each room and the rooms it may import, in the order in which data flows.
+const ROOMS: [(&str, &[&str]); 17] = [
+    ("settings", &[]),
+    ("algebra", &[]),
+    ("diagnostic", &[]),
+    ("law", &["algebra"]),
+    ("netlist", &["algebra", "diagnostic"]),
+    ("circuit", &["algebra", "diagnostic", "law", "netlist"]),
+    ("mna", &["algebra", "circuit", "diagnostic", "law"]),
+    ("lcs", &["algebra", "circuit", "law", "mna"]),
+    ("solve", &["settings"]),
+    ("waveform", &[]),
+    ("plan", &["lcs", "settings", "solve"]),
+    (
+        "integrate",
+        &[
+            "circuit", "lcs", "mna", "plan", "settings", "solve", "waveform",
+        ],
+    ),
+    ("passivity", &["lcs", "settings"]),
+    (
+        "check",
+        &[
+            "circuit",
+            "diagnostic",
+            "law",
+            "lcs",
+            "mna",
+            "passivity",
+            "settings",
+            "solve",
+        ],
+    ),
+    ("forms", &["check", "lcs", "passivity", "settings", "solve"]),
+    (
+        "report",
+        &["check", "circuit", "integrate", "law", "lcs", "waveform"],
+    ),
+    (
+        "cli",
+        &[
+            "algebra",
+            "check",
+            "circuit",
+            "diagnostic",
+            "forms",
+            "integrate",
+            "law",
+            "lcs",
+            "mna",
+            "netlist",
+            "passivity",
+            "plan",
+            "report",
+            "settings",
+            "solve",
+            "waveform",
+        ],
+    ),
+];
+
+/// Imports against the flow: (beginning of the path, room, why).
+const EXCEPTIONS: [(&str, &str, &str); 3] = [
+    (
+        "netlist/mod.rs",
+        "circuit",
+        "re-exports `load`, which reads a file and elaborates it",
+    ),
+    (
+        "mna/",
+        "lcs",
+        "ports and inputs pass through unchanged; a system file becomes a behaviour again",
+    ),
+    (
+        "plan.rs",
+        "integrate",
+        "plans read the options they are made from",
+    ),
+];
+
+/// What only certain files may name: (text, allowed beginnings of paths, why).
+const CONFINED: [(&str, &[&str], &str); 6] = [
+    ("nom::", &["netlist/"], "text is parsed in one room"),
+    ("clap::", &["cli/"], "arguments belong to the command line"),
+    (
+        "miette::",
+        &["cli/"],
+        "findings are data; the command line renders them",
+    ),
+    (
+        "clarabel::",
+        &["solve/", "passivity/", "check/"],
+        "one place a conic solver is called from each kind of problem",
+    ),
+    (
+        "std::process",
+        &["main.rs", "cli/"],
+        "the library runs no programs",
+    ),
+    (
+        "std::fs",
+        &["cli/", "circuit/load.rs"],
+        "the library opens no files but netlists",
+    ),
+];
+
+fn source() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+}
+
+/// (path below src, text without comments and tests) of every source file that is not a test.
+fn files() -> Vec<(String, String)> {
+    let mut found = Vec::new();
+    let mut folders = vec![source()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            let name = path
+                .file_name()
+                .expect("a name")
+                .to_string_lossy()
+                .into_owned();
+            let is_test = name == "tests"
+                || name == "tests.rs"
+                || name == "fixtures.rs"
+                || name == "snapshots";
+            if is_test {
+                continue;
+            }
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                let below = path.strip_prefix(source()).expect("below src");
+                let text = std::fs::read_to_string(&path).expect("a source file");
+                found.push((below.to_string_lossy().replace('\\', "/"), code(&text)));
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Without comments and without the module of tests that closes a file.
+fn code(text: &str) -> String {
+    let end = text
+        .find("\n#[cfg(test)]\nmod tests {")
+        .or_else(|| text.find("\n#[cfg(test)]\npub(crate) mod tests {"));
+    let lines = text[..end.unwrap_or(text.len())].lines();
+    lines
+        .map(|line| line.split("//").next().unwrap_or(""))
+        .collect::<Vec<_>>()
+        .join("\n")
+}
+
+/// The rooms a text names as `crate::room` or `crate::{room, …}`.
+fn imports(text: &str) -> BTreeSet<String> {
+    let mut rooms = BTreeSet::new();
+    for (at, _) in text.match_indices("crate::") {
+        let rest = &text[at + "crate::".len()..];
+        let Some(group) = rest.strip_prefix('{') else {
+            rooms.insert(identifier(rest));
+            continue;
+        };
+        let mut depth = 0;
+        let mut start = true;
+        for (k, c) in group.char_indices() {
+            match c {
+                '}' if depth == 0 => break,
+                '{' => depth += 1,
+                '}' => depth -= 1,
+                ',' if depth == 0 => start = true,
+                c if start && c.is_alphabetic() => {
+                    rooms.insert(identifier(&group[k..]));
+                    start = false;
+                }
+                _ => {}
+            }
+        }
+    }
+    rooms
+}
+
+fn identifier(text: &str) -> String {
+    text.chars()
+        .take_while(|c| c.is_alphanumeric() || *c == '_')
+        .collect()
+}
+
+fn room(path: &str) -> String {
+    identifier(path)
+}
+
+#[test]
+fn imports_follow_the_flow_of_data() {
+    let allowed: BTreeMap<&str, &[&str]> = ROOMS.into_iter().collect();
+    let mut faults = Vec::new();
+    let mut used = BTreeSet::new();
+    for (path, text) in files() {
+        let from = room(&path);
+        if from == "lib" || from == "main" {
+            continue;
+        }
+        let Some(allowed) = allowed.get(from.as_str()) else {
+            faults.push(format!("{path}: the room `{from}` is not in the plan"));
+            continue;
+        };
+        for to in imports(&text)
+            .into_iter()
+            .filter(|to| *to != from && !allowed.contains(&to.as_str()))
+        {
+            match EXCEPTIONS
+                .iter()
+                .position(|e| path.starts_with(e.0) && e.1 == to)
+            {
+                Some(k) => {
+                    used.insert(k);
+                }
+                None => faults.push(format!("{path} imports {to}")),
+            }
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+    assert_eq!(
+        used.len(),
+        EXCEPTIONS.len(),
+        "an exception is no longer needed"
+    );
+}
+
+#[test]
+fn the_plan_itself_has_no_back_edges() {
+    for (k, (room, imports)) in ROOMS.iter().enumerate() {
+        for import in *imports {
+            let j = ROOMS.iter().position(|r| r.0 == *import);
+            assert!(
+                j.is_some_and(|j| j < k),
+                "{room} imports {import}, which stands after it"
+            );
+        }
+    }
+}
+
+#[test]
+fn matrices_and_spice_stay_in_their_rooms() {
+    for (path, text) in files() {
+        if ["netlist", "circuit"].contains(&room(&path).as_str()) {
+            assert!(
+                !text.contains("nalgebra"),
+                "{path}: text and circuits know no matrices"
+            );
+        }
+        for (name, allowed, why) in CONFINED {
+            if text.contains(name) {
+                assert!(
+                    allowed.iter().any(|a| path.starts_with(a)),
+                    "{path} names {name}: {why}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn groups_of_imports_are_read() {
+    let text =
+        "use crate::{lcs::{Lcs, reduce}, mna};\nlet x = crate::settings::Settings::default();";
+    let expected: BTreeSet<String> = ["lcs", "mna", "settings"].map(str::to_owned).into();
+    assert_eq!(imports(text), expected);
+    assert!(
+        code("a\n// crate::cli\nb").lines().count() == 3
+            && imports("// \ncrate::algebra::x").contains("algebra")
+    );
+    assert!(imports(&code("// crate::cli")).is_empty());
+}
+
+#[test]
+fn the_rooms_are_those_of_the_library() {
+    let lib = std::fs::read_to_string(source().join("lib.rs")).expect("lib.rs");
+    let declared: BTreeSet<&str> = lib
+        .lines()
+        .filter_map(|line| line.strip_prefix("pub mod ")?.strip_suffix(';'))
+        .collect();
+    let planned: BTreeSet<&str> = ROOMS.iter().map(|r| r.0).collect();
+    assert_eq!(declared, planned);
+    let drawn =
+        std::fs::read_to_string(source().join("../docs/architecture.md")).expect("architecture.md");
+    for room in planned {
+        assert!(
+            drawn.contains(&format!("`{room}`")),
+            "docs/architecture.md does not mention `{room}`"
+        );
+    }
+}
