@@ -358,7 +358,7 @@ impl<'b, F: Field> Eliminated<'b, F> {
     }
 
     /// Equations without a pivot: they relate sources alone, or accuse a port.
-    fn constraints(&self, frame: &Frame) -> Result<Vec<Vec<F>>, ReduceError> {
+    fn constraints(&self, frame: &Frame) -> Result<Vec<(Vec<F>, Vec<String>)>, ReduceError> {
         let mut constraints = Vec::new();
         for r in (0..self.found.equations).filter(|&r| !self.found.used[r]) {
             let row = frame.gather(self.matrix.row(r), false, None);
@@ -372,15 +372,15 @@ impl<'b, F: Field> Eliminated<'b, F> {
             if self.agree(frame, &row) {
                 continue;
             }
+            let of = |c: usize| self.source(c - frame.u().start);
+            let named: Vec<String> = frame.u().filter(|&c| !row[c].is_zero()).map(of).collect();
+            let elements = conflict(&self.held_graph(), &named).unwrap_or(named);
             // At an operating point an inductor across a source is a constraint on its value at that instant.
             let instant = self.position.storage == StorageHold::Static;
             if self.held.is_empty() && !instant {
-                let of = |c: usize| self.source(c - frame.u().start);
-                let named: Vec<String> = frame.u().filter(|&c| !row[c].is_zero()).map(of).collect();
-                let elements = conflict(&self.held_graph(), &named).unwrap_or(named);
                 return Err(ReduceError::Sources { elements });
             }
-            constraints.push(normalised(&row[..frame.base]));
+            constraints.push((normalised(&row[..frame.base]), elements));
         }
         Ok(constraints)
     }
@@ -399,6 +399,13 @@ impl<'b, F: Field> Eliminated<'b, F> {
                 (true, _) if switch.ron.f64 == 0.0 => set(&switch.name, Class::Voltage),
                 (false, None) => set(&switch.name, Class::Current),
                 _ => {}
+            }
+        }
+        for (pair, hold) in self.behaviour.pairs.iter().zip(&self.position.devices) {
+            match hold {
+                Hold::Free => {}
+                Hold::Closed => set(&pair.port.device, Class::Voltage),
+                Hold::Open => set(&pair.port.device, Class::Current),
             }
         }
         if self.position.storage == StorageHold::Static {
@@ -472,6 +479,9 @@ impl<'b, F: Field> Eliminated<'b, F> {
             .collect();
         if is_static {
             for (k, observed) in self.behaviour.observed.iter().enumerate() {
+                if self.unknown.iter().any(|(_, name)| *name == observed.name) {
+                    continue;
+                }
                 let row = self.matrix.row(self.found.equations + k);
                 rows.push((observed.name.clone(), frame.gather(row, false, None)));
             }

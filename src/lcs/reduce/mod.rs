@@ -229,8 +229,8 @@ struct Reduction<F> {
     guards: Vec<(Vec<F>, Vec<F>)>,
     /// Guards × undetermined directions.
     kernel: Vec<Vec<F>>,
-    /// Rows that must vanish.
-    constraints: Vec<Vec<F>>,
+    /// Rows that must vanish, and the elements that make them.
+    constraints: Vec<(Vec<F>, Vec<String>)>,
     /// n×p.
     shift: Vec<Vec<F>>,
     /// n×(q + 1): J and the constant.
