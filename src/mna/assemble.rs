@@ -5,7 +5,7 @@ use petgraph::unionfind::UnionFind;
 use super::couple::{self, Winding};
 use super::{
     Behaviour, Coefficient, Column, Equation, Observed, Pair, Power, SourcePort, StoragePort,
-    SwitchPort,
+    SwitchPort, topology,
 };
 use crate::algebra::Value;
 use crate::circuit::{Affine, Circuit, ElementId, Kind, NodeId, Output, Probed, Quantity};
@@ -36,6 +36,7 @@ pub fn behaviour(circuit: &Circuit) -> Result<Behaviour, Vec<Diagnostic>> {
     let mut faults = Vec::new();
     let mut out = Behaviour {
         title: circuit.title.clone(),
+        graph: topology::edges(circuit),
         ..Behaviour::default()
     };
     out.column("1");

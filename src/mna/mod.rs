@@ -217,6 +217,8 @@ pub struct Behaviour {
     pub power: Vec<Power>,
     /// Things the user should know (references of islands).
     pub notes: Vec<Diagnostic>,
+    /// The graph of the circuit, for messages; empty for a system given as matrices.
+    pub graph: Vec<topology::Edge>,
     /// The coefficients are measured doubles: what cancels to less than their rounding counts as 0.
     pub inexact: bool,
     ball: OnceLock<Reduced<Ball>>,

@@ -27,7 +27,7 @@ pub struct Topology {
 
 /// The classes of the normal tree, in its order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Class {
+pub(crate) enum Class {
     Voltage,
     Capacitor,
     Middle,
@@ -57,7 +57,10 @@ fn class(element: &Element) -> Class {
 pub fn topology(circuit: &Circuit) -> Topology {
     let mut order: Vec<usize> = (0..circuit.elements.len()).collect();
     order.sort_by_key(|&k| class(&circuit.elements[k]));
-    let graph = Graph::new(circuit, &order);
+    let edges = (0..circuit.elements.len())
+        .map(|k| ends(circuit, k))
+        .collect();
+    let graph = Graph::new(circuit.nodes.len(), edges, &order);
     let names = |which: bool| {
         let chosen = circuit
             .elements
@@ -87,38 +90,34 @@ pub fn topology(circuit: &Circuit) -> Topology {
     }
 }
 
-/// A spanning forest grown in a given order of elements.
-struct Graph<'c> {
-    circuit: &'c Circuit,
+/// A spanning forest grown in a given order of edges.
+struct Graph {
+    edges: Vec<(usize, usize)>,
     in_tree: Vec<bool>,
-    /// For each node the tree elements at it.
+    /// For each node the tree edges at it.
     at: Vec<Vec<usize>>,
 }
 
-impl<'c> Graph<'c> {
-    fn new(circuit: &'c Circuit, order: &[usize]) -> Self {
-        let mut sets = UnionFind::<usize>::new(circuit.nodes.len());
-        let mut in_tree = vec![false; circuit.elements.len()];
-        let mut at = vec![Vec::new(); circuit.nodes.len()];
+impl Graph {
+    fn new(nodes: usize, edges: Vec<(usize, usize)>, order: &[usize]) -> Self {
+        let mut sets = UnionFind::<usize>::new(nodes);
+        let mut in_tree = vec![false; edges.len()];
+        let mut at = vec![Vec::new(); nodes];
         for &k in order {
-            let (p, n) = ends(circuit, k);
+            let (p, n) = edges[k];
             if sets.union(p, n) {
                 in_tree[k] = true;
                 at[p].push(k);
                 at[n].push(k);
             }
         }
-        Self {
-            circuit,
-            in_tree,
-            at,
-        }
+        Self { edges, in_tree, at }
     }
 
-    /// The elements of the loop that a link closes, the link last, each with the sign of its voltage around the loop.
+    /// The edges of the loop that a link closes, the link last, each with the sign of its voltage around the loop.
     fn loop_of(&self, link: usize) -> Vec<(usize, f64)> {
-        let (p, n) = ends(self.circuit, link);
-        // Breadth-first from p to n through the tree; `via` is the element by which a node was reached.
+        let (p, n) = self.edges[link];
+        // Breadth-first from p to n through the tree; `via` is the edge by which a node was reached.
         let mut via: Vec<Option<usize>> = vec![None; self.at.len()];
         let mut queue = VecDeque::from([p]);
         while let Some(node) = queue.pop_front() {
@@ -134,23 +133,16 @@ impl<'c> Graph<'c> {
         let mut node = n;
         while let (true, Some(k)) = (node != p, via[node]) {
             let before = self.far(k, node);
-            members.push((
-                k,
-                if ends(self.circuit, k).0 == before {
-                    1.0
-                } else {
-                    -1.0
-                },
-            ));
+            members.push((k, if self.edges[k].0 == before { 1.0 } else { -1.0 }));
             node = before;
         }
         members.reverse();
         members
     }
 
-    /// The elements between the two parts that removing a tree element leaves, each with the sign of its current.
+    /// The edges between the two parts that removing a tree edge leaves, each with the sign of its current.
     fn cut_of(&self, branch: usize) -> Vec<(usize, f64)> {
-        let (p, _) = ends(self.circuit, branch);
+        let (p, _) = self.edges[branch];
         let mut inside = vec![false; self.at.len()];
         inside[p] = true;
         let mut queue = VecDeque::from([p]);
@@ -163,18 +155,65 @@ impl<'c> Graph<'c> {
                 }
             }
         }
-        (0..self.circuit.elements.len())
-            .filter_map(|k| {
-                let (p, n) = ends(self.circuit, k);
-                (inside[p] != inside[n]).then_some((k, if inside[p] { 1.0 } else { -1.0 }))
-            })
+        let crossing = self
+            .edges
+            .iter()
+            .enumerate()
+            .filter(|(_, e)| inside[e.0] != inside[e.1]);
+        crossing
+            .map(|(k, e)| (k, if inside[e.0] { 1.0 } else { -1.0 }))
             .collect()
     }
 
-    fn far(&self, element: usize, node: usize) -> usize {
-        let (p, n) = ends(self.circuit, element);
+    fn far(&self, edge: usize, node: usize) -> usize {
+        let (p, n) = self.edges[edge];
         if p == node { n } else { p }
     }
+}
+
+/// An element as an edge of the graph, for messages about a position of devices and switches.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Edge {
+    /// The element.
+    pub name: String,
+    /// Its nodes.
+    pub ends: (usize, usize),
+    /// Its class in the normal tree.
+    pub(crate) class: Class,
+}
+
+/// The edges of a circuit.
+pub(crate) fn edges(circuit: &Circuit) -> Vec<Edge> {
+    let edge = |(k, e): (usize, &Element)| Edge {
+        name: e.name.clone(),
+        ends: ends(circuit, k),
+        class: class(e),
+    };
+    circuit.elements.iter().enumerate().map(edge).collect()
+}
+
+/// The loop of voltage sources and shorts, or else the cut-set of current sources and open branches, that one of the
+/// named elements is in; in the order of the edges.
+pub(crate) fn conflict(edges: &[Edge], named: &[String]) -> Option<Vec<String>> {
+    let nodes = edges.iter().map(|e| e.ends.0.max(e.ends.1) + 1).max()?;
+    let mut order: Vec<usize> = (0..edges.len()).collect();
+    order.sort_by_key(|&k| edges[k].class);
+    let graph = Graph::new(nodes, edges.iter().map(|e| e.ends).collect(), &order);
+    let loops = (0..edges.len())
+        .filter(|&k| edges[k].class == Class::Voltage && !graph.in_tree[k])
+        .map(|k| graph.loop_of(k));
+    let cuts = (0..edges.len())
+        .filter(|&k| edges[k].class == Class::Current && graph.in_tree[k])
+        .map(|k| graph.cut_of(k));
+    loops.chain(cuts).find_map(|members| {
+        let mut members: Vec<usize> = members.into_iter().map(|m| m.0).collect();
+        members.sort_unstable();
+        let names: Vec<String> = members.iter().map(|&k| edges[k].name.clone()).collect();
+        names
+            .iter()
+            .any(|name| named.contains(name))
+            .then_some(names)
+    })
 }
 
 fn ends(circuit: &Circuit, k: usize) -> (usize, usize) {

@@ -2,9 +2,10 @@
 
 use crate::algebra::{Elimination, Field, Matrix};
 use crate::circuit::source::Wave;
+use crate::mna::topology::{Class, Edge, conflict};
 use crate::mna::{Behaviour, Column, Reduced};
 
-use super::flow::Flow;
+use super::flow::{Flow, add_scaled};
 use super::frame::Frame;
 use super::{ClassOrder, Hold, Position, ReduceError, Reduction, Role, StorageHold};
 
@@ -184,9 +185,14 @@ impl<'b, F: Field> Eliminated<'b, F> {
         let devices_first = matches!(order, ClassOrder::DevicesFirst | ClassOrder::OtherRoleFirst);
         let other_role = matches!(order, ClassOrder::OtherRole | ClassOrder::OtherRoleFirst);
         let held: Vec<usize> = self.held.iter().map(|&k| self.guard_column(k)).collect();
-        let columns = self.columns.len();
-        let unknown = (0..columns)
+        // The input of a function block is a reading like any other: it is y, whatever it reads.
+        let inputs = self
+            .free
+            .iter()
+            .filter(|&&k| self.behaviour.pairs[k].fixed_role);
+        let unknown = (0..self.columns.len())
             .filter(|c| self.columns[*c] == Columns::Unknown && !held.contains(c))
+            .chain(inputs.map(|&k| self.pairs[k].0))
             .collect();
         self.eliminate(unknown);
         if devices_first {
@@ -220,15 +226,18 @@ impl<'b, F: Field> Eliminated<'b, F> {
         }
     }
 
-    /// Of each free pair the quantity that should be y, and what held pairs leave unknown; then the other quantity of the
-    /// pairs not used yet. A function block has one choice only.
+    /// Of each free device the quantity that should be y, and what held pairs leave unknown; then the other quantity of
+    /// the devices not used yet.
     fn eliminate_pairs(&mut self, held: &[usize], other_role: bool) {
-        let choices: Vec<(usize, usize)> = (self.free.iter())
+        let devices = self
+            .free
+            .iter()
+            .filter(|&&k| !self.behaviour.pairs[k].fixed_role);
+        let choices: Vec<(usize, usize)> = devices
             .map(|&k| {
                 let (reverse, forward) = self.pairs[k];
-                let pair = &self.behaviour.pairs[k];
-                let voltage = !pair.fixed_role && (pair.prefers_current_as_y() != other_role);
-                if voltage {
+                let current = self.behaviour.pairs[k].prefers_current_as_y() != other_role;
+                if current {
                     (forward, reverse)
                 } else {
                     (reverse, forward)
@@ -310,14 +319,12 @@ impl<'b, F: Field> Eliminated<'b, F> {
             .map(|r| flow.finish(&frame, &frame.gather(self.matrix.row(r), false, None)))
             .collect();
         let image = self.times_metric(&s);
-        let product = |a: usize, b: usize| {
-            s.iter()
-                .zip(&image)
-                .fold(F::zero(), |sum, (s, t)| sum.add(&s[a].mul(&t[b])))
-        };
-        let energy = (0..frame.n)
-            .map(|a| (0..frame.n).map(|b| product(a, b)).collect())
-            .collect();
+        let mut energy = vec![vec![F::zero(); frame.n]; frame.n];
+        for (row, image) in s.iter().zip(&image) {
+            for (target, x) in energy.iter_mut().zip(row).filter(|(_, x)| !x.is_zero()) {
+                add_scaled(target, x, &image[..frame.n]);
+            }
+        }
         Ok(Reduction {
             rates: flow.rates(&frame),
             y,
@@ -369,12 +376,42 @@ impl<'b, F: Field> Eliminated<'b, F> {
             let instant = self.position.storage == StorageHold::Static;
             if self.held.is_empty() && !instant {
                 let of = |c: usize| self.source(c - frame.u().start);
-                let elements = frame.u().filter(|&c| !row[c].is_zero()).map(of).collect();
+                let named: Vec<String> = frame.u().filter(|&c| !row[c].is_zero()).map(of).collect();
+                let elements = conflict(&self.held_graph(), &named).unwrap_or(named);
                 return Err(ReduceError::Sources { elements });
             }
             constraints.push(normalised(&row[..frame.base]));
         }
         Ok(constraints)
+    }
+
+    /// The circuit's graph with what this position makes short or open in the class of sources.
+    fn held_graph(&self) -> Vec<Edge> {
+        let mut graph = self.behaviour.graph.clone();
+        let mut set = |name: &str, class: Class| {
+            graph
+                .iter_mut()
+                .filter(|e| e.name == name)
+                .for_each(|e| e.class = class);
+        };
+        for (switch, &on) in self.behaviour.switches.iter().zip(&self.position.switches) {
+            match (on, switch.roff) {
+                (true, _) if switch.ron.f64 == 0.0 => set(&switch.name, Class::Voltage),
+                (false, None) => set(&switch.name, Class::Current),
+                _ => {}
+            }
+        }
+        if self.position.storage == StorageHold::Static {
+            for storage in &self.behaviour.storage {
+                let class = if storage.capacitor {
+                    Class::Current
+                } else {
+                    Class::Voltage
+                };
+                set(&storage.element, class);
+            }
+        }
+        graph
     }
 
     /// The devices whose λ a row contains.

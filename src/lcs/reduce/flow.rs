@@ -226,7 +226,7 @@ impl<F: Field> Flow<F> {
 }
 
 /// target ← target + scale · row.
-fn add_scaled<F: Field>(target: &mut [F], scale: &F, row: &[F]) {
+pub(super) fn add_scaled<F: Field>(target: &mut [F], scale: &F, row: &[F]) {
     let minus = scale.neg();
     for (t, x) in target.iter_mut().zip(row).filter(|(_, x)| !x.is_zero()) {
         t.sub_mul(&minus, x);

@@ -79,7 +79,7 @@ pub enum ReduceError {
         device: String,
     },
     /// A loop of voltage sources or a cut-set of current sources.
-    #[error("{} prescribe each other's voltages or currents (a loop of voltage sources or a cut-set of current sources)", .elements.join(", "))]
+    #[error("{}", conflict(.elements))]
     Sources {
         /// The sources, and what joins them.
         elements: Vec<String>,
@@ -112,6 +112,17 @@ pub enum ReduceError {
         /// Storage labels.
         elements: Vec<String>,
     },
+}
+
+fn conflict(elements: &[String]) -> String {
+    match elements {
+        [one] => format!("{one} is shorted, or its current has no way back"),
+        _ => format!(
+            "{} contradict each other: a loop of voltage sources and shorts or a cut-set of current sources and open \
+             branches",
+            elements.join(", ")
+        ),
+    }
 }
 
 /// Reduces a behaviour to the system of one position.
@@ -249,5 +260,16 @@ pub(super) mod oracle {
             ball.map(|r| publish(behaviour, position, &r)),
             exact.map(|r| publish(behaviour, position, &r)),
         )
+    }
+
+    /// Whether the standard order of classes suffices.
+    pub(in crate::lcs) fn standard_order_suffices(
+        behaviour: &Behaviour,
+        position: &Position,
+    ) -> bool {
+        let order = ClassOrder::Standard;
+        Eliminated::new(behaviour, behaviour.ball(), position, order)
+            .system()
+            .is_ok()
     }
 }

@@ -1,6 +1,7 @@
 //! Systems derived by hand.
 
 use super::*;
+use crate::mna::Behaviour;
 
 const C: f64 = 1e-6;
 const L: f64 = 10e-3;
@@ -169,4 +170,206 @@ fn an_ideal_transformer_of_coupled_inductors() {
     assert_matrix("E", &s.e, &[&[(2.0 / 3.0) / 1e-3]]);
     let k = s.outputs.names.iter().position(|n| n == "v(3)").unwrap();
     assert!(close(s.outputs.rows.u[(k, 0)], 4.0 / 3.0));
+}
+
+fn at(text: &str, switches: &[bool], storage: StorageHold) -> Result<Lcs, ReduceError> {
+    let behaviour = behaviour(&circuit(text)).unwrap();
+    let position = Position {
+        storage,
+        ..Position::free(&behaviour, switches.to_vec())
+    };
+    reduce(&behaviour, &position)
+}
+
+#[test]
+fn a_conflict_names_what_joins_the_sources() {
+    let names = |result: Result<Lcs, ReduceError>| match result.unwrap_err() {
+        ReduceError::Sources { elements } => elements.join(" "),
+        other => panic!("{other}"),
+    };
+    let dynamic = StorageHold::Dynamic;
+    assert_eq!(
+        names(at(
+            "v1 1 0 5\n s1 1 2 0\n s2 2 0 0\n r1 1 2 1",
+            &[true, true],
+            dynamic
+        )),
+        "v1 s1 s2"
+    );
+    assert!(
+        at(
+            "v1 1 0 5\n s1 1 2 0\n s2 2 0 0\n r1 1 2 1",
+            &[true, false],
+            dynamic
+        )
+        .is_ok()
+    );
+    assert_eq!(
+        names(at("i1 0 1 5\n s1 1 2 0\n r1 2 0 1", &[false], dynamic)),
+        "i1 s1"
+    );
+    assert_eq!(
+        names(at(
+            "v1 1 0 5\n l1 1 2 1m\n l2 2 0 1m",
+            &[],
+            StorageHold::Static
+        )),
+        "v1 l1 l2"
+    );
+    assert_eq!(
+        names(at(
+            "i1 0 1 5\n c1 1 2 1u\n r1 2 0 1",
+            &[],
+            StorageHold::Static
+        )),
+        "i1 c1"
+    );
+}
+
+#[test]
+fn what_would_need_a_derivative_is_an_error_that_says_so() {
+    // The comparator watches the current of a capacitor across a source.
+    let text = "v1 1 0 5\n c1 1 0 1u\n h1 2 0 v1 10\n r1 2 0 1k\n rel1 3 0 2 0\n r2 3 0 1";
+    let error = at(text, &[], StorageHold::Dynamic).unwrap_err();
+    assert_eq!(error.to_string(), "rel1 depends on the derivative of v1");
+    // The comparator's output charges a capacitor without any resistance.
+    let text = "v1 1 0 5\n r1 1 0 1\n rel1 2 0 1 0\n c1 2 0 1u";
+    let error = at(text, &[], StorageHold::Dynamic).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "v(c1) follows rel1 without delay, so its current would be a derivative"
+    );
+}
+
+#[test]
+fn only_ideal_pairs_can_be_held() {
+    let error = try_held("v1 1 0 5\n r1 1 2 1\n d1 2 0 0.7 0", "c").unwrap_err();
+    assert_eq!(
+        error,
+        ReduceError::NotIdeal {
+            device: "d1".into()
+        }
+    );
+    let error = try_held("v1 1 0 5\n r1 1 2 1\n d1 2 0", "").unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "a position with 0 devices for a circuit with 1"
+    );
+}
+
+#[test]
+fn windings_of_two_fluxes_and_of_one() {
+    // k = 0.5: L = [[1, 1], [1, 4]] mH.
+    let s = free("v1 1 0 1\n r0 1 2 5\n l1 2 0 1m\n l2 3 0 4m\n k1 l1 l2 0.5\n r1 3 0 40");
+    assert_matrix("P", &s.energy, &[&[1e-3, 1e-3], &[1e-3, 4e-3]]);
+    // Three windings on one core with a fourth turns ratio: k = 1 throughout, one state.
+    let text = "v1 1 0 1\n r0 1 2 5\n l1 2 0 1m\n l2 3 0 4m\n l3 4 0 9m\n r1 3 0 40\n r2 4 0 90\n";
+    let s = free(&format!("{text} k1 l1 l2 1\n k2 l1 l3 1\n k3 l2 l3 1"));
+    assert_eq!(s.n(), 1);
+    // Both loads are 10 Ω on the primary: 5 ∥ 5 = 2.5 Ω.
+    assert_matrix("A", &s.a, &[&[-2.5 / 1e-3]]);
+    // k23 = −1 with the others 1 is impossible.
+    let impossible = circuit(&format!("{text} k1 l1 l2 1\n k2 l1 l3 1\n k3 l2 l3 -1"));
+    assert!(behaviour(&impossible).is_err());
+}
+
+#[test]
+fn tight_coupling_keeps_all_its_digits() {
+    // 1 − k² = 2·10⁻¹²: the leakage decides the fast eigenvalue.
+    let s = free("l1 1 0 1m\n l2 2 0 1m\n k1 l1 l2 0.999999999999\n r1 1 0 1\n r2 2 0 1");
+    let k = 1.0 - 1e-12;
+    let leakage = 1e-3 * 1.999_999_999_999e-12;
+    // L⁻¹ = [[1, −k], [−k, 1]]/(L (1 − k²))
+    assert_matrix(
+        "A",
+        &s.a,
+        &[
+            &[-1.0 / leakage, k / leakage],
+            &[k / leakage, -1.0 / leakage],
+        ],
+    );
+}
+
+#[test]
+fn floating_parts_have_a_reference_of_their_own() {
+    let c =
+        circuit("v1 1 0 1\n r0 1 0 5\n l1 1 0 1m\n l2 a b 4m\n k1 l1 l2 0.5\n d1 a c\n c1 c b 1u");
+    let behaviour = behaviour(&c).unwrap();
+    assert_eq!(behaviour.notes.len(), 1);
+    let s = reduce(&behaviour, &Position::free(&behaviour, Vec::new())).unwrap();
+    let row = |n: &str| s.outputs.names.iter().position(|m| m == n).unwrap();
+    // a is the reference.
+    let a = row("v(a)");
+    assert_eq!(
+        (
+            s.outputs.rows.x.row(a).amax(),
+            s.outputs.rows.lambda.row(a).amax()
+        ),
+        (0.0, 0.0)
+    );
+    // v(c) − v(b) is the capacitor.
+    let difference = s.outputs.rows.x.row(row("v(c)")) - s.outputs.rows.x.row(row("v(b)"));
+    let k = s.states.iter().position(|x| x.name == "v(c1)").unwrap();
+    assert!(close(difference[k], 1.0) && close(difference.sum(), 1.0));
+}
+
+#[test]
+fn measured_matrices_reduce_like_the_circuit_they_came_from() {
+    // The skew bridge written as doubles: its modes need D's exact rank, which thirds do not have as doubles.
+    let text = "c1 1 0 3u\n l1 1 0 7m\n d1 1 2\n d2 0 2\n d3 3 1\n d4 3 0\n cf 2 3 300n\n r1 2 3 3\n r2 2 4 7\n r3 4 3 11";
+    let circuit_behaviour = behaviour(&circuit(text)).unwrap();
+    let s = reduce(
+        &circuit_behaviour,
+        &Position::free(&circuit_behaviour, Vec::new()),
+    )
+    .unwrap();
+    let matrices = Behaviour::from_lcs(&s);
+    let again = reduce(&matrices, &Position::free(&matrices, Vec::new())).unwrap();
+    assert_eq!(
+        (&again.a, &again.b, &again.c, &again.d),
+        (&s.a, &s.b, &s.c, &s.d)
+    );
+    for pattern in 0..16u32 {
+        let devices = (0..4)
+            .map(|k| {
+                if pattern >> k & 1 == 1 {
+                    Hold::Closed
+                } else {
+                    Hold::Open
+                }
+            })
+            .collect::<Vec<_>>();
+        let position = Position {
+            devices,
+            ..Position::free(&matrices, Vec::new())
+        };
+        let mode = reduce(&matrices, &position).unwrap();
+        let truth = reduce(&circuit_behaviour, &position).unwrap();
+        assert_eq!(
+            (mode.n(), mode.held.kernel.ncols()),
+            (truth.n(), truth.held.kernel.ncols()),
+            "{pattern:b}"
+        );
+        // The same eigenvalues, whatever states represent the mode.
+        let trace = |m: &DMatrix<f64>| m.trace();
+        assert!(
+            (trace(&mode.a) - trace(&truth.a)).abs() <= 1e-9 * trace(&truth.a).abs(),
+            "{pattern:b}"
+        );
+    }
+}
+
+#[test]
+fn pivots_are_exchanged_before_a_sound_active_circuit_is_accused() {
+    // The diode hangs on 1.4 v(l1), and l1 carries no current: greedy order makes v(l1) follow the diode.
+    let text = "d1 0 4\n l1 2 0 88u\n e1 4 0 3 2 1.4";
+    let behaviour = behaviour(&circuit(text)).unwrap();
+    let position = Position::free(&behaviour, Vec::new());
+    assert!(!crate::lcs::reduce::oracle::standard_order_suffices(
+        &behaviour, &position
+    ));
+    let s = reduce(&behaviour, &position).unwrap();
+    assert_eq!((s.n(), s.m()), (0, 1));
+    assert_eq!(s.ports[0].y, "-v(d1)");
+    assert_matrix("D", &s.d, &[&[0.0]]);
 }

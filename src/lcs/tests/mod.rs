@@ -2,7 +2,9 @@
 
 mod hand;
 mod laws;
+mod netlists;
 mod nodal;
+mod papers;
 mod random;
 
 use super::*;

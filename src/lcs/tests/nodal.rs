@@ -13,6 +13,8 @@ pub(super) enum Branch {
     Voltage(f64),
     /// i = value.
     Current(f64),
+    /// v = R i.
+    Resistance(f64),
 }
 
 /// Node potentials and branch currents of a circuit at complex frequency s.
@@ -46,7 +48,7 @@ impl Nodal {
                 m[(i, p)] += c;
                 m[(i, n)] -= c;
             };
-            let affine = |m: &mut DMatrix<C64>, rhs: &mut DVector<C64>, control: &Affine| {
+            let affine = |m: &mut DMatrix<C64>, control: &Affine| {
                 for (gain, quantity) in &control.terms {
                     let column = match quantity {
                         Quantity::Voltage(node) => node.index(),
@@ -54,7 +56,6 @@ impl Nodal {
                     };
                     m[(i, column)] -= real(gain.f64);
                 }
-                rhs[i] += real(control.constant);
             };
             match &e.kind {
                 Kind::Resistor(r) => {
@@ -95,14 +96,14 @@ impl Nodal {
                     control,
                 } => {
                     voltage(&mut m, one);
-                    affine(&mut m, &mut rhs, control);
+                    affine(&mut m, control);
                 }
                 Kind::Controlled {
                     output: Output::Current,
                     control,
                 } => {
                     m[(i, i)] += one;
-                    affine(&mut m, &mut rhs, control);
+                    affine(&mut m, control);
                 }
                 Kind::Device(_) | Kind::Switch(_) | Kind::Function { .. } => {
                     match branch(&e.name) {
@@ -113,6 +114,10 @@ impl Nodal {
                         Branch::Current(x) => {
                             m[(i, i)] += one;
                             rhs[i] = real(x);
+                        }
+                        Branch::Resistance(r) => {
+                            voltage(&mut m, one);
+                            m[(i, i)] -= real(r);
                         }
                     }
                 }
@@ -153,6 +158,20 @@ impl Nodal {
 
     pub(super) fn current(&self, circuit: &Circuit, name: &str) -> C64 {
         self.i[circuit.element(name).unwrap().index()]
+    }
+
+    /// The varying part of an affine quantity.
+    pub(super) fn affine(&self, affine: &Affine) -> C64 {
+        affine
+            .terms
+            .iter()
+            .fold(C64::new(0.0, 0.0), |sum, (gain, quantity)| {
+                let value = match quantity {
+                    Quantity::Voltage(node) => self.v[node.index()],
+                    Quantity::Current(id) => self.i[id.index()],
+                };
+                sum + value * gain.f64
+            })
     }
 
     /// What rounding in this solution can amount to, for voltages and for currents, with branches of about 1 Ω to 1 kΩ.

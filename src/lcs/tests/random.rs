@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 
 use super::nodal::{Branch, C64, Nodal};
-use crate::circuit::{Circuit, Kind};
+use crate::circuit::{Circuit, Kind, Output};
 use crate::lcs::reduce::oracle::both;
 use crate::lcs::{Hold, Lcs, Position, ReduceError, Role, reduce};
 use crate::mna::fixture::circuit;
@@ -83,12 +83,19 @@ fn complex(row: &[f64], x: &DVector<C64>) -> (C64, f64) {
 }
 
 /// Compares y, λ ↦ y and u ↦ y and every output at one frequency with nodal analysis.
-fn compare(
+pub(super) fn compare(
     circuit: &Circuit,
     s: &Lcs,
     held: &dyn Fn(&str) -> Branch,
 ) -> Result<usize, TestCaseError> {
     let frequency = C64::new(3e4, 2e5);
+    let function = |name: &str| {
+        let id = circuit.element(name)?;
+        match &circuit.elements[id.index()].kind {
+            Kind::Function { output, input, .. } => Some((*output, input)),
+            _ => None,
+        }
+    };
     let mut compared = 0;
     for column in 0..s.m() + s.p() {
         let (b, d, u, lambda) = if column < s.m() {
@@ -114,9 +121,11 @@ fn compare(
         let branch = |name: &str| match s.ports.iter().position(|p| p.device == name) {
             Some(k) => {
                 let value = if lambda == Some(k) { 1.0 } else { 0.0 };
-                match s.ports[k].role {
-                    Role::Current => Branch::Current(value),
-                    _ => Branch::Voltage(-value),
+                match (s.ports[k].role, function(name)) {
+                    (Role::Current, _) => Branch::Current(value),
+                    (Role::Function, Some((Output::Voltage, _))) => Branch::Voltage(value),
+                    (Role::Function, _) => Branch::Current(value),
+                    (Role::Voltage, _) => Branch::Voltage(-value),
                 }
             }
             None => held(name),
@@ -136,9 +145,13 @@ fn compare(
             let y = y + C64::new(d[k], 0.0);
             let expected = match port.role {
                 Role::Current => -nodal.voltage(circuit, &port.device),
-                _ => nodal.current(circuit, &port.device),
+                Role::Voltage => nodal.current(circuit, &port.device),
+                Role::Function => match function(&port.device) {
+                    Some((_, input)) => nodal.affine(input),
+                    None => unreachable!("{} has no input", port.device),
+                },
             };
-            let floor = if port.role == Role::Current {
+            let floor = if port.role != Role::Voltage {
                 nodal.floor().0
             } else {
                 nodal.floor().1
@@ -160,10 +173,11 @@ fn compare(
                 _ => C64::new(0.0, 0.0),
             };
             let inside = &name[2..name.len() - 1];
-            let expected = if name.starts_with("v(") {
-                nodal.potential(circuit.node(inside).unwrap().index())
-            } else {
-                nodal.current(circuit, inside)
+            let node = |name: &str| nodal.potential(circuit.node(name).unwrap().index());
+            let expected = match (name.starts_with("v("), inside.split_once(',')) {
+                (true, Some((a, b))) => node(a) - node(b),
+                (true, None) => node(inside),
+                _ => nodal.current(circuit, inside),
             };
             let floor = if name.starts_with('v') {
                 nodal.floor().0
