@@ -31,6 +31,7 @@ pub mod forms;
 pub mod integrate;
 pub mod law;
 pub mod lcs;
+pub mod measure;
 pub mod mna;
 pub mod netlist;
 pub mod passivity;

@@ -118,9 +118,9 @@ proptest! {
         prop_assume!(lcs.m() <= 5);
         let (h, steps) = (1e-6, 40);
         if let Some(expected) = oracle(&lcs, x.clone(), h, steps) {
-            let (state, residual) = stepped(&lcs, x, h, steps);
+            let (state, residual) = stepped(&lcs, x.clone(), h, steps);
             let metric = |v: &DVector<f64>| v.dot(&(&lcs.energy * v)).sqrt();
-            let scale = metric(&expected).max(1e-6);
+            let scale = metric(&expected).max(metric(&x)).max(1e-6);
             prop_assert!(metric(&(&state - &expected)) <= 1e-7 * scale, "{text}\n{state}{expected}");
             prop_assert!(residual <= 1e-11, "{text}\n{residual:e}");
         }
@@ -133,7 +133,10 @@ proptest! {
         let options = SimOptions { method: Method::Theta, ..SimOptions::default() };
         let run = simulate(&circuit, &behaviour, options)
             .map_err(|e| TestCaseError::fail(format!("{text}{e}")))?;
-        prop_assert!(run.energy.residual_relative < 1e-3, "{text}\n{:?}", run.energy);
-        prop_assert!(run.energy.dissipated >= -1e-9 * run.energy.source.abs());
+        let (energy, rounding) = (run.energy, 1e-15 * 10.0 * 10.0 / 100.0 * 200e-6);
+        if energy.source.abs().max(energy.stored.abs()) > rounding {
+            prop_assert!(energy.residual_relative < 1e-3, "{text}\n{energy:?}");
+        }
+        prop_assert!(energy.dissipated >= -1e-9 * energy.source.abs() - rounding, "{energy:?}");
     }
 }

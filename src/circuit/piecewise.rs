@@ -4,7 +4,7 @@ use crate::algebra::Value;
 use crate::law::Curve;
 
 /// Most knots of one function.
-const MAX_KNOTS: usize = 10_000;
+const MAX_KNOTS: usize = 1_000;
 /// Two lines meet in a knot, or have one slope, if they differ by less than so many roundings.
 const ROUNDINGS: f64 = 64.0;
 

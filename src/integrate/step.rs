@@ -168,6 +168,8 @@ pub(crate) struct FusedMode {
     active: Vec<bool>,
     /// Row-major; n rows x⁺, m rows of guards, then rows that must vanish (only where M_aa is singular).
     k: Vec<f64>,
+    /// For every guard the sum of the magnitudes it was computed from, as a row over |z|.
+    sizes: Vec<f64>,
     width: usize,
     /// Whether M_aa is regular; if not λ_a is the least-norm choice.
     pub regular: bool,
@@ -275,6 +277,20 @@ impl StepMatrices {
         (lambda, solve)
     }
 
+    /// |M_aa⁻¹| |q_a|, the magnitudes λ_a is computed from.
+    fn lambda_sizes(&self, solve: &ActiveSolve) -> DMatrix<f64> {
+        let d = &self.scaling.d;
+        let mut q = self.q.select_rows(&solve.indices).abs();
+        for (mut row, &j) in q.row_iter_mut().zip(&solve.indices) {
+            row *= d[j];
+        }
+        let mut sizes = DMatrix::zeros(self.m.nrows(), self.q.ncols());
+        for (row, &j) in (solve.inverse.abs() * q).row_iter().zip(&solve.indices) {
+            sizes.set_row(j, &(row * d[j]));
+        }
+        sizes
+    }
+
     fn fuse(&self, lcs: &Lcs, columns: &Columns, active: &[bool]) -> FusedMode {
         let (n, m, width) = (lcs.n(), lcs.m(), columns.len());
         let (lambda, solve) = self.lambda_rows(active);
@@ -282,40 +298,43 @@ impl StepMatrices {
         let y = &self.m * &lambda + &self.q;
         // Blocking ports are tested at the end of the step, conducting ones by their λ. For γ < 1 that is not where y and λ
         // belong: there y is that of a very short implicit step from the end.
-        let y_end = match &self.after {
-            None => y.clone(),
+        let y_size = self.m.abs() * lambda.abs() + self.q.abs();
+        let (y_end, y_end_size) = match &self.after {
+            None => (y.clone(), y_size.clone()),
             Some(after) => {
                 let (lambda, _) = after.lambda_rows(active);
-                (&after.m * lambda + &after.q) * columns.end_rows(&x_next)
+                let end = columns.end_rows(&x_next);
+                let size = (after.m.abs() * lambda.abs() + after.q.abs()) * end.abs();
+                ((&after.m * lambda + &after.q) * end, size)
             }
         };
+        let lambda_size = self.lambda_sizes(&solve);
         let extra = if solve.regular {
             0
         } else {
             solve.indices.len()
         };
         let mut k = Vec::with_capacity((n + m + extra) * width);
+        let mut sizes = Vec::with_capacity((m + extra) * width);
         (0..n).for_each(|i| k.extend(x_next.row(i).iter()));
-        (0..m).for_each(|j| {
-            k.extend(
-                if active[j] {
-                    lambda.row(j)
-                } else {
-                    y_end.row(j)
-                }
-                .iter(),
-            )
-        });
-        if !solve.regular {
-            solve
-                .indices
-                .iter()
-                .for_each(|&j| k.extend(y.row(j).iter()));
+        for j in 0..m {
+            let (guard, size) = if active[j] {
+                (&lambda, &lambda_size)
+            } else {
+                (&y_end, &y_end_size)
+            };
+            k.extend(guard.row(j).iter());
+            sizes.extend(size.row(j).iter());
+        }
+        for &j in solve.indices.iter().take(extra) {
+            k.extend(y.row(j).iter());
+            sizes.extend(y_size.row(j).iter());
         }
         let power = PowerForms::new(lcs, columns, self.h, self.scheme, &x_next, &lambda);
         FusedMode {
             active: active.to_vec(),
             k,
+            sizes,
             width,
             regular: solve.regular,
             power,
@@ -350,14 +369,15 @@ impl FusedMode {
 
     #[cold]
     fn holds_to_rounding(&self, z: &[f64], n: usize, out: &mut [f64]) -> bool {
-        let size = |row: &[f64]| row.iter().zip(z).map(|(a, b)| (a * b).abs()).sum::<f64>();
-        for (i, row) in self.k.chunks_exact(self.width).enumerate().skip(n) {
+        let rows = self.k.chunks_exact(self.width).enumerate().skip(n);
+        for ((i, row), size) in rows.zip(self.sizes.chunks_exact(self.width)) {
+            let size = size.iter().zip(z).map(|(a, b)| a * b.abs()).sum::<f64>();
             let negative = if i < out.len() {
                 -out[i]
             } else {
                 row.iter().zip(z).map(|(a, b)| a * b).sum::<f64>().abs()
             };
-            if negative > GUARD_ROUNDING * size(row) || negative.is_nan() {
+            if negative > GUARD_ROUNDING * size || negative.is_nan() {
                 return false;
             }
         }

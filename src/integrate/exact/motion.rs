@@ -48,6 +48,8 @@ pub(crate) struct Motion {
     terms: Vec<f64>,
     polynomials: Vec<f64>,
     amplitude: Vec<f64>,
+    /// Largest values met since the mode was entered, sampled when the noise is refreshed.
+    peak: Vec<f64>,
     floors: Vec<f64>,
     /// How far below zero each guard was on entry, by rounding of the time or of simultaneous events.
     slack: Vec<f64>,
@@ -88,6 +90,8 @@ impl Motion {
         self.amplitude.clear();
         self.amplitude.extend_from_slice(amplitude);
         self.amplitude.resize(flow.dim(), 0.0);
+        self.peak.clear();
+        self.peak.resize(flow.dim(), 0.0);
         self.steady = flow.guards() == 0;
         let guards = &self.now[flow.dim()..flow.dim() + flow.guards()];
         self.slack.clear();
@@ -99,6 +103,9 @@ impl Motion {
         for (a, v) in self.amplitude.iter_mut().zip(&self.now) {
             *a = a.max(v.abs());
         }
+        for (peak, v) in self.peak.iter_mut().zip(&self.now) {
+            *peak = peak.max(v.abs());
+        }
         flow.noise(&self.amplitude, &mut self.floors);
         for (floor, slack) in self.floors.iter_mut().zip(&self.slack) {
             *floor += slack;
@@ -109,7 +116,7 @@ impl Motion {
     /// Largest value a combination of states can have had on the way here.
     pub(crate) fn reach<'r>(&self, row: impl IntoIterator<Item = &'r f64>) -> f64 {
         row.into_iter()
-            .zip(&self.amplitude)
+            .zip(&self.peak)
             .map(|(c, a)| (c * a).abs())
             .sum()
     }

@@ -1,0 +1,302 @@
+//! Measurements on waveforms, as `.meas tran` and `.four` define them.
+//!
+//! Between two rows a waveform is the straight line through them, and every measure is exact for that line; two rows at
+//! one time are an edge.
+
+mod fourier;
+
+use thiserror::Error;
+
+pub use fourier::{Harmonic, Spectrum, fourier};
+
+/// Why a measurement has no value.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum MeasureError {
+    /// The window from … to … holds no piece of the waveform.
+    #[error("no part of the run lies between {from} s and {to} s")]
+    Window {
+        /// Its start, s.
+        from: f64,
+        /// Its end, s.
+        to: f64,
+    },
+    /// The crossing asked for does not happen.
+    #[error("the value {level} is crossed {found} times only")]
+    NoCrossing {
+        /// The level.
+        level: f64,
+        /// Crossings that there are.
+        found: usize,
+    },
+}
+
+/// What is computed over a window of time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Over {
+    /// (1/T) ∫ y dt.
+    Average,
+    /// √((1/T) ∫ y² dt).
+    Rms,
+    /// The least value.
+    Minimum,
+    /// The greatest value.
+    Maximum,
+    /// Greatest minus least.
+    PeakToPeak,
+    /// ∫ y dt.
+    Integral,
+}
+
+/// Which crossings of a level count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Edge {
+    /// From below.
+    Rise,
+    /// From above.
+    Fall,
+    /// Either.
+    Cross,
+}
+
+/// One of the crossings, from 1, or the last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Which {
+    /// The n-th, n ≥ 1.
+    Number(usize),
+    /// The last.
+    Last,
+}
+
+/// A waveform: times in s, nondecreasing, and as many values.
+#[derive(Debug, Clone, Copy)]
+pub struct Trace<'a> {
+    /// Times, s.
+    pub time: &'a [f64],
+    /// Values.
+    pub values: &'a [f64],
+}
+
+/// One straight piece, (t0, y0) to (t1, y1) with t0 ≤ t1.
+#[derive(Debug, Clone, Copy)]
+struct Line {
+    t0: f64,
+    y0: f64,
+    t1: f64,
+    y1: f64,
+}
+
+impl Line {
+    fn at(&self, t: f64) -> f64 {
+        if t >= self.t1 {
+            self.y1
+        } else {
+            self.y0 + (self.y1 - self.y0) * ((t - self.t0) / (self.t1 - self.t0))
+        }
+    }
+
+    fn clipped(&self, from: f64, to: f64) -> Option<Self> {
+        let (t0, t1) = (self.t0.max(from), self.t1.min(to));
+        (t0 <= t1).then(|| Self {
+            t0,
+            y0: if t0 == self.t0 { self.y0 } else { self.at(t0) },
+            t1,
+            y1: if t1 == self.t1 { self.y1 } else { self.at(t1) },
+        })
+    }
+}
+
+impl<'a> Trace<'a> {
+    fn lines(&self) -> impl Iterator<Item = Line> + 'a {
+        let (time, values) = (self.time, self.values);
+        time.windows(2).zip(values.windows(2)).map(|(t, y)| Line {
+            t0: t[0],
+            y0: y[0],
+            t1: t[1],
+            y1: y[1],
+        })
+    }
+
+    /// A measure over from ≤ t ≤ to.
+    ///
+    /// # Errors
+    /// [`MeasureError::Window`] where the run has no piece of positive length there.
+    pub fn over(&self, what: Over, from: f64, to: f64) -> Result<f64, MeasureError> {
+        let lines: Vec<Line> = self.lines().filter_map(|l| l.clipped(from, to)).collect();
+        let length: f64 = lines.iter().map(|l| l.t1 - l.t0).sum();
+        if length.is_nan() || length <= 0.0 {
+            return Err(MeasureError::Window { from, to });
+        }
+        let sum = |f: fn(&Line) -> f64| lines.iter().map(|l| (l.t1 - l.t0) * f(l)).sum::<f64>();
+        let integral = || sum(|l| 0.5 * (l.y0 + l.y1));
+        let ends = || lines.iter().flat_map(|l| [l.y0, l.y1]);
+        let least = || ends().fold(f64::INFINITY, f64::min);
+        let greatest = || ends().fold(f64::NEG_INFINITY, f64::max);
+        Ok(match what {
+            Over::Average => integral() / length,
+            Over::Integral => integral(),
+            Over::Rms => (sum(|l| (l.y0 * l.y0 + l.y0 * l.y1 + l.y1 * l.y1) / 3.0) / length).sqrt(),
+            Over::Minimum => least(),
+            Over::Maximum => greatest(),
+            Over::PeakToPeak => greatest() - least(),
+        })
+    }
+
+    /// The value at `t`; at an edge the value after it.
+    ///
+    /// # Errors
+    /// [`MeasureError::Window`] outside the run.
+    pub fn at(&self, t: f64) -> Result<f64, MeasureError> {
+        let after = self.time.partition_point(|&own| own <= t);
+        let missing = MeasureError::Window { from: t, to: t };
+        let k = after.checked_sub(1).ok_or_else(|| missing.clone())?;
+        match (self.time.get(after), self.values.get(after)) {
+            (Some(&t1), Some(&y1)) => Ok(Line {
+                t0: self.time[k],
+                y0: self.values[k],
+                t1,
+                y1,
+            }
+            .at(t)),
+            _ if self.time[k] == t => Ok(self.values[k]),
+            _ => Err(missing),
+        }
+    }
+
+    /// The slope at `t`, of the piece to its right, at the end of the run to its left.
+    ///
+    /// # Errors
+    /// [`MeasureError::Window`] outside the run.
+    pub fn slope(&self, t: f64) -> Result<f64, MeasureError> {
+        self.lines()
+            .filter(|l| l.t0 <= t && t <= l.t1 && l.t0 < l.t1)
+            .last()
+            .map(|l| (l.y1 - l.y0) / (l.t1 - l.t0))
+            .ok_or(MeasureError::Window { from: t, to: t })
+    }
+
+    /// When the waveform crosses a level from `after` on: the time at which it leaves the level or passes through it.
+    ///
+    /// # Errors
+    /// [`MeasureError::NoCrossing`] where there are fewer crossings.
+    pub fn crossing(
+        &self,
+        level: f64,
+        edge: Edge,
+        which: Which,
+        after: f64,
+    ) -> Result<f64, MeasureError> {
+        let mut found = Vec::new();
+        // The side of the level the waveform came from, kept while it runs along it.
+        let mut side = 0.0;
+        for line in self.lines().filter_map(|l| l.clipped(after, f64::INFINITY)) {
+            let (a, b) = (line.y0 - level, line.y1 - level);
+            if a != 0.0 {
+                side = a.signum();
+            }
+            if b != 0.0 && side != 0.0 && b.signum() != side {
+                let t = if a == 0.0 {
+                    line.t0
+                } else {
+                    line.t0 + (line.t1 - line.t0) * (a / (a - b))
+                };
+                let counts = match edge {
+                    Edge::Rise => side < 0.0,
+                    Edge::Fall => side > 0.0,
+                    Edge::Cross => true,
+                };
+                if counts {
+                    found.push(t);
+                }
+            }
+            if b != 0.0 {
+                side = b.signum();
+            }
+        }
+        let wanted = match which {
+            Which::Number(n) => n.checked_sub(1).and_then(|k| found.get(k)),
+            Which::Last => found.last(),
+        };
+        wanted.copied().ok_or(MeasureError::NoCrossing {
+            level,
+            found: found.len(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 0 → 2 in 1 s, an edge to −1, constant for 1 s, up to 0 in 1 s.
+    const TIME: [f64; 5] = [0.0, 1.0, 1.0, 2.0, 3.0];
+    const VALUES: [f64; 5] = [0.0, 2.0, -1.0, -1.0, 0.0];
+
+    fn trace() -> Trace<'static> {
+        Trace {
+            time: &TIME,
+            values: &VALUES,
+        }
+    }
+
+    #[test]
+    fn windows() {
+        let over = |what, from, to| trace().over(what, from, to).unwrap();
+        assert_eq!(over(Over::Integral, 0.0, 3.0), 1.0 - 1.0 - 0.5);
+        assert_eq!(over(Over::Average, 0.0, 1.0), 1.0);
+        assert_eq!(over(Over::Average, 0.5, 1.5), 0.25);
+        // ∫ (2t)² = 4/3 over 1 s.
+        assert!((over(Over::Rms, 0.0, 1.0) - (4.0_f64 / 3.0).sqrt()).abs() < 1e-15);
+        assert_eq!(over(Over::Maximum, 0.0, 0.5), 1.0);
+        assert_eq!(over(Over::Minimum, 2.5, 3.0), -0.5);
+        assert_eq!(over(Over::PeakToPeak, 0.0, 3.0), 3.0);
+        let fault = trace().over(Over::Average, 4.0, 5.0);
+        assert_eq!(fault, Err(MeasureError::Window { from: 4.0, to: 5.0 }));
+    }
+
+    #[test]
+    fn rms_of_a_ramp() {
+        let ramp = Trace {
+            time: &[0.0, 1.0],
+            values: &[0.0, 3.0],
+        };
+        assert!((ramp.over(Over::Rms, 0.0, 1.0).unwrap() - 3.0_f64.sqrt()).abs() < 1e-15);
+    }
+
+    #[test]
+    fn values_and_slopes() {
+        assert_eq!(trace().at(0.25), Ok(0.5));
+        assert_eq!(trace().at(1.0), Ok(-1.0));
+        assert_eq!(trace().at(3.0), Ok(0.0));
+        assert!(trace().at(3.5).is_err() && trace().at(-1.0).is_err());
+        assert_eq!(trace().slope(0.5), Ok(2.0));
+        assert_eq!(trace().slope(1.0), Ok(0.0));
+        assert_eq!(trace().slope(3.0), Ok(1.0));
+    }
+
+    #[test]
+    fn crossings() {
+        let when = |level, edge, which| trace().crossing(level, edge, which, 0.0);
+        assert_eq!(when(1.0, Edge::Rise, Which::Number(1)), Ok(0.5));
+        assert_eq!(when(1.0, Edge::Fall, Which::Number(1)), Ok(1.0));
+        assert_eq!(when(-0.5, Edge::Cross, Which::Last), Ok(2.5));
+        let none = MeasureError::NoCrossing {
+            level: 1.0,
+            found: 1,
+        };
+        assert_eq!(when(1.0, Edge::Rise, Which::Number(2)), Err(none));
+        // Touching is no crossing; passing along the level is one.
+        let touch = Trace {
+            time: &[0.0, 1.0, 2.0, 3.0, 4.0],
+            values: &[1.0, 0.0, 1.0, 0.0, -1.0],
+        };
+        assert_eq!(
+            touch.crossing(0.0, Edge::Fall, Which::Number(1), 0.0),
+            Ok(3.0)
+        );
+        assert!(
+            touch
+                .crossing(0.0, Edge::Rise, Which::Number(1), 0.0)
+                .is_err()
+        );
+    }
+}
