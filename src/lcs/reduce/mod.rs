@@ -18,6 +18,7 @@ mod eliminated;
 mod flow;
 mod frame;
 mod publish;
+mod system;
 
 use crate::algebra::Field;
 use crate::mna::{Behaviour, Reduced};
