@@ -9,6 +9,7 @@ mod couple;
 #[cfg(test)]
 pub(crate) mod fixture;
 mod graph;
+mod readings;
 mod standard;
 mod system;
 pub mod topology;

@@ -211,6 +211,9 @@ fn in_some_order<F: Field>(
     .ok_or(error)
 }
 
+/// A row over [x | λ | u | u' | 1] that must vanish, and the elements whose loop or cut-set it is.
+type Constraint<F> = (Vec<F>, Vec<String>);
+
 /// A system over a field, before it is written as doubles.
 #[derive(Debug)]
 struct Reduction<F> {
@@ -231,7 +234,7 @@ struct Reduction<F> {
     /// Guards × undetermined directions.
     kernel: Vec<Vec<F>>,
     /// Rows that must vanish, and the elements that make them.
-    constraints: Vec<(Vec<F>, Vec<String>)>,
+    constraints: Vec<Constraint<F>>,
     /// n×p.
     shift: Vec<Vec<F>>,
     /// n×(q + 1): J and the constant.

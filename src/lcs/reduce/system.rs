@@ -8,7 +8,7 @@ use crate::mna::topology::{Class, Edge, conflict};
 use super::eliminated::Eliminated;
 use super::flow::{Flow, add_scaled};
 use super::frame::Frame;
-use super::{ReduceError, Reduction, StorageHold};
+use super::{Constraint, ReduceError, Reduction, StorageHold};
 
 impl<F: Field> Eliminated<'_, F> {
     /// The system that the elimination has found.
@@ -101,7 +101,7 @@ impl<F: Field> Eliminated<'_, F> {
     }
 
     /// Equations without a pivot: they relate sources alone, or accuse a port.
-    fn constraints(&self, frame: &Frame) -> Result<Vec<(Vec<F>, Vec<String>)>, ReduceError> {
+    fn constraints(&self, frame: &Frame) -> Result<Vec<Constraint<F>>, ReduceError> {
         let mut constraints = Vec::new();
         for r in (0..self.found.equations).filter(|&r| !self.found.used[r]) {
             let row = frame.gather(self.matrix.row(r), false, None);
