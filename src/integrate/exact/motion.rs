@@ -47,7 +47,10 @@ pub(crate) struct Motion {
     next: Vec<f64>,
     terms: Vec<f64>,
     polynomials: Vec<f64>,
+    /// Largest |w| that noise is measured by; at least `peak`.
     amplitude: Vec<f64>,
+    /// Largest |x| met in this mode.
+    peak: Vec<f64>,
     floors: Vec<f64>,
     /// How far below zero each guard was on entry, by rounding of the time or of simultaneous events.
     slack: Vec<f64>,
@@ -85,6 +88,8 @@ impl Motion {
         self.now[..x.len()].copy_from_slice(x);
         exosystem.write(t, &mut self.now[x.len()..flow.dim()]);
         flow.read_guards(&mut self.now);
+        self.peak.clear();
+        self.peak.extend(x.iter().map(|v| v.abs()));
         self.amplitude.clear();
         self.amplitude.extend_from_slice(amplitude);
         self.amplitude.resize(flow.dim(), 0.0);
@@ -95,7 +100,15 @@ impl Motion {
         self.refresh_noise(flow);
     }
 
+    #[inline]
+    fn note_peak(&mut self) {
+        for (peak, v) in self.peak.iter_mut().zip(&self.now) {
+            *peak = peak.max(v.abs());
+        }
+    }
+
     fn refresh_noise(&mut self, flow: &Flow) {
+        self.note_peak();
         for (a, v) in self.amplitude.iter_mut().zip(&self.now) {
             *a = a.max(v.abs());
         }
@@ -109,7 +122,7 @@ impl Motion {
     /// Largest value a combination of states can have had on the way here.
     pub(crate) fn reach<'r>(&self, row: impl IntoIterator<Item = &'r f64>) -> f64 {
         row.into_iter()
-            .zip(&self.amplitude)
+            .zip(&self.peak)
             .map(|(c, a)| (c * a).abs())
             .sum()
     }
@@ -281,6 +294,7 @@ impl Motion {
         self.energy[0] += source;
         self.energy[1] += dissipated;
         std::mem::swap(&mut self.now, &mut self.next);
+        self.note_peak();
         self.t = t;
         self.steps += 1;
         self.since_refresh += 1;
