@@ -216,13 +216,10 @@ fn distinct(rows: &DMatrix<f64>) -> DMatrix<f64> {
     for i in 0..rows.nrows() {
         let size = rows.row(i).amax();
         let same = |&(j, other): &(usize, f64)| {
-            rows.row(i)
-                .iter()
-                .zip(rows.row(j).iter())
-                .all(|(a, b)| {
-                    let (a, b) = (a / size, b / other);
-                    (a - b).abs() <= EQUAL * a.abs().max(b.abs())
-                })
+            rows.row(i).iter().zip(rows.row(j).iter()).all(|(a, b)| {
+                let (a, b) = (a / size, b / other);
+                (a - b).abs() <= EQUAL * a.abs().max(b.abs())
+            })
         };
         if size > 0.0 && !kept.iter().any(same) {
             kept.push((i, size));
