@@ -68,13 +68,15 @@ impl JumpProblem {
         if n.ncols() == 0 {
             return None;
         }
+        // N is orthonormal and D levelled: what is below rounding is zero, else noise would pass for a constraint.
+        let n = cleaned(n);
         let k = n.ncols();
         let basis = &d * &n;
         if (&lcs.b * &basis).amax() == 0.0 {
             return None;
         }
         let h = basis.transpose() * &cb * &basis;
-        let (feed, size) = (&feedthrough * &n, h.amax());
+        let (feed, size) = (cleaned(&feedthrough * &n), h.amax());
         let sigma = if size > 0.0 { 1.0 / size } else { 1.0 };
         let matrix = if split {
             let w = stack(&n, &feed);
@@ -178,6 +180,10 @@ fn stack(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     all.rows_mut(0, a.nrows()).copy_from(a);
     all.rows_mut(a.nrows(), b.nrows()).copy_from(b);
     all
+}
+
+fn cleaned(a: DMatrix<f64>) -> DMatrix<f64> {
+    a.map(|v| if v.abs() < ROUNDING { 0.0 } else { v })
 }
 
 fn is_semidefinite(symmetric: &DMatrix<f64>) -> bool {

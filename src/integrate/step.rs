@@ -317,8 +317,8 @@ impl StepMatrices {
         let mut k = Vec::with_capacity((n + m + extra) * width);
         let mut sizes = Vec::with_capacity((m + extra) * width);
         (0..n).for_each(|i| k.extend(x_next.row(i).iter()));
-        for j in 0..m {
-            let (guard, size) = if active[j] {
+        for (j, &conducts) in active.iter().enumerate().take(m) {
+            let (guard, size) = if conducts {
                 (&lambda, &lambda_size)
             } else {
                 (&y_end, &y_end_size)

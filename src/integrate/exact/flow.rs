@@ -126,13 +126,16 @@ impl Flow {
         }
         if let Some(kernel) = &self.levels[level as usize] {
             kernel.apply(w, next);
+            for (next, w) in next[..self.dim].iter_mut().zip(w) {
+                *next += w;
+            }
         }
         true
     }
 
     #[cold]
     fn tabulate(&mut self, level: u32) -> bool {
-        let Some(Exponential { matrix, loss }) =
+        let Some(Exponential { increment, loss }) =
             expm::exponential(&self.generator, self.step(level))
         else {
             return false;
@@ -141,8 +144,8 @@ impl Flow {
         let mut fused = DMatrix::zeros(self.dim + self.rows.nrows(), self.dim);
         fused
             .rows_mut(self.dim, self.rows.nrows())
-            .copy_from(&(&self.rows * &matrix));
-        fused.rows_mut(0, self.dim).copy_from(&matrix);
+            .copy_from(&(&self.rows + &self.rows * &increment));
+        fused.rows_mut(0, self.dim).copy_from(&increment);
         self.levels[level as usize] = Some(Kernel::new(&fused));
         true
     }
@@ -190,7 +193,8 @@ impl Flow {
                 break;
             }
             let step = self.h * (-f64::from(at)).exp2();
-            if let Some(Exponential { matrix, .. }) = expm::exponential(&self.generator, step) {
+            if let Some(Exponential { increment, .. }) = expm::exponential(&self.generator, step) {
+                let matrix = increment + DMatrix::identity(self.dim, self.dim);
                 for gram in &mut grams {
                     let moved = matrix.transpose() * &*gram * &matrix;
                     *gram += moved;

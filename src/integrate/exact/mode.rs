@@ -210,16 +210,16 @@ impl Mode {
 
 /// The rows that are no positive multiple of an earlier one: equal guards fall together.
 fn distinct(rows: &DMatrix<f64>) -> DMatrix<f64> {
-    /// Entries that agree to this part of a row's largest are equal.
+    /// Entries that agree to this part of themselves are equal.
     const EQUAL: f64 = 1e-14;
     let mut kept: Vec<(usize, f64)> = Vec::new();
     for i in 0..rows.nrows() {
         let size = rows.row(i).amax();
         let same = |&(j, other): &(usize, f64)| {
-            rows.row(i)
-                .iter()
-                .zip(rows.row(j).iter())
-                .all(|(a, b)| (a / size - b / other).abs() <= EQUAL)
+            rows.row(i).iter().zip(rows.row(j).iter()).all(|(a, b)| {
+                let (a, b) = (a / size, b / other);
+                (a - b).abs() <= EQUAL * a.abs().max(b.abs())
+            })
         };
         if size > 0.0 && !kept.iter().any(same) {
             kept.push((i, size));

@@ -47,8 +47,9 @@ pub(crate) struct Motion {
     next: Vec<f64>,
     terms: Vec<f64>,
     polynomials: Vec<f64>,
+    /// Largest |w| that noise is measured by; at least `peak`.
     amplitude: Vec<f64>,
-    /// Largest values met since the mode was entered, sampled when the noise is refreshed.
+    /// Largest |x| met in this mode.
     peak: Vec<f64>,
     floors: Vec<f64>,
     /// How far below zero each guard was on entry, by rounding of the time or of simultaneous events.
@@ -87,11 +88,11 @@ impl Motion {
         self.now[..x.len()].copy_from_slice(x);
         exosystem.write(t, &mut self.now[x.len()..flow.dim()]);
         flow.read_guards(&mut self.now);
+        self.peak.clear();
+        self.peak.extend(x.iter().map(|v| v.abs()));
         self.amplitude.clear();
         self.amplitude.extend_from_slice(amplitude);
         self.amplitude.resize(flow.dim(), 0.0);
-        self.peak.clear();
-        self.peak.resize(flow.dim(), 0.0);
         self.steady = flow.guards() == 0;
         let guards = &self.now[flow.dim()..flow.dim() + flow.guards()];
         self.slack.clear();
@@ -99,12 +100,17 @@ impl Motion {
         self.refresh_noise(flow);
     }
 
-    fn refresh_noise(&mut self, flow: &Flow) {
-        for (a, v) in self.amplitude.iter_mut().zip(&self.now) {
-            *a = a.max(v.abs());
-        }
+    #[inline]
+    fn note_peak(&mut self) {
         for (peak, v) in self.peak.iter_mut().zip(&self.now) {
             *peak = peak.max(v.abs());
+        }
+    }
+
+    fn refresh_noise(&mut self, flow: &Flow) {
+        self.note_peak();
+        for (a, v) in self.amplitude.iter_mut().zip(&self.now) {
+            *a = a.max(v.abs());
         }
         flow.noise(&self.amplitude, &mut self.floors);
         for (floor, slack) in self.floors.iter_mut().zip(&self.slack) {
@@ -288,6 +294,7 @@ impl Motion {
         self.energy[0] += source;
         self.energy[1] += dissipated;
         std::mem::swap(&mut self.now, &mut self.next);
+        self.note_peak();
         self.t = t;
         self.steps += 1;
         self.since_refresh += 1;
