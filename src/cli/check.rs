@@ -52,6 +52,7 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Report, Failure> {
         }
     };
     diagnostics.extend(behaviour.notes.iter().cloned());
+    diagnostics.extend(mna::topology::findings(&circuit));
     input::positions(&behaviour, &args.switches)?;
     let subject = Subject::Circuit(Box::new((circuit, behaviour)));
     match input::start_system(&subject, &args.switches, streams) {

@@ -3,7 +3,6 @@
 use std::io::Write;
 
 use super::args::{self, MethodArgs, SimArgs, Summary};
-use super::cpu;
 use super::exit::{Exit, Failure};
 use super::input::{self, Subject};
 use super::output::{self, Format};
@@ -150,8 +149,7 @@ pub fn run(
         },
         Subject::System(_) => Circuit::default(),
     };
-    let before = cpu::own().unwrap_or_default();
-    let mut result = match (subject, tran) {
+    let result = match (subject, tran) {
         (Subject::Circuit(both), _) => simulate(&circuit, &both.1, options),
         (Subject::System(system), Some(tran)) => {
             simulate_system(&system.lcs, &system.x0, tran, options)
@@ -164,13 +162,6 @@ pub fn run(
         }
     };
     bar.finish_and_clear();
-    let reached = match &mut result {
-        Ok(run) => Some(run),
-        Err(error) => error.partial.as_deref_mut(),
-    };
-    if let Some(run) = reached {
-        run.stats.cpu_seconds = (cpu::own().unwrap_or_default() - before).max(0.0);
-    }
     result
 }
 

@@ -34,8 +34,8 @@ fn class(element: &Element) -> Class {
     }
 }
 
-/// Loops of voltage sources and cut-sets of current sources (errors); capacitor loops, inductor cut-sets and dangling
-/// nodes (notes); with the elements by name.
+/// Loops of voltage sources and cut-sets of current sources (errors); capacitor loops and inductor cut-sets
+/// (notes); with the elements by name.
 #[must_use]
 pub fn findings(circuit: &Circuit) -> Vec<Diagnostic> {
     let mut order: Vec<usize> = (0..circuit.elements.len()).collect();
@@ -56,7 +56,6 @@ pub fn findings(circuit: &Circuit) -> Vec<Diagnostic> {
         };
         diagnostics.extend(finding);
     }
-    diagnostics.extend(dangling(circuit));
     diagnostics
 }
 
@@ -201,31 +200,6 @@ fn inductor_cut(circuit: &Circuit, members: &[(usize, f64)]) -> Option<Diagnosti
     Some(Diagnostic::note("inductor-cutset", first.span, message))
 }
 
-/// Nodes with a single connection.
-fn dangling(circuit: &Circuit) -> Vec<Diagnostic> {
-    let mut touching: Vec<Vec<usize>> = vec![Vec::new(); circuit.nodes.len()];
-    for k in 0..circuit.elements.len() {
-        let (p, n) = ends(circuit, k);
-        touching[p].push(k);
-        touching[n].push(k);
-    }
-    let lonely = touching
-        .iter()
-        .enumerate()
-        .skip(1)
-        .filter(|(_, list)| list.len() == 1);
-    lonely
-        .map(|(node, list)| {
-            let element = &circuit.elements[list[0]];
-            let message = format!(
-                "nothing but {} is connected to node {}",
-                element.name, circuit.nodes[node]
-            );
-            Diagnostic::note("dangling-node", element.span, message)
-        })
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -294,12 +268,5 @@ mod tests {
                     .to_string()
             )]
         );
-    }
-
-    #[test]
-    fn dangling_nodes_are_named() {
-        let text = "v1 1 0 5\n l1 1 0 1m\n l2 a b 1m\n k1 l1 l2 0.9\n r1 a b 1\n r2 1 9 1";
-        let message = "nothing but r2 is connected to node 9".to_string();
-        assert_eq!(messages(text), [("dangling-node", message)]);
     }
 }
