@@ -8,6 +8,7 @@ mod assemble;
 mod couple;
 #[cfg(test)]
 pub(crate) mod fixture;
+mod sliding;
 mod standard;
 mod system;
 pub mod topology;
