@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Each room and the rooms it may import, in the order in which data flows.
-const ROOMS: [(&str, &[&str]); 17] = [
+const ROOMS: [(&str, &[&str]); 18] = [
     ("settings", &[]),
     ("algebra", &[]),
     ("diagnostic", &[]),
@@ -16,6 +16,7 @@ const ROOMS: [(&str, &[&str]); 17] = [
     ("lcs", &["algebra", "circuit", "law", "mna"]),
     ("solve", &["settings"]),
     ("waveform", &[]),
+    ("measure", &[]),
     ("plan", &["lcs", "settings", "solve"]),
     (
         "integrate",

@@ -84,6 +84,8 @@ pub struct Held {
     pub kernel: DMatrix<f64>,
     /// Rows over [x | u | u' | 1] that must vanish for this position to exist (a conducting diode across a source).
     pub constraints: Rows,
+    /// For each constraint the elements whose loop or cut-set it is.
+    pub constrained: Vec<Vec<String>>,
     /// pairs×q: areas of the guards' impulses when the storage vector changes from s⁻ to s⁺: `impulse · (s⁻ − s⁺)`.
     pub impulse: DMatrix<f64>,
 }

@@ -4,26 +4,24 @@ use petgraph::unionfind::UnionFind;
 
 use super::couple::{self, Winding};
 use super::{
-    Behaviour, Coefficient, Column, Equation, Observed, Pair, Power, SourcePort, StoragePort,
-    SwitchPort, topology,
+    Behaviour, Coefficient, Column, Equation, Pair, SourcePort, StoragePort, SwitchPort, topology,
 };
-use crate::algebra::Value;
-use crate::circuit::{Affine, Circuit, ElementId, Kind, NodeId, Output, Probed, Quantity};
+use crate::circuit::{Circuit, Kind, NodeId, Output, Quantity};
 use crate::diagnostic::{Diagnostic, Severity};
-use crate::lcs::{Input, Port, PowerKind, Role};
+use crate::lcs::{Input, Port, Role};
 
 /// What is known of an element's two quantities while assembling.
 #[derive(Clone)]
-struct Branch {
+pub(super) struct Branch {
     /// Its current as a combination of columns.
-    current: Equation,
+    pub(super) current: Equation,
 }
 
-struct Assembly<'a> {
-    circuit: &'a Circuit,
-    out: Behaviour,
-    potential: Vec<Option<Column>>,
-    branches: Vec<Branch>,
+pub(super) struct Assembly<'a> {
+    pub(super) circuit: &'a Circuit,
+    pub(super) out: Behaviour,
+    pub(super) potential: Vec<Option<Column>>,
+    pub(super) branches: Vec<Branch>,
     kcl: Vec<Equation>,
 }
 
@@ -131,7 +129,7 @@ fn list(noun: &str, names: &[&str]) -> String {
 }
 
 impl Assembly<'_> {
-    fn voltage(&self, p: NodeId, n: NodeId) -> Equation {
+    pub(super) fn voltage(&self, p: NodeId, n: NodeId) -> Equation {
         let mut terms = Vec::with_capacity(2);
         if p != n {
             terms.extend(self.potential[p.index()].map(|c| (Coefficient::ONE, c)));
@@ -140,7 +138,7 @@ impl Assembly<'_> {
         terms
     }
 
-    fn internal(&mut self, name: String) -> Column {
+    pub(super) fn internal(&mut self, name: String) -> Column {
         let column = self.out.column(name);
         self.out.internal.push(column);
         column
@@ -425,163 +423,6 @@ impl Assembly<'_> {
         match &element.kind {
             Kind::Function { law, .. } | Kind::Device(law) => law.clone(),
             _ => crate::law::Law::ideal_diode(),
-        }
-    }
-
-    fn affine(&self, affine: &Affine) -> Equation {
-        let mut equation = Equation::new();
-        let scaled = |gain: Value, c: Coefficient| match c {
-            Coefficient::MINUS_ONE => Coefficient::Minus(gain),
-            _ => Coefficient::Plus(gain),
-        };
-        for &(gain, quantity) in &affine.terms {
-            match quantity {
-                Quantity::Voltage(node) => {
-                    equation
-                        .extend(self.potential[node.index()].map(|c| (Coefficient::Plus(gain), c)));
-                }
-                Quantity::Current(element) => {
-                    for (c, column) in self.current(element) {
-                        equation.push((scaled(gain, c), column));
-                    }
-                }
-            }
-        }
-        if affine.constant != 0.0 {
-            equation.push((
-                Coefficient::Plus(Value::binary(affine.constant)),
-                Behaviour::ONE,
-            ));
-        }
-        equation
-    }
-
-    /// The current of an element as ±1 combination of columns (a resistor's gets its own column in `outputs`).
-    fn current(&self, element: ElementId) -> Equation {
-        self.branches[element.index()].current.clone()
-    }
-
-    /// Gives every resistor whose current controls something a column of its own, then states controlled outputs.
-    fn outputs(&mut self) {
-        let circuit = self.circuit;
-        let affines = circuit.elements.iter().filter_map(|e| match &e.kind {
-            Kind::Controlled { control, .. } => Some(control),
-            Kind::Function { input, .. } => Some(input),
-            Kind::Switch(s) => Some(&s.control),
-            _ => None,
-        });
-        let controls: Vec<ElementId> = affines
-            .flat_map(|a| a.terms.iter())
-            .filter_map(|(_, q)| match q {
-                Quantity::Current(e) => Some(*e),
-                Quantity::Voltage(_) => None,
-            })
-            .collect();
-        for element in controls {
-            let k = element.index();
-            if matches!(circuit.elements[k].kind, Kind::Resistor(v) if v.f64 != 0.0)
-                && self.branches[k].current.len() != 1
-                || self.branches[k]
-                    .current
-                    .iter()
-                    .any(|(c, _)| !matches!(*c, Coefficient::ONE))
-            {
-                let column = self.internal(format!("i({})", circuit.elements[k].name));
-                let mut equation = self.branches[k].current.clone();
-                equation.push((Coefficient::MINUS_ONE, column));
-                self.out.equations.push(equation);
-                self.branches[k].current = vec![(Coefficient::ONE, column)];
-            }
-        }
-        for (k, element) in circuit.elements.iter().enumerate() {
-            match &element.kind {
-                Kind::Controlled { output, control } => {
-                    let mut equation = match output {
-                        Output::Voltage => self.voltage(element.p, element.n),
-                        Output::Current => self.branches[k].current.clone(),
-                    };
-                    equation.extend(
-                        self.affine(control)
-                            .into_iter()
-                            .map(|(c, col)| (c.negated(), col)),
-                    );
-                    self.out.equations.push(equation);
-                }
-                Kind::Function { input, .. } => {
-                    let y = self
-                        .out
-                        .pairs
-                        .iter()
-                        .find(|p| p.port.device == element.name)
-                        .map(|p| p.reverse);
-                    if let Some(y) = y {
-                        let mut equation = self.affine(input);
-                        equation.push((Coefficient::MINUS_ONE, y));
-                        self.out.equations.push(equation);
-                    }
-                }
-                _ => {}
-            }
-        }
-    }
-
-    fn observed(&mut self, name: String, unit: &'static str, mut equation: Equation) -> usize {
-        let column = self.out.column(name.clone());
-        equation.push((Coefficient::MINUS_ONE, column));
-        self.out.equations.push(equation);
-        self.out.observed.push(Observed { name, unit, column });
-        self.out.observed.len() - 1
-    }
-
-    /// Probes, switch controls and the two factors of every power.
-    fn observe(&mut self) {
-        let circuit = self.circuit;
-        for probe in circuit.probes() {
-            let (unit, equation) = match probe.what {
-                Probed::Voltage(a, b) => ("V", self.voltage(a, b)),
-                Probed::Current(e) => ("A", self.current(e)),
-            };
-            self.observed(probe.name, unit, equation);
-        }
-        self.out.probes = self.out.observed.len();
-        for k in 0..self.out.switches.len() {
-            let name = self.out.switches[k].name.clone();
-            let control = circuit
-                .elements
-                .iter()
-                .find(|e| e.name == name)
-                .and_then(|e| match &e.kind {
-                    Kind::Switch(s) => Some(&s.control),
-                    _ => None,
-                });
-            let equation = control.map(|c| self.affine(c)).unwrap_or_default();
-            self.out.switches[k].control = self.observed(format!("{name}.control"), "V", equation);
-        }
-        for (k, element) in circuit.elements.iter().enumerate() {
-            let kind = match &element.kind {
-                Kind::Capacitor(_) | Kind::Inductor(_) => continue,
-                Kind::VoltageSource(_)
-                | Kind::CurrentSource(_)
-                | Kind::Controlled { .. }
-                | Kind::Function { .. } => PowerKind::Source,
-                Kind::Resistor(_) | Kind::Device(_) | Kind::Switch(_) => PowerKind::Dissipated,
-            };
-            let v = self.observed(
-                format!("v({})", element.name),
-                "V",
-                self.voltage(element.p, element.n),
-            );
-            let i = self.observed(
-                format!("i({})", element.name),
-                "A",
-                self.branches[k].current.clone(),
-            );
-            self.out.power.push(Power {
-                element: element.name.clone(),
-                kind,
-                v,
-                i,
-            });
         }
     }
 }

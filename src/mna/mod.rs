@@ -8,6 +8,8 @@ mod assemble;
 mod couple;
 #[cfg(test)]
 pub(crate) mod fixture;
+mod graph;
+mod readings;
 mod sliding;
 mod standard;
 mod system;

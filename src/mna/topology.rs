@@ -1,29 +1,11 @@
-//! What the graph of a circuit says before any number is looked at: islands, the normal tree, and the loops and
-//! cut-sets that make a circuit impossible or take a state away.
+//! What the graph of a circuit says before any number is looked at: the loops and cut-sets that make a circuit
+//! impossible or take a state away, and nodes that lead nowhere.
 
-use std::collections::VecDeque;
-
-use petgraph::unionfind::UnionFind;
-
+use super::graph::Graph;
 use crate::algebra::Field;
 use crate::circuit::source::Wave;
 use crate::circuit::{Circuit, Element, Kind, Output};
 use crate::diagnostic::Diagnostic;
-
-/// The graph's findings, by element and node names.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Topology {
-    /// Parts without a path to ground: their nodes, the reference first.
-    pub islands: Vec<Vec<String>>,
-    /// The elements of the normal tree: voltage sources, then capacitors, then resistors, devices and switches, then
-    /// inductors, then current sources, as long as no loop closes.
-    pub tree: Vec<String>,
-    /// The other elements.
-    pub links: Vec<String>,
-    /// Loops of voltage sources and cut-sets of current sources (errors); capacitor loops, inductor cut-sets and dangling
-    /// nodes (notes).
-    pub diagnostics: Vec<Diagnostic>,
-}
 
 /// The classes of the normal tree, in its order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -52,23 +34,16 @@ fn class(element: &Element) -> Class {
     }
 }
 
-/// Reads the graph of a circuit.
+/// Loops of voltage sources and cut-sets of current sources (errors); capacitor loops, inductor cut-sets and dangling
+/// nodes (notes); with the elements by name.
 #[must_use]
-pub fn topology(circuit: &Circuit) -> Topology {
+pub fn findings(circuit: &Circuit) -> Vec<Diagnostic> {
     let mut order: Vec<usize> = (0..circuit.elements.len()).collect();
     order.sort_by_key(|&k| class(&circuit.elements[k]));
     let edges = (0..circuit.elements.len())
         .map(|k| ends(circuit, k))
         .collect();
     let graph = Graph::new(circuit.nodes.len(), edges, &order);
-    let names = |which: bool| {
-        let chosen = circuit
-            .elements
-            .iter()
-            .zip(&graph.in_tree)
-            .filter(|(_, t)| **t == which);
-        chosen.map(|(e, _)| e.name.clone()).collect()
-    };
     let mut diagnostics = Vec::new();
     for (k, element) in circuit.elements.iter().enumerate() {
         let class = class(element);
@@ -82,93 +57,7 @@ pub fn topology(circuit: &Circuit) -> Topology {
         diagnostics.extend(finding);
     }
     diagnostics.extend(dangling(circuit));
-    Topology {
-        islands: islands(circuit),
-        tree: names(true),
-        links: names(false),
-        diagnostics,
-    }
-}
-
-/// A spanning forest grown in a given order of edges.
-struct Graph {
-    edges: Vec<(usize, usize)>,
-    in_tree: Vec<bool>,
-    /// For each node the tree edges at it.
-    at: Vec<Vec<usize>>,
-}
-
-impl Graph {
-    fn new(nodes: usize, edges: Vec<(usize, usize)>, order: &[usize]) -> Self {
-        let mut sets = UnionFind::<usize>::new(nodes);
-        let mut in_tree = vec![false; edges.len()];
-        let mut at = vec![Vec::new(); nodes];
-        for &k in order {
-            let (p, n) = edges[k];
-            if sets.union(p, n) {
-                in_tree[k] = true;
-                at[p].push(k);
-                at[n].push(k);
-            }
-        }
-        Self { edges, in_tree, at }
-    }
-
-    /// The edges of the loop that a link closes, the link last, each with the sign of its voltage around the loop.
-    fn loop_of(&self, link: usize) -> Vec<(usize, f64)> {
-        let (p, n) = self.edges[link];
-        // Breadth-first from p to n through the tree; `via` is the edge by which a node was reached.
-        let mut via: Vec<Option<usize>> = vec![None; self.at.len()];
-        let mut queue = VecDeque::from([p]);
-        while let Some(node) = queue.pop_front() {
-            for &k in &self.at[node] {
-                let next = self.far(k, node);
-                if next != p && via[next].is_none() {
-                    via[next] = Some(k);
-                    queue.push_back(next);
-                }
-            }
-        }
-        let mut members = vec![(link, -1.0)];
-        let mut node = n;
-        while let (true, Some(k)) = (node != p, via[node]) {
-            let before = self.far(k, node);
-            members.push((k, if self.edges[k].0 == before { 1.0 } else { -1.0 }));
-            node = before;
-        }
-        members.reverse();
-        members
-    }
-
-    /// The edges between the two parts that removing a tree edge leaves, each with the sign of its current.
-    fn cut_of(&self, branch: usize) -> Vec<(usize, f64)> {
-        let (p, _) = self.edges[branch];
-        let mut inside = vec![false; self.at.len()];
-        inside[p] = true;
-        let mut queue = VecDeque::from([p]);
-        while let Some(node) = queue.pop_front() {
-            for &k in self.at[node].iter().filter(|&&k| k != branch) {
-                let next = self.far(k, node);
-                if !inside[next] {
-                    inside[next] = true;
-                    queue.push_back(next);
-                }
-            }
-        }
-        let crossing = self
-            .edges
-            .iter()
-            .enumerate()
-            .filter(|(_, e)| inside[e.0] != inside[e.1]);
-        crossing
-            .map(|(k, e)| (k, if inside[e.0] { 1.0 } else { -1.0 }))
-            .collect()
-    }
-
-    fn far(&self, edge: usize, node: usize) -> usize {
-        let (p, n) = self.edges[edge];
-        if p == node { n } else { p }
-    }
+    diagnostics
 }
 
 /// An element as an edge of the graph, for messages about a position of devices and switches.
@@ -293,10 +182,7 @@ fn capacitor_loop(circuit: &Circuit, members: &[(usize, f64)]) -> Option<Diagnos
     let message = if let [_] = members {
         format!("{what} is shorted: its voltage is 0")
     } else {
-        format!(
-            "{what} form a loop, so v({}) is not a state of its own",
-            link.name
-        )
+        format!("{what} form a loop: the capacitor voltages in it are not independent states")
     };
     Some(Diagnostic::note("capacitor-loop", link.span, message))
 }
@@ -310,10 +196,7 @@ fn inductor_cut(circuit: &Circuit, members: &[(usize, f64)]) -> Option<Diagnosti
     let message = if let [_] = members {
         format!("{what} leads nowhere: its current is 0")
     } else {
-        format!(
-            "{what} are a cut-set, so i({}) is not a state of its own",
-            first.name
-        )
+        format!("{what} are a cut-set: the inductor currents in it are not independent states")
     };
     Some(Diagnostic::note("inductor-cutset", first.span, message))
 }
@@ -343,59 +226,26 @@ fn dangling(circuit: &Circuit) -> Vec<Diagnostic> {
         .collect()
 }
 
-/// The nodes of every part without ground, the first in file order (its reference) first.
-fn islands(circuit: &Circuit) -> Vec<Vec<String>> {
-    let mut sets = UnionFind::<usize>::new(circuit.nodes.len());
-    for k in 0..circuit.elements.len() {
-        let (p, n) = ends(circuit, k);
-        sets.union(p, n);
-    }
-    let mut islands: Vec<(usize, Vec<String>)> = Vec::new();
-    for (node, name) in circuit.nodes.iter().enumerate().skip(1) {
-        let root = sets.find(node);
-        if root == sets.find(0) {
-            continue;
-        }
-        match islands.iter_mut().find(|i| i.0 == root) {
-            Some(island) => island.1.push(name.clone()),
-            None => islands.push((root, vec![name.clone()])),
-        }
-    }
-    islands.into_iter().map(|i| i.1).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::diagnostic::Severity;
     use crate::mna::fixture::{circuit, drive};
 
-    fn findings(text: &str) -> Vec<(&'static str, String)> {
-        let topology = topology(&circuit(text));
-        topology
-            .diagnostics
+    fn messages(text: &str) -> Vec<(&'static str, String)> {
+        findings(&circuit(text))
             .into_iter()
             .map(|d| (d.code, d.message))
             .collect()
     }
 
     #[test]
-    fn the_normal_tree_takes_capacitors_before_inductors() {
-        let t = topology(&circuit(
-            "l1 1 0 1m\n c1 1 0 1u\n r1 1 2 1\n d1 2 0\n v1 3 0 1\n r2 3 1 1",
-        ));
-        assert_eq!(t.tree, ["c1", "r1", "v1"]);
-        assert_eq!(t.links, ["l1", "d1", "r2"]);
-        assert_eq!(t.diagnostics, []);
-    }
-
-    #[test]
     fn voltage_sources_in_a_loop_are_named() {
-        let found = findings("v1 1 0 5\n v2 2 1 1\n r1 2 0 1k\n v3 2 0 7");
+        let found = messages("v1 1 0 5\n v2 2 1 1\n r1 2 0 1k\n v3 2 0 7");
         let message = "v1, v2 and v3 form a loop of voltage sources that contradict each other";
         assert_eq!(found, [("voltage-loop", message.to_string())]);
-        assert_eq!(findings("v1 1 0 5\n v2 2 1 1\n r1 2 0 1k\n v3 2 0 6"), []);
-        assert_eq!(findings("v1 1 1 5\n r1 1 0 1")[0].1, "v1 is shorted");
+        assert_eq!(messages("v1 1 0 5\n v2 2 1 1\n r1 2 0 1k\n v3 2 0 6"), []);
+        assert_eq!(messages("v1 1 1 5\n r1 1 0 1")[0].1, "v1 is shorted");
     }
 
     #[test]
@@ -412,49 +262,44 @@ mod tests {
             let mut c = circuit(&format!("v1 1 0 0\n r1 1 0 1\n {second}"));
             drive(&mut c, "v1", wave.clone());
             drive(&mut c, "v2", wave.clone());
-            assert_eq!(topology(&c).diagnostics.len(), faults, "{second}");
+            assert_eq!(findings(&c).len(), faults, "{second}");
         }
     }
 
     #[test]
     fn current_sources_without_a_way_back_are_named() {
-        let found = findings("i1 0 1 1\n i2 1 2 2\n r1 2 0 1k");
+        let found = messages("i1 0 1 1\n i2 1 2 2\n r1 2 0 1k");
         let message = "i1 and i2 are a cut-set of current sources that contradict each other";
         assert_eq!(found, [("current-cutset", message.to_string())]);
-        assert_eq!(findings("i1 0 1 1\n i2 1 2 1\n r1 2 0 1k"), []);
-        let alone = findings("i1 0 1 1\n r1 2 0 1k");
+        assert_eq!(messages("i1 0 1 1\n i2 1 2 1\n r1 2 0 1k"), []);
+        let alone = messages("i1 0 1 1\n r1 2 0 1k");
         assert_eq!(alone[0].1, "the current of i1 has no way back");
     }
 
     #[test]
     fn loops_of_capacitors_and_cut_sets_of_inductors_are_notes() {
-        let t = topology(&circuit("v1 1 0 5\n c1 1 2 1u\n c2 2 0 1u\n r1 2 0 1"));
-        assert_eq!(t.diagnostics.len(), 1);
-        assert_eq!(t.diagnostics[0].severity, Severity::Note);
+        let t = findings(&circuit("v1 1 0 5\n c1 1 2 1u\n c2 2 0 1u\n r1 2 0 1"));
+        assert_eq!(t.len(), 1);
+        assert_eq!(t[0].severity, Severity::Note);
         assert_eq!(
-            t.diagnostics[0].message,
-            "v1, c1 and c2 form a loop, so v(c2) is not a state of its own"
+            t[0].message,
+            "v1, c1 and c2 form a loop: the capacitor voltages in it are not independent states"
         );
-        let found = findings("v1 1 0 5\n r1 1 2 1\n l1 2 3 1m\n l2 3 0 1m");
+        let found = messages("v1 1 0 5\n r1 1 2 1\n l1 2 3 1m\n l2 3 0 1m");
         assert_eq!(
             found,
             [(
                 "inductor-cutset",
-                "l1 and l2 are a cut-set, so i(l1) is not a state of its own".to_string()
+                "l1 and l2 are a cut-set: the inductor currents in it are not independent states"
+                    .to_string()
             )]
         );
     }
 
     #[test]
-    fn islands_and_dangling_nodes_are_named() {
-        let t = topology(&circuit(
-            "v1 1 0 5\n l1 1 0 1m\n l2 a b 1m\n k1 l1 l2 0.9\n r1 a b 1\n r2 1 9 1",
-        ));
-        assert_eq!(t.islands, [["a", "b"]]);
-        assert_eq!(t.diagnostics.len(), 1);
-        assert_eq!(
-            t.diagnostics[0].message,
-            "nothing but r2 is connected to node 9"
-        );
+    fn dangling_nodes_are_named() {
+        let text = "v1 1 0 5\n l1 1 0 1m\n l2 a b 1m\n k1 l1 l2 0.9\n r1 a b 1\n r2 1 9 1";
+        let message = "nothing but r2 is connected to node 9".to_string();
+        assert_eq!(messages(text), [("dangling-node", message)]);
     }
 }

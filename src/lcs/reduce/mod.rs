@@ -18,6 +18,7 @@ mod eliminated;
 mod flow;
 mod frame;
 mod publish;
+mod system;
 
 use crate::algebra::Field;
 use crate::mna::{Behaviour, Reduced};
@@ -210,6 +211,9 @@ fn in_some_order<F: Field>(
     .ok_or(error)
 }
 
+/// A row over [x | λ | u | u' | 1] that must vanish, and the elements whose loop or cut-set it is.
+type Constraint<F> = (Vec<F>, Vec<String>);
+
 /// A system over a field, before it is written as doubles.
 #[derive(Debug)]
 struct Reduction<F> {
@@ -229,8 +233,8 @@ struct Reduction<F> {
     guards: Vec<(Vec<F>, Vec<F>)>,
     /// Guards × undetermined directions.
     kernel: Vec<Vec<F>>,
-    /// Rows that must vanish.
-    constraints: Vec<Vec<F>>,
+    /// Rows that must vanish, and the elements that make them.
+    constraints: Vec<Constraint<F>>,
     /// n×p.
     shift: Vec<Vec<F>>,
     /// n×(q + 1): J and the constant.

@@ -94,6 +94,7 @@ pub(super) fn publish<F: Field>(
     let controls = pick(&mut behaviour.switches.iter().map(|s| s.control));
     let guards: Vec<&[F]> = r.guards.iter().map(|g| g.0.as_slice()).collect();
     let guard_impulses: Vec<&[F]> = r.guards.iter().map(|g| g.1.as_slice()).collect();
+    let constraints: Vec<&[F]> = r.constraints.iter().map(|c| c.0.as_slice()).collect();
     let kernel = slices(&r.kernel);
     let held_pairs = (position.devices.iter().enumerate())
         .filter(|(_, hold)| **hold != Hold::Free)
@@ -103,7 +104,8 @@ pub(super) fn publish<F: Field>(
         pairs: held_pairs,
         guard: round.rows(&guards, n, m, p),
         kernel: round.matrix(&kernel, 0..width(&kernel)),
-        constraints: round.rows(&slices(&r.constraints), n, m, p),
+        constraints: round.rows(&constraints, n, m, p),
+        constrained: r.constraints.iter().map(|c| c.1.clone()).collect(),
         impulse: round.matrix(&guard_impulses, 0..width(&guard_impulses)),
     };
     let mut metric = DMatrix::zeros(q, q);

@@ -208,22 +208,15 @@ fn a_conflict_names_what_joins_the_sources() {
         names(at("i1 0 1 5\n s1 1 2 0\n r1 2 0 1", &[false], dynamic)),
         "i1 s1"
     );
-    assert_eq!(
-        names(at(
-            "v1 1 0 5\n l1 1 2 1m\n l2 2 0 1m",
-            &[],
-            StorageHold::Static
-        )),
-        "v1 l1 l2"
-    );
-    assert_eq!(
-        names(at(
-            "i1 0 1 5\n c1 1 2 1u\n r1 2 0 1",
-            &[],
-            StorageHold::Static
-        )),
-        "i1 c1"
-    );
+    // At an operating point the source's value at that instant decides.
+    let operating_point = |text: &str| at(text, &[], StorageHold::Static).unwrap().held;
+    let found = operating_point("v1 1 0 5\n l1 1 2 1m\n l2 2 0 1m");
+    assert_eq!(found.constrained, [["v1", "l1", "l2"]]);
+    assert_matrix("v1 = 0", &found.constraints.u, &[&[1.0]]);
+    let found = operating_point("i1 0 1 5\n c1 1 2 1u\n r1 2 0 1");
+    assert_eq!(found.constrained, [["i1", "c1"]]);
+    let found = held("v1 1 0 5\n d1 1 2\n d2 2 0\n r1 1 2 1", "cc").held;
+    assert_eq!(found.constrained, [["v1", "d1", "d2"]]);
 }
 
 #[test]

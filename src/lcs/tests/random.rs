@@ -17,10 +17,11 @@ fn parts(kinds: usize, count: std::ops::Range<usize>) -> impl Strategy<Value = V
     prop::collection::vec((0..kinds, 0u8..6, 0u8..6, 0u8..6, 0u8..6, 1u32..100), count)
 }
 
-/// Kinds 0–7 are passive with at most one source of each sort; 8–11 are controlled sources.
+/// Kinds 0–7 are passive with at most one source of each sort; 8–11 are controlled sources, the last two by the current of an earlier branch.
 fn netlist(parts: &[Part], spread: bool) -> String {
     let mut text = String::new();
     let (mut voltage, mut current) = (false, false);
+    let mut names: Vec<String> = Vec::new();
     for (k, &(kind, p, n, a, b, value)) in parts.iter().enumerate() {
         let wide = |units: [&'static str; 3]| {
             if spread {
@@ -44,8 +45,14 @@ fn netlist(parts: &[Part], spread: bool) -> String {
             }
             8 => format!("e{k} {p} {n} {a} {b} {}", f64::from(value) / 50.0),
             9 => format!("g{k} {p} {n} {a} {b} {}", f64::from(value) / 5000.0),
+            10 | 11 if !names.is_empty() => {
+                let letter = if kind == 10 { 'f' } else { 'h' };
+                let control = &names[a as usize % names.len()];
+                format!("{letter}{k} {p} {n} {control} {}", f64::from(value) / 50.0)
+            }
             _ => format!("r{k} {p} {n} {value}0"),
         };
+        names.extend(line.split(' ').next().map(str::to_string));
         text += &line;
         text.push('\n');
     }
@@ -266,7 +273,7 @@ proptest! {
     }
 
     #[test]
-    fn active_networks_agree_with_nodal_analysis(parts in parts(10, 3..14)) {
+    fn active_networks_agree_with_nodal_analysis(parts in parts(12, 3..14)) {
         let circuit = circuit(&netlist(&parts, false));
         let behaviour = everything(&circuit);
         if let Ok(s) = reduce(&behaviour, &Position::free(&behaviour, Vec::new())) {
@@ -305,7 +312,7 @@ proptest! {
     }
 
     #[test]
-    fn balls_and_rationals_give_the_same_doubles(parts in parts(10, 3..12), conducting in any::<u32>()) {
+    fn balls_and_rationals_give_the_same_doubles(parts in parts(12, 3..12), conducting in any::<u32>()) {
         let circuit = circuit(&netlist(&parts, true));
         let behaviour = everything(&circuit);
         let devices = (0..behaviour.pairs.len())

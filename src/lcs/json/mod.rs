@@ -1,0 +1,190 @@
+//! The system as JSON, schema `circ-lcs/1`, written and read.
+
+mod read;
+mod write;
+
+use nalgebra::DVector;
+use serde::{Deserialize, Serialize};
+
+pub use read::read;
+pub use write::write;
+
+use super::Lcs;
+use crate::circuit::Tran;
+use crate::circuit::source::{Form, WaveError};
+use crate::law::CurveError;
+
+/// The name of the schema.
+pub const SCHEMA: &str = "circ-lcs/1";
+
+/// A system with what a simulation of it needs.
+#[derive(Debug, Clone)]
+pub struct SystemFile {
+    /// The system.
+    pub lcs: Lcs,
+    /// The (shifted) state at the start.
+    pub x0: DVector<f64>,
+    /// The transient analysis, if the file names one.
+    pub tran: Option<Tran>,
+}
+
+/// What is wrong with a system file.
+#[derive(Debug, thiserror::Error)]
+pub enum JsonError {
+    /// Not JSON, or not of the schema's form.
+    #[error("not a circ system: {0}")]
+    Syntax(#[from] serde_json::Error),
+    /// Another schema.
+    #[error("the schema is `{0}`, not `circ-lcs/1`")]
+    Schema(String),
+    /// A matrix of the wrong shape.
+    #[error("{name} must be {rows}×{cols}")]
+    Shape {
+        /// The matrix.
+        name: &'static str,
+        /// Rows it should have.
+        rows: usize,
+        /// Columns it should have.
+        cols: usize,
+    },
+    /// An entry that is not finite.
+    #[error("{0} has an entry that is not finite")]
+    NotFinite(&'static str),
+    /// A port whose two names fit no role.
+    #[error("port `{0}`: λ must be `i(NAME)` or `-v(NAME)` with y the other, or a block's output")]
+    Role(String),
+    /// An unknown law.
+    #[error("port `{device}`: unknown law `{kind}`")]
+    Law {
+        /// The device.
+        device: String,
+        /// What the file says.
+        kind: String,
+    },
+    /// A law that is not monotone.
+    #[error("port `{device}`: {reason}")]
+    Curve {
+        /// The device.
+        device: String,
+        /// What is wrong with its curve.
+        reason: CurveError,
+    },
+    /// A waveform.
+    #[error("input `{name}`: {source}")]
+    Wave {
+        /// The input.
+        name: String,
+        /// What is wrong.
+        source: WaveError,
+    },
+    /// A time span that cannot be simulated.
+    #[error("tran: tstep and tstop must be positive")]
+    Tran,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Document {
+    schema: String,
+    #[serde(default)]
+    title: String,
+    states: Vec<StateDoc>,
+    #[serde(default)]
+    inputs: Vec<InputDoc>,
+    #[serde(default)]
+    ports: Vec<PortDoc>,
+    #[serde(rename = "A")]
+    a: Vec<Vec<f64>>,
+    #[serde(rename = "B", default)]
+    b: Vec<Vec<f64>>,
+    #[serde(rename = "C", default)]
+    c: Vec<Vec<f64>>,
+    #[serde(rename = "D", default)]
+    d: Vec<Vec<f64>>,
+    #[serde(rename = "E", default)]
+    e: Vec<Vec<f64>>,
+    #[serde(rename = "G", default)]
+    g: Vec<Vec<f64>>,
+    #[serde(rename = "e", default)]
+    e0: Vec<f64>,
+    #[serde(rename = "F", default)]
+    f: Vec<f64>,
+    #[serde(default)]
+    x0: Vec<f64>,
+    /// Stored energy ½ xᵀ P x.
+    #[serde(rename = "P", default, skip_serializing_if = "Vec::is_empty")]
+    p: Vec<Vec<f64>>,
+    #[serde(default)]
+    outputs: OutputsDoc,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    tran: Option<TranDoc>,
+    #[serde(default, skip_serializing_if = "serde_json::Map::is_empty")]
+    switches: serde_json::Map<String, serde_json::Value>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct StateDoc {
+    name: String,
+    #[serde(default)]
+    unit: String,
+    #[serde(default, skip_serializing_if = "serde_json::Map::is_empty")]
+    shift: serde_json::Map<String, serde_json::Value>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct InputDoc {
+    name: String,
+    #[serde(default)]
+    unit: String,
+    waveform: Form,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    dc: Option<f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct PortDoc {
+    device: String,
+    lambda: String,
+    y: String,
+    law: LawDoc,
+}
+
+#[derive(Serialize, Deserialize, Default)]
+struct LawDoc {
+    kind: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    vfwd: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    ron: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    roff: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    vertices: Option<Vec<[f64; 2]>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    first: Option<[f64; 2]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    last: Option<[f64; 2]>,
+}
+
+#[derive(Serialize, Deserialize, Default)]
+#[serde(default)]
+struct OutputsDoc {
+    names: Vec<String>,
+    units: Vec<String>,
+    x: Vec<Vec<f64>>,
+    lambda: Vec<Vec<f64>>,
+    u: Vec<Vec<f64>>,
+    du: Vec<Vec<f64>>,
+    one: Vec<f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct TranDoc {
+    tstep: f64,
+    tstop: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    tstart: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    tmax: Option<f64>,
+    #[serde(default)]
+    uic: bool,
+}

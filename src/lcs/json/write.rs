@@ -1,0 +1,144 @@
+//! From a system to its text.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::{Document, InputDoc, LawDoc, OutputsDoc, PortDoc, SCHEMA, StateDoc, TranDoc};
+use crate::circuit::Tran;
+use crate::circuit::source::Form;
+use crate::law::Law;
+use crate::lcs::Lcs;
+
+fn rows(m: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    // −0.0 and 0.0 are one number to a reader.
+    (0..m.nrows())
+        .map(|i| (0..m.ncols()).map(|j| m[(i, j)] + 0.0).collect())
+        .collect()
+}
+
+fn law_document(law: &Law) -> LawDoc {
+    let kind = law.kind().to_owned();
+    match law {
+        Law::Diode { vfwd, ron, roff } => LawDoc {
+            kind,
+            vfwd: (vfwd.f64 != 0.0).then_some(vfwd.f64),
+            ron: (ron.f64 != 0.0).then_some(ron.f64),
+            roff: roff.map(|r| r.f64),
+            ..LawDoc::default()
+        },
+        Law::Curve(curve) => LawDoc {
+            kind,
+            vertices: Some(curve.vertices.iter().map(|v| [v.0.f64, v.1.f64]).collect()),
+            first: Some([curve.first.0.f64, curve.first.1.f64]),
+            last: Some([curve.last.0.f64, curve.last.1.f64]),
+            ..LawDoc::default()
+        },
+    }
+}
+
+/// Writes a system, one matrix row per array, doubles so that they read back to the same bits.
+#[must_use]
+pub fn write(lcs: &Lcs, x0: &DVector<f64>, tran: Option<Tran>) -> String {
+    let named = |values: &[f64]| -> serde_json::Map<String, serde_json::Value> {
+        lcs.inputs
+            .iter()
+            .zip(values)
+            .filter(|(_, v)| **v != 0.0)
+            .map(|(input, v)| (input.name.clone(), (*v).into()))
+            .collect()
+    };
+    let out = &lcs.outputs;
+    let document = Document {
+        schema: SCHEMA.to_owned(),
+        title: lcs.title.clone(),
+        states: lcs
+            .states
+            .iter()
+            .enumerate()
+            .map(|(k, s)| StateDoc {
+                name: s.name.clone(),
+                unit: s.unit.to_owned(),
+                shift: named(&lcs.shift.row(k).iter().copied().collect::<Vec<_>>()),
+            })
+            .collect(),
+        inputs: lcs
+            .inputs
+            .iter()
+            .map(|input| InputDoc {
+                name: input.name.clone(),
+                unit: input.unit.to_owned(),
+                waveform: Form::from(&input.source.wave),
+                dc: Some(input.source.dc),
+            })
+            .collect(),
+        ports: lcs
+            .ports
+            .iter()
+            .map(|p| PortDoc {
+                device: p.device.clone(),
+                lambda: p.lambda.clone(),
+                y: p.y.clone(),
+                law: law_document(&p.law),
+            })
+            .collect(),
+        a: rows(&lcs.a),
+        b: rows(&lcs.b),
+        c: rows(&lcs.c),
+        d: rows(&lcs.d),
+        e: rows(&lcs.e),
+        g: rows(&lcs.g),
+        e0: lcs.e0.iter().map(|v| v + 0.0).collect(),
+        f: lcs.f.iter().map(|v| v + 0.0).collect(),
+        x0: x0.iter().map(|v| v + 0.0).collect(),
+        p: rows(&lcs.energy),
+        outputs: OutputsDoc {
+            names: out.names.clone(),
+            units: out.units.iter().map(|u| (*u).to_owned()).collect(),
+            x: rows(&out.rows.x),
+            lambda: rows(&out.rows.lambda),
+            u: rows(&out.rows.u),
+            du: rows(&out.rows.du),
+            one: out.rows.one.iter().map(|v| v + 0.0).collect(),
+        },
+        tran: tran.map(|t| TranDoc {
+            tstep: t.tstep,
+            tstop: t.tstop,
+            tstart: (t.tstart != 0.0).then_some(t.tstart),
+            tmax: t.tmax,
+            uic: t.uic,
+        }),
+        switches: lcs
+            .switches
+            .iter()
+            .map(|(name, on)| (name.clone(), if *on { "on" } else { "off" }.into()))
+            .collect(),
+    };
+    lines(&document)
+}
+
+/// JSON with one line per top-level key and per matrix row.
+fn lines(document: &Document) -> String {
+    let Ok(serde_json::Value::Object(map)) = serde_json::to_value(document) else {
+        return String::new();
+    };
+    let order = [
+        "schema", "title", "states", "inputs", "ports", "A", "B", "C", "D", "E", "G", "e", "F",
+        "x0", "P", "outputs", "tran", "switches",
+    ];
+    let entries: Vec<String> = order
+        .iter()
+        .filter_map(|key| map.get(*key).map(|value| (key, value)))
+        .map(|(key, value)| {
+            let text = match value {
+                serde_json::Value::Array(items)
+                    if items.iter().any(|i| i.is_array() || i.is_object()) =>
+                {
+                    let rows: Vec<String> = items.iter().map(|i| format!("    {i}")).collect();
+                    format!("[\n{}\n  ]", rows.join(",\n"))
+                }
+                other => other.to_string(),
+            };
+            format!("  \"{key}\": {text}")
+        })
+        .collect();
+    format!("{{\n{}\n}}\n", entries.join(",\n"))
+}

@@ -1,0 +1,259 @@
+//! The system read off an elimination, and what is wrong where there is none.
+
+use crate::algebra::Field;
+use crate::circuit::source::Wave;
+use crate::lcs::{Hold, Role};
+use crate::mna::topology::{Class, Edge, conflict};
+
+use super::eliminated::Eliminated;
+use super::flow::{Flow, add_scaled};
+use super::frame::Frame;
+use super::{Constraint, ReduceError, Reduction, StorageHold};
+
+impl<F: Field> Eliminated<'_, F> {
+    /// The system that the elimination has found.
+    pub(super) fn system(self) -> Result<Reduction<F>, ReduceError> {
+        let frame = Frame::new(&self)?;
+        let constraints = self.constraints(&frame)?;
+        let is_static = self.position.storage == StorageHold::Static;
+        let s: Vec<Vec<F>> = self
+            .state
+            .iter()
+            .map(|&c| frame.express(&self, c))
+            .collect();
+        if !is_static {
+            self.check_storage(&frame, &s)?;
+        }
+        let mut flow = Flow::solve(&self, &frame, &s, is_static)?;
+        let objective = self.objective(&frame, is_static);
+        let (undetermined, notes) = flow.least_norm(&frame, &objective);
+        let guards: Vec<Vec<F>> = self
+            .held
+            .iter()
+            .map(|&k| frame.express(&self, self.guard_column(k)))
+            .collect();
+        let kernel = guards
+            .iter()
+            .map(|g| flow.along(&frame, g, &undetermined))
+            .collect();
+        let mut y = Vec::with_capacity(self.free.len());
+        for (k, role) in &frame.pairs {
+            let (reverse, forward) = self.pairs[*k];
+            let column = if *role == Role::Voltage {
+                forward
+            } else {
+                reverse
+            };
+            let row = flow.finish(&frame, &frame.express(&self, column)).0;
+            let rates = frame
+                .du()
+                .filter(|&c| !row[c].is_zero())
+                .map(|c| c - frame.du().start);
+            let sources: Vec<String> = rates.map(|j| self.source(j)).collect();
+            if !sources.is_empty() {
+                return Err(ReduceError::SourceRate {
+                    port: self.device(*k),
+                    sources,
+                });
+            }
+            y.push(row);
+        }
+        let readings = (self.found.equations..self.matrix.rows())
+            .map(|r| flow.finish(&frame, &frame.gather(self.matrix.row(r), false, None)))
+            .collect();
+        let image = self.times_metric(&s);
+        let mut energy = vec![vec![F::zero(); frame.n]; frame.n];
+        for (row, image) in s.iter().zip(&image) {
+            for (target, x) in energy.iter_mut().zip(row).filter(|(_, x)| !x.is_zero()) {
+                add_scaled(target, x, &image[..frame.n]);
+            }
+        }
+        Ok(Reduction {
+            rates: flow.rates(&frame),
+            y,
+            readings,
+            guards: guards.iter().map(|g| flow.finish(&frame, g)).collect(),
+            kernel,
+            constraints,
+            shift: flow.shift.clone(),
+            inject: flow.inject(&frame, &s),
+            energy,
+            s: s.iter().map(|row| flow.finish(&frame, row).0).collect(),
+            states: frame.states,
+            pairs: frame.pairs,
+            metric: self.reduced.metric.clone(),
+            notes,
+        })
+    }
+
+    /// P · rows.
+    pub(super) fn times_metric(&self, rows: &[Vec<F>]) -> Vec<Vec<F>> {
+        let width = rows.first().map_or(0, Vec::len);
+        let mut product = vec![vec![F::zero(); width]; rows.len()];
+        for (a, b, x) in &self.reduced.metric {
+            for (sum, value) in product[*a].iter_mut().zip(&rows[*b]) {
+                if !value.is_zero() {
+                    *sum = sum.add(&x.mul(value));
+                }
+            }
+        }
+        product
+    }
+
+    /// Equations without a pivot: they relate sources alone, or accuse a port.
+    fn constraints(&self, frame: &Frame) -> Result<Vec<Constraint<F>>, ReduceError> {
+        let mut constraints = Vec::new();
+        for r in (0..self.found.equations).filter(|&r| !self.found.used[r]) {
+            let row = frame.gather(self.matrix.row(r), false, None);
+            if row.iter().all(F::is_zero) {
+                continue;
+            }
+            let elements = self.pairs_in(frame, &row);
+            if !elements.is_empty() {
+                return Err(ReduceError::Port { elements });
+            }
+            if self.agree(frame, &row) {
+                continue;
+            }
+            let of = |c: usize| self.source(c - frame.u().start);
+            let named: Vec<String> = frame.u().filter(|&c| !row[c].is_zero()).map(of).collect();
+            let elements = conflict(&self.held_graph(), &named).unwrap_or(named);
+            // At an operating point an inductor across a source is a constraint on its value at that instant.
+            let instant = self.position.storage == StorageHold::Static;
+            if self.held.is_empty() && !instant {
+                return Err(ReduceError::Sources { elements });
+            }
+            constraints.push((normalised(&row[..frame.base]), elements));
+        }
+        Ok(constraints)
+    }
+
+    /// The circuit's graph with what this position makes short or open in the class of sources.
+    fn held_graph(&self) -> Vec<Edge> {
+        let mut graph = self.behaviour.graph.clone();
+        let mut set = |name: &str, class: Class| {
+            graph
+                .iter_mut()
+                .filter(|e| e.name == name)
+                .for_each(|e| e.class = class);
+        };
+        for (switch, &on) in self.behaviour.switches.iter().zip(&self.position.switches) {
+            match (on, switch.roff) {
+                (true, _) if switch.ron.f64 == 0.0 => set(&switch.name, Class::Voltage),
+                (false, None) => set(&switch.name, Class::Current),
+                _ => {}
+            }
+        }
+        for (pair, hold) in self.behaviour.pairs.iter().zip(&self.position.devices) {
+            match hold {
+                Hold::Free => {}
+                Hold::Closed => set(&pair.port.device, Class::Voltage),
+                Hold::Open => set(&pair.port.device, Class::Current),
+            }
+        }
+        if self.position.storage == StorageHold::Static {
+            for storage in &self.behaviour.storage {
+                let class = if storage.capacitor {
+                    Class::Current
+                } else {
+                    Class::Voltage
+                };
+                set(&storage.element, class);
+            }
+        }
+        graph
+    }
+
+    /// The devices whose λ a row contains.
+    fn pairs_in(&self, frame: &Frame, row: &[F]) -> Vec<String> {
+        let present = frame.lambda().filter(|&c| !row[c].is_zero());
+        present
+            .map(|c| self.device(frame.pairs[c - frame.n].0))
+            .collect()
+    }
+
+    /// Whether Σ a_k u_k + c vanishes because equal waveforms and constants cancel.
+    fn agree(&self, frame: &Frame, row: &[F]) -> bool {
+        let source = |j: usize| &self.behaviour.sources[j].input.source;
+        let mut constant = row[frame.one()].clone();
+        let mut sums: Vec<(usize, F)> = Vec::new();
+        for c in frame.u().filter(|&c| !row[c].is_zero()) {
+            let j = c - frame.u().start;
+            if let Wave::Dc(value) = source(j).wave {
+                constant = constant.add(&row[c].mul(&F::value(value.into())));
+                continue;
+            }
+            match sums.iter_mut().find(|(k, _)| source(*k) == source(j)) {
+                Some((_, sum)) => *sum = sum.add(&row[c]),
+                None => sums.push((j, row[c].clone())),
+            }
+        }
+        constant.is_zero() && sums.iter().all(|(_, sum)| sum.is_zero())
+    }
+
+    /// Dependent storage may follow other storage and sources, nothing else.
+    fn check_storage(&self, frame: &Frame, s: &[Vec<F>]) -> Result<(), ReduceError> {
+        for (k, row) in s.iter().enumerate() {
+            let ports = self.pairs_in(frame, row);
+            if !ports.is_empty() {
+                return Err(ReduceError::Feedthrough {
+                    storage: self.storage_label(k),
+                    ports,
+                });
+            }
+            if row[frame.base..].iter().any(|x| !x.is_zero()) {
+                return Err(ReduceError::Singular {
+                    elements: vec![self.storage_label(k)],
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// The quantities whose squares a least-norm choice minimises, with names: everything a position leaves unknown; in an
+    /// operating point what is observed (node potentials) as well.
+    fn objective(&self, frame: &Frame, is_static: bool) -> Vec<(String, Vec<F>)> {
+        if frame.f.is_empty() {
+            return Vec::new();
+        }
+        let unknown = self.unknown.iter();
+        let mut rows: Vec<(String, Vec<F>)> = unknown
+            .map(|(c, name)| (name.clone(), frame.express(self, *c)))
+            .collect();
+        if is_static {
+            for (k, observed) in self.behaviour.observed.iter().enumerate() {
+                if self.unknown.iter().any(|(_, name)| *name == observed.name) {
+                    continue;
+                }
+                let row = self.matrix.row(self.found.equations + k);
+                rows.push((observed.name.clone(), frame.gather(row, false, None)));
+            }
+        }
+        rows
+    }
+}
+
+/// Scales a row so that its largest entry is ±1.
+fn normalised<F: Field>(row: &[F]) -> Vec<F> {
+    let size = |x: &F| x.to_f64().abs();
+    let largest = row
+        .iter()
+        .filter(|x| !x.is_zero())
+        .max_by(|a, b| size(a).total_cmp(&size(b)));
+    match largest {
+        Some(largest) => row.iter().map(|x| x.div(largest)).collect(),
+        None => row.to_vec(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::algebra::rational;
+
+    #[test]
+    fn a_row_is_scaled_by_its_largest_entry() {
+        let row: Vec<_> = [2.0, -8.0, 0.0].map(rational).to_vec();
+        assert_eq!(normalised(&row), [-0.25, 1.0, 0.0].map(rational).to_vec());
+    }
+}
