@@ -53,6 +53,17 @@ pub(crate) enum Owner {
     Slide(usize, bool),
 }
 
+/// What a mode's guards need to know of the switches.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SwitchFacts<'a> {
+    /// By switch.
+    pub(crate) thresholds: &'a [Threshold],
+    /// Ron and 1/Roff of each sliding switch.
+    pub(crate) limits: &'a [(f64, f64)],
+    /// Switches that sources alone drive.
+    pub(crate) drives: &'a [Drive],
+}
+
 /// One mode over w = [x; z].
 #[derive(Debug, Clone)]
 pub(crate) struct Mode {
@@ -110,12 +121,15 @@ impl Mode {
         key: Key,
         lcs: &Lcs,
         exosystem: &Exosystem,
-        thresholds: &[Threshold],
-        limits: &[(f64, f64)],
-        drives: &[Drive],
+        switches: &SwitchFacts<'_>,
         h: f64,
         energy: bool,
     ) -> Option<Self> {
+        let SwitchFacts {
+            thresholds,
+            limits,
+            drives,
+        } = *switches;
         let (n, dz) = (lcs.n(), exosystem.dim());
         let dim = n + dz;
         let mut generator = DMatrix::zeros(dim, dim);

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::assembler::Assembler;
 use super::exosystem::Exosystem;
 use super::free::Free;
-use super::mode::{Key, Mode};
+use super::mode::{Key, Mode, SwitchFacts};
 use super::schedule::Drive;
 use crate::integrate::run::SimError;
 use crate::integrate::switching::Threshold;
@@ -78,16 +78,12 @@ impl<'a> Plant<'a> {
         let sliding = key.sliding_switches();
         let system = self.assembler.assemble(&holds, &key.switches, &sliding);
         let mode = system.ok().and_then(|lcs| {
-            Mode::new(
-                key.clone(),
-                &lcs,
-                exosystem,
-                &self.thresholds,
-                &limits,
-                &self.drives,
-                self.h,
-                self.energy,
-            )
+            let facts = SwitchFacts {
+                thresholds: &self.thresholds,
+                limits: &limits,
+                drives: &self.drives,
+            };
+            Mode::new(key.clone(), &lcs, exosystem, &facts, self.h, self.energy)
         });
         let at = mode.map(|mode| {
             self.modes.push(mode);

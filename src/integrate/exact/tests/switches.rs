@@ -157,8 +157,8 @@ fn a_controller_slides_on_its_threshold() {
          Vref ref 0 PWL(0 5 10m 5 11m 8)\n.model sw SW(ideal Vt=0 Vh=0)\n.tran 0.1m 20m uic\n.save v(out) i(S1) v(1,2)",
     );
     // Closed: v' = 10⁴ − 1100 v.
-    let (rest, rate) = (1e4 / 1.1e3, 1.1e3);
-    let reach = -(1.0 - 5.0 / rest as f64).ln() / rate;
+    let (rest, rate): (f64, f64) = (1e4 / 1.1e3, 1.1e3);
+    let reach = -(1.0 - 5.0 / rest).ln() / rate;
     let off = |v: f64| (1e4 - 3e3) / 1.1e3 - v;
     let leave = 10e-3 + off(5.0) / 3e3;
     let v_leave = 5.0 + off(5.0);
