@@ -163,10 +163,8 @@ impl Problem {
 
     fn exact(&self, tran: &Tran, settings: &Settings) -> Result<Exact<'_>, SimError> {
         Exact::new(exact::Setup {
-            assemble: Box::new(|devices, switches| self.reduce(devices, switches)),
-            pairs: self.behaviour.pairs.len(),
+            assembler: exact::Assembler::new(&self.behaviour),
             position: self.position.clone(),
-            thresholds: self.thresholds(),
             t: 0.0,
             until: tran.tstop,
             start: self.start.clone(),

@@ -10,6 +10,7 @@ mod couple;
 pub(crate) mod fixture;
 mod graph;
 mod readings;
+mod sliding;
 mod standard;
 mod system;
 pub mod topology;

@@ -5,11 +5,10 @@
 
 use circ::circuit::{ElaborateOptions, elaborate};
 use circ::diagnostic::SourceMap;
-use circ::integrate::exact::{Exact, Setup};
-use circ::integrate::run::{Grid, Log, Reason, SimError, Stepper};
+use circ::integrate::exact::{Assembler, Exact, Setup};
+use circ::integrate::run::{Grid, Log, Stepper};
 use circ::integrate::stats::Stats;
-use circ::integrate::switching::Threshold;
-use circ::lcs::{Hold, Position, StorageHold, reduce};
+use circ::lcs::{Position, reduce};
 use circ::mna;
 use circ::settings::Settings;
 use cpu_time::ThreadTime;
@@ -34,32 +33,12 @@ fn run(text: &str, energy: bool) -> (f64, f64, Stats, usize) {
     let behaviour = mna::behaviour(&circuit)
         .expect("a sound circuit")
         .standard();
-    let thresholds: Vec<Threshold> = behaviour
-        .switches
-        .iter()
-        .map(|s| Threshold {
-            name: s.name.clone(),
-            on_above: s.on_above,
-            off_below: s.off_below,
-        })
-        .collect();
-    let position = vec![false; thresholds.len()];
-    let pairs = behaviour.pairs.len();
-    let assemble = |devices: &[Hold], switches: &[bool]| {
-        let position = Position {
-            devices: devices.to_vec(),
-            switches: switches.to_vec(),
-            storage: StorageHold::Dynamic,
-        };
-        reduce(&behaviour, &position).map_err(|e| SimError::before(Reason::Circuit(e.to_string())))
-    };
-    let lcs = assemble(&vec![Hold::Free; pairs], &position).expect("a system");
+    let position = vec![false; behaviour.switches.len()];
+    let lcs = reduce(&behaviour, &Position::free(&behaviour, position.clone())).expect("a system");
     let begin = ThreadTime::now();
     let mut exact = Exact::new(Setup {
-        assemble: Box::new(assemble),
-        pairs,
+        assembler: Assembler::new(&behaviour),
         position,
-        thresholds,
         t: 0.0,
         until: tran.tstop,
         start: DVector::from_column_slice(lcs.storage.initial.as_slice()),

@@ -1,7 +1,7 @@
 //! Whether a mode can be entered: what it conserves, what must vanish, and on which side of zero its guards leave.
 
 use super::exosystem::Exosystem;
-use super::mode::Mode;
+use super::mode::{Mode, Owner};
 
 /// A mode may move the storage vector by no more than this part of its amplitude; more is a jump and needs an impulse.
 const CONSISTENT: f64 = 1e-9;
@@ -18,7 +18,7 @@ const ORDERS: usize = 4;
 pub(crate) enum Finding {
     /// The mode does not exist at this state: it would move charge or flux, or a constraint does not hold.
     Inconsistent,
-    /// A guard of devices leaves downwards: its row.
+    /// A guard of devices or of a sliding switch leaves downwards: its row.
     Refused(usize),
     /// All guards of devices hold on some interval after now; these switches leave at once.
     Holds(Vec<usize>),
@@ -128,9 +128,9 @@ impl Inspector {
             }
             let first = (0..ORDERS).find(|&k| value[k].abs() > noise[k]);
             if first.is_some_and(|k| value[k] < 0.0) {
-                match i.checked_sub(mode.device_guards) {
-                    None => return Finding::Refused(i),
-                    Some(k) => leaving.push(mode.guarded_switches[k]),
+                match mode.owner(i) {
+                    Owner::Switch(k) => leaving.push(k),
+                    Owner::Devices | Owner::Slide(..) => return Finding::Refused(i),
                 }
             }
         }

@@ -19,7 +19,7 @@ impl Exact<'_> {
     pub(super) fn project(&mut self, key: &Key, log: &mut Log) -> Result<bool, SimError> {
         let t = self.motion.t;
         let u = self.inputs(t);
-        let free = self.plant.free(&key.switches).map_err(|mut error| {
+        let free = self.plant.free(key).map_err(|mut error| {
             error.t = error.t.or(Some(t));
             error
         })?;
@@ -44,7 +44,7 @@ impl Exact<'_> {
     ) -> Result<bool, SimError> {
         let t = self.motion.t;
         let u = self.inputs(t);
-        let free = self.plant.free(&key.switches)?;
+        let free = self.plant.free(key)?;
         let s = free.storage(after, &u);
         for (name, area) in free.impulses(p) {
             log.impulse(t, name, area);
@@ -78,19 +78,16 @@ impl Exact<'_> {
     ) -> Result<Option<(usize, Vec<usize>)>, SimError> {
         let t = self.motion.t;
         let fastest = self.plant.fastest();
-        let x = self.plant.free(&key.switches)?.state_from(&self.storage);
+        let x = self.plant.free(key)?.state_from(&self.storage);
         for part in PROPOSALS {
             let h = part / fastest;
             let u = self.inputs(t + h);
             self.lcp_solves += 1;
-            let free = self.plant.free(&key.switches)?;
+            let free = self.plant.free(key)?;
             let Some(closed) = free.propose(&x, &u, h, Degenerate::Open) else {
                 continue;
             };
-            let candidate = Key {
-                closed,
-                switches: key.switches.clone(),
-            };
+            let candidate = key.with_closed(closed);
             let Some(at) = self.plant.mode(&candidate, &self.exosystem) else {
                 continue;
             };
@@ -101,7 +98,7 @@ impl Exact<'_> {
             else {
                 continue;
             };
-            let free = self.plant.free(&key.switches)?;
+            let free = self.plant.free(key)?;
             let after = free.state_from(&s);
             let Some(p) = free.impulse_between(&x, &after, &candidate.closed) else {
                 continue;

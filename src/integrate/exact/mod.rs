@@ -2,6 +2,7 @@
 //! matrix exponential; between modes stands a complementarity problem.
 
 mod accumulation;
+mod assembler;
 mod exosystem;
 mod expm;
 mod flow;
@@ -23,5 +24,5 @@ mod work;
 #[cfg(test)]
 mod tests;
 
-pub use plant::Assemble;
+pub use assembler::Assembler;
 pub use stepper::{Exact, Setup};

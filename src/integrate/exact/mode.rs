@@ -17,6 +17,29 @@ pub(crate) struct Key {
     pub(crate) closed: Vec<bool>,
     /// By switch: on.
     pub(crate) switches: Vec<bool>,
+    /// Switches on their thresholds, in order, and whether their voltage and current are positive.
+    pub(crate) sliding: Vec<(usize, bool)>,
+}
+
+impl Key {
+    /// The same switch positions with other conducting devices.
+    pub(crate) fn with_closed(&self, closed: Vec<bool>) -> Self {
+        Self {
+            closed,
+            switches: self.switches.clone(),
+            sliding: self.sliding.clone(),
+        }
+    }
+
+    /// Switches on their thresholds.
+    pub(crate) fn sliding_switches(&self) -> Vec<usize> {
+        self.sliding.iter().map(|s| s.0).collect()
+    }
+
+    /// Whether the switches of another key stand as here.
+    pub(crate) fn same_switches(&self, other: &Self) -> bool {
+        self.switches == other.switches && self.sliding == other.sliding
+    }
 }
 
 /// Who ends the mode when a guard falls through zero.
@@ -26,6 +49,19 @@ pub(crate) enum Owner {
     Devices,
     /// A switch.
     Switch(usize),
+    /// A switch on its threshold, which ends fully on or off.
+    Slide(usize, bool),
+}
+
+/// What a mode's guards need to know of the switches.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SwitchFacts<'a> {
+    /// By switch.
+    pub(crate) thresholds: &'a [Threshold],
+    /// Ron and 1/Roff of each sliding switch.
+    pub(crate) limits: &'a [(f64, f64)],
+    /// Switches that sources alone drive.
+    pub(crate) drives: &'a [Drive],
 }
 
 /// One mode over w = [x; z].
@@ -41,7 +77,7 @@ pub(crate) struct Mode {
     pub(crate) jets: [DMatrix<f64>; 4],
     /// Number of guards that belong to devices.
     pub(crate) device_guards: usize,
-    /// Switch of each further guard.
+    /// Switch of each further guard; two guards for each sliding switch follow.
     pub(crate) guarded_switches: Vec<usize>,
     /// What must vanish for the mode to exist, over w; with the first two derivatives below it.
     pub(crate) constraints: DMatrix<f64>,
@@ -85,11 +121,15 @@ impl Mode {
         key: Key,
         lcs: &Lcs,
         exosystem: &Exosystem,
-        thresholds: &[Threshold],
-        drives: &[Drive],
+        switches: &SwitchFacts<'_>,
         h: f64,
         energy: bool,
     ) -> Option<Self> {
+        let SwitchFacts {
+            thresholds,
+            limits,
+            drives,
+        } = *switches;
         let (n, dz) = (lcs.n(), exosystem.dim());
         let dim = n + dz;
         let mut generator = DMatrix::zeros(dim, dim);
@@ -110,7 +150,14 @@ impl Mode {
             held
         };
         let devices = distinct(&devices);
-        let controls = over_w(&lcs.controls, n, exosystem);
+        let slides = key.sliding_switches();
+        let published: Vec<usize> = (0..thresholds.len())
+            .filter(|i| !slides.contains(i))
+            .collect();
+        let mut controls = DMatrix::zeros(thresholds.len(), dim);
+        for (k, row) in over_w(&lcs.controls, n, exosystem).row_iter().enumerate() {
+            controls.set_row(published[k], &row);
+        }
         let driven = |i: usize| {
             drives.iter().any(|drive| {
                 let row = controls.row(i);
@@ -119,8 +166,12 @@ impl Mode {
                     && row.iter().skip(n).eq(drive.row.iter())
             })
         };
-        let guarded_switches: Vec<usize> = (0..thresholds.len()).filter(|&i| !driven(i)).collect();
-        let mut guards = DMatrix::zeros(devices.nrows() + guarded_switches.len(), dim);
+        let guarded_switches: Vec<usize> =
+            published.iter().copied().filter(|&i| !driven(i)).collect();
+        let mut guards = DMatrix::zeros(
+            devices.nrows() + guarded_switches.len() + 2 * slides.len(),
+            dim,
+        );
         guards.rows_mut(0, devices.nrows()).copy_from(&devices);
         for (k, &i) in guarded_switches.iter().enumerate() {
             let (sign, level) = if key.switches[i] {
@@ -131,6 +182,25 @@ impl Mode {
             let mut row = guards.row_mut(devices.nrows() + k);
             row += controls.row(i) * sign;
             row[n] -= sign * level;
+        }
+        let after = devices.nrows() + guarded_switches.len();
+        for (k, &(switch, positive)) in key.sliding.iter().enumerate() {
+            // Between on and off: v − Ron i ≥ 0 and i − v/Roff ≥ 0, or both ≤ 0.
+            let term = lcs
+                .outputs
+                .power
+                .iter()
+                .position(|p| p.element == thresholds[switch].name)?;
+            let v = over_w(&lcs.outputs.power_v, n, exosystem)
+                .row(term)
+                .into_owned();
+            let i = over_w(&lcs.outputs.power_i, n, exosystem)
+                .row(term)
+                .into_owned();
+            let sign = if positive { 1.0 } else { -1.0 };
+            let (ron, goff) = limits[k];
+            guards.set_row(after + 2 * k, &((&v - &i * ron) * sign));
+            guards.set_row(after + 2 * k + 1, &((&i - &v * goff) * sign));
         }
         let first = &guards * &generator;
         let second = &first * &generator;
@@ -176,9 +246,12 @@ impl Mode {
 
     /// Who a guard belongs to.
     pub(crate) fn owner(&self, guard: usize) -> Owner {
-        match guard.checked_sub(self.device_guards) {
-            None => Owner::Devices,
-            Some(k) => Owner::Switch(self.guarded_switches[k]),
+        let Some(k) = guard.checked_sub(self.device_guards) else {
+            return Owner::Devices;
+        };
+        match k.checked_sub(self.guarded_switches.len()) {
+            None => Owner::Switch(self.guarded_switches[k]),
+            Some(k) => Owner::Slide(self.key.sliding[k / 2].0, k % 2 == 0),
         }
     }
 

@@ -2,20 +2,18 @@
 
 use std::collections::BTreeMap;
 
+use super::assembler::Assembler;
 use super::exosystem::Exosystem;
 use super::free::Free;
-use super::mode::{Key, Mode};
+use super::mode::{Key, Mode, SwitchFacts};
 use super::schedule::Drive;
 use crate::integrate::run::SimError;
 use crate::integrate::switching::Threshold;
-use crate::lcs::{Hold, Lcs};
-
-/// Reduces the circuit with its devices held or free, for a switch position.
-pub type Assemble<'a> = Box<dyn FnMut(&[Hold], &[bool]) -> Result<Lcs, SimError> + 'a>;
+use crate::lcs::Hold;
 
 /// Systems and modes, created when first visited.
 pub(crate) struct Plant<'a> {
-    assemble: Assemble<'a>,
+    assembler: Assembler<'a>,
     /// Number of device pairs.
     pub(crate) pairs: usize,
     pub(crate) thresholds: Vec<Threshold>,
@@ -24,26 +22,19 @@ pub(crate) struct Plant<'a> {
     h: f64,
     energy: bool,
     tolerance: f64,
-    frees: Vec<(Vec<bool>, Free)>,
+    frees: Vec<(Key, Free)>,
     index: BTreeMap<Key, Option<usize>>,
     pub(crate) modes: Vec<Mode>,
 }
 
 impl<'a> Plant<'a> {
     /// A plant without modes; `h` is the output step, `energy` asks for the balance, `tolerance` that of complementarity residuals.
-    pub(crate) fn new(
-        assemble: Assemble<'a>,
-        pairs: usize,
-        thresholds: Vec<Threshold>,
-        h: f64,
-        energy: bool,
-        tolerance: f64,
-    ) -> Self {
+    pub(crate) fn new(assembler: Assembler<'a>, h: f64, energy: bool, tolerance: f64) -> Self {
         Self {
-            assemble,
-            pairs,
+            pairs: assembler.pairs(),
+            thresholds: assembler.thresholds(),
+            assembler,
             drives: Vec::new(),
-            thresholds,
             h,
             energy,
             tolerance,
@@ -53,14 +44,16 @@ impl<'a> Plant<'a> {
         }
     }
 
-    /// The complementarity system for a switch position.
-    pub(crate) fn free(&mut self, switches: &[bool]) -> Result<&mut Free, SimError> {
-        let at = match self.frees.iter().position(|(p, _)| p == switches) {
+    /// The complementarity system for the switch positions of a mode.
+    pub(crate) fn free(&mut self, key: &Key) -> Result<&mut Free, SimError> {
+        let at = match self.frees.iter().position(|(k, _)| k.same_switches(key)) {
             Some(at) => at,
             None => {
-                let lcs = (self.assemble)(&vec![Hold::Free; self.pairs], switches)?;
+                let free = vec![Hold::Free; self.pairs];
+                let sliding = key.sliding_switches();
+                let lcs = self.assembler.assemble(&free, &key.switches, &sliding)?;
                 self.frees
-                    .push((switches.to_vec(), Free::new(lcs, self.tolerance)));
+                    .push((key.clone(), Free::new(lcs, self.tolerance)));
                 self.frees.len() - 1
             }
         };
@@ -77,16 +70,20 @@ impl<'a> Plant<'a> {
             .iter()
             .map(|&c| if c { Hold::Closed } else { Hold::Open })
             .collect();
-        let mode = (self.assemble)(&holds, &key.switches).ok().and_then(|lcs| {
-            Mode::new(
-                key.clone(),
-                &lcs,
-                exosystem,
-                &self.thresholds,
-                &self.drives,
-                self.h,
-                self.energy,
-            )
+        let limits: Vec<(f64, f64)> = key
+            .sliding
+            .iter()
+            .map(|&(k, _)| self.assembler.limits(k))
+            .collect();
+        let sliding = key.sliding_switches();
+        let system = self.assembler.assemble(&holds, &key.switches, &sliding);
+        let mode = system.ok().and_then(|lcs| {
+            let facts = SwitchFacts {
+                thresholds: &self.thresholds,
+                limits: &limits,
+                drives: &self.drives,
+            };
+            Mode::new(key.clone(), &lcs, exosystem, &facts, self.h, self.energy)
         });
         let at = mode.map(|mode| {
             self.modes.push(mode);

@@ -5,17 +5,17 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::accumulation::Accumulation;
+use super::assembler::Assembler;
 use super::exosystem::Exosystem;
 use super::inspect::Inspector;
 use super::mode::{Key, Owner};
 use super::motion::{Arrival, Motion};
-use super::plant::{Assemble, Plant};
+use super::plant::Plant;
 use super::schedule::drives;
 use super::transition::Trigger;
 use crate::circuit::Source;
 use crate::integrate::energy::Balance;
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
-use crate::integrate::switching::Threshold;
 use crate::settings::Settings;
 
 /// Times closer than this many units in the last place are one time.
@@ -25,14 +25,10 @@ const LOSS: f64 = 1e-10;
 
 /// What a run of the exact integrator starts from.
 pub struct Setup<'a> {
-    /// Reduces the circuit.
-    pub assemble: Assemble<'a>,
-    /// Number of device pairs.
-    pub pairs: usize,
+    /// The circuit.
+    pub assembler: Assembler<'a>,
     /// Positions of the switches at the start.
     pub position: Vec<bool>,
-    /// Their thresholds.
-    pub thresholds: Vec<Threshold>,
     /// Start, s.
     pub t: f64,
     /// End, s.
@@ -45,6 +41,15 @@ pub struct Setup<'a> {
     pub energy: bool,
     /// Tolerances.
     pub settings: Settings,
+}
+
+/// When a switch stayed on its threshold.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Slides {
+    count: u32,
+    first: f64,
+    since: Option<f64>,
+    seconds: f64,
 }
 
 /// See the [module](super).
@@ -83,6 +88,8 @@ pub struct Exact<'a> {
     pub(super) notes: Vec<String>,
     pub(super) accumulation: Accumulation,
     pub(super) noted_shared: bool,
+    /// By switch: times it slid, since when it slides, seconds in all, start of the first.
+    pub(super) slides: BTreeMap<usize, Slides>,
     pub(super) row: Vec<f64>,
 }
 
@@ -93,10 +100,8 @@ impl<'a> Exact<'a> {
     /// The reduction's for the start position; sources that no finite linear system generates.
     pub fn new(setup: Setup<'a>) -> Result<Self, SimError> {
         let Setup {
-            assemble,
-            pairs,
+            assembler,
             mut position,
-            thresholds,
             t,
             until,
             start,
@@ -104,15 +109,13 @@ impl<'a> Exact<'a> {
             energy,
             settings,
         } = setup;
-        let mut plant = Plant::new(
-            assemble,
-            pairs,
-            thresholds,
-            h,
-            energy,
-            settings.lcp_residual,
-        );
-        let lcs = plant.free(&position)?.lcs.clone();
+        let mut plant = Plant::new(assembler, h, energy, settings.lcp_residual);
+        let mut key = Key {
+            closed: vec![false; plant.pairs],
+            switches: position.clone(),
+            sliding: Vec::new(),
+        };
+        let lcs = plant.free(&key)?.lcs.clone();
         let sources: Vec<Source> = lcs.inputs.iter().map(|i| i.source.clone()).collect();
         let exosystem = Exosystem::of(&sources, t, until).ok_or_else(|| {
             SimError::before(Reason::Unsupported(
@@ -126,6 +129,7 @@ impl<'a> Exact<'a> {
             let i = drive.switch;
             position[i] = plant.thresholds[i].position(position[i], drive.control(&z));
         }
+        key.switches = position;
         let sources_count = sources.len();
         let volts = lcs
             .storage
@@ -143,10 +147,7 @@ impl<'a> Exact<'a> {
             motion: Motion::at(t),
             inspector: Inspector::default(),
             mode: None,
-            key: Key {
-                closed: vec![false; pairs],
-                switches: position,
-            },
+            key,
             storage: start.as_slice().to_vec(),
             scale: vec![0.0; start.len()],
             volts,
@@ -167,6 +168,7 @@ impl<'a> Exact<'a> {
             notes: Vec::new(),
             accumulation: Accumulation::new(t),
             noted_shared: false,
+            slides: BTreeMap::new(),
             row: vec![0.0; columns],
         };
         exact.rescale();
@@ -239,9 +241,17 @@ impl<'a> Exact<'a> {
         self.same_instant(from);
         let mut key = self.key.clone();
         let mut discontinuous = false;
-        if let Owner::Switch(i) = self.plant.modes[from].owner(guard) {
-            key.switches[i] = !key.switches[i];
-            discontinuous = true;
+        match self.plant.modes[from].owner(guard) {
+            Owner::Devices => {}
+            Owner::Switch(i) => {
+                key.switches[i] = !key.switches[i];
+                discontinuous = true;
+            }
+            Owner::Slide(i, on) => {
+                key.sliding.retain(|s| s.0 != i);
+                key.switches[i] = on;
+                discontinuous = true;
+            }
         }
         self.remember_inputs();
         self.change(key, discontinuous, Trigger::Guard(guard), log)
@@ -302,6 +312,9 @@ impl<'a> Exact<'a> {
                 edge = true;
             }
         }
+        if edge {
+            key.sliding.clear();
+        }
         self.left_here.clear();
         self.instant = t;
         self.change(key, edge, Trigger::Sources, log)
@@ -354,17 +367,47 @@ impl<'a> Exact<'a> {
         Ok(())
     }
 
+    /// Keeps account of switches that start or end to slide on entering mode `at`, or at the end of the run.
+    pub(super) fn note_slides(&mut self, at: usize) {
+        let t = self.motion.t;
+        let now = &self.plant.modes[at].key.sliding;
+        for &(i, _) in &self.key.sliding {
+            if let Some(slides) = self
+                .slides
+                .get_mut(&i)
+                .filter(|_| now.iter().all(|s| s.0 != i))
+            {
+                slides.seconds += t - slides.since.take().unwrap_or(t);
+            }
+        }
+        for &(i, _) in now {
+            let slides = self.slides.entry(i).or_insert(Slides {
+                first: t,
+                ..Slides::default()
+            });
+            if slides.since.is_none() {
+                slides.since = Some(t);
+                slides.count += 1;
+            }
+        }
+    }
+
     /// Names of what differs between the present mode and another.
     fn label(&mut self, at: usize) -> Result<String, SimError> {
         let new = self.plant.modes[at].key.clone();
         let mut words: Vec<String> = Vec::new();
         for (i, threshold) in self.plant.thresholds.iter().enumerate() {
-            if new.switches[i] != self.key.switches[i] {
+            let slides = |key: &Key| key.sliding.iter().any(|s| s.0 == i);
+            if slides(&new) {
+                if !slides(&self.key) {
+                    words.push(format!("{} slides", threshold.name));
+                }
+            } else if slides(&self.key) || new.switches[i] != self.key.switches[i] {
                 let position = if new.switches[i] { "on" } else { "off" };
                 words.push(format!("{} {position}", threshold.name));
             }
         }
-        let free = self.plant.free(&new.switches)?;
+        let free = self.plant.free(&new)?;
         for (j, port) in free.lcs.ports.iter().enumerate() {
             if new.closed.get(j) != self.key.closed.get(j) && !words.contains(&port.device) {
                 words.push(port.device.clone());
@@ -431,6 +474,14 @@ impl Stepper for Exact<'_> {
     fn finish(&mut self) -> Outcome {
         self.take_storage();
         self.notes.extend(self.accumulation.end());
+        for (&i, slides) in &self.slides {
+            let seconds = slides.seconds + slides.since.map_or(0.0, |since| self.motion.t - since);
+            self.notes.push(format!(
+                "{} slides on its threshold, where closing and opening contradict each other: {} times, first at t = {:e} s, \
+                 {seconds:e} s in all",
+                self.plant.thresholds[i].name, slides.count, slides.first
+            ));
+        }
         let loss = self
             .plant
             .modes

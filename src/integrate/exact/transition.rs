@@ -42,12 +42,18 @@ impl Exact<'_> {
         let left_row = (wants_rows && self.started).then(|| self.row.clone());
         let mut jumped = false;
         let mut positions = vec![key.switches.clone()];
+        let mut closed_sets: Vec<Vec<bool>> = Vec::new();
         let mut entry = None;
-        for _ in 0..2 + 2 * self.plant.thresholds.len() {
+        for _ in 0..3 + 2 * self.plant.thresholds.len() {
             // A device event in a convex circuit is continuous; an edge or a switch may need an impulse.
             let mut found = self.follow(&key, trigger);
             if found.is_none() && !discontinuous {
                 found = self.find_mode(&key, trigger)?;
+            }
+            if found.is_none() && !key.sliding.is_empty() {
+                key.sliding.clear();
+                discontinuous = true;
+                continue;
             }
             if found.is_none() {
                 jumped |= self.project(&key, log)?;
@@ -65,10 +71,12 @@ impl Exact<'_> {
                 entry = Some(at);
                 break;
             }
-            for i in leaving {
+            closed_sets.push(key.closed.clone());
+            for &i in &leaving {
                 key.switches[i] = !key.switches[i];
             }
             if positions.contains(&key.switches) {
+                entry = self.slide(&key, &leaving, &closed_sets);
                 break;
             }
             positions.push(key.switches.clone());
@@ -90,6 +98,7 @@ impl Exact<'_> {
         }
         let same = self.mode == Some(at);
         self.report(at, jumped, log)?;
+        self.note_slides(at);
         self.mode = Some(at);
         self.key.clone_from(&self.plant.modes[at].key);
         let mode = &self.plant.modes[at];
@@ -110,6 +119,45 @@ impl Exact<'_> {
         Ok(())
     }
 
+    /// The mode in which these switches stay on their thresholds, where closing and opening contradict each other.
+    fn slide(&mut self, key: &Key, switches: &[usize], closed_sets: &[Vec<bool>]) -> Option<usize> {
+        /// Switches that may start to slide together.
+        const MOST: usize = 4;
+        if switches.len() > MOST {
+            return None;
+        }
+        let neighbours = closed_sets.iter().flat_map(|set| {
+            (0..set.len()).map(|j| {
+                let mut closed = set.clone();
+                closed[j] = !closed[j];
+                closed
+            })
+        });
+        let candidates: Vec<Vec<bool>> = closed_sets.iter().cloned().chain(neighbours).collect();
+        for closed in candidates {
+            for signs in 0..1_u32 << switches.len() {
+                let mut candidate = key.with_closed(closed.clone());
+                let new = switches
+                    .iter()
+                    .enumerate()
+                    .map(|(k, &i)| (i, signs >> k & 1 == 0));
+                candidate.sliding.extend(new);
+                candidate.sliding.sort_unstable();
+                candidate.sliding.dedup_by_key(|s| s.0);
+                // The position that a sliding switch came from does not matter.
+                for &(i, _) in &candidate.sliding {
+                    candidate.switches[i] = false;
+                }
+                if let Some((at, leaving)) = self.try_key(&candidate, &[])
+                    && leaving.is_empty()
+                {
+                    return Some(at);
+                }
+            }
+        }
+        None
+    }
+
     /// Remembers what followed.
     fn remember(&mut self, step: (usize, Trigger, usize)) {
         if let Some(k) = self.successors.iter().position(|s| *s == step) {
@@ -128,7 +176,7 @@ impl Exact<'_> {
         for k in 0..self.successors.len() {
             let (left, why, at) = self.successors[k];
             if (left, why) == (from, trigger)
-                && self.plant.modes[at].key.switches == key.switches
+                && self.plant.modes[at].key.same_switches(key)
                 && !(self.left_here.len() > PATIENCE && self.left_here.contains(&at))
                 && let Some(leaving) = self.try_mode(at)
             {
@@ -166,30 +214,15 @@ impl Exact<'_> {
         if self.plant.pairs == 0 {
             return Ok(None);
         }
-        let t = self.motion.t;
-        let fastest = self.plant.fastest();
-        let free = self.plant.free(&key.switches)?;
-        let x = free.state_from(&self.storage);
-        for part in PROPOSALS {
-            let h = part / fastest;
-            let u = self.inputs(t + h);
-            self.lcp_solves += 1;
-            for degenerate in [Degenerate::Open, Degenerate::As(&key.closed)] {
-                let proposal = self
-                    .plant
-                    .free(&key.switches)?
-                    .propose(&x, &u, h, degenerate);
-                let Some(closed) = proposal.filter(|c| !tried.contains(c)) else {
-                    continue;
-                };
-                tried.push(closed.clone());
-                let candidate = Key {
-                    closed,
-                    switches: key.switches.clone(),
-                };
-                if let Some(found) = self.try_key(&candidate, &barred) {
-                    return Ok(Some(found));
-                }
+        if key.sliding.is_empty() || self.plant.free(key).is_ok() {
+            if let Some(found) = self.try_proposals(key, &mut tried, &barred)? {
+                return Ok(Some(found));
+            }
+        } else if !tried.contains(&key.closed) {
+            // On a threshold the circuit may have no complementarity system; the modes around the present one remain.
+            tried.push(key.closed.clone());
+            if let Some(found) = self.try_key(key, &barred) {
+                return Ok(Some(found));
             }
         }
         // Neighbours, nearest first.
@@ -202,15 +235,42 @@ impl Exact<'_> {
                     continue;
                 }
                 tried.push(closed.clone());
-                let candidate = Key {
-                    closed,
-                    switches: key.switches.clone(),
-                };
+                let candidate = key.with_closed(closed);
                 if let Some(found) = self.try_key(&candidate, &barred) {
                     return Ok(Some(found));
                 }
             }
             next += 1;
+        }
+        Ok(None)
+    }
+
+    /// Modes proposed by one implicit step of several lengths.
+    fn try_proposals(
+        &mut self,
+        key: &Key,
+        tried: &mut Vec<Vec<bool>>,
+        barred: &[usize],
+    ) -> Result<Option<(usize, Vec<usize>)>, SimError> {
+        let t = self.motion.t;
+        let fastest = self.plant.fastest();
+        let free = self.plant.free(key)?;
+        let x = free.state_from(&self.storage);
+        for part in PROPOSALS {
+            let h = part / fastest;
+            let u = self.inputs(t + h);
+            self.lcp_solves += 1;
+            for degenerate in [Degenerate::Open, Degenerate::As(&key.closed)] {
+                let proposal = self.plant.free(key)?.propose(&x, &u, h, degenerate);
+                let Some(closed) = proposal.filter(|c| !tried.contains(c)) else {
+                    continue;
+                };
+                tried.push(closed.clone());
+                let candidate = key.with_closed(closed);
+                if let Some(found) = self.try_key(&candidate, barred) {
+                    return Ok(Some(found));
+                }
+            }
         }
         Ok(None)
     }

@@ -2,14 +2,13 @@
 
 use nalgebra::DVector;
 
-use super::{Exact, Setup};
+use super::{Assembler, Exact, Setup};
 use crate::circuit::{Circuit, ElaborateOptions, Tran, elaborate};
 use crate::diagnostic::SourceMap;
 use crate::integrate::Run;
-use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, run};
-use crate::integrate::switching::Threshold;
-use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
-use crate::mna;
+use crate::integrate::run::{Frame, Grid, Log, SimError, run};
+use crate::lcs::{Lcs, Position, reduce};
+use crate::mna::{self, Behaviour};
 use crate::settings::Settings;
 
 mod bridges;
@@ -36,35 +35,18 @@ fn circuit(text: &str) -> Circuit {
 fn prepare_circuit(circuit: &Circuit, energy: bool) -> (Exact<'static>, Lcs, Tran) {
     let tran = circuit.tran.expect("a .tran card");
     let behaviour = mna::behaviour(circuit).expect("a sound circuit").standard();
-    let thresholds: Vec<Threshold> = behaviour
-        .switches
-        .iter()
-        .map(|s| Threshold {
-            name: s.name.clone(),
-            on_above: s.on_above,
-            off_below: s.off_below,
-        })
-        .collect();
+    // A test may leak what it runs on.
+    let behaviour: &'static Behaviour = Box::leak(Box::new(behaviour));
     let position: Vec<bool> = behaviour
         .switches
         .iter()
         .map(|s| s.initial.unwrap_or(false))
         .collect();
-    let pairs = behaviour.pairs.len();
-    let assemble = move |devices: &[Hold], switches: &[bool]| {
-        let position = Position {
-            devices: devices.to_vec(),
-            switches: switches.to_vec(),
-            storage: StorageHold::Dynamic,
-        };
-        reduce(&behaviour, &position).map_err(|e| SimError::before(Reason::Circuit(e.to_string())))
-    };
-    let lcs = assemble(&vec![Hold::Free; pairs], &position).expect("a system");
+    let start = Position::free(behaviour, position.clone());
+    let lcs = reduce(behaviour, &start).expect("a system");
     let exact = Exact::new(Setup {
-        assemble: Box::new(assemble),
-        pairs,
+        assembler: Assembler::new(behaviour),
         position,
-        thresholds,
         t: 0.0,
         until: tran.tstop,
         start: DVector::from_column_slice(lcs.storage.initial.as_slice()),

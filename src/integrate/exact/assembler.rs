@@ -1,0 +1,92 @@
+//! The circuit reduced for a mode, switches on their thresholds included.
+
+use crate::integrate::run::{Reason, SimError};
+use crate::integrate::switching::Threshold;
+use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
+use crate::mna::Behaviour;
+
+/// Reduces one behaviour (with ideal pairs) for its modes.
+#[derive(Debug)]
+pub struct Assembler<'a> {
+    behaviour: &'a Behaviour,
+    /// The behaviours with some switches on their thresholds.
+    sliding: Vec<(Vec<usize>, Behaviour)>,
+}
+
+impl<'a> Assembler<'a> {
+    /// For a behaviour whose laws are ideal pairs, see [`Behaviour::standard`].
+    #[must_use]
+    pub fn new(behaviour: &'a Behaviour) -> Self {
+        Self {
+            behaviour,
+            sliding: Vec::new(),
+        }
+    }
+
+    /// Number of device pairs.
+    pub(crate) fn pairs(&self) -> usize {
+        self.behaviour.pairs.len()
+    }
+
+    /// The switches' thresholds.
+    pub(crate) fn thresholds(&self) -> Vec<Threshold> {
+        self.behaviour
+            .switches
+            .iter()
+            .map(|s| Threshold {
+                name: s.name.clone(),
+                on_above: s.on_above,
+                off_below: s.off_below,
+            })
+            .collect()
+    }
+
+    /// Ron and 1/Roff of a switch.
+    pub(crate) fn limits(&self, switch: usize) -> (f64, f64) {
+        let switch = &self.behaviour.switches[switch];
+        (switch.ron.f64, switch.roff.map_or(0.0, |r| 1.0 / r.f64))
+    }
+
+    /// The system with these devices and switches; the switches in `sliding` (in order) are on their thresholds.
+    pub(crate) fn assemble(
+        &mut self,
+        devices: &[Hold],
+        switches: &[bool],
+        sliding: &[usize],
+    ) -> Result<Lcs, SimError> {
+        let circuit = |error: String| SimError::before(Reason::Circuit(error));
+        if sliding.is_empty() {
+            let position = Position {
+                devices: devices.to_vec(),
+                switches: switches.to_vec(),
+                storage: StorageHold::Dynamic,
+            };
+            return reduce(self.behaviour, &position).map_err(|e| circuit(e.to_string()));
+        }
+        let at = match self.sliding.iter().position(|(s, _)| s == sliding) {
+            Some(at) => at,
+            None => {
+                let mut behaviour = self.behaviour.clone();
+                // From the last on, so that the indices before stay.
+                for &k in sliding.iter().rev() {
+                    let switch = &self.behaviour.switches[k];
+                    let level = 0.5 * (switch.on_above + switch.off_below);
+                    behaviour = behaviour
+                        .sliding(k, level)
+                        .ok_or_else(|| circuit("no such switch".into()))?;
+                }
+                self.sliding.push((sliding.to_vec(), behaviour));
+                self.sliding.len() - 1
+            }
+        };
+        let mut devices = devices.to_vec();
+        devices.resize(devices.len() + sliding.len(), Hold::Closed);
+        let left = (0..switches.len()).filter(|k| !sliding.contains(k));
+        let position = Position {
+            devices,
+            switches: left.map(|k| switches[k]).collect(),
+            storage: StorageHold::Dynamic,
+        };
+        reduce(&self.sliding[at].1, &position).map_err(|e| circuit(e.to_string()))
+    }
+}
