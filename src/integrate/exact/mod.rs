@@ -15,6 +15,7 @@ mod motion;
 mod plant;
 mod polynomial;
 mod rays;
+mod report;
 mod schedule;
 mod spectrum;
 mod stepper;
