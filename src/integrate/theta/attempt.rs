@@ -18,6 +18,7 @@ impl Theta<'_> {
             plant,
             now,
             attempt,
+            amplitudes,
             settings,
             ..
         } = self;
@@ -46,7 +47,8 @@ impl Theta<'_> {
         }
         let n = now.x.len();
         let fused = system.step(attempt.step).fused(attempt.mode);
-        if fused.step(&self.z, n, &mut self.out) {
+        let noise = |k| amplitudes.rounding(&system.lcs, k);
+        if fused.step(&self.z, n, &mut self.out, noise) {
             return Ok(());
         }
         self.solve_step(h, t1)

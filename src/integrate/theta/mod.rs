@@ -262,15 +262,31 @@ impl<'a> Theta<'a> {
         &self.amplitudes
     }
 
-    /// Takes note of the present state's size.
+    /// Takes note of the size of the present state and of every branch's voltage and current: a state that stays at zero
+    /// would else be judged by its own rounding.
     pub fn see(&mut self) {
+        let known = self.read_lambda().is_ok();
         let Self {
             amplitudes,
             plant,
             now,
             ..
         } = self;
-        amplitudes.see(&plant.systems[now.system].1.lcs, &now.x);
+        let lcs = &plant.systems[now.system].1.lcs;
+        amplitudes.see(lcs, &now.x);
+        if !known {
+            return;
+        }
+        let at = Point {
+            x: &now.x,
+            lambda: &self.lambda,
+            u: &now.u,
+            du: &self.du,
+        };
+        for i in 0..lcs.outputs.power.len() {
+            let v = reading::value(&lcs.outputs.power_v, i, at);
+            amplitudes.see_branch(v, reading::value(&lcs.outputs.power_i, i, at));
+        }
     }
 
     /// Control values of the switches at t = 0+, after the first jump in the start position.

@@ -83,13 +83,15 @@ impl Theta<'_> {
             z,
             out,
             lambda,
+            amplitudes,
             ..
         } = self;
         let system = &mut plant.systems[now.system].1;
         let (mode, _) = system.mode(step, &now.active);
         let n = now.x.len();
         let fused = system.step(step).fused(mode);
-        if fused.regular && fused.step(z, n, out) {
+        let noise = |k| amplitudes.rounding(&system.lcs, k);
+        if fused.regular && fused.step(z, n, out, noise) {
             fused.lambda(&out[n..], lambda);
             return Ok(());
         }
