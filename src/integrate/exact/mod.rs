@@ -12,6 +12,7 @@ mod jump;
 mod kernel;
 mod mode;
 mod motion;
+mod pause;
 mod plant;
 mod polynomial;
 mod rays;
@@ -26,4 +27,5 @@ mod work;
 mod tests;
 
 pub use assembler::Assembler;
+pub(crate) use pause::Place;
 pub use stepper::{Exact, Setup};

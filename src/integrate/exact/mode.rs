@@ -45,8 +45,8 @@ impl Key {
 /// Who ends the mode when a guard falls through zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Owner {
-    /// Device pairs (an extreme ray may join several).
-    Devices,
+    /// A device: this pair, or several with it as the first.
+    Device(usize),
     /// A switch.
     Switch(usize),
     /// A switch on its threshold, which ends fully on or off.
@@ -75,8 +75,8 @@ pub(crate) struct Mode {
     pub(crate) flow: Flow,
     /// Guard rows over w and their first three derivatives.
     pub(crate) jets: [DMatrix<f64>; 4],
-    /// Number of guards that belong to devices.
-    pub(crate) device_guards: usize,
+    /// Guards that belong to devices: the first pair of each.
+    pub(crate) device_guards: Vec<usize>,
     /// Switch of each further guard; two guards for each sliding switch follow.
     pub(crate) guarded_switches: Vec<usize>,
     /// What must vanish for the mode to exist, over w; with the first two derivatives below it.
@@ -144,12 +144,20 @@ impl Mode {
 
         let held = over_w(&lcs.held.guard, n, exosystem);
         let shared = lcs.held.kernel.ncols() > 0;
-        let devices = if shared {
-            rays::extreme_rays(&lcs.held.kernel)? * held
-        } else {
-            held
+        let rays = shared.then(|| rays::extreme_rays(&lcs.held.kernel));
+        let devices = match rays {
+            Some(ref rays) => rays.as_ref()? * held,
+            None => held,
         };
-        let devices = distinct(&devices);
+        let kept = distinct(&devices);
+        let devices = devices.select_rows(&kept);
+        let device_guards = match &rays {
+            Some(Some(rays)) => {
+                let first = |&ray: &usize| rays.row(ray).iter().position(|r| *r != 0.0);
+                kept.iter().map(|ray| first(ray).unwrap_or(0)).collect()
+            }
+            _ => kept,
+        };
         let slides = key.sliding_switches();
         let published: Vec<usize> = (0..thresholds.len())
             .filter(|i| !slides.contains(i))
@@ -232,7 +240,7 @@ impl Mode {
             key,
             n,
             jets: [guards, first, second, third],
-            device_guards: devices.nrows(),
+            device_guards,
             guarded_switches,
             constraints,
             storage,
@@ -246,8 +254,8 @@ impl Mode {
 
     /// Who a guard belongs to.
     pub(crate) fn owner(&self, guard: usize) -> Owner {
-        let Some(k) = guard.checked_sub(self.device_guards) else {
-            return Owner::Devices;
+        let Some(k) = guard.checked_sub(self.device_guards.len()) else {
+            return Owner::Device(self.device_guards[guard]);
         };
         match k.checked_sub(self.guarded_switches.len()) {
             None => Owner::Switch(self.guarded_switches[k]),
@@ -282,7 +290,7 @@ impl Mode {
 }
 
 /// The rows that are no positive multiple of an earlier one: equal guards fall together.
-fn distinct(rows: &DMatrix<f64>) -> DMatrix<f64> {
+fn distinct(rows: &DMatrix<f64>) -> Vec<usize> {
     /// Entries that agree to this part of themselves are equal.
     const EQUAL: f64 = 1e-14;
     let mut kept: Vec<(usize, f64)> = Vec::new();
@@ -298,7 +306,7 @@ fn distinct(rows: &DMatrix<f64>) -> DMatrix<f64> {
             kept.push((i, size));
         }
     }
-    DMatrix::from_fn(kept.len(), rows.ncols(), |i, j| rows[(kept[i].0, j)])
+    kept.into_iter().map(|(i, _)| i).collect()
 }
 
 /// Quadratic forms of the power out of sources and into what dissipates, over w.
