@@ -18,6 +18,7 @@ mod polynomial;
 mod rays;
 mod report;
 mod schedule;
+mod spans;
 mod spectrum;
 mod stepper;
 mod transition;

@@ -7,6 +7,7 @@ use super::flow::Flow;
 use super::kernel::Kernel;
 use super::rays;
 use super::schedule::Drive;
+use super::work::Term;
 use crate::integrate::switching::Threshold;
 use crate::lcs::{Lcs, PowerKind, Rows};
 
@@ -214,8 +215,8 @@ impl Mode {
         let second = &first * &generator;
         let third = &second * &generator;
         let mut flow = Flow::new(generator, n, &guards, h, exosystem.rates())?;
-        if let Some(forms) = power_forms(lcs, n, exosystem).filter(|_| energy) {
-            flow.set_power(forms);
+        if energy {
+            flow.set_work(work(lcs, n, exosystem));
         }
 
         let c0 = over_w(&lcs.held.constraints, n, exosystem);
@@ -309,23 +310,17 @@ fn distinct(rows: &DMatrix<f64>) -> Vec<usize> {
     kept.into_iter().map(|(i, _)| i).collect()
 }
 
-/// Quadratic forms of the power out of sources and into what dissipates, over w.
-fn power_forms(lcs: &Lcs, n: usize, exosystem: &Exosystem) -> Option<[DMatrix<f64>; 2]> {
-    let terms = &lcs.outputs.power;
-    if terms.is_empty() {
-        return None;
-    }
+/// What sources deliver and what dissipates, over w.
+fn work(lcs: &Lcs, n: usize, exosystem: &Exosystem) -> Vec<Term> {
     let v = over_w(&lcs.outputs.power_v, n, exosystem);
     let i = over_w(&lcs.outputs.power_i, n, exosystem);
-    let dim = n + exosystem.dim();
-    let mut forms = [DMatrix::zeros(dim, dim), DMatrix::zeros(dim, dim)];
-    for (k, term) in terms.iter().enumerate() {
-        let product = v.row(k).transpose() * i.row(k);
-        let symmetric = (&product + product.transpose()) * 0.5;
-        match term.kind {
-            PowerKind::Source => forms[0] -= symmetric,
-            PowerKind::Dissipated => forms[1] += symmetric,
-        }
-    }
-    Some(forms)
+    let row = |m: &DMatrix<f64>, k: usize| m.row(k).iter().copied().collect();
+    let terms = lcs.outputs.power.iter().enumerate();
+    terms
+        .map(|(k, term)| Term {
+            v: row(&v, k),
+            i: row(&i, k),
+            source: term.kind == PowerKind::Source,
+        })
+        .collect()
 }

@@ -71,6 +71,8 @@ pub struct Exact<'a> {
     /// What followed: (mode left, why, mode entered), latest last.
     pub(super) successors: Vec<(usize, Trigger, usize)>,
     pub(super) metric: DMatrix<f64>,
+    /// From start to end, s.
+    pub(super) duration: f64,
     pub(super) started: bool,
     pub(super) settings: Settings,
     pub(super) energy: bool,
@@ -152,6 +154,7 @@ impl<'a> Exact<'a> {
             instant: t,
             successors: Vec::new(),
             metric,
+            duration: until - t,
             started: false,
             settings,
             energy,
@@ -212,17 +215,24 @@ impl<'a> Exact<'a> {
     /// Reads the storage vector at the current state.
     pub(super) fn take_storage(&mut self) {
         if let Some(at) = self.mode {
-            let mode = &self.plant.modes[at];
+            let mode = &mut self.plant.modes[at];
+            let [source, dissipated] = self.motion.take_energy(&mut mode.flow);
+            self.balance.add((source, dissipated));
             mode.storage_at(&self.motion.now, &mut self.storage);
             // An event often finds a current at zero: its size is what it was on the way.
             for (i, scale) in self.scale.iter_mut().enumerate() {
                 *scale = scale.max(self.motion.reach(mode.storage.row(i).columns(0, mode.n)));
             }
             self.rescale();
-            let [source, dissipated] = std::mem::take(&mut self.motion.energy);
-            self.balance.add((source, dissipated));
             self.note_stored();
         }
+    }
+
+    /// Energy that the run is about over its duration, W.
+    pub(super) fn power(&self) -> f64 {
+        let s = DVector::from_column_slice(&self.scale);
+        let stored = 0.5 * s.dot(&(&self.metric * &s));
+        stored.max(self.balance.largest()) / self.duration
     }
 
     /// Notes the stored energy.

@@ -135,6 +135,9 @@ impl Exact<'_> {
         self.note_slides(at);
         self.mode = Some(at);
         self.key.clone_from(&self.plant.modes[at].key);
+        if self.energy {
+            self.motion.power = self.power();
+        }
         let mode = &self.plant.modes[at];
         let Inspector { x, amplitude, .. } = &self.inspector;
         self.motion
