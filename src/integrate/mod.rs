@@ -6,6 +6,7 @@ pub mod exact;
 #[cfg(test)]
 #[path = "../../tests/systems/mod.rs"]
 pub(crate) mod fixtures;
+mod handover;
 pub mod inputs;
 pub mod jump;
 pub mod reading;

@@ -18,6 +18,7 @@ use nalgebra::DVector;
 
 use crate::integrate::control::{Amplitudes, Control};
 use crate::integrate::energy::{self, Balance};
+use crate::integrate::exact::Place;
 use crate::integrate::inputs::Inputs;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
@@ -312,6 +313,22 @@ impl<'a> Theta<'a> {
     #[must_use]
     pub fn state(&self) -> &[f64] {
         &self.now.x
+    }
+
+    /// Where the run stands, for another method to go on from.
+    pub(crate) fn place(&self) -> Place {
+        Place {
+            t: self.now.t,
+            storage: self.system().storage(&self.now.x, &self.now.u),
+            switches: self.switches.position().to_vec(),
+        }
+    }
+
+    /// Starts a new energy balance from the present state.
+    pub(crate) fn empty_account(&mut self) {
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        let stored = energy::stored(lcs, &self.now.x, &self.now.u);
+        self.now.balance = Balance::new(stored);
     }
 
     /// The largest complementarity residual of a step that the solvers solved.
