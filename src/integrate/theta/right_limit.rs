@@ -89,7 +89,7 @@ impl Theta<'_> {
         let (mode, _) = system.mode(step, &now.active);
         let n = now.x.len();
         let fused = system.step(step).fused(mode);
-        if fused.regular && fused.step(z, n, out) {
+        if fused.step(z, n, out) && fused.is_strict(z, &out[n..]) {
             fused.lambda(&out[n..], lambda);
             return Ok(());
         }
