@@ -20,12 +20,13 @@ pub struct Equilibrium {
     pub unique: Option<bool>,
 }
 
-/// Residual, relative to the terms, at which the interior point method's answer counts as an equilibrium.
-const ROUGH: f64 = 1e-6;
+/// Residual in balanced units at which the interior point method's answer counts as an equilibrium.
+const ROUGH: f64 = 1e-7;
 
-/// The equilibria of an autonomous system of complementary pairs; all of them where A is regular and m ≤ 16.
+/// The equilibria of an autonomous system of complementary pairs, all of them where A is regular and m ≤ 16; of a system
+/// with other laws x = 0 where it is one.
 pub(super) fn all(facts: &Facts) -> Vec<Equilibrium> {
-    if !facts.is_autonomous() || facts.laws.iter().any(|l| !l.half_line) {
+    if !facts.is_autonomous() {
         return Vec::new();
     }
     let system = &facts.system;
@@ -39,6 +40,16 @@ pub(super) fn all(facts: &Facts) -> Vec<Equilibrium> {
             None
         }
     };
+    if facts.laws.iter().any(|l| !l.half_line) {
+        let zero = || {
+            equilibrium(
+                &DVector::zeros(system.n()),
+                &DVector::zeros(system.m()),
+                unique(1),
+            )
+        };
+        return facts.rests_at_zero().then(zero).into_iter().collect();
+    }
     let inverse = if scale::well_conditioned(&system.a) {
         system.a.clone().try_inverse()
     } else {
@@ -94,36 +105,76 @@ fn equilibrium(x: &DVector<f64>, lambda: &DVector<f64>, unique: Option<bool>) ->
 }
 
 /// For singular A and a passive system: λᵀy − xᵀP(Ax + Bλ + e) = −½ zᵀQ(P)z + … is convex in z = (x, λ), and vanishes at
-/// the equilibria.
+/// the equilibria. Of those on the sides that its minimum finds for the ports, the one of least norm in balanced units.
 fn singular(facts: &Facts) -> Option<(DVector<f64>, DVector<f64>)> {
     let certificate = facts.certificate()?;
-    let system = &facts.system;
-    let (n, m) = (system.n(), system.m());
-    let objective = -crate::passivity::lmi::matrix(system, &certificate.p);
+    let (n, m) = (facts.system.n(), facts.system.m());
+    let balanced = scale::balance(&facts.system);
+    let system = &balanced.system;
+    let p = scale::scaled(&certificate.p, &balanced.states, &balanced.states);
+    let e = facts.e.component_div(&balanced.states) / balanced.omega;
+    let f = facts.f.component_mul(&balanced.ports) / balanced.omega;
+    // Equilibria are homogeneous in the constant terms.
+    let size = e.amax().max(f.amax());
+    if size == 0.0 {
+        return Some((DVector::zeros(n), DVector::zeros(m)));
+    }
+    let (e, f) = (e / size, f / size);
+
     let mut linear = DVector::zeros(n + m);
-    linear
-        .rows_mut(0, n)
-        .copy_from(&-(&certificate.p * &facts.e));
-    linear.rows_mut(n, m).copy_from(&facts.f);
-    let mut rows = DMatrix::zeros(n + 2 * m, n + m);
-    rows.view_mut((0, 0), (n, n)).copy_from(&system.a);
-    rows.view_mut((0, n), (n, m)).copy_from(&system.b);
-    rows.view_mut((n, 0), (m, n)).copy_from(&system.c);
-    rows.view_mut((n, n), (m, m)).copy_from(&system.d);
-    rows.view_mut((n + m, n), (m, m)).fill_with_identity();
-    let mut offsets = DVector::zeros(n + 2 * m);
-    offsets.rows_mut(0, n).copy_from(&facts.e);
-    offsets.rows_mut(n, m).copy_from(&facts.f);
-    let z = program::minimise(&objective, &linear, &rows, &offsets, n)?;
-    let (x, lambda) = (z.rows(0, n).into_owned(), z.rows(n, m).map(|v| v.max(0.0)));
-    let rest = &system.a * &x + &system.b * &lambda + &facts.e;
-    let terms = system.a.abs() * x.abs() + system.b.abs() * &lambda + facts.e.abs();
-    let y = &system.c * &x + &system.d * &lambda + &facts.f;
-    let sizes = system.c.abs() * x.abs() + system.d.abs() * &lambda + facts.f.abs();
-    let still = (0..n).all(|i| rest[i].abs() <= ROUGH * terms.amax());
-    let complementary = (0..m).all(|j| {
-        y[j] >= -ROUGH * sizes.amax()
-            && y[j].abs().min(lambda[j]) <= ROUGH * sizes.amax().max(lambda.amax())
-    });
-    (still && complementary).then_some((x, lambda))
+    linear.rows_mut(0, n).copy_from(&-(&p * &e));
+    linear.rows_mut(n, m).copy_from(&f);
+    let mut flow = system.a.clone().resize_horizontally(n + m, 0.0);
+    flow.columns_mut(n, m).copy_from(&system.b);
+    let mut output = system.c.clone().resize_horizontally(n + m, 0.0);
+    output.columns_mut(n, m).copy_from(&system.d);
+    let lambda = DMatrix::from_fn(m, n + m, |j, k| if k == n + j { 1.0 } else { 0.0 });
+    let stack = |blocks: &[(&DMatrix<f64>, &DVector<f64>)]| {
+        let rows = blocks.iter().flat_map(|(a, _)| a.row_iter());
+        let offsets = blocks.iter().flat_map(|(_, b)| b.iter().copied());
+        let rows: Vec<_> = rows.map(|row| row.into_owned()).collect();
+        (
+            DMatrix::from_rows(&rows),
+            DVector::from_iterator(rows.len(), offsets),
+        )
+    };
+    let none = DVector::zeros(m);
+    let (a, b) = stack(&[(&flow, &e), (&output, &f), (&lambda, &none)]);
+    let objective = -crate::passivity::lmi::matrix(system, &p);
+    let z = program::minimise(&objective, &linear, &a, &b, n)?;
+
+    let y = &output * &z + &f;
+    let conducts = |j: usize| z[n + j] > y[j];
+    let pick = |yes: bool| {
+        let on = |j| {
+            if conducts(j) == yes {
+                (&output, f[j])
+            } else {
+                (&lambda, 0.0)
+            }
+        };
+        let rows: Vec<_> = (0..m).map(|j| on(j).0.row(j).into_owned()).collect();
+        let rows = if m == 0 {
+            DMatrix::zeros(0, n)
+        } else {
+            DMatrix::from_rows(&rows)
+        };
+        (rows, DVector::from_iterator(m, (0..m).map(|j| on(j).1)))
+    };
+    let (zero, positive) = (pick(true), pick(false));
+    let (a, b) = stack(&[(&flow, &e), (&zero.0, &zero.1), (&positive.0, &positive.1)]);
+    let norm = DMatrix::from_fn(n + m, n + m, |i, k| if i == k { 1.0 } else { 0.0 });
+    let z = program::minimise(&norm, &DVector::zeros(n + m), &a, &b, n + m)?;
+
+    let rest = (&flow * &z + &e).amax();
+    let y = &output * &z + &f;
+    let sides = (0..m).map(|j| y[j].min(z[n + j]).abs()).fold(0.0, f64::max);
+    let found = (
+        z.rows(0, n).component_mul(&balanced.states) * size,
+        z.rows(n, m)
+            .map(|v| v.max(0.0))
+            .component_mul(&balanced.ports)
+            * size,
+    );
+    (rest.max(sides) <= ROUGH * z.amax().max(1.0)).then_some(found)
 }

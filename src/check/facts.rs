@@ -165,6 +165,18 @@ impl Facts {
         self.e_driven.amax() == 0.0 && self.g_driven.amax() == 0.0
     }
 
+    /// x = 0 with λ = 0 is a solution and every law passes through it (Assumption 7); not asked of driven terms.
+    pub(super) fn rests_at_zero(&self) -> bool {
+        self.e.amax() == 0.0
+            && self.laws.iter().zip(self.f.iter()).all(|(law, &f)| {
+                if law.half_line {
+                    f >= 0.0
+                } else {
+                    law.through_origin && f == 0.0
+                }
+            })
+    }
+
     /// Whether a changing source enters y.
     pub(super) fn drives_y(&self) -> bool {
         !self.g_driven.is_empty() && self.g_driven.amax() > 0.0

@@ -1,17 +1,20 @@
 //! What is known about a circuit before it runs: faults, certificates, and which theorem says what.
 
+mod convergence;
 mod equilibria;
 mod excitation;
 mod facts;
 mod feedthrough;
 mod jumps;
 mod laws;
+mod limit;
 pub mod program;
 mod stiffness;
 mod text;
 mod theorems;
 pub mod topology;
 
+pub use convergence::Convergence;
 pub use equilibria::Equilibrium;
 pub use excitation::Excitation;
 pub use feedthrough::Feedthrough;
@@ -66,6 +69,8 @@ pub struct Report {
     pub theorems: Vec<Theorem>,
     /// States of rest of an autonomous circuit.
     pub equilibria: Vec<Equilibrium>,
+    /// Where all motions end, as far as that is certified; `null` where nothing is.
+    pub convergence: Option<Convergence>,
     /// Where states can jump.
     pub jumps: Jumps,
     /// Time constants over the modes.
@@ -156,6 +161,11 @@ pub fn system(lcs: &Lcs) -> Report {
         Verdict::NotPassive(witness) => Some(witness.describe()),
         Verdict::NotDecided { reason } => Some(reason.clone()),
     };
+    let mut equilibria = equilibria::all(&facts);
+    let convergence = convergence::find(&facts, &equilibria);
+    if convergence.as_ref().is_some_and(|c| c.to.is_some()) {
+        equilibria.iter_mut().for_each(|e| e.unique = Some(true));
+    }
     let rate = facts.strict.as_ref().map_or(0.0, |s| s.decay_rate);
     Report {
         title: lcs.title.clone(),
@@ -177,8 +187,9 @@ pub fn system(lcs: &Lcs) -> Report {
         p: certificate.map(|c| rows(&c.p)),
         p_from: certificate.map(|c| c.from.name()),
         residuals: certificate.map(|c| c.residuals),
-        theorems: theorems::all(&facts),
-        equilibria: equilibria::all(&facts),
+        theorems: theorems::all(&facts, &equilibria),
+        equilibria,
+        convergence,
         jumps: jumps::find(&facts),
         stiffness: Some(stiffness::over_modes(&facts.system)),
         states: facts.state_names.clone(),
@@ -207,6 +218,7 @@ pub fn faulty(title: &str, faults: Vec<Fault>) -> Report {
         residuals: None,
         theorems: Vec::new(),
         equilibria: Vec::new(),
+        convergence: None,
         jumps: Jumps::default(),
         stiffness: None,
         states: Vec::new(),

@@ -396,6 +396,15 @@ impl FusedMode {
         true
     }
 
+    /// Whether λ of this mode is the only one, by strict complementarity: it is regular and no guard is zero up to rounding.
+    pub(crate) fn is_strict(&self, z: &[f64], guards: &[f64]) -> bool {
+        let sizes = self.sizes.chunks_exact(self.width);
+        self.regular
+            && guards.iter().zip(sizes).all(|(&guard, size)| {
+                guard > GUARD_ROUNDING * size.iter().zip(z).map(|(a, b)| a * b.abs()).sum::<f64>()
+            })
+    }
+
     /// λ of this mode from the guards of a step.
     pub(crate) fn lambda(&self, guards: &[f64], lambda: &mut [f64]) {
         for ((l, &guard), &on) in lambda.iter_mut().zip(guards).zip(&self.active) {

@@ -91,7 +91,7 @@ impl Theta<'_> {
         let n = now.x.len();
         let fused = system.step(step).fused(mode);
         let noise = |k| amplitudes.rounding(&system.lcs, k);
-        if fused.regular && fused.step(z, n, out, noise) {
+        if fused.step(z, n, out, noise) && fused.is_strict(z, &out[n..]) {
             fused.lambda(&out[n..], lambda);
             return Ok(());
         }
