@@ -200,6 +200,7 @@ cases! {
     ten_thousand_periods,
     ten_thousand_swings,
     values_lc_fast,
+    values_all_extreme,
     values_lc_slow,
     values_rc,
     values_rectifier,

@@ -10,6 +10,7 @@ mod handover;
 pub mod inputs;
 pub mod jump;
 pub mod reading;
+mod roles;
 pub mod run;
 pub mod simulate;
 pub mod start;

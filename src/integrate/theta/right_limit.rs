@@ -11,7 +11,13 @@ impl Theta<'_> {
             Stepping::Fixed(h) => h.min(self.longest),
             Stepping::Controlled { first, .. } => first,
         };
-        base * SHORT
+        // Within the present piece of every source, as far as the rounding of t tells pieces apart.
+        let piece = self.inputs.next_breakpoint(self.now.t) - self.now.t;
+        if piece > Self::slack(self.now.t) {
+            base.min(piece) * SHORT
+        } else {
+            base * SHORT
+        }
     }
 
     /// z and the matrices of the short implicit step from now; slopes of the inputs go into `du`.
