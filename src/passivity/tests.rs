@@ -250,6 +250,53 @@ fn a_thousand_active_networks_are_not_passive() {
     }
 }
 
+#[test]
+fn an_infeasible_inequality_has_a_mixture_of_motions_for_a_witness() {
+    // The inequality alone, without the search for single motions: a negative margin comes with a verified dual solution.
+    let mut random = Random(5);
+    let (mut refuted, mut proved, mut mixtures) = (0, 0, 0);
+    for k in 0..60 {
+        let (n, m) = (1 + random.below(4), 1 + random.below(3));
+        let (mut system, _) = passive(&mut random, n, m);
+        match k % 3 {
+            0 => system.d -= DMatrix::identity(m, m) * (1.05 * system.d.amax() * m as f64 + 0.1),
+            1 => {
+                for i in 0..n {
+                    system.a[(i, i)] += 1.0 + 2.0 * system.a.amax();
+                }
+            }
+            _ => system.c[(0, 0)] += 3.0 * system.c.amax(),
+        }
+        let verdict = decide(&system, None);
+        if let Err(lmi::Unsolved::Witness(witness)) = lmi::solve(&system) {
+            assert!(witness.verify(&system));
+            assert_eq!(verdict.answer(), Some(false), "network {k}: {witness:?}");
+            proved += 1;
+            mixtures += usize::from(matches!(witness, Witness::Mixture(_)));
+        }
+        refuted += usize::from(verdict.answer() == Some(false));
+    }
+    assert!(
+        proved >= refuted - 5 && mixtures > 45,
+        "{mixtures} mixtures, {proved} proofs for {refuted} refuted"
+    );
+    // A passive system has none: x' = −x + v, y = x gains energy at v = −x only while x shrinks, and grows only if fed.
+    let rc = System {
+        a: dmatrix![-1.0],
+        b: dmatrix![1.0],
+        c: dmatrix![1.0],
+        d: dmatrix![0.0],
+    };
+    for v in [-1.0, 2.0] {
+        let mixture = mixture::Mixture {
+            states: dmatrix![1.0],
+            inputs: dmatrix![v],
+            supply: -1.0,
+        };
+        assert!(!Witness::Mixture(mixture).verify(&rc), "{v}");
+    }
+}
+
 /// An independent sweep of λ_min(H(jω) + H(jω)*), real arithmetic: H(jω) = D + C(A² + ω²)⁻¹(−A − jω)B.
 fn sweep_fails(system: &System) -> bool {
     let n = system.n();
