@@ -23,11 +23,11 @@ pub struct Equilibrium {
 /// Residual in balanced units at which the interior point method's answer counts as an equilibrium.
 const ROUGH: f64 = 1e-7;
 
-/// The equilibria of an autonomous system of complementary pairs, all of them where A is regular and m ≤ 16; of a system
-/// with other laws x = 0 where it is one.
-pub(super) fn all(facts: &Facts) -> Vec<Equilibrium> {
+/// The equilibria of an autonomous system of complementary pairs: all of them where A is regular and m ≤ 16, else one; of a
+/// system with other laws x = 0 where it is one. `None` where nothing is known, an empty list where there is none.
+pub(super) fn all(facts: &Facts) -> Option<Vec<Equilibrium>> {
     if !facts.is_autonomous() {
-        return Vec::new();
+        return None;
     }
     let system = &facts.system;
     let incremental = facts.strict.as_ref().is_some_and(|s| s.decay_rate > 0.0);
@@ -48,7 +48,7 @@ pub(super) fn all(facts: &Facts) -> Vec<Equilibrium> {
                 unique(1),
             )
         };
-        return facts.rests_at_zero().then(zero).into_iter().collect();
+        return facts.rests_at_zero().then(|| vec![zero()]);
     }
     let inverse = if scale::well_conditioned(&system.a) {
         system.a.clone().try_inverse()
@@ -56,23 +56,20 @@ pub(super) fn all(facts: &Facts) -> Vec<Equilibrium> {
         None
     };
     let Some(inverse) = inverse else {
-        return singular(facts)
-            .map(|(x, lambda)| equilibrium(&x, &lambda, unique(1)))
-            .into_iter()
-            .collect();
+        return singular(facts).map(|(x, lambda)| vec![equilibrium(&x, &lambda, unique(1))]);
     };
     let at = |lambda: &DVector<f64>| -(&inverse * (&system.b * lambda + &facts.e));
     let m = &system.d - &system.c * &inverse * &system.b;
     let q = &facts.f - &system.c * &inverse * &facts.e;
-    let Ok(lcp) = Lcp::new(m, q) else {
-        return Vec::new();
-    };
+    let lcp = Lcp::new(m, q).ok()?;
     let tolerance = Settings::default().lcp_residual;
     let mut driver = Driver::new(lcp.m.clone(), tolerance);
     if driver.is_monotone() || lcp.size() > enumerate::LARGEST {
         let solution = driver.solve(&lcp.q);
-        if solution.status != Status::Solved {
-            return Vec::new();
+        match solution.status {
+            Status::Solved => {}
+            Status::Infeasible(_) => return Some(Vec::new()),
+            Status::Failed => return None,
         }
         let (lambda, only) = driver.least_norm(&lcp.q, &solution);
         let x = at(&lambda);
@@ -81,14 +78,11 @@ pub(super) fn all(facts: &Facts) -> Vec<Equilibrium> {
         } else {
             unique(1)
         };
-        return vec![equilibrium(&x, &lambda, unique)];
+        return Some(vec![equilibrium(&x, &lambda, unique)]);
     }
     let found = enumerate::solve(&lcp, tolerance);
-    let count = found.len();
-    found
-        .iter()
-        .map(|lambda| equilibrium(&at(lambda), lambda, Some(count == 1)))
-        .collect()
+    let one = |lambda| equilibrium(&at(lambda), lambda, Some(found.len() == 1));
+    Some(found.iter().map(one).collect())
 }
 
 /// −0 reads like a sign.

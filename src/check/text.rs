@@ -148,27 +148,33 @@ impl fmt::Display for Report {
                 writeln!(f, "       gives {}", theorem.gives)?;
             }
         }
-        for equilibrium in &self.equilibria {
-            let values: Vec<String> = self
-                .states
-                .iter()
-                .zip(&equilibrium.x)
-                .map(|(name, x)| format!("{name} = {x:.6e}"))
+        let equilibria = self.equilibria.as_deref().unwrap_or(&[]);
+        if self.equilibria.as_ref().is_some_and(Vec::is_empty) {
+            writeln!(
+                f,
+                "equilibrium   none: the static complementarity problem has no solution"
+            )?;
+        }
+        for equilibrium in equilibria {
+            // Several, or none of x to show: λ tells them apart.
+            let lambda = if equilibria.len() > 1 || self.states.is_empty() {
+                equilibrium.lambda.as_slice()
+            } else {
+                &[]
+            };
+            let names = self.states.iter().chain(&self.lambdas);
+            let values: Vec<String> = names
+                .zip(equilibrium.x.iter().chain(lambda))
+                .map(|(name, value)| format!("{name} = {value:.6e}"))
                 .collect();
             let only = if equilibrium.unique == Some(true) {
                 " (the only one)"
             } else {
                 ""
             };
-            writeln!(
-                f,
-                "equilibrium   {}{only}",
-                if values.is_empty() {
-                    "-".into()
-                } else {
-                    values.join(", ")
-                }
-            )?;
+            if !values.is_empty() {
+                writeln!(f, "equilibrium   {}{only}", values.join(", "))?;
+            }
         }
         if let Some(long_run) = &self.convergence {
             writeln!(f, "{}", in_the_long_run(long_run, &self.states))?;
