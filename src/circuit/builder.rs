@@ -49,6 +49,8 @@ pub(super) struct Builder<'n, 'o> {
     pub(super) other_analysis: bool,
     pub(super) ics: Vec<(ScopeId, &'n [(Signal, Expr)])>,
     pub(super) saves: Vec<(ScopeId, &'n [Wanted])>,
+    pub(super) measurements: Vec<(ScopeId, &'n ast::Meas)>,
+    pub(super) fours: Vec<(ScopeId, &'n ast::Four)>,
     /// Which branch of each `.if` was taken, in the order of the walk.
     pub(super) choices: VecDeque<Option<usize>>,
     /// The subcircuits being expanded, from the outside in.
@@ -78,6 +80,8 @@ impl<'n, 'o> Builder<'n, 'o> {
             other_analysis: false,
             ics: Vec::new(),
             saves: Vec::new(),
+            measurements: Vec::new(),
+            fours: Vec::new(),
             choices: VecDeque::new(),
             nesting: Vec::new(),
             used: HashSet::new(),
@@ -381,6 +385,11 @@ impl<'n, 'o> Builder<'n, 'o> {
         }
         for (scope, list) in std::mem::take(&mut self.saves) {
             self.save(list, scope);
+        }
+        let cards = std::mem::take(&mut self.measurements);
+        self.measure(&cards);
+        for (scope, card) in std::mem::take(&mut self.fours) {
+            self.fourier(card, scope);
         }
     }
 }

@@ -85,6 +85,8 @@ impl<'n> Builder<'n, '_> {
             Statement::Analysis(_) => self.other_analysis = true,
             Statement::Ic(list) => self.ics.push((scope, list)),
             Statement::Save(list) => self.saves.push((scope, list)),
+            Statement::Meas(meas) => self.measurements.push((scope, meas)),
+            Statement::Four(four) => self.fours.push((scope, four)),
             Statement::Element(_) | Statement::If(_) => {}
         }
     }

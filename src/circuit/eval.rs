@@ -253,23 +253,7 @@ impl<'n> Scopes<'n> {
                 .ok()?;
             return self.checked(expr, form);
         }
-        let (x, y) = (x.constant.f64, y.constant.f64);
-        let value = match op {
-            Binary::Rem => x % y,
-            Binary::Pow => x.powf(y),
-            Binary::Less => f64::from(x < y),
-            Binary::LessEqual => f64::from(x <= y),
-            Binary::Greater => f64::from(x > y),
-            Binary::GreaterEqual => f64::from(x >= y),
-            Binary::Equal => f64::from(x == y),
-            Binary::NotEqual => f64::from(x != y),
-            Binary::And => f64::from(truth(x) && truth(y)),
-            Binary::Or => f64::from(truth(x) || truth(y)),
-            Binary::Add => x + y,
-            Binary::Sub => x - y,
-            Binary::Mul => x * y,
-            Binary::Div => x / y,
-        };
+        let value = functions::operation(op, x.constant.f64, y.constant.f64);
         self.checked(expr, Form::number(value))
     }
 

@@ -13,8 +13,10 @@ mod drive;
 mod elaborate;
 mod eval;
 mod form;
+mod formula;
 mod functions;
 pub(crate) mod load;
+mod measurement;
 mod model;
 mod names;
 mod passive;
@@ -29,6 +31,8 @@ use crate::algebra::Value;
 use crate::diagnostic::Span;
 use crate::law::Law;
 pub use elaborate::{Diodes, ElaborateOptions, elaborate};
+pub use formula::Formula;
+pub use measurement::{FourierAnalysis, Harmonics, Measured, NamedMeasurement};
 pub use source::Source;
 
 /// A node; 0 is ground.
@@ -75,6 +79,12 @@ pub struct Circuit {
     pub probes: Vec<Probe>,
     /// `.ic v(n)=…` (and differences `v(a,b)=…`): nodes and volts.
     pub initial_voltages: Vec<(NodeId, NodeId, f64)>,
+    /// `.meas tran`, in file order.
+    pub measurements: Vec<NamedMeasurement>,
+    /// `.four`, in file order.
+    pub fourier: Vec<FourierAnalysis>,
+    /// The signals that measurements need.
+    pub measured: Vec<Probe>,
 }
 
 /// One branch of the circuit (or a controlled output), from node `p` to node `n`.

@@ -34,6 +34,21 @@ impl Findings {
             .any(|d| d.severity == crate::diagnostic::Severity::Error)
     }
 
+    /// Number of findings so far.
+    pub(super) fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// Makes warnings of the errors found since there were `from` findings, and says what follows from them.
+    pub(super) fn soften(&mut self, from: usize, consequence: &str) {
+        for finding in &mut self.list[from..] {
+            if finding.severity == crate::diagnostic::Severity::Error {
+                finding.severity = crate::diagnostic::Severity::Warning;
+                finding.message.push_str(consequence);
+            }
+        }
+    }
+
     pub(super) fn into_list(self) -> Vec<Diagnostic> {
         self.list
     }

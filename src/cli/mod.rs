@@ -9,6 +9,7 @@ pub mod exit;
 mod graph;
 pub mod input;
 mod lcs;
+mod measured;
 pub mod ngspice;
 mod op;
 pub mod output;

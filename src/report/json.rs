@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::measured::Measurements;
 use crate::integrate::{Energy, Impulse, Run};
 
 #[derive(Serialize)]
@@ -20,12 +21,18 @@ struct Summary<'a> {
     energy: Energy,
     notes: &'a [String],
     impulses: &'a [Impulse],
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    measurements: Vec<serde_json::Value>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    fourier: Vec<serde_json::Value>,
 }
 
-/// What a run did, as one JSON object on one line: method, plan, counters, energy balance, notes, impulses.
+/// What a run did, as one JSON object on one line: method, plan, counters, energy balance, notes, impulses, and what was
+/// measured.
 #[must_use]
-pub fn summary(run: &Run) -> String {
+pub fn summary(run: &Run, found: &Measurements) -> String {
     let stats = &run.stats;
+    let (measurements, fourier) = found.json();
     let summary = Summary {
         method: &run.method,
         plan: &run.plan,
@@ -41,6 +48,8 @@ pub fn summary(run: &Run) -> String {
         energy: run.energy,
         notes: &run.notes,
         impulses: &run.impulses,
+        measurements,
+        fourier,
     };
     line(&summary)
 }
@@ -80,7 +89,7 @@ mod tests {
             ..Run::default()
         };
         assert_eq!(
-            summary(&run),
+            summary(&run, &Measurements::default()),
             "{\"method\":\"exact\",\"plan\":[\"piecewise linear\"],\"steps\":7,\"rejected\":0,\"events\":2,\"jumps\":0,\
              \"modes\":0,\"lcp_solves\":0,\"pivotings\":0,\"factorisations\":0,\"cpu_seconds\":0.0,\
              \"energy\":{\"source\":1.5,\"dissipated\":1.0,\"stored\":0.5,\"residual_relative\":0.0},\"notes\":[],\

@@ -1,10 +1,12 @@
 //! What a netlist says, card by card: nothing evaluated, nothing derived, every piece with its place in the text.
 
 mod expr;
+mod measure;
 
 use std::fmt;
 
 pub use expr::{Binary, Expr, ExprKind, Unary};
+pub use measure::{Four, Meas};
 
 use crate::diagnostic::{Diagnostic, Span};
 
@@ -68,6 +70,10 @@ pub enum Statement {
     Save(Vec<Wanted>),
     /// `.global`.
     Global(Vec<Name>),
+    /// `.meas tran`, or a `meas` command inside `.control`.
+    Meas(Box<Meas>),
+    /// `.four`.
+    Four(Four),
 }
 
 /// An element card.
