@@ -374,7 +374,7 @@ impl<'n> Scopes<'n> {
                 "true" => Some(Value::decimal(1.0, 1, 0)),
                 "false" => Some(Value::decimal(0.0, 0, 0)),
                 "inf" | "infinity" | "infinite" => Some(Value::binary(f64::INFINITY)),
-                "temp" | "temper" => Some(Value::decimal(27.0, 27, 0)),
+                "temp" | "temper" => Some(self.temperature),
                 "boltz" => Some(Value::decimal(1.380_649e-23, 1_380_649, -29)),
                 "echarge" => Some(Value::decimal(1.602_176_634e-19, 1_602_176_634, -28)),
                 "kelvin" => Some(Value::decimal(-273.15, -27315, -2)),

@@ -25,6 +25,7 @@ mod place;
 mod probe;
 mod scope;
 pub mod source;
+mod sweep;
 mod switch;
 
 use crate::algebra::Value;
@@ -34,6 +35,7 @@ pub use elaborate::{Diodes, ElaborateOptions, elaborate};
 pub use formula::Formula;
 pub use measurement::{FourierAnalysis, Harmonics, Measured, NamedMeasurement};
 pub use source::Source;
+pub use sweep::{Sweep, Swept, combinations};
 
 /// A node; 0 is ground.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -79,6 +81,10 @@ pub struct Circuit {
     pub probes: Vec<Probe>,
     /// `.ic v(n)=…` (and differences `v(a,b)=…`): nodes and volts.
     pub initial_voltages: Vec<(NodeId, NodeId, f64)>,
+    /// `.step`, the first one innermost; the circuit has the values as they stand.
+    pub steps: Vec<Sweep>,
+    /// `.dc`, the first sweep innermost.
+    pub dc: Vec<Sweep>,
     /// `.meas tran`, in file order.
     pub measurements: Vec<NamedMeasurement>,
     /// `.four`, in file order.

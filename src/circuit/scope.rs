@@ -115,6 +115,8 @@ pub(super) struct Scopes<'n> {
     pub(super) rails_read: BTreeSet<NodeId>,
     /// The end of the run, s.
     pub(super) tstop: f64,
+    /// °C.
+    pub(super) temperature: Value,
 }
 
 impl<'n> Scopes<'n> {
@@ -130,6 +132,7 @@ impl<'n> Scopes<'n> {
             rails: HashMap::new(),
             rails_read: BTreeSet::new(),
             tstop: 1.0,
+            temperature: Value::decimal(27.0, 27, 0),
         }
     }
 

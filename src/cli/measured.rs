@@ -2,15 +2,21 @@
 
 use super::exit::Failure;
 use super::input::Subject;
-use crate::circuit::{Circuit, Probe};
+use super::sim::Request;
+use crate::circuit::{Circuit, Probe, Tran};
 use crate::integrate::{Grid, Run};
 use crate::mna;
 use crate::report::measured::Measurements;
 use crate::waveform::Waveforms;
 
+/// Rows that measurements see at least, besides those at events: a coarser print step is divided for them.
+const ROWS: usize = 2000;
+
 /// What a circuit's measurements need, and how its results are shown without that.
 pub(super) struct Measuring<'a> {
     circuit: &'a Circuit,
+    /// Rows that are computed for each row that is shown.
+    divisions: usize,
     /// Columns that are shown.
     shown: usize,
     /// Rows at events are shown.
@@ -46,14 +52,29 @@ pub(super) fn with_signals(circuit: &Circuit) -> Result<Subject, Failure> {
 }
 
 impl<'a> Measuring<'a> {
-    /// For a circuit as it was before [`with_signals`]; `events` are to be shown.
+    /// For a circuit as it was before [`with_signals`].
     #[must_use]
-    pub(super) fn of(circuit: &'a Circuit, events: bool) -> Self {
+    pub(super) fn of(circuit: &'a Circuit, request: &Request) -> Self {
+        let rows = circuit.tran.map_or(ROWS, |tran| Grid::of(&tran).len());
         Self {
             circuit,
+            // A fixed step is the user's choice of accuracy, which rows between would change.
+            divisions: if request.step.is_some() {
+                1
+            } else {
+                ROWS.div_ceil(rows)
+            },
             shown: circuit.probes().len(),
-            events,
+            events: request.events,
         }
+    }
+
+    /// The print step of the run, s.
+    #[must_use]
+    pub(super) fn tstep(&self) -> Option<f64> {
+        self.circuit
+            .tran
+            .map(|tran| tran.tstep / self.divisions as f64)
     }
 
     /// Measures on all rows, then leaves only what is shown.
@@ -72,10 +93,9 @@ impl<'a> Measuring<'a> {
     }
 
     fn cut(&self, waves: &Waveforms) -> Waveforms {
-        let grid = self.circuit.tran.map(|tran| Grid {
-            tstart: tran.tstart,
-            tstep: tran.tstep,
-            tstop: tran.tstop,
+        let grids = self.circuit.tran.zip(self.tstep()).map(|(tran, tstep)| {
+            let fine = Tran { tstep, ..tran };
+            (Grid::of(&tran), Grid::of(&fine))
         });
         let mut kept = Waveforms {
             title: waves.title.clone(),
@@ -83,14 +103,29 @@ impl<'a> Measuring<'a> {
             units: waves.units[..self.shown].to_vec(),
             ..Waveforms::default()
         };
+        let mut keep = |t: f64, k: usize| {
+            kept.time.push(t);
+            kept.values.extend_from_slice(&waves.row(k)[..self.shown]);
+        };
         let mut next = 0;
         for (k, &t) in waves.time.iter().enumerate() {
+            let Some((shown, fine)) = &grids else {
+                keep(t, k);
+                continue;
+            };
             // Of the rows at one output time the last is the one of the grid.
-            let on_grid = grid.is_none_or(|grid| grid.time(next) == t)
-                && waves.time.get(k + 1).is_none_or(|&after| after > t);
-            if self.events || on_grid {
-                kept.time.push(t);
-                kept.values.extend_from_slice(&waves.row(k)[..self.shown]);
+            let on_grid =
+                fine.time(next) == t && waves.time.get(k + 1).is_none_or(|&after| after > t);
+            let last = next + 1 == fine.len();
+            if on_grid && (last || next % self.divisions == 0) {
+                let index = if last {
+                    shown.len() - 1
+                } else {
+                    next / self.divisions
+                };
+                keep(shown.time(index), k);
+            } else if self.events && !on_grid {
+                keep(t, k);
             }
             next += usize::from(on_grid);
         }

@@ -5,6 +5,7 @@ mod bench;
 mod check;
 mod compare;
 mod cpu;
+mod dc;
 pub mod exit;
 mod graph;
 pub mod input;
@@ -15,6 +16,7 @@ mod op;
 pub mod output;
 mod render;
 pub mod sim;
+mod steps;
 pub mod streams;
 
 use std::panic::{self, AssertUnwindSafe};

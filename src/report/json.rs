@@ -1,6 +1,7 @@
 //! Summaries as JSON.
 
 use serde::Serialize;
+use serde_json::Value;
 
 use super::measured::Measurements;
 use crate::integrate::{Energy, Impulse, Run};
@@ -22,36 +23,50 @@ struct Summary<'a> {
     notes: &'a [String],
     impulses: &'a [Impulse],
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    measurements: Vec<serde_json::Value>,
+    measurements: Vec<Value>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    fourier: Vec<serde_json::Value>,
+    fourier: Vec<Value>,
 }
 
 /// What a run did, as one JSON object on one line: method, plan, counters, energy balance, notes, impulses, and what was
 /// measured.
 #[must_use]
 pub fn summary(run: &Run, found: &Measurements) -> String {
-    let stats = &run.stats;
-    let (measurements, fourier) = found.json();
-    let summary = Summary {
-        method: &run.method,
-        plan: &run.plan,
-        steps: stats.steps,
-        rejected: stats.rejected,
-        events: stats.events,
-        jumps: stats.jumps,
-        modes: stats.modes,
-        lcp_solves: stats.lcp_solves,
-        pivotings: stats.pivotings,
-        factorisations: stats.factorisations,
-        cpu_seconds: stats.cpu_seconds,
-        energy: run.energy,
-        notes: &run.notes,
-        impulses: &run.impulses,
-        measurements,
-        fourier,
-    };
-    line(&summary)
+    line(&Summary::of(run, found))
+}
+
+/// The same as an object to add to.
+#[must_use]
+pub(super) fn summary_object(run: &Run, found: &Measurements) -> serde_json::Map<String, Value> {
+    match serde_json::to_value(Summary::of(run, found)) {
+        Ok(Value::Object(object)) => object,
+        _ => serde_json::Map::new(),
+    }
+}
+
+impl<'a> Summary<'a> {
+    fn of(run: &'a Run, found: &Measurements) -> Self {
+        let stats = &run.stats;
+        let (measurements, fourier) = found.json();
+        Self {
+            method: &run.method,
+            plan: &run.plan,
+            steps: stats.steps,
+            rejected: stats.rejected,
+            events: stats.events,
+            jumps: stats.jumps,
+            modes: stats.modes,
+            lcp_solves: stats.lcp_solves,
+            pivotings: stats.pivotings,
+            factorisations: stats.factorisations,
+            cpu_seconds: stats.cpu_seconds,
+            energy: run.energy,
+            notes: &run.notes,
+            impulses: &run.impulses,
+            measurements,
+            fourier,
+        }
+    }
 }
 
 /// Any report as JSON on one line; plain data always serialises.

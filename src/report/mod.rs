@@ -6,6 +6,7 @@
 pub mod json;
 pub mod measured;
 pub mod si;
+pub mod steps;
 pub mod table;
 pub mod text;
 

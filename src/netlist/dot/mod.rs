@@ -3,6 +3,7 @@
 mod define;
 pub(in crate::netlist) mod measure;
 mod output;
+mod sweep;
 
 use nom::Input as _;
 
@@ -128,9 +129,11 @@ pub(in crate::netlist) fn card(i: Input<'_>) -> Parsed<'_, Dot> {
         ".print" | ".plot" => save(rest, true),
         ".meas" | ".measure" => measure::meas(start, rest, false),
         ".four" | ".fourier" => measure::four(start, rest),
-        ".ac" | ".dc" | ".noise" | ".tf" | ".option" | ".options" | ".opt" | ".temp"
-        | ".nodeset" | ".sens" | ".pz" | ".disto" | ".sp" | ".pss" | ".net" | ".savebias"
-        | ".loadbias" | ".machine" | ".endmachine" | ".ferret" | ".data" | ".enddata" | ".step" => {
+        ".step" => sweep::step(rest),
+        ".dc" => sweep::dc(rest),
+        ".ac" | ".noise" | ".tf" | ".option" | ".options" | ".opt" | ".temp" | ".nodeset"
+        | ".sens" | ".pz" | ".disto" | ".sp" | ".pss" | ".net" | ".savebias" | ".loadbias"
+        | ".machine" | ".endmachine" | ".ferret" | ".data" | ".enddata" => {
             Ok((skip(rest), Dot::Skipped))
         }
         ".backanno" | ".wave" | ".width" | ".protect" | ".unprotect" | ".prot" | ".unprot"
