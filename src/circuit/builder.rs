@@ -49,6 +49,14 @@ pub(super) struct Builder<'n, 'o> {
     pub(super) other_analysis: bool,
     pub(super) ics: Vec<(ScopeId, &'n [(Signal, Expr)])>,
     pub(super) saves: Vec<(ScopeId, &'n [Wanted])>,
+    /// What `.print dc` asks for, which counts where there is no `.tran`.
+    pub(super) dc_saves: Vec<(ScopeId, &'n [Wanted])>,
+    pub(super) measurements: Vec<(ScopeId, &'n ast::Meas)>,
+    pub(super) fours: Vec<(ScopeId, &'n ast::Four)>,
+    pub(super) step_cards: Vec<&'n ast::Sweep>,
+    pub(super) dc_cards: Option<&'n [ast::Sweep]>,
+    /// Names of the elements of the top level.
+    pub(super) root_elements: HashSet<&'n str>,
     /// Which branch of each `.if` was taken, in the order of the walk.
     pub(super) choices: VecDeque<Option<usize>>,
     /// The subcircuits being expanded, from the outside in.
@@ -78,6 +86,12 @@ impl<'n, 'o> Builder<'n, 'o> {
             other_analysis: false,
             ics: Vec::new(),
             saves: Vec::new(),
+            dc_saves: Vec::new(),
+            measurements: Vec::new(),
+            fours: Vec::new(),
+            step_cards: Vec::new(),
+            dc_cards: None,
+            root_elements: HashSet::new(),
             choices: VecDeque::new(),
             nesting: Vec::new(),
             used: HashSet::new(),
@@ -103,9 +117,13 @@ impl<'n, 'o> Builder<'n, 'o> {
                 Some(Value::binary(*value)),
             );
         }
+        if let Some(temperature) = self.options.temperature {
+            self.scopes.temperature = Value::binary(temperature);
+        }
         self.define(&netlist.body, ScopeId::ROOT);
         self.check_overrides();
         self.circuit.tran = self.transient();
+        self.dc_sweeps();
         self.elements(&netlist.body, ScopeId::ROOT);
         if self.circuit.elements.is_empty() && read && !self.failed() {
             self.tell(
@@ -379,8 +397,18 @@ impl<'n, 'o> Builder<'n, 'o> {
         for (scope, list) in std::mem::take(&mut self.ics) {
             self.initial(list, scope);
         }
-        for (scope, list) in std::mem::take(&mut self.saves) {
+        let saves = if self.circuit.tran.is_some() || self.circuit.dc.is_empty() {
+            std::mem::take(&mut self.saves)
+        } else {
+            std::mem::take(&mut self.dc_saves)
+        };
+        for (scope, list) in saves {
             self.save(list, scope);
+        }
+        let cards = std::mem::take(&mut self.measurements);
+        self.measure(&cards);
+        for (scope, card) in std::mem::take(&mut self.fours) {
+            self.fourier(card, scope);
         }
     }
 }

@@ -5,15 +5,18 @@ mod bench;
 mod check;
 mod compare;
 mod cpu;
+mod dc;
 pub mod exit;
 mod graph;
 pub mod input;
 mod lcs;
+mod measured;
 pub mod ngspice;
 mod op;
 pub mod output;
 mod render;
 pub mod sim;
+mod steps;
 pub mod streams;
 
 use std::panic::{self, AssertUnwindSafe};

@@ -1,5 +1,6 @@
 //! The time loop, shared by all methods: a [`Stepper`] moves, the loop writes rows.
 
+use crate::circuit::Tran;
 use crate::integrate::{Energy, Impulse, Run, Stats};
 use crate::waveform::Waveforms;
 
@@ -236,6 +237,16 @@ pub struct Grid {
 const GRID_CLOSE: f64 = 1e-6;
 
 impl Grid {
+    /// The output times of a transient analysis.
+    #[must_use]
+    pub const fn of(tran: &Tran) -> Self {
+        Self {
+            tstart: tran.tstart,
+            tstep: tran.tstep,
+            tstop: tran.tstop,
+        }
+    }
+
     /// Number of output times.
     #[must_use]
     pub fn len(&self) -> usize {
