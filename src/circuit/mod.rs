@@ -24,6 +24,7 @@ mod probe;
 mod scope;
 pub mod source;
 mod switch;
+mod transistor;
 
 use crate::algebra::Value;
 use crate::diagnostic::Span;
