@@ -76,7 +76,7 @@ fn standard_values() {
 
 #[test]
 fn square_law_transistors() {
-    converges("buck-mos", 20, "v(3)", 4e-9, 2e-4);
+    converges("buck-mos", 20, "i(l1)", 4e-9, 2e-3);
 }
 
 #[test]
