@@ -83,7 +83,7 @@ pub struct Exact<'a> {
     pub(super) notes: Vec<String>,
     pub(super) accumulation: Accumulation,
     pub(super) noted_shared: bool,
-    /// By switch: times it slid, since when it slides, seconds in all, start of the first.
+    /// By switch, then by step of a function block: when it slid.
     pub(super) slides: BTreeMap<usize, Slides>,
     pub(super) row: Vec<f64>,
 }
