@@ -159,6 +159,7 @@ fn a_driven_output_leaves_theorem_2_to_the_result_with_inputs() {
         delay: 0.0,
         damping: 0.0,
         phase: 0.0,
+        cycles: None,
     };
     drive(&mut driven, "v1", sine, &[0.0], &[0.0, 0.0, -1.0, 1.0]);
     let report = system(&driven);

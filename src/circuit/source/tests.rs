@@ -364,16 +364,18 @@ fn waves() -> impl Strategy<Value = Wave> {
             1.0..1e5,
             -1e-3..1e-3,
             -500.0..500.0,
-            -180.0..180.0
+            -180.0..180.0,
+            prop_oneof![Just(None), (0.5..4.0).prop_map(Some), Just(Some(3.0))]
         )
             .prop_map(
-                |(offset, amplitude, frequency, delay, damping, phase)| Wave::Sin {
+                |(offset, amplitude, frequency, delay, damping, phase, cycles)| Wave::Sin {
                     offset,
                     amplitude,
                     frequency,
                     delay,
                     damping,
-                    phase
+                    phase,
+                    cycles,
                 }
             ),
         (
