@@ -5,6 +5,7 @@ use std::collections::{HashSet, VecDeque};
 use super::elaborate::ElaborateOptions;
 use super::names::Names;
 use super::scope::{ScopeId, Scopes};
+use super::transistor::Channel;
 use super::{Circuit, Element, ElementId, NodeId};
 use crate::algebra::Value;
 use crate::diagnostic::{Diagnostic, Severity, Span};
@@ -45,6 +46,8 @@ pub(super) struct Builder<'n, 'o> {
     pub(super) names: Names<'n>,
     pub(super) pending: Vec<Pending<'n>>,
     pub(super) couplings: Vec<PendingCoupling<'n>>,
+    /// The channels of transistors, until their gate drives are known.
+    pub(super) channels: Vec<Channel>,
     pub(super) trans: Vec<&'n ast::Tran>,
     pub(super) other_analysis: bool,
     pub(super) ics: Vec<(ScopeId, &'n [(Signal, Expr)])>,
@@ -85,6 +88,7 @@ impl<'n, 'o> Builder<'n, 'o> {
             names: Names::new(),
             pending: Vec::new(),
             couplings: Vec::new(),
+            channels: Vec::new(),
             trans: Vec::new(),
             other_analysis: false,
             ics: Vec::new(),
@@ -218,6 +222,9 @@ impl<'n, 'o> Builder<'n, 'o> {
                 model,
                 initial,
             } => self.switch(card, control, model, *initial, scope),
+            Device::Transistor { words, area, args } => {
+                self.transistor(card, words, area.as_ref(), args, scope)
+            }
             Device::Call { subckt, args } => self.call(card, subckt, args, scope),
             Device::Unsupported { what } => {
                 let message = format!(
@@ -227,7 +234,7 @@ impl<'n, 'o> Builder<'n, 'o> {
                 self.tell(
                     Diagnostic::error("unsupported-element", card.span, message)
                         .label("not supported yet")
-                        .help("supported elements are R C L K V I E F G H B D S W X"),
+                        .help("supported elements are R C L K V I E F G H B D S W M J Z X"),
                 );
             }
         }
@@ -390,6 +397,7 @@ impl<'n, 'o> Builder<'n, 'o> {
     /// Everything that refers to elements and nodes by name.
     fn resolve(&mut self) {
         self.find_rails();
+        self.open_channels();
         for pending in std::mem::take(&mut self.pending) {
             if let Some(form) = self.control(&pending) {
                 self.place(pending.element, form);

@@ -27,6 +27,7 @@ mod scope;
 pub mod source;
 mod sweep;
 mod switch;
+mod transistor;
 
 use crate::algebra::Value;
 use crate::diagnostic::Span;

@@ -59,6 +59,14 @@ pub enum Reason {
     /// Switch positions contradict each other at one instant.
     #[error("switch positions do not settle")]
     SwitchesDoNotSettle,
+    /// Events follow each other without end.
+    #[error("{events} events follow each other within {span:e} s")]
+    EventsAccumulate {
+        /// Their number.
+        events: usize,
+        /// The time they take, s.
+        span: f64,
+    },
     /// The circuit has no operating point.
     #[error("no operating point: {0}; `uic` starts from initial conditions instead")]
     NoOperatingPoint(String),
@@ -176,6 +184,12 @@ impl Log {
     #[must_use]
     pub fn wants_rows(&self) -> bool {
         self.wants_rows
+    }
+
+    /// Takes back what was logged since there were `events` events and `impulses` impulses.
+    pub(crate) fn back_to(&mut self, events: usize, impulses: usize) {
+        self.events.truncate(events);
+        self.impulses.truncate(impulses);
     }
 
     /// A row at an event: once at a continuous event, twice (left limit, right limit) at a jump. Ignored unless

@@ -12,12 +12,18 @@ impl Theta<'_> {
     pub(super) fn attempt(&mut self, h: f64, t1: f64) -> Result<(), SimError> {
         self.inputs.left(t1, &mut self.u_next);
         self.stats.lcp_solves += 1;
-        let settle = self.now.settle && !self.lambda.is_empty();
-        let scheme = self.scheme;
+        let damped = self.starts_damped();
+        let settle = self.now.settle && (damped || !self.lambda.is_empty());
+        let scheme = if settle && damped {
+            Scheme::MOREAU
+        } else {
+            self.scheme
+        };
         let Self {
             plant,
             now,
             attempt,
+            amplitudes,
             settings,
             ..
         } = self;
@@ -46,18 +52,19 @@ impl Theta<'_> {
         }
         let n = now.x.len();
         let fused = system.step(attempt.step).fused(attempt.mode);
-        if fused.step(&self.z, n, &mut self.out) {
+        let noise = |k| amplitudes.rounding(&system.lcs, k);
+        if fused.step(&self.z, n, &mut self.out, noise) {
             return Ok(());
         }
-        self.solve_step(h, t1)
+        self.solve_step(scheme, h, t1)
     }
 
     /// The step with γ = 1 by the solvers. Where the user's own γ = 1 > θ leaves a stiff step without solution, θ = 1 has one.
     #[cold]
-    pub(super) fn solve_step(&mut self, h: f64, t1: f64) -> Result<(), SimError> {
+    pub(super) fn solve_step(&mut self, scheme: Scheme, h: f64, t1: f64) -> Result<(), SimError> {
         self.stats.pivotings += 1;
-        let first = self.solve_with(self.scheme, h, t1);
-        if first.is_err() && self.scheme != Scheme::MOREAU {
+        let first = self.solve_with(scheme, h, t1);
+        if first.is_err() && scheme != Scheme::MOREAU {
             return self.solve_with(Scheme::MOREAU, h, t1);
         }
         first

@@ -154,6 +154,15 @@ pub enum Device {
         /// `ON`, `OFF`.
         initial: Option<bool>,
     },
+    /// M, J, Z: drain, gate and source are the element's nodes.
+    Transistor {
+        /// A bulk node or none, then the model name.
+        words: Vec<Name>,
+        /// The area factor.
+        area: Option<Expr>,
+        /// `w=`, `l=`, `m=`, `off`, …
+        args: Vec<Assign>,
+    },
     /// X.
     Call {
         /// The subcircuit.
