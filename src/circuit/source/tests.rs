@@ -327,7 +327,7 @@ fn arguments_are_checked_and_defaults_filled() {
     );
     assert_eq!(
         wave("sin", &[1.0]).unwrap_err().to_string(),
-        "`sin` takes 2 to 6 arguments, found 1"
+        "`sin` takes 2 to 7 arguments, found 1"
     );
     assert_eq!(
         wave("pulse", &[0.0, 1.0, 0.0, -1e-9])
