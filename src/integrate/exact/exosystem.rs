@@ -303,6 +303,7 @@ mod tests {
             delay,
             damping,
             phase,
+            cycles: None,
         })
     }
 
