@@ -6,6 +6,7 @@ mod check;
 mod compare;
 mod cpu;
 pub mod exit;
+mod forms;
 mod graph;
 pub mod input;
 mod lcs;

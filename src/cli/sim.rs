@@ -4,6 +4,7 @@ use std::io::Write;
 
 use super::args::{self, MethodArgs, SimArgs, Summary};
 use super::exit::{Exit, Failure};
+use super::forms;
 use super::input::{self, Subject};
 use super::output::{self, Format};
 use super::streams::Streams;
@@ -26,9 +27,14 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         .iter()
         .map(|path| Format::of(path))
         .collect::<Result<Vec<_>, _>>()?;
-    let subject = input::open(&args.input, &args.probes, streams)?;
     let request = Request::of(&args.method, args.events)?;
-    let outcome = run(&subject, &request, None, streams);
+    let outcome = match forms::open(args)? {
+        Some(form) => Ok(forms::run(&form, args)?),
+        None => {
+            let subject = input::open(&args.input, &args.probes, streams)?;
+            run(&subject, &request, None, streams)
+        }
+    };
     let (finished, error) = match outcome {
         Ok(run) => (Some(run), None),
         Err(mut error) => (error.partial.take().map(|run| *run), Some(error)),
