@@ -41,7 +41,10 @@ const ROOMS: [(&str, &[&str]); 18] = [
             "solve",
         ],
     ),
-    ("forms", &["check", "lcs", "passivity", "settings", "solve"]),
+    (
+        "forms",
+        &["check", "lcs", "netlist", "passivity", "settings", "solve"],
+    ),
     (
         "report",
         &[
