@@ -25,6 +25,8 @@ pub struct Verdict {
     pub accept: bool,
     /// The step to try next, s.
     pub next: f64,
+    /// The error of the step, relative to the amplitude.
+    pub error: f64,
 }
 
 /// A step is doubled where the error of the doubled one would still leave this factor of room.
@@ -66,7 +68,11 @@ impl Control {
         } else {
             h
         };
-        Verdict { accept, next }
+        Verdict {
+            accept,
+            next,
+            error,
+        }
     }
 }
 

@@ -380,6 +380,7 @@ fn dispatch(
     {
         theta.expect_amplitudes(amplitudes);
     }
+    theta.estimate_errors();
     let frame = frame(method, notes);
     run(&mut theta, Frame { progress, ..frame }, log())
 }

@@ -121,6 +121,9 @@ impl Theta<'_> {
             };
             return Err(SimError::at(self.now.t, reason));
         }
+        if self.now.estimate.is_some() && self.control.is_none() {
+            self.carry_error();
+        }
         if let Some((basis, pattern)) = self.attempt.solved.take() {
             self.commit_solved(basis, pattern, t1);
         } else {
@@ -134,6 +137,34 @@ impl Theta<'_> {
         self.now.t = t1;
         self.last_h = self.attempt.h;
         Ok(())
+    }
+
+    /// The error after the attempted step.
+    fn carry_error(&mut self) {
+        let Self {
+            plant,
+            now,
+            attempt,
+            out,
+            scheme,
+            ..
+        } = self;
+        let Some(estimate) = &mut now.estimate else {
+            return;
+        };
+        if now.settle {
+            estimate.restart();
+        }
+        let n = now.x.len();
+        let fused = || {
+            plant.systems[now.system]
+                .1
+                .step(attempt.step)
+                .fused(attempt.mode)
+        };
+        let map = attempt.solved.is_none().then(|| fused().flow(n));
+        let second_order = scheme.order() == 2 && !attempt.settle;
+        estimate.step(attempt.h, &now.x, &out[..n], map, second_order);
     }
 
     #[cold]

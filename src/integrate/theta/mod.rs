@@ -6,6 +6,7 @@
 //! and a sign test. Where that fails, the step is solved with γ = 1 by the [`Driver`](crate::solve::Driver).
 
 mod attempt;
+mod estimate;
 mod jumps;
 mod march;
 mod right_limit;
@@ -16,6 +17,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::DVector;
 
+use self::estimate::Estimate;
 use crate::integrate::control::{Amplitudes, Control};
 use crate::integrate::energy::{self, Balance};
 use crate::integrate::exact::Place;
@@ -137,6 +139,8 @@ struct Now {
     settle: bool,
     system: usize,
     balance: Balance,
+    /// The error so far, where it is asked for.
+    estimate: Option<Estimate>,
 }
 
 impl Now {
@@ -149,6 +153,9 @@ impl Now {
         self.settle = other.settle;
         self.system = other.system;
         self.balance = other.balance;
+        if let (Some(mine), Some(other)) = (&mut self.estimate, &other.estimate) {
+            mine.copy_from(other);
+        }
     }
 }
 
@@ -209,6 +216,7 @@ impl<'a> Theta<'a> {
             settle: true,
             system: at,
             balance: Balance::new(stored),
+            estimate: None,
         };
         let amplitudes = Amplitudes::new(&system.lcs, &inputs);
         let switches = Switches::new(position, thresholds, &system.lcs);
@@ -255,6 +263,16 @@ impl<'a> Theta<'a> {
     /// Sets the amplitudes known beforehand, by storage element.
     pub fn expect_amplitudes(&mut self, amplitudes: Amplitudes) {
         self.amplitudes = amplitudes;
+    }
+
+    /// Has the error estimated along the run.
+    pub fn estimate_errors(&mut self) {
+        let mut estimate = Estimate::default();
+        if self.control.is_none() {
+            estimate.enter(self.now.x.iter().map(|_| 0.0));
+        }
+        self.kept.estimate = Some(estimate.clone());
+        self.now.estimate = Some(estimate);
     }
 
     /// The amplitudes seen so far.
@@ -347,6 +365,13 @@ impl<'a> Theta<'a> {
         &self.plant.systems[self.now.system].1
     }
 
+    fn settle_estimate(&mut self) {
+        if let (Some(estimate), None) = (&mut self.now.estimate, &self.control) {
+            let lcs = &self.plant.systems[self.now.system].1.lcs;
+            estimate.settle(lcs, &mut self.amplitudes);
+        }
+    }
+
     /// Buffers for the present system.
     fn resize(&mut self) {
         let (n, m, width) = {
@@ -428,7 +453,9 @@ impl Stepper for Theta<'_> {
                 names.join(", ")
             ));
         }
+        self.settle_estimate();
         Outcome {
+            error_estimate: self.now.estimate.as_ref().map(Estimate::relative),
             stats: self.stats.clone(),
             energy: self.now.balance.energy(),
             notes,
