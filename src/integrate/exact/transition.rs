@@ -146,12 +146,15 @@ impl Exact<'_> {
         if jumped {
             self.jumps += 1;
         }
-        if let Some(row) = left_row.filter(|_| !same || jumped) {
-            if jumped {
-                log.row(t, &row);
-            }
+        if let Some(before) = left_row {
             self.read_row();
-            log.row(t, &self.row);
+            let jumped = self.row_jumps(&before);
+            if jumped {
+                log.row(t, &before);
+            }
+            if jumped || !same {
+                log.row(t, &self.row);
+            }
         }
         Ok(())
     }

@@ -296,16 +296,16 @@ impl Forms {
             .unwrap_or_else(|| DMatrix::identity(dim, dim));
         let mut to_y = &triangle * order.transpose();
         let mut from_y = &order * &back;
-        for j in 0..dim {
-            to_y.column_mut(j).unscale_mut(size[j]);
-            from_y.row_mut(j).scale_mut(size[j]);
+        for (j, &size) in size.iter().enumerate() {
+            to_y.column_mut(j).unscale_mut(size);
+            from_y.row_mut(j).scale_mut(size);
         }
         let mut seen = rows * &order * back;
         let moved = &to_y * generator * from_y;
         let d = expm::balance(&moved, unit);
-        for j in 0..dim {
-            to_y.row_mut(j).unscale_mut(d[j]);
-            seen.column_mut(j).scale_mut(d[j]);
+        for (j, &d) in d.iter().enumerate() {
+            to_y.row_mut(j).unscale_mut(d);
+            seen.column_mut(j).scale_mut(d);
         }
         let moved = DMatrix::from_fn(dim, dim, |i, j| moved[(i, j)] * d[j] / d[i]);
         let mut powers = [DMatrix::zeros(dim, dim), DMatrix::zeros(dim, dim)];
