@@ -2,6 +2,7 @@
 #![allow(missing_docs, reason = "tests")]
 
 mod buck;
+mod events;
 mod handover;
 mod relays;
 #[path = "../runs/mod.rs"]

@@ -53,6 +53,21 @@ impl Exact<'_> {
         Ok(())
     }
 
+    /// Whether some probe has another value in the present row than `before`, by more than rounding.
+    pub(super) fn row_jumps(&self, before: &[f64]) -> bool {
+        /// Relative to the largest value of one kind in both rows.
+        const ROUNDING: f64 = 1e-9;
+        [true, false].into_iter().any(|volts| {
+            let of_kind = || {
+                let rows = before.iter().zip(&self.row).zip(&self.row_is_volts);
+                rows.filter(move |(_, v)| **v == volts)
+                    .map(|(pair, _)| pair)
+            };
+            let largest = of_kind().fold(0.0_f64, |m, (a, b)| m.max(a.abs()).max(b.abs()));
+            of_kind().any(|(a, b)| (a - b).abs() > ROUNDING * largest)
+        })
+    }
+
     /// Keeps account of what starts or ends to slide on entering mode `at`: switches on their thresholds, function blocks on
     /// their steps.
     pub(super) fn note_slides(&mut self, at: usize) {
