@@ -14,7 +14,7 @@ const ROOMS: [(&str, &[&str]); 18] = [
     ("circuit", &["algebra", "diagnostic", "law", "netlist"]),
     ("mna", &["algebra", "circuit", "diagnostic", "law"]),
     ("lcs", &["algebra", "circuit", "law", "mna"]),
-    ("solve", &["settings"]),
+    ("solve", &["law", "settings"]),
     ("waveform", &[]),
     ("measure", &[]),
     ("plan", &["lcs", "settings", "solve"]),

@@ -8,6 +8,7 @@ pub mod exact;
 pub(crate) mod fixtures;
 pub mod inputs;
 pub mod jump;
+mod lawful;
 pub mod reading;
 pub mod run;
 pub mod simulate;

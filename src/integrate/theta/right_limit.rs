@@ -48,11 +48,14 @@ impl Theta<'_> {
             now,
             settings,
             z,
+            lambda,
+            y,
             ..
         } = self;
         let matrices = plant.systems[now.system].1.step_mut(step);
         let q = matrices.q(z);
         matrices.driver.suggest(&now.active);
+        matrices.driver.suggest_point(lambda, y);
         let mut solution = matrices.driver.solve(&q);
         let lcs = &plant.systems[now.system].1.lcs;
         if let Some(error) = unsolved(&solution, lcs, now.t, settings.lcp_residual) {
@@ -86,6 +89,12 @@ impl Theta<'_> {
             ..
         } = self;
         let system = &mut plant.systems[now.system].1;
+        if system.curved {
+            let solution = self.right_limit()?;
+            self.lambda.copy_from_slice(solution.lambda.as_slice());
+            self.y.copy_from_slice(solution.y.as_slice());
+            return Ok(());
+        }
         let (mode, _) = system.mode(step, &now.active);
         let n = now.x.len();
         let fused = system.step(step).fused(mode);
