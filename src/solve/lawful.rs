@@ -49,8 +49,8 @@ pub(super) struct Lawful {
     w: DVector<f64>,
     /// (I + M')⁻¹.
     averaged: DMatrix<f64>,
-    /// The voltage in which each law bends, in equilibrated variables.
-    bend: DVector<f64>,
+    /// The largest voltage in which a law bends, in equilibrated variables.
+    bend: f64,
     tolerance: f64,
 }
 
@@ -66,7 +66,7 @@ struct Point {
     slope: DVector<f64>,
     rest: DVector<f64>,
     residual: DVector<f64>,
-    /// max_j |R_j| relative to the largest of ‖q'‖∞, |y'_j|, |M'_jk λ'_k| and the bend of the law.
+    /// max_j |R_j| relative to the largest of ‖q'‖∞, |y'_j|, |M'_jk λ'_k| and the bends of the laws.
     size: f64,
     /// (I + M')⁻¹R.
     step: DVector<f64>,
@@ -105,14 +105,11 @@ impl Lawful {
         let size = m.nrows();
         let d = &scaling.d;
         let is_ideal = |j: &usize| ports[*j].law.is_ideal_diode();
-        let bend = DVector::from_fn(size, |j, _| {
-            let volts = ports[j].law.bend();
-            if ports[j].current {
-                volts * d[j]
-            } else {
-                volts / d[j]
-            }
+        let bends = ports.iter().zip(d.iter()).map(|(port, d)| {
+            let volts = port.law.bend();
+            if port.current { volts * d } else { volts / d }
         });
+        let bend = bends.fold(0.0, f64::max);
         let m = DMatrix::from_fn(size, size, |i, j| d[i] * m[(i, j)] * d[j]);
         let identity = || DMatrix::identity(size, size);
         // I + M' is regular for every monotone M'; for others the splitting has no meaning, and any measure serves.
@@ -300,10 +297,10 @@ impl Lawful {
         }
         point.residual = &self.m * &point.lambda + q - &point.y;
         point.step = &self.averaged * &point.residual;
-        let floor = q.amax();
+        let floor = q.amax().max(self.bend);
         for j in 0..size {
             let terms = (0..size).map(|k| (self.m[(j, k)] * point.lambda[k]).abs());
-            let scale = terms.fold(floor.max(self.bend[j]), f64::max);
+            let scale = terms.fold(floor, f64::max);
             let scale = scale.max(point.y[j].abs());
             let part = point.residual[j].abs() / scale;
             if point.residual[j] != 0.0 {
