@@ -16,6 +16,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::integrate::energy::PowerForms;
+use crate::integrate::lawful;
 use crate::lcs::Lcs;
 use crate::solve::Driver;
 use crate::solve::active::{ActiveSolve, equilibrated_inverse};
@@ -218,7 +219,7 @@ impl StepMatrices {
                 q: DVector::zeros(m.nrows()),
             })
             .m;
-        let driver = Driver::new(m.clone(), tolerance);
+        let driver = lawful::driver(lcs, m.clone(), tolerance);
         let after = if gamma < 1.0 {
             let short = Self::new(lcs, columns, h * SHORT, Scheme::MOREAU, tolerance)?;
             Some(Box::new(short))

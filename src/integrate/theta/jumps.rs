@@ -215,7 +215,7 @@ impl Theta<'_> {
         let stored = energy::stored(&old.lcs, &self.now.x, &self.now.u);
         let carried = self.now.estimate.as_ref().map(|estimate| {
             let error = estimate.error();
-            &old.lcs.storage.x.columns(0, error.len()) * DVector::from_column_slice(error)
+            old.lcs.storage.x.columns(0, error.len()) * DVector::from_column_slice(error)
         });
         self.settle_estimate();
         let position = self.switches.position().to_vec();

@@ -10,6 +10,7 @@ mod estimate;
 mod jumps;
 mod march;
 mod right_limit;
+mod stages;
 #[cfg(test)]
 mod tests;
 
@@ -31,6 +32,7 @@ use crate::integrate::system::{Plant, Reduce, System};
 use crate::lcs::{Lcs, Port, Role};
 use crate::settings::Settings;
 use crate::solve::{Solution, Status};
+use stages::Tableau;
 
 /// How steps are chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -109,6 +111,8 @@ pub struct Theta<'a> {
     z: Vec<f64>,
     out: Vec<f64>,
     lambda: Vec<f64>,
+    /// y of the last solve, where a law is curved.
+    y: Vec<f64>,
     attempt: Attempt,
     coarse: Vec<f64>,
     /// Buffer for s.
@@ -169,6 +173,8 @@ struct Attempt {
     settle: bool,
     /// Basis and pattern after the step, where the solvers ran.
     solved: Option<(Vec<bool>, Vec<Option<bool>>)>,
+    /// Energy from sources and into resistors and devices, J, where the stages tell it.
+    work: Option<(f64, f64)>,
 }
 
 impl<'a> Theta<'a> {
@@ -220,10 +226,11 @@ impl<'a> Theta<'a> {
         };
         let amplitudes = Amplitudes::new(&system.lcs, &inputs);
         let switches = Switches::new(position, thresholds, &system.lcs);
+        let order = Tableau::of(system, scheme).map_or(scheme.order(), |t| t.order);
         let (control, preferred) = match stepping {
             Stepping::Fixed(_) => (None, f64::INFINITY),
             Stepping::Controlled { span, first } => {
-                (Some(Control::new(scheme, &settings, span)), first)
+                (Some(Control::new(order, &settings, span)), first)
             }
         };
         let mut theta = Self {
@@ -244,6 +251,7 @@ impl<'a> Theta<'a> {
             z: Vec::new(),
             out: Vec::new(),
             lambda: Vec::new(),
+            y: Vec::new(),
             attempt: Attempt::default(),
             coarse: Vec::new(),
             storage: Vec::new(),
@@ -382,6 +390,8 @@ impl<'a> Theta<'a> {
         self.out.resize(n + m, 0.0);
         self.lambda.clear();
         self.lambda.resize(m, 0.0);
+        self.y.clear();
+        self.y.resize(m, 0.0);
         self.coarse.resize(n, 0.0);
         self.attempt.h = f64::NAN;
     }
