@@ -10,13 +10,16 @@ const ROOMS: [(&str, &[&str]); 18] = [
     ("algebra", &[]),
     ("diagnostic", &[]),
     ("law", &["algebra"]),
-    ("netlist", &["algebra", "diagnostic"]),
-    ("circuit", &["algebra", "diagnostic", "law", "netlist"]),
+    ("measure", &[]),
+    ("netlist", &["algebra", "diagnostic", "measure"]),
+    (
+        "circuit",
+        &["algebra", "diagnostic", "law", "measure", "netlist"],
+    ),
     ("mna", &["algebra", "circuit", "diagnostic", "law"]),
     ("lcs", &["algebra", "circuit", "law", "mna"]),
     ("solve", &["settings"]),
     ("waveform", &[]),
-    ("measure", &[]),
     ("plan", &["lcs", "settings", "solve"]),
     (
         "integrate",
@@ -44,7 +47,15 @@ const ROOMS: [(&str, &[&str]); 18] = [
     ),
     (
         "report",
-        &["check", "circuit", "integrate", "law", "lcs", "waveform"],
+        &[
+            "check",
+            "circuit",
+            "integrate",
+            "law",
+            "lcs",
+            "measure",
+            "waveform",
+        ],
     ),
     (
         "cli",

@@ -199,6 +199,7 @@ cases! {
     source_shorted_by_a_switch,
     ten_thousand_periods,
     ten_thousand_swings,
+    values_all_extreme,
     values_lc_fast,
     values_lc_slow,
     values_rc,

@@ -48,6 +48,10 @@ impl<'n> Builder<'n, '_> {
             },
             None => None,
         };
+        let swept = self
+            .swept(&card.name.text)
+            .filter(|_| scope == ScopeId::ROOT);
+        let dc_value = swept.or(dc_value);
         let wave = match wave {
             Some(call) => match self.wave(card, call, args, scope) {
                 Some(wave) => wave,

@@ -282,18 +282,7 @@ impl Reader<'_> {
                     .next()
                     .unwrap_or("")
                     .to_lowercase();
-                if name == ".step" {
-                    self.tell(
-                        Diagnostic::warning(
-                            "step",
-                            span,
-                            "`.step` is not supported yet: one run with the values as they stand",
-                        )
-                        .label("ignored"),
-                    );
-                } else {
-                    self.skipped.push((name, span));
-                }
+                self.skipped.push((name, span));
             }
         }
         true

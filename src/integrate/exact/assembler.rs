@@ -28,6 +28,12 @@ impl<'a> Assembler<'a> {
         self.behaviour.pairs.len()
     }
 
+    /// The device of a pair.
+    pub(crate) fn device(&self, pair: usize) -> Option<&str> {
+        let pair = self.behaviour.pairs.get(pair)?;
+        Some(&pair.port.device)
+    }
+
     /// The switches' thresholds.
     pub(crate) fn thresholds(&self) -> Vec<Threshold> {
         self.behaviour

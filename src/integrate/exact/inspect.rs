@@ -136,7 +136,7 @@ impl Inspector {
             if first.is_some_and(|k| value[k] < 0.0) {
                 match mode.owner(i) {
                     Owner::Switch(k) => leaving.push(k),
-                    Owner::Devices | Owner::Slide(..) => return Finding::Refused(i),
+                    Owner::Device(_) | Owner::Slide(..) => return Finding::Refused(i),
                 }
             }
         }

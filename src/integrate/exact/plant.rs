@@ -93,6 +93,16 @@ impl<'a> Plant<'a> {
         at
     }
 
+    /// Distance of output times, s.
+    pub(crate) fn output_step(&self) -> f64 {
+        self.h
+    }
+
+    /// The device of a pair.
+    pub(crate) fn device(&self, pair: usize) -> Option<&str> {
+        self.assembler.device(pair)
+    }
+
     /// The fastest rate seen, 1/s.
     pub(crate) fn fastest(&self) -> f64 {
         self.modes

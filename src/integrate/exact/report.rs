@@ -78,6 +78,15 @@ impl Exact<'_> {
         }
     }
 
+    /// Ends all slides now, where the run is left to another method.
+    pub(super) fn close_slides(&mut self) {
+        let t = self.motion.t;
+        for slides in self.slides.values_mut() {
+            slides.seconds += t - slides.since.take().unwrap_or(t);
+        }
+        self.key.sliding.clear();
+    }
+
     /// Names of what differs between the present mode and another.
     fn label(&mut self, at: usize) -> Result<String, SimError> {
         let new = self.plant.modes[at].key.clone();

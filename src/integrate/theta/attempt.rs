@@ -23,6 +23,7 @@ impl Theta<'_> {
             plant,
             now,
             attempt,
+            amplitudes,
             settings,
             ..
         } = self;
@@ -51,7 +52,8 @@ impl Theta<'_> {
         }
         let n = now.x.len();
         let fused = system.step(attempt.step).fused(attempt.mode);
-        if fused.step(&self.z, n, &mut self.out) {
+        let noise = |k| amplitudes.rounding(&system.lcs, k);
+        if fused.step(&self.z, n, &mut self.out, noise) {
             return Ok(());
         }
         self.solve_step(scheme, h, t1)

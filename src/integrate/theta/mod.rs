@@ -18,6 +18,7 @@ use nalgebra::DVector;
 
 use crate::integrate::control::{Amplitudes, Control};
 use crate::integrate::energy::{self, Balance};
+use crate::integrate::exact::Place;
 use crate::integrate::inputs::Inputs;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
@@ -262,15 +263,31 @@ impl<'a> Theta<'a> {
         &self.amplitudes
     }
 
-    /// Takes note of the present state's size.
+    /// Takes note of the size of the present state and of every branch's voltage and current: a state that stays at zero
+    /// would else be judged by its own rounding.
     pub fn see(&mut self) {
+        let known = self.read_lambda().is_ok();
         let Self {
             amplitudes,
             plant,
             now,
             ..
         } = self;
-        amplitudes.see(&plant.systems[now.system].1.lcs, &now.x);
+        let lcs = &plant.systems[now.system].1.lcs;
+        amplitudes.see(lcs, &now.x);
+        if !known {
+            return;
+        }
+        let at = Point {
+            x: &now.x,
+            lambda: &self.lambda,
+            u: &now.u,
+            du: &self.du,
+        };
+        for i in 0..lcs.outputs.power.len() {
+            let v = reading::value(&lcs.outputs.power_v, i, at);
+            amplitudes.see_branch(v, reading::value(&lcs.outputs.power_i, i, at));
+        }
     }
 
     /// Control values of the switches at t = 0+, after the first jump in the start position.
@@ -296,6 +313,22 @@ impl<'a> Theta<'a> {
     #[must_use]
     pub fn state(&self) -> &[f64] {
         &self.now.x
+    }
+
+    /// Where the run stands, for another method to go on from.
+    pub(crate) fn place(&self) -> Place {
+        Place {
+            t: self.now.t,
+            storage: self.system().storage(&self.now.x, &self.now.u),
+            switches: self.switches.position().to_vec(),
+        }
+    }
+
+    /// Starts a new energy balance from the present state.
+    pub(crate) fn empty_account(&mut self) {
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        let stored = energy::stored(lcs, &self.now.x, &self.now.u);
+        self.now.balance = Balance::new(stored);
     }
 
     /// The largest complementarity residual of a step that the solvers solved.

@@ -1,7 +1,9 @@
 //! Dot cards: one parser each; what is only recognised is named, so that nothing is skipped in silence.
 
 mod define;
+pub(in crate::netlist) mod measure;
 mod output;
+mod sweep;
 
 use nom::Input as _;
 
@@ -125,10 +127,15 @@ pub(in crate::netlist) fn card(i: Input<'_>) -> Parsed<'_, Dot> {
         ".global" => global(rest),
         ".save" | ".probe" => save(rest, false),
         ".print" | ".plot" => save(rest, true),
-        ".ac" | ".dc" | ".noise" | ".tf" | ".four" | ".fourier" | ".meas" | ".measure"
-        | ".option" | ".options" | ".opt" | ".temp" | ".nodeset" | ".sens" | ".pz" | ".disto"
-        | ".sp" | ".pss" | ".net" | ".savebias" | ".loadbias" | ".machine" | ".endmachine"
-        | ".ferret" | ".data" | ".enddata" | ".step" => Ok((skip(rest), Dot::Skipped)),
+        ".meas" | ".measure" => measure::meas(start, rest, false),
+        ".four" | ".fourier" => measure::four(start, rest),
+        ".step" => sweep::step(rest),
+        ".dc" => sweep::dc(rest),
+        ".ac" | ".noise" | ".tf" | ".option" | ".options" | ".opt" | ".temp" | ".nodeset"
+        | ".sens" | ".pz" | ".disto" | ".sp" | ".pss" | ".net" | ".savebias" | ".loadbias"
+        | ".machine" | ".endmachine" | ".ferret" | ".data" | ".enddata" => {
+            Ok((skip(rest), Dot::Skipped))
+        }
         ".backanno" | ".wave" | ".width" | ".protect" | ".unprotect" | ".prot" | ".unprot"
         | ".endc" | ".newpage" => Ok((skip(rest), Dot::Nothing)),
         _ => {
