@@ -14,7 +14,7 @@ impl Theta<'_> {
             return self.attempt_stages(tableau, h, t1);
         }
         self.inputs.left(t1, &mut self.u_next);
-        self.stats.lcp_solves += 1;
+        self.stats.lcp_solves += u64::from(!self.lambda.is_empty());
         let damped = self.starts_damped();
         let settle = self.now.settle && (damped || !self.lambda.is_empty());
         let scheme = if settle && damped {
