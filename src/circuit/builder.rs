@@ -5,6 +5,7 @@ use std::collections::{HashSet, VecDeque};
 use super::elaborate::ElaborateOptions;
 use super::names::Names;
 use super::scope::{ScopeId, Scopes};
+use super::transistor::Channel;
 use super::{Circuit, Element, ElementId, NodeId};
 use crate::algebra::Value;
 use crate::diagnostic::{Diagnostic, Severity, Span};
@@ -45,10 +46,23 @@ pub(super) struct Builder<'n, 'o> {
     pub(super) names: Names<'n>,
     pub(super) pending: Vec<Pending<'n>>,
     pub(super) couplings: Vec<PendingCoupling<'n>>,
+    /// The channels of transistors, until their gate drives are known.
+    pub(super) channels: Vec<Channel>,
     pub(super) trans: Vec<&'n ast::Tran>,
     pub(super) other_analysis: bool,
     pub(super) ics: Vec<(ScopeId, &'n [(Signal, Expr)])>,
+    pub(super) nodesets: Vec<(ScopeId, &'n [(Signal, Expr)])>,
+    /// `.temp`.
+    pub(super) temperature: Option<&'n Expr>,
     pub(super) saves: Vec<(ScopeId, &'n [Wanted])>,
+    /// What `.print dc` asks for, which counts where there is no `.tran`.
+    pub(super) dc_saves: Vec<(ScopeId, &'n [Wanted])>,
+    pub(super) measurements: Vec<(ScopeId, &'n ast::Meas)>,
+    pub(super) fours: Vec<(ScopeId, &'n ast::Four)>,
+    pub(super) step_cards: Vec<&'n ast::Sweep>,
+    pub(super) dc_cards: Option<&'n [ast::Sweep]>,
+    /// Names of the elements of the top level.
+    pub(super) root_elements: HashSet<&'n str>,
     /// Which branch of each `.if` was taken, in the order of the walk.
     pub(super) choices: VecDeque<Option<usize>>,
     /// The subcircuits being expanded, from the outside in.
@@ -74,10 +88,19 @@ impl<'n, 'o> Builder<'n, 'o> {
             names: Names::new(),
             pending: Vec::new(),
             couplings: Vec::new(),
+            channels: Vec::new(),
             trans: Vec::new(),
             other_analysis: false,
             ics: Vec::new(),
+            nodesets: Vec::new(),
+            temperature: None,
             saves: Vec::new(),
+            dc_saves: Vec::new(),
+            measurements: Vec::new(),
+            fours: Vec::new(),
+            step_cards: Vec::new(),
+            dc_cards: None,
+            root_elements: HashSet::new(),
             choices: VecDeque::new(),
             nesting: Vec::new(),
             used: HashSet::new(),
@@ -106,6 +129,7 @@ impl<'n, 'o> Builder<'n, 'o> {
         self.define(&netlist.body, ScopeId::ROOT);
         self.check_overrides();
         self.circuit.tran = self.transient();
+        self.dc_sweeps();
         self.elements(&netlist.body, ScopeId::ROOT);
         if self.circuit.elements.is_empty() && read && !self.failed() {
             self.tell(
@@ -198,6 +222,9 @@ impl<'n, 'o> Builder<'n, 'o> {
                 model,
                 initial,
             } => self.switch(card, control, model, *initial, scope),
+            Device::Transistor { words, area, args } => {
+                self.transistor(card, words, area.as_ref(), args, scope)
+            }
             Device::Call { subckt, args } => self.call(card, subckt, args, scope),
             Device::Unsupported { what } => {
                 let message = format!(
@@ -207,7 +234,7 @@ impl<'n, 'o> Builder<'n, 'o> {
                 self.tell(
                     Diagnostic::error("unsupported-element", card.span, message)
                         .label("not supported yet")
-                        .help("supported elements are R C L K V I E F G H B D S W X"),
+                        .help("supported elements are R C L K V I E F G H B D S W M J Z X"),
                 );
             }
         }
@@ -370,6 +397,7 @@ impl<'n, 'o> Builder<'n, 'o> {
     /// Everything that refers to elements and nodes by name.
     fn resolve(&mut self) {
         self.find_rails();
+        self.open_channels();
         for pending in std::mem::take(&mut self.pending) {
             if let Some(form) = self.control(&pending) {
                 self.place(pending.element, form);
@@ -379,8 +407,21 @@ impl<'n, 'o> Builder<'n, 'o> {
         for (scope, list) in std::mem::take(&mut self.ics) {
             self.initial(list, scope);
         }
-        for (scope, list) in std::mem::take(&mut self.saves) {
+        for (scope, list) in std::mem::take(&mut self.nodesets) {
+            self.nodeset(list, scope);
+        }
+        let saves = if self.circuit.tran.is_some() || self.circuit.dc.is_empty() {
+            std::mem::take(&mut self.saves)
+        } else {
+            std::mem::take(&mut self.dc_saves)
+        };
+        for (scope, list) in saves {
             self.save(list, scope);
+        }
+        let cards = std::mem::take(&mut self.measurements);
+        self.measure(&cards);
+        for (scope, card) in std::mem::take(&mut self.fours) {
+            self.fourier(card, scope);
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The time loop, shared by all methods: a [`Stepper`] moves, the loop writes rows.
 
+use crate::circuit::Tran;
 use crate::integrate::{Energy, Impulse, Run, Stats};
 use crate::waveform::Waveforms;
 
@@ -134,6 +135,8 @@ pub struct Outcome {
     pub stats: Stats,
     /// Energy balance.
     pub energy: Energy,
+    /// See [`Run::error_estimate`].
+    pub error_estimate: Option<f64>,
     /// Things the user should know.
     pub notes: Vec<String>,
 }
@@ -236,6 +239,16 @@ pub struct Grid {
 const GRID_CLOSE: f64 = 1e-6;
 
 impl Grid {
+    /// The output times of a transient analysis.
+    #[must_use]
+    pub const fn of(tran: &Tran) -> Self {
+        Self {
+            tstart: tran.tstart,
+            tstep: tran.tstep,
+            tstop: tran.tstop,
+        }
+    }
+
     /// Number of output times.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -331,6 +344,7 @@ pub fn run(stepper: &mut dyn Stepper, frame: Frame<'_>, mut log: Log) -> Result<
         plan,
         stats: outcome.stats,
         energy: outcome.energy,
+        error_estimate: outcome.error_estimate,
         impulses: log.impulses,
         events: log.events,
         notes: all_notes,

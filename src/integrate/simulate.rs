@@ -9,10 +9,10 @@ use crate::integrate::control::Amplitudes;
 use crate::integrate::exact::{self, Exact, Place};
 use crate::integrate::handover::Handover;
 use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, Stepper, run};
-use crate::integrate::start;
 use crate::integrate::step::Scheme;
 use crate::integrate::switching::Threshold;
 use crate::integrate::theta::{Setup, Start, Stepping, Theta};
+use crate::integrate::{roles, start};
 use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
 use crate::mna::{Behaviour, SwitchPort};
 use crate::plan::{Plan, not_exact, plan};
@@ -209,6 +209,22 @@ impl Problem<'_> {
         })
     }
 
+    /// See [`roles`].
+    fn choose_roles(&mut self, tran: &Tran) -> Result<(), SimError> {
+        let lcs = self.free(&self.position)?;
+        if roles::doubtful(&lcs, tran.tstop) {
+            let first = self.behaviour.in_other_roles();
+            let first = std::mem::replace(&mut self.behaviour, first);
+            if !self
+                .free(&self.position)
+                .is_ok_and(|other| roles::better(&lcs, &other))
+            {
+                self.behaviour = first;
+            }
+        }
+        Ok(())
+    }
+
     /// Positions of switches without `ON`/`OFF` that agree with their controls at the start state.
     fn settle_switches(&mut self, tran: &Tran, settings: &Settings) -> Result<(), SimError> {
         let mut seen = Vec::new();
@@ -313,6 +329,7 @@ fn dispatch(
     options: SimOptions<'_>,
 ) -> Result<Run, SimError> {
     check(&tran, &options)?;
+    problem.choose_roles(&tran)?;
     problem.settle_switches(&tran, &options.settings)?;
     let lcs = problem.free(&problem.position)?;
     let Plan {
@@ -369,6 +386,7 @@ fn dispatch(
     {
         theta.expect_amplitudes(amplitudes);
     }
+    theta.estimate_errors();
     let frame = frame(method, notes);
     run(&mut theta, Frame { progress, ..frame }, log())
 }

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::active::ActiveSolve;
+use super::lawful::{Lawful, PortLaw};
 use super::lcp::{Answered, Lcp, Scaling, Solution, Status};
 use super::lemke::{self, Lemke};
 use super::{convex, norm, pivot};
@@ -20,6 +21,8 @@ pub struct Driver {
     monotone: bool,
     warm: Vec<bool>,
     sets: Vec<(Vec<bool>, ActiveSolve)>,
+    /// Where a port has a law other than 0 ≤ λ ⟂ y ≥ 0.
+    lawful: Option<Box<Lawful>>,
     /// Factorisations computed so far.
     pub factorisations: u64,
 }
@@ -51,7 +54,33 @@ impl Driver {
             monotone,
             warm: vec![false; size],
             sets: Vec::new(),
+            lawful: None,
             factorisations: 0,
+        }
+    }
+
+    /// The number of pairs.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.scaled.size()
+    }
+
+    /// Prepares M for ports with any laws; see [`lawful`](super::lawful).
+    #[must_use]
+    pub fn with_laws(m: DMatrix<f64>, ports: Vec<PortLaw>, tolerance: f64) -> Self {
+        let curved = ports.iter().any(|port| !port.law.is_ideal_diode());
+        let scaling = Scaling::of(&m);
+        let lawful = curved.then(|| Box::new(Lawful::new(&m, &scaling, ports, tolerance)));
+        Self {
+            lawful,
+            ..Self::new(m, tolerance)
+        }
+    }
+
+    /// Proposes a solution to start from, where that is of use: for curved laws.
+    pub fn suggest_point(&mut self, lambda: &[f64], y: &[f64]) {
+        if let Some(lawful) = &mut self.lawful {
+            lawful.suggest(lambda, y);
         }
     }
 
@@ -68,6 +97,9 @@ impl Driver {
 
     /// Solves for one q.
     pub fn solve(&mut self, q: &DVector<f64>) -> Solution {
+        if let Some(lawful) = &mut self.lawful {
+            return lawful.solve(q);
+        }
         self.scaled.q = q.component_mul(&self.scaling.d);
         let size = self.scaled.size();
         let slack = SLACK * self.scaled.q.amax();
@@ -112,9 +144,13 @@ impl Driver {
     }
 
     /// The least-norm member of the solution set that `solution` belongs to, and whether the set is a single point. For
-    /// matrices that are not monotone the solution is returned as it is, and counted as unique where M_aa is regular.
+    /// matrices that are not monotone the solution is returned as it is, and counted as unique where M_aa is regular; with curved laws
+    /// it is returned as it is.
     #[must_use]
     pub fn least_norm(&mut self, q: &DVector<f64>, solution: &Solution) -> (DVector<f64>, bool) {
+        if self.lawful.is_some() {
+            return (solution.lambda.clone(), true);
+        }
         self.scaled.q = q.component_mul(&self.scaling.d);
         let scaled = solution.lambda.component_div(&self.scaling.d);
         let y = self.scaled.y(&scaled);
@@ -217,14 +253,20 @@ impl Driver {
         })
     }
 
-    /// λ' clipped to λ' ≥ 0 where it is negative by rounding, with its residual in scaled variables.
-    fn candidate(&self, scaled: DVector<f64>, basis: Vec<bool>, by: Answered) -> Solution {
+    /// λ' clipped to λ' ≥ 0 where it is negative by rounding, with its residual in scaled variables; what is clipped leaves
+    /// the index set.
+    fn candidate(&self, scaled: DVector<f64>, mut basis: Vec<bool>, by: Answered) -> Solution {
         let size = scaled.len();
         let one = Scaling {
             d: DVector::from_element(size, 1.0),
         };
         let rounding = self.tolerance * scaled.amax().max(self.scaled.q.amax());
-        let clipped = scaled.map(|v| if v.abs() <= rounding { v.max(0.0) } else { v });
+        let mut clipped = scaled;
+        for (v, active) in clipped.iter_mut().zip(&mut basis) {
+            if (-rounding..0.0).contains(v) {
+                (*v, *active) = (0.0, false);
+            }
+        }
         let y = self.scaled.y(&clipped);
         let residual = one.residual(&self.scaled, &clipped, &y);
         let active = one.active(&clipped, &y, self.tolerance);

@@ -41,7 +41,7 @@ impl<'a> Assembler<'a> {
     pub fn with_steps_of(mut self, original: &Behaviour) -> Self {
         let mut first = 0;
         for pair in &original.pairs {
-            let vertices = pair.port.law.curve().vertices;
+            let vertices = pair.port.law.curve().map_or_else(Vec::new, |c| c.vertices);
             let jumps = vertices
                 .windows(2)
                 .enumerate()

@@ -318,6 +318,7 @@ mod tests {
             delay,
             damping,
             phase,
+            cycles: None,
         })
     }
 

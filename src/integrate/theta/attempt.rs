@@ -10,14 +10,23 @@ impl Theta<'_> {
 
     /// Computes the step from now to t1 = now + h into `out` without committing it.
     pub(super) fn attempt(&mut self, h: f64, t1: f64) -> Result<(), SimError> {
+        if let Some(tableau) = Tableau::of(self.system(), self.scheme) {
+            return self.attempt_stages(tableau, h, t1);
+        }
         self.inputs.left(t1, &mut self.u_next);
-        self.stats.lcp_solves += 1;
-        let settle = self.now.settle && !self.lambda.is_empty();
-        let scheme = self.scheme;
+        self.stats.lcp_solves += u64::from(!self.lambda.is_empty());
+        let damped = self.starts_damped();
+        let settle = self.now.settle && (damped || !self.lambda.is_empty());
+        let scheme = if settle && damped {
+            Scheme::MOREAU
+        } else {
+            self.scheme
+        };
         let Self {
             plant,
             now,
             attempt,
+            amplitudes,
             settings,
             ..
         } = self;
@@ -42,22 +51,24 @@ impl Theta<'_> {
                 h,
                 settle,
                 solved: None,
+                work: None,
             };
         }
         let n = now.x.len();
         let fused = system.step(attempt.step).fused(attempt.mode);
-        if fused.step(&self.z, n, &mut self.out) {
+        let noise = |k| amplitudes.rounding(&system.lcs, k);
+        if fused.step(&self.z, n, &mut self.out, noise) {
             return Ok(());
         }
-        self.solve_step(h, t1)
+        self.solve_step(scheme, h, t1)
     }
 
     /// The step with γ = 1 by the solvers. Where the user's own γ = 1 > θ leaves a stiff step without solution, θ = 1 has one.
     #[cold]
-    pub(super) fn solve_step(&mut self, h: f64, t1: f64) -> Result<(), SimError> {
+    pub(super) fn solve_step(&mut self, scheme: Scheme, h: f64, t1: f64) -> Result<(), SimError> {
         self.stats.pivotings += 1;
-        let first = self.solve_with(self.scheme, h, t1);
-        if first.is_err() && self.scheme != Scheme::MOREAU {
+        let first = self.solve_with(scheme, h, t1);
+        if first.is_err() && scheme != Scheme::MOREAU {
             return self.solve_with(Scheme::MOREAU, h, t1);
         }
         first
@@ -100,6 +111,7 @@ impl Theta<'_> {
             h,
             settle: false,
             solved: Some((solution.basis, solution.active)),
+            work: None,
         };
         Ok(())
     }
@@ -113,6 +125,9 @@ impl Theta<'_> {
                 limit: self.settings.max_steps,
             };
             return Err(SimError::at(self.now.t, reason));
+        }
+        if self.now.estimate.is_some() && self.control.is_none() {
+            self.carry_error();
         }
         if let Some((basis, pattern)) = self.attempt.solved.take() {
             self.commit_solved(basis, pattern, t1);
@@ -129,10 +144,44 @@ impl Theta<'_> {
         Ok(())
     }
 
+    /// The error after the attempted step.
+    fn carry_error(&mut self) {
+        let Self {
+            plant,
+            now,
+            attempt,
+            out,
+            scheme,
+            ..
+        } = self;
+        let Some(estimate) = &mut now.estimate else {
+            return;
+        };
+        if now.settle {
+            estimate.restart();
+        }
+        let n = now.x.len();
+        let fused = || {
+            plant.systems[now.system]
+                .1
+                .step(attempt.step)
+                .fused(attempt.mode)
+        };
+        let map = attempt.solved.is_none().then(|| fused().flow(n));
+        let second_order = scheme.order() == 2 && !attempt.settle;
+        estimate.step(attempt.h, &now.x, &out[..n], map, second_order);
+    }
+
     #[cold]
     pub(super) fn commit_solved(&mut self, basis: Vec<bool>, pattern: Vec<Option<bool>>, t1: f64) {
         let n = self.now.x.len();
         let h = self.attempt.h;
+        if let Some(work) = self.attempt.work {
+            self.now.balance.add(work);
+            self.take_pattern(basis, &pattern, t1);
+            self.attempt.h = f64::NAN;
+            return;
+        }
         // Energy at the end of the step (γ = 1) from the solution itself.
         for (du, (a, b)) in self.du.iter_mut().zip(self.u_next.iter().zip(&self.now.u)) {
             *du = (a - b) / h;
