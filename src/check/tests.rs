@@ -159,6 +159,7 @@ fn a_driven_output_leaves_theorem_2_to_the_result_with_inputs() {
         delay: 0.0,
         damping: 0.0,
         phase: 0.0,
+        cycles: None,
     };
     drive(&mut driven, "v1", sine, &[0.0], &[0.0, 0.0, -1.0, 1.0]);
     let report = system(&driven);
@@ -486,6 +487,7 @@ fn dissipation_decides_where_a_circuit_with_ideal_diodes_comes_to_rest() {
         delay: 0.0,
         damping: 0.0,
         phase: 0.0,
+        cycles: None,
     };
     drive(&mut driven, "v1", square, &[1.0, 0.0], &[0.0; 4]);
     assert_eq!(system(&driven).convergence, None);

@@ -51,6 +51,9 @@ pub(super) struct Builder<'n, 'o> {
     pub(super) trans: Vec<&'n ast::Tran>,
     pub(super) other_analysis: bool,
     pub(super) ics: Vec<(ScopeId, &'n [(Signal, Expr)])>,
+    pub(super) nodesets: Vec<(ScopeId, &'n [(Signal, Expr)])>,
+    /// `.temp`.
+    pub(super) temperature: Option<&'n Expr>,
     pub(super) saves: Vec<(ScopeId, &'n [Wanted])>,
     /// What `.print dc` asks for, which counts where there is no `.tran`.
     pub(super) dc_saves: Vec<(ScopeId, &'n [Wanted])>,
@@ -89,6 +92,8 @@ impl<'n, 'o> Builder<'n, 'o> {
             trans: Vec::new(),
             other_analysis: false,
             ics: Vec::new(),
+            nodesets: Vec::new(),
+            temperature: None,
             saves: Vec::new(),
             dc_saves: Vec::new(),
             measurements: Vec::new(),
@@ -120,9 +125,6 @@ impl<'n, 'o> Builder<'n, 'o> {
                 &name.to_lowercase(),
                 Some(Value::binary(*value)),
             );
-        }
-        if let Some(temperature) = self.options.temperature {
-            self.scopes.temperature = Value::binary(temperature);
         }
         self.define(&netlist.body, ScopeId::ROOT);
         self.check_overrides();
@@ -404,6 +406,9 @@ impl<'n, 'o> Builder<'n, 'o> {
         self.couple();
         for (scope, list) in std::mem::take(&mut self.ics) {
             self.initial(list, scope);
+        }
+        for (scope, list) in std::mem::take(&mut self.nodesets) {
+            self.nodeset(list, scope);
         }
         let saves = if self.circuit.tran.is_some() || self.circuit.dc.is_empty() {
             std::mem::take(&mut self.saves)

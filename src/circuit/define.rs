@@ -14,6 +14,7 @@ impl<'n> Builder<'n, '_> {
             self.define_one(statement, scope);
         }
         if scope == ScopeId::ROOT {
+            self.set_temperature();
             self.steps();
         }
         for statement in &block.statements {
@@ -87,6 +88,8 @@ impl<'n> Builder<'n, '_> {
             Statement::Tran(tran) => self.trans.push(tran),
             Statement::Analysis(_) => self.other_analysis = true,
             Statement::Ic(list) => self.ics.push((scope, list)),
+            Statement::Nodeset(list) => self.nodesets.push((scope, list)),
+            Statement::Temperature(value) => self.temperature = Some(value),
             Statement::Save(list) => self.saves.push((scope, list)),
             Statement::SaveDc(list) => self.dc_saves.push((scope, list)),
             Statement::Meas(meas) => self.measurements.push((scope, meas)),

@@ -12,6 +12,7 @@ mod diode;
 mod drive;
 mod elaborate;
 mod eval;
+mod exponential;
 mod form;
 mod formula;
 mod functions;
@@ -82,6 +83,8 @@ pub struct Circuit {
     pub probes: Vec<Probe>,
     /// `.ic v(n)=…` (and differences `v(a,b)=…`): nodes and volts.
     pub initial_voltages: Vec<(NodeId, NodeId, f64)>,
+    /// `.nodeset v(n)=…`: nodes and volts from which the switches of the operating point are looked for.
+    pub nodesets: Vec<(NodeId, NodeId, f64)>,
     /// `.step`, the first one innermost; the circuit has the values as they stand.
     pub steps: Vec<Sweep>,
     /// `.dc`, the first sweep innermost.

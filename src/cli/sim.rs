@@ -32,20 +32,12 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         .iter()
         .map(|path| Format::of(path))
         .collect::<Result<Vec<_>, _>>()?;
+    let request = Request::of(&args.method, args.events)?;
     if let Some(form) = forms::open(args)? {
-        let run = forms::run(&form, args)?;
-        deliver(
-            &run,
-            &Measurements::default(),
-            args,
-            &formats,
-            true,
-            streams,
-        )?;
-        return Ok(Exit::Done);
+        let finished = (forms::run(&form, args)?, Measurements::default());
+        return finish(args, &formats, (Some(finished), None), streams);
     }
     let (subject, cards) = input::open_with_cards(&args.input, &args.probes, streams)?;
-    let request = Request::of(&args.method, args.events)?;
     if let (Subject::Circuit(both), Some((netlist, sources))) = (&subject, cards) {
         let (circuit, _) = &**both;
         if circuit.tran.is_none() && !circuit.dc.is_empty() {
@@ -62,9 +54,33 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
             return stepping.sim(&formats, streams);
         }
     }
-    let (finished, error) = measured_run(&subject, &request, streams)?;
+    let finished = measured_run(&subject, &request, streams)?;
+    finish(args, &formats, finished, streams)
+}
+
+/// Writes what a run gave, or as much of it as there is, and says why it ended early.
+fn finish(
+    args: &SimArgs,
+    formats: &[Format],
+    (finished, error): Finished,
+    streams: &Streams,
+) -> Result<Exit, Failure> {
     if let Some((run, found)) = &finished {
-        deliver(run, found, args, &formats, error.is_none(), streams)?;
+        if args.method.step.is_some() && run.method == Method::Exact.name() {
+            streams.say("note: --step is of no use to exact integration, which has no steps");
+        }
+        for (path, format) in args.outputs.iter().zip(formats) {
+            let figure = || Figure::of_waveforms(&run.waveforms);
+            match output::write(run, &figure, *format, path) {
+                // A picture of a run that broke off before its first row.
+                Err(Failure::Picture(_)) if error.is_some() => {}
+                written => written?,
+            }
+        }
+        summarise(run, found, args, streams);
+        if args.outputs.is_empty() {
+            show(run, streams)?;
+        }
     }
     match error {
         None => Ok(Exit::Done),
@@ -73,33 +89,6 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
             args.input.file.display()
         ))),
     }
-}
-
-/// Writes a run to where it was asked for, `whole` unless it broke off.
-fn deliver(
-    run: &Run,
-    found: &Measurements,
-    args: &SimArgs,
-    formats: &[Format],
-    whole: bool,
-    streams: &Streams,
-) -> Result<(), Failure> {
-    if args.method.step.is_some() && run.method == Method::Exact.name() {
-        streams.say("note: --step is of no use to exact integration, which has no steps");
-    }
-    for (path, format) in args.outputs.iter().zip(formats) {
-        let figure = || Figure::of_waveforms(&run.waveforms);
-        match output::write(run, &figure, *format, path) {
-            // A picture of a run that broke off before its first row.
-            Err(Failure::Picture(_)) if !whole => {}
-            written => written?,
-        }
-    }
-    summarise(run, found, args, streams);
-    if args.outputs.is_empty() {
-        show(run, streams)?;
-    }
-    Ok(())
 }
 
 /// A run, or as much of it as there is, and what its measurements found.

@@ -5,12 +5,13 @@ use nalgebra::DVector;
 use crate::circuit::{
     Circuit, Element, ElementId, Kind, NodeId, Probe, Probed, Source, source::Wave,
 };
+use crate::integrate::lawful;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Reason, SimError};
 use crate::lcs::{Hold, Lcs, Position, ReduceError, StorageHold, reduce};
 use crate::mna::{Behaviour, behaviour};
 use crate::settings::Settings;
-use crate::solve::{Driver, Status};
+use crate::solve::Status;
 
 /// The state of a circuit before t = 0+.
 #[derive(Debug, Clone, PartialEq)]
@@ -121,6 +122,11 @@ pub fn operating_point(
         .iter()
         .map(|s| s.initial.unwrap_or(false))
         .collect();
+    if let Some(guess) = from_nodesets(circuit, values, settings) {
+        for ((position, switch), on) in position.iter_mut().zip(&behaviour.switches).zip(guess) {
+            *position = switch.initial.unwrap_or(on);
+        }
+    }
     let mut seen = Vec::new();
     loop {
         let point = static_solution(&behaviour, &position, values, settings)?;
@@ -166,6 +172,17 @@ pub fn operating_point(
         }
         seen.push(std::mem::replace(&mut position, wanted));
     }
+}
+
+/// Switch positions of the operating point with the voltages of `.nodeset` held; `None` without such a point.
+fn from_nodesets(circuit: &Circuit, values: Values, settings: &Settings) -> Option<Vec<bool>> {
+    if circuit.nodesets.is_empty() {
+        return None;
+    }
+    let mut held = circuit.clone();
+    held.initial_voltages = std::mem::take(&mut held.nodesets);
+    let point = operating_point(&held, values, true, settings).ok()?;
+    Some(point.switches.into_iter().map(|(_, on)| on).collect())
 }
 
 /// The circuit with all node voltages and element currents as probes.
@@ -347,7 +364,7 @@ fn devices(
     if q.is_empty() {
         return Ok(DVector::zeros(0));
     }
-    let mut driver = Driver::new(lcs.d.clone(), settings.lcp_residual);
+    let mut driver = lawful::driver(lcs, lcs.d.clone(), settings.lcp_residual);
     let solution = driver.solve(q);
     match solution.status {
         Status::Solved => {}

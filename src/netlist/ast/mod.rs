@@ -68,6 +68,10 @@ pub enum Statement {
     Analysis(Span),
     /// `.ic`.
     Ic(Vec<(Signal, Expr)>),
+    /// `.nodeset`.
+    Nodeset(Vec<(Signal, Expr)>),
+    /// `.temp t`, `.options temp=t`, °C.
+    Temperature(Expr),
     /// `.save`, `.print`, `.probe`, `.plot`.
     Save(Vec<Wanted>),
     /// `.print dc`, `.plot dc`.

@@ -237,7 +237,7 @@ fn met<'a>(i: Input<'a>, level: Option<&str>) -> Parsed<'a, Instant<Expr>> {
 }
 
 /// `.four frequency [harmonics [periods]] v(a) i(r1) …`.
-pub(super) fn four<'a>(start: Input<'a>, i: Input<'a>) -> Parsed<'a, Dot> {
+pub(in crate::netlist) fn four<'a>(start: Input<'a>, i: Input<'a>) -> Parsed<'a, Dot> {
     let (mut at, frequency) = operand::value(separator(i)).map_err(|e| match e {
         nom::Err::Error(_) => missing(i, "the frequency"),
         e => e,
