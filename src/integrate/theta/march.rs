@@ -1,6 +1,7 @@
 //! From stop to stop in base steps, halved where the error or a switch asks for it.
 
 use super::*;
+use crate::integrate::control::Verdict;
 
 impl Theta<'_> {
     /// Advances to `stop`, which no breakpoint lies before; u is the left limit there.
@@ -130,15 +131,15 @@ impl Theta<'_> {
         }
         let mut impulse = false;
         if self.control.is_some() {
-            let mut accepted = self.controlled(h, t1, last_chance, &mut impulse)?;
+            let mut verdict = self.controlled(h, t1, last_chance, &mut impulse)?;
             // The midpoint rule may have rung at what an edge or a jump left behind: the same step once more, damped.
-            if !accepted && self.kept.settle && self.scheme.order() == 2 {
+            if !verdict.accept && self.kept.settle && self.scheme.order() == 2 {
                 self.back(steps);
                 self.damped = true;
-                accepted = self.controlled(h, t1, last_chance, &mut impulse)?;
+                verdict = self.controlled(h, t1, last_chance, &mut impulse)?;
                 self.damped = false;
             }
-            if !accepted && !last_chance {
+            if !verdict.accept && !last_chance {
                 self.back(steps);
                 return Ok(false);
             }
@@ -176,14 +177,14 @@ impl Theta<'_> {
         Ok(true)
     }
 
-    /// A step of h and two of h/2, the latter committed; whether their difference is small enough.
+    /// A step of h and two of h/2, the latter committed, and what error control says of their difference.
     fn controlled(
         &mut self,
         h: f64,
         t1: f64,
         last_chance: bool,
         impulse: &mut bool,
-    ) -> Result<bool, SimError> {
+    ) -> Result<Verdict, SimError> {
         self.attempt(h, t1)?;
         let n = self.now.x.len();
         self.coarse.copy_from_slice(&self.out[..n]);
@@ -199,12 +200,16 @@ impl Theta<'_> {
         let error = self
             .amplitudes
             .error(&self.system().lcs, &self.coarse, &self.now.x);
-        let Some(control) = &self.control else {
-            return Ok(true);
+        let verdict = match &self.control {
+            Some(control) => control.judge(h, error),
+            None => Verdict {
+                accept: true,
+                next: h,
+                error,
+            },
         };
-        let verdict = control.judge(h, error);
         self.preferred = verdict.next;
-        Ok(verdict.accept)
+        Ok(verdict)
     }
 
     pub(super) fn back(&mut self, steps: u64) {
