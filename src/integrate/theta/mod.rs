@@ -104,6 +104,8 @@ pub struct Theta<'a> {
     now: Now,
     kept: Now,
     started: bool,
+    /// Settling steps of the midpoint rule are Moreau's for now.
+    damped: bool,
     preferred: f64,
     last_h: f64,
     u_next: Vec<f64>,
@@ -246,6 +248,7 @@ impl<'a> Theta<'a> {
             kept: now.clone(),
             now,
             started: false,
+            damped: false,
             preferred,
             last_h: 0.0,
             z: Vec::new(),
