@@ -46,14 +46,17 @@ pub fn plan(lcs: &Lcs, options: &SimOptions) -> Plan {
         },
     };
     if matches!(method, Method::Euler | Method::Theta) {
+        let curved = lcs.ports.iter().any(|p| !p.law.is_piecewise_linear());
+        let rule = if curved && scheme != Scheme::MOREAU {
+            "three implicit stages of order 3".to_string()
+        } else {
+            format!("θ = {}, γ = {}", scheme.theta, scheme.gamma)
+        };
         words.push(match options.step {
-            Some(h) => format!(
-                "θ = {}, γ = {}, fixed step {h:e} s",
-                scheme.theta, scheme.gamma
-            ),
+            Some(h) => format!("{rule}, fixed step {h:e} s"),
             None => format!(
-                "θ = {}, γ = {}, steps chosen for a tolerance of {:e}",
-                scheme.theta, scheme.gamma, options.settings.tol
+                "{rule}, steps chosen for a tolerance of {:e}",
+                options.settings.tol
             ),
         });
     }
@@ -75,7 +78,13 @@ pub fn plan(lcs: &Lcs, options: &SimOptions) -> Plan {
 /// What keeps a system from exact integration: the element and why.
 #[must_use]
 pub fn not_exact(lcs: &Lcs) -> Option<String> {
-    // Every law so far is piecewise linear; a source may lack a finite exosystem.
+    if let Some(port) = lcs.ports.iter().find(|p| !p.law.is_piecewise_linear()) {
+        return Some(format!(
+            "the law of {} does not consist of straight pieces",
+            port.device
+        ));
+    }
+    // A source may lack a finite exosystem.
     let endless = |input: &&Input| input.source.piece(0.0).is_none();
     let source = lcs.inputs.iter().find(endless)?;
     Some(format!(

@@ -18,7 +18,7 @@ const ROOMS: [(&str, &[&str]); 18] = [
     ),
     ("mna", &["algebra", "circuit", "diagnostic", "law"]),
     ("lcs", &["algebra", "circuit", "law", "mna"]),
-    ("solve", &["settings"]),
+    ("solve", &["law", "settings"]),
     ("waveform", &[]),
     ("plan", &["lcs", "settings", "solve"]),
     (
@@ -41,7 +41,10 @@ const ROOMS: [(&str, &[&str]); 18] = [
             "solve",
         ],
     ),
-    ("forms", &["check", "lcs", "passivity", "settings", "solve"]),
+    (
+        "forms",
+        &["check", "lcs", "netlist", "passivity", "settings", "solve"],
+    ),
     (
         "report",
         &[

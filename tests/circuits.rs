@@ -382,8 +382,10 @@ fn every_netlist_runs_and_balances_its_energy() {
     for name in names {
         let run = run(&name, SimOptions::default());
         assert!(run.waveforms.values.iter().all(|v| v.is_finite()), "{name}");
+        // Time-stepping keeps the balance to its own error.
+        let limit = if run.method == "exact" { 1e-9 } else { 1e-6 };
         assert!(
-            run.energy.residual_relative < 1e-9,
+            run.energy.residual_relative < limit,
             "{name}: {:?}",
             run.energy
         );

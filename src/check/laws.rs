@@ -66,6 +66,16 @@ impl Graph {
                 vertices: curve.vertices.iter().map(|(v, i)| (v.f64, i.f64)).collect(),
                 last: (curve.last.0.f64, curve.last.1.f64),
             },
+            // The hull that has the same bounds and the same zero.
+            Law::Exponential(diode) => Self {
+                first: if diode.breakdown.is_some() {
+                    (1.0, 1.0)
+                } else {
+                    (1.0, 0.0)
+                },
+                vertices: vec![(-diode.slope, -diode.is), (0.0, 0.0)],
+                last: (1.0, 1.0),
+            },
         }
     }
 

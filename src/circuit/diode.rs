@@ -48,7 +48,7 @@ impl<'n> Builder<'n, '_> {
                     return None;
                 }
                 let factor = self.factor(area.or(args.get(&["area"])), args, scope)?;
-                self.diode_law(card, name, &Parameters::new(&chain), scope)
+                self.diode_law(card, name, &Parameters::new(&chain), args, scope)
                     .map(|law| scaled(law, factor))
             })
         };
@@ -84,6 +84,7 @@ impl<'n> Builder<'n, '_> {
         card: &ast::Element,
         name: &Name,
         params: &Parameters<'n>,
+        args: Args<'n>,
         scope: ScopeId,
     ) -> Option<Law> {
         let piecewise = ["ron", "roff", "vfwd", "vrev", "rrev"]
@@ -94,23 +95,16 @@ impl<'n> Builder<'n, '_> {
         let near_ideal = emission.is_some_and(|n| n.f64 <= IDEAL_EMISSION)
             || params.flag("ideal")
             || (name.text.contains("ideal") && !is_exponential);
-        let series = self.parameter(params, "rs", scope)?.unwrap_or(ZERO);
         let exponential = !piecewise && !near_ideal;
-
-        if self.options.diodes == Diodes::Exp
-            || (exponential && self.options.diodes == Diodes::Auto)
-        {
-            let message = format!(
-                "`{}` has the exponential model `{}`, which is not supported yet",
-                card.name.text, name.text
-            );
-            self.tell(
-                Diagnostic::error("exponential-diode", name.span, message)
-                    .label("an exponential diode")
-                    .help("`--diodes ideal` simulates it as an ideal diode in series with its RS"),
-            );
-            return None;
+        let wanted = match self.options.diodes {
+            Diodes::Exp => true,
+            Diodes::Auto => exponential,
+            Diodes::Ideal => false,
+        };
+        if wanted {
+            return self.exponential_law(card, name, params, args, scope);
         }
+        let series = self.parameter(params, "rs", scope)?.unwrap_or(ZERO);
         if exponential {
             if params.get("bv").is_some() {
                 self.unused(format!("bv of {}", name.text), name);
@@ -166,6 +160,7 @@ fn scaled(law: Law, factor: f64) -> Law {
     }
     let less = |r: Value| Value::binary(r.f64 / factor);
     match law {
+        Law::Exponential(diode) => Law::Exponential(diode.times(factor)),
         Law::Diode { vfwd, ron, roff } => Law::Diode {
             vfwd,
             ron: less(ron),
@@ -214,7 +209,7 @@ mod tests {
     fn diode(card: &str, model: &str, diodes: Diodes) -> Option<(f64, f64, Option<f64>)> {
         match law(card, model, diodes)? {
             Law::Diode { vfwd, ron, roff } => Some((vfwd.f64, ron.f64, roff.map(|r| r.f64))),
-            Law::Curve(curve) => panic!("{curve:?}"),
+            other => panic!("{other:?}"),
         }
     }
 
@@ -237,9 +232,6 @@ mod tests {
                 Some((0.0, 0.5, Some(500.0))),
             ),
             ("D1 b 0 m m=4", "m D(Ron=1)", Some((0.0, 0.25, None))),
-            (d, "m D", None),
-            (d, "m D(IS=1e-14 N=1)", None),
-            ("D1 b 0 ideal", "ideal D(IS=1e-14)", None),
         ] {
             assert_eq!(
                 diode(card, model, Diodes::Auto),
@@ -263,7 +255,6 @@ mod tests {
             diode("D1 b 0 other", "m D", Diodes::Ideal),
             Some((0.0, 0.0, None))
         );
-        assert_eq!(diode("D1 b 0 m", "m D(Ron=1m)", Diodes::Exp), None);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use crate::netlist::Netlist;
 /// Which law a diode model becomes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Diodes {
-    /// What the model says: `Ron Roff Vfwd`, `N ≤ 0.05` or `ideal` is piecewise linear.
+    /// What the model says: `Ron Roff Vfwd`, `N ≤ 0.05` or `ideal` is piecewise linear, everything else exponential.
     #[default]
     Auto,
     /// Every exponential model is replaced by the ideal diode in series with its RS.

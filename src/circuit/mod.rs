@@ -12,6 +12,7 @@ mod diode;
 mod drive;
 mod elaborate;
 mod eval;
+mod exponential;
 mod form;
 mod formula;
 mod functions;

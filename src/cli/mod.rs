@@ -7,6 +7,7 @@ mod compare;
 mod cpu;
 mod dc;
 pub mod exit;
+mod forms;
 mod graph;
 pub mod input;
 mod lcs;

@@ -5,6 +5,7 @@ use std::io::Write;
 use super::args::{self, MethodArgs, SimArgs, Summary};
 use super::dc;
 use super::exit::{Exit, Failure};
+use super::forms;
 use super::input::{self, Subject};
 use super::measured::{self, Measuring};
 use super::output::{self, Format};
@@ -31,8 +32,12 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         .iter()
         .map(|path| Format::of(path))
         .collect::<Result<Vec<_>, _>>()?;
-    let (subject, cards) = input::open_with_cards(&args.input, &args.probes, streams)?;
     let request = Request::of(&args.method, args.events)?;
+    if let Some(form) = forms::open(args)? {
+        let finished = (forms::run(&form, args)?, Measurements::default());
+        return finish(args, &formats, (Some(finished), None), streams);
+    }
+    let (subject, cards) = input::open_with_cards(&args.input, &args.probes, streams)?;
     if let (Subject::Circuit(both), Some((netlist, sources))) = (&subject, cards) {
         let (circuit, _) = &**both;
         if circuit.tran.is_none() && !circuit.dc.is_empty() {
@@ -49,14 +54,24 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
             return stepping.sim(&formats, streams);
         }
     }
-    let (finished, error) = measured_run(&subject, &request, streams)?;
+    let finished = measured_run(&subject, &request, streams)?;
+    finish(args, &formats, finished, streams)
+}
+
+/// Writes what a run gave, or as much of it as there is, and says why it ended early.
+fn finish(
+    args: &SimArgs,
+    formats: &[Format],
+    (finished, error): Finished,
+    streams: &Streams,
+) -> Result<Exit, Failure> {
     if let Some((run, found)) = &finished {
         if args.method.step.is_some() && run.method == Method::Exact.name() {
             streams.say("note: --step is of no use to exact integration, which has no steps");
         }
         for (path, format) in args.outputs.iter().zip(formats) {
             let figure = || Figure::of_waveforms(&run.waveforms);
-            match output::write(run, &figure, format, path) {
+            match output::write(run, &figure, *format, path) {
                 // A picture of a run that broke off before its first row.
                 Err(Failure::Picture(_)) if error.is_some() => {}
                 written => written?,

@@ -5,7 +5,6 @@
 //! the errors of all steps together stay below the tolerance. Step sizes change by factors of two only.
 
 use crate::integrate::inputs::Inputs;
-use crate::integrate::step::Scheme;
 use crate::lcs::Lcs;
 use crate::settings::Settings;
 
@@ -25,6 +24,8 @@ pub struct Verdict {
     pub accept: bool,
     /// The step to try next, s.
     pub next: f64,
+    /// The error of the step, relative to the amplitude.
+    pub error: f64,
 }
 
 /// A step is doubled where the error of the doubled one would still leave this factor of room.
@@ -35,10 +36,9 @@ const ROOM: f64 = 2.0;
 const CORNER: f64 = 1e-5;
 
 impl Control {
-    /// Control over a span, s.
+    /// Control of a method of an order, over a span, s.
     #[must_use]
-    pub fn new(scheme: Scheme, settings: &Settings, span: f64) -> Self {
-        let order = scheme.order();
+    pub fn new(order: i32, settings: &Settings, span: f64) -> Self {
         Self {
             order,
             tol: settings.tol,
@@ -66,7 +66,11 @@ impl Control {
         } else {
             h
         };
-        Verdict { accept, next }
+        Verdict {
+            accept,
+            next,
+            error,
+        }
     }
 }
 
@@ -180,7 +184,7 @@ mod tests {
 
     #[test]
     fn order_decides_the_growth() {
-        let control = Control::new(Scheme::MIDPOINT, &Settings::default(), 1.0);
+        let control = Control::new(2, &Settings::default(), 1.0);
         let h = 0.01;
         // tol·h = 1e-6; the estimate is a third of the difference.
         assert!(!control.judge(h, 4e-6).accept);

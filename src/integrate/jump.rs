@@ -12,6 +12,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::integrate::lawful;
 use crate::lcs::Lcs;
 use crate::solve::lcp::Scaling;
 use crate::solve::{Driver, Status};
@@ -27,6 +28,8 @@ pub struct JumpProblem {
     /// Whether D + Dᵀ and the jump matrix NᵀCBN are positive semidefinite, as for every passive network. If not, the jump is
     /// not given by this problem.
     pub monotone: bool,
+    /// Where curved laws take part: the ideal ports and the system of them alone, which the rest is about.
+    part: Option<Box<(Vec<usize>, Lcs)>>,
 }
 
 /// What a jump did.
@@ -49,6 +52,14 @@ impl JumpProblem {
         let m = lcs.m();
         if m == 0 || lcs.n() == 0 {
             return None;
+        }
+        if lawful::is_curved(lcs) {
+            let (ports, part) = lawful::ideal_part(lcs);
+            let problem = Self::new(&part, tolerance)?;
+            return Some(Self {
+                part: Some(Box::new((ports, part))),
+                ..problem
+            });
         }
         let cb = &lcs.c * &lcs.b;
         // Levelled with CB where D is zero, so that ports without feedthrough have a scale too.
@@ -86,6 +97,7 @@ impl JumpProblem {
             sigma,
             driver,
             monotone,
+            part: None,
         })
     }
 
@@ -99,6 +111,23 @@ impl JumpProblem {
         x: &DVector<f64>,
         u: &DVector<f64>,
     ) -> Result<Option<Jump>, Infeasible> {
+        if let Some(whole) = self.part.take() {
+            let (ports, part) = &*whole;
+            let found = self.solve(part, x, u);
+            let to_whole = |jump: Jump| {
+                let mut p = DVector::zeros(lcs.m());
+                for (k, &j) in ports.iter().enumerate() {
+                    p[j] = jump.p[k];
+                }
+                Jump { p, ..jump }
+            };
+            let found = match found {
+                Ok(jump) => Ok(jump.map(to_whole)),
+                Err(Infeasible { port }) => Err(Infeasible { port: ports[port] }),
+            };
+            self.part = Some(whole);
+            return found;
+        }
         let k = self.basis.ncols();
         let right = self.basis.transpose() * (&lcs.c * x + &lcs.g * u + &lcs.f);
         if right.amax() == 0.0 {

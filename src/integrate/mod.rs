@@ -9,6 +9,7 @@ pub(crate) mod fixtures;
 mod handover;
 pub mod inputs;
 pub mod jump;
+mod lawful;
 pub mod reading;
 mod roles;
 pub mod run;

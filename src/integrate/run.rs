@@ -135,6 +135,8 @@ pub struct Outcome {
     pub stats: Stats,
     /// Energy balance.
     pub energy: Energy,
+    /// See [`Run::error_estimate`].
+    pub error_estimate: Option<f64>,
     /// Things the user should know.
     pub notes: Vec<String>,
 }
@@ -342,6 +344,7 @@ pub fn run(stepper: &mut dyn Stepper, frame: Frame<'_>, mut log: Log) -> Result<
         plan,
         stats: outcome.stats,
         energy: outcome.energy,
+        error_estimate: outcome.error_estimate,
         impulses: log.impulses,
         events: log.events,
         notes: all_notes,

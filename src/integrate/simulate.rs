@@ -93,6 +93,7 @@ pub fn simulate(
             .collect(),
         start: initial.storage,
         notes,
+        original: behaviour,
         behaviour: standard,
     };
     drive(problem, tran, options)
@@ -108,7 +109,8 @@ pub fn simulate_system(
     tran: Tran,
     options: SimOptions<'_>,
 ) -> Result<Run, SimError> {
-    let behaviour = Behaviour::from_lcs(lcs).standard();
+    let original = Behaviour::from_lcs(lcs);
+    let behaviour = original.standard();
     let mut start = DVector::zeros(behaviour.storage.len());
     start.rows_mut(0, x.len()).copy_from(x);
     let problem = Problem {
@@ -116,13 +118,16 @@ pub fn simulate_system(
         settle: vec![],
         start,
         notes: vec![],
+        original: &original,
         behaviour,
     };
     drive(problem, tran, options)
 }
 
 /// What the steppers share.
-struct Problem {
+struct Problem<'a> {
+    /// As given.
+    original: &'a Behaviour,
     /// All laws as ideal pairs.
     behaviour: Behaviour,
     position: Vec<bool>,
@@ -138,7 +143,7 @@ const SCOUT_STEPS: f64 = 256.0;
 /// The scout gives up after this many steps (trains of many pulses); what it has seen by then is used.
 const SCOUT_LIMIT: u64 = 20_000;
 
-impl Problem {
+impl Problem<'_> {
     fn reduce(&self, devices: &[Hold], switches: &[bool]) -> Result<Lcs, SimError> {
         let position = Position {
             devices: devices.to_vec(),
@@ -164,7 +169,7 @@ impl Problem {
 
     fn exact(&self, tran: &Tran, settings: &Settings) -> Result<Exact<'_>, SimError> {
         Exact::new(exact::Setup {
-            assembler: exact::Assembler::new(&self.behaviour),
+            assembler: exact::Assembler::new(&self.behaviour).with_steps_of(self.original),
             position: self.position.clone(),
             t: 0.0,
             until: tran.tstop,
@@ -273,7 +278,7 @@ impl Problem {
     }
 }
 
-impl Problem {
+impl Problem<'_> {
     /// Exact integration with Moreau's steps where it cannot go on.
     fn handover<'a>(
         &'a self,
@@ -299,7 +304,7 @@ fn controlled(tran: &Tran) -> Stepping {
     }
 }
 
-fn drive(problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
+fn drive(problem: Problem<'_>, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
     let begin = ThreadTime::now();
     let mut result = dispatch(problem, tran, options);
     let stats = match &mut result {
@@ -312,7 +317,11 @@ fn drive(problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result<Run, S
     result
 }
 
-fn dispatch(mut problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
+fn dispatch(
+    mut problem: Problem<'_>,
+    tran: Tran,
+    options: SimOptions<'_>,
+) -> Result<Run, SimError> {
     check(&tran, &options)?;
     problem.choose_roles(&tran)?;
     problem.settle_switches(&tran, &options.settings)?;
@@ -371,6 +380,7 @@ fn dispatch(mut problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result
     {
         theta.expect_amplitudes(amplitudes);
     }
+    theta.estimate_errors();
     let frame = frame(method, notes);
     run(&mut theta, Frame { progress, ..frame }, log())
 }

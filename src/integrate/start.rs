@@ -5,12 +5,13 @@ use nalgebra::DVector;
 use crate::circuit::{
     Circuit, Element, ElementId, Kind, NodeId, Probe, Probed, Source, source::Wave,
 };
+use crate::integrate::lawful;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Reason, SimError};
 use crate::lcs::{Hold, Lcs, Position, ReduceError, StorageHold, reduce};
 use crate::mna::{Behaviour, behaviour};
 use crate::settings::Settings;
-use crate::solve::{Driver, Status};
+use crate::solve::Status;
 
 /// The state of a circuit before t = 0+.
 #[derive(Debug, Clone, PartialEq)]
@@ -363,7 +364,7 @@ fn devices(
     if q.is_empty() {
         return Ok(DVector::zeros(0));
     }
-    let mut driver = Driver::new(lcs.d.clone(), settings.lcp_residual);
+    let mut driver = lawful::driver(lcs, lcs.d.clone(), settings.lcp_residual);
     let solution = driver.solve(q);
     match solution.status {
         Status::Solved => {}

@@ -16,6 +16,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::integrate::energy::PowerForms;
+use crate::integrate::lawful;
 use crate::lcs::Lcs;
 use crate::solve::Driver;
 use crate::solve::active::{ActiveSolve, equilibrated_inverse};
@@ -218,7 +219,7 @@ impl StepMatrices {
                 q: DVector::zeros(m.nrows()),
             })
             .m;
-        let driver = Driver::new(m.clone(), tolerance);
+        let driver = lawful::driver(lcs, m.clone(), tolerance);
         let after = if gamma < 1.0 {
             let short = Self::new(lcs, columns, h * SHORT, Scheme::MOREAU, tolerance)?;
             Some(Box::new(short))
@@ -403,6 +404,11 @@ impl FusedMode {
             && guards.iter().zip(sizes).all(|(&guard, size)| {
                 guard > GUARD_ROUNDING * size.iter().zip(z).map(|(a, b)| a * b.abs()).sum::<f64>()
             })
+    }
+
+    /// The rows of x⁺ over z, and how long each is.
+    pub(crate) fn flow(&self, n: usize) -> (&[f64], usize) {
+        (&self.k[..n * self.width], self.width)
     }
 
     /// λ of this mode from the guards of a step.

@@ -4,6 +4,7 @@ use nalgebra::DVector;
 
 use crate::integrate::inputs::Inputs;
 use crate::integrate::jump::JumpProblem;
+use crate::integrate::lawful;
 use crate::integrate::run::{Reason, SimError};
 use crate::integrate::step::{Columns, Scheme, StepMatrices};
 use crate::lcs::Lcs;
@@ -17,6 +18,8 @@ pub(crate) struct System {
     pub columns: Columns,
     /// The jump problem, where an impulse can flow at all.
     pub jump: Option<JumpProblem>,
+    /// Whether a law does not consist of straight pieces.
+    pub curved: bool,
     matrices: Vec<StepMatrices>,
     clock: u64,
 }
@@ -33,8 +36,9 @@ impl System {
         };
         let jump = JumpProblem::new(&lcs, tolerance);
         Self {
-            lcs,
             columns,
+            curved: lawful::is_curved(&lcs),
+            lcs,
             jump,
             matrices: Vec::new(),
             clock: 0,

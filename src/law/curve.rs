@@ -1,6 +1,6 @@
 //! What every piecewise-linear law answers: membership, potential, resolvent.
 
-use super::Curve;
+use super::{Curve, Resolvent};
 
 /// Why points and directions are no maximal monotone curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -87,18 +87,35 @@ impl Curve {
     /// monotone curve (Minty).
     #[must_use]
     pub fn resolvent(&self, rho: f64, z: f64) -> (f64, f64) {
+        let at = self.slopes(rho, z);
+        (at.v, at.i)
+    }
+
+    /// [`Self::resolvent`] with its slopes, those of the piece the point is on.
+    pub(super) fn slopes(&self, rho: f64, z: f64) -> Resolvent {
         let pieces = self.pieces();
         let last = pieces.len().saturating_sub(1);
         for (k, piece) in pieces.iter().enumerate() {
             let (v, i) = piece.from;
             let (dv, di) = piece.along;
-            let t = (z - v - rho * i) / (dv + rho * di);
+            let length = dv + rho * di;
+            let t = (z - v - rho * i) / length;
             // The first ray has t ≤ 0, segments 0 ≤ t ≤ 1, the last ray t ≥ 0.
             if (k == 0 && t <= 0.0) || (k > 0 && (t <= 1.0 || k == last)) {
-                return (v + t * dv, i + t * di);
+                return Resolvent {
+                    v: v + t * dv,
+                    i: i + t * di,
+                    dv: dv / length,
+                    di: di / length,
+                };
             }
         }
-        (z, 0.0)
+        Resolvent {
+            v: z,
+            i: 0.0,
+            dv: 1.0,
+            di: 0.0,
+        }
     }
 
     /// Whether i ∈ ∂φ(v) to within `tolerance` (V), currents weighted by ρ (Ω): the resolvent leaves the point where it is.

@@ -22,7 +22,7 @@ mod tests {
 
     #[test]
     fn a_dead_zone_shrinks_towards_zero() {
-        let curve = Law::dead_zone(1.0.into(), 2.0.into()).curve();
+        let curve = Law::dead_zone(1.0.into(), 2.0.into()).curve().unwrap();
         assert_eq!(curve.resolvent(1.0, 0.5), (0.5, 0.0));
         // v + 2 (v − 1) = 4
         assert_eq!(curve.resolvent(1.0, 4.0), (2.0, 2.0));

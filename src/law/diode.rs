@@ -48,7 +48,7 @@ mod tests {
 
     #[test]
     fn the_ideal_diode_blocks_or_conducts() {
-        let curve = Law::ideal_diode().curve();
+        let curve = Law::ideal_diode().curve().unwrap();
         assert_eq!(curve.resolvent(2.0, -3.0), (-3.0, 0.0));
         assert_eq!(curve.resolvent(2.0, 3.0), (0.0, 1.5));
         assert_eq!(curve.potential(-1.0), 0.0);
@@ -62,7 +62,7 @@ mod tests {
             ron: 0.1.into(),
             roff: Some(1e3.into()),
         };
-        let curve = law.curve();
+        let curve = law.curve().unwrap();
         // Conducting: v = 0.7 + 0.1 i.
         assert!(curve.contains(0.8, 1.0, 1.0, 1e-12));
         // Leaking: i = v / 1 kΩ.

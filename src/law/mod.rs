@@ -3,6 +3,7 @@
 mod curve;
 mod dead_zone;
 mod diode;
+mod exponential;
 mod relay;
 mod saturation;
 mod table;
@@ -10,6 +11,7 @@ mod zener;
 
 use crate::algebra::Value;
 pub use curve::CurveError;
+pub use exponential::{Breakdown, Exponential, wright_omega};
 
 const ZERO: Value = Value::decimal(0.0, 0, 0);
 const ONE: Value = Value::decimal(1.0, 1, 0);
@@ -28,6 +30,22 @@ pub enum Law {
     },
     /// Any other piecewise-linear monotone curve.
     Curve(Curve),
+    /// The exponential diode.
+    Exponential(Exponential),
+}
+
+/// The resolvent of a law: the point (v, i) with v + ρ i = z, and how it moves with z. dv/dz and ρ di/dz lie between 0 and 1
+/// and add up to 1 (an element of Clarke's generalised derivative at a corner).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Resolvent {
+    /// V.
+    pub v: f64,
+    /// A.
+    pub i: f64,
+    /// dv/dz.
+    pub dv: f64,
+    /// di/dz, S.
+    pub di: f64,
 }
 
 /// A piecewise-linear maximal monotone curve: a ray into `vertices[0]`, segments, a ray out of the last vertex.
@@ -50,15 +68,43 @@ impl Law {
         match self {
             Self::Diode { .. } => "ideal_diode",
             Self::Curve(curve) => curve.kind,
+            Self::Exponential(_) => "exponential",
         }
     }
 
-    /// The law as a curve of straight pieces.
+    /// Whether the law consists of straight pieces.
     #[must_use]
-    pub fn curve(&self) -> Curve {
+    pub const fn is_piecewise_linear(&self) -> bool {
+        !matches!(self, Self::Exponential(_))
+    }
+
+    /// The voltage in which the law bends, V: 0 for corners.
+    #[must_use]
+    pub const fn bend(&self) -> f64 {
         match self {
-            Self::Diode { vfwd, ron, roff } => diode::curve(*vfwd, *ron, *roff),
-            Self::Curve(curve) => curve.clone(),
+            Self::Diode { .. } | Self::Curve(_) => 0.0,
+            Self::Exponential(diode) => diode.slope,
+        }
+    }
+
+    /// The point of the law with v + ρ i = z, for ρ > 0 in Ω: z ↦ v is the resolvent (I + ρ ∂φ)⁻¹, nonexpansive and defined
+    /// for every z.
+    #[must_use]
+    pub fn resolvent(&self, rho: f64, z: f64) -> Resolvent {
+        match self {
+            Self::Diode { vfwd, ron, roff } => diode::curve(*vfwd, *ron, *roff).slopes(rho, z),
+            Self::Curve(curve) => curve.slopes(rho, z),
+            Self::Exponential(diode) => diode.resolvent(rho, z),
+        }
+    }
+
+    /// The law as a curve of straight pieces, if it is one.
+    #[must_use]
+    pub fn curve(&self) -> Option<Curve> {
+        match self {
+            Self::Diode { vfwd, ron, roff } => Some(diode::curve(*vfwd, *ron, *roff)),
+            Self::Curve(curve) => Some(curve.clone()),
+            Self::Exponential(_) => None,
         }
     }
 }

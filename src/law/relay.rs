@@ -22,7 +22,7 @@ mod tests {
 
     #[test]
     fn a_relay_switches_at_zero() {
-        let curve = Law::relay((-1.0).into(), 3.0.into()).curve();
+        let curve = Law::relay((-1.0).into(), 3.0.into()).curve().unwrap();
         assert_eq!(curve.resolvent(2.0, -4.0), (-2.0, -1.0));
         assert_eq!(curve.resolvent(2.0, 1.0), (0.0, 0.5));
         assert_eq!(curve.resolvent(2.0, 8.0), (2.0, 3.0));

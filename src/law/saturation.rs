@@ -22,7 +22,9 @@ mod tests {
 
     #[test]
     fn a_saturation_is_linear_between_its_rails() {
-        let curve = Law::saturation(0.0.into(), 3.0.into(), 0.15.into()).curve();
+        let curve = Law::saturation(0.0.into(), 3.0.into(), 0.15.into())
+            .curve()
+            .unwrap();
         assert!(curve.contains(0.0, 1.5, 1.0, 1e-12));
         assert!(curve.contains(-1.0, 0.0, 1.0, 1e-12) && curve.contains(1.0, 3.0, 1.0, 1e-12));
         assert!(!curve.contains(0.1, 1.5, 1.0, 1e-12));

@@ -22,7 +22,7 @@ mod tests {
 
     #[test]
     fn a_zener_clamps_both_ways() {
-        let curve = Law::zener(5.0.into(), 1.0.into()).curve();
+        let curve = Law::zener(5.0.into(), 1.0.into()).curve().unwrap();
         assert_eq!(curve.resolvent(1.0, 3.0), (1.0, 2.0));
         assert_eq!(curve.resolvent(1.0, 0.5), (0.5, 0.0));
         assert_eq!(curve.resolvent(1.0, -7.0), (-5.0, -2.0));

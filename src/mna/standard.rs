@@ -6,7 +6,7 @@ use crate::law::{Curve, Law};
 use crate::lcs::Role;
 
 impl Behaviour {
-    /// The same behaviour with every piecewise-linear law replaced by ideal pairs 0 ≤ p ⟂ q ≥ 0.
+    /// The same behaviour with every piecewise-linear law replaced by ideal pairs 0 ≤ p ⟂ q ≥ 0; other laws stay as they are.
     ///
     /// A curve with corners V_1 … V_K, a first ray d_0, segments V_{k+1} − V_k = T_k d_k and a last ray d_K is
     ///
@@ -26,10 +26,11 @@ impl Behaviour {
             ..self.clone()
         };
         for pair in &self.pairs {
-            if !pair.fixed_role && pair.port.law.is_ideal_diode() {
-                out.pairs.push(pair.clone());
-            } else {
-                expand(&mut out, pair);
+            match pair.port.law.curve() {
+                Some(curve) if pair.fixed_role || !pair.port.law.is_ideal_diode() => {
+                    expand(&mut out, pair, curve);
+                }
+                _ => out.pairs.push(pair.clone()),
             }
         }
         out
@@ -62,14 +63,14 @@ struct Shape {
     pieces: Vec<(Vec<Term>, Value)>,
 }
 
-fn shape(law: &Law) -> Shape {
+fn shape(curve: Curve) -> Shape {
     let one = Value::decimal(1.0, 1, 0);
     let Curve {
         vertices,
         first,
         last,
         ..
-    } = law.curve();
+    } = curve;
     let origin = (Value::decimal(0.0, 0, 0), Value::decimal(0.0, 0, 0));
     let plus =
         |(v, i): (Value, Value), t: Value| (Coefficient::Ratio(v, t), Coefficient::Ratio(i, t));
@@ -105,8 +106,8 @@ fn shape(law: &Law) -> Shape {
     }
 }
 
-fn expand(out: &mut Behaviour, pair: &Pair) {
-    let shape = shape(&pair.port.law);
+fn expand(out: &mut Behaviour, pair: &Pair, curve: Curve) {
+    let shape = shape(curve);
     let count = shape.pieces.len();
     let device = &pair.port.device;
     out.internal.push(pair.reverse);

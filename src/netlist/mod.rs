@@ -20,6 +20,7 @@ pub mod value;
 
 pub use ast::Netlist;
 pub use decode::decode;
+pub use expr::expression;
 pub use read::parse;
 
 pub use crate::circuit::load::{Loaded, load};

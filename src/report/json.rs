@@ -20,6 +20,8 @@ struct Summary<'a> {
     factorisations: u64,
     cpu_seconds: f64,
     energy: Energy,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error_estimate: Option<f64>,
     notes: &'a [String],
     impulses: &'a [Impulse],
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -61,6 +63,7 @@ impl<'a> Summary<'a> {
             factorisations: stats.factorisations,
             cpu_seconds: stats.cpu_seconds,
             energy: run.energy,
+            error_estimate: run.error_estimate,
             notes: &run.notes,
             impulses: &run.impulses,
             measurements,

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::active::ActiveSolve;
+use super::lawful::{Lawful, PortLaw};
 use super::lcp::{Answered, Lcp, Scaling, Solution, Status};
 use super::lemke::{self, Lemke};
 use super::{convex, norm, pivot};
@@ -20,6 +21,8 @@ pub struct Driver {
     monotone: bool,
     warm: Vec<bool>,
     sets: Vec<(Vec<bool>, ActiveSolve)>,
+    /// Where a port has a law other than 0 ≤ λ ⟂ y ≥ 0.
+    lawful: Option<Box<Lawful>>,
     /// Factorisations computed so far.
     pub factorisations: u64,
 }
@@ -51,6 +54,7 @@ impl Driver {
             monotone,
             warm: vec![false; size],
             sets: Vec::new(),
+            lawful: None,
             factorisations: 0,
         }
     }
@@ -59,6 +63,25 @@ impl Driver {
     #[must_use]
     pub fn size(&self) -> usize {
         self.scaled.size()
+    }
+
+    /// Prepares M for ports with any laws; see [`lawful`](super::lawful).
+    #[must_use]
+    pub fn with_laws(m: DMatrix<f64>, ports: Vec<PortLaw>, tolerance: f64) -> Self {
+        let curved = ports.iter().any(|port| !port.law.is_ideal_diode());
+        let scaling = Scaling::of(&m);
+        let lawful = curved.then(|| Box::new(Lawful::new(&m, &scaling, ports, tolerance)));
+        Self {
+            lawful,
+            ..Self::new(m, tolerance)
+        }
+    }
+
+    /// Proposes a solution to start from, where that is of use: for curved laws.
+    pub fn suggest_point(&mut self, lambda: &[f64], y: &[f64]) {
+        if let Some(lawful) = &mut self.lawful {
+            lawful.suggest(lambda, y);
+        }
     }
 
     /// Whether M + Mᵀ ⪰ 0 (to rounding).
@@ -74,6 +97,9 @@ impl Driver {
 
     /// Solves for one q.
     pub fn solve(&mut self, q: &DVector<f64>) -> Solution {
+        if let Some(lawful) = &mut self.lawful {
+            return lawful.solve(q);
+        }
         self.scaled.q = q.component_mul(&self.scaling.d);
         let size = self.scaled.size();
         let slack = SLACK * self.scaled.q.amax();
@@ -118,9 +144,13 @@ impl Driver {
     }
 
     /// The least-norm member of the solution set that `solution` belongs to, and whether the set is a single point. For
-    /// matrices that are not monotone the solution is returned as it is, and counted as unique where M_aa is regular.
+    /// matrices that are not monotone the solution is returned as it is, and counted as unique where M_aa is regular; with curved laws
+    /// it is returned as it is.
     #[must_use]
     pub fn least_norm(&mut self, q: &DVector<f64>, solution: &Solution) -> (DVector<f64>, bool) {
+        if self.lawful.is_some() {
+            return (solution.lambda.clone(), true);
+        }
         self.scaled.q = q.component_mul(&self.scaling.d);
         let scaled = solution.lambda.component_div(&self.scaling.d);
         let y = self.scaled.y(&scaled);

@@ -52,6 +52,10 @@ pub enum Answered {
     Lemke,
     /// clarabel.
     Convex,
+    /// Newton's method on the resolvents of curved laws.
+    Newton,
+    /// Newton's method from where Douglas–Rachford splitting came to.
+    Splitting,
     /// None.
     Nobody,
 }

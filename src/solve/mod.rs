@@ -8,6 +8,7 @@
 //! | [`lemke`] | Lemke with lexicographic ties | M copositive-plus for a certain end |
 //! | [`convex`] | clarabel on min λᵀ(Mλ + q) | M + Mᵀ ⪰ 0 |
 //! | [`enumerate`] | all index sets: the oracle of the tests | m ≤ 16 |
+//! | [`lawful`] | any maximal monotone laws: Newton, splitting | M + Mᵀ ⪰ 0 for a certain end |
 //! | [`norm`] | the least-norm member of the solution set | |
 //! | [`driver`] | the chain warm → block → Lemke → clarabel | |
 //!
@@ -17,10 +18,12 @@ pub mod active;
 pub mod convex;
 pub mod driver;
 pub mod enumerate;
+pub mod lawful;
 pub mod lcp;
 pub mod lemke;
 pub mod norm;
 pub mod pivot;
 
 pub use driver::Driver;
+pub use lawful::PortLaw;
 pub use lcp::{Answered, Lcp, Solution, Status};

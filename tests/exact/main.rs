@@ -1,7 +1,10 @@
 //! The exact integrator on whole circuits: where it gives way to steps, sliding, accumulation.
 #![allow(missing_docs, reason = "tests")]
 
+mod buck;
+mod events;
 mod handover;
+mod relays;
 #[path = "../runs/mod.rs"]
 mod runs;
 

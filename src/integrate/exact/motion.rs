@@ -98,6 +98,11 @@ impl Motion {
         self.amplitude.clear();
         self.amplitude.extend_from_slice(amplitude);
         self.amplitude.resize(flow.dim(), 0.0);
+        let (z, sizes) = (
+            &self.now[x.len()..flow.dim()],
+            &mut self.amplitude[x.len()..],
+        );
+        exosystem.envelope(z, sizes);
         self.steady = flow.guards() == 0;
         let guards = &self.now[flow.dim()..flow.dim() + flow.guards()];
         self.slack.clear();
@@ -135,10 +140,10 @@ impl Motion {
         self.since_refresh = 0;
     }
 
-    /// Largest value a combination of states can have had on the way here.
+    /// Largest value a combination of w can have had on the way here.
     pub(crate) fn reach<'r>(&self, row: impl IntoIterator<Item = &'r f64>) -> f64 {
         row.into_iter()
-            .zip(&self.peak)
+            .zip(self.peak.iter().chain(&self.amplitude[self.peak.len()..]))
             .map(|(c, a)| (c * a).abs())
             .sum()
     }

@@ -83,9 +83,11 @@ pub struct Exact<'a> {
     pub(super) notes: Vec<String>,
     pub(super) accumulation: Accumulation,
     pub(super) noted_shared: bool,
-    /// By switch: times it slid, since when it slides, seconds in all, start of the first.
+    /// By switch, then by step of a function block: when it slid.
     pub(super) slides: BTreeMap<usize, Slides>,
     pub(super) row: Vec<f64>,
+    /// By probe: a voltage.
+    pub(super) row_is_volts: Vec<bool>,
 }
 
 impl<'a> Exact<'a> {
@@ -167,6 +169,7 @@ impl<'a> Exact<'a> {
             noted_shared: false,
             slides: BTreeMap::new(),
             row: vec![0.0; columns],
+            row_is_volts: lcs.outputs.units.iter().map(|u| *u == "V").collect(),
         };
         exact.rescale();
         Ok(exact)
@@ -221,7 +224,7 @@ impl<'a> Exact<'a> {
             mode.storage_at(&self.motion.now, &mut self.storage);
             // An event often finds a current at zero: its size is what it was on the way.
             for (i, scale) in self.scale.iter_mut().enumerate() {
-                *scale = scale.max(self.motion.reach(mode.storage.row(i).columns(0, mode.n)));
+                *scale = scale.max(self.motion.reach(mode.storage.row(i).iter()));
             }
             self.rescale();
             self.note_stored();

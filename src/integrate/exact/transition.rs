@@ -26,16 +26,6 @@ pub(crate) enum Trigger {
     Sources,
 }
 
-/// Relative to the largest output: two rows at one time that differ by more are a step, not rounding.
-const STEP: f64 = 1e-10;
-
-/// Whether an output steps from one row to the other: with a source, or because a switch moves.
-fn is_step(left: &[f64], right: &[f64]) -> bool {
-    let rows = || left.iter().zip(right);
-    let largest = rows().fold(0.0, |most: f64, (a, b)| most.max(a.abs()).max(b.abs()));
-    rows().any(|(a, b)| (a - b).abs() > STEP * largest)
-}
-
 impl Exact<'_> {
     /// Enters the mode from here on. Where there is none, everything is as it was before.
     pub(super) fn change(
@@ -156,13 +146,13 @@ impl Exact<'_> {
         if jumped {
             self.jumps += 1;
         }
-        if let Some(left) = left_row {
+        if let Some(before) = left_row {
             self.read_row();
-            let step = jumped || is_step(&left, &self.row);
-            if step {
-                log.row(t, &left);
+            let jumped = self.row_jumps(&before);
+            if jumped {
+                log.row(t, &before);
             }
-            if step || !same {
+            if jumped || !same {
                 log.row(t, &self.row);
             }
         }

@@ -10,8 +10,11 @@ impl Theta<'_> {
 
     /// Computes the step from now to t1 = now + h into `out` without committing it.
     pub(super) fn attempt(&mut self, h: f64, t1: f64) -> Result<(), SimError> {
+        if let Some(tableau) = Tableau::of(self.system(), self.scheme) {
+            return self.attempt_stages(tableau, h, t1);
+        }
         self.inputs.left(t1, &mut self.u_next);
-        self.stats.lcp_solves += 1;
+        self.stats.lcp_solves += u64::from(!self.lambda.is_empty());
         let damped = self.starts_damped();
         let settle = self.now.settle && (damped || !self.lambda.is_empty());
         let scheme = if settle && damped {
@@ -48,6 +51,7 @@ impl Theta<'_> {
                 h,
                 settle,
                 solved: None,
+                work: None,
             };
         }
         let n = now.x.len();
@@ -107,6 +111,7 @@ impl Theta<'_> {
             h,
             settle: false,
             solved: Some((solution.basis, solution.active)),
+            work: None,
         };
         Ok(())
     }
@@ -120,6 +125,9 @@ impl Theta<'_> {
                 limit: self.settings.max_steps,
             };
             return Err(SimError::at(self.now.t, reason));
+        }
+        if self.now.estimate.is_some() && self.control.is_none() {
+            self.carry_error();
         }
         if let Some((basis, pattern)) = self.attempt.solved.take() {
             self.commit_solved(basis, pattern, t1);
@@ -136,10 +144,44 @@ impl Theta<'_> {
         Ok(())
     }
 
+    /// The error after the attempted step.
+    fn carry_error(&mut self) {
+        let Self {
+            plant,
+            now,
+            attempt,
+            out,
+            scheme,
+            ..
+        } = self;
+        let Some(estimate) = &mut now.estimate else {
+            return;
+        };
+        if now.settle {
+            estimate.restart();
+        }
+        let n = now.x.len();
+        let fused = || {
+            plant.systems[now.system]
+                .1
+                .step(attempt.step)
+                .fused(attempt.mode)
+        };
+        let map = attempt.solved.is_none().then(|| fused().flow(n));
+        let second_order = scheme.order() == 2 && !attempt.settle;
+        estimate.step(attempt.h, &now.x, &out[..n], map, second_order);
+    }
+
     #[cold]
     pub(super) fn commit_solved(&mut self, basis: Vec<bool>, pattern: Vec<Option<bool>>, t1: f64) {
         let n = self.now.x.len();
         let h = self.attempt.h;
+        if let Some(work) = self.attempt.work {
+            self.now.balance.add(work);
+            self.take_pattern(basis, &pattern, t1);
+            self.attempt.h = f64::NAN;
+            return;
+        }
         // Energy at the end of the step (γ = 1) from the solution itself.
         for (du, (a, b)) in self.du.iter_mut().zip(self.u_next.iter().zip(&self.now.u)) {
             *du = (a - b) / h;

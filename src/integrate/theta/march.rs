@@ -153,6 +153,9 @@ impl Theta<'_> {
                 self.back(steps);
                 return Ok(false);
             }
+            if let Some(estimate) = &mut self.now.estimate {
+                estimate.add(verdict.error);
+            }
         } else {
             self.preferred = f64::INFINITY;
             self.fixed_step(h, t1)?;

@@ -6,9 +6,11 @@
 //! and a sign test. Where that fails, the step is solved with γ = 1 by the [`Driver`](crate::solve::Driver).
 
 mod attempt;
+mod estimate;
 mod jumps;
 mod march;
 mod right_limit;
+mod stages;
 #[cfg(test)]
 mod tests;
 
@@ -16,6 +18,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::DVector;
 
+use self::estimate::Estimate;
 use crate::integrate::control::{Amplitudes, Control};
 use crate::integrate::energy::{self, Balance};
 use crate::integrate::exact::Place;
@@ -29,6 +32,7 @@ use crate::integrate::system::{Plant, Reduce, System};
 use crate::lcs::{Lcs, Port, Role};
 use crate::settings::Settings;
 use crate::solve::{Solution, Status};
+use stages::Tableau;
 
 /// How steps are chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,6 +111,8 @@ pub struct Theta<'a> {
     z: Vec<f64>,
     out: Vec<f64>,
     lambda: Vec<f64>,
+    /// y of the last solve, where a law is curved.
+    y: Vec<f64>,
     attempt: Attempt,
     coarse: Vec<f64>,
     /// Buffer for s.
@@ -137,6 +143,8 @@ struct Now {
     settle: bool,
     system: usize,
     balance: Balance,
+    /// The error so far, where it is asked for.
+    estimate: Option<Estimate>,
 }
 
 impl Now {
@@ -149,6 +157,9 @@ impl Now {
         self.settle = other.settle;
         self.system = other.system;
         self.balance = other.balance;
+        if let (Some(mine), Some(other)) = (&mut self.estimate, &other.estimate) {
+            mine.copy_from(other);
+        }
     }
 }
 
@@ -162,6 +173,8 @@ struct Attempt {
     settle: bool,
     /// Basis and pattern after the step, where the solvers ran.
     solved: Option<(Vec<bool>, Vec<Option<bool>>)>,
+    /// Energy from sources and into resistors and devices, J, where the stages tell it.
+    work: Option<(f64, f64)>,
 }
 
 impl<'a> Theta<'a> {
@@ -209,13 +222,15 @@ impl<'a> Theta<'a> {
             settle: true,
             system: at,
             balance: Balance::new(stored),
+            estimate: None,
         };
         let amplitudes = Amplitudes::new(&system.lcs, &inputs);
         let switches = Switches::new(position, thresholds, &system.lcs);
+        let order = Tableau::of(system, scheme).map_or(scheme.order(), |t| t.order);
         let (control, preferred) = match stepping {
             Stepping::Fixed(_) => (None, f64::INFINITY),
             Stepping::Controlled { span, first } => {
-                (Some(Control::new(scheme, &settings, span)), first)
+                (Some(Control::new(order, &settings, span)), first)
             }
         };
         let mut theta = Self {
@@ -236,6 +251,7 @@ impl<'a> Theta<'a> {
             z: Vec::new(),
             out: Vec::new(),
             lambda: Vec::new(),
+            y: Vec::new(),
             attempt: Attempt::default(),
             coarse: Vec::new(),
             storage: Vec::new(),
@@ -255,6 +271,16 @@ impl<'a> Theta<'a> {
     /// Sets the amplitudes known beforehand, by storage element.
     pub fn expect_amplitudes(&mut self, amplitudes: Amplitudes) {
         self.amplitudes = amplitudes;
+    }
+
+    /// Has the error estimated along the run.
+    pub fn estimate_errors(&mut self) {
+        let mut estimate = Estimate::default();
+        if self.control.is_none() {
+            estimate.enter(self.now.x.iter().map(|_| 0.0));
+        }
+        self.kept.estimate = Some(estimate.clone());
+        self.now.estimate = Some(estimate);
     }
 
     /// The amplitudes seen so far.
@@ -347,6 +373,13 @@ impl<'a> Theta<'a> {
         &self.plant.systems[self.now.system].1
     }
 
+    fn settle_estimate(&mut self) {
+        if let (Some(estimate), None) = (&mut self.now.estimate, &self.control) {
+            let lcs = &self.plant.systems[self.now.system].1.lcs;
+            estimate.settle(lcs, &mut self.amplitudes);
+        }
+    }
+
     /// Buffers for the present system.
     fn resize(&mut self) {
         let (n, m, width) = {
@@ -357,6 +390,8 @@ impl<'a> Theta<'a> {
         self.out.resize(n + m, 0.0);
         self.lambda.clear();
         self.lambda.resize(m, 0.0);
+        self.y.clear();
+        self.y.resize(m, 0.0);
         self.coarse.resize(n, 0.0);
         self.attempt.h = f64::NAN;
     }
@@ -428,7 +463,9 @@ impl Stepper for Theta<'_> {
                 names.join(", ")
             ));
         }
+        self.settle_estimate();
         Outcome {
+            error_estimate: self.now.estimate.as_ref().map(Estimate::relative),
             stats: self.stats.clone(),
             energy: self.now.balance.energy(),
             notes,

@@ -163,6 +163,19 @@ struct LawDoc {
     first: Option<[f64; 2]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     last: Option<[f64; 2]>,
+    /// Of an exponential diode: Is, A; N k T/q, V; RS, Ω; BV, V; Ibv, A; NBV k T/q, V.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    is: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    slope: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    rs: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    bv: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    ibv: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    breakdown_slope: Option<f64>,
 }
 
 #[derive(Serialize, Deserialize, Default)]

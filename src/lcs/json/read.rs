@@ -6,7 +6,7 @@ use super::{Document, JsonError, LawDoc, PortDoc, SCHEMA, SystemFile};
 use crate::algebra::Value;
 use crate::circuit::Tran;
 use crate::circuit::source::Source;
-use crate::law::{Curve, Law};
+use crate::law::{Breakdown, Curve, Exponential, Law};
 use crate::lcs::{Input, Lcs, Outputs, Port, Role, Rows, State, Storage};
 
 fn unit(text: &str) -> &'static str {
@@ -76,6 +76,12 @@ fn law(doc: &LawDoc, device: &str) -> Result<Law, JsonError> {
             roff: doc.roff.map(value),
         });
     }
+    if doc.kind == "exponential" {
+        return exponential(doc).ok_or_else(|| JsonError::Law {
+            device: device.to_owned(),
+            kind: doc.kind.clone(),
+        });
+    }
     let kind = ["zener", "table", "relay", "saturation", "dead_zone"]
         .into_iter()
         .find(|k| *k == doc.kind);
@@ -102,6 +108,25 @@ fn law(doc: &LawDoc, device: &str) -> Result<Law, JsonError> {
             kind: doc.kind.clone(),
         }),
     }
+}
+
+/// `None` where a parameter is missing or out of range.
+fn exponential(doc: &LawDoc) -> Option<Law> {
+    let breakdown = match (doc.bv, doc.ibv, doc.breakdown_slope) {
+        (None, None, None) => None,
+        (bv, ibv, slope) => Some(Breakdown {
+            bv: bv?,
+            ibv: ibv?,
+            slope: slope?,
+        }),
+    };
+    let diode = Exponential {
+        is: doc.is?,
+        slope: doc.slope?,
+        rs: doc.rs.unwrap_or(0.0),
+        breakdown,
+    };
+    diode.is_sound().then_some(Law::Exponential(diode))
 }
 
 fn role(doc: &PortDoc) -> Result<Role, JsonError> {

@@ -32,6 +32,16 @@ fn law_document(law: &Law) -> LawDoc {
             last: Some([curve.last.0.f64, curve.last.1.f64]),
             ..LawDoc::default()
         },
+        Law::Exponential(diode) => LawDoc {
+            kind,
+            is: Some(diode.is),
+            slope: Some(diode.slope),
+            rs: (diode.rs != 0.0).then_some(diode.rs),
+            bv: diode.breakdown.map(|b| b.bv),
+            ibv: diode.breakdown.map(|b| b.ibv),
+            breakdown_slope: diode.breakdown.map(|b| b.slope),
+            ..LawDoc::default()
+        },
     }
 }
 

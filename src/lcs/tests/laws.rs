@@ -13,7 +13,7 @@ fn check(law: &Law, currents: &[f64]) {
     c.probes.clear();
     let behaviour = behaviour(&c).unwrap().standard();
     let pairs = behaviour.pairs.len();
-    let curve = law.curve();
+    let curve = law.curve().unwrap();
     for &i in currents {
         let mut found = 0;
         for pattern in 0..1u32 << pairs {

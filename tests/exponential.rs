@@ -1,0 +1,214 @@
+//! Circuits with exponential diodes: random networks, the drop against ideal diodes, what cannot be done with them.
+#![allow(missing_docs, reason = "tests")]
+
+use std::collections::HashMap;
+
+use circ::circuit::{Circuit, Diodes, ElaborateOptions, Kind, elaborate};
+use circ::diagnostic::SourceMap;
+use circ::integrate::{Method, Run, SimOptions, Values, operating_point, simulate};
+use circ::law::Law;
+use circ::lcs::{Position, json, reduce};
+use circ::mna::behaviour;
+use circ::netlist::parse;
+use circ::settings::Settings;
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+
+fn circuit(text: &str, diodes: Diodes) -> Circuit {
+    let mut sources = SourceMap::default();
+    let root = sources.add("test.cir", text);
+    let (netlist, _) = parse(&mut sources, root, &|_| {
+        Err(std::io::ErrorKind::NotFound.into())
+    });
+    let options = ElaborateOptions {
+        diodes,
+        ..ElaborateOptions::default()
+    };
+    let (circuit, findings) = elaborate(&netlist, &options);
+    circuit.unwrap_or_else(|| panic!("{findings:?}\n{text}"))
+}
+
+fn run(text: &str, diodes: Diodes, options: SimOptions<'_>) -> Run {
+    let circuit = circuit(text, diodes);
+    simulate(&circuit, &behaviour(&circuit).unwrap(), options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn column(run: &Run, probe: &str) -> Vec<f64> {
+    let j = run.waveforms.find(probe).unwrap();
+    run.waveforms.column(j).collect()
+}
+
+const MODELS: &str = "\
+.model silicon d(is=1e-14)
+.model schottky d(is=1u n=1.05 rs=50m)
+.model power d(is=1n n=1.8 rs=10m bv=30 ibv=1m)
+.model dz d(is=1f bv=5.1 ibv=5m rs=2)
+.model di d(ideal)
+.model straight d(ron=0.1 roff=1meg vfwd=0.7 vrev=12 rrev=1)
+";
+
+/// Sources and diodes of every kind on a random resistive network without loops of voltage sources.
+fn network() -> impl Strategy<Value = String> {
+    let element = (
+        0..10_u8,
+        0..6_usize,
+        0..6_usize,
+        -2.0..6.0f64,
+        -40.0..40.0f64,
+    );
+    (2..7_usize, prop::collection::vec(element, 3..14)).prop_map(|(nodes, elements)| {
+        let mut text = String::from("random\n");
+        for k in 1..nodes {
+            text += &format!("rt{k} {k} {} {}\n", k - 1, 330 * k);
+        }
+        for (k, (kind, a, b, decades, value)) in elements.into_iter().enumerate() {
+            let (a, b) = (a % nodes, b % nodes);
+            if a == b {
+                continue;
+            }
+            let ohms = 10_f64.powf(decades);
+            text += &match kind {
+                0 => format!("r{k} {a} {b} {ohms}\n"),
+                1 => format!("v{k} s{k} {a} {value}\nrs{k} s{k} {b} {ohms}\n"),
+                2 => format!("i{k} {a} {b} {}\n", value * 1e-3),
+                3 => format!("d{k} {a} {b} silicon\n"),
+                4 => format!("d{k} {a} {b} schottky\n"),
+                5 => format!("d{k} {a} {b} power 3\n"),
+                6 => format!("d{k} {a} {b} dz\n"),
+                7 => format!("d{k} {a} {b} di\n"),
+                8 => format!("d{k} {a} {b} straight\n"),
+                _ => format!("b{k} {a} {b} i=pwl(v({a},{b}), -2,-20m, -1,0, 1,0, 3,5m)\n"),
+            };
+        }
+        text + MODELS + ".op\n.end\n"
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 1000,
+        failure_persistence: None,
+        rng_seed: RngSeed::Fixed(2),
+        ..Default::default()
+    })]
+
+    /// Every network has an operating point: currents balance at every node, and every element is on its law.
+    #[test]
+    fn random_networks_of_all_laws_have_their_operating_point(text in network()) {
+        let circuit = circuit(&text, Diodes::Auto);
+        let point = operating_point(&circuit, Values::Dc, false, &Settings::default())
+            .unwrap_or_else(|e| panic!("{e}\n{text}"));
+        let volts: HashMap<&str, f64> = point.nodes.iter().map(|(n, v)| (n.as_str(), *v)).collect();
+        let volts = |n: usize| volts.get(circuit.nodes[n].as_str()).copied().unwrap_or(0.0);
+        let mut sums = vec![(0.0, 0.0_f64); circuit.nodes.len()];
+        for (element, (name, i)) in circuit.elements.iter().zip(&point.currents) {
+            prop_assert_eq!(&element.name, name);
+            for (node, i) in [(element.p, *i), (element.n, -i)] {
+                sums[node.index()].0 += i;
+                sums[node.index()].1 = sums[node.index()].1.max(i.abs());
+            }
+            let v = volts(element.p.index()) - volts(element.n.index());
+            if let Kind::Device(law) = &element.kind {
+                // On the law, with 1 nA worth 1 µV.
+                let at = law.resolvent(1e3, v + 1e3 * i);
+                prop_assert!((at.v - v).abs() <= 1e-7 * (1.0 + v.abs()), "{} is at {} V, {} A\n{}", name, v, i, text);
+            }
+        }
+        for (node, (sum, size)) in sums.iter().enumerate() {
+            prop_assert!(sum.abs() <= 1e-8 * (size + 1e-3), "{} A into node {}\n{}", sum, circuit.nodes[node], text);
+        }
+    }
+}
+
+const RECTIFIER: &str = "\
+half wave
+vs in 0 sin(0 10 50)
+d1 in out dm
+rload out 0 1k
+.model dm d(is=1e-14 n=1.2 rs=3)
+.tran 100u 20m
+.save v(in) v(out) i(d1)
+.end
+";
+
+#[test]
+fn ideal_and_exponential_diodes_differ_by_the_drop() {
+    let ideal = run(RECTIFIER, Diodes::Ideal, SimOptions::default());
+    let exponential = run(RECTIFIER, Diodes::Exp, SimOptions::default());
+    assert_eq!(
+        (ideal.method.as_str(), exponential.method.as_str()),
+        ("exact", "theta")
+    );
+    let Kind::Device(Law::Exponential(law)) = circuit(RECTIFIER, Diodes::Auto).elements[1].kind
+    else {
+        panic!("no exponential diode")
+    };
+    let (vin, found) = (
+        column(&exponential, "v(in)"),
+        column(&exponential, "v(out)"),
+    );
+    let without = column(&ideal, "v(out)");
+    let mut conducting = 0;
+    for k in 0..vin.len() {
+        let i = found[k] / 1e3;
+        let drop = law.slope * (i / law.is).ln_1p() + law.rs * i;
+        if i > 1e-6 {
+            conducting += 1;
+            assert!((vin[k] - found[k] - drop).abs() < 1e-7, "at {k}: {drop}");
+            // The ideal diode keeps RS, so that the difference is the junction alone, up to the divider of RS and load.
+            let expected = law.slope * (i / law.is).ln_1p() * 1e3 / 1003.0;
+            assert!(
+                (without[k] - found[k] - expected).abs() < 1e-7,
+                "at {k}: {expected}"
+            );
+        }
+    }
+    assert!(conducting > 80);
+}
+
+#[test]
+fn steps_converge_with_their_order() {
+    let text = "charging\nvs in 0 sin(1 1 1k)\nr1 in a 1k\nd1 a out dm\nc1 out 0 100n ic=0\nrl out 0 10k\n.model dm d(is=1e-9 n=2)\n.tran 10u 1m uic\n.end\n";
+    let end = |method, step| {
+        let options = SimOptions {
+            method,
+            step: Some(step),
+            ..SimOptions::default()
+        };
+        *column(&run(text, Diodes::Auto, options), "v(out)")
+            .last()
+            .unwrap()
+    };
+    let reference = end(Method::Theta, 1e-7);
+    for (method, order) in [(Method::Theta, 3.0_f64), (Method::Euler, 1.0)] {
+        let (coarse, fine) = (
+            end(method, 1e-5) - reference,
+            end(method, 0.5e-5) - reference,
+        );
+        let seen = (coarse / fine).log2();
+        assert!((seen - order).abs() < 0.35, "{method:?}: order {seen}");
+    }
+}
+
+#[test]
+fn exact_integration_is_refused_by_name() {
+    let circuit = circuit(RECTIFIER, Diodes::Auto);
+    let options = SimOptions {
+        method: Method::Exact,
+        ..SimOptions::default()
+    };
+    let error = simulate(&circuit, &behaviour(&circuit).unwrap(), options).unwrap_err();
+    assert!(error.to_string().contains("the law of d1"), "{error}");
+}
+
+#[test]
+fn the_law_survives_its_file() {
+    let circuit = circuit(RECTIFIER, Diodes::Auto);
+    let behaviour = behaviour(&circuit).unwrap();
+    let lcs = reduce(&behaviour, &Position::free(&behaviour, vec![])).unwrap();
+    let text = json::write(&lcs, &nalgebra::DVector::zeros(0), circuit.tran);
+    let again = json::read(&text).unwrap();
+    assert_eq!(again.lcs.ports[0].law, lcs.ports[0].law);
+    let broken = text.replace("\"is\"", "\"other\"");
+    assert!(json::read(&broken).is_err());
+}
