@@ -130,7 +130,8 @@ impl<'n> Builder<'n, '_> {
             let (x, y) = (self.scopes.finite(x, scope), self.scopes.finite(y, scope));
             numbers.push((x?.f64, y?.f64));
         }
-        self.scopes
+        let form = self
+            .scopes
             .table(&form, &numbers)
             .map_err(|why| {
                 let at = points
@@ -140,7 +141,8 @@ impl<'n> Builder<'n, '_> {
                     .map_or(input, |(p, _)| &p[1].0);
                 self.scopes.unfit(at, why)
             })
-            .ok()
+            .ok()?;
+        self.scopes.checked(input, form)
     }
 
     /// c0 + c1 x1 + … + cn xn; higher coefficients must be zero. A single coefficient for one input is c1 (SPICE2).

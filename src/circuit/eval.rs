@@ -1,6 +1,6 @@
 //! Evaluation of expressions: numbers, and piecewise-linear forms in the circuit's voltages and currents.
 
-use super::behaviour::{TIME, Unfit};
+use super::behaviour::{TIME, Unfit, is_time};
 use super::form::Form;
 use super::functions::{self, CallError, truth};
 use super::scope::{Param, ScopeId, Scopes};
@@ -13,6 +13,9 @@ use crate::netlist::suggest::nearest;
 const MAX_DEPTH: usize = 128;
 /// Most operations of all evaluations of a netlist.
 const MAX_STEPS: usize = 20_000_000;
+/// Most corners of a function of voltages and currents: each becomes a complementarity pair, and the work of a run grows
+/// with their third to fourth power (200 of them: seconds).
+const MAX_CORNERS: usize = 200;
 
 /// Finds the quantity that `v(…)` or `i(…)` means; `None` where only numbers are allowed.
 pub(super) type Resolve<'r, 'n> =
@@ -257,7 +260,21 @@ impl<'n> Scopes<'n> {
         self.checked(expr, Form::number(value))
     }
 
-    fn checked(&mut self, expr: &Expr, form: Form) -> Option<Form> {
+    /// The form, if its numbers are finite and its corners few enough.
+    pub(super) fn checked(&mut self, expr: &Expr, form: Form) -> Option<Form> {
+        let of_quantities = form.ridges.iter().filter(|r| !is_time(&r.along));
+        let corners = of_quantities.map(|r| r.curve.corners()).max().unwrap_or(0);
+        if corners > MAX_CORNERS {
+            let message = format!(
+                "this piecewise-linear function has {corners} corners; at most {MAX_CORNERS} are supported"
+            );
+            self.findings.tell(
+                Diagnostic::error("too-large", expr.span, message)
+                    .label("too many corners up to here")
+                    .help("every corner is an ideal device: use fewer points or less nesting"),
+            );
+            return None;
+        }
         let sound =
             !form.constant.f64.is_nan() && form.terms.iter().all(|(gain, _)| gain.f64.is_finite());
         if sound && (form.constant.f64.is_finite() || mentions_infinity(expr)) {

@@ -92,6 +92,11 @@ impl Piecewise {
         Self::through(&[(level, 0.0), (level, 1.0)], 0.0, 0.0)
     }
 
+    /// Number of knots.
+    pub(super) fn corners(&self) -> usize {
+        self.knots.len()
+    }
+
     /// slope and f(0), if there is no knot.
     pub(super) fn as_line(&self) -> Option<(f64, f64)> {
         (self.knots.is_empty()).then(|| (self.pieces[0].slope, self.pieces[0].left))
