@@ -17,7 +17,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::DVector;
 
-use crate::integrate::control::{Amplitudes, Control};
+use crate::integrate::control::{Amplitudes, CORNER, Control};
 use crate::integrate::energy::{self, Balance};
 use crate::integrate::inputs::Inputs;
 use crate::integrate::reading::{self, Point};
@@ -112,6 +112,8 @@ pub struct Theta<'a> {
     y: Vec<f64>,
     attempt: Attempt,
     coarse: Vec<f64>,
+    /// What differences of states are rounding, where a law is curved.
+    rounding: Vec<f64>,
     /// Buffer for s.
     storage: Vec<f64>,
     control: Option<Control>,
@@ -217,11 +219,17 @@ impl<'a> Theta<'a> {
         };
         let amplitudes = Amplitudes::new(&system.lcs, &inputs);
         let switches = Switches::new(position, thresholds, &system.lcs);
-        let order = Tableau::of(system, scheme).map_or(scheme.order(), |t| t.order);
+        let tableau = Tableau::of(system, scheme);
+        let order = tableau.map_or(scheme.order(), |t| t.order);
+        let corner = if tableau.is_some() {
+            stages::GRANT
+        } else {
+            CORNER
+        };
         let (control, preferred) = match stepping {
             Stepping::Fixed(_) => (None, f64::INFINITY),
             Stepping::Controlled { span, first } => {
-                (Some(Control::new(order, &settings, span)), first)
+                (Some(Control::new(order, corner, &settings, span)), first)
             }
         };
         let mut theta = Self {
@@ -245,6 +253,7 @@ impl<'a> Theta<'a> {
             y: Vec::new(),
             attempt: Attempt::default(),
             coarse: Vec::new(),
+            rounding: Vec::new(),
             storage: Vec::new(),
             control,
             stats: Stats::default(),
@@ -335,6 +344,8 @@ impl<'a> Theta<'a> {
         self.y.clear();
         self.y.resize(m, 0.0);
         self.coarse.resize(n, 0.0);
+        self.rounding.clear();
+        self.rounding.resize(n, 0.0);
         self.attempt.h = f64::NAN;
     }
 }
