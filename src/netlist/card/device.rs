@@ -147,6 +147,21 @@ pub(super) fn call<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
     Ok((at, (words, Device::Call { subckt, args })))
 }
 
+/// `A1 a k model`: a code model with two terminals, which may be ngspice's `sidiode`. Others are recognised only.
+pub(super) fn code_model<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
+    let two = nodes(i, 2, "node").and_then(|(at, two)| {
+        let (at, model) = word(separator(at))?;
+        Ok((separator(at), two, model))
+    });
+    match two {
+        Ok((at, nodes, model)) if at_end(at) => {
+            let (area, args) = (None, Vec::new());
+            Ok((at, (nodes, Device::Diode { model, area, args })))
+        }
+        _ => unsupported(i, name),
+    }
+}
+
 /// A card that is recognised but not supported.
 pub(super) fn unsupported<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
     let what = describe(name.text.chars().next().unwrap_or(' '));

@@ -64,7 +64,8 @@ pub(super) fn element(i: Input<'_>) -> Parsed<'_, Element> {
         'w' => device::current_switch,
         'x' => device::call,
         'm' | 'q' | 'j' | 'z' => device::transistor,
-        't' | 'o' | 'u' | 'a' | 'p' | 'y' | 'n' => device::unsupported,
+        'a' => device::code_model,
+        't' | 'o' | 'u' | 'p' | 'y' | 'n' => device::unsupported,
         _ => {
             let message = format!(
                 "`{}` is no element: no element begins with `{letter}`",
