@@ -197,6 +197,11 @@ impl Theta<'_> {
             *impulse = self.impulsive(0.5 * h)?;
         }
         self.commit(t1)?;
+        for (k, coarse) in self.coarse.iter_mut().enumerate() {
+            if (*coarse - self.now.x[k]).abs() <= self.rounding[k] {
+                *coarse = self.now.x[k];
+            }
+        }
         let error = self
             .amplitudes
             .error(&self.system().lcs, &self.coarse, &self.now.x);
