@@ -66,6 +66,17 @@ impl Graph {
                 vertices: curve.vertices.iter().map(|(v, i)| (v.f64, i.f64)).collect(),
                 last: (curve.last.0.f64, curve.last.1.f64),
             },
+            Law::Rounded(diode) => Self {
+                first: match diode.reverse {
+                    Some(corner) => (1.0, corner.g),
+                    None => (1.0, diode.g),
+                },
+                vertices: (diode.reverse.iter().map(|c| -c.v))
+                    .chain([diode.forward.v])
+                    .map(|v| (v, diode.g * v))
+                    .collect(),
+                last: (1.0, diode.forward.g),
+            },
             // The hull that has the same bounds and the same zero.
             Law::Exponential(diode) => Self {
                 first: if diode.breakdown.is_some() {

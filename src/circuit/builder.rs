@@ -71,6 +71,8 @@ pub(super) struct Builder<'n, 'o> {
     instances: usize,
     /// Model parameters that had no effect, by model.
     pub(super) unused_parameters: Vec<(String, Span)>,
+    /// Models of transistors whose approximation was told.
+    pub(super) told_models: Vec<String>,
     /// The nodes of the auxiliary sources that behavioural elements share.
     pub(super) auxiliary_nodes: Vec<Option<NodeId>>,
     /// The node whose voltage is the time, if there is one.
@@ -106,6 +108,7 @@ impl<'n, 'o> Builder<'n, 'o> {
             used: HashSet::new(),
             instances: 0,
             unused_parameters: Vec::new(),
+            told_models: Vec::new(),
             auxiliary_nodes: Vec::new(),
             clock: None,
         }
@@ -223,7 +226,11 @@ impl<'n, 'o> Builder<'n, 'o> {
                 initial,
             } => self.switch(card, control, model, *initial, scope),
             Device::Transistor { words, area, args } => {
-                self.transistor(card, words, area.as_ref(), args, scope)
+                if card.name.text.starts_with('q') {
+                    self.bipolar(card, words, area.as_ref(), args, scope);
+                } else {
+                    self.transistor(card, words, area.as_ref(), args, scope);
+                }
             }
             Device::Call { subckt, args } => self.call(card, subckt, args, scope),
             Device::Unsupported { what } => {
@@ -234,7 +241,7 @@ impl<'n, 'o> Builder<'n, 'o> {
                 self.tell(
                     Diagnostic::error("unsupported-element", card.span, message)
                         .label("not supported yet")
-                        .help("supported elements are R C L K V I E F G H B D S W M J Z X"),
+                        .help("supported elements are R C L K V I E F G H B D S W M Q J Z X"),
                 );
             }
         }

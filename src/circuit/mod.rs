@@ -5,6 +5,7 @@
 mod analysis;
 mod audit;
 mod behaviour;
+mod bipolar;
 mod builder;
 mod controlled;
 mod define;

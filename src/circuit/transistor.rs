@@ -76,11 +76,9 @@ impl<'n> Builder<'n, '_> {
         let (Some(drain), Some(gate), Some(source)) = (drain, gate, source) else {
             return;
         };
-        let is_model = |word: &&Name| self.scopes.model(scope, &word.text).is_some();
-        let Some(name) = words.iter().find(is_model).or(words.last()) else {
+        let Some((bulk, name, area)) = self.model_word(words, area, scope) else {
             return;
         };
-        let bulk = words.first().filter(|first| !std::ptr::eq(*first, name));
         let bulk = bulk.map_or(source, |bulk| self.node(bulk, scope));
         let Some(chain) = self.model(card, name, scope) else {
             return;
@@ -176,6 +174,19 @@ impl<'n> Builder<'n, '_> {
             series: figures.series,
             beta: figures.beta,
         }));
+    }
+
+    /// The bulk node, the model and the area factor among the words of a card.
+    pub(super) fn model_word(
+        &self,
+        words: &'n [Name],
+        area: Option<&'n Expr>,
+        scope: ScopeId,
+    ) -> Option<(Option<&'n Name>, &'n Name, Option<&'n Expr>)> {
+        let is_model = |word: &Name| self.scopes.model(scope, &word.text).is_some();
+        let last = words.len().checked_sub(1)?;
+        let at = words.iter().position(is_model).unwrap_or(last);
+        Some((words[..at].first(), &words[at], area.filter(|_| at < last)))
     }
 
     fn sort(&mut self, card: &ast::Element, chain: &[&'n Model], name: &Name) -> Option<Sort> {

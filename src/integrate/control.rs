@@ -12,6 +12,7 @@ use crate::settings::Settings;
 #[derive(Debug, Clone)]
 pub struct Control {
     order: i32,
+    grant: f64,
     tol: f64,
     span: f64,
     smallest: f64,
@@ -31,16 +32,18 @@ pub struct Verdict {
 /// A step is doubled where the error of the doubled one would still leave this factor of room.
 const ROOM: f64 = 2.0;
 
-/// Steps shorter than this part of the span are granted its part of the tolerance: corners of the solution (a diode that turns
-/// on) are few, and shorter steps only there would not pay.
-const CORNER: f64 = 1e-5;
+/// The part of the tolerance that is granted where the solution has corners (a diode that turns on): they are few, and shorter
+/// steps only there would not pay.
+pub const CORNER: f64 = 1e-5;
 
 impl Control {
-    /// Control of a method of an order, over a span, s.
+    /// Control of a method of an order, over a span, s; steps shorter than the part `grant` of the span are granted that part
+    /// of the tolerance.
     #[must_use]
-    pub fn new(order: i32, settings: &Settings, span: f64) -> Self {
+    pub fn new(order: i32, grant: f64, settings: &Settings, span: f64) -> Self {
         Self {
             order,
+            grant,
             tol: settings.tol,
             span,
             smallest: settings.min_step * span,
@@ -57,7 +60,7 @@ impl Control {
     #[must_use]
     pub fn judge(&self, h: f64, difference: f64) -> Verdict {
         let error = difference / (2_f64.powi(self.order) - 1.0);
-        let allowed = self.tol * (h / self.span).max(CORNER);
+        let allowed = self.tol * (h / self.span).max(self.grant);
         let accept = error <= allowed;
         let next = if !accept {
             0.5 * h
@@ -184,7 +187,7 @@ mod tests {
 
     #[test]
     fn order_decides_the_growth() {
-        let control = Control::new(2, &Settings::default(), 1.0);
+        let control = Control::new(2, CORNER, &Settings::default(), 1.0);
         let h = 0.01;
         // tol·h = 1e-6; the estimate is a third of the difference.
         assert!(!control.judge(h, 4e-6).accept);

@@ -39,6 +39,8 @@ pub(crate) struct Handover<'a> {
     exact: Exact<'a>,
     takeover: Takeover<'a>,
     stepping: Option<Stepping<'a>>,
+    /// The steps, s.
+    step: f64,
     /// Shortest interval of steps, s.
     shortest: f64,
     interval: f64,
@@ -50,11 +52,12 @@ pub(crate) struct Handover<'a> {
 }
 
 impl<'a> Handover<'a> {
-    /// Exact integration that leaves what it cannot do to steps, for `shortest` seconds at least.
-    pub(crate) fn new(exact: Exact<'a>, takeover: Takeover<'a>, shortest: f64) -> Self {
+    /// Exact integration that leaves what it cannot do to steps of `step` seconds, for `shortest` seconds at least.
+    pub(crate) fn new(exact: Exact<'a>, takeover: Takeover<'a>, step: f64, shortest: f64) -> Self {
         Self {
             exact,
             takeover,
+            step,
             stepping: None,
             shortest,
             interval: shortest,
@@ -161,8 +164,8 @@ impl<'a> Handover<'a> {
                 String::new()
             };
             format!(
-                "between t = {from:e} s and t = {to:e} s Moreau's steps took the place of exact integration{again}: {device}{}",
-                i.reason
+                "between t = {from:e} s and t = {to:e} s Moreau's steps of {:e} s took the place of exact integration{again}: {device}{}",
+                self.step, i.reason
             )
         });
         let mut notes: Vec<String> = told.collect();

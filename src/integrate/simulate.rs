@@ -278,6 +278,9 @@ impl Problem<'_> {
     }
 }
 
+/// Moreau's steps in an output step where they take the place of exact integration.
+const HANDOVER_STEPS: f64 = 128.0;
+
 impl Problem<'_> {
     /// Exact integration with Moreau's steps where it cannot go on.
     fn handover<'a>(
@@ -285,12 +288,15 @@ impl Problem<'_> {
         tran: &'a Tran,
         settings: &'a Settings,
     ) -> Result<Handover<'a>, SimError> {
-        let stepping = controlled(tran);
+        // An error control would follow every switching of a chattering circuit.
+        let step = tran.tstep / HANDOVER_STEPS;
+        let stepping = Stepping::Fixed(step);
         Ok(Handover::new(
             self.exact(tran, settings)?,
             Box::new(move |place| {
                 self.stepper(place.clone(), tran, Scheme::MOREAU, stepping, settings)
             }),
+            step,
             tran.tstep,
         ))
     }

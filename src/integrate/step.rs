@@ -347,6 +347,11 @@ impl StepMatrices {
         &self.q * DVector::from_column_slice(z)
     }
 
+    /// The sums of the magnitudes that x⁺ is computed from.
+    pub(crate) fn x_sizes(&self, z: &[f64], lambda: &DVector<f64>) -> DVector<f64> {
+        self.phi.abs() * DVector::from_column_slice(z).abs() + self.response.abs() * lambda.abs()
+    }
+
     /// x⁺ for a given λ.
     pub(crate) fn x_next(&self, z: &[f64], lambda: &DVector<f64>) -> DVector<f64> {
         &self.phi * DVector::from_column_slice(z) + &self.response * lambda

@@ -5,6 +5,7 @@ mod dead_zone;
 mod diode;
 mod exponential;
 mod relay;
+mod rounded;
 mod saturation;
 mod table;
 mod zener;
@@ -12,6 +13,7 @@ mod zener;
 use crate::algebra::Value;
 pub use curve::CurveError;
 pub use exponential::{Breakdown, Exponential, wright_omega};
+pub use rounded::{Corner, Rounded};
 
 const ZERO: Value = Value::decimal(0.0, 0, 0);
 const ONE: Value = Value::decimal(1.0, 1, 0);
@@ -32,6 +34,8 @@ pub enum Law {
     Curve(Curve),
     /// The exponential diode.
     Exponential(Exponential),
+    /// Straight lines with rounded corners.
+    Rounded(Rounded),
 }
 
 /// The resolvent of a law: the point (v, i) with v + ρ i = z, and how it moves with z. dv/dz and ρ di/dz lie between 0 and 1
@@ -69,13 +73,14 @@ impl Law {
             Self::Diode { .. } => "ideal_diode",
             Self::Curve(curve) => curve.kind,
             Self::Exponential(_) => "exponential",
+            Self::Rounded(_) => "rounded",
         }
     }
 
     /// Whether the law consists of straight pieces.
     #[must_use]
     pub const fn is_piecewise_linear(&self) -> bool {
-        !matches!(self, Self::Exponential(_))
+        !matches!(self, Self::Exponential(_) | Self::Rounded(_))
     }
 
     /// The voltage in which the law bends, V: 0 for corners.
@@ -84,6 +89,7 @@ impl Law {
         match self {
             Self::Diode { .. } | Self::Curve(_) => 0.0,
             Self::Exponential(diode) => diode.slope,
+            Self::Rounded(diode) => diode.forward.width,
         }
     }
 
@@ -95,6 +101,7 @@ impl Law {
             Self::Diode { vfwd, ron, roff } => diode::curve(*vfwd, *ron, *roff).slopes(rho, z),
             Self::Curve(curve) => curve.slopes(rho, z),
             Self::Exponential(diode) => diode.resolvent(rho, z),
+            Self::Rounded(diode) => diode.resolvent(rho, z),
         }
     }
 
@@ -104,7 +111,7 @@ impl Law {
         match self {
             Self::Diode { vfwd, ron, roff } => Some(diode::curve(*vfwd, *ron, *roff)),
             Self::Curve(curve) => Some(curve.clone()),
-            Self::Exponential(_) => None,
+            Self::Exponential(_) | Self::Rounded(_) => None,
         }
     }
 }

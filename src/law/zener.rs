@@ -14,6 +14,26 @@ impl Law {
             last: (ZERO, ONE),
         })
     }
+
+    /// The zener diode of straight lines: `reverse` and `forward` are its voltage and resistance on either side, positive;
+    /// between them i = v/roff, or 0 where `roff` is `None`.
+    #[must_use]
+    pub fn resistive_zener(
+        reverse: (Value, Value),
+        forward: (Value, Value),
+        roff: Option<Value>,
+    ) -> Self {
+        let point = |v: Value| {
+            let leak = roff.map_or(ZERO, |r| Value::binary(v.f64 / r.f64));
+            (v, leak)
+        };
+        Self::Curve(Curve {
+            kind: "zener",
+            vertices: vec![point(reverse.0.negated()), point(forward.0)],
+            first: (reverse.1, ONE),
+            last: (forward.1, ONE),
+        })
+    }
 }
 
 #[cfg(test)]

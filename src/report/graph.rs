@@ -100,7 +100,7 @@ fn law_name(law: &Law) -> &'static str {
     match law {
         Law::Diode { .. } if *law == Law::ideal_diode() => "ideal_diode",
         Law::Diode { .. } => "diode",
-        Law::Curve(_) | Law::Exponential(_) => law.kind(),
+        Law::Curve(_) | Law::Exponential(_) | Law::Rounded(_) => law.kind(),
     }
 }
 

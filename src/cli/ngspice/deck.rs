@@ -9,7 +9,7 @@ use crate::circuit::{
     Tran,
 };
 use crate::cli::args::Realisation;
-use crate::law::Law;
+use crate::law::{Exponential, Law};
 
 /// Ω: what a short or an ideal conducting device becomes where ngspice needs a resistance.
 const NEAR_SHORT: f64 = 1e-6;
@@ -214,6 +214,20 @@ impl Writer<'_> {
             }
             Kind::Device(Law::Diode { vfwd, ron, roff }) => {
                 self.diode(id, &p, &n, vfwd.f64, ron.f64, roff.map(|r| r.f64));
+            }
+            Kind::Device(Law::Exponential(diode)) => {
+                let card = self.card('d', id);
+                let (model, is, rs) = (&element.name, diode.is, diode.rs);
+                self.line(format!("{card} {p} {n} m.{model}"));
+                let thermal = Exponential::thermal_voltage(27.0);
+                let breakdown = diode.breakdown.map_or(String::new(), |b| {
+                    let nbv = b.slope / thermal;
+                    format!(" bv={:e} ibv={:e} nbv={nbv:e}", b.bv, b.ibv)
+                });
+                let emission = diode.slope / thermal;
+                self.line(format!(
+                    ".model m.{model} d(is={is:e} n={emission:e} rs={rs:e}{breakdown})"
+                ));
             }
             Kind::Device(law) => {
                 let card = self.card('b', id);

@@ -18,9 +18,9 @@ const PATIENCE: Duration = Duration::from_secs(20);
 const GLANCE: Duration = Duration::from_millis(2);
 /// Short runs are repeated until they took this much user CPU together, s, or this often: the clock of a process counts in
 /// ticks of up to 10 ms, which only a mean gets below.
-const REPETITIONS: (f64, usize) = (0.1, 8);
+const REPETITIONS: (f64, usize) = (0.3, 24);
 /// Runs of the trivial netlist whose mean is the start-up time.
-const START_UPS: usize = 16;
+const START_UPS: usize = 32;
 /// What is missing at the end of the time axis, relative to its length, before a run counts as broken off.
 const UNFINISHED: f64 = 1e-6;
 /// Lines of ngspice that are quoted.

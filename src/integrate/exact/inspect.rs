@@ -117,23 +117,24 @@ impl Inspector {
         let m = mode.flow.guards();
         let mut leaving = Vec::new();
         for i in 0..m {
-            let (mut value, mut noise) = ([0.0; ORDERS], [0.0; ORDERS]);
-            for k in 0..ORDERS {
-                let row = mode.jets[k].row(i);
-                value[k] = row.iter().zip(w).map(|(r, w)| r * w).sum();
-                noise[k] = GROUP
-                    * f64::EPSILON
-                    * row
-                        .iter()
-                        .enumerate()
-                        .map(|(j, r)| (r * size(j)).abs())
-                        .sum::<f64>();
-            }
-            for k in 0..ORDERS - 1 {
-                noise[k] += time * value[k + 1].abs();
-            }
-            let first = (0..ORDERS).find(|&k| value[k].abs() > noise[k]);
-            if first.is_some_and(|k| value[k] < 0.0) {
+            let dot = |k: usize| -> (f64, f64) {
+                let terms = mode.jets[k].row(i).into_iter().zip(w).enumerate();
+                terms.fold((0.0, 0.0), |(value, whole), (j, (r, w))| {
+                    (value + r * w, whole + (r * size(j)).abs())
+                })
+            };
+            // The first derivative that is no rounding decides; the next one says what an error of the time does to it.
+            let mut next = dot(0);
+            let first = (0..ORDERS).find_map(|k| {
+                let (value, whole) = next;
+                let mut noise = GROUP * f64::EPSILON * whole;
+                if k + 1 < ORDERS {
+                    next = dot(k + 1);
+                    noise += time * next.0.abs();
+                }
+                (value.abs() > noise).then_some(value)
+            });
+            if first.is_some_and(|value| value < 0.0) {
                 match mode.owner(i) {
                     Owner::Switch(k) => leaving.push(k),
                     Owner::Device(_) | Owner::Slide(..) => return Finding::Refused(i),

@@ -23,6 +23,13 @@ pub(crate) struct Key {
 }
 
 impl Key {
+    /// Takes over another key without allocating.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.closed.clone_from(&other.closed);
+        self.switches.clone_from(&other.switches);
+        self.sliding.clone_from(&other.sliding);
+    }
+
     /// The same switch positions with other conducting devices.
     pub(crate) fn with_closed(&self, closed: Vec<bool>) -> Self {
         Self {

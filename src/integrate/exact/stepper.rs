@@ -52,6 +52,8 @@ pub struct Exact<'a> {
     pub(super) inspector: Inspector,
     pub(super) mode: Option<usize>,
     pub(super) key: Key,
+    /// The key that a change starts from; work space.
+    next_key: Key,
     /// Storage vector before the start or at the last change.
     pub(super) storage: Vec<f64>,
     /// Largest values of the storage elements so far, levelled by kind.
@@ -74,6 +76,8 @@ pub struct Exact<'a> {
     /// From start to end, s.
     pub(super) duration: f64,
     pub(super) started: bool,
+    /// The next time at which something is known to happen, s.
+    next_stop: f64,
     pub(super) settings: Settings,
     pub(super) energy: bool,
     pub(super) balance: Balance,
@@ -144,6 +148,7 @@ impl<'a> Exact<'a> {
             motion: Motion::at(t, settings.max_steps),
             inspector: Inspector::default(),
             mode: None,
+            next_key: key.clone(),
             key,
             storage: start.as_slice().to_vec(),
             scale: vec![0.0; start.len()],
@@ -158,6 +163,7 @@ impl<'a> Exact<'a> {
             metric,
             duration: until - t,
             started: false,
+            next_stop: f64::NEG_INFINITY,
             settings,
             energy,
             balance: Balance::new(stored),
@@ -193,17 +199,6 @@ impl<'a> Exact<'a> {
         SAME_TIME_ULPS * f64::EPSILON * self.motion.t.abs()
     }
 
-    /// The next time at which something is known to happen, s.
-    fn next_stop(&self) -> f64 {
-        let switching = self
-            .plant
-            .drives
-            .iter()
-            .map(|d| d.next)
-            .fold(f64::INFINITY, f64::min);
-        self.exosystem.next_breakpoint().min(switching)
-    }
-
     pub(super) fn fail(&self, reason: Reason) -> SimError {
         SimError::at(self.motion.t, reason)
     }
@@ -233,16 +228,13 @@ impl<'a> Exact<'a> {
 
     /// Energy that the run is about over its duration, W.
     pub(super) fn power(&self) -> f64 {
-        let s = DVector::from_column_slice(&self.scale);
-        let stored = 0.5 * s.dot(&(&self.metric * &s));
-        stored.max(self.balance.largest()) / self.duration
+        stored(&self.metric, &self.scale).max(self.balance.largest()) / self.duration
     }
 
     /// Notes the stored energy.
     pub(super) fn note_stored(&mut self) {
         if self.energy {
-            let s = DVector::from_column_slice(&self.storage);
-            self.balance.note(0.5 * s.dot(&(&self.metric * &s)));
+            self.balance.note(stored(&self.metric, &self.storage));
         }
     }
 
@@ -251,7 +243,7 @@ impl<'a> Exact<'a> {
         let from = self.mode.unwrap_or(0);
         self.take_storage();
         self.same_instant(from);
-        let mut key = self.key.clone();
+        let mut key = self.take_key();
         let mut discontinuous = false;
         match self.plant.modes[from].owner(guard) {
             Owner::Device(_) => {}
@@ -266,7 +258,26 @@ impl<'a> Exact<'a> {
             }
         }
         self.remember_inputs();
-        self.change(key, discontinuous, Trigger::Guard(guard), log)
+        self.change_to(key, discontinuous, Trigger::Guard(guard), log)
+    }
+
+    /// A copy of the present key, to be given back by [`Self::change_to`].
+    fn take_key(&mut self) -> Key {
+        let mut key = std::mem::take(&mut self.next_key);
+        key.copy_from(&self.key);
+        key
+    }
+
+    fn change_to(
+        &mut self,
+        mut key: Key,
+        discontinuous: bool,
+        trigger: Trigger,
+        log: &mut Log,
+    ) -> Result<(), SimError> {
+        let result = self.change(&mut key, discontinuous, trigger, log);
+        self.next_key = key;
+        result
     }
 
     /// Remembers that a mode was left at this instant.
@@ -295,18 +306,20 @@ impl<'a> Exact<'a> {
         self.remember_inputs();
         let mut edge = false;
         for i in 0..self.sources.len() {
-            let old = *self.exosystem.piece(i);
-            if old.end <= near {
-                let Some(piece) = self.sources[i].piece(old.end.max(t)) else {
+            let old = self.exosystem.piece(i);
+            let end = old.end;
+            if end <= near {
+                let last = old.value(end);
+                let Some(piece) = self.sources[i].piece(end.max(t)) else {
                     return Err(
                         self.fail(Reason::Unsupported("a source lost its closed form".into()))
                     );
                 };
-                edge |= old.value(old.end) != piece.value(old.end);
+                edge |= last != piece.value(end);
                 self.exosystem.set_piece(i, piece);
             }
         }
-        let mut key = self.key.clone();
+        let mut key = self.take_key();
         self.exosystem.write(t, &mut self.z);
         for drive in &self.plant.drives {
             let (i, on) = (drive.switch, key.switches[drive.switch]);
@@ -329,17 +342,19 @@ impl<'a> Exact<'a> {
         }
         self.left_here.clear();
         self.instant = t;
-        self.change(key, edge, Trigger::Sources, log)
+        self.change_to(key, edge, Trigger::Sources, log)
     }
 
-    /// When the driven switches move next on the present pieces.
+    /// When the driven switches move next on the present pieces, and what is known to happen first.
     pub(super) fn look_ahead(&mut self) {
         let end = self.exosystem.next_breakpoint();
+        self.next_stop = end;
         self.exosystem.write(self.motion.t, &mut self.z);
         for drive in &mut self.plant.drives {
             let i = drive.switch;
             let threshold = &self.plant.thresholds[i];
             drive.look_ahead(threshold, self.key.switches[i], self.motion.t, &self.z, end);
+            self.next_stop = self.next_stop.min(drive.next);
         }
     }
 
@@ -352,11 +367,20 @@ impl<'a> Exact<'a> {
 
     fn start(&mut self, log: &mut Log) -> Result<(), SimError> {
         self.remember_inputs();
-        let key = self.key.clone();
-        self.change(key, true, Trigger::Sources, log)?;
+        let key = self.take_key();
+        self.change_to(key, true, Trigger::Sources, log)?;
         self.started = true;
         Ok(())
     }
+}
+
+/// ½ sᵀ M s.
+fn stored(metric: &DMatrix<f64>, s: &[f64]) -> f64 {
+    let columns = metric.column_iter().zip(s);
+    let rows = |column: &[f64]| column.iter().zip(s).map(|(m, s)| m * s).sum::<f64>();
+    0.5 * columns
+        .map(|(column, s)| s * rows(column.as_slice()))
+        .sum::<f64>()
 }
 
 impl Stepper for Exact<'_> {
@@ -369,7 +393,7 @@ impl Stepper for Exact<'_> {
             self.start(log)?;
         }
         loop {
-            let next = self.next_stop();
+            let next = self.next_stop;
             let due = next <= t + SAME_TIME_ULPS * f64::EPSILON * t.abs();
             let stop = if due { next.min(t) } else { t };
             let Some(at) = self.mode else {

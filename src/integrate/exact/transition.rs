@@ -30,7 +30,7 @@ impl Exact<'_> {
     /// Enters the mode from here on. Where there is none, everything is as it was before.
     pub(super) fn change(
         &mut self,
-        key: Key,
+        key: &mut Key,
         discontinuous: bool,
         trigger: Trigger,
         log: &mut Log,
@@ -56,7 +56,7 @@ impl Exact<'_> {
     /// Finds the mode: positions of the switches, impulse of the devices, conducting devices.
     fn enter(
         &mut self,
-        mut key: Key,
+        key: &mut Key,
         mut discontinuous: bool,
         trigger: Trigger,
         log: &mut Log,
@@ -68,15 +68,15 @@ impl Exact<'_> {
         }
         let left_row = (wants_rows && self.started).then(|| self.row.clone());
         let mut jumped = false;
-        let mut positions = vec![key.switches.clone()];
+        let mut positions: Vec<Vec<bool>> = Vec::new();
         let mut closed_sets: Vec<Vec<bool>> = Vec::new();
         let mut entry = None;
         let mut moving: Vec<usize> = Vec::new();
         for _ in 0..3 + 2 * self.plant.thresholds.len() {
             // A device event in a convex circuit is continuous; an edge or a switch may need an impulse.
-            let mut found = self.follow(&key, trigger);
+            let mut found = self.follow(key, trigger);
             if found.is_none() && !discontinuous {
-                found = self.find_mode(&key, trigger)?;
+                found = self.find_mode(key, trigger)?;
             }
             if found.is_none() && !key.sliding.is_empty() {
                 key.sliding.clear();
@@ -84,15 +84,15 @@ impl Exact<'_> {
                 continue;
             }
             if found.is_none() {
-                jumped |= self.project(&key, log)?;
-                found = self.find_mode(&key, trigger)?;
+                jumped |= self.project(key, log)?;
+                found = self.find_mode(key, trigger)?;
             }
             if found.is_none() && self.plant.pairs > 0 {
-                found = self.jump_into(&key, log)?;
+                found = self.jump_into(key, log)?;
                 jumped |= found.is_some();
             }
             let Some((at, mut leaving)) = found else {
-                let device = self.culprit(&key, trigger);
+                let device = self.culprit(key, trigger);
                 return Err(self.fail(Reason::Infeasible).device(device));
             };
             key.closed.clone_from(&self.plant.modes[at].key.closed);
@@ -102,6 +102,7 @@ impl Exact<'_> {
                 break;
             }
             closed_sets.push(key.closed.clone());
+            positions.push(key.switches.clone());
             for &i in &leaving {
                 key.switches[i] = !key.switches[i];
                 if !moving.contains(&i) {
@@ -111,11 +112,10 @@ impl Exact<'_> {
             if positions.contains(&key.switches) {
                 // The switches that moved last contradict themselves, or all that moved contradict each other.
                 entry = self
-                    .slide(&key, &leaving, &closed_sets)
-                    .or_else(|| self.slide(&key, &moving, &closed_sets));
+                    .slide(key, &leaving, &closed_sets)
+                    .or_else(|| self.slide(key, &moving, &closed_sets));
                 break;
             }
-            positions.push(key.switches.clone());
             discontinuous = true;
         }
         let Some(at) = entry else {
@@ -134,7 +134,7 @@ impl Exact<'_> {
         self.report(at, jumped, log)?;
         self.note_slides(at);
         self.mode = Some(at);
-        self.key.clone_from(&self.plant.modes[at].key);
+        self.key.copy_from(&self.plant.modes[at].key);
         if self.energy {
             self.motion.power = self.power();
         }

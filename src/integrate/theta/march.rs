@@ -1,6 +1,7 @@
 //! From stop to stop in base steps, halved where the error or a switch asks for it.
 
 use super::*;
+use crate::integrate::control::Verdict;
 
 impl Theta<'_> {
     /// Advances to `stop`, which no breakpoint lies before; u is the left limit there.
@@ -49,10 +50,10 @@ impl Theta<'_> {
         Ok(0.5 * h)
     }
 
-    /// Whether steps after edges and jumps are Moreau's: the midpoint rule with prescribed steps. Error control finds its own
-    /// step there, and other θ and γ are taken as they are.
+    /// Whether steps after edges and jumps are Moreau's: those of the midpoint rule with prescribed steps, or where error
+    /// control would not have it otherwise. Other θ and γ are taken as they are.
     pub(super) fn starts_damped(&self) -> bool {
-        self.control.is_none() && self.scheme.order() == 2
+        self.scheme.order() == 2 && (self.control.is_none() || self.damped)
     }
 
     pub(super) fn finish_step(
@@ -130,25 +131,14 @@ impl Theta<'_> {
         }
         let mut impulse = false;
         if self.control.is_some() {
-            self.attempt(h, t1)?;
-            let n = self.now.x.len();
-            self.coarse.copy_from_slice(&self.out[..n]);
-            let middle = self.now.t + 0.5 * (t1 - self.now.t);
-            self.attempt(0.5 * h, middle)?;
-            self.commit(middle)?;
-            self.attempt(0.5 * h, t1)?;
-            if last_chance && self.attempt.solved.is_some() {
-                impulse = self.impulsive(0.5 * h)?;
+            let mut verdict = self.controlled(h, t1, last_chance, &mut impulse)?;
+            // The midpoint rule may have rung at what an edge or a jump left behind: the same step once more, damped.
+            if !verdict.accept && self.kept.settle && self.scheme.order() == 2 {
+                self.back(steps);
+                self.damped = true;
+                verdict = self.controlled(h, t1, last_chance, &mut impulse)?;
+                self.damped = false;
             }
-            self.commit(t1)?;
-            let error = self
-                .amplitudes
-                .error(&self.system().lcs, &self.coarse, &self.now.x);
-            let Some(control) = &self.control else {
-                return Ok(true);
-            };
-            let verdict = control.judge(h, error);
-            self.preferred = verdict.next;
             if !verdict.accept && !last_chance {
                 self.back(steps);
                 return Ok(false);
@@ -185,6 +175,46 @@ impl Theta<'_> {
         }
         self.report(log);
         Ok(true)
+    }
+
+    /// A step of h and two of h/2, the latter committed, and what error control says of their difference.
+    fn controlled(
+        &mut self,
+        h: f64,
+        t1: f64,
+        last_chance: bool,
+        impulse: &mut bool,
+    ) -> Result<Verdict, SimError> {
+        self.attempt(h, t1)?;
+        let n = self.now.x.len();
+        self.coarse.copy_from_slice(&self.out[..n]);
+        let middle = self.now.t + 0.5 * (t1 - self.now.t);
+        self.attempt(0.5 * h, middle)?;
+        self.commit(middle)?;
+        self.now.settle = self.damped;
+        self.attempt(0.5 * h, t1)?;
+        if last_chance && self.attempt.solved.is_some() {
+            *impulse = self.impulsive(0.5 * h)?;
+        }
+        self.commit(t1)?;
+        for (k, coarse) in self.coarse.iter_mut().enumerate() {
+            if (*coarse - self.now.x[k]).abs() <= self.rounding[k] {
+                *coarse = self.now.x[k];
+            }
+        }
+        let error = self
+            .amplitudes
+            .error(&self.system().lcs, &self.coarse, &self.now.x);
+        let verdict = match &self.control {
+            Some(control) => control.judge(h, error),
+            None => Verdict {
+                accept: true,
+                next: h,
+                error,
+            },
+        };
+        self.preferred = verdict.next;
+        Ok(verdict)
     }
 
     pub(super) fn back(&mut self, steps: u64) {

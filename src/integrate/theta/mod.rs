@@ -19,7 +19,7 @@ use std::collections::BTreeSet;
 use nalgebra::DVector;
 
 use self::estimate::Estimate;
-use crate::integrate::control::{Amplitudes, Control};
+use crate::integrate::control::{Amplitudes, CORNER, Control};
 use crate::integrate::energy::{self, Balance};
 use crate::integrate::exact::Place;
 use crate::integrate::inputs::Inputs;
@@ -104,6 +104,8 @@ pub struct Theta<'a> {
     now: Now,
     kept: Now,
     started: bool,
+    /// Settling steps of the midpoint rule are Moreau's for now.
+    damped: bool,
     preferred: f64,
     last_h: f64,
     u_next: Vec<f64>,
@@ -115,6 +117,8 @@ pub struct Theta<'a> {
     y: Vec<f64>,
     attempt: Attempt,
     coarse: Vec<f64>,
+    /// What differences of states are rounding, where a law is curved.
+    rounding: Vec<f64>,
     /// Buffer for s.
     storage: Vec<f64>,
     control: Option<Control>,
@@ -226,11 +230,17 @@ impl<'a> Theta<'a> {
         };
         let amplitudes = Amplitudes::new(&system.lcs, &inputs);
         let switches = Switches::new(position, thresholds, &system.lcs);
-        let order = Tableau::of(system, scheme).map_or(scheme.order(), |t| t.order);
+        let tableau = Tableau::of(system, scheme);
+        let order = tableau.map_or(scheme.order(), |t| t.order);
+        let corner = if tableau.is_some() {
+            stages::GRANT
+        } else {
+            CORNER
+        };
         let (control, preferred) = match stepping {
             Stepping::Fixed(_) => (None, f64::INFINITY),
             Stepping::Controlled { span, first } => {
-                (Some(Control::new(order, &settings, span)), first)
+                (Some(Control::new(order, corner, &settings, span)), first)
             }
         };
         let mut theta = Self {
@@ -246,6 +256,7 @@ impl<'a> Theta<'a> {
             kept: now.clone(),
             now,
             started: false,
+            damped: false,
             preferred,
             last_h: 0.0,
             z: Vec::new(),
@@ -254,6 +265,7 @@ impl<'a> Theta<'a> {
             y: Vec::new(),
             attempt: Attempt::default(),
             coarse: Vec::new(),
+            rounding: Vec::new(),
             storage: Vec::new(),
             control,
             stats: Stats::default(),
@@ -273,10 +285,13 @@ impl<'a> Theta<'a> {
         self.amplitudes = amplitudes;
     }
 
-    /// Has the error estimated along the run.
+    /// Has the error estimated along the run; there is no estimate for prescribed steps of curved laws.
     pub fn estimate_errors(&mut self) {
         let mut estimate = Estimate::default();
         if self.control.is_none() {
+            if Tableau::of(self.system(), self.scheme).is_some() {
+                return;
+            }
             estimate.enter(self.now.x.iter().map(|_| 0.0));
         }
         self.kept.estimate = Some(estimate.clone());
@@ -393,6 +408,8 @@ impl<'a> Theta<'a> {
         self.y.clear();
         self.y.resize(m, 0.0);
         self.coarse.resize(n, 0.0);
+        self.rounding.clear();
+        self.rounding.resize(n, 0.0);
         self.attempt.h = f64::NAN;
     }
 }

@@ -11,6 +11,11 @@
 use super::attempt::unsolved;
 use super::*;
 
+/// The part of the tolerance granted to every step: resistive laws forget errors instead of adding them up.
+pub(super) const GRANT: f64 = 1e-3;
+/// Differences below this part of the terms a state is a sum of are rounding, and no error of the step.
+const ROUNDING: f64 = 1e-11;
+
 /// The coefficients of a method.
 #[derive(Debug)]
 pub(super) struct Tableau {
@@ -109,6 +114,10 @@ impl Theta<'_> {
             self.lambda.copy_from_slice(solution.lambda.as_slice());
             self.y.copy_from_slice(solution.y.as_slice());
             self.worst_residual = self.worst_residual.max(solution.residual);
+            if at_end {
+                let sizes = system.step(step).x_sizes(&self.z, &solution.lambda);
+                self.rounding.copy_from_slice((sizes * ROUNDING).as_slice());
+            }
             let weight = last_row.get(j).copied().unwrap_or(tableau.gamma);
             let at = Point {
                 x: x.as_slice(),

@@ -176,6 +176,13 @@ struct LawDoc {
     ibv: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     breakdown_slope: Option<f64>,
+    /// Of straight lines with rounded corners: conductance between them, S; (V, S, width in V) of each.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    conductance: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    forward: Option<[f64; 3]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    reverse: Option<[f64; 3]>,
 }
 
 #[derive(Serialize, Deserialize, Default)]

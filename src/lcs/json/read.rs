@@ -6,7 +6,7 @@ use super::{Document, JsonError, LawDoc, PortDoc, SCHEMA, SystemFile};
 use crate::algebra::Value;
 use crate::circuit::Tran;
 use crate::circuit::source::Source;
-use crate::law::{Breakdown, Curve, Exponential, Law};
+use crate::law::{Breakdown, Corner, Curve, Exponential, Law, Rounded};
 use crate::lcs::{Input, Lcs, Outputs, Port, Role, Rows, State, Storage};
 
 fn unit(text: &str) -> &'static str {
@@ -76,8 +76,13 @@ fn law(doc: &LawDoc, device: &str) -> Result<Law, JsonError> {
             roff: doc.roff.map(value),
         });
     }
-    if doc.kind == "exponential" {
-        return exponential(doc).ok_or_else(|| JsonError::Law {
+    if doc.kind == "exponential" || doc.kind == "rounded" {
+        let law = if doc.kind == "rounded" {
+            rounded(doc)
+        } else {
+            exponential(doc)
+        };
+        return law.ok_or_else(|| JsonError::Law {
             device: device.to_owned(),
             kind: doc.kind.clone(),
         });
@@ -108,6 +113,17 @@ fn law(doc: &LawDoc, device: &str) -> Result<Law, JsonError> {
             kind: doc.kind.clone(),
         }),
     }
+}
+
+/// `None` where a parameter is missing or out of range.
+fn rounded(doc: &LawDoc) -> Option<Law> {
+    let corner = |[v, g, width]: [f64; 3]| Corner { v, g, width };
+    let diode = Rounded {
+        g: doc.conductance?,
+        forward: corner(doc.forward?),
+        reverse: doc.reverse.map(corner),
+    };
+    diode.is_sound().then_some(Law::Rounded(diode))
 }
 
 /// `None` where a parameter is missing or out of range.

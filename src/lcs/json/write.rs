@@ -32,6 +32,13 @@ fn law_document(law: &Law) -> LawDoc {
             last: Some([curve.last.0.f64, curve.last.1.f64]),
             ..LawDoc::default()
         },
+        Law::Rounded(diode) => LawDoc {
+            kind,
+            conductance: Some(diode.g),
+            forward: Some([diode.forward.v, diode.forward.g, diode.forward.width]),
+            reverse: diode.reverse.map(|c| [c.v, c.g, c.width]),
+            ..LawDoc::default()
+        },
         Law::Exponential(diode) => LawDoc {
             kind,
             is: Some(diode.is),

@@ -154,11 +154,11 @@ pub enum Device {
         /// `ON`, `OFF`.
         initial: Option<bool>,
     },
-    /// M, J, Z: drain, gate and source are the element's nodes.
+    /// M, Q, J, Z: drain, gate and source (collector, base and emitter) are the element's nodes.
     Transistor {
-        /// A bulk node or none, then the model name.
+        /// A bulk or substrate node or none, the model name, an area factor or none.
         words: Vec<Name>,
-        /// The area factor.
+        /// The last word as a value: the area factor, unless that word is the model.
         area: Option<Expr>,
         /// `w=`, `l=`, `m=`, `off`, …
         args: Vec<Assign>,

@@ -1,4 +1,4 @@
-//! D, S, W, M, J, Z, X, and the letters that are only recognised.
+//! D, S, W, M, Q, J, Z, X, and the letters that are only recognised.
 
 use nom::Input as _;
 
@@ -74,26 +74,31 @@ fn switch(at: Input<'_>, own: Vec<Name>, control: Control) -> Parsed<'_, Body> {
     ))
 }
 
-/// `M1 d g s [b] model [w=… l=…] [off]`, `J1 d g s model [area]`, `Z1 d g s model [area]`. Which of the words after the source
-/// of a MOSFET is its model is known only when all models are.
+/// `M1 d g s [b] model [w=… l=…] [off]`, `Q1 c b e [s] model [area]`, `J1 d g s model [area]`, `Z1 d g s model [area]`. Which of
+/// the words after the third node is the model is known only when all models are.
 pub(super) fn transistor<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
-    let (at, nodes) = nodes(i, 3, "node")?;
-    let (mut at, first) = node(separator(at)).map_err(|_| missing(at, "the model name"))?;
-    let mut words = vec![first];
-    if name.text.starts_with('m')
-        && !assignment_follows(separator(at))
-        && let Ok((rest, second)) = node(separator(at))
-        && second.text != "off"
-    {
-        words.push(second);
+    let (mut at, nodes) = nodes(i, 3, "node")?;
+    let most = if name.text.starts_with(['m', 'q']) {
+        3
+    } else {
+        2
+    };
+    let (mut words, mut area) = (Vec::new(), None);
+    while words.len() < most && !assignment_follows(separator(at)) {
+        let Ok((rest, one)) = node(separator(at)) else {
+            break;
+        };
+        if one.text == "off" {
+            break;
+        }
+        // `2n3904` and `2` may both be read as numbers.
+        area = operand::value(separator(at)).ok().map(|(_, value)| value);
+        words.push(one);
         at = rest;
     }
-    let (at, area) = if blank_number(at) && !assignment_follows(at) {
-        let (at, value) = operand::value(at)?;
-        (at, Some(value))
-    } else {
-        (at, None)
-    };
+    if words.is_empty() {
+        return Err(missing(at, "the model name"));
+    }
     let (at, args) = assigns(at)?;
     Ok((at, (nodes, Device::Transistor { words, area, args })))
 }
@@ -140,6 +145,21 @@ pub(super) fn call<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
         ));
     }
     Ok((at, (words, Device::Call { subckt, args })))
+}
+
+/// `A1 a k model`: a code model with two terminals, which may be ngspice's `sidiode`. Others are recognised only.
+pub(super) fn code_model<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
+    let two = nodes(i, 2, "node").and_then(|(at, two)| {
+        let (at, model) = word(separator(at))?;
+        Ok((separator(at), two, model))
+    });
+    match two {
+        Ok((at, nodes, model)) if at_end(at) => {
+            let (area, args) = (None, Vec::new());
+            Ok((at, (nodes, Device::Diode { model, area, args })))
+        }
+        _ => unsupported(i, name),
+    }
 }
 
 /// A card that is recognised but not supported.

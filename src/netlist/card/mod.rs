@@ -63,8 +63,9 @@ pub(super) fn element(i: Input<'_>) -> Parsed<'_, Element> {
         's' => device::voltage_switch,
         'w' => device::current_switch,
         'x' => device::call,
-        'm' | 'j' | 'z' => device::transistor,
-        'q' | 't' | 'o' | 'u' | 'a' | 'p' | 'y' | 'n' => device::unsupported,
+        'm' | 'q' | 'j' | 'z' => device::transistor,
+        'a' => device::code_model,
+        't' | 'o' | 'u' | 'p' | 'y' | 'n' => device::unsupported,
         _ => {
             let message = format!(
                 "`{}` is no element: no element begins with `{letter}`",
@@ -73,7 +74,7 @@ pub(super) fn element(i: Input<'_>) -> Parsed<'_, Element> {
             return Err(refuse(
                 Diagnostic::error("unknown-element", name.span, message)
                     .label("unknown element letter")
-                    .help("elements are R C L K V I E F G H B D S W M J Z X; a comment begins with `*` or `;`"),
+                    .help("elements are R C L K V I E F G H B D S W M Q J Z X; a comment begins with `*` or `;`"),
             ));
         }
     };
