@@ -272,3 +272,27 @@ fn one_token_changed() {
         "{simulated} simulated, {refused} refused"
     );
 }
+
+/// What the run through every token has found before.
+#[test]
+fn cases_met() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for (file, from, to) in [
+        // Time constants of 1e-28 s: the steps are counted inside a print step too.
+        ("netlists/sepic.cir", "c1 out 0 100u", "c1 out 0 1e-30"),
+        // A coupled inductance below zero.
+        (
+            "tests/data/everything.cir",
+            "L1  sw out 47uH",
+            "L1  sw out -1u",
+        ),
+    ] {
+        let path = root.join(file);
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(text.contains(from));
+        assert_eq!(
+            watched(&path, &text.replace(from, to)),
+            Ok(Verdict::Refused)
+        );
+    }
+}

@@ -223,6 +223,21 @@ impl<'n> Builder<'n, '_> {
                     None => {}
                 }
             }
+            let negative = ids.iter().find(|id| {
+                matches!(self.circuit.elements[id.index()].kind, Kind::Inductor(l) if l.f64 < 0.0)
+            });
+            if let Some(id) = negative {
+                let name = self.circuit.elements[id.index()].name.clone();
+                let message = format!(
+                    "`{}` couples `{name}`, whose inductance is negative",
+                    card.name
+                );
+                self.tell(
+                    Diagnostic::error("coupling", card.span, message)
+                        .label("no winding has a negative inductance"),
+                );
+                continue;
+            }
             for (i, &a) in ids.iter().enumerate() {
                 for &b in &ids[i + 1..] {
                     let twice = self

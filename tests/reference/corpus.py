@@ -38,7 +38,7 @@ FINE_SETTINGS = [(1e-5, "gear"), (1e-6, "trap"), (1e-6, "gear"), (1e-4, "gear")]
 SHIFT = 0.1
 DIVISIONS = 50
 MOST_STEPS = 4e6
-TIMEOUT = 120
+TIMEOUT = 600
 
 
 def read_bytes(path):

@@ -23,6 +23,8 @@ pub(crate) enum Arrival {
     Fired(usize),
     /// The flow left the range of doubles.
     Overflow,
+    /// More steps than allowed.
+    Exhausted,
 }
 
 /// What the guards say about a step.
@@ -44,6 +46,8 @@ pub(crate) struct Motion {
     pub(crate) entered: f64,
     /// Steps taken.
     pub(crate) steps: u64,
+    /// Steps allowed.
+    most: u64,
     /// Energy from sources and energy dissipated on Taylor's steps since last taken, J.
     energy: [f64; 2],
     spans: Spans,
@@ -66,10 +70,11 @@ pub(crate) struct Motion {
 
 impl Motion {
     /// A motion that stands at `t` in no mode yet.
-    pub(crate) fn at(t: f64) -> Self {
+    pub(crate) fn at(t: f64, most: u64) -> Self {
         Self {
             t,
             entered: t,
+            most,
             ..Self::default()
         }
     }
@@ -196,6 +201,9 @@ impl Motion {
         }
         let mut deepest_next = 0;
         while units > 0 {
+            if self.steps > self.most {
+                return Arrival::Exhausted;
+            }
             let limit = flow.step_limit(self.t - self.entered);
             let aligned = bottom - units.trailing_zeros().min(bottom);
             let mut level = aligned.max(deepest_next);

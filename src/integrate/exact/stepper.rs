@@ -145,7 +145,7 @@ impl<'a> Exact<'a> {
             plant,
             sources,
             exosystem,
-            motion: Motion::at(t),
+            motion: Motion::at(t, settings.max_steps),
             inspector: Inspector::default(),
             mode: None,
             next_key: key.clone(),
@@ -414,6 +414,8 @@ impl Stepper for Exact<'_> {
                     }
                 }
                 Arrival::Overflow => return Err(self.fail(Reason::Overflow)),
+                // Told below.
+                Arrival::Exhausted => {}
             }
             if self.motion.steps > self.settings.max_steps {
                 return Err(self.fail(Reason::TooManySteps {
