@@ -10,13 +10,16 @@ const ROOMS: [(&str, &[&str]); 18] = [
     ("algebra", &[]),
     ("diagnostic", &[]),
     ("law", &["algebra"]),
-    ("netlist", &["algebra", "diagnostic"]),
-    ("circuit", &["algebra", "diagnostic", "law", "netlist"]),
+    ("measure", &[]),
+    ("netlist", &["algebra", "diagnostic", "measure"]),
+    (
+        "circuit",
+        &["algebra", "diagnostic", "law", "measure", "netlist"],
+    ),
     ("mna", &["algebra", "circuit", "diagnostic", "law"]),
     ("lcs", &["algebra", "circuit", "law", "mna"]),
     ("solve", &["law", "settings"]),
     ("waveform", &[]),
-    ("measure", &[]),
     ("plan", &["lcs", "settings", "solve"]),
     (
         "integrate",
@@ -38,10 +41,21 @@ const ROOMS: [(&str, &[&str]); 18] = [
             "solve",
         ],
     ),
-    ("forms", &["check", "lcs", "passivity", "settings", "solve"]),
+    (
+        "forms",
+        &["check", "lcs", "netlist", "passivity", "settings", "solve"],
+    ),
     (
         "report",
-        &["check", "circuit", "integrate", "law", "lcs", "waveform"],
+        &[
+            "check",
+            "circuit",
+            "integrate",
+            "law",
+            "lcs",
+            "measure",
+            "waveform",
+        ],
     ),
     (
         "cli",

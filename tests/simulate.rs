@@ -338,3 +338,34 @@ fn counters_of_a_run() {
     stats.cpu_seconds = 0.0;
     insta::assert_debug_snapshot!((stats, run.plan));
 }
+
+/// A source's edge and a switch that moves are steps of the outputs: with events, a row before and one after.
+#[test]
+fn steps_of_the_outputs_have_two_rows() {
+    for method in [Method::Exact, Method::Theta] {
+        let options = SimOptions {
+            method,
+            events: true,
+            ..SimOptions::default()
+        };
+        let run = simulate(
+            "v1 in 0 pulse(0 2 0.25m 0 0 1)
+             vc c 0 pwl(0 0 1m 1)
+             s1 in out c 0 sw1
+             r1 out 0 1
+             .model sw1 sw(vt=0.5 ron=0 roff=inf)
+             .tran 0.2m 1m
+             .save v(in) v(out)",
+            options,
+        );
+        let rows_at = |t: f64| -> Vec<[f64; 2]> {
+            let waves = &run.waveforms;
+            (0..waves.len())
+                .filter(|&k| (waves.time[k] - t).abs() < 1e-15)
+                .map(|k| [waves.row(k)[0], waves.row(k)[1]])
+                .collect()
+        };
+        assert_eq!(rows_at(0.25e-3), [[0.0, 0.0], [2.0, 0.0]], "{method:?}");
+        assert_eq!(rows_at(0.5e-3), [[2.0, 0.0], [2.0, 2.0]], "{method:?}");
+    }
+}

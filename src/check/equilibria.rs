@@ -20,13 +20,14 @@ pub struct Equilibrium {
     pub unique: Option<bool>,
 }
 
-/// Residual, relative to the terms, at which the interior point method's answer counts as an equilibrium.
-const ROUGH: f64 = 1e-6;
+/// Residual in balanced units at which the interior point method's answer counts as an equilibrium.
+const ROUGH: f64 = 1e-7;
 
-/// The equilibria of an autonomous system of complementary pairs; all of them where A is regular and m ≤ 16.
-pub(super) fn all(facts: &Facts) -> Vec<Equilibrium> {
-    if !facts.is_autonomous() || facts.laws.iter().any(|l| !l.half_line) {
-        return Vec::new();
+/// The equilibria of an autonomous system of complementary pairs: all of them where A is regular and m ≤ 16, else one; of a
+/// system with other laws x = 0 where it is one. `None` where nothing is known, an empty list where there is none.
+pub(super) fn all(facts: &Facts) -> Option<Vec<Equilibrium>> {
+    if !facts.is_autonomous() {
+        return None;
     }
     let system = &facts.system;
     let incremental = facts.strict.as_ref().is_some_and(|s| s.decay_rate > 0.0);
@@ -39,29 +40,36 @@ pub(super) fn all(facts: &Facts) -> Vec<Equilibrium> {
             None
         }
     };
+    if facts.laws.iter().any(|l| !l.half_line) {
+        let zero = || {
+            equilibrium(
+                &DVector::zeros(system.n()),
+                &DVector::zeros(system.m()),
+                unique(1),
+            )
+        };
+        return facts.rests_at_zero().then(|| vec![zero()]);
+    }
     let inverse = if scale::well_conditioned(&system.a) {
         system.a.clone().try_inverse()
     } else {
         None
     };
     let Some(inverse) = inverse else {
-        return singular(facts)
-            .map(|(x, lambda)| equilibrium(&x, &lambda, unique(1)))
-            .into_iter()
-            .collect();
+        return singular(facts).map(|(x, lambda)| vec![equilibrium(&x, &lambda, unique(1))]);
     };
     let at = |lambda: &DVector<f64>| -(&inverse * (&system.b * lambda + &facts.e));
     let m = &system.d - &system.c * &inverse * &system.b;
     let q = &facts.f - &system.c * &inverse * &facts.e;
-    let Ok(lcp) = Lcp::new(m, q) else {
-        return Vec::new();
-    };
+    let lcp = Lcp::new(m, q).ok()?;
     let tolerance = Settings::default().lcp_residual;
     let mut driver = Driver::new(lcp.m.clone(), tolerance);
     if driver.is_monotone() || lcp.size() > enumerate::LARGEST {
         let solution = driver.solve(&lcp.q);
-        if solution.status != Status::Solved {
-            return Vec::new();
+        match solution.status {
+            Status::Solved => {}
+            Status::Infeasible(_) => return Some(Vec::new()),
+            Status::Failed => return None,
         }
         let (lambda, only) = driver.least_norm(&lcp.q, &solution);
         let x = at(&lambda);
@@ -70,14 +78,11 @@ pub(super) fn all(facts: &Facts) -> Vec<Equilibrium> {
         } else {
             unique(1)
         };
-        return vec![equilibrium(&x, &lambda, unique)];
+        return Some(vec![equilibrium(&x, &lambda, unique)]);
     }
     let found = enumerate::solve(&lcp, tolerance);
-    let count = found.len();
-    found
-        .iter()
-        .map(|lambda| equilibrium(&at(lambda), lambda, Some(count == 1)))
-        .collect()
+    let one = |lambda| equilibrium(&at(lambda), lambda, Some(found.len() == 1));
+    Some(found.iter().map(one).collect())
 }
 
 /// −0 reads like a sign.
@@ -94,36 +99,76 @@ fn equilibrium(x: &DVector<f64>, lambda: &DVector<f64>, unique: Option<bool>) ->
 }
 
 /// For singular A and a passive system: λᵀy − xᵀP(Ax + Bλ + e) = −½ zᵀQ(P)z + … is convex in z = (x, λ), and vanishes at
-/// the equilibria.
+/// the equilibria. Of those on the sides that its minimum finds for the ports, the one of least norm in balanced units.
 fn singular(facts: &Facts) -> Option<(DVector<f64>, DVector<f64>)> {
     let certificate = facts.certificate()?;
-    let system = &facts.system;
-    let (n, m) = (system.n(), system.m());
-    let objective = -crate::passivity::lmi::matrix(system, &certificate.p);
+    let (n, m) = (facts.system.n(), facts.system.m());
+    let balanced = scale::balance(&facts.system);
+    let system = &balanced.system;
+    let p = scale::scaled(&certificate.p, &balanced.states, &balanced.states);
+    let e = facts.e.component_div(&balanced.states) / balanced.omega;
+    let f = facts.f.component_mul(&balanced.ports) / balanced.omega;
+    // Equilibria are homogeneous in the constant terms.
+    let size = e.amax().max(f.amax());
+    if size == 0.0 {
+        return Some((DVector::zeros(n), DVector::zeros(m)));
+    }
+    let (e, f) = (e / size, f / size);
+
     let mut linear = DVector::zeros(n + m);
-    linear
-        .rows_mut(0, n)
-        .copy_from(&-(&certificate.p * &facts.e));
-    linear.rows_mut(n, m).copy_from(&facts.f);
-    let mut rows = DMatrix::zeros(n + 2 * m, n + m);
-    rows.view_mut((0, 0), (n, n)).copy_from(&system.a);
-    rows.view_mut((0, n), (n, m)).copy_from(&system.b);
-    rows.view_mut((n, 0), (m, n)).copy_from(&system.c);
-    rows.view_mut((n, n), (m, m)).copy_from(&system.d);
-    rows.view_mut((n + m, n), (m, m)).fill_with_identity();
-    let mut offsets = DVector::zeros(n + 2 * m);
-    offsets.rows_mut(0, n).copy_from(&facts.e);
-    offsets.rows_mut(n, m).copy_from(&facts.f);
-    let z = program::minimise(&objective, &linear, &rows, &offsets, n)?;
-    let (x, lambda) = (z.rows(0, n).into_owned(), z.rows(n, m).map(|v| v.max(0.0)));
-    let rest = &system.a * &x + &system.b * &lambda + &facts.e;
-    let terms = system.a.abs() * x.abs() + system.b.abs() * &lambda + facts.e.abs();
-    let y = &system.c * &x + &system.d * &lambda + &facts.f;
-    let sizes = system.c.abs() * x.abs() + system.d.abs() * &lambda + facts.f.abs();
-    let still = (0..n).all(|i| rest[i].abs() <= ROUGH * terms.amax());
-    let complementary = (0..m).all(|j| {
-        y[j] >= -ROUGH * sizes.amax()
-            && y[j].abs().min(lambda[j]) <= ROUGH * sizes.amax().max(lambda.amax())
-    });
-    (still && complementary).then_some((x, lambda))
+    linear.rows_mut(0, n).copy_from(&-(&p * &e));
+    linear.rows_mut(n, m).copy_from(&f);
+    let mut flow = system.a.clone().resize_horizontally(n + m, 0.0);
+    flow.columns_mut(n, m).copy_from(&system.b);
+    let mut output = system.c.clone().resize_horizontally(n + m, 0.0);
+    output.columns_mut(n, m).copy_from(&system.d);
+    let lambda = DMatrix::from_fn(m, n + m, |j, k| if k == n + j { 1.0 } else { 0.0 });
+    let stack = |blocks: &[(&DMatrix<f64>, &DVector<f64>)]| {
+        let rows = blocks.iter().flat_map(|(a, _)| a.row_iter());
+        let offsets = blocks.iter().flat_map(|(_, b)| b.iter().copied());
+        let rows: Vec<_> = rows.map(|row| row.into_owned()).collect();
+        (
+            DMatrix::from_rows(&rows),
+            DVector::from_iterator(rows.len(), offsets),
+        )
+    };
+    let none = DVector::zeros(m);
+    let (a, b) = stack(&[(&flow, &e), (&output, &f), (&lambda, &none)]);
+    let objective = -crate::passivity::lmi::matrix(system, &p);
+    let z = program::minimise(&objective, &linear, &a, &b, n)?;
+
+    let y = &output * &z + &f;
+    let conducts = |j: usize| z[n + j] > y[j];
+    let pick = |yes: bool| {
+        let on = |j| {
+            if conducts(j) == yes {
+                (&output, f[j])
+            } else {
+                (&lambda, 0.0)
+            }
+        };
+        let rows: Vec<_> = (0..m).map(|j| on(j).0.row(j).into_owned()).collect();
+        let rows = if m == 0 {
+            DMatrix::zeros(0, n)
+        } else {
+            DMatrix::from_rows(&rows)
+        };
+        (rows, DVector::from_iterator(m, (0..m).map(|j| on(j).1)))
+    };
+    let (zero, positive) = (pick(true), pick(false));
+    let (a, b) = stack(&[(&flow, &e), (&zero.0, &zero.1), (&positive.0, &positive.1)]);
+    let norm = DMatrix::from_fn(n + m, n + m, |i, k| if i == k { 1.0 } else { 0.0 });
+    let z = program::minimise(&norm, &DVector::zeros(n + m), &a, &b, n + m)?;
+
+    let rest = (&flow * &z + &e).amax();
+    let y = &output * &z + &f;
+    let sides = (0..m).map(|j| y[j].min(z[n + j]).abs()).fold(0.0, f64::max);
+    let found = (
+        z.rows(0, n).component_mul(&balanced.states) * size,
+        z.rows(n, m)
+            .map(|v| v.max(0.0))
+            .component_mul(&balanced.ports)
+            * size,
+    );
+    (rest.max(sides) <= ROUGH * z.amax().max(1.0)).then_some(found)
 }

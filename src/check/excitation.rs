@@ -29,6 +29,7 @@ impl Excitation {
                 offset,
                 amplitude,
                 damping,
+                cycles,
                 ..
             } => {
                 // A negative damping grows without bound.
@@ -40,7 +41,9 @@ impl Excitation {
                 if *amplitude == 0.0 {
                     range(&[*offset], false)
                 } else {
-                    range(&[offset - size, offset + size], false)
+                    // Cut off where it is not back at its start.
+                    let cut = cycles.is_some_and(|n| n.fract() != 0.0 || *damping != 0.0);
+                    range(&[offset - size, offset + size], cut)
                 }
             }
             Wave::Sffm {

@@ -59,6 +59,8 @@ pub(super) struct Facts {
     /// Names and ranges of those sources.
     pub(super) driven: Vec<(String, Excitation)>,
     pub(super) laws: Vec<PortLaw>,
+    /// What was added to λ of each port in the normal form.
+    pub(super) offsets: Vec<f64>,
     pub(super) energy: DMatrix<f64>,
     pub(super) verdict: Verdict,
     pub(super) strict: Option<Strict>,
@@ -75,6 +77,7 @@ impl Facts {
         let mut system = System::of(lcs);
         let (mut e, mut f) = (lcs.e0.clone(), lcs.f.clone());
         let mut laws = Vec::with_capacity(m);
+        let mut offsets = vec![0.0; m];
         for (j, port) in lcs.ports.iter().enumerate() {
             let mut law = port_law(&port.device, port.role, &port.law);
             if port.role == Role::Function {
@@ -102,6 +105,7 @@ impl Facts {
                     _ if ron.f64 == 0.0 => {
                         f -= system.d.column(j) * offset;
                         e -= system.b.column(j) * offset;
+                        offsets[j] = offset;
                         law.half_line = true;
                     }
                     _ => {}
@@ -148,6 +152,7 @@ impl Facts {
             g_driven,
             driven,
             laws,
+            offsets,
             verdict,
             strict,
         };
@@ -163,6 +168,18 @@ impl Facts {
     /// Whether nothing moves by itself: no source changes in time.
     pub(super) fn is_autonomous(&self) -> bool {
         self.e_driven.amax() == 0.0 && self.g_driven.amax() == 0.0
+    }
+
+    /// x = 0 with λ = 0 is a solution and every law passes through it (Assumption 7); not asked of driven terms.
+    pub(super) fn rests_at_zero(&self) -> bool {
+        self.e.amax() == 0.0
+            && self.laws.iter().zip(self.f.iter()).all(|(law, &f)| {
+                if law.half_line {
+                    f >= 0.0
+                } else {
+                    law.through_origin && f == 0.0
+                }
+            })
     }
 
     /// Whether a changing source enters y.

@@ -1,17 +1,19 @@
 //! What is known about a circuit before it runs: faults, certificates, and which theorem says what.
 
+mod convergence;
 mod equilibria;
 mod excitation;
 mod facts;
 mod feedthrough;
 mod jumps;
 mod laws;
+mod limit;
 pub mod program;
 mod stiffness;
 mod text;
 mod theorems;
-pub mod topology;
 
+pub use convergence::Convergence;
 pub use equilibria::Equilibrium;
 pub use excitation::Excitation;
 pub use feedthrough::Feedthrough;
@@ -24,6 +26,7 @@ use nalgebra::DMatrix;
 use crate::circuit::Circuit;
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 use crate::lcs::Lcs;
+use crate::mna::topology;
 use crate::passivity::{Residuals, Verdict};
 use facts::Facts;
 
@@ -64,14 +67,18 @@ pub struct Report {
     pub residuals: Option<Residuals>,
     /// Statement by statement.
     pub theorems: Vec<Theorem>,
-    /// States of rest of an autonomous circuit.
-    pub equilibria: Vec<Equilibrium>,
+    /// States of rest of an autonomous circuit, an empty list if it has none; `null` where that is not known.
+    pub equilibria: Option<Vec<Equilibrium>>,
+    /// Where all motions end, as far as that is certified; `null` where nothing is.
+    pub convergence: Option<Convergence>,
     /// Where states can jump.
     pub jumps: Jumps,
     /// Time constants over the modes.
     pub stiffness: Option<Stiffness>,
     /// Names of the states, the rows of P.
     pub states: Vec<String>,
+    /// Names of the ports' λ.
+    pub lambdas: Vec<String>,
     /// The switch positions that everything above is said for, `{"s1":"off"}`.
     #[serde(serialize_with = "positions")]
     pub switches: Vec<(String, bool)>,
@@ -139,9 +146,14 @@ pub struct Size {
 /// The report of a circuit with the system it was reduced to.
 #[must_use]
 pub fn circuit(circuit: &Circuit, lcs: &Lcs) -> Report {
+    let (tree, links) = topology::normal_tree(circuit);
+    let name = |&node: &usize| circuit.nodes[node].clone();
     Report {
-        islands: topology::islands(circuit),
-        normal_tree: topology::normal_tree(circuit),
+        islands: topology::islands(circuit)
+            .iter()
+            .map(|part| part.iter().map(name).collect())
+            .collect(),
+        normal_tree: NormalTree { tree, links },
         ..system(lcs)
     }
 }
@@ -156,6 +168,18 @@ pub fn system(lcs: &Lcs) -> Report {
         Verdict::NotPassive(witness) => Some(witness.describe()),
         Verdict::NotDecided { reason } => Some(reason.clone()),
     };
+    let mut equilibria = equilibria::all(&facts);
+    let known = equilibria.as_deref().unwrap_or(&[]);
+    let convergence = convergence::find(&facts, known);
+    let theorems = theorems::all(&facts, known);
+    for equilibrium in equilibria.iter_mut().flatten() {
+        if convergence.as_ref().is_some_and(|c| c.to.is_some()) {
+            equilibrium.unique = Some(true);
+        }
+        for (lambda, offset) in equilibrium.lambda.iter_mut().zip(&facts.offsets) {
+            *lambda -= offset;
+        }
+    }
     let rate = facts.strict.as_ref().map_or(0.0, |s| s.decay_rate);
     Report {
         title: lcs.title.clone(),
@@ -177,11 +201,13 @@ pub fn system(lcs: &Lcs) -> Report {
         p: certificate.map(|c| rows(&c.p)),
         p_from: certificate.map(|c| c.from.name()),
         residuals: certificate.map(|c| c.residuals),
-        theorems: theorems::all(&facts),
-        equilibria: equilibria::all(&facts),
+        theorems,
+        equilibria,
+        convergence,
         jumps: jumps::find(&facts),
         stiffness: Some(stiffness::over_modes(&facts.system)),
         states: facts.state_names.clone(),
+        lambdas: lcs.ports.iter().map(|port| port.lambda.clone()).collect(),
         switches: lcs.switches.clone(),
     }
 }
@@ -206,10 +232,12 @@ pub fn faulty(title: &str, faults: Vec<Fault>) -> Report {
         p_from: None,
         residuals: None,
         theorems: Vec::new(),
-        equilibria: Vec::new(),
+        equilibria: None,
+        convergence: None,
         jumps: Jumps::default(),
         stiffness: None,
         states: Vec::new(),
+        lambdas: Vec::new(),
         switches: Vec::new(),
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::Report;
+use super::{Convergence, Report};
 
 fn answer(value: Option<bool>) -> &'static str {
     match value {
@@ -10,6 +10,42 @@ fn answer(value: Option<bool>) -> &'static str {
         Some(false) => "no",
         None => "not decided",
     }
+}
+
+/// `converges to  v(c1) = 0 (statement)`.
+fn in_the_long_run(long_run: &Convergence, names: &[String]) -> String {
+    let by = long_run.by;
+    if let Some(x) = &long_run.to {
+        let values: Vec<String> = names
+            .iter()
+            .zip(x)
+            .map(|(name, x)| format!("{name} = {x:.6e}"))
+            .collect();
+        return format!(
+            "converges to  {} from every start ({by})",
+            values.join(", ")
+        );
+    }
+    if long_run.moving.is_empty() {
+        return format!(
+            "converges to  one of the equilibria, in {} dimensions, that the start decides ({by})",
+            long_run.dimension
+        );
+    }
+    let frequencies: Vec<String> = long_run
+        .frequencies_hz
+        .iter()
+        .map(|f| format!("{f:.6e} Hz"))
+        .collect();
+    let at = if frequencies.is_empty() {
+        String::new()
+    } else {
+        format!(" at {}", frequencies.join(", "))
+    };
+    format!(
+        "may keep on   {}{at}: nothing certified damps it ({by})",
+        long_run.moving.join(" ")
+    )
 }
 
 impl fmt::Display for Report {
@@ -112,27 +148,36 @@ impl fmt::Display for Report {
                 writeln!(f, "       gives {}", theorem.gives)?;
             }
         }
-        for equilibrium in &self.equilibria {
-            let values: Vec<String> = self
-                .states
-                .iter()
-                .zip(&equilibrium.x)
-                .map(|(name, x)| format!("{name} = {x:.6e}"))
+        let equilibria = self.equilibria.as_deref().unwrap_or(&[]);
+        if self.equilibria.as_ref().is_some_and(Vec::is_empty) {
+            writeln!(
+                f,
+                "equilibrium   none: the static complementarity problem has no solution"
+            )?;
+        }
+        for equilibrium in equilibria {
+            // Several, or none of x to show: λ tells them apart.
+            let lambda = if equilibria.len() > 1 || self.states.is_empty() {
+                equilibrium.lambda.as_slice()
+            } else {
+                &[]
+            };
+            let names = self.states.iter().chain(&self.lambdas);
+            let values: Vec<String> = names
+                .zip(equilibrium.x.iter().chain(lambda))
+                .map(|(name, value)| format!("{name} = {value:.6e}"))
                 .collect();
             let only = if equilibrium.unique == Some(true) {
                 " (the only one)"
             } else {
                 ""
             };
-            writeln!(
-                f,
-                "equilibrium   {}{only}",
-                if values.is_empty() {
-                    "-".into()
-                } else {
-                    values.join(", ")
-                }
-            )?;
+            if !values.is_empty() {
+                writeln!(f, "equilibrium   {}{only}", values.join(", "))?;
+            }
+        }
+        if let Some(long_run) = &self.convergence {
+            writeln!(f, "{}", in_the_long_run(long_run, &self.states))?;
         }
         if self.jumps.states.is_empty() {
             writeln!(

@@ -3,6 +3,7 @@
 use super::builder::Builder;
 use super::scope::ScopeId;
 use super::{Kind, NodeId, Tran};
+use crate::algebra::Value;
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::netlist::ast::{self, Expr, Signal};
 
@@ -66,6 +67,47 @@ impl<'n> Builder<'n, '_> {
     /// Whether `.tran … startup` asks for supplies that ramp up.
     pub(super) fn startup(&self) -> bool {
         self.trans.iter().any(|t| t.startup)
+    }
+
+    /// The temperature of expressions: of a sweep, else of `.temp`.
+    pub(super) fn set_temperature(&mut self) {
+        let swept = self.options.temperature.map(Value::binary);
+        let written = self.temperature.take();
+        let written = written.and_then(|e| self.scopes.finite(e, ScopeId::ROOT));
+        if let Some(temperature) = swept.or(written) {
+            self.scopes.temperature = temperature;
+        }
+    }
+
+    /// `.nodeset`: node voltages from which the operating point is looked for.
+    pub(super) fn nodeset(&mut self, list: &'n [(Signal, Expr)], scope: ScopeId) {
+        for (signal, value) in list {
+            let Some(value) = self.scopes.finite(value, scope).map(|v| v.f64) else {
+                continue;
+            };
+            let node = |name| self.names.expect_node(name, &self.scopes, scope);
+            let pair = match signal {
+                Signal::Voltage(a, b) => node(a).and_then(|a| {
+                    let b = b.as_ref().map_or(Ok(NodeId::GROUND), node)?;
+                    Ok((a, b))
+                }),
+                Signal::Current(name) => {
+                    let fault = Diagnostic::error("ignored", name.span, "a current");
+                    Err(Box::new(fault.label("node voltages only")))
+                }
+            };
+            match pair {
+                Ok((a, b)) => self.circuit.nodesets.push((a, b, value)),
+                Err(fault) => {
+                    let message = format!("{}: `.nodeset` is ignored", fault.message);
+                    self.tell(Diagnostic {
+                        severity: Severity::Warning,
+                        message,
+                        ..*fault
+                    });
+                }
+            }
+        }
     }
 
     /// `.ic`: what it cannot set is ignored with a warning.

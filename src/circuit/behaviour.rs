@@ -325,6 +325,7 @@ impl Scopes<'_> {
                 delay: 0.0,
                 damping: 0.0,
                 phase: (constant * rate.signum()).to_degrees() + quarter,
+                cycles: None,
             },
         ))
     }

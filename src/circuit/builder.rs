@@ -51,7 +51,18 @@ pub(super) struct Builder<'n, 'o> {
     pub(super) trans: Vec<&'n ast::Tran>,
     pub(super) other_analysis: bool,
     pub(super) ics: Vec<(ScopeId, &'n [(Signal, Expr)])>,
+    pub(super) nodesets: Vec<(ScopeId, &'n [(Signal, Expr)])>,
+    /// `.temp`.
+    pub(super) temperature: Option<&'n Expr>,
     pub(super) saves: Vec<(ScopeId, &'n [Wanted])>,
+    /// What `.print dc` asks for, which counts where there is no `.tran`.
+    pub(super) dc_saves: Vec<(ScopeId, &'n [Wanted])>,
+    pub(super) measurements: Vec<(ScopeId, &'n ast::Meas)>,
+    pub(super) fours: Vec<(ScopeId, &'n ast::Four)>,
+    pub(super) step_cards: Vec<&'n ast::Sweep>,
+    pub(super) dc_cards: Option<&'n [ast::Sweep]>,
+    /// Names of the elements of the top level.
+    pub(super) root_elements: HashSet<&'n str>,
     /// Which branch of each `.if` was taken, in the order of the walk.
     pub(super) choices: VecDeque<Option<usize>>,
     /// The subcircuits being expanded, from the outside in.
@@ -83,7 +94,15 @@ impl<'n, 'o> Builder<'n, 'o> {
             trans: Vec::new(),
             other_analysis: false,
             ics: Vec::new(),
+            nodesets: Vec::new(),
+            temperature: None,
             saves: Vec::new(),
+            dc_saves: Vec::new(),
+            measurements: Vec::new(),
+            fours: Vec::new(),
+            step_cards: Vec::new(),
+            dc_cards: None,
+            root_elements: HashSet::new(),
             choices: VecDeque::new(),
             nesting: Vec::new(),
             used: HashSet::new(),
@@ -113,6 +132,7 @@ impl<'n, 'o> Builder<'n, 'o> {
         self.define(&netlist.body, ScopeId::ROOT);
         self.check_overrides();
         self.circuit.tran = self.transient();
+        self.dc_sweeps();
         self.elements(&netlist.body, ScopeId::ROOT);
         if self.circuit.elements.is_empty() && read && !self.failed() {
             self.tell(
@@ -394,8 +414,21 @@ impl<'n, 'o> Builder<'n, 'o> {
         for (scope, list) in std::mem::take(&mut self.ics) {
             self.initial(list, scope);
         }
-        for (scope, list) in std::mem::take(&mut self.saves) {
+        for (scope, list) in std::mem::take(&mut self.nodesets) {
+            self.nodeset(list, scope);
+        }
+        let saves = if self.circuit.tran.is_some() || self.circuit.dc.is_empty() {
+            std::mem::take(&mut self.saves)
+        } else {
+            std::mem::take(&mut self.dc_saves)
+        };
+        for (scope, list) in saves {
             self.save(list, scope);
+        }
+        let cards = std::mem::take(&mut self.measurements);
+        self.measure(&cards);
+        for (scope, card) in std::mem::take(&mut self.fours) {
+            self.fourier(card, scope);
         }
     }
 }

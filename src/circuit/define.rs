@@ -13,6 +13,10 @@ impl<'n> Builder<'n, '_> {
         for statement in &block.statements {
             self.define_one(statement, scope);
         }
+        if scope == ScopeId::ROOT {
+            self.set_temperature();
+            self.steps();
+        }
         for statement in &block.statements {
             let Statement::If(branches) = statement else {
                 continue;
@@ -84,7 +88,20 @@ impl<'n> Builder<'n, '_> {
             Statement::Tran(tran) => self.trans.push(tran),
             Statement::Analysis(_) => self.other_analysis = true,
             Statement::Ic(list) => self.ics.push((scope, list)),
+            Statement::Nodeset(list) => self.nodesets.push((scope, list)),
+            Statement::Temperature(value) => self.temperature = Some(value),
             Statement::Save(list) => self.saves.push((scope, list)),
+            Statement::SaveDc(list) => self.dc_saves.push((scope, list)),
+            Statement::Meas(meas) => self.measurements.push((scope, meas)),
+            Statement::Four(four) => self.fours.push((scope, four)),
+            Statement::Step(sweep) => self.step_cards.push(sweep),
+            Statement::Dc(sweeps) => {
+                self.other_analysis = true;
+                self.dc_cards = Some(sweeps);
+            }
+            Statement::Element(element) if scope == ScopeId::ROOT => {
+                self.root_elements.insert(&element.name.text);
+            }
             Statement::Element(_) | Statement::If(_) => {}
         }
     }

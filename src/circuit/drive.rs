@@ -27,7 +27,19 @@ impl<'n> Builder<'n, '_> {
         scope: ScopeId,
     ) {
         let known = [
-            "rser", "cpar", "rpar", "r", "td", "repeat", "distof1", "distof2", "tfall", "dc",
+            "rser",
+            "cpar",
+            "rpar",
+            "r",
+            "td",
+            "repeat",
+            "distof1",
+            "distof2",
+            "tfall",
+            "dc",
+            "file",
+            "value_scale_factor",
+            "time_scale_factor",
         ];
         if let Some(load) = args.iter().find(|a| a.name.text == "load") {
             let message = format!(
@@ -48,6 +60,10 @@ impl<'n> Builder<'n, '_> {
             },
             None => None,
         };
+        let swept = self
+            .swept(&card.name.text)
+            .filter(|_| scope == ScopeId::ROOT);
+        let dc_value = swept.or(dc_value);
         let wave = match wave {
             Some(call) => match self.wave(card, call, args, scope) {
                 Some(wave) => wave,
@@ -134,19 +150,24 @@ impl<'n> Builder<'n, '_> {
             return None;
         }
         match call.name.text.as_str() {
-            "sin" | "sine" => self.sine(call, &x),
+            "sin" | "sine" => Some(self.sine(&x)),
             "pulse" => self.pulse(call, &x),
             "exp" => Some(self.exponential(&x)),
             "pwl" => self.pwl(call, &x, args, scope),
             "sffm" | "am" => self.modulated(call, x),
             name => {
+                let why = match name {
+                    "trnoise" | "trrandom" => {
+                        "a random source, which no exact or repeatable run can follow"
+                    }
+                    _ => "recognised only",
+                };
                 let message = format!(
-                    "{} of `{}` is recognised but not supported yet",
+                    "{} of `{}` is not supported",
                     name.to_uppercase(),
                     card.name.text
                 );
-                let fault = Diagnostic::error("unsupported", call.name.span, message)
-                    .label("not supported yet");
+                let fault = Diagnostic::error("unsupported", call.name.span, message).label(why);
                 self.tell(fault.help("supported waveforms are SIN, PULSE, PWL, EXP, SFFM, AM"));
                 None
             }
@@ -158,24 +179,18 @@ impl<'n> Builder<'n, '_> {
         self.circuit.tran.map_or((0.0, 1.0), |t| (t.tstep, t.tstop))
     }
 
-    fn sine(&mut self, call: &WaveCall, x: &[f64]) -> Option<Wave> {
+    fn sine(&self, x: &[f64]) -> Wave {
         let at = |k: usize| x.get(k).copied().unwrap_or(0.0);
-        if at(6) != 0.0 {
-            let message = "the number of cycles of SIN is recognised but not supported yet";
-            self.tell(
-                Diagnostic::error("unsupported", call.args[6].value.span, message)
-                    .label("not supported yet"),
-            );
-            return None;
-        }
-        Some(Wave::Sin {
+        let frequency = x.get(2).copied().unwrap_or(1.0 / self.defaults().1);
+        Wave::Sin {
             offset: at(0),
             amplitude: at(1),
-            frequency: x.get(2).copied().unwrap_or(1.0 / self.defaults().1),
+            frequency,
             delay: at(3),
             damping: at(4),
             phase: at(5),
-        })
+            cycles: Some(at(6)).filter(|&n| n > 0.0 && frequency > 0.0),
+        }
     }
 
     fn pulse(&mut self, call: &WaveCall, x: &[f64]) -> Option<Wave> {
@@ -272,14 +287,17 @@ impl<'n> Builder<'n, '_> {
             self.tell(Diagnostic::error("pwl-odd", span, message).label("without a partner"));
             return None;
         }
+        let mut scale = |name| self.arg(args, &[name], scope);
+        let (times, values) = (scale("time_scale_factor")?, scale("value_scale_factor")?);
+        let (times, values) = (times.map_or(1.0, |v| v.f64), values.map_or(1.0, |v| v.f64));
         let mut points: Vec<(f64, f64)> = Vec::with_capacity(x.len() / 2);
         for (k, pair) in x.chunks_exact(2).enumerate() {
             let written = &call.args[2 * k];
             let before = points.last().map_or(0.0, |p| p.0);
             let time = if written.plus {
-                before + pair[0]
+                before + times * pair[0]
             } else {
-                pair[0]
+                times * pair[0]
             };
             if k > 0 && time < before {
                 let message = format!("PWL goes back in time, from {before} s to {time} s");
@@ -289,7 +307,7 @@ impl<'n> Builder<'n, '_> {
                 );
                 return None;
             }
-            points.push((time, pair[1]));
+            points.push((time, values * pair[1]));
         }
         let repeat = args
             .0

@@ -1,7 +1,7 @@
 //! Netlist to [`Circuit`]: parameters evaluated, subcircuits expanded, models turned into laws.
 
-use super::Circuit;
 use super::builder::Builder;
+use super::{Circuit, Sweep, Swept};
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::netlist::Netlist;
 
@@ -24,6 +24,26 @@ pub struct ElaborateOptions {
     pub diodes: Diodes,
     /// `--param NAME=VALUE`: replaces the values of `.param` at the top level.
     pub params: Vec<(String, f64)>,
+    /// Values that a sweep gives to elements of the top level: sources' DC values, resistances.
+    pub values: Vec<(String, f64)>,
+    /// The temperature that a sweep sets, °C.
+    pub temperature: Option<f64>,
+}
+
+impl ElaborateOptions {
+    /// The same choices, with these values in place of those of the sweeps.
+    #[must_use]
+    pub fn at(&self, sweeps: &[Sweep], values: &[f64]) -> Self {
+        let mut options = self.clone();
+        for (sweep, &value) in sweeps.iter().zip(values) {
+            match &sweep.what {
+                Swept::Param(name) => options.params.push((name.clone(), value)),
+                Swept::Element(name) => options.values.push((name.clone(), value)),
+                Swept::Temperature => options.temperature = Some(value),
+            }
+        }
+        options
+    }
 }
 
 /// Builds the circuit a netlist describes.

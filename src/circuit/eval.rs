@@ -253,23 +253,7 @@ impl<'n> Scopes<'n> {
                 .ok()?;
             return self.checked(expr, form);
         }
-        let (x, y) = (x.constant.f64, y.constant.f64);
-        let value = match op {
-            Binary::Rem => x % y,
-            Binary::Pow => x.powf(y),
-            Binary::Less => f64::from(x < y),
-            Binary::LessEqual => f64::from(x <= y),
-            Binary::Greater => f64::from(x > y),
-            Binary::GreaterEqual => f64::from(x >= y),
-            Binary::Equal => f64::from(x == y),
-            Binary::NotEqual => f64::from(x != y),
-            Binary::And => f64::from(truth(x) && truth(y)),
-            Binary::Or => f64::from(truth(x) || truth(y)),
-            Binary::Add => x + y,
-            Binary::Sub => x - y,
-            Binary::Mul => x * y,
-            Binary::Div => x / y,
-        };
+        let value = functions::operation(op, x.constant.f64, y.constant.f64);
         self.checked(expr, Form::number(value))
     }
 
@@ -390,7 +374,7 @@ impl<'n> Scopes<'n> {
                 "true" => Some(Value::decimal(1.0, 1, 0)),
                 "false" => Some(Value::decimal(0.0, 0, 0)),
                 "inf" | "infinity" | "infinite" => Some(Value::binary(f64::INFINITY)),
-                "temp" | "temper" => Some(Value::decimal(27.0, 27, 0)),
+                "temp" | "temper" => Some(self.temperature),
                 "boltz" => Some(Value::decimal(1.380_649e-23, 1_380_649, -29)),
                 "echarge" => Some(Value::decimal(1.602_176_634e-19, 1_602_176_634, -28)),
                 "kelvin" => Some(Value::decimal(-273.15, -27315, -2)),

@@ -1,4 +1,6 @@
-//! The functions that expressions may call, on numbers.
+//! The functions and operators of expressions, on numbers.
+
+use crate::netlist::ast::Binary;
 
 /// Why a call has no value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -89,6 +91,26 @@ pub(super) fn call(name: &str, args: &[f64]) -> Result<f64, CallError> {
         Ok(value)
     } else {
         Err(CallError::Domain)
+    }
+}
+
+/// The value of an operator.
+pub(super) fn operation(op: Binary, x: f64, y: f64) -> f64 {
+    match op {
+        Binary::Add => x + y,
+        Binary::Sub => x - y,
+        Binary::Mul => x * y,
+        Binary::Div => x / y,
+        Binary::Rem => x % y,
+        Binary::Pow => x.powf(y),
+        Binary::Less => f64::from(x < y),
+        Binary::LessEqual => f64::from(x <= y),
+        Binary::Greater => f64::from(x > y),
+        Binary::GreaterEqual => f64::from(x >= y),
+        Binary::Equal => f64::from(x == y),
+        Binary::NotEqual => f64::from(x != y),
+        Binary::And => f64::from(truth(x) && truth(y)),
+        Binary::Or => f64::from(truth(x) || truth(y)),
     }
 }
 

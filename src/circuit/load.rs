@@ -6,13 +6,15 @@ use std::path::Path;
 use super::Circuit;
 use super::elaborate::{ElaborateOptions, elaborate};
 use crate::diagnostic::{Diagnostic, SourceMap};
-use crate::netlist;
+use crate::netlist::{self, Netlist};
 
 /// What came of a netlist file.
 #[derive(Debug, Clone)]
 pub struct Loaded {
     /// All files read, for showing findings.
     pub sources: SourceMap,
+    /// The cards, to elaborate again with other values; `None` if the file could not be read.
+    pub netlist: Option<Netlist>,
     /// The circuit, unless there was an error.
     pub circuit: Option<Circuit>,
     /// Everything found, the parser's findings first.
@@ -29,6 +31,7 @@ pub fn load(path: &Path, options: &ElaborateOptions) -> Loaded {
             let message = format!("cannot read `{}`: {error}", path.display());
             return Loaded {
                 sources,
+                netlist: None,
                 circuit: None,
                 diagnostics: vec![Diagnostic::error("unreadable", None, message)],
             };
@@ -40,6 +43,7 @@ pub fn load(path: &Path, options: &ElaborateOptions) -> Loaded {
     diagnostics.extend(more);
     Loaded {
         sources,
+        netlist: Some(parsed),
         circuit,
         diagnostics,
     }

@@ -15,8 +15,10 @@ mod elaborate;
 mod eval;
 mod exponential;
 mod form;
+mod formula;
 mod functions;
 pub(crate) mod load;
+mod measurement;
 mod model;
 mod names;
 mod passive;
@@ -25,6 +27,7 @@ mod place;
 mod probe;
 mod scope;
 pub mod source;
+mod sweep;
 mod switch;
 mod transistor;
 
@@ -32,7 +35,10 @@ use crate::algebra::Value;
 use crate::diagnostic::Span;
 use crate::law::Law;
 pub use elaborate::{Diodes, ElaborateOptions, elaborate};
+pub use formula::Formula;
+pub use measurement::{FourierAnalysis, Harmonics, Measured, NamedMeasurement};
 pub use source::Source;
+pub use sweep::{Sweep, Swept, combinations};
 
 /// A node; 0 is ground.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -78,6 +84,18 @@ pub struct Circuit {
     pub probes: Vec<Probe>,
     /// `.ic v(n)=…` (and differences `v(a,b)=…`): nodes and volts.
     pub initial_voltages: Vec<(NodeId, NodeId, f64)>,
+    /// `.nodeset v(n)=…`: nodes and volts from which the switches of the operating point are looked for.
+    pub nodesets: Vec<(NodeId, NodeId, f64)>,
+    /// `.step`, the first one innermost; the circuit has the values as they stand.
+    pub steps: Vec<Sweep>,
+    /// `.dc`, the first sweep innermost.
+    pub dc: Vec<Sweep>,
+    /// `.meas tran`, in file order.
+    pub measurements: Vec<NamedMeasurement>,
+    /// `.four`, in file order.
+    pub fourier: Vec<FourierAnalysis>,
+    /// The signals that measurements need.
+    pub measured: Vec<Probe>,
 }
 
 /// One branch of the circuit (or a controlled output), from node `p` to node `n`.

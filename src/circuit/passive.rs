@@ -111,6 +111,10 @@ impl<'n> Builder<'n, '_> {
         let Some(value) = self.passive_value(card, values, args, letter, scope) else {
             return;
         };
+        let swept = self
+            .swept(&card.name.text)
+            .filter(|_| scope == ScopeId::ROOT);
+        let value = swept.map_or(value, Value::binary);
         let multiplier = match (
             self.arg(args, &["m"], scope),
             self.arg(args, &["scale"], scope),

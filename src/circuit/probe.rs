@@ -92,24 +92,23 @@ impl Circuit {
         }
     }
 
-    fn voltage(&self, a: NodeId, b: NodeId) -> Probe {
-        let name = |node: NodeId| &self.nodes[node.index()];
-        let name = if b == NodeId::GROUND {
-            format!("v({})", name(a))
-        } else {
-            format!("v({},{})", name(a), name(b))
+    /// A probe with its canonical name.
+    pub(super) fn probe_of(&self, what: Probed) -> Probe {
+        let node = |node: NodeId| &self.nodes[node.index()];
+        let name = match what {
+            Probed::Voltage(a, NodeId::GROUND) => format!("v({})", node(a)),
+            Probed::Voltage(a, b) => format!("v({},{})", node(a), node(b)),
+            Probed::Current(id) => format!("i({})", self.elements[id.index()].name),
         };
-        Probe {
-            name,
-            what: Probed::Voltage(a, b),
-        }
+        Probe { name, what }
+    }
+
+    fn voltage(&self, a: NodeId, b: NodeId) -> Probe {
+        self.probe_of(Probed::Voltage(a, b))
     }
 
     fn current(&self, id: ElementId) -> Probe {
-        Probe {
-            name: format!("i({})", self.elements[id.index()].name),
-            what: Probed::Current(id),
-        }
+        self.probe_of(Probed::Current(id))
     }
 
     fn node_like(&self, name: &str) -> Option<NodeId> {

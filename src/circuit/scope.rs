@@ -34,6 +34,21 @@ impl Findings {
             .any(|d| d.severity == crate::diagnostic::Severity::Error)
     }
 
+    /// Number of findings so far.
+    pub(super) fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// Makes warnings of the errors found since there were `from` findings, and says what follows from them.
+    pub(super) fn soften(&mut self, from: usize, consequence: &str) {
+        for finding in &mut self.list[from..] {
+            if finding.severity == crate::diagnostic::Severity::Error {
+                finding.severity = crate::diagnostic::Severity::Warning;
+                finding.message.push_str(consequence);
+            }
+        }
+    }
+
     pub(super) fn into_list(self) -> Vec<Diagnostic> {
         self.list
     }
@@ -100,6 +115,8 @@ pub(super) struct Scopes<'n> {
     pub(super) rails_read: BTreeSet<NodeId>,
     /// The end of the run, s.
     pub(super) tstop: f64,
+    /// °C.
+    pub(super) temperature: Value,
 }
 
 impl<'n> Scopes<'n> {
@@ -115,6 +132,7 @@ impl<'n> Scopes<'n> {
             rails: HashMap::new(),
             rails_read: BTreeSet::new(),
             tstop: 1.0,
+            temperature: Value::decimal(27.0, 27, 0),
         }
     }
 

@@ -30,8 +30,8 @@ pub struct Source {
 pub enum Wave {
     /// A constant.
     Dc(f64),
-    /// offset + amplitude·e^{−damping (t−delay)}·sin(2π frequency (t−delay) + phase) for t ≥ delay, before it the value
-    /// at the phase alone.
+    /// offset + amplitude·e^{−damping (t−delay)}·sin(2π frequency (t−delay) + phase) for t ≥ delay, before it and after its
+    /// cycles the value at the phase alone.
     Sin {
         /// Offset.
         offset: f64,
@@ -45,6 +45,8 @@ pub enum Wave {
         damping: f64,
         /// Phase, degrees.
         phase: f64,
+        /// Number of cycles; `None` is without end.
+        cycles: Option<f64>,
     },
     /// Trapezoids; a zero `rise` or `fall` is a true edge. A pulse longer than its period is cut by the next one.
     Pulse {
@@ -236,6 +238,7 @@ impl Wave {
                 delay,
                 damping,
                 phase,
+                cycles,
             } => {
                 let oscillation = Oscillation {
                     amplitude,
@@ -244,15 +247,24 @@ impl Wave {
                     phase: phase.to_radians(),
                 };
                 let start = offset + oscillation.value(0.0);
+                let end = cycles.map_or(f64::INFINITY, |n| delay + n / frequency);
                 if side.before(t, delay) {
                     Segment::constant(start, f64::NEG_INFINITY, delay)
-                } else {
-                    let piece = Piece::with_terms(delay, f64::INFINITY, offset, [oscillation]);
+                } else if side.before(t, end) {
+                    let piece = Piece::with_terms(delay, end, offset, [oscillation]);
+                    // Whole cycles end where they began, to the last bit.
+                    let last = match cycles {
+                        None => f64::NAN,
+                        Some(n) if damping == 0.0 && n.fract() == 0.0 => start,
+                        Some(_) => piece.value(end),
+                    };
                     Segment {
                         piece,
                         first: start,
-                        last: f64::NAN,
+                        last,
                     }
+                } else {
+                    Segment::constant(start, end, f64::INFINITY)
                 }
             }
             Self::Pulse {

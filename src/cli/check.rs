@@ -33,6 +33,7 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Report, Failure> {
         sources,
         circuit,
         mut diagnostics,
+        ..
     } = input::load(&args.input);
     if let Some(unreadable) = diagnostics.iter().find(|d| d.code == "unreadable") {
         return Err(Failure::Message(unreadable.message.clone()));

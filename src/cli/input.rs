@@ -13,7 +13,7 @@ use crate::integrate::start;
 use crate::lcs::json::SystemFile;
 use crate::lcs::{Lcs, Position, reduce};
 use crate::mna::{self, Behaviour};
-use crate::netlist::{self, Loaded};
+use crate::netlist::{self, Loaded, Netlist};
 use crate::settings::Settings;
 use crate::waveform::canonical_name;
 
@@ -45,18 +45,22 @@ pub fn system(input: &Input) -> Result<Option<SystemFile>, Failure> {
 /// Reads a netlist with the choices made on the command line.
 #[must_use]
 pub fn load(input: &Input) -> Loaded {
+    netlist::load(&input.file, &choices(input))
+}
+
+/// What the command line changes in a circuit.
+#[must_use]
+pub fn choices(input: &Input) -> ElaborateOptions {
     let diodes = match input.diodes {
         Diodes::Auto => circuit::Diodes::Auto,
         Diodes::Ideal => circuit::Diodes::Ideal,
         Diodes::Exp => circuit::Diodes::Exp,
     };
-    netlist::load(
-        &input.file,
-        &ElaborateOptions {
-            diodes,
-            params: input.params.clone(),
-        },
-    )
+    ElaborateOptions {
+        diodes,
+        params: input.params.clone(),
+        ..ElaborateOptions::default()
+    }
 }
 
 /// Reads a file, shows what was found in it, and keeps the named probes if there are any.
@@ -64,32 +68,59 @@ pub fn load(input: &Input) -> Loaded {
 /// # Errors
 /// [`Failure::Faults`] when the circuit cannot be built, [`Failure::Message`] for an unknown probe.
 pub fn open(input: &Input, probes: &[String], streams: &Streams) -> Result<Subject, Failure> {
+    let (subject, _) = open_with_cards(input, probes, streams)?;
+    if let Subject::Circuit(both) = &subject
+        && !both.0.steps.is_empty()
+    {
+        streams.say("note: `.step` is left out: these are the values as they stand");
+    }
+    Ok(subject)
+}
+
+/// The same, with the cards of the netlist and where they stand.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_with_cards(
+    input: &Input,
+    probes: &[String],
+    streams: &Streams,
+) -> Result<(Subject, Option<(Netlist, SourceMap)>), Failure> {
     if let Some(mut system) = system(input)? {
         keep_outputs(&mut system.lcs, probes)?;
-        return Ok(Subject::System(Box::new(system)));
+        return Ok((Subject::System(Box::new(system)), None));
     }
     let Loaded {
         sources,
+        netlist,
         circuit,
         diagnostics,
     } = load(input);
     show(&diagnostics, &sources, streams);
     let mut circuit = circuit.ok_or_else(|| faults(input, &diagnostics))?;
-    if !probes.is_empty() {
-        circuit.probes = probes
-            .iter()
-            .map(|name| {
-                let unknown =
-                    || Failure::Message(format!("--probe {name}: no such node or element"));
-                circuit.probe(name).ok_or_else(unknown)
-            })
-            .collect::<Result<_, _>>()?;
-    }
+    keep_probes(&mut circuit, probes)?;
     let behaviour = mna::behaviour(&circuit).map_err(|diagnostics| {
         show(&diagnostics, &sources, streams);
         faults(input, &diagnostics)
     })?;
-    Ok(Subject::Circuit(Box::new((circuit, behaviour))))
+    let subject = Subject::Circuit(Box::new((circuit, behaviour)));
+    Ok((subject, netlist.map(|netlist| (netlist, sources))))
+}
+
+/// Leaves exactly the probes named on the command line, if there are any.
+///
+/// # Errors
+/// [`Failure::Message`] for an unknown one.
+pub fn keep_probes(circuit: &mut Circuit, probes: &[String]) -> Result<(), Failure> {
+    if probes.is_empty() {
+        return Ok(());
+    }
+    let found = probes.iter().map(|name| {
+        let unknown = || Failure::Message(format!("--probe {name}: no such node or element"));
+        circuit.probe(name).ok_or_else(unknown)
+    });
+    circuit.probes = found.collect::<Result<_, _>>()?;
+    Ok(())
 }
 
 /// The circuit of a netlist.
@@ -190,7 +221,7 @@ pub fn show(diagnostics: &[Diagnostic], sources: &SourceMap, streams: &Streams) 
     }
 }
 
-fn faults(input: &Input, diagnostics: &[Diagnostic]) -> Failure {
+pub(super) fn faults(input: &Input, diagnostics: &[Diagnostic]) -> Failure {
     let count = diagnostics
         .iter()
         .filter(|d| d.severity == Severity::Error)

@@ -64,11 +64,16 @@ pub(super) fn unknown_ending(path: &Path, known: &str) -> Failure {
     ))
 }
 
-/// Writes a run to a file.
+/// Writes a run to a file; pictures show `figure`.
 ///
 /// # Errors
 /// Those of the file, or of drawing a picture.
-pub fn write(run: &Run, format: Format, path: &Path) -> Result<(), Failure> {
+pub fn write(
+    run: &Run,
+    figure: &dyn Fn() -> Figure,
+    format: Format,
+    path: &Path,
+) -> Result<(), Failure> {
     let waves = &run.waveforms;
     // A picture is made before its file, so that a failure leaves none behind.
     match format {
@@ -80,9 +85,9 @@ pub fn write(run: &Run, format: Format, path: &Path) -> Result<(), Failure> {
             npz::write(&mut bytes, waves).map_err(|e| Failure::file(path, e))?;
             bytes_to_file(path, bytes.get_ref())
         }
-        Format::Html => bytes_to_file(path, html::page(run)?.as_bytes()),
-        Format::Svg => picture_to_file(path, &svg::draw(&Figure::of_waveforms(waves))?),
-        Format::Png => picture_to_file(path, &svg::draw(&Figure::of_waveforms(waves))?),
+        Format::Html => bytes_to_file(path, html::page(run, &figure())?.as_bytes()),
+        Format::Svg => picture_to_file(path, &svg::draw(&figure())?),
+        Format::Png => picture_to_file(path, &svg::draw(&figure())?),
     }
 }
 

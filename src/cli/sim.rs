@@ -3,12 +3,18 @@
 use std::io::Write;
 
 use super::args::{self, MethodArgs, SimArgs, Summary};
+use super::dc;
 use super::exit::{Exit, Failure};
+use super::forms;
 use super::input::{self, Subject};
+use super::measured::{self, Measuring};
 use super::output::{self, Format};
+use super::steps::Stepping;
 use super::streams::Streams;
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{Method, Run, SimError, SimOptions, simulate, simulate_system};
+use crate::report::figure::Figure;
+use crate::report::measured::Measurements;
 use crate::report::{json, terminal, text};
 use crate::settings::Settings;
 use crate::waveform::csv;
@@ -26,25 +32,52 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         .iter()
         .map(|path| Format::of(path))
         .collect::<Result<Vec<_>, _>>()?;
-    let subject = input::open(&args.input, &args.probes, streams)?;
     let request = Request::of(&args.method, args.events)?;
-    let outcome = run(&subject, &request, None, streams);
-    let (finished, error) = match outcome {
-        Ok(run) => (Some(run), None),
-        Err(mut error) => (error.partial.take().map(|run| *run), Some(error)),
-    };
-    if let Some(run) = &finished {
+    if let Some(form) = forms::open(args)? {
+        let finished = (forms::run(&form, args)?, Measurements::default());
+        return finish(args, &formats, (Some(finished), None), streams);
+    }
+    let (subject, cards) = input::open_with_cards(&args.input, &args.probes, streams)?;
+    if let (Subject::Circuit(both), Some((netlist, sources))) = (&subject, cards) {
+        let (circuit, _) = &**both;
+        if circuit.tran.is_none() && !circuit.dc.is_empty() {
+            return dc::sim(args, circuit, &netlist, &sources, streams);
+        }
+        if !circuit.steps.is_empty() {
+            let stepping = Stepping {
+                args,
+                circuit,
+                netlist,
+                sources,
+                request,
+            };
+            return stepping.sim(&formats, streams);
+        }
+    }
+    let finished = measured_run(&subject, &request, streams)?;
+    finish(args, &formats, finished, streams)
+}
+
+/// Writes what a run gave, or as much of it as there is, and says why it ended early.
+fn finish(
+    args: &SimArgs,
+    formats: &[Format],
+    (finished, error): Finished,
+    streams: &Streams,
+) -> Result<Exit, Failure> {
+    if let Some((run, found)) = &finished {
         if args.method.step.is_some() && run.method == Method::Exact.name() {
             streams.say("note: --step is of no use to exact integration, which has no steps");
         }
         for (path, format) in args.outputs.iter().zip(formats) {
-            match output::write(run, format, path) {
+            let figure = || Figure::of_waveforms(&run.waveforms);
+            match output::write(run, &figure, *format, path) {
                 // A picture of a run that broke off before its first row.
                 Err(Failure::Picture(_)) if error.is_some() => {}
                 written => written?,
             }
         }
-        summarise(run, args, streams);
+        summarise(run, found, args, streams);
         if args.outputs.is_empty() {
             show(run, streams)?;
         }
@@ -56,6 +89,44 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
             args.input.file.display()
         ))),
     }
+}
+
+/// A run, or as much of it as there is, and what its measurements found.
+pub(super) type Finished = (Option<(Run, Measurements)>, Option<SimError>);
+
+/// Simulates, and measures where the circuit asks for it: on the rows at events too.
+///
+/// # Errors
+/// See [`Failure`].
+pub(super) fn measured_run(
+    subject: &Subject,
+    request: &Request,
+    streams: &Streams,
+) -> Result<Finished, Failure> {
+    let measuring = match subject {
+        Subject::Circuit(both) if measured::asked(&both.0) => Some((
+            Measuring::of(&both.0, request),
+            measured::with_signals(&both.0)?,
+        )),
+        _ => None,
+    };
+    let request = Request {
+        events: request.events || measuring.is_some(),
+        ..request.clone()
+    };
+    let tstep = measuring
+        .as_ref()
+        .and_then(|(measuring, _)| measuring.tstep());
+    let subject = measuring.as_ref().map_or(subject, |(_, subject)| subject);
+    let (finished, error) = match run(subject, &request, tstep, streams) {
+        Ok(run) => (Some(run), None),
+        Err(mut error) => (error.partial.take().map(|run| *run), Some(error)),
+    };
+    let finished = finished.map(|mut run| {
+        let found = measuring.map(|(measuring, _)| measuring.carry_out(&mut run));
+        (run, found.unwrap_or_default())
+    });
+    Ok((finished, error))
 }
 
 /// How a subject is to be integrated.
@@ -175,9 +246,10 @@ pub fn tran(subject: &Subject) -> Option<Tran> {
 }
 
 /// On standard error: JSON where asked for; words where asked for, for a person, and with `-v`; else the notes alone.
-fn summarise(run: &Run, args: &SimArgs, streams: &Streams) {
+/// What was measured is in all of them.
+fn summarise(run: &Run, found: &Measurements, args: &SimArgs, streams: &Streams) {
     match args.summary {
-        Some(Summary::Json) => streams.error(json::summary(run)),
+        Some(Summary::Json) => return streams.error(json::summary(run, found)),
         Some(Summary::Text) => streams.error(text::summary(run, streams.verbose)),
         None if streams.verbose || streams.err_is_terminal() => {
             streams.say(text::summary(run, streams.verbose));
@@ -187,6 +259,9 @@ fn summarise(run: &Run, args: &SimArgs, streams: &Streams) {
                 streams.say(format!("note: {note}"));
             }
         }
+    }
+    if !found.is_empty() {
+        streams.say(found.words());
     }
 }
 

@@ -13,11 +13,13 @@
 //! | [`observer`] | state observer with multivalued output injection | RR-7158 (39)-(42) |
 //! | [`feedback`] | output feedback u = Sx + Gλ | RR-7158 Remark 10 |
 //! | [`json`] | all of them as files | |
+//! | [`expression`] | functions of state and time in such files | |
 //!
 //! A conversion returns the new form, or [`FormError::Hypothesis`] with the condition that fails and its size. Every form
 //! is a [`Complementarity`] problem and is integrated by the one implicit step of [`step`].
 
 pub mod cone;
+pub mod expression;
 pub mod feedback;
 pub mod inequality;
 pub mod json;

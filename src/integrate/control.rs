@@ -25,6 +25,8 @@ pub struct Verdict {
     pub accept: bool,
     /// The step to try next, s.
     pub next: f64,
+    /// The error of the step, relative to the amplitude.
+    pub error: f64,
 }
 
 /// A step is doubled where the error of the doubled one would still leave this factor of room.
@@ -67,7 +69,11 @@ impl Control {
         } else {
             h
         };
-        Verdict { accept, next }
+        Verdict {
+            accept,
+            next,
+            error,
+        }
     }
 }
 
@@ -77,9 +83,12 @@ pub struct Amplitudes {
     names: Vec<String>,
     units: Vec<&'static str>,
     values: Vec<f64>,
-    /// Largest source, by unit: (V, A).
-    sources: (f64, f64),
+    /// Largest source or branch quantity, by unit: (V, A).
+    branches: (f64, f64),
 }
+
+/// A state is known to this part of its amplitude: a few roundings.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// A quantity smaller than this part of the largest one of its unit is judged by that part.
 const FLOOR: f64 = 1e-3;
@@ -88,17 +97,17 @@ impl Amplitudes {
     /// Nothing seen yet but what the inputs can reach.
     #[must_use]
     pub fn new(lcs: &Lcs, inputs: &Inputs) -> Self {
-        let mut sources = (0.0_f64, 0.0_f64);
+        let mut branches = (0.0_f64, 0.0_f64);
         for (input, value) in lcs.inputs.iter().zip(inputs.amplitudes()) {
             let side = if input.unit == "V" {
-                &mut sources.0
+                &mut branches.0
             } else {
-                &mut sources.1
+                &mut branches.1
             };
             *side = side.max(value.abs());
         }
         let mut new = Self {
-            sources,
+            branches,
             ..Self::default()
         };
         new.see(lcs, &vec![0.0; lcs.n()]);
@@ -119,6 +128,19 @@ impl Amplitudes {
         }
     }
 
+    /// Takes note of the voltage and the current of a branch.
+    pub fn see_branch(&mut self, v: f64, i: f64) {
+        let (volts, amperes) = self.branches;
+        self.branches = (volts.max(v.abs()), amperes.max(i.abs()));
+    }
+
+    /// What arithmetic alone leaves uncertain in state k, in its unit.
+    #[must_use]
+    pub fn rounding(&self, lcs: &Lcs, k: usize) -> f64 {
+        let at = self.position(k, &lcs.states[k].name);
+        ROUNDING * at.map_or(0.0, |at| self.values[at])
+    }
+
     fn position(&self, guess: usize, name: &str) -> Option<usize> {
         if self.names.get(guess).is_some_and(|other| other == name) {
             return Some(guess);
@@ -135,12 +157,12 @@ impl Amplitudes {
                 .iter()
                 .zip(&self.units)
                 .filter(|(_, u)| **u == unit);
-            let source = if unit == "V" {
-                self.sources.0
+            let branch = if unit == "V" {
+                self.branches.0
             } else {
-                self.sources.1
+                self.branches.1
             };
-            seen.map(|(v, _)| *v).fold(source, f64::max)
+            seen.map(|(v, _)| *v).fold(branch, f64::max)
         };
         let (volts, amperes) = (largest("V"), largest("A"));
         let mut worst = 0.0_f64;

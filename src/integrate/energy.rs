@@ -235,6 +235,11 @@ impl Balance {
         self.first
     }
 
+    /// The largest energy noted, J.
+    pub(crate) fn largest(&self) -> f64 {
+        self.largest
+    }
+
     /// Adds energy from sources and dissipated energy, J.
     #[inline]
     pub fn add(&mut self, (source, dissipated): (f64, f64)) {

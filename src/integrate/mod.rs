@@ -6,10 +6,12 @@ pub mod exact;
 #[cfg(test)]
 #[path = "../../tests/systems/mod.rs"]
 pub(crate) mod fixtures;
+mod handover;
 pub mod inputs;
 pub mod jump;
 mod lawful;
 pub mod reading;
+mod roles;
 pub mod run;
 pub mod simulate;
 pub mod start;

@@ -1,5 +1,6 @@
 //! The time loop, shared by all methods: a [`Stepper`] moves, the loop writes rows.
 
+use crate::circuit::Tran;
 use crate::integrate::{Energy, Impulse, Run, Stats};
 use crate::waveform::Waveforms;
 
@@ -58,6 +59,14 @@ pub enum Reason {
     /// Switch positions contradict each other at one instant.
     #[error("switch positions do not settle")]
     SwitchesDoNotSettle,
+    /// Events follow each other without end.
+    #[error("{events} events follow each other within {span:e} s")]
+    EventsAccumulate {
+        /// Their number.
+        events: usize,
+        /// The time they take, s.
+        span: f64,
+    },
     /// The circuit has no operating point.
     #[error("no operating point: {0}; `uic` starts from initial conditions instead")]
     NoOperatingPoint(String),
@@ -126,6 +135,8 @@ pub struct Outcome {
     pub stats: Stats,
     /// Energy balance.
     pub energy: Energy,
+    /// See [`Run::error_estimate`].
+    pub error_estimate: Option<f64>,
     /// Things the user should know.
     pub notes: Vec<String>,
 }
@@ -177,6 +188,12 @@ impl Log {
         self.wants_rows
     }
 
+    /// Takes back what was logged since there were `events` events and `impulses` impulses.
+    pub(crate) fn back_to(&mut self, events: usize, impulses: usize) {
+        self.events.truncate(events);
+        self.impulses.truncate(impulses);
+    }
+
     /// A row at an event: once at a continuous event, twice (left limit, right limit) at a jump. Ignored unless
     /// [`Self::wants_rows`].
     pub fn row(&mut self, t: f64, row: &[f64]) {
@@ -222,6 +239,16 @@ pub struct Grid {
 const GRID_CLOSE: f64 = 1e-6;
 
 impl Grid {
+    /// The output times of a transient analysis.
+    #[must_use]
+    pub const fn of(tran: &Tran) -> Self {
+        Self {
+            tstart: tran.tstart,
+            tstep: tran.tstep,
+            tstop: tran.tstop,
+        }
+    }
+
     /// Number of output times.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -317,6 +344,7 @@ pub fn run(stepper: &mut dyn Stepper, frame: Frame<'_>, mut log: Log) -> Result<
         plan,
         stats: outcome.stats,
         energy: outcome.energy,
+        error_estimate: outcome.error_estimate,
         impulses: log.impulses,
         events: log.events,
         notes: all_notes,

@@ -6,12 +6,13 @@ use nalgebra::DVector;
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::Run;
 use crate::integrate::control::Amplitudes;
-use crate::integrate::exact::{self, Exact};
+use crate::integrate::exact::{self, Exact, Place};
+use crate::integrate::handover::Handover;
 use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, Stepper, run};
-use crate::integrate::start;
 use crate::integrate::step::Scheme;
 use crate::integrate::switching::Threshold;
 use crate::integrate::theta::{Setup, Start, Stepping, Theta};
+use crate::integrate::{roles, start};
 use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
 use crate::mna::{Behaviour, SwitchPort};
 use crate::plan::{Plan, not_exact, plan};
@@ -92,6 +93,7 @@ pub fn simulate(
             .collect(),
         start: initial.storage,
         notes,
+        original: behaviour,
         behaviour: standard,
     };
     drive(problem, tran, options)
@@ -107,7 +109,8 @@ pub fn simulate_system(
     tran: Tran,
     options: SimOptions<'_>,
 ) -> Result<Run, SimError> {
-    let behaviour = Behaviour::from_lcs(lcs).standard();
+    let original = Behaviour::from_lcs(lcs);
+    let behaviour = original.standard();
     let mut start = DVector::zeros(behaviour.storage.len());
     start.rows_mut(0, x.len()).copy_from(x);
     let problem = Problem {
@@ -115,13 +118,16 @@ pub fn simulate_system(
         settle: vec![],
         start,
         notes: vec![],
+        original: &original,
         behaviour,
     };
     drive(problem, tran, options)
 }
 
 /// What the steppers share.
-struct Problem {
+struct Problem<'a> {
+    /// As given.
+    original: &'a Behaviour,
     /// All laws as ideal pairs.
     behaviour: Behaviour,
     position: Vec<bool>,
@@ -137,7 +143,7 @@ const SCOUT_STEPS: f64 = 256.0;
 /// The scout gives up after this many steps (trains of many pulses); what it has seen by then is used.
 const SCOUT_LIMIT: u64 = 20_000;
 
-impl Problem {
+impl Problem<'_> {
     fn reduce(&self, devices: &[Hold], switches: &[bool]) -> Result<Lcs, SimError> {
         let position = Position {
             devices: devices.to_vec(),
@@ -163,7 +169,7 @@ impl Problem {
 
     fn exact(&self, tran: &Tran, settings: &Settings) -> Result<Exact<'_>, SimError> {
         Exact::new(exact::Setup {
-            assembler: exact::Assembler::new(&self.behaviour),
+            assembler: exact::Assembler::new(&self.behaviour).with_steps_of(self.original),
             position: self.position.clone(),
             t: 0.0,
             until: tran.tstop,
@@ -174,8 +180,17 @@ impl Problem {
         })
     }
 
+    fn start(&self) -> Place {
+        Place {
+            t: 0.0,
+            storage: self.start.clone(),
+            switches: self.position.clone(),
+        }
+    }
+
     fn stepper(
         &self,
+        place: Place,
         tran: &Tran,
         scheme: Scheme,
         stepping: Stepping,
@@ -183,10 +198,10 @@ impl Problem {
     ) -> Result<Theta<'_>, SimError> {
         Theta::new(Setup {
             reduce: Box::new(|position| self.free(position)),
-            position: self.position.clone(),
+            position: place.switches,
             thresholds: self.thresholds(),
-            t: 0.0,
-            start: Start::Storage(self.start.clone()),
+            t: place.t,
+            start: Start::Storage(place.storage),
             scheme,
             stepping,
             longest: tran.tmax.unwrap_or(f64::INFINITY),
@@ -194,12 +209,29 @@ impl Problem {
         })
     }
 
+    /// See [`roles`].
+    fn choose_roles(&mut self, tran: &Tran) -> Result<(), SimError> {
+        let lcs = self.free(&self.position)?;
+        if roles::doubtful(&lcs, tran.tstop) {
+            let first = self.behaviour.in_other_roles();
+            let first = std::mem::replace(&mut self.behaviour, first);
+            if !self
+                .free(&self.position)
+                .is_ok_and(|other| roles::better(&lcs, &other))
+            {
+                self.behaviour = first;
+            }
+        }
+        Ok(())
+    }
+
     /// Positions of switches without `ON`/`OFF` that agree with their controls at the start state.
     fn settle_switches(&mut self, tran: &Tran, settings: &Settings) -> Result<(), SimError> {
         let mut seen = Vec::new();
         while self.settle.contains(&true) {
             let stepping = Stepping::Fixed(tran.tstep);
-            let mut theta = self.stepper(tran, Scheme::MOREAU, stepping, settings)?;
+            let start = self.start();
+            let mut theta = self.stepper(start, tran, Scheme::MOREAU, stepping, settings)?;
             let controls = theta.controls_at_start()?;
             let wanted: Vec<bool> = (0..controls.len())
                 .map(|k| {
@@ -212,11 +244,9 @@ impl Problem {
                 })
                 .collect();
             drop(theta);
-            if wanted == self.position {
+            // Positions that contradict each other are left to the run.
+            if wanted == self.position || seen.contains(&wanted) {
                 break;
-            }
-            if seen.contains(&wanted) {
-                return Err(SimError::at(0.0, Reason::SwitchesDoNotSettle));
             }
             seen.push(std::mem::replace(&mut self.position, wanted));
         }
@@ -231,7 +261,7 @@ impl Problem {
         };
         let stepping = Stepping::Fixed(tran.tstop / SCOUT_STEPS);
         let mut theta = self
-            .stepper(tran, Scheme::MOREAU, stepping, &settings)
+            .stepper(self.start(), tran, Scheme::MOREAU, stepping, &settings)
             .ok()?;
         let mut log = Log::new(0, f64::INFINITY, false);
         for k in 1..=SCOUT_STEPS as u32 {
@@ -248,7 +278,33 @@ impl Problem {
     }
 }
 
-fn drive(problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
+impl Problem<'_> {
+    /// Exact integration with Moreau's steps where it cannot go on.
+    fn handover<'a>(
+        &'a self,
+        tran: &'a Tran,
+        settings: &'a Settings,
+    ) -> Result<Handover<'a>, SimError> {
+        let stepping = controlled(tran);
+        Ok(Handover::new(
+            self.exact(tran, settings)?,
+            Box::new(move |place| {
+                self.stepper(place.clone(), tran, Scheme::MOREAU, stepping, settings)
+            }),
+            tran.tstep,
+        ))
+    }
+}
+
+/// Steps chosen by their error.
+fn controlled(tran: &Tran) -> Stepping {
+    Stepping::Controlled {
+        span: tran.tstop,
+        first: tran.tstep / 64.0,
+    }
+}
+
+fn drive(problem: Problem<'_>, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
     let begin = ThreadTime::now();
     let mut result = dispatch(problem, tran, options);
     let stats = match &mut result {
@@ -261,8 +317,13 @@ fn drive(problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result<Run, S
     result
 }
 
-fn dispatch(mut problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
+fn dispatch(
+    mut problem: Problem<'_>,
+    tran: Tran,
+    options: SimOptions<'_>,
+) -> Result<Run, SimError> {
     check(&tran, &options)?;
+    problem.choose_roles(&tran)?;
     problem.settle_switches(&tran, &options.settings)?;
     let lcs = problem.free(&problem.position)?;
     let Plan {
@@ -280,34 +341,48 @@ fn dispatch(mut problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result
         tstep: tran.tstep,
         tstop: tran.tstop,
     };
-    let frame = Frame {
+    let frame = |method: Method, notes: Vec<String>| Frame {
         title: lcs.title.clone(),
         names: lcs.outputs.names.clone(),
         units: lcs.outputs.units.clone(),
         grid,
         method: method.name().into(),
-        plan: words,
-        notes: problem.notes.clone(),
-        progress: options.progress,
+        plan: words.clone(),
+        notes,
+        progress: None,
     };
-    let log = Log::new(frame.names.len(), grid.tstart, options.events);
-    if method == Method::Exact {
-        return run(&mut problem.exact(&tran, &options.settings)?, frame, log);
+    let log = || Log::new(lcs.outputs.names.len(), grid.tstart, options.events);
+    let (mut method, mut notes) = (method, problem.notes.clone());
+    let (mut progress, settings) = (options.progress, &options.settings);
+    if options.method == Method::Exact {
+        let mut exact = problem.exact(&tran, settings)?;
+        let frame = frame(method, notes);
+        return run(&mut exact, Frame { progress, ..frame }, log());
     }
-    let stepping = match options.step {
-        Some(h) => Stepping::Fixed(h),
-        None => Stepping::Controlled {
-            span: tran.tstop,
-            first: tran.tstep / 64.0,
-        },
-    };
-    let mut theta = problem.stepper(&tran, scheme, stepping, &options.settings)?;
+    if method == Method::Exact {
+        let frame = Frame {
+            progress: progress.as_mut().map(|p| &mut **p as &mut dyn FnMut(f64)),
+            ..frame(method, notes.clone())
+        };
+        let attempt = problem.handover(&tran, settings);
+        match attempt.and_then(|mut handover| run(&mut handover, frame, log())) {
+            Ok(run) => return Ok(run),
+            Err(error) => notes.push(format!(
+                "exact integration ended, and the whole run was made in steps instead: {error}"
+            )),
+        }
+        method = Method::Theta;
+    }
+    let stepping = options.step.map_or(controlled(&tran), Stepping::Fixed);
+    let mut theta = problem.stepper(problem.start(), &tran, scheme, stepping, settings)?;
     if options.step.is_none()
-        && let Some(amplitudes) = problem.scout(&tran, &options.settings)
+        && let Some(amplitudes) = problem.scout(&tran, settings)
     {
         theta.expect_amplitudes(amplitudes);
     }
-    run(&mut theta, frame, log)
+    theta.estimate_errors();
+    let frame = frame(method, notes);
+    run(&mut theta, Frame { progress, ..frame }, log())
 }
 
 fn check(tran: &Tran, options: &SimOptions<'_>) -> Result<(), SimError> {

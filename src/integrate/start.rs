@@ -122,6 +122,11 @@ pub fn operating_point(
         .iter()
         .map(|s| s.initial.unwrap_or(false))
         .collect();
+    if let Some(guess) = from_nodesets(circuit, values, settings) {
+        for ((position, switch), on) in position.iter_mut().zip(&behaviour.switches).zip(guess) {
+            *position = switch.initial.unwrap_or(on);
+        }
+    }
     let mut seen = Vec::new();
     loop {
         let point = static_solution(&behaviour, &position, values, settings)?;
@@ -167,6 +172,17 @@ pub fn operating_point(
         }
         seen.push(std::mem::replace(&mut position, wanted));
     }
+}
+
+/// Switch positions of the operating point with the voltages of `.nodeset` held; `None` without such a point.
+fn from_nodesets(circuit: &Circuit, values: Values, settings: &Settings) -> Option<Vec<bool>> {
+    if circuit.nodesets.is_empty() {
+        return None;
+    }
+    let mut held = circuit.clone();
+    held.initial_voltages = std::mem::take(&mut held.nodesets);
+    let point = operating_point(&held, values, true, settings).ok()?;
+    Some(point.switches.into_iter().map(|(_, on)| on).collect())
 }
 
 /// The circuit with all node voltages and element currents as probes.

@@ -62,6 +62,8 @@ pub struct Run {
     pub stats: Stats,
     /// The energy balance.
     pub energy: Energy,
+    /// The error of the states that the steps themselves let expect, relative to their amplitudes; none for exact runs.
+    pub error_estimate: Option<f64>,
     /// Impulses at jumps.
     pub impulses: Vec<Impulse>,
     /// Event times, s, with the devices whose state changed.

@@ -19,7 +19,7 @@ use crate::integrate::energy::PowerForms;
 use crate::integrate::lawful;
 use crate::lcs::Lcs;
 use crate::solve::Driver;
-use crate::solve::active::{ActiveSolve, refined_inverse};
+use crate::solve::active::{ActiveSolve, equilibrated_inverse};
 use crate::solve::lcp::{Lcp, Scaling};
 
 /// θ for the state, γ for λ.
@@ -196,7 +196,7 @@ impl StepMatrices {
         let w_inverse = if n == 0 {
             identity.clone()
         } else {
-            refined_inverse(&(&identity - &lcs.a * (h * theta)))?
+            equilibrated_inverse(&(&identity - &lcs.a * (h * theta)))?
         };
         let explicit = &identity + &lcs.a * (h * (1.0 - theta));
         let phi = &w_inverse * columns.rows(&explicit, &(&lcs.e * h), theta, &(&lcs.e0 * h));
@@ -359,9 +359,15 @@ impl StepMatrices {
 }
 
 impl FusedMode {
-    /// `out` = [x⁺; guards]; whether every guard is ≥ 0 up to rounding.
+    /// `out` = [x⁺; guards]; whether every guard is ≥ 0 up to rounding, where `noise(k)` is what state k may be off.
     #[inline]
-    pub(crate) fn step(&self, z: &[f64], n: usize, out: &mut [f64]) -> bool {
+    pub(crate) fn step(
+        &self,
+        z: &[f64],
+        n: usize,
+        out: &mut [f64],
+        noise: impl Fn(usize) -> f64,
+    ) -> bool {
         debug_assert_eq!(z.len(), self.width);
         let mut rows = self.k.chunks_exact(self.width);
         for (value, row) in out.iter_mut().zip(&mut rows) {
@@ -370,24 +376,44 @@ impl FusedMode {
         if out[n..].iter().all(|&guard| guard >= 0.0) && self.regular {
             return true;
         }
-        self.holds_to_rounding(z, n, out)
+        self.holds_to_rounding(z, n, out, noise)
     }
 
     #[cold]
-    fn holds_to_rounding(&self, z: &[f64], n: usize, out: &mut [f64]) -> bool {
+    fn holds_to_rounding(
+        &self,
+        z: &[f64],
+        n: usize,
+        out: &[f64],
+        noise: impl Fn(usize) -> f64,
+    ) -> bool {
         let rows = self.k.chunks_exact(self.width).enumerate().skip(n);
         for ((i, row), size) in rows.zip(self.sizes.chunks_exact(self.width)) {
-            let size = size.iter().zip(z).map(|(a, b)| a * b.abs()).sum::<f64>();
-            let negative = if i < out.len() {
-                -out[i]
-            } else {
-                row.iter().zip(z).map(|(a, b)| a * b).sum::<f64>().abs()
+            let rounding = size.iter().zip(z).map(|(a, b)| a * b.abs()).sum::<f64>();
+            let inherited = (0..n).map(|k| size[k] * noise(k)).sum::<f64>();
+            let negative = match out.get(i) {
+                Some(guard) => -guard,
+                None => row.iter().zip(z).map(|(a, b)| a * b).sum::<f64>().abs(),
             };
-            if negative > GUARD_ROUNDING * size || negative.is_nan() {
+            if negative > GUARD_ROUNDING * rounding + inherited || negative.is_nan() {
                 return false;
             }
         }
         true
+    }
+
+    /// Whether λ of this mode is the only one, by strict complementarity: it is regular and no guard is zero up to rounding.
+    pub(crate) fn is_strict(&self, z: &[f64], guards: &[f64]) -> bool {
+        let sizes = self.sizes.chunks_exact(self.width);
+        self.regular
+            && guards.iter().zip(sizes).all(|(&guard, size)| {
+                guard > GUARD_ROUNDING * size.iter().zip(z).map(|(a, b)| a * b.abs()).sum::<f64>()
+            })
+    }
+
+    /// The rows of x⁺ over z, and how long each is.
+    pub(crate) fn flow(&self, n: usize) -> (&[f64], usize) {
+        (&self.k[..n * self.width], self.width)
     }
 
     /// λ of this mode from the guards of a step.

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::{Line, MeasureError, Trace};
 
-/// One harmonic, magnitude·cos(2π k f t + phase) with t from the start of the run.
+/// One harmonic, magnitude·sin(2π k f t + phase) with t from the start of the period, as in SPICE.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Harmonic {
     /// Its frequency, Hz.
@@ -53,7 +53,7 @@ pub fn fourier(trace: Trace<'_>, frequency: f64, count: usize) -> Result<Spectru
         let omega = TAU * frequency * k as f64;
         let (mut cosine, mut sine) = (0.0, 0.0);
         for line in &lines {
-            let (c, s) = moments(line, omega);
+            let (c, s) = moments(line, omega, from);
             cosine += c;
             sine += s;
         }
@@ -61,7 +61,7 @@ pub fn fourier(trace: Trace<'_>, frequency: f64, count: usize) -> Result<Spectru
         harmonics.push(Harmonic {
             frequency: frequency * k as f64,
             magnitude: a.hypot(b),
-            phase: (-b).atan2(a).to_degrees(),
+            phase: a.atan2(b).to_degrees(),
         });
     }
     let distortion = harmonics.iter().skip(1).map(|h| h.magnitude * h.magnitude);
@@ -74,9 +74,9 @@ pub fn fourier(trace: Trace<'_>, frequency: f64, count: usize) -> Result<Spectru
     })
 }
 
-/// ∫ y cos ωt dt and ∫ y sin ωt dt over one straight piece, about its middle:
+/// ∫ y cos ω(t − t₀) dt and ∫ y sin ω(t − t₀) dt over one straight piece, about its middle:
 /// with y = m + d s, t = c + h s, s ∈ [−1, 1], θ = ωh: ∫ cos θs = 2 sinc θ and ∫ s sin θs = 2 (sinc θ − cos θ)/θ.
-fn moments(line: &Line, omega: f64) -> (f64, f64) {
+fn moments(line: &Line, omega: f64, origin: f64) -> (f64, f64) {
     let half = 0.5 * (line.t1 - line.t0);
     let (middle, rise) = (0.5 * (line.y0 + line.y1), 0.5 * (line.y1 - line.y0));
     let theta = omega * half;
@@ -90,7 +90,7 @@ fn moments(line: &Line, omega: f64) -> (f64, f64) {
         let sinc = theta.sin() / theta;
         (sinc, (sinc - theta.cos()) / theta)
     };
-    let (sin, cos) = (omega * (line.t0 + half)).sin_cos();
+    let (sin, cos) = (omega * (line.t0 + half - origin)).sin_cos();
     let (even, odd) = (2.0 * half * middle * even, 2.0 * half * rise * odd);
     (even * cos - odd * sin, even * sin + odd * cos)
 }
@@ -119,7 +119,7 @@ mod tests {
             };
             assert!((harmonic.magnitude - expected).abs() < 1e-14, "{k}");
         }
-        assert!((spectrum.harmonics[0].phase + 90.0).abs() < 1e-12);
+        assert!(spectrum.harmonics[0].phase.abs() < 1e-12);
         let odd: f64 = [3.0_f64, 5.0, 7.0, 9.0].iter().map(|k| k.powi(-2)).sum();
         assert!((spectrum.thd.unwrap() - odd.sqrt()).abs() < 1e-14);
     }
@@ -127,7 +127,7 @@ mod tests {
     #[test]
     fn a_fine_sine_has_its_amplitude_and_phase() {
         let time: Vec<f64> = (0..=20_000).map(|k| f64::from(k) * 1e-4).collect();
-        let wave = |t: &f64| 1.0 + 3.0 * (TAU * t + 0.5).cos();
+        let wave = |t: &f64| 1.0 + 3.0 * (TAU * t + 0.5).sin();
         let values: Vec<f64> = time.iter().map(wave).collect();
         let trace = Trace {
             time: &time,

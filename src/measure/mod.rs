@@ -4,10 +4,12 @@
 //! one time are an edge.
 
 mod fourier;
+mod measurement;
 
 use thiserror::Error;
 
 pub use fourier::{Harmonic, Spectrum, fourier};
+pub use measurement::{Found, Instant, Measurement, Scene, Use, Window};
 
 /// Why a measurement has no value.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -21,13 +23,36 @@ pub enum MeasureError {
         to: f64,
     },
     /// The crossing asked for does not happen.
-    #[error("the value {level} is crossed {found} times only")]
+    #[error("{}", crossings(*.level, *.found))]
     NoCrossing {
         /// The level.
         level: f64,
         /// Crossings that there are.
         found: usize,
     },
+    /// The number of a crossing is no whole number from 1 on.
+    #[error("there is no crossing number {0}")]
+    Count(f64),
+    /// The value is not a finite number.
+    #[error("the value is not a finite number")]
+    NotFinite,
+    /// Another measurement that this one needs has no value.
+    #[error("`{0}` has no value")]
+    Needs(String),
+    /// It refers to what the circuit does not have.
+    #[error("it refers to what the circuit does not have")]
+    Unread,
+    /// The measurement needs its own result.
+    #[error("its own result is needed first")]
+    Circular,
+}
+
+fn crossings(level: f64, found: usize) -> String {
+    match found {
+        0 => format!("the value {level} is not crossed"),
+        1 => format!("the value {level} is crossed once only"),
+        _ => format!("the value {level} is crossed {found} times only"),
+    }
 }
 
 /// What is computed over a window of time.
@@ -45,6 +70,10 @@ pub enum Over {
     PeakToPeak,
     /// ∫ y dt.
     Integral,
+    /// When the least value is reached first.
+    WhenMinimum,
+    /// When the greatest value is reached first.
+    WhenMaximum,
 }
 
 /// Which crossings of a level count.
@@ -138,6 +167,8 @@ impl<'a> Trace<'a> {
             Over::Minimum => least(),
             Over::Maximum => greatest(),
             Over::PeakToPeak => greatest() - least(),
+            Over::WhenMinimum => reached(&lines, least()),
+            Over::WhenMaximum => reached(&lines, greatest()),
         })
     }
 
@@ -174,7 +205,7 @@ impl<'a> Trace<'a> {
             .ok_or(MeasureError::Window { from: t, to: t })
     }
 
-    /// When the waveform crosses a level from `after` on: the time at which it leaves the level or passes through it.
+    /// When the waveform crosses a level within a window: the time at which it leaves the level or passes through it.
     ///
     /// # Errors
     /// [`MeasureError::NoCrossing`] where there are fewer crossings.
@@ -183,12 +214,12 @@ impl<'a> Trace<'a> {
         level: f64,
         edge: Edge,
         which: Which,
-        after: f64,
+        within: (f64, f64),
     ) -> Result<f64, MeasureError> {
         let mut found = Vec::new();
         // The side of the level the waveform came from, kept while it runs along it.
         let mut side = 0.0;
-        for line in self.lines().filter_map(|l| l.clipped(after, f64::INFINITY)) {
+        for line in self.lines().filter_map(|l| l.clipped(within.0, within.1)) {
             let (a, b) = (line.y0 - level, line.y1 - level);
             if a != 0.0 {
                 side = a.signum();
@@ -223,6 +254,14 @@ impl<'a> Trace<'a> {
     }
 }
 
+/// The first end of a piece that has this value.
+fn reached(lines: &[Line], value: f64) -> f64 {
+    let ends = lines.iter().flat_map(|l| [(l.t0, l.y0), (l.t1, l.y1)]);
+    ends.into_iter()
+        .find(|&(_, y)| y == value)
+        .map_or(f64::NAN, |(t, _)| t)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -238,6 +277,8 @@ mod tests {
         }
     }
 
+    const ALL: (f64, f64) = (0.0, f64::INFINITY);
+
     #[test]
     fn windows() {
         let over = |what, from, to| trace().over(what, from, to).unwrap();
@@ -249,6 +290,8 @@ mod tests {
         assert_eq!(over(Over::Maximum, 0.0, 0.5), 1.0);
         assert_eq!(over(Over::Minimum, 2.5, 3.0), -0.5);
         assert_eq!(over(Over::PeakToPeak, 0.0, 3.0), 3.0);
+        assert_eq!(over(Over::WhenMaximum, 0.0, 3.0), 1.0);
+        assert_eq!(over(Over::WhenMinimum, 1.5, 3.0), 1.5);
         let fault = trace().over(Over::Average, 4.0, 5.0);
         assert_eq!(fault, Err(MeasureError::Window { from: 4.0, to: 5.0 }));
     }
@@ -275,10 +318,12 @@ mod tests {
 
     #[test]
     fn crossings() {
-        let when = |level, edge, which| trace().crossing(level, edge, which, 0.0);
+        let when = |level, edge, which| trace().crossing(level, edge, which, ALL);
         assert_eq!(when(1.0, Edge::Rise, Which::Number(1)), Ok(0.5));
         assert_eq!(when(1.0, Edge::Fall, Which::Number(1)), Ok(1.0));
         assert_eq!(when(-0.5, Edge::Cross, Which::Last), Ok(2.5));
+        let early = trace().crossing(-0.5, Edge::Cross, Which::Last, (0.0, 2.0));
+        assert_eq!(early, Ok(1.0));
         let none = MeasureError::NoCrossing {
             level: 1.0,
             found: 1,
@@ -290,12 +335,12 @@ mod tests {
             values: &[1.0, 0.0, 1.0, 0.0, -1.0],
         };
         assert_eq!(
-            touch.crossing(0.0, Edge::Fall, Which::Number(1), 0.0),
+            touch.crossing(0.0, Edge::Fall, Which::Number(1), ALL),
             Ok(3.0)
         );
         assert!(
             touch
-                .crossing(0.0, Edge::Rise, Which::Number(1), 0.0)
+                .crossing(0.0, Edge::Rise, Which::Number(1), ALL)
                 .is_err()
         );
     }

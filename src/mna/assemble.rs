@@ -1,7 +1,5 @@
 //! From the circuit to the equations of its static multiport.
 
-use petgraph::unionfind::UnionFind;
-
 use super::couple::{self, Winding};
 use super::{
     Behaviour, Coefficient, Column, Equation, Pair, SourcePort, StoragePort, SwitchPort, topology,
@@ -82,36 +80,24 @@ pub fn behaviour(circuit: &Circuit) -> Result<Behaviour, Vec<Diagnostic>> {
     Ok(assembly.out)
 }
 
-/// Which nodes are references: ground and the first node of each island. Terminals are joined by every element; a
-/// controlled source joins its output terminals only.
+/// Which nodes are references: ground and the first node of each island.
 fn references(circuit: &Circuit, notes: &mut Vec<Diagnostic>) -> Vec<bool> {
-    let mut sets = UnionFind::<usize>::new(circuit.nodes.len());
-    for element in &circuit.elements {
-        sets.union(element.p.index(), element.n.index());
-    }
     let mut reference = vec![false; circuit.nodes.len()];
-    let mut seen = vec![false; circuit.nodes.len()];
-    for (n, is_reference) in reference.iter_mut().enumerate() {
-        let root = sets.find(n);
-        if !seen[root] {
-            seen[root] = true;
-            *is_reference = true;
-            if n > 0 {
-                let members: Vec<&str> = (n..circuit.nodes.len())
-                    .filter(|&k| sets.find(k) == root)
-                    .map(|k| circuit.nodes[k].as_str())
-                    .collect();
-                notes.push(Diagnostic::note(
-                    "island",
-                    None,
-                    format!(
-                        "no path from ground to {}: potentials there are relative to node `{}`",
-                        list("node", &members),
-                        circuit.nodes[n]
-                    ),
-                ));
-            }
-        }
+    if let Some(ground) = reference.first_mut() {
+        *ground = true;
+    }
+    for island in topology::islands(circuit) {
+        reference[island[0]] = true;
+        let members: Vec<&str> = island.iter().map(|&k| circuit.nodes[k].as_str()).collect();
+        notes.push(Diagnostic::note(
+            "island",
+            None,
+            format!(
+                "no path from ground to {}: potentials there are relative to node `{}`",
+                list("node", &members),
+                members[0]
+            ),
+        ));
     }
     reference
 }

@@ -37,6 +37,22 @@ impl Behaviour {
     }
 }
 
+impl Behaviour {
+    /// The same behaviour with the other quantity of every device preferred as λ.
+    #[must_use]
+    pub fn in_other_roles(&self) -> Self {
+        let mut out = self.clone();
+        for pair in out.pairs.iter_mut().filter(|pair| !pair.fixed_role) {
+            pair.port.role = match pair.port.role {
+                Role::Voltage => Role::Current,
+                Role::Current => Role::Voltage,
+                Role::Function => Role::Function,
+            };
+        }
+        out
+    }
+}
+
 /// A direction or point with exact coefficients; segments are differences of two points.
 type Term = (Coefficient, Coefficient);
 

@@ -1,10 +1,12 @@
 //! What the graph of a circuit says before any number is looked at: the loops and cut-sets that make a circuit
 //! impossible or take a state away, and nodes that lead nowhere.
 
+use petgraph::unionfind::UnionFind;
+
 use super::graph::Graph;
 use crate::algebra::Field;
 use crate::circuit::source::Wave;
-use crate::circuit::{Circuit, Element, Kind, Output};
+use crate::circuit::{Circuit, Element, Kind, NodeId, Output};
 use crate::diagnostic::Diagnostic;
 
 /// The classes of the normal tree, in its order.
@@ -34,16 +36,54 @@ fn class(element: &Element) -> Class {
     }
 }
 
-/// Loops of voltage sources and cut-sets of current sources (errors); capacitor loops and inductor cut-sets
-/// (notes); with the elements by name.
+/// The nodes of every part of the circuit without a path to ground, in file order: the first is its reference. Terminals
+/// are joined by every element; a controlled source joins its output terminals only, and coupled inductors are no paths.
 #[must_use]
-pub fn findings(circuit: &Circuit) -> Vec<Diagnostic> {
+pub fn islands(circuit: &Circuit) -> Vec<Vec<usize>> {
+    let mut parts = UnionFind::<usize>::new(circuit.nodes.len());
+    for element in &circuit.elements {
+        parts.union(element.p.index(), element.n.index());
+    }
+    let ground = NodeId::GROUND.index();
+    let mut islands: Vec<Vec<usize>> = Vec::new();
+    for node in (1..circuit.nodes.len()).filter(|&node| !parts.equiv(node, ground)) {
+        match islands.iter_mut().find(|part| parts.equiv(part[0], node)) {
+            Some(part) => part.push(node),
+            None => islands.push(vec![node]),
+        }
+    }
+    islands
+}
+
+/// The spanning forest grown in the order of the classes, and that order: capacitor links close loops of capacitors and
+/// voltage sources, inductors in the tree form cut-sets with current sources.
+fn forest(circuit: &Circuit) -> (Graph, Vec<usize>) {
     let mut order: Vec<usize> = (0..circuit.elements.len()).collect();
     order.sort_by_key(|&k| class(&circuit.elements[k]));
     let edges = (0..circuit.elements.len())
         .map(|k| ends(circuit, k))
         .collect();
-    let graph = Graph::new(circuit.nodes.len(), edges, &order);
+    (Graph::new(circuit.nodes.len(), edges, &order), order)
+}
+
+/// Names of the elements of the normal tree, and of the links that close its loops; voltage sources first, then
+/// capacitors, everything resistive, inductors, current sources.
+#[must_use]
+pub fn normal_tree(circuit: &Circuit) -> (Vec<String>, Vec<String>) {
+    let (graph, order) = forest(circuit);
+    let (tree, links): (Vec<usize>, Vec<usize>) = order.iter().partition(|&&k| graph.in_tree[k]);
+    let names = |list: Vec<usize>| {
+        let name = |k: usize| circuit.elements[k].name.clone();
+        list.into_iter().map(name).collect()
+    };
+    (names(tree), names(links))
+}
+
+/// Loops of voltage sources and cut-sets of current sources (errors); capacitor loops and inductor cut-sets
+/// (notes); with the elements by name.
+#[must_use]
+pub fn findings(circuit: &Circuit) -> Vec<Diagnostic> {
+    let (graph, _) = forest(circuit);
     let mut diagnostics = Vec::new();
     for (k, element) in circuit.elements.iter().enumerate() {
         let class = class(element);
@@ -211,6 +251,27 @@ mod tests {
             .into_iter()
             .map(|d| (d.code, d.message))
             .collect()
+    }
+
+    #[test]
+    fn capacitors_across_a_source_are_links_and_inductors_come_last() {
+        let (tree, links) = normal_tree(&circuit("l1 1 2 1\n c1 1 0 1\n r1 2 0 1\n v1 1 0 1"));
+        assert_eq!(tree, ["v1", "r1"]);
+        assert_eq!(links, ["c1", "l1"]);
+    }
+
+    #[test]
+    fn transformer_secondaries_are_islands() {
+        let secondaries = circuit("l1 1 0 1\n l2 2 3 1\n r2 3 2 1\n l3 4 5 1\n r3 4 5 1");
+        let names: Vec<Vec<&str>> = islands(&secondaries)
+            .iter()
+            .map(|part| {
+                part.iter()
+                    .map(|&n| secondaries.nodes[n].as_str())
+                    .collect()
+            })
+            .collect();
+        assert_eq!(names, [["2", "3"], ["4", "5"]]);
     }
 
     #[test]

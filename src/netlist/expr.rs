@@ -6,12 +6,12 @@ use nom::Input as _;
 
 use super::ast::{Binary, Expr, ExprKind, Name, Signal, Unary};
 use super::lex::{
-    Fault, Input, Parsed, ahead, at_end, between, blank, ends_word, missing, next_word, refuse,
-    symbol,
+    Fault, Input, Line, Parsed, State, ahead, at_end, between, blank, ends_word, input, missing,
+    next_word, refuse, symbol,
 };
 use super::operand::{bad_number, braced, quoted};
 use super::value;
-use crate::diagnostic::Diagnostic;
+use crate::diagnostic::{Diagnostic, FileId};
 
 /// Deepest nesting of parentheses, calls and signs in one expression.
 const MAX_DEPTH: usize = 64;
@@ -25,6 +25,32 @@ pub(super) fn expr(i: Input<'_>) -> Parsed<'_, Expr> {
         start.extra.state.operators.set(0);
     }
     nested(start, ternary)
+}
+
+/// An expression that is the whole text, for files that are no netlists.
+///
+/// # Errors
+/// What is wrong with it.
+pub fn expression(text: &str) -> Result<Expr, Box<Diagnostic>> {
+    let line = Line {
+        file: FileId(0),
+        start: 0,
+        text: text.to_owned(),
+    };
+    let state = State::default();
+    let fault = match expr(input(&line, &state)) {
+        Ok((rest, found)) if at_end(rest) => return Ok(found),
+        Ok((rest, _)) => Diagnostic::error(
+            "bad-expression",
+            next_word(rest),
+            "this does not continue the expression",
+        ),
+        Err(nom::Err::Error(Fault::Told(told)) | nom::Err::Failure(Fault::Told(told))) => {
+            return Err(told);
+        }
+        Err(_) => Diagnostic::error("bad-expression", None, "this is no expression"),
+    };
+    Err(Box::new(fault))
 }
 
 /// Runs a parser one level deeper.
@@ -344,8 +370,6 @@ pub(super) fn signal_arguments<'a>(open: Input<'a>, function: &Name) -> Parsed<'
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnostic::FileId;
-    use crate::netlist::lex::{Line, State, input};
 
     fn read(text: &str) -> Result<String, String> {
         let line = Line {

@@ -10,9 +10,9 @@ use crate::diagnostic::{Diagnostic, Span};
 /// Deepest nesting of includes.
 const MAX_INCLUDES: usize = 32;
 /// Most files in one netlist.
-const MAX_FILES: usize = 512;
+pub(super) const MAX_FILES: usize = 512;
 /// Most bytes in one netlist.
-const MAX_BYTES: usize = 256 << 20;
+pub(super) const MAX_BYTES: usize = 256 << 20;
 
 impl Reader<'_> {
     /// `.lib path`, `.lib path section`; a path may contain blanks.
@@ -31,7 +31,7 @@ impl Reader<'_> {
     }
 
     /// The path and text of an included file, tried relative to the including one, with `\` as `/` too.
-    fn find(&self, written: &str, from: &Path) -> Option<(PathBuf, Vec<u8>)> {
+    pub(super) fn find(&self, written: &str, from: &Path) -> Option<(PathBuf, Vec<u8>)> {
         let folder = from.parent().unwrap_or(Path::new(""));
         let slashes = written.replace('\\', "/");
         [written, slashes.as_str()].into_iter().find_map(|name| {

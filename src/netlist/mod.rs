@@ -7,6 +7,7 @@
 pub mod ast;
 mod block;
 pub(crate) mod card;
+mod data;
 mod decode;
 mod dot;
 mod expr;
@@ -19,6 +20,7 @@ pub mod value;
 
 pub use ast::Netlist;
 pub use decode::decode;
+pub use expr::expression;
 pub use read::parse;
 
 pub use crate::circuit::load::{Loaded, load};

@@ -192,7 +192,10 @@ impl Reader<'_> {
             let parsed = finish(card::element(start), line);
             self.keep_findings(&state);
             match parsed {
-                Ok(element) => self.push(Statement::Element(element)),
+                Ok(mut element) => {
+                    self.read_points(&mut element, path);
+                    self.push(Statement::Element(element));
+                }
                 Err(fault) => self.tell(*fault),
             }
         }
@@ -205,29 +208,38 @@ impl Reader<'_> {
         }
     }
 
-    /// A line between `.control` and `.endc`: only `tran` matters.
+    /// A line between `.control` and `.endc`: analyses, measurements and what is to be saved; the rest is skipped.
     fn command(&mut self, line: &Line) {
         let state = State::default();
         let start = input(line, &state);
         let Ok((rest, name)) = word(start) else {
             return;
         };
-        if name.text == "tran" {
-            match finish(dot::tran(start, rest, true), line) {
-                Ok(tran) => self.push(Statement::Tran(tran)),
-                Err(fault) => self.tell(Diagnostic {
-                    severity: Severity::Warning,
-                    ..*fault
-                }),
-            }
-        } else if name.text == "op" {
-            self.push(Statement::Analysis(name.span));
-        } else if !self
-            .skipped
-            .iter()
-            .any(|(text, _)| text == ".control commands")
-        {
-            self.skipped.push((".control commands".into(), line.span()));
+        let parsed = match name.text.as_str() {
+            "tran" => finish(
+                dot::tran(start, rest, true)
+                    .map(|(rest, t)| (rest, Dot::statement(Statement::Tran(t)))),
+                line,
+            ),
+            "meas" | "measure" => finish(dot::measure::meas(start, rest, true), line),
+            "fourier" => finish(dot::measure::four(start, rest), line),
+            "save" => finish(dot::save(rest), line),
+            "op" => Ok(Dot::statement(Statement::Analysis(name.span))),
+            // They ask for nothing that is not done anyway.
+            "run" | "quit" | "exit" | "end" | "*" => Ok(Dot::Nothing),
+            _ => Ok(Dot::Skipped),
+        };
+        match parsed {
+            Ok(Dot::Statement(statement)) => self.push(*statement),
+            Ok(Dot::Skipped) => self
+                .skipped
+                .push((format!("{} (in .control)", name.text), line.span())),
+            Ok(_) => {}
+            Err(fault) => self.tell(Diagnostic {
+                severity: Severity::Warning,
+                message: format!("{}; the command is left out", fault.message),
+                ..*fault
+            }),
         }
     }
 
@@ -272,31 +284,24 @@ impl Reader<'_> {
             }
             Dot::Include(file) => self.include(&file.whole, None, file.span, path),
             Dot::Lib(file) => self.lib(&file, path),
+            Dot::Options(temperature) => {
+                if let Some(temperature) = temperature {
+                    self.push(Statement::Temperature(temperature));
+                }
+                self.skip(line);
+            }
             Dot::EndLib | Dot::Control | Dot::Nothing => {}
             Dot::End => return false,
             Dot::Title(text) => self.title = Some(text),
-            Dot::Skipped => {
-                let name = line
-                    .text
-                    .split_whitespace()
-                    .next()
-                    .unwrap_or("")
-                    .to_lowercase();
-                if name == ".step" {
-                    self.tell(
-                        Diagnostic::warning(
-                            "step",
-                            span,
-                            "`.step` is not supported yet: one run with the values as they stand",
-                        )
-                        .label("ignored"),
-                    );
-                } else {
-                    self.skipped.push((name, span));
-                }
-            }
+            Dot::Skipped => self.skip(line),
         }
         true
+    }
+
+    /// Keeps the first word of a line for the note about what is skipped.
+    fn skip(&mut self, line: &Line) {
+        let name = line.text.split_whitespace().next().unwrap_or("");
+        self.skipped.push((name.to_lowercase(), line.span()));
     }
 
     fn note_skipped(&mut self) {

@@ -55,6 +55,8 @@ pub enum Outcome {
         z: DVector<f64>,
         /// t.
         margin: f64,
+        /// X, the multiplier of F ⪰ tI; zero by zero if it was lost.
+        dual: DMatrix<f64>,
     },
     /// The search broke off.
     Stalled {
@@ -150,7 +152,7 @@ pub fn maximise(face: &Face) -> Outcome {
             return Outcome::Interior { z, margin: t };
         }
         if t + gap < 0.0 && t < -ZERO * gap {
-            return Outcome::Infeasible { z, margin: t };
+            return judge(&blocks, z, t, mu, weight);
         }
         if gap < GAP {
             return judge(&blocks, z, t, mu, weight);
@@ -164,15 +166,14 @@ fn judge(blocks: &[Block; 3], z: DVector<f64>, t: f64, mu: f64, weight: f64) -> 
     if t > 0.0 {
         return Outcome::Interior { z, margin: t };
     }
-    if t < -ZERO * gap {
-        return Outcome::Infeasible { z, margin: t };
-    }
-    match blocks[0].factor(&z, t) {
-        Some(factor) => Outcome::Boundary {
-            dual: factor.inverse() * mu,
+    let dual = blocks[0].factor(&z, t).map(|f| f.inverse() * mu);
+    match dual {
+        dual if t < -ZERO * gap => Outcome::Infeasible {
             z,
             margin: t,
+            dual: dual.unwrap_or_default(),
         },
+        Some(dual) => Outcome::Boundary { z, margin: t, dual },
         None => Outcome::Stalled {
             z,
             reason: "the barrier lost its interior point",

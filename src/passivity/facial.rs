@@ -87,21 +87,12 @@ impl Face {
 
     /// F = −WᵀQ(P)W over the solutions of PBN = CᵀN, N = ker(D + Dᵀ), W its complement; of a balanced system.
     pub(super) fn kernel(system: &System) -> Result<Self, Inconsistent> {
-        let (n, m) = (system.n(), system.m());
-        let (values, vectors) = scale::eigen(&(&system.d + system.d.transpose()));
-        let size = system.d.amax().max(f64::MIN_POSITIVE);
-        let kernel: Vec<usize> = (0..m)
-            .filter(|&i| values[i].abs() <= scale::RANK * size)
-            .collect();
-        let rest: Vec<usize> = (0..m)
-            .filter(|&i| values[i].abs() > scale::RANK * size)
-            .collect();
-        let null = vectors.select_columns(&kernel);
+        let n = system.n();
+        let (null, rest) = lossless(&system.d);
         let (p0, u2) = equalities(&(&system.b * &null), &(system.c.transpose() * &null), &null)?;
-        let mut w = DMatrix::zeros(n + m, n + rest.len());
+        let mut w = DMatrix::zeros(n + rest.nrows(), n + rest.ncols());
         w.view_mut((0, 0), (n, n)).fill_with_identity();
-        w.view_mut((n, n), (m, rest.len()))
-            .copy_from(&vectors.select_columns(&rest));
+        w.view_mut((n, n), rest.shape()).copy_from(&rest);
         let at = |p: &DMatrix<f64>| -(w.transpose() * lmi::matrix(system, p) * &w);
         let zero = at(&DMatrix::zeros(n, n));
         let p = symmetric_basis(&u2);
@@ -213,6 +204,18 @@ impl Face {
             directions: &self.directions * &parts.kernel,
         })
     }
+}
+
+/// Orthonormal bases of ker(D + Dᵀ) and of its complement.
+pub(super) fn lossless(d: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+    let (values, vectors) = scale::eigen(&(d + d.transpose()));
+    let size = d.amax().max(f64::MIN_POSITIVE);
+    let (kernel, rest): (Vec<usize>, Vec<usize>) =
+        (0..values.len()).partition(|&i| values[i].abs() <= scale::RANK * size);
+    (
+        vectors.select_columns(&kernel),
+        vectors.select_columns(&rest),
+    )
 }
 
 /// P₀ and U₂ of the symmetric solutions P = P₀ + U₂ZU₂ᵀ of PM = R (M = BN, R = CᵀN, balanced units).

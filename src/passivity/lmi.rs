@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::barrier::{self, Outcome};
 use super::facial::{Face, Inconsistent};
+use super::mixture::Mixture;
 use super::{Certificate, Origin, System, Witness, scale, verify};
 
 /// Unknowns of the barrier beyond which the matrix inequality is not attempted: its cost grows with their cube
@@ -94,24 +95,49 @@ pub(super) fn solve_with(
             residuals,
         })
     })
-    .map_err(Unsolved::Open)
+    .map_err(|ended| {
+        let mixture = ended
+            .dual
+            .and_then(|x| Mixture::of_dual(&balanced.system, &x))
+            .map(|mixture| Witness::Mixture(mixture).unbalanced(&balanced));
+        match mixture {
+            Some(witness) if witness.verify(system) => Unsolved::Witness(witness),
+            _ => Unsolved::Open(ended.reason),
+        }
+    })
+}
+
+/// How a search without a result ended.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Ended {
+    /// In words.
+    pub(crate) reason: String,
+    /// The multiplier X ⪰ 0 of F(z) ⪰ 0 where the whole face, not one exposed later, turned out infeasible.
+    pub(crate) dual: Option<DMatrix<f64>>,
+}
+
+impl From<String> for Ended {
+    fn from(reason: String) -> Self {
+        Self { reason, dual: None }
+    }
 }
 
 /// Looks for z with F(z) ⪰ 0 and P(z) ≻ 0 that `accept` accepts: the largest margin, then a smaller face where that
 /// margin is zero. `accept` decides on the z of the given face.
 ///
 /// # Errors
-/// Where the search ended, in words.
+/// Where the search ended.
 pub(crate) fn search<T>(
     whole: &Face,
     maximise: impl Fn(&Face) -> Outcome,
     accept: impl Fn(&DVector<f64>) -> Result<T, String>,
-) -> Result<T, String> {
+) -> Result<T, Ended> {
     if whole.unknowns() > MAX_UNKNOWNS {
         return Err(format!(
             "the inequality has {} unknowns, more than the {MAX_UNKNOWNS} attempted",
             whole.unknowns()
-        ));
+        )
+        .into());
     }
     let whole = whole.rebased();
     let mut face = whole.clone();
@@ -130,16 +156,20 @@ pub(crate) fn search<T>(
             Outcome::Interior { .. } => whole
                 .expose(&whole.nearly_null(&z))
                 .ok_or_else(|| format!("the solution found for the inequality is not confirmed: {failure}"))?,
-            Outcome::Infeasible { margin, .. } => {
-                return Err(format!(
-                    "the inequality has margin {margin:.1e} < 0 after {round} rounds of facial reduction, but no \
-                     violation was confirmed"
-                ));
+            Outcome::Infeasible { margin, dual, .. } => {
+                return Err(Ended {
+                    reason: format!(
+                        "the inequality has margin {margin:.1e} < 0 after {round} rounds of facial reduction, but no \
+                         violation was confirmed"
+                    ),
+                    dual: (round == 0 && !dual.is_empty()).then_some(dual),
+                });
             }
-            Outcome::Stalled { reason, .. } => return Err(reason.into()),
+            Outcome::Stalled { reason, .. } => return Err(reason.to_string().into()),
         };
     }
-    Err(format!(
-        "the inequality is still not strictly feasible after {ROUNDS} exposing rounds"
-    ))
+    Err(
+        format!("the inequality is still not strictly feasible after {ROUNDS} exposing rounds")
+            .into(),
+    )
 }

@@ -20,6 +20,7 @@ pub mod energy;
 pub mod facial;
 pub mod gradient;
 pub mod lmi;
+pub mod mixture;
 pub(crate) mod scale;
 #[cfg(feature = "sdp")]
 pub mod sdp;

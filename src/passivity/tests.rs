@@ -1,79 +1,17 @@
 //! Verdicts on the circuits of the papers, on random networks whose passivity is known, and under role swaps.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, dmatrix};
 
 use super::*;
+use fixtures::{C, L, R, Random, bridge, filter};
 
-/// A matrix by rows, `dmatrix![1.0, 2.0; 3.0, 4.0]`.
-macro_rules! dmatrix {
-    ($($($x:expr),*);*) => {{
-        let rows = [$(vec![$($x),*]),*];
-        DMatrix::from_fn(rows.len(), rows[0].len(), |i, j| rows[i][j])
-    }};
-}
+#[path = "../../tests/systems/passive.rs"]
+mod fixtures;
 
-const C: f64 = 1e-6;
-const L: f64 = 1e-2;
-const R: f64 = 1e3;
-
-/// RR-7158 (36)-(37).
-fn bridge() -> System {
-    System {
-        a: dmatrix![0.0, -1.0 / C; 1.0 / L, 0.0],
-        b: dmatrix![0.0, 0.0, -1.0 / C, 1.0 / C; 0.0, 0.0, 0.0, 0.0],
-        c: dmatrix![0.0, 0.0; 0.0, 0.0; -1.0, 0.0; 1.0, 0.0],
-        d: dmatrix![1.0 / R, 1.0 / R, -1.0, 0.0; 1.0 / R, 1.0 / R, 0.0, -1.0; 1.0, 0.0, 0.0, 0.0; 0.0, 1.0, 0.0, 0.0],
-    }
-}
-
-/// RR-7158 (38).
-fn skew() -> System {
-    System {
-        a: dmatrix![-1.0 / (R * C)],
-        b: dmatrix![1.0 / C, 0.0, 1.0 / C, 0.0],
-        c: dmatrix![1.0; 0.0; 1.0; 0.0],
-        d: dmatrix![0.0, -1.0, 0.0, 0.0; 1.0, 0.0, 1.0, -1.0; 0.0, -1.0, 0.0, 0.0; 0.0, 1.0, 0.0, 0.0],
-    }
-}
-
-/// Uniform numbers in (−1, 1) from a fixed seed (xorshift64*).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        ((self.next() + 1.0) / 2.0 * n as f64) as usize
-    }
-
-    fn matrix(&mut self, rows: usize, columns: usize) -> DMatrix<f64> {
-        DMatrix::from_fn(rows, columns, |_, _| self.next())
-    }
-}
-
-/// A random passive system by construction: x' = (J − R)Hx + (G − K)λ, y = (G + K)ᵀHx + (S + T)λ with J, T skew,
-/// H ≻ 0 diagonal over six decades and [[R, K], [Kᵀ, S]] ⪰ 0 of low rank. Returned with its energy H.
+/// A random passive system with its energy: losses of random rank, energies over six decades.
 fn passive(random: &mut Random, n: usize, m: usize) -> (System, DMatrix<f64>) {
-    let h = DMatrix::from_diagonal(&nalgebra::DVector::from_fn(n, |_, _| {
-        10_f64.powf(3.0 * random.next())
-    }));
     let rank = random.below(n + m + 1);
-    let factor = random.matrix(n + m, rank);
-    let loss = &factor * factor.transpose();
-    let j = random.matrix(n, n);
-    let t = random.matrix(m, m);
-    let g = random.matrix(n, m);
-    let k = loss.view((0, n), (n, m)).into_owned();
-    let a = (&j - j.transpose() - loss.view((0, 0), (n, n))) * &h;
-    let b = &g - &k;
-    let c = (&g + &k).transpose() * &h;
-    let d = loss.view((n, n), (m, m)) + (&t - t.transpose());
-    (System { a, b, c, d }, h)
+    fixtures::passive(random, (n, m), rank, 0.0, 1e3)
 }
 
 #[test]
@@ -109,12 +47,12 @@ fn the_inequality_alone_finds_the_energy_of_the_bridge() {
 
 #[test]
 fn the_skew_bridge_of_38_has_p_equal_to_c() {
-    let certificate = decide(&skew(), None)
+    let certificate = decide(&filter(), None)
         .certificate()
         .cloned()
         .expect("passive");
     assert!((certificate.p[(0, 0)] / C - 1.0).abs() < 1e-12);
-    let strict = strict::maximise(&skew(), &certificate.p, certificate.from);
+    let strict = strict::maximise(&filter(), &certificate.p, certificate.from);
     assert!(
         (strict.decay_rate * R * C - 1.0).abs() < 1e-5,
         "{}",
@@ -250,6 +188,53 @@ fn a_thousand_active_networks_are_not_passive() {
     }
 }
 
+#[test]
+fn an_infeasible_inequality_has_a_mixture_of_motions_for_a_witness() {
+    // The inequality alone, without the search for single motions: a negative margin comes with a verified dual solution.
+    let mut random = Random(5);
+    let (mut refuted, mut proved, mut mixtures) = (0, 0, 0);
+    for k in 0..60 {
+        let (n, m) = (1 + random.below(4), 1 + random.below(3));
+        let (mut system, _) = passive(&mut random, n, m);
+        match k % 3 {
+            0 => system.d -= DMatrix::identity(m, m) * (1.05 * system.d.amax() * m as f64 + 0.1),
+            1 => {
+                for i in 0..n {
+                    system.a[(i, i)] += 1.0 + 2.0 * system.a.amax();
+                }
+            }
+            _ => system.c[(0, 0)] += 3.0 * system.c.amax(),
+        }
+        let verdict = decide(&system, None);
+        if let Err(lmi::Unsolved::Witness(witness)) = lmi::solve(&system) {
+            assert!(witness.verify(&system));
+            assert_eq!(verdict.answer(), Some(false), "network {k}: {witness:?}");
+            proved += 1;
+            mixtures += usize::from(matches!(witness, Witness::Mixture(_)));
+        }
+        refuted += usize::from(verdict.answer() == Some(false));
+    }
+    assert!(
+        proved >= refuted - 5 && mixtures > 45,
+        "{mixtures} mixtures, {proved} proofs for {refuted} refuted"
+    );
+    // A passive system has none: x' = −x + v, y = x gains energy at v = −x only while x shrinks, and grows only if fed.
+    let rc = System {
+        a: dmatrix![-1.0],
+        b: dmatrix![1.0],
+        c: dmatrix![1.0],
+        d: dmatrix![0.0],
+    };
+    for v in [-1.0, 2.0] {
+        let mixture = mixture::Mixture {
+            states: dmatrix![1.0],
+            inputs: dmatrix![v],
+            supply: -1.0,
+        };
+        assert!(!Witness::Mixture(mixture).verify(&rc), "{v}");
+    }
+}
+
 /// An independent sweep of λ_min(H(jω) + H(jω)*), real arithmetic: H(jω) = D + C(A² + ω²)⁻¹(−A − jω)B.
 fn sweep_fails(system: &System) -> bool {
     let n = system.n();
@@ -280,7 +265,7 @@ mod second_opinion {
 
     #[test]
     fn cone_solver_and_barrier_agree() {
-        for system in [bridge(), skew()] {
+        for system in [bridge(), filter()] {
             let barrier = lmi::solve(&system).expect("barrier");
             let cone = sdp::solve(&system).expect("cone");
             let scale = barrier.p.diagonal().map(f64::sqrt);

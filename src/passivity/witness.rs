@@ -6,6 +6,7 @@
 
 use nalgebra::{Complex, DMatrix, DVector};
 
+use super::mixture::Mixture;
 use super::scale::{self, Balanced};
 use super::{System, sweep, verify};
 
@@ -13,7 +14,7 @@ pub(super) type C = Complex<f64>;
 
 /// Relative error assumed in every entry of A, B, C, D when a witness is verified: it must stand for all matrices within
 /// it. Larger: weakly active networks are not recognised; smaller: rounding is taken for activity.
-const ENTRIES: f64 = 1e-11;
+pub(super) const ENTRIES: f64 = 1e-11;
 
 /// States beyond which only the feedthrough is searched: the sweep takes hundreds of factorisations.
 const LARGEST: usize = 150;
@@ -54,6 +55,8 @@ pub enum Witness {
         /// v.
         direction: Vec<f64>,
     },
+    /// A dual solution of (45): several motions that together grow and gain energy.
+    Mixture(Mixture),
 }
 
 impl Witness {
@@ -76,6 +79,12 @@ impl Witness {
             }
             Self::Asymmetric { .. } => "C B is not symmetric on the lossless ports: P B = Cᵀ has no solution".into(),
             Self::Markov { .. } => "C B is not positive semidefinite on the lossless ports: P B = Cᵀ has no P ≻ 0".into(),
+            Self::Mixture(mixture) => format!(
+                "{} motions whose second moments grow together gain energy at the ports: Σ vᵀy = {:.3e} < 0 (the inequality (45) \
+                 is infeasible by duality)",
+                mixture.states.ncols(),
+                mixture.supply
+            ),
         }
     }
 
@@ -130,6 +139,7 @@ impl Witness {
                 let size = v.abs().dot(&(system.c.abs() * (system.b.abs() * v.abs())));
                 shape(v.len()) && lossless(system, &v) && value < -verify::KERNEL * size
             }
+            Self::Mixture(mixture) => mixture.verify(system),
         }
     }
 
@@ -174,6 +184,11 @@ impl Witness {
             Self::Markov { direction } => Self::Markov {
                 direction: port(direction),
             },
+            Self::Mixture(mixture) => Self::Mixture(Mixture {
+                states: DMatrix::from_diagonal(&balanced.states) * mixture.states,
+                inputs: DMatrix::from_diagonal(&balanced.ports) * mixture.inputs,
+                supply: mixture.supply * balanced.omega,
+            }),
         }
     }
 }

@@ -48,17 +48,30 @@ impl Figure {
     /// Volts above, amperes below.
     #[must_use]
     pub fn of_waveforms(waves: &Waveforms) -> Self {
+        Self::of_runs(&[(String::new(), waves)])
+    }
+
+    /// The same with the curves of several runs, each under its label.
+    #[must_use]
+    pub fn of_runs(runs: &[(String, &Waveforms)]) -> Self {
+        let series = |unit: &str| {
+            let mut all = Vec::new();
+            for (label, waves) in runs {
+                for j in (0..waves.width()).filter(|&j| waves.units[j] == unit) {
+                    let name = format!("{} {label}", waves.names[j]);
+                    all.push(Series::column(waves, j, name.trim_end().into()));
+                }
+            }
+            all
+        };
         let panel = |quantity: &str, unit: &'static str| Panel {
             quantity: quantity.into(),
             unit,
-            series: (0..waves.width())
-                .filter(|&j| waves.units[j] == unit)
-                .map(|j| Series::column(waves, j, waves.names[j].clone()))
-                .collect(),
+            series: series(unit),
         };
         let panels = [panel("voltage", "V"), panel("current", "A")];
         Self {
-            title: waves.title.clone(),
+            title: runs.first().map_or(String::new(), |(_, w)| w.title.clone()),
             panels: panels
                 .into_iter()
                 .filter(|p| !p.series.is_empty())

@@ -8,13 +8,13 @@ const STYLE: &str = "body{font-family:sans-serif;margin:2em auto;max-width:70em;
 svg{max-width:100%;height:auto}pre{background:#f4f4f4;padding:1em;overflow:auto}\
 table{border-collapse:collapse}td,th{padding:.2em 1em;border-bottom:1px solid #ddd;text-align:right}";
 
-/// The page of a run, without references to anything outside itself.
+/// The page of a run and a picture of it, without references to anything outside itself.
 ///
 /// # Errors
 /// Those of [`svg::draw`].
-pub fn page(run: &Run) -> Result<String, PictureError> {
+pub fn page(run: &Run, figure: &Figure) -> Result<String, PictureError> {
     let title = escaped(&run.waveforms.title);
-    let picture = svg::draw(&Figure::of_waveforms(&run.waveforms))?;
+    let picture = svg::draw(figure)?;
     let summary = escaped(&text::summary(run, false));
     let plan: String = run
         .plan
@@ -92,7 +92,7 @@ mod tests {
             }],
             ..Run::default()
         };
-        let page = page(&run).unwrap();
+        let page = page(&run, &Figure::of_waveforms(&run.waveforms)).unwrap();
         assert!(
             page.contains("<svg ") && page.contains("d1 conducts") && page.contains("i(d1) 1 µA·s")
         );

@@ -1,7 +1,9 @@
 //! Summaries as JSON.
 
 use serde::Serialize;
+use serde_json::Value;
 
+use super::measured::Measurements;
 use crate::integrate::{Energy, Impulse, Run};
 
 #[derive(Serialize)]
@@ -18,31 +20,56 @@ struct Summary<'a> {
     factorisations: u64,
     cpu_seconds: f64,
     energy: Energy,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error_estimate: Option<f64>,
     notes: &'a [String],
     impulses: &'a [Impulse],
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    measurements: Vec<Value>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    fourier: Vec<Value>,
 }
 
-/// What a run did, as one JSON object on one line: method, plan, counters, energy balance, notes, impulses.
+/// What a run did, as one JSON object on one line: method, plan, counters, energy balance, notes, impulses, and what was
+/// measured.
 #[must_use]
-pub fn summary(run: &Run) -> String {
-    let stats = &run.stats;
-    let summary = Summary {
-        method: &run.method,
-        plan: &run.plan,
-        steps: stats.steps,
-        rejected: stats.rejected,
-        events: stats.events,
-        jumps: stats.jumps,
-        modes: stats.modes,
-        lcp_solves: stats.lcp_solves,
-        pivotings: stats.pivotings,
-        factorisations: stats.factorisations,
-        cpu_seconds: stats.cpu_seconds,
-        energy: run.energy,
-        notes: &run.notes,
-        impulses: &run.impulses,
-    };
-    line(&summary)
+pub fn summary(run: &Run, found: &Measurements) -> String {
+    line(&Summary::of(run, found))
+}
+
+/// The same as an object to add to.
+#[must_use]
+pub(super) fn summary_object(run: &Run, found: &Measurements) -> serde_json::Map<String, Value> {
+    match serde_json::to_value(Summary::of(run, found)) {
+        Ok(Value::Object(object)) => object,
+        _ => serde_json::Map::new(),
+    }
+}
+
+impl<'a> Summary<'a> {
+    fn of(run: &'a Run, found: &Measurements) -> Self {
+        let stats = &run.stats;
+        let (measurements, fourier) = found.json();
+        Self {
+            method: &run.method,
+            plan: &run.plan,
+            steps: stats.steps,
+            rejected: stats.rejected,
+            events: stats.events,
+            jumps: stats.jumps,
+            modes: stats.modes,
+            lcp_solves: stats.lcp_solves,
+            pivotings: stats.pivotings,
+            factorisations: stats.factorisations,
+            cpu_seconds: stats.cpu_seconds,
+            energy: run.energy,
+            error_estimate: run.error_estimate,
+            notes: &run.notes,
+            impulses: &run.impulses,
+            measurements,
+            fourier,
+        }
+    }
 }
 
 /// Any report as JSON on one line; plain data always serialises.
@@ -80,7 +107,7 @@ mod tests {
             ..Run::default()
         };
         assert_eq!(
-            summary(&run),
+            summary(&run, &Measurements::default()),
             "{\"method\":\"exact\",\"plan\":[\"piecewise linear\"],\"steps\":7,\"rejected\":0,\"events\":2,\"jumps\":0,\
              \"modes\":0,\"lcp_solves\":0,\"pivotings\":0,\"factorisations\":0,\"cpu_seconds\":0.0,\
              \"energy\":{\"source\":1.5,\"dissipated\":1.0,\"stored\":0.5,\"residual_relative\":0.0},\"notes\":[],\

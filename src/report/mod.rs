@@ -4,7 +4,9 @@
 //! font, [`html`] puts it on a page. [`text`] and [`json`] are the summaries, [`terminal`] plots with characters.
 
 pub mod json;
+pub mod measured;
 pub mod si;
+pub mod steps;
 pub mod table;
 pub mod text;
 

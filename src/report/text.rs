@@ -41,6 +41,12 @@ pub fn summary(run: &Run, verbose: bool) -> String {
         si::quantity(energy.stored, "J", 4),
         si::plain(energy.residual_relative, 2),
     ));
+    if let Some(error) = run.error_estimate {
+        lines.push(format!(
+            "error: {} of the amplitudes, as the steps let expect",
+            si::plain(error, 2)
+        ));
+    }
     for impulse in run.impulses.iter().take(IMPULSES_SHOWN) {
         let unit = if impulse.name.starts_with("i(") {
             "A·s"

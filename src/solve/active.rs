@@ -80,6 +80,34 @@ pub fn refined_inverse(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(inverse * residual)
 }
 
+/// As [`refined_inverse`], after rows and columns were brought near 1 by powers of two: what is singular then is so in any units.
+#[must_use]
+pub fn equilibrated_inverse(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let (mut scaled, n) = (a.clone(), a.nrows());
+    let (mut left, mut right) = (DVector::from_element(n, 1.0), DVector::from_element(n, 1.0));
+    let factor = |largest: f64| match largest {
+        v if v > 0.0 && v.is_finite() => (-0.5 * v.log2()).round().exp2(),
+        _ => 1.0,
+    };
+    for _ in 0..SWEEPS {
+        for i in 0..n {
+            let by = factor(scaled.row(i).amax());
+            scaled.row_mut(i).scale_mut(by);
+            left[i] *= by;
+            let by = factor(scaled.column(i).amax());
+            scaled.column_mut(i).scale_mut(by);
+            right[i] *= by;
+        }
+    }
+    let inverse = refined_inverse(&scaled)?;
+    Some(DMatrix::from_fn(n, n, |i, j| {
+        right[i] * inverse[(i, j)] * left[j]
+    }))
+}
+
+/// Sweeps of the equilibration; each takes the square root of what is left of the imbalance.
+const SWEEPS: usize = 8;
+
 /// The Moore-Penrose inverse with rank decided at [`RANK`].
 #[must_use]
 pub fn pseudo_inverse(a: &DMatrix<f64>) -> DMatrix<f64> {

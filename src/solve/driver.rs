@@ -59,6 +59,12 @@ impl Driver {
         }
     }
 
+    /// The number of pairs.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.scaled.size()
+    }
+
     /// Prepares M for ports with any laws; see [`lawful`](super::lawful).
     #[must_use]
     pub fn with_laws(m: DMatrix<f64>, ports: Vec<PortLaw>, tolerance: f64) -> Self {
@@ -247,14 +253,20 @@ impl Driver {
         })
     }
 
-    /// λ' clipped to λ' ≥ 0 where it is negative by rounding, with its residual in scaled variables.
-    fn candidate(&self, scaled: DVector<f64>, basis: Vec<bool>, by: Answered) -> Solution {
+    /// λ' clipped to λ' ≥ 0 where it is negative by rounding, with its residual in scaled variables; what is clipped leaves
+    /// the index set.
+    fn candidate(&self, scaled: DVector<f64>, mut basis: Vec<bool>, by: Answered) -> Solution {
         let size = scaled.len();
         let one = Scaling {
             d: DVector::from_element(size, 1.0),
         };
         let rounding = self.tolerance * scaled.amax().max(self.scaled.q.amax());
-        let clipped = scaled.map(|v| if v.abs() <= rounding { v.max(0.0) } else { v });
+        let mut clipped = scaled;
+        for (v, active) in clipped.iter_mut().zip(&mut basis) {
+            if (-rounding..0.0).contains(v) {
+                (*v, *active) = (0.0, false);
+            }
+        }
         let y = self.scaled.y(&clipped);
         let residual = one.residual(&self.scaled, &clipped, &y);
         let active = one.active(&clipped, &y, self.tolerance);

@@ -29,6 +29,9 @@ const PIVOT: f64 = 1e-11;
 /// Ratios closer than this, relative to the larger, tie and are decided by the next lexicographic column.
 const TIE: f64 = 1e-12;
 
+/// Entries of a column of the tableau are known to this part of its largest.
+const NOISE: f64 = 1e-15;
+
 /// Runs Lemke on an equilibrated problem with covering vector `cover` > 0.
 #[must_use]
 pub fn solve(lcp: &Lcp, cover: &DVector<f64>) -> Lemke {
@@ -111,11 +114,16 @@ fn lexicographic_minimum(
     let size = basis.len();
     for k in 0..=size {
         let column = if k == 0 { rhs } else { k - 1 };
-        let ratio = |i: usize| t[(i, column)] / t[(i, entering)];
-        let least = tied.iter().map(|&i| ratio(i)).fold(f64::INFINITY, f64::min);
-        let spread = tied.iter().map(|&i| ratio(i).abs()).fold(0.0, f64::max);
-        let close = TIE * least.abs().max(TIE * spread);
-        tied.retain(|&i| ratio(i) - least <= close);
+        let noise = NOISE * t.column(column).amax();
+        let ratio = |i: usize| (t[(i, column)] / t[(i, entering)], noise / t[(i, entering)]);
+        let (least, blur) = tied
+            .iter()
+            .map(|&i| ratio(i))
+            .fold((f64::INFINITY, 0.0), |a, b| if b.0 < a.0 { b } else { a });
+        tied.retain(|&i| {
+            let (value, own) = ratio(i);
+            value - least <= TIE * least.abs() + blur + own
+        });
         if k == 0
             && let Some(&row) = tied.iter().find(|&&i| basis[i] == z0)
         {
@@ -160,6 +168,31 @@ mod tests {
     fn skew_bridge_pair() {
         let end = run(dmatrix![0.0, -1.0; 1.0, 0.0], dvector![2.0, -3.0]);
         assert_eq!(end, Lemke::Basis(vec![true, true]));
+    }
+
+    #[test]
+    fn cancelling_right_hand_sides_tie() {
+        // A bridge arm with two equal diodes in parallel: at the solution λ_2 alone carries the current and three pairs vanish
+        // together, in the tableau only to rounding.
+        let a = 0.0006357784054158147;
+        let b = -0.02034490897330607;
+        let c = 0.9999936422159459;
+        let m = dmatrix![
+            0.00999993642215946, c, -0.00020344908973306069, c;
+            -c, a, b, a;
+            0.0002034490897330607, b, 0.6510370871457942, b;
+            -c, a, b, a
+        ];
+        let q = dvector![
+            -1.4380978419164194e-8,
+            -9.146726369255016e-12,
+            2.926952438161605e-10,
+            -9.146726369255016e-12
+        ];
+        let Lemke::Basis(active) = run(m, q) else {
+            panic!("no basis")
+        };
+        assert!(active[1] || active[3], "{active:?}");
     }
 
     #[test]

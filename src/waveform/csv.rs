@@ -16,8 +16,16 @@ impl<W: Write> Writer<W> {
     ///
     /// # Errors
     /// Those of `to`.
-    pub fn new(mut to: W, names: &[String]) -> std::io::Result<Self> {
-        to.write_all(b"time")?;
+    pub fn new(to: W, names: &[String]) -> std::io::Result<Self> {
+        Self::over(to, "time", names)
+    }
+
+    /// The same over another quantity than time, such as a swept voltage.
+    ///
+    /// # Errors
+    /// Those of `to`.
+    pub fn over(mut to: W, axis: &str, names: &[String]) -> std::io::Result<Self> {
+        write!(to, "{axis}")?;
         for name in names {
             if name.contains([',', '"', '\n']) {
                 write!(to, ",\"{}\"", name.replace('"', "\"\""))?;
@@ -29,7 +37,7 @@ impl<W: Write> Writer<W> {
         Ok(Self { to })
     }
 
-    /// Writes one row: time in s, then the values.
+    /// Writes one row: time (or what stands in its place), then the values.
     ///
     /// # Errors
     /// Those of the target.

@@ -7,6 +7,7 @@ mod sweeping;
 
 use nalgebra::DMatrix;
 
+use super::equilibria::Equilibrium;
 use super::facts::{Facts, Swap};
 use crate::passivity::{gradient, scale};
 
@@ -78,7 +79,7 @@ fn over_swaps(facts: &Facts, check: impl Fn(&Swap, &mut Hypotheses)) -> Hypothes
 }
 
 /// All statements, in the order of the report.
-pub(super) fn all(facts: &Facts) -> Vec<Theorem> {
+pub(super) fn all(facts: &Facts, equilibria: &[Equilibrium]) -> Vec<Theorem> {
     let mut list = Vec::new();
     if facts.system.m() == 0 {
         list.push(linear());
@@ -101,7 +102,7 @@ pub(super) fn all(facts: &Facts) -> Vec<Theorem> {
         stability::stability(facts),
         stability::lipschitz(facts),
         stability::invariance(facts),
-        stability::dissipation(facts),
+        stability::dissipation(facts, equilibria),
     ]);
     list
 }

@@ -1,13 +1,27 @@
 //! Stability, dependence on the start, invariance: RR-7158 Theorems 3 to 5.
 
-use nalgebra::{DMatrix, DVector};
-
-use super::{Hypotheses, Theorem, ZERO, passive};
-use crate::check::facts::{Facts, Swap};
+use super::{Hypotheses, Theorem, passive};
+use crate::check::convergence::{self, DISSIPATION, INVARIANCE};
+use crate::check::equilibria::Equilibrium;
+use crate::check::facts::Facts;
+use crate::check::limit::LimitSet;
 use crate::passivity::strict;
 
 /// Autonomous, and x = 0 with λ = 0 is a solution (Assumption 7).
 fn rests_at_zero(facts: &Facts, h: &mut Hypotheses) {
+    autonomous(facts, h);
+    let rests = facts.rests_at_zero();
+    h.need(
+        rests,
+        if rests {
+            "Assumption 7: x = 0 is a solution, Φ^{*,−} ≥ Φ^{*,−}(0)"
+        } else {
+            "Assumption 7 fails: x = 0 is no equilibrium (constant sources)"
+        },
+    );
+}
+
+fn autonomous(facts: &Facts, h: &mut Hypotheses) {
     if facts.is_autonomous() {
         h.need(true, "autonomous");
     } else {
@@ -17,22 +31,6 @@ fn rests_at_zero(facts: &Facts, h: &mut Hypotheses) {
             format!("not autonomous: driven by {}", names.join(", ")),
         );
     }
-    let rests = facts.e.amax() == 0.0
-        && facts.laws.iter().zip(facts.f.iter()).all(|(law, &f)| {
-            if law.half_line {
-                f >= 0.0
-            } else {
-                law.through_origin && f == 0.0
-            }
-        });
-    h.need(
-        rests,
-        if rests {
-            "Assumption 7: x = 0 is a solution, Φ^{*,−} ≥ Φ^{*,−}(0)"
-        } else {
-            "Assumption 7 fails: x = 0 is no equilibrium (constant sources)"
-        },
-    );
 }
 
 /// RR-7158 Theorem 3 with Propositions 4 and 5.
@@ -76,76 +74,74 @@ pub(super) fn invariance(facts: &Facts) -> Theorem {
     let mut h = Hypotheses::default();
     rests_at_zero(facts, &mut h);
     passive(facts, &mut h);
-    let strictly = |swap: &Swap| {
-        swap.laws.iter().zip(swap.f.iter()).all(|(law, &f)| {
-            if law.half_line {
-                f > 0.0
-            } else {
-                law.strictly && f == 0.0
-            }
-        })
-    };
-    let found = facts.swaps.iter().find(|swap| strictly(swap));
-    match found {
+    match convergence::strict_laws(facts) {
         Some(swap) => h.need(true, format!("Φ^{{*,−}}(z) > Φ^{{*,−}}(0) for z ≠ 0{}", swap.note())),
         None => h.need(
             false,
             "Φ^{*,−}(z) > Φ^{*,−}(0) for z ≠ 0 fails: ideal diodes have Φ^{*,−} = 0 on the whole half line",
         ),
     };
-    let gives = facts.certificate().map_or_else(
+    let gives = convergence::invariant_set(facts).map_or_else(
         || "convergence to the largest invariant subset of {⟨PAz, z⟩ = 0}".into(),
-        |c| {
-            let pa = &c.p * &facts.system.a;
+        |set| {
             format!(
-                "every orbit tends to the largest invariant subset of {{⟨PAz, z⟩ = 0}}, of dimension {}",
-                kernel_dimension(&(&pa + pa.transpose()), &(c.p.abs() * facts.system.a.abs()))
+                "every motion tends to the largest invariant subset of {{⟨PAz, z⟩ = 0}}, {}",
+                describe(facts, &set)
             )
         },
     );
-    h.theorem("RR-7158 Theorem 5", gives)
+    h.theorem(INVARIANCE, gives)
 }
 
-/// The dissipation argument: where strict passivity or the laws leave no lossless motion, orbits tend to 0.
-pub(super) fn dissipation(facts: &Facts) -> Theorem {
+/// The dissipation argument of [`limit`](crate::check): what ideal diodes leave room for, under its own name.
+pub(super) fn dissipation(facts: &Facts, equilibria: &[Equilibrium]) -> Theorem {
     let mut h = Hypotheses::default();
-    rests_at_zero(facts, &mut h);
+    autonomous(facts, &mut h);
     passive(facts, &mut h);
-    let gives = match facts.certificate() {
-        None => "limit points in the lossless set".to_string(),
-        Some(c) => {
-            let q = crate::passivity::lmi::matrix(&facts.system, &c.p);
-            let size = crate::passivity::lmi::magnitude(&facts.system, &c.p);
-            let dimension = kernel_dimension(&q, &size);
+    let set = equilibria
+        .first()
+        .and_then(|equilibrium| convergence::dissipative_set(facts, equilibrium));
+    h.need(
+        !equilibria.is_empty(),
+        if equilibria.is_empty() {
+            "no equilibrium was found"
+        } else {
+            "an equilibrium solves the static complementarity problem"
+        },
+    );
+    let gives = set.map_or_else(
+        || "limit points without dissipation".into(),
+        |set| {
             format!(
-                "along limit solutions (x, λ) stays in ker Q(P), of dimension {dimension}: no energy is dissipated there{}",
-                if dimension == 0 {
-                    ", so every orbit tends to 0"
-                } else {
-                    ""
-                }
+                "along limit motions (x, λ) differs from the equilibrium within ker Q(P), of dimension {}, and the ports \
+                 keep their sides: what is left is {}",
+                convergence::lossless_pairs(facts),
+                describe(facts, &set)
             )
-        }
-    };
-    h.theorem(
-        "Dissipation argument (LaSalle, any Φ^{*,−} ≥ Φ^{*,−}(0))",
-        gives,
-    )
+        },
+    );
+    h.theorem(DISSIPATION, gives)
 }
 
-/// Dimension of the kernel of a symmetric matrix, relative to the sizes of its terms.
-fn kernel_dimension(q: &DMatrix<f64>, size: &DMatrix<f64>) -> usize {
-    if q.is_empty() {
-        return 0;
+/// A limit set in words.
+fn describe(facts: &Facts, set: &LimitSet) -> String {
+    if set.dimension == 0 {
+        return "one point: every motion converges to the equilibrium".into();
     }
-    let d = DVector::from_fn(q.nrows(), |i, _| {
-        let s = size.row(i).amax().max(size.column(i).amax());
-        if s > 0.0 { 1.0 / s.sqrt() } else { 1.0 }
-    });
-    let unit = DMatrix::from_fn(q.nrows(), q.ncols(), |i, j| d[i] * q[(i, j)] * d[j]);
-    let values = unit.symmetric_eigenvalues();
-    values
+    if set.rests() {
+        return format!(
+            "states of rest in {} dimensions: every motion converges to one of the equilibria",
+            set.dimension
+        );
+    }
+    let names: Vec<&str> = set
+        .moving
         .iter()
-        .filter(|v| v.abs() <= ZERO * values.amax().max(1.0))
-        .count()
+        .map(|&k| facts.state_names[k].as_str())
+        .collect();
+    format!(
+        "motions of {} in {} dimensions",
+        names.join(", "),
+        set.dimension
+    )
 }

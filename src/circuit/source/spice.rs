@@ -95,15 +95,19 @@ impl Form {
                     "delay",
                     "damping",
                     "phase",
+                    "cycles",
                 ];
-                let args = read("sin", "2 to 6", 2, names)?;
+                let args = read("sin", "2 to 7", 2, names)?;
+                let frequency = args.get(2, 1.0 / tstop)?;
+                let cycles = args.duration(6, 0.0)?;
                 Wave::Sin {
                     offset: args.get(0, 0.0)?,
                     amplitude: args.get(1, 0.0)?,
-                    frequency: args.get(2, 1.0 / tstop)?,
+                    frequency,
                     delay: args.get(3, 0.0)?,
                     damping: args.get(4, 0.0)?,
                     phase: args.get(5, 0.0)?,
+                    cycles: Some(cycles).filter(|&n| n > 0.0 && frequency > 0.0),
                 }
             }
             "pulse" => {
@@ -233,10 +237,11 @@ impl From<&Wave> for Form {
                 delay,
                 damping,
                 phase,
-            } => Self::new(
-                "sin",
-                vec![offset, amplitude, frequency, delay, damping, phase],
-            ),
+                cycles,
+            } => {
+                let args = [offset, amplitude, frequency, delay, damping, phase];
+                Self::new("sin", args.into_iter().chain(cycles).collect())
+            }
             Wave::Pulse {
                 v1,
                 v2,

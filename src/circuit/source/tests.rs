@@ -327,7 +327,7 @@ fn arguments_are_checked_and_defaults_filled() {
     );
     assert_eq!(
         wave("sin", &[1.0]).unwrap_err().to_string(),
-        "`sin` takes 2 to 6 arguments, found 1"
+        "`sin` takes 2 to 7 arguments, found 1"
     );
     assert_eq!(
         wave("pulse", &[0.0, 1.0, 0.0, -1e-9])
@@ -364,16 +364,18 @@ fn waves() -> impl Strategy<Value = Wave> {
             1.0..1e5,
             -1e-3..1e-3,
             -500.0..500.0,
-            -180.0..180.0
+            -180.0..180.0,
+            prop_oneof![Just(None), (0.5..4.0).prop_map(Some), Just(Some(3.0))]
         )
             .prop_map(
-                |(offset, amplitude, frequency, delay, damping, phase)| Wave::Sin {
+                |(offset, amplitude, frequency, delay, damping, phase, cycles)| Wave::Sin {
                     offset,
                     amplitude,
                     frequency,
                     delay,
                     damping,
-                    phase
+                    phase,
+                    cycles,
                 }
             ),
         (

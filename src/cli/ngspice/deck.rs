@@ -454,8 +454,29 @@ fn waveform(wave: &Wave, edge: f64) -> (String, bool) {
             delay,
             damping,
             phase,
+            cycles,
         } => {
-            format!("sin({offset:e} {amplitude:e} {frequency:e} {delay:e} {damping:e} {phase:e})")
+            // ngspice knows no number of cycles: chords, 5e-6 of the amplitude below their arc.
+            let Some(cycles) = cycles else {
+                return (
+                    format!(
+                        "sin({offset:e} {amplitude:e} {frequency:e} {delay:e} {damping:e} {phase:e})"
+                    ),
+                    false,
+                );
+            };
+            let (count, end) = ((cycles * 1000.0).ceil(), delay + cycles / frequency);
+            let mut text = String::from("pwl(");
+            for k in 0..count as usize {
+                let t = delay + (end - delay) * (k as f64 / count);
+                let _ = write!(text, "{t:e} {:e} ", wave.value(t));
+            }
+            if wave.is_edge(end) {
+                let before = end - widened(0.0);
+                let _ = write!(text, "{before:e} {:e} ", wave.value_left(end));
+            }
+            let _ = write!(text, "{end:e} {:e})", wave.value(end));
+            text
         }
         Wave::Pulse {
             v1,

@@ -1,8 +1,15 @@
-//! Events that accumulate at one time (Zeno): the state reaches the point of accumulation to rounding after finitely many.
+//! Events that accumulate at one time (Zeno): the state reaches the point of accumulation to rounding after finitely many,
+//! or, where it does not, the events come in a burst without end.
+
+use std::collections::VecDeque;
 
 /// Shrinking intervals in a row, and their total shrinkage, that count as an accumulation.
 const EVENTS: u32 = 12;
 const SHRINKAGE: f64 = 1e-3;
+
+/// So many events within this part of an output step are a burst that does not end by itself.
+const BURST: usize = 1024;
+const BURST_SPAN: f64 = 1e-4;
 
 /// Watches the intervals between events.
 #[derive(Debug, Clone)]
@@ -12,6 +19,8 @@ pub(crate) struct Accumulation {
     first_interval: f64,
     interval: f64,
     count: u32,
+    /// Times of the latest events.
+    latest: VecDeque<f64>,
 }
 
 impl Accumulation {
@@ -23,7 +32,21 @@ impl Accumulation {
             first_interval: f64::INFINITY,
             interval: f64::INFINITY,
             count: 0,
+            latest: VecDeque::with_capacity(BURST),
         }
+    }
+
+    /// The number of events and their span, s, where an event at t belongs to a burst, with output steps of length h.
+    pub(crate) fn burst(&mut self, t: f64, h: f64) -> Option<(usize, f64)> {
+        if self.latest.len() == BURST {
+            let span = t - self.latest.pop_front()?;
+            if span <= BURST_SPAN * h {
+                self.latest.clear();
+                return Some((BURST, span));
+            }
+        }
+        self.latest.push_back(t);
+        None
     }
 
     /// An event at t; returns the note of an accumulation that it ends.
@@ -64,6 +87,19 @@ impl Accumulation {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_burst_is_told_from_a_clock() {
+        let mut watch = Accumulation::new(0.0);
+        let bursts = |watch: &mut Accumulation, dt: f64| {
+            (0..3 * BURST)
+                .filter(|&k| watch.burst(1.0 + k as f64 * dt, 1e-3).is_some())
+                .count()
+        };
+        assert_eq!(bursts(&mut watch, 2e-10), 0);
+        let mut watch = Accumulation::new(0.0);
+        assert_eq!(bursts(&mut watch, 5e-11), 2);
+    }
 
     #[test]
     fn a_geometric_series_is_noted_and_a_clock_is_not() {

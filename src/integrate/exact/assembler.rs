@@ -5,12 +5,23 @@ use crate::integrate::switching::Threshold;
 use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
 use crate::mna::Behaviour;
 
+/// A jump of a function block's output at one value of its input: while the first pair conducts and the second does not, the
+/// output is between the two levels and the input stays.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Step {
+    /// The block.
+    pub(crate) device: String,
+    /// Number of the first pair.
+    pub(crate) pair: usize,
+}
+
 /// Reduces one behaviour (with ideal pairs) for its modes.
 #[derive(Debug)]
 pub struct Assembler<'a> {
     behaviour: &'a Behaviour,
     /// The behaviours with some switches on their thresholds.
     sliding: Vec<(Vec<usize>, Behaviour)>,
+    steps: Vec<Step>,
 }
 
 impl<'a> Assembler<'a> {
@@ -20,12 +31,47 @@ impl<'a> Assembler<'a> {
         Self {
             behaviour,
             sliding: Vec::new(),
+            steps: Vec::new(),
         }
+    }
+
+    /// Has it known where the function blocks of the behaviour *before* [`Behaviour::standard`] jump, so that a run can tell
+    /// when they slide.
+    #[must_use]
+    pub fn with_steps_of(mut self, original: &Behaviour) -> Self {
+        let mut first = 0;
+        for pair in &original.pairs {
+            let vertices = pair.port.law.curve().map_or_else(Vec::new, |c| c.vertices);
+            let jumps = vertices
+                .windows(2)
+                .enumerate()
+                .filter(|(_, w)| w[0].0.f64 == w[1].0.f64);
+            if pair.fixed_role {
+                self.steps.extend(jumps.map(|(k, _)| Step {
+                    device: pair.port.device.clone(),
+                    pair: first + k,
+                }));
+            }
+            let ideal = !pair.fixed_role && pair.port.law.is_ideal_diode();
+            first += if ideal { 1 } else { vertices.len().max(1) };
+        }
+        self
+    }
+
+    /// See [`Self::with_steps_of`].
+    pub(crate) fn steps(&self) -> &[Step] {
+        &self.steps
     }
 
     /// Number of device pairs.
     pub(crate) fn pairs(&self) -> usize {
         self.behaviour.pairs.len()
+    }
+
+    /// The device of a pair.
+    pub(crate) fn device(&self, pair: usize) -> Option<&str> {
+        let pair = self.behaviour.pairs.get(pair)?;
+        Some(&pair.port.device)
     }
 
     /// The switches' thresholds.

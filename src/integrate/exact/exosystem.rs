@@ -243,6 +243,21 @@ impl Exosystem {
             .fold(f64::INFINITY, f64::min)
     }
 
+    /// Raises `sizes` to what z and, of its waves, their amplitudes are: a sine at zero is not small.
+    pub(crate) fn envelope(&self, z: &[f64], sizes: &mut [f64]) {
+        for (k, size) in sizes.iter_mut().enumerate() {
+            let wave = |k: usize| self.columns.get(k) == Some(&Column::Quadrature);
+            let partner = if wave(k) {
+                z[k - 1]
+            } else if wave(k + 1) {
+                z[k + 1]
+            } else {
+                0.0
+            };
+            *size = size.max(z[k].hypot(partner));
+        }
+    }
+
     /// z(t) on the current pieces, from closed forms.
     pub(crate) fn write(&self, t: f64, z: &mut [f64]) {
         for (k, column) in self.columns.iter().enumerate() {
@@ -303,6 +318,7 @@ mod tests {
             delay,
             damping,
             phase,
+            cycles: None,
         })
     }
 

@@ -6,21 +6,13 @@ use super::expm::{self, Exponential};
 use super::kernel::Kernel;
 use super::polynomial::MAX_DEGREE;
 use super::spectrum::{Rate, Spectrum};
-use super::work::{self, Form};
+use super::work::{Sizes, Taylor, Term, Work};
 
 /// Halvings of the output step that a table may hold; below it Taylor's series takes over in any case.
 const DEEPEST: u32 = 62;
 
 /// Rounding of a computed guard, in units of 2⁻⁵³ Σ |row| |w|.
 const NOISE: f64 = 16.0;
-
-/// Power out of sources and into what dissipates, and their integrals over steps.
-#[derive(Debug, Clone)]
-struct Power {
-    matrices: [DMatrix<f64>; 2],
-    instant: [Form; 2],
-    levels: Vec<Option<[Form; 2]>>,
-}
 
 /// exp(𝒜 h/2^k) for the levels k that were needed, Taylor's series below, and guard rows with their derivative.
 ///
@@ -39,7 +31,7 @@ pub(crate) struct Flow {
     bottom: u32,
     levels: Vec<Option<Kernel>>,
     spectrum: Spectrum,
-    power: Option<Power>,
+    work: Option<Work>,
     /// Largest loss that an exponential reported.
     pub(crate) loss: f64,
 }
@@ -79,7 +71,7 @@ impl Flow {
             bottom,
             levels: vec![None; bottom as usize + 1],
             spectrum,
-            power: None,
+            work: None,
             loss: 0.0,
         })
     }
@@ -150,71 +142,44 @@ impl Flow {
         true
     }
 
-    /// Adds the quadratic forms (power out of sources, power dissipated) whose integrals [`Self::energy`] gives.
-    pub(crate) fn set_power(&mut self, matrices: [DMatrix<f64>; 2]) {
-        let instant = [Form::new(&matrices[0]), Form::new(&matrices[1])];
-        self.power = Some(Power {
-            matrices,
-            instant,
-            levels: vec![None; self.levels.len()],
-        });
+    /// Has the energy of these products integrated along the flow.
+    pub(crate) fn set_work(&mut self, terms: Vec<Term>) {
+        self.work = Work::new(terms, self.h, self.bottom);
     }
 
-    /// (from sources, dissipated) over the step h/2^level from w, J.
+    /// Whether there is energy to integrate.
     #[inline]
-    pub(crate) fn energy(&mut self, level: u32, w: &[f64]) -> [f64; 2] {
-        let Some(power) = &self.power else {
-            return [0.0; 2];
-        };
-        if let Some(forms) = &power.levels[level as usize] {
-            return [forms[0].value(w), forms[1].value(w)];
-        }
-        self.integrate_forms(level);
-        self.energy(level, w)
+    pub(crate) fn works(&self) -> bool {
+        self.work.is_some()
     }
 
-    /// Gramians from the deepest level up: 𝒢(2h) = 𝒢(h) + Φ(h)ᵀ 𝒢(h) Φ(h).
-    #[cold]
-    fn integrate_forms(&mut self, level: u32) {
-        let Some(power) = &mut self.power else { return };
-        let mut grams = power.matrices.each_ref().map(|q| {
-            work::gramian(
-                &self.generator,
-                q,
-                self.h * (-f64::from(self.bottom)).exp2(),
-            )
-        });
-        let mut at = self.bottom;
-        loop {
-            if power.levels[at as usize].is_none() {
-                power.levels[at as usize] = Some(grams.each_ref().map(Form::new));
-            }
-            if at <= level {
-                break;
-            }
-            let step = self.h * (-f64::from(at)).exp2();
-            if let Some(Exponential { increment, .. }) = expm::exponential(&self.generator, step) {
-                let matrix = increment + DMatrix::identity(self.dim, self.dim);
-                for gram in &mut grams {
-                    let moved = matrix.transpose() * &*gram * &matrix;
-                    *gram += moved;
-                }
-            }
-            at -= 1;
-        }
+    /// (from sources, dissipated) over 2^k steps of the deepest level from w, J.
+    pub(crate) fn energy(&mut self, k: u32, w: &[f64], sizes: Sizes<'_>) -> [f64; 2] {
+        let generator = &self.generator;
+        self.work
+            .as_mut()
+            .map_or([0.0; 2], |work| work.over(k, w, generator, sizes))
     }
 
-    /// (from sources, dissipated) over the fraction `part` of a Taylor step dt, J; `w` is work space of length dim.
+    /// See [`Work::may_join`].
+    #[inline]
+    pub(crate) fn may_join(&mut self, k: u32, sizes: Sizes<'_>) -> bool {
+        let generator = &self.generator;
+        self.work
+            .as_mut()
+            .is_some_and(|work| work.may_join(k, generator, sizes))
+    }
+
+    /// (from sources, dissipated) along a Taylor polynomial, J; `w` is work space of length dim.
     pub(crate) fn energy_of_taylor(
-        &self,
-        terms: &[f64],
-        degree: usize,
-        dt: f64,
-        part: f64,
+        &mut self,
+        polynomial: Taylor<'_>,
+        sizes: Sizes<'_>,
         w: &mut [f64],
     ) -> [f64; 2] {
-        self.power.as_ref().map_or([0.0; 2], |power| {
-            work::along_taylor(&power.instant, terms, degree, dt, part, w)
+        let generator = &self.generator;
+        self.work.as_mut().map_or([0.0; 2], |work| {
+            work.along_taylor(polynomial, generator, sizes, w)
         })
     }
 

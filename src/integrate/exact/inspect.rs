@@ -33,6 +33,9 @@ pub(crate) struct Inspector {
     pub(crate) amplitude: Vec<f64>,
     w: Vec<f64>,
     s: Vec<f64>,
+    /// w with the sources a few units in the last place of t later, and the storage there.
+    later: Vec<f64>,
+    s_later: Vec<f64>,
 }
 
 impl Inspector {
@@ -69,13 +72,16 @@ impl Inspector {
         self.w.resize(mode.flow.dim(), 0.0);
         exosystem.write(t, &mut self.w[n..]);
         mode.storage_at(&self.w, &mut self.s);
-        if self
-            .s
-            .iter()
-            .zip(s)
-            .zip(scale)
-            .any(|((a, b), size)| (a - b).abs() > CONSISTENT * size)
-        {
+        // What the sources move within the resolution of t: at 1 V/ps that is a millivolt where t is a second.
+        let time = TIME_ULPS * f64::EPSILON * t.abs();
+        self.later.clone_from(&self.w);
+        exosystem.write(t + time, &mut self.later[n..]);
+        mode.storage_at(&self.later, &mut self.s_later);
+        let moved = (0..s.len()).any(|i| {
+            let drift = (self.s_later[i] - self.s[i]).abs();
+            (self.s[i] - s[i]).abs() > CONSISTENT * scale[i] + drift
+        });
+        if moved {
             return Finding::Inconsistent;
         }
         self.amplitude.clear();
@@ -87,7 +93,7 @@ impl Inspector {
                 .map(|(j, s)| (j * s).abs())
                 .sum::<f64>()
         }));
-        let (w, amplitude) = (&self.w, &self.amplitude);
+        let (w, later, amplitude) = (&self.w, &self.later, &self.amplitude);
         let size = |j: usize| {
             if j < n {
                 amplitude[j].max(w[j].abs())
@@ -96,19 +102,19 @@ impl Inspector {
             }
         };
         let broken = mode.constraints.row_iter().any(|row| {
-            let value: f64 = row.iter().zip(w).map(|(c, w)| c * w).sum();
+            let value = |w: &[f64]| row.iter().zip(w).map(|(c, w)| c * w).sum::<f64>();
             let whole: f64 = row
                 .iter()
                 .enumerate()
                 .map(|(j, c)| (c * size(j)).abs())
                 .sum();
-            value.abs() > CONSISTENT * whole
+            let drift = (value(later) - value(w)).abs();
+            value(w).abs() > CONSISTENT * whole + drift
         });
         if broken {
             return Finding::Inconsistent;
         }
         let m = mode.flow.guards();
-        let time = TIME_ULPS * f64::EPSILON * t.abs();
         let mut leaving = Vec::new();
         for i in 0..m {
             let (mut value, mut noise) = ([0.0; ORDERS], [0.0; ORDERS]);
@@ -130,7 +136,7 @@ impl Inspector {
             if first.is_some_and(|k| value[k] < 0.0) {
                 match mode.owner(i) {
                     Owner::Switch(k) => leaving.push(k),
-                    Owner::Devices | Owner::Slide(..) => return Finding::Refused(i),
+                    Owner::Device(_) | Owner::Slide(..) => return Finding::Refused(i),
                 }
             }
         }

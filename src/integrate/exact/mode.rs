@@ -7,6 +7,7 @@ use super::flow::Flow;
 use super::kernel::Kernel;
 use super::rays;
 use super::schedule::Drive;
+use super::work::Term;
 use crate::integrate::switching::Threshold;
 use crate::lcs::{Lcs, PowerKind, Rows};
 
@@ -45,8 +46,8 @@ impl Key {
 /// Who ends the mode when a guard falls through zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Owner {
-    /// Device pairs (an extreme ray may join several).
-    Devices,
+    /// A device: this pair, or several with it as the first.
+    Device(usize),
     /// A switch.
     Switch(usize),
     /// A switch on its threshold, which ends fully on or off.
@@ -75,8 +76,8 @@ pub(crate) struct Mode {
     pub(crate) flow: Flow,
     /// Guard rows over w and their first three derivatives.
     pub(crate) jets: [DMatrix<f64>; 4],
-    /// Number of guards that belong to devices.
-    pub(crate) device_guards: usize,
+    /// Guards that belong to devices: the first pair of each.
+    pub(crate) device_guards: Vec<usize>,
     /// Switch of each further guard; two guards for each sliding switch follow.
     pub(crate) guarded_switches: Vec<usize>,
     /// What must vanish for the mode to exist, over w; with the first two derivatives below it.
@@ -144,12 +145,20 @@ impl Mode {
 
         let held = over_w(&lcs.held.guard, n, exosystem);
         let shared = lcs.held.kernel.ncols() > 0;
-        let devices = if shared {
-            rays::extreme_rays(&lcs.held.kernel)? * held
-        } else {
-            held
+        let rays = shared.then(|| rays::extreme_rays(&lcs.held.kernel));
+        let devices = match rays {
+            Some(ref rays) => rays.as_ref()? * held,
+            None => held,
         };
-        let devices = distinct(&devices);
+        let kept = distinct(&devices);
+        let devices = devices.select_rows(&kept);
+        let device_guards = match &rays {
+            Some(Some(rays)) => {
+                let first = |&ray: &usize| rays.row(ray).iter().position(|r| *r != 0.0);
+                kept.iter().map(|ray| first(ray).unwrap_or(0)).collect()
+            }
+            _ => kept,
+        };
         let slides = key.sliding_switches();
         let published: Vec<usize> = (0..thresholds.len())
             .filter(|i| !slides.contains(i))
@@ -206,8 +215,8 @@ impl Mode {
         let second = &first * &generator;
         let third = &second * &generator;
         let mut flow = Flow::new(generator, n, &guards, h, exosystem.rates())?;
-        if let Some(forms) = power_forms(lcs, n, exosystem).filter(|_| energy) {
-            flow.set_power(forms);
+        if energy {
+            flow.set_work(work(lcs, n, exosystem));
         }
 
         let c0 = over_w(&lcs.held.constraints, n, exosystem);
@@ -232,7 +241,7 @@ impl Mode {
             key,
             n,
             jets: [guards, first, second, third],
-            device_guards: devices.nrows(),
+            device_guards,
             guarded_switches,
             constraints,
             storage,
@@ -246,8 +255,8 @@ impl Mode {
 
     /// Who a guard belongs to.
     pub(crate) fn owner(&self, guard: usize) -> Owner {
-        let Some(k) = guard.checked_sub(self.device_guards) else {
-            return Owner::Devices;
+        let Some(k) = guard.checked_sub(self.device_guards.len()) else {
+            return Owner::Device(self.device_guards[guard]);
         };
         match k.checked_sub(self.guarded_switches.len()) {
             None => Owner::Switch(self.guarded_switches[k]),
@@ -282,7 +291,7 @@ impl Mode {
 }
 
 /// The rows that are no positive multiple of an earlier one: equal guards fall together.
-fn distinct(rows: &DMatrix<f64>) -> DMatrix<f64> {
+fn distinct(rows: &DMatrix<f64>) -> Vec<usize> {
     /// Entries that agree to this part of themselves are equal.
     const EQUAL: f64 = 1e-14;
     let mut kept: Vec<(usize, f64)> = Vec::new();
@@ -298,26 +307,20 @@ fn distinct(rows: &DMatrix<f64>) -> DMatrix<f64> {
             kept.push((i, size));
         }
     }
-    DMatrix::from_fn(kept.len(), rows.ncols(), |i, j| rows[(kept[i].0, j)])
+    kept.into_iter().map(|(i, _)| i).collect()
 }
 
-/// Quadratic forms of the power out of sources and into what dissipates, over w.
-fn power_forms(lcs: &Lcs, n: usize, exosystem: &Exosystem) -> Option<[DMatrix<f64>; 2]> {
-    let terms = &lcs.outputs.power;
-    if terms.is_empty() {
-        return None;
-    }
+/// What sources deliver and what dissipates, over w.
+fn work(lcs: &Lcs, n: usize, exosystem: &Exosystem) -> Vec<Term> {
     let v = over_w(&lcs.outputs.power_v, n, exosystem);
     let i = over_w(&lcs.outputs.power_i, n, exosystem);
-    let dim = n + exosystem.dim();
-    let mut forms = [DMatrix::zeros(dim, dim), DMatrix::zeros(dim, dim)];
-    for (k, term) in terms.iter().enumerate() {
-        let product = v.row(k).transpose() * i.row(k);
-        let symmetric = (&product + product.transpose()) * 0.5;
-        match term.kind {
-            PowerKind::Source => forms[0] -= symmetric,
-            PowerKind::Dissipated => forms[1] += symmetric,
-        }
-    }
-    Some(forms)
+    let row = |m: &DMatrix<f64>, k: usize| m.row(k).iter().copied().collect();
+    let terms = lcs.outputs.power.iter().enumerate();
+    terms
+        .map(|(k, term)| Term {
+            v: row(&v, k),
+            i: row(&i, k),
+            source: term.kind == PowerKind::Source,
+        })
+        .collect()
 }

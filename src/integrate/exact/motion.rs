@@ -3,6 +3,8 @@
 use super::exosystem::Exosystem;
 use super::flow::Flow;
 use super::polynomial;
+use super::spans::Spans;
+use super::work::{Sizes, Taylor};
 
 /// Table steps after which the exosystem is set from its closed form again.
 const REFRESH: u32 = 64;
@@ -42,8 +44,11 @@ pub(crate) struct Motion {
     pub(crate) entered: f64,
     /// Steps taken.
     pub(crate) steps: u64,
-    /// Energy from sources and energy dissipated since last taken, J.
-    pub(crate) energy: [f64; 2],
+    /// Energy from sources and energy dissipated on Taylor's steps since last taken, J.
+    energy: [f64; 2],
+    spans: Spans,
+    /// Energy of the run over its duration, W.
+    pub(crate) power: f64,
     next: Vec<f64>,
     terms: Vec<f64>,
     polynomials: Vec<f64>,
@@ -93,11 +98,27 @@ impl Motion {
         self.amplitude.clear();
         self.amplitude.extend_from_slice(amplitude);
         self.amplitude.resize(flow.dim(), 0.0);
+        let (z, sizes) = (
+            &self.now[x.len()..flow.dim()],
+            &mut self.amplitude[x.len()..],
+        );
+        exosystem.envelope(z, sizes);
         self.steady = flow.guards() == 0;
         let guards = &self.now[flow.dim()..flow.dim() + flow.guards()];
         self.slack.clear();
         self.slack.extend(guards.iter().map(|g| (-g).max(0.0)));
         self.refresh_noise(flow);
+    }
+
+    /// Energy from sources and energy dissipated since last taken, J.
+    pub(crate) fn take_energy(&mut self, flow: &mut Flow) -> [f64; 2] {
+        let mut energy = std::mem::take(&mut self.energy);
+        let sizes = Sizes {
+            amplitude: &self.amplitude,
+            power: self.power,
+        };
+        self.spans.drain(flow, sizes, &mut energy);
+        energy
     }
 
     #[inline]
@@ -119,10 +140,10 @@ impl Motion {
         self.since_refresh = 0;
     }
 
-    /// Largest value a combination of states can have had on the way here.
+    /// Largest value a combination of w can have had on the way here.
     pub(crate) fn reach<'r>(&self, row: impl IntoIterator<Item = &'r f64>) -> f64 {
         row.into_iter()
-            .zip(&self.peak)
+            .zip(self.peak.iter().chain(&self.amplitude[self.peak.len()..]))
             .map(|(c, a)| (c * a).abs())
             .sum()
     }
@@ -216,7 +237,7 @@ impl Motion {
     }
 
     /// One Taylor step to `end`, at most h/2^K away; every guard is followed as a polynomial, so nothing hides.
-    fn taylor(&mut self, flow: &Flow, exosystem: &Exosystem, end: f64) -> Arrival {
+    fn taylor(&mut self, flow: &mut Flow, exosystem: &Exosystem, end: f64) -> Arrival {
         let dt = end - self.t;
         let (dim, m) = (flow.dim(), flow.guards());
         self.degree = flow.taylor(&self.now, dt, &mut self.terms);
@@ -247,10 +268,23 @@ impl Motion {
         } else {
             end
         };
-        let [source, dissipated] =
-            flow.energy_of_taylor(&self.terms, self.degree, dt, s, &mut self.next[..dim]);
-        self.energy[0] += source;
-        self.energy[1] += dissipated;
+        if flow.works() {
+            let polynomial = Taylor {
+                terms: &self.terms,
+                degree: self.degree,
+                h: dt,
+                part: s,
+            };
+            let sizes = Sizes {
+                amplitude: &self.amplitude,
+                power: self.power,
+            };
+            let [source, dissipated] =
+                flow.energy_of_taylor(polynomial, sizes, &mut self.next[..dim]);
+            self.energy[0] += source;
+            self.energy[1] += dissipated;
+            self.spans.part();
+        }
         flow.sum(&self.terms, self.degree, s, &mut self.next);
         self.next[dim..].copy_from_slice(&self.now[dim..]);
         std::mem::swap(&mut self.now, &mut self.next);
@@ -290,9 +324,14 @@ impl Motion {
 
     #[inline]
     fn accept(&mut self, flow: &mut Flow, exosystem: &Exosystem, level: u32, t: f64) {
-        let [source, dissipated] = flow.energy(level, &self.now);
-        self.energy[0] += source;
-        self.energy[1] += dissipated;
+        if flow.works() {
+            let k = flow.bottom() - level;
+            let sizes = Sizes {
+                amplitude: &self.amplitude,
+                power: self.power,
+            };
+            self.spans.push(k, &self.now, flow, sizes);
+        }
         std::mem::swap(&mut self.now, &mut self.next);
         self.note_peak();
         self.t = t;

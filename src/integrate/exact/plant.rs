@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::assembler::Assembler;
+use super::assembler::{Assembler, Step};
 use super::exosystem::Exosystem;
 use super::free::Free;
 use super::mode::{Key, Mode, SwitchFacts};
@@ -91,6 +91,21 @@ impl<'a> Plant<'a> {
         });
         self.index.insert(key.clone(), at);
         at
+    }
+
+    /// Where function blocks jump.
+    pub(crate) fn steps(&self) -> &[Step] {
+        self.assembler.steps()
+    }
+
+    /// Distance of output times, s.
+    pub(crate) fn output_step(&self) -> f64 {
+        self.h
+    }
+
+    /// The device of a pair.
+    pub(crate) fn device(&self, pair: usize) -> Option<&str> {
+        self.assembler.device(pair)
     }
 
     /// The fastest rate seen, 1/s.

@@ -53,20 +53,39 @@ impl Exact<'_> {
         Ok(())
     }
 
-    /// Keeps account of switches that start or end to slide on entering mode `at`, or at the end of the run.
+    /// Whether some probe has another value in the present row than `before`, by more than rounding.
+    pub(super) fn row_jumps(&self, before: &[f64]) -> bool {
+        /// Relative to the largest value of one kind in both rows.
+        const ROUNDING: f64 = 1e-9;
+        [true, false].into_iter().any(|volts| {
+            let of_kind = || {
+                let rows = before.iter().zip(&self.row).zip(&self.row_is_volts);
+                rows.filter(move |(_, v)| **v == volts)
+                    .map(|(pair, _)| pair)
+            };
+            let largest = of_kind().fold(0.0_f64, |m, (a, b)| m.max(a.abs()).max(b.abs()));
+            of_kind().any(|(a, b)| (a - b).abs() > ROUNDING * largest)
+        })
+    }
+
+    /// Keeps account of what starts or ends to slide on entering mode `at`: switches on their thresholds, function blocks on
+    /// their steps.
     pub(super) fn note_slides(&mut self, at: usize) {
         let t = self.motion.t;
-        let now = &self.plant.modes[at].key.sliding;
-        for &(i, _) in &self.key.sliding {
-            if let Some(slides) = self
-                .slides
-                .get_mut(&i)
-                .filter(|_| now.iter().all(|s| s.0 != i))
-            {
+        let key = &self.plant.modes[at].key;
+        let switches = key.sliding.iter().map(|s| s.0);
+        let after = self.plant.thresholds.len();
+        let on_step = |pair: usize| key.closed[pair] && !key.closed[pair + 1];
+        let steps = self.plant.steps().iter().enumerate();
+        let blocks = steps
+            .filter(|(_, s)| on_step(s.pair))
+            .map(|(k, _)| after + k);
+        for (&i, slides) in &mut self.slides {
+            if slides.since.is_some() && !switches.clone().chain(blocks.clone()).any(|j| j == i) {
                 slides.seconds += t - slides.since.take().unwrap_or(t);
             }
         }
-        for &(i, _) in now {
+        for i in switches.chain(blocks) {
             let slides = self.slides.entry(i).or_insert(Slides {
                 first: t,
                 ..Slides::default()
@@ -76,6 +95,15 @@ impl Exact<'_> {
                 slides.count += 1;
             }
         }
+    }
+
+    /// Ends all slides now, where the run is left to another method.
+    pub(super) fn close_slides(&mut self) {
+        let t = self.motion.t;
+        for slides in self.slides.values_mut() {
+            slides.seconds += t - slides.since.take().unwrap_or(t);
+        }
+        self.key.sliding.clear();
     }
 
     /// Names of what differs between the present mode and another.
@@ -105,12 +133,22 @@ impl Exact<'_> {
     /// Notes about the run as a whole.
     pub(super) fn note_end(&mut self) {
         self.notes.extend(self.accumulation.end());
+        let thresholds = &self.plant.thresholds;
         for (&i, slides) in &self.slides {
             let seconds = slides.seconds + slides.since.map_or(0.0, |since| self.motion.t - since);
+            let what = match thresholds.get(i) {
+                Some(switch) => format!(
+                    "{} slides on its threshold, where closing and opening contradict each other",
+                    switch.name
+                ),
+                None => format!(
+                    "{} slides: its input stays where its output jumps, and the output is in between",
+                    self.plant.steps()[i - thresholds.len()].device
+                ),
+            };
             self.notes.push(format!(
-                "{} slides on its threshold, where closing and opening contradict each other: {} times, first at t = {:e} s, \
-                 {seconds:e} s in all",
-                self.plant.thresholds[i].name, slides.count, slides.first
+                "{what}: {} times, first at t = {:e} s, {seconds:e} s in all",
+                slides.count, slides.first
             ));
         }
         let loss = self

@@ -55,6 +55,26 @@ impl Drive {
         self.row.iter().zip(z).map(|(r, z)| r * z).sum()
     }
 
+    /// Whether the switch cannot stay where it is with the sources at z at time t: the control is beyond the threshold by more
+    /// than rounding.
+    pub(crate) fn misplaced(&self, threshold: &Threshold, on: bool, t: f64, z: &[f64]) -> bool {
+        /// Roundings of a control and of the time at which it passes its threshold.
+        const ROUNDINGS: f64 = 64.0;
+        let dot = |row: &[f64]| -> (f64, f64) {
+            let terms = row.iter().zip(z).map(|(r, z)| r * z);
+            terms.fold((0.0, 0.0), |(sum, size), term| {
+                (sum + term, size + term.abs())
+            })
+        };
+        let ((control, size), (slope, _)) = (dot(&self.row), dot(&self.slope));
+        let noise = ROUNDINGS * f64::EPSILON * (size + (slope * t).abs());
+        if on {
+            control < threshold.off_below - noise
+        } else {
+            control > threshold.on_above + noise
+        }
+    }
+
     /// Finds the next passage after t, where the sources stand at z and their pieces last until `end`.
     pub(crate) fn look_ahead(
         &mut self,

@@ -10,6 +10,7 @@ use super::exosystem::Exosystem;
 use super::inspect::Inspector;
 use super::mode::{Key, Owner};
 use super::motion::{Arrival, Motion};
+use super::pause::Before;
 use super::plant::Plant;
 use super::report::Slides;
 use super::schedule::drives;
@@ -56,6 +57,8 @@ pub struct Exact<'a> {
     /// Largest values of the storage elements so far, levelled by kind.
     pub(super) scale: Vec<f64>,
     pub(super) volts: Vec<bool>,
+    /// What a change that fails gives back, and where the switches would have stood after it.
+    pub(super) before_change: Before,
     /// z at the last breakpoint.
     pub(super) z: Vec<f64>,
     /// u before the last breakpoint.
@@ -68,6 +71,8 @@ pub struct Exact<'a> {
     /// What followed: (mode left, why, mode entered), latest last.
     pub(super) successors: Vec<(usize, Trigger, usize)>,
     pub(super) metric: DMatrix<f64>,
+    /// From start to end, s.
+    pub(super) duration: f64,
     pub(super) started: bool,
     pub(super) settings: Settings,
     pub(super) energy: bool,
@@ -78,9 +83,11 @@ pub struct Exact<'a> {
     pub(super) notes: Vec<String>,
     pub(super) accumulation: Accumulation,
     pub(super) noted_shared: bool,
-    /// By switch: times it slid, since when it slides, seconds in all, start of the first.
+    /// By switch, then by step of a function block: when it slid.
     pub(super) slides: BTreeMap<usize, Slides>,
     pub(super) row: Vec<f64>,
+    /// By probe: a voltage.
+    pub(super) row_is_volts: Vec<bool>,
 }
 
 impl<'a> Exact<'a> {
@@ -141,6 +148,7 @@ impl<'a> Exact<'a> {
             storage: start.as_slice().to_vec(),
             scale: vec![0.0; start.len()],
             volts,
+            before_change: Before::default(),
             z,
             before: DVector::zeros(sources_count),
             labels: BTreeMap::new(),
@@ -148,6 +156,7 @@ impl<'a> Exact<'a> {
             instant: t,
             successors: Vec::new(),
             metric,
+            duration: until - t,
             started: false,
             settings,
             energy,
@@ -160,6 +169,7 @@ impl<'a> Exact<'a> {
             noted_shared: false,
             slides: BTreeMap::new(),
             row: vec![0.0; columns],
+            row_is_volts: lcs.outputs.units.iter().map(|u| *u == "V").collect(),
         };
         exact.rescale();
         Ok(exact)
@@ -206,21 +216,33 @@ impl<'a> Exact<'a> {
     }
 
     /// Reads the storage vector at the current state.
-    fn take_storage(&mut self) {
+    pub(super) fn take_storage(&mut self) {
         if let Some(at) = self.mode {
-            let mode = &self.plant.modes[at];
+            let mode = &mut self.plant.modes[at];
+            let [source, dissipated] = self.motion.take_energy(&mut mode.flow);
+            self.balance.add((source, dissipated));
             mode.storage_at(&self.motion.now, &mut self.storage);
             // An event often finds a current at zero: its size is what it was on the way.
             for (i, scale) in self.scale.iter_mut().enumerate() {
-                *scale = scale.max(self.motion.reach(mode.storage.row(i).columns(0, mode.n)));
+                *scale = scale.max(self.motion.reach(mode.storage.row(i).iter()));
             }
             self.rescale();
-            let [source, dissipated] = std::mem::take(&mut self.motion.energy);
-            self.balance.add((source, dissipated));
-            if self.energy {
-                let s = DVector::from_column_slice(&self.storage);
-                self.balance.note(0.5 * s.dot(&(&self.metric * &s)));
-            }
+            self.note_stored();
+        }
+    }
+
+    /// Energy that the run is about over its duration, W.
+    pub(super) fn power(&self) -> f64 {
+        let s = DVector::from_column_slice(&self.scale);
+        let stored = 0.5 * s.dot(&(&self.metric * &s));
+        stored.max(self.balance.largest()) / self.duration
+    }
+
+    /// Notes the stored energy.
+    pub(super) fn note_stored(&mut self) {
+        if self.energy {
+            let s = DVector::from_column_slice(&self.storage);
+            self.balance.note(0.5 * s.dot(&(&self.metric * &s)));
         }
     }
 
@@ -232,7 +254,7 @@ impl<'a> Exact<'a> {
         let mut key = self.key.clone();
         let mut discontinuous = false;
         match self.plant.modes[from].owner(guard) {
-            Owner::Devices => {}
+            Owner::Device(_) => {}
             Owner::Switch(i) => {
                 key.switches[i] = !key.switches[i];
                 discontinuous = true;
@@ -257,7 +279,7 @@ impl<'a> Exact<'a> {
     }
 
     /// Keeps u as it is now, for the work of sources in a jump.
-    fn remember_inputs(&mut self) {
+    pub(super) fn remember_inputs(&mut self) {
         self.exosystem.write(self.motion.t, &mut self.z);
         let h = self.exosystem.output();
         for (u, row) in self.before.iter_mut().zip(h.row_iter()) {
@@ -359,7 +381,14 @@ impl Stepper for Exact<'_> {
             {
                 Arrival::Reached if due => self.breakpoint(log)?,
                 Arrival::Reached => return Ok(()),
-                Arrival::Fired(guard) => self.fired(guard, log)?,
+                Arrival::Fired(guard) => {
+                    self.fired(guard, log)?;
+                    let (t, h) = (self.motion.t, self.plant.output_step());
+                    if let Some((events, span)) = self.accumulation.burst(t, h) {
+                        let error = self.fail(Reason::EventsAccumulate { events, span });
+                        return Err(error.device(self.owner_name(at, guard)));
+                    }
+                }
                 Arrival::Overflow => return Err(self.fail(Reason::Overflow)),
             }
             if self.motion.steps > self.settings.max_steps {

@@ -2,7 +2,8 @@
 
 use super::free::Degenerate;
 use super::inspect::{Finding, Inspector};
-use super::mode::Key;
+use super::mode::{Key, Owner};
+use super::schedule::Drive;
 use super::stepper::Exact;
 use crate::integrate::run::{Log, Reason, SimError};
 
@@ -26,8 +27,34 @@ pub(crate) enum Trigger {
 }
 
 impl Exact<'_> {
-    /// Finds the mode from here on: positions of the switches, impulse of the devices, conducting devices.
+    /// Enters the mode from here on. Where there is none, everything is as it was before.
     pub(super) fn change(
+        &mut self,
+        key: Key,
+        discontinuous: bool,
+        trigger: Trigger,
+        log: &mut Log,
+    ) -> Result<(), SimError> {
+        let before = &mut self.before_change;
+        before.storage.clone_from(&self.storage);
+        before.scale.clone_from(&self.scale);
+        before.switches.clone_from(&key.switches);
+        before.balance = self.balance;
+        let (events, impulses) = (log.events.len(), log.impulses.len());
+        let result = self.enter(key, discontinuous, trigger, log);
+        if result.is_err() {
+            self.storage.clone_from(&self.before_change.storage);
+            self.scale.clone_from(&self.before_change.scale);
+            self.balance = self.before_change.balance;
+            log.back_to(events, impulses);
+        } else {
+            self.before_change.switches.clone_from(&self.key.switches);
+        }
+        result
+    }
+
+    /// Finds the mode: positions of the switches, impulse of the devices, conducting devices.
+    fn enter(
         &mut self,
         mut key: Key,
         mut discontinuous: bool,
@@ -44,6 +71,7 @@ impl Exact<'_> {
         let mut positions = vec![key.switches.clone()];
         let mut closed_sets: Vec<Vec<bool>> = Vec::new();
         let mut entry = None;
+        let mut moving: Vec<usize> = Vec::new();
         for _ in 0..3 + 2 * self.plant.thresholds.len() {
             // A device event in a convex circuit is continuous; an edge or a switch may need an impulse.
             let mut found = self.follow(&key, trigger);
@@ -63,10 +91,12 @@ impl Exact<'_> {
                 found = self.jump_into(&key, log)?;
                 jumped |= found.is_some();
             }
-            let Some((at, leaving)) = found else {
-                return Err(self.fail(Reason::Infeasible));
+            let Some((at, mut leaving)) = found else {
+                let device = self.culprit(&key, trigger);
+                return Err(self.fail(Reason::Infeasible).device(device));
             };
             key.closed.clone_from(&self.plant.modes[at].key.closed);
+            leaving.extend(self.misplaced(at));
             if leaving.is_empty() {
                 entry = Some(at);
                 break;
@@ -74,20 +104,24 @@ impl Exact<'_> {
             closed_sets.push(key.closed.clone());
             for &i in &leaving {
                 key.switches[i] = !key.switches[i];
+                if !moving.contains(&i) {
+                    moving.push(i);
+                }
             }
             if positions.contains(&key.switches) {
-                entry = self.slide(&key, &leaving, &closed_sets);
+                // The switches that moved last contradict themselves, or all that moved contradict each other.
+                entry = self
+                    .slide(&key, &leaving, &closed_sets)
+                    .or_else(|| self.slide(&key, &moving, &closed_sets));
                 break;
             }
             positions.push(key.switches.clone());
             discontinuous = true;
         }
         let Some(at) = entry else {
-            let names: Vec<&str> = self
-                .plant
-                .thresholds
+            let names: Vec<&str> = moving
                 .iter()
-                .map(|t| t.name.as_str())
+                .map(|&i| self.plant.thresholds[i].name.as_str())
                 .collect();
             return Err(self
                 .fail(Reason::SwitchesDoNotSettle)
@@ -101,6 +135,9 @@ impl Exact<'_> {
         self.note_slides(at);
         self.mode = Some(at);
         self.key.clone_from(&self.plant.modes[at].key);
+        if self.energy {
+            self.motion.power = self.power();
+        }
         let mode = &self.plant.modes[at];
         let Inspector { x, amplitude, .. } = &self.inspector;
         self.motion
@@ -109,23 +146,74 @@ impl Exact<'_> {
         if jumped {
             self.jumps += 1;
         }
-        if let Some(row) = left_row.filter(|_| !same || jumped) {
-            if jumped {
-                log.row(t, &row);
-            }
+        if let Some(before) = left_row {
             self.read_row();
-            log.row(t, &self.row);
+            let jumped = self.row_jumps(&before);
+            if jumped {
+                log.row(t, &before);
+            }
+            if jumped || !same {
+                log.row(t, &self.row);
+            }
         }
         Ok(())
     }
 
+    /// Switches that the sources alone move in mode `at` and that cannot stay as they are: in another position the control
+    /// was another one.
+    fn misplaced(&self, at: usize) -> Vec<usize> {
+        let mode = &self.plant.modes[at];
+        let wrong = |i: usize, drive: &Drive| {
+            let on = mode.key.switches[i];
+            drive.misplaced(&self.plant.thresholds[i], on, self.motion.t, &self.z)
+        };
+        let drives = self.plant.drives.iter().map(|drive| (drive.switch, drive));
+        drives
+            .filter(|(i, drive)| {
+                !mode.guarded_switches.contains(i)
+                    && !mode.key.sliding.iter().any(|s| s.0 == *i)
+                    && wrong(*i, drive)
+            })
+            .map(|(i, _)| i)
+            .collect()
+    }
+
+    /// The device or switches at which no mode goes on.
+    fn culprit(&mut self, key: &Key, trigger: Trigger) -> String {
+        let moved: Vec<&str> = (0..key.switches.len())
+            .filter(|&i| self.key.switches.get(i) != key.switches.get(i))
+            .map(|i| self.plant.thresholds[i].name.as_str())
+            .collect();
+        if !moved.is_empty() {
+            return moved.join(", ");
+        }
+        let guard = match (trigger, self.mode) {
+            (Trigger::Guard(guard), Some(from)) => Some((from, guard)),
+            _ => self
+                .plant
+                .mode(key, &self.exosystem)
+                .and_then(|at| match self.inspect(at) {
+                    Finding::Refused(guard) => Some((at, guard)),
+                    Finding::Inconsistent | Finding::Holds(_) => None,
+                }),
+        };
+        guard.map_or_else(
+            || self.plant.device(0).unwrap_or("the sources").to_string(),
+            |(at, guard)| self.owner_name(at, guard),
+        )
+    }
+
+    /// The device or switch of a guard of mode `at`.
+    pub(super) fn owner_name(&self, at: usize, guard: usize) -> String {
+        let name = match self.plant.modes[at].owner(guard) {
+            Owner::Switch(i) | Owner::Slide(i, _) => Some(self.plant.thresholds[i].name.as_str()),
+            Owner::Device(pair) => self.plant.device(pair),
+        };
+        name.unwrap_or_default().to_string()
+    }
+
     /// The mode in which these switches stay on their thresholds, where closing and opening contradict each other.
     fn slide(&mut self, key: &Key, switches: &[usize], closed_sets: &[Vec<bool>]) -> Option<usize> {
-        /// Switches that may start to slide together.
-        const MOST: usize = 4;
-        if switches.len() > MOST {
-            return None;
-        }
         let neighbours = closed_sets.iter().flat_map(|set| {
             (0..set.len()).map(|j| {
                 let mut closed = set.clone();
@@ -134,26 +222,35 @@ impl Exact<'_> {
             })
         });
         let candidates: Vec<Vec<bool>> = closed_sets.iter().cloned().chain(neighbours).collect();
-        for closed in candidates {
-            for signs in 0..1_u32 << switches.len() {
-                let mut candidate = key.with_closed(closed.clone());
-                let new = switches
-                    .iter()
-                    .enumerate()
-                    .map(|(k, &i)| (i, signs >> k & 1 == 0));
-                candidate.sliding.extend(new);
-                candidate.sliding.sort_unstable();
-                candidate.sliding.dedup_by_key(|s| s.0);
-                // The position that a sliding switch came from does not matter.
-                for &(i, _) in &candidate.sliding {
-                    candidate.switches[i] = false;
-                }
-                if let Some((at, leaving)) = self.try_key(&candidate, &[])
-                    && leaving.is_empty()
-                {
-                    return Some(at);
-                }
-            }
+        candidates
+            .into_iter()
+            .find_map(|closed| self.slide_with(key.with_closed(closed), switches))
+    }
+
+    /// As [`Self::slide`], with these devices conducting. The flow does not depend on the signs of the switches' voltages and
+    /// currents, so that a sign that is refused is the other one.
+    fn slide_with(&mut self, mut candidate: Key, switches: &[usize]) -> Option<usize> {
+        candidate
+            .sliding
+            .extend(switches.iter().map(|&i| (i, true)));
+        candidate.sliding.sort_unstable();
+        candidate.sliding.dedup_by_key(|s| s.0);
+        // The position that a sliding switch came from does not matter.
+        for &(i, _) in &candidate.sliding {
+            candidate.switches[i] = false;
+        }
+        for _ in 0..=switches.len() {
+            let at = self.plant.mode(&candidate, &self.exosystem)?;
+            let refused = match self.inspect(at) {
+                Finding::Holds(leaving) => return leaving.is_empty().then_some(at),
+                Finding::Refused(guard) => self.plant.modes[at].owner(guard),
+                Finding::Inconsistent => return None,
+            };
+            let Owner::Slide(i, _) = refused else {
+                return None;
+            };
+            let slide = candidate.sliding.iter_mut().find(|s| **s == (i, true))?;
+            slide.1 = false;
         }
         None
     }
@@ -283,15 +380,18 @@ impl Exact<'_> {
         self.try_mode(at).map(|leaving| (at, leaving))
     }
 
-    pub(super) fn try_mode(&mut self, at: usize) -> Option<Vec<usize>> {
-        let mode = &self.plant.modes[at];
-        match self.inspector.inspect(
-            mode,
+    fn inspect(&mut self, at: usize) -> Finding {
+        self.inspector.inspect(
+            &self.plant.modes[at],
             &self.exosystem,
             self.motion.t,
             &self.storage,
             &self.scale,
-        ) {
+        )
+    }
+
+    pub(super) fn try_mode(&mut self, at: usize) -> Option<Vec<usize>> {
+        match self.inspect(at) {
             Finding::Holds(leaving) => Some(leaving),
             Finding::Inconsistent | Finding::Refused(_) => None,
         }

@@ -1,33 +1,65 @@
-//! Energy over a step: ∫ wᵀ Q w dt along the flow, exactly.
+//! Energy along a mode: ∫ v·i dt of sources and of what dissipates, exactly.
+//!
+//! Power is Σ (v·w)(i·w) with rows v, i over w. Where a row has large entries that nearly cancel along the solution (an
+//! amplifier's inputs, a node behind a small resistance), a quadratic form of w would lose the square of that factor. So the
+//! forms are taken over y = T w, where T comes from the pivoted QR factorisation of the rows themselves: what the rows see
+//! is then a coordinate and no difference.
 
 use nalgebra::DMatrix;
 
-/// Terms of the series of a Gramian over a step with ‖𝒜‖ h ≤ 1: 2^k/k! is below rounding beyond.
-const TERMS: usize = 30;
+use super::expm;
+use super::kernel::Kernel;
 
-/// Nodes and weights of Gauss-Legendre's rule with 8 points on [0, 1]; exact to degree 15, and to 1e-18 for products of two
-/// exponentials over one radius of contraction.
-const GAUSS: [(f64, f64); 8] = [
-    (0.019855071751231884, 0.05061426814518813),
-    (0.10166676129318664, 0.11119051722668724),
-    (0.2372337950418355, 0.15685332293894363),
-    (0.4082826787521751, 0.181341891689181),
-    (0.591717321247825, 0.181341891689181),
-    (0.7627662049581645, 0.15685332293894363),
-    (0.8983332387068134, 0.11119051722668724),
-    (0.9801449282487681, 0.05061426814518813),
+/// ‖𝒜‖ h up to which the series over a step is summed; longer steps follow by doubling.
+const SERIES: f64 = 0.125;
+/// Terms of the series; (2·0.125)^k/k! is below rounding beyond, in every entry: their sizes are not comparable.
+const TERMS: usize = 15;
+/// ‖𝒜‖ t beyond which exp(𝒜t) is no longer squared but computed anew: what squaring loses is 2⁻⁵³ ‖𝒜‖ t.
+const STIFF: f64 = 1e5;
+/// Spans are joined while no coordinate can grow by more than this over them.
+const GROWTH: f64 = 1e6;
+/// Spans are joined up to 2^this times the output step.
+const LONGEST: u32 = 12;
+/// Rounding of a power below this part of the run's is no loss.
+const HARMLESS: f64 = 1e-13;
+/// Rows below this part of the largest are rounding.
+const NOTHING: f64 = 1e-13;
+
+/// Nodes and weights of Gauss-Legendre's rules with 3, 5 and 8 points on [0, 1]. With d Taylor terms above rounding, d/2 + 1
+/// points integrate the product of two such series to rounding.
+const GAUSS: [&[(f64, f64)]; 3] = [
+    &[
+        (0.1127016653792583, 0.2777777777777778),
+        (0.5, 0.4444444444444444),
+        (0.8872983346207417, 0.2777777777777778),
+    ],
+    &[
+        (0.04691007703066802, 0.11846344252809454),
+        (0.23076534494715845, 0.23931433524968324),
+        (0.5, 0.28444444444444444),
+        (0.7692346550528415, 0.23931433524968324),
+        (0.9530899229693319, 0.11846344252809454),
+    ],
+    &[
+        (0.019855071751231884, 0.05061426814518813),
+        (0.10166676129318664, 0.11119051722668724),
+        (0.2372337950418355, 0.15685332293894363),
+        (0.4082826787521751, 0.181341891689181),
+        (0.591717321247825, 0.181341891689181),
+        (0.7627662049581645, 0.15685332293894363),
+        (0.8983332387068134, 0.11119051722668724),
+        (0.9801449282487681, 0.05061426814518813),
+    ],
 ];
 
-/// A quadratic form wᵀ Q w, upper triangle row by row with doubled off-diagonal entries.
+/// A quadratic form yᵀ Q y, upper triangle row by row with doubled off-diagonal entries.
 #[derive(Debug, Clone)]
-pub(crate) struct Form {
-    dim: usize,
+struct Form {
     packed: Vec<f64>,
 }
 
 impl Form {
-    /// Packs a symmetric matrix.
-    pub(crate) fn new(q: &DMatrix<f64>) -> Self {
+    fn new(q: &DMatrix<f64>) -> Self {
         let dim = q.nrows();
         let packed = (0..dim)
             .flat_map(|i| (i..dim).map(move |j| (i, j)))
@@ -39,78 +71,377 @@ impl Form {
                 }
             })
             .collect();
-        Self { dim, packed }
+        Self { packed }
     }
 
-    /// wᵀ Q w.
     #[inline]
-    pub(crate) fn value(&self, w: &[f64]) -> f64 {
+    fn value(&self, y: &[f64]) -> f64 {
         let mut rest = &self.packed[..];
         let mut sum = 0.0;
-        for i in 0..self.dim {
-            let (row, tail) = rest.split_at(self.dim - i);
-            sum += w[i] * row.iter().zip(&w[i..]).map(|(q, w)| q * w).sum::<f64>();
+        for i in 0..y.len() {
+            let (row, tail) = rest.split_at(y.len() - i);
+            sum += y[i] * row.iter().zip(&y[i..]).map(|(q, y)| q * y).sum::<f64>();
             rest = tail;
         }
         sum
     }
 }
 
-/// ∫₀ʰ e^{𝒜ᵀt} Q e^{𝒜t} dt for a step with ‖𝒜‖ h ≤ 1, by its series Q_{k+1} = 𝒜ᵀ Q_k + Q_k 𝒜.
-pub(crate) fn gramian(generator: &DMatrix<f64>, q: &DMatrix<f64>, h: f64) -> DMatrix<f64> {
-    let mut term = q * h;
-    let mut sum = term.clone();
-    for k in 1..TERMS {
-        let product = &term * generator;
-        term = (&product + product.transpose()) * (h / (k as f64 + 1.0));
-        sum += &term;
-    }
-    sum
+/// How large things are in a run.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sizes<'a> {
+    /// |w|.
+    pub(crate) amplitude: &'a [f64],
+    /// Energy of the run over its duration, W; zero where not known.
+    pub(crate) power: f64,
 }
 
-/// ∫ wᵀ Q w dt along a Taylor polynomial w = Σ terms s^k, s = t/h, for two forms.
-/// `part` is the fraction of the polynomial's step, `w` work space of its dimension.
-pub(crate) fn along_taylor(
-    forms: &[Form; 2],
-    terms: &[f64],
-    degree: usize,
-    h: f64,
-    part: f64,
-    w: &mut [f64],
-) -> [f64; 2] {
-    let dim = w.len();
-    let mut sums = [0.0; 2];
-    for (node, weight) in GAUSS {
-        let s = node * part;
-        for (i, out) in w.iter_mut().enumerate() {
-            *out = (0..=degree)
-                .rev()
-                .fold(0.0, |sum, k| sum * s + terms[k * dim + i]);
+/// One product of a voltage and a current.
+#[derive(Debug, Clone)]
+pub(crate) struct Term {
+    /// v over w.
+    pub(crate) v: Vec<f64>,
+    /// i over w.
+    pub(crate) i: Vec<f64>,
+    /// Counts as delivered by a source (with the opposite sign) rather than as dissipated.
+    pub(crate) source: bool,
+}
+
+/// Energy from sources and energy dissipated along w' = 𝒜 w.
+#[derive(Debug, Clone)]
+pub(crate) struct Work {
+    terms: Vec<Term>,
+    /// ‖𝒜‖ is that of the mode; unit of time: h/2^bottom, s.
+    unit: f64,
+    bottom: u32,
+    forms: Option<Forms>,
+}
+
+/// The forms over y = T w, made when first needed.
+#[derive(Debug, Clone)]
+struct Forms {
+    to_y: Kernel,
+    y: Vec<f64>,
+    /// Power out of sources, power dissipated.
+    instant: [Form; 2],
+    /// Their integrals over 2^k units.
+    over: Vec<[Form; 2]>,
+    /// Where `over` ends.
+    latest: Doubling,
+}
+
+/// exp(𝒜t) − I and ∫₀ᵗ exp(𝒜ᵀs) Q exp(𝒜s) ds over y, for t that doubles.
+#[derive(Debug, Clone)]
+struct Doubling {
+    generator: DMatrix<f64>,
+    norm: f64,
+    t: f64,
+    increment: DMatrix<f64>,
+    grams: [DMatrix<f64>; 2],
+    buffers: [DMatrix<f64>; 2],
+}
+
+impl Work {
+    /// For a mode whose table of steps ends at h/2^`bottom`. `None` where nothing takes or gives power.
+    pub(crate) fn new(terms: Vec<Term>, h: f64, bottom: u32) -> Option<Self> {
+        let terms: Vec<Term> = terms
+            .into_iter()
+            .filter(|t| [&t.v, &t.i].iter().all(|row| row.iter().any(|r| *r != 0.0)))
+            .collect();
+        (!terms.is_empty()).then(|| Self {
+            terms,
+            unit: h * (-f64::from(bottom)).exp2(),
+            bottom,
+            forms: None,
+        })
+    }
+
+    fn forms(&mut self, generator: &DMatrix<f64>, sizes: Sizes<'_>) -> &mut Forms {
+        let (terms, unit) = (&self.terms, self.unit);
+        self.forms
+            .get_or_insert_with(|| Forms::new(terms, generator, sizes, unit))
+    }
+
+    /// (from sources, dissipated) over 2^k units from w, J.
+    #[inline]
+    pub(crate) fn over(
+        &mut self,
+        k: u32,
+        w: &[f64],
+        generator: &DMatrix<f64>,
+        sizes: Sizes<'_>,
+    ) -> [f64; 2] {
+        let forms = self.forms(generator, sizes);
+        forms.double_to(k);
+        forms.to_y.apply(w, &mut forms.y);
+        forms.over[k as usize].each_ref().map(|f| f.value(&forms.y))
+    }
+
+    /// Whether two spans of 2^k units may be taken as one of twice the length.
+    pub(crate) fn may_join(&mut self, k: u32, generator: &DMatrix<f64>, sizes: Sizes<'_>) -> bool {
+        let (longest, forms) = (self.bottom + LONGEST, self.forms(generator, sizes));
+        if (k as usize) + 1 < forms.over.len() {
+            return true;
         }
-        for (sum, form) in sums.iter_mut().zip(forms) {
-            *sum += weight * h * part * form.value(w);
+        if k >= longest {
+            return false;
+        }
+        forms.double_to(k);
+        let calm = forms.latest.increment.amax() <= GROWTH;
+        if calm {
+            forms.double_to(k + 1);
+        }
+        calm
+    }
+
+    /// ∫ v·i dt along the Taylor polynomial w = Σ terms s^k, s = t/h, over the fraction `part` of its step h. `w` is work
+    /// space.
+    pub(crate) fn along_taylor(
+        &mut self,
+        polynomial: Taylor<'_>,
+        generator: &DMatrix<f64>,
+        sizes: Sizes<'_>,
+        w: &mut [f64],
+    ) -> [f64; 2] {
+        let Taylor {
+            terms,
+            degree,
+            h,
+            part,
+        } = polynomial;
+        let forms = self.forms(generator, sizes);
+        let dim = w.len();
+        let rule = match degree {
+            0..=4 => GAUSS[0],
+            5..=8 => GAUSS[1],
+            _ => GAUSS[2],
+        };
+        let mut sums = [0.0; 2];
+        for (node, weight) in rule {
+            let s = node * part;
+            for (i, out) in w.iter_mut().enumerate() {
+                *out = (0..=degree)
+                    .rev()
+                    .fold(0.0, |sum, k| sum * s + terms[k * dim + i]);
+            }
+            forms.to_y.apply(w, &mut forms.y);
+            for (sum, form) in sums.iter_mut().zip(&forms.instant) {
+                *sum += weight * h * part * form.value(&forms.y);
+            }
+        }
+        sums
+    }
+}
+
+/// A Taylor polynomial w = Σ terms s^k, s = t/h, of which `part` is travelled.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Taylor<'a> {
+    /// degree + 1 blocks of the dimension of w.
+    pub(crate) terms: &'a [f64],
+    /// Its degree.
+    pub(crate) degree: usize,
+    /// Its step, s.
+    pub(crate) h: f64,
+    /// How much of it counts.
+    pub(crate) part: f64,
+}
+
+impl Forms {
+    fn new(terms: &[Term], generator: &DMatrix<f64>, sizes: Sizes<'_>, unit: f64) -> Self {
+        let dim = generator.nrows();
+        let size: Vec<f64> = sizes
+            .amplitude
+            .iter()
+            .map(|&a| if a > 0.0 { a } else { 1.0 })
+            .collect();
+        // Voltages and currents in the sizes that w takes, of one magnitude each.
+        let count = 2 * terms.len();
+        let mut rows = DMatrix::zeros(count.max(dim), dim);
+        for (k, term) in terms.iter().enumerate() {
+            let norm = |row: &[f64]| {
+                row.iter()
+                    .zip(&size)
+                    .map(|(r, s)| (r * s).abs())
+                    .sum::<f64>()
+            };
+            let alpha = (norm(&term.i) / norm(&term.v)).sqrt();
+            for j in 0..dim {
+                rows[(2 * k, j)] = alpha * term.v[j] * size[j];
+                rows[(2 * k + 1, j)] = term.i[j] / alpha * size[j];
+            }
+        }
+        let qr = rows.clone().col_piv_qr();
+        let mut triangle = qr.r();
+        let mut order = DMatrix::identity(dim, dim);
+        qr.p().permute_columns(&mut order);
+        // Unit rows: the coordinates are scaled below. Where rounding does no harm the coordinates stay those of w, in which
+        // the flow of a graded circuit is accurate.
+        let least = if sizes.power > 0.0 {
+            (HARMLESS * sizes.power / f64::EPSILON).sqrt()
+        } else {
+            NOTHING * triangle[(0, 0)].abs()
+        };
+        for j in 0..dim {
+            let pivot = triangle[(j, j)];
+            let mut row = triangle.row_mut(j);
+            if pivot.abs() > least {
+                row /= pivot;
+            } else {
+                row.fill(0.0);
+                row[j] = 1.0;
+            }
+        }
+        let back = triangle
+            .solve_upper_triangular(&DMatrix::identity(dim, dim))
+            .unwrap_or_else(|| DMatrix::identity(dim, dim));
+        let mut to_y = &triangle * order.transpose();
+        let mut from_y = &order * &back;
+        for (j, &size) in size.iter().enumerate() {
+            to_y.column_mut(j).unscale_mut(size);
+            from_y.row_mut(j).scale_mut(size);
+        }
+        let mut seen = rows * &order * back;
+        let moved = &to_y * generator * from_y;
+        let d = expm::balance(&moved, unit);
+        for (j, &d) in d.iter().enumerate() {
+            to_y.row_mut(j).unscale_mut(d);
+            seen.column_mut(j).scale_mut(d);
+        }
+        let moved = DMatrix::from_fn(dim, dim, |i, j| moved[(i, j)] * d[j] / d[i]);
+        let mut powers = [DMatrix::zeros(dim, dim), DMatrix::zeros(dim, dim)];
+        for (k, term) in terms.iter().enumerate() {
+            let (v, i) = (seen.row(2 * k), seen.row(2 * k + 1));
+            let sign = if term.source { -0.5 } else { 0.5 };
+            let power = &mut powers[usize::from(!term.source)];
+            power.ger(sign, &v.transpose(), &i.transpose(), 1.0);
+            power.ger(sign, &i.transpose(), &v.transpose(), 1.0);
+        }
+        let instant = powers.each_ref().map(Form::new);
+        let halvings = (expm::norm_1(&moved) * unit / SERIES).log2().ceil();
+        let halvings = if halvings > 0.0 {
+            halvings.min(1e3) as u32
+        } else {
+            0
+        };
+        let mut latest = Doubling::new(&moved, &powers, unit * (-f64::from(halvings)).exp2());
+        for _ in 0..halvings {
+            latest.double();
+        }
+        Self {
+            to_y: Kernel::new(&to_y),
+            y: vec![0.0; dim],
+            instant,
+            over: vec![latest.forms()],
+            latest,
         }
     }
-    sums
+
+    #[inline]
+    fn double_to(&mut self, k: u32) {
+        while self.over.len() <= k as usize {
+            self.latest.double();
+            self.over.push(self.latest.forms());
+        }
+    }
+}
+
+impl Doubling {
+    /// Series over a step with ‖𝒜‖ h ≤ [`SERIES`]: 𝒜ᵏhᵏ/k!, and Q_{k+1} = (𝒜ᵀ Q_k + Q_k 𝒜) h/(k + 1).
+    fn new(generator: &DMatrix<f64>, powers: &[DMatrix<f64>; 2], h: f64) -> Self {
+        let dim = generator.nrows();
+        let a = generator * h;
+        let mut buffer = DMatrix::zeros(dim, dim);
+        let mut sum = |first: DMatrix<f64>, symmetric: bool| {
+            let (mut term, mut sum) = (first.clone(), first);
+            for k in 2..TERMS {
+                term.mul_to(&a, &mut buffer);
+                let part = 1.0 / k as f64;
+                for i in 0..dim {
+                    for j in 0..dim {
+                        let transposed = if symmetric { buffer[(j, i)] } else { 0.0 };
+                        term[(i, j)] = part * (buffer[(i, j)] + transposed);
+                    }
+                }
+                sum += &term;
+            }
+            sum
+        };
+        let increment = sum(a.clone(), false);
+        let grams = powers.each_ref().map(|q| sum(q * h, true));
+        Self {
+            generator: generator.clone(),
+            norm: expm::norm_1(generator),
+            t: h,
+            increment,
+            grams,
+            buffers: [buffer, DMatrix::zeros(dim, dim)],
+        }
+    }
+
+    /// Φ = I + E: E ← 2 E + E², Γ ← Γ + Φᵀ Γ Φ.
+    fn double(&mut self) {
+        let [first, second] = &mut self.buffers;
+        let e = &mut self.increment;
+        for gram in &mut self.grams {
+            gram.mul_to(e, first);
+            *first += &*gram;
+            second.gemm_tr(1.0, e, first, 0.0);
+            *second += &*first;
+            *gram += &*second;
+        }
+        self.t *= 2.0;
+        let anew = (self.norm * self.t > STIFF)
+            .then(|| expm::exponential(&self.generator, self.t))
+            .flatten();
+        if let Some(exponential) = anew {
+            *e = exponential.increment;
+        } else {
+            e.mul_to(e, first);
+            *e *= 2.0;
+            *e += &*first;
+        }
+    }
+
+    fn forms(&self) -> [Form; 2] {
+        self.grams.each_ref().map(Form::new)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::DVector;
+
+    fn sizes(amplitude: &[f64]) -> Sizes<'_> {
+        Sizes {
+            amplitude,
+            power: 0.0,
+        }
+    }
+
+    fn term(v: &[f64], i: &[f64], source: bool) -> Term {
+        Term {
+            v: v.to_vec(),
+            i: i.to_vec(),
+            source,
+        }
+    }
 
     /// x' = −x/τ: ∫₀ʰ x² dt = x₀² τ/2 (1 − e^{−2h/τ}).
     #[test]
     fn both_integrals_of_a_decay() {
         let tau = 2e-3;
-        let (a, q) = (
-            DMatrix::from_element(1, 1, -1.0 / tau),
-            DMatrix::from_element(1, 1, 1.0),
-        );
-        let h = 1.5e-3;
+        let a = DMatrix::from_element(1, 1, -1.0 / tau);
         let exact = |h: f64| -9.0 * tau / 2.0 * (-2.0 * h / tau).exp_m1();
-        let form = Form::new(&gramian(&a, &q, h));
-        assert!((form.value(&[3.0]) / exact(h) - 1.0).abs() < 1e-15);
+        let h = 1.5e-3;
+        let terms = vec![term(&[1.0], &[1.0], true), term(&[2.0], &[1.0], false)];
+        let mut work = Work::new(terms, h, 0).unwrap();
+        for k in 0..6 {
+            let [source, dissipated] = work.over(k, &[3.0], &a, sizes(&[3.0]));
+            let expected = exact(h * f64::from(1 << k));
+            assert!((source / expected + 1.0).abs() < 1e-15, "{k}");
+            assert!((dissipated / expected - 2.0).abs() < 1e-15, "{k}");
+            assert!(work.may_join(k, &a, sizes(&[3.0])));
+        }
         let terms: Vec<f64> = (0..=20)
             .scan(3.0, |t, k| {
                 let now = *t;
@@ -118,16 +449,52 @@ mod tests {
                 Some(now)
             })
             .collect();
-        let forms = [Form::new(&q), Form::new(&(q * 2.0))];
-        let along = along_taylor(&forms, &terms, 20, h, 0.4, &mut [0.0]);
-        assert!((along[0] / exact(0.4 * h) - 1.0).abs() < 1e-14);
-        assert!((along[1] / exact(0.4 * h) - 2.0).abs() < 1e-14);
+        for (degree, part) in [(20, 0.4), (8, 0.02), (4, 2e-4)] {
+            let polynomial = Taylor {
+                terms: &terms,
+                degree,
+                h,
+                part,
+            };
+            let [source, dissipated] = work.along_taylor(polynomial, &a, sizes(&[3.0]), &mut [0.0]);
+            assert!((source / exact(part * h) + 1.0).abs() < 1e-14, "{degree}");
+            assert!(
+                (dissipated / exact(part * h) - 2.0).abs() < 1e-14,
+                "{degree}"
+            );
+        }
     }
 
+    /// A growing mode is not followed over spans that its coordinates outgrow.
     #[test]
-    fn packed_form() {
-        let q = DMatrix::from_row_slice(3, 3, &[1.0, 2.0, 3.0, 2.0, 5.0, 6.0, 3.0, 6.0, 9.0]);
-        let w = DVector::from_row_slice(&[1.0, -2.0, 0.5]);
-        assert_eq!(Form::new(&q).value(w.as_slice()), w.dot(&(&q * &w)));
+    fn growth_ends_the_joining() {
+        let a = DMatrix::from_element(1, 1, 1.0);
+        let mut work = Work::new(vec![term(&[1.0], &[1.0], false)], 1.0, 0).unwrap();
+        let joined = (0..12)
+            .take_while(|&k| work.may_join(k, &a, sizes(&[1.0])))
+            .count();
+        // e^16 > 1e6
+        assert_eq!(joined, 4);
+        let [_, found] = work.over(4, &[1.0], &a, sizes(&[1.0]));
+        assert!((found / (0.5 * 32_f64.exp_m1()) - 1.0).abs() < 1e-14);
+    }
+
+    /// An amplifier: x₂ follows −10⁶ x₁ within 10⁻⁹ s, and v = x₂ + 10⁶ x₁ is the small difference that drives it.
+    #[test]
+    fn differences_of_large_rows_are_exact() {
+        let (gain, fast, slow) = (1e6, 1e9, 1.0);
+        // x₁' = −slow x₁, v' = −fast v + …: in x₂ = v − gain x₁.
+        let a = DMatrix::from_row_slice(2, 2, &[-slow, 0.0, gain * (slow - fast), -fast]);
+        let terms = vec![term(&[gain, 1.0], &[gain, 1.0], false)];
+        let mut work = Work::new(terms, 1e-3, 20).unwrap();
+        // v = x₂ + gain x₁ obeys v' = −fast v exactly: ∫ v² = v₀²/(2 fast).
+        let w = [1.0, 1e-3 - gain];
+        let v = w[1] + gain;
+        let [_, found] = work.over(20, &w, &a, sizes(&[1.0, gain]));
+        assert!(
+            (found / (v * v / (2.0 * fast)) - 1.0).abs() < 1e-6,
+            "{found}"
+        );
+        // The explicit form over w would be off by gain²·ε·1e-3 s ≫ v²/fast.
     }
 }

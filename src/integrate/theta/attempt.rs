@@ -14,13 +14,19 @@ impl Theta<'_> {
             return self.attempt_stages(tableau, h, t1);
         }
         self.inputs.left(t1, &mut self.u_next);
-        self.stats.lcp_solves += 1;
-        let settle = self.now.settle && !self.lambda.is_empty();
-        let scheme = self.scheme;
+        self.stats.lcp_solves += u64::from(!self.lambda.is_empty());
+        let damped = self.starts_damped();
+        let settle = self.now.settle && (damped || !self.lambda.is_empty());
+        let scheme = if settle && damped {
+            Scheme::MOREAU
+        } else {
+            self.scheme
+        };
         let Self {
             plant,
             now,
             attempt,
+            amplitudes,
             settings,
             ..
         } = self;
@@ -50,18 +56,19 @@ impl Theta<'_> {
         }
         let n = now.x.len();
         let fused = system.step(attempt.step).fused(attempt.mode);
-        if fused.step(&self.z, n, &mut self.out) {
+        let noise = |k| amplitudes.rounding(&system.lcs, k);
+        if fused.step(&self.z, n, &mut self.out, noise) {
             return Ok(());
         }
-        self.solve_step(h, t1)
+        self.solve_step(scheme, h, t1)
     }
 
     /// The step with γ = 1 by the solvers. Where the user's own γ = 1 > θ leaves a stiff step without solution, θ = 1 has one.
     #[cold]
-    pub(super) fn solve_step(&mut self, h: f64, t1: f64) -> Result<(), SimError> {
+    pub(super) fn solve_step(&mut self, scheme: Scheme, h: f64, t1: f64) -> Result<(), SimError> {
         self.stats.pivotings += 1;
-        let first = self.solve_with(self.scheme, h, t1);
-        if first.is_err() && self.scheme != Scheme::MOREAU {
+        let first = self.solve_with(scheme, h, t1);
+        if first.is_err() && scheme != Scheme::MOREAU {
             return self.solve_with(Scheme::MOREAU, h, t1);
         }
         first
@@ -119,6 +126,9 @@ impl Theta<'_> {
             };
             return Err(SimError::at(self.now.t, reason));
         }
+        if self.now.estimate.is_some() && self.control.is_none() {
+            self.carry_error();
+        }
         if let Some((basis, pattern)) = self.attempt.solved.take() {
             self.commit_solved(basis, pattern, t1);
         } else {
@@ -132,6 +142,34 @@ impl Theta<'_> {
         self.now.t = t1;
         self.last_h = self.attempt.h;
         Ok(())
+    }
+
+    /// The error after the attempted step.
+    fn carry_error(&mut self) {
+        let Self {
+            plant,
+            now,
+            attempt,
+            out,
+            scheme,
+            ..
+        } = self;
+        let Some(estimate) = &mut now.estimate else {
+            return;
+        };
+        if now.settle {
+            estimate.restart();
+        }
+        let n = now.x.len();
+        let fused = || {
+            plant.systems[now.system]
+                .1
+                .step(attempt.step)
+                .fused(attempt.mode)
+        };
+        let map = attempt.solved.is_none().then(|| fused().flow(n));
+        let second_order = scheme.order() == 2 && !attempt.settle;
+        estimate.step(attempt.h, &now.x, &out[..n], map, second_order);
     }
 
     #[cold]

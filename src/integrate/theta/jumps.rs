@@ -213,6 +213,11 @@ impl Theta<'_> {
         let old = self.system();
         let s = old.storage(&self.now.x, &self.now.u);
         let stored = energy::stored(&old.lcs, &self.now.x, &self.now.u);
+        let carried = self.now.estimate.as_ref().map(|estimate| {
+            let error = estimate.error();
+            old.lcs.storage.x.columns(0, error.len()) * DVector::from_column_slice(error)
+        });
+        self.settle_estimate();
         let position = self.switches.position().to_vec();
         let at = self
             .plant
@@ -226,6 +231,11 @@ impl Theta<'_> {
         let x = system.state_from(&s);
         self.now.x.clear();
         self.now.x.extend(x.iter());
+        if let (Some(estimate), Some(carried), None) =
+            (&mut self.now.estimate, carried, &self.control)
+        {
+            estimate.enter((&system.lcs.storage.inject * carried).iter().copied());
+        }
         if self.now.active.len() != system.lcs.m() {
             self.now.active = vec![false; system.lcs.m()];
             self.now.pattern = vec![false; system.lcs.m()];

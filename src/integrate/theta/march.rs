@@ -21,7 +21,7 @@ impl Theta<'_> {
                 t0 + span * (k as f64 / count)
             };
             if simple {
-                self.attempt(h, t1)?;
+                let h = self.fixed_step(h, t1)?;
                 let changed = self.attempt.solved.is_some();
                 let impulse = changed && self.impulsive(h)?;
                 self.finish_step(t1, impulse, log)?;
@@ -31,6 +31,28 @@ impl Theta<'_> {
         }
         self.switches.forget_chatter();
         Ok(())
+    }
+
+    /// A step whose length is prescribed, not committed. After an edge or a jump the midpoint rule would swing around what is
+    /// faster than the step, undamped; it starts with two halves of Moreau's scheme instead, which are damped and leave it
+    /// its order (Rannacher 1984). Returns the length of the last part.
+    fn fixed_step(&mut self, h: f64, t1: f64) -> Result<f64, SimError> {
+        if !(self.now.settle && self.starts_damped()) {
+            self.attempt(h, t1)?;
+            return Ok(h);
+        }
+        let middle = self.now.t + 0.5 * (t1 - self.now.t);
+        self.attempt(0.5 * h, middle)?;
+        self.commit(middle)?;
+        self.now.settle = true;
+        self.attempt(0.5 * h, t1)?;
+        Ok(0.5 * h)
+    }
+
+    /// Whether steps after edges and jumps are Moreau's: the midpoint rule with prescribed steps. Error control finds its own
+    /// step there, and other θ and γ are taken as they are.
+    pub(super) fn starts_damped(&self) -> bool {
+        self.control.is_none() && self.scheme.order() == 2
     }
 
     pub(super) fn finish_step(
@@ -136,9 +158,12 @@ impl Theta<'_> {
                 self.back(steps);
                 return Ok(false);
             }
+            if let Some(estimate) = &mut self.now.estimate {
+                estimate.add(verdict.error);
+            }
         } else {
             self.preferred = f64::INFINITY;
-            self.attempt(h, t1)?;
+            self.fixed_step(h, t1)?;
             self.commit(t1)?;
         }
         if self.switches.watch() && self.crossed()? {

@@ -6,6 +6,7 @@
 //! and a sign test. Where that fails, the step is solved with γ = 1 by the [`Driver`](crate::solve::Driver).
 
 mod attempt;
+mod estimate;
 mod jumps;
 mod march;
 mod right_limit;
@@ -17,8 +18,10 @@ use std::collections::BTreeSet;
 
 use nalgebra::DVector;
 
+use self::estimate::Estimate;
 use crate::integrate::control::{Amplitudes, CORNER, Control};
 use crate::integrate::energy::{self, Balance};
+use crate::integrate::exact::Place;
 use crate::integrate::inputs::Inputs;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
@@ -142,6 +145,8 @@ struct Now {
     settle: bool,
     system: usize,
     balance: Balance,
+    /// The error so far, where it is asked for.
+    estimate: Option<Estimate>,
 }
 
 impl Now {
@@ -154,6 +159,9 @@ impl Now {
         self.settle = other.settle;
         self.system = other.system;
         self.balance = other.balance;
+        if let (Some(mine), Some(other)) = (&mut self.estimate, &other.estimate) {
+            mine.copy_from(other);
+        }
     }
 }
 
@@ -216,6 +224,7 @@ impl<'a> Theta<'a> {
             settle: true,
             system: at,
             balance: Balance::new(stored),
+            estimate: None,
         };
         let amplitudes = Amplitudes::new(&system.lcs, &inputs);
         let switches = Switches::new(position, thresholds, &system.lcs);
@@ -273,21 +282,47 @@ impl<'a> Theta<'a> {
         self.amplitudes = amplitudes;
     }
 
+    /// Has the error estimated along the run.
+    pub fn estimate_errors(&mut self) {
+        let mut estimate = Estimate::default();
+        if self.control.is_none() {
+            estimate.enter(self.now.x.iter().map(|_| 0.0));
+        }
+        self.kept.estimate = Some(estimate.clone());
+        self.now.estimate = Some(estimate);
+    }
+
     /// The amplitudes seen so far.
     #[must_use]
     pub fn amplitudes(&self) -> &Amplitudes {
         &self.amplitudes
     }
 
-    /// Takes note of the present state's size.
+    /// Takes note of the size of the present state and of every branch's voltage and current: a state that stays at zero
+    /// would else be judged by its own rounding.
     pub fn see(&mut self) {
+        let known = self.read_lambda().is_ok();
         let Self {
             amplitudes,
             plant,
             now,
             ..
         } = self;
-        amplitudes.see(&plant.systems[now.system].1.lcs, &now.x);
+        let lcs = &plant.systems[now.system].1.lcs;
+        amplitudes.see(lcs, &now.x);
+        if !known {
+            return;
+        }
+        let at = Point {
+            x: &now.x,
+            lambda: &self.lambda,
+            u: &now.u,
+            du: &self.du,
+        };
+        for i in 0..lcs.outputs.power.len() {
+            let v = reading::value(&lcs.outputs.power_v, i, at);
+            amplitudes.see_branch(v, reading::value(&lcs.outputs.power_i, i, at));
+        }
     }
 
     /// Control values of the switches at t = 0+, after the first jump in the start position.
@@ -315,6 +350,22 @@ impl<'a> Theta<'a> {
         &self.now.x
     }
 
+    /// Where the run stands, for another method to go on from.
+    pub(crate) fn place(&self) -> Place {
+        Place {
+            t: self.now.t,
+            storage: self.system().storage(&self.now.x, &self.now.u),
+            switches: self.switches.position().to_vec(),
+        }
+    }
+
+    /// Starts a new energy balance from the present state.
+    pub(crate) fn empty_account(&mut self) {
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        let stored = energy::stored(lcs, &self.now.x, &self.now.u);
+        self.now.balance = Balance::new(stored);
+    }
+
     /// The largest complementarity residual of a step that the solvers solved.
     #[must_use]
     pub fn worst_residual(&self) -> f64 {
@@ -329,6 +380,13 @@ impl<'a> Theta<'a> {
 
     fn system(&self) -> &System {
         &self.plant.systems[self.now.system].1
+    }
+
+    fn settle_estimate(&mut self) {
+        if let (Some(estimate), None) = (&mut self.now.estimate, &self.control) {
+            let lcs = &self.plant.systems[self.now.system].1.lcs;
+            estimate.settle(lcs, &mut self.amplitudes);
+        }
     }
 
     /// Buffers for the present system.
@@ -416,7 +474,9 @@ impl Stepper for Theta<'_> {
                 names.join(", ")
             ));
         }
+        self.settle_estimate();
         Outcome {
+            error_estimate: self.now.estimate.as_ref().map(Estimate::relative),
             stats: self.stats.clone(),
             energy: self.now.balance.energy(),
             notes,

@@ -11,7 +11,13 @@ impl Theta<'_> {
             Stepping::Fixed(h) => h.min(self.longest),
             Stepping::Controlled { first, .. } => first,
         };
-        base * SHORT
+        // Within the present piece of every source, as far as the rounding of t tells pieces apart.
+        let piece = self.inputs.next_breakpoint(self.now.t) - self.now.t;
+        if piece > Self::slack(self.now.t) {
+            base.min(piece) * SHORT
+        } else {
+            base * SHORT
+        }
     }
 
     /// The step by which λ is read. A curved law tells its current at the instant itself, so only the ideal ports beside it need a
@@ -97,6 +103,7 @@ impl Theta<'_> {
             z,
             out,
             lambda,
+            amplitudes,
             ..
         } = self;
         let system = &mut plant.systems[now.system].1;
@@ -109,7 +116,8 @@ impl Theta<'_> {
         let (mode, _) = system.mode(step, &now.active);
         let n = now.x.len();
         let fused = system.step(step).fused(mode);
-        if fused.regular && fused.step(z, n, out) {
+        let noise = |k| amplitudes.rounding(&system.lcs, k);
+        if fused.step(z, n, out, noise) && fused.is_strict(z, &out[n..]) {
             fused.lambda(&out[n..], lambda);
             return Ok(());
         }

@@ -1,10 +1,14 @@
 //! What a netlist says, card by card: nothing evaluated, nothing derived, every piece with its place in the text.
 
 mod expr;
+mod measure;
+mod sweep;
 
 use std::fmt;
 
 pub use expr::{Binary, Expr, ExprKind, Unary};
+pub use measure::{Four, Meas};
+pub use sweep::{Points, Sweep, Target};
 
 use crate::diagnostic::{Diagnostic, Span};
 
@@ -60,14 +64,28 @@ pub enum Statement {
     If(Vec<Branch>),
     /// `.tran`, or a `tran` command inside `.control`.
     Tran(Tran),
-    /// `.op`, `.ac`, `.dc` …: some analysis other than `.tran`.
+    /// `.op`: an analysis other than `.tran`.
     Analysis(Span),
     /// `.ic`.
     Ic(Vec<(Signal, Expr)>),
+    /// `.nodeset`.
+    Nodeset(Vec<(Signal, Expr)>),
+    /// `.temp t`, `.options temp=t`, °C.
+    Temperature(Expr),
     /// `.save`, `.print`, `.probe`, `.plot`.
     Save(Vec<Wanted>),
+    /// `.print dc`, `.plot dc`.
+    SaveDc(Vec<Wanted>),
     /// `.global`.
     Global(Vec<Name>),
+    /// `.meas tran`, or a `meas` command inside `.control`.
+    Meas(Box<Meas>),
+    /// `.four`.
+    Four(Four),
+    /// `.step`.
+    Step(Sweep),
+    /// `.dc`: the first sweep is the innermost.
+    Dc(Vec<Sweep>),
 }
 
 /// An element card.

@@ -1,15 +1,16 @@
 //! Dot cards: one parser each; what is only recognised is named, so that nothing is skipped in silence.
 
 mod define;
+pub(in crate::netlist) mod measure;
 mod output;
+mod sweep;
 
 use nom::Input as _;
 
 use define::{func, model, params, subckt};
-use output::save;
 
 use crate::diagnostic::{Diagnostic, Span};
-use crate::netlist::ast::{Assign, Expr, Name, Signal, Statement, Tran};
+use crate::netlist::ast::{Assign, Expr, Name, Points, Signal, Statement, Sweep, Target, Tran};
 use crate::netlist::lex::{
     Fault, Input, Parsed, ahead, at_end, between, blank, end, missing, node, refuse, separator,
     symbol, tell, word,
@@ -44,6 +45,8 @@ pub(in crate::netlist) enum Dot {
     End,
     /// `.title text`.
     Title(String),
+    /// `.options`: the temperature it sets, if it does.
+    Options(Option<Expr>),
     /// A card that does not change the transient and is skipped with a note.
     Skipped,
     /// A card that asks for nothing (`.backanno`, `.width`).
@@ -51,7 +54,8 @@ pub(in crate::netlist) enum Dot {
 }
 
 impl Dot {
-    fn statement(statement: Statement) -> Self {
+    /// A card that stands in the netlist.
+    pub(in crate::netlist) fn statement(statement: Statement) -> Self {
         Self::Statement(Box::new(statement))
     }
 }
@@ -68,7 +72,7 @@ pub(in crate::netlist) struct Path {
 }
 
 /// All directives, for "did you mean".
-pub(in crate::netlist) const DIRECTIVES: [&str; 26] = [
+pub(in crate::netlist) const DIRECTIVES: [&str; 27] = [
     ".ac",
     ".backanno",
     ".control",
@@ -94,6 +98,7 @@ pub(in crate::netlist) const DIRECTIVES: [&str; 26] = [
     ".save",
     ".step",
     ".subckt",
+    ".temp",
     ".tran",
 ];
 
@@ -121,14 +126,20 @@ pub(in crate::netlist) fn card(i: Input<'_>) -> Parsed<'_, Dot> {
             tran(start, rest, false).map(|(rest, t)| (rest, Dot::statement(Statement::Tran(t))))
         }
         ".op" => Ok((skip(rest), Dot::statement(Statement::Analysis(name.span)))),
-        ".ic" => initial(rest),
+        ".ic" => initial(rest, Statement::Ic),
+        ".nodeset" => initial(rest, Statement::Nodeset),
+        ".temp" => temperature(rest),
+        ".option" | ".options" | ".opt" => Ok((skip(rest), Dot::Options(options(rest)))),
         ".global" => global(rest),
-        ".save" | ".probe" => save(rest, false),
-        ".print" | ".plot" => save(rest, true),
-        ".ac" | ".dc" | ".noise" | ".tf" | ".four" | ".fourier" | ".meas" | ".measure"
-        | ".option" | ".options" | ".opt" | ".temp" | ".nodeset" | ".sens" | ".pz" | ".disto"
-        | ".sp" | ".pss" | ".net" | ".savebias" | ".loadbias" | ".machine" | ".endmachine"
-        | ".ferret" | ".data" | ".enddata" | ".step" => Ok((skip(rest), Dot::Skipped)),
+        ".save" | ".probe" => save(rest),
+        ".print" | ".plot" => output::save(rest, true),
+        ".meas" | ".measure" => measure::meas(start, rest, false),
+        ".four" | ".fourier" => measure::four(start, rest),
+        ".step" => sweep::step(rest),
+        ".dc" => sweep::dc(rest),
+        ".ac" | ".noise" | ".tf" | ".sens" | ".pz" | ".disto" | ".sp" | ".pss" | ".net"
+        | ".savebias" | ".loadbias" | ".machine" | ".endmachine" | ".ferret" | ".data"
+        | ".enddata" => Ok((skip(rest), Dot::Skipped)),
         ".backanno" | ".wave" | ".width" | ".protect" | ".unprotect" | ".prot" | ".unprot"
         | ".endc" | ".newpage" => Ok((skip(rest), Dot::Nothing)),
         _ => {
@@ -266,8 +277,13 @@ pub(in crate::netlist) fn tran<'a>(
     ))
 }
 
-/// `.ic v(n)=1 v(a,b)=2 i(l1)=3`.
-fn initial(i: Input<'_>) -> Parsed<'_, Dot> {
+/// `.save`, `.probe`, and the command.
+pub(in crate::netlist) fn save(i: Input<'_>) -> Parsed<'_, Dot> {
+    output::save(i, false)
+}
+
+/// `.ic v(n)=1 v(a,b)=2 i(l1)=3`, `.nodeset v(n)=1`.
+fn initial(i: Input<'_>, statement: fn(Vec<(Signal, Expr)>) -> Statement) -> Parsed<'_, Dot> {
     let mut all = Vec::new();
     let mut at = separator(i);
     while !at_end(at) {
@@ -285,7 +301,7 @@ fn initial(i: Input<'_>) -> Parsed<'_, Dot> {
         all.push((signal, value));
         at = separator(rest);
     }
-    Ok((at, Dot::statement(Statement::Ic(all))))
+    Ok((at, Dot::statement(statement(all))))
 }
 
 /// `v(…)` or `i(…)`.
@@ -295,6 +311,51 @@ pub(in crate::netlist) fn signal(i: Input<'_>) -> Parsed<'_, Signal> {
         ("v" | "i", Some(open)) => expr::signal_arguments(open, &name),
         _ => Err(nom::Err::Error(Fault::Mismatch)),
     }
+}
+
+/// `.temp t`, or several temperatures, which are a sweep as in LTspice.
+fn temperature(i: Input<'_>) -> Parsed<'_, Dot> {
+    let start = separator(i);
+    let mut values = Vec::new();
+    let mut at = start;
+    while !at_end(at) {
+        let (rest, value) = operand::value(at).map_err(|e| match e {
+            nom::Err::Error(_) => missing(at, "a temperature"),
+            e => e,
+        })?;
+        values.push(value);
+        at = separator(rest);
+    }
+    let span = between(start, at);
+    let statement = match values.len() {
+        0 => return Err(missing(at, "a temperature")),
+        1 => values.pop().map(Statement::Temperature),
+        _ => Some(Statement::Step(Sweep {
+            target: Target::Temperature(span),
+            points: Points::List(values),
+            span,
+        })),
+    };
+    Ok((at, statement.map_or(Dot::Nothing, Dot::statement)))
+}
+
+/// The temperature among options, which are names with and without values.
+fn options(i: Input<'_>) -> Option<Expr> {
+    let mut temperature = None;
+    let mut at = separator(i);
+    while let Ok((rest, name)) = word(at) {
+        at = separator(rest);
+        if let Some(rest) = symbol(rest, '=') {
+            let Ok((rest, value)) = operand::lenient(rest) else {
+                break;
+            };
+            if name.text == "temp" {
+                temperature = Some(value);
+            }
+            at = separator(rest);
+        }
+    }
+    temperature
 }
 
 fn global(i: Input<'_>) -> Parsed<'_, Dot> {

@@ -16,13 +16,16 @@ const ANALYSES: [&str; 11] = [
 /// `.save v(a) i(d1) out @d1[i] all`, `.print tran …`.
 pub(super) fn save(i: Input<'_>, analysis: bool) -> Parsed<'_, Dot> {
     let mut at = separator(i);
+    let mut statement: fn(Vec<Wanted>) -> Statement = Statement::Save;
     if let Ok((rest, name)) = word(at)
         && ANALYSES.contains(&name.text.as_str())
         && symbol(rest, '(').is_none()
         && (analysis || name.text == "tran")
     {
-        if name.text != "tran" {
-            return Ok((skip(at), Dot::Skipped));
+        match name.text.as_str() {
+            "tran" => {}
+            "dc" => statement = Statement::SaveDc,
+            _ => return Ok((skip(at), Dot::Skipped)),
         }
         at = separator(rest);
     }
@@ -32,7 +35,7 @@ pub(super) fn save(i: Input<'_>, analysis: bool) -> Parsed<'_, Dot> {
         all.extend(one);
         at = separator(rest);
     }
-    Ok((at, Dot::statement(Statement::Save(all))))
+    Ok((at, Dot::statement(statement(all))))
 }
 
 /// One thing to print; `None` for the limits of a plot.

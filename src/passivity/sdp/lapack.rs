@@ -301,7 +301,7 @@ unsafe extern "C" fn dsyevr_(
     }
 }
 
-/// The thin SVD A = U diag(s) Vᵀ, s descending.
+/// The thin SVD A = U diag(s) Vᵀ, s descending, or the workspace it needs where `lwork` asks for that; returns `info`.
 ///
 /// # Safety
 /// LAPACK's extents.
@@ -311,9 +311,14 @@ unsafe fn svd(
     s: *mut f64,
     (u, ldu): (*mut f64, c_int),
     (vt, ldvt): (*mut f64, c_int),
+    (work, lwork): (*mut f64, c_int),
 ) -> c_int {
     // SAFETY: the caller vouches for the extents.
     unsafe {
+        if lwork == -1 {
+            *work = 1.0;
+            return 0;
+        }
         let svd = read(a, m as usize, n as usize, lda).svd(true, true);
         let (Some(left), Some(right)) = (svd.u, svd.v_t) else {
             return 1;
@@ -347,12 +352,14 @@ unsafe extern "C" fn dgesdd_(
 ) {
     // SAFETY: the arguments are LAPACK's, with its extents.
     unsafe {
-        *info = 0;
-        if *lwork == -1 {
-            *work = 1.0;
-            return;
-        }
-        *info = svd((*m, *n), (a, *lda), s, (u, *ldu), (vt, *ldvt));
+        *info = svd(
+            (*m, *n),
+            (a, *lda),
+            s,
+            (u, *ldu),
+            (vt, *ldvt),
+            (work, *lwork),
+        );
     }
 }
 
@@ -376,11 +383,13 @@ unsafe extern "C" fn dgesvd_(
 ) {
     // SAFETY: the arguments are LAPACK's, with its extents.
     unsafe {
-        *info = 0;
-        if *lwork == -1 {
-            *work = 1.0;
-            return;
-        }
-        *info = svd((*m, *n), (a, *lda), s, (u, *ldu), (vt, *ldvt));
+        *info = svd(
+            (*m, *n),
+            (a, *lda),
+            s,
+            (u, *ldu),
+            (vt, *ldvt),
+            (work, *lwork),
+        );
     }
 }

@@ -134,16 +134,13 @@ fn maximise(face: &Face) -> Outcome {
     }
     let z = DVector::from_column_slice(&solver.solution.x[..unknowns]);
     let margin = solver.solution.x[unknowns];
+    let dual = square(&solver.solution.z[..fq], q);
     if margin > 30.0 * ACCURACY {
         Outcome::Interior { z, margin }
     } else if margin < -30.0 * ACCURACY {
-        Outcome::Infeasible { z, margin }
+        Outcome::Infeasible { z, margin, dual }
     } else {
-        Outcome::Boundary {
-            z,
-            margin,
-            dual: square(&solver.solution.z[..fq], q),
-        }
+        Outcome::Boundary { z, margin, dual }
     }
 }
 

@@ -186,3 +186,44 @@ fn a_controller_slides_on_its_threshold() {
         run.notes
     );
 }
+
+/// Three inverters in a ring without any delay: only the point at which all are half on is consistent. In the start position
+/// each control is one that sources alone set; in others it is not.
+#[test]
+fn a_ring_of_inverters_rests_on_its_thresholds() {
+    let run = simulate(
+        "V1 v 0 5\nR1 v a 1k\nS1 a 0 c 0 sw\nR2 v b 1k\nS2 b 0 a 0 sw\nR3 v c 1k\nS3 c 0 b 0 sw\nR4 a x 1k\nC1 x 0 1u IC=0\n\
+         .model sw SW(ideal Vt=2 Vh=0)\n.tran 0.1m 1m uic\n.save v(a) v(b) v(c) v(x)",
+    );
+    for t in [0.0, 0.5e-3, 1e-3] {
+        for node in ["v(a)", "v(b)", "v(c)"] {
+            assert!((at(&run, t, node) - 2.0).abs() < 1e-14, "{node}");
+        }
+        let charged = -2.0 * (-t / 1e-3).exp_m1();
+        assert!((at(&run, t, "v(x)") - charged).abs() < 1e-14);
+    }
+}
+
+/// More switches than could be tried with every sign at once.
+#[test]
+fn six_controllers_slide_together() {
+    let stage = |k: u32| {
+        format!(
+            "S{k} 1 m{k} ref o{k} sw OFF\nR{k} m{k} o{k} 1k\nC{k} o{k} 0 1u IC=0\nRl{k} o{k} 0 10k\n"
+        )
+    };
+    let stages: String = (1..=6).map(stage).collect();
+    let run = simulate(&format!(
+        "V1 1 0 10\nVref ref 0 5\n{stages}.model sw SW(ideal Vt=0 Vh=0)\n.tran 0.1m 5m uic\n.save v(o1) v(o6)"
+    ));
+    assert_eq!(
+        (at(&run, 5e-3, "v(o1)"), at(&run, 5e-3, "v(o6)")),
+        (5.0, 5.0)
+    );
+    let sliding = run
+        .notes
+        .iter()
+        .filter(|n| n.contains("slides on its threshold"));
+    assert_eq!(sliding.count(), 6, "{:?}", run.notes);
+    assert!(run.events.len() <= 2, "{:?}", run.events);
+}

@@ -1,0 +1,208 @@
+//! `.step` and `.dc`: quantities and the values they take.
+
+use super::builder::Builder;
+use super::scope::ScopeId;
+use crate::algebra::Value;
+use crate::diagnostic::{Diagnostic, Span};
+use crate::netlist::ast::{self, Points, Target};
+
+/// Most runs or operating points of all sweeps together.
+const MOST: usize = 100_000;
+/// A value this close to the last one, relative to the increment, still counts (decimal steps in binary).
+const CLOSE: f64 = 1e-9;
+
+/// A quantity and the values it takes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sweep {
+    /// What changes.
+    pub what: Swept,
+    /// At least one value.
+    pub values: Vec<f64>,
+}
+
+/// What a sweep changes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Swept {
+    /// A parameter of the top level.
+    Param(String),
+    /// The DC value of a source, V or A, or a resistance, Ω.
+    Element(String),
+    /// The temperature, °C.
+    Temperature,
+}
+
+impl Swept {
+    /// As a column is called: `rload`, `v1`, `temp`.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Param(name) | Self::Element(name) => name,
+            Self::Temperature => "temp",
+        }
+    }
+}
+
+/// All combinations of the values of sweeps, the first sweep innermost.
+#[must_use]
+pub fn combinations(sweeps: &[Sweep]) -> Vec<Vec<f64>> {
+    let mut all = vec![Vec::new()];
+    for sweep in sweeps.iter().rev() {
+        all = all
+            .iter()
+            .flat_map(|outer: &Vec<f64>| {
+                let with = |value: &f64| [&[*value], outer.as_slice()].concat();
+                sweep.values.iter().map(with)
+            })
+            .collect();
+    }
+    all
+}
+
+impl<'n> Builder<'n, '_> {
+    /// The value that a sweep gives to an element.
+    pub(super) fn swept(&self, name: &str) -> Option<f64> {
+        let values = &self.options.values;
+        values
+            .iter()
+            .find(|(own, _)| own == name)
+            .map(|(_, value)| *value)
+    }
+
+    /// Takes in the sweeps of `.step`; a parameter that nothing else defines has its first value.
+    pub(super) fn steps(&mut self) {
+        let cards = std::mem::take(&mut self.step_cards);
+        for card in cards {
+            let Some(sweep) = self.sweep(card) else {
+                continue;
+            };
+            if let Swept::Param(name) = &sweep.what {
+                if self
+                    .options
+                    .params
+                    .iter()
+                    .any(|(own, _)| own.eq_ignore_ascii_case(name))
+                {
+                    // The value from outside is the one that counts.
+                    self.declare(&card.target);
+                    continue;
+                }
+                if self.scopes.param(ScopeId::ROOT, name).is_none() {
+                    let first = sweep.values.first().copied().map(Value::binary);
+                    self.scopes.fix(ScopeId::ROOT, name, first);
+                }
+                self.declare(&card.target);
+            }
+            self.circuit.steps.push(sweep);
+        }
+        self.limit_sweeps();
+    }
+
+    /// Takes in `.dc`; of several the last counts.
+    pub(super) fn dc_sweeps(&mut self) {
+        let Some(cards) = self.dc_cards.take() else {
+            return;
+        };
+        let sweeps: Option<Vec<Sweep>> = cards.iter().map(|card| self.sweep(card)).collect();
+        self.circuit.dc = sweeps.unwrap_or_default();
+        if let (Some(_), Some(first)) = (self.circuit.tran, cards.first()) {
+            let message = "`.dc` is left out, as there is a `.tran`";
+            let note = Diagnostic::note("skipped", first.span, message);
+            self.tell(note.label("carried out by `circ sim` where it stands alone"));
+        }
+        self.limit_sweeps();
+    }
+
+    fn declare(&mut self, target: &'n Target) {
+        if let Target::Param(name) | Target::Element(name) = target {
+            let root = self.scopes.get_mut(ScopeId::ROOT);
+            root.declared.insert(&name.text);
+        }
+    }
+
+    fn limit_sweeps(&mut self) {
+        let too_many = |sweeps: &[Sweep]| {
+            sweeps
+                .iter()
+                .try_fold(1_usize, |all, sweep| all.checked_mul(sweep.values.len()))
+                .is_none_or(|all| all > MOST)
+        };
+        if too_many(&self.circuit.steps) || too_many(&self.circuit.dc) {
+            let message = format!("the sweeps have more than {MOST} combinations");
+            self.tell(Diagnostic::error("too-large", None, message));
+        }
+    }
+
+    fn sweep(&mut self, card: &'n ast::Sweep) -> Option<Sweep> {
+        let values = self.sweep_values(&card.points, card.span)?;
+        let what = match &card.target {
+            Target::Temperature(_) => Swept::Temperature,
+            Target::Param(name) => Swept::Param(name.text.clone()),
+            Target::Element(name) if self.root_elements.contains(name.text.as_str()) => {
+                if !name.text.starts_with(['v', 'i', 'r']) {
+                    let message = format!("`{}` has no value that a sweep can set", name.text);
+                    let fault = Diagnostic::error("bad-sweep", name.span, message);
+                    self.tell(
+                        fault
+                            .label("neither a source nor a resistor")
+                            .help("write its value as `{name}` and sweep that parameter"),
+                    );
+                    return None;
+                }
+                Swept::Element(name.text.clone())
+            }
+            // LTspice lets a parameter stand without `param`.
+            Target::Element(name) => {
+                if self.scopes.param(ScopeId::ROOT, &name.text).is_none() {
+                    let message =
+                        format!("there is neither a source nor a parameter `{}`", name.text);
+                    let fault = Diagnostic::error("unknown-element", name.span, message);
+                    self.tell(fault.label("nothing to sweep"));
+                    return None;
+                }
+                Swept::Param(name.text.clone())
+            }
+        };
+        Some(Sweep { what, values })
+    }
+
+    fn sweep_values(&mut self, points: &'n Points, span: Span) -> Option<Vec<f64>> {
+        let mut number = |e| self.scopes.finite(e, ScopeId::ROOT).map(|v| v.f64);
+        let (fault, label) = match points {
+            Points::List(list) => return list.iter().map(number).collect(),
+            Points::Linear([start, stop, increment]) => {
+                let (start, stop, increment) = (number(start)?, number(stop)?, number(increment)?);
+                // LTspice and ngspice both go from the first to the last value, whatever the sign.
+                let count = ((stop - start) / increment).abs() + CLOSE;
+                if start == stop {
+                    return Some(vec![start]);
+                } else if increment == 0.0 {
+                    ("the increment of the sweep is zero", "never ends")
+                } else if count >= MOST as f64 {
+                    ("the sweep has too many values", "far too many values")
+                } else {
+                    let increment = increment.abs().copysign(stop - start);
+                    let value = |k: usize| start + k as f64 * increment;
+                    return Some((0..=count as usize).map(value).collect());
+                }
+            }
+            Points::Logarithmic { base, range } => {
+                let [start, stop, per] = range;
+                let (start, stop, per) = (number(start)?, number(stop)?, number(per)?);
+                let base = f64::from(*base);
+                let count = (stop / start).log(base).abs() * per + CLOSE;
+                if !(start * stop > 0.0 && per >= 1.0) {
+                    let what = "a logarithmic sweep needs values of one sign, and at least one per decade or octave";
+                    (what, "no such sweep")
+                } else if count >= MOST as f64 {
+                    ("the sweep has too many values", "far too many values")
+                } else {
+                    let sign = (stop.abs() - start.abs()).signum();
+                    let value = |k: usize| start * base.powf(sign * k as f64 / per);
+                    return Some((0..=count as usize).map(value).collect());
+                }
+            }
+        };
+        self.tell(Diagnostic::error("bad-sweep", span, fault).label(label));
+        None
+    }
+}

@@ -1,0 +1,93 @@
+//! `circ sim` on nonlinear forms, which are no circuits.
+
+use std::fs;
+
+use super::args::{Method, SimArgs};
+use super::exit::Failure;
+use crate::forms::json::nonlinear::{self, NonlinearFile};
+use crate::integrate::Run;
+use crate::settings::Settings;
+use crate::waveform::Waveforms;
+
+/// Reads a nonlinear form; `None` for every other file, unreadable ones included.
+///
+/// # Errors
+/// [`Failure::Message`] when it is one with a fault.
+pub(super) fn open(args: &SimArgs) -> Result<Option<NonlinearFile>, Failure> {
+    let Ok(bytes) = fs::read(&args.input.file) else {
+        return Ok(None);
+    };
+    let text = String::from_utf8_lossy(&bytes);
+    if !text.trim_start().starts_with('{') {
+        return Ok(None);
+    }
+    nonlinear::read(&text)
+        .map_err(|e| Failure::Message(format!("{}: {e}", args.input.file.display())))
+}
+
+/// Runs it by Moreau's scheme, the only one that these forms have.
+///
+/// # Errors
+/// [`Failure::Message`] for another method, an unknown probe, or a step without solution.
+pub(super) fn run(form: &NonlinearFile, args: &SimArgs) -> Result<Run, Failure> {
+    let fail =
+        |reason: String| Failure::Message(format!("{}: {reason}", args.input.file.display()));
+    if !matches!(args.method.method, Method::Auto | Method::Euler) {
+        return Err(fail(
+            "nonlinear forms are stepped by `--method euler`".into(),
+        ));
+    }
+    let (_, m) = form.size();
+    let pairs = |what: &str| (1..=m).map(|j| format!("{what}(d{j})")).collect::<Vec<_>>();
+    let names = [form.states.clone(), pairs("lambda"), pairs("y")].concat();
+    let units = [form.units.clone(), vec!["A"; m], vec!["V"; m]].concat();
+    let columns: Vec<usize> = if args.probes.is_empty() {
+        (0..names.len()).collect()
+    } else {
+        let find = |probe: &String| {
+            let unknown = || fail(format!("--probe {probe}: the form has {}", names.join(" ")));
+            let wanted = probe.to_lowercase();
+            names.iter().position(|n| *n == wanted).ok_or_else(unknown)
+        };
+        args.probes.iter().map(find).collect::<Result<_, _>>()?
+    };
+    let tol = args.method.tol.unwrap_or(Settings::default().tol);
+    let found = form
+        .run(args.method.step, tol)
+        .map_err(|e| fail(e.to_string()))?;
+    let mut values = Vec::with_capacity(columns.len() * found.trajectory.t.len());
+    for k in 0..found.trajectory.t.len() {
+        let [x, lambda, y] = [
+            &found.trajectory.x[k],
+            &found.trajectory.lambda[k],
+            &found.trajectory.y[k],
+        ];
+        let row: Vec<f64> = x.iter().chain(lambda).chain(y).copied().collect();
+        values.extend(columns.iter().map(|&j| row[j]));
+    }
+    let mut run = Run {
+        waveforms: Waveforms {
+            title: form.title.clone(),
+            units: columns.iter().map(|&j| units[j]).collect(),
+            names: columns.iter().map(|&j| names[j].clone()).collect(),
+            time: found.trajectory.t,
+            values,
+        },
+        method: "euler".into(),
+        plan: vec![format!(
+            "a nonlinear form: Moreau's scheme, {} steps per row",
+            found.steps_per_row
+        )],
+        ..Run::default()
+    };
+    run.stats.steps = found.steps as u64;
+    run.notes = vec![
+        "a form has no sources and no losses to balance: the energies are not computed".into(),
+    ];
+    if let Some(error) = found.error {
+        run.notes.push(format!(
+            "the last halving of the step changed the states by {error:.1e} of their size"
+        ));
+    }
+    Ok(run)
+}

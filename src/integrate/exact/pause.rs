@@ -1,0 +1,84 @@
+//! Leaving a run to another method, and taking it up again.
+
+use nalgebra::DVector;
+
+use super::mode::Key;
+use super::stepper::Exact;
+use super::transition::Trigger;
+use crate::integrate::Energy;
+use crate::integrate::energy::Balance;
+use crate::integrate::run::{Log, Reason, SimError};
+
+/// Where one method leaves a run and another goes on.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Place {
+    /// Time, s.
+    pub(crate) t: f64,
+    /// All capacitor voltages and inductor currents at t⁻.
+    pub(crate) storage: DVector<f64>,
+    /// By switch: on.
+    pub(crate) switches: Vec<bool>,
+}
+
+/// The run before a change of mode.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Before {
+    pub(super) storage: Vec<f64>,
+    pub(super) scale: Vec<f64>,
+    pub(super) switches: Vec<bool>,
+    pub(super) balance: Balance,
+}
+
+impl Exact<'_> {
+    /// Ends in the present mode and tells where the run stands.
+    pub(crate) fn leave(&mut self) -> Place {
+        self.take_storage();
+        self.close_slides();
+        self.mode = None;
+        Place {
+            t: self.motion.t,
+            storage: DVector::from_column_slice(&self.storage),
+            switches: self.before_change.switches.clone(),
+        }
+    }
+
+    /// Goes on from a place that another method has reached with this energy since [`Self::leave`].
+    ///
+    /// # Errors
+    /// No mode holds there; the run may be taken up at a later place.
+    pub(crate) fn resume(&mut self, place: &Place, energy: &Energy) -> Result<(), SimError> {
+        self.stand_at(place, energy);
+        for i in 0..self.sources.len() {
+            let Some(piece) = self.sources[i].piece(place.t) else {
+                return Err(self.fail(Reason::Unsupported("a source has no closed form".into())));
+            };
+            self.exosystem.set_piece(i, piece);
+        }
+        self.remember_inputs();
+        self.left_here.clear();
+        self.instant = place.t;
+        let key = Key {
+            closed: self.key.closed.clone(),
+            switches: place.switches.clone(),
+            sliding: Vec::new(),
+        };
+        self.key.clone_from(&key);
+        // Its state satisfies the constraints up to rounding; what is left of a jump is not worth a word.
+        let mut log = Log::new(0, f64::INFINITY, false);
+        let jumps = self.jumps;
+        self.started = false;
+        let result = self.change(key, true, Trigger::Sources, &mut log);
+        self.started = true;
+        self.jumps = jumps;
+        result
+    }
+
+    /// Takes over a place, without a mode, with the energy spent since [`Self::leave`].
+    pub(crate) fn stand_at(&mut self, place: &Place, energy: &Energy) {
+        self.motion.t = place.t;
+        self.storage.copy_from_slice(place.storage.as_slice());
+        self.rescale();
+        self.balance.add((energy.source, energy.dissipated));
+        self.note_stored();
+    }
+}

@@ -1,0 +1,134 @@
+//! The error a run of steps carries, from the steps themselves.
+//!
+//! With prescribed steps the local error is read from differences of consecutive states, h²x''/2 ≈ (x_{k+1} − 2x_k + x_{k−1})/2 for
+//! methods of order 1 (an upper estimate for θ = ½, γ = 1, where only λ is of order 1) and h³x'''/12 ≈ ∇³x/12 for the midpoint rule (E. Hairer, G. Wanner, Solving Ordinary Differential
+//! Equations II, IV.8), and carried along by the step's own map, e ← R e + local, so that what is forgotten leaves the estimate too.
+//! A step that changes the active set counts with order 1: somewhere in it x' has a kink. With chosen steps the errors of
+//! all of them are added: the flow of a passive circuit is a contraction.
+
+use crate::integrate::control::Amplitudes;
+use crate::lcs::Lcs;
+
+/// Steps whose difference in length is below this part are one step length.
+const SAME: f64 = 1e-9;
+
+/// See the [module](self).
+#[derive(Debug, Clone, Default)]
+pub(super) struct Estimate {
+    h: f64,
+    /// How many steps in a row of this length the differences come from.
+    known: u8,
+    difference: Vec<f64>,
+    second: Vec<f64>,
+    error: Vec<f64>,
+    carried: Vec<f64>,
+    /// Largest |e| and |x| of each state since the present system was entered.
+    largest: Vec<f64>,
+    amplitude: Vec<f64>,
+    /// The largest relative error in the systems left, or the sum of errors of chosen steps.
+    relative: f64,
+}
+
+impl Estimate {
+    /// For a system of n states whose start carries the error `error`.
+    pub(super) fn enter(&mut self, error: impl Iterator<Item = f64>) {
+        self.error.clear();
+        self.error.extend(error);
+        let n = self.error.len();
+        for v in [
+            &mut self.difference,
+            &mut self.second,
+            &mut self.carried,
+            &mut self.largest,
+            &mut self.amplitude,
+        ] {
+            v.clear();
+            v.resize(n, 0.0);
+        }
+        self.known = 0;
+    }
+
+    /// Copies another estimate into this one's buffers.
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        (self.h, self.known, self.relative) = (other.h, other.known, other.relative);
+        self.difference.clone_from(&other.difference);
+        self.second.clone_from(&other.second);
+        self.error.clone_from(&other.error);
+        self.carried.clone_from(&other.carried);
+        self.largest.clone_from(&other.largest);
+        self.amplitude.clone_from(&other.amplitude);
+    }
+
+    /// e now.
+    pub(super) fn error(&self) -> &[f64] {
+        &self.error
+    }
+
+    /// The differences so far say nothing about the next step: the state jumped, or a source did.
+    pub(super) fn restart(&mut self) {
+        self.known = 0;
+    }
+
+    /// Adds the error of an accepted step of chosen length, relative to the amplitude.
+    pub(super) fn add(&mut self, error: f64) {
+        self.relative += error;
+    }
+
+    /// A step of length h from `before` to `after`. `map` holds the rows of R (and whatever follows in them, `width` in
+    /// all), where the active set stayed.
+    #[inline]
+    pub(super) fn step(
+        &mut self,
+        h: f64,
+        before: &[f64],
+        after: &[f64],
+        map: Option<(&[f64], usize)>,
+        second_order: bool,
+    ) {
+        if (h - self.h).abs() > SAME * h {
+            (self.h, self.known) = (h, 0);
+        }
+        match map {
+            Some((rows, width)) => {
+                for (e, row) in self.carried.iter_mut().zip(rows.chunks_exact(width)) {
+                    *e = row.iter().zip(&self.error).map(|(r, e)| r * e).sum();
+                }
+            }
+            None => self.carried.copy_from_slice(&self.error),
+        }
+        // The first steps in a row have no differences; the first that has them counts for those too.
+        let (one, two) = match (self.known, second_order && map.is_some()) {
+            (0, _) | (1, true) => (0.0, 0.0),
+            (1, false) => (1.0, 0.0),
+            (_, false) => (0.5, 0.0),
+            (2, true) => (0.0, 3.0 / 12.0),
+            (_, true) => (0.0, 1.0 / 12.0),
+        };
+        for i in 0..before.len() {
+            let first = after[i] - before[i];
+            let second = first - self.difference[i];
+            let third = second - self.second[i];
+            self.error[i] = self.carried[i] + one * second + two * third;
+            self.largest[i] = self.largest[i].max(self.error[i].abs());
+            self.amplitude[i] = self.amplitude[i].max(after[i].abs());
+            (self.difference[i], self.second[i]) = (first, second);
+        }
+        self.known = match map {
+            Some(_) => (self.known + 1).min(3),
+            None => 0,
+        };
+    }
+
+    /// Takes the largest error in the present system into account, relative to amplitudes.
+    pub(super) fn settle(&mut self, lcs: &Lcs, amplitudes: &mut Amplitudes) {
+        amplitudes.see(lcs, &self.amplitude);
+        let nothing = vec![0.0; self.largest.len()];
+        let worst = amplitudes.error(lcs, &self.largest, &nothing);
+        self.relative = self.relative.max(worst);
+    }
+
+    /// The estimate, relative to the amplitude of the state it is largest for.
+    pub(super) fn relative(&self) -> f64 {
+        self.relative
+    }
+}

@@ -1,0 +1,42 @@
+//! `.step` and `.dc` as written.
+
+use super::{Expr, Name};
+use crate::diagnostic::Span;
+
+/// One quantity and the values it takes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sweep {
+    /// What changes.
+    pub target: Target,
+    /// Through which values.
+    pub points: Points,
+    /// From the target to the last value.
+    pub span: Span,
+}
+
+/// What a sweep changes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Target {
+    /// `param name`.
+    Param(Name),
+    /// `v1`: the DC value of a source, or a resistance.
+    Element(Name),
+    /// `temp`.
+    Temperature(Span),
+}
+
+/// The values of a sweep.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Points {
+    /// `start stop increment`.
+    Linear([Expr; 3]),
+    /// `dec start stop n`, `oct start stop n`: n values per factor of ten or two.
+    Logarithmic {
+        /// 10 or 2.
+        base: u32,
+        /// `start stop n`.
+        range: [Expr; 3],
+    },
+    /// `list a b c …`.
+    List(Vec<Expr>),
+}

@@ -1,0 +1,133 @@
+//! `.step`, `.dc`.
+
+use super::Dot;
+use crate::diagnostic::Diagnostic;
+use crate::netlist::ast::{Expr, Points, Statement, Sweep, Target};
+use crate::netlist::lex::{
+    Input, Parsed, at_end, between, blank, end, expect_word, missing, next_word, refuse, separator,
+    symbol, word,
+};
+use crate::netlist::operand;
+
+/// `.step [lin | dec | oct] [param] name start stop n`, `.step [param] name list a b c`.
+pub(super) fn step(i: Input<'_>) -> Parsed<'_, Dot> {
+    let (rest, sweep) = sweep(i)?;
+    let (rest, ()) = end(rest)?;
+    Ok((rest, Dot::statement(Statement::Step(sweep))))
+}
+
+/// `.dc v1 start stop increment [v2 start stop increment …]`.
+pub(super) fn dc(i: Input<'_>) -> Parsed<'_, Dot> {
+    let mut all = Vec::new();
+    let mut at = separator(i);
+    loop {
+        let (rest, one) = sweep(at)?;
+        all.push(one);
+        at = separator(rest);
+        if at_end(at) {
+            return Ok((at, Dot::statement(Statement::Dc(all))));
+        }
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Scale {
+    Linear,
+    Logarithmic(u32),
+    List,
+}
+
+fn scale(i: Input<'_>) -> Option<(Input<'_>, Scale)> {
+    let (rest, name) = word(separator(i)).ok()?;
+    let scale = match name.text.as_str() {
+        "lin" => Scale::Linear,
+        "dec" => Scale::Logarithmic(10),
+        "oct" => Scale::Logarithmic(2),
+        "list" => Scale::List,
+        _ => return None,
+    };
+    Some((rest, scale))
+}
+
+fn sweep(i: Input<'_>) -> Parsed<'_, Sweep> {
+    let start = blank(separator(i));
+    let (rest, before) = match scale(start) {
+        Some((rest, scale)) => (rest, Some(scale)),
+        None => (start, None),
+    };
+    let (rest, name) = expect_word(separator(rest), "a source, `param name` or `temp`")?;
+    let (rest, target) = match name.text.as_str() {
+        "param" => {
+            let (rest, name) = expect_word(rest, "the name of the parameter")?;
+            (rest, Target::Param(name))
+        }
+        "temp" | "temper" => (rest, Target::Temperature(name.span)),
+        _ => (rest, Target::Element(name)),
+    };
+    // LTspice's `npn 2n2222(vaf)`.
+    let model = |i| word(i).is_ok_and(|(rest, _)| symbol(rest, '(').is_some());
+    if symbol(rest, '(').is_some() || model(rest) {
+        let fault = Diagnostic::error(
+            "unsupported",
+            between(start, rest),
+            "a parameter of a model cannot be swept",
+        );
+        return Err(refuse(
+            fault
+                .label("recognised only")
+                .help("write `{name}` in the model and sweep that parameter"),
+        ));
+    }
+    let (mut at, scale) = match (before, scale(rest)) {
+        (None, Some((rest, scale))) => (rest, scale),
+        (before, _) => (rest, before.unwrap_or(Scale::Linear)),
+    };
+    let mut values: Vec<Expr> = Vec::new();
+    loop {
+        let next = separator(at);
+        let full = !matches!(scale, Scale::List) && values.len() == 3;
+        if full || at_end(next) {
+            break;
+        }
+        let (rest, value) = operand::value(next).map_err(|e| match e {
+            nom::Err::Error(_) => missing(next, "a value"),
+            e => e,
+        })?;
+        values.push(value);
+        at = rest;
+    }
+    let span = between(start, at);
+    let points = match scale {
+        Scale::List if values.is_empty() => return Err(missing(at, "a value")),
+        Scale::List => Points::List(values),
+        Scale::Linear | Scale::Logarithmic(_) => {
+            let range: [Expr; 3] = values.try_into().map_err(|values: Vec<Expr>| {
+                let what = match (values.len(), scale) {
+                    (0, _) => "the first value",
+                    (1, _) => "the last value",
+                    (_, Scale::Linear) => "the increment",
+                    _ => "the number of values per decade or octave",
+                };
+                if at_end(at) {
+                    missing(at, what)
+                } else {
+                    let fault =
+                        Diagnostic::error("missing", next_word(at), format!("expected {what}"));
+                    refuse(fault.label("expected a value"))
+                }
+            })?;
+            match scale {
+                Scale::Logarithmic(base) => Points::Logarithmic { base, range },
+                _ => Points::Linear(range),
+            }
+        }
+    };
+    Ok((
+        at,
+        Sweep {
+            target,
+            points,
+            span,
+        },
+    ))
+}

@@ -1,0 +1,165 @@
+//! The runs of `.step` together: one table of rows, one table of measurements, one summary.
+
+use serde_json::{Map, Value};
+
+use super::measured::Measurements;
+use super::{json, si, table};
+use crate::integrate::{Energy, Run, Stats};
+use crate::waveform::Waveforms;
+
+/// One of the runs.
+#[derive(Debug, Clone)]
+pub struct Step {
+    /// What is stepped and its value here.
+    pub values: Vec<(String, f64)>,
+    /// The run.
+    pub run: Run,
+    /// What was measured.
+    pub found: Measurements,
+}
+
+impl Step {
+    /// `r=1 c=2e-6`.
+    #[must_use]
+    pub fn label(&self) -> String {
+        label(&self.values)
+    }
+}
+
+/// `r=1 c=2e-6`.
+#[must_use]
+pub fn label(values: &[(String, f64)]) -> String {
+    let words: Vec<String> = values
+        .iter()
+        .map(|(name, value)| format!("{name}={}", si::plain(*value, 9)))
+        .collect();
+    words.join(" ")
+}
+
+/// The rows of all runs, one run after another, with a column for every stepped quantity after the signals.
+///
+/// Time starts anew with every run.
+#[must_use]
+pub fn rows(steps: &[Step]) -> Waveforms {
+    let Some(first) = steps.first() else {
+        return Waveforms::default();
+    };
+    let mut all = Waveforms {
+        title: first.run.waveforms.title.clone(),
+        names: first.run.waveforms.names.clone(),
+        units: first.run.waveforms.units.clone(),
+        ..Waveforms::default()
+    };
+    for (name, _) in &first.values {
+        all.names.push(name.clone());
+        all.units.push("");
+    }
+    for Step { values, run, .. } in steps {
+        for (k, &t) in run.waveforms.time.iter().enumerate() {
+            all.time.push(t);
+            all.values.extend_from_slice(run.waveforms.row(k));
+            all.values.extend(values.iter().map(|(_, value)| value));
+        }
+    }
+    all
+}
+
+/// A run that stands for all of them: counters and energies added up, each note once.
+#[must_use]
+pub fn total(steps: &[Step]) -> Run {
+    let mut total = Run::default();
+    for Step { run, .. } in steps {
+        if total.method.is_empty() {
+            total.method.clone_from(&run.method);
+            total.plan.clone_from(&run.plan);
+        }
+        let (sum, own) = (&mut total.stats, &run.stats);
+        *sum = Stats {
+            steps: sum.steps + own.steps,
+            rejected: sum.rejected + own.rejected,
+            events: sum.events + own.events,
+            jumps: sum.jumps + own.jumps,
+            modes: sum.modes + own.modes,
+            lcp_solves: sum.lcp_solves + own.lcp_solves,
+            pivotings: sum.pivotings + own.pivotings,
+            factorisations: sum.factorisations + own.factorisations,
+            cpu_seconds: sum.cpu_seconds + own.cpu_seconds,
+        };
+        let (sum, own) = (&mut total.energy, &run.energy);
+        *sum = Energy {
+            source: sum.source + own.source,
+            dissipated: sum.dissipated + own.dissipated,
+            stored: sum.stored + own.stored,
+            residual_relative: sum.residual_relative.max(own.residual_relative),
+        };
+        for note in &run.notes {
+            if !total.notes.contains(note) {
+                total.notes.push(note.clone());
+            }
+        }
+    }
+    total.waveforms = rows(steps);
+    total
+}
+
+/// The results of `.meas` with a line per run, and those of `.four` below each other.
+#[must_use]
+pub fn measured(steps: &[Step]) -> String {
+    let Some(first) = steps.first().filter(|step| !step.found.is_empty()) else {
+        return String::new();
+    };
+    let mut text = String::new();
+    if !first.found.measured.is_empty() {
+        let stepped = first.values.iter().map(|(name, _)| name.as_str());
+        let names = first.found.measured.iter().map(|m| m.name.as_str());
+        let header: Vec<&str> = stepped.chain(names).collect();
+        let rows: Vec<Vec<String>> = steps
+            .iter()
+            .map(|step| {
+                let values = step.values.iter().map(|(_, value)| si::plain(*value, 7));
+                let found = step.found.measured.iter().map(|m| match &m.result {
+                    Ok(found) => si::plain(found.value, 7),
+                    Err(_) => "failed".into(),
+                });
+                values.chain(found).collect()
+            })
+            .collect();
+        text.push_str(&table::aligned(&header, &rows));
+    }
+    for step in steps {
+        for measured in &step.found.measured {
+            if let Err(why) = &measured.result {
+                text.push_str(&format!(
+                    "{} failed at {}: {why}\n",
+                    measured.name,
+                    step.label()
+                ));
+            }
+        }
+    }
+    for step in steps {
+        let harmonics = Measurements {
+            measured: Vec::new(),
+            harmonics: step.found.harmonics.clone(),
+        };
+        if !harmonics.is_empty() {
+            text.push_str(&format!("{}\n{}", step.label(), harmonics.words()));
+        }
+    }
+    text
+}
+
+/// The summary of all runs, with theirs as `"runs"`, each with its `"values"`.
+#[must_use]
+pub fn summary(steps: &[Step]) -> String {
+    let mut all = json::summary_object(&total(steps), &Measurements::default());
+    let runs = steps.iter().map(|step| {
+        let mut own = json::summary_object(&step.run, &step.found);
+        let values = step.values.iter();
+        let values: Map<String, Value> = values.map(|(n, v)| (n.clone(), (*v).into())).collect();
+        own.insert("values".into(), Value::Object(values));
+        Value::Object(own)
+    });
+    all.insert("runs".into(), runs.collect());
+    json::line(&all)
+}

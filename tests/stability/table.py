@@ -1,0 +1,154 @@
+#!/usr/bin/env python3
+"""Runs every case of tests/stability with circ and with ngspice and writes the table of docs/stability.md.
+
+    tests/stability/table.py [CIRC]     CIRC is the program, default target/debug/circ
+
+A case is a netlist; its comments say what is right:
+
+    *CHECK PROBE at=T is=VALUE [of=SCALE] exact=R euler=R theta=R    |found - VALUE| <= R * SCALE (default |VALUE|)
+    *EITHER PROBE at=T is=VALUE or=OTHER ...                         the same with two right answers
+    *REFUSES METHOD...                                               there is no solution, and the method must say so
+    *STEP H                                                          fixed step of euler and theta
+
+`tests/stability.rs` holds the methods to it; this script only reports.
+"""
+
+import bisect
+import csv
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+sys.path.insert(0, str(HERE.parent / "reference"))
+from make import column, interpolate, raw, seconds, version  # noqa: E402
+
+METHODS = ["exact", "euler", "theta"]
+# What ngspice is given for what only exists here: ideal switches, and edges that take no time (it would take a print step).
+SUBSTITUTED = [(r"sw\(ideal", "sw(ron=1u roff=1g"), (r"(pulse\(\S+ \S+ \S+) 0 0 ", r"\1 1n 1n ")]
+
+
+class Case:
+    def __init__(self, path):
+        self.name, self.text = path.stem, path.read_text()
+        self.title = self.text.splitlines()[0]
+        self.checks = [
+            (kind, probe, dict(word.split("=") for word in rest.split()))
+            for kind, probe, rest in re.findall(r"^\*(CHECK|EITHER) (\S+) (.*)$", self.text, re.M)
+        ]
+        refuses = re.search(r"^\*REFUSES (.*)$", self.text, re.M)
+        self.refuses = refuses[1].split() if refuses else []
+        step = re.search(r"^\*STEP (\S+)$", self.text, re.M)
+        self.step = step[1] if step else None
+
+    def errors(self, value, method):
+        """(relative error, what was wrong) per check."""
+        for _, probe, words in self.checks:
+            if method in METHODS and method not in words:
+                continue
+            if method not in METHODS and probe.startswith("i(d"):
+                continue  # ngspice does not write the currents of devices
+            right = [float(words[key]) for key in ("is", "or") if key in words]
+            scale = seconds(words["of"]) if "of" in words else max(map(abs, right))
+            found = value(probe, seconds(words["at"]))
+            error = min(abs(found - r) for r in right) / scale
+            yield error, f"{probe} = {found:.4g} instead of {right[0]:.4g}"
+
+
+def worst(errors):
+    found = list(errors)
+    if not found:
+        return "not run"
+    error, what = max(found)
+    return f"{error:.0e}" if error <= 0.05 else f"**{what}**"
+
+
+def circ(program, case, method):
+    if method not in case.refuses and not any(method in words for _, _, words in case.checks):
+        return "not run"
+    with tempfile.TemporaryDirectory() as tmp:
+        out = pathlib.Path(tmp) / "out.csv"
+        words = [program, "sim", str(HERE / f"{case.name}.cir"), "--method", method, "-o", str(out)]
+        if case.step and method != "exact":
+            words += ["--step", case.step]
+        try:
+            run = subprocess.run(words, capture_output=True, text=True, timeout=60)
+        except subprocess.TimeoutExpired:
+            return "**no answer within 60 s**"
+        if run.returncode != 0:
+            lines = [line for line in run.stderr.splitlines() if line.startswith("error")]
+            reason = (lines or run.stderr.splitlines() or ["?"])[0].removeprefix("error: ")
+            reason = reason.split(".cir: ")[-1].split("; `uic`")[0]
+            return f"refuses: {reason}" if method in case.refuses else f"**{reason}**"
+        if method in case.refuses:
+            return "**runs**"
+        rows = list(csv.reader(out.open()))
+        times = [float(row[0]) for row in rows[1:]]
+
+        def value(probe, t):
+            j = rows[0].index(probe)
+            k = min(range(len(times)), key=lambda k: abs(times[k] - t))
+            return float(rows[k + 1][j])
+
+        return worst(case.errors(value, method))
+
+
+def ngspice(case):
+    deck = re.sub(r"^\.save.*\n", "", case.text, flags=re.M)
+    for pattern, other in SUBSTITUTED:
+        deck = re.sub(pattern, other, deck)
+    with tempfile.TemporaryDirectory() as tmp:
+        path, out = pathlib.Path(tmp) / "deck.cir", pathlib.Path(tmp) / "out.raw"
+        path.write_text(deck)
+        try:
+            run = subprocess.run(["ngspice", "-n", "-b", "-r", str(out), str(path)], cwd=tmp, capture_output=True,
+                                 text=True, stdin=subprocess.DEVNULL, timeout=60)
+        except subprocess.TimeoutExpired:
+            return "**no answer within 60 s**"
+        said = [line.strip() for line in (run.stdout + run.stderr).splitlines()]
+        words = [s for s in said if re.search(r"too small|singular|[Ee]rror|failed|iterations", s)]
+        words.sort(key=lambda s: not s.startswith("doAnalyses"))
+        quote = f"“{words[0].removeprefix('doAnalyses: ')}”" if words else ""
+        if run.returncode != 0 or not out.exists():
+            return f"gives up: {quote or f'exit status {run.returncode}'}"
+        names, values = raw(out)
+        if not values or not values[0]:
+            return f"gives up: {quote or 'no rows'}"
+        times = values[0]
+        if case.refuses:
+            probe = re.search(r"^\.save (\S+)", case.text, re.M)[1]
+            return f"**runs**: {probe} = {column(names, values, probe)[-1]:.4g} at the end"
+
+        def value(probe, t):
+            return interpolate(t, times, column(names, values, probe))
+
+        short = "" if times[-1] > 0.999 * max(seconds(w["at"]) for _, _, w in case.checks) else ", stops early"
+        return worst(case.errors(value, "ngspice")) + short + (f"; {quote}" if short else "")
+
+
+def cases():
+    return [Case(path) for path in sorted(HERE.glob("*.cir"))]
+
+
+def table(program):
+    lines = ["| case | exact | Moreau (`euler`) | `theta` | ngspice |", "|---|---|---|---|---|"]
+    for case in cases():
+        cells = [circ(program, case, method) for method in METHODS] + [ngspice(case)]
+        cells = ["the same" if k in (1, 2) and cell[:8] == cells[0][:8] == "refuses:" else cell.replace("|", "\\|")
+                 for k, cell in enumerate(cells)]
+        lines.append(f"| [{case.title}](../tests/stability/{case.name}.cir) | " + " | ".join(cells) + " |")
+        print(case.name, *cells, sep="\n    ")
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    program = str(pathlib.Path(sys.argv[1]).resolve()) if len(sys.argv) > 1 else str(ROOT / "target/debug/circ")
+    page = ROOT / "docs/stability.md"
+    marks = f"<!-- tests/stability/table.py, {version()} -->\n", "<!-- end -->\n"
+    made = marks[0] + table(program) + marks[1]
+    text = page.read_text()
+    start, end = text.index("<!-- tests/stability/table.py"), text.index(marks[1]) + len(marks[1])
+    page.write_text(text[:start] + made + text[end:])

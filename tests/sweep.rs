@@ -1,0 +1,322 @@
+//! `.step` and `.dc`: values, their order, what comes out, and what is refused.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use circ::circuit::{ElaborateOptions, Swept, combinations, elaborate};
+use circ::diagnostic::SourceMap;
+use circ::netlist::parse;
+use serde_json::Value;
+
+const DISCHARGE: &str = "\
+a capacitor discharges
+c1 out 0 {c} ic=1
+r1 out 0 {r}
+.param r=7k
+.tran 0.5m 1m uic
+.step param r list 1k 2k
+.step dec param c 1u 10u 1
+.meas tran half when v(out)=0.5 fall=1
+.save v(out)
+.end
+";
+
+fn circ(directory: &Path, arguments: &str) -> (i32, String, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_circ"))
+        .current_dir(directory)
+        .args(arguments.split_whitespace())
+        .stdin(Stdio::null())
+        .output()
+        .unwrap();
+    (
+        output.status.code().unwrap(),
+        String::from_utf8(output.stdout).unwrap(),
+        String::from_utf8(output.stderr).unwrap(),
+    )
+}
+
+fn place(netlist: &str) -> tempfile::TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    fs::write(directory.path().join("a.cir"), netlist).unwrap();
+    directory
+}
+
+fn table(csv: &str) -> (Vec<&str>, Vec<Vec<f64>>) {
+    let mut lines = csv.lines();
+    let names = lines.next().unwrap().split(',').collect();
+    let row = |line: &str| line.split(',').map(|cell| cell.parse().unwrap()).collect();
+    (names, lines.map(row).collect())
+}
+
+/// Rows of all runs below each other, the first `.step` innermost: v = exp(−t/rc).
+#[test]
+fn every_combination_is_run_in_order() {
+    let place = place(DISCHARGE);
+    let (status, out, err) = circ(place.path(), "sim a.cir");
+    assert_eq!(status, 0, "{err}");
+    let (names, rows) = table(&out);
+    assert_eq!(names, ["time", "v(out)", "r", "c"]);
+    let mut expected = Vec::new();
+    for c in [1e-6, 1e-5] {
+        for r in [1e3, 2e3] {
+            for t in [0.0, 0.5e-3, 1e-3] {
+                expected.push([t, f64::exp(-t / (r * c)), r, c]);
+            }
+        }
+    }
+    assert_eq!(rows.len(), expected.len());
+    for (row, expected) in rows.iter().zip(&expected) {
+        for (a, b) in row.iter().zip(expected) {
+            assert!(
+                (a - b).abs() <= 1e-9 * b.abs(),
+                "{row:?} is not {expected:?}"
+            );
+        }
+    }
+    // Half of the voltage after rc·ln 2, where the run is long enough.
+    insta::assert_snapshot!(err, @r"
+    r        c          half
+    1000  1e-6  0.0006931472
+    2000  1e-6        failed
+    1000  1e-5        failed
+    2000  1e-5        failed
+    half failed at r=2000 c=1e-6: the value 0.5 is not crossed
+    half failed at r=1000 c=1e-5: the value 0.5 is not crossed
+    half failed at r=2000 c=1e-5: the value 0.5 is not crossed
+    ");
+}
+
+#[test]
+fn files_and_summary_hold_all_runs() {
+    let place = place(DISCHARGE);
+    let arguments =
+        "sim a.cir -o a.csv -o a.json -o a.raw -o a.npz -o a.svg -o a.html --summary json";
+    let (status, _, err) = circ(place.path(), arguments);
+    assert_eq!(status, 0, "{err}");
+    let summary: Value = serde_json::from_str(err.lines().last().unwrap()).unwrap();
+    let runs = summary["runs"].as_array().unwrap();
+    assert_eq!(runs.len(), 4);
+    assert_eq!(runs[1]["values"]["r"], 2000.0);
+    let half = runs[0]["measurements"][0]["value"].as_f64().unwrap();
+    assert!((half / (1e-3 * 2_f64.ln()) - 1.0).abs() < 1e-6);
+    let work = |summary: &Value| summary["steps"].as_u64().unwrap();
+    assert_eq!(work(&summary), runs.iter().map(work).sum::<u64>());
+    let read = |name: &str| fs::read(place.path().join(name)).unwrap();
+    let picture = String::from_utf8(read("a.svg")).unwrap();
+    for label in ["v(out) r=1000 c=1e-6", "v(out) r=2000 c=1e-5"] {
+        assert!(picture.contains(label), "{label}");
+    }
+    let json: Value = serde_json::from_slice(&read("a.json")).unwrap();
+    assert_eq!(json["time"].as_array().unwrap().len(), 12);
+    assert!(!read("a.raw").is_empty() && !read("a.npz").is_empty() && !read("a.html").is_empty());
+}
+
+#[test]
+fn a_value_from_outside_is_not_stepped() {
+    let place = place(DISCHARGE);
+    let (status, out, err) = circ(place.path(), "sim a.cir --param r=3k --param c=1u");
+    assert_eq!(status, 0, "{err}");
+    let (names, rows) = table(&out);
+    assert_eq!(names, ["time", "v(out)"]);
+    assert!((rows[2][1] - f64::exp(-1.0 / 3.0)).abs() < 1e-12);
+}
+
+/// A run that breaks off is named, and written as far as it came; the others are written whole.
+#[test]
+fn a_run_that_fails_does_not_take_the_others_with_it() {
+    let place = place(
+        "a current that the diode blocks from 1 ms on, if it is positive
+i1 0 a pwl(0 -1 2m {i})
+d1 0 a di
+.model di d(ideal)
+.tran 0.5m 2m
+.step param i list 1 -1
+.save v(a) i(d1)
+.end
+",
+    );
+    let (status, out, err) = circ(place.path(), "sim a.cir");
+    assert_eq!(status, 2);
+    let rows = table(&out).1;
+    let times = |i: f64| -> Vec<f64> { rows.iter().filter(|r| r[3] == i).map(|r| r[0]).collect() };
+    assert_eq!(times(1.0), [0.0, 0.5e-3, 1e-3]);
+    assert_eq!(times(-1.0), [0.0, 0.5e-3, 1e-3, 1.5e-3, 2e-3]);
+    assert!(
+        err.contains("a.cir at i=1: at t = ") && !err.contains("i=-1"),
+        "{err}"
+    );
+}
+
+/// A value that makes no circuit ends it all, and is named.
+#[test]
+fn a_value_without_a_circuit_is_named() {
+    let place = place(
+        "a conductance
+v1 a 0 1
+r1 a 0 {1/g}
+.tran 1m 2m
+.step param g 1 0 1
+.end
+",
+    );
+    let (status, out, err) = circ(place.path(), "sim a.cir");
+    assert_eq!((status, out.as_str()), (2, ""));
+    assert!(
+        err.contains("1 error at g=0") && err.contains("divides by zero"),
+        "{err}"
+    );
+}
+
+/// A divider with a diode: v = (v1/r + i1 + 0.7/rd) / (2/r + 1/rd) where it conducts, else (v1/r + i1)·r/2.
+#[test]
+fn operating_points_over_two_sources() {
+    let place = place(
+        "a clamp
+v1 in 0 pulse(0 1 0 1 1 1 4)
+r1 in out 1k
+d1 out 0 di
+r2 out 0 1k
+i1 0 out 0
+.model di d(ron=1 vfwd=0.7)
+.dc v1 -1 3 1 i1 0 1m 0.5m
+.print dc v(out) i(d1)
+.print tran v(in)
+.end
+",
+    );
+    let (status, out, err) = circ(place.path(), "sim a.cir");
+    assert_eq!(status, 0, "{err}");
+    let (names, rows) = table(&out);
+    assert_eq!(names, ["v1", "i1", "v(out)", "i(d1)"]);
+    let mut expected = rows.iter();
+    for i1 in [0.0, 0.5e-3, 1e-3] {
+        for v1 in [-1.0, 0.0, 1.0, 2.0, 3.0] {
+            let row = expected.next().unwrap();
+            let blocks = (v1 / 1e3 + i1) * 500.0;
+            let conducts = (v1 / 1e3 + i1 + 0.7) / (2e-3 + 1.0);
+            let out = if blocks > 0.7 { conducts } else { blocks };
+            assert_eq!(row[..2], [v1, i1]);
+            assert!((row[2] - out).abs() < 1e-12, "{row:?} {out}");
+            assert!((row[3] - (out - 0.7).max(0.0)).abs() < 1e-12, "{row:?}");
+        }
+    }
+    assert!(expected.next().is_none());
+}
+
+fn steps(card: &str) -> (Vec<(Swept, Vec<f64>)>, Vec<String>) {
+    let text = format!("t\nv1 a 0 1\nr1 a 0 {{1k+temp+x}}\n.param x=1\n.tran 1 2\n{card}\n.end\n");
+    let mut sources = SourceMap::default();
+    let root = sources.add("a.cir", text);
+    let (netlist, mut findings) = parse(&mut sources, root, &|_| {
+        Err(std::io::ErrorKind::NotFound.into())
+    });
+    let (circuit, more) = elaborate(&netlist, &ElaborateOptions::default());
+    findings.extend(more);
+    let sweeps = circuit.map_or(vec![], |c| {
+        c.steps.into_iter().map(|s| (s.what, s.values)).collect()
+    });
+    (sweeps, findings.into_iter().map(|d| d.message).collect())
+}
+
+#[test]
+fn values_of_sweeps() {
+    let x = || Swept::Param("x".into());
+    let v1 = || Swept::Element("v1".into());
+    for (card, what, expected) in [
+        (
+            ".step param x 1 2 0.25",
+            x(),
+            vec![1.0, 1.25, 1.5, 1.75, 2.0],
+        ),
+        (
+            ".step param x 0.1 0.5 0.1",
+            x(),
+            vec![0.1, 0.2, 0.30000000000000004, 0.4, 0.5],
+        ),
+        (".step x 3 0 -2", x(), vec![3.0, 1.0]),
+        (".step v1 3 0 2", v1(), vec![3.0, 1.0]),
+        (
+            ".step lin r1 1k 2k 1k",
+            Swept::Element("r1".into()),
+            vec![1e3, 2e3],
+        ),
+        (
+            ".step temp list -40 27 {2*50}",
+            Swept::Temperature,
+            vec![-40.0, 27.0, 100.0],
+        ),
+        (".step oct v1 1 8 1", v1(), vec![1.0, 2.0, 4.0, 8.0]),
+        (".step param x dec 100 1 1", x(), vec![100.0, 10.0, 1.0]),
+        (".step param y list 4", Swept::Param("y".into()), vec![4.0]),
+    ] {
+        let (sweeps, findings) = steps(card);
+        assert_eq!(findings, Vec::<String>::new(), "{card}");
+        assert_eq!(sweeps.len(), 1, "{card}");
+        assert_eq!(sweeps[0].0, what);
+        assert_eq!(
+            sweeps[0].1.len(),
+            expected.len(),
+            "{card} {:?}",
+            sweeps[0].1
+        );
+        for (a, b) in sweeps[0].1.iter().zip(&expected) {
+            assert!((a - b).abs() <= 1e-12 * b.abs(), "{card}");
+        }
+    }
+    for (card, message) in [
+        (".step param x 1 2", "the increment is missing"),
+        (".step param x 1 2 0", "the increment of the sweep is zero"),
+        (".step param x 0 1 1e-9", "the sweep has too many values"),
+        (
+            ".step dec param x 0 1 5",
+            "a logarithmic sweep needs values of one sign, and at least one per decade or octave",
+        ),
+        (
+            ".step v7 0 1 1",
+            "there is neither a source nor a parameter `v7`",
+        ),
+        (
+            ".step d dmod(is) 1 2 1",
+            "a parameter of a model cannot be swept",
+        ),
+        (".step param x list", "a value is missing"),
+        (".step", "a source, `param name` or `temp` is missing"),
+    ] {
+        let (sweeps, findings) = steps(card);
+        assert!(
+            sweeps.is_empty() && findings == [message],
+            "{card}: {findings:?}"
+        );
+    }
+}
+
+#[test]
+fn nothing_to_sweep_is_one_combination() {
+    assert_eq!(combinations(&[]), [Vec::<f64>::new()]);
+}
+
+/// The temperature is the name `temp` of expressions; a resistance and a source are set by their names.
+#[test]
+fn what_is_swept_is_set() {
+    let netlist = "\
+t
+v1 a 0 1
+r1 a b {1k+temp}
+r2 b 0 1k
+.dc temp 0 100 100 v1 1 2 1 r2 1k 3k 2k
+.end
+";
+    let place = place(netlist);
+    let (status, out, err) = circ(place.path(), "sim a.cir --probe v(b)");
+    assert_eq!(status, 0, "{err}");
+    let (names, rows) = table(&out);
+    assert_eq!(names, ["temp", "v1", "r2", "v(b)"]);
+    assert_eq!(rows.len(), 8);
+    for row in rows {
+        let [temp, v1, r2, vb] = row[..] else {
+            panic!()
+        };
+        assert!((vb - v1 * r2 / (r2 + 1e3 + temp)).abs() < 1e-12);
+    }
+}
