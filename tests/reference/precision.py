@@ -174,9 +174,11 @@ def main():
             f"Geometric mean of the ratios: {mean:.0f}, smallest {min(ratios):.0f} ({version}, {platform.machine()}).",
         ]
     )
+    pictures = [f"![{name}: error against run time](precision/{name}.svg)" for name in names or CIRCUITS]
     if importlib.util.find_spec("pulsim"):
         head = ["", "| netlist | Pulsim 2.0 | CPU | error |", "|---|---|---|---|"]
-        table += "\n".join(["", *head, *pulsim(circ), ""])
+        table += "\n".join(["", *head, *pulsim(circ)])
+    table += "\n\n" + "\n".join(pictures)
     begin, end = "<!-- precision.py begins -->", "<!-- precision.py ends -->"
     text = PAGE.read_text()
     before, after = text.split(begin)[0], text.split(end)[1]
