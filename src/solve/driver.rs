@@ -6,6 +6,7 @@ use super::active::ActiveSolve;
 use super::lawful::{Lawful, PortLaw};
 use super::lcp::{Answered, Lcp, Scaling, Solution, Status};
 use super::lemke::{self, Lemke};
+use super::parts::Parts;
 use super::{convex, norm, pivot};
 
 /// Factored active sets kept per matrix; the oldest goes first.
@@ -21,6 +22,8 @@ pub struct Driver {
     monotone: bool,
     warm: Vec<bool>,
     sets: Vec<(Vec<bool>, ActiveSolve)>,
+    /// Where M falls into parts; these then do everything.
+    parts: Option<Parts>,
     /// Where a port has a law other than 0 ≤ λ ⟂ y ≥ 0.
     lawful: Option<Box<Lawful>>,
     /// Factorisations computed so far.
@@ -48,6 +51,7 @@ impl Driver {
         });
         let monotone = is_monotone(&scaled.m);
         Self {
+            parts: Parts::of(&scaled.m, tolerance),
             scaled,
             scaling,
             tolerance,
@@ -101,6 +105,14 @@ impl Driver {
             return lawful.solve(q);
         }
         self.scaled.q = q.component_mul(&self.scaling.d);
+        if let Some(parts) = &mut self.parts {
+            let found = parts.solve(&self.scaled.q, &self.warm);
+            self.factorisations = parts.factorisations();
+            if found.status == Status::Solved {
+                self.warm.copy_from_slice(&found.basis);
+            }
+            return self.in_own_units(found);
+        }
         let size = self.scaled.size();
         let slack = SLACK * self.scaled.q.amax();
         let mut best = self.candidate(DVector::zeros(size), vec![false; size], Answered::Warm);
@@ -154,6 +166,15 @@ impl Driver {
         self.scaled.q = q.component_mul(&self.scaling.d);
         let scaled = solution.lambda.component_div(&self.scaling.d);
         let y = self.scaled.y(&scaled);
+        if let Some(parts) = &mut self.parts {
+            let solution = Solution {
+                lambda: scaled,
+                y,
+                ..solution.clone()
+            };
+            let (lambda, unique) = parts.least_norm(&self.scaled.q, &solution);
+            return (self.scaling.unscale(&lambda), unique);
+        }
         let scale = scaled.amax().max(self.scaled.q.amax());
         let strict = scaled
             .iter()
@@ -171,6 +192,19 @@ impl Driver {
             (found.lambda, unique)
         } else {
             (solution.lambda.clone(), unique)
+        }
+    }
+
+    /// A solution of the scaled problem in the units of M.
+    fn in_own_units(&self, found: Solution) -> Solution {
+        Solution {
+            status: match found.status {
+                Status::Infeasible(ray) => Status::Infeasible(self.scaling.unscale(&ray)),
+                other => other,
+            },
+            lambda: self.scaling.unscale(&found.lambda),
+            y: found.y.component_div(&self.scaling.d),
+            ..found
         }
     }
 

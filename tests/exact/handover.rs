@@ -74,30 +74,22 @@ fn a_circuit_without_solution_is_an_error_of_both() {
     );
 }
 
-/// Two switches and a relay on one node: at 80 µs no combination of them and the diode holds for any time.
-const NO_MODE: &str = "V1 1 0 pulse(-5 5 0 0.1m 0.1m 0.4m 1m)\nVr ref 0 3\nR2 2 1 5k\nR3 3 1 9k\nR4 4 2 2k\nR5 5 3 80\n\
+/// Two switches, a diode and a relay around one inductor: at 80 µs closing the switch takes an impulse, at 100 µs and on the
+/// relay holds its input.
+const ENTANGLED: &str = "V1 1 0 pulse(-5 5 0 0.1m 0.1m 0.4m 1m)\nVr ref 0 3\nR2 2 1 5k\nR3 3 1 9k\nR4 4 2 2k\nR5 5 3 80\n\
     C0 5 0 2u ic=0\nS1 2 5 1 ref sa\nD2 0 2 d\nS3 3 2 ref 5 sb\nC4 1 5 7u ic=5\nG5 2 0 4 0 -0.2m\nL6 2 1 0.4m ic=0\n\
     B7 x7 0 v=2*sgn(v(4)-v(ref))\nR7 x7 3 500\n.model d d(ideal)\n.model sa sw(ideal vt=0 vh=0)\n\
     .model sb sw(ron=0.1 roff=inf vt=0 vh=0.1)\n.tran 20u 1m uic\n.save v(5) i(l6)";
 
 #[test]
-fn an_event_without_a_next_mode_is_left_to_steps() {
-    let error = try_run(NO_MODE, by(Method::Exact)).expect_err("no mode");
-    assert!(matches!(error.reason, Reason::Infeasible), "{error}");
-    assert_eq!(error.device.as_deref(), Some("s1"));
-    assert!((error.t.expect("a time") - 80e-6).abs() < 1e-12, "{error}");
-    let run = try_run(NO_MODE, by(Method::Auto)).unwrap_or_else(|e| panic!("{e}"));
-    let note = run.notes.iter().find(|n| n.contains("took the place"));
-    let note = note.unwrap_or_else(|| panic!("{:?}", run.notes));
-    assert!(
-        note.contains("s1: the one-step") && note.contains("8e-5"),
-        "{note}"
-    );
+fn entangled_switches_agree_with_steps() {
+    let run = try_run(ENTANGLED, by(Method::Auto)).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(run.method, "exact");
     let steps = SimOptions {
         step: Some(2e-8),
         ..by(Method::Euler)
     };
-    let moreau = try_run(NO_MODE, steps).unwrap_or_else(|e| panic!("{e}"));
+    let moreau = try_run(ENTANGLED, steps).unwrap_or_else(|e| panic!("{e}"));
     for (a, b) in run.waveforms.values.iter().zip(&moreau.waveforms.values) {
         assert!((a - b).abs() < 0.05, "{a} {b}");
     }

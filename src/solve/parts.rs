@@ -1,0 +1,134 @@
+//! Problems that fall into parts without an entry of M between them.
+//!
+//! Each part is solved alone and accepted at its own size: a rectifier of nanovolts beside one of gigavolts would else be rounding.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::Driver;
+use super::lcp::{Answered, Solution, Status};
+
+/// The drivers of the parts of M, with the ports each has; none where M is one part.
+#[derive(Debug, Clone)]
+pub(super) struct Parts(Vec<(Vec<usize>, Driver)>);
+
+impl Parts {
+    /// The parts of M, at least two of them.
+    pub(super) fn of(m: &DMatrix<f64>, tolerance: f64) -> Option<Self> {
+        let size = m.nrows();
+        let mut label: Vec<usize> = (0..size).collect();
+        for i in 0..size {
+            for j in 0..i {
+                if (m[(i, j)] != 0.0 || m[(j, i)] != 0.0) && label[i] != label[j] {
+                    let (from, to) = (label[i].max(label[j]), label[i].min(label[j]));
+                    label
+                        .iter_mut()
+                        .filter(|l| **l == from)
+                        .for_each(|l| *l = to);
+                }
+            }
+        }
+        let groups: Vec<Vec<usize>> = (0..size)
+            .map(|k| (0..size).filter(|&i| label[i] == k).collect::<Vec<_>>())
+            .filter(|group| !group.is_empty())
+            .collect();
+        let driver = |group: Vec<usize>| {
+            let part = m.select_rows(&group).select_columns(&group);
+            (group, Driver::new(part, tolerance))
+        };
+        (groups.len() > 1).then(|| Self(groups.into_iter().map(driver).collect()))
+    }
+
+    /// Solves all parts, each first with its part of `warm`.
+    pub(super) fn solve(&mut self, q: &DVector<f64>, warm: &[bool]) -> Solution {
+        let size = q.len();
+        let mut whole = Solution {
+            status: Status::Solved,
+            lambda: DVector::zeros(size),
+            y: DVector::zeros(size),
+            residual: 0.0,
+            active: vec![None; size],
+            basis: vec![false; size],
+            by: Answered::Warm,
+        };
+        for (group, driver) in &mut self.0 {
+            let first: Vec<bool> = group.iter().map(|&j| warm[j]).collect();
+            driver.suggest(&first);
+            let found = driver.solve(&q.select_rows(&*group));
+            for (k, &j) in group.iter().enumerate() {
+                whole.lambda[j] = found.lambda[k];
+                whole.y[j] = found.y[k];
+                whole.active[j] = found.active[k];
+                whole.basis[j] = found.basis[k];
+            }
+            whole.residual = whole.residual.max(found.residual);
+            match (found.status, &whole.status) {
+                (Status::Infeasible(ray), Status::Solved | Status::Failed) => {
+                    let mut all = DVector::zeros(size);
+                    group.iter().zip(ray.iter()).for_each(|(&j, v)| all[j] = *v);
+                    (whole.status, whole.by) = (Status::Infeasible(all), found.by);
+                }
+                (Status::Failed, Status::Solved) => {
+                    (whole.status, whole.by) = (Status::Failed, found.by);
+                }
+                (_, Status::Solved) if found.by != Answered::Warm => whole.by = found.by,
+                _ => {}
+            }
+        }
+        whole
+    }
+
+    /// See [`Driver::least_norm`].
+    pub(super) fn least_norm(
+        &mut self,
+        q: &DVector<f64>,
+        solution: &Solution,
+    ) -> (DVector<f64>, bool) {
+        let (mut lambda, mut unique) = (solution.lambda.clone(), true);
+        for (group, driver) in &mut self.0 {
+            let part = Solution {
+                status: Status::Solved,
+                lambda: solution.lambda.select_rows(&*group),
+                y: solution.y.select_rows(&*group),
+                residual: solution.residual,
+                active: group.iter().map(|&j| solution.active[j]).collect(),
+                basis: group.iter().map(|&j| solution.basis[j]).collect(),
+                by: solution.by,
+            };
+            let (least, alone) = driver.least_norm(&q.select_rows(&*group), &part);
+            group
+                .iter()
+                .zip(least.iter())
+                .for_each(|(&j, v)| lambda[j] = *v);
+            unique &= alone;
+        }
+        (lambda, unique)
+    }
+
+    /// Factorisations computed so far.
+    pub(super) fn factorisations(&self) -> u64 {
+        self.0.iter().map(|(_, driver)| driver.factorisations).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{dmatrix, dvector};
+
+    #[test]
+    fn a_small_part_is_solved_beside_a_large_one() {
+        let m = dmatrix![2.0, 0.0, 0.0; 0.0, 1.0, 1.0; 0.0, -1.0, 0.0];
+        let mut driver = Driver::new(m, 1e-9);
+        let found = driver.solve(&dvector![-1e-9, -1e9, 2.0]);
+        assert_eq!(found.status, Status::Solved);
+        assert_eq!(found.lambda, dvector![5e-10, 2.0, 1e9 - 2.0]);
+        assert_eq!(found.active, vec![Some(true); 3]);
+    }
+
+    #[test]
+    fn the_ray_of_one_part_is_a_ray_of_the_whole() {
+        let mut driver = Driver::new(dmatrix![1.0, 0.0; 0.0, 0.0], 1e-9);
+        let found = driver.solve(&dvector![-1.0, -2.0]);
+        assert_eq!(found.status, Status::Infeasible(dvector![0.0, 0.5]));
+    }
+}
