@@ -34,6 +34,7 @@ def bench(circ, name):
     with tempfile.TemporaryDirectory() as folder:
         data = pathlib.Path(folder) / "bench.json"
         picture = ROOT / "docs" / "precision" / f"{name}.svg"
+        picture.parent.mkdir(exist_ok=True)
         netlist = ROOT / "netlists" / f"{name}.cir"
         command = [circ, "bench", netlist, "--against", "ngspice", "--quiet", "-o", data, "-o", picture]
         subprocess.run(command, check=True, cwd=ROOT)
