@@ -19,8 +19,8 @@ use crate::diagnostic::Diagnostic;
 use crate::law::{Exponential, Law};
 use crate::netlist::ast::{self, Assign, Expr, Name};
 
-/// Temperature of the junctions, °C.
-const CELSIUS: f64 = 27.0;
+/// Temperature at which parameters were measured where TNOM does not say, °C.
+const NOMINAL: f64 = 27.0;
 /// The current at which an ideal junction has its drop, A.
 const RATED: f64 = 1e-3;
 
@@ -32,6 +32,8 @@ struct Figures {
     reverse: (f64, f64),
     /// RC, RB, RE, Ω.
     ohms: [f64; 3],
+    /// kT/q, V.
+    thermal: f64,
 }
 
 impl<'n> Builder<'n, '_> {
@@ -88,7 +90,7 @@ impl<'n> Builder<'n, '_> {
         let [c, b, e] = inner;
         let ideal = self.options.diodes == Diodes::Ideal;
         let junction = |(beta, emission): (f64, f64)| {
-            let slope = emission * Exponential::thermal_voltage(CELSIUS);
+            let slope = emission * figures.thermal;
             let is = figures.is / beta;
             Kind::Device(if ideal {
                 Law::Diode {
@@ -184,15 +186,20 @@ impl<'n> Builder<'n, '_> {
             }
         };
         let params = Parameters::new(&chain);
+        let thermal = Exponential::thermal_voltage(self.scopes.temperature.f64);
         let mut number = |name: &str, otherwise: f64| -> Option<f64> {
             Some(
                 self.parameter(&params, name, scope)?
                     .map_or(otherwise, |v| v.f64),
             )
         };
-        let is = number("is", 1e-16)?;
-        let forward = (number("bf", 100.0)?, number("nf", 1.0)?);
-        let reverse = (number("br", 1.0)?, number("nr", 1.0)?);
+        // IS(T) = IS (T/Tnom)^XTI exp((T/Tnom − 1) EG q/kT), β(T) = β (T/Tnom)^XTB.
+        let ratio = thermal / Exponential::thermal_voltage(number("tnom", NOMINAL)?);
+        let (eg, xti) = (number("eg", 1.11)?, number("xti", 3.0)?);
+        let gain = ratio.powf(number("xtb", 0.0)?);
+        let is = number("is", 1e-16)? * ratio.powf(xti) * ((ratio - 1.0) * eg / thermal).exp();
+        let forward = (number("bf", 100.0)? * gain, number("nf", 1.0)?);
+        let reverse = (number("br", 1.0)? * gain, number("nr", 1.0)?);
         let ohms = [number("rc", 0.0)?, number("rb", 0.0)?, number("re", 0.0)?];
         let m = self.arg(args, &["m"], scope)?.map_or(1.0, |v| v.f64);
         let area = match area.or(args.get(&["area"])) {
@@ -201,7 +208,7 @@ impl<'n> Builder<'n, '_> {
         };
         let times = m * area;
         let positive = [is, forward.0, forward.1, reverse.0, reverse.1, times];
-        if positive.iter().any(|x| *x <= 0.0) || ohms.iter().any(|x| *x < 0.0) {
+        if positive.iter().any(|x| !x.is_finite() || *x <= 0.0) || ohms.iter().any(|x| *x < 0.0) {
             let message = format!(
                 "model `{}` of `{}` is no transistor: IS, BF, BR, NF, NR and the area must be positive, RB, RC and RE not negative",
                 name.text, card.name.text
@@ -215,6 +222,7 @@ impl<'n> Builder<'n, '_> {
             forward,
             reverse,
             ohms: ohms.map(|r| r / times),
+            thermal,
         })
     }
 }

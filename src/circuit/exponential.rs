@@ -8,7 +8,7 @@ use crate::diagnostic::Diagnostic;
 use crate::law::{Breakdown, Exponential, Law};
 use crate::netlist::ast::{self, Name};
 
-/// Temperature of circuit and model where nothing else is said, °C.
+/// Temperature at which parameters were measured where TNOM does not say, °C.
 const NOMINAL: f64 = 27.0;
 /// Parameters of charge, of noise and of high injection.
 const LEFT_OUT: [&str; 17] = [
@@ -17,7 +17,8 @@ const LEFT_OUT: [&str; 17] = [
 ];
 
 impl<'n> Builder<'n, '_> {
-    /// The exponential law of a model: `IS N RS BV IBV NBV EG XTI TNOM`, and the temperature of the card (`temp`, `dtemp`).
+    /// The exponential law of a model: `IS N RS BV IBV NBV EG XTI TNOM`, and the temperature of the card (`temp`, `dtemp`), else
+    /// of the circuit.
     ///
     /// IS(T) = IS (T/Tnom)^(XTI/N) exp((T/Tnom − 1) EG q/(N k T)).
     pub(super) fn exponential_law(
@@ -33,6 +34,7 @@ impl<'n> Builder<'n, '_> {
                 self.unused(format!("{left_out} of {}", name.text), name);
             }
         }
+        let circuit = self.scopes.temperature.f64;
         let mut number = |names: &[&str], otherwise: f64| -> Option<f64> {
             for one in names {
                 if let Some(expr) = params.get(one) {
@@ -50,7 +52,7 @@ impl<'n> Builder<'n, '_> {
         let nbv = number(&["nbv"], n)?;
         let nominal = number(&["tnom", "t_measured"], NOMINAL)?;
         let (eg, xti) = (number(&["eg"], 1.11)?, number(&["xti"], 3.0)?);
-        let model = number(&["temp", "t_abs"], NOMINAL)?;
+        let model = number(&["temp", "t_abs"], circuit)?;
         let shift = self.arg(args, &["dtemp"], scope)?.map_or(0.0, |t| t.f64);
         let celsius = self
             .arg(args, &["temp"], scope)?
@@ -130,6 +132,15 @@ mod tests {
         assert_eq!(bare, diode("D1 b 0 m", "m D(Ron=1m)", Diodes::Exp));
         assert_eq!(diode("D1 b 0 m", "m D(IS=0)", Diodes::Auto), None);
         assert_eq!(diode("D1 b 0 m", "m D(RS=-1)", Diodes::Auto), None);
+    }
+
+    #[test]
+    fn the_circuit_has_a_temperature_too() {
+        let card = diode("D1 b 0 m temp=77", "m D(IS=1e-14)", Diodes::Auto);
+        for all in ["temp 77", "options temp=77"] {
+            let text = format!("m D(IS=1e-14)\n.{all}");
+            assert_eq!(diode("D1 b 0 m", &text, Diodes::Auto), card, "{all}");
+        }
     }
 
     #[test]

@@ -21,7 +21,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-CIRCUITS = """bridge-resistor bridge-capacitor-filter bridge-source rectifier rlcd clamp peak-detector voltage-doubler
+CIRCUITS = """bridge-resistor bridge-capacitor-filter buck rectifier rlcd clamp peak-detector voltage-doubler
 three-phase-rectifier isolated-rectifier cockcroft-walton buck-open-loop boost flyback""".split()
 TARGET = 1e-4
 # What the mean of repeated runs tells from the start-up, s.
@@ -73,7 +73,7 @@ def setting(found):
         return ""
     parts = dict(p.split("=") for p in measured["parameter"].split(";"))
     tolerance = measured["method"].split("=")[1]
-    return f"`{parts['diodes']}`, {parts['method']}, reltol {tolerance}, max step {parts['maxstep']}"
+    return f"`{parts['diodes']}`, {parts['method']}, reltol {tolerance}, max step {float(parts['maxstep']):.2g}"
 
 
 def row(name, measurements):
