@@ -211,6 +211,15 @@ impl Log {
         }
     }
 
+    /// Makes room for so many rows.
+    fn expect(&mut self, rows: usize) {
+        /// Longer runs grow as they go.
+        const MOST: usize = 1 << 20;
+        let rows = rows.min(MOST);
+        self.time.reserve(rows);
+        self.values.reserve(rows * self.columns);
+    }
+
     /// A row of the output grid; it replaces an event row for the same right limit.
     fn grid_row(&mut self, t: f64, row: &[f64]) {
         if self.last_is_event && self.time.last() == Some(&t) {
@@ -313,6 +322,7 @@ pub fn run(stepper: &mut dyn Stepper, frame: Frame<'_>, mut log: Log) -> Result<
     } = frame;
     let mut row = vec![0.0; names.len()];
     let mut failure = None;
+    log.expect(grid.len());
     for k in 0..grid.len() {
         let t = grid.time(k);
         if let Err(error) = stepper.advance(t, &mut log) {

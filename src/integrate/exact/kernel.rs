@@ -16,13 +16,21 @@ pub(crate) struct Kernel {
 impl Kernel {
     /// Repacks a matrix.
     pub(crate) fn new(matrix: &DMatrix<f64>) -> Self {
-        let (rows, columns) = matrix.shape();
+        Self::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)])
+    }
+
+    /// Packs entries (row, column).
+    pub(crate) fn from_fn(
+        rows: usize,
+        columns: usize,
+        entry: impl Fn(usize, usize) -> f64,
+    ) -> Self {
         let mut blocks = Vec::with_capacity(rows.div_ceil(BLOCK) * columns);
         for first in (0..rows).step_by(BLOCK) {
             for j in 0..columns {
                 blocks.push(std::array::from_fn(|i| {
                     if first + i < rows {
-                        matrix[(first + i, j)]
+                        entry(first + i, j)
                     } else {
                         0.0
                     }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::assembler::{Assembler, Step};
+use super::clock::{Clock, Control};
 use super::exosystem::Exosystem;
 use super::free::Free;
 use super::mode::{Key, Mode, SwitchFacts};
@@ -19,6 +20,8 @@ pub(crate) struct Plant<'a> {
     pub(crate) thresholds: Vec<Threshold>,
     /// Switches that sources alone drive.
     pub(crate) drives: Vec<Drive>,
+    /// Those whose sources do nothing else.
+    pub(crate) clocks: Vec<Clock>,
     h: f64,
     energy: bool,
     tolerance: f64,
@@ -35,6 +38,7 @@ impl<'a> Plant<'a> {
             thresholds: assembler.thresholds(),
             assembler,
             drives: Vec::new(),
+            clocks: Vec::new(),
             h,
             energy,
             tolerance,
@@ -65,6 +69,11 @@ impl<'a> Plant<'a> {
         if let Some(&known) = self.index.get(key) {
             return known;
         }
+        // A control that depends on nothing does not stay on its threshold.
+        let clocked = |switch: usize| self.clocks.iter().any(|clock| clock.switch == switch);
+        if key.sliding.iter().any(|s| clocked(s.0)) {
+            return None;
+        }
         let holds: Vec<Hold> = key
             .closed
             .iter()
@@ -82,6 +91,7 @@ impl<'a> Plant<'a> {
                 thresholds: &self.thresholds,
                 limits: &limits,
                 drives: &self.drives,
+                clocks: &self.clocks,
             };
             Mode::new(key.clone(), &lcs, exosystem, &facts, self.h, self.energy)
         });
@@ -91,6 +101,11 @@ impl<'a> Plant<'a> {
         });
         self.index.insert(key.clone(), at);
         at
+    }
+
+    /// See [`controls`](super::clock::controls).
+    pub(crate) fn controls(&self) -> (Vec<bool>, Vec<Control>) {
+        self.assembler.controls()
     }
 
     /// Where function blocks jump.
