@@ -44,17 +44,18 @@ fn neg_mod(a: u64) -> u64 {
     if a == 0 { 0 } else { P - a }
 }
 
-/// a⁻¹ = a^(p−2).
+/// a⁻¹ = a^(p−2), p − 2 = 4 (2⁵⁹ − 1) + 1.
 fn inv_mod(a: u64) -> u64 {
-    let (mut base, mut exponent, mut result) = (a, P - 2, 1);
-    while exponent > 0 {
-        if exponent & 1 == 1 {
-            result = mul_mod(result, base);
-        }
-        base = mul_mod(base, base);
-        exponent >>= 1;
-    }
-    result
+    let square = |x: u64, times: u32| (0..times).fold(x, |x, _| mul_mod(x, x));
+    // a^(2^(2k) − 1) and a^(2^(k + 1) − 1) from a^(2^k − 1); 59 is 111011 in binary.
+    let double = |x: u64, k: u32| mul_mod(square(x, k), x);
+    let next = |x: u64| mul_mod(square(x, 1), a);
+    let x3 = next(double(a, 1));
+    let x7 = next(double(x3, 3));
+    let x14 = double(x7, 7);
+    let x29 = next(double(x14, 14));
+    let x59 = next(double(x29, 29));
+    mul_mod(square(x59, 2), a)
 }
 
 fn residue_of(n: &BigInt) -> u64 {

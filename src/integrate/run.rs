@@ -277,7 +277,12 @@ impl Grid {
     /// Output time k < [`Self::len`], s.
     #[must_use]
     pub fn time(&self, k: usize) -> f64 {
-        if k + 1 >= self.len() {
+        self.time_of(k, self.len())
+    }
+
+    /// Output time k of `len` in all, s.
+    fn time_of(&self, k: usize, len: usize) -> f64 {
+        if k + 1 >= len {
             self.tstop
         } else {
             self.tstart + k as f64 * self.tstep
@@ -322,9 +327,10 @@ pub fn run(stepper: &mut dyn Stepper, frame: Frame<'_>, mut log: Log) -> Result<
     } = frame;
     let mut row = vec![0.0; names.len()];
     let mut failure = None;
-    log.expect(grid.len());
-    for k in 0..grid.len() {
-        let t = grid.time(k);
+    let rows = grid.len();
+    log.expect(rows);
+    for k in 0..rows {
+        let t = grid.time_of(k, rows);
         if let Err(error) = stepper.advance(t, &mut log) {
             failure = Some(error);
             break;

@@ -65,23 +65,41 @@ impl Dense {
 
     /// self ← a b, all of matching sizes.
     pub(super) fn set_product(&mut self, a: &Self, b: &Self) {
-        let blocks = a.blocks;
         debug_assert_eq!((self.rows, self.columns), (a.rows, b.columns));
         debug_assert_eq!(a.columns, b.rows);
-        if blocks == 0 {
-            return;
+        match a.blocks {
+            0 => {}
+            1 => self.set_product_in::<1>(a, b),
+            2 => self.set_product_in::<2>(a, b),
+            3 => self.set_product_in::<3>(a, b),
+            4 => self.set_product_in::<4>(a, b),
+            blocks => {
+                self.data.fill([0.0; BLOCK]);
+                for (j, out) in self.data.chunks_exact_mut(blocks).enumerate() {
+                    for (column, &factor) in a.data.chunks_exact(blocks).zip(b.column(j)) {
+                        for (s, a) in out.as_flattened_mut().iter_mut().zip(column.as_flattened()) {
+                            *s += a * factor;
+                        }
+                    }
+                }
+            }
         }
-        for (j, out) in self.data.chunks_exact_mut(blocks).enumerate() {
-            let factors = b.column(j);
-            for (i, out) in out.iter_mut().enumerate() {
-                let mut sum = [0.0; BLOCK];
-                for (column, &factor) in a.data.chunks_exact(blocks).zip(factors) {
-                    for (s, &a) in sum.iter_mut().zip(&column[i]) {
+    }
+
+    /// The product where a column has `B` blocks: its sums stay in registers.
+    fn set_product_in<const B: usize>(&mut self, a: &Self, b: &Self) {
+        let (columns, _) = a.data.as_chunks::<B>();
+        let (outs, _) = self.data.as_chunks_mut::<B>();
+        for (j, out) in outs.iter_mut().enumerate() {
+            let mut sums = [[0.0; BLOCK]; B];
+            for (column, &factor) in columns.iter().zip(b.column(j)) {
+                for (sum, block) in sums.iter_mut().zip(column) {
+                    for (s, a) in sum.iter_mut().zip(block) {
                         *s += a * factor;
                     }
                 }
-                *out = sum;
             }
+            *out = sums;
         }
     }
 
@@ -170,7 +188,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
         #[test]
-        fn products_are_those_of_matrices(m in 0_usize..10, k in 0_usize..10, n in 0_usize..10, seed in any::<u32>()) {
+        fn products_are_those_of_matrices(m in 0_usize..20, k in 0_usize..10, n in 0_usize..10, seed in any::<u32>()) {
             let (a, b) = (random(m, k, seed), random(k, n, seed ^ 77));
             let mut product = Dense::zeros(m, n);
             product.set_product(&Dense::of(&a), &Dense::of(&b));
