@@ -67,10 +67,11 @@ impl Theta<'_> {
             z,
             lambda,
             y,
+            amplitudes,
             ..
         } = self;
+        let q = plant.systems[now.system].1.prepare(step, z, amplitudes);
         let matrices = plant.systems[now.system].1.step_mut(step);
-        let q = matrices.q(z);
         matrices.driver.suggest(&now.active);
         matrices.driver.suggest_point(lambda, y);
         let mut solution = matrices.driver.solve(&q);
@@ -132,12 +133,7 @@ impl Theta<'_> {
             self.lambda.fill(0.0);
         }
         let lcs = &self.plant.systems[self.now.system].1.lcs;
-        let at = Point {
-            x: &self.now.x,
-            lambda: &self.lambda,
-            u: &self.now.u,
-            du: &self.du,
-        };
+        let at = self.now.point(&self.lambda, &self.du);
         for (i, value) in row.iter_mut().enumerate() {
             *value = reading::value(&lcs.outputs.rows, i, at);
         }
