@@ -5,6 +5,7 @@
 //! is the static multiport `N [v; i; 1] = 0`, stated as a list of exact equations.
 
 mod assemble;
+mod clocked;
 mod couple;
 #[cfg(test)]
 pub(crate) mod fixture;
@@ -22,6 +23,7 @@ use crate::diagnostic::Diagnostic;
 use crate::lcs::{Input, Port, PowerKind, Role};
 
 pub use assemble::behaviour;
+pub(crate) use clocked::SourceControl;
 
 /// An exact coefficient of an equation.
 #[derive(Debug, Clone, Copy, PartialEq)]

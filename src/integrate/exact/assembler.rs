@@ -1,10 +1,9 @@
 //! The circuit reduced for a mode, switches on their thresholds included.
 
-use super::clock::{self, Control};
 use crate::integrate::run::{Reason, SimError};
 use crate::integrate::switching::Threshold;
 use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
-use crate::mna::Behaviour;
+use crate::mna::{Behaviour, SourceControl};
 
 /// A jump of a function block's output at one value of its input: while the first pair conducts and the second does not, the
 /// output is between the two levels and the input stays.
@@ -73,9 +72,9 @@ impl<'a> Assembler<'a> {
         &self.steps
     }
 
-    /// See [`clock::controls`].
-    pub(crate) fn controls(&self) -> (Vec<bool>, Vec<Control>) {
-        clock::controls(self.behaviour)
+    /// See [`Behaviour::source_controls`].
+    pub(crate) fn controls(&self) -> (Vec<bool>, Vec<SourceControl>) {
+        self.behaviour.source_controls()
     }
 
     /// Number of device pairs.

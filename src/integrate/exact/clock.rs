@@ -1,11 +1,10 @@
 //! Switches controlled by sources that act on nothing else: when they move is known before the run, and their sources have no
 //! part in the flow.
 
-use crate::algebra::Field;
 use crate::circuit::Source;
-use crate::circuit::source::{Piece, Wave};
+use crate::circuit::source::Piece;
 use crate::integrate::switching::Threshold;
-use crate::mna::{Behaviour, Column};
+use crate::mna::SourceControl;
 
 /// A switch whose control is a constant plus multiples of straight sources that drive nothing but switches.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,94 +20,14 @@ pub(crate) struct Clock {
     on: bool,
 }
 
-/// The control of a switch that could be a [`Clock`]: the switch, the constant, inputs with their factors.
-pub(crate) type Control = (usize, f64, Vec<(usize, f64)>);
-
-/// Which sources act through the controls of such switches alone, whatever the position, and those controls.
-pub(crate) fn controls(behaviour: &Behaviour) -> (Vec<bool>, Vec<Control>) {
-    let reduced = behaviour.ball();
-    let matrix = &reduced.matrix;
-    let nonzero = |row: usize| (0..matrix.cols()).filter(move |&c| !matrix.at(row, c).is_zero());
-    let place = |c: Column| reduced.place[c];
-    let reads = |row: usize, c: Option<usize>| c.is_some_and(|c| !matrix.at(row, c).is_zero());
-    let reading = |k: usize| reduced.equations + k;
-    let readings = reading(0)..matrix.rows();
-    // Columns that an equation of their own holds at zero: the current of a source without a load.
-    let vanishing: Vec<usize> = (0..reduced.equations)
-        .filter_map(|row| {
-            let mut columns = nonzero(row);
-            columns.next().filter(|_| columns.next().is_none())
-        })
-        .collect();
-    let vanishes = |k: usize| nonzero(reading(k)).all(|c| vanishing.contains(&c));
-    // A reading is no reason to keep a source in the flow: a factor of a product that vanishes, the control of a switch.
-    let idle = |row: usize| {
-        let k = row - reduced.equations;
-        let power = behaviour.power.iter().filter(|p| p.v == k || p.i == k);
-        let mut power = power.map(|p| vanishes(if p.v == k { p.i } else { p.v }));
-        let controls = behaviour.switches.iter().any(|s| s.control == k);
-        k >= behaviour.probes
-            && power.all(|vanishes| vanishes)
-            && (controls || is_power(behaviour, k))
-    };
-    let mut silent: Vec<bool> = behaviour
-        .sources
-        .iter()
-        .map(|source| {
-            let (value, rate) = (place(source.value), source.rate.and_then(place));
-            let wave = &source.input.source.wave;
-            matches!(wave, Wave::Dc(_) | Wave::Pulse { .. } | Wave::Pwl { .. })
-                && (0..reduced.equations).all(|row| !reads(row, value) && !reads(row, rate))
-                && readings.clone().all(|row| !reads(row, rate))
-                && readings.clone().all(|row| !reads(row, value) || idle(row))
-        })
-        .collect();
-    // The control of a switch as such a combination.
-    let control = |silent: &[bool], switch: usize| -> Option<Control> {
-        let row = reading(behaviour.switches[switch].control);
-        let (mut constant, mut terms) = (0.0, Vec::new());
-        for c in nonzero(row) {
-            let is = |k: &usize| silent[*k] && place(behaviour.sources[*k].value) == Some(c);
-            let input = (0..silent.len()).find(is);
-            match input {
-                Some(input) => terms.push((input, matrix.at(row, c).to_f64())),
-                None if place(Behaviour::ONE) == Some(c) => constant = matrix.at(row, c).to_f64(),
-                None => return None,
-            }
-        }
-        (!terms.is_empty()).then_some((switch, constant, terms))
-    };
-    let switches = 0..behaviour.switches.len();
-    loop {
-        let found: Vec<Control> = switches
-            .clone()
-            .filter_map(|switch| control(&silent, switch))
-            .collect();
-        let mixed = |input: usize| {
-            let value = place(behaviour.sources[input].value);
-            switches.clone().any(|switch| {
-                reads(reading(behaviour.switches[switch].control), value)
-                    && !found.iter().any(|control| control.0 == switch)
-            })
-        };
-        let kept: Vec<bool> = (0..silent.len())
-            .map(|input| silent[input] && !mixed(input))
-            .collect();
-        if kept == silent {
-            return (silent, found);
-        }
-        silent = kept;
-    }
-}
-
-fn is_power(behaviour: &Behaviour, k: usize) -> bool {
-    behaviour.power.iter().any(|p| p.v == k || p.i == k)
-}
-
 impl Clock {
     /// The clock of a control, with its sources at t. `None` where a source has no closed form.
-    pub(crate) fn new(control: Control, sources: &[Source], t: f64) -> Option<Self> {
-        let (switch, constant, terms) = control;
+    pub(crate) fn new(control: SourceControl, sources: &[Source], t: f64) -> Option<Self> {
+        let SourceControl {
+            switch,
+            constant,
+            terms,
+        } = control;
         let terms = terms
             .into_iter()
             .map(|(input, factor)| Some((input, factor, sources[input].piece(t)?)))
@@ -214,6 +133,7 @@ impl Clock {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::circuit::source::Wave;
 
     fn pulse() -> Vec<Source> {
         let wave = Wave::Pulse {
@@ -237,7 +157,12 @@ mod tests {
             on_above: 0.5,
             off_below: 0.5,
         };
-        let mut clock = Clock::new((0, 0.0, vec![(0, 1.0)]), &sources, 0.0).unwrap();
+        let control = SourceControl {
+            switch: 0,
+            constant: 0.0,
+            terms: vec![(0, 1.0)],
+        };
+        let mut clock = Clock::new(control, &sources, 0.0).unwrap();
         let (mut t, mut on, mut moves) = (0.0, false, Vec::new());
         loop {
             clock.look_ahead(&threshold, on, (t, 12.0), &sources);

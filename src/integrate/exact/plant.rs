@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::assembler::{Assembler, Step};
-use super::clock::{Clock, Control};
+use super::clock::Clock;
 use super::exosystem::Exosystem;
 use super::free::Free;
 use super::mode::{Key, Mode, SwitchFacts};
@@ -11,6 +11,7 @@ use super::schedule::Drive;
 use crate::integrate::run::SimError;
 use crate::integrate::switching::Threshold;
 use crate::lcs::Hold;
+use crate::mna::SourceControl;
 
 /// Systems and modes, created when first visited.
 pub(crate) struct Plant<'a> {
@@ -103,8 +104,8 @@ impl<'a> Plant<'a> {
         at
     }
 
-    /// See [`controls`](super::clock::controls).
-    pub(crate) fn controls(&self) -> (Vec<bool>, Vec<Control>) {
+    /// See [`Assembler::controls`].
+    pub(crate) fn controls(&self) -> (Vec<bool>, Vec<SourceControl>) {
         self.assembler.controls()
     }
 
