@@ -600,7 +600,7 @@ fn bench_measures_ladders_in_the_promised_columns() {
     assert!(lines.all(|l| l.starts_with("divider,euler,")), "{ran}");
     let ran = run_in(
         directory.path(),
-        "bench divider.cir --methods theta -o b.csv -o b.json -o b.svg -o b.png",
+        "bench divider.cir --methods theta -o b.csv -o b.json -o b.svg -o b.png --signals s.csv",
     );
     assert_eq!((ran.status, ran.out.as_str()), (0, ""), "{ran}");
     assert!(
@@ -616,8 +616,21 @@ fn bench_measures_ladders_in_the_promised_columns() {
     let document: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(directory.path().join("b.json")).unwrap())
             .unwrap();
-    assert_eq!(document["measurements"][0]["method"], "theta");
+    let first = &document["measurements"][0];
+    assert_eq!(first["method"], "theta");
+    let signals = first["signals"].as_array().unwrap();
+    let worst = |error: &str| {
+        let errors = signals.iter().map(|s| s[error].as_f64().unwrap());
+        errors.fold(0.0, f64::max)
+    };
+    for error in ["max_error", "rms_error"] {
+        assert_eq!(first[error], worst(error), "{first}");
+    }
+    let lines = fs::read_to_string(directory.path().join("s.csv")).unwrap();
+    let runs = document["measurements"].as_array().unwrap().len();
+    assert!(signals.len() > 1 && lines.lines().count() == 1 + runs * signals.len());
     assert_eq!(run("bench divider.cir -o b.xls").status, 2);
+    assert_eq!(run("bench divider.cir --signals b.json").status, 2);
 }
 
 #[test]
