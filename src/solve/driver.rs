@@ -88,6 +88,18 @@ impl Driver {
         }
     }
 
+    /// How λ answers a small change of q at a solution (λ, y) with curved laws; `None` for ideal ones, and where neither the
+    /// network nor the laws determine it.
+    #[must_use]
+    pub fn response(
+        &self,
+        lambda: &DVector<f64>,
+        y: &DVector<f64>,
+        dq: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        self.lawful.as_ref()?.response(lambda, y, dq)
+    }
+
     /// Whether M + Mᵀ ⪰ 0 (to rounding).
     #[must_use]
     pub fn is_monotone(&self) -> bool {
