@@ -155,6 +155,20 @@ fn the_temperature_is_a_name_of_expressions() {
         ohms(".options reltol=1e-4 noacct temp={10*5} gmin=1e-12"),
         50.0
     );
+    let notes = |options: &str| read(&format!("v1 a 0 1\nr1 a 0 1\n.tran 1 2\n{options}")).1;
+    assert_eq!(notes(".options temp=50"), [""; 0]);
+    for (options, skipped) in [
+        (".options temp=50 reltol=1e-4", ".options but for temp"),
+        (".OPTIONS noacct TEMP=50", ".options but for temp"),
+        (".options reltol=1e-4", ".options"),
+        (".options temp", ".options"),
+    ] {
+        let notes = notes(options);
+        assert!(
+            notes.len() == 1 && notes[0].ends_with(&format!("transient: {skipped}")),
+            "{notes:?}"
+        );
+    }
     let steps = circuit("v1 a 0 1\nr1 a 0 {temp}\n.tran 1 2\n.temp 0 25 100").steps;
     assert_eq!(steps[0].values, [0.0, 25.0, 100.0]);
 }
