@@ -123,13 +123,13 @@ pub fn keep_probes(circuit: &mut Circuit, probes: &[String]) -> Result<(), Failu
     Ok(())
 }
 
-/// The circuit of a netlist.
+/// The circuit of a subject.
 ///
 /// # Errors
-/// As [`open`]; a system has no circuit.
-pub fn circuit(input: &Input, streams: &Streams) -> Result<(Circuit, Behaviour), Failure> {
-    match open(input, &[], streams)? {
-        Subject::Circuit(both) => Ok(*both),
+/// [`Failure::Message`]: a system has no circuit.
+pub fn circuit_of<'s>(input: &Input, subject: &'s Subject) -> Result<&'s Circuit, Failure> {
+    match subject {
+        Subject::Circuit(both) => Ok(&both.0),
         Subject::System(_) => {
             let message = "is a system without a circuit; this command needs a netlist";
             Err(Failure::Message(format!(
