@@ -3,6 +3,9 @@
 //! Steps have no events to miss and no modes to find: where events accumulate, switches contradict each other or the
 //! complementarity problem at an event has no mode as its solution, the implicit step still has a solution.
 
+#[cfg(test)]
+mod tests;
+
 use crate::integrate::exact::{Exact, Place};
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
 use crate::integrate::stats::Stats;
