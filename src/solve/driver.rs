@@ -131,6 +131,11 @@ impl Driver {
         if best.residual <= ROUNDING {
             return self.accept(best);
         }
+        // What is no number has no solution, and no pivot.
+        if !q.iter().all(|q| q.is_finite()) {
+            best.by = Answered::Nobody;
+            return best;
+        }
         let chain: [fn(&mut Self, f64) -> Option<Found>; 4] = [
             Self::try_warm,
             Self::try_block,

@@ -11,6 +11,9 @@
 //! With chosen steps the errors of
 //! all of them are added: the flow of a passive circuit is a contraction.
 
+#[cfg(test)]
+mod tests;
+
 use crate::integrate::control::Amplitudes;
 use crate::integrate::theta::stages::StepError;
 use crate::lcs::Lcs;
