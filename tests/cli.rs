@@ -634,6 +634,30 @@ fn bench_measures_ladders_in_the_promised_columns() {
 }
 
 #[test]
+fn what_works_on_matrices_says_so_of_a_nonlinear_form() {
+    let directory = place();
+    let form = include_str!("forms/cubic.json");
+    fs::write(directory.path().join("cubic.json"), form).unwrap();
+    for command in ["check", "lcs", "bench"] {
+        let ran = run_in(directory.path(), &format!("{command} cubic.json"));
+        assert_eq!(ran.status, 2, "{ran}");
+        assert!(
+            ran.err
+                .starts_with("error: cubic.json: a nonlinear form, sound at its start"),
+            "{ran}"
+        );
+    }
+    let broken = form.replace("[[1]]", "[[2]]");
+    assert_ne!(form, broken);
+    fs::write(directory.path().join("cubic.json"), broken).unwrap();
+    let ran = run_in(directory.path(), "check cubic.json");
+    assert!(
+        ran.status == 2 && ran.err.contains("Assumption 4.1"),
+        "{ran}"
+    );
+}
+
+#[test]
 fn a_reader_that_goes_away_is_no_failure() {
     let directory = place();
     let long = DIVIDER.replace(".tran 1m 3m", ".tran 1u 100m");

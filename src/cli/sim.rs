@@ -34,7 +34,7 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         .map(|path| Format::of(path))
         .collect::<Result<Vec<_>, _>>()?;
     let request = Request::of(&args.method, args.events)?;
-    if let Some(form) = forms::open(args)? {
+    if let Some(form) = forms::open(&args.input)? {
         let finished = (forms::run(&form, args)?, Measurements::default());
         return finish(args, &formats, (Some(finished), None), streams);
     }
