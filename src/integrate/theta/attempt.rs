@@ -50,8 +50,7 @@ impl Theta<'_> {
                 mode,
                 h,
                 settle,
-                solved: None,
-                work: None,
+                ..Attempt::default()
             };
         }
         let n = now.x.len();
@@ -135,7 +134,7 @@ impl Theta<'_> {
             h,
             settle: false,
             solved: Some((solution.basis, solution.active)),
-            work: None,
+            ..Attempt::default()
         };
         Ok(())
     }
@@ -185,6 +184,10 @@ impl Theta<'_> {
             estimate.restart();
         }
         let n = now.x.len();
+        if let Some(error) = attempt.error.take() {
+            estimate.stages(attempt.h, &out[..n], error);
+            return;
+        }
         let fused = || {
             plant.systems[now.system]
                 .1

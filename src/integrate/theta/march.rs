@@ -158,6 +158,9 @@ impl Theta<'_> {
                 return Ok(false);
             }
             self.preferred = h;
+            if let (Some(estimate), None) = (&mut self.now.estimate, &self.control) {
+                estimate.switched_late(&self.kept.x, &self.now.x);
+            }
             self.report(log);
             self.switch(&[], log)?;
         }

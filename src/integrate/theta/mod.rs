@@ -189,6 +189,8 @@ struct Attempt {
     solved: Option<(Vec<bool>, Vec<Option<bool>>)>,
     /// Energy from sources and into resistors and devices, J, where the stages tell it.
     work: Option<(f64, f64)>,
+    /// What the stages tell of the error, where it is asked for.
+    error: Option<stages::StepError>,
 }
 
 impl<'a> Theta<'a> {
@@ -295,13 +297,10 @@ impl<'a> Theta<'a> {
         self.amplitudes = amplitudes;
     }
 
-    /// Has the error estimated along the run; there is no estimate for prescribed steps of curved laws.
+    /// Has the error estimated along the run.
     pub fn estimate_errors(&mut self) {
         let mut estimate = Estimate::default();
         if self.control.is_none() {
-            if Tableau::of(self.system(), self.scheme).is_some() {
-                return;
-            }
             estimate.enter(self.now.x.iter().map(|_| 0.0));
         }
         self.kept.estimate = Some(estimate.clone());
