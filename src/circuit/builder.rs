@@ -250,6 +250,9 @@ impl<'n, 'o> Builder<'n, 'o> {
     /// Expands a subcircuit.
     fn call(&mut self, card: &'n ast::Element, name: &'n Name, args: &'n [Assign], scope: ScopeId) {
         let Some(subckt) = self.scopes.subckt(scope, &name.text) else {
+            if self.scopes.model(scope, &name.text).is_some() {
+                return self.thyristor(card, name, args, scope);
+            }
             let message = format!(
                 "`{}` calls unknown subcircuit `{}`",
                 card.name.text, name.text

@@ -29,6 +29,7 @@ mod scope;
 pub mod source;
 mod sweep;
 mod switch;
+mod thyristor;
 mod transistor;
 
 use crate::algebra::Value;
@@ -195,6 +196,23 @@ pub struct Switch {
     pub off_below: f64,
     /// `ON`/`OFF` on the card.
     pub initial: Option<bool>,
+    /// A switch inside a thyristor, which the control alone does not move.
+    pub latch: Option<Latch>,
+}
+
+/// What moves the switches inside a thyristor.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Latch {
+    /// On while a gate is, afterwards as long as the valve conducts and the control, the switch's own current, exceeds
+    /// `off_below`.
+    Hold {
+        /// Switches that turn it on.
+        gates: Vec<ElementId>,
+        /// The diode in series.
+        valve: ElementId,
+    },
+    /// On while this latch is off: a resistance that gives the diode 0 V where no current flows, and so a voltage.
+    Rest(ElementId),
 }
 
 /// `K`: two inductors and their coupling coefficient.

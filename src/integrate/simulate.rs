@@ -10,11 +10,11 @@ use crate::integrate::exact::{self, Exact, Place};
 use crate::integrate::handover::Handover;
 use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, Stepper, run};
 use crate::integrate::step::Scheme;
-use crate::integrate::switching::Threshold;
+use crate::integrate::switching::{Threshold, at_start};
 use crate::integrate::theta::{Setup, Start, Stepping, Theta};
 use crate::integrate::{roles, start};
 use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
-use crate::mna::{Behaviour, SwitchPort};
+use crate::mna::Behaviour;
 use crate::plan::{Plan, not_exact, plan};
 use crate::settings::Settings;
 
@@ -159,12 +159,7 @@ impl Problem<'_> {
     }
 
     fn thresholds(&self) -> Vec<Threshold> {
-        let threshold = |s: &SwitchPort| Threshold {
-            name: s.name.clone(),
-            on_above: s.on_above,
-            off_below: s.off_below,
-        };
-        self.behaviour.switches.iter().map(threshold).collect()
+        self.behaviour.switches.iter().map(Threshold::of).collect()
     }
 
     fn exact(&self, tran: &Tran, settings: &Settings) -> Result<Exact<'_>, SimError> {
@@ -233,7 +228,7 @@ impl Problem<'_> {
             let start = self.start();
             let mut theta = self.stepper(start, tran, Scheme::MOREAU, stepping, settings)?;
             let controls = theta.controls_at_start()?;
-            let wanted: Vec<bool> = (0..controls.len())
+            let asked: Vec<bool> = (0..controls.len())
                 .map(|k| {
                     let switch = &self.behaviour.switches[k];
                     match (self.settle[k], self.position[k]) {
@@ -243,6 +238,7 @@ impl Problem<'_> {
                     }
                 })
                 .collect();
+            let wanted = at_start(&self.behaviour.switches, asked);
             drop(theta);
             // Positions that contradict each other are left to the run.
             if wanted == self.position || seen.contains(&wanted) {

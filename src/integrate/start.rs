@@ -8,6 +8,7 @@ use crate::circuit::{
 use crate::integrate::lawful;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Reason, SimError};
+use crate::integrate::switching::at_start;
 use crate::lcs::{Hold, Lcs, Position, ReduceError, StorageHold, reduce};
 use crate::mna::{Behaviour, behaviour};
 use crate::settings::Settings;
@@ -117,11 +118,7 @@ pub fn operating_point(
         SimError::before(Reason::NoOperatingPoint(words.join("; ")))
     })?;
     let behaviour = behaviour.standard();
-    let mut position: Vec<bool> = behaviour
-        .switches
-        .iter()
-        .map(|s| s.initial.unwrap_or(false))
-        .collect();
+    let mut position = of_cards(&behaviour);
     if let Some(guess) = from_nodesets(circuit, values, settings) {
         for ((position, switch), on) in position.iter_mut().zip(&behaviour.switches).zip(guess) {
             *position = switch.initial.unwrap_or(on);
@@ -130,12 +127,13 @@ pub fn operating_point(
     let mut seen = Vec::new();
     loop {
         let point = static_solution(&behaviour, &position, values, settings)?;
-        let wanted: Vec<bool> = behaviour
+        let asked: Vec<bool> = behaviour
             .switches
             .iter()
             .zip(&point.controls)
             .map(|(s, &control)| s.initial.unwrap_or(control > s.on_above))
             .collect();
+        let wanted = at_start(&behaviour.switches, asked);
         if wanted == position {
             notes.extend(point.notes);
             let count = circuit.nodes.len() - 1;
@@ -172,6 +170,13 @@ pub fn operating_point(
         }
         seen.push(std::mem::replace(&mut position, wanted));
     }
+}
+
+/// The positions that the cards of the switches name, off where they name none.
+fn of_cards(behaviour: &Behaviour) -> Vec<bool> {
+    let named = behaviour.switches.iter();
+    let asked = named.map(|s| s.initial.unwrap_or(false)).collect();
+    at_start(&behaviour.switches, asked)
 }
 
 /// Switch positions of the operating point with the voltages of `.nodeset` held; `None` without such a point.
@@ -427,11 +432,7 @@ pub fn initial(
     if uic {
         return Ok(Initial {
             storage: from_initial_conditions(circuit, behaviour),
-            switches: behaviour
-                .switches
-                .iter()
-                .map(|s| s.initial.unwrap_or(false))
-                .collect(),
+            switches: of_cards(behaviour),
             notes: Vec::new(),
         });
     }

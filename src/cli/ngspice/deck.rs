@@ -5,8 +5,8 @@ use std::fmt::Write;
 
 use crate::circuit::source::Wave;
 use crate::circuit::{
-    Affine, Circuit, Element, ElementId, Kind, NodeId, Output, Probed, Quantity, Source, Switch,
-    Tran,
+    Affine, Circuit, Element, ElementId, Kind, Latch, NodeId, Output, Probed, Quantity, Source,
+    Switch, Tran,
 };
 use crate::cli::args::Realisation;
 use crate::law::{Exponential, Law};
@@ -274,13 +274,32 @@ impl Writer<'_> {
         }
     }
 
+    /// A thyristor's switch has hysteresis around 1: its control is 2 with a gate, else 1 as long as its current holds it.
+    fn latch(&self, gates: &[ElementId], switch: &Switch) -> String {
+        let current = self.affine(&switch.control);
+        let held = format!("({current} > {:e} ? 1 : 0)", switch.off_below);
+        gates.iter().fold(held, |otherwise, gate| {
+            let gate = &self.circuit.elements[gate.index()];
+            let Kind::Switch(switch) = &gate.kind else {
+                return otherwise;
+            };
+            let (name, level) = (&gate.name, switch.on_above);
+            format!("(v({name}_control) > {level:e} ? 2 : {otherwise})")
+        })
+    }
+
     fn switch(&mut self, id: ElementId, p: &str, n: &str, switch: &Switch) {
         let name = self.circuit.elements[id.index()].name.clone();
-        let control = self.affine(&switch.control);
-        let (threshold, half) = (
-            0.5 * (switch.on_above + switch.off_below),
-            0.5 * (switch.on_above - switch.off_below),
-        );
+        let (control, threshold, half) = match &switch.latch {
+            None => (
+                self.affine(&switch.control),
+                0.5 * (switch.on_above + switch.off_below),
+                0.5 * (switch.on_above - switch.off_below),
+            ),
+            Some(Latch::Hold { gates, .. }) => (self.latch(gates, switch), 1.0, 0.5),
+            // Between an open switch that leaks and a diode no potential is undetermined.
+            Some(Latch::Rest(_)) => return,
+        };
         let (ron, roff) = (
             switch.ron.f64.max(NEAR_SHORT),
             switch.roff.map_or(NEAR_OPEN, |r| r.f64),
@@ -290,7 +309,17 @@ impl Writer<'_> {
             Some(false) => " off",
             None => "",
         };
-        self.line(format!("b.{name}_control {name}_control 0 v={control}"));
+        if switch.latch.is_some() {
+            // A loop from the current to the switch and back needs a time to settle in.
+            let delay = EDGE * self.tran.tstop;
+            self.notes
+                .insert(format!("thyristors follow their gates within {delay:e} s"));
+            self.line(format!("b.{name}_now {name}_now 0 v={control}"));
+            self.line(format!("r.{name}_delay {name}_now {name}_control 1"));
+            self.line(format!("c.{name}_delay {name}_control 0 {delay:e}"));
+        } else {
+            self.line(format!("b.{name}_control {name}_control 0 v={control}"));
+        }
         let card = self.card('s', id);
         self.line(format!("{card} {p} {n} {name}_control 0 m.{name}{initial}"));
         self.line(format!(

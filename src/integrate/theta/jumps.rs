@@ -158,8 +158,8 @@ impl Theta<'_> {
         }
     }
 
-    /// Whether a switch's control is beyond its threshold now.
-    pub(super) fn crossed(&mut self) -> Result<bool, SimError> {
+    /// What the controls ask of the switches now.
+    pub(super) fn crossed(&mut self) -> Result<Change, SimError> {
         if self.switches.needs_lambda() {
             self.read_lambda()?;
         }
@@ -170,7 +170,12 @@ impl Theta<'_> {
             u: &self.now.u,
             du: &self.du,
         };
-        Ok(self.switches.update(lcs, at, false))
+        Ok(self.switches.update(lcs, at, &self.now.pattern, false))
+    }
+
+    /// Whether the controls ask a switch to move now.
+    pub(super) fn asked(&mut self) -> Result<bool, SimError> {
+        Ok(self.switches.watch() && self.crossed()? != Change::None)
     }
 
     /// Flips the switches `moving`, then those whose controls ask for it until none does, with the jumps this causes.
@@ -192,7 +197,8 @@ impl Theta<'_> {
                     u: &self.now.u,
                     du: &self.du,
                 };
-                if !self.switches.update(lcs, at, true) {
+                let pattern = &self.now.pattern;
+                if self.switches.update(lcs, at, pattern, true) == Change::None {
                     if log.wants_rows() {
                         self.log_row(log);
                     }

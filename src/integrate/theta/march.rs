@@ -151,8 +151,14 @@ impl Theta<'_> {
             self.fixed_step(h, t1)?;
             self.commit(t1)?;
         }
-        if self.switches.watch() && self.crossed()? {
-            if level < LOCATE && !last_chance && !self.switches.chattering(CHATTER) {
+        let change = if self.switches.watch() {
+            self.crossed()?
+        } else {
+            Change::None
+        };
+        if change != Change::None {
+            let may_halve = level < LOCATE && !last_chance && !self.switches.chattering(CHATTER);
+            if change == Change::Passage && may_halve {
                 self.back(steps);
                 self.preferred = f64::INFINITY;
                 return Ok(false);

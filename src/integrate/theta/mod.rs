@@ -27,7 +27,7 @@ use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
 use crate::integrate::stats::Stats;
 use crate::integrate::step::{SHORT, Scheme};
-use crate::integrate::switching::{Switches, Threshold};
+use crate::integrate::switching::{Change, Switches, Threshold};
 use crate::integrate::system::{Plant, Reduce, System};
 use crate::lcs::{Lcs, Port, Role};
 use crate::settings::Settings;
@@ -424,7 +424,7 @@ impl Stepper for Theta<'_> {
             self.begin(log)?;
             let lcs = &self.plant.systems[self.now.system].1.lcs;
             let moving = self.switches.misplaced(lcs, &self.now.u);
-            if !moving.is_empty() || self.switches.watch() && self.crossed()? {
+            if !moving.is_empty() || self.asked()? {
                 self.switch(&moving, log)?;
             }
         }
@@ -444,9 +444,13 @@ impl Stepper for Theta<'_> {
             } else {
                 breakpoint.min(t)
             };
-            let (known, moving) =
-                self.switches
-                    .next_known(&self.system().lcs, &self.inputs, now, limit);
+            let (known, moving) = self.switches.next_known(
+                &self.system().lcs,
+                &self.inputs,
+                now,
+                limit,
+                Self::slack(limit),
+            );
             let mut stop = if merged { t } else { limit };
             let early = known < stop - Self::slack(stop);
             if early {
@@ -457,7 +461,7 @@ impl Stepper for Theta<'_> {
             if at_breakpoint {
                 self.edge(breakpoint.max(stop), log)?;
             }
-            if !moving.is_empty() || at_breakpoint && self.switches.watch() && self.crossed()? {
+            if !moving.is_empty() || at_breakpoint && self.asked()? {
                 self.switch(&moving, log)?;
             }
         }
