@@ -17,6 +17,7 @@ mod exponential;
 mod form;
 mod formula;
 mod functions;
+mod line;
 pub(crate) mod load;
 mod measurement;
 mod model;
@@ -79,6 +80,8 @@ pub struct Circuit {
     pub elements: Vec<Element>,
     /// Coupled inductors, pair by pair.
     pub couplings: Vec<Coupling>,
+    /// Ideal transmission lines; their ports are elements.
+    pub lines: Vec<Line>,
     /// The transient analysis asked for.
     pub tran: Option<Tran>,
     /// What `.save`, `.print`, `.probe`, `.plot tran` ask for; empty means the default set.
@@ -228,6 +231,30 @@ pub struct Coupling {
     pub k: Value,
     /// The card.
     pub span: Option<Span>,
+}
+
+/// `T`: a lossless line by its characteristics. Each port is the impedance in series with a source of the wave that arrives
+/// there, e₁(t) = a₂(t − delay) with a₂ = v₂ + Z i₂ = 2 Z i₂ + e₂ the wave that left the other port (F. H. Branin, "Transient
+/// analysis of lossless transmission lines", Proc. IEEE 55, 1967).
+#[derive(Debug, Clone)]
+pub struct Line {
+    /// Name of the card.
+    pub name: String,
+    /// Z, Ω.
+    pub impedance: Value,
+    /// s.
+    pub delay: f64,
+    /// Its ends.
+    pub ports: [LinePort; 2],
+}
+
+/// One end of a line: an impedance from the port's first node, in series with the wave source to its second node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LinePort {
+    /// The impedance; its current enters the line.
+    pub impedance: ElementId,
+    /// The source, a [`source::Wave::Arriving`].
+    pub wave: ElementId,
 }
 
 /// `.tran tstep tstop [tstart [tmax]] [uic]`, in seconds.

@@ -3,11 +3,12 @@
 use cpu_time::ThreadTime;
 use nalgebra::DVector;
 
-use crate::circuit::{Circuit, Tran};
+use crate::circuit::{self, Circuit, ElementId, Tran};
 use crate::integrate::Run;
 use crate::integrate::control::Amplitudes;
 use crate::integrate::exact::{self, Exact, Place};
 use crate::integrate::handover::Handover;
+use crate::integrate::line::Line;
 use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, Stepper, run};
 use crate::integrate::step::Scheme;
 use crate::integrate::switching::{Threshold, at_start};
@@ -85,6 +86,7 @@ pub fn simulate(
     let mut notes: Vec<String> = behaviour.notes.iter().map(|n| n.message.clone()).collect();
     notes.extend(initial.notes);
     let problem = Problem {
+        lines: lines(circuit, &initial.waves),
         position: initial.switches,
         settle: standard
             .switches
@@ -114,6 +116,7 @@ pub fn simulate_system(
     let mut start = DVector::zeros(behaviour.storage.len());
     start.rows_mut(0, x.len()).copy_from(x);
     let problem = Problem {
+        lines: vec![],
         position: vec![],
         settle: vec![],
         start,
@@ -124,12 +127,27 @@ pub fn simulate_system(
     drive(problem, tran, options)
 }
 
+/// The transmission lines of a circuit; `waves` are what arrives at first, line by line.
+fn lines(circuit: &Circuit, waves: &[[f64; 2]]) -> Vec<Line> {
+    let name = |id: ElementId| circuit.elements[id.index()].name.clone();
+    let line = |(line, initial): (&circuit::Line, &[f64; 2])| Line {
+        impedance: line.impedance.f64,
+        delay: line.delay,
+        impedances: line.ports.map(|port| name(port.impedance)),
+        sources: line.ports.map(|port| name(port.wave)),
+        initial: *initial,
+    };
+    circuit.lines.iter().zip(waves).map(line).collect()
+}
+
 /// What the steppers share.
 struct Problem<'a> {
     /// As given.
     original: &'a Behaviour,
     /// All laws as ideal pairs.
     behaviour: Behaviour,
+    /// Transmission lines.
+    lines: Vec<Line>,
     position: Vec<bool>,
     /// Switches whose start position follows from the start state.
     settle: Vec<bool>,
@@ -191,7 +209,7 @@ impl Problem<'_> {
         stepping: Stepping,
         settings: &Settings,
     ) -> Result<Theta<'_>, SimError> {
-        Theta::new(Setup {
+        let mut theta = Theta::new(Setup {
             reduce: Box::new(|position| self.free(position)),
             position: place.switches,
             thresholds: self.thresholds(),
@@ -201,7 +219,9 @@ impl Problem<'_> {
             stepping,
             longest: tran.tmax.unwrap_or(f64::INFINITY),
             settings: settings.clone(),
-        })
+        })?;
+        theta.attach(&self.lines);
+        Ok(theta)
     }
 
     /// See [`roles`].

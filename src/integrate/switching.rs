@@ -145,9 +145,14 @@ impl Switches {
         };
         let rows = &lcs.controls;
         let state_free = |i: usize| zero(&rows.x, i) && zero(&rows.lambda, i) && zero(&rows.du, i);
+        // What arrives on a line is no more known beforehand than a state is.
+        let known = |i: usize| {
+            let mut inputs = lcs.inputs.iter().enumerate();
+            !inputs.any(|(j, input)| input.source.wave.is_arriving() && rows.u[(i, j)] != 0.0)
+        };
         let thresholds = || self.thresholds.iter().enumerate();
         self.driven = thresholds()
-            .map(|(i, t)| state_free(i) && t.latch.is_none())
+            .map(|(i, t)| state_free(i) && known(i) && t.latch.is_none())
             .collect();
         let port = |t: &Threshold| {
             let valve = t.valve()?;

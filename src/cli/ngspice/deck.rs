@@ -5,8 +5,8 @@ use std::fmt::Write;
 
 use crate::circuit::source::Wave;
 use crate::circuit::{
-    Affine, Circuit, Element, ElementId, Kind, Latch, NodeId, Output, Probed, Quantity, Source,
-    Switch, Tran,
+    Affine, Circuit, Element, ElementId, Kind, Latch, Line, NodeId, Output, Probed, Quantity,
+    Source, Switch, Tran,
 };
 use crate::cli::args::Realisation;
 use crate::law::{Exponential, Law};
@@ -82,8 +82,16 @@ pub fn deck(circuit: &Circuit, options: &Options) -> Result<Deck, DeckError> {
     };
     let title = circuit.title.replace(char::is_control, " ");
     writer.line(format!("* {title}"));
+    let ports = circuit.lines.iter().flat_map(|line| line.ports);
+    let of_lines: Vec<ElementId> = ports.flat_map(|port| [port.impedance, port.wave]).collect();
     for (k, element) in circuit.elements.iter().enumerate() {
-        writer.element(ElementId(k as u32), element)?;
+        let id = ElementId(k as u32);
+        if !of_lines.contains(&id) {
+            writer.element(id, element)?;
+        }
+    }
+    for line in &circuit.lines {
+        writer.transmission_line(line);
     }
     for k in &circuit.couplings {
         let (a, b) = (writer.card('l', k.a), writer.card('l', k.b));
@@ -161,6 +169,39 @@ impl Writer<'_> {
 
     fn node(&self, id: NodeId) -> &str {
         &self.circuit.nodes[id.index()]
+    }
+
+    fn transmission_line(&mut self, line: &Line) {
+        let mut ends = String::new();
+        let mut initial = String::new();
+        for port in &line.ports {
+            let (first, last) = (
+                &self.circuit.elements[port.impedance.index()],
+                &self.circuit.elements[port.wave.index()],
+            );
+            let _ = write!(ends, " {} {}", self.node(first.p), self.node(last.n));
+        }
+        if self.tran.uic {
+            // ngspice takes v and i of both ends: e₁ = v₂ + Z i₂ with i₂ = 0.
+            let wave = |k: usize| {
+                let source = &self.circuit.elements[line.ports[k].wave.index()];
+                match &source.kind {
+                    Kind::VoltageSource(source) => source.wave.value(0.0),
+                    _ => 0.0,
+                }
+            };
+            initial = format!(" ic={:e},0,{:e},0", wave(1), wave(0));
+        }
+        let name = &line.name;
+        let card = if name.starts_with('t') {
+            name.clone()
+        } else {
+            format!("t.{name}")
+        };
+        self.line(format!(
+            "{card}{ends} z0={:e} td={:e}{initial}",
+            line.impedance.f64, line.delay
+        ));
     }
 
     fn element(&mut self, id: ElementId, element: &Element) -> Result<(), DeckError> {
@@ -557,6 +598,8 @@ fn waveform(wave: &Wave, edge: f64) -> (String, bool) {
         } => format!(
             "sffm({offset:e} {amplitude:e} {carrier:e} {index:e} {signal:e} {carrier_phase:e} {signal_phase:e})"
         ),
+        // The ports of a line are written as one card.
+        Wave::Arriving { initial, .. } => format!("dc {initial:e}"),
         Wave::Am {
             amplitude,
             offset,

@@ -22,7 +22,7 @@ impl Theta<'_> {
             ..
         } = self;
         amplitudes.see(&plant.systems[now.system].1.lcs, &now.x);
-        Ok(())
+        self.break_waves()
     }
 
     /// At a breakpoint: inputs take their right limits, the state jumps if it must.
@@ -30,7 +30,7 @@ impl Theta<'_> {
         let mut u = self.now.u.clone();
         self.inputs.right(t, &mut u);
         if u == self.now.u {
-            return Ok(());
+            return self.break_waves();
         }
         let rows = log.wants_rows();
         let before = if rows {
@@ -46,6 +46,7 @@ impl Theta<'_> {
         }
         self.jump(&old, log)?;
         self.find_mode()?;
+        self.break_waves()?;
         self.report_quietly(log);
         if rows {
             self.log_row(log);
@@ -199,6 +200,7 @@ impl Theta<'_> {
                 };
                 let pattern = &self.now.pattern;
                 if self.switches.update(lcs, at, pattern, true) == Change::None {
+                    self.break_waves()?;
                     if log.wants_rows() {
                         self.log_row(log);
                     }

@@ -225,6 +225,7 @@ impl Theta<'_> {
 
     pub(super) fn back(&mut self, steps: u64) {
         self.now.copy_from(&self.kept);
+        self.inputs.lines_mut().back_to(self.now.t);
         self.stats.steps = steps;
         self.pending.clear();
         self.attempt.h = f64::NAN;
