@@ -253,6 +253,23 @@ impl Switches {
         change
     }
 
+    /// Whether the controls that ask for another position are no further past their thresholds than the part `uncertain` of what
+    /// they are computed from.
+    pub(crate) fn undecided(&self, lcs: &Lcs, at: Point<'_>, uncertain: f64) -> bool {
+        self.thresholds.iter().enumerate().all(|(i, threshold)| {
+            let (on, control) = (self.position[i], reading::value(&lcs.controls, i, at));
+            let level = if on {
+                threshold.off_below
+            } else {
+                threshold.on_above
+            };
+            let size = reading::magnitude(&lcs.controls, i, at);
+            self.driven[i]
+                || threshold.position(on, control) == on
+                || (control - level).abs() <= uncertain * size
+        })
+    }
+
     /// Names with their positions, of those that differ from `before` (all if `None`).
     pub(crate) fn flipped(&self, before: &[bool]) -> String {
         let names = self.thresholds.iter().enumerate().filter(|(i, t)| {

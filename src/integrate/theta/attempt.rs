@@ -60,7 +60,33 @@ impl Theta<'_> {
         if fused.step(&self.z, n, &mut self.out, noise) {
             return Ok(());
         }
-        self.solve_step(scheme, h, t1)
+        let tried = attempt.clone();
+        self.solve_step(scheme, h, t1)?;
+        self.confirm(tried);
+        Ok(())
+    }
+
+    /// Returns to the tried step where the solvers find its active set and leave every port as far below zero: what its guards
+    /// refuse is zero to the rounding of the problem.
+    #[cold]
+    fn confirm(&mut self, tried: Attempt) {
+        let n = self.now.x.len();
+        let fused = self.plant.systems[self.now.system]
+            .1
+            .step(tried.step)
+            .fused(tried.mode);
+        let found = |(basis, _): &(Vec<bool>, _)| *basis == self.now.active;
+        if !fused.regular || !self.attempt.solved.as_ref().is_some_and(found) {
+            return;
+        }
+        let solved = self.out.clone();
+        fused.step(&self.z, n, &mut self.out, |_| 0.0);
+        let mut guards = self.out[n..].iter().zip(&solved[n..]);
+        if guards.all(|(&guard, &solved)| guard >= 2.0 * solved.min(0.0)) {
+            self.attempt = tried;
+        } else {
+            self.out = solved;
+        }
     }
 
     /// The step with γ = 1 by the solvers. Where the user's own γ = 1 > θ leaves a stiff step without solution, θ = 1 has one.

@@ -165,12 +165,7 @@ impl Theta<'_> {
             self.read_lambda()?;
         }
         let lcs = &self.plant.systems[self.now.system].1.lcs;
-        let at = Point {
-            x: &self.now.x,
-            lambda: &self.lambda,
-            u: &self.now.u,
-            du: &self.du,
-        };
+        let at = self.now.point(&self.lambda, &self.du);
         Ok(self.switches.update(lcs, at, &self.now.pattern, false))
     }
 
@@ -192,12 +187,7 @@ impl Theta<'_> {
                     self.read_lambda()?;
                 }
                 let lcs = &self.plant.systems[self.now.system].1.lcs;
-                let at = Point {
-                    x: &self.now.x,
-                    lambda: &self.lambda,
-                    u: &self.now.u,
-                    du: &self.du,
-                };
+                let at = self.now.point(&self.lambda, &self.du);
                 let pattern = &self.now.pattern;
                 if self.switches.update(lcs, at, pattern, true) == Change::None {
                     self.break_waves()?;
@@ -211,6 +201,16 @@ impl Theta<'_> {
             log.event(self.now.t, self.switches.flipped(&before));
             self.change_position(log)?;
             before = self.switches.position().to_vec();
+        }
+        // A switch whose positions contradict each other by less than the right limit is known to slides: it stays as it is.
+        self.read_lambda()?;
+        let at = self.now.point(&self.lambda, &self.du);
+        if self.switches.undecided(&self.system().lcs, at, SHORT) {
+            self.break_waves()?;
+            if log.wants_rows() {
+                self.log_row(log);
+            }
+            return Ok(());
         }
         Err(SimError::at(self.now.t, Reason::SwitchesDoNotSettle)
             .device(self.switches.flipped(&[])))

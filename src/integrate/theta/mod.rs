@@ -166,6 +166,16 @@ struct Now {
 }
 
 impl Now {
+    /// The present point, with λ and the slopes of the inputs there.
+    fn point<'a>(&'a self, lambda: &'a [f64], du: &'a [f64]) -> Point<'a> {
+        Point {
+            x: &self.x,
+            lambda,
+            u: &self.u,
+            du,
+        }
+    }
+
     fn copy_from(&mut self, other: &Self) {
         self.x.clone_from(&other.x);
         self.u.clone_from(&other.u);
@@ -329,12 +339,7 @@ impl<'a> Theta<'a> {
         }
         self.read_lambda()?;
         let lcs = &self.plant.systems[self.now.system].1.lcs;
-        let at = Point {
-            x: &self.now.x,
-            lambda: &self.lambda,
-            u: &self.now.u,
-            du: &self.du,
-        };
+        let at = self.now.point(&self.lambda, &self.du);
         for port in &self.ports {
             let i = reading::value(&lcs.outputs.power_i, port.current, at);
             let e = self.now.u[port.input];
@@ -388,12 +393,7 @@ impl<'a> Theta<'a> {
         if !known {
             return;
         }
-        let at = Point {
-            x: &now.x,
-            lambda: &self.lambda,
-            u: &now.u,
-            du: &self.du,
-        };
+        let at = now.point(&self.lambda, &self.du);
         for i in 0..lcs.outputs.power.len() {
             let v = reading::value(&lcs.outputs.power_v, i, at);
             amplitudes.see_branch(v, reading::value(&lcs.outputs.power_i, i, at));
@@ -408,12 +408,7 @@ impl<'a> Theta<'a> {
         self.begin(&mut Log::new(0, f64::INFINITY, false))?;
         self.read_lambda()?;
         let lcs = &self.plant.systems[self.now.system].1.lcs;
-        let at = Point {
-            x: &self.now.x,
-            lambda: &self.lambda,
-            u: &self.now.u,
-            du: &self.du,
-        };
+        let at = self.now.point(&self.lambda, &self.du);
         Ok((0..self.switches.len())
             .map(|i| reading::value(&lcs.controls, i, at))
             .collect())

@@ -138,12 +138,7 @@ impl Theta<'_> {
             self.lambda.fill(0.0);
         }
         let lcs = &self.plant.systems[self.now.system].1.lcs;
-        let at = Point {
-            x: &self.now.x,
-            lambda: &self.lambda,
-            u: &self.now.u,
-            du: &self.du,
-        };
+        let at = self.now.point(&self.lambda, &self.du);
         for (i, value) in row.iter_mut().enumerate() {
             *value = reading::value(&lcs.outputs.rows, i, at);
         }
