@@ -151,8 +151,14 @@ impl Theta<'_> {
             self.fixed_step(h, t1)?;
             self.commit(t1)?;
         }
-        if self.switches.watch() && self.crossed()? {
-            if level < LOCATE && !last_chance && !self.switches.chattering(CHATTER) {
+        let change = if self.switches.watch() {
+            self.crossed()?
+        } else {
+            Change::None
+        };
+        if change != Change::None {
+            let may_halve = level < LOCATE && !last_chance && !self.switches.chattering(CHATTER);
+            if change == Change::Passage && may_halve {
                 self.back(steps);
                 self.preferred = f64::INFINITY;
                 return Ok(false);
@@ -222,6 +228,7 @@ impl Theta<'_> {
 
     pub(super) fn back(&mut self, steps: u64) {
         self.now.copy_from(&self.kept);
+        self.inputs.lines_mut().back_to(self.now.t);
         self.stats.steps = steps;
         self.pending.clear();
         self.attempt.h = f64::NAN;
