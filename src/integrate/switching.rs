@@ -16,14 +16,20 @@ pub struct Threshold {
 }
 
 impl Threshold {
+    /// How far a control value is beyond the threshold that a switch in this position waits for.
+    #[must_use]
+    pub fn excess(&self, on: bool, control: f64) -> f64 {
+        if on {
+            self.off_below - control
+        } else {
+            control - self.on_above
+        }
+    }
+
     /// The position that a control value asks for.
     #[must_use]
     pub fn position(&self, on: bool, control: f64) -> bool {
-        if on {
-            control >= self.off_below
-        } else {
-            control > self.on_above
-        }
+        on != (self.excess(on, control) > 0.0)
     }
 }
 
@@ -110,24 +116,39 @@ impl Switches {
         }
     }
 
-    /// Whether a control that depends on the state asks for another position; `flip` carries it out. Switches that sources
-    /// alone drive move at the times of [`Self::next_known`] only.
-    pub(crate) fn update(&mut self, lcs: &Lcs, at: Point<'_>, flip: bool) -> bool {
-        let mut any = false;
-        for (i, threshold) in self.thresholds.iter().enumerate() {
-            if self.driven[i] {
-                continue;
-            }
-            let wanted = threshold.position(self.position[i], reading::value(&lcs.controls, i, at));
-            if wanted != self.position[i] {
-                any = true;
-                if flip {
-                    self.position[i] = wanted;
-                    self.in_this_step += 1;
-                }
-            }
-        }
-        any
+    /// The switches whose controls depend on the state, with how far these are beyond their thresholds. Switches that sources alone drive move at the times of [`Self::next_known`] only.
+    fn watched<'a>(
+        &'a self,
+        lcs: &'a Lcs,
+        at: Point<'a>,
+    ) -> impl Iterator<Item = (usize, f64)> + 'a {
+        let watched = (0..self.thresholds.len()).filter(|&i| !self.driven[i]);
+        watched.map(move |i| {
+            let control = reading::value(&lcs.controls, i, at);
+            (i, self.thresholds[i].excess(self.position[i], control))
+        })
+    }
+
+    /// Whether a control that depends on the state asks for another position.
+    pub(crate) fn beyond(&self, lcs: &Lcs, at: Point<'_>) -> bool {
+        self.watched(lcs, at).any(|(_, excess)| excess > 0.0)
+    }
+
+    /// How far each control that depends on the state is beyond its threshold, positive where the switch is to move.
+    pub(crate) fn excess(&self, lcs: &Lcs, at: Point<'_>) -> Vec<f64> {
+        self.watched(lcs, at).map(|(_, excess)| excess).collect()
+    }
+
+    /// Moves the switches whose controls depend on the state and ask for another position; whether there is one.
+    pub(crate) fn update(&mut self, lcs: &Lcs, at: Point<'_>) -> bool {
+        let moving: Vec<usize> = self
+            .watched(lcs, at)
+            .filter(|(_, excess)| *excess > 0.0)
+            .map(|(i, _)| i)
+            .collect();
+        self.toggle(&moving);
+        self.in_this_step += u32::try_from(moving.len()).unwrap_or(u32::MAX);
+        !moving.is_empty()
     }
 
     /// Names with their positions, of those that differ from `before` (all if `None`).

@@ -160,17 +160,33 @@ impl Theta<'_> {
 
     /// Whether a switch's control is beyond its threshold now.
     pub(super) fn crossed(&mut self) -> Result<bool, SimError> {
+        self.read_controls()?;
+        let (lcs, at) = self.at_present();
+        Ok(self.switches.beyond(lcs, at))
+    }
+
+    /// How far the controls of switches that watch the state are beyond their thresholds now.
+    pub(super) fn excess(&mut self) -> Result<Vec<f64>, SimError> {
+        self.read_controls()?;
+        let (lcs, at) = self.at_present();
+        Ok(self.switches.excess(lcs, at))
+    }
+
+    fn read_controls(&mut self) -> Result<(), SimError> {
         if self.switches.needs_lambda() {
             self.read_lambda()?;
         }
-        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        Ok(())
+    }
+
+    fn at_present(&self) -> (&Lcs, Point<'_>) {
         let at = Point {
             x: &self.now.x,
             lambda: &self.lambda,
             u: &self.now.u,
             du: &self.du,
         };
-        Ok(self.switches.update(lcs, at, false))
+        (&self.plant.systems[self.now.system].1.lcs, at)
     }
 
     /// Flips the switches `moving`, then those whose controls ask for it until none does, with the jumps this causes.
@@ -192,7 +208,7 @@ impl Theta<'_> {
                     u: &self.now.u,
                     du: &self.du,
                 };
-                if !self.switches.update(lcs, at, true) {
+                if !self.switches.update(lcs, at) {
                     if log.wants_rows() {
                         self.log_row(log);
                     }
