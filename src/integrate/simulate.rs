@@ -180,9 +180,12 @@ impl Problem<'_> {
         self.behaviour.switches.iter().map(Threshold::of).collect()
     }
 
-    fn exact(&self, tran: &Tran, settings: &Settings) -> Result<Exact<'_>, SimError> {
+    /// `lcs` is the system of the start position.
+    fn exact(&self, tran: &Tran, lcs: &Lcs, settings: &Settings) -> Result<Exact<'_>, SimError> {
         Exact::new(exact::Setup {
-            assembler: exact::Assembler::new(&self.behaviour).with_steps_of(self.original),
+            assembler: exact::Assembler::new(&self.behaviour)
+                .with_steps_of(self.original)
+                .knowing(&self.position, lcs),
             position: self.position.clone(),
             t: 0.0,
             until: tran.tstop,
@@ -224,24 +227,22 @@ impl Problem<'_> {
         Ok(theta)
     }
 
-    /// See [`roles`].
-    fn choose_roles(&mut self, tran: &Tran) -> Result<(), SimError> {
+    /// See [`roles`]; returns the system of the start position.
+    fn choose_roles(&mut self, tran: &Tran) -> Result<Lcs, SimError> {
         let lcs = self.free(&self.position)?;
         if roles::doubtful(&lcs, tran.tstop) {
             let first = self.behaviour.in_other_roles();
             let first = std::mem::replace(&mut self.behaviour, first);
-            if !self
-                .free(&self.position)
-                .is_ok_and(|other| roles::better(&lcs, &other))
-            {
-                self.behaviour = first;
+            match self.free(&self.position) {
+                Ok(other) if roles::better(&lcs, &other) => return Ok(other),
+                _ => self.behaviour = first,
             }
         }
-        Ok(())
+        Ok(lcs)
     }
 
-    /// Positions of switches without `ON`/`OFF` that agree with their controls at the start state.
-    fn settle_switches(&mut self, tran: &Tran, settings: &Settings) -> Result<(), SimError> {
+    /// Positions of switches without `ON`/`OFF` that agree with their controls at the start state; whether one moved.
+    fn settle_switches(&mut self, tran: &Tran, settings: &Settings) -> Result<bool, SimError> {
         let mut seen = Vec::new();
         while self.settle.contains(&true) {
             let stepping = Stepping::Fixed(tran.tstep);
@@ -266,7 +267,7 @@ impl Problem<'_> {
             }
             seen.push(std::mem::replace(&mut self.position, wanted));
         }
-        Ok(())
+        Ok(!seen.is_empty())
     }
 
     /// Amplitudes from a coarse run.
@@ -302,13 +303,14 @@ impl Problem<'_> {
     fn handover<'a>(
         &'a self,
         tran: &'a Tran,
+        lcs: &Lcs,
         settings: &'a Settings,
     ) -> Result<Handover<'a>, SimError> {
         // An error control would follow every switching of a chattering circuit.
         let step = tran.tstep / HANDOVER_STEPS;
         let stepping = Stepping::Fixed(step);
         Ok(Handover::new(
-            self.exact(tran, settings)?,
+            self.exact(tran, lcs, settings)?,
             Box::new(move |place| {
                 self.stepper(place.clone(), tran, Scheme::MOREAU, stepping, settings)
             }),
@@ -345,9 +347,10 @@ fn dispatch(
     options: SimOptions<'_>,
 ) -> Result<Run, SimError> {
     check(&tran, &options)?;
-    problem.choose_roles(&tran)?;
-    problem.settle_switches(&tran, &options.settings)?;
-    let lcs = problem.free(&problem.position)?;
+    let mut lcs = problem.choose_roles(&tran)?;
+    if problem.settle_switches(&tran, &options.settings)? {
+        lcs = problem.free(&problem.position)?;
+    }
     let Plan {
         method,
         scheme,
@@ -377,7 +380,7 @@ fn dispatch(
     let (mut method, mut notes) = (method, problem.notes.clone());
     let (mut progress, settings) = (options.progress, &options.settings);
     if options.method == Method::Exact {
-        let mut exact = problem.exact(&tran, settings)?;
+        let mut exact = problem.exact(&tran, &lcs, settings)?;
         let frame = frame(method, notes);
         return run(&mut exact, Frame { progress, ..frame }, log());
     }
@@ -386,7 +389,7 @@ fn dispatch(
             progress: progress.as_mut().map(|p| &mut **p as &mut dyn FnMut(f64)),
             ..frame(method, notes.clone())
         };
-        let attempt = problem.handover(&tran, settings);
+        let attempt = problem.handover(&tran, &lcs, settings);
         match attempt.and_then(|mut handover| run(&mut handover, frame, log())) {
             Ok(run) => return Ok(run),
             Err(error) => notes.push(format!(

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::assembler::{Assembler, Step};
+use super::clock::{Clock, Control};
 use super::exosystem::Exosystem;
 use super::free::Free;
 use super::mode::{Key, Mode, SwitchFacts};
@@ -21,6 +22,8 @@ pub(crate) struct Plant<'a> {
     pub(crate) valves: Vec<Option<usize>>,
     /// Switches that sources alone drive.
     pub(crate) drives: Vec<Drive>,
+    /// Those whose sources do nothing else.
+    pub(crate) clocks: Vec<Clock>,
     h: f64,
     energy: bool,
     tolerance: f64,
@@ -43,6 +46,7 @@ impl<'a> Plant<'a> {
             thresholds,
             assembler,
             drives: Vec::new(),
+            clocks: Vec::new(),
             h,
             energy,
             tolerance,
@@ -73,6 +77,11 @@ impl<'a> Plant<'a> {
         if let Some(&known) = self.index.get(key) {
             return known;
         }
+        // A control that depends on nothing does not stay on its threshold.
+        let clocked = |switch: usize| self.clocks.iter().any(|clock| clock.switch == switch);
+        if key.sliding.iter().any(|s| clocked(s.0)) {
+            return None;
+        }
         let holds: Vec<Hold> = key
             .closed
             .iter()
@@ -90,6 +99,7 @@ impl<'a> Plant<'a> {
                 thresholds: &self.thresholds,
                 limits: &limits,
                 drives: &self.drives,
+                clocks: &self.clocks,
             };
             Mode::new(key.clone(), &lcs, exosystem, &facts, self.h, self.energy)
         });
@@ -108,6 +118,11 @@ impl<'a> Plant<'a> {
             **valve == Some(pair) && threshold.holds(position[*i], position)
         });
         holding.map(|(i, _)| i).collect()
+    }
+
+    /// See [`controls`](super::clock::controls).
+    pub(crate) fn controls(&self) -> (Vec<bool>, Vec<Control>) {
+        self.assembler.controls()
     }
 
     /// Where function blocks jump.

@@ -1,6 +1,5 @@
 //! From one mode to the next: positions of the switches, impulse of the devices, conducting devices.
 
-use super::free::Degenerate;
 use super::inspect::{Finding, Inspector};
 use super::mode::{Key, Owner};
 use super::schedule::Drive;
@@ -381,11 +380,13 @@ impl Exact<'_> {
             let h = part / fastest;
             let u = self.inputs(t + h);
             self.lcp_solves += 1;
-            for degenerate in [Degenerate::Open, Degenerate::As(&key.closed)] {
-                let proposal = self.plant.free(key)?.propose(&x, &u, h, degenerate);
-                let Some(closed) = proposal.filter(|c| !tried.contains(c)) else {
+            let Some(proposal) = self.plant.free(key)?.propose(&x, &u, h) else {
+                continue;
+            };
+            for closed in [proposal.open(), proposal.as_before(&key.closed)] {
+                if tried.contains(&closed) {
                     continue;
-                };
+                }
                 tried.push(closed.clone());
                 let candidate = key.with_closed(closed);
                 if let Some(found) = self.try_key(&candidate, barred) {
