@@ -239,6 +239,7 @@ mod tests {
             name: "s".into(),
             on_above: 0.5,
             off_below: 0.5,
+            latch: None,
         };
         let mut clock = Clock::new((0, 0.0, vec![(0, 1.0)]), &sources, 0.0).unwrap();
         let (mut t, mut on, mut moves) = (0.0, false, Vec::new());
