@@ -209,14 +209,19 @@ impl Theta<'_> {
             self.attempt.h = f64::NAN;
             return;
         }
-        // Energy at the end of the step (γ = 1) from the solution itself.
+        // Energy at k + θ with λ of the end (γ = 1): for θ = ½ the balance of this step, too, is exact.
+        let theta = self.system().step(self.attempt.step).scheme.theta;
+        let mean = |after: &[f64], before: &[f64]| -> Vec<f64> {
+            let pairs = after.iter().zip(before);
+            pairs.map(|(a, b)| theta * a + (1.0 - theta) * b).collect()
+        };
         for (du, (a, b)) in self.du.iter_mut().zip(self.u_next.iter().zip(&self.now.u)) {
             *du = (a - b) / h;
         }
         let at = Point {
-            x: &self.out[..n],
+            x: &mean(&self.out[..n], &self.now.x),
             lambda: &self.lambda,
-            u: &self.u_next,
+            u: &mean(&self.u_next, &self.now.u),
             du: &self.du,
         };
         let (source, dissipated) = energy::power(&self.system().lcs, at);
