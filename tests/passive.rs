@@ -16,7 +16,6 @@ use circ::solve::enumerate;
 use circ::solve::lcp::Lcp;
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 
 fn circuit(text: &str) -> Option<Circuit> {
     let mut sources = SourceMap::default();
@@ -110,7 +109,7 @@ fn stepped(lcs: &Lcs, x: DVector<f64>, h: f64, steps: usize) -> (DVector<f64>, f
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 2000, rng_seed: RngSeed::Fixed(2026), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn same_states_as_the_oracle(text in netlist()) {
@@ -129,15 +128,50 @@ proptest! {
 
     #[test]
     fn midpoint_keeps_the_energy_balance(text in netlist()) {
-        let Some(circuit) = circuit(&text) else { return Err(TestCaseError::fail(text)) };
-        let behaviour = behaviour(&circuit).expect("a behaviour");
-        let options = SimOptions { method: Method::Theta, ..SimOptions::default() };
-        let run = simulate(&circuit, &behaviour, options)
-            .map_err(|e| TestCaseError::fail(format!("{text}{e}")))?;
-        let (energy, rounding) = (run.energy, 1e-15 * 10.0 * 10.0 / 100.0 * 200e-6);
-        if energy.source.abs().max(energy.stored.abs()) > rounding {
-            prop_assert!(energy.residual_relative < 1e-3, "{text}\n{energy:?}");
-        }
-        prop_assert!(energy.dissipated >= -1e-9 * energy.source.abs() - rounding, "{energy:?}");
+        balances(&text)?;
+    }
+}
+
+/// A run by the midpoint rule has its energy balance and does not create energy.
+fn balances(text: &str) -> Result<(), TestCaseError> {
+    let Some(circuit) = circuit(text) else {
+        return Err(TestCaseError::fail(text.to_owned()));
+    };
+    let behaviour = behaviour(&circuit).expect("a behaviour");
+    let options = SimOptions {
+        method: Method::Theta,
+        ..SimOptions::default()
+    };
+    let run = simulate(&circuit, &behaviour, options)
+        .map_err(|e| TestCaseError::fail(format!("{text}{e}")))?;
+    let (energy, rounding) = (run.energy, 1e-15 * 10.0 * 10.0 / 100.0 * 200e-6);
+    if energy.source.abs().max(energy.stored.abs()) > rounding {
+        prop_assert!(energy.residual_relative < 1e-3, "{text}\n{energy:?}");
+    }
+    prop_assert!(
+        energy.dissipated >= -1e-9 * energy.source.abs() - rounding,
+        "{energy:?}"
+    );
+    Ok(())
+}
+
+/// Circuits that were hard: currents and voltages that stay a rounding beside zero, so that the solvers are asked in every step; rings
+/// of three diodes, whose equations contradict each other by rounding.
+#[test]
+fn balance_beside_zero() {
+    let circuits = [
+        "rt2 2 1 940\nrt3 3 2 1410\nrt4 4 3 1880\nd0 4 3 di\nl1 1 4 5u ic=-0.001\nd2 4 3 di\nd3 3 1 di\nc4 2 3 5n ic=-1\n",
+        "rt2 2 1 940\nrt3 3 2 1410\nrt4 4 3 1880\nd0 2 3 di\nd1 2 4 di\nl2 4 2 1u ic=-0.001\nc3 2 1 17n ic=-10\nd4 0 1 di\n",
+        "rt2 2 1 940\nd0 2 1 di\nl1 1 2 1u ic=-0.001\nd2 0 1 di\n",
+        "rt2 2 1 940\nrt3 3 2 1410\nc0 1 0 1n ic=0\nc1 2 0 8n ic=0\nd2 2 0 di\nd3 0 3 di\nl4 2 1 1u ic=0\nd5 3 2 di\nc6 1 3 1n ic=-1\n",
+        "rt2 2 1 940\nrt3 3 2 1410\nrt4 4 3 1880\nr0 4 1 1\nl1 2 4 2u ic=0\nc2 4 0 1n ic=-1\nd3 4 3 di\n",
+        "rt2 2 1 940\nrt3 3 2 1410\nc0 2 0 74n ic=-16\nd1 1 2 di\nl2 2 3 83u ic=0.011\nd3 2 3 di\n",
+        "rt2 2 1 940\nrt3 3 2 1410\nc0 0 1 58n ic=0\nd1 0 1 di\nd2 1 3 di\nd3 3 0 di\nl4 2 0 1u ic=0\nc5 0 2 1n ic=0\nc6 3 2 1n ic=-1\n",
+    ];
+    for elements in circuits {
+        let text = format!(
+            "random\n.model di d(ron=0 vfwd=0 n=0.01)\nv1 s 0 sin(0 10 1k)\nrs s 1 100\n{elements}.tran 2u 200u uic\n.end\n"
+        );
+        balances(&text).unwrap_or_else(|e| panic!("{e}"));
     }
 }

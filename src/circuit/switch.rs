@@ -173,6 +173,7 @@ impl<'n> Builder<'n, '_> {
                 on_above: on,
                 off_below: off,
                 initial: None,
+                latch: None,
             };
             return Some((switch, Vec::new()));
         }
@@ -208,6 +209,7 @@ impl<'n> Builder<'n, '_> {
             on_above,
             off_below,
             initial: None,
+            latch: None,
         };
         Some((switch, steps))
     }

@@ -124,6 +124,7 @@ pub fn power(lcs: &Lcs, at: Point<'_>) -> (f64, f64) {
         match term.kind {
             PowerKind::Source => source -= product,
             PowerKind::Dissipated => dissipated += product,
+            PowerKind::Line => {}
         }
     }
     (source, dissipated)

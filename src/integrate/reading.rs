@@ -18,7 +18,17 @@ pub struct Point<'a> {
 /// Row `i` of `rows` at a point. Blocks without columns (a system without devices, rows without u') count as zero.
 #[must_use]
 pub fn value(rows: &Rows, i: usize, at: Point<'_>) -> f64 {
-    let mut sum = if i < rows.one.len() { rows.one[i] } else { 0.0 };
+    sum(rows, i, at, |term| term)
+}
+
+/// The sum of the magnitudes that [`value`] is computed from.
+#[must_use]
+pub fn magnitude(rows: &Rows, i: usize, at: Point<'_>) -> f64 {
+    sum(rows, i, at, f64::abs)
+}
+
+fn sum(rows: &Rows, i: usize, at: Point<'_>, part: impl Fn(f64) -> f64) -> f64 {
+    let mut sum = rows.one.get(i).map_or(0.0, |&one| part(one));
     for (block, values) in [
         (&rows.x, at.x),
         (&rows.lambda, at.lambda),
@@ -30,7 +40,7 @@ pub fn value(rows: &Rows, i: usize, at: Point<'_>) -> f64 {
             for (j, &v) in values.iter().enumerate().take(columns) {
                 let weight = block[(i, j)];
                 if weight != 0.0 {
-                    sum += weight * v;
+                    sum += part(weight * v);
                 }
             }
         }

@@ -319,14 +319,39 @@ impl Lawful {
 
     /// −R'⁻¹ R, for M' + μ with a μ that is lost in rounding everywhere but on the kernel of M'.
     fn newton_step(&self, at: &Point) -> Option<DVector<f64>> {
+        self.against(&at.slope, &at.rest, &at.residual)
+    }
+
+    /// −R'⁻¹ b, from dλ'/dw and −dy'/dw.
+    fn against(
+        &self,
+        slope: &DVector<f64>,
+        rest: &DVector<f64>,
+        b: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
         let mut matrix = self.m.clone();
-        for (mut column, slope) in matrix.column_iter_mut().zip(at.slope.iter()) {
+        for (mut column, slope) in matrix.column_iter_mut().zip(slope.iter()) {
             column *= *slope;
         }
-        for j in 0..at.w.len() {
-            matrix[(j, j)] += at.rest[j] + MONOTONE * at.slope[j];
+        for (j, (rest, slope)) in rest.iter().zip(slope.iter()).enumerate() {
+            matrix[(j, j)] += rest + MONOTONE * slope;
         }
-        solved(matrix, &-&at.residual)
+        solved(matrix, &-b)
+    }
+
+    /// dλ for a change dq from a solution (λ, y): −S R'⁻¹ dq.
+    pub(super) fn response(
+        &self,
+        lambda: &DVector<f64>,
+        y: &DVector<f64>,
+        dq: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        let d = &self.scaling.d;
+        let laws = (0..d.len()).map(|j| self.law(j, lambda[j] / d[j] - y[j] * d[j]));
+        let (slope, rest): (Vec<f64>, Vec<f64>) = laws.map(|(_, _, s, r)| (s, r)).unzip();
+        let (slope, rest) = (DVector::from_vec(slope), DVector::from_vec(rest));
+        let dw = self.against(&slope, &rest, &dq.component_mul(d))?;
+        Some(dw.component_mul(&slope).component_mul(d))
     }
 
     /// The step to the solution of the problem in which the curved laws are straight and the ideal ones as they are.

@@ -124,27 +124,42 @@ pub fn nonnegative_least_squares(e: &DMatrix<f64>, f: &DVector<f64>) -> DVector<
     let n = e.ncols();
     let mut passive = vec![false; n];
     let mut u = DVector::zeros(n);
-    let tolerance = 1e2 * f64::EPSILON * e.amax().max(1.0) * f.norm();
+    let rounding = 1e2 * f64::EPSILON * e.amax().max(1.0);
+    // Columns whose gradient is positive by rounding alone: they entered and were to leave at once.
+    let mut refused = vec![false; n];
     for _ in 0..30 * (n + 1) {
         let gradient = e.transpose() * (f - e * &u);
+        let tolerance = rounding * f.norm().max((e.abs() * &u).amax());
         let Some(enter) = (0..n)
-            .filter(|&j| !passive[j] && gradient[j] > tolerance)
+            .filter(|&j| !passive[j] && !refused[j] && gradient[j] > tolerance)
             .max_by(|&a, &b| gradient[a].total_cmp(&gradient[b]))
         else {
             break;
         };
         passive[enter] = true;
+        let mut moved = false;
         loop {
             let set: Vec<usize> = (0..n).filter(|&j| passive[j]).collect();
+            if set.is_empty() {
+                refused[enter] = true;
+                break;
+            }
             let columns = e.select_columns(&set);
             let svd = columns.svd(true, true);
             let limit = f64::EPSILON * 1e3 * svd.singular_values.max();
             let Ok(solved) = svd.solve(f, limit) else {
                 return u;
             };
+            let at = set.iter().position(|&j| j == enter);
+            if !moved && at.is_some_and(|at| solved[at] <= 0.0) {
+                (passive[enter], refused[enter]) = (false, true);
+                break;
+            }
+            moved = true;
             if solved.iter().all(|&v| v > 0.0) {
                 u.fill(0.0);
                 set.iter().zip(solved.iter()).for_each(|(&j, &v)| u[j] = v);
+                refused.fill(false);
                 break;
             }
             let step = set
@@ -209,6 +224,37 @@ mod tests {
         let (lambda, unique) = least(&lcp, &dvector![3.0, 2.0]);
         assert!((lambda - dvector![3.0, 2.0]).norm() < 1e-12);
         assert!(unique);
+    }
+
+    #[test]
+    fn columns_that_enter_by_rounding_leave_and_stay_out() {
+        // From a chattering comparator: five nearly dependent columns.
+        let e = DMatrix::from_column_slice(
+            3,
+            5,
+            &[
+                7.050_101_361_672_679e-9,
+                0.160_918_642_578_446_8,
+                0.0,
+                5.709_773_986_183_874e-10,
+                -0.986_967_674_481_140_5,
+                0.0,
+                -1.000_000_000_000_000_2,
+                5.709_569_499_543_558e-10,
+                0.0,
+                7.050_106_828_182_639e-9,
+                0.160_918_642_578_446_8,
+                0.0,
+                -1.0,
+                0.0,
+                1.0,
+            ],
+        );
+        let f = dvector![0.0, 0.0, 1.0];
+        let u = nonnegative_least_squares(&e, &f);
+        assert!(u.min() >= 0.0, "{u}");
+        let gradient = e.transpose() * (&f - &e * &u);
+        assert!(gradient.max() <= 1e-8, "{gradient}");
     }
 
     #[test]

@@ -50,8 +50,7 @@ impl Theta<'_> {
                 mode,
                 h,
                 settle,
-                solved: None,
-                work: None,
+                ..Attempt::default()
             };
         }
         let n = now.x.len();
@@ -60,7 +59,31 @@ impl Theta<'_> {
         if fused.step(&self.z, n, &mut self.out, noise) {
             return Ok(());
         }
-        self.solve_step(scheme, h, t1)
+        let tried = attempt.clone();
+        self.solve_step(scheme, h, t1)?;
+        self.confirm(tried);
+        Ok(())
+    }
+
+    /// Returns to the tried step where the solvers find its active set: then y ≥ 0 at its end, and what the guards of blocking ports
+    /// refused was the error of their short step or rounding. Currents must be as they are with γ = 1, zero or more.
+    #[cold]
+    fn confirm(&mut self, tried: Attempt) {
+        let found = |(basis, _): &(Vec<bool>, _)| *basis == self.now.active;
+        let n = self.now.x.len();
+        let system = &self.plant.systems[self.now.system].1;
+        let fused = system.step(tried.step).fused(tried.mode);
+        if !fused.regular || !self.attempt.solved.as_ref().is_some_and(found) {
+            return;
+        }
+        let solved = self.out.clone();
+        fused.step(&self.z, n, &mut self.out, |_| 0.0);
+        let as_far = |j: usize| self.out[n + j] >= 2.0 * solved[n + j].min(0.0);
+        if (0..self.now.active.len()).all(|j| !self.now.active[j] || as_far(j)) {
+            self.attempt = tried;
+        } else {
+            self.out = solved;
+        }
     }
 
     /// The step with γ = 1 by the solvers. Where the user's own γ = 1 > θ leaves a stiff step without solution, θ = 1 has one.
@@ -81,8 +104,8 @@ impl Theta<'_> {
         let (step, new) = change_matrices(system, h, Self::slack(t1), scheme, tolerance)
             .map_err(|reason| SimError::at(now.t, reason))?;
         self.stats.factorisations += u64::from(new);
+        let q = system.prepare(step, &self.z, &self.amplitudes);
         let matrices = system.step_mut(step);
-        let q = matrices.q(&self.z);
         let before = matrices.driver.factorisations;
         matrices.driver.suggest(&now.active);
         let solution = matrices.driver.solve(&q);
@@ -111,7 +134,7 @@ impl Theta<'_> {
             h,
             settle: false,
             solved: Some((solution.basis, solution.active)),
-            work: None,
+            ..Attempt::default()
         };
         Ok(())
     }
@@ -141,7 +164,7 @@ impl Theta<'_> {
         self.now.u.copy_from_slice(&self.u_next);
         self.now.t = t1;
         self.last_h = self.attempt.h;
-        Ok(())
+        self.send_waves()
     }
 
     /// The error after the attempted step.
@@ -161,6 +184,10 @@ impl Theta<'_> {
             estimate.restart();
         }
         let n = now.x.len();
+        if let Some(error) = attempt.error.take() {
+            estimate.stages(attempt.h, &out[..n], error);
+            return;
+        }
         let fused = || {
             plant.systems[now.system]
                 .1
@@ -202,8 +229,9 @@ impl Theta<'_> {
     pub(super) fn take_pattern(&mut self, basis: Vec<bool>, seen: &[Option<bool>], t: f64) {
         let ports = &self.system().lcs.ports;
         let before = &self.now.pattern;
-        let on =
-            |(&lambda, port): (&Option<bool>, &Port)| lambda == Some(port.role != Role::Voltage);
+        let on = |(&lambda, port): (&Option<bool>, &lcs::Port)| {
+            lambda == Some(port.role != Role::Voltage)
+        };
         let pattern: Vec<bool> = seen.iter().zip(ports).map(on).collect();
         if pattern != *before && self.started {
             let changed = (0..pattern.len()).filter(|&j| pattern[j] != before[j]);

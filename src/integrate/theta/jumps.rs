@@ -22,7 +22,7 @@ impl Theta<'_> {
             ..
         } = self;
         amplitudes.see(&plant.systems[now.system].1.lcs, &now.x);
-        Ok(())
+        self.break_waves()
     }
 
     /// At a breakpoint: inputs take their right limits, the state jumps if it must.
@@ -30,7 +30,7 @@ impl Theta<'_> {
         let mut u = self.now.u.clone();
         self.inputs.right(t, &mut u);
         if u == self.now.u {
-            return Ok(());
+            return self.break_waves();
         }
         let rows = log.wants_rows();
         let before = if rows {
@@ -46,6 +46,7 @@ impl Theta<'_> {
         }
         self.jump(&old, log)?;
         self.find_mode()?;
+        self.break_waves()?;
         self.report_quietly(log);
         if rows {
             self.log_row(log);
@@ -158,35 +159,29 @@ impl Theta<'_> {
         }
     }
 
-    /// Whether a switch's control is beyond its threshold now.
-    pub(super) fn crossed(&mut self) -> Result<bool, SimError> {
-        self.read_controls()?;
-        let (lcs, at) = self.at_present();
-        Ok(self.switches.beyond(lcs, at))
+    /// What the controls ask of the switches now.
+    pub(super) fn crossed(&mut self) -> Result<Change, SimError> {
+        if self.switches.needs_lambda() {
+            self.read_lambda()?;
+        }
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        let at = self.now.point(&self.lambda, &self.du);
+        Ok(self.switches.update(lcs, at, &self.now.pattern, false))
+    }
+
+    /// Whether the controls ask a switch to move now.
+    pub(super) fn asked(&mut self) -> Result<bool, SimError> {
+        Ok(self.switches.watch() && self.crossed()? != Change::None)
     }
 
     /// How far the controls of switches that watch the state are beyond their thresholds now.
     pub(super) fn excess(&mut self) -> Result<Vec<f64>, SimError> {
-        self.read_controls()?;
-        let (lcs, at) = self.at_present();
-        Ok(self.switches.excess(lcs, at))
-    }
-
-    fn read_controls(&mut self) -> Result<(), SimError> {
         if self.switches.needs_lambda() {
             self.read_lambda()?;
         }
-        Ok(())
-    }
-
-    fn at_present(&self) -> (&Lcs, Point<'_>) {
-        let at = Point {
-            x: &self.now.x,
-            lambda: &self.lambda,
-            u: &self.now.u,
-            du: &self.du,
-        };
-        (&self.plant.systems[self.now.system].1.lcs, at)
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        let at = self.now.point(&self.lambda, &self.du);
+        Ok(self.switches.excess(lcs, at, &self.now.pattern))
     }
 
     /// Flips the switches `moving`, then those whose controls ask for it until none does, with the jumps this causes.
@@ -202,13 +197,10 @@ impl Theta<'_> {
                     self.read_lambda()?;
                 }
                 let lcs = &self.plant.systems[self.now.system].1.lcs;
-                let at = Point {
-                    x: &self.now.x,
-                    lambda: &self.lambda,
-                    u: &self.now.u,
-                    du: &self.du,
-                };
-                if !self.switches.update(lcs, at) {
+                let at = self.now.point(&self.lambda, &self.du);
+                let pattern = &self.now.pattern;
+                if self.switches.update(lcs, at, pattern, true) == Change::None {
+                    self.break_waves()?;
                     if log.wants_rows() {
                         self.log_row(log);
                     }
@@ -219,6 +211,16 @@ impl Theta<'_> {
             log.event(self.now.t, self.switches.flipped(&before));
             self.change_position(log)?;
             before = self.switches.position().to_vec();
+        }
+        // A switch whose positions contradict each other by less than the right limit is known to slides: it stays as it is.
+        self.read_lambda()?;
+        let at = self.now.point(&self.lambda, &self.du);
+        if self.switches.undecided(&self.system().lcs, at, SHORT) {
+            self.break_waves()?;
+            if log.wants_rows() {
+                self.log_row(log);
+            }
+            return Ok(());
         }
         Err(SimError::at(self.now.t, Reason::SwitchesDoNotSettle)
             .device(self.switches.flipped(&[])))

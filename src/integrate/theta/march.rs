@@ -168,9 +168,18 @@ impl Theta<'_> {
             return Ok(Tried::Halve);
         }
         let mut tried = Tried::Done;
-        if self.switches.watch() && self.crossed()? {
-            if h > finest && !last_chance && !self.switches.chattering(CHATTER) {
+        let change = if self.switches.watch() {
+            self.crossed()?
+        } else {
+            Change::None
+        };
+        if change != Change::None {
+            let may_locate = h > finest && !last_chance && !self.switches.chattering(CHATTER);
+            if change == Change::Passage && may_locate {
                 self.locate(finest, steps, &mut impulse, log)?;
+            }
+            if let (Some(estimate), None) = (&mut self.now.estimate, &self.control) {
+                estimate.switched_late(&self.kept.x, &self.now.x);
             }
             self.report(log);
             self.switch(&[], log)?;
@@ -307,6 +316,7 @@ impl Theta<'_> {
 
     pub(super) fn back(&mut self, steps: u64) {
         self.now.copy_from(&self.kept);
+        self.inputs.lines_mut().back_to(self.now.t);
         self.stats.steps = steps;
         self.pending.clear();
         self.attempt.h = f64::NAN;

@@ -23,13 +23,14 @@ use crate::integrate::control::{Amplitudes, CORNER, Control};
 use crate::integrate::energy::{self, Balance};
 use crate::integrate::exact::Place;
 use crate::integrate::inputs::Inputs;
+use crate::integrate::line::Line;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
 use crate::integrate::stats::Stats;
 use crate::integrate::step::{SHORT, Scheme};
-use crate::integrate::switching::{Switches, Threshold};
+use crate::integrate::switching::{Change, Switches, Threshold};
 use crate::integrate::system::{Plant, Reduce, System};
-use crate::lcs::{Lcs, Port, Role};
+use crate::lcs::{self, Lcs, Role};
 use crate::settings::Settings;
 use crate::solve::{Solution, Status};
 use stages::Tableau;
@@ -128,8 +129,21 @@ pub struct Theta<'a> {
     notes: Vec<String>,
     worst_residual: f64,
     pending: Vec<(f64, String)>,
+    /// The ports of transmission lines.
+    ports: Vec<Port>,
     /// Largest |s| so far, by storage element: what the error control calls the amplitude.
     amplitudes: Amplitudes,
+}
+
+/// One end of a transmission line.
+#[derive(Debug, Clone, Copy)]
+struct Port {
+    /// The line and its end.
+    at: (usize, usize),
+    /// The power term whose current enters the line.
+    current: usize,
+    /// The input that is the wave that arrives.
+    input: usize,
 }
 
 /// Everything a rejected step has to give back.
@@ -152,6 +166,16 @@ struct Now {
 }
 
 impl Now {
+    /// The present point, with λ and the slopes of the inputs there.
+    fn point<'a>(&'a self, lambda: &'a [f64], du: &'a [f64]) -> Point<'a> {
+        Point {
+            x: &self.x,
+            lambda,
+            u: &self.u,
+            du,
+        }
+    }
+
     fn copy_from(&mut self, other: &Self) {
         self.x.clone_from(&other.x);
         self.u.clone_from(&other.u);
@@ -179,6 +203,8 @@ struct Attempt {
     solved: Option<(Vec<bool>, Vec<Option<bool>>)>,
     /// Energy from sources and into resistors and devices, J, where the stages tell it.
     work: Option<(f64, f64)>,
+    /// What the stages tell of the error, where it is asked for.
+    error: Option<stages::StepError>,
 }
 
 impl<'a> Theta<'a> {
@@ -274,10 +300,60 @@ impl<'a> Theta<'a> {
             notes: Vec::new(),
             worst_residual: 0.0,
             pending: Vec::new(),
+            ports: Vec::new(),
             amplitudes,
         };
         theta.resize();
         Ok(theta)
+    }
+
+    /// Connects the ports of transmission lines, before the run begins.
+    pub(crate) fn attach(&mut self, lines: &[Line]) {
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        self.inputs.attach(&lcs.inputs, lines);
+        let input = |name: &String| lcs.inputs.iter().position(|i| i.name == *name);
+        let power = &lcs.outputs.power;
+        let term = |name: &String| power.iter().position(|p| p.element == *name);
+        self.ports = (lines.iter().enumerate())
+            .flat_map(|(k, line)| {
+                [0, 1].map(|port| {
+                    Some(Port {
+                        at: (k, port),
+                        current: term(&line.impedances[port])?,
+                        input: input(&line.sources[port])?,
+                    })
+                })
+            })
+            .flatten()
+            .collect();
+        self.now.u = self.inputs.all(self.now.t);
+        self.u_next.clone_from(&self.now.u);
+        let stored = self.now.balance.first() + self.inputs.lines().stored(self.now.t);
+        self.now.balance = Balance::new(stored);
+        self.kept.copy_from(&self.now);
+        self.longest = self.longest.min(self.inputs.lines().longest_step());
+    }
+
+    /// Has the waves leave the ports of lines as they are now.
+    fn send_waves(&mut self) -> Result<(), SimError> {
+        if self.ports.is_empty() {
+            return Ok(());
+        }
+        self.read_lambda()?;
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        let at = self.now.point(&self.lambda, &self.du);
+        for port in &self.ports {
+            let i = reading::value(&lcs.outputs.power_i, port.current, at);
+            let e = self.now.u[port.input];
+            (self.inputs.lines_mut()).depart(port.at, self.now.t, i, e);
+        }
+        Ok(())
+    }
+
+    /// Something happens now that may break the waves that leave: as they are after it.
+    fn break_waves(&mut self) -> Result<(), SimError> {
+        self.inputs.lines_mut().note_break(self.now.t);
+        self.send_waves()
     }
 
     /// Sets the amplitudes known beforehand, by storage element.
@@ -285,13 +361,10 @@ impl<'a> Theta<'a> {
         self.amplitudes = amplitudes;
     }
 
-    /// Has the error estimated along the run; there is no estimate for prescribed steps of curved laws.
+    /// Has the error estimated along the run.
     pub fn estimate_errors(&mut self) {
         let mut estimate = Estimate::default();
         if self.control.is_none() {
-            if Tableau::of(self.system(), self.scheme).is_some() {
-                return;
-            }
             estimate.enter(self.now.x.iter().map(|_| 0.0));
         }
         self.kept.estimate = Some(estimate.clone());
@@ -319,12 +392,7 @@ impl<'a> Theta<'a> {
         if !known {
             return;
         }
-        let at = Point {
-            x: &now.x,
-            lambda: &self.lambda,
-            u: &now.u,
-            du: &self.du,
-        };
+        let at = now.point(&self.lambda, &self.du);
         for i in 0..lcs.outputs.power.len() {
             let v = reading::value(&lcs.outputs.power_v, i, at);
             amplitudes.see_branch(v, reading::value(&lcs.outputs.power_i, i, at));
@@ -339,12 +407,7 @@ impl<'a> Theta<'a> {
         self.begin(&mut Log::new(0, f64::INFINITY, false))?;
         self.read_lambda()?;
         let lcs = &self.plant.systems[self.now.system].1.lcs;
-        let at = Point {
-            x: &self.now.x,
-            lambda: &self.lambda,
-            u: &self.now.u,
-            du: &self.du,
-        };
+        let at = self.now.point(&self.lambda, &self.du);
         Ok((0..self.switches.len())
             .map(|i| reading::value(&lcs.controls, i, at))
             .collect())
@@ -424,7 +487,7 @@ impl Stepper for Theta<'_> {
             self.begin(log)?;
             let lcs = &self.plant.systems[self.now.system].1.lcs;
             let moving = self.switches.misplaced(lcs, &self.now.u);
-            if !moving.is_empty() || self.switches.watch() && self.crossed()? {
+            if !moving.is_empty() || self.asked()? {
                 self.switch(&moving, log)?;
             }
         }
@@ -444,9 +507,13 @@ impl Stepper for Theta<'_> {
             } else {
                 breakpoint.min(t)
             };
-            let (known, moving) =
-                self.switches
-                    .next_known(&self.system().lcs, &self.inputs, now, limit);
+            let (known, moving) = self.switches.next_known(
+                &self.system().lcs,
+                &self.inputs,
+                now,
+                limit,
+                Self::slack(limit),
+            );
             let mut stop = if merged { t } else { limit };
             let early = known < stop - Self::slack(stop);
             if early {
@@ -457,7 +524,7 @@ impl Stepper for Theta<'_> {
             if at_breakpoint {
                 self.edge(breakpoint.max(stop), log)?;
             }
-            if !moving.is_empty() || at_breakpoint && self.switches.watch() && self.crossed()? {
+            if !moving.is_empty() || at_breakpoint && self.asked()? {
                 self.switch(&moving, log)?;
             }
         }

@@ -3,6 +3,10 @@
 use super::attempt::unsolved;
 use super::*;
 
+/// What is read goes on along a line, so that its error adds up with every reflection: it is read by a step shorter by this
+/// part, where the rounding of the state grows to 2¹⁸ε.
+const SHORT_ON_LINES: f64 = 1.0 / 64.0;
+
 impl Theta<'_> {
     /// The step by which λ at the right limit is found, s.
     pub(super) fn read_step(&self) -> f64 {
@@ -26,6 +30,8 @@ impl Theta<'_> {
         let short = self.read_step();
         if self.system().curved {
             short * SHORT
+        } else if !self.ports.is_empty() {
+            short * SHORT_ON_LINES
         } else {
             short
         }
@@ -67,10 +73,11 @@ impl Theta<'_> {
             z,
             lambda,
             y,
+            amplitudes,
             ..
         } = self;
+        let q = plant.systems[now.system].1.prepare(step, z, amplitudes);
         let matrices = plant.systems[now.system].1.step_mut(step);
-        let q = matrices.q(z);
         matrices.driver.suggest(&now.active);
         matrices.driver.suggest_point(lambda, y);
         let mut solution = matrices.driver.solve(&q);
@@ -132,12 +139,7 @@ impl Theta<'_> {
             self.lambda.fill(0.0);
         }
         let lcs = &self.plant.systems[self.now.system].1.lcs;
-        let at = Point {
-            x: &self.now.x,
-            lambda: &self.lambda,
-            u: &self.now.u,
-            du: &self.du,
-        };
+        let at = self.now.point(&self.lambda, &self.du);
         for (i, value) in row.iter_mut().enumerate() {
             *value = reading::value(&lcs.outputs.rows, i, at);
         }
@@ -148,10 +150,11 @@ impl Theta<'_> {
             plant,
             now,
             storage,
+            inputs,
             ..
         } = self;
         let lcs = &plant.systems[now.system].1.lcs;
-        now.balance
-            .note(energy::stored_with(lcs, &now.x, &now.u, storage));
+        let stored = energy::stored_with(lcs, &now.x, &now.u, storage);
+        now.balance.note(stored + inputs.lines().stored(now.t));
     }
 }
