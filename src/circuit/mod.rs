@@ -29,6 +29,7 @@ mod piecewise;
 mod place;
 mod probe;
 mod scope;
+mod smooth;
 pub mod source;
 mod sweep;
 mod switch;
