@@ -160,7 +160,7 @@ impl<'n> Builder<'n, '_> {
         }
         Some(match vrev {
             None => Law::Diode { vfwd, ron, roff },
-            Some(vrev) => Law::resistive_zener((vrev, rrev), (vfwd, ron), roff),
+            Some(vrev) => Law::Curve(Curve::zener((vrev, rrev), (vfwd, ron), roff)),
         })
     }
 
@@ -229,25 +229,12 @@ fn scaled(law: Law, factor: f64) -> Law {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ElaborateOptions, elaborate};
+    use super::super::fixture;
     use super::*;
-    use crate::diagnostic::SourceMap;
-    use crate::netlist::parse;
 
     fn law(card: &str, model: &str, diodes: Diodes) -> Option<Law> {
-        let mut sources = SourceMap::default();
-        let root = sources.add(
-            "test.cir",
-            format!("title\nV1 a 0 5\nR1 a b 1\n{card}\n.model {model}\n"),
-        );
-        let (netlist, _) = parse(&mut sources, root, &|_| {
-            Err(std::io::ErrorKind::NotFound.into())
-        });
-        let options = ElaborateOptions {
-            diodes,
-            ..ElaborateOptions::default()
-        };
-        match elaborate(&netlist, &options).0?.elements.pop()?.kind {
+        let text = format!("V1 a 0 5\nR1 a b 1\n{card}\n.model {model}");
+        match fixture::read(&text, diodes).0?.elements.pop()?.kind {
             Kind::Device(law) => Some(law),
             other => panic!("{other:?}"),
         }

@@ -14,6 +14,8 @@ mod drive;
 mod elaborate;
 mod eval;
 mod exponential;
+#[cfg(test)]
+mod fixture;
 mod form;
 mod formula;
 mod functions;

@@ -88,14 +88,20 @@ impl Threshold {
         matches!(self.latch, Some(LatchPort::Rest(_)))
     }
 
+    /// How far a control value is beyond the threshold that a switch in this position waits for.
+    #[must_use]
+    pub fn excess(&self, on: bool, control: f64) -> f64 {
+        if on {
+            self.off_below - control
+        } else {
+            control - self.on_above
+        }
+    }
+
     /// The position that a control value asks for.
     #[must_use]
     pub fn position(&self, on: bool, control: f64) -> bool {
-        if on {
-            control >= self.off_below
-        } else {
-            control > self.on_above
-        }
+        on != (self.excess(on, control) > 0.0)
     }
 }
 
@@ -268,6 +274,31 @@ impl Switches {
                 || threshold.position(on, control) == on
                 || (control - level).abs() <= uncertain * size
         })
+    }
+
+    /// How far each control that depends on the state is beyond its threshold, positive where the switch is to move at the passage;
+    /// far below where a switch waits for nothing.
+    pub(crate) fn excess(&self, lcs: &Lcs, at: Point<'_>, conducting: &[bool]) -> Vec<f64> {
+        let waits = |i: usize, threshold: &Threshold| {
+            let held = |port: usize| conducting[port] && threshold.off_below > 0.0;
+            !self.driven[i]
+                && match threshold.latch {
+                    None => true,
+                    Some(_) => {
+                        threshold.holds(self.position[i], &self.position)
+                            && self.valves[i].is_some_and(held)
+                    }
+                }
+        };
+        let thresholds = self.thresholds.iter().enumerate();
+        let excess = thresholds.map(|(i, threshold)| {
+            if waits(i, threshold) {
+                threshold.excess(self.position[i], reading::value(&lcs.controls, i, at))
+            } else {
+                f64::MIN
+            }
+        });
+        excess.collect()
     }
 
     /// Names with their positions, of those that differ from `before` (all if `None`).

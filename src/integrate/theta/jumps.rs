@@ -174,6 +174,16 @@ impl Theta<'_> {
         Ok(self.switches.watch() && self.crossed()? != Change::None)
     }
 
+    /// How far the controls of switches that watch the state are beyond their thresholds now.
+    pub(super) fn excess(&mut self) -> Result<Vec<f64>, SimError> {
+        if self.switches.needs_lambda() {
+            self.read_lambda()?;
+        }
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        let at = self.now.point(&self.lambda, &self.du);
+        Ok(self.switches.excess(lcs, at, &self.now.pattern))
+    }
+
     /// Flips the switches `moving`, then those whose controls ask for it until none does, with the jumps this causes.
     pub(super) fn switch(&mut self, moving: &[usize], log: &mut Log) -> Result<(), SimError> {
         if log.wants_rows() {

@@ -83,7 +83,7 @@ pub enum Start {
 /// Sub-steps of a base step are multiples of 2^−FINEST of it.
 const FINEST: u32 = 40;
 /// State-driven switching times are located to 2^−LOCATE of a base step.
-const LOCATE: u32 = 24;
+const LOCATE: i32 = 24;
 /// Switchings in one base step after which they are no longer located but taken at the ends of whole base steps
 /// (chattering: the base step then decides how fast a sliding switch switches).
 const CHATTER: u32 = 32;
@@ -192,6 +192,8 @@ struct Attempt {
     solved: Option<(Vec<bool>, Vec<Option<bool>>)>,
     /// Energy from sources and into resistors and devices, J, where the stages tell it.
     work: Option<(f64, f64)>,
+    /// What the stages tell of the error, where it is asked for.
+    error: Option<stages::StepError>,
 }
 
 impl<'a> Theta<'a> {
@@ -299,13 +301,10 @@ impl<'a> Theta<'a> {
         self.amplitudes = amplitudes;
     }
 
-    /// Has the error estimated along the run; there is no estimate for prescribed steps of curved laws.
+    /// Has the error estimated along the run.
     pub fn estimate_errors(&mut self) {
         let mut estimate = Estimate::default();
         if self.control.is_none() {
-            if Tableau::of(self.system(), self.scheme).is_some() {
-                return;
-            }
             estimate.enter(self.now.x.iter().map(|_| 0.0));
         }
         self.kept.estimate = Some(estimate.clone());

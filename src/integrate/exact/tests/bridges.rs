@@ -2,7 +2,7 @@
 
 use super::{at, simulate};
 
-const BRIDGE: &str = "C1 1 0 1u IC=10\nL1 1 0 10m IC=0\nDF1 1 2 ideal\nDR1 0 2 ideal\nDR2 3 1 ideal\nDF2 3 0 ideal\n\
+pub(in crate::integrate) const BRIDGE: &str = "C1 1 0 1u IC=10\nL1 1 0 10m IC=0\nDF1 1 2 ideal\nDR1 0 2 ideal\nDR2 3 1 ideal\nDF2 3 0 ideal\n\
     R1 2 3 1k\n.model ideal D(ideal)\n";
 
 const TIMES: [f64; 8] = [0.1e-3, 0.2e-3, 0.5e-3, 1e-3, 2e-3, 3e-3, 4e-3, 5e-3];

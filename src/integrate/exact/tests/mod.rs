@@ -11,13 +11,13 @@ use crate::lcs::{Lcs, Position, reduce};
 use crate::mna::{self, Behaviour};
 use crate::settings::Settings;
 
-mod bridges;
+pub(in crate::integrate) mod bridges;
 mod passive;
 mod relays;
 mod stiff;
 mod switches;
 
-fn circuit(text: &str) -> Circuit {
+pub(in crate::integrate) fn circuit(text: &str) -> Circuit {
     let mut sources = SourceMap::default();
     let root = sources.add("test.cir", format!("test\n{text}\n.end\n"));
     let (netlist, findings) = crate::netlist::parse(&mut sources, root, &|_| unreachable!());
@@ -32,7 +32,10 @@ fn circuit(text: &str) -> Circuit {
 }
 
 /// A stepper for a netlist that starts from `uic` and whose switches start as their cards say.
-fn prepare_circuit(circuit: &Circuit, energy: bool) -> (Exact<'static>, Lcs, Tran) {
+pub(in crate::integrate) fn prepare_circuit(
+    circuit: &Circuit,
+    energy: bool,
+) -> (Exact<'static>, Lcs, Tran) {
     let tran = circuit.tran.expect("a .tran card");
     let behaviour = mna::behaviour(circuit).expect("a sound circuit").standard();
     // A test may leak what it runs on.
