@@ -298,6 +298,18 @@ fn exact_integration_says_why_not() {
 }
 
 #[test]
+fn a_delay_too_short_for_the_run_is_refused() {
+    let text = "v1 s 0 1\nrs s a 50\nt1 a 0 b 0 z0=50 td=1f\nrl b 0 50\n.tran 1u 1m";
+    let refusal = try_run(text, SimOptions::default())
+        .unwrap_err()
+        .to_string();
+    assert!(
+        refusal.contains("t1.e1: a delay of 1e-15 s asks for more than"),
+        "{refusal}"
+    );
+}
+
+#[test]
 fn faults_are_located() {
     for (card, expected) in [
         ("t1 a 0 b 0 td=1n", "`t1` names no impedance `Z0`"),

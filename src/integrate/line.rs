@@ -21,6 +21,14 @@ pub struct Line {
     pub initial: [f64; 2],
 }
 
+impl Line {
+    /// No step is longer than this, s.
+    #[must_use]
+    pub fn longest_step(&self) -> f64 {
+        self.delay / STEPS_PER_DELAY
+    }
+}
+
 /// A step is no longer than this part of a delay: what arrives at its end has left before its start, and enough records lie
 /// between the two for straight lines.
 const STEPS_PER_DELAY: f64 = 8.0;

@@ -270,6 +270,18 @@ impl Problem<'_> {
         Ok(!seen.is_empty())
     }
 
+    /// The error of a line whose delay asks for more steps than a run may take.
+    fn too_short(&self, tran: &Tran, settings: &Settings) -> Option<SimError> {
+        let limit = settings.max_steps;
+        let asks = |line: &&Line| tran.tstop / line.longest_step() > limit as f64;
+        let line = self.lines.iter().find(asks)?;
+        let what = format!(
+            "a delay of {:e} s asks for more than {limit} steps until {:e} s; a resistor or a short may take the line's place",
+            line.delay, tran.tstop
+        );
+        Some(SimError::before(Reason::Unsupported(what)).device(line.sources[0].clone()))
+    }
+
     /// Amplitudes from a coarse run.
     fn scout(&self, tran: &Tran, settings: &Settings) -> Option<Amplitudes> {
         let settings = Settings {
@@ -360,6 +372,9 @@ fn dispatch(
         return Err(SimError::before(Reason::Unsupported(format!(
             "no exact integration: {obstacle}"
         ))));
+    }
+    if let Some(line) = problem.too_short(&tran, &options.settings) {
+        return Err(line);
     }
     let grid = Grid {
         tstart: tran.tstart,

@@ -178,7 +178,8 @@ impl Theta<'_> {
             if change == Change::Passage && may_locate {
                 self.locate(finest, steps, &mut impulse, log)?;
             }
-            if let (Some(estimate), None) = (&mut self.now.estimate, &self.control) {
+            let late = change == Change::Passage;
+            if let (true, Some(estimate), None) = (late, &mut self.now.estimate, &self.control) {
                 estimate.switched_late(&self.kept.x, &self.now.x);
             }
             self.report(log);
