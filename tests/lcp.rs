@@ -165,6 +165,39 @@ fn infeasible_problems_carry_a_certificate() {
     }
 }
 
+/// Three diodes in a ring: M is singular but for rounding.
+#[test]
+fn degenerate_ports_leave_a_singular_set() {
+    let m = dmatrix![
+        9.765608416423303e-1, -4.637459906335678e-6, -2.441355729506762e-1;
+        -4.637459906335678e-6, 9.765106919136114e-1, -9.765095325486348e-1;
+        -2.441355729506762e-1, -9.765095325486348e-1, 1.0375434257863039
+    ];
+    let q = dvector![
+        1.634684698349708e-5,
+        3.37842142228853e-4,
+        -3.419288539786958e-4
+    ];
+    let solution = Driver::new(m, TOLERANCE).solve(&q);
+    assert_eq!(solution.status, Status::Solved);
+    assert_eq!(solution.basis, [true, false, true]);
+}
+
+/// q of a ring must be orthogonal to its loop; rounding of large terms behind a small q contradicts that.
+#[test]
+fn a_contradiction_within_the_uncertainty_of_q_is_none() {
+    let m = dmatrix![2.0, -1.0, -1.0; -1.0, 1.0, 0.0; -1.0, 0.0, 1.0];
+    let q = dvector![-2e-6, 1e-6, 1e-6 - 1e-13];
+    let mut driver = Driver::new(m, TOLERANCE);
+    assert_ne!(driver.solve(&q).status, Status::Solved);
+    driver.blur(&dvector![1e-12, 1e-12, 1e-12]);
+    let solution = driver.solve(&q);
+    assert_eq!(solution.status, Status::Solved);
+    assert!(solution.lambda.amax() < 3e-6, "{}", solution.lambda);
+    driver.blur(&dvector![1e-15, 1e-15, 1e-15]);
+    assert_ne!(driver.solve(&q).status, Status::Solved);
+}
+
 #[test]
 fn the_driver_says_who_answered() {
     let mut driver = Driver::new(dmatrix![2.0, 1.0; 1.0, 2.0], TOLERANCE);

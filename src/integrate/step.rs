@@ -347,6 +347,25 @@ impl StepMatrices {
         &self.q * DVector::from_column_slice(z)
     }
 
+    /// Has the solvers know what rounding leaves uncertain in q(z), where `noise(k)` is what state k may be off.
+    pub(crate) fn blur(&mut self, lcs: &Lcs, z: &[f64], noise: impl Fn(usize) -> f64) {
+        // In units of GUARD_ROUNDING, so that one product does for both.
+        let z = DVector::from_iterator(
+            z.len(),
+            z.iter().enumerate().map(|(k, v)| {
+                v.abs()
+                    + if k < lcs.n() {
+                        noise(k) / GUARD_ROUNDING
+                    } else {
+                        0.0
+                    }
+            }),
+        );
+        // q is what is left of C x⁺ and the rest.
+        let size = self.q.abs() * &z + lcs.c.abs() * (self.phi.abs() * &z);
+        self.driver.blur(&(size * GUARD_ROUNDING));
+    }
+
     /// The sums of the magnitudes that x⁺ is computed from.
     pub(crate) fn x_sizes(&self, z: &[f64], lambda: &DVector<f64>) -> DVector<f64> {
         self.phi.abs() * DVector::from_column_slice(z).abs() + self.response.abs() * lambda.abs()

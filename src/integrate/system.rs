@@ -2,6 +2,7 @@
 
 use nalgebra::DVector;
 
+use crate::integrate::control::Amplitudes;
 use crate::integrate::inputs::Inputs;
 use crate::integrate::jump::JumpProblem;
 use crate::integrate::lawful;
@@ -83,6 +84,19 @@ impl System {
     /// Cached matrices by index.
     pub(crate) fn step_mut(&mut self, index: usize) -> &mut StepMatrices {
         &mut self.matrices[index]
+    }
+
+    /// q of a step from z, with the solvers told what is uncertain in it.
+    pub(crate) fn prepare(
+        &mut self,
+        step: usize,
+        z: &[f64],
+        amplitudes: &Amplitudes,
+    ) -> DVector<f64> {
+        let lcs = &self.lcs;
+        let matrices = &mut self.matrices[step];
+        matrices.blur(lcs, z, |k| amplitudes.rounding(lcs, k));
+        matrices.q(z)
     }
 
     /// The fused mode of an active set.

@@ -19,6 +19,8 @@ pub struct Driver {
     scaled: Lcp,
     scaling: Scaling,
     tolerance: f64,
+    /// What q' is uncertain by.
+    noise: DVector<f64>,
     monotone: bool,
     warm: Vec<bool>,
     sets: Vec<(Vec<bool>, ActiveSolve)>,
@@ -32,9 +34,6 @@ pub struct Driver {
 
 /// A residual at which no other method is asked for a better one: a few roundings of a solve.
 const ROUNDING: f64 = 1e-13;
-
-/// λ', the index set it was computed on, and the method.
-type Found = (DVector<f64>, Vec<bool>, Answered);
 
 /// Violations below this multiple of the problem's size count as zero inside the pivoting methods (rounding of one solve).
 const SLACK: f64 = 1e-14;
@@ -55,6 +54,7 @@ impl Driver {
             scaled,
             scaling,
             tolerance,
+            noise: DVector::zeros(size),
             monotone,
             warm: vec![false; size],
             sets: Vec::new(),
@@ -111,6 +111,15 @@ impl Driver {
         self.warm.copy_from_slice(active);
     }
 
+    /// What each q_j is uncertain by from now on: where it is a small difference of large numbers, more than its own rounding.
+    /// An ideal port judges by it; before the first call q is exact.
+    pub fn blur(&mut self, noise: &DVector<f64>) {
+        self.noise = noise.component_mul(&self.scaling.d);
+        if let Some(parts) = &mut self.parts {
+            parts.blur(&self.noise);
+        }
+    }
+
     /// Solves for one q.
     pub fn solve(&mut self, q: &DVector<f64>) -> Solution {
         if let Some(lawful) = &mut self.lawful {
@@ -128,15 +137,12 @@ impl Driver {
         let size = self.scaled.size();
         let slack = SLACK * self.scaled.q.amax();
         let mut best = self.candidate(DVector::zeros(size), vec![false; size], Answered::Warm);
-        if best.residual <= ROUNDING {
-            return self.accept(best);
-        }
         // What is no number has no solution, and no pivot.
         if !q.iter().all(|q| q.is_finite()) {
             best.by = Answered::Nobody;
             return best;
         }
-        let chain: [fn(&mut Self, f64) -> Option<Found>; 4] = [
+        let chain: [fn(&mut Self, f64) -> Option<Solution>; 4] = [
             Self::try_warm,
             Self::try_block,
             Self::try_lemke,
@@ -146,14 +152,16 @@ impl Driver {
             if k == 3 && best.residual <= self.tolerance {
                 break;
             }
-            if let Some((lambda, basis, by)) = method(self, slack) {
-                let found = self.candidate(lambda, basis, by);
+            if let Some(found) = method(self, slack) {
                 if found.residual <= ROUNDING {
                     return self.accept(found);
                 }
                 if found.residual < best.residual {
                     best = found;
                 }
+            }
+            if best.residual <= ROUNDING {
+                return self.accept(best);
             }
             // Lemke's ray ends the search where it is a verified proof.
             if k == 2
@@ -251,26 +259,23 @@ impl Driver {
         self.sets[at].1.refined(&self.scaled)
     }
 
-    fn try_warm(&mut self, _: f64) -> Option<Found> {
+    fn try_warm(&mut self, _: f64) -> Option<Solution> {
         let warm = self.warm.clone();
-        Some((self.refined_on(&warm), warm, Answered::Warm))
+        Some(self.on(warm, Answered::Warm))
     }
 
-    fn try_block(&mut self, slack: f64) -> Option<Found> {
-        pivot::solve(&self.scaled, &self.warm, slack).map(|(l, set)| (l, set, Answered::Block))
+    fn try_block(&mut self, slack: f64) -> Option<Solution> {
+        let (lambda, set) = pivot::solve(&self.scaled, &self.warm, slack)?;
+        Some(self.candidate(lambda, set, Answered::Block))
     }
 
-    fn try_lemke(&mut self, _: f64) -> Option<Found> {
+    fn try_lemke(&mut self, _: f64) -> Option<Solution> {
         let mut last = None;
         for cover in covers(self.scaled.size()) {
             if let Lemke::Basis(active) = lemke::solve(&self.scaled, &cover) {
-                let lambda = self.refined_on(&active);
-                let y = self.scaled.y(&lambda);
-                let one = Scaling {
-                    d: DVector::from_element(lambda.len(), 1.0),
-                };
-                let good = one.residual(&self.scaled, &lambda, &y) <= self.tolerance;
-                last = Some((lambda, active, Answered::Lemke));
+                let found = self.near(active, Answered::Lemke);
+                let good = found.residual <= self.tolerance;
+                last = Some(found);
                 if good {
                     break;
                 }
@@ -279,14 +284,42 @@ impl Driver {
         last
     }
 
-    fn try_convex(&mut self, _: f64) -> Option<Found> {
+    fn try_convex(&mut self, _: f64) -> Option<Solution> {
         if !self.monotone {
             return None;
         }
         let rough = convex::solve(&self.scaled)?;
         let y = self.scaled.y(&rough);
         let active: Vec<bool> = (0..rough.len()).map(|j| rough[j] > y[j]).collect();
-        Some((self.refined_on(&active), active, Answered::Convex))
+        Some(self.near(active, Answered::Convex))
+    }
+
+    /// The solve on an active set, as a candidate.
+    fn on(&mut self, active: Vec<bool>, by: Answered) -> Solution {
+        let lambda = self.refined_on(&active);
+        self.candidate(lambda, active, by)
+    }
+
+    /// The best solve on an active set or near it, by exchanging the pair that is violated most until a set comes back. Where M_aa
+    /// is singular but for rounding a degenerate port in the set makes λ any multiple of its kernel; a set without it solves.
+    fn near(&mut self, mut active: Vec<bool>, by: Answered) -> Solution {
+        let mut best = self.on(active.clone(), by);
+        let mut seen = Vec::new();
+        while best.residual > self.tolerance && !seen.contains(&active) {
+            seen.push(active.clone());
+            let lambda = self.refined_on(&active);
+            let y = self.scaled.y(&lambda);
+            let (worst, violation) = y.zip_map(&lambda, f64::min).argmin();
+            if violation >= 0.0 {
+                break;
+            }
+            active[worst] = !active[worst];
+            let found = self.on(active.clone(), by);
+            if found.residual < best.residual {
+                best = found;
+            }
+        }
+        best
     }
 
     /// A verified Farkas certificate v ≥ 0, Mᵀv ≤ 0, qᵀv < 0 from Lemke's rays, in the units of q: v scaled to qᵀv = −1.
@@ -298,28 +331,30 @@ impl Driver {
             };
             let gain = self.scaled.q.dot(&ray);
             let columns = self.scaled.m.transpose() * &ray;
-            let certain = gain < -self.tolerance * self.scaled.q.amax() * ray.amax()
+            let certain = gain
+                < -self.tolerance * self.scaled.q.amax() * ray.amax() - self.noise.dot(&ray)
                 && columns.max() <= self.tolerance * ray.amax();
             certain.then(|| self.scaling.unscale(&(ray / -gain)))
         })
     }
 
-    /// λ' clipped to λ' ≥ 0 where it is negative by rounding, with its residual in scaled variables; what is clipped leaves
-    /// the index set.
-    fn candidate(&self, scaled: DVector<f64>, mut basis: Vec<bool>, by: Answered) -> Solution {
+    /// λ' clipped to λ' ≥ 0 where it is negative by rounding, with its residual in scaled variables beyond what its index set makes of
+    /// the uncertainty of q'; what is clipped leaves the index set.
+    fn candidate(&mut self, scaled: DVector<f64>, mut basis: Vec<bool>, by: Answered) -> Solution {
         let size = scaled.len();
         let one = Scaling {
             d: DVector::from_element(size, 1.0),
         };
+        let (of_lambda, of_y) = self.uncertain(&basis);
         let rounding = self.tolerance * scaled.amax().max(self.scaled.q.amax());
         let mut clipped = scaled;
-        for (v, active) in clipped.iter_mut().zip(&mut basis) {
-            if (-rounding..0.0).contains(v) {
-                (*v, *active) = (0.0, false);
+        for (j, active) in basis.iter_mut().enumerate() {
+            if clipped[j] < 0.0 && clipped[j] >= -rounding.max(of_lambda[j]) {
+                (clipped[j], *active) = (0.0, false);
             }
         }
         let y = self.scaled.y(&clipped);
-        let residual = one.residual(&self.scaled, &clipped, &y);
+        let residual = one.residual_beyond(&self.scaled, &clipped, &y, |j| of_y[j]);
         let active = one.active(&clipped, &y, self.tolerance);
         Solution {
             status: Status::Failed,
@@ -330,6 +365,26 @@ impl Driver {
             basis,
             by,
         }
+    }
+
+    /// What the uncertainty of q' is in λ'_a = −M_aa⁻¹ q'_a and in y'_ā = q'_ā + M_āa λ'_a.
+    fn uncertain(&mut self, basis: &[bool]) -> (DVector<f64>, DVector<f64>) {
+        let mut of_lambda = DVector::zeros(basis.len());
+        if self.noise.amax() == 0.0 {
+            return (of_lambda.clone(), of_lambda);
+        }
+        let mut of_y = self.noise.clone();
+        let ActiveSolve {
+            indices, inverse, ..
+        } = self.on_set(basis);
+        let (indices, inverse) = (indices.clone(), inverse.clone());
+        let noise = self.noise.select_rows(&indices);
+        let through = self.scaled.m.select_columns(&indices) * &inverse;
+        for (k, v) in (inverse.abs() * &noise).iter().enumerate() {
+            of_lambda[indices[k]] = *v;
+        }
+        of_y += through.abs() * noise;
+        (of_lambda, of_y)
     }
 
     fn accept(&mut self, mut found: Solution) -> Solution {

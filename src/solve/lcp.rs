@@ -176,21 +176,38 @@ impl Scaling {
     }
 
     /// The natural residual ‖min(λ', y')‖∞ relative to max(‖q'‖∞, ‖λ'‖∞): dimensionless, 0 for an exact solution.
-    ///
-    /// This is the single acceptance test of every solution in the crate.
     #[must_use]
     pub fn residual(&self, lcp: &Lcp, lambda: &DVector<f64>, y: &DVector<f64>) -> f64 {
+        self.residual_beyond(lcp, lambda, y, |_| 0.0)
+    }
+
+    /// The part of the [natural residual](Self::residual) that is not explained by q'_j being uncertain by `noise(j)`.
+    ///
+    /// This is the single acceptance test of every solution in the crate.
+    pub(crate) fn residual_beyond(
+        &self,
+        lcp: &Lcp,
+        lambda: &DVector<f64>,
+        y: &DVector<f64>,
+        noise: impl Fn(usize) -> f64,
+    ) -> f64 {
         let (mut worst, mut scale) = (0.0_f64, 0.0_f64);
         for j in 0..lcp.size() {
             let (l, w) = (lambda[j] / self.d[j], y[j] * self.d[j]);
-            // The smaller of a number and none would be the number.
-            if l.is_nan() || w.is_nan() {
+            let natural = if l < w { l.abs() } else { w.abs() - noise(j) };
+            // A comparison with what is no number says nothing.
+            if l.is_nan() || w.is_nan() || natural.is_nan() {
                 return f64::INFINITY;
             }
-            worst = worst.max(l.min(w).abs());
+            worst = worst.max(natural);
             scale = scale.max(l.abs()).max((lcp.q[j] * self.d[j]).abs());
         }
-        if worst == 0.0 { 0.0 } else { worst / scale }
+        // Rounding of the smallest numbers there are is nothing relative.
+        if worst <= f64::MIN_POSITIVE {
+            0.0
+        } else {
+            worst / scale
+        }
     }
 
     /// What the devices do, see [`Solution::active`]; quantities below `tolerance` times the largest vanish.

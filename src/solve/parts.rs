@@ -38,6 +38,13 @@ impl Parts {
         (groups.len() > 1).then(|| Self(groups.into_iter().map(driver).collect()))
     }
 
+    /// See [`Driver::blur`].
+    pub(super) fn blur(&mut self, noise: &DVector<f64>) {
+        for (group, driver) in &mut self.0 {
+            driver.blur(&noise.select_rows(&*group));
+        }
+    }
+
     /// Solves all parts, each first with its part of `warm`.
     pub(super) fn solve(&mut self, q: &DVector<f64>, warm: &[bool]) -> Solution {
         let size = q.len();

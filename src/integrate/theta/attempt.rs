@@ -65,23 +65,21 @@ impl Theta<'_> {
         Ok(())
     }
 
-    /// Returns to the tried step where the solvers find its active set and leave every port as far below zero: what its guards
-    /// refuse is zero to the rounding of the problem.
+    /// Returns to the tried step where the solvers find its active set: then y ≥ 0 at its end, and what the guards of blocking ports
+    /// refused was the error of their short step or rounding. Currents must be as they are with γ = 1, zero or more.
     #[cold]
     fn confirm(&mut self, tried: Attempt) {
-        let n = self.now.x.len();
-        let fused = self.plant.systems[self.now.system]
-            .1
-            .step(tried.step)
-            .fused(tried.mode);
         let found = |(basis, _): &(Vec<bool>, _)| *basis == self.now.active;
+        let n = self.now.x.len();
+        let system = &self.plant.systems[self.now.system].1;
+        let fused = system.step(tried.step).fused(tried.mode);
         if !fused.regular || !self.attempt.solved.as_ref().is_some_and(found) {
             return;
         }
         let solved = self.out.clone();
         fused.step(&self.z, n, &mut self.out, |_| 0.0);
-        let mut guards = self.out[n..].iter().zip(&solved[n..]);
-        if guards.all(|(&guard, &solved)| guard >= 2.0 * solved.min(0.0)) {
+        let as_far = |j: usize| self.out[n + j] >= 2.0 * solved[n + j].min(0.0);
+        if (0..self.now.active.len()).all(|j| !self.now.active[j] || as_far(j)) {
             self.attempt = tried;
         } else {
             self.out = solved;
@@ -106,8 +104,8 @@ impl Theta<'_> {
         let (step, new) = change_matrices(system, h, Self::slack(t1), scheme, tolerance)
             .map_err(|reason| SimError::at(now.t, reason))?;
         self.stats.factorisations += u64::from(new);
+        let q = system.prepare(step, &self.z, &self.amplitudes);
         let matrices = system.step_mut(step);
-        let q = matrices.q(&self.z);
         let before = matrices.driver.factorisations;
         matrices.driver.suggest(&now.active);
         let solution = matrices.driver.solve(&q);

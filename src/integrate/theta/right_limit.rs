@@ -67,10 +67,11 @@ impl Theta<'_> {
             z,
             lambda,
             y,
+            amplitudes,
             ..
         } = self;
+        let q = plant.systems[now.system].1.prepare(step, z, amplitudes);
         let matrices = plant.systems[now.system].1.step_mut(step);
-        let q = matrices.q(z);
         matrices.driver.suggest(&now.active);
         matrices.driver.suggest_point(lambda, y);
         let mut solution = matrices.driver.solve(&q);
