@@ -84,6 +84,46 @@ fn network() -> impl Strategy<Value = String> {
     })
 }
 
+/// The operating point: currents balance at every node, and every element is on its law.
+fn balanced(text: &str) -> Result<(), TestCaseError> {
+    let circuit = circuit(text, Diodes::Auto);
+    let point = operating_point(&circuit, Values::Dc, false, &Settings::default())
+        .unwrap_or_else(|e| panic!("{e}\n{text}"));
+    let volts: HashMap<&str, f64> = point.nodes.iter().map(|(n, v)| (n.as_str(), *v)).collect();
+    let volts = |n: usize| volts.get(circuit.nodes[n].as_str()).copied().unwrap_or(0.0);
+    let mut sums = vec![(0.0, 0.0_f64); circuit.nodes.len()];
+    for (element, (name, i)) in circuit.elements.iter().zip(&point.currents) {
+        prop_assert_eq!(&element.name, name);
+        for (node, i) in [(element.p, *i), (element.n, -i)] {
+            sums[node.index()].0 += i;
+            sums[node.index()].1 = sums[node.index()].1.max(i.abs());
+        }
+        let v = volts(element.p.index()) - volts(element.n.index());
+        if let Kind::Device(law) = &element.kind {
+            // On the law, with 1 nA worth 1 µV.
+            let at = law.resolvent(1e3, v + 1e3 * i);
+            prop_assert!(
+                (at.v - v).abs() <= 1e-7 * (1.0 + v.abs()),
+                "{} is at {} V, {} A\n{}",
+                name,
+                v,
+                i,
+                text
+            );
+        }
+    }
+    for (node, (sum, size)) in sums.iter().enumerate() {
+        prop_assert!(
+            sum.abs() <= 1e-8 * (size + 1e-3),
+            "{} A into node {}\n{}",
+            sum,
+            circuit.nodes[node],
+            text
+        );
+    }
+    Ok(())
+}
+
 proptest! {
     #![proptest_config(ProptestConfig {
         cases: 1000,
@@ -92,32 +132,70 @@ proptest! {
         ..Default::default()
     })]
 
-    /// Every network has an operating point: currents balance at every node, and every element is on its law.
     #[test]
     fn random_networks_of_all_laws_have_their_operating_point(text in network()) {
-        let circuit = circuit(&text, Diodes::Auto);
-        let point = operating_point(&circuit, Values::Dc, false, &Settings::default())
-            .unwrap_or_else(|e| panic!("{e}\n{text}"));
-        let volts: HashMap<&str, f64> = point.nodes.iter().map(|(n, v)| (n.as_str(), *v)).collect();
-        let volts = |n: usize| volts.get(circuit.nodes[n].as_str()).copied().unwrap_or(0.0);
-        let mut sums = vec![(0.0, 0.0_f64); circuit.nodes.len()];
-        for (element, (name, i)) in circuit.elements.iter().zip(&point.currents) {
-            prop_assert_eq!(&element.name, name);
-            for (node, i) in [(element.p, *i), (element.n, -i)] {
-                sums[node.index()].0 += i;
-                sums[node.index()].1 = sums[node.index()].1.max(i.abs());
-            }
-            let v = volts(element.p.index()) - volts(element.n.index());
-            if let Kind::Device(law) = &element.kind {
-                // On the law, with 1 nA worth 1 µV.
-                let at = law.resolvent(1e3, v + 1e3 * i);
-                prop_assert!((at.v - v).abs() <= 1e-7 * (1.0 + v.abs()), "{} is at {} V, {} A\n{}", name, v, i, text);
-            }
-        }
-        for (node, (sum, size)) in sums.iter().enumerate() {
-            prop_assert!(sum.abs() <= 1e-8 * (size + 1e-3), "{} A into node {}\n{}", sum, circuit.nodes[node], text);
-        }
+        balanced(&text)?;
     }
+}
+
+/// Transistors, often in parallel with diodes and with each other, on a ladder of resistors.
+fn transistors() -> impl Strategy<Value = String> {
+    let element = (
+        0..8_u8,
+        0..6_usize,
+        0..6_usize,
+        0..6_usize,
+        2.0..6.0f64,
+        -15.0..15.0f64,
+    );
+    (3..7_usize, prop::collection::vec(element, 2..10)).prop_map(|(nodes, elements)| {
+        let mut text = String::from("random\n");
+        for k in 1..nodes {
+            text += &format!("rt{k} {k} {} {}\n", k - 1, 330 * k);
+        }
+        for (k, (kind, a, b, c, decades, value)) in elements.into_iter().enumerate() {
+            let (a, b, c) = (a % nodes, b % nodes, c % nodes);
+            let ohms = 10_f64.powf(decades);
+            text += &match kind {
+                0 if a != b => format!("v{k} s{k} {a} {value}\nrs{k} s{k} {b} {ohms}\n"),
+                1 if a != b => format!("d{k} {a} {b} silicon\n"),
+                2 if a != b => format!("v{k} s{k} {a} {value}\nrs{k} s{k} {b} {ohms}\nd{k} s{k} {b} power\n"),
+                3 => format!("v{k} s{k} 0 {}\nrc{k} s{k} {a} 1k\nrb{k} s{k} {b} {ohms}\nq{k} {a} {b} {c} nn\n", value.abs()),
+                4 => format!("q{k} {a} {b} {c} nn\nd{k} {b} {c} silicon\n"),
+                5 | 6 => format!("q{k} {a} {b} {c} nn\n"),
+                7 => format!("q{k} {a} {b} {c} pp\n"),
+                _ => String::new(),
+            };
+        }
+        text + MODELS + ".model nn npn(is=1e-15 bf=120 br=3)\n.model pp pnp(is=3e-15 bf=60 rb=20)\n.op\n.end\n"
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 500,
+        failure_persistence: None,
+        rng_seed: RngSeed::Fixed(3),
+        ..Default::default()
+    })]
+
+    #[test]
+    fn random_networks_of_transistors_have_an_operating_point(text in transistors()) {
+        balanced(&text)?;
+    }
+}
+
+#[test]
+fn a_mirror_copies_its_current() {
+    // Both bases draw I/BF; the output adds the leakage of its blocking collector, IS (1 + 1/BR).
+    let text = "mirror\nv1 vcc 0 5\nr1 vcc b 1k\nq1 b b 0 nn\nq2 c b 0 nn\nr2 vcc c 100\n.model nn npn(is=1e-15 bf=50 br=2)\n.op\n.end\n";
+    let circuit = circuit(text, Diodes::Auto);
+    let point = operating_point(&circuit, Values::Dc, false, &Settings::default()).unwrap();
+    let node = |name: &str| point.nodes.iter().find(|(n, _)| n == name).unwrap().1;
+    let v = node("b");
+    let i = 1e-15 * (v / circ::law::Exponential::thermal_voltage(27.0)).exp_m1();
+    assert!((i * (1.0 + 2.0 / 50.0) - (5.0 - v) / 1e3).abs() < 1e-12);
+    assert!((i + 1.5e-15 - (5.0 - node("c")) / 100.0).abs() < 1e-12);
 }
 
 const RECTIFIER: &str = "\

@@ -44,17 +44,18 @@ fn neg_mod(a: u64) -> u64 {
     if a == 0 { 0 } else { P - a }
 }
 
-/// a⁻¹ = a^(p−2).
+/// a⁻¹ = a^(p−2), p − 2 = 4 (2⁵⁹ − 1) + 1.
 fn inv_mod(a: u64) -> u64 {
-    let (mut base, mut exponent, mut result) = (a, P - 2, 1);
-    while exponent > 0 {
-        if exponent & 1 == 1 {
-            result = mul_mod(result, base);
-        }
-        base = mul_mod(base, base);
-        exponent >>= 1;
-    }
-    result
+    let square = |x: u64, times: u32| (0..times).fold(x, |x, _| mul_mod(x, x));
+    // a^(2^(2k) − 1) and a^(2^(k + 1) − 1) from a^(2^k − 1); 59 is 111011 in binary.
+    let double = |x: u64, k: u32| mul_mod(square(x, k), x);
+    let next = |x: u64| mul_mod(square(x, 1), a);
+    let x3 = next(double(a, 1));
+    let x7 = next(double(x3, 3));
+    let x14 = double(x7, 7);
+    let x29 = next(double(x14, 14));
+    let x59 = next(double(x29, 29));
+    mul_mod(square(x59, 2), a)
 }
 
 fn residue_of(n: &BigInt) -> u64 {
@@ -102,8 +103,42 @@ impl Ball {
         .settle()
     }
 
+    /// The ball around an integer of at most 53 bits.
+    fn integer(x: f64) -> Self {
+        let residue = x.abs() as u64;
+        Self {
+            residue: if x < 0.0 { neg_mod(residue) } else { residue },
+            value: Double { hi: x, lo: 0.0 },
+            radius: 0.0,
+        }
+    }
+
+    /// The ball around mantissa · 10^exponent where both are exact doubles.
+    fn decimal(mantissa: i128, exponent: i32) -> Option<Self> {
+        /// 10^22 is the largest power of ten among the doubles.
+        const POWERS: u32 = 22;
+        let size = exponent.unsigned_abs();
+        if mantissa.unsigned_abs() >= 1 << 53 || size > POWERS {
+            return None;
+        }
+        let mut power = Self::integer(1.0);
+        for _ in 0..size {
+            power.residue = mul_mod(power.residue, 10);
+            power.value.hi *= 10.0;
+        }
+        let mantissa = Self::integer(mantissa as f64);
+        Some(if exponent < 0 {
+            mantissa.div(&power)
+        } else {
+            mantissa.mul(&power)
+        })
+    }
+
     /// 1/self.
     fn recip(&self) -> Self {
+        if self.value.hi.abs() == 1.0 && self.value.lo == 0.0 && self.radius == 0.0 {
+            return *self;
+        }
         let value = self.value.recip();
         let size = self.value.hi.abs();
         // |1/x − 1/(x ± r)| ≤ r / (|x| (|x| − r)); an interval that contains 0 has no bound.
@@ -152,7 +187,8 @@ impl Field for Ball {
     }
 
     fn value(value: Value) -> Self {
-        Self::from_rational(&value.exact())
+        let short = value.decimal.and_then(|(m, e)| Self::decimal(m, e));
+        short.unwrap_or_else(|| Self::from_rational(&value.exact()))
     }
 
     fn is_zero(&self) -> bool {
@@ -282,6 +318,16 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..Default::default() })]
+        #[test]
+        fn a_short_decimal_is_the_rational(mantissa in -(1i128 << 54)..1 << 54, exponent in -25i32..26) {
+            let value = Number::decimal(0.0, mantissa, exponent);
+            let (ball, exact) = (<Ball as Field>::value(value), value.exact());
+            let slow = Ball::from_rational(&exact);
+            prop_assert_eq!((ball.residue, ball.value.hi), (slow.residue, slow.value.hi));
+            prop_assert!(contains(&ball, &exact));
+            prop_assert!(ball.radius <= 1e-29 * ball.value.hi.abs());
+        }
+
         #[test]
         fn the_interval_contains_the_exact_result(a in number(), b in number(), c in number()) {
             let (x, y, z) = (Ball::from_rational(&a), Ball::from_rational(&b), Ball::from_rational(&c));

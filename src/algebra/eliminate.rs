@@ -96,25 +96,41 @@ impl<F: Field> Matrix<F> {
     /// pivot was found. An elimination over columns in class order makes each class depend on later ones as
     /// far as the equations allow (DESIGN 3.2).
     pub fn eliminate(&mut self, column: usize, state: &mut Elimination) -> bool {
-        let mut best: Option<(usize, f64)> = None;
-        for row in 0..state.equations {
-            let entry = self.at(row, column);
-            if state.used[row] || entry.is_zero() {
-                continue;
-            }
-            let largest = self
-                .row(row)
-                .iter()
-                .fold(0.0, |m: f64, x| m.max(x.to_f64().abs()));
-            let relative = entry.to_f64().abs() / largest;
-            if best.is_none_or(|(_, size)| relative > size) {
-                best = Some((row, relative));
+        let free = |row: &usize| !state.used[*row] && !self.at(*row, column).is_zero();
+        let mut candidates = (0..state.equations).filter(free);
+        let (first, second) = (candidates.next(), candidates.next());
+        let relative = |row: usize| {
+            let sizes = self.row(row).iter().map(|x| x.to_f64().abs());
+            self.at(row, column).to_f64().abs() / sizes.fold(0.0, f64::max)
+        };
+        let mut best = first.map(|row| (row, 0.0));
+        if let (Some((row, size)), Some(_)) = (&mut best, second) {
+            *size = relative(*row);
+            for other in second.into_iter().chain(candidates) {
+                let its = relative(other);
+                if its > *size {
+                    (*row, *size) = (other, its);
+                }
             }
         }
         let Some((row, _)) = best else { return false };
         state.used[row] = true;
         state.pivot[column] = Some(row);
         self.pivot(row, column);
+        true
+    }
+
+    /// Gives the equation of `leaving`, which has a pivot, to `entering`, which has none and a nonzero entry there; returns whether that is so.
+    pub fn exchange(&mut self, leaving: usize, entering: usize, state: &mut Elimination) -> bool {
+        let Some(row) = state.pivot[leaving] else {
+            return false;
+        };
+        if state.pivot[entering].is_some() || self.at(row, entering).is_zero() {
+            return false;
+        }
+        state.pivot[leaving] = None;
+        state.pivot[entering] = Some(row);
+        self.pivot(row, entering);
         true
     }
 

@@ -160,7 +160,7 @@ impl<'n> Builder<'n, '_> {
         }
         Some(match vrev {
             None => Law::Diode { vfwd, ron, roff },
-            Some(vrev) => Law::resistive_zener((vrev, rrev), (vfwd, ron), roff),
+            Some(vrev) => Law::Curve(Curve::zener((vrev, rrev), (vfwd, ron), roff)),
         })
     }
 

@@ -131,6 +131,7 @@ impl<'n> Builder<'n, '_> {
                 on_above: on,
                 off_below: off,
                 initial: None,
+                latch: None,
             });
         }
         let threshold = self.parameter(&params, &t, scope)?.map_or(0.0, |v| v.f64);
@@ -154,6 +155,7 @@ impl<'n> Builder<'n, '_> {
             on_above,
             off_below,
             initial: None,
+            latch: None,
         })
     }
 }

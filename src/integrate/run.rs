@@ -211,6 +211,15 @@ impl Log {
         }
     }
 
+    /// Makes room for so many rows.
+    fn expect(&mut self, rows: usize) {
+        /// Longer runs grow as they go.
+        const MOST: usize = 1 << 20;
+        let rows = rows.min(MOST);
+        self.time.reserve(rows);
+        self.values.reserve(rows * self.columns);
+    }
+
     /// A row of the output grid; it replaces an event row for the same right limit.
     fn grid_row(&mut self, t: f64, row: &[f64]) {
         if self.last_is_event && self.time.last() == Some(&t) {
@@ -268,7 +277,12 @@ impl Grid {
     /// Output time k < [`Self::len`], s.
     #[must_use]
     pub fn time(&self, k: usize) -> f64 {
-        if k + 1 >= self.len() {
+        self.time_of(k, self.len())
+    }
+
+    /// Output time k of `len` in all, s.
+    fn time_of(&self, k: usize, len: usize) -> f64 {
+        if k + 1 >= len {
             self.tstop
         } else {
             self.tstart + k as f64 * self.tstep
@@ -313,8 +327,10 @@ pub fn run(stepper: &mut dyn Stepper, frame: Frame<'_>, mut log: Log) -> Result<
     } = frame;
     let mut row = vec![0.0; names.len()];
     let mut failure = None;
-    for k in 0..grid.len() {
-        let t = grid.time(k);
+    let rows = grid.len();
+    log.expect(rows);
+    for k in 0..rows {
+        let t = grid.time_of(k, rows);
         if let Err(error) = stepper.advance(t, &mut log) {
             failure = Some(error);
             break;

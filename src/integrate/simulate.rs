@@ -3,18 +3,19 @@
 use cpu_time::ThreadTime;
 use nalgebra::DVector;
 
-use crate::circuit::{Circuit, Tran};
+use crate::circuit::{self, Circuit, ElementId, Tran};
 use crate::integrate::Run;
 use crate::integrate::control::Amplitudes;
 use crate::integrate::exact::{self, Exact, Place};
 use crate::integrate::handover::Handover;
+use crate::integrate::line::Line;
 use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, Stepper, run};
 use crate::integrate::step::Scheme;
-use crate::integrate::switching::Threshold;
+use crate::integrate::switching::{Threshold, at_start};
 use crate::integrate::theta::{Setup, Start, Stepping, Theta};
 use crate::integrate::{roles, start};
 use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
-use crate::mna::{Behaviour, SwitchPort};
+use crate::mna::Behaviour;
 use crate::plan::{Plan, not_exact, plan};
 use crate::settings::Settings;
 
@@ -85,6 +86,7 @@ pub fn simulate(
     let mut notes: Vec<String> = behaviour.notes.iter().map(|n| n.message.clone()).collect();
     notes.extend(initial.notes);
     let problem = Problem {
+        lines: lines(circuit, &initial.waves),
         position: initial.switches,
         settle: standard
             .switches
@@ -114,6 +116,7 @@ pub fn simulate_system(
     let mut start = DVector::zeros(behaviour.storage.len());
     start.rows_mut(0, x.len()).copy_from(x);
     let problem = Problem {
+        lines: vec![],
         position: vec![],
         settle: vec![],
         start,
@@ -124,12 +127,27 @@ pub fn simulate_system(
     drive(problem, tran, options)
 }
 
+/// The transmission lines of a circuit; `waves` are what arrives at first, line by line.
+fn lines(circuit: &Circuit, waves: &[[f64; 2]]) -> Vec<Line> {
+    let name = |id: ElementId| circuit.elements[id.index()].name.clone();
+    let line = |(line, initial): (&circuit::Line, &[f64; 2])| Line {
+        impedance: line.impedance.f64,
+        delay: line.delay,
+        impedances: line.ports.map(|port| name(port.impedance)),
+        sources: line.ports.map(|port| name(port.wave)),
+        initial: *initial,
+    };
+    circuit.lines.iter().zip(waves).map(line).collect()
+}
+
 /// What the steppers share.
 struct Problem<'a> {
     /// As given.
     original: &'a Behaviour,
     /// All laws as ideal pairs.
     behaviour: Behaviour,
+    /// Transmission lines.
+    lines: Vec<Line>,
     position: Vec<bool>,
     /// Switches whose start position follows from the start state.
     settle: Vec<bool>,
@@ -159,17 +177,15 @@ impl Problem<'_> {
     }
 
     fn thresholds(&self) -> Vec<Threshold> {
-        let threshold = |s: &SwitchPort| Threshold {
-            name: s.name.clone(),
-            on_above: s.on_above,
-            off_below: s.off_below,
-        };
-        self.behaviour.switches.iter().map(threshold).collect()
+        self.behaviour.switches.iter().map(Threshold::of).collect()
     }
 
-    fn exact(&self, tran: &Tran, settings: &Settings) -> Result<Exact<'_>, SimError> {
+    /// `lcs` is the system of the start position.
+    fn exact(&self, tran: &Tran, lcs: &Lcs, settings: &Settings) -> Result<Exact<'_>, SimError> {
         Exact::new(exact::Setup {
-            assembler: exact::Assembler::new(&self.behaviour).with_steps_of(self.original),
+            assembler: exact::Assembler::new(&self.behaviour)
+                .with_steps_of(self.original)
+                .knowing(&self.position, lcs),
             position: self.position.clone(),
             t: 0.0,
             until: tran.tstop,
@@ -196,7 +212,7 @@ impl Problem<'_> {
         stepping: Stepping,
         settings: &Settings,
     ) -> Result<Theta<'_>, SimError> {
-        Theta::new(Setup {
+        let mut theta = Theta::new(Setup {
             reduce: Box::new(|position| self.free(position)),
             position: place.switches,
             thresholds: self.thresholds(),
@@ -206,34 +222,34 @@ impl Problem<'_> {
             stepping,
             longest: tran.tmax.unwrap_or(f64::INFINITY),
             settings: settings.clone(),
-        })
+        })?;
+        theta.attach(&self.lines);
+        Ok(theta)
     }
 
-    /// See [`roles`].
-    fn choose_roles(&mut self, tran: &Tran) -> Result<(), SimError> {
+    /// See [`roles`]; returns the system of the start position.
+    fn choose_roles(&mut self, tran: &Tran) -> Result<Lcs, SimError> {
         let lcs = self.free(&self.position)?;
         if roles::doubtful(&lcs, tran.tstop) {
             let first = self.behaviour.in_other_roles();
             let first = std::mem::replace(&mut self.behaviour, first);
-            if !self
-                .free(&self.position)
-                .is_ok_and(|other| roles::better(&lcs, &other))
-            {
-                self.behaviour = first;
+            match self.free(&self.position) {
+                Ok(other) if roles::better(&lcs, &other) => return Ok(other),
+                _ => self.behaviour = first,
             }
         }
-        Ok(())
+        Ok(lcs)
     }
 
-    /// Positions of switches without `ON`/`OFF` that agree with their controls at the start state.
-    fn settle_switches(&mut self, tran: &Tran, settings: &Settings) -> Result<(), SimError> {
+    /// Positions of switches without `ON`/`OFF` that agree with their controls at the start state; whether one moved.
+    fn settle_switches(&mut self, tran: &Tran, settings: &Settings) -> Result<bool, SimError> {
         let mut seen = Vec::new();
         while self.settle.contains(&true) {
             let stepping = Stepping::Fixed(tran.tstep);
             let start = self.start();
             let mut theta = self.stepper(start, tran, Scheme::MOREAU, stepping, settings)?;
             let controls = theta.controls_at_start()?;
-            let wanted: Vec<bool> = (0..controls.len())
+            let asked: Vec<bool> = (0..controls.len())
                 .map(|k| {
                     let switch = &self.behaviour.switches[k];
                     match (self.settle[k], self.position[k]) {
@@ -243,6 +259,7 @@ impl Problem<'_> {
                     }
                 })
                 .collect();
+            let wanted = at_start(&self.behaviour.switches, asked);
             drop(theta);
             // Positions that contradict each other are left to the run.
             if wanted == self.position || seen.contains(&wanted) {
@@ -250,7 +267,7 @@ impl Problem<'_> {
             }
             seen.push(std::mem::replace(&mut self.position, wanted));
         }
-        Ok(())
+        Ok(!seen.is_empty())
     }
 
     /// Amplitudes from a coarse run.
@@ -286,13 +303,14 @@ impl Problem<'_> {
     fn handover<'a>(
         &'a self,
         tran: &'a Tran,
+        lcs: &Lcs,
         settings: &'a Settings,
     ) -> Result<Handover<'a>, SimError> {
         // An error control would follow every switching of a chattering circuit.
         let step = tran.tstep / HANDOVER_STEPS;
         let stepping = Stepping::Fixed(step);
         Ok(Handover::new(
-            self.exact(tran, settings)?,
+            self.exact(tran, lcs, settings)?,
             Box::new(move |place| {
                 self.stepper(place.clone(), tran, Scheme::MOREAU, stepping, settings)
             }),
@@ -329,9 +347,10 @@ fn dispatch(
     options: SimOptions<'_>,
 ) -> Result<Run, SimError> {
     check(&tran, &options)?;
-    problem.choose_roles(&tran)?;
-    problem.settle_switches(&tran, &options.settings)?;
-    let lcs = problem.free(&problem.position)?;
+    let mut lcs = problem.choose_roles(&tran)?;
+    if problem.settle_switches(&tran, &options.settings)? {
+        lcs = problem.free(&problem.position)?;
+    }
     let Plan {
         method,
         scheme,
@@ -361,7 +380,7 @@ fn dispatch(
     let (mut method, mut notes) = (method, problem.notes.clone());
     let (mut progress, settings) = (options.progress, &options.settings);
     if options.method == Method::Exact {
-        let mut exact = problem.exact(&tran, settings)?;
+        let mut exact = problem.exact(&tran, &lcs, settings)?;
         let frame = frame(method, notes);
         return run(&mut exact, Frame { progress, ..frame }, log());
     }
@@ -370,7 +389,7 @@ fn dispatch(
             progress: progress.as_mut().map(|p| &mut **p as &mut dyn FnMut(f64)),
             ..frame(method, notes.clone())
         };
-        let attempt = problem.handover(&tran, settings);
+        let attempt = problem.handover(&tran, &lcs, settings);
         match attempt.and_then(|mut handover| run(&mut handover, frame, log())) {
             Ok(run) => return Ok(run),
             Err(error) => notes.push(format!(

@@ -90,6 +90,9 @@ const PROXIMAL: f64 = 1e-4;
 const PROXIMAL_STEPS: u32 = 50;
 /// A pivot of R' this small is a direction that neither the network nor the laws determine.
 const SINGULAR: f64 = 1e-10;
+/// Added to M' in Newton's matrix: rounding leaves M' an eigenvalue of −1e-16 in place of 0, and along its vector the step would
+/// go the wrong way; the bound of what it takes from the speed of convergence is far below the tolerance.
+const MONOTONE: f64 = 1e-13;
 
 /// Least −dy'/dw in the second method: a blocking junction has next to none, and a loop of such ports no regular matrix.
 const BLOCKED: f64 = 1e-8;
@@ -314,7 +317,7 @@ impl Lawful {
         point
     }
 
-    /// −R'⁻¹ R.
+    /// −R'⁻¹ R, for M' + μ with a μ that is lost in rounding everywhere but on the kernel of M'.
     fn newton_step(&self, at: &Point) -> Option<DVector<f64>> {
         self.against(&at.slope, &at.rest, &at.residual)
     }
@@ -330,8 +333,8 @@ impl Lawful {
         for (mut column, slope) in matrix.column_iter_mut().zip(slope.iter()) {
             column *= *slope;
         }
-        for (j, rest) in rest.iter().enumerate() {
-            matrix[(j, j)] += rest;
+        for (j, (rest, slope)) in rest.iter().zip(slope.iter()).enumerate() {
+            matrix[(j, j)] += rest + MONOTONE * slope;
         }
         solved(matrix, &-b)
     }

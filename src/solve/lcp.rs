@@ -194,12 +194,11 @@ impl Scaling {
         let (mut worst, mut scale) = (0.0_f64, 0.0_f64);
         for j in 0..lcp.size() {
             let (l, w) = (lambda[j] / self.d[j], y[j] * self.d[j]);
-            let natural = if l < w { l.abs() } else { w.abs() - noise(j) };
-            // A comparison with what is no number says nothing.
-            if l.is_nan() || w.is_nan() || natural.is_nan() {
+            // The smaller of a number and none would be the number.
+            if l.is_nan() || w.is_nan() {
                 return f64::INFINITY;
             }
-            worst = worst.max(natural);
+            worst = worst.max(if l < w { l.abs() } else { w.abs() - noise(j) });
             scale = scale.max(l.abs()).max((lcp.q[j] * self.d[j]).abs());
         }
         // Rounding of the smallest numbers there are is nothing relative.

@@ -94,22 +94,17 @@ impl Piecewise {
             least = ends.1;
         }
         let slopes: Vec<f64> = whole.pieces.iter().map(|p| p.slope).collect();
-        let jumps = vertices.len() > whole.knots.len();
-        let kind = match slopes[..] {
-            [0.0, 0.0] if jumps => "relay",
-            [0.0, a, 0.0] if a > 0.0 && !jumps => "saturation",
-            [a, 0.0, b] if a > 0.0 && b > 0.0 && !jumps => "dead_zone",
-            _ => "table",
-        };
-        let ray = |slope: Option<&f64>| {
-            let slope = slope.copied().unwrap_or(0.0);
-            (Value::decimal(1.0, 1, 0), Value::binary(slope))
-        };
-        Curve {
-            kind,
-            vertices,
-            first: ray(slopes.first()),
-            last: ray(slopes.last()),
+        let ray = |slope: f64| (Value::decimal(1.0, 1, 0), Value::binary(slope));
+        match (&slopes[..], &vertices[..]) {
+            (&[0.0, 0.0], &[(at, low), (_, high)]) => Curve::relay(at, low, high),
+            (&[0.0, slope, 0.0], &[from, to]) if slope > 0.0 => Curve::saturation(from, to),
+            (&[a, 0.0, b], &[(from, level), (to, _)]) if a > 0.0 && b > 0.0 => {
+                Curve::dead_zone((from, to), level, (a.into(), b.into()))
+            }
+            _ => {
+                let ends = [slopes.first(), slopes.last()].map(|s| ray(s.copied().unwrap_or(0.0)));
+                Curve::table(vertices, ends[0], ends[1])
+            }
         }
     }
 }

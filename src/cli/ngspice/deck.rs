@@ -10,8 +10,8 @@ use std::fmt::Write;
 
 use crate::circuit::source::Wave;
 use crate::circuit::{
-    Affine, Circuit, Element, ElementId, Kind, NodeId, Output, Probed, Quantity, Source, Switch,
-    Tran,
+    Affine, Circuit, Element, ElementId, Kind, Latch, Line, NodeId, Output, Probed, Quantity,
+    Source, Switch, Tran,
 };
 use crate::cli::args::Realisation;
 use crate::law::{Exponential, Law};
@@ -87,8 +87,16 @@ pub fn deck(circuit: &Circuit, options: &Options) -> Result<Deck, DeckError> {
     };
     let title = circuit.title.replace(char::is_control, " ");
     writer.line(format!("* {title}"));
+    let ports = circuit.lines.iter().flat_map(|line| line.ports);
+    let of_lines: Vec<ElementId> = ports.flat_map(|port| [port.impedance, port.wave]).collect();
     for (k, element) in circuit.elements.iter().enumerate() {
-        writer.element(ElementId(k as u32), element)?;
+        let id = ElementId(k as u32);
+        if !of_lines.contains(&id) {
+            writer.element(id, element)?;
+        }
+    }
+    for line in &circuit.lines {
+        writer.transmission_line(line);
     }
     for k in &circuit.couplings {
         let (a, b) = (writer.card('l', k.a), writer.card('l', k.b));
@@ -166,6 +174,39 @@ impl Writer<'_> {
 
     fn node(&self, id: NodeId) -> &str {
         &self.circuit.nodes[id.index()]
+    }
+
+    fn transmission_line(&mut self, line: &Line) {
+        let mut ends = String::new();
+        let mut initial = String::new();
+        for port in &line.ports {
+            let (first, last) = (
+                &self.circuit.elements[port.impedance.index()],
+                &self.circuit.elements[port.wave.index()],
+            );
+            let _ = write!(ends, " {} {}", self.node(first.p), self.node(last.n));
+        }
+        if self.tran.uic {
+            // ngspice takes v and i of both ends: e₁ = v₂ + Z i₂ with i₂ = 0.
+            let wave = |k: usize| {
+                let source = &self.circuit.elements[line.ports[k].wave.index()];
+                match &source.kind {
+                    Kind::VoltageSource(source) => source.wave.value(0.0),
+                    _ => 0.0,
+                }
+            };
+            initial = format!(" ic={:e},0,{:e},0", wave(1), wave(0));
+        }
+        let name = &line.name;
+        let card = if name.starts_with('t') {
+            name.clone()
+        } else {
+            format!("t.{name}")
+        };
+        self.line(format!(
+            "{card}{ends} z0={:e} td={:e}{initial}",
+            line.impedance.f64, line.delay
+        ));
     }
 
     fn element(&mut self, id: ElementId, element: &Element) -> Result<(), DeckError> {
@@ -279,13 +320,32 @@ impl Writer<'_> {
         }
     }
 
+    /// A thyristor's switch has hysteresis around 1: its control is 2 with a gate, else 1 as long as its current holds it.
+    fn latch(&self, gates: &[ElementId], switch: &Switch) -> String {
+        let current = self.affine(&switch.control);
+        let held = format!("({current} > {:e} ? 1 : 0)", switch.off_below);
+        gates.iter().fold(held, |otherwise, gate| {
+            let gate = &self.circuit.elements[gate.index()];
+            let Kind::Switch(switch) = &gate.kind else {
+                return otherwise;
+            };
+            let (name, level) = (&gate.name, switch.on_above);
+            format!("(v({name}_control) > {level:e} ? 2 : {otherwise})")
+        })
+    }
+
     fn switch(&mut self, id: ElementId, p: &str, n: &str, switch: &Switch) {
         let name = self.circuit.elements[id.index()].name.clone();
-        let control = self.affine(&switch.control);
-        let (threshold, half) = (
-            0.5 * (switch.on_above + switch.off_below),
-            0.5 * (switch.on_above - switch.off_below),
-        );
+        let (control, threshold, half) = match &switch.latch {
+            None => (
+                self.affine(&switch.control),
+                0.5 * (switch.on_above + switch.off_below),
+                0.5 * (switch.on_above - switch.off_below),
+            ),
+            Some(Latch::Hold { gates, .. }) => (self.latch(gates, switch), 1.0, 0.5),
+            // Between an open switch that leaks and a diode no potential is undetermined.
+            Some(Latch::Rest(_)) => return,
+        };
         let (ron, roff) = (
             switch.ron.f64.max(NEAR_SHORT),
             switch.roff.map_or(NEAR_OPEN, |r| r.f64),
@@ -295,7 +355,17 @@ impl Writer<'_> {
             Some(false) => " off",
             None => "",
         };
-        self.line(format!("b.{name}_control {name}_control 0 v={control}"));
+        if switch.latch.is_some() {
+            // A loop from the current to the switch and back needs a time to settle in.
+            let delay = EDGE * self.tran.tstop;
+            self.notes
+                .insert(format!("thyristors follow their gates within {delay:e} s"));
+            self.line(format!("b.{name}_now {name}_now 0 v={control}"));
+            self.line(format!("r.{name}_delay {name}_now {name}_control 1"));
+            self.line(format!("c.{name}_delay {name}_control 0 {delay:e}"));
+        } else {
+            self.line(format!("b.{name}_control {name}_control 0 v={control}"));
+        }
         let card = self.card('s', id);
         self.line(format!("{card} {p} {n} {name}_control 0 m.{name}{initial}"));
         self.line(format!(

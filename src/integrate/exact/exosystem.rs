@@ -43,8 +43,10 @@ pub(crate) struct Exosystem {
     generator: DMatrix<f64>,
     output: DMatrix<f64>,
     rates: Vec<Rate>,
-    /// Current pieces by input.
+    /// Current pieces by input; blank for inputs left out.
     pieces: Vec<Piece>,
+    /// Inputs left out: they count as 0.
+    silent: Vec<bool>,
 }
 
 /// What the pieces of one input over a run are made of.
@@ -103,16 +105,24 @@ impl Shape {
 }
 
 impl Exosystem {
-    /// The exosystem of these sources over [from, until]; `None` if one has no closed form.
-    pub(crate) fn of(sources: &[Source], from: f64, until: f64) -> Option<Self> {
+    /// The exosystem of these sources over [from, until], those that are `silent` left out; `None` if one has no closed form.
+    pub(crate) fn of(sources: &[Source], silent: Vec<bool>, from: f64, until: f64) -> Option<Self> {
+        let blank = Source {
+            dc: 0.0,
+            wave: Wave::Dc(0.0),
+        };
         let mut shapes = Vec::new();
         let mut first = Vec::new();
-        for source in sources {
+        for (source, silent) in sources.iter().zip(&silent) {
+            let source = if *silent { &blank } else { source };
             let piece = source.piece(from)?;
             shapes.push(Shape::of_source(source, from, until)?);
             first.push(piece);
         }
-        Some(Self::new(&shapes, first))
+        Some(Self {
+            silent,
+            ..Self::new(&shapes, first)
+        })
     }
 
     /// The structure for inputs of these shapes, standing on their first pieces.
@@ -193,6 +203,7 @@ impl Exosystem {
             generator,
             output: h,
             rates,
+            silent: vec![false; first.len()],
             pieces: first,
         }
     }
@@ -230,9 +241,11 @@ impl Exosystem {
         &self.pieces[input]
     }
 
-    /// Input i goes on along another piece.
+    /// Input i goes on along another piece, unless it is left out.
     pub(crate) fn set_piece(&mut self, input: usize, piece: Piece) {
-        self.pieces[input] = piece;
+        if !self.silent[input] {
+            self.pieces[input] = piece;
+        }
     }
 
     /// The next breakpoint, s.
@@ -349,7 +362,7 @@ mod tests {
             }),
             source(Wave::Dc(4.0)),
         ];
-        let mut exosystem = Exosystem::of(&sources, 0.0, 3.0).unwrap();
+        let mut exosystem = Exosystem::of(&sources, vec![false; sources.len()], 0.0, 3.0).unwrap();
         // one, a line 2, a step 1, one shared pair, a step and a damped pair, a step and two decays
         assert_eq!(exosystem.dim(), 1 + 2 + 1 + 2 + 3 + 3);
         let mut z = DVector::zeros(exosystem.dim());

@@ -1,35 +1,21 @@
-//! exp(A h) − I for small dense A, accurate when the eigenvalues of A h lie many decades apart.
+//! exp(A h/2^k) − I for small dense A and k = 0, 1, …, accurate when the eigenvalues of A h lie many decades apart.
 //!
 //! The difference from the identity is kept: where steps are short it carries digits that exp(A h) itself would drop, and
 //! a run of many steps would lose them systematically.
 
 use nalgebra::{Complex, DMatrix};
 
-/// ‖A h‖₁ up to which scaling and squaring of the diagonal Padé approximant [13/13] is used: its loss, about
-/// 2.5e-17·‖A h‖, stays near rounding below this.
-const DIAGONAL_LIMIT: f64 = 1e3;
+use super::dense::Dense;
+use super::shifted::Shifted;
 
-/// Largest ‖Z‖₁ for which the diagonal approximant [13/13] of exp(Z) is exact to rounding (Higham, SIAM J. Matrix Anal.
-/// Appl. 26 (2005), table 2.3).
-const THETA_13: f64 = 5.371_920_351_148_152;
+/// ‖A h‖₁ up to which shorter steps are squared: what that loses, about 2.5e-17·‖A h‖, stays near rounding below this.
+pub(crate) const SQUARED: f64 = 1e3;
 
-/// Coefficients of the numerator of the [13/13] approximant.
-const PADE_13: [f64; 14] = [
-    64_764_752_532_480_000.0,
-    32_382_376_266_240_000.0,
-    7_771_770_303_897_600.0,
-    1_187_353_796_428_800.0,
-    129_060_195_264_000.0,
-    10_559_470_521_600.0,
-    670_442_572_800.0,
-    33_522_128_640.0,
-    1_323_241_920.0,
-    40_840_800.0,
-    960_960.0,
-    16_380.0,
-    182.0,
-    1.0,
-];
+/// ‖A h‖₁ up to which the series is summed; longer steps begin with a part of this size.
+pub(crate) const SERIES: f64 = 0.125;
+
+/// Terms of the series: 0.125^k/k! is below rounding beyond, in every entry; their sizes are not comparable.
+const TERMS: u32 = 14;
 
 /// Conjugate pairs (zero, pole) of the sub-diagonal approximant [7/8] of exp.
 const PAIRS: [(Complex<f64>, Complex<f64>); 3] = [
@@ -56,47 +42,116 @@ const LAST: (f64, Complex<f64>) = (
 /// Squarings of the [7/8] approximant: with 2³ steps its error on the whole negative axis is below 1e-13.
 const SQUARINGS: u32 = 3;
 
-/// exp(A h) − I, and what is known about its error.
+/// exp(A h/2^k) − I for all k, computed when asked for, each from the next where that is accurate.
+///
+/// Where ‖A h/2^k‖₁ is small after balancing, the series; up to a limit the square of the half step; beyond, the L-stable
+/// sub-diagonal approximant [7/8] in product form with 2³ squarings, whose cost does not grow with ‖A h‖ and whose error is
+/// not multiplied by it when A is graded (spread storage elements).
 #[derive(Debug, Clone)]
-pub(crate) struct Exponential {
-    /// exp(A h) − I.
-    pub(crate) increment: DMatrix<f64>,
-    /// Where A h is stiff: max|R(h) − R(h/2)²| relative to max|R(h)|, in the balanced coordinates.
-    pub(crate) loss: Option<f64>,
+pub(crate) struct Ladder {
+    /// A h in balanced coordinates.
+    whole: Dense,
+    norm: f64,
+    /// Balanced coordinates times these are the original ones.
+    scale: Vec<f64>,
+    /// ‖A h‖₁ up to which steps are squared.
+    limit: f64,
+    rungs: Vec<Option<Dense>>,
 }
 
-/// exp(A h) − I. `None` if an entry is not finite or a factor is singular.
-///
-/// Diagonal Padé [13/13] with scaling and squaring for ‖A h‖₁ ≤ 1e3 after balancing; beyond, the L-stable sub-diagonal
-/// approximant [7/8] in product form with 2³ squarings, whose cost does not grow with ‖A h‖ and whose error is not
-/// multiplied by it when A is graded (spread storage elements).
-pub(crate) fn exponential(a: &DMatrix<f64>, h: f64) -> Option<Exponential> {
-    let scale = balance(a, h);
-    let z = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| {
-        a[(i, j)] * h * scale[j] / scale[i]
-    });
-    let norm = norm_1(&z);
-    if !norm.is_finite() {
-        return None;
-    }
-    let (mut r, loss) = if norm <= DIAGONAL_LIMIT {
-        (diagonal(&z, norm)?, None)
-    } else {
-        let whole = subdiagonal(&z)?;
-        let half = subdiagonal(&(&z * 0.5))?;
-        let twice = &half * &half;
-        let loss = (&twice - &whole).amax() / whole.amax().max(f64::MIN_POSITIVE);
-        let identity = DMatrix::identity(z.nrows(), z.nrows());
-        (whole - identity, Some(loss))
-    };
-    for j in 0..r.ncols() {
-        for i in 0..r.nrows() {
-            r[(i, j)] *= scale[i] / scale[j];
+impl Ladder {
+    /// The ladder of A below h, squared while ‖A h/2^k‖₁ ≤ `limit`.
+    pub(crate) fn new(a: &DMatrix<f64>, h: f64, limit: f64) -> Self {
+        let scale = balance(a, h);
+        let whole = Dense::from_fn(a.nrows(), a.ncols(), |i, j| {
+            a[(i, j)] * h * scale[j] / scale[i]
+        });
+        Self {
+            norm: whole.norm_1(),
+            whole,
+            scale,
+            limit,
+            rungs: Vec::new(),
         }
     }
-    r.iter()
-        .all(|v| v.is_finite())
-        .then_some(Exponential { increment: r, loss })
+
+    /// ‖A h‖₁ after balancing.
+    pub(crate) fn norm(&self) -> f64 {
+        self.norm
+    }
+
+    fn norm_at(&self, k: u32) -> f64 {
+        self.norm * (-f64::from(k)).exp2()
+    }
+
+    /// exp(A h/2^k) − I, and where A h/2^k is stiff max|R(t) − R(t/2)²| relative to max|R(t)|, in the balanced coordinates.
+    /// `None` if an entry is not finite or a factor is singular.
+    pub(crate) fn increment(&mut self, k: u32) -> Option<(Dense, Option<f64>)> {
+        let stiff = self.norm_at(k) > self.limit;
+        let twice = if stiff {
+            Some(squared(self.rung(k + 1)?))
+        } else {
+            None
+        };
+        let rung = self.rung(k)?;
+        let loss = twice.map(|mut twice| {
+            twice.combine(1.0, -1.0, rung);
+            let mut whole = rung.clone();
+            whole.shift(1.0);
+            twice.amax() / whole.amax().max(f64::MIN_POSITIVE)
+        });
+        let mut increment = rung.clone();
+        for j in 0..self.scale.len() {
+            let column = increment.column_mut(j).iter_mut().zip(&self.scale);
+            column.for_each(|(value, scale)| *value *= scale / self.scale[j]);
+        }
+        increment.is_finite().then_some((increment, loss))
+    }
+
+    /// exp(A h/2^k) − I in the balanced coordinates.
+    fn rung(&mut self, k: u32) -> Option<&Dense> {
+        if self.rungs.len() <= k as usize {
+            self.rungs.resize(k as usize + 1, None);
+        }
+        if self.rungs[k as usize].is_none() {
+            let norm = self.norm_at(k);
+            let rung = if norm <= SERIES {
+                self.series(k)
+            } else if norm <= self.limit {
+                squared(self.rung(k + 1)?)
+            } else {
+                let mut rung = subdiagonal(&self.whole, k)?;
+                rung.shift(-1.0);
+                rung
+            };
+            self.rungs[k as usize] = Some(rung);
+        }
+        self.rungs[k as usize].as_ref()
+    }
+
+    /// Σ Z^j/j! − I by Horner's rule.
+    fn series(&self, k: u32) -> Dense {
+        let n = self.whole.columns();
+        let mut z = self.whole.clone();
+        z.combine((-f64::from(k)).exp2(), 0.0, &self.whole);
+        let mut sum = z.clone();
+        let mut product = Dense::zeros(n, n);
+        for j in (2..=TERMS).rev() {
+            // sum ← Z + Z sum/j
+            product.set_product(&z, &sum);
+            sum.combine(0.0, 1.0, &z);
+            sum.combine(1.0, 1.0 / f64::from(j), &product);
+        }
+        sum
+    }
+}
+
+/// (I + X)² − I.
+fn squared(x: &Dense) -> Dense {
+    let mut square = Dense::zeros(x.rows(), x.columns());
+    square.set_product(x, x);
+    square.combine(1.0, 2.0, x);
+    square
 }
 
 /// Powers of two d such that diag(d)⁻¹ A h diag(d) has rows and columns of like size (Osborne; Parlett and Reinsch,
@@ -146,72 +201,38 @@ fn power_of_two(x: f64) -> f64 {
     }
 }
 
-/// Largest absolute column sum.
-pub(crate) fn norm_1(a: &DMatrix<f64>) -> f64 {
-    a.column_iter()
-        .map(|c| c.iter().map(|v| v.abs()).sum::<f64>())
-        .fold(0.0, f64::max)
-}
-
-/// Padé [13/13] with scaling and squaring (Higham 2005, algorithm 2.3), less the identity: r − I = (V − U)⁻¹ 2U, and
-/// (I + X)² − I = 2X + X².
-fn diagonal(z: &DMatrix<f64>, norm: f64) -> Option<DMatrix<f64>> {
-    let squarings = if norm > THETA_13 {
-        (norm / THETA_13).log2().ceil() as i32
-    } else {
-        0
-    };
-    let z = z * (-f64::from(squarings)).exp2();
-    let identity = DMatrix::identity(z.nrows(), z.nrows());
-    let b = &PADE_13;
-    let z2 = &z * &z;
-    let z4 = &z2 * &z2;
-    let z6 = &z4 * &z2;
-    let u = &z
-        * (&z6 * (&z6 * b[13] + &z4 * b[11] + &z2 * b[9])
-            + &z6 * b[7]
-            + &z4 * b[5]
-            + &z2 * b[3]
-            + &identity * b[1]);
-    let v = &z6 * (&z6 * b[12] + &z4 * b[10] + &z2 * b[8])
-        + &z6 * b[6]
-        + &z4 * b[4]
-        + &z2 * b[2]
-        + &identity * b[0];
-    let mut r = (&v - &u).lu().solve(&(&u * 2.0))?;
-    for _ in 0..squarings {
-        r = &r * &r + &r * 2.0;
-    }
-    Some(r)
-}
-
-/// Padé [7/8] of exp(Z/8) as a product of (Z − z)(Z − p)⁻¹ = I + (p − z)(Z − p)⁻¹ over its zeros and poles, squared three
-/// times.
-fn subdiagonal(z: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let n = z.nrows();
-    let z = z.map(|v| Complex::new(v / f64::from(1_u32 << SQUARINGS), 0.0));
-    let shifted_inverse = |pole: Complex<f64>| {
-        let mut shifted = z.clone();
-        for i in 0..n {
-            shifted[(i, i)] -= pole;
-        }
-        shifted.lu().try_inverse()
-    };
+/// Padé [7/8] of exp(Z/8), Z = A h/2^k, as a product of (Z − z)(Z − p)⁻¹ = I + (p − z)(Z − p)⁻¹ over its zeros and poles,
+/// squared three times.
+fn subdiagonal(whole: &Dense, k: u32) -> Option<Dense> {
+    let n = whole.columns();
+    let mut z = whole.clone();
+    z.combine((-f64::from(k + SQUARINGS)).exp2(), 0.0, whole);
+    let mut shifted = Shifted::new(n);
     let (zero, pole) = LAST;
     // (Z − z)(Z − p)⁻¹(Z − p̄)⁻¹ = Im((p − z)(Z − p)⁻¹)/Im p, which is −z/|p|² at Z = 0.
     let weight = -pole.norm_sqr() / (zero * pole.im);
     let factor = (pole - zero) * weight;
-    let mut r = shifted_inverse(pole)?.map(|v| (v * factor).im);
+    let [re, im] = shifted.inverse(&z, pole)?;
+    let mut r = re.clone();
+    r.combine(factor.im, factor.re, im);
+    let (mut square, mut product) = (Dense::zeros(n, n), Dense::zeros(n, n));
     for (zero, pole) in PAIRS {
-        let mut m = shifted_inverse(pole)? * (pole - zero);
-        for i in 0..n {
-            m[(i, i)] += 1.0;
-        }
-        let (re, im) = (m.map(|v| v.re), m.map(|v| v.im));
-        r = (&re * &re + &im * &im) * r * (pole.norm_sqr() / zero.norm_sqr());
+        let factor = pole - zero;
+        let [re, im] = shifted.inverse(&z, pole)?;
+        // M = I + (p − z)(Z − p)⁻¹
+        let (mut m_re, mut m_im) = (re.clone(), im.clone());
+        m_re.combine(factor.re, -factor.im, im);
+        m_im.combine(factor.re, factor.im, re);
+        m_re.shift(1.0);
+        square.set_product(&m_re, &m_re);
+        product.set_product(&m_im, &m_im);
+        square.combine(1.0, 1.0, &product);
+        product.set_product(&square, &r);
+        r.combine(0.0, pole.norm_sqr() / zero.norm_sqr(), &product);
     }
     for _ in 0..SQUARINGS {
-        r = &r * &r;
+        product.set_product(&r, &r);
+        std::mem::swap(&mut r, &mut product);
     }
     Some(r)
 }
@@ -220,8 +241,13 @@ fn subdiagonal(z: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 mod tests {
     use super::*;
 
+    fn matrix(dense: &Dense) -> DMatrix<f64> {
+        DMatrix::from_fn(dense.rows(), dense.columns(), |i, j| dense.column(j)[i])
+    }
+
     fn whole(a: &DMatrix<f64>, h: f64) -> DMatrix<f64> {
-        exponential(a, h).unwrap().increment + DMatrix::identity(a.nrows(), a.nrows())
+        let (increment, _) = Ladder::new(a, h, SQUARED).increment(0).unwrap();
+        matrix(&increment) + DMatrix::identity(a.nrows(), a.nrows())
     }
 
     #[test]
@@ -240,8 +266,8 @@ mod tests {
     #[test]
     fn both_approximants_agree_where_both_hold() {
         let a = DMatrix::from_row_slice(3, 3, &[-3.0, 1.0, 0.5, 2.0, -5.0, 1.0, 0.0, 1.0, -0.2]);
-        let first = diagonal(&a, norm_1(&a)).unwrap() + DMatrix::identity(3, 3);
-        let second = subdiagonal(&a).unwrap();
+        let first = whole(&a, 1.0);
+        let second = matrix(&subdiagonal(&Dense::of(&a), 0).unwrap());
         assert!((first - second).amax() < 1e-14);
     }
 
@@ -277,12 +303,20 @@ mod tests {
         for decades in [3, 6, 9, 12, 15] {
             let a = graded(5, 10f64.powi(decades));
             let (s, t) = (0.7e-2, 0.3e-2 + 0.001);
-            let sum = exponential(&a, s + t).unwrap();
+            let mut ladder = Ladder::new(&a, s + t, SQUARED);
+            let (_, loss) = ladder.increment(0).unwrap();
             let product = whole(&a, s) * whole(&a, t);
             let exact = whole(&a, s + t);
             let error = (&exact - product).amax() / exact.amax();
             assert!(error < 1e-12, "1e{decades}: {error:e}");
-            assert!(sum.loss.unwrap_or(0.0) < 1e-12);
+            assert!(loss.unwrap_or(0.0) < 1e-12);
+            for k in 1..20 {
+                let (rung, _) = ladder.increment(k).unwrap();
+                let anew = whole(&a, (s + t) * (-f64::from(k)).exp2());
+                let rung = matrix(&rung) + DMatrix::identity(5, 5);
+                let error = (rung - &anew).amax() / anew.amax();
+                assert!(error < 1e-13, "1e{decades}, rung {k}: {error:e}");
+            }
         }
     }
 }

@@ -2,9 +2,10 @@
 
 use nalgebra::DMatrix;
 
-use super::expm::{self, Exponential};
+use super::dense::Dense;
+use super::expm::{self, Ladder};
 use super::kernel::Kernel;
-use super::polynomial::MAX_DEGREE;
+use super::polynomial::{self, MAX_DEGREE};
 use super::spectrum::{Rate, Spectrum};
 use super::work::{Sizes, Taylor, Term, Work};
 
@@ -24,11 +25,16 @@ pub(crate) struct Flow {
     generator: DMatrix<f64>,
     generator_kernel: Kernel,
     /// [𝒢; 𝒢𝒜].
-    rows: DMatrix<f64>,
+    rows: Dense,
     rows_kernel: Kernel,
+    /// Rounding of the guards and of their derivatives, from |w|.
+    noise_kernel: Kernel,
     guard_kernel: Kernel,
     h: f64,
     bottom: u32,
+    /// h/2^level.
+    steps: Vec<f64>,
+    ladder: Ladder,
     levels: Vec<Option<Kernel>>,
     spectrum: Spectrum,
     work: Option<Work>,
@@ -51,24 +57,34 @@ impl Flow {
         }
         let dim = generator.nrows();
         let m = guards.nrows();
-        let mut rows = DMatrix::zeros(2 * m, dim);
-        rows.rows_mut(0, m).copy_from(guards);
-        rows.rows_mut(m, m).copy_from(&(guards * &generator));
-        let d = expm::balance(&generator, h);
-        let balanced = DMatrix::from_fn(dim, dim, |i, j| generator[(i, j)] * d[j] / d[i]);
-        let halvings = (expm::norm_1(&balanced) * h).log2().ceil();
-        let bottom = (halvings.max(0.0) as u32).min(DEEPEST);
+        let first = guards * &generator;
+        let rows = Dense::from_fn(2 * m, dim, |i, j| {
+            if i < m {
+                guards[(i, j)]
+            } else {
+                first[(i - m, j)]
+            }
+        });
+        let ladder = Ladder::new(&generator, h, expm::SQUARED);
+        let bottom = (ladder.norm().log2().ceil().max(0.0) as u32).min(DEEPEST);
         let spectrum = Spectrum::new(&generator.view((0, 0), (n, n)).into_owned(), sources);
         Some(Self {
             dim,
             guards: m,
             generator_kernel: Kernel::new(&generator),
             generator,
-            rows_kernel: Kernel::new(&rows),
+            rows_kernel: Kernel::from_fn(2 * m, dim, |i, j| rows.column(j)[i]),
+            noise_kernel: Kernel::from_fn(2 * m, dim, |i, j| {
+                NOISE * f64::EPSILON * rows.column(j)[i].abs()
+            }),
             guard_kernel: Kernel::new(guards),
             rows,
             h,
             bottom,
+            steps: (0..=bottom)
+                .map(|level| h * (-f64::from(level)).exp2())
+                .collect(),
+            ladder,
             levels: vec![None; bottom as usize + 1],
             spectrum,
             work: None,
@@ -98,7 +114,7 @@ impl Flow {
 
     /// h/2^level, s.
     pub(crate) fn step(&self, level: u32) -> f64 {
-        self.h * (-f64::from(level)).exp2()
+        self.steps[level as usize]
     }
 
     /// See [`Spectrum::step_limit`]; without guards nothing can hide.
@@ -127,18 +143,21 @@ impl Flow {
 
     #[cold]
     fn tabulate(&mut self, level: u32) -> bool {
-        let Some(Exponential { increment, loss }) =
-            expm::exponential(&self.generator, self.step(level))
-        else {
+        let Some((increment, loss)) = self.ladder.increment(level) else {
             return false;
         };
         self.loss = self.loss.max(loss.unwrap_or(0.0));
-        let mut fused = DMatrix::zeros(self.dim + self.rows.nrows(), self.dim);
-        fused
-            .rows_mut(self.dim, self.rows.nrows())
-            .copy_from(&(&self.rows + &self.rows * &increment));
-        fused.rows_mut(0, self.dim).copy_from(&increment);
-        self.levels[level as usize] = Some(Kernel::new(&fused));
+        let (dim, rows) = (self.dim, &self.rows);
+        let mut guards = rows.clone();
+        guards.set_product(rows, &increment);
+        guards.combine(1.0, 1.0, rows);
+        self.levels[level as usize] = Some(Kernel::from_fn(dim + rows.rows(), dim, |i, j| {
+            if i < dim {
+                increment.column(j)[i]
+            } else {
+                guards.column(j)[i - dim]
+            }
+        }));
         true
     }
 
@@ -170,16 +189,15 @@ impl Flow {
             .is_some_and(|work| work.may_join(k, generator, sizes))
     }
 
-    /// (from sources, dissipated) along a Taylor polynomial, J; `w` is work space of length dim.
+    /// (from sources, dissipated) along a Taylor polynomial, J.
     pub(crate) fn energy_of_taylor(
         &mut self,
         polynomial: Taylor<'_>,
         sizes: Sizes<'_>,
-        w: &mut [f64],
     ) -> [f64; 2] {
         let generator = &self.generator;
         self.work.as_mut().map_or([0.0; 2], |work| {
-            work.along_taylor(polynomial, generator, sizes, w)
+            work.along_taylor(polynomial, generator, sizes)
         })
     }
 
@@ -191,24 +209,24 @@ impl Flow {
 
     /// Rounding noise of g and g' where |w| ≤ `amplitude`.
     pub(crate) fn noise(&self, amplitude: &[f64], floors: &mut Vec<f64>) {
-        floors.clear();
-        floors.extend(self.rows.row_iter().map(|row| {
-            NOISE
-                * f64::EPSILON
-                * row
-                    .iter()
-                    .zip(amplitude)
-                    .map(|(r, a)| (r * a).abs())
-                    .sum::<f64>()
-        }));
+        floors.resize(2 * self.guards, 0.0);
+        self.noise_kernel.apply(amplitude, floors);
     }
 
     /// Taylor terms (𝒜 dt)^k w/k! for k = 0…degree into `terms` (degree + 1 blocks of `dim`); returns the degree.
-    /// `dt` ≤ h/2^K.
-    pub(crate) fn taylor(&self, w: &[f64], dt: f64, terms: &mut Vec<f64>) -> usize {
+    /// `dt` ≤ h/2^K; `largest` is work space.
+    pub(crate) fn taylor(
+        &self,
+        w: &[f64],
+        dt: f64,
+        terms: &mut Vec<f64>,
+        largest: &mut Vec<f64>,
+    ) -> usize {
         let dim = self.dim;
         terms.resize((MAX_DEGREE + 1) * dim, 0.0);
         terms[..dim].copy_from_slice(&w[..dim]);
+        largest.clear();
+        largest.extend(w[..dim].iter().map(|v| v.abs()));
         let mut small_before = false;
         for k in 1..=MAX_DEGREE {
             let (known, rest) = terms.split_at_mut(k * dim);
@@ -216,10 +234,13 @@ impl Flow {
             self.generator_kernel.apply(&known[(k - 1) * dim..], term);
             let factor = dt / k as f64;
             let mut small = true;
-            for (i, value) in term.iter_mut().enumerate() {
+            for (value, largest) in term.iter_mut().zip(&mut *largest) {
                 *value *= factor;
-                let largest = (0..k).map(|j| known[j * dim + i].abs()).fold(0.0, f64::max);
-                small &= value.abs() <= 0.1 * f64::EPSILON * largest;
+                let size = value.abs();
+                small &= size <= 0.1 * f64::EPSILON * *largest;
+                if size > *largest {
+                    *largest = size;
+                }
             }
             if small && small_before {
                 return k;
@@ -231,12 +252,7 @@ impl Flow {
 
     /// Σ terms s^k: w at the fraction s of Taylor's step.
     pub(crate) fn sum(&self, terms: &[f64], degree: usize, s: f64, w: &mut [f64]) {
-        let dim = self.dim;
-        for (i, out) in w[..dim].iter_mut().enumerate() {
-            *out = (0..=degree)
-                .rev()
-                .fold(0.0, |sum, k| sum * s + terms[k * dim + i]);
-        }
+        polynomial::values(terms, degree, s, &mut w[..self.dim]);
     }
 
     /// The guards as polynomials in the fraction of Taylor's step: `values[k·guards + i]` is coefficient k of guard i.
@@ -282,8 +298,8 @@ mod tests {
                 assert!((a - b).abs() <= 3e-15 * b.abs().max(1.0));
             }
         }
-        let mut terms = Vec::new();
-        let degree = flow.taylor(&[1.0, 0.0], flow.step(4), &mut terms);
+        let (mut terms, mut largest) = (Vec::new(), Vec::new());
+        let degree = flow.taylor(&[1.0, 0.0], flow.step(4), &mut terms, &mut largest);
         let mut w = vec![0.0; 2];
         flow.sum(&terms, degree, 1.0, &mut w);
         assert!(

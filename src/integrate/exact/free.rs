@@ -15,13 +15,23 @@ struct Step {
     driver: Driver,
 }
 
-/// What becomes of pairs whose current and voltage are both zero.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Degenerate<'a> {
-    /// They block.
-    Open,
-    /// They stay as they are here.
-    As(&'a [bool]),
+/// Which pairs conduct; `None` for those whose current and voltage are both zero.
+#[derive(Debug, Clone)]
+pub(crate) struct Proposal(Vec<Option<bool>>);
+
+impl Proposal {
+    /// Pairs that are zero on both sides block.
+    pub(crate) fn open(&self) -> Vec<bool> {
+        self.0.iter().map(|pair| pair.unwrap_or(false)).collect()
+    }
+
+    /// Pairs that are zero on both sides stay as they are.
+    pub(crate) fn as_before(&self, before: &[bool]) -> Vec<bool> {
+        let pairs = self.0.iter().zip(before);
+        pairs
+            .map(|(pair, before)| pair.unwrap_or(*before))
+            .collect()
+    }
 }
 
 /// The system with every pair free.
@@ -69,14 +79,12 @@ impl Free {
     }
 
     /// Which pairs conduct during one implicit step of length `h` from x to inputs `u`: the candidate for the next mode.
-    /// Pairs that are zero on both sides come as `degenerate` says.
     pub(crate) fn propose(
         &mut self,
         x: &DVector<f64>,
         u: &DVector<f64>,
         h: f64,
-        degenerate: Degenerate<'_>,
-    ) -> Option<Vec<bool>> {
+    ) -> Option<Proposal> {
         let at = match self.steps.iter().position(|s| s.h == h) {
             Some(at) => at,
             None => {
@@ -107,18 +115,10 @@ impl Free {
         if solution.status != Status::Solved {
             return None;
         }
-        Some(
-            lcs.ports
-                .iter()
-                .zip(&solution.active)
-                .enumerate()
-                .map(|(j, (port, active))| match (active, degenerate) {
-                    (Some(active), _) => *active == (port.role != Role::Voltage),
-                    (None, Degenerate::Open) => false,
-                    (None, Degenerate::As(before)) => before[j],
-                })
-                .collect(),
-        )
+        let pairs = lcs.ports.iter().zip(&solution.active);
+        let conducts =
+            pairs.map(|(port, active)| active.map(|active| active == (port.role != Role::Voltage)));
+        Some(Proposal(conducts.collect()))
     }
 
     /// The impulse that takes state x to state `after` with these pairs conducting, if there is one: p ≥ 0 acts on the

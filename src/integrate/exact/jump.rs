@@ -2,7 +2,6 @@
 
 use nalgebra::DVector;
 
-use super::free::Degenerate;
 use super::inspect::Finding;
 use super::mode::Key;
 use super::stepper::Exact;
@@ -84,10 +83,10 @@ impl Exact<'_> {
             let u = self.inputs(t + h);
             self.lcp_solves += 1;
             let free = self.plant.free(key)?;
-            let Some(closed) = free.propose(&x, &u, h, Degenerate::Open) else {
+            let Some(proposal) = free.propose(&x, &u, h) else {
                 continue;
             };
-            let candidate = key.with_closed(closed);
+            let candidate = key.with_closed(proposal.open());
             let Some(at) = self.plant.mode(&candidate, &self.exosystem) else {
                 continue;
             };

@@ -16,13 +16,21 @@ pub(crate) struct Kernel {
 impl Kernel {
     /// Repacks a matrix.
     pub(crate) fn new(matrix: &DMatrix<f64>) -> Self {
-        let (rows, columns) = matrix.shape();
+        Self::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)])
+    }
+
+    /// Packs entries (row, column).
+    pub(crate) fn from_fn(
+        rows: usize,
+        columns: usize,
+        entry: impl Fn(usize, usize) -> f64,
+    ) -> Self {
         let mut blocks = Vec::with_capacity(rows.div_ceil(BLOCK) * columns);
         for first in (0..rows).step_by(BLOCK) {
             for j in 0..columns {
                 blocks.push(std::array::from_fn(|i| {
                     if first + i < rows {
-                        matrix[(first + i, j)]
+                        entry(first + i, j)
                     } else {
                         0.0
                     }
@@ -44,20 +52,32 @@ impl Kernel {
             y[..self.rows].fill(0.0);
             return;
         }
-        let outputs = y[..self.rows].chunks_mut(BLOCK);
-        for (block, out) in self.blocks.chunks_exact(self.columns).zip(outputs) {
-            let mut sum = [0.0; BLOCK];
-            for (column, &value) in block.iter().zip(w) {
-                for (s, &k) in sum.iter_mut().zip(column) {
-                    *s += k * value;
-                }
-            }
-            match <&mut [f64; BLOCK]>::try_from(&mut *out) {
-                Ok(four) => *four = sum,
-                Err(_) => out.copy_from_slice(&sum[..out.len()]),
+        let (full, tail) = y[..self.rows].as_chunks_mut::<BLOCK>();
+        let mut blocks = &self.blocks[..];
+        for out in full {
+            let (block, rest) = blocks.split_at(self.columns);
+            *out = product(block, w);
+            blocks = rest;
+        }
+        if !tail.is_empty() {
+            let sums = product(blocks, w);
+            for (out, sum) in tail.iter_mut().zip(sums) {
+                *out = sum;
             }
         }
     }
+}
+
+/// Four rows times w.
+#[inline]
+fn product(block: &[[f64; BLOCK]], w: &[f64]) -> [f64; BLOCK] {
+    let mut sums = [0.0; BLOCK];
+    for (column, &value) in block.iter().zip(w) {
+        for (sum, &k) in sums.iter_mut().zip(column) {
+            *sum += k * value;
+        }
+    }
+    sums
 }
 
 #[cfg(test)]

@@ -3,6 +3,8 @@
 
 mod accumulation;
 mod assembler;
+mod clock;
+mod dense;
 mod exosystem;
 mod expm;
 mod flow;
@@ -18,6 +20,7 @@ mod polynomial;
 mod rays;
 mod report;
 mod schedule;
+mod shifted;
 mod spans;
 mod spectrum;
 mod stepper;

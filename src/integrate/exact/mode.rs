@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::clock::Clock;
 use super::exosystem::Exosystem;
 use super::flow::Flow;
 use super::kernel::Kernel;
@@ -70,6 +71,8 @@ pub(crate) struct SwitchFacts<'a> {
     pub(crate) limits: &'a [(f64, f64)],
     /// Switches that sources alone drive.
     pub(crate) drives: &'a [Drive],
+    /// Those whose sources do nothing else.
+    pub(crate) clocks: &'a [Clock],
 }
 
 /// One mode over w = [x; z].
@@ -137,6 +140,7 @@ impl Mode {
             thresholds,
             limits,
             drives,
+            clocks,
         } = *switches;
         let (n, dz) = (lcs.n(), exosystem.dim());
         let dim = n + dz;
@@ -175,15 +179,25 @@ impl Mode {
             controls.set_row(published[k], &row);
         }
         let driven = |i: usize| {
-            drives.iter().any(|drive| {
-                let row = controls.row(i);
-                drive.switch == i
-                    && row.columns(0, n).iter().all(|v| *v == 0.0)
-                    && row.iter().skip(n).eq(drive.row.iter())
-            })
+            clocks.iter().any(|clock| clock.switch == i)
+                || drives.iter().any(|drive| {
+                    let row = controls.row(i);
+                    drive.switch == i
+                        && row.columns(0, n).iter().all(|v| *v == 0.0)
+                        && row.iter().skip(n).eq(drive.row.iter())
+                })
         };
-        let guarded_switches: Vec<usize> =
-            published.iter().copied().filter(|&i| !driven(i)).collect();
+        let guarded = |i: &usize| {
+            let threshold = &thresholds[*i];
+            match threshold.latch {
+                None => !driven(*i),
+                // Without a holding current the valve's guard is that of its current.
+                Some(_) => {
+                    threshold.off_below > 0.0 && threshold.holds(key.switches[*i], &key.switches)
+                }
+            }
+        };
+        let guarded_switches: Vec<usize> = published.iter().copied().filter(guarded).collect();
         let mut guards = DMatrix::zeros(
             devices.nrows() + guarded_switches.len() + 2 * slides.len(),
             dim,

@@ -14,6 +14,18 @@ const GRID_ULPS: f64 = 8.0;
 /// values and slopes, (ωh)²/48 of the spread at ωh = 0.7, is below it.
 const MARGIN: f64 = 0.02;
 
+/// As [`f64::max`] where neither is NaN, in one instruction.
+#[inline]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// As [`f64::min`] where neither is NaN.
+#[inline]
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
 /// How a stretch ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Arrival {
@@ -55,6 +67,8 @@ pub(crate) struct Motion {
     pub(crate) power: f64,
     next: Vec<f64>,
     terms: Vec<f64>,
+    /// Work space of Taylor's series.
+    largest: Vec<f64>,
     polynomials: Vec<f64>,
     /// Largest |w| that noise is measured by; at least `peak`.
     amplitude: Vec<f64>,
@@ -129,14 +143,14 @@ impl Motion {
     #[inline]
     fn note_peak(&mut self) {
         for (peak, v) in self.peak.iter_mut().zip(&self.now) {
-            *peak = peak.max(v.abs());
+            *peak = larger(*peak, v.abs());
         }
     }
 
     fn refresh_noise(&mut self, flow: &Flow) {
         self.note_peak();
         for (a, v) in self.amplitude.iter_mut().zip(&self.now) {
-            *a = a.max(v.abs());
+            *a = larger(*a, v.abs());
         }
         flow.noise(&self.amplitude, &mut self.floors);
         for (floor, slack) in self.floors.iter_mut().zip(&self.slack) {
@@ -248,7 +262,7 @@ impl Motion {
     fn taylor(&mut self, flow: &mut Flow, exosystem: &Exosystem, end: f64) -> Arrival {
         let dt = end - self.t;
         let (dim, m) = (flow.dim(), flow.guards());
-        self.degree = flow.taylor(&self.now, dt, &mut self.terms);
+        self.degree = flow.taylor(&self.now, dt, &mut self.terms, &mut self.largest);
         if !self.terms[..(self.degree + 1) * dim]
             .iter()
             .all(|v| v.is_finite())
@@ -287,8 +301,7 @@ impl Motion {
                 amplitude: &self.amplitude,
                 power: self.power,
             };
-            let [source, dissipated] =
-                flow.energy_of_taylor(polynomial, sizes, &mut self.next[..dim]);
+            let [source, dissipated] = flow.energy_of_taylor(polynomial, sizes);
             self.energy[0] += source;
             self.energy[1] += dissipated;
             self.spans.part();
@@ -318,8 +331,9 @@ impl Motion {
         for i in 0..m {
             let (b0, b3) = (g0[i], g1[i]);
             let (b1, b2) = (b0 + third * s0[i], b3 - third * s1[i]);
-            let low = b1.min(b2);
-            let spread = b1.max(b2).max(b0).max(b3) - low.min(b0).min(b3);
+            let low = smaller(b1, b2);
+            let high = larger(larger(b1, b2), larger(b0, b3));
+            let spread = high - smaller(low, smaller(b0, b3));
             let noise = floor[i] + third * slope_floor[i];
             clear &= b3 >= -floor[i] && low + noise >= MARGIN * spread;
         }

@@ -54,12 +54,18 @@ impl Exact<'_> {
             };
             self.exosystem.set_piece(i, piece);
         }
+        let mut switches = place.switches.clone();
+        for clock in &mut self.plant.clocks {
+            let i = clock.switch;
+            clock.stand_at(&self.sources, place.t);
+            switches[i] = self.plant.thresholds[i].position(switches[i], clock.control(place.t));
+        }
         self.remember_inputs();
         self.left_here.clear();
         self.instant = place.t;
         let mut key = Key {
             closed: self.key.closed.clone(),
-            switches: place.switches.clone(),
+            switches,
             sliding: Vec::new(),
         };
         self.key.copy_from(&key);

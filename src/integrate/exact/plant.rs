@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::assembler::{Assembler, Step};
+use super::clock::{Clock, Control};
 use super::exosystem::Exosystem;
 use super::free::Free;
 use super::mode::{Key, Mode, SwitchFacts};
@@ -17,8 +18,12 @@ pub(crate) struct Plant<'a> {
     /// Number of device pairs.
     pub(crate) pairs: usize,
     pub(crate) thresholds: Vec<Threshold>,
+    /// By switch: the pair in series with a thyristor's.
+    pub(crate) valves: Vec<Option<usize>>,
     /// Switches that sources alone drive.
     pub(crate) drives: Vec<Drive>,
+    /// Those whose sources do nothing else.
+    pub(crate) clocks: Vec<Clock>,
     h: f64,
     energy: bool,
     tolerance: f64,
@@ -30,11 +35,18 @@ pub(crate) struct Plant<'a> {
 impl<'a> Plant<'a> {
     /// A plant without modes; `h` is the output step, `energy` asks for the balance, `tolerance` that of complementarity residuals.
     pub(crate) fn new(assembler: Assembler<'a>, h: f64, energy: bool, tolerance: f64) -> Self {
+        let thresholds = assembler.thresholds();
+        let valve = |t: &Threshold| {
+            let valve = t.valve()?;
+            (0..assembler.pairs()).find(|&pair| assembler.device(pair) == Some(valve))
+        };
         Self {
             pairs: assembler.pairs(),
-            thresholds: assembler.thresholds(),
+            valves: thresholds.iter().map(valve).collect(),
+            thresholds,
             assembler,
             drives: Vec::new(),
+            clocks: Vec::new(),
             h,
             energy,
             tolerance,
@@ -65,6 +77,11 @@ impl<'a> Plant<'a> {
         if let Some(&known) = self.index.get(key) {
             return known;
         }
+        // A control that depends on nothing does not stay on its threshold.
+        let clocked = |switch: usize| self.clocks.iter().any(|clock| clock.switch == switch);
+        if key.sliding.iter().any(|s| clocked(s.0)) {
+            return None;
+        }
         let holds: Vec<Hold> = key
             .closed
             .iter()
@@ -82,6 +99,7 @@ impl<'a> Plant<'a> {
                 thresholds: &self.thresholds,
                 limits: &limits,
                 drives: &self.drives,
+                clocks: &self.clocks,
             };
             Mode::new(key.clone(), &lcs, exosystem, &facts, self.h, self.energy)
         });
@@ -91,6 +109,20 @@ impl<'a> Plant<'a> {
         });
         self.index.insert(key.clone(), at);
         at
+    }
+
+    /// The switches of thyristors that hold themselves with valve `pair` in series.
+    pub(crate) fn released(&self, pair: usize, position: &[bool]) -> Vec<usize> {
+        let latches = self.thresholds.iter().zip(&self.valves).enumerate();
+        let holding = latches.filter(|(i, (threshold, valve))| {
+            **valve == Some(pair) && threshold.holds(position[*i], position)
+        });
+        holding.map(|(i, _)| i).collect()
+    }
+
+    /// See [`controls`](super::clock::controls).
+    pub(crate) fn controls(&self) -> (Vec<bool>, Vec<Control>) {
+        self.assembler.controls()
     }
 
     /// Where function blocks jump.

@@ -17,8 +17,32 @@ pub(crate) fn first_crossing(a: &[f64], floor: f64) -> Option<f64> {
     if a[0] - rest >= -floor {
         return None;
     }
+    if let [a0, a1, a2, a3, tail @ ..] = a {
+        let cubic = [
+            *a0,
+            a0 + a1 / 3.0,
+            a0 + (2.0 * a1 + a2) / 3.0,
+            a0 + a1 + a2 + a3,
+        ];
+        let tail: f64 = tail.iter().map(|v| v.abs()).sum();
+        if cubic.iter().all(|b| b - tail >= -floor) {
+            return None;
+        }
+    }
     let bernstein = to_bernstein(a);
     search(a, &bernstein[..=degree], floor, 0.0, 1.0, 0)
+}
+
+/// Σ terms s^k by Horner's rule, where `terms` are `degree` + 1 blocks of the length of `out`.
+pub(crate) fn values(terms: &[f64], degree: usize, s: f64, out: &mut [f64]) {
+    let dim = out.len();
+    out.copy_from_slice(&terms[degree * dim..(degree + 1) * dim]);
+    for block in (0..degree).rev() {
+        let block = &terms[block * dim..(block + 1) * dim];
+        for (out, term) in out.iter_mut().zip(block) {
+            *out = *out * s + term;
+        }
+    }
 }
 
 /// p(s) by Horner's rule.

@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 
+use super::clock::Clock;
 use super::exosystem::Exosystem;
 use super::mode::over_w;
 use crate::integrate::switching::Threshold;
@@ -20,13 +21,14 @@ pub(crate) struct Drive {
     pub(crate) next: f64,
 }
 
-/// The drives of a system's switches; switches with another control are guarded instead.
-pub(crate) fn drives(lcs: &Lcs, exosystem: &Exosystem) -> Vec<Drive> {
+/// The drives of a system's switches but the clocks; switches with another control are guarded instead.
+pub(crate) fn drives(lcs: &Lcs, exosystem: &Exosystem, clocks: &[Clock]) -> Vec<Drive> {
     let Rows { x, lambda, .. } = &lcs.controls;
     let zero = |m: &DMatrix<f64>, i: usize| i >= m.nrows() || m.row(i).iter().all(|v| *v == 0.0);
     let rows = over_w(&lcs.controls, lcs.n(), exosystem);
     (0..rows.nrows())
         .filter(|&i| zero(x, i) && zero(lambda, i))
+        .filter(|&i| clocks.iter().all(|clock| clock.switch != i))
         .filter_map(|i| {
             let row: Vec<f64> = rows.row(i).iter().skip(lcs.n()).copied().collect();
             let straight = row

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, linalg::Schur};
 
+use super::dense::Dense;
 use super::expm;
 
 /// A transient e^{−at} is below the rounding of what it started from once a·t exceeds −ln(2⁻⁵³).
@@ -43,7 +44,7 @@ impl Spectrum {
                     frequency: v.im.abs(),
                 })),
                 None => {
-                    let norm = expm::norm_1(&balanced);
+                    let norm = Dense::of(&balanced).norm_1();
                     rates.push(Rate {
                         decay: 0.0,
                         frequency: norm,

@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::accumulation::Accumulation;
 use super::assembler::Assembler;
+use super::clock::Clock;
 use super::exosystem::Exosystem;
 use super::inspect::Inspector;
 use super::mode::{Key, Owner};
@@ -18,6 +19,7 @@ use super::transition::Trigger;
 use crate::circuit::Source;
 use crate::integrate::energy::Balance;
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
+use crate::integrate::switching::fire;
 use crate::settings::Settings;
 
 /// Times closer than this many units in the last place are one time.
@@ -75,6 +77,7 @@ pub struct Exact<'a> {
     pub(super) metric: DMatrix<f64>,
     /// From start to end, s.
     pub(super) duration: f64,
+    until: f64,
     pub(super) started: bool,
     /// The next time at which something is known to happen, s.
     next_stop: f64,
@@ -118,18 +121,35 @@ impl<'a> Exact<'a> {
         };
         let lcs = plant.free(&key)?.lcs.clone();
         let sources: Vec<Source> = lcs.inputs.iter().map(|i| i.source.clone()).collect();
-        let exosystem = Exosystem::of(&sources, t, until).ok_or_else(|| {
+        let unsupported = || {
             SimError::before(Reason::Unsupported(
                 "a source has no closed form as a linear system".to_string(),
             ))
-        })?;
-        plant.drives = drives(&lcs, &exosystem);
+        };
+        let (silent, controls) = plant.controls();
+        let exosystem = Exosystem::of(&sources, silent, t, until).ok_or_else(unsupported)?;
+        plant.clocks = controls
+            .into_iter()
+            .map(|control| Clock::new(control, &sources, t))
+            .collect::<Option<_>>()
+            .ok_or_else(unsupported)?;
+        plant.drives = drives(&lcs, &exosystem, &plant.clocks);
+        let latches = |i: usize| plant.thresholds[i].latch.is_some();
+        plant.drives.retain(|drive| !latches(drive.switch));
         let mut z = vec![0.0; exosystem.dim()];
         exosystem.write(t, &mut z);
-        for drive in &plant.drives {
-            let i = drive.switch;
-            position[i] = plant.thresholds[i].position(position[i], drive.control(&z));
+        let driven = plant
+            .drives
+            .iter()
+            .map(|drive| (drive.switch, drive.control(&z)));
+        let clocked = plant
+            .clocks
+            .iter()
+            .map(|clock| (clock.switch, clock.control(t)));
+        for (i, control) in driven.chain(clocked) {
+            position[i] = plant.thresholds[i].position(position[i], control);
         }
+        fire(&plant.thresholds, &mut position);
         key.switches = position;
         let sources_count = sources.len();
         let volts = lcs
@@ -162,6 +182,7 @@ impl<'a> Exact<'a> {
             successors: Vec::new(),
             metric,
             duration: until - t,
+            until,
             started: false,
             next_stop: f64::NEG_INFINITY,
             settings,
@@ -246,7 +267,12 @@ impl<'a> Exact<'a> {
         let mut key = self.take_key();
         let mut discontinuous = false;
         match self.plant.modes[from].owner(guard) {
-            Owner::Device(_) => {}
+            // A thyristor's current ends, and no gate holds it.
+            Owner::Device(pair) => {
+                for i in self.plant.released(pair, &key.switches) {
+                    key.switches[i] = false;
+                }
+            }
             Owner::Switch(i) => {
                 key.switches[i] = !key.switches[i];
                 discontinuous = true;
@@ -257,6 +283,7 @@ impl<'a> Exact<'a> {
                 discontinuous = true;
             }
         }
+        fire(&self.plant.thresholds, &mut key.switches);
         self.remember_inputs();
         self.change_to(key, discontinuous, Trigger::Guard(guard), log)
     }
@@ -337,6 +364,13 @@ impl<'a> Exact<'a> {
                 edge = true;
             }
         }
+        for clock in &self.plant.clocks {
+            if clock.next <= near {
+                key.switches[clock.switch] = !key.switches[clock.switch];
+                edge = true;
+            }
+        }
+        fire(&self.plant.thresholds, &mut key.switches);
         if edge {
             key.sliding.clear();
         }
@@ -355,6 +389,12 @@ impl<'a> Exact<'a> {
             let threshold = &self.plant.thresholds[i];
             drive.look_ahead(threshold, self.key.switches[i], self.motion.t, &self.z, end);
             self.next_stop = self.next_stop.min(drive.next);
+        }
+        for clock in &mut self.plant.clocks {
+            let i = clock.switch;
+            let (threshold, on) = (&self.plant.thresholds[i], self.key.switches[i]);
+            clock.look_ahead(threshold, on, (self.motion.t, self.until), &self.sources);
+            self.next_stop = self.next_stop.min(clock.next);
         }
     }
 

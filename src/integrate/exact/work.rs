@@ -7,17 +7,18 @@
 
 use nalgebra::DMatrix;
 
-use super::expm;
+use super::dense::Dense;
+use super::expm::{self, Ladder};
 use super::kernel::Kernel;
 
-/// ‖𝒜‖ h up to which the series over a step is summed; longer steps follow by doubling.
-const SERIES: f64 = 0.125;
-/// Terms of the series; (2·0.125)^k/k! is below rounding beyond, in every entry: their sizes are not comparable.
+/// Terms of the series over a step with ‖𝒜‖ h ≤ [`expm::SERIES`]; (2·0.125)^k/k! is below rounding beyond, in every entry: their sizes are not comparable.
 const TERMS: usize = 15;
 /// ‖𝒜‖ t beyond which exp(𝒜t) is no longer squared but computed anew: what squaring loses is 2⁻⁵³ ‖𝒜‖ t.
 const STIFF: f64 = 1e5;
 /// Spans are joined while no coordinate can grow by more than this over them.
 const GROWTH: f64 = 1e6;
+/// Longer spans than so far are prepared when this many could have been joined to them: before, that is more work than it spares.
+const PATIENCE: u32 = 16;
 /// Spans are joined up to 2^this times the output step.
 const LONGEST: u32 = 12;
 /// Rounding of a power below this part of the run's is no loss.
@@ -25,31 +26,27 @@ const HARMLESS: f64 = 1e-13;
 /// Rows below this part of the largest are rounding.
 const NOTHING: f64 = 1e-13;
 
-/// Nodes and weights of Gauss-Legendre's rules with 3, 5 and 8 points on [0, 1]. With d Taylor terms above rounding, d/2 + 1
-/// points integrate the product of two such series to rounding.
-const GAUSS: [&[(f64, f64)]; 3] = [
-    &[
-        (0.1127016653792583, 0.2777777777777778),
-        (0.5, 0.4444444444444444),
-        (0.8872983346207417, 0.2777777777777778),
-    ],
-    &[
-        (0.04691007703066802, 0.11846344252809454),
-        (0.23076534494715845, 0.23931433524968324),
-        (0.5, 0.28444444444444444),
-        (0.7692346550528415, 0.23931433524968324),
-        (0.9530899229693319, 0.11846344252809454),
-    ],
-    &[
-        (0.019855071751231884, 0.05061426814518813),
-        (0.10166676129318664, 0.11119051722668724),
-        (0.2372337950418355, 0.15685332293894363),
-        (0.4082826787521751, 0.181341891689181),
-        (0.591717321247825, 0.181341891689181),
-        (0.7627662049581645, 0.15685332293894363),
-        (0.8983332387068134, 0.11119051722668724),
-        (0.9801449282487681, 0.05061426814518813),
-    ],
+/// Gauss-Legendre points on [0, 1]: with ‖𝒜‖ h ≤ 1 so many integrate a product of two solutions to rounding.
+const POINTS: usize = 8;
+const NODES: [f64; POINTS] = [
+    0.019855071751231884,
+    0.10166676129318664,
+    0.2372337950418355,
+    0.4082826787521751,
+    0.591717321247825,
+    0.7627662049581645,
+    0.8983332387068134,
+    0.9801449282487681,
+];
+const WEIGHTS: [f64; POINTS] = [
+    0.05061426814518813,
+    0.11119051722668724,
+    0.15685332293894363,
+    0.181341891689181,
+    0.181341891689181,
+    0.15685332293894363,
+    0.11119051722668724,
+    0.05061426814518813,
 ];
 
 /// A quadratic form yᵀ Q y, upper triangle row by row with doubled off-diagonal entries.
@@ -59,18 +56,13 @@ struct Form {
 }
 
 impl Form {
-    fn new(q: &DMatrix<f64>) -> Self {
-        let dim = q.nrows();
-        let packed = (0..dim)
-            .flat_map(|i| (i..dim).map(move |j| (i, j)))
-            .map(|(i, j)| {
-                if i == j {
-                    q[(i, i)]
-                } else {
-                    q[(i, j)] + q[(j, i)]
-                }
-            })
-            .collect();
+    fn new(q: &Dense) -> Self {
+        let dim = q.rows();
+        let mut packed = Vec::with_capacity(dim * (dim + 1) / 2);
+        for i in 0..dim {
+            packed.push(q.column(i)[i]);
+            packed.extend((i + 1..dim).map(|j| q.column(j)[i] + q.column(i)[j]));
+        }
         Self { packed }
     }
 
@@ -84,6 +76,30 @@ impl Form {
             rest = tail;
         }
         sum
+    }
+
+    /// Σ weights y(nodes)ᵀ Q y(nodes).
+    fn integral(&self, y: &[[f64; POINTS]]) -> f64 {
+        let mut rest = &self.packed[..];
+        let mut values = [0.0; POINTS];
+        for i in 0..y.len() {
+            let (row, tail) = rest.split_at(y.len() - i);
+            let mut product = [0.0; POINTS];
+            for (q, y) in row.iter().zip(&y[i..]) {
+                for (p, y) in product.iter_mut().zip(y) {
+                    *p += q * y;
+                }
+            }
+            for (value, (p, y)) in values.iter_mut().zip(product.iter().zip(&y[i])) {
+                *value += p * y;
+            }
+            rest = tail;
+        }
+        values
+            .iter()
+            .zip(WEIGHTS)
+            .map(|(v, weight)| v * weight)
+            .sum()
     }
 }
 
@@ -114,6 +130,8 @@ pub(crate) struct Work {
     /// ‖𝒜‖ is that of the mode; unit of time: h/2^bottom, s.
     unit: f64,
     bottom: u32,
+    /// How many spans could have been joined to longer ones than there are forms for.
+    asked: u32,
     forms: Option<Forms>,
 }
 
@@ -122,23 +140,35 @@ pub(crate) struct Work {
 struct Forms {
     to_y: Kernel,
     y: Vec<f64>,
+    /// T.
+    from_w: Dense,
+    /// y at the points of a quadrature.
+    nodes: Vec<[f64; POINTS]>,
     /// Power out of sources, power dissipated.
     instant: [Form; 2],
+    /// The generator over y, and the forms of `instant`.
+    generator: DMatrix<f64>,
+    powers: [Dense; 2],
+    /// A unit, and 2^this times it the longest span, s.
+    unit: f64,
+    longest: u32,
     /// Their integrals over 2^k units.
     over: Vec<[Form; 2]>,
-    /// Where `over` ends.
-    latest: Doubling,
+    /// Where `over` ends, once it has begun.
+    latest: Option<Doubling>,
 }
 
-/// exp(𝒜t) − I and ∫₀ᵗ exp(𝒜ᵀs) Q exp(𝒜s) ds over y, for t that doubles.
+/// ∫₀ᵗ exp(𝒜ᵀs) Q exp(𝒜s) ds over y, for t that doubles.
 #[derive(Debug, Clone)]
 struct Doubling {
-    generator: DMatrix<f64>,
-    norm: f64,
-    t: f64,
-    increment: DMatrix<f64>,
-    grams: [DMatrix<f64>; 2],
-    buffers: [DMatrix<f64>; 2],
+    /// exp(𝒜 longest/2^k) − I.
+    ladder: Ladder,
+    /// t is the longest over 2^k.
+    k: u32,
+    /// exp(𝒜t) − I.
+    increment: Dense,
+    grams: [Dense; 2],
+    buffers: [Dense; 2],
 }
 
 impl Work {
@@ -152,14 +182,15 @@ impl Work {
             terms,
             unit: h * (-f64::from(bottom)).exp2(),
             bottom,
+            asked: 0,
             forms: None,
         })
     }
 
     fn forms(&mut self, generator: &DMatrix<f64>, sizes: Sizes<'_>) -> &mut Forms {
-        let (terms, unit) = (&self.terms, self.unit);
+        let (terms, unit, longest) = (&self.terms, self.unit, self.bottom + LONGEST);
         self.forms
-            .get_or_insert_with(|| Forms::new(terms, generator, sizes, unit))
+            .get_or_insert_with(|| Forms::new(terms, generator, sizes, unit, longest))
     }
 
     /// (from sources, dissipated) over 2^k units from w, J.
@@ -172,36 +203,41 @@ impl Work {
         sizes: Sizes<'_>,
     ) -> [f64; 2] {
         let forms = self.forms(generator, sizes);
-        forms.double_to(k);
+        if forms.over.len() <= k as usize {
+            forms.double_to(k);
+        }
         forms.to_y.apply(w, &mut forms.y);
         forms.over[k as usize].each_ref().map(|f| f.value(&forms.y))
     }
 
     /// Whether two spans of 2^k units may be taken as one of twice the length.
     pub(crate) fn may_join(&mut self, k: u32, generator: &DMatrix<f64>, sizes: Sizes<'_>) -> bool {
-        let (longest, forms) = (self.bottom + LONGEST, self.forms(generator, sizes));
-        if (k as usize) + 1 < forms.over.len() {
+        let ready = self.forms.as_ref().map_or(0, |forms| forms.over.len());
+        if (k as usize) + 1 < ready {
             return true;
         }
-        if k >= longest {
+        if k >= self.bottom + LONGEST {
             return false;
         }
-        forms.double_to(k);
-        let calm = forms.latest.increment.amax() <= GROWTH;
+        self.asked += 1;
+        if self.asked < PATIENCE {
+            return false;
+        }
+        self.asked = 0;
+        let forms = self.forms(generator, sizes);
+        let calm = forms.double_to(k).increment.amax() <= GROWTH;
         if calm {
             forms.double_to(k + 1);
         }
         calm
     }
 
-    /// ∫ v·i dt along the Taylor polynomial w = Σ terms s^k, s = t/h, over the fraction `part` of its step h. `w` is work
-    /// space.
+    /// ∫ v·i dt along the Taylor polynomial w = Σ terms s^k, s = t/h, over the fraction `part` of its step h.
     pub(crate) fn along_taylor(
         &mut self,
         polynomial: Taylor<'_>,
         generator: &DMatrix<f64>,
         sizes: Sizes<'_>,
-        w: &mut [f64],
     ) -> [f64; 2] {
         let Taylor {
             terms,
@@ -209,27 +245,32 @@ impl Work {
             h,
             part,
         } = polynomial;
-        let forms = self.forms(generator, sizes);
-        let dim = w.len();
-        let rule = match degree {
-            0..=4 => GAUSS[0],
-            5..=8 => GAUSS[1],
-            _ => GAUSS[2],
-        };
-        let mut sums = [0.0; 2];
-        for (node, weight) in rule {
-            let s = node * part;
-            for (i, out) in w.iter_mut().enumerate() {
-                *out = (0..=degree)
-                    .rev()
-                    .fold(0.0, |sum, k| sum * s + terms[k * dim + i]);
+        let dim = generator.nrows();
+        let Forms {
+            instant,
+            from_w,
+            nodes,
+            ..
+        } = self.forms(generator, sizes);
+        let s = NODES.map(|node| node * part);
+        nodes.fill([0.0; POINTS]);
+        for j in 0..dim {
+            // w_j at the nodes by Horner's rule, then its part of y.
+            let mut w = [terms[degree * dim + j]; POINTS];
+            for term in terms[j..degree * dim].iter().step_by(dim).rev() {
+                for (w, s) in w.iter_mut().zip(&s) {
+                    *w = *w * s + term;
+                }
             }
-            forms.to_y.apply(w, &mut forms.y);
-            for (sum, form) in sums.iter_mut().zip(&forms.instant) {
-                *sum += weight * h * part * form.value(&forms.y);
+            for (y, t) in nodes.iter_mut().zip(from_w.column(j)) {
+                for (y, w) in y.iter_mut().zip(&w) {
+                    *y += t * w;
+                }
             }
         }
-        sums
+        instant
+            .each_ref()
+            .map(|form| h * part * form.integral(nodes))
     }
 }
 
@@ -247,7 +288,13 @@ pub(crate) struct Taylor<'a> {
 }
 
 impl Forms {
-    fn new(terms: &[Term], generator: &DMatrix<f64>, sizes: Sizes<'_>, unit: f64) -> Self {
+    fn new(
+        terms: &[Term],
+        generator: &DMatrix<f64>,
+        sizes: Sizes<'_>,
+        unit: f64,
+        longest: u32,
+    ) -> Self {
         let dim = generator.nrows();
         let size: Vec<f64> = sizes
             .amplitude
@@ -316,89 +363,108 @@ impl Forms {
             power.ger(sign, &v.transpose(), &i.transpose(), 1.0);
             power.ger(sign, &i.transpose(), &v.transpose(), 1.0);
         }
+        let powers = powers.each_ref().map(Dense::of);
         let instant = powers.each_ref().map(Form::new);
-        let halvings = (expm::norm_1(&moved) * unit / SERIES).log2().ceil();
+        Self {
+            to_y: Kernel::new(&to_y),
+            y: vec![0.0; dim],
+            from_w: Dense::of(&to_y),
+            nodes: vec![[0.0; POINTS]; dim],
+            instant,
+            generator: moved,
+            powers,
+            unit,
+            longest,
+            over: Vec::new(),
+            latest: None,
+        }
+    }
+
+    /// The doubling at one unit.
+    fn begin(&self) -> Doubling {
+        let norm = Dense::of(&self.generator).norm_1();
+        let halvings = (norm * self.unit / expm::SERIES).log2().ceil();
         let halvings = if halvings > 0.0 {
             halvings.min(1e3) as u32
         } else {
             0
         };
-        let mut latest = Doubling::new(&moved, &powers, unit * (-f64::from(halvings)).exp2());
+        let longest = self.unit * f64::from(self.longest).exp2();
+        let k = self.longest + halvings;
+        let mut latest = Doubling::new(&self.generator, &self.powers, longest, k);
         for _ in 0..halvings {
             latest.double();
         }
-        Self {
-            to_y: Kernel::new(&to_y),
-            y: vec![0.0; dim],
-            instant,
-            over: vec![latest.forms()],
-            latest,
-        }
+        latest
     }
 
-    #[inline]
-    fn double_to(&mut self, k: u32) {
+    /// Has the integrals up to 2^k units; returns where they end.
+    fn double_to(&mut self, k: u32) -> &Doubling {
+        let begun = self.latest.take();
+        let mut latest = begun.unwrap_or_else(|| {
+            let latest = self.begin();
+            self.over.push(latest.forms());
+            latest
+        });
         while self.over.len() <= k as usize {
-            self.latest.double();
-            self.over.push(self.latest.forms());
+            latest.double();
+            self.over.push(latest.forms());
         }
+        self.latest.insert(latest)
     }
 }
 
 impl Doubling {
-    /// Series over a step with ‖𝒜‖ h ≤ [`SERIES`]: 𝒜ᵏhᵏ/k!, and Q_{k+1} = (𝒜ᵀ Q_k + Q_k 𝒜) h/(k + 1).
-    fn new(generator: &DMatrix<f64>, powers: &[DMatrix<f64>; 2], h: f64) -> Self {
+    /// From 2^−`k` of the longest time on, with ‖𝒜‖ t ≤ [`expm::SERIES`]: Q_{j+1} = (𝒜ᵀ Q_j + Q_j 𝒜) t/(j + 1).
+    fn new(generator: &DMatrix<f64>, powers: &[Dense; 2], longest: f64, k: u32) -> Self {
         let dim = generator.nrows();
-        let a = generator * h;
-        let mut buffer = DMatrix::zeros(dim, dim);
-        let mut sum = |first: DMatrix<f64>, symmetric: bool| {
-            let (mut term, mut sum) = (first.clone(), first);
-            for k in 2..TERMS {
-                term.mul_to(&a, &mut buffer);
-                let part = 1.0 / k as f64;
-                for i in 0..dim {
-                    for j in 0..dim {
-                        let transposed = if symmetric { buffer[(j, i)] } else { 0.0 };
-                        term[(i, j)] = part * (buffer[(i, j)] + transposed);
-                    }
-                }
-                sum += &term;
+        let t = longest * (-f64::from(k)).exp2();
+        let a = Dense::from_fn(dim, dim, |i, j| generator[(i, j)] * t);
+        let mut buffer = Dense::zeros(dim, dim);
+        let mut series = |power: &Dense| {
+            let mut term = power.clone();
+            term.combine(t, 0.0, power);
+            let mut sum = term.clone();
+            for j in 2..TERMS {
+                buffer.set_product(&term, &a);
+                term.set_symmetric(1.0 / j as f64, &buffer);
+                sum.combine(1.0, 1.0, &term);
             }
             sum
         };
-        let increment = sum(a.clone(), false);
-        let grams = powers.each_ref().map(|q| sum(q * h, true));
-        Self {
-            generator: generator.clone(),
-            norm: expm::norm_1(generator),
-            t: h,
-            increment,
+        let grams = powers.each_ref().map(&mut series);
+        let mut doubling = Self {
+            ladder: Ladder::new(generator, longest, STIFF),
+            increment: Dense::zeros(dim, dim),
+            k,
             grams,
-            buffers: [buffer, DMatrix::zeros(dim, dim)],
+            buffers: [buffer.clone(), buffer],
+        };
+        doubling.renew();
+        doubling
+    }
+
+    /// exp(𝒜t) − I; nothing where it is beyond doubles, as the flow itself is then.
+    fn renew(&mut self) {
+        if let Some((increment, _)) = self.ladder.increment(self.k) {
+            self.increment = increment;
         }
     }
 
-    /// Φ = I + E: E ← 2 E + E², Γ ← Γ + Φᵀ Γ Φ.
+    /// Φ = I + E: Γ ← Γ + Φᵀ Γ Φ.
     fn double(&mut self) {
         let [first, second] = &mut self.buffers;
-        let e = &mut self.increment;
+        let e = &self.increment;
         for gram in &mut self.grams {
-            gram.mul_to(e, first);
-            *first += &*gram;
-            second.gemm_tr(1.0, e, first, 0.0);
-            *second += &*first;
-            *gram += &*second;
+            first.set_product(gram, e);
+            first.combine(1.0, 1.0, gram);
+            second.set_transposed_product(e, first);
+            gram.combine(1.0, 1.0, first);
+            gram.combine(1.0, 1.0, second);
         }
-        self.t *= 2.0;
-        let anew = (self.norm * self.t > STIFF)
-            .then(|| expm::exponential(&self.generator, self.t))
-            .flatten();
-        if let Some(exponential) = anew {
-            *e = exponential.increment;
-        } else {
-            e.mul_to(e, first);
-            *e *= 2.0;
-            *e += &*first;
+        if self.k > 0 {
+            self.k -= 1;
+            self.renew();
         }
     }
 
@@ -440,7 +506,7 @@ mod tests {
             let expected = exact(h * f64::from(1 << k));
             assert!((source / expected + 1.0).abs() < 1e-15, "{k}");
             assert!((dissipated / expected - 2.0).abs() < 1e-15, "{k}");
-            assert!(work.may_join(k, &a, sizes(&[3.0])));
+            assert!((0..PATIENCE).any(|_| work.may_join(k, &a, sizes(&[3.0]))));
         }
         let terms: Vec<f64> = (0..=20)
             .scan(3.0, |t, k| {
@@ -456,7 +522,7 @@ mod tests {
                 h,
                 part,
             };
-            let [source, dissipated] = work.along_taylor(polynomial, &a, sizes(&[3.0]), &mut [0.0]);
+            let [source, dissipated] = work.along_taylor(polynomial, &a, sizes(&[3.0]));
             assert!((source / exact(part * h) + 1.0).abs() < 1e-14, "{degree}");
             assert!(
                 (dissipated / exact(part * h) - 2.0).abs() < 1e-14,
@@ -471,7 +537,7 @@ mod tests {
         let a = DMatrix::from_element(1, 1, 1.0);
         let mut work = Work::new(vec![term(&[1.0], &[1.0], false)], 1.0, 0).unwrap();
         let joined = (0..12)
-            .take_while(|&k| work.may_join(k, &a, sizes(&[1.0])))
+            .take_while(|&k| (0..PATIENCE).any(|_| work.may_join(k, &a, sizes(&[1.0]))))
             .count();
         // e^16 > 1e6
         assert_eq!(joined, 4);

@@ -164,7 +164,7 @@ impl Theta<'_> {
         self.now.u.copy_from_slice(&self.u_next);
         self.now.t = t1;
         self.last_h = self.attempt.h;
-        Ok(())
+        self.send_waves()
     }
 
     /// The error after the attempted step.
@@ -229,8 +229,9 @@ impl Theta<'_> {
     pub(super) fn take_pattern(&mut self, basis: Vec<bool>, seen: &[Option<bool>], t: f64) {
         let ports = &self.system().lcs.ports;
         let before = &self.now.pattern;
-        let on =
-            |(&lambda, port): (&Option<bool>, &Port)| lambda == Some(port.role != Role::Voltage);
+        let on = |(&lambda, port): (&Option<bool>, &lcs::Port)| {
+            lambda == Some(port.role != Role::Voltage)
+        };
         let pattern: Vec<bool> = seen.iter().zip(ports).map(on).collect();
         if pattern != *before && self.started {
             let changed = (0..pattern.len()).filter(|&j| pattern[j] != before[j]);

@@ -23,13 +23,14 @@ use crate::integrate::control::{Amplitudes, CORNER, Control};
 use crate::integrate::energy::{self, Balance};
 use crate::integrate::exact::Place;
 use crate::integrate::inputs::Inputs;
+use crate::integrate::line::Line;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
 use crate::integrate::stats::Stats;
 use crate::integrate::step::{SHORT, Scheme};
-use crate::integrate::switching::{Switches, Threshold};
+use crate::integrate::switching::{Change, Switches, Threshold};
 use crate::integrate::system::{Plant, Reduce, System};
-use crate::lcs::{Lcs, Port, Role};
+use crate::lcs::{self, Lcs, Role};
 use crate::settings::Settings;
 use crate::solve::{Solution, Status};
 use stages::Tableau;
@@ -82,7 +83,7 @@ pub enum Start {
 /// Sub-steps of a base step are multiples of 2^−FINEST of it.
 const FINEST: u32 = 40;
 /// State-driven switching times are located to 2^−LOCATE of a base step.
-const LOCATE: u32 = 24;
+const LOCATE: i32 = 24;
 /// Switchings in one base step after which they are no longer located but taken at the ends of whole base steps
 /// (chattering: the base step then decides how fast a sliding switch switches).
 const CHATTER: u32 = 32;
@@ -128,8 +129,21 @@ pub struct Theta<'a> {
     notes: Vec<String>,
     worst_residual: f64,
     pending: Vec<(f64, String)>,
+    /// The ports of transmission lines.
+    ports: Vec<Port>,
     /// Largest |s| so far, by storage element: what the error control calls the amplitude.
     amplitudes: Amplitudes,
+}
+
+/// One end of a transmission line.
+#[derive(Debug, Clone, Copy)]
+struct Port {
+    /// The line and its end.
+    at: (usize, usize),
+    /// The power term whose current enters the line.
+    current: usize,
+    /// The input that is the wave that arrives.
+    input: usize,
 }
 
 /// Everything a rejected step has to give back.
@@ -286,10 +300,60 @@ impl<'a> Theta<'a> {
             notes: Vec::new(),
             worst_residual: 0.0,
             pending: Vec::new(),
+            ports: Vec::new(),
             amplitudes,
         };
         theta.resize();
         Ok(theta)
+    }
+
+    /// Connects the ports of transmission lines, before the run begins.
+    pub(crate) fn attach(&mut self, lines: &[Line]) {
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        self.inputs.attach(&lcs.inputs, lines);
+        let input = |name: &String| lcs.inputs.iter().position(|i| i.name == *name);
+        let power = &lcs.outputs.power;
+        let term = |name: &String| power.iter().position(|p| p.element == *name);
+        self.ports = (lines.iter().enumerate())
+            .flat_map(|(k, line)| {
+                [0, 1].map(|port| {
+                    Some(Port {
+                        at: (k, port),
+                        current: term(&line.impedances[port])?,
+                        input: input(&line.sources[port])?,
+                    })
+                })
+            })
+            .flatten()
+            .collect();
+        self.now.u = self.inputs.all(self.now.t);
+        self.u_next.clone_from(&self.now.u);
+        let stored = self.now.balance.first() + self.inputs.lines().stored(self.now.t);
+        self.now.balance = Balance::new(stored);
+        self.kept.copy_from(&self.now);
+        self.longest = self.longest.min(self.inputs.lines().longest_step());
+    }
+
+    /// Has the waves leave the ports of lines as they are now.
+    fn send_waves(&mut self) -> Result<(), SimError> {
+        if self.ports.is_empty() {
+            return Ok(());
+        }
+        self.read_lambda()?;
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        let at = self.now.point(&self.lambda, &self.du);
+        for port in &self.ports {
+            let i = reading::value(&lcs.outputs.power_i, port.current, at);
+            let e = self.now.u[port.input];
+            (self.inputs.lines_mut()).depart(port.at, self.now.t, i, e);
+        }
+        Ok(())
+    }
+
+    /// Something happens now that may break the waves that leave: as they are after it.
+    fn break_waves(&mut self) -> Result<(), SimError> {
+        self.inputs.lines_mut().note_break(self.now.t);
+        self.send_waves()
     }
 
     /// Sets the amplitudes known beforehand, by storage element.
@@ -423,7 +487,7 @@ impl Stepper for Theta<'_> {
             self.begin(log)?;
             let lcs = &self.plant.systems[self.now.system].1.lcs;
             let moving = self.switches.misplaced(lcs, &self.now.u);
-            if !moving.is_empty() || self.switches.watch() && self.crossed()? {
+            if !moving.is_empty() || self.asked()? {
                 self.switch(&moving, log)?;
             }
         }
@@ -443,9 +507,13 @@ impl Stepper for Theta<'_> {
             } else {
                 breakpoint.min(t)
             };
-            let (known, moving) =
-                self.switches
-                    .next_known(&self.system().lcs, &self.inputs, now, limit);
+            let (known, moving) = self.switches.next_known(
+                &self.system().lcs,
+                &self.inputs,
+                now,
+                limit,
+                Self::slack(limit),
+            );
             let mut stop = if merged { t } else { limit };
             let early = known < stop - Self::slack(stop);
             if early {
@@ -456,7 +524,7 @@ impl Stepper for Theta<'_> {
             if at_breakpoint {
                 self.edge(breakpoint.max(stop), log)?;
             }
-            if !moving.is_empty() || at_breakpoint && self.switches.watch() && self.crossed()? {
+            if !moving.is_empty() || at_breakpoint && self.asked()? {
                 self.switch(&moving, log)?;
             }
         }

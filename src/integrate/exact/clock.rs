@@ -1,0 +1,263 @@
+//! Switches controlled by sources that act on nothing else: when they move is known before the run, and their sources have no
+//! part in the flow.
+
+use crate::algebra::Field;
+use crate::circuit::Source;
+use crate::circuit::source::{Piece, Wave};
+use crate::integrate::switching::Threshold;
+use crate::mna::{Behaviour, Column};
+
+/// A switch whose control is a constant plus multiples of straight sources that drive nothing but switches.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Clock {
+    /// The switch.
+    pub(crate) switch: usize,
+    constant: f64,
+    /// Input, factor, present piece.
+    terms: Vec<(usize, f64, Piece)>,
+    /// When the switch next moves, s.
+    pub(crate) next: f64,
+    /// The position in which `next` was found.
+    on: bool,
+}
+
+/// The control of a switch that could be a [`Clock`]: the switch, the constant, inputs with their factors.
+pub(crate) type Control = (usize, f64, Vec<(usize, f64)>);
+
+/// Which sources act through the controls of such switches alone, whatever the position, and those controls.
+pub(crate) fn controls(behaviour: &Behaviour) -> (Vec<bool>, Vec<Control>) {
+    let reduced = behaviour.ball();
+    let matrix = &reduced.matrix;
+    let nonzero = |row: usize| (0..matrix.cols()).filter(move |&c| !matrix.at(row, c).is_zero());
+    let place = |c: Column| reduced.place[c];
+    let reads = |row: usize, c: Option<usize>| c.is_some_and(|c| !matrix.at(row, c).is_zero());
+    let reading = |k: usize| reduced.equations + k;
+    let readings = reading(0)..matrix.rows();
+    // Columns that an equation of their own holds at zero: the current of a source without a load.
+    let vanishing: Vec<usize> = (0..reduced.equations)
+        .filter_map(|row| {
+            let mut columns = nonzero(row);
+            columns.next().filter(|_| columns.next().is_none())
+        })
+        .collect();
+    let vanishes = |k: usize| nonzero(reading(k)).all(|c| vanishing.contains(&c));
+    // A reading is no reason to keep a source in the flow: a factor of a product that vanishes, the control of a switch.
+    let idle = |row: usize| {
+        let k = row - reduced.equations;
+        let power = behaviour.power.iter().filter(|p| p.v == k || p.i == k);
+        let mut power = power.map(|p| vanishes(if p.v == k { p.i } else { p.v }));
+        let controls = behaviour.switches.iter().any(|s| s.control == k);
+        k >= behaviour.probes
+            && power.all(|vanishes| vanishes)
+            && (controls || is_power(behaviour, k))
+    };
+    let mut silent: Vec<bool> = behaviour
+        .sources
+        .iter()
+        .map(|source| {
+            let (value, rate) = (place(source.value), source.rate.and_then(place));
+            let wave = &source.input.source.wave;
+            matches!(wave, Wave::Dc(_) | Wave::Pulse { .. } | Wave::Pwl { .. })
+                && (0..reduced.equations).all(|row| !reads(row, value) && !reads(row, rate))
+                && readings.clone().all(|row| !reads(row, rate))
+                && readings.clone().all(|row| !reads(row, value) || idle(row))
+        })
+        .collect();
+    // The control of a switch as such a combination.
+    let control = |silent: &[bool], switch: usize| -> Option<Control> {
+        if behaviour.switches[switch].latch.is_some() {
+            return None;
+        }
+        let row = reading(behaviour.switches[switch].control);
+        let (mut constant, mut terms) = (0.0, Vec::new());
+        for c in nonzero(row) {
+            let is = |k: &usize| silent[*k] && place(behaviour.sources[*k].value) == Some(c);
+            let input = (0..silent.len()).find(is);
+            match input {
+                Some(input) => terms.push((input, matrix.at(row, c).to_f64())),
+                None if place(Behaviour::ONE) == Some(c) => constant = matrix.at(row, c).to_f64(),
+                None => return None,
+            }
+        }
+        (!terms.is_empty()).then_some((switch, constant, terms))
+    };
+    let switches = 0..behaviour.switches.len();
+    loop {
+        let found: Vec<Control> = switches
+            .clone()
+            .filter_map(|switch| control(&silent, switch))
+            .collect();
+        let mixed = |input: usize| {
+            let value = place(behaviour.sources[input].value);
+            switches.clone().any(|switch| {
+                reads(reading(behaviour.switches[switch].control), value)
+                    && !found.iter().any(|control| control.0 == switch)
+            })
+        };
+        let kept: Vec<bool> = (0..silent.len())
+            .map(|input| silent[input] && !mixed(input))
+            .collect();
+        if kept == silent {
+            return (silent, found);
+        }
+        silent = kept;
+    }
+}
+
+fn is_power(behaviour: &Behaviour, k: usize) -> bool {
+    behaviour.power.iter().any(|p| p.v == k || p.i == k)
+}
+
+impl Clock {
+    /// The clock of a control, with its sources at t. `None` where a source has no closed form.
+    pub(crate) fn new(control: Control, sources: &[Source], t: f64) -> Option<Self> {
+        let (switch, constant, terms) = control;
+        let terms = terms
+            .into_iter()
+            .map(|(input, factor)| Some((input, factor, sources[input].piece(t)?)))
+            .collect::<Option<_>>()?;
+        Some(Self {
+            switch,
+            constant,
+            terms,
+            next: f64::NEG_INFINITY,
+            on: false,
+        })
+    }
+
+    /// Goes to time t, forwards or backwards.
+    pub(crate) fn stand_at(&mut self, sources: &[Source], t: f64) {
+        self.next = f64::NEG_INFINITY;
+        for (input, _, piece) in &mut self.terms {
+            if let Some(there) = sources[*input].piece(t) {
+                *piece = there;
+            }
+        }
+    }
+
+    /// The control on the present pieces.
+    pub(crate) fn control(&self, t: f64) -> f64 {
+        let terms = self
+            .terms
+            .iter()
+            .map(|(_, factor, piece)| factor * piece.value(t));
+        self.constant + terms.sum::<f64>()
+    }
+
+    fn slope(&self) -> f64 {
+        let terms = self
+            .terms
+            .iter()
+            .map(|(_, factor, piece)| factor * piece.slope);
+        terms.sum()
+    }
+
+    fn end(&self) -> f64 {
+        let ends = self.terms.iter().map(|(_, _, piece)| piece.end);
+        ends.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Finds when the switch next moves after t, if that is not known; nothing matters from `until` on.
+    pub(crate) fn look_ahead(
+        &mut self,
+        threshold: &Threshold,
+        on: bool,
+        (t, until): (f64, f64),
+        sources: &[Source],
+    ) {
+        if self.next > t && self.on == on {
+            return;
+        }
+        self.stand_at(sources, t);
+        self.on = on;
+        self.next = self.first_move(threshold, (t, until), sources);
+    }
+
+    /// The next move of the switch from the pieces at t on.
+    fn first_move(
+        &mut self,
+        threshold: &Threshold,
+        (mut t, until): (f64, f64),
+        sources: &[Source],
+    ) -> f64 {
+        loop {
+            let end = self.end();
+            if end > t {
+                let slope = self.slope();
+                let (level, towards) = if self.on {
+                    (threshold.off_below, slope < 0.0)
+                } else {
+                    (threshold.on_above, slope > 0.0)
+                };
+                let passage = t + ((level - self.control(t)) / slope).max(0.0);
+                if towards && passage < end {
+                    return passage;
+                }
+                t = end;
+            }
+            if t >= until {
+                return f64::INFINITY;
+            }
+            for (input, _, piece) in &mut self.terms {
+                if piece.end <= t {
+                    match sources[*input].piece(t) {
+                        Some(next) if next.end > t => *piece = next,
+                        // A piece too short for the resolution of t.
+                        _ => piece.end = t.next_up(),
+                    }
+                }
+            }
+            if threshold.position(self.on, self.control(t)) != self.on {
+                return t;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pulse() -> Vec<Source> {
+        let wave = Wave::Pulse {
+            v1: 0.0,
+            v2: 1.0,
+            delay: 1.0,
+            rise: 0.5,
+            fall: 0.0,
+            width: 2.0,
+            period: 5.0,
+            count: None,
+        };
+        vec![Source { dc: 0.0, wave }]
+    }
+
+    #[test]
+    fn a_pulse_moves_its_switch_twice_a_period() {
+        let sources = pulse();
+        let threshold = Threshold {
+            name: "s".into(),
+            on_above: 0.5,
+            off_below: 0.5,
+            latch: None,
+        };
+        let mut clock = Clock::new((0, 0.0, vec![(0, 1.0)]), &sources, 0.0).unwrap();
+        let (mut t, mut on, mut moves) = (0.0, false, Vec::new());
+        loop {
+            clock.look_ahead(&threshold, on, (t, 12.0), &sources);
+            // Asked again it stays.
+            clock.look_ahead(&threshold, on, (t + 0.1, 12.0), &sources);
+            if clock.next == f64::INFINITY {
+                break;
+            }
+            (t, on) = (clock.next, !on);
+            moves.push(t);
+        }
+        assert_eq!(moves, [1.25, 3.5, 6.25, 8.5, 11.25]);
+        // From another position at another time.
+        clock.stand_at(&sources, 2.0);
+        assert_eq!(clock.control(2.0), 1.0);
+        clock.look_ahead(&threshold, true, (2.0, 12.0), &sources);
+        assert_eq!(clock.next, 3.5);
+    }
+}
