@@ -200,5 +200,6 @@ mod tests {
         let mut driver = Driver::new(dmatrix![1.0, 0.0; 0.0, 2.0], 1e-9);
         let found = driver.solve(&dvector![f64::NAN, -8.0]);
         assert_eq!((found.status, found.lambda[1]), (Status::Failed, 4.0));
+        assert_eq!(found.residual, f64::INFINITY);
     }
 }

@@ -106,3 +106,18 @@ fn at(run: &Run, t: f64, name: &str) -> f64 {
         .expect("an output time");
     run.waveforms.values[k * run.waveforms.names.len() + column]
 }
+
+/// Times of the events whose label contains `what`, s.
+fn times_of(run: &Run, what: &str) -> Vec<f64> {
+    let events = run.events.iter().filter(|e| e.1.contains(what));
+    events.map(|e| e.0).collect()
+}
+
+/// Times of the events after the start, s.
+fn times_after_start(run: &Run) -> Vec<f64> {
+    run.events
+        .iter()
+        .map(|e| e.0)
+        .filter(|&t| t > 0.0)
+        .collect()
+}
