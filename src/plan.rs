@@ -87,6 +87,12 @@ pub fn not_exact(lcs: &Lcs) -> Option<String> {
     // A source may lack a finite exosystem.
     let endless = |input: &&Input| input.source.piece(0.0).is_none();
     let source = lcs.inputs.iter().find(endless)?;
+    if source.source.wave.is_arriving() {
+        return Some(format!(
+            "{} is a delayed wave on a transmission line, which no finite linear system makes",
+            source.name
+        ));
+    }
     Some(format!(
         "the waveform of {} solves no linear equation of finite order",
         source.name

@@ -600,7 +600,7 @@ fn bench_measures_ladders_in_the_promised_columns() {
     assert!(lines.all(|l| l.starts_with("divider,euler,")), "{ran}");
     let ran = run_in(
         directory.path(),
-        "bench divider.cir --methods theta -o b.csv -o b.json -o b.svg -o b.png",
+        "bench divider.cir --methods theta -o b.csv -o b.json -o b.svg -o b.png --signals s.csv",
     );
     assert_eq!((ran.status, ran.out.as_str()), (0, ""), "{ran}");
     assert!(
@@ -616,8 +616,45 @@ fn bench_measures_ladders_in_the_promised_columns() {
     let document: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(directory.path().join("b.json")).unwrap())
             .unwrap();
-    assert_eq!(document["measurements"][0]["method"], "theta");
+    let first = &document["measurements"][0];
+    assert_eq!(first["method"], "theta");
+    let signals = first["signals"].as_array().unwrap();
+    let worst = |error: &str| {
+        let errors = signals.iter().map(|s| s[error].as_f64().unwrap());
+        errors.fold(0.0, f64::max)
+    };
+    for error in ["max_error", "rms_error"] {
+        assert_eq!(first[error], worst(error), "{first}");
+    }
+    let lines = fs::read_to_string(directory.path().join("s.csv")).unwrap();
+    let runs = document["measurements"].as_array().unwrap().len();
+    assert!(signals.len() > 1 && lines.lines().count() == 1 + runs * signals.len());
     assert_eq!(run("bench divider.cir -o b.xls").status, 2);
+    assert_eq!(run("bench divider.cir --signals b.json").status, 2);
+}
+
+#[test]
+fn what_works_on_matrices_says_so_of_a_nonlinear_form() {
+    let directory = place();
+    let form = include_str!("forms/cubic.json");
+    fs::write(directory.path().join("cubic.json"), form).unwrap();
+    for command in ["check", "lcs", "bench"] {
+        let ran = run_in(directory.path(), &format!("{command} cubic.json"));
+        assert_eq!(ran.status, 2, "{ran}");
+        assert!(
+            ran.err
+                .starts_with("error: cubic.json: a nonlinear form, sound at its start"),
+            "{ran}"
+        );
+    }
+    let broken = form.replace("[[1]]", "[[2]]");
+    assert_ne!(form, broken);
+    fs::write(directory.path().join("cubic.json"), broken).unwrap();
+    let ran = run_in(directory.path(), "check cubic.json");
+    assert!(
+        ran.status == 2 && ran.err.contains("Assumption 4.1"),
+        "{ran}"
+    );
 }
 
 #[test]

@@ -151,10 +151,34 @@ fn the_temperature_is_a_name_of_expressions() {
     };
     assert_eq!(ohms(""), 27.0);
     assert_eq!(ohms(".temp 85"), 85.0);
+    // The value that `.step temp` gives counts for more.
+    let mut sources = SourceMap::default();
+    let root = sources.add("a.cir", "t\nv1 a 0 1\nr1 a 0 {temp}\n.temp 85\n.end\n");
+    let (netlist, _) = parse(&mut sources, root, &|_| Err(io::ErrorKind::NotFound.into()));
+    let options = ElaborateOptions {
+        temperature: Some(10.0),
+        ..ElaborateOptions::default()
+    };
+    let swept = elaborate(&netlist, &options).0.unwrap();
+    assert!(matches!(swept.elements[1].kind, Kind::Resistor(r) if r.f64 == 10.0));
     assert_eq!(
         ohms(".options reltol=1e-4 noacct temp={10*5} gmin=1e-12"),
         50.0
     );
+    let notes = |options: &str| read(&format!("v1 a 0 1\nr1 a 0 1\n.tran 1 2\n{options}")).1;
+    assert_eq!(notes(".options temp=50"), [""; 0]);
+    for (options, skipped) in [
+        (".options temp=50 reltol=1e-4", ".options but for temp"),
+        (".OPTIONS noacct TEMP=50", ".options but for temp"),
+        (".options reltol=1e-4", ".options"),
+        (".options temp", ".options"),
+    ] {
+        let notes = notes(options);
+        assert!(
+            notes.len() == 1 && notes[0].ends_with(&format!("transient: {skipped}")),
+            "{notes:?}"
+        );
+    }
     let steps = circuit("v1 a 0 1\nr1 a 0 {temp}\n.tran 1 2\n.temp 0 25 100").steps;
     assert_eq!(steps[0].values, [0.0, 25.0, 100.0]);
 }

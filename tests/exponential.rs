@@ -84,6 +84,46 @@ fn network() -> impl Strategy<Value = String> {
     })
 }
 
+/// The operating point: currents balance at every node, and every element is on its law.
+fn balanced(text: &str) -> Result<(), TestCaseError> {
+    let circuit = circuit(text, Diodes::Auto);
+    let point = operating_point(&circuit, Values::Dc, false, &Settings::default())
+        .unwrap_or_else(|e| panic!("{e}\n{text}"));
+    let volts: HashMap<&str, f64> = point.nodes.iter().map(|(n, v)| (n.as_str(), *v)).collect();
+    let volts = |n: usize| volts.get(circuit.nodes[n].as_str()).copied().unwrap_or(0.0);
+    let mut sums = vec![(0.0, 0.0_f64); circuit.nodes.len()];
+    for (element, (name, i)) in circuit.elements.iter().zip(&point.currents) {
+        prop_assert_eq!(&element.name, name);
+        for (node, i) in [(element.p, *i), (element.n, -i)] {
+            sums[node.index()].0 += i;
+            sums[node.index()].1 = sums[node.index()].1.max(i.abs());
+        }
+        let v = volts(element.p.index()) - volts(element.n.index());
+        if let Kind::Device(law) = &element.kind {
+            // On the law, with 1 nA worth 1 µV.
+            let at = law.resolvent(1e3, v + 1e3 * i);
+            prop_assert!(
+                (at.v - v).abs() <= 1e-7 * (1.0 + v.abs()),
+                "{} is at {} V, {} A\n{}",
+                name,
+                v,
+                i,
+                text
+            );
+        }
+    }
+    for (node, (sum, size)) in sums.iter().enumerate() {
+        prop_assert!(
+            sum.abs() <= 1e-8 * (size + 1e-3),
+            "{} A into node {}\n{}",
+            sum,
+            circuit.nodes[node],
+            text
+        );
+    }
+    Ok(())
+}
+
 proptest! {
     #![proptest_config(ProptestConfig {
         cases: 1000,
@@ -92,32 +132,70 @@ proptest! {
         ..Default::default()
     })]
 
-    /// Every network has an operating point: currents balance at every node, and every element is on its law.
     #[test]
     fn random_networks_of_all_laws_have_their_operating_point(text in network()) {
-        let circuit = circuit(&text, Diodes::Auto);
-        let point = operating_point(&circuit, Values::Dc, false, &Settings::default())
-            .unwrap_or_else(|e| panic!("{e}\n{text}"));
-        let volts: HashMap<&str, f64> = point.nodes.iter().map(|(n, v)| (n.as_str(), *v)).collect();
-        let volts = |n: usize| volts.get(circuit.nodes[n].as_str()).copied().unwrap_or(0.0);
-        let mut sums = vec![(0.0, 0.0_f64); circuit.nodes.len()];
-        for (element, (name, i)) in circuit.elements.iter().zip(&point.currents) {
-            prop_assert_eq!(&element.name, name);
-            for (node, i) in [(element.p, *i), (element.n, -i)] {
-                sums[node.index()].0 += i;
-                sums[node.index()].1 = sums[node.index()].1.max(i.abs());
-            }
-            let v = volts(element.p.index()) - volts(element.n.index());
-            if let Kind::Device(law) = &element.kind {
-                // On the law, with 1 nA worth 1 µV.
-                let at = law.resolvent(1e3, v + 1e3 * i);
-                prop_assert!((at.v - v).abs() <= 1e-7 * (1.0 + v.abs()), "{} is at {} V, {} A\n{}", name, v, i, text);
-            }
-        }
-        for (node, (sum, size)) in sums.iter().enumerate() {
-            prop_assert!(sum.abs() <= 1e-8 * (size + 1e-3), "{} A into node {}\n{}", sum, circuit.nodes[node], text);
-        }
+        balanced(&text)?;
     }
+}
+
+/// Transistors, often in parallel with diodes and with each other, on a ladder of resistors.
+fn transistors() -> impl Strategy<Value = String> {
+    let element = (
+        0..8_u8,
+        0..6_usize,
+        0..6_usize,
+        0..6_usize,
+        2.0..6.0f64,
+        -15.0..15.0f64,
+    );
+    (3..7_usize, prop::collection::vec(element, 2..10)).prop_map(|(nodes, elements)| {
+        let mut text = String::from("random\n");
+        for k in 1..nodes {
+            text += &format!("rt{k} {k} {} {}\n", k - 1, 330 * k);
+        }
+        for (k, (kind, a, b, c, decades, value)) in elements.into_iter().enumerate() {
+            let (a, b, c) = (a % nodes, b % nodes, c % nodes);
+            let ohms = 10_f64.powf(decades);
+            text += &match kind {
+                0 if a != b => format!("v{k} s{k} {a} {value}\nrs{k} s{k} {b} {ohms}\n"),
+                1 if a != b => format!("d{k} {a} {b} silicon\n"),
+                2 if a != b => format!("v{k} s{k} {a} {value}\nrs{k} s{k} {b} {ohms}\nd{k} s{k} {b} power\n"),
+                3 => format!("v{k} s{k} 0 {}\nrc{k} s{k} {a} 1k\nrb{k} s{k} {b} {ohms}\nq{k} {a} {b} {c} nn\n", value.abs()),
+                4 => format!("q{k} {a} {b} {c} nn\nd{k} {b} {c} silicon\n"),
+                5 | 6 => format!("q{k} {a} {b} {c} nn\n"),
+                7 => format!("q{k} {a} {b} {c} pp\n"),
+                _ => String::new(),
+            };
+        }
+        text + MODELS + ".model nn npn(is=1e-15 bf=120 br=3)\n.model pp pnp(is=3e-15 bf=60 rb=20)\n.op\n.end\n"
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 500,
+        failure_persistence: None,
+        rng_seed: RngSeed::Fixed(3),
+        ..Default::default()
+    })]
+
+    #[test]
+    fn random_networks_of_transistors_have_an_operating_point(text in transistors()) {
+        balanced(&text)?;
+    }
+}
+
+#[test]
+fn a_mirror_copies_its_current() {
+    // Both bases draw I/BF; the output adds the leakage of its blocking collector, IS (1 + 1/BR).
+    let text = "mirror\nv1 vcc 0 5\nr1 vcc b 1k\nq1 b b 0 nn\nq2 c b 0 nn\nr2 vcc c 100\n.model nn npn(is=1e-15 bf=50 br=2)\n.op\n.end\n";
+    let circuit = circuit(text, Diodes::Auto);
+    let point = operating_point(&circuit, Values::Dc, false, &Settings::default()).unwrap();
+    let node = |name: &str| point.nodes.iter().find(|(n, _)| n == name).unwrap().1;
+    let v = node("b");
+    let i = 1e-15 * (v / circ::law::Exponential::thermal_voltage(27.0)).exp_m1();
+    assert!((i * (1.0 + 2.0 / 50.0) - (5.0 - v) / 1e3).abs() < 1e-12);
+    assert!((i + 1.5e-15 - (5.0 - node("c")) / 100.0).abs() < 1e-12);
 }
 
 const RECTIFIER: &str = "\
@@ -211,4 +289,76 @@ fn the_law_survives_its_file() {
     assert_eq!(again.lcs.ports[0].law, lcs.ports[0].law);
     let broken = text.replace("\"is\"", "\"other\"");
     assert!(json::read(&broken).is_err());
+}
+
+/// Circuits with curved laws and their storage elements, and the step to begin with.
+const ESTIMATED: [(&str, &str, &[&str], f64); 5] = [
+    (
+        "charging",
+        "vs in 0 sin(1 1 1k)\nr1 in a 1k\nd1 a out dm\nc1 out 0 100n\nrl out 0 10k\n.model dm d(is=1e-9 n=2)\n.tran 20u 2m uic\n",
+        &["v(out)"],
+        1e-5,
+    ),
+    (
+        "half wave",
+        "vs in 0 sin(0 10 50)\nd1 in out dm\nc1 out 0 100u\nrl out 0 1k\n.model dm d(is=1e-14 rs=1)\n.tran 200u 30m uic\n",
+        &["v(out)"],
+        1e-4,
+    ),
+    (
+        "clamp",
+        "vs in 0 sin(0 5 1k)\nc1 in a 100n\nr1 a 0 100k\nd1 0 a dm\n.model dm d(is=1e-12 rs=10)\n.tran 10u 1m uic\n.save v(in,a)\n",
+        &["v(in,a)"],
+        2e-6,
+    ),
+    (
+        "resonant",
+        "vs in 0 pulse(0 5 0 10u 10u 200u 500u)\nl1 in a 1m\nr1 a b 20\nd1 b out dm\nc1 out 0 1u\nrl out 0 100\n.model dm d(is=1e-12 rs=0.1)\n.tran 10u 1m uic\n",
+        &["v(out)", "i(l1)"],
+        2e-6,
+    ),
+    (
+        "bridge",
+        "vs a b sin(0 10 1k)\nr0 b 0 1meg\nd1 a p dm\nd2 b p dm\nd3 0 a dm\nd4 0 b dm\nc1 p 0 10u\nrl p 0 500\n.model dm d(is=1e-12 rs=1)\n.tran 10u 2m uic\n",
+        &["v(p)"],
+        2e-6,
+    ),
+];
+
+/// The largest error of the storage elements at the rows, relative to their amplitudes in the reference.
+fn error(found: &Run, reference: &Run, storage: &[&str]) -> f64 {
+    let errors = storage.iter().map(|probe| {
+        let (a, b) = (column(found, probe), column(reference, probe));
+        let amplitude = b.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let differences = a.iter().zip(&b).map(|(a, b)| (a - b).abs());
+        differences.fold(0.0, f64::max) / amplitude
+    });
+    errors.fold(0.0, f64::max)
+}
+
+#[test]
+fn prescribed_steps_tell_their_error() {
+    for (name, cards, storage, h) in ESTIMATED {
+        let text = format!("{name}\n{cards}.end\n");
+        let stepped = |method, step| {
+            let options = SimOptions {
+                method,
+                step: Some(step),
+                ..SimOptions::default()
+            };
+            run(&text, Diodes::Auto, options)
+        };
+        let reference = stepped(Method::Theta, h / 16.0);
+        for method in [Method::Theta, Method::Euler] {
+            for step in [h, h / 3.0] {
+                let found = stepped(method, step);
+                let error = error(&found, &reference, storage);
+                let ratio = found.error_estimate.unwrap() / error;
+                assert!(
+                    (0.5..5.0).contains(&ratio),
+                    "{name} {method:?} {step:e}: {ratio} of {error:e}"
+                );
+            }
+        }
+    }
 }

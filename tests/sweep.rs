@@ -320,3 +320,94 @@ r2 b 0 1k
         assert!((vb - v1 * r2 / (r2 + 1e3 + temp)).abs() < 1e-12);
     }
 }
+
+const DIVIDERS: &str = "\
+dividers
+v1 in 0 dc 10
+r1 in out 1k
+r2 out 0 {r}
+.param r=1k
+.step param r list 1k 3k
+.tran 1m 3m
+.save v(out)
+.end
+";
+
+/// v(out) = 10 r/(1 kΩ + r) at every value, and at the value as it stands where a netlist without `.step` has its own.
+#[test]
+fn the_operating_point_of_every_step() {
+    let place = place(DIVIDERS);
+    let (status, out, err) = circ(place.path(), "op a.cir --json");
+    assert_eq!((status, err.as_str()), (0, ""));
+    let found: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(found["nodes"]["out"], 5.0);
+    let steps = found["steps"].as_array().unwrap();
+    assert_eq!(steps.len(), 2);
+    for (step, (r, v)) in steps.iter().zip([(1e3, 5.0), (3e3, 7.5)]) {
+        assert_eq!(step["values"]["r"], r);
+        assert_eq!(step["nodes"]["out"], v);
+        assert!(step["notes"].as_array().unwrap().is_empty());
+    }
+    let (status, out, err) = circ(place.path(), "op a.cir");
+    assert_eq!((status, err.as_str()), (0, ""));
+    let (first, second) = out.split_once("\n\n").unwrap();
+    assert!(
+        first.starts_with("r=1000\n") && second.starts_with("r=3000\n"),
+        "{out}"
+    );
+    assert!(second.contains("7.5 V"), "{out}");
+    let (_, out, _) = circ(place.path(), "op a.cir --param r=4k --json");
+    let found: Value = serde_json::from_str(&out).unwrap();
+    assert!(
+        found["nodes"]["out"] == 8.0 && found.get("steps").is_none(),
+        "{out}"
+    );
+}
+
+/// A diode carries 1 A one way and no current the other.
+#[test]
+fn a_step_without_an_operating_point_is_named_and_the_others_are_told() {
+    let place = place(
+        "one way\ni1 0 a dc {i}\nd1 0 a di\n.model di d(ideal)\n.step param i list 1 -1\n.op\n.end\n",
+    );
+    let (status, out, err) = circ(place.path(), "op a.cir");
+    assert_eq!(status, 2);
+    assert!(out.starts_with("i=-1\n") && !out.contains("i=1\n"), "{out}");
+    assert!(err.trim_end().ends_with("at i=1"), "{err}");
+}
+
+/// With ngspice where it is installed, else the missing program is named, once for every step.
+#[test]
+fn every_step_is_compared_with_ngspice() {
+    let place = place(DIVIDERS);
+    let (status, out, err) = circ(place.path(), "compare a.cir --json");
+    if Command::new("ngspice").arg("--version").output().is_err() {
+        assert_eq!(
+            (status, err.matches("ngspice is not installed").count()),
+            (2, 2)
+        );
+        return;
+    }
+    assert_eq!(status, 0, "{err}");
+    let found: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(found["within"], true);
+    let amplitudes = found["steps"].as_array().unwrap().iter().map(|step| {
+        let signal = &step["signals"][0];
+        assert_eq!(signal["name"], "v(out)");
+        (
+            step["values"]["r"].as_f64().unwrap(),
+            signal["amplitude"].as_f64().unwrap(),
+        )
+    });
+    for ((r, amplitude), expected) in amplitudes.zip([(1e3, 5.0), (3e3, 7.5)]) {
+        assert!(
+            r == expected.0 && (amplitude - expected.1).abs() < 1e-6,
+            "{out}"
+        );
+    }
+    let (status, _, err) = circ(place.path(), "compare a.cir -o a.svg");
+    assert!(
+        status == 2 && err.contains("`-o` and `--keep` take one run"),
+        "{err}"
+    );
+}

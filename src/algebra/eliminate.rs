@@ -120,6 +120,20 @@ impl<F: Field> Matrix<F> {
         true
     }
 
+    /// Gives the equation of `leaving`, which has a pivot, to `entering`, which has none and a nonzero entry there; returns whether that is so.
+    pub fn exchange(&mut self, leaving: usize, entering: usize, state: &mut Elimination) -> bool {
+        let Some(row) = state.pivot[leaving] else {
+            return false;
+        };
+        if state.pivot[entering].is_some() || self.at(row, entering).is_zero() {
+            return false;
+        }
+        state.pivot[leaving] = None;
+        state.pivot[entering] = Some(row);
+        self.pivot(row, entering);
+        true
+    }
+
     /// Scales `row` to 1 in `column` and subtracts it from every other row so that they are 0 there.
     fn pivot(&mut self, row: usize, column: usize) {
         let inverse = F::one().div(self.at(row, column));

@@ -12,6 +12,8 @@ pub struct Excitation {
     pub high: f64,
     /// Whether it has edges: then it is right-continuous of locally bounded variation, else locally absolutely continuous.
     pub jumps: bool,
+    /// Whether it consists of pieces that a finite linear system makes: polynomials, exponentials, sinusoids.
+    pub pieces: bool,
 }
 
 impl Excitation {
@@ -22,6 +24,7 @@ impl Excitation {
             low: values.iter().copied().fold(f64::INFINITY, f64::min),
             high: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
             jumps,
+            pieces: source.piece(0.0).is_some(),
         };
         match &source.wave {
             Wave::Dc(value) => range(&[*value], false),
@@ -46,6 +49,8 @@ impl Excitation {
                     range(&[offset - size, offset + size], cut)
                 }
             }
+            // What arrives is as large as what the circuit sends.
+            Wave::Arriving { .. } => range(&[f64::NEG_INFINITY, f64::INFINITY], true),
             Wave::Sffm {
                 offset, amplitude, ..
             } => range(&[offset - amplitude.abs(), offset + amplitude.abs()], false),

@@ -229,25 +229,34 @@ impl<'n> Builder<'n, '_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Circuit, ElaborateOptions, elaborate};
+    use super::super::{Circuit, fixture};
     use super::*;
-    use crate::diagnostic::SourceMap;
-    use crate::netlist::parse;
 
     fn read(text: &str, diodes: Diodes) -> (Option<Circuit>, Vec<Diagnostic>) {
-        let mut sources = SourceMap::default();
-        let root = sources.add(
-            "test.cir",
-            format!("title\nV1 c 0 5\nR1 c b 1k\nR2 e 0 1\n{text}\n"),
+        fixture::read(&format!("V1 c 0 5\nR1 c b 1k\nR2 e 0 1\n{text}"), diodes)
+    }
+
+    /// IS(T) and β(T) by hand at 77 °C: (T/Tnom)³ exp(EG (1/VT(Tnom) − 1/VT(T))) and (T/Tnom)^XTB.
+    #[test]
+    fn transistors_take_the_temperature_of_the_circuit() {
+        let (circuit, _) = read(
+            "Q1 c b e m\n.model m NPN(IS=1e-14 BF=200 BR=4 XTB=1.5)\n.temp 77",
+            Diodes::Auto,
         );
-        let (netlist, _) = parse(&mut sources, root, &|_| {
-            Err(std::io::ErrorKind::NotFound.into())
-        });
-        let options = ElaborateOptions {
-            diodes,
-            ..ElaborateOptions::default()
+        let elements = circuit.unwrap().elements;
+        let Kind::Device(Law::Exponential(junction)) = elements[4].kind else {
+            panic!("no junction")
         };
-        elaborate(&netlist, &options)
+        let boltzmann = 8.617_333_262e-5;
+        let (t, nominal): (f64, f64) = (350.15, 300.15);
+        let is =
+            1e-14 * (t / nominal).powi(3) * (1.11 / boltzmann * (1.0 / nominal - 1.0 / t)).exp();
+        let beta = 200.0 * (t / nominal).powf(1.5);
+        assert!((junction.slope / (boltzmann * t) - 1.0).abs() < 1e-9);
+        assert!(
+            (junction.is / (is / beta) - 1.0).abs() < 1e-7,
+            "{junction:?}"
+        );
     }
 
     #[test]

@@ -232,6 +232,7 @@ impl<'n, 'o> Builder<'n, 'o> {
                     self.transistor(card, words, area.as_ref(), args, scope);
                 }
             }
+            Device::Line { args, ic } => self.line(card, args, ic, scope),
             Device::Call { subckt, args } => self.call(card, subckt, args, scope),
             Device::Unsupported { what } => {
                 let message = format!(
@@ -241,7 +242,7 @@ impl<'n, 'o> Builder<'n, 'o> {
                 self.tell(
                     Diagnostic::error("unsupported-element", card.span, message)
                         .label("not supported yet")
-                        .help("supported elements are R C L K V I E F G H B D S W M Q J Z X"),
+                        .help("supported elements are R C L K V I E F G H B D S W M Q J Z T X"),
                 );
             }
         }
@@ -250,6 +251,9 @@ impl<'n, 'o> Builder<'n, 'o> {
     /// Expands a subcircuit.
     fn call(&mut self, card: &'n ast::Element, name: &'n Name, args: &'n [Assign], scope: ScopeId) {
         let Some(subckt) = self.scopes.subckt(scope, &name.text) else {
+            if self.scopes.model(scope, &name.text).is_some() {
+                return self.thyristor(card, name, args, scope);
+            }
             let message = format!(
                 "`{}` calls unknown subcircuit `{}`",
                 card.name.text, name.text

@@ -8,7 +8,7 @@ use super::scope::ScopeId;
 use super::{Element, Kind};
 use crate::algebra::Value;
 use crate::diagnostic::Diagnostic;
-use crate::law::{Corner, Curve, Law, Rounded};
+use crate::law::{Corner, Curve, Law, Rounded, Side};
 use crate::netlist::ast::{self, Assign, Expr, Name};
 
 /// A diode whose emission coefficient is this small is taken as ideal.
@@ -122,11 +122,6 @@ impl<'n> Builder<'n, '_> {
             });
         }
         let (vfwd, ron, roff) = if piecewise {
-            for ignored in ["ilimit", "revilimit"] {
-                if params.get(ignored).is_some() {
-                    self.unused(format!("{ignored} of {}", name.text), name);
-                }
-            }
             let vfwd = self.parameter(params, "vfwd", scope)?.unwrap_or(ZERO);
             let ron = self.parameter(params, "ron", scope)?.unwrap_or(ONE);
             (vfwd, ron, self.off_resistance(params, scope)?)
@@ -148,7 +143,13 @@ impl<'n> Builder<'n, '_> {
         } else {
             [0.0; 2]
         };
-        if widths.iter().any(|w| *w != 0.0) && self.options.diodes != Diodes::Ideal {
+        let rounded = widths.iter().any(|w| *w != 0.0) && self.options.diodes != Diodes::Ideal;
+        let limits = if piecewise {
+            self.limits(name, params, rounded, scope)?
+        } else {
+            [None; 2]
+        };
+        if rounded {
             return self.rounded(
                 card,
                 name,
@@ -158,10 +159,39 @@ impl<'n> Builder<'n, '_> {
                 widths,
             );
         }
+        if limits.iter().any(Option::is_some) {
+            let side = |v: Value, r: Value, limit: Option<f64>| Side { v, r, limit };
+            let forward = side(vfwd, ron, limits[0]);
+            let reverse = vrev.map(|v| side(v, rrev, limits[1]));
+            return Some(Law::Curve(Curve::limited(forward, reverse, roff)));
+        }
         Some(match vrev {
             None => Law::Diode { vfwd, ron, roff },
-            Some(vrev) => Law::resistive_zener((vrev, rrev), (vfwd, ron), roff),
+            Some(vrev) => Law::Curve(Curve::zener((vrev, rrev), (vfwd, ron), roff)),
         })
+    }
+
+    /// Ilimit and Revilimit, where they are positive and the corners are sharp.
+    fn limits(
+        &mut self,
+        name: &Name,
+        params: &Parameters<'n>,
+        rounded: bool,
+        scope: ScopeId,
+    ) -> Option<[Option<f64>; 2]> {
+        let mut limits = [None; 2];
+        for (limit, parameter) in limits.iter_mut().zip(["ilimit", "revilimit"]) {
+            let Some(expr) = params.get(parameter) else {
+                continue;
+            };
+            // An infinite limit is none.
+            let value = self.scopes.number(expr, scope)?;
+            *limit = Some(value.f64).filter(|x| x.is_finite() && *x > 0.0 && !rounded);
+            if limit.is_none() && value.f64 != f64::INFINITY {
+                self.unused(format!("{parameter} of {}", name.text), name);
+            }
+        }
+        Some(limits)
     }
 
     /// Straight lines with corners of the widths (forward, reverse).
@@ -229,25 +259,12 @@ fn scaled(law: Law, factor: f64) -> Law {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ElaborateOptions, elaborate};
+    use super::super::fixture;
     use super::*;
-    use crate::diagnostic::SourceMap;
-    use crate::netlist::parse;
 
     fn law(card: &str, model: &str, diodes: Diodes) -> Option<Law> {
-        let mut sources = SourceMap::default();
-        let root = sources.add(
-            "test.cir",
-            format!("title\nV1 a 0 5\nR1 a b 1\n{card}\n.model {model}\n"),
-        );
-        let (netlist, _) = parse(&mut sources, root, &|_| {
-            Err(std::io::ErrorKind::NotFound.into())
-        });
-        let options = ElaborateOptions {
-            diodes,
-            ..ElaborateOptions::default()
-        };
-        match elaborate(&netlist, &options).0?.elements.pop()?.kind {
+        let text = format!("V1 a 0 5\nR1 a b 1\n{card}\n.model {model}");
+        match fixture::read(&text, diodes).0?.elements.pop()?.kind {
             Kind::Device(law) => Some(law),
             other => panic!("{other:?}"),
         }
@@ -339,6 +356,34 @@ mod tests {
             self::law("D1 b 0 m", "m D(Ron=1 Vrev=0.1 Epsilon=0.4)", Diodes::Auto),
             None
         );
+    }
+
+    #[test]
+    fn currents_are_limited() {
+        let Some(Law::Curve(curve)) = law(
+            "D1 b 0 m 2",
+            "m D(Ron=1 Vfwd=1 Ilimit=3 Vrev=10 Rrev=2)",
+            Diodes::Auto,
+        ) else {
+            panic!("no curve")
+        };
+        // Two in parallel carry 6 A at most; the breakdown has no limit.
+        let last = curve.vertices.last().map(|(_, i)| i.f64);
+        assert_eq!((last, curve.last.1.f64), (Some(6.0), 0.0));
+        assert_eq!((curve.first.0.f64, curve.first.1.f64), (1.0, 1.0));
+        assert!(curve.contains(1.5, 1.0, 1.0, 1e-12));
+        // With rounded corners, or where it is no limit, the parameter has no effect.
+        for model in [
+            "m D(Ron=1 Ilimit=3 Epsilon=0.1)",
+            "m D(Ron=1 Ilimit=inf)",
+            "m D(Ron=1 Ilimit=0)",
+        ] {
+            let found = law("D1 b 0 m", model, Diodes::Auto);
+            assert!(
+                matches!(found, Some(Law::Rounded(_) | Law::Diode { .. })),
+                "{model}"
+            );
+        }
     }
 
     #[test]

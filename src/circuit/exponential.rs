@@ -85,23 +85,12 @@ impl<'n> Builder<'n, '_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Diodes, ElaborateOptions, Kind, elaborate};
+    use super::super::{Diodes, Kind, fixture};
     use super::*;
-    use crate::diagnostic::SourceMap;
-    use crate::netlist::parse;
 
     fn diode(card: &str, model: &str, diodes: Diodes) -> Option<Exponential> {
-        let mut sources = SourceMap::default();
-        let text = format!("title\nV1 a 0 5\nR1 a b 1\n{card}\n.model {model}\n");
-        let root = sources.add("test.cir", text);
-        let (netlist, _) = parse(&mut sources, root, &|_| {
-            Err(std::io::ErrorKind::NotFound.into())
-        });
-        let options = ElaborateOptions {
-            diodes,
-            ..ElaborateOptions::default()
-        };
-        match elaborate(&netlist, &options).0?.elements.pop()?.kind {
+        let text = format!("V1 a 0 5\nR1 a b 1\n{card}\n.model {model}");
+        match fixture::read(&text, diodes).0?.elements.pop()?.kind {
             Kind::Device(Law::Exponential(diode)) => Some(diode),
             other => panic!("{other:?}"),
         }
@@ -141,6 +130,8 @@ mod tests {
             let text = format!("m D(IS=1e-14)\n.{all}");
             assert_eq!(diode("D1 b 0 m", &text, Diodes::Auto), card, "{all}");
         }
+        let warmer = diode("D1 b 0 m dtemp=50", "m D(IS=1e-14)", Diodes::Auto);
+        assert_eq!(warmer, card);
     }
 
     #[test]

@@ -14,9 +14,12 @@ mod drive;
 mod elaborate;
 mod eval;
 mod exponential;
+#[cfg(test)]
+mod fixture;
 mod form;
 mod formula;
 mod functions;
+mod line;
 pub(crate) mod load;
 mod measurement;
 mod model;
@@ -26,9 +29,11 @@ mod piecewise;
 mod place;
 mod probe;
 mod scope;
+mod smooth;
 pub mod source;
 mod sweep;
 mod switch;
+mod thyristor;
 mod transistor;
 
 use crate::algebra::Value;
@@ -78,6 +83,8 @@ pub struct Circuit {
     pub elements: Vec<Element>,
     /// Coupled inductors, pair by pair.
     pub couplings: Vec<Coupling>,
+    /// Ideal transmission lines; their ports are elements.
+    pub lines: Vec<Line>,
     /// The transient analysis asked for.
     pub tran: Option<Tran>,
     /// What `.save`, `.print`, `.probe`, `.plot tran` ask for; empty means the default set.
@@ -195,6 +202,23 @@ pub struct Switch {
     pub off_below: f64,
     /// `ON`/`OFF` on the card.
     pub initial: Option<bool>,
+    /// A switch inside a thyristor, which the control alone does not move.
+    pub latch: Option<Latch>,
+}
+
+/// What moves the switches inside a thyristor.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Latch {
+    /// On while a gate is, afterwards as long as the valve conducts and the control, the switch's own current, exceeds
+    /// `off_below`.
+    Hold {
+        /// Switches that turn it on.
+        gates: Vec<ElementId>,
+        /// The diode in series.
+        valve: ElementId,
+    },
+    /// On while this latch is off: a resistance that gives the diode 0 V where no current flows, and so a voltage.
+    Rest(ElementId),
 }
 
 /// `K`: two inductors and their coupling coefficient.
@@ -210,6 +234,30 @@ pub struct Coupling {
     pub k: Value,
     /// The card.
     pub span: Option<Span>,
+}
+
+/// `T`: a lossless line by its characteristics. Each port is the impedance in series with a source of the wave that arrives
+/// there, e₁(t) = a₂(t − delay) with a₂ = v₂ + Z i₂ = 2 Z i₂ + e₂ the wave that left the other port (F. H. Branin, "Transient
+/// analysis of lossless transmission lines", Proc. IEEE 55, 1967).
+#[derive(Debug, Clone)]
+pub struct Line {
+    /// Name of the card.
+    pub name: String,
+    /// Z, Ω.
+    pub impedance: Value,
+    /// s.
+    pub delay: f64,
+    /// Its ends.
+    pub ports: [LinePort; 2],
+}
+
+/// One end of a line: an impedance from the port's first node, in series with the wave source to its second node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LinePort {
+    /// The impedance; its current enters the line.
+    pub impedance: ElementId,
+    /// The source, a [`source::Wave::Arriving`].
+    pub wave: ElementId,
 }
 
 /// `.tran tstep tstop [tstart [tmax]] [uic]`, in seconds.

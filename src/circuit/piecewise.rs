@@ -1,7 +1,9 @@
 //! Piecewise-linear functions of one variable, with jumps: composed, multiplied, and split into monotone curves.
 
-use crate::algebra::Value;
-use crate::law::Curve;
+mod monotone;
+
+#[cfg(test)]
+mod tests;
 
 /// Most knots of one function.
 const MAX_KNOTS: usize = 1_000;
@@ -27,15 +29,6 @@ pub(super) struct Piecewise {
     knots: Vec<f64>,
     /// One more than knots.
     pieces: Vec<Piece>,
-}
-
-/// A nondecreasing function and the sign with which it enters a sum.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Monotone {
-    /// +1 or −1.
-    pub(super) sign: f64,
-    /// The function.
-    pub(super) curve: Curve,
 }
 
 impl Piecewise {
@@ -317,105 +310,6 @@ impl Piecewise {
         Self { knots, pieces }
     }
 
-    /// (u, jump) at every knot.
-    fn jumps(&self) -> impl Iterator<Item = f64> {
-        self.pieces.windows(2).map(|w| w[1].left - w[0].right)
-    }
-
-    /// f = linear·u + Σ ± nondecreasing functions. At jumps the functions take all values between.
-    pub(super) fn monotone(&self) -> (f64, Vec<Monotone>) {
-        let rises = self.pieces.iter().any(|p| p.slope > 0.0) || self.jumps().any(|j| j > 0.0);
-        let falls = self.pieces.iter().any(|p| p.slope < 0.0) || self.jumps().any(|j| j < 0.0);
-        let one = |f: &Self, sign| Monotone {
-            sign,
-            curve: f.clone().scaled(sign).curve(),
-        };
-        match (rises, falls) {
-            (_, false) => (0.0, vec![one(self, 1.0)]),
-            (false, true) => (0.0, vec![one(self, -1.0)]),
-            (true, true) if self.knots.len() == 1 && self.jumps().all(|j| j == 0.0) => {
-                // One corner, as of |u|: a hinge and a line.
-                let least = self.pieces[0].slope.min(self.pieces[1].slope);
-                (least, vec![one(&self.plus(&Self::line(-least, 0.0)), 1.0)])
-            }
-            (true, true) => {
-                let parts = self.split().into_iter().map(|(sign, part)| Monotone {
-                    sign,
-                    curve: part.curve(),
-                });
-                (0.0, parts.collect())
-            }
-        }
-    }
-
-    /// f = up − down, each nondecreasing, with their signs.
-    fn split(&self) -> [(f64, Self); 2] {
-        let part = |sign: f64, start: f64| {
-            let mut y = start;
-            let mut pieces = Vec::with_capacity(self.pieces.len());
-            for (k, piece) in self.pieces.iter().enumerate() {
-                let jump = k
-                    .checked_sub(1)
-                    .map_or(0.0, |i| piece.left - self.pieces[i].right);
-                y += (sign * jump).max(0.0);
-                let left = y;
-                y += (sign * (piece.right - piece.left)).max(0.0);
-                pieces.push(Piece {
-                    left,
-                    right: y,
-                    slope: (sign * piece.slope).max(0.0),
-                });
-            }
-            Self {
-                knots: self.knots.clone(),
-                pieces,
-            }
-            .simplified()
-        };
-        [
-            (1.0, part(1.0, self.pieces[0].left)),
-            (-1.0, part(-1.0, 0.0)),
-        ]
-    }
-
-    /// A nondecreasing function as a curve; a line gets a corner at zero.
-    fn curve(&self) -> Curve {
-        let whole = if self.knots.is_empty() {
-            self.refined(&[0.0])
-        } else {
-            self.clone()
-        };
-        let mut vertices: Vec<(Value, Value)> = Vec::new();
-        let mut least = f64::NEG_INFINITY;
-        for (k, &u) in whole.knots.iter().enumerate() {
-            let ends = (whole.pieces[k].right, whole.pieces[k + 1].left);
-            let ends = (ends.0.max(least), ends.1.max(ends.0).max(least));
-            vertices.push((u.into(), ends.0.into()));
-            if ends.1 > ends.0 {
-                vertices.push((u.into(), ends.1.into()));
-            }
-            least = ends.1;
-        }
-        let slopes: Vec<f64> = whole.pieces.iter().map(|p| p.slope).collect();
-        let jumps = vertices.len() > whole.knots.len();
-        let kind = match slopes[..] {
-            [0.0, 0.0] if jumps => "relay",
-            [0.0, a, 0.0] if a > 0.0 && !jumps => "saturation",
-            [a, 0.0, b] if a > 0.0 && b > 0.0 && !jumps => "dead_zone",
-            _ => "table",
-        };
-        let ray = |slope: Option<&f64>| {
-            let slope = slope.copied().unwrap_or(0.0);
-            (Value::decimal(1.0, 1, 0), Value::binary(slope))
-        };
-        Curve {
-            kind,
-            vertices,
-            first: ray(slopes.first()),
-            last: ray(slopes.last()),
-        }
-    }
-
     /// The points with the values at both ends `from` and `to` included; two points at one u are a jump.
     pub(super) fn points(&self, from: f64, to: f64) -> Vec<(f64, f64)> {
         let inside = self.refined(&[from, to]);
@@ -433,93 +327,5 @@ impl Piecewise {
             }
         }
         points
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// f just left and just right of u, from the pieces.
-    fn both(f: &Piecewise, u: f64) -> (f64, f64) {
-        let left = f.knots.partition_point(|&x| x < u);
-        let right = f.knots.partition_point(|&x| x <= u);
-        (f.at(left, u), f.at(right, u))
-    }
-
-    fn value(f: &Piecewise, u: f64) -> f64 {
-        both(f, u).1
-    }
-
-    #[test]
-    fn composition_is_pointwise() {
-        let tent = Piecewise::through(&[(-1.0, 0.0), (0.0, 2.0), (1.0, 0.0)], 0.0, -3.0);
-        let outer = Piecewise::through(&[(0.5, 1.0), (0.5, 2.0), (1.5, 4.0)], 1.0, 0.5);
-        let both = tent.then(&outer).expect("few knots");
-        for k in -40..40 {
-            let u = f64::from(k) * 0.077;
-            let expected = value(&outer, value(&tent, u));
-            assert!((value(&both, u) - expected).abs() < 1e-12, "{u}");
-        }
-        let product = tent.times(&Piecewise::step(0.3)).expect("a step");
-        assert_eq!(value(&product, 0.2), 0.0);
-        assert!((value(&product, 0.5) - 1.0).abs() < 1e-15);
-        assert_eq!(tent.times(&tent), None);
-    }
-
-    #[test]
-    fn a_steep_clamp_keeps_its_numbers() {
-        let clamp = Piecewise::through(&[(-4.8, -4.8), (4.8, 4.8)], 0.0, 0.0);
-        let f = Piecewise::line(1e5, 0.0).then(&clamp).expect("two knots");
-        let (linear, parts) = f.monotone();
-        assert_eq!((linear, parts.len(), parts[0].sign), (0.0, 1, 1.0));
-        let curve = &parts[0].curve;
-        assert_eq!(curve.kind, "saturation");
-        let corners: Vec<(f64, f64)> = curve.vertices.iter().map(|(u, y)| (u.f64, y.f64)).collect();
-        assert_eq!(corners, [(-4.8e-5, -4.8), (4.8e-5, 4.8)]);
-        assert_eq!((curve.first.1.f64, curve.last.1.f64), (0.0, 0.0));
-    }
-
-    #[test]
-    fn knots_that_do_nothing_vanish() {
-        let ramp = Piecewise::ramp();
-        let line = ramp.plus(&Piecewise::line(-1.0, 0.0).then(&ramp).unwrap().scaled(-1.0));
-        assert_eq!(line.as_line(), Some((1.0, 0.0)));
-        let shifted = Piecewise::line(1.0, -2.0).then(&ramp).unwrap();
-        let other = Piecewise::line(-1.0, 2.0).then(&ramp).unwrap();
-        assert_eq!(
-            shifted.plus(&other.scaled(-1.0)).as_line(),
-            Some((1.0, -2.0))
-        );
-    }
-
-    #[test]
-    fn sums_of_monotone_parts() {
-        let window = Piecewise::step(1.0).plus(&Piecewise::step(2.0).scaled(-1.0));
-        let (linear, parts) = window.monotone();
-        assert_eq!((linear, parts.len()), (0.0, 2));
-        assert_eq!((parts[0].sign, parts[1].sign), (1.0, -1.0));
-        assert_eq!(
-            (parts[0].curve.kind, parts[1].curve.kind),
-            ("relay", "relay")
-        );
-        let ramp = Piecewise::ramp();
-        let magnitude = ramp.plus(&Piecewise::line(-1.0, 0.0).then(&ramp).unwrap());
-        let (linear, parts) = magnitude.monotone();
-        assert_eq!((linear, parts.len(), parts[0].sign), (-1.0, 1, 1.0));
-        assert_eq!(parts[0].curve.last.1.f64, 2.0);
-    }
-
-    #[test]
-    fn waveform_points() {
-        let f = Piecewise::step(1.0).scaled(5.0);
-        assert_eq!(
-            f.points(0.0, 3.0),
-            [(0.0, 0.0), (1.0, 0.0), (1.0, 5.0), (3.0, 5.0)]
-        );
-        assert_eq!(
-            Piecewise::line(2.0, 1.0).points(0.0, 2.0),
-            [(0.0, 1.0), (2.0, 5.0)]
-        );
     }
 }

@@ -121,6 +121,14 @@ pub enum Wave {
         /// Delay, s.
         delay: f64,
     },
+    /// The wave that arrives at a port of a transmission line: what left the other port `delay` before, which only the run
+    /// knows; `initial` before anything has arrived.
+    Arriving {
+        /// Delay of the line, s.
+        delay: f64,
+        /// Initial value.
+        initial: f64,
+    },
 }
 
 impl Source {
@@ -211,13 +219,19 @@ impl Wave {
     }
 
     /// The closed form on [start, end) around `t`, where start and end are breakpoints (or ∓∞). It is the same object for
-    /// every `t` of the interval. `None` for frequency modulation, which no finite linear system generates.
+    /// every `t` of the interval. `None` for frequency modulation and waves on lines, which no finite linear system generates.
     #[must_use]
     pub fn piece(&self, t: f64) -> Option<Piece> {
         match self {
-            Self::Sffm { .. } => None,
+            Self::Sffm { .. } | Self::Arriving { .. } => None,
             _ => Some(self.segment(t, Side::Right).piece),
         }
+    }
+
+    /// Whether it is the wave that arrives on a transmission line.
+    #[must_use]
+    pub const fn is_arriving(&self) -> bool {
+        matches!(self, Self::Arriving { .. })
     }
 
     /// The values (before, after) of the edge at `t`.
@@ -299,6 +313,9 @@ impl Wave {
                 t,
                 side,
             ),
+            Self::Arriving { initial, .. } => {
+                Segment::constant(initial, f64::NEG_INFINITY, f64::INFINITY)
+            }
             Self::Sffm { .. } => Segment::constant(f64::NAN, f64::NEG_INFINITY, f64::INFINITY),
             Self::Am {
                 amplitude,

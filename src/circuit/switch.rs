@@ -3,9 +3,10 @@
 use super::builder::{Builder, Pending};
 use super::model::{ONE, Parameters, ZERO};
 use super::scope::ScopeId;
-use super::{Affine, Element, Kind, Switch};
+use super::{Affine, Element, Kind, NodeId, Switch, smooth};
 use crate::algebra::Value;
 use crate::diagnostic::Diagnostic;
+use crate::law::Law;
 use crate::netlist::ast::{self, Control, Name};
 
 /// Off-resistance of ngspice's switch model where none is given, Ω.
@@ -26,36 +27,77 @@ impl<'n> Builder<'n, '_> {
             self.node(&card.nodes[0], scope),
             self.node(&card.nodes[1], scope),
         );
-        let Some(mut switch) = self.switch_model(card, name, scope) else {
+        let own = match control {
+            Control::Nodes(pairs, _) => matches!(&pairs[..], [(a, b)]
+                if self.node(a, scope) == p && self.node(b, scope) == n),
+            _ => false,
+        };
+        let Some((mut switch, smooth)) = self.switch_model(card, name, own, scope) else {
             return;
         };
         switch.initial = initial;
         let full = self.full_name(&card.name, scope);
-        let element = Element {
-            name: full,
+        let part = |name: String, p: NodeId, kind: Kind| Element {
+            name,
             p,
             n,
-            kind: Kind::Switch(switch),
+            kind,
             ic: None,
             span: Some(card.span),
         };
-        if let Some(element) = self.add(element) {
-            self.pending.push(Pending {
-                element,
-                scope,
-                control,
-                span: card.span,
+        if own && !smooth.is_empty() {
+            let (on, off) = (switch.on_above, switch.off_below);
+            let levels = (0.5 * (on + off), 0.5 * (on - off));
+            let ohms = (switch.ron.f64, switch.roff.map_or(f64::INFINITY, |r| r.f64));
+            let law = Law::Curve(smooth::law(levels, ohms, smooth.len()));
+            self.add(part(full, p, Kind::Device(law)));
+            return;
+        }
+        let mut switches = Vec::new();
+        if smooth.is_empty() {
+            switches.push(part(full, p, Kind::Switch(switch)));
+        } else {
+            // The current of the switch is that of its first terminal.
+            let inner = self.new_node(format!("{full}.p"));
+            self.add(Element {
+                n: inner,
+                ..part(full.clone(), p, Kind::Resistor(ZERO))
             });
+            if let Some(roff) = switch.roff {
+                self.add(part(format!("{full}.off"), inner, Kind::Resistor(roff)));
+            }
+            for (k, (level, ohms)) in smooth.into_iter().enumerate() {
+                let step = Switch {
+                    ron: Value::binary(ohms),
+                    roff: None,
+                    on_above: level,
+                    off_below: level,
+                    ..switch.clone()
+                };
+                let name = format!("{full}.{}", k + 1);
+                switches.push(part(name, inner, Kind::Switch(step)));
+            }
+        }
+        for switch in switches {
+            if let Some(element) = self.add(switch) {
+                self.pending.push(Pending {
+                    element,
+                    scope,
+                    control,
+                    span: card.span,
+                });
+            }
         }
     }
 
-    /// The resistances and thresholds of a model; a negative `control` gain marks a switch that is on below.
+    /// The resistances and thresholds of a model, and for a smooth switch the steps of its conductance; `own`: its control is its own voltage.
     fn switch_model(
         &mut self,
         card: &'n ast::Element,
         name: &'n Name,
+        own: bool,
         scope: ScopeId,
-    ) -> Option<Switch> {
+    ) -> Option<(Switch, Vec<(f64, f64)>)> {
         let chain = self.model(card, name, scope)?;
         let model = chain[0];
         let kind = chain
@@ -124,37 +166,52 @@ impl<'n> Builder<'n, '_> {
             }
             let on = self.parameter(&params, &on, scope)?.map_or(1.0, |v| v.f64);
             let off = self.parameter(&params, &off, scope)?.map_or(0.0, |v| v.f64);
-            return Some(Switch {
+            let switch = Switch {
                 control: Affine::default(),
                 ron,
                 roff,
                 on_above: on,
                 off_below: off,
                 initial: None,
-            });
+                latch: None,
+            };
+            return Some((switch, Vec::new()));
         }
         let threshold = self.parameter(&params, &t, scope)?.map_or(0.0, |v| v.f64);
         let hysteresis = self.parameter(&params, &h, scope)?.map_or(0.0, |v| v.f64);
+        let width = hysteresis.abs();
+        let (on_above, off_below) = (threshold + width, threshold - width);
+        let mut steps = Vec::new();
         if hysteresis < 0.0 {
+            let stairs = smooth::stairs(threshold, width, ron.f64, roff.map(|r| r.f64));
+            // On its own voltage a law, unless that would fall somewhere.
+            let rises = !own || threshold >= width;
+            steps = stairs.filter(|_| rises).unwrap_or_default();
+            let taken = if steps.is_empty() {
+                format!("its hysteresis is taken as {width}")
+            } else {
+                let count = steps.len();
+                format!("its conductance changes in {count} steps from {off_below} to {on_above}")
+            };
             let message = format!(
-                "model `{}` has a negative `{h}` (LTspice's smooth switch): its hysteresis is taken as {}",
-                name.text, -hysteresis
+                "model `{}` has a negative `{h}` (LTspice's smooth switch): {taken}",
+                name.text
             );
             self.tell(
                 Diagnostic::warning("smooth-switch", model.name.span, message)
                     .label("approximated"),
             );
         }
-        let width = hysteresis.abs();
-        let (on_above, off_below) = (threshold + width, threshold - width);
-        Some(Switch {
+        let switch = Switch {
             control: Affine::default(),
             ron,
             roff,
             on_above,
             off_below,
             initial: None,
-        })
+            latch: None,
+        };
+        Some((switch, steps))
     }
 }
 
@@ -178,7 +235,7 @@ impl Switch {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ElaborateOptions, NodeId, Quantity, elaborate};
+    use super::super::{ElaborateOptions, Quantity, elaborate};
     use super::*;
     use crate::diagnostic::SourceMap;
     use crate::netlist::parse;
@@ -215,6 +272,35 @@ mod tests {
     }
 
     #[test]
+    fn a_smooth_switch_is_a_staircase_or_a_law() {
+        let read = |text: &str| {
+            let mut sources = SourceMap::default();
+            let text = format!("title\nV1 a 0 5\nV2 c 0 1\nR1 b 0 1\n{text}\n");
+            let root = sources.add("test.cir", text);
+            let (netlist, _) = parse(&mut sources, root, &|_| {
+                Err(std::io::ErrorKind::NotFound.into())
+            });
+            let (circuit, findings) = elaborate(&netlist, &ElaborateOptions::default());
+            assert!(findings.iter().any(|f| f.code == "smooth-switch"));
+            circuit.unwrap_or_else(|| panic!("{findings:?}")).elements
+        };
+        let stairs = read("S1 a b c 0 ms\n.model ms SW(Ron=1 Roff=1Meg Vt=2 Vh=-1)");
+        let names: Vec<&str> = stairs[3..].iter().map(|e| e.name.as_str()).collect();
+        assert_eq!(names[..3], ["s1", "s1.off", "s1.1"]);
+        assert_eq!(
+            (names.len(), stairs[4].p, stairs[4].n),
+            (8, stairs[3].n, stairs[10].n)
+        );
+        let own = read("S1 a b a b ms\n.model ms SW(Ron=1 Roff=1Meg Vt=2 Vh=-1)");
+        assert!(own.len() == 4 && matches!(own[3].kind, Kind::Device(Law::Curve(_))));
+        let falling = read("S1 a b a b ms\n.model ms SW(Ron=1 Roff=1Meg Vt=0 Vh=-1)");
+        let Kind::Switch(switch) = &falling[3].kind else {
+            panic!("no switch")
+        };
+        assert_eq!((switch.on_above, switch.off_below), (1.0, -1.0));
+    }
+
+    #[test]
     fn models() {
         for (model, expected) in [
             ("SW", (0.0, 0.0, 1.0, Some(1e12), 1.0)),
@@ -222,7 +308,7 @@ mod tests {
                 "SW(Vt=5 Vh=0.5 Ron=5m Roff=1Meg)",
                 (5.5, 4.5, 5e-3, Some(1e6), 1.0),
             ),
-            ("SW Vt=5 Vh=-0.5", (5.5, 4.5, 1.0, Some(1e12), 1.0)),
+            ("SW(ideal Vt=5 Vh=-0.5)", (5.5, 4.5, 0.0, None, 1.0)),
             ("SW(Vt=1 Ron=0 Roff=inf)", (1.0, 1.0, 0.0, None, 1.0)),
             ("SW(ideal Vt=1)", (1.0, 1.0, 0.0, None, 1.0)),
             ("VSWITCH(Von=4 Voff=1)", (4.0, 1.0, 1.0, Some(1e6), 1.0)),

@@ -147,6 +147,7 @@ impl<'n> Builder<'n, '_> {
                 on_above: figures.threshold,
                 off_below: figures.threshold,
                 initial: None,
+                latch: None,
             }),
         );
         let mut diode = |suffix: &str, p: NodeId, n: NodeId| {

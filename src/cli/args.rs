@@ -213,6 +213,9 @@ pub struct BenchArgs {
     /// Write measurements to this file (repeatable); the ending chooses csv, json, svg or png
     #[arg(short, long = "output", value_name = "OUT")]
     pub outputs: Vec<PathBuf>,
+    /// Write the errors of every signal to this csv file, a line for each
+    #[arg(long, value_name = "OUT.csv")]
+    pub signals: Option<PathBuf>,
 }
 
 /// `circ compare`.

@@ -5,6 +5,7 @@ use std::io::BufReader;
 use std::path::Path;
 
 use serde::Serialize;
+use serde_json::{Map, Value};
 
 use super::args::{self, CompareArgs};
 use super::exit::{Exit, Failure};
@@ -12,6 +13,7 @@ use super::input::{self, Subject};
 use super::ngspice::{self, deck};
 use super::output;
 use super::sim::{self, Request};
+use super::stepped::Stepped;
 use super::streams::Streams;
 use crate::circuit::Tran;
 use crate::integrate::Method;
@@ -38,50 +40,160 @@ const SHIFT: f64 = 0.1;
 /// Signals drawn, the worst first.
 const DRAWN: usize = 3;
 
-/// Compares a simulation with ngspice's or with a file; status 1 outside the tolerance.
+/// Compares a simulation with ngspice's or with a file; status 1 outside the tolerance. With `.step` every run is compared
+/// with ngspice's.
 ///
 /// # Errors
 /// See [`Failure`].
 pub(super) fn compare(args: &CompareArgs, streams: &Streams) -> Result<Exit, Failure> {
-    let subject = input::open(&args.input, &[], streams)?;
-    let tran = sim::tran(&subject).ok_or_else(|| {
-        Failure::Message(format!(
-            "{}: there is no `.tran` to compare",
-            args.input.file.display()
-        ))
-    })?;
-    let theirs = match args.against.to_str() {
-        Some("ngspice") => from_ngspice(args, &subject, tran, streams)?,
-        _ => from_file(&args.against)?,
-    };
-    let ours = simulated(args, &subject, tran, streams)?;
-    let shift = args.shift.unwrap_or(theirs.shift);
-    let found = compare_waveforms(&ours, &theirs.waveforms, At::ReferenceRows, shift)?;
-    let within = found.signals.iter().all(|s| s.shifted <= args.tol);
+    let (subject, cards) = input::open_with_cards(&args.input, &[], streams)?;
+    if let (Subject::Circuit(both), Some((netlist, sources))) = (&subject, cards)
+        && !both.0.steps.is_empty()
+    {
+        if with_ngspice(args) {
+            let stepped = Stepped {
+                input: &args.input,
+                probes: &[],
+                sweeps: &both.0.steps,
+                netlist,
+                sources,
+            };
+            return every(args, &stepped, streams);
+        }
+        streams
+            .say("note: `.step` is left out: the file is compared with the values as they stand");
+    }
+    let found = Found::of(args, &subject, streams)?;
     if let Some(path) = &args.output {
-        draw(path, &ours, &theirs, &found)?;
+        draw(path, &found)?;
     }
-    for note in &theirs.notes {
-        streams.say(format!("note: {note}"));
-    }
+    found.tell_notes(streams);
     if args.json {
-        let document = Document {
-            against: &theirs.name,
+        streams.data(json::line(&found.document(args)) + "\n")?;
+    } else {
+        streams.data(text::comparison(&found.comparison))?;
+        streams.say(found.verdict(args));
+    }
+    Ok(exit(found.within))
+}
+
+fn with_ngspice(args: &CompareArgs) -> bool {
+    args.against.to_str() == Some("ngspice")
+}
+
+const fn exit(within: bool) -> Exit {
+    if within { Exit::Done } else { Exit::No }
+}
+
+/// The comparisons of all runs of `.step`.
+fn every(args: &CompareArgs, stepped: &Stepped<'_>, streams: &Streams) -> Result<Exit, Failure> {
+    if args.output.is_some() || args.keep.is_some() {
+        let message = "`-o` and `--keep` take one run, and `.step` asks for several";
+        return Err(Failure::Message(format!(
+            "{}: {message}",
+            args.input.file.display()
+        )));
+    }
+    let (mut done, mut failures) = (Vec::new(), Vec::new());
+    for values in stepped.combinations() {
+        let label = stepped.label(&values);
+        let subject = stepped.subject(&values, streams)?;
+        let found = match Found::of(args, &subject, streams) {
+            Ok(found) => found,
+            Err(failure) => {
+                failures.push(format!("{failure} at {label}"));
+                continue;
+            }
+        };
+        if !args.json {
+            streams.data(format!(
+                "{label}\n{}\n",
+                text::comparison(&found.comparison)
+            ))?;
+            streams.say(format!("{label}: {}", found.verdict(args)));
+        }
+        found.tell_notes(streams);
+        done.push((stepped.named(&values), found));
+    }
+    let within = done.iter().all(|(_, found)| found.within);
+    if args.json {
+        let steps = done.iter().map(|(values, found)| Step {
+            values: values
+                .iter()
+                .map(|(n, v)| (n.clone(), (*v).into()))
+                .collect(),
+            document: found.document(args),
+        });
+        let document = Steps {
             tol: args.tol,
             within,
-            notes: &theirs.notes,
-            comparison: &found,
+            steps: steps.collect(),
         };
         streams.data(json::line(&document) + "\n")?;
-    } else {
-        streams.data(text::comparison(&found))?;
-        let verdict = if within { "within" } else { "outside" };
-        streams.say(format!(
-            "{verdict} the tolerance of {:e}, against {}",
-            args.tol, theirs.name
-        ));
     }
-    Ok(if within { Exit::Done } else { Exit::No })
+    if failures.is_empty() {
+        Ok(exit(within))
+    } else {
+        Err(Failure::Message(failures.join("\nerror: ")))
+    }
+}
+
+/// Both sides of a run, and how far they are apart.
+struct Found {
+    ours: Waveforms,
+    theirs: Theirs,
+    comparison: Comparison,
+    within: bool,
+}
+
+impl Found {
+    fn of(args: &CompareArgs, subject: &Subject, streams: &Streams) -> Result<Self, Failure> {
+        let tran = sim::tran(subject).ok_or_else(|| {
+            Failure::Message(format!(
+                "{}: there is no `.tran` to compare",
+                args.input.file.display()
+            ))
+        })?;
+        let theirs = if with_ngspice(args) {
+            from_ngspice(args, subject, tran, streams)?
+        } else {
+            from_file(&args.against)?
+        };
+        let ours = simulated(args, subject, tran, streams)?;
+        let shift = args.shift.unwrap_or(theirs.shift);
+        let comparison = compare_waveforms(&ours, &theirs.waveforms, At::ReferenceRows, shift)?;
+        let within = comparison.signals.iter().all(|s| s.shifted <= args.tol);
+        Ok(Self {
+            ours,
+            theirs,
+            comparison,
+            within,
+        })
+    }
+
+    fn document(&self, args: &CompareArgs) -> Document<'_> {
+        Document {
+            against: &self.theirs.name,
+            tol: args.tol,
+            within: self.within,
+            notes: &self.theirs.notes,
+            comparison: &self.comparison,
+        }
+    }
+
+    fn verdict(&self, args: &CompareArgs) -> String {
+        let verdict = if self.within { "within" } else { "outside" };
+        format!(
+            "{verdict} the tolerance of {:e}, against {}",
+            args.tol, self.theirs.name
+        )
+    }
+
+    fn tell_notes(&self, streams: &Streams) {
+        for note in &self.theirs.notes {
+            streams.say(format!("note: {note}"));
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -92,6 +204,20 @@ struct Document<'a> {
     notes: &'a [String],
     #[serde(flatten)]
     comparison: &'a Comparison,
+}
+
+#[derive(Serialize)]
+struct Steps<'a> {
+    tol: f64,
+    within: bool,
+    steps: Vec<Step<'a>>,
+}
+
+#[derive(Serialize)]
+struct Step<'a> {
+    values: Map<String, Value>,
+    #[serde(flatten)]
+    document: Document<'a>,
 }
 
 /// The other side.
@@ -209,14 +335,15 @@ fn simulated(
 }
 
 /// The worst signals on both sides, with their difference.
-fn draw(path: &Path, ours: &Waveforms, theirs: &Theirs, found: &Comparison) -> Result<(), Failure> {
+fn draw(path: &Path, found: &Found) -> Result<(), Failure> {
     if !path
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("svg") || e.eq_ignore_ascii_case("png"))
     {
         return Err(output::unknown_ending(path, "svg or png"));
     }
-    let mut worst: Vec<_> = found.signals.iter().collect();
+    let (ours, theirs) = (&found.ours, &found.theirs);
+    let mut worst: Vec<_> = found.comparison.signals.iter().collect();
     worst.sort_by(|a, b| b.max.total_cmp(&a.max));
     let names: Vec<String> = worst.iter().take(DRAWN).map(|s| s.name.clone()).collect();
     let delta = difference(ours, &theirs.waveforms)?;

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use super::args::{Method, SimArgs};
+use super::args::{Input, Method, SimArgs};
 use super::exit::Failure;
 use crate::forms::json::nonlinear::{self, NonlinearFile};
 use crate::integrate::Run;
@@ -13,16 +13,15 @@ use crate::waveform::Waveforms;
 ///
 /// # Errors
 /// [`Failure::Message`] when it is one with a fault.
-pub(super) fn open(args: &SimArgs) -> Result<Option<NonlinearFile>, Failure> {
-    let Ok(bytes) = fs::read(&args.input.file) else {
+pub(super) fn open(input: &Input) -> Result<Option<NonlinearFile>, Failure> {
+    let Ok(bytes) = fs::read(&input.file) else {
         return Ok(None);
     };
     let text = String::from_utf8_lossy(&bytes);
     if !text.trim_start().starts_with('{') {
         return Ok(None);
     }
-    nonlinear::read(&text)
-        .map_err(|e| Failure::Message(format!("{}: {e}", args.input.file.display())))
+    nonlinear::read(&text).map_err(|e| Failure::Message(format!("{}: {e}", input.file.display())))
 }
 
 /// Runs it by Moreau's scheme, the only one that these forms have.

@@ -25,13 +25,14 @@ pub(super) fn graph(args: &GraphArgs, streams: &Streams) -> Result<Exit, Failure
     {
         return Err(output::unknown_ending(path, "dot, svg or png"));
     }
-    let (circuit, _) = input::circuit(&args.input, streams)?;
+    let subject = input::open(&args.input, &[], streams)?;
+    let circuit = input::circuit_of(&args.input, &subject)?;
     match ending {
-        None => streams.data(graph::dot(&circuit))?,
+        None => streams.data(graph::dot(circuit))?,
         Some((path, ending)) if matches!(ending.as_str(), "dot" | "gv") => {
-            output::bytes_to_file(path, graph::dot(&circuit).as_bytes())?;
+            output::bytes_to_file(path, graph::dot(circuit).as_bytes())?;
         }
-        Some((path, _)) => output::picture_to_file(path, &graph::svg(&circuit)?)?,
+        Some((path, _)) => output::picture_to_file(path, &graph::svg(circuit)?)?,
     }
     Ok(Exit::Done)
 }

@@ -4,6 +4,7 @@ use std::fs;
 
 use super::args::{Diodes, Input};
 use super::exit::Failure;
+use super::forms;
 use super::render;
 use super::streams::Streams;
 use crate::circuit::{self, Circuit, ElaborateOptions};
@@ -28,7 +29,7 @@ pub enum Subject {
 /// Reads a file whose first character is `{` as a system; `None` for everything else.
 ///
 /// # Errors
-/// [`Failure::Message`] when it is JSON but no system.
+/// [`Failure::Message`] when it is JSON but no system, with the failed hypothesis of a nonlinear form.
 pub fn system(input: &Input) -> Result<Option<SystemFile>, Failure> {
     let Ok(bytes) = fs::read(&input.file) else {
         return Ok(None);
@@ -36,6 +37,12 @@ pub fn system(input: &Input) -> Result<Option<SystemFile>, Failure> {
     let text = String::from_utf8_lossy(&bytes);
     if !text.trim_start().starts_with('{') {
         return Ok(None);
+    }
+    if forms::open(input)?.is_some() {
+        return Err(Failure::Message(format!(
+            "{}: a nonlinear form, sound at its start; it has no matrices to work on, and is for `circ sim` alone",
+            input.file.display()
+        )));
     }
     let system = json::read(&text)
         .map_err(|e| Failure::Message(format!("{}: {e}", input.file.display())))?;
@@ -123,13 +130,13 @@ pub fn keep_probes(circuit: &mut Circuit, probes: &[String]) -> Result<(), Failu
     Ok(())
 }
 
-/// The circuit of a netlist.
+/// The circuit of a subject.
 ///
 /// # Errors
-/// As [`open`]; a system has no circuit.
-pub fn circuit(input: &Input, streams: &Streams) -> Result<(Circuit, Behaviour), Failure> {
-    match open(input, &[], streams)? {
-        Subject::Circuit(both) => Ok(*both),
+/// [`Failure::Message`]: a system has no circuit.
+pub fn circuit_of<'s>(input: &Input, subject: &'s Subject) -> Result<&'s Circuit, Failure> {
+    match subject {
+        Subject::Circuit(both) => Ok(&both.0),
         Subject::System(_) => {
             let message = "is a system without a circuit; this command needs a netlist";
             Err(Failure::Message(format!(

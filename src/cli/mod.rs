@@ -17,6 +17,7 @@ mod op;
 pub mod output;
 mod render;
 pub mod sim;
+mod stepped;
 mod steps;
 pub mod streams;
 

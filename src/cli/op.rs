@@ -6,28 +6,98 @@ use serde_json::{Map, Value};
 use super::args::OpArgs;
 use super::exit::{Exit, Failure};
 use super::input;
+use super::stepped::Stepped;
 use super::streams::Streams;
+use crate::circuit::Circuit;
 use crate::integrate::{OperatingPoint, Values, operating_point};
-use crate::report::{json, si, table};
+use crate::report::{json, si, steps, table};
 use crate::settings::Settings;
 
-/// Prints the operating point with the sources' DC values.
+/// Prints the operating point with the sources' DC values, with `.step` that of every combination of its values.
 ///
 /// # Errors
 /// See [`Failure`].
 pub(super) fn op(args: &OpArgs, streams: &Streams) -> Result<Exit, Failure> {
-    let (circuit, _) = input::circuit(&args.input, streams)?;
-    let point = operating_point(&circuit, Values::Dc, false, &Settings::default())
-        .map_err(|e| Failure::Message(format!("{}: {e}", args.input.file.display())))?;
+    let (subject, cards) = input::open_with_cards(&args.input, &[], streams)?;
+    let circuit = input::circuit_of(&args.input, &subject)?;
+    let solved = |circuit: &Circuit| {
+        operating_point(circuit, Values::Dc, false, &Settings::default())
+            .map_err(|e| Failure::Message(format!("{}: {e}", args.input.file.display())))
+    };
+    let (netlist, sources) = match cards {
+        Some(cards) if !circuit.steps.is_empty() => cards,
+        _ => return one(args, &solved(circuit)?, streams),
+    };
+    let stepped = Stepped {
+        input: &args.input,
+        probes: &[],
+        sweeps: &circuit.steps,
+        netlist,
+        sources,
+    };
+    let (mut points, mut failures) = (Vec::new(), Vec::new());
+    for values in stepped.combinations() {
+        let subject = stepped.subject(&values, streams)?;
+        match solved(input::circuit_of(&args.input, &subject)?) {
+            Ok(point) => points.push((stepped.named(&values), point)),
+            Err(failure) => failures.push(format!("{failure} at {}", stepped.label(&values))),
+        }
+    }
     if args.json {
-        streams.data(json::line(&Document::of(&point)) + "\n")?;
+        // The point with the values as they stand, as of a netlist without `.step`.
+        let own = solved(circuit)?;
+        let steps = points.iter().map(|(values, point)| StepDocument {
+            values: values
+                .iter()
+                .map(|(n, v)| (n.clone(), (*v).into()))
+                .collect(),
+            point: Document::of(point),
+        });
+        let document = SteppedDocument {
+            point: Document::of(&own),
+            steps: steps.collect(),
+        };
+        streams.data(json::line(&document) + "\n")?;
+    } else {
+        for (values, point) in &points {
+            let label = steps::label(values);
+            for note in &point.notes {
+                streams.say(format!("note: {label}: {note}"));
+            }
+            streams.data(format!("{label}\n{}\n", words(point)))?;
+        }
+    }
+    if failures.is_empty() {
+        Ok(Exit::Done)
+    } else {
+        Err(Failure::Message(failures.join("\nerror: ")))
+    }
+}
+
+fn one(args: &OpArgs, point: &OperatingPoint, streams: &Streams) -> Result<Exit, Failure> {
+    if args.json {
+        streams.data(json::line(&Document::of(point)) + "\n")?;
         return Ok(Exit::Done);
     }
     for note in &point.notes {
         streams.say(format!("note: {note}"));
     }
-    streams.data(words(&point))?;
+    streams.data(words(point))?;
     Ok(Exit::Done)
+}
+
+#[derive(Serialize)]
+struct SteppedDocument<'a> {
+    #[serde(flatten)]
+    point: Document<'a>,
+    steps: Vec<StepDocument<'a>>,
+}
+
+#[derive(Serialize)]
+struct StepDocument<'a> {
+    values: Map<String, Value>,
+    #[serde(flatten)]
+    point: Document<'a>,
 }
 
 #[derive(Serialize)]

@@ -9,6 +9,7 @@ use super::forms;
 use super::input::{self, Subject};
 use super::measured::{self, Measuring};
 use super::output::{self, Format};
+use super::stepped::Stepped;
 use super::steps::Stepping;
 use super::streams::Streams;
 use crate::circuit::{Circuit, Tran};
@@ -33,7 +34,7 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         .map(|path| Format::of(path))
         .collect::<Result<Vec<_>, _>>()?;
     let request = Request::of(&args.method, args.events)?;
-    if let Some(form) = forms::open(args)? {
+    if let Some(form) = forms::open(&args.input)? {
         let finished = (forms::run(&form, args)?, Measurements::default());
         return finish(args, &formats, (Some(finished), None), streams);
     }
@@ -44,11 +45,16 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
             return dc::sim(args, circuit, &netlist, &sources, streams);
         }
         if !circuit.steps.is_empty() {
-            let stepping = Stepping {
-                args,
-                circuit,
+            let stepped = Stepped {
+                input: &args.input,
+                probes: &args.probes,
+                sweeps: &circuit.steps,
                 netlist,
                 sources,
+            };
+            let stepping = Stepping {
+                args,
+                stepped,
                 request,
             };
             return stepping.sim(&formats, streams);

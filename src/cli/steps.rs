@@ -6,15 +6,11 @@ use rayon::prelude::*;
 
 use super::args::{SimArgs, Summary};
 use super::exit::{Exit, Failure};
-use super::input::{self, Subject};
 use super::output::{self, Format};
 use super::sim::{self, Request};
+use super::stepped::Stepped;
 use super::streams::Streams;
-use crate::circuit::{Circuit, combinations, elaborate};
-use crate::diagnostic::{Diagnostic, SourceMap};
 use crate::integrate::SimError;
-use crate::mna;
-use crate::netlist::Netlist;
 use crate::report::figure::Figure;
 use crate::report::steps::{self, Step};
 use crate::report::{terminal, text};
@@ -24,12 +20,8 @@ use crate::waveform::csv;
 pub(super) struct Stepping<'a> {
     /// The command line.
     pub args: &'a SimArgs,
-    /// The circuit with the values as they stand.
-    pub circuit: &'a Circuit,
-    /// Its cards.
-    pub netlist: Netlist,
-    /// The files they stand in.
-    pub sources: SourceMap,
+    /// The circuits.
+    pub stepped: Stepped<'a>,
     /// How to integrate.
     pub request: Request,
 }
@@ -40,7 +32,7 @@ type Outcome = (Option<Step>, Option<SimError>);
 impl Stepping<'_> {
     /// Runs, writes and tells.
     pub(super) fn sim(&self, formats: &[Format], streams: &Streams) -> Result<Exit, Failure> {
-        let combinations = combinations(&self.circuit.steps);
+        let combinations = self.stepped.combinations();
         let bar = streams.progress(combinations.len() as u64, "stepping");
         let quiet = Streams {
             quiet: true,
@@ -63,7 +55,7 @@ impl Stepping<'_> {
                 format!(
                     "{} at {}: {error}",
                     self.args.input.file.display(),
-                    steps::label(&self.named(values))
+                    self.stepped.label(values)
                 )
             }));
         }
@@ -77,27 +69,12 @@ impl Stepping<'_> {
         }
     }
 
-    fn named(&self, values: &[f64]) -> Vec<(String, f64)> {
-        let names = self.circuit.steps.iter().map(|s| s.what.name().to_string());
-        names.zip(values.iter().copied()).collect()
-    }
-
     /// The run with these values.
     fn one(&self, values: &[f64], streams: &Streams) -> Result<Outcome, Failure> {
-        let options = input::choices(&self.args.input).at(&self.circuit.steps, values);
-        let refused = |findings: &[Diagnostic]| {
-            input::show(findings, &self.sources, streams);
-            let faults = input::faults(&self.args.input, findings);
-            Failure::Faults(format!("{faults} at {}", steps::label(&self.named(values))))
-        };
-        let (circuit, findings) = elaborate(&self.netlist, &options);
-        let mut circuit = circuit.ok_or_else(|| refused(&findings))?;
-        input::keep_probes(&mut circuit, &self.args.probes)?;
-        let behaviour = mna::behaviour(&circuit).map_err(|findings| refused(&findings))?;
-        let subject = Subject::Circuit(Box::new((circuit, behaviour)));
+        let subject = self.stepped.subject(values, streams)?;
         let (finished, error) = sim::measured_run(&subject, &self.request, streams)?;
         let step = finished.map(|(run, found)| Step {
-            values: self.named(values),
+            values: self.stepped.named(values),
             run,
             found,
         });

@@ -29,7 +29,8 @@ pub struct Verdict {
     pub error: f64,
 }
 
-/// A step is doubled where the error of the doubled one would still leave this factor of room.
+/// A step is doubled, and doubled again, where the error of the longer one would still leave this factor of room: a step that an
+/// edge cut short says nothing against the next one.
 const ROOM: f64 = 2.0;
 
 /// The part of the tolerance that is granted where the solution has corners (a diode that turns on): they are few, and shorter
@@ -62,13 +63,15 @@ impl Control {
         let error = difference / (2_f64.powi(self.order) - 1.0);
         let allowed = self.tol * (h / self.span).max(self.grant);
         let accept = error <= allowed;
-        let next = if !accept {
-            0.5 * h
-        } else if error * ROOM * 2_f64.powi(self.order) <= allowed {
-            2.0 * h
-        } else {
-            h
-        };
+        let mut next = if accept { h } else { 0.5 * h };
+        if accept {
+            let doubled = 2_f64.powi(self.order);
+            let mut expected = error * ROOM * doubled;
+            while expected <= allowed && next < self.span {
+                next *= 2.0;
+                expected *= doubled;
+            }
+        }
         Verdict {
             accept,
             next,

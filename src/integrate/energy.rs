@@ -46,8 +46,8 @@ impl PowerForms {
         let ends = columns.rows(&no_x, &identity, 1.0, &none);
         let starts = columns.rows(&no_x, &identity, 0.0, &none);
         let du = (ends - starts) / h;
-        let over_z = |rows: &Rows, i: usize| -> DVector<f64> {
-            let mut row = DVector::zeros(width);
+        let over_z = |rows: &Rows| -> DMatrix<f64> {
+            let mut table = DMatrix::zeros(terms.len(), width);
             let blocks = [
                 (&rows.x, &x),
                 (&rows.lambda, lambda),
@@ -55,24 +55,25 @@ impl PowerForms {
                 (&rows.du, &du),
             ];
             for (block, map) in blocks {
-                if i < block.nrows() && block.ncols() == map.nrows() {
-                    row += (block.row(i) * map).transpose();
+                if block.nrows() == terms.len() && block.ncols() == map.nrows() {
+                    table += block * map;
                 }
             }
-            row[width - 1] += if i < rows.one.len() { rows.one[i] } else { 0.0 };
-            row
-        };
-        let mut source = DMatrix::zeros(width, width);
-        let mut dissipated = DMatrix::zeros(width, width);
-        for (i, term) in terms.iter().enumerate() {
-            let v = over_z(&lcs.outputs.power_v, i);
-            let current = over_z(&lcs.outputs.power_i, i);
-            let product = &v * current.transpose() * h;
-            match term.kind {
-                PowerKind::Source => source -= product,
-                PowerKind::Dissipated => dissipated += product,
+            for (i, one) in rows.one.iter().enumerate().take(terms.len()) {
+                table[(i, width - 1)] += one;
             }
-        }
+            table
+        };
+        let (v, i) = (over_z(&lcs.outputs.power_v), over_z(&lcs.outputs.power_i));
+        let sum = |kind: PowerKind, sign: f64| -> DMatrix<f64> {
+            let of_kind = (0..terms.len()).filter(|&k| terms[k].kind == kind);
+            let rows: Vec<usize> = of_kind.collect();
+            v.select_rows(&rows).tr_mul(&i.select_rows(&rows)) * (sign * h)
+        };
+        let (source, dissipated) = (
+            sum(PowerKind::Source, -1.0),
+            sum(PowerKind::Dissipated, 1.0),
+        );
         let pack = |q: DMatrix<f64>| {
             // zᵀQz with Q folded onto its upper triangle, row by row; nothing where Q = 0.
             if q.amax() == 0.0 {
@@ -123,6 +124,7 @@ pub fn power(lcs: &Lcs, at: Point<'_>) -> (f64, f64) {
         match term.kind {
             PowerKind::Source => source -= product,
             PowerKind::Dissipated => dissipated += product,
+            PowerKind::Line => {}
         }
     }
     (source, dissipated)

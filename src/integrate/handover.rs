@@ -3,6 +3,9 @@
 //! Steps have no events to miss and no modes to find: where events accumulate, switches contradict each other or the
 //! complementarity problem at an event has no mode as its solution, the implicit step still has a solution.
 
+#[cfg(test)]
+mod tests;
+
 use crate::integrate::exact::{Exact, Place};
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
 use crate::integrate::stats::Stats;
@@ -49,6 +52,8 @@ pub(crate) struct Handover<'a> {
     interruptions: Vec<Interruption>,
     stats: Stats,
     notes: Vec<String>,
+    /// The estimated error of all steps, relative to amplitudes: the exact integration adds none.
+    error: Option<f64>,
 }
 
 impl<'a> Handover<'a> {
@@ -65,6 +70,7 @@ impl<'a> Handover<'a> {
             interruptions: Vec::new(),
             stats: Stats::default(),
             notes: Vec::new(),
+            error: None,
         }
     }
 
@@ -81,8 +87,10 @@ impl<'a> Handover<'a> {
             self.shortest
         };
         self.interrupt(error, place.t);
+        let mut theta = (self.takeover)(&place)?;
+        theta.estimate_errors();
         self.stepping = Some(Stepping {
-            theta: (self.takeover)(&place)?,
+            theta,
             since: place.t,
             until: place.t + self.interval,
         });
@@ -133,7 +141,15 @@ impl<'a> Handover<'a> {
 
     /// Books the steps taken since `since`.
     fn account(&mut self, since: f64, t: f64, outcome: Outcome) {
-        let Outcome { stats, notes, .. } = outcome;
+        let Outcome {
+            stats,
+            notes,
+            error_estimate,
+            ..
+        } = outcome;
+        if let Some(error) = error_estimate {
+            *self.error.get_or_insert(0.0) += error;
+        }
         self.stats.steps += stats.steps;
         self.stats.rejected += stats.rejected;
         self.stats.events += stats.events;
@@ -242,6 +258,7 @@ impl Stepper for Handover<'_> {
         stats.lcp_solves += lcp_solves;
         stats.pivotings += pivotings;
         stats.factorisations += factorisations;
+        outcome.error_estimate = self.error;
         outcome.notes.extend(self.interruption_notes());
         outcome.notes.append(&mut self.notes);
         outcome

@@ -2,6 +2,7 @@
 
 use crate::circuit::Source;
 use crate::circuit::source::{Wave, crossings};
+use crate::integrate::line::{Line, Lines};
 use crate::lcs::Input;
 
 /// All inputs u(t) with their one-sided limits and breakpoints.
@@ -9,6 +10,9 @@ use crate::lcs::Input;
 pub struct Inputs {
     sources: Vec<Source>,
     varying: Vec<usize>,
+    /// By input: the line and the port at which it arrives.
+    arriving: Vec<Option<(usize, usize)>>,
+    lines: Lines,
 }
 
 /// Steps of the error-controlled steppers per period of the fastest sine: an error estimate must not alias.
@@ -22,7 +26,36 @@ impl Inputs {
         let varying = (0..sources.len())
             .filter(|&j| !is_constant(&sources[j].wave))
             .collect();
-        Self { sources, varying }
+        Self {
+            arriving: vec![None; sources.len()],
+            lines: Lines::default(),
+            sources,
+            varying,
+        }
+    }
+
+    /// Has the inputs of these names be the waves that arrive at the ports of lines.
+    pub(crate) fn attach(&mut self, inputs: &[Input], lines: &[Line]) {
+        self.lines = Lines::new(lines);
+        for (arriving, input) in self.arriving.iter_mut().zip(inputs) {
+            let port = |line: &Line| line.sources.iter().position(|s| *s == input.name);
+            let mut found = lines.iter().enumerate();
+            *arriving = found.find_map(|(k, line)| Some((k, port(line)?)));
+        }
+    }
+
+    /// What travels on lines.
+    pub(crate) const fn lines(&self) -> &Lines {
+        &self.lines
+    }
+
+    /// What travels on lines.
+    pub(crate) const fn lines_mut(&mut self) -> &mut Lines {
+        &mut self.lines
+    }
+
+    fn value(&self, j: usize, t: f64) -> f64 {
+        self.arriving[j].map_or_else(|| self.sources[j].value(t), |at| self.lines.right(at, t))
     }
 
     /// Indices of the inputs that are not constant.
@@ -34,20 +67,23 @@ impl Inputs {
     /// Right limits u(t⁺) of all inputs.
     #[must_use]
     pub fn all(&self, t: f64) -> Vec<f64> {
-        self.sources.iter().map(|s| s.value(t)).collect()
+        (0..self.sources.len()).map(|j| self.value(j, t)).collect()
     }
 
     /// Writes right limits of the varying inputs.
     pub fn right(&self, t: f64, u: &mut [f64]) {
         for &j in &self.varying {
-            u[j] = self.sources[j].value(t);
+            u[j] = self.value(j, t);
         }
     }
 
     /// Writes left limits of the varying inputs.
     pub fn left(&self, t: f64, u: &mut [f64]) {
         for &j in &self.varying {
-            u[j] = self.sources[j].value_left(t);
+            u[j] = match self.arriving[j] {
+                Some(at) => self.lines.left(at, t),
+                None => self.sources[j].value_left(t),
+            };
         }
     }
 
@@ -55,7 +91,10 @@ impl Inputs {
     pub fn slopes(&self, t: f64, du: &mut [f64]) {
         du.fill(0.0);
         for &j in &self.varying {
-            du[j] = self.sources[j].derivative(t);
+            du[j] = match self.arriving[j] {
+                Some(at) => self.lines.slope(at, t),
+                None => self.sources[j].derivative(t),
+            };
         }
     }
 
@@ -65,7 +104,7 @@ impl Inputs {
         self.varying
             .iter()
             .filter_map(|&j| self.sources[j].next_breakpoint(t))
-            .fold(f64::INFINITY, f64::min)
+            .fold(self.lines.next_breakpoint(t), f64::min)
     }
 
     /// The first time in (from, to] at which `constant + gains·u` passes `level` upwards (`rising`) or downwards.
@@ -127,6 +166,7 @@ impl Inputs {
 
 fn is_constant(wave: &Wave) -> bool {
     match wave {
+        Wave::Arriving { .. } => false,
         Wave::Dc(_) => true,
         Wave::Sin { amplitude, .. } => *amplitude == 0.0,
         Wave::Pulse { v1, v2, .. } | Wave::Exp { v1, v2, .. } => v1 == v2,
@@ -138,6 +178,7 @@ fn is_constant(wave: &Wave) -> bool {
 fn amplitude(wave: &Wave) -> f64 {
     match wave {
         Wave::Dc(value) => value.abs(),
+        Wave::Arriving { initial, .. } => initial.abs(),
         Wave::Sin {
             offset, amplitude, ..
         }

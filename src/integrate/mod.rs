@@ -10,6 +10,7 @@ mod handover;
 pub mod inputs;
 pub mod jump;
 mod lawful;
+pub mod line;
 pub mod reading;
 mod roles;
 pub mod run;

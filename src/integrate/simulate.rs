@@ -3,18 +3,19 @@
 use cpu_time::ThreadTime;
 use nalgebra::DVector;
 
-use crate::circuit::{Circuit, Tran};
+use crate::circuit::{self, Circuit, ElementId, Tran};
 use crate::integrate::Run;
 use crate::integrate::control::Amplitudes;
 use crate::integrate::exact::{self, Exact, Place};
 use crate::integrate::handover::Handover;
+use crate::integrate::line::Line;
 use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, Stepper, run};
 use crate::integrate::step::Scheme;
-use crate::integrate::switching::Threshold;
+use crate::integrate::switching::{Threshold, at_start};
 use crate::integrate::theta::{Setup, Start, Stepping, Theta};
 use crate::integrate::{roles, start};
 use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
-use crate::mna::{Behaviour, SwitchPort};
+use crate::mna::Behaviour;
 use crate::plan::{Plan, not_exact, plan};
 use crate::settings::Settings;
 
@@ -85,6 +86,7 @@ pub fn simulate(
     let mut notes: Vec<String> = behaviour.notes.iter().map(|n| n.message.clone()).collect();
     notes.extend(initial.notes);
     let problem = Problem {
+        lines: lines(circuit, &initial.waves),
         position: initial.switches,
         settle: standard
             .switches
@@ -114,6 +116,7 @@ pub fn simulate_system(
     let mut start = DVector::zeros(behaviour.storage.len());
     start.rows_mut(0, x.len()).copy_from(x);
     let problem = Problem {
+        lines: vec![],
         position: vec![],
         settle: vec![],
         start,
@@ -124,12 +127,27 @@ pub fn simulate_system(
     drive(problem, tran, options)
 }
 
+/// The transmission lines of a circuit; `waves` are what arrives at first, line by line.
+fn lines(circuit: &Circuit, waves: &[[f64; 2]]) -> Vec<Line> {
+    let name = |id: ElementId| circuit.elements[id.index()].name.clone();
+    let line = |(line, initial): (&circuit::Line, &[f64; 2])| Line {
+        impedance: line.impedance.f64,
+        delay: line.delay,
+        impedances: line.ports.map(|port| name(port.impedance)),
+        sources: line.ports.map(|port| name(port.wave)),
+        initial: *initial,
+    };
+    circuit.lines.iter().zip(waves).map(line).collect()
+}
+
 /// What the steppers share.
 struct Problem<'a> {
     /// As given.
     original: &'a Behaviour,
     /// All laws as ideal pairs.
     behaviour: Behaviour,
+    /// Transmission lines.
+    lines: Vec<Line>,
     position: Vec<bool>,
     /// Switches whose start position follows from the start state.
     settle: Vec<bool>,
@@ -159,12 +177,7 @@ impl Problem<'_> {
     }
 
     fn thresholds(&self) -> Vec<Threshold> {
-        let threshold = |s: &SwitchPort| Threshold {
-            name: s.name.clone(),
-            on_above: s.on_above,
-            off_below: s.off_below,
-        };
-        self.behaviour.switches.iter().map(threshold).collect()
+        self.behaviour.switches.iter().map(Threshold::of).collect()
     }
 
     /// `lcs` is the system of the start position.
@@ -199,7 +212,7 @@ impl Problem<'_> {
         stepping: Stepping,
         settings: &Settings,
     ) -> Result<Theta<'_>, SimError> {
-        Theta::new(Setup {
+        let mut theta = Theta::new(Setup {
             reduce: Box::new(|position| self.free(position)),
             position: place.switches,
             thresholds: self.thresholds(),
@@ -209,7 +222,9 @@ impl Problem<'_> {
             stepping,
             longest: tran.tmax.unwrap_or(f64::INFINITY),
             settings: settings.clone(),
-        })
+        })?;
+        theta.attach(&self.lines);
+        Ok(theta)
     }
 
     /// See [`roles`]; returns the system of the start position.
@@ -234,7 +249,7 @@ impl Problem<'_> {
             let start = self.start();
             let mut theta = self.stepper(start, tran, Scheme::MOREAU, stepping, settings)?;
             let controls = theta.controls_at_start()?;
-            let wanted: Vec<bool> = (0..controls.len())
+            let asked: Vec<bool> = (0..controls.len())
                 .map(|k| {
                     let switch = &self.behaviour.switches[k];
                     match (self.settle[k], self.position[k]) {
@@ -244,6 +259,7 @@ impl Problem<'_> {
                     }
                 })
                 .collect();
+            let wanted = at_start(&self.behaviour.switches, asked);
             drop(theta);
             // Positions that contradict each other are left to the run.
             if wanted == self.position || seen.contains(&wanted) {
@@ -252,6 +268,18 @@ impl Problem<'_> {
             seen.push(std::mem::replace(&mut self.position, wanted));
         }
         Ok(!seen.is_empty())
+    }
+
+    /// The error of a line whose delay asks for more steps than a run may take.
+    fn too_short(&self, tran: &Tran, settings: &Settings) -> Option<SimError> {
+        let limit = settings.max_steps;
+        let asks = |line: &&Line| tran.tstop / line.longest_step() > limit as f64;
+        let line = self.lines.iter().find(asks)?;
+        let what = format!(
+            "a delay of {:e} s asks for more than {limit} steps until {:e} s; a resistor or a short may take the line's place",
+            line.delay, tran.tstop
+        );
+        Some(SimError::before(Reason::Unsupported(what)).device(line.sources[0].clone()))
     }
 
     /// Amplitudes from a coarse run.
@@ -344,6 +372,9 @@ fn dispatch(
         return Err(SimError::before(Reason::Unsupported(format!(
             "no exact integration: {obstacle}"
         ))));
+    }
+    if let Some(line) = problem.too_short(&tran, &options.settings) {
+        return Err(line);
     }
     let grid = Grid {
         tstart: tran.tstart,

@@ -3,11 +3,13 @@
 use nalgebra::DVector;
 
 use crate::circuit::{
-    Circuit, Element, ElementId, Kind, NodeId, Probe, Probed, Source, source::Wave,
+    Circuit, Element, ElementId, Kind, Line, LinePort, NodeId, Output, Probe, Probed, Source,
+    source::Wave,
 };
 use crate::integrate::lawful;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Reason, SimError};
+use crate::integrate::switching::at_start;
 use crate::lcs::{Hold, Lcs, Position, ReduceError, StorageHold, reduce};
 use crate::mna::{Behaviour, behaviour};
 use crate::settings::Settings;
@@ -20,6 +22,8 @@ pub struct Initial {
     pub storage: DVector<f64>,
     /// Switch positions.
     pub switches: Vec<bool>,
+    /// The waves that arrive at the two ends of every transmission line, V.
+    pub waves: Vec<[f64; 2]>,
     /// Things the user should know.
     pub notes: Vec<String>,
 }
@@ -108,6 +112,7 @@ pub fn operating_point(
 ) -> Result<OperatingPoint, SimError> {
     let mut notes = Vec::new();
     let mut statics = observed_circuit(circuit);
+    without_delay(&mut statics);
     tie_floating(circuit, &mut statics, hold_ic, &mut notes);
     if hold_ic {
         hold_initial_voltages(circuit, &mut statics);
@@ -117,11 +122,7 @@ pub fn operating_point(
         SimError::before(Reason::NoOperatingPoint(words.join("; ")))
     })?;
     let behaviour = behaviour.standard();
-    let mut position: Vec<bool> = behaviour
-        .switches
-        .iter()
-        .map(|s| s.initial.unwrap_or(false))
-        .collect();
+    let mut position = of_cards(&behaviour);
     if let Some(guess) = from_nodesets(circuit, values, settings) {
         for ((position, switch), on) in position.iter_mut().zip(&behaviour.switches).zip(guess) {
             *position = switch.initial.unwrap_or(on);
@@ -130,12 +131,13 @@ pub fn operating_point(
     let mut seen = Vec::new();
     loop {
         let point = static_solution(&behaviour, &position, values, settings)?;
-        let wanted: Vec<bool> = behaviour
+        let asked: Vec<bool> = behaviour
             .switches
             .iter()
             .zip(&point.controls)
             .map(|(s, &control)| s.initial.unwrap_or(control > s.on_above))
             .collect();
+        let wanted = at_start(&behaviour.switches, asked);
         if wanted == position {
             notes.extend(point.notes);
             let count = circuit.nodes.len() - 1;
@@ -174,6 +176,13 @@ pub fn operating_point(
     }
 }
 
+/// The positions that the cards of the switches name, off where they name none.
+fn of_cards(behaviour: &Behaviour) -> Vec<bool> {
+    let named = behaviour.switches.iter();
+    let asked = named.map(|s| s.initial.unwrap_or(false)).collect();
+    at_start(&behaviour.switches, asked)
+}
+
 /// Switch positions of the operating point with the voltages of `.nodeset` held; `None` without such a point.
 fn from_nodesets(circuit: &Circuit, values: Values, settings: &Settings) -> Option<Vec<bool>> {
     if circuit.nodesets.is_empty() {
@@ -203,6 +212,25 @@ fn observed_circuit(circuit: &Circuit) -> Circuit {
     Circuit {
         probes: nodes.chain(currents).collect(),
         ..circuit.clone()
+    }
+}
+
+/// What `wave` says arrives at both ends of every line.
+fn waves(circuit: &Circuit, wave: impl Fn(&LinePort) -> f64) -> Vec<[f64; 2]> {
+    let ends = |line: &Line| [wave(&line.ports[0]), wave(&line.ports[1])];
+    circuit.lines.iter().map(ends).collect()
+}
+
+/// Has what leaves the ends of lines arrive at the others at once, which makes them shorts: v₁ = v₂, i₁ = −i₂.
+fn without_delay(statics: &mut Circuit) {
+    for line in statics.lines.clone() {
+        for (here, there) in [(0, 1), (1, 0)] {
+            let control = line.leaving(there, statics);
+            statics.elements[line.ports[here].wave.index()].kind = Kind::Controlled {
+                output: Output::Voltage,
+                control,
+            };
+        }
     }
 }
 
@@ -427,11 +455,13 @@ pub fn initial(
     if uic {
         return Ok(Initial {
             storage: from_initial_conditions(circuit, behaviour),
-            switches: behaviour
-                .switches
-                .iter()
-                .map(|s| s.initial.unwrap_or(false))
-                .collect(),
+            switches: of_cards(behaviour),
+            waves: waves(circuit, |port| {
+                match circuit.elements[port.wave.index()].kind {
+                    Kind::VoltageSource(ref source) => source.wave.value(0.0),
+                    _ => 0.0,
+                }
+            }),
             notes: Vec::new(),
         });
     }
@@ -443,6 +473,15 @@ pub fn initial(
     Ok(Initial {
         storage: DVector::from_vec(point.storage),
         switches: point.switches.iter().map(|(_, on)| *on).collect(),
+        waves: waves(circuit, |port| {
+            let source = &circuit.elements[port.wave.index()];
+            let volts = |node: NodeId| {
+                node.index()
+                    .checked_sub(1)
+                    .map_or(0.0, |k| point.nodes[k].1)
+            };
+            volts(source.p) - volts(source.n)
+        }),
         notes,
     })
 }

@@ -371,6 +371,19 @@ impl StepMatrices {
         self.phi.abs() * DVector::from_column_slice(z).abs() + self.response.abs() * lambda.abs()
     }
 
+    /// What a small change of x has become at the end of a step to (λ, y) on curved laws.
+    pub(crate) fn carried(
+        &self,
+        change: &DVector<f64>,
+        lambda: &DVector<f64>,
+        y: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        let n = change.len();
+        let dq = self.q.columns(0, n) * change;
+        let response = self.driver.response(lambda, y, &dq)?;
+        Some(self.phi.columns(0, n) * change + &self.response * response)
+    }
+
     /// x⁺ for a given λ.
     pub(crate) fn x_next(&self, z: &[f64], lambda: &DVector<f64>) -> DVector<f64> {
         &self.phi * DVector::from_column_slice(z) + &self.response * lambda

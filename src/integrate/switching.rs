@@ -1,8 +1,12 @@
 //! Switches: their positions, thresholds, and when controls cross them.
+//!
+//! The switch of a thyristor is a latch: on while one of its gates is, afterwards as long as the valve in series conducts more
+//! than the holding current. It therefore turns on only with a gate and off only without one, at the zero of its current.
 
 use crate::integrate::inputs::Inputs;
 use crate::integrate::reading::{self, Point};
 use crate::lcs::Lcs;
+use crate::mna::{LatchPort, SwitchPort};
 
 /// Thresholds of one switch.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,18 +17,103 @@ pub struct Threshold {
     pub on_above: f64,
     /// Turns off when the control is below this.
     pub off_below: f64,
+    /// What holds the switch of a thyristor.
+    pub latch: Option<LatchPort>,
+}
+
+/// Turns on every latch one of whose gates is on, and gives the switches that depend on latches their positions.
+pub(crate) fn fire(thresholds: &[Threshold], position: &mut [bool]) {
+    for (i, threshold) in thresholds.iter().enumerate() {
+        if threshold.gated(position) {
+            position[i] = true;
+        }
+    }
+    for (i, threshold) in thresholds.iter().enumerate() {
+        if let Some(LatchPort::Rest(latch)) = threshold.latch {
+            position[i] = !position[latch];
+        }
+    }
+}
+
+/// Positions at a start from nothing, where a latch is on if a gate is; `asked` is what the controls ask the switches for.
+pub(crate) fn at_start(switches: &[SwitchPort], mut asked: Vec<bool>) -> Vec<bool> {
+    let thresholds: Vec<Threshold> = switches.iter().map(Threshold::of).collect();
+    for (i, threshold) in thresholds.iter().enumerate() {
+        if threshold.latch.is_some() {
+            asked[i] = false;
+        }
+    }
+    fire(&thresholds, &mut asked);
+    asked
 }
 
 impl Threshold {
+    /// Those of a switch.
+    #[must_use]
+    pub fn of(switch: &SwitchPort) -> Self {
+        Self {
+            name: switch.name.clone(),
+            on_above: switch.on_above,
+            off_below: switch.off_below,
+            latch: switch.latch.clone(),
+        }
+    }
+
+    /// The device in series with a thyristor's switch.
+    #[must_use]
+    pub fn valve(&self) -> Option<&str> {
+        match &self.latch {
+            Some(LatchPort::Hold { valve, .. }) => Some(valve),
+            _ => None,
+        }
+    }
+
+    /// Whether a gate holds it on; `position` is that of all switches.
+    #[must_use]
+    pub fn gated(&self, position: &[bool]) -> bool {
+        match &self.latch {
+            Some(LatchPort::Hold { gates, .. }) => gates.iter().any(|&gate| position[gate]),
+            _ => false,
+        }
+    }
+
+    /// Whether it is the switch of a thyristor that conducts without a gate.
+    #[must_use]
+    pub fn holds(&self, on: bool, position: &[bool]) -> bool {
+        on && self.valve().is_some() && !self.gated(position)
+    }
+
+    /// Whether it moves with a latch and is not worth a word.
+    pub(crate) const fn is_rest(&self) -> bool {
+        matches!(self.latch, Some(LatchPort::Rest(_)))
+    }
+
+    /// How far a control value is beyond the threshold that a switch in this position waits for.
+    #[must_use]
+    pub fn excess(&self, on: bool, control: f64) -> f64 {
+        if on {
+            self.off_below - control
+        } else {
+            control - self.on_above
+        }
+    }
+
     /// The position that a control value asks for.
     #[must_use]
     pub fn position(&self, on: bool, control: f64) -> bool {
-        if on {
-            control >= self.off_below
-        } else {
-            control > self.on_above
-        }
+        on != (self.excess(on, control) > 0.0)
     }
+}
+
+/// What controls ask of the switches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Change {
+    /// They stay.
+    None,
+    /// Thyristors whose current has ended block from now on: nothing moves at this moment.
+    Release,
+    /// Some move, at the time at which a control passes its threshold.
+    Passage,
 }
 
 /// The switches of a run.
@@ -34,16 +123,20 @@ pub(crate) struct Switches {
     thresholds: Vec<Threshold>,
     /// Whether each control depends on sources alone, in the present system.
     driven: Vec<bool>,
+    /// By switch: the port of a latch's valve in the present system.
+    valves: Vec<Option<usize>>,
     needs_lambda: bool,
     in_this_step: u32,
 }
 
 impl Switches {
-    pub(crate) fn new(position: Vec<bool>, thresholds: Vec<Threshold>, lcs: &Lcs) -> Self {
+    pub(crate) fn new(mut position: Vec<bool>, thresholds: Vec<Threshold>, lcs: &Lcs) -> Self {
+        fire(&thresholds, &mut position);
         let mut switches = Self {
             position,
             thresholds,
             driven: vec![],
+            valves: vec![],
             needs_lambda: false,
             in_this_step: 0,
         };
@@ -58,7 +151,20 @@ impl Switches {
         };
         let rows = &lcs.controls;
         let state_free = |i: usize| zero(&rows.x, i) && zero(&rows.lambda, i) && zero(&rows.du, i);
-        self.driven = (0..self.thresholds.len()).map(state_free).collect();
+        // What arrives on a line is no more known beforehand than a state is.
+        let known = |i: usize| {
+            let mut inputs = lcs.inputs.iter().enumerate();
+            !inputs.any(|(j, input)| input.source.wave.is_arriving() && rows.u[(i, j)] != 0.0)
+        };
+        let thresholds = || self.thresholds.iter().enumerate();
+        self.driven = thresholds()
+            .map(|(i, t)| state_free(i) && known(i) && t.latch.is_none())
+            .collect();
+        let port = |t: &Threshold| {
+            let valve = t.valve()?;
+            lcs.ports.iter().position(|port| port.device == valve)
+        };
+        self.valves = self.thresholds.iter().map(port).collect();
         self.needs_lambda = (0..self.thresholds.len()).any(|i| !zero(&rows.lambda, i));
     }
 
@@ -72,7 +178,10 @@ impl Switches {
 
     /// Whether some control depends on the state and has to be watched in every step.
     pub(crate) fn watch(&self) -> bool {
-        self.driven.iter().any(|d| !d)
+        let watched = |(i, t): (usize, &Threshold)| {
+            !self.driven[i] && (t.latch.is_none() || t.holds(self.position[i], &self.position))
+        };
+        self.thresholds.iter().enumerate().any(watched)
     }
 
     pub(crate) fn needs_lambda(&self) -> bool {
@@ -108,26 +217,46 @@ impl Switches {
         for &i in which {
             self.position[i] = !self.position[i];
         }
+        fire(&self.thresholds, &mut self.position);
     }
 
-    /// Whether a control that depends on the state asks for another position; `flip` carries it out. Switches that sources
-    /// alone drive move at the times of [`Self::next_known`] only.
-    pub(crate) fn update(&mut self, lcs: &Lcs, at: Point<'_>, flip: bool) -> bool {
-        let mut any = false;
+    /// What controls that depend on the state ask for, where the ports in `conducting` conduct; `flip` carries it out. Switches
+    /// that sources alone drive move at the times of [`Self::next_known`] only.
+    pub(crate) fn update(
+        &mut self,
+        lcs: &Lcs,
+        at: Point<'_>,
+        conducting: &[bool],
+        flip: bool,
+    ) -> Change {
+        let mut change = Change::None;
         for (i, threshold) in self.thresholds.iter().enumerate() {
-            if self.driven[i] {
-                continue;
-            }
-            let wanted = threshold.position(self.position[i], reading::value(&lcs.controls, i, at));
-            if wanted != self.position[i] {
-                any = true;
-                if flip {
-                    self.position[i] = wanted;
-                    self.in_this_step += 1;
+            let on = self.position[i];
+            let control = || reading::value(&lcs.controls, i, at);
+            let wanted = match threshold.latch {
+                _ if self.driven[i] => continue,
+                None if threshold.position(on, control()) != on => Change::Passage,
+                Some(_) if threshold.holds(on, &self.position) => {
+                    if !self.valves[i].is_some_and(|port| conducting[port]) {
+                        Change::Release
+                    } else if threshold.off_below > 0.0 && control() <= threshold.off_below {
+                        Change::Passage
+                    } else {
+                        continue;
+                    }
                 }
+                _ => continue,
+            };
+            change = change.max(wanted);
+            if flip {
+                self.position[i] = !on;
+                self.in_this_step += 1;
             }
         }
-        any
+        if flip {
+            fire(&self.thresholds, &mut self.position);
+        }
+        change
     }
 
     /// Whether the controls that ask for another position are no further past their thresholds than the part `uncertain` of what
@@ -147,13 +276,36 @@ impl Switches {
         })
     }
 
+    /// How far each control that depends on the state is beyond its threshold, positive where the switch is to move at the passage;
+    /// far below where a switch waits for nothing.
+    pub(crate) fn excess(&self, lcs: &Lcs, at: Point<'_>, conducting: &[bool]) -> Vec<f64> {
+        let waits = |i: usize, threshold: &Threshold| {
+            let held = |port: usize| conducting[port] && threshold.off_below > 0.0;
+            !self.driven[i]
+                && match threshold.latch {
+                    None => true,
+                    Some(_) => {
+                        threshold.holds(self.position[i], &self.position)
+                            && self.valves[i].is_some_and(held)
+                    }
+                }
+        };
+        let thresholds = self.thresholds.iter().enumerate();
+        let excess = thresholds.map(|(i, threshold)| {
+            if waits(i, threshold) {
+                threshold.excess(self.position[i], reading::value(&lcs.controls, i, at))
+            } else {
+                f64::MIN
+            }
+        });
+        excess.collect()
+    }
+
     /// Names with their positions, of those that differ from `before` (all if `None`).
     pub(crate) fn flipped(&self, before: &[bool]) -> String {
-        let names = self
-            .thresholds
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| before.get(*i).is_none_or(|b| *b != self.position[*i]));
+        let names = self.thresholds.iter().enumerate().filter(|(i, t)| {
+            !t.is_rest() && before.get(*i).is_none_or(|b| *b != self.position[*i])
+        });
         let words: Vec<String> = names
             .map(|(i, t)| format!("{} {}", t.name, if self.position[i] { "on" } else { "off" }))
             .collect();
@@ -161,16 +313,18 @@ impl Switches {
     }
 
     /// The first time in (t, limit] at which controls that depend on sources alone pass the thresholds of their switches, and
-    /// which ones; an infinite time and none where nothing happens.
+    /// which ones do at that time or no more than `slack` later (edges of several sources that are one but for rounding); an
+    /// infinite time and none where nothing happens.
     pub(crate) fn next_known(
         &self,
         lcs: &Lcs,
         inputs: &Inputs,
         t: f64,
         limit: f64,
+        slack: f64,
     ) -> (f64, Vec<usize>) {
         let mut first = f64::INFINITY;
-        let mut which = Vec::new();
+        let mut passages = Vec::new();
         for i in (0..self.thresholds.len()).filter(|&i| self.driven[i]) {
             let (on, threshold) = (self.position[i], &self.thresholds[i]);
             let level = if on {
@@ -179,16 +333,14 @@ impl Switches {
                 threshold.on_above
             };
             let gains: Vec<f64> = lcs.controls.u.row(i).iter().copied().collect();
-            let until = first.min(limit);
+            let until = (first + slack).min(limit);
             let passage = inputs.passage(&gains, lcs.controls.one[i], level, !on, t, until);
             let Some(time) = passage else { continue };
-            if time < first {
-                first = time;
-                which.clear();
-            }
-            which.push(i);
+            first = first.min(time);
+            passages.push((time, i));
         }
-        (first, which)
+        passages.retain(|(time, _)| *time <= first + slack);
+        (first, passages.into_iter().map(|(_, i)| i).collect())
     }
 }
 
@@ -202,6 +354,7 @@ mod tests {
             name: "s1".into(),
             on_above: 2.0,
             off_below: 1.0,
+            latch: None,
         };
         assert_eq!(
             [0.5, 1.0, 1.5, 2.0, 2.5].map(|v| switch.position(false, v)),

@@ -164,7 +164,6 @@ impl Curve {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::Law;
     use super::*;
     use crate::algebra::Value;
 
@@ -234,9 +233,7 @@ mod tests {
 
     #[test]
     fn faults_are_named() {
-        let Law::Curve(zener) = Law::zener(5.1.into(), 0.7.into()) else {
-            unreachable!()
-        };
+        let zener = Curve::zener((5.1.into(), 0.0.into()), (0.7.into(), 0.0.into()), None);
         assert_eq!(zener.check(), Ok(()));
         let broken = |change: &dyn Fn(&mut Curve)| {
             let mut curve = zener.clone();

@@ -1,28 +1,29 @@
-//! The dead zone: no output for small inputs, a straight gain beyond.
+//! The dead zone: a constant output for inputs between two bounds, a straight gain beyond.
 
-use super::{Curve, Law, ONE, ZERO};
+use super::{Curve, ONE};
 use crate::algebra::Value;
 
-impl Law {
-    /// Output 0 for |input| ≤ `width`, slope `gain` beyond; both positive.
+impl Curve {
+    /// Output `level` for inputs from `bounds.0` to `bounds.1`, the slopes `gains` below and above; the gains are positive.
     #[must_use]
-    pub fn dead_zone(width: Value, gain: Value) -> Self {
-        Self::Curve(Curve {
+    pub fn dead_zone(bounds: (Value, Value), level: Value, gains: (Value, Value)) -> Self {
+        Self {
             kind: "dead_zone",
-            vertices: vec![(width.negated(), ZERO), (width, ZERO)],
-            first: (ONE, gain),
-            last: (ONE, gain),
-        })
+            vertices: vec![(bounds.0, level), (bounds.1, level)],
+            first: (ONE, gains.0),
+            last: (ONE, gains.1),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::ZERO;
     use super::*;
 
     #[test]
     fn a_dead_zone_shrinks_towards_zero() {
-        let curve = Law::dead_zone(1.0.into(), 2.0.into()).curve().unwrap();
+        let curve = Curve::dead_zone(((-1.0).into(), 1.0.into()), ZERO, (2.0.into(), 2.0.into()));
         assert_eq!(curve.resolvent(1.0, 0.5), (0.5, 0.0));
         // v + 2 (v − 1) = 4
         assert_eq!(curve.resolvent(1.0, 4.0), (2.0, 2.0));

@@ -4,6 +4,7 @@ mod curve;
 mod dead_zone;
 mod diode;
 mod exponential;
+mod limited;
 mod relay;
 mod rounded;
 mod saturation;
@@ -13,6 +14,7 @@ mod zener;
 use crate::algebra::Value;
 pub use curve::CurveError;
 pub use exponential::{Breakdown, Exponential, wright_omega};
+pub use limited::Side;
 pub use rounded::{Corner, Rounded};
 
 const ZERO: Value = Value::decimal(0.0, 0, 0);

@@ -1,18 +1,18 @@
 //! Saturation: a straight gain between two output levels (an op-amp with rails, a comparator with a finite gain).
 
-use super::{Curve, Law, ONE, ZERO};
+use super::{Curve, ONE, ZERO};
 use crate::algebra::Value;
 
-impl Law {
-    /// Output `low` below input −`width`, `high` above `width`, linear between; `width` > 0.
+impl Curve {
+    /// Constant before the point `from` (input, output) and after `to`, straight between; `from` is below `to` in both coordinates.
     #[must_use]
-    pub fn saturation(low: Value, high: Value, width: Value) -> Self {
-        Self::Curve(Curve {
+    pub fn saturation(from: (Value, Value), to: (Value, Value)) -> Self {
+        Self {
             kind: "saturation",
-            vertices: vec![(width.negated(), low), (width, high)],
+            vertices: vec![from, to],
             first: (ONE, ZERO),
             last: (ONE, ZERO),
-        })
+        }
     }
 }
 
@@ -22,9 +22,7 @@ mod tests {
 
     #[test]
     fn a_saturation_is_linear_between_its_rails() {
-        let curve = Law::saturation(0.0.into(), 3.0.into(), 0.15.into())
-            .curve()
-            .unwrap();
+        let curve = Curve::saturation(((-0.15).into(), ZERO), (0.15.into(), 3.0.into()));
         assert!(curve.contains(0.0, 1.5, 1.0, 1e-12));
         assert!(curve.contains(-1.0, 0.0, 1.0, 1e-12) && curve.contains(1.0, 3.0, 1.0, 1e-12));
         assert!(!curve.contains(0.1, 1.5, 1.0, 1e-12));

@@ -177,6 +177,8 @@ pub enum PowerKind {
     Source,
     /// Resistors, switches and devices; power into them is "dissipated".
     Dissipated,
+    /// The ports of transmission lines, which store what enters them until it leaves.
+    Line,
 }
 
 /// One element of the energy balance.

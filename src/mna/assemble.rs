@@ -2,9 +2,10 @@
 
 use super::couple::{self, Winding};
 use super::{
-    Behaviour, Coefficient, Column, Equation, Pair, SourcePort, StoragePort, SwitchPort, topology,
+    Behaviour, Coefficient, Column, Equation, LatchPort, Pair, SourcePort, StoragePort, SwitchPort,
+    topology,
 };
-use crate::circuit::{Circuit, Kind, NodeId, Output, Quantity};
+use crate::circuit::{Circuit, ElementId, Kind, Latch, NodeId, Output, Quantity};
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::lcs::{Input, Port, Role};
 
@@ -269,6 +270,7 @@ impl Assembly<'_> {
                         off_below: switch.off_below,
                         initial: switch.initial,
                         control: usize::MAX,
+                        latch: switch.latch.as_ref().map(|latch| self.latch(latch)),
                     });
                     vec![(Coefficient::ONE, i)]
                 }
@@ -381,6 +383,22 @@ impl Assembly<'_> {
                     .unwrap_or(a);
                 self.out.metric.push((first + a, first + b, value));
             }
+        }
+    }
+
+    /// The switches of a latch by their numbers among the switches.
+    fn latch(&self, latch: &Latch) -> LatchPort {
+        let elements = &self.circuit.elements;
+        let number = |gate: &ElementId| {
+            let before = elements[..gate.index()].iter();
+            before.filter(|e| matches!(e.kind, Kind::Switch(_))).count()
+        };
+        match latch {
+            Latch::Hold { gates, valve } => LatchPort::Hold {
+                gates: gates.iter().map(number).collect(),
+                valve: elements[valve.index()].name.clone(),
+            },
+            Latch::Rest(latch) => LatchPort::Rest(number(latch)),
         }
     }
 

@@ -56,6 +56,9 @@ impl Behaviour {
             .collect();
         // The control of a switch as such a combination.
         let control = |silent: &[bool], switch: usize| -> Option<SourceControl> {
+            if self.switches[switch].latch.is_some() {
+                return None;
+            }
             let row = reading(self.switches[switch].control);
             let (mut constant, mut terms) = (0.0, Vec::new());
             for c in nonzero(row) {

@@ -150,6 +150,7 @@ pub(crate) fn circuit(text: &str) -> Circuit {
                 on_above: 0.0,
                 off_below: 0.0,
                 initial: None,
+                latch: None,
             }),
             other => panic!("no such element: {other}"),
         };

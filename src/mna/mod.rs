@@ -167,6 +167,22 @@ pub struct SwitchPort {
     pub initial: Option<bool>,
     /// Index of its control among the observed quantities.
     pub control: usize,
+    /// A switch inside a thyristor.
+    pub latch: Option<LatchPort>,
+}
+
+/// See [`Latch`](crate::circuit::Latch); switches are given by their indices.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum LatchPort {
+    /// On while a gate is, then as long as it holds itself.
+    Hold {
+        /// The switches that turn it on.
+        gates: Vec<usize>,
+        /// Name of the device in series.
+        valve: String,
+    },
+    /// On while this latch is off.
+    Rest(usize),
 }
 
 /// A quantity that can be read: a combination of columns.

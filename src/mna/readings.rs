@@ -136,8 +136,13 @@ impl Assembly<'_> {
             let equation = control.map(|c| self.affine(c)).unwrap_or_default();
             self.out.switches[k].control = self.observed(format!("{name}.control"), "V", equation);
         }
+        let ports = circuit.lines.iter().flat_map(|line| &line.ports);
+        let of_lines: Vec<usize> = ports
+            .flat_map(|port| [port.impedance.index(), port.wave.index()])
+            .collect();
         for (k, element) in circuit.elements.iter().enumerate() {
             let kind = match &element.kind {
+                _ if of_lines.contains(&k) => PowerKind::Line,
                 Kind::Capacitor(_) | Kind::Inductor(_) => continue,
                 Kind::VoltageSource(_)
                 | Kind::CurrentSource(_)

@@ -284,11 +284,15 @@ impl Reader<'_> {
             }
             Dot::Include(file) => self.include(&file.whole, None, file.span, path),
             Dot::Lib(file) => self.lib(&file, path),
-            Dot::Options(temperature) => {
+            Dot::Options(temperature, others) => {
+                match &temperature {
+                    Some(_) if others => self.skip_as(".options but for temp", line),
+                    Some(_) => {}
+                    None => self.skip(line),
+                }
                 if let Some(temperature) = temperature {
                     self.push(Statement::Temperature(temperature));
                 }
-                self.skip(line);
             }
             Dot::EndLib | Dot::Control | Dot::Nothing => {}
             Dot::End => return false,
@@ -301,7 +305,11 @@ impl Reader<'_> {
     /// Keeps the first word of a line for the note about what is skipped.
     fn skip(&mut self, line: &Line) {
         let name = line.text.split_whitespace().next().unwrap_or("");
-        self.skipped.push((name.to_lowercase(), line.span()));
+        self.skip_as(&name.to_lowercase(), line);
+    }
+
+    fn skip_as(&mut self, name: &str, line: &Line) {
+        self.skipped.push((name.to_owned(), line.span()));
     }
 
     fn note_skipped(&mut self) {

@@ -13,7 +13,7 @@ const TEXT_SIZE: u32 = 24;
 const SMALLEST: f64 = 1e-17;
 
 /// One method at one setting on one circuit.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Measurement {
     /// The netlist.
     pub circuit: String,
@@ -31,10 +31,48 @@ pub struct Measurement {
     pub max_error: Option<f64>,
     /// Largest RMS error of any signal relative to its amplitude; `None` where the run failed.
     pub rms_error: Option<f64>,
+    /// Every signal's own; none where the run failed.
+    pub signals: Vec<SignalError>,
     /// What the error is measured against.
     pub reference: String,
     /// The failure in the failing program's own words.
     pub failure: Option<String>,
+}
+
+/// The error of one signal, relative to its amplitude.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct SignalError {
+    /// Its name.
+    pub name: String,
+    /// `V` or `A`.
+    pub unit: &'static str,
+    /// What errors are relative to, in `unit`.
+    pub amplitude: f64,
+    /// The largest error.
+    pub max_error: f64,
+    /// Where it is, s.
+    pub max_time: f64,
+    /// The root of the mean square.
+    pub rms_error: f64,
+}
+
+impl Measurement {
+    /// The same with these errors, and the largest of them for the whole.
+    #[must_use]
+    pub fn with(self, signals: Vec<SignalError>) -> Self {
+        let largest = |error: fn(&SignalError) -> f64| signals.iter().map(error).reduce(f64::max);
+        Self {
+            max_error: largest(|s| s.max_error),
+            rms_error: largest(|s| s.rms_error),
+            signals,
+            ..self
+        }
+    }
+
+    /// The method without its setting.
+    fn family(&self) -> &str {
+        self.method.split(':').next().unwrap_or(&self.method)
+    }
 }
 
 /// The observed order of a ladder of steps: the error behaves like h to this power.
@@ -74,6 +112,34 @@ pub fn csv(measurements: &[Measurement]) -> String {
     text
 }
 
+/// The errors of every signal as CSV: `circuit,method,parameter,signal,unit,amplitude,max_error,max_time,rms_error,reference`,
+/// in the order of the measurements. A failure has no lines.
+#[must_use]
+pub fn signals_csv(measurements: &[Measurement]) -> String {
+    let mut text = String::from(
+        "circuit,method,parameter,signal,unit,amplitude,max_error,max_time,rms_error,reference\n",
+    );
+    for m in measurements {
+        for s in &m.signals {
+            let cells = [
+                quoted(&m.circuit),
+                quoted(&m.method),
+                quoted(&m.parameter),
+                quoted(&s.name),
+                s.unit.into(),
+                format!("{:e}", s.amplitude),
+                format!("{:e}", s.max_error),
+                format!("{:e}", s.max_time),
+                format!("{:e}", s.rms_error),
+                quoted(&m.reference),
+            ];
+            text.push_str(&cells.join(","));
+            text.push('\n');
+        }
+    }
+    text
+}
+
 fn quoted(cell: &str) -> String {
     if cell.contains([',', '"', '\n']) {
         format!("\"{}\"", cell.replace('"', "\"\""))
@@ -82,7 +148,7 @@ fn quoted(cell: &str) -> String {
     }
 }
 
-/// Measurements as the lines of a table, failures with their words.
+/// Measurements as the lines of a table, failures with their words; below it the signals at the best point of each method.
 #[must_use]
 pub fn text(measurements: &[Measurement], orders: &[Order]) -> String {
     let number = |x: Option<f64>| x.map_or_else(|| "failed".into(), |x| si::plain(x, 3));
@@ -121,7 +187,48 @@ pub fn text(measurements: &[Measurement], orders: &[Order]) -> String {
             order.series, order.max, order.rms
         ));
     }
+    text.push_str(&signals_text(measurements));
     text
+}
+
+/// A line for each signal at the best point of each method; empty where one signal is all there is.
+fn signals_text(measurements: &[Measurement]) -> String {
+    let mut best: Vec<&Measurement> = Vec::new();
+    for m in measurements.iter().filter(|m| m.signals.len() > 1) {
+        match best.iter_mut().find(|b| b.family() == m.family()) {
+            Some(b) if (m.max_error, m.cpu_seconds) < (b.max_error, b.cpu_seconds) => *b = m,
+            Some(_) => {}
+            None => best.push(m),
+        }
+    }
+    if best.is_empty() {
+        return String::new();
+    }
+    let lines = |m: &&Measurement| {
+        let name = format!("{} {}", m.method, m.parameter);
+        let heads = std::iter::once(name.trim().to_owned()).chain(std::iter::repeat(String::new()));
+        let line = |(head, s): (String, &SignalError)| {
+            vec![
+                head,
+                s.name.clone(),
+                si::quantity(s.amplitude, s.unit, 4),
+                si::plain(s.max_error, 3),
+                si::quantity(s.max_time, "s", 6),
+                si::plain(s.rms_error, 3),
+            ]
+        };
+        heads.zip(&m.signals).map(line).collect::<Vec<_>>()
+    };
+    let rows: Vec<Vec<String>> = best.iter().flat_map(lines).collect();
+    let header = [
+        "best point",
+        "signal",
+        "amplitude",
+        "max error",
+        "at",
+        "rms error",
+    ];
+    format!("\n{}", table::aligned(&header, &rows))
 }
 
 /// The picture: CPU seconds across, largest error down, both logarithmic, one colour per series. Failures have no point.
@@ -204,17 +311,33 @@ mod tests {
     use super::*;
 
     fn measurement(method: &str, cpu_seconds: f64, max_error: Option<f64>) -> Measurement {
-        Measurement {
+        let blank = Measurement {
             circuit: "rectifier.cir".into(),
             method: method.into(),
             series: method.into(),
             parameter: "step=1e-6".into(),
             steps: 1000,
             cpu_seconds,
-            max_error,
-            rms_error: max_error.map(|e| e / 2.0),
             reference: "exact".into(),
-            failure: max_error.is_none().then(|| "Timestep too small".into()),
+            ..Measurement::default()
+        };
+        let signal = |name: &str, unit, error| SignalError {
+            name: name.into(),
+            unit,
+            amplitude: 5.0,
+            max_error: error,
+            max_time: 1e-3,
+            rms_error: error / 2.0,
+        };
+        match max_error {
+            Some(error) => blank.with(vec![
+                signal("v(a,b)", "V", error),
+                signal("i(d1)", "A", error / 10.0),
+            ]),
+            None => Measurement {
+                failure: Some("Timestep too small".into()),
+                ..blank
+            },
         }
     }
 
@@ -236,5 +359,45 @@ mod tests {
             Some("rectifier.cir,ngspice,step=1e-6,1000,2e-1,,,failed: Timestep too small")
         );
         assert!(matches!(draw(&all[3..]), Err(PictureError::Empty(_))));
+    }
+
+    #[test]
+    fn the_best_point_of_every_method_has_a_line_for_every_signal() {
+        let all = [
+            measurement("theta", 1e-3, Some(1e-4)),
+            measurement("theta", 1e-2, Some(1e-6)),
+            measurement("theta", 5e-3, Some(1e-6)),
+            measurement("ngspice:reltol=1e-3", 0.1, Some(1e-2)),
+            measurement("ngspice:reltol=1e-4", 0.2, Some(1e-3)),
+            measurement("ngspice:reltol=1e-5", 0.2, None),
+        ];
+        assert_eq!(
+            (all[0].max_error, all[0].rms_error),
+            (Some(1e-4), Some(5e-5))
+        );
+        let table = text(&all, &[]);
+        let (_, signals) = table.split_once("\n\n").unwrap();
+        let lines: Vec<Vec<&str>> = signals
+            .lines()
+            .map(|l| {
+                l.split("  ")
+                    .map(str::trim)
+                    .filter(|c| !c.is_empty())
+                    .collect()
+            })
+            .collect();
+        assert_eq!(lines.len(), 5, "{table}");
+        assert_eq!(
+            lines[1],
+            ["theta step=1e-6", "v(a,b)", "5 V", "1e-6", "1 ms", "5e-7"]
+        );
+        assert_eq!(lines[2], ["i(d1)", "5 A", "1e-7", "1 ms", "5e-8"]);
+        assert_eq!(lines[3][0], "ngspice:reltol=1e-4 step=1e-6");
+        let csv = signals_csv(&all);
+        assert_eq!(csv.lines().count(), 11);
+        assert_eq!(
+            csv.lines().nth(1),
+            Some("rectifier.cir,theta,step=1e-6,\"v(a,b)\",V,5e0,1e-4,1e-3,5e-5,exact")
+        );
     }
 }

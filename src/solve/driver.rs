@@ -88,6 +88,18 @@ impl Driver {
         }
     }
 
+    /// How λ answers a small change of q at a solution (λ, y) with curved laws; `None` for ideal ones, and where neither the
+    /// network nor the laws determine it.
+    #[must_use]
+    pub fn response(
+        &self,
+        lambda: &DVector<f64>,
+        y: &DVector<f64>,
+        dq: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        self.lawful.as_ref()?.response(lambda, y, dq)
+    }
+
     /// Whether M + Mᵀ ⪰ 0 (to rounding).
     #[must_use]
     pub fn is_monotone(&self) -> bool {
@@ -125,6 +137,11 @@ impl Driver {
         let size = self.scaled.size();
         let slack = SLACK * self.scaled.q.amax();
         let mut best = self.candidate(DVector::zeros(size), vec![false; size], Answered::Warm);
+        // What is no number has no solution, and no pivot.
+        if !q.iter().all(|q| q.is_finite()) {
+            best.by = Answered::Nobody;
+            return best;
+        }
         let chain: [fn(&mut Self, f64) -> Option<Solution>; 4] = [
             Self::try_warm,
             Self::try_block,

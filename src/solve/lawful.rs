@@ -90,6 +90,9 @@ const PROXIMAL: f64 = 1e-4;
 const PROXIMAL_STEPS: u32 = 50;
 /// A pivot of R' this small is a direction that neither the network nor the laws determine.
 const SINGULAR: f64 = 1e-10;
+/// Added to M' in Newton's matrix: rounding leaves M' an eigenvalue of −1e-16 in place of 0, and along its vector the step would
+/// go the wrong way; the bound of what it takes from the speed of convergence is far below the tolerance.
+const MONOTONE: f64 = 1e-13;
 
 /// Least −dy'/dw in the second method: a blocking junction has next to none, and a loop of such ports no regular matrix.
 const BLOCKED: f64 = 1e-8;
@@ -314,16 +317,41 @@ impl Lawful {
         point
     }
 
-    /// −R'⁻¹ R.
+    /// −R'⁻¹ R, for M' + μ with a μ that is lost in rounding everywhere but on the kernel of M'.
     fn newton_step(&self, at: &Point) -> Option<DVector<f64>> {
+        self.against(&at.slope, &at.rest, &at.residual)
+    }
+
+    /// −R'⁻¹ b, from dλ'/dw and −dy'/dw.
+    fn against(
+        &self,
+        slope: &DVector<f64>,
+        rest: &DVector<f64>,
+        b: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
         let mut matrix = self.m.clone();
-        for (mut column, slope) in matrix.column_iter_mut().zip(at.slope.iter()) {
+        for (mut column, slope) in matrix.column_iter_mut().zip(slope.iter()) {
             column *= *slope;
         }
-        for (j, rest) in at.rest.iter().enumerate() {
-            matrix[(j, j)] += rest;
+        for (j, (rest, slope)) in rest.iter().zip(slope.iter()).enumerate() {
+            matrix[(j, j)] += rest + MONOTONE * slope;
         }
-        solved(matrix, &-&at.residual)
+        solved(matrix, &-b)
+    }
+
+    /// dλ for a change dq from a solution (λ, y): −S R'⁻¹ dq.
+    pub(super) fn response(
+        &self,
+        lambda: &DVector<f64>,
+        y: &DVector<f64>,
+        dq: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        let d = &self.scaling.d;
+        let laws = (0..d.len()).map(|j| self.law(j, lambda[j] / d[j] - y[j] * d[j]));
+        let (slope, rest): (Vec<f64>, Vec<f64>) = laws.map(|(_, _, s, r)| (s, r)).unzip();
+        let (slope, rest) = (DVector::from_vec(slope), DVector::from_vec(rest));
+        let dw = self.against(&slope, &rest, &dq.component_mul(d))?;
+        Some(dw.component_mul(&slope).component_mul(d))
     }
 
     /// The step to the solution of the problem in which the curved laws are straight and the ideal ones as they are.

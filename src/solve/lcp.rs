@@ -194,11 +194,11 @@ impl Scaling {
         let (mut worst, mut scale) = (0.0_f64, 0.0_f64);
         for j in 0..lcp.size() {
             let (l, w) = (lambda[j] / self.d[j], y[j] * self.d[j]);
-            let natural = if l < w { l.abs() } else { w.abs() - noise(j) };
-            if natural.is_nan() {
+            // The smaller of a number and none would be the number.
+            if l.is_nan() || w.is_nan() {
                 return f64::INFINITY;
             }
-            worst = worst.max(natural);
+            worst = worst.max(if l < w { l.abs() } else { w.abs() - noise(j) });
             scale = scale.max(l.abs()).max((lcp.q[j] * self.d[j]).abs());
         }
         // Rounding of the smallest numbers there are is nothing relative.
@@ -255,6 +255,11 @@ mod tests {
         assert!(residual(dvector![1.0, -0.5]) > 0.1, "λ negative");
         assert!(residual(dvector![1.0, 0.5]) > 0.1, "both positive");
         assert_eq!(residual(dvector![f64::NAN, 0.0]), f64::INFINITY);
+        let y = dvector![f64::NAN, 3.0];
+        assert_eq!(
+            scaling.residual(&lcp, &dvector![0.0, 0.0], &y),
+            f64::INFINITY
+        );
     }
 
     #[test]

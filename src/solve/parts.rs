@@ -138,4 +138,68 @@ mod tests {
         let found = driver.solve(&dvector![-1.0, -2.0]);
         assert_eq!(found.status, Status::Infeasible(dvector![0.0, 0.5]));
     }
+
+    #[test]
+    fn an_entry_on_either_side_of_the_diagonal_couples() {
+        for m in [dmatrix![1.0, -1.0; 0.0, 1.0], dmatrix![1.0, 0.0; -1.0, 1.0]] {
+            assert!(Parts::of(&m, 1e-9).is_none(), "{m}");
+        }
+        let chain = dmatrix![
+            1.0, 0.0, 2.0, 0.0;
+            0.0, 1.0, 0.0, 0.0;
+            0.0, 0.0, 1.0, 3.0;
+            0.0, 0.0, 0.0, 1.0
+        ];
+        let Some(Parts(parts)) = Parts::of(&chain, 1e-9) else {
+            panic!("two parts")
+        };
+        let groups: Vec<_> = parts.into_iter().map(|(group, _)| group).collect();
+        assert_eq!(groups, [vec![0, 2, 3], vec![1]]);
+    }
+
+    /// The first part has every λ ≥ 0 as its solution, the second one.
+    #[test]
+    fn the_least_norm_is_that_of_every_part() {
+        let mut driver = Driver::new(dmatrix![0.0, 0.0; 0.0, 2.0], 1e-9);
+        let q = dvector![0.0, -8.0];
+        let found = driver.solve(&q);
+        assert_eq!(found.lambda[1], 4.0);
+        let another = Solution {
+            lambda: dvector![5.0, 4.0],
+            y: dvector![0.0, 0.0],
+            basis: vec![true, true],
+            ..found
+        };
+        assert_eq!(driver.least_norm(&q, &another), (dvector![0.0, 4.0], false));
+        let mut regular = Driver::new(dmatrix![1.0, 0.0; 0.0, 2.0], 1e-9);
+        let found = regular.solve(&dvector![-1.0, -8.0]);
+        let least = regular.least_norm(&dvector![-1.0, -8.0], &found);
+        assert_eq!(least, (dvector![1.0, 4.0], true));
+    }
+
+    #[test]
+    fn every_part_starts_with_its_own_set_and_keeps_its_factors() {
+        let mut driver = Driver::new(dmatrix![1.0, 0.0; 0.0, 2.0], 1e-9);
+        driver.suggest(&[true, true]);
+        let found = driver.solve(&dvector![-1.0, -8.0]);
+        assert_eq!((found.by, driver.factorisations), (Answered::Warm, 2));
+        assert_eq!(found.basis, [true, true]);
+        // The set of the last solution comes first now.
+        let found = driver.solve(&dvector![-2.0, -4.0]);
+        assert_eq!((found.by, driver.factorisations), (Answered::Warm, 2));
+        assert_eq!(found.lambda, dvector![2.0, 2.0]);
+        driver.suggest(&[false, false]);
+        let found = driver.solve(&dvector![1.0, -4.0]);
+        assert_ne!(found.by, Answered::Warm);
+        assert_eq!(found.basis, [false, true]);
+    }
+
+    /// What is no number has no solution; the part beside it has its own.
+    #[test]
+    fn a_part_that_fails_fails_the_whole() {
+        let mut driver = Driver::new(dmatrix![1.0, 0.0; 0.0, 2.0], 1e-9);
+        let found = driver.solve(&dvector![f64::NAN, -8.0]);
+        assert_eq!((found.status, found.lambda[1]), (Status::Failed, 4.0));
+        assert_eq!(found.residual, f64::INFINITY);
+    }
 }

@@ -36,7 +36,7 @@ OTHER_OPTIONS = {
     "exponential-clamp": "reltol=1e-7 abstol=1e-15 vntol=1e-9 gmin=1e-15",
 }
 # ngspice's largest step where a twentieth of the print step is not small enough, or needlessly small.
-LARGEST_STEP = {"flyback": "10n", "cuk": "100n", "sepic": "100n", "buck-open-loop": "100n", "isolated-rectifier": "10u", "exponential-half-wave": "1u", "exponential-bridge": "1u", "exponential-clamp": "50n", "common-emitter": "100n"}
+LARGEST_STEP = {"flyback": "10n", "cuk": "100n", "sepic": "100n", "buck-open-loop": "100n", "isolated-rectifier": "10u", "exponential-half-wave": "1u", "exponential-bridge": "1u", "exponential-clamp": "50n", "common-emitter": "100n", "line-mismatch": "2p", "line-rectifier": "0.1n"}
 
 
 def version():

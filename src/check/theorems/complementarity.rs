@@ -39,9 +39,19 @@ pub(super) fn inputs(facts: &Facts) -> Theorem {
             )
         },
     );
+    let others = facts.driven.iter().filter(|(_, source)| !source.pieces);
+    let others: Vec<&str> = others.map(|(name, _)| name.as_str()).collect();
     h.need(
-        true,
-        "the sources are piecewise sums of polynomials, exponentials and sinusoids",
+        others.is_empty(),
+        if others.is_empty() {
+            "the sources are piecewise sums of polynomials, exponentials and sinusoids".into()
+        } else {
+            format!(
+                "{} {} no sum of polynomials, exponentials and sinusoids",
+                others.join(", "),
+                if others.len() == 1 { "is" } else { "are" }
+            )
+        },
     );
     h.theorem(
         "Camlibel-Heemels-Schumacher 2002 Theorem 7.5 (passive systems with inputs)",

@@ -16,6 +16,7 @@ use super::Wave;
 /// | `exp` | v1, v2, rise delay, rise tau, fall delay, fall tau |
 /// | `sffm` | offset, amplitude, carrier, index, signal, carrier phase, signal phase |
 /// | `am` | amplitude, offset, modulation, carrier, delay |
+/// | `arriving` | delay, initial value: what leaves the other port of a transmission line; written only |
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Form {
     /// `dc`, `sin`, `pulse`, `pwl`, `exp`, `sffm` or `am`.
@@ -56,6 +57,11 @@ pub enum WaveError {
         /// Its value.
         value: f64,
     },
+    /// The wave on a transmission line.
+    #[error(
+        "`arriving`: the wave on a transmission line follows from the line, which a system of matrices does not hold"
+    )]
+    Arriving,
     /// Times of a `pwl` that run backwards.
     #[error("`pwl`: time {after} follows {before}; times must not decrease")]
     Order {
@@ -179,6 +185,7 @@ impl Form {
                     delay: args.get(4, 0.0)?,
                 }
             }
+            "arriving" => return Err(WaveError::Arriving),
             _ => return Err(WaveError::Kind(self.kind.clone())),
         })
     }
@@ -302,6 +309,7 @@ impl From<&Wave> for Form {
                 carrier,
                 delay,
             } => Self::new("am", vec![amplitude, offset, modulation, carrier, delay]),
+            Wave::Arriving { delay, initial } => Self::new("arriving", vec![delay, initial]),
         }
     }
 }

@@ -1,12 +1,17 @@
 //! A circuit as a deck for ngspice, ideal devices replaced by what ngspice can do.
 
+mod waveform;
+
+#[cfg(test)]
+mod tests;
+
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use crate::circuit::source::Wave;
 use crate::circuit::{
-    Affine, Circuit, Element, ElementId, Kind, NodeId, Output, Probed, Quantity, Source, Switch,
-    Tran,
+    Affine, Circuit, Element, ElementId, Kind, Latch, Line, NodeId, Output, Probed, Quantity,
+    Source, Switch, Tran,
 };
 use crate::cli::args::Realisation;
 use crate::law::{Exponential, Law};
@@ -82,8 +87,16 @@ pub fn deck(circuit: &Circuit, options: &Options) -> Result<Deck, DeckError> {
     };
     let title = circuit.title.replace(char::is_control, " ");
     writer.line(format!("* {title}"));
+    let ports = circuit.lines.iter().flat_map(|line| line.ports);
+    let of_lines: Vec<ElementId> = ports.flat_map(|port| [port.impedance, port.wave]).collect();
     for (k, element) in circuit.elements.iter().enumerate() {
-        writer.element(ElementId(k as u32), element)?;
+        let id = ElementId(k as u32);
+        if !of_lines.contains(&id) {
+            writer.element(id, element)?;
+        }
+    }
+    for line in &circuit.lines {
+        writer.transmission_line(line);
     }
     for k in &circuit.couplings {
         let (a, b) = (writer.card('l', k.a), writer.card('l', k.b));
@@ -161,6 +174,39 @@ impl Writer<'_> {
 
     fn node(&self, id: NodeId) -> &str {
         &self.circuit.nodes[id.index()]
+    }
+
+    fn transmission_line(&mut self, line: &Line) {
+        let mut ends = String::new();
+        let mut initial = String::new();
+        for port in &line.ports {
+            let (first, last) = (
+                &self.circuit.elements[port.impedance.index()],
+                &self.circuit.elements[port.wave.index()],
+            );
+            let _ = write!(ends, " {} {}", self.node(first.p), self.node(last.n));
+        }
+        if self.tran.uic {
+            // ngspice takes v and i of both ends: e₁ = v₂ + Z i₂ with i₂ = 0.
+            let wave = |k: usize| {
+                let source = &self.circuit.elements[line.ports[k].wave.index()];
+                match &source.kind {
+                    Kind::VoltageSource(source) => source.wave.value(0.0),
+                    _ => 0.0,
+                }
+            };
+            initial = format!(" ic={:e},0,{:e},0", wave(1), wave(0));
+        }
+        let name = &line.name;
+        let card = if name.starts_with('t') {
+            name.clone()
+        } else {
+            format!("t.{name}")
+        };
+        self.line(format!(
+            "{card}{ends} z0={:e} td={:e}{initial}",
+            line.impedance.f64, line.delay
+        ));
     }
 
     fn element(&mut self, id: ElementId, element: &Element) -> Result<(), DeckError> {
@@ -274,13 +320,32 @@ impl Writer<'_> {
         }
     }
 
+    /// A thyristor's switch has hysteresis around 1: its control is 2 with a gate, else 1 as long as its current holds it.
+    fn latch(&self, gates: &[ElementId], switch: &Switch) -> String {
+        let current = self.affine(&switch.control);
+        let held = format!("({current} > {:e} ? 1 : 0)", switch.off_below);
+        gates.iter().fold(held, |otherwise, gate| {
+            let gate = &self.circuit.elements[gate.index()];
+            let Kind::Switch(switch) = &gate.kind else {
+                return otherwise;
+            };
+            let (name, level) = (&gate.name, switch.on_above);
+            format!("(v({name}_control) > {level:e} ? 2 : {otherwise})")
+        })
+    }
+
     fn switch(&mut self, id: ElementId, p: &str, n: &str, switch: &Switch) {
         let name = self.circuit.elements[id.index()].name.clone();
-        let control = self.affine(&switch.control);
-        let (threshold, half) = (
-            0.5 * (switch.on_above + switch.off_below),
-            0.5 * (switch.on_above - switch.off_below),
-        );
+        let (control, threshold, half) = match &switch.latch {
+            None => (
+                self.affine(&switch.control),
+                0.5 * (switch.on_above + switch.off_below),
+                0.5 * (switch.on_above - switch.off_below),
+            ),
+            Some(Latch::Hold { gates, .. }) => (self.latch(gates, switch), 1.0, 0.5),
+            // Between an open switch that leaks and a diode no potential is undetermined.
+            Some(Latch::Rest(_)) => return,
+        };
         let (ron, roff) = (
             switch.ron.f64.max(NEAR_SHORT),
             switch.roff.map_or(NEAR_OPEN, |r| r.f64),
@@ -290,7 +355,17 @@ impl Writer<'_> {
             Some(false) => " off",
             None => "",
         };
-        self.line(format!("b.{name}_control {name}_control 0 v={control}"));
+        if switch.latch.is_some() {
+            // A loop from the current to the switch and back needs a time to settle in.
+            let delay = EDGE * self.tran.tstop;
+            self.notes
+                .insert(format!("thyristors follow their gates within {delay:e} s"));
+            self.line(format!("b.{name}_now {name}_now 0 v={control}"));
+            self.line(format!("r.{name}_delay {name}_now {name}_control 1"));
+            self.line(format!("c.{name}_delay {name}_control 0 {delay:e}"));
+        } else {
+            self.line(format!("b.{name}_control {name}_control 0 v={control}"));
+        }
         let card = self.card('s', id);
         self.line(format!("{card} {p} {n} {name}_control 0 m.{name}{initial}"));
         self.line(format!(
@@ -368,7 +443,7 @@ impl Writer<'_> {
 
     fn source(&mut self, source: &Source) -> String {
         let edge = EDGE * self.tran.tstop;
-        let (wave, stretched) = waveform(&source.wave, edge);
+        let (wave, stretched) = waveform::words(&source.wave, edge);
         if stretched {
             self.notes
                 .insert(format!("edges of zero width take {edge:e} s"));
@@ -435,212 +510,5 @@ const fn letter(output: Output) -> char {
     match output {
         Output::Voltage => 'v',
         Output::Current => 'i',
-    }
-}
-
-/// A waveform in SPICE's words, and whether an edge had to be given a width.
-fn waveform(wave: &Wave, edge: f64) -> (String, bool) {
-    let mut stretched = false;
-    let mut widened = |duration: f64| {
-        stretched |= duration == 0.0;
-        if duration == 0.0 { edge } else { duration }
-    };
-    let text = match wave {
-        Wave::Dc(value) => format!("{value:e}"),
-        Wave::Sin {
-            offset,
-            amplitude,
-            frequency,
-            delay,
-            damping,
-            phase,
-            cycles,
-        } => {
-            // ngspice knows no number of cycles: chords, 5e-6 of the amplitude below their arc.
-            let Some(cycles) = cycles else {
-                return (
-                    format!(
-                        "sin({offset:e} {amplitude:e} {frequency:e} {delay:e} {damping:e} {phase:e})"
-                    ),
-                    false,
-                );
-            };
-            let (count, end) = ((cycles * 1000.0).ceil(), delay + cycles / frequency);
-            let mut text = String::from("pwl(");
-            for k in 0..count as usize {
-                let t = delay + (end - delay) * (k as f64 / count);
-                let _ = write!(text, "{t:e} {:e} ", wave.value(t));
-            }
-            if wave.is_edge(end) {
-                let before = end - widened(0.0);
-                let _ = write!(text, "{before:e} {:e} ", wave.value_left(end));
-            }
-            let _ = write!(text, "{end:e} {:e})", wave.value(end));
-            text
-        }
-        Wave::Pulse {
-            v1,
-            v2,
-            delay,
-            rise,
-            fall,
-            width,
-            period,
-            count,
-        } => {
-            let (rise, fall) = (widened(*rise), widened(*fall));
-            let count = count.map_or(String::new(), |n| format!(" {n:e}"));
-            format!("pulse({v1:e} {v2:e} {delay:e} {rise:e} {fall:e} {width:e} {period:e}{count})")
-        }
-        Wave::Pwl {
-            points,
-            repeat,
-            delay,
-        } => {
-            let mut text = String::from("pwl(");
-            let mut previous = f64::NEG_INFINITY;
-            for &(t, value) in points {
-                let t = if t > previous {
-                    t
-                } else {
-                    previous + widened(0.0)
-                };
-                previous = t;
-                let _ = write!(text, "{t:e} {value:e} ");
-            }
-            text.push(')');
-            if let Some(from) = repeat {
-                let _ = write!(text, " r={from:e}");
-            }
-            if *delay != 0.0 {
-                let _ = write!(text, " td={delay:e}");
-            }
-            text
-        }
-        Wave::Sffm {
-            offset,
-            amplitude,
-            carrier,
-            index,
-            signal,
-            carrier_phase,
-            signal_phase,
-        } => format!(
-            "sffm({offset:e} {amplitude:e} {carrier:e} {index:e} {signal:e} {carrier_phase:e} {signal_phase:e})"
-        ),
-        Wave::Am {
-            amplitude,
-            offset,
-            modulation,
-            carrier,
-            delay,
-        } => {
-            format!("am({amplitude:e} {offset:e} {modulation:e} {carrier:e} {delay:e})")
-        }
-        Wave::Exp {
-            v1,
-            v2,
-            rise_delay,
-            rise_tau,
-            fall_delay,
-            fall_tau,
-        } => {
-            format!("exp({v1:e} {v2:e} {rise_delay:e} {rise_tau:e} {fall_delay:e} {fall_tau:e})")
-        }
-    };
-    (text, stretched)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::circuit::{ElaborateOptions, elaborate};
-    use crate::diagnostic::SourceMap;
-    use crate::netlist;
-
-    fn circuit(text: &str) -> Circuit {
-        let mut sources = SourceMap::default();
-        let root = sources.add("test.cir", text);
-        let missing = |_: &std::path::Path| Err(std::io::ErrorKind::NotFound.into());
-        let (parsed, faults) = netlist::parse(&mut sources, root, &missing);
-        assert!(faults.is_empty(), "{faults:?}");
-        let (circuit, faults) = elaborate(&parsed, &ElaborateOptions::default());
-        circuit.unwrap_or_else(|| panic!("{faults:?}"))
-    }
-
-    fn options(realisation: Realisation) -> Options {
-        Options {
-            reltol: 1e-4,
-            max_step: 1e-6,
-            method: "gear",
-            realisation,
-        }
-    }
-
-    #[test]
-    fn ideal_devices_become_what_ngspice_has() {
-        let circuit = circuit(
-            "rectifier with a switch\n\
-             v1 in 0 pulse(0 5 0 0 0 1m 2m)\n\
-             d1 in out dideal\n\
-             s1 out load c 0 sw1\n\
-             vc c 0 dc 5\n\
-             x1 load 0 filter\n\
-             .subckt filter a b\n\
-             r1 a b 1k\n\
-             c1 a b 1u ic=1\n\
-             .ends\n\
-             .model dideal d(ron=0.1 vfwd=0.7 roff=1meg)\n\
-             .model sw1 sw(vt=1 vh=0.5 ron=1m roff=1g)\n\
-             .tran 1u 4m uic\n\
-             .save v(load) v(in,out) i(d1) i(x1.r1)\n\
-             .end\n",
-        );
-        let deck = deck(&circuit, &options(Realisation::N001)).unwrap();
-        insta::assert_snapshot!(format!("{}{}", deck.text, deck.notes.join("\n")), @r"
-        * rectifier with a switch
-        v1 in 0 dc 5e0 pulse(0e0 5e0 0e0 4e-10 4e-10 1e-3 2e-3)
-        v.d1_sense in d1_sense 0
-        v.d1_drop d1_sense d1_drop 7e-1
-        d1 d1_drop out m.d1
-        .model m.d1 d(is=1e-12 n=0.01 rs=1e-1)
-        r.d1_off d1_sense out 1e6
-        b.s1_control s1_control 0 v=(0e0 + (1e0)*v(c))
-        s1 out load s1_control 0 m.s1
-        .model m.s1 sw(vt=1e0 vh=5e-1 ron=1e-3 roff=1e9)
-        vc c 0 dc 5e0
-        v.x1.r1_sense load x1.r1_sense 0
-        r.x1.r1 x1.r1_sense 0 1e3
-        c.x1.c1 load 0 1e-6 ic=1e0
-        .options reltol=1e-4 method=gear
-        .tran 1e-6 4e-3 0e0 1e-6 uic
-        .save i(v.d1_sense) i(v.x1.r1_sense) v(in) v(load) v(out)
-        .end
-        edges of zero width take 4e-10 s
-        ideal diodes are D models with N = 0.01
-        ");
-    }
-
-    #[test]
-    fn code_model_diodes_are_measured_in_series() {
-        let circuit =
-            circuit("t\nv1 a 0 1\nd1 a 0 di\n.model di d(ideal)\n.tran 1u 1m\n.save i(d1)\n.end\n");
-        let deck = deck(&circuit, &options(Realisation::Sidiode)).unwrap();
-        assert!(
-            deck.text
-                .contains("v.d1_sense a d1_sense 0\na.d1 d1_sense 0 m.d1\n"),
-            "{}",
-            deck.text
-        );
-        assert_eq!(
-            deck.probes,
-            [("i(d1)".to_owned(), Reading::Vector("i(v.d1_sense)".into()))]
-        );
-    }
-
-    #[test]
-    fn without_a_transient_there_is_no_deck() {
-        let error = deck(&Circuit::default(), &options(Realisation::Default)).unwrap_err();
-        assert_eq!(error, DeckError::NoTran);
     }
 }

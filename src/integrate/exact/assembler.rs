@@ -90,15 +90,7 @@ impl<'a> Assembler<'a> {
 
     /// The switches' thresholds.
     pub(crate) fn thresholds(&self) -> Vec<Threshold> {
-        self.behaviour
-            .switches
-            .iter()
-            .map(|s| Threshold {
-                name: s.name.clone(),
-                on_above: s.on_above,
-                off_below: s.off_below,
-            })
-            .collect()
+        self.behaviour.switches.iter().map(Threshold::of).collect()
     }
 
     /// Ron and 1/Roff of a switch.

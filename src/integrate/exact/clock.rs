@@ -156,6 +156,7 @@ mod tests {
             name: "s".into(),
             on_above: 0.5,
             off_below: 0.5,
+            latch: None,
         };
         let control = SourceControl {
             switch: 0,

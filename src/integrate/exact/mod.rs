@@ -28,7 +28,7 @@ mod transition;
 mod work;
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 
 pub use assembler::Assembler;
 pub(crate) use pause::Place;

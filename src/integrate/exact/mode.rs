@@ -187,8 +187,17 @@ impl Mode {
                         && row.iter().skip(n).eq(drive.row.iter())
                 })
         };
-        let guarded_switches: Vec<usize> =
-            published.iter().copied().filter(|&i| !driven(i)).collect();
+        let guarded = |i: &usize| {
+            let threshold = &thresholds[*i];
+            match threshold.latch {
+                None => !driven(*i),
+                // Without a holding current the valve's guard is that of its current.
+                Some(_) => {
+                    threshold.off_below > 0.0 && threshold.holds(key.switches[*i], &key.switches)
+                }
+            }
+        };
+        let guarded_switches: Vec<usize> = published.iter().copied().filter(guarded).collect();
         let mut guards = DMatrix::zeros(
             devices.nrows() + guarded_switches.len() + 2 * slides.len(),
             dim,

@@ -19,6 +19,8 @@ pub(crate) struct Plant<'a> {
     /// Number of device pairs.
     pub(crate) pairs: usize,
     pub(crate) thresholds: Vec<Threshold>,
+    /// By switch: the pair in series with a thyristor's.
+    pub(crate) valves: Vec<Option<usize>>,
     /// Switches that sources alone drive.
     pub(crate) drives: Vec<Drive>,
     /// Those whose sources do nothing else.
@@ -34,9 +36,15 @@ pub(crate) struct Plant<'a> {
 impl<'a> Plant<'a> {
     /// A plant without modes; `h` is the output step, `energy` asks for the balance, `tolerance` that of complementarity residuals.
     pub(crate) fn new(assembler: Assembler<'a>, h: f64, energy: bool, tolerance: f64) -> Self {
+        let thresholds = assembler.thresholds();
+        let valve = |t: &Threshold| {
+            let valve = t.valve()?;
+            (0..assembler.pairs()).find(|&pair| assembler.device(pair) == Some(valve))
+        };
         Self {
             pairs: assembler.pairs(),
-            thresholds: assembler.thresholds(),
+            valves: thresholds.iter().map(valve).collect(),
+            thresholds,
             assembler,
             drives: Vec::new(),
             clocks: Vec::new(),
@@ -102,6 +110,15 @@ impl<'a> Plant<'a> {
         });
         self.index.insert(key.clone(), at);
         at
+    }
+
+    /// The switches of thyristors that hold themselves with valve `pair` in series.
+    pub(crate) fn released(&self, pair: usize, position: &[bool]) -> Vec<usize> {
+        let latches = self.thresholds.iter().zip(&self.valves).enumerate();
+        let holding = latches.filter(|(i, (threshold, valve))| {
+            **valve == Some(pair) && threshold.holds(position[*i], position)
+        });
+        holding.map(|(i, _)| i).collect()
     }
 
     /// See [`Assembler::controls`].

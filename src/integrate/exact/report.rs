@@ -110,7 +110,8 @@ impl Exact<'_> {
     fn label(&mut self, at: usize) -> Result<String, SimError> {
         let new = self.plant.modes[at].key.clone();
         let mut words: Vec<String> = Vec::new();
-        for (i, threshold) in self.plant.thresholds.iter().enumerate() {
+        let thresholds = self.plant.thresholds.iter().enumerate();
+        for (i, threshold) in thresholds.filter(|(_, t)| !t.is_rest()) {
             let slides = |key: &Key| key.sliding.iter().any(|s| s.0 == i);
             if slides(&new) {
                 if !slides(&self.key) {

@@ -19,6 +19,7 @@ use super::transition::Trigger;
 use crate::circuit::Source;
 use crate::integrate::energy::Balance;
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
+use crate::integrate::switching::fire;
 use crate::settings::Settings;
 
 /// Times closer than this many units in the last place are one time.
@@ -133,6 +134,8 @@ impl<'a> Exact<'a> {
             .collect::<Option<_>>()
             .ok_or_else(unsupported)?;
         plant.drives = drives(&lcs, &exosystem, &plant.clocks);
+        let latches = |i: usize| plant.thresholds[i].latch.is_some();
+        plant.drives.retain(|drive| !latches(drive.switch));
         let mut z = vec![0.0; exosystem.dim()];
         exosystem.write(t, &mut z);
         let driven = plant
@@ -146,6 +149,7 @@ impl<'a> Exact<'a> {
         for (i, control) in driven.chain(clocked) {
             position[i] = plant.thresholds[i].position(position[i], control);
         }
+        fire(&plant.thresholds, &mut position);
         key.switches = position;
         let sources_count = sources.len();
         let volts = lcs
@@ -263,7 +267,12 @@ impl<'a> Exact<'a> {
         let mut key = self.take_key();
         let mut discontinuous = false;
         match self.plant.modes[from].owner(guard) {
-            Owner::Device(_) => {}
+            // A thyristor's current ends, and no gate holds it.
+            Owner::Device(pair) => {
+                for i in self.plant.released(pair, &key.switches) {
+                    key.switches[i] = false;
+                }
+            }
             Owner::Switch(i) => {
                 key.switches[i] = !key.switches[i];
                 discontinuous = true;
@@ -274,6 +283,7 @@ impl<'a> Exact<'a> {
                 discontinuous = true;
             }
         }
+        fire(&self.plant.thresholds, &mut key.switches);
         self.remember_inputs();
         self.change_to(key, discontinuous, Trigger::Guard(guard), log)
     }
@@ -360,6 +370,7 @@ impl<'a> Exact<'a> {
                 edge = true;
             }
         }
+        fire(&self.plant.thresholds, &mut key.switches);
         if edge {
             key.sliding.clear();
         }

@@ -5,6 +5,7 @@ use super::mode::{Key, Owner};
 use super::schedule::Drive;
 use super::stepper::Exact;
 use crate::integrate::run::{Log, Reason, SimError};
+use crate::integrate::switching::fire;
 
 /// Lengths of the implicit step that proposes the next mode, in units of the fastest time constant seen.
 pub(super) const PROPOSALS: [f64; 7] = [1e-6, 1e-4, 1e-8, 1e-2, 1e-10, 1.0, 1e2];
@@ -96,6 +97,9 @@ impl Exact<'_> {
             };
             key.closed.clone_from(&self.plant.modes[at].key.closed);
             leaving.extend(self.misplaced(at));
+            leaving.extend(self.let_go(at));
+            leaving.sort_unstable();
+            leaving.dedup();
             if leaving.is_empty() {
                 entry = Some(at);
                 break;
@@ -108,6 +112,7 @@ impl Exact<'_> {
                     moving.push(i);
                 }
             }
+            fire(&self.plant.thresholds, &mut key.switches);
             if positions.contains(&key.switches) {
                 // The switches that moved last contradict themselves, or all that moved contradict each other.
                 entry = self
@@ -177,9 +182,21 @@ impl Exact<'_> {
             .collect()
     }
 
+    /// Thyristors that hold themselves in mode `at` although their valves block.
+    fn let_go(&self, at: usize) -> Vec<usize> {
+        let Key {
+            closed, switches, ..
+        } = &self.plant.modes[at].key;
+        let blocks = |i: usize| self.plant.valves[i].is_some_and(|pair| !closed[pair]);
+        let thresholds = self.plant.thresholds.iter().enumerate();
+        let holding = thresholds.filter(|(i, t)| t.holds(switches[*i], switches));
+        holding.map(|(i, _)| i).filter(|&i| blocks(i)).collect()
+    }
+
     /// The device or switches at which no mode goes on.
     fn culprit(&mut self, key: &Key, trigger: Trigger) -> String {
         let moved: Vec<&str> = (0..key.switches.len())
+            .filter(|&i| !self.plant.thresholds[i].is_rest())
             .filter(|&i| self.key.switches.get(i) != key.switches.get(i))
             .map(|i| self.plant.thresholds[i].name.as_str())
             .collect();
@@ -213,6 +230,13 @@ impl Exact<'_> {
 
     /// The mode in which these switches stay on their thresholds, where closing and opening contradict each other.
     fn slide(&mut self, key: &Key, switches: &[usize], closed_sets: &[Vec<bool>]) -> Option<usize> {
+        // A latch has no position between on and off.
+        if switches
+            .iter()
+            .any(|&i| self.plant.thresholds[i].latch.is_some())
+        {
+            return None;
+        }
         let neighbours = closed_sets.iter().flat_map(|set| {
             (0..set.len()).map(|j| {
                 let mut closed = set.clone();

@@ -50,8 +50,7 @@ impl Theta<'_> {
                 mode,
                 h,
                 settle,
-                solved: None,
-                work: None,
+                ..Attempt::default()
             };
         }
         let n = now.x.len();
@@ -135,7 +134,7 @@ impl Theta<'_> {
             h,
             settle: false,
             solved: Some((solution.basis, solution.active)),
-            work: None,
+            ..Attempt::default()
         };
         Ok(())
     }
@@ -165,7 +164,7 @@ impl Theta<'_> {
         self.now.u.copy_from_slice(&self.u_next);
         self.now.t = t1;
         self.last_h = self.attempt.h;
-        Ok(())
+        self.send_waves()
     }
 
     /// The error after the attempted step.
@@ -185,6 +184,10 @@ impl Theta<'_> {
             estimate.restart();
         }
         let n = now.x.len();
+        if let Some(error) = attempt.error.take() {
+            estimate.stages(attempt.h, &out[..n], error);
+            return;
+        }
         let fused = || {
             plant.systems[now.system]
                 .1
@@ -206,14 +209,19 @@ impl Theta<'_> {
             self.attempt.h = f64::NAN;
             return;
         }
-        // Energy at the end of the step (γ = 1) from the solution itself.
+        // Energy at k + θ with λ of the end (γ = 1): for θ = ½ the balance of this step, too, is exact.
+        let theta = self.system().step(self.attempt.step).scheme.theta;
+        let mean = |after: &[f64], before: &[f64]| -> Vec<f64> {
+            let pairs = after.iter().zip(before);
+            pairs.map(|(a, b)| theta * a + (1.0 - theta) * b).collect()
+        };
         for (du, (a, b)) in self.du.iter_mut().zip(self.u_next.iter().zip(&self.now.u)) {
             *du = (a - b) / h;
         }
         let at = Point {
-            x: &self.out[..n],
+            x: &mean(&self.out[..n], &self.now.x),
             lambda: &self.lambda,
-            u: &self.u_next,
+            u: &mean(&self.u_next, &self.now.u),
             du: &self.du,
         };
         let (source, dissipated) = energy::power(&self.system().lcs, at);

@@ -3,10 +3,19 @@
 //! With prescribed steps the local error is read from differences of consecutive states, h²x''/2 ≈ (x_{k+1} − 2x_k + x_{k−1})/2 for
 //! methods of order 1 (an upper estimate for θ = ½, γ = 1, where only λ is of order 1) and h³x'''/12 ≈ ∇³x/12 for the midpoint rule (E. Hairer, G. Wanner, Solving Ordinary Differential
 //! Equations II, IV.8), and carried along by the step's own map, e ← R e + local, so that what is forgotten leaves the estimate too.
-//! A step that changes the active set counts with order 1: somewhere in it x' has a kink. With chosen steps the errors of
+//! A step that changes the active set counts with order 1: somewhere in it x' has a kink.
+//!
+//! With curved laws the stages tell both: e is carried by their derivatives, and the local error is the change of the embedded difference
+//! d = O(hᵖ) from step to step, which has the order of the error, times the ratio of the two constants.
+//!
+//! With chosen steps the errors of
 //! all of them are added: the flow of a passive circuit is a contraction.
 
+#[cfg(test)]
+mod tests;
+
 use crate::integrate::control::Amplitudes;
+use crate::integrate::theta::stages::StepError;
 use crate::lcs::Lcs;
 
 /// Steps whose difference in length is below this part are one step length.
@@ -117,6 +126,32 @@ impl Estimate {
             Some(_) => (self.known + 1).min(3),
             None => 0,
         };
+    }
+
+    /// A step of length h to `after` of which the stages tell the error.
+    pub(super) fn stages(&mut self, h: f64, after: &[f64], step: StepError) {
+        let ratio = if self.known > 0 {
+            (h / self.h).powi(step.order)
+        } else {
+            0.0
+        };
+        // The first step in a row has no other to compare with: as if there had been rest before it.
+        for (i, x) in after.iter().enumerate() {
+            let change = step.embedded[i] - ratio * self.difference[i];
+            self.error[i] = step.carried[i] + step.constant * change;
+            self.largest[i] = self.largest[i].max(self.error[i].abs());
+            self.amplitude[i] = self.amplitude[i].max(x.abs());
+            self.difference[i] = step.embedded[i];
+        }
+        (self.h, self.known) = (h, 1);
+    }
+
+    /// A switch should have moved somewhere in the step from `before` to `after`, and does so at its end: the state is off by what
+    /// the step did to it. A switch that chatters makes up for that the next time, so that nothing is carried along.
+    pub(super) fn switched_late(&mut self, before: &[f64], after: &[f64]) {
+        for (i, largest) in self.largest.iter_mut().enumerate() {
+            *largest = largest.max(self.error[i].abs() + (after[i] - before[i]).abs());
+        }
     }
 
     /// Takes the largest error in the present system into account, relative to amplitudes.

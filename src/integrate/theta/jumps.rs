@@ -22,7 +22,7 @@ impl Theta<'_> {
             ..
         } = self;
         amplitudes.see(&plant.systems[now.system].1.lcs, &now.x);
-        Ok(())
+        self.break_waves()
     }
 
     /// At a breakpoint: inputs take their right limits, the state jumps if it must.
@@ -30,7 +30,7 @@ impl Theta<'_> {
         let mut u = self.now.u.clone();
         self.inputs.right(t, &mut u);
         if u == self.now.u {
-            return Ok(());
+            return self.break_waves();
         }
         let rows = log.wants_rows();
         let before = if rows {
@@ -46,6 +46,7 @@ impl Theta<'_> {
         }
         self.jump(&old, log)?;
         self.find_mode()?;
+        self.break_waves()?;
         self.report_quietly(log);
         if rows {
             self.log_row(log);
@@ -158,14 +159,29 @@ impl Theta<'_> {
         }
     }
 
-    /// Whether a switch's control is beyond its threshold now.
-    pub(super) fn crossed(&mut self) -> Result<bool, SimError> {
+    /// What the controls ask of the switches now.
+    pub(super) fn crossed(&mut self) -> Result<Change, SimError> {
         if self.switches.needs_lambda() {
             self.read_lambda()?;
         }
         let lcs = &self.plant.systems[self.now.system].1.lcs;
         let at = self.now.point(&self.lambda, &self.du);
-        Ok(self.switches.update(lcs, at, false))
+        Ok(self.switches.update(lcs, at, &self.now.pattern, false))
+    }
+
+    /// Whether the controls ask a switch to move now.
+    pub(super) fn asked(&mut self) -> Result<bool, SimError> {
+        Ok(self.switches.watch() && self.crossed()? != Change::None)
+    }
+
+    /// How far the controls of switches that watch the state are beyond their thresholds now.
+    pub(super) fn excess(&mut self) -> Result<Vec<f64>, SimError> {
+        if self.switches.needs_lambda() {
+            self.read_lambda()?;
+        }
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        let at = self.now.point(&self.lambda, &self.du);
+        Ok(self.switches.excess(lcs, at, &self.now.pattern))
     }
 
     /// Flips the switches `moving`, then those whose controls ask for it until none does, with the jumps this causes.
@@ -182,7 +198,9 @@ impl Theta<'_> {
                 }
                 let lcs = &self.plant.systems[self.now.system].1.lcs;
                 let at = self.now.point(&self.lambda, &self.du);
-                if !self.switches.update(lcs, at, true) {
+                let pattern = &self.now.pattern;
+                if self.switches.update(lcs, at, pattern, true) == Change::None {
+                    self.break_waves()?;
                     if log.wants_rows() {
                         self.log_row(log);
                     }
@@ -198,6 +216,7 @@ impl Theta<'_> {
         self.read_lambda()?;
         let at = self.now.point(&self.lambda, &self.du);
         if self.switches.undecided(&self.system().lcs, at, SHORT) {
+            self.break_waves()?;
             if log.wants_rows() {
                 self.log_row(log);
             }

@@ -3,6 +3,17 @@
 use super::*;
 use crate::integrate::control::Verdict;
 
+/// What became of a part of a base step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Tried {
+    /// It must be halved.
+    Halve,
+    /// It is done.
+    Done,
+    /// It is done, and a switch moved at its end.
+    Switched,
+}
+
 impl Theta<'_> {
     /// Advances to `stop`, which no breakpoint lies before; u is the left limit there.
     pub(super) fn interval(&mut self, stop: f64, log: &mut Log) -> Result<(), SimError> {
@@ -75,13 +86,29 @@ impl Theta<'_> {
         Ok(())
     }
 
-    /// A base step with halving: for the error and to locate state-driven switchings.
+    /// A base step with halving: for the error and to locate state-driven switchings, after which the rest is a base step of its own.
     pub(super) fn divided_step(
         &mut self,
         base: f64,
         end: f64,
         log: &mut Log,
     ) -> Result<(), SimError> {
+        let finest = (base / 2_f64.powi(LOCATE)).max(Self::slack(end));
+        let mut base = base;
+        while !self.halved_step(base, end, finest, log)? {
+            base = end - self.now.t;
+        }
+        Ok(())
+    }
+
+    /// A base step up to its end, or to the first switching: `false`.
+    fn halved_step(
+        &mut self,
+        base: f64,
+        end: f64,
+        finest: f64,
+        log: &mut Log,
+    ) -> Result<bool, SimError> {
         const WHOLE: u64 = 1 << FINEST;
         let start = self.now.t;
         let mut done = 0;
@@ -104,25 +131,31 @@ impl Theta<'_> {
                 } else {
                     start + base * ((done + size) as f64 / WHOLE as f64)
                 };
-                if self.tentative(h, t1, level, log)? {
-                    done += size;
-                    break;
+                match self.tentative(h, t1, level, finest, log)? {
+                    Tried::Done => {
+                        done += size;
+                        break;
+                    }
+                    Tried::Switched => return Ok(self.now.t == end),
+                    Tried::Halve => {
+                        self.stats.rejected += 1;
+                        level += 1;
+                    }
                 }
-                self.stats.rejected += 1;
-                level += 1;
             }
         }
-        Ok(())
+        Ok(true)
     }
 
-    /// One step of a divided base step: `false` to have it halved, else it is done, with all its consequences.
-    pub(super) fn tentative(
+    /// One step of a divided base step: to be halved, or done with all its consequences.
+    fn tentative(
         &mut self,
         h: f64,
         t1: f64,
         level: u32,
+        finest: f64,
         log: &mut Log,
-    ) -> Result<bool, SimError> {
+    ) -> Result<Tried, SimError> {
         self.kept.copy_from(&self.now);
         let steps = self.stats.steps;
         let mut last_chance = level + 2 >= FINEST;
@@ -130,36 +163,28 @@ impl Theta<'_> {
             last_chance |= h <= control.smallest();
         }
         let mut impulse = false;
-        if self.control.is_some() {
-            let mut verdict = self.controlled(h, t1, last_chance, &mut impulse)?;
-            // The midpoint rule may have rung at what an edge or a jump left behind: the same step once more, damped.
-            if !verdict.accept && self.kept.settle && self.scheme.order() == 2 {
-                self.back(steps);
-                self.damped = true;
-                verdict = self.controlled(h, t1, last_chance, &mut impulse)?;
-                self.damped = false;
-            }
-            if !verdict.accept && !last_chance {
-                self.back(steps);
-                return Ok(false);
-            }
-            if let Some(estimate) = &mut self.now.estimate {
-                estimate.add(verdict.error);
-            }
-        } else {
-            self.preferred = f64::INFINITY;
-            self.fixed_step(h, t1)?;
-            self.commit(t1)?;
+        if !self.advance(h, t1, last_chance, &mut impulse)? {
+            self.back(steps);
+            return Ok(Tried::Halve);
         }
-        if self.switches.watch() && self.crossed()? {
-            if level < LOCATE && !last_chance && !self.switches.chattering(CHATTER) {
-                self.back(steps);
-                self.preferred = f64::INFINITY;
-                return Ok(false);
+        let mut tried = Tried::Done;
+        let change = if self.switches.watch() {
+            self.crossed()?
+        } else {
+            Change::None
+        };
+        if change != Change::None {
+            let may_locate = h > finest && !last_chance && !self.switches.chattering(CHATTER);
+            if change == Change::Passage && may_locate {
+                self.locate(finest, steps, &mut impulse, log)?;
             }
-            self.preferred = h;
+            let late = change == Change::Passage;
+            if let (true, Some(estimate), None) = (late, &mut self.now.estimate, &self.control) {
+                estimate.switched_late(&self.kept.x, &self.now.x);
+            }
             self.report(log);
             self.switch(&[], log)?;
+            tried = Tried::Switched;
         }
         if impulse {
             self.now.settle = true;
@@ -174,7 +199,80 @@ impl Theta<'_> {
             amplitudes.see(&plant.systems[now.system].1.lcs, &now.x);
         }
         self.report(log);
-        Ok(true)
+        Ok(tried)
+    }
+
+    /// Commits a step of h, of prescribed length or, as two halves, if error control accepts it: else `false`.
+    fn advance(
+        &mut self,
+        h: f64,
+        t1: f64,
+        last_chance: bool,
+        impulse: &mut bool,
+    ) -> Result<bool, SimError> {
+        if self.control.is_none() {
+            self.preferred = f64::INFINITY;
+            self.fixed_step(h, t1)?;
+            self.commit(t1)?;
+            return Ok(true);
+        }
+        let steps = self.stats.steps;
+        let mut verdict = self.controlled(h, t1, last_chance, impulse)?;
+        // The midpoint rule may have rung at what an edge or a jump left behind: the same step once more, damped.
+        if !verdict.accept && self.kept.settle && self.scheme.order() == 2 {
+            self.back(steps);
+            self.damped = true;
+            verdict = self.controlled(h, t1, last_chance, impulse)?;
+            self.damped = false;
+        }
+        if let Some(estimate) = &mut self.now.estimate {
+            estimate.add(verdict.error);
+        }
+        Ok(verdict.accept || last_chance)
+    }
+
+    /// Goes back before a step in which switches passed their thresholds, and again to `finest` after the first of them did. The time is
+    /// that of a straight line between the controls' distances at both ends of a bracket, aimed at a little behind the passage
+    /// and a little before it in turn; every third time it is the middle.
+    fn locate(
+        &mut self,
+        finest: f64,
+        steps: u64,
+        impulse: &mut bool,
+        log: &mut Log,
+    ) -> Result<(), SimError> {
+        let (mut end, mut beyond) = (self.now.t, self.excess()?);
+        self.back(steps);
+        let mut before = self.excess()?;
+        let mut aside = finest;
+        for count in 0_u32.. {
+            let (t0, width) = (self.now.t, end - self.now.t);
+            let t1 = if width <= 2.0 * finest {
+                end
+            } else {
+                let part = if count % 3 == 2 {
+                    0.5
+                } else {
+                    passage(&before, &beyond)
+                };
+                t0 + (part * width + 0.5 * aside).clamp(finest, width - finest)
+            };
+            self.kept.copy_from(&self.now);
+            let steps = self.stats.steps;
+            self.advance(t1 - t0, t1, false, impulse)?;
+            let excess = self.excess()?;
+            if t1 == end {
+                break;
+            }
+            if excess.iter().any(|e| *e > 0.0) {
+                (end, beyond, aside) = (t1, excess, -finest);
+                self.back(steps);
+            } else {
+                (before, aside) = (excess, finest);
+                self.report(log);
+            }
+        }
+        Ok(())
     }
 
     /// A step of h and two of h/2, the latter committed, and what error control says of their difference.
@@ -219,6 +317,7 @@ impl Theta<'_> {
 
     pub(super) fn back(&mut self, steps: u64) {
         self.now.copy_from(&self.kept);
+        self.inputs.lines_mut().back_to(self.now.t);
         self.stats.steps = steps;
         self.pending.clear();
         self.attempt.h = f64::NAN;
@@ -288,4 +387,13 @@ impl Theta<'_> {
         let still = vec![0.0; self.now.u.len()];
         self.log_impulses(t, &p, &still, log);
     }
+}
+
+/// The part of a bracket after which the first of several quantities that are positive at its end alone passes zero.
+fn passage(before: &[f64], beyond: &[f64]) -> f64 {
+    let pairs = before.iter().zip(beyond);
+    let parts = pairs
+        .filter(|(_, b)| **b > 0.0)
+        .map(|(a, b)| -a.min(0.0) / (b - a.min(0.0)));
+    parts.fold(1.0, f64::min)
 }

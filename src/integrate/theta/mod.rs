@@ -8,6 +8,7 @@
 mod attempt;
 mod estimate;
 mod jumps;
+mod lines;
 mod march;
 mod right_limit;
 mod stages;
@@ -27,7 +28,7 @@ use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
 use crate::integrate::stats::Stats;
 use crate::integrate::step::{SHORT, Scheme};
-use crate::integrate::switching::{Switches, Threshold};
+use crate::integrate::switching::{Change, Switches, Threshold};
 use crate::integrate::system::{Plant, Reduce, System};
 use crate::lcs::{Lcs, Port, Role};
 use crate::settings::Settings;
@@ -82,7 +83,7 @@ pub enum Start {
 /// Sub-steps of a base step are multiples of 2^−FINEST of it.
 const FINEST: u32 = 40;
 /// State-driven switching times are located to 2^−LOCATE of a base step.
-const LOCATE: u32 = 24;
+const LOCATE: i32 = 24;
 /// Switchings in one base step after which they are no longer located but taken at the ends of whole base steps
 /// (chattering: the base step then decides how fast a sliding switch switches).
 const CHATTER: u32 = 32;
@@ -128,6 +129,8 @@ pub struct Theta<'a> {
     notes: Vec<String>,
     worst_residual: f64,
     pending: Vec<(f64, String)>,
+    /// The ports of transmission lines.
+    ports: Vec<lines::Port>,
     /// Largest |s| so far, by storage element: what the error control calls the amplitude.
     amplitudes: Amplitudes,
 }
@@ -189,6 +192,8 @@ struct Attempt {
     solved: Option<(Vec<bool>, Vec<Option<bool>>)>,
     /// Energy from sources and into resistors and devices, J, where the stages tell it.
     work: Option<(f64, f64)>,
+    /// What the stages tell of the error, where it is asked for.
+    error: Option<stages::StepError>,
 }
 
 impl<'a> Theta<'a> {
@@ -284,6 +289,7 @@ impl<'a> Theta<'a> {
             notes: Vec::new(),
             worst_residual: 0.0,
             pending: Vec::new(),
+            ports: Vec::new(),
             amplitudes,
         };
         theta.resize();
@@ -295,13 +301,10 @@ impl<'a> Theta<'a> {
         self.amplitudes = amplitudes;
     }
 
-    /// Has the error estimated along the run; there is no estimate for prescribed steps of curved laws.
+    /// Has the error estimated along the run.
     pub fn estimate_errors(&mut self) {
         let mut estimate = Estimate::default();
         if self.control.is_none() {
-            if Tableau::of(self.system(), self.scheme).is_some() {
-                return;
-            }
             estimate.enter(self.now.x.iter().map(|_| 0.0));
         }
         self.kept.estimate = Some(estimate.clone());
@@ -424,7 +427,7 @@ impl Stepper for Theta<'_> {
             self.begin(log)?;
             let lcs = &self.plant.systems[self.now.system].1.lcs;
             let moving = self.switches.misplaced(lcs, &self.now.u);
-            if !moving.is_empty() || self.switches.watch() && self.crossed()? {
+            if !moving.is_empty() || self.asked()? {
                 self.switch(&moving, log)?;
             }
         }
@@ -444,9 +447,13 @@ impl Stepper for Theta<'_> {
             } else {
                 breakpoint.min(t)
             };
-            let (known, moving) =
-                self.switches
-                    .next_known(&self.system().lcs, &self.inputs, now, limit);
+            let (known, moving) = self.switches.next_known(
+                &self.system().lcs,
+                &self.inputs,
+                now,
+                limit,
+                Self::slack(limit),
+            );
             let mut stop = if merged { t } else { limit };
             let early = known < stop - Self::slack(stop);
             if early {
@@ -457,7 +464,7 @@ impl Stepper for Theta<'_> {
             if at_breakpoint {
                 self.edge(breakpoint.max(stop), log)?;
             }
-            if !moving.is_empty() || at_breakpoint && self.switches.watch() && self.crossed()? {
+            if !moving.is_empty() || at_breakpoint && self.asked()? {
                 self.switch(&moving, log)?;
             }
         }

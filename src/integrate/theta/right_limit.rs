@@ -3,6 +3,10 @@
 use super::attempt::unsolved;
 use super::*;
 
+/// What is read goes on along a line, so that its error adds up with every reflection: it is read by a step shorter by this
+/// part, where the rounding of the state grows to 2¹⁸ε.
+const SHORT_ON_LINES: f64 = 1.0 / 64.0;
+
 impl Theta<'_> {
     /// The step by which λ at the right limit is found, s.
     pub(super) fn read_step(&self) -> f64 {
@@ -26,6 +30,8 @@ impl Theta<'_> {
         let short = self.read_step();
         if self.system().curved {
             short * SHORT
+        } else if !self.ports.is_empty() {
+            short * SHORT_ON_LINES
         } else {
             short
         }
@@ -144,10 +150,11 @@ impl Theta<'_> {
             plant,
             now,
             storage,
+            inputs,
             ..
         } = self;
         let lcs = &plant.systems[now.system].1.lcs;
-        now.balance
-            .note(energy::stored_with(lcs, &now.x, &now.u, storage));
+        let stored = energy::stored_with(lcs, &now.x, &now.u, storage);
+        now.balance.note(stored + inputs.lines().stored(now.t));
     }
 }

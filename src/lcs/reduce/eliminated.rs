@@ -223,7 +223,7 @@ impl<'b, F: Field> Eliminated<'b, F> {
     }
 
     /// Of each free device the quantity that should be y, and what held pairs leave unknown; then the other quantity of
-    /// the devices not used yet.
+    /// the devices not used yet; then exchanges.
     fn eliminate_pairs(&mut self, held: &[usize], other_role: bool) {
         let devices = self
             .free
@@ -250,6 +250,7 @@ impl<'b, F: Field> Eliminated<'b, F> {
         let unused = |c: &&(usize, usize)| self.found.pivot[c.0].is_none();
         let second = choices.iter().filter(unused).map(|c| c.1).collect();
         self.eliminate(second);
+        self.exchange_roles();
     }
 
     pub(super) fn device(&self, pair: usize) -> String {

@@ -15,6 +15,7 @@
 //! The part of x that follows u' is the shift: x_physical = x + Σ u, so that no derivative appears in x'.
 
 mod eliminated;
+mod exchange;
 mod flow;
 mod frame;
 mod publish;

@@ -366,3 +366,21 @@ fn pivots_are_exchanged_before_a_sound_active_circuit_is_accused() {
     assert_eq!(s.ports[0].y, "-v(d1)");
     assert_matrix("D", &s.d, &[&[0.0]]);
 }
+
+#[test]
+fn a_junction_in_parallel_with_a_diode_changes_roles() {
+    // f1 carries 100 i(d2): with y = i(d1), i(d2) the voltage of both would be asked for, and d3 would be left without y.
+    let s = free("r1 1 0 1k\n d1 1 0\n d2 1 0\n r2 2 0 1k\n d3 1 2\n f1 2 0 d2 100");
+    let lambdas: Vec<&str> = s.ports.iter().map(|p| p.lambda.as_str()).collect();
+    assert_eq!(lambdas, ["i(d1)", "-v(d2)", "i(d3)"]);
+    // v1 = −λ2, i2 = −v1/R1 − λ1 − λ3, y3 = −v(d3) = R2 (λ3 − 100 i2) − v1.
+    assert_matrix(
+        "D",
+        &s.d,
+        &[
+            &[0.0, 1.0, 0.0],
+            &[-1.0, 1e-3, -1.0],
+            &[1e5, 1.0 - 1e2, 1e3 + 1e5],
+        ],
+    );
+}

@@ -1,7 +1,7 @@
 //! Piecewise-linear laws as ideal pairs: the pairs and the law say the same.
 
 use super::*;
-use crate::law::Law;
+use crate::law::{Curve, Law};
 use crate::mna::fixture::circuit;
 
 /// A device alone with a current source of 1 A/unit: for every combination of conducting and blocking pairs that is
@@ -53,12 +53,22 @@ fn check(law: &Law, currents: &[f64]) {
 #[test]
 fn pairs_reproduce_their_law() {
     let currents = [-3.0, -0.5, 0.25, 2.0];
-    check(&Law::zener(5.0.into(), 0.7.into()), &currents);
+    let zero = || 0.0.into();
+    let zener = Curve::zener((5.0.into(), zero()), (0.7.into(), zero()), None);
+    check(&Law::Curve(zener), &currents);
     check(
-        &Law::saturation((-4.0).into(), 3.0.into(), 0.5.into()),
+        &Law::Curve(Curve::saturation(
+            ((-0.5).into(), (-4.0).into()),
+            (0.5.into(), 3.0.into()),
+        )),
         &[-3.0, 0.1, 2.0],
     );
-    check(&Law::dead_zone(1.0.into(), 2.0.into()), &[-3.0, 2.0]);
+    let dead = Curve::dead_zone(
+        ((-1.0).into(), 1.0.into()),
+        zero(),
+        (2.0.into(), 2.0.into()),
+    );
+    check(&Law::Curve(dead), &[-3.0, 2.0]);
     let diode = |vfwd: f64, ron: f64, roff: Option<f64>| Law::Diode {
         vfwd: vfwd.into(),
         ron: ron.into(),
@@ -76,7 +86,7 @@ fn pairs_reproduce_their_law() {
         point(2.0, 1.5),
     ];
     check(
-        &Law::table(points, point(1.0, 0.5), point(0.0, 1.0)).unwrap(),
+        &Law::Curve(Curve::table(points, point(1.0, 0.5), point(0.0, 1.0))),
         &currents,
     );
 }

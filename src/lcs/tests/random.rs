@@ -282,6 +282,29 @@ proptest! {
     }
 
     #[test]
+    fn a_choice_of_roles_is_found_where_there_is_one(parts in parts(12, 3..14)) {
+        // No storage, and devices in its place.
+        let parts: Vec<Part> = parts
+            .into_iter()
+            .map(|(kind, p, n, a, b, value)| (if matches!(kind, 2 | 3) { 4 } else { kind }, p, n, a, b, value))
+            .collect();
+        let circuit = circuit(&netlist(&parts, false));
+        let behaviour = everything(&circuit);
+        let names: Vec<&str> = behaviour.pairs.iter().map(|p| p.port.device.as_str()).collect();
+        let regular = |choice: u32| {
+            let branch = |name: &str| {
+                let k = names.iter().position(|n| *n == name).unwrap();
+                if choice >> k & 1 == 1 { Branch::Voltage(0.0) } else { Branch::Current(0.0) }
+            };
+            Nodal::solve(&circuit, C64::new(1.0, 0.0), &|_| 0.0, &branch).is_some_and(|n| n.condition < 1e8)
+        };
+        if let Err(error) = reduce(&behaviour, &Position::free(&behaviour, Vec::new())) {
+            let choice = (0..1_u32 << names.len()).find(|&choice| regular(choice));
+            prop_assert_eq!(choice, None, "{}", error);
+        }
+    }
+
+    #[test]
     fn modes_agree_with_nodal_analysis_and_conserve_charge(parts in parts(8, 3..14), conducting in any::<u32>()) {
         let circuit = circuit(&netlist(&parts, false));
         let behaviour = everything(&circuit);

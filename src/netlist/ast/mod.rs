@@ -163,6 +163,13 @@ pub enum Device {
         /// `w=`, `l=`, `m=`, `off`, …
         args: Vec<Assign>,
     },
+    /// T.
+    Line {
+        /// `z0=`, `td=`, `f=`, `nl=`.
+        args: Vec<Assign>,
+        /// `ic=v1,i1,v2,i2`.
+        ic: Vec<Expr>,
+    },
     /// X.
     Call {
         /// The subcircuit.

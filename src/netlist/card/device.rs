@@ -2,7 +2,7 @@
 
 use nom::Input as _;
 
-use super::{Body, assignment_follows, assigns, describe, nodes};
+use super::{Body, assign, assignment_follows, assigns, describe, nodes, numbers};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Control, Device, Name};
 use crate::netlist::lex::{
@@ -159,6 +159,26 @@ pub(super) fn code_model<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
             Ok((at, (nodes, Device::Diode { model, area, args })))
         }
         _ => unsupported(i, name),
+    }
+}
+
+/// `T1 a b c d z0=50 td=10n [ic=v1,i1,v2,i2]`, or `f=1meg nl=0.25` in place of `td`.
+pub(super) fn line<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
+    let (mut at, nodes) = nodes(i, 4, "node")?;
+    let (mut args, mut ic) = (Vec::new(), Vec::new());
+    loop {
+        at = separator(at);
+        let initial = word(at).ok().filter(|(_, name)| name.text == "ic");
+        if let Some(rest) = initial.and_then(|(rest, _)| symbol(rest, '=')) {
+            (at, ic) = numbers(rest, "an initial value")?;
+        } else if !at_end(at)
+            && let Ok((rest, one)) = assign(at)
+        {
+            args.push(one);
+            at = rest;
+        } else {
+            return Ok((at, (nodes, Device::Line { args, ic })));
+        }
     }
 }
 

@@ -65,7 +65,8 @@ pub(super) fn element(i: Input<'_>) -> Parsed<'_, Element> {
         'x' => device::call,
         'm' | 'q' | 'j' | 'z' => device::transistor,
         'a' => device::code_model,
-        't' | 'o' | 'u' | 'p' | 'y' | 'n' => device::unsupported,
+        't' => device::line,
+        'o' | 'u' | 'p' | 'y' | 'n' => device::unsupported,
         _ => {
             let message = format!(
                 "`{}` is no element: no element begins with `{letter}`",
@@ -74,7 +75,7 @@ pub(super) fn element(i: Input<'_>) -> Parsed<'_, Element> {
             return Err(refuse(
                 Diagnostic::error("unknown-element", name.span, message)
                     .label("unknown element letter")
-                    .help("elements are R C L K V I E F G H B D S W M Q J Z X; a comment begins with `*` or `;`"),
+                    .help("elements are R C L K V I E F G H B D S W M Q J Z T X; a comment begins with `*` or `;`"),
             ));
         }
     };

@@ -45,8 +45,8 @@ pub(in crate::netlist) enum Dot {
     End,
     /// `.title text`.
     Title(String),
-    /// `.options`: the temperature it sets, if it does.
-    Options(Option<Expr>),
+    /// `.options`: the temperature it sets, if it does, and whether there are others, which are skipped.
+    Options(Option<Expr>, bool),
     /// A card that does not change the transient and is skipped with a note.
     Skipped,
     /// A card that asks for nothing (`.backanno`, `.width`).
@@ -129,7 +129,7 @@ pub(in crate::netlist) fn card(i: Input<'_>) -> Parsed<'_, Dot> {
         ".ic" => initial(rest, Statement::Ic),
         ".nodeset" => initial(rest, Statement::Nodeset),
         ".temp" => temperature(rest),
-        ".option" | ".options" | ".opt" => Ok((skip(rest), Dot::Options(options(rest)))),
+        ".option" | ".options" | ".opt" => Ok((skip(rest), options(rest))),
         ".global" => global(rest),
         ".save" | ".probe" => save(rest),
         ".print" | ".plot" => output::save(rest, true),
@@ -340,22 +340,27 @@ fn temperature(i: Input<'_>) -> Parsed<'_, Dot> {
 }
 
 /// The temperature among options, which are names with and without values.
-fn options(i: Input<'_>) -> Option<Expr> {
-    let mut temperature = None;
+fn options(i: Input<'_>) -> Dot {
+    let (mut temperature, mut others) = (None, false);
     let mut at = separator(i);
     while let Ok((rest, name)) = word(at) {
         at = separator(rest);
-        if let Some(rest) = symbol(rest, '=') {
-            let Ok((rest, value)) = operand::lenient(rest) else {
-                break;
-            };
-            if name.text == "temp" {
-                temperature = Some(value);
-            }
-            at = separator(rest);
+        let value = match symbol(rest, '=') {
+            Some(rest) => match operand::lenient(rest) {
+                Ok((rest, value)) => {
+                    at = separator(rest);
+                    Some(value)
+                }
+                Err(_) => return Dot::Options(temperature, true),
+            },
+            None => None,
+        };
+        match value {
+            Some(value) if name.text == "temp" => temperature = Some(value),
+            _ => others = true,
         }
     }
-    temperature
+    Dot::Options(temperature, others || !at_end(at))
 }
 
 fn global(i: Input<'_>) -> Parsed<'_, Dot> {

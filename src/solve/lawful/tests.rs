@@ -211,3 +211,26 @@ fn a_current_that_no_law_carries_is_no_solution() {
     };
     assert_eq!(solve(&network).status, Status::Failed);
 }
+
+#[test]
+fn the_kernel_of_a_rounded_matrix_is_followed_the_right_way() {
+    // Rank one but for the last digit, which makes the determinant −7.5e-20. With the ideal diode conducting, 0 V across it,
+    // i = q₂ − q₁ m₂₁/m₁₁ = 15.07 nA through the junction; from where it blocks only the kernel of M leads there.
+    let m = dmatrix![0.002780450822413297, 9.289188481070114e-5; 9.289188481070115e-5, 3.103418407592942e-6];
+    let q = dvector![-1.9679974845688268, -0.06574867365459573];
+    let law = diode(5.951870501769332e-9, 0.05325030127862577, 0.0, None);
+    let ports = vec![
+        PortLaw {
+            law: Law::ideal_diode(),
+            current: true,
+        },
+        PortLaw {
+            law,
+            current: false,
+        },
+    ];
+    let network = Network { m, ports, q };
+    let found = solve(&network);
+    check(&network, &found);
+    assert!((found.y[1] - 1.507e-8).abs() < 1e-11, "{found:?}");
+}

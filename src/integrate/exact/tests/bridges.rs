@@ -1,8 +1,8 @@
 //! Rectifiers.
 
-use super::{at, simulate};
+use super::{at, simulate, times_after_start};
 
-const BRIDGE: &str = "C1 1 0 1u IC=10\nL1 1 0 10m IC=0\nDF1 1 2 ideal\nDR1 0 2 ideal\nDR2 3 1 ideal\nDF2 3 0 ideal\n\
+pub(in crate::integrate) const BRIDGE: &str = "C1 1 0 1u IC=10\nL1 1 0 10m IC=0\nDF1 1 2 ideal\nDR1 0 2 ideal\nDR2 3 1 ideal\nDF2 3 0 ideal\n\
     R1 2 3 1k\n.model ideal D(ideal)\n";
 
 const TIMES: [f64; 8] = [0.1e-3, 0.2e-3, 0.5e-3, 1e-3, 2e-3, 3e-3, 4e-3, 5e-3];
@@ -100,12 +100,7 @@ fn bridge_with_capacitor_filter() {
     let switching = [
         32.0421, 211.7642, 357.0594, 536.7816, 682.0768, 861.7989, 1007.0942, 1186.8163,
     ];
-    let times: Vec<f64> = run
-        .events
-        .iter()
-        .map(|e| e.0)
-        .filter(|&t| t > 0.0)
-        .collect();
+    let times = times_after_start(&run);
     for (t, expected) in times.iter().zip(switching) {
         assert!((t - expected * 1e-6).abs() < 1e-10, "{t} {expected}");
     }
@@ -171,12 +166,7 @@ fn bridge_from_a_source() {
         "V1 1 0 SIN(0 10 {1e4/(2*pi)} 0 0 90)\nDF1 1 2 d\nDR1 0 2 d\nDR2 3 1 d\nDF2 3 0 d\nR1 2 3 1k\nCf 2 3 300n IC=0\n\
          .model d D(Vfwd=0.21 Ron=0 ideal)\n.tran 1u 5m uic\n.save v(2,3)",
     );
-    let times: Vec<f64> = run
-        .events
-        .iter()
-        .map(|e| e.0)
-        .filter(|&t| t > 0.0)
-        .collect();
+    let times = times_after_start(&run);
     assert_eq!(times.len(), BRIDGE_C_SWITCHING.len());
     for (t, expected) in times.iter().zip(BRIDGE_C_SWITCHING) {
         assert!((t - expected).abs() < 1e-15, "{t} {expected}");

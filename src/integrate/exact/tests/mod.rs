@@ -11,13 +11,13 @@ use crate::lcs::{Lcs, Position, reduce};
 use crate::mna::{self, Behaviour};
 use crate::settings::Settings;
 
-mod bridges;
+pub(in crate::integrate) mod bridges;
 mod passive;
 mod relays;
 mod stiff;
 mod switches;
 
-fn circuit(text: &str) -> Circuit {
+pub(in crate::integrate) fn circuit(text: &str) -> Circuit {
     let mut sources = SourceMap::default();
     let root = sources.add("test.cir", format!("test\n{text}\n.end\n"));
     let (netlist, findings) = crate::netlist::parse(&mut sources, root, &|_| unreachable!());
@@ -32,7 +32,10 @@ fn circuit(text: &str) -> Circuit {
 }
 
 /// A stepper for a netlist that starts from `uic` and whose switches start as their cards say.
-fn prepare_circuit(circuit: &Circuit, energy: bool) -> (Exact<'static>, Lcs, Tran) {
+pub(in crate::integrate) fn prepare_circuit(
+    circuit: &Circuit,
+    energy: bool,
+) -> (Exact<'static>, Lcs, Tran) {
     let tran = circuit.tran.expect("a .tran card");
     let behaviour = mna::behaviour(circuit).expect("a sound circuit").standard();
     // A test may leak what it runs on.
@@ -102,4 +105,19 @@ fn at(run: &Run, t: f64, name: &str) -> f64 {
         .position(|&s| (s - t).abs() < 1e-12)
         .expect("an output time");
     run.waveforms.values[k * run.waveforms.names.len() + column]
+}
+
+/// Times of the events whose label contains `what`, s.
+fn times_of(run: &Run, what: &str) -> Vec<f64> {
+    let events = run.events.iter().filter(|e| e.1.contains(what));
+    events.map(|e| e.0).collect()
+}
+
+/// Times of the events after the start, s.
+fn times_after_start(run: &Run) -> Vec<f64> {
+    run.events
+        .iter()
+        .map(|e| e.0)
+        .filter(|&t| t > 0.0)
+        .collect()
 }

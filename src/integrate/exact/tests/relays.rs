@@ -23,14 +23,8 @@ fn with_relays(text: &str, relays: &[Relay<'_>]) -> Circuit {
                 )
             })
             .collect();
-        let zero = Value::binary(0.0);
-        let along = (Value::binary(1.0), zero);
-        let law = Law::Curve(Curve {
-            kind: "relay",
-            vertices: vec![(zero, Value::binary(*low)), (zero, Value::binary(*high))],
-            first: along,
-            last: along,
-        });
+        let (low, high) = (Value::binary(*low), Value::binary(*high));
+        let law = Law::Curve(Curve::relay(Value::binary(0.0), low, high));
         let element = circuit.element(name).expect("an element");
         circuit.elements[element.index()].kind = Kind::Function {
             output: Output::Voltage,

@@ -1,6 +1,6 @@
 //! Switches and jumps.
 
-use super::{at, simulate};
+use super::{at, simulate, times_after_start, times_of};
 
 const MAFFEZZONI_SWITCHING: [f64; 10] = [
     12.564487, 30.693306, 49.264901, 68.179976, 87.359148, 106.739990, 126.274023, 145.923954,
@@ -44,12 +44,7 @@ fn maffezzoni_without_hysteresis() {
         4.345995076,
         4.433242386,
     ];
-    let off: Vec<f64> = run
-        .events
-        .iter()
-        .filter(|e| e.1.contains("off"))
-        .map(|e| e.0)
-        .collect();
+    let off = times_of(&run, "off");
     assert_eq!(off.len(), 10, "{:?}", run.events);
     for (k, t) in off.iter().enumerate() {
         assert!((t * 1e6 - MAFFEZZONI_SWITCHING[k]).abs() < 1e-6, "{t}");
@@ -68,12 +63,7 @@ fn maffezzoni_truly_ideal() {
     // Between switchings i relaxes to 20 A or to 0 with L/R = 200 µs: an independent scalar iteration.
     let tau = 200e-6;
     let (mut i, mut k) = (0.0_f64, 0);
-    let off: Vec<f64> = run
-        .events
-        .iter()
-        .filter(|e| e.1.contains("off"))
-        .map(|e| e.0)
-        .collect();
+    let off = times_of(&run, "off");
     assert_eq!(off.len(), 10, "{:?}", run.events);
     while k < 10 {
         let rise = |s: f64| 20.0 + (i - 20.0) * (-s / tau).exp();
@@ -163,12 +153,7 @@ fn a_controller_slides_on_its_threshold() {
     let leave = 10e-3 + off(5.0) / 3e3;
     let v_leave = 5.0 + off(5.0);
     let again = leave + ((rest - v_leave) / (rest - 8.0)).ln() / rate;
-    let times: Vec<f64> = run
-        .events
-        .iter()
-        .map(|e| e.0)
-        .filter(|&t| t > 0.0)
-        .collect();
+    let times = times_after_start(&run);
     for (t, expected) in times.iter().zip([reach, leave, again]) {
         assert!((t - expected).abs() < 1e-12, "{:?}", run.events);
     }

@@ -1,0 +1,116 @@
+//! ngspice's ladders.
+
+use super::{Bench, Reference, errors};
+use crate::circuit::{Circuit, Kind};
+use crate::cli::args::Realisation;
+use crate::cli::exit::Failure;
+use crate::cli::input::Subject;
+use crate::cli::ngspice::{self, NgspiceError, deck};
+use crate::law::Law;
+use crate::report::work::Measurement;
+
+/// ngspice's ladder: `reltol`, and print steps per largest step.
+const NGSPICE: [(f64, f64); 7] = [
+    (1e-4, 0.1),
+    (1e-6, 0.1),
+    (1e-3, 1.0),
+    (1e-4, 1.0),
+    (1e-5, 1.0),
+    (1e-6, 1.0),
+    (1e-4, 10.0),
+];
+/// Rows of the reference that ngspice's own time points are read against, at least.
+const ROWS: f64 = 50_000.0;
+
+impl Bench<'_> {
+    /// ngspice over its settings and its realisations of the diodes.
+    pub(super) fn ngspice(&self) -> Result<Vec<Measurement>, Failure> {
+        let Subject::Circuit(both) = self.subject else {
+            return Err(Failure::Message(
+                "a system without a circuit has no ngspice deck".into(),
+            ));
+        };
+        let failed = |e: NgspiceError| Failure::Message(e.to_string());
+        let start_up = ngspice::start_up().map_err(failed)?;
+        let divisions = (ROWS * self.tran.tstep / (self.tran.tstop - self.tran.tstart))
+            .ceil()
+            .max(1.0);
+        let reference = self.reference(Some(self.tran.tstep / divisions))?;
+        let realisations: &[Realisation] = if has_diodes(&both.0) {
+            &[
+                Realisation::Default,
+                Realisation::N001,
+                Realisation::N0001,
+                Realisation::Sidiode,
+            ]
+        } else {
+            &[Realisation::N001]
+        };
+        let bar = self
+            .streams
+            .progress((realisations.len() * 2 * NGSPICE.len()) as u64, "ngspice");
+        let mut measurements = Vec::new();
+        for &realisation in realisations {
+            for method in ["gear", "trap"] {
+                for (reltol, divisor) in NGSPICE {
+                    let longest = self.tran.tmax.unwrap_or(f64::INFINITY);
+                    let max_step = longest.min(self.tran.tstep / divisor);
+                    let options = deck::Options {
+                        reltol,
+                        max_step,
+                        method,
+                        realisation,
+                    };
+                    let measured = self.ngspice_at(&both.0, &options, &reference, start_up);
+                    measurements.push(measured?);
+                    bar.inc(1);
+                }
+            }
+        }
+        bar.finish_and_clear();
+        Ok(measurements)
+    }
+
+    fn ngspice_at(
+        &self,
+        circuit: &Circuit,
+        options: &deck::Options,
+        reference: &Reference,
+        start_up: f64,
+    ) -> Result<Measurement, Failure> {
+        let deck = deck::deck(circuit, options).map_err(|e| Failure::Message(e.to_string()))?;
+        let diodes = options.realisation.name();
+        let mut measurement = Measurement {
+            circuit: self.circuit.clone(),
+            method: format!("ngspice:reltol={:e}", options.reltol),
+            series: format!("ngspice {} {diodes}", options.method),
+            parameter: format!(
+                "method={};maxstep={:e};diodes={diodes}",
+                options.method, options.max_step
+            ),
+            reference: reference.name.clone(),
+            ..Measurement::default()
+        };
+        match ngspice::timed(&deck, self.tran.tstop) {
+            Ok((outcome, cpu_seconds)) => {
+                // Edges that are vertical here take a little time there.
+                let shift = 2.0 * deck::EDGE * self.tran.tstop;
+                measurement.steps = outcome.waveforms.len().saturating_sub(1) as u64;
+                measurement.cpu_seconds = (cpu_seconds - start_up).max(0.0);
+                Ok(measurement.with(errors(&outcome.waveforms, reference, shift)))
+            }
+            Err(NgspiceError::Failed(words)) => Ok(Measurement {
+                failure: Some(words),
+                ..measurement
+            }),
+            Err(error) => Err(Failure::Message(error.to_string())),
+        }
+    }
+}
+
+fn has_diodes(circuit: &Circuit) -> bool {
+    circuit
+        .elements
+        .iter()
+        .any(|e| matches!(e.kind, Kind::Device(Law::Diode { .. })))
+}
