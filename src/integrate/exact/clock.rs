@@ -73,7 +73,7 @@ impl Clock {
         ends.fold(f64::INFINITY, f64::min)
     }
 
-    /// Finds when the switch next moves after t, if that is not known; nothing matters from `until` on.
+    /// Finds when the switch next moves after t, if that is not known; nothing matters after `until`.
     pub(crate) fn look_ahead(
         &mut self,
         threshold: &Threshold,
@@ -111,7 +111,7 @@ impl Clock {
                 }
                 t = end;
             }
-            if t >= until {
+            if t > until {
                 return f64::INFINITY;
             }
             for (input, _, piece) in &mut self.terms {
