@@ -24,7 +24,7 @@ const ROOMS: [(&str, &[&str]); 18] = [
     (
         "integrate",
         &[
-            "algebra", "circuit", "lcs", "mna", "plan", "settings", "solve", "waveform",
+            "circuit", "lcs", "mna", "plan", "settings", "solve", "waveform",
         ],
     ),
     ("passivity", &["lcs", "settings"]),

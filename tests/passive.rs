@@ -167,6 +167,7 @@ fn balance_beside_zero() {
         "rt2 2 1 940\nrt3 3 2 1410\nrt4 4 3 1880\nr0 4 1 1\nl1 2 4 2u ic=0\nc2 4 0 1n ic=-1\nd3 4 3 di\n",
         "rt2 2 1 940\nrt3 3 2 1410\nc0 2 0 74n ic=-16\nd1 1 2 di\nl2 2 3 83u ic=0.011\nd3 2 3 di\n",
         "rt2 2 1 940\nrt3 3 2 1410\nrt4 4 3 1880\nd0 1 2 di\nd1 2 4 di\nl2 3 4 31u ic=-0.001\nc3 3 1 49n ic=1\nd4 4 1 di\nr5 1 3 54\nc6 0 1 1n ic=0\n",
+        "rt2 2 1 940\nrt3 3 2 1410\nrt4 4 3 1880\nd0 1 4 di\nl1 4 3 6u ic=0.001\nd2 0 1 di\n",
         "rt2 2 1 940\nrt3 3 2 1410\nc0 0 1 58n ic=0\nd1 0 1 di\nd2 1 3 di\nd3 3 0 di\nl4 2 0 1u ic=0\nc5 0 2 1n ic=0\nc6 3 2 1n ic=-1\n",
     ];
     for elements in circuits {

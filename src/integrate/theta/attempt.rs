@@ -1,6 +1,8 @@
 //! One step: tried with the present active set, else solved, then committed.
 
 use super::*;
+use crate::solve::active::ActiveSolve;
+use crate::solve::lcp::{Lcp, Scaling};
 
 impl Theta<'_> {
     /// Rounding of the difference of two times near `t`.
@@ -209,7 +211,8 @@ impl Theta<'_> {
             self.attempt.h = f64::NAN;
             return;
         }
-        // Energy at k + θ with λ of the end (γ = 1): for θ = ½ the balance of this step, too, is exact.
+        // Energy at k + θ, where the found set gives the λ that are no forces on the state: with those of the end (γ = 1) sources
+        // would be charged for what their voltage moves in half a step.
         let theta = self.system().step(self.attempt.step).scheme.theta;
         let mean = |after: &[f64], before: &[f64]| -> Vec<f64> {
             let pairs = after.iter().zip(before);
@@ -218,10 +221,13 @@ impl Theta<'_> {
         for (du, (a, b)) in self.du.iter_mut().zip(self.u_next.iter().zip(&self.now.u)) {
             *du = (a - b) / h;
         }
+        let x = mean(&self.out[..n], &self.now.x);
+        let u = mean(&self.u_next, &self.now.u);
+        let lambda = on_set(&self.system().lcs, &basis, &x, &u, &self.lambda);
         let at = Point {
-            x: &mean(&self.out[..n], &self.now.x),
-            lambda: &self.lambda,
-            u: &mean(&self.u_next, &self.now.u),
+            x: &x,
+            lambda: &lambda,
+            u: &u,
             du: &self.du,
         };
         let (source, dissipated) = energy::power(&self.system().lcs, at);
@@ -256,6 +262,27 @@ impl Theta<'_> {
         self.take_pattern(found.basis, &found.active, self.now.t);
         Ok(())
     }
+}
+
+/// λ + δ with y_a = 0 at (x, u) on an active set, δ the least that reduces y_a most: nothing where D_aa = 0.
+fn on_set(lcs: &Lcs, active: &[bool], x: &[f64], u: &[f64], lambda: &[f64]) -> Vec<f64> {
+    let vector = DVector::from_column_slice;
+    let mut lambda = vector(lambda);
+    let scaling = Scaling::of(&lcs.d);
+    let d = scaling.apply(&Lcp {
+        m: lcs.d.clone(),
+        q: &lcs.c * vector(x) + &lcs.g * vector(u) + &lcs.f,
+    });
+    let y = d.y(&lambda.component_div(&scaling.d));
+    let solve = ActiveSolve::new(&d.m, active);
+    for (&j, correction) in solve
+        .indices
+        .iter()
+        .zip(solve.lambda(&y).select_rows(&solve.indices).iter())
+    {
+        lambda[j] += correction * scaling.d[j];
+    }
+    lambda.as_slice().to_vec()
 }
 
 /// Matrices for a step in which the active set changes or the state may jump: the scheme's θ with γ = 1, or Moreau's where
