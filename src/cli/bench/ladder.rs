@@ -21,7 +21,13 @@ pub(super) struct Rung {
     pub(super) series: &'static str,
     pub(super) parameter: String,
     pub(super) request: Request,
+    /// Where the rows are not at the print step, their distance, s.
+    pub(super) rows: Option<f64>,
 }
+
+/// Rows of the second exact run per print step: the fewest that ngspice's ladder has, so that runs with as many rows can be
+/// compared.
+const SPARSE: f64 = 0.1;
 
 /// The ladders of our own methods.
 pub(super) fn rungs(tran: Tran) -> Vec<Rung> {
@@ -33,12 +39,14 @@ pub(super) fn rungs(tran: Tran) -> Vec<Rung> {
         tol: None,
         events: false,
     };
-    let mut rungs = vec![Rung {
+    let exact = |rows: Option<f64>| Rung {
         method: "exact",
         series: "exact",
-        parameter: String::new(),
+        parameter: rows.map_or_else(String::new, |rows| format!("rows={rows:e}")),
         request: request(Method::Exact),
-    }];
+        rows,
+    };
+    let mut rungs = vec![exact(None), exact(Some(tran.tstep / SPARSE))];
     let siconos = Request {
         theta: Some(0.5),
         gamma: Some(1.0),
@@ -72,6 +80,7 @@ pub(super) fn rungs(tran: Tran) -> Vec<Rung> {
                     series: method,
                     parameter: format!("step={step:e}"),
                     request,
+                    rows: None,
                 });
             }
         }
@@ -85,6 +94,7 @@ pub(super) fn rungs(tran: Tran) -> Vec<Rung> {
                 series: controlled,
                 parameter: format!("tol={tol:e}"),
                 request,
+                rows: None,
             });
         }
     }

@@ -138,7 +138,7 @@ impl Bench<'_> {
         let mut best: Option<Run> = None;
         let mut spent = 0.0;
         for _ in 0..REPETITIONS.0 {
-            match sim::run(self.subject, &rung.request, None, &self.silent) {
+            match sim::run(self.subject, &rung.request, rung.rows, &self.silent) {
                 Ok(run) => {
                     spent += run.stats.cpu_seconds;
                     if best
