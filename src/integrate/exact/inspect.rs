@@ -123,8 +123,9 @@ impl Inspector {
                     (value + r * w, whole + (r * size(j)).abs())
                 })
             };
-            // The first derivative that is no rounding decides; the next one says what an error of the time does to it.
-            let mut next = dot(0);
+            // The first derivative that is no rounding decides, the next one says what an error of the time does to it; but one that
+            // the next turns around before the guard has left its rounding decides nothing.
+            let (mut next, mut floor) = (dot(0), 0.0);
             let first = (0..ORDERS).find_map(|k| {
                 let (value, whole) = next;
                 let mut noise = GROUP * f64::EPSILON * whole;
@@ -132,7 +133,14 @@ impl Inspector {
                     next = dot(k + 1);
                     noise += time * next.0.abs();
                 }
-                (value.abs() > noise).then_some(value)
+                if k == 0 {
+                    floor = noise;
+                }
+                let turned = k > 0
+                    && value * next.0 < 0.0
+                    && next.0.abs() > GROUP * f64::EPSILON * next.1
+                    && value.abs().powi(k as i32 + 1) <= floor * next.0.abs().powi(k as i32);
+                (value.abs() > noise && !turned).then_some(value)
             });
             if first.is_some_and(|value| value < 0.0) {
                 match mode.owner(i) {

@@ -277,6 +277,11 @@ impl Motion {
                 for (k, c) in coefficients.iter_mut().enumerate().take(self.degree + 1) {
                     *c = self.polynomials[k * m + i];
                 }
+                // A slope that is rounding beside a curvature that is not makes no crossing.
+                let [_, slope, curvature, ..] = &mut coefficients;
+                if *slope < 0.0 && -*slope <= self.floors[m + i] * dt && *curvature > 0.0 {
+                    *slope = 0.0;
+                }
                 let crossing =
                     polynomial::first_crossing(&coefficients[..=self.degree], self.floors[i]);
                 if let Some(s) = crossing.filter(|&s| s < first.0 || first.1.is_none()) {

@@ -193,8 +193,9 @@ pub(super) fn compare(
             };
             prop_assert!(
                 agree(value + direct, expected, size + direct.norm(), floor),
-                "{name}: {} ≠ {expected}",
-                value + direct
+                "{name}: {} ≠ {expected} (condition {:e})",
+                value + direct,
+                nodal.condition
             );
             compared += 1;
         }
