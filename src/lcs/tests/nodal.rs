@@ -138,12 +138,16 @@ impl Nodal {
             rhs[k] = C64::new(0.0, 0.0);
         }
         equilibrate(&mut m, &mut rhs);
-        let lu = m.full_piv_lu();
+        let lu = m.clone().full_piv_lu();
         let pivots: Vec<f64> = lu.u().diagonal().iter().map(|x| x.norm()).collect();
         let (least, most) = pivots
             .iter()
             .fold((f64::MAX, 0.0f64), |(a, b), &x| (a.min(x), b.max(x)));
-        let x = lu.solve(&rhs)?;
+        let mut x = lu.solve(&rhs)?;
+        // Refined, so that small unknowns beside large ones are right too.
+        for _ in 0..2 {
+            x += lu.solve(&(&rhs - &m * &x))?;
+        }
         Some(Self {
             v: x.iter().take(nodes).copied().collect(),
             i: x.iter().skip(nodes).copied().collect(),
