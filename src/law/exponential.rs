@@ -178,9 +178,9 @@ impl Exponential {
             };
         }
         // The exponential left out above.
-        let (other, slope) = match (reverse, self.breakdown) {
-            (Some(_), _) => (self.is * (found.v / self.slope).exp(), self.slope),
-            (None, Some(b)) => (b.ibv * (-(found.v + b.bv) / b.slope).exp(), b.slope),
+        let (other, slope, sign) = match (reverse, self.breakdown) {
+            (Some(_), _) => (self.is * (found.v / self.slope).exp(), self.slope, 1.0),
+            (None, Some(b)) => (b.ibv * (-(found.v + b.bv) / b.slope).exp(), b.slope, -1.0),
             (None, None) => return found,
         };
         if r * other > f64::EPSILON * (z.abs() + self.slope) || other > slope * f64::EPSILON / r {
@@ -194,9 +194,14 @@ impl Exponential {
                     break;
                 }
             }
-            // The straight equation tells i better than the exponential of a large v.
-            i = (z - v) / r;
+            // Where it is steeper than the resistance the exponential is the worse way to i.
+            if r * g > 1.0 {
+                i = (z - v) / r;
+            }
             found = Junction { v, i, g };
+        } else {
+            found.i += sign * other;
+            found.g += other / slope;
         }
         found
     }
