@@ -36,6 +36,11 @@ pub(crate) struct Inspector {
     /// w with the sources a few units in the last place of t later, and the storage there.
     later: Vec<f64>,
     s_later: Vec<f64>,
+    /// How large w can have been.
+    sizes: Vec<f64>,
+    /// Guards with their derivatives, and their sizes.
+    jets: Vec<f64>,
+    jet_sizes: Vec<f64>,
 }
 
 impl Inspector {
@@ -52,7 +57,7 @@ impl Inspector {
         self.w.extend_from_slice(&self.x);
         self.w.resize(mode.flow.dim(), 0.0);
         exosystem.write(t, &mut self.w[mode.n..]);
-        mode.storage_at(&self.w, &mut self.s);
+        mode.storage.values(&self.w, &mut self.s);
         self.s.iter().all(|v| v.is_finite()).then(|| self.s.clone())
     }
 
@@ -71,12 +76,12 @@ impl Inspector {
         self.w.extend_from_slice(&self.x);
         self.w.resize(mode.flow.dim(), 0.0);
         exosystem.write(t, &mut self.w[n..]);
-        mode.storage_at(&self.w, &mut self.s);
+        mode.storage.values(&self.w, &mut self.s);
         // What the sources move within the resolution of t: at 1 V/ps that is a millivolt where t is a second.
         let time = TIME_ULPS * f64::EPSILON * t.abs();
         self.later.clone_from(&self.w);
         exosystem.write(t + time, &mut self.later[n..]);
-        mode.storage_at(&self.later, &mut self.s_later);
+        mode.storage.values(&self.later, &mut self.s_later);
         let moved = (0..s.len()).any(|i| {
             let drift = (self.s_later[i] - self.s[i]).abs();
             (self.s[i] - s[i]).abs() > CONSISTENT * scale[i] + drift
@@ -84,45 +89,28 @@ impl Inspector {
         if moved {
             return Finding::Inconsistent;
         }
-        self.amplitude.clear();
-        self.amplitude.extend((0..n).map(|i| {
-            mode.inject
-                .row(i)
-                .iter()
-                .zip(scale)
-                .map(|(j, s)| (j * s).abs())
-                .sum::<f64>()
-        }));
-        let (w, later, amplitude) = (&self.w, &self.later, &self.amplitude);
-        let size = |j: usize| {
-            if j < n {
-                amplitude[j].max(w[j].abs())
-            } else {
-                w[j].abs()
-            }
-        };
+        mode.inject.largest(scale, &mut self.amplitude);
+        self.sizes.clear();
+        self.sizes.extend(self.w.iter().map(|w| w.abs()));
+        for (size, amplitude) in self.sizes.iter_mut().zip(&self.amplitude) {
+            *size = size.max(*amplitude);
+        }
+        let (w, later, sizes) = (&self.w, &self.later, &self.sizes);
         let broken = mode.constraints.row_iter().any(|row| {
             let value = |w: &[f64]| row.iter().zip(w).map(|(c, w)| c * w).sum::<f64>();
-            let whole: f64 = row
-                .iter()
-                .enumerate()
-                .map(|(j, c)| (c * size(j)).abs())
-                .sum();
+            let whole: f64 = row.iter().zip(sizes).map(|(c, size)| c.abs() * size).sum();
             let drift = (value(later) - value(w)).abs();
             value(w).abs() > CONSISTENT * whole + drift
         });
         if broken {
             return Finding::Inconsistent;
         }
+        mode.jets.values(w, &mut self.jets);
+        mode.jets.largest(sizes, &mut self.jet_sizes);
         let m = mode.flow.guards();
         let mut leaving = Vec::new();
         for i in 0..m {
-            let dot = |k: usize| -> (f64, f64) {
-                let terms = mode.jets[k].row(i).into_iter().zip(w).enumerate();
-                terms.fold((0.0, 0.0), |(value, whole), (j, (r, w))| {
-                    (value + r * w, whole + (r * size(j)).abs())
-                })
-            };
+            let dot = |k: usize| (self.jets[k * m + i], self.jet_sizes[k * m + i]);
             // The first derivative that is no rounding decides, the next one says what an error of the time does to it; but one that
             // the next turns around before the guard has left its rounding decides nothing.
             let (mut next, mut floor) = (dot(0), 0.0);

@@ -75,6 +75,37 @@ pub(crate) struct SwitchFacts<'a> {
     pub(crate) clocks: &'a [Clock],
 }
 
+/// A map, and how large its values can be.
+#[derive(Debug, Clone)]
+pub(crate) struct Map {
+    map: Kernel,
+    /// |map|.
+    sizes: Kernel,
+    rows: usize,
+}
+
+impl Map {
+    fn new(matrix: &DMatrix<f64>) -> Self {
+        Self {
+            map: Kernel::new(matrix),
+            sizes: Kernel::new(&matrix.abs()),
+            rows: matrix.nrows(),
+        }
+    }
+
+    /// `values` = map · w.
+    pub(crate) fn values(&self, w: &[f64], values: &mut Vec<f64>) {
+        values.resize(self.rows, 0.0);
+        self.map.apply(w, values);
+    }
+
+    /// `largest` = |map| · sizes.
+    pub(crate) fn largest(&self, sizes: &[f64], largest: &mut Vec<f64>) {
+        largest.resize(self.rows, 0.0);
+        self.sizes.apply(sizes, largest);
+    }
+}
+
 /// One mode over w = [x; z].
 #[derive(Debug, Clone)]
 pub(crate) struct Mode {
@@ -84,8 +115,8 @@ pub(crate) struct Mode {
     pub(crate) n: usize,
     /// Its flow and guards: first those of devices, then those of switches.
     pub(crate) flow: Flow,
-    /// Guard rows over w and their first three derivatives.
-    pub(crate) jets: [DMatrix<f64>; 4],
+    /// Guards over w and below them their first three derivatives.
+    pub(crate) jets: Map,
     /// Guards that belong to devices: the first pair of each.
     pub(crate) device_guards: Vec<usize>,
     /// Switch of each further guard; two guards for each sliding switch follow.
@@ -93,9 +124,9 @@ pub(crate) struct Mode {
     /// What must vanish for the mode to exist, over w; with the first two derivatives below it.
     pub(crate) constraints: DMatrix<f64>,
     /// s = storage · w, q×dim.
-    pub(crate) storage: DMatrix<f64>,
+    pub(crate) storage: Map,
     /// x = inject · s + inject_one, n×q.
-    pub(crate) inject: DMatrix<f64>,
+    pub(crate) inject: Map,
     /// n.
     pub(crate) inject_one: DVector<f64>,
     /// Probe rows over w.
@@ -235,6 +266,11 @@ impl Mode {
         let first = &guards * &generator;
         let second = &first * &generator;
         let third = &second * &generator;
+        let m = guards.nrows();
+        let mut jets = DMatrix::zeros(4 * m, dim);
+        for (k, rows) in [&guards, &first, &second, &third].into_iter().enumerate() {
+            jets.rows_mut(k * m, m).copy_from(rows);
+        }
         let mut flow = Flow::new(generator, n, &guards, h, exosystem.rates())?;
         if energy {
             flow.set_work(work(lcs, n, exosystem));
@@ -261,12 +297,12 @@ impl Mode {
         Some(Self {
             key,
             n,
-            jets: [guards, first, second, third],
+            jets: Map::new(&jets),
             device_guards,
             guarded_switches,
             constraints,
-            storage,
-            inject: map.inject.clone(),
+            storage: Map::new(&storage),
+            inject: Map::new(&map.inject),
             inject_one: map.inject_one.clone(),
             outputs: Kernel::new(&over_w(&lcs.outputs.rows, n, exosystem)),
             shared,
@@ -287,27 +323,10 @@ impl Mode {
 
     /// The state that conserves charge and flux from storage s.
     pub(crate) fn state_from(&self, s: &[f64], x: &mut Vec<f64>) {
-        x.clear();
-        x.extend((0..self.n).map(|i| {
-            self.inject_one[i]
-                + self
-                    .inject
-                    .row(i)
-                    .iter()
-                    .zip(s)
-                    .map(|(j, s)| j * s)
-                    .sum::<f64>()
-        }));
-    }
-
-    /// The storage vector at w.
-    pub(crate) fn storage_at(&self, w: &[f64], s: &mut Vec<f64>) {
-        s.clear();
-        s.extend(
-            self.storage
-                .row_iter()
-                .map(|row| row.iter().zip(w).map(|(m, w)| m * w).sum::<f64>()),
-        );
+        self.inject.values(s, x);
+        for (x, one) in x.iter_mut().zip(self.inject_one.iter()) {
+            *x += one;
+        }
     }
 }
 

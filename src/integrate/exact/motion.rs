@@ -159,12 +159,13 @@ impl Motion {
         self.since_refresh = 0;
     }
 
-    /// Largest value a combination of w can have had on the way here.
-    pub(crate) fn reach<'r>(&self, row: impl IntoIterator<Item = &'r f64>) -> f64 {
-        row.into_iter()
-            .zip(self.peak.iter().chain(&self.amplitude[self.peak.len()..]))
-            .map(|(c, a)| (c * a).abs())
-            .sum()
+    /// How large w can have been on the way here.
+    pub(crate) fn reach(&mut self) -> &[f64] {
+        self.largest.clear();
+        self.largest.extend_from_slice(&self.peak);
+        let sources = &self.amplitude[self.peak.len()..];
+        self.largest.extend_from_slice(sources);
+        &self.largest
     }
 
     /// Moves to `stop` or to the first guard that falls through zero before it.

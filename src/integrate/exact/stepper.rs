@@ -60,6 +60,8 @@ pub struct Exact<'a> {
     pub(super) storage: Vec<f64>,
     /// Largest values of the storage elements so far, levelled by kind.
     pub(super) scale: Vec<f64>,
+    /// How large the storage can have been since the last event.
+    reach: Vec<f64>,
     pub(super) volts: Vec<bool>,
     /// What a change that fails gives back, and where the switches would have stood after it.
     pub(super) before_change: Before,
@@ -172,6 +174,7 @@ impl<'a> Exact<'a> {
             key,
             storage: start.as_slice().to_vec(),
             scale: vec![0.0; start.len()],
+            reach: vec![],
             volts,
             before_change: Before::default(),
             z,
@@ -237,10 +240,11 @@ impl<'a> Exact<'a> {
             let mode = &mut self.plant.modes[at];
             let [source, dissipated] = self.motion.take_energy(&mut mode.flow);
             self.balance.add((source, dissipated));
-            mode.storage_at(&self.motion.now, &mut self.storage);
+            mode.storage.values(&self.motion.now, &mut self.storage);
             // An event often finds a current at zero: its size is what it was on the way.
-            for (i, scale) in self.scale.iter_mut().enumerate() {
-                *scale = scale.max(self.motion.reach(mode.storage.row(i).iter()));
+            mode.storage.largest(self.motion.reach(), &mut self.reach);
+            for (scale, reach) in self.scale.iter_mut().zip(&self.reach) {
+                *scale = scale.max(*reach);
             }
             self.rescale();
             self.note_stored();
