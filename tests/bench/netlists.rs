@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 
 use circ::circuit::ElaborateOptions;
-use circ::integrate::{Method, Run, SimOptions, simulate};
+use circ::integrate::{Method, SimOptions, Stats, simulate};
 use circ::{mna, netlist};
 
 const NETLISTS: [&str; 14] = [
@@ -26,7 +26,7 @@ const NETLISTS: [&str; 14] = [
     "flyback",
 ];
 
-fn runs(file: &Path, count: usize) -> Vec<Run> {
+fn runs(file: &Path, count: usize) -> Vec<Stats> {
     let loaded = netlist::load(file, &ElaborateOptions::default());
     let circuit = loaded.circuit.expect("a sound netlist");
     let behaviour = mna::behaviour(&circuit).expect("a sound circuit");
@@ -35,7 +35,8 @@ fn runs(file: &Path, count: usize) -> Vec<Run> {
             method: Method::Exact,
             ..SimOptions::default()
         };
-        simulate(&circuit, &behaviour, options).expect("a run")
+        let run = simulate(&circuit, &behaviour, options);
+        run.expect("a run").stats
     };
     (0..count).map(|_| run()).collect()
 }
@@ -52,8 +53,8 @@ fn main() {
     }
     for file in files {
         let mut runs = runs(&file, count);
-        runs.sort_by(|a, b| a.stats.cpu_seconds.total_cmp(&b.stats.cpu_seconds));
-        let (first, median) = (&runs[0].stats, &runs[count / 2].stats);
+        runs.sort_by(|a, b| a.cpu_seconds.total_cmp(&b.cpu_seconds));
+        let (first, median) = (&runs[0], &runs[count / 2]);
         println!(
             "{:24} {:8.3} ms, median {:8.3} ms, {} steps, {} events, {} modes",
             file.file_stem().unwrap_or_default().to_string_lossy(),

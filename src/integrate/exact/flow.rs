@@ -30,6 +30,8 @@ pub(crate) struct Flow {
     /// Rounding of the guards and of their derivatives, from |w|.
     noise_kernel: Kernel,
     guard_kernel: Kernel,
+    /// |𝒢|.
+    guard_sizes: Kernel,
     h: f64,
     bottom: u32,
     /// h/2^level.
@@ -78,6 +80,7 @@ impl Flow {
                 NOISE * f64::EPSILON * rows.column(j)[i].abs()
             }),
             guard_kernel: Kernel::new(guards),
+            guard_sizes: Kernel::new(&guards.abs()),
             rows,
             h,
             bottom,
@@ -255,16 +258,44 @@ impl Flow {
         polynomial::values(terms, degree, s, &mut w[..self.dim]);
     }
 
-    /// The guards as polynomials in the fraction of Taylor's step: `values[k·guards + i]` is coefficient k of guard i.
-    pub(crate) fn guard_polynomials(&self, terms: &[f64], degree: usize, values: &mut Vec<f64>) {
+    /// Of every guard in the fraction of Taylor's step: coefficients 2 and 3, and a bound on what the higher ones add up to.
+    pub(crate) fn guard_cubics(
+        &self,
+        terms: &[f64],
+        degree: usize,
+        rest: &mut Vec<f64>,
+        values: &mut Vec<f64>,
+    ) {
         let (dim, m) = (self.dim, self.guards);
-        values.resize((MAX_DEGREE + 1) * m, 0.0);
-        for k in 0..=degree {
-            self.guard_kernel.apply(
-                &terms[k * dim..(k + 1) * dim],
-                &mut values[k * m..(k + 1) * m],
-            );
+        values.clear();
+        values.resize(3 * m, 0.0);
+        for k in 2..=degree.min(3) {
+            let value = &mut values[(k - 2) * m..(k - 1) * m];
+            self.guard_kernel.apply(&terms[k * dim..], value);
         }
+        rest.clear();
+        rest.resize(dim, 0.0);
+        for term in terms[..(degree + 1) * dim].chunks_exact(dim).skip(4) {
+            for (rest, term) in rest.iter_mut().zip(term) {
+                *rest += term.abs();
+            }
+        }
+        self.guard_sizes.apply(rest, &mut values[2 * m..]);
+    }
+
+    /// Guard i as a polynomial in the fraction of Taylor's step.
+    pub(crate) fn guard_polynomial(
+        &self,
+        i: usize,
+        terms: &[f64],
+        degree: usize,
+    ) -> [f64; MAX_DEGREE + 1] {
+        let mut polynomial = [0.0; MAX_DEGREE + 1];
+        for (j, term) in terms.chunks_exact(self.dim).take(degree + 1).enumerate() {
+            let row = (0..self.dim).map(|j| self.rows.column(j)[i]);
+            polynomial[j] = row.zip(term).map(|(g, term)| g * term).sum();
+        }
+        polynomial
     }
 }
 
@@ -306,9 +337,13 @@ mod tests {
             (w[0] - next[0]).abs() < 4e-16 && (w[1] - next[1]).abs() < 4e-16,
             "{w:?} {next:?} {degree}"
         );
+        let polynomial = flow.guard_polynomial(0, &terms, degree);
+        assert_eq!(polynomial[0], 1.0);
+        assert!((polynomial[2] + 0.5 * 0.625 * 0.625).abs() < 1e-15);
         let mut values = Vec::new();
-        flow.guard_polynomials(&terms, degree, &mut values);
-        assert_eq!(values[0], 1.0);
-        assert!((values[2] + 0.5 * 0.625 * 0.625).abs() < 1e-15);
+        flow.guard_cubics(&terms, degree, &mut largest, &mut values);
+        assert_eq!(values[..2], polynomial[2..4]);
+        let rest = polynomial[4..].iter().map(|c| c.abs()).sum::<f64>();
+        assert!((values[2] - rest).abs() < 1e-15);
     }
 }

@@ -69,7 +69,7 @@ pub(crate) struct Motion {
     terms: Vec<f64>,
     /// Work space of Taylor's series.
     largest: Vec<f64>,
-    polynomials: Vec<f64>,
+    cubics: Vec<f64>,
     /// Largest |w| that noise is measured by; at least `peak`.
     amplitude: Vec<f64>,
     /// Largest |x| met in this mode.
@@ -214,43 +214,53 @@ impl Motion {
                 other => return other,
             }
         }
-        let mut deepest_next = 0;
+        // The level that was needed, and where a guard is expected to fall through zero: no step goes beyond.
+        let (mut needed, mut barrier) = (0_u32, f64::INFINITY);
         while units > 0 {
             if self.steps > self.most {
                 return Arrival::Exhausted;
             }
             let limit = flow.step_limit(self.t - self.entered);
             let aligned = bottom - units.trailing_zeros().min(bottom);
-            let mut level = aligned.max(deepest_next);
+            let mut level = aligned.max(needed);
             while level < bottom && flow.step(level) > limit {
                 level += 1;
             }
-            deepest_next = level.saturating_sub(1);
             loop {
+                while level < bottom && self.t + flow.step(level) > barrier {
+                    level += 1;
+                }
                 let span = 1_u64 << (bottom - level);
                 let end = if units == span {
                     stop
                 } else {
                     stop - (units - span) as f64 * unit
                 };
-                if !flow.leap(level, &self.now, &mut self.next) {
-                    return Arrival::Overflow;
+                let mut clear = false;
+                if end <= barrier {
+                    if !flow.leap(level, &self.now, &mut self.next) {
+                        return Arrival::Overflow;
+                    }
+                    clear = self.judge(flow, flow.step(level)) == Verdict::Clear;
                 }
-                if self.judge(flow, flow.step(level)) == Verdict::Clear {
+                if clear {
                     self.accept(flow, exosystem, level, end);
-                    units -= span;
-                    break;
-                }
-                if level == bottom {
+                    needed = needed.saturating_sub(1);
+                } else if level == bottom {
                     match self.taylor(flow, exosystem, end) {
-                        Arrival::Reached => {}
+                        Arrival::Reached => barrier = f64::INFINITY,
                         other => return other,
                     }
-                    units -= span;
-                    break;
+                } else {
+                    match self.crossing(flow, flow.step(level)) {
+                        Some(part) => barrier = self.t + part * flow.step(level),
+                        None => needed = level + 1,
+                    }
+                    level += 1;
+                    continue;
                 }
-                level += 1;
-                deepest_next = level;
+                units -= span;
+                break;
             }
         }
         if !self.steady && flow.step_limit(self.t - self.entered) >= flow.step(0) {
@@ -264,30 +274,33 @@ impl Motion {
         let dt = end - self.t;
         let (dim, m) = (flow.dim(), flow.guards());
         self.degree = flow.taylor(&self.now, dt, &mut self.terms, &mut self.largest);
-        if !self.terms[..(self.degree + 1) * dim]
-            .iter()
-            .all(|v| v.is_finite())
-        {
+        flow.sum(&self.terms, self.degree, 1.0, &mut self.next);
+        if !self.next[..dim].iter().all(|v| v.is_finite()) {
             return Arrival::Overflow;
         }
         let mut first = (1.0, None);
-        if m > 0 {
-            flow.guard_polynomials(&self.terms, self.degree, &mut self.polynomials);
-            let mut coefficients = [0.0; polynomial::MAX_DEGREE + 1];
-            for i in 0..m {
-                for (k, c) in coefficients.iter_mut().enumerate().take(self.degree + 1) {
-                    *c = self.polynomials[k * m + i];
-                }
-                // A slope that is rounding beside a curvature that is not makes no crossing.
-                let [_, slope, curvature, ..] = &mut coefficients;
-                if *slope < 0.0 && -*slope <= self.floors[m + i] * dt && *curvature > 0.0 {
-                    *slope = 0.0;
-                }
-                let crossing =
-                    polynomial::first_crossing(&coefficients[..=self.degree], self.floors[i]);
-                if let Some(s) = crossing.filter(|&s| s < first.0 || first.1.is_none()) {
-                    first = (s, Some(i));
-                }
+        flow.guard_cubics(
+            &self.terms,
+            self.degree,
+            &mut self.largest,
+            &mut self.cubics,
+        );
+        for i in 0..m {
+            let [g, slope] = [0, m].map(|from| self.now[dim + from + i]);
+            let [second, third, rest] = [0, m, 2 * m].map(|from| self.cubics[from + i]);
+            let floor = self.floors[i];
+            if polynomial::cubic_holds([g, slope * dt, second, third], rest, floor) {
+                continue;
+            }
+            let mut coefficients = flow.guard_polynomial(i, &self.terms, self.degree);
+            // A slope that is rounding beside a curvature that is not makes no crossing.
+            let [_, slope, curvature, ..] = &mut coefficients;
+            if *slope < 0.0 && -*slope <= self.floors[m + i] * dt && *curvature > 0.0 {
+                *slope = 0.0;
+            }
+            let crossing = polynomial::first_crossing(&coefficients[..=self.degree], floor);
+            if let Some(s) = crossing.filter(|&s| s < first.0 || first.1.is_none()) {
+                first = (s, Some(i));
             }
         }
         let (s, fired) = first;
@@ -312,8 +325,9 @@ impl Motion {
             self.energy[1] += dissipated;
             self.spans.part();
         }
-        flow.sum(&self.terms, self.degree, s, &mut self.next);
-        self.next[dim..].copy_from_slice(&self.now[dim..]);
+        if fired.is_some() {
+            flow.sum(&self.terms, self.degree, s, &mut self.next);
+        }
         std::mem::swap(&mut self.now, &mut self.next);
         self.t = t;
         self.steps += 1;
@@ -348,6 +362,20 @@ impl Motion {
         } else {
             Verdict::Unclear
         }
+    }
+
+    /// The part of the step from `now` to `next` after which the first guard falls through zero, by the cubics through values and
+    /// slopes; `None` if all end above it.
+    fn crossing(&self, flow: &Flow, h: f64) -> Option<f64> {
+        let (dim, m) = (flow.dim(), flow.guards());
+        let ends = |k: usize| [self.now[k], self.next[k]];
+        let fallen = (0..m).filter(|&i| self.next[dim + i] < -self.floors[i]);
+        fallen
+            .map(|i| {
+                let slopes = ends(dim + m + i).map(|slope| slope * h);
+                polynomial::zero_of_cubic(ends(dim + i), slopes)
+            })
+            .reduce(smaller)
     }
 
     #[inline]

@@ -18,19 +18,39 @@ pub(crate) fn first_crossing(a: &[f64], floor: f64) -> Option<f64> {
         return None;
     }
     if let [a0, a1, a2, a3, tail @ ..] = a {
-        let cubic = [
-            *a0,
-            a0 + a1 / 3.0,
-            a0 + (2.0 * a1 + a2) / 3.0,
-            a0 + a1 + a2 + a3,
-        ];
         let tail: f64 = tail.iter().map(|v| v.abs()).sum();
-        if cubic.iter().all(|b| b - tail >= -floor) {
+        if cubic_holds([*a0, *a1, *a2, *a3], tail, floor) {
             return None;
         }
     }
+    // Falling all the way: one crossing.
+    let rise = |(k, c): (usize, &f64)| (k as f64 * c).max(0.0);
+    let steepest = a[1] + a.iter().enumerate().skip(2).map(rise).sum::<f64>();
+    if a[0] > 0.0 && steepest < 0.0 && value(a, 1.0) < -floor {
+        return Some(root(a, 0.0, 1.0, 0.0));
+    }
     let bernstein = to_bernstein(a);
     search(a, &bernstein[..=degree], floor, 0.0, 1.0, 0)
+}
+
+/// Whether a0 + a1 s + a2 s² + a3 s³, and a rest of at most `tail`, cannot fall below −floor on [0, 1].
+#[inline]
+pub(crate) fn cubic_holds([a0, a1, a2, a3]: [f64; 4], tail: f64, floor: f64) -> bool {
+    let third = a0 + a1 / 3.0;
+    let least = a0.min(third).min(third + (a1 + a2) / 3.0);
+    least.min(a0 + a1 + a2 + a3) - tail >= -floor
+}
+
+/// Nearly a zero on [0, 1] of the cubic with these values and slopes at 0 and 1, the first of them ≥ 0 and the second < 0.
+pub(crate) fn zero_of_cubic(values: [f64; 2], slopes: [f64; 2]) -> f64 {
+    let rise = values[1] - values[0];
+    let a = [
+        values[0],
+        slopes[0],
+        3.0 * rise - 2.0 * slopes[0] - slopes[1],
+        slopes[0] + slopes[1] - 2.0 * rise,
+    ];
+    root(&a, 0.0, 1.0, f64::EPSILON.sqrt())
 }
 
 /// Σ terms s^k by Horner's rule, where `terms` are `degree` + 1 blocks of the length of `out`.
@@ -88,7 +108,7 @@ fn search(a: &[f64], b: &[f64], floor: f64, low: f64, high: f64, depth: u32) -> 
         .filter(|w| (w[0] >= 0.0) != (w[1] >= 0.0))
         .count();
     if b[0] > 0.0 && b[last] < -floor && changes == 1 {
-        return Some(root(a, low, high));
+        return Some(root(a, low, high, 0.0));
     }
     if depth == MAX_DEPTH {
         return Some(low);
@@ -115,8 +135,8 @@ fn halves(b: &[f64]) -> (Coefficients, Coefficients) {
     (left, right)
 }
 
-/// The root of p in [low, high], where p(low) > 0 > p(high): Newton, bracketed.
-fn root(a: &[f64], mut low: f64, mut high: f64) -> f64 {
+/// The root of p in [low, high], where p(low) > 0 > p(high), once it moves by no more than `close`: Newton, bracketed.
+fn root(a: &[f64], mut low: f64, mut high: f64, close: f64) -> f64 {
     /// Bisections alone reach rounding within this many steps.
     const STEPS: usize = 64;
     let mut s = 0.5 * (low + high);
@@ -133,10 +153,14 @@ fn root(a: &[f64], mut low: f64, mut high: f64) -> f64 {
         } else {
             0.5 * (low + high)
         };
-        if next == s || p == 0.0 {
+        if p == 0.0 {
             break;
         }
+        let moved = (next - s).abs();
         s = next;
+        if moved <= close {
+            break;
+        }
     }
     s
 }

@@ -23,10 +23,20 @@ pub(crate) struct Rate {
     pub(crate) frequency: f64,
 }
 
-/// All rates of a mode.
+/// All rates of a mode: what limits steps while a transient and all slower ones live, the fastest first.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Spectrum {
-    rates: Vec<Rate>,
+    limits: Vec<Limit>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Limit {
+    /// The age at which the transient is extinct, s.
+    until: f64,
+    /// What oscillations allow, s.
+    resolved: f64,
+    /// The first step after a change of mode, s.
+    first: f64,
 }
 
 impl Spectrum {
@@ -52,19 +62,38 @@ impl Spectrum {
                 }
             }
         }
-        Self { rates }
+        // Those that do not decay come last.
+        rates.sort_by(|a, b| b.decay.total_cmp(&a.decay));
+        let mut limits = vec![Limit {
+            until: f64::INFINITY,
+            resolved: f64::INFINITY,
+            first: f64::INFINITY,
+        }];
+        let mut fastest = 0.0_f64;
+        for rate in rates.iter().rev() {
+            let slower = limits[limits.len() - 1];
+            fastest = fastest.max(rate.decay.abs()).max(rate.frequency);
+            limits.push(Limit {
+                until: if rate.decay > 0.0 {
+                    EXTINCT / rate.decay
+                } else {
+                    f64::INFINITY
+                },
+                resolved: slower.resolved.min(RESOLVED / rate.frequency),
+                first: FIRST / fastest,
+            });
+        }
+        limits.reverse();
+        Self { limits }
     }
 
     /// The longest step that hides nothing `age` seconds after the last change of mode: dead transients no longer count,
     /// decays are followed on steps that double, oscillations are resolved while they last.
     pub(crate) fn step_limit(&self, age: f64) -> f64 {
-        let mut limit = f64::INFINITY;
-        let mut fastest = 0.0_f64;
-        for rate in self.rates.iter().filter(|r| r.decay * age <= EXTINCT) {
-            fastest = fastest.max(rate.decay.abs()).max(rate.frequency);
-            limit = limit.min(RESOLVED / rate.frequency);
-        }
-        limit.min(age.max(FIRST / fastest))
+        let living = self.limits.iter().find(|limit| age <= limit.until);
+        living.map_or(f64::INFINITY, |limit| {
+            limit.resolved.min(age.max(limit.first))
+        })
     }
 }
 

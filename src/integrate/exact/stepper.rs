@@ -207,15 +207,13 @@ impl<'a> Exact<'a> {
 
     /// Raises the amplitudes to the present storage; elements of one kind share the largest.
     pub(super) fn rescale(&mut self) {
-        for volts in [true, false] {
-            let of_kind = |i: usize| self.volts[i] == volts;
-            let largest = (0..self.storage.len())
-                .filter(|&i| of_kind(i))
-                .map(|i| self.storage[i].abs().max(self.scale[i]))
-                .fold(0.0, f64::max);
-            for i in (0..self.storage.len()).filter(|&i| self.volts[i] == volts) {
-                self.scale[i] = largest;
-            }
+        let mut largest = [0.0_f64; 2];
+        for ((&volts, s), &scale) in self.volts.iter().zip(&self.storage).zip(&self.scale) {
+            let largest = &mut largest[usize::from(volts)];
+            *largest = largest.max(s.abs()).max(scale);
+        }
+        for (&volts, scale) in self.volts.iter().zip(&mut self.scale) {
+            *scale = largest[usize::from(volts)];
         }
     }
 

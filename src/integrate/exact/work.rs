@@ -26,28 +26,70 @@ const HARMLESS: f64 = 1e-13;
 /// Rows below this part of the largest are rounding.
 const NOTHING: f64 = 1e-13;
 
-/// Gauss-Legendre points on [0, 1]: with ‖𝒜‖ h ≤ 1 so many integrate a product of two solutions to rounding.
-const POINTS: usize = 8;
-const NODES: [f64; POINTS] = [
-    0.019855071751231884,
-    0.10166676129318664,
-    0.2372337950418355,
-    0.4082826787521751,
-    0.591717321247825,
-    0.7627662049581645,
-    0.8983332387068134,
-    0.9801449282487681,
-];
-const WEIGHTS: [f64; POINTS] = [
-    0.05061426814518813,
-    0.11119051722668724,
-    0.15685332293894363,
-    0.181341891689181,
-    0.181341891689181,
-    0.15685332293894363,
-    0.11119051722668724,
-    0.05061426814518813,
-];
+/// The rule of Gauss and Legendre with `P` points on [0, 1].
+struct Gauss<const P: usize> {
+    nodes: [f64; P],
+    weights: [f64; P],
+}
+
+/// For products of two polynomials of a degree of Taylor's series that is exact to rounding: the coefficients fall like those of an
+/// exponential, so that half the points that such a product takes in general integrate it to rounding.
+const SHORT: usize = 8;
+const MIDDLE: usize = 16;
+const FOUR: Gauss<4> = Gauss {
+    nodes: [
+        0.06943184420297371,
+        0.33000947820757187,
+        0.6699905217924281,
+        0.9305681557970263,
+    ],
+    weights: [
+        0.17392742256872692,
+        0.32607257743127305,
+        0.32607257743127305,
+        0.17392742256872692,
+    ],
+};
+const SIX: Gauss<6> = Gauss {
+    nodes: [
+        0.03376524289842399,
+        0.16939530676686773,
+        0.38069040695840156,
+        0.6193095930415985,
+        0.8306046932331322,
+        0.966234757101576,
+    ],
+    weights: [
+        0.08566224618958518,
+        0.1803807865240693,
+        0.23395696728634552,
+        0.23395696728634552,
+        0.1803807865240693,
+        0.08566224618958518,
+    ],
+};
+const EIGHT: Gauss<8> = Gauss {
+    nodes: [
+        0.019855071751231884,
+        0.10166676129318664,
+        0.2372337950418355,
+        0.4082826787521751,
+        0.591717321247825,
+        0.7627662049581645,
+        0.8983332387068134,
+        0.9801449282487681,
+    ],
+    weights: [
+        0.05061426814518813,
+        0.11119051722668724,
+        0.15685332293894363,
+        0.181341891689181,
+        0.181341891689181,
+        0.15685332293894363,
+        0.11119051722668724,
+        0.05061426814518813,
+    ],
+};
 
 /// A quadratic form yᵀ Q y, upper triangle row by row with doubled off-diagonal entries.
 #[derive(Debug, Clone)]
@@ -66,40 +108,27 @@ impl Form {
         Self { packed }
     }
 
+    /// Σ weights y(nodes)ᵀ Q y(nodes), where `y` holds the values at the nodes one coordinate after the other.
     #[inline]
-    fn value(&self, y: &[f64]) -> f64 {
+    fn integral<const P: usize>(&self, y: &[f64], weights: [f64; P]) -> f64 {
+        let (y, _) = y.as_chunks::<P>();
         let mut rest = &self.packed[..];
-        let mut sum = 0.0;
-        for i in 0..y.len() {
+        let mut values = [0.0; P];
+        for (i, left) in y.iter().enumerate() {
             let (row, tail) = rest.split_at(y.len() - i);
-            sum += y[i] * row.iter().zip(&y[i..]).map(|(q, y)| q * y).sum::<f64>();
-            rest = tail;
-        }
-        sum
-    }
-
-    /// Σ weights y(nodes)ᵀ Q y(nodes).
-    fn integral(&self, y: &[[f64; POINTS]]) -> f64 {
-        let mut rest = &self.packed[..];
-        let mut values = [0.0; POINTS];
-        for i in 0..y.len() {
-            let (row, tail) = rest.split_at(y.len() - i);
-            let mut product = [0.0; POINTS];
-            for (q, y) in row.iter().zip(&y[i..]) {
-                for (p, y) in product.iter_mut().zip(y) {
-                    *p += q * y;
+            let mut product = [0.0; P];
+            for (&q, right) in row.iter().zip(&y[i..]) {
+                for p in 0..P {
+                    product[p] += q * right[p];
                 }
             }
-            for (value, (p, y)) in values.iter_mut().zip(product.iter().zip(&y[i])) {
-                *value += p * y;
+            for p in 0..P {
+                values[p] += product[p] * left[p];
             }
             rest = tail;
         }
-        values
-            .iter()
-            .zip(WEIGHTS)
-            .map(|(v, weight)| v * weight)
-            .sum()
+        let weighted = values.iter().zip(weights);
+        weighted.map(|(v, weight)| v * weight).sum()
     }
 }
 
@@ -142,8 +171,8 @@ struct Forms {
     y: Vec<f64>,
     /// T.
     from_w: Dense,
-    /// y at the points of a quadrature.
-    nodes: Vec<[f64; POINTS]>,
+    /// y at the points of a quadrature, one coordinate after the other.
+    at_nodes: Vec<f64>,
     /// Power out of sources, power dissipated.
     instant: [Form; 2],
     /// The generator over y, and the forms of `instant`.
@@ -152,8 +181,10 @@ struct Forms {
     /// A unit, and 2^this times it the longest span, s.
     unit: f64,
     longest: u32,
-    /// Their integrals over 2^k units.
-    over: Vec<[Form; 2]>,
+    /// Their integrals over 2^k units, [Γ₀; Γ₁].
+    over: Vec<Kernel>,
+    /// Γ y.
+    products: Vec<f64>,
     /// Where `over` ends, once it has begun.
     latest: Option<Doubling>,
 }
@@ -207,7 +238,10 @@ impl Work {
             forms.double_to(k);
         }
         forms.to_y.apply(w, &mut forms.y);
-        forms.over[k as usize].each_ref().map(|f| f.value(&forms.y))
+        let (y, products) = (&forms.y, &mut forms.products);
+        forms.over[k as usize].apply(y, products);
+        let (sources, dissipated) = products.split_at(y.len());
+        [sources, dissipated].map(|p| p.iter().zip(y).map(|(p, y)| p * y).sum())
     }
 
     /// Whether two spans of 2^k units may be taken as one of twice the length.
@@ -239,38 +273,14 @@ impl Work {
         generator: &DMatrix<f64>,
         sizes: Sizes<'_>,
     ) -> [f64; 2] {
-        let Taylor {
-            terms,
-            degree,
-            h,
-            part,
-        } = polynomial;
-        let dim = generator.nrows();
-        let Forms {
-            instant,
-            from_w,
-            nodes,
-            ..
-        } = self.forms(generator, sizes);
-        let s = NODES.map(|node| node * part);
-        nodes.fill([0.0; POINTS]);
-        for j in 0..dim {
-            // w_j at the nodes by Horner's rule, then its part of y.
-            let mut w = [terms[degree * dim + j]; POINTS];
-            for term in terms[j..degree * dim].iter().step_by(dim).rev() {
-                for (w, s) in w.iter_mut().zip(&s) {
-                    *w = *w * s + term;
-                }
-            }
-            for (y, t) in nodes.iter_mut().zip(from_w.column(j)) {
-                for (y, w) in y.iter_mut().zip(&w) {
-                    *y += t * w;
-                }
-            }
+        let forms = self.forms(generator, sizes);
+        if polynomial.degree <= SHORT {
+            forms.along(polynomial, &FOUR)
+        } else if polynomial.degree <= MIDDLE {
+            forms.along(polynomial, &SIX)
+        } else {
+            forms.along(polynomial, &EIGHT)
         }
-        instant
-            .each_ref()
-            .map(|form| h * part * form.integral(nodes))
     }
 }
 
@@ -369,15 +379,50 @@ impl Forms {
             to_y: Kernel::new(&to_y),
             y: vec![0.0; dim],
             from_w: Dense::of(&to_y),
-            nodes: vec![[0.0; POINTS]; dim],
+            at_nodes: Vec::new(),
             instant,
             generator: moved,
             powers,
             unit,
             longest,
             over: Vec::new(),
+            products: vec![0.0; 2 * dim],
             latest: None,
         }
+    }
+
+    /// ∫ v·i dt along a Taylor polynomial.
+    fn along<const P: usize>(&mut self, polynomial: Taylor<'_>, rule: &Gauss<P>) -> [f64; 2] {
+        let Taylor {
+            terms,
+            degree,
+            h,
+            part,
+        } = polynomial;
+        let dim = self.from_w.columns();
+        let s = rule.nodes.map(|node| node * part);
+        self.at_nodes.clear();
+        self.at_nodes.resize(P * dim, 0.0);
+        let (y, _) = self.at_nodes.as_chunks_mut::<P>();
+        let (lower, last) = terms[..(degree + 1) * dim].split_at(degree * dim);
+        for j in 0..dim {
+            // w_j at the nodes by Horner's rule, then its part of y.
+            let mut w = [last[j]; P];
+            for term in lower.chunks_exact(dim).rev() {
+                for p in 0..P {
+                    w[p] = w[p] * s[p] + term[j];
+                }
+            }
+            for (y, &t) in y.iter_mut().zip(self.from_w.column(j)) {
+                for p in 0..P {
+                    y[p] += t * w[p];
+                }
+            }
+        }
+        let y = &self.at_nodes;
+        self.instant
+            .each_ref()
+            .map(|form| h * part * form.integral(y, rule.weights))
     }
 
     /// The doubling at one unit.
@@ -468,8 +513,12 @@ impl Doubling {
         }
     }
 
-    fn forms(&self) -> [Form; 2] {
-        self.grams.each_ref().map(Form::new)
+    /// [Γ₀; Γ₁].
+    fn forms(&self) -> Kernel {
+        let dim = self.increment.rows();
+        Kernel::from_fn(2 * dim, dim, |i, j| {
+            self.grams[i / dim].column(j)[i % dim]
+        })
     }
 }
 
@@ -515,7 +564,7 @@ mod tests {
                 Some(now)
             })
             .collect();
-        for (degree, part) in [(20, 0.4), (8, 0.02), (4, 2e-4)] {
+        for (degree, part) in [(20, 0.4), (14, 0.2), (8, 0.02), (4, 2e-4)] {
             let polynomial = Taylor {
                 terms: &terms,
                 degree,
