@@ -9,13 +9,16 @@ use super::polynomial::{self, MAX_DEGREE};
 use super::spectrum::{Rate, Spectrum};
 use super::work::{Sizes, Taylor, Term, Work};
 
-/// Halvings of the output step that a table may hold; below it Taylor's series takes over in any case.
+/// The longest step is 2^LONG output steps.
+pub(crate) const LONG: u32 = 4;
+/// Halvings of the longest step that a table may hold; below it Taylor's series takes over in any case.
 const DEEPEST: u32 = 62;
 
 /// Rounding of a computed guard, in units of 2⁻⁵³ Σ |row| |w|.
 const NOISE: f64 = 16.0;
 
-/// exp(𝒜 h/2^k) for the levels k that were needed, Taylor's series below, and guard rows with their derivative.
+/// exp(𝒜 h/2^k) for the levels k that were needed, h the longest step, Taylor's series below, and guard rows with their
+/// derivative. Level [`LONG`] is the output step.
 ///
 /// Vectors are laid out as `[w | g | g']` with `g = 𝒢 w`, `g' = 𝒢 𝒜 w`; `g ≥ 0` keeps the mode.
 #[derive(Debug, Clone)]
@@ -45,15 +48,16 @@ pub(crate) struct Flow {
 }
 
 impl Flow {
-    /// `generator` = [[A, EH],[0, S]] with `n` rows of A first, `guards` its rows over w, `h` the output step, `sources`
+    /// `generator` = [[A, EH],[0, S]] with `n` rows of A first, `guards` its rows over w, `output_step` in s, `sources`
     /// the rates of S. `None` if the entries are not finite.
     pub(crate) fn new(
         generator: DMatrix<f64>,
         n: usize,
         guards: &DMatrix<f64>,
-        h: f64,
+        output_step: f64,
         sources: &[Rate],
     ) -> Option<Self> {
+        let h = output_step * f64::from(LONG).exp2();
         if !generator.iter().chain(guards.iter()).all(|v| v.is_finite()) {
             return None;
         }
@@ -68,7 +72,7 @@ impl Flow {
             }
         });
         let ladder = Ladder::new(&generator, h, expm::SQUARED);
-        let bottom = (ladder.norm().log2().ceil().max(0.0) as u32).min(DEEPEST);
+        let bottom = (ladder.norm().log2().ceil().max(0.0) as u32).clamp(LONG, DEEPEST);
         let spectrum = Spectrum::new(&generator.view((0, 0), (n, n)).into_owned(), sources);
         Some(Self {
             dim,
@@ -162,6 +166,34 @@ impl Flow {
             }
         }));
         true
+    }
+
+    /// The rows of `outputs` (so many) after 1, 2, …, `most` output steps, one below the other; `None` beyond doubles.
+    pub(crate) fn followed(
+        &mut self,
+        outputs: &Kernel,
+        rows: usize,
+        most: usize,
+    ) -> Option<Kernel> {
+        let (step, _) = self.ladder.increment(LONG)?;
+        let dim = self.dim;
+        let (mut increment, mut product) = (step.clone(), Dense::zeros(dim, dim));
+        let mut table = Dense::zeros(most * rows, dim);
+        let (mut column, mut output) = (vec![0.0; dim], vec![0.0; rows]);
+        for k in 0..most {
+            for j in 0..dim {
+                column.copy_from_slice(increment.column(j));
+                column[j] += 1.0;
+                outputs.apply(&column, &mut output);
+                table.column_mut(j)[k * rows..(k + 1) * rows].copy_from_slice(&output);
+            }
+            // (I + E)(I + F) = I + E + F + E F
+            product.set_product(&increment, &step);
+            increment.combine(1.0, 1.0, &step);
+            increment.combine(1.0, 1.0, &product);
+        }
+        let table = Kernel::from_fn(most * rows, dim, |i, j| table.column(j)[i]);
+        Some(table)
     }
 
     /// Has the energy of these products integrated along the flow.
@@ -319,18 +351,20 @@ mod tests {
     #[test]
     fn levels_and_taylor_give_the_same_flow() {
         let mut flow = oscillator(1e-3);
-        assert_eq!(flow.bottom(), 4);
+        assert_eq!(flow.bottom(), 4 + LONG);
         let mut next = vec![0.0; 4];
-        for level in 0..=4 {
+        for level in 0..=flow.bottom() {
             assert!(flow.leap(level, &[1.0, 0.0], &mut next));
-            let (s, c) = (1e4 * flow.step(level)).sin_cos();
+            let angle = 1e4 * flow.step(level);
+            let (s, c) = angle.sin_cos();
             let expected = [c, s, c, -1e4 * s];
             for (a, b) in next.iter().zip(expected) {
-                assert!((a - b).abs() <= 3e-15 * b.abs().max(1.0));
+                let error = (a - b).abs() / b.abs().max(1.0);
+                assert!(error <= 5e-16 * (6.0 + angle), "{level}: {error:e}");
             }
         }
         let (mut terms, mut largest) = (Vec::new(), Vec::new());
-        let degree = flow.taylor(&[1.0, 0.0], flow.step(4), &mut terms, &mut largest);
+        let degree = flow.taylor(&[1.0, 0.0], flow.step(4 + LONG), &mut terms, &mut largest);
         let mut w = vec![0.0; 2];
         flow.sum(&terms, degree, 1.0, &mut w);
         assert!(

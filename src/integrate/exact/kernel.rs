@@ -47,12 +47,17 @@ impl Kernel {
     /// y = K w; `w` must have one value per column, `y` one per row.
     #[inline]
     pub(crate) fn apply(&self, w: &[f64], y: &mut [f64]) {
+        self.apply_first(self.rows, w, y);
+    }
+
+    /// As [`Self::apply`], the first `rows` rows alone.
+    pub(crate) fn apply_first(&self, rows: usize, w: &[f64], y: &mut [f64]) {
         let w = &w[..self.columns];
         if self.columns == 0 {
-            y[..self.rows].fill(0.0);
+            y[..rows].fill(0.0);
             return;
         }
-        let (full, tail) = y[..self.rows].as_chunks_mut::<BLOCK>();
+        let (full, tail) = y[..rows].as_chunks_mut::<BLOCK>();
         let mut blocks = &self.blocks[..];
         for out in full {
             let (block, rest) = blocks.split_at(self.columns);

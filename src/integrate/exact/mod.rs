@@ -2,6 +2,7 @@
 //! matrix exponential; between modes stands a complementarity problem.
 
 mod accumulation;
+mod ahead;
 mod assembler;
 mod clock;
 mod dense;

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::ahead;
 use super::clock::Clock;
 use super::exosystem::Exosystem;
 use super::flow::Flow;
@@ -131,6 +132,8 @@ pub(crate) struct Mode {
     pub(crate) inject_one: DVector<f64>,
     /// Probe rows over w.
     pub(crate) outputs: Kernel,
+    /// The rows that follow.
+    pub(crate) rows: ahead::Rows,
     /// Whether devices share currents or voltages that the ideal model does not determine.
     pub(crate) shared: bool,
 }
@@ -305,6 +308,7 @@ impl Mode {
             inject: Map::new(&map.inject),
             inject_one: map.inject_one.clone(),
             outputs: Kernel::new(&over_w(&lcs.outputs.rows, n, exosystem)),
+            rows: ahead::Rows::new(lcs.outputs.names.len()),
             shared,
             flow,
         })

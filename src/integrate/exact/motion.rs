@@ -1,7 +1,7 @@
 //! Moving along a mode until a time or until a guard falls through zero.
 
 use super::exosystem::Exosystem;
-use super::flow::Flow;
+use super::flow::{Flow, LONG};
 use super::polynomial;
 use super::spans::Spans;
 use super::work::{Sizes, Taylor};
@@ -9,7 +9,7 @@ use super::work::{Sizes, Taylor};
 /// Table steps after which the exosystem is set from its closed form again.
 const REFRESH: u32 = 64;
 /// A step is the output step if it differs by no more than this many units in the last place of the time.
-const GRID_ULPS: f64 = 8.0;
+pub(super) const GRID_ULPS: f64 = 8.0;
 /// Required distance of a guard's control polygon from zero, relative to its spread: the error of the cubic through
 /// values and slopes, (ωh)²/48 of the spread at ωh = 0.7, is below it.
 const MARGIN: f64 = 0.02;
@@ -77,7 +77,10 @@ pub(crate) struct Motion {
     floors: Vec<f64>,
     /// How far below zero each guard was on entry, by rounding of the time or of simultaneous events.
     slack: Vec<f64>,
-    steady: bool,
+    /// Steps of the output grid are short enough from here on.
+    pub(crate) steady: bool,
+    /// No long step goes beyond, s: there one ended that was not clear.
+    barrier: f64,
     since_refresh: u32,
     degree: usize,
 }
@@ -123,6 +126,7 @@ impl Motion {
         );
         exosystem.envelope(z, sizes);
         self.steady = flow.guards() == 0;
+        self.barrier = f64::INFINITY;
         let guards = &self.now[flow.dim()..flow.dim() + flow.guards()];
         self.slack.clear();
         self.slack.extend(guards.iter().map(|g| (-g).max(0.0)));
@@ -172,18 +176,68 @@ impl Motion {
     #[inline]
     pub(crate) fn travel(&mut self, flow: &mut Flow, exosystem: &Exosystem, stop: f64) -> Arrival {
         if self.steady {
-            let off = stop - self.t - flow.step(0);
+            let off = stop - self.t - flow.step(LONG);
             if off.abs() <= GRID_ULPS * f64::EPSILON * stop.abs() {
-                if !flow.leap(0, &self.now, &mut self.next) {
+                if !flow.leap(LONG, &self.now, &mut self.next) {
                     return Arrival::Overflow;
                 }
-                if self.judge(flow, flow.step(0)) == Verdict::Clear {
-                    self.accept(flow, exosystem, 0, stop);
+                if self.judge(flow, flow.step(LONG)) == Verdict::Clear {
+                    self.accept(flow, exosystem, LONG, stop);
                     return Arrival::Reached;
                 }
             }
         }
         self.crawl(flow, exosystem, stop)
+    }
+
+    /// A step over as many output steps as nothing happens on, to `end` at most: their number, at least 2. The state before stays
+    /// in [`Self::before`] until [`Self::arrive`].
+    pub(crate) fn leap_ahead(&mut self, flow: &mut Flow, end: f64) -> Option<usize> {
+        if self.t >= self.barrier {
+            self.barrier = f64::INFINITY;
+        }
+        let limit = flow.step_limit(self.t - self.entered);
+        let longest = limit.min(end.min(self.barrier) - self.t);
+        let mut level = (0..LONG).find(|&level| flow.step(level) <= longest)?;
+        loop {
+            if !flow.leap(level, &self.now, &mut self.next) {
+                return None;
+            }
+            let step = flow.step(level);
+            if self.judge(flow, step) == Verdict::Clear {
+                std::mem::swap(&mut self.now, &mut self.next);
+                return Some(1 << (LONG - level));
+            }
+            let part = self.crossing(flow, step).unwrap_or(0.5);
+            self.barrier = self.t + part * step;
+            level = (level + 1..LONG).find(|&level| flow.step(level) <= part * step)?;
+        }
+    }
+
+    /// The state before [`Self::leap_ahead`].
+    pub(crate) fn before(&self) -> &[f64] {
+        &self.next
+    }
+
+    /// Ends [`Self::leap_ahead`] over `count` output steps after `taken` of them, at `t`.
+    pub(crate) fn arrive(
+        &mut self,
+        flow: &mut Flow,
+        exosystem: &Exosystem,
+        taken: usize,
+        count: usize,
+        t: f64,
+    ) {
+        std::mem::swap(&mut self.now, &mut self.next);
+        if taken == count {
+            self.accept(flow, exosystem, LONG - count.ilog2(), t);
+        } else {
+            for _ in 0..taken {
+                // It was clear as part of the long step.
+                flow.leap(LONG, &self.now, &mut self.next);
+                self.accept(flow, exosystem, LONG, t);
+            }
+        }
     }
 
     /// The general case: Taylor's series for what the table of halved steps does not cover, then table steps that grow from
@@ -263,7 +317,7 @@ impl Motion {
                 break;
             }
         }
-        if !self.steady && flow.step_limit(self.t - self.entered) >= flow.step(0) {
+        if !self.steady && flow.step_limit(self.t - self.entered) >= flow.step(LONG) {
             self.steady = true;
         }
         Arrival::Reached
@@ -392,7 +446,7 @@ impl Motion {
         self.note_peak();
         self.t = t;
         self.steps += 1;
-        self.since_refresh += 1;
+        self.since_refresh += 1_u32 << LONG.saturating_sub(level);
         if self.since_refresh >= REFRESH {
             let n = flow.dim() - exosystem.dim();
             exosystem.write(t, &mut self.now[n..flow.dim()]);

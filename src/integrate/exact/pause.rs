@@ -32,6 +32,7 @@ pub(super) struct Before {
 impl Exact<'_> {
     /// Ends in the present mode and tells where the run stands.
     pub(crate) fn leave(&mut self) -> Place {
+        self.end_ahead();
         self.take_storage();
         self.close_slides();
         self.mode = None;

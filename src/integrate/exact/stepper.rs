@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::accumulation::Accumulation;
+use super::ahead::Ahead;
 use super::assembler::Assembler;
 use super::clock::Clock;
 use super::exosystem::Exosystem;
@@ -79,7 +80,8 @@ pub struct Exact<'a> {
     pub(super) metric: DMatrix<f64>,
     /// From start to end, s.
     pub(super) duration: f64,
-    until: f64,
+    pub(super) until: f64,
+    pub(super) ahead: Ahead,
     pub(super) started: bool,
     /// The next time at which something is known to happen, s.
     next_stop: f64,
@@ -186,6 +188,7 @@ impl<'a> Exact<'a> {
             metric,
             duration: until - t,
             until,
+            ahead: Ahead::default(),
             started: false,
             next_stop: f64::NEG_INFINITY,
             settings,
@@ -427,12 +430,19 @@ fn stored(metric: &DMatrix<f64>, s: &[f64]) -> f64 {
 
 impl Stepper for Exact<'_> {
     fn time(&self) -> f64 {
-        self.motion.t
+        if self.ahead.pending() {
+            self.ahead.t
+        } else {
+            self.motion.t
+        }
     }
 
     fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), SimError> {
         if !self.started {
             self.start(log)?;
+        }
+        if self.has_row(t) {
+            return Ok(());
         }
         loop {
             let next = self.next_stop;
@@ -441,6 +451,9 @@ impl Stepper for Exact<'_> {
             let Some(at) = self.mode else {
                 return Err(self.fail(Reason::Infeasible));
             };
+            if self.step_ahead(at, t, next) {
+                return Ok(());
+            }
             match self
                 .motion
                 .travel(&mut self.plant.modes[at].flow, &self.exosystem, stop)
@@ -468,12 +481,15 @@ impl Stepper for Exact<'_> {
     }
 
     fn read(&mut self, row: &mut [f64]) {
-        if let Some(at) = self.mode {
+        if let Some(values) = self.ahead.row() {
+            row.copy_from_slice(values);
+        } else if let Some(at) = self.mode {
             self.plant.modes[at].outputs.apply(&self.motion.now, row);
         }
     }
 
     fn finish(&mut self) -> Outcome {
+        self.end_ahead();
         self.take_storage();
         self.note_end();
         let mut outcome = Outcome {

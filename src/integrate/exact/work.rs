@@ -19,8 +19,8 @@ const STIFF: f64 = 1e5;
 const GROWTH: f64 = 1e6;
 /// Longer spans than so far are prepared when this many could have been joined to them: before, that is more work than it spares.
 const PATIENCE: u32 = 16;
-/// Spans are joined up to 2^this times the output step.
-const LONGEST: u32 = 12;
+/// Spans are joined up to 2^this times the longest step.
+const LONGEST: u32 = 8;
 /// Rounding of a power below this part of the run's is no loss.
 const HARMLESS: f64 = 1e-13;
 /// Rows below this part of the largest are rounding.
@@ -516,9 +516,7 @@ impl Doubling {
     /// [Γ₀; Γ₁].
     fn forms(&self) -> Kernel {
         let dim = self.increment.rows();
-        Kernel::from_fn(2 * dim, dim, |i, j| {
-            self.grams[i / dim].column(j)[i % dim]
-        })
+        Kernel::from_fn(2 * dim, dim, |i, j| self.grams[i / dim].column(j)[i % dim])
     }
 }
 

@@ -1,0 +1,194 @@
+//! Rows ahead: where a mode is calm, one long step passes several output times, and their rows follow from its begin.
+
+use super::flow::{Flow, LONG};
+use super::kernel::Kernel;
+use super::mode::Mode;
+use super::motion::GRID_ULPS;
+use super::stepper::Exact;
+
+/// Rows of a long step at most.
+pub(super) const MOST: usize = 1 << LONG;
+/// A mode's rows are tabulated after so many single ones: before, that is more work than it spares.
+const PATIENCE: u32 = 32;
+
+/// The output rows that follow one state of a mode.
+#[derive(Debug, Clone)]
+pub(crate) struct Rows {
+    columns: usize,
+    singles: u32,
+    /// C exp(𝒜kh) for k = 1…MOST, one below the other, once tabulated.
+    table: Option<Kernel>,
+}
+
+impl Rows {
+    /// For `columns` outputs.
+    pub(crate) fn new(columns: usize) -> Self {
+        Self {
+            columns,
+            singles: 0,
+            table: None,
+        }
+    }
+
+    /// Whether there is a table, made once it is worth it.
+    fn ready(&mut self, flow: &mut Flow, outputs: &Kernel) -> bool {
+        if self.table.is_none() {
+            self.singles += 1;
+            if self.singles >= PATIENCE {
+                self.table = flow.followed(outputs, self.columns, MOST);
+            }
+        }
+        self.table.is_some()
+    }
+}
+
+/// Rows that were computed and not asked for yet.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Ahead {
+    /// When the long step began, and the output step, s.
+    begin: f64,
+    h: f64,
+    /// Rows of the step, and how many of them were asked for; none without a step.
+    count: usize,
+    taken: usize,
+    columns: usize,
+    values: Vec<f64>,
+    /// The time last asked for, s.
+    pub(super) t: f64,
+}
+
+impl Ahead {
+    /// Whether rows are left.
+    pub(super) fn pending(&self) -> bool {
+        self.taken < self.count
+    }
+
+    /// The row last asked for.
+    pub(super) fn row(&self) -> Option<&[f64]> {
+        let from = self.taken.checked_sub(1)? * self.columns;
+        self.values.get(from..from + self.columns)
+    }
+
+    /// Whether `t` is the time of the next row, which is taken then.
+    fn take(&mut self, t: f64) -> bool {
+        let off = t - self.begin - (self.taken + 1) as f64 * self.h;
+        let next = self.pending() && off.abs() <= GRID_ULPS * f64::EPSILON * t.abs();
+        if next {
+            self.taken += 1;
+            self.t = t;
+        }
+        next
+    }
+}
+
+impl Exact<'_> {
+    /// Whether the row at `t` is there already.
+    #[inline]
+    pub(super) fn has_row(&mut self, t: f64) -> bool {
+        if self.ahead.count == 0 {
+            return false;
+        }
+        if self.ahead.take(t) {
+            if !self.ahead.pending() {
+                self.motion.t = t;
+            }
+            return true;
+        }
+        self.end_ahead();
+        false
+    }
+
+    /// Stands at the last row that was asked for.
+    pub(super) fn end_ahead(&mut self) {
+        let Ahead {
+            count, taken, t, ..
+        } = self.ahead;
+        self.ahead.count = 0;
+        self.ahead.taken = 0;
+        if let (true, Some(at)) = (count > 0, self.mode) {
+            let flow = &mut self.plant.modes[at].flow;
+            self.motion.arrive(flow, &self.exosystem, taken, count, t);
+        }
+    }
+
+    /// Steps over as many rows as nothing can happen on, `t` the first of them and `next` when something is known to happen.
+    pub(super) fn step_ahead(&mut self, at: usize, t: f64, next: f64) -> bool {
+        let Mode {
+            flow,
+            outputs,
+            rows,
+            ..
+        } = &mut self.plant.modes[at];
+        let h = flow.step(LONG);
+        let negligible = GRID_ULPS * f64::EPSILON * (t + MOST as f64 * h).abs();
+        if !self.motion.steady
+            || (t - self.motion.t - h).abs() > negligible
+            || !rows.ready(flow, outputs)
+        {
+            return false;
+        }
+        // What happens at the end of a step is left to the step that arrives there.
+        let end = (next - negligible).min(self.until + negligible);
+        let Some(count) = self.motion.leap_ahead(flow, end) else {
+            return false;
+        };
+        let Some(table) = &rows.table else {
+            return false;
+        };
+        let columns = rows.columns;
+        let ahead = &mut self.ahead;
+        ahead.values.resize(MOST * columns, 0.0);
+        table.apply_first(count * columns, self.motion.before(), &mut ahead.values);
+        (ahead.begin, ahead.h, ahead.t) = (self.motion.t, h, t);
+        (ahead.count, ahead.taken, ahead.columns) = (count, 1, columns);
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::integrate::exact::tests::{circuit, prepare_circuit};
+    use crate::integrate::run::{Log, Stepper};
+
+    const RINGING: &str = "v1 a 0 sin(0 10 1k)\nr1 a b 10\nl1 b c 1m ic=0.1\nc1 c 0 1u ic=-3\nd1 c e d\nr2 e 0 300\n\
+        c2 e 0 2u ic=1\n.model d d(ideal)\n.tran 1u 3m uic\n";
+
+    /// Asked along the output grid, which long steps pass, and at times of its own in between, where they are given up: the
+    /// same rows, energies and events.
+    #[test]
+    fn rows_do_not_depend_on_what_is_asked_for_between() {
+        let circuit = circuit(RINGING);
+        let run = |odd: usize| {
+            let (mut exact, lcs, tran) = prepare_circuit(&circuit, true);
+            let columns = lcs.outputs.names.len();
+            let (mut log, mut row) = (Log::new(columns, 0.0, false), vec![0.0; columns]);
+            let mut rows = Vec::new();
+            for k in 0..=3000 {
+                let t = k as f64 * tran.tstep;
+                exact.advance(t, &mut log).expect("a run");
+                assert!((exact.time() - t).abs() < 1e-18);
+                exact.read(&mut row);
+                rows.extend_from_slice(&row);
+                if odd > 0 && k % odd == 0 && k < 3000 {
+                    exact
+                        .advance(t + 0.3 * tran.tstep, &mut log)
+                        .expect("a run");
+                }
+            }
+            (rows, exact.finish(), log.events)
+        };
+        let (rows, outcome, events) = run(0);
+        assert!(outcome.stats.steps < 1000, "{} steps", outcome.stats.steps);
+        assert!(outcome.energy.residual_relative < 1e-12);
+        for odd in [1, 5, 37] {
+            let (others, other, found) = run(odd);
+            assert!(other.stats.steps > outcome.stats.steps);
+            assert!(other.energy.residual_relative < 1e-12);
+            assert!((other.energy.source / outcome.energy.source - 1.0).abs() < 1e-11);
+            let far = rows.iter().zip(&others).map(|(a, b)| (a - b).abs());
+            assert!(far.fold(0.0, f64::max) < 1e-12);
+            let apart = events.iter().zip(&found).map(|(a, b)| (a.0 - b.0).abs());
+            assert!(apart.fold(0.0, f64::max) < 1e-15 && events.len() == found.len());
+        }
+    }
+}
