@@ -33,6 +33,8 @@ pub(crate) struct Flow {
     /// Rounding of the guards and of their derivatives, from |w|.
     noise_kernel: Kernel,
     guard_kernel: Kernel,
+    /// 𝒢 row by row.
+    guard_rows: Vec<f64>,
     /// |𝒢|.
     guard_sizes: Kernel,
     h: f64,
@@ -84,6 +86,7 @@ impl Flow {
                 NOISE * f64::EPSILON * rows.column(j)[i].abs()
             }),
             guard_kernel: Kernel::new(guards),
+            guard_rows: guards.transpose().as_slice().to_vec(),
             guard_sizes: Kernel::new(&guards.abs()),
             rows,
             h,
@@ -323,9 +326,10 @@ impl Flow {
         degree: usize,
     ) -> [f64; MAX_DEGREE + 1] {
         let mut polynomial = [0.0; MAX_DEGREE + 1];
-        for (j, term) in terms.chunks_exact(self.dim).take(degree + 1).enumerate() {
-            let row = (0..self.dim).map(|j| self.rows.column(j)[i]);
-            polynomial[j] = row.zip(term).map(|(g, term)| g * term).sum();
+        let row = &self.guard_rows[i * self.dim..(i + 1) * self.dim];
+        let terms = terms[..(degree + 1) * self.dim].chunks_exact(self.dim);
+        for (coefficient, term) in polynomial.iter_mut().zip(terms) {
+            *coefficient = row.iter().zip(term).map(|(g, term)| g * term).sum();
         }
         polynomial
     }

@@ -16,7 +16,7 @@ use super::pause::Before;
 use super::plant::Plant;
 use super::report::Slides;
 use super::schedule::drives;
-use super::transition::Trigger;
+use super::transition::{PROPOSALS, Trigger};
 use crate::circuit::Source;
 use crate::integrate::energy::Balance;
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
@@ -72,6 +72,8 @@ pub struct Exact<'a> {
     pub(super) before: DVector<f64>,
     /// What the log says about a change from one mode to another.
     pub(super) labels: BTreeMap<(usize, usize), String>,
+    /// [`PROPOSALS`], the latest successful first.
+    pub(super) proposals: [f64; PROPOSALS.len()],
     /// Modes left at the present instant.
     pub(super) left_here: Vec<usize>,
     pub(super) instant: f64,
@@ -182,6 +184,7 @@ impl<'a> Exact<'a> {
             z,
             before: DVector::zeros(sources_count),
             labels: BTreeMap::new(),
+            proposals: PROPOSALS,
             left_here: Vec::new(),
             instant: t,
             successors: Vec::new(),

@@ -7,8 +7,9 @@ use super::stepper::Exact;
 use crate::integrate::run::{Log, Reason, SimError};
 use crate::integrate::switching::fire;
 
-/// Lengths of the implicit step that proposes the next mode, in units of the fastest time constant seen.
-pub(super) const PROPOSALS: [f64; 7] = [1e-6, 1e-4, 1e-8, 1e-2, 1e-10, 1.0, 1e2];
+/// Lengths of the implicit step that proposes the next mode, in units of the fastest time constant seen. The long ones are for stiff
+/// circuits: a current that starts without a slope is no more than rounding on the others.
+pub(super) const PROPOSALS: [f64; 9] = [1e-6, 1e-4, 1e-8, 1e-2, 1e-10, 1.0, 1e2, 1e4, 1e6];
 /// Modes tried around the proposals before the search ends.
 const MOST_NEIGHBOURS: usize = 400;
 /// Events at one instant after which modes already left there are not entered again.
@@ -376,7 +377,7 @@ impl Exact<'_> {
         let fastest = self.plant.fastest();
         let free = self.plant.free(key)?;
         let x = free.state_from(&self.storage);
-        for part in PROPOSALS {
+        for (k, part) in self.proposals.into_iter().enumerate() {
             let h = part / fastest;
             let u = self.inputs(t + h);
             self.lcp_solves += 1;
@@ -390,6 +391,8 @@ impl Exact<'_> {
                 tried.push(closed.clone());
                 let candidate = key.with_closed(closed);
                 if let Some(found) = self.try_key(&candidate, barred) {
+                    // What was found once is tried first from now on.
+                    self.proposals[..=k].rotate_right(1);
                     return Ok(Some(found));
                 }
             }
