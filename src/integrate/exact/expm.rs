@@ -56,12 +56,15 @@ pub(crate) struct Ladder {
     scale: Vec<f64>,
     /// ‖A h‖₁ up to which steps are squared.
     limit: f64,
+    /// Rungs below this one are squares in any case.
+    doubled: u32,
     rungs: Vec<Option<Dense>>,
 }
 
 impl Ladder {
-    /// The ladder of A below h, squared while ‖A h/2^k‖₁ ≤ `limit`.
-    pub(crate) fn new(a: &DMatrix<f64>, h: f64, limit: f64) -> Self {
+    /// The ladder of A below h, squared while ‖A h/2^k‖₁ ≤ `limit` and for k < `doubled`: what that loses is what repeated steps of
+    /// rung `doubled` lose as well.
+    pub(crate) fn new(a: &DMatrix<f64>, h: f64, limit: f64, doubled: u32) -> Self {
         let scale = balance(a, h);
         let whole = Dense::from_fn(a.nrows(), a.ncols(), |i, j| {
             a[(i, j)] * h * scale[j] / scale[i]
@@ -71,6 +74,7 @@ impl Ladder {
             whole,
             scale,
             limit,
+            doubled,
             rungs: Vec::new(),
         }
     }
@@ -87,7 +91,7 @@ impl Ladder {
     /// exp(A h/2^k) − I, and where A h/2^k is stiff max|R(t) − R(t/2)²| relative to max|R(t)|, in the balanced coordinates.
     /// `None` if an entry is not finite or a factor is singular.
     pub(crate) fn increment(&mut self, k: u32) -> Option<(Dense, Option<f64>)> {
-        let stiff = self.norm_at(k) > self.limit;
+        let stiff = self.norm_at(k) > self.limit && k >= self.doubled;
         let twice = if stiff {
             Some(squared(self.rung(k + 1)?))
         } else {
@@ -117,7 +121,7 @@ impl Ladder {
             let norm = self.norm_at(k);
             let rung = if norm <= SERIES {
                 self.series(k)
-            } else if norm <= self.limit {
+            } else if norm <= self.limit || k < self.doubled {
                 squared(self.rung(k + 1)?)
             } else {
                 let mut rung = subdiagonal(&self.whole, k)?;
@@ -246,7 +250,7 @@ mod tests {
     }
 
     fn whole(a: &DMatrix<f64>, h: f64) -> DMatrix<f64> {
-        let (increment, _) = Ladder::new(a, h, SQUARED).increment(0).unwrap();
+        let (increment, _) = Ladder::new(a, h, SQUARED, 0).increment(0).unwrap();
         matrix(&increment) + DMatrix::identity(a.nrows(), a.nrows())
     }
 
@@ -303,7 +307,7 @@ mod tests {
         for decades in [3, 6, 9, 12, 15] {
             let a = graded(5, 10f64.powi(decades));
             let (s, t) = (0.7e-2, 0.3e-2 + 0.001);
-            let mut ladder = Ladder::new(&a, s + t, SQUARED);
+            let mut ladder = Ladder::new(&a, s + t, SQUARED, 0);
             let (_, loss) = ladder.increment(0).unwrap();
             let product = whole(&a, s) * whole(&a, t);
             let exact = whole(&a, s + t);

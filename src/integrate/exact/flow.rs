@@ -73,7 +73,7 @@ impl Flow {
                 first[(i - m, j)]
             }
         });
-        let ladder = Ladder::new(&generator, h, expm::SQUARED);
+        let ladder = Ladder::new(&generator, h, expm::SQUARED, LONG);
         let bottom = (ladder.norm().log2().ceil().max(0.0) as u32).clamp(LONG, DEEPEST);
         let spectrum = Spectrum::new(&generator.view((0, 0), (n, n)).into_owned(), sources);
         Some(Self {
@@ -228,15 +228,9 @@ impl Flow {
     }
 
     /// (from sources, dissipated) along a Taylor polynomial, J.
-    pub(crate) fn energy_of_taylor(
-        &mut self,
-        polynomial: Taylor<'_>,
-        sizes: Sizes<'_>,
-    ) -> [f64; 2] {
-        let generator = &self.generator;
-        self.work.as_mut().map_or([0.0; 2], |work| {
-            work.along_taylor(polynomial, generator, sizes)
-        })
+    pub(crate) fn energy_of_taylor(&mut self, polynomial: Taylor<'_>) -> [f64; 2] {
+        let work = self.work.as_mut();
+        work.map_or([0.0; 2], |work| work.along_taylor(polynomial))
     }
 
     /// Fills g and g' behind w.

@@ -370,11 +370,7 @@ impl Motion {
                 h: dt,
                 part: s,
             };
-            let sizes = Sizes {
-                amplitude: &self.amplitude,
-                power: self.power,
-            };
-            let [source, dissipated] = flow.energy_of_taylor(polynomial, sizes);
+            let [source, dissipated] = flow.energy_of_taylor(polynomial);
             self.energy[0] += source;
             self.energy[1] += dissipated;
             self.spans.part();

@@ -32,8 +32,8 @@ struct Gauss<const P: usize> {
     weights: [f64; P],
 }
 
-/// For products of two polynomials of a degree of Taylor's series that is exact to rounding: the coefficients fall like those of an
-/// exponential, so that half the points that such a product takes in general integrate it to rounding.
+/// Degrees up to which four and six points do. Where Taylor's series of this degree is exact to rounding its coefficients fall like those
+/// of an exponential, so that half the points that a product of two such polynomials takes in general integrate it to rounding.
 const SHORT: usize = 8;
 const MIDDLE: usize = 16;
 const FOUR: Gauss<4> = Gauss {
@@ -91,47 +91,6 @@ const EIGHT: Gauss<8> = Gauss {
     ],
 };
 
-/// A quadratic form yᵀ Q y, upper triangle row by row with doubled off-diagonal entries.
-#[derive(Debug, Clone)]
-struct Form {
-    packed: Vec<f64>,
-}
-
-impl Form {
-    fn new(q: &Dense) -> Self {
-        let dim = q.rows();
-        let mut packed = Vec::with_capacity(dim * (dim + 1) / 2);
-        for i in 0..dim {
-            packed.push(q.column(i)[i]);
-            packed.extend((i + 1..dim).map(|j| q.column(j)[i] + q.column(i)[j]));
-        }
-        Self { packed }
-    }
-
-    /// Σ weights y(nodes)ᵀ Q y(nodes), where `y` holds the values at the nodes one coordinate after the other.
-    #[inline]
-    fn integral<const P: usize>(&self, y: &[f64], weights: [f64; P]) -> f64 {
-        let (y, _) = y.as_chunks::<P>();
-        let mut rest = &self.packed[..];
-        let mut values = [0.0; P];
-        for (i, left) in y.iter().enumerate() {
-            let (row, tail) = rest.split_at(y.len() - i);
-            let mut product = [0.0; P];
-            for (&q, right) in row.iter().zip(&y[i..]) {
-                for p in 0..P {
-                    product[p] += q * right[p];
-                }
-            }
-            for p in 0..P {
-                values[p] += product[p] * left[p];
-            }
-            rest = tail;
-        }
-        let weighted = values.iter().zip(weights);
-        weighted.map(|(v, weight)| v * weight).sum()
-    }
-}
-
 /// How large things are in a run.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sizes<'a> {
@@ -156,6 +115,10 @@ pub(crate) struct Term {
 #[derive(Debug, Clone)]
 pub(crate) struct Work {
     terms: Vec<Term>,
+    /// v and i of all terms in turn, column by column.
+    factors: Vec<f64>,
+    /// Their values at the points of a quadrature.
+    at_nodes: Vec<f64>,
     /// ‖𝒜‖ is that of the mode; unit of time: h/2^bottom, s.
     unit: f64,
     bottom: u32,
@@ -169,13 +132,7 @@ pub(crate) struct Work {
 struct Forms {
     to_y: Kernel,
     y: Vec<f64>,
-    /// T.
-    from_w: Dense,
-    /// y at the points of a quadrature, one coordinate after the other.
-    at_nodes: Vec<f64>,
-    /// Power out of sources, power dissipated.
-    instant: [Form; 2],
-    /// The generator over y, and the forms of `instant`.
+    /// The generator over y, power out of sources, power dissipated.
     generator: DMatrix<f64>,
     powers: [Dense; 2],
     /// A unit, and 2^this times it the longest span, s.
@@ -209,7 +166,11 @@ impl Work {
             .into_iter()
             .filter(|t| [&t.v, &t.i].iter().all(|row| row.iter().any(|r| *r != 0.0)))
             .collect();
-        (!terms.is_empty()).then(|| Self {
+        let dim = terms.first()?.v.len();
+        let column = |j: usize| terms.iter().flat_map(move |term| [term.v[j], term.i[j]]);
+        Some(Self {
+            factors: (0..dim).flat_map(column).collect(),
+            at_nodes: Vec::new(),
             terms,
             unit: h * (-f64::from(bottom)).exp2(),
             bottom,
@@ -267,20 +228,51 @@ impl Work {
     }
 
     /// ∫ v·i dt along the Taylor polynomial w = Σ terms s^k, s = t/h, over the fraction `part` of its step h.
-    pub(crate) fn along_taylor(
-        &mut self,
-        polynomial: Taylor<'_>,
-        generator: &DMatrix<f64>,
-        sizes: Sizes<'_>,
-    ) -> [f64; 2] {
-        let forms = self.forms(generator, sizes);
+    pub(crate) fn along_taylor(&mut self, polynomial: Taylor<'_>) -> [f64; 2] {
         if polynomial.degree <= SHORT {
-            forms.along(polynomial, &FOUR)
+            self.along(polynomial, &FOUR)
         } else if polynomial.degree <= MIDDLE {
-            forms.along(polynomial, &SIX)
+            self.along(polynomial, &SIX)
         } else {
-            forms.along(polynomial, &EIGHT)
+            self.along(polynomial, &EIGHT)
         }
+    }
+
+    fn along<const P: usize>(&mut self, polynomial: Taylor<'_>, rule: &Gauss<P>) -> [f64; 2] {
+        let Taylor {
+            terms,
+            degree,
+            h,
+            part,
+        } = polynomial;
+        let factors = 2 * self.terms.len();
+        let dim = self.factors.len() / factors;
+        let s = rule.nodes.map(|node| node * part);
+        self.at_nodes.clear();
+        self.at_nodes.resize(P * factors, 0.0);
+        let (values, _) = self.at_nodes.as_chunks_mut::<P>();
+        let (lower, last) = terms[..(degree + 1) * dim].split_at(degree * dim);
+        for (j, column) in self.factors.chunks_exact(factors).enumerate() {
+            // w_j at the nodes by Horner's rule, then its part of the factors.
+            let mut w = [last[j]; P];
+            for term in lower.chunks_exact(dim).rev() {
+                for p in 0..P {
+                    w[p] = w[p] * s[p] + term[j];
+                }
+            }
+            for (value, &factor) in values.iter_mut().zip(column) {
+                for p in 0..P {
+                    value[p] += factor * w[p];
+                }
+            }
+        }
+        let mut energy = [0.0; 2];
+        let (pairs, _) = values.as_chunks::<2>();
+        for (term, [v, i]) in self.terms.iter().zip(pairs) {
+            let power = (0..P).map(|p| rule.weights[p] * v[p] * i[p]);
+            energy[usize::from(!term.source)] += h * part * power.sum::<f64>();
+        }
+        [-energy[0], energy[1]]
     }
 }
 
@@ -374,13 +366,9 @@ impl Forms {
             power.ger(sign, &i.transpose(), &v.transpose(), 1.0);
         }
         let powers = powers.each_ref().map(Dense::of);
-        let instant = powers.each_ref().map(Form::new);
         Self {
             to_y: Kernel::new(&to_y),
             y: vec![0.0; dim],
-            from_w: Dense::of(&to_y),
-            at_nodes: Vec::new(),
-            instant,
             generator: moved,
             powers,
             unit,
@@ -389,40 +377,6 @@ impl Forms {
             products: vec![0.0; 2 * dim],
             latest: None,
         }
-    }
-
-    /// ∫ v·i dt along a Taylor polynomial.
-    fn along<const P: usize>(&mut self, polynomial: Taylor<'_>, rule: &Gauss<P>) -> [f64; 2] {
-        let Taylor {
-            terms,
-            degree,
-            h,
-            part,
-        } = polynomial;
-        let dim = self.from_w.columns();
-        let s = rule.nodes.map(|node| node * part);
-        self.at_nodes.clear();
-        self.at_nodes.resize(P * dim, 0.0);
-        let (y, _) = self.at_nodes.as_chunks_mut::<P>();
-        let (lower, last) = terms[..(degree + 1) * dim].split_at(degree * dim);
-        for j in 0..dim {
-            // w_j at the nodes by Horner's rule, then its part of y.
-            let mut w = [last[j]; P];
-            for term in lower.chunks_exact(dim).rev() {
-                for p in 0..P {
-                    w[p] = w[p] * s[p] + term[j];
-                }
-            }
-            for (y, &t) in y.iter_mut().zip(self.from_w.column(j)) {
-                for p in 0..P {
-                    y[p] += t * w[p];
-                }
-            }
-        }
-        let y = &self.at_nodes;
-        self.instant
-            .each_ref()
-            .map(|form| h * part * form.integral(y, rule.weights))
     }
 
     /// The doubling at one unit.
@@ -479,7 +433,7 @@ impl Doubling {
         };
         let grams = powers.each_ref().map(&mut series);
         let mut doubling = Self {
-            ladder: Ladder::new(generator, longest, STIFF),
+            ladder: Ladder::new(generator, longest, STIFF, 0),
             increment: Dense::zeros(dim, dim),
             k,
             grams,
@@ -569,7 +523,7 @@ mod tests {
                 h,
                 part,
             };
-            let [source, dissipated] = work.along_taylor(polynomial, &a, sizes(&[3.0]));
+            let [source, dissipated] = work.along_taylor(polynomial);
             assert!((source / exact(part * h) + 1.0).abs() < 1e-14, "{degree}");
             assert!(
                 (dissipated / exact(part * h) - 2.0).abs() < 1e-14,
