@@ -205,7 +205,14 @@ pub fn run(
     });
     let bar = streams.progress(PROGRESS as u64, "simulating");
     let span = tran.map_or(1.0, |t| t.tstop);
-    let mut report = |t: f64| bar.set_position((t / span * PROGRESS) as u64);
+    let mut shown = 0;
+    let mut report = |t: f64| {
+        let position = (t / span * PROGRESS) as u64;
+        if position != shown {
+            shown = position;
+            bar.set_position(position);
+        }
+    };
     let mut settings = Settings::default();
     if let Some(tol) = request.tol {
         settings.tol = tol;
@@ -217,7 +224,7 @@ pub fn run(
         step: request.step,
         events: request.events,
         settings,
-        progress: Some(&mut report),
+        progress: (!bar.is_hidden()).then_some(&mut report),
     };
     let circuit = match subject {
         Subject::Circuit(both) => Circuit {
