@@ -8,24 +8,30 @@ use super::stepper::Exact;
 
 /// Rows of a long step at most.
 pub(super) const MOST: usize = 1 << LONG;
-/// A mode's rows are tabulated after so many single ones: before, that is more work than it spares.
-const PATIENCE: u32 = 32;
+/// A mode's rows are tabulated after so many single ones for each dimension of w: before, that is more work than it spares.
+const PATIENCE: usize = 6;
+/// Entries of a table at most; rows of larger circuits cost so much that long steps spare little.
+const LARGEST: usize = 1 << 16;
 
 /// The output rows that follow one state of a mode.
 #[derive(Debug, Clone)]
 pub(crate) struct Rows {
     columns: usize,
-    singles: u32,
+    /// Single rows so far, and after how many there is a table.
+    singles: usize,
+    patience: usize,
     /// C exp(𝒜kh) for k = 1…MOST, one below the other, once tabulated.
     table: Option<Kernel>,
 }
 
 impl Rows {
-    /// For `columns` outputs.
-    pub(crate) fn new(columns: usize) -> Self {
+    /// For `columns` outputs over w of length `dim`.
+    pub(crate) fn new(columns: usize, dim: usize) -> Self {
+        let fits = MOST * columns * dim <= LARGEST;
         Self {
             columns,
             singles: 0,
+            patience: if fits { PATIENCE * dim } else { usize::MAX },
             table: None,
         }
     }
@@ -34,7 +40,7 @@ impl Rows {
     fn ready(&mut self, flow: &mut Flow, outputs: &Kernel) -> bool {
         if self.table.is_none() {
             self.singles += 1;
-            if self.singles >= PATIENCE {
+            if self.singles >= self.patience {
                 self.table = flow.followed(outputs, self.columns, MOST);
             }
         }

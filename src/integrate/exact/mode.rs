@@ -308,7 +308,7 @@ impl Mode {
             inject: Map::new(&map.inject),
             inject_one: map.inject_one.clone(),
             outputs: Kernel::new(&over_w(&lcs.outputs.rows, n, exosystem)),
-            rows: ahead::Rows::new(lcs.outputs.names.len()),
+            rows: ahead::Rows::new(lcs.outputs.names.len(), dim),
             shared,
             flow,
         })
