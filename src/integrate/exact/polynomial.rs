@@ -190,6 +190,17 @@ mod tests {
     }
 
     #[test]
+    fn a_cubic_is_judged_with_its_rest_and_solved() {
+        // (s − 0.25)(s² + 1): values −0.25 and 1.5, slopes 1 and 3.5
+        let a = [-0.25, 1.0, -0.25, 1.0];
+        let s = zero_of_cubic([0.25, -1.5], [-1.0, -3.5]);
+        assert!((s - 0.25).abs() < 1e-7);
+        let lifted = [a[0] + 0.3, a[1], a[2], a[3]];
+        assert!(cubic_holds(lifted, 0.04, 0.0) && !cubic_holds(lifted, 0.06, 0.0));
+        assert!(!cubic_holds(a, 0.0, 0.2) && cubic_holds(a, 0.0, 0.3));
+    }
+
+    #[test]
     fn a_dip_between_positive_ends_is_found() {
         let p = from_roots(&[0.5, 0.5001]);
         let s = first_crossing(&p, 1e-15).unwrap();
