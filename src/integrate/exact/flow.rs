@@ -12,7 +12,7 @@ use super::work::{Sizes, Taylor, Term, Work};
 /// The longest step is 2^LONG output steps.
 pub(crate) const LONG: u32 = 4;
 /// Halvings of the longest step that a table may hold; below it Taylor's series takes over in any case.
-const DEEPEST: u32 = 62;
+const DEEPEST: u32 = 62 + LONG;
 
 /// Rounding of a computed guard, in units of 2⁻⁵³ Σ |row| |w|.
 const NOISE: f64 = 16.0;

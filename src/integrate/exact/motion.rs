@@ -256,7 +256,7 @@ impl Motion {
             units += 1.0;
             fraction = 0.0;
         }
-        let mut units = units as u64;
+        let mut units = units as u128;
         if fraction > negligible.min(rest * 0.5) || units == 0 {
             let end = if units == 0 {
                 stop
@@ -284,7 +284,7 @@ impl Motion {
                 while level < bottom && self.t + flow.step(level) > barrier {
                     level += 1;
                 }
-                let span = 1_u64 << (bottom - level);
+                let span = 1_u128 << (bottom - level);
                 let end = if units == span {
                     stop
                 } else {

@@ -1,6 +1,6 @@
 //! Graded stiffness, and contacts that one output step would hide.
 
-use super::{at, simulate};
+use super::{at, simulate, try_simulate};
 
 /// Exponent k, capacitors, voltages after 1 s; from `tests/exact/reference.py`.
 const GRADED: [(u32, [&str; 5], [f64; 5]); 4] = [
@@ -120,4 +120,16 @@ fn grazing_contacts_within_one_output_step() {
             );
         }
     }
+}
+
+/// Rates of 1e21 1/s on an output step of 10 ms: L di/dt = R (I − i) − v with R I = 1 nV, I = 1 mA.
+#[test]
+fn twenty_decades_within_an_output_step() {
+    let run = try_simulate(
+        "v1 1 0 pulse(0 1e9 0 1p 1p 0.5 1)\nr1 1 2 1e12\nc1 2 0 1e-15\nd1 2 3 d\nr2 3 0 1u\nl1 3 4 1e3\nc2 4 0 1k\n\
+         .model d d(ideal)\n.tran 10m 0.4\n",
+    )
+    .unwrap_or_else(|e| panic!("{e}"));
+    let i = at(&run, 0.4, "i(l1)");
+    assert!((i / 4e-13 - 1.0).abs() < 1e-6, "{i:e}");
 }
