@@ -7,7 +7,7 @@ use super::motion::GRID_ULPS;
 use super::stepper::Exact;
 
 /// Rows of a long step at most.
-pub(super) const MOST: usize = 1 << LONG;
+const MOST: usize = 1 << LONG;
 /// A mode's rows are tabulated after so many single ones for each dimension of w: before, that is more work than it spares.
 const PATIENCE: usize = 6;
 /// Entries of a table at most; rows of larger circuits cost so much that long steps spare little.
@@ -51,13 +51,11 @@ impl Rows {
 /// Rows that were computed and not asked for yet.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Ahead {
-    /// When the long step began, and the output step, s.
+    /// When the long step began, s.
     begin: f64,
-    h: f64,
     /// Rows of the step, and how many of them were asked for; none without a step.
     count: usize,
     taken: usize,
-    columns: usize,
     values: Vec<f64>,
     /// The time last asked for, s.
     pub(super) t: f64,
@@ -69,15 +67,15 @@ impl Ahead {
         self.taken < self.count
     }
 
-    /// The row last asked for.
-    pub(super) fn row(&self) -> Option<&[f64]> {
-        let from = self.taken.checked_sub(1)? * self.columns;
-        self.values.get(from..from + self.columns)
+    /// The row last asked for, of so many columns.
+    pub(super) fn row(&self, columns: usize) -> Option<&[f64]> {
+        let from = self.taken.checked_sub(1)? * columns;
+        self.values.get(from..from + columns)
     }
 
-    /// Whether `t` is the time of the next row, which is taken then.
-    fn take(&mut self, t: f64) -> bool {
-        let off = t - self.begin - (self.taken + 1) as f64 * self.h;
+    /// Whether `t` is the time of the next row of the output step `h`, which is taken then.
+    fn take(&mut self, t: f64, h: f64) -> bool {
+        let off = t - self.begin - (self.taken + 1) as f64 * h;
         let next = self.pending() && off.abs() <= GRID_ULPS * f64::EPSILON * t.abs();
         if next {
             self.taken += 1;
@@ -94,7 +92,7 @@ impl Exact<'_> {
         if self.ahead.count == 0 {
             return false;
         }
-        if self.ahead.take(t) {
+        if self.ahead.take(t, self.plant.output_step()) {
             if !self.ahead.pending() {
                 self.motion.t = t;
             }
@@ -145,8 +143,8 @@ impl Exact<'_> {
         let ahead = &mut self.ahead;
         ahead.values.resize(MOST * columns, 0.0);
         table.apply_first(count * columns, self.motion.before(), &mut ahead.values);
-        (ahead.begin, ahead.h, ahead.t) = (self.motion.t, h, t);
-        (ahead.count, ahead.taken, ahead.columns) = (count, 1, columns);
+        (ahead.begin, ahead.t) = (self.motion.t, t);
+        (ahead.count, ahead.taken) = (count, 1);
         true
     }
 }

@@ -484,7 +484,7 @@ impl Stepper for Exact<'_> {
     }
 
     fn read(&mut self, row: &mut [f64]) {
-        if let Some(values) = self.ahead.row() {
+        if let Some(values) = self.ahead.row(row.len()) {
             row.copy_from_slice(values);
         } else if let Some(at) = self.mode {
             self.plant.modes[at].outputs.apply(&self.motion.now, row);
