@@ -314,6 +314,9 @@ mod tests {
             let error = (&exact - product).amax() / exact.amax();
             assert!(error < 1e-12, "1e{decades}: {error:e}");
             assert!(loss.unwrap_or(0.0) < 1e-12);
+            let (squares, _) = Ladder::new(&a, s + t, SQUARED, 4).increment(0).unwrap();
+            let squares = matrix(&squares) + DMatrix::identity(5, 5);
+            assert!((squares - &exact).amax() / exact.amax() < 1e-12);
             for k in 1..20 {
                 let (rung, _) = ladder.increment(k).unwrap();
                 let anew = whole(&a, (s + t) * (-f64::from(k)).exp2());
