@@ -6,6 +6,7 @@ use super::dense::Dense;
 use super::expm::{self, Ladder};
 use super::kernel::Kernel;
 use super::polynomial::{self, MAX_DEGREE};
+use super::recurring::{Prepared, Recurring};
 use super::spectrum::{Rate, Spectrum};
 use super::work::{Sizes, Taylor, Term, Work};
 
@@ -43,6 +44,9 @@ pub(crate) struct Flow {
     steps: Vec<f64>,
     ladder: Ladder,
     levels: Vec<Option<Kernel>>,
+    recurring: Recurring,
+    /// Work space of spans that recur.
+    moved: Vec<f64>,
     spectrum: Spectrum,
     work: Option<Work>,
     /// Largest loss that an exponential reported.
@@ -96,6 +100,8 @@ impl Flow {
                 .collect(),
             ladder,
             levels: vec![None; bottom as usize + 1],
+            recurring: Recurring::default(),
+            moved: Vec::new(),
             spectrum,
             work: None,
             loss: 0.0,
@@ -169,6 +175,58 @@ impl Flow {
             }
         }));
         true
+    }
+
+    /// Whether `t` recurs: the place of the span. Times within `same` are one where the second order of what they differ by is rounding.
+    #[inline]
+    pub(crate) fn recurs(&mut self, t: f64, same: f64) -> Option<usize> {
+        let unit = self.steps[self.bottom as usize];
+        self.recurring.find(t, same.min(f64::EPSILON.sqrt() * unit))
+    }
+
+    /// As [`Self::leap`] over `t` seconds, which a span stands for that recurs; returns the energy (from sources, dissipated), J.
+    pub(crate) fn leap_again(
+        &mut self,
+        span: usize,
+        t: f64,
+        w: &[f64],
+        next: &mut [f64],
+        sizes: Sizes<'_>,
+    ) -> Option<[f64; 2]> {
+        let (generator, work, loss) = (&self.generator, &mut self.work, &mut self.loss);
+        let dim = self.dim;
+        let (time, prepared) = self.recurring.get(span, |t| {
+            let (mut increment, lost) = Ladder::new(generator, t, expm::SQUARED, 0).increment(0)?;
+            *loss = loss.max(lost.unwrap_or(0.0));
+            let energy = work.as_mut().map(|work| work.span(t, generator, sizes));
+            let mut both = Dense::zeros(2 * dim, dim);
+            for j in 0..dim {
+                both.column_mut(j)[..dim].copy_from_slice(increment.column(j));
+            }
+            increment.shift(1.0);
+            let mut slope = Dense::zeros(dim, dim);
+            slope.set_product(&Dense::of(generator), &increment);
+            for j in 0..dim {
+                both.column_mut(j)[dim..].copy_from_slice(slope.column(j));
+            }
+            let flow = Kernel::from_fn(2 * dim, dim, |i, j| both.column(j)[i]);
+            Some(Prepared { flow, energy })
+        })?;
+        let off = t - time;
+        self.moved.resize(2 * dim, 0.0);
+        prepared.flow.apply(w, &mut self.moved);
+        let (increment, slope) = self.moved.split_at(dim);
+        let (next, guards) = next.split_at_mut(dim);
+        for (next, ((increment, slope), w)) in
+            next.iter_mut().zip(increment.iter().zip(slope).zip(w))
+        {
+            *next = w + (increment + off * slope);
+        }
+        self.rows_kernel.apply(next, guards);
+        Some(match (work, &prepared.energy) {
+            (Some(work), Some(forms)) => work.along_span(forms, off, w, generator, sizes),
+            _ => [0.0; 2],
+        })
     }
 
     /// The rows of `outputs` (so many) after 1, 2, …, `most` output steps, one below the other; `None` beyond doubles.
@@ -377,5 +435,40 @@ mod tests {
         assert_eq!(values[..2], polynomial[2..4]);
         let rest = polynomial[4..].iter().map(|c| c.abs()).sum::<f64>();
         assert!((values[2] - rest).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_span_that_recurs_is_travelled_to_rounding_whatever_its_time() {
+        let mut flow = oscillator(1e-3);
+        flow.set_work(vec![Term {
+            v: vec![1.0, 0.0],
+            i: vec![1.0, 0.0],
+            source: false,
+        }]);
+        let t: f64 = 3e-4;
+        let span = (0..100)
+            .find_map(|_| flow.recurs(t, 1e-15))
+            .expect("a span");
+        let (mut next, amplitude) = (vec![0.0; 4], [1.0, 1.0]);
+        let sizes = Sizes {
+            amplitude: &amplitude,
+            power: 0.0,
+        };
+        for t in [t, t - 1e-13, t + 1e-13] {
+            let [_, dissipated] = flow
+                .leap_again(span, t, &[1.0, 0.0], &mut next, sizes)
+                .unwrap();
+            let angle = 1e4 * t;
+            let (s, c) = angle.sin_cos();
+            for (a, b) in next.iter().zip([c, s, c, -1e4 * s]) {
+                assert!((a - b).abs() < 4e-15 * b.abs().max(1.0), "{a} {b}");
+            }
+            // ∫ cos² = (t + sin cos/ω)/2
+            let exact = 0.5 * (t + s * c * 1e-4);
+            assert!(
+                (dissipated - exact).abs() < 4e-15 * exact,
+                "{dissipated:e} {exact:e}"
+            );
+        }
     }
 }

@@ -19,6 +19,7 @@ mod pause;
 mod plant;
 mod polynomial;
 mod rays;
+mod recurring;
 mod report;
 mod schedule;
 mod shifted;

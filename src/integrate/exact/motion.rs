@@ -232,23 +232,69 @@ impl Motion {
         if taken == count {
             self.accept(flow, exosystem, LONG - count.ilog2(), t);
         } else {
-            for _ in 0..taken {
+            for left in (0..taken).rev() {
                 // It was clear as part of the long step.
                 flow.leap(LONG, &self.now, &mut self.next);
-                self.accept(flow, exosystem, LONG, t);
+                self.accept(flow, exosystem, LONG, t - left as f64 * flow.step(LONG));
             }
         }
     }
 
-    /// The general case: Taylor's series for what the table of halved steps does not cover, then table steps that grow from
-    /// small to large, each halved where the guards are not clear.
+    /// The general case.
     fn crawl(&mut self, flow: &mut Flow, exosystem: &Exosystem, stop: f64) -> Arrival {
+        if stop <= self.t {
+            return Arrival::Reached;
+        }
+        if !self.travel_again(flow, exosystem, stop) {
+            let arrival = self.climb(flow, exosystem, stop);
+            if arrival != Arrival::Reached {
+                return arrival;
+            }
+        }
+        if !self.steady && flow.step_limit(self.t - self.entered) >= flow.step(LONG) {
+            self.steady = true;
+        }
+        Arrival::Reached
+    }
+
+    /// One step to `stop` if that span recurs and nothing happens on it.
+    fn travel_again(&mut self, flow: &mut Flow, exosystem: &Exosystem, stop: f64) -> bool {
+        let rest = stop - self.t;
+        if rest > flow.step_limit(self.t - self.entered) {
+            return false;
+        }
+        let Some(span) = flow.recurs(rest, GRID_ULPS * f64::EPSILON * stop.abs()) else {
+            return false;
+        };
+        let sizes = Sizes {
+            amplitude: &self.amplitude,
+            power: self.power,
+        };
+        let Some(energy) = flow.leap_again(span, rest, &self.now, &mut self.next, sizes) else {
+            return false;
+        };
+        if self.judge(flow, rest) != Verdict::Clear {
+            return false;
+        }
+        self.part(energy);
+        self.take_next(flow, exosystem, stop, 1);
+        true
+    }
+
+    /// Adds the energy (from sources, dissipated) of a step that is no span of the table.
+    fn part(&mut self, energy: [f64; 2]) {
+        for (sum, energy) in self.energy.iter_mut().zip(energy) {
+            *sum += energy;
+        }
+        self.spans.part();
+    }
+
+    /// Taylor's series for what the table of halved steps does not cover, then table steps that grow from small to large, each halved
+    /// where the guards are not clear.
+    fn climb(&mut self, flow: &mut Flow, exosystem: &Exosystem, stop: f64) -> Arrival {
         let bottom = flow.bottom();
         let unit = flow.step(bottom);
         let rest = stop - self.t;
-        if rest <= 0.0 {
-            return Arrival::Reached;
-        }
         let mut units = (rest / unit).floor();
         let mut fraction = rest - units * unit;
         let negligible = GRID_ULPS * f64::EPSILON * stop.abs();
@@ -317,9 +363,6 @@ impl Motion {
                 break;
             }
         }
-        if !self.steady && flow.step_limit(self.t - self.entered) >= flow.step(LONG) {
-            self.steady = true;
-        }
         Arrival::Reached
     }
 
@@ -370,10 +413,8 @@ impl Motion {
                 h: dt,
                 part: s,
             };
-            let [source, dissipated] = flow.energy_of_taylor(polynomial);
-            self.energy[0] += source;
-            self.energy[1] += dissipated;
-            self.spans.part();
+            let energy = flow.energy_of_taylor(polynomial);
+            self.part(energy);
         }
         if fired.is_some() {
             flow.sum(&self.terms, self.degree, s, &mut self.next);
@@ -438,11 +479,17 @@ impl Motion {
             };
             self.spans.push(k, &self.now, flow, sizes);
         }
+        self.take_next(flow, exosystem, t, 1_u32 << LONG.saturating_sub(level));
+    }
+
+    /// Stands at `next` and t; what the exosystem accumulates counts as that of so many steps.
+    #[inline]
+    fn take_next(&mut self, flow: &Flow, exosystem: &Exosystem, t: f64, steps: u32) {
         std::mem::swap(&mut self.now, &mut self.next);
         self.note_peak();
         self.t = t;
         self.steps += 1;
-        self.since_refresh += 1_u32 << LONG.saturating_sub(level);
+        self.since_refresh += steps;
         if self.since_refresh >= REFRESH {
             let n = flow.dim() - exosystem.dim();
             exosystem.write(t, &mut self.now[n..flow.dim()]);

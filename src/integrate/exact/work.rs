@@ -198,11 +198,35 @@ impl Work {
         if forms.over.len() <= k as usize {
             forms.double_to(k);
         }
-        forms.to_y.apply(w, &mut forms.y);
-        let (y, products) = (&forms.y, &mut forms.products);
-        forms.over[k as usize].apply(y, products);
-        let (sources, dissipated) = products.split_at(y.len());
-        [sources, dissipated].map(|p| p.iter().zip(y).map(|(p, y)| p * y).sum())
+        forms.y_of(w);
+        products(&forms.over[k as usize], &forms.y, &mut forms.products)
+    }
+
+    /// The forms of the energy over a span of `t` seconds and of the power at its end, for [`Self::along_span`].
+    pub(crate) fn span(
+        &mut self,
+        t: f64,
+        generator: &DMatrix<f64>,
+        sizes: Sizes<'_>,
+    ) -> [Kernel; 2] {
+        self.forms(generator, sizes).span(t)
+    }
+
+    /// (from sources, dissipated) from w over the span of these forms and `off` seconds more, J.
+    #[inline]
+    pub(crate) fn along_span(
+        &mut self,
+        span: &[Kernel; 2],
+        off: f64,
+        w: &[f64],
+        generator: &DMatrix<f64>,
+        sizes: Sizes<'_>,
+    ) -> [f64; 2] {
+        let forms = self.forms(generator, sizes);
+        forms.y_of(w);
+        let energy = products(&span[0], &forms.y, &mut forms.products);
+        let power = products(&span[1], &forms.y, &mut forms.products);
+        std::array::from_fn(|i| energy[i] + off * power[i])
     }
 
     /// Whether two spans of 2^k units may be taken as one of twice the length.
@@ -379,17 +403,23 @@ impl Forms {
         }
     }
 
-    /// The doubling at one unit.
-    fn begin(&self) -> Doubling {
+    /// Takes w over into y.
+    #[inline]
+    fn y_of(&mut self, w: &[f64]) {
+        self.to_y.apply(w, &mut self.y);
+    }
+
+    /// The doubling at 2^−`after` of the longest time, which it can go on to.
+    fn begin(&self, longest: f64, after: u32) -> Doubling {
+        let t = longest * (-f64::from(after)).exp2();
         let norm = Dense::of(&self.generator).norm_1();
-        let halvings = (norm * self.unit / expm::SERIES).log2().ceil();
+        let halvings = (norm * t / expm::SERIES).log2().ceil();
         let halvings = if halvings > 0.0 {
             halvings.min(1e3) as u32
         } else {
             0
         };
-        let longest = self.unit * f64::from(self.longest).exp2();
-        let k = self.longest + halvings;
+        let k = after + halvings;
         let mut latest = Doubling::new(&self.generator, &self.powers, longest, k);
         for _ in 0..halvings {
             latest.double();
@@ -397,11 +427,26 @@ impl Forms {
         latest
     }
 
+    /// The integrals over `t` seconds and their derivatives Φᵀ Q Φ.
+    fn span(&self, t: f64) -> [Kernel; 2] {
+        let mut doubling = self.begin(t, 0);
+        let integrals = doubling.forms();
+        doubling.increment.shift(1.0);
+        let flow = &doubling.increment;
+        let [product, _] = &mut doubling.buffers;
+        for (gram, power) in doubling.grams.iter_mut().zip(&self.powers) {
+            product.set_product(power, flow);
+            gram.set_transposed_product(flow, product);
+        }
+        [integrals, doubling.forms()]
+    }
+
     /// Has the integrals up to 2^k units; returns where they end.
     fn double_to(&mut self, k: u32) -> &Doubling {
         let begun = self.latest.take();
         let mut latest = begun.unwrap_or_else(|| {
-            let latest = self.begin();
+            let longest = self.unit * f64::from(self.longest).exp2();
+            let latest = self.begin(longest, self.longest);
             self.over.push(latest.forms());
             latest
         });
@@ -411,6 +456,14 @@ impl Forms {
         }
         self.latest.insert(latest)
     }
+}
+
+/// (y · Γ₀y, y · Γ₁y) for [Γ₀; Γ₁].
+#[inline]
+fn products(forms: &Kernel, y: &[f64], products: &mut [f64]) -> [f64; 2] {
+    forms.apply(y, products);
+    let (sources, dissipated) = products.split_at(y.len());
+    [sources, dissipated].map(|p| p.iter().zip(y).map(|(p, y)| p * y).sum())
 }
 
 impl Doubling {

@@ -1,0 +1,99 @@
+//! Spans that recur: a circuit that a clock switches travels the same times period by period, from an edge to the next output row and
+//! from there to the next edge. Their exponentials are kept.
+
+use super::kernel::Kernel;
+
+/// Spans of a mode that are known at most.
+const MOST: usize = 32;
+/// A span is prepared when it is met so often: before, that is more work than it spares.
+const PATIENCE: u32 = 8;
+
+/// The flow over one span. Its time differs from that of a span it stands for by roundings, of which the first order is taken along.
+#[derive(Debug, Clone)]
+pub(super) struct Prepared {
+    /// exp(𝒜t) − I, and below it 𝒜 exp(𝒜t).
+    pub(super) flow: Kernel,
+    /// The forms of its energy, see [`Work::span`](super::work::Work::span), if any is asked for.
+    pub(super) energy: Option<[Kernel; 2]>,
+}
+
+/// The spans that a mode was asked for.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Recurring {
+    /// s.
+    times: Vec<f64>,
+    met: Vec<u32>,
+    prepared: Vec<Option<Prepared>>,
+    /// The place of the next new span once all are taken.
+    next: usize,
+}
+
+impl Recurring {
+    /// The place of the span of `t`, of which all within `same` are one, once it was met often enough to be prepared.
+    #[inline]
+    pub(super) fn find(&mut self, t: f64, same: f64) -> Option<usize> {
+        let Some(at) = self.times.iter().position(|time| (time - t).abs() <= same) else {
+            self.meet(t);
+            return None;
+        };
+        self.met[at] += 1;
+        (self.met[at] >= PATIENCE).then_some(at)
+    }
+
+    /// Notes a new span, in the place of the oldest that is not prepared if there is no other.
+    fn meet(&mut self, t: f64) {
+        if self.times.len() < MOST {
+            self.times.push(t);
+            self.met.push(1);
+            self.prepared.push(None);
+            return;
+        }
+        let free = (self.next..MOST)
+            .chain(0..self.next)
+            .find(|&at| self.prepared[at].is_none());
+        if let Some(at) = free {
+            self.times[at] = t;
+            self.met[at] = 1;
+            self.next = (at + 1) % MOST;
+        }
+    }
+
+    /// The time and the flow of the span at a place from [`Self::find`]; prepared when first asked for. `None` beyond doubles.
+    #[inline]
+    pub(super) fn get(
+        &mut self,
+        at: usize,
+        prepare: impl FnOnce(f64) -> Option<Prepared>,
+    ) -> Option<(f64, &Prepared)> {
+        let t = self.times[at];
+        if self.prepared[at].is_none() {
+            self.prepared[at] = prepare(t);
+        }
+        Some((t, self.prepared[at].as_ref()?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_recurs_is_known_among_what_does_not() {
+        let mut recurring = Recurring::default();
+        let mut found = None;
+        for k in 0..20 * MOST {
+            assert_eq!(recurring.find(1e-6 * (k + 2) as f64, 1e-15), None, "{k}");
+            let again = recurring.find(1e-6 + 1e-16 * (k % 3) as f64, 1e-15);
+            assert_eq!(again.is_some(), k + 1 >= PATIENCE as usize, "{k}");
+            if let Some(at) = again {
+                assert_eq!(*found.get_or_insert(at), at);
+                let flow = Prepared {
+                    flow: Kernel::default(),
+                    energy: None,
+                };
+                let time = recurring.get(at, |_| Some(flow)).map(|(t, _)| t);
+                assert_eq!(time, Some(1e-6));
+            }
+        }
+    }
+}
