@@ -7,7 +7,7 @@
 mod tests;
 
 use crate::integrate::exact::{Exact, Place};
-use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
+use crate::integrate::run::{Grid, Log, Outcome, Reason, SimError, Stepper};
 use crate::integrate::stats::Stats;
 use crate::integrate::theta::Theta;
 
@@ -229,6 +229,13 @@ impl Stepper for Handover<'_> {
         match &mut self.stepping {
             Some(stepping) => stepping.theta.read(row),
             None => self.exact.read(row),
+        }
+    }
+
+    fn rows_ahead(&mut self, grid: &Grid, k: usize) -> &[f64] {
+        match &self.stepping {
+            Some(_) => &[],
+            None => self.exact.rows_ahead(grid, k),
         }
     }
 

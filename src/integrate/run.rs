@@ -1,5 +1,7 @@
 //! The time loop, shared by all methods: a [`Stepper`] moves, the loop writes rows.
 
+use std::ops::Range;
+
 use crate::circuit::Tran;
 use crate::integrate::{Energy, Impulse, Run, Stats};
 use crate::waveform::Waveforms;
@@ -124,6 +126,11 @@ pub trait Stepper {
     fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), SimError>;
     /// Probe values at the current time (right limit), one per output name.
     fn read(&mut self, row: &mut [f64]);
+    /// Advances over the output times k, k + 1, … of the grid whose rows are known already, and returns these rows, one after the
+    /// other.
+    fn rows_ahead(&mut self, _grid: &Grid, _k: usize) -> &[f64] {
+        &[]
+    }
     /// Counters, energy, notes.
     fn finish(&mut self) -> Outcome;
 }
@@ -220,15 +227,46 @@ impl Log {
         self.values.reserve(rows * self.columns);
     }
 
-    /// A row of the output grid; it replaces an event row for the same right limit.
-    fn grid_row(&mut self, t: f64, row: &[f64]) {
-        if self.last_is_event && self.time.last() == Some(&t) {
+    /// Rows at these output times, one after the other; the first replaces an event row for the same right limit.
+    ///
+    /// # Errors
+    /// [`Reason::Overflow`] at the first row that is not finite; those before it are taken.
+    fn grid_rows(
+        &mut self,
+        grid: &Grid,
+        times: Range<usize>,
+        rows: &[f64],
+    ) -> Result<(), SimError> {
+        let len = grid.len();
+        let t = |k: usize| grid.time_of(k, len);
+        if let Some(at) = not_finite(rows) {
+            let bad = times.start + at / self.columns;
+            self.grid_rows(grid, times.start..bad, &rows[..at - at % self.columns])?;
+            return Err(SimError::at(t(bad), Reason::Overflow));
+        }
+        if self.last_is_event && self.time.last() == Some(&t(times.start)) {
             self.time.pop();
             self.values.truncate(self.values.len() - self.columns);
         }
-        self.time.push(t);
-        self.values.extend_from_slice(row);
+        self.time.extend(times.map(t));
+        self.values.extend_from_slice(rows);
         self.last_is_event = false;
+        Ok(())
+    }
+}
+
+/// The first value that is not finite.
+fn not_finite(values: &[f64]) -> Option<usize> {
+    // What is finite is nothing when taken zero times: four values at once, and no branch for each.
+    let (fours, rest) = values.as_chunks::<4>();
+    let nothing = fours.iter().fold([0.0; 4], |sum, four| {
+        std::array::from_fn(|i| sum[i] + 0.0 * four[i])
+    });
+    let finite = nothing.iter().all(|v| *v == 0.0) && rest.iter().all(|v| v.is_finite());
+    if finite {
+        None
+    } else {
+        values.iter().position(|v| !v.is_finite())
     }
 }
 
@@ -306,7 +344,7 @@ pub struct Frame<'a> {
     pub plan: Vec<String>,
     /// Notes from before the run.
     pub notes: Vec<String>,
-    /// Called with the time reached, s, after every output row.
+    /// Called with the time reached, s, after an output row or several.
     pub progress: Option<&'a mut dyn FnMut(f64)>,
 }
 
@@ -329,20 +367,26 @@ pub fn run(stepper: &mut dyn Stepper, frame: Frame<'_>, mut log: Log) -> Result<
     let mut failure = None;
     let rows = grid.len();
     log.expect(rows);
-    for k in 0..rows {
+    let mut k = 0;
+    while k < rows {
         let t = grid.time_of(k, rows);
-        if let Err(error) = stepper.advance(t, &mut log) {
-            failure = Some(error);
-            break;
+        let advanced = stepper.advance(t, &mut log).and_then(|()| {
+            stepper.read(&mut row);
+            log.grid_rows(&grid, k..k + 1, &row)?;
+            let ahead = stepper.rows_ahead(&grid, k + 1);
+            let after = k + 1 + ahead.len() / row.len().max(1);
+            log.grid_rows(&grid, k + 1..after, ahead)?;
+            Ok(after)
+        });
+        match advanced {
+            Ok(after) => k = after,
+            Err(error) => {
+                failure = Some(error);
+                break;
+            }
         }
-        stepper.read(&mut row);
-        if row.iter().any(|v| !v.is_finite()) {
-            failure = Some(SimError::at(t, Reason::Overflow));
-            break;
-        }
-        log.grid_row(t, &row);
         if let Some(report) = progress.as_mut() {
-            report(t);
+            report(grid.time_of(k - 1, rows));
         }
     }
     let mut outcome = stepper.finish();
@@ -453,6 +497,21 @@ mod tests {
         let kept = error.partial.unwrap().waveforms;
         assert_eq!(kept.time, [0.0, 1.0, 2.0]);
         assert_eq!(kept.values, [0.0, 1.0, 2.0]);
+    }
+
+    #[test]
+    fn what_is_not_finite_is_found_wherever_it_stands() {
+        for len in 0..10 {
+            let mut values = vec![-1e308; len];
+            assert_eq!(not_finite(&values), None);
+            for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                for at in (0..len).rev() {
+                    values[at] = bad;
+                    assert_eq!(not_finite(&values), Some(at));
+                }
+                values.fill(-1e308);
+            }
+        }
     }
 
     #[test]

@@ -260,10 +260,12 @@ impl Motion {
     /// One step to `stop` if that span recurs and nothing happens on it.
     fn travel_again(&mut self, flow: &mut Flow, exosystem: &Exosystem, stop: f64) -> bool {
         let rest = stop - self.t;
-        if rest > flow.step_limit(self.t - self.entered) {
+        let same = GRID_ULPS * f64::EPSILON * stop.abs();
+        // The output step is in the table.
+        if (rest - flow.step(LONG)).abs() <= same || rest > flow.step_limit(self.t - self.entered) {
             return false;
         }
-        let Some(span) = flow.recurs(rest, GRID_ULPS * f64::EPSILON * stop.abs()) else {
+        let Some(span) = flow.recurs(rest, same) else {
             return false;
         };
         let sizes = Sizes {

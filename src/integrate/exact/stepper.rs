@@ -19,7 +19,7 @@ use super::schedule::drives;
 use super::transition::{PROPOSALS, Trigger};
 use crate::circuit::Source;
 use crate::integrate::energy::Balance;
-use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
+use crate::integrate::run::{Grid, Log, Outcome, Reason, SimError, Stepper};
 use crate::integrate::switching::fire;
 use crate::settings::Settings;
 
@@ -489,6 +489,10 @@ impl Stepper for Exact<'_> {
         } else if let Some(at) = self.mode {
             self.plant.modes[at].outputs.apply(&self.motion.now, row);
         }
+    }
+
+    fn rows_ahead(&mut self, grid: &Grid, k: usize) -> &[f64] {
+        self.take_rows(grid, k)
     }
 
     fn finish(&mut self) -> Outcome {
