@@ -39,14 +39,17 @@ const LAST: (f64, Complex<f64>) = (
     Complex::new(10.169_446_006_657_515, 1.649_201_796_822_227_7),
 );
 
+/// Of so many stiff rungs one is computed anew, and the others are squares: fewer squarings than the approximant has itself.
+const ANEW: u32 = 3;
+
 /// Squarings of the [7/8] approximant: with 2³ steps its error on the whole negative axis is below 1e-13.
 const SQUARINGS: u32 = 3;
 
 /// exp(A h/2^k) − I for all k, computed when asked for, each from the next where that is accurate.
 ///
-/// Where ‖A h/2^k‖₁ is small after balancing, the series; up to a limit the square of the half step; beyond, the L-stable
-/// sub-diagonal approximant [7/8] in product form with 2³ squarings, whose cost does not grow with ‖A h‖ and whose error is
-/// not multiplied by it when A is graded (spread storage elements).
+/// Where ‖A h/2^k‖₁ is small after balancing, the series; up to a limit the square of the half step; beyond, for every third rung
+/// the L-stable sub-diagonal approximant [7/8] in product form with 2³ squarings, whose cost does not grow with ‖A h‖ and whose
+/// error is not multiplied by it when A is graded (spread storage elements).
 #[derive(Debug, Clone)]
 pub(crate) struct Ladder {
     /// A h in balanced coordinates.
@@ -88,11 +91,19 @@ impl Ladder {
         self.norm * (-f64::from(k)).exp2()
     }
 
-    /// exp(A h/2^k) − I, and where A h/2^k is stiff max|R(t) − R(t/2)²| relative to max|R(t)|, in the balanced coordinates.
+    fn stiff(&self, k: u32) -> bool {
+        self.norm_at(k) > self.limit && k >= self.doubled
+    }
+
+    /// Whether a rung is neither a series nor a square.
+    fn anew(&self, k: u32) -> bool {
+        self.stiff(k) && ((k - self.doubled).is_multiple_of(ANEW) || !self.stiff(k + 1))
+    }
+
+    /// exp(A h/2^k) − I, and where that is computed anew max|R(t) − R(t/2)²| relative to max|R(t)|, in the balanced coordinates.
     /// `None` if an entry is not finite or a factor is singular.
     pub(crate) fn increment(&mut self, k: u32) -> Option<(Dense, Option<f64>)> {
-        let stiff = self.norm_at(k) > self.limit && k >= self.doubled;
-        let twice = if stiff {
+        let twice = if self.anew(k) {
             Some(squared(self.rung(k + 1)?))
         } else {
             None
@@ -118,15 +129,14 @@ impl Ladder {
             self.rungs.resize(k as usize + 1, None);
         }
         if self.rungs[k as usize].is_none() {
-            let norm = self.norm_at(k);
-            let rung = if norm <= SERIES {
+            let rung = if self.norm_at(k) <= SERIES {
                 self.series(k)
-            } else if norm <= self.limit || k < self.doubled {
-                squared(self.rung(k + 1)?)
-            } else {
+            } else if self.anew(k) {
                 let mut rung = subdiagonal(&self.whole, k)?;
                 rung.shift(-1.0);
                 rung
+            } else {
+                squared(self.rung(k + 1)?)
             };
             self.rungs[k as usize] = Some(rung);
         }

@@ -31,13 +31,10 @@ pub(crate) struct Flow {
     /// [𝒢; 𝒢𝒜].
     rows: Dense,
     rows_kernel: Kernel,
-    /// Rounding of the guards and of their derivatives, from |w|.
-    noise_kernel: Kernel,
-    guard_kernel: Kernel,
+    /// |[𝒢; 𝒢𝒜]|.
+    sizes_kernel: Kernel,
     /// 𝒢 row by row.
     guard_rows: Vec<f64>,
-    /// |𝒢|.
-    guard_sizes: Kernel,
     h: f64,
     bottom: u32,
     /// h/2^level.
@@ -77,6 +74,7 @@ impl Flow {
                 first[(i - m, j)]
             }
         });
+        let rows_kernel = Kernel::stacked(&[&rows]);
         let ladder = Ladder::new(&generator, h, expm::SQUARED, LONG);
         let bottom = (ladder.norm().log2().ceil().max(0.0) as u32).clamp(LONG, DEEPEST);
         let spectrum = Spectrum::new(&generator.view((0, 0), (n, n)).into_owned(), sources);
@@ -85,13 +83,9 @@ impl Flow {
             guards: m,
             generator_kernel: Kernel::new(&generator),
             generator,
-            rows_kernel: Kernel::from_fn(2 * m, dim, |i, j| rows.column(j)[i]),
-            noise_kernel: Kernel::from_fn(2 * m, dim, |i, j| {
-                NOISE * f64::EPSILON * rows.column(j)[i].abs()
-            }),
-            guard_kernel: Kernel::new(guards),
+            sizes_kernel: rows_kernel.map(f64::abs),
+            rows_kernel,
             guard_rows: guards.transpose().as_slice().to_vec(),
-            guard_sizes: Kernel::new(&guards.abs()),
             rows,
             h,
             bottom,
@@ -163,17 +157,11 @@ impl Flow {
             return false;
         };
         self.loss = self.loss.max(loss.unwrap_or(0.0));
-        let (dim, rows) = (self.dim, &self.rows);
+        let rows = &self.rows;
         let mut guards = rows.clone();
         guards.set_product(rows, &increment);
         guards.combine(1.0, 1.0, rows);
-        self.levels[level as usize] = Some(Kernel::from_fn(dim + rows.rows(), dim, |i, j| {
-            if i < dim {
-                increment.column(j)[i]
-            } else {
-                guards.column(j)[i - dim]
-            }
-        }));
+        self.levels[level as usize] = Some(Kernel::stacked(&[&increment, &guards]));
         true
     }
 
@@ -196,20 +184,14 @@ impl Flow {
         let (generator, work, loss) = (&self.generator, &mut self.work, &mut self.loss);
         let dim = self.dim;
         let (time, prepared) = self.recurring.get(span, |t| {
-            let (mut increment, lost) = Ladder::new(generator, t, expm::SQUARED, 0).increment(0)?;
+            let (increment, lost) = Ladder::new(generator, t, expm::SQUARED, 0).increment(0)?;
             *loss = loss.max(lost.unwrap_or(0.0));
             let energy = work.as_mut().map(|work| work.span(t, generator, sizes));
-            let mut both = Dense::zeros(2 * dim, dim);
-            for j in 0..dim {
-                both.column_mut(j)[..dim].copy_from_slice(increment.column(j));
-            }
-            increment.shift(1.0);
+            let mut whole = increment.clone();
+            whole.shift(1.0);
             let mut slope = Dense::zeros(dim, dim);
-            slope.set_product(&Dense::of(generator), &increment);
-            for j in 0..dim {
-                both.column_mut(j)[dim..].copy_from_slice(slope.column(j));
-            }
-            let flow = Kernel::from_fn(2 * dim, dim, |i, j| both.column(j)[i]);
+            slope.set_product(&Dense::of(generator), &whole);
+            let flow = Kernel::stacked(&[&increment, &slope]);
             Some(Prepared { flow, energy })
         })?;
         let off = t - time;
@@ -253,8 +235,7 @@ impl Flow {
             increment.combine(1.0, 1.0, &step);
             increment.combine(1.0, 1.0, &product);
         }
-        let table = Kernel::from_fn(most * rows, dim, |i, j| table.column(j)[i]);
-        Some(table)
+        Some(Kernel::stacked(&[&table]))
     }
 
     /// Has the energy of these products integrated along the flow.
@@ -300,7 +281,10 @@ impl Flow {
     /// Rounding noise of g and g' where |w| ≤ `amplitude`.
     pub(crate) fn noise(&self, amplitude: &[f64], floors: &mut Vec<f64>) {
         floors.resize(2 * self.guards, 0.0);
-        self.noise_kernel.apply(amplitude, floors);
+        self.sizes_kernel.apply(amplitude, floors);
+        for floor in floors {
+            *floor *= NOISE * f64::EPSILON;
+        }
     }
 
     /// Taylor terms (𝒜 dt)^k w/k! for k = 0…degree into `terms` (degree + 1 blocks of `dim`); returns the degree.
@@ -358,7 +342,7 @@ impl Flow {
         values.resize(3 * m, 0.0);
         for k in 2..=degree.min(3) {
             let value = &mut values[(k - 2) * m..(k - 1) * m];
-            self.guard_kernel.apply(&terms[k * dim..], value);
+            self.rows_kernel.apply_first(m, &terms[k * dim..], value);
         }
         rest.clear();
         rest.resize(dim, 0.0);
@@ -367,7 +351,7 @@ impl Flow {
                 *rest += term.abs();
             }
         }
-        self.guard_sizes.apply(rest, &mut values[2 * m..]);
+        self.sizes_kernel.apply_first(m, rest, &mut values[2 * m..]);
     }
 
     /// Guard i as a polynomial in the fraction of Taylor's step.

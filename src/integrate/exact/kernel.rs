@@ -2,6 +2,8 @@
 
 use nalgebra::DMatrix;
 
+use super::dense::Dense;
+
 /// Rows computed together: four independent accumulators keep the adders of any x86-64 or ARM64 core busy.
 const BLOCK: usize = 4;
 
@@ -16,31 +18,47 @@ pub(crate) struct Kernel {
 impl Kernel {
     /// Repacks a matrix.
     pub(crate) fn new(matrix: &DMatrix<f64>) -> Self {
-        Self::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)])
+        let mut kernel = Self::zeros(matrix.nrows(), matrix.ncols());
+        for (j, column) in matrix.column_iter().enumerate() {
+            kernel.set_column(0, j, column.as_slice());
+        }
+        kernel
     }
 
-    /// Packs entries (row, column).
-    pub(crate) fn from_fn(
-        rows: usize,
-        columns: usize,
-        entry: impl Fn(usize, usize) -> f64,
-    ) -> Self {
-        let mut blocks = Vec::with_capacity(rows.div_ceil(BLOCK) * columns);
-        for first in (0..rows).step_by(BLOCK) {
+    /// These matrices of equally many columns, one below the other.
+    pub(super) fn stacked(parts: &[&Dense]) -> Self {
+        let columns = parts.first().map_or(0, |part| part.columns());
+        let mut kernel = Self::zeros(parts.iter().map(|part| part.rows()).sum(), columns);
+        let mut first = 0;
+        for part in parts {
             for j in 0..columns {
-                blocks.push(std::array::from_fn(|i| {
-                    if first + i < rows {
-                        entry(first + i, j)
-                    } else {
-                        0.0
-                    }
-                }));
+                kernel.set_column(first, j, part.column(j));
             }
+            first += part.rows();
         }
+        kernel
+    }
+
+    fn zeros(rows: usize, columns: usize) -> Self {
         Self {
             rows,
             columns,
-            blocks,
+            blocks: vec![[0.0; BLOCK]; rows.div_ceil(BLOCK) * columns],
+        }
+    }
+
+    /// The entries of column j from row `first` on.
+    fn set_column(&mut self, first: usize, j: usize, values: &[f64]) {
+        for (i, &value) in (first..).zip(values) {
+            self.blocks[i / BLOCK * self.columns + j][i % BLOCK] = value;
+        }
+    }
+
+    /// Every entry through `f`, which leaves zero as it is.
+    pub(crate) fn map(&self, f: impl Fn(f64) -> f64) -> Self {
+        Self {
+            blocks: self.blocks.iter().map(|block| block.map(&f)).collect(),
+            ..*self
         }
     }
 
@@ -100,8 +118,14 @@ mod tests {
             let w = DVector::from_fn(columns, |i, _| value(i + 1000));
             let mut y = vec![f64::NAN; rows];
             Kernel::new(&matrix).apply(w.as_slice(), &mut y);
-            let expected = matrix * w;
+            let expected = &matrix * &w;
             prop_assert_eq!(y.as_slice(), expected.as_slice());
+            let parts = matrix.row_iter().map(|row| Dense::of(&row.into_owned().reshape_generic(nalgebra::Dyn(1), nalgebra::Dyn(columns))));
+            let parts: Vec<Dense> = parts.collect();
+            let kernel = Kernel::stacked(&parts.iter().collect::<Vec<_>>()).map(|v| 2.0 * v);
+            kernel.apply(w.as_slice(), &mut y);
+            let twice = 2.0 * expected;
+            prop_assert_eq!(y.as_slice(), twice.as_slice());
         }
     }
 }

@@ -87,9 +87,10 @@ pub(crate) struct Map {
 
 impl Map {
     fn new(matrix: &DMatrix<f64>) -> Self {
+        let map = Kernel::new(matrix);
         Self {
-            map: Kernel::new(matrix),
-            sizes: Kernel::new(&matrix.abs()),
+            sizes: map.map(f64::abs),
+            map,
             rows: matrix.nrows(),
         }
     }

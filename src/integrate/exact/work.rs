@@ -522,8 +522,8 @@ impl Doubling {
 
     /// [Γ₀; Γ₁].
     fn forms(&self) -> Kernel {
-        let dim = self.increment.rows();
-        Kernel::from_fn(2 * dim, dim, |i, j| self.grams[i / dim].column(j)[i % dim])
+        let [first, second] = &self.grams;
+        Kernel::stacked(&[first, second])
     }
 }
 
