@@ -2,6 +2,10 @@
 
 use std::process::ExitCode;
 
+/// Modes and their reductions are many small allocations.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 fn main() -> ExitCode {
     circ::cli::main().into()
 }

@@ -9,6 +9,10 @@ use circ::circuit::ElaborateOptions;
 use circ::integrate::{Method, SimOptions, Stats, simulate};
 use circ::{mna, netlist};
 
+/// That of the command.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 const NETLISTS: [&str; 14] = [
     "bridge-resistor",
     "bridge-capacitor-filter",
