@@ -5,10 +5,10 @@ use nalgebra::DMatrix;
 use super::dense::Dense;
 use super::expm::{self, Ladder};
 use super::kernel::Kernel;
-use super::polynomial::{self, MAX_DEGREE};
 use super::recurring::{Prepared, Recurring};
+use super::series::{MAX_DEGREE, Series};
 use super::spectrum::{Rate, Spectrum};
-use super::work::{Sizes, Taylor, Term, Work};
+use super::work::{Sizes, Term, Work};
 
 /// The longest step is 2^LONG output steps.
 pub(crate) const LONG: u32 = 4;
@@ -266,10 +266,10 @@ impl Flow {
             .is_some_and(|work| work.may_join(k, generator, sizes))
     }
 
-    /// (from sources, dissipated) along a Taylor polynomial, J.
-    pub(crate) fn energy_of_taylor(&mut self, polynomial: Taylor<'_>) -> [f64; 2] {
+    /// (from sources, dissipated) along the first `t` seconds of a Taylor series, `part` of its step, J.
+    pub(crate) fn energy_of_series(&mut self, series: &Series, part: f64, t: f64) -> [f64; 2] {
         let work = self.work.as_mut();
-        work.map_or([0.0; 2], |work| work.along_taylor(polynomial))
+        work.map_or([0.0; 2], |work| work.along_series(series, part, t))
     }
 
     /// Fills g and g' behind w.
@@ -287,85 +287,31 @@ impl Flow {
         }
     }
 
-    /// Taylor terms (𝒜 dt)^k w/k! for k = 0…degree into `terms` (degree + 1 blocks of `dim`); returns the degree.
-    /// `dt` ≤ h/2^K; `largest` is work space.
-    pub(crate) fn taylor(
-        &self,
-        w: &[f64],
-        dt: f64,
-        terms: &mut Vec<f64>,
-        largest: &mut Vec<f64>,
-    ) -> usize {
-        let dim = self.dim;
-        terms.resize((MAX_DEGREE + 1) * dim, 0.0);
-        terms[..dim].copy_from_slice(&w[..dim]);
-        largest.clear();
-        largest.extend(w[..dim].iter().map(|v| v.abs()));
-        let mut small_before = false;
-        for k in 1..=MAX_DEGREE {
-            let (known, rest) = terms.split_at_mut(k * dim);
-            let term = &mut rest[..dim];
-            self.generator_kernel.apply(&known[(k - 1) * dim..], term);
-            let factor = dt / k as f64;
-            let mut small = true;
-            for (value, largest) in term.iter_mut().zip(&mut *largest) {
-                *value *= factor;
-                let size = value.abs();
-                small &= size <= 0.1 * f64::EPSILON * *largest;
-                if size > *largest {
-                    *largest = size;
-                }
-            }
-            if small && small_before {
-                return k;
-            }
-            small_before = small;
-        }
-        MAX_DEGREE
-    }
-
-    /// Σ terms s^k: w at the fraction s of Taylor's step.
-    pub(crate) fn sum(&self, terms: &[f64], degree: usize, s: f64, w: &mut [f64]) {
-        polynomial::values(terms, degree, s, &mut w[..self.dim]);
+    /// Taylor's series for `dt` ≤ h/2^K from w on.
+    pub(crate) fn expand(&self, series: &mut Series, w: &[f64], dt: f64) {
+        series.expand(&self.generator_kernel, &w[..self.dim], dt);
     }
 
     /// Of every guard in the fraction of Taylor's step: coefficients 2 and 3, and a bound on what the higher ones add up to.
-    pub(crate) fn guard_cubics(
-        &self,
-        terms: &[f64],
-        degree: usize,
-        rest: &mut Vec<f64>,
-        values: &mut Vec<f64>,
-    ) {
-        let (dim, m) = (self.dim, self.guards);
+    pub(crate) fn guard_cubics(&self, series: &Series, rest: &mut Vec<f64>, values: &mut Vec<f64>) {
+        let m = self.guards;
         values.clear();
         values.resize(3 * m, 0.0);
-        for k in 2..=degree.min(3) {
+        for k in 2..=series.degree().min(3) {
             let value = &mut values[(k - 2) * m..(k - 1) * m];
-            self.rows_kernel.apply_first(m, &terms[k * dim..], value);
+            self.rows_kernel.apply_first(m, series.term(k), value);
         }
-        rest.clear();
-        rest.resize(dim, 0.0);
-        for term in terms[..(degree + 1) * dim].chunks_exact(dim).skip(4) {
-            for (rest, term) in rest.iter_mut().zip(term) {
-                *rest += term.abs();
-            }
-        }
+        series.rest(4, rest);
         self.sizes_kernel.apply_first(m, rest, &mut values[2 * m..]);
     }
 
     /// Guard i as a polynomial in the fraction of Taylor's step.
-    pub(crate) fn guard_polynomial(
-        &self,
-        i: usize,
-        terms: &[f64],
-        degree: usize,
-    ) -> [f64; MAX_DEGREE + 1] {
+    pub(crate) fn guard_polynomial(&self, i: usize, series: &Series) -> [f64; MAX_DEGREE + 1] {
         let mut polynomial = [0.0; MAX_DEGREE + 1];
         let row = &self.guard_rows[i * self.dim..(i + 1) * self.dim];
-        let terms = terms[..(degree + 1) * self.dim].chunks_exact(self.dim);
-        for (coefficient, term) in polynomial.iter_mut().zip(terms) {
-            *coefficient = row.iter().zip(term).map(|(g, term)| g * term).sum();
+        for (k, coefficient) in polynomial.iter_mut().enumerate().take(series.degree() + 1) {
+            let terms = row.iter().zip(series.term(k));
+            *coefficient = terms.map(|(g, term)| g * term).sum();
         }
         polynomial
     }
@@ -403,19 +349,19 @@ mod tests {
                 assert!(error <= 5e-16 * (6.0 + angle), "{level}: {error:e}");
             }
         }
-        let (mut terms, mut largest) = (Vec::new(), Vec::new());
-        let degree = flow.taylor(&[1.0, 0.0], flow.step(4 + LONG), &mut terms, &mut largest);
+        let mut series = Series::default();
+        flow.expand(&mut series, &[1.0, 0.0], flow.step(4 + LONG));
         let mut w = vec![0.0; 2];
-        flow.sum(&terms, degree, 1.0, &mut w);
+        series.at(1.0, &mut w);
         assert!(
             (w[0] - next[0]).abs() < 4e-16 && (w[1] - next[1]).abs() < 4e-16,
-            "{w:?} {next:?} {degree}"
+            "{w:?} {next:?}"
         );
-        let polynomial = flow.guard_polynomial(0, &terms, degree);
+        let polynomial = flow.guard_polynomial(0, &series);
         assert_eq!(polynomial[0], 1.0);
         assert!((polynomial[2] + 0.5 * 0.625 * 0.625).abs() < 1e-15);
-        let mut values = Vec::new();
-        flow.guard_cubics(&terms, degree, &mut largest, &mut values);
+        let (mut rest, mut values) = (Vec::new(), Vec::new());
+        flow.guard_cubics(&series, &mut rest, &mut values);
         assert_eq!(values[..2], polynomial[2..4]);
         let rest = polynomial[4..].iter().map(|c| c.abs()).sum::<f64>();
         assert!((values[2] - rest).abs() < 1e-15);

@@ -5,14 +5,16 @@ use nalgebra::DMatrix;
 use super::dense::Dense;
 
 /// Rows computed together: four independent accumulators keep the adders of any x86-64 or ARM64 core busy.
-const BLOCK: usize = 4;
+pub(super) const BLOCK: usize = 4;
+/// Rows computed together.
+pub(super) type Block = [f64; BLOCK];
 
 /// A dense matrix in blocks of four rows, each block column by column, for y = K w without allocation.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Kernel {
     rows: usize,
     columns: usize,
-    blocks: Vec<[f64; BLOCK]>,
+    blocks: Vec<Block>,
 }
 
 impl Kernel {
@@ -68,6 +70,14 @@ impl Kernel {
         self.apply_first(self.rows, w, y);
     }
 
+    /// As [`Self::apply`] to whole blocks, zeros behind the last row.
+    #[inline]
+    pub(super) fn apply_padded(&self, w: &[f64], y: &mut [Block]) {
+        for (block, y) in self.blocks.chunks_exact(self.columns).zip(y) {
+            *y = product(block, w);
+        }
+    }
+
     /// As [`Self::apply`], the first `rows` rows alone.
     pub(crate) fn apply_first(&self, rows: usize, w: &[f64], y: &mut [f64]) {
         let w = &w[..self.columns];
@@ -93,7 +103,7 @@ impl Kernel {
 
 /// Four rows times w.
 #[inline]
-fn product(block: &[[f64; BLOCK]], w: &[f64]) -> [f64; BLOCK] {
+fn product(block: &[Block], w: &[f64]) -> Block {
     let mut sums = [0.0; BLOCK];
     for (column, &value) in block.iter().zip(w) {
         for (sum, &k) in sums.iter_mut().zip(column) {

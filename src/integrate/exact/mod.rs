@@ -22,6 +22,7 @@ mod rays;
 mod recurring;
 mod report;
 mod schedule;
+mod series;
 mod shifted;
 mod spans;
 mod spectrum;

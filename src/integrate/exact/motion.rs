@@ -3,8 +3,9 @@
 use super::exosystem::Exosystem;
 use super::flow::{Flow, LONG};
 use super::polynomial;
+use super::series::Series;
 use super::spans::Spans;
-use super::work::{Sizes, Taylor};
+use super::work::Sizes;
 
 /// Table steps after which the exosystem is set from its closed form again.
 const REFRESH: u32 = 64;
@@ -66,9 +67,9 @@ pub(crate) struct Motion {
     /// Energy of the run over its duration, W.
     pub(crate) power: f64,
     next: Vec<f64>,
-    terms: Vec<f64>,
-    /// Work space of Taylor's series.
-    largest: Vec<f64>,
+    series: Series,
+    /// Work space: what the series' higher terms add up to, how large w can have been.
+    sizes: Vec<f64>,
     cubics: Vec<f64>,
     /// Largest |w| that noise is measured by; at least `peak`.
     amplitude: Vec<f64>,
@@ -82,7 +83,6 @@ pub(crate) struct Motion {
     /// No long step goes beyond, s: there one ended that was not clear.
     barrier: f64,
     since_refresh: u32,
-    degree: usize,
 }
 
 impl Motion {
@@ -165,11 +165,11 @@ impl Motion {
 
     /// How large w can have been on the way here.
     pub(crate) fn reach(&mut self) -> &[f64] {
-        self.largest.clear();
-        self.largest.extend_from_slice(&self.peak);
+        self.sizes.clear();
+        self.sizes.extend_from_slice(&self.peak);
         let sources = &self.amplitude[self.peak.len()..];
-        self.largest.extend_from_slice(sources);
-        &self.largest
+        self.sizes.extend_from_slice(sources);
+        &self.sizes
     }
 
     /// Moves to `stop` or to the first guard that falls through zero before it.
@@ -372,18 +372,13 @@ impl Motion {
     fn taylor(&mut self, flow: &mut Flow, exosystem: &Exosystem, end: f64) -> Arrival {
         let dt = end - self.t;
         let (dim, m) = (flow.dim(), flow.guards());
-        self.degree = flow.taylor(&self.now, dt, &mut self.terms, &mut self.largest);
-        flow.sum(&self.terms, self.degree, 1.0, &mut self.next);
+        flow.expand(&mut self.series, &self.now, dt);
+        self.series.at(1.0, &mut self.next[..dim]);
         if !self.next[..dim].iter().all(|v| v.is_finite()) {
             return Arrival::Overflow;
         }
         let mut first = (1.0, None);
-        flow.guard_cubics(
-            &self.terms,
-            self.degree,
-            &mut self.largest,
-            &mut self.cubics,
-        );
+        flow.guard_cubics(&self.series, &mut self.sizes, &mut self.cubics);
         for i in 0..m {
             let [g, slope] = [0, m].map(|from| self.now[dim + from + i]);
             let [second, third, rest] = [0, m, 2 * m].map(|from| self.cubics[from + i]);
@@ -391,13 +386,14 @@ impl Motion {
             if polynomial::cubic_holds([g, slope * dt, second, third], rest, floor) {
                 continue;
             }
-            let mut coefficients = flow.guard_polynomial(i, &self.terms, self.degree);
+            let mut coefficients = flow.guard_polynomial(i, &self.series);
             // A slope that is rounding beside a curvature that is not makes no crossing.
             let [_, slope, curvature, ..] = &mut coefficients;
             if *slope < 0.0 && -*slope <= self.floors[m + i] * dt && *curvature > 0.0 {
                 *slope = 0.0;
             }
-            let crossing = polynomial::first_crossing(&coefficients[..=self.degree], floor);
+            let crossing =
+                polynomial::first_crossing(&coefficients[..=self.series.degree()], floor);
             if let Some(s) = crossing.filter(|&s| s < first.0 || first.1.is_none()) {
                 first = (s, Some(i));
             }
@@ -409,17 +405,11 @@ impl Motion {
             end
         };
         if flow.works() {
-            let polynomial = Taylor {
-                terms: &self.terms,
-                degree: self.degree,
-                h: dt,
-                part: s,
-            };
-            let energy = flow.energy_of_taylor(polynomial);
+            let energy = flow.energy_of_series(&self.series, s, s * dt);
             self.part(energy);
         }
         if fired.is_some() {
-            flow.sum(&self.terms, self.degree, s, &mut self.next);
+            self.series.at(s, &mut self.next[..dim]);
         }
         std::mem::swap(&mut self.now, &mut self.next);
         self.t = t;

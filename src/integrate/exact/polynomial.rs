@@ -1,8 +1,7 @@
 //! First sign change of a polynomial on [0, 1], missed by nothing: the control polygon of Bernstein's form bounds the
 //! polynomial from below (Farin, Curves and Surfaces for CAGD, ch. 6).
 
-/// Highest degree handled; a Taylor polynomial of exp over one radius of contraction is exact to rounding below it.
-pub(crate) const MAX_DEGREE: usize = 20;
+use super::series::MAX_DEGREE;
 
 /// Halvings of [0, 1] before an undecided piece counts as a contact.
 const MAX_DEPTH: u32 = 48;
@@ -27,7 +26,7 @@ pub(crate) fn first_crossing(a: &[f64], floor: f64) -> Option<f64> {
     let rise = |(k, c): (usize, &f64)| (k as f64 * c).max(0.0);
     let steepest = a[1] + a.iter().enumerate().skip(2).map(rise).sum::<f64>();
     if a[0] > 0.0 && steepest < 0.0 && value(a, 1.0) < -floor {
-        return Some(root(a, 0.0, 1.0, 0.0));
+        return Some(root(a, 0.0, 1.0, f64::EPSILON));
     }
     let bernstein = to_bernstein(a);
     search(a, &bernstein[..=degree], floor, 0.0, 1.0, 0)
@@ -53,30 +52,16 @@ pub(crate) fn zero_of_cubic(values: [f64; 2], slopes: [f64; 2]) -> f64 {
     root(&a, 0.0, 1.0, f64::EPSILON.sqrt())
 }
 
-/// Σ terms s^k by Horner's rule, where `terms` are `degree` + 1 blocks of the length of `out`.
-pub(crate) fn values(terms: &[f64], degree: usize, s: f64, out: &mut [f64]) {
-    let dim = out.len();
-    out.copy_from_slice(&terms[degree * dim..(degree + 1) * dim]);
-    for block in (0..degree).rev() {
-        let block = &terms[block * dim..(block + 1) * dim];
-        for (out, term) in out.iter_mut().zip(block) {
-            *out = *out * s + term;
-        }
-    }
-}
-
 /// p(s) by Horner's rule.
 pub(crate) fn value(a: &[f64], s: f64) -> f64 {
     a.iter().rev().fold(0.0, |sum, &c| sum * s + c)
 }
 
-/// p'(s).
-fn slope(a: &[f64], s: f64) -> f64 {
+/// p(s) and p'(s).
+fn value_and_slope(a: &[f64], s: f64) -> (f64, f64) {
     a.iter()
-        .enumerate()
-        .skip(1)
         .rev()
-        .fold(0.0, |sum, (k, &c)| sum * s + c * k as f64)
+        .fold((0.0, 0.0), |(p, slope), &c| (p * s + c, slope * s + p))
 }
 
 /// b_i = Σ_{k ≤ i} C(i,k)/C(n,k) a_k.
@@ -108,7 +93,7 @@ fn search(a: &[f64], b: &[f64], floor: f64, low: f64, high: f64, depth: u32) -> 
         .filter(|w| (w[0] >= 0.0) != (w[1] >= 0.0))
         .count();
     if b[0] > 0.0 && b[last] < -floor && changes == 1 {
-        return Some(root(a, low, high, 0.0));
+        return Some(root(a, low, high, f64::EPSILON));
     }
     if depth == MAX_DEPTH {
         return Some(low);
@@ -135,30 +120,32 @@ fn halves(b: &[f64]) -> (Coefficients, Coefficients) {
     (left, right)
 }
 
-/// The root of p in [low, high], where p(low) > 0 > p(high), once it moves by no more than `close`: Newton, bracketed.
+/// The root of p in [low, high], where p(low) > 0 > p(high), once it moves by no more than the part `close` of itself: Newton from the
+/// chord's zero, bracketed.
 fn root(a: &[f64], mut low: f64, mut high: f64, close: f64) -> f64 {
     /// Bisections alone reach rounding within this many steps.
     const STEPS: usize = 64;
-    let mut s = 0.5 * (low + high);
+    let (from, to) = (value(a, low), value(a, high));
+    let mut s = low + (high - low) * (from / (from - to));
     for _ in 0..STEPS {
-        let p = value(a, s);
+        let (p, slope) = value_and_slope(a, s);
+        if p == 0.0 {
+            break;
+        }
         if p > 0.0 {
             low = s;
         } else {
             high = s;
         }
-        let newton = s - p / slope(a, s);
+        let newton = s - p / slope;
         let next = if newton > low && newton < high {
             newton
         } else {
             0.5 * (low + high)
         };
-        if p == 0.0 {
-            break;
-        }
         let moved = (next - s).abs();
         s = next;
-        if moved <= close {
+        if moved <= close * s {
             break;
         }
     }

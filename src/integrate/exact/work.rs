@@ -10,6 +10,7 @@ use nalgebra::DMatrix;
 use super::dense::Dense;
 use super::expm::{self, Ladder};
 use super::kernel::Kernel;
+use super::series::Series;
 
 /// Terms of the series over a step with ‖𝒜‖ h ≤ [`expm::SERIES`]; (2·0.125)^k/k! is below rounding beyond, in every entry: their sizes are not comparable.
 const TERMS: usize = 15;
@@ -251,39 +252,30 @@ impl Work {
         calm
     }
 
-    /// ∫ v·i dt along the Taylor polynomial w = Σ terms s^k, s = t/h, over the fraction `part` of its step h.
-    pub(crate) fn along_taylor(&mut self, polynomial: Taylor<'_>) -> [f64; 2] {
-        if polynomial.degree <= SHORT {
-            self.along(polynomial, &FOUR)
-        } else if polynomial.degree <= MIDDLE {
-            self.along(polynomial, &SIX)
-        } else {
-            self.along(polynomial, &EIGHT)
+    /// ∫ v·i dt along the first `t` seconds of a Taylor series, `part` of its step.
+    pub(crate) fn along_series(&mut self, series: &Series, part: f64, t: f64) -> [f64; 2] {
+        match series.degree() {
+            ..=SHORT => self.along(series, part, t, &FOUR),
+            ..=MIDDLE => self.along(series, part, t, &SIX),
+            _ => self.along(series, part, t, &EIGHT),
         }
     }
 
-    fn along<const P: usize>(&mut self, polynomial: Taylor<'_>, rule: &Gauss<P>) -> [f64; 2] {
-        let Taylor {
-            terms,
-            degree,
-            h,
-            part,
-        } = polynomial;
+    fn along<const P: usize>(
+        &mut self,
+        series: &Series,
+        part: f64,
+        t: f64,
+        rule: &Gauss<P>,
+    ) -> [f64; 2] {
         let factors = 2 * self.terms.len();
-        let dim = self.factors.len() / factors;
         let s = rule.nodes.map(|node| node * part);
         self.at_nodes.clear();
         self.at_nodes.resize(P * factors, 0.0);
         let (values, _) = self.at_nodes.as_chunks_mut::<P>();
-        let (lower, last) = terms[..(degree + 1) * dim].split_at(degree * dim);
         for (j, column) in self.factors.chunks_exact(factors).enumerate() {
-            // w_j at the nodes by Horner's rule, then its part of the factors.
-            let mut w = [last[j]; P];
-            for term in lower.chunks_exact(dim).rev() {
-                for p in 0..P {
-                    w[p] = w[p] * s[p] + term[j];
-                }
-            }
+            // w_j at the nodes, then its part of the factors.
+            let w = series.component(j, s);
             for (value, &factor) in values.iter_mut().zip(column) {
                 for p in 0..P {
                     value[p] += factor * w[p];
@@ -294,23 +286,10 @@ impl Work {
         let (pairs, _) = values.as_chunks::<2>();
         for (term, [v, i]) in self.terms.iter().zip(pairs) {
             let power = (0..P).map(|p| rule.weights[p] * v[p] * i[p]);
-            energy[usize::from(!term.source)] += h * part * power.sum::<f64>();
+            energy[usize::from(!term.source)] += power.sum::<f64>();
         }
-        [-energy[0], energy[1]]
+        [-t * energy[0], t * energy[1]]
     }
-}
-
-/// A Taylor polynomial w = Σ terms s^k, s = t/h, of which `part` is travelled.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Taylor<'a> {
-    /// degree + 1 blocks of the dimension of w.
-    pub(crate) terms: &'a [f64],
-    /// Its degree.
-    pub(crate) degree: usize,
-    /// Its step, s.
-    pub(crate) h: f64,
-    /// How much of it counts.
-    pub(crate) part: f64,
 }
 
 impl Forms {
@@ -562,27 +541,23 @@ mod tests {
             assert!((dissipated / expected - 2.0).abs() < 1e-15, "{k}");
             assert!((0..PATIENCE).any(|_| work.may_join(k, &a, sizes(&[3.0]))));
         }
-        let terms: Vec<f64> = (0..=20)
-            .scan(3.0, |t, k| {
-                let now = *t;
-                *t *= -h / tau / (f64::from(k) + 1.0);
-                Some(now)
-            })
-            .collect();
-        for (degree, part) in [(20, 0.4), (14, 0.2), (8, 0.02), (4, 2e-4)] {
-            let polynomial = Taylor {
-                terms: &terms,
-                degree,
-                h,
-                part,
-            };
-            let [source, dissipated] = work.along_taylor(polynomial);
-            assert!((source / exact(part * h) + 1.0).abs() < 1e-14, "{degree}");
-            assert!(
-                (dissipated / exact(part * h) - 2.0).abs() < 1e-14,
-                "{degree}"
-            );
+        let mut rules = [false; 3];
+        for (dt, part) in [
+            (h, 0.4),
+            (h, 1.0),
+            (0.2 * h, 1.0),
+            (0.02 * h, 1.0),
+            (2e-4 * h, 0.7),
+        ] {
+            let mut series = Series::default();
+            series.expand(&Kernel::new(&a), &[3.0], dt);
+            let (degree, t) = (series.degree(), part * dt);
+            rules[usize::from(degree > SHORT) + usize::from(degree > MIDDLE)] = true;
+            let [source, dissipated] = work.along_series(&series, part, t);
+            assert!((source / exact(t) + 1.0).abs() < 1e-14, "{degree}");
+            assert!((dissipated / exact(t) - 2.0).abs() < 1e-14, "{degree}");
         }
+        assert_eq!(rules, [true; 3]);
     }
 
     /// A growing mode is not followed over spans that its coordinates outgrow.
