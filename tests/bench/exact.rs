@@ -14,6 +14,10 @@ use circ::settings::Settings;
 use cpu_time::ThreadTime;
 use nalgebra::DVector;
 
+/// That of the command.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 const BRIDGE: &str = "C1 1 0 1u IC=10\nL1 1 0 10m IC=0\nDF1 1 2 d\nDR1 0 2 d\nDR2 3 1 d\nDF2 3 0 d\nR1 2 3 1k\n.model d D(ideal)\n";
 const RECTIFIER: &str = "V1 a 0 SIN(0 325 50)\nV2 b 0 SIN(0 325 50 0 0 -120)\nV3 c 0 SIN(0 325 50 0 0 120)\n\
     L1 a a1 1m\nL2 b b1 1m\nL3 c c1 1m\nR1 a1 a2 0.1\nR2 b1 b2 0.1\nR3 c1 c2 0.1\n\
