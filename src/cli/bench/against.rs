@@ -9,16 +9,17 @@ use crate::cli::ngspice::{self, NgspiceError, deck};
 use crate::law::Law;
 use crate::report::work::Measurement;
 
-/// ngspice's ladder: `reltol`, and print steps per largest step.
-const NGSPICE: [(f64, f64); 7] = [
-    (1e-4, 0.1),
-    (1e-6, 0.1),
-    (1e-3, 1.0),
-    (1e-4, 1.0),
-    (1e-5, 1.0),
-    (1e-6, 1.0),
-    (1e-4, 10.0),
-];
+/// Values of `reltol`.
+const RELTOL: [f64; 4] = [1e-3, 1e-4, 1e-5, 1e-6];
+/// Print steps per largest step, refined in turn.
+const DIVISORS: [f64; 9] = [0.1, 0.3, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0];
+/// An RMS error below which steps are not refined further.
+const ENOUGH: f64 = 1e-5;
+/// A good RMS error; steps are not refined beyond so many times the CPU time of the cheapest run that has it.
+const GOOD: f64 = 1e-4;
+const DEAR: f64 = 3.0;
+/// Nor beyond so much, s.
+const LONGEST: f64 = 1.0;
 /// Rows of the reference that ngspice's own time points are read against, at least.
 const ROWS: f64 = 50_000.0;
 
@@ -46,26 +47,37 @@ impl Bench<'_> {
         } else {
             &[Realisation::N001]
         };
-        let bar = self
-            .streams
-            .progress((realisations.len() * 2 * NGSPICE.len()) as u64, "ngspice");
+        let ladders: Vec<(Realisation, &'static str, f64)> = realisations
+            .iter()
+            .flat_map(|&r| ["gear", "trap"].map(|method| (r, method)))
+            .flat_map(|(r, method)| RELTOL.map(|reltol| (r, method, reltol)))
+            .collect();
+        let bar = self.streams.progress(ladders.len() as u64, "ngspice");
         let mut measurements = Vec::new();
-        for &realisation in realisations {
-            for method in ["gear", "trap"] {
-                for (reltol, divisor) in NGSPICE {
-                    let longest = self.tran.tmax.unwrap_or(f64::INFINITY);
-                    let max_step = longest.min(self.tran.tstep / divisor);
-                    let options = deck::Options {
-                        reltol,
-                        max_step,
-                        method,
-                        realisation,
-                    };
-                    let measured = self.ngspice_at(&both.0, &options, &reference, start_up);
-                    measurements.push(measured?);
-                    bar.inc(1);
+        let mut longest = LONGEST;
+        for (realisation, method, reltol) in ladders {
+            let most = self.tran.tmax.unwrap_or(f64::INFINITY);
+            let mut steps = DIVISORS.map(|d| most.min(self.tran.tstep / d)).to_vec();
+            steps.dedup();
+            for max_step in steps {
+                let options = deck::Options {
+                    reltol,
+                    max_step,
+                    method,
+                    realisation,
+                };
+                let measured = self.ngspice_at(&both.0, &options, &reference, start_up)?;
+                let within = |limit: f64| measured.rms_error.is_some_and(|error| error <= limit);
+                if within(GOOD) {
+                    longest = longest.min(DEAR * measured.cpu_seconds);
+                }
+                let last = within(ENOUGH) || measured.cpu_seconds > longest;
+                measurements.push(measured);
+                if last {
+                    break;
                 }
             }
+            bar.inc(1);
         }
         bar.finish_and_clear();
         Ok(measurements)

@@ -157,7 +157,7 @@ struct Doubling {
     /// exp(𝒜t) − I.
     increment: Dense,
     grams: [Dense; 2],
-    buffers: [Dense; 2],
+    buffers: [Dense; 3],
 }
 
 impl Work {
@@ -412,10 +412,11 @@ impl Forms {
         let integrals = doubling.forms();
         doubling.increment.shift(1.0);
         let flow = &doubling.increment;
-        let [product, _] = &mut doubling.buffers;
+        let [product, _, transposed] = &mut doubling.buffers;
+        transposed.set_transposed(flow);
         for (gram, power) in doubling.grams.iter_mut().zip(&self.powers) {
             product.set_product(power, flow);
-            gram.set_transposed_product(flow, product);
+            gram.set_product(transposed, product);
         }
         [integrals, doubling.forms()]
     }
@@ -469,7 +470,7 @@ impl Doubling {
             increment: Dense::zeros(dim, dim),
             k,
             grams,
-            buffers: [buffer.clone(), buffer],
+            buffers: [buffer.clone(), buffer.clone(), buffer],
         };
         doubling.renew();
         doubling
@@ -484,12 +485,13 @@ impl Doubling {
 
     /// Φ = I + E: Γ ← Γ + Φᵀ Γ Φ.
     fn double(&mut self) {
-        let [first, second] = &mut self.buffers;
+        let [first, second, transposed] = &mut self.buffers;
         let e = &self.increment;
+        transposed.set_transposed(e);
         for gram in &mut self.grams {
             first.set_product(gram, e);
             first.combine(1.0, 1.0, gram);
-            second.set_transposed_product(e, first);
+            second.set_product(transposed, first);
             gram.combine(1.0, 1.0, first);
             gram.combine(1.0, 1.0, second);
         }
