@@ -45,7 +45,7 @@ fn meets_solution(circuit: &str, events: usize) {
     let found: Vec<f64> = run
         .events
         .iter()
-        .filter(|e| e.1 != "jump")
+        .filter(|e| &*e.1 != "jump")
         .map(|e| e.0)
         .collect();
     assert_eq!(found.len(), events, "{circuit}: {:?}", run.events);

@@ -7,7 +7,7 @@
 mod tests;
 
 use crate::integrate::exact::{Exact, Place};
-use crate::integrate::run::{Grid, Log, Outcome, Reason, SimError, Stepper};
+use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper, Times};
 use crate::integrate::stats::Stats;
 use crate::integrate::theta::Theta;
 
@@ -232,10 +232,10 @@ impl Stepper for Handover<'_> {
         }
     }
 
-    fn rows_ahead(&mut self, grid: &Grid, k: usize) -> &[f64] {
+    fn rows_ahead(&mut self, times: &Times, k: usize) -> &[f64] {
         match &self.stepping {
             Some(_) => &[],
-            None => self.exact.rows_ahead(grid, k),
+            None => self.exact.rows_ahead(times, k),
         }
     }
 

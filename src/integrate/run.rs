@@ -1,6 +1,7 @@
 //! The time loop, shared by all methods: a [`Stepper`] moves, the loop writes rows.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use crate::circuit::Tran;
 use crate::integrate::{Energy, Impulse, Run, Stats};
@@ -128,7 +129,7 @@ pub trait Stepper {
     fn read(&mut self, row: &mut [f64]);
     /// Advances over the output times k, k + 1, … of the grid whose rows are known already, and returns these rows, one after the
     /// other.
-    fn rows_ahead(&mut self, _grid: &Grid, _k: usize) -> &[f64] {
+    fn rows_ahead(&mut self, _times: &Times, _k: usize) -> &[f64] {
         &[]
     }
     /// Counters, energy, notes.
@@ -152,7 +153,7 @@ pub struct Outcome {
 #[derive(Debug, Default)]
 pub struct Log {
     /// Event times, s, with what changed.
-    pub events: Vec<(f64, String)>,
+    pub events: Vec<(f64, Arc<str>)>,
     /// Impulses at jumps.
     pub impulses: Vec<Impulse>,
     wants_rows: bool,
@@ -176,7 +177,7 @@ impl Log {
     }
 
     /// An event: a device or switch changed its state at `t`.
-    pub fn event(&mut self, t: f64, what: impl Into<String>) {
+    pub fn event(&mut self, t: f64, what: impl Into<Arc<str>>) {
         self.events.push((t, what.into()));
     }
 
@@ -233,22 +234,20 @@ impl Log {
     /// [`Reason::Overflow`] at the first row that is not finite; those before it are taken.
     fn grid_rows(
         &mut self,
-        grid: &Grid,
-        times: Range<usize>,
+        times: &Times,
+        which: Range<usize>,
         rows: &[f64],
     ) -> Result<(), SimError> {
-        let len = grid.len();
-        let t = |k: usize| grid.time_of(k, len);
         if let Some(at) = not_finite(rows) {
-            let bad = times.start + at / self.columns;
-            self.grid_rows(grid, times.start..bad, &rows[..at - at % self.columns])?;
-            return Err(SimError::at(t(bad), Reason::Overflow));
+            let bad = which.start + at / self.columns;
+            self.grid_rows(times, which.start..bad, &rows[..at - at % self.columns])?;
+            return Err(SimError::at(times.at(bad), Reason::Overflow));
         }
-        if self.last_is_event && self.time.last() == Some(&t(times.start)) {
+        if self.last_is_event && self.time.last() == Some(&times.at(which.start)) {
             self.time.pop();
             self.values.truncate(self.values.len() - self.columns);
         }
-        self.time.extend(times.map(t));
+        self.time.extend(which.map(|k| times.at(k)));
         self.values.extend_from_slice(rows);
         self.last_is_event = false;
         Ok(())
@@ -315,15 +314,40 @@ impl Grid {
     /// Output time k < [`Self::len`], s.
     #[must_use]
     pub fn time(&self, k: usize) -> f64 {
-        self.time_of(k, self.len())
+        self.times().at(k)
     }
 
-    /// Output time k of `len` in all, s.
-    fn time_of(&self, k: usize, len: usize) -> f64 {
-        if k + 1 >= len {
-            self.tstop
+    /// The times one by one.
+    #[must_use]
+    pub fn times(&self) -> Times {
+        Times {
+            grid: *self,
+            len: self.len(),
+        }
+    }
+}
+
+/// The times of a [`Grid`], counted once.
+#[derive(Debug, Clone, Copy)]
+pub struct Times {
+    grid: Grid,
+    /// Their number.
+    pub len: usize,
+}
+
+impl Times {
+    /// Output time k, s.
+    #[must_use]
+    pub fn at(&self, k: usize) -> f64 {
+        let Grid {
+            tstart,
+            tstep,
+            tstop,
+        } = self.grid;
+        if k + 1 >= self.len {
+            tstop
         } else {
-            self.tstart + k as f64 * self.tstep
+            tstart + k as f64 * tstep
         }
     }
 }
@@ -365,17 +389,16 @@ pub fn run(stepper: &mut dyn Stepper, frame: Frame<'_>, mut log: Log) -> Result<
     } = frame;
     let mut row = vec![0.0; names.len()];
     let mut failure = None;
-    let rows = grid.len();
-    log.expect(rows);
+    let times = grid.times();
+    log.expect(times.len);
     let mut k = 0;
-    while k < rows {
-        let t = grid.time_of(k, rows);
-        let advanced = stepper.advance(t, &mut log).and_then(|()| {
+    while k < times.len {
+        let advanced = stepper.advance(times.at(k), &mut log).and_then(|()| {
             stepper.read(&mut row);
-            log.grid_rows(&grid, k..k + 1, &row)?;
-            let ahead = stepper.rows_ahead(&grid, k + 1);
+            log.grid_rows(&times, k..k + 1, &row)?;
+            let ahead = stepper.rows_ahead(&times, k + 1);
             let after = k + 1 + ahead.len() / row.len().max(1);
-            log.grid_rows(&grid, k + 1..after, ahead)?;
+            log.grid_rows(&times, k + 1..after, ahead)?;
             Ok(after)
         });
         match advanced {
@@ -386,7 +409,7 @@ pub fn run(stepper: &mut dyn Stepper, frame: Frame<'_>, mut log: Log) -> Result<
             }
         }
         if let Some(report) = progress.as_mut() {
-            report(grid.time_of(k - 1, rows));
+            report(times.at(k - 1));
         }
     }
     let mut outcome = stepper.finish();

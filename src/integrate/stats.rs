@@ -1,5 +1,7 @@
 //! What a run did and what it found, besides the waveforms.
 
+use std::sync::Arc;
+
 use crate::waveform::Waveforms;
 
 /// Counters of one run; deterministic except `cpu_seconds`.
@@ -67,7 +69,7 @@ pub struct Run {
     /// Impulses at jumps.
     pub impulses: Vec<Impulse>,
     /// Event times, s, with the devices whose state changed.
-    pub events: Vec<(f64, String)>,
+    pub events: Vec<(f64, Arc<str>)>,
     /// Things the user should know.
     pub notes: Vec<String>,
 }

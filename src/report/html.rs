@@ -24,7 +24,7 @@ pub fn page(run: &Run, figure: &Figure) -> Result<String, PictureError> {
     let events = run
         .events
         .iter()
-        .map(|(t, what)| [si::quantity(*t, "s", 9), what.clone()]);
+        .map(|(t, what)| [si::quantity(*t, "s", 9), what.to_string()]);
     let impulses = run.impulses.iter().map(|i| {
         let unit = if i.name.starts_with("i(") {
             "A·s"

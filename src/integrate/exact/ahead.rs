@@ -5,7 +5,7 @@ use super::kernel::Kernel;
 use super::mode::Mode;
 use super::motion::GRID_ULPS;
 use super::stepper::Exact;
-use crate::integrate::run::Grid;
+use crate::integrate::run::Times;
 
 /// Rows of a long step at most.
 const MOST: usize = 1 << LONG;
@@ -88,14 +88,14 @@ impl Ahead {
 
 impl Exact<'_> {
     /// See [`Stepper::rows_ahead`](crate::integrate::run::Stepper::rows_ahead).
-    pub(super) fn take_rows(&mut self, grid: &Grid, k: usize) -> &[f64] {
+    pub(super) fn take_rows(&mut self, times: &Times, k: usize) -> &[f64] {
         let ahead = &mut self.ahead;
         // The last output time need not be a step away from the one before.
-        let count = (ahead.count - ahead.taken).min(grid.len().saturating_sub(k + 1));
+        let count = (ahead.count - ahead.taken).min(times.len.saturating_sub(k + 1));
         let before = ahead.taken;
         if count > 0 {
             ahead.taken += count - 1;
-            let t = grid.time(k + count - 1);
+            let t = times.at(k + count - 1);
             if !ahead.take(t, self.plant.output_step()) {
                 ahead.taken = before;
             } else if !ahead.pending() {

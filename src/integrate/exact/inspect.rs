@@ -45,43 +45,38 @@ pub(crate) struct Inspector {
 
 impl Inspector {
     /// The storage that `mode` would have after taking over storage `s` by conservation of charge and flux.
-    pub(crate) fn project(
-        &mut self,
-        mode: &Mode,
-        exosystem: &Exosystem,
-        t: f64,
-        s: &[f64],
-    ) -> Option<Vec<f64>> {
+    pub(crate) fn project(&mut self, mode: &Mode, z: &[f64], s: &[f64]) -> Option<Vec<f64>> {
         mode.state_from(s, &mut self.x);
         self.w.clear();
         self.w.extend_from_slice(&self.x);
-        self.w.resize(mode.flow.dim(), 0.0);
-        exosystem.write(t, &mut self.w[mode.n..]);
+        self.w.extend_from_slice(z);
         mode.storage.values(&self.w, &mut self.s);
         self.s.iter().all(|v| v.is_finite()).then(|| self.s.clone())
     }
 
-    /// Inspects `mode` at storage `s`, whose amplitudes so far are `scale`, at time t on the current source pieces.
+    /// Inspects `mode` at storage `s`, whose amplitudes so far are `scale`, at time t on the current source pieces, where the exosystem
+    /// is at z.
     pub(crate) fn inspect(
         &mut self,
         mode: &Mode,
-        exosystem: &Exosystem,
-        t: f64,
+        (exosystem, t, z): (&Exosystem, f64, &[f64]),
         s: &[f64],
         scale: &[f64],
     ) -> Finding {
         mode.state_from(s, &mut self.x);
-        let n = mode.n;
         self.w.clear();
         self.w.extend_from_slice(&self.x);
-        self.w.resize(mode.flow.dim(), 0.0);
-        exosystem.write(t, &mut self.w[n..]);
+        self.w.extend_from_slice(z);
         mode.storage.values(&self.w, &mut self.s);
         // What the sources move within the resolution of t: at 1 V/ps that is a millivolt where t is a second.
         let time = TIME_ULPS * f64::EPSILON * t.abs();
-        self.later.clone_from(&self.w);
-        exosystem.write(t + time, &mut self.later[n..]);
-        mode.storage.values(&self.later, &mut self.s_later);
+        if mode.driven {
+            self.later.clone_from(&self.w);
+            exosystem.write(t + time, &mut self.later[mode.n..]);
+            mode.storage.values(&self.later, &mut self.s_later);
+        } else {
+            self.s_later.clone_from(&self.s);
+        }
         let moved = (0..s.len()).any(|i| {
             let drift = (self.s_later[i] - self.s[i]).abs();
             (self.s[i] - s[i]).abs() > CONSISTENT * scale[i] + drift

@@ -91,10 +91,7 @@ impl Exact<'_> {
                 continue;
             };
             let mode = &self.plant.modes[at];
-            let Some(s) = self
-                .inspector
-                .project(mode, &self.exosystem, t, &self.storage)
-            else {
+            let Some(s) = self.inspector.project(mode, &self.z, &self.storage) else {
                 continue;
             };
             let free = self.plant.free(key)?;
@@ -105,7 +102,7 @@ impl Exact<'_> {
             let mode = &self.plant.modes[at];
             if let Finding::Holds(leaving) =
                 self.inspector
-                    .inspect(mode, &self.exosystem, t, &s, &self.scale)
+                    .inspect(mode, (&self.exosystem, t, &self.z), &s, &self.scale)
             {
                 self.leap(key, &x, &after, &p, log)?;
                 return Ok(Some((at, leaving)));

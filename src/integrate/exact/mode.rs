@@ -127,6 +127,8 @@ pub(crate) struct Mode {
     pub(crate) constraints: DMatrix<f64>,
     /// s = storage · w, q×dim.
     pub(crate) storage: Map,
+    /// Whether storage or constraints follow the sources.
+    pub(crate) driven: bool,
     /// x = inject · s + inject_one, n×q.
     pub(crate) inject: Map,
     /// n.
@@ -305,6 +307,7 @@ impl Mode {
             device_guards,
             guarded_switches,
             constraints,
+            driven: rows > 0 || map.u.iter().any(|u| *u != 0.0),
             storage: Map::new(&storage),
             inject: Map::new(&map.inject),
             inject_one: map.inject_one.clone(),

@@ -96,11 +96,11 @@ impl Motion {
         }
     }
 
-    /// Enters a mode at `t` with state `x` of amplitudes `amplitude`, exosystem values from their closed form.
+    /// Enters a mode at `t` with state `x` of amplitudes `amplitude` and the exosystem at z.
     pub(crate) fn enter(
         &mut self,
         flow: &Flow,
-        exosystem: &Exosystem,
+        (exosystem, z): (&Exosystem, &[f64]),
         t: f64,
         x: &[f64],
         amplitude: &[f64],
@@ -113,18 +113,14 @@ impl Motion {
         self.next.clear();
         self.next.resize(length, 0.0);
         self.now[..x.len()].copy_from_slice(x);
-        exosystem.write(t, &mut self.now[x.len()..flow.dim()]);
+        self.now[x.len()..flow.dim()].copy_from_slice(z);
         flow.read_guards(&mut self.now);
         self.peak.clear();
         self.peak.extend(x.iter().map(|v| v.abs()));
         self.amplitude.clear();
         self.amplitude.extend_from_slice(amplitude);
         self.amplitude.resize(flow.dim(), 0.0);
-        let (z, sizes) = (
-            &self.now[x.len()..flow.dim()],
-            &mut self.amplitude[x.len()..],
-        );
-        exosystem.envelope(z, sizes);
+        exosystem.envelope(z, &mut self.amplitude[x.len()..]);
         self.steady = flow.guards() == 0;
         self.barrier = f64::INFINITY;
         let guards = &self.now[flow.dim()..flow.dim() + flow.guards()];

@@ -1,5 +1,7 @@
 //! What a run tells: events in the log, notes at its end.
 
+use std::sync::Arc;
+
 use super::mode::Key;
 use super::stepper::Exact;
 use crate::integrate::run::{Log, SimError};
@@ -25,19 +27,23 @@ impl Exact<'_> {
         log: &mut Log,
     ) -> Result<(), SimError> {
         let changed = self.started && self.plant.modes[at].key != self.key;
-        let mut words = String::new();
+        let mut words = None;
         if changed {
             let pair = (self.mode.unwrap_or(at), at);
-            if !self.labels.contains_key(&pair) {
-                let label = self.label(at)?;
-                self.labels.insert(pair, label);
-            }
-            words.clone_from(&self.labels[&pair]);
+            let label = match self.labels.get(&pair) {
+                Some(label) => label.clone(),
+                None => {
+                    let label: Arc<str> = self.label(at)?.into();
+                    self.labels.insert(pair, label.clone());
+                    label
+                }
+            };
+            words = Some(label).filter(|label| !label.is_empty());
             self.events += 1;
             self.notes.extend(self.accumulation.event(self.motion.t));
         }
         if jumped {
-            words += if words.is_empty() { "jump" } else { ", jump" };
+            words = Some(words.map_or("jump".into(), |label| format!("{label}, jump").into()));
         }
         if self.plant.modes[at].shared && !self.noted_shared {
             self.noted_shared = true;
@@ -47,7 +53,7 @@ impl Exact<'_> {
                 self.motion.t
             ));
         }
-        if !words.is_empty() {
+        if let Some(words) = words {
             log.event(self.motion.t, words);
         }
         Ok(())

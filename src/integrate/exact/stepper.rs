@@ -1,6 +1,7 @@
 //! The event-driven stepper: travel in a mode, find the next one, repeat.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -19,7 +20,7 @@ use super::schedule::drives;
 use super::transition::{PROPOSALS, Trigger};
 use crate::circuit::Source;
 use crate::integrate::energy::Balance;
-use crate::integrate::run::{Grid, Log, Outcome, Reason, SimError, Stepper};
+use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper, Times};
 use crate::integrate::switching::fire;
 use crate::settings::Settings;
 
@@ -66,12 +67,12 @@ pub struct Exact<'a> {
     pub(super) volts: Vec<bool>,
     /// What a change that fails gives back, and where the switches would have stood after it.
     pub(super) before_change: Before,
-    /// z at the last breakpoint.
+    /// z at the last change or breakpoint.
     pub(super) z: Vec<f64>,
     /// u before the last breakpoint.
     pub(super) before: DVector<f64>,
     /// What the log says about a change from one mode to another.
-    pub(super) labels: BTreeMap<(usize, usize), String>,
+    pub(super) labels: BTreeMap<(usize, usize), Arc<str>>,
     /// [`PROPOSALS`], the latest successful first.
     pub(super) proposals: [f64; PROPOSALS.len()],
     /// Modes left at the present instant.
@@ -391,7 +392,6 @@ impl<'a> Exact<'a> {
     pub(super) fn look_ahead(&mut self) {
         let end = self.exosystem.next_breakpoint();
         self.next_stop = end;
-        self.exosystem.write(self.motion.t, &mut self.z);
         for drive in &mut self.plant.drives {
             let i = drive.switch;
             let threshold = &self.plant.thresholds[i];
@@ -491,8 +491,8 @@ impl Stepper for Exact<'_> {
         }
     }
 
-    fn rows_ahead(&mut self, grid: &Grid, k: usize) -> &[f64] {
-        self.take_rows(grid, k)
+    fn rows_ahead(&mut self, times: &Times, k: usize) -> &[f64] {
+        self.take_rows(times, k)
     }
 
     fn finish(&mut self) -> Outcome {

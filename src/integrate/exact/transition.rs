@@ -145,8 +145,8 @@ impl Exact<'_> {
         }
         let mode = &self.plant.modes[at];
         let Inspector { x, amplitude, .. } = &self.inspector;
-        self.motion
-            .enter(&mode.flow, &self.exosystem, t, x, amplitude);
+        let sources = (&self.exosystem, &self.z[..]);
+        self.motion.enter(&mode.flow, sources, t, x, amplitude);
         self.look_ahead();
         if jumped {
             self.jumps += 1;
@@ -411,8 +411,7 @@ impl Exact<'_> {
     fn inspect(&mut self, at: usize) -> Finding {
         self.inspector.inspect(
             &self.plant.modes[at],
-            &self.exosystem,
-            self.motion.t,
+            (&self.exosystem, self.motion.t, &self.z),
             &self.storage,
             &self.scale,
         )

@@ -254,10 +254,12 @@ impl Work {
 
     /// ∫ v·i dt along the first `t` seconds of a Taylor series, `part` of its step.
     pub(crate) fn along_series(&mut self, series: &Series, part: f64, t: f64) -> [f64; 2] {
-        match series.degree() {
-            ..=SHORT => self.along(series, part, t, &FOUR),
-            ..=MIDDLE => self.along(series, part, t, &SIX),
-            _ => self.along(series, part, t, &EIGHT),
+        if series.degree() <= SHORT {
+            self.along(series, part, t, &FOUR)
+        } else if series.degree() <= MIDDLE {
+            self.along(series, part, t, &SIX)
+        } else {
+            self.along(series, part, t, &EIGHT)
         }
     }
 

@@ -257,11 +257,11 @@ fn events_are_those_of_the_circuit() {
         32.0421, 211.7642, 357.0594, 536.7816, 682.0768, 861.7989, 1007.0942, 1186.8163,
     ];
     assert_eq!(run.stats.events, 31, "{:?}", &run.events[..8]);
-    assert_eq!(run.events[0].1, "jump");
+    assert_eq!(&*run.events[0].1, "jump");
     for ((t, names), exact) in run.events[1..].iter().zip(exact) {
         assert!((t * 1e6 - exact).abs() < 0.16, "{t} {exact}");
         assert!(
-            ["df1 df2", "df2 df1", "dr1 dr2"].contains(&names.as_str()),
+            ["df1 df2", "df2 df1", "dr1 dr2"].contains(&&**names),
             "{names}"
         );
     }
