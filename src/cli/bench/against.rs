@@ -13,13 +13,18 @@ use crate::report::work::Measurement;
 const RELTOL: [f64; 4] = [1e-3, 1e-4, 1e-5, 1e-6];
 /// Print steps per largest step, refined in turn.
 const DIVISORS: [f64; 9] = [0.1, 0.3, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0];
-/// An RMS error below which steps are not refined further.
-const ENOUGH: f64 = 1e-5;
-/// A good RMS error; steps are not refined beyond so many times the CPU time of the cheapest run that has it.
+/// Steps are not refined further below this RMS error,
+const ENOUGH: f64 = 3e-5;
+/// nor beyond so many times the CPU time of the cheapest run with a good one,
+const DEAR: f64 = 2.0;
 const GOOD: f64 = 1e-4;
-const DEAR: f64 = 3.0;
-/// Nor beyond so much, s.
-const LONGEST: f64 = 1.0;
+/// nor beyond so much, s,
+const LONGEST: f64 = 0.5;
+/// nor where a run costs so many times the one before, and its error is not below this part of the other's,
+const MORE: f64 = 1.3;
+const LESS: f64 = 0.8;
+/// nor after so many failures in a row.
+const FAILURES: usize = 4;
 /// Rows of the reference that ngspice's own time points are read against, at least.
 const ROWS: f64 = 50_000.0;
 
@@ -59,6 +64,7 @@ impl Bench<'_> {
             let most = self.tran.tmax.unwrap_or(f64::INFINITY);
             let mut steps = DIVISORS.map(|d| most.min(self.tran.tstep / d)).to_vec();
             steps.dedup();
+            let (mut before, mut failures) = (None, 0);
             for max_step in steps {
                 let options = deck::Options {
                     reltol,
@@ -67,15 +73,23 @@ impl Bench<'_> {
                     realisation,
                 };
                 let measured = self.ngspice_at(&both.0, &options, &reference, start_up)?;
-                let within = |limit: f64| measured.rms_error.is_some_and(|error| error <= limit);
-                if within(GOOD) {
-                    longest = longest.min(DEAR * measured.cpu_seconds);
-                }
-                let last = within(ENOUGH) || measured.cpu_seconds > longest;
+                let (cost, error) = (measured.cpu_seconds, measured.rms_error);
                 measurements.push(measured);
-                if last {
+                let Some(error) = error else {
+                    failures += 1;
+                    if failures == FAILURES {
+                        break;
+                    }
+                    continue;
+                };
+                if error <= GOOD {
+                    longest = longest.min(DEAR * cost);
+                }
+                let in_vain = before.is_some_and(|(c, e)| cost > MORE * c && error > LESS * e);
+                if error <= ENOUGH || cost > longest || in_vain {
                     break;
                 }
+                (before, failures) = (Some((cost, error)), 0);
             }
             bar.inc(1);
         }
