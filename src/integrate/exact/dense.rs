@@ -105,20 +105,20 @@ impl Dense {
 
     /// self ← aᵀ, of matching size.
     pub(super) fn set_transposed(&mut self, a: &Self) {
-        for j in 0..self.columns {
-            for i in 0..self.rows {
-                self.data[j * self.blocks + i / BLOCK][i % BLOCK] = a.column(i)[j];
+        for i in 0..self.rows {
+            let (block, lane) = (i / BLOCK, i % BLOCK);
+            let rows = self.data.iter_mut().skip(block);
+            let rows = rows.step_by(self.blocks.max(1));
+            for (out, value) in rows.zip(a.column(i)) {
+                out[lane] = *value;
             }
         }
     }
 
     /// self ← factor (a + aᵀ), square and of matching size.
     pub(super) fn set_symmetric(&mut self, factor: f64, a: &Self) {
-        for j in 0..self.columns {
-            for (i, out) in self.column_mut(j).iter_mut().enumerate() {
-                *out = factor * (a.column(j)[i] + a.column(i)[j]);
-            }
-        }
+        self.set_transposed(a);
+        self.combine(factor, factor, a);
     }
 
     /// self ← self · scale + other · factor.

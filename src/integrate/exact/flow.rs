@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::dense::Dense;
 use super::expm::{self, Ladder};
-use super::kernel::Kernel;
+use super::kernel::{Kernel, SparseKernel};
 use super::recurring::{Prepared, Recurring};
 use super::series::{MAX_DEGREE, Series};
 use super::spectrum::{Rate, Spectrum};
@@ -27,7 +27,7 @@ pub(crate) struct Flow {
     dim: usize,
     guards: usize,
     generator: DMatrix<f64>,
-    generator_kernel: Kernel,
+    generator_kernel: SparseKernel,
     /// [𝒢; 𝒢𝒜].
     rows: Dense,
     rows_kernel: Kernel,
@@ -81,7 +81,7 @@ impl Flow {
         Some(Self {
             dim,
             guards: m,
-            generator_kernel: Kernel::new(&generator),
+            generator_kernel: SparseKernel::new(&generator),
             generator,
             sizes_kernel: rows_kernel.map(f64::abs),
             rows_kernel,

@@ -70,14 +70,6 @@ impl Kernel {
         self.apply_first(self.rows, w, y);
     }
 
-    /// As [`Self::apply`] to whole blocks, zeros behind the last row.
-    #[inline]
-    pub(super) fn apply_padded(&self, w: &[f64], y: &mut [Block]) {
-        for (block, y) in self.blocks.chunks_exact(self.columns).zip(y) {
-            *y = product(block, w);
-        }
-    }
-
     /// As [`Self::apply`], the first `rows` rows alone.
     pub(crate) fn apply_first(&self, rows: usize, w: &[f64], y: &mut [f64]) {
         let w = &w[..self.columns];
@@ -97,6 +89,49 @@ impl Kernel {
             for (out, sum) in tail.iter_mut().zip(sums) {
                 *out = sum;
             }
+        }
+    }
+}
+
+/// A matrix with many zeros, whose blocks of four rows and one column are left out where they are zero.
+#[derive(Debug, Clone, Default)]
+pub(super) struct SparseKernel {
+    /// By block of rows: where its blocks end.
+    ends: Vec<usize>,
+    /// (column, entries).
+    blocks: Vec<(usize, Block)>,
+}
+
+impl SparseKernel {
+    /// Repacks a matrix.
+    pub(super) fn new(matrix: &DMatrix<f64>) -> Self {
+        let dense = Kernel::new(matrix);
+        let mut sparse = Self::default();
+        for k in 0..dense.rows.div_ceil(BLOCK) {
+            let rows = &dense.blocks[k * dense.columns..(k + 1) * dense.columns];
+            let blocks = rows.iter().copied().enumerate();
+            sparse
+                .blocks
+                .extend(blocks.filter(|(_, block)| *block != [0.0; BLOCK]));
+            sparse.ends.push(sparse.blocks.len());
+        }
+        sparse
+    }
+
+    /// y = K w in whole blocks, zeros behind the last row.
+    #[inline]
+    pub(super) fn apply(&self, w: &[f64], y: &mut [Block]) {
+        let mut begin = 0;
+        for (&end, y) in self.ends.iter().zip(y) {
+            let mut sums = [0.0; BLOCK];
+            for (column, block) in &self.blocks[begin..end] {
+                let value = w[*column];
+                for (sum, k) in sums.iter_mut().zip(block) {
+                    *sum += k * value;
+                }
+            }
+            *y = sums;
+            begin = end;
         }
     }
 }
@@ -124,12 +159,17 @@ mod tests {
         #[test]
         fn equals_the_dense_product(rows in 0_usize..13, columns in 0_usize..9, seed in any::<u32>()) {
             let value = |i: usize| (((i as f64 + 1.3) * f64::from(seed)).sin() * 10.0).round();
-            let matrix = DMatrix::from_fn(rows, columns, |i, j| value(i * 31 + j));
+            let empty = |j: usize| (seed >> j) & 1 == 1;
+            let entry = |i: usize, j: usize| if empty(j) { 0.0 } else { value(i * 31 + j) };
+            let matrix = DMatrix::from_fn(rows, columns, entry);
             let w = DVector::from_fn(columns, |i, _| value(i + 1000));
             let mut y = vec![f64::NAN; rows];
             Kernel::new(&matrix).apply(w.as_slice(), &mut y);
             let expected = &matrix * &w;
             prop_assert_eq!(y.as_slice(), expected.as_slice());
+            let mut blocks = vec![[f64::NAN; BLOCK]; rows.div_ceil(BLOCK)];
+            SparseKernel::new(&matrix).apply(w.as_slice(), &mut blocks);
+            prop_assert_eq!(&blocks.as_flattened()[..rows], expected.as_slice());
             let parts = matrix.row_iter().map(|row| Dense::of(&row.into_owned().reshape_generic(nalgebra::Dyn(1), nalgebra::Dyn(columns))));
             let parts: Vec<Dense> = parts.collect();
             let kernel = Kernel::stacked(&parts.iter().collect::<Vec<_>>()).map(|v| 2.0 * v);

@@ -6,7 +6,7 @@ use super::kernel::Kernel;
 /// Spans of a mode that are known at most.
 const MOST: usize = 32;
 /// A span is prepared when it is met so often: before, that is more work than it spares.
-const PATIENCE: u32 = 8;
+const PATIENCE: u32 = 16;
 
 /// The flow over one span. Its time differs from that of a span it stands for by roundings, of which the first order is taken along.
 #[derive(Debug, Clone)]

@@ -1,6 +1,6 @@
 //! Taylor's series of a mode's flow, w(t + s·dt) = Σ (𝒜 dt)^k w/k! · s^k: what tables of exponentials do not cover.
 
-use super::kernel::{BLOCK, Block, Kernel};
+use super::kernel::{BLOCK, Block, SparseKernel};
 
 /// Highest degree; where ‖𝒜‖ dt ≤ 1 the rest is below rounding.
 pub(crate) const MAX_DEGREE: usize = 20;
@@ -20,7 +20,7 @@ pub(crate) struct Series {
 
 impl Series {
     /// The terms for `dt` from w on, w' = 𝒜 w.
-    pub(crate) fn expand(&mut self, generator: &Kernel, w: &[f64], dt: f64) {
+    pub(crate) fn expand(&mut self, generator: &SparseKernel, w: &[f64], dt: f64) {
         let blocks = w.len().div_ceil(BLOCK);
         self.blocks = blocks;
         self.terms.resize((MAX_DEGREE + 1) * blocks, [0.0; BLOCK]);
@@ -35,7 +35,7 @@ impl Series {
         for k in 1..=MAX_DEGREE {
             let (known, rest) = self.terms.split_at_mut(k * blocks);
             let term = &mut rest[..blocks];
-            generator.apply_padded(known[(k - 1) * blocks..].as_flattened(), term);
+            generator.apply(known[(k - 1) * blocks..].as_flattened(), term);
             let nothing = settle(term, &mut self.largest, dt / k as f64);
             if nothing && nothing_before {
                 self.degree = k;
@@ -132,7 +132,7 @@ mod tests {
             let start: Vec<f64> = (0..dim).map(|i| [1.0, 0.0][i % 2]).collect();
             let (mut series, mut w) = (Series::default(), vec![0.0; dim]);
             let dt = 1.0 / pairs as f64;
-            series.expand(&Kernel::new(&a), &start, dt);
+            series.expand(&SparseKernel::new(&a), &start, dt);
             assert!((14..=MAX_DEGREE).contains(&series.degree()));
             for s in [0.0, 0.3, 1.0] {
                 series.at(s, &mut w);

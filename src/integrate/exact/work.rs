@@ -116,7 +116,9 @@ pub(crate) struct Term {
 #[derive(Debug, Clone)]
 pub(crate) struct Work {
     terms: Vec<Term>,
-    /// v and i of all terms in turn, column by column.
+    /// The components of w that they see.
+    seen: Vec<usize>,
+    /// For each of these the columns of v and i of all terms in turn.
     factors: Vec<f64>,
     /// Their values at the points of a quadrature.
     at_nodes: Vec<f64>,
@@ -169,8 +171,10 @@ impl Work {
             .collect();
         let dim = terms.first()?.v.len();
         let column = |j: usize| terms.iter().flat_map(move |term| [term.v[j], term.i[j]]);
+        let seen: Vec<usize> = (0..dim).filter(|&j| column(j).any(|f| f != 0.0)).collect();
         Some(Self {
-            factors: (0..dim).flat_map(column).collect(),
+            factors: seen.iter().flat_map(|&j| column(j)).collect(),
+            seen,
             at_nodes: Vec::new(),
             terms,
             unit: h * (-f64::from(bottom)).exp2(),
@@ -275,7 +279,7 @@ impl Work {
         self.at_nodes.clear();
         self.at_nodes.resize(P * factors, 0.0);
         let (values, _) = self.at_nodes.as_chunks_mut::<P>();
-        for (j, column) in self.factors.chunks_exact(factors).enumerate() {
+        for (&j, column) in self.seen.iter().zip(self.factors.chunks_exact(factors)) {
             // w_j at the nodes, then its part of the factors.
             let w = series.component(j, s);
             for (value, &factor) in values.iter_mut().zip(column) {
@@ -513,6 +517,7 @@ impl Doubling {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::integrate::exact::kernel::SparseKernel;
 
     fn sizes(amplitude: &[f64]) -> Sizes<'_> {
         Sizes {
@@ -554,7 +559,7 @@ mod tests {
             (2e-4 * h, 0.7),
         ] {
             let mut series = Series::default();
-            series.expand(&Kernel::new(&a), &[3.0], dt);
+            series.expand(&SparseKernel::new(&a), &[3.0], dt);
             let (degree, t) = (series.degree(), part * dt);
             rules[usize::from(degree > SHORT) + usize::from(degree > MIDDLE)] = true;
             let [source, dissipated] = work.along_series(&series, part, t);
