@@ -3,7 +3,7 @@
 
     cargo build --release && tests/reference/precision.py [CIRC] [NETLIST...]     CIRC: default target/release/circ
 
-Each netlist is measured by `circ bench FILE --against ngspice`. ngspice's best setting is the cheapest of its ladder (print
+Each netlist is measured by `circ bench FILE --against ngspice`. ngspice's best setting is the cheapest of its ladder (largest
 steps, `reltol`, `gear` and `trap`, four realisations of the diode) with an RMS error of at most 1e-4; where none gets there, its most
 accurate one, marked so. It has a row for each of its steps; where they are ten print steps long circ's exact run has its rows there too. Times are user CPU seconds: of circ the solve with its set-up and energy balance, of ngspice the process
 less its start-up. Runs of milliseconds are too short to time: those netlists are simulated over several times their span. With the PyPI package `pulsim` installed its fixed-step solver runs on two of the circuits too.
