@@ -3,8 +3,7 @@
 
 use nalgebra::DMatrix;
 
-/// Rows held together: four independent accumulators keep the adders of any x86-64 or ARM64 core busy.
-const BLOCK: usize = 4;
+use super::kernel::{BLOCK, Block};
 
 /// A matrix in blocks of four rows, column by column; rows beyond the last are zero.
 #[derive(Debug, Clone, Default)]
@@ -13,7 +12,7 @@ pub(super) struct Dense {
     columns: usize,
     /// Blocks in a column.
     blocks: usize,
-    data: Vec<[f64; BLOCK]>,
+    data: Vec<Block>,
 }
 
 impl Dense {
