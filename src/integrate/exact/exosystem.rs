@@ -260,14 +260,14 @@ impl Exosystem {
     pub(crate) fn envelope(&self, z: &[f64], sizes: &mut [f64]) {
         for (k, size) in sizes.iter_mut().enumerate() {
             let wave = |k: usize| self.columns.get(k) == Some(&Column::Quadrature);
-            let partner = if wave(k) {
-                z[k - 1]
+            let whole = if wave(k) {
+                z[k].hypot(z[k - 1])
             } else if wave(k + 1) {
-                z[k + 1]
+                z[k].hypot(z[k + 1])
             } else {
-                0.0
+                z[k].abs()
             };
-            *size = size.max(z[k].hypot(partner));
+            *size = size.max(whole);
         }
     }
 

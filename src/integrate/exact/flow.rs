@@ -33,6 +33,9 @@ pub(crate) struct Flow {
     rows_kernel: Kernel,
     /// |[𝒢; 𝒢𝒜]|.
     sizes_kernel: Kernel,
+    /// The noise of g and g' at these amplitudes of w.
+    noise: Vec<f64>,
+    amplitude: Vec<f64>,
     /// 𝒢 row by row.
     guard_rows: Vec<f64>,
     h: f64,
@@ -85,6 +88,8 @@ impl Flow {
             generator,
             sizes_kernel: rows_kernel.map(f64::abs),
             rows_kernel,
+            noise: Vec::new(),
+            amplitude: Vec::new(),
             guard_rows: guards.transpose().as_slice().to_vec(),
             rows,
             h,
@@ -279,12 +284,23 @@ impl Flow {
     }
 
     /// Rounding noise of g and g' where |w| ≤ `amplitude`.
-    pub(crate) fn noise(&self, amplitude: &[f64], floors: &mut Vec<f64>) {
-        floors.resize(2 * self.guards, 0.0);
-        self.sizes_kernel.apply(amplitude, floors);
-        for floor in floors {
-            *floor *= NOISE * f64::EPSILON;
+    pub(crate) fn noise(&mut self, amplitude: &[f64]) -> &[f64] {
+        if self.amplitude != amplitude {
+            self.amplitude.clear();
+            self.amplitude.extend_from_slice(amplitude);
+            self.noise.resize(2 * self.guards, 0.0);
+            self.sizes_kernel.apply(amplitude, &mut self.noise);
+            for noise in &mut self.noise {
+                *noise *= NOISE * f64::EPSILON;
+            }
         }
+        &self.noise
+    }
+
+    /// `sizes` = |𝒢| |w|.
+    pub(crate) fn sizes_of_guards(&self, w: &[f64], sizes: &mut Vec<f64>) {
+        sizes.resize(self.guards, 0.0);
+        self.sizes_kernel.apply_first(self.guards, w, sizes);
     }
 
     /// Taylor's series for `dt` ≤ h/2^K from w on.

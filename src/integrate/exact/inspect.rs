@@ -24,14 +24,12 @@ pub(crate) enum Finding {
     Holds(Vec<usize>),
 }
 
-/// Work space of inspections; after one, `x` is the state in the inspected mode.
+/// Work space of inspections; after one, `w` stands in the inspected mode.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Inspector {
-    /// State in the inspected mode.
-    pub(crate) x: Vec<f64>,
-    /// Amplitudes of x, from those of the storage.
-    pub(crate) amplitude: Vec<f64>,
-    w: Vec<f64>,
+    /// `[w | g | g']` in the inspected mode.
+    pub(crate) w: Vec<f64>,
+    x: Vec<f64>,
     s: Vec<f64>,
     /// w with the sources a few units in the last place of t later, and the storage there.
     later: Vec<f64>,
@@ -43,13 +41,62 @@ pub(crate) struct Inspector {
     jet_sizes: Vec<f64>,
 }
 
+/// How large things were when a mode was last looked at closely.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Familiar {
+    /// Amplitudes of the storage.
+    scale: Vec<f64>,
+    /// Those of x that come of them.
+    pub(crate) amplitude: Vec<f64>,
+    /// |w| up to which `noise` holds; empty before.
+    sizes: Vec<f64>,
+    /// Of each guard.
+    noise: Vec<f64>,
+    /// |w| that the storage's amplitudes have taken account of.
+    reached: Vec<f64>,
+}
+
+impl Familiar {
+    /// Whether the noise holds for w.
+    fn covers(&self, w: &[f64]) -> bool {
+        let mut sizes = w.iter().zip(&self.sizes);
+        self.sizes.len() == w.len() && sizes.all(|(w, size)| w.abs() <= *size)
+    }
+
+    /// How large w was so far, if it has grown by this.
+    pub(crate) fn grown(&mut self, reach: &[f64]) -> Option<&[f64]> {
+        self.reached.resize(reach.len(), 0.0);
+        let grown = reach
+            .iter()
+            .zip(&self.reached)
+            .any(|(now, before)| now > before);
+        for (reached, now) in self.reached.iter_mut().zip(reach) {
+            *reached = reached.max(*now);
+        }
+        grown.then_some(&self.reached)
+    }
+
+    /// Whether all guards are positive by more than noise, where times are known to `time`.
+    fn clear(&self, guards: &[f64], time: f64) -> bool {
+        let (g, slopes) = guards.split_at(self.noise.len());
+        let mut guards = g.iter().zip(slopes).zip(&self.noise);
+        guards.all(|((g, slope), noise)| *g > noise + time * slope.abs())
+    }
+}
+
 impl Inspector {
+    /// Stands at w in `mode` from storage `s`.
+    fn stand(&mut self, mode: &Mode, z: &[f64], s: &[f64]) {
+        mode.state_from(s, &mut self.x);
+        let dim = mode.flow.dim();
+        self.w.resize(dim + 2 * mode.flow.guards(), 0.0);
+        self.w[..mode.n].copy_from_slice(&self.x);
+        self.w[mode.n..dim].copy_from_slice(z);
+    }
+
     /// The storage that `mode` would have after taking over storage `s` by conservation of charge and flux.
     pub(crate) fn project(&mut self, mode: &Mode, z: &[f64], s: &[f64]) -> Option<Vec<f64>> {
-        mode.state_from(s, &mut self.x);
-        self.w.clear();
-        self.w.extend_from_slice(&self.x);
-        self.w.extend_from_slice(z);
+        self.stand(mode, z, s);
         mode.storage.values(&self.w, &mut self.s);
         self.s.iter().all(|v| v.is_finite()).then(|| self.s.clone())
     }
@@ -58,42 +105,56 @@ impl Inspector {
     /// is at z.
     pub(crate) fn inspect(
         &mut self,
-        mode: &Mode,
+        mode: &mut Mode,
         (exosystem, t, z): (&Exosystem, f64, &[f64]),
         s: &[f64],
         scale: &[f64],
     ) -> Finding {
-        mode.state_from(s, &mut self.x);
-        self.w.clear();
-        self.w.extend_from_slice(&self.x);
-        self.w.extend_from_slice(z);
-        mode.storage.values(&self.w, &mut self.s);
+        self.stand(mode, z, s);
         // What the sources move within the resolution of t: at 1 V/ps that is a millivolt where t is a second.
         let time = TIME_ULPS * f64::EPSILON * t.abs();
-        if mode.driven {
-            self.later.clone_from(&self.w);
-            exosystem.write(t + time, &mut self.later[mode.n..]);
-            mode.storage.values(&self.later, &mut self.s_later);
-        } else {
-            self.s_later.clone_from(&self.s);
+        if !mode.keeps {
+            mode.storage.values(&self.w, &mut self.s);
+            if mode.driven {
+                self.later.clone_from(&self.w);
+                exosystem.write(t + time, &mut self.later[mode.n..]);
+                mode.storage.values(&self.later, &mut self.s_later);
+            } else {
+                self.s_later.clone_from(&self.s);
+            }
+            let moved = (0..s.len()).any(|i| {
+                let drift = (self.s_later[i] - self.s[i]).abs();
+                (self.s[i] - s[i]).abs() > CONSISTENT * scale[i] + drift
+            });
+            if moved {
+                return Finding::Inconsistent;
+            }
         }
-        let moved = (0..s.len()).any(|i| {
-            let drift = (self.s_later[i] - self.s[i]).abs();
-            (self.s[i] - s[i]).abs() > CONSISTENT * scale[i] + drift
-        });
-        if moved {
-            return Finding::Inconsistent;
+        if mode.familiar.scale != scale {
+            let familiar = &mut mode.familiar;
+            familiar.scale.clear();
+            familiar.scale.extend_from_slice(scale);
+            mode.inject.largest(scale, &mut familiar.amplitude);
         }
-        mode.inject.largest(scale, &mut self.amplitude);
-        self.sizes.clear();
-        self.sizes.extend(self.w.iter().map(|w| w.abs()));
-        for (size, amplitude) in self.sizes.iter_mut().zip(&self.amplitude) {
+        mode.flow.read_guards(&mut self.w);
+        let (w, guards) = self.w.split_at(mode.flow.dim());
+        let known = mode.familiar.covers(w);
+        if known && mode.constraints.is_empty() && mode.familiar.clear(guards, time) {
+            return Finding::Holds(Vec::new());
+        }
+        let (later, sizes) = (&self.later, &mut self.sizes);
+        sizes.clear();
+        sizes.extend(w.iter().map(|w| w.abs()));
+        for (size, amplitude) in sizes.iter_mut().zip(&mode.familiar.amplitude) {
             *size = size.max(*amplitude);
         }
-        let (w, later, sizes) = (&self.w, &self.later, &self.sizes);
         let broken = mode.constraints.row_iter().any(|row| {
             let value = |w: &[f64]| row.iter().zip(w).map(|(c, w)| c * w).sum::<f64>();
-            let whole: f64 = row.iter().zip(sizes).map(|(c, size)| c.abs() * size).sum();
+            let whole: f64 = row
+                .iter()
+                .zip(&*sizes)
+                .map(|(c, size)| c.abs() * size)
+                .sum();
             let drift = (value(later) - value(w)).abs();
             value(w).abs() > CONSISTENT * whole + drift
         });
@@ -131,6 +192,16 @@ impl Inspector {
                     Owner::Device(_) | Owner::Slide(..) => return Finding::Refused(i),
                 }
             }
+        }
+        if !known {
+            let familiar = &mut mode.familiar;
+            // Waves count with their amplitudes: they come back.
+            exosystem.envelope(z, &mut sizes[mode.n..]);
+            mode.flow.sizes_of_guards(sizes, &mut familiar.noise);
+            for noise in &mut familiar.noise {
+                *noise *= GROUP * f64::EPSILON;
+            }
+            familiar.sizes.clone_from(sizes);
         }
         Finding::Holds(leaving)
     }

@@ -58,6 +58,7 @@ impl Exact<'_> {
         );
         let old = DVector::from_column_slice(&self.storage);
         let gain = 0.5 * (s.dot(&(&self.metric * &s)) - old.dot(&(&self.metric * &old)));
+        self.before = u;
         self.balance.add((source, source - gain));
         let moved = s
             .iter()
@@ -99,7 +100,7 @@ impl Exact<'_> {
             let Some(p) = free.impulse_between(&x, &after, &candidate.closed) else {
                 continue;
             };
-            let mode = &self.plant.modes[at];
+            let mode = &mut self.plant.modes[at];
             if let Finding::Holds(leaving) =
                 self.inspector
                     .inspect(mode, (&self.exosystem, t, &self.z), &s, &self.scale)

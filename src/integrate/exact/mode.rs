@@ -6,6 +6,7 @@ use super::ahead;
 use super::clock::Clock;
 use super::exosystem::Exosystem;
 use super::flow::Flow;
+use super::inspect::Familiar;
 use super::kernel::Kernel;
 use super::rays;
 use super::schedule::Drive;
@@ -129,6 +130,8 @@ pub(crate) struct Mode {
     pub(crate) storage: Map,
     /// Whether storage or constraints follow the sources.
     pub(crate) driven: bool,
+    /// Whether the states are the storage, so that every storage is taken over as it is.
+    pub(crate) keeps: bool,
     /// x = inject · s + inject_one, n×q.
     pub(crate) inject: Map,
     /// n.
@@ -139,6 +142,8 @@ pub(crate) struct Mode {
     pub(crate) rows: ahead::Rows,
     /// Whether devices share currents or voltages that the ideal model does not determine.
     pub(crate) shared: bool,
+    /// See [`Inspector`](super::inspect::Inspector).
+    pub(crate) familiar: Familiar,
 }
 
 /// Rows over [x | u | u' | 1] as rows over w, with u = H z and u' = H S z.
@@ -300,6 +305,10 @@ impl Mode {
         let mut ones = storage.column_mut(n);
         ones += &map.one;
 
+        let driven = rows > 0 || map.u.iter().any(|u| *u != 0.0);
+        let whole = (&map.x * &map.inject).is_identity(0.0);
+        let keeps = whole && !driven && map.one.iter().chain(&map.inject_one).all(|v| *v == 0.0);
+
         Some(Self {
             key,
             n,
@@ -307,13 +316,15 @@ impl Mode {
             device_guards,
             guarded_switches,
             constraints,
-            driven: rows > 0 || map.u.iter().any(|u| *u != 0.0),
+            driven,
+            keeps,
             storage: Map::new(&storage),
             inject: Map::new(&map.inject),
             inject_one: map.inject_one.clone(),
             outputs: Kernel::new(&over_w(&lcs.outputs.rows, n, exosystem)),
             rows: ahead::Rows::new(lcs.outputs.names.len(), dim),
             shared,
+            familiar: Familiar::default(),
             flow,
         })
     }

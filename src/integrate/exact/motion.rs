@@ -78,7 +78,7 @@ pub(crate) struct Motion {
     floors: Vec<f64>,
     /// How far below zero each guard was on entry, by rounding of the time or of simultaneous events.
     slack: Vec<f64>,
-    /// Steps of the output grid are short enough from here on.
+    /// See [`Self::settles`].
     pub(crate) steady: bool,
     /// No long step goes beyond, s: there one ended that was not clear.
     barrier: f64,
@@ -96,34 +96,30 @@ impl Motion {
         }
     }
 
-    /// Enters a mode at `t` with state `x` of amplitudes `amplitude` and the exosystem at z.
+    /// Enters a mode at `t` at `[w | g | g']`, with amplitudes `amplitude` of the state.
     pub(crate) fn enter(
         &mut self,
-        flow: &Flow,
-        (exosystem, z): (&Exosystem, &[f64]),
+        flow: &mut Flow,
+        exosystem: &Exosystem,
         t: f64,
-        x: &[f64],
+        w: &[f64],
         amplitude: &[f64],
     ) {
-        let length = flow.dim() + 2 * flow.guards();
+        let (n, dim) = (amplitude.len(), flow.dim());
         self.t = t;
         self.entered = t;
         self.now.clear();
-        self.now.resize(length, 0.0);
-        self.next.clear();
-        self.next.resize(length, 0.0);
-        self.now[..x.len()].copy_from_slice(x);
-        self.now[x.len()..flow.dim()].copy_from_slice(z);
-        flow.read_guards(&mut self.now);
+        self.now.extend_from_slice(w);
+        self.next.resize(w.len(), 0.0);
         self.peak.clear();
-        self.peak.extend(x.iter().map(|v| v.abs()));
+        self.peak.extend(w[..n].iter().map(|v| v.abs()));
         self.amplitude.clear();
         self.amplitude.extend_from_slice(amplitude);
-        self.amplitude.resize(flow.dim(), 0.0);
-        exosystem.envelope(z, &mut self.amplitude[x.len()..]);
+        self.amplitude.resize(dim, 0.0);
+        exosystem.envelope(&w[n..dim], &mut self.amplitude[n..]);
         self.steady = flow.guards() == 0;
         self.barrier = f64::INFINITY;
-        let guards = &self.now[flow.dim()..flow.dim() + flow.guards()];
+        let guards = &w[dim..dim + flow.guards()];
         self.slack.clear();
         self.slack.extend(guards.iter().map(|g| (-g).max(0.0)));
         self.refresh_noise(flow);
@@ -147,12 +143,13 @@ impl Motion {
         }
     }
 
-    fn refresh_noise(&mut self, flow: &Flow) {
+    fn refresh_noise(&mut self, flow: &mut Flow) {
         self.note_peak();
         for (a, v) in self.amplitude.iter_mut().zip(&self.now) {
             *a = larger(*a, v.abs());
         }
-        flow.noise(&self.amplitude, &mut self.floors);
+        self.floors.clear();
+        self.floors.extend_from_slice(flow.noise(&self.amplitude));
         for (floor, slack) in self.floors.iter_mut().zip(&self.slack) {
             *floor += slack;
         }
@@ -171,16 +168,14 @@ impl Motion {
     /// Moves to `stop` or to the first guard that falls through zero before it.
     #[inline]
     pub(crate) fn travel(&mut self, flow: &mut Flow, exosystem: &Exosystem, stop: f64) -> Arrival {
-        if self.steady {
-            let off = stop - self.t - flow.step(LONG);
-            if off.abs() <= GRID_ULPS * f64::EPSILON * stop.abs() {
-                if !flow.leap(LONG, &self.now, &mut self.next) {
-                    return Arrival::Overflow;
-                }
-                if self.judge(flow, flow.step(LONG)) == Verdict::Clear {
-                    self.accept(flow, exosystem, LONG, stop);
-                    return Arrival::Reached;
-                }
+        let off = stop - self.t - flow.step(LONG);
+        if off.abs() <= GRID_ULPS * f64::EPSILON * stop.abs() && self.settles(flow) {
+            if !flow.leap(LONG, &self.now, &mut self.next) {
+                return Arrival::Overflow;
+            }
+            if self.judge(flow, flow.step(LONG)) == Verdict::Clear {
+                self.accept(flow, exosystem, LONG, stop);
+                return Arrival::Reached;
             }
         }
         self.crawl(flow, exosystem, stop)
@@ -247,10 +242,14 @@ impl Motion {
                 return arrival;
             }
         }
-        if !self.steady && flow.step_limit(self.t - self.entered) >= flow.step(LONG) {
-            self.steady = true;
-        }
+        self.settles(flow);
         Arrival::Reached
+    }
+
+    /// Whether steps of the output grid are short enough from here on.
+    fn settles(&mut self, flow: &Flow) -> bool {
+        self.steady |= flow.step_limit(self.t - self.entered) >= flow.step(LONG);
+        self.steady
     }
 
     /// One step to `stop` if that span recurs and nothing happens on it.
@@ -472,7 +471,7 @@ impl Motion {
 
     /// Stands at `next` and t; what the exosystem accumulates counts as that of so many steps.
     #[inline]
-    fn take_next(&mut self, flow: &Flow, exosystem: &Exosystem, t: f64, steps: u32) {
+    fn take_next(&mut self, flow: &mut Flow, exosystem: &Exosystem, t: f64, steps: u32) {
         std::mem::swap(&mut self.now, &mut self.next);
         self.note_peak();
         self.t = t;

@@ -6,7 +6,6 @@ use super::mode::Key;
 use super::stepper::Exact;
 use super::transition::Trigger;
 use crate::integrate::Energy;
-use crate::integrate::energy::Balance;
 use crate::integrate::run::{Log, Reason, SimError};
 
 /// Where one method leaves a run and another goes on.
@@ -20,15 +19,6 @@ pub(crate) struct Place {
     pub(crate) switches: Vec<bool>,
 }
 
-/// The run before a change of mode.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Before {
-    pub(super) storage: Vec<f64>,
-    pub(super) scale: Vec<f64>,
-    pub(super) switches: Vec<bool>,
-    pub(super) balance: Balance,
-}
-
 impl Exact<'_> {
     /// Ends in the present mode and tells where the run stands.
     pub(crate) fn leave(&mut self) -> Place {
@@ -39,7 +29,10 @@ impl Exact<'_> {
         Place {
             t: self.motion.t,
             storage: DVector::from_column_slice(&self.storage),
-            switches: self.before_change.switches.clone(),
+            switches: self
+                .wanted
+                .take()
+                .unwrap_or_else(|| self.key.switches.clone()),
         }
     }
 
@@ -61,7 +54,7 @@ impl Exact<'_> {
             clock.stand_at(&self.sources, place.t);
             switches[i] = self.plant.thresholds[i].position(switches[i], clock.control(place.t));
         }
-        self.remember_inputs();
+        self.exosystem.write(place.t, &mut self.z);
         self.left_here.clear();
         self.instant = place.t;
         let mut key = Key {

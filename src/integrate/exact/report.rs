@@ -26,7 +26,7 @@ impl Exact<'_> {
         jumped: bool,
         log: &mut Log,
     ) -> Result<(), SimError> {
-        let changed = self.started && self.plant.modes[at].key != self.key;
+        let changed = self.started && self.mode != Some(at);
         let mut words = None;
         if changed {
             let pair = (self.mode.unwrap_or(at), at);

@@ -13,7 +13,6 @@ use super::exosystem::Exosystem;
 use super::inspect::Inspector;
 use super::mode::{Key, Owner};
 use super::motion::{Arrival, Motion};
-use super::pause::Before;
 use super::plant::Plant;
 use super::report::Slides;
 use super::schedule::drives;
@@ -62,14 +61,16 @@ pub struct Exact<'a> {
     pub(super) storage: Vec<f64>,
     /// Largest values of the storage elements so far, levelled by kind.
     pub(super) scale: Vec<f64>,
+    /// ½ sᵀ M s of these, J.
+    pub(super) capacity: f64,
     /// How large the storage can have been since the last event.
     reach: Vec<f64>,
     pub(super) volts: Vec<bool>,
-    /// What a change that fails gives back, and where the switches would have stood after it.
-    pub(super) before_change: Before,
+    /// Where the switches would stand after a change that failed.
+    pub(super) wanted: Option<Vec<bool>>,
     /// z at the last change or breakpoint.
     pub(super) z: Vec<f64>,
-    /// u before the last breakpoint.
+    /// u before a jump.
     pub(super) before: DVector<f64>,
     /// What the log says about a change from one mode to another.
     pub(super) labels: BTreeMap<(usize, usize), Arc<str>>,
@@ -86,6 +87,8 @@ pub struct Exact<'a> {
     pub(super) until: f64,
     pub(super) ahead: Ahead,
     pub(super) started: bool,
+    /// When the next piece of a source ends, s.
+    next_piece: f64,
     /// The next time at which something is known to happen, s.
     next_stop: f64,
     pub(super) settings: Settings,
@@ -179,9 +182,10 @@ impl<'a> Exact<'a> {
             key,
             storage: start.as_slice().to_vec(),
             scale: vec![0.0; start.len()],
+            capacity: 0.0,
             reach: vec![],
             volts,
-            before_change: Before::default(),
+            wanted: None,
             z,
             before: DVector::zeros(sources_count),
             labels: BTreeMap::new(),
@@ -194,6 +198,7 @@ impl<'a> Exact<'a> {
             until,
             ahead: Ahead::default(),
             started: false,
+            next_piece: f64::NEG_INFINITY,
             next_stop: f64::NEG_INFINITY,
             settings,
             energy,
@@ -222,6 +227,7 @@ impl<'a> Exact<'a> {
         for (&volts, scale) in self.volts.iter().zip(&mut self.scale) {
             *scale = largest[usize::from(volts)];
         }
+        self.capacity = stored(&self.metric, &self.scale);
     }
 
     fn ulps(&self) -> f64 {
@@ -239,6 +245,16 @@ impl<'a> Exact<'a> {
         self.exosystem.output() * z
     }
 
+    /// u in the mode that is left; that of the present pieces where there is none.
+    pub(super) fn inputs_before(&self) -> DVector<f64> {
+        let Some(at) = self.mode else {
+            return self.inputs(self.motion.t);
+        };
+        let n = self.plant.modes[at].n;
+        let z = &self.motion.now[n..n + self.exosystem.dim()];
+        self.exosystem.output() * DVector::from_column_slice(z)
+    }
+
     /// Reads the storage vector at the current state.
     pub(super) fn take_storage(&mut self) {
         if let Some(at) = self.mode {
@@ -247,18 +263,15 @@ impl<'a> Exact<'a> {
             self.balance.add((source, dissipated));
             mode.storage.values(&self.motion.now, &mut self.storage);
             // An event often finds a current at zero: its size is what it was on the way.
-            mode.storage.largest(self.motion.reach(), &mut self.reach);
-            for (scale, reach) in self.scale.iter_mut().zip(&self.reach) {
-                *scale = scale.max(*reach);
+            if let Some(reach) = mode.familiar.grown(self.motion.reach()) {
+                mode.storage.largest(reach, &mut self.reach);
+                for (scale, reach) in self.scale.iter_mut().zip(&self.reach) {
+                    *scale = scale.max(*reach);
+                }
+                self.rescale();
             }
-            self.rescale();
             self.note_stored();
         }
-    }
-
-    /// Energy that the run is about over its duration, W.
-    pub(super) fn power(&self) -> f64 {
-        stored(&self.metric, &self.scale).max(self.balance.largest()) / self.duration
     }
 
     /// Notes the stored energy.
@@ -293,7 +306,7 @@ impl<'a> Exact<'a> {
             }
         }
         fire(&self.plant.thresholds, &mut key.switches);
-        self.remember_inputs();
+        self.exosystem.write(self.motion.t, &mut self.z);
         self.change_to(key, discontinuous, Trigger::Guard(guard), log)
     }
 
@@ -325,36 +338,12 @@ impl<'a> Exact<'a> {
         self.left_here.push(from);
     }
 
-    /// Keeps u as it is now, for the work of sources in a jump.
-    pub(super) fn remember_inputs(&mut self) {
-        self.exosystem.write(self.motion.t, &mut self.z);
-        let h = self.exosystem.output();
-        for (u, row) in self.before.iter_mut().zip(h.row_iter()) {
-            *u = row.iter().zip(&self.z).map(|(h, z)| h * z).sum();
-        }
-    }
-
     /// Sources reach breakpoints, driven switches move.
     fn breakpoint(&mut self, log: &mut Log) -> Result<(), SimError> {
         let t = self.motion.t;
         let near = t + self.ulps();
         self.take_storage();
-        self.remember_inputs();
-        let mut edge = false;
-        for i in 0..self.sources.len() {
-            let old = self.exosystem.piece(i);
-            let end = old.end;
-            if end <= near {
-                let last = old.value(end);
-                let Some(piece) = self.sources[i].piece(end.max(t)) else {
-                    return Err(
-                        self.fail(Reason::Unsupported("a source lost its closed form".into()))
-                    );
-                };
-                edge |= last != piece.value(end);
-                self.exosystem.set_piece(i, piece);
-            }
-        }
+        let mut edge = self.next_piece <= near && self.take_pieces(near)?;
         let mut key = self.take_key();
         self.exosystem.write(t, &mut self.z);
         for drive in &self.plant.drives {
@@ -388,10 +377,30 @@ impl<'a> Exact<'a> {
         self.change_to(key, edge, Trigger::Sources, log)
     }
 
+    /// Sources whose pieces end go on along the next ones; returns whether one of them jumps.
+    fn take_pieces(&mut self, near: f64) -> Result<bool, SimError> {
+        let mut edge = false;
+        for i in 0..self.sources.len() {
+            let old = self.exosystem.piece(i);
+            let end = old.end;
+            if end <= near {
+                let last = old.value(end);
+                let Some(piece) = self.sources[i].piece(end.max(self.motion.t)) else {
+                    return Err(
+                        self.fail(Reason::Unsupported("a source lost its closed form".into()))
+                    );
+                };
+                edge |= last != piece.value(end);
+                self.exosystem.set_piece(i, piece);
+            }
+        }
+        Ok(edge)
+    }
+
     /// When the driven switches move next on the present pieces, and what is known to happen first.
     pub(super) fn look_ahead(&mut self) {
         let end = self.exosystem.next_breakpoint();
-        self.next_stop = end;
+        (self.next_piece, self.next_stop) = (end, end);
         for drive in &mut self.plant.drives {
             let i = drive.switch;
             let threshold = &self.plant.thresholds[i];
@@ -414,7 +423,7 @@ impl<'a> Exact<'a> {
     }
 
     fn start(&mut self, log: &mut Log) -> Result<(), SimError> {
-        self.remember_inputs();
+        self.exosystem.write(self.motion.t, &mut self.z);
         let key = self.take_key();
         self.change_to(key, true, Trigger::Sources, log)?;
         self.started = true;
@@ -424,11 +433,9 @@ impl<'a> Exact<'a> {
 
 /// ½ sᵀ M s.
 fn stored(metric: &DMatrix<f64>, s: &[f64]) -> f64 {
-    let columns = metric.column_iter().zip(s);
+    let columns = metric.as_slice().chunks_exact(s.len().max(1)).zip(s);
     let rows = |column: &[f64]| column.iter().zip(s).map(|(m, s)| m * s).sum::<f64>();
-    0.5 * columns
-        .map(|(column, s)| s * rows(column.as_slice()))
-        .sum::<f64>()
+    0.5 * columns.map(|(column, s)| s * rows(column)).sum::<f64>()
 }
 
 impl Stepper for Exact<'_> {

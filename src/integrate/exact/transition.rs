@@ -1,7 +1,7 @@
 //! From one mode to the next: positions of the switches, impulse of the devices, conducting devices.
 
-use super::inspect::{Finding, Inspector};
-use super::mode::{Key, Owner};
+use super::inspect::Finding;
+use super::mode::{Key, Mode, Owner};
 use super::schedule::Drive;
 use super::stepper::Exact;
 use crate::integrate::run::{Log, Reason, SimError};
@@ -36,46 +36,55 @@ impl Exact<'_> {
         trigger: Trigger,
         log: &mut Log,
     ) -> Result<(), SimError> {
-        let before = &mut self.before_change;
-        before.storage.clone_from(&self.storage);
-        before.scale.clone_from(&self.scale);
-        before.switches.clone_from(&key.switches);
-        before.balance = self.balance;
+        self.wanted = None;
+        let left_row = (log.wants_rows() && self.started).then(|| {
+            self.read_row();
+            self.row.clone()
+        });
+        // Most changes are like one before.
+        let followed = self.follow(key, trigger);
+        if let Some((at, leaving)) = &followed
+            && self.leaving(*at, leaving).is_empty()
+        {
+            let at = *at;
+            return self.enter(at, false, trigger, left_row, log);
+        }
+        let (storage, scale) = (self.storage.clone(), self.scale.clone());
+        let (balance, switches) = (self.balance, key.switches.clone());
         let (events, impulses) = (log.events.len(), log.impulses.len());
-        let result = self.enter(key, discontinuous, trigger, log);
+        self.before = self.inputs_before();
+        let found = self.search(key, discontinuous, trigger, followed, log);
+        let result = found.and_then(|(at, jumped)| self.enter(at, jumped, trigger, left_row, log));
         if result.is_err() {
-            self.storage.clone_from(&self.before_change.storage);
-            self.scale.clone_from(&self.before_change.scale);
-            self.balance = self.before_change.balance;
+            (self.storage, self.scale) = (storage, scale);
+            (self.balance, self.wanted) = (balance, Some(switches));
             log.back_to(events, impulses);
-        } else {
-            self.before_change.switches.clone_from(&self.key.switches);
         }
         result
     }
 
-    /// Finds the mode: positions of the switches, impulse of the devices, conducting devices.
-    fn enter(
+    /// Finds the mode and whether the state jumps into it: positions of the switches, impulse of the devices, conducting devices.
+    /// `followed` is what [`Self::follow`] found.
+    fn search(
         &mut self,
         key: &mut Key,
         mut discontinuous: bool,
         trigger: Trigger,
+        followed: Option<(usize, Vec<usize>)>,
         log: &mut Log,
-    ) -> Result<(), SimError> {
-        let t = self.motion.t;
-        let wants_rows = log.wants_rows();
-        if wants_rows && self.started {
-            self.read_row();
-        }
-        let left_row = (wants_rows && self.started).then(|| self.row.clone());
+    ) -> Result<(usize, bool), SimError> {
         let mut jumped = false;
         let mut positions: Vec<Vec<bool>> = Vec::new();
         let mut closed_sets: Vec<Vec<bool>> = Vec::new();
         let mut entry = None;
         let mut moving: Vec<usize> = Vec::new();
+        let mut followed = Some(followed);
         for _ in 0..3 + 2 * self.plant.thresholds.len() {
             // A device event in a convex circuit is continuous; an edge or a switch may need an impulse.
-            let mut found = self.follow(key, trigger);
+            let mut found = match followed.take() {
+                Some(found) => found,
+                None => self.follow(key, trigger),
+            };
             if found.is_none() && !discontinuous {
                 found = self.find_mode(key, trigger)?;
             }
@@ -92,15 +101,12 @@ impl Exact<'_> {
                 found = self.jump_into(key, log)?;
                 jumped |= found.is_some();
             }
-            let Some((at, mut leaving)) = found else {
+            let Some((at, leaving)) = found else {
                 let device = self.culprit(key, trigger);
                 return Err(self.fail(Reason::Infeasible).device(device));
             };
             key.closed.clone_from(&self.plant.modes[at].key.closed);
-            leaving.extend(self.misplaced(at));
-            leaving.extend(self.let_go(at));
-            leaving.sort_unstable();
-            leaving.dedup();
+            let leaving = self.leaving(at, &leaving);
             if leaving.is_empty() {
                 entry = Some(at);
                 break;
@@ -123,15 +129,27 @@ impl Exact<'_> {
             }
             discontinuous = true;
         }
-        let Some(at) = entry else {
+        let at = entry.ok_or_else(|| {
             let names: Vec<&str> = moving
                 .iter()
                 .map(|&i| self.plant.thresholds[i].name.as_str())
                 .collect();
-            return Err(self
-                .fail(Reason::SwitchesDoNotSettle)
-                .device(names.join(", ")));
-        };
+            self.fail(Reason::SwitchesDoNotSettle)
+                .device(names.join(", "))
+        })?;
+        Ok((at, jumped))
+    }
+
+    /// Enters mode `at`, which was inspected last.
+    fn enter(
+        &mut self,
+        at: usize,
+        jumped: bool,
+        trigger: Trigger,
+        left_row: Option<Vec<f64>>,
+        log: &mut Log,
+    ) -> Result<(), SimError> {
+        let t = self.motion.t;
         if let (Some(from), false) = (self.mode, jumped) {
             self.remember((from, trigger, at));
         }
@@ -139,14 +157,18 @@ impl Exact<'_> {
         self.report(at, jumped, log)?;
         self.note_slides(at);
         self.mode = Some(at);
-        self.key.copy_from(&self.plant.modes[at].key);
+        let Mode {
+            key,
+            flow,
+            familiar,
+            ..
+        } = &mut self.plant.modes[at];
+        self.key.copy_from(key);
         if self.energy {
-            self.motion.power = self.power();
+            self.motion.power = self.capacity.max(self.balance.largest()) / self.duration;
         }
-        let mode = &self.plant.modes[at];
-        let Inspector { x, amplitude, .. } = &self.inspector;
-        let sources = (&self.exosystem, &self.z[..]);
-        self.motion.enter(&mode.flow, sources, t, x, amplitude);
+        let (w, amplitude) = (&self.inspector.w, &familiar.amplitude);
+        self.motion.enter(flow, &self.exosystem, t, w, amplitude);
         self.look_ahead();
         if jumped {
             self.jumps += 1;
@@ -164,34 +186,43 @@ impl Exact<'_> {
         Ok(())
     }
 
+    /// Switches that cannot stay as they are in mode `at`, `guards` those whose guards fall.
+    fn leaving(&self, at: usize, guards: &[usize]) -> Vec<usize> {
+        let mut leaving = guards.to_vec();
+        leaving.extend(self.misplaced(at));
+        leaving.extend(self.let_go(at));
+        leaving.sort_unstable();
+        leaving.dedup();
+        leaving
+    }
+
     /// Switches that the sources alone move in mode `at` and that cannot stay as they are: in another position the control
     /// was another one.
-    fn misplaced(&self, at: usize) -> Vec<usize> {
+    fn misplaced(&self, at: usize) -> impl Iterator<Item = usize> {
         let mode = &self.plant.modes[at];
-        let wrong = |i: usize, drive: &Drive| {
+        let wrong = move |i: usize, drive: &Drive| {
             let on = mode.key.switches[i];
             drive.misplaced(&self.plant.thresholds[i], on, self.motion.t, &self.z)
         };
         let drives = self.plant.drives.iter().map(|drive| (drive.switch, drive));
         drives
-            .filter(|(i, drive)| {
+            .filter(move |(i, drive)| {
                 !mode.guarded_switches.contains(i)
                     && !mode.key.sliding.iter().any(|s| s.0 == *i)
                     && wrong(*i, drive)
             })
             .map(|(i, _)| i)
-            .collect()
     }
 
     /// Thyristors that hold themselves in mode `at` although their valves block.
-    fn let_go(&self, at: usize) -> Vec<usize> {
+    fn let_go(&self, at: usize) -> impl Iterator<Item = usize> {
         let Key {
             closed, switches, ..
         } = &self.plant.modes[at].key;
         let blocks = |i: usize| self.plant.valves[i].is_some_and(|pair| !closed[pair]);
         let thresholds = self.plant.thresholds.iter().enumerate();
         let holding = thresholds.filter(|(i, t)| t.holds(switches[*i], switches));
-        holding.map(|(i, _)| i).filter(|&i| blocks(i)).collect()
+        holding.map(|(i, _)| i).filter(move |&i| blocks(i))
     }
 
     /// The device or switches at which no mode goes on.
@@ -410,7 +441,7 @@ impl Exact<'_> {
 
     fn inspect(&mut self, at: usize) -> Finding {
         self.inspector.inspect(
-            &self.plant.modes[at],
+            &mut self.plant.modes[at],
             (&self.exosystem, self.motion.t, &self.z),
             &self.storage,
             &self.scale,
