@@ -398,7 +398,9 @@ pub fn run(stepper: &mut dyn Stepper, frame: Frame<'_>, mut log: Log) -> Result<
             log.grid_rows(&times, k..k + 1, &row)?;
             let ahead = stepper.rows_ahead(&times, k + 1);
             let after = k + 1 + ahead.len() / row.len().max(1);
-            log.grid_rows(&times, k + 1..after, ahead)?;
+            if after > k + 1 {
+                log.grid_rows(&times, k + 1..after, ahead)?;
+            }
             Ok(after)
         });
         match advanced {

@@ -1,5 +1,7 @@
 //! From a circuit, or a system, to a run.
 
+use std::cell::RefCell;
+
 use cpu_time::ThreadTime;
 use nalgebra::DVector;
 
@@ -95,6 +97,7 @@ pub fn simulate(
             .collect(),
         start: initial.storage,
         notes,
+        known: RefCell::default(),
         original: behaviour,
         behaviour: standard,
     };
@@ -121,6 +124,7 @@ pub fn simulate_system(
         settle: vec![],
         start,
         notes: vec![],
+        known: RefCell::default(),
         original: &original,
         behaviour,
     };
@@ -154,6 +158,8 @@ struct Problem<'a> {
     /// Storage vector s⁻ before the start.
     start: DVector<f64>,
     notes: Vec<String>,
+    /// See [`Problem::free`].
+    known: RefCell<Vec<(Vec<bool>, Lcs)>>,
 }
 
 /// Steps of the run that finds the amplitudes beforehand.
@@ -172,8 +178,15 @@ impl Problem<'_> {
             .map_err(|error| SimError::before(Reason::Circuit(error.to_string())))
     }
 
+    /// The system of a position with all devices free.
     fn free(&self, switches: &[bool]) -> Result<Lcs, SimError> {
-        self.reduce(&vec![Hold::Free; self.behaviour.pairs.len()], switches)
+        let mut known = self.known.borrow_mut();
+        if let Some((_, lcs)) = known.iter().find(|(position, _)| position == switches) {
+            return Ok(lcs.clone());
+        }
+        let lcs = self.reduce(&vec![Hold::Free; self.behaviour.pairs.len()], switches)?;
+        known.push((switches.to_vec(), lcs.clone()));
+        Ok(lcs)
     }
 
     fn thresholds(&self) -> Vec<Threshold> {
@@ -231,11 +244,12 @@ impl Problem<'_> {
     fn choose_roles(&mut self, tran: &Tran) -> Result<Lcs, SimError> {
         let lcs = self.free(&self.position)?;
         if roles::doubtful(&lcs, tran.tstop) {
-            let first = self.behaviour.in_other_roles();
-            let first = std::mem::replace(&mut self.behaviour, first);
+            let other = self.behaviour.in_other_roles();
+            let first = std::mem::replace(&mut self.behaviour, other);
+            let known = self.known.take();
             match self.free(&self.position) {
                 Ok(other) if roles::better(&lcs, &other) => return Ok(other),
-                _ => self.behaviour = first,
+                _ => (self.behaviour, self.known) = (first, RefCell::new(known)),
             }
         }
         Ok(lcs)

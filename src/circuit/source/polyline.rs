@@ -52,6 +52,27 @@ pub(super) fn pulse_corners(
     corners
 }
 
+/// One lap on the axis of time.
+struct Lap {
+    /// Where time 0 of the points is, s.
+    begin: f64,
+    /// Where the next lap begins, s.
+    next: f64,
+    /// The points from here on are the first of the next lap, s.
+    whole: f64,
+}
+
+impl Lap {
+    /// Time of a point.
+    fn time(&self, &(at, _): &(f64, f64)) -> f64 {
+        if at >= self.whole {
+            self.next
+        } else {
+            (self.begin + at).min(self.next)
+        }
+    }
+}
+
 impl<'a> Polyline<'a> {
     pub(super) fn pulse(
         corners: &'a [(f64, f64); 5],
@@ -87,17 +108,19 @@ impl<'a> Polyline<'a> {
         }
     }
 
-    /// Time of point `i` in lap `k`. The points at the end of a lap are the first of the next.
-    fn time(&self, k: f64, i: usize) -> f64 {
-        let (at, _) = self.points[i];
+    /// Lap `k` on the axis of time.
+    fn on_axis(&self, k: f64) -> Lap {
         let Some((from, period)) = self.laps else {
-            return self.offset + at;
+            return Lap {
+                begin: self.offset,
+                next: f64::INFINITY,
+                whole: f64::INFINITY,
+            };
         };
-        let next = (self.offset + (k + 1.0) * period) + self.points[from].0;
-        if at >= self.points[self.points.len() - 1].0 {
-            next
-        } else {
-            ((self.offset + k * period) + at).min(next)
+        Lap {
+            begin: self.offset + k * period,
+            next: (self.offset + (k + 1.0) * period) + self.points[from].0,
+            whole: self.points[self.points.len() - 1].0,
         }
     }
 
@@ -118,22 +141,24 @@ impl<'a> Polyline<'a> {
     }
 
     fn unstopped(&self, t: f64, side: Side, initial: f64) -> Segment {
-        let lap = self.lap(t, side);
-        let begin = if lap > 0.0 {
+        let number = self.lap(t, side);
+        let begin = if number > 0.0 {
             self.laps.map_or(0, |(from, _)| from)
         } else {
             0
         };
-        let passed = self.passed(lap, begin, t, side);
+        let lap = self.on_axis(number);
+        let passed = |point: &(f64, f64)| !side.before(t, lap.time(point));
+        let passed = begin + self.points[begin..].partition_point(passed);
         if passed == begin {
-            return Segment::constant(initial, f64::NEG_INFINITY, self.time(lap, begin));
+            return Segment::constant(initial, f64::NEG_INFINITY, lap.time(&self.points[begin]));
         }
-        let i = passed - 1;
-        let (start, (_, first)) = (self.time(lap, i), self.points[i]);
-        let Some(&(_, last)) = self.points.get(passed) else {
+        let point = self.points[passed - 1];
+        let (start, (_, first)) = (lap.time(&point), point);
+        let Some(next) = self.points.get(passed) else {
             return Segment::constant(first, start, f64::INFINITY);
         };
-        let end = self.time(lap, passed);
+        let (end, (_, last)) = (lap.time(next), *next);
         let slope = (last - first) / (end - start);
         Segment {
             piece: Piece::line(start, end, start, first, slope),
@@ -147,32 +172,15 @@ impl<'a> Polyline<'a> {
         let Some((from, period)) = self.laps else {
             return 0.0;
         };
-        let guess = ((t - self.offset - self.points[from].0) / period).floor();
-        let mut lap = if guess.is_finite() {
-            (guess - 1.0).max(0.0)
-        } else {
-            0.0
-        };
         // The quotient may be one off for rounding, never more; beyond 2^53 laps k + 1 = k.
+        let guess = ((t - self.offset - self.points[from].0) / period) as i64;
+        let mut lap = guess.saturating_sub(1).max(0) as f64;
         for _ in 0..3 {
-            if !side.before(t, self.time(lap, self.points.len() - 1)) {
-                lap += 1.0;
+            if side.before(t, self.on_axis(lap).next) {
+                break;
             }
+            lap += 1.0;
         }
         lap
-    }
-
-    /// Index after the last point of the lap that `t` has passed.
-    fn passed(&self, lap: f64, begin: usize, t: f64, side: Side) -> usize {
-        let (mut low, mut high) = (begin, self.points.len());
-        while low < high {
-            let middle = (low + high) / 2;
-            if side.before(t, self.time(lap, middle)) {
-                high = middle;
-            } else {
-                low = middle + 1;
-            }
-        }
-        low
     }
 }

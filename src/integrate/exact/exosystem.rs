@@ -250,10 +250,11 @@ impl Exosystem {
 
     /// The next breakpoint, s.
     pub(crate) fn next_breakpoint(&self) -> f64 {
-        self.pieces
-            .iter()
-            .map(|p| p.end)
-            .fold(f64::INFINITY, f64::min)
+        let ends = self.pieces.iter().map(|piece| piece.end);
+        ends.fold(
+            f64::INFINITY,
+            |first, end| if end < first { end } else { first },
+        )
     }
 
     /// Raises `sizes` to what z and, of its waves, their amplitudes are: a sine at zero is not small.

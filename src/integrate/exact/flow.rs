@@ -16,7 +16,7 @@ pub(crate) const LONG: u32 = 4;
 const DEEPEST: u32 = 62 + LONG;
 
 /// Rounding of a computed guard, in units of 2⁻⁵³ Σ |row| |w|.
-const NOISE: f64 = 16.0;
+pub(super) const NOISE: f64 = 16.0;
 
 /// exp(𝒜 h/2^k) for the levels k that were needed, h the longest step, Taylor's series below, and guard rows with their
 /// derivative. Level [`LONG`] is the output step.
@@ -25,6 +25,7 @@ const NOISE: f64 = 16.0;
 #[derive(Debug, Clone)]
 pub(crate) struct Flow {
     dim: usize,
+    states: usize,
     guards: usize,
     generator: DMatrix<f64>,
     generator_kernel: SparseKernel,
@@ -33,9 +34,6 @@ pub(crate) struct Flow {
     rows_kernel: Kernel,
     /// |[𝒢; 𝒢𝒜]|.
     sizes_kernel: Kernel,
-    /// The noise of g and g' at these amplitudes of w.
-    noise: Vec<f64>,
-    amplitude: Vec<f64>,
     /// 𝒢 row by row.
     guard_rows: Vec<f64>,
     h: f64,
@@ -83,13 +81,12 @@ impl Flow {
         let spectrum = Spectrum::new(&generator.view((0, 0), (n, n)).into_owned(), sources);
         Some(Self {
             dim,
+            states: n,
             guards: m,
             generator_kernel: SparseKernel::new(&generator),
             generator,
             sizes_kernel: rows_kernel.map(f64::abs),
             rows_kernel,
-            noise: Vec::new(),
-            amplitude: Vec::new(),
             guard_rows: guards.transpose().as_slice().to_vec(),
             rows,
             h,
@@ -110,6 +107,11 @@ impl Flow {
     /// Length of w.
     pub(crate) fn dim(&self) -> usize {
         self.dim
+    }
+
+    /// Length of x.
+    pub(crate) fn states(&self) -> usize {
+        self.states
     }
 
     /// Number of guards.
@@ -284,23 +286,12 @@ impl Flow {
     }
 
     /// Rounding noise of g and g' where |w| ≤ `amplitude`.
-    pub(crate) fn noise(&mut self, amplitude: &[f64]) -> &[f64] {
-        if self.amplitude != amplitude {
-            self.amplitude.clear();
-            self.amplitude.extend_from_slice(amplitude);
-            self.noise.resize(2 * self.guards, 0.0);
-            self.sizes_kernel.apply(amplitude, &mut self.noise);
-            for noise in &mut self.noise {
-                *noise *= NOISE * f64::EPSILON;
-            }
+    pub(crate) fn noise(&self, amplitude: &[f64], floors: &mut Vec<f64>) {
+        floors.resize(2 * self.guards, 0.0);
+        self.sizes_kernel.apply(amplitude, floors);
+        for floor in floors {
+            *floor *= NOISE * f64::EPSILON;
         }
-        &self.noise
-    }
-
-    /// `sizes` = |𝒢| |w|.
-    pub(crate) fn sizes_of_guards(&self, w: &[f64], sizes: &mut Vec<f64>) {
-        sizes.resize(self.guards, 0.0);
-        self.sizes_kernel.apply_first(self.guards, w, sizes);
     }
 
     /// Taylor's series for `dt` ≤ h/2^K from w on.

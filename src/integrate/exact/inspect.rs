@@ -1,6 +1,7 @@
 //! Whether a mode can be entered: what it conserves, what must vanish, and on which side of zero its guards leave.
 
 use super::exosystem::Exosystem;
+use super::flow::NOISE;
 use super::mode::{Mode, Owner};
 
 /// A mode may move the storage vector by no more than this part of its amplitude; more is a jump and needs an impulse.
@@ -10,6 +11,8 @@ const CONSISTENT: f64 = 1e-9;
 const GROUP: f64 = 128.0;
 /// Event times are known to this many units in the last place.
 const TIME_ULPS: f64 = 8.0;
+/// Inspections after which the sizes of a mode are taken anew.
+const USES: u32 = 64;
 /// Derivatives looked at: g, g', g'', g'''.
 const ORDERS: usize = 4;
 
@@ -47,40 +50,47 @@ pub(crate) struct Familiar {
     /// Amplitudes of the storage.
     scale: Vec<f64>,
     /// Those of x that come of them.
-    pub(crate) amplitude: Vec<f64>,
-    /// |w| up to which `noise` holds; empty before.
-    sizes: Vec<f64>,
-    /// Of each guard.
-    noise: Vec<f64>,
+    amplitude: Vec<f64>,
+    /// Amplitudes of w.
+    pub(crate) sizes: Vec<f64>,
+    /// Rounding of g and g' that comes of them.
+    pub(crate) noise: Vec<f64>,
+    /// How often it was enough to look at these.
+    uses: u32,
     /// |w| that the storage's amplitudes have taken account of.
     reached: Vec<f64>,
 }
 
 impl Familiar {
-    /// Whether the noise holds for w.
-    fn covers(&self, w: &[f64]) -> bool {
+    /// Whether w is as large as it was; now and then it is looked at closely again.
+    fn covers(&mut self, w: &[f64]) -> bool {
+        self.uses = (self.uses + 1) % USES;
         let mut sizes = w.iter().zip(&self.sizes);
-        self.sizes.len() == w.len() && sizes.all(|(w, size)| w.abs() <= *size)
+        self.uses > 0 && self.sizes.len() == w.len() && sizes.all(|(w, size)| w.abs() <= *size)
     }
 
-    /// How large w was so far, if it has grown by this.
-    pub(crate) fn grown(&mut self, reach: &[f64]) -> Option<&[f64]> {
-        self.reached.resize(reach.len(), 0.0);
-        let grown = reach
-            .iter()
-            .zip(&self.reached)
-            .any(|(now, before)| now > before);
-        for (reached, now) in self.reached.iter_mut().zip(reach) {
-            *reached = reached.max(*now);
-        }
-        grown.then_some(&self.reached)
-    }
-
-    /// Whether all guards are positive by more than noise, where times are known to `time`.
+    /// Whether all guards of `[g | g']` are positive by more than noise, where times are known to `time`.
     fn clear(&self, guards: &[f64], time: f64) -> bool {
-        let (g, slopes) = guards.split_at(self.noise.len());
+        let (g, slopes) = guards.split_at(guards.len() / 2);
         let mut guards = g.iter().zip(slopes).zip(&self.noise);
-        guards.all(|((g, slope), noise)| *g > noise + time * slope.abs())
+        guards.all(|((g, slope), noise)| *g > GROUP / NOISE * noise + time * slope.abs())
+    }
+
+    /// How large w was so far, if it has grown by this: the state, the sources.
+    pub(crate) fn grown(&mut self, [x, z]: [&[f64]; 2]) -> Option<&[f64]> {
+        self.reached.resize(x.len() + z.len(), 0.0);
+        let (known_x, known_z) = self.reached.split_at_mut(x.len());
+        let within =
+            |now: &[f64], known: &[f64]| now.iter().zip(known).all(|(now, known)| now <= known);
+        if within(x, known_x) && within(z, known_z) {
+            return None;
+        }
+        for (known, now) in [(known_x, x), (known_z, z)] {
+            for (known, now) in known.iter_mut().zip(now) {
+                *known = known.max(*now);
+            }
+        }
+        Some(&self.reached)
     }
 }
 
@@ -197,10 +207,7 @@ impl Inspector {
             let familiar = &mut mode.familiar;
             // Waves count with their amplitudes: they come back.
             exosystem.envelope(z, &mut sizes[mode.n..]);
-            mode.flow.sizes_of_guards(sizes, &mut familiar.noise);
-            for noise in &mut familiar.noise {
-                *noise *= GROUP * f64::EPSILON;
-            }
+            mode.flow.noise(sizes, &mut familiar.noise);
             familiar.sizes.clone_from(sizes);
         }
         Finding::Holds(leaving)

@@ -56,8 +56,7 @@ impl Exact<'_> {
             u.as_slice(),
             p.as_slice(),
         );
-        let old = DVector::from_column_slice(&self.storage);
-        let gain = 0.5 * (s.dot(&(&self.metric * &s)) - old.dot(&(&self.metric * &old)));
+        let gain = self.metric.stored(s.as_slice()) - self.metric.stored(&self.storage);
         self.before = u;
         self.balance.add((source, source - gain));
         let moved = s

@@ -13,6 +13,7 @@ mod free;
 mod inspect;
 mod jump;
 mod kernel;
+mod metric;
 mod mode;
 mod motion;
 mod pause;

@@ -1,5 +1,7 @@
 //! A mode: which devices conduct, where the switches stand, and the linear system that holds there.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::ahead;
@@ -10,9 +12,13 @@ use super::inspect::Familiar;
 use super::kernel::Kernel;
 use super::rays;
 use super::schedule::Drive;
+use super::transition::Trigger;
 use super::work::Term;
 use crate::integrate::switching::Threshold;
 use crate::lcs::{Lcs, PowerKind, Rows};
+
+/// Successors of a mode that are remembered; the oldest goes first.
+const MOST_SUCCESSORS: usize = 64;
 
 /// Which devices conduct and where the switches stand.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Default)]
@@ -130,7 +136,7 @@ pub(crate) struct Mode {
     pub(crate) storage: Map,
     /// Whether storage or constraints follow the sources.
     pub(crate) driven: bool,
-    /// Whether the states are the storage, so that every storage is taken over as it is.
+    /// Whether the states are the storage, s = x.
     pub(crate) keeps: bool,
     /// x = inject · s + inject_one, n×q.
     pub(crate) inject: Map,
@@ -144,6 +150,10 @@ pub(crate) struct Mode {
     pub(crate) shared: bool,
     /// See [`Inspector`](super::inspect::Inspector).
     pub(crate) familiar: Familiar,
+    /// What followed: why it was left and for which mode, the latest first.
+    pub(crate) successors: Vec<(Trigger, usize)>,
+    /// What the log says about a change from here to other modes.
+    pub(crate) labels: Vec<(usize, Arc<str>)>,
 }
 
 /// Rows over [x | u | u' | 1] as rows over w, with u = H z and u' = H S z.
@@ -306,8 +316,9 @@ impl Mode {
         ones += &map.one;
 
         let driven = rows > 0 || map.u.iter().any(|u| *u != 0.0);
-        let whole = (&map.x * &map.inject).is_identity(0.0);
-        let keeps = whole && !driven && map.one.iter().chain(&map.inject_one).all(|v| *v == 0.0);
+        let one = |m: &DMatrix<f64>| *m == DMatrix::identity(n, n);
+        let shifted = map.one.iter().chain(&map.inject_one).any(|v| *v != 0.0);
+        let keeps = one(&map.x) && one(&map.inject) && !driven && !shifted;
 
         Some(Self {
             key,
@@ -325,8 +336,27 @@ impl Mode {
             rows: ahead::Rows::new(lcs.outputs.names.len(), dim),
             shared,
             familiar: Familiar::default(),
+            successors: Vec::new(),
+            labels: Vec::new(),
             flow,
         })
+    }
+
+    /// Remembers that mode `to` followed.
+    pub(crate) fn remember(&mut self, trigger: Trigger, to: usize) {
+        let step = (trigger, to);
+        if let Some(k) = self.successors.iter().position(|s| *s == step) {
+            self.successors.swap(k, 0);
+        } else {
+            self.successors.truncate(MOST_SUCCESSORS - 1);
+            self.successors.insert(0, step);
+        }
+    }
+
+    /// What is said of a change to mode `to`, if that is known.
+    pub(crate) fn label(&self, to: usize) -> Option<&Arc<str>> {
+        let (_, label) = self.labels.iter().find(|(at, _)| *at == to)?;
+        Some(label)
     }
 
     /// Who a guard belongs to.
@@ -340,8 +370,23 @@ impl Mode {
         }
     }
 
+    /// The storage at w.
+    pub(crate) fn storage_at(&self, w: &[f64], s: &mut Vec<f64>) {
+        if self.keeps {
+            s.clear();
+            s.extend_from_slice(&w[..self.n]);
+        } else {
+            self.storage.values(w, s);
+        }
+    }
+
     /// The state that conserves charge and flux from storage s.
     pub(crate) fn state_from(&self, s: &[f64], x: &mut Vec<f64>) {
+        if self.keeps {
+            x.clear();
+            x.extend_from_slice(s);
+            return;
+        }
         self.inject.values(s, x);
         for (x, one) in x.iter_mut().zip(self.inject_one.iter()) {
             *x += one;

@@ -2,6 +2,7 @@
 
 use super::exosystem::Exosystem;
 use super::flow::{Flow, LONG};
+use super::inspect::Familiar;
 use super::polynomial;
 use super::series::Series;
 use super::spans::Spans;
@@ -96,33 +97,26 @@ impl Motion {
         }
     }
 
-    /// Enters a mode at `t` at `[w | g | g']`, with amplitudes `amplitude` of the state.
-    pub(crate) fn enter(
-        &mut self,
-        flow: &mut Flow,
-        exosystem: &Exosystem,
-        t: f64,
-        w: &[f64],
-        amplitude: &[f64],
-    ) {
-        let (n, dim) = (amplitude.len(), flow.dim());
+    /// Enters a mode at `t` at `[w | g | g']`.
+    pub(crate) fn enter(&mut self, flow: &Flow, t: f64, w: &[f64], familiar: &Familiar) {
+        let dim = flow.dim();
         self.t = t;
         self.entered = t;
         self.now.clear();
         self.now.extend_from_slice(w);
         self.next.resize(w.len(), 0.0);
-        self.peak.clear();
-        self.peak.extend(w[..n].iter().map(|v| v.abs()));
-        self.amplitude.clear();
-        self.amplitude.extend_from_slice(amplitude);
-        self.amplitude.resize(dim, 0.0);
-        exosystem.envelope(&w[n..dim], &mut self.amplitude[n..]);
         self.steady = flow.guards() == 0;
         self.barrier = f64::INFINITY;
-        let guards = &w[dim..dim + flow.guards()];
+        self.amplitude.clear();
+        self.amplitude.extend_from_slice(&familiar.sizes);
         self.slack.clear();
-        self.slack.extend(guards.iter().map(|g| (-g).max(0.0)));
-        self.refresh_noise(flow);
+        let guards = &w[dim..dim + flow.guards()];
+        self.slack.extend(guards.iter().map(|g| larger(-g, 0.0)));
+        self.floors.clear();
+        self.floors.extend_from_slice(&familiar.noise);
+        self.peak.clear();
+        self.peak.extend(w[..flow.states()].iter().map(|v| v.abs()));
+        self.add_slack();
     }
 
     /// Energy from sources and energy dissipated since last taken, J.
@@ -143,26 +137,25 @@ impl Motion {
         }
     }
 
-    fn refresh_noise(&mut self, flow: &mut Flow) {
+    fn refresh_noise(&mut self, flow: &Flow) {
         self.note_peak();
         for (a, v) in self.amplitude.iter_mut().zip(&self.now) {
             *a = larger(*a, v.abs());
         }
-        self.floors.clear();
-        self.floors.extend_from_slice(flow.noise(&self.amplitude));
+        flow.noise(&self.amplitude, &mut self.floors);
+        self.add_slack();
+    }
+
+    fn add_slack(&mut self) {
         for (floor, slack) in self.floors.iter_mut().zip(&self.slack) {
             *floor += slack;
         }
         self.since_refresh = 0;
     }
 
-    /// How large w can have been on the way here.
-    pub(crate) fn reach(&mut self) -> &[f64] {
-        self.sizes.clear();
-        self.sizes.extend_from_slice(&self.peak);
-        let sources = &self.amplitude[self.peak.len()..];
-        self.sizes.extend_from_slice(sources);
-        &self.sizes
+    /// How large w can have been on the way here: the state, the sources.
+    pub(crate) fn reach(&self) -> [&[f64]; 2] {
+        [&self.peak, &self.amplitude[self.peak.len()..]]
     }
 
     /// Moves to `stop` or to the first guard that falls through zero before it.
@@ -471,7 +464,7 @@ impl Motion {
 
     /// Stands at `next` and t; what the exosystem accumulates counts as that of so many steps.
     #[inline]
-    fn take_next(&mut self, flow: &mut Flow, exosystem: &Exosystem, t: f64, steps: u32) {
+    fn take_next(&mut self, flow: &Flow, exosystem: &Exosystem, t: f64, steps: u32) {
         std::mem::swap(&mut self.now, &mut self.next);
         self.note_peak();
         self.t = t;

@@ -57,17 +57,16 @@ impl Exact<'_> {
         self.exosystem.write(place.t, &mut self.z);
         self.left_here.clear();
         self.instant = place.t;
-        let mut key = Key {
+        let key = Key {
             closed: self.key.closed.clone(),
             switches,
             sliding: Vec::new(),
         };
-        self.key.copy_from(&key);
         // Its state satisfies the constraints up to rounding; what is left of a jump is not worth a word.
         let mut log = Log::new(0, f64::INFINITY, false);
         let jumps = self.jumps;
         self.started = false;
-        let result = self.change(&mut key, true, Trigger::Sources, &mut log);
+        let result = self.change(key, true, Trigger::Sources, &mut log);
         self.started = true;
         self.jumps = jumps;
         result

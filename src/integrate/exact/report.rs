@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::mode::Key;
 use super::stepper::Exact;
-use crate::integrate::run::{Log, SimError};
+use crate::integrate::run::Log;
 
 /// Estimated relative loss of an exponential above which it is reported.
 const LOSS: f64 = 1e-10;
@@ -20,21 +20,16 @@ pub(super) struct Slides {
 
 impl Exact<'_> {
     /// Logs which devices and switches changed.
-    pub(super) fn report(
-        &mut self,
-        at: usize,
-        jumped: bool,
-        log: &mut Log,
-    ) -> Result<(), SimError> {
+    pub(super) fn report(&mut self, at: usize, jumped: bool, log: &mut Log) {
         let changed = self.started && self.mode != Some(at);
         let mut words = None;
         if changed {
-            let pair = (self.mode.unwrap_or(at), at);
-            let label = match self.labels.get(&pair) {
+            let from = self.mode.unwrap_or(at);
+            let label = match self.plant.modes[from].label(at) {
                 Some(label) => label.clone(),
                 None => {
-                    let label: Arc<str> = self.label(at)?.into();
-                    self.labels.insert(pair, label.clone());
+                    let label: Arc<str> = self.label(from, at).into();
+                    self.plant.modes[from].labels.push((at, label.clone()));
                     label
                 }
             };
@@ -56,7 +51,6 @@ impl Exact<'_> {
         if let Some(words) = words {
             log.event(self.motion.t, words);
         }
-        Ok(())
     }
 
     /// Whether some probe has another value in the present row than `before`, by more than rounding.
@@ -79,6 +73,9 @@ impl Exact<'_> {
     pub(super) fn note_slides(&mut self, at: usize) {
         let t = self.motion.t;
         let key = &self.plant.modes[at].key;
+        if key.sliding.is_empty() && self.slides.is_empty() && self.plant.steps().is_empty() {
+            return;
+        }
         let switches = key.sliding.iter().map(|s| s.0);
         let after = self.plant.thresholds.len();
         let on_step = |pair: usize| key.closed[pair] && !key.closed[pair + 1];
@@ -112,29 +109,29 @@ impl Exact<'_> {
         self.key.sliding.clear();
     }
 
-    /// Names of what differs between the present mode and another.
-    fn label(&mut self, at: usize) -> Result<String, SimError> {
-        let new = self.plant.modes[at].key.clone();
+    /// Names of what differs between two modes.
+    fn label(&self, from: usize, to: usize) -> String {
+        let [old, new] = [from, to].map(|at| &self.plant.modes[at].key);
         let mut words: Vec<String> = Vec::new();
         let thresholds = self.plant.thresholds.iter().enumerate();
         for (i, threshold) in thresholds.filter(|(_, t)| !t.is_rest()) {
             let slides = |key: &Key| key.sliding.iter().any(|s| s.0 == i);
-            if slides(&new) {
-                if !slides(&self.key) {
+            if slides(new) {
+                if !slides(old) {
                     words.push(format!("{} slides", threshold.name));
                 }
-            } else if slides(&self.key) || new.switches[i] != self.key.switches[i] {
+            } else if slides(old) || new.switches[i] != old.switches[i] {
                 let position = if new.switches[i] { "on" } else { "off" };
                 words.push(format!("{} {position}", threshold.name));
             }
         }
-        let free = self.plant.free(&new)?;
-        for (j, port) in free.lcs.ports.iter().enumerate() {
-            if new.closed.get(j) != self.key.closed.get(j) && !words.contains(&port.device) {
-                words.push(port.device.clone());
+        for pair in (0..self.plant.pairs).filter(|&pair| new.closed[pair] != old.closed[pair]) {
+            let device = self.plant.device(pair).unwrap_or_default();
+            if !words.iter().any(|word| word == device) {
+                words.push(device.to_string());
             }
         }
-        Ok(words.join(", "))
+        words.join(", ")
     }
 
     /// Notes about the run as a whole.

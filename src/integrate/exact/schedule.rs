@@ -1,6 +1,6 @@
 //! Switches that piecewise straight sources alone control: their times need no guard.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::clock::Clock;
 use super::exosystem::Exosystem;
@@ -15,8 +15,10 @@ pub(crate) struct Drive {
     pub(crate) switch: usize,
     /// Over z.
     pub(crate) row: Vec<f64>,
-    /// Its derivative, row · S.
-    slope: Vec<f64>,
+    /// What is not zero in the row, by column.
+    terms: Vec<(usize, f64)>,
+    /// The same of its derivative, row · S.
+    slopes: Vec<(usize, f64)>,
     /// When its control next passes the threshold on the present pieces, s.
     pub(crate) next: f64,
 }
@@ -37,13 +39,13 @@ pub(crate) fn drives(lcs: &Lcs, exosystem: &Exosystem, clocks: &[Clock]) -> Vec<
                 .all(|(k, v)| *v == 0.0 || exosystem.is_straight(k));
             straight.then(|| Drive {
                 switch: i,
-                slope: (0..row.len())
-                    .map(|k| {
-                        (0..row.len())
-                            .map(|j| row[j] * exosystem.generator()[(j, k)])
-                            .sum()
-                    })
-                    .collect(),
+                terms: terms(&row),
+                slopes: terms(
+                    exosystem
+                        .generator()
+                        .tr_mul(&DVector::from_column_slice(&row))
+                        .as_slice(),
+                ),
                 row,
                 next: f64::INFINITY,
             })
@@ -51,10 +53,21 @@ pub(crate) fn drives(lcs: &Lcs, exosystem: &Exosystem, clocks: &[Clock]) -> Vec<
         .collect()
 }
 
+/// What is not zero in a row, by column.
+fn terms(row: &[f64]) -> Vec<(usize, f64)> {
+    let entries = row.iter().copied().enumerate();
+    entries.filter(|(_, r)| *r != 0.0).collect()
+}
+
+/// Such a row times z.
+fn dot(terms: &[(usize, f64)], z: &[f64]) -> f64 {
+    terms.iter().map(|&(k, r)| r * z[k]).sum()
+}
+
 impl Drive {
     /// c at z.
     pub(crate) fn control(&self, z: &[f64]) -> f64 {
-        self.row.iter().zip(z).map(|(r, z)| r * z).sum()
+        dot(&self.terms, z)
     }
 
     /// Whether the switch cannot stay where it is with the sources at z at time t: the control is beyond the threshold by more
@@ -62,13 +75,8 @@ impl Drive {
     pub(crate) fn misplaced(&self, threshold: &Threshold, on: bool, t: f64, z: &[f64]) -> bool {
         /// Roundings of a control and of the time at which it passes its threshold.
         const ROUNDINGS: f64 = 64.0;
-        let dot = |row: &[f64]| -> (f64, f64) {
-            let terms = row.iter().zip(z).map(|(r, z)| r * z);
-            terms.fold((0.0, 0.0), |(sum, size), term| {
-                (sum + term, size + term.abs())
-            })
-        };
-        let ((control, size), (slope, _)) = (dot(&self.row), dot(&self.slope));
+        let (control, slope) = (self.control(z), dot(&self.slopes, z));
+        let size: f64 = self.terms.iter().map(|&(k, r)| (r * z[k]).abs()).sum();
         let noise = ROUNDINGS * f64::EPSILON * (size + (slope * t).abs());
         if on {
             control < threshold.off_below - noise
@@ -86,7 +94,7 @@ impl Drive {
         z: &[f64],
         end: f64,
     ) {
-        let slope: f64 = self.slope.iter().zip(z).map(|(r, z)| r * z).sum();
+        let slope = dot(&self.slopes, z);
         let level = if on {
             threshold.off_below
         } else {

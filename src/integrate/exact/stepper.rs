@@ -1,9 +1,8 @@
 //! The event-driven stepper: travel in a mode, find the next one, repeat.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use super::accumulation::Accumulation;
 use super::ahead::Ahead;
@@ -11,6 +10,7 @@ use super::assembler::Assembler;
 use super::clock::Clock;
 use super::exosystem::Exosystem;
 use super::inspect::Inspector;
+use super::metric::Metric;
 use super::mode::{Key, Owner};
 use super::motion::{Arrival, Motion};
 use super::plant::Plant;
@@ -24,7 +24,7 @@ use crate::integrate::switching::fire;
 use crate::settings::Settings;
 
 /// Times closer than this many units in the last place are one time.
-const SAME_TIME_ULPS: f64 = 4.0;
+pub(super) const SAME_TIME_ULPS: f64 = 4.0;
 
 /// What a run of the exact integrator starts from.
 pub struct Setup<'a> {
@@ -55,8 +55,6 @@ pub struct Exact<'a> {
     pub(super) inspector: Inspector,
     pub(super) mode: Option<usize>,
     pub(super) key: Key,
-    /// The key that a change starts from; work space.
-    next_key: Key,
     /// Storage vector before the start or at the last change.
     pub(super) storage: Vec<f64>,
     /// Largest values of the storage elements so far, levelled by kind.
@@ -72,16 +70,12 @@ pub struct Exact<'a> {
     pub(super) z: Vec<f64>,
     /// u before a jump.
     pub(super) before: DVector<f64>,
-    /// What the log says about a change from one mode to another.
-    pub(super) labels: BTreeMap<(usize, usize), Arc<str>>,
     /// [`PROPOSALS`], the latest successful first.
     pub(super) proposals: [f64; PROPOSALS.len()],
     /// Modes left at the present instant.
     pub(super) left_here: Vec<usize>,
     pub(super) instant: f64,
-    /// What followed: (mode left, why, mode entered), latest last.
-    pub(super) successors: Vec<(usize, Trigger, usize)>,
-    pub(super) metric: DMatrix<f64>,
+    pub(super) metric: Metric,
     /// From start to end, s.
     pub(super) duration: f64,
     pub(super) until: f64,
@@ -168,8 +162,8 @@ impl<'a> Exact<'a> {
             .iter()
             .map(|name| name.starts_with('v'))
             .collect();
-        let metric = lcs.storage.metric.clone();
-        let stored = 0.5 * start.dot(&(&metric * &start));
+        let metric = Metric::new(&lcs.storage.metric);
+        let stored = metric.stored(start.as_slice());
         let columns = lcs.outputs.names.len();
         let mut exact = Self {
             plant,
@@ -178,7 +172,6 @@ impl<'a> Exact<'a> {
             motion: Motion::at(t, settings.max_steps),
             inspector: Inspector::default(),
             mode: None,
-            next_key: key.clone(),
             key,
             storage: start.as_slice().to_vec(),
             scale: vec![0.0; start.len()],
@@ -188,11 +181,9 @@ impl<'a> Exact<'a> {
             wanted: None,
             z,
             before: DVector::zeros(sources_count),
-            labels: BTreeMap::new(),
             proposals: PROPOSALS,
             left_here: Vec::new(),
             instant: t,
-            successors: Vec::new(),
             metric,
             duration: until - t,
             until,
@@ -227,7 +218,7 @@ impl<'a> Exact<'a> {
         for (&volts, scale) in self.volts.iter().zip(&mut self.scale) {
             *scale = largest[usize::from(volts)];
         }
-        self.capacity = stored(&self.metric, &self.scale);
+        self.capacity = self.metric.stored(&self.scale);
     }
 
     fn ulps(&self) -> f64 {
@@ -261,7 +252,7 @@ impl<'a> Exact<'a> {
             let mode = &mut self.plant.modes[at];
             let [source, dissipated] = self.motion.take_energy(&mut mode.flow);
             self.balance.add((source, dissipated));
-            mode.storage.values(&self.motion.now, &mut self.storage);
+            mode.storage_at(&self.motion.now, &mut self.storage);
             // An event often finds a current at zero: its size is what it was on the way.
             if let Some(reach) = mode.familiar.grown(self.motion.reach()) {
                 mode.storage.largest(reach, &mut self.reach);
@@ -277,7 +268,7 @@ impl<'a> Exact<'a> {
     /// Notes the stored energy.
     pub(super) fn note_stored(&mut self) {
         if self.energy {
-            self.balance.note(stored(&self.metric, &self.storage));
+            self.balance.note(self.metric.stored(&self.storage));
         }
     }
 
@@ -286,7 +277,7 @@ impl<'a> Exact<'a> {
         let from = self.mode.unwrap_or(0);
         self.take_storage();
         self.same_instant(from);
-        let mut key = self.take_key();
+        let mut key = std::mem::take(&mut self.key);
         let mut discontinuous = false;
         match self.plant.modes[from].owner(guard) {
             // A thyristor's current ends, and no gate holds it.
@@ -307,26 +298,7 @@ impl<'a> Exact<'a> {
         }
         fire(&self.plant.thresholds, &mut key.switches);
         self.exosystem.write(self.motion.t, &mut self.z);
-        self.change_to(key, discontinuous, Trigger::Guard(guard), log)
-    }
-
-    /// A copy of the present key, to be given back by [`Self::change_to`].
-    fn take_key(&mut self) -> Key {
-        let mut key = std::mem::take(&mut self.next_key);
-        key.copy_from(&self.key);
-        key
-    }
-
-    fn change_to(
-        &mut self,
-        mut key: Key,
-        discontinuous: bool,
-        trigger: Trigger,
-        log: &mut Log,
-    ) -> Result<(), SimError> {
-        let result = self.change(&mut key, discontinuous, trigger, log);
-        self.next_key = key;
-        result
+        self.change(key, discontinuous, Trigger::Guard(guard), log)
     }
 
     /// Remembers that a mode was left at this instant.
@@ -344,7 +316,7 @@ impl<'a> Exact<'a> {
         let near = t + self.ulps();
         self.take_storage();
         let mut edge = self.next_piece <= near && self.take_pieces(near)?;
-        let mut key = self.take_key();
+        let mut key = std::mem::take(&mut self.key);
         self.exosystem.write(t, &mut self.z);
         for drive in &self.plant.drives {
             let (i, on) = (drive.switch, key.switches[drive.switch]);
@@ -374,7 +346,7 @@ impl<'a> Exact<'a> {
         }
         self.left_here.clear();
         self.instant = t;
-        self.change_to(key, edge, Trigger::Sources, log)
+        self.change(key, edge, Trigger::Sources, log)
     }
 
     /// Sources whose pieces end go on along the next ones; returns whether one of them jumps.
@@ -424,18 +396,11 @@ impl<'a> Exact<'a> {
 
     fn start(&mut self, log: &mut Log) -> Result<(), SimError> {
         self.exosystem.write(self.motion.t, &mut self.z);
-        let key = self.take_key();
-        self.change_to(key, true, Trigger::Sources, log)?;
+        let key = std::mem::take(&mut self.key);
+        self.change(key, true, Trigger::Sources, log)?;
         self.started = true;
         Ok(())
     }
-}
-
-/// ½ sᵀ M s.
-fn stored(metric: &DMatrix<f64>, s: &[f64]) -> f64 {
-    let columns = metric.as_slice().chunks_exact(s.len().max(1)).zip(s);
-    let rows = |column: &[f64]| column.iter().zip(s).map(|(m, s)| m * s).sum::<f64>();
-    0.5 * columns.map(|(column, s)| s * rows(column)).sum::<f64>()
 }
 
 impl Stepper for Exact<'_> {

@@ -15,9 +15,6 @@ const MOST_NEIGHBOURS: usize = 400;
 /// Events at one instant after which modes already left there are not entered again.
 const PATIENCE: usize = 2;
 
-/// Transitions remembered; the oldest goes first.
-const MOST_SUCCESSORS: usize = 64;
-
 /// Why a mode is left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Trigger {
@@ -31,7 +28,7 @@ impl Exact<'_> {
     /// Enters the mode from here on. Where there is none, everything is as it was before.
     pub(super) fn change(
         &mut self,
-        key: &mut Key,
+        mut key: Key,
         discontinuous: bool,
         trigger: Trigger,
         log: &mut Log,
@@ -42,25 +39,37 @@ impl Exact<'_> {
             self.row.clone()
         });
         // Most changes are like one before.
-        let followed = self.follow(key, trigger);
-        if let Some((at, leaving)) = &followed
-            && self.leaving(*at, leaving).is_empty()
+        let followed = self.follow(&key, trigger);
+        if let Some((at, guards)) = &followed
+            && guards.is_empty()
+            && self.misplaced(*at).next().is_none()
+            && self.let_go(*at).next().is_none()
         {
             let at = *at;
-            return self.enter(at, false, trigger, left_row, log);
+            key.closed.clone_from(&self.plant.modes[at].key.closed);
+            self.enter(at, key, false, trigger, left_row, log);
+            return Ok(());
         }
+        let left = self.mode.map(|at| self.plant.modes[at].key.clone());
+        self.key = left.unwrap_or_else(|| key.clone());
         let (storage, scale) = (self.storage.clone(), self.scale.clone());
         let (balance, switches) = (self.balance, key.switches.clone());
         let (events, impulses) = (log.events.len(), log.impulses.len());
         self.before = self.inputs_before();
-        let found = self.search(key, discontinuous, trigger, followed, log);
-        let result = found.and_then(|(at, jumped)| self.enter(at, jumped, trigger, left_row, log));
-        if result.is_err() {
-            (self.storage, self.scale) = (storage, scale);
-            (self.balance, self.wanted) = (balance, Some(switches));
-            log.back_to(events, impulses);
+        let found = self.search(&mut key, discontinuous, trigger, followed, log);
+        match found {
+            Ok((at, jumped)) => {
+                key.copy_from(&self.plant.modes[at].key);
+                self.enter(at, key, jumped, trigger, left_row, log);
+                Ok(())
+            }
+            Err(error) => {
+                (self.storage, self.scale) = (storage, scale);
+                (self.balance, self.wanted) = (balance, Some(switches));
+                log.back_to(events, impulses);
+                Err(error)
+            }
         }
-        result
     }
 
     /// Finds the mode and whether the state jumps into it: positions of the switches, impulse of the devices, conducting devices.
@@ -101,12 +110,15 @@ impl Exact<'_> {
                 found = self.jump_into(key, log)?;
                 jumped |= found.is_some();
             }
-            let Some((at, leaving)) = found else {
+            let Some((at, mut leaving)) = found else {
                 let device = self.culprit(key, trigger);
                 return Err(self.fail(Reason::Infeasible).device(device));
             };
             key.closed.clone_from(&self.plant.modes[at].key.closed);
-            let leaving = self.leaving(at, &leaving);
+            leaving.extend(self.misplaced(at));
+            leaving.extend(self.let_go(at));
+            leaving.sort_unstable();
+            leaving.dedup();
             if leaving.is_empty() {
                 entry = Some(at);
                 break;
@@ -140,35 +152,30 @@ impl Exact<'_> {
         Ok((at, jumped))
     }
 
-    /// Enters mode `at`, which was inspected last.
+    /// Enters mode `at`, which was inspected last, under its key.
     fn enter(
         &mut self,
         at: usize,
+        key: Key,
         jumped: bool,
         trigger: Trigger,
         left_row: Option<Vec<f64>>,
         log: &mut Log,
-    ) -> Result<(), SimError> {
+    ) {
         let t = self.motion.t;
         if let (Some(from), false) = (self.mode, jumped) {
-            self.remember((from, trigger, at));
+            self.plant.modes[from].remember(trigger, at);
         }
         let same = self.mode == Some(at);
-        self.report(at, jumped, log)?;
+        self.report(at, jumped, log);
         self.note_slides(at);
         self.mode = Some(at);
-        let Mode {
-            key,
-            flow,
-            familiar,
-            ..
-        } = &mut self.plant.modes[at];
-        self.key.copy_from(key);
+        self.key = key;
         if self.energy {
             self.motion.power = self.capacity.max(self.balance.largest()) / self.duration;
         }
-        let (w, amplitude) = (&self.inspector.w, &familiar.amplitude);
-        self.motion.enter(flow, &self.exosystem, t, w, amplitude);
+        let Mode { flow, familiar, .. } = &self.plant.modes[at];
+        self.motion.enter(flow, t, &self.inspector.w, familiar);
         self.look_ahead();
         if jumped {
             self.jumps += 1;
@@ -183,17 +190,6 @@ impl Exact<'_> {
                 log.row(t, &self.row);
             }
         }
-        Ok(())
-    }
-
-    /// Switches that cannot stay as they are in mode `at`, `guards` those whose guards fall.
-    fn leaving(&self, at: usize, guards: &[usize]) -> Vec<usize> {
-        let mut leaving = guards.to_vec();
-        leaving.extend(self.misplaced(at));
-        leaving.extend(self.let_go(at));
-        leaving.sort_unstable();
-        leaving.dedup();
-        leaving
     }
 
     /// Switches that the sources alone move in mode `at` and that cannot stay as they are: in another position the control
@@ -310,24 +306,12 @@ impl Exact<'_> {
         None
     }
 
-    /// Remembers what followed.
-    fn remember(&mut self, step: (usize, Trigger, usize)) {
-        if let Some(k) = self.successors.iter().position(|s| *s == step) {
-            self.successors.swap(k, 0);
-        } else {
-            if self.successors.len() == MOST_SUCCESSORS {
-                self.successors.pop();
-            }
-            self.successors.insert(0, step);
-        }
-    }
-
     /// The mode that followed the same trigger before, if it holds now.
     fn follow(&mut self, key: &Key, trigger: Trigger) -> Option<(usize, Vec<usize>)> {
         let from = self.mode?;
-        for k in 0..self.successors.len() {
-            let (left, why, at) = self.successors[k];
-            if (left, why) == (from, trigger)
+        for k in 0..self.plant.modes[from].successors.len() {
+            let (why, at) = self.plant.modes[from].successors[k];
+            if why == trigger
                 && self.plant.modes[at].key.same_switches(key)
                 && !(self.left_here.len() > PATIENCE && self.left_here.contains(&at))
                 && let Some(leaving) = self.try_mode(at)

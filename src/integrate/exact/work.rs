@@ -449,7 +449,10 @@ impl Forms {
 fn products(forms: &Kernel, y: &[f64], products: &mut [f64]) -> [f64; 2] {
     forms.apply(y, products);
     let (sources, dissipated) = products.split_at(y.len());
-    [sources, dissipated].map(|p| p.iter().zip(y).map(|(p, y)| p * y).sum())
+    let both = sources.iter().zip(dissipated).zip(y);
+    both.fold([0.0; 2], |[sum0, sum1], ((p0, p1), y)| {
+        [sum0 + p0 * y, sum1 + p1 * y]
+    })
 }
 
 impl Doubling {
