@@ -21,6 +21,21 @@ pub fn value(rows: &Rows, i: usize, at: Point<'_>) -> f64 {
     sum(rows, i, at, |term| term)
 }
 
+/// All rows for inputs u, where these alone decide them.
+pub(crate) fn of_sources(rows: &Rows, u: &[f64]) -> Option<Vec<f64>> {
+    let others = [&rows.x, &rows.lambda, &rows.du];
+    if others.iter().any(|block| block.iter().any(|v| *v != 0.0)) {
+        return None;
+    }
+    let at = Point {
+        x: &[],
+        lambda: &[],
+        u,
+        du: &[],
+    };
+    Some((0..rows.one.len()).map(|i| value(rows, i, at)).collect())
+}
+
 /// The sum of the magnitudes that [`value`] is computed from.
 #[must_use]
 pub fn magnitude(rows: &Rows, i: usize, at: Point<'_>) -> f64 {

@@ -10,12 +10,13 @@ use crate::integrate::Run;
 use crate::integrate::control::Amplitudes;
 use crate::integrate::exact::{self, Exact, Place};
 use crate::integrate::handover::Handover;
+use crate::integrate::inputs::Inputs;
 use crate::integrate::line::Line;
 use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, Stepper, run};
 use crate::integrate::step::Scheme;
 use crate::integrate::switching::{Threshold, at_start};
 use crate::integrate::theta::{Setup, Start, Stepping, Theta};
-use crate::integrate::{roles, start};
+use crate::integrate::{reading, roles, start};
 use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
 use crate::mna::Behaviour;
 use crate::plan::{Plan, not_exact, plan};
@@ -259,10 +260,16 @@ impl Problem<'_> {
     fn settle_switches(&mut self, tran: &Tran, settings: &Settings) -> Result<bool, SimError> {
         let mut seen = Vec::new();
         while self.settle.contains(&true) {
-            let stepping = Stepping::Fixed(tran.tstep);
-            let start = self.start();
-            let mut theta = self.stepper(start, tran, Scheme::MOREAU, stepping, settings)?;
-            let controls = theta.controls_at_start()?;
+            let lcs = self.free(&self.position)?;
+            let controls =
+                match reading::of_sources(&lcs.controls, &Inputs::new(&lcs.inputs).all(0.0)) {
+                    Some(controls) => controls,
+                    None => {
+                        let stepping = Stepping::Fixed(tran.tstep);
+                        self.stepper(self.start(), tran, Scheme::MOREAU, stepping, settings)?
+                            .controls_at_start()?
+                    }
+                };
             let asked: Vec<bool> = (0..controls.len())
                 .map(|k| {
                     let switch = &self.behaviour.switches[k];
@@ -274,7 +281,6 @@ impl Problem<'_> {
                 })
                 .collect();
             let wanted = at_start(&self.behaviour.switches, asked);
-            drop(theta);
             // Positions that contradict each other are left to the run.
             if wanted == self.position || seen.contains(&wanted) {
                 break;

@@ -109,13 +109,13 @@ impl Motion {
         self.barrier = f64::INFINITY;
         self.amplitude.clear();
         self.amplitude.extend_from_slice(&familiar.sizes);
-        self.slack.clear();
+        self.peak.clear();
+        self.peak.extend(w[..flow.states()].iter().map(|v| v.abs()));
         let guards = &w[dim..dim + flow.guards()];
+        self.slack.clear();
         self.slack.extend(guards.iter().map(|g| larger(-g, 0.0)));
         self.floors.clear();
         self.floors.extend_from_slice(&familiar.noise);
-        self.peak.clear();
-        self.peak.extend(w[..flow.states()].iter().map(|v| v.abs()));
         self.add_slack();
     }
 

@@ -426,7 +426,7 @@ impl Stepper for Exact<'_> {
             let Some(at) = self.mode else {
                 return Err(self.fail(Reason::Infeasible));
             };
-            if self.step_ahead(at, t, next) {
+            if (!due && t <= self.motion.t) || self.step_ahead(at, t, next) {
                 return Ok(());
             }
             match self
