@@ -1,6 +1,6 @@
 //! Rows ahead: where a mode is calm, one long step passes several output times, and their rows follow from its begin.
 
-use super::flow::{Flow, LONG};
+use super::flow::{Flow, LONG, Way};
 use super::kernel::Kernel;
 use super::mode::Mode;
 use super::motion::GRID_ULPS;
@@ -9,6 +9,8 @@ use crate::integrate::run::Times;
 
 /// Rows of a long step at most.
 const MOST: usize = 1 << LONG;
+/// Rows of a step from one event to the next at most.
+const MOST_BETWEEN: f64 = 64.0;
 /// A mode's rows are tabulated after so many single ones for each dimension of w: before, that is more work than it spares.
 const PATIENCE: usize = 6;
 /// Entries of a table at most; rows of larger circuits cost so much that long steps spare little.
@@ -37,12 +39,21 @@ impl Rows {
         }
     }
 
+    /// So many rows on the way.
+    fn way<'a>(&self, outputs: &'a Kernel, rows: usize) -> Way<'a> {
+        Way {
+            outputs,
+            columns: self.columns,
+            rows,
+        }
+    }
+
     /// Whether there is a table, made once it is worth it.
     fn ready(&mut self, flow: &mut Flow, outputs: &Kernel) -> bool {
         if self.table.is_none() {
             self.singles += 1;
             if self.singles >= self.patience {
-                self.table = flow.followed(outputs, self.columns, MOST);
+                self.table = flow.followed(self.way(outputs, MOST));
             }
         }
         self.table.is_some()
@@ -52,7 +63,7 @@ impl Rows {
 /// Rows that were computed and not asked for yet.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Ahead {
-    /// When the long step began, s.
+    /// An output step before the first row, s.
     begin: f64,
     /// Rows of the step, and how many of them were asked for; none without a step.
     count: usize,
@@ -60,12 +71,19 @@ pub(super) struct Ahead {
     values: Vec<f64>,
     /// The time last asked for, s.
     pub(super) t: f64,
+    /// Where the step ends, s, and its energy, if it is one to where something is known to happen.
+    stop: Option<(f64, [f64; 2])>,
 }
 
 impl Ahead {
     /// Whether rows are left.
-    pub(super) fn pending(&self) -> bool {
+    fn pending(&self) -> bool {
         self.taken < self.count
+    }
+
+    /// Whether the motion is behind the rows.
+    pub(super) fn leads(&self) -> bool {
+        self.count > 0
     }
 
     /// The row last asked for, of so many columns.
@@ -98,8 +116,6 @@ impl Exact<'_> {
             let t = times.at(k + count - 1);
             if !ahead.take(t, self.plant.output_step()) {
                 ahead.taken = before;
-            } else if !ahead.pending() {
-                self.motion.t = t;
             }
         }
         let columns = self.row.len();
@@ -112,31 +128,81 @@ impl Exact<'_> {
         if self.ahead.count == 0 {
             return false;
         }
-        if self.ahead.take(t, self.plant.output_step()) {
-            if !self.ahead.pending() {
-                self.motion.t = t;
-            }
-            return true;
+        let has = self.ahead.take(t, self.plant.output_step());
+        if !has {
+            self.end_ahead(t);
         }
-        self.end_ahead();
-        false
+        has
     }
 
-    /// Stands at the last row that was asked for.
-    pub(super) fn end_ahead(&mut self) {
-        let Ahead {
-            count, taken, t, ..
-        } = self.ahead;
+    /// Stands at the last row that was asked for, or at the end of the step where that is no later than `t`.
+    pub(super) fn end_ahead(&mut self, t: f64) {
+        let Ahead { count, taken, .. } = self.ahead;
         self.ahead.count = 0;
         self.ahead.taken = 0;
+        let (last, stop) = (self.ahead.t, self.ahead.stop.take());
         if let (true, Some(at)) = (count > 0, self.mode) {
             let flow = &mut self.plant.modes[at].flow;
-            self.motion.arrive(flow, &self.exosystem, taken, count, t);
+            match stop {
+                None => self
+                    .motion
+                    .arrive(flow, &self.exosystem, taken, count, last),
+                Some((stop, energy)) if stop <= t + GRID_ULPS * f64::EPSILON * t.abs() => {
+                    self.motion
+                        .arrive_again(flow, &self.exosystem, stop, energy);
+                }
+                // It was clear as part of the long step.
+                Some(_) => {
+                    self.motion.travel(flow, &self.exosystem, last);
+                }
+            }
         }
+    }
+
+    /// Steps from an event to where something is known to happen `next`, if that span recurs, over all rows between, `t` the first of
+    /// them.
+    fn stretch_ahead(&mut self, at: usize, t: f64, next: f64) -> bool {
+        let negligible = GRID_ULPS * f64::EPSILON * next.abs();
+        if self.motion.t > self.motion.entered
+            || next <= t + negligible
+            || next > self.until + negligible
+        {
+            return false;
+        }
+        let Mode {
+            flow,
+            outputs,
+            rows,
+            ..
+        } = &mut self.plant.modes[at];
+        let h = flow.step(LONG);
+        let between = ((next - negligible - t) / h).floor();
+        if between >= MOST_BETWEEN || rows.patience == usize::MAX {
+            return false;
+        }
+        let count = between as usize + 1;
+        let (first, way) = (t - self.motion.t, rows.way(outputs, count));
+        let Some((span, energy)) = self.motion.leap_again(flow, next, first, Some(way)) else {
+            return false;
+        };
+        let ahead = &mut self.ahead;
+        ahead.values.resize(count * rows.columns, 0.0);
+        flow.rows_again(
+            span,
+            first,
+            &self.motion.now[..flow.dim()],
+            &mut ahead.values,
+        );
+        (ahead.begin, ahead.t, ahead.stop) = (t - h, t, Some((next, energy)));
+        (ahead.count, ahead.taken) = (count, 1);
+        true
     }
 
     /// Steps over as many rows as nothing can happen on, `t` the first of them and `next` when something is known to happen.
     pub(super) fn step_ahead(&mut self, at: usize, t: f64, next: f64) -> bool {
+        if self.stretch_ahead(at, t, next) {
+            return true;
+        }
         let Mode {
             flow,
             outputs,
@@ -177,42 +243,78 @@ mod tests {
     const RINGING: &str = "v1 a 0 sin(0 10 1k)\nr1 a b 10\nl1 b c 1m ic=0.1\nc1 c 0 1u ic=-3\nd1 c e d\nr2 e 0 300\n\
         c2 e 0 2u ic=1\n.model d d(ideal)\n.tran 1u 3m uic\n";
 
+    /// Edges on rows and between them, with the same number of rows between edges and with one more now and then.
+    const CLOCKED: &str = "v1 a 0 dc 24\ns1 a b g 0 sw\nd1 0 b d\nl1 b c 40u\nc1 c 0 20u\nr1 c 0 4\n\
+        vg g 0 pulse(0 1 3.3u 0 0 WIDTH 10u)\n.model d d(ideal)\n.model sw sw(vt=0.5 vh=0 ron=10m roff=1meg)\n\
+        .save v(c) i(l1) i(v1)\n.tran 1u 3m uic\n";
+
+    /// The last row asked for, between two edges.
+    const LAST: usize = 2995;
+
     /// Asked along the output grid, which long steps pass, and at times of its own in between, where they are given up: the
     /// same rows, energies and events.
     #[test]
     fn rows_do_not_depend_on_what_is_asked_for_between() {
-        let circuit = circuit(RINGING);
-        let run = |odd: usize| {
-            let (mut exact, lcs, tran) = prepare_circuit(&circuit, true);
-            let columns = lcs.outputs.names.len();
-            let (mut log, mut row) = (Log::new(columns, 0.0, false), vec![0.0; columns]);
-            let mut rows = Vec::new();
-            for k in 0..=3000 {
-                let t = k as f64 * tran.tstep;
-                exact.advance(t, &mut log).expect("a run");
-                assert!((exact.time() - t).abs() < 1e-18);
-                exact.read(&mut row);
-                rows.extend_from_slice(&row);
-                if odd > 0 && k % odd == 0 && k < 3000 {
-                    exact
-                        .advance(t + 0.3 * tran.tstep, &mut log)
-                        .expect("a run");
+        let clocked = |width| CLOCKED.replace("WIDTH", width);
+        for (netlist, most) in [
+            (RINGING.to_string(), 1000),
+            (clocked("4.7u"), 900),
+            (clocked("4.5u"), 900),
+        ] {
+            let circuit = circuit(&netlist);
+            let run = |odd: usize| {
+                let (mut exact, lcs, tran) = prepare_circuit(&circuit, true);
+                let columns = lcs.outputs.names.len();
+                let (mut log, mut row) = (Log::new(columns, 0.0, false), vec![0.0; columns]);
+                let mut rows = Vec::new();
+                for k in 0..=LAST {
+                    let t = k as f64 * tran.tstep;
+                    exact.advance(t, &mut log).expect("a run");
+                    assert!((exact.time() - t).abs() < 1e-18);
+                    exact.read(&mut row);
+                    rows.extend_from_slice(&row);
+                    if odd > 0 && k % odd == 0 && k < LAST {
+                        let between = t + 0.2 * tran.tstep;
+                        exact.advance(between, &mut log).expect("a run");
+                        assert!((exact.time() - between).abs() < 1e-18);
+                    }
                 }
+                (rows, exact.finish(), log.events)
+            };
+            let (rows, outcome, events) = run(0);
+            assert!(outcome.stats.steps < most, "{} steps", outcome.stats.steps);
+            assert!(outcome.energy.residual_relative < 1e-12);
+            for odd in [1, 5, 37] {
+                let (others, other, found) = run(odd);
+                assert!(other.stats.steps > outcome.stats.steps);
+                assert!(other.energy.residual_relative < 1e-12);
+                assert!((other.energy.source / outcome.energy.source - 1.0).abs() < 1e-11);
+                let far = rows.iter().zip(&others).map(|(a, b)| (a - b).abs());
+                let largest = rows.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+                let far = far.fold(0.0, f64::max) / largest;
+                assert!(far < 2e-13, "{far:e}");
+                let apart = events.iter().zip(&found).map(|(a, b)| (a.0 - b.0).abs());
+                assert!(apart.fold(0.0, f64::max) < 1e-15 && events.len() == found.len());
             }
-            (rows, exact.finish(), log.events)
-        };
-        let (rows, outcome, events) = run(0);
-        assert!(outcome.stats.steps < 1000, "{} steps", outcome.stats.steps);
-        assert!(outcome.energy.residual_relative < 1e-12);
-        for odd in [1, 5, 37] {
-            let (others, other, found) = run(odd);
-            assert!(other.stats.steps > outcome.stats.steps);
-            assert!(other.energy.residual_relative < 1e-12);
-            assert!((other.energy.source / outcome.energy.source - 1.0).abs() < 1e-11);
-            let far = rows.iter().zip(&others).map(|(a, b)| (a - b).abs());
-            assert!(far.fold(0.0, f64::max) < 1e-12);
-            let apart = events.iter().zip(&found).map(|(a, b)| (a.0 - b.0).abs());
-            assert!(apart.fold(0.0, f64::max) < 1e-15 && events.len() == found.len());
         }
+    }
+
+    /// A run that ends on a row in the middle of a long step has its energy from the state there.
+    #[test]
+    fn a_run_may_end_between_edges() {
+        let circuit = circuit(&CLOCKED.replace("WIDTH", "4.7u"));
+        let (mut exact, lcs, tran) = prepare_circuit(&circuit, true);
+        let columns = lcs.outputs.names.len();
+        let (mut log, mut row) = (Log::new(columns, 0.0, false), vec![0.0; columns]);
+        for k in 0..=LAST {
+            let t = k as f64 * tran.tstep;
+            exact.advance(t, &mut log).expect("a run");
+            exact.read(&mut row);
+        }
+        assert!(exact.ahead.leads());
+        let energy = exact.finish().energy;
+        let stored = 0.5 * (20e-6 * row[0] * row[0] + 40e-6 * row[1] * row[1]);
+        assert!((energy.stored / stored - 1.0).abs() < 1e-12);
+        assert!(energy.residual_relative < 1e-12);
     }
 }

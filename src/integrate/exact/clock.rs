@@ -3,9 +3,29 @@
 
 use super::stepper::SAME_TIME_ULPS;
 use crate::circuit::Source;
-use crate::circuit::source::Piece;
 use crate::integrate::switching::Threshold;
 use crate::mna::SourceControl;
+
+/// constant + slope (t − origin) until `end`: a piece of a straight source.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Line {
+    end: f64,
+    origin: f64,
+    constant: f64,
+    slope: f64,
+}
+
+impl Line {
+    fn of(source: &Source, t: f64) -> Option<Self> {
+        let piece = source.piece(t)?;
+        Some(Self {
+            end: piece.end,
+            origin: piece.origin,
+            constant: piece.constant,
+            slope: piece.slope,
+        })
+    }
+}
 
 /// A switch whose control is a constant plus multiples of straight sources that drive nothing but switches.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,7 +34,7 @@ pub(crate) struct Clock {
     pub(crate) switch: usize,
     constant: f64,
     /// Input, factor, present piece.
-    terms: Vec<(usize, f64, Piece)>,
+    terms: Vec<(usize, f64, Line)>,
     /// When the switch next moves, s.
     pub(crate) next: f64,
     /// The position in which `next` was found.
@@ -31,7 +51,7 @@ impl Clock {
         } = control;
         let terms = terms
             .into_iter()
-            .map(|(input, factor)| Some((input, factor, sources[input].piece(t)?)))
+            .map(|(input, factor)| Some((input, factor, Line::of(&sources[input], t)?)))
             .collect::<Option<_>>()?;
         Some(Self {
             switch,
@@ -45,9 +65,9 @@ impl Clock {
     /// Goes to time t, forwards or backwards.
     pub(crate) fn stand_at(&mut self, sources: &[Source], t: f64) {
         self.next = f64::NEG_INFINITY;
-        for (input, _, piece) in &mut self.terms {
-            if let Some(there) = sources[*input].piece(t) {
-                *piece = there;
+        for (input, _, line) in &mut self.terms {
+            if let Some(there) = Line::of(&sources[*input], t) {
+                *line = there;
             }
         }
     }
@@ -57,20 +77,17 @@ impl Clock {
         let terms = self
             .terms
             .iter()
-            .map(|(_, factor, piece)| factor * piece.value(t));
+            .map(|(_, factor, line)| factor * (line.constant + line.slope * (t - line.origin)));
         self.constant + terms.sum::<f64>()
     }
 
     fn slope(&self) -> f64 {
-        let terms = self
-            .terms
-            .iter()
-            .map(|(_, factor, piece)| factor * piece.slope);
-        terms.sum()
+        let terms = self.terms.iter();
+        terms.map(|(_, factor, line)| factor * line.slope).sum()
     }
 
     fn end(&self) -> f64 {
-        let ends = self.terms.iter().map(|(_, _, piece)| piece.end);
+        let ends = self.terms.iter().map(|(_, _, line)| line.end);
         ends.fold(f64::INFINITY, f64::min)
     }
 
@@ -109,21 +126,23 @@ impl Clock {
                 } else {
                     (threshold.on_above, slope > 0.0)
                 };
-                let passage = t + ((level - self.control(t)) / slope).max(0.0);
-                if towards && passage < end {
-                    return passage;
+                if towards {
+                    let passage = t + ((level - self.control(t)) / slope).max(0.0);
+                    if passage < end {
+                        return passage;
+                    }
                 }
                 t = end;
             }
             if t > until {
                 return f64::INFINITY;
             }
-            for (input, _, piece) in &mut self.terms {
-                if piece.end <= t {
-                    match sources[*input].piece(t) {
-                        Some(next) if next.end > t => *piece = next,
+            for (input, _, line) in &mut self.terms {
+                if line.end <= t {
+                    match Line::of(&sources[*input], t) {
+                        Some(next) if next.end > t => *line = next,
                         // A piece too short for the resolution of t.
-                        _ => piece.end = t.next_up(),
+                        _ => line.end = t.next_up(),
                     }
                 }
             }

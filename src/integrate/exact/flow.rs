@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::dense::Dense;
 use super::expm::{self, Ladder};
-use super::kernel::{Kernel, SparseKernel};
+use super::kernel::{BLOCK, Block, Kernel, SparseKernel};
 use super::recurring::{Prepared, Recurring};
 use super::series::{MAX_DEGREE, Series};
 use super::spectrum::{Rate, Spectrum};
@@ -45,6 +45,7 @@ pub(crate) struct Flow {
     recurring: Recurring,
     /// Work space of spans that recur.
     moved: Vec<f64>,
+    slopes: Vec<Block>,
     spectrum: Spectrum,
     work: Option<Work>,
     /// Largest loss that an exponential reported.
@@ -98,6 +99,7 @@ impl Flow {
             levels: vec![None; bottom as usize + 1],
             recurring: Recurring::default(),
             moved: Vec::new(),
+            slopes: Vec::new(),
             spectrum,
             work: None,
             loss: 0.0,
@@ -172,25 +174,37 @@ impl Flow {
         true
     }
 
-    /// Whether `t` recurs: the place of the span. Times within `same` are one where the second order of what they differ by is rounding.
+    /// Whether `t`, and where in it the first row is, recurs: the place of the span. Times within `same` are one where the second order
+    /// of what they differ by is rounding.
     #[inline]
-    pub(crate) fn recurs(&mut self, t: f64, same: f64) -> Option<usize> {
+    pub(crate) fn recurs(&mut self, t: [f64; 2], same: f64) -> Option<usize> {
         let unit = self.steps[self.bottom as usize];
         self.recurring.find(t, same.min(f64::EPSILON.sqrt() * unit))
     }
 
-    /// As [`Self::leap`] over `t` seconds, which a span stands for that recurs; returns the energy (from sources, dissipated), J.
+    /// Something happened on a span that recurs.
+    pub(crate) fn refuse(&mut self, span: usize) {
+        self.recurring.refuse(span);
+    }
+
+    /// As [`Self::leap`] over `t` seconds, which a span stands for that recurs, with these rows on the way; returns the energy (from
+    /// sources, dissipated), J.
     pub(crate) fn leap_again(
         &mut self,
         span: usize,
         t: f64,
-        w: &[f64],
-        next: &mut [f64],
+        rows: Option<Way<'_>>,
+        (w, next): (&[f64], &mut [f64]),
         sizes: Sizes<'_>,
     ) -> Option<[f64; 2]> {
-        let (generator, work, loss) = (&self.generator, &mut self.work, &mut self.loss);
+        let (generator, ladder, work, loss) = (
+            &self.generator,
+            &mut self.ladder,
+            &mut self.work,
+            &mut self.loss,
+        );
         let dim = self.dim;
-        let (time, prepared) = self.recurring.get(span, |t| {
+        let ([time, _], prepared) = self.recurring.get(span, |[t, first]| {
             let (increment, lost) = Ladder::new(generator, t, expm::SQUARED, 0).increment(0)?;
             *loss = loss.max(lost.unwrap_or(0.0));
             let energy = work.as_mut().map(|work| work.span(t, generator, sizes));
@@ -199,7 +213,15 @@ impl Flow {
             let mut slope = Dense::zeros(dim, dim);
             slope.set_product(&Dense::of(generator), &whole);
             let flow = Kernel::stacked(&[&increment, &slope]);
-            Some(Prepared { flow, energy })
+            let rows = match rows {
+                Some(way) => {
+                    let step = ladder.increment(LONG)?.0;
+                    let mut ladder = Ladder::new(generator, first, expm::SQUARED, 0);
+                    followed(way, &ladder.increment(0)?.0, &step)
+                }
+                None => Kernel::default(),
+            };
+            Some(Prepared { flow, energy, rows })
         })?;
         let off = t - time;
         self.moved.resize(2 * dim, 0.0);
@@ -218,31 +240,27 @@ impl Flow {
         })
     }
 
+    /// The rows on the way of a span that was leapt over from w, the first of them after `first` seconds.
+    pub(crate) fn rows_again(&mut self, span: usize, first: f64, w: &[f64], rows: &mut [f64]) {
+        let Some(([_, time], prepared)) = self.recurring.get(span, |_| None) else {
+            return;
+        };
+        // exp(𝒜 first) w = exp(𝒜 time) exp(𝒜 off) w
+        let off = first - time;
+        let blocks = self.dim.div_ceil(BLOCK);
+        self.slopes.resize(blocks, [0.0; BLOCK]);
+        self.generator_kernel.apply(w, &mut self.slopes);
+        self.moved.clear();
+        let slopes = self.slopes.as_flattened();
+        self.moved
+            .extend(w.iter().zip(slopes).map(|(w, slope)| w + off * slope));
+        prepared.rows.apply(&self.moved, rows);
+    }
+
     /// The rows of `outputs` (so many) after 1, 2, …, `most` output steps, one below the other; `None` beyond doubles.
-    pub(crate) fn followed(
-        &mut self,
-        outputs: &Kernel,
-        rows: usize,
-        most: usize,
-    ) -> Option<Kernel> {
+    pub(crate) fn followed(&mut self, way: Way<'_>) -> Option<Kernel> {
         let (step, _) = self.ladder.increment(LONG)?;
-        let dim = self.dim;
-        let (mut increment, mut product) = (step.clone(), Dense::zeros(dim, dim));
-        let mut table = Dense::zeros(most * rows, dim);
-        let (mut column, mut output) = (vec![0.0; dim], vec![0.0; rows]);
-        for k in 0..most {
-            for j in 0..dim {
-                column.copy_from_slice(increment.column(j));
-                column[j] += 1.0;
-                outputs.apply(&column, &mut output);
-                table.column_mut(j)[k * rows..(k + 1) * rows].copy_from_slice(&output);
-            }
-            // (I + E)(I + F) = I + E + F + E F
-            product.set_product(&increment, &step);
-            increment.combine(1.0, 1.0, &step);
-            increment.combine(1.0, 1.0, &product);
-        }
-        Some(Kernel::stacked(&[&table]))
+        Some(followed(way, &step, &step))
     }
 
     /// Has the energy of these products integrated along the flow.
@@ -324,6 +342,43 @@ impl Flow {
     }
 }
 
+/// Output rows on the way.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Way<'a> {
+    /// Over w.
+    pub(crate) outputs: &'a Kernel,
+    /// Outputs of a row.
+    pub(crate) columns: usize,
+    /// Their number.
+    pub(crate) rows: usize,
+}
+
+/// The rows after exp(𝒜t) − I = `first` and every further `step`, one below the other.
+fn followed(way: Way<'_>, first: &Dense, step: &Dense) -> Kernel {
+    let Way {
+        outputs,
+        columns,
+        rows,
+    } = way;
+    let dim = step.columns();
+    let (mut increment, mut product) = (first.clone(), Dense::zeros(dim, dim));
+    let mut table = Dense::zeros(rows * columns, dim);
+    let (mut column, mut output) = (vec![0.0; dim], vec![0.0; columns]);
+    for k in 0..rows {
+        for j in 0..dim {
+            column.copy_from_slice(increment.column(j));
+            column[j] += 1.0;
+            outputs.apply(&column, &mut output);
+            table.column_mut(j)[k * columns..(k + 1) * columns].copy_from_slice(&output);
+        }
+        // (I + E)(I + F) = I + E + F + E F
+        product.set_product(&increment, step);
+        increment.combine(1.0, 1.0, step);
+        increment.combine(1.0, 1.0, &product);
+    }
+    Kernel::stacked(&[&table])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -374,6 +429,7 @@ mod tests {
         assert!((values[2] - rest).abs() < 1e-15);
     }
 
+    /// So are the rows on its way, whatever the time of the first.
     #[test]
     fn a_span_that_recurs_is_travelled_to_rounding_whatever_its_time() {
         let mut flow = oscillator(1e-3);
@@ -383,8 +439,14 @@ mod tests {
             source: false,
         }]);
         let t: f64 = 3e-4;
+        let (first, outputs) = (2e-5, Kernel::new(&DMatrix::identity(2, 2)));
+        let rows = Way {
+            outputs: &outputs,
+            columns: 2,
+            rows: 3,
+        };
         let span = (0..100)
-            .find_map(|_| flow.recurs(t, 1e-15))
+            .find_map(|_| flow.recurs([t, first], 1e-15))
             .expect("a span");
         let (mut next, amplitude) = (vec![0.0; 4], [1.0, 1.0]);
         let sizes = Sizes {
@@ -393,7 +455,7 @@ mod tests {
         };
         for t in [t, t - 1e-13, t + 1e-13] {
             let [_, dissipated] = flow
-                .leap_again(span, t, &[1.0, 0.0], &mut next, sizes)
+                .leap_again(span, t, Some(rows), (&[1.0, 0.0], &mut next), sizes)
                 .unwrap();
             let angle = 1e4 * t;
             let (s, c) = angle.sin_cos();
@@ -406,6 +468,15 @@ mod tests {
                 (dissipated - exact).abs() < 4e-15 * exact,
                 "{dissipated:e} {exact:e}"
             );
+        }
+        let mut rows = [0.0; 6];
+        for first in [first, first - 1e-13, first + 1e-13] {
+            flow.rows_again(span, first, &[1.0, 0.0], &mut rows);
+            for (k, row) in rows.as_chunks::<2>().0.iter().enumerate() {
+                let (s, c) = (1e4 * (first + k as f64 * 1e-3)).sin_cos();
+                let far = (row[0] - c).abs().max((row[1] - s).abs());
+                assert!(far < 1e-14, "{far:e}");
+            }
         }
     }
 }

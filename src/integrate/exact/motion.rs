@@ -1,7 +1,7 @@
 //! Moving along a mode until a time or until a guard falls through zero.
 
 use super::exosystem::Exosystem;
-use super::flow::{Flow, LONG};
+use super::flow::{Flow, LONG, Way};
 use super::inspect::Familiar;
 use super::polynomial;
 use super::series::Series;
@@ -247,28 +247,57 @@ impl Motion {
 
     /// One step to `stop` if that span recurs and nothing happens on it.
     fn travel_again(&mut self, flow: &mut Flow, exosystem: &Exosystem, stop: f64) -> bool {
-        let rest = stop - self.t;
         let same = GRID_ULPS * f64::EPSILON * stop.abs();
         // The output step is in the table.
-        if (rest - flow.step(LONG)).abs() <= same || rest > flow.step_limit(self.t - self.entered) {
+        if (stop - self.t - flow.step(LONG)).abs() <= same {
             return false;
         }
-        let Some(span) = flow.recurs(rest, same) else {
-            return false;
-        };
+        let again = self.leap_again(flow, stop, 0.0, None);
+        if let Some((_, energy)) = again {
+            self.arrive_again(flow, exosystem, stop, energy);
+        }
+        again.is_some()
+    }
+
+    /// A step to `stop` if that span recurs, with these rows on the way, the first of them after `first` seconds, and nothing happens
+    /// on it: its place and its energy (from sources, dissipated). The motion stays where it is until [`Self::arrive_again`].
+    pub(crate) fn leap_again(
+        &mut self,
+        flow: &mut Flow,
+        stop: f64,
+        first: f64,
+        rows: Option<Way<'_>>,
+    ) -> Option<(usize, [f64; 2])> {
+        let rest = stop - self.t;
+        if rest > flow.step_limit(self.t - self.entered) {
+            return None;
+        }
+        let same = GRID_ULPS * f64::EPSILON * stop.abs();
+        let span = flow.recurs([rest, first], same)?;
         let sizes = Sizes {
             amplitude: &self.amplitude,
             power: self.power,
         };
-        let Some(energy) = flow.leap_again(span, rest, &self.now, &mut self.next, sizes) else {
-            return false;
-        };
-        if self.judge(flow, rest) != Verdict::Clear {
-            return false;
+        let ends = (&self.now[..], &mut self.next[..]);
+        let energy = flow.leap_again(span, rest, rows, ends, sizes)?;
+        if self.judge(flow, rest) == Verdict::Clear {
+            return Some((span, energy));
         }
+        flow.refuse(span);
+        None
+    }
+
+    /// Ends [`Self::leap_again`].
+    pub(crate) fn arrive_again(
+        &mut self,
+        flow: &Flow,
+        exosystem: &Exosystem,
+        stop: f64,
+        energy: [f64; 2],
+    ) {
         self.part(energy);
-        self.take_next(flow, exosystem, stop, 1);
-        true
+        let steps = ((stop - self.t) / flow.step(LONG)).ceil();
+        self.take_next(flow, exosystem, stop, steps as u32);
     }
 
     /// Adds the energy (from sources, dissipated) of a step that is no span of the table.

@@ -22,7 +22,7 @@ pub(crate) struct Place {
 impl Exact<'_> {
     /// Ends in the present mode and tells where the run stands.
     pub(crate) fn leave(&mut self) -> Place {
-        self.end_ahead();
+        self.end_ahead(f64::NEG_INFINITY);
         self.take_storage();
         self.close_slides();
         self.mode = None;

@@ -405,7 +405,7 @@ impl<'a> Exact<'a> {
 
 impl Stepper for Exact<'_> {
     fn time(&self) -> f64 {
-        if self.ahead.pending() {
+        if self.ahead.leads() {
             self.ahead.t
         } else {
             self.motion.t
@@ -468,7 +468,7 @@ impl Stepper for Exact<'_> {
     }
 
     fn finish(&mut self) -> Outcome {
-        self.end_ahead();
+        self.end_ahead(f64::NEG_INFINITY);
         self.take_storage();
         self.note_end();
         let mut outcome = Outcome {
