@@ -171,6 +171,15 @@ pub fn source_work_of_jump(
     work
 }
 
+/// (from sources, dissipated), J, where storage elements s become s⁺ because a switch joins them to one another or to sources: the
+/// impulses in the loops (cut-sets) move s⁺ to where it is closest to s in the metric M of stored energy, so that ½ ΔᵀM Δ is lost,
+/// Δ = s⁺ − s, and the sources bring s⁺ᵀM Δ.
+pub(crate) fn taking_over(metric: &DMatrix<f64>, s: &[f64], after: &DVector<f64>) -> (f64, f64) {
+    let step = after - DVector::from_column_slice(s);
+    let charge = metric * &step;
+    (after.dot(&charge), 0.5 * step.dot(&charge))
+}
+
 /// Stored energy, J: ½ sᵀ M s of all storage elements, or ½ xᵀ P x where the system does not name them.
 #[must_use]
 pub fn stored(lcs: &Lcs, x: &[f64], u: &[f64]) -> f64 {
@@ -231,10 +240,11 @@ impl Balance {
         }
     }
 
-    /// Stored energy at the start, J.
-    #[must_use]
-    pub fn first(&self) -> f64 {
-        self.first
+    /// So much more is stored from the start on, J.
+    pub(crate) fn hold(&mut self, more: f64) {
+        self.first += more;
+        self.last += more;
+        self.largest = self.largest.max(self.last.abs());
     }
 
     /// The largest energy noted, J.

@@ -37,6 +37,9 @@ pub(super) fn pulse_corners(
         corners[4].0 = corners[3].0;
         return corners;
     }
+    if corners[3].0 < period * (1.0 - PERIOD_ROUNDING) {
+        return corners;
+    }
     for k in 1..5 {
         let (before, corner) = (corners[k - 1], corners[k]);
         if corner.0 > period * (1.0 + PERIOD_ROUNDING) {

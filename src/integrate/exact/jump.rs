@@ -45,17 +45,20 @@ impl Exact<'_> {
         let u = self.inputs(t);
         let free = self.plant.free(key)?;
         let s = free.storage(after, &u);
+        let joined = free.storage(x, &self.before);
+        let (brought, _) = energy::taking_over(&free.lcs.storage.metric, &self.storage, &joined);
         for (name, area) in free.impulses(p) {
             log.impulse(t, name, area);
         }
-        let source = energy::source_work_of_jump(
-            &free.lcs,
-            x.as_slice(),
-            after.as_slice(),
-            self.before.as_slice(),
-            u.as_slice(),
-            p.as_slice(),
-        );
+        let source = brought
+            + energy::source_work_of_jump(
+                &free.lcs,
+                x.as_slice(),
+                after.as_slice(),
+                self.before.as_slice(),
+                u.as_slice(),
+                p.as_slice(),
+            );
         let gain = self.metric.stored(s.as_slice()) - self.metric.stored(&self.storage);
         self.before = u;
         self.balance.add((source, source - gain));

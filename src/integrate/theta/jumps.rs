@@ -6,11 +6,7 @@ use crate::integrate::jump::Jump;
 impl Theta<'_> {
     /// The first jump, from inconsistent initial values.
     pub(super) fn begin(&mut self, log: &mut Log) -> Result<(), SimError> {
-        // Folding the storage vector into a state is part of the start: what it loses is dissipated.
         let u = self.now.u.clone();
-        let folded = energy::stored(&self.system().lcs, &self.now.x, &u);
-        let lost = self.now.balance.first() - folded;
-        self.now.balance.add((0.0, lost));
         self.jump(&u, log)?;
         self.note_energy();
         self.find_mode()?;
@@ -230,7 +226,6 @@ impl Theta<'_> {
     pub(super) fn change_position(&mut self, log: &mut Log) -> Result<(), SimError> {
         let old = self.system();
         let s = old.storage(&self.now.x, &self.now.u);
-        let stored = energy::stored(&old.lcs, &self.now.x, &self.now.u);
         let carried = self.now.estimate.as_ref().map(|estimate| {
             let error = estimate.error();
             old.lcs.storage.x.columns(0, error.len()) * DVector::from_column_slice(error)
@@ -258,9 +253,11 @@ impl Theta<'_> {
             self.now.active = vec![false; system.lcs.m()];
             self.now.pattern = vec![false; system.lcs.m()];
         }
-        // What the instant of switching loses (net of what sources deliver in it) is dissipated.
-        let gain = energy::stored(&system.lcs, &self.now.x, &self.now.u) - stored;
-        self.now.balance.add((0.0, -gain));
+        let joined = system.storage(&self.now.x, &self.now.u);
+        let metric = &system.lcs.storage.metric;
+        self.now
+            .balance
+            .add(energy::taking_over(metric, s.as_slice(), &joined));
         self.resize();
         self.switches.rebuild(&self.plant.systems[at].1.lcs);
         let u = self.now.u.clone();

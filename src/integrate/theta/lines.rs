@@ -36,8 +36,8 @@ impl Theta<'_> {
             .collect();
         self.now.u = self.inputs.all(self.now.t);
         self.u_next.clone_from(&self.now.u);
-        let stored = self.now.balance.first() + self.inputs.lines().stored(self.now.t);
-        self.now.balance = Balance::new(stored);
+        let waves = self.inputs.lines().stored(self.now.t);
+        self.now.balance.hold(waves);
         self.kept.copy_from(&self.now);
         self.longest = self.longest.min(self.inputs.lines().longest_step());
     }

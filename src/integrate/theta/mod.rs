@@ -227,10 +227,13 @@ impl<'a> Theta<'a> {
             }
         };
         let metric = &system.lcs.storage.metric;
-        let stored = if metric.nrows() == storage.len() {
-            0.5 * storage.dot(&(metric * &storage))
+        let balance = if metric.nrows() == storage.len() {
+            let mut balance = Balance::new(0.5 * storage.dot(&(metric * &storage)));
+            let joined = system.storage(x.as_slice(), &u);
+            balance.add(energy::taking_over(metric, storage.as_slice(), &joined));
+            balance
         } else {
-            energy::stored(&system.lcs, x.as_slice(), &u)
+            Balance::new(energy::stored(&system.lcs, x.as_slice(), &u))
         };
         let now = Now {
             t,
@@ -240,7 +243,7 @@ impl<'a> Theta<'a> {
             pattern: vec![false; system.lcs.m()],
             settle: true,
             system: at,
-            balance: Balance::new(stored),
+            balance,
             estimate: None,
         };
         let amplitudes = Amplitudes::new(&system.lcs, &inputs);

@@ -1,6 +1,8 @@
 //! Switches and jumps.
 
-use super::{at, simulate, times_after_start, times_of};
+use super::{at, circuit, simulate, times_after_start, times_of};
+use crate::integrate::{self, Method, SimOptions};
+use crate::mna;
 
 const MAFFEZZONI_SWITCHING: [f64; 10] = [
     12.564487, 30.693306, 49.264901, 68.179976, 87.359148, 106.739990, 126.274023, 145.923954,
@@ -104,6 +106,44 @@ fn charge_is_shared_through_a_closing_switch() {
         (run.energy.dissipated - loss).abs() < 1e-12 * loss,
         "{:?}",
         run.energy
+    );
+}
+
+/// By every method (energy from sources, dissipated), J.
+fn energies(text: &str, expected: (f64, f64)) {
+    let circuit = circuit(text);
+    let behaviour = mna::behaviour(&circuit).expect("a sound circuit");
+    for method in [Method::Exact, Method::Theta, Method::Euler] {
+        let options = SimOptions {
+            method,
+            ..SimOptions::default()
+        };
+        let run = integrate::simulate(&circuit, &behaviour, options).expect("a run");
+        let energy = run.energy;
+        let near = |value: f64, exact: f64| (value - exact).abs() < 1e-11 * expected.0.abs();
+        assert!(near(energy.source, expected.0), "{method:?} {energy:?}");
+        assert!(near(energy.dissipated, expected.1), "{method:?} {energy:?}");
+    }
+}
+
+/// An edge charges a capacitive divider to 2.5 V, which closes a switch at the same instant, whereupon it is at 2 V: the source
+/// brings 7.5 µC at 5 V in the mean, then 0.5 µC at 10 V.
+#[test]
+fn an_edge_that_moves_a_switch_works_once() {
+    let text = "V1 a 0 PULSE(0 10 1u 0 0 1 2)\nC1 a b 1u\nC2 b 0 3u\nS1 b d b 0 sw\nC3 d 0 1u\n.model sw SW(Vt=1 Vh=0 ideal)\n\
+        .tran 1u 2u uic\n.save v(b) v(d)";
+    let run = simulate(text);
+    assert!((at(&run, 2e-6, "v(b)") - 2.0).abs() < 1e-14);
+    assert!((at(&run, 2e-6, "v(d)") - 2.0).abs() < 1e-14);
+    energies(text, (42.5e-6, 2.5e-6));
+}
+
+/// A capacitor across a source takes its voltage at the start: 5 µC flow back into 5 V.
+#[test]
+fn a_source_takes_back_what_a_capacitor_has_too_much() {
+    energies(
+        "V1 1 0 5\nC1 1 0 1u IC=10\n.tran 1u 2u uic",
+        (-25e-6, 12.5e-6),
     );
 }
 
