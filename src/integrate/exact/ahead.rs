@@ -20,6 +20,8 @@ const LARGEST: usize = 1 << 16;
 #[derive(Debug, Clone)]
 pub(crate) struct Rows {
     columns: usize,
+    /// Whether tables are worth their entries.
+    fits: bool,
     /// Single rows so far, and after how many there is a table.
     singles: usize,
     patience: usize,
@@ -33,8 +35,9 @@ impl Rows {
         let fits = MOST * columns * dim <= LARGEST;
         Self {
             columns,
+            fits,
             singles: 0,
-            patience: if fits { PATIENCE * dim } else { usize::MAX },
+            patience: PATIENCE * dim,
             table: None,
         }
     }
@@ -50,7 +53,7 @@ impl Rows {
 
     /// Whether there is a table, made once it is worth it.
     fn ready(&mut self, flow: &mut Flow, outputs: &Kernel) -> bool {
-        if self.table.is_none() {
+        if self.table.is_none() && self.fits {
             self.singles += 1;
             if self.singles >= self.patience {
                 self.table = flow.followed(self.way(outputs, MOST));
@@ -164,6 +167,7 @@ impl Exact<'_> {
     fn stretch_ahead(&mut self, at: usize, t: f64, next: f64) -> bool {
         let negligible = GRID_ULPS * f64::EPSILON * next.abs();
         if self.motion.t > self.motion.entered
+            || t <= self.motion.t + negligible
             || next <= t + negligible
             || next > self.until + negligible
         {
@@ -177,7 +181,7 @@ impl Exact<'_> {
         } = &mut self.plant.modes[at];
         let h = flow.step(LONG);
         let between = ((next - negligible - t) / h).floor();
-        if between >= MOST_BETWEEN || rows.patience == usize::MAX {
+        if between >= MOST_BETWEEN || !rows.fits {
             return false;
         }
         let count = between as usize + 1;
@@ -187,12 +191,10 @@ impl Exact<'_> {
         };
         let ahead = &mut self.ahead;
         ahead.values.resize(count * rows.columns, 0.0);
-        flow.rows_again(
-            span,
-            first,
-            &self.motion.now[..flow.dim()],
-            &mut ahead.values,
-        );
+        let w = &self.motion.now[..flow.dim()];
+        if !flow.rows_again(span, first, w, &mut ahead.values) {
+            return false;
+        }
         (ahead.begin, ahead.t, ahead.stop) = (t - h, t, Some((next, energy)));
         (ahead.count, ahead.taken) = (count, 1);
         true

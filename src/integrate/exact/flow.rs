@@ -240,11 +240,20 @@ impl Flow {
         })
     }
 
-    /// The rows on the way of a span that was leapt over from w, the first of them after `first` seconds.
-    pub(crate) fn rows_again(&mut self, span: usize, first: f64, w: &[f64], rows: &mut [f64]) {
+    /// The rows on the way of a span that was leapt over from w, the first of them after `first` seconds; `false` if it has other rows.
+    pub(crate) fn rows_again(
+        &mut self,
+        span: usize,
+        first: f64,
+        w: &[f64],
+        rows: &mut [f64],
+    ) -> bool {
         let Some(([_, time], prepared)) = self.recurring.get(span, |_| None) else {
-            return;
+            return false;
         };
+        if prepared.rows.rows() != rows.len() {
+            return false;
+        }
         // exp(𝒜 first) w = exp(𝒜 time) exp(𝒜 off) w
         let off = first - time;
         let blocks = self.dim.div_ceil(BLOCK);
@@ -255,6 +264,7 @@ impl Flow {
         self.moved
             .extend(w.iter().zip(slopes).map(|(w, slope)| w + off * slope));
         prepared.rows.apply(&self.moved, rows);
+        true
     }
 
     /// The rows of `outputs` (so many) after 1, 2, …, `most` output steps, one below the other; `None` beyond doubles.
@@ -471,7 +481,8 @@ mod tests {
         }
         let mut rows = [0.0; 6];
         for first in [first, first - 1e-13, first + 1e-13] {
-            flow.rows_again(span, first, &[1.0, 0.0], &mut rows);
+            assert!(flow.rows_again(span, first, &[1.0, 0.0], &mut rows));
+            assert!(!flow.rows_again(span, first, &[1.0, 0.0], &mut [0.0; 4]));
             for (k, row) in rows.as_chunks::<2>().0.iter().enumerate() {
                 let (s, c) = (1e4 * (first + k as f64 * 1e-3)).sin_cos();
                 let far = (row[0] - c).abs().max((row[1] - s).abs());

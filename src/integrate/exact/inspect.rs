@@ -145,6 +145,7 @@ impl Inspector {
             familiar.scale.clear();
             familiar.scale.extend_from_slice(scale);
             mode.inject.largest(scale, &mut familiar.amplitude);
+            familiar.sizes.clear();
         }
         mode.flow.read_guards(&mut self.w);
         let (w, guards) = self.w.split_at(mode.flow.dim());

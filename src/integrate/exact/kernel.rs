@@ -56,6 +56,11 @@ impl Kernel {
         }
     }
 
+    /// Number of rows.
+    pub(super) fn rows(&self) -> usize {
+        self.rows
+    }
+
     /// Every entry through `f`, which leaves zero as it is.
     pub(crate) fn map(&self, f: impl Fn(f64) -> f64) -> Self {
         Self {
