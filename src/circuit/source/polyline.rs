@@ -68,10 +68,11 @@ struct Lap {
 impl Lap {
     /// Time of a point.
     fn time(&self, &(at, _): &(f64, f64)) -> f64 {
-        if at >= self.whole {
+        let time = self.begin + at;
+        if at >= self.whole || time > self.next {
             self.next
         } else {
-            (self.begin + at).min(self.next)
+            time
         }
     }
 }
@@ -151,8 +152,7 @@ impl<'a> Polyline<'a> {
             0
         };
         let lap = self.on_axis(number);
-        let passed = |point: &(f64, f64)| !side.before(t, lap.time(point));
-        let passed = begin + self.points[begin..].partition_point(passed);
+        let passed = self.passed(&lap, begin, t, side);
         if passed == begin {
             return Segment::constant(initial, f64::NEG_INFINITY, lap.time(&self.points[begin]));
         }
@@ -168,6 +168,21 @@ impl<'a> Polyline<'a> {
             first,
             last,
         }
+    }
+
+    /// Index after the last point of the lap that `t` has passed.
+    fn passed(&self, lap: &Lap, begin: usize, t: f64, side: Side) -> usize {
+        // Unlike `partition_point` with branches: the answer is mostly the one before.
+        let (mut low, mut high) = (begin, self.points.len());
+        while low < high {
+            let middle = (low + high) / 2;
+            if side.before(t, lap.time(&self.points[middle])) {
+                high = middle;
+            } else {
+                low = middle + 1;
+            }
+        }
+        low
     }
 
     /// The lap `t` falls into, from 0.
