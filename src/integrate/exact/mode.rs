@@ -89,7 +89,6 @@ pub(crate) struct Map {
     map: Kernel,
     /// |map|.
     sizes: Kernel,
-    rows: usize,
 }
 
 impl Map {
@@ -98,19 +97,18 @@ impl Map {
         Self {
             sizes: map.map(f64::abs),
             map,
-            rows: matrix.nrows(),
         }
     }
 
     /// `values` = map · w.
     pub(crate) fn values(&self, w: &[f64], values: &mut Vec<f64>) {
-        values.resize(self.rows, 0.0);
+        values.resize(self.map.rows(), 0.0);
         self.map.apply(w, values);
     }
 
     /// `largest` = |map| · sizes.
     pub(crate) fn largest(&self, sizes: &[f64], largest: &mut Vec<f64>) {
-        largest.resize(self.rows, 0.0);
+        largest.resize(self.map.rows(), 0.0);
         self.sizes.apply(sizes, largest);
     }
 }
