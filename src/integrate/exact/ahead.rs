@@ -2,7 +2,6 @@
 
 use super::flow::{Flow, LONG, Way};
 use super::kernel::Kernel;
-use super::mode::Mode;
 use super::motion::GRID_ULPS;
 use super::stepper::Exact;
 use crate::integrate::run::Times;
@@ -173,12 +172,8 @@ impl Exact<'_> {
         {
             return false;
         }
-        let Mode {
-            flow,
-            outputs,
-            rows,
-            ..
-        } = &mut self.plant.modes[at];
+        let mode = &mut self.plant.modes[at];
+        let (flow, outputs, rows) = (&mut mode.flow, &mode.outputs, &mut mode.rows);
         let h = flow.step(LONG);
         let between = ((next - negligible - t) / h).floor();
         if between >= MOST_BETWEEN || !rows.fits {
@@ -205,12 +200,8 @@ impl Exact<'_> {
         if self.stretch_ahead(at, t, next) {
             return true;
         }
-        let Mode {
-            flow,
-            outputs,
-            rows,
-            ..
-        } = &mut self.plant.modes[at];
+        let mode = &mut self.plant.modes[at];
+        let (flow, outputs, rows) = (&mut mode.flow, &mode.outputs, &mut mode.rows);
         let h = flow.step(LONG);
         let negligible = GRID_ULPS * f64::EPSILON * (t + MOST as f64 * h).abs();
         if !self.motion.steady

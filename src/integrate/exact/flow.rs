@@ -267,7 +267,7 @@ impl Flow {
         true
     }
 
-    /// The rows of `outputs` (so many) after 1, 2, …, `most` output steps, one below the other; `None` beyond doubles.
+    /// These rows, the first after an output step, one below the other; `None` beyond doubles.
     pub(crate) fn followed(&mut self, way: Way<'_>) -> Option<Kernel> {
         let (step, _) = self.ladder.increment(LONG)?;
         Some(followed(way, &step, &step))

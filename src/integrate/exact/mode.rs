@@ -232,9 +232,10 @@ impl Mode {
             clocks.iter().any(|clock| clock.switch == i)
                 || drives.iter().any(|drive| {
                     let row = controls.row(i);
+                    let (x, z) = row.columns_range_pair(..n, n..);
                     drive.switch == i
-                        && row.columns(0, n).iter().all(|v| *v == 0.0)
-                        && row.iter().skip(n).eq(drive.row.iter())
+                        && x.iter().all(|v| *v == 0.0)
+                        && drive.is(z.clone_owned().as_slice())
                 })
         };
         let guarded = |i: &usize| {

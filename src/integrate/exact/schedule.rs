@@ -13,9 +13,7 @@ use crate::lcs::{Lcs, Rows};
 pub(crate) struct Drive {
     /// The switch.
     pub(crate) switch: usize,
-    /// Over z.
-    pub(crate) row: Vec<f64>,
-    /// What is not zero in the row, by column.
+    /// What is not zero in its row over z, by column.
     terms: Vec<(usize, f64)>,
     /// The same of its derivative, row · S.
     slopes: Vec<(usize, f64)>,
@@ -46,7 +44,6 @@ pub(crate) fn drives(lcs: &Lcs, exosystem: &Exosystem, clocks: &[Clock]) -> Vec<
                         .tr_mul(&DVector::from_column_slice(&row))
                         .as_slice(),
                 ),
-                row,
                 next: f64::INFINITY,
             })
         })
@@ -65,6 +62,11 @@ fn dot(terms: &[(usize, f64)], z: &[f64]) -> f64 {
 }
 
 impl Drive {
+    /// Whether it is the control with this row over z.
+    pub(crate) fn is(&self, row: &[f64]) -> bool {
+        self.terms == terms(row)
+    }
+
     /// c at z.
     pub(crate) fn control(&self, z: &[f64]) -> f64 {
         dot(&self.terms, z)
