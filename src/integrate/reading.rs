@@ -76,3 +76,22 @@ pub fn impulse(rows: &Rows, i: usize, p: &[f64], step_of_u: &[f64]) -> f64 {
     }
     sum
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{dmatrix, dvector};
+
+    #[test]
+    fn rows_of_sources_alone_need_no_state() {
+        let mut rows = Rows {
+            x: dmatrix![0.0; 0.0],
+            u: dmatrix![2.0; -1.0],
+            one: dvector![1.0, 0.5],
+            ..Rows::default()
+        };
+        assert_eq!(of_sources(&rows, &[3.0]), Some(vec![7.0, -2.5]));
+        rows.x[1] = 1e-300;
+        assert_eq!(of_sources(&rows, &[3.0]), None);
+    }
+}
