@@ -1,0 +1,1 @@
+//! Curved laws: diodes and transistors that take part in jumps.

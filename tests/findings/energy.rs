@@ -1,0 +1,1 @@
+//! Energy, stated errors and verification.

@@ -1,0 +1,1 @@
+//! What netlists say: sources, start values, devices.

@@ -1,0 +1,1 @@
+//! Changes of mode: switches that move together, and jumps.

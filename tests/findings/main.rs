@@ -1,0 +1,52 @@
+//! Netlists that once ended with a wrong answer, an endless run or a refusal without help, each with what is right.
+//!
+//! Answers come from closed forms, from ngspice with converged steps, or from the same circuit with finite resistances; the
+//! netlists stand beside this file.
+
+#![allow(dead_code, reason = "each module uses its part")]
+
+mod curved;
+mod energy;
+mod front;
+mod jumps;
+mod numbers;
+mod output;
+#[path = "../runs/mod.rs"]
+mod runs;
+
+use std::path::{Path, PathBuf};
+
+use circ::circuit::{Circuit, ElaborateOptions};
+use circ::integrate::{Method, Run, SimError, SimOptions, simulate};
+use circ::mna::behaviour;
+use circ::netlist::load;
+
+/// The path of `tests/findings/NAME.cir`.
+fn path(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/findings/{name}.cir"))
+}
+
+/// The circuit of `tests/findings/NAME.cir`.
+fn circuit(name: &str) -> Circuit {
+    let loaded = load(&path(name), &ElaborateOptions::default());
+    loaded
+        .circuit
+        .unwrap_or_else(|| panic!("{name}: {:?}", loaded.diagnostics))
+}
+
+/// Its run by a method, with rows at events.
+fn attempt(name: &str, method: Method) -> Result<Run, SimError> {
+    let circuit = circuit(name);
+    let behaviour = behaviour(&circuit).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+    let options = SimOptions {
+        method,
+        events: true,
+        ..SimOptions::default()
+    };
+    simulate(&circuit, &behaviour, options)
+}
+
+/// As [`attempt`], of a run that must end well.
+fn run(name: &str, method: Method) -> Run {
+    attempt(name, method).unwrap_or_else(|e| panic!("{name}: {e}"))
+}

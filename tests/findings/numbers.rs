@@ -1,0 +1,1 @@
+//! Extreme values: resistances over many decades, equal eigenvalues, long chains.
