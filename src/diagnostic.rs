@@ -180,8 +180,54 @@ impl Diagnostic {
     }
 }
 
+/// A broken invariant of this program: its own fault, never the circuit's, and never a result.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Internal {
+    /// Where in the program, `lcs::reduce`.
+    pub place: &'static str,
+    /// What does not hold, with the names of the circuit's elements concerned.
+    pub what: String,
+}
+
+impl Internal {
+    /// What does not hold at this place.
+    pub fn new(place: &'static str, what: impl Into<String>) -> Self {
+        Self {
+            place,
+            what: what.into(),
+        }
+    }
+}
+
+impl fmt::Display for Internal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { place, what } = self;
+        write!(
+            f,
+            "internal error in {place}: {what}; this is a fault of circ, not of the circuit: please report it with the netlist"
+        )
+    }
+}
+
+impl std::error::Error for Internal {}
+
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.message)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_internal_error_names_the_place_and_asks_for_the_netlist() {
+        let error = Internal::new("lcs::reduce", "v(c1) has no column").to_string();
+        assert!(
+            error.contains("lcs::reduce: v(c1) has no column"),
+            "{error}"
+        );
+        assert!(error.contains("report it with the netlist"), "{error}");
     }
 }

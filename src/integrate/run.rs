@@ -4,7 +4,9 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::circuit::Tran;
+use crate::diagnostic::Internal;
 use crate::integrate::{Energy, Impulse, Run, Stats};
+use crate::lcs::ReduceError;
 use crate::waveform::Waveforms;
 
 /// A simulation that ended early: when, at which device, and why, with everything computed so far.
@@ -82,6 +84,25 @@ pub enum Reason {
     /// The method asked for does not cover the circuit.
     #[error("{0}")]
     Unsupported(String),
+    /// A broken invariant.
+    #[error("{0}")]
+    Internal(Internal),
+}
+
+impl Reason {
+    /// A broken invariant: what does not hold at this place of the program, as `integrate::exact`.
+    pub fn internal(place: &'static str, what: impl Into<String>) -> Self {
+        Self::Internal(Internal::new(place, what))
+    }
+}
+
+impl From<ReduceError> for Reason {
+    fn from(error: ReduceError) -> Self {
+        match error {
+            ReduceError::Internal(broken) => Self::Internal(broken),
+            error => Self::Circuit(error.to_string()),
+        }
+    }
 }
 
 impl SimError {

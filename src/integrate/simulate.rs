@@ -175,8 +175,7 @@ impl Problem<'_> {
             switches: switches.to_vec(),
             storage: StorageHold::Dynamic,
         };
-        reduce(&self.behaviour, &position)
-            .map_err(|error| SimError::before(Reason::Circuit(error.to_string())))
+        reduce(&self.behaviour, &position).map_err(|error| SimError::before(error.into()))
     }
 
     /// The system of a position with all devices free.

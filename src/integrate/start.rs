@@ -360,9 +360,7 @@ fn static_solution(
             ..position
         };
         match reduce(behaviour, &moving) {
-            Err(e @ ReduceError::Sources { .. }) => {
-                SimError::before(Reason::Circuit(e.to_string()))
-            }
+            Err(e @ ReduceError::Sources { .. }) => SimError::before(e.into()),
             _ => error,
         }
     })?;
@@ -438,7 +436,10 @@ fn check_constraints(lcs: &Lcs, at: Point<'_>) -> Result<(), SimError> {
 }
 
 fn no_point(error: &ReduceError) -> SimError {
-    SimError::before(Reason::NoOperatingPoint(error.to_string()))
+    SimError::before(match error {
+        ReduceError::Internal(_) => error.clone().into(),
+        error => Reason::NoOperatingPoint(error.to_string()),
+    })
 }
 
 /// The start of a transient: [`from_initial_conditions`] with `uic`, else the [`operating_point`] with `.ic` held.

@@ -311,6 +311,8 @@ impl Behaviour {
         order.iter().enumerate().for_each(|(k, &c)| rank[c] = k);
         let internal = sort.iter().filter(|s| **s == 0).count();
         let visible = count - self.observed.len();
+        let mut observed: Vec<usize> = (0..self.observed.len()).collect();
+        observed.sort_by_key(|&k| self.observed[k].column);
 
         let mut rows = Vec::with_capacity(self.equations.len());
         let mut readings: Vec<SparseRow<F>> = vec![Vec::new(); self.observed.len()];
@@ -329,10 +331,9 @@ impl Behaviour {
             match row.last() {
                 // value = Σ terms is written Σ terms − value = 0.
                 Some(last) if last.0 >= visible => {
-                    let name = order[last.0];
-                    let k = self.observed.iter().position(|o| o.column == name);
+                    let k = observed[last.0 - visible];
                     row.pop();
-                    readings[k.unwrap_or_default()] = row;
+                    readings[k] = row;
                 }
                 _ => rows.push(row),
             }

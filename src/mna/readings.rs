@@ -123,17 +123,13 @@ impl Assembly<'_> {
             self.observed(probe.name, unit, equation);
         }
         self.out.probes = self.out.observed.len();
-        for k in 0..self.out.switches.len() {
-            let name = self.out.switches[k].name.clone();
-            let control = circuit
-                .elements
-                .iter()
-                .find(|e| e.name == name)
-                .and_then(|e| match &e.kind {
-                    Kind::Switch(s) => Some(&s.control),
-                    _ => None,
-                });
-            let equation = control.map(|c| self.affine(c)).unwrap_or_default();
+        // The switches stand in the order of their elements.
+        let switches = circuit.elements.iter().filter_map(|e| match &e.kind {
+            Kind::Switch(switch) => Some((&e.name, &switch.control)),
+            _ => None,
+        });
+        for (k, (name, control)) in switches.enumerate() {
+            let equation = self.affine(control);
             self.out.switches[k].control = self.observed(format!("{name}.control"), "V", equation);
         }
         let ports = circuit.lines.iter().flat_map(|line| &line.ports);

@@ -235,7 +235,13 @@ impl Driver {
 
     /// The solve on one active set, cached.
     fn on_set(&mut self, active: &[bool]) -> &ActiveSolve {
-        let at = if let Some(at) = self.sets.iter().position(|(set, _)| set == active) {
+        let at = self.set(active);
+        &self.sets[at].1
+    }
+
+    /// The place of the solve on one active set.
+    fn set(&mut self, active: &[bool]) -> usize {
+        if let Some(at) = self.sets.iter().position(|(set, _)| set == active) {
             at
         } else {
             if self.sets.len() == KEPT_SETS {
@@ -245,17 +251,11 @@ impl Driver {
             self.sets
                 .push((active.to_vec(), ActiveSolve::new(&self.scaled.m, active)));
             self.sets.len() - 1
-        };
-        &self.sets[at].1
+        }
     }
 
     fn refined_on(&mut self, active: &[bool]) -> DVector<f64> {
-        self.on_set(active);
-        let at = self
-            .sets
-            .iter()
-            .position(|(set, _)| set == active)
-            .unwrap_or(0);
+        let at = self.set(active);
         self.sets[at].1.refined(&self.scaled)
     }
 

@@ -106,7 +106,6 @@ impl<'a> Assembler<'a> {
         switches: &[bool],
         sliding: &[usize],
     ) -> Result<Lcs, SimError> {
-        let circuit = |error: String| SimError::before(Reason::Circuit(error));
         if sliding.is_empty() {
             if let Some((_, lcs)) = self
                 .known
@@ -119,7 +118,7 @@ impl<'a> Assembler<'a> {
                 switches: switches.to_vec(),
                 storage: StorageHold::Dynamic,
             };
-            return reduce(self.behaviour, &position).map_err(|e| circuit(e.to_string()));
+            return reduce(self.behaviour, &position).map_err(|e| SimError::before(e.into()));
         }
         let at = match self.sliding.iter().position(|(s, _)| s == sliding) {
             Some(at) => at,
@@ -129,9 +128,10 @@ impl<'a> Assembler<'a> {
                 for &k in sliding.iter().rev() {
                     let switch = &self.behaviour.switches[k];
                     let level = 0.5 * (switch.on_above + switch.off_below);
-                    behaviour = behaviour
-                        .sliding(k, level)
-                        .ok_or_else(|| circuit("no such switch".into()))?;
+                    behaviour = behaviour.sliding(k, level).ok_or_else(|| {
+                        let what = format!("{} cannot slide", switch.name);
+                        SimError::before(Reason::internal("integrate::exact", what))
+                    })?;
                 }
                 self.sliding.push((sliding.to_vec(), behaviour));
                 self.sliding.len() - 1
@@ -145,6 +145,6 @@ impl<'a> Assembler<'a> {
             switches: left.map(|k| switches[k]).collect(),
             storage: StorageHold::Dynamic,
         };
-        reduce(&self.sliding[at].1, &position).map_err(|e| circuit(e.to_string()))
+        reduce(&self.sliding[at].1, &position).map_err(|e| SimError::before(e.into()))
     }
 }

@@ -274,7 +274,12 @@ impl<'a> Exact<'a> {
 
     /// A guard fell through zero.
     fn fired(&mut self, guard: usize, log: &mut Log) -> Result<(), SimError> {
-        let from = self.mode.unwrap_or(0);
+        let Some(from) = self.mode else {
+            return Err(self.fail(Reason::internal(
+                "integrate::exact",
+                "a guard fired in no mode",
+            )));
+        };
         self.take_storage();
         self.same_instant(from);
         let mut key = std::mem::take(&mut self.key);
@@ -424,7 +429,7 @@ impl Stepper for Exact<'_> {
             let due = next <= t + SAME_TIME_ULPS * f64::EPSILON * t.abs();
             let stop = if due { next.min(t) } else { t };
             let Some(at) = self.mode else {
-                return Err(self.fail(Reason::Infeasible));
+                return Err(self.fail(Reason::internal("integrate::exact", "a run in no mode")));
             };
             if (!due && t <= self.motion.t) || self.step_ahead(at, t, next) {
                 return Ok(());

@@ -1,9 +1,10 @@
 //! A behaviour eliminated in class order.
 
 use crate::algebra::{Elimination, Field, Matrix};
+use crate::diagnostic::Internal;
 use crate::mna::{Behaviour, Column, Reduced};
 
-use super::{ClassOrder, Hold, Position, StorageHold};
+use super::{ClassOrder, Hold, Position, ReduceError, StorageHold};
 
 /// What a column of the behaviour is in a position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,10 +54,17 @@ impl<'b, F: Field> Eliminated<'b, F> {
         reduced: &'b Reduced<F>,
         position: &'b Position,
         order: ClassOrder,
-    ) -> Self {
+    ) -> Result<Self, ReduceError> {
         let matrix = reduced.matrix.clone();
         // Every column but the internal ones that were eliminated has a place.
-        let place = |c: Column| reduced.place[c].unwrap_or_default();
+        let place = |c: Column| {
+            let name = || behaviour.columns.get(c).map_or("a column", String::as_str);
+            let lost = || Internal::new("lcs::reduce", format!("{} has no place", name()));
+            let place = reduced.place.get(c).copied().flatten();
+            place.ok_or_else(|| ReduceError::Internal(lost()))
+        };
+        let storage = behaviour.storage.iter();
+        let pairs = behaviour.pairs.iter();
         let mut eliminated = Self {
             behaviour,
             reduced,
@@ -64,24 +72,25 @@ impl<'b, F: Field> Eliminated<'b, F> {
             found: Elimination::new(reduced.equations, matrix.cols()),
             columns: vec![Columns::Unknown; matrix.cols()],
             matrix,
-            state: behaviour.storage.iter().map(|s| place(s.state)).collect(),
-            rate: behaviour.storage.iter().map(|s| place(s.flow)).collect(),
-            pairs: behaviour
-                .pairs
-                .iter()
-                .map(|p| (place(p.reverse), place(p.forward)))
-                .collect(),
+            state: (storage.clone().map(|s| place(s.state))).collect::<Result<_, _>>()?,
+            rate: storage.map(|s| place(s.flow)).collect::<Result<_, _>>()?,
+            pairs: pairs
+                .map(|p| Ok((place(p.reverse)?, place(p.forward)?)))
+                .collect::<Result<_, ReduceError>>()?,
             free: Vec::new(),
             held: Vec::new(),
             unknown: Vec::new(),
         };
-        eliminated.assign(&place);
+        eliminated.assign(&place)?;
         eliminated.run(order);
-        eliminated
+        Ok(eliminated)
     }
 
     /// Says of every column what it is, and puts held quantities in.
-    fn assign(&mut self, place: &impl Fn(Column) -> usize) {
+    fn assign(
+        &mut self,
+        place: &impl Fn(Column) -> Result<usize, ReduceError>,
+    ) -> Result<(), ReduceError> {
         let behaviour = self.behaviour;
         let is_static = self.position.storage == StorageHold::Static;
         for k in 0..self.state.len() {
@@ -96,13 +105,13 @@ impl<'b, F: Field> Eliminated<'b, F> {
             }
         }
         for (k, source) in behaviour.sources.iter().enumerate() {
-            self.columns[place(source.value)] = Columns::Given(k);
+            self.columns[place(source.value)?] = Columns::Given(k);
             if let Some(rate) = source.rate {
-                self.columns[place(rate)] = Columns::GivenRate(k);
+                self.columns[place(rate)?] = Columns::GivenRate(k);
             }
             let letter = if source.input.unit == "V" { 'i' } else { 'v' };
             self.unknown.push((
-                place(source.other),
+                place(source.other)?,
                 format!("{letter}({})", source.input.name),
             ));
         }
@@ -128,7 +137,7 @@ impl<'b, F: Field> Eliminated<'b, F> {
             }
         }
         for (k, switch) in behaviour.switches.iter().enumerate() {
-            let (v, i) = (place(switch.v), place(switch.i));
+            let (v, i) = (place(switch.v)?, place(switch.i)?);
             let (ron, roff) = &self.reduced.switches[k];
             match if self.position.switches[k] {
                 Some(ron)
@@ -153,9 +162,10 @@ impl<'b, F: Field> Eliminated<'b, F> {
             }
         }
         for &c in &self.reduced.free {
-            self.unknown.push((place(c), behaviour.columns[c].clone()));
+            self.unknown.push((place(c)?, behaviour.columns[c].clone()));
         }
-        self.columns[place(Behaviour::ONE)] = Columns::One;
+        self.columns[place(Behaviour::ONE)?] = Columns::One;
+        Ok(())
     }
 
     fn drop_column(&mut self, column: usize) {
@@ -263,5 +273,26 @@ impl<'b, F: Field> Eliminated<'b, F> {
 
     pub(super) fn source(&self, k: usize) -> String {
         self.behaviour.sources[k].input.name.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mna::behaviour;
+    use crate::mna::fixture::circuit;
+
+    #[test]
+    fn a_column_without_a_place_is_an_internal_error_that_names_it() {
+        let behaviour = behaviour(&circuit("v1 1 0 1\n r1 1 2 1\n c1 2 0 1u")).unwrap();
+        let position = Position::free(&behaviour, Vec::new());
+        let mut reduced = behaviour.ball().clone();
+        reduced.place[behaviour.storage[0].state] = None;
+        let Err(error) = Eliminated::new(&behaviour, &reduced, &position, ClassOrder::Standard)
+        else {
+            panic!("a system without the place of a state");
+        };
+        let words = error.to_string();
+        assert!(words.contains("lcs::reduce: v(c1) has no place"), "{words}");
     }
 }

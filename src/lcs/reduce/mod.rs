@@ -22,6 +22,7 @@ mod publish;
 mod system;
 
 use crate::algebra::Field;
+use crate::diagnostic::Internal;
 use crate::mna::{Behaviour, Reduced};
 
 use super::{Hold, Lcs, Role};
@@ -114,6 +115,9 @@ pub enum ReduceError {
         /// Storage labels.
         elements: Vec<String>,
     },
+    /// A broken invariant.
+    #[error("{0}")]
+    Internal(Internal),
 }
 
 fn conflict(elements: &[String]) -> String {
@@ -193,7 +197,7 @@ fn in_some_order<F: Field>(
     reduced: &Reduced<F>,
     position: &Position,
 ) -> Result<Reduction<F>, ReduceError> {
-    let first = Eliminated::new(behaviour, reduced, position, ClassOrder::Standard).system();
+    let first = Eliminated::new(behaviour, reduced, position, ClassOrder::Standard)?.system();
     let Err(error) = first else { return first };
     if matches!(error, ReduceError::Sources { .. }) || position.storage == StorageHold::Static {
         return Err(error);
@@ -206,7 +210,7 @@ fn in_some_order<F: Field>(
     .into_iter()
     .find_map(|order| {
         Eliminated::new(behaviour, reduced, position, order)
-            .system()
+            .and_then(Eliminated::system)
             .ok()
     })
     .ok_or(error)
@@ -274,7 +278,7 @@ pub(super) mod oracle {
     ) -> bool {
         let order = ClassOrder::Standard;
         Eliminated::new(behaviour, behaviour.ball(), position, order)
-            .system()
+            .and_then(Eliminated::system)
             .is_ok()
     }
 }
