@@ -70,6 +70,14 @@ impl Inputs {
         (0..self.sources.len()).map(|j| self.value(j, t)).collect()
     }
 
+    /// Left limits u(t⁻) of all inputs.
+    #[must_use]
+    pub fn all_before(&self, t: f64) -> Vec<f64> {
+        let mut u = self.all(t);
+        self.left(t, &mut u);
+        u
+    }
+
     /// Writes right limits of the varying inputs.
     pub fn right(&self, t: f64, u: &mut [f64]) {
         for &j in &self.varying {

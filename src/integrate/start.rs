@@ -48,8 +48,8 @@ pub struct OperatingPoint {
 pub enum Values {
     /// Their `DC` values (`.op`).
     Dc,
-    /// Their waveforms at t = 0 (start of a transient).
-    AtZero,
+    /// Their waveforms at t = 0⁻ (start of a transient): an edge at t = 0 acts after it.
+    BeforeZero,
 }
 
 /// Storage values from `IC=` cards, else from differences of `.ic` node voltages for capacitors, else 0 (`uic`).
@@ -340,7 +340,7 @@ fn static_solution(
         .iter()
         .map(|i| match values {
             Values::Dc => i.source.dc,
-            Values::AtZero => i.source.value(0.0),
+            Values::BeforeZero => i.source.value_left(0.0),
         })
         .collect();
     let q = &lcs.g * DVector::from_column_slice(&u) + &lcs.f;
@@ -466,7 +466,7 @@ pub fn initial(
             notes: Vec::new(),
         });
     }
-    let point = operating_point(circuit, Values::AtZero, true, settings)?;
+    let point = operating_point(circuit, Values::BeforeZero, true, settings)?;
     let mut notes = point.notes;
     for s in behaviour.storage.iter().filter(|s| s.initial.is_some()) {
         notes.push(format!("IC= of {} is ignored without uic", s.element));

@@ -1,1 +1,126 @@
 //! What netlists say: sources, start values, devices.
+
+use std::io::ErrorKind;
+
+use circ::circuit::{Circuit, ElaborateOptions, elaborate};
+use circ::diagnostic::SourceMap;
+use circ::integrate::{Method, Run, SimOptions, simulate};
+use circ::mna::behaviour;
+use circ::netlist::parse;
+
+use crate::run;
+
+const METHODS: [Method; 3] = [Method::Exact, Method::Euler, Method::Theta];
+
+/// The circuit of a netlist without includes.
+fn read(text: &str) -> Circuit {
+    let mut sources = SourceMap::default();
+    let root = sources.add("test.cir", text);
+    let (netlist, faults) = parse(&mut sources, root, &|_| Err(ErrorKind::NotFound.into()));
+    let (circuit, more) = elaborate(&netlist, &ElaborateOptions::default());
+    circuit.unwrap_or_else(|| panic!("{text}: {faults:?} {more:?}"))
+}
+
+fn run_text(text: &str, method: Method) -> Run {
+    let circuit = read(text);
+    let behaviour = behaviour(&circuit).unwrap_or_else(|e| panic!("{text}: {e:?}"));
+    let options = SimOptions {
+        method,
+        ..SimOptions::default()
+    };
+    simulate(&circuit, &behaviour, options).unwrap_or_else(|e| panic!("{text}: {e}"))
+}
+
+/// (time, value) of a signal at the row nearest to `t`.
+fn value(run: &Run, name: &str, t: f64) -> f64 {
+    let waves = &run.waveforms;
+    let column = waves.names.iter().position(|n| n == name).expect(name);
+    let distance = |k: &usize| (waves.time[*k] - t).abs();
+    let nearest = (0..waves.time.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    waves.values[nearest.expect("rows") * waves.names.len() + column]
+}
+
+#[test]
+fn an_edge_at_zero_acts_after_the_operating_point() {
+    for method in METHODS {
+        let run = run("edge_at_zero", method);
+        for t in [0.0, 50e-6, 100e-6, 300e-6_f64] {
+            let right = 1.0 - (-t / 1e-4).exp();
+            let found = value(&run, "v(b)", t);
+            assert!((found - right).abs() < 1e-4, "{method:?} {t}: {found}");
+        }
+        assert_eq!(value(&run, "v(a)", 0.0), 1.0);
+    }
+}
+
+/// Every kind of source with an edge at t = 0, into R and C: what is charged in 0.1 ms of a time constant of 0.1 ms.
+#[test]
+fn every_edge_at_zero_acts_after_the_operating_point() {
+    let charged = 1.0 - (-1.0_f64).exp();
+    for (source, start, uic) in [
+        ("PULSE(0 1 0 0 0 1 2)", 0.0, ""),
+        ("PULSE(0 1 0 0 0 1 2)", 0.0, "uic"),
+        // From 2 V in steady state.
+        ("PULSE(2 1 0 0 0 1 2)", 2.0, ""),
+        ("PWL(0 0 0 1 1 1)", 0.0, ""),
+        ("PWL(0 3 0 2 0 1)", 3.0, ""),
+        // No edge: what the waveform says at t = 0.
+        ("SIN(1 1 0 0 0 0)", 1.0, ""),
+        ("PULSE(1 0 1 0 0 1 2)", 1.0, ""),
+        ("PWL(0 1 1 1)", 1.0, ""),
+        // Its edges lie before t = 0.
+        ("PULSE(0 1 -1u 0 0 1 2)", 1.0, ""),
+    ] {
+        let text = format!("t\nV1 a 0 {source}\nR1 a b 1k\nC1 b 0 100n\n.tran 1u 100u {uic}\n");
+        for method in METHODS {
+            let found = run_text(&text, method);
+            let right = start + (1.0 - start) * charged;
+            let (first, last) = (value(&found, "v(b)", 0.0), value(&found, "v(b)", 1e-4));
+            assert!(
+                (first - start).abs() < 1e-12,
+                "{source} {method:?}: {first}"
+            );
+            assert!((last - right).abs() < 1e-4, "{source} {method:?}: {last}");
+        }
+    }
+}
+
+/// Two capacitors across the source: the edge shares its charge among them, and the source's work is CV²/2 + CV²/2.
+#[test]
+fn an_edge_at_zero_charges_capacitors_across_the_source() {
+    let text = "t\nV1 a 0 PULSE(0 4 0 0 0 1 2)\nC1 a b 1u\nC2 b 0 3u\nR1 b 0 1g\n.tran 1u 10u\n";
+    for method in METHODS {
+        let run = run_text(text, method);
+        assert!((value(&run, "v(b)", 0.0) - 1.0).abs() < 1e-9, "{method:?}");
+        let work = 0.5 * 0.75e-6 * 16.0;
+        // No resistance: what the source brings beyond the stored energy would be lost; here nothing is.
+        assert!(
+            (run.energy.source / work - 1.0).abs() < 1e-3,
+            "{method:?} {:?}",
+            run.energy
+        );
+        assert!(
+            run.energy.residual_relative < 1e-9,
+            "{method:?} {:?}",
+            run.energy
+        );
+    }
+}
+
+/// A gate that rises at t = 0 closes its switch after the operating point, in which it is open.
+#[test]
+fn a_gate_that_rises_at_zero_finds_the_operating_point_before_it() {
+    let text = "t\nV1 a 0 10\nVg g 0 PULSE(0 1 0 0 0 1 2)\nS1 a b g 0 sw\nR1 b 0 1k\nC1 b 0 1u\n\
+                R2 a b 1k\n.model sw SW(Vt=0.5 Ron=1k Roff=1g)\n.tran 1u 1m\n.meas tran v0 find v(b) at=0\n";
+    for method in METHODS {
+        let run = run_text(text, method);
+        let first = value(&run, "v(b)", 0.0);
+        assert!((first - 5.0).abs() < 1e-4, "{method:?}: {first}");
+        // 500 Ω against 1 kΩ, 1 µF: 20/3 V with 1/3 ms.
+        let (right, found) = (
+            20.0 / 3.0 - 5.0 / 3.0 * (-3.0_f64).exp(),
+            value(&run, "v(b)", 1e-3),
+        );
+        assert!((found - right).abs() < 1e-3, "{method:?}: {found} {right}");
+    }
+}

@@ -55,6 +55,8 @@ impl Exact<'_> {
             switches[i] = self.plant.thresholds[i].position(switches[i], clock.control(place.t));
         }
         self.exosystem.write(place.t, &mut self.z);
+        // Its edges have acted.
+        self.before = self.inputs(place.t);
         self.left_here.clear();
         self.instant = place.t;
         let key = Key {

@@ -68,7 +68,7 @@ pub struct Exact<'a> {
     pub(super) wanted: Option<Vec<bool>>,
     /// z at the last change or breakpoint.
     pub(super) z: Vec<f64>,
-    /// u before a jump.
+    /// u before a jump: at the end of the mode that is left, or before the start.
     pub(super) before: DVector<f64>,
     /// [`PROPOSALS`], the latest successful first.
     pub(super) proposals: [f64; PROPOSALS.len()],
@@ -131,6 +131,9 @@ impl<'a> Exact<'a> {
             ))
         };
         let (silent, controls) = plant.controls();
+        let before = sources.iter().zip(&silent);
+        let before = before.map(|(s, silent)| if *silent { 0.0 } else { s.value_left(t) });
+        let before = DVector::from_iterator(sources.len(), before);
         let exosystem = Exosystem::of(&sources, silent, t, until).ok_or_else(unsupported)?;
         plant.clocks = controls
             .into_iter()
@@ -155,7 +158,6 @@ impl<'a> Exact<'a> {
         }
         fire(&plant.thresholds, &mut position);
         key.switches = position;
-        let sources_count = sources.len();
         let volts = lcs
             .storage
             .names
@@ -180,7 +182,7 @@ impl<'a> Exact<'a> {
             volts,
             wanted: None,
             z,
-            before: DVector::zeros(sources_count),
+            before,
             proposals: PROPOSALS,
             left_here: Vec::new(),
             instant: t,
@@ -236,11 +238,8 @@ impl<'a> Exact<'a> {
         self.exosystem.output() * z
     }
 
-    /// u in the mode that is left; that of the present pieces where there is none.
-    pub(super) fn inputs_before(&self) -> DVector<f64> {
-        let Some(at) = self.mode else {
-            return self.inputs(self.motion.t);
-        };
+    /// u at the end of mode `at`.
+    pub(super) fn inputs_at_end_of(&self, at: usize) -> DVector<f64> {
         let n = self.plant.modes[at].n;
         let z = &self.motion.now[n..n + self.exosystem.dim()];
         self.exosystem.output() * DVector::from_column_slice(z)

@@ -55,7 +55,9 @@ impl Exact<'_> {
         let (storage, scale) = (self.storage.clone(), self.scale.clone());
         let (balance, switches) = (self.balance, key.switches.clone());
         let (events, impulses) = (log.events.len(), log.impulses.len());
-        self.before = self.inputs_before();
+        if let Some(at) = self.mode {
+            self.before = self.inputs_at_end_of(at);
+        }
         let found = self.search(&mut key, discontinuous, trigger, followed, log);
         match found {
             Ok((at, jumped)) => {

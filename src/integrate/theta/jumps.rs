@@ -4,10 +4,11 @@ use super::*;
 use crate::integrate::jump::Jump;
 
 impl Theta<'_> {
-    /// The first jump, from inconsistent initial values.
+    /// The first jump: from inconsistent initial values, by edges of the sources at the start.
     pub(super) fn begin(&mut self, log: &mut Log) -> Result<(), SimError> {
-        let u = self.now.u.clone();
-        self.jump(&u, log)?;
+        let u = self.inputs.all(self.now.t);
+        let before = std::mem::replace(&mut self.now.u, u);
+        self.jump(&before, log)?;
         self.note_energy();
         self.find_mode()?;
         self.started = true;

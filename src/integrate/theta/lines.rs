@@ -34,7 +34,7 @@ impl Theta<'_> {
             })
             .flatten()
             .collect();
-        self.now.u = self.inputs.all(self.now.t);
+        self.now.u = self.inputs.all_before(self.now.t);
         self.u_next.clone_from(&self.now.u);
         let waves = self.inputs.lines().stored(self.now.t);
         self.now.balance.hold(waves);

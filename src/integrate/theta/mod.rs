@@ -140,7 +140,7 @@ pub struct Theta<'a> {
 struct Now {
     t: f64,
     x: Vec<f64>,
-    /// Right limit of u at t.
+    /// Right limit of u at t; the left one before the run begins.
     u: Vec<f64>,
     /// The index set the next step tries first.
     active: Vec<bool>,
@@ -217,7 +217,8 @@ impl<'a> Theta<'a> {
         let inputs = Inputs::new(&first.inputs);
         let mut plant = Plant::new(reduce, settings.lcp_residual);
         let at = plant.system(&position, &inputs, t)?;
-        let u = inputs.all(t);
+        // Edges at the start act when the run begins.
+        let u = inputs.all_before(t);
         let system = &plant.systems[at].1;
         let (x, storage) = match start {
             Start::Storage(s) => (system.state_from(&s), s),
