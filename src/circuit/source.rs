@@ -9,7 +9,7 @@ mod piece;
 mod polyline;
 mod spice;
 
-pub use crossings::{Crossing, crossings};
+pub use crossings::{Crossing, Rest, crossings};
 pub use piece::{Oscillation, Piece};
 pub use spice::{Form, WaveError};
 

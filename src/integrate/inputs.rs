@@ -1,7 +1,7 @@
 //! The sources of a system, evaluated together.
 
 use crate::circuit::Source;
-use crate::circuit::source::{Wave, crossings};
+use crate::circuit::source::{Rest, Wave, crossings};
 use crate::integrate::line::{Line, Lines};
 use crate::lcs::Input;
 
@@ -13,6 +13,17 @@ pub struct Inputs {
     /// By input: the line and the port at which it arrives.
     arriving: Vec<Option<(usize, usize)>>,
     lines: Lines,
+}
+
+/// How a combination of sources passes a level.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Passage {
+    /// Upwards.
+    Rising,
+    /// Downwards.
+    Falling,
+    /// Downwards, or down to rest on the level.
+    FallingOrRest,
 }
 
 /// Steps of the error-controlled steppers per period of the fastest sine: an error estimate must not alias.
@@ -115,14 +126,14 @@ impl Inputs {
             .fold(self.lines.next_breakpoint(t), f64::min)
     }
 
-    /// The first time in (from, to] at which `constant + gains·u` passes `level` upwards (`rising`) or downwards.
+    /// The first time in (from, to] at which `constant + gains·u` passes `level` in this direction.
     #[must_use]
     pub fn passage(
         &self,
         gains: &[f64],
         constant: f64,
         level: f64,
-        rising: bool,
+        direction: Passage,
         from: f64,
         to: f64,
     ) -> Option<f64> {
@@ -132,10 +143,15 @@ impl Inputs {
             .zip(&self.sources)
             .filter(|(gain, _)| *gain != 0.0)
             .collect();
-        let passages = crossings(&terms, constant, level, from, to);
+        let rest = if direction == Passage::FallingOrRest {
+            Rest::IsBelow
+        } else {
+            Rest::IsNeither
+        };
+        let passages = crossings(&terms, (constant, level), rest, from, to);
         passages
             .into_iter()
-            .find(|c| c.rising == rising)
+            .find(|c| c.rising == (direction == Passage::Rising))
             .map(|c| c.time)
     }
 

@@ -272,10 +272,11 @@ impl Problem<'_> {
             let asked: Vec<bool> = (0..controls.len())
                 .map(|k| {
                     let switch = &self.behaviour.switches[k];
-                    match (self.settle[k], self.position[k]) {
-                        (false, on) => on,
-                        (true, true) => controls[k] >= switch.off_below,
-                        (true, false) => controls[k] > switch.on_above,
+                    let on = self.position[k];
+                    if self.settle[k] {
+                        Threshold::of(switch).position(on, controls[k])
+                    } else {
+                        on
                     }
                 })
                 .collect();
@@ -284,9 +285,26 @@ impl Problem<'_> {
             if wanted == self.position || seen.contains(&wanted) {
                 break;
             }
-            seen.push(std::mem::replace(&mut self.position, wanted));
+            let next = self.step_towards(wanted, &seen);
+            seen.push(std::mem::replace(&mut self.position, next));
         }
         Ok(!seen.is_empty())
+    }
+
+    /// `wanted`, or where shorts and open branches contradict each other in it the first position on the way, one switch further,
+    /// that is a circuit and not `seen`: what that switch drives may ask for another position.
+    fn step_towards(&self, wanted: Vec<bool>, seen: &[Vec<bool>]) -> Vec<bool> {
+        if self.free(&wanted).is_ok() {
+            return wanted;
+        }
+        let moving = (0..wanted.len()).filter(|&k| wanted[k] != self.position[k]);
+        let positions = moving.map(|k| {
+            let mut position = self.position.clone();
+            position[k] = wanted[k];
+            at_start(&self.behaviour.switches, position)
+        });
+        let mut sound = positions.filter(|p| !seen.contains(p) && self.free(p).is_ok());
+        sound.next().unwrap_or(wanted)
     }
 
     /// The error of a line whose delay asks for more steps than a run may take.

@@ -3,8 +3,10 @@
 //! The switch of a thyristor is a latch: on while one of its gates is, afterwards as long as the valve in series conducts more
 //! than the holding current. It therefore turns on only with a gate and off only without one, at the zero of its current.
 
-use crate::integrate::inputs::Inputs;
+use crate::integrate::inputs::{Inputs, Passage};
 use crate::integrate::reading::{self, Point};
+use crate::integrate::run::SimError;
+use crate::integrate::settle::settle;
 use crate::lcs::Lcs;
 use crate::mna::{LatchPort, SwitchPort};
 
@@ -98,11 +100,47 @@ impl Threshold {
         }
     }
 
-    /// The position that a control value asks for.
+    /// The position that a control value asks for. Without hysteresis the switch is on exactly for values above the threshold;
+    /// with it the position stays where the control is between the thresholds or on one of them.
     #[must_use]
     pub fn position(&self, on: bool, control: f64) -> bool {
-        on != (self.excess(on, control) > 0.0)
+        if self.is_sharp() {
+            control > self.on_above
+        } else {
+            on != (self.excess(on, control) > 0.0)
+        }
     }
+
+    /// Whether one threshold serves both directions: then a control that rests on it turns the switch off.
+    #[must_use]
+    pub fn is_sharp(&self) -> bool {
+        self.latch.is_none() && self.on_above == self.off_below
+    }
+
+    /// Whether the switch leaves position `on` right after an instant at which its control has this value and slope, each known
+    /// up to its noise: beyond the threshold, on the way there, or at rest on a threshold that serves both directions.
+    #[must_use]
+    pub(crate) fn leaves(&self, on: bool, control: Known, slope: Known) -> bool {
+        let excess = self.excess(on, control.value);
+        let drift = if on { -slope.value } else { slope.value };
+        if excess.abs() > control.noise {
+            excess > 0.0
+        } else if drift.abs() > slope.noise {
+            drift > 0.0
+        } else {
+            on && self.is_sharp()
+        }
+    }
+}
+
+/// Roundings of a control and of the time at which it passes its threshold, in units of the last place of its terms.
+pub(crate) const ROUNDINGS: f64 = 64.0;
+
+/// A value with the bound of its rounding.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Known {
+    pub(crate) value: f64,
+    pub(crate) noise: f64,
 }
 
 /// What controls ask of the switches.
@@ -212,6 +250,19 @@ impl Switches {
         (0..self.thresholds.len()).filter(wrong).collect()
     }
 
+    /// See [`settle`](crate::integrate::settle::settle).
+    pub(crate) fn settle(
+        &mut self,
+        left: &[bool],
+        asking: impl FnMut(&[bool]) -> Result<Vec<usize>, SimError>,
+    ) -> Result<bool, SimError> {
+        settle(&self.thresholds, left, &mut self.position, asking)
+    }
+
+    pub(crate) fn thresholds(&self) -> &[Threshold] {
+        &self.thresholds
+    }
+
     /// Flips the given switches.
     pub(crate) fn toggle(&mut self, which: &[usize]) {
         for &i in which {
@@ -301,22 +352,12 @@ impl Switches {
         excess.collect()
     }
 
-    fn different(&self, before: &[bool]) -> impl Iterator<Item = (usize, &Threshold)> {
-        let thresholds = self.thresholds.iter().enumerate();
-        thresholds.filter(move |(i, t)| !t.is_rest() && before[*i] != self.position[*i])
-    }
-
-    /// Names of those that differ from `before`.
-    pub(crate) fn moved(&self, before: &[bool]) -> Vec<String> {
-        self.different(before)
-            .map(|(_, t)| t.name.clone())
-            .collect()
-    }
-
-    /// Names with their positions, of those that differ from `before`.
+    /// Names with their positions, of those that differ from `before` (all if `None`).
     pub(crate) fn flipped(&self, before: &[bool]) -> String {
-        let words: Vec<String> = self
-            .different(before)
+        let names = self.thresholds.iter().enumerate().filter(|(i, t)| {
+            !t.is_rest() && before.get(*i).is_none_or(|b| *b != self.position[*i])
+        });
+        let words: Vec<String> = names
             .map(|(i, t)| format!("{} {}", t.name, if self.position[i] { "on" } else { "off" }))
             .collect();
         words.join(" ")
@@ -344,7 +385,12 @@ impl Switches {
             };
             let gains: Vec<f64> = lcs.controls.u.row(i).iter().copied().collect();
             let until = (first + slack).min(limit);
-            let passage = inputs.passage(&gains, lcs.controls.one[i], level, !on, t, until);
+            let side = match (on, threshold.is_sharp()) {
+                (false, _) => Passage::Rising,
+                (true, false) => Passage::Falling,
+                (true, true) => Passage::FallingOrRest,
+            };
+            let passage = inputs.passage(&gains, lcs.controls.one[i], level, side, t, until);
             let Some(time) = passage else { continue };
             first = first.min(time);
             passages.push((time, i));
@@ -374,5 +420,33 @@ mod tests {
             [0.5, 1.0, 1.5, 2.0, 2.5].map(|v| switch.position(true, v)),
             [false, true, true, true, true]
         );
+    }
+
+    #[test]
+    fn without_hysteresis_a_control_at_rest_on_the_threshold_is_off() {
+        let switch = Threshold {
+            name: "s1".into(),
+            on_above: 1.0,
+            off_below: 1.0,
+            latch: None,
+        };
+        let known = |value: f64| Known {
+            value,
+            noise: 1e-15,
+        };
+        for (on, value, slope, leaves) in [
+            (true, 1.0, 0.0, true),
+            (true, 1.0, 1.0, false),
+            (true, 1.0, -1.0, true),
+            (false, 1.0, 0.0, false),
+            (false, 1.0, 1.0, true),
+            (false, 1.0, -1.0, false),
+            (true, 0.9, 5.0, true),
+            (false, 1.1, -5.0, true),
+        ] {
+            let found = switch.leaves(on, known(value), known(slope));
+            assert_eq!(found, leaves, "{on} {value} {slope}");
+        }
+        assert!(!switch.position(true, 1.0));
     }
 }

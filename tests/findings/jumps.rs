@@ -1,1 +1,107 @@
 //! Changes of mode: switches that move together, and jumps.
+
+use circ::integrate::{Method, Run};
+
+use super::runs::{at, column};
+use super::{changed, run};
+
+/// The largest difference of a probe between two runs on the same grid, in parts of its amplitude.
+fn difference(a: &Run, b: &Run, probe: &str) -> f64 {
+    let (a, b) = (column(a, probe), column(b, probe));
+    assert_eq!(a.len(), b.len());
+    let amplitude = a.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let pairs = a.iter().zip(&b);
+    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / amplitude
+}
+
+/// The exact run of a netlist with ideal switches approaches those with resistances of 1 mΩ and 1 MΩ, then 1 µΩ and 1 GΩ, by three decades.
+fn is_the_limit(name: &str, probe: &str, time: f64) {
+    let ideal = run(name, Method::Exact);
+    let error = |resistances: &str| {
+        let real = changed(
+            name,
+            &[("SW(ideal", &format!("SW({resistances}"))],
+            Method::Exact,
+        );
+        (at(&real, probe, time) - at(&ideal, probe, time)).abs()
+    };
+    let (coarse, fine) = (error("Ron=1m Roff=1meg"), error("Ron=1u Roff=1g"));
+    let scale = at(&ideal, probe, time).abs();
+    assert!(coarse < 1e-2 * scale, "{name}: {coarse} of {scale}");
+    assert!(
+        fine < 2e-3 * coarse && fine > 2e-4 * coarse,
+        "{name}: {coarse} {fine}"
+    );
+}
+
+#[test]
+fn two_switches_on_one_crossing_keep_the_current_of_the_inductor() {
+    for name in ["halfbridge_submodule_ideal", "complementary_sin"] {
+        let exact = run(name, Method::Exact);
+        assert_eq!(exact.stats.jumps, 0, "{name}");
+        is_the_limit(name, "i(l1)", 4e-3);
+    }
+    let exact = run("halfbridge_submodule_ideal", Method::Exact);
+    assert!((at(&exact, "i(l1)", 4e-3) - 2.0497).abs() < 1e-4);
+}
+
+#[test]
+fn a_pair_of_switches_on_a_state_keeps_its_output_within_the_band() {
+    for resistances in ["ideal", "Ron=1u Roff=1g", "Ron=1m Roff=1meg"] {
+        let name = "hysteretic_sync_buck";
+        let run = changed(name, &[("ideal", resistances)], Method::Exact);
+        let (time, v) = (&run.waveforms.time, column(&run, "v(out)"));
+        let late: Vec<f64> = (0..v.len())
+            .filter(|&k| time[k] > 2e-3)
+            .map(|k| v[k])
+            .collect();
+        let mean = late.iter().sum::<f64>() / late.len() as f64;
+        let range = late
+            .iter()
+            .fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(*v), b.max(*v)));
+        assert!((mean - 5.0).abs() < 0.02, "{resistances}: {mean}");
+        assert!(range.0 > 4.8 && range.1 < 5.2, "{resistances}: {range:?}");
+    }
+    is_the_limit("hysteretic_sync_buck", "v(out)", 0.3e-3);
+}
+
+#[test]
+fn a_switch_that_another_one_drives_moves_with_it_by_all_methods() {
+    let name = "switch_drives_switch";
+    let exact = run(name, Method::Exact);
+    // The pair of complementary_sin in other words.
+    let pair = run("complementary_sin", Method::Exact);
+    for t in [1e-3, 2.5e-3, 4e-3] {
+        let (a, b) = (at(&exact, "i(l1)", t), at(&pair, "i(l1)", t));
+        assert!((a - b).abs() < 1e-12 * b.abs().max(1.0), "{t}: {a} {b}");
+    }
+    let stepped = run(name, Method::Theta);
+    assert!((at(&stepped, "i(l1)", 4e-3) - at(&exact, "i(l1)", 4e-3)).abs() < 1e-3);
+}
+
+#[test]
+fn a_switch_whose_control_rests_on_its_threshold_is_off() {
+    let name = "switch_at_threshold";
+    let exact = run(name, Method::Exact);
+    let stepped = run(name, Method::Theta);
+    // The gate is above 0 for 5.02 µs of 10 µs: nearly what a threshold of 1 nV makes of it.
+    let above = changed(name, &[("SW(Ron=1m", "SW(Vt=1n Ron=1m")], Method::Exact);
+    for t in [1e-3, 2e-3, 3e-3] {
+        let v = at(&exact, "v(out)", t);
+        assert!((v - at(&above, "v(out)", t)).abs() < 1e-6, "{t}: {v}");
+        assert!((v - at(&stepped, "v(out)", t)).abs() < 1e-2, "{t}: {v}");
+    }
+    assert!((at(&exact, "v(out)", 3e-3) - 5.8657).abs() < 1e-3);
+}
+
+#[test]
+fn what_is_recorded_changes_nothing_where_a_kink_and_an_edge_coincide() {
+    let name = "coincident_kink_and_edge";
+    let without = changed(name, &[], Method::Exact);
+    let with = changed(name, &[("v(3)", "v(3) v(g)")], Method::Exact);
+    let stepped = changed(name, &[], Method::Theta);
+    for probe in ["v(1)", "v(2)", "v(3)"] {
+        assert!(difference(&without, &with, probe) < 1e-12, "{probe}");
+        assert!(difference(&without, &stepped, probe) < 1e-3, "{probe}");
+    }
+}

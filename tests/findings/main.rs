@@ -16,7 +16,8 @@ mod runs;
 
 use std::path::{Path, PathBuf};
 
-use circ::circuit::{Circuit, ElaborateOptions};
+use circ::circuit::{Circuit, ElaborateOptions, elaborate};
+use circ::diagnostic::SourceMap;
 use circ::integrate::{Method, Run, SimError, SimOptions, simulate};
 use circ::mna::behaviour;
 use circ::netlist::load;
@@ -49,4 +50,24 @@ fn attempt(name: &str, method: Method) -> Result<Run, SimError> {
 /// As [`attempt`], of a run that must end well.
 fn run(name: &str, method: Method) -> Run {
     attempt(name, method).unwrap_or_else(|e| panic!("{name}: {e}"))
+}
+
+/// As [`run`], with pieces of the netlist's text replaced; each must occur.
+fn changed(name: &str, replacements: &[(&str, &str)], method: Method) -> Run {
+    let mut text = std::fs::read_to_string(path(name)).expect("a netlist");
+    for (from, to) in replacements {
+        assert!(text.contains(from), "{name} has no `{from}`");
+        text = text.replace(from, to);
+    }
+    let mut sources = SourceMap::default();
+    let root = sources.add(name, text);
+    let (netlist, _) = circ::netlist::parse(&mut sources, root, &|_| unreachable!());
+    let (circuit, findings) = elaborate(&netlist, &ElaborateOptions::default());
+    let circuit = circuit.unwrap_or_else(|| panic!("{name}: {findings:?}"));
+    let behaviour = behaviour(&circuit).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+    let options = SimOptions {
+        method,
+        ..SimOptions::default()
+    };
+    simulate(&circuit, &behaviour, options).unwrap_or_else(|e| panic!("{name}: {e}"))
 }

@@ -11,6 +11,15 @@ pub struct Crossing {
     pub rising: bool,
 }
 
+/// What a combination that comes to rest on the level does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rest {
+    /// It stays on the side that it came from.
+    IsNeither,
+    /// It has fallen below the level.
+    IsBelow,
+}
+
 /// All passages of `constant + Σ gain·source` through `level` in (from, to], in order of time. Touching the level without
 /// leaving to the other side is no passage; a jump through it is one, at the time of the edge.
 ///
@@ -19,8 +28,8 @@ pub struct Crossing {
 #[must_use]
 pub fn crossings(
     terms: &[(f64, &Source)],
-    constant: f64,
-    level: f64,
+    (constant, level): (f64, f64),
+    rest: Rest,
     from: f64,
     to: f64,
 ) -> Vec<Crossing> {
@@ -29,7 +38,11 @@ pub fn crossings(
         constant: constant - level,
     };
     let mut found = Vec::new();
-    let mut above = sign(combination.just_after(from));
+    let side = |value: f64| match (sign(value), rest) {
+        (0, Rest::IsBelow) => -1,
+        (sign, _) => sign,
+    };
+    let mut above = side(combination.just_after(from));
     let mut start = from;
     while start < to {
         let end = terms
@@ -40,9 +53,9 @@ pub fn crossings(
             side: above,
             found: &mut found,
         };
-        passages.enter(start, combination.just_after(start));
+        passages.enter(start, side(combination.just_after(start)));
         combination.search(start, end, &mut passages);
-        passages.enter(end, combination.just_after(end));
+        passages.enter(end, side(combination.just_after(end)));
         above = passages.side;
         start = end;
     }
@@ -66,9 +79,8 @@ struct Passages<'a> {
 }
 
 impl Passages<'_> {
-    /// Right after `time` the combination has this value (relative to the level).
-    fn enter(&mut self, time: f64, value: f64) {
-        let side = sign(value);
+    /// Right after `time` the combination is on this side of the level.
+    fn enter(&mut self, time: f64, side: i8) {
         if side != 0 && side != self.side {
             self.found.push(Crossing {
                 time,
@@ -117,7 +129,7 @@ impl Combination<'_> {
             let (value, slope) = (smooth.value(start), smooth.derivative(start));
             let root = start - value / slope;
             if root > start && root < end && sign(value) != sign(slope) {
-                passages.enter(root, slope);
+                passages.enter(root, sign(slope));
             }
         } else {
             smooth.search(start, end, passages);
@@ -210,7 +222,7 @@ impl Smooth {
             if middle <= a || middle >= b || self.derivative(middle).abs() > second * half {
                 let (left, right) = (self.value(a), self.value(b));
                 if sign(right) != 0 && sign(left) != sign(right) && sign(right) != passages.side {
-                    passages.enter(self.root(a, b, sign(right)), right);
+                    passages.enter(self.root(a, b, sign(right)), sign(right));
                 }
             } else {
                 parts.push((middle, b));

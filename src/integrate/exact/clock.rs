@@ -3,7 +3,7 @@
 
 use super::stepper::SAME_TIME_ULPS;
 use crate::circuit::Source;
-use crate::integrate::switching::Threshold;
+use crate::integrate::switching::{Known, ROUNDINGS, Threshold};
 use crate::mna::SourceControl;
 
 /// constant + slope (t − origin) until `end`: a piece of a straight source.
@@ -86,6 +86,25 @@ impl Clock {
         terms.map(|(_, factor, line)| factor * line.slope).sum()
     }
 
+    /// Whether the switch leaves position `on` right after t on the present pieces.
+    pub(crate) fn leaves(&self, threshold: &Threshold, on: bool, t: f64) -> bool {
+        let (mut size, mut steepness) = (self.constant.abs(), 0.0);
+        for (_, factor, line) in &self.terms {
+            let slope = (factor * line.slope).abs();
+            size += (factor * line.constant).abs() + slope * (t - line.origin).abs();
+            steepness += slope;
+        }
+        let control = Known {
+            value: self.control(t),
+            noise: ROUNDINGS * f64::EPSILON * (size + steepness * t.abs()),
+        };
+        let slope = Known {
+            value: self.slope(),
+            noise: ROUNDINGS * f64::EPSILON * steepness,
+        };
+        threshold.leaves(on, control, slope)
+    }
+
     fn end(&self) -> f64 {
         let ends = self.terms.iter().map(|(_, _, line)| line.end);
         ends.fold(f64::INFINITY, f64::min)
@@ -146,7 +165,7 @@ impl Clock {
                     }
                 }
             }
-            if threshold.position(self.on, self.control(t)) != self.on {
+            if self.leaves(threshold, self.on, t) {
                 return t;
             }
         }
@@ -170,6 +189,57 @@ mod tests {
             count: None,
         };
         vec![Source { dc: 0.0, wave }]
+    }
+
+    /// The times at which a clock moves a switch with this threshold, and its position before the first.
+    fn moves(sources: &[Source], level: f64) -> (bool, Vec<f64>) {
+        let threshold = Threshold {
+            name: "s".into(),
+            on_above: level,
+            off_below: level,
+            latch: None,
+        };
+        let control = SourceControl {
+            switch: 0,
+            constant: 0.0,
+            terms: vec![(0, 1.0)],
+        };
+        let mut clock = Clock::new(control, sources, 0.0).unwrap();
+        let first = clock.leaves(&threshold, false, 0.0);
+        let (mut t, mut on, mut moves) = (0.0, first, Vec::new());
+        loop {
+            clock.look_ahead(&threshold, on, (t, 12.0), sources);
+            if clock.next == f64::INFINITY {
+                return (first, moves);
+            }
+            (t, on) = (clock.next, !on);
+            moves.push(t);
+        }
+    }
+
+    #[test]
+    fn a_gate_at_rest_on_the_threshold_is_off_and_one_that_touches_it_stays() {
+        // Falls at 3.5 to rest on 0, rises from it at 1.
+        assert_eq!(
+            moves(&pulse(), 0.0),
+            (false, vec![1.0, 3.5, 6.0, 8.5, 11.0])
+        );
+        let triangle = Wave::Pulse {
+            v1: 1.0,
+            v2: 0.0,
+            delay: 0.0,
+            rise: 1.0,
+            fall: 1.0,
+            width: 0.0,
+            period: 2.0,
+            count: None,
+        };
+        let triangle = vec![Source {
+            dc: 0.0,
+            wave: triangle,
+        }];
+        assert_eq!(moves(&triangle, 0.0), (true, vec![]));
+        assert_eq!(moves(&triangle, 1.0), (false, vec![]));
     }
 
     #[test]

@@ -9,6 +9,8 @@ const CONSISTENT: f64 = 1e-9;
 /// Guards within this many times the rounding noise of one evaluation are taken together as zero: simultaneous events of
 /// symmetric circuits differ by the roundings of a few operations.
 const GROUP: f64 = 128.0;
+/// The same in units of a guard's [noise](super::flow::Flow::noise).
+pub(super) const SIMULTANEOUS: f64 = GROUP / NOISE;
 /// Event times are known to this many units in the last place.
 const TIME_ULPS: f64 = 8.0;
 /// Inspections after which the sizes of a mode are taken anew.
@@ -73,7 +75,7 @@ impl Familiar {
     fn clear(&self, guards: &[f64], time: f64) -> bool {
         let (g, slopes) = guards.split_at(guards.len() / 2);
         let mut guards = g.iter().zip(slopes).zip(&self.noise);
-        guards.all(|((g, slope), noise)| *g > GROUP / NOISE * noise + time * slope.abs())
+        guards.all(|((g, slope), noise)| *g > SIMULTANEOUS * noise + time * slope.abs())
     }
 
     /// How large w was so far, if it has grown by this: the state, the sources.
@@ -174,36 +176,16 @@ impl Inspector {
         }
         mode.jets.values(w, &mut self.jets);
         mode.jets.largest(sizes, &mut self.jet_sizes);
-        let m = mode.flow.guards();
         let mut leaving = Vec::new();
-        for i in 0..m {
-            let dot = |k: usize| (self.jets[k * m + i], self.jet_sizes[k * m + i]);
-            // The first derivative that is no rounding decides, the next one says what an error of the time does to it; but one that
-            // the next turns around before the guard has left its rounding decides nothing.
-            let (mut next, mut floor) = (dot(0), 0.0);
-            let first = (0..ORDERS).find_map(|k| {
-                let (value, whole) = next;
-                let mut noise = GROUP * f64::EPSILON * whole;
-                if k + 1 < ORDERS {
-                    next = dot(k + 1);
-                    noise += time * next.0.abs();
-                }
-                if k == 0 {
-                    floor = noise;
-                }
-                let turned = k > 0
-                    && value * next.0 < 0.0
-                    && next.0.abs() > GROUP * f64::EPSILON * next.1
-                    && value.abs().powi(k as i32 + 1) <= floor * next.0.abs().powi(k as i32);
-                (value.abs() > noise && !turned).then_some(value)
-            });
-            if first.is_some_and(|value| value < 0.0) {
+        for i in 0..mode.flow.guards() {
+            if self.leaves(mode, i, t) {
                 match mode.owner(i) {
                     Owner::Switch(k) => leaving.push(k),
                     Owner::Device(_) | Owner::Slide(..) => return Finding::Refused(i),
                 }
             }
         }
+        let sizes = &mut self.sizes;
         if !known {
             let familiar = &mut mode.familiar;
             // Waves count with their amplitudes: they come back.
@@ -212,5 +194,46 @@ impl Inspector {
             familiar.sizes.clone_from(sizes);
         }
         Finding::Holds(leaving)
+    }
+
+    /// Reads the guards of the mode in which the run stands at state x, with the sources at z, for [`Self::leaves`].
+    pub(crate) fn look(&mut self, mode: &Mode, x: &[f64], z: &[f64]) {
+        self.w.clear();
+        self.w.extend_from_slice(x);
+        self.w.extend_from_slice(z);
+        self.sizes.clear();
+        self.sizes.extend(self.w.iter().map(|w| w.abs()));
+        for (size, known) in self.sizes.iter_mut().zip(&mode.familiar.sizes) {
+            *size = size.max(*known);
+        }
+        mode.jets.values(&self.w, &mut self.jets);
+        mode.jets.largest(&self.sizes, &mut self.jet_sizes);
+    }
+
+    /// Whether guard i, as it was read last, is negative right after t. The first derivative that is no rounding decides, the next one
+    /// says what an error of the time does to it; but one that the next turns around before the guard has left its rounding
+    /// decides nothing. A guard at rest on zero stays, but for that of a switch which is off there.
+    pub(crate) fn leaves(&self, mode: &Mode, i: usize, t: f64) -> bool {
+        let time = TIME_ULPS * f64::EPSILON * t.abs();
+        let m = mode.flow.guards();
+        let dot = |k: usize| (self.jets[k * m + i], self.jet_sizes[k * m + i]);
+        let (mut next, mut floor) = (dot(0), 0.0);
+        let first = (0..ORDERS).find_map(|k| {
+            let (value, whole) = next;
+            let mut noise = GROUP * f64::EPSILON * whole;
+            if k + 1 < ORDERS {
+                next = dot(k + 1);
+                noise += time * next.0.abs();
+            }
+            if k == 0 {
+                floor = noise;
+            }
+            let turned = k > 0
+                && value * next.0 < 0.0
+                && next.0.abs() > GROUP * f64::EPSILON * next.1
+                && value.abs().powi(k as i32 + 1) <= floor * next.0.abs().powi(k as i32);
+            (value.abs() > noise && !turned).then_some(value)
+        });
+        first.map_or_else(|| mode.is_off_at_rest(i), |value| value < 0.0)
     }
 }

@@ -128,6 +128,10 @@ pub(crate) struct Mode {
     pub(crate) device_guards: Vec<usize>,
     /// Switch of each further guard; two guards for each sliding switch follow.
     pub(crate) guarded_switches: Vec<usize>,
+    /// By guarded switch: whether sources alone control it.
+    pub(crate) controlled_by_sources: Vec<bool>,
+    /// By guarded switch: on, with one threshold for both directions, so that a control at rest on it turns it off.
+    off_at_rest: Vec<bool>,
     /// What must vanish for the mode to exist, over w; with the first two derivatives below it.
     pub(crate) constraints: DMatrix<f64>,
     /// s = storage · w, q×dim.
@@ -320,11 +324,19 @@ impl Mode {
         let keeps = one(&map.x) && one(&map.inject) && !driven && !shifted;
 
         Some(Self {
-            key,
             n,
             jets: Map::new(&jets),
             device_guards,
+            controlled_by_sources: guarded_switches
+                .iter()
+                .map(|&i| controls.row(i).columns(0, n).iter().all(|v| *v == 0.0))
+                .collect(),
+            off_at_rest: guarded_switches
+                .iter()
+                .map(|&i| key.switches[i] && thresholds[i].is_sharp())
+                .collect(),
             guarded_switches,
+            key,
             constraints,
             driven,
             keeps,
@@ -367,6 +379,12 @@ impl Mode {
             None => Owner::Switch(self.guarded_switches[k]),
             Some(k) => Owner::Slide(self.key.sliding[k / 2].0, k % 2 == 0),
         }
+    }
+
+    /// Whether a guard is that of a switch which does not stay on where the control rests on its threshold.
+    pub(crate) fn is_off_at_rest(&self, guard: usize) -> bool {
+        let k = guard.checked_sub(self.device_guards.len());
+        k.is_some_and(|k| self.off_at_rest.get(k).copied().unwrap_or(false))
     }
 
     /// The storage at w.

@@ -2,7 +2,7 @@
 
 use super::exosystem::Exosystem;
 use super::flow::{Flow, LONG, Way};
-use super::inspect::Familiar;
+use super::inspect::{Familiar, SIMULTANEOUS};
 use super::polynomial;
 use super::series::Series;
 use super::spans::Spans;
@@ -151,6 +151,11 @@ impl Motion {
             *floor += slack;
         }
         self.since_refresh = 0;
+    }
+
+    /// Whether a guard stands at zero, as far as rounding tells simultaneous events apart.
+    pub(crate) fn is_at_zero(&self, flow: &Flow, guard: usize) -> bool {
+        self.now[flow.dim() + guard] <= SIMULTANEOUS * self.floors[guard]
     }
 
     /// How large w can have been on the way here: the state, the sources.

@@ -52,13 +52,11 @@ impl Exact<'_> {
         for clock in &mut self.plant.clocks {
             let i = clock.switch;
             clock.stand_at(&self.sources, place.t);
-            switches[i] = self.plant.thresholds[i].position(switches[i], clock.control(place.t));
+            switches[i] ^= clock.leaves(&self.plant.thresholds[i], switches[i], place.t);
         }
         self.exosystem.write(place.t, &mut self.z);
         // Its edges have acted.
         self.before = self.inputs(place.t);
-        self.left_here.clear();
-        self.instant = place.t;
         let key = Key {
             closed: self.key.closed.clone(),
             switches,

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::clock::Clock;
 use super::exosystem::Exosystem;
 use super::mode::over_w;
-use crate::integrate::switching::Threshold;
+use crate::integrate::switching::{Known, ROUNDINGS, Threshold};
 use crate::lcs::{Lcs, Rows};
 
 /// The control of one switch as a combination of straight columns of z, less nothing: c = row · z.
@@ -72,19 +72,20 @@ impl Drive {
         dot(&self.terms, z)
     }
 
-    /// Whether the switch cannot stay where it is with the sources at z at time t: the control is beyond the threshold by more
-    /// than rounding.
-    pub(crate) fn misplaced(&self, threshold: &Threshold, on: bool, t: f64, z: &[f64]) -> bool {
-        /// Roundings of a control and of the time at which it passes its threshold.
-        const ROUNDINGS: f64 = 64.0;
-        let (control, slope) = (self.control(z), dot(&self.slopes, z));
-        let size: f64 = self.terms.iter().map(|&(k, r)| (r * z[k]).abs()).sum();
-        let noise = ROUNDINGS * f64::EPSILON * (size + (slope * t).abs());
-        if on {
-            control < threshold.off_below - noise
-        } else {
-            control > threshold.on_above + noise
-        }
+    /// Whether the switch leaves position `on` right after time t with the sources at z.
+    pub(crate) fn leaves(&self, threshold: &Threshold, on: bool, t: f64, z: &[f64]) -> bool {
+        let size =
+            |terms: &[(usize, f64)]| -> f64 { terms.iter().map(|&(k, r)| (r * z[k]).abs()).sum() };
+        let steepness = size(&self.slopes);
+        let control = Known {
+            value: self.control(z),
+            noise: ROUNDINGS * f64::EPSILON * (size(&self.terms) + steepness * t.abs()),
+        };
+        let slope = Known {
+            value: dot(&self.slopes, z),
+            noise: ROUNDINGS * f64::EPSILON * steepness,
+        };
+        threshold.leaves(on, control, slope)
     }
 
     /// Finds the next passage after t, where the sources stand at z and their pieces last until `end`.

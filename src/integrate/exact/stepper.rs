@@ -72,9 +72,6 @@ pub struct Exact<'a> {
     pub(super) before: DVector<f64>,
     /// [`PROPOSALS`], the latest successful first.
     pub(super) proposals: [f64; PROPOSALS.len()],
-    /// Modes left at the present instant.
-    pub(super) left_here: Vec<usize>,
-    pub(super) instant: f64,
     pub(super) metric: Metric,
     /// From start to end, s.
     pub(super) duration: f64,
@@ -145,16 +142,13 @@ impl<'a> Exact<'a> {
         plant.drives.retain(|drive| !latches(drive.switch));
         let mut z = vec![0.0; exosystem.dim()];
         exosystem.write(t, &mut z);
-        let driven = plant
-            .drives
-            .iter()
-            .map(|drive| (drive.switch, drive.control(&z)));
-        let clocked = plant
-            .clocks
-            .iter()
-            .map(|clock| (clock.switch, clock.control(t)));
-        for (i, control) in driven.chain(clocked) {
-            position[i] = plant.thresholds[i].position(position[i], control);
+        for drive in &plant.drives {
+            let i = drive.switch;
+            position[i] ^= drive.leaves(&plant.thresholds[i], position[i], t, &z);
+        }
+        for clock in &plant.clocks {
+            let i = clock.switch;
+            position[i] ^= clock.leaves(&plant.thresholds[i], position[i], t);
         }
         fire(&plant.thresholds, &mut position);
         key.switches = position;
@@ -184,8 +178,6 @@ impl<'a> Exact<'a> {
             z,
             before,
             proposals: PROPOSALS,
-            left_here: Vec::new(),
-            instant: t,
             metric,
             duration: until - t,
             until,
@@ -271,86 +263,105 @@ impl<'a> Exact<'a> {
         }
     }
 
-    /// A guard fell through zero.
-    fn fired(&mut self, guard: usize, log: &mut Log) -> Result<(), SimError> {
-        let Some(from) = self.mode else {
-            return Err(self.fail(Reason::internal(
-                "integrate::exact",
-                "a guard fired in no mode",
-            )));
-        };
-        self.take_storage();
-        self.same_instant(from);
-        let mut key = std::mem::take(&mut self.key);
-        let mut discontinuous = false;
-        match self.plant.modes[from].owner(guard) {
-            // A thyristor's current ends, and no gate holds it.
-            Owner::Device(pair) => {
-                for i in self.plant.released(pair, &key.switches) {
-                    key.switches[i] = false;
-                }
-            }
-            Owner::Switch(i) => {
-                key.switches[i] = !key.switches[i];
-                discontinuous = true;
-            }
-            Owner::Slide(i, on) => {
-                key.sliding.retain(|s| s.0 != i);
-                key.switches[i] = on;
-                discontinuous = true;
-            }
-        }
-        fire(&self.plant.thresholds, &mut key.switches);
-        self.exosystem.write(self.motion.t, &mut self.z);
-        self.change(key, discontinuous, Trigger::Guard(guard), log)
-    }
-
-    /// Remembers that a mode was left at this instant.
-    fn same_instant(&mut self, from: usize) {
-        if (self.motion.t - self.instant).abs() > self.ulps() {
-            self.left_here.clear();
-        }
-        self.instant = self.motion.t;
-        self.left_here.push(from);
-    }
-
-    /// Sources reach breakpoints, driven switches move.
-    fn breakpoint(&mut self, log: &mut Log) -> Result<(), SimError> {
+    /// Something happens now: a guard fell through zero, sources reach breakpoints, switches that sources drive move. All that
+    /// happens at one instant is taken together before a mode is looked for.
+    fn instant(&mut self, fired: Option<usize>, log: &mut Log) -> Result<(), SimError> {
         let t = self.motion.t;
         let near = t + self.ulps();
+        if let (Some(at), Some(guard)) = (self.mode, fired)
+            && t - self.motion.entered <= self.ulps()
+        {
+            let what = "a mode is left at the instant at which it was entered";
+            let reason = Reason::internal("integrate::exact", what);
+            return Err(self.fail(reason).device(self.owner_name(at, guard)));
+        }
         self.take_storage();
-        let mut edge = self.next_piece <= near && self.take_pieces(near)?;
-        let mut key = std::mem::take(&mut self.key);
+        let known = self.next_stop <= near;
+        let corner = self.next_piece <= near;
+        let mut discontinuous = corner && self.take_pieces(near)?;
         self.exosystem.write(t, &mut self.z);
+        let mut key = std::mem::take(&mut self.key);
+        if known {
+            discontinuous |= self.move_driven(&mut key, near);
+        }
+        if discontinuous {
+            key.sliding.clear();
+        }
+        discontinuous |= self.move_guarded(&mut key, fired, corner);
+        fire(&self.plant.thresholds, &mut key.switches);
+        let trigger = fired.map_or(Trigger::Sources, Trigger::Guard);
+        self.change(key, discontinuous, trigger, log)
+    }
+
+    /// Moves the switches that sources alone drive and that are due before `near`; whether one moved.
+    fn move_driven(&mut self, key: &mut Key, near: f64) -> bool {
+        let mut moved = false;
+        let guarded: &[usize] = self
+            .mode
+            .map_or(&[], |at| &self.plant.modes[at].guarded_switches);
         for drive in &self.plant.drives {
             let (i, on) = (drive.switch, key.switches[drive.switch]);
-            let due = drive.next <= near;
-            let wanted = if due {
-                !on
-            } else {
-                self.plant.thresholds[i].position(on, drive.control(&self.z))
-            };
-            let guarded = self
-                .mode
-                .is_some_and(|at| self.plant.modes[at].guarded_switches.contains(&i));
-            if wanted != on && !guarded {
-                key.switches[i] = wanted;
-                edge = true;
+            let leaves = || drive.leaves(&self.plant.thresholds[i], on, self.motion.t, &self.z);
+            if !guarded.contains(&i) && (drive.next <= near || leaves()) {
+                key.switches[i] = !on;
+                moved = true;
             }
         }
         for clock in &self.plant.clocks {
             if clock.next <= near {
                 key.switches[clock.switch] = !key.switches[clock.switch];
-                edge = true;
+                moved = true;
             }
         }
-        fire(&self.plant.thresholds, &mut key.switches);
-        if edge {
-            key.sliding.clear();
+        moved
+    }
+
+    /// Moves the switches whose guards end the mode now: the one that `fired` and all that pass their thresholds with it, in the
+    /// present mode with the sources as they go on after a `corner`. Whether one moved.
+    fn move_guarded(&mut self, key: &mut Key, fired: Option<usize>, corner: bool) -> bool {
+        let Some(at) = self.mode else { return false };
+        let mut moved = false;
+        let owner = fired.map(|guard| self.plant.modes[at].owner(guard));
+        match owner {
+            // A thyristor's current ends, and no gate holds it.
+            Some(Owner::Device(pair)) => {
+                for i in self.plant.released(pair, &key.switches) {
+                    key.switches[i] = false;
+                }
+            }
+            Some(Owner::Switch(i)) if !corner => {
+                key.switches[i] = !key.switches[i];
+                moved = true;
+            }
+            Some(Owner::Slide(i, on)) => {
+                key.sliding.retain(|s| s.0 != i);
+                key.switches[i] = on;
+                moved = true;
+            }
+            Some(Owner::Switch(_)) | None => {}
         }
-        self.left_here.clear();
-        self.instant = t;
-        self.change(key, edge, Trigger::Sources, log)
+        let mode = &self.plant.modes[at];
+        let first = mode.device_guards.len();
+        let may_pass = |k: usize| {
+            let decided = !corner && fired == Some(first + k);
+            let sources_turn = corner && mode.controlled_by_sources[k];
+            !decided && (sources_turn || self.motion.is_at_zero(&mode.flow, first + k))
+        };
+        let candidates: Vec<usize> = (0..mode.guarded_switches.len())
+            .filter(|&k| may_pass(k))
+            .collect();
+        if !candidates.is_empty() {
+            let now = &self.motion.now[..mode.n];
+            self.inspector.look(mode, now, &self.z);
+            for k in candidates {
+                if self.inspector.leaves(mode, first + k, self.motion.t) {
+                    let i = mode.guarded_switches[k];
+                    key.switches[i] = !key.switches[i];
+                    moved = true;
+                }
+            }
+        }
+        moved
     }
 
     /// Sources whose pieces end go on along the next ones; returns whether one of them jumps.
@@ -437,10 +448,10 @@ impl Stepper for Exact<'_> {
                 .motion
                 .travel(&mut self.plant.modes[at].flow, &self.exosystem, stop)
             {
-                Arrival::Reached if due => self.breakpoint(log)?,
+                Arrival::Reached if due => self.instant(None, log)?,
                 Arrival::Reached => return Ok(()),
                 Arrival::Fired(guard) => {
-                    self.fired(guard, log)?;
+                    self.instant(Some(guard), log)?;
                     let (t, h) = (self.motion.t, self.plant.output_step());
                     if let Some((events, span)) = self.accumulation.burst(t, h) {
                         let error = self.fail(Reason::EventsAccumulate { events, span });

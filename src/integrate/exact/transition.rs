@@ -1,10 +1,13 @@
 //! From one mode to the next: positions of the switches, impulse of the devices, conducting devices.
 
+use nalgebra::DVector;
+
 use super::inspect::Finding;
 use super::mode::{Key, Mode, Owner};
 use super::schedule::Drive;
 use super::stepper::Exact;
 use crate::integrate::run::{Log, Reason, SimError};
+use crate::integrate::settle;
 use crate::integrate::switching::fire;
 
 /// Lengths of the implicit step that proposes the next mode, in units of the fastest time constant seen. The long ones are for stiff
@@ -12,8 +15,6 @@ use crate::integrate::switching::fire;
 pub(super) const PROPOSALS: [f64; 9] = [1e-6, 1e-4, 1e-8, 1e-2, 1e-10, 1.0, 1e2, 1e4, 1e6];
 /// Modes tried around the proposals before the search ends.
 const MOST_NEIGHBOURS: usize = 400;
-/// Events at one instant after which modes already left there are not entered again.
-const PATIENCE: usize = 2;
 
 /// Why a mode is left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,6 +92,9 @@ impl Exact<'_> {
         let mut moving: Vec<usize> = Vec::new();
         let mut followed = Some(followed);
         for _ in 0..3 + 2 * self.plant.thresholds.len() {
+            if discontinuous && self.settle(key)? {
+                followed = None;
+            }
             // A device event in a convex circuit is continuous; an edge or a switch may need an impulse.
             let mut found = match followed.take() {
                 Some(found) => found,
@@ -114,7 +118,7 @@ impl Exact<'_> {
             }
             let Some((at, mut leaving)) = found else {
                 let device = self.culprit(key, trigger);
-                return Err(self.fail(Reason::Infeasible).devices(device));
+                return Err(self.fail(Reason::Infeasible).device(device));
             };
             key.closed.clone_from(&self.plant.modes[at].key.closed);
             leaving.extend(self.misplaced(at));
@@ -144,12 +148,37 @@ impl Exact<'_> {
             discontinuous = true;
         }
         let at = entry.ok_or_else(|| {
-            let names = moving
+            let names: Vec<&str> = moving
                 .iter()
-                .map(|&i| self.plant.thresholds[i].name.as_str());
-            self.fail(Reason::SwitchesDoNotSettle).devices(names)
+                .map(|&i| self.plant.thresholds[i].name.as_str())
+                .collect();
+            self.fail(Reason::SwitchesDoNotSettle)
+                .device(names.join(", "))
         })?;
         Ok((at, jumped))
+    }
+
+    /// See [`settle`]; whether a switch moved.
+    fn settle(&mut self, key: &mut Key) -> Result<bool, SimError> {
+        if !key.sliding.is_empty() || key.switches.len() < 2 {
+            return Ok(false);
+        }
+        let u = self.inputs(self.motion.t);
+        let s = DVector::from_column_slice(&self.storage);
+        let thresholds = self.plant.thresholds.clone();
+        let mut candidate = key.clone();
+        settle::settle(
+            &thresholds,
+            &self.key.switches,
+            &mut key.switches,
+            |position| {
+                candidate.switches.copy_from_slice(position);
+                let lcs = &self.plant.free(&candidate)?.lcs;
+                let mut asking = settle::asking(lcs, &thresholds, position, &s, &u);
+                asking.retain(|i| self.plant.clocks.iter().all(|clock| clock.switch != *i));
+                Ok(asking)
+            },
+        )
     }
 
     /// Enters mode `at`, which was inspected last, under its key.
@@ -198,7 +227,7 @@ impl Exact<'_> {
         let mode = &self.plant.modes[at];
         let wrong = move |i: usize, drive: &Drive| {
             let on = mode.key.switches[i];
-            drive.misplaced(&self.plant.thresholds[i], on, self.motion.t, &self.z)
+            drive.leaves(&self.plant.thresholds[i], on, self.motion.t, &self.z)
         };
         let drives = self.plant.drives.iter().map(|drive| (drive.switch, drive));
         drives
@@ -222,14 +251,14 @@ impl Exact<'_> {
     }
 
     /// The device or switches at which no mode goes on.
-    fn culprit(&mut self, key: &Key, trigger: Trigger) -> Vec<String> {
-        let moved: Vec<String> = (0..key.switches.len())
+    fn culprit(&mut self, key: &Key, trigger: Trigger) -> String {
+        let moved: Vec<&str> = (0..key.switches.len())
             .filter(|&i| !self.plant.thresholds[i].is_rest())
             .filter(|&i| self.key.switches.get(i) != key.switches.get(i))
-            .map(|i| self.plant.thresholds[i].name.clone())
+            .map(|i| self.plant.thresholds[i].name.as_str())
             .collect();
         if !moved.is_empty() {
-            return moved;
+            return moved.join(", ");
         }
         let guard = match (trigger, self.mode) {
             (Trigger::Guard(guard), Some(from)) => Some((from, guard)),
@@ -241,12 +270,10 @@ impl Exact<'_> {
                     Finding::Inconsistent | Finding::Holds(_) => None,
                 }),
         };
-        let first = || self.plant.device(0).map(String::from);
-        guard
-            .map(|(at, guard)| self.owner_name(at, guard))
-            .or_else(first)
-            .into_iter()
-            .collect()
+        guard.map_or_else(
+            || self.plant.device(0).unwrap_or("the sources").to_string(),
+            |(at, guard)| self.owner_name(at, guard),
+        )
     }
 
     /// The device or switch of a guard of mode `at`.
@@ -315,22 +342,12 @@ impl Exact<'_> {
             let (why, at) = self.plant.modes[from].successors[k];
             if why == trigger
                 && self.plant.modes[at].key.same_switches(key)
-                && !(self.left_here.len() > PATIENCE && self.left_here.contains(&at))
                 && let Some(leaving) = self.try_mode(at)
             {
                 return Some((at, leaving));
             }
         }
         None
-    }
-
-    /// Modes that were left at this instant too often to be entered again.
-    fn barred(&self) -> Vec<usize> {
-        if self.left_here.len() > PATIENCE {
-            self.left_here.clone()
-        } else {
-            Vec::new()
-        }
     }
 
     /// A mode that holds on some interval after now: from one implicit step of the complementarity system at several
@@ -341,11 +358,10 @@ impl Exact<'_> {
         key: &Key,
         trigger: Trigger,
     ) -> Result<Option<(usize, Vec<usize>)>, SimError> {
-        let barred = self.barred();
         let mut tried: Vec<Vec<bool>> = Vec::new();
         if trigger == Trigger::Sources || self.plant.pairs == 0 {
             tried.push(key.closed.clone());
-            if let Some(found) = self.try_key(key, &barred) {
+            if let Some(found) = self.try_key(key) {
                 return Ok(Some(found));
             }
         }
@@ -353,13 +369,13 @@ impl Exact<'_> {
             return Ok(None);
         }
         if key.sliding.is_empty() || self.plant.free(key).is_ok() {
-            if let Some(found) = self.try_proposals(key, &mut tried, &barred)? {
+            if let Some(found) = self.try_proposals(key, &mut tried)? {
                 return Ok(Some(found));
             }
         } else if !tried.contains(&key.closed) {
             // On a threshold the circuit may have no complementarity system; the modes around the present one remain.
             tried.push(key.closed.clone());
-            if let Some(found) = self.try_key(key, &barred) {
+            if let Some(found) = self.try_key(key) {
                 return Ok(Some(found));
             }
         }
@@ -374,7 +390,7 @@ impl Exact<'_> {
                 }
                 tried.push(closed.clone());
                 let candidate = key.with_closed(closed);
-                if let Some(found) = self.try_key(&candidate, &barred) {
+                if let Some(found) = self.try_key(&candidate) {
                     return Ok(Some(found));
                 }
             }
@@ -388,7 +404,6 @@ impl Exact<'_> {
         &mut self,
         key: &Key,
         tried: &mut Vec<Vec<bool>>,
-        barred: &[usize],
     ) -> Result<Option<(usize, Vec<usize>)>, SimError> {
         let t = self.motion.t;
         let fastest = self.plant.fastest();
@@ -407,7 +422,7 @@ impl Exact<'_> {
                 }
                 tried.push(closed.clone());
                 let candidate = key.with_closed(closed);
-                if let Some(found) = self.try_key(&candidate, barred) {
+                if let Some(found) = self.try_key(&candidate) {
                     // What was found once is tried first from now on.
                     self.proposals[..=k].rotate_right(1);
                     return Ok(Some(found));
@@ -417,11 +432,8 @@ impl Exact<'_> {
         Ok(None)
     }
 
-    pub(super) fn try_key(&mut self, key: &Key, barred: &[usize]) -> Option<(usize, Vec<usize>)> {
-        let at = self
-            .plant
-            .mode(key, &self.exosystem)
-            .filter(|at| !barred.contains(at))?;
+    pub(super) fn try_key(&mut self, key: &Key) -> Option<(usize, Vec<usize>)> {
+        let at = self.plant.mode(key, &self.exosystem)?;
         self.try_mode(at).map(|leaving| (at, leaving))
     }
 

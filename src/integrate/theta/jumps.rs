@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::integrate::jump::Jump;
+use crate::integrate::settle;
 
 impl Theta<'_> {
     /// The first jump: from inconsistent initial values, by edges of the sources at the start.
@@ -204,6 +205,7 @@ impl Theta<'_> {
                     return Ok(());
                 }
             }
+            self.settle(&before)?;
             self.stats.events += 1;
             log.event(self.now.t, self.switches.flipped(&before));
             self.change_position(log)?;
@@ -219,14 +221,31 @@ impl Theta<'_> {
             }
             return Ok(());
         }
-        let (lcs, pattern) = (
-            &self.plant.systems[self.now.system].1.lcs,
-            &self.now.pattern,
-        );
-        let at = self.now.point(&self.lambda, &self.du);
-        self.switches.update(lcs, at, pattern, true);
-        let moving = self.switches.moved(&before);
-        Err(SimError::at(self.now.t, Reason::SwitchesDoNotSettle).devices(moving))
+        Err(SimError::at(self.now.t, Reason::SwitchesDoNotSettle)
+            .device(self.switches.flipped(&[])))
+    }
+
+    /// Moves the switches that those which have left position `before` move, see [`settle`](settle::settle).
+    fn settle(&mut self, before: &[bool]) -> Result<(), SimError> {
+        if before.len() < 2 {
+            return Ok(());
+        }
+        let s = self.system().storage(&self.now.x, &self.now.u);
+        let u = DVector::from_column_slice(&self.now.u);
+        let thresholds = self.switches.thresholds().to_vec();
+        let Self {
+            plant,
+            switches,
+            inputs,
+            now,
+            ..
+        } = self;
+        switches.settle(before, |position| {
+            let at = plant.system(position, inputs, now.t)?;
+            let lcs = &plant.systems[at].1.lcs;
+            Ok(settle::asking(lcs, &thresholds, position, &s, &u))
+        })?;
+        Ok(())
     }
 
     /// Takes the storage over into the system of the present switch position.

@@ -9,7 +9,7 @@ fn times(found: &[Crossing]) -> Vec<f64> {
 #[test]
 fn crossings_of_ramps_and_edges_are_exact() {
     let wave = source("pulse", &[0.0, 1.0, 0.0, 0.25, 0.5, 0.25, 2.0]);
-    let found = crossings(&[(1.0, &wave)], 0.0, 0.5, 0.0, 4.0);
+    let found = crossings(&[(1.0, &wave)], (0.0, 0.5), Rest::IsNeither, 0.0, 4.0);
     assert_eq!(times(&found), [0.125, 0.75, 2.125, 2.75]);
     assert_eq!(
         found.iter().map(|c| c.rising).collect::<Vec<_>>(),
@@ -17,13 +17,28 @@ fn crossings_of_ramps_and_edges_are_exact() {
     );
     let edge = source("pulse", &[0.0, 1.0, 0.3, 0.0, 0.0, 0.25, 2.0]);
     assert_eq!(
-        times(&crossings(&[(1.0, &edge)], 0.0, 0.5, 0.0, 2.0)),
+        times(&crossings(
+            &[(1.0, &edge)],
+            (0.0, 0.5),
+            Rest::IsNeither,
+            0.0,
+            2.0
+        )),
         [0.3, 0.3 + 0.25]
     );
     // reached but not passed
-    assert_eq!(crossings(&[(1.0, &edge)], 0.0, 1.0, 0.0, 2.0), []);
     assert_eq!(
-        times(&crossings(&[(1.0, &edge)], 0.0, 0.0, 0.0, 2.0)),
+        crossings(&[(1.0, &edge)], (0.0, 1.0), Rest::IsNeither, 0.0, 2.0),
+        []
+    );
+    assert_eq!(
+        times(&crossings(
+            &[(1.0, &edge)],
+            (0.0, 0.0),
+            Rest::IsNeither,
+            0.0,
+            2.0
+        )),
         [0.3]
     );
 }
@@ -31,7 +46,7 @@ fn crossings_of_ramps_and_edges_are_exact() {
 #[test]
 fn crossings_of_sinusoids_are_all_found_to_rounding() {
     let wave = source("sin", &[0.0, 1.0, 1e3, 0.0, 0.0, 0.0]);
-    let found = crossings(&[(1.0, &wave)], 0.0, 0.5, 0.0, 20e-3);
+    let found = crossings(&[(1.0, &wave)], (0.0, 0.5), Rest::IsNeither, 0.0, 20e-3);
     assert_eq!(found.len(), 40);
     for (k, crossing) in found.iter().enumerate() {
         let angle = if k % 2 == 0 { 30.0 } else { 150.0 };
@@ -43,9 +58,24 @@ fn crossings_of_sinusoids_are_all_found_to_rounding() {
         );
         assert_eq!(crossing.rising, k % 2 == 0);
     }
-    assert_eq!(crossings(&[(1.0, &wave)], 0.0, 1.0 + 1e-9, 0.0, 20e-3), []);
+    assert_eq!(
+        crossings(
+            &[(1.0, &wave)],
+            (0.0, 1.0 + 1e-9),
+            Rest::IsNeither,
+            0.0,
+            20e-3
+        ),
+        []
+    );
     // two crossings 2·acos(1 − 1e-9)/ω = 0.0142 us apart around each crest
-    let close = crossings(&[(1.0, &wave)], 0.0, 1.0 - 1e-9, 0.0, 20e-3);
+    let close = crossings(
+        &[(1.0, &wave)],
+        (0.0, 1.0 - 1e-9),
+        Rest::IsNeither,
+        0.0,
+        20e-3,
+    );
     assert_eq!(close.len(), 40);
     assert!(
         (close[1].time
@@ -62,7 +92,7 @@ fn crossings_of_a_reference_against_a_carrier() {
     let reference = source("sin", &[0.0, 0.8, 50.0, 0.0, 0.0, 0.0]);
     let carrier = source("pulse", &[-1.0, 1.0, 0.0, 0.5e-3, 0.5e-3, 0.0, 1e-3]);
     let terms = [(1.0, &reference), (-1.0, &carrier)];
-    let found = crossings(&terms, 0.0, 0.0, 0.0, 20e-3);
+    let found = crossings(&terms, (0.0, 0.0), Rest::IsNeither, 0.0, 20e-3);
     assert_eq!(found.len(), 40);
     for pair in found.windows(2) {
         assert_ne!(pair[0].rising, pair[1].rising);
@@ -76,7 +106,7 @@ fn crossings_of_a_reference_against_a_carrier() {
 #[test]
 fn crossings_of_a_modulated_tone() {
     let wave = source("sffm", &[0.0, 1.0, 1e3, 3.0, 100.0]);
-    let found = crossings(&[(1.0, &wave)], 0.0, 0.0, 0.0, 10e-3);
+    let found = crossings(&[(1.0, &wave)], (0.0, 0.0), Rest::IsNeither, 0.0, 10e-3);
     // the phase runs over 10 turns in one signal period and is monotone (index·signal < carrier)
     assert_eq!(found.len(), 19);
     assert!(

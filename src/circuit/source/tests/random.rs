@@ -174,7 +174,7 @@ proptest! {
     fn crossings_agree_with_sampling(a in waves(), b in waves(), gain in -2.0..2.0, level in -3.0..3.0) {
         let (a, b) = (Source { dc: 0.0, wave: a }, Source { dc: 0.0, wave: b });
         let value = |t: f64| a.value(t) + gain * b.value(t) - level;
-        let found = crossings(&[(1.0, &a), (gain, &b)], 0.0, level, 0.0, 1e-3);
+        let found = crossings(&[(1.0, &a), (gain, &b)], (0.0, level), Rest::IsNeither, 0.0, 1e-3);
         prop_assert!(found.windows(2).all(|w| w[0].time <= w[1].time && w[0].rising != w[1].rising));
         // Between passages the sampled sign is the one the last passage left.
         let mut above = None;
