@@ -1,19 +1,37 @@
 //! State jumps: what an impulse of the devices does to the state in no time.
 //!
-//! The limit h → 0 of the step problem. Impulses p lie in Q_D, the solutions of LCP(0, D): p ≥ 0, Dp ≥ 0, (D + Dᵀ)p = 0, and
-//! x⁺ = x + Bp satisfies Cx⁺ + Gu⁺ + F ∈ Q_D* with ⟨Cx⁺ + Gu⁺ + F, p⟩ = 0. For a passive network, where PBp = Cᵀp on
-//! ker(D + Dᵀ), this is the projection x⁺ = argmin ½‖x⁺ − x‖²_P; Brogliato-Thibault (24)-(26) is the case D = 0. With
-//! p = N z, N a basis of ker(D + Dᵀ) in which z are some of the components of p themselves, and V those rows of [N; DN] whose
-//! sign z ≥ 0 does not settle, the conditions are the monotone complementarity problem
+//! The limit h → 0 of the step problem. A port's λ and y fill intervals, from the bounds λ⁻ and y⁻ up where there are bounds
+//! ([`Law::least_current`](crate::law::Law::least_current), [`Law::greatest_voltage`](crate::law::Law::greatest_voltage); both 0 for an ideal
+//! pair). An impulse p_j of λ_j is met by a finite y_j: it needs a bound y⁻_j, and y_j stays there. The impulse η = Dp of y_j is
+//! met by a finite λ_j: it needs a bound λ⁻_j, and λ_j stays there. So impulses form the cone
 //!
 //! ```text
-//! 0 ≤ z ⟂ NᵀCBN z + Nᵀ(Cx + Gu⁺ + F) − Vᵀ s ≥ 0,   0 ≤ s ⟂ V z ≥ 0.
+//! Q = { p : (D + Dᵀ)p = 0, p_j ≥ 0 and p_j = 0 without y⁻_j, (Dp)_j ≥ 0 and (Dp)_j = 0 without λ⁻_j },
 //! ```
+//!
+//! for ideal pairs the solutions of LCP(0, D). The state x⁺ = x + Bp is admissible where finite λ ≥ λ⁻, y ≥ y⁻ have
+//! y = Cx⁺ + Dλ + Gu⁺ + F, and for D ⪰ 0 such λ, y exist on the laws, or next to them, if and only if
+//!
+//! ```text
+//! w(x⁺) = Cx⁺ + Gu⁺ + F + Dλ⁻ − y⁻ ∈ Q* (bounds that are missing are 0 here),      and ⟨w(x⁺), p⟩ = 0.
+//! ```
+//!
+//! For a passive network, where PBp = Cᵀp on ker(D + Dᵀ), this is the projection x⁺ = argmin ½‖x⁺ − x‖²_P onto the closure of the
+//! states from which the circuit can go on; Brogliato-Thibault (24)-(26) is the case D = 0 with ideal pairs. With
+//! p = N z, N a basis of the subspace of Q's equations in which z are some of the components of p themselves, and V those rows of
+//! [N; DN] whose sign z ≥ 0 does not settle, the conditions are the monotone complementarity problem
+//!
+//! ```text
+//! 0 ≤ z ⟂ NᵀCBN z + Nᵀw(x) − Vᵀ s ≥ 0,   0 ≤ s ⟂ V z ≥ 0.
+//! ```
+//!
+//! An ideal diode beside an exponential one shows why the finite λ of curved laws count: where a switch interrupts an inductor, the
+//! current goes through the exponential diode, and no impulse opens the ideal one.
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::integrate::lawful;
-use crate::lcs::Lcs;
+use crate::diagnostic::Internal;
+use crate::lcs::{Lcs, Role};
 use crate::solve::lcp::Scaling;
 use crate::solve::{Driver, Status};
 
@@ -28,8 +46,10 @@ pub struct JumpProblem {
     /// Whether D + Dᵀ and the jump matrix NᵀCBN are positive semidefinite, as for every passive network. If not, the jump is
     /// not given by this problem.
     pub monotone: bool,
-    /// Where curved laws take part: the ideal ports and the system of them alone, which the rest is about.
-    part: Option<Box<(Vec<usize>, Lcs)>>,
+    /// m: Dλ⁻ − y⁻.
+    bounds: DVector<f64>,
+    /// m: the units of the equilibrated λ.
+    units: DVector<f64>,
 }
 
 /// What a jump did.
@@ -43,6 +63,9 @@ pub struct Jump {
 
 /// Changes below this, relative to the quantities they are computed from, are rounding and no jump.
 const ROUNDING: f64 = 1e-12;
+/// A forward impulse of voltage below this part of the largest impulse, in equilibrated variables, is the residual that a solution
+/// may have.
+const FORWARD: f64 = 1e-6;
 
 impl JumpProblem {
     /// Prepares the jump problem; `None` where no impulse can flow (D + Dᵀ positive definite, or no ports): then the plan
@@ -53,28 +76,30 @@ impl JumpProblem {
         if m == 0 || lcs.n() == 0 {
             return None;
         }
-        if lawful::is_curved(lcs) {
-            let (ports, part) = lawful::ideal_part(lcs);
-            let problem = Self::new(&part, tolerance)?;
-            return Some(Self {
-                part: Some(Box::new((ports, part))),
-                ..problem
-            });
+        let ends: Vec<Ends> = (0..m).map(|j| Ends::of(lcs, j)).collect();
+        let carriers: Vec<usize> = (0..m).filter(|&j| ends[j].y.is_some()).collect();
+        if carriers.is_empty() {
+            return None;
         }
         let cb = &lcs.c * &lcs.b;
         // Levelled with CB where D is zero, so that ports without feedthrough have a scale too.
         let scaling = Scaling::of(&levelled(&lcs.d, &cb));
         let d = DMatrix::from_diagonal(&scaling.d);
         let feedthrough = &d * &lcs.d * &d;
-        let symmetric = &feedthrough + feedthrough.transpose();
-        // Q_D lies in ker(D + Dᵀ) only for D + Dᵀ ⪰ 0; else the problem below is not used (see `monotone`).
+        let carried = feedthrough.select_rows(&carriers).select_columns(&carriers);
+        let symmetric = &carried + carried.transpose();
+        // Q lies in ker(D + Dᵀ) only for D + Dᵀ ⪰ 0; else the problem below is not used (see `monotone`).
         let semidefinite = is_semidefinite(&symmetric);
         let kernel = if semidefinite {
             kernel(symmetric)
         } else {
-            DMatrix::identity(m, m)
+            DMatrix::identity(carriers.len(), carriers.len())
         };
-        let (n, v) = reduced(&kernel, &feedthrough);
+        let mut n = DMatrix::zeros(m, kernel.ncols());
+        for (row, &j) in kernel.row_iter().zip(&carriers) {
+            n.set_row(j, &row);
+        }
+        let (n, v) = reduced(n, &feedthrough, &ends);
         let k = n.ncols();
         let basis = &d * &n;
         if k == 0 || (&lcs.b * &basis).amax() == 0.0 {
@@ -97,7 +122,8 @@ impl JumpProblem {
             sigma,
             driver,
             monotone,
-            part: None,
+            bounds: bounds(lcs, &ends),
+            units: scaling.d,
         })
     }
 
@@ -111,25 +137,8 @@ impl JumpProblem {
         x: &DVector<f64>,
         u: &DVector<f64>,
     ) -> Result<Option<Jump>, Infeasible> {
-        if let Some(whole) = self.part.take() {
-            let (ports, part) = &*whole;
-            let found = self.solve(part, x, u);
-            let to_whole = |jump: Jump| {
-                let mut p = DVector::zeros(lcs.m());
-                for (k, &j) in ports.iter().enumerate() {
-                    p[j] = jump.p[k];
-                }
-                Jump { p, ..jump }
-            };
-            let found = match found {
-                Ok(jump) => Ok(jump.map(to_whole)),
-                Err(Infeasible { port }) => Err(Infeasible { port: ports[port] }),
-            };
-            self.part = Some(whole);
-            return found;
-        }
         let k = self.basis.ncols();
-        let right = self.basis.transpose() * (&lcs.c * x + &lcs.g * u + &lcs.f);
+        let right = self.basis.transpose() * (&lcs.c * x + &lcs.g * u + &lcs.f + &self.bounds);
         if right.amax() == 0.0 {
             return Ok(None);
         }
@@ -156,15 +165,75 @@ impl JumpProblem {
         Ok(Some(Jump { x: x + change, p }))
     }
 
+    /// Whether no device has an impulse of voltage across it in its forward direction: it would take a current before.
+    ///
+    /// # Errors
+    /// The device with the largest; the jump is wrong then, whatever the circuit.
+    pub fn verify(&self, lcs: &Lcs, p: &DVector<f64>) -> Result<(), Internal> {
+        let through = &lcs.d * p;
+        let scaled = |j: usize| (p[j] / self.units[j], through[j] * self.units[j]);
+        let largest = (0..p.len()).fold(0.0_f64, |a, j| {
+            let (p, y) = scaled(j);
+            a.max(p.abs()).max(y.abs())
+        });
+        let reverse = |j: usize| match lcs.ports[j].role {
+            Role::Voltage => (scaled(j).0, p[j]),
+            Role::Current => (scaled(j).1, through[j]),
+            Role::Function => (0.0, 0.0),
+        };
+        let worst = (0..p.len()).min_by(|&a, &b| reverse(a).0.total_cmp(&reverse(b).0));
+        match worst {
+            Some(port) if reverse(port).0 < -FORWARD * largest => {
+                let (device, area) = (&lcs.ports[port].device, -reverse(port).1);
+                let what = format!("a jump puts a forward impulse of {area:e} V s across {device}");
+                Err(Internal::new("integrate::jump", what))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Whether p only makes up for rounding in Cx + Gu + F.
     fn is_rounding(&self, lcs: &Lcs, x: &DVector<f64>, u: &DVector<f64>, p: &DVector<f64>) -> bool {
-        let terms = lcs.c.abs() * x.abs() + lcs.g.abs() * u.abs() + lcs.f.abs();
+        let terms = lcs.c.abs() * x.abs() + lcs.g.abs() * u.abs() + lcs.f.abs() + self.bounds.abs();
         let corrected = &lcs.c * (&lcs.b * p);
         corrected
             .iter()
             .zip(terms.iter())
             .all(|(c, t)| c.abs() <= ROUNDING * t)
     }
+}
+
+/// The bounds λ⁻ and y⁻ of a port.
+#[derive(Debug, Clone, Copy)]
+struct Ends {
+    lambda: Option<f64>,
+    y: Option<f64>,
+}
+
+impl Ends {
+    fn of(lcs: &Lcs, j: usize) -> Self {
+        let law = &lcs.ports[j].law;
+        // + 0: what is no bound of an ideal pair is 0 and not −0.
+        let (current, voltage) = (law.least_current(), law.greatest_voltage().map(|v| 0.0 - v));
+        match lcs.ports[j].role {
+            Role::Voltage => Self {
+                lambda: voltage,
+                y: current,
+            },
+            Role::Current | Role::Function => Self {
+                lambda: current,
+                y: voltage,
+            },
+        }
+    }
+}
+
+/// Dλ⁻ − y⁻.
+fn bounds(lcs: &Lcs, ends: &[Ends]) -> DVector<f64> {
+    let vector = |of: fn(&Ends) -> Option<f64>| {
+        DVector::from_iterator(ends.len(), ends.iter().map(|e| of(e).unwrap_or(0.0)))
+    };
+    &lcs.d * vector(|e| e.lambda) - vector(|e| e.y)
 }
 
 /// No admissible state can be reached by an impulse of the devices.
@@ -202,9 +271,23 @@ fn kernel(mut s: DMatrix<f64>) -> DMatrix<f64> {
     n
 }
 
-/// The columns of N that p ≥ 0 and Dp ≥ 0 leave free, and the rows of [N; DN] that z ≥ 0 does not imply.
-fn reduced(kernel: &DMatrix<f64>, d: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
-    let feed = (d * kernel).map(|v| if v.abs() < ROUNDING { 0.0 } else { v });
+/// The columns of N without impulses that Q has not, and the rows of [N; DN] that z ≥ 0 does not imply.
+fn reduced(
+    mut kernel: DMatrix<f64>,
+    d: &DMatrix<f64>,
+    ends: &[Ends],
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let through = |kernel: &DMatrix<f64>, bounded: bool| {
+        let rows: Vec<usize> = (0..ends.len())
+            .filter(|&j| ends[j].lambda.is_some() == bounded)
+            .collect();
+        (d.select_rows(&rows) * kernel).map(|v| if v.abs() < ROUNDING { 0.0 } else { v })
+    };
+    let equations = through(&kernel, false);
+    if equations.amax() > 0.0 {
+        kernel *= null(equations);
+    }
+    let feed = through(&kernel, true);
     let mut columns: Vec<usize> = (0..kernel.ncols()).collect();
     let rows: Vec<_> = kernel.row_iter().chain(feed.row_iter()).collect();
     loop {
@@ -224,6 +307,37 @@ fn reduced(kernel: &DMatrix<f64>, d: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f6
         .collect();
     let v = DMatrix::from_fn(open.len(), columns.len(), |i, j| open[i][columns[j]]);
     (kernel.select_columns(&columns), v)
+}
+
+/// A basis of the kernel of E (entries near 1), by elimination with complete pivoting: column j has 1 in a row of its own.
+fn null(mut e: DMatrix<f64>) -> DMatrix<f64> {
+    let m = e.ncols();
+    let zero = ROUNDING * e.amax();
+    let mut free: Vec<usize> = (0..m).collect();
+    let mut open: Vec<usize> = (0..e.nrows()).collect();
+    let mut pivots = Vec::new();
+    loop {
+        let entries = open.iter().flat_map(|&i| free.iter().map(move |&j| (i, j)));
+        let largest = entries.max_by(|&a, &b| e[a].abs().total_cmp(&e[b].abs()));
+        let Some((i, j)) = largest.filter(|&at| e[at].abs() > zero) else {
+            break;
+        };
+        let row = e.row(i) / e[(i, j)];
+        let column = e.column(j).into_owned();
+        e -= column * &row;
+        e.set_row(i, &row);
+        open.retain(|&other| other != i);
+        free.retain(|&other| other != j);
+        pivots.push((i, j));
+    }
+    let mut n = DMatrix::zeros(m, free.len());
+    for (k, &f) in free.iter().enumerate() {
+        n[(f, k)] = 1.0;
+        for &(i, j) in &pivots {
+            n[(j, k)] = -e[(i, f)];
+        }
+    }
+    n
 }
 
 fn is_semidefinite(symmetric: &DMatrix<f64>) -> bool {
@@ -248,7 +362,8 @@ fn levelled(d: &DMatrix<f64>, cb: &DMatrix<f64>) -> DMatrix<f64> {
 mod tests {
     use super::*;
     use crate::integrate::fixtures;
-    use nalgebra::dvector;
+    use crate::law::{Breakdown, Exponential, Law};
+    use nalgebra::{dmatrix, dvector};
 
     #[test]
     fn bridge_with_capacitor_filter_shares_charge() {
@@ -292,5 +407,102 @@ mod tests {
             jumps.solve(&lcs, &dvector![-3.0], &DVector::zeros(0)),
             Ok(None)
         );
+    }
+
+    /// An inductor of 1 mH whose current comes out of the anodes of devices in parallel: λ is the current of the first and the voltage of
+    /// the last.
+    fn inductor_into(laws: [Law; 2]) -> Lcs {
+        let mut lcs = fixtures::bridge();
+        // x' = (−v)/L, v = −λ₂; y₁ = −v = λ₂, y₂ = x − λ₁.
+        let [first, last] = laws;
+        let port = |law: Law, role| crate::lcs::Port {
+            law,
+            role,
+            ..lcs.ports[0].clone()
+        };
+        let ports = vec![port(first, Role::Current), port(last, Role::Voltage)];
+        lcs.ports = ports;
+        lcs.b = dmatrix![0.0, 1e3];
+        lcs.c = dmatrix![0.0; 1.0];
+        lcs.d = dmatrix![0.0, 1.0; -1.0, 0.0];
+        lcs.g = DMatrix::zeros(2, 0);
+        lcs.f = DVector::zeros(2);
+        lcs
+    }
+
+    fn exponential(is: f64, bv: Option<f64>) -> Law {
+        Law::Exponential(Exponential {
+            is,
+            slope: 0.026,
+            rs: 0.0,
+            breakdown: bv.map(|bv| Breakdown {
+                bv,
+                ibv: 1e-3,
+                slope: 0.026,
+            }),
+        })
+    }
+
+    fn jumped(laws: [Law; 2], i: f64) -> Option<Jump> {
+        let lcs = inductor_into(laws);
+        let mut jumps = JumpProblem::new(&lcs, 1e-9)?;
+        assert!(jumps.monotone);
+        let found = jumps.solve(&lcs, &dvector![i], &DVector::zeros(0)).unwrap();
+        if let Some(jump) = &found {
+            assert_eq!(jumps.verify(&lcs, &jump.p), Ok(()));
+        }
+        found
+    }
+
+    #[test]
+    fn a_curved_law_takes_an_interrupted_current_forward() {
+        let curved = || exponential(1e-6, None);
+        for laws in [
+            [curved(), Law::ideal_diode()],
+            [Law::ideal_diode(), curved()],
+            [curved(), curved()],
+        ] {
+            assert_eq!(jumped(laws.clone(), 1.0), None);
+            // In reverse the current is that of the leakages at once, by an impulse of L times the change.
+            let leaks: f64 = laws.iter().map(|law| law.least_current().unwrap()).sum();
+            let jump = jumped(laws, -1.0).unwrap();
+            assert!((jump.x[0] - leaks).abs() < 1e-15, "{jump:?}");
+            assert!((jump.p[1] - 1e-3 * (1.0 + leaks)).abs() < 1e-15, "{jump:?}");
+        }
+        // Breakdown takes the current in reverse, too.
+        for laws in [
+            [exponential(1e-6, Some(5.0)), Law::ideal_diode()],
+            [curved(), exponential(1e-6, Some(5.0))],
+        ] {
+            assert_eq!(jumped(laws, -1.0), None);
+        }
+    }
+
+    #[test]
+    fn a_curved_law_joins_no_capacitors_in_no_time() {
+        let mut lcs = fixtures::clamped_capacitor();
+        let at = |lcs: &Lcs| {
+            let x = dvector![3.0];
+            JumpProblem::new(lcs, 1e-9)?
+                .solve(lcs, &x, &DVector::zeros(0))
+                .unwrap()
+        };
+        assert!(at(&lcs).is_some());
+        lcs.ports[0].law = exponential(1e-14, None);
+        assert_eq!(at(&lcs), None);
+    }
+
+    #[test]
+    fn a_forward_impulse_is_an_error() {
+        let lcs = inductor_into([exponential(1e-6, None), Law::ideal_diode()]);
+        let jumps = JumpProblem::new(&lcs, 1e-9).unwrap();
+        // Opening the ideal diode against the exponential one.
+        let wrong = jumps.verify(&lcs, &dvector![0.0, -1e-3]).unwrap_err();
+        assert!(
+            wrong.what.contains("forward impulse of 1e-3 V s"),
+            "{wrong}"
+        );
+        assert_eq!(jumps.verify(&lcs, &dvector![0.0, 1e-3]), Ok(()));
+        assert_eq!(jumps.verify(&lcs, &dvector![1.0, 0.0]), Ok(()));
     }
 }

@@ -181,9 +181,14 @@ impl Exponential {
         let (other, slope, sign) = match (reverse, self.breakdown) {
             (Some(_), _) => (self.is * (found.v / self.slope).exp(), self.slope, 1.0),
             (None, Some(b)) => (b.ibv * (-(found.v + b.bv) / b.slope).exp(), b.slope, -1.0),
-            (None, None) => return found,
+            (None, None) => (0.0, self.slope, 1.0),
         };
-        if r * other > f64::EPSILON * (z.abs() + self.slope) || other > slope * f64::EPSILON / r {
+        // Near 0 V both v and i above are small differences of large numbers.
+        let cancelled = found.v.abs() < self.slope;
+        if cancelled
+            || r * other > f64::EPSILON * (z.abs() + self.slope)
+            || other > slope * f64::EPSILON / r
+        {
             let mut v = found.v;
             let (mut i, mut g) = self.direct(v);
             for _ in 0..POLISH {
@@ -313,6 +318,21 @@ mod tests {
             // i is what the law says at v; an error in v is worth g times as much in i.
             let error = (diode.current(p.v) - p.i).abs();
             prop_assert!(error <= 1e-11 * (p.i.abs() + diode.is) + 4e-16 * p.v.abs() * p.di / p.dv, "{p:?} {error}");
+        }
+
+        #[test]
+        fn small_currents_have_all_their_digits(diode in any_diode(), rho in -6.0..6.0f64, decades in -40.0..-1.0f64, up in prop::bool::ANY) {
+            let rho = 10_f64.powf(rho);
+            let z = diode.slope * 10_f64.powf(decades) * if up { 1.0 } else { -1.0 };
+            let at = diode.resolvent(rho, z);
+            prop_assert!((at.v + rho * at.i - z).abs() <= 1e-14 * z.abs().max(at.v.abs()), "{at:?}");
+            let junction = at.v - diode.rs * at.i;
+            // Where the resistance takes most of z, the digits of the junction's voltage are those of what it leaves.
+            let left = 1e-14 + 1e-15 * z.abs() / junction.abs();
+            if diode.breakdown.is_none() {
+                let law = diode.is * (junction / diode.slope).exp_m1();
+                prop_assert!((law / at.i - 1.0).abs() <= left, "{at:?} {law}");
+            }
         }
 
         #[test]

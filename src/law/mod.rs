@@ -1,5 +1,6 @@
 //! Device laws: maximal monotone curves in the (v, i) plane, −λ ∈ ∂φ(y).
 
+mod bounds;
 mod curve;
 mod dead_zone;
 mod diode;

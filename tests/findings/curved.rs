@@ -1,1 +1,81 @@
 //! Curved laws: diodes and transistors that take part in jumps.
+
+use circ::integrate::{Method, Run};
+use circ::measure::{Over, Trace};
+
+use super::run;
+
+fn average(run: &Run, probe: &str, from: f64, to: f64) -> f64 {
+    let values: Vec<f64> = super::runs::column(run, probe);
+    let trace = Trace {
+        time: &run.waveforms.time,
+        values: &values,
+    };
+    trace.over(Over::Average, from, to).unwrap()
+}
+
+/// A converter by steps of both kinds: the mean of its output is `expected` to `tolerance`, in V.
+fn delivers(name: &str, from: f64, to: f64, expected: f64, tolerance: f64) {
+    let found = run(name, Method::Auto);
+    assert_eq!(found.method, "theta");
+    let mean = average(&found, "v(out)", from, to);
+    assert!(
+        (mean - expected).abs() < tolerance,
+        "{name}: {mean} V in place of {expected} V"
+    );
+    assert!(found.energy.residual_relative < 1e-3, "{:?}", found.energy);
+}
+
+// The transistors as SW with the same RON (KP and VTO at the gate's high level) and a diode of N = 0.05 by ngspice 39 with
+// reltol = 1e-6 and steps of 10 ns at most.
+
+#[test]
+fn the_freewheel_diode_of_a_buck_takes_the_current() {
+    delivers("nmos_exp_buck", 400e-6, 500e-6, 12.7413, 1e-3);
+}
+
+#[test]
+fn the_output_diode_of_a_boost_takes_the_current() {
+    delivers("nmos_exp_boost", 2.9e-3, 3e-3, 23.8661, 2e-3);
+}
+
+#[test]
+fn a_buck_with_a_floating_driver_delivers() {
+    delivers("mosfet_buck", 2e-3, 3e-3, 11.71048, 1e-3);
+}
+
+#[test]
+fn a_buck_with_a_transistor_of_p_type_delivers() {
+    delivers("pmos_buck", 2e-3, 3e-3, 4.54272, 1e-3);
+}
+
+#[test]
+fn a_switch_and_a_schottky_diode_are_a_buck() {
+    delivers("sw_schottky_buck", 400e-6, 500e-6, 12.90714, 1e-3);
+}
+
+#[test]
+fn the_secondary_of_a_flyback_takes_the_flux() {
+    // Runge and Kutta's steps of 5 ns for the current of either winding and the output.
+    delivers("nmos_exp_flyback", 2.9e-3, 3e-3, 3.5975, 5e-4);
+}
+
+#[test]
+fn an_ideal_diode_leaves_the_current_to_an_exponential_one() {
+    // L i' = −N k T/q ln(1 + i/IS) by Runge and Kutta's method.
+    for method in [Method::Theta, Method::Euler] {
+        let found = run("lost_current", method);
+        let i = super::runs::at(&found, "i(l1)", 50e-6);
+        assert!((i - 0.958_337_993).abs() < 1e-5, "{method:?}: {i}");
+        assert_eq!((found.stats.jumps, found.impulses.len()), (0, 0));
+    }
+}
+
+#[test]
+fn a_source_that_starts_at_zero_starts() {
+    // ngspice 39, reltol = 1e-6 and steps of 5 ns.
+    let found = run("one_diode_rlc_refused", Method::Auto);
+    let at = |probe, t| super::runs::at(&found, probe, t);
+    assert!((at("i(l1)", 15e-6) - 7.383_914).abs() < 1e-4);
+    assert!((at("v(out)", 50e-6) - 8.025_838).abs() < 1e-4);
+}

@@ -61,9 +61,16 @@ impl Theta<'_> {
         let u = DVector::from_column_slice(&self.now.u);
         let System { lcs, jump, .. } = &mut self.plant.systems[self.now.system].1;
         let found = match jump {
-            Some(problem) if problem.monotone => problem.solve(lcs, &x, &u).map_err(|e| {
-                SimError::at(t, Reason::Infeasible).device(lcs.ports[e.port].device.clone())
-            })?,
+            Some(problem) if problem.monotone => {
+                let found = problem.solve(lcs, &x, &u).map_err(|e| {
+                    SimError::at(t, Reason::Infeasible).device(lcs.ports[e.port].device.clone())
+                })?;
+                if let Some(jump) = &found {
+                    let checked = problem.verify(lcs, &jump.p);
+                    checked.map_err(|broken| SimError::at(t, Reason::Internal(broken)))?;
+                }
+                found
+            }
             Some(_) => self.step_limit()?,
             None => None,
         };
