@@ -397,6 +397,34 @@ fn check_lists_faults_with_status_1_and_certificates_with_0() {
         words.out.contains("passive") && words.status == 0,
         "{words}"
     );
+    // A position without a system is a fault at its element, for every command.
+    let directory = place();
+    let loops = "two sources\nv1 a 0 5\nv2 b 0 6\ns1 a b c 0 sw\nvc c 0 1\n.model sw sw(ideal vt=0.5)\n.tran 1u 1m\n";
+    fs::write(directory.path().join("loop.cir"), loops).unwrap();
+    let ran = run_in(directory.path(), "check loop.cir --json");
+    let report: serde_json::Value = serde_json::from_str(&ran.out).unwrap();
+    let fault = &report["faults"][0];
+    assert_eq!(
+        (
+            ran.status,
+            &fault["code"],
+            &fault["file"],
+            &fault["line"],
+            &fault["column"]
+        ),
+        (
+            1,
+            &"voltage-loop".into(),
+            &"loop.cir".into(),
+            &2.into(),
+            &1.into()
+        )
+    );
+    for command in ["sim loop.cir", "op loop.cir", "lcs loop.cir --switch s1=on"] {
+        let ran = run_in(directory.path(), command);
+        assert_eq!(ran.status, 2, "{ran}");
+        assert!(ran.err.contains("loop.cir:2:1"), "{ran}");
+    }
     let unknown = run("check chopper.cir --switch s9=on");
     assert_eq!(unknown.status, 2, "{unknown}");
     assert!(unknown.err.contains("the circuit has s1"), "{unknown}");

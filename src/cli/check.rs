@@ -57,18 +57,26 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Report, Failure> {
     input::positions(&behaviour, &args.switches)?;
     let subject = Subject::Circuit(Box::new((circuit, behaviour)));
     match input::start_system(&subject, &args.switches, streams) {
-        Ok(system) => {
+        Ok((system, without)) => {
             let mut report = match &subject {
-                Subject::Circuit(parts) => check::circuit(&parts.0, &system.lcs),
+                Subject::Circuit(parts) => {
+                    // A run would be refused, too; what follows is about the start from initial conditions.
+                    diagnostics.extend(without.map(|error| error.diagnostic(&parts.0)));
+                    check::circuit(&parts.0, &system.lcs)
+                }
                 Subject::System(_) => check::system(&system.lcs),
             };
+            report.ok = diagnostics.iter().all(|d| d.severity < Severity::Error);
             report
                 .faults
                 .splice(0..0, diagnostics.iter().map(|d| Fault::of(d, &sources)));
             Ok(report)
         }
         Err(failure) => {
-            diagnostics.push(Diagnostic::error("no-system", None, failure.to_string()));
+            diagnostics.push(match (failure, &subject) {
+                (Failure::Run(error), Subject::Circuit(parts)) => error.diagnostic(&parts.0),
+                (failure, _) => Diagnostic::error("no-system", None, failure.to_string()),
+            });
             Ok(faulty(&title, &diagnostics, &sources))
         }
     }

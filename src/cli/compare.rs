@@ -15,7 +15,8 @@ use super::output;
 use super::sim::{self, Request};
 use super::stepped::Stepped;
 use super::streams::Streams;
-use crate::circuit::Tran;
+use crate::circuit::{Circuit, Tran};
+use crate::diagnostic::SourceMap;
 use crate::integrate::Method;
 use crate::report::figure::Figure;
 use crate::report::{json, svg, text};
@@ -47,6 +48,7 @@ const DRAWN: usize = 3;
 /// See [`Failure`].
 pub(super) fn compare(args: &CompareArgs, streams: &Streams) -> Result<Exit, Failure> {
     let (subject, cards) = input::open_with_cards(&args.input, &[], streams)?;
+    let files = cards.as_ref().map(|(_, sources)| sources.clone());
     if let (Subject::Circuit(both), Some((netlist, sources))) = (&subject, cards)
         && !both.0.steps.is_empty()
     {
@@ -63,7 +65,7 @@ pub(super) fn compare(args: &CompareArgs, streams: &Streams) -> Result<Exit, Fai
         streams
             .say("note: `.step` is left out: the file is compared with the values as they stand");
     }
-    let found = Found::of(args, &subject, streams)?;
+    let found = Found::of(args, &subject, files.as_ref(), streams)?;
     if let Some(path) = &args.output {
         draw(path, &found)?;
     }
@@ -98,7 +100,7 @@ fn every(args: &CompareArgs, stepped: &Stepped<'_>, streams: &Streams) -> Result
     for values in stepped.combinations() {
         let label = stepped.label(&values);
         let subject = stepped.subject(&values, streams)?;
-        let found = match Found::of(args, &subject, streams) {
+        let found = match Found::of(args, &subject, Some(&stepped.sources), streams) {
             Ok(found) => found,
             Err(failure) => {
                 failures.push(format!("{failure} at {label}"));
@@ -147,7 +149,12 @@ struct Found {
 }
 
 impl Found {
-    fn of(args: &CompareArgs, subject: &Subject, streams: &Streams) -> Result<Self, Failure> {
+    fn of(
+        args: &CompareArgs,
+        subject: &Subject,
+        sources: Option<&SourceMap>,
+        streams: &Streams,
+    ) -> Result<Self, Failure> {
         let tran = sim::tran(subject).ok_or_else(|| {
             Failure::Message(format!(
                 "{}: there is no `.tran` to compare",
@@ -159,7 +166,8 @@ impl Found {
         } else {
             from_file(&args.against)?
         };
-        let ours = simulated(args, subject, tran, streams)?;
+        let circuit = input::circuit_of(&args.input, subject).ok();
+        let ours = simulated(args, subject, circuit.zip(sources), tran, streams)?;
         let shift = args.shift.unwrap_or(theirs.shift);
         let comparison = compare_waveforms(&ours, &theirs.waveforms, At::ReferenceRows, shift)?;
         let within = comparison.signals.iter().all(|s| s.shifted <= args.tol);
@@ -305,6 +313,7 @@ fn from_file(path: &Path) -> Result<Theirs, Failure> {
 fn simulated(
     args: &CompareArgs,
     subject: &Subject,
+    place: Option<(&Circuit, &SourceMap)>,
     tran: Tran,
     streams: &Streams,
 ) -> Result<Waveforms, Failure> {
@@ -327,7 +336,7 @@ fn simulated(
         .ceil()
         .max(1.0);
     let run = sim::run(subject, &request, Some(tran.tstep / divisions), streams)
-        .map_err(|e| Failure::Message(format!("{}: {e}", args.input.file.display())))?;
+        .map_err(|error| input::broke_off(&args.input, &error, place, streams))?;
     for note in &run.notes {
         streams.say(format!("note: {note}"));
     }

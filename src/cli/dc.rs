@@ -48,7 +48,8 @@ pub(super) fn sim(
         let point = point.map_err(|error| {
             let names = circuit.dc.iter().map(|s| s.what.name().to_string());
             let label = steps::label(&names.zip(values.iter().copied()).collect::<Vec<_>>());
-            Failure::Message(format!("{} at {label}: {error}", args.input.file.display()))
+            let failure = input::broke_off(&args.input, &error, Some((&circuit, sources)), streams);
+            Failure::Faults(format!("{failure} at {label}"))
         })?;
         Ok(values
             .iter()

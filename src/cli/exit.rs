@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use crate::integrate::SimError;
 use crate::report::PictureError;
 use crate::waveform::WaveformError;
 use crate::waveform::compare::CompareError;
@@ -60,6 +61,9 @@ pub enum Failure {
     /// Two sets of waveforms have nothing in common.
     #[error(transparent)]
     Compare(#[from] CompareError),
+    /// A run, or its start, could not be computed; shown at its element where the circuit is at hand.
+    #[error(transparent)]
+    Run(#[from] Box<SimError>),
     /// Anything else that the user should read.
     #[error("{0}")]
     Message(String),

@@ -25,7 +25,7 @@ pub(super) fn graph(args: &GraphArgs, streams: &Streams) -> Result<Exit, Failure
     {
         return Err(output::unknown_ending(path, "dot, svg or png"));
     }
-    let subject = input::open(&args.input, &[], streams)?;
+    let (subject, _) = input::open(&args.input, &[], streams)?;
     let circuit = input::circuit_of(&args.input, &subject)?;
     match ending {
         None => streams.data(graph::dot(circuit))?,

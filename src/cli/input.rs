@@ -10,7 +10,7 @@ use super::streams::Streams;
 use crate::circuit::{self, Circuit, ElaborateOptions};
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 use crate::forms::json;
-use crate::integrate::start;
+use crate::integrate::{SimError, start};
 use crate::lcs::json::SystemFile;
 use crate::lcs::{Lcs, Position, reduce};
 use crate::mna::{self, Behaviour};
@@ -70,18 +70,23 @@ pub fn choices(input: &Input) -> ElaborateOptions {
     }
 }
 
-/// Reads a file, shows what was found in it, and keeps the named probes if there are any.
+/// Reads a file, shows what was found in it, and keeps the named probes if there are any. With a netlist come the files it was
+/// read from.
 ///
 /// # Errors
 /// [`Failure::Faults`] when the circuit cannot be built, [`Failure::Message`] for an unknown probe.
-pub fn open(input: &Input, probes: &[String], streams: &Streams) -> Result<Subject, Failure> {
-    let (subject, _) = open_with_cards(input, probes, streams)?;
+pub fn open(
+    input: &Input,
+    probes: &[String],
+    streams: &Streams,
+) -> Result<(Subject, Option<SourceMap>), Failure> {
+    let (subject, cards) = open_with_cards(input, probes, streams)?;
     if let Subject::Circuit(both) = &subject
         && !both.0.steps.is_empty()
     {
         streams.say("note: `.step` is left out: these are the values as they stand");
     }
-    Ok(subject)
+    Ok((subject, cards.map(|(_, sources)| sources)))
 }
 
 /// The same, with the cards of the netlist and where they stand.
@@ -147,18 +152,21 @@ pub fn circuit_of<'s>(input: &Input, subject: &'s Subject) -> Result<&'s Circuit
     }
 }
 
-/// The system that a subject starts as: matrices in the start position of its switches (or the one asked for), and x there.
+/// The system that a subject starts as: matrices in the start position of its switches (or the one asked for), and x there; and
+/// why the initial conditions had to take the place of its operating point, if they had to.
 ///
 /// # Errors
-/// [`Failure::Message`] for an unknown switch or a circuit that is no system.
+/// [`Failure::Message`] for an unknown switch, [`Failure::Run`] for a circuit that is no system.
 pub fn start_system(
     subject: &Subject,
     wanted: &[(String, bool)],
     streams: &Streams,
-) -> Result<SystemFile, Failure> {
+) -> Result<(SystemFile, Option<SimError>), Failure> {
     let (circuit, behaviour) = match subject {
         Subject::Circuit(both) => (&both.0, &both.1),
-        Subject::System(system) if wanted.is_empty() => return Ok((**system).clone()),
+        Subject::System(system) if wanted.is_empty() => {
+            return Ok(((**system).clone(), None));
+        }
         Subject::System(_) => {
             return Err(Failure::Message(
                 "--switch: a system file holds one position of its switches".into(),
@@ -167,13 +175,13 @@ pub fn start_system(
     };
     let uic = circuit.tran.is_some_and(|t| t.uic);
     let settings = Settings::default();
-    let initial = start::initial(circuit, behaviour, uic, &settings).or_else(|error| {
-        streams.say(format!(
-            "note: {error}; the start state is the initial conditions"
-        ));
-        start::initial(circuit, behaviour, true, &settings)
-    });
-    let initial = initial.map_err(|e| Failure::Message(e.to_string()))?;
+    let (initial, without) = match start::initial(circuit, behaviour, uic, &settings) {
+        Ok(initial) => (initial, None),
+        Err(error) => {
+            let initial = start::initial(circuit, behaviour, true, &settings);
+            (initial.map_err(Box::new)?, Some(error))
+        }
+    };
     for note in &initial.notes {
         streams.say(format!("note: {note}"));
     }
@@ -182,13 +190,14 @@ pub fn start_system(
         switches[k] = on;
     }
     let lcs = reduce(behaviour, &Position::free(behaviour, switches))
-        .map_err(|e| Failure::Message(e.to_string()))?;
+        .map_err(|error| Box::new(SimError::before(error.into())))?;
     let x0 = &lcs.storage.inject * &initial.storage + &lcs.storage.inject_one;
-    Ok(SystemFile {
+    let system = SystemFile {
         lcs,
         x0,
         tran: circuit.tran,
-    })
+    };
+    Ok((system, without))
 }
 
 /// Indices and positions of the switches named on the command line.
@@ -226,6 +235,24 @@ pub fn show(diagnostics: &[Diagnostic], sources: &SourceMap, streams: &Streams) 
     if !shown.is_empty() {
         streams.error(render(&shown, sources, streams.err_is_terminal()));
     }
+}
+
+/// A run that broke off: shows why, at the card of the element where it shows.
+pub(super) fn broke_off(
+    input: &Input,
+    error: &SimError,
+    circuit: Option<(&Circuit, &SourceMap)>,
+    streams: &Streams,
+) -> Failure {
+    let file = input.file.display();
+    let Some((circuit, sources)) = circuit else {
+        return Failure::Message(format!("{file}: {error}"));
+    };
+    show(&[error.diagnostic(circuit)], sources, streams);
+    Failure::Faults(match error.t {
+        Some(t) if t > 0.0 => format!("{file}: the run ended at t = {t:e} s"),
+        _ => format!("{file}: the circuit cannot be simulated"),
+    })
 }
 
 pub(super) fn faults(input: &Input, diagnostics: &[Diagnostic]) -> Failure {

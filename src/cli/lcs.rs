@@ -2,7 +2,7 @@
 
 use super::args::{LcsArgs, SystemFormat};
 use super::exit::{Exit, Failure};
-use super::input;
+use super::input::{self, Subject};
 use super::output;
 use super::streams::Streams;
 use crate::lcs::format::{Format, format};
@@ -13,8 +13,19 @@ use crate::lcs::json;
 /// # Errors
 /// See [`Failure`].
 pub(super) fn lcs(args: &LcsArgs, streams: &Streams) -> Result<Exit, Failure> {
-    let subject = input::open(&args.input, &[], streams)?;
-    let system = input::start_system(&subject, &args.switches, streams)?;
+    let (subject, sources) = input::open(&args.input, &[], streams)?;
+    let system = input::start_system(&subject, &args.switches, streams);
+    let (system, without) = system.map_err(|failure| match (failure, &subject, sources) {
+        (Failure::Run(error), Subject::Circuit(parts), Some(sources)) => {
+            input::broke_off(&args.input, &error, Some((&parts.0, &sources)), streams)
+        }
+        (failure, ..) => failure,
+    })?;
+    if let Some(error) = without {
+        streams.say(format!(
+            "note: {error}; the start state is the initial conditions"
+        ));
+    }
     let text = match args.format {
         SystemFormat::Json => json::write(&system.lcs, &system.x0, system.tran),
         SystemFormat::Text => format(&system.lcs, Format::Text),

@@ -20,9 +20,12 @@ use crate::settings::Settings;
 pub(super) fn op(args: &OpArgs, streams: &Streams) -> Result<Exit, Failure> {
     let (subject, cards) = input::open_with_cards(&args.input, &[], streams)?;
     let circuit = input::circuit_of(&args.input, &subject)?;
+    let sources = cards.as_ref().map(|(_, sources)| sources.clone());
     let solved = |circuit: &Circuit| {
-        operating_point(circuit, Values::Dc, false, &Settings::default())
-            .map_err(|e| Failure::Message(format!("{}: {e}", args.input.file.display())))
+        operating_point(circuit, Values::Dc, false, &Settings::default()).map_err(|error| {
+            let place = sources.as_ref().map(|sources| (circuit, sources));
+            input::broke_off(&args.input, &error, place, streams)
+        })
     };
     let (netlist, sources) = match cards {
         Some(cards) if !circuit.steps.is_empty() => cards,

@@ -13,6 +13,7 @@ use super::stepped::Stepped;
 use super::steps::Stepping;
 use super::streams::Streams;
 use crate::circuit::{Circuit, Tran};
+use crate::diagnostic::SourceMap;
 use crate::integrate::{Method, Run, SimError, SimOptions, simulate, simulate_system};
 use crate::report::figure::Figure;
 use crate::report::measured::Measurements;
@@ -36,9 +37,10 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
     let request = Request::of(&args.method, args.events)?;
     if let Some(form) = forms::open(&args.input)? {
         let finished = (forms::run(&form, args)?, Measurements::default());
-        return finish(args, &formats, (Some(finished), None), streams);
+        return finish(args, &formats, (Some(finished), None), None, streams);
     }
     let (subject, cards) = input::open_with_cards(&args.input, &args.probes, streams)?;
+    let sources = cards.as_ref().map(|(_, sources)| sources.clone());
     if let (Subject::Circuit(both), Some((netlist, sources))) = (&subject, cards) {
         let (circuit, _) = &**both;
         if circuit.tran.is_none() && !circuit.dc.is_empty() {
@@ -61,7 +63,9 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         }
     }
     let finished = measured_run(&subject, &request, streams)?;
-    finish(args, &formats, finished, streams)
+    let circuit = input::circuit_of(&args.input, &subject);
+    let place = circuit.ok().zip(sources.as_ref());
+    finish(args, &formats, finished, place, streams)
 }
 
 /// Writes what a run gave, or as much of it as there is, and says why it ended early.
@@ -69,6 +73,7 @@ fn finish(
     args: &SimArgs,
     formats: &[Format],
     (finished, error): Finished,
+    place: Option<(&Circuit, &SourceMap)>,
     streams: &Streams,
 ) -> Result<Exit, Failure> {
     if let Some((run, found)) = &finished {
@@ -90,10 +95,7 @@ fn finish(
     }
     match error {
         None => Ok(Exit::Done),
-        Some(error) => Err(Failure::Message(format!(
-            "{}: {error}",
-            args.input.file.display()
-        ))),
+        Some(error) => Err(input::broke_off(&args.input, &error, place, streams)),
     }
 }
 

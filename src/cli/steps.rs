@@ -6,10 +6,12 @@ use rayon::prelude::*;
 
 use super::args::{SimArgs, Summary};
 use super::exit::{Exit, Failure};
+use super::input;
 use super::output::{self, Format};
 use super::sim::{self, Request};
 use super::stepped::Stepped;
 use super::streams::Streams;
+use crate::circuit::Circuit;
 use crate::integrate::SimError;
 use crate::report::figure::Figure;
 use crate::report::steps::{self, Step};
@@ -26,8 +28,8 @@ pub(super) struct Stepping<'a> {
     pub request: Request,
 }
 
-/// A run as far as it came, and why not further.
-type Outcome = (Option<Step>, Option<SimError>);
+/// A run as far as it came, and why and in which circuit not further.
+type Outcome = (Option<Step>, Option<(SimError, Circuit)>);
 
 impl Stepping<'_> {
     /// Runs, writes and tells.
@@ -51,13 +53,11 @@ impl Stepping<'_> {
         for (values, outcome) in combinations.iter().zip(outcomes) {
             let (step, error) = outcome?;
             done.extend(step);
-            failures.extend(error.map(|error| {
-                format!(
-                    "{} at {}: {error}",
-                    self.args.input.file.display(),
-                    self.stepped.label(values)
-                )
-            }));
+            if let Some((error, circuit)) = error {
+                let place = Some((&circuit, &self.stepped.sources));
+                let failure = input::broke_off(&self.args.input, &error, place, streams);
+                failures.push(format!("{failure} at {}", self.stepped.label(values)));
+            }
         }
         if !done.is_empty() {
             self.write(&done, formats, !failures.is_empty(), streams)?;
@@ -78,7 +78,8 @@ impl Stepping<'_> {
             run,
             found,
         });
-        Ok((step, error))
+        let circuit = || input::circuit_of(&self.args.input, &subject).ok().cloned();
+        Ok((step, error.and_then(|error| Some((error, circuit()?)))))
     }
 
     fn write(

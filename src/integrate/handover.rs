@@ -7,7 +7,7 @@
 mod tests;
 
 use crate::integrate::exact::{Exact, Place};
-use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper, Times};
+use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper, Times, named};
 use crate::integrate::stats::Stats;
 use crate::integrate::theta::Theta;
 
@@ -20,7 +20,7 @@ const MOST_NOTES: usize = 8;
 /// Interruptions by one device for one reason.
 #[derive(Debug, Clone)]
 struct Interruption {
-    device: Option<String>,
+    elements: Vec<String>,
     reason: Reason,
     count: u32,
     /// Start and end of the first, s.
@@ -98,16 +98,18 @@ impl<'a> Handover<'a> {
     }
 
     fn interrupt(&mut self, error: SimError, t: f64) {
-        let SimError { device, reason, .. } = error;
+        let SimError {
+            elements, reason, ..
+        } = error;
         let same = |i: &Interruption| {
-            i.device == device
+            i.elements == elements
                 && std::mem::discriminant(&i.reason) == std::mem::discriminant(&reason)
         };
         // The one in progress stands last.
         let known = match self.interruptions.iter().position(same) {
             Some(at) => self.interruptions.remove(at),
             None => Interruption {
-                device,
+                elements,
                 reason,
                 count: 0,
                 first: (t, t),
@@ -172,7 +174,7 @@ impl<'a> Handover<'a> {
 
     fn interruption_notes(&self) -> Vec<String> {
         let told = self.interruptions.iter().take(MOST_NOTES).map(|i| {
-            let device = i.device.as_ref().map_or(String::new(), |d| format!("{d}: "));
+            let device = named(&i.elements);
             let (from, to) = i.first;
             let again = if i.count > 1 {
                 format!(" (and {} times more, {:e} s in all)", i.count - 1, i.seconds)

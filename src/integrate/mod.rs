@@ -11,6 +11,7 @@ pub mod inputs;
 pub mod jump;
 mod lawful;
 pub mod line;
+mod located;
 pub mod reading;
 mod roles;
 pub mod run;
@@ -23,7 +24,7 @@ pub mod switching;
 pub mod system;
 pub mod theta;
 
-pub use run::{Frame, Grid, Log, Outcome, Reason, SimError, Stepper};
+pub use run::{Frame, Grid, Log, NoRest, Outcome, Reason, SimError, Stepper};
 pub use simulate::{Method, SimOptions, simulate, simulate_system};
 pub use start::{OperatingPoint, Values, operating_point};
 pub use stats::{Energy, Impulse, Run, Stats};

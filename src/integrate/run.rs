@@ -11,20 +11,33 @@ use crate::waveform::Waveforms;
 
 /// A simulation that ended early: when, at which device, and why, with everything computed so far.
 #[derive(Debug, thiserror::Error)]
-#[error("{}{}{reason}", at(*.t), device.as_ref().map_or(String::new(), |d| format!("{d}: ")))]
+#[error("{}{}{reason}", at(*.t), named(.elements))]
 pub struct SimError {
     /// Time, s; `None` before the run started.
     pub t: Option<f64>,
-    /// The element or switch concerned.
-    pub device: Option<String>,
+    /// The elements concerned, or parts of them (`d3.1`); the first is where the failure shows.
+    pub elements: Vec<String>,
     /// Why.
     pub reason: Reason,
     /// The run up to the failure.
     pub partial: Option<Box<Run>>,
 }
 
-fn at(t: Option<f64>) -> String {
-    t.map_or(String::new(), |t| format!("at t = {t:e} s: "))
+/// "at t = 1e-3 s: ", nothing before the run.
+pub(super) fn at(t: Option<f64>) -> String {
+    match t {
+        None => String::new(),
+        Some(0.0) => "at t = 0: ".into(),
+        Some(t) => format!("at t = {t:e} s: "),
+    }
+}
+
+/// "d1, d2: ", nothing where no element is concerned.
+pub(crate) fn named(elements: &[String]) -> String {
+    match elements {
+        [] => String::new(),
+        _ => elements.join(", ") + ": ",
+    }
 }
 
 /// Why a simulation cannot go on.
@@ -74,10 +87,10 @@ pub enum Reason {
     },
     /// The circuit has no operating point.
     #[error("no operating point: {0}; `uic` starts from initial conditions instead")]
-    NoOperatingPoint(String),
+    NoOperatingPoint(NoRest),
     /// The circuit in this switch position is not a system.
     #[error("{0}")]
-    Circuit(String),
+    Circuit(ReduceError),
     /// The state left the range of doubles.
     #[error("the solution grows beyond the range of numbers")]
     Overflow,
@@ -87,6 +100,28 @@ pub enum Reason {
     /// A broken invariant.
     #[error("{0}")]
     Internal(Internal),
+}
+
+/// Why a circuit has no operating point.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NoRest {
+    /// Its network with open capacitors and shorted inductors is none.
+    #[error("{0}")]
+    Network(String),
+    /// That network is no system.
+    #[error("{0}")]
+    System(ReduceError),
+    /// The devices contradict it.
+    #[error("no state of the devices satisfies the circuit equations")]
+    Devices,
+    /// Currents or voltages grow without end.
+    #[error(
+        "a voltage source across inductors or a current source into capacitors has no steady state"
+    )]
+    Sources,
+    /// A current flows where only capacitors lead on.
+    #[error("a current flows into a part of the circuit that only capacitors hold")]
+    Floating,
 }
 
 impl Reason {
@@ -100,7 +135,7 @@ impl From<ReduceError> for Reason {
     fn from(error: ReduceError) -> Self {
         match error {
             ReduceError::Internal(broken) => Self::Internal(broken),
-            error => Self::Circuit(error.to_string()),
+            error => Self::Circuit(error),
         }
     }
 }
@@ -111,7 +146,7 @@ impl SimError {
     pub fn before(reason: Reason) -> Self {
         Self {
             t: None,
-            device: None,
+            elements: Vec::new(),
             reason,
             partial: None,
         }
@@ -122,16 +157,22 @@ impl SimError {
     pub fn at(t: f64, reason: Reason) -> Self {
         Self {
             t: Some(t),
-            device: None,
+            elements: Vec::new(),
             reason,
             partial: None,
         }
     }
 
-    /// Names the device concerned.
+    /// Names the element concerned.
     #[must_use]
-    pub fn device(mut self, name: impl Into<String>) -> Self {
-        self.device = Some(name.into());
+    pub fn device(self, name: impl Into<String>) -> Self {
+        self.devices([name])
+    }
+
+    /// Names the elements concerned.
+    #[must_use]
+    pub fn devices(mut self, names: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.elements = names.into_iter().map(Into::into).collect();
         self
     }
 }

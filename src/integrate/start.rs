@@ -8,7 +8,7 @@ use crate::circuit::{
 };
 use crate::integrate::lawful;
 use crate::integrate::reading::{self, Point};
-use crate::integrate::run::{Reason, SimError};
+use crate::integrate::run::{NoRest, Reason, SimError};
 use crate::integrate::switching::at_start;
 use crate::lcs::{Hold, Lcs, Position, ReduceError, StorageHold, reduce};
 use crate::mna::{Behaviour, behaviour};
@@ -113,13 +113,13 @@ pub fn operating_point(
     let mut notes = Vec::new();
     let mut statics = observed_circuit(circuit);
     without_delay(&mut statics);
-    tie_floating(circuit, &mut statics, hold_ic, &mut notes);
+    let tied = tie_floating(circuit, &mut statics, hold_ic, &mut notes);
     if hold_ic {
         hold_initial_voltages(circuit, &mut statics);
     }
     let behaviour = behaviour(&statics).map_err(|faults| {
         let words: Vec<String> = faults.iter().map(|f| f.message.clone()).collect();
-        SimError::before(Reason::NoOperatingPoint(words.join("; ")))
+        no_rest(NoRest::Network(words.join("; ")))
     })?;
     let behaviour = behaviour.standard();
     let mut position = of_cards(&behaviour);
@@ -143,9 +143,9 @@ pub fn operating_point(
             let count = circuit.nodes.len() - 1;
             let (currents, ties) = point.readings[count..].split_at(circuit.elements.len());
             let largest = currents.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
-            if ties.iter().any(|i| i.abs() > ROUNDING * largest) {
-                let what = "a current flows into a part of the circuit that only capacitors hold";
-                return Err(SimError::before(Reason::NoOperatingPoint(what.into())));
+            if let Some(k) = (0..ties.len()).find(|&k| ties[k].abs() > ROUNDING * largest) {
+                let names = feeding(circuit, tied[k]);
+                return Err(no_rest(NoRest::Floating).devices(names));
             }
             let named = |names: &[String], values: &[f64]| -> Vec<(String, f64)> {
                 names.iter().cloned().zip(values.iter().copied()).collect()
@@ -166,11 +166,10 @@ pub fn operating_point(
         }
         if seen.contains(&wanted) || seen.len() > 64 {
             let names = behaviour.switches.iter().zip(wanted.iter().zip(&position));
-            let moving: Vec<&str> = names
+            let moving = names
                 .filter(|(_, (a, b))| a != b)
-                .map(|(s, _)| s.name.as_str())
-                .collect();
-            return Err(SimError::before(Reason::SwitchesDoNotSettle).device(moving.join(" ")));
+                .map(|(s, _)| s.name.as_str());
+            return Err(SimError::before(Reason::SwitchesDoNotSettle).devices(moving));
         }
         seen.push(std::mem::replace(&mut position, wanted));
     }
@@ -277,8 +276,14 @@ fn conductive(circuit: &Circuit, with_capacitors: bool) -> Vec<usize> {
     (0..root.len()).map(|i| find(&mut root, i)).collect()
 }
 
-/// Ties every part of the circuit that only capacitors hold to 0 V.
-fn tie_floating(circuit: &Circuit, statics: &mut Circuit, hold_ic: bool, notes: &mut Vec<String>) {
+/// Ties every part of the circuit that only capacitors hold to 0 V; returns a node of each.
+fn tie_floating(
+    circuit: &Circuit,
+    statics: &mut Circuit,
+    hold_ic: bool,
+    notes: &mut Vec<String>,
+) -> Vec<usize> {
+    let mut tied = Vec::new();
     let (dc, all) = (conductive(circuit, false), conductive(circuit, true));
     for (i, &root) in dc.iter().enumerate() {
         // Its own root, not ground, and joined by capacitors to something with a smaller index.
@@ -300,8 +305,10 @@ fn tie_floating(circuit: &Circuit, statics: &mut Circuit, hold_ic: bool, notes: 
             notes.push(format!(
                 "node {name} is held by capacitors alone and starts at 0 V"
             ));
+            tied.push(i);
         }
     }
+    tied
 }
 
 /// Holds `.ic` node voltages by sources; one per node or difference.
@@ -334,7 +341,7 @@ fn static_solution(
         switches: switches.to_vec(),
         storage: StorageHold::Static,
     };
-    let lcs = reduce(behaviour, &position).map_err(|e| no_point(&e))?;
+    let lcs = reduce(behaviour, &position).map_err(no_point)?;
     let u: Vec<f64> = lcs
         .inputs
         .iter()
@@ -396,14 +403,16 @@ fn devices(
         Status::Solved => {}
         Status::Infeasible(ray) => {
             let device = lcs.ports[ray.imax()].device.clone();
-            let what = "no state of the devices satisfies the circuit equations".to_string();
-            return Err(SimError::before(Reason::NoOperatingPoint(what)).device(device));
+            return Err(no_rest(NoRest::Devices).device(device));
         }
         Status::Failed => {
-            return Err(SimError::before(Reason::Residual {
+            let violation = solution.lambda.zip_map(&solution.y, |l, y| l.min(y).abs());
+            let device = lcs.ports[violation.imax()].device.clone();
+            let reason = Reason::Residual {
                 residual: solution.residual,
                 tolerance: settings.lcp_residual,
-            }));
+            };
+            return Err(SimError::before(reason).device(device));
         }
     }
     let (lambda, unique) = driver.least_norm(q, &solution);
@@ -426,20 +435,31 @@ fn check_constraints(lcs: &Lcs, at: Point<'_>) -> Result<(), SimError> {
                 .filter(|&j| rows.u[(i, j)] != 0.0)
                 .map(|j| lcs.inputs[j].name.as_str())
                 .collect();
-            let what = "a voltage source across inductors or a current source into capacitors has no steady state";
-            return Err(
-                SimError::before(Reason::NoOperatingPoint(what.into())).device(names.join(", "))
-            );
+            return Err(no_rest(NoRest::Sources).devices(names));
         }
     }
     Ok(())
 }
 
-fn no_point(error: &ReduceError) -> SimError {
-    SimError::before(match error {
-        ReduceError::Internal(_) => error.clone().into(),
-        error => Reason::NoOperatingPoint(error.to_string()),
-    })
+fn no_rest(why: NoRest) -> SimError {
+    SimError::before(Reason::NoOperatingPoint(why))
+}
+
+fn no_point(error: ReduceError) -> SimError {
+    match error {
+        ReduceError::Internal(_) => SimError::before(error.into()),
+        error => no_rest(NoRest::System(error)),
+    }
+}
+
+/// Elements that drive a current into the part of the circuit that a node belongs to and only capacitors hold.
+fn feeding(circuit: &Circuit, node: usize) -> impl Iterator<Item = &str> {
+    let parts = conductive(circuit, false);
+    let inside = move |id: NodeId| parts[id.index()] == parts[node];
+    let elements = circuit.elements.iter();
+    elements
+        .filter(move |e| inside(e.p) != inside(e.n) && !matches!(e.kind, Kind::Capacitor(_)))
+        .map(|e| e.name.as_str())
 }
 
 /// The start of a transient: [`from_initial_conditions`] with `uic`, else the [`operating_point`] with `.ic` held.

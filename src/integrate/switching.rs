@@ -352,12 +352,22 @@ impl Switches {
         excess.collect()
     }
 
-    /// Names with their positions, of those that differ from `before` (all if `None`).
+    fn different(&self, before: &[bool]) -> impl Iterator<Item = (usize, &Threshold)> {
+        let thresholds = self.thresholds.iter().enumerate();
+        thresholds.filter(move |(i, t)| !t.is_rest() && before[*i] != self.position[*i])
+    }
+
+    /// Names of those that differ from `before`.
+    pub(crate) fn moved(&self, before: &[bool]) -> Vec<String> {
+        self.different(before)
+            .map(|(_, t)| t.name.clone())
+            .collect()
+    }
+
+    /// Names with their positions, of those that differ from `before`.
     pub(crate) fn flipped(&self, before: &[bool]) -> String {
-        let names = self.thresholds.iter().enumerate().filter(|(i, t)| {
-            !t.is_rest() && before.get(*i).is_none_or(|b| *b != self.position[*i])
-        });
-        let words: Vec<String> = names
+        let words: Vec<String> = self
+            .different(before)
             .map(|(i, t)| format!("{} {}", t.name, if self.position[i] { "on" } else { "off" }))
             .collect();
         words.join(" ")

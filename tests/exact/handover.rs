@@ -23,7 +23,7 @@ fn events_without_end_are_left_to_steps() {
         matches!(error.reason, Reason::EventsAccumulate { .. }),
         "{error}"
     );
-    assert_eq!(error.device.as_deref(), Some("s1"));
+    assert_eq!(error.elements, ["s1"]);
     // Closed: v' = 10⁴ − 1100 v from 0 to 5.
     let (rest, rate): (f64, f64) = (1e4 / 1.1e3, 1.1e3);
     let reach = -(1.0 - 5.0 / rest).ln() / rate;
@@ -67,7 +67,7 @@ fn events_without_end_are_left_to_steps() {
 fn a_circuit_without_solution_is_an_error_of_both() {
     let text = "V1 1 0 SIN(0 1 1k)\nR1 1 2 1\nE1 3 0 2 0 3\nD1 2 3 d\nC1 2 0 1u\n.model d D(ideal)\n.tran 10u 2m uic";
     let error = try_run(text, by(Method::Auto)).expect_err("no solution");
-    assert_eq!(error.device.as_deref(), Some("d1"));
+    assert_eq!(error.elements, ["d1"]);
     let partial = error.partial.expect("the run so far");
     assert_eq!(partial.method, "theta");
     assert!(

@@ -124,3 +124,37 @@ fn a_gate_that_rises_at_zero_finds_the_operating_point_before_it() {
         assert!((found - right).abs() < 1e-3, "{method:?}: {found} {right}");
     }
 }
+
+/// Every failure of a run names its place, its cause and what to do; the whole message is the snapshot.
+#[cfg(feature = "cli")]
+#[test]
+fn a_run_that_fails_says_where_and_why_and_what_to_do() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/findings/failing");
+    let entries = std::fs::read_dir(folder).expect("the folder");
+    let mut files: Vec<_> = entries
+        .map(|entry| entry.expect("an entry").path())
+        .collect();
+    files.sort();
+    assert!(files.len() >= 10);
+    for file in files {
+        let name = file
+            .file_stem()
+            .expect("a name")
+            .to_string_lossy()
+            .into_owned();
+        let text = std::fs::read_to_string(&file).expect("a netlist");
+        let mut sources = SourceMap::default();
+        let root = sources.add(format!("{name}.cir"), text);
+        let (netlist, _) = parse(&mut sources, root, &|_| Err(ErrorKind::NotFound.into()));
+        let (circuit, findings) = elaborate(&netlist, &ElaborateOptions::default());
+        let circuit = circuit.unwrap_or_else(|| panic!("{name}: {findings:?}"));
+        let equations = behaviour(&circuit).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+        let error = simulate(&circuit, &equations, SimOptions::default()).expect_err(&name);
+        let finding = error.diagnostic(&circuit);
+        let text = circ::cli::render(&[finding], &sources, false);
+        let text: Vec<&str> = text.lines().map(str::trim_end).collect();
+        insta::with_settings!({ snapshot_path => "../snapshots/failing", prepend_module_to_snapshot => false }, {
+            insta::assert_snapshot!(name.as_str(), text.join("\n"));
+        });
+    }
+}

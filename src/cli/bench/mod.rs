@@ -41,7 +41,7 @@ pub(super) fn bench(args: &BenchArgs, streams: &Streams) -> Result<Exit, Failure
     {
         return Err(output::unknown_ending(path, "csv"));
     }
-    let subject = input::open(&args.input, &[], streams)?;
+    let (subject, _) = input::open(&args.input, &[], streams)?;
     let file = &args.input.file;
     let tran = sim::tran(&subject).ok_or_else(|| {
         Failure::Message(format!(

@@ -118,7 +118,7 @@ impl Exact<'_> {
             }
             let Some((at, mut leaving)) = found else {
                 let device = self.culprit(key, trigger);
-                return Err(self.fail(Reason::Infeasible).device(device));
+                return Err(self.fail(Reason::Infeasible).devices(device));
             };
             key.closed.clone_from(&self.plant.modes[at].key.closed);
             leaving.extend(self.misplaced(at));
@@ -148,12 +148,10 @@ impl Exact<'_> {
             discontinuous = true;
         }
         let at = entry.ok_or_else(|| {
-            let names: Vec<&str> = moving
+            let names = moving
                 .iter()
-                .map(|&i| self.plant.thresholds[i].name.as_str())
-                .collect();
-            self.fail(Reason::SwitchesDoNotSettle)
-                .device(names.join(", "))
+                .map(|&i| self.plant.thresholds[i].name.as_str());
+            self.fail(Reason::SwitchesDoNotSettle).devices(names)
         })?;
         Ok((at, jumped))
     }
@@ -251,14 +249,14 @@ impl Exact<'_> {
     }
 
     /// The device or switches at which no mode goes on.
-    fn culprit(&mut self, key: &Key, trigger: Trigger) -> String {
-        let moved: Vec<&str> = (0..key.switches.len())
+    fn culprit(&mut self, key: &Key, trigger: Trigger) -> Vec<String> {
+        let moved: Vec<String> = (0..key.switches.len())
             .filter(|&i| !self.plant.thresholds[i].is_rest())
             .filter(|&i| self.key.switches.get(i) != key.switches.get(i))
-            .map(|i| self.plant.thresholds[i].name.as_str())
+            .map(|i| self.plant.thresholds[i].name.clone())
             .collect();
         if !moved.is_empty() {
-            return moved.join(", ");
+            return moved;
         }
         let guard = match (trigger, self.mode) {
             (Trigger::Guard(guard), Some(from)) => Some((from, guard)),
@@ -270,10 +268,12 @@ impl Exact<'_> {
                     Finding::Inconsistent | Finding::Holds(_) => None,
                 }),
         };
-        guard.map_or_else(
-            || self.plant.device(0).unwrap_or("the sources").to_string(),
-            |(at, guard)| self.owner_name(at, guard),
-        )
+        let first = || self.plant.device(0).map(String::from);
+        guard
+            .map(|(at, guard)| self.owner_name(at, guard))
+            .or_else(first)
+            .into_iter()
+            .collect()
     }
 
     /// The device or switch of a guard of mode `at`.

@@ -228,8 +228,14 @@ impl Theta<'_> {
             }
             return Ok(());
         }
-        Err(SimError::at(self.now.t, Reason::SwitchesDoNotSettle)
-            .device(self.switches.flipped(&[])))
+        let (lcs, pattern) = (
+            &self.plant.systems[self.now.system].1.lcs,
+            &self.now.pattern,
+        );
+        let at = self.now.point(&self.lambda, &self.du);
+        self.switches.update(lcs, at, pattern, true);
+        let moving = self.switches.moved(&before);
+        Err(SimError::at(self.now.t, Reason::SwitchesDoNotSettle).devices(moving))
     }
 
     /// Moves the switches that those which have left position `before` move, see [`settle`](settle::settle).

@@ -120,6 +120,28 @@ pub enum ReduceError {
     Internal(Internal),
 }
 
+impl ReduceError {
+    /// The elements it accuses, or parts of them.
+    #[must_use]
+    pub fn elements(&self) -> Vec<&str> {
+        let (first, rest): (Option<&str>, &[String]) = match self {
+            Self::Position { .. } | Self::Internal(_) => (None, &[]),
+            Self::NotIdeal { device } => (Some(device), &[]),
+            Self::Sources { elements } | Self::Port { elements } => (None, elements),
+            Self::Feedthrough { storage, ports } => (Some(storage), ports),
+            Self::SourceRate { port, sources } => (Some(port), sources),
+            Self::Singular { elements } => (None, elements),
+        };
+        // Of a storage label `v(c1)` the element.
+        let element = |label| {
+            let inner = |(_, rest): (&str, _)| str::strip_suffix(rest, ')');
+            str::split_once(label, '(').and_then(inner).unwrap_or(label)
+        };
+        let all = first.into_iter().chain(rest.iter().map(String::as_str));
+        all.map(element).collect()
+    }
+}
+
 fn conflict(elements: &[String]) -> String {
     match elements {
         [one] => format!("{one} is shorted, or its current has no way back"),

@@ -1,0 +1,294 @@
+//! Why a run ended, as a finding at the element where it shows, with the cause in the circuit's words and what to do.
+
+use super::run::{NoRest, Reason, SimError, at};
+use crate::circuit::{Circuit, Element, Kind};
+use crate::diagnostic::Diagnostic;
+use crate::law::Law;
+use crate::lcs::ReduceError;
+
+impl SimError {
+    /// The finding for the user of `circuit`: the place is the card of the first element concerned.
+    #[must_use]
+    pub fn diagnostic(&self, circuit: &Circuit) -> Diagnostic {
+        let mut names: Vec<&str> = self.elements.iter().map(String::as_str).collect();
+        if names.is_empty() {
+            names = of_reason(&self.reason);
+        }
+        let mut elements: Vec<&Element> = Vec::new();
+        for element in names.iter().filter_map(|name| whole(circuit, name)) {
+            if !elements.iter().any(|known| known.name == element.name) {
+                elements.push(element);
+            }
+        }
+        let Told {
+            code,
+            message,
+            label,
+            help,
+        } = told(self, &elements);
+        let place = elements.iter().find_map(|e| e.span);
+        let diagnostic = Diagnostic::error(code, place, at(self.t) + &message).label(label);
+        match help {
+            Some(help) => diagnostic.help(help),
+            None => diagnostic,
+        }
+    }
+}
+
+/// The element of this name, or the one it is a part of: `d3` for the piece `d3.1` of its law.
+fn whole<'a>(circuit: &'a Circuit, name: &str) -> Option<&'a Element> {
+    let mut name = name;
+    loop {
+        if let Some(id) = circuit.element(name) {
+            return Some(&circuit.elements[id.index()]);
+        }
+        name = name.rsplit_once('.')?.0;
+    }
+}
+
+fn of_reason(reason: &Reason) -> Vec<&str> {
+    match reason {
+        Reason::Circuit(error) | Reason::NoOperatingPoint(NoRest::System(error)) => {
+            error.elements()
+        }
+        _ => Vec::new(),
+    }
+}
+
+struct Told {
+    code: &'static str,
+    message: String,
+    label: String,
+    help: Option<String>,
+}
+
+const UIC: &str = "`uic` on `.tran` starts from initial conditions instead";
+const DEVICE: &str = "a current may have no path but a device that blocks, or a voltage be shorted by one that conducts: a \
+                      resistor across the device (`Roff` in its model), or in series with it (`Ron`, `RS`), decides";
+
+fn told(error: &SimError, elements: &[&Element]) -> Told {
+    let names: Vec<&str> = elements.iter().map(|e| e.name.as_str()).collect();
+    let names = listed(&names);
+    let curved = elements
+        .iter()
+        .any(|e| matches!(&e.kind, Kind::Device(Law::Exponential(_) | Law::Rounded(_))));
+    let ideal = curved.then_some("`--diodes ideal` takes ideal diodes in place of curved ones");
+    let or = |help: &str| match ideal {
+        Some(ideal) => format!("{help}; {ideal}"),
+        None => help.to_string(),
+    };
+    let plain = |code, help: Option<String>| Told {
+        code,
+        message: error.reason.to_string(),
+        label: names.clone(),
+        help,
+    };
+    match &error.reason {
+        Reason::Infeasible => Told {
+            code: "no-solution",
+            message: "no state of the devices satisfies the circuit equations".into(),
+            label: impossible(elements),
+            help: Some(or(DEVICE)),
+        },
+        Reason::NoOperatingPoint(why) => no_rest(why, elements, &or),
+        Reason::Circuit(error) => no_system(error, elements),
+        Reason::Residual { .. } => plain(
+            "not-solved",
+            Some(or("a resistance in series with the device (`RS`, `Ron` in its model) or across it eases the problem")),
+        ),
+        Reason::Singular { .. } => plain(
+            "singular",
+            Some("another `--step` or another method may pass; a negative resistance or a gain near 1 in a loop causes this".into()),
+        ),
+        Reason::StepTooSmall { .. } => plain(
+            "step-too-small",
+            Some(or("a larger `--tol`, or a fixed `--step`, goes on")),
+        ),
+        Reason::TooManySteps { .. } => plain(
+            "too-many-steps",
+            Some("a shorter `.tran`, a larger `--tol` or a larger `--step` needs fewer".into()),
+        ),
+        Reason::SwitchesDoNotSettle => Told {
+            code: "switches-do-not-settle",
+            message: format!("in no position of {names} do the controls leave the switches where they are"),
+            label: "every position asks for another one".into(),
+            help: Some(
+                "hysteresis (`Vh` in the model), or a resistor and a capacitor in front of the control, lets them settle".into(),
+            ),
+        },
+        Reason::EventsAccumulate { .. } => plain(
+            "events-accumulate",
+            Some(
+                "hysteresis (`Vh`), or a small resistance or capacitance where it switches, ends the chatter; \
+                 `--method theta` steps over it"
+                    .into(),
+            ),
+        ),
+        Reason::Overflow => plain(
+            "overflow",
+            Some("a negative resistance, or a loop with gain of the wrong sign, makes a circuit grow without bound".into()),
+        ),
+        Reason::Unsupported(_) => plain("unsupported", None),
+        Reason::Internal(_) => plain("internal", None),
+    }
+}
+
+fn impossible(elements: &[&Element]) -> String {
+    match elements {
+        [one] if matches!(one.kind, Kind::Device(_)) => {
+            format!("{} can neither conduct nor block", one.name)
+        }
+        _ => {
+            let names: Vec<&str> = elements.iter().map(|e| e.name.as_str()).collect();
+            listed(&names)
+        }
+    }
+}
+
+fn no_rest(why: &NoRest, elements: &[&Element], or: &dyn Fn(&str) -> String) -> Told {
+    let names: Vec<&str> = elements.iter().map(|e| e.name.as_str()).collect();
+    let mut told = Told {
+        code: "no-operating-point",
+        message: format!("no operating point: {why}"),
+        label: listed(&names),
+        help: Some(UIC.into()),
+    };
+    match why {
+        NoRest::Network(_) => {}
+        NoRest::System(error) => {
+            let system = no_system(error, elements);
+            told.message = format!("no operating point: {}", system.message);
+            told.label = system.label;
+            told.help = system.help.map(|help| format!("{help}; {UIC}"));
+        }
+        NoRest::Devices => {
+            told.label = impossible(elements);
+            told.help = Some(format!("{}; {UIC}", or(DEVICE)));
+        }
+        NoRest::Sources => {
+            let what = match elements {
+                [one] if is_voltage_source(one) => "its voltage lies across inductors alone",
+                [one] if is_current_source(one) => "its current flows into capacitors alone",
+                _ => "sources across inductors alone, or into capacitors alone",
+            };
+            told.label = what.into();
+            told.help = Some(format!(
+                "a resistance in series with the inductors (`Rser`) or across the capacitors (`Rpar`) gives a steady state; {UIC}"
+            ));
+        }
+        NoRest::Floating => {
+            told.label = "its current ends in capacitors".into();
+            told.help = Some(format!("a large resistor to ground takes it up; {UIC}"));
+        }
+    }
+    told
+}
+
+fn no_system(error: &ReduceError, elements: &[&Element]) -> Told {
+    let names: Vec<&str> = elements.iter().map(|e| e.name.as_str()).collect();
+    let names = listed(&names);
+    let told = |code, message: String, help: &str| Told {
+        code,
+        message,
+        label: names.clone(),
+        help: Some(help.into()),
+    };
+    match error {
+        ReduceError::Sources { .. } => match elements {
+            [one] if is_voltage_source(one) => told(
+                "voltage-loop",
+                format!("{} is shorted", one.name),
+                "a resistor in series, or `Ron` in the model of the switch or diode that shorts it, limits its current",
+            ),
+            [one] if is_current_source(one) => told(
+                "current-cutset",
+                format!("the current of {} has no way back", one.name),
+                "a resistor across it, or `Roff` in the model of the switch or diode that opens, gives it a path",
+            ),
+            _ if elements.iter().any(|e| is_current_source(e)) => told(
+                "current-cutset",
+                between(elements, is_current_source, |one, rest| {
+                    format!("the current of {one} has no way back but {rest}, and that is open")
+                })
+                .unwrap_or_else(|| {
+                    format!("{names} are a cut-set of current sources and open branches that contradict each other")
+                }),
+                "a resistor across an open branch (`Roff` in the model of a switch or diode) gives the current a path",
+            ),
+            _ => told(
+                "voltage-loop",
+                between(elements, is_voltage_source, |one, rest| format!("{one} is shorted by {rest}"))
+                    .unwrap_or_else(|| {
+                        format!("{names} form a loop of voltage sources and shorts that contradict each other")
+                    }),
+                "a resistance in the loop (`Ron` in the model of a switch or diode) limits its current",
+            ),
+        },
+        ReduceError::Port { .. } => told(
+            "contradiction",
+            error.to_string(),
+            "a small resistor in series and a large one in parallel leave it one of the two",
+        ),
+        ReduceError::Feedthrough { .. } => told(
+            "feedthrough",
+            error.to_string(),
+            "a small resistance in series with the capacitor, or a large one across the inductor, separates them",
+        ),
+        ReduceError::SourceRate { .. } => told(
+            "source-rate",
+            error.to_string(),
+            "a small resistance in series with the source separates them",
+        ),
+        ReduceError::Singular { .. } => told(
+            "singular",
+            error.to_string(),
+            "inductors coupled with k = 1 share one flux: a k below 1, or a resistor across one of them, decides",
+        ),
+        ReduceError::Position { .. } | ReduceError::NotIdeal { .. } | ReduceError::Internal(_) => {
+            Told {
+                code: "internal",
+                message: error.to_string(),
+                label: names,
+                help: None,
+            }
+        }
+    }
+}
+
+/// What to say of the one source among these elements and of all that is not it.
+fn between(
+    elements: &[&Element],
+    source: fn(&Element) -> bool,
+    words: impl Fn(&str, String) -> String,
+) -> Option<String> {
+    let (sources, rest): (Vec<&Element>, Vec<&Element>) = elements.iter().partition(|e| source(e));
+    let names: Vec<&str> = rest.iter().map(|e| e.name.as_str()).collect();
+    match (&sources[..], &names[..]) {
+        ([one], [_, ..]) => Some(words(&one.name, listed(&names))),
+        _ => None,
+    }
+}
+
+const fn is_voltage_source(element: &Element) -> bool {
+    matches!(element.kind, Kind::VoltageSource(_))
+}
+
+const fn is_current_source(element: &Element) -> bool {
+    matches!(element.kind, Kind::CurrentSource(_))
+}
+
+/// "d1, d2 and d3"; of many, how many more there are.
+fn listed(names: &[&str]) -> String {
+    /// More would not be read.
+    const MOST: usize = 6;
+    match names {
+        [] => String::new(),
+        [one] => (*one).to_string(),
+        [rest @ .., last] if names.len() <= MOST => format!("{} and {last}", rest.join(", ")),
+        _ => format!(
+            "{} and {} more",
+            names[..MOST].join(", "),
+            names.len() - MOST
+        ),
+    }
+}
