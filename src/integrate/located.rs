@@ -176,6 +176,12 @@ fn no_rest(why: &NoRest, elements: &[&Element], or: &dyn Fn(&str) -> String) -> 
                 "a resistance in series with the inductors (`Rser`) or across the capacitors (`Rpar`) gives a steady state; {UIC}"
             ));
         }
+        NoRest::Held => {
+            told.label = "`.ic` holds its two nodes at different voltages".into();
+            told.help = Some(format!(
+                "{UIC}: `IC=` of the capacitors and inductors, then `.ic`"
+            ));
+        }
         NoRest::Floating => {
             told.label = "its current ends in capacitors".into();
             told.help = Some(format!("a large resistor to ground takes it up; {UIC}"));

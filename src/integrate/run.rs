@@ -119,6 +119,9 @@ pub enum NoRest {
         "a voltage source across inductors or a current source into capacitors has no steady state"
     )]
     Sources,
+    /// A voltage is held across an inductor.
+    #[error("`.ic` holds a voltage across an inductor, whose current has no steady state")]
+    Held,
     /// A current flows where only capacitors lead on.
     #[error("a current flows into a part of the circuit that only capacitors hold")]
     Floating,

@@ -91,6 +91,7 @@ pub fn simulate(
     let problem = Problem {
         lines: lines(circuit, &initial.waves),
         position: initial.switches,
+        conducting: initial.conducting,
         settle: standard
             .switches
             .iter()
@@ -122,6 +123,7 @@ pub fn simulate_system(
     let problem = Problem {
         lines: vec![],
         position: vec![],
+        conducting: vec![],
         settle: vec![],
         start,
         notes: vec![],
@@ -154,6 +156,8 @@ struct Problem<'a> {
     /// Transmission lines.
     lines: Vec<Line>,
     position: Vec<bool>,
+    /// See [`start::Initial::conducting`]; empty where not known.
+    conducting: Vec<bool>,
     /// Switches whose start position follows from the start state.
     settle: Vec<bool>,
     /// Storage vector s⁻ before the start.
@@ -195,7 +199,7 @@ impl Problem<'_> {
 
     /// `lcs` is the system of the start position.
     fn exact(&self, tran: &Tran, lcs: &Lcs, settings: &Settings) -> Result<Exact<'_>, SimError> {
-        Exact::new(exact::Setup {
+        let mut exact = Exact::new(exact::Setup {
             assembler: exact::Assembler::new(&self.behaviour)
                 .with_steps_of(self.original)
                 .knowing(&self.position, lcs),
@@ -206,7 +210,9 @@ impl Problem<'_> {
             h: tran.tstep,
             energy: true,
             settings: settings.clone(),
-        })
+        })?;
+        exact.expect(&self.conducting);
+        Ok(exact)
     }
 
     fn start(&self) -> Place {
@@ -237,6 +243,7 @@ impl Problem<'_> {
             settings: settings.clone(),
         })?;
         theta.attach(&self.lines);
+        theta.expect(&self.conducting);
         Ok(theta)
     }
 

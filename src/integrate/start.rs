@@ -1,16 +1,18 @@
 //! Where a run starts: initial conditions (`uic`) or the operating point.
 
+mod prescribed;
+mod statics;
+
 use nalgebra::DVector;
 
-use crate::circuit::{
-    Circuit, Element, ElementId, Kind, Line, LinePort, NodeId, Output, Probe, Probed, Source,
-    source::Wave,
-};
+use self::prescribed::{Guess, Prescribed, Voltage, hold_voltages, open_inductors, read_guesses};
+use self::statics::{feeding, observed_circuit, tie_floating, without_delay};
+use crate::circuit::{Circuit, Element, Kind, Line, LinePort, NodeId};
 use crate::integrate::lawful;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{NoRest, Reason, SimError};
 use crate::integrate::switching::at_start;
-use crate::lcs::{Hold, Lcs, Position, ReduceError, StorageHold, reduce};
+use crate::lcs::{Hold, Lcs, Position, ReduceError, Role, StorageHold, reduce};
 use crate::mna::{Behaviour, behaviour};
 use crate::settings::Settings;
 use crate::solve::Status;
@@ -22,6 +24,8 @@ pub struct Initial {
     pub storage: DVector<f64>,
     /// Switch positions.
     pub switches: Vec<bool>,
+    /// By ideal pair of the devices: whether it conducts at the operating point. A latch has several, and starts in this one.
+    pub conducting: Vec<bool>,
     /// The waves that arrive at the two ends of every transmission line, V.
     pub waves: Vec<[f64; 2]>,
     /// Things the user should know.
@@ -41,6 +45,8 @@ pub struct OperatingPoint {
     pub notes: Vec<String>,
     /// All capacitor voltages and inductor currents.
     pub storage: Vec<f64>,
+    /// By ideal pair of the devices: whether it conducts, by more than rounding.
+    pub conducting: Vec<bool>,
 }
 
 /// Which values the sources have.
@@ -99,7 +105,8 @@ fn node_voltages(circuit: &Circuit) -> Vec<Option<f64>> {
 }
 
 /// Solves the operating point: capacitors open, inductors short, devices by their complementarity problem y = Dλ + q with the
-/// least-norm λ, switch positions iterated; with `hold_ic` the `.ic` node voltages are held.
+/// least-norm λ, switch positions iterated; with `hold_ic` the `.ic` node voltages are held. Where something drives the node already,
+/// they (and those of `.nodeset`) choose among several solutions, as a latch has.
 ///
 /// # Errors
 /// [`Reason::NoOperatingPoint`]: sources across shorted inductors, currents into capacitors alone, devices that contradict each
@@ -110,13 +117,42 @@ pub fn operating_point(
     hold_ic: bool,
     settings: &Settings,
 ) -> Result<OperatingPoint, SimError> {
+    let Prescribed { held, mut guesses } = Prescribed::of(circuit, hold_ic);
+    let asked = guesses.clone();
+    for _ in 0..GUESSES {
+        let Ok(mut point) = at_rest(circuit, (&held, &guesses), values, settings) else {
+            break;
+        };
+        let found: Vec<Guess> = guesses.iter().map(|guess| guess.found(&point)).collect();
+        if found.iter().zip(&guesses).all(|(a, b)| a.agrees(b)) {
+            let missed = asked.iter().zip(&found).filter(|(a, b)| !a.agrees(b));
+            point
+                .notes
+                .extend(missed.map(|(asked, found)| asked.missed(found, circuit)));
+            return Ok(point);
+        }
+        guesses = found;
+    }
+    at_rest(circuit, (&held, &[]), values, settings)
+}
+
+/// Times that guessed voltages are replaced by what follows from them. A latch needs one.
+const GUESSES: usize = 8;
+
+/// The [`operating_point`] with these node voltages held, where controls see the guesses in place of the voltages of their nodes.
+fn at_rest(
+    circuit: &Circuit,
+    (held, guesses): (&[Voltage], &[Guess]),
+    values: Values,
+    settings: &Settings,
+) -> Result<OperatingPoint, SimError> {
     let mut notes = Vec::new();
     let mut statics = observed_circuit(circuit);
     without_delay(&mut statics);
-    let tied = tie_floating(circuit, &mut statics, hold_ic, &mut notes);
-    if hold_ic {
-        hold_initial_voltages(circuit, &mut statics);
-    }
+    let tied = tie_floating(circuit, &mut statics, held, &mut notes);
+    hold_voltages(held, &mut statics);
+    let without_current = open_inductors(circuit, held, &mut statics);
+    read_guesses(guesses, &mut statics);
     let behaviour = behaviour(&statics).map_err(|faults| {
         let words: Vec<String> = faults.iter().map(|f| f.message.clone()).collect();
         no_rest(NoRest::Network(words.join("; ")))
@@ -147,6 +183,18 @@ pub fn operating_point(
                 let names = feeding(circuit, tied[k]);
                 return Err(no_rest(NoRest::Floating).devices(names));
             }
+            let volts = |id: NodeId| id.index().checked_sub(1).map_or(0.0, |k| point.readings[k]);
+            let across = |e: &&Element| {
+                let (a, b) = (volts(e.p), volts(e.n));
+                (a - b).abs() > ROUNDING * a.abs().max(b.abs())
+            };
+            if let Some(inductor) = without_current
+                .iter()
+                .map(|&k| &circuit.elements[k])
+                .find(across)
+            {
+                return Err(no_rest(NoRest::Held).device(inductor.name.clone()));
+            }
             let named = |names: &[String], values: &[f64]| -> Vec<(String, f64)> {
                 names.iter().cloned().zip(values.iter().copied()).collect()
             };
@@ -162,6 +210,7 @@ pub fn operating_point(
                     .collect(),
                 notes,
                 storage: point.storage,
+                conducting: point.conducting,
             });
         }
         if seen.contains(&wanted) || seen.len() > 64 {
@@ -193,134 +242,15 @@ fn from_nodesets(circuit: &Circuit, values: Values, settings: &Settings) -> Opti
     Some(point.switches.into_iter().map(|(_, on)| on).collect())
 }
 
-/// The circuit with all node voltages and element currents as probes.
-fn observed_circuit(circuit: &Circuit) -> Circuit {
-    let nodes = circuit
-        .nodes
-        .iter()
-        .enumerate()
-        .skip(1)
-        .map(|(i, name)| Probe {
-            name: format!("v({name})"),
-            what: Probed::Voltage(NodeId(i as u32), NodeId::GROUND),
-        });
-    let currents = circuit.elements.iter().enumerate().map(|(i, e)| Probe {
-        name: format!("i({})", e.name),
-        what: Probed::Current(ElementId(i as u32)),
-    });
-    Circuit {
-        probes: nodes.chain(currents).collect(),
-        ..circuit.clone()
-    }
-}
-
 /// What `wave` says arrives at both ends of every line.
 fn waves(circuit: &Circuit, wave: impl Fn(&LinePort) -> f64) -> Vec<[f64; 2]> {
     let ends = |line: &Line| [wave(&line.ports[0]), wave(&line.ports[1])];
     circuit.lines.iter().map(ends).collect()
 }
 
-/// Has what leaves the ends of lines arrive at the others at once, which makes them shorts: v₁ = v₂, i₁ = −i₂.
-fn without_delay(statics: &mut Circuit) {
-    for line in statics.lines.clone() {
-        for (here, there) in [(0, 1), (1, 0)] {
-            let control = line.leaving(there, statics);
-            statics.elements[line.ports[here].wave.index()].kind = Kind::Controlled {
-                output: Output::Voltage,
-                control,
-            };
-        }
-    }
-}
-
-fn source(name: String, p: NodeId, n: NodeId, volts: f64) -> Element {
-    let kind = Kind::VoltageSource(Source {
-        dc: volts,
-        wave: Wave::Dc(volts),
-    });
-    Element {
-        name,
-        p,
-        n,
-        kind,
-        ic: None,
-        span: None,
-    }
-}
-
-/// Nodes joined by anything that carries direct current or fixes a voltage.
-fn conductive(circuit: &Circuit, with_capacitors: bool) -> Vec<usize> {
-    let mut root: Vec<usize> = (0..circuit.nodes.len()).collect();
-    fn find(root: &mut [usize], mut i: usize) -> usize {
-        while root[i] != i {
-            root[i] = root[root[i]];
-            i = root[i];
-        }
-        i
-    }
-    for e in &circuit.elements {
-        let joins = match &e.kind {
-            Kind::Capacitor(_) => with_capacitors,
-            Kind::CurrentSource(_) => false,
-            Kind::Controlled { output, .. } | Kind::Function { output, .. } => {
-                *output == crate::circuit::Output::Voltage
-            }
-            _ => true,
-        };
-        if joins {
-            let (a, b) = (find(&mut root, e.p.index()), find(&mut root, e.n.index()));
-            // The smaller index stays the root: ground, else the first node in file order.
-            root[a.max(b)] = a.min(b);
-        }
-    }
-    (0..root.len()).map(|i| find(&mut root, i)).collect()
-}
-
-/// Ties every part of the circuit that only capacitors hold to 0 V; returns a node of each.
-fn tie_floating(
-    circuit: &Circuit,
-    statics: &mut Circuit,
-    hold_ic: bool,
-    notes: &mut Vec<String>,
-) -> Vec<usize> {
-    let mut tied = Vec::new();
-    let (dc, all) = (conductive(circuit, false), conductive(circuit, true));
-    for (i, &root) in dc.iter().enumerate() {
-        // Its own root, not ground, and joined by capacitors to something with a smaller index.
-        let floats = i == root && i != 0 && all[i] != i;
-        let held = hold_ic
-            && circuit.initial_voltages.iter().any(|(a, b, _)| {
-                [a, b]
-                    .iter()
-                    .any(|n| n.index() != 0 && dc[n.index()] == root)
-            });
-        if floats && !held {
-            let name = &circuit.nodes[i];
-            let tie = source(format!("tie:{name}"), NodeId(i as u32), NodeId::GROUND, 0.0);
-            statics.probes.push(Probe {
-                name: format!("i({})", tie.name),
-                what: Probed::Current(ElementId(statics.elements.len() as u32)),
-            });
-            statics.elements.push(tie);
-            notes.push(format!(
-                "node {name} is held by capacitors alone and starts at 0 V"
-            ));
-            tied.push(i);
-        }
-    }
-    tied
-}
-
-/// Holds `.ic` node voltages by sources; one per node or difference.
-fn hold_initial_voltages(circuit: &Circuit, statics: &mut Circuit) {
-    for (k, &(a, b, volts)) in circuit.initial_voltages.iter().enumerate() {
-        statics
-            .elements
-            .push(source(format!("ic:{k}"), a, b, volts));
-    }
-}
-
 struct Static {
+    /// By port: whether it conducts.
+    conducting: Vec<bool>,
     readings: Vec<f64>,
     controls: Vec<f64>,
     storage: Vec<f64>,
@@ -352,7 +282,7 @@ fn static_solution(
         .collect();
     let q = &lcs.g * DVector::from_column_slice(&u) + &lcs.f;
     let mut notes = Vec::new();
-    let lambda = devices(&lcs, &q, settings, &mut notes)?;
+    let (lambda, active) = devices(&lcs, &q, settings, &mut notes)?;
     let du = vec![0.0; u.len()];
     let at = Point {
         x: &[],
@@ -380,7 +310,11 @@ fn static_solution(
     if lcs.storage.lambda.ncols() == lambda.len() {
         storage += &lcs.storage.lambda * &lambda;
     }
+    let ports = lcs.ports.iter().zip(active);
     Ok(Static {
+        conducting: ports
+            .map(|(port, active)| active == Some(port.role != Role::Voltage))
+            .collect(),
         readings: all(&lcs.outputs.rows),
         controls: all(&lcs.controls),
         storage: storage.as_slice().to_vec(),
@@ -388,14 +322,15 @@ fn static_solution(
     })
 }
 
+/// λ of the devices, and which of them are active, where it is not zero on both sides.
 fn devices(
     lcs: &Lcs,
     q: &DVector<f64>,
     settings: &Settings,
     notes: &mut Vec<String>,
-) -> Result<DVector<f64>, SimError> {
+) -> Result<(DVector<f64>, Vec<Option<bool>>), SimError> {
     if q.is_empty() {
-        return Ok(DVector::zeros(0));
+        return Ok((DVector::zeros(0), Vec::new()));
     }
     let mut driver = lawful::driver(lcs, lcs.d.clone(), settings.lcp_residual);
     let solution = driver.solve(q);
@@ -422,7 +357,7 @@ fn devices(
                 .into(),
         );
     }
-    Ok(lambda)
+    Ok((lambda, solution.active))
 }
 
 fn check_constraints(lcs: &Lcs, at: Point<'_>) -> Result<(), SimError> {
@@ -452,16 +387,6 @@ fn no_point(error: ReduceError) -> SimError {
     }
 }
 
-/// Elements that drive a current into the part of the circuit that a node belongs to and only capacitors hold.
-fn feeding(circuit: &Circuit, node: usize) -> impl Iterator<Item = &str> {
-    let parts = conductive(circuit, false);
-    let inside = move |id: NodeId| parts[id.index()] == parts[node];
-    let elements = circuit.elements.iter();
-    elements
-        .filter(move |e| inside(e.p) != inside(e.n) && !matches!(e.kind, Kind::Capacitor(_)))
-        .map(|e| e.name.as_str())
-}
-
 /// The start of a transient: [`from_initial_conditions`] with `uic`, else the [`operating_point`] with `.ic` held.
 /// Switch positions with `uic` are those of the cards, off where none is given; the run settles them at t = 0.
 ///
@@ -477,6 +402,7 @@ pub fn initial(
         return Ok(Initial {
             storage: from_initial_conditions(circuit, behaviour),
             switches: of_cards(behaviour),
+            conducting: vec![false; behaviour.pairs.len()],
             waves: waves(circuit, |port| {
                 match circuit.elements[port.wave.index()].kind {
                     Kind::VoltageSource(ref source) => source.wave.value(0.0),
@@ -494,6 +420,7 @@ pub fn initial(
     Ok(Initial {
         storage: DVector::from_vec(point.storage),
         switches: point.switches.iter().map(|(_, on)| *on).collect(),
+        conducting: point.conducting,
         waves: waves(circuit, |port| {
             let source = &circuit.elements[port.wave.index()];
             let volts = |node: NodeId| {

@@ -125,6 +125,94 @@ fn a_gate_that_rises_at_zero_finds_the_operating_point_before_it() {
     }
 }
 
+#[test]
+fn a_held_voltage_takes_the_current_from_inductors_beside_it() {
+    // ngspice 39: i(l1) is 0 at t = 0 and 3.622196 mA at 1 ms.
+    for method in METHODS {
+        let run = run("ic_across_inductor", method);
+        assert_eq!(value(&run, "i(l1)", 0.0), 0.0, "{method:?}");
+        let found = value(&run, "i(l1)", 1e-3);
+        assert!((found - 3.622196e-3).abs() < 1e-7, "{method:?}: {found}");
+    }
+    // Of two in series the one at the held node; the other one's current follows from it.
+    let text = "t\nV1 a 0 5\nR1 a b 100\nL1 b c 1m\nL2 c 0 1m\nI1 c 0 2\nC1 b 0 1u\n.ic v(b)=0\n.tran 1u 2u\n\
+                .save i(l1) i(l2)\n";
+    let run = run_text(text, Method::Exact);
+    let found = [value(&run, "i(l1)", 0.0), value(&run, "i(l2)", 0.0)];
+    assert!(
+        found[0].abs() < 1e-12 && (found[1] + 2.0).abs() < 1e-12,
+        "{found:?}"
+    );
+}
+
+#[test]
+fn a_latch_starts_as_ic_says() {
+    let run = run("latch_ic", Method::Exact);
+    assert_eq!(
+        [value(&run, "v(q)", 0.0), value(&run, "v(qbar)", 0.0)],
+        [0.0, 5.0]
+    );
+    let column = run
+        .waveforms
+        .names
+        .iter()
+        .position(|n| n == "v(q)")
+        .expect("v(q)");
+    let width = run.waveforms.names.len();
+    let mut passages = Vec::new();
+    for k in 1..run.waveforms.time.len() {
+        let [before, after] = [k - 1, k].map(|k| run.waveforms.values[k * width + column] > 2.5);
+        if before != after {
+            passages.push(run.waveforms.time[k]);
+        }
+    }
+    // Set by the trigger at a third of 5 V; then 10 kΩ against the open switch charge the capacitor to two thirds.
+    let (low, high, share) = (5.0 * 10.0 / 10010.0, 10.0 / 3.0, 1e7 / (1e7 + 1e4_f64));
+    let set = 5e-3 + 10e-9 * 2.0 / 3.0;
+    let charged = 1e-2 * share * ((5.0 * share - low) / (5.0 * share - high)).ln();
+    assert!((passages[0] - set).abs() < 1e-9, "{passages:?}");
+    assert!(
+        (passages[1] - passages[0] - charged).abs() < 1e-8,
+        "{passages:?} {charged}"
+    );
+}
+
+/// Two cross-coupled comparators at rest are in the state that is prescribed, by `.ic` or `.nodeset`, and stay in it.
+#[test]
+fn of_two_states_at_rest_the_prescribed_one_is_taken() {
+    for card in [".ic", ".nodeset"] {
+        for (q, other) in [(0.0, 5.0), (5.0, 0.0)] {
+            let text = format!(
+                "t\nE3 p 0 VALUE={{V(o) > 2.5 ? 0 : 5}}\n\
+                 E4 o 0 VALUE={{V(p) > 2.5 ? 0 : 5}}\n{card} v(p)={q} v(o)={other}\nR1 p c 1k\nC1 c 0 1n\n.tran 1u 10u\n"
+            );
+            for method in METHODS {
+                let run = run_text(&text, method);
+                for t in [0.0, 1e-5] {
+                    let found = [value(&run, "v(p)", t), value(&run, "v(o)", t)];
+                    assert_eq!(found, [q, other], "{card} {method:?} {t}");
+                }
+            }
+        }
+    }
+}
+
+/// What a source drives it drives, whatever `.ic` says, and a note tells it.
+#[test]
+fn a_driven_node_keeps_its_voltage() {
+    let text = "t\nV1 a 0 5\nR1 a 0 1k\nE1 b 0 a 0 2\nR2 b c 1k\nC1 c 0 1u\n.ic v(b)=0 v(c)=1\n.tran 1u 10u\n";
+    let run = run_text(text, Method::Exact);
+    assert_eq!(
+        [value(&run, "v(b)", 0.0), value(&run, "v(c)", 0.0)],
+        [10.0, 1.0]
+    );
+    assert!(
+        run.notes.iter().any(|n| n.contains("drives v(b)")),
+        "{:?}",
+        run.notes
+    );
+}
+
 /// Every failure of a run names its place, its cause and what to do; the whole message is the snapshot.
 #[cfg(feature = "cli")]
 #[test]

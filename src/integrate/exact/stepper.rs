@@ -202,6 +202,13 @@ impl<'a> Exact<'a> {
         Ok(exact)
     }
 
+    /// Tells which pairs conducted before the start: of several modes that hold, the first one tried.
+    pub fn expect(&mut self, conducting: &[bool]) {
+        if !conducting.is_empty() {
+            self.key.closed.copy_from_slice(conducting);
+        }
+    }
+
     /// Raises the amplitudes to the present storage; elements of one kind share the largest.
     pub(super) fn rescale(&mut self) {
         let mut largest = [0.0_f64; 2];
