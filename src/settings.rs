@@ -13,6 +13,9 @@ pub struct Settings {
     pub min_step: f64,
     /// Limit of steps in one run (default 200 million); reaching it is an error that names the time.
     pub max_steps: u64,
+    /// Most memory for the rows of one run, bytes (default 1 GiB); a run that would need more is refused before it starts, or ends
+    /// where rows at events fill it. Rows that are written as they come do not count.
+    pub max_held: usize,
 }
 
 impl Default for Settings {
@@ -22,6 +25,7 @@ impl Default for Settings {
             lcp_residual: 1e-9,
             min_step: 1e-12,
             max_steps: 200_000_000,
+            max_held: 1 << 30,
         }
     }
 }

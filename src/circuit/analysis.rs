@@ -57,6 +57,7 @@ impl<'n> Builder<'n, '_> {
         let tmax = times.get(3).copied().filter(|t| *t > 0.0);
         Some(Tran {
             tstep,
+            prints: step > 0.0,
             tstop,
             tstart,
             tmax,

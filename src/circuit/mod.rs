@@ -265,6 +265,9 @@ pub struct LinePort {
 pub struct Tran {
     /// Distance of output times; (tstop − tstart)/1000 where the card names none.
     pub tstep: f64,
+    /// The card names the print step. Where it does not, rows stand at events and corners of sources too, as other programs keep the
+    /// steps they take.
+    pub prints: bool,
     /// Last time.
     pub tstop: f64,
     /// First time written.

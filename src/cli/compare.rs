@@ -2,13 +2,14 @@
 
 use std::fs::File;
 use std::io::BufReader;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::args::{self, CompareArgs};
 use super::exit::{Exit, Failure};
+use super::files;
 use super::input::{self, Subject};
 use super::ngspice::{self, deck};
 use super::output;
@@ -47,7 +48,15 @@ const DRAWN: usize = 3;
 /// # Errors
 /// See [`Failure`].
 pub(super) fn compare(args: &CompareArgs, streams: &Streams) -> Result<Exit, Failure> {
-    let (subject, cards) = input::open_with_cards(&args.input, &[], streams)?;
+    let outputs: Vec<&Path> = [&args.output, &args.keep]
+        .into_iter()
+        .flatten()
+        .map(PathBuf::as_path)
+        .collect();
+    if !with_ngspice(args) {
+        files::spare(&outputs, [args.against.as_path()])?;
+    }
+    let (subject, cards) = input::open_with_cards(&args.input, &[], &outputs, streams)?;
     let files = cards.as_ref().map(|(_, sources)| sources.clone());
     if let (Subject::Circuit(both), Some((netlist, sources))) = (&subject, cards)
         && !both.0.steps.is_empty()
@@ -262,7 +271,7 @@ fn from_ngspice(
         };
         let deck = deck::deck(&both.0, &options).map_err(|e| Failure::Message(e.to_string()))?;
         if let Some(path) = &args.keep {
-            output::bytes_to_file(path, deck.text.as_bytes())?;
+            files::write(path, deck.text.as_bytes())?;
         }
         match ngspice::run(&deck, tran.tstop) {
             Ok(outcome) => {

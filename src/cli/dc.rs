@@ -4,8 +4,9 @@ use rayon::prelude::*;
 
 use super::args::SimArgs;
 use super::exit::{Exit, Failure};
+use super::files;
 use super::input;
-use super::output::{self, Format};
+use super::output::Format;
 use super::streams::Streams;
 use crate::circuit::{Circuit, Probed, combinations, elaborate};
 use crate::diagnostic::SourceMap;
@@ -74,7 +75,7 @@ pub(super) fn sim(
         }
     }
     for path in &args.outputs {
-        output::bytes_to_file(path, &text)?;
+        files::write(path, &text)?;
     }
     if args.outputs.is_empty() {
         streams.data(text)?;

@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use super::signals::Signals;
 use crate::integrate::SimError;
 use crate::report::PictureError;
 use crate::waveform::WaveformError;
@@ -18,6 +19,8 @@ pub enum Exit {
     No,
     /// 2: it could not be done.
     Failed,
+    /// 128 + its number: ended by a signal.
+    Signal(i32),
 }
 
 impl From<Exit> for ExitCode {
@@ -26,6 +29,7 @@ impl From<Exit> for ExitCode {
             Exit::Done => 0,
             Exit::No => 1,
             Exit::Failed => 2,
+            Exit::Signal(signal) => u8::try_from(Signals::status(signal)).unwrap_or(u8::MAX),
         })
     }
 }

@@ -1,7 +1,10 @@
 //! `circ graph`.
 
+use std::path::{Path, PathBuf};
+
 use super::args::GraphArgs;
 use super::exit::{Exit, Failure};
+use super::files;
 use super::input;
 use super::output;
 use super::streams::Streams;
@@ -25,12 +28,13 @@ pub(super) fn graph(args: &GraphArgs, streams: &Streams) -> Result<Exit, Failure
     {
         return Err(output::unknown_ending(path, "dot, svg or png"));
     }
-    let (subject, _) = input::open(&args.input, &[], streams)?;
+    let outputs: Vec<&Path> = args.output.iter().map(PathBuf::as_path).collect();
+    let (subject, _) = input::open(&args.input, &[], &outputs, streams)?;
     let circuit = input::circuit_of(&args.input, &subject)?;
     match ending {
         None => streams.data(graph::dot(circuit))?,
         Some((path, ending)) if matches!(ending.as_str(), "dot" | "gv") => {
-            output::bytes_to_file(path, graph::dot(circuit).as_bytes())?;
+            files::write(path, graph::dot(circuit).as_bytes())?;
         }
         Some((path, _)) => output::picture_to_file(path, &graph::svg(circuit)?)?,
     }

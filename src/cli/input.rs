@@ -1,9 +1,11 @@
 //! What a file holds: a circuit from a netlist, or a system in JSON.
 
 use std::fs;
+use std::path::Path;
 
 use super::args::{Diodes, Input};
 use super::exit::Failure;
+use super::files;
 use super::forms;
 use super::render;
 use super::streams::Streams;
@@ -71,16 +73,17 @@ pub fn choices(input: &Input) -> ElaborateOptions {
 }
 
 /// Reads a file, shows what was found in it, and keeps the named probes if there are any. With a netlist come the files it was
-/// read from.
+/// read from; none of the `outputs` may be one of them.
 ///
 /// # Errors
-/// [`Failure::Faults`] when the circuit cannot be built, [`Failure::Message`] for an unknown probe.
+/// [`Failure::Faults`] when the circuit cannot be built, [`Failure::Message`] for an unknown probe and for such an output.
 pub fn open(
     input: &Input,
     probes: &[String],
+    outputs: &[&Path],
     streams: &Streams,
 ) -> Result<(Subject, Option<SourceMap>), Failure> {
-    let (subject, cards) = open_with_cards(input, probes, streams)?;
+    let (subject, cards) = open_with_cards(input, probes, outputs, streams)?;
     if let Subject::Circuit(both) = &subject
         && !both.0.steps.is_empty()
     {
@@ -96,8 +99,10 @@ pub fn open(
 pub fn open_with_cards(
     input: &Input,
     probes: &[String],
+    outputs: &[&Path],
     streams: &Streams,
 ) -> Result<(Subject, Option<(Netlist, SourceMap)>), Failure> {
+    files::spare(outputs, [input.file.as_path()])?;
     if let Some(mut system) = system(input)? {
         keep_outputs(&mut system.lcs, probes)?;
         return Ok((Subject::System(Box::new(system)), None));
@@ -109,6 +114,7 @@ pub fn open_with_cards(
         diagnostics,
     } = load(input);
     show(&diagnostics, &sources, streams);
+    files::spare(outputs, sources.files.iter().map(|f| Path::new(&f.path)))?;
     let mut circuit = circuit.ok_or_else(|| faults(input, &diagnostics))?;
     keep_probes(&mut circuit, probes)?;
     let behaviour = mna::behaviour(&circuit).map_err(|diagnostics| {

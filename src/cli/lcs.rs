@@ -1,9 +1,11 @@
 //! `circ lcs`.
 
+use std::path::{Path, PathBuf};
+
 use super::args::{LcsArgs, SystemFormat};
 use super::exit::{Exit, Failure};
+use super::files;
 use super::input::{self, Subject};
-use super::output;
 use super::streams::Streams;
 use crate::lcs::format::{Format, format};
 use crate::lcs::json;
@@ -13,7 +15,8 @@ use crate::lcs::json;
 /// # Errors
 /// See [`Failure`].
 pub(super) fn lcs(args: &LcsArgs, streams: &Streams) -> Result<Exit, Failure> {
-    let (subject, sources) = input::open(&args.input, &[], streams)?;
+    let outputs: Vec<&Path> = args.output.iter().map(PathBuf::as_path).collect();
+    let (subject, sources) = input::open(&args.input, &[], &outputs, streams)?;
     let system = input::start_system(&subject, &args.switches, streams);
     let (system, without) = system.map_err(|failure| match (failure, &subject, sources) {
         (Failure::Run(error), Subject::Circuit(parts), Some(sources)) => {
@@ -39,7 +42,7 @@ pub(super) fn lcs(args: &LcsArgs, streams: &Streams) -> Result<Exit, Failure> {
         text + "\n"
     };
     match &args.output {
-        Some(path) => output::bytes_to_file(path, text.as_bytes())?,
+        Some(path) => files::write(path, text.as_bytes())?,
         None => streams.data(text)?,
     }
     Ok(Exit::Done)

@@ -2,9 +2,10 @@
 
 use super::exit::Failure;
 use super::input::Subject;
+use super::rows;
 use super::sim::Request;
 use crate::circuit::{Circuit, Probe, Tran};
-use crate::integrate::{Grid, Run};
+use crate::integrate::{Grid, RowKind, Run};
 use crate::mna;
 use crate::report::measured::Measurements;
 use crate::waveform::Waveforms;
@@ -19,8 +20,6 @@ pub(super) struct Measuring<'a> {
     divisions: usize,
     /// Columns that are shown.
     shown: usize,
-    /// Rows at events are shown.
-    events: bool,
 }
 
 /// Whether a circuit asks for measurements.
@@ -65,7 +64,6 @@ impl<'a> Measuring<'a> {
                 ROWS.div_ceil(rows)
             },
             shown: circuit.probes().len(),
-            events: request.events,
         }
     }
 
@@ -88,47 +86,41 @@ impl<'a> Measuring<'a> {
             measured: self.circuit.measure(&waves.time, &column),
             harmonics: self.circuit.harmonics(&waves.time, &column),
         };
-        run.waveforms = self.cut(waves);
+        (run.waveforms, run.kinds) = self.cut(waves, &run.kinds);
         found
     }
 
-    fn cut(&self, waves: &Waveforms) -> Waveforms {
-        let grids = self.circuit.tran.zip(self.tstep()).map(|(tran, tstep)| {
-            let fine = Tran { tstep, ..tran };
-            (Grid::of(&tran), Grid::of(&fine))
-        });
+    /// The signals that are shown, at the print steps and between.
+    fn cut(&self, waves: &Waveforms, kinds: &[RowKind]) -> (Waveforms, Vec<RowKind>) {
+        let grid = self.circuit.tran.map(|tran| Grid::of(&tran));
+        let fine = self.circuit.tran.zip(self.tstep());
+        let fine = fine.map(|(tran, tstep)| Grid::of(&Tran { tstep, ..tran }).len());
         let mut kept = Waveforms {
             title: waves.title.clone(),
             names: waves.names[..self.shown].to_vec(),
             units: waves.units[..self.shown].to_vec(),
             ..Waveforms::default()
         };
-        let mut keep = |t: f64, k: usize| {
-            kept.time.push(t);
-            kept.values.extend_from_slice(&waves.row(k)[..self.shown]);
-        };
+        let mut kept_kinds = Vec::new();
+        // The next of the fine grid.
         let mut next = 0;
-        for (k, &t) in waves.time.iter().enumerate() {
-            let Some((shown, fine)) = &grids else {
-                keep(t, k);
-                continue;
-            };
-            // Of the rows at one output time the last is the one of the grid.
-            let on_grid =
-                fine.time(next) == t && waves.time.get(k + 1).is_none_or(|&after| after > t);
-            let last = next + 1 == fine.len();
-            if on_grid && (last || next % self.divisions == 0) {
-                let index = if last {
-                    shown.len() - 1
+        for (t, values, kind) in rows::block(waves, kinds).rows() {
+            let mut time = Some(t);
+            if let (RowKind::Grid, Some(grid), Some(fine)) = (kind, &grid, fine) {
+                let shown = if next + 1 == fine {
+                    Some(grid.len() - 1)
                 } else {
-                    next / self.divisions
+                    (next % self.divisions == 0).then(|| next / self.divisions)
                 };
-                keep(shown.time(index), k);
-            } else if self.events && !on_grid {
-                keep(t, k);
+                time = shown.map(|k| grid.time(k));
+                next += 1;
             }
-            next += usize::from(on_grid);
+            if let Some(time) = time {
+                kept.time.push(time);
+                kept.values.extend_from_slice(&values[..self.shown]);
+                kept_kinds.push(kind);
+            }
         }
-        kept
+        (kept, kept_kinds)
     }
 }

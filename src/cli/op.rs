@@ -18,7 +18,7 @@ use crate::settings::Settings;
 /// # Errors
 /// See [`Failure`].
 pub(super) fn op(args: &OpArgs, streams: &Streams) -> Result<Exit, Failure> {
-    let (subject, cards) = input::open_with_cards(&args.input, &[], streams)?;
+    let (subject, cards) = input::open_with_cards(&args.input, &[], &[], streams)?;
     let circuit = input::circuit_of(&args.input, &subject)?;
     let sources = cards.as_ref().map(|(_, sources)| sources.clone());
     let solved = |circuit: &Circuit| {

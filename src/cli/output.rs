@@ -1,11 +1,13 @@
-//! Files of results: the ending chooses the format.
+//! Results of a run: the ending of a file chooses the format.
 
-use std::fs::File;
 use std::io::{self, BufWriter, Cursor, Write};
-use std::path::Path;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
 
 use super::exit::Failure;
-use crate::integrate::Run;
+use super::files::{self, Written};
+use super::rows::{Columns, Form, Shown, Stream};
+use crate::integrate::{Block, Run};
 use crate::report::figure::Figure;
 use crate::report::{PictureError, html, png, svg};
 use crate::waveform::{csv, json, npz, raw};
@@ -54,6 +56,12 @@ impl Format {
             }
         })
     }
+
+    /// Whether it is looked at: events, jumps and corners belong in it then.
+    #[must_use]
+    pub const fn is_picture(self) -> bool {
+        matches!(self, Self::Svg | Self::Png | Self::Html)
+    }
 }
 
 /// The failure that a file's ending chooses none of these formats.
@@ -64,31 +72,156 @@ pub(super) fn unknown_ending(path: &Path, known: &str) -> Failure {
     ))
 }
 
+/// The results of a run: those that are written as rows come, and those that need all of them.
+pub(super) struct Outputs {
+    streams: Vec<Stream>,
+    held: Vec<(Written, Format)>,
+    shown: Shown,
+    names: Vec<PathBuf>,
+}
+
+impl Outputs {
+    /// Files for these paths, which appear under their names at the end; without any, rows to standard output if `to_pipe`.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub(super) fn open(
+        paths: &[PathBuf],
+        formats: &[Format],
+        to_pipe: bool,
+        shown: Shown,
+        columns: &Columns,
+    ) -> Result<Self, Failure> {
+        let mut outputs = Self {
+            streams: Vec::new(),
+            held: Vec::new(),
+            shown,
+            names: paths.to_vec(),
+        };
+        let stream = |form, file| Stream::new(form, file, shown, columns.clone());
+        for (path, format) in paths.iter().zip(formats) {
+            let file = Written::create(path)?;
+            match format {
+                Format::Csv => outputs.streams.push(stream(Form::Csv, Some(file))),
+                Format::Raw if file.can_seek() => {
+                    outputs.streams.push(stream(Form::Raw, Some(file)));
+                }
+                format => outputs.held.push((file, *format)),
+            }
+        }
+        if paths.is_empty() && to_pipe {
+            outputs.streams.push(stream(Form::Csv, None));
+        }
+        Ok(outputs)
+    }
+
+    /// Whether something needs all rows at once.
+    pub(super) fn hold(&self) -> bool {
+        !self.held.is_empty()
+    }
+
+    /// Writes rows; a run ends where that fails.
+    pub(super) fn take(&mut self, block: Block<'_>) -> ControlFlow<()> {
+        let mut done = true;
+        for stream in &mut self.streams {
+            done &= stream.take(block);
+        }
+        if done {
+            ControlFlow::Continue(())
+        } else {
+            ControlFlow::Break(())
+        }
+    }
+
+    /// Time of the last row written, s.
+    pub(super) fn last(&self) -> Option<f64> {
+        self.streams.first().and_then(Stream::last)
+    }
+
+    /// The files, in words.
+    pub(super) fn words(&self) -> String {
+        let names: Vec<String> = self.names.iter().map(|n| n.display().to_string()).collect();
+        names.join(", ")
+    }
+
+    /// Writes what needs all rows, and gives all files their names; `incomplete` says why a run ended early. Every file is tried.
+    ///
+    /// # Errors
+    /// The first failure.
+    pub(super) fn finish(
+        self,
+        run: &Run,
+        figure: &dyn Fn() -> Figure,
+        incomplete: Option<&str>,
+    ) -> Result<(), Failure> {
+        let mut first = Ok(());
+        for mut stream in self.streams {
+            // What came before a failure is kept.
+            let failure = stream.failure();
+            let said = incomplete.or(failure.as_ref().map(|_| "incomplete: not all was written"));
+            let finished = stream.finish(said);
+            first = first.and(failure.map_or(finished, Err));
+        }
+        for (file, format) in self.held {
+            let written = match write(run, figure, self.shown, format, file, incomplete) {
+                // A picture of a run that broke off before its first row.
+                Err(Failure::Picture(_)) if incomplete.is_some() => Ok(()),
+                written => written,
+            };
+            first = first.and(written);
+        }
+        first
+    }
+}
+
 /// Writes a run to a file; pictures show `figure`.
-///
-/// # Errors
-/// Those of the file, or of drawing a picture.
-pub fn write(
+fn write(
     run: &Run,
     figure: &dyn Fn() -> Figure,
+    shown: Shown,
     format: Format,
-    path: &Path,
+    mut file: Written,
+    incomplete: Option<&str>,
 ) -> Result<(), Failure> {
-    let waves = &run.waveforms;
-    // A picture is made before its file, so that a failure leaves none behind.
-    match format {
-        Format::Csv => to_file(path, |file| csv::write(file, waves)),
-        Format::Raw => to_file(path, |file| raw::write(file, waves)),
-        Format::Json => to_file(path, |file| json::write(file, waves)),
+    let titled =
+        |title: &str| incomplete.map_or(title.to_owned(), |why| format!("{title} ({why})"));
+    let drawing = || {
+        let mut figure = figure();
+        figure.title = titled(&figure.title);
+        figure
+    };
+    let waves = || {
+        let mut waves = shown.of(&run.waveforms, &run.kinds);
+        waves.title = titled(&waves.title);
+        waves
+    };
+    let result = match format {
+        Format::Html => {
+            let page = html::page(run, &drawing())?;
+            file.append(page.as_bytes())
+        }
+        Format::Svg => file.append(svg::draw(&drawing())?.as_bytes()),
+        Format::Png => file.append(&png::from_svg(&svg::draw(&drawing())?)?),
+        Format::Npz if file.can_seek() => npz::write(BufWriter::new(&mut file), &waves()),
         Format::Npz => {
             let mut bytes = Cursor::new(Vec::new());
-            npz::write(&mut bytes, waves).map_err(|e| Failure::file(path, e))?;
-            bytes_to_file(path, bytes.get_ref())
+            npz::write(&mut bytes, &waves()).and_then(|()| file.append(bytes.get_ref()))
         }
-        Format::Html => bytes_to_file(path, html::page(run, &figure())?.as_bytes()),
-        Format::Svg => picture_to_file(path, &svg::draw(&figure())?),
-        Format::Png => picture_to_file(path, &svg::draw(&figure())?),
-    }
+        Format::Json => buffered(&mut file, |to| json::write(to, &waves())),
+        Format::Csv => buffered(&mut file, |to| csv::write(to, &waves())),
+        Format::Raw => buffered(&mut file, |to| raw::write(to, &waves())),
+    };
+    result.map_err(|e| file.failure(e))?;
+    file.finish()
+}
+
+fn buffered(
+    file: &mut Written,
+    content: impl FnOnce(&mut BufWriter<&mut Written>) -> io::Result<()>,
+) -> io::Result<()> {
+    let mut file = BufWriter::new(file);
+    content(&mut file)?;
+    file.flush()
 }
 
 /// Writes a drawing as it is, or rasterised where the file's ending is `png`.
@@ -104,25 +237,5 @@ pub fn picture_to_file(path: &Path, drawing: &str) -> Result<(), Failure> {
     } else {
         Ok(drawing.as_bytes().to_vec())
     };
-    bytes_to_file(path, &rasterised?)
-}
-
-/// Writes bytes to a new file.
-///
-/// # Errors
-/// Those of the file.
-pub fn bytes_to_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    to_file(path, |file| file.write_all(bytes))
-}
-
-fn to_file(
-    path: &Path,
-    content: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
-) -> Result<(), Failure> {
-    let write = || {
-        let mut file = BufWriter::new(File::create(path)?);
-        content(&mut file)?;
-        file.flush()
-    };
-    write().map_err(|e| Failure::file(path, e))
+    files::write(path, &rasterised?)
 }

@@ -1,30 +1,35 @@
 //! `circ sim`.
 
-use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use super::args::{self, MethodArgs, SimArgs, Summary};
 use super::dc;
 use super::exit::{Exit, Failure};
+use super::files;
 use super::forms;
 use super::input::{self, Subject};
 use super::measured::{self, Measuring};
-use super::output::{self, Format};
+use super::output::{Format, Outputs};
+use super::rows::{self, Columns, Shown};
+use super::signals::Signals;
 use super::stepped::Stepped;
 use super::steps::Stepping;
 use super::streams::Streams;
 use crate::circuit::{Circuit, Tran};
 use crate::diagnostic::SourceMap;
-use crate::integrate::{Method, Run, SimError, SimOptions, simulate, simulate_system};
+use crate::integrate::{
+    Block, Method, Reason, Run, SimError, SimOptions, Sink, simulate, simulate_system,
+};
 use crate::report::figure::Figure;
 use crate::report::measured::Measurements;
 use crate::report::{json, terminal, text};
 use crate::settings::Settings;
-use crate::waveform::csv;
 
 /// Divisions of the progress bar.
 const PROGRESS: f64 = 1000.0;
 
-/// Simulates and writes what was asked for; a run that broke off is written as far as it came.
+/// Simulates and writes what was asked for; a run that broke off or was interrupted is written as far as it came.
 ///
 /// # Errors
 /// See [`Failure`].
@@ -35,12 +40,18 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         .map(|path| Format::of(path))
         .collect::<Result<Vec<_>, _>>()?;
     let request = Request::of(&args.method, args.events)?;
+    let paths: Vec<&Path> = args.outputs.iter().map(PathBuf::as_path).collect();
     if let Some(form) = forms::open(&args.input)? {
-        let finished = (forms::run(&form, args)?, Measurements::default());
-        return finish(args, &formats, (Some(finished), None), None, streams);
+        files::spare(&paths, [args.input.file.as_path()])?;
+        let run = forms::run(&form, args)?;
+        let destination = Destination::of(args, &formats, None, None, streams);
+        let outputs = destination.open(&Columns::of(&run.waveforms))?;
+        let finished = (Some((run, Measurements::default())), None);
+        return destination.finish(outputs, finished, true, None);
     }
-    let (subject, cards) = input::open_with_cards(&args.input, &args.probes, streams)?;
+    let (subject, cards) = input::open_with_cards(&args.input, &args.probes, &paths, streams)?;
     let sources = cards.as_ref().map(|(_, sources)| sources.clone());
+    let signals = Signals::watch()?;
     if let (Subject::Circuit(both), Some((netlist, sources))) = (&subject, cards) {
         let (circuit, _) = &**both;
         if circuit.tran.is_none() && !circuit.dc.is_empty() {
@@ -56,59 +67,178 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
             };
             let stepping = Stepping {
                 args,
+                circuit,
                 stepped,
                 request,
+                signals: &signals,
             };
             return stepping.sim(&formats, streams);
         }
     }
-    let finished = measured_run(&subject, &request, streams)?;
-    let circuit = input::circuit_of(&args.input, &subject);
-    let place = circuit.ok().zip(sources.as_ref());
-    finish(args, &formats, finished, place, streams)
+    let place = match &subject {
+        Subject::Circuit(both) => sources.as_ref().map(|sources| (&both.0, sources)),
+        Subject::System(_) => None,
+    };
+    let destination = Destination::of(args, &formats, tran(&subject), place, streams);
+    let mut outputs = destination.open(&Columns::of_subject(&subject))?;
+    let measures = matches!(&subject, Subject::Circuit(both) if measured::asked(&both.0));
+    let collects = outputs.hold() || destination.plots || measures;
+    let mut take = |block: Block<'_>| outputs.take(block);
+    let route = Route {
+        corners: destination.has_pictures(),
+        sink: (!measures).then_some(&mut take as Sink<'_>),
+        discard: !collects,
+        cancel: Some(signals.flag()),
+        held: None,
+    };
+    let finished = measured_run(&subject, &request, route, streams)?;
+    destination.finish(outputs, finished, measures, signals.received())
 }
 
-/// Writes what a run gave, or as much of it as there is, and says why it ended early.
-fn finish(
-    args: &SimArgs,
-    formats: &[Format],
-    (finished, error): Finished,
-    place: Option<(&Circuit, &SourceMap)>,
-    streams: &Streams,
-) -> Result<Exit, Failure> {
-    if let Some((run, found)) = &finished {
-        if args.method.step.is_some() && run.method == Method::Exact.name() {
-            streams.say("note: --step is of no use to exact integration, which has no steps");
-        }
-        for (path, format) in args.outputs.iter().zip(formats) {
-            let figure = || Figure::of_waveforms(&run.waveforms);
-            match output::write(run, &figure, *format, path) {
-                // A picture of a run that broke off before its first row.
-                Err(Failure::Picture(_)) if error.is_some() => {}
-                written => written?,
-            }
-        }
-        summarise(run, found, args, streams);
-        if args.outputs.is_empty() {
-            show(run, streams)?;
+/// Where the results of a command go, and what it says.
+pub(super) struct Destination<'a> {
+    args: &'a SimArgs,
+    formats: &'a [Format],
+    tran: Option<Tran>,
+    /// The circuit and the files it was read from.
+    place: Option<(&'a Circuit, &'a SourceMap)>,
+    /// A plot on a terminal.
+    pub(super) plots: bool,
+    pub(super) streams: &'a Streams,
+}
+
+impl<'a> Destination<'a> {
+    /// As the command line asks for it.
+    pub(super) fn of(
+        args: &'a SimArgs,
+        formats: &'a [Format],
+        tran: Option<Tran>,
+        place: Option<(&'a Circuit, &'a SourceMap)>,
+        streams: &'a Streams,
+    ) -> Self {
+        Self {
+            args,
+            formats,
+            tran,
+            place,
+            plots: args.outputs.is_empty() && streams.out_is_terminal(),
+            streams,
         }
     }
-    match error {
-        None => Ok(Exit::Done),
-        Some(error) => Err(input::broke_off(&args.input, &error, place, streams)),
+
+    /// Whether anything is looked at.
+    pub(super) fn has_pictures(&self) -> bool {
+        self.plots || self.formats.iter().any(|format| format.is_picture())
+    }
+
+    /// Opens files.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub(super) fn open(&self, columns: &Columns) -> Result<Outputs, Failure> {
+        let between = self.tran.is_some_and(|tran| !tran.prints);
+        let shown = Shown {
+            events: self.args.events || between,
+            corners: between,
+        };
+        let to_pipe = !self.plots;
+        Outputs::open(&self.args.outputs, self.formats, to_pipe, shown, columns)
+    }
+
+    /// Writes what a run gave, or as much of it as there is, and says why it ended early. `feeds`: the rows have not been written yet.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub(super) fn finish(
+        &self,
+        mut outputs: Outputs,
+        (finished, error): Finished,
+        feeds: bool,
+        signal: Option<(i32, &str)>,
+    ) -> Result<Exit, Failure> {
+        let Some((run, found)) = finished else {
+            return error.map_or(Ok(Exit::Done), |error| Err(self.failure(&error)));
+        };
+        if self.args.method.step.is_some() && run.method == Method::Exact.name() {
+            self.streams
+                .say("note: --step is of no use to exact integration, which has no steps");
+        }
+        if feeds {
+            // A failure is told by `finish`.
+            let _ = outputs.take(rows::block(&run.waveforms, &run.kinds));
+        }
+        let last = outputs.last().or(run.waveforms.time.last().copied());
+        let until = last.map_or("before its first row".into(), |t| format!("at {t:e} s"));
+        let incomplete = error.as_ref().map(|_| format!("incomplete: ends {until}"));
+        let files = outputs.words();
+        let figure = || Figure::of_waveforms(&run.waveforms);
+        let written = outputs.finish(&run, &figure, incomplete.as_deref());
+        summarise(&run, &found, self.args, self.streams);
+        if self.plots {
+            let (lines, columns) = self.streams.size();
+            let plot = terminal::plot(&run.waveforms, columns, lines);
+            self.streams.data(plot)?;
+        }
+        if let Err(failure) = written {
+            if let (false, Some(t)) = (failure.is_closed_pipe() || files.is_empty(), last) {
+                self.streams
+                    .say(format!("note: rows were written until {t:e} s"));
+            }
+            return Err(failure);
+        }
+        let Some(error) = error else {
+            return Ok(Exit::Done);
+        };
+        let kept = match (files.is_empty(), last) {
+            (false, Some(t)) => format!("; the rows until {t:e} s are in {files}"),
+            _ => String::new(),
+        };
+        match signal {
+            Some((signal, name)) if error.reason == Reason::Interrupted => {
+                let file = self.args.input.file.display();
+                self.streams
+                    .error(format!("{file}: {error} by {name}{kept}"));
+                Ok(Exit::Signal(signal))
+            }
+            _ => match self.failure(&error) {
+                Failure::Faults(message) => Err(Failure::Faults(message + &kept)),
+                Failure::Message(message) => Err(Failure::Message(message + &kept)),
+                other => Err(other),
+            },
+        }
+    }
+
+    fn failure(&self, error: &SimError) -> Failure {
+        input::broke_off(&self.args.input, error, self.place, self.streams)
     }
 }
 
 /// A run, or as much of it as there is, and what its measurements found.
 pub(super) type Finished = (Option<(Run, Measurements)>, Option<SimError>);
 
-/// Simulates, and measures where the circuit asks for it: on the rows at events too.
+/// Where the rows of a run go.
+#[derive(Default)]
+pub(super) struct Route<'a> {
+    /// Rows at events and corners.
+    pub corners: bool,
+    /// Takes rows as they come.
+    pub sink: Option<Sink<'a>>,
+    /// Rows are for the sink alone.
+    pub discard: bool,
+    /// Ends the run.
+    pub cancel: Option<&'a AtomicBool>,
+    /// Bytes for rows at most, if not the usual.
+    pub held: Option<usize>,
+}
+
+/// Simulates, and measures where the circuit asks for it: on the rows at events and corners too.
 ///
 /// # Errors
 /// See [`Failure`].
 pub(super) fn measured_run(
     subject: &Subject,
     request: &Request,
+    route: Route<'_>,
     streams: &Streams,
 ) -> Result<Finished, Failure> {
     let measuring = match subject {
@@ -118,15 +248,15 @@ pub(super) fn measured_run(
         )),
         _ => None,
     };
-    let request = Request {
-        events: request.events || measuring.is_some(),
-        ..request.clone()
+    let route = Route {
+        corners: route.corners || measuring.is_some(),
+        ..route
     };
     let tstep = measuring
         .as_ref()
         .and_then(|(measuring, _)| measuring.tstep());
     let subject = measuring.as_ref().map_or(subject, |(_, subject)| subject);
-    let (finished, error) = match run(subject, &request, tstep, streams) {
+    let (finished, error) = match run_to(subject, request, tstep, route, streams) {
         Ok(run) => (Some(run), None),
         Err(mut error) => (error.partial.take().map(|run| *run), Some(error)),
     };
@@ -201,10 +331,23 @@ pub fn run(
     tstep: Option<f64>,
     streams: &Streams,
 ) -> Result<Run, SimError> {
+    run_to(subject, request, tstep, Route::default(), streams)
+}
+
+/// The same with rows on their way.
+fn run_to(
+    subject: &Subject,
+    request: &Request,
+    tstep: Option<f64>,
+    route: Route<'_>,
+    streams: &Streams,
+) -> Result<Run, SimError> {
     let tran = tran(subject).map(|t| Tran {
         tstep: tstep.unwrap_or(t.tstep),
         ..t
     });
+    let mut sink = route.sink;
+    let sink = sink.as_mut().map(|s| &mut **s as Sink<'_>);
     let bar = streams.progress(PROGRESS as u64, "simulating");
     let span = tran.map_or(1.0, |t| t.tstop);
     let mut shown = 0;
@@ -219,12 +362,19 @@ pub fn run(
     if let Some(tol) = request.tol {
         settings.tol = tol;
     }
+    if let Some(held) = route.held {
+        settings.max_held = held;
+    }
     let options = SimOptions {
         method: request.method,
         theta: request.theta,
         gamma: request.gamma,
         step: request.step,
         events: request.events,
+        corners: route.corners,
+        rows: sink,
+        discard: route.discard,
+        cancel: route.cancel,
         settings,
         progress: (!bar.is_hidden()).then_some(&mut report),
     };
@@ -242,9 +392,7 @@ pub fn run(
         }
         (Subject::System(_), None) => {
             let reason = "the system has no \"tran\": {\"tstep\", \"tstop\"}";
-            Err(SimError::before(crate::integrate::Reason::Unsupported(
-                reason.into(),
-            )))
+            Err(SimError::before(Reason::Unsupported(reason.into())))
         }
     };
     bar.finish_and_clear();
@@ -278,15 +426,4 @@ fn summarise(run: &Run, found: &Measurements, args: &SimArgs, streams: &Streams)
     if !found.is_empty() {
         streams.say(found.words());
     }
-}
-
-/// On standard output: a character plot for a person, CSV for a program.
-fn show(run: &Run, streams: &Streams) -> Result<(), Failure> {
-    if streams.out_is_terminal() {
-        let (lines, columns) = streams.size();
-        return Ok(streams.data(terminal::plot(&run.waveforms, columns, lines))?);
-    }
-    let mut out = streams.out();
-    csv::write(&mut out, &run.waveforms)?;
-    Ok(out.flush()?)
 }

@@ -1,31 +1,35 @@
 //! `.step`: a run for every combination of values, in parallel, with results in the order of the values.
 
-use std::io::Write;
-
 use rayon::prelude::*;
 
 use super::args::{SimArgs, Summary};
 use super::exit::{Exit, Failure};
 use super::input;
-use super::output::{self, Format};
-use super::sim::{self, Request};
+use super::output::{Format, Outputs};
+use super::rows::{self, Columns};
+use super::signals::Signals;
+use super::sim::{self, Destination, Request, Route};
 use super::stepped::Stepped;
 use super::streams::Streams;
 use crate::circuit::Circuit;
-use crate::integrate::SimError;
+use crate::integrate::{Grid, Reason, SimError};
 use crate::report::figure::Figure;
 use crate::report::steps::{self, Step};
 use crate::report::{terminal, text};
-use crate::waveform::csv;
+use crate::settings::Settings;
 
 /// What the runs have in common.
 pub(super) struct Stepping<'a> {
     /// The command line.
     pub args: &'a SimArgs,
+    /// With the values as they stand.
+    pub circuit: &'a Circuit,
     /// The circuits.
     pub stepped: Stepped<'a>,
     /// How to integrate.
     pub request: Request,
+    /// What ends the runs.
+    pub signals: &'a Signals,
 }
 
 /// A run as far as it came, and why and in which circuit not further.
@@ -35,32 +39,60 @@ impl Stepping<'_> {
     /// Runs, writes and tells.
     pub(super) fn sim(&self, formats: &[Format], streams: &Streams) -> Result<Exit, Failure> {
         let combinations = self.stepped.combinations();
+        let columns = self.columns();
+        let held = Settings::default().max_held / combinations.len().max(1);
+        if let Some(tran) = self.circuit.tran {
+            let most = held / ((columns.names.len() + 1) * size_of::<f64>());
+            let refused = |error: SimError| {
+                let (file, runs) = (self.args.input.file.display(), combinations.len());
+                Failure::Message(format!("{file}: each of {runs} runs of `.step`: {error}"))
+            };
+            Grid::of(&tran)
+                .check(columns.names.len(), Some(most))
+                .map_err(refused)?;
+        }
+        let destination = Destination::of(self.args, formats, self.circuit.tran, None, streams);
+        let outputs = destination.open(&columns)?;
         let bar = streams.progress(combinations.len() as u64, "stepping");
-        let quiet = Streams {
-            quiet: true,
-            verbose: false,
-        };
         let outcomes: Vec<Result<Outcome, Failure>> = combinations
             .par_iter()
             .map(|values| {
-                let outcome = self.one(values, &quiet);
+                let outcome = self.one(values, &destination, held);
                 bar.inc(1);
                 outcome
             })
             .collect();
         bar.finish_and_clear();
-        let (mut done, mut failures) = (Vec::new(), Vec::new());
+        let (mut done, mut failures, mut interrupted) = (Vec::new(), Vec::new(), false);
         for (values, outcome) in combinations.iter().zip(outcomes) {
             let (step, error) = outcome?;
             done.extend(step);
-            if let Some((error, circuit)) = error {
-                let place = Some((&circuit, &self.stepped.sources));
-                let failure = input::broke_off(&self.args.input, &error, place, streams);
-                failures.push(format!("{failure} at {}", self.stepped.label(values)));
+            let Some((error, circuit)) = error else {
+                continue;
+            };
+            if error.reason == Reason::Interrupted {
+                interrupted = true;
+                continue;
             }
+            let place = Some((&circuit, &self.stepped.sources));
+            let failure = input::broke_off(&self.args.input, &error, place, streams);
+            failures.push(format!("{failure} at {}", self.stepped.label(values)));
         }
         if !done.is_empty() {
-            self.write(&done, formats, !failures.is_empty(), streams)?;
+            let incomplete = if interrupted {
+                Some("incomplete: interrupted")
+            } else {
+                (!failures.is_empty()).then_some("incomplete: runs broke off")
+            };
+            self.write(&done, outputs, incomplete, &destination)?;
+        }
+        if let (true, Some((signal, name))) = (interrupted, self.signals.received()) {
+            let (file, runs) = (self.args.input.file.display(), combinations.len());
+            streams.error(format!(
+                "{file}: interrupted by {name}: {} of {runs} runs were begun",
+                done.len()
+            ));
+            return Ok(Exit::Signal(signal));
         }
         if failures.is_empty() {
             Ok(Exit::Done)
@@ -69,10 +101,39 @@ impl Stepping<'_> {
         }
     }
 
-    /// The run with these values.
-    fn one(&self, values: &[f64], streams: &Streams) -> Result<Outcome, Failure> {
-        let subject = self.stepped.subject(values, streams)?;
-        let (finished, error) = sim::measured_run(&subject, &self.request, streams)?;
+    /// Those of the signals, then what is stepped.
+    fn columns(&self) -> Columns {
+        let mut columns = Columns::of_circuit(self.circuit);
+        for sweep in self.stepped.sweeps {
+            columns.names.push(sweep.what.name().to_string());
+            columns.units.push("");
+        }
+        columns
+    }
+
+    /// The run with these values, of so many bytes at most.
+    fn one(
+        &self,
+        values: &[f64],
+        destination: &Destination<'_>,
+        held: usize,
+    ) -> Result<Outcome, Failure> {
+        if self.signals.received().is_some() {
+            let error = SimError::before(Reason::Interrupted);
+            return Ok((None, Some((error, self.circuit.clone()))));
+        }
+        let quiet = Streams {
+            quiet: true,
+            verbose: false,
+        };
+        let subject = self.stepped.subject(values, &quiet)?;
+        let route = Route {
+            corners: destination.has_pictures(),
+            cancel: Some(self.signals.flag()),
+            held: Some(held),
+            ..Route::default()
+        };
+        let (finished, error) = sim::measured_run(&subject, &self.request, route, &quiet)?;
         let step = finished.map(|(run, found)| Step {
             values: self.stepped.named(values),
             run,
@@ -85,22 +146,19 @@ impl Stepping<'_> {
     fn write(
         &self,
         done: &[Step],
-        formats: &[Format],
-        broke_off: bool,
-        streams: &Streams,
+        mut outputs: Outputs,
+        incomplete: Option<&str>,
+        destination: &Destination<'_>,
     ) -> Result<(), Failure> {
+        let streams = destination.streams;
         let total = steps::total(done);
         let figure = || {
             let runs: Vec<_> = done.iter().map(|s| (s.label(), &s.run.waveforms)).collect();
             Figure::of_runs(&runs)
         };
-        for (path, format) in self.args.outputs.iter().zip(formats) {
-            match output::write(&total, &figure, *format, path) {
-                // A picture of runs that broke off before their first row.
-                Err(Failure::Picture(_)) if broke_off => {}
-                written => written?,
-            }
-        }
+        // A failure is told by `finish`.
+        let _ = outputs.take(rows::block(&total.waveforms, &total.kinds));
+        let written = outputs.finish(&total, &figure, incomplete);
         let wordy = streams.verbose || streams.err_is_terminal();
         match self.args.summary {
             Some(Summary::Json) => streams.error(steps::summary(done)),
@@ -115,20 +173,14 @@ impl Stepping<'_> {
         if !matches!(self.args.summary, Some(Summary::Json)) {
             streams.say(steps::measured(done));
         }
-        if !self.args.outputs.is_empty() {
-            return Ok(());
-        }
-        if streams.out_is_terminal() {
+        if destination.plots {
             let (lines, columns) = streams.size();
             for step in done {
                 streams.data(step.label() + "\n")?;
                 let room = (lines / done.len()).max(1);
                 streams.data(terminal::plot(&step.run.waveforms, columns, room))?;
             }
-            return Ok(());
         }
-        let mut out = streams.out();
-        csv::write(&mut out, &total.waveforms)?;
-        Ok(out.flush()?)
+        written
     }
 }

@@ -7,7 +7,7 @@
 mod tests;
 
 use crate::integrate::exact::{Exact, Place};
-use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper, Times, named};
+use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper, Times, is_final, named};
 use crate::integrate::stats::Stats;
 use crate::integrate::theta::Theta;
 
@@ -76,7 +76,7 @@ impl<'a> Handover<'a> {
 
     /// Steps go on from where the exact integration failed.
     fn give_way(&mut self, error: SimError) -> Result<(), SimError> {
-        if matches!(error.reason, Reason::TooManySteps { .. }) {
+        if is_final(&error) || matches!(error.reason, Reason::TooManySteps { .. }) {
             return Err(error);
         }
         let place = self.exact.leave();

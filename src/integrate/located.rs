@@ -128,6 +128,16 @@ fn told(error: &SimError, elements: &[&Element]) -> Told {
             "overflow",
             Some("a negative resistance, or a loop with gain of the wrong sign, makes a circuit grow without bound".into()),
         ),
+        Reason::TooManyRows { .. } => plain(
+            "too-many-rows",
+            Some(
+                "csv and raw files are written as rows come, unless the netlist measures; a longer print step, a later start and \
+                 fewer signals make less of them"
+                    .into(),
+            ),
+        ),
+        Reason::RowsTooDense { .. } => plain("rows-too-dense", Some("`.tran tstep tstop`: a longer tstep".into())),
+        Reason::Interrupted => plain("interrupted", None),
         Reason::Unsupported(_) => plain("unsupported", None),
         Reason::Internal(_) => plain("internal", None),
     }

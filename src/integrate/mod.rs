@@ -14,6 +14,7 @@ pub mod line;
 mod located;
 pub mod reading;
 mod roles;
+pub mod rows;
 pub mod run;
 mod settle;
 pub mod simulate;
@@ -24,6 +25,7 @@ pub mod switching;
 pub mod system;
 pub mod theta;
 
+pub use rows::{Asked, Block, RowKind, Sink};
 pub use run::{Frame, Grid, Log, NoRest, Outcome, Reason, SimError, Stepper};
 pub use simulate::{Method, SimOptions, simulate, simulate_system};
 pub use start::{OperatingPoint, Values, operating_point};

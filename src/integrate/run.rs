@@ -1,10 +1,10 @@
 //! The time loop, shared by all methods: a [`Stepper`] moves, the loop writes rows.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use crate::circuit::Tran;
 use crate::diagnostic::Internal;
+use crate::integrate::rows::{Asked, RowKind, Sheet};
 use crate::integrate::{Energy, Impulse, Run, Stats};
 use crate::lcs::ReduceError;
 use crate::waveform::Waveforms;
@@ -94,6 +94,36 @@ pub enum Reason {
     /// The state left the range of doubles.
     #[error("the solution grows beyond the range of numbers")]
     Overflow,
+    /// The run was cancelled, or nobody takes its rows any more.
+    #[error("interrupted")]
+    Interrupted,
+    /// More rows than may be held at once.
+    #[error(
+        "{rows:e} rows of {} values are {:.3} GB, more than the {:.3} GB that may be held at once",
+        .columns + 1, gigabytes(*.rows, *.columns), gigabytes(*.limit as f64, *.columns)
+    )]
+    TooManyRows {
+        /// Their number.
+        rows: f64,
+        /// Values of a row besides its time.
+        columns: usize,
+        /// The largest number that is held.
+        limit: usize,
+    },
+    /// Output times closer to each other than doubles are.
+    #[error(
+        "{rows:e} rows from {tstart:e} s to {tstop:e} s are closer to each other than numbers are: the print step must be {least:.1e} s or longer"
+    )]
+    RowsTooDense {
+        /// Their number.
+        rows: f64,
+        /// First, s.
+        tstart: f64,
+        /// Last, s.
+        tstop: f64,
+        /// The shortest distance of rows, s.
+        least: f64,
+    },
     /// The method asked for does not cover the circuit.
     #[error("{0}")]
     Unsupported(String),
@@ -141,6 +171,11 @@ impl From<ReduceError> for Reason {
             error => Self::Circuit(error),
         }
     }
+}
+
+/// The memory of so many rows.
+fn gigabytes(rows: f64, columns: usize) -> f64 {
+    rows * (columns + 1) as f64 * size_of::<f64>() as f64 * 1e-9
 }
 
 impl SimError {
@@ -215,50 +250,76 @@ pub struct Outcome {
 }
 
 /// Collects what happens between output times.
-#[derive(Debug, Default)]
-pub struct Log {
-    /// Event times, s, with what changed.
+#[derive(Default)]
+pub struct Log<'a> {
+    /// Event times, s, with what changed; the first [`Self::LISTED`].
     pub events: Vec<(f64, Arc<str>)>,
-    /// Impulses at jumps.
+    /// Impulses at jumps; the first [`Self::LISTED`].
     pub impulses: Vec<Impulse>,
-    wants_rows: bool,
-    from: f64,
-    columns: usize,
-    time: Vec<f64>,
-    values: Vec<f64>,
-    last_is_event: bool,
+    rows: Sheet<'a>,
 }
 
-impl Log {
-    /// A log for rows of `columns` values from time `from` on; event rows only if `wants_rows`.
+impl<'a> Log<'a> {
+    /// Events and impulses listed; those after them are only counted.
+    pub const LISTED: usize = 1 << 20;
+
+    /// A log for rows of `columns` values from time `from` on, all of them collected; event rows only if `wants_rows`.
     #[must_use]
     pub fn new(columns: usize, from: f64, wants_rows: bool) -> Self {
+        let asked = Asked {
+            events: wants_rows,
+            ..Asked::default()
+        };
+        Self::of(columns, from, asked)
+    }
+
+    /// The same for the rows that are asked for.
+    #[must_use]
+    pub fn of(columns: usize, from: f64, asked: Asked<'a>) -> Self {
         Self {
-            columns,
-            from,
-            wants_rows,
+            rows: Sheet::new(columns, from, asked),
             ..Self::default()
         }
     }
 
     /// An event: a device or switch changed its state at `t`.
     pub fn event(&mut self, t: f64, what: impl Into<Arc<str>>) {
-        self.events.push((t, what.into()));
+        if self.events.len() < Self::LISTED {
+            self.events.push((t, what.into()));
+        }
     }
 
     /// An impulse of this area at `t`.
     pub fn impulse(&mut self, t: f64, name: impl Into<String>, area: f64) {
-        self.impulses.push(Impulse {
-            t,
-            name: name.into(),
-            area,
-        });
+        if self.impulses.len() < Self::LISTED {
+            self.impulses.push(Impulse {
+                t,
+                name: name.into(),
+                area,
+            });
+        }
     }
 
     /// Whether rows at event times were asked for.
     #[must_use]
     pub fn wants_rows(&self) -> bool {
-        self.wants_rows
+        self.rows.wants_events()
+    }
+
+    /// Whether rows at corners of sources were asked for.
+    #[must_use]
+    pub fn wants_corners(&self) -> bool {
+        self.rows.wants_corners()
+    }
+
+    /// Whether a run that stands at `t` may go on: steppers ask at every step.
+    ///
+    /// # Errors
+    /// [`Reason::Interrupted`] when it was cancelled or nobody takes its rows any more, [`Reason::TooManyRows`] when more were
+    /// collected than allowed.
+    #[inline]
+    pub fn go_on(&self, t: f64) -> Result<(), SimError> {
+        self.rows.go_on(t)
     }
 
     /// Takes back what was logged since there were `events` events and `impulses` impulses.
@@ -270,67 +331,20 @@ impl Log {
     /// A row at an event: once at a continuous event, twice (left limit, right limit) at a jump. Ignored unless
     /// [`Self::wants_rows`].
     pub fn row(&mut self, t: f64, row: &[f64]) {
-        debug_assert_eq!(row.len(), self.columns);
-        if self.wants_rows && t >= self.from {
-            let at = self.time.len();
-            if at >= 2 && self.last_is_event && self.time[at - 2..] == [t, t] {
-                // Several things at one instant: the first row before, the last one after all of them.
-                self.time.pop();
-                self.values.truncate(self.values.len() - self.columns);
-            }
-            self.time.push(t);
-            self.values.extend_from_slice(row);
-            self.last_is_event = true;
+        self.rows.between(t, row, RowKind::Event);
+    }
+
+    /// A row at a corner of a source. Ignored unless [`Self::wants_corners`], and where there is a row.
+    pub fn corner(&mut self, t: f64, row: &[f64]) {
+        if self.wants_corners() {
+            self.rows.between(t, row, RowKind::Corner);
         }
     }
 
-    /// Makes room for so many rows.
-    fn expect(&mut self, rows: usize) {
-        /// Longer runs grow as they go.
-        const MOST: usize = 1 << 20;
-        let rows = rows.min(MOST);
-        self.time.reserve(rows);
-        self.values.reserve(rows * self.columns);
-    }
-
-    /// Rows at these output times, one after the other; the first replaces an event row for the same right limit.
-    ///
-    /// # Errors
-    /// [`Reason::Overflow`] at the first row that is not finite; those before it are taken.
-    fn grid_rows(
-        &mut self,
-        times: &Times,
-        which: Range<usize>,
-        rows: &[f64],
-    ) -> Result<(), SimError> {
-        if let Some(at) = not_finite(rows) {
-            let bad = which.start + at / self.columns;
-            self.grid_rows(times, which.start..bad, &rows[..at - at % self.columns])?;
-            return Err(SimError::at(times.at(bad), Reason::Overflow));
-        }
-        if self.last_is_event && self.time.last() == Some(&times.at(which.start)) {
-            self.time.pop();
-            self.values.truncate(self.values.len() - self.columns);
-        }
-        self.time.extend(which.map(|k| times.at(k)));
-        self.values.extend_from_slice(rows);
-        self.last_is_event = false;
-        Ok(())
-    }
-}
-
-/// The first value that is not finite.
-fn not_finite(values: &[f64]) -> Option<usize> {
-    // What is finite is nothing when taken zero times: four values at once, and no branch for each.
-    let (fours, rest) = values.as_chunks::<4>();
-    let nothing = fours.iter().fold([0.0; 4], |sum, four| {
-        std::array::from_fn(|i| sum[i] + 0.0 * four[i])
-    });
-    let finite = nothing.iter().all(|v| *v == 0.0) && rest.iter().all(|v| v.is_finite());
-    if finite {
-        None
-    } else {
-        values.iter().position(|v| !v.is_finite())
+    /// Forgets an attempt that failed, for another one from the start. Rows that were handed on stay: returns the time of the last, s.
+    pub(crate) fn again(&mut self) -> Option<f64> {
+        self.back_to(0, 0);
+        self.rows.again()
     }
 }
 
@@ -363,11 +377,46 @@ impl Grid {
     /// Number of output times.
     #[must_use]
     pub fn len(&self) -> usize {
+        self.count() as usize
+    }
+
+    /// The same, which may be more than a computer can count.
+    #[must_use]
+    pub fn count(&self) -> f64 {
         let span = self.tstop - self.tstart;
         if !(span > 0.0 && self.tstep > 0.0) {
-            return 1;
+            return 1.0;
         }
-        (span / self.tstep - GRID_CLOSE).ceil().max(1.0) as usize + 1
+        (span / self.tstep - GRID_CLOSE).ceil().max(1.0) + 1.0
+    }
+
+    /// # Errors
+    /// [`Reason::RowsTooDense`] for output times that doubles do not tell apart; [`Reason::TooManyRows`] for more than `most` rows, of
+    /// so many columns besides time.
+    pub fn check(&self, columns: usize, most: Option<usize>) -> Result<(), SimError> {
+        let Self {
+            tstart,
+            tstep,
+            tstop,
+        } = *self;
+        let rows = self.count();
+        let least = 2.0 * f64::EPSILON * tstop.abs();
+        if tstep < least {
+            return Err(SimError::before(Reason::RowsTooDense {
+                rows,
+                tstart,
+                tstop,
+                least,
+            }));
+        }
+        match most {
+            Some(limit) if rows > limit as f64 => Err(SimError::before(Reason::TooManyRows {
+                rows,
+                columns,
+                limit,
+            })),
+            _ => Ok(()),
+        }
     }
 
     /// Never: `tstop` is always there.
@@ -441,7 +490,18 @@ pub struct Frame<'a> {
 ///
 /// # Errors
 /// The stepper's, with the run so far in [`SimError::partial`].
-pub fn run(stepper: &mut dyn Stepper, frame: Frame<'_>, mut log: Log) -> Result<Run, SimError> {
+pub fn run(stepper: &mut dyn Stepper, frame: Frame<'_>, mut log: Log<'_>) -> Result<Run, SimError> {
+    attempt(stepper, frame, &mut log, true)
+}
+
+/// The same with a log that can be used [again](Log::again): after a failure of what is not the `last` attempt, unless [`is_final`],
+/// the rows stay in it.
+pub(crate) fn attempt(
+    stepper: &mut dyn Stepper,
+    frame: Frame<'_>,
+    log: &mut Log<'_>,
+    last: bool,
+) -> Result<Run, SimError> {
     let Frame {
         title,
         names,
@@ -455,16 +515,19 @@ pub fn run(stepper: &mut dyn Stepper, frame: Frame<'_>, mut log: Log) -> Result<
     let mut row = vec![0.0; names.len()];
     let mut failure = None;
     let times = grid.times();
-    log.expect(times.len);
+    log.rows.expect(times.len);
     let mut k = 0;
     while k < times.len {
-        let advanced = stepper.advance(times.at(k), &mut log).and_then(|()| {
+        let advanced = stepper.advance(times.at(k), log).and_then(|()| {
             stepper.read(&mut row);
-            log.grid_rows(&times, k..k + 1, &row)?;
+            log.rows.grid(&times, k..k + 1, &row)?;
             let ahead = stepper.rows_ahead(&times, k + 1);
             let after = k + 1 + ahead.len() / row.len().max(1);
             if after > k + 1 {
-                log.grid_rows(&times, k + 1..after, ahead)?;
+                log.rows.grid(&times, k + 1..after, ahead)?;
+            }
+            if after < times.len {
+                log.go_on(times.at(after - 1))?;
             }
             Ok(after)
         });
@@ -482,21 +545,31 @@ pub fn run(stepper: &mut dyn Stepper, frame: Frame<'_>, mut log: Log) -> Result<
     let mut outcome = stepper.finish();
     let mut all_notes = notes;
     all_notes.append(&mut outcome.notes);
+    if log.events.len() == Log::LISTED {
+        all_notes.push(format!("the first {} events are listed", Log::LISTED));
+    }
+    let failure = match failure {
+        Some(error) if !last && !is_final(&error) => return Err(error),
+        failure => failure,
+    };
+    log.rows.end();
+    let (time, values, kinds) = log.rows.collected();
     let run = Run {
         waveforms: Waveforms {
             title,
             names,
             units,
-            time: log.time,
-            values: log.values,
+            time,
+            values,
         },
+        kinds,
         method,
         plan,
         stats: outcome.stats,
         energy: outcome.energy,
         error_estimate: outcome.error_estimate,
-        impulses: log.impulses,
-        events: log.events,
+        impulses: std::mem::take(&mut log.impulses),
+        events: std::mem::take(&mut log.events),
         notes: all_notes,
     };
     match failure {
@@ -506,6 +579,14 @@ pub fn run(stepper: &mut dyn Stepper, frame: Frame<'_>, mut log: Log) -> Result<
             Err(error)
         }
     }
+}
+
+/// Whether no other method would come further.
+pub(crate) fn is_final(error: &SimError) -> bool {
+    matches!(
+        error.reason,
+        Reason::Interrupted | Reason::TooManyRows { .. }
+    )
 }
 
 #[cfg(test)]
@@ -587,21 +668,6 @@ mod tests {
         let kept = error.partial.unwrap().waveforms;
         assert_eq!(kept.time, [0.0, 1.0, 2.0]);
         assert_eq!(kept.values, [0.0, 1.0, 2.0]);
-    }
-
-    #[test]
-    fn what_is_not_finite_is_found_wherever_it_stands() {
-        for len in 0..10 {
-            let mut values = vec![-1e308; len];
-            assert_eq!(not_finite(&values), None);
-            for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-                for at in (0..len).rev() {
-                    values[at] = bad;
-                    assert_eq!(not_finite(&values), Some(at));
-                }
-                values.fill(-1e308);
-            }
-        }
     }
 
     #[test]

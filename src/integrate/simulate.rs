@@ -1,6 +1,7 @@
 //! From a circuit, or a system, to a run.
 
 use std::cell::RefCell;
+use std::sync::atomic::AtomicBool;
 
 use cpu_time::ThreadTime;
 use nalgebra::DVector;
@@ -12,7 +13,8 @@ use crate::integrate::exact::{self, Exact, Place};
 use crate::integrate::handover::Handover;
 use crate::integrate::inputs::Inputs;
 use crate::integrate::line::Line;
-use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, Stepper, run};
+use crate::integrate::rows::{Asked, Sink};
+use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, Stepper, attempt, is_final, run};
 use crate::integrate::step::Scheme;
 use crate::integrate::switching::{Threshold, at_start};
 use crate::integrate::theta::{Setup, Start, Stepping, Theta};
@@ -60,8 +62,16 @@ pub struct SimOptions<'a> {
     pub gamma: Option<f64>,
     /// Fixed step, s; error-controlled where absent.
     pub step: Option<f64>,
-    /// Rows at event times too.
+    /// Rows at event times too. Where the circuit's `.tran` names no print step there are always rows at events and corners.
     pub events: bool,
+    /// Rows at event times and at corners of sources too.
+    pub corners: bool,
+    /// Takes the rows as they come, besides [`Run::waveforms`].
+    pub rows: Option<Sink<'a>>,
+    /// Rows are for [`Self::rows`] alone: a run of any length needs no memory for them.
+    pub discard: bool,
+    /// Ends the run when set, with [`Reason::Interrupted`] and all rows so far.
+    pub cancel: Option<&'a AtomicBool>,
     /// Tolerances.
     pub settings: Settings,
     /// Called with the time reached, s.
@@ -417,14 +427,14 @@ fn dispatch(
             "no exact integration: {obstacle}"
         ))));
     }
+    let grid = Grid::of(&tran);
+    let columns = lcs.outputs.names.len();
+    let most =
+        (!options.discard).then(|| options.settings.max_held / ((columns + 1) * size_of::<f64>()));
+    grid.check(columns, most)?;
     if let Some(line) = problem.too_short(&tran, &options.settings) {
         return Err(line);
     }
-    let grid = Grid {
-        tstart: tran.tstart,
-        tstep: tran.tstep,
-        tstop: tran.tstop,
-    };
     let frame = |method: Method, notes: Vec<String>| Frame {
         title: lcs.title.clone(),
         names: lcs.outputs.names.clone(),
@@ -435,25 +445,39 @@ fn dispatch(
         notes,
         progress: None,
     };
-    let log = || Log::new(lcs.outputs.names.len(), grid.tstart, options.events);
+    let asked = Asked {
+        events: options.events || !tran.prints,
+        corners: options.corners || !tran.prints,
+        sink: options.rows,
+        discard: options.discard,
+        most,
+        cancel: options.cancel,
+    };
+    let mut log = Log::of(columns, grid.tstart, asked);
     let (mut method, mut notes) = (method, problem.notes.clone());
     let (mut progress, settings) = (options.progress, &options.settings);
     if options.method == Method::Exact {
         let mut exact = problem.exact(&tran, &lcs, settings)?;
         let frame = frame(method, notes);
-        return run(&mut exact, Frame { progress, ..frame }, log());
+        return run(&mut exact, Frame { progress, ..frame }, log);
     }
     if method == Method::Exact {
         let frame = Frame {
             progress: progress.as_mut().map(|p| &mut **p as &mut dyn FnMut(f64)),
             ..frame(method, notes.clone())
         };
-        let attempt = problem.handover(&tran, &lcs, settings);
-        match attempt.and_then(|mut handover| run(&mut handover, frame, log())) {
+        let handover = problem.handover(&tran, &lcs, settings);
+        match handover.and_then(|mut both| attempt(&mut both, frame, &mut log, false)) {
             Ok(run) => return Ok(run),
-            Err(error) => notes.push(format!(
-                "exact integration ended, and the whole run was made in steps instead: {error}"
-            )),
+            Err(error) if is_final(&error) => return Err(error),
+            Err(error) => notes.push(match log.again() {
+                None => format!(
+                    "exact integration ended, and the whole run was made in steps instead: {error}"
+                ),
+                Some(t) => format!(
+                    "exact integration ended, and the whole run was made in steps instead; rows until {t:e} s are exact: {error}"
+                ),
+            }),
         }
         method = Method::Theta;
     }
@@ -466,7 +490,7 @@ fn dispatch(
     }
     theta.estimate_errors();
     let frame = frame(method, notes);
-    run(&mut theta, Frame { progress, ..frame }, log())
+    run(&mut theta, Frame { progress, ..frame }, log)
 }
 
 fn check(tran: &Tran, options: &SimOptions<'_>) -> Result<(), SimError> {

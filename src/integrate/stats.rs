@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::integrate::rows::RowKind;
 use crate::waveform::Waveforms;
 
 /// Counters of one run; deterministic except `cpu_seconds`.
@@ -54,8 +55,12 @@ pub struct Impulse {
 /// Everything a simulation returns.
 #[derive(Debug, Clone, Default)]
 pub struct Run {
-    /// The waveforms on the output grid (with event rows if asked for).
+    /// The waveforms on the output grid (with event rows if asked for); no row where they were for [`SimOptions::rows`] alone.
+    ///
+    /// [`SimOptions::rows`]: crate::integrate::SimOptions::rows
     pub waveforms: Waveforms,
+    /// What each row stands at; empty where all are the grid's.
+    pub kinds: Vec<RowKind>,
     /// `exact`, `theta`, `euler`.
     pub method: String,
     /// What the plan decided, in words.

@@ -99,6 +99,7 @@ pub fn total(steps: &[Step]) -> Run {
         }
     }
     total.waveforms = rows(steps);
+    total.kinds = steps.iter().flat_map(|s| s.run.kinds.clone()).collect();
     total
 }
 

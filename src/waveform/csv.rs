@@ -25,15 +25,7 @@ impl<W: Write> Writer<W> {
     /// # Errors
     /// Those of `to`.
     pub fn over(mut to: W, axis: &str, names: &[String]) -> std::io::Result<Self> {
-        write!(to, "{axis}")?;
-        for name in names {
-            if name.contains([',', '"', '\n']) {
-                write!(to, ",\"{}\"", name.replace('"', "\"\""))?;
-            } else {
-                write!(to, ",{name}")?;
-            }
-        }
-        to.write_all(b"\n")?;
+        header(&mut to, axis, names)?;
         Ok(Self { to })
     }
 
@@ -42,12 +34,36 @@ impl<W: Write> Writer<W> {
     /// # Errors
     /// Those of the target.
     pub fn row(&mut self, time: f64, values: &[f64]) -> std::io::Result<()> {
-        write!(self.to, "{time:.16e}")?;
-        for value in values {
-            write!(self.to, ",{value:.16e}")?;
-        }
-        self.to.write_all(b"\n")
+        row(&mut self.to, time, values)
     }
+}
+
+/// Writes the header: the axis, `time` or what stands in its place, then the names.
+///
+/// # Errors
+/// Those of `to`.
+pub fn header(to: &mut impl Write, axis: &str, names: &[String]) -> std::io::Result<()> {
+    write!(to, "{axis}")?;
+    for name in names {
+        if name.contains([',', '"', '\n']) {
+            write!(to, ",\"{}\"", name.replace('"', "\"\""))?;
+        } else {
+            write!(to, ",{name}")?;
+        }
+    }
+    to.write_all(b"\n")
+}
+
+/// Writes one row: time (or what stands in its place), then the values.
+///
+/// # Errors
+/// Those of `to`.
+pub fn row(to: &mut impl Write, time: f64, values: &[f64]) -> std::io::Result<()> {
+    write!(to, "{time:.16e}")?;
+    for value in values {
+        write!(to, ",{value:.16e}")?;
+    }
+    to.write_all(b"\n")
 }
 
 /// Writes all rows.

@@ -11,8 +11,10 @@ use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 use super::{WaveformError, Waveforms};
 
 const FORMAT: &str = "npz";
+/// The archive's format has room for so many bytes.
+const LONGEST_COMMENT: usize = u16::MAX as usize;
 
-/// Writes one vector for `time` and one per name.
+/// Writes one vector for `time` and one per name; the title is the archive's comment.
 ///
 /// # Errors
 /// Those of `to`.
@@ -22,6 +24,13 @@ pub fn write(to: impl Write + Seek, waves: &Waveforms) -> std::io::Result<()> {
     for (j, name) in waves.names.iter().enumerate() {
         member(&mut archive, name, waves.column(j))?;
     }
+    let mut comment = String::new();
+    for c in waves.title.chars() {
+        if comment.len() + c.len_utf8() <= LONGEST_COMMENT {
+            comment.push(c);
+        }
+    }
+    archive.set_comment(comment)?;
     archive.finish()?.flush()
 }
 

@@ -13,29 +13,63 @@ const PLOT: &str = "Transient Analysis";
 /// Readers that know several dialects (spicelib) look for the word `ngspice` here.
 const COMMAND: &str = "circ, in the format of ngspice";
 
+/// Characters of the title's line for a word on what is missing, and of the number of rows: a header keeps its length when they change.
+const RESERVED: usize = 48;
+const DIGITS: usize = 20;
+
 /// Writes the header and all rows in binary.
 ///
 /// # Errors
 /// Those of `to`.
 pub fn write(mut to: impl Write, waves: &Waveforms) -> std::io::Result<()> {
-    let title = waves.title.replace(char::is_control, " ");
+    let columns = (&waves.names[..], &waves.units[..]);
+    header(&mut to, &waves.title, columns, waves.len() as u64, None)?;
+    for (k, time) in waves.time.iter().enumerate() {
+        row(&mut to, *time, waves.row(k))?;
+    }
+    Ok(())
+}
+
+/// Writes the header for so many rows of columns with these names and units. Headers that differ in the number of rows and in what
+/// is said to be `incomplete` alone are of one length, so that one can be written in the place of the other.
+///
+/// # Errors
+/// Those of `to`.
+pub fn header(
+    to: &mut impl Write,
+    title: &str,
+    (names, units): (&[String], &[&'static str]),
+    rows: u64,
+    incomplete: Option<&str>,
+) -> std::io::Result<()> {
+    let title = title.replace(char::is_control, " ");
+    let note: String = incomplete
+        .map_or(String::new(), |why| format!(" ({why})"))
+        .chars()
+        .filter(char::is_ascii)
+        .take(RESERVED)
+        .collect();
     write!(
         to,
-        "Title: {title}\nDate: \nCommand: {COMMAND}\nPlotname: {PLOT}\nFlags: real\nNo. Variables: {}\nNo. Points: {}\n\
-         Variables:\n\t0\ttime\ttime\n",
-        waves.width() + 1,
-        waves.len(),
+        "Title: {title}{note:RESERVED$}\nDate: \nCommand: {COMMAND}\nPlotname: {PLOT}\nFlags: real\nNo. Variables: {}\n\
+         No. Points: {rows:<DIGITS$}\nVariables:\n\t0\ttime\ttime\n",
+        names.len() + 1,
     )?;
-    for (j, (name, unit)) in waves.names.iter().zip(&waves.units).enumerate() {
+    for (j, (name, unit)) in names.iter().zip(units).enumerate() {
         let kind = if *unit == "A" { "current" } else { "voltage" };
         writeln!(to, "\t{}\t{name}\t{kind}", j + 1)?;
     }
-    to.write_all(b"Binary:\n")?;
-    for (k, time) in waves.time.iter().enumerate() {
-        to.write_all(&time.to_le_bytes())?;
-        for value in waves.row(k) {
-            to.write_all(&value.to_le_bytes())?;
-        }
+    to.write_all(b"Binary:\n")
+}
+
+/// Writes one row in binary.
+///
+/// # Errors
+/// Those of `to`.
+pub fn row(to: &mut impl Write, time: f64, values: &[f64]) -> std::io::Result<()> {
+    to.write_all(&time.to_le_bytes())?;
+    for value in values {
+        to.write_all(&value.to_le_bytes())?;
     }
     Ok(())
 }

@@ -1,1 +1,395 @@
-//! Rows, files and interruption.
+//! Rows, files and interruption, as users of the command meet them.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use circ::waveform::{Waveforms, csv, json, npz, raw};
+use tempfile::TempDir;
+
+/// `circ` in a folder that also holds `tests/findings/NAME.cir`.
+fn circ(folder: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_circ"));
+    command.current_dir(folder).stdin(Stdio::null());
+    command
+}
+
+fn place(netlists: &[&str]) -> TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in netlists {
+        let to = folder.path().join(name).with_extension("cir");
+        fs::copy(super::path(name), to).expect("a copy");
+    }
+    folder
+}
+
+fn ends(folder: &Path, arguments: &str) -> Output {
+    let arguments = arguments.split_whitespace();
+    circ(folder).args(arguments).output().expect("circ runs")
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// The names in a folder.
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).expect("a folder");
+    let name = |entry: fs::DirEntry| entry.file_name().to_string_lossy().into_owned();
+    let mut names: Vec<String> = entries
+        .map(|entry| name(entry.expect("an entry")))
+        .collect();
+    names.sort();
+    names
+}
+
+/// Sends a signal by the shell's `kill`.
+fn kill(child: &Child, signal: &str) {
+    let command = format!("kill -{signal} {}", child.id());
+    let sent = Command::new("sh").args(["-c", &command]).status();
+    assert!(sent.expect("a shell").success());
+}
+
+/// Waits until something holds, a minute at most.
+fn until(what: &str, holds: impl Fn() -> bool) {
+    let begin = Instant::now();
+    while !holds() {
+        assert!(begin.elapsed() < Duration::from_secs(60), "never {what}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+/// Bytes in the folder's files.
+fn bytes(folder: &Path) -> u64 {
+    let sizes = names(folder).into_iter();
+    sizes
+        .map(|name| fs::metadata(folder.join(name)).map_or(0, |m| m.len()))
+        .sum()
+}
+
+fn read_csv(path: &Path) -> Waveforms {
+    csv::read(fs::File::open(path).expect("a file")).expect("rows")
+}
+
+/// Largest memory of a process so far, kB.
+#[cfg(target_os = "linux")]
+fn peak_memory(child: &Child) -> u64 {
+    let status = fs::read_to_string(format!("/proc/{}/status", child.id())).expect("a process");
+    let line = status.lines().find(|line| line.starts_with("VmHWM"));
+    let words = line.expect("a size").split_whitespace();
+    words
+        .filter_map(|word| word.parse().ok())
+        .next()
+        .expect("kB")
+}
+
+/// A thousand million rows: none of them waits in memory, and Ctrl-C leaves whole files of those so far that say so.
+#[test]
+#[cfg(target_os = "linux")]
+fn rows_are_written_as_they_come_and_an_interrupted_run_keeps_them() {
+    let folder = place(&["rows_1e9"]);
+    let arguments = ["sim", "rows_1e9.cir", "-o", "a.csv", "-o", "a.raw"];
+    let mut command = circ(folder.path());
+    let child = command.args(arguments).stderr(Stdio::piped()).spawn();
+    let child = child.expect("circ runs");
+    until("a million bytes", || bytes(folder.path()) > 1_000_000);
+    let before = peak_memory(&child);
+    until("thirty million bytes", || bytes(folder.path()) > 30_000_000);
+    // 4e5 rows more would be 10 MB.
+    assert!(peak_memory(&child) < before + 2000, "{before} kB");
+    assert!(!folder.path().join("a.csv").exists());
+    kill(&child, "INT");
+    let output = child.wait_with_output().expect("an end");
+    assert_eq!(output.status.code(), Some(130));
+    let said = said(&output);
+    assert!(
+        said.contains("interrupted by SIGINT; the rows until "),
+        "{said}"
+    );
+    assert_eq!(names(folder.path()), ["a.csv", "a.raw", "rows_1e9.cir"]);
+    let text = read_csv(&folder.path().join("a.csv"));
+    let binary = fs::File::open(folder.path().join("a.raw")).expect("a file");
+    let binary = raw::read(binary).expect("rows");
+    assert!(text.len() > 100_000);
+    assert_eq!((&text.time, &text.values), (&binary.time, &binary.values));
+    let last = text.time[text.len() - 1];
+    assert!(said.contains(&format!("until {last:e} s")), "{said}");
+    let title = format!("ten to the nine rows (incomplete: ends at {last:e} s)");
+    assert_eq!(binary.title, title);
+}
+
+/// What needs all rows at once is refused with their number before anything is done.
+#[test]
+fn rows_that_do_not_fit_are_refused_with_their_number() {
+    let folder = place(&["rows_1e9"]);
+    for format in ["npz", "json", "svg", "html"] {
+        let output = ends(folder.path(), &format!("sim rows_1e9.cir -o b.{format}"));
+        assert_eq!(output.status.code(), Some(2));
+        let said = said(&output);
+        assert!(
+            said.contains("1.000000001e9 rows of 3 values are 24.000 GB, more than the 1.074 GB"),
+            "{said}"
+        );
+    }
+    let text = fs::read_to_string(folder.path().join("rows_1e9.cir")).expect("a netlist");
+    let measured = text.replace(".end", ".meas tran top max v(a)\n.end");
+    let dense = text.replace(".tran 1n 1", ".tran 1e-30 1e30");
+    fs::write(folder.path().join("measured.cir"), measured).expect("a netlist");
+    fs::write(folder.path().join("dense.cir"), dense).expect("a netlist");
+    let output = ends(folder.path(), "sim measured.cir -o b.csv");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        said(&output).contains("e9 rows of 3 values"),
+        "{}",
+        said(&output)
+    );
+    let output = ends(folder.path(), "sim dense.cir -o b.csv");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        said(&output).contains("1e60 rows from 0e0 s"),
+        "{}",
+        said(&output)
+    );
+    assert_eq!(
+        names(folder.path()),
+        ["dense.cir", "measured.cir", "rows_1e9.cir"]
+    );
+}
+
+/// SIGTERM in the middle of one print step of very many steps; the rows before are in the pipe and in each file.
+#[test]
+#[cfg(unix)]
+fn a_run_ends_at_once_and_keeps_its_rows_in_every_format() {
+    let folder = place(&[]);
+    let path = folder.path();
+    let slow = "one long step\nv1 a 0 sin(0 1 1k)\nl1 a b 1m\nd1 b c dd\nr1 c 0 1\n.model dd d(ideal)\n\
+        .tran 2000 2000\n.end\n";
+    fs::write(path.join("slow.cir"), slow).expect("a netlist");
+    for method in ["exact", "theta --step 1u"] {
+        for outputs in ["", "-o a.csv -o a.raw -o a.npz -o a.json -o a.html"] {
+            let arguments = format!("sim slow.cir --method {method} {outputs}");
+            let mut command = circ(path);
+            command.args(arguments.split_whitespace());
+            let child = command
+                .stdout(Stdio::piped())
+                .stderr(Stdio::piped())
+                .spawn();
+            let child = child.expect("circ runs");
+            std::thread::sleep(Duration::from_millis(400));
+            kill(&child, "TERM");
+            let output = child.wait_with_output().expect("an end");
+            assert_eq!(output.status.code(), Some(143), "{}", said(&output));
+            assert!(said(&output).contains("interrupted by SIGTERM"));
+            if outputs.is_empty() {
+                let rows = String::from_utf8_lossy(&output.stdout).into_owned();
+                assert_eq!(rows.lines().count(), 2, "{rows}");
+                continue;
+            }
+            let file = |name: &str| fs::File::open(path.join(name)).expect("a file");
+            let rows = read_csv(&path.join("a.csv"));
+            let others = [
+                raw::read(file("a.raw")).expect("rows"),
+                npz::read(file("a.npz")).expect("rows"),
+                json::read(file("a.json")).expect("rows"),
+            ];
+            for other in &others {
+                assert_eq!((&other.time, &other.values), (&rows.time, &rows.values));
+            }
+            let note = "one long step (incomplete: ends at 0e0 s)";
+            assert_eq!([&others[0].title, &others[2].title], [note, note]);
+            let page = fs::read_to_string(path.join("a.html")).expect("a page");
+            assert!(page.contains("incomplete"));
+        }
+    }
+}
+
+/// Whatever it is called, a file that the run reads is not written.
+#[test]
+#[cfg(unix)]
+fn files_that_are_read_are_not_overwritten() {
+    use std::os::unix::fs::symlink;
+    let folder = place(&[]);
+    let path = folder.path();
+    let netlist =
+        "reads files\n.include part.inc.csv\nv1 a 0 pwl file=stim.csv\n.tran 1m 10m\n.end\n";
+    let files = [
+        ("net.cir.csv", netlist),
+        ("part.inc.csv", "r1 a 0 1k\n"),
+        ("stim.csv", "0,0\n10m,1\n"),
+    ];
+    for (name, text) in files {
+        fs::write(path.join(name), text).expect("a file");
+    }
+    symlink("stim.csv", path.join("link.csv")).expect("a link");
+    fs::hard_link(path.join("stim.csv"), path.join("hard.csv")).expect("a link");
+    let outputs = [
+        "stim.csv",
+        "./stim.csv",
+        "link.csv",
+        "hard.csv",
+        "part.inc.csv",
+        "net.cir.csv",
+    ];
+    for output in outputs {
+        let ended = ends(path, &format!("sim net.cir.csv -o good.csv -o {output}"));
+        assert_eq!(ended.status.code(), Some(2), "{output}");
+        assert!(
+            said(&ended).contains("would be overwritten"),
+            "{}",
+            said(&ended)
+        );
+        let ended = ends(path, &format!("lcs net.cir.csv -o {output}"));
+        assert_eq!(ended.status.code(), Some(2), "{output}");
+        assert!(!path.join("good.csv").exists());
+    }
+    for (name, text) in files {
+        assert_eq!(fs::read_to_string(path.join(name)).expect("a file"), text);
+    }
+    let ended = ends(path, "sim net.cir.csv -o good.csv");
+    assert_eq!(ended.status.code(), Some(0), "{}", said(&ended));
+    assert_eq!(read_csv(&path.join("good.csv")).len(), 11);
+}
+
+/// A run that fails keeps an earlier result of the same name until it has something itself, and says that it is not whole.
+#[test]
+fn a_run_that_fails_says_which_rows_it_leaves() {
+    let folder = place(&[]);
+    let path = folder.path();
+    let netlist =
+        "fails\ni1 0 a pwl(0 -1 2m 1)\nd1 0 a di\n.model di d(ideal)\n.tran 0.5m 2m\n.end\n";
+    fs::write(path.join("net.cir"), netlist).expect("a netlist");
+    fs::write(path.join("out.csv"), "of an earlier run").expect("a file");
+    let ended = ends(path, "sim net.cir -o nowhere/out.csv -o out.csv");
+    assert_eq!(ended.status.code(), Some(2));
+    assert_eq!(
+        fs::read_to_string(path.join("out.csv")).expect("a file"),
+        "of an earlier run"
+    );
+    let ended = ends(path, "sim net.cir -o out.csv -o out.json");
+    assert_eq!(ended.status.code(), Some(2));
+    let rows = read_csv(&path.join("out.csv"));
+    assert_eq!(rows.time, [0.0, 0.5e-3, 1e-3]);
+    assert!(
+        said(&ended).contains("; the rows until 1e-3 s are in out.csv, out.json"),
+        "{}",
+        said(&ended)
+    );
+    let rows = json::read(fs::File::open(path.join("out.json")).expect("a file")).expect("rows");
+    assert_eq!(rows.title, "fails (incomplete: ends at 1e-3 s)");
+    assert_eq!(names(path), ["net.cir", "out.csv", "out.json"]);
+}
+
+/// A full disk and a reader that goes away end a run at once; the first is a failure.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_and_a_closed_pipe_end_the_run() {
+    let folder = place(&["rows_1e9"]);
+    let full = fs::OpenOptions::new().write(true).open("/dev/full");
+    let mut command = circ(folder.path());
+    let arguments = ["sim", "rows_1e9.cir"];
+    let output = command
+        .args(arguments)
+        .stdout(full.expect("a device"))
+        .output();
+    let output = output.expect("circ runs");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        said(&output).contains("No space left on device"),
+        "{}",
+        said(&output)
+    );
+    let mut command = circ(folder.path());
+    let child = command
+        .args(arguments)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn();
+    let mut child = child.expect("circ runs");
+    drop(child.stdout.take());
+    let output = child.wait_with_output().expect("an end");
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    assert_eq!(said(&output), "");
+}
+
+/// Two rows a period without a print step: the ripple of the current stands in the rows at edges and events.
+#[test]
+fn rows_stand_at_events_and_corners_where_no_print_step_is_named() {
+    let right = 4.1417;
+    let folder = place(&["aliased_rows"]);
+    for method in ["exact", "theta"] {
+        let arguments = format!("sim aliased_rows.cir -o a.csv --method {method}");
+        let ended = ends(folder.path(), &arguments);
+        assert_eq!(ended.status.code(), Some(0), "{}", said(&ended));
+        let rows = read_csv(&folder.path().join("a.csv"));
+        let current = rows.find("i(l1)").expect("a current");
+        let late = rows
+            .time
+            .iter()
+            .zip(rows.column(current))
+            .filter(|(t, _)| **t >= 4.9e-3);
+        let (low, high) = late.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (_, i)| {
+            (low.min(i), high.max(i))
+        });
+        assert!(
+            (high - low - right).abs() < 1e-3,
+            "{method}: {}",
+            high - low
+        );
+        assert!(
+            said(&ended).contains("ipp                 =  4.14169"),
+            "{}",
+            said(&ended)
+        );
+        // The grid of 1,000 steps is among them.
+        for k in 0..=1000 {
+            let t = f64::from(k) * 5e-6;
+            assert!(rows.time.iter().any(|row| (row - t).abs() < 1e-15), "{t}");
+        }
+    }
+}
+
+/// Corners of a source, jumps and events: rows without a print step, in pictures with one, and not in files with one.
+#[test]
+fn corners_jumps_and_events_have_rows() {
+    let netlist = "corners\nv1 a 0 pwl(0 0 1.2345m 1 2.3456m 1 2.3456m -1 3m -1)\nr1 a b 1k\nd1 b 0 di\n\
+        .model di d(ideal)\n.save v(a) i(d1)\nTRAN\n.end\n";
+    let folder = place(&[]);
+    let path = folder.path();
+    let rows_of = |tran: &str, options: &str| {
+        fs::write(path.join("net.cir"), netlist.replace("TRAN", tran)).expect("a netlist");
+        let ended = ends(path, &format!("sim net.cir -o a.csv -o a.svg {options}"));
+        assert_eq!(ended.status.code(), Some(0), "{}", said(&ended));
+        (
+            read_csv(&path.join("a.csv")),
+            fs::read_to_string(path.join("a.svg")).expect("a picture"),
+        )
+    };
+    for method in ["exact", "theta"] {
+        let method = format!("--method {method}");
+        let (own, _) = rows_of(".tran 3m", &method);
+        assert_eq!(own.time.len(), 1001 + 1 + 2, "{method}");
+        let at = |t: f64| -> Vec<f64> {
+            let rows = own.time.iter().zip(own.column(0));
+            rows.filter(|(row, _)| **row == t).map(|(_, v)| v).collect()
+        };
+        assert_eq!(at(1.2345e-3), [1.0], "{method}");
+        assert_eq!(at(2.3456e-3), [1.0, -1.0], "{method}");
+        let (coarse, drawn) = rows_of(".tran 1m 3m", &method);
+        assert_eq!(coarse.time, [0.0, 1e-3, 2e-3, 3e-3]);
+        // Four rows of the grid, the corner, the jump.
+        let curves = drawn.split("<polyline").skip(1);
+        let points = curves.map(|curve| {
+            let (_, points) = curve.split_once("points=\"").expect("points");
+            let (points, _) = points.split_once('"').expect("points");
+            points.split_whitespace().count()
+        });
+        assert_eq!(points.max(), Some(7), "{method}");
+        let (events, _) = rows_of(".tran 1m 3m", &format!("{method} --events"));
+        assert_eq!(
+            events.time,
+            [0.0, 1e-3, 2e-3, 2.3456e-3, 2.3456e-3, 3e-3],
+            "{method}"
+        );
+    }
+}

@@ -109,6 +109,7 @@ mod tests {
     fn ladders_halve_the_print_step_and_stay_affordable() {
         let tran = Tran {
             tstep: 1e-6,
+            prints: true,
             tstop: 0.1,
             tstart: 0.0,
             tmax: None,

@@ -4,7 +4,7 @@ mod against;
 mod ladder;
 mod order;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -12,6 +12,7 @@ use self::ladder::{Rung, rungs};
 use self::order::orders;
 use super::args::BenchArgs;
 use super::exit::{Exit, Failure};
+use super::files;
 use super::input::{self, Subject};
 use super::output;
 use super::sim::{self, Request};
@@ -41,7 +42,13 @@ pub(super) fn bench(args: &BenchArgs, streams: &Streams) -> Result<Exit, Failure
     {
         return Err(output::unknown_ending(path, "csv"));
     }
-    let (subject, _) = input::open(&args.input, &[], streams)?;
+    let outputs: Vec<&Path> = args
+        .outputs
+        .iter()
+        .chain(&args.signals)
+        .map(PathBuf::as_path)
+        .collect();
+    let (subject, _) = input::open(&args.input, &[], &outputs, streams)?;
     let file = &args.input.file;
     let tran = sim::tran(&subject).ok_or_else(|| {
         Failure::Message(format!(
@@ -217,19 +224,19 @@ fn report(
     let orders = orders(measurements);
     for path in &args.outputs {
         match ending(path)?.as_str() {
-            "csv" => output::bytes_to_file(path, work::csv(measurements).as_bytes())?,
+            "csv" => files::write(path, work::csv(measurements).as_bytes())?,
             "json" => {
                 let document = Document {
                     measurements,
                     orders: &orders,
                 };
-                output::bytes_to_file(path, (json::line(&document) + "\n").as_bytes())?;
+                files::write(path, (json::line(&document) + "\n").as_bytes())?;
             }
             _ => output::picture_to_file(path, &work::draw(measurements)?)?,
         }
     }
     if let Some(path) = &args.signals {
-        output::bytes_to_file(path, work::signals_csv(measurements).as_bytes())?;
+        files::write(path, work::signals_csv(measurements).as_bytes())?;
     }
     let table = work::text(measurements, &orders);
     if !args.outputs.is_empty() {

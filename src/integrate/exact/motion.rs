@@ -37,8 +37,8 @@ pub(crate) enum Arrival {
     Fired(usize),
     /// The flow left the range of doubles.
     Overflow,
-    /// More steps than allowed.
-    Exhausted,
+    /// On the way, after as many steps as allowed at a time.
+    Resting,
 }
 
 /// What the guards say about a step.
@@ -60,8 +60,8 @@ pub(crate) struct Motion {
     pub(crate) entered: f64,
     /// Steps taken.
     pub(crate) steps: u64,
-    /// Steps allowed.
-    most: u64,
+    /// [`Self::travel`] rests here.
+    pub(crate) most: u64,
     /// Energy from sources and energy dissipated on Taylor's steps since last taken, J.
     energy: [f64; 2],
     spans: Spans,
@@ -88,11 +88,10 @@ pub(crate) struct Motion {
 
 impl Motion {
     /// A motion that stands at `t` in no mode yet.
-    pub(crate) fn at(t: f64, most: u64) -> Self {
+    pub(crate) fn at(t: f64) -> Self {
         Self {
             t,
             entered: t,
-            most,
             ..Self::default()
         }
     }
@@ -342,7 +341,7 @@ impl Motion {
         let (mut needed, mut barrier) = (0_u32, f64::INFINITY);
         while units > 0 {
             if self.steps > self.most {
-                return Arrival::Exhausted;
+                return Arrival::Resting;
             }
             let limit = flow.step_limit(self.t - self.entered);
             let aligned = bottom - units.trailing_zeros().min(bottom);

@@ -26,6 +26,9 @@ use crate::settings::Settings;
 /// Times closer than this many units in the last place are one time.
 pub(super) const SAME_TIME_ULPS: f64 = 4.0;
 
+/// Steps after which a run asks whether it may go on.
+const REST: u64 = 1 << 12;
+
 /// What a run of the exact integrator starts from.
 pub struct Setup<'a> {
     /// The circuit.
@@ -82,6 +85,8 @@ pub struct Exact<'a> {
     next_piece: f64,
     /// The next time at which something is known to happen, s.
     next_stop: f64,
+    /// A piece ended when the mode was last left.
+    pub(super) corner: bool,
     pub(super) settings: Settings,
     pub(super) energy: bool,
     pub(super) balance: Balance,
@@ -165,7 +170,7 @@ impl<'a> Exact<'a> {
             plant,
             sources,
             exosystem,
-            motion: Motion::at(t, settings.max_steps),
+            motion: Motion::at(t),
             inspector: Inspector::default(),
             mode: None,
             key,
@@ -185,6 +190,7 @@ impl<'a> Exact<'a> {
             started: false,
             next_piece: f64::NEG_INFINITY,
             next_stop: f64::NEG_INFINITY,
+            corner: false,
             settings,
             energy,
             balance: Balance::new(stored),
@@ -284,8 +290,8 @@ impl<'a> Exact<'a> {
         }
         self.take_storage();
         let known = self.next_stop <= near;
-        let corner = self.next_piece <= near;
-        let mut discontinuous = corner && self.take_pieces(near)?;
+        self.corner = self.next_piece <= near;
+        let mut discontinuous = self.corner && self.take_pieces(near)?;
         self.exosystem.write(t, &mut self.z);
         let mut key = std::mem::take(&mut self.key);
         if known {
@@ -294,7 +300,7 @@ impl<'a> Exact<'a> {
         if discontinuous {
             key.sliding.clear();
         }
-        discontinuous |= self.move_guarded(&mut key, fired, corner);
+        discontinuous |= self.move_guarded(&mut key, fired, self.corner);
         fire(&self.plant.thresholds, &mut key.switches);
         let trigger = fired.map_or(Trigger::Sources, Trigger::Guard);
         self.change(key, discontinuous, trigger, log)
@@ -451,6 +457,7 @@ impl Stepper for Exact<'_> {
             if (!due && t <= self.motion.t) || self.step_ahead(at, t, next) {
                 return Ok(());
             }
+            self.motion.most = self.settings.max_steps.min(self.motion.steps + REST);
             match self
                 .motion
                 .travel(&mut self.plant.modes[at].flow, &self.exosystem, stop)
@@ -466,9 +473,10 @@ impl Stepper for Exact<'_> {
                     }
                 }
                 Arrival::Overflow => return Err(self.fail(Reason::Overflow)),
-                // Told below.
-                Arrival::Exhausted => {}
+                // Asked below whether to go on.
+                Arrival::Resting => {}
             }
+            log.go_on(self.motion.t)?;
             if self.motion.steps > self.settings.max_steps {
                 return Err(self.fail(Reason::TooManySteps {
                     limit: self.settings.max_steps,

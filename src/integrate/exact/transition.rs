@@ -215,6 +215,8 @@ impl Exact<'_> {
             }
             if jumped || !same {
                 log.row(t, &self.row);
+            } else if self.corner {
+                log.corner(t, &self.row);
             }
         }
     }

@@ -28,16 +28,14 @@ impl Theta<'_> {
         let mut u = self.now.u.clone();
         self.inputs.right(t, &mut u);
         if u == self.now.u {
+            if log.wants_corners() {
+                let row = self.row();
+                log.corner(self.now.t, &row);
+            }
             return self.break_waves();
         }
         let rows = log.wants_rows();
-        let before = if rows {
-            let mut row = vec![0.0; self.system().lcs.outputs.names.len()];
-            self.read_point(&mut row);
-            Some(row)
-        } else {
-            None
-        };
+        let before = rows.then(|| self.row());
         let old = std::mem::replace(&mut self.now.u, u);
         if let Some(row) = &before {
             log.row(self.now.t, row);

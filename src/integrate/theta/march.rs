@@ -32,6 +32,7 @@ impl Theta<'_> {
             } else {
                 t0 + span * (k as f64 / count)
             };
+            log.go_on(self.now.t)?;
             if simple {
                 let h = self.fixed_step(h, t1)?;
                 let changed = self.attempt.solved.is_some();
@@ -113,6 +114,7 @@ impl Theta<'_> {
         let start = self.now.t;
         let mut done = 0;
         while done < WHOLE {
+            log.go_on(self.now.t)?;
             let wanted = (base / self.preferred)
                 .log2()
                 .ceil()
@@ -343,9 +345,15 @@ impl Theta<'_> {
     }
 
     pub(super) fn log_row(&mut self, log: &mut Log) {
-        let mut row = vec![0.0; self.system().lcs.outputs.names.len()];
-        self.read(&mut row);
+        let row = self.row();
         log.row(self.now.t, &row);
+    }
+
+    /// Probe values at the present.
+    pub(super) fn row(&mut self) -> Vec<f64> {
+        let mut row = vec![0.0; self.system().lcs.outputs.names.len()];
+        self.read_point(&mut row);
+        row
     }
 
     /// Whether the attempted step of a network that may jump by itself contains an impulse: p = hλ is compared with that

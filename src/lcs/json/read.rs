@@ -173,6 +173,7 @@ pub fn read(text: &str) -> Result<SystemFile, JsonError> {
         Some(t) if t.tstep > 0.0 && t.tstop > 0.0 && t.tstep.is_finite() && t.tstop.is_finite() => {
             Some(Tran {
                 tstep: t.tstep,
+                prints: true,
                 tstop: t.tstop,
                 tstart: t.tstart.unwrap_or(0.0),
                 tmax: t.tmax,
