@@ -105,3 +105,11 @@ fn what_is_recorded_changes_nothing_where_a_kink_and_an_edge_coincide() {
         assert!(difference(&without, &stepped, probe) < 1e-3, "{probe}");
     }
 }
+
+#[test]
+fn a_hysteretic_switch_that_slides_is_a_choice_and_says_so() {
+    let sliding = run("hysteretic_switch_slides", Method::Exact);
+    let told =
+        |n: &String| n.contains("s0 slides between its thresholds") && n.contains("a choice");
+    assert!(sliding.notes.iter().any(told), "{:?}", sliding.notes);
+}

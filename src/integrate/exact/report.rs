@@ -141,17 +141,24 @@ impl Exact<'_> {
         for (&i, slides) in &self.slides {
             let seconds = slides.seconds + slides.since.map_or(0.0, |since| self.motion.t - since);
             let what = match thresholds.get(i) {
+                Some(switch) if switch.is_sharp() => format!(
+                    "{} slides on its threshold, where closing and opening contradict each other. What is shown is the limit of \
+                     ever faster switching; a delay that the circuit leaves out can make another mean",
+                    switch.name
+                ),
                 Some(switch) => format!(
-                    "{} slides on its threshold, where closing and opening contradict each other",
+                    "{} slides between its thresholds: closing and opening contradict each other at once, hysteresis or not. The \
+                     middle of the band is a choice; a delay or a capacitance that the circuit leaves out decides",
                     switch.name
                 ),
                 None => format!(
-                    "{} slides: its input stays where its output jumps, and the output is in between",
+                    "{} slides: its input stays where its output jumps, and the output is in between. What is shown is the limit of \
+                     ever faster switching; a delay that the circuit leaves out can make another mean",
                     self.plant.steps()[i - thresholds.len()].device
                 ),
             };
             self.notes.push(format!(
-                "{what}: {} times, first at t = {:e} s, {seconds:e} s in all",
+                "{what} ({} times, first at t = {:e} s, {seconds:e} s in all)",
                 slides.count, slides.first
             ));
         }
