@@ -113,3 +113,16 @@ fn a_hysteretic_switch_that_slides_is_a_choice_and_says_so() {
         |n: &String| n.contains("s0 slides between its thresholds") && n.contains("a choice");
     assert!(sliding.notes.iter().any(told), "{:?}", sliding.notes);
 }
+
+#[test]
+fn a_pair_of_switches_moves_together_on_a_steep_edge() {
+    // The saw tooth returns at 10⁸ V/s: the rounding of the time is more than that of the control.
+    let name = "sync_boost_sawtooth";
+    let ideal = changed(name, &[], Method::Exact);
+    assert_eq!(ideal.stats.jumps, 0);
+    let real = changed(name, &[("SW(ideal", "SW(Ron=1u Roff=1g")], Method::Exact);
+    for probe in ["v(o)", "i(l1)"] {
+        let distance = difference(&ideal, &real, probe);
+        assert!(distance < 1e-4, "{probe}: {distance}");
+    }
+}

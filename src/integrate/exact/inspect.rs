@@ -18,6 +18,11 @@ const USES: u32 = 64;
 /// Derivatives looked at: g, g', g'', g'''.
 const ORDERS: usize = 4;
 
+/// What event times near t are known to, s.
+pub(super) fn resolution(t: f64) -> f64 {
+    TIME_ULPS * f64::EPSILON * t.abs()
+}
+
 /// What was found.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Finding {
@@ -124,7 +129,7 @@ impl Inspector {
     ) -> Finding {
         self.stand(mode, z, s);
         // What the sources move within the resolution of t: at 1 V/ps that is a millivolt where t is a second.
-        let time = TIME_ULPS * f64::EPSILON * t.abs();
+        let time = resolution(t);
         if !mode.keeps {
             mode.storage.values(&self.w, &mut self.s);
             if mode.driven {
@@ -214,7 +219,7 @@ impl Inspector {
     /// says what an error of the time does to it; but one that the next turns around before the guard has left its rounding
     /// decides nothing. A guard at rest on zero stays, but for that of a switch which is off there.
     pub(crate) fn leaves(&self, mode: &Mode, i: usize, t: f64) -> bool {
-        let time = TIME_ULPS * f64::EPSILON * t.abs();
+        let time = resolution(t);
         let m = mode.flow.guards();
         let dot = |k: usize| (self.jets[k * m + i], self.jet_sizes[k * m + i]);
         let (mut next, mut floor) = (dot(0), 0.0);

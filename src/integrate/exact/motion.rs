@@ -2,7 +2,7 @@
 
 use super::exosystem::Exosystem;
 use super::flow::{Flow, LONG, Way};
-use super::inspect::{Familiar, SIMULTANEOUS};
+use super::inspect::{Familiar, SIMULTANEOUS, resolution};
 use super::polynomial;
 use super::series::Series;
 use super::spans::Spans;
@@ -152,9 +152,11 @@ impl Motion {
         self.since_refresh = 0;
     }
 
-    /// Whether a guard stands at zero, as far as rounding tells simultaneous events apart.
+    /// Whether a guard stands at zero, as far as its rounding and that of the time tell simultaneous events apart.
     pub(crate) fn is_at_zero(&self, flow: &Flow, guard: usize) -> bool {
-        self.now[flow.dim() + guard] <= SIMULTANEOUS * self.floors[guard]
+        let [value, slope] = [guard, flow.guards() + guard].map(|at| self.now[flow.dim() + at]);
+        let noise = SIMULTANEOUS * self.floors[guard] + resolution(self.t) * slope.abs();
+        value <= noise
     }
 
     /// How large w can have been on the way here: the state, the sources.
