@@ -43,6 +43,8 @@ pub struct JumpProblem {
     /// The unit of z, which brings the jump matrix near 1 (time has no scale in a jump).
     sigma: f64,
     driver: Driver,
+    /// k×k: NᵀCBN, scaled.
+    coupling: DMatrix<f64>,
     /// Whether D + Dᵀ and the jump matrix NᵀCBN are positive semidefinite, as for every passive network. If not, the jump is
     /// not given by this problem.
     pub monotone: bool,
@@ -59,6 +61,29 @@ pub struct Jump {
     pub x: DVector<f64>,
     /// m: impulses of λ, in units of λ times s.
     pub p: DVector<f64>,
+    /// Ports that compete for the jump, see [`JumpProblem::rivals`]; empty where the jump is the limit of all resistances.
+    pub rivals: Vec<usize>,
+}
+
+impl Jump {
+    /// What a user should know of a jump at t between [`rivals`](Self::rivals).
+    #[must_use]
+    pub fn note(&self, lcs: &Lcs, t: f64) -> Option<String> {
+        let mut names: Vec<&str> = Vec::new();
+        for &port in &self.rivals {
+            let name = lcs.ports[port].device.as_str();
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        (!names.is_empty()).then(|| {
+            format!(
+                "at t = {t:e} s {} compete for an impulse: how they share it depends on the ratios of the resistances that the ideal \
+                 model leaves out; the state that least energy separates from the one before is shown",
+                names.join(", ")
+            )
+        })
+    }
 }
 
 /// Changes below this, relative to the quantities they are computed from, are rounding and no jump.
@@ -108,9 +133,10 @@ impl JumpProblem {
         let h = basis.transpose() * &cb * &basis;
         let size = h.amax();
         let sigma = if size > 0.0 { 1.0 / size } else { 1.0 };
+        let coupling = h * sigma;
         let rows = v.nrows();
         let mut matrix = DMatrix::zeros(k + rows, k + rows);
-        matrix.view_mut((0, 0), (k, k)).copy_from(&(h * sigma));
+        matrix.view_mut((0, 0), (k, k)).copy_from(&coupling);
         matrix
             .view_mut((0, k), (k, rows))
             .copy_from(&-v.transpose());
@@ -121,6 +147,7 @@ impl JumpProblem {
             basis,
             sigma,
             driver,
+            coupling,
             monotone,
             bounds: bounds(lcs, &ends),
             units: scaling.d,
@@ -144,7 +171,7 @@ impl JumpProblem {
         }
         let solution = self
             .driver
-            .solve(&right.resize_vertically(self.driver.size(), 0.0));
+            .solve(&right.clone().resize_vertically(self.driver.size(), 0.0));
         let worst = match &solution.status {
             Status::Solved => None,
             Status::Infeasible(ray) => Some(ray.clone()),
@@ -162,7 +189,33 @@ impl JumpProblem {
         if !(0..x.len()).any(moved) || self.is_rounding(lcs, x, u, &p) {
             return Ok(None);
         }
-        Ok(Some(Jump { x: x + change, p }))
+        let z: Vec<f64> = z.iter().copied().collect();
+        Ok(Some(Jump {
+            x: x + change,
+            p,
+            rivals: self.rivals(&z, &right),
+        }))
+    }
+
+    /// The ports between which a limit of vanishing resistances would depend on the ratios of these. With resistances an impulse
+    /// only grows, ż_i = max(0, −(Hz + q)_i)/R_i with H = NᵀCBN. Where H_ij ≤ 0 between all z that move, every z ends at the least
+    /// solution of the complementarity problem, whatever the R. Where H_ij > 0, what i conducts takes from j, and the first may have
+    /// conducted more than the projection says.
+    fn rivals(&self, z: &[f64], q: &DVector<f64>) -> Vec<usize> {
+        /// In parts of √(H_ii H_jj), and of the largest z and q.
+        const ROUNDING: f64 = 1e-9;
+        let h = &self.coupling;
+        let largest = z.iter().fold(0.0_f64, |a, z| a.max(*z));
+        let moves = |i: &usize| z[*i] > ROUNDING * largest || q[*i] < -ROUNDING * q.amax();
+        let moving: Vec<usize> = (0..z.len()).filter(moves).collect();
+        let competes = |&i: &usize| {
+            let with =
+                |&j: &usize| i != j && h[(i, j)] > ROUNDING * (h[(i, i)] * h[(j, j)]).abs().sqrt();
+            moving.iter().any(with)
+        };
+        let competing: Vec<usize> = moving.iter().copied().filter(competes).collect();
+        let carries = |&port: &usize| competing.iter().any(|&i| self.basis[(port, i)] != 0.0);
+        (0..self.basis.nrows()).filter(carries).collect()
     }
 
     /// Whether no device has an impulse of voltage across it in its forward direction: it would take a current before.

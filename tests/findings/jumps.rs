@@ -126,3 +126,39 @@ fn a_pair_of_switches_moves_together_on_a_steep_edge() {
         assert!(distance < 1e-4, "{probe}: {distance}");
     }
 }
+
+#[test]
+fn diodes_that_compete_for_an_impulse_are_named_and_a_ladder_of_them_is_not() {
+    let resistive = |name: &str, first: &str, second: &str| {
+        let models = format!(".model d1 D(ron={first})\n.model d2 D(ron={second})");
+        let (from, to) = match name {
+            "rival_diodes" => ("D2 b d di", "D2 b d d2"),
+            _ => ("D2 c d di", "D2 c d d2"),
+        };
+        let replacements = [
+            ("D1 b c di", "D1 b c d1"),
+            (from, to),
+            (".model di D(ideal)", models.as_str()),
+            ("SW(ideal", "SW(ron=1u"),
+            ("10u uic", "200u uic"),
+        ];
+        at(&changed(name, &replacements, Method::Exact), "v(d)", 200e-6)
+    };
+    let told = |run: &Run| {
+        run.notes
+            .iter()
+            .any(|n| n.contains("d1, d2 compete for an impulse"))
+    };
+    for method in [Method::Exact, Method::Theta] {
+        assert!(told(&run("rival_diodes", method)));
+        let ladder = run("diode_ladder", method);
+        assert!(!told(&ladder));
+        assert!((at(&ladder, "v(d)", 10e-6) - 2.5).abs() < 1e-9);
+    }
+    // The note is true: ratios of resistances decide there, and do not on the ladder.
+    for (first, second) in [("1m", "1m"), ("1", "1m"), ("1m", "1")] {
+        assert!((resistive("diode_ladder", first, second) - 2.5).abs() < 1e-6);
+    }
+    assert!(resistive("rival_diodes", "1m", "1") < 4.4);
+    assert!(resistive("rival_diodes", "1", "1m") > 5.9);
+}

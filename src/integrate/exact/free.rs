@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::diagnostic::Internal;
 use crate::integrate::jump::{Infeasible, Jump, JumpProblem};
 use crate::lcs::{Lcs, Role};
 use crate::solve::{Driver, Status, norm};
@@ -76,6 +77,12 @@ impl Free {
             Some(problem) if problem.monotone => problem.solve(&self.lcs, x, u),
             _ => Ok(None),
         }
+    }
+
+    /// See [`JumpProblem::verify`].
+    pub(crate) fn verify(&self, p: &DVector<f64>) -> Result<(), Internal> {
+        let problem = self.jump.as_ref();
+        problem.map_or(Ok(()), |problem| problem.verify(&self.lcs, p))
     }
 
     /// Which pairs conduct during one implicit step of length `h` from x to inputs `u`: the candidate for the next mode.

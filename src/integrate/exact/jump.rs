@@ -7,7 +7,7 @@ use super::mode::Key;
 use super::stepper::Exact;
 use super::transition::PROPOSALS;
 use crate::integrate::energy;
-use crate::integrate::run::{Log, SimError};
+use crate::integrate::run::{Log, Reason, SimError};
 
 /// Movements of the storage below this part of its amplitude are rounding and no jump.
 const ROUNDING: f64 = 1e-12;
@@ -26,7 +26,18 @@ impl Exact<'_> {
         self.lcp_solves += u64::from(free.lcs.m() > 0);
         // Where the projection finds nothing admissible, jumps into proposed modes are tried.
         let (after, p) = match free.jump(&x, &u) {
-            Ok(Some(jump)) => (jump.x, jump.p),
+            Ok(Some(jump)) => {
+                let checked = free.verify(&jump.p);
+                let checked = checked.map_err(|broken| SimError::at(t, Reason::Internal(broken)));
+                checked?;
+                if !self.noted_rivals
+                    && let Some(note) = jump.note(&free.lcs, t)
+                {
+                    self.noted_rivals = true;
+                    self.notes.push(note);
+                }
+                (jump.x, jump.p)
+            }
             Ok(None) | Err(_) => (x.clone(), DVector::zeros(free.lcs.m())),
         };
         self.leap(key, &x, &after, &p, log)

@@ -96,6 +96,8 @@ pub struct Exact<'a> {
     pub(super) notes: Vec<String>,
     pub(super) accumulation: Accumulation,
     pub(super) noted_shared: bool,
+    /// Whether a jump between rivals has been noted.
+    pub(super) noted_rivals: bool,
     /// By switch, then by step of a function block: when it slid.
     pub(super) slides: BTreeMap<usize, Slides>,
     pub(super) row: Vec<f64>,
@@ -200,6 +202,7 @@ impl<'a> Exact<'a> {
             notes: Vec::new(),
             accumulation: Accumulation::new(t),
             noted_shared: false,
+            noted_rivals: false,
             slides: BTreeMap::new(),
             row: vec![0.0; columns],
             row_is_volts: lcs.outputs.units.iter().map(|u| *u == "V").collect(),

@@ -66,6 +66,12 @@ impl Theta<'_> {
                 if let Some(jump) = &found {
                     let checked = problem.verify(lcs, &jump.p);
                     checked.map_err(|broken| SimError::at(t, Reason::Internal(broken)))?;
+                    if !self.noted_rivals
+                        && let Some(note) = jump.note(lcs, t)
+                    {
+                        self.noted_rivals = true;
+                        self.notes.push(note);
+                    }
                 }
                 found
             }
@@ -111,7 +117,11 @@ impl Theta<'_> {
         }
         let p = half * 2.0 - whole;
         let x = DVector::from_column_slice(&self.now.x) + &self.system().lcs.b * &p;
-        Ok(Some(Jump { x, p }))
+        Ok(Some(Jump {
+            x,
+            p,
+            rivals: vec![],
+        }))
     }
 
     /// Impulses of the ports and of the outputs, by name, once each.

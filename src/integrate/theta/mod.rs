@@ -126,6 +126,8 @@ pub struct Theta<'a> {
     stats: Stats,
     modes: BTreeSet<(usize, Vec<bool>)>,
     not_unique: BTreeSet<String>,
+    /// Whether a jump between rivals has been noted.
+    noted_rivals: bool,
     notes: Vec<String>,
     worst_residual: f64,
     pending: Vec<(f64, String)>,
@@ -290,6 +292,7 @@ impl<'a> Theta<'a> {
             stats: Stats::default(),
             modes: BTreeSet::new(),
             not_unique: BTreeSet::new(),
+            noted_rivals: false,
             notes: Vec::new(),
             worst_residual: 0.0,
             pending: Vec::new(),
