@@ -26,6 +26,7 @@ const ROOMS: [(&str, &[&str]); 18] = [
         &[
             "circuit",
             "diagnostic",
+            "law",
             "lcs",
             "mna",
             "plan",
