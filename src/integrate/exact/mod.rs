@@ -6,6 +6,7 @@ mod ahead;
 mod assembler;
 mod clock;
 mod dense;
+mod eigenvalues;
 mod exosystem;
 mod expm;
 mod flow;

@@ -1,8 +1,8 @@
 //! How fast a mode's solution can move, and for how long: eigenvalues of A and frequencies of the sources.
 
-use nalgebra::{DMatrix, linalg::Schur};
+use nalgebra::DMatrix;
 
-use super::dense::Dense;
+use super::eigenvalues::eigenvalues;
 use super::expm;
 
 /// A transient e^{−at} is below the rounding of what it started from once a·t exceeds −ln(2⁻⁵³).
@@ -11,8 +11,6 @@ const EXTINCT: f64 = 37.0;
 const RESOLVED: f64 = 0.7;
 /// First step after a change of mode, relative to the fastest rate.
 const FIRST: f64 = 0.5;
-/// Iterations per eigenvalue of the QR algorithm.
-const QR_SWEEPS: usize = 60;
 
 /// One eigenvalue −decay ± i·frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,26 +38,20 @@ struct Limit {
 }
 
 impl Spectrum {
-    /// Eigenvalues of A (n×n) and the rates of the sources. Where the QR algorithm fails, ‖A‖ after balancing stands for
-    /// all of them.
+    /// Eigenvalues of A (n×n) and the rates of the sources. Where the QR algorithm fails, bounds of the numerical range stand
+    /// for them.
     pub(crate) fn new(a: &DMatrix<f64>, sources: &[Rate]) -> Self {
         let n = a.nrows();
         let mut rates = sources.to_vec();
         if n > 0 {
             let d = expm::balance(a, 1.0);
             let balanced = DMatrix::from_fn(n, n, |i, j| a[(i, j)] * d[j] / d[i]);
-            match Schur::try_new(balanced.clone(), f64::EPSILON, QR_SWEEPS * n) {
-                Some(schur) => rates.extend(schur.complex_eigenvalues().iter().map(|v| Rate {
+            match eigenvalues(&balanced) {
+                Some(found) => rates.extend(found.iter().map(|v| Rate {
                     decay: -v.re,
                     frequency: v.im.abs(),
                 })),
-                None => {
-                    let norm = Dense::of(&balanced).norm_1();
-                    rates.push(Rate {
-                        decay: 0.0,
-                        frequency: norm,
-                    });
-                }
+                None => rates.extend(numerical_range(&balanced)),
             }
         }
         // Those that do not decay come last.
@@ -97,6 +89,22 @@ impl Spectrum {
     }
 }
 
+/// Bounds of the eigenvalues by the two parts of A (Bendixson 1902): none decays faster or slower than the eigenvalues of the
+/// symmetric part, and none turns faster than the norm of the skew part. In coordinates near those of stored energy, which
+/// balancing gives, the symmetric part of a passive circuit is dissipation alone.
+fn numerical_range(a: &DMatrix<f64>) -> Vec<Rate> {
+    let symmetric = 0.5 * (a + a.transpose());
+    let frequency = (0.5 * (a - a.transpose())).norm();
+    let decays = symmetric.symmetric_eigenvalues();
+    decays
+        .iter()
+        .map(|v| Rate {
+            decay: -v,
+            frequency,
+        })
+        .collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -117,6 +125,22 @@ mod tests {
         );
         assert!((spectrum.step_limit(1.0) / 0.7e-3 - 1.0).abs() < 1e-9);
         assert_eq!(Spectrum::default().step_limit(0.0), f64::INFINITY);
+    }
+
+    #[test]
+    fn the_numerical_range_bounds_decay_and_frequency() {
+        // A damped oscillation −1 ± 10i beside a decay 5, over a basis of its own.
+        let a =
+            DMatrix::from_row_slice(3, 3, &[-1.0, 10.0, 0.2, -10.0, -1.0, 0.1, -0.2, 0.3, -5.0]);
+        let found = eigenvalues(&a).expect("eigenvalues");
+        let bounds = numerical_range(&a);
+        let slowest = bounds.iter().map(|r| r.decay).fold(f64::INFINITY, f64::min);
+        let fastest = bounds.iter().map(|r| r.decay).fold(0.0, f64::max);
+        for value in found {
+            assert!((slowest..=fastest).contains(&-value.re), "{value}");
+            assert!(value.im.abs() <= bounds[0].frequency, "{value}");
+        }
+        assert!(slowest > 0.5 && bounds[0].frequency < 15.0);
     }
 
     #[test]
