@@ -1,1 +1,158 @@
 //! Extreme values: resistances over many decades, equal eigenvalues, long chains.
+
+use circ::integrate::{Method, Run};
+
+use crate::runs::column;
+use crate::{changed, run};
+
+/// The largest difference of a column of two runs on the same grid, relative to its amplitude.
+fn difference(a: &Run, b: &Run, probe: &str) -> f64 {
+    assert_eq!(a.waveforms.time, b.waveforms.time);
+    let (a, b) = (column(a, probe), column(b, probe));
+    let amplitude = a.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let pairs = a.iter().zip(&b);
+    pairs.fold(0.0_f64, |m, (a, b)| m.max((a - b).abs())) / amplitude
+}
+
+/// The exact integrator alone, and no more than so many steps.
+#[track_caller]
+fn assert_exact(run: &Run, steps: u64) {
+    assert!(
+        run.notes.iter().all(|note| !note.contains("steps")),
+        "{:?}",
+        run.notes
+    );
+    assert!(run.stats.steps <= steps, "{} steps", run.stats.steps);
+    let residual = run.energy.residual_relative;
+    assert!(residual < 1e-10, "energy residual {residual:e}");
+}
+
+/// 10 V · sin ωt into L and R, from i₀ at t₀ on.
+struct Branch {
+    r: f64,
+    i0: f64,
+    t0: f64,
+}
+
+impl Branch {
+    const W: f64 = 100.0 * std::f64::consts::PI;
+    const L: f64 = 1e-3;
+
+    fn forced(&self, t: f64) -> f64 {
+        let z = self.r.hypot(Self::W * Self::L);
+        10.0 / z * (Self::W * t - (Self::W * Self::L).atan2(self.r)).sin()
+    }
+
+    fn current(&self, t: f64) -> f64 {
+        let decay = (-(t - self.t0) * self.r / Self::L).exp();
+        self.forced(t) + (self.i0 - self.forced(self.t0)) * decay
+    }
+}
+
+/// A diode that carries i in Ron = 0 and in Roff: the current changes the branch at each of its zeros.
+#[test]
+fn a_half_wave_rectifier_is_that_of_its_closed_form_for_any_roff() {
+    for roff in ["1e3", "1e6", "1e9", "1e12", "1e14", "1e16", "1e18"] {
+        let to = format!("roff={roff}");
+        let run = changed("halfwave_roff_1e16", &[("roff=1e16", &to)], Method::Exact);
+        assert_exact(&run, 4000);
+        let roff: f64 = roff.parse().unwrap();
+        let (voltage, forward) = (column(&run, "v(o)"), column(&run, "v(u)"));
+        // The diode conducts first.
+        let mut conducts = true;
+        let mut branch = Branch {
+            r: 10.1,
+            i0: 0.0,
+            t0: 0.0,
+        };
+        let sign = |conducts: bool| if conducts { 1.0 } else { -1.0 };
+        let mut worst = 0.0_f64;
+        for (k, &t) in run.waveforms.time.iter().enumerate() {
+            if t > branch.t0 && branch.current(t) * sign(conducts) < 0.0 {
+                let (mut low, mut high) = (run.waveforms.time[k - 1], t);
+                for _ in 0..60 {
+                    let middle = 0.5 * (low + high);
+                    if branch.current(middle) * sign(conducts) < 0.0 {
+                        high = middle;
+                    } else {
+                        low = middle;
+                    }
+                }
+                conducts = !conducts;
+                let r = if conducts { 10.1 } else { 10.1 + roff };
+                branch = Branch {
+                    r,
+                    i0: 0.0,
+                    t0: high,
+                };
+            }
+            let i = branch.current(t);
+            let across = if conducts { 0.0 } else { roff * i };
+            worst = worst.max((voltage[k] - 10.0 * i).abs());
+            worst = worst.max((forward[k] - 10.0 * i - across).abs());
+        }
+        assert!(worst < 1e-9, "Roff = {roff:e}: {worst:e} V");
+    }
+}
+
+/// L/Roff = 1e-15 s: the waveform is that of ideal diodes, and the energy balances.
+#[test]
+fn two_strings_behind_a_large_roff_are_those_of_ideal_diodes() {
+    for roff in ["1e10", "1e12", "1e14", "1e16", "1e18"] {
+        let law = format!("roff={roff}");
+        let run = changed("pvroff_2_1e12", &[("roff=1e12", &law)], Method::Exact);
+        assert_exact(&run, 4000);
+        let ideal = changed("pvroff_2_1e12", &[("roff=1e12", "")], Method::Exact);
+        for probe in ["v(bus)", "i(l0)", "i(l1)"] {
+            let apart = difference(&ideal, &run, probe);
+            let leak = 100.0 / roff.parse::<f64>().unwrap();
+            assert!(
+                apart < 1e-10 + leak,
+                "Roff = {roff}: {probe} off by {apart:e}"
+            );
+        }
+    }
+}
+
+/// Ten equal strings have nine equal eigenvalues.
+#[test]
+fn ten_equal_strings_take_no_more_steps_than_rows_and_events() {
+    let run = run("equal_strings", Method::Exact);
+    assert_exact(&run, 3000);
+    let run = changed("equal_strings", &[], Method::Exact);
+    let ideal = changed("equal_strings", &[("roff=1e12", "")], Method::Exact);
+    for probe in ["v(bus)", "i(l0)", "i(l7)"] {
+        let apart = difference(&ideal, &run, probe);
+        assert!(apart < 1e-9, "{probe} off by {apart:e}");
+    }
+}
+
+#[test]
+fn ten_strings_of_ordinary_values_take_no_more_steps_than_rows_and_events() {
+    let exact = changed("pv10_ordinary_values", &[], Method::Exact);
+    assert_exact(&exact, 3000);
+    let steps = changed("pv10_ordinary_values", &[], Method::Theta);
+    for probe in ["v(bus)", "i(l0)", "i(l7)"] {
+        let apart = difference(&exact, &steps, probe);
+        assert!(apart < 1e-3, "{probe} off by {apart:e}");
+    }
+}
+
+#[test]
+fn eight_equal_phases_take_no_more_steps_than_rows_and_events() {
+    let exact = changed("multiphase_buck_8", &[], Method::Exact);
+    assert_exact(&exact, 5000);
+    let steps = changed("multiphase_buck_8", &[], Method::Theta);
+    for probe in ["v(o)", "i(l0)", "i(l5)"] {
+        let apart = difference(&exact, &steps, probe);
+        assert!(apart < 1e-3, "{probe} off by {apart:e}");
+    }
+}
+
+#[test]
+fn a_mesh_of_equal_sections_takes_no_more_steps_than_rows() {
+    let exact = changed("mesh_rc_49", &[], Method::Exact);
+    assert!(exact.stats.steps <= 1500, "{} steps", exact.stats.steps);
+    let residual = exact.energy.residual_relative;
+    assert!(residual < 1e-7, "energy residual {residual:e}");
+}

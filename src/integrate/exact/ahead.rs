@@ -165,7 +165,7 @@ impl Exact<'_> {
     /// them.
     fn stretch_ahead(&mut self, at: usize, t: f64, next: f64) -> bool {
         let negligible = GRID_ULPS * f64::EPSILON * next.abs();
-        if self.motion.t > self.motion.entered
+        if self.motion.age > 0.0
             || t <= self.motion.t + negligible
             || next <= t + negligible
             || next > self.until + negligible

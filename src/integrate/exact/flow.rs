@@ -1,6 +1,6 @@
 //! The linear flow of one mode, w' = 𝒜 w with w = [x; z] (state and exosystem), and its guards.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::dense::Dense;
 use super::expm::{self, Ladder};
@@ -119,6 +119,11 @@ impl Flow {
     /// Number of guards.
     pub(crate) fn guards(&self) -> usize {
         self.guards
+    }
+
+    /// 𝒢.
+    pub(crate) fn guard_matrix(&self) -> DMatrix<f64> {
+        DMatrix::from_row_slice(self.guards, self.dim, &self.guard_rows)
     }
 
     /// 𝒜.
@@ -320,6 +325,38 @@ impl Flow {
         for floor in floors {
             *floor *= NOISE * f64::EPSILON;
         }
+    }
+
+    /// The first term of Taylor's series of guard i, from order `from` on, that is more than `noise` times rounding: a source acts on a
+    /// diode behind a chain of n sections with its n-th derivative.
+    pub(crate) fn first_term(
+        &self,
+        i: usize,
+        from: usize,
+        w: &[f64],
+        sizes: &[f64],
+        noise: f64,
+    ) -> Option<f64> {
+        let dt = self.steps[self.bottom as usize];
+        let row = &self.guard_rows[i * self.dim..(i + 1) * self.dim];
+        let mut term = DVector::from_column_slice(&w[..self.dim]);
+        let mut whole = DVector::from_column_slice(&sizes[..self.dim]);
+        let magnitudes = self.generator.abs();
+        for k in 1..=MAX_DEGREE {
+            term = &self.generator * term * (dt / k as f64);
+            whole = &magnitudes * whole * (dt / k as f64);
+            if k < from {
+                continue;
+            }
+            let values = row.iter().zip(term.iter().zip(&whole));
+            let (value, size) = values.fold((0.0, 0.0), |(value, size), (g, (term, whole))| {
+                (value + g * term, size + g.abs() * whole)
+            });
+            if value.abs() > noise * f64::EPSILON * size {
+                return Some(value);
+            }
+        }
+        None
     }
 
     /// Taylor's series for `dt` ≤ h/2^K from w on.

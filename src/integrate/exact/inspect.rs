@@ -1,8 +1,9 @@
 //! Whether a mode can be entered: what it conserves, what must vanish, and on which side of zero its guards leave.
 
 use super::exosystem::Exosystem;
-use super::flow::NOISE;
+use super::flow::{Flow, NOISE};
 use super::mode::{Mode, Owner};
+use super::slaved::{Follower, Manifold, followers};
 
 /// A mode may move the storage vector by no more than this part of its amplitude; more is a jump and needs an impulse.
 const CONSISTENT: f64 = 1e-9;
@@ -49,6 +50,10 @@ pub(crate) struct Inspector {
     /// Guards with their derivatives, and their sizes.
     jets: Vec<f64>,
     jet_sizes: Vec<f64>,
+    /// The same where some states follow the others, and whether w is there.
+    slow: Vec<f64>,
+    slow_sizes: Vec<f64>,
+    settled: bool,
 }
 
 /// How large things were when a mode was last looked at closely.
@@ -62,6 +67,10 @@ pub(crate) struct Familiar {
     pub(crate) sizes: Vec<f64>,
     /// Rounding of g and g' that comes of them.
     pub(crate) noise: Vec<f64>,
+    /// The states that are small beside their amplitudes once they follow the others.
+    pub(crate) followers: Vec<Follower>,
+    /// Where they do.
+    manifold: Option<Manifold>,
     /// How often it was enough to look at these.
     uses: u32,
     /// |w| that the storage's amplitudes have taken account of.
@@ -81,6 +90,30 @@ impl Familiar {
         let (g, slopes) = guards.split_at(guards.len() / 2);
         let mut guards = g.iter().zip(slopes).zip(&self.noise);
         guards.all(|((g, slope), noise)| *g > SIMULTANEOUS * noise + time * slope.abs())
+    }
+
+    /// Finds which states follow the others.
+    fn find_followers(&mut self, flow: &Flow) {
+        followers(
+            flow.generator(),
+            flow.states(),
+            &self.sizes,
+            &mut self.followers,
+        );
+        let known = self.manifold.as_ref();
+        if !known.is_some_and(|manifold| manifold.is_of(&self.followers)) {
+            let components: Vec<usize> = self.followers.iter().map(|f| f.component).collect();
+            self.manifold = (!components.is_empty())
+                .then(|| Manifold::new(flow.generator(), &flow.guard_matrix(), &components, ORDERS))
+                .flatten();
+        }
+    }
+
+    /// Whether a guard sees states that follow the others.
+    fn is_seen_to_follow(&self, guard: usize) -> bool {
+        self.manifold
+            .as_ref()
+            .is_some_and(|manifold| manifold.is_seen_by(guard))
     }
 
     /// How large w was so far, if it has grown by this: the state, the sources.
@@ -179,8 +212,15 @@ impl Inspector {
         if broken {
             return Finding::Inconsistent;
         }
-        mode.jets.values(w, &mut self.jets);
-        mode.jets.largest(sizes, &mut self.jet_sizes);
+        if !known {
+            let familiar = &mut mode.familiar;
+            familiar.sizes.clone_from(sizes);
+            // Waves count with their amplitudes: they come back.
+            exosystem.envelope(z, &mut familiar.sizes[mode.n..]);
+            mode.flow.noise(&familiar.sizes, &mut familiar.noise);
+            familiar.find_followers(&mode.flow);
+        }
+        self.read_jets(mode);
         let mut leaving = Vec::new();
         for i in 0..mode.flow.guards() {
             if self.leaves(mode, i, t) {
@@ -189,14 +229,6 @@ impl Inspector {
                     Owner::Device(_) | Owner::Slide(..) => return Finding::Refused(i),
                 }
             }
-        }
-        let sizes = &mut self.sizes;
-        if !known {
-            let familiar = &mut mode.familiar;
-            // Waves count with their amplitudes: they come back.
-            exosystem.envelope(z, &mut sizes[mode.n..]);
-            mode.flow.noise(sizes, &mut familiar.noise);
-            familiar.sizes.clone_from(sizes);
         }
         Finding::Holds(leaving)
     }
@@ -211,8 +243,22 @@ impl Inspector {
         for (size, known) in self.sizes.iter_mut().zip(&mode.familiar.sizes) {
             *size = size.max(*known);
         }
-        mode.jets.values(&self.w, &mut self.jets);
+        self.read_jets(mode);
+    }
+
+    /// The guards with their derivatives at w, and where states follow the others those on their manifold.
+    fn read_jets(&mut self, mode: &Mode) {
+        let w = &self.w[..mode.flow.dim()];
+        mode.jets.values(w, &mut self.jets);
         mode.jets.largest(&self.sizes, &mut self.jet_sizes);
+        let manifold = mode.familiar.manifold.as_ref();
+        self.settled = false;
+        if let Some(manifold) = manifold
+            && manifold.holds(w, &self.sizes, GROUP * f64::EPSILON)
+        {
+            manifold.jets(w, &self.sizes, &mut self.slow, &mut self.slow_sizes);
+            self.settled = true;
+        }
     }
 
     /// Whether guard i, as it was read last, is negative right after t. The first derivative that is no rounding decides, the next one
@@ -221,7 +267,17 @@ impl Inspector {
     pub(crate) fn leaves(&self, mode: &Mode, i: usize, t: f64) -> bool {
         let time = resolution(t);
         let m = mode.flow.guards();
-        let dot = |k: usize| (self.jets[k * m + i], self.jet_sizes[k * m + i]);
+        let (g, slope) = (self.jets[i], self.jets[m + i]);
+        // What of a guard is a transient that is rounding decides nothing.
+        let slow = self.settled
+            && mode.familiar.is_seen_to_follow(i)
+            && g.abs() <= GROUP * f64::EPSILON * self.jet_sizes[i] + time * slope.abs();
+        let (jets, sizes) = if slow {
+            (&self.slow, &self.slow_sizes)
+        } else {
+            (&self.jets, &self.jet_sizes)
+        };
+        let dot = |k: usize| (jets[k * m + i], sizes[k * m + i]);
         let (mut next, mut floor) = (dot(0), 0.0);
         let first = (0..ORDERS).find_map(|k| {
             let (value, whole) = next;
@@ -239,6 +295,7 @@ impl Inspector {
                 && value.abs().powi(k as i32 + 1) <= floor * next.0.abs().powi(k as i32);
             (value.abs() > noise && !turned).then_some(value)
         });
+        let first = first.or_else(|| mode.flow.first_term(i, ORDERS, &self.w, &self.sizes, GROUP));
         first.map_or_else(|| mode.is_off_at_rest(i), |value| value < 0.0)
     }
 }

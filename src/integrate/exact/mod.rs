@@ -26,6 +26,7 @@ mod report;
 mod schedule;
 mod series;
 mod shifted;
+mod slaved;
 mod spans;
 mod spectrum;
 mod stepper;

@@ -92,7 +92,7 @@ pub(crate) struct Map {
 }
 
 impl Map {
-    fn new(matrix: &DMatrix<f64>) -> Self {
+    pub(super) fn new(matrix: &DMatrix<f64>) -> Self {
         let map = Kernel::new(matrix);
         Self {
             sizes: map.map(f64::abs),

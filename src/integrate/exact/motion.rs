@@ -5,6 +5,7 @@ use super::flow::{Flow, LONG, Way};
 use super::inspect::{Familiar, SIMULTANEOUS, resolution};
 use super::polynomial;
 use super::series::Series;
+use super::slaved::Follower;
 use super::spans::Spans;
 use super::work::Sizes;
 
@@ -56,8 +57,8 @@ pub(crate) struct Motion {
     pub(crate) t: f64,
     /// `[w | g | g']` at `t`.
     pub(crate) now: Vec<f64>,
-    /// When the mode was entered, s.
-    pub(crate) entered: f64,
+    /// How long ago the mode was entered, s; the time itself may not resolve it.
+    pub(crate) age: f64,
     /// Steps taken.
     pub(crate) steps: u64,
     /// [`Self::travel`] rests here.
@@ -79,6 +80,10 @@ pub(crate) struct Motion {
     floors: Vec<f64>,
     /// How far below zero each guard was on entry, by rounding of the time or of simultaneous events.
     slack: Vec<f64>,
+    /// States that follow others some time after the entry, how many of them do by now, and the age at which the next one does, s.
+    followers: Vec<Follower>,
+    following: usize,
+    follows: f64,
     /// See [`Self::settles`].
     pub(crate) steady: bool,
     /// No long step goes beyond, s: there one ended that was not clear.
@@ -91,7 +96,6 @@ impl Motion {
     pub(crate) fn at(t: f64) -> Self {
         Self {
             t,
-            entered: t,
             ..Self::default()
         }
     }
@@ -100,7 +104,7 @@ impl Motion {
     pub(crate) fn enter(&mut self, flow: &Flow, t: f64, w: &[f64], familiar: &Familiar) {
         let dim = flow.dim();
         self.t = t;
-        self.entered = t;
+        self.age = 0.0;
         self.now.clear();
         self.now.extend_from_slice(w);
         self.next.resize(w.len(), 0.0);
@@ -113,6 +117,9 @@ impl Motion {
         let guards = &w[dim..dim + flow.guards()];
         self.slack.clear();
         self.slack.extend(guards.iter().map(|g| larger(-g, 0.0)));
+        self.followers.clone_from(&familiar.followers);
+        self.following = 0;
+        self.note_next_follower();
         self.floors.clear();
         self.floors.extend_from_slice(&familiar.noise);
         self.add_slack();
@@ -141,8 +148,38 @@ impl Motion {
         for (a, v) in self.amplitude.iter_mut().zip(&self.now) {
             *a = larger(*a, v.abs());
         }
-        flow.noise(&self.amplitude, &mut self.floors);
+        if self.age >= self.follows {
+            self.follow(flow);
+        }
+        if self.following == 0 {
+            flow.noise(&self.amplitude, &mut self.floors);
+        } else {
+            self.sizes.clone_from(&self.amplitude);
+            for follower in &self.followers[..self.following] {
+                let j = follower.component;
+                self.sizes[j] = larger(follower.size, self.now[j].abs());
+            }
+            flow.noise(&self.sizes, &mut self.floors);
+        }
         self.add_slack();
+    }
+
+    /// The states that follow others by now. A guard that has risen since needs no slack.
+    fn follow(&mut self, flow: &Flow) {
+        let age = self.age;
+        let later = self.followers[self.following..].iter();
+        self.following += later.take_while(|follower| follower.age <= age).count();
+        self.note_next_follower();
+        let guards = &self.now[flow.dim()..];
+        for (slack, g) in self.slack.iter_mut().zip(guards) {
+            *slack = smaller(*slack, larger(-g, 0.0));
+        }
+    }
+
+    /// The age at which the next state follows the others.
+    fn note_next_follower(&mut self) {
+        let next = self.followers.get(self.following);
+        self.follows = next.map_or(f64::INFINITY, |next| next.age);
     }
 
     fn add_slack(&mut self) {
@@ -186,7 +223,7 @@ impl Motion {
         if self.t >= self.barrier {
             self.barrier = f64::INFINITY;
         }
-        let limit = flow.step_limit(self.t - self.entered);
+        let limit = flow.step_limit(self.age);
         let longest = limit.min(end.min(self.barrier) - self.t);
         let mut level = (0..LONG).find(|&level| flow.step(level) <= longest)?;
         loop {
@@ -247,7 +284,7 @@ impl Motion {
 
     /// Whether steps of the output grid are short enough from here on.
     fn settles(&mut self, flow: &Flow) -> bool {
-        self.steady |= flow.step_limit(self.t - self.entered) >= flow.step(LONG);
+        self.steady |= flow.step_limit(self.age) >= flow.step(LONG);
         self.steady
     }
 
@@ -275,7 +312,7 @@ impl Motion {
         rows: Option<Way<'_>>,
     ) -> Option<(usize, [f64; 2])> {
         let rest = stop - self.t;
-        if rest > flow.step_limit(self.t - self.entered) {
+        if rest > flow.step_limit(self.age) {
             return None;
         }
         let same = GRID_ULPS * f64::EPSILON * stop.abs();
@@ -303,6 +340,7 @@ impl Motion {
     ) {
         self.part(energy);
         let steps = ((stop - self.t) / flow.step(LONG)).ceil();
+        self.age += stop - self.t;
         self.take_next(flow, exosystem, stop, steps as u32);
     }
 
@@ -334,25 +372,26 @@ impl Motion {
             } else {
                 stop - units as f64 * unit
             };
-            match self.taylor(flow, exosystem, end) {
+            match self.taylor(flow, exosystem, fraction, end) {
                 Arrival::Reached => {}
                 other => return other,
             }
         }
-        // The level that was needed, and where a guard is expected to fall through zero: no step goes beyond.
-        let (mut needed, mut barrier) = (0_u32, f64::INFINITY);
+        // The level that was needed, and how many units remain where a guard is expected to fall through zero: no step goes beyond.
+        // They are counted, as the time itself may not resolve them.
+        let (mut needed, mut barrier) = (0_u32, 0_u128);
         while units > 0 {
             if self.steps > self.most {
                 return Arrival::Resting;
             }
-            let limit = flow.step_limit(self.t - self.entered);
+            let limit = flow.step_limit(self.age);
             let aligned = bottom - units.trailing_zeros().min(bottom);
             let mut level = aligned.max(needed);
             while level < bottom && flow.step(level) > limit {
                 level += 1;
             }
             loop {
-                while level < bottom && self.t + flow.step(level) > barrier {
+                while level < bottom && 1_u128 << (bottom - level) > units - barrier {
                     level += 1;
                 }
                 let span = 1_u128 << (bottom - level);
@@ -362,7 +401,7 @@ impl Motion {
                     stop - (units - span) as f64 * unit
                 };
                 let mut clear = false;
-                if end <= barrier {
+                if span <= units - barrier {
                     if !flow.leap(level, &self.now, &mut self.next) {
                         return Arrival::Overflow;
                     }
@@ -372,13 +411,13 @@ impl Motion {
                     self.accept(flow, exosystem, level, end);
                     needed = needed.saturating_sub(1);
                 } else if level == bottom {
-                    match self.taylor(flow, exosystem, end) {
-                        Arrival::Reached => barrier = f64::INFINITY,
+                    match self.taylor(flow, exosystem, unit, end) {
+                        Arrival::Reached => barrier = 0,
                         other => return other,
                     }
                 } else {
                     match self.crossing(flow, flow.step(level)) {
-                        Some(part) => barrier = self.t + part * flow.step(level),
+                        Some(part) => barrier = units - (part * span as f64) as u128,
                         None => needed = level + 1,
                     }
                     level += 1;
@@ -391,9 +430,9 @@ impl Motion {
         Arrival::Reached
     }
 
-    /// One Taylor step to `end`, at most h/2^K away; every guard is followed as a polynomial, so nothing hides.
-    fn taylor(&mut self, flow: &mut Flow, exosystem: &Exosystem, end: f64) -> Arrival {
-        let dt = end - self.t;
+    /// One Taylor step over `dt` ≤ h/2^K to `end`, which differs from that by what the time does not resolve; every guard is
+    /// followed as a polynomial, so nothing hides.
+    fn taylor(&mut self, flow: &mut Flow, exosystem: &Exosystem, dt: f64, end: f64) -> Arrival {
         let (dim, m) = (flow.dim(), flow.guards());
         flow.expand(&mut self.series, &self.now, dt);
         self.series.at(1.0, &mut self.next[..dim]);
@@ -436,6 +475,7 @@ impl Motion {
         }
         std::mem::swap(&mut self.now, &mut self.next);
         self.t = t;
+        self.age += s * dt;
         self.steps += 1;
         let n = dim - exosystem.dim();
         exosystem.write(t, &mut self.now[n..dim]);
@@ -494,6 +534,7 @@ impl Motion {
             };
             self.spans.push(k, &self.now, flow, sizes);
         }
+        self.age += flow.step(level);
         self.take_next(flow, exosystem, t, 1_u32 << LONG.saturating_sub(level));
     }
 
@@ -505,7 +546,7 @@ impl Motion {
         self.t = t;
         self.steps += 1;
         self.since_refresh += steps;
-        if self.since_refresh >= REFRESH {
+        if self.since_refresh >= REFRESH || self.age >= self.follows {
             let n = flow.dim() - exosystem.dim();
             exosystem.write(t, &mut self.now[n..flow.dim()]);
             flow.read_guards(&mut self.now);

@@ -285,7 +285,7 @@ impl<'a> Exact<'a> {
         let t = self.motion.t;
         let near = t + self.ulps();
         if let (Some(at), Some(guard)) = (self.mode, fired)
-            && t - self.motion.entered <= self.ulps()
+            && self.motion.age <= self.ulps()
         {
             let what = "a mode is left at the instant at which it was entered";
             let reason = Reason::internal("integrate::exact", what);

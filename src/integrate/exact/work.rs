@@ -332,6 +332,11 @@ impl Forms {
         let mut triangle = qr.r();
         let mut order = DMatrix::identity(dim, dim);
         qr.p().permute_columns(&mut order);
+        // What is rounding of a column couples nothing: sizes that were taken at the start of a run may be far from what comes.
+        for mut column in triangle.column_iter_mut() {
+            let rounding = dim as f64 * f64::EPSILON * column.norm();
+            column.apply(|r| *r = if r.abs() <= rounding { 0.0 } else { *r });
+        }
         // Unit rows: the coordinates are scaled below. Where rounding does no harm the coordinates stay those of w, in which
         // the flow of a graded circuit is accurate.
         let least = if sizes.power > 0.0 {

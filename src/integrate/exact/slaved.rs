@@ -1,0 +1,277 @@
+//! States that follow the others within no time: a current that decays with L/Roff, a voltage behind a small resistance.
+//!
+//! For component j of w' = 𝒜 w with d = −𝒜_jj > 0
+//!
+//! ```text
+//! |w_j(t)| ≤ e^{−dt} |w_j(0)| + Σ_{k ≠ j} |𝒜_jk| |w_k| / d,
+//! ```
+//!
+//! and an error of w obeys the same. Once the remainder has decayed, the rounding of a guard with Roff·i in it is that of the
+//! voltages which i follows, and not Roff times that of the largest current of the run. With F the components that follow and S the
+//! others, w_F = K w_S with K = −𝒜_FF⁻¹ 𝒜_FS, and on that manifold w_S' = (𝒜_SS + 𝒜_SF K) w_S: where the difference from it is
+//! rounding, the sign of a guard is that of its value there, of its derivative there, and so on.
+
+use nalgebra::DMatrix;
+
+use super::mode::Map;
+
+/// Sweeps over the components that follow each other.
+const SWEEPS: usize = 64;
+/// A sweep goes on where it takes a size to less than this part.
+const SHRINKS: f64 = 0.9;
+/// A component is slaved where it is at most this part of its amplitude: otherwise the amplitude is good enough.
+const WORTH: f64 = 1.0 / 64.0;
+/// So many time constants leave nothing of what a component was before: e^−100 = 4e-44.
+const EXTINCT: f64 = 100.0;
+/// The largest part of its decay that a component may owe to others that decay as well.
+const MOST_COUPLED: f64 = 0.9;
+
+/// A component that follows others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Follower {
+    /// Its index in w.
+    pub(crate) component: usize,
+    /// How large it is then.
+    pub(crate) size: f64,
+    /// How long after a change of mode, s.
+    pub(crate) age: f64,
+}
+
+/// The components of w = [x; z] that follow the others where |w| ≤ `sizes`; `n` states come first. The fastest first.
+pub(crate) fn followers(
+    generator: &DMatrix<f64>,
+    n: usize,
+    sizes: &[f64],
+    found: &mut Vec<Follower>,
+) {
+    found.clear();
+    let mut settled: Option<Vec<f64>> = None;
+    for _ in 0..SWEEPS {
+        let mut shrunk = false;
+        for j in 0..n {
+            let decay = -generator[(j, j)];
+            if decay <= 0.0 || sizes[j] == 0.0 {
+                continue;
+            }
+            let known = settled.as_deref().unwrap_or(sizes);
+            let size = coupled(generator, j, known, |_| true) / decay;
+            if size < SHRINKS * known[j] {
+                settled.get_or_insert_with(|| sizes.to_vec())[j] = size;
+                shrunk = true;
+            }
+        }
+        if !shrunk {
+            break;
+        }
+    }
+    let Some(settled) = settled else { return };
+    let slaved = |j: usize| j < n && settled[j] <= WORTH * sizes[j];
+    for j in (0..n).filter(|&j| slaved(j)) {
+        let decay = -generator[(j, j)];
+        let part = coupled(generator, j, sizes, slaved) / (decay * sizes[j]);
+        if part <= MOST_COUPLED {
+            found.push(Follower {
+                component: j,
+                size: settled[j],
+                age: EXTINCT / (decay * (1.0 - part)),
+            });
+        }
+    }
+    found.sort_by(|a, b| a.age.total_cmp(&b.age));
+}
+
+/// Σ_{k ≠ j} |𝒜_jk| sizes_k over these k.
+fn coupled(
+    generator: &DMatrix<f64>,
+    j: usize,
+    sizes: &[f64],
+    which: impl Fn(usize) -> bool,
+) -> f64 {
+    let row = generator.row(j);
+    let others = row.iter().zip(sizes).enumerate();
+    let others = others.filter(|&(k, (a, _))| *a != 0.0 && k != j && which(k));
+    others.map(|(_, (a, size))| a.abs() * size).sum()
+}
+
+/// Guards on the manifold on which some components follow the others.
+#[derive(Debug, Clone)]
+pub(crate) struct Manifold {
+    /// F, and by component of w whether it is of F.
+    followers: Vec<usize>,
+    follows: Vec<bool>,
+    /// w_F = K w_S, over all of w.
+    slaves: DMatrix<f64>,
+    /// By guard: whether it sees F.
+    sees: Vec<bool>,
+    /// Guards over w_S and below them their derivatives, as many as there are orders.
+    jets: Map,
+}
+
+impl Manifold {
+    /// That of these components, with as many orders of the guards; `None` where they do not follow (𝒜_FF is singular).
+    pub(crate) fn new(
+        generator: &DMatrix<f64>,
+        guards: &DMatrix<f64>,
+        followers: &[usize],
+        orders: usize,
+    ) -> Option<Self> {
+        let dim = generator.nrows();
+        let follows: Vec<bool> = (0..dim).map(|j| followers.contains(&j)).collect();
+        let mut fast = generator.select_rows(followers);
+        let own = fast.select_columns(followers);
+        for &j in followers {
+            fast.column_mut(j).fill(0.0);
+        }
+        // Rows by their diagonals: those of different Roff are decades apart.
+        let scale: Vec<f64> = (0..own.nrows()).map(|k| own[(k, k)]).collect();
+        let levelled = |matrix: &DMatrix<f64>| {
+            DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
+                matrix[(i, j)] / scale[i]
+            })
+        };
+        let slaves = -levelled(&own).lu().solve(&levelled(&fast))?;
+        let slow = |rows: &DMatrix<f64>| {
+            let mut slow = rows + rows.select_columns(followers) * &slaves;
+            for &j in followers {
+                slow.column_mut(j).fill(0.0);
+            }
+            slow
+        };
+        let flow = slow(generator);
+        let m = guards.nrows();
+        let mut jets = DMatrix::zeros(orders * m, dim);
+        let mut rows = slow(guards);
+        for k in 0..orders {
+            jets.rows_mut(k * m, m).copy_from(&rows);
+            rows = slow(&(&rows * &flow));
+        }
+        let sees = guards
+            .row_iter()
+            .map(|row| followers.iter().any(|&j| row[j] != 0.0));
+        jets.iter().all(|v| v.is_finite()).then(|| Self {
+            sees: sees.collect(),
+            followers: followers.to_vec(),
+            follows,
+            slaves,
+            jets: Map::new(&jets),
+        })
+    }
+
+    /// Whether it is that of these components.
+    pub(crate) fn is_of(&self, followers: &[Follower]) -> bool {
+        followers.len() == self.followers.len()
+            && followers.iter().all(|f| self.follows[f.component])
+    }
+
+    /// Whether w is on it up to this part of the sizes of its components.
+    pub(crate) fn holds(&self, w: &[f64], sizes: &[f64], rounding: f64) -> bool {
+        self.followers.iter().enumerate().all(|(k, &j)| {
+            let row = self.slaves.row(k);
+            let (value, size) = row
+                .iter()
+                .zip(w)
+                .zip(sizes)
+                .fold((0.0, sizes[j]), |(value, whole), ((s, w), size)| {
+                    (value + s * w, whole + (s * size).abs())
+                });
+            (w[j] - value).abs() <= rounding * size
+        })
+    }
+
+    /// Whether a guard sees a component that follows.
+    pub(crate) fn is_seen_by(&self, guard: usize) -> bool {
+        self.sees[guard]
+    }
+
+    /// The guards and their derivatives on it at w, and the sums of the magnitudes they come from.
+    pub(crate) fn jets(
+        &self,
+        w: &[f64],
+        sizes: &[f64],
+        values: &mut Vec<f64>,
+        whole: &mut Vec<f64>,
+    ) {
+        self.jets.values(w, values);
+        self.jets.largest(sizes, whole);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(generator: &DMatrix<f64>, n: usize, sizes: &[f64]) -> Vec<Follower> {
+        let mut found = Vec::new();
+        followers(generator, n, sizes, &mut found);
+        found
+    }
+
+    /// L i' = v − Roff i beside a capacitor and a source.
+    #[test]
+    fn a_current_into_a_large_resistance_follows_its_voltage() {
+        let (l, roff, c, r) = (1e-3, 1e16, 1e-6, 10.0);
+        let mut a = DMatrix::zeros(3, 3);
+        a[(0, 0)] = -roff / l;
+        a[(0, 1)] = -1.0 / l;
+        a[(0, 2)] = 1.0 / l;
+        a[(1, 1)] = -1.0 / (r * c);
+        let found = of(&a, 2, &[10.0, 5.0, 3.0]);
+        // The capacitor discharges, slower.
+        assert_eq!(found.len(), 2);
+        assert!((found[1].component, found[1].size) == (1, 0.0));
+        let Follower {
+            component,
+            size,
+            age,
+        } = found[0];
+        assert_eq!(component, 0);
+        assert!((size * roff / 3.0 - 1.0).abs() < 1e-12, "{size}");
+        assert!((age * roff / l / 100.0 - 1.0).abs() < 1e-12, "{age}");
+        // A current that is small anyway.
+        let small = of(&a, 2, &[1e-15, 5.0, 3.0]);
+        assert!(small.iter().all(|follower| follower.component == 1));
+    }
+
+    /// v − Roff i falls through zero with v: the signs of g, g', … there are those of v alone.
+    #[test]
+    fn a_guard_on_the_manifold_is_that_of_the_voltage() {
+        let (l, roff) = (1e-3, 1e16);
+        let mut a = DMatrix::zeros(3, 3);
+        a[(0, 0)] = -roff / l;
+        a[(0, 1)] = 1.0 / l;
+        a[(1, 2)] = 314.0;
+        a[(2, 1)] = -314.0;
+        let guard = DMatrix::from_row_slice(1, 3, &[roff, 0.0, 0.0]);
+        let manifold = Manifold::new(&a, &guard, &[0], 3).unwrap();
+        let (w, sizes) = ([1e-17, 1e-20, 5.0], [10.0, 5.0, 5.0]);
+        assert!(manifold.holds(&w, &sizes, 1e-14));
+        assert!(!manifold.holds(&[1e-12, 0.0, 5.0], &sizes, 1e-14));
+        let (mut values, mut whole) = (Vec::new(), Vec::new());
+        manifold.jets(&w, &sizes, &mut values, &mut whole);
+        let expected = [1e-20, 314.0 * 5.0, -314.0 * 314.0 * 1e-20];
+        for (found, expected) in values.iter().zip(expected) {
+            assert!((found / expected - 1.0).abs() < 1e-12, "{found} {expected}");
+        }
+        assert!((whole[0] / 5.0 - 1.0).abs() < 1e-12 && manifold.is_seen_by(0));
+    }
+
+    #[test]
+    fn currents_that_decay_together_follow_together() {
+        // Two legs of a star behind Roff each.
+        let rate = 1e15;
+        let a = DMatrix::from_row_slice(2, 3, &[-2.0 * rate, rate, 1e3, rate, -2.0 * rate, 1e3]);
+        let found = of(&a, 2, &[10.0, 10.0, 300.0]);
+        assert_eq!(found.len(), 2);
+        for follower in found {
+            let size = follower.size / (1e3 * 300.0 / rate);
+            assert!((0.99..2.0).contains(&size), "{size}");
+            assert!((follower.age * rate / 100.0 - 1.0).abs() < 1e-12);
+        }
+        // A ring of two that only oscillates follows nothing.
+        let a = DMatrix::from_row_slice(2, 2, &[-1.0, 1e3, -1e3, -1.0]);
+        assert!(of(&a, 2, &[1.0, 1.0]).is_empty());
+        // Their difference lives on: neither follows.
+        let a = DMatrix::from_row_slice(2, 2, &[-rate, rate, rate, -rate]);
+        assert!(of(&a, 2, &[1.0, 1.0]).is_empty());
+    }
+}
