@@ -1,7 +1,7 @@
 //! What is legal and odd, or missing, once the whole circuit is known.
 
 use super::builder::Builder;
-use super::{Kind, NodeId, Quantity};
+use super::{Element, Kind, NodeId, Quantity};
 use crate::diagnostic::{Diagnostic, Severity, Span};
 use crate::netlist::ast::{Block, Statement};
 
@@ -100,11 +100,13 @@ impl<'n> Builder<'n, '_> {
             } else {
                 String::new()
             };
-            notes.push(Diagnostic::note(
-                "dangling",
-                None,
-                format!("connected at one end only: node {shown}{more}"),
-            ));
+            let first = terminals.iter().skip(1).position(|count| *count == 1);
+            let at_first =
+                |e: &&Element| first.is_some_and(|k| [e.p, e.n].iter().any(|n| n.index() == k + 1));
+            let element = self.circuit.elements.iter().find(at_first);
+            let message = format!("connected at one end only: node {shown}{more}");
+            let note = Diagnostic::note("dangling", element.and_then(|e| e.span), message);
+            notes.push(note.label(format!("nothing else is at node {}", dangling[0])));
         }
         let uic = self.circuit.tran.is_some_and(|t| t.uic);
         let ignored = self

@@ -186,6 +186,8 @@ impl<'n> Builder<'n, '_> {
             }
         };
         let params = Parameters::new(&chain);
+        // Level 2 was a name of level 1 with a substrate.
+        self.level(card, name, &params, &[1.0, 2.0], scope)?;
         let thermal = Exponential::thermal_voltage(self.scopes.temperature.f64);
         let mut number = |name: &str, otherwise: f64| -> Option<f64> {
             Some(

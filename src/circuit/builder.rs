@@ -61,6 +61,8 @@ pub(super) struct Builder<'n, 'o> {
     pub(super) fours: Vec<(ScopeId, &'n ast::Four)>,
     pub(super) step_cards: Vec<&'n ast::Sweep>,
     pub(super) dc_cards: Option<&'n [ast::Sweep]>,
+    /// Values that `alter` sets, by element; the last one counts.
+    pub(super) altered: Vec<(&'n Name, Value)>,
     /// Names of the elements of the top level.
     pub(super) root_elements: HashSet<&'n str>,
     /// Which branch of each `.if` was taken, in the order of the walk.
@@ -102,6 +104,7 @@ impl<'n, 'o> Builder<'n, 'o> {
             fours: Vec::new(),
             step_cards: Vec::new(),
             dc_cards: None,
+            altered: Vec::new(),
             root_elements: HashSet::new(),
             choices: VecDeque::new(),
             nesting: Vec::new(),
@@ -131,6 +134,7 @@ impl<'n, 'o> Builder<'n, 'o> {
         }
         self.define(&netlist.body, ScopeId::ROOT);
         self.check_overrides();
+        self.check_altered();
         self.circuit.tran = self.transient();
         self.dc_sweeps();
         self.elements(&netlist.body, ScopeId::ROOT);
@@ -145,6 +149,7 @@ impl<'n, 'o> Builder<'n, 'o> {
         if !self.circuit.elements.is_empty() && read && !self.failed() {
             self.check_ground(netlist.end);
             self.note_oddities();
+            self.warn_of_thresholds();
         }
         if read && self.trans.is_empty() && !self.other_analysis {
             self.tell(

@@ -94,6 +94,7 @@ impl<'n> Builder<'n, '_> {
             Statement::SaveDc(list) => self.dc_saves.push((scope, list)),
             Statement::Meas(meas) => self.measurements.push((scope, meas)),
             Statement::Four(four) => self.fours.push((scope, four)),
+            Statement::Alter(alter) => self.alter(alter),
             Statement::Step(sweep) => self.step_cards.push(sweep),
             Statement::Dc(sweeps) => {
                 self.other_analysis = true;

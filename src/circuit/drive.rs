@@ -63,7 +63,7 @@ impl<'n> Builder<'n, '_> {
         let swept = self
             .swept(&card.name.text)
             .filter(|_| scope == ScopeId::ROOT);
-        let dc_value = swept.or(dc_value);
+        let dc_value = swept.map(|v| v.f64).or(dc_value);
         let wave = match wave {
             Some(call) => match self.wave(card, call, args, scope) {
                 Some(wave) => wave,
@@ -219,6 +219,14 @@ impl<'n> Builder<'n, '_> {
             self.tell(
                 Diagnostic::warning("pulse-overfull", call.name.span, message)
                     .label("cut off by the next period"),
+            );
+        }
+        if x.get(5) == Some(&0.0) && at(0) != at(1) {
+            let message = "PULSE with a width of 0 has no top: it falls as soon as it has risen";
+            self.tell(
+                Diagnostic::note("pulse-width-zero", call.args[5].value.span, message)
+                    .label("some versions of ngspice take the stop time instead")
+                    .help("leave the last two values out for a single step"),
             );
         }
         let count = x.get(7).copied().filter(|n| *n > 0.0);

@@ -10,11 +10,12 @@ use crate::netlist::ast::{self, Name};
 
 /// Temperature at which parameters were measured where TNOM does not say, °C.
 const NOMINAL: f64 = 27.0;
-/// Parameters of charge, of noise and of high injection.
-const LEFT_OUT: [&str; 17] = [
-    "cjo", "cj0", "cj", "tt", "vj", "pb", "m", "fc", "kf", "af", "ikf", "ikr", "isr", "nr", "jsw",
-    "cjsw", "cjp",
+/// Parameters of charge and of noise.
+const LEFT_OUT: [&str; 13] = [
+    "cjo", "cj0", "cj", "tt", "vj", "pb", "m", "fc", "kf", "af", "nr", "cjsw", "cjp",
 ];
+/// Parameters that bend the curve at rest: high injection, recombination, side walls.
+const BENDING: [&str; 4] = ["ikf", "ikr", "isr", "jsw"];
 
 impl<'n> Builder<'n, '_> {
     /// The exponential law of a model: `IS N RS BV IBV NBV EG XTI TNOM`, and the temperature of the card (`temp`, `dtemp`), else
@@ -29,6 +30,8 @@ impl<'n> Builder<'n, '_> {
         args: Args<'n>,
         scope: ScopeId,
     ) -> Option<Law> {
+        // Level 3 scales the same equations with the geometry.
+        self.level(card, name, params, &[1.0, 3.0], scope)?;
         for left_out in LEFT_OUT {
             if params.get(left_out).is_some() {
                 self.unused(format!("{left_out} of {}", name.text), name);
@@ -44,6 +47,14 @@ impl<'n> Builder<'n, '_> {
             }
             Some(otherwise)
         };
+        let mut bending = Vec::new();
+        for parameter in BENDING {
+            // Zero and infinite ones are none.
+            let value = number(&[parameter], 0.0)?;
+            if value != 0.0 && value.is_finite() {
+                bending.push(parameter);
+            }
+        }
         let is = number(&["is", "js"], 1e-14)?;
         let n = number(&["n"], 1.0)?;
         let rs = number(&["rs"], 0.0)?;
@@ -72,14 +83,41 @@ impl<'n> Builder<'n, '_> {
             }),
         };
         if !diode.is_sound() {
+            let no_breakdown = |x: f64| x == f64::INFINITY;
+            let (what, value) = [("IS", is), ("N", n), ("BV", bv), ("IBV", ibv), ("NBV", nbv)]
+                .into_iter()
+                .find(|(what, x)| {
+                    !(*x > 0.0 && (x.is_finite() || *what == "BV" && no_breakdown(*x)))
+                })
+                .unwrap_or(("RS", rs));
             let message = format!(
-                "model `{}` of `{}` is no diode: IS, N, BV and IBV must be positive, RS not negative",
+                "model `{}` of `{}` is no diode: {what} is {value}",
                 name.text, card.name.text
             );
-            self.tell(Diagnostic::error("bad-value", name.span, message).label("out of range"));
+            self.tell(
+                Diagnostic::error("bad-value", name.span, message)
+                    .label("out of range")
+                    .help("IS, N, BV, IBV and NBV must be positive, RS not negative; `--diodes ideal` needs none of them"),
+            );
             return None;
         }
+        self.warn_of_bends(card, name, &bending);
         Some(Law::Exponential(diode))
+    }
+
+    /// Warns once a model of parameters that would bend its curve.
+    fn warn_of_bends(&mut self, card: &ast::Element, name: &Name, given: &[&str]) {
+        if given.is_empty() || self.told_models.contains(&name.text) {
+            return;
+        }
+        self.told_models.push(name.text.clone());
+        let message = format!(
+            "the curve of `{}` is simulated without {} of model `{}`",
+            card.name.text,
+            given.join(", "),
+            name.text
+        );
+        self.tell(Diagnostic::warning("diode-curve", name.span, message).label("approximated"));
     }
 }
 

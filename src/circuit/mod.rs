@@ -33,6 +33,7 @@ mod smooth;
 pub mod source;
 mod sweep;
 mod switch;
+mod threshold;
 mod thyristor;
 mod transistor;
 

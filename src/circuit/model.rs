@@ -12,6 +12,18 @@ pub(super) const ZERO: Value = Value::decimal(0.0, 0, 0);
 /// One, exactly.
 pub(super) const ONE: Value = Value::decimal(1.0, 1, 0);
 
+/// What levels are called, by the letter of their elements.
+const LEVELS: [(char, f64, &str); 8] = [
+    ('q', 4.0, "VBIC"),
+    ('q', 6.0, "MEXTRAM"),
+    ('q', 8.0, "HICUM"),
+    ('q', 9.0, "VBIC"),
+    ('q', 504.0, "MEXTRAM"),
+    ('d', 2.0, "Fowler and Nordheim"),
+    ('z', 5.0, "HFET1"),
+    ('z', 6.0, "HFET2"),
+];
+
 impl<'n> Builder<'n, '_> {
     /// The model a card names, with those it extends, the nearest first.
     pub(super) fn model(
@@ -86,6 +98,39 @@ impl<'n> Builder<'n, '_> {
         };
         let value = self.scopes.number(roff, scope)?;
         Some(Some(value).filter(|v| v.f64.is_finite()))
+    }
+
+    /// The level of a model, which must be one of those that are `simulated`: parameters of another one mean something else.
+    pub(super) fn level(
+        &mut self,
+        card: &ast::Element,
+        name: &Name,
+        params: &Parameters<'n>,
+        simulated: &[f64],
+        scope: ScopeId,
+    ) -> Option<f64> {
+        let level = self
+            .parameter(params, "level", scope)?
+            .map_or(1.0, |v| v.f64);
+        if simulated.contains(&level) {
+            return Some(level);
+        }
+        let letter = card.name.text.chars().next().unwrap_or(' ');
+        let called = LEVELS
+            .iter()
+            .find(|(l, number, _)| *l == letter && *number == level);
+        let called = called.map_or(String::new(), |(_, _, name)| format!(" ({name})"));
+        let known: Vec<String> = simulated.iter().map(f64::to_string).collect();
+        let message = format!(
+            "`{}` has model `{}` of level {level}{called}, whose equations are not simulated",
+            card.name.text, name.text
+        );
+        self.tell(
+            Diagnostic::error("unsupported-model", name.span, message)
+                .label(format!("level {} is simulated", known.join(" or ")))
+                .help("its parameters mean something else there: a model of the level that is simulated has to take its place"),
+        );
+        None
     }
 
     pub(super) fn unused(&mut self, what: String, name: &Name) {

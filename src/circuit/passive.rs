@@ -114,7 +114,7 @@ impl<'n> Builder<'n, '_> {
         let swept = self
             .swept(&card.name.text)
             .filter(|_| scope == ScopeId::ROOT);
-        let value = swept.map_or(value, Value::binary);
+        let value = swept.unwrap_or(value);
         let multiplier = match (
             self.arg(args, &["m"], scope),
             self.arg(args, &["scale"], scope),

@@ -6,6 +6,7 @@ use super::scope::ScopeId;
 use super::{Circuit, ElementId, NodeId, Probe, Probed};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Name, Signal, Wanted};
+use crate::netlist::suggest::nearest;
 
 impl<'n> Builder<'n, '_> {
     pub(super) fn save(&mut self, list: &'n [Wanted], scope: ScopeId) {
@@ -48,7 +49,9 @@ impl<'n> Builder<'n, '_> {
                 Some(probe) => self.print(probe),
                 None => {
                     let message = format!("`{text}` is not in the circuit and cannot be printed");
-                    self.tell(Diagnostic::warning("unknown-probe", span, message).label("ignored"));
+                    let warning = Diagnostic::warning("unknown-probe", span, message);
+                    let help = self.circuit.what_there_is(&text);
+                    self.tell(warning.label("ignored").help(help));
                 }
             }
         }
@@ -123,5 +126,28 @@ impl Circuit {
         self.element(name)
             .or_else(|| self.element(&without_letter(name)?))
             .or_else(|| self.element(&name.replace(':', ".")))
+    }
+
+    /// The signal that was probably meant, or else the first ones of its kind.
+    fn what_there_is(&self, text: &str) -> String {
+        /// More names are no help.
+        const MOST: usize = 8;
+        let current = text.starts_with("i(") || text.starts_with('@');
+        let known: Vec<String> = if current {
+            let elements = self.elements.iter();
+            elements.map(|e| format!("i({})", e.name)).collect()
+        } else {
+            let nodes = self.nodes.iter().skip(1);
+            nodes.map(|n| format!("v({n})")).collect()
+        };
+        if let Some(near) = nearest(text, known.iter().map(String::as_str)) {
+            return format!("did you mean `{near}`?");
+        }
+        let more = known.len().saturating_sub(MOST);
+        let first = known[..known.len() - more].join(", ");
+        match more {
+            0 => format!("there are {first}"),
+            _ => format!("there are {first} and {more} more"),
+        }
     }
 }

@@ -4,7 +4,7 @@ use super::builder::Builder;
 use super::scope::ScopeId;
 use crate::algebra::Value;
 use crate::diagnostic::{Diagnostic, Span};
-use crate::netlist::ast::{self, Points, Target};
+use crate::netlist::ast::{self, Alter, Name, Points, Target};
 
 /// Most runs or operating points of all sweeps together.
 const MOST: usize = 100_000;
@@ -59,13 +59,53 @@ pub fn combinations(sweeps: &[Sweep]) -> Vec<Vec<f64>> {
 }
 
 impl<'n> Builder<'n, '_> {
-    /// The value that a sweep gives to an element.
-    pub(super) fn swept(&self, name: &str) -> Option<f64> {
+    /// The value that a sweep, else an `alter`, gives to an element.
+    pub(super) fn swept(&self, name: &str) -> Option<Value> {
         let values = &self.options.values;
+        let altered = || self.altered.iter().rev().find(|(own, _)| own.text == name);
         values
             .iter()
             .find(|(own, _)| own == name)
-            .map(|(_, value)| *value)
+            .map(|(_, value)| Value::binary(*value))
+            .or_else(|| altered().map(|(_, value)| *value))
+    }
+
+    /// Takes in an `alter`, where it sets the value of a source or a passive element.
+    pub(super) fn alter(&mut self, alter: &'n Alter) {
+        let letter = alter.name.text.chars().next().unwrap_or(' ');
+        let known: &[&str] = match letter {
+            'v' | 'i' => &["dc"],
+            'r' => &["resistance", "r"],
+            'c' => &["capacitance", "c"],
+            'l' => &["inductance", "l"],
+            _ => &[],
+        };
+        let quantity = alter.quantity.as_deref().or(known.first().copied());
+        if quantity.is_some_and(|q| known.contains(&q)) {
+            self.altered.push((&alter.name, alter.value));
+        } else {
+            self.not_altered(&alter.name);
+        }
+    }
+
+    /// Altered elements exist.
+    pub(super) fn check_altered(&mut self) {
+        let (known, unknown): (Vec<_>, Vec<_>) = std::mem::take(&mut self.altered)
+            .into_iter()
+            .partition(|(name, _)| self.root_elements.contains(name.text.as_str()));
+        self.altered = known;
+        for (name, _) in unknown {
+            self.not_altered(name);
+        }
+    }
+
+    fn not_altered(&mut self, name: &Name) {
+        let message = format!("`alter` of `{}` is not carried out", name.text);
+        self.tell(
+            Diagnostic::warning("control-left-out", name.span, message)
+                .label("the result is without it")
+                .help("`alter` sets the DC value of a source, or a resistance, capacitance or inductance of the top level"),
+        );
     }
 
     /// Takes in the sweeps of `.step`; a parameter that nothing else defines has its first value.

@@ -227,6 +227,13 @@ impl<'n> Builder<'n, '_> {
         scope: ScopeId,
     ) -> Option<Figures> {
         let params = Parameters::new(chain);
+        let level = match (sort.family, card.name.text.starts_with('z')) {
+            (Family::Jfet, false) => self.level(card, name, &params, &[1.0, 2.0], scope)?,
+            (Family::Jfet, true) => self.level(card, name, &params, &[1.0], scope)?,
+            _ => self
+                .parameter(&params, "level", scope)?
+                .map_or(1.0, |v| v.f64),
+        };
         let mut number = |names: &[&str], otherwise: f64| -> Option<f64> {
             for one in names {
                 if let Some(value) = self.parameter(&params, one, scope)? {
@@ -241,7 +248,6 @@ impl<'n> Builder<'n, '_> {
             Family::Mos | Family::Vdmos => 0.0,
         };
         let vto = number(&["vto", "vth0", "vt0", "vt"], vto)?;
-        let level = number(&["level"], 1.0)?;
         let series = number(&["rd"], 0.0)? + number(&["rs"], 0.0)?;
         let given = number(&["ron"], f64::NAN)?;
         let is_given = given > 0.0;

@@ -30,6 +30,7 @@ pub(super) fn braced(i: Input<'_>) -> Parsed<'_, Expr> {
                 ),
             )
             .label(format!("no `{close}` follows"))
+            .help("close it on this card; a card goes on in the next line after a `+`")
         } else {
             Diagnostic::error(
                 "bad-expression",

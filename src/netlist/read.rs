@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 
 use super::ast::{Block, Branch, Netlist, Statement, Subckt};
 use super::block::{Open, OpenKind};
+use super::control::Script;
 use super::dot::{self, Dot};
 use super::include::{lexical, library_sections};
-use super::lex::{Fault, Line, Parsed, State, at_end, input, logical, next_word, title, word};
+use super::lex::{Fault, Line, Parsed, State, at_end, input, logical, next_word, title};
 use super::{card, decode};
-use crate::diagnostic::{Diagnostic, FileId, Severity, SourceMap, Span};
+use crate::diagnostic::{Diagnostic, FileId, SourceMap, Span};
 
 /// Reads a netlist: text to cards, includes in place. Never stops at the first fault.
 ///
@@ -57,6 +58,7 @@ pub fn parse(
         files: vec![lexical(&path)],
         bytes: text.len(),
         skipped: Vec::new(),
+        script: Script::default(),
         title: None,
     };
     reader.title_line(&text, title_span);
@@ -69,6 +71,7 @@ pub fn parse(
     }
     reader.lines(&lines, &path);
     reader.close_all();
+    reader.end_script();
     reader.note_skipped();
 
     netlist.title = reader.title.take().unwrap_or_default();
@@ -84,7 +87,8 @@ pub(super) struct Reader<'a> {
     /// The files being read, from the root inwards.
     pub(super) files: Vec<PathBuf>,
     pub(super) bytes: usize,
-    skipped: Vec<(String, Span)>,
+    pub(super) skipped: Vec<(String, Span)>,
+    pub(super) script: Script,
     title: Option<String>,
 }
 
@@ -208,41 +212,6 @@ impl Reader<'_> {
         }
     }
 
-    /// A line between `.control` and `.endc`: analyses, measurements and what is to be saved; the rest is skipped.
-    fn command(&mut self, line: &Line) {
-        let state = State::default();
-        let start = input(line, &state);
-        let Ok((rest, name)) = word(start) else {
-            return;
-        };
-        let parsed = match name.text.as_str() {
-            "tran" => finish(
-                dot::tran(start, rest, true)
-                    .map(|(rest, t)| (rest, Dot::statement(Statement::Tran(t)))),
-                line,
-            ),
-            "meas" | "measure" => finish(dot::measure::meas(start, rest, true), line),
-            "fourier" => finish(dot::measure::four(start, rest), line),
-            "save" => finish(dot::save(rest), line),
-            "op" => Ok(Dot::statement(Statement::Analysis(name.span))),
-            // They ask for nothing that is not done anyway.
-            "run" | "quit" | "exit" | "end" | "*" => Ok(Dot::Nothing),
-            _ => Ok(Dot::Skipped),
-        };
-        match parsed {
-            Ok(Dot::Statement(statement)) => self.push(*statement),
-            Ok(Dot::Skipped) => self
-                .skipped
-                .push((format!("{} (in .control)", name.text), line.span())),
-            Ok(_) => {}
-            Err(fault) => self.tell(Diagnostic {
-                severity: Severity::Warning,
-                message: format!("{}; the command is left out", fault.message),
-                ..*fault
-            }),
-        }
-    }
-
     fn dot(&mut self, dot: Dot, line: &Line, path: &Path) -> bool {
         let span = line.span();
         match dot {
@@ -336,7 +305,7 @@ impl Reader<'_> {
 }
 
 /// The result of a card's parser as a result with a diagnostic; a card must be read to its end.
-fn finish<T>(parsed: Parsed<'_, T>, line: &Line) -> Result<T, Box<Diagnostic>> {
+pub(super) fn finish<T>(parsed: Parsed<'_, T>, line: &Line) -> Result<T, Box<Diagnostic>> {
     match parsed {
         Ok((rest, value)) if at_end(rest) => Ok(value),
         Ok((rest, _)) => Err(Box::new(

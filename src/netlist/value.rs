@@ -34,7 +34,8 @@ impl fmt::Display for NumberError {
 /// A number: `[sign] digits [. digits] [e exponent] [suffix] [unit letters]` or `digits suffix digits` (`4k7` = 4.7k).
 ///
 /// Suffixes, any case: `t g meg k mil m u µ n p f a`; `mil` is 25.4·10⁻⁶. Letters after the suffix, or letters that are
-/// no suffix (`5ohm`, `10uF`, `5Vdc`), are a unit and change nothing.
+/// no suffix (`5ohm`, `10uF`, `5Vdc`), are a unit and change nothing. `a` is a suffix before a unit alone (`5aF`): `5A` and `5amps`
+/// are ampere.
 ///
 /// # Errors
 /// What keeps the text from being a number, and where.
@@ -184,11 +185,20 @@ fn suffix(text: &str) -> (Option<(i128, i64)>, usize) {
         'n' => -9,
         'p' => -12,
         'f' => -15,
-        'a' => -18,
+        'a' if !is_ampere(text) => -18,
         'r' if text[1..].starts_with(|c: char| c.is_ascii_digit()) => 0,
         _ => return (None, 0),
     };
     (Some((1, power)), first.len_utf8())
+}
+
+/// Whether these letters are the unit A.
+fn is_ampere(text: &str) -> bool {
+    let unit = &text[..letters(text)];
+    matches!(
+        unit.to_ascii_lowercase().as_str(),
+        "a" | "amp" | "amps" | "ampere" | "amperes"
+    )
 }
 
 /// The length of the letters at the start of a text (a unit: `Hz`, `Ω`, `°C`).
@@ -217,7 +227,11 @@ mod tests {
             ("1mil", 25.4e-6, (254, -7)),
             ("1M", 1e-3, (1, -3)),
             ("1F", 1e-15, (1, -15)),
-            ("2a", 2e-18, (2, -18)),
+            ("2aF", 2e-18, (2, -18)),
+            ("2a", 2.0, (2, 0)),
+            ("2A", 2.0, (2, 0)),
+            ("2mA", 2e-3, (2, -3)),
+            ("2amps", 2.0, (2, 0)),
             ("5Vdc", 5.0, (5, 0)),
             ("5ohm", 5.0, (5, 0)),
             ("50Hz", 50.0, (5, 1)),

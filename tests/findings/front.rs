@@ -213,6 +213,58 @@ fn a_driven_node_keeps_its_voltage() {
     );
 }
 
+/// 2 A and 10 A into 1 kΩ, as ngspice 39 reads them.
+#[test]
+fn a_is_the_unit_ampere() {
+    assert_eq!(value(&run("ampere", Method::Exact), "v(a)", 5e-6), 2e3);
+    assert_eq!(
+        value(&run("ampere_param", Method::Exact), "v(a)", 5e-6),
+        1e4
+    );
+}
+
+#[test]
+fn models_of_levels_with_other_equations_are_refused() {
+    let loaded = circ::netlist::load(&crate::path("hicum"), &ElaborateOptions::default());
+    let said: Vec<&str> = loaded
+        .diagnostics
+        .iter()
+        .map(|d| d.message.as_str())
+        .collect();
+    assert!(
+        loaded.circuit.is_none() && said[0].contains("level 8 (HICUM)"),
+        "{said:?}"
+    );
+}
+
+#[test]
+fn values_altered_before_the_run_count() {
+    let run = run("control_alter", Method::Exact);
+    assert!((value(&run, "v(b)", 5e-3) - 10.0).abs() < 1e-12);
+    // From 1 V in steady state; 2 kΩ and 2 µF; what follows the run, or is undone before it, does not count.
+    let text = "t\nV1 a 0 PULSE(1 3 0 0 0 1 2)\nR1 a b 1k\nC1 b 0 1u\nV2 c 0 1\n.control\nalter r1 = 7\nreset\n\
+                alter @r1[resistance]=2k\nalter c1 capacitance = 2u\nalter v2 dc 5\ntran 1u 4m\nalter r1 = 1\n.endc\n";
+    let run = run_text(text, Method::Exact);
+    let right = 3.0 - 2.0 * (-1.0_f64).exp();
+    assert!((value(&run, "v(b)", 4e-3) - right).abs() < 1e-9);
+    assert_eq!(value(&run, "v(c)", 4e-3), 5.0);
+}
+
+/// A triangle, as in ngspice 47.
+#[test]
+fn a_pulse_of_no_width_is_a_triangle() {
+    let run = run("pulse_width_0", Method::Exact);
+    for (t, right) in [(25e-6, 0.0), (50e-6, 1.0), (75e-6, 0.0), (100e-6, -1.0)] {
+        assert!((value(&run, "v(a)", t) - right).abs() < 1e-9, "{t}");
+    }
+}
+
+#[test]
+fn a_print_step_longer_than_the_run_leaves_first_and_last_row() {
+    let run = run_text("t\nV1 a 0 5\nR1 a 0 1k\n.tran 1 1u\n", Method::Auto);
+    assert_eq!(run.waveforms.time, [0.0, 1e-6]);
+}
+
 /// Every failure of a run names its place, its cause and what to do; the whole message is the snapshot.
 #[cfg(feature = "cli")]
 #[test]

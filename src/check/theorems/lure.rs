@@ -164,7 +164,7 @@ fn assumption_4(swap: &Swap, fed: &[usize], h: &mut Hypotheses) {
     );
     h.need(
         range <= ZERO.sqrt() && kernel <= ZERO.sqrt(),
-        format!("(21) R(C_II) ⊂ R(D_II + D_IIᵀ) ⊂ ker(B_II)⊥ up to {range:.1e} and {kernel:.1e}"),
+        format!("(21) R(C_II) ⊂ R(D_II + D_IIᵀ) and ker(D_II + D_IIᵀ) ⊂ ker(B_II) up to {range:.1e} and {kernel:.1e}"),
     );
 }
 

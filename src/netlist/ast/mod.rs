@@ -4,6 +4,7 @@ mod expr;
 mod measure;
 mod sweep;
 
+use crate::algebra::Value;
 use std::fmt;
 
 pub use expr::{Binary, Expr, ExprKind, Unary};
@@ -86,6 +87,19 @@ pub enum Statement {
     Step(Sweep),
     /// `.dc`: the first sweep is the innermost.
     Dc(Vec<Sweep>),
+    /// `alter` inside `.control`, before the run.
+    Alter(Alter),
+}
+
+/// `alter r1 = 100`, `alter @v1[dc] = 5`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Alter {
+    /// The element.
+    pub name: Name,
+    /// What of it, where that is written.
+    pub quantity: Option<String>,
+    /// Its value from then on.
+    pub value: Value,
 }
 
 /// An element card.

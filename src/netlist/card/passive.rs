@@ -42,7 +42,7 @@ pub(super) fn passive<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
     Ok((at, (nodes, Device::Passive { values, args })))
 }
 
-/// Capital suffixes that SPICE reads otherwise than people do: 1M Ω is 1 mΩ, 1F is 1 fF.
+/// Suffixes that SPICE reads otherwise than people do: 1M Ω is 1 mΩ, 1F is 1 fF, 1a is 1.
 pub(super) fn warn_of_suffix(at: Input<'_>, name: &Name, value: &Expr) {
     let at = separator(at);
     let ExprKind::Number(number) = &value.kind else {
@@ -56,31 +56,30 @@ pub(super) fn warn_of_suffix(at: Input<'_>, name: &Name, value: &Expr) {
     if number.f64 == 0.0 || !digits.ends_with(|c: char| c.is_ascii_digit() || c == '.') {
         return;
     }
-    let finding = match (name.text.chars().next(), last) {
+    let capital = "SPICE suffixes know no capitals";
+    let (code, message, label, help) = match (name.text.chars().next(), last) {
         (Some('r'), 'M') => (
             "suffix-m",
-            "milli",
+            format!("`{written}` is {digits} milli"),
+            capital,
             format!("write `{digits}Meg` for {digits} MΩ, `{digits}m` for {digits} mΩ"),
         ),
         (Some('c'), 'F') => (
             "suffix-f",
-            "femto",
+            format!("`{written}` is {digits} femto"),
+            capital,
             format!("write `{digits}` for {digits} F, `{digits}f` for {digits} fF"),
         ),
-        (Some('v' | 'i'), 'A') => (
+        (Some('r' | 'c' | 'l'), 'a' | 'A') => (
             "suffix-a",
-            "atto",
-            format!("write `{digits}` for {digits} A"),
+            format!("`{written}` is {digits}, its `{last}` the unit ampere"),
+            "not atto",
+            format!("write `{digits}e-18` for {digits} atto"),
         ),
         _ => return,
     };
-    let message = format!("`{written}` is {digits} {}", finding.1);
-    tell(
-        at,
-        Diagnostic::warning(finding.0, value.span, message)
-            .label("SPICE suffixes know no capitals")
-            .help(finding.2),
-    );
+    let warning = Diagnostic::warning(code, value.span, message);
+    tell(at, warning.label(label).help(help));
 }
 
 /// `K1 L1 L2 0.99`, `K1 (L1 L2 L3) {k}`.

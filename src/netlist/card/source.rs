@@ -1,6 +1,5 @@
 //! V and I: a DC value, a waveform, an AC specification (ignored) in any order.
 
-use super::passive::warn_of_suffix;
 use super::{Body, assign, assignment_follows, expect_value, keyword, nodes};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Assign, Device, Name, WaveArg, WaveCall};
@@ -19,7 +18,7 @@ const WAVES: [&str; 12] = [
 const FLAGS: [&str; 3] = ["load", "distof1", "distof2"];
 
 /// `V1 a b DC 5 AC 1 SIN(0 5 50) Rser=1`.
-pub(super) fn source<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
+pub(super) fn source<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
     let (mut at, nodes) = nodes(i, 2, "node")?;
     let (mut dc, mut wave, mut args) = (None, None, Vec::new());
     loop {
@@ -44,9 +43,7 @@ pub(super) fn source<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
                 at = rest;
                 continue;
             }
-            let before = rest;
-            let (rest, value) = expect_value(before, "the DC value")?;
-            warn_of_suffix(before, name, &value);
+            let (rest, value) = expect_value(rest, "the DC value")?;
             (at, dc) = (rest, Some(value));
         } else if let Some(rest) = keyword(at, "ac") {
             at = skip_ac(symbol(rest, '=').unwrap_or(rest));
@@ -61,7 +58,7 @@ pub(super) fn source<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
         } else if dc.is_none() {
             let (rest, value) = expect_value(at, "a value or waveform")?;
             if symbol(rest, '(').is_some() {
-                let known = "SIN, PULSE, PWL, EXP";
+                let known = "SIN, PULSE, PWL, EXP, SFFM, AM";
                 let fault =
                     Diagnostic::error("unknown-waveform", next_word(at), "unknown waveform");
                 return Err(refuse(
@@ -70,7 +67,6 @@ pub(super) fn source<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
                         .help(format!("waveforms are {known}")),
                 ));
             }
-            warn_of_suffix(at, name, &value);
             (at, dc) = (rest, Some(value));
         } else {
             return Ok((at, (nodes, Device::Source { dc, wave, args })));
