@@ -13,6 +13,7 @@ mod numbers;
 mod output;
 #[path = "../runs/mod.rs"]
 mod runs;
+mod turn_off;
 
 use std::path::{Path, PathBuf};
 
@@ -54,6 +55,15 @@ fn run(name: &str, method: Method) -> Run {
 
 /// As [`run`], with pieces of the netlist's text replaced; each must occur.
 fn changed(name: &str, replacements: &[(&str, &str)], method: Method) -> Run {
+    let options = SimOptions {
+        method,
+        ..SimOptions::default()
+    };
+    changed_by(name, replacements, options)
+}
+
+/// As [`changed`], with all options.
+fn changed_by(name: &str, replacements: &[(&str, &str)], options: SimOptions<'_>) -> Run {
     let mut text = std::fs::read_to_string(path(name)).expect("a netlist");
     for (from, to) in replacements {
         assert!(text.contains(from), "{name} has no `{from}`");
@@ -65,9 +75,5 @@ fn changed(name: &str, replacements: &[(&str, &str)], method: Method) -> Run {
     let (circuit, findings) = elaborate(&netlist, &ElaborateOptions::default());
     let circuit = circuit.unwrap_or_else(|| panic!("{name}: {findings:?}"));
     let behaviour = behaviour(&circuit).unwrap_or_else(|e| panic!("{name}: {e:?}"));
-    let options = SimOptions {
-        method,
-        ..SimOptions::default()
-    };
     simulate(&circuit, &behaviour, options).unwrap_or_else(|e| panic!("{name}: {e}"))
 }

@@ -1,8 +1,11 @@
 //! One step: tried with the present active set, else solved, then committed.
 
 use super::*;
-use crate::solve::active::ActiveSolve;
-use crate::solve::lcp::{Lcp, Scaling};
+use crate::solve::lcp::Scaling;
+use crate::solve::norm;
+
+/// Singular values of the equilibrated D below this are rounding of zeros.
+const SINGULAR: f64 = 1e-10;
 
 impl Theta<'_> {
     /// Rounding of the difference of two times near `t`.
@@ -130,11 +133,16 @@ impl Theta<'_> {
         }
         self.lambda.copy_from_slice(solution.lambda.as_slice());
         self.worst_residual = self.worst_residual.max(solution.residual);
+        let sets = solution.basis.iter().zip(&now.active);
+        let off = |(port, (after, before)): (&Port, (&bool, &bool))| {
+            after != before && *after == (port.role == Role::Voltage)
+        };
+        let off = system.lcs.ports.iter().zip(sets).any(off);
         self.attempt = Attempt {
             step,
             mode: 0,
             h,
-            settle: false,
+            turned_off: off && self.scheme.order() == 2,
             solved: Some((solution.basis, solution.active)),
             ..Attempt::default()
         };
@@ -161,7 +169,8 @@ impl Theta<'_> {
             let fused = system.step(self.attempt.step).fused(self.attempt.mode);
             self.now.balance.add(fused.power.over_step(&self.z));
         }
-        self.now.settle = false;
+        self.now.turned_off = self.attempt.turned_off;
+        self.now.settle = self.now.turned_off;
         self.now.x.copy_from_slice(&self.out[..n]);
         self.now.u.copy_from_slice(&self.u_next);
         self.now.t = t1;
@@ -264,25 +273,30 @@ impl Theta<'_> {
     }
 }
 
-/// λ + δ with y_a = 0 at (x, u) on an active set, δ the least that reduces y_a most: nothing where D_aa = 0.
+/// λ + δ with y_a = 0 at (x, u) on an active set, δ the least that reduces y_a most among those that are no forces on the state,
+/// B δ = 0: what the sources bring then still is what is stored and dissipated.
 fn on_set(lcs: &Lcs, active: &[bool], x: &[f64], u: &[f64], lambda: &[f64]) -> Vec<f64> {
     let vector = DVector::from_column_slice;
-    let mut lambda = vector(lambda);
-    let scaling = Scaling::of(&lcs.d);
-    let d = scaling.apply(&Lcp {
-        m: lcs.d.clone(),
-        q: &lcs.c * vector(x) + &lcs.g * vector(u) + &lcs.f,
-    });
-    let y = d.y(&lambda.component_div(&scaling.d));
-    let solve = ActiveSolve::new(&d.m, active);
-    for (&j, correction) in solve
-        .indices
-        .iter()
-        .zip(solve.lambda(&y).select_rows(&solve.indices).iter())
-    {
-        lambda[j] += correction * scaling.d[j];
+    let mut lambda = lambda.to_vec();
+    let set: Vec<usize> = (0..active.len()).filter(|&j| active[j]).collect();
+    if set.is_empty() {
+        return lambda;
     }
-    lambda.as_slice().to_vec()
+    let scaling = Scaling::of(&lcs.d);
+    let d = DMatrix::from_diagonal(&scaling.d.select_rows(&set));
+    let idle = norm::kernel(&(lcs.b.select_columns(&set) * &d));
+    if idle.ncols() == 0 {
+        return lambda;
+    }
+    let y = &lcs.c * vector(x) + &lcs.d * vector(&lambda) + &lcs.g * vector(u) + &lcs.f;
+    let through = &d * lcs.d.select_rows(&set).select_columns(&set) * &d * &idle;
+    let y = &d * y.select_rows(&set);
+    if let Ok(w) = through.svd(true, true).solve(&y, SINGULAR) {
+        for (&j, correction) in set.iter().zip((d * idle * w).iter()) {
+            lambda[j] -= correction;
+        }
+    }
+    lambda
 }
 
 /// Matrices for a step in which the active set changes or the state may jump: the scheme's θ with γ = 1, or Moreau's where

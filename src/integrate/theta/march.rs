@@ -62,10 +62,11 @@ impl Theta<'_> {
         Ok(0.5 * h)
     }
 
-    /// Whether steps after edges and jumps are Moreau's: those of the midpoint rule with prescribed steps, or where error
-    /// control would not have it otherwise. Other θ and γ are taken as they are.
+    /// Whether steps after edges and jumps are Moreau's: those of the midpoint rule with prescribed steps, where error control would not
+    /// have it otherwise, and where a device that turned off leaves a current behind that decays faster than the step: error control does
+    /// not see it, a blocking resistance does. Other θ and γ are taken as they are.
     pub(super) fn starts_damped(&self) -> bool {
-        self.scheme.order() == 2 && (self.control.is_none() || self.damped)
+        self.scheme.order() == 2 && (self.control.is_none() || self.damped || self.now.turned_off)
     }
 
     pub(super) fn finish_step(
@@ -285,13 +286,15 @@ impl Theta<'_> {
         last_chance: bool,
         impulse: &mut bool,
     ) -> Result<Verdict, SimError> {
+        let turned_off = self.now.turned_off;
         self.attempt(h, t1)?;
         let n = self.now.x.len();
         self.coarse.copy_from_slice(&self.out[..n]);
         let middle = self.now.t + 0.5 * (t1 - self.now.t);
         self.attempt(0.5 * h, middle)?;
         self.commit(middle)?;
-        self.now.settle = self.damped;
+        self.now.turned_off |= turned_off;
+        self.now.settle = self.damped || self.now.turned_off;
         self.attempt(0.5 * h, t1)?;
         if last_chance && self.attempt.solved.is_some() {
             *impulse = self.impulsive(0.5 * h)?;

@@ -17,7 +17,7 @@ mod tests;
 
 use std::collections::BTreeSet;
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use self::estimate::Estimate;
 use crate::integrate::control::{Amplitudes, CORNER, Control};
@@ -150,6 +150,9 @@ struct Now {
     pattern: Vec<bool>,
     /// The next step must have γ = 1: the constraints may not hold at t.
     settle: bool,
+    /// A device turned off in the step before: what current it left behind decays through its blocking resistance, faster than any
+    /// step, and the midpoint rule would ring at it.
+    turned_off: bool,
     system: usize,
     balance: Balance,
     /// The error so far, where it is asked for.
@@ -174,6 +177,7 @@ impl Now {
         self.pattern.clone_from(&other.pattern);
         self.t = other.t;
         self.settle = other.settle;
+        self.turned_off = other.turned_off;
         self.system = other.system;
         self.balance = other.balance;
         if let (Some(mine), Some(other)) = (&mut self.estimate, &other.estimate) {
@@ -190,6 +194,8 @@ struct Attempt {
     h: f64,
     /// Whether it was made for a settling step.
     settle: bool,
+    /// Whether a device turned off in a step of the midpoint rule.
+    turned_off: bool,
     /// Basis and pattern after the step, where the solvers ran.
     solved: Option<(Vec<bool>, Vec<Option<bool>>)>,
     /// Energy from sources and into resistors and devices, J, where the stages tell it.
@@ -245,6 +251,7 @@ impl<'a> Theta<'a> {
             active: vec![false; system.lcs.m()],
             pattern: vec![false; system.lcs.m()],
             settle: true,
+            turned_off: false,
             system: at,
             balance,
             estimate: None,

@@ -197,6 +197,7 @@ impl Theta<'_> {
             h,
             settle: false,
             solved: Some((solution.basis, solution.active)),
+            turned_off: false,
             work: Some(work),
             error,
         };

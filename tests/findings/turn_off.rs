@@ -1,0 +1,77 @@
+//! Devices that turn off into a large resistance, by steps.
+
+use circ::integrate::{Method, Run, SimOptions};
+
+use super::changed_by;
+use super::runs::column;
+
+/// The half-wave rectifier with another blocking resistance, by the midpoint rule: with chosen or given steps.
+fn half_wave(roff: &str, step: Option<f64>) -> Run {
+    let options = SimOptions {
+        method: Method::Theta,
+        step,
+        ..SimOptions::default()
+    };
+    let roff = format!("roff={roff}");
+    changed_by("halfwave_roff_1e16", &[("roff=1e16", &roff)], options)
+}
+
+#[test]
+fn a_blocking_diode_has_the_voltage_of_the_source_at_once() {
+    for roff in ["1e6", "1e9", "1e12"] {
+        for step in [None, Some(10e-6)] {
+            let run = half_wave(roff, step);
+            let [source, anode, current] = ["v(s)", "v(u)", "i(l1)"].map(|name| column(&run, name));
+            let resistance: f64 = roff.parse().unwrap();
+            let mut blocking = 0;
+            for (k, t) in run.waveforms.time.iter().enumerate() {
+                // Conduction ends 0.10 ms after the half-wave.
+                let phase = t % 20e-3;
+                if (10.11e-3..19.99e-3).contains(&phase) {
+                    blocking += 1;
+                    // L di/dt and the load's share of 10 V, and the step's own error of the slope.
+                    assert!(
+                        (source[k] - anode[k]).abs() < 2e-5,
+                        "{roff} {step:?}: {} V at {t} s",
+                        source[k] - anode[k]
+                    );
+                    let leak = source[k] / resistance;
+                    assert!(
+                        (current[k] - leak).abs() < 1e-4 * 10.0 / resistance,
+                        "{roff} {step:?}: {} A at {t} s",
+                        current[k]
+                    );
+                }
+            }
+            assert!(blocking > 2900, "{blocking}");
+        }
+    }
+}
+
+#[test]
+fn turning_off_dissipates_what_the_resistances_take() {
+    // ∫ i² (0.1 Ω + 10 Ω) over three half-waves, from the closed form of the current: Z = √(10.1² + (ωL)²).
+    let (r, l, omega) = (10.1_f64, 1e-3, 100.0 * std::f64::consts::PI);
+    let (z, phase) = (r.hypot(omega * l), (omega * l / r).atan());
+    let current =
+        |t: f64| 10.0 / z * ((omega * t - phase).sin() + phase.sin() * (-r * t / l).exp()).max(0.0);
+    let n = 200_000;
+    let h = 11e-3 / f64::from(n);
+    let squares: f64 = (0..n)
+        .map(|k| current((f64::from(k) + 0.5) * h).powi(2))
+        .sum();
+    let heat = 3.0 * r * squares * h;
+    for roff in ["1e6", "1e9", "1e12"] {
+        for (step, tolerance) in [(None, 1e-5), (Some(10e-6), 1e-4)] {
+            let energy = half_wave(roff, step).energy;
+            // The blocking resistance takes another 25 V² · 30 ms/roff at most.
+            let leak = 1.5 / roff.parse::<f64>().unwrap();
+            assert!(
+                (energy.dissipated - heat).abs() < tolerance * heat + leak,
+                "{roff} {step:?}: {} J in place of {heat} J",
+                energy.dissipated
+            );
+            assert!(energy.residual_relative < 1e-9, "{energy:?}");
+        }
+    }
+}
