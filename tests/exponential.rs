@@ -359,7 +359,7 @@ fn prescribed_steps_tell_their_error() {
             for step in [h, h / 3.0] {
                 let found = stepped(method, step);
                 let error = error(&found, &reference, storage);
-                let ratio = found.error_estimate.unwrap() / error;
+                let ratio = found.error.max.unwrap() / error;
                 assert!(
                     (0.5..5.0).contains(&ratio),
                     "{name} {method:?} {step:e}: {ratio} of {error:e}"

@@ -146,7 +146,7 @@ fn source_driven_switch_closes_two_capacitors_together() {
         .count();
     assert_eq!(rows, 2, "{:?}", run.events);
     close(
-        run.energy.dissipated,
+        run.energy.jumps,
         0.5 * 1e-4 - 0.5 * 1.3e-6 * (10.0_f64 / 1.3).powi(2),
         1e-10,
     );

@@ -411,6 +411,13 @@ pub fn tran(subject: &Subject) -> Option<Tran> {
 /// On standard error: JSON where asked for; words where asked for, for a person, and with `-v`; else the notes alone.
 /// What was measured is in all of them.
 fn summarise(run: &Run, found: &Measurements, args: &SimArgs, streams: &Streams) {
+    let in_words = args.summary == Some(Summary::Text)
+        || args.summary.is_none() && (streams.verbose || streams.err_is_terminal());
+    if !in_words {
+        for warning in text::warnings(run) {
+            streams.say(format!("warning: {warning}"));
+        }
+    }
     match args.summary {
         Some(Summary::Json) => return streams.error(json::summary(run, found)),
         Some(Summary::Text) => streams.error(text::summary(run, streams.verbose)),

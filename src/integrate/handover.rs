@@ -8,7 +8,7 @@ mod tests;
 
 use crate::integrate::exact::{Exact, Place};
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper, Times, is_final, named};
-use crate::integrate::stats::Stats;
+use crate::integrate::stats::{StatedError, Stats};
 use crate::integrate::theta::Theta;
 
 /// Makes a stepper that starts at a place.
@@ -53,7 +53,7 @@ pub(crate) struct Handover<'a> {
     stats: Stats,
     notes: Vec<String>,
     /// The estimated error of all steps, relative to amplitudes: the exact integration adds none.
-    error: Option<f64>,
+    error: StatedError,
 }
 
 impl<'a> Handover<'a> {
@@ -70,7 +70,7 @@ impl<'a> Handover<'a> {
             interruptions: Vec::new(),
             stats: Stats::default(),
             notes: Vec::new(),
-            error: None,
+            error: StatedError::default(),
         }
     }
 
@@ -146,11 +146,11 @@ impl<'a> Handover<'a> {
         let Outcome {
             stats,
             notes,
-            error_estimate,
+            error,
             ..
         } = outcome;
-        if let Some(error) = error_estimate {
-            *self.error.get_or_insert(0.0) += error;
+        if let Some(error) = error.max {
+            *self.error.max.get_or_insert(0.0) += error;
         }
         self.stats.steps += stats.steps;
         self.stats.rejected += stats.rejected;
@@ -267,7 +267,7 @@ impl Stepper for Handover<'_> {
         stats.lcp_solves += lcp_solves;
         stats.pivotings += pivotings;
         stats.factorisations += factorisations;
-        outcome.error_estimate = self.error;
+        outcome.error = self.error;
         outcome.notes.extend(self.interruption_notes());
         outcome.notes.append(&mut self.notes);
         outcome

@@ -29,4 +29,4 @@ pub use rows::{Asked, Block, RowKind, Sink};
 pub use run::{Frame, Grid, Log, NoRest, Outcome, Reason, SimError, Stepper};
 pub use simulate::{Method, SimOptions, simulate, simulate_system};
 pub use start::{OperatingPoint, Values, operating_point};
-pub use stats::{Energy, Impulse, Run, Stats};
+pub use stats::{Energy, Impulse, JumpReason, Run, StateJump, StateJumps, StatedError, Stats};

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::circuit::Tran;
 use crate::diagnostic::Internal;
 use crate::integrate::rows::{Asked, RowKind, Sheet};
-use crate::integrate::{Energy, Impulse, Run, Stats};
+use crate::integrate::{Energy, Impulse, Run, StateJump, StateJumps, StatedError, Stats};
 use crate::lcs::ReduceError;
 use crate::waveform::Waveforms;
 
@@ -243,8 +243,8 @@ pub struct Outcome {
     pub stats: Stats,
     /// Energy balance.
     pub energy: Energy,
-    /// See [`Run::error_estimate`].
-    pub error_estimate: Option<f64>,
+    /// See [`Run::error`].
+    pub error: StatedError,
     /// Things the user should know.
     pub notes: Vec<String>,
 }
@@ -256,6 +256,8 @@ pub struct Log<'a> {
     pub events: Vec<(f64, Arc<str>)>,
     /// Impulses at jumps; the first [`Self::LISTED`].
     pub impulses: Vec<Impulse>,
+    /// Jumps of the state.
+    pub state_jumps: StateJumps,
     rows: Sheet<'a>,
 }
 
@@ -298,6 +300,11 @@ impl<'a> Log<'a> {
                 area,
             });
         }
+    }
+
+    /// A jump of the state.
+    pub fn state_jump(&mut self, jump: StateJump) {
+        self.state_jumps.add(jump);
     }
 
     /// Whether rows at event times were asked for.
@@ -567,9 +574,10 @@ pub(crate) fn attempt(
         plan,
         stats: outcome.stats,
         energy: outcome.energy,
-        error_estimate: outcome.error_estimate,
+        error: outcome.error,
         impulses: std::mem::take(&mut log.impulses),
         events: std::mem::take(&mut log.events),
+        state_jumps: std::mem::take(&mut log.state_jumps),
         notes: all_notes,
     };
     match failure {

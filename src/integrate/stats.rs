@@ -33,11 +33,17 @@ pub struct Stats {
 pub struct Energy {
     /// Delivered by sources.
     pub source: f64,
-    /// Dissipated in resistors, devices and by jumps.
+    /// Dissipated in resistors, switches and devices.
     pub dissipated: f64,
     /// Stored at the end minus stored at the start.
     pub stored: f64,
-    /// |source − dissipated − stored| relative to the largest energy seen.
+    /// Lost in jumps: where charges or fluxes are joined, or find no path, in no time.
+    pub jumps: f64,
+    /// Lost by the damping of the steps; less than nothing where they add energy.
+    pub numerical: f64,
+    /// source − dissipated − stored − jumps − numerical: what these, each computed by itself, leave unexplained.
+    pub residual: f64,
+    /// |residual| relative to the largest energy seen.
     pub residual_relative: f64,
 }
 
@@ -50,6 +56,149 @@ pub struct Impulse {
     pub name: String,
     /// A·s or V·s.
     pub area: f64,
+}
+
+/// What made the state jump.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum JumpReason {
+    /// The initial values contradict each other, or the sources at t = 0⁺.
+    Start,
+    /// An edge of a source.
+    SourceEdge,
+    /// Switches that moved, `s1, s2`.
+    Switch(String),
+    /// A device that began to conduct or to block.
+    Device(String),
+}
+
+impl std::fmt::Display for JumpReason {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Start => f.write_str("start"),
+            Self::SourceEdge => f.write_str("source edge"),
+            Self::Switch(name) => write!(f, "switch {name}"),
+            Self::Device(name) => write!(f, "device {name}"),
+        }
+    }
+}
+
+impl serde::Serialize for JumpReason {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// A jump that changed voltages of capacitors or currents of inductors by more than rounding.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct StateJump {
+    /// Time, s.
+    pub t: f64,
+    /// The capacitors and inductors that jumped.
+    pub elements: Vec<String>,
+    /// The energy it lost, J.
+    pub loss: f64,
+    /// What made it.
+    pub reason: JumpReason,
+    /// Whether a current lost its path or charges of different voltages were joined: energy that no device took up in time.
+    #[serde(skip)]
+    pub destroys: bool,
+}
+
+/// A jump that loses more than this part of the energy at hand destroys a current or a charge; below it lies a current of 3e-5
+/// of its amplitude, as a switch that opens where a current is meant to be zero finds it.
+const DESTROYED: f64 = 1e-9;
+
+impl StateJump {
+    /// The jump at `t` of the storage elements `moved`, which lost `loss`, J, where `energy`, J, is at hand. At an edge of a source
+    /// capacitors take up their charge through devices that a resistance, however small, would have warmed in their place: no charge
+    /// is destroyed.
+    pub(crate) fn new(
+        t: f64,
+        storage: (&[String], &[&str]),
+        moved: &[usize],
+        (loss, energy): (f64, f64),
+        reason: JumpReason,
+    ) -> Self {
+        let (elements, units) = storage;
+        let current = moved.iter().any(|&k| units[k] == "A");
+        Self {
+            t,
+            elements: moved.iter().map(|&k| elements[k].clone()).collect(),
+            loss,
+            destroys: loss > DESTROYED * energy && (current || reason != JumpReason::SourceEdge),
+            reason,
+        }
+    }
+}
+
+/// The jumps of a run: the first one by one, and all of them together.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct StateJumps {
+    /// The first [`Self::KEPT`].
+    pub first: Vec<StateJump>,
+    /// The first of those that destroy a current or charge.
+    pub destroyer: Option<StateJump>,
+    /// Number and loss, J, of all.
+    pub all: (u64, f64),
+    /// Number and loss, J, of those that destroy a current or charge.
+    pub destroying: (u64, f64),
+}
+
+impl StateJumps {
+    /// Jumps that are kept one by one.
+    pub const KEPT: usize = 100;
+
+    /// Adds the jumps of another run.
+    pub fn extend(&mut self, other: &Self) {
+        let add = |sum: &mut (u64, f64), own: (u64, f64)| {
+            sum.0 += own.0;
+            sum.1 += own.1;
+        };
+        add(&mut self.all, other.all);
+        add(&mut self.destroying, other.destroying);
+        if self.destroyer.is_none() {
+            self.destroyer.clone_from(&other.destroyer);
+        }
+        let room = Self::KEPT - self.first.len().min(Self::KEPT);
+        self.first.extend(other.first.iter().take(room).cloned());
+    }
+
+    /// Adds a jump.
+    pub fn add(&mut self, jump: StateJump) {
+        let count = |(number, loss): &mut (u64, f64)| {
+            *number += 1;
+            *loss += jump.loss;
+        };
+        count(&mut self.all);
+        if jump.destroys {
+            count(&mut self.destroying);
+            self.destroyer.get_or_insert_with(|| jump.clone());
+        }
+        if self.first.len() < Self::KEPT {
+            self.first.push(jump);
+        }
+    }
+}
+
+/// The error of a run as far as its method knows it, relative to the amplitude of each quantity.
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
+pub struct StatedError {
+    /// Of the worst value.
+    pub max: Option<f64>,
+    /// Root mean square over the run, of the worst quantity.
+    pub rms: Option<f64>,
+}
+
+impl StatedError {
+    /// That of two runs together: known where both are.
+    #[must_use]
+    pub fn worse(self, other: Self) -> Self {
+        let both = |a: Option<f64>, b: Option<f64>| Some(a?.max(b?));
+        Self {
+            max: both(self.max, other.max),
+            rms: both(self.rms, other.rms),
+        }
+    }
 }
 
 /// Everything a simulation returns.
@@ -69,10 +218,12 @@ pub struct Run {
     pub stats: Stats,
     /// The energy balance.
     pub energy: Energy,
-    /// The error of the states that the steps themselves let expect, relative to their amplitudes; none for exact runs.
-    pub error_estimate: Option<f64>,
+    /// The error that the steps themselves let expect; nothing for exact runs, nor where the steps do not tell.
+    pub error: StatedError,
     /// Impulses at jumps.
     pub impulses: Vec<Impulse>,
+    /// Jumps of the state.
+    pub state_jumps: StateJumps,
     /// Event times, s, with the devices whose state changed.
     pub events: Vec<(f64, Arc<str>)>,
     /// Things the user should know.

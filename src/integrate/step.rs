@@ -331,7 +331,7 @@ impl StepMatrices {
             k.extend(y.row(j).iter());
             sizes.extend(y_size.row(j).iter());
         }
-        let power = PowerForms::new(lcs, columns, self.h, self.scheme, &x_next, &lambda);
+        let power = PowerForms::new(lcs, columns, self.h, self.scheme, active, &x_next, &lambda);
         FusedMode {
             active: active.to_vec(),
             k,

@@ -195,6 +195,10 @@ pub struct PowerTerm {
 pub struct Storage {
     /// `v(c1)`, … `i(l1)` for *all* capacitors and inductors (flux states for coupled ones), in circuit order.
     pub names: Vec<String>,
+    /// The elements themselves, `c1`, `l1` (states of a system without a circuit behind it).
+    pub elements: Vec<String>,
+    /// `V` or `A`, of each.
+    pub units: Vec<&'static str>,
     /// q×n: s = X x + Λ λ + U u + k.
     pub x: DMatrix<f64>,
     /// q×m: zero (or empty) but for operating points, where storage is open or short and devices decide its values.

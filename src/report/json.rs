@@ -4,7 +4,8 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::measured::Measurements;
-use crate::integrate::{Energy, Impulse, Run};
+use super::text;
+use crate::integrate::{Energy, Impulse, Run, StateJump, StatedError};
 
 #[derive(Serialize)]
 struct Summary<'a> {
@@ -20,18 +21,27 @@ struct Summary<'a> {
     factorisations: u64,
     cpu_seconds: f64,
     energy: Energy,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    error_estimate: Option<f64>,
+    error: StatedError,
     notes: &'a [String],
     impulses: &'a [Impulse],
+    state_jumps: &'a [StateJump],
+    state_jumps_total: Total,
+    warnings: Vec<String>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     measurements: Vec<Value>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     fourier: Vec<Value>,
 }
 
-/// What a run did, as one JSON object on one line: method, plan, counters, energy balance, notes, impulses, and what was
-/// measured.
+/// Of all jumps, those that are not listed included.
+#[derive(Serialize)]
+struct Total {
+    count: u64,
+    loss: f64,
+}
+
+/// What a run did, as one JSON object on one line: method, plan, counters, energy balance, stated error, notes, impulses, jumps of the
+/// state, and what was measured.
 #[must_use]
 pub fn summary(run: &Run, found: &Measurements) -> String {
     line(&Summary::of(run, found))
@@ -63,9 +73,15 @@ impl<'a> Summary<'a> {
             factorisations: stats.factorisations,
             cpu_seconds: stats.cpu_seconds,
             energy: run.energy,
-            error_estimate: run.error_estimate,
+            error: run.error,
             notes: &run.notes,
             impulses: &run.impulses,
+            state_jumps: &run.state_jumps.first,
+            state_jumps_total: Total {
+                count: run.state_jumps.all.0,
+                loss: run.state_jumps.all.1,
+            },
+            warnings: text::warnings(run),
             measurements,
             fourier,
         }
@@ -81,10 +97,18 @@ pub fn line(report: &impl Serialize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::integrate::Stats;
+    use crate::integrate::{JumpReason, StateJumps, Stats};
 
     #[test]
     fn the_summary_has_the_promised_keys() {
+        let mut state_jumps = StateJumps::default();
+        state_jumps.add(StateJump {
+            t: 1e-3,
+            elements: vec!["l1".into()],
+            loss: 0.25,
+            reason: JumpReason::Switch("s1".into()),
+            destroys: true,
+        });
         let run = Run {
             method: "exact".into(),
             plan: vec!["piecewise linear".into()],
@@ -96,22 +120,32 @@ mod tests {
             energy: Energy {
                 source: 1.5,
                 dissipated: 1.0,
-                stored: 0.5,
-                residual_relative: 0.0,
+                stored: 0.25,
+                jumps: 0.25,
+                ..Energy::default()
+            },
+            error: StatedError {
+                max: Some(1e-4),
+                rms: None,
             },
             impulses: vec![Impulse {
                 t: 0.001,
                 name: "i(d1)".into(),
                 area: -2e-6,
             }],
+            state_jumps,
             ..Run::default()
         };
         assert_eq!(
             summary(&run, &Measurements::default()),
             "{\"method\":\"exact\",\"plan\":[\"piecewise linear\"],\"steps\":7,\"rejected\":0,\"events\":2,\"jumps\":0,\
              \"modes\":0,\"lcp_solves\":0,\"pivotings\":0,\"factorisations\":0,\"cpu_seconds\":0.0,\
-             \"energy\":{\"source\":1.5,\"dissipated\":1.0,\"stored\":0.5,\"residual_relative\":0.0},\"notes\":[],\
-             \"impulses\":[{\"t\":0.001,\"name\":\"i(d1)\",\"area\":-2e-6}]}"
+             \"energy\":{\"source\":1.5,\"dissipated\":1.0,\"stored\":0.25,\"jumps\":0.25,\"numerical\":0.0,\"residual\":0.0,\
+             \"residual_relative\":0.0},\"error\":{\"max\":0.0001,\"rms\":null},\"notes\":[],\
+             \"impulses\":[{\"t\":0.001,\"name\":\"i(d1)\",\"area\":-2e-6}],\
+             \"state_jumps\":[{\"t\":0.001,\"elements\":[\"l1\"],\"loss\":0.25,\"reason\":\"switch s1\"}],\
+             \"state_jumps_total\":{\"count\":1,\"loss\":0.25},\
+             \"warnings\":[\"l1 jumps at 1 ms (switch s1): a current or charge is destroyed, and 250 mJ with it\"]}"
         );
     }
 }

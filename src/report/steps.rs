@@ -4,7 +4,7 @@ use serde_json::{Map, Value};
 
 use super::measured::Measurements;
 use super::{json, si, table};
-use crate::integrate::{Energy, Run, Stats};
+use crate::integrate::{Energy, Run, StatedError, Stats};
 use crate::waveform::Waveforms;
 
 /// One of the runs.
@@ -90,14 +90,22 @@ pub fn total(steps: &[Step]) -> Run {
             source: sum.source + own.source,
             dissipated: sum.dissipated + own.dissipated,
             stored: sum.stored + own.stored,
+            jumps: sum.jumps + own.jumps,
+            numerical: sum.numerical + own.numerical,
+            residual: sum.residual + own.residual,
             residual_relative: sum.residual_relative.max(own.residual_relative),
         };
+        total.state_jumps.extend(&run.state_jumps);
         for note in &run.notes {
             if !total.notes.contains(note) {
                 total.notes.push(note.clone());
             }
         }
     }
+    // One run that does not know its error leaves that of all unknown.
+    total.error = (steps.iter().map(|step| step.run.error))
+        .reduce(StatedError::worse)
+        .unwrap_or_default();
     total.waveforms = rows(steps);
     total.kinds = steps.iter().flat_map(|s| s.run.kinds.clone()).collect();
     total

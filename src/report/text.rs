@@ -1,11 +1,11 @@
 //! Summaries in words.
 
 use super::{si, table};
-use crate::integrate::Run;
+use crate::integrate::{Method, Run, StateJump};
 use crate::waveform::compare::Comparison;
 
-/// Impulses listed before the rest is only counted.
-const IMPULSES_SHOWN: usize = 8;
+/// Impulses and jumps listed before the rest is only counted.
+const SHOWN: usize = 8;
 
 /// What a run did: method, work, energy balance, impulses and notes; with `verbose` the plan and the event times too.
 #[must_use]
@@ -35,19 +35,31 @@ pub fn summary(run: &Run, verbose: bool) -> String {
     ));
     let energy = &run.energy;
     lines.push(format!(
-        "energy: source {}, dissipated {}, stored {}, residual {} of the largest",
+        "energy: source {}, dissipated {}, stored {}, lost in jumps {}, by numerical damping {}, residual {} of the largest",
         si::quantity(energy.source, "J", 4),
         si::quantity(energy.dissipated, "J", 4),
         si::quantity(energy.stored, "J", 4),
+        si::quantity(energy.jumps, "J", 4),
+        si::quantity(energy.numerical, "J", 4),
         si::plain(energy.residual_relative, 2),
     ));
-    if let Some(error) = run.error_estimate {
+    lines.extend(stated_error(run));
+    let jumps = &run.state_jumps;
+    for jump in jumps.first.iter().take(SHOWN) {
         lines.push(format!(
-            "error: {} of the amplitudes, as the steps let expect",
-            si::plain(error, 2)
+            "jump: {} at {} ({}), {} lost",
+            jump.elements.join(", "),
+            si::quantity(jump.t, "s", 6),
+            jump.reason,
+            si::quantity(jump.loss, "J", 4),
         ));
     }
-    for impulse in run.impulses.iter().take(IMPULSES_SHOWN) {
+    let (count, loss) = jumps.all;
+    if count > SHOWN as u64 {
+        let (more, all) = (count - SHOWN as u64, si::quantity(loss, "J", 4));
+        lines.push(format!("jump: {more} more, {all} lost in all"));
+    }
+    for impulse in run.impulses.iter().take(SHOWN) {
         let unit = if impulse.name.starts_with("i(") {
             "A·s"
         } else {
@@ -59,11 +71,8 @@ pub fn summary(run: &Run, verbose: bool) -> String {
         );
         lines.push(format!("impulse: {} at {time}, area {area}", impulse.name));
     }
-    if run.impulses.len() > IMPULSES_SHOWN {
-        lines.push(format!(
-            "impulse: {} more",
-            run.impulses.len() - IMPULSES_SHOWN
-        ));
+    if run.impulses.len() > SHOWN {
+        lines.push(format!("impulse: {} more", run.impulses.len() - SHOWN));
     }
     if verbose {
         lines.extend(
@@ -72,8 +81,58 @@ pub fn summary(run: &Run, verbose: bool) -> String {
                 .map(|(t, what)| format!("event: {} {what}", si::quantity(*t, "s", 9))),
         );
     }
+    lines.extend(warnings(run).iter().map(|text| format!("warning: {text}")));
     lines.extend(run.notes.iter().map(|note| format!("note: {note}")));
     lines.join("\n") + "\n"
+}
+
+/// The error that a run states, or that it does not know it; nothing where there are no steps to err.
+fn stated_error(run: &Run) -> Option<String> {
+    let part = |error: f64| si::plain(error, 2);
+    match (run.error.max, run.error.rms) {
+        (Some(max), Some(rms)) => Some(format!(
+            "error: {} of the amplitudes at most, {} RMS, as the steps let expect",
+            part(max),
+            part(rms)
+        )),
+        (Some(max), None) => Some(format!(
+            "error: {} of the amplitudes, as the steps let expect",
+            part(max)
+        )),
+        _ if run.method == Method::Exact.name() => None,
+        _ => Some("error: not known".into()),
+    }
+}
+
+/// What a user must be told by default: that a current or charge was destroyed.
+#[must_use]
+pub fn warnings(run: &Run) -> Vec<String> {
+    let Some(first) = &run.state_jumps.destroyer else {
+        return Vec::new();
+    };
+    let (count, loss) = run.state_jumps.destroying;
+    let more = if count > 1 {
+        format!(
+            "; {} more jumps like it, {} in all",
+            count - 1,
+            si::quantity(loss, "J", 3)
+        )
+    } else {
+        String::new()
+    };
+    let StateJump {
+        t,
+        elements,
+        loss,
+        reason,
+        ..
+    } = first;
+    vec![format!(
+        "{} jumps at {} ({reason}): a current or charge is destroyed, and {} with it{more}",
+        elements.join(", "),
+        si::quantity(*t, "s", 6),
+        si::quantity(*loss, "J", 3),
+    )]
 }
 
 /// One line per signal: amplitude and its errors relative to it, with the instants of the worst points.
@@ -111,12 +170,25 @@ pub fn comparison(found: &Comparison) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::integrate::{Energy, Impulse, Stats};
+    use crate::integrate::{Energy, Impulse, JumpReason, StateJumps, Stats};
     use crate::waveform::compare::SignalError;
 
     #[test]
     fn a_run_in_words() {
+        let jump = StateJump {
+            t: 1e-3,
+            elements: vec!["l1".into()],
+            loss: 1e-3,
+            reason: JumpReason::Switch("s1".into()),
+            destroys: true,
+        };
         let run = Run {
+            state_jumps: StateJumps {
+                first: vec![jump.clone()],
+                destroyer: Some(jump),
+                all: (2, 2e-3),
+                destroying: (2, 2e-3),
+            },
             method: "theta".into(),
             plan: vec!["no devices: linear".into()],
             stats: Stats {
@@ -129,8 +201,10 @@ mod tests {
             energy: Energy {
                 source: 0.0125,
                 dissipated: 0.01,
-                stored: 0.0025,
+                stored: 0.0015,
+                jumps: 0.001,
                 residual_relative: 3.1e-7,
+                ..Energy::default()
             },
             impulses: vec![
                 Impulse {
@@ -147,7 +221,9 @@ mod tests {
         insta::assert_snapshot!(summary(&run, true), @r"
         plan: no devices: linear
         theta: 1200 steps (3 rejected), 4 events, 0 jumps, 0 modes, 0 LCP solves, 1.5 ms CPU
-        energy: source 12.5 mJ, dissipated 10 mJ, stored 2.5 mJ, residual 3.1e-7 of the largest
+        energy: source 12.5 mJ, dissipated 10 mJ, stored 1.5 mJ, lost in jumps 1 mJ, by numerical damping 0 J, residual 3.1e-7 of the largest
+        error: not known
+        jump: l1 at 1 ms (switch s1), 1 mJ lost
         impulse: i(d1) at 1 ms, area 2 µA·s
         impulse: i(d1) at 1 ms, area 2 µA·s
         impulse: i(d1) at 1 ms, area 2 µA·s
@@ -158,6 +234,7 @@ mod tests {
         impulse: i(d1) at 1 ms, area 2 µA·s
         impulse: 1 more
         event: 1 ms d1 conducts
+        warning: l1 jumps at 1 ms (switch s1): a current or charge is destroyed, and 1 mJ with it; 1 more jumps like it, 2 mJ in all
         note: v(x) is relative to node a
         ");
         assert!(!summary(&run, false).contains("plan:"));

@@ -36,7 +36,7 @@ fn events_without_end_are_left_to_steps() {
     let rise = |t: f64| rest + (5.0 - rest) * (-rate * (t - 1e-3)).exp();
     assert!((at(&run, "v(out)", 2e-3) - rise(2e-3)).abs() < 1e-3);
     assert!(run.energy.residual_relative < 1e-5, "{:?}", run.energy);
-    let estimate = run.error_estimate.expect("the estimate of the steps");
+    let estimate = run.error.max.expect("the estimate of the steps");
     let error = (at(&run, "v(out)", 0.95e-3) - 5.0).abs() / 6.4;
     assert!(
         (error..50.0 * error).contains(&estimate),

@@ -61,6 +61,8 @@ pub fn system(
         },
         storage: Storage {
             names: states.iter().map(|(s, _)| (*s).into()).collect(),
+            elements: states.iter().map(|(s, _)| (*s).into()).collect(),
+            units: states.iter().map(|(_, unit)| *unit).collect(),
             x: DMatrix::identity(n, n),
             lambda: DMatrix::zeros(n, m),
             u: DMatrix::zeros(n, 0),

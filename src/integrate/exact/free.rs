@@ -66,6 +66,11 @@ impl Free {
         &self.lcs.storage.x * x + &self.lcs.storage.u * u + &self.lcs.storage.one
     }
 
+    /// Whether jumps are projections in the metric of stored energy: where no device can carry an impulse too.
+    pub(crate) fn is_projected(&self) -> bool {
+        self.jump.as_ref().is_none_or(|jump| jump.monotone)
+    }
+
     /// The impulse of the devices at state x, if one is needed. Active networks have no energy to project in; their jump
     /// is left to the limit of small steps.
     pub(crate) fn jump(

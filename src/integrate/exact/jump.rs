@@ -5,9 +5,10 @@ use nalgebra::DVector;
 use super::inspect::Finding;
 use super::mode::Key;
 use super::stepper::Exact;
-use super::transition::PROPOSALS;
+use super::transition::{PROPOSALS, Trigger};
 use crate::integrate::energy;
 use crate::integrate::run::{Log, Reason, SimError};
+use crate::integrate::stats::{JumpReason, StateJump};
 
 /// Movements of the storage below this part of its amplitude are rounding and no jump.
 const ROUNDING: f64 = 1e-12;
@@ -57,22 +58,23 @@ impl Exact<'_> {
         let free = self.plant.free(key)?;
         let s = free.storage(after, &u);
         let joined = free.storage(x, &self.before);
-        let (brought, _) = energy::taking_over(&free.lcs.storage.metric, &self.storage, &joined);
+        let lcs = &free.lcs;
+        self.balance
+            .add_jump(energy::taking_over(lcs, &self.storage, x, &joined));
         for (name, area) in free.impulses(p) {
             log.impulse(t, name, area);
         }
-        let source = brought
-            + energy::source_work_of_jump(
-                &free.lcs,
-                x.as_slice(),
-                after.as_slice(),
-                self.before.as_slice(),
-                u.as_slice(),
-                p.as_slice(),
-            );
-        let gain = self.metric.stored(s.as_slice()) - self.metric.stored(&self.storage);
+        let source = energy::source_work_of_jump(
+            lcs,
+            x.as_slice(),
+            after.as_slice(),
+            self.before.as_slice(),
+            u.as_slice(),
+            p.as_slice(),
+        );
+        let loss = energy::loss_of_jump(lcs, x, after, &u, p, free.is_projected());
         self.before = u;
-        self.balance.add((source, source - gain));
+        self.balance.add_jump((source, loss));
         let moved = s
             .iter()
             .zip(&self.storage)
@@ -81,6 +83,44 @@ impl Exact<'_> {
         self.storage.copy_from_slice(s.as_slice());
         self.rescale();
         Ok(moved)
+    }
+
+    /// What makes the state jump into mode `at`.
+    pub(super) fn jump_reason(&self, at: usize, trigger: Trigger) -> JumpReason {
+        if !self.started {
+            return JumpReason::Start;
+        }
+        let new = &self.plant.modes[at].key.switches;
+        let thresholds = self.plant.thresholds.iter().enumerate();
+        let moved = thresholds
+            .filter(|(i, t)| !t.is_rest() && self.key.switches.get(*i) != new.get(*i))
+            .map(|(_, t)| t.name.as_str());
+        let moved: Vec<&str> = moved.collect();
+        match (trigger, self.mode) {
+            _ if !moved.is_empty() => JumpReason::Switch(moved.join(", ")),
+            (Trigger::Guard(guard), Some(from)) => JumpReason::Device(self.owner_name(from, guard)),
+            _ => JumpReason::SourceEdge,
+        }
+    }
+
+    /// Writes down that the storage jumped here from `before`, losing so much, J, if it did by more than rounding.
+    pub(super) fn note_jump(&self, before: &[f64], loss: f64, reason: JumpReason, log: &mut Log) {
+        let moved = |k: usize| {
+            let (a, b) = (self.storage[k], before[k]);
+            (a - b).abs() > ROUNDING * self.scale[k].max(b.abs())
+        };
+        let jumped: Vec<usize> = (0..before.len()).filter(|&k| moved(k)).collect();
+        if !jumped.is_empty() {
+            let storage = (&*self.elements, &*self.units);
+            let sizes = (loss, self.capacity);
+            log.state_jump(StateJump::new(
+                self.motion.t,
+                storage,
+                &jumped,
+                sizes,
+                reason,
+            ));
+        }
     }
 
     /// A jump into a mode that small implicit steps propose, proved by its impulse.

@@ -77,7 +77,7 @@ impl Exact<'_> {
         self.motion.t = place.t;
         self.storage.copy_from_slice(place.storage.as_slice());
         self.rescale();
-        self.balance.add((energy.source, energy.dissipated));
+        self.balance.add_part(energy);
         self.note_stored();
     }
 }

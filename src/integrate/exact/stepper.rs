@@ -67,6 +67,9 @@ pub struct Exact<'a> {
     /// How large the storage can have been since the last event.
     reach: Vec<f64>,
     pub(super) volts: Vec<bool>,
+    /// By storage element: its name, and the unit of its state.
+    pub(super) elements: Vec<String>,
+    pub(super) units: Vec<&'static str>,
     /// Where the switches would stand after a change that failed.
     pub(super) wanted: Option<Vec<bool>>,
     /// z at the last change or breakpoint.
@@ -159,12 +162,8 @@ impl<'a> Exact<'a> {
         }
         fire(&plant.thresholds, &mut position);
         key.switches = position;
-        let volts = lcs
-            .storage
-            .names
-            .iter()
-            .map(|name| name.starts_with('v'))
-            .collect();
+        let volts = lcs.storage.units.iter().map(|unit| *unit == "V").collect();
+        let (elements, units) = (lcs.storage.elements.clone(), lcs.storage.units.clone());
         let metric = Metric::new(&lcs.storage.metric);
         let stored = metric.stored(start.as_slice());
         let columns = lcs.outputs.names.len();
@@ -181,6 +180,8 @@ impl<'a> Exact<'a> {
             capacity: 0.0,
             reach: vec![],
             volts,
+            elements,
+            units,
             wanted: None,
             z,
             before,

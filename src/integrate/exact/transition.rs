@@ -62,6 +62,11 @@ impl Exact<'_> {
         let found = self.search(&mut key, discontinuous, trigger, followed, log);
         match found {
             Ok((at, jumped)) => {
+                if jumped {
+                    let loss = self.balance.lost_in_jumps() - balance.lost_in_jumps();
+                    let reason = self.jump_reason(at, trigger);
+                    self.note_jump(&storage, loss, reason, log);
+                }
                 key.copy_from(&self.plant.modes[at].key);
                 self.enter(at, key, jumped, trigger, left_row, log);
                 Ok(())

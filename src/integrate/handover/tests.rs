@@ -74,7 +74,7 @@ fn steps_take_over_where_no_mode_is_found_and_give_back() {
              one-step complementarity problem has no solution (no state of the devices satisfies the circuit equations)"
         ]
     );
-    let estimate = outcome.error_estimate.unwrap();
+    let estimate = outcome.error.max.unwrap();
     assert!(
         (0.5 * largest..5.0 * largest).contains(&estimate),
         "{estimate:e} of {largest:e}"

@@ -1,11 +1,6 @@
 //! One step: tried with the present active set, else solved, then committed.
 
 use super::*;
-use crate::solve::lcp::Scaling;
-use crate::solve::norm;
-
-/// Singular values of the equilibrated D below this are rounding of zeros.
-const SINGULAR: f64 = 1e-10;
 
 impl Theta<'_> {
     /// Rounding of the difference of two times near `t`.
@@ -168,6 +163,8 @@ impl Theta<'_> {
             let system = &self.plant.systems[self.now.system].1;
             let fused = system.step(self.attempt.step).fused(self.attempt.mode);
             self.now.balance.add(fused.power.over_step(&self.z));
+            let loss = fused.power.numerical(&self.z, &self.out, n);
+            self.now.balance.add_numerical(loss);
         }
         self.now.turned_off = self.attempt.turned_off;
         self.now.settle = self.now.turned_off;
@@ -214,33 +211,28 @@ impl Theta<'_> {
     pub(super) fn commit_solved(&mut self, basis: Vec<bool>, pattern: Vec<Option<bool>>, t1: f64) {
         let n = self.now.x.len();
         let h = self.attempt.h;
-        if let Some(work) = self.attempt.work {
+        if let Some((work, loss)) = self.attempt.work {
             self.now.balance.add(work);
+            self.now.balance.add_numerical(loss);
             self.take_pattern(basis, &pattern, t1);
             self.attempt.h = f64::NAN;
             return;
         }
-        // Energy at k + θ, where the found set gives the λ that are no forces on the state: with those of the end (γ = 1) sources
-        // would be charged for what their voltage moves in half a step.
-        let theta = self.system().step(self.attempt.step).scheme.theta;
-        let mean = |after: &[f64], before: &[f64]| -> Vec<f64> {
-            let pairs = after.iter().zip(before);
-            pairs.map(|(a, b)| theta * a + (1.0 - theta) * b).collect()
-        };
+        let step = self.system().step(self.attempt.step);
+        let theta = step.scheme.theta;
         for (du, (a, b)) in self.du.iter_mut().zip(self.u_next.iter().zip(&self.now.u)) {
             *du = (a - b) / h;
         }
-        let x = mean(&self.out[..n], &self.now.x);
-        let u = mean(&self.u_next, &self.now.u);
-        let lambda = on_set(&self.system().lcs, &basis, &x, &u, &self.lambda);
-        let at = Point {
-            x: &x,
-            lambda: &lambda,
-            u: &u,
-            du: &self.du,
-        };
-        let (source, dissipated) = energy::power(&self.system().lcs, at);
-        self.now.balance.add((source * h, dissipated * h));
+        let (source, dissipated, loss) = energy::of_solved(
+            &self.plant.systems[self.now.system].1.lcs,
+            (theta, h),
+            (&self.now.x, &self.now.u),
+            (&self.out[..n], &self.u_next),
+            &self.du,
+            (&basis, &self.lambda),
+        );
+        self.now.balance.add((source, dissipated));
+        self.now.balance.add_numerical(loss);
         self.take_pattern(basis, &pattern, t1);
         self.attempt.h = f64::NAN;
     }
@@ -271,32 +263,6 @@ impl Theta<'_> {
         self.take_pattern(found.basis, &found.active, self.now.t);
         Ok(())
     }
-}
-
-/// λ + δ with y_a = 0 at (x, u) on an active set, δ the least that reduces y_a most among those that are no forces on the state,
-/// B δ = 0: what the sources bring then still is what is stored and dissipated.
-fn on_set(lcs: &Lcs, active: &[bool], x: &[f64], u: &[f64], lambda: &[f64]) -> Vec<f64> {
-    let vector = DVector::from_column_slice;
-    let mut lambda = lambda.to_vec();
-    let set: Vec<usize> = (0..active.len()).filter(|&j| active[j]).collect();
-    if set.is_empty() {
-        return lambda;
-    }
-    let scaling = Scaling::of(&lcs.d);
-    let d = DMatrix::from_diagonal(&scaling.d.select_rows(&set));
-    let idle = norm::kernel(&(lcs.b.select_columns(&set) * &d));
-    if idle.ncols() == 0 {
-        return lambda;
-    }
-    let y = &lcs.c * vector(x) + &lcs.d * vector(&lambda) + &lcs.g * vector(u) + &lcs.f;
-    let through = &d * lcs.d.select_rows(&set).select_columns(&set) * &d * &idle;
-    let y = &d * y.select_rows(&set);
-    if let Ok(w) = through.svd(true, true).solve(&y, SINGULAR) {
-        for (&j, correction) in set.iter().zip((d * idle * w).iter()) {
-            lambda[j] -= correction;
-        }
-    }
-    lambda
 }
 
 /// Matrices for a step in which the active set changes or the state may jump: the scheme's θ with γ = 1, or Moreau's where

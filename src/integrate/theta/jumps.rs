@@ -3,6 +3,7 @@
 use super::*;
 use crate::integrate::jump::Jump;
 use crate::integrate::settle;
+use crate::integrate::stats::{JumpReason, StateJump};
 
 impl Theta<'_> {
     /// The first jump: from inconsistent initial values, by edges of the sources at the start.
@@ -10,6 +11,8 @@ impl Theta<'_> {
         let u = self.inputs.all(self.now.t);
         let before = std::mem::replace(&mut self.now.u, u);
         self.jump(&before, log)?;
+        let start = std::mem::take(&mut self.start);
+        self.note_jump(&start, 0.0, JumpReason::Start, log);
         self.note_energy();
         self.find_mode()?;
         self.started = true;
@@ -36,11 +39,14 @@ impl Theta<'_> {
         }
         let rows = log.wants_rows();
         let before = rows.then(|| self.row());
+        let storage = self.system().storage(&self.now.x, &self.now.u);
+        let lost = self.now.balance.lost_in_jumps();
         let old = std::mem::replace(&mut self.now.u, u);
         if let Some(row) = &before {
             log.row(self.now.t, row);
         }
         self.jump(&old, log)?;
+        self.note_jump(&storage, lost, JumpReason::SourceEdge, log);
         self.find_mode()?;
         self.break_waves()?;
         self.report_quietly(log);
@@ -58,6 +64,7 @@ impl Theta<'_> {
         let x = DVector::from_column_slice(&self.now.x);
         let u = DVector::from_column_slice(&self.now.u);
         let System { lcs, jump, .. } = &mut self.plant.systems[self.now.system].1;
+        let passive = jump.as_ref().is_none_or(|problem| problem.monotone);
         let found = match jump {
             Some(problem) if problem.monotone => {
                 let found = problem.solve(lcs, &x, &u).map_err(|e| {
@@ -80,14 +87,14 @@ impl Theta<'_> {
         };
         let lcs = &self.plant.systems[self.now.system].1.lcs;
         let (after, p) = match found {
-            Some(jump) => (jump.x, jump.p.as_slice().to_vec()),
-            None => (x.clone(), vec![0.0; lcs.m()]),
+            Some(jump) => (jump.x, jump.p),
+            None => (x.clone(), DVector::zeros(lcs.m())),
         };
+        let loss = energy::loss_of_jump(lcs, &x, &after, &u, &p, passive);
+        let p = p.as_slice();
         let source =
-            energy::source_work_of_jump(lcs, x.as_slice(), after.as_slice(), old, u.as_slice(), &p);
-        let gain = energy::stored(lcs, after.as_slice(), u.as_slice())
-            - energy::stored(lcs, x.as_slice(), old);
-        self.now.balance.add((source, source - gain));
+            energy::source_work_of_jump(lcs, x.as_slice(), after.as_slice(), old, u.as_slice(), p);
+        self.now.balance.add_jump((source, loss));
         let step: Vec<f64> = u.iter().zip(old).map(|(a, b)| a - b).collect();
         // A jump at the rounding of the amplitudes seen so far corrects the state and is not worth a word.
         let lcs = &self.plant.systems[self.now.system].1.lcs;
@@ -98,9 +105,67 @@ impl Theta<'_> {
             log.event(t, "jump");
         }
         if size > JUMP || step.iter().any(|s| *s != 0.0) {
-            self.log_impulses(t, &p, &step, log);
+            self.log_impulses(t, p, &step, log);
         }
         Ok(())
+    }
+
+    /// Writes down that the storage jumped here from `before`, if it did by more than rounding; until then jumps had lost `lost`, J.
+    pub(super) fn note_jump(
+        &self,
+        before: &DVector<f64>,
+        lost: f64,
+        reason: JumpReason,
+        log: &mut Log,
+    ) {
+        let system = self.system();
+        let storage = &system.lcs.storage;
+        let after = system.storage(&self.now.x, &self.now.u);
+        if before.len() != after.len() || before.len() != storage.elements.len() {
+            return;
+        }
+        let size = |k: usize| before[k].abs().max(after[k].abs());
+        let kind = |k: usize| {
+            let same = (0..after.len()).filter(|&j| storage.units[j] == storage.units[k]);
+            same.map(size).fold(0.0, f64::max)
+        };
+        let jumped: Vec<usize> = (0..after.len())
+            .filter(|&k| (after[k] - before[k]).abs() > JUMP * kind(k))
+            .collect();
+        if !jumped.is_empty() {
+            let balance = &self.now.balance;
+            let sizes = (balance.lost_in_jumps() - lost, balance.largest());
+            let storage = (&*storage.elements, &*storage.units);
+            log.state_jump(StateJump::new(self.now.t, storage, &jumped, sizes, reason));
+        }
+    }
+
+    /// Writes down the jump that the impulses p make in the present step. What it loses is part of what the step's damping loses.
+    pub(super) fn note_impulse(&mut self, t: f64, p: &[f64], log: &mut Log) {
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        let storage = &lcs.storage;
+        let p = DVector::from_column_slice(p);
+        let step = &lcs.b * &p;
+        let after = DVector::from_column_slice(&self.out[..lcs.n()]);
+        let u = DVector::from_column_slice(&self.u_next);
+        let loss = energy::loss_of_jump(lcs, &(&after - &step), &after, &u, &p, false);
+        let moved = &storage.x * step;
+        let kind = |k: usize| {
+            let same = (0..moved.len()).filter(|&j| storage.units[j] == storage.units[k]);
+            same.map(|j| moved[j].abs()).fold(0.0, f64::max)
+        };
+        let jumped: Vec<usize> = (0..moved.len())
+            .filter(|&k| moved[k].abs() > JUMP * kind(k))
+            .collect();
+        let devices: Vec<&str> = (0..lcs.m())
+            .filter(|&j| p[j].abs() > JUMP * p.amax())
+            .map(|j| lcs.ports[j].device.as_str())
+            .collect();
+        let reason = JumpReason::Device(devices.join(", "));
+        let sizes = (loss, self.now.balance.largest());
+        let storage = (&*storage.elements, &*storage.units);
+        log.state_jump(StateJump::new(t, storage, &jumped, sizes, reason));
+        self.now.balance.reattribute_to_jump(loss);
     }
 
     /// The jump of a network that is not passive, where no projection exists: the limit of the implicit step, p = hλ at h and
@@ -202,7 +267,12 @@ impl Theta<'_> {
         if log.wants_rows() {
             self.log_row(log);
         }
-        let mut before = self.switches.position().to_vec();
+        let storage = self.system().storage(&self.now.x, &self.now.u);
+        let (lost, first) = (
+            self.now.balance.lost_in_jumps(),
+            self.switches.position().to_vec(),
+        );
+        let mut before = first.clone();
         self.switches.toggle(moving);
         for _ in 0..2 + 2 * before.len() {
             if self.switches.position() == before {
@@ -213,6 +283,8 @@ impl Theta<'_> {
                 let at = self.now.point(&self.lambda, &self.du);
                 let pattern = &self.now.pattern;
                 if self.switches.update(lcs, at, pattern, true) == Change::None {
+                    let moved = self.switches.moved(&first).join(", ");
+                    self.note_jump(&storage, lost, JumpReason::Switch(moved), log);
                     self.break_waves()?;
                     if log.wants_rows() {
                         self.log_row(log);
@@ -230,6 +302,8 @@ impl Theta<'_> {
         self.read_lambda()?;
         let at = self.now.point(&self.lambda, &self.du);
         if self.switches.undecided(&self.system().lcs, at, SHORT) {
+            let moved = self.switches.moved(&first).join(", ");
+            self.note_jump(&storage, lost, JumpReason::Switch(moved), log);
             self.break_waves()?;
             if log.wants_rows() {
                 self.log_row(log);
@@ -301,10 +375,9 @@ impl Theta<'_> {
             self.now.pattern = vec![false; system.lcs.m()];
         }
         let joined = system.storage(&self.now.x, &self.now.u);
-        let metric = &system.lcs.storage.metric;
         self.now
             .balance
-            .add(energy::taking_over(metric, s.as_slice(), &joined));
+            .add_jump(energy::taking_over(&system.lcs, s.as_slice(), &x, &joined));
         self.resize();
         self.switches.rebuild(&self.plant.systems[at].1.lcs);
         let u = self.now.u.clone();

@@ -397,6 +397,7 @@ impl Theta<'_> {
         let p: Vec<f64> = self.lambda.iter().map(|l| l * self.attempt.h).collect();
         let still = vec![0.0; self.now.u.len()];
         self.log_impulses(t, &p, &still, log);
+        self.note_impulse(t, &p, log);
     }
 }
 

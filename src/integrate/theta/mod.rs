@@ -17,7 +17,7 @@ mod tests;
 
 use std::collections::BTreeSet;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use self::estimate::Estimate;
 use crate::integrate::control::{Amplitudes, CORNER, Control};
@@ -26,7 +26,7 @@ use crate::integrate::exact::Place;
 use crate::integrate::inputs::Inputs;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
-use crate::integrate::stats::Stats;
+use crate::integrate::stats::{StatedError, Stats};
 use crate::integrate::step::{SHORT, Scheme};
 use crate::integrate::switching::{Change, Switches, Threshold};
 use crate::integrate::system::{Plant, Reduce, System};
@@ -105,6 +105,8 @@ pub struct Theta<'a> {
     now: Now,
     kept: Now,
     started: bool,
+    /// Storage before the start.
+    start: DVector<f64>,
     /// Settling steps of the midpoint rule are Moreau's for now.
     damped: bool,
     preferred: f64,
@@ -121,7 +123,7 @@ pub struct Theta<'a> {
     /// What differences of states are rounding, where a law is curved.
     rounding: Vec<f64>,
     /// Buffer for s.
-    storage: Vec<f64>,
+    stock: Vec<f64>,
     control: Option<Control>,
     stats: Stats,
     modes: BTreeSet<(usize, Vec<bool>)>,
@@ -198,8 +200,8 @@ struct Attempt {
     turned_off: bool,
     /// Basis and pattern after the step, where the solvers ran.
     solved: Option<(Vec<bool>, Vec<Option<bool>>)>,
-    /// Energy from sources and into resistors and devices, J, where the stages tell it.
-    work: Option<(f64, f64)>,
+    /// Energy from sources, into resistors and devices, and lost by the method, J, where the stages tell it.
+    work: Option<((f64, f64), f64)>,
     /// What the stages tell of the error, where it is asked for.
     error: Option<stages::StepError>,
 }
@@ -239,7 +241,12 @@ impl<'a> Theta<'a> {
         let balance = if metric.nrows() == storage.len() {
             let mut balance = Balance::new(0.5 * storage.dot(&(metric * &storage)));
             let joined = system.storage(x.as_slice(), &u);
-            balance.add(energy::taking_over(metric, storage.as_slice(), &joined));
+            balance.add_jump(energy::taking_over(
+                &system.lcs,
+                storage.as_slice(),
+                &x,
+                &joined,
+            ));
             balance
         } else {
             Balance::new(energy::stored(&system.lcs, x.as_slice(), &u))
@@ -284,6 +291,7 @@ impl<'a> Theta<'a> {
             kept: now.clone(),
             now,
             started: false,
+            start: storage.clone(),
             damped: false,
             preferred,
             last_h: 0.0,
@@ -294,7 +302,7 @@ impl<'a> Theta<'a> {
             attempt: Attempt::default(),
             coarse: Vec::new(),
             rounding: Vec::new(),
-            storage: Vec::new(),
+            stock: Vec::new(),
             control,
             stats: Stats::default(),
             modes: BTreeSet::new(),
@@ -511,7 +519,10 @@ impl Stepper for Theta<'_> {
         }
         self.settle_estimate();
         Outcome {
-            error_estimate: self.now.estimate.as_ref().map(Estimate::relative),
+            error: StatedError {
+                max: self.now.estimate.as_ref().map(Estimate::relative),
+                rms: None,
+            },
             stats: self.stats.clone(),
             energy: self.now.balance.energy(),
             notes,

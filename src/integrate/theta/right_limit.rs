@@ -149,12 +149,12 @@ impl Theta<'_> {
         let Self {
             plant,
             now,
-            storage,
+            stock,
             inputs,
             ..
         } = self;
         let lcs = &plant.systems[now.system].1.lcs;
-        let stored = energy::stored_with(lcs, &now.x, &now.u, storage);
+        let stored = energy::stored_with(lcs, &now.x, &now.u, stock);
         now.balance.note(stored + inputs.lines().stored(now.t));
     }
 }

@@ -10,6 +10,7 @@
 
 use super::attempt::unsolved;
 use super::*;
+use crate::integrate::energy::StageLoss;
 
 /// The part of the tolerance granted to every step: resistive laws forget errors instead of adding them up.
 pub(super) const GRANT: f64 = 1e-3;
@@ -105,7 +106,7 @@ impl Theta<'_> {
         let count = tableau.lower.len();
         // (X_k − B_k)/γ = h f(X_k).
         let mut slopes: Vec<DVector<f64>> = Vec::with_capacity(count);
-        let mut work = (0.0, 0.0);
+        let (mut work, mut loss) = ((0.0, 0.0), StageLoss::default());
         let mut error = self.error_before(tableau);
         // (δX_k − δB_k)/γ for the error δx before the step.
         let mut error_slopes: Vec<DVector<f64>> = Vec::with_capacity(count);
@@ -154,7 +155,9 @@ impl Theta<'_> {
             let (source, dissipated) = energy::power(&system.lcs, at);
             work.0 += weight * h * source;
             work.1 += weight * h * dissipated;
-            slopes.push((&x - base) / tableau.gamma);
+            let slope = (&x - base) / tableau.gamma;
+            loss.stage(&system.lcs, weight, at, &slope, h);
+            slopes.push(slope);
             if let Some(error) = &mut error {
                 let matrices = self.system().step(step);
                 let carry = |change: &DVector<f64>| {
@@ -184,6 +187,11 @@ impl Theta<'_> {
         let Some((x, solution)) = last else {
             return Ok(());
         };
+        let loss = loss.of_step(
+            &self.system().lcs,
+            (&self.now.x, &self.now.u),
+            (x.as_slice(), &self.u_next),
+        );
         self.out[..n].copy_from_slice(x.as_slice());
         for (out, (&on, (&lambda, &y))) in self.out[n..]
             .iter_mut()
@@ -198,7 +206,7 @@ impl Theta<'_> {
             settle: false,
             solved: Some((solution.basis, solution.active)),
             turned_off: false,
-            work: Some(work),
+            work: Some((work, loss)),
             error,
         };
         Ok(())

@@ -314,7 +314,7 @@ fn the_error_is_estimated_from_the_steps() {
                 .unwrap();
             worst.push(theta.state()[0]);
         }
-        (worst, theta.finish().error_estimate.unwrap())
+        (worst, theta.finish().error.max.unwrap())
     };
     let (exact, _) = end(Scheme::MIDPOINT, 1e-8);
     for (scheme, h) in [

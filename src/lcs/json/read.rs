@@ -285,6 +285,8 @@ pub fn read(text: &str) -> Result<SystemFile, JsonError> {
         f: vector("F", &doc.f, m)?,
         storage: Storage {
             names: states.iter().map(|s| s.name.clone()).collect(),
+            elements: states.iter().map(|s| s.name.clone()).collect(),
+            units: states.iter().map(|s| s.unit).collect(),
             x: DMatrix::identity(n, n),
             lambda: DMatrix::zeros(n, m),
             u: DMatrix::zeros(n, p),

@@ -116,6 +116,12 @@ pub(super) fn publish<F: Field>(
     let has_dynamics = width(&inject) > 0;
     let storage = Storage {
         names: behaviour.storage.iter().map(|s| s.name.clone()).collect(),
+        elements: (behaviour.storage.iter())
+            .map(|s| s.element.clone())
+            .collect(),
+        units: (behaviour.storage.iter())
+            .map(|s| if s.capacitor { "V" } else { "A" })
+            .collect(),
         x: round.matrix(&s, 0..n),
         lambda: round.matrix(&s, n..n + m),
         u: round.matrix(&s, n + m..n + m + p),
