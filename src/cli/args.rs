@@ -127,6 +127,9 @@ pub struct SimArgs {
     /// Add rows at event times: two with equal time at a jump, before and after
     #[arg(long)]
     pub events: bool,
+    /// Make the run a second time by an independent method; status 1 where the two differ by more than their errors
+    #[arg(long)]
+    pub verify: bool,
     /// Print a summary of the run on standard error
     #[arg(long, value_enum, value_name = "FORMAT")]
     pub summary: Option<Summary>,

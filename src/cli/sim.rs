@@ -19,7 +19,8 @@ use super::streams::Streams;
 use crate::circuit::{Circuit, Tran};
 use crate::diagnostic::SourceMap;
 use crate::integrate::{
-    Block, Method, Reason, Run, SimError, SimOptions, Sink, simulate, simulate_system,
+    Block, Method, Reason, Run, SimError, SimOptions, Sink, Verified, VerifyOptions, simulate,
+    simulate_system, verify, verify_system,
 };
 use crate::report::figure::Figure;
 use crate::report::measured::Measurements;
@@ -42,6 +43,7 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
     let request = Request::of(&args.method, args.events)?;
     let paths: Vec<&Path> = args.outputs.iter().map(PathBuf::as_path).collect();
     if let Some(form) = forms::open(&args.input)? {
+        only_one_way(args)?;
         files::spare(&paths, [args.input.file.as_path()])?;
         let run = forms::run(&form, args)?;
         let destination = Destination::of(args, &formats, None, None, streams);
@@ -55,9 +57,11 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
     if let (Subject::Circuit(both), Some((netlist, sources))) = (&subject, cards) {
         let (circuit, _) = &**both;
         if circuit.tran.is_none() && !circuit.dc.is_empty() {
+            only_one_way(args)?;
             return dc::sim(args, circuit, &netlist, &sources, streams);
         }
         if !circuit.steps.is_empty() {
+            only_one_way(args)?;
             let stepped = Stepped {
                 input: &args.input,
                 probes: &args.probes,
@@ -82,17 +86,39 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
     let destination = Destination::of(args, &formats, tran(&subject), place, streams);
     let mut outputs = destination.open(&Columns::of_subject(&subject))?;
     let measures = matches!(&subject, Subject::Circuit(both) if measured::asked(&both.0));
-    let collects = outputs.hold() || destination.plots || measures;
+    let collects = outputs.hold() || destination.plots || measures || args.verify;
     let mut take = |block: Block<'_>| outputs.take(block);
     let route = Route {
-        corners: destination.has_pictures(),
+        corners: destination.has_pictures() || args.verify,
         sink: (!measures).then_some(&mut take as Sink<'_>),
         discard: !collects,
         cancel: Some(signals.flag()),
         held: None,
     };
-    let finished = measured_run(&subject, &request, route, streams)?;
+    let mut finished = measured_run(&subject, &request, route, streams)?;
+    if let (true, (Some((run, _)), None)) = (args.verify, &mut finished) {
+        let options = VerifyOptions {
+            settings: request.settings(),
+            cancel: Some(signals.flag()),
+        };
+        match second(&subject, run, &options) {
+            Ok(verified) => run.verified = Some(verified),
+            // The rows are whole.
+            Err(error) => run.notes.push(format!("not verified: {error}")),
+        }
+    }
     destination.finish(outputs, finished, measures, signals.received())
+}
+
+/// # Errors
+/// [`Failure::Message`] where a second run is asked for of what is no single transient run.
+fn only_one_way(args: &SimArgs) -> Result<(), Failure> {
+    if args.verify {
+        let file = args.input.file.display();
+        let message = "`--verify` takes one transient run of a circuit or system, without `.step`";
+        return Err(Failure::Message(format!("{file}: {message}")));
+    }
+    Ok(())
 }
 
 /// Where the results of a command go, and what it says.
@@ -187,7 +213,7 @@ impl<'a> Destination<'a> {
             return Err(failure);
         }
         let Some(error) = error else {
-            return Ok(Exit::Done);
+            return self.verdict(&run, signal);
         };
         let kept = match (files.is_empty(), last) {
             (false, Some(t)) => format!("; the rows until {t:e} s are in {files}"),
@@ -208,9 +234,57 @@ impl<'a> Destination<'a> {
         }
     }
 
+    /// What the second run, if one was asked for, says of the first.
+    fn verdict(&self, run: &Run, signal: Option<(i32, &str)>) -> Result<Exit, Failure> {
+        let file = self.args.input.file.display();
+        match &run.verified {
+            Some(verified) if !verified.holds() => {
+                let Verified {
+                    method,
+                    max_difference,
+                    tolerance,
+                    signal,
+                    time,
+                } = verified;
+                self.streams.error(format!(
+                    "{file}: not verified: {signal} differs by {max_difference:.1e} of its amplitude from a second run ({method}) at \
+                     t = {time:e} s, where {tolerance:.1e} is tolerated"
+                ));
+                Ok(Exit::No)
+            }
+            None if self.args.verify => match signal {
+                Some((signal, name)) => {
+                    self.streams
+                        .error(format!("{file}: the second run was interrupted by {name}"));
+                    Ok(Exit::Signal(signal))
+                }
+                None => Err(Failure::Message(format!(
+                    "{file}: the second run failed; the rows are those of the first"
+                ))),
+            },
+            _ => Ok(Exit::Done),
+        }
+    }
+
     fn failure(&self, error: &SimError) -> Failure {
         input::broke_off(&self.args.input, error, self.place, self.streams)
     }
+}
+
+/// Makes a run a second time.
+fn second(subject: &Subject, run: &Run, options: &VerifyOptions<'_>) -> Result<Verified, SimError> {
+    match subject {
+        Subject::Circuit(both) => verify(&both.0, &both.1, run, options),
+        Subject::System(system) => match system.tran {
+            Some(tran) => verify_system((&system.lcs, &system.x0), tran, run, options),
+            None => Err(no_tran()),
+        },
+    }
+}
+
+fn no_tran() -> SimError {
+    let reason = "the system has no \"tran\": {\"tstep\", \"tstop\"}";
+    SimError::before(Reason::Unsupported(reason.into()))
 }
 
 /// A run, or as much of it as there is, and what its measurements found.
@@ -285,6 +359,15 @@ pub struct Request {
 }
 
 impl Request {
+    /// The tolerances.
+    fn settings(&self) -> Settings {
+        let mut settings = Settings::default();
+        if let Some(tol) = self.tol {
+            settings.tol = tol;
+        }
+        settings
+    }
+
     /// What the flags ask for; θ or γ without a method ask for `theta`.
     ///
     /// # Errors
@@ -358,10 +441,7 @@ fn run_to(
             bar.set_position(position);
         }
     };
-    let mut settings = Settings::default();
-    if let Some(tol) = request.tol {
-        settings.tol = tol;
-    }
+    let mut settings = request.settings();
     if let Some(held) = route.held {
         settings.max_held = held;
     }
@@ -390,10 +470,7 @@ fn run_to(
         (Subject::System(system), Some(tran)) => {
             simulate_system(&system.lcs, &system.x0, tran, options)
         }
-        (Subject::System(_), None) => {
-            let reason = "the system has no \"tran\": {\"tstep\", \"tstop\"}";
-            Err(SimError::before(Reason::Unsupported(reason.into())))
-        }
+        (Subject::System(_), None) => Err(no_tran()),
     };
     bar.finish_and_clear();
     result

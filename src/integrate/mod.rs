@@ -24,9 +24,11 @@ pub mod step;
 pub mod switching;
 pub mod system;
 pub mod theta;
+pub mod verify;
 
 pub use rows::{Asked, Block, RowKind, Sink};
 pub use run::{Frame, Grid, Log, NoRest, Outcome, Reason, SimError, Stepper};
 pub use simulate::{Method, SimOptions, simulate, simulate_system};
 pub use start::{OperatingPoint, Values, operating_point};
 pub use stats::{Energy, Impulse, JumpReason, Run, StateJump, StateJumps, StatedError, Stats};
+pub use verify::{Verified, VerifyOptions, verify, verify_system};

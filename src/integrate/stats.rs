@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::integrate::rows::RowKind;
+use crate::integrate::verify::Verified;
 use crate::waveform::Waveforms;
 
 /// Counters of one run; deterministic except `cpu_seconds`.
@@ -228,4 +229,6 @@ pub struct Run {
     pub events: Vec<(f64, Arc<str>)>,
     /// Things the user should know.
     pub notes: Vec<String>,
+    /// What a second run by an independent method found, where there was one.
+    pub verified: Option<Verified>,
 }

@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use super::measured::Measurements;
 use super::text;
-use crate::integrate::{Energy, Impulse, Run, StateJump, StatedError};
+use crate::integrate::{Energy, Impulse, Run, StateJump, StatedError, Verified};
 
 #[derive(Serialize)]
 struct Summary<'a> {
@@ -27,6 +27,8 @@ struct Summary<'a> {
     state_jumps: &'a [StateJump],
     state_jumps_total: Total,
     warnings: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    verified: Option<&'a Verified>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     measurements: Vec<Value>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -82,6 +84,7 @@ impl<'a> Summary<'a> {
                 loss: run.state_jumps.all.1,
             },
             warnings: text::warnings(run),
+            verified: run.verified.as_ref(),
             measurements,
             fourier,
         }

@@ -74,6 +74,16 @@ pub fn summary(run: &Run, verbose: bool) -> String {
     if run.impulses.len() > SHOWN {
         lines.push(format!("impulse: {} more", run.impulses.len() - SHOWN));
     }
+    if let Some(verified) = &run.verified {
+        lines.push(format!(
+            "verified by {}: {} differs by {} of its amplitude at {}, {} is tolerated",
+            verified.method,
+            verified.signal,
+            si::plain(verified.max_difference, 2),
+            si::quantity(verified.time, "s", 6),
+            si::plain(verified.tolerance, 2),
+        ));
+    }
     if verbose {
         lines.extend(
             run.events

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use circ::integrate::{Method, Run, SimOptions, VerifyOptions, simulate, verify};
 use circ::waveform::{Waveforms, csv, json, npz, raw};
 use tempfile::TempDir;
 
@@ -347,6 +348,75 @@ fn rows_stand_at_events_and_corners_where_no_print_step_is_named() {
             assert!(rows.time.iter().any(|row| (row - t).abs() < 1e-15), "{t}");
         }
     }
+}
+
+/// A second run by steps agrees with the exact one, and an exact one with steps; a curve that is off in one row, an edge that is late
+/// and one that is missing are found, with their signal and time.
+#[test]
+fn a_second_run_verifies_the_first() {
+    let netlist = "clocked\nv1 a 0 24\ns1 a b g 0 sw\nd1 0 b di\nl1 b c 40u\nc1 c 0 20u\nr1 c 0 4\n\
+        vg g 0 pulse(0 1 3.3u 0 0 4.7u 10u)\n.model di d(ideal)\n.model sw sw(vt=0.5 ron=10m roff=1meg)\n\
+        .save v(b) v(c) i(l1)\n.tran 1u 300u uic\n.end\n";
+    let folder = place(&[]);
+    fs::write(folder.path().join("net.cir"), netlist).expect("a netlist");
+    for (method, other) in [("exact", "theta"), ("theta", "exact")] {
+        let arguments = format!("sim net.cir -o a.csv --verify --summary json --method {method}");
+        let ended = ends(folder.path(), &arguments);
+        let line = said(&ended);
+        let line = line.lines().next().expect("a summary");
+        let summary: serde_json::Value = serde_json::from_str(line).expect("JSON");
+        let verified = &summary["verified"];
+        let by = verified["method"].as_str().expect("a method");
+        assert!(by.starts_with(other), "{by}");
+        let number = |key: &str| verified[key].as_f64().expect("a number");
+        let (difference, tolerance) = (number("max_difference"), number("tolerance"));
+        // The estimate of a run of steps may fall short of its error by a little, and that is said.
+        let status = i32::from(difference > tolerance);
+        assert_eq!(ended.status.code(), Some(status), "{}", said(&ended));
+        assert!(difference < 1e-4 && tolerance < 1e-3, "{line}");
+        assert!(method == "theta" || status == 0, "{line}");
+        // The rows are those of the run without it.
+        assert_eq!(read_csv(&folder.path().join("a.csv")).len(), 301);
+    }
+    let loaded = circ::netlist::load(
+        &folder.path().join("net.cir"),
+        &circ::circuit::ElaborateOptions::default(),
+    );
+    let circuit = loaded.circuit.expect("a circuit");
+    let behaviour = circ::mna::behaviour(&circuit).expect("a sound circuit");
+    let options = SimOptions {
+        method: Method::Exact,
+        corners: true,
+        ..SimOptions::default()
+    };
+    let run = simulate(&circuit, &behaviour, options).expect("a run");
+    let judged = |run: &Run| {
+        verify(&circuit, &behaviour, run, &VerifyOptions::default()).expect("a second run")
+    };
+    assert!(judged(&run).holds());
+    let column = |name: &str| run.waveforms.find(name).expect("a signal");
+    let width = run.waveforms.width();
+    let at = |t: f64| {
+        let mut rows = run.waveforms.time.iter();
+        rows.position(|row| (row - t).abs() < 1e-12).expect("a row")
+    };
+    // One row off by a thousandth of the amplitude.
+    let mut wrong = run.clone();
+    wrong.waveforms.values[at(150e-6) * width + column("v(c)")] *= 1.001;
+    let found = judged(&wrong);
+    assert!(!found.holds() && found.signal == "v(c)", "{found:?}");
+    assert!((found.time - 150e-6).abs() < 1e-12, "{found:?}");
+    // The pulse from 203.3 to 208 us left out: in rows, and in events.
+    let mut wrong = run.clone();
+    for (k, t) in run.waveforms.time.iter().enumerate() {
+        if (203.25e-6..208.05e-6).contains(t) {
+            wrong.waveforms.values[k * width + column("v(b)")] = 0.0;
+        }
+    }
+    wrong.events.retain(|e| !(203e-6..209e-6).contains(&e.0));
+    let found = judged(&wrong);
+    assert!(!found.holds() && found.signal == "v(b)", "{found:?}");
+    assert!((203.2e-6..208.1e-6).contains(&found.time), "{found:?}");
 }
 
 /// Corners of a source, jumps and events: rows without a print step, in pictures with one, and not in files with one.

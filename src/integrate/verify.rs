@@ -1,0 +1,239 @@
+//! A run made a second time by an independent method, and how far the two are apart.
+//!
+//! Exact integration and implicit steps share the reduced systems and nothing of the way through time: one finds events and modes, the
+//! other solves a complementarity problem at every step. The steps are made at two tolerances, whose distance tells what they know
+//! themselves. Signals are compared at the output times as curves with their jumps, where an edge may stand as far aside as events of the
+//! verifying runs do among each other.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::AtomicBool;
+
+use nalgebra::DVector;
+
+use crate::circuit::{Circuit, Tran};
+use crate::integrate::rows::RowKind;
+use crate::integrate::run::{Reason, SimError};
+use crate::integrate::simulate::{Method, SimOptions, simulate, simulate_system};
+use crate::integrate::stats::Run;
+use crate::lcs::Lcs;
+use crate::mna::Behaviour;
+use crate::settings::Settings;
+use crate::waveform::compare::{Tube, tubes};
+
+/// What the second run found.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Verified {
+    /// How it was made: `exact`, `theta at a tolerance of 1e-6`.
+    pub method: String,
+    /// The largest difference of a signal from the second run, relative to the signal's amplitude: that of the signal for which it is the
+    /// largest part of what is tolerated.
+    pub max_difference: f64,
+    /// What is tolerated of that signal: the error that the first run states and that of the second.
+    pub tolerance: f64,
+    /// The signal.
+    pub signal: String,
+    /// Where its difference is largest, s.
+    pub time: f64,
+}
+
+impl Verified {
+    /// Whether the runs agree.
+    #[must_use]
+    pub fn holds(&self) -> bool {
+        self.max_difference <= self.tolerance
+    }
+}
+
+/// How a second run is made.
+#[derive(Clone, Default)]
+pub struct VerifyOptions<'a> {
+    /// Those of the first run; the tolerances of the steps are chosen here.
+    pub settings: Settings,
+    /// As [`SimOptions::cancel`].
+    pub cancel: Option<&'a AtomicBool>,
+}
+
+/// The error of exact runs, relative to amplitudes: rounding in stiff circuits.
+const EXACT: f64 = 1e-9;
+/// Tolerances of the verifying steps, one after the other until they know enough. Their own error is no less than that.
+const TOLERANCES: [f64; 3] = [1e-4, 1e-5, 1e-6];
+/// An error of the verifying steps, relative to amplitudes, below which they know enough.
+const ENOUGH: f64 = 3e-3;
+/// The distance of two runs of steps may be smaller than the error of the finer one.
+const SAFETY: f64 = 2.0;
+/// Events of the two methods may be apart by this part of an output step where the events of the verifying runs agree better, and output
+/// times so close to an event are left out: what decays within an instant is not followed by steps.
+const ASIDE: f64 = 0.01;
+/// Where more than this part of the output times were left out (a print step of a clock's period), all are compared.
+const MOST_LEFT_OUT: f64 = 0.5;
+
+/// Makes the run of a circuit a second time; `run` has its rows at the output times, and at events and corners too if it was made with
+/// [`SimOptions::corners`].
+///
+/// # Errors
+/// The second run's.
+pub fn verify(
+    circuit: &Circuit,
+    behaviour: &Behaviour,
+    run: &Run,
+    options: &VerifyOptions<'_>,
+) -> Result<Verified, SimError> {
+    let step = circuit.tran.map_or(0.0, |tran| tran.tstep);
+    second(run, step, options, &|options| {
+        simulate(circuit, behaviour, options)
+    })
+}
+
+/// The same for the run of a system, see [`simulate_system`].
+///
+/// # Errors
+/// The second run's.
+pub fn verify_system(
+    (lcs, x): (&Lcs, &DVector<f64>),
+    tran: Tran,
+    run: &Run,
+    options: &VerifyOptions<'_>,
+) -> Result<Verified, SimError> {
+    second(run, tran.tstep, options, &|options| {
+        simulate_system(lcs, x, tran, options)
+    })
+}
+
+fn second(
+    run: &Run,
+    step: f64,
+    options: &VerifyOptions<'_>,
+    simulate: &dyn Fn(SimOptions<'_>) -> Result<Run, SimError>,
+) -> Result<Verified, SimError> {
+    let again = |method, tol: f64| {
+        simulate(SimOptions {
+            method,
+            corners: true,
+            settings: Settings {
+                tol,
+                ..options.settings.clone()
+            },
+            cancel: options.cancel,
+            ..SimOptions::default()
+        })
+    };
+    let is_exact = run.method == Method::Exact.name();
+    let stated = match run.error.max {
+        Some(error) => error,
+        None if is_exact => EXACT,
+        None => options.settings.tol,
+    };
+    if !is_exact {
+        match again(Method::Exact, options.settings.tol) {
+            Ok(exact) => {
+                let aside = apart(run, &exact).min(ASIDE * step);
+                let times = quiet_times(run, &[run, &exact], ASIDE * step);
+                let found = tubes(&run.waveforms, &exact.waveforms, &times, aside);
+                let judged = found.into_iter().map(|tube| (tube, stated + EXACT));
+                return Ok(worst(Method::Exact.name().into(), judged));
+            }
+            Err(error) if error.reason == Reason::Interrupted => return Err(error),
+            // Then steps.
+            Err(_) => {}
+        }
+    }
+    let method = if run.method == Method::Theta.name() {
+        Method::Euler
+    } else {
+        Method::Theta
+    };
+    let mut coarse = again(method, TOLERANCES[0])?;
+    let mut verified = None;
+    for tol in &TOLERANCES[1..] {
+        let fine = match again(method, *tol) {
+            Ok(fine) => fine,
+            // What is known already counts.
+            Err(error) => match (verified, error.reason == Reason::Interrupted) {
+                (Some(verified), false) => return Ok(verified),
+                _ => return Err(error),
+            },
+        };
+        let itself = SAFETY * apart(&coarse, &fine);
+        let aside = itself.max(apart(run, &fine).min(ASIDE * step));
+        let times = quiet_times(run, &[run, &coarse, &fine], itself.max(ASIDE * step));
+        let own = tubes(&coarse.waveforms, &fine.waveforms, &times, itself);
+        let own: BTreeMap<&str, f64> = own.iter().map(|t| (t.name.as_str(), t.distance)).collect();
+        let judged = tubes(&run.waveforms, &fine.waveforms, &times, aside);
+        let judged = judged.into_iter().map(|tube| {
+            let own = own.get(tube.name.as_str()).copied().unwrap_or(0.0);
+            (tube, stated + tol.max(SAFETY * own))
+        });
+        let found = worst(
+            format!("{} at a tolerance of {tol:e}", method.name()),
+            judged,
+        );
+        let enough = found.holds() && found.tolerance - stated <= ENOUGH;
+        verified = Some(found);
+        if enough {
+            break;
+        }
+        coarse = fine;
+    }
+    verified.ok_or_else(|| {
+        SimError::before(Reason::internal(
+            "integrate::verify",
+            "no tolerance to verify at",
+        ))
+    })
+}
+
+/// The signal whose difference is the largest part of what is tolerated.
+fn worst(method: String, judged: impl Iterator<Item = (Tube, f64)>) -> Verified {
+    let part = |(tube, tolerance): &(Tube, f64)| tube.distance / tolerance;
+    let (tube, tolerance) = judged
+        .max_by(|a, b| part(a).total_cmp(&part(b)))
+        .unwrap_or_default();
+    Verified {
+        method,
+        max_difference: tube.distance,
+        tolerance,
+        signal: tube.name,
+        time: tube.time,
+    }
+}
+
+/// The times of the grid's rows that no event of these runs is near, nor the start and the end (beyond which none is seen); all of them if those were too few.
+fn quiet_times(run: &Run, runs: &[&Run], near: f64) -> Vec<f64> {
+    let kind = |k: usize| run.kinds.get(k).copied().unwrap_or(RowKind::Grid);
+    let times = run.waveforms.time.iter().enumerate();
+    let all: Vec<f64> = times
+        .filter(|(k, _)| kind(*k) == RowKind::Grid)
+        .map(|(_, t)| *t)
+        .collect();
+    let events = runs.iter().flat_map(|run| run.events.iter().map(|e| e.0));
+    let end = all.last().copied().unwrap_or(0.0);
+    let mut events: Vec<f64> = events.chain([0.0, end]).collect();
+    events.sort_by(f64::total_cmp);
+    let is_quiet = |t: &f64| {
+        let next = events.partition_point(|event| *event < t - near);
+        events.get(next).is_none_or(|event| *event > t + near)
+    };
+    let quiet: Vec<f64> = all.iter().copied().filter(is_quiet).collect();
+    if (quiet.len() as f64) < (1.0 - MOST_LEFT_OUT) * all.len() as f64 {
+        return all;
+    }
+    quiet
+}
+
+/// How far events of the same name are apart, s: the largest distance among names that both runs have equally often.
+fn apart(a: &Run, b: &Run) -> f64 {
+    let by_name = |run: &'_ Run| {
+        let mut times: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+        for (t, what) in &run.events {
+            times.entry(what.to_string()).or_default().push(*t);
+        }
+        times
+    };
+    let (a, b) = (by_name(a), by_name(b));
+    let both = a
+        .iter()
+        .filter_map(|(name, times)| Some((times, b.get(name)?)));
+    both.filter(|(a, b)| a.len() == b.len())
+        .flat_map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b).abs()))
+        .fold(0.0, f64::max)
+}
