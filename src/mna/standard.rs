@@ -16,7 +16,11 @@ impl Behaviour {
     ///
     /// The lengths T_k are chosen so that consecutive directions satisfy dv_{k−1} di_k + di_{k−1} dv_k = 1: then the power
     /// into the rest of the circuit is Σ λ_k y_k up to what the curve's own slopes dissipate and terms linear in λ, and a
-    /// passive circuit keeps D + Dᵀ ⪰ 0.
+    /// passive circuit with one corner a device keeps D + Dᵀ ⪰ 0.
+    ///
+    /// A device whose conductance only grows on both sides of one segment (a zener diode) is that segment's resistor with a
+    /// diode, a source and a resistor in parallel for every corner: a circuit, so that λ_k y_k is power and D + Dᵀ ⪰ 0 for any
+    /// number of corners.
     #[must_use]
     pub fn standard(&self) -> Self {
         let mut out = Self {
@@ -28,7 +32,10 @@ impl Behaviour {
         for pair in &self.pairs {
             match pair.port.law.curve() {
                 Some(curve) if pair.fixed_role || !pair.port.law.is_ideal_diode() => {
-                    expand(&mut out, pair, curve);
+                    match middle(&curve).filter(|_| !pair.fixed_role) {
+                        Some(middle) => branches(&mut out, pair, &curve, middle),
+                        None => expand(&mut out, pair, curve),
+                    }
                 }
                 _ => out.pairs.push(pair.clone()),
             }
@@ -104,6 +111,89 @@ fn shape(curve: Curve) -> Shape {
         first: plus(first, unit),
         pieces,
     }
+}
+
+/// Conductances of the pieces, infinite where they are vertical.
+fn conductances(curve: &Curve) -> Vec<f64> {
+    let segments = curve.vertices.windows(2).map(|w| {
+        let [(v0, i0), (v1, i1)] = [w[0], w[1]].map(|(v, i)| (v.f64, i.f64));
+        (v1 - v0, i1 - i0)
+    });
+    let ray = |(v, i): (Value, Value)| std::iter::once((v.f64, i.f64));
+    let along = ray(curve.first).chain(segments).chain(ray(curve.last));
+    along.map(|(v, i)| i / v).collect()
+}
+
+/// The segment, 1 being that from the first corner to the second, from which the conductance grows to both sides.
+fn middle(curve: &Curve) -> Option<usize> {
+    let g = conductances(curve);
+    let segments = 1..g.len() - 1;
+    let middle = segments.min_by(|&a, &b| g[a].total_cmp(&g[b]))?;
+    let grows = |w: &[f64]| w[0] <= w[1];
+    let falls = |w: &[f64]| w[0] >= w[1];
+    let outward = g[..=middle].windows(2).all(falls) && g[middle..].windows(2).all(grows);
+    (outward && g[middle].is_finite()).then_some(middle)
+}
+
+/// The middle segment as a resistor, and for every corner V_k, with the growth G_k of the conductance beyond it,
+/// 0 ≤ i_k ⟂ V_k + i_k/G_k − v ≥ 0 above and 0 ≤ i_k ⟂ v − V_k + i_k/G_k ≥ 0 below; i is the sum.
+fn branches(out: &mut Behaviour, pair: &Pair, curve: &Curve, middle: usize) {
+    let device = &pair.port.device;
+    out.internal.push(pair.reverse);
+    out.internal.push(pair.forward);
+    let along = out.column(format!("{device}.s"));
+    out.internal.push(along);
+    // v = v₀ + (v₁ − v₀) s, i = i₀ + (i₁ − i₀) s + Σ ± i_k
+    let [(v0, i0), (v1, i1)] = [curve.vertices[middle - 1], curve.vertices[middle]];
+    let mut v: Equation = vec![(Coefficient::ONE, pair.reverse)];
+    let mut i: Equation = vec![(Coefficient::MINUS_ONE, pair.forward)];
+    for (equation, from, to) in [(&mut v, v0, v1), (&mut i, i0, i1)] {
+        equation.push((Coefficient::Plus(from), Behaviour::ONE));
+        equation.push((Coefficient::Plus(to), along));
+        equation.push((Coefficient::Minus(from), along));
+    }
+    let g = conductances(curve);
+    for (k, &(corner, _)) in curve.vertices.iter().enumerate() {
+        let growth = (g[k + 1] - g[k]).abs();
+        if growth == 0.0 {
+            continue;
+        }
+        let above = k >= middle;
+        let name = format!("{device}.{}", k + 1);
+        let (reverse, forward) = (
+            out.column(format!("-v({name})")),
+            out.column(format!("i({name})")),
+        );
+        let mut branch: Equation = vec![(Coefficient::MINUS_ONE, reverse)];
+        if growth.is_finite() {
+            branch.push((Coefficient::Plus(Value::binary(growth.recip())), forward));
+        }
+        if above {
+            branch.push((Coefficient::Plus(corner), Behaviour::ONE));
+            branch.push((Coefficient::ONE, pair.reverse));
+            i.push((Coefficient::ONE, forward));
+        } else {
+            branch.push((Coefficient::Minus(corner), Behaviour::ONE));
+            branch.push((Coefficient::MINUS_ONE, pair.reverse));
+            i.push((Coefficient::MINUS_ONE, forward));
+        }
+        out.equations.push(branch);
+        let mut port = pair.port.clone();
+        port.law = Law::ideal_diode();
+        port.role = Role::Voltage;
+        port.device = name;
+        out.pairs.push(Pair {
+            port,
+            reverse,
+            forward,
+            fixed_role: false,
+            reverse_name: out.columns[reverse].clone(),
+            forward_name: out.columns[forward].clone(),
+            units: pair.units,
+        });
+    }
+    out.equations.push(v);
+    out.equations.push(i);
 }
 
 fn expand(out: &mut Behaviour, pair: &Pair, curve: Curve) {

@@ -156,3 +156,37 @@ fn a_mesh_of_equal_sections_takes_no_more_steps_than_rows() {
     let residual = exact.energy.residual_relative;
     assert!(residual < 1e-7, "energy residual {residual:e}");
 }
+
+/// The forward drop is reached by an impulse, and Roff then discharges the capacitor.
+#[test]
+fn a_zener_diode_across_a_charged_capacitor_makes_it_jump() {
+    let run = run("zener_cap", Method::Exact);
+    let across = column(&run, "v(2)");
+    let tau = 66.51e6 * 59.81e-9;
+    assert!(run.waveforms.time.len() > 400);
+    for (t, v) in run.waveforms.time.iter().zip(&across) {
+        let expected = -0.3 * (-t / tau).exp();
+        assert!((v - expected).abs() < 1e-12, "{v} at {t}");
+    }
+    let jump = &run.impulses[..];
+    assert!(jump.len() == 1 && jump[0].name == "i(d3)", "{jump:?}");
+    assert!((jump[0].area / (59.81e-9 * 4.7) - 1.0).abs() < 1e-12);
+    for scale in ["-5e125", "-5e-125"] {
+        let run = changed("zener_cap", &[("ic=-5.0", &format!("ic={scale}"))], Method::Exact);
+        let expected = if scale == "-5e125" { -0.3 } else { -0.0 };
+        assert!((column(&run, "v(2)")[0] - expected).abs() < 1e-12, "{scale}");
+    }
+}
+
+/// C Δv = 1 µF · 4.7 V is a charge, whatever Rrev.
+#[test]
+fn the_impulse_of_a_zener_diode_is_a_charge() {
+    for rrev in ["rrev=66.51", "rrev=1"] {
+        let run = changed("zener_impulse", &[("rrev=66.51", rrev)], Method::Exact);
+        let [impulse] = &run.impulses[..] else {
+            panic!("{:?}", run.impulses)
+        };
+        assert_eq!(impulse.name, "i(d3)");
+        assert!((impulse.area / 4.7e-6 - 1.0).abs() < 1e-9, "{impulse:?}");
+    }
+}

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::diagnostic::Internal;
 use crate::integrate::jump::{Infeasible, Jump, JumpProblem};
-use crate::lcs::{Lcs, Role};
+use crate::lcs::{Lcs, Outputs, Role, Rows};
 use crate::solve::{Driver, Status, norm};
 
 /// One implicit step prepared: λ solves LCP(M, q) with M = D + hC W⁻¹B, W = I − hA.
@@ -203,7 +203,27 @@ impl Free {
         const ROUNDING: f64 = 1e-12;
         let through = &self.lcs.d * p;
         let (mut currents, mut voltages) = (Vec::new(), Vec::new());
+        let Outputs {
+            power,
+            power_v,
+            power_i,
+            ..
+        } = &self.lcs.outputs;
+        let element = |name: &str| power.iter().position(|term| term.element == name);
         for (j, port) in self.lcs.ports.iter().enumerate() {
+            // Of a device of several pairs, `d1.2`, its own current and voltage.
+            let whole = port
+                .device
+                .rsplit_once('.')
+                .filter(|_| element(&port.device).is_none());
+            if let Some((device, k)) =
+                whole.and_then(|(device, _)| Some((device, element(device)?)))
+            {
+                let area = |rows: &Rows| rows.lambda.row(k).transpose().dot(p);
+                currents.push((format!("i({device})"), area(power_i)));
+                voltages.push((format!("v({device})"), area(power_v)));
+                continue;
+            }
             let (current, voltage) = match port.role {
                 Role::Current => (p[j], -through[j]),
                 Role::Voltage => (through[j], -p[j]),
