@@ -386,6 +386,9 @@ impl Exact<'_> {
                 return Ok(Some(found));
             }
         }
+        if let Some(found) = self.walk(key, &mut tried) {
+            return Ok(Some(found));
+        }
         // Neighbours, nearest first.
         let mut next = 0;
         while next < tried.len() && tried.len() < MOST_NEIGHBOURS {
@@ -404,6 +407,36 @@ impl Exact<'_> {
             next += 1;
         }
         Ok(None)
+    }
+
+    /// From each of these sets of conducting devices on, what refuses a mode changes sides, one device after the other (Murty's
+    /// pivoting, Operations Research 22 (1974)): devices that change together, far from every proposal, are found as many modes
+    /// away as there are devices.
+    fn walk(&mut self, key: &Key, tried: &mut Vec<Vec<bool>>) -> Option<(usize, Vec<usize>)> {
+        for start in 0..tried.len() {
+            let mut closed = tried[start].clone();
+            for _ in 0..2 * self.plant.pairs {
+                let candidate = key.with_closed(closed.clone());
+                let Some(at) = self.plant.mode(&candidate, &self.exosystem) else {
+                    break;
+                };
+                match self.inspect(at) {
+                    Finding::Holds(leaving) => return Some((at, leaving)),
+                    Finding::Refused(guard) => {
+                        let Owner::Device(pair) = self.plant.modes[at].owner(guard) else {
+                            break;
+                        };
+                        closed[pair] = !closed[pair];
+                    }
+                    Finding::Inconsistent => break,
+                }
+                if tried.contains(&closed) {
+                    break;
+                }
+                tried.push(closed.clone());
+            }
+        }
+        None
     }
 
     /// Modes proposed by one implicit step of several lengths.

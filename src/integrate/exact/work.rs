@@ -24,6 +24,8 @@ const PATIENCE: u32 = 16;
 const LONGEST: u32 = 8;
 /// Rounding of a power below this part of the run's is no loss.
 const HARMLESS: f64 = 1e-13;
+/// Amplitudes below this part of the largest count as this large.
+const SMALLEST: f64 = 1e-60;
 /// Rows below this part of the largest are rounding.
 const NOTHING: f64 = 1e-13;
 
@@ -307,10 +309,12 @@ impl Forms {
         longest: u32,
     ) -> Self {
         let dim = generator.nrows();
+        // At the start of a long chain amplitudes are so small that their products vanish.
+        let least = SMALLEST * sizes.amplitude.iter().fold(0.0, |m: f64, a| m.max(*a));
         let size: Vec<f64> = sizes
             .amplitude
             .iter()
-            .map(|&a| if a > 0.0 { a } else { 1.0 })
+            .map(|&a| if a > 0.0 { a.max(least) } else { 1.0 })
             .collect();
         // Voltages and currents in the sizes that w takes, of one magnitude each.
         let count = 2 * terms.len();
