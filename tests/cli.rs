@@ -431,6 +431,31 @@ fn check_lists_faults_with_status_1_and_certificates_with_0() {
     assert_eq!(run("check missing.cir").status, 2);
 }
 
+/// A hundred of them, errors first, and how many more there are.
+#[test]
+fn a_flood_of_findings_is_cut() {
+    let directory = place();
+    let lines: String = (0..300).map(|k| format!("v{k} a{k} b\nr{k} a\n")).collect();
+    fs::write(
+        directory.path().join("flood.cir"),
+        format!("flood\n{lines}"),
+    )
+    .unwrap();
+    let ran = run_in(directory.path(), "sim flood.cir");
+    assert_eq!(ran.status, 2);
+    assert_eq!(ran.err.matches("flood.cir:").count(), 101);
+    assert!(
+        ran.err.contains("findings more") && ran.err.contains("flood.cir: 300 errors"),
+        "{ran}"
+    );
+    let ran = run_in(directory.path(), "check flood.cir --json");
+    let report: serde_json::Value = serde_json::from_str(&ran.out).unwrap();
+    assert_eq!(
+        (ran.status, report["faults"].as_array().unwrap().len()),
+        (1, 101)
+    );
+}
+
 #[test]
 fn lcs_prints_every_format_and_reads_its_json() {
     assert_snapshot!(run("lcs rectifier.cir"));

@@ -1,6 +1,7 @@
 //! A netlist file to a circuit, in one call.
 
-use std::fs;
+use std::fs::{self, File};
+use std::io::{self, Read};
 use std::path::Path;
 
 use super::Circuit;
@@ -21,11 +22,33 @@ pub struct Loaded {
     pub diagnostics: Vec<Diagnostic>,
 }
 
+/// Most bytes that are read of one file.
+const MOST: u64 = 256 << 20;
+
+/// The bytes of a regular file: what never ends (a device), or keeps its reader waiting (a pipe without a writer), is refused.
+///
+/// # Errors
+/// Those of the file system; a file that is not regular or larger than 256 MB.
+pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
+    if !fs::metadata(path)?.is_file() {
+        return Err(io::Error::other("it is not a regular file"));
+    }
+    let mut bytes = Vec::new();
+    File::open(path)?.take(MOST + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > MOST {
+        return Err(io::Error::other(format!(
+            "it has more than {} MB",
+            MOST >> 20
+        )));
+    }
+    Ok(bytes)
+}
+
 /// Reads, parses and elaborates a netlist file.
 #[must_use]
 pub fn load(path: &Path, options: &ElaborateOptions) -> Loaded {
     let mut sources = SourceMap::default();
-    let bytes = match fs::read(path) {
+    let bytes = match read(path) {
         Ok(bytes) => bytes,
         Err(error) => {
             let message = format!("cannot read `{}`: {error}", path.display());
@@ -38,7 +61,7 @@ pub fn load(path: &Path, options: &ElaborateOptions) -> Loaded {
         }
     };
     let root = sources.add(path.to_string_lossy(), netlist::decode(&bytes));
-    let (parsed, mut diagnostics) = netlist::parse(&mut sources, root, &|path| fs::read(path));
+    let (parsed, mut diagnostics) = netlist::parse(&mut sources, root, &|path| read(path));
     let (circuit, more) = elaborate(&parsed, options);
     diagnostics.extend(more);
     Loaded {

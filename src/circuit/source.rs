@@ -212,6 +212,45 @@ impl Wave {
         Some(self.segment(after, Side::Right).piece.end).filter(|end| end.is_finite())
     }
 
+    /// About how many breakpoints lie in [0, `until`].
+    #[must_use]
+    pub fn corners(&self, until: f64) -> f64 {
+        let laps = |delay: f64, period: f64, count: f64| {
+            if period > 0.0 {
+                ((until - delay).max(0.0) / period).min(count)
+            } else {
+                1.0
+            }
+        };
+        match self {
+            Self::Pulse {
+                delay,
+                rise,
+                fall,
+                period,
+                count,
+                ..
+            } => {
+                let kinks = if *rise == 0.0 && *fall == 0.0 {
+                    2.0
+                } else {
+                    4.0
+                };
+                kinks * laps(*delay, *period, count.unwrap_or(f64::INFINITY))
+            }
+            Self::Pwl {
+                points,
+                repeat: Some(from),
+                delay,
+            } => {
+                let period = points.last().map_or(0.0, |last| last.0 - from);
+                points.len() as f64 * laps(*delay, period, f64::INFINITY)
+            }
+            Self::Pwl { points, .. } => points.len() as f64,
+            _ => 2.0,
+        }
+    }
+
     /// Whether the value jumps at `t`. Decided on the waveform's parameters, not on rounded values.
     #[must_use]
     pub fn is_edge(&self, t: f64) -> bool {

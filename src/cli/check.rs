@@ -67,9 +67,9 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Report, Failure> {
                 Subject::System(_) => check::system(&system.lcs),
             };
             report.ok = diagnostics.iter().all(|d| d.severity < Severity::Error);
-            report
-                .faults
-                .splice(0..0, diagnostics.iter().map(|d| Fault::of(d, &sources)));
+            let shown = input::most(diagnostics);
+            let shown = shown.iter().map(|d| Fault::of(d, &sources));
+            report.faults.splice(0..0, shown);
             Ok(report)
         }
         Err(failure) => {
@@ -84,8 +84,6 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Report, Failure> {
 
 fn faulty(title: &str, diagnostics: &[Diagnostic], sources: &SourceMap) -> Report {
     debug_assert!(diagnostics.iter().any(|d| d.severity == Severity::Error));
-    check::faulty(
-        title,
-        diagnostics.iter().map(|d| Fault::of(d, sources)).collect(),
-    )
+    let shown = input::most(diagnostics.to_vec());
+    check::faulty(title, shown.iter().map(|d| Fault::of(d, sources)).collect())
 }

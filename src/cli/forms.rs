@@ -1,9 +1,8 @@
 //! `circ sim` on nonlinear forms, which are no circuits.
 
-use std::fs;
-
 use super::args::{Input, Method, SimArgs};
 use super::exit::Failure;
+use crate::circuit;
 use crate::forms::json::nonlinear::{self, NonlinearFile};
 use crate::integrate::Run;
 use crate::settings::Settings;
@@ -14,7 +13,7 @@ use crate::waveform::Waveforms;
 /// # Errors
 /// [`Failure::Message`] when it is one with a fault.
 pub(super) fn open(input: &Input) -> Result<Option<NonlinearFile>, Failure> {
-    let Ok(bytes) = fs::read(&input.file) else {
+    let Ok(bytes) = circuit::load::read(&input.file) else {
         return Ok(None);
     };
     let text = String::from_utf8_lossy(&bytes);

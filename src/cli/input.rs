@@ -1,6 +1,5 @@
 //! What a file holds: a circuit from a netlist, or a system in JSON.
 
-use std::fs;
 use std::path::Path;
 
 use super::args::{Diodes, Input};
@@ -33,7 +32,7 @@ pub enum Subject {
 /// # Errors
 /// [`Failure::Message`] when it is JSON but no system, with the failed hypothesis of a nonlinear form.
 pub fn system(input: &Input) -> Result<Option<SystemFile>, Failure> {
-    let Ok(bytes) = fs::read(&input.file) else {
+    let Ok(bytes) = circuit::load::read(&input.file) else {
         return Ok(None);
     };
     let text = String::from_utf8_lossy(&bytes);
@@ -231,6 +230,23 @@ pub fn positions(
     found.collect()
 }
 
+/// Findings shown of one netlist.
+const MOST: usize = 100;
+
+/// The first findings, errors before the rest where there are too many, and how many are left out.
+#[must_use]
+pub fn most(mut diagnostics: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    let Some(more) = diagnostics.len().checked_sub(MOST).filter(|more| *more > 0) else {
+        return diagnostics;
+    };
+    diagnostics.sort_by_key(|d| d.severity != Severity::Error);
+    let severity = diagnostics[MOST].severity;
+    diagnostics.truncate(MOST);
+    let message = format!("and {more} findings more");
+    diagnostics.push(Diagnostic::new("more", severity, None, message));
+    diagnostics
+}
+
 /// Shows findings on standard error: errors always, the rest unless quiet.
 pub fn show(diagnostics: &[Diagnostic], sources: &SourceMap, streams: &Streams) {
     let shown: Vec<Diagnostic> = diagnostics
@@ -239,7 +255,7 @@ pub fn show(diagnostics: &[Diagnostic], sources: &SourceMap, streams: &Streams) 
         .cloned()
         .collect();
     if !shown.is_empty() {
-        streams.error(render(&shown, sources, streams.err_is_terminal()));
+        streams.error(render(&most(shown), sources, streams.err_is_terminal()));
     }
 }
 

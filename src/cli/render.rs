@@ -11,6 +11,8 @@ use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 
 /// Width of messages in columns.
 const WIDTH: usize = 100;
+/// Bytes of a line that are shown before and from a place on: the rest of a longer line is left out.
+const SHOWN: usize = 160;
 
 /// All findings, each with `file:line:col` and the text underlined, with or without terminal colours.
 #[must_use]
@@ -91,15 +93,14 @@ impl miette::Diagnostic for Shown<'_> {
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
         let span = self.diagnostic.span.filter(|_| self.source.is_some())?;
         let label = (!self.diagnostic.label.is_empty()).then(|| self.diagnostic.label.clone());
+        let length = (span.end - span.start).min(SHOWN);
         Some(Box::new(std::iter::once(LabeledSpan::new(
-            label,
-            span.start,
-            span.end - span.start,
+            label, span.start, length,
         ))))
     }
 }
 
-/// A file that shows whole lines around a place, where miette alone would show the place only.
+/// A file that shows whole lines (as much of them as can be read) around a place, where miette alone would show the place only.
 #[derive(Debug)]
 struct WholeLines {
     path: String,
@@ -121,14 +122,18 @@ impl SourceCode for WholeLines {
         else {
             return Err(MietteError::OutOfBounds);
         };
-        let start = before.rfind('\n').map_or(0, |i| i + 1);
+        let line = before.rfind('\n').map_or(0, |i| i + 1);
         let end = after.find('\n').map_or(self.text.len(), |i| place.1 + i);
+        let start = self
+            .text
+            .ceil_char_boundary(line.max(place.0.saturating_sub(SHOWN)));
+        let end = self.text.floor_char_boundary(end.min(place.1 + SHOWN));
         Ok(Box::new(MietteSpanContents::new_named(
             self.path.clone(),
             &self.text.as_bytes()[start..end],
             SourceSpan::from((start, end - start)),
             before.matches('\n').count(),
-            before[start..].chars().count(),
+            before[line..].chars().count(),
             self.text.lines().count(),
         )))
     }

@@ -19,7 +19,7 @@ use crate::integrate::step::Scheme;
 use crate::integrate::switching::{Threshold, at_start};
 use crate::integrate::theta::{Setup, Start, Stepping, Theta};
 use crate::integrate::{reading, roles, start};
-use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
+use crate::lcs::{Hold, Input, Lcs, Position, StorageHold, reduce};
 use crate::mna::Behaviour;
 use crate::plan::{Plan, not_exact, plan};
 use crate::settings::Settings;
@@ -336,6 +336,19 @@ impl Problem<'_> {
         Some(SimError::before(Reason::Unsupported(what)).device(line.sources[0].clone()))
     }
 
+    /// The error of a source with more edges and kinks than a run may take steps.
+    fn too_many_edges(&self, lcs: &Lcs, tran: &Tran, settings: &Settings) -> Option<SimError> {
+        let limit = settings.max_steps;
+        let corners = |input: &Input| input.source.wave.corners(tran.tstop);
+        let input = lcs.inputs.iter().find(|i| corners(i) > limit as f64)?;
+        let what = format!(
+            "it has {:.1e} edges and kinks until {:e} s, where a run may take {limit} steps",
+            corners(input),
+            tran.tstop
+        );
+        Some(SimError::before(Reason::Unsupported(what)).device(input.name.clone()))
+    }
+
     /// Amplitudes from a coarse run.
     fn scout(&self, tran: &Tran, settings: &Settings) -> Option<Amplitudes> {
         let settings = Settings {
@@ -432,8 +445,11 @@ fn dispatch(
     let most =
         (!options.discard).then(|| options.settings.max_held / ((columns + 1) * size_of::<f64>()));
     grid.check(columns, most)?;
-    if let Some(line) = problem.too_short(&tran, &options.settings) {
-        return Err(line);
+    let endless = problem
+        .too_short(&tran, &options.settings)
+        .or_else(|| problem.too_many_edges(&lcs, &tran, &options.settings));
+    if let Some(error) = endless {
+        return Err(error);
     }
     let frame = |method: Method, notes: Vec<String>| Frame {
         title: lcs.title.clone(),

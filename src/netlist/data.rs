@@ -35,10 +35,17 @@ impl Reader<'_> {
             self.tell(fault.label("only a PWL without points of its own reads a file"));
             return;
         }
-        let Some((path, bytes)) = self.find(&written, from) else {
-            let fault = Diagnostic::error("missing-file", span, format!("cannot read `{written}`"));
-            self.tell(fault.label("the points of the PWL should be in it"));
-            return;
+        let (path, bytes) = match self.find(&written, from) {
+            Ok(Some(found)) => found,
+            missing => {
+                let why = missing
+                    .err()
+                    .map_or(String::new(), |error| format!(": {error}"));
+                let message = format!("cannot read `{written}`{why}");
+                let fault = Diagnostic::error("missing-file", span, message);
+                self.tell(fault.label("the points of the PWL should be in it"));
+                return;
+            }
         };
         self.bytes += bytes.len();
         if self.sources.files.len() > MAX_FILES || self.bytes > MAX_BYTES {

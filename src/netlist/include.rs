@@ -1,5 +1,6 @@
 //! `.include` and `.lib`: finding files and sections of libraries.
 
+use std::io;
 use std::path::{Component, Path, PathBuf};
 
 use super::lex::{Line, logical, title};
@@ -19,7 +20,7 @@ impl Reader<'_> {
     pub(super) fn lib(&mut self, file: &dot::Path, path: &Path) {
         match &file.section {
             Some((short, section))
-                if self.find(&file.whole, path).is_none() && self.find(short, path).is_some() =>
+                if self.is_missing(&file.whole, path) && !self.is_missing(short, path) =>
             {
                 self.include(short, Some(section), file.span, path);
             }
@@ -30,14 +31,31 @@ impl Reader<'_> {
         }
     }
 
-    /// The path and text of an included file, tried relative to the including one, with `\` as `/` too.
-    pub(super) fn find(&self, written: &str, from: &Path) -> Option<(PathBuf, Vec<u8>)> {
+    fn is_missing(&self, written: &str, from: &Path) -> bool {
+        matches!(self.find(written, from), Ok(None))
+    }
+
+    /// The path and text of an included file, tried relative to the including one, with `\` as `/` too; `None` where there is
+    /// none.
+    ///
+    /// # Errors
+    /// Why what is there cannot be read.
+    pub(super) fn find(
+        &self,
+        written: &str,
+        from: &Path,
+    ) -> io::Result<Option<(PathBuf, Vec<u8>)>> {
         let folder = from.parent().unwrap_or(Path::new(""));
         let slashes = written.replace('\\', "/");
-        [written, slashes.as_str()].into_iter().find_map(|name| {
+        for name in [written, slashes.as_str()] {
             let path = lexical(&folder.join(name));
-            (self.loader)(&path).ok().map(|bytes| (path, bytes))
-        })
+            match (self.loader)(&path) {
+                Ok(bytes) => return Ok(Some((path, bytes))),
+                Err(error) if is_there(&error) => return Err(error),
+                Err(_) => {}
+            }
+        }
+        Ok(None)
     }
 
     pub(super) fn include(
@@ -47,13 +65,21 @@ impl Reader<'_> {
         span: Span,
         from: &Path,
     ) {
-        let Some((path, bytes)) = self.find(written, from) else {
-            self.tell(
-                Diagnostic::warning("missing-file", span, format!("cannot read `{written}`"))
-                    .label("left out")
-                    .help("what it defines may be missing further on"),
-            );
-            return;
+        let (path, bytes) = match self.find(written, from) {
+            Ok(Some(found)) => found,
+            Ok(None) => {
+                self.tell(
+                    Diagnostic::warning("missing-file", span, format!("cannot read `{written}`"))
+                        .label("left out")
+                        .help("what it defines may be missing further on"),
+                );
+                return;
+            }
+            Err(error) => {
+                let message = format!("cannot read `{written}`: {error}");
+                self.tell(Diagnostic::error("unreadable", span, message).label("not read"));
+                return;
+            }
         };
         if self.files.contains(&path) {
             self.tell(
@@ -109,6 +135,14 @@ impl Reader<'_> {
         }
         self.files.pop();
     }
+}
+
+/// Whether it is not the name that is at fault.
+fn is_there(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        io::ErrorKind::Other | io::ErrorKind::PermissionDenied
+    )
 }
 
 /// The name of a `.lib name` line.

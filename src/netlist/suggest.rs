@@ -6,8 +6,11 @@ pub(crate) fn nearest<'a>(
     candidates: impl IntoIterator<Item = &'a str>,
 ) -> Option<String> {
     let limit = (name.chars().count() / 3).clamp(1, 3);
+    /// More candidates are not looked at: many unknown names among many known ones would take for ever.
+    const MOST: usize = 2000;
     candidates
         .into_iter()
+        .take(MOST)
         .map(|candidate| (strsim::damerau_levenshtein(name, candidate), candidate))
         .filter(|&(distance, candidate)| distance > 0 && distance <= limit && candidate.len() > 1)
         .min()

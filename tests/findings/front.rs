@@ -265,6 +265,82 @@ fn a_print_step_longer_than_the_run_leaves_first_and_last_row() {
     assert_eq!(run.waveforms.time, [0.0, 1e-6]);
 }
 
+/// A device never ends, and a pipe waits for its writer: neither is read.
+#[cfg(unix)]
+#[test]
+fn only_regular_files_are_read() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let pipe = folder.path().join("pipe");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.expect("mkfifo").success());
+    let cards = [
+        ".include /dev/zero".to_string(),
+        ".lib /dev/zero".into(),
+        format!(".include {}", pipe.display()),
+        "V2 b 0 PWL file=/dev/zero".into(),
+    ];
+    for card in cards {
+        let file = folder.path().join("t.cir");
+        std::fs::write(
+            &file,
+            format!("t\nV1 a 0 1\nR1 a b 1\nR2 b 0 1\n{card}\n.tran 1u 1m\n"),
+        )
+        .expect("a file");
+        let loaded = circ::netlist::load(&file, &ElaborateOptions::default());
+        let said = loaded
+            .diagnostics
+            .iter()
+            .any(|d| d.message.contains("not a regular file"));
+        assert!(
+            said && loaded.circuit.is_none(),
+            "{card}: {:?}",
+            loaded.diagnostics
+        );
+    }
+    let loaded = circ::netlist::load(&pipe, &ElaborateOptions::default());
+    assert_eq!(loaded.diagnostics[0].code, "unreadable");
+}
+
+#[test]
+fn edges_without_number_are_refused_before_the_run() {
+    let text = "t\nV1 a 0 PULSE(0 1 0 0 0 0.5p 1p)\nR1 a 0 1k\n.tran 1m 1000\n";
+    let circuit = read(text);
+    let equations = behaviour(&circuit).expect("equations");
+    for method in METHODS {
+        let options = SimOptions {
+            method,
+            ..SimOptions::default()
+        };
+        let error = simulate(&circuit, &equations, options).expect_err("1e15 periods");
+        assert_eq!(
+            (error.t, &error.elements[..]),
+            (None, &["v1".to_string()][..])
+        );
+        assert!(error.to_string().contains("2.0e15 edges"), "{error}");
+    }
+}
+
+/// What is shown of a line of any length can be read.
+#[cfg(feature = "cli")]
+#[test]
+fn a_long_line_is_shown_around_the_place() {
+    let nodes: String = (0..100_000).map(|k| format!("µ{k} ")).collect();
+    let mut sources = SourceMap::default();
+    let root = sources.add(
+        "long.cir",
+        format!("t\nV1 a 0 1\nR1 a 0 1\nX1 {nodes} none {nodes}\n.tran 1u 1m\n"),
+    );
+    let (netlist, _) = parse(&mut sources, root, &|_| Err(ErrorKind::NotFound.into()));
+    let (circuit, findings) = elaborate(&netlist, &ElaborateOptions::default());
+    assert!(circuit.is_none());
+    let text = circ::cli::render(&findings, &sources, false);
+    assert!(
+        text.len() < 10_000 && text.contains("long.cir:4:"),
+        "{} bytes",
+        text.len()
+    );
+}
+
 /// Every failure of a run names its place, its cause and what to do; the whole message is the snapshot.
 #[cfg(feature = "cli")]
 #[test]

@@ -76,6 +76,10 @@ impl Dense {
                 self.data.fill([0.0; BLOCK]);
                 for (j, out) in self.data.chunks_exact_mut(blocks).enumerate() {
                     for (column, &factor) in a.data.chunks_exact(blocks).zip(b.column(j)) {
+                        // Large systems are sparse.
+                        if factor == 0.0 {
+                            continue;
+                        }
                         for (s, a) in out.as_flattened_mut().iter_mut().zip(column.as_flattened()) {
                             *s += a * factor;
                         }
