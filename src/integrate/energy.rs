@@ -530,6 +530,14 @@ impl Balance {
         self.jumps += loss;
     }
 
+    /// Takes back all but a part of the jumps since `before`, whose storage changed by Δ in all with `square` = ½ΔᵀMΔ: sources deliver
+    /// in proportion, and where the whole loses L, a part a loses a(L + square) − a² square.
+    pub(crate) fn take_part(&mut self, before: &Self, part: f64, square: f64) {
+        let (source, loss) = (self.source - before.source, self.jumps - before.jumps);
+        *self = *before;
+        self.add_jump((part * source, part * (loss + square) - part * part * square));
+    }
+
     /// Energy lost in jumps so far, J.
     pub(crate) fn lost_in_jumps(&self) -> f64 {
         self.jumps

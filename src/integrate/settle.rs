@@ -13,7 +13,7 @@ use crate::lcs::Lcs;
 
 /// A control beyond its threshold by less than this part of its terms decides nothing here, and storage that moves by less than
 /// this part of its energy's square root stays.
-const DECISIVE: f64 = 1e-9;
+pub(crate) const DECISIVE: f64 = 1e-9;
 
 /// Moves the switches whose controls ask for it in the `position` reached, until none does; whether one moved. `left` is the
 /// position before this instant: a switch that has moved at this instant stays. `asking` says which switches a position's
@@ -74,25 +74,85 @@ pub(crate) fn asking(
     u: &DVector<f64>,
 ) -> Vec<usize> {
     let storage = &lcs.storage;
-    let x = &storage.inject * s + &storage.inject_one;
-    let change = &storage.x * &x + &storage.u * u + &storage.one - s;
+    let controls = Controls::of(lcs, s, u);
+    let change = &storage.x * &controls.x + &storage.u * u + &storage.one - s;
     let energy = |s: &DVector<f64>| s.dot(&(&storage.metric * s));
     let keeps = energy(&change) <= DECISIVE * DECISIVE * energy(s);
-    let rows = &lcs.controls;
-    let zero = |block: &DMatrix<f64>, i: usize| {
-        i >= block.nrows() || block.row(i).iter().all(|v| *v == 0.0)
-    };
-    let at = Point {
-        x: x.as_slice(),
-        lambda: &[],
-        u: u.as_slice(),
-        du: &[],
-    };
     let asks = |&i: &usize| {
-        let decided = zero(&rows.lambda, i) && zero(&rows.du, i) && (keeps || zero(&rows.x, i));
-        let noise = || DECISIVE * reading::magnitude(rows, i, at);
-        let excess = || thresholds[i].excess(position[i], reading::value(rows, i, at));
-        decided && thresholds[i].latch.is_none() && excess() > noise()
+        let decided = controls.known(i) && (keeps || zero(&lcs.controls.x, i));
+        let excess = || thresholds[i].excess(position[i], controls.value(i));
+        decided && thresholds[i].latch.is_none() && excess() > controls.noise(i)
     };
     (0..position.len()).filter(asks).collect()
+}
+
+/// The part of a jump from storage `before` to `after` at which the first of the switches `leaving` pass their thresholds, and which
+/// these are; `None` where none does on the way, or where the storage does not decide their controls. `left` is the system that
+/// the jump leaves, `entered` that of `position`, in which the switches leave once the jump is done.
+///
+/// Where a position leaves a current no path, or joins capacitors, the limit of resistances takes the storage to where it may stay
+/// along a line, in no time. A switch that is controlled by it moves on the way, and the rest has its path again: a converter
+/// that interrupts its inductor while a current control watches loses what is between the thresholds, not all.
+pub(crate) fn interruption(
+    (left, entered): (&Lcs, &Lcs),
+    thresholds: &[Threshold],
+    (position, leaving): (&[bool], &[usize]),
+    (before, after): (&DVector<f64>, &DVector<f64>),
+    u: &DVector<f64>,
+) -> Option<(f64, Vec<usize>)> {
+    let [start, end] = [before, after].map(|s| Controls::of(left, s, u));
+    let reached = Controls::of(entered, after, u);
+    let part = |i: usize| {
+        let known = [&start, &end, &reached].iter().all(|c| c.known(i));
+        let same = || (end.value(i) - reached.value(i)).abs() <= end.noise(i) + reached.noise(i);
+        if !known || !same() || thresholds[i].latch.is_some() {
+            return None;
+        }
+        let [waits, passed] = [&start, &end].map(|c| thresholds[i].excess(position[i], c.value(i)));
+        (waits < -start.noise(i) && passed > 0.0).then(|| (i, waits / (waits - passed)))
+    };
+    let parts: Vec<(usize, f64)> = leaving.iter().filter_map(|&i| part(i)).collect();
+    let first = parts.iter().map(|(_, part)| *part).reduce(f64::min)?;
+    let together = parts.iter().filter(|(_, part)| *part <= first + DECISIVE);
+    Some((first, together.map(|(i, _)| *i).collect()))
+}
+
+fn zero(block: &DMatrix<f64>, i: usize) -> bool {
+    i >= block.nrows() || block.row(i).iter().all(|v| *v == 0.0)
+}
+
+/// The controls of a system at storage s under inputs u.
+struct Controls<'a> {
+    lcs: &'a Lcs,
+    x: DVector<f64>,
+    u: &'a DVector<f64>,
+}
+
+impl<'a> Controls<'a> {
+    fn of(lcs: &'a Lcs, s: &DVector<f64>, u: &'a DVector<f64>) -> Self {
+        let x = &lcs.storage.inject * s + &lcs.storage.inject_one;
+        Self { lcs, x, u }
+    }
+
+    fn at(&self) -> Point<'_> {
+        Point {
+            x: self.x.as_slice(),
+            lambda: &[],
+            u: self.u.as_slice(),
+            du: &[],
+        }
+    }
+
+    /// Whether neither currents of devices nor slopes of sources have a part in control i.
+    fn known(&self, i: usize) -> bool {
+        zero(&self.lcs.controls.lambda, i) && zero(&self.lcs.controls.du, i)
+    }
+
+    fn value(&self, i: usize) -> f64 {
+        reading::value(&self.lcs.controls, i, self.at())
+    }
+
+    fn noise(&self, i: usize) -> f64 {
+        DECISIVE * reading::magnitude(&self.lcs.controls, i, self.at())
+    }
 }

@@ -6,7 +6,7 @@
 use crate::integrate::inputs::{Inputs, Passage};
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::SimError;
-use crate::integrate::settle::settle;
+use crate::integrate::settle::{DECISIVE, settle};
 use crate::lcs::Lcs;
 use crate::mna::{LatchPort, SwitchPort};
 
@@ -161,6 +161,8 @@ pub(crate) struct Switches {
     thresholds: Vec<Threshold>,
     /// Whether each control depends on sources alone, in the present system.
     driven: Vec<bool>,
+    /// Whether that is so since the present system was entered.
+    newly_driven: Vec<bool>,
     /// By switch: the port of a latch's valve in the present system.
     valves: Vec<Option<usize>>,
     needs_lambda: bool,
@@ -174,6 +176,7 @@ impl Switches {
             position,
             thresholds,
             driven: vec![],
+            newly_driven: vec![],
             valves: vec![],
             needs_lambda: false,
             in_this_step: 0,
@@ -195,9 +198,16 @@ impl Switches {
             !inputs.any(|(j, input)| input.source.wave.is_arriving() && rows.u[(i, j)] != 0.0)
         };
         let thresholds = || self.thresholds.iter().enumerate();
-        self.driven = thresholds()
+        let driven: Vec<bool> = thresholds()
             .map(|(i, t)| state_free(i) && known(i) && t.latch.is_none())
             .collect();
+        let before = self.driven.iter().copied().chain(std::iter::repeat(true));
+        self.newly_driven = driven
+            .iter()
+            .zip(before)
+            .map(|(now, before)| *now && !before)
+            .collect();
+        self.driven = driven;
         let port = |t: &Threshold| {
             let valve = t.valve()?;
             lcs.ports.iter().position(|port| port.device == valve)
@@ -250,6 +260,12 @@ impl Switches {
         (0..self.thresholds.len()).filter(wrong).collect()
     }
 
+    /// Flips switches that controls have asked to move, and counts them.
+    pub(crate) fn follow(&mut self, asking: &[usize]) {
+        self.toggle(asking);
+        self.in_this_step += asking.len() as u32;
+    }
+
     /// See [`settle`](crate::integrate::settle::settle).
     pub(crate) fn settle(
         &mut self,
@@ -271,43 +287,47 @@ impl Switches {
         fire(&self.thresholds, &mut self.position);
     }
 
-    /// What controls that depend on the state ask for, where the ports in `conducting` conduct; `flip` carries it out. Switches
-    /// that sources alone drive move at the times of [`Self::next_known`] only.
-    pub(crate) fn update(
-        &mut self,
-        lcs: &Lcs,
-        at: Point<'_>,
-        conducting: &[bool],
-        flip: bool,
-    ) -> Change {
-        let mut change = Change::None;
-        for (i, threshold) in self.thresholds.iter().enumerate() {
-            let on = self.position[i];
-            let control = || reading::value(&lcs.controls, i, at);
-            let wanted = match threshold.latch {
-                _ if self.driven[i] => continue,
-                None if threshold.position(on, control()) != on => Change::Passage,
-                Some(_) if threshold.holds(on, &self.position) => {
-                    if !self.valves[i].is_some_and(|port| conducting[port]) {
-                        Change::Release
-                    } else if threshold.off_below > 0.0 && control() <= threshold.off_below {
-                        Change::Passage
-                    } else {
-                        continue;
-                    }
-                }
-                _ => continue,
+    /// What controls that depend on the state ask for, where the ports in `conducting` conduct. Switches that sources alone drive
+    /// move at the times of [`Self::next_known`] only.
+    pub(crate) fn asked(&self, lcs: &Lcs, at: Point<'_>, conducting: &[bool]) -> Change {
+        (0..self.len())
+            .filter(|&i| !self.driven[i])
+            .map(|i| self.change(i, lcs, at, conducting))
+            .max()
+            .unwrap_or(Change::None)
+    }
+
+    /// The switches that controls ask to move in a position that was just entered. One that sources alone drive since then, as the
+    /// state has lost its part in the control, is asked too, if it is beyond its threshold by more than rounding.
+    pub(crate) fn asking(&self, lcs: &Lcs, at: Point<'_>, conducting: &[bool]) -> Vec<usize> {
+        let asks = |&i: &usize| {
+            let beyond = || {
+                let control = reading::value(&lcs.controls, i, at);
+                let noise = DECISIVE * reading::magnitude(&lcs.controls, i, at);
+                self.thresholds[i].excess(self.position[i], control) > noise
             };
-            change = change.max(wanted);
-            if flip {
-                self.position[i] = !on;
-                self.in_this_step += 1;
+            let waits = self.driven[i] && !(self.newly_driven[i] && beyond());
+            !waits && self.change(i, lcs, at, conducting) != Change::None
+        };
+        (0..self.len()).filter(asks).collect()
+    }
+
+    fn change(&self, i: usize, lcs: &Lcs, at: Point<'_>, conducting: &[bool]) -> Change {
+        let (threshold, on) = (&self.thresholds[i], self.position[i]);
+        let control = || reading::value(&lcs.controls, i, at);
+        match threshold.latch {
+            None if threshold.position(on, control()) != on => Change::Passage,
+            Some(_) if threshold.holds(on, &self.position) => {
+                if !self.valves[i].is_some_and(|port| conducting[port]) {
+                    Change::Release
+                } else if threshold.off_below > 0.0 && control() <= threshold.off_below {
+                    Change::Passage
+                } else {
+                    Change::None
+                }
             }
+            _ => Change::None,
         }
-        if flip {
-            fire(&self.thresholds, &mut self.position);
-        }
-        change
     }
 
     /// Whether the controls that ask for another position are no further past their thresholds than the part `uncertain` of what

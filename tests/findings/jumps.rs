@@ -162,3 +162,22 @@ fn diodes_that_compete_for_an_impulse_are_named_and_a_ladder_of_them_is_not() {
     assert!(resistive("rival_diodes", "1m", "1") < 4.4);
     assert!(resistive("rival_diodes", "1", "1m") > 5.9);
 }
+
+#[test]
+fn a_jump_ends_where_it_moves_a_switch() {
+    // Both switches of a pair are open within ±13 mV: the current falls until the control of the other threshold is reached, not to 0.
+    let name = "current_control_dead_band";
+    let real = changed(name, &[("SW(ideal", "SW(Ron=1u Roff=1g")], Method::Exact);
+    for method in [Method::Exact, Method::Theta] {
+        let ideal = changed(name, &[], method);
+        let distance = difference(&real, &ideal, "i(l1)");
+        assert!(distance < 1e-4, "{method:?}: {distance}");
+        // What Roff dissipates is lost in the jumps.
+        let lost = ideal.energy.dissipated + ideal.energy.jumps - real.energy.dissipated;
+        assert!(
+            lost.abs() < 1e-4 * real.energy.dissipated,
+            "{method:?}: {lost}"
+        );
+        assert!(ideal.energy.residual_relative < 1e-10, "{method:?}");
+    }
+}

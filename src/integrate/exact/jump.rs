@@ -6,14 +6,70 @@ use super::inspect::Finding;
 use super::mode::Key;
 use super::stepper::Exact;
 use super::transition::{PROPOSALS, Trigger};
-use crate::integrate::energy;
+use crate::integrate::energy::{self, Balance};
 use crate::integrate::run::{Log, Reason, SimError};
+use crate::integrate::settle;
 use crate::integrate::stats::{JumpReason, StateJump};
 
 /// Movements of the storage below this part of its amplitude are rounding and no jump.
 const ROUNDING: f64 = 1e-12;
 
+/// What stood before a jump.
+pub(super) struct Before {
+    storage: Vec<f64>,
+    balance: Balance,
+    /// Impulses in the log.
+    impulses: usize,
+}
+
 impl Exact<'_> {
+    /// What stands before a jump from here.
+    pub(super) fn before_jump(&self, log: &Log) -> Before {
+        Before {
+            storage: self.storage.clone(),
+            balance: self.balance,
+            impulses: log.impulses.len(),
+        }
+    }
+
+    /// Ends a jump into `key` where the first of the switches `leaving` pass their thresholds on the way, and returns these, see
+    /// [`settle::interruption`].
+    pub(super) fn interrupt(
+        &mut self,
+        before: &Before,
+        key: &Key,
+        leaving: &[usize],
+        log: &mut Log,
+    ) -> Result<Option<Vec<usize>>, SimError> {
+        let left = self.key.clone();
+        if !left.sliding.is_empty() || !key.sliding.is_empty() {
+            return Ok(None);
+        }
+        let u = self.inputs(self.motion.t);
+        let [start, end] = [&before.storage, &self.storage].map(|s| DVector::from_column_slice(s));
+        let left = self.plant.free(&left)?.lcs.clone();
+        let thresholds = self.plant.thresholds.clone();
+        let found = settle::interruption(
+            (&left, &self.plant.free(key)?.lcs),
+            &thresholds,
+            (&key.switches, leaving),
+            (&start, &end),
+            &u,
+        );
+        let Some((part, first)) = found else {
+            return Ok(None);
+        };
+        let change = end - &start;
+        let square = self.metric.stored(change.as_slice());
+        self.balance.take_part(&before.balance, part, square);
+        self.storage
+            .copy_from_slice((start + change * part).as_slice());
+        for impulse in &mut log.impulses[before.impulses..] {
+            impulse.area *= part;
+        }
+        Ok(Some(first))
+    }
+
     /// The devices' impulse at the present storage in a switch position, by projection in the energy metric. Returns
     /// whether the storage moved.
     pub(super) fn project(&mut self, key: &Key, log: &mut Log) -> Result<bool, SimError> {

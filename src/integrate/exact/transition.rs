@@ -113,8 +113,13 @@ impl Exact<'_> {
                 discontinuous = true;
                 continue;
             }
+            let mut jump = None;
             if found.is_none() {
-                jumped |= self.project(key, log)?;
+                let before = self.before_jump(log);
+                if self.project(key, log)? {
+                    jumped = true;
+                    jump = Some(before);
+                }
                 found = self.find_mode(key, trigger)?;
             }
             if found.is_none() && self.plant.pairs > 0 {
@@ -133,6 +138,11 @@ impl Exact<'_> {
             if leaving.is_empty() {
                 entry = Some(at);
                 break;
+            }
+            if let Some(before) = jump
+                && let Some(first) = self.interrupt(&before, key, &leaving, log)?
+            {
+                leaving = first;
             }
             closed_sets.push(key.closed.clone());
             positions.push(key.switches.clone());

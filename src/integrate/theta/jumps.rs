@@ -244,7 +244,7 @@ impl Theta<'_> {
         }
         let lcs = &self.plant.systems[self.now.system].1.lcs;
         let at = self.now.point(&self.lambda, &self.du);
-        Ok(self.switches.update(lcs, at, &self.now.pattern, false))
+        Ok(self.switches.asked(lcs, at, &self.now.pattern))
     }
 
     /// Whether the controls ask a switch to move now.
@@ -273,16 +273,13 @@ impl Theta<'_> {
             self.switches.position().to_vec(),
         );
         let mut before = first.clone();
+        // Where the last change of position started, and the storage where the next one does.
+        let (mut started, mut s) = (None, storage.clone());
         self.switches.toggle(moving);
         for _ in 0..2 + 2 * before.len() {
             if self.switches.position() == before {
-                if self.switches.needs_lambda() {
-                    self.read_lambda()?;
-                }
-                let lcs = &self.plant.systems[self.now.system].1.lcs;
-                let at = self.now.point(&self.lambda, &self.du);
-                let pattern = &self.now.pattern;
-                if self.switches.update(lcs, at, pattern, true) == Change::None {
+                let asking = self.asking()?;
+                if asking.is_empty() {
                     let moved = self.switches.moved(&first).join(", ");
                     self.note_jump(&storage, lost, JumpReason::Switch(moved), log);
                     self.break_waves()?;
@@ -291,11 +288,23 @@ impl Theta<'_> {
                     }
                     return Ok(());
                 }
+                s = self.system().storage(&self.now.x, &self.now.u);
+                match started
+                    .take()
+                    .and_then(|start| self.interrupt(start, &asking, &s))
+                {
+                    Some((there, first)) => {
+                        s = there;
+                        self.switches.follow(&first);
+                    }
+                    None => self.switches.follow(&asking),
+                }
             }
-            self.settle(&before)?;
+            self.settle(&before, &s)?;
             self.stats.events += 1;
             log.event(self.now.t, self.switches.flipped(&before));
-            self.change_position(log)?;
+            started = Some((self.now.system, s.clone(), self.now.balance));
+            self.change_position(&s, log)?;
             before = self.switches.position().to_vec();
         }
         // A switch whose positions contradict each other by less than the right limit is known to slides: it stays as it is.
@@ -310,22 +319,51 @@ impl Theta<'_> {
             }
             return Ok(());
         }
-        let (lcs, pattern) = (
-            &self.plant.systems[self.now.system].1.lcs,
-            &self.now.pattern,
-        );
-        let at = self.now.point(&self.lambda, &self.du);
-        self.switches.update(lcs, at, pattern, true);
+        let asking = self.asking()?;
+        self.switches.toggle(&asking);
         let moving = self.switches.moved(&before);
         Err(SimError::at(self.now.t, Reason::SwitchesDoNotSettle).devices(moving))
     }
 
+    /// The switches that controls ask to move in the present position.
+    fn asking(&mut self) -> Result<Vec<usize>, SimError> {
+        if self.switches.needs_lambda() {
+            self.read_lambda()?;
+        }
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        let at = self.now.point(&self.lambda, &self.du);
+        Ok(self.switches.asking(lcs, at, &self.now.pattern))
+    }
+
+    /// Where the jump from `start` (system, storage, balance) to storage `end` stops because the first of the switches `asking` pass
+    /// their thresholds on the way, and which these are; see [`settle::interruption`].
+    fn interrupt(
+        &mut self,
+        (left, start, balance): (usize, DVector<f64>, Balance),
+        asking: &[usize],
+        end: &DVector<f64>,
+    ) -> Option<(DVector<f64>, Vec<usize>)> {
+        let systems = &self.plant.systems;
+        let (left, entered) = (&systems[left].1.lcs, &systems[self.now.system].1.lcs);
+        let u = DVector::from_column_slice(&self.now.u);
+        let (part, first) = settle::interruption(
+            (left, entered),
+            self.switches.thresholds(),
+            (self.switches.position(), asking),
+            (&start, end),
+            &u,
+        )?;
+        let change = end - &start;
+        let square = 0.5 * change.dot(&(&entered.storage.metric * &change));
+        self.now.balance.take_part(&balance, part, square);
+        Some((start + change * part, first))
+    }
+
     /// Moves the switches that those which have left position `before` move, see [`settle`](settle::settle).
-    fn settle(&mut self, before: &[bool]) -> Result<(), SimError> {
+    fn settle(&mut self, before: &[bool], s: &DVector<f64>) -> Result<(), SimError> {
         if before.len() < 2 {
             return Ok(());
         }
-        let s = self.system().storage(&self.now.x, &self.now.u);
         let u = DVector::from_column_slice(&self.now.u);
         let thresholds = self.switches.thresholds().to_vec();
         let Self {
@@ -338,15 +376,14 @@ impl Theta<'_> {
         switches.settle(before, |position| {
             let at = plant.system(position, inputs, now.t)?;
             let lcs = &plant.systems[at].1.lcs;
-            Ok(settle::asking(lcs, &thresholds, position, &s, &u))
+            Ok(settle::asking(lcs, &thresholds, position, s, &u))
         })?;
         Ok(())
     }
 
-    /// Takes the storage over into the system of the present switch position.
-    pub(super) fn change_position(&mut self, log: &mut Log) -> Result<(), SimError> {
+    /// Takes storage s over into the system of the present switch position.
+    fn change_position(&mut self, s: &DVector<f64>, log: &mut Log) -> Result<(), SimError> {
         let old = self.system();
-        let s = old.storage(&self.now.x, &self.now.u);
         let carried = self.now.estimate.as_ref().map(|estimate| {
             let error = estimate.error();
             old.lcs.storage.x.columns(0, error.len()) * DVector::from_column_slice(error)
@@ -362,7 +399,7 @@ impl Theta<'_> {
             })?;
         self.now.system = at;
         let system = &self.plant.systems[at].1;
-        let x = system.state_from(&s);
+        let x = system.state_from(s);
         self.now.x.clear();
         self.now.x.extend(x.iter());
         if let (Some(estimate), Some(carried), None) =
