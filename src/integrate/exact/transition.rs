@@ -436,7 +436,11 @@ impl Exact<'_> {
                         let Owner::Device(pair) = self.plant.modes[at].owner(guard) else {
                             break;
                         };
-                        closed[pair] = !closed[pair];
+                        // The pair of a switch on its threshold stays closed.
+                        let Some(side) = closed.get_mut(pair) else {
+                            break;
+                        };
+                        *side = !*side;
                     }
                     Finding::Inconsistent => break,
                 }
