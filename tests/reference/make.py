@@ -22,6 +22,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 NETLISTS = HERE.parent.parent / "netlists"
 INTO = HERE
 ROWS = 400
+TIMEOUT = 600  # s, for one run
 OPTIONS = "reltol=1e-4 abstol=1n vntol=1u"
 # Where OPTIONS will not do: ngspice gives up ("timestep too small"), or its trapezoidal rule at reltol=1e-4 is wrong by 7 %
 # (boost: 12.27 V at 1.416 ms against 13.178 V at reltol=1e-6 and 13.178 V with Gear; sepic: 8.71 V against 9.115 V).
@@ -74,7 +75,7 @@ def run(text, folder):
         deck.write_text(text)
         result = subprocess.run(
             ["ngspice", "-n", "-b", "-r", str(out), str(deck)],
-            cwd=folder, capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=600)
+            cwd=folder, capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=TIMEOUT)
         if result.returncode != 0 or not out.exists():
             lines = [line for line in (result.stdout + result.stderr).splitlines() if "too small" in line or "rror" in line]
             raise Failed(lines[0] if lines else f"exit status {result.returncode}")

@@ -1,0 +1,376 @@
+//! One case by `circ` and by the oracle.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+
+use circ::circuit::{ElaborateOptions, elaborate};
+use circ::diagnostic::SourceMap;
+use circ::integrate::{Method, Run, SimOptions, simulate};
+use circ::mna::behaviour;
+use circ::netlist::parse;
+use circ::settings::Settings;
+
+use crate::changes::change;
+use crate::circuit::{Card, Circuit, DiodeModel, Part, states};
+use crate::oracle;
+use crate::random::Random;
+use crate::topologies::Case;
+
+/// Largest difference of states relative to their amplitudes that needs no explanation.
+pub(crate) const AGREES: f64 = 1e-6;
+
+/// What became of a case.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Outcome {
+    Agrees {
+        difference: f64,
+        error: f64,
+        method: String,
+    },
+    Differs {
+        difference: f64,
+        what: String,
+    },
+    /// `circ` refused, loudly.
+    Refused(String),
+    Panicked(String),
+    /// The oracle has no answer.
+    Declined(String),
+}
+
+/// A run of a netlist, or what was said instead; one that goes on for longer than this is said to hang.
+const LONGEST: Duration = Duration::from_secs(60);
+
+pub(crate) fn run(text: &str, method: Method) -> Result<Run, String> {
+    let (send, receive) = mpsc::channel();
+    let owned = text.to_string();
+    // A run without progress cannot be ended from outside; its thread is left alone.
+    std::thread::spawn(move || drop(send.send(attempt(&owned, method))));
+    receive
+        .recv_timeout(LONGEST + Duration::from_secs(30))
+        .unwrap_or_else(|_| Err("hang: no progress".into()))
+}
+
+fn attempt(text: &str, method: Method) -> Result<Run, String> {
+    let end = Instant::now() + LONGEST;
+    let guarded = catch_unwind(AssertUnwindSafe(|| {
+        let mut sources = SourceMap::default();
+        let root = sources.add("random.cir", text);
+        let (netlist, findings) = parse(&mut sources, root, &|_| {
+            Err(std::io::ErrorKind::NotFound.into())
+        });
+        let (circuit, more) = elaborate(&netlist, &ElaborateOptions::default());
+        let circuit = circuit.ok_or_else(|| format!("not read: {findings:?} {more:?}"))?;
+        let behaviour = behaviour(&circuit).map_err(|e| format!("no behaviour: {e:?}"))?;
+        let mut progress = |t: f64| assert!(Instant::now() < end, "hang: at {t:e} s");
+        let options = SimOptions {
+            method,
+            progress: Some(&mut progress),
+            settings: Settings {
+                tol: 1e-7,
+                max_steps: 3_000_000,
+                ..Settings::default()
+            },
+            ..SimOptions::default()
+        };
+        simulate(&circuit, &behaviour, options).map_err(|e| e.to_string())
+    }));
+    guarded.unwrap_or_else(|e| {
+        let text = e.downcast_ref::<String>().cloned();
+        let text = text.or_else(|| e.downcast_ref::<&str>().map(ToString::to_string));
+        Err(format!("panic: {}", text.unwrap_or_default()))
+    })
+}
+
+/// The columns of the signals at the rows k·stop/rows, k = 1, …, row by row.
+pub(crate) fn rows(
+    run: &Run,
+    circuit: &Circuit,
+    signals: &[String],
+) -> Result<Vec<Vec<f64>>, String> {
+    let columns: Vec<usize> = signals
+        .iter()
+        .map(|name| {
+            run.waveforms
+                .find(name)
+                .ok_or_else(|| format!("no column {name}"))
+        })
+        .collect::<Result<_, _>>()?;
+    let step = circuit.step();
+    let mut rows = Vec::new();
+    for k in 1..=circuit.rows {
+        let t = k as f64 * step;
+        let close = |&time: &f64| (time - t).abs() <= 1e-9 * step;
+        let row = run.waveforms.time.iter().rposition(close);
+        let row = row.ok_or_else(|| format!("no row at {t}"))?;
+        rows.push(columns.iter().map(|&j| run.waveforms.row(row)[j]).collect());
+    }
+    Ok(rows)
+}
+
+/// Amplitude of each signal; what is below a thousandth of the largest of its kind counts as that.
+pub(crate) fn amplitudes(rows: &[Vec<f64>], signals: &[String]) -> Vec<f64> {
+    let own: Vec<f64> = (0..signals.len())
+        .map(|j| rows.iter().fold(0.0_f64, |m, row| m.max(row[j].abs())))
+        .collect();
+    let largest = |kind: char| {
+        let of_kind = own.iter().zip(signals).filter(|(_, s)| s.starts_with(kind));
+        of_kind.fold(1e-12_f64, |m, (a, _)| m.max(*a))
+    };
+    let floors = (1e-3 * largest('v'), 1e-3 * largest('i'));
+    let pairs = own.iter().zip(signals);
+    pairs
+        .map(|(a, s)| {
+            a.max(if s.starts_with('v') {
+                floors.0
+            } else {
+                floors.1
+            })
+        })
+        .collect()
+}
+
+/// The largest difference, where and in what.
+pub(crate) fn difference(a: &[Vec<f64>], b: &[Vec<f64>], signals: &[String]) -> (f64, String) {
+    let amplitudes = amplitudes(b, signals);
+    let mut worst = (0.0, String::new());
+    for (k, (one, other)) in a.iter().zip(b).enumerate() {
+        for (j, (x, y)) in one.iter().zip(other).enumerate() {
+            let d = (x - y).abs() / amplitudes[j];
+            let d = if d.is_nan() { f64::INFINITY } else { d };
+            if d > worst.0 {
+                worst = (
+                    d,
+                    format!("{} in row {}: {x} is not {y}", signals[j], k + 1),
+                );
+            }
+        }
+    }
+    worst
+}
+
+/// Whether every switch and diode has resistances that the oracle can work with as they stand.
+fn is_plain(circuit: &Circuit) -> bool {
+    circuit.cards.iter().all(|card| match card.part {
+        Part::S(m) => m.ron >= 1e-5 && m.roff <= 1e9,
+        Part::M(m) => m.rb >= 1e-5 && m.ron >= 1e-5 && m.roff <= 1e9,
+        Part::D(DiodeModel::Lines(_, ron, roff)) => ron >= 1e-5 && roff <= 1e9,
+        _ => true,
+    })
+}
+
+/// The circuit with no resistance below `ron` and none above `roff` in switches and diodes.
+pub(crate) fn realised(circuit: &Circuit, ron: f64, roff: f64) -> Circuit {
+    let mut circuit = circuit.clone();
+    for card in &mut circuit.cards {
+        match &mut card.part {
+            Part::S(m) => (m.ron, m.roff) = (m.ron.max(ron), m.roff.min(roff)),
+            Part::D(DiodeModel::Lines(_, on, off)) => (*on, *off) = (on.max(ron), off.min(roff)),
+            Part::M(m) => {
+                (m.ron, m.roff) = (m.ron.max(ron), m.roff.min(roff));
+                m.rb = m.rb.max(ron);
+            }
+            _ => {}
+        }
+    }
+    circuit
+}
+
+/// The circuit with a resistance across every inductor and exponential diode, without which nodes between them have no voltage.
+fn shunted(circuit: &Circuit, ohms: f64) -> Circuit {
+    let mut circuit = circuit.clone();
+    let mut shunts = Vec::new();
+    for card in &circuit.cards {
+        if matches!(card.part, Part::L(..) | Part::D(DiodeModel::Curved(..))) {
+            shunts.push(Card {
+                name: format!("rshunt{}", card.name),
+                nodes: card.nodes.clone(),
+                part: Part::R(ohms),
+            });
+        }
+    }
+    circuit.cards.extend(shunts);
+    circuit
+}
+
+/// The size of a circuit's resistances, Ω.
+fn ohms(circuit: &Circuit) -> f64 {
+    let r = circuit.cards.iter().filter_map(|c| match c.part {
+        Part::R(r) => Some(r.ln()),
+        _ => None,
+    });
+    let (sum, count) = r.fold((0.0, 0.0), |(s, n), r| (s + r, n + 1.0));
+    if count > 0.0 {
+        (sum / count).exp()
+    } else {
+        1.0
+    }
+}
+
+/// What the oracle says about a circuit: rows, and their own error.
+pub(crate) fn expected(circuit: &Circuit) -> Result<(Vec<Vec<f64>>, f64), String> {
+    let signals = states(circuit);
+    let answer = |circuit: &Circuit, tolerance| {
+        oracle::simulate(circuit, tolerance)
+            .map(|a| a.rows)
+            .map_err(|e| e.0)
+    };
+    if is_plain(circuit)
+        && let Ok(rows) = answer(circuit, 1e-7)
+    {
+        let coarse = answer(circuit, 1e-6)?;
+        let error = difference(&coarse, &rows, &signals).0;
+        return Ok((rows, error));
+    }
+    // Towards the ideal circuit: three decades and what they tend to.
+    let z = ohms(circuit);
+    let at = |e: f64| {
+        let realised = realised(circuit, z * e, z / e);
+        answer(&realised, 1e-7).or_else(|_| answer(&shunted(&realised, z / e), 1e-7))
+    };
+    let limit = |a: &[Vec<f64>], b: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        let row = |(a, b): (&Vec<f64>, &Vec<f64>)| {
+            a.iter().zip(b).map(|(a, b)| b + (b - a) / 9.0).collect()
+        };
+        a.iter().zip(b).map(row).collect()
+    };
+    let (one, mut last) = (at(1e-4)?, at(1e-5)?);
+    let mut coarse = limit(&one, &last);
+    let mut error = f64::INFINITY;
+    for e in [1e-6, 1e-7, 1e-8] {
+        // Smaller ones may be beyond the oracle.
+        let Ok(next) = at(e) else { break };
+        let fine = limit(&last, &next);
+        // The rest falls at least with e.
+        error = 0.3 * difference(&coarse, &fine, &signals).0;
+        (last, coarse) = (next, fine);
+        if error < 0.3 * AGREES {
+            break;
+        }
+    }
+    Ok((coarse, error))
+}
+
+/// A run of a case, with its rows.
+pub(crate) struct Base {
+    run: Run,
+    rows: Vec<Vec<f64>>,
+}
+
+/// The run of a case, or what became of it.
+pub(crate) fn base(case: &Case) -> Result<Base, Outcome> {
+    let run = run(&case.circuit.text(), Method::Auto).map_err(|e| {
+        if e.starts_with("panic") || e.starts_with("hang") {
+            Outcome::Panicked(e)
+        } else {
+            Outcome::Refused(e)
+        }
+    })?;
+    let rows = rows(&run, &case.circuit, &states(&case.circuit));
+    match rows {
+        Ok(rows) => Ok(Base { run, rows }),
+        Err(what) => Err(Outcome::Differs {
+            difference: f64::INFINITY,
+            what,
+        }),
+    }
+}
+
+/// `circ` against the oracle.
+pub(crate) fn judge(case: &Case, base: &Base) -> Outcome {
+    let signals = states(&case.circuit);
+    let (run, found) = (&base.run, &base.rows);
+    let (expected, error) = match expected(&case.circuit) {
+        Ok(e) => e,
+        Err(e) => return Outcome::Declined(e),
+    };
+    let (difference, what) = difference(found, &expected, &signals);
+    if let Some(fault) = run.notes.iter().find(|n| n.contains("internal error")) {
+        return Outcome::Panicked(format!("{fault} (differs by {difference:.1e})"));
+    }
+    let (method, stated) = method(run);
+    if difference <= AGREES + 3.0 * error + stated {
+        return Outcome::Agrees {
+            difference,
+            error,
+            method,
+        };
+    }
+    let what =
+        format!("{what} ({method}, stated {stated:.1e}, the oracle's own error {error:.1e})");
+    Outcome::Differs { difference, what }
+}
+
+/// What made the rows, and the error that it states itself: an exact run that hands over to steps says so.
+fn method(run: &Run) -> (String, f64) {
+    let handed_over = run.notes.iter().any(|n| n.contains("exact integration"));
+    let method = match (run.method.as_str(), handed_over) {
+        ("exact", true) => "exact and steps".to_string(),
+        ("exact", false) => return ("exact".into(), 0.0),
+        (method, true) => format!("{method} in the place of exact"),
+        (method, false) => method.to_string(),
+    };
+    (method, run.error.max.unwrap_or(0.0))
+}
+
+/// `circ` against itself after a change that must not matter; `None` where the change does not apply.
+pub(crate) fn unchanged(
+    case: &Case,
+    base: &Base,
+    kind: usize,
+    random: &mut Random,
+) -> Option<Outcome> {
+    let circuit = &case.circuit;
+    let signals = states(circuit);
+    let change = change(circuit, kind, random)?;
+    let failed = |what: String| {
+        Some(Outcome::Differs {
+            difference: f64::INFINITY,
+            what: format!("{}: {what}\n{}", change.name, change.text),
+        })
+    };
+    let second = match run(&change.text, Method::Auto) {
+        Ok(run) => run,
+        Err(e) => return failed(e),
+    };
+    let names: Vec<String> = change.signals.iter().map(|s| s.0.clone()).collect();
+    let other = match rows(&second, &change.circuit, &names) {
+        Ok(rows) => rows,
+        Err(e) => return failed(e),
+    };
+    let other: Vec<Vec<f64>> = other
+        .into_iter()
+        .skip(change.every - 1)
+        .step_by(change.every)
+        .map(|row| {
+            let signals = change.signals.iter();
+            row.iter().zip(signals).map(|(x, (_, f))| x / f).collect()
+        })
+        .collect();
+    // One signal alone stands beside itself.
+    let (rows, signals) = if change.signals.len() == signals.len() {
+        (base.rows.clone(), signals)
+    } else {
+        let place = signals.iter().position(|s| *s == names[0])?;
+        (
+            base.rows.iter().map(|row| vec![row[place]]).collect(),
+            names,
+        )
+    };
+    let (difference, what) = difference(&other, &rows, &signals);
+    let ((one, error), (two, other_error)) = (method(&base.run), method(&second));
+    let method = format!("{one}, {two}");
+    Some(if difference <= AGREES + error + other_error {
+        Outcome::Agrees {
+            difference,
+            error: 0.0,
+            method,
+        }
+    } else {
+        Outcome::Differs {
+            difference,
+            what: format!("{}: {what} ({method})\n{}", change.name, change.text),
+        }
+    })
+}

@@ -1,0 +1,193 @@
+//! Random converters: the same waveforms by `circ`, by an independent simulator, in realisations with finite resistances, by
+//! ngspice, and after every change that must not matter.
+//!
+//! `CIRC_CONVERTERS=N cargo test --release --test converters -- --nocapture` runs N cases; `CIRC_CONVERTERS_SEED` is the first
+//! seed (else the clock's), `CIRC_CONVERTERS_FOLDER` takes the netlists of failures.
+#![allow(missing_docs, reason = "tests")]
+
+mod bench;
+mod changes;
+mod circuit;
+mod compare;
+mod oracle;
+mod random;
+mod references;
+mod runner;
+mod topologies;
+
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Straight to standard error: the test harness swallows what macros print.
+fn tell(text: &str) {
+    writeln!(std::io::stderr(), "{text}").expect("a standard error");
+}
+
+fn number(variable: &str) -> Option<u64> {
+    std::env::var(variable).ok()?.parse().ok()
+}
+
+#[test]
+fn long_loop_of_free_seeds() {
+    let Some(count) = number("CIRC_CONVERTERS") else {
+        return tell("NOT RUN: the long loop of random converters (set CIRC_CONVERTERS=N)");
+    };
+    let clock = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    let first =
+        number("CIRC_CONVERTERS_SEED").unwrap_or_else(|| clock.map_or(1, |d| d.as_micros() as u64));
+    let folder = std::env::var_os("CIRC_CONVERTERS_FOLDER").map(PathBuf::from);
+    let summary = runner::run(first, count, folder.as_ref(), &tell);
+    tell(&summary.text());
+    assert!(
+        summary.failed.is_empty() && summary.refused.is_empty(),
+        "from seed {first}"
+    );
+}
+
+/// Writes what `tests/reference/converters.py` reads.
+#[test]
+fn decks() {
+    if let Some(folder) = std::env::var_os("CIRC_CONVERTERS_DECKS") {
+        references::write_decks(std::path::Path::new(&folder), 240);
+    }
+}
+
+/// Cases that fail today, with the reason; a case that agrees must leave the list.
+const OPEN: [(u64, &str); 0] = [];
+
+/// Cases against the oracle and after one change each.
+fn agree(seeds: std::ops::Range<u64>) {
+    let mut wrong = Vec::new();
+    let mut declined = 0;
+    for seed in seeds.clone() {
+        let case = topologies::case(seed);
+        let known = OPEN.iter().any(|(open, _)| *open == seed);
+        let mut fails = false;
+        for outcome in runner::both(&case, seed).into_iter().flatten() {
+            match outcome {
+                compare::Outcome::Agrees { .. } => {}
+                compare::Outcome::Declined(_) => declined += 1,
+                bad => {
+                    fails = true;
+                    if !known {
+                        let text = case.circuit.text();
+                        wrong.push(format!("{}: {bad:?}\n{text}", case.circuit.title));
+                    }
+                }
+            }
+        }
+        if known && !fails {
+            wrong.push(format!(
+                "{} agrees now: take it out of OPEN",
+                case.circuit.title
+            ));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(
+        10 * declined <= seeds.count(),
+        "the oracle declines {declined}"
+    );
+}
+
+/// Seed 1012, a six-pulse rectifier with Roff = 1e15, makes hardly any progress and would take a minute to be seen to.
+#[test]
+fn fixed_converters_agree() {
+    agree(1000..1012);
+}
+
+#[test]
+fn more_fixed_converters_agree() {
+    agree(1013..1025);
+}
+
+/// ngspice's answers; with `CIRC_CONVERTERS` all, else each seventh.
+#[test]
+fn converters_meet_ngspice() {
+    let all = number("CIRC_CONVERTERS").is_some();
+    let (names, wrong) = references::compare(0, if all { 1 } else { 7 });
+    assert!(names.len() >= if all { 100 } else { 15 }, "{}", names.len());
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// The oracle itself, against closed forms.
+mod of_the_oracle {
+    use crate::circuit::{Card, Circuit, DiodeModel, Part, SwitchModel, Wave};
+    use crate::oracle::simulate;
+
+    fn card(name: &str, nodes: &str, part: Part) -> Card {
+        let nodes = nodes.split(' ').map(str::to_string).collect();
+        Card {
+            name: name.into(),
+            nodes,
+            part,
+        }
+    }
+
+    fn circuit(cards: Vec<Card>, stop: f64, rows: usize) -> Circuit {
+        Circuit {
+            title: String::new(),
+            cards,
+            stop,
+            rows,
+        }
+    }
+
+    /// 1 mF through 1 Ω + Ron while the gate is high, and through 1 Ω + Roff before.
+    #[test]
+    fn a_switched_capacitor_charges_by_exponentials() {
+        let gate = Wave::Pulse {
+            levels: [0.0, 1.0],
+            delay: 1e-3,
+            rise: 0.0,
+            fall: 0.0,
+            width: 1.0,
+            period: 2.0,
+        };
+        let model = SwitchModel {
+            ron: 1.0,
+            roff: 99.0,
+            vt: 0.5,
+            vh: 0.0,
+        };
+        let cards = vec![
+            card("v1", "1 0", Part::V(Wave::Dc(10.0))),
+            card("r1", "1 2", Part::R(1.0)),
+            card("s1", "2 3 g 0", Part::S(model)),
+            card("vg", "g 0", Part::V(gate)),
+            card("c1", "3 0", Part::C(1e-3, 0.0)),
+        ];
+        let answer = simulate(&circuit(cards, 3e-3, 3), 1e-7).expect("an answer");
+        let before = 10.0 * (1.0 - (-1e-3_f64 / 0.1).exp());
+        for (row, t) in answer.rows.iter().zip([0.0, 1e-3, 2e-3]) {
+            let expected = 10.0 - (10.0 - before) * (-t / 2e-3_f64).exp();
+            assert!(
+                (row[0] - expected).abs() < 1e-9,
+                "{row:?} is not {expected}"
+            );
+        }
+    }
+
+    /// A diode ends the swing of L and C at its first maximum, 2 V, where the current comes back to zero.
+    #[test]
+    fn a_diode_holds_a_resonant_swing() {
+        let model = DiodeModel::Lines(0.0, 1e-6, 1e9);
+        let cards = vec![
+            card("v1", "1 0", Part::V(Wave::Dc(1.0))),
+            card("l1", "1 2", Part::L(1e-3, 0.0)),
+            card("d1", "2 3", Part::D(model)),
+            card("c1", "3 0", Part::C(1e-3, 0.0)),
+        ];
+        let answer = simulate(&circuit(cards, 5e-3, 5), 1e-7).expect("an answer");
+        for (row, t) in answer.rows.iter().zip([1.0_f64, 2.0, 3.0]) {
+            assert!((row[0] - t.sin()).abs() < 1e-5, "{row:?} at {t} ms");
+            assert!((row[1] - (1.0 - t.cos())).abs() < 1e-5, "{row:?} at {t} ms");
+        }
+        for row in &answer.rows[3..] {
+            assert!(
+                row[0].abs() < 1e-5 && (row[1] - 2.0).abs() < 1e-5,
+                "{row:?}"
+            );
+        }
+    }
+}
