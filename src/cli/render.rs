@@ -93,11 +93,21 @@ impl miette::Diagnostic for Shown<'_> {
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
         let span = self.diagnostic.span.filter(|_| self.source.is_some())?;
         let label = (!self.diagnostic.label.is_empty()).then(|| self.diagnostic.label.clone());
-        let length = (span.end - span.start).min(SHOWN);
+        let text = &self.source.as_ref()?.text;
+        let length = boundary(text, span.end.min(span.start + SHOWN)) - span.start;
         Some(Box::new(std::iter::once(LabeledSpan::new(
             label, span.start, length,
         ))))
     }
+}
+
+/// The beginning of the character at a byte, which may be the end of the text.
+fn boundary(text: &str, at: usize) -> usize {
+    let at = at.min(text.len());
+    (0..=at)
+        .rev()
+        .find(|&k| text.is_char_boundary(k))
+        .unwrap_or(0)
 }
 
 /// A file that shows whole lines (as much of them as can be read) around a place, where miette alone would show the place only.
@@ -124,10 +134,8 @@ impl SourceCode for WholeLines {
         };
         let line = before.rfind('\n').map_or(0, |i| i + 1);
         let end = after.find('\n').map_or(self.text.len(), |i| place.1 + i);
-        let start = self
-            .text
-            .ceil_char_boundary(line.max(place.0.saturating_sub(SHOWN)));
-        let end = self.text.floor_char_boundary(end.min(place.1 + SHOWN));
+        let start = boundary(&self.text, line.max(place.0.saturating_sub(SHOWN)));
+        let end = boundary(&self.text, end.min(place.1 + SHOWN));
         Ok(Box::new(MietteSpanContents::new_named(
             self.path.clone(),
             &self.text.as_bytes()[start..end],

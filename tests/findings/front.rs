@@ -333,12 +333,20 @@ fn a_long_line_is_shown_around_the_place() {
     let (netlist, _) = parse(&mut sources, root, &|_| Err(ErrorKind::NotFound.into()));
     let (circuit, findings) = elaborate(&netlist, &ElaborateOptions::default());
     assert!(circuit.is_none());
-    let text = circ::cli::render(&findings, &sources, false);
-    assert!(
-        text.len() < 10_000 && text.contains("long.cir:4:"),
-        "{} bytes",
-        text.len()
-    );
+    let cards = netlist.body.statements.iter();
+    let span = cards.filter_map(|s| match s {
+        circ::netlist::ast::Statement::Element(e) => Some(e.span),
+        _ => None,
+    });
+    let whole = circ::diagnostic::Diagnostic::error("long", span.last(), "the whole card");
+    for findings in [findings, vec![whole]] {
+        let text = circ::cli::render(&findings, &sources, false);
+        assert!(
+            text.len() < 10_000 && text.contains("long.cir:4:"),
+            "{} bytes",
+            text.len()
+        );
+    }
 }
 
 /// Every failure of a run names its place, its cause and what to do; the whole message is the snapshot.
