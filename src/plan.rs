@@ -21,8 +21,17 @@ pub struct Plan {
 pub fn plan(lcs: &Lcs, options: &SimOptions) -> Plan {
     let mut words = Vec::new();
     let (n, m, p) = (lcs.n(), lcs.m(), lcs.p());
+    // What follows from the matrices holds until a switch moves.
+    let (here, there) = if lcs.switches.is_empty() {
+        ("", "")
+    } else {
+        (
+            "in the start position of the switches: ",
+            " until one moves",
+        )
+    };
     words.push(format!(
-        "{n} states, {m} complementarity pairs, {p} sources"
+        "{here}{n} states, {m} complementarity pairs, {p} sources"
     ));
     let obstacle = not_exact(lcs);
     let method = match (options.method, &obstacle) {
@@ -61,9 +70,13 @@ pub fn plan(lcs: &Lcs, options: &SimOptions) -> Plan {
         });
     }
     if m == 0 {
-        words.push("no devices: linear propagation, no complementarity problem is built".into());
+        words.push(format!(
+            "{here}no devices: linear propagation, no complementarity problem is built{there}"
+        ));
     } else if is_positive_definite(lcs) {
-        words.push("D + Dᵀ is positive definite: no jump logic".into());
+        words.push(format!(
+            "{here}D + Dᵀ is positive definite: no jump logic{there}"
+        ));
     }
     if lcs.switches.is_empty() {
         words.push("no switches: one system for the whole run".into());

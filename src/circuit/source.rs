@@ -267,6 +267,55 @@ impl Wave {
         }
     }
 
+    /// The shortest period in which it repeats, s; of a modulated wave that of its highest frequency. `None` if it does not repeat.
+    #[must_use]
+    pub fn period(&self) -> Option<f64> {
+        let of = |frequency: f64| (frequency > 0.0).then(|| 1.0 / frequency);
+        match *self {
+            Self::Sin {
+                amplitude,
+                frequency,
+                ..
+            } => of(frequency).filter(|_| amplitude != 0.0),
+            Self::Pulse {
+                v1,
+                v2,
+                period,
+                count,
+                ..
+            } => {
+                let repeats = v1 != v2 && count.is_none_or(|count| count > 1.0);
+                Some(period).filter(|period| repeats && *period > 0.0)
+            }
+            Self::Pwl {
+                ref points, repeat, ..
+            } => {
+                let (from, to) = (repeat?, points.last()?.0);
+                Some(to - from).filter(|period| *period > 0.0)
+            }
+            Self::Sffm {
+                amplitude,
+                carrier,
+                index,
+                signal,
+                ..
+            } => of(carrier.abs() + (index * signal).abs()).filter(|_| amplitude != 0.0),
+            Self::Am {
+                amplitude,
+                modulation,
+                carrier,
+                ..
+            } => of(carrier.abs() + modulation.abs()).filter(|_| amplitude != 0.0),
+            Self::Dc(_) | Self::Exp { .. } | Self::Arriving { .. } => None,
+        }
+    }
+
+    /// Whether it has corners wherever it is not straight.
+    #[must_use]
+    pub const fn has_corners(&self) -> bool {
+        matches!(self, Self::Pulse { .. } | Self::Pwl { .. })
+    }
+
     /// Whether it is the wave that arrives on a transmission line.
     #[must_use]
     pub const fn is_arriving(&self) -> bool {

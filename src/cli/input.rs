@@ -255,7 +255,7 @@ pub fn show(diagnostics: &[Diagnostic], sources: &SourceMap, streams: &Streams) 
         .cloned()
         .collect();
     if !shown.is_empty() {
-        streams.error(render(&most(shown), sources, streams.err_is_terminal()));
+        streams.error(render(&most(shown), sources, streams.colours()));
     }
 }
 

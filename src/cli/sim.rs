@@ -16,12 +16,14 @@ use super::signals::Signals;
 use super::stepped::Stepped;
 use super::steps::Stepping;
 use super::streams::Streams;
+use crate::circuit::source::Wave;
 use crate::circuit::{Circuit, Tran};
 use crate::diagnostic::SourceMap;
 use crate::integrate::{
-    Block, Method, Reason, Run, SimError, SimOptions, Sink, Verified, VerifyOptions, simulate,
-    simulate_system, verify, verify_system,
+    Block, Method, Reason, Run, SimError, SimOptions, Sink, Verified, VerifyOptions, aliased,
+    simulate, simulate_system, verify, verify_system,
 };
+use crate::lcs::Input;
 use crate::report::figure::Figure;
 use crate::report::measured::Measurements;
 use crate::report::{json, terminal, text};
@@ -271,6 +273,17 @@ impl<'a> Destination<'a> {
     }
 }
 
+/// The sources of a subject.
+fn waves(subject: &Subject) -> impl Iterator<Item = (&str, &Wave)> {
+    let inputs: Vec<&Input> = match subject {
+        Subject::Circuit(both) => both.1.sources.iter().map(|s| &s.input).collect(),
+        Subject::System(system) => system.lcs.inputs.iter().collect(),
+    };
+    inputs
+        .into_iter()
+        .map(|input| (input.name.as_str(), &input.source.wave))
+}
+
 /// Makes a run a second time.
 fn second(subject: &Subject, run: &Run, options: &VerifyOptions<'_>) -> Result<Verified, SimError> {
     match subject {
@@ -329,6 +342,7 @@ pub(super) fn measured_run(
     let tstep = measuring
         .as_ref()
         .and_then(|(measuring, _)| measuring.tstep());
+    let shown = subject;
     let subject = measuring.as_ref().map_or(subject, |(_, subject)| subject);
     let (finished, error) = match run_to(subject, request, tstep, route, streams) {
         Ok(run) => (Some(run), None),
@@ -336,6 +350,7 @@ pub(super) fn measured_run(
     };
     let finished = finished.map(|mut run| {
         let found = measuring.map(|(measuring, _)| measuring.carry_out(&mut run));
+        run.aliased = tran(shown).and_then(|tran| aliased(&tran, waves(shown), &run));
         (run, found.unwrap_or_default())
     });
     Ok((finished, error))

@@ -1,5 +1,6 @@
 //! Standard output for data, standard error for everything else.
 
+use std::env;
 use std::fmt::Display;
 use std::io::{self, IsTerminal, Write};
 
@@ -8,6 +9,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 /// Lines of a terminal when it does not say.
 const DEFAULT_SIZE: (usize, usize) = (24, 80);
+
+/// Whether the terminal only takes text, line after line.
+fn is_dumb() -> bool {
+    env::var_os("TERM").is_some_and(|term| term == "dumb")
+}
 
 /// Where a command writes, and how much it says.
 pub struct Streams {
@@ -28,6 +34,14 @@ impl Streams {
     #[must_use]
     pub fn err_is_terminal(&self) -> bool {
         io::stderr().is_terminal()
+    }
+
+    /// Whether standard error shows colours: a terminal that can, unless the user's environment says otherwise (`NO_COLOR`, `CLICOLOR=0`).
+    #[must_use]
+    pub fn colours(&self) -> bool {
+        let no_colour = env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+        let unwanted = env::var_os("CLICOLOR").is_some_and(|value| value == "0");
+        self.err_is_terminal() && !is_dumb() && !no_colour && !unwanted
     }
 
     /// Lines and columns of the terminal on standard output.
@@ -71,7 +85,7 @@ impl Streams {
     /// A progress bar over `length` units on a terminal; hidden elsewhere and when quiet.
     #[must_use]
     pub fn progress(&self, length: u64, what: &str) -> ProgressBar {
-        if self.quiet || !self.err_is_terminal() {
+        if self.quiet || !self.err_is_terminal() || is_dumb() {
             return ProgressBar::hidden();
         }
         let style = ProgressStyle::with_template("{msg} {wide_bar} {percent}% {eta}");

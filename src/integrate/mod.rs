@@ -1,5 +1,6 @@
 //! From a complementarity system to waveforms.
 
+pub mod aliasing;
 pub mod control;
 pub mod energy;
 pub mod exact;
@@ -26,6 +27,7 @@ pub mod system;
 pub mod theta;
 pub mod verify;
 
+pub use aliasing::{Aliased, aliased};
 pub use rows::{Asked, Block, RowKind, Sink};
 pub use run::{Frame, Grid, Log, NoRest, Outcome, Reason, SimError, Stepper};
 pub use simulate::{Method, SimOptions, simulate, simulate_system};

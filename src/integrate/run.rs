@@ -579,6 +579,7 @@ pub(crate) fn attempt(
         events: std::mem::take(&mut log.events),
         state_jumps: std::mem::take(&mut log.state_jumps),
         notes: all_notes,
+        aliased: None,
         verified: None,
     };
     match failure {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::integrate::aliasing::Aliased;
 use crate::integrate::rows::RowKind;
 use crate::integrate::verify::Verified;
 use crate::waveform::Waveforms;
@@ -229,6 +230,8 @@ pub struct Run {
     pub events: Vec<(f64, Arc<str>)>,
     /// Things the user should know.
     pub notes: Vec<String>,
+    /// What repeats too fast for the output times.
+    pub aliased: Option<Aliased>,
     /// What a second run by an independent method found, where there was one.
     pub verified: Option<Verified>,
 }

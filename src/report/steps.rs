@@ -107,6 +107,7 @@ pub fn total(steps: &[Step]) -> Run {
         .reduce(StatedError::worse)
         .unwrap_or_default();
     total.waveforms = rows(steps);
+    total.aliased = steps.iter().find_map(|step| step.run.aliased.clone());
     total.kinds = steps.iter().flat_map(|s| s.run.kinds.clone()).collect();
     total
 }

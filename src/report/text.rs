@@ -1,7 +1,7 @@
 //! Summaries in words.
 
 use super::{si, table};
-use crate::integrate::{Method, Run, StateJump};
+use crate::integrate::{Aliased, Method, Run, StateJump};
 use crate::waveform::compare::Comparison;
 
 /// Impulses and jumps listed before the rest is only counted.
@@ -114,9 +114,41 @@ fn stated_error(run: &Run) -> Option<String> {
     }
 }
 
-/// What a user must be told by default: that a current or charge was destroyed.
+/// What a user must be told by default: that a current or charge was destroyed, that rows do not show what happens between them.
 #[must_use]
 pub fn warnings(run: &Run) -> Vec<String> {
+    let mut warnings = destroyed(run);
+    warnings.extend(run.aliased.as_ref().map(aliasing));
+    warnings
+}
+
+fn aliasing(aliased: &Aliased) -> String {
+    let Aliased {
+        name,
+        period,
+        source,
+        tstep,
+        named,
+    } = aliased;
+    let whose = if *source {
+        "the period of"
+    } else {
+        "the period in which events repeat at"
+    };
+    let step = if *named {
+        "the print step"
+    } else {
+        "the step of the 1,000 rows that `.tran` without a print step has"
+    };
+    format!(
+        "{step}, {}, is half or more of {whose} {name}, {}: rows do not show its course; a print step below {} in `.tran` does",
+        si::quantity(*tstep, "s", 4),
+        si::quantity(*period, "s", 4),
+        si::quantity(0.1 * period, "s", 2),
+    )
+}
+
+fn destroyed(run: &Run) -> Vec<String> {
     let Some(first) = &run.state_jumps.destroyer else {
         return Vec::new();
     };

@@ -350,6 +350,66 @@ fn rows_stand_at_events_and_corners_where_no_print_step_is_named() {
     }
 }
 
+/// A print step of half a period or more is a warning that names what repeats: a source or, without one, a switch. A run without states
+/// does not claim to know its error.
+#[test]
+fn a_print_step_that_shows_nothing_is_a_warning() {
+    let folder = place(&["print_step", "aliased_rows"]);
+    let path = folder.path();
+    let warned = |netlist: &str, text: &str| {
+        fs::write(path.join("net.cir"), text).expect("a netlist");
+        let ended = ends(path, "sim net.cir -o a.csv");
+        assert_eq!(ended.status.code(), Some(0), "{netlist}: {}", said(&ended));
+        let warned = said(&ended);
+        let line = warned
+            .lines()
+            .find(|line| line.contains("rows do not show"));
+        line.map(str::to_string)
+    };
+    let text = |name: &str| fs::read_to_string(super::path(name)).expect("a netlist");
+    let rectifier = text("print_step");
+    let found = warned("print_step", &rectifier).expect("a warning");
+    assert!(
+        found.starts_with(
+            "warning: the print step, 10 ms, is half or more of the period of v1, 20 ms"
+        ),
+        "{found}"
+    );
+    assert_eq!(
+        warned("fine", &rectifier.replace(".tran 10m", ".tran 1m")),
+        None
+    );
+    let buck = text("aliased_rows");
+    assert_eq!(warned("its own rows", &buck), None);
+    let found = warned("coarse", &buck.replace(".tran 5m", ".tran 7u 5m")).expect("a warning");
+    assert!(
+        found.contains("7 µs, is half or more of the period of vg, 10 µs"),
+        "{found}"
+    );
+    // 100 kHz without corners between 1,000 rows.
+    let tone = "tone\nv1 a 0 sin(0 1 100k)\nr1 a 0 1\n.tran 10m\n.end\n";
+    let found = warned("tone", tone).expect("a warning");
+    assert!(
+        found.contains("1,000 rows") && found.contains("of v1, 10 µs"),
+        "{found}"
+    );
+    // Charges through 1 kΩ from 1 V to 3 V of 4 V and is discharged at once: 1.1 ms.
+    let oscillator = "oscillator\nv1 a 0 4\nr1 a b 1k\nc1 b 0 1u\ns1 b 0 b 0 sw\n\
+        .model sw sw(vt=2 vh=1 ron=1 roff=1g)\n.tran 5m 100m uic\n.end\n";
+    let found = warned("oscillator", oscillator).expect("a warning");
+    assert!(
+        found.contains("the period in which events repeat at s1, 1.1 ms"),
+        "{found}"
+    );
+    assert_eq!(
+        warned("fine", &oscillator.replace(".tran 5m", ".tran 0.1m")),
+        None
+    );
+    fs::write(path.join("net.cir"), &rectifier).expect("a netlist");
+    let ended = ends(path, "sim net.cir -q -o a.csv --summary text");
+    assert!(!said(&ended).contains("error: 0"), "{}", said(&ended));
+}
+
 /// A second run by steps agrees with the exact one, and an exact one with steps; a curve that is off in one row, an edge that is late
 /// and one that is missing are found, with their signal and time.
 #[test]

@@ -520,7 +520,9 @@ impl Stepper for Theta<'_> {
         self.settle_estimate();
         Outcome {
             error: StatedError {
-                max: self.now.estimate.as_ref().map(Estimate::relative),
+                // No state that moved: nothing was sampled, and nothing is known.
+                max: (self.now.estimate.as_ref().map(Estimate::relative))
+                    .filter(|error| *error > 0.0),
                 rms: None,
             },
             stats: self.stats.clone(),

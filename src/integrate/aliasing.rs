@@ -1,0 +1,86 @@
+//! Output times too far apart to show what repeats between them.
+
+use std::collections::BTreeMap;
+
+use crate::circuit::Tran;
+use crate::circuit::source::Wave;
+use crate::integrate::stats::Run;
+
+/// Something that repeats faster than the output times can show.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Aliased {
+    /// The source, or the device or switch whose events repeat.
+    pub name: String,
+    /// Its period, s.
+    pub period: f64,
+    /// Whether it is a source.
+    pub source: bool,
+    /// The distance of output times, s.
+    pub tstep: f64,
+    /// Whether the netlist names it.
+    pub named: bool,
+}
+
+/// Periods of events in a row that make a period of the run.
+const REPEATED: usize = 8;
+/// A print step is half a period if it differs from it by this part: decimal fractions are not exact.
+const ROUNDING: f64 = 1e-9;
+
+/// The fastest of sources and events whose period is shorter than twice the print step, or just that.
+///
+/// A source counts if it repeats within the run. Where the netlist names no print step, rows stand at events and at corners, and sources
+/// without corners alone count. The period of events is the median over those of one name.
+#[must_use]
+pub fn aliased<'a>(
+    tran: &Tran,
+    sources: impl Iterator<Item = (&'a str, &'a Wave)>,
+    run: &Run,
+) -> Option<Aliased> {
+    let span = tran.tstop - tran.tstart;
+    let too_fast = |period: f64| period * (1.0 - ROUNDING) <= 2.0 * tran.tstep;
+    let sources = sources.filter_map(|(name, wave)| {
+        let period = wave.period().filter(|period| *period < span)?;
+        (tran.prints || !wave.has_corners()).then(|| (name.to_string(), period, true))
+    });
+    let events = if tran.prints {
+        periods(run)
+    } else {
+        Vec::new()
+    };
+    let events = events
+        .into_iter()
+        .map(|(name, period)| (name, period, false));
+    let fastest = sources
+        .chain(events)
+        .filter(|(_, period, _)| too_fast(*period))
+        .min_by(|a, b| a.1.total_cmp(&b.1));
+    fastest.map(|(name, period, source)| Aliased {
+        name,
+        period,
+        source,
+        tstep: tran.tstep,
+        named: tran.prints,
+    })
+}
+
+/// Names of events that repeat, and their periods, s.
+fn periods(run: &Run) -> Vec<(String, f64)> {
+    let mut times: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for (t, what) in &run.events {
+        times.entry(what).or_default().push(*t);
+    }
+    let period = |(name, times): (&str, Vec<f64>)| {
+        // A switch turns on once a period; a device that changes sides does so twice.
+        let plain = name.replace(" on", "").replace(" off", "");
+        let events = if plain == name { 2 } else { 1 };
+        let pairs = times.iter().zip(times.iter().skip(events));
+        let mut periods: Vec<f64> = pairs.map(|(from, to)| to - from).collect();
+        if periods.len() < events * REPEATED {
+            return None;
+        }
+        periods.sort_by(f64::total_cmp);
+        let median = periods[periods.len() / 2];
+        (median > 0.0).then_some((plain, median))
+    };
+    times.into_iter().filter_map(period).collect()
+}
