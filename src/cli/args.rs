@@ -12,7 +12,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
     arg_required_else_help = true,
     subcommand_required = true,
     help_expected = true,
-    after_help = "Exit status: 0 done; 1 the answer is no (outside tolerance, faults found); 2 it could not be done."
+    after_help = "Exit status: 0 done; 1 the answer is no (outside tolerance, faults found); 2 it could not be done; 128 + n ended by signal n."
 )]
 pub struct Cli {
     /// Say nothing but errors
@@ -119,15 +119,23 @@ pub struct SimArgs {
     #[expect(missing_docs, reason = "documented where it is defined")]
     pub method: MethodArgs,
     /// Write results to this file (repeatable); the ending chooses csv, raw, npz, json, svg, png or html
+    ///
+    /// A file appears when it is whole, or as far as the run came. Rows of csv and raw are written as they come; the others hold all rows,
+    /// 1 GiB at most. Pictures show events, jumps and corners of sources whatever the print step.
     #[arg(short, long = "output", value_name = "OUT")]
     pub outputs: Vec<PathBuf>,
     /// Show exactly these signals: v(a), v(a,b), i(d1), @d1[i], v1#branch (repeatable)
     #[arg(long = "probe", value_name = "NAME")]
     pub probes: Vec<String>,
     /// Add rows at event times: two with equal time at a jump, before and after
+    ///
+    /// Where `.tran` names no print step they are there anyway, and so are rows at corners of sources.
     #[arg(long)]
     pub events: bool,
     /// Make the run a second time by an independent method; status 1 where the two differ by more than their errors
+    ///
+    /// An exact run is made in steps at two tolerances, a run in steps exactly if that can be, else in steps of another scheme. The
+    /// summary has the largest difference relative to a signal's amplitude, and what is tolerated.
     #[arg(long)]
     pub verify: bool,
     /// Print a summary of the run on standard error
