@@ -194,17 +194,81 @@ impl Scopes<'_> {
                 return Ok(other.clone().scaled(factor.constant));
             }
         }
-        let (Some(a), Some(b)) = (x.one_dimensional(), y.one_dimensional()) else {
-            return Err(Unfit::Nonlinear);
-        };
-        if !parallel(&a.along, &b.along) {
-            return Err(Unfit::Nonlinear);
+        if let (Some(a), Some(b)) = (x.one_dimensional(), y.one_dimensional())
+            && parallel(&a.along, &b.along)
+            && let Some(curve) = a.curve.times(&b.curve)
+        {
+            return Ok(Form::number(0.0).plus_ridge(Ridge {
+                along: a.along,
+                curve,
+            }));
         }
-        let curve = a.curve.times(&b.curve).ok_or(Unfit::Nonlinear)?;
-        Ok(Form::number(0.0).plus_ridge(Ridge {
-            along: a.along,
-            curve,
-        }))
+        for (factor, sum) in [(&x, &y), (&y, &x)] {
+            if sum.terms.is_empty() && sum.ridges.len() > 1 {
+                let first = factor.clone().scaled(sum.constant);
+                return sum.ridges.iter().try_fold(first, |all, ridge| {
+                    let part = Form::number(0.0).plus_ridge(ridge.clone());
+                    Ok(all.plus(self.product(factor.clone(), part)?))
+                });
+            }
+        }
+        self.product_of_levels(&x, &y)
+            .or_else(|_| self.product_of_tones(&x, &y))
+    }
+
+    /// The product of two forms that take two values each: with s, t ∈ {0, 1} for which one, st = max(0, s + t − 1).
+    fn product_of_levels(&mut self, x: &Form, y: &Form) -> Result<Form, Unfit> {
+        let levels = self.levels(x).zip(self.levels(y));
+        let ((x0, x1), (y0, y1)) = levels.ok_or(Unfit::Nonlinear)?;
+        let s = self.apply(&Piecewise::step(0.5 * (x0 + x1)), x)?;
+        let t = self.apply(&Piecewise::step(0.5 * (y0 + y1)), y)?;
+        let excess = s.clone().plus(t.clone()).plus(Form::number(-1.0));
+        let both = self.apply(&Piecewise::ramp(), &excess)?;
+        let (dx, dy) = (x1 - x0, y1 - y0);
+        Ok(Form::number(x0 * y0)
+            .plus(s.scaled((dx * y0).into()))
+            .plus(t.scaled((x0 * dy).into()))
+            .plus(both.scaled((dx * dy).into())))
+    }
+
+    /// The smaller and the larger of the two values that a form takes: a comparison, or a function of comparators' outputs.
+    fn levels(&self, form: &Form) -> Option<(f64, f64)> {
+        /// Comparators in one sum.
+        const MOST: usize = 8;
+        let Ridge { along, curve } = form.one_dimensional()?;
+        let mut values = match curve.steps() {
+            Some(values) => values,
+            None if along.len() <= MOST => {
+                let mut sums = vec![0.0];
+                for (gain, quantity) in &along {
+                    let (low, high) = self.outputs(*quantity)?;
+                    let with = |sum: &f64| [sum + gain.f64 * low, sum + gain.f64 * high];
+                    sums = sums.iter().flat_map(with).collect();
+                }
+                sums.into_iter().map(|u| curve.value(u)).collect()
+            }
+            None => return None,
+        };
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        match values[..] {
+            [low, high] => Some((low, high)),
+            _ => None,
+        }
+    }
+
+    /// The two outputs of an auxiliary comparator.
+    fn outputs(&self, quantity: Quantity) -> Option<(f64, f64)> {
+        let is_it = |index: &usize| auxiliary(*index) == quantity;
+        let index = (0..self.auxiliaries.len()).find(is_it)?;
+        let Auxiliary::Curve(_, curve) = &self.auxiliaries[index] else {
+            return None;
+        };
+        let flat = curve.first.1.f64 == 0.0 && curve.last.1.f64 == 0.0;
+        match curve.vertices[..] {
+            [(v0, low), (v1, high)] if flat && v0.f64 == v1.f64 => Some((low.f64, high.f64)),
+            _ => None,
+        }
     }
 
     /// The form as a function of one sum: as it stands, with rails as numbers, or with auxiliary voltages.
@@ -280,7 +344,7 @@ impl Scopes<'_> {
     }
 
     /// The voltage of an auxiliary source, the same one for the same demand.
-    fn demand(&mut self, wanted: Auxiliary) -> Form {
+    pub(super) fn demand(&mut self, wanted: Auxiliary) -> Form {
         let known = self.auxiliaries.iter().position(|a| *a == wanted);
         let index = known.unwrap_or_else(|| {
             self.auxiliaries.push(wanted);

@@ -203,7 +203,8 @@ impl<'n> Scopes<'n> {
                 Diagnostic::error("not-linear", expr.span, message)
                     .label("recognised, but cannot be simulated")
                     .help(
-                        "sums with constant factors, max min abs limit if u uramp sgn table pwl are supported",
+                        "sums with constant factors, max min abs limit if u uramp sgn table pwl are supported, and \
+                         products of comparisons or of the sines of sources at ground",
                     )
             }
             Unfit::TooLarge => {

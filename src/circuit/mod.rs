@@ -35,6 +35,7 @@ mod sweep;
 mod switch;
 mod threshold;
 mod thyristor;
+mod tones;
 mod transistor;
 
 use crate::algebra::Value;

@@ -95,6 +95,12 @@ impl Piecewise {
         (self.knots.is_empty()).then(|| (self.pieces[0].slope, self.pieces[0].left))
     }
 
+    /// The values it takes from left to right, if it is constant between its knots.
+    pub(super) fn steps(&self) -> Option<Vec<f64>> {
+        let flat = |p: &Piece| (p.slope == 0.0 && p.left == p.right).then_some(p.left);
+        self.pieces.iter().map(flat).collect()
+    }
+
     /// Whether all numbers are finite.
     pub(super) fn is_finite(&self) -> bool {
         let sound = |p: &Piece| (p.left + p.right).is_finite() && p.slope.is_finite();

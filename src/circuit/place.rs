@@ -5,6 +5,7 @@ use super::builder::Builder;
 use super::form::{Form, Ridge, negative};
 use super::piecewise::Piecewise;
 use super::source::{Source, Wave};
+use super::tones::at_node;
 use super::{Affine, Element, ElementId, Kind, NodeId, Output, Quantity};
 use crate::algebra::Value;
 use crate::law::{Curve, Law};
@@ -15,6 +16,7 @@ impl<'n> Builder<'n, '_> {
         if let Some(tran) = self.circuit.tran {
             self.scopes.tstop = tran.tstop;
         }
+        self.scopes.tones = self.circuit.elements.iter().filter_map(at_node).collect();
         for element in &self.circuit.elements {
             let Kind::VoltageSource(Source {
                 dc,

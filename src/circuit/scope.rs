@@ -6,6 +6,7 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 
 use super::NodeId;
 use super::behaviour::Auxiliary;
+use super::tones::Known;
 use crate::algebra::Value;
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Expr, Func, Model, Name, Subckt};
@@ -111,6 +112,8 @@ pub(super) struct Scopes<'n> {
     pub(super) auxiliaries: Vec<Auxiliary>,
     /// Nodes that a DC source holds, with their voltages.
     pub(super) rails: HashMap<NodeId, f64>,
+    /// Nodes at which a source holds a sum of a constant and sines against ground.
+    pub(super) tones: HashMap<NodeId, Known>,
     /// Those of them whose voltage an expression took as a number.
     pub(super) rails_read: BTreeSet<NodeId>,
     /// The end of the run, s.
@@ -130,6 +133,7 @@ impl<'n> Scopes<'n> {
             gave_up: false,
             auxiliaries: Vec::new(),
             rails: HashMap::new(),
+            tones: HashMap::new(),
             rails_read: BTreeSet::new(),
             tstop: 1.0,
             temperature: Value::decimal(27.0, 27, 0),

@@ -334,17 +334,90 @@ fn a_long_line_is_shown_around_the_place() {
     let (circuit, findings) = elaborate(&netlist, &ElaborateOptions::default());
     assert!(circuit.is_none());
     let cards = netlist.body.statements.iter();
-    let span = cards.filter_map(|s| match s {
+    let mut span = cards.filter_map(|s| match s {
         circ::netlist::ast::Statement::Element(e) => Some(e.span),
         _ => None,
     });
-    let whole = circ::diagnostic::Diagnostic::error("long", span.last(), "the whole card");
+    let whole = circ::diagnostic::Diagnostic::error("long", span.next_back(), "the whole card");
     for findings in [findings, vec![whole]] {
         let text = circ::cli::render(&findings, &sources, false);
         assert!(
             text.len() < 10_000 && text.contains("long.cir:4:"),
             "{} bytes",
             text.len()
+        );
+    }
+}
+
+#[test]
+fn products_of_comparisons_are_logic() {
+    let truth = |yes: bool| f64::from(u8::from(yes));
+    let run = run("behaviour_and", Method::Exact);
+    let rows = run.waveforms.time.len();
+    assert!(rows > 2000);
+    // At t = 0 and at the comparators' own instants either side counts.
+    let check = |run: &Run, name: &str, right: &dyn Fn([f64; 3]) -> f64, near: [f64; 3]| {
+        for &t in &run.waveforms.time[1..] {
+            let inputs = ["v(a)", "v(b)", "v(d)"].map(|name| {
+                let there = run.waveforms.names.iter().any(|n| n == name);
+                if there { value(run, name, t) } else { 0.0 }
+            });
+            if inputs
+                .iter()
+                .zip(near)
+                .any(|(v, level)| (v - level).abs() < 1e-3)
+            {
+                continue;
+            }
+            let found = value(run, name, t);
+            assert!(
+                (found - right(inputs)).abs() < 1e-9,
+                "{name} at {t}: {found}, {inputs:?}"
+            );
+        }
+    };
+    check(
+        &run,
+        "v(c)",
+        &|[a, b, _]| 5.0 * truth(a > 0.5) * truth(b < 0.2),
+        [0.5, 0.2, 9.0],
+    );
+    let sources = "t\nV1 a 0 SIN(0 1 1k)\nV2 b 0 SIN(0 1 3k)\nV3 d 0 SIN(0.1 1 700)\n";
+    let run = run_text(
+        &format!(
+            "{sources}B1 e 0 V=(V(a)>0)*(V(b)>0)*(V(d)>0)*3 - 1\n\
+             B2 f 0 V=V(a)>0 ? (V(b)>0 ? 5 : 2) : (V(d)>0 ? 1 : -1)\n.tran 5u 2m\n"
+        ),
+        Method::Exact,
+    );
+    let three = |[a, b, d]: [f64; 3]| 3.0 * truth(a > 0.0) * truth(b > 0.0) * truth(d > 0.0) - 1.0;
+    check(&run, "v(e)", &three, [0.0; 3]);
+    let nested = |[a, b, d]: [f64; 3]| match (a > 0.0, b > 0.0, d > 0.0) {
+        (true, true, _) => 5.0,
+        (true, false, _) => 2.0,
+        (false, _, true) => 1.0,
+        _ => -1.0,
+    };
+    check(&run, "v(f)", &nested, [0.0; 3]);
+}
+
+#[test]
+fn products_of_known_sines_are_sines() {
+    let run = run("product_of_sources", Method::Exact);
+    for &t in &run.waveforms.time {
+        let right = value(&run, "v(a)", t) * value(&run, "v(b)", t);
+        assert!((value(&run, "v(c)", t) - right).abs() < 1e-12, "{t}");
+    }
+    let text = "t\nV1 a 0 SIN(0 1 1k)\nV3 d 0 SIN(0.5 2 3k 0 0 30)\nV4 0 e SIN(1 1 1k -0.1m)\nV5 q 0 3\n\
+                B1 f 0 V=(V(a)+2*V(d)+1)*(V(d)-V(e))\nB2 g 0 V=V(q)*V(a)*V(a)*V(d)\n.tran 1u 0.2m\n";
+    let run = run_text(text, Method::Exact);
+    for &t in &run.waveforms.time {
+        let [a, d, e] = ["v(a)", "v(d)", "v(e)"].map(|name| value(&run, name, t));
+        let found = [value(&run, "v(f)", t), value(&run, "v(g)", t)];
+        let right = [(a + 2.0 * d + 1.0) * (d - e), 3.0 * a * a * d];
+        assert!(
+            (found[0] - right[0]).abs() + (found[1] - right[1]).abs() < 1e-11,
+            "{t}: {found:?} {right:?}"
         );
     }
 }
