@@ -143,7 +143,7 @@ d1 0 a di
     assert_eq!(times(1.0), [0.0, 0.5e-3, 1e-3]);
     assert_eq!(times(-1.0), [0.0, 0.5e-3, 1e-3, 1.5e-3, 2e-3]);
     assert!(
-        err.contains("a.cir at i=1: at t = ") && !err.contains("i=-1"),
+        err.contains("a.cir: the run ended at t = 1e-3 s at i=1") && !err.contains("i=-1"),
         "{err}"
     );
 }
