@@ -124,6 +124,10 @@ fn told(error: &SimError, elements: &[&Element]) -> Told {
                     .into(),
             ),
         ),
+        Reason::NotGraded { .. } => plain(
+            "not-graded",
+            Some("`--method theta` is not concerned; a smaller `Roff`, or none, and a larger `Ron`, or none, leave the decades out".into()),
+        ),
         Reason::Overflow => plain(
             "overflow",
             Some("a negative resistance, or a loop with gain of the wrong sign, makes a circuit grow without bound".into()),

@@ -85,6 +85,14 @@ pub enum Reason {
         /// The time they take, s.
         span: f64,
     },
+    /// A mode's exponential has lost its digits to a resistance that decades part from the others.
+    #[error(
+        "exact integration would be wrong by {loss:.0e} of a signal in each step: decades lie between a resistance and the others, and no single storage element has to itself what it makes fast"
+    )]
+    NotGraded {
+        /// Relative to the signal.
+        loss: f64,
+    },
     /// The circuit has no operating point.
     #[error("no operating point: {0}; `uic` starts from initial conditions instead")]
     NoOperatingPoint(NoRest),

@@ -212,3 +212,26 @@ fn rectifiers_that_commutate_at_one_instant_find_their_mode() {
     let left = at(6e-3) / at(5.4e-3) / (-0.6e-3_f64 / (30.0 * 1e-3)).exp();
     assert!((left - 1.0).abs() < 1e-9, "{left}");
 }
+
+/// What Roff makes fast is the sum of two currents, in neither of which it is a digit: steps take over, and say why.
+#[test]
+fn inductors_that_share_a_diode_are_left_to_steps_where_roff_is_large() {
+    let ideal = changed("star_of_inductors", &[("roff=1e16", "")], Method::Exact);
+    for roff in ["roff=1e12", "roff=1e16"] {
+        let replaced = [("roff=1e16", roff), ("tran 20u 60m", "tran 20u 15m")];
+        let run = changed("star_of_inductors", &replaced, Method::Auto);
+        assert!(
+            run.notes.iter().any(|note| note.contains("decades")),
+            "{:?}",
+            run.notes
+        );
+        for probe in ["i(l1)", "v(o)"] {
+            let (found, right) = (column(&run, probe), column(&ideal, probe));
+            let worst = found
+                .iter()
+                .zip(&right)
+                .fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+            assert!(worst < 1e-2, "{roff}: {probe} off by {worst:e}");
+        }
+    }
+}

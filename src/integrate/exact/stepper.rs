@@ -23,6 +23,8 @@ use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper, Times};
 use crate::integrate::switching::fire;
 use crate::settings::Settings;
 
+/// Estimated relative loss of an exponential above which the signs of guards are not known: steps take over.
+const MOST_LOSS: f64 = 1e-8;
 /// Times closer than this many units in the last place are one time.
 pub(super) const SAME_TIME_ULPS: f64 = 4.0;
 
@@ -458,6 +460,10 @@ impl Stepper for Exact<'_> {
             let Some(at) = self.mode else {
                 return Err(self.fail(Reason::internal("integrate::exact", "a run in no mode")));
             };
+            let flow = &self.plant.modes[at].flow;
+            if flow.loss > MOST_LOSS && flow.guards() > 0 {
+                return Err(self.fail(Reason::NotGraded { loss: flow.loss }));
+            }
             if (!due && t <= self.motion.t) || self.step_ahead(at, t, next) {
                 return Ok(());
             }
