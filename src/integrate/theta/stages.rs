@@ -17,6 +17,10 @@ pub(super) const GRANT: f64 = 1e-3;
 /// Differences below this part of the terms a state is a sum of are rounding, and no error of the step.
 const ROUNDING: f64 = 1e-11;
 
+/// A motion has ended within a step where its last stage moves by less than this part of its first; and what a first stage moves is of interest
+/// above this part of the tolerance, or of the amplitude where steps are prescribed.
+const SUDDEN: f64 = 0.1;
+
 /// The coefficients of a method.
 #[derive(Debug)]
 pub(super) struct Tableau {
@@ -84,13 +88,52 @@ impl Tableau {
 }
 
 impl Theta<'_> {
-    /// Computes the step from now to t1 = now + h into `out` without committing it.
+    /// Computes the step from now to t1 = now + h into `out` without committing it. After an edge or a jump one of Moreau's takes its place
+    /// where a motion ends within the step: a stage of Alexander's starts far beyond where the ones before it came to, and a junction
+    /// that clamped the motion in these does not hold it there. Two such steps agree, so that error control would not see it.
     pub(super) fn attempt_stages(
         &mut self,
         tableau: &'static Tableau,
         h: f64,
         t1: f64,
     ) -> Result<(), SimError> {
+        let slopes = self.attempt_tableau(tableau, h, t1)?;
+        if self.now.settle && self.ends_suddenly(&slopes) {
+            self.attempt_tableau(&EULER, h, t1)?;
+        }
+        Ok(())
+    }
+
+    /// Whether a state moves in the first stage of a step, by more than is granted, and much less in the last.
+    fn ends_suddenly(&self, slopes: &[DVector<f64>]) -> bool {
+        let [first, .., last] = slopes else {
+            return false;
+        };
+        let granted = if self.control.is_some() {
+            SUDDEN * self.settings.tol
+        } else {
+            SUDDEN
+        };
+        let lcs = &self.system().lcs;
+        let mut moved = self.now.x.clone();
+        (0..moved.len()).any(|k| {
+            if last[k].abs() >= SUDDEN * first[k].abs() {
+                return false;
+            }
+            moved[k] += first[k];
+            let size = self.amplitudes.error(lcs, &self.now.x, &moved);
+            moved[k] = self.now.x[k];
+            size > granted
+        })
+    }
+
+    /// The step by one method; the h f(X_j) of its stages.
+    fn attempt_tableau(
+        &mut self,
+        tableau: &'static Tableau,
+        h: f64,
+        t1: f64,
+    ) -> Result<Vec<DVector<f64>>, SimError> {
         let tolerance = self.settings.lcp_residual;
         let (t0, n) = (self.now.t, self.now.x.len());
         let slack = Self::slack(t1);
@@ -185,7 +228,7 @@ impl Theta<'_> {
             last = Some((x, solution));
         }
         let Some((x, solution)) = last else {
-            return Ok(());
+            return Ok(slopes);
         };
         let loss = loss.of_step(
             &self.system().lcs,
@@ -209,7 +252,7 @@ impl Theta<'_> {
             work: Some((work, loss)),
             error,
         };
-        Ok(())
+        Ok(slopes)
     }
 
     /// The error before the step, where it is asked for.
