@@ -1,7 +1,11 @@
 //! The rows of a run on their way: collected, handed on as they come, or both.
 
+use std::cell::Cell;
 use std::ops::{ControlFlow, Range};
+use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
+
+use cpu_time::ThreadTime;
 
 use crate::integrate::run::{Reason, SimError, Times};
 
@@ -58,6 +62,8 @@ pub struct Asked<'a> {
     pub most: Option<usize>,
     /// Set by another thread or a signal: the run is to end.
     pub cancel: Option<&'a AtomicBool>,
+    /// CPU seconds that the sink has taken, no part of the solve's.
+    pub elsewhere: Rc<Cell<f64>>,
 }
 
 /// Rows handed on at a time, at least.
@@ -270,9 +276,12 @@ impl<'a> Sheet<'a> {
             values: &self.values[self.handed * self.columns..end * self.columns],
             kinds: self.kinds.get(self.handed..end).unwrap_or_default(),
         };
+        let begin = ThreadTime::now();
         if sink(block).is_break() {
             self.stop = Some(Stop::Sink);
         }
+        let elsewhere = &self.asked.elsewhere;
+        elsewhere.set(elsewhere.get() + begin.elapsed().as_secs_f64());
         self.last_handed = self.time[end - 1];
         self.handed = end;
         if self.asked.discard {
