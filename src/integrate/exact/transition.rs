@@ -396,34 +396,54 @@ impl Exact<'_> {
                 return Ok(Some(found));
             }
         }
-        if let Some(found) = self.walk(key, &mut tried) {
-            return Ok(Some(found));
-        }
-        // Neighbours, nearest first.
-        let mut next = 0;
+        // Neighbours of the first proposal, then far ones, then all others.
+        let (mut next, proposed) = (0, tried.len());
         while next < tried.len() && tried.len() < MOST_NEIGHBOURS {
-            for j in 0..self.plant.pairs {
-                let mut closed = tried[next].clone();
-                closed[j] = !closed[j];
-                if tried.contains(&closed) {
-                    continue;
-                }
-                tried.push(closed.clone());
-                let candidate = key.with_closed(closed);
-                if let Some(found) = self.try_key(&candidate) {
-                    return Ok(Some(found));
-                }
+            if let Some(found) = self.try_neighbours(key, next, &mut tried) {
+                return Ok(Some(found));
+            }
+            if next == 0
+                && let Some(found) = self.walk(key, proposed, &mut tried)
+            {
+                return Ok(Some(found));
             }
             next += 1;
         }
         Ok(None)
     }
 
-    /// From each of these sets of conducting devices on, what refuses a mode changes sides, one device after the other (Murty's
+    /// The modes in which one device stands otherwise than in `tried[which]`.
+    fn try_neighbours(
+        &mut self,
+        key: &Key,
+        which: usize,
+        tried: &mut Vec<Vec<bool>>,
+    ) -> Option<(usize, Vec<usize>)> {
+        for j in 0..self.plant.pairs {
+            let mut closed = tried[which].clone();
+            closed[j] = !closed[j];
+            if tried.contains(&closed) {
+                continue;
+            }
+            tried.push(closed.clone());
+            let candidate = key.with_closed(closed);
+            if let Some(found) = self.try_key(&candidate) {
+                return Some(found);
+            }
+        }
+        None
+    }
+
+    /// From each of the sets of conducting devices that were `proposed` on, what refuses a mode changes sides, one device after the other (Murty's
     /// pivoting, Operations Research 22 (1974)): devices that change together, far from every proposal, are found as many modes
     /// away as there are devices.
-    fn walk(&mut self, key: &Key, tried: &mut Vec<Vec<bool>>) -> Option<(usize, Vec<usize>)> {
-        for start in 0..tried.len() {
+    fn walk(
+        &mut self,
+        key: &Key,
+        proposed: usize,
+        tried: &mut Vec<Vec<bool>>,
+    ) -> Option<(usize, Vec<usize>)> {
+        for start in 0..proposed {
             let mut closed = tried[start].clone();
             for _ in 0..2 * self.plant.pairs {
                 let candidate = key.with_closed(closed.clone());
