@@ -149,8 +149,14 @@ impl<'a> Handover<'a> {
             error,
             ..
         } = outcome;
-        if let Some(error) = error.max {
-            *self.error.max.get_or_insert(0.0) += error;
+        // The exact integration adds none: what several parts err adds up at most.
+        for (sum, part) in [
+            (&mut self.error.max, error.max),
+            (&mut self.error.rms, error.rms),
+        ] {
+            if let Some(part) = part {
+                *sum.get_or_insert(0.0) += part;
+            }
         }
         self.stats.steps += stats.steps;
         self.stats.rejected += stats.rejected;

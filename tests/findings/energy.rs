@@ -51,6 +51,19 @@ fn what_damped_steps_lose_is_numerical() {
     );
 }
 
+/// 10 V charge the capacitor to zero, where diodes clamp it, within a tenth of the first step, and leave a current in the inductor that the
+/// steps miss altogether: the stated error says that it may be all of it.
+#[test]
+fn a_transient_inside_the_first_step_is_no_error_of_zero() {
+    let exact = run_exactly("fixed_step_estimate_zero");
+    let last = |run: &Run| run.waveforms.values[run.waveforms.values.len() - 1];
+    for method in STEPPED {
+        let found = stepped("fixed_step_estimate_zero", method, 1e-3);
+        assert!(last(&found).abs() < 1e-9 && last(&exact) > 1.7e-3);
+        assert!(found.error.max > Some(1.0), "{method:?}: {:?}", found.error);
+    }
+}
+
 /// The energy of a tank falls by 1/(1 + h²ω²) a step with Moreau's scheme: 100 steps of ω h = 0.316.
 #[test]
 fn a_coarse_step_of_moreaus_scheme_shows_in_the_numerical_loss() {

@@ -58,6 +58,9 @@ impl Theta<'_> {
         self.attempt(0.5 * h, middle)?;
         self.commit(middle)?;
         self.now.settle = true;
+        if let Some(estimate) = &mut self.now.estimate {
+            estimate.pair();
+        }
         self.attempt(0.5 * h, t1)?;
         Ok(0.5 * h)
     }
@@ -229,7 +232,7 @@ impl Theta<'_> {
             self.damped = false;
         }
         if let Some(estimate) = &mut self.now.estimate {
-            estimate.add(verdict.error);
+            estimate.add(verdict.error, h);
         }
         Ok(verdict.accept || last_chance)
     }
@@ -288,10 +291,12 @@ impl Theta<'_> {
     ) -> Result<Verdict, SimError> {
         let turned_off = self.now.turned_off;
         self.attempt(h, t1)?;
+        let mut changed = self.attempt.solved.is_some();
         let n = self.now.x.len();
         self.coarse.copy_from_slice(&self.out[..n]);
         let middle = self.now.t + 0.5 * (t1 - self.now.t);
         self.attempt(0.5 * h, middle)?;
+        changed |= self.attempt.solved.is_some();
         self.commit(middle)?;
         self.now.turned_off |= turned_off;
         self.now.settle = self.damped || self.now.turned_off;
@@ -299,6 +304,7 @@ impl Theta<'_> {
         if last_chance && self.attempt.solved.is_some() {
             *impulse = self.impulsive(0.5 * h)?;
         }
+        changed |= self.attempt.solved.is_some();
         self.commit(t1)?;
         for (k, coarse) in self.coarse.iter_mut().enumerate() {
             if (*coarse - self.now.x[k]).abs() <= self.rounding[k] {
@@ -308,7 +314,8 @@ impl Theta<'_> {
         let error = self
             .amplitudes
             .error(&self.system().lcs, &self.coarse, &self.now.x);
-        let verdict = match &self.control {
+        let smooth = self.system().curved || !changed;
+        let mut verdict = match &self.control {
             Some(control) => control.judge(h, error),
             None => Verdict {
                 accept: true,
@@ -317,6 +324,10 @@ impl Theta<'_> {
             },
         };
         self.preferred = verdict.next;
+        if !smooth {
+            // Of first order, whose halves err as much as they differ from the whole.
+            verdict.error = error;
+        }
         Ok(verdict)
     }
 

@@ -519,12 +519,7 @@ impl Stepper for Theta<'_> {
         }
         self.settle_estimate();
         Outcome {
-            error: StatedError {
-                // No state that moved: nothing was sampled, and nothing is known.
-                max: (self.now.estimate.as_ref().map(Estimate::relative))
-                    .filter(|error| *error > 0.0),
-                rms: None,
-            },
+            error: (self.now.estimate.as_ref()).map_or(StatedError::default(), Estimate::stated),
             stats: self.stats.clone(),
             energy: self.now.balance.energy(),
             notes,

@@ -55,9 +55,9 @@ fn the_map_of_the_step_carries_the_error() {
     let mut estimate = entered(-8.0);
     let errors = along(&mut estimate, line, 1.0, 0..3, Some(0.5), false);
     assert_eq!(errors, [-4.0, -2.0, -1.0]);
-    // Where the active set changes there is no map, and nothing is forgotten.
+    // Where the active set changes there is no map, and nothing is forgotten; a second one in a row counts as after rest.
     let errors = along(&mut estimate, line, 1.0, 3..5, None, true);
-    assert_eq!(errors, [-1.0, -1.0]);
+    assert_eq!(errors, [-1.0, -0.5]);
 }
 
 /// Somewhere in the step x' changes by 1.
@@ -123,12 +123,12 @@ fn the_worst_system_counts() {
     step(&mut estimate, 10.0, 10.0);
     assert_eq!(estimate.error(), [-16.0, 0.0]);
     estimate.settle(&lcs, &mut amplitudes);
-    assert_eq!(estimate.relative(), 1.6);
+    assert_eq!(estimate.stated().max, Some(MARGIN * 1.6));
     estimate.enter([-2.0, 0.0].into_iter());
     step(&mut estimate, 10.0, 10.0);
     assert_eq!(estimate.error(), [-2.0, 0.0]);
     estimate.settle(&lcs, &mut amplitudes);
-    assert_eq!(estimate.relative(), 1.6);
+    assert_eq!(estimate.stated().max, Some(MARGIN * 1.6));
 }
 
 /// What the step did to the state, at that time only.
@@ -139,16 +139,65 @@ fn a_late_switch_is_no_error_to_carry() {
     let mut estimate = Estimate::default();
     estimate.enter([-2.0, 0.0].into_iter());
     let rows = [1.0, 0.0, 0.0, 1.0];
+    estimate.step(1.0, &[-32.0, 0.0], &[0.0; 2], Some((&rows, 2)), false);
     estimate.step(1.0, &[0.0; 2], &[32.0, 0.0], Some((&rows, 2)), false);
     estimate.switched_late(&[2.0, 0.0], &[32.0, 0.0]);
     estimate.settle(&lcs, &mut amplitudes);
-    assert_eq!((estimate.relative(), estimate.error()[0]), (1.0, -2.0));
+    assert_eq!(estimate.stated().max, Some(MARGIN));
+    assert_eq!(estimate.error()[0], -2.0);
 }
 
 #[test]
 fn errors_of_chosen_steps_add_up() {
     let mut estimate = Estimate::default();
-    estimate.add(0.5);
-    estimate.add(0.25);
-    assert_eq!(estimate.relative(), 0.75);
+    estimate.add(0.5, 1.0);
+    estimate.add(0.25, 3.0);
+    let stated = estimate.stated();
+    assert_eq!(stated.max, Some(0.75));
+    // ½ for 1 s and ¾ for 3 s.
+    let mean: f64 = (0.25 + 3.0 * 0.5625) / 4.0;
+    assert_eq!(stated.rms, Some(mean.sqrt()));
+}
+
+#[test]
+fn what_no_step_has_told_is_not_known() {
+    // One step tells nothing, nor do equal ones; different ones do.
+    let lcs = fixtures::bridge();
+    let mut amplitudes = Amplitudes::new(&lcs, &Inputs::new(&[]));
+    let mut estimate = Estimate::default();
+    estimate.enter([0.0, 0.0].into_iter());
+    let rows = [1.0, 0.0, 0.0, 1.0];
+    for x in [0.0, 1.0] {
+        estimate.step(1.0, &[x * x, 0.0], &[x + 1.0, 0.0], Some((&rows, 2)), false);
+        estimate.settle(&lcs, &mut amplitudes);
+        assert_eq!(estimate.stated().max, None);
+    }
+    estimate.step(1.0, &[2.0, 0.0], &[5.0, 0.0], Some((&rows, 2)), false);
+    estimate.settle(&lcs, &mut amplitudes);
+    assert!(estimate.stated().max.is_some() && estimate.stated().rms.is_some());
+}
+
+/// A start whose transient is over within the first half of the first step.
+#[test]
+fn a_transient_inside_the_first_step_is_seen() {
+    let over = |t: f64| if t > 0.0 { 0.0 } else { 5.0 };
+    let mut estimate = entered(0.0);
+    estimate.restart();
+    along(&mut estimate, over, 1.0, 0..1, Some(0.0), false);
+    estimate.pair();
+    estimate.restart();
+    let errors = along(&mut estimate, over, 1.0, 1..2, Some(0.0), false);
+    assert_eq!(errors, [5.0]);
+    // A device that changed in it is no excuse.
+    let errors = along(&mut entered(0.0), over, 1.0, 0..1, None, false);
+    assert_eq!(errors, [-2.5]);
+}
+
+/// Where the state follows what is slower than the step, the error of the step is damped as the state is.
+#[test]
+fn what_decays_within_the_step_hardly_counts() {
+    let parabola = |t: f64| 0.5 * t * t;
+    let mut estimate = entered(0.0);
+    let errors = along(&mut estimate, parabola, 1.0, 0..5, Some(0.01), false);
+    assert!((errors[4] - 0.5 * 0.01).abs() < 1e-4, "{errors:?}");
 }
