@@ -69,7 +69,7 @@ fn stepped(lcs: &Lcs, x: &DVector<f64>, h: f64) -> Option<DVector<f64>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 1000, failure_persistence: None, ..Default::default() })]
+    #![proptest_config(ProptestConfig { cases: 1000, failure_persistence: Some(Box::new(proptest::test_runner::FileFailurePersistence::WithSource("regressions"))), ..Default::default() })]
 
     #[test]
     fn jumps_are_limits_of_implicit_steps(

@@ -252,7 +252,7 @@ fn passive(size: usize) -> impl Strategy<Value = (DMatrix<f64>, DVector<f64>, DV
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: Some(Box::new(proptest::test_runner::FileFailurePersistence::WithSource("regressions"))), ..ProptestConfig::default() })]
 
     #[test]
     fn passive_problems_are_solved_to_rounding((m, q, known) in (1..9_usize).prop_flat_map(passive)) {

@@ -233,7 +233,9 @@ fn one_token_changed() {
     }
     let config = ProptestConfig {
         cases: cases.parse().unwrap(),
-        failure_persistence: None,
+        failure_persistence: Some(Box::new(
+            proptest::test_runner::FileFailurePersistence::WithSource("regressions"),
+        )),
         ..ProptestConfig::default()
     };
     let edit = prop_oneof![

@@ -110,7 +110,7 @@ fn stepped(lcs: &Lcs, x: DVector<f64>, h: f64, steps: usize) -> (DVector<f64>, f
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: Some(Box::new(proptest::test_runner::FileFailurePersistence::WithSource("regressions"))), ..ProptestConfig::default() })]
 
     #[test]
     fn same_states_as_the_oracle(text in netlist()) {

@@ -317,7 +317,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..Default::default() })]
+        #![proptest_config(ProptestConfig { cases: 256, failure_persistence: Some(Box::new(proptest::test_runner::FileFailurePersistence::WithSource("regressions"))), ..Default::default() })]
         #[test]
         fn a_short_decimal_is_the_rational(mantissa in -(1i128 << 54)..1 << 54, exponent in -25i32..26) {
             let value = Number::decimal(0.0, mantissa, exponent);

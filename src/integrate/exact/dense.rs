@@ -178,7 +178,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+        #![proptest_config(ProptestConfig { failure_persistence: Some(Box::new(proptest::test_runner::FileFailurePersistence::WithSource("regressions"))), ..ProptestConfig::default() })]
         #[test]
         fn products_are_those_of_matrices(m in 0_usize..20, k in 0_usize..10, n in 0_usize..10, seed in any::<u32>()) {
             let (a, b) = (random(m, k, seed), random(k, n, seed ^ 77));

@@ -160,7 +160,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+        #![proptest_config(ProptestConfig { failure_persistence: Some(Box::new(proptest::test_runner::FileFailurePersistence::WithSource("regressions"))), ..ProptestConfig::default() })]
         #[test]
         fn equals_the_dense_product(rows in 0_usize..13, columns in 0_usize..9, seed in any::<u32>()) {
             let value = |i: usize| (((i as f64 + 1.3) * f64::from(seed)).sin() * 10.0).round();

@@ -215,7 +215,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+        #![proptest_config(ProptestConfig { failure_persistence: Some(Box::new(proptest::test_runner::FileFailurePersistence::WithSource("regressions"))), ..ProptestConfig::default() })]
         /// Against the known roots: p falls through its smallest root in (0, 1) of odd multiplicity.
         #[test]
         fn agrees_with_known_roots(mut roots in prop::collection::vec(-0.5_f64..1.5, 1..7)) {

@@ -251,7 +251,9 @@ fn passivity(s: &Lcs) -> Result<(), TestCaseError> {
 fn config(cases: u32) -> ProptestConfig {
     ProptestConfig {
         cases,
-        failure_persistence: None,
+        failure_persistence: Some(Box::new(
+            proptest::test_runner::FileFailurePersistence::WithSource("regressions"),
+        )),
         ..Default::default()
     }
 }

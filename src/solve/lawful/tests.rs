@@ -132,7 +132,7 @@ fn check(network: &Network, found: &Solution) {
 proptest! {
     #![proptest_config(ProptestConfig {
         cases: 1000,
-        failure_persistence: None,
+        failure_persistence: Some(Box::new(proptest::test_runner::FileFailurePersistence::WithSource("regressions"))),
         ..Default::default()
     })]
 

@@ -124,7 +124,7 @@ fn waves() -> impl Strategy<Value = Wave> {
 const CLOSE: f64 = 1e-8;
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(512) })]
+    #![proptest_config(ProptestConfig { failure_persistence: Some(Box::new(proptest::test_runner::FileFailurePersistence::WithSource("regressions"))), ..ProptestConfig::with_cases(512) })]
 
     #[test]
     fn breakpoints_increase_and_pieces_join(wave in waves(), start in -2e-3..4e-3) {

@@ -36,7 +36,7 @@ fn passive() -> impl Strategy<Value = String> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, cases: 32, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { failure_persistence: Some(Box::new(proptest::test_runner::FileFailurePersistence::WithSource("regressions"))), cases: 32, ..ProptestConfig::default() })]
     /// Moreau's scheme, extrapolated from h and h/2 to h → 0 (Richardson), is the exact solution.
     #[test]
     fn random_passive_circuits_agree_with_moreau(text in passive()) {
