@@ -206,7 +206,8 @@ fn the_impulse_of_a_zener_diode_is_a_charge() {
 fn rectifiers_that_commutate_at_one_instant_find_their_mode() {
     let exact = run("rect4", Method::Exact);
     assert_exact(&exact, 2000);
-    assert!(exact.stats.modes <= 60, "{} modes", exact.stats.modes);
+    // Neighbours of one proposal at each of four commutations of 24 diodes; a search among all neighbours made 744.
+    assert!(exact.stats.modes <= 4 * 24, "{} modes", exact.stats.modes);
     assert_eq!(exact.waveforms.time.last(), Some(&6e-3));
     let at = |t: f64| crate::runs::at(&exact, "v(p0,n0)", t);
     let left = at(6e-3) / at(5.4e-3) / (-0.6e-3_f64 / (30.0 * 1e-3)).exp();
