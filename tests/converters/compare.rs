@@ -37,6 +37,8 @@ pub(crate) enum Outcome {
     Panicked(String),
     /// The oracle has no answer.
     Declined(String),
+    /// The difference has a cause that `circ` names itself.
+    Explained(String),
 }
 
 /// A run of a netlist, or what was said instead; one that goes on for longer than this is said to hang.
@@ -160,16 +162,17 @@ fn is_plain(circuit: &Circuit) -> bool {
     })
 }
 
-/// The circuit with no resistance below `ron` and none above `roff` in switches and diodes.
+/// The circuit with `ron` in series with every switch and diode and `roff` across them, so that both vanish together.
 pub(crate) fn realised(circuit: &Circuit, ron: f64, roff: f64) -> Circuit {
     let mut circuit = circuit.clone();
+    let across = |r: f64| 1.0 / (1.0 / r + 1.0 / roff);
     for card in &mut circuit.cards {
         match &mut card.part {
-            Part::S(m) => (m.ron, m.roff) = (m.ron.max(ron), m.roff.min(roff)),
-            Part::D(DiodeModel::Lines(_, on, off)) => (*on, *off) = (on.max(ron), off.min(roff)),
+            Part::S(m) => (m.ron, m.roff) = (m.ron + ron, across(m.roff)),
+            Part::D(DiodeModel::Lines(_, on, off)) => (*on, *off) = (*on + ron, across(*off)),
             Part::M(m) => {
-                (m.ron, m.roff) = (m.ron.max(ron), m.roff.min(roff));
-                m.rb = m.rb.max(ron);
+                (m.ron, m.roff) = (m.ron + ron, across(m.roff));
+                m.rb += ron;
             }
             _ => {}
         }

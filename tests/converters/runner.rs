@@ -16,6 +16,8 @@ pub(crate) struct Summary {
     pub(crate) agree: [u64; 2],
     /// The oracle has no answer.
     pub(crate) declined: u64,
+    /// Differences whose cause `circ` names itself.
+    pub(crate) explained: BTreeMap<String, u64>,
     /// Refused by `circ`, with the oracle's word on whether there is an answer.
     pub(crate) refused: BTreeMap<String, Vec<u64>>,
     /// Everything else, by kind.
@@ -47,6 +49,7 @@ impl Summary {
                 }
             }
             Outcome::Declined(_) => self.declined += 1,
+            Outcome::Explained(why) => *self.explained.entry(why.clone()).or_default() += 1,
             Outcome::Refused(why) => self.refused.entry(kind(why)).or_default().push(seed),
             Outcome::Panicked(why) => self.failed.entry(kind(why)).or_default().push(seed),
             Outcome::Differs { what, .. } => {
@@ -63,8 +66,14 @@ impl Summary {
 
     pub(crate) fn text(&self) -> String {
         let mut text = format!(
-            "{} cases: {} agree with the oracle ({:?}), {} with a changed circuit, the oracle declines {}; largest difference allowed {:.1e}\n",
-            self.cases, self.agree[0], self.methods, self.agree[1], self.declined, self.largest
+            "{} cases: {} agree with the oracle ({:?}), {} with a changed circuit, the oracle declines {}, explained {:?}; largest difference allowed {:.1e}\n",
+            self.cases,
+            self.agree[0],
+            self.methods,
+            self.agree[1],
+            self.declined,
+            self.explained,
+            self.largest
         );
         for (title, kinds) in [("refused", &self.refused), ("failed", &self.failed)] {
             for (kind, seeds) in kinds {
@@ -106,7 +115,10 @@ pub(crate) fn run(
         for (what, outcome) in both(&case, seed).into_iter().enumerate() {
             let Some(outcome) = outcome else { continue };
             summary.count(seed, what, &outcome);
-            let is_bad = !matches!(outcome, Outcome::Agrees { .. } | Outcome::Declined(_));
+            let is_bad = !matches!(
+                outcome,
+                Outcome::Agrees { .. } | Outcome::Declined(_) | Outcome::Explained(_)
+            );
             if is_bad {
                 let text = format!("{outcome:?}");
                 let short: String = text.chars().take(240).collect();
@@ -118,7 +130,7 @@ pub(crate) fn run(
                 }
             }
         }
-        if summary.cases % 1000 == 0 {
+        if summary.cases % 250 == 0 {
             tell(&summary.text());
         }
     }
