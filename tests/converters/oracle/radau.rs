@@ -305,6 +305,14 @@ impl March<'_> {
                 h *= larger;
                 continue;
             };
+            // The polynomial may be late: what it takes for the lower end may be past the crossing.
+            let is_past = |s: f64| {
+                let trial = self.step(t, s * h);
+                trial.is_some_and(|trial| self.guards(&trial.stages[2], t + s * h) < 0.0)
+            };
+            if low > 0.0 && is_past(low) {
+                (low, high) = (0.0, low);
+            }
             // The instant, on steps that end there.
             let (mut g_low, mut g_high) = (1e-12_f64, -1e-12_f64);
             let mut found = None;
