@@ -90,7 +90,7 @@ fn agree(seeds: std::ops::Range<u64>) {
     );
 }
 
-/// Seed 1012, a six-pulse rectifier with Roff = 1e15, makes hardly any progress and would take a minute to be seen to.
+/// Without seed 1012, a six-pulse rectifier with Roff = 1e15, which takes too long for this part.
 #[test]
 fn fixed_converters_agree() {
     agree(1000..1012);
