@@ -111,7 +111,7 @@ fn a_start_without_a_mode_is_stepped_from_the_start() {
     let run = try_run(text, by(Method::Auto)).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(run.method, "theta");
     let words =
-        "exact integration ended, and the whole run was made in steps instead: at t = 0e0 s: d8";
+        "exact integration ended, and the whole run was made in steps instead: at t = 0: d8";
     assert!(
         run.notes.iter().any(|n| n.starts_with(words)),
         "{:?}",

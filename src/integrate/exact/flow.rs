@@ -116,6 +116,11 @@ impl Flow {
         self.states
     }
 
+    /// The shortest step of the table, s: below the fastest time constant.
+    pub(crate) fn shortest(&self) -> f64 {
+        self.step(self.bottom())
+    }
+
     /// Number of guards.
     pub(crate) fn guards(&self) -> usize {
         self.guards

@@ -50,6 +50,8 @@ pub(crate) struct Inspector {
     /// Guards with their derivatives, and their sizes.
     jets: Vec<f64>,
     jet_sizes: Vec<f64>,
+    /// Whose quantities pass zero at this instant, and what the resolution of the time leaves of them.
+    slips: Vec<(Owner, f64)>,
     /// The same where some states follow the others, and whether w is there.
     slow: Vec<f64>,
     slow_sizes: Vec<f64>,
@@ -190,7 +192,11 @@ impl Inspector {
         mode.flow.read_guards(&mut self.w);
         let (w, guards) = self.w.split_at(mode.flow.dim());
         let known = mode.familiar.covers(w);
-        if known && mode.constraints.is_empty() && mode.familiar.clear(guards, time) {
+        if known
+            && mode.constraints.is_empty()
+            && self.slips.is_empty()
+            && mode.familiar.clear(guards, time)
+        {
             return Finding::Holds(Vec::new());
         }
         let (later, sizes) = (&self.later, &mut self.sizes);
@@ -231,6 +237,22 @@ impl Inspector {
             }
         }
         Finding::Holds(leaving)
+    }
+
+    /// Forgets what passed zero at an instant before.
+    pub(crate) fn forget_slips(&mut self) {
+        self.slips.clear();
+    }
+
+    /// Notes that the quantity of this owner passes zero at t with this slope: in the mode that follows, where it may change much
+    /// more slowly, it is zero as far as the old slope and the resolution of the time tell.
+    pub(crate) fn note_slip(&mut self, owner: Owner, t: f64, slope: f64) {
+        self.slips.push((owner, resolution(t) * slope.abs()));
+    }
+
+    fn slip(&self, owner: Owner) -> f64 {
+        let own = self.slips.iter().filter(|(o, _)| *o == owner);
+        own.map(|(_, slip)| *slip).fold(0.0, f64::max)
     }
 
     /// Reads the guards of the mode in which the run stands at state x, with the sources at z, for [`Self::leaves`].
@@ -287,6 +309,7 @@ impl Inspector {
                 noise += time * next.0.abs();
             }
             if k == 0 {
+                noise += self.slip(mode.owner(i));
                 floor = noise;
             }
             let turned = k > 0

@@ -54,6 +54,8 @@ impl Exact<'_> {
             clock.stand_at(&self.sources, place.t);
             switches[i] ^= clock.leaves(&self.plant.thresholds[i], switches[i], place.t);
         }
+        self.inspector.forget_slips();
+        self.left_here.clear();
         self.exosystem.write(place.t, &mut self.z);
         // Its edges have acted.
         self.before = self.inputs(place.t);

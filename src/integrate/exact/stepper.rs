@@ -6,7 +6,7 @@ use nalgebra::DVector;
 
 use super::accumulation::Accumulation;
 use super::ahead::Ahead;
-use super::assembler::Assembler;
+use super::assembler::{Assembler, Step};
 use super::clock::Clock;
 use super::exosystem::Exosystem;
 use super::inspect::Inspector;
@@ -16,7 +16,7 @@ use super::motion::{Arrival, Motion};
 use super::plant::Plant;
 use super::report::Slides;
 use super::schedule::drives;
-use super::transition::{PROPOSALS, Trigger};
+use super::transition::{PATIENCE, PROPOSALS, Trigger};
 use crate::circuit::Source;
 use crate::integrate::energy::Balance;
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper, Times};
@@ -80,6 +80,8 @@ pub struct Exact<'a> {
     pub(super) before: DVector<f64>,
     /// [`PROPOSALS`], the latest successful first.
     pub(super) proposals: [f64; PROPOSALS.len()],
+    /// Modes left at the present instant.
+    pub(super) left_here: Vec<usize>,
     pub(super) metric: Metric,
     /// From start to end, s.
     pub(super) duration: f64,
@@ -188,6 +190,7 @@ impl<'a> Exact<'a> {
             z,
             before,
             proposals: PROPOSALS,
+            left_here: Vec::new(),
             metric,
             duration: until - t,
             until,
@@ -287,15 +290,12 @@ impl<'a> Exact<'a> {
     fn instant(&mut self, fired: Option<usize>, log: &mut Log) -> Result<(), SimError> {
         let t = self.motion.t;
         let near = t + self.ulps();
-        if let (Some(at), Some(guard)) = (self.mode, fired)
-            && self.motion.age <= self.ulps()
-        {
-            let what = "a mode is left at the instant at which it was entered";
-            let reason = Reason::internal("integrate::exact", what);
-            return Err(self.fail(reason).device(self.owner_name(at, guard)));
+        if let (Some(at), Some(guard)) = (self.mode, fired) {
+            self.leave_here(at, guard)?;
         }
         self.take_storage();
         let known = self.next_stop <= near;
+        self.inspector.forget_slips();
         self.corner = self.next_piece <= near;
         let mut discontinuous = self.corner && self.take_pieces(near)?;
         self.exosystem.write(t, &mut self.z);
@@ -310,6 +310,21 @@ impl<'a> Exact<'a> {
         fire(&self.plant.thresholds, &mut key.switches);
         let trigger = fired.map_or(Trigger::Sources, Trigger::Guard);
         self.change(key, discontinuous, trigger, log)
+    }
+
+    /// Takes note that mode `at` is left by a guard. One that is left at the instant at which it was entered was found by rounding:
+    /// after [`PATIENCE`] of them none is entered again at this instant, and an instant without end is an internal error.
+    fn leave_here(&mut self, at: usize, guard: usize) -> Result<(), SimError> {
+        if self.motion.age > f64::EPSILON * self.plant.modes[at].flow.shortest() {
+            self.left_here.clear();
+        }
+        self.left_here.push(at);
+        if self.left_here.len() > PATIENCE + 2 * (self.plant.pairs + self.plant.thresholds.len()) {
+            let what = "modes are left at the instant at which they were entered, without end";
+            let reason = Reason::internal("integrate::exact", what);
+            return Err(self.fail(reason).device(self.owner_name(at, guard)));
+        }
+        Ok(())
     }
 
     /// Moves the switches that sources alone drive and that are due before `near`; whether one moved.
@@ -341,6 +356,9 @@ impl<'a> Exact<'a> {
         let Some(at) = self.mode else { return false };
         let mut moved = false;
         let owner = fired.map(|guard| self.plant.modes[at].owner(guard));
+        if let Some(guard) = fired {
+            self.note_slip(at, guard);
+        }
         match owner {
             // A thyristor's current ends, and no gate holds it.
             Some(Owner::Device(pair)) => {
@@ -373,14 +391,36 @@ impl<'a> Exact<'a> {
             let now = &self.motion.now[..mode.n];
             self.inspector.look(mode, now, &self.z);
             for k in candidates {
+                let mode = &self.plant.modes[at];
                 if self.inspector.leaves(mode, first + k, self.motion.t) {
                     let i = mode.guarded_switches[k];
                     key.switches[i] = !key.switches[i];
                     moved = true;
+                    self.note_slip(at, first + k);
                 }
             }
         }
         moved
+    }
+
+    /// Notes that a guard of mode `at` passes zero now, where its quantity goes on in the next mode: the control of a switch, the input of
+    /// a function block on a step. Of a diode's current and voltage one begins where the other ends.
+    fn note_slip(&mut self, at: usize, guard: usize) {
+        let mode = &self.plant.modes[at];
+        let slope = self.motion.now[mode.flow.dim() + mode.flow.guards() + guard];
+        let t = self.motion.t;
+        match mode.owner(guard) {
+            owner @ Owner::Switch(_) => self.inspector.note_slip(owner, t, slope),
+            Owner::Device(pair) => {
+                let step = |step: &&Step| pair == step.pair || pair == step.pair + 1;
+                if let Some(step) = self.plant.steps().iter().find(step) {
+                    for pair in [step.pair, step.pair + 1] {
+                        self.inspector.note_slip(Owner::Device(pair), t, slope);
+                    }
+                }
+            }
+            Owner::Slide(..) => {}
+        }
     }
 
     /// Sources whose pieces end go on along the next ones; returns whether one of them jumps.

@@ -16,6 +16,9 @@ pub(super) const PROPOSALS: [f64; 9] = [1e-6, 1e-4, 1e-8, 1e-2, 1e-10, 1.0, 1e2,
 /// Modes tried around the proposals before the search ends.
 const MOST_NEIGHBOURS: usize = 400;
 
+/// Modes left at the instant at which they were entered after which none of them is entered again there.
+pub(super) const PATIENCE: usize = 2;
+
 /// Why a mode is left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Trigger {
@@ -359,12 +362,18 @@ impl Exact<'_> {
             let (why, at) = self.plant.modes[from].successors[k];
             if why == trigger
                 && self.plant.modes[at].key.same_switches(key)
+                && !self.is_barred(at)
                 && let Some(leaving) = self.try_mode(at)
             {
                 return Some((at, leaving));
             }
         }
         None
+    }
+
+    /// Whether a mode was left at this instant too often to be entered again.
+    fn is_barred(&self, at: usize) -> bool {
+        self.left_here.len() > PATIENCE && self.left_here.contains(&at)
     }
 
     /// A mode that holds on some interval after now: from one implicit step of the complementarity system at several
@@ -508,6 +517,9 @@ impl Exact<'_> {
 
     pub(super) fn try_key(&mut self, key: &Key) -> Option<(usize, Vec<usize>)> {
         let at = self.plant.mode(key, &self.exosystem)?;
+        if self.is_barred(at) {
+            return None;
+        }
         self.try_mode(at).map(|leaving| (at, leaving))
     }
 
