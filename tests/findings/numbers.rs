@@ -236,3 +236,14 @@ fn inductors_that_share_a_diode_are_left_to_steps_where_roff_is_large() {
         }
     }
 }
+
+/// Windings that share a current which an enormous Roff makes fast: what is slow in them is lost to rounding, and that is said.
+#[test]
+fn states_that_decay_together_too_fast_are_a_note() {
+    let told = |roff: &str| {
+        let run = changed("llc_large_roff", &[("roff=1e15", roff)], Method::Exact);
+        run.notes.iter().any(|n| n.contains("decay together"))
+    };
+    assert!(told("roff=1e15"));
+    assert!(!told("roff=1e9"));
+}

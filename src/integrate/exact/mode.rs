@@ -381,6 +381,23 @@ impl Mode {
         }
     }
 
+    /// The fastest rate at which several states move each other, 1/s: their sum is fast, and what is slow stands in the difference of
+    /// large entries. `None` where every fast state is fast by itself.
+    pub(crate) fn fast_sum(&self) -> Option<f64> {
+        /// Entries of a row above this part of the largest of all belong to the fast rate.
+        const FAST: f64 = 1e-6;
+        let a = self.flow.generator().view((0, 0), (self.n, self.n));
+        let largest = a.amax();
+        let several = |row: usize| {
+            a.row(row)
+                .iter()
+                .filter(|v| v.abs() > FAST * largest)
+                .count()
+                > 1
+        };
+        (0..self.n).any(several).then_some(largest)
+    }
+
     /// Whether a guard is that of a switch which does not stay on where the control rests on its threshold.
     pub(crate) fn is_off_at_rest(&self, guard: usize) -> bool {
         let k = guard.checked_sub(self.device_guards.len());

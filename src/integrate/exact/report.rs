@@ -9,6 +9,10 @@ use crate::integrate::run::Log;
 /// Estimated relative loss of an exponential above which it is reported.
 const LOSS: f64 = 1e-10;
 
+/// The part of a state that the rounding of a fast rate may move over the run above which that is said: Roff = 1e12 passed where
+/// 1e15 was wrong.
+const SLOW_PART: f64 = 1e-3;
+
 /// When a switch stayed on its threshold.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Slides {
@@ -168,6 +172,15 @@ impl Exact<'_> {
             .iter()
             .map(|m| m.flow.loss)
             .fold(0.0, f64::max);
+        let rates = self.plant.modes.iter().filter_map(|mode| mode.fast_sum());
+        let fastest = rates.fold(0.0, f64::max);
+        if fastest * f64::EPSILON * self.duration > SLOW_PART {
+            self.notes.push(format!(
+                "several currents or voltages decay together at {fastest:.0e} 1/s, by a Roff or Ron far from all other resistances; what \
+                 changes slowly in them may have lost its digits, and the values be wrong: `--verify` or a Roff a thousand times \
+                 smaller tells"
+            ));
+        }
         if loss > LOSS {
             self.notes.push(format!(
                 "the circuit is stiff without being graded: the matrix exponential is accurate to about {loss:.0e} a step"
