@@ -64,6 +64,15 @@ fn changed(name: &str, replacements: &[(&str, &str)], method: Method) -> Run {
 
 /// As [`changed`], with all options.
 fn changed_by(name: &str, replacements: &[(&str, &str)], options: SimOptions<'_>) -> Run {
+    attempt_changed(name, replacements, options).unwrap_or_else(|e| panic!("{name}: {e}"))
+}
+
+/// As [`changed_by`], of a run that may fail.
+fn attempt_changed(
+    name: &str,
+    replacements: &[(&str, &str)],
+    options: SimOptions<'_>,
+) -> Result<Run, SimError> {
     let mut text = std::fs::read_to_string(path(name)).expect("a netlist");
     for (from, to) in replacements {
         assert!(text.contains(from), "{name} has no `{from}`");
@@ -75,5 +84,5 @@ fn changed_by(name: &str, replacements: &[(&str, &str)], options: SimOptions<'_>
     let (circuit, findings) = elaborate(&netlist, &ElaborateOptions::default());
     let circuit = circuit.unwrap_or_else(|| panic!("{name}: {findings:?}"));
     let behaviour = behaviour(&circuit).unwrap_or_else(|e| panic!("{name}: {e:?}"));
-    simulate(&circuit, &behaviour, options).unwrap_or_else(|e| panic!("{name}: {e}"))
+    simulate(&circuit, &behaviour, options)
 }

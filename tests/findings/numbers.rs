@@ -1,9 +1,9 @@
 //! Extreme values: resistances over many decades, equal eigenvalues, long chains.
 
-use circ::integrate::{Method, Run};
+use circ::integrate::{Method, Reason, Run, SimOptions};
 
 use crate::runs::column;
-use crate::{changed, run};
+use crate::{attempt_changed, changed, run};
 
 /// The largest difference of a column of two runs on the same grid, relative to its amplitude.
 fn difference(a: &Run, b: &Run, probe: &str) -> f64 {
@@ -246,4 +246,23 @@ fn states_that_decay_together_too_fast_are_a_note() {
     };
     assert!(told("roff=1e15"));
     assert!(!told("roff=1e9"));
+}
+
+/// v = −(1/9)(e^{λt} − 1) with λ = 9e6 1/s; in long steps the stiff exponentials would take e^{λh} to 0.
+#[test]
+fn what_grows_is_followed_or_overflows() {
+    let name = "grows";
+    let v = crate::runs::at(&run(name, Method::Exact), "v(a)", 50e-6);
+    let expected = -((9e6_f64 * 50e-6).exp_m1()) / 9.0;
+    assert!(
+        (v.abs() / expected.abs() - 1.0).abs() < 1e-11,
+        "{v:e} {expected:e}"
+    );
+    let options = SimOptions {
+        method: Method::Exact,
+        ..SimOptions::default()
+    };
+    let long = attempt_changed(name, &[(".tran 10u 50u", ".tran 1m 10m")], options);
+    let error = long.expect_err("no number is as large");
+    assert_eq!(error.reason, Reason::Overflow);
 }

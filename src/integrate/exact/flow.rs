@@ -146,10 +146,10 @@ impl Flow {
         self.steps[level as usize]
     }
 
-    /// See [`Spectrum::step_limit`]; without guards nothing can hide.
+    /// See [`Spectrum::step_limit`]; without guards nothing can hide, and only growth counts.
     pub(crate) fn step_limit(&self, age: f64) -> f64 {
         if self.guards == 0 {
-            f64::INFINITY
+            self.spectrum.growth_limit()
         } else {
             self.spectrum.step_limit(age)
         }

@@ -108,7 +108,7 @@ impl Motion {
         self.now.clear();
         self.now.extend_from_slice(w);
         self.next.resize(w.len(), 0.0);
-        self.steady = flow.guards() == 0;
+        self.steady = flow.guards() == 0 && flow.step_limit(0.0) >= flow.step(LONG);
         self.barrier = f64::INFINITY;
         self.amplitude.clear();
         self.amplitude.extend_from_slice(&familiar.sizes);

@@ -9,6 +9,11 @@ use super::expm;
 const EXTINCT: f64 = 37.0;
 /// ωh up to which a cubic through values and slopes at both ends follows an oscillation to (ωh)⁴/384 of its amplitude.
 const RESOLVED: f64 = 0.7;
+/// λh up to which the exponentials follow a solution that grows as e^{λt}: those of long stiff steps are meant for decay and take
+/// any e^{λh} to 0.
+const GROWN: f64 = 1.0;
+/// Real parts of eigenvalues below this part of the largest eigenvalue are rounding.
+const ROUNDING: f64 = 1e-12;
 /// First step after a change of mode, relative to the fastest rate.
 const FIRST: f64 = 0.5;
 
@@ -25,6 +30,8 @@ pub(crate) struct Rate {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Spectrum {
     limits: Vec<Limit>,
+    /// The fastest growth, 1/s.
+    growth: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -43,14 +50,22 @@ impl Spectrum {
     pub(crate) fn new(a: &DMatrix<f64>, sources: &[Rate]) -> Self {
         let n = a.nrows();
         let mut rates = sources.to_vec();
+        let mut growth = 0.0;
         if n > 0 {
             let d = expm::balance(a, 1.0);
             let balanced = DMatrix::from_fn(n, n, |i, j| a[(i, j)] * d[j] / d[i]);
             match eigenvalues(&balanced) {
-                Some(found) => rates.extend(found.iter().map(|v| Rate {
-                    decay: -v.re,
-                    frequency: v.im.abs(),
-                })),
+                Some(found) => {
+                    let largest = found.iter().map(|v| v.norm()).fold(0.0, f64::max);
+                    let fastest = found.iter().map(|v| v.re).fold(0.0, f64::max);
+                    if fastest > ROUNDING * largest {
+                        growth = fastest;
+                    }
+                    rates.extend(found.iter().map(|v| Rate {
+                        decay: -v.re,
+                        frequency: v.im.abs(),
+                    }));
+                }
                 None => rates.extend(numerical_range(&balanced)),
             }
         }
@@ -76,16 +91,22 @@ impl Spectrum {
             });
         }
         limits.reverse();
-        Self { limits }
+        Self { limits, growth }
     }
 
     /// The longest step that hides nothing `age` seconds after the last change of mode: dead transients no longer count,
     /// decays are followed on steps that double, oscillations are resolved while they last.
     pub(crate) fn step_limit(&self, age: f64) -> f64 {
         let living = self.limits.iter().find(|limit| age <= limit.until);
-        living.map_or(f64::INFINITY, |limit| {
+        let limit = living.map_or(f64::INFINITY, |limit| {
             limit.resolved.min(age.max(limit.first))
-        })
+        });
+        limit.min(self.growth_limit())
+    }
+
+    /// The longest step that follows what grows, s; infinite in a mode without growth.
+    pub(crate) fn growth_limit(&self) -> f64 {
+        GROWN / self.growth
     }
 }
 
