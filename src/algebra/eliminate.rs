@@ -94,7 +94,7 @@ impl<F: Field> Matrix<F> {
     ///
     /// Among the candidates the entry largest relative to its row is taken, the first of equals. Returns whether a
     /// pivot was found. An elimination over columns in class order makes each class depend on later ones as
-    /// far as the equations allow (DESIGN 3.2).
+    /// far as the equations allow.
     pub fn eliminate(&mut self, column: usize, state: &mut Elimination) -> bool {
         let free = |row: &usize| !state.used[*row] && !self.at(*row, column).is_zero();
         let mut candidates = (0..state.equations).filter(free);

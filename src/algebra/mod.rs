@@ -1,6 +1,6 @@
 //! Exact numbers and the class-ordered elimination written once over them.
 //!
-//! Which column can be a pivot is decided without a tolerance (DESIGN 3); [`Value`] is a number as the netlist wrote it.
+//! Which column can be a pivot is decided without a tolerance; [`Value`] is a number as the netlist wrote it.
 //! Two fields carry the elimination: [`Ball`], fast, with exact zeros and an error bound, and [`Rational`], exact
 //! throughout, which takes over where a ball is too wide and is the oracle in tests.
 

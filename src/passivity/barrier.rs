@@ -5,7 +5,7 @@
 //! ```
 //!
 //! is followed along μ → 0 by Newton's method on −t/μ − Σ log det. At a centred point X = μ(F − tI)⁻¹ is dual feasible
-//! with gap μ(q + 2n + 1). (NUMERICS C: on these problems faster than a general cone solver and better at its dual.)
+//! with gap μ(q + 2n + 1). (On these problems it is faster than a general cone solver and better at its dual.)
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 

@@ -34,7 +34,7 @@ fn power_of_two(x: f64) -> f64 {
 }
 
 /// Balances (A, B, C, D): Osborne's iteration on the state indices of [[A, B], [C, D]], then time, then a congruence on
-/// the ports (NUMERICS C).
+/// the ports.
 pub(crate) fn balance(system: &System) -> Balanced {
     let (n, m) = (system.n(), system.m());
     let System {

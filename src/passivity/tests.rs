@@ -26,7 +26,7 @@ fn stored_energy_certifies_the_bridge_of_37() {
 
 #[test]
 fn the_inequality_alone_finds_the_energy_of_the_bridge() {
-    // The feasible set is the single point diag(C, L): DESIGN, misprints of (36).
+    // The feasible set is the single point diag(C, L); (36) prints another.
     let certificate = decide(&bridge(), None)
         .certificate()
         .cloned()

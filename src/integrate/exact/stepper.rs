@@ -292,6 +292,8 @@ impl<'a> Exact<'a> {
         let near = t + self.ulps();
         if let (Some(at), Some(guard)) = (self.mode, fired) {
             self.leave_here(at, guard)?;
+        } else {
+            self.left_here.clear();
         }
         self.take_storage();
         let known = self.next_stop <= near;

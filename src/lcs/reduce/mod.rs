@@ -1,6 +1,6 @@
 //! From port behaviour to the complementarity system of one position.
 //!
-//! The columns of the behaviour are eliminated in class order (DESIGN 3.2): quantities nobody prescribes, rates of
+//! The columns of the behaviour are eliminated in class order: quantities nobody prescribes, rates of
 //! storage (i_C, v_L), device currents, device voltages of devices not yet used, states. What stays free are the
 //! sources, the states x, one of (v, i) per device = λ, and the undetermined quantities f: rates of storage that
 //! depends on other storage, held quantities that the position pins only through the states. With s = S_x x + S_u u + k all
@@ -203,7 +203,7 @@ fn check(behaviour: &Behaviour, position: &Position) -> Result<(), ReduceError> 
 /// The order of the classes. Greedy order alone can accuse a sound active network, so others are tried before an error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum ClassOrder {
-    /// As in DESIGN 3.2.
+    /// That of the module.
     Standard,
     /// Of each device first the quantity that is otherwise second choice.
     OtherRole,
