@@ -13,6 +13,30 @@
 //! |---|---|---|---|---|---|---|---|---|
 //! | shape | n×n | n×m | m×n | m×m | n×p | m×p | n | m |
 //!
+//! A [`Model`] is a circuit from a netlist, or built by a program; everything else is asked of it.
+//!
+//! ```
+//! use circ::{Model, SimOptions};
+//!
+//! let rectifier = "rectifier\nv1 in 0 sin(0 10 50)\nd1 in out d\nc1 out 0 100u\nr1 out 0 1k\n\
+//!     .model d d(ideal)\n.tran 0.1m 40m\n.end\n";
+//! let model = Model::parse(rectifier, "rectifier.cir")?;
+//! let run = model.transient(SimOptions::default())?;
+//! let peak = run.waveforms.column(1).fold(0.0, f64::max);
+//! assert!((peak - 10.0).abs() < 1e-3);
+//! assert!(run.events[0].concerns("d1"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! | to | take |
+//! |---|---|
+//! | read a netlist, change values | [`Model`] |
+//! | simulate from start to end | [`Model::transient`], with [`SimOptions`] |
+//! | drive a simulation, with a controller in the loop | [`Model::simulation`]: [`Simulation`], [`Stop`], [`Checkpoint`] |
+//! | see what happened | [`Run`], [`Event`], [`Waveforms`] |
+//! | have the matrices | [`Model::lcs`]: [`Lcs`] |
+//! | build a circuit without text | [`Circuit::named`] |
+//!
 //! Data flows one way, and the modules stand in that order:
 //!
 //! ```text
@@ -33,6 +57,7 @@ pub mod law;
 pub mod lcs;
 pub mod measure;
 pub mod mna;
+pub mod model;
 pub mod netlist;
 pub mod passivity;
 pub mod plan;
@@ -43,6 +68,16 @@ pub mod waveform;
 
 #[cfg(feature = "cli")]
 pub mod cli;
+
+pub use circuit::{Circuit, Diodes, ElaborateOptions};
+pub use diagnostic::{Diagnostic, Severity};
+pub use integrate::{
+    Change, Checkpoint, Event, Method, OperatingPoint, Run, SimError, SimOptions, Simulation,
+    SimulationOptions, Stop, StopReason,
+};
+pub use lcs::Lcs;
+pub use model::{Faults, Model};
+pub use waveform::Waveforms;
 
 /// Compiles and runs the README's example.
 #[cfg(doctest)]

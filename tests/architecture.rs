@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Each room and the rooms it may import, in the order in which data flows.
-const ROOMS: [(&str, &[&str]); 18] = [
+const ROOMS: [(&str, &[&str]); 19] = [
     ("settings", &[]),
     ("algebra", &[]),
     ("diagnostic", &[]),
@@ -33,6 +33,18 @@ const ROOMS: [(&str, &[&str]); 18] = [
             "settings",
             "solve",
             "waveform",
+        ],
+    ),
+    (
+        "model",
+        &[
+            "circuit",
+            "diagnostic",
+            "integrate",
+            "lcs",
+            "mna",
+            "netlist",
+            "settings",
         ],
     ),
     ("passivity", &["lcs", "settings"]),

@@ -45,8 +45,8 @@ fn meets_solution(circuit: &str, events: usize) {
     let found: Vec<f64> = run
         .events
         .iter()
-        .filter(|e| &*e.1 != "jump")
-        .map(|e| e.0)
+        .filter(|event| !event.changes.is_empty())
+        .map(|event| event.t)
         .collect();
     assert_eq!(found.len(), events, "{circuit}: {:?}", run.events);
     for (found, expected) in found.into_iter().zip(expected) {
@@ -183,7 +183,7 @@ const MAFFEZZONI: [(f64, f64, f64); 10] = [
 #[test]
 fn maffezzonis_switch_meets_its_exact_solution() {
     let run = exact("maffezzoni");
-    let times: Vec<f64> = run.events.iter().map(|e| e.0).collect();
+    let times: Vec<f64> = run.events.iter().map(|e| e.t).collect();
     for (k, (t_off, peak, end)) in MAFFEZZONI.into_iter().enumerate() {
         let nearest = times
             .iter()

@@ -118,8 +118,8 @@ fn maffezzonis_switch_against_the_exact_periods() {
     let seen: Vec<f64> = run
         .events
         .iter()
-        .filter(|(_, w)| w.contains("s1 off"))
-        .map(|(t, _)| t * 1e6)
+        .filter(|event| event.turns("s1", false))
+        .map(|event| event.t * 1e6)
         .collect();
     for (seen, exact) in seen.iter().zip(offs) {
         close(*seen, exact, 2e-3);
@@ -210,7 +210,7 @@ fn operating_points() {
     let floating = op("v1 1 0 5\nc2 2 0 1u\nc1 1 2 1u").unwrap();
     assert_eq!(floating.nodes[1], ("2".to_string(), 0.0));
     assert!(
-        floating.notes[0].contains("capacitors alone"),
+        floating.notes[0].text.contains("capacitors alone"),
         "{:?}",
         floating.notes
     );
@@ -323,7 +323,7 @@ fn buck_with_a_source_driven_switch() {
     assert_eq!(
         run.events
             .iter()
-            .filter(|(_, what)| what.contains("s1"))
+            .filter(|event| event.concerns("s1"))
             .count(),
         100
     );

@@ -52,8 +52,8 @@ fn close(what: &str, found: f64, expected: f64, within: f64) {
 
 /// The times at which the log says something.
 fn times(run: &Run, what: &str) -> Vec<f64> {
-    let said = run.events.iter().filter(|e| e.1.contains(what));
-    said.map(|e| e.0).collect()
+    let said = run.events.iter().filter(|e| e.to_string().contains(what));
+    said.map(|e| e.t).collect()
 }
 
 /// Current of a thyristor with R and L in series that fires at α, as a function of the angle x ≥ α, relative to V/Z: a steady

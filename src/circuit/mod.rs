@@ -6,6 +6,7 @@ mod analysis;
 mod audit;
 mod behaviour;
 mod bipolar;
+mod build;
 mod builder;
 mod controlled;
 mod define;
@@ -19,6 +20,7 @@ mod fixture;
 mod form;
 mod formula;
 mod functions;
+mod held;
 mod line;
 pub(crate) mod load;
 mod measurement;
@@ -43,6 +45,7 @@ use crate::diagnostic::Span;
 use crate::law::Law;
 pub use elaborate::{Diodes, ElaborateOptions, elaborate};
 pub use formula::Formula;
+pub use held::{held_at, holder};
 pub use measurement::{FourierAnalysis, Harmonics, Measured, NamedMeasurement};
 pub use source::Source;
 pub use sweep::{Sweep, Swept, combinations};
@@ -323,25 +326,29 @@ impl Circuit {
         if !self.probes.is_empty() {
             return self.probes.clone();
         }
-        let nodes = self
-            .nodes
-            .iter()
-            .enumerate()
-            .skip(1)
-            .map(|(i, name)| Probe {
-                name: format!("v({name})"),
-                what: Probed::Voltage(NodeId(i as u32), NodeId::GROUND),
-            });
         let shown = |e: &Element| matches!(e.kind, Kind::VoltageSource(_) | Kind::Inductor(_));
-        let currents = self
-            .elements
-            .iter()
-            .enumerate()
-            .filter(|(_, e)| shown(e))
-            .map(|(i, e)| Probe {
-                name: format!("i({})", e.name),
-                what: Probed::Current(ElementId(i as u32)),
-            });
-        nodes.chain(currents).collect()
+        self.all_voltages().chain(self.currents_of(shown)).collect()
+    }
+
+    /// The voltages of all nodes but ground.
+    pub(crate) fn all_voltages(&self) -> impl Iterator<Item = Probe> {
+        let nodes = self.nodes.iter().enumerate().skip(1);
+        nodes.map(|(i, name)| Probe {
+            name: format!("v({name})"),
+            what: Probed::Voltage(NodeId(i as u32), NodeId::GROUND),
+        })
+    }
+
+    /// The currents of these elements.
+    pub(crate) fn currents_of(
+        &self,
+        shown: impl Fn(&Element) -> bool,
+    ) -> impl Iterator<Item = Probe> {
+        let elements = self.elements.iter().enumerate();
+        let shown = elements.filter(move |(_, e)| shown(e));
+        shown.map(|(i, e)| Probe {
+            name: format!("i({})", e.name),
+            what: Probed::Current(ElementId(i as u32)),
+        })
     }
 }

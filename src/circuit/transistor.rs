@@ -250,7 +250,7 @@ impl<'n> Builder<'n, '_> {
         let vto = number(&["vto", "vth0", "vt0", "vt"], vto)?;
         let series = number(&["rd"], 0.0)? + number(&["rs"], 0.0)?;
         let given = number(&["ron"], f64::NAN)?;
-        let is_given = given > 0.0;
+        let is_given = given >= 0.0;
         let rds = number(&["rds"], f64::INFINITY)?;
         let body = number(&["rb"], 0.0)?;
         let mobility = 1e-4 * number(&["uo", "u0"], 600.0)?;

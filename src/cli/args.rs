@@ -124,8 +124,12 @@ pub struct SimArgs {
     /// 1 GiB at most. Pictures show events, jumps and corners of sources whatever the print step.
     #[arg(short, long = "output", value_name = "OUT")]
     pub outputs: Vec<PathBuf>,
-    /// Show exactly these signals: v(a), v(a,b), i(d1), @d1[i], v1#branch (repeatable)
-    #[arg(long = "probe", value_name = "NAME")]
+    /// Signals to show.
+    #[arg(
+        long = "probe",
+        value_name = "NAME",
+        help = "Show exactly these signals: v(a), v(a,b), i(d1), @d1[i], v1#branch (repeatable)"
+    )]
     pub probes: Vec<String>,
     /// Add rows at event times: two with equal time at a jump, before and after
     ///

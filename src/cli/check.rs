@@ -56,7 +56,7 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Report, Failure> {
     diagnostics.extend(mna::topology::findings(&circuit));
     input::positions(&behaviour, &args.switches)?;
     let subject = Subject::Circuit(Box::new((circuit, behaviour)));
-    match input::start_system(&subject, &args.switches, streams) {
+    match input::start_system(&subject, &args.switches, Some(&sources), streams) {
         Ok((system, without)) => {
             let mut report = match &subject {
                 Subject::Circuit(parts) => {

@@ -16,9 +16,9 @@ use super::output;
 use super::sim::{self, Request};
 use super::stepped::Stepped;
 use super::streams::Streams;
-use crate::circuit::{Circuit, Tran};
+use crate::circuit::Tran;
 use crate::diagnostic::SourceMap;
-use crate::integrate::Method;
+use crate::integrate::{Method, Places};
 use crate::report::figure::Figure;
 use crate::report::{json, svg, text};
 use crate::waveform::compare::{At, Comparison, compare as compare_waveforms, difference};
@@ -175,8 +175,7 @@ impl Found {
         } else {
             from_file(&args.against)?
         };
-        let circuit = input::circuit_of(&args.input, subject).ok();
-        let ours = simulated(args, subject, circuit.zip(sources), tran, streams)?;
+        let ours = simulated(args, subject, subject.places(sources), tran, streams)?;
         let shift = args.shift.unwrap_or(theirs.shift);
         let comparison = compare_waveforms(&ours, &theirs.waveforms, At::ReferenceRows, shift)?;
         let within = comparison.signals.iter().all(|s| s.shifted <= args.tol);
@@ -322,7 +321,7 @@ fn from_file(path: &Path) -> Result<Theirs, Failure> {
 fn simulated(
     args: &CompareArgs,
     subject: &Subject,
-    place: Option<(&Circuit, &SourceMap)>,
+    places: Places<'_>,
     tran: Tran,
     streams: &Streams,
 ) -> Result<Waveforms, Failure> {
@@ -345,8 +344,8 @@ fn simulated(
         .ceil()
         .max(1.0);
     let run = sim::run(subject, &request, Some(tran.tstep / divisions), streams)
-        .map_err(|error| input::broke_off(&args.input, &error, place, streams))?;
-    for note in &run.notes {
+        .map_err(|error| input::broke_off(&args.input, &error, places, streams))?;
+    for note in places.all(&run.notes) {
         streams.say(format!("note: {note}"));
     }
     Ok(run.waveforms)

@@ -10,7 +10,7 @@ use super::output::Format;
 use super::streams::Streams;
 use crate::circuit::{Circuit, Probed, combinations, elaborate};
 use crate::diagnostic::SourceMap;
-use crate::integrate::{OperatingPoint, Values, operating_point};
+use crate::integrate::{OperatingPoint, Places, Values, operating_point};
 use crate::netlist::Netlist;
 use crate::report::steps;
 use crate::settings::Settings;
@@ -49,7 +49,12 @@ pub(super) fn sim(
         let point = point.map_err(|error| {
             let names = circuit.dc.iter().map(|s| s.what.name().to_string());
             let label = steps::label(&names.zip(values.iter().copied()).collect::<Vec<_>>());
-            let failure = input::broke_off(&args.input, &error, Some((&circuit, sources)), streams);
+            let failure = input::broke_off(
+                &args.input,
+                &error,
+                Places(Some((&circuit, sources))),
+                streams,
+            );
             Failure::Faults(format!("{failure} at {label}"))
         })?;
         Ok(values

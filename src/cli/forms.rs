@@ -80,12 +80,14 @@ pub(super) fn run(form: &NonlinearFile, args: &SimArgs) -> Result<Run, Failure> 
     };
     run.stats.steps = found.steps as u64;
     run.notes = vec![
-        "a form has no sources and no losses to balance: the energies are not computed".into(),
+        "a form has no sources and no losses to balance: the energies are not computed"
+            .to_string()
+            .into(),
     ];
     if let Some(error) = found.error {
-        run.notes.push(format!(
-            "the last halving of the step changed the states by {error:.1e} of their size"
-        ));
+        let text =
+            format!("the last halving of the step changed the states by {error:.1e} of their size");
+        run.notes.push(text.into());
     }
     Ok(run)
 }

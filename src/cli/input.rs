@@ -11,7 +11,7 @@ use super::streams::Streams;
 use crate::circuit::{self, Circuit, ElaborateOptions};
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 use crate::forms::json;
-use crate::integrate::{SimError, start};
+use crate::integrate::{Places, SimError, start};
 use crate::lcs::json::SystemFile;
 use crate::lcs::{Lcs, Position, reduce};
 use crate::mna::{self, Behaviour};
@@ -25,6 +25,16 @@ pub enum Subject {
     Circuit(Box<(Circuit, Behaviour)>),
     /// From a file of `circ lcs`.
     System(Box<SystemFile>),
+}
+
+impl Subject {
+    /// Where its elements stand in these files.
+    pub fn places<'a>(&'a self, sources: Option<&'a SourceMap>) -> Places<'a> {
+        Places(match self {
+            Self::Circuit(both) => sources.map(|sources| (&both.0, sources)),
+            Self::System(_) => None,
+        })
+    }
 }
 
 /// Reads a file whose first character is `{` as a system; `None` for everything else.
@@ -165,6 +175,7 @@ pub fn circuit_of<'s>(input: &Input, subject: &'s Subject) -> Result<&'s Circuit
 pub fn start_system(
     subject: &Subject,
     wanted: &[(String, bool)],
+    sources: Option<&SourceMap>,
     streams: &Streams,
 ) -> Result<(SystemFile, Option<SimError>), Failure> {
     let (circuit, behaviour) = match subject {
@@ -187,7 +198,7 @@ pub fn start_system(
             (initial.map_err(Box::new)?, Some(error))
         }
     };
-    for note in &initial.notes {
+    for note in subject.places(sources).all(&initial.notes) {
         streams.say(format!("note: {note}"));
     }
     let mut switches = initial.switches;
@@ -263,11 +274,11 @@ pub fn show(diagnostics: &[Diagnostic], sources: &SourceMap, streams: &Streams) 
 pub(super) fn broke_off(
     input: &Input,
     error: &SimError,
-    circuit: Option<(&Circuit, &SourceMap)>,
+    places: Places<'_>,
     streams: &Streams,
 ) -> Failure {
     let file = input.file.display();
-    let Some((circuit, sources)) = circuit else {
+    let Some((circuit, sources)) = places.0 else {
         return Failure::Message(format!("{file}: {error}"));
     };
     show(&[error.diagnostic(circuit)], sources, streams);

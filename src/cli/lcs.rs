@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::args::{LcsArgs, SystemFormat};
 use super::exit::{Exit, Failure};
 use super::files;
-use super::input::{self, Subject};
+use super::input;
 use super::streams::Streams;
 use crate::lcs::format::{Format, format};
 use crate::lcs::json;
@@ -17,12 +17,13 @@ use crate::lcs::json;
 pub(super) fn lcs(args: &LcsArgs, streams: &Streams) -> Result<Exit, Failure> {
     let outputs: Vec<&Path> = args.output.iter().map(PathBuf::as_path).collect();
     let (subject, sources) = input::open(&args.input, &[], &outputs, streams)?;
-    let system = input::start_system(&subject, &args.switches, streams);
-    let (system, without) = system.map_err(|failure| match (failure, &subject, sources) {
-        (Failure::Run(error), Subject::Circuit(parts), Some(sources)) => {
-            input::broke_off(&args.input, &error, Some((&parts.0, &sources)), streams)
+    let system = input::start_system(&subject, &args.switches, sources.as_ref(), streams);
+    let (system, without) = system.map_err(|failure| match failure {
+        Failure::Run(error) if sources.is_some() => {
+            let places = subject.places(sources.as_ref());
+            input::broke_off(&args.input, &error, places, streams)
         }
-        (failure, ..) => failure,
+        failure => failure,
     })?;
     if let Some(error) = without {
         streams.say(format!(

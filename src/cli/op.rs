@@ -9,7 +9,7 @@ use super::input;
 use super::stepped::Stepped;
 use super::streams::Streams;
 use crate::circuit::Circuit;
-use crate::integrate::{OperatingPoint, Values, operating_point};
+use crate::integrate::{OperatingPoint, Places, Values, operating_point};
 use crate::report::{json, si, steps, table};
 use crate::settings::Settings;
 
@@ -22,10 +22,11 @@ pub(super) fn op(args: &OpArgs, streams: &Streams) -> Result<Exit, Failure> {
     let circuit = input::circuit_of(&args.input, &subject)?;
     let sources = cards.as_ref().map(|(_, sources)| sources.clone());
     let solved = |circuit: &Circuit| {
-        operating_point(circuit, Values::Dc, false, &Settings::default()).map_err(|error| {
-            let place = sources.as_ref().map(|sources| (circuit, sources));
-            input::broke_off(&args.input, &error, place, streams)
-        })
+        let places = Places(sources.as_ref().map(|sources| (circuit, sources)));
+        let point = operating_point(circuit, Values::Dc, false, &Settings::default())
+            .map_err(|error| input::broke_off(&args.input, &error, places, streams))?;
+        let notes = places.all(&point.notes);
+        Ok::<_, Failure>((point, notes))
     };
     let (netlist, sources) = match cards {
         Some(cards) if !circuit.steps.is_empty() => cards,
@@ -42,29 +43,29 @@ pub(super) fn op(args: &OpArgs, streams: &Streams) -> Result<Exit, Failure> {
     for values in stepped.combinations() {
         let subject = stepped.subject(&values, streams)?;
         match solved(input::circuit_of(&args.input, &subject)?) {
-            Ok(point) => points.push((stepped.named(&values), point)),
+            Ok((point, notes)) => points.push((stepped.named(&values), point, notes)),
             Err(failure) => failures.push(format!("{failure} at {}", stepped.label(&values))),
         }
     }
     if args.json {
         // The point with the values as they stand, as of a netlist without `.step`.
-        let own = solved(circuit)?;
-        let steps = points.iter().map(|(values, point)| StepDocument {
+        let (own, notes) = solved(circuit)?;
+        let steps = points.iter().map(|(values, point, notes)| StepDocument {
             values: values
                 .iter()
                 .map(|(n, v)| (n.clone(), (*v).into()))
                 .collect(),
-            point: Document::of(point),
+            point: Document::of(point, notes),
         });
         let document = SteppedDocument {
-            point: Document::of(&own),
+            point: Document::of(&own, &notes),
             steps: steps.collect(),
         };
         streams.data(json::line(&document) + "\n")?;
     } else {
-        for (values, point) in &points {
+        for (values, point, notes) in &points {
             let label = steps::label(values);
-            for note in &point.notes {
+            for note in notes {
                 streams.say(format!("note: {label}: {note}"));
             }
             streams.data(format!("{label}\n{}\n", words(point)))?;
@@ -77,12 +78,16 @@ pub(super) fn op(args: &OpArgs, streams: &Streams) -> Result<Exit, Failure> {
     }
 }
 
-fn one(args: &OpArgs, point: &OperatingPoint, streams: &Streams) -> Result<Exit, Failure> {
+fn one(
+    args: &OpArgs,
+    (point, notes): &(OperatingPoint, Vec<String>),
+    streams: &Streams,
+) -> Result<Exit, Failure> {
     if args.json {
-        streams.data(json::line(&Document::of(point)) + "\n")?;
+        streams.data(json::line(&Document::of(point, notes)) + "\n")?;
         return Ok(Exit::Done);
     }
-    for note in &point.notes {
+    for note in notes {
         streams.say(format!("note: {note}"));
     }
     streams.data(words(point))?;
@@ -112,7 +117,7 @@ struct Document<'a> {
 }
 
 impl<'a> Document<'a> {
-    fn of(point: &'a OperatingPoint) -> Self {
+    fn of(point: &'a OperatingPoint, notes: &'a [String]) -> Self {
         let numbers = |values: &[(String, f64)]| {
             values
                 .iter()
@@ -127,7 +132,7 @@ impl<'a> Document<'a> {
                 .iter()
                 .map(|(n, on)| (n.clone(), position(*on).into()))
                 .collect(),
-            notes: &point.notes,
+            notes,
         }
     }
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::exit::Failure;
 use super::files::{self, Written};
 use super::rows::{Columns, Form, Shown, Stream};
-use crate::integrate::{Block, Run};
+use crate::integrate::{Block, Places, Run};
 use crate::report::figure::Figure;
 use crate::report::{PictureError, html, png, svg};
 use crate::waveform::{csv, json, npz, raw};
@@ -150,7 +150,7 @@ impl Outputs {
     /// The first failure.
     pub(super) fn finish(
         self,
-        run: &Run,
+        (run, places): (&Run, Places<'_>),
         figure: &dyn Fn() -> Figure,
         incomplete: Option<&str>,
     ) -> Result<(), Failure> {
@@ -163,7 +163,7 @@ impl Outputs {
             first = first.and(failure.map_or(finished, Err));
         }
         for (file, format) in self.held {
-            let written = match write(run, figure, self.shown, format, file, incomplete) {
+            let written = match write((run, places), figure, self.shown, format, file, incomplete) {
                 // A picture of a run that broke off before its first row.
                 Err(Failure::Picture(_)) if incomplete.is_some() => Ok(()),
                 written => written,
@@ -176,7 +176,7 @@ impl Outputs {
 
 /// Writes a run to a file; pictures show `figure`.
 fn write(
-    run: &Run,
+    (run, places): (&Run, Places<'_>),
     figure: &dyn Fn() -> Figure,
     shown: Shown,
     format: Format,
@@ -197,7 +197,7 @@ fn write(
     };
     let result = match format {
         Format::Html => {
-            let page = html::page(run, &drawing())?;
+            let page = html::page(run, places, &drawing())?;
             file.append(page.as_bytes())
         }
         Format::Svg => file.append(svg::draw(&drawing())?.as_bytes()),

@@ -18,10 +18,9 @@ use super::steps::Stepping;
 use super::streams::Streams;
 use crate::circuit::source::Wave;
 use crate::circuit::{Circuit, Tran};
-use crate::diagnostic::SourceMap;
 use crate::integrate::{
-    Block, Method, Reason, Run, SimError, SimOptions, Sink, Verified, VerifyOptions, aliased,
-    simulate, simulate_system, verify, verify_system,
+    Block, Method, Note, Places, Reason, Run, SimError, SimOptions, Sink, Verified, VerifyOptions,
+    aliased, simulate, simulate_system, verify, verify_system,
 };
 use crate::lcs::Input;
 use crate::report::figure::Figure;
@@ -48,7 +47,7 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         only_one_way(args)?;
         files::spare(&paths, [args.input.file.as_path()])?;
         let run = forms::run(&form, args)?;
-        let destination = Destination::of(args, &formats, None, None, streams);
+        let destination = Destination::of(args, &formats, None, Places::default(), streams);
         let outputs = destination.open(&Columns::of(&run.waveforms))?;
         let finished = (Some((run, Measurements::default())), None);
         return destination.finish(outputs, finished, true, None);
@@ -81,11 +80,8 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
             return stepping.sim(&formats, streams);
         }
     }
-    let place = match &subject {
-        Subject::Circuit(both) => sources.as_ref().map(|sources| (&both.0, sources)),
-        Subject::System(_) => None,
-    };
-    let destination = Destination::of(args, &formats, tran(&subject), place, streams);
+    let places = subject.places(sources.as_ref());
+    let destination = Destination::of(args, &formats, tran(&subject), places, streams);
     let mut outputs = destination.open(&Columns::of_subject(&subject))?;
     let measures = matches!(&subject, Subject::Circuit(both) if measured::asked(&both.0));
     let collects = outputs.hold() || destination.plots || measures || args.verify;
@@ -106,7 +102,10 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         match second(&subject, run, &options) {
             Ok(verified) => run.verified = Some(verified),
             // The rows are whole.
-            Err(error) => run.notes.push(format!("not verified: {error}")),
+            Err(error) => {
+                let text = format!("not verified: {error}");
+                run.notes.push(Note::of(error.elements, text));
+            }
         }
     }
     destination.finish(outputs, finished, measures, signals.received())
@@ -128,8 +127,8 @@ pub(super) struct Destination<'a> {
     args: &'a SimArgs,
     formats: &'a [Format],
     tran: Option<Tran>,
-    /// The circuit and the files it was read from.
-    place: Option<(&'a Circuit, &'a SourceMap)>,
+    /// Where elements stand.
+    pub(super) places: Places<'a>,
     /// A plot on a terminal.
     pub(super) plots: bool,
     pub(super) streams: &'a Streams,
@@ -141,14 +140,14 @@ impl<'a> Destination<'a> {
         args: &'a SimArgs,
         formats: &'a [Format],
         tran: Option<Tran>,
-        place: Option<(&'a Circuit, &'a SourceMap)>,
+        places: Places<'a>,
         streams: &'a Streams,
     ) -> Self {
         Self {
             args,
             formats,
             tran,
-            place,
+            places,
             plots: args.outputs.is_empty() && streams.out_is_terminal(),
             streams,
         }
@@ -200,8 +199,8 @@ impl<'a> Destination<'a> {
         let incomplete = error.as_ref().map(|_| format!("incomplete: ends {until}"));
         let files = outputs.words();
         let figure = || Figure::of_waveforms(&run.waveforms);
-        let written = outputs.finish(&run, &figure, incomplete.as_deref());
-        summarise(&run, &found, self.args, self.streams);
+        let written = outputs.finish((&run, self.places), &figure, incomplete.as_deref());
+        summarise((&run, self.places), &found, self.args, self.streams);
         if self.plots {
             let (lines, columns) = self.streams.size();
             let plot = terminal::plot(&run.waveforms, columns, lines);
@@ -269,7 +268,7 @@ impl<'a> Destination<'a> {
     }
 
     fn failure(&self, error: &SimError) -> Failure {
-        input::broke_off(&self.args.input, error, self.place, self.streams)
+        input::broke_off(&self.args.input, error, self.places, self.streams)
     }
 }
 
@@ -502,22 +501,27 @@ pub fn tran(subject: &Subject) -> Option<Tran> {
 
 /// On standard error: JSON where asked for; words where asked for, for a person, and with `-v`; else the notes alone.
 /// What was measured is in all of them.
-fn summarise(run: &Run, found: &Measurements, args: &SimArgs, streams: &Streams) {
+fn summarise(
+    (run, places): (&Run, Places<'_>),
+    found: &Measurements,
+    args: &SimArgs,
+    streams: &Streams,
+) {
     let in_words = args.summary == Some(Summary::Text)
         || args.summary.is_none() && (streams.verbose || streams.err_is_terminal());
     if !in_words {
-        for warning in text::warnings(run) {
+        for warning in text::warnings(run, places) {
             streams.say(format!("warning: {warning}"));
         }
     }
     match args.summary {
-        Some(Summary::Json) => return streams.error(json::summary(run, found)),
-        Some(Summary::Text) => streams.error(text::summary(run, streams.verbose)),
+        Some(Summary::Json) => return streams.error(json::summary(run, found, places)),
+        Some(Summary::Text) => streams.error(text::summary(run, places, streams.verbose)),
         None if streams.verbose || streams.err_is_terminal() => {
-            streams.say(text::summary(run, streams.verbose));
+            streams.say(text::summary(run, places, streams.verbose));
         }
         None => {
-            for note in &run.notes {
+            for note in places.all(&run.notes) {
                 streams.say(format!("note: {note}"));
             }
         }

@@ -12,7 +12,7 @@ use super::sim::{self, Destination, Request, Route};
 use super::stepped::Stepped;
 use super::streams::Streams;
 use crate::circuit::Circuit;
-use crate::integrate::{Grid, Reason, SimError};
+use crate::integrate::{Grid, Places, Reason, SimError};
 use crate::report::figure::Figure;
 use crate::report::steps::{self, Step};
 use crate::report::{terminal, text};
@@ -51,7 +51,8 @@ impl Stepping<'_> {
                 .check(columns.names.len(), Some(most))
                 .map_err(refused)?;
         }
-        let destination = Destination::of(self.args, formats, self.circuit.tran, None, streams);
+        let places = Places(Some((self.circuit, &self.stepped.sources)));
+        let destination = Destination::of(self.args, formats, self.circuit.tran, places, streams);
         let outputs = destination.open(&columns)?;
         let bar = streams.progress(combinations.len() as u64, "stepping");
         let outcomes: Vec<Result<Outcome, Failure>> = combinations
@@ -74,8 +75,8 @@ impl Stepping<'_> {
                 interrupted = true;
                 continue;
             }
-            let place = Some((&circuit, &self.stepped.sources));
-            let failure = input::broke_off(&self.args.input, &error, place, streams);
+            let places = Places(Some((&circuit, &self.stepped.sources)));
+            let failure = input::broke_off(&self.args.input, &error, places, streams);
             failures.push(format!("{failure} at {}", self.stepped.label(values)));
         }
         if !done.is_empty() {
@@ -158,14 +159,18 @@ impl Stepping<'_> {
         };
         // A failure is told by `finish`.
         let _ = outputs.take(rows::block(&total.waveforms, &total.kinds));
-        let written = outputs.finish(&total, &figure, incomplete);
+        let written = outputs.finish((&total, destination.places), &figure, incomplete);
         let wordy = streams.verbose || streams.err_is_terminal();
         match self.args.summary {
-            Some(Summary::Json) => streams.error(steps::summary(done)),
-            Some(Summary::Text) => streams.error(text::summary(&total, streams.verbose)),
-            None if wordy => streams.say(text::summary(&total, streams.verbose)),
+            Some(Summary::Json) => streams.error(steps::summary(done, destination.places)),
+            Some(Summary::Text) => {
+                streams.error(text::summary(&total, destination.places, streams.verbose))
+            }
+            None if wordy => {
+                streams.say(text::summary(&total, destination.places, streams.verbose))
+            }
             None => {
-                for note in &total.notes {
+                for note in destination.places.all(&total.notes) {
                     streams.say(format!("note: {note}"));
                 }
             }

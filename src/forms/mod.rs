@@ -16,7 +16,7 @@
 //! | [`expression`] | functions of state and time in such files | |
 //!
 //! A conversion returns the new form, or [`FormError::Hypothesis`] with the condition that fails and its size. Every form
-//! is a [`Complementarity`] problem and is integrated by the one implicit step of [`step`].
+//! is a [`Complementarity`] problem and is integrated by the one implicit step of [`mod@step`].
 
 pub mod cone;
 pub mod expression;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::circuit::Tran;
 use crate::circuit::source::Wave;
+use crate::integrate::event::{Change, Event};
 use crate::integrate::stats::Run;
 
 /// Something that repeats faster than the output times can show.
@@ -65,14 +66,22 @@ pub fn aliased<'a>(
 
 /// Names of events that repeat, and their periods, s.
 fn periods(run: &Run) -> Vec<(String, f64)> {
-    let mut times: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
-    for (t, what) in &run.events {
-        times.entry(what).or_default().push(*t);
+    let mut times: BTreeMap<String, (&Event, Vec<f64>)> = BTreeMap::new();
+    for event in &run.events {
+        let (_, times) = times
+            .entry(event.to_string())
+            .or_insert((event, Vec::new()));
+        times.push(event.t);
     }
-    let period = |(name, times): (&str, Vec<f64>)| {
-        // A switch turns on once a period; a device that changes sides does so twice.
-        let plain = name.replace(" on", "").replace(" off", "");
-        let events = if plain == name { 2 } else { 1 };
+    let period = |(event, times): (&Event, Vec<f64>)| {
+        let names: Vec<&str> = event.changes.iter().map(Change::name).collect();
+        let plain = if names.is_empty() {
+            event.to_string()
+        } else {
+            names.join(", ")
+        };
+        // What is on, or conducts, is so once a period; of jumps there may be one each way.
+        let events = if event.changes.is_empty() { 2 } else { 1 };
         let pairs = times.iter().zip(times.iter().skip(events));
         let mut periods: Vec<f64> = pairs.map(|(from, to)| to - from).collect();
         if periods.len() < events * REPEATED {
@@ -82,5 +91,5 @@ fn periods(run: &Run) -> Vec<(String, f64)> {
         let median = periods[periods.len() / 2];
         (median > 0.0).then_some((plain, median))
     };
-    times.into_iter().filter_map(period).collect()
+    times.into_values().filter_map(period).collect()
 }

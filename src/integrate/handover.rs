@@ -6,13 +6,16 @@
 #[cfg(test)]
 mod tests;
 
+use crate::circuit::Source;
+use crate::integrate::Note;
+use crate::integrate::energy::Balance;
 use crate::integrate::exact::{Exact, Place};
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper, Times, is_final, named};
-use crate::integrate::stats::{StatedError, Stats};
+use crate::integrate::stats::{Energy, StatedError, Stats};
 use crate::integrate::theta::Theta;
 
 /// Makes a stepper that starts at a place.
-pub(crate) type Takeover<'a> = Box<dyn Fn(&Place) -> Result<Theta<'a>, SimError> + 'a>;
+pub(crate) type Takeover = Box<dyn Fn(&Place) -> Result<Theta, SimError> + Send>;
 
 /// Kinds of interruptions told one by one; of the others only the number is.
 const MOST_NOTES: usize = 8;
@@ -30,18 +33,18 @@ struct Interruption {
 }
 
 /// Steps in place of the exact integration.
-struct Stepping<'a> {
-    theta: Theta<'a>,
+struct Stepping {
+    theta: Theta,
     since: f64,
     /// When the exact integration is tried again, s.
     until: f64,
 }
 
 /// See the [module](self).
-pub(crate) struct Handover<'a> {
-    exact: Exact<'a>,
-    takeover: Takeover<'a>,
-    stepping: Option<Stepping<'a>>,
+pub(crate) struct Handover {
+    exact: Exact,
+    takeover: Takeover,
+    stepping: Option<Stepping>,
     /// The steps, s.
     step: f64,
     /// Shortest interval of steps, s.
@@ -51,14 +54,14 @@ pub(crate) struct Handover<'a> {
     resumed: f64,
     interruptions: Vec<Interruption>,
     stats: Stats,
-    notes: Vec<String>,
+    notes: Vec<Note>,
     /// The estimated error of all steps, relative to amplitudes: the exact integration adds none.
     error: StatedError,
 }
 
-impl<'a> Handover<'a> {
+impl Handover {
     /// Exact integration that leaves what it cannot do to steps of `step` seconds, for `shortest` seconds at least.
-    pub(crate) fn new(exact: Exact<'a>, takeover: Takeover<'a>, step: f64, shortest: f64) -> Self {
+    pub(crate) fn new(exact: Exact, takeover: Takeover, step: f64, shortest: f64) -> Self {
         Self {
             exact,
             takeover,
@@ -158,13 +161,8 @@ impl<'a> Handover<'a> {
                 *sum.get_or_insert(0.0) += part;
             }
         }
-        self.stats.steps += stats.steps;
-        self.stats.rejected += stats.rejected;
-        self.stats.events += stats.events;
-        self.stats.jumps += stats.jumps;
-        self.stats.lcp_solves += stats.lcp_solves;
-        self.stats.pivotings += stats.pivotings;
-        self.stats.factorisations += stats.factorisations;
+        // Modes are those of the exact integration.
+        self.stats.add(&Stats { modes: 0, ..stats });
         for note in notes {
             if !self.notes.contains(&note) {
                 self.notes.push(note);
@@ -178,7 +176,7 @@ impl<'a> Handover<'a> {
         }
     }
 
-    fn interruption_notes(&self) -> Vec<String> {
+    fn interruption_notes(&self) -> Vec<Note> {
         let told = self.interruptions.iter().take(MOST_NOTES).map(|i| {
             let device = named(&i.elements);
             let (from, to) = i.first;
@@ -187,27 +185,110 @@ impl<'a> Handover<'a> {
             } else {
                 String::new()
             };
-            format!(
+            let text = format!(
                 "between t = {from:e} s and t = {to:e} s Moreau's steps of {:e} s took the place of exact integration{again}: {device}{}",
                 self.step, i.reason
-            )
+            );
+            Note::of(&i.elements, text)
         });
-        let mut notes: Vec<String> = told.collect();
+        let mut notes: Vec<Note> = told.collect();
         if let Some(rest) = self
             .interruptions
             .get(MOST_NOTES..)
             .filter(|r| !r.is_empty())
         {
             let times: u32 = rest.iter().map(|i| i.count).sum();
-            notes.push(format!(
+            let text = format!(
                 "Moreau's steps took the place of exact integration {times} times for other reasons"
-            ));
+            );
+            notes.push(text.into());
         }
         notes
     }
 }
 
-impl Stepper for Handover<'_> {
+impl Handover {
+    /// Where the run stands.
+    pub(crate) fn place(&mut self) -> Place {
+        match &self.stepping {
+            Some(stepping) => stepping.theta.place(),
+            None => self.exact.stand(),
+        }
+    }
+
+    /// Which ideal pairs conducted when exact integration last held.
+    pub(crate) fn conducting(&self) -> &[bool] {
+        self.exact.conducting()
+    }
+
+    /// Energy so far.
+    pub(crate) fn balance(&mut self) -> Balance {
+        let steps = self.stepping.as_mut().map(|s| s.theta.balance().energy());
+        let balance = self.exact.balance();
+        let mut sum = *balance;
+        if let Some(steps) = steps {
+            sum.add_part(&steps);
+        }
+        sum
+    }
+
+    /// Has another balance from here on.
+    pub(crate) fn set_balance(&mut self, balance: Balance) {
+        if let Some(stepping) = &mut self.stepping {
+            stepping.theta.empty_account();
+        }
+        *self.exact.balance() = balance;
+    }
+
+    /// Goes to a place where these pairs conduct and the sources are these; `false` where exact integration cannot go on there.
+    pub(crate) fn restore(
+        &mut self,
+        place: &Place,
+        conducting: &[bool],
+        sources: impl Iterator<Item = Source>,
+    ) -> bool {
+        if let Some(stepping) = self.stepping.take() {
+            let (since, outcome) = (stepping.since, { stepping }.theta.finish());
+            self.account(since, since, outcome);
+        }
+        self.exact.leave();
+        for (input, source) in sources.enumerate() {
+            self.exact.replace_source(input, source);
+        }
+        self.exact.expect(conducting);
+        self.exact.forget_events();
+        self.exact.resume(place, &Energy::default()).is_ok()
+    }
+
+    /// A source has another waveform from here on, which the takeover knows already: an edge now.
+    ///
+    /// # Errors
+    /// As [`Stepper::advance`].
+    pub(crate) fn set_source(
+        &mut self,
+        input: usize,
+        source: Source,
+        log: &mut Log,
+    ) -> Result<(), SimError> {
+        if let Some(stepping) = &mut self.stepping {
+            self.exact.replace_source(input, source);
+            let place = stepping.theta.place();
+            let mut theta = (self.takeover)(&place)?;
+            theta.estimate_errors();
+            let (since, outcome) = (stepping.since, stepping.theta.finish());
+            self.exact.stand_at(&place, &outcome.energy);
+            (stepping.theta, stepping.since) = (theta, place.t);
+            self.account(since, place.t, outcome);
+            return Ok(());
+        }
+        match self.exact.set_source(input, source, log) {
+            Ok(()) => Ok(()),
+            Err(error) => self.give_way(error),
+        }
+    }
+}
+
+impl Stepper for Handover {
     fn time(&self) -> f64 {
         match &self.stepping {
             Some(stepping) => stepping.theta.time(),
@@ -226,7 +307,7 @@ impl Stepper for Handover<'_> {
             };
             let until = stepping.until;
             stepping.theta.advance(until.min(t), log)?;
-            if until > t {
+            if until > t || log.pauses() {
                 return Ok(());
             }
             self.take_back();
@@ -255,24 +336,7 @@ impl Stepper for Handover<'_> {
             self.account(stepping.since, place.t, outcome);
         }
         let mut outcome = self.exact.finish();
-        let Stats {
-            steps,
-            rejected,
-            events,
-            jumps,
-            lcp_solves,
-            pivotings,
-            factorisations,
-            ..
-        } = self.stats;
-        let stats = &mut outcome.stats;
-        stats.steps += steps;
-        stats.rejected += rejected;
-        stats.events += events;
-        stats.jumps += jumps;
-        stats.lcp_solves += lcp_solves;
-        stats.pivotings += pivotings;
-        stats.factorisations += factorisations;
+        outcome.stats.add(&self.stats);
         outcome.error = self.error;
         outcome.notes.extend(self.interruption_notes());
         outcome.notes.append(&mut self.notes);

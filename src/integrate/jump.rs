@@ -31,6 +31,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnostic::Internal;
+use crate::integrate::Note;
 use crate::lcs::{Lcs, Role};
 use crate::solve::lcp::Scaling;
 use crate::solve::{Driver, Status};
@@ -61,14 +62,14 @@ pub struct Jump {
     pub x: DVector<f64>,
     /// m: impulses of λ, in units of λ times s.
     pub p: DVector<f64>,
-    /// Ports that compete for the jump, see [`JumpProblem::rivals`]; empty where the jump is the limit of all resistances.
+    /// Ports that compete for the jump, see `JumpProblem::rivals`; empty where the jump is the limit of all resistances.
     pub rivals: Vec<usize>,
 }
 
 impl Jump {
     /// What a user should know of a jump at t between [`rivals`](Self::rivals).
     #[must_use]
-    pub fn note(&self, lcs: &Lcs, t: f64) -> Option<String> {
+    pub fn note(&self, lcs: &Lcs, t: f64) -> Option<Note> {
         let mut names: Vec<&str> = Vec::new();
         for &port in &self.rivals {
             let name = lcs.ports[port].device.as_str();
@@ -77,11 +78,12 @@ impl Jump {
             }
         }
         (!names.is_empty()).then(|| {
-            format!(
+            let text = format!(
                 "at t = {t:e} s {} compete for an impulse: how they share it depends on the ratios of the resistances that the ideal \
                  model leaves out; the state that least energy separates from the one before is shown",
                 names.join(", ")
-            )
+            );
+            Note::of(names, text)
         })
     }
 }

@@ -36,7 +36,7 @@ impl SimError {
 }
 
 /// The element of this name, or the one it is a part of: `d3` for the piece `d3.1` of its law.
-fn whole<'a>(circuit: &'a Circuit, name: &str) -> Option<&'a Element> {
+pub(super) fn whole<'a>(circuit: &'a Circuit, name: &str) -> Option<&'a Element> {
     let mut name = name;
     loop {
         if let Some(id) = circuit.element(name) {

@@ -3,22 +3,26 @@
 pub mod aliasing;
 pub mod control;
 pub mod energy;
+pub mod event;
 pub mod exact;
 #[cfg(test)]
 #[path = "../../tests/systems/mod.rs"]
 pub(crate) mod fixtures;
 mod handover;
+mod impulses;
 pub mod inputs;
 pub mod jump;
 mod lawful;
 pub mod line;
 mod located;
+mod note;
 pub mod reading;
 mod roles;
 pub mod rows;
 pub mod run;
 mod settle;
 pub mod simulate;
+pub mod simulation;
 pub mod start;
 pub mod stats;
 pub mod step;
@@ -28,9 +32,12 @@ pub mod theta;
 pub mod verify;
 
 pub use aliasing::{Aliased, aliased};
+pub use event::{Change, Event};
+pub use note::{Note, Places};
 pub use rows::{Asked, Block, RowKind, Sink};
 pub use run::{Frame, Grid, Log, NoRest, Outcome, Reason, SimError, Stepper};
 pub use simulate::{Method, SimOptions, simulate, simulate_system};
+pub use simulation::{Checkpoint, Simulation, SimulationOptions, Stop, StopReason};
 pub use start::{OperatingPoint, Values, operating_point};
 pub use stats::{Energy, Impulse, JumpReason, Run, StateJump, StateJumps, StatedError, Stats};
 pub use verify::{Verified, VerifyOptions, verify, verify_system};

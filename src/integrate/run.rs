@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use crate::circuit::Tran;
 use crate::diagnostic::Internal;
+use crate::integrate::event::{Change, Event};
 use crate::integrate::rows::{Asked, RowKind, Sheet};
-use crate::integrate::{Energy, Impulse, Run, StateJump, StateJumps, StatedError, Stats};
+use crate::integrate::{Energy, Impulse, Note, Run, StateJump, StateJumps, StatedError, Stats};
 use crate::lcs::ReduceError;
 use crate::waveform::Waveforms;
 
@@ -254,19 +255,21 @@ pub struct Outcome {
     /// See [`Run::error`].
     pub error: StatedError,
     /// Things the user should know.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
 }
 
 /// Collects what happens between output times.
 #[derive(Default)]
 pub struct Log<'a> {
-    /// Event times, s, with what changed; the first [`Self::LISTED`].
-    pub events: Vec<(f64, Arc<str>)>,
+    /// The first [`Self::LISTED`].
+    pub events: Vec<Event>,
     /// Impulses at jumps; the first [`Self::LISTED`].
     pub impulses: Vec<Impulse>,
     /// Jumps of the state.
     pub state_jumps: StateJumps,
     rows: Sheet<'a>,
+    /// The number of events above which steppers pause.
+    pause: Option<usize>,
 }
 
 impl<'a> Log<'a> {
@@ -292,10 +295,10 @@ impl<'a> Log<'a> {
         }
     }
 
-    /// An event: a device or switch changed its state at `t`.
-    pub fn event(&mut self, t: f64, what: impl Into<Arc<str>>) {
+    /// A device or switch changed its state at `t`, or the state jumped.
+    pub fn event(&mut self, t: f64, changes: Arc<[Change]>, jump: bool) {
         if self.events.len() < Self::LISTED {
-            self.events.push((t, what.into()));
+            self.events.push(Event { t, changes, jump });
         }
     }
 
@@ -335,6 +338,16 @@ impl<'a> Log<'a> {
     #[inline]
     pub fn go_on(&self, t: f64) -> Result<(), SimError> {
         self.rows.go_on(t)
+    }
+
+    /// Has steppers pause at the next event, or no longer do so.
+    pub(crate) fn pause_at_event(&mut self, pause: bool) {
+        self.pause = pause.then_some(self.events.len());
+    }
+
+    /// Whether a stepper that has just logged what happened is to return before the time it was to reach.
+    pub(crate) fn pauses(&self) -> bool {
+        self.pause.is_some_and(|known| self.events.len() > known)
     }
 
     /// Takes back what was logged since there were `events` events and `impulses` impulses.
@@ -496,7 +509,7 @@ pub struct Frame<'a> {
     /// What the plan decided.
     pub plan: Vec<String>,
     /// Notes from before the run.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
     /// Called with the time reached, s, after an output row or several.
     pub progress: Option<&'a mut dyn FnMut(f64)>,
 }
@@ -561,7 +574,7 @@ pub(crate) fn attempt(
     let mut all_notes = notes;
     all_notes.append(&mut outcome.notes);
     if log.events.len() == Log::LISTED {
-        all_notes.push(format!("the first {} events are listed", Log::LISTED));
+        all_notes.push(format!("the first {} events are listed", Log::LISTED).into());
     }
     let failure = match failure {
         Some(error) if !last && !is_final(&error) => return Err(error),
@@ -582,6 +595,7 @@ pub(crate) fn attempt(
         plan,
         stats: outcome.stats,
         energy: outcome.energy,
+        balanced: true,
         error: outcome.error,
         impulses: std::mem::take(&mut log.impulses),
         events: std::mem::take(&mut log.events),
@@ -640,7 +654,7 @@ mod tests {
                 return Err(SimError::at(2.5, Reason::Infeasible).device("d1"));
             }
             if self.0 < 1.0 && t >= 1.0 {
-                log.event(1.0, "d1");
+                log.event(1.0, Arc::default(), true);
                 log.row(1.0, &[-1.0]);
                 log.row(1.0, &[1.0]);
             }

@@ -1,14 +1,14 @@
 //! From a circuit, or a system, to a run.
 
-use std::cell::{Cell, RefCell};
+use std::cell::Cell;
 use std::rc::Rc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use cpu_time::ThreadTime;
 use nalgebra::DVector;
 
-use crate::circuit::{self, Circuit, ElementId, Tran};
-use crate::integrate::Run;
+use crate::circuit::{self, Circuit, ElementId, Source, Tran};
 use crate::integrate::control::Amplitudes;
 use crate::integrate::exact::{self, Exact, Place};
 use crate::integrate::handover::Handover;
@@ -19,9 +19,10 @@ use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, Stepper, attempt
 use crate::integrate::step::Scheme;
 use crate::integrate::switching::{Threshold, at_start};
 use crate::integrate::theta::{Setup, Start, Stepping, Theta};
+use crate::integrate::{Note, Run};
 use crate::integrate::{reading, roles, start};
-use crate::lcs::{Hold, Input, Lcs, Position, StorageHold, reduce};
-use crate::mna::Behaviour;
+use crate::lcs::{Input, Lcs, Position, reduce};
+use crate::mna::{Behaviour, SwitchPort};
 use crate::plan::{Plan, not_exact, plan};
 use crate::settings::Settings;
 
@@ -95,25 +96,7 @@ pub fn simulate(
             "the netlist asks for no .tran analysis".into(),
         ))
     })?;
-    let standard = behaviour.standard();
-    let initial = start::initial(circuit, &standard, tran.uic, &options.settings)?;
-    let mut notes: Vec<String> = behaviour.notes.iter().map(|n| n.message.clone()).collect();
-    notes.extend(initial.notes);
-    let problem = Problem {
-        lines: lines(circuit, &initial.waves),
-        position: initial.switches,
-        conducting: initial.conducting,
-        settle: standard
-            .switches
-            .iter()
-            .map(|s| tran.uic && s.initial.is_none())
-            .collect(),
-        start: initial.storage,
-        notes,
-        known: RefCell::default(),
-        original: behaviour,
-        behaviour: standard,
-    };
+    let problem = Problem::of_circuit(circuit, behaviour, tran.uic, &options.settings)?;
     drive(problem, tran, options)
 }
 
@@ -127,22 +110,18 @@ pub fn simulate_system(
     tran: Tran,
     options: SimOptions<'_>,
 ) -> Result<Run, SimError> {
-    let original = Behaviour::from_lcs(lcs);
-    let behaviour = original.standard();
-    let mut start = DVector::zeros(behaviour.storage.len());
-    start.rows_mut(0, x.len()).copy_from(x);
-    let problem = Problem {
-        lines: vec![],
-        position: vec![],
-        conducting: vec![],
-        settle: vec![],
-        start,
-        notes: vec![],
-        known: RefCell::default(),
-        original: &original,
-        behaviour,
-    };
-    drive(problem, tran, options)
+    match drive(Problem::of_system(lcs, x), tran, options) {
+        Ok(run) => Ok(Run {
+            balanced: false,
+            ..run
+        }),
+        Err(mut error) => {
+            if let Some(partial) = &mut error.partial {
+                partial.balanced = false;
+            }
+            Err(error)
+        }
+    }
 }
 
 /// The transmission lines of a circuit; `waves` are what arrives at first, line by line.
@@ -158,24 +137,93 @@ fn lines(circuit: &Circuit, waves: &[[f64; 2]]) -> Vec<Line> {
     circuit.lines.iter().zip(waves).map(line).collect()
 }
 
-/// What the steppers share.
-struct Problem<'a> {
-    /// As given.
-    original: &'a Behaviour,
+/// The systems of a circuit by switch position, all devices free, each reduced once.
+#[derive(Debug, Clone)]
+pub(super) struct Systems {
     /// All laws as ideal pairs.
-    behaviour: Behaviour,
+    pub(super) behaviour: Arc<Behaviour>,
+    known: Arc<Mutex<Known>>,
+}
+
+#[derive(Debug, Default)]
+struct Known {
+    systems: Vec<(Vec<bool>, Lcs)>,
+    /// Waveforms that were given to inputs in place of their own.
+    replaced: Vec<(usize, Source)>,
+}
+
+impl Known {
+    /// With the sources as they are now.
+    fn adapted(&self, lcs: &Lcs) -> Lcs {
+        let mut lcs = lcs.clone();
+        for (input, source) in &self.replaced {
+            lcs.inputs[*input].source = source.clone();
+        }
+        lcs
+    }
+}
+
+impl Systems {
+    fn of(behaviour: Behaviour) -> Self {
+        Self {
+            behaviour: Arc::new(behaviour),
+            known: Arc::default(),
+        }
+    }
+
+    /// The system of a position.
+    pub(super) fn free(&self, switches: &[bool]) -> Result<Lcs, SimError> {
+        let mut known = self.known();
+        let found = known.systems.iter().find(|(p, _)| p == switches);
+        if let Some((_, lcs)) = found {
+            return Ok(known.adapted(lcs));
+        }
+        let position = Position::free(&self.behaviour, switches.to_vec());
+        let lcs = reduce(&self.behaviour, &position).map_err(|e| SimError::before(e.into()))?;
+        let adapted = known.adapted(&lcs);
+        known.systems.push((switches.to_vec(), lcs));
+        Ok(adapted)
+    }
+
+    /// An input has another waveform in every system asked for from now on.
+    pub(super) fn replace_source(&self, input: usize, source: Source) {
+        let mut known = self.known();
+        known.replaced.retain(|(other, _)| *other != input);
+        known.replaced.push((input, source));
+    }
+
+    /// Just these inputs have other waveforms than their own in every system asked for from now on.
+    pub(super) fn replace_sources(&self, sources: Vec<(usize, Source)>) {
+        self.known().replaced = sources;
+    }
+
+    /// The inputs with other waveforms than their own.
+    pub(super) fn replaced(&self) -> Vec<(usize, Source)> {
+        self.known().replaced.clone()
+    }
+
+    fn known(&self) -> MutexGuard<'_, Known> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// What the steppers share.
+#[derive(Debug, Clone)]
+pub(super) struct Problem {
+    pub(super) systems: Systems,
+    /// Where function blocks jump.
+    steps: Vec<exact::Step>,
     /// Transmission lines.
     lines: Vec<Line>,
-    position: Vec<bool>,
+    /// Where it starts.
+    pub(super) start: Place,
     /// See [`start::Initial::conducting`]; empty where not known.
-    conducting: Vec<bool>,
+    pub(super) conducting: Vec<bool>,
     /// Switches whose start position follows from the start state.
     settle: Vec<bool>,
-    /// Storage vector s⁻ before the start.
-    start: DVector<f64>,
-    notes: Vec<String>,
-    /// See [`Problem::free`].
-    known: RefCell<Vec<(Vec<bool>, Lcs)>>,
+    pub(super) notes: Vec<Note>,
+    /// Whether sources may be given other values on the way.
+    free_sources: bool,
 }
 
 /// Steps of the run that finds the amplitudes beforehand.
@@ -183,67 +231,127 @@ const SCOUT_STEPS: f64 = 256.0;
 /// The scout gives up after this many steps (trains of many pulses); what it has seen by then is used.
 const SCOUT_LIMIT: u64 = 20_000;
 
-impl Problem<'_> {
-    fn reduce(&self, devices: &[Hold], switches: &[bool]) -> Result<Lcs, SimError> {
-        let position = Position {
-            devices: devices.to_vec(),
-            switches: switches.to_vec(),
-            storage: StorageHold::Dynamic,
-        };
-        reduce(&self.behaviour, &position).map_err(|error| SimError::before(error.into()))
+impl Problem {
+    /// The transient of a circuit, from its initial conditions if `uic`, else from its operating point.
+    pub(super) fn of_circuit(
+        circuit: &Circuit,
+        behaviour: &Behaviour,
+        uic: bool,
+        settings: &Settings,
+    ) -> Result<Self, SimError> {
+        let standard = behaviour.standard();
+        let initial = start::initial(circuit, &standard, uic, settings)?;
+        let of_circuit = behaviour.notes.iter().map(|note| note.message.clone());
+        let mut notes: Vec<Note> = of_circuit.map(Note::from).collect();
+        notes.extend(initial.notes);
+        let switches = standard.switches.iter();
+        Ok(Self {
+            lines: lines(circuit, &initial.waves),
+            start: Place {
+                t: 0.0,
+                storage: initial.storage,
+                switches: initial.switches,
+            },
+            conducting: initial.conducting,
+            settle: switches.map(|s| uic && s.initial.is_none()).collect(),
+            notes,
+            steps: exact::steps_of(behaviour),
+            systems: Systems::of(standard),
+            free_sources: false,
+        })
     }
 
-    /// The system of a position with all devices free.
-    fn free(&self, switches: &[bool]) -> Result<Lcs, SimError> {
-        let mut known = self.known.borrow_mut();
-        if let Some((_, lcs)) = known.iter().find(|(position, _)| position == switches) {
-            return Ok(lcs.clone());
+    /// The transient of a system from state x.
+    pub(super) fn of_system(lcs: &Lcs, x: &DVector<f64>) -> Self {
+        let original = Behaviour::from_lcs(lcs);
+        let behaviour = original.standard();
+        let mut storage = DVector::zeros(behaviour.storage.len());
+        storage.rows_mut(0, x.len()).copy_from(x);
+        Self {
+            lines: vec![],
+            start: Place {
+                t: 0.0,
+                storage,
+                switches: vec![],
+            },
+            conducting: vec![],
+            settle: vec![],
+            notes: vec![
+                "a system without a circuit has no powers to balance: the energies are not computed"
+                    .to_string()
+                    .into(),
+            ],
+            steps: exact::steps_of(&original),
+            systems: Systems::of(behaviour),
+            free_sources: false,
         }
-        let lcs = self.reduce(&vec![Hold::Free; self.behaviour.pairs.len()], switches)?;
-        known.push((switches.to_vec(), lcs.clone()));
+    }
+
+    /// The same with sources that may be given other values on the way.
+    pub(super) fn with_free_sources(self) -> Self {
+        Self {
+            free_sources: true,
+            ..self
+        }
+    }
+
+    /// The same circuit from another place on; `conducting` as in [`start::Initial`].
+    pub(super) fn standing_at(self, start: Place, conducting: Vec<bool>) -> Self {
+        Self {
+            settle: vec![false; start.switches.len()],
+            start,
+            conducting,
+            ..self
+        }
+    }
+
+    /// Chooses what is a state and settles the switches; returns the system of the start position.
+    pub(super) fn prepare(&mut self, tran: &Tran, settings: &Settings) -> Result<Lcs, SimError> {
+        let lcs = self.choose_roles(tran)?;
+        if self.settle_switches(tran, settings)? {
+            return self.systems.free(&self.start.switches);
+        }
         Ok(lcs)
     }
 
+    fn switches(&self) -> &[SwitchPort] {
+        &self.systems.behaviour.switches
+    }
+
     fn thresholds(&self) -> Vec<Threshold> {
-        self.behaviour.switches.iter().map(Threshold::of).collect()
+        self.switches().iter().map(Threshold::of).collect()
     }
 
     /// `lcs` is the system of the start position.
-    fn exact(&self, tran: &Tran, lcs: &Lcs, settings: &Settings) -> Result<Exact<'_>, SimError> {
+    fn exact(&self, tran: &Tran, lcs: &Lcs, settings: &Settings) -> Result<Exact, SimError> {
         let mut exact = Exact::new(exact::Setup {
-            assembler: exact::Assembler::new(&self.behaviour)
-                .with_steps_of(self.original)
-                .knowing(&self.position, lcs),
-            position: self.position.clone(),
-            t: 0.0,
+            assembler: exact::Assembler::new(Arc::clone(&self.systems.behaviour))
+                .with_steps(self.steps.clone())
+                .knowing(&self.start.switches, lcs),
+            position: self.start.switches.clone(),
+            t: self.start.t,
             until: tran.tstop,
-            start: self.start.clone(),
+            start: self.start.storage.clone(),
             h: tran.tstep,
             energy: true,
+            free: self.free_sources,
             settings: settings.clone(),
         })?;
         exact.expect(&self.conducting);
         Ok(exact)
     }
 
-    fn start(&self) -> Place {
-        Place {
-            t: 0.0,
-            storage: self.start.clone(),
-            switches: self.position.clone(),
-        }
-    }
-
-    fn stepper(
+    pub(super) fn stepper(
         &self,
         place: Place,
         tran: &Tran,
         scheme: Scheme,
         stepping: Stepping,
         settings: &Settings,
-    ) -> Result<Theta<'_>, SimError> {
+    ) -> Result<Theta, SimError> {
+        let systems = self.systems.clone();
         let mut theta = Theta::new(Setup {
-            reduce: Box::new(|position| self.free(position)),
+            reduce: Box::new(move |position| systems.free(position)),
             position: place.switches,
             thresholds: self.thresholds(),
             t: place.t,
@@ -260,14 +368,14 @@ impl Problem<'_> {
 
     /// See [`roles`]; returns the system of the start position.
     fn choose_roles(&mut self, tran: &Tran) -> Result<Lcs, SimError> {
-        let lcs = self.free(&self.position)?;
+        let lcs = self.systems.free(&self.start.switches)?;
         if roles::doubtful(&lcs, tran.tstop) {
-            let other = self.behaviour.in_other_roles();
-            let first = std::mem::replace(&mut self.behaviour, other);
-            let known = self.known.take();
-            match self.free(&self.position) {
-                Ok(other) if roles::better(&lcs, &other) => return Ok(other),
-                _ => (self.behaviour, self.known) = (first, RefCell::new(known)),
+            let others = Systems::of(self.systems.behaviour.in_other_roles());
+            if let Ok(other) = others.free(&self.start.switches)
+                && roles::better(&lcs, &other)
+            {
+                self.systems = others;
+                return Ok(other);
             }
         }
         Ok(lcs)
@@ -277,20 +385,20 @@ impl Problem<'_> {
     fn settle_switches(&mut self, tran: &Tran, settings: &Settings) -> Result<bool, SimError> {
         let mut seen = Vec::new();
         while self.settle.contains(&true) {
-            let lcs = self.free(&self.position)?;
+            let lcs = self.systems.free(&self.start.switches)?;
             let controls =
                 match reading::of_sources(&lcs.controls, &Inputs::new(&lcs.inputs).all(0.0)) {
                     Some(controls) => controls,
                     None => {
                         let stepping = Stepping::Fixed(tran.tstep);
-                        self.stepper(self.start(), tran, Scheme::MOREAU, stepping, settings)?
+                        self.stepper(self.start.clone(), tran, Scheme::MOREAU, stepping, settings)?
                             .controls_at_start()?
                     }
                 };
             let asked: Vec<bool> = (0..controls.len())
                 .map(|k| {
-                    let switch = &self.behaviour.switches[k];
-                    let on = self.position[k];
+                    let switch = &self.switches()[k];
+                    let on = self.start.switches[k];
                     if self.settle[k] {
                         Threshold::of(switch).position(on, controls[k])
                     } else {
@@ -298,13 +406,13 @@ impl Problem<'_> {
                     }
                 })
                 .collect();
-            let wanted = at_start(&self.behaviour.switches, asked);
+            let wanted = at_start(self.switches(), asked);
             // Positions that contradict each other are left to the run.
-            if wanted == self.position || seen.contains(&wanted) {
+            if wanted == self.start.switches || seen.contains(&wanted) {
                 break;
             }
             let next = self.step_towards(wanted, &seen);
-            seen.push(std::mem::replace(&mut self.position, next));
+            seen.push(std::mem::replace(&mut self.start.switches, next));
         }
         Ok(!seen.is_empty())
     }
@@ -312,16 +420,16 @@ impl Problem<'_> {
     /// `wanted`, or where shorts and open branches contradict each other in it the first position on the way, one switch further,
     /// that is a circuit and not `seen`: what that switch drives may ask for another position.
     fn step_towards(&self, wanted: Vec<bool>, seen: &[Vec<bool>]) -> Vec<bool> {
-        if self.free(&wanted).is_ok() {
+        if self.systems.free(&wanted).is_ok() {
             return wanted;
         }
-        let moving = (0..wanted.len()).filter(|&k| wanted[k] != self.position[k]);
+        let moving = (0..wanted.len()).filter(|&k| wanted[k] != self.start.switches[k]);
         let positions = moving.map(|k| {
-            let mut position = self.position.clone();
+            let mut position = self.start.switches.clone();
             position[k] = wanted[k];
-            at_start(&self.behaviour.switches, position)
+            at_start(self.switches(), position)
         });
-        let mut sound = positions.filter(|p| !seen.contains(p) && self.free(p).is_ok());
+        let mut sound = positions.filter(|p| !seen.contains(p) && self.systems.free(p).is_ok());
         sound.next().unwrap_or(wanted)
     }
 
@@ -351,14 +459,20 @@ impl Problem<'_> {
     }
 
     /// Amplitudes from a coarse run.
-    fn scout(&self, tran: &Tran, settings: &Settings) -> Option<Amplitudes> {
+    pub(super) fn scout(&self, tran: &Tran, settings: &Settings) -> Option<Amplitudes> {
         let settings = Settings {
             max_steps: SCOUT_LIMIT,
             ..settings.clone()
         };
         let stepping = Stepping::Fixed(tran.tstop / SCOUT_STEPS);
         let mut theta = self
-            .stepper(self.start(), tran, Scheme::MOREAU, stepping, &settings)
+            .stepper(
+                self.start.clone(),
+                tran,
+                Scheme::MOREAU,
+                stepping,
+                &settings,
+            )
             .ok()?;
         let mut log = Log::new(0, f64::INFINITY, false);
         for k in 1..=SCOUT_STEPS as u32 {
@@ -378,21 +492,23 @@ impl Problem<'_> {
 /// Moreau's steps in an output step where they take the place of exact integration.
 const HANDOVER_STEPS: f64 = 128.0;
 
-impl Problem<'_> {
+impl Problem {
     /// Exact integration with Moreau's steps where it cannot go on.
-    fn handover<'a>(
-        &'a self,
-        tran: &'a Tran,
+    pub(super) fn handover(
+        &self,
+        tran: &Tran,
         lcs: &Lcs,
-        settings: &'a Settings,
-    ) -> Result<Handover<'a>, SimError> {
+        settings: &Settings,
+    ) -> Result<Handover, SimError> {
         // An error control would follow every switching of a chattering circuit.
         let step = tran.tstep / HANDOVER_STEPS;
         let stepping = Stepping::Fixed(step);
+        let (problem, span, settings_of_steps) = (self.clone(), *tran, settings.clone());
         Ok(Handover::new(
             self.exact(tran, lcs, settings)?,
             Box::new(move |place| {
-                self.stepper(place.clone(), tran, Scheme::MOREAU, stepping, settings)
+                let place = place.clone();
+                problem.stepper(place, &span, Scheme::MOREAU, stepping, &settings_of_steps)
             }),
             step,
             tran.tstep,
@@ -401,14 +517,14 @@ impl Problem<'_> {
 }
 
 /// Steps chosen by their error.
-fn controlled(tran: &Tran) -> Stepping {
+pub(super) fn controlled(tran: &Tran) -> Stepping {
     Stepping::Controlled {
         span: tran.tstop,
         first: tran.tstep / 64.0,
     }
 }
 
-fn drive(problem: Problem<'_>, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
+fn drive(problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
     let begin = ThreadTime::now();
     let elsewhere = Rc::<Cell<f64>>::default();
     let mut result = dispatch(problem, tran, options, Rc::clone(&elsewhere));
@@ -424,16 +540,13 @@ fn drive(problem: Problem<'_>, tran: Tran, options: SimOptions<'_>) -> Result<Ru
 
 /// `elsewhere` counts the CPU seconds of what takes the rows.
 fn dispatch(
-    mut problem: Problem<'_>,
+    mut problem: Problem,
     tran: Tran,
     options: SimOptions<'_>,
     elsewhere: Rc<Cell<f64>>,
 ) -> Result<Run, SimError> {
     check(&tran, &options)?;
-    let mut lcs = problem.choose_roles(&tran)?;
-    if problem.settle_switches(&tran, &options.settings)? {
-        lcs = problem.free(&problem.position)?;
-    }
+    let lcs = problem.prepare(&tran, &options.settings)?;
     let Plan {
         method,
         scheme,
@@ -455,7 +568,7 @@ fn dispatch(
     if let Some(error) = endless {
         return Err(error);
     }
-    let frame = |method: Method, notes: Vec<String>| Frame {
+    let frame = |method: Method, notes: Vec<Note>| Frame {
         title: lcs.title.clone(),
         names: lcs.outputs.names.clone(),
         units: lcs.outputs.units.clone(),
@@ -491,19 +604,22 @@ fn dispatch(
         match handover.and_then(|mut both| attempt(&mut both, frame, &mut log, false)) {
             Ok(run) => return Ok(run),
             Err(error) if is_final(&error) => return Err(error),
-            Err(error) => notes.push(match log.again() {
-                None => format!(
-                    "exact integration ended, and the whole run was made in steps instead: {error}"
-                ),
-                Some(t) => format!(
-                    "exact integration ended, and the whole run was made in steps instead; rows until {t:e} s are exact: {error}"
-                ),
-            }),
+            Err(error) => {
+                let text = match log.again() {
+                    None => format!(
+                        "exact integration ended, and the whole run was made in steps instead: {error}"
+                    ),
+                    Some(t) => format!(
+                        "exact integration ended, and the whole run was made in steps instead; rows until {t:e} s are exact: {error}"
+                    ),
+                };
+                notes.push(Note::of(error.elements, text));
+            }
         }
         method = Method::Theta;
     }
     let stepping = options.step.map_or(controlled(&tran), Stepping::Fixed);
-    let mut theta = problem.stepper(problem.start(), &tran, scheme, stepping, settings)?;
+    let mut theta = problem.stepper(problem.start.clone(), &tran, scheme, stepping, settings)?;
     if options.step.is_none()
         && let Some(amplitudes) = problem.scout(&tran, settings)
     {
@@ -514,7 +630,7 @@ fn dispatch(
     run(&mut theta, Frame { progress, ..frame }, log)
 }
 
-fn check(tran: &Tran, options: &SimOptions<'_>) -> Result<(), SimError> {
+pub(super) fn check(tran: &Tran, options: &SimOptions<'_>) -> Result<(), SimError> {
     let wrong = |what: &str| Err(SimError::before(Reason::Unsupported(what.into())));
     let between = |v: Option<f64>| v.is_none_or(|v| (0.5..=1.0).contains(&v));
     if !between(options.theta) || !between(options.gamma) {

@@ -8,6 +8,7 @@ use nalgebra::DVector;
 use self::prescribed::{Guess, Prescribed, Voltage, hold_voltages, open_inductors, read_guesses};
 use self::statics::{feeding, observed_circuit, tie_floating, without_delay};
 use crate::circuit::{Circuit, Element, Kind, Line, LinePort, NodeId};
+use crate::integrate::Note;
 use crate::integrate::lawful;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{NoRest, Reason, SimError};
@@ -29,7 +30,7 @@ pub struct Initial {
     /// The waves that arrive at the two ends of every transmission line, V.
     pub waves: Vec<[f64; 2]>,
     /// Things the user should know.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
 }
 
 /// A solved operating point.
@@ -42,7 +43,7 @@ pub struct OperatingPoint {
     /// Switch positions.
     pub switches: Vec<(String, bool)>,
     /// Things the user should know.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
     /// All capacitor voltages and inductor currents.
     pub storage: Vec<f64>,
     /// By ideal pair of the devices: whether it conducts, by more than rounding.
@@ -254,7 +255,7 @@ struct Static {
     readings: Vec<f64>,
     controls: Vec<f64>,
     storage: Vec<f64>,
-    notes: Vec<String>,
+    notes: Vec<Note>,
 }
 
 /// A constraint of the static circuit may be off by this part of its terms (rounding).
@@ -327,7 +328,7 @@ fn devices(
     lcs: &Lcs,
     q: &DVector<f64>,
     settings: &Settings,
-    notes: &mut Vec<String>,
+    notes: &mut Vec<Note>,
 ) -> Result<(DVector<f64>, Vec<Option<bool>>), SimError> {
     if q.is_empty() {
         return Ok((DVector::zeros(0), Vec::new()));
@@ -352,10 +353,8 @@ fn devices(
     }
     let (lambda, unique) = driver.least_norm(q, &solution);
     if !unique {
-        notes.push(
-            "voltages or currents of devices are not determined by the ideal model; the least-norm choice is shown"
-                .into(),
-        );
+        let text = "voltages or currents of devices are not determined by the ideal model; the least-norm choice is shown";
+        notes.push(text.to_string().into());
     }
     Ok((lambda, solution.active))
 }
@@ -415,7 +414,8 @@ pub fn initial(
     let point = operating_point(circuit, Values::BeforeZero, true, settings)?;
     let mut notes = point.notes;
     for s in behaviour.storage.iter().filter(|s| s.initial.is_some()) {
-        notes.push(format!("IC= of {} is ignored without uic", s.element));
+        let text = format!("IC= of {} is ignored without uic", s.element);
+        notes.push(Note::of([&s.element], text));
     }
     Ok(Initial {
         storage: DVector::from_vec(point.storage),

@@ -1,8 +1,8 @@
 //! What a run did and what it found, besides the waveforms.
 
-use std::sync::Arc;
-
+use crate::integrate::Note;
 use crate::integrate::aliasing::Aliased;
+use crate::integrate::event::Event;
 use crate::integrate::rows::RowKind;
 use crate::integrate::verify::Verified;
 use crate::waveform::Waveforms;
@@ -28,6 +28,21 @@ pub struct Stats {
     pub factorisations: u64,
     /// User CPU seconds of the solve alone.
     pub cpu_seconds: f64,
+}
+
+impl Stats {
+    /// Adds those of another part.
+    pub fn add(&mut self, other: &Self) {
+        self.steps += other.steps;
+        self.rejected += other.rejected;
+        self.events += other.events;
+        self.jumps += other.jumps;
+        self.modes += other.modes;
+        self.lcp_solves += other.lcp_solves;
+        self.pivotings += other.pivotings;
+        self.factorisations += other.factorisations;
+        self.cpu_seconds += other.cpu_seconds;
+    }
 }
 
 /// The energy balance of a run, J.
@@ -220,16 +235,18 @@ pub struct Run {
     pub stats: Stats,
     /// The energy balance.
     pub energy: Energy,
+    /// Whether the energies are known: a system without a circuit has no powers to balance.
+    pub balanced: bool,
     /// The error that the steps themselves let expect; nothing for exact runs, nor where the steps do not tell.
     pub error: StatedError,
     /// Impulses at jumps.
     pub impulses: Vec<Impulse>,
     /// Jumps of the state.
     pub state_jumps: StateJumps,
-    /// Event times, s, with the devices whose state changed.
-    pub events: Vec<(f64, Arc<str>)>,
+    /// Changes of devices and switches, and jumps, in order of time.
+    pub events: Vec<Event>,
     /// Things the user should know.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
     /// What repeats too fast for the output times.
     pub aliased: Option<Aliased>,
     /// What a second run by an independent method found, where there was one.

@@ -3,6 +3,9 @@
 //! The switch of a thyristor is a latch: on while one of its gates is, afterwards as long as the valve in series conducts more
 //! than the holding current. It therefore turns on only with a gate and off only without one, at the zero of its current.
 
+use std::sync::Arc;
+
+use crate::integrate::event::Change;
 use crate::integrate::inputs::{Inputs, Passage};
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::SimError;
@@ -145,7 +148,7 @@ pub(crate) struct Known {
 
 /// What controls ask of the switches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Change {
+pub(crate) enum Demand {
     /// They stay.
     None,
     /// Thyristors whose current has ended block from now on: nothing moves at this moment.
@@ -244,20 +247,33 @@ impl Switches {
         self.in_this_step >= limit
     }
 
-    /// Switches driven by sources alone whose controls ask for another position at the start.
-    pub(crate) fn misplaced(&self, lcs: &Lcs, u: &[f64]) -> Vec<usize> {
+    /// Switches driven by sources alone whose controls ask for another position right after the start, where the inputs have these
+    /// values and slopes.
+    pub(crate) fn misplaced(&self, lcs: &Lcs, u: &[f64], slopes: &[f64]) -> Vec<usize> {
         let at = Point {
             x: &[],
             lambda: &[],
             u,
             du: &[],
         };
-        let wrong = |&i: &usize| {
-            let control = reading::value(&lcs.controls, i, at);
-            self.driven[i]
-                && self.thresholds[i].position(self.position[i], control) != self.position[i]
+        let known = |value: f64, size: f64| Known {
+            value,
+            noise: ROUNDINGS * f64::EPSILON * size,
         };
-        (0..self.thresholds.len()).filter(wrong).collect()
+        let wrong = |&i: &usize| {
+            let value = reading::value(&lcs.controls, i, at);
+            let size = reading::magnitude(&lcs.controls, i, at);
+            let gains = lcs.controls.u.row(i);
+            let drifts = || gains.iter().zip(slopes).map(|(gain, du)| gain * du);
+            let (slope, steepness) = (drifts().sum(), drifts().map(f64::abs).sum());
+            self.thresholds[i].leaves(
+                self.position[i],
+                known(value, size),
+                known(slope, steepness),
+            )
+        };
+        let driven = (0..self.thresholds.len()).filter(|&i| self.driven[i]);
+        driven.filter(wrong).collect()
     }
 
     /// Flips switches that controls have asked to move, and counts them.
@@ -289,12 +305,12 @@ impl Switches {
 
     /// What controls that depend on the state ask for, where the ports in `conducting` conduct. Switches that sources alone drive
     /// move at the times of [`Self::next_known`] only.
-    pub(crate) fn asked(&self, lcs: &Lcs, at: Point<'_>, conducting: &[bool]) -> Change {
+    pub(crate) fn asked(&self, lcs: &Lcs, at: Point<'_>, conducting: &[bool]) -> Demand {
         (0..self.len())
             .filter(|&i| !self.driven[i])
             .map(|i| self.change(i, lcs, at, conducting))
             .max()
-            .unwrap_or(Change::None)
+            .unwrap_or(Demand::None)
     }
 
     /// The switches that controls ask to move in a position that was just entered. One that sources alone drive since then, as the
@@ -307,26 +323,26 @@ impl Switches {
                 self.thresholds[i].excess(self.position[i], control) > noise
             };
             let waits = self.driven[i] && !(self.newly_driven[i] && beyond());
-            !waits && self.change(i, lcs, at, conducting) != Change::None
+            !waits && self.change(i, lcs, at, conducting) != Demand::None
         };
         (0..self.len()).filter(asks).collect()
     }
 
-    fn change(&self, i: usize, lcs: &Lcs, at: Point<'_>, conducting: &[bool]) -> Change {
+    fn change(&self, i: usize, lcs: &Lcs, at: Point<'_>, conducting: &[bool]) -> Demand {
         let (threshold, on) = (&self.thresholds[i], self.position[i]);
         let control = || reading::value(&lcs.controls, i, at);
         match threshold.latch {
-            None if threshold.position(on, control()) != on => Change::Passage,
+            None if threshold.position(on, control()) != on => Demand::Passage,
             Some(_) if threshold.holds(on, &self.position) => {
                 if !self.valves[i].is_some_and(|port| conducting[port]) {
-                    Change::Release
+                    Demand::Release
                 } else if threshold.off_below > 0.0 && control() <= threshold.off_below {
-                    Change::Passage
+                    Demand::Passage
                 } else {
-                    Change::None
+                    Demand::None
                 }
             }
-            _ => Change::None,
+            _ => Demand::None,
         }
     }
 
@@ -384,13 +400,13 @@ impl Switches {
             .collect()
     }
 
-    /// Names with their positions, of those that differ from `before`.
-    pub(crate) fn flipped(&self, before: &[bool]) -> String {
-        let words: Vec<String> = self
-            .different(before)
-            .map(|(i, t)| format!("{} {}", t.name, if self.position[i] { "on" } else { "off" }))
-            .collect();
-        words.join(" ")
+    /// The switches whose positions differ from `before`.
+    pub(crate) fn flipped(&self, before: &[bool]) -> Arc<[Change]> {
+        let switch = |(i, t): (usize, &Threshold)| Change::Switch {
+            name: t.name.as_str().into(),
+            on: self.position[i],
+        };
+        self.different(before).map(switch).collect()
     }
 
     /// The first time in (t, limit] at which controls that depend on sources alone pass the thresholds of their switches, and

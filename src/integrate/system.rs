@@ -120,18 +120,18 @@ impl System {
 }
 
 /// Reduces the circuit for a switch position.
-pub type Reduce<'a> = Box<dyn FnMut(&[bool]) -> Result<Lcs, SimError> + 'a>;
+pub type Reduce = Box<dyn FnMut(&[bool]) -> Result<Lcs, SimError> + Send>;
 
 /// All switch positions visited so far.
-pub(crate) struct Plant<'a> {
-    reduce: Reduce<'a>,
+pub(crate) struct Plant {
+    reduce: Reduce,
     /// Positions with their systems, in order of first visit.
     pub systems: Vec<(Vec<bool>, System)>,
     tolerance: f64,
 }
 
-impl<'a> Plant<'a> {
-    pub(crate) fn new(reduce: Reduce<'a>, tolerance: f64) -> Self {
+impl Plant {
+    pub(crate) fn new(reduce: Reduce, tolerance: f64) -> Self {
         Self {
             reduce,
             systems: Vec::new(),

@@ -205,7 +205,7 @@ fn quiet_times(run: &Run, runs: &[&Run], near: f64) -> Vec<f64> {
         .filter(|(k, _)| kind(*k) == RowKind::Grid)
         .map(|(_, t)| *t)
         .collect();
-    let events = runs.iter().flat_map(|run| run.events.iter().map(|e| e.0));
+    let events = runs.iter().flat_map(|run| run.events.iter().map(|e| e.t));
     let end = all.last().copied().unwrap_or(0.0);
     let mut events: Vec<f64> = events.chain([0.0, end]).collect();
     events.sort_by(f64::total_cmp);
@@ -224,8 +224,8 @@ fn quiet_times(run: &Run, runs: &[&Run], near: f64) -> Vec<f64> {
 fn apart(a: &Run, b: &Run) -> f64 {
     let by_name = |run: &'_ Run| {
         let mut times: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-        for (t, what) in &run.events {
-            times.entry(what.to_string()).or_default().push(*t);
+        for event in &run.events {
+            times.entry(event.to_string()).or_default().push(event.t);
         }
         times
     };

@@ -325,7 +325,10 @@ mod tests {
             let rho = 10_f64.powf(rho);
             let z = diode.slope * 10_f64.powf(decades) * if up { 1.0 } else { -1.0 };
             let at = diode.resolvent(rho, z);
-            prop_assert!((at.v + rho * at.i - z).abs() <= 1e-14 * z.abs().max(at.v.abs()), "{at:?}");
+            // A breakdown near 0 V leaves a current there, whose voltage across rs the junction takes back: a difference of the two.
+            let taken_back = diode.breakdown.map_or(0.0, |_| diode.rs * at.i.abs());
+            let size = 1e-14 * z.abs().max(at.v.abs()) + f64::EPSILON * taken_back;
+            prop_assert!((at.v + rho * at.i - z).abs() <= size, "{at:?}");
             let junction = at.v - diode.rs * at.i;
             // Where the resistance takes most of z, the digits of the junction's voltage are those of what it leaves.
             let left = 1e-14 + 1e-15 * z.abs() / junction.abs();

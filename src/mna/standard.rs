@@ -178,22 +178,27 @@ fn branches(out: &mut Behaviour, pair: &Pair, curve: &Curve, middle: usize) {
             i.push((Coefficient::MINUS_ONE, forward));
         }
         out.equations.push(branch);
-        let mut port = pair.port.clone();
-        port.law = Law::ideal_diode();
-        port.role = Role::Voltage;
-        port.device = name;
-        out.pairs.push(Pair {
-            port,
-            reverse,
-            forward,
-            fixed_role: false,
-            reverse_name: out.columns[reverse].clone(),
-            forward_name: out.columns[forward].clone(),
-            units: pair.units,
-        });
+        push_ideal(out, pair, name, (reverse, forward));
     }
     out.equations.push(v);
     out.equations.push(i);
+}
+
+/// Adds an ideal pair between these columns to the law of `pair`, which it is a part of.
+fn push_ideal(out: &mut Behaviour, pair: &Pair, name: String, (reverse, forward): (usize, usize)) {
+    let mut port = pair.port.clone();
+    port.law = Law::ideal_diode();
+    port.role = Role::Voltage;
+    port.device = name;
+    out.pairs.push(Pair {
+        port,
+        reverse,
+        forward,
+        fixed_role: false,
+        reverse_name: out.columns[reverse].clone(),
+        forward_name: out.columns[forward].clone(),
+        units: pair.units,
+    });
 }
 
 fn expand(out: &mut Behaviour, pair: &Pair, curve: Curve) {
@@ -237,20 +242,11 @@ fn expand(out: &mut Behaviour, pair: &Pair, curve: Curve) {
     out.equations.push(v);
     out.equations.push(i);
     for (k, (reverse, forward)) in pairs.into_iter().enumerate() {
-        let mut port = pair.port.clone();
-        port.law = Law::ideal_diode();
-        port.role = Role::Voltage;
-        if count > 1 {
-            port.device = format!("{device}.{}", k + 1);
-        }
-        out.pairs.push(Pair {
-            port,
-            reverse,
-            forward,
-            fixed_role: false,
-            reverse_name: out.columns[reverse].clone(),
-            forward_name: out.columns[forward].clone(),
-            units: pair.units,
-        });
+        let name = if count > 1 {
+            format!("{device}.{}", k + 1)
+        } else {
+            device.clone()
+        };
+        push_ideal(out, pair, name, (reverse, forward));
     }
 }

@@ -20,7 +20,7 @@ impl Behaviour {
             ..Self::default()
         };
         out.column("1");
-        let metric = if lcs.energy.nrows() == n && lcs.energy.clone().cholesky().is_some() {
+        let metric = if lcs.energy.nrows() == n && is_definite(&lcs.energy) {
             lcs.energy.clone()
         } else {
             DMatrix::identity(n, n)
@@ -171,5 +171,29 @@ impl Behaviour {
             });
         }
         self.probes = self.observed.len();
+    }
+}
+
+/// Whether a symmetric matrix is positive definite. A diagonal one, as uncoupled storage has, tells at once.
+fn is_definite(m: &DMatrix<f64>) -> bool {
+    let off = |j: usize| (0..m.nrows()).any(|i| i != j && m[(i, j)] != 0.0);
+    if (0..m.ncols()).any(off) {
+        m.clone().cholesky().is_some()
+    } else {
+        m.diagonal().iter().all(|d| *d > 0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn definite_is_what_every_state_has_energy_in() {
+        use nalgebra::dmatrix;
+        assert!(is_definite(&dmatrix![1.0, 0.0; 0.0, 2.0]));
+        assert!(!is_definite(&dmatrix![1.0, 0.0; 0.0, 0.0]));
+        assert!(is_definite(&dmatrix![1.0, 0.5; 0.5, 2.0]));
+        assert!(!is_definite(&dmatrix![1.0, 2.0; 2.0, 2.0]));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::figure::Figure;
 use super::{PictureError, si, svg, text};
-use crate::integrate::Run;
+use crate::integrate::{Places, Run};
 
 const STYLE: &str = "body{font-family:sans-serif;margin:2em auto;max-width:70em;color:#282828}\
 svg{max-width:100%;height:auto}pre{background:#f4f4f4;padding:1em;overflow:auto}\
@@ -12,10 +12,10 @@ table{border-collapse:collapse}td,th{padding:.2em 1em;border-bottom:1px solid #d
 ///
 /// # Errors
 /// Those of [`svg::draw`].
-pub fn page(run: &Run, figure: &Figure) -> Result<String, PictureError> {
+pub fn page(run: &Run, places: Places<'_>, figure: &Figure) -> Result<String, PictureError> {
     let title = escaped(&run.waveforms.title);
     let picture = svg::draw(figure)?;
-    let summary = escaped(&text::summary(run, false));
+    let summary = escaped(&text::summary(run, places, false));
     let plan: String = run
         .plan
         .iter()
@@ -24,7 +24,7 @@ pub fn page(run: &Run, figure: &Figure) -> Result<String, PictureError> {
     let events = run
         .events
         .iter()
-        .map(|(t, what)| [si::quantity(*t, "s", 9), what.to_string()]);
+        .map(|event| [si::quantity(event.t, "s", 9), event.to_string()]);
     let impulses = run.impulses.iter().map(|i| {
         let unit = if i.name.starts_with("i(") {
             "A·s"
@@ -72,6 +72,7 @@ fn escaped(text: &str) -> String {
 mod tests {
     use super::*;
     use crate::integrate::Impulse;
+    use crate::integrate::event::conducts;
     use crate::waveform::Waveforms;
 
     #[test]
@@ -84,7 +85,7 @@ mod tests {
                 time: vec![0.0, 1.0],
                 values: vec![0.0, 1.0],
             },
-            events: vec![(0.5, "d1 conducts".into())],
+            events: vec![conducts("d1", 0.5)],
             impulses: vec![Impulse {
                 t: 0.5,
                 name: "i(d1)".into(),
@@ -92,7 +93,12 @@ mod tests {
             }],
             ..Run::default()
         };
-        let page = page(&run, &Figure::of_waveforms(&run.waveforms)).unwrap();
+        let page = page(
+            &run,
+            Places::default(),
+            &Figure::of_waveforms(&run.waveforms),
+        )
+        .unwrap();
         assert!(
             page.contains("<svg ") && page.contains("d1 conducts") && page.contains("i(d1) 1 µA·s")
         );

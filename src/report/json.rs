@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use super::measured::Measurements;
 use super::text;
-use crate::integrate::{Energy, Impulse, Run, StateJump, StatedError, Verified};
+use crate::integrate::{Energy, Impulse, Places, Run, StateJump, StatedError, Verified};
 
 #[derive(Serialize)]
 struct Summary<'a> {
@@ -20,9 +20,9 @@ struct Summary<'a> {
     pivotings: u64,
     factorisations: u64,
     cpu_seconds: f64,
-    energy: Energy,
+    energy: Balance,
     error: StatedError,
-    notes: &'a [String],
+    notes: Vec<String>,
     impulses: &'a [Impulse],
     state_jumps: &'a [StateJump],
     state_jumps_total: Total,
@@ -45,21 +45,25 @@ struct Total {
 /// What a run did, as one JSON object on one line: method, plan, counters, energy balance, stated error, notes, impulses, jumps of the
 /// state, and what was measured.
 #[must_use]
-pub fn summary(run: &Run, found: &Measurements) -> String {
-    line(&Summary::of(run, found))
+pub fn summary(run: &Run, found: &Measurements, places: Places<'_>) -> String {
+    line(&Summary::of(run, found, places))
 }
 
 /// The same as an object to add to.
 #[must_use]
-pub(super) fn summary_object(run: &Run, found: &Measurements) -> serde_json::Map<String, Value> {
-    match serde_json::to_value(Summary::of(run, found)) {
+pub(super) fn summary_object(
+    run: &Run,
+    found: &Measurements,
+    places: Places<'_>,
+) -> serde_json::Map<String, Value> {
+    match serde_json::to_value(Summary::of(run, found, places)) {
         Ok(Value::Object(object)) => object,
         _ => serde_json::Map::new(),
     }
 }
 
 impl<'a> Summary<'a> {
-    fn of(run: &'a Run, found: &Measurements) -> Self {
+    fn of(run: &'a Run, found: &Measurements, places: Places<'_>) -> Self {
         let stats = &run.stats;
         let (measurements, fourier) = found.json();
         Self {
@@ -74,20 +78,42 @@ impl<'a> Summary<'a> {
             pivotings: stats.pivotings,
             factorisations: stats.factorisations,
             cpu_seconds: stats.cpu_seconds,
-            energy: run.energy,
+            energy: Balance::of(run),
             error: run.error,
-            notes: &run.notes,
+            notes: places.all(&run.notes),
             impulses: &run.impulses,
             state_jumps: &run.state_jumps.first,
             state_jumps_total: Total {
                 count: run.state_jumps.all.0,
                 loss: run.state_jumps.all.1,
             },
-            warnings: text::warnings(run),
+            warnings: text::warnings(run, places),
             verified: run.verified.as_ref(),
             measurements,
             fourier,
         }
+    }
+}
+
+/// The energy balance.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Balance {
+    Known(Energy),
+    /// Null by each key.
+    Unknown(Value),
+}
+
+impl Balance {
+    fn of(run: &Run) -> Self {
+        if run.balanced {
+            return Self::Known(run.energy);
+        }
+        let mut energy = serde_json::to_value(run.energy).unwrap_or_default();
+        if let Value::Object(keys) = &mut energy {
+            keys.values_mut().for_each(|value| *value = Value::Null);
+        }
+        Self::Unknown(energy)
     }
 }
 
@@ -127,6 +153,7 @@ mod tests {
                 jumps: 0.25,
                 ..Energy::default()
             },
+            balanced: true,
             error: StatedError {
                 max: Some(1e-4),
                 rms: None,
@@ -140,7 +167,7 @@ mod tests {
             ..Run::default()
         };
         assert_eq!(
-            summary(&run, &Measurements::default()),
+            summary(&run, &Measurements::default(), Places::default()),
             "{\"method\":\"exact\",\"plan\":[\"piecewise linear\"],\"steps\":7,\"rejected\":0,\"events\":2,\"jumps\":0,\
              \"modes\":0,\"lcp_solves\":0,\"pivotings\":0,\"factorisations\":0,\"cpu_seconds\":0.0,\
              \"energy\":{\"source\":1.5,\"dissipated\":1.0,\"stored\":0.25,\"jumps\":0.25,\"numerical\":0.0,\"residual\":0.0,\

@@ -4,7 +4,7 @@ use serde_json::{Map, Value};
 
 use super::measured::Measurements;
 use super::{json, si, table};
-use crate::integrate::{Energy, Run, StatedError, Stats};
+use crate::integrate::{Energy, Places, Run, StatedError};
 use crate::waveform::Waveforms;
 
 /// One of the runs.
@@ -67,24 +67,16 @@ pub fn rows(steps: &[Step]) -> Waveforms {
 /// A run that stands for all of them: counters and energies added up, each note once.
 #[must_use]
 pub fn total(steps: &[Step]) -> Run {
-    let mut total = Run::default();
+    let mut total = Run {
+        balanced: steps.iter().all(|step| step.run.balanced),
+        ..Run::default()
+    };
     for Step { run, .. } in steps {
         if total.method.is_empty() {
             total.method.clone_from(&run.method);
             total.plan.clone_from(&run.plan);
         }
-        let (sum, own) = (&mut total.stats, &run.stats);
-        *sum = Stats {
-            steps: sum.steps + own.steps,
-            rejected: sum.rejected + own.rejected,
-            events: sum.events + own.events,
-            jumps: sum.jumps + own.jumps,
-            modes: sum.modes + own.modes,
-            lcp_solves: sum.lcp_solves + own.lcp_solves,
-            pivotings: sum.pivotings + own.pivotings,
-            factorisations: sum.factorisations + own.factorisations,
-            cpu_seconds: sum.cpu_seconds + own.cpu_seconds,
-        };
+        total.stats.add(&run.stats);
         let (sum, own) = (&mut total.energy, &run.energy);
         *sum = Energy {
             source: sum.source + own.source,
@@ -161,10 +153,10 @@ pub fn measured(steps: &[Step]) -> String {
 
 /// The summary of all runs, with theirs as `"runs"`, each with its `"values"`.
 #[must_use]
-pub fn summary(steps: &[Step]) -> String {
-    let mut all = json::summary_object(&total(steps), &Measurements::default());
+pub fn summary(steps: &[Step], places: Places<'_>) -> String {
+    let mut all = json::summary_object(&total(steps), &Measurements::default(), places);
     let runs = steps.iter().map(|step| {
-        let mut own = json::summary_object(&step.run, &step.found);
+        let mut own = json::summary_object(&step.run, &step.found, places);
         let values = step.values.iter();
         let values: Map<String, Value> = values.map(|(n, v)| (n.clone(), (*v).into())).collect();
         own.insert("values".into(), Value::Object(values));

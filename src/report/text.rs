@@ -1,7 +1,7 @@
 //! Summaries in words.
 
 use super::{si, table};
-use crate::integrate::{Aliased, Method, Run, StateJump};
+use crate::integrate::{Aliased, Method, Note, Places, Run, StateJump};
 use crate::waveform::compare::Comparison;
 
 /// Impulses and jumps listed before the rest is only counted.
@@ -9,7 +9,7 @@ const SHOWN: usize = 8;
 
 /// What a run did: method, work, energy balance, impulses and notes; with `verbose` the plan and the event times too.
 #[must_use]
-pub fn summary(run: &Run, verbose: bool) -> String {
+pub fn summary(run: &Run, places: Places<'_>, verbose: bool) -> String {
     let stats = &run.stats;
     let mut lines = Vec::new();
     if !run.waveforms.title.is_empty() {
@@ -34,7 +34,7 @@ pub fn summary(run: &Run, verbose: bool) -> String {
         si::quantity(stats.cpu_seconds, "s", 3),
     ));
     let energy = &run.energy;
-    lines.push(format!(
+    let balance = format!(
         "energy: source {}, dissipated {}, stored {}, lost in jumps {}, by numerical damping {}, residual {} of the largest",
         si::quantity(energy.source, "J", 4),
         si::quantity(energy.dissipated, "J", 4),
@@ -42,7 +42,8 @@ pub fn summary(run: &Run, verbose: bool) -> String {
         si::quantity(energy.jumps, "J", 4),
         si::quantity(energy.numerical, "J", 4),
         si::plain(energy.residual_relative, 2),
-    ));
+    );
+    lines.extend(run.balanced.then_some(balance));
     lines.extend(stated_error(run));
     let jumps = &run.state_jumps;
     for jump in jumps.first.iter().take(SHOWN) {
@@ -88,11 +89,20 @@ pub fn summary(run: &Run, verbose: bool) -> String {
         lines.extend(
             run.events
                 .iter()
-                .map(|(t, what)| format!("event: {} {what}", si::quantity(*t, "s", 9))),
+                .map(|event| format!("event: {} {event}", si::quantity(event.t, "s", 9))),
         );
     }
-    lines.extend(warnings(run).iter().map(|text| format!("warning: {text}")));
-    lines.extend(run.notes.iter().map(|note| format!("note: {note}")));
+    lines.extend(
+        warnings(run, places)
+            .iter()
+            .map(|text| format!("warning: {text}")),
+    );
+    lines.extend(
+        places
+            .all(&run.notes)
+            .iter()
+            .map(|note| format!("note: {note}")),
+    );
     lines.join("\n") + "\n"
 }
 
@@ -116,13 +126,13 @@ fn stated_error(run: &Run) -> Option<String> {
 
 /// What a user must be told by default: that a current or charge was destroyed, that rows do not show what happens between them.
 #[must_use]
-pub fn warnings(run: &Run) -> Vec<String> {
-    let mut warnings = destroyed(run);
-    warnings.extend(run.aliased.as_ref().map(aliasing));
-    warnings
+pub fn warnings(run: &Run, places: Places<'_>) -> Vec<String> {
+    let warnings = destroyed(run).into_iter();
+    let warnings = warnings.chain(run.aliased.as_ref().map(aliasing));
+    warnings.map(|warning| places.of(&warning)).collect()
 }
 
-fn aliasing(aliased: &Aliased) -> String {
+fn aliasing(aliased: &Aliased) -> Note {
     let Aliased {
         name,
         period,
@@ -140,18 +150,18 @@ fn aliasing(aliased: &Aliased) -> String {
     } else {
         "the step of the 1,000 rows that `.tran` without a print step has"
     };
-    format!(
+    let text = format!(
         "{step}, {}, is half or more of {whose} {name}, {}: rows do not show its course; a print step below {} in `.tran` does",
         si::quantity(*tstep, "s", 4),
         si::quantity(*period, "s", 4),
         si::quantity(0.1 * period, "s", 2),
-    )
+    );
+    // Events of several devices at once are named together.
+    Note::of(name.split(", "), text)
 }
 
-fn destroyed(run: &Run) -> Vec<String> {
-    let Some(first) = &run.state_jumps.destroyer else {
-        return Vec::new();
-    };
+fn destroyed(run: &Run) -> Option<Note> {
+    let first = run.state_jumps.destroyer.as_ref()?;
     let (count, loss) = run.state_jumps.destroying;
     let more = if count > 1 {
         format!(
@@ -169,12 +179,13 @@ fn destroyed(run: &Run) -> Vec<String> {
         reason,
         ..
     } = first;
-    vec![format!(
+    let text = format!(
         "{} jumps at {} ({reason}): a current or charge is destroyed, and {} with it{more}",
         elements.join(", "),
         si::quantity(*t, "s", 6),
         si::quantity(*loss, "J", 3),
-    )]
+    );
+    Some(Note::of(elements, text))
 }
 
 /// One line per signal: amplitude and its errors relative to it, with the instants of the worst points.
@@ -212,6 +223,7 @@ pub fn comparison(found: &Comparison) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::integrate::event::conducts;
     use crate::integrate::{Energy, Impulse, JumpReason, StateJumps, Stats};
     use crate::waveform::compare::SignalError;
 
@@ -248,6 +260,7 @@ mod tests {
                 residual_relative: 3.1e-7,
                 ..Energy::default()
             },
+            balanced: true,
             impulses: vec![
                 Impulse {
                     t: 1e-3,
@@ -256,11 +269,11 @@ mod tests {
                 };
                 9
             ],
-            events: vec![(1e-3, "d1 conducts".into())],
-            notes: vec!["v(x) is relative to node a".into()],
+            events: vec![conducts("d1", 1e-3)],
+            notes: vec!["v(x) is relative to node a".to_string().into()],
             ..Run::default()
         };
-        insta::assert_snapshot!(summary(&run, true), @r"
+        insta::assert_snapshot!(summary(&run, Places::default(), true), @r"
         plan: no devices: linear
         theta: 1200 steps (3 rejected), 4 events, 0 jumps, 0 modes, 0 LCP solves, 1.5 ms CPU
         energy: source 12.5 mJ, dissipated 10 mJ, stored 1.5 mJ, lost in jumps 1 mJ, by numerical damping 0 J, residual 3.1e-7 of the largest
@@ -279,7 +292,7 @@ mod tests {
         warning: l1 jumps at 1 ms (switch s1): a current or charge is destroyed, and 1 mJ with it; 1 more jumps like it, 2 mJ in all
         note: v(x) is relative to node a
         ");
-        assert!(!summary(&run, false).contains("plan:"));
+        assert!(!summary(&run, Places::default(), false).contains("plan:"));
     }
 
     #[test]

@@ -68,7 +68,7 @@ impl ActiveSolve {
     }
 }
 
-/// The inverse by LU with one Newton step X ← X (2I − A X), `None` where A is singular to [`RANK`].
+/// The inverse by LU with one Newton step X ← X (2I − A X), `None` where A is singular to `RANK`.
 #[must_use]
 pub fn refined_inverse(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let k = a.nrows();
@@ -108,7 +108,7 @@ pub fn equilibrated_inverse(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 /// Sweeps of the equilibration; each takes the square root of what is left of the imbalance.
 const SWEEPS: usize = 8;
 
-/// The Moore-Penrose inverse with rank decided at [`RANK`].
+/// The Moore-Penrose inverse with rank decided at `RANK`.
 #[must_use]
 pub fn pseudo_inverse(a: &DMatrix<f64>) -> DMatrix<f64> {
     let svd = a.clone().svd(true, true);

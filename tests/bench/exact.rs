@@ -3,6 +3,8 @@
 //! `cargo bench --bench exact` prints one line per circuit: median thread time of nine runs.
 #![allow(clippy::print_stdout, missing_docs, reason = "a bench prints")]
 
+use std::sync::Arc;
+
 use circ::circuit::{ElaborateOptions, elaborate};
 use circ::diagnostic::SourceMap;
 use circ::integrate::exact::{Assembler, Exact, Setup};
@@ -41,13 +43,14 @@ fn run(text: &str, energy: bool) -> (f64, f64, Stats, usize) {
     let lcs = reduce(&behaviour, &Position::free(&behaviour, position.clone())).expect("a system");
     let begin = ThreadTime::now();
     let mut exact = Exact::new(Setup {
-        assembler: Assembler::new(&behaviour),
+        assembler: Assembler::new(Arc::new(behaviour)),
         position,
         t: 0.0,
         until: tran.tstop,
         start: DVector::from_column_slice(lcs.storage.initial.as_slice()),
         h: tran.tstep,
         energy,
+        free: false,
         settings: Settings::default(),
     })
     .expect("a system");

@@ -22,6 +22,18 @@ pub(crate) enum Wave {
     Pwl(Vec<(f64, f64)>),
 }
 
+impl Wave {
+    /// The largest magnitude it may have.
+    pub(crate) fn largest(&self) -> f64 {
+        match self {
+            Self::Dc(v) => v.abs(),
+            Self::Sin(offset, amplitude, ..) => offset.abs() + amplitude.abs(),
+            Self::Pulse { levels: [a, b], .. } => a.abs().max(b.abs()),
+            Self::Pwl(corners) => corners.iter().fold(0.0, |m, c| m.max(c.1.abs())),
+        }
+    }
+}
+
 /// How a comparator is written.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Writing {

@@ -1,5 +1,6 @@
 //! One case by `circ` and by the oracle.
 
+use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
@@ -22,6 +23,10 @@ pub(crate) const AGREES: f64 = 1e-6;
 
 /// An oracle whose own error is larger than this says nothing.
 const UNSURE: f64 = 1e-4;
+
+/// Of error-controlled steps, and where these are in doubt.
+const TOLERANCE: f64 = 1e-7;
+const FINER: f64 = 1e-9;
 
 /// What became of a case.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,16 +53,21 @@ pub(crate) enum Outcome {
 const LONGEST: Duration = Duration::from_secs(60);
 
 pub(crate) fn run(text: &str, method: Method) -> Result<Run, String> {
+    run_to(text, method, TOLERANCE)
+}
+
+/// As [`run`], with another tolerance of the steps.
+fn run_to(text: &str, method: Method, tol: f64) -> Result<Run, String> {
     let (send, receive) = mpsc::channel();
     let owned = text.to_string();
     // A run without progress cannot be ended from outside; its thread is left alone.
-    std::thread::spawn(move || drop(send.send(attempt(&owned, method))));
+    std::thread::spawn(move || drop(send.send(attempt(&owned, method, tol))));
     receive
         .recv_timeout(LONGEST + Duration::from_secs(30))
         .unwrap_or_else(|_| Err("hang: no progress".into()))
 }
 
-fn attempt(text: &str, method: Method) -> Result<Run, String> {
+fn attempt(text: &str, method: Method, tol: f64) -> Result<Run, String> {
     let end = Instant::now() + LONGEST;
     let guarded = catch_unwind(AssertUnwindSafe(|| {
         let mut sources = SourceMap::default();
@@ -73,7 +83,7 @@ fn attempt(text: &str, method: Method) -> Result<Run, String> {
             method,
             progress: Some(&mut progress),
             settings: Settings {
-                tol: 1e-7,
+                tol,
                 max_steps: 3_000_000,
                 ..Settings::default()
             },
@@ -114,16 +124,39 @@ pub(crate) fn rows(
     Ok(rows)
 }
 
+/// Below this part of what drives a circuit nothing counts.
+const NOTHING: f64 = 1e-9;
+
+/// The least amplitudes that count, V and A: a circuit at rest has none of its own.
+fn floors(circuit: &Circuit) -> (f64, f64) {
+    let (mut volts, mut amps) = (0.0_f64, 0.0_f64);
+    for card in &circuit.cards {
+        match &card.part {
+            Part::C(_, ic) => volts = volts.max(ic.abs()),
+            Part::L(_, ic) => amps = amps.max(ic.abs()),
+            Part::V(wave) => volts = volts.max(wave.largest()),
+            Part::I(wave) => amps = amps.max(wave.largest()),
+            _ => {}
+        }
+    }
+    let z = ohms(circuit);
+    (NOTHING * volts.max(z * amps), NOTHING * amps.max(volts / z))
+}
+
 /// Amplitude of each signal; what is below a thousandth of the largest of its kind counts as that.
-pub(crate) fn amplitudes(rows: &[Vec<f64>], signals: &[String]) -> Vec<f64> {
+pub(crate) fn amplitudes(
+    rows: &[Vec<f64>],
+    signals: &[String],
+    (volts, amps): (f64, f64),
+) -> Vec<f64> {
     let own: Vec<f64> = (0..signals.len())
         .map(|j| rows.iter().fold(0.0_f64, |m, row| m.max(row[j].abs())))
         .collect();
-    let largest = |kind: char| {
+    let largest = |kind: char, least: f64| {
         let of_kind = own.iter().zip(signals).filter(|(_, s)| s.starts_with(kind));
-        of_kind.fold(1e-12_f64, |m, (a, _)| m.max(*a))
+        of_kind.fold(1e3 * least, |m, (a, _)| m.max(*a))
     };
-    let floors = (1e-3 * largest('v'), 1e-3 * largest('i'));
+    let floors = (1e-3 * largest('v', volts), 1e-3 * largest('i', amps));
     let pairs = own.iter().zip(signals);
     pairs
         .map(|(a, s)| {
@@ -137,8 +170,13 @@ pub(crate) fn amplitudes(rows: &[Vec<f64>], signals: &[String]) -> Vec<f64> {
 }
 
 /// The largest difference, where and in what.
-pub(crate) fn difference(a: &[Vec<f64>], b: &[Vec<f64>], signals: &[String]) -> (f64, String) {
-    let amplitudes = amplitudes(b, signals);
+pub(crate) fn difference(
+    a: &[Vec<f64>],
+    b: &[Vec<f64>],
+    signals: &[String],
+    floors: (f64, f64),
+) -> (f64, String) {
+    let amplitudes = amplitudes(b, signals, floors);
     let mut worst = (0.0, String::new());
     for (k, (one, other)) in a.iter().zip(b).enumerate() {
         for (j, (x, y)) in one.iter().zip(other).enumerate() {
@@ -153,6 +191,17 @@ pub(crate) fn difference(a: &[Vec<f64>], b: &[Vec<f64>], signals: &[String]) -> 
         }
     }
     worst
+}
+
+/// The rows that are at no edge of a source. Where the state jumps at the instant of a row, the oracle's row is the one before.
+fn beside_edges(circuit: &Circuit, rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let edges = oracle::corners(circuit);
+    let is_beside = |k: usize| {
+        let t = (k + 1) as f64 * circuit.step();
+        edges.iter().all(|e| (e - t).abs() > 1e-9 * circuit.step())
+    };
+    let kept = rows.iter().enumerate().filter(|(k, _)| is_beside(*k));
+    kept.map(|(_, row)| row.clone()).collect()
 }
 
 /// Whether every switch and diode has resistances that the oracle can work with as they stand.
@@ -214,11 +263,13 @@ fn ohms(circuit: &Circuit) -> f64 {
     }
 }
 
-/// What the oracle says about a circuit: rows, and their own error.
-pub(crate) fn expected(circuit: &Circuit) -> Result<(Vec<Vec<f64>>, f64), String> {
+/// What the oracle says about a circuit for so many multiplications: rows, and their own error.
+pub(crate) fn expected(circuit: &Circuit, budget: u64) -> Result<(Vec<Vec<f64>>, f64), String> {
     let signals = states(circuit);
+    let budget = Cell::new(budget);
+    let least = floors(circuit);
     let answer = |circuit: &Circuit, tolerance| {
-        oracle::simulate(circuit, tolerance)
+        oracle::simulate(circuit, tolerance, &budget)
             .map(|a| a.rows)
             .map_err(|e| e.0)
     };
@@ -226,7 +277,7 @@ pub(crate) fn expected(circuit: &Circuit) -> Result<(Vec<Vec<f64>>, f64), String
         && let Ok(rows) = answer(circuit, 1e-7)
     {
         let coarse = answer(circuit, 1e-6)?;
-        let error = difference(&coarse, &rows, &signals).0;
+        let error = difference(&coarse, &rows, &signals, least).0;
         return Ok((rows, error));
     }
     // Towards the ideal circuit: three decades and what they tend to.
@@ -245,11 +296,15 @@ pub(crate) fn expected(circuit: &Circuit) -> Result<(Vec<Vec<f64>>, f64), String
     let mut coarse = limit(&one, &last);
     let mut error = f64::INFINITY;
     for e in [1e-6, 1e-7, 1e-8] {
-        // Smaller ones may be beyond the oracle.
-        let Ok(next) = at(e) else { break };
+        let next = match at(e) {
+            Ok(next) => next,
+            Err(why) if error == f64::INFINITY => return Err(why),
+            // Smaller ones may be beyond the oracle.
+            Err(_) => break,
+        };
         let fine = limit(&last, &next);
         // The rest falls at least with e.
-        error = 0.3 * difference(&coarse, &fine, &signals).0;
+        error = 0.3 * difference(&coarse, &fine, &signals, least).0;
         (last, coarse) = (next, fine);
         if error < 0.3 * AGREES {
             break;
@@ -283,45 +338,77 @@ pub(crate) fn base(case: &Case) -> Result<Base, Outcome> {
     }
 }
 
-/// `circ` against the oracle.
-pub(crate) fn judge(case: &Case, base: &Base) -> Outcome {
+/// `circ` against the oracle, which may spend so many multiplications.
+pub(crate) fn judge(case: &Case, base: &Base, budget: u64) -> Outcome {
     let signals = states(&case.circuit);
     let (run, found) = (&base.run, &base.rows);
-    let (expected, error) = match expected(&case.circuit) {
+    // Whatever the oracle says.
+    let mut notes = run.notes.iter();
+    if let Some(fault) = notes.find(|n| n.text.contains("internal error")) {
+        return Outcome::Panicked(fault.text.clone());
+    }
+    let (expected, error) = match expected(&case.circuit, budget) {
         Ok(e) => e,
         Err(e) => return Outcome::Declined(e),
     };
     if error > UNSURE {
         return Outcome::Declined(format!("its own error is {error:.1e}"));
     }
-    let (difference, what) = difference(found, &expected, &signals);
-    if let Some(fault) = run.notes.iter().find(|n| n.contains("internal error")) {
-        return Outcome::Panicked(format!("{fault} (differs by {difference:.1e})"));
-    }
+    let least = floors(&case.circuit);
+    let (worst, what) = difference(found, &expected, &signals, least);
     let (method, stated) = method(run);
-    if difference <= AGREES + 3.0 * error + stated {
+    let allowed = AGREES + 3.0 * error + stated;
+    if worst <= allowed {
         return Outcome::Agrees {
-            difference,
+            difference: worst,
             error,
             method,
         };
+    }
+    let [one, other] = [found, &expected].map(|rows| beside_edges(&case.circuit, rows));
+    if one.len() < found.len() && difference(&one, &other, &signals, least).0 <= allowed {
+        return Outcome::Explained("the state jumps at the instant of a row".into());
+    }
+    // Steps that state too small an error.
+    if run.method != "exact"
+        && let Ok(run) = run_to(&case.circuit.text(), Method::Auto, FINER)
+        && let Ok(found) = rows(&run, &case.circuit, &signals)
+        && difference(&found, &expected, &signals, least).0 <= AGREES + 3.0 * error
+    {
+        return Outcome::Explained(
+            "steps are further off than they state, finer ones agree".into(),
+        );
     }
     // What competes for an impulse shares it by ratios of resistances that an ideal circuit does not have.
     if run
         .notes
         .iter()
-        .any(|n| n.contains("compete for an impulse"))
+        .any(|n| n.text.contains("compete for an impulse"))
     {
         return Outcome::Explained("elements compete for an impulse".into());
     }
     let what =
         format!("{what} ({method}, stated {stated:.1e}, the oracle's own error {error:.1e})");
-    Outcome::Differs { difference, what }
+    Outcome::Differs {
+        difference: worst,
+        what,
+    }
+}
+
+/// What becomes of a case that `circ` refuses: where the oracle has no answer either, there may be none.
+pub(crate) fn refused(case: &Case, why: String, budget: u64) -> Outcome {
+    match expected(&case.circuit, budget) {
+        Ok((_, error)) if error <= UNSURE => Outcome::Refused(why),
+        _ => Outcome::Declined("nor has circ an answer".into()),
+    }
 }
 
 /// What made the rows, and the error that it states itself: an exact run that hands over to steps says so.
 fn method(run: &Run) -> (String, f64) {
-    let handed_over = run.notes.iter().any(|n| n.contains("exact integration"));
+    let handed_over = run
+        .notes
+        .iter()
+        .any(|n| n.text.contains("exact integration"));
     let method = match (run.method.as_str(), handed_over) {
         ("exact", true) => "exact and steps".to_string(),
         ("exact", false) => return ("exact".into(), 0.0),
@@ -375,7 +462,7 @@ pub(crate) fn unchanged(
             names,
         )
     };
-    let (difference, what) = difference(&other, &rows, &signals);
+    let (difference, what) = difference(&other, &rows, &signals, floors(circuit));
     let ((one, error), (two, other_error)) = (method(&base.run), method(&second));
     let method = format!("{one}, {two}");
     Some(if difference <= AGREES + error + other_error {

@@ -68,7 +68,7 @@ fn standard_values() {
     let run = converges("buck-feedback", 100, "i(l1)", 20e-9, 3e-3);
     // Between the transistors the inductor's current goes through a body diode.
     assert!(
-        run.events.iter().any(|e| e.1.contains("dn")),
+        run.events.iter().any(|e| e.concerns("dn")),
         "{:?}",
         run.events
     );
@@ -102,7 +102,7 @@ fn double_crossings() {
             let opened = run
                 .events
                 .iter()
-                .filter(|e| inside(e.0) && e.1.contains("sn on"));
+                .filter(|e| inside(e.t) && e.turns("sn", true));
             opened.count()
         })
         .max();
@@ -115,12 +115,12 @@ fn double_crossings() {
 fn a_multivalued_comparator_behind_lags_cycles() {
     converges("buck-multivalued", 20, "i(l1)", 4e-9, 0.02);
     let run = exact("buck-multivalued", 200);
-    assert!(run.notes.iter().all(|n| !n.contains("bcomp slides")));
+    assert!(run.notes.iter().all(|n| !n.text.contains("bcomp slides")));
     let crossings: Vec<f64> = run
         .events
         .iter()
-        .filter(|e| e.1.contains("sn on"))
-        .map(|e| e.0)
+        .filter(|e| e.turns("sn", true))
+        .map(|e| e.t)
         .collect();
     let intervals = crossings.windows(2).map(|w| w[1] - w[0]);
     let (shortest, longest) = intervals.fold((f64::INFINITY, 0.0_f64), |(s, l), dt| {
@@ -138,7 +138,7 @@ fn a_multivalued_comparator_slides() {
     assert!(
         run.notes
             .iter()
-            .any(|n| n.starts_with("bcomp slides") && n.contains("12 times")),
+            .any(|n| n.text.starts_with("bcomp slides") && n.text.contains("12 times")),
         "{:?}",
         run.notes
     );

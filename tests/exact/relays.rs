@@ -12,7 +12,7 @@ const MS: f64 = 1e-3;
 fn two_relays_pass_their_accumulation_point_and_stay() {
     let found = exact("two-relays");
     let grid = run("two-relays", SimOptions::default());
-    let events: Vec<f64> = found.events.iter().map(|e| e.0 / MS).collect();
+    let events: Vec<f64> = found.events.iter().map(|e| e.t / MS).collect();
     let (mut t, mut interval) = (0.1, 1.1 / 3.0);
     for found in &events[..20] {
         assert!((found - t).abs() < 1e-12, "{found} {t}");
@@ -30,11 +30,11 @@ fn two_relays_pass_their_accumulation_point_and_stay() {
             assert!(v.abs() < 1e-12, "{node} = {v} at {t}");
         }
     }
-    assert!(found.notes.iter().any(|n| n.contains("accumulate")));
+    assert!(found.notes.iter().any(|n| n.text.contains("accumulate")));
     for relay in ["bs1", "bs2"] {
         let note = format!("{relay} slides");
         assert!(
-            found.notes.iter().any(|n| n.starts_with(&note)),
+            found.notes.iter().any(|n| n.text.starts_with(&note)),
             "{:?}",
             found.notes
         );
@@ -85,7 +85,7 @@ fn parallel_inverters_slide() {
         assert!((at(&grid, "v(o)", t * MS) - expected).abs() < 1e-9, "{t}");
     }
     assert!(grid.events.len() < 12, "{:?}", grid.events);
-    let slides = grid.notes.iter().filter(|n| n.contains("slides"));
+    let slides = grid.notes.iter().filter(|n| n.text.contains("slides"));
     assert_eq!(slides.count(), 3, "{:?}", grid.notes);
     // Moreau's scheme is of first order.
     for probe in ["v(o)", "i(l1)", "i(l2)", "i(l3)"] {

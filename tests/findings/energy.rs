@@ -1,7 +1,7 @@
 //! Energy, stated errors and verification.
 
 use super::*;
-use circ::integrate::JumpReason;
+use circ::integrate::{JumpReason, Places};
 use circ::report::text;
 
 const STEPPED: [Method; 2] = [Method::Theta, Method::Euler];
@@ -115,7 +115,7 @@ fn a_dead_time_without_a_path_destroys_the_current_and_says_so() {
         let lost: f64 = jumps.first.iter().map(|jump| jump.loss).sum();
         assert!((run.energy.jumps - lost).abs() < 1e-15 && jumps.all.1 == lost);
         assert!(run.energy.residual_relative < 1e-9, "{:?}", run.energy);
-        let [warning] = &text::warnings(&run)[..] else {
+        let [warning] = &text::warnings(&run, Places::default())[..] else {
             panic!("one warning");
         };
         assert!(

@@ -207,7 +207,7 @@ fn a_driven_node_keeps_its_voltage() {
         [10.0, 1.0]
     );
     assert!(
-        run.notes.iter().any(|n| n.contains("drives v(b)")),
+        run.notes.iter().any(|n| n.text.contains("drives v(b)")),
         "{:?}",
         run.notes
     );

@@ -9,6 +9,7 @@ mod curved;
 mod energy;
 mod front;
 mod jumps;
+mod notes;
 mod numbers;
 mod output;
 #[path = "../runs/mod.rs"]

@@ -18,7 +18,7 @@ fn difference(a: &Run, b: &Run, probe: &str) -> f64 {
 #[track_caller]
 fn assert_exact(run: &Run, steps: u64) {
     assert!(
-        run.notes.iter().all(|note| !note.contains("steps")),
+        run.notes.iter().all(|note| !note.text.contains("steps")),
         "{:?}",
         run.notes
     );
@@ -222,7 +222,7 @@ fn inductors_that_share_a_diode_are_left_to_steps_where_roff_is_large() {
         let replaced = [("roff=1e16", roff), ("tran 20u 60m", "tran 20u 15m")];
         let run = changed("star_of_inductors", &replaced, Method::Auto);
         assert!(
-            run.notes.iter().any(|note| note.contains("decades")),
+            run.notes.iter().any(|note| note.text.contains("decades")),
             "{:?}",
             run.notes
         );
@@ -242,7 +242,7 @@ fn inductors_that_share_a_diode_are_left_to_steps_where_roff_is_large() {
 fn states_that_decay_together_too_fast_are_a_note() {
     let told = |roff: &str| {
         let run = changed("llc_large_roff", &[("roff=1e15", roff)], Method::Exact);
-        run.notes.iter().any(|n| n.contains("decay together"))
+        run.notes.iter().any(|n| n.text.contains("decay together"))
     };
     assert!(told("roff=1e15"));
     assert!(!told("roff=1e9"));

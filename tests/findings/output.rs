@@ -371,7 +371,7 @@ fn a_print_step_that_shows_nothing_is_a_warning() {
     let found = warned("print_step", &rectifier).expect("a warning");
     assert!(
         found.starts_with(
-            "warning: the print step, 10 ms, is half or more of the period of v1, 20 ms"
+            "warning: net.cir:4:1: the print step, 10 ms, is half or more of the period of v1, 20 ms"
         ),
         "{found}"
     );
@@ -473,7 +473,7 @@ fn a_second_run_verifies_the_first() {
             wrong.waveforms.values[k * width + column("v(b)")] = 0.0;
         }
     }
-    wrong.events.retain(|e| !(203e-6..209e-6).contains(&e.0));
+    wrong.events.retain(|e| !(203e-6..209e-6).contains(&e.t));
     let found = judged(&wrong);
     assert!(!found.holds() && found.signal == "v(b)", "{found:?}");
     assert!((203.2e-6..208.1e-6).contains(&found.time), "{found:?}");
@@ -522,4 +522,21 @@ fn corners_jumps_and_events_have_rows() {
             "{method}"
         );
     }
+}
+
+/// A system of matrices says nothing of the powers of its sources and losses.
+#[test]
+fn a_system_without_a_circuit_reports_no_energies() {
+    let folder = place(&[]);
+    let system = r#"{"schema":"circ-lcs/1","states":[{"name":"v(c1)","unit":"V"}],"A":[[-1]],"x0":[1],
+        "tran":{"tstep":0.1,"tstop":1,"uic":true}}"#;
+    fs::write(folder.path().join("a.json"), system).expect("a system");
+    let json = ends(folder.path(), "sim a.json -o a.csv --summary json");
+    let summary: serde_json::Value = serde_json::from_slice(&json.stderr).expect("JSON");
+    let energy = summary["energy"].as_object().expect("keys");
+    assert!(energy.contains_key("residual_relative"));
+    assert!(energy.values().all(serde_json::Value::is_null), "{summary}");
+    let words = said(&ends(folder.path(), "sim a.json -o a.csv --summary text"));
+    assert!(!words.contains("energy: "), "{words}");
+    assert!(words.contains("no powers to balance"), "{words}");
 }

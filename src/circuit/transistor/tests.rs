@@ -65,6 +65,8 @@ fn thresholds_and_resistances() {
             "M1 b g 0 m m=2\n.model m VDMOS(Vto=3 Ron=0.1 Vds=100)",
             (3.0, 0.05, 1.0),
         ),
+        // An explicit 0 is an ideal channel.
+        ("M1 b g 0 m\n.model m VDMOS(Vto=3 Ron=0)", (3.0, 0.0, 1.0)),
         // A JFET at 0 V: 1/(2·1e-3·(0 + 3)) + 1 + 2.
         (
             "J1 b g 0 m\n.model m NJF(Vto=-3 Beta=1m Rd=1 Rs=2)",

@@ -106,7 +106,7 @@ impl Ahead {
     }
 }
 
-impl Exact<'_> {
+impl Exact {
     /// See [`Stepper::rows_ahead`](crate::integrate::run::Stepper::rows_ahead).
     pub(super) fn take_rows(&mut self, times: &Times, k: usize) -> &[f64] {
         let ahead = &mut self.ahead;
@@ -286,7 +286,7 @@ mod tests {
                 let largest = rows.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
                 let far = far.fold(0.0, f64::max) / largest;
                 assert!(far < 2e-13, "{far:e}");
-                let apart = events.iter().zip(&found).map(|(a, b)| (a.0 - b.0).abs());
+                let apart = events.iter().zip(&found).map(|(a, b)| (a.t - b.t).abs());
                 assert!(apart.fold(0.0, f64::max) < 1e-15 && events.len() == found.len());
             }
         }

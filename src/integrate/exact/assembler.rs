@@ -1,5 +1,7 @@
 //! The circuit reduced for a mode, switches on their thresholds included.
 
+use std::sync::Arc;
+
 use crate::integrate::run::{Reason, SimError};
 use crate::integrate::switching::Threshold;
 use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
@@ -15,10 +17,32 @@ pub(crate) struct Step {
     pub(crate) pair: usize,
 }
 
+/// Where the function blocks of a behaviour jump; pairs are those of its [standard form](Behaviour::standard).
+pub(crate) fn steps_of(original: &Behaviour) -> Vec<Step> {
+    let mut steps = Vec::new();
+    let mut first = 0;
+    for pair in &original.pairs {
+        let vertices = pair.port.law.curve().map_or_else(Vec::new, |c| c.vertices);
+        let jumps = vertices
+            .windows(2)
+            .enumerate()
+            .filter(|(_, w)| w[0].0.f64 == w[1].0.f64);
+        if pair.fixed_role {
+            steps.extend(jumps.map(|(k, _)| Step {
+                device: pair.port.device.clone(),
+                pair: first + k,
+            }));
+        }
+        let ideal = !pair.fixed_role && pair.port.law.is_ideal_diode();
+        first += if ideal { 1 } else { vertices.len().max(1) };
+    }
+    steps
+}
+
 /// Reduces one behaviour (with ideal pairs) for its modes.
 #[derive(Debug)]
-pub struct Assembler<'a> {
-    behaviour: &'a Behaviour,
+pub struct Assembler {
+    behaviour: Arc<Behaviour>,
     /// The behaviours with some switches on their thresholds.
     sliding: Vec<(Vec<usize>, Behaviour)>,
     steps: Vec<Step>,
@@ -26,10 +50,10 @@ pub struct Assembler<'a> {
     known: Option<(Vec<bool>, Lcs)>,
 }
 
-impl<'a> Assembler<'a> {
+impl Assembler {
     /// For a behaviour whose laws are ideal pairs, see [`Behaviour::standard`].
     #[must_use]
-    pub fn new(behaviour: &'a Behaviour) -> Self {
+    pub fn new(behaviour: Arc<Behaviour>) -> Self {
         Self {
             behaviour,
             sliding: Vec::new(),
@@ -44,30 +68,14 @@ impl<'a> Assembler<'a> {
         self
     }
 
-    /// Has it known where the function blocks of the behaviour *before* [`Behaviour::standard`] jump, so that a run can tell
-    /// when they slide.
+    /// Has it known where function blocks jump, so that a run can tell when they slide.
     #[must_use]
-    pub fn with_steps_of(mut self, original: &Behaviour) -> Self {
-        let mut first = 0;
-        for pair in &original.pairs {
-            let vertices = pair.port.law.curve().map_or_else(Vec::new, |c| c.vertices);
-            let jumps = vertices
-                .windows(2)
-                .enumerate()
-                .filter(|(_, w)| w[0].0.f64 == w[1].0.f64);
-            if pair.fixed_role {
-                self.steps.extend(jumps.map(|(k, _)| Step {
-                    device: pair.port.device.clone(),
-                    pair: first + k,
-                }));
-            }
-            let ideal = !pair.fixed_role && pair.port.law.is_ideal_diode();
-            first += if ideal { 1 } else { vertices.len().max(1) };
-        }
+    pub(crate) fn with_steps(mut self, steps: Vec<Step>) -> Self {
+        self.steps = steps;
         self
     }
 
-    /// See [`Self::with_steps_of`].
+    /// See [`Self::with_steps`].
     pub(crate) fn steps(&self) -> &[Step] {
         &self.steps
     }
@@ -118,12 +126,12 @@ impl<'a> Assembler<'a> {
                 switches: switches.to_vec(),
                 storage: StorageHold::Dynamic,
             };
-            return reduce(self.behaviour, &position).map_err(|e| SimError::before(e.into()));
+            return reduce(&self.behaviour, &position).map_err(|e| SimError::before(e.into()));
         }
         let at = match self.sliding.iter().position(|(s, _)| s == sliding) {
             Some(at) => at,
             None => {
-                let mut behaviour = self.behaviour.clone();
+                let mut behaviour = Behaviour::clone(&self.behaviour);
                 // From the last on, so that the indices before stay.
                 for &k in sliding.iter().rev() {
                     let switch = &self.behaviour.switches[k];

@@ -105,8 +105,14 @@ impl Shape {
 }
 
 impl Exosystem {
-    /// The exosystem of these sources over [from, until], those that are `silent` left out; `None` if one has no closed form.
-    pub(crate) fn of(sources: &[Source], silent: Vec<bool>, from: f64, until: f64) -> Option<Self> {
+    /// The exosystem of these sources over [from, until], those that are `silent` left out; `None` if one has no closed form. Where they
+    /// are `free` each may be given another value at any time.
+    pub(crate) fn of(
+        sources: &[Source],
+        silent: Vec<bool>,
+        (from, until): (f64, f64),
+        free: bool,
+    ) -> Option<Self> {
         let blank = Source {
             dc: 0.0,
             wave: Wave::Dc(0.0),
@@ -116,7 +122,9 @@ impl Exosystem {
         for (source, silent) in sources.iter().zip(&silent) {
             let source = if *silent { &blank } else { source };
             let piece = source.piece(from)?;
-            shapes.push(Shape::of_source(source, from, until)?);
+            let mut shape = Shape::of_source(source, from, until)?;
+            shape.changes |= free;
+            shapes.push(shape);
             first.push(piece);
         }
         Some(Self {
@@ -363,7 +371,8 @@ mod tests {
             }),
             source(Wave::Dc(4.0)),
         ];
-        let mut exosystem = Exosystem::of(&sources, vec![false; sources.len()], 0.0, 3.0).unwrap();
+        let mut exosystem =
+            Exosystem::of(&sources, vec![false; sources.len()], (0.0, 3.0), false).unwrap();
         // one, a line 2, a step 1, one shared pair, a step and a damped pair, a step and two decays
         assert_eq!(exosystem.dim(), 1 + 2 + 1 + 2 + 3 + 3);
         let mut z = DVector::zeros(exosystem.dim());

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::diagnostic::Internal;
 use crate::integrate::jump::{Infeasible, Jump, JumpProblem};
-use crate::lcs::{Lcs, Outputs, Role, Rows};
+use crate::lcs::{Lcs, Role};
 use crate::solve::{Driver, Status, norm};
 
 /// One implicit step prepared: λ solves LCP(M, q) with M = D + hC W⁻¹B, W = I − hA.
@@ -195,55 +195,5 @@ impl Free {
     /// Factorisations spent in proposals.
     pub(crate) fn factorisations(&self) -> u64 {
         self.steps.iter().map(|s| s.driver.factorisations).sum()
-    }
-
-    /// Impulses of the ports by the name of their device's quantity, with areas.
-    pub(crate) fn impulses(&self, p: &DVector<f64>) -> Vec<(String, f64)> {
-        /// Areas below this part of the largest of their kind are rounding.
-        const ROUNDING: f64 = 1e-12;
-        let through = &self.lcs.d * p;
-        let (mut currents, mut voltages) = (Vec::new(), Vec::new());
-        let Outputs {
-            power,
-            power_v,
-            power_i,
-            ..
-        } = &self.lcs.outputs;
-        let element = |name: &str| power.iter().position(|term| term.element == name);
-        for (j, port) in self.lcs.ports.iter().enumerate() {
-            // Of a device of several pairs, `d1.2`, its own current and voltage.
-            let whole = port
-                .device
-                .rsplit_once('.')
-                .filter(|_| element(&port.device).is_none());
-            if let Some((device, k)) =
-                whole.and_then(|(device, _)| Some((device, element(device)?)))
-            {
-                let area = |rows: &Rows| rows.lambda.row(k).transpose().dot(p);
-                currents.push((format!("i({device})"), area(power_i)));
-                voltages.push((format!("v({device})"), area(power_v)));
-                continue;
-            }
-            let (current, voltage) = match port.role {
-                Role::Current => (p[j], -through[j]),
-                Role::Voltage => (through[j], -p[j]),
-                Role::Function => {
-                    currents.push((port.lambda.clone(), p[j]));
-                    continue;
-                }
-            };
-            currents.push((format!("i({})", port.device), current));
-            voltages.push((format!("v({})", port.device), voltage));
-        }
-        let mut all: Vec<(String, f64)> = Vec::new();
-        for kind in [currents, voltages] {
-            let largest = kind.iter().fold(0.0_f64, |a, (_, area)| a.max(area.abs()));
-            for (name, area) in kind {
-                if area.abs() > ROUNDING * largest && !all.iter().any(|(n, _)| *n == name) {
-                    all.push((name, area));
-                }
-            }
-        }
-        all
     }
 }

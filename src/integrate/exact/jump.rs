@@ -7,6 +7,7 @@ use super::mode::Key;
 use super::stepper::Exact;
 use super::transition::{PROPOSALS, Trigger};
 use crate::integrate::energy::{self, Balance};
+use crate::integrate::impulses;
 use crate::integrate::run::{Log, Reason, SimError};
 use crate::integrate::settle;
 use crate::integrate::stats::{JumpReason, StateJump};
@@ -22,7 +23,7 @@ pub(super) struct Before {
     impulses: usize,
 }
 
-impl Exact<'_> {
+impl Exact {
     /// What stands before a jump from here.
     pub(super) fn before_jump(&self, log: &Log) -> Before {
         Before {
@@ -117,7 +118,8 @@ impl Exact<'_> {
         let lcs = &free.lcs;
         self.balance
             .add_jump(energy::taking_over(lcs, &self.storage, x, &joined));
-        for (name, area) in free.impulses(p) {
+        let step = &u - &self.before;
+        for (name, area) in impulses::of_jump(lcs, p, step.as_slice()) {
             log.impulse(t, name, area);
         }
         let source = energy::source_work_of_jump(

@@ -37,5 +37,6 @@ mod work;
 pub(super) mod tests;
 
 pub use assembler::Assembler;
+pub(crate) use assembler::{Step, steps_of};
 pub(crate) use pause::Place;
 pub use stepper::{Exact, Setup};

@@ -14,6 +14,7 @@ use super::rays;
 use super::schedule::Drive;
 use super::transition::Trigger;
 use super::work::Term;
+use crate::integrate::event::Change;
 use crate::integrate::switching::Threshold;
 use crate::lcs::{Lcs, PowerKind, Rows};
 
@@ -155,7 +156,7 @@ pub(crate) struct Mode {
     /// What followed: why it was left and for which mode, the latest first.
     pub(crate) successors: Vec<(Trigger, usize)>,
     /// What the log says about a change from here to other modes.
-    pub(crate) labels: Vec<(usize, Arc<str>)>,
+    pub(crate) labels: Vec<(usize, Arc<[Change]>)>,
 }
 
 /// Rows over [x | u | u' | 1] as rows over w, with u = H z and u' = H S z.
@@ -365,7 +366,7 @@ impl Mode {
     }
 
     /// What is said of a change to mode `to`, if that is known.
-    pub(crate) fn label(&self, to: usize) -> Option<&Arc<str>> {
+    pub(crate) fn label(&self, to: usize) -> Option<&Arc<[Change]>> {
         let (_, label) = self.labels.iter().find(|(at, _)| *at == to)?;
         Some(label)
     }

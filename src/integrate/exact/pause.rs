@@ -1,12 +1,16 @@
-//! Leaving a run to another method, and taking it up again.
+//! Leaving a run to another method, taking it up again, and giving sources other values on the way.
 
 use nalgebra::DVector;
 
+use super::accumulation::Accumulation;
 use super::mode::Key;
 use super::stepper::Exact;
 use super::transition::Trigger;
+use crate::circuit::Source;
 use crate::integrate::Energy;
+use crate::integrate::energy::Balance;
 use crate::integrate::run::{Log, Reason, SimError};
+use crate::integrate::switching::fire;
 
 /// Where one method leaves a run and another goes on.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,7 +23,80 @@ pub(crate) struct Place {
     pub(crate) switches: Vec<bool>,
 }
 
-impl Exact<'_> {
+impl Exact {
+    /// Where the run stands.
+    pub(crate) fn stand(&mut self) -> Place {
+        self.end_ahead(f64::NEG_INFINITY);
+        self.take_storage();
+        Place {
+            t: self.motion.t,
+            storage: DVector::from_column_slice(&self.storage),
+            switches: self.key.switches.clone(),
+        }
+    }
+
+    /// Which ideal pairs conduct.
+    pub(crate) fn conducting(&self) -> &[bool] {
+        &self.key.closed
+    }
+
+    /// Events seen so far say nothing about those to come.
+    pub(crate) fn forget_events(&mut self) {
+        self.accumulation = Accumulation::new(f64::NEG_INFINITY);
+    }
+
+    /// The balance so far; another one to go on with.
+    pub(crate) const fn balance(&mut self) -> &mut Balance {
+        &mut self.balance
+    }
+
+    /// A source has another waveform from here on; what that makes happen is left to [`Self::resume`].
+    pub(crate) fn replace_source(&mut self, input: usize, source: Source) {
+        self.sources[input] = source;
+    }
+
+    /// A source has another waveform from here on: an edge now. For an integrator made for sources that are free.
+    ///
+    /// # Errors
+    /// As [`Stepper::advance`](crate::integrate::Stepper::advance).
+    pub(crate) fn set_source(
+        &mut self,
+        input: usize,
+        source: Source,
+        log: &mut Log,
+    ) -> Result<(), SimError> {
+        if !self.started {
+            self.start(log)?;
+        }
+        self.end_ahead(f64::NEG_INFINITY);
+        self.take_storage();
+        self.left_here.clear();
+        self.inspector.forget_slips();
+        let t = self.motion.t;
+        let Some(piece) = source.piece(t) else {
+            return Err(self.fail(Reason::Unsupported("a source has no closed form".into())));
+        };
+        self.sources[input] = source;
+        self.exosystem.set_piece(input, piece);
+        self.exosystem.write(t, &mut self.z);
+        let mut key = std::mem::take(&mut self.key);
+        for clock in &mut self.plant.clocks {
+            let i = clock.switch;
+            clock.stand_at(&self.sources, t);
+            key.switches[i] ^= clock.leaves(&self.plant.thresholds[i], key.switches[i], t);
+            clock.next = f64::INFINITY;
+        }
+        key.sliding.clear();
+        self.corner = true;
+        self.move_driven(&mut key, t);
+        for clock in &mut self.plant.clocks {
+            clock.next = f64::NEG_INFINITY;
+        }
+        self.move_guarded(&mut key, None, true);
+        fire(&self.plant.thresholds, &mut key.switches);
+        self.change(key, true, Trigger::Sources, log)
+    }
+
     /// Ends in the present mode and tells where the run stands.
     pub(crate) fn leave(&mut self) -> Place {
         self.end_ahead(f64::NEG_INFINITY);

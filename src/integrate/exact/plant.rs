@@ -14,8 +14,8 @@ use crate::lcs::Hold;
 use crate::mna::SourceControl;
 
 /// Systems and modes, created when first visited.
-pub(crate) struct Plant<'a> {
-    assembler: Assembler<'a>,
+pub(crate) struct Plant {
+    assembler: Assembler,
     /// Number of device pairs.
     pub(crate) pairs: usize,
     pub(crate) thresholds: Vec<Threshold>,
@@ -33,9 +33,9 @@ pub(crate) struct Plant<'a> {
     pub(crate) modes: Vec<Mode>,
 }
 
-impl<'a> Plant<'a> {
+impl Plant {
     /// A plant without modes; `h` is the output step, `energy` asks for the balance, `tolerance` that of complementarity residuals.
-    pub(crate) fn new(assembler: Assembler<'a>, h: f64, energy: bool, tolerance: f64) -> Self {
+    pub(crate) fn new(assembler: Assembler, h: f64, energy: bool, tolerance: f64) -> Self {
         let thresholds = assembler.thresholds();
         let valve = |t: &Threshold| {
             let valve = t.valve()?;

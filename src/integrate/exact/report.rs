@@ -4,10 +4,14 @@ use std::sync::Arc;
 
 use super::mode::Key;
 use super::stepper::Exact;
+use crate::integrate::Note;
+use crate::integrate::event::Change;
 use crate::integrate::run::Log;
 
 /// Estimated relative loss of an exponential above which it is reported.
 const LOSS: f64 = 1e-10;
+/// Estimated relative loss of an exponential above which the signs of guards are not known: steps take over.
+pub(super) const MOST_LOSS: f64 = 1e-8;
 
 /// The part of a state that the rounding of a fast rate may move over the run above which that is said: Roff = 1e12 passed where
 /// 1e15 was wrong.
@@ -22,38 +26,36 @@ pub(super) struct Slides {
     seconds: f64,
 }
 
-impl Exact<'_> {
+impl Exact {
     /// Logs which devices and switches changed.
     pub(super) fn report(&mut self, at: usize, jumped: bool, log: &mut Log) {
         let changed = self.started && self.mode != Some(at);
-        let mut words = None;
+        let mut changes: Arc<[Change]> = Arc::default();
         if changed {
             let from = self.mode.unwrap_or(at);
-            let label = match self.plant.modes[from].label(at) {
+            changes = match self.plant.modes[from].label(at) {
                 Some(label) => label.clone(),
                 None => {
-                    let label: Arc<str> = self.label(from, at).into();
+                    let label = self.label(from, at);
                     self.plant.modes[from].labels.push((at, label.clone()));
                     label
                 }
             };
-            words = Some(label).filter(|label| !label.is_empty());
             self.events += 1;
-            self.notes.extend(self.accumulation.event(self.motion.t));
-        }
-        if jumped {
-            words = Some(words.map_or("jump".into(), |label| format!("{label}, jump").into()));
+            let ended = self.accumulation.event(self.motion.t);
+            self.notes.extend(ended.map(Note::from));
         }
         if self.plant.modes[at].shared && !self.noted_shared {
             self.noted_shared = true;
-            self.notes.push(format!(
+            let text = format!(
                 "at t = {:e} s the ideal model leaves a current among conducting devices or a voltage among blocking ones \
                  undetermined: the least-norm choice is shown",
                 self.motion.t
-            ));
+            );
+            self.notes.push(text.into());
         }
-        if let Some(words) = words {
-            log.event(self.motion.t, words);
+        if jumped || !changes.is_empty() {
+            log.event(self.motion.t, changes, jumped);
         }
     }
 
@@ -113,58 +115,65 @@ impl Exact<'_> {
         self.key.sliding.clear();
     }
 
-    /// Names of what differs between two modes.
-    fn label(&self, from: usize, to: usize) -> String {
+    /// What differs between two modes.
+    fn label(&self, from: usize, to: usize) -> Arc<[Change]> {
         let [old, new] = [from, to].map(|at| &self.plant.modes[at].key);
-        let mut words: Vec<String> = Vec::new();
+        let mut changes: Vec<Change> = Vec::new();
         let thresholds = self.plant.thresholds.iter().enumerate();
         for (i, threshold) in thresholds.filter(|(_, t)| !t.is_rest()) {
             let slides = |key: &Key| key.sliding.iter().any(|s| s.0 == i);
             if slides(new) {
                 if !slides(old) {
-                    words.push(format!("{} slides", threshold.name));
+                    changes.push(Change::Slides(threshold.name.as_str().into()));
                 }
             } else if slides(old) || new.switches[i] != old.switches[i] {
-                let position = if new.switches[i] { "on" } else { "off" };
-                words.push(format!("{} {position}", threshold.name));
+                changes.push(Change::Switch {
+                    name: threshold.name.as_str().into(),
+                    on: new.switches[i],
+                });
             }
         }
         for pair in (0..self.plant.pairs).filter(|&pair| new.closed[pair] != old.closed[pair]) {
             let device = self.plant.device(pair).unwrap_or_default();
-            if !words.iter().any(|word| word == device) {
-                words.push(device.to_string());
+            if !changes.iter().any(|change| change.name() == device) {
+                let own = (0..self.plant.pairs).filter(|&p| self.plant.device(p) == Some(device));
+                changes.push(Change::Device {
+                    name: device.into(),
+                    conducts: own.into_iter().any(|p| new.closed[p]),
+                });
             }
         }
-        words.join(", ")
+        changes.into()
     }
 
     /// Notes about the run as a whole.
     pub(super) fn note_end(&mut self) {
-        self.notes.extend(self.accumulation.end());
+        self.notes.extend(self.accumulation.end().map(Note::from));
         let thresholds = &self.plant.thresholds;
         for (&i, slides) in &self.slides {
             let seconds = slides.seconds + slides.since.map_or(0.0, |since| self.motion.t - since);
-            let what = match thresholds.get(i) {
-                Some(switch) if switch.is_sharp() => format!(
-                    "{} slides on its threshold, where closing and opening contradict each other. What is shown is the limit of \
+            let (name, what) = match thresholds.get(i) {
+                Some(switch) if switch.is_sharp() => (
+                    &switch.name,
+                    "slides on its threshold, where closing and opening contradict each other. What is shown is the limit of \
                      ever faster switching; a delay that the circuit leaves out can make another mean",
-                    switch.name
                 ),
-                Some(switch) => format!(
-                    "{} slides between its thresholds: closing and opening contradict each other at once, hysteresis or not. The \
+                Some(switch) => (
+                    &switch.name,
+                    "slides between its thresholds: closing and opening contradict each other at once, hysteresis or not. The \
                      middle of the band is a choice; a delay or a capacitance that the circuit leaves out decides",
-                    switch.name
                 ),
-                None => format!(
-                    "{} slides: its input stays where its output jumps, and the output is in between. What is shown is the limit of \
+                None => (
+                    &self.plant.steps()[i - thresholds.len()].device,
+                    "slides: its input stays where its output jumps, and the output is in between. What is shown is the limit of \
                      ever faster switching; a delay that the circuit leaves out can make another mean",
-                    self.plant.steps()[i - thresholds.len()].device
                 ),
             };
-            self.notes.push(format!(
-                "{what} ({} times, first at t = {:e} s, {seconds:e} s in all)",
+            let text = format!(
+                "{name} {what} ({} times, first at t = {:e} s, {seconds:e} s in all)",
                 slides.count, slides.first
-            ));
+            );
+            self.notes.push(Note::of([name], text));
         }
         let loss = self
             .plant
@@ -175,16 +184,18 @@ impl Exact<'_> {
         let rates = self.plant.modes.iter().filter_map(|mode| mode.fast_sum());
         let fastest = rates.fold(0.0, f64::max);
         if fastest * f64::EPSILON * self.duration > SLOW_PART {
-            self.notes.push(format!(
+            let text = format!(
                 "several currents or voltages decay together at {fastest:.0e} 1/s, by a Roff or Ron far from all other resistances; what \
                  changes slowly in them may have lost its digits, and the values be wrong: `--verify` or a Roff a thousand times \
                  smaller tells"
-            ));
+            );
+            self.notes.push(text.into());
         }
         if loss > LOSS {
-            self.notes.push(format!(
+            let text = format!(
                 "the circuit is stiff without being graded: the matrix exponential is accurate to about {loss:.0e} a step"
-            ));
+            );
+            self.notes.push(text.into());
         }
     }
 }

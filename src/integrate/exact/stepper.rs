@@ -14,17 +14,16 @@ use super::metric::Metric;
 use super::mode::{Key, Owner};
 use super::motion::{Arrival, Motion};
 use super::plant::Plant;
-use super::report::Slides;
+use super::report::{MOST_LOSS, Slides};
 use super::schedule::drives;
 use super::transition::{PATIENCE, PROPOSALS, Trigger};
 use crate::circuit::Source;
+use crate::integrate::Note;
 use crate::integrate::energy::Balance;
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper, Times};
 use crate::integrate::switching::fire;
 use crate::settings::Settings;
 
-/// Estimated relative loss of an exponential above which the signs of guards are not known: steps take over.
-const MOST_LOSS: f64 = 1e-8;
 /// Times closer than this many units in the last place are one time.
 pub(super) const SAME_TIME_ULPS: f64 = 4.0;
 
@@ -32,9 +31,9 @@ pub(super) const SAME_TIME_ULPS: f64 = 4.0;
 const REST: u64 = 1 << 12;
 
 /// What a run of the exact integrator starts from.
-pub struct Setup<'a> {
+pub struct Setup {
     /// The circuit.
-    pub assembler: Assembler<'a>,
+    pub assembler: Assembler,
     /// Positions of the switches at the start.
     pub position: Vec<bool>,
     /// Start, s.
@@ -47,13 +46,15 @@ pub struct Setup<'a> {
     pub h: f64,
     /// Whether to integrate the energy balance.
     pub energy: bool,
+    /// Whether sources may be given other values on the way.
+    pub free: bool,
     /// Tolerances.
     pub settings: Settings,
 }
 
 /// See the [module](super).
-pub struct Exact<'a> {
-    pub(super) plant: Plant<'a>,
+pub struct Exact {
+    pub(super) plant: Plant,
     pub(super) sources: Vec<Source>,
     pub(super) exosystem: Exosystem,
     pub(super) motion: Motion,
@@ -100,7 +101,7 @@ pub struct Exact<'a> {
     pub(super) events: u64,
     pub(super) jumps: u64,
     pub(super) lcp_solves: u64,
-    pub(super) notes: Vec<String>,
+    pub(super) notes: Vec<Note>,
     pub(super) accumulation: Accumulation,
     pub(super) noted_shared: bool,
     /// Whether a jump between rivals has been noted.
@@ -112,12 +113,12 @@ pub struct Exact<'a> {
     pub(super) row_is_volts: Vec<bool>,
 }
 
-impl<'a> Exact<'a> {
+impl Exact {
     /// A stepper at its start, before the jump at t = 0+.
     ///
     /// # Errors
     /// The reduction's for the start position; sources that no finite linear system generates.
-    pub fn new(setup: Setup<'a>) -> Result<Self, SimError> {
+    pub fn new(setup: Setup) -> Result<Self, SimError> {
         let Setup {
             assembler,
             mut position,
@@ -126,6 +127,7 @@ impl<'a> Exact<'a> {
             start,
             h,
             energy,
+            free,
             settings,
         } = setup;
         let mut plant = Plant::new(assembler, h, energy, settings.lcp_residual);
@@ -145,7 +147,8 @@ impl<'a> Exact<'a> {
         let before = sources.iter().zip(&silent);
         let before = before.map(|(s, silent)| if *silent { 0.0 } else { s.value_left(t) });
         let before = DVector::from_iterator(sources.len(), before);
-        let exosystem = Exosystem::of(&sources, silent, t, until).ok_or_else(unsupported)?;
+        let exosystem =
+            Exosystem::of(&sources, silent, (t, until), free).ok_or_else(unsupported)?;
         plant.clocks = controls
             .into_iter()
             .map(|control| Clock::new(control, &sources, t))
@@ -330,7 +333,7 @@ impl<'a> Exact<'a> {
     }
 
     /// Moves the switches that sources alone drive and that are due before `near`; whether one moved.
-    fn move_driven(&mut self, key: &mut Key, near: f64) -> bool {
+    pub(super) fn move_driven(&mut self, key: &mut Key, near: f64) -> bool {
         let mut moved = false;
         let guarded: &[usize] = self
             .mode
@@ -354,7 +357,12 @@ impl<'a> Exact<'a> {
 
     /// Moves the switches whose guards end the mode now: the one that `fired` and all that pass their thresholds with it, in the
     /// present mode with the sources as they go on after a `corner`. Whether one moved.
-    fn move_guarded(&mut self, key: &mut Key, fired: Option<usize>, corner: bool) -> bool {
+    pub(super) fn move_guarded(
+        &mut self,
+        key: &mut Key,
+        fired: Option<usize>,
+        corner: bool,
+    ) -> bool {
         let Some(at) = self.mode else { return false };
         let mut moved = false;
         let owner = fired.map(|guard| self.plant.modes[at].owner(guard));
@@ -470,7 +478,7 @@ impl<'a> Exact<'a> {
         }
     }
 
-    fn start(&mut self, log: &mut Log) -> Result<(), SimError> {
+    pub(super) fn start(&mut self, log: &mut Log) -> Result<(), SimError> {
         self.exosystem.write(self.motion.t, &mut self.z);
         let key = std::mem::take(&mut self.key);
         self.change(key, true, Trigger::Sources, log)?;
@@ -479,7 +487,7 @@ impl<'a> Exact<'a> {
     }
 }
 
-impl Stepper for Exact<'_> {
+impl Stepper for Exact {
     fn time(&self) -> f64 {
         if self.ahead.leads() {
             self.ahead.t
@@ -529,6 +537,9 @@ impl Stepper for Exact<'_> {
                 Arrival::Resting => {}
             }
             log.go_on(self.motion.t)?;
+            if log.pauses() {
+                return Ok(());
+            }
             if self.motion.steps > self.settings.max_steps {
                 return Err(self.fail(Reason::TooManySteps {
                     limit: self.settings.max_steps,

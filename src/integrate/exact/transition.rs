@@ -28,7 +28,7 @@ pub(crate) enum Trigger {
     Sources,
 }
 
-impl Exact<'_> {
+impl Exact {
     /// Enters the mode from here on. Where there is none, everything is as it was before.
     pub(super) fn change(
         &mut self,

@@ -11,10 +11,10 @@ const STEP: f64 = 1e-7;
 const SHORTEST: f64 = 2e-5;
 
 /// The bridge, which is a parallel RLC circuit for its capacitor.
-fn bridge() -> Handover<'static> {
+fn bridge() -> Handover {
     let circuit = circuit(&format!("{BRIDGE}.tran 1u 5m uic\n.save v(1)"));
     let (exact, lcs, _) = prepare_circuit(&circuit, true);
-    let takeover: Takeover<'static> = Box::new(move |place| {
+    let takeover: Takeover = Box::new(move |place| {
         let lcs = lcs.clone();
         Theta::new(Setup {
             reduce: Box::new(move |_| Ok(lcs.clone())),
@@ -47,7 +47,7 @@ fn steps_take_over_where_no_mode_is_found_and_give_back() {
     let mut run = bridge();
     let mut log = Log::new(1, 0.0, false);
     let mut row = [0.0];
-    let mut error = |run: &mut Handover<'_>, t: f64| {
+    let mut error = |run: &mut Handover, t: f64| {
         run.read(&mut row);
         (row[0] - voltage(t)).abs() / 10.0
     };
@@ -69,10 +69,11 @@ fn steps_take_over_where_no_mode_is_found_and_give_back() {
     let outcome = run.finish();
     assert_eq!(
         outcome.notes,
-        [
+        [Note::of(
+            ["df1"],
             "between t = 1e-3 s and t = 1.02e-3 s Moreau's steps of 1e-7 s took the place of exact integration: df1: the \
              one-step complementarity problem has no solution (no state of the devices satisfies the circuit equations)"
-        ]
+        )]
     );
     let estimate = outcome.error.max.unwrap();
     assert!(
@@ -106,7 +107,7 @@ fn an_interval_that_was_too_short_is_doubled() {
     run.advance(4e-3, &mut log).unwrap();
     let notes = run.finish().notes;
     assert!(
-        notes.len() == 1 && notes[0].contains("(and 3 times more"),
+        notes.len() == 1 && notes[0].text.contains("(and 3 times more"),
         "{notes:?}"
     );
 }

@@ -2,6 +2,7 @@
 
 use super::statics::source;
 use crate::circuit::{Circuit, Element, Kind, NodeId, Output, Quantity, Source};
+use crate::integrate::Note;
 use crate::integrate::start::OperatingPoint;
 
 /// v(a) − v(b), V.
@@ -99,11 +100,15 @@ impl Guess {
     }
 
     /// What to say where the operating point has another voltage.
-    pub(super) fn missed(&self, found: &Self, circuit: &Circuit) -> String {
+    pub(super) fn missed(&self, found: &Self, circuit: &Circuit) -> Note {
         let node = &circuit.nodes[self.node.index()];
-        format!(
-            "a source drives v({node}), which starts at {} V; the {} V prescribed for it are a guess",
-            found.volts, self.volts
+        let here = |e: &&Element| [e.p, e.n].contains(&self.node);
+        Note::of(
+            circuit.elements.iter().find(here).map(|e| &e.name),
+            format!(
+                "a source drives v({node}), which starts at {} V; the {} V prescribed for it are a guess",
+                found.volts, self.volts
+            ),
         )
     }
 }

@@ -3,24 +3,13 @@
 use super::prescribed::Voltage;
 use crate::circuit::source::Wave;
 use crate::circuit::{Circuit, Element, ElementId, Kind, NodeId, Output, Probe, Probed, Source};
+use crate::integrate::Note;
 
 /// The circuit with all node voltages and element currents as probes.
 pub(super) fn observed_circuit(circuit: &Circuit) -> Circuit {
-    let nodes = circuit
-        .nodes
-        .iter()
-        .enumerate()
-        .skip(1)
-        .map(|(i, name)| Probe {
-            name: format!("v({name})"),
-            what: Probed::Voltage(NodeId(i as u32), NodeId::GROUND),
-        });
-    let currents = circuit.elements.iter().enumerate().map(|(i, e)| Probe {
-        name: format!("i({})", e.name),
-        what: Probed::Current(ElementId(i as u32)),
-    });
+    let currents = circuit.currents_of(|_| true);
     Circuit {
-        probes: nodes.chain(currents).collect(),
+        probes: circuit.all_voltages().chain(currents).collect(),
         ..circuit.clone()
     }
 }
@@ -86,7 +75,7 @@ pub(super) fn tie_floating(
     circuit: &Circuit,
     statics: &mut Circuit,
     held: &[Voltage],
-    notes: &mut Vec<String>,
+    notes: &mut Vec<Note>,
 ) -> Vec<usize> {
     let mut tied = Vec::new();
     let (dc, all) = (conductive(circuit, false), conductive(circuit, true));
@@ -106,8 +95,10 @@ pub(super) fn tie_floating(
                 what: Probed::Current(ElementId(statics.elements.len() as u32)),
             });
             statics.elements.push(tie);
-            notes.push(format!(
-                "node {name} is held by capacitors alone and starts at 0 V"
+            let here = |e: &&Element| [e.p, e.n].iter().any(|n| n.index() == i);
+            notes.push(Note::of(
+                circuit.elements.iter().find(here).map(|e| &e.name),
+                format!("node {name} is held by capacitors alone and starts at 0 V"),
             ));
             tied.push(i);
         }

@@ -2,7 +2,7 @@
 
 use super::*;
 
-impl Theta<'_> {
+impl Theta {
     /// Rounding of the difference of two times near `t`.
     pub(super) fn slack(t: f64) -> f64 {
         8.0 * f64::EPSILON * t.abs()
@@ -245,9 +245,18 @@ impl Theta<'_> {
             |(&lambda, port): (&Option<bool>, &Port)| lambda == Some(port.role != Role::Voltage);
         let pattern: Vec<bool> = seen.iter().zip(ports).map(on).collect();
         if pattern != *before && self.started {
-            let changed = (0..pattern.len()).filter(|&j| pattern[j] != before[j]);
-            let names: Vec<&str> = changed.map(|j| ports[j].device.as_str()).collect();
-            self.pending.push((t, names.join(" ")));
+            let mut changes: Vec<Change> = Vec::new();
+            for (j, port) in ports.iter().enumerate() {
+                let known = || changes.iter().any(|change| change.name() == port.device);
+                if pattern[j] != before[j] && !known() {
+                    let own = |k: &usize| ports[*k].device == port.device;
+                    changes.push(Change::Device {
+                        name: port.device.as_str().into(),
+                        conducts: (0..ports.len()).filter(own).any(|k| pattern[k]),
+                    });
+                }
+            }
+            self.pending.push((t, changes.into()));
         }
         self.modes.insert((self.now.system, pattern.clone()));
         self.now.active = basis;

@@ -1,11 +1,12 @@
 //! What happens in no time: the start, edges of sources, switches.
 
 use super::*;
+use crate::integrate::impulses;
 use crate::integrate::jump::Jump;
 use crate::integrate::settle;
 use crate::integrate::stats::{JumpReason, StateJump};
 
-impl Theta<'_> {
+impl Theta {
     /// The first jump: from inconsistent initial values, by edges of the sources at the start.
     pub(super) fn begin(&mut self, log: &mut Log) -> Result<(), SimError> {
         let u = self.inputs.all(self.now.t);
@@ -102,7 +103,7 @@ impl Theta<'_> {
         self.now.x.copy_from_slice(after.as_slice());
         if size > JUMP {
             self.stats.jumps += 1;
-            log.event(t, "jump");
+            log.event(t, Arc::default(), true);
         }
         if size > JUMP || step.iter().any(|s| *s != 0.0) {
             self.log_impulses(t, p, &step, log);
@@ -189,56 +190,17 @@ impl Theta<'_> {
         }))
     }
 
-    /// Impulses of the ports and of the outputs, by name, once each.
+    /// Logs the impulses of a jump by port impulses p and steps of the inputs.
     pub(super) fn log_impulses(&self, t: f64, p: &[f64], step: &[f64], log: &mut Log) {
-        let lcs = &self.system().lcs;
-        let mut named: Vec<(String, f64)> = Vec::new();
-        let mut add = |name: String, area: f64, scale: f64| {
-            if area.abs() > 1e-12 * scale && !named.iter().any(|(other, _)| *other == name) {
-                named.push((name, area));
-            }
-        };
-        let through = &lcs.d * DVector::from_column_slice(p);
-        for kind in [Role::Current, Role::Voltage] {
-            // λ and y of the ports as currents first, then as voltages; scales are those of all ports together.
-            let scale = |values: &[f64]| values.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
-            for (j, port) in lcs.ports.iter().enumerate() {
-                let current = format!("i({})", port.device);
-                let voltage = format!("v({})", port.device);
-                match (port.role, kind) {
-                    (Role::Current, Role::Current) => add(current, p[j], scale(p)),
-                    (Role::Voltage, Role::Current) => {
-                        add(current, through[j], scale(through.as_slice()));
-                    }
-                    (Role::Voltage, _) => add(voltage, -p[j], scale(p)),
-                    (Role::Current, _) => {
-                        add(voltage, -through[j], scale(through.as_slice()));
-                    }
-                    (Role::Function, _) => add(port.lambda.clone(), p[j], scale(p)),
-                }
-            }
-        }
-        let outputs = &lcs.outputs;
-        for (i, name) in outputs.names.iter().enumerate() {
-            let area = reading::impulse(&outputs.rows, i, p, step);
-            let size = (0..p.len())
-                .map(|j| {
-                    if i < outputs.rows.lambda.nrows() && j < outputs.rows.lambda.ncols() {
-                        (outputs.rows.lambda[(i, j)] * p[j]).abs()
-                    } else {
-                        0.0
-                    }
-                })
-                .fold(0.0, f64::max);
-            add(name.clone(), area, size);
-        }
+        let p = DVector::from_column_slice(p);
+        let named = impulses::of_jump(&self.system().lcs, &p, step);
         for (name, area) in named {
             log.impulse(t, name, area);
         }
     }
 
     /// What the controls ask of the switches now.
-    pub(super) fn crossed(&mut self) -> Result<Change, SimError> {
+    pub(super) fn crossed(&mut self) -> Result<Demand, SimError> {
         if self.switches.needs_lambda() {
             self.read_lambda()?;
         }
@@ -249,7 +211,7 @@ impl Theta<'_> {
 
     /// Whether the controls ask a switch to move now.
     pub(super) fn asked(&mut self) -> Result<bool, SimError> {
-        Ok(self.switches.watch() && self.crossed()? != Change::None)
+        Ok(self.switches.watch() && self.crossed()? != Demand::None)
     }
 
     /// How far the controls of switches that watch the state are beyond their thresholds now.
@@ -302,7 +264,7 @@ impl Theta<'_> {
             }
             self.settle(&before, &s)?;
             self.stats.events += 1;
-            log.event(self.now.t, self.switches.flipped(&before));
+            log.event(self.now.t, self.switches.flipped(&before), false);
             started = Some((self.now.system, s.clone(), self.now.balance));
             self.change_position(&s, log)?;
             before = self.switches.position().to_vec();

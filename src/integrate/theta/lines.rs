@@ -14,7 +14,7 @@ pub(super) struct Port {
     input: usize,
 }
 
-impl Theta<'_> {
+impl Theta {
     /// Connects the ports of transmission lines, before the run begins.
     pub(crate) fn attach(&mut self, lines: &[Line]) {
         let lcs = &self.plant.systems[self.now.system].1.lcs;

@@ -14,7 +14,7 @@ enum Tried {
     Switched,
 }
 
-impl Theta<'_> {
+impl Theta {
     /// Advances to `stop`, which no breakpoint lies before; u is the left limit there.
     pub(super) fn interval(&mut self, stop: f64, log: &mut Log) -> Result<(), SimError> {
         let (t0, span) = (self.now.t, stop - self.now.t);
@@ -40,6 +40,9 @@ impl Theta<'_> {
                 self.finish_step(t1, impulse, log)?;
             } else {
                 self.divided_step(h, t1, log)?;
+            }
+            if log.pauses() {
+                break;
             }
         }
         self.switches.forget_chatter();
@@ -177,14 +180,14 @@ impl Theta<'_> {
         let change = if self.switches.watch() {
             self.crossed()?
         } else {
-            Change::None
+            Demand::None
         };
-        if change != Change::None {
+        if change != Demand::None {
             let may_locate = h > finest && !last_chance && !self.switches.chattering(CHATTER);
-            if change == Change::Passage && may_locate {
+            if change == Demand::Passage && may_locate {
                 self.locate(finest, steps, &mut impulse, log)?;
             }
-            let late = change == Change::Passage;
+            let late = change == Demand::Passage;
             if let (true, Some(estimate), None) = (late, &mut self.now.estimate, &self.control) {
                 estimate.switched_late(&self.kept.x, &self.now.x);
             }
@@ -343,7 +346,7 @@ impl Theta<'_> {
     pub(super) fn report(&mut self, log: &mut Log) {
         for (t, what) in std::mem::take(&mut self.pending) {
             self.stats.events += 1;
-            log.event(t, what);
+            log.event(t, what, false);
             if log.wants_rows() && t == self.now.t {
                 self.log_row(log);
             }
@@ -354,7 +357,7 @@ impl Theta<'_> {
     pub(super) fn report_quietly(&mut self, log: &mut Log) {
         for (t, what) in self.pending.drain(..) {
             self.stats.events += 1;
-            log.event(t, what);
+            log.event(t, what, false);
         }
     }
 

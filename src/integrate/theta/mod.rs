@@ -16,19 +16,22 @@ mod stages;
 mod tests;
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use nalgebra::DVector;
 
 use self::estimate::Estimate;
+use crate::integrate::Note;
 use crate::integrate::control::{Amplitudes, CORNER, Control};
 use crate::integrate::energy::{self, Balance};
+use crate::integrate::event::Change;
 use crate::integrate::exact::Place;
 use crate::integrate::inputs::Inputs;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
 use crate::integrate::stats::{StatedError, Stats};
 use crate::integrate::step::{SHORT, Scheme};
-use crate::integrate::switching::{Change, Switches, Threshold};
+use crate::integrate::switching::{Demand, Switches, Threshold};
 use crate::integrate::system::{Plant, Reduce, System};
 use crate::lcs::{Lcs, Port, Role};
 use crate::settings::Settings;
@@ -50,9 +53,9 @@ pub enum Stepping {
 }
 
 /// What a run of the stepper starts from.
-pub struct Setup<'a> {
+pub struct Setup {
     /// Reduces the circuit for a switch position.
-    pub reduce: Reduce<'a>,
+    pub reduce: Reduce,
     /// Start position of every switch.
     pub position: Vec<bool>,
     /// Thresholds of every switch.
@@ -94,8 +97,8 @@ const JUMP: f64 = 1e-12;
 const IMPULSE_RATIO: f64 = 0.75;
 
 /// See the [module](self).
-pub struct Theta<'a> {
-    plant: Plant<'a>,
+pub struct Theta {
+    plant: Plant,
     inputs: Inputs,
     switches: Switches,
     scheme: Scheme,
@@ -130,9 +133,9 @@ pub struct Theta<'a> {
     not_unique: BTreeSet<String>,
     /// Whether a jump between rivals has been noted.
     noted_rivals: bool,
-    notes: Vec<String>,
+    notes: Vec<Note>,
     worst_residual: f64,
-    pending: Vec<(f64, String)>,
+    pending: Vec<(f64, Arc<[Change]>)>,
     /// The ports of transmission lines.
     ports: Vec<lines::Port>,
     /// Largest |s| so far, by storage element: what the error control calls the amplitude.
@@ -206,12 +209,12 @@ struct Attempt {
     error: Option<stages::StepError>,
 }
 
-impl<'a> Theta<'a> {
+impl Theta {
     /// A stepper at its start, before the jump at t = 0+.
     ///
     /// # Errors
     /// The reduction's for the start position.
-    pub fn new(setup: Setup<'a>) -> Result<Self, SimError> {
+    pub fn new(setup: Setup) -> Result<Self, SimError> {
         let Setup {
             mut reduce,
             position,
@@ -398,6 +401,17 @@ impl<'a> Theta<'a> {
         }
     }
 
+    /// Has another balance from here on.
+    pub(crate) fn set_balance(&mut self, balance: Balance) {
+        self.now.balance = balance;
+    }
+
+    /// The balance so far.
+    pub(crate) fn balance(&mut self) -> Balance {
+        self.note_energy();
+        self.now.balance
+    }
+
     /// Starts a new energy balance from the present state.
     pub(crate) fn empty_account(&mut self) {
         let lcs = &self.plant.systems[self.now.system].1.lcs;
@@ -447,7 +461,7 @@ impl<'a> Theta<'a> {
     }
 }
 
-impl Stepper for Theta<'_> {
+impl Stepper for Theta {
     fn time(&self) -> f64 {
         self.now.t
     }
@@ -455,8 +469,9 @@ impl Stepper for Theta<'_> {
     fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), SimError> {
         if !self.started {
             self.begin(log)?;
+            self.inputs.slopes(self.now.t, &mut self.du);
             let lcs = &self.plant.systems[self.now.system].1.lcs;
-            let moving = self.switches.misplaced(lcs, &self.now.u);
+            let moving = self.switches.misplaced(lcs, &self.now.u, &self.du);
             if !moving.is_empty() || self.asked()? {
                 self.switch(&moving, log)?;
             }
@@ -490,12 +505,18 @@ impl Stepper for Theta<'_> {
                 stop = known;
             }
             self.interval(stop, log)?;
+            if log.pauses() && self.now.t < stop {
+                break;
+            }
             let at_breakpoint = !early && (breakpoint - stop).abs() <= Self::slack(stop);
             if at_breakpoint {
                 self.edge(breakpoint.max(stop), log)?;
             }
             if !moving.is_empty() || at_breakpoint && self.asked()? {
                 self.switch(&moving, log)?;
+            }
+            if log.pauses() {
+                break;
             }
         }
         self.note_energy();
@@ -512,10 +533,11 @@ impl Stepper for Theta<'_> {
         let mut notes = self.notes.clone();
         if !self.not_unique.is_empty() {
             let names: Vec<&str> = self.not_unique.iter().map(String::as_str).collect();
-            notes.push(format!(
+            let text = format!(
                 "voltages or currents of {} are not determined by the ideal model; the least-norm choice is shown",
                 names.join(", ")
-            ));
+            );
+            notes.push(Note::of(names, text));
         }
         self.settle_estimate();
         Outcome {

@@ -7,7 +7,7 @@ use super::*;
 /// part, where the rounding of the state grows to 2¹⁸ε.
 const SHORT_ON_LINES: f64 = 1.0 / 64.0;
 
-impl Theta<'_> {
+impl Theta {
     /// The step by which λ at the right limit is found, s.
     pub(super) fn read_step(&self) -> f64 {
         let base = match self.stepping {

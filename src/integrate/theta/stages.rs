@@ -87,7 +87,7 @@ impl Tableau {
     }
 }
 
-impl Theta<'_> {
+impl Theta {
     /// Computes the step from now to t1 = now + h into `out` without committing it. After an edge or a jump one of Moreau's takes its place
     /// where a motion ends within the step: a stage of Alexander's starts far beyond where the ones before it came to, and a junction
     /// that clamped the motion in these does not hold it there. Two such steps agree, so that error control would not see it.

@@ -15,12 +15,7 @@ pub(super) const SICONOS: Scheme = Scheme {
     gamma: 1.0,
 };
 
-pub(super) fn stepper<'a>(
-    lcs: &Lcs,
-    x: DVector<f64>,
-    scheme: Scheme,
-    stepping: Stepping,
-) -> Theta<'a> {
+pub(super) fn stepper(lcs: &Lcs, x: DVector<f64>, scheme: Scheme, stepping: Stepping) -> Theta {
     let lcs = lcs.clone();
     Theta::new(Setup {
         reduce: Box::new(move |_| Ok(lcs.clone())),
@@ -257,11 +252,12 @@ fn events_are_those_of_the_circuit() {
         32.0421, 211.7642, 357.0594, 536.7816, 682.0768, 861.7989, 1007.0942, 1186.8163,
     ];
     assert_eq!(run.stats.events, 31, "{:?}", &run.events[..8]);
-    assert_eq!(&*run.events[0].1, "jump");
-    for ((t, names), exact) in run.events[1..].iter().zip(exact) {
+    assert_eq!(run.events[0].to_string(), "jump");
+    for (event, exact) in run.events[1..].iter().zip(exact) {
+        let (t, names) = (event.t, event.to_string());
         assert!((t * 1e6 - exact).abs() < 0.16, "{t} {exact}");
         assert!(
-            ["df1 df2", "df2 df1", "dr1 dr2"].contains(&&**names),
+            ["df", "dr"].iter().any(|d| names.matches(d).count() == 2),
             "{names}"
         );
     }

@@ -24,6 +24,11 @@ pub(super) fn known(network: &Network, mode: &Mode, x: &[f64], u: &[f64]) -> Vec
     known
 }
 
+/// exp(x) without numbers below the normal ones, which cost much and are nothing beside 1.
+fn exponential(x: f64) -> f64 {
+    if x < -700.0 { 0.0 } else { x.exp() }
+}
+
 /// v = q + Z i(v): Newton on the voltages, a voltage above the knee moved in the logarithm of its current.
 fn currents(network: &Network, mode: &Mode, known: &mut [f64], first: usize) {
     let m = network.curved.len();
@@ -34,12 +39,13 @@ fn currents(network: &Network, mode: &Mode, known: &mut [f64], first: usize) {
         .map(|&(is, n)| n * THERMAL * (n * THERMAL / (std::f64::consts::SQRT_2 * is)).ln())
         .collect();
     let mut v: Vec<f64> = open.iter().zip(&knees).map(|(q, k)| q.min(*k)).collect();
+    let mut last = f64::INFINITY;
     for _ in 0..200 {
         let mut a = vec![0.0; m * m];
         let mut residual = vec![0.0; m];
         let law = |k: usize| {
             let (is, n) = network.curved[k];
-            let e = (v[k] / (n * THERMAL)).exp();
+            let e = exponential(v[k] / (n * THERMAL));
             (is * (e - 1.0), is * e / (n * THERMAL))
         };
         for i in 0..m {
@@ -72,13 +78,15 @@ fn currents(network: &Network, mode: &Mode, known: &mut [f64], first: usize) {
             largest = largest.max((next - v[k]).abs() / (nvt + 1e-9 * v[k].abs()));
             v[k] = next;
         }
-        if largest < 1e-13 {
+        // What does not shrink any more is rounding.
+        if largest < 1e-13 || largest < 1e-9 && largest >= 0.5 * last {
             break;
         }
+        last = largest;
     }
     for k in 0..m {
         let (is, n) = network.curved[k];
-        known[first + k] = is * ((v[k] / (n * THERMAL)).exp() - 1.0);
+        known[first + k] = is * (exponential(v[k] / (n * THERMAL)) - 1.0);
     }
 }
 

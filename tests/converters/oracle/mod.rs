@@ -11,8 +11,11 @@ mod positions;
 mod radau;
 mod waves;
 
+use std::cell::Cell;
+
 use crate::circuit::Circuit;
 pub(crate) use network::Network;
+pub(crate) use waves::corners;
 
 /// Why the oracle has no answer: the circuit, or the accuracy, is beyond it.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,10 +29,20 @@ pub(crate) struct Answer {
     pub(crate) steps: usize,
 }
 
-/// Simulates with the tolerance of one step, relative to the largest value of each state.
-pub(crate) fn simulate(circuit: &Circuit, tolerance: f64) -> Result<Answer, Declined> {
+/// Simulates with the tolerance of one step, relative to the largest value of each state. Multiplications are taken from
+/// `budget`, a count rather than a time, so that a seed has the same answer on every machine.
+pub(crate) fn simulate(
+    circuit: &Circuit,
+    tolerance: f64,
+    budget: &Cell<u64>,
+) -> Result<Answer, Declined> {
     let network = Network::new(circuit)?;
-    radau::run(&network, circuit, tolerance)
+    radau::run(&network, circuit, tolerance, budget)
+}
+
+/// Takes `work` from the budget; nothing is left when it does not suffice.
+fn spend(budget: &Cell<u64>, work: usize) {
+    budget.set(budget.get().saturating_sub(work as u64));
 }
 
 /// A square matrix by rows, factorised in place with partial pivoting after its rows have been scaled.

@@ -136,6 +136,12 @@ impl Network {
         self.states() + self.waves.len() + self.curved.len() + 1
     }
 
+    /// Multiplications that a mode costs: one factorisation, and six refinements of each column.
+    pub(super) fn work(&self) -> usize {
+        let n = self.nodes + self.wires.len();
+        n * n * n / 3 + 12 * n * n * self.width()
+    }
+
     /// The network in positions, one per device.
     pub(super) fn mode(&self, positions: &[bool]) -> Result<Mode, Declined> {
         let (free, width) = (self.nodes - 1, self.width());

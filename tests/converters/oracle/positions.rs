@@ -1,10 +1,11 @@
 //! Positions of switches, comparators and diodes at one instant.
 
+use std::cell::Cell;
 use std::collections::HashMap;
 use std::rc::Rc;
 
 use super::network::{Device, Mode, Row};
-use super::{Declined, Network, curved};
+use super::{Declined, Network, curved, spend};
 
 /// What everything depends on at one instant: states, sources and the derivatives of the sources.
 pub(super) struct Instant<'a> {
@@ -16,6 +17,7 @@ pub(super) struct Instant<'a> {
 /// Modes that have been seen.
 pub(super) struct Modes<'n> {
     pub(super) network: &'n Network,
+    budget: &'n Cell<u64>,
     known: HashMap<Vec<bool>, Rc<Mode>>,
 }
 
@@ -31,9 +33,10 @@ struct Guard {
 }
 
 impl<'n> Modes<'n> {
-    pub(super) fn new(network: &'n Network) -> Self {
+    pub(super) fn new(network: &'n Network, budget: &'n Cell<u64>) -> Self {
         Self {
             network,
+            budget,
             known: HashMap::new(),
         }
     }
@@ -42,6 +45,7 @@ impl<'n> Modes<'n> {
         if let Some(mode) = self.known.get(positions) {
             return Ok(Rc::clone(mode));
         }
+        spend(self.budget, self.network.work());
         let mode = Rc::new(self.network.mode(positions)?);
         self.known.insert(positions.to_vec(), Rc::clone(&mode));
         Ok(mode)

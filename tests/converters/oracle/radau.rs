@@ -1,11 +1,12 @@
 //! Radau IIA of order 5 (E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II", IV.8) from event to event.
 
+use std::cell::Cell;
 use std::rc::Rc;
 
 use super::network::{Mode, Network};
 use super::positions::{Instant, Modes};
 use super::waves::{Piece, piece, stops};
-use super::{Answer, Declined, Factors, curved};
+use super::{Answer, Declined, Factors, curved, spend};
 use crate::circuit::Circuit;
 
 /// √6.
@@ -32,9 +33,14 @@ const D: [f64; 3] = [-(13.0 + 7.0 * S) / 3.0, (-13.0 + 7.0 * S) / 3.0, -1.0 / 3.
 /// Events and steps after which the oracle gives up.
 const EVENTS: usize = 4000;
 const STEPS: usize = 20_000;
+/// What a step costs beside its matrix, in multiplications; an exponential diode costs eight times as much.
+const OVERHEAD: usize = 1000;
+/// Why there is no answer once the budget is spent.
+const OUT_OF_WORK: &str = "more work than its budget";
 
 struct March<'n> {
     modes: Modes<'n>,
+    budget: &'n Cell<u64>,
     pieces: Vec<Piece>,
     positions: Vec<bool>,
     mode: Rc<Mode>,
@@ -55,13 +61,15 @@ pub(super) fn run(
     network: &Network,
     circuit: &Circuit,
     tolerance: f64,
+    budget: &Cell<u64>,
 ) -> Result<Answer, Declined> {
     let stops = stops(circuit);
-    let mut modes = Modes::new(network);
+    let mut modes = Modes::new(network, budget);
     let positions = vec![false; network.devices.len()];
     let mode = modes.get(&positions)?;
     let mut march = March {
         modes,
+        budget,
         pieces: vec![],
         positions,
         mode,
@@ -166,6 +174,8 @@ impl March<'_> {
                     matrix[row * 3 * n + row] += 1.0;
                 }
             }
+            let devices = 1 + 8 * network.curved.len();
+            spend(self.budget, 9 * n * n * n + 60 * n * n + OVERHEAD * devices);
             let step = Factors::new(3 * n, matrix)?.solve(&right);
             let mut size = 0.0_f64;
             for i in 0..3 {
@@ -284,14 +294,18 @@ impl March<'_> {
         let (mut t, mut h) = (start, stop - start);
         let mut still = 0;
         while stop - t > 1e-15 * stop {
+            if self.budget.get() == 0 {
+                return Err(Declined(OUT_OF_WORK.into()));
+            }
             if self.answer.steps > STEPS || self.answer.events > EVENTS {
                 return Err(Declined("too many steps or events".into()));
             }
             h = h.min(stop - t);
             let step = self.step(t, h);
+            // Smaller by what the error asks for; what overflowed has none.
+            let error = step.as_ref().map_or(1e4, |s| s.error);
+            let error = if error.is_nan() { 1e4 } else { error };
             let Some(step) = step.filter(|s| s.error <= 1.0) else {
-                // Smaller by what the error asks for.
-                let error = self.step(t, h).map_or(1e4, |s| s.error);
                 h *= (0.9 * error.powf(-0.25)).clamp(0.05, 0.7);
                 if h < 1e-16 * stop {
                     return Err(Declined("a step too small".into()));

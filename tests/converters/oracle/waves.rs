@@ -71,8 +71,8 @@ pub(super) fn piece(wave: &Wave, t: f64) -> Piece {
     }
 }
 
-/// Corners of all sources and the instants of rows, in order, each once; rows are marked.
-pub(super) fn stops(circuit: &Circuit) -> Vec<(f64, bool)> {
+/// Corners of all sources.
+pub(crate) fn corners(circuit: &Circuit) -> Vec<f64> {
     let mut times = Vec::new();
     for card in &circuit.cards {
         let (Part::V(wave) | Part::I(wave)) = &card.part else {
@@ -92,13 +92,20 @@ pub(super) fn stops(circuit: &Circuit) -> Vec<(f64, bool)> {
                 for k in 0..=count {
                     let start = delay + k as f64 * period;
                     for corner in [0.0, *rise, rise + width, rise + width + fall] {
-                        times.push((start + corner, false));
+                        times.push(start + corner);
                     }
                 }
             }
-            Wave::Pwl(corners) => times.extend(corners.iter().map(|c| (c.0, false))),
+            Wave::Pwl(corners) => times.extend(corners.iter().map(|c| c.0)),
         }
     }
+    times
+}
+
+/// Corners of all sources and the instants of rows, in order, each once; rows are marked.
+pub(super) fn stops(circuit: &Circuit) -> Vec<(f64, bool)> {
+    let corners = corners(circuit).into_iter();
+    let mut times: Vec<(f64, bool)> = corners.map(|t| (t, false)).collect();
     times.extend((1..=circuit.rows).map(|k| (circuit.stop * k as f64 / circuit.rows as f64, true)));
     times.retain(|&(t, _)| t > 0.0 && t <= circuit.stop);
     times.sort_by(|a, b| a.0.total_cmp(&b.0));

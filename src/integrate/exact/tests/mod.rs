@@ -1,5 +1,7 @@
 //! The stepper against exact values.
 
+use std::sync::Arc;
+
 use nalgebra::DVector;
 
 use super::{Assembler, Exact, Setup};
@@ -8,7 +10,7 @@ use crate::diagnostic::SourceMap;
 use crate::integrate::Run;
 use crate::integrate::run::{Frame, Grid, Log, SimError, run};
 use crate::lcs::{Lcs, Position, reduce};
-use crate::mna::{self, Behaviour};
+use crate::mna;
 use crate::settings::Settings;
 
 pub(in crate::integrate) mod bridges;
@@ -32,29 +34,25 @@ pub(in crate::integrate) fn circuit(text: &str) -> Circuit {
 }
 
 /// A stepper for a netlist that starts from `uic` and whose switches start as their cards say.
-pub(in crate::integrate) fn prepare_circuit(
-    circuit: &Circuit,
-    energy: bool,
-) -> (Exact<'static>, Lcs, Tran) {
+pub(in crate::integrate) fn prepare_circuit(circuit: &Circuit, energy: bool) -> (Exact, Lcs, Tran) {
     let tran = circuit.tran.expect("a .tran card");
     let behaviour = mna::behaviour(circuit).expect("a sound circuit").standard();
-    // A test may leak what it runs on.
-    let behaviour: &'static Behaviour = Box::leak(Box::new(behaviour));
     let position: Vec<bool> = behaviour
         .switches
         .iter()
         .map(|s| s.initial.unwrap_or(false))
         .collect();
-    let start = Position::free(behaviour, position.clone());
-    let lcs = reduce(behaviour, &start).expect("a system");
+    let start = Position::free(&behaviour, position.clone());
+    let lcs = reduce(&behaviour, &start).expect("a system");
     let exact = Exact::new(Setup {
-        assembler: Assembler::new(behaviour),
+        assembler: Assembler::new(Arc::new(behaviour)),
         position,
         t: 0.0,
         until: tran.tstop,
         start: DVector::from_column_slice(lcs.storage.initial.as_slice()),
         h: tran.tstep,
         energy,
+        free: false,
         settings: Settings::default(),
     })
     .expect("sources with closed forms");
@@ -109,15 +107,15 @@ fn at(run: &Run, t: f64, name: &str) -> f64 {
 
 /// Times of the events whose label contains `what`, s.
 fn times_of(run: &Run, what: &str) -> Vec<f64> {
-    let events = run.events.iter().filter(|e| e.1.contains(what));
-    events.map(|e| e.0).collect()
+    let events = run.events.iter().filter(|e| e.to_string().contains(what));
+    events.map(|e| e.t).collect()
 }
 
 /// Times of the events after the start, s.
 fn times_after_start(run: &Run) -> Vec<f64> {
     run.events
         .iter()
-        .map(|e| e.0)
+        .map(|e| e.t)
         .filter(|&t| t > 0.0)
         .collect()
 }

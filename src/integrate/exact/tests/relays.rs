@@ -52,10 +52,10 @@ fn two_relays_pass_their_accumulation_point() {
     let run = simulate_circuit(&circuit).unwrap_or_else(|e| panic!("{e}"));
     // From (1, 0.3): x2 = 0 after 0.1 s, x1 = 0 after another 1.1/3 s, then every interval is a third of the last:
     // the sum is 0.1 + 1.1/3 · 3/2.
-    let last = run.events.last().expect("events").0;
+    let last = run.events.last().expect("events").t;
     assert!((last - 0.65).abs() < 1e-13, "{last}");
     assert!(
-        run.notes.iter().any(|n| n.contains("accumulate")),
+        run.notes.iter().any(|n| n.text.contains("accumulate")),
         "{:?}",
         run.notes
     );

@@ -114,9 +114,9 @@ fn grazing_contacts_within_one_output_step() {
             // 1 − cos t = 2 − δ
             let first = (delta - 1.0).acos();
             assert!(
-                (run.events[0].0 - first).abs() < 1e-11,
+                (run.events[0].t - first).abs() < 1e-11,
                 "{} {first}",
-                run.events[0].0
+                run.events[0].t
             );
         }
     }

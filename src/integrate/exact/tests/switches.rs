@@ -208,7 +208,7 @@ fn a_controller_slides_on_its_threshold() {
     assert!(
         run.notes
             .iter()
-            .any(|n| n.starts_with("s1 slides") && n.contains("2 times")),
+            .any(|n| n.text.starts_with("s1 slides") && n.text.contains("2 times")),
         "{:?}",
         run.notes
     );
@@ -250,7 +250,7 @@ fn six_controllers_slide_together() {
     let sliding = run
         .notes
         .iter()
-        .filter(|n| n.contains("slides on its threshold"));
+        .filter(|n| n.text.contains("slides on its threshold"));
     assert_eq!(sliding.count(), 6, "{:?}", run.notes);
     assert!(run.events.len() <= 2, "{:?}", run.events);
 }

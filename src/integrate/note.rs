@@ -1,0 +1,70 @@
+//! What is worth knowing about a run, with the place in the netlist where it shows.
+
+use super::located::whole;
+use crate::circuit::Circuit;
+use crate::diagnostic::SourceMap;
+
+/// Something worth knowing about a run.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Note {
+    /// What.
+    pub text: String,
+    /// The elements concerned, or parts of them (`d3.1`); the first is where it shows.
+    pub elements: Vec<String>,
+}
+
+impl Note {
+    /// Something about these elements.
+    pub fn of(
+        elements: impl IntoIterator<Item = impl Into<String>>,
+        text: impl Into<String>,
+    ) -> Self {
+        Self {
+            text: text.into(),
+            elements: elements.into_iter().map(Into::into).collect(),
+        }
+    }
+}
+
+/// Something about the run as a whole.
+impl From<String> for Note {
+    fn from(text: String) -> Self {
+        Self {
+            text,
+            elements: Vec::new(),
+        }
+    }
+}
+
+/// Where elements stand: their circuit, and the files that it was read from. A system without a netlist has neither.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Places<'a>(pub Option<(&'a Circuit, &'a SourceMap)>);
+
+impl Places<'_> {
+    /// `file:line:column: text`, with the place of the first of these elements that stands in a file; the text where none does.
+    #[must_use]
+    pub fn at(&self, elements: &[String], text: &str) -> String {
+        let place = self.0.and_then(|(circuit, sources)| {
+            let mut spans = elements
+                .iter()
+                .filter_map(|name| whole(circuit, name)?.span);
+            let span = spans.next()?;
+            let file = sources.files.get(span.file.0 as usize)?;
+            let (line, column) = sources.line_column(span);
+            Some(format!("{}:{line}:{column}: ", file.path))
+        });
+        place.unwrap_or_default() + text
+    }
+
+    /// A note at its place.
+    #[must_use]
+    pub fn of(&self, note: &Note) -> String {
+        self.at(&note.elements, &note.text)
+    }
+
+    /// Notes at their places.
+    #[must_use]
+    pub fn all(&self, notes: &[Note]) -> Vec<String> {
+        notes.iter().map(|note| self.of(note)).collect()
+    }
+}

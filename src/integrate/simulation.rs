@@ -1,0 +1,580 @@
+//! A run that its caller drives: from stop to stop, with sources and switches moved in between.
+//!
+//! The methods, events, jumps and energies are those of [`simulate`](crate::integrate::simulate()); what differs is who asks for the
+//! next time. A simulation owns all it needs and may be sent to another thread.
+
+use std::sync::Arc;
+
+use crate::circuit::{Circuit, Source, Tran, held_at, holder};
+use crate::integrate::Note;
+use crate::integrate::energy::Balance;
+use crate::integrate::event::Event;
+use crate::integrate::exact::Place;
+use crate::integrate::handover::Handover;
+use crate::integrate::run::{Log, Reason, SimError, Stepper};
+use crate::integrate::simulate::{Method, Problem, SimOptions, check, controlled};
+use crate::integrate::stats::{Impulse, Run, StateJumps, Stats};
+use crate::integrate::step::Scheme;
+use crate::integrate::theta::{Stepping, Theta};
+use crate::lcs::Lcs;
+use crate::mna::{Behaviour, behaviour};
+use crate::plan::{not_exact, plan};
+use crate::settings::Settings;
+use crate::waveform::canonical_name;
+
+/// What a simulation may be asked for.
+#[derive(Debug, Clone, Default)]
+pub struct SimulationOptions {
+    /// The method.
+    pub method: Method,
+    /// θ, default ½ (1 for `euler`).
+    pub theta: Option<f64>,
+    /// γ, default ½ (1 for `euler`).
+    pub gamma: Option<f64>,
+    /// Fixed step, s; error-controlled where absent.
+    pub step: Option<f64>,
+    /// Where it ends at the latest, s; by default where the circuit's `.tran` does.
+    pub until: Option<f64>,
+    /// Tolerances.
+    pub settings: Settings,
+}
+
+/// Why [`Simulation::advance_to_event`] came back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StopReason {
+    /// The time asked for is reached.
+    Time,
+    /// A device or switch changed its state, or the state jumped.
+    Event,
+}
+
+/// Where a simulation stands after an advance, and what happened on the way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stop {
+    /// Time, s.
+    pub time: f64,
+    /// Why it stands here.
+    pub reason: StopReason,
+    /// What happened since the last stop, one at this time included.
+    pub events: Vec<Event>,
+}
+
+/// A state of a simulation to return to.
+#[derive(Debug, Clone)]
+pub struct Checkpoint {
+    circuit: Arc<Circuit>,
+    problem: Problem,
+    /// Waveforms that were given to sources.
+    replaced: Vec<(usize, Source)>,
+    balance: Balance,
+    impulses: Vec<Impulse>,
+    state_jumps: StateJumps,
+}
+
+impl Checkpoint {
+    /// Its time, s.
+    #[must_use]
+    pub const fn time(&self) -> f64 {
+        self.problem.start.t
+    }
+}
+
+/// The stepper of a simulation.
+enum Way {
+    Exact(Box<Handover>),
+    Steps(Box<Theta>),
+}
+
+impl Way {
+    /// The stepper that the plan chooses, at the start of the problem.
+    fn of(
+        problem: &Problem,
+        lcs: &Lcs,
+        tran: &Tran,
+        options: &SimulationOptions,
+        notes: &mut Vec<Note>,
+        log: &mut Log<'_>,
+    ) -> Result<Self, SimError> {
+        let SimulationOptions {
+            method, settings, ..
+        } = options;
+        if let (Method::Exact, Some(obstacle)) = (method, not_exact(lcs)) {
+            let what = format!("no exact integration: {obstacle}");
+            return Err(SimError::before(Reason::Unsupported(what)));
+        }
+        let plan = plan(lcs, &options.as_asked());
+        let start = problem.start.t;
+        if plan.method == Method::Exact {
+            let exact = problem.handover(tran, lcs, settings);
+            match exact.and_then(|mut exact| exact.advance(start, log).map(|()| exact)) {
+                Ok(exact) => return Ok(Self::Exact(Box::new(exact))),
+                Err(error) if *method == Method::Exact => return Err(error),
+                Err(error) => {
+                    let text = format!("steps are made in place of exact integration: {error}");
+                    notes.push(text.into());
+                }
+            }
+            *log = Log::default();
+        }
+        let mut theta = steps(problem, tran, plan.scheme, options)?;
+        theta.advance(start, log)?;
+        Ok(Self::Steps(Box::new(theta)))
+    }
+
+    fn stepper(&mut self) -> &mut dyn Stepper {
+        match self {
+            Self::Exact(exact) => &mut **exact,
+            Self::Steps(theta) => &mut **theta,
+        }
+    }
+
+    fn place(&mut self) -> Place {
+        match self {
+            Self::Exact(exact) => exact.place(),
+            Self::Steps(theta) => theta.place(),
+        }
+    }
+
+    fn balance(&mut self) -> Balance {
+        match self {
+            Self::Exact(exact) => exact.balance(),
+            Self::Steps(theta) => theta.balance(),
+        }
+    }
+
+    /// Which ideal pairs conduct; empty where not known.
+    fn conducting(&self) -> Vec<bool> {
+        match self {
+            Self::Exact(exact) => exact.conducting().to_vec(),
+            Self::Steps(_) => vec![],
+        }
+    }
+
+    /// Goes on with the energy balance of another stepper that came to where this one starts, its first jump included.
+    fn carry_on(&mut self, mut balance: Balance) {
+        balance.add_part(&self.balance().energy());
+        self.start_balance(balance);
+    }
+
+    /// Has another balance from here on.
+    fn start_balance(&mut self, balance: Balance) {
+        match self {
+            Self::Exact(exact) => exact.set_balance(balance),
+            Self::Steps(theta) => theta.set_balance(balance),
+        }
+    }
+}
+
+/// A circuit in the course of a transient. It stands at right limits: after everything that happens at its time.
+///
+/// # Example
+/// A capacitor is charged to 3 V by a source that is then taken down to 1 V.
+/// ```
+/// use circ::{Model, SimulationOptions};
+///
+/// let model = Model::parse("charge\nv1 1 0 3\nr1 1 2 1k\nc1 2 0 1u\n.tran 1u 10m uic\n.end\n", "charge.cir")?;
+/// let mut simulation = model.simulation(SimulationOptions::default())?;
+/// simulation.advance_to(1e-3)?;
+/// let charged = simulation.value("v(2)")?;
+/// assert!((charged - 3.0 * (1.0 - (-1.0_f64).exp())).abs() < 1e-12);
+/// simulation.set_source("v1", 1.0)?;
+/// simulation.advance_to(2e-3)?;
+/// assert!((simulation.value("v(2)")? - (1.0 + (charged - 1.0) * (-1.0_f64).exp())).abs() < 1e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Simulation {
+    circuit: Arc<Circuit>,
+    problem: Problem,
+    lcs: Lcs,
+    tran: Tran,
+    options: SimulationOptions,
+    way: Way,
+    row: Vec<f64>,
+    impulses: Vec<Impulse>,
+    state_jumps: StateJumps,
+    notes: Vec<Note>,
+    spent: Stats,
+}
+
+impl Simulation {
+    /// A simulation that stands at t = 0⁺, after the jump there.
+    ///
+    /// # Errors
+    /// As [`simulate`](crate::integrate::simulate()) before its first row.
+    pub fn new(
+        circuit: &Circuit,
+        multiport: &Behaviour,
+        options: SimulationOptions,
+    ) -> Result<Self, SimError> {
+        let tran = transient(circuit.tran, options.until)?;
+        check(&tran, &options.as_asked())?;
+        let problem = Problem::of_circuit(circuit, multiport, tran.uic, &options.settings)?;
+        Self::start(Arc::new(circuit.clone()), problem, tran, options)
+    }
+
+    fn start(
+        circuit: Arc<Circuit>,
+        problem: Problem,
+        tran: Tran,
+        options: SimulationOptions,
+    ) -> Result<Self, SimError> {
+        let mut problem = problem.with_free_sources();
+        let lcs = problem.prepare(&tran, &options.settings)?;
+        let (mut notes, mut log) = (problem.notes.clone(), Log::default());
+        let way = Way::of(&problem, &lcs, &tran, &options, &mut notes, &mut log)?;
+        Ok(Self {
+            row: vec![0.0; lcs.outputs.names.len()],
+            circuit,
+            problem,
+            lcs,
+            tran,
+            options,
+            way,
+            impulses: log.impulses,
+            state_jumps: log.state_jumps,
+            notes,
+            spent: Stats::default(),
+        })
+    }
+
+    /// The present time, s.
+    #[must_use]
+    pub fn time(&mut self) -> f64 {
+        self.way.stepper().time()
+    }
+
+    /// Advances to this time, s: no earlier than the present one, no later than the end.
+    ///
+    /// # Errors
+    /// See [`Reason`]; the simulation stays at the last time it reached.
+    pub fn advance_to(&mut self, t: f64) -> Result<Stop, SimError> {
+        self.advance(t, false)
+    }
+
+    /// Advances to the next event, to `t` at most.
+    ///
+    /// # Errors
+    /// As [`Self::advance_to`].
+    pub fn advance_to_event(&mut self, t: f64) -> Result<Stop, SimError> {
+        self.advance(t, true)
+    }
+
+    fn advance(&mut self, t: f64, pause: bool) -> Result<Stop, SimError> {
+        let (now, end) = (self.time(), self.tran.tstop);
+        if !(t >= now && t <= end) {
+            let what = format!(
+                "the simulation stands at {now:e} s and ends at {end:e} s: it cannot go to {t:e} s"
+            );
+            return Err(SimError::at(now, Reason::Unsupported(what)));
+        }
+        let mut log = Log::default();
+        log.pause_at_event(pause);
+        let advanced = self.way.stepper().advance(t, &mut log);
+        let events = self.take(log);
+        advanced?;
+        let time = self.time();
+        let reason = if time < t {
+            StopReason::Event
+        } else {
+            StopReason::Time
+        };
+        Ok(Stop {
+            time,
+            reason,
+            events,
+        })
+    }
+
+    /// Keeps what a log holds but the events.
+    fn take(&mut self, mut log: Log<'_>) -> Vec<Event> {
+        let room = Log::LISTED.saturating_sub(self.impulses.len());
+        self.impulses.extend(log.impulses.drain(..).take(room));
+        self.state_jumps.extend(&log.state_jumps);
+        log.events
+    }
+
+    /// What [`Self::value`] can be asked for.
+    #[must_use]
+    pub fn probes(&self) -> &[String] {
+        &self.lcs.outputs.names
+    }
+
+    /// A probe's value now, V or A.
+    ///
+    /// # Errors
+    /// The simulation has no such probe.
+    pub fn value(&mut self, probe: &str) -> Result<f64, SimError> {
+        let name = canonical_name(probe);
+        let names = &self.lcs.outputs.names;
+        let Some(at) = names.iter().position(|n| canonical_name(n) == name) else {
+            return Err(unknown("probe", probe, names.iter().map(String::as_str)));
+        };
+        self.way.stepper().read(&mut self.row);
+        Ok(self.row[at])
+    }
+
+    /// Names of the state: `v(c1)`, `i(l1)`.
+    #[must_use]
+    pub fn state_names(&self) -> &[String] {
+        &self.lcs.storage.names
+    }
+
+    /// All capacitor voltages, V, and inductor currents, A, now.
+    #[must_use]
+    pub fn state(&mut self) -> Vec<f64> {
+        self.way.place().storage.as_slice().to_vec()
+    }
+
+    /// Switches that are on, in the order of [`Self::switches`].
+    #[must_use]
+    pub fn positions(&mut self) -> Vec<bool> {
+        self.way.place().switches
+    }
+
+    /// Names of the switches.
+    #[must_use]
+    pub fn switches(&self) -> Vec<&str> {
+        let switches = self.problem.systems.behaviour.switches.iter();
+        switches.map(|switch| switch.name.as_str()).collect()
+    }
+
+    /// Holds a source at a value, V or A, from now on: an edge, with the jumps it makes.
+    ///
+    /// # Errors
+    /// There is no such source; else as [`Self::advance_to`].
+    pub fn set_source(&mut self, name: &str, value: f64) -> Result<Vec<Event>, SimError> {
+        let sources = &self.problem.systems.behaviour.sources;
+        let Some(input) = sources.iter().position(|s| s.input.name == name) else {
+            return Err(unknown(
+                "source",
+                name,
+                sources.iter().map(|s| s.input.name.as_str()),
+            ));
+        };
+        if !value.is_finite() {
+            let what = format!("{name} cannot be set to {value}");
+            return Err(SimError::before(Reason::Unsupported(what)));
+        }
+        self.can_be_moved()?;
+        let source = Source::constant(value);
+        self.problem.systems.replace_source(input, source.clone());
+        let mut log = Log::default();
+        let set = match &mut self.way {
+            Way::Exact(exact) => exact.set_source(input, source, &mut log),
+            Way::Steps(_) => {
+                let (place, conducting) = (self.way.place(), self.way.conducting());
+                self.go_on_with(self.problem.clone().standing_at(place, conducting))
+            }
+        };
+        let events = self.take(log);
+        set.map(|()| events)
+    }
+
+    /// Holds a switch in a position from now on, whatever its control says, until it is set again.
+    ///
+    /// # Errors
+    /// There is no such switch, or it is part of a thyristor; else as [`Self::advance_to`].
+    pub fn set_switch(&mut self, name: &str, on: bool) -> Result<Vec<Event>, SimError> {
+        let source = holder(name);
+        if self.circuit.element(&source).is_none() {
+            self.take_switch(name)?;
+        }
+        self.set_source(&source, held_at(on))
+    }
+
+    /// Has a switch controlled by a source of its own, at first so that it stays.
+    fn take_switch(&mut self, name: &str) -> Result<(), SimError> {
+        self.can_be_moved()?;
+        let place = self.way.place();
+        let at = self.switches().iter().position(|switch| *switch == name);
+        let on = at.is_some_and(|at| place.switches[at]);
+        let Some(circuit) = self.circuit.with_held_switch(name, on) else {
+            return Err(unknown(
+                "switch that can be set",
+                name,
+                self.switches().into_iter(),
+            ));
+        };
+        let multiport = behaviour(&circuit).map_err(|_| {
+            let what = format!("{name} cannot be held by a source");
+            SimError::before(Reason::internal("integrate::simulation", what))
+        })?;
+        let replaced = self.problem.systems.replaced();
+        let problem = Problem::of_circuit(&circuit, &multiport, true, &self.options.settings)?;
+        problem.systems.replace_sources(replaced);
+        let conducting = self.way.conducting();
+        let problem = problem.standing_at(place, conducting).with_free_sources();
+        self.circuit = Arc::new(circuit);
+        self.go_on_with(problem)
+    }
+
+    /// Another problem from where the present one stands.
+    fn go_on_with(&mut self, problem: Problem) -> Result<(), SimError> {
+        let mut problem = problem;
+        self.lcs = problem.prepare(&self.tran, &self.options.settings)?;
+        let mut log = Log::default();
+        let (tran, options, notes) = (&self.tran, &self.options, &mut self.notes);
+        let mut way = Way::of(&problem, &self.lcs, tran, options, notes, &mut log)?;
+        way.carry_on(self.way.balance());
+        let outcome = self.way.stepper().finish();
+        self.spent.add(&outcome.stats);
+        self.notes.extend(outcome.notes);
+        (self.way, self.problem) = (way, problem);
+        self.take(log);
+        Ok(())
+    }
+
+    /// # Errors
+    /// What travels on transmission lines is part of the state, and not kept beside it.
+    fn can_be_moved(&self) -> Result<(), SimError> {
+        if self.circuit.lines.is_empty() {
+            return Ok(());
+        }
+        let what = "sources and switches of a circuit with transmission lines cannot be set during a run, nor can it be taken up again";
+        Err(SimError::before(Reason::Unsupported(what.into())))
+    }
+
+    /// The present state, to return to.
+    ///
+    /// # Errors
+    /// The circuit has transmission lines.
+    pub fn checkpoint(&mut self) -> Result<Checkpoint, SimError> {
+        self.can_be_moved()?;
+        let problem = self.problem.clone();
+        Ok(Checkpoint {
+            circuit: Arc::clone(&self.circuit),
+            problem: problem.standing_at(self.way.place(), self.way.conducting()),
+            replaced: self.problem.systems.replaced(),
+            balance: self.way.balance(),
+            impulses: self.impulses.clone(),
+            state_jumps: self.state_jumps.clone(),
+        })
+    }
+
+    /// Goes back, or on, to a state of this simulation.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), SimError> {
+        let Checkpoint {
+            circuit,
+            problem,
+            replaced,
+            balance,
+            impulses,
+            state_jumps,
+        } = checkpoint;
+        problem.systems.replace_sources(replaced.clone());
+        self.circuit = Arc::clone(circuit);
+        let same = Arc::ptr_eq(&problem.systems.behaviour, &self.problem.systems.behaviour);
+        let back = match &mut self.way {
+            Way::Exact(exact) if same => {
+                let inputs = problem.systems.free(&problem.start.switches)?.inputs;
+                let sources = inputs.into_iter().map(|input| input.source);
+                exact.restore(&problem.start, &problem.conducting, sources)
+            }
+            _ => false,
+        };
+        if !back {
+            self.go_on_with(problem.clone())?;
+        }
+        self.way.start_balance(*balance);
+        self.impulses.clone_from(impulses);
+        self.state_jumps.clone_from(state_jumps);
+        Ok(())
+    }
+
+    /// Counters, energy, jumps and notes of all that was simulated; without rows and events, which the caller has.
+    #[must_use]
+    pub fn finish(mut self) -> Run {
+        let mut outcome = self.way.stepper().finish();
+        self.spent.add(&outcome.stats);
+        self.notes.append(&mut outcome.notes);
+        Run {
+            method: match self.way {
+                Way::Exact(_) => Method::Exact.name().into(),
+                Way::Steps(_) if self.options.method == Method::Euler => {
+                    Method::Euler.name().into()
+                }
+                Way::Steps(_) => Method::Theta.name().into(),
+            },
+            stats: self.spent,
+            energy: outcome.energy,
+            balanced: true,
+            error: outcome.error,
+            impulses: self.impulses,
+            state_jumps: self.state_jumps,
+            notes: self.notes,
+            ..Run::default()
+        }
+    }
+}
+
+impl SimulationOptions {
+    /// The same as options of a whole run.
+    fn as_asked(&self) -> SimOptions<'static> {
+        SimOptions {
+            method: self.method,
+            theta: self.theta,
+            gamma: self.gamma,
+            step: self.step,
+            settings: self.settings.clone(),
+            ..SimOptions::default()
+        }
+    }
+}
+
+/// The span of a simulation: that of `.tran`, unless it is to end elsewhere.
+fn transient(tran: Option<Tran>, until: Option<f64>) -> Result<Tran, SimError> {
+    /// Parts of a span that no card divides.
+    const PARTS: f64 = 1000.0;
+    let of_span = |tstop: f64| Tran {
+        tstep: tstop / PARTS,
+        prints: true,
+        tstop,
+        tstart: 0.0,
+        tmax: None,
+        uic: false,
+    };
+    match (tran, until) {
+        (Some(tran), until) => Ok(Tran {
+            tstop: until.unwrap_or(tran.tstop),
+            tstart: 0.0,
+            ..tran
+        }),
+        (None, Some(until)) => Ok(of_span(until)),
+        (None, None) => {
+            let what = "the netlist asks for no .tran analysis: say until when a simulation may go";
+            Err(SimError::before(Reason::Unsupported(what.into())))
+        }
+    }
+}
+
+/// Steps from the start of a problem.
+fn steps(
+    problem: &Problem,
+    tran: &Tran,
+    scheme: Scheme,
+    options: &SimulationOptions,
+) -> Result<Theta, SimError> {
+    let stepping = options.step.map_or(controlled(tran), Stepping::Fixed);
+    let settings = &options.settings;
+    let mut theta = problem.stepper(problem.start.clone(), tran, scheme, stepping, settings)?;
+    if options.step.is_none()
+        && let Some(amplitudes) = problem.scout(tran, settings)
+    {
+        theta.expect_amplitudes(amplitudes);
+    }
+    theta.estimate_errors();
+    Ok(theta)
+}
+
+fn unknown<'a>(what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> SimError {
+    let known: Vec<&str> = known.collect();
+    let there = if known.is_empty() {
+        "there is none".into()
+    } else {
+        format!("there are {}", known.join(" "))
+    };
+    SimError::before(Reason::Unsupported(format!("no {what} `{name}`: {there}")))
+}

@@ -1,0 +1,283 @@
+//! A circuit to be analysed again and again, with other values.
+
+use std::fmt::{self, Display, Formatter};
+use std::path::Path;
+
+use crate::circuit::source::Wave;
+use crate::circuit::{Circuit, ElaborateOptions, Element, Kind, elaborate, load};
+use crate::diagnostic::{Diagnostic, Severity, SourceMap};
+use crate::integrate::{
+    OperatingPoint, Run, SimError, SimOptions, Simulation, SimulationOptions, Values,
+    operating_point, simulate,
+};
+use crate::lcs::{Lcs, Position, ReduceError, reduce};
+use crate::mna::{self, Behaviour};
+use crate::netlist::{self, Netlist};
+use crate::settings::Settings;
+
+/// A circuit with the netlist behind it: values are changed without parsing again.
+///
+/// # Example
+/// The cut-off of a low-pass filter, for two capacitances.
+/// ```
+/// use circ::Model;
+///
+/// let mut model = Model::parse("filter\nv1 in 0 1\nr1 in out 1k\nc1 out 0 1u\n.end\n", "filter.cir")?;
+/// assert_eq!(model.lcs()?.a[(0, 0)], -1e3);
+/// model.set("c1", 2e-6)?;
+/// assert_eq!(model.lcs()?.a[(0, 0)], -500.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Model {
+    /// None behind a circuit that was built by a program.
+    netlist: Option<Netlist>,
+    sources: SourceMap,
+    options: ElaborateOptions,
+    circuit: Circuit,
+    multiport: Behaviour,
+    findings: Vec<Diagnostic>,
+}
+
+impl Model {
+    /// Reads a netlist file and what it includes.
+    ///
+    /// # Errors
+    /// [`Faults`]: everything that is wrong with it.
+    pub fn load(path: impl AsRef<Path>, options: ElaborateOptions) -> Result<Self, Faults> {
+        let load::Loaded {
+            sources,
+            netlist,
+            circuit,
+            diagnostics,
+        } = load::load(path.as_ref(), &options);
+        match (netlist, circuit) {
+            (Some(netlist), Some(circuit)) => {
+                Self::of(Some(netlist), sources, options, circuit, diagnostics)
+            }
+            _ => Err(Faults {
+                findings: diagnostics,
+                sources,
+            }),
+        }
+    }
+
+    /// Reads a netlist from text; files it includes are read beside `name`.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse(text: &str, name: &str) -> Result<Self, Faults> {
+        Self::parse_with(text, name, ElaborateOptions::default())
+    }
+
+    /// The same with other choices.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse_with(text: &str, name: &str, options: ElaborateOptions) -> Result<Self, Faults> {
+        let mut sources = SourceMap::default();
+        let root = sources.add(name, text);
+        let (netlist, mut findings) = netlist::parse(&mut sources, root, &|path| load::read(path));
+        let (circuit, more) = elaborate(&netlist, &options);
+        findings.extend(more);
+        match circuit {
+            Some(circuit) => Self::of(Some(netlist), sources, options, circuit, findings),
+            None => Err(Faults { findings, sources }),
+        }
+    }
+
+    /// A circuit that a program built.
+    ///
+    /// # Errors
+    /// [`Faults`] of its topology: shorts and open branches that contradict each other.
+    pub fn of_circuit(circuit: Circuit) -> Result<Self, Faults> {
+        let (sources, options) = (SourceMap::default(), ElaborateOptions::default());
+        Self::of(None, sources, options, circuit, vec![])
+    }
+
+    fn of(
+        netlist: Option<Netlist>,
+        sources: SourceMap,
+        options: ElaborateOptions,
+        circuit: Circuit,
+        mut findings: Vec<Diagnostic>,
+    ) -> Result<Self, Faults> {
+        match mna::behaviour(&circuit) {
+            Ok(multiport) => Ok(Self {
+                netlist,
+                sources,
+                options,
+                circuit,
+                multiport,
+                findings,
+            }),
+            Err(faults) => {
+                findings.extend(faults);
+                Err(Faults { findings, sources })
+            }
+        }
+    }
+
+    /// Gives an element of the top level (a resistance, capacitance, inductance, the DC value of a source) or a `.param` another
+    /// value; everything that depends on it follows.
+    ///
+    /// # Errors
+    /// There is no such element or parameter, or the circuit is none with that value; the model stays as it was.
+    pub fn set(&mut self, name: &str, value: f64) -> Result<(), Faults> {
+        let name = name.to_lowercase();
+        let mut options = self.options.clone();
+        let values = match self.circuit.element(&name) {
+            Some(id) => {
+                if let Some(reason) = not_settable(&self.circuit.elements[id.index()]) {
+                    let message = format!("`{name}` cannot be set: {reason}");
+                    return Err(self.faults(vec![Diagnostic::error("set", None, message)]));
+                }
+                &mut options.values
+            }
+            None => &mut options.params,
+        };
+        values.retain(|(other, _)| *other != name);
+        values.push((name.clone(), value));
+        let circuit = match &self.netlist {
+            Some(netlist) => {
+                let (circuit, findings) = elaborate(netlist, &options);
+                let Some(mut circuit) = circuit else {
+                    return Err(self.faults(findings));
+                };
+                circuit.probes.clone_from(&self.circuit.probes);
+                circuit
+            }
+            None => {
+                let mut circuit = self.circuit.clone();
+                let Some(id) = circuit.element(&name) else {
+                    let message = format!("the circuit has no element `{name}`");
+                    return Err(self.faults(vec![Diagnostic::error("set", None, message)]));
+                };
+                circuit.elements[id.index()].kind.set_value(value);
+                circuit
+            }
+        };
+        match mna::behaviour(&circuit) {
+            Ok(multiport) => {
+                (self.circuit, self.multiport, self.options) = (circuit, multiport, options);
+                Ok(())
+            }
+            Err(findings) => Err(self.faults(findings)),
+        }
+    }
+
+    fn faults(&self, findings: Vec<Diagnostic>) -> Faults {
+        Faults {
+            findings,
+            sources: self.sources.clone(),
+        }
+    }
+
+    /// Warnings and notes of the netlist.
+    #[must_use]
+    pub fn findings(&self) -> &[Diagnostic] {
+        &self.findings
+    }
+
+    /// The files it was read from.
+    #[must_use]
+    pub const fn sources(&self) -> &SourceMap {
+        &self.sources
+    }
+
+    /// The flattened circuit.
+    #[must_use]
+    pub const fn circuit(&self) -> &Circuit {
+        &self.circuit
+    }
+
+    /// Its static multiport: the circuit without storage, sources and devices.
+    #[must_use]
+    pub const fn multiport(&self) -> &Behaviour {
+        &self.multiport
+    }
+
+    /// Simulates the transient that `.tran` asks for.
+    ///
+    /// # Errors
+    /// See [`Reason`](crate::integrate::Reason); the run so far is in [`SimError::partial`].
+    pub fn transient(&self, options: SimOptions<'_>) -> Result<Run, SimError> {
+        simulate(&self.circuit, &self.multiport, options)
+    }
+
+    /// A transient whose caller drives it.
+    ///
+    /// # Errors
+    /// As [`Simulation::new`].
+    pub fn simulation(&self, options: SimulationOptions) -> Result<Simulation, SimError> {
+        Simulation::new(&self.circuit, &self.multiport, options)
+    }
+
+    /// The operating point with the sources' DC values.
+    ///
+    /// # Errors
+    /// See [`operating_point`].
+    pub fn operating_point(&self) -> Result<OperatingPoint, SimError> {
+        operating_point(&self.circuit, Values::Dc, false, &Settings::default())
+    }
+
+    /// The complementarity system where switches stand as their cards say, off where they say nothing.
+    ///
+    /// # Errors
+    /// Shorts and open branches contradict each other.
+    pub fn lcs(&self) -> Result<Lcs, ReduceError> {
+        let switches = self.multiport.switches.iter();
+        let start = switches.map(|s| s.initial.unwrap_or(false)).collect();
+        reduce(&self.multiport, &Position::free(&self.multiport, start))
+    }
+}
+
+/// Why an element has no value that can be replaced.
+fn not_settable(element: &Element) -> Option<&'static str> {
+    if element.name.contains('.') {
+        return Some("it stands in a subcircuit; a `.param` in its place can be set");
+    }
+    match &element.kind {
+        Kind::Resistor(_) | Kind::Capacitor(_) | Kind::Inductor(_) => None,
+        Kind::VoltageSource(source) | Kind::CurrentSource(source) => match source.wave {
+            Wave::Dc(_) => None,
+            _ => Some("its waveform has several values; each may be a `.param`, which can be set"),
+        },
+        _ => Some("it is neither a resistor, capacitor, inductor nor a source"),
+    }
+}
+
+/// Everything that is wrong with a netlist; prints a line a finding, `file:line:column: message`.
+#[derive(Debug, Clone)]
+pub struct Faults {
+    /// The findings, those that are no errors included.
+    pub findings: Vec<Diagnostic>,
+    /// The files they point into.
+    pub sources: SourceMap,
+}
+
+impl Display for Faults {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let errors = self
+            .findings
+            .iter()
+            .filter(|d| d.severity == Severity::Error);
+        for (k, finding) in errors.enumerate() {
+            if k > 0 {
+                writeln!(f)?;
+            }
+            if let Some(span) = finding.span {
+                let (line, column) = self.sources.line_column(span);
+                write!(
+                    f,
+                    "{}:{line}:{column}: ",
+                    self.sources.files[span.file.0 as usize].path
+                )?;
+            }
+            write!(f, "{}", finding.message)?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for Faults {}

@@ -1,0 +1,75 @@
+//! Notes and warnings of a run stand at the place in the netlist of what they name.
+
+use std::fs;
+use std::process::Command;
+
+use super::path;
+
+/// What `circ` says of a netlist with this text: notes and warnings, with # for times and other numbers of many digits.
+fn told(command: &str, text: &str) -> String {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("a.cir"), text).expect("a netlist");
+    let output = Command::new(env!("CARGO_BIN_EXE_circ"))
+        .current_dir(folder.path())
+        .args(command.split_whitespace())
+        .arg("a.cir")
+        .output()
+        .expect("circ runs");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let lines = said
+        .lines()
+        .filter(|line| line.starts_with("note: ") || line.starts_with("warning: "));
+    let number = |word: &&str| word.parse::<f64>().is_ok_and(|x| x.to_string().len() > 3);
+    let plain = |line: &str| {
+        let words = line.split(' ');
+        let words = words.map(|word| if number(&word) { "#" } else { word });
+        words.collect::<Vec<_>>().join(" ")
+    };
+    lines.map(plain).collect::<Vec<_>>().join("\n")
+}
+
+/// The text of `tests/findings/NAME.cir`.
+fn text(name: &str) -> String {
+    fs::read_to_string(path(name)).expect("a netlist")
+}
+
+#[test]
+fn what_an_operating_point_notes_has_a_place() {
+    let text = "a capacitor with a value of its own, and one that nothing else holds\n\
+        V1 1 0 5\n\
+        C1 1 2 1u IC=3\n\
+        C2 2 0 1u\n\
+        .ic v(1)=4\n\
+        .tran 1m 2m\n";
+    insta::assert_snapshot!(told("sim", text));
+    insta::assert_snapshot!(told("op", text));
+}
+
+#[test]
+fn a_switch_that_slides_has_a_place() {
+    insta::assert_snapshot!(told("sim", &text("hysteretic_switch_slides")));
+}
+
+#[test]
+fn diodes_that_compete_have_a_place() {
+    insta::assert_snapshot!(told("sim", &text("rival_diodes")));
+}
+
+#[test]
+fn a_device_that_steps_take_over_has_a_place() {
+    insta::assert_snapshot!(told(
+        "sim",
+        "a two-point controller with next to no hysteresis\nV1 1 0 10\nS1 1 2 ref out sw OFF\nR1 2 out 1k\nC1 out 0 1u IC=0\nR2 out 0 10k\n\
+         Vref ref 0 PWL(0 5 1m 5 1.1m 8)\n.model sw SW(ideal Vt=0 Vh=1e-11)\n.tran 10u 2m uic\n.save v(out)\n"
+    ));
+}
+
+#[test]
+fn destroyed_currents_and_rows_too_far_apart_have_a_place() {
+    insta::assert_snapshot!(told(
+        "sim",
+        "an inductor that a switch leaves without a path\nV1 1 0 1\n\
+         L1 1 2 1m\nR1 2 3 1\nS1 3 0 g 0 sw\nVg g 0 PULSE(1 0 1m 0 0 2 4)\n.model sw SW(ideal Vt=0.5)\n.tran 1u 2m\n"
+    ));
+    insta::assert_snapshot!(told("sim", &text("print_step")));
+}
