@@ -101,6 +101,8 @@ pub(crate) struct Manifold {
     follows: Vec<bool>,
     /// w_F = K w_S, over all of w.
     slaves: DMatrix<f64>,
+    /// The rate of w_F − K w_S over w, by row in units of the follower's decay −𝒜_jj: zero to rounding where w stays there.
+    drift: DMatrix<f64>,
     /// By guard: whether it sees F.
     sees: Vec<bool>,
     /// Guards over w_S and below them their derivatives, as many as there are orders.
@@ -137,6 +139,10 @@ impl Manifold {
             }
             slow
         };
+        let mut drift = generator.select_rows(followers) - &slaves * generator;
+        for (mut row, scale) in drift.row_iter_mut().zip(&scale) {
+            row /= -scale;
+        }
         let flow = slow(generator);
         let m = guards.nrows();
         let mut jets = DMatrix::zeros(orders * m, dim);
@@ -153,6 +159,7 @@ impl Manifold {
             followers: followers.to_vec(),
             follows,
             slaves,
+            drift,
             jets: Map::new(&jets),
         })
     }
@@ -163,7 +170,8 @@ impl Manifold {
             && followers.iter().all(|f| self.follows[f.component])
     }
 
-    /// Whether w is on it up to this part of the sizes of its components.
+    /// Whether w is on it and stays there, up to this part of the sizes of its components: a quantity that passes zero may be the
+    /// difference from the manifold itself, and then its rate is none of the manifold's.
     pub(crate) fn holds(&self, w: &[f64], sizes: &[f64], rounding: f64) -> bool {
         self.followers.iter().enumerate().all(|(k, &j)| {
             let row = self.slaves.row(k);
@@ -174,7 +182,8 @@ impl Manifold {
                 .fold((0.0, sizes[j]), |(value, whole), ((s, w), size)| {
                     (value + s * w, whole + (s * size).abs())
                 });
-            (w[j] - value).abs() <= rounding * size
+            let drift: f64 = self.drift.row(k).iter().zip(w).map(|(d, w)| d * w).sum();
+            (w[j] - value).abs() <= rounding * size && drift.abs() <= rounding * size
         })
     }
 
@@ -253,6 +262,16 @@ mod tests {
             assert!((found / expected - 1.0).abs() < 1e-12, "{found} {expected}");
         }
         assert!((whole[0] / 5.0 - 1.0).abs() < 1e-12 && manifold.is_seen_by(0));
+    }
+
+    /// Two currents decay with rates of one size, i₁ towards −i₀/2, and the guard is their difference from that: where it passes zero
+    /// its rate is none of the manifold's.
+    #[test]
+    fn what_passes_through_the_manifold_is_not_on_it() {
+        let a = DMatrix::from_row_slice(2, 2, &[-33.0, -33.0, -33.0, -66.0]);
+        let guard = DMatrix::from_row_slice(1, 2, &[-10.0, -20.0]);
+        let manifold = Manifold::new(&a, &guard, &[1], 3).unwrap();
+        assert!(!manifold.holds(&[-0.24, 0.12], &[0.53, 0.53], 1e-14));
     }
 
     #[test]

@@ -103,6 +103,28 @@ fn a_capacitor_shorted_by_two_diodes() {
     assert!(at(&run, 0.0, "v(4)").abs() < 1e-15);
 }
 
+/// The diode's voltage and the current of one inductor decay towards values that the other gives, with a rate of its own size.
+#[test]
+fn a_diode_lets_go_while_two_currents_decay_together() {
+    let run = simulate(
+        "R2 2 0 10\nR4 4 0 10\nD2 2 4 d\nL3 2 0 0.3 IC=-0.53\nL4 2 4 0.3 IC=0.12\n.model d D(ideal)\n.tran 0.1 0.3 uic",
+    );
+    // i(l3) = −0.53 e^(−t·5/0.3) as long as d2 conducts, until it is twice that of l4, which stands.
+    let event = 0.06 * (0.53_f64 / 0.24).ln();
+    assert_eq!(run.events.len(), 1);
+    assert!((run.events[0].t / event - 1.0).abs() < 1e-14);
+    // Then x' = −(10/0.3) M x with M = [1 1; 1 2], whose eigenvalues are (3 ± √5)/2.
+    let root = 5.0_f64.sqrt();
+    let [slow, fast] = [(3.0 - root) / 2.0, (3.0 + root) / 2.0];
+    let t = 0.3 - event;
+    let [p, q] = [slow, fast].map(|value| (-t * value / 0.03).exp());
+    // x(0) = 0.12 (−2, 1); e^(−Mτ) by Sylvester's formula.
+    let [mx, x] = [[-1.0, 0.0], [-2.0, 1.0]];
+    let i4 = 0.12
+        * (p * (mx[1] - fast * x[1]) / (slow - fast) + q * (mx[1] - slow * x[1]) / (fast - slow));
+    assert!((at(&run, 0.3, "i(l4)") - i4).abs() < 1e-15, "{i4}");
+}
+
 /// A current or voltage that is zero to rounding when the source passes zero leaves with a slope that is rounding, or as small as
 /// what is left of a transient: the curvature says on which side.
 #[test]
