@@ -34,13 +34,14 @@
 //! | simulate from start to end | [`Model::transient`], with [`SimOptions`] |
 //! | drive a simulation, with a controller in the loop | [`Model::simulation`]: [`Simulation`], [`Stop`], [`Checkpoint`] |
 //! | see what happened | [`Run`], [`Event`], [`Waveforms`] |
+//! | sweep, measure, ask for operating points | [`analysis`] |
 //! | have the matrices | [`Model::lcs`]: [`Lcs`] |
 //! | build a circuit without text | [`Circuit::named`] |
 //!
 //! Data flows one way, and the modules stand in that order:
 //!
 //! ```text
-//! netlist → circuit → mna → lcs → plan → integrate (with solve) → waveform → report
+//! netlist → circuit → mna → lcs → plan → integrate (with solve) → model → analysis → report
 //! ```
 
 // Lets the systems under tests/ be used by the library's own tests as well.
@@ -48,6 +49,7 @@
 extern crate self as circ;
 
 pub mod algebra;
+pub mod analysis;
 pub mod check;
 pub mod circuit;
 pub mod diagnostic;

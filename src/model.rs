@@ -4,11 +4,11 @@ use std::fmt::{self, Display, Formatter};
 use std::path::Path;
 
 use crate::circuit::source::Wave;
-use crate::circuit::{Circuit, ElaborateOptions, Element, Kind, elaborate, load};
+use crate::circuit::{Circuit, ElaborateOptions, Element, Kind, Sweep, elaborate, load};
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 use crate::integrate::{
-    OperatingPoint, Run, SimError, SimOptions, Simulation, SimulationOptions, Values,
-    operating_point, simulate,
+    OperatingPoint, Places, Reason, Run, SimError, SimOptions, Simulation, SimulationOptions,
+    Values, operating_point, simulate,
 };
 use crate::lcs::{Lcs, Position, ReduceError, reduce};
 use crate::mna::{self, Behaviour};
@@ -95,7 +95,7 @@ impl Model {
         Self::of(None, sources, options, circuit, vec![])
     }
 
-    fn of(
+    pub(crate) fn of(
         netlist: Option<Netlist>,
         sources: SourceMap,
         options: ElaborateOptions,
@@ -166,6 +166,58 @@ impl Model {
         }
     }
 
+    /// The model with these values in place of those of the sweeps.
+    ///
+    /// # Errors
+    /// The netlist is no circuit with them, or there is no netlist.
+    pub fn at(&self, sweeps: &[Sweep], values: &[f64]) -> Result<Self, Faults> {
+        let circuit = self.circuit_at(sweeps, values)?;
+        match mna::behaviour(&circuit) {
+            Ok(multiport) => Ok(Self {
+                netlist: self.netlist.clone(),
+                sources: self.sources.clone(),
+                options: self.options.at(sweeps, values),
+                circuit,
+                multiport,
+                findings: self.findings.clone(),
+            }),
+            Err(findings) => Err(self.faults(findings)),
+        }
+    }
+
+    /// The circuit of that model, with the probes of this one.
+    pub(crate) fn circuit_at(&self, sweeps: &[Sweep], values: &[f64]) -> Result<Circuit, Faults> {
+        let Some(netlist) = &self.netlist else {
+            let message = "a circuit without a netlist has no sweeps";
+            return Err(self.faults(vec![Diagnostic::error("sweep", None, message)]));
+        };
+        let (circuit, findings) = elaborate(netlist, &self.options.at(sweeps, values));
+        let mut circuit = circuit.ok_or_else(|| self.faults(findings))?;
+        let probes = self.circuit.probes.iter().map(|p| circuit.probe(&p.name));
+        if let Some(probes) = probes.collect() {
+            circuit.probes = probes;
+        }
+        Ok(circuit)
+    }
+
+    /// The model with this circuit, whose values are the same.
+    ///
+    /// # Errors
+    /// Its equations cannot be set up.
+    pub(crate) fn with_circuit(&self, circuit: Circuit) -> Result<Self, SimError> {
+        match mna::behaviour(&circuit) {
+            Ok(multiport) => Ok(Self {
+                circuit,
+                multiport,
+                ..self.clone()
+            }),
+            Err(findings) => {
+                let reason = self.faults(findings).to_string();
+                Err(SimError::before(Reason::Unsupported(reason)))
+            }
+        }
+    }
+
     fn faults(&self, findings: Vec<Diagnostic>) -> Faults {
         Faults {
             findings,
@@ -183,6 +235,16 @@ impl Model {
     #[must_use]
     pub const fn sources(&self) -> &SourceMap {
         &self.sources
+    }
+
+    /// Where its elements stand in them.
+    #[must_use]
+    pub fn places(&self) -> Places<'_> {
+        Places(
+            self.netlist
+                .as_ref()
+                .map(|_| (&self.circuit, &self.sources)),
+        )
     }
 
     /// The flattened circuit.

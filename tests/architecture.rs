@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Each room and the rooms it may import, in the order in which data flows.
-const ROOMS: [(&str, &[&str]); 19] = [
+const ROOMS: [(&str, &[&str]); 20] = [
     ("settings", &[]),
     ("algebra", &[]),
     ("diagnostic", &[]),
@@ -47,6 +47,10 @@ const ROOMS: [(&str, &[&str]); 19] = [
             "settings",
         ],
     ),
+    (
+        "analysis",
+        &["circuit", "integrate", "model", "settings", "waveform"],
+    ),
     ("passivity", &["lcs", "settings"]),
     (
         "check",
@@ -68,6 +72,7 @@ const ROOMS: [(&str, &[&str]); 19] = [
     (
         "report",
         &[
+            "analysis",
             "check",
             "circuit",
             "integrate",
@@ -81,6 +86,7 @@ const ROOMS: [(&str, &[&str]); 19] = [
         "cli",
         &[
             "algebra",
+            "analysis",
             "check",
             "circuit",
             "diagnostic",
@@ -89,6 +95,7 @@ const ROOMS: [(&str, &[&str]); 19] = [
             "law",
             "lcs",
             "mna",
+            "model",
             "netlist",
             "passivity",
             "plan",

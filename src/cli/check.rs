@@ -7,6 +7,7 @@ use super::streams::Streams;
 use crate::check::{self, Fault, Report};
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 use crate::mna;
+use crate::model::Model;
 use crate::netlist::Loaded;
 use crate::report::json;
 
@@ -31,9 +32,9 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Report, Failure> {
     }
     let Loaded {
         sources,
+        netlist,
         circuit,
-        mut diagnostics,
-        ..
+        diagnostics,
     } = input::load(&args.input);
     if let Some(unreadable) = diagnostics.iter().find(|d| d.code == "unreadable") {
         return Err(Failure::Message(unreadable.message.clone()));
@@ -45,24 +46,25 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Report, Failure> {
         return Ok(faulty("", &diagnostics, &sources));
     };
     let title = circuit.title.clone();
-    let behaviour = match mna::behaviour(&circuit) {
-        Ok(behaviour) => behaviour,
-        Err(faults) => {
-            diagnostics.extend(faults);
-            return Ok(faulty(&title, &diagnostics, &sources));
-        }
+    let choices = input::choices(&args.input);
+    let model = match Model::of(netlist, sources, choices, circuit, diagnostics) {
+        Ok(model) => model,
+        Err(faults) => return Ok(faulty(&title, &faults.findings, &faults.sources)),
     };
-    diagnostics.extend(behaviour.notes.iter().cloned());
-    diagnostics.extend(mna::topology::findings(&circuit));
-    input::positions(&behaviour, &args.switches)?;
-    let subject = Subject::Circuit(Box::new((circuit, behaviour)));
-    match input::start_system(&subject, &args.switches, Some(&sources), streams) {
+    let sources = model.sources().clone();
+    let mut diagnostics = model.findings().to_vec();
+    diagnostics.extend(model.multiport().notes.iter().cloned());
+    diagnostics.extend(mna::topology::findings(model.circuit()));
+    input::positions(model.multiport(), &args.switches)?;
+    let subject = Subject::Circuit(Box::new(model));
+    match input::start_system(&subject, &args.switches, streams) {
         Ok((system, without)) => {
             let mut report = match &subject {
-                Subject::Circuit(parts) => {
+                Subject::Circuit(model) => {
+                    let circuit = model.circuit();
                     // A run would be refused, too; what follows is about the start from initial conditions.
-                    diagnostics.extend(without.map(|error| error.diagnostic(&parts.0)));
-                    check::circuit(&parts.0, &system.lcs)
+                    diagnostics.extend(without.map(|error| error.diagnostic(circuit)));
+                    check::circuit(circuit, &system.lcs)
                 }
                 Subject::System(_) => check::system(&system.lcs),
             };
@@ -74,7 +76,7 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Report, Failure> {
         }
         Err(failure) => {
             diagnostics.push(match (failure, &subject) {
-                (Failure::Run(error), Subject::Circuit(parts)) => error.diagnostic(&parts.0),
+                (Failure::Run(error), Subject::Circuit(model)) => error.diagnostic(model.circuit()),
                 (failure, _) => Diagnostic::error("no-system", None, failure.to_string()),
             });
             Ok(faulty(&title, &diagnostics, &sources))

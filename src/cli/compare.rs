@@ -14,13 +14,13 @@ use super::input::{self, Subject};
 use super::ngspice::{self, deck};
 use super::output;
 use super::sim::{self, Request};
-use super::stepped::Stepped;
 use super::streams::Streams;
+use crate::analysis::variants;
 use crate::circuit::Tran;
-use crate::diagnostic::SourceMap;
-use crate::integrate::{Method, Places};
+use crate::integrate::Method;
+use crate::model::Model;
 use crate::report::figure::Figure;
-use crate::report::{json, svg, text};
+use crate::report::{json, steps, svg, text};
 use crate::waveform::compare::{At, Comparison, compare as compare_waveforms, difference};
 use crate::waveform::{Waveforms, csv, raw};
 
@@ -56,25 +56,17 @@ pub(super) fn compare(args: &CompareArgs, streams: &Streams) -> Result<Exit, Fai
     if !with_ngspice(args) {
         files::spare(&outputs, [args.against.as_path()])?;
     }
-    let (subject, cards) = input::open_with_cards(&args.input, &[], &outputs, streams)?;
-    let files = cards.as_ref().map(|(_, sources)| sources.clone());
-    if let (Subject::Circuit(both), Some((netlist, sources))) = (&subject, cards)
-        && !both.0.steps.is_empty()
+    let subject = input::open(&args.input, &[], &outputs, streams)?;
+    if let Subject::Circuit(model) = &subject
+        && !model.circuit().steps.is_empty()
     {
         if with_ngspice(args) {
-            let stepped = Stepped {
-                input: &args.input,
-                probes: &[],
-                sweeps: &both.0.steps,
-                netlist,
-                sources,
-            };
-            return every(args, &stepped, streams);
+            return every(args, model, streams);
         }
         streams
             .say("note: `.step` is left out: the file is compared with the values as they stand");
     }
-    let found = Found::of(args, &subject, files.as_ref(), streams)?;
+    let found = Found::of(args, &subject, streams)?;
     if let Some(path) = &args.output {
         draw(path, &found)?;
     }
@@ -97,7 +89,7 @@ const fn exit(within: bool) -> Exit {
 }
 
 /// The comparisons of all runs of `.step`.
-fn every(args: &CompareArgs, stepped: &Stepped<'_>, streams: &Streams) -> Result<Exit, Failure> {
+fn every(args: &CompareArgs, model: &Model, streams: &Streams) -> Result<Exit, Failure> {
     if args.output.is_some() || args.keep.is_some() {
         let message = "`-o` and `--keep` take one run, and `.step` asks for several";
         return Err(Failure::Message(format!(
@@ -106,10 +98,11 @@ fn every(args: &CompareArgs, stepped: &Stepped<'_>, streams: &Streams) -> Result
         )));
     }
     let (mut done, mut failures) = (Vec::new(), Vec::new());
-    for values in stepped.combinations() {
-        let label = stepped.label(&values);
-        let subject = stepped.subject(&values, streams)?;
-        let found = match Found::of(args, &subject, Some(&stepped.sources), streams) {
+    for variant in variants(model, &model.circuit().steps) {
+        let values = variant.named();
+        let label = steps::label(&values);
+        let model = input::variant(&args.input, &variant, streams)?;
+        let found = match Found::of(args, &Subject::Circuit(Box::new(model)), streams) {
             Ok(found) => found,
             Err(failure) => {
                 failures.push(format!("{failure} at {label}"));
@@ -124,7 +117,7 @@ fn every(args: &CompareArgs, stepped: &Stepped<'_>, streams: &Streams) -> Result
             streams.say(format!("{label}: {}", found.verdict(args)));
         }
         found.tell_notes(streams);
-        done.push((stepped.named(&values), found));
+        done.push((values, found));
     }
     let within = done.iter().all(|(_, found)| found.within);
     if args.json {
@@ -158,13 +151,8 @@ struct Found {
 }
 
 impl Found {
-    fn of(
-        args: &CompareArgs,
-        subject: &Subject,
-        sources: Option<&SourceMap>,
-        streams: &Streams,
-    ) -> Result<Self, Failure> {
-        let tran = sim::tran(subject).ok_or_else(|| {
+    fn of(args: &CompareArgs, subject: &Subject, streams: &Streams) -> Result<Self, Failure> {
+        let tran = subject.tran().ok_or_else(|| {
             Failure::Message(format!(
                 "{}: there is no `.tran` to compare",
                 args.input.file.display()
@@ -175,7 +163,7 @@ impl Found {
         } else {
             from_file(&args.against)?
         };
-        let ours = simulated(args, subject, subject.places(sources), tran, streams)?;
+        let ours = simulated(args, subject, tran, streams)?;
         let shift = args.shift.unwrap_or(theirs.shift);
         let comparison = compare_waveforms(&ours, &theirs.waveforms, At::ReferenceRows, shift)?;
         let within = comparison.signals.iter().all(|s| s.shifted <= args.tol);
@@ -250,7 +238,7 @@ fn from_ngspice(
     tran: Tran,
     streams: &Streams,
 ) -> Result<Theirs, Failure> {
-    let Subject::Circuit(both) = subject else {
+    let Subject::Circuit(model) = subject else {
         let message = "a system without a circuit has no ngspice deck; compare it with a file";
         return Err(Failure::Message(format!(
             "{}: {message}",
@@ -268,7 +256,8 @@ fn from_ngspice(
             method,
             realisation: args.realisation,
         };
-        let deck = deck::deck(&both.0, &options).map_err(|e| Failure::Message(e.to_string()))?;
+        let deck =
+            deck::deck(model.circuit(), &options).map_err(|e| Failure::Message(e.to_string()))?;
         if let Some(path) = &args.keep {
             files::write(path, deck.text.as_bytes())?;
         }
@@ -321,7 +310,6 @@ fn from_file(path: &Path) -> Result<Theirs, Failure> {
 fn simulated(
     args: &CompareArgs,
     subject: &Subject,
-    places: Places<'_>,
     tran: Tran,
     streams: &Streams,
 ) -> Result<Waveforms, Failure> {
@@ -344,8 +332,8 @@ fn simulated(
         .ceil()
         .max(1.0);
     let run = sim::run(subject, &request, Some(tran.tstep / divisions), streams)
-        .map_err(|error| input::broke_off(&args.input, &error, places, streams))?;
-    for note in places.all(&run.notes) {
+        .map_err(|error| input::broke_off(&args.input, &error, subject.places(), streams))?;
+    for note in subject.places().all(&run.notes) {
         streams.say(format!("note: {note}"));
     }
     Ok(run.waveforms)

@@ -29,8 +29,8 @@ pub(super) fn graph(args: &GraphArgs, streams: &Streams) -> Result<Exit, Failure
         return Err(output::unknown_ending(path, "dot, svg or png"));
     }
     let outputs: Vec<&Path> = args.output.iter().map(PathBuf::as_path).collect();
-    let (subject, _) = input::open(&args.input, &[], &outputs, streams)?;
-    let circuit = input::circuit_of(&args.input, &subject)?;
+    let subject = input::open_as_it_stands(&args.input, &outputs, streams)?;
+    let circuit = input::model_of(&args.input, &subject)?.circuit();
     match ending {
         None => streams.data(graph::dot(circuit))?,
         Some((path, ending)) if matches!(ending.as_str(), "dot" | "gv") => {

@@ -8,32 +8,43 @@ use super::files;
 use super::forms;
 use super::render;
 use super::streams::Streams;
-use crate::circuit::{self, Circuit, ElaborateOptions};
+use crate::analysis::Variant;
+use crate::circuit::{self, Circuit, ElaborateOptions, Tran};
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 use crate::forms::json;
 use crate::integrate::{Places, SimError, start};
 use crate::lcs::json::SystemFile;
 use crate::lcs::{Lcs, Position, reduce};
-use crate::mna::{self, Behaviour};
-use crate::netlist::{self, Loaded, Netlist};
+use crate::mna::Behaviour;
+use crate::model::{Faults, Model};
+use crate::netlist::{self, Loaded};
+use crate::report::steps;
 use crate::settings::Settings;
 use crate::waveform::canonical_name;
 
 /// What there is to simulate.
 pub enum Subject {
     /// From a netlist.
-    Circuit(Box<(Circuit, Behaviour)>),
+    Circuit(Box<Model>),
     /// From a file of `circ lcs`.
     System(Box<SystemFile>),
 }
 
 impl Subject {
-    /// Where its elements stand in these files.
-    pub fn places<'a>(&'a self, sources: Option<&'a SourceMap>) -> Places<'a> {
-        Places(match self {
-            Self::Circuit(both) => sources.map(|sources| (&both.0, sources)),
-            Self::System(_) => None,
-        })
+    /// Where its elements stand.
+    pub fn places(&self) -> Places<'_> {
+        match self {
+            Self::Circuit(model) => model.places(),
+            Self::System(_) => Places::default(),
+        }
+    }
+
+    /// The transient that it asks for.
+    pub fn tran(&self) -> Option<Tran> {
+        match self {
+            Self::Circuit(model) => model.circuit().tran,
+            Self::System(system) => system.tran,
+        }
     }
 }
 
@@ -81,8 +92,26 @@ pub fn choices(input: &Input) -> ElaborateOptions {
     }
 }
 
-/// Reads a file, shows what was found in it, and keeps the named probes if there are any. With a netlist come the files it was
-/// read from; none of the `outputs` may be one of them.
+/// Reads a file as [`open`] does, for a command that takes the values as they stand and says so of a netlist with `.step`.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_as_it_stands(
+    input: &Input,
+    outputs: &[&Path],
+    streams: &Streams,
+) -> Result<Subject, Failure> {
+    let subject = open(input, &[], outputs, streams)?;
+    if let Subject::Circuit(model) = &subject
+        && !model.circuit().steps.is_empty()
+    {
+        streams.say("note: `.step` is left out: these are the values as they stand");
+    }
+    Ok(subject)
+}
+
+/// Reads a file, shows what was found in it, and keeps the named probes if there are any; none of the `outputs` may be one of the
+/// files that were read.
 ///
 /// # Errors
 /// [`Failure::Faults`] when the circuit cannot be built, [`Failure::Message`] for an unknown probe and for such an output.
@@ -91,30 +120,11 @@ pub fn open(
     probes: &[String],
     outputs: &[&Path],
     streams: &Streams,
-) -> Result<(Subject, Option<SourceMap>), Failure> {
-    let (subject, cards) = open_with_cards(input, probes, outputs, streams)?;
-    if let Subject::Circuit(both) = &subject
-        && !both.0.steps.is_empty()
-    {
-        streams.say("note: `.step` is left out: these are the values as they stand");
-    }
-    Ok((subject, cards.map(|(_, sources)| sources)))
-}
-
-/// The same, with the cards of the netlist and where they stand.
-///
-/// # Errors
-/// As [`open`].
-pub fn open_with_cards(
-    input: &Input,
-    probes: &[String],
-    outputs: &[&Path],
-    streams: &Streams,
-) -> Result<(Subject, Option<(Netlist, SourceMap)>), Failure> {
+) -> Result<Subject, Failure> {
     files::spare(outputs, [input.file.as_path()])?;
     if let Some(mut system) = system(input)? {
         keep_outputs(&mut system.lcs, probes)?;
-        return Ok((Subject::System(Box::new(system)), None));
+        return Ok(Subject::System(Box::new(system)));
     }
     let Loaded {
         sources,
@@ -126,19 +136,37 @@ pub fn open_with_cards(
     files::spare(outputs, sources.files.iter().map(|f| Path::new(&f.path)))?;
     let mut circuit = circuit.ok_or_else(|| faults(input, &diagnostics))?;
     keep_probes(&mut circuit, probes)?;
-    let behaviour = mna::behaviour(&circuit).map_err(|diagnostics| {
-        show(&diagnostics, &sources, streams);
-        faults(input, &diagnostics)
-    })?;
-    let subject = Subject::Circuit(Box::new((circuit, behaviour)));
-    Ok((subject, netlist.map(|netlist| (netlist, sources))))
+    let model = Model::of(netlist, sources, choices(input), circuit, Vec::new())
+        .map_err(|faults| refused(input, &faults, streams))?;
+    Ok(Subject::Circuit(Box::new(model)))
+}
+
+/// The model of one of the runs of `.step`.
+///
+/// # Errors
+/// [`Failure::Faults`] where the netlist is no circuit with these values.
+pub(super) fn variant(
+    input: &Input,
+    variant: &Variant<'_>,
+    streams: &Streams,
+) -> Result<Model, Failure> {
+    variant.model().map_err(|faults| {
+        let failure = refused(input, &faults, streams);
+        Failure::Faults(format!("{failure} at {}", steps::label(&variant.named())))
+    })
+}
+
+/// A netlist that is no circuit: shows why.
+pub(super) fn refused(input: &Input, faults: &Faults, streams: &Streams) -> Failure {
+    show(&faults.findings, &faults.sources, streams);
+    self::faults(input, &faults.findings)
 }
 
 /// Leaves exactly the probes named on the command line, if there are any.
 ///
 /// # Errors
 /// [`Failure::Message`] for an unknown one.
-pub fn keep_probes(circuit: &mut Circuit, probes: &[String]) -> Result<(), Failure> {
+fn keep_probes(circuit: &mut Circuit, probes: &[String]) -> Result<(), Failure> {
     if probes.is_empty() {
         return Ok(());
     }
@@ -150,13 +178,13 @@ pub fn keep_probes(circuit: &mut Circuit, probes: &[String]) -> Result<(), Failu
     Ok(())
 }
 
-/// The circuit of a subject.
+/// The model of a subject.
 ///
 /// # Errors
 /// [`Failure::Message`]: a system has no circuit.
-pub fn circuit_of<'s>(input: &Input, subject: &'s Subject) -> Result<&'s Circuit, Failure> {
+pub fn model_of<'s>(input: &Input, subject: &'s Subject) -> Result<&'s Model, Failure> {
     match subject {
-        Subject::Circuit(both) => Ok(&both.0),
+        Subject::Circuit(model) => Ok(model),
         Subject::System(_) => {
             let message = "is a system without a circuit; this command needs a netlist";
             Err(Failure::Message(format!(
@@ -175,11 +203,10 @@ pub fn circuit_of<'s>(input: &Input, subject: &'s Subject) -> Result<&'s Circuit
 pub fn start_system(
     subject: &Subject,
     wanted: &[(String, bool)],
-    sources: Option<&SourceMap>,
     streams: &Streams,
 ) -> Result<(SystemFile, Option<SimError>), Failure> {
     let (circuit, behaviour) = match subject {
-        Subject::Circuit(both) => (&both.0, &both.1),
+        Subject::Circuit(model) => (model.circuit(), model.multiport()),
         Subject::System(system) if wanted.is_empty() => {
             return Ok(((**system).clone(), None));
         }
@@ -198,7 +225,7 @@ pub fn start_system(
             (initial.map_err(Box::new)?, Some(error))
         }
     };
-    for note in subject.places(sources).all(&initial.notes) {
+    for note in subject.places().all(&initial.notes) {
         streams.say(format!("note: {note}"));
     }
     let mut switches = initial.switches;
@@ -288,7 +315,7 @@ pub(super) fn broke_off(
     })
 }
 
-pub(super) fn faults(input: &Input, diagnostics: &[Diagnostic]) -> Failure {
+fn faults(input: &Input, diagnostics: &[Diagnostic]) -> Failure {
     let count = diagnostics
         .iter()
         .filter(|d| d.severity == Severity::Error)

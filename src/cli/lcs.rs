@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::args::{LcsArgs, SystemFormat};
 use super::exit::{Exit, Failure};
 use super::files;
-use super::input;
+use super::input::{self, Subject};
 use super::streams::Streams;
 use crate::lcs::format::{Format, format};
 use crate::lcs::json;
@@ -16,12 +16,11 @@ use crate::lcs::json;
 /// See [`Failure`].
 pub(super) fn lcs(args: &LcsArgs, streams: &Streams) -> Result<Exit, Failure> {
     let outputs: Vec<&Path> = args.output.iter().map(PathBuf::as_path).collect();
-    let (subject, sources) = input::open(&args.input, &[], &outputs, streams)?;
-    let system = input::start_system(&subject, &args.switches, sources.as_ref(), streams);
+    let subject = input::open_as_it_stands(&args.input, &outputs, streams)?;
+    let system = input::start_system(&subject, &args.switches, streams);
     let (system, without) = system.map_err(|failure| match failure {
-        Failure::Run(error) if sources.is_some() => {
-            let places = subject.places(sources.as_ref());
-            input::broke_off(&args.input, &error, places, streams)
+        Failure::Run(error) if matches!(subject, Subject::Circuit(_)) => {
+            input::broke_off(&args.input, &error, subject.places(), streams)
         }
         failure => failure,
     })?;

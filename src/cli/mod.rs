@@ -12,7 +12,6 @@ mod forms;
 mod graph;
 pub mod input;
 mod lcs;
-mod measured;
 pub mod ngspice;
 mod op;
 pub mod output;
@@ -20,7 +19,6 @@ mod render;
 mod rows;
 mod signals;
 pub mod sim;
-mod stepped;
 mod steps;
 pub mod streams;
 

@@ -6,50 +6,42 @@ use serde_json::{Map, Value};
 use super::args::OpArgs;
 use super::exit::{Exit, Failure};
 use super::input;
-use super::stepped::Stepped;
 use super::streams::Streams;
-use crate::circuit::Circuit;
-use crate::integrate::{OperatingPoint, Places, Values, operating_point};
+use crate::analysis::variants;
+use crate::integrate::OperatingPoint;
+use crate::model::Model;
 use crate::report::{json, si, steps, table};
-use crate::settings::Settings;
 
 /// Prints the operating point with the sources' DC values, with `.step` that of every combination of its values.
 ///
 /// # Errors
 /// See [`Failure`].
 pub(super) fn op(args: &OpArgs, streams: &Streams) -> Result<Exit, Failure> {
-    let (subject, cards) = input::open_with_cards(&args.input, &[], &[], streams)?;
-    let circuit = input::circuit_of(&args.input, &subject)?;
-    let sources = cards.as_ref().map(|(_, sources)| sources.clone());
-    let solved = |circuit: &Circuit| {
-        let places = Places(sources.as_ref().map(|sources| (circuit, sources)));
-        let point = operating_point(circuit, Values::Dc, false, &Settings::default())
+    let subject = input::open(&args.input, &[], &[], streams)?;
+    let model = input::model_of(&args.input, &subject)?;
+    let solved = |model: &Model| {
+        let places = model.places();
+        let point = model
+            .operating_point()
             .map_err(|error| input::broke_off(&args.input, &error, places, streams))?;
         let notes = places.all(&point.notes);
         Ok::<_, Failure>((point, notes))
     };
-    let (netlist, sources) = match cards {
-        Some(cards) if !circuit.steps.is_empty() => cards,
-        _ => return one(args, &solved(circuit)?, streams),
-    };
-    let stepped = Stepped {
-        input: &args.input,
-        probes: &[],
-        sweeps: &circuit.steps,
-        netlist,
-        sources,
-    };
+    let sweeps = &model.circuit().steps;
+    if sweeps.is_empty() {
+        return one(args, &solved(model)?, streams);
+    }
     let (mut points, mut failures) = (Vec::new(), Vec::new());
-    for values in stepped.combinations() {
-        let subject = stepped.subject(&values, streams)?;
-        match solved(input::circuit_of(&args.input, &subject)?) {
-            Ok((point, notes)) => points.push((stepped.named(&values), point, notes)),
-            Err(failure) => failures.push(format!("{failure} at {}", stepped.label(&values))),
+    for variant in variants(model, sweeps) {
+        let values = variant.named();
+        match solved(&input::variant(&args.input, &variant, streams)?) {
+            Ok((point, notes)) => points.push((values, point, notes)),
+            Err(failure) => failures.push(format!("{failure} at {}", steps::label(&values))),
         }
     }
     if args.json {
         // The point with the values as they stand, as of a netlist without `.step`.
-        let (own, notes) = solved(circuit)?;
+        let (own, notes) = solved(model)?;
         let steps = points.iter().map(|(values, point, notes)| StepDocument {
             values: values
                 .iter()

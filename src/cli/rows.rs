@@ -35,22 +35,13 @@ impl Shown {
             units: waves.units.clone(),
             ..Waveforms::default()
         };
-        for (t, values, kind) in block(waves, kinds).rows() {
+        for (t, values, kind) in Block::of(waves, kinds).rows() {
             if self.has(kind) {
                 shown.time.push(t);
                 shown.values.extend_from_slice(values);
             }
         }
         shown
-    }
-}
-
-/// All rows at once.
-pub(super) fn block<'a>(waves: &'a Waveforms, kinds: &'a [RowKind]) -> Block<'a> {
-    Block {
-        time: &waves.time,
-        values: &waves.values,
-        kinds,
     }
 }
 
@@ -88,7 +79,7 @@ impl Columns {
     /// Those that a run will have.
     pub(super) fn of_subject(subject: &Subject) -> Self {
         match subject {
-            Subject::Circuit(both) => Self::of_circuit(&both.0),
+            Subject::Circuit(model) => Self::of_circuit(model.circuit()),
             Subject::System(system) => {
                 let lcs = &system.lcs;
                 Self {

@@ -9,13 +9,12 @@ use super::exit::{Exit, Failure};
 use super::files;
 use super::forms;
 use super::input::{self, Subject};
-use super::measured::{self, Measuring};
 use super::output::{Format, Outputs};
-use super::rows::{self, Columns, Shown};
+use super::rows::{Columns, Shown};
 use super::signals::Signals;
-use super::stepped::Stepped;
 use super::steps::Stepping;
 use super::streams::Streams;
+use crate::analysis::{self, Finished, Measurements, is_measured};
 use crate::circuit::source::Wave;
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{
@@ -23,8 +22,8 @@ use crate::integrate::{
     aliased, simulate, simulate_system, verify, verify_system,
 };
 use crate::lcs::Input;
+use crate::model::Model;
 use crate::report::figure::Figure;
-use crate::report::measured::Measurements;
 use crate::report::{json, terminal, text};
 use crate::settings::Settings;
 
@@ -49,52 +48,42 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         let run = forms::run(&form, args)?;
         let destination = Destination::of(args, &formats, None, Places::default(), streams);
         let outputs = destination.open(&Columns::of(&run.waveforms))?;
-        let finished = (Some((run, Measurements::default())), None);
+        let finished = Finished::of(Ok(run));
         return destination.finish(outputs, finished, true, None);
     }
-    let (subject, cards) = input::open_with_cards(&args.input, &args.probes, &paths, streams)?;
-    let sources = cards.as_ref().map(|(_, sources)| sources.clone());
+    let subject = input::open(&args.input, &args.probes, &paths, streams)?;
     let signals = Signals::watch()?;
-    if let (Subject::Circuit(both), Some((netlist, sources))) = (&subject, cards) {
-        let (circuit, _) = &**both;
+    if let Subject::Circuit(model) = &subject {
+        let circuit = model.circuit();
         if circuit.tran.is_none() && !circuit.dc.is_empty() {
             only_one_way(args)?;
-            return dc::sim(args, circuit, &netlist, &sources, streams);
+            return dc::sim(args, model, streams);
         }
         if !circuit.steps.is_empty() {
             only_one_way(args)?;
-            let stepped = Stepped {
-                input: &args.input,
-                probes: &args.probes,
-                sweeps: &circuit.steps,
-                netlist,
-                sources,
-            };
             let stepping = Stepping {
                 args,
-                circuit,
-                stepped,
+                model,
                 request,
                 signals: &signals,
             };
             return stepping.sim(&formats, streams);
         }
     }
-    let places = subject.places(sources.as_ref());
-    let destination = Destination::of(args, &formats, tran(&subject), places, streams);
+    let destination = Destination::of(args, &formats, subject.tran(), subject.places(), streams);
     let mut outputs = destination.open(&Columns::of_subject(&subject))?;
-    let measures = matches!(&subject, Subject::Circuit(both) if measured::asked(&both.0));
+    let measures = matches!(&subject, Subject::Circuit(model) if is_measured(model.circuit()));
     let collects = outputs.hold() || destination.plots || measures || args.verify;
     let mut take = |block: Block<'_>| outputs.take(block);
     let route = Route {
         corners: destination.has_pictures() || args.verify,
-        sink: (!measures).then_some(&mut take as Sink<'_>),
+        sink: Some(&mut take),
         discard: !collects,
         cancel: Some(signals.flag()),
         held: None,
     };
-    let mut finished = measured_run(&subject, &request, route, streams)?;
-    if let (true, (Some((run, _)), None)) = (args.verify, &mut finished) {
+    let mut finished = measured_run(&subject, &request, route, streams);
+    if let (true, Some((run, _)), None) = (args.verify, &mut finished.run, &finished.error) {
         let options = VerifyOptions {
             settings: request.settings(),
             cancel: Some(signals.flag()),
@@ -179,11 +168,11 @@ impl<'a> Destination<'a> {
     pub(super) fn finish(
         &self,
         mut outputs: Outputs,
-        (finished, error): Finished,
+        Finished { run, error }: Finished,
         feeds: bool,
         signal: Option<(i32, &str)>,
     ) -> Result<Exit, Failure> {
-        let Some((run, found)) = finished else {
+        let Some((run, found)) = run else {
             return error.map_or(Ok(Exit::Done), |error| Err(self.failure(&error)));
         };
         if self.args.method.step.is_some() && run.method == Method::Exact.name() {
@@ -192,7 +181,7 @@ impl<'a> Destination<'a> {
         }
         if feeds {
             // A failure is told by `finish`.
-            let _ = outputs.take(rows::block(&run.waveforms, &run.kinds));
+            let _ = outputs.take(Block::of(&run.waveforms, &run.kinds));
         }
         let last = outputs.last().or(run.waveforms.time.last().copied());
         let until = last.map_or("before its first row".into(), |t| format!("at {t:e} s"));
@@ -272,21 +261,10 @@ impl<'a> Destination<'a> {
     }
 }
 
-/// The sources of a subject.
-fn waves(subject: &Subject) -> impl Iterator<Item = (&str, &Wave)> {
-    let inputs: Vec<&Input> = match subject {
-        Subject::Circuit(both) => both.1.sources.iter().map(|s| &s.input).collect(),
-        Subject::System(system) => system.lcs.inputs.iter().collect(),
-    };
-    inputs
-        .into_iter()
-        .map(|input| (input.name.as_str(), &input.source.wave))
-}
-
 /// Makes a run a second time.
 fn second(subject: &Subject, run: &Run, options: &VerifyOptions<'_>) -> Result<Verified, SimError> {
     match subject {
-        Subject::Circuit(both) => verify(&both.0, &both.1, run, options),
+        Subject::Circuit(model) => verify(model.circuit(), model.multiport(), run, options),
         Subject::System(system) => match system.tran {
             Some(tran) => verify_system((&system.lcs, &system.x0), tran, run, options),
             None => Err(no_tran()),
@@ -298,9 +276,6 @@ fn no_tran() -> SimError {
     let reason = "the system has no \"tran\": {\"tstep\", \"tstop\"}";
     SimError::before(Reason::Unsupported(reason.into()))
 }
-
-/// A run, or as much of it as there is, and what its measurements found.
-pub(super) type Finished = (Option<(Run, Measurements)>, Option<SimError>);
 
 /// Where the rows of a run go.
 #[derive(Default)]
@@ -317,42 +292,47 @@ pub(super) struct Route<'a> {
     pub held: Option<usize>,
 }
 
-/// Simulates, and measures where the circuit asks for it: on the rows at events and corners too.
-///
-/// # Errors
-/// See [`Failure`].
-pub(super) fn measured_run(
+/// Simulates, and measures where the circuit asks for it; then [`Route::sink`] gets no rows.
+fn measured_run(
     subject: &Subject,
     request: &Request,
     route: Route<'_>,
     streams: &Streams,
-) -> Result<Finished, Failure> {
-    let measuring = match subject {
-        Subject::Circuit(both) if measured::asked(&both.0) => Some((
-            Measuring::of(&both.0, request),
-            measured::with_signals(&both.0)?,
-        )),
-        _ => None,
+) -> Finished {
+    let system = match subject {
+        Subject::Circuit(model) => return transient(model, request, route, streams),
+        Subject::System(system) => system,
     };
-    let route = Route {
-        corners: route.corners || measuring.is_some(),
-        ..route
-    };
-    let tstep = measuring
-        .as_ref()
-        .and_then(|(measuring, _)| measuring.tstep());
-    let shown = subject;
-    let subject = measuring.as_ref().map_or(subject, |(_, subject)| subject);
-    let (finished, error) = match run_to(subject, request, tstep, route, streams) {
-        Ok(run) => (Some(run), None),
-        Err(mut error) => (error.partial.take().map(|run| *run), Some(error)),
-    };
-    let finished = finished.map(|mut run| {
-        let found = measuring.map(|(measuring, _)| measuring.carry_out(&mut run));
-        run.aliased = tran(shown).and_then(|tran| aliased(&tran, waves(shown), &run));
-        (run, found.unwrap_or_default())
-    });
-    Ok((finished, error))
+    let mut finished = Finished::of(run_to(subject, request, None, route, streams));
+    if let (Some((run, _)), Some(tran)) = (&mut finished.run, system.tran) {
+        run.aliased = aliased(&tran, waves(&system.lcs.inputs), run);
+    }
+    finished
+}
+
+/// The same of a circuit.
+pub(super) fn transient(
+    model: &Model,
+    request: &Request,
+    route: Route<'_>,
+    streams: &Streams,
+) -> Finished {
+    let tran = model.circuit().tran;
+    let run = |options: SimOptions<'_>| analysis::transient(model, options);
+    let mut finished = with_options(tran, request, route, streams, run);
+    if let (Some((run, _)), Some(tran)) = (&mut finished.run, tran) {
+        let inputs = model.multiport().sources.iter().map(|s| &s.input);
+        run.aliased = aliased(&tran, waves(inputs), run);
+    }
+    finished
+}
+
+/// Names and waveforms of sources.
+fn waves<'a>(
+    inputs: impl IntoIterator<Item = &'a Input>,
+) -> impl Iterator<Item = (&'a str, &'a Wave)> {
+    let named = |input: &'a Input| (input.name.as_str(), &input.source.wave);
+    inputs.into_iter().map(named)
 }
 
 /// How a subject is to be integrated.
@@ -439,10 +419,35 @@ fn run_to(
     route: Route<'_>,
     streams: &Streams,
 ) -> Result<Run, SimError> {
-    let tran = tran(subject).map(|t| Tran {
+    let tran = subject.tran().map(|t| Tran {
         tstep: tstep.unwrap_or(t.tstep),
         ..t
     });
+    with_options(tran, request, route, streams, |options| {
+        match (subject, tran) {
+            (Subject::Circuit(model), _) => {
+                let circuit = Circuit {
+                    tran,
+                    ..model.circuit().clone()
+                };
+                simulate(&circuit, model.multiport(), options)
+            }
+            (Subject::System(system), Some(tran)) => {
+                simulate_system(&system.lcs, &system.x0, tran, options)
+            }
+            (Subject::System(_), None) => Err(no_tran()),
+        }
+    })
+}
+
+/// Runs what takes options, with a progress bar over the span of `tran`.
+fn with_options<R>(
+    tran: Option<Tran>,
+    request: &Request,
+    route: Route<'_>,
+    streams: &Streams,
+    run: impl FnOnce(SimOptions<'_>) -> R,
+) -> R {
     let mut sink = route.sink;
     let sink = sink.as_mut().map(|s| &mut **s as Sink<'_>);
     let bar = streams.progress(PROGRESS as u64, "simulating");
@@ -459,7 +464,7 @@ fn run_to(
     if let Some(held) = route.held {
         settings.max_held = held;
     }
-    let options = SimOptions {
+    let result = run(SimOptions {
         method: request.method,
         theta: request.theta,
         gamma: request.gamma,
@@ -471,32 +476,9 @@ fn run_to(
         cancel: route.cancel,
         settings,
         progress: (!bar.is_hidden()).then_some(&mut report),
-    };
-    let circuit = match subject {
-        Subject::Circuit(both) => Circuit {
-            tran,
-            ..both.0.clone()
-        },
-        Subject::System(_) => Circuit::default(),
-    };
-    let result = match (subject, tran) {
-        (Subject::Circuit(both), _) => simulate(&circuit, &both.1, options),
-        (Subject::System(system), Some(tran)) => {
-            simulate_system(&system.lcs, &system.x0, tran, options)
-        }
-        (Subject::System(_), None) => Err(no_tran()),
-    };
+    });
     bar.finish_and_clear();
     result
-}
-
-/// The transient that a subject asks for.
-#[must_use]
-pub fn tran(subject: &Subject) -> Option<Tran> {
-    match subject {
-        Subject::Circuit(both) => both.0.tran,
-        Subject::System(system) => system.tran,
-    }
 }
 
 /// On standard error: JSON where asked for; words where asked for, for a person, and with `-v`; else the notes alone.

@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use cpu_time::ThreadTime;
 
 use crate::integrate::run::{Reason, SimError, Times};
+use crate::waveform::Waveforms;
 
 /// What stands at the time of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -32,6 +33,16 @@ pub struct Block<'a> {
 }
 
 impl<'a> Block<'a> {
+    /// All rows of these waveforms.
+    #[must_use]
+    pub fn of(waves: &'a Waveforms, kinds: &'a [RowKind]) -> Self {
+        Self {
+            time: &waves.time,
+            values: &waves.values,
+            kinds,
+        }
+    }
+
     /// Time, values and kind of each row.
     pub fn rows(self) -> impl Iterator<Item = (f64, &'a [f64], RowKind)> {
         let width = self.values.len() / self.time.len().max(1);

@@ -3,8 +3,8 @@
 use serde::Serialize;
 use serde_json::Value;
 
-use super::measured::Measurements;
 use super::text;
+use crate::analysis::Measurements;
 use crate::integrate::{Energy, Impulse, Places, Run, StateJump, StatedError, Verified};
 
 #[derive(Serialize)]

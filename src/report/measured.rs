@@ -3,24 +3,10 @@
 use serde_json::{Map, Value, json};
 
 use super::table;
+use crate::analysis::Measurements;
 use crate::circuit::{Harmonics, Measured};
 
-/// The outcome of the measurements of one run.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Measurements {
-    /// Of `.meas`, in file order.
-    pub measured: Vec<Measured>,
-    /// Of `.four`, in file order.
-    pub harmonics: Vec<Harmonics>,
-}
-
 impl Measurements {
-    /// Whether nothing was asked for.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.measured.is_empty() && self.harmonics.is_empty()
-    }
-
     /// One line per measurement, a table per Fourier analysis; a measurement without a value says why.
     #[must_use]
     pub fn words(&self) -> String {

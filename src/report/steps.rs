@@ -2,8 +2,8 @@
 
 use serde_json::{Map, Value};
 
-use super::measured::Measurements;
 use super::{json, si, table};
+use crate::analysis::Measurements;
 use crate::integrate::{Energy, Places, Run, StatedError};
 use crate::waveform::Waveforms;
 

@@ -31,7 +31,7 @@ const ROWS: f64 = 50_000.0;
 impl Bench<'_> {
     /// ngspice over its settings and its realisations of the diodes.
     pub(super) fn ngspice(&self) -> Result<Vec<Measurement>, Failure> {
-        let Subject::Circuit(both) = self.subject else {
+        let Subject::Circuit(model) = self.subject else {
             return Err(Failure::Message(
                 "a system without a circuit has no ngspice deck".into(),
             ));
@@ -42,7 +42,7 @@ impl Bench<'_> {
             .ceil()
             .max(1.0);
         let reference = self.reference(Some(self.tran.tstep / divisions))?;
-        let realisations: &[Realisation] = if has_diodes(&both.0) {
+        let realisations: &[Realisation] = if has_diodes(model.circuit()) {
             &[
                 Realisation::Default,
                 Realisation::N001,
@@ -72,7 +72,7 @@ impl Bench<'_> {
                     method,
                     realisation,
                 };
-                let measured = self.ngspice_at(&both.0, &options, &reference, start_up)?;
+                let measured = self.ngspice_at(model.circuit(), &options, &reference, start_up)?;
                 let (cost, error) = (measured.cpu_seconds, measured.rms_error);
                 measurements.push(measured);
                 let Some(error) = error else {

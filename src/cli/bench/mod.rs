@@ -48,9 +48,9 @@ pub(super) fn bench(args: &BenchArgs, streams: &Streams) -> Result<Exit, Failure
         .chain(&args.signals)
         .map(PathBuf::as_path)
         .collect();
-    let (subject, _) = input::open(&args.input, &[], &outputs, streams)?;
+    let subject = input::open_as_it_stands(&args.input, &outputs, streams)?;
     let file = &args.input.file;
-    let tran = sim::tran(&subject).ok_or_else(|| {
+    let tran = subject.tran().ok_or_else(|| {
         Failure::Message(format!(
             "{}: there is no `.tran` to measure",
             file.display()

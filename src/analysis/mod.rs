@@ -1,0 +1,15 @@
+//! What is asked of a circuit besides one transient: functions of a [`Model`](crate::Model) and of options.
+//!
+//! | question | answer |
+//! |---|---|
+//! | `.meas` and `.four` of a transient | [`transient`]: a run with its [`Measurements`] |
+//! | `.dc` | [`dc`]: a [`Characteristic`] |
+//! | `.step`, or any other values | [`variants`]: a [`Variant`] for every combination of values; [`each`] asks all of them, in parallel |
+
+mod dc;
+mod measured;
+mod sweep;
+
+pub use dc::{Characteristic, Unsolved, dc};
+pub use measured::{Finished, Measurements, is_measured, transient};
+pub use sweep::{Variant, each, variants};
