@@ -2,6 +2,7 @@
 
 pub mod aliasing;
 pub mod control;
+mod cpu;
 pub mod energy;
 pub mod event;
 pub mod exact;

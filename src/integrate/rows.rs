@@ -5,7 +5,7 @@ use std::ops::{ControlFlow, Range};
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use cpu_time::ThreadTime;
+use crate::integrate::cpu::ThreadTime;
 
 use crate::integrate::run::{Reason, SimError, Times};
 use crate::waveform::Waveforms;

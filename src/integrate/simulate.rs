@@ -5,7 +5,7 @@ use std::rc::Rc;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use cpu_time::ThreadTime;
+use crate::integrate::cpu::ThreadTime;
 use nalgebra::DVector;
 
 use crate::circuit::{self, Circuit, ElementId, Source, Tran};
