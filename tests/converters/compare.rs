@@ -16,6 +16,7 @@ use crate::changes::change;
 use crate::circuit::{Card, Circuit, DiodeModel, Part, states};
 use crate::oracle;
 use crate::random::Random;
+use crate::resumed;
 use crate::topologies::Case;
 
 /// Largest difference of states relative to their amplitudes that needs no explanation.
@@ -27,6 +28,8 @@ const UNSURE: f64 = 1e-4;
 /// Of error-controlled steps, and where these are in doubt.
 const TOLERANCE: f64 = 1e-7;
 const FINER: f64 = 1e-9;
+/// Of a run.
+pub(crate) const MOST_STEPS: u64 = 3_000_000;
 
 /// What became of a case.
 #[derive(Debug, Clone, PartialEq)]
@@ -84,18 +87,21 @@ fn attempt(text: &str, method: Method, tol: f64) -> Result<Run, String> {
             progress: Some(&mut progress),
             settings: Settings {
                 tol,
-                max_steps: 3_000_000,
+                max_steps: MOST_STEPS,
                 ..Settings::default()
             },
             ..SimOptions::default()
         };
         simulate(&circuit, &behaviour, options).map_err(|e| e.to_string())
     }));
-    guarded.unwrap_or_else(|e| {
-        let text = e.downcast_ref::<String>().cloned();
-        let text = text.or_else(|| e.downcast_ref::<&str>().map(ToString::to_string));
-        Err(format!("panic: {}", text.unwrap_or_default()))
-    })
+    guarded.unwrap_or_else(|e| Err(said(e.as_ref())))
+}
+
+/// The words of a panic.
+pub(crate) fn said(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<String>().cloned();
+    let text = text.or_else(|| panic.downcast_ref::<&str>().map(ToString::to_string));
+    format!("panic: {}", text.unwrap_or_default())
 }
 
 /// The columns of the signals at the rows k·stop/rows, k = 1, …, row by row.
@@ -416,6 +422,51 @@ fn method(run: &Run) -> (String, f64) {
         (method, false) => method.to_string(),
     };
     (method, run.error.max.unwrap_or(0.0))
+}
+
+/// `circ` against itself where the run is stopped, left and taken up again.
+pub(crate) fn resumed(case: &Case, base: &Base, seed: u64) -> Outcome {
+    let circuit = &case.circuit;
+    let signals = states(circuit);
+    let apart = |found: &[Vec<f64>], rows: &[Vec<f64>]| {
+        let [one, other] = [found, rows].map(|rows| beside_edges(circuit, rows));
+        difference(&one, &other, &signals, floors(circuit))
+    };
+    let found = match resumed::rows(circuit, seed, TOLERANCE) {
+        Ok(rows) => rows,
+        Err(what) => {
+            return Outcome::Differs {
+                difference: f64::INFINITY,
+                what: format!("taken up again: {what}"),
+            };
+        }
+    };
+    let (difference, what) = apart(&found, &base.rows);
+    let (method, stated) = method(&base.run);
+    // Steps that state too small an error.
+    if difference > AGREES + 2.0 * stated
+        && base.run.method != "exact"
+        && let Ok(run) = run_to(&circuit.text(), Method::Auto, FINER)
+        && let Ok(whole) = rows(&run, circuit, &signals)
+        && let Ok(found) = resumed::rows(circuit, seed, FINER)
+        && apart(&found, &whole).0 <= AGREES
+    {
+        return Outcome::Explained(
+            "steps are further off than they state, finer ones agree".into(),
+        );
+    }
+    if difference <= AGREES + 2.0 * stated {
+        Outcome::Agrees {
+            difference,
+            error: 0.0,
+            method,
+        }
+    } else {
+        Outcome::Differs {
+            difference,
+            what: format!("taken up again: {what} ({method})"),
+        }
+    }
 }
 
 /// `circ` against itself after a change that must not matter; `None` where the change does not apply.

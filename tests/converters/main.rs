@@ -12,6 +12,7 @@ mod compare;
 mod oracle;
 mod random;
 mod references;
+mod resumed;
 mod runner;
 mod topologies;
 
@@ -99,6 +100,28 @@ fn fixed_converters_agree() {
 #[test]
 fn more_fixed_converters_agree() {
     agree(1013..1025);
+}
+
+/// Whatever change the seeds of the tests above happen to draw.
+#[test]
+fn converters_are_taken_up_again() {
+    let count = number("CIRC_CONVERTERS").unwrap_or(24);
+    let mut wrong = Vec::new();
+    for seed in 1000..1000 + count {
+        let case = topologies::case(seed);
+        let Ok(base) = compare::base(&case) else {
+            continue;
+        };
+        match compare::resumed(&case, &base, seed) {
+            compare::Outcome::Agrees { .. } | compare::Outcome::Explained(_) => {}
+            bad => wrong.push(format!(
+                "{}: {bad:?}\n{}",
+                case.circuit.title,
+                case.circuit.text()
+            )),
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 /// ngspice's answers; with `CIRC_CONVERTERS` all, else each seventh.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use crate::changes::KINDS;
-use crate::compare::{Base, Outcome, base, judge, refused, unchanged};
+use crate::compare::{Base, Outcome, base, judge, refused, resumed, unchanged};
 use crate::random::Random;
 use crate::topologies::{Case, case};
 
@@ -162,7 +162,10 @@ pub(crate) fn both(case: &Case, seed: u64) -> [Option<Outcome>; 2] {
 
 fn changed(case: &Case, base: &Base, seed: u64) -> Option<Outcome> {
     let mut random = Random::new(!seed);
-    let kind = random.below(KINDS.len() + 1);
+    let kind = random.below(KINDS.len() + 2);
+    if kind == KINDS.len() + 1 {
+        return Some(resumed(case, base, seed));
+    }
     unchanged(case, base, kind, &mut random)
 }
 
