@@ -18,7 +18,7 @@ fn model(cards: &str) -> Model {
 fn a_characteristic_has_a_row_for_every_pair_of_values() {
     let model = model(
         "v1 a 0 0\nr1 a b 1\nd1 b 0 d\n.model d d(vfwd=0.5 ron=2 roff=1e30)\n\
-         .dc v1 -1 3 1 r1 1 3 2\n.print dc i(v1) v(b)\n",
+         .dc v1 -1 3 1 r1 1 3 2\n.save i(v1)\n.print dc v(b)\n.print tran v(a)\n",
     );
     let found = dc(&model).unwrap();
     assert_eq!(found.names, ["v1", "r1", "i(v1)", "v(b)"]);

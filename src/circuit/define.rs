@@ -90,7 +90,11 @@ impl<'n> Builder<'n, '_> {
             Statement::Ic(list) => self.ics.push((scope, list)),
             Statement::Nodeset(list) => self.nodesets.push((scope, list)),
             Statement::Temperature(value) => self.temperature = Some(value),
-            Statement::Save(list) => self.saves.push((scope, list)),
+            Statement::Save(list) => {
+                self.saves.push((scope, list));
+                self.dc_saves.push((scope, list));
+            }
+            Statement::SaveTran(list) => self.saves.push((scope, list)),
             Statement::SaveDc(list) => self.dc_saves.push((scope, list)),
             Statement::Meas(meas) => self.measurements.push((scope, meas)),
             Statement::Four(four) => self.fours.push((scope, four)),

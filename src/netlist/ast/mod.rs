@@ -73,8 +73,10 @@ pub enum Statement {
     Nodeset(Vec<(Signal, Expr)>),
     /// `.temp t`, `.options temp=t`, °C.
     Temperature(Expr),
-    /// `.save`, `.print`, `.probe`, `.plot`.
+    /// `.save`, `.print`, `.probe`, `.plot` of every analysis.
     Save(Vec<Wanted>),
+    /// `.print tran`, `.plot tran`.
+    SaveTran(Vec<Wanted>),
     /// `.print dc`, `.plot dc`.
     SaveDc(Vec<Wanted>),
     /// `.global`.

@@ -23,7 +23,7 @@ pub(super) fn save(i: Input<'_>, analysis: bool) -> Parsed<'_, Dot> {
         && (analysis || name.text == "tran")
     {
         match name.text.as_str() {
-            "tran" => {}
+            "tran" => statement = Statement::SaveTran,
             "dc" => statement = Statement::SaveDc,
             _ => return Ok((skip(at), Dot::Skipped)),
         }
