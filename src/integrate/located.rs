@@ -116,7 +116,7 @@ fn told(error: &SimError, elements: &[&Element]) -> Told {
                 "hysteresis (`Vh` in the model), or a resistor and a capacitor in front of the control, lets them settle".into(),
             ),
         },
-        Reason::EventsAccumulate { .. } => plain(
+        Reason::EventsAccumulate { .. } | Reason::NoProgress { .. } => plain(
             "events-accumulate",
             Some(
                 "hysteresis (`Vh`), or a small resistance or capacitance where it switches, ends the chatter; \

@@ -86,6 +86,14 @@ pub enum Reason {
         /// The time they take, s.
         span: f64,
     },
+    /// Steps within one mode come no further.
+    #[error("{steps} steps come no further than {span:e} s")]
+    NoProgress {
+        /// Their number.
+        steps: u64,
+        /// The time they take, s.
+        span: f64,
+    },
     /// A mode's exponential has lost its digits to a resistance that decades part from the others.
     #[error(
         "exact integration would be wrong by {loss:.0e} of a signal in each step: decades lie between a resistance and the others, and no single storage element has to itself what it makes fast"

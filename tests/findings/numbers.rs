@@ -1,9 +1,10 @@
 //! Extreme values: resistances over many decades, equal eigenvalues, long chains.
 
 use circ::integrate::{Method, Reason, Run, SimOptions};
+use circ::settings::Settings;
 
 use crate::runs::column;
-use crate::{attempt_changed, changed, run};
+use crate::{attempt_changed, changed, changed_by, run};
 
 /// The largest difference of a column of two runs on the same grid, relative to its amplitude.
 fn difference(a: &Run, b: &Run, probe: &str) -> f64 {
@@ -265,4 +266,45 @@ fn what_grows_is_followed_or_overflows() {
     let long = attempt_changed(name, &[(".tran 10u 50u", ".tran 1m 10m")], options);
     let error = long.expect_err("no number is as large");
     assert_eq!(error.reason, Reason::Overflow);
+}
+
+/// Where everything is zero, the second derivative of a guard that rises with its third is rounding, and turns nothing around.
+#[test]
+fn a_chain_of_pumps_starts_from_rest() {
+    let name = "multiplier_at_rest";
+    let exact = changed(name, &[], Method::Auto);
+    assert_exact(&exact, 4000);
+    let options = SimOptions {
+        method: Method::Theta,
+        settings: Settings {
+            tol: 1e-8,
+            ..Settings::default()
+        },
+        ..SimOptions::default()
+    };
+    // Rows from the start on: a first step must not hide what happens in it.
+    let from_rest = (".tran 50n 2u", ".tran 1n 200n");
+    let steps = changed_by(name, &[from_rest], options);
+    let exact = changed(name, &[from_rest], Method::Auto);
+    for probe in ["i(l1)", "v(0,5)"] {
+        let distance = difference(&exact, &steps, probe);
+        assert!(distance < 1e-6, "{probe}: {distance:e}");
+    }
+}
+
+/// Rounding of 10 V and more in the voltages of diodes of 1e15 Ω: whatever it does to the modes, the work is bounded.
+#[test]
+fn a_mode_without_progress_ends() {
+    let run = changed("series_resonant_roff_1e15", &[], Method::Auto);
+    assert!(run.stats.steps < 1_000_000, "{} steps", run.stats.steps);
+    let plain = [("roff=1e15", "roff=1e8"), ("roff=1e12", "roff=1e8")];
+    let plain = changed("series_resonant_roff_1e15", &plain, Method::Exact);
+    let stated = run.error.max.unwrap_or(0.0);
+    for probe in ["i(l1)", "v(8,9)"] {
+        let distance = difference(&plain, &run, probe);
+        assert!(
+            distance < stated + 1e-5,
+            "{probe}: {distance:e}, {stated:e} stated"
+        );
+    }
 }

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::dense::Dense;
 use super::expm::{self, Ladder};
+use super::inspect::GROUP;
 use super::kernel::{BLOCK, Block, Kernel, SparseKernel};
 use super::recurring::{Prepared, Recurring};
 use super::series::{MAX_DEGREE, Series};
@@ -362,6 +363,43 @@ impl Flow {
             }
         }
         None
+    }
+
+    /// Of guard i, which stands on zero, the first coefficient of its [polynomial](Self::guard_polynomial) over `dt` that is more than
+    /// rounding, and than what an error `time` of the time makes of the next one, decides as where a mode is inspected: where it is
+    /// positive the guard rises, and no coefficient before it that rounding makes negative turns it around. `sizes` are those that w
+    /// can have had.
+    pub(crate) fn settle_polynomial(
+        &self,
+        i: usize,
+        polynomial: &mut [f64],
+        sizes: &[f64],
+        [dt, time]: [f64; 2],
+        (term, next): (&mut Vec<f64>, &mut Vec<f64>),
+    ) {
+        let row = &self.guard_rows[i * self.dim..(i + 1) * self.dim];
+        term.clear();
+        term.extend_from_slice(&sizes[..self.dim]);
+        for k in 1..polynomial.len() {
+            next.clear();
+            next.extend((0..self.dim).map(|row| {
+                let entries = self.generator.row(row);
+                let sum: f64 = entries.iter().zip(&*term).map(|(a, w)| a.abs() * w).sum();
+                sum * dt / k as f64
+            }));
+            std::mem::swap(term, next);
+            let whole: f64 = row.iter().zip(&*term).map(|(g, w)| g.abs() * w).sum();
+            let after = polynomial.get(k + 1).copied().unwrap_or(0.0);
+            let noise = GROUP * f64::EPSILON * whole + time / dt * (k + 1) as f64 * after.abs();
+            if polynomial[k].abs() > noise {
+                if polynomial[k] > 0.0 {
+                    for earlier in &mut polynomial[1..k] {
+                        *earlier = earlier.max(0.0);
+                    }
+                }
+                return;
+            }
+        }
     }
 
     /// Taylor's series for `dt` ≤ h/2^K from w on.

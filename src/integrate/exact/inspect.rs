@@ -9,7 +9,7 @@ use super::slaved::{Follower, Manifold, followers};
 const CONSISTENT: f64 = 1e-9;
 /// Guards within this many times the rounding noise of one evaluation are taken together as zero: simultaneous events of
 /// symmetric circuits differ by the roundings of a few operations.
-const GROUP: f64 = 128.0;
+pub(super) const GROUP: f64 = 128.0;
 /// The same in units of a guard's [noise](super::flow::Flow::noise).
 pub(super) const SIMULTANEOUS: f64 = GROUP / NOISE;
 /// Event times are known to this many units in the last place.

@@ -70,9 +70,11 @@ pub(crate) struct Motion {
     pub(crate) power: f64,
     next: Vec<f64>,
     series: Series,
-    /// Work space: what the series' higher terms add up to, how large w can have been.
+    /// Work space: what the series' higher terms add up to, how large w can have been, a guard's polynomial, the sizes of its terms.
     sizes: Vec<f64>,
     cubics: Vec<f64>,
+    term: Vec<f64>,
+    next_term: Vec<f64>,
     /// Largest |w| that noise is measured by; at least `peak`.
     amplitude: Vec<f64>,
     /// Largest |x| met in this mode.
@@ -454,8 +456,13 @@ impl Motion {
             if *slope < 0.0 && -*slope <= self.floors[m + i] * dt && *curvature > 0.0 {
                 *slope = 0.0;
             }
-            let crossing =
-                polynomial::first_crossing(&coefficients[..=self.series.degree()], floor);
+            let coefficients = &mut coefficients[..=self.series.degree()];
+            if g <= floor {
+                let work = (&mut self.term, &mut self.next_term);
+                let times = [dt, resolution(self.t)];
+                flow.settle_polynomial(i, coefficients, &self.amplitude, times, work);
+            }
+            let crossing = polynomial::first_crossing(coefficients, floor);
             if let Some(s) = crossing.filter(|&s| s < first.0 || first.1.is_none()) {
                 first = (s, Some(i));
             }

@@ -517,7 +517,8 @@ impl Stepper for Exact {
             if (!due && t <= self.motion.t) || self.step_ahead(at, t, next) {
                 return Ok(());
             }
-            self.motion.most = self.settings.max_steps.min(self.motion.steps + REST);
+            let (from, rest) = (self.motion.t, self.motion.steps + REST);
+            self.motion.most = self.settings.max_steps.min(rest);
             match self
                 .motion
                 .travel(&mut self.plant.modes[at].flow, &self.exosystem, stop)
@@ -533,8 +534,13 @@ impl Stepper for Exact {
                     }
                 }
                 Arrival::Overflow => return Err(self.fail(Reason::Overflow)),
-                // Asked below whether to go on.
-                Arrival::Resting => {}
+                // A guard that rounding keeps near zero allows only steps of the fastest time constant, hidden from the output.
+                Arrival::Resting => {
+                    let (span, runs) = (self.motion.t - from, self.settings.max_steps / REST);
+                    if self.motion.steps > rest && span * (runs as f64) < self.plant.output_step() {
+                        return Err(self.fail(Reason::NoProgress { steps: REST, span }));
+                    }
+                }
             }
             log.go_on(self.motion.t)?;
             if log.pauses() {
