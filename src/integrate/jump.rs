@@ -77,15 +77,18 @@ impl Jump {
                 names.push(name);
             }
         }
-        (!names.is_empty()).then(|| {
-            let text = format!(
-                "at t = {t:e} s {} compete for an impulse: how they share it depends on the ratios of the resistances that the ideal \
-                 model leaves out; the state that least energy separates from the one before is shown",
-                names.join(", ")
-            );
-            Note::of(names, text)
-        })
+        (!names.is_empty()).then(|| rivals_note(&names, t))
     }
+}
+
+/// What a user should know of a jump at t for which these elements compete.
+pub(crate) fn rivals_note(names: &[&str], t: f64) -> Note {
+    let text = format!(
+        "at t = {t:e} s {} compete for an impulse: how they share it depends on the ratios of the resistances that the ideal \
+         model leaves out; the state that least energy separates from the one before is shown",
+        names.join(", ")
+    );
+    Note::of(names.iter().copied(), text)
 }
 
 /// Changes below this, relative to the quantities they are computed from, are rounding and no jump.

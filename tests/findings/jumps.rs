@@ -164,6 +164,43 @@ fn diodes_that_compete_for_an_impulse_are_named_and_a_ladder_of_them_is_not() {
     assert!(resistive("rival_diodes", "1", "1m") > 5.9);
 }
 
+/// A diode and a switch charge one capacitor from two others: the note is true, ratios of resistances decide. Where the switch takes what
+/// the diode gives they do not.
+#[test]
+fn a_switch_competes_with_a_diode() {
+    let name = "rival_switch";
+    let told = |run: &Run| {
+        run.notes
+            .iter()
+            .any(|n| n.text.contains("d1, s1 compete for an impulse"))
+    };
+    let apart = ("C2 5 0 29u IC=0", "C2 5 0 29u IC=-40");
+    assert!(told(&changed(name, &[], Method::Exact)));
+    assert!(!told(&changed(name, &[apart], Method::Exact)));
+    let resistive = |diode: &str, switch: &str, start: (&str, &str)| {
+        let diode = format!("D(Ron={diode} Roff=1g)");
+        let switch = format!("SW(Ron={switch} Roff=1g");
+        let replacements = [
+            ("D(ideal)", diode.as_str()),
+            ("SW(ideal", switch.as_str()),
+            (".tran 1u 10u", ".tran 1m 10m"),
+            start,
+        ];
+        at(&changed(name, &replacements, Method::Exact), "v(3)", 10e-3)
+    };
+    // All three together: −14 V · 25/68 = −5.147 V, unless the diode is faster.
+    let (slow, fast) = (
+        resistive("1", "1m", ("IC=-14", "IC=-14")),
+        resistive("1m", "1", ("IC=-14", "IC=-14")),
+    );
+    assert!((slow + 5.147).abs() < 0.1 && fast < -8.0, "{slow} {fast}");
+    let ideal = at(&changed(name, &[apart], Method::Exact), "v(3)", 10e-6);
+    for (diode, switch) in [("1", "1m"), ("1m", "1")] {
+        let v = resistive(diode, switch, apart);
+        assert!((v - ideal).abs() < 1e-2, "{v} is not {ideal}");
+    }
+}
+
 #[test]
 fn a_jump_ends_where_it_moves_a_switch() {
     // Both switches of a pair are open within ±13 mV: the current falls until the control of the other threshold is reached, not to 0.

@@ -8,6 +8,7 @@ use super::stepper::Exact;
 use super::transition::{PROPOSALS, Trigger};
 use crate::integrate::energy::{self, Balance};
 use crate::integrate::impulses;
+use crate::integrate::jump::rivals_note;
 use crate::integrate::run::{Log, Reason, SimError};
 use crate::integrate::settle;
 use crate::integrate::stats::{JumpReason, StateJump};
@@ -76,6 +77,7 @@ impl Exact {
     pub(super) fn project(&mut self, key: &Key, log: &mut Log) -> Result<bool, SimError> {
         let t = self.motion.t;
         let u = self.inputs(t);
+        self.note_switch_rivals(key, &u);
         let free = self.plant.free(key).map_err(|mut error| {
             error.t = error.t.or(Some(t));
             error
@@ -99,6 +101,63 @@ impl Exact {
             Ok(None) | Err(_) => (x.clone(), DVector::zeros(free.lcs.m())),
         };
         self.leap(key, &x, &after, &p, log)
+    }
+
+    /// Notes switches that join capacitors now (or part inductors) while devices would take an impulse without them, where each of the
+    /// two impulses takes from the other, ⟨Δs of the switches, Δs of the devices⟩ > 0 in the energy metric: with resistances the
+    /// faster of them leaves less for the other, and the order of their ends depends on ratios.
+    fn note_switch_rivals(&mut self, key: &Key, u: &DVector<f64>) {
+        if self.noted_rivals || self.plant.pairs == 0 || !key.sliding.is_empty() {
+            return;
+        }
+        let moved = |i: &usize| {
+            let stood = if self.started {
+                self.key.switches[*i]
+            } else {
+                false
+            };
+            key.switches[*i] != stood
+        };
+        let moved: Vec<usize> = (0..key.switches.len()).filter(moved).collect();
+        let mut before = key.clone();
+        for &i in &moved {
+            before.switches[i] = !before.switches[i];
+        }
+        let s = DVector::from_column_slice(&self.storage);
+        let Ok(free) = self.plant.free(key) else {
+            return;
+        };
+        let joining = free.storage(&free.state_from(&self.storage), u) - &s;
+        let sizes = self.scale.iter().zip(&joining);
+        if moved.is_empty() || sizes.clone().all(|(size, d)| d.abs() <= ROUNDING * size) {
+            return;
+        }
+        let Ok(free) = self.plant.free(&before) else {
+            return;
+        };
+        let x = free.state_from(&self.storage);
+        let Ok(Some(jump)) = free.jump(&x, u) else {
+            return;
+        };
+        let change = free.storage(&jump.x, u) - free.storage(&x, u);
+        let [one, other, both] = [&joining, &change, &(&joining + &change)]
+            .map(|change| self.metric.stored(change.as_slice()));
+        // 2⟨a, b⟩ = ‖a + b‖² − ‖a‖² − ‖b‖²
+        if both - one - other <= ROUNDING * one.max(other) {
+            return;
+        }
+        let ports = free.lcs.ports.iter().zip(&jump.p);
+        let devices = ports
+            .filter(|(_, p)| **p > 0.0)
+            .map(|(port, _)| port.device.clone());
+        let mut names: Vec<String> = devices.collect();
+        names.dedup();
+        let switches = moved.iter().map(|&i| self.plant.thresholds[i].name.clone());
+        names.extend(switches);
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        self.noted_rivals = true;
+        let note = rivals_note(&names, self.motion.t);
+        self.notes.push(note);
     }
 
     /// Carries out a jump of the free state from x to `after` by impulses p, with its impulses and energies.
