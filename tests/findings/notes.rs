@@ -3,7 +3,11 @@
 use std::fs;
 use std::process::Command;
 
-use super::path;
+use circ::integrate::{Method, SimOptions};
+use circ::settings::Settings;
+
+use super::runs::column;
+use super::{changed, changed_by, path};
 
 /// What `circ` says of a netlist with this text: notes and warnings, with # for times and other numbers of many digits.
 fn told(command: &str, text: &str) -> String {
@@ -72,4 +76,40 @@ fn destroyed_currents_and_rows_too_far_apart_have_a_place() {
          L1 1 2 1m\nR1 2 3 1\nS1 3 0 g 0 sw\nVg g 0 PULSE(1 0 1m 0 0 2 4)\n.model sw SW(ideal Vt=0.5)\n.tran 1u 2m\n"
     ));
     insta::assert_snapshot!(told("sim", &text("print_step")));
+}
+
+/// Steps of a tank that rests need not be as short as its period; exact integration takes no other ones.
+#[test]
+fn a_run_made_in_steps_in_the_place_of_exact_integration_says_so() {
+    let options = |method, max_steps| SimOptions {
+        method,
+        settings: Settings {
+            max_steps,
+            ..Settings::default()
+        },
+        ..SimOptions::default()
+    };
+    let name = "tank_at_rest";
+    let run = changed_by(name, &[], options(Method::Auto, 100_000));
+    let told: Vec<&str> = run.notes.iter().map(|n| n.text.as_str()).collect();
+    assert!(
+        told.iter().any(|n| n
+            .starts_with("exact integration ended, and the whole run was made in steps instead")
+            && n.contains("more than 100000 steps")),
+        "{told:?}"
+    );
+    assert_eq!(run.method, "theta");
+    // Without the tank, by exact integration.
+    let text = [("L2 3 0 1p IC=0", "R2 3 0 1"), ("C2 3 0 1n IC=0", "")];
+    let exact = changed(name, &text, Method::Exact);
+    let stated = run.error.max.expect("steps state an error");
+    let (a, b) = (column(&run, "v(2)"), column(&exact, "v(2)"));
+    let distance = a
+        .iter()
+        .zip(&b)
+        .fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+    assert!(
+        distance < 10.0 * stated && stated < 1e-3,
+        "{distance:e} {stated:e}"
+    );
 }
