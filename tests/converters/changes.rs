@@ -34,6 +34,9 @@ pub(crate) const KINDS: [&str; 10] = [
 pub(crate) fn change(circuit: &Circuit, kind: usize, random: &mut Random) -> Option<Change> {
     let same = |names: Vec<String>| names.into_iter().map(|n| (n, 1.0)).collect::<Vec<_>>();
     let own = states(circuit);
+    if own.is_empty() {
+        return None;
+    }
     let of = |name, changed: Circuit, signals| Change {
         name,
         text: changed.text(),
@@ -49,7 +52,7 @@ pub(crate) fn change(circuit: &Circuit, kind: usize, random: &mut Random) -> Opt
             ..of(name, changed, same(own))
         },
         1 => {
-            let one = own[random.below(own.len().max(1)).min(own.len() - 1)].clone();
+            let one = own[random.below(own.len())].clone();
             Change {
                 text: circuit.text_saving(std::slice::from_ref(&one), circuit.rows),
                 ..of(name, changed, vec![(one, 1.0)])

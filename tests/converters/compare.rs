@@ -14,7 +14,7 @@ use circ::settings::Settings;
 
 use crate::changes::change;
 use crate::circuit::{Card, Circuit, DiodeModel, Part, states};
-use crate::oracle;
+use crate::oracle::{self, Answer, COARSE, FINE};
 use crate::random::Random;
 use crate::resumed;
 use crate::topologies::Case;
@@ -269,54 +269,97 @@ fn ohms(circuit: &Circuit) -> f64 {
     }
 }
 
-/// What the oracle says about a circuit for so many multiplications: rows, and their own error.
-pub(crate) fn expected(circuit: &Circuit, budget: u64) -> Result<(Vec<Vec<f64>>, f64), String> {
+/// What the oracle says about a circuit.
+pub(crate) struct Expected {
+    rows: Vec<Vec<f64>>,
+    /// Their own error, relative to amplitudes.
+    error: f64,
+    /// Rows so close to an event that the limit of realisations may have them on its other side.
+    doubtful: Vec<usize>,
+}
+
+impl Expected {
+    /// The rows that are not doubtful, of any answer.
+    fn sure(&self, rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let kept = rows.iter().enumerate();
+        let kept = kept.filter(|(k, _)| !self.doubtful.contains(k));
+        kept.map(|(_, row)| row.clone()).collect()
+    }
+}
+
+/// Rows that an event passes as realisations tend to the ideal circuit: it moves by a ninth of what it moved between the last two. Where
+/// these differ in more than the times of their events, none is known.
+fn doubtful(circuit: &Circuit, one: &Answer, two: &Answer) -> Vec<usize> {
+    if one.events.len() != two.events.len() {
+        return Vec::new();
+    }
+    let passes = |t: f64| {
+        let mut events = one.events.iter().zip(&two.events);
+        // The whole of it, as the ninth is an estimate.
+        events.any(|(a, b)| (t - b).abs() <= (a - b).abs())
+    };
+    (0..circuit.rows)
+        .filter(|k| passes((k + 1) as f64 * circuit.step()))
+        .collect()
+}
+
+/// What the oracle says about a circuit for so many multiplications.
+pub(crate) fn expected(circuit: &Circuit, budget: u64) -> Result<Expected, String> {
     let signals = states(circuit);
     let budget = Cell::new(budget);
     let least = floors(circuit);
-    let answer = |circuit: &Circuit, tolerance| {
-        oracle::simulate(circuit, tolerance, &budget)
-            .map(|a| a.rows)
-            .map_err(|e| e.0)
-    };
+    let answer =
+        |circuit: &Circuit, accuracy| oracle::simulate(circuit, accuracy, &budget).map_err(|e| e.0);
     if is_plain(circuit)
-        && let Ok(rows) = answer(circuit, 1e-7)
+        && let Ok(fine) = answer(circuit, FINE)
     {
-        let coarse = answer(circuit, 1e-6)?;
-        let error = difference(&coarse, &rows, &signals, least).0;
-        return Ok((rows, error));
+        let coarse = answer(circuit, COARSE)?;
+        let error = difference(&coarse.rows, &fine.rows, &signals, least).0;
+        return Ok(Expected {
+            rows: fine.rows,
+            error,
+            doubtful: Vec::new(),
+        });
     }
     // Towards the ideal circuit: three decades and what they tend to.
     let z = ohms(circuit);
-    let at = |e: f64| {
+    let at = |e: f64, accuracy| {
         let realised = realised(circuit, z * e, z / e);
-        answer(&realised, 1e-7).or_else(|_| answer(&shunted(&realised, z / e), 1e-7))
+        answer(&realised, accuracy).or_else(|_| answer(&shunted(&realised, z / e), accuracy))
     };
-    let limit = |a: &[Vec<f64>], b: &[Vec<f64>]| -> Vec<Vec<f64>> {
+    let limit = |a: &Answer, b: &Answer| -> Vec<Vec<f64>> {
         let row = |(a, b): (&Vec<f64>, &Vec<f64>)| {
             a.iter().zip(b).map(|(a, b)| b + (b - a) / 9.0).collect()
         };
-        a.iter().zip(b).map(row).collect()
+        a.rows.iter().zip(&b.rows).map(row).collect()
     };
-    let (one, mut last) = (at(1e-4)?, at(1e-5)?);
-    let mut coarse = limit(&one, &last);
-    let mut error = f64::INFINITY;
+    let (mut one, mut last) = (at(1e-4, FINE)?, at(1e-5, FINE)?);
+    let coarse = at(1e-5, COARSE)?;
+    let of_steps = difference(&coarse.rows, &last.rows, &signals, least).0;
+    let mut found: Option<Expected> = None;
     for e in [1e-6, 1e-7, 1e-8] {
-        let next = match at(e) {
+        let next = match at(e, FINE) {
             Ok(next) => next,
-            Err(why) if error == f64::INFINITY => return Err(why),
+            Err(why) if found.is_none() => return Err(why),
             // Smaller ones may be beyond the oracle.
             Err(_) => break,
         };
-        let fine = limit(&last, &next);
+        let mut fine = Expected {
+            rows: limit(&last, &next),
+            error: 0.0,
+            doubtful: doubtful(circuit, &last, &next),
+        };
+        let coarse = fine.sure(&limit(&one, &last));
         // The rest falls at least with e.
-        error = 0.3 * difference(&coarse, &fine, &signals, least).0;
-        (last, coarse) = (next, fine);
-        if error < 0.3 * AGREES {
+        let of_limit = 0.3 * difference(&coarse, &fine.sure(&fine.rows), &signals, least).0;
+        fine.error = of_limit + of_steps;
+        (one, last) = (last, next);
+        found = Some(fine);
+        if of_limit < 0.3 * AGREES {
             break;
         }
     }
-    Ok((coarse, error))
+    found.ok_or_else(|| "no limit".into())
 }
 
 /// A run of a case, with its rows.
@@ -353,15 +396,20 @@ pub(crate) fn judge(case: &Case, base: &Base, budget: u64) -> Outcome {
     if let Some(fault) = notes.find(|n| n.text.contains("internal error")) {
         return Outcome::Panicked(fault.text.clone());
     }
-    let (expected, error) = match expected(&case.circuit, budget) {
+    let expected = match expected(&case.circuit, budget) {
         Ok(e) => e,
         Err(e) => return Outcome::Declined(e),
     };
+    let error = expected.error;
     if error > UNSURE {
         return Outcome::Declined(format!("its own error is {error:.1e}"));
     }
     let least = floors(&case.circuit);
-    let (worst, what) = difference(found, &expected, &signals, least);
+    let compared = |found: &[Vec<f64>]| {
+        let (found, rows) = (expected.sure(found), expected.sure(&expected.rows));
+        difference(&found, &rows, &signals, least)
+    };
+    let (worst, what) = compared(found);
     let (method, stated) = method(run);
     let allowed = AGREES + 3.0 * error + stated;
     if worst <= allowed {
@@ -371,7 +419,7 @@ pub(crate) fn judge(case: &Case, base: &Base, budget: u64) -> Outcome {
             method,
         };
     }
-    let [one, other] = [found, &expected].map(|rows| beside_edges(&case.circuit, rows));
+    let [one, other] = [found, &expected.rows].map(|rows| beside_edges(&case.circuit, rows));
     if one.len() < found.len() && difference(&one, &other, &signals, least).0 <= allowed {
         return Outcome::Explained("the state jumps at the instant of a row".into());
     }
@@ -379,7 +427,7 @@ pub(crate) fn judge(case: &Case, base: &Base, budget: u64) -> Outcome {
     if run.method != "exact"
         && let Ok(run) = run_to(&case.circuit.text(), Method::Auto, FINER)
         && let Ok(found) = rows(&run, &case.circuit, &signals)
-        && difference(&found, &expected, &signals, least).0 <= AGREES + 3.0 * error
+        && compared(&found).0 <= AGREES + 3.0 * error
     {
         return Outcome::Explained(
             "steps are further off than they state, finer ones agree".into(),
@@ -404,7 +452,7 @@ pub(crate) fn judge(case: &Case, base: &Base, budget: u64) -> Outcome {
 /// What becomes of a case that `circ` refuses: where the oracle has no answer either, there may be none.
 pub(crate) fn refused(case: &Case, why: String, budget: u64) -> Outcome {
     match expected(&case.circuit, budget) {
-        Ok((_, error)) if error <= UNSURE => Outcome::Refused(why),
+        Ok(expected) if expected.error <= UNSURE => Outcome::Refused(why),
         _ => Outcome::Declined("nor has circ an answer".into()),
     }
 }

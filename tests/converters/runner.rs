@@ -1,145 +1,258 @@
-//! Many cases from one seed on, with what became of them counted.
+//! Many cases from one seed on. What became of each goes into a file, from which a run that was ended goes on.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use crate::changes::KINDS;
 use crate::compare::{Base, Outcome, base, judge, refused, resumed, unchanged};
 use crate::random::Random;
 use crate::topologies::{Case, case};
 
-/// What became of many cases.
-#[derive(Debug, Default)]
-pub(crate) struct Summary {
-    pub(crate) cases: u64,
-    /// Comparisons with the oracle and with changed circuits that agree.
-    pub(crate) agree: [u64; 2],
-    /// The oracle has no answer: why, and how often by stage and by style.
-    pub(crate) declined: BTreeMap<String, BTreeMap<String, u64>>,
-    /// Cases by stage and by style.
-    pub(crate) kinds: BTreeMap<String, u64>,
-    /// Differences whose cause `circ` names itself.
-    pub(crate) explained: BTreeMap<String, u64>,
-    /// Refused by `circ`, with the oracle's word on whether there is an answer.
-    pub(crate) refused: BTreeMap<String, Vec<u64>>,
-    /// Everything else, by kind.
-    pub(crate) failed: BTreeMap<String, Vec<u64>>,
-    /// The largest difference of those that agree.
-    pub(crate) largest: f64,
-    /// By method.
-    pub(crate) methods: BTreeMap<String, u64>,
-    /// Times of the runs of `circ` without changes and of the oracle, by style.
-    pub(crate) times: BTreeMap<String, [Duration; 2]>,
-    /// The longest runs of `circ`, longest first.
-    pub(crate) slowest: Vec<(Duration, u64, String)>,
+/// What became of one comparison of a case.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Record {
+    seed: u64,
+    stage: String,
+    style: String,
+    /// With the oracle, else with the case after a change.
+    with_oracle: bool,
+    class: Class,
+    /// The method of what agrees; the reason of anything else, without its numbers.
+    kind: String,
+    difference: f64,
+    /// Of `circ` and of the comparison, s.
+    seconds: [f64; 2],
 }
 
-/// So many of the longest runs are told.
-const SLOWEST: usize = 20;
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Class {
+    Agrees,
+    /// The oracle has no answer.
+    Declined,
+    /// A difference whose cause `circ` names itself.
+    Explained,
+    /// Refused by `circ`, where the oracle has an answer.
+    Refused,
+    Failed,
+}
 
-/// Digits are left out, so that messages that differ in numbers alone are one kind.
+const CLASSES: [(&str, Class); 5] = [
+    ("agrees", Class::Agrees),
+    ("declined", Class::Declined),
+    ("explained", Class::Explained),
+    ("refused", Class::Refused),
+    ("failed", Class::Failed),
+];
+
+/// What ended without an outcome: the process, while this case ran.
+const DIED: &str = "the process ended in the middle";
+
+/// Digits are left out, so that messages that differ in numbers alone are one kind; so is what separates columns.
 fn kind(text: &str) -> String {
     let letters = text
         .chars()
-        .filter(|c| !c.is_ascii_digit() && *c != '.' && *c != '-');
+        .filter(|c| !c.is_ascii_digit() && !".-;\n".contains(*c));
     letters.take(110).collect()
 }
 
-/// Stage and style.
-fn kinds(case: &Case) -> [String; 2] {
-    [case.stage.into(), format!("{:?}", case.style)]
-}
-
-impl Summary {
-    fn time(&mut self, [time, oracle]: [Duration; 2], seed: u64, case: &Case) {
-        let of_style = self.times.entry(format!("{:?}", case.style)).or_default();
-        of_style[0] += time;
-        of_style[1] += oracle;
-        let place = self.slowest.partition_point(|s| s.0 > time);
-        if place < SLOWEST {
-            let name = format!("{} {:?}", case.stage, case.style);
-            self.slowest.insert(place, (time, seed, name));
-            self.slowest.truncate(SLOWEST);
-        }
-        for kind in kinds(case) {
-            *self.kinds.entry(kind).or_default() += 1;
+/// The class, the kind and the difference of an outcome.
+fn classify(outcome: &Outcome) -> (Class, String, f64) {
+    match outcome {
+        Outcome::Agrees {
+            difference, method, ..
+        } => (Class::Agrees, method.clone(), *difference),
+        Outcome::Declined(why) => (Class::Declined, kind(why), f64::NAN),
+        Outcome::Explained(why) => (Class::Explained, kind(why), f64::NAN),
+        Outcome::Refused(why) => (Class::Refused, kind(why), f64::NAN),
+        Outcome::Panicked(why) => (Class::Failed, kind(why), f64::NAN),
+        Outcome::Differs { what, difference } => {
+            let name = what.split(" in row ").next().unwrap_or(what);
+            let name = if what.contains("stated") && !what.contains("(exact, ") {
+                "differs by more than the stated error".to_string()
+            } else {
+                kind(name)
+            };
+            (Class::Failed, name, *difference)
         }
     }
+}
 
-    fn count(&mut self, seed: u64, case: &Case, what: usize, outcome: &Outcome) {
-        match outcome {
-            Outcome::Agrees {
-                difference, method, ..
-            } => {
-                self.agree[what] += 1;
-                self.largest = self.largest.max(*difference);
-                if what == 0 {
-                    *self.methods.entry(method.clone()).or_default() += 1;
-                }
-            }
-            Outcome::Declined(why) => {
-                let of_why = self.declined.entry(kind(why)).or_default();
-                for kind in kinds(case) {
-                    *of_why.entry(kind).or_default() += 1;
-                }
-            }
-            Outcome::Explained(why) => *self.explained.entry(why.clone()).or_default() += 1,
-            Outcome::Refused(why) => self.refused.entry(kind(why)).or_default().push(seed),
-            Outcome::Panicked(why) => self.failed.entry(kind(why)).or_default().push(seed),
-            Outcome::Differs { what, .. } => {
-                let name = what.split(" in row ").next().unwrap_or(what);
-                let name = if what.contains("stated") && !what.contains("(exact, ") {
-                    "differs by more than the stated error".to_string()
-                } else {
-                    kind(name)
-                };
-                self.failed.entry(name).or_default().push(seed);
-            }
-        }
+impl Record {
+    fn line(&self) -> String {
+        let class = CLASSES.iter().find(|c| c.1 == self.class);
+        format!(
+            "{};{};{};{};{};{};{:.2e};{:.3};{:.3}\n",
+            self.seed,
+            self.stage,
+            self.style,
+            if self.with_oracle {
+                "oracle"
+            } else {
+                "changed"
+            },
+            class.expect("all are listed").0,
+            self.kind,
+            self.difference,
+            self.seconds[0],
+            self.seconds[1],
+        )
+    }
+
+    /// Reads what [`Self::line`] writes.
+    fn of(line: &str) -> Option<Self> {
+        let parts: Vec<&str> = line.split(';').collect();
+        let [seed, stage, style, what, class, kind, difference, one, two] = parts[..] else {
+            return None;
+        };
+        Some(Self {
+            seed: seed.parse().ok()?,
+            stage: stage.into(),
+            style: style.into(),
+            with_oracle: what == "oracle",
+            class: CLASSES.iter().find(|c| c.0 == class)?.1,
+            kind: kind.into(),
+            difference: difference.parse().ok()?,
+            seconds: [one.parse().ok()?, two.parse().ok()?],
+        })
+    }
+}
+
+/// What became of many cases.
+#[derive(Debug, Default)]
+pub(crate) struct Summary(Vec<Record>);
+
+/// So many of the longest runs are told, and so many seeds of each kind.
+const SLOWEST: usize = 20;
+const SEEDS: usize = 12;
+
+impl Summary {
+    /// Nothing failed and nothing was refused.
+    pub(crate) fn is_clean(&self) -> bool {
+        self.0
+            .iter()
+            .all(|r| !matches!(r.class, Class::Refused | Class::Failed))
+    }
+
+    fn with_oracle(&self) -> impl Iterator<Item = &Record> {
+        self.0.iter().filter(|r| r.with_oracle)
     }
 
     pub(crate) fn text(&self) -> String {
-        let mut text = format!(
-            "{} cases: {} agree with the oracle ({:?}), {} with a changed circuit, explained {:?}; largest difference allowed {:.1e}\n",
-            self.cases, self.agree[0], self.methods, self.agree[1], self.explained, self.largest
-        );
-        let times = self.times.iter();
-        let times = times.map(|(style, [circ, oracle])| {
-            format!(
-                "{style} {:.0} s and {:.0} s",
-                circ.as_secs_f64(),
-                oracle.as_secs_f64()
-            )
-        });
-        text += &format!(
-            "times of circ and the oracle: {}\n",
-            times.collect::<Vec<_>>().join(", ")
-        );
-        for (why, of_why) in &self.declined {
-            // Each case stands under its stage and under its style.
-            let count = of_why.values().sum::<u64>() / 2;
-            let parts = of_why
-                .iter()
-                .map(|(k, n)| format!("{k} {n}/{}", self.kinds[k]));
-            let parts: Vec<String> = parts.collect();
-            text += &format!("the oracle declines {count}, {why}: {}\n", parts.join(", "));
-        }
-        let slowest = self.slowest.iter();
-        let slowest =
-            slowest.map(|(t, seed, what)| format!("{seed} {what} {:.1} s", t.as_secs_f64()));
-        text += &format!("slowest: {}\n", slowest.collect::<Vec<_>>().join(", "));
-        for (title, kinds) in [("refused", &self.refused), ("failed", &self.failed)] {
-            for (kind, seeds) in kinds {
-                let shown: Vec<String> = seeds.iter().take(8).map(u64::to_string).collect();
-                text += &format!(
-                    "{title} {}: {kind} (seeds {} …)\n",
-                    seeds.len(),
-                    shown.join(" ")
-                );
+        let (mut stages, mut times) = (BTreeMap::new(), BTreeMap::new());
+        let mut largest = 0.0_f64;
+        for r in self.with_oracle() {
+            for group in [&r.stage, &r.style] {
+                *stages.entry(group.as_str()).or_insert(0_u32) += 1;
+            }
+            let of_style: &mut [f64; 2] = times.entry(r.style.as_str()).or_default();
+            of_style[0] += r.seconds[0];
+            of_style[1] += r.seconds[1];
+            if r.class == Class::Agrees {
+                largest = largest.max(r.difference);
             }
         }
-        text
+        let mut text = format!(
+            "{} cases, largest difference of what agrees {largest:.1e}\n",
+            self.with_oracle().count()
+        );
+        let mut groups: BTreeMap<(Class, bool, &str), Vec<&Record>> = BTreeMap::new();
+        for r in &self.0 {
+            let group = (r.class, r.with_oracle, r.kind.as_str());
+            groups.entry(group).or_default().push(r);
+        }
+        for ((class, with_oracle, kind), records) in groups {
+            let name = CLASSES.iter().find(|c| c.1 == class);
+            let name = name.expect("all are listed").0;
+            let what = if with_oracle { "" } else { " after a change" };
+            text += &format!("{name}{what} {}: {kind}", records.len());
+            if class == Class::Declined {
+                let mut counts: BTreeMap<&str, u32> = BTreeMap::new();
+                for group in records.iter().flat_map(|r| [&r.stage, &r.style]) {
+                    *counts.entry(group).or_default() += 1;
+                }
+                let parts = counts.iter().map(|(k, n)| format!("{k} {n}/{}", stages[k]));
+                text += &format!(" ({})", parts.collect::<Vec<_>>().join(", "));
+            } else if class != Class::Agrees {
+                let seeds = records.iter().take(SEEDS).map(|r| r.seed.to_string());
+                let more = if records.len() > SEEDS { " …" } else { "" };
+                text += &format!(" (seeds {}{more})", seeds.collect::<Vec<_>>().join(" "));
+            }
+            text += "\n";
+        }
+        let times = times.iter();
+        let times =
+            times.map(|(style, [circ, oracle])| format!("{style} {circ:.0} s and {oracle:.0} s"));
+        let times: Vec<String> = times.collect();
+        text += &format!("times of circ and the oracle: {}\n", times.join(", "));
+        let mut slowest: Vec<&Record> = self.with_oracle().collect();
+        slowest.sort_by(|a, b| b.seconds[0].total_cmp(&a.seconds[0]));
+        let slowest = slowest.iter().take(SLOWEST);
+        let slowest = slowest.map(|r| format!("{} {} {:.1} s", r.seed, r.stage, r.seconds[0]));
+        let slowest: Vec<String> = slowest.collect();
+        text + &format!("slowest: {}\n", slowest.join(", "))
+    }
+}
+
+/// The files of a long run.
+struct Files {
+    folder: PathBuf,
+    records: fs::File,
+}
+
+impl Files {
+    /// The files in a folder, with what stands in them already. A case that was begun and has no record ended the process.
+    fn open(folder: &Path) -> (Self, Summary) {
+        fs::create_dir_all(folder).expect("a folder");
+        let path = folder.join("cases.csv");
+        let known = fs::read_to_string(&path).unwrap_or_default();
+        let mut summary = Summary(known.lines().filter_map(Record::of).collect());
+        let file = fs::OpenOptions::new().create(true).append(true).open(&path);
+        let mut files = Self {
+            folder: folder.to_path_buf(),
+            records: file.expect("a file"),
+        };
+        let begun = fs::read_to_string(files.running()).unwrap_or_default();
+        let begun = begun.split_whitespace().next_back();
+        let begun = begun.and_then(|seed| seed.parse::<u64>().ok());
+        if let Some(seed) = begun.filter(|seed| !summary.0.iter().any(|r| r.seed == *seed)) {
+            let record = Record {
+                seed,
+                stage: case(seed).stage.into(),
+                style: format!("{:?}", case(seed).style),
+                with_oracle: true,
+                class: Class::Failed,
+                kind: DIED.into(),
+                difference: f64::NAN,
+                seconds: [0.0; 2],
+            };
+            files.write(&record);
+            summary.0.push(record);
+        }
+        (files, summary)
+    }
+
+    /// The case that runs: its netlist and, last, its seed.
+    fn running(&self) -> PathBuf {
+        self.folder.join("running.cir")
+    }
+
+    fn begin(&self, seed: u64, case: &Case) {
+        let text = format!("{}* {seed}\n", case.circuit.text());
+        fs::write(self.running(), text).expect("a file");
+    }
+
+    fn write(&mut self, record: &Record) {
+        let line = record.line();
+        self.records.write_all(line.as_bytes()).expect("a file");
+    }
+
+    /// The netlist of a case that fails.
+    fn keep(&self, seed: u64, case: &Case, why: &str) {
+        let path = self.folder.join(format!("{seed}.cir"));
+        fs::write(path, format!("{}* {why}\n", case.circuit.text())).expect("a file");
     }
 }
 
@@ -147,7 +260,7 @@ impl Summary {
 const BUDGET: u64 = 1_000_000_000;
 const THOROUGH: u64 = 64;
 /// On the other free seeds: most need less.
-const SMALL: u64 = 30_000_000;
+const SMALL: u64 = 300_000_000;
 /// Among free seeds those that this divides are run after a change, too.
 const CHANGED: u64 = 8;
 
@@ -169,52 +282,77 @@ fn changed(case: &Case, base: &Base, seed: u64) -> Option<Outcome> {
     unchanged(case, base, kind, &mut random)
 }
 
-/// Runs so many cases; each failure is told at once, and its netlist goes into the folder.
+/// One free seed, with the seconds of `circ` and of the comparison.
+fn free(case: &Case, seed: u64) -> ([Option<Outcome>; 2], [f64; 2]) {
+    let budget = if seed.is_multiple_of(THOROUGH) {
+        BUDGET
+    } else {
+        SMALL
+    };
+    let start = Instant::now();
+    let base = base(case);
+    let of_circ = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let first = match &base {
+        Ok(base) => judge(case, base, budget),
+        Err(Outcome::Refused(why)) => refused(case, why.clone(), budget),
+        Err(outcome) => outcome.clone(),
+    };
+    let of_oracle = start.elapsed().as_secs_f64();
+    let base = base.ok().filter(|_| seed.is_multiple_of(CHANGED));
+    let second = base.and_then(|base| changed(case, &base, seed));
+    ([Some(first), second], [of_circ, of_oracle])
+}
+
+/// Runs so many cases, those without a record in the folder. Each failure is told at once; its netlist goes into the folder, as
+/// does a record of every case.
 pub(crate) fn run(
     first: u64,
     count: u64,
     folder: Option<&PathBuf>,
     tell: &dyn Fn(&str),
 ) -> Summary {
-    let mut summary = Summary::default();
-    for seed in first..first + count {
+    let (mut files, mut summary) = match folder {
+        Some(folder) => {
+            let (files, summary) = Files::open(folder);
+            (Some(files), summary)
+        }
+        None => (None, Summary::default()),
+    };
+    let known: std::collections::BTreeSet<u64> = summary.0.iter().map(|r| r.seed).collect();
+    for seed in (first..first + count).filter(|seed| !known.contains(seed)) {
         let case = case(seed);
-        summary.cases += 1;
-        let start = Instant::now();
-        let base = base(&case);
-        let mut times = [start.elapsed(), Duration::ZERO];
-        let budget = if seed % THOROUGH == 0 { BUDGET } else { SMALL };
-        let outcomes = match base {
-            Ok(base) => {
-                let start = Instant::now();
-                let first = judge(&case, &base, budget);
-                times[1] = start.elapsed();
-                let second = (seed % CHANGED == 0).then(|| changed(&case, &base, seed));
-                [Some(first), second.flatten()]
-            }
-            Err(Outcome::Refused(why)) => [Some(refused(&case, why, budget)), None],
-            Err(outcome) => [Some(outcome), None],
-        };
-        summary.time(times, seed, &case);
+        if let Some(files) = &files {
+            files.begin(seed, &case);
+        }
+        let (outcomes, seconds) = free(&case, seed);
         for (what, outcome) in outcomes.into_iter().enumerate() {
             let Some(outcome) = outcome else { continue };
-            summary.count(seed, &case, what, &outcome);
-            let is_bad = !matches!(
-                outcome,
-                Outcome::Agrees { .. } | Outcome::Declined(_) | Outcome::Explained(_)
-            );
-            if is_bad {
+            let (class, kind, difference) = classify(&outcome);
+            let record = Record {
+                seed,
+                stage: case.stage.into(),
+                style: format!("{:?}", case.style),
+                with_oracle: what == 0,
+                class,
+                kind,
+                difference,
+                seconds,
+            };
+            if matches!(class, Class::Refused | Class::Failed) {
                 let text = format!("{outcome:?}");
                 let short: String = text.chars().take(240).collect();
                 tell(&format!("{seed} {} {:?}: {short}", case.stage, case.style));
-                if let Some(folder) = folder {
-                    let path = folder.join(format!("{seed}.cir"));
-                    std::fs::write(path, format!("{}* {text}\n", case.circuit.text()))
-                        .expect("a file");
+                if let Some(files) = &files {
+                    files.keep(seed, &case, &text);
                 }
             }
+            if let Some(files) = &mut files {
+                files.write(&record);
+            }
+            summary.0.push(record);
         }
-        if summary.cases % 1000 == 0 {
+        if (seed + 1 - first).is_multiple_of(1000) {
             tell(&summary.text());
         }
     }

@@ -25,19 +25,39 @@ pub(crate) struct Declined(pub(crate) String);
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Answer {
     pub(crate) rows: Vec<Vec<f64>>,
-    pub(crate) events: usize,
+    /// When devices moved between corners of the sources, s.
+    pub(crate) events: Vec<f64>,
     pub(crate) steps: usize,
 }
 
-/// Simulates with the tolerance of one step, relative to the largest value of each state. Multiplications are taken from
-/// `budget`, a count rather than a time, so that a seed has the same answer on every machine.
+/// How finely to step.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Accuracy {
+    /// Of one step, relative to the largest value of each state since the first row.
+    pub(crate) tolerance: f64,
+    /// The longest step in parts of the time between neighbouring corners and rows.
+    pub(crate) longest: f64,
+}
+
+/// What an answer is made with, and what tells its error: never the same steps.
+pub(crate) const FINE: Accuracy = Accuracy {
+    tolerance: 1e-7,
+    longest: 0.5,
+};
+pub(crate) const COARSE: Accuracy = Accuracy {
+    tolerance: 1e-6,
+    longest: 1.0,
+};
+
+/// Simulates. Multiplications are taken from `budget`, a count rather than a time, so that a seed has the same answer on every
+/// machine.
 pub(crate) fn simulate(
     circuit: &Circuit,
-    tolerance: f64,
+    accuracy: Accuracy,
     budget: &Cell<u64>,
 ) -> Result<Answer, Declined> {
     let network = Network::new(circuit)?;
-    radau::run(&network, circuit, tolerance, budget)
+    radau::run(&network, circuit, accuracy, budget)
 }
 
 /// Takes `work` from the budget; nothing is left when it does not suffice.

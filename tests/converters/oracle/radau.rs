@@ -6,7 +6,7 @@ use std::rc::Rc;
 use super::network::{Mode, Network};
 use super::positions::{Instant, Modes};
 use super::waves::{Piece, piece, stops};
-use super::{Answer, Declined, Factors, curved, spend};
+use super::{Accuracy, Answer, Declined, Factors, curved, spend};
 use crate::circuit::Circuit;
 
 /// √6.
@@ -47,7 +47,7 @@ struct March<'n> {
     x: Vec<f64>,
     /// Largest value of each state so far.
     amplitudes: Vec<f64>,
-    tolerance: f64,
+    accuracy: Accuracy,
     answer: Answer,
 }
 
@@ -60,7 +60,7 @@ struct Step {
 pub(super) fn run(
     network: &Network,
     circuit: &Circuit,
-    tolerance: f64,
+    accuracy: Accuracy,
     budget: &Cell<u64>,
 ) -> Result<Answer, Declined> {
     let stops = stops(circuit);
@@ -75,7 +75,7 @@ pub(super) fn run(
         mode,
         x: network.start.clone(),
         amplitudes: vec![0.0; network.states()],
-        tolerance,
+        accuracy,
         answer: Answer::default(),
     };
     let mut t = 0.0;
@@ -87,6 +87,10 @@ pub(super) fn run(
         t = stop;
         if is_row {
             let row = network.shown.iter().map(|&k| march.x[k]).collect();
+            if march.answer.rows.is_empty() {
+                // What states were given at the start, and lost since, is not what rows show.
+                march.amplitudes = march.x.iter().map(|x| x.abs()).collect();
+            }
             march.answer.rows.push(row);
         }
     }
@@ -219,7 +223,7 @@ impl March<'_> {
             let scale = self.amplitudes[k]
                 .max(stages[2][k].abs())
                 .max(self.x[k].abs());
-            e.abs() / (self.tolerance * scale.max(largest[k]))
+            e.abs() / (self.accuracy.tolerance * scale.max(largest[k]))
         });
         Some(relative.fold(0.0, f64::max))
     }
@@ -291,16 +295,17 @@ impl March<'_> {
     }
 
     fn advance(&mut self, start: f64, stop: f64) -> Result<(), Declined> {
-        let (mut t, mut h) = (start, stop - start);
+        let longest = self.accuracy.longest * (stop - start);
+        let (mut t, mut h) = (start, longest);
         let mut still = 0;
         while stop - t > 1e-15 * stop {
             if self.budget.get() == 0 {
                 return Err(Declined(OUT_OF_WORK.into()));
             }
-            if self.answer.steps > STEPS || self.answer.events > EVENTS {
+            if self.answer.steps > STEPS || self.answer.events.len() > EVENTS {
                 return Err(Declined("too many steps or events".into()));
             }
-            h = h.min(stop - t);
+            h = h.min(stop - t).min(longest);
             let step = self.step(t, h);
             // Smaller by what the error asks for; what overflowed has none.
             let error = step.as_ref().map_or(1e4, |s| s.error);
@@ -369,7 +374,7 @@ impl March<'_> {
                 return Err(Declined("events without progress".into()));
             }
             t = (t + s * h).min(stop);
-            self.answer.events += 1;
+            self.answer.events.push(t);
             self.settle(t)?;
             h = stop - t;
         }
