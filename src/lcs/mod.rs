@@ -7,6 +7,7 @@ pub mod reduce;
 mod tests;
 
 pub use reduce::{Position, ReduceError, StorageHold, reduce};
+pub(crate) use reduce::{is_coupled, reduce_apart};
 
 use nalgebra::{DMatrix, DVector};
 
@@ -23,6 +24,8 @@ pub struct Lcs {
     pub title: String,
     /// Names and units of x.
     pub states: Vec<State>,
+    /// Numbers of the states that stand for what decays fast, apart from the others; none in the basis of these names.
+    pub fast: Vec<usize>,
     /// Names, units and waveforms of u.
     pub inputs: Vec<Input>,
     /// The pairs (λ, y) and their laws.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::integrate::run::{Reason, SimError};
 use crate::integrate::switching::Threshold;
-use crate::lcs::{Hold, Lcs, Position, StorageHold, reduce};
+use crate::lcs::{Hold, Lcs, Position, StorageHold, is_coupled, reduce_apart};
 use crate::mna::{Behaviour, SourceControl};
 
 /// A jump of a function block's output at one value of its input: while the first pair conducts and the second does not, the
@@ -46,6 +46,8 @@ pub struct Assembler {
     /// The behaviours with some switches on their thresholds.
     sliding: Vec<(Vec<usize>, Behaviour)>,
     steps: Vec<Step>,
+    /// The longest step, s.
+    span: f64,
     /// The system of one position of the switches, all devices free.
     known: Option<(Vec<bool>, Lcs)>,
 }
@@ -58,6 +60,7 @@ impl Assembler {
             behaviour,
             sliding: Vec::new(),
             steps: Vec::new(),
+            span: f64::INFINITY,
             known: None,
         }
     }
@@ -65,6 +68,13 @@ impl Assembler {
     /// Spares it the reduction of this position with all devices free.
     pub(crate) fn knowing(mut self, switches: &[bool], lcs: &Lcs) -> Self {
         self.known = Some((switches.to_vec(), lcs.clone()));
+        self
+    }
+
+    /// Has it known how long the longest step is, s.
+    #[must_use]
+    pub(crate) fn with_span(mut self, span: f64) -> Self {
+        self.span = span;
         self
     }
 
@@ -115,10 +125,11 @@ impl Assembler {
         sliding: &[usize],
     ) -> Result<Lcs, SimError> {
         if sliding.is_empty() {
-            if let Some((_, lcs)) = self
-                .known
-                .take_if(|(known, _)| known == switches && devices.iter().all(|d| *d == Hold::Free))
-            {
+            if let Some((_, lcs)) = self.known.take_if(|(known, lcs)| {
+                known == switches
+                    && !is_coupled(lcs, self.span)
+                    && devices.iter().all(|d| *d == Hold::Free)
+            }) {
                 return Ok(lcs);
             }
             let position = Position {
@@ -126,7 +137,8 @@ impl Assembler {
                 switches: switches.to_vec(),
                 storage: StorageHold::Dynamic,
             };
-            return reduce(&self.behaviour, &position).map_err(|e| SimError::before(e.into()));
+            return reduce_apart(&self.behaviour, &position, self.span)
+                .map_err(|e| SimError::before(e.into()));
         }
         let at = match self.sliding.iter().position(|(s, _)| s == sliding) {
             Some(at) => at,
@@ -153,6 +165,7 @@ impl Assembler {
             switches: left.map(|k| switches[k]).collect(),
             storage: StorageHold::Dynamic,
         };
-        reduce(&self.sliding[at].1, &position).map_err(|e| SimError::before(e.into()))
+        reduce_apart(&self.sliding[at].1, &position, self.span)
+            .map_err(|e| SimError::before(e.into()))
     }
 }

@@ -100,7 +100,7 @@ impl Ladder {
         self.stiff(k) && ((k - self.doubled).is_multiple_of(ANEW) || !self.stiff(k + 1))
     }
 
-    /// exp(A h/2^k) − I, and where that is computed anew max|R(t) − R(t/2)²| relative to max|R(t)|, in the balanced coordinates.
+    /// exp(A h/2^k) − I, and where that is computed anew max|R(t) − R(t/2)²| relative to max(|R(t)|, 1), in the balanced coordinates.
     /// `None` if an entry is not finite or a factor is singular.
     pub(crate) fn increment(&mut self, k: u32) -> Option<(Dense, Option<f64>)> {
         let twice = if self.anew(k) {
@@ -113,7 +113,7 @@ impl Ladder {
             twice.combine(1.0, -1.0, rung);
             let mut whole = rung.clone();
             whole.shift(1.0);
-            twice.amax() / whole.amax().max(f64::MIN_POSITIVE)
+            twice.amax() / whole.amax().max(1.0)
         });
         let mut increment = rung.clone();
         for j in 0..self.scale.len() {
@@ -157,6 +157,52 @@ impl Ladder {
             sum.combine(1.0, 1.0 / f64::from(j), &product);
         }
         sum
+    }
+}
+
+/// The ladders of the parts of A that owe nothing to each other.
+#[derive(Debug, Clone)]
+pub(crate) struct Ladders {
+    /// The rows and columns of each.
+    parts: Vec<(Vec<usize>, Ladder)>,
+}
+
+impl Ladders {
+    /// As [`Ladder::new`], of an A in which the states `fast` are not coupled with the others.
+    pub(crate) fn new(a: &DMatrix<f64>, fast: &[usize], h: f64, limit: f64, doubled: u32) -> Self {
+        let slow = (0..a.nrows()).filter(|j| !fast.contains(j)).collect();
+        let parts = [slow, fast.to_vec()].into_iter();
+        let ladder = |part: Vec<usize>| {
+            let block = a.select_rows(&part).select_columns(&part);
+            (part, Ladder::new(&block, h, limit, doubled))
+        };
+        Self {
+            parts: parts.filter(|part| !part.is_empty()).map(ladder).collect(),
+        }
+    }
+
+    /// The largest ‖A h‖₁ after balancing.
+    pub(crate) fn norm(&self) -> f64 {
+        let norms = self.parts.iter().map(|(_, ladder)| ladder.norm());
+        norms.fold(0.0, f64::max)
+    }
+
+    /// See [`Ladder::increment`].
+    pub(crate) fn increment(&mut self, k: u32) -> Option<(Dense, Option<f64>)> {
+        if let [(_, ladder)] = &mut self.parts[..] {
+            return ladder.increment(k);
+        }
+        let dim = self.parts.iter().map(|(part, _)| part.len()).sum();
+        let (mut whole, mut most) = (Dense::zeros(dim, dim), None);
+        for (part, ladder) in &mut self.parts {
+            let (increment, loss) = ladder.increment(k)?;
+            for (j, &column) in part.iter().enumerate() {
+                let values = part.iter().zip(increment.column(j));
+                values.for_each(|(&row, value)| whole.column_mut(column)[row] = *value);
+            }
+            most = most.into_iter().chain(loss).reduce(f64::max);
+        }
+        Some((whole, most))
     }
 }
 

@@ -3,9 +3,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::dense::Dense;
-use super::expm::{self, Ladder};
+use super::expm::{self, Ladders};
 use super::inspect::GROUP;
 use super::kernel::{BLOCK, Block, Kernel, SparseKernel};
+use super::mode::Sizes as RowSizes;
 use super::recurring::{Prepared, Recurring};
 use super::series::{MAX_DEGREE, Series};
 use super::spectrum::{Rate, Spectrum};
@@ -13,6 +14,12 @@ use super::work::{Sizes, Term, Work};
 
 /// The longest step is 2^LONG output steps.
 pub(crate) const LONG: u32 = 4;
+
+/// 2^[`LONG`] output steps, s.
+pub(crate) fn longest_step(output_step: f64) -> f64 {
+    output_step * f64::from(LONG).exp2()
+}
+
 /// Halvings of the longest step that a table may hold; below it Taylor's series takes over in any case.
 const DEEPEST: u32 = 62 + LONG;
 
@@ -27,6 +34,8 @@ pub(super) const NOISE: f64 = 16.0;
 pub(crate) struct Flow {
     dim: usize,
     states: usize,
+    /// States that are coupled with none but each other.
+    fast: Vec<usize>,
     guards: usize,
     generator: DMatrix<f64>,
     generator_kernel: SparseKernel,
@@ -41,7 +50,7 @@ pub(crate) struct Flow {
     bottom: u32,
     /// h/2^level.
     steps: Vec<f64>,
-    ladder: Ladder,
+    ladder: Ladders,
     levels: Vec<Option<Kernel>>,
     recurring: Recurring,
     /// Work space of spans that recur.
@@ -49,21 +58,23 @@ pub(crate) struct Flow {
     slopes: Vec<Block>,
     spectrum: Spectrum,
     work: Option<Work>,
+    sizes: RowSizes,
     /// Largest loss that an exponential reported.
     pub(crate) loss: f64,
 }
 
 impl Flow {
-    /// `generator` = [[A, EH],[0, S]] with `n` rows of A first, `guards` its rows over w, `output_step` in s, `sources`
+    /// `generator` = [[A, EH],[0, S]] with `n` rows of A first, of which `fast` are not coupled with the others, `guards` its rows over w, `output_step` in s, `sources`
     /// the rates of S. `None` if the entries are not finite.
     pub(crate) fn new(
         generator: DMatrix<f64>,
         n: usize,
+        fast: &[usize],
         guards: &DMatrix<f64>,
         output_step: f64,
         sources: &[Rate],
     ) -> Option<Self> {
-        let h = output_step * f64::from(LONG).exp2();
+        let h = longest_step(output_step);
         if !generator.iter().chain(guards.iter()).all(|v| v.is_finite()) {
             return None;
         }
@@ -78,12 +89,13 @@ impl Flow {
             }
         });
         let rows_kernel = Kernel::stacked(&[&rows]);
-        let ladder = Ladder::new(&generator, h, expm::SQUARED, LONG);
+        let ladder = Ladders::new(&generator, fast, h, expm::SQUARED, LONG);
         let bottom = (ladder.norm().log2().ceil().max(0.0) as u32).clamp(LONG, DEEPEST);
         let spectrum = Spectrum::new(&generator.view((0, 0), (n, n)).into_owned(), sources);
         Some(Self {
             dim,
             states: n,
+            fast: fast.to_vec(),
             guards: m,
             generator_kernel: SparseKernel::new(&generator),
             generator,
@@ -103,6 +115,7 @@ impl Flow {
             slopes: Vec::new(),
             spectrum,
             work: None,
+            sizes: RowSizes::default(),
             loss: 0.0,
         })
     }
@@ -208,15 +221,17 @@ impl Flow {
         (w, next): (&[f64], &mut [f64]),
         sizes: Sizes<'_>,
     ) -> Option<[f64; 2]> {
-        let (generator, ladder, work, loss) = (
+        let (generator, fast, ladder, work, loss) = (
             &self.generator,
+            &self.fast,
             &mut self.ladder,
             &mut self.work,
             &mut self.loss,
         );
         let dim = self.dim;
         let ([time, _], prepared) = self.recurring.get(span, |[t, first]| {
-            let (increment, lost) = Ladder::new(generator, t, expm::SQUARED, 0).increment(0)?;
+            let (increment, lost) =
+                Ladders::new(generator, fast, t, expm::SQUARED, 0).increment(0)?;
             *loss = loss.max(lost.unwrap_or(0.0));
             let energy = work.as_mut().map(|work| work.span(t, generator, sizes));
             let mut whole = increment.clone();
@@ -227,7 +242,7 @@ impl Flow {
             let rows = match rows {
                 Some(way) => {
                     let step = ladder.increment(LONG)?.0;
-                    let mut ladder = Ladder::new(generator, first, expm::SQUARED, 0);
+                    let mut ladder = Ladders::new(generator, fast, first, expm::SQUARED, 0);
                     followed(way, &ladder.increment(0)?.0, &step)
                 }
                 None => Kernel::default(),
@@ -278,6 +293,14 @@ impl Flow {
         true
     }
 
+    /// w' at w.
+    pub(crate) fn rates_of(&self, w: &[f64], rates: &mut Vec<f64>) {
+        rates.resize(self.dim.next_multiple_of(BLOCK), 0.0);
+        let (blocks, _) = rates.as_chunks_mut::<BLOCK>();
+        self.generator_kernel.apply(w, blocks);
+        rates.truncate(self.dim);
+    }
+
     /// These rows, the first after an output step, one below the other; `None` beyond doubles.
     pub(crate) fn followed(&mut self, way: Way<'_>) -> Option<Kernel> {
         let (step, _) = self.ladder.increment(LONG)?;
@@ -286,7 +309,17 @@ impl Flow {
 
     /// Has the energy of these products integrated along the flow.
     pub(crate) fn set_work(&mut self, terms: Vec<Term>) {
-        self.work = Work::new(terms, self.h, self.bottom);
+        self.work = Work::new(terms, &self.fast, self.h, self.bottom);
+    }
+
+    /// Has it known what the entries of 𝒢 and 𝒜 were summed from.
+    pub(crate) fn set_sizes(&mut self, sizes: RowSizes) {
+        self.sizes = sizes;
+    }
+
+    /// See [`Self::set_sizes`].
+    pub(crate) fn sizes(&self) -> &RowSizes {
+        &self.sizes
     }
 
     /// Whether there is energy to integrate.
@@ -479,6 +512,7 @@ mod tests {
         Flow::new(
             generator,
             2,
+            &[],
             &DMatrix::from_row_slice(1, 2, &[1.0, 0.0]),
             h,
             &[],

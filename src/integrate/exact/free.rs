@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::flow::NOISE;
 use crate::diagnostic::Internal;
 use crate::integrate::jump::{Infeasible, Jump, JumpProblem};
 use crate::lcs::{Lcs, Role};
@@ -64,6 +65,12 @@ impl Free {
     /// The storage vector of a state.
     pub(crate) fn storage(&self, x: &DVector<f64>, u: &DVector<f64>) -> DVector<f64> {
         &self.lcs.storage.x * x + &self.lcs.storage.u * u + &self.lcs.storage.one
+    }
+
+    /// What is rounding in [`Self::storage`], by the magnitudes that it is summed from.
+    pub(crate) fn storage_rounding(&self, x: &DVector<f64>, u: &DVector<f64>) -> DVector<f64> {
+        let map = &self.lcs.storage;
+        (map.x.abs() * x.abs() + map.u.abs() * u.abs() + map.one.abs()) * (NOISE * f64::EPSILON)
     }
 
     /// Whether jumps are projections in the metric of stored energy: where no device can carry an impulse too.

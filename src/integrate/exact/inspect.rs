@@ -16,8 +16,11 @@ pub(super) const SIMULTANEOUS: f64 = GROUP / NOISE;
 const TIME_ULPS: f64 = 8.0;
 /// Inspections after which the sizes of a mode are taken anew.
 const USES: u32 = 64;
+/// Ages from which on states follow the others that differ by this factor are of different levels: when the faster ones follow, the
+/// others still move.
+const LEVEL: f64 = 1e3;
 /// Derivatives looked at: g, g', g'', g'''.
-const ORDERS: usize = 4;
+pub(super) const ORDERS: usize = 4;
 
 /// What event times near t are known to, s.
 pub(super) fn resolution(t: f64) -> f64 {
@@ -45,17 +48,24 @@ pub(crate) struct Inspector {
     /// w with the sources a few units in the last place of t later, and the storage there.
     later: Vec<f64>,
     s_later: Vec<f64>,
+    s_sizes: Vec<f64>,
     /// How large w can have been.
     sizes: Vec<f64>,
     /// Guards with their derivatives, and their sizes.
     jets: Vec<f64>,
     jet_sizes: Vec<f64>,
+    /// How fast the storage came to this instant, where it is known, and the same as w' in the inspected mode with all that its guards
+    /// make of it: what the resolution of the time leaves of them.
+    pace: Vec<f64>,
+    rates: Vec<f64>,
+    drifts: Vec<f64>,
+    work: Vec<f64>,
     /// Whose quantities pass zero at this instant, and what the resolution of the time leaves of them.
     slips: Vec<(Owner, f64)>,
-    /// The same where some states follow the others, and whether w is there.
+    /// The same where some states follow the others, and which of the manifolds w is on.
     slow: Vec<f64>,
     slow_sizes: Vec<f64>,
-    settled: bool,
+    settled: Option<usize>,
 }
 
 /// How large things were when a mode was last looked at closely.
@@ -71,8 +81,8 @@ pub(crate) struct Familiar {
     pub(crate) noise: Vec<f64>,
     /// The states that are small beside their amplitudes once they follow the others.
     pub(crate) followers: Vec<Follower>,
-    /// Where they do.
-    manifold: Option<Manifold>,
+    /// Where they do: one manifold for each [level](LEVEL) of their ages, the fastest alone first.
+    manifolds: Vec<Manifold>,
     /// How often it was enough to look at these.
     uses: u32,
     /// |w| that the storage's amplitudes have taken account of.
@@ -102,20 +112,26 @@ impl Familiar {
             &self.sizes,
             &mut self.followers,
         );
-        let known = self.manifold.as_ref();
-        if !known.is_some_and(|manifold| manifold.is_of(&self.followers)) {
-            let components: Vec<usize> = self.followers.iter().map(|f| f.component).collect();
-            self.manifold = (!components.is_empty())
-                .then(|| Manifold::new(flow.generator(), &flow.guard_matrix(), &components, ORDERS))
-                .flatten();
+        let faster = |k: usize| &self.followers[..k];
+        let ages = self.followers.windows(2).enumerate();
+        let apart = ages.filter(|(_, pair)| pair[1].age > LEVEL * pair[0].age);
+        let mut levels: Vec<usize> = apart.map(|(k, _)| k + 1).collect();
+        levels.extend((!self.followers.is_empty()).then_some(self.followers.len()));
+        let known = self.manifolds.iter().zip(&levels);
+        if self.manifolds.len() == levels.len() && known.clone().all(|(m, &k)| m.is_of(faster(k))) {
+            return;
         }
-    }
-
-    /// Whether a guard sees states that follow the others.
-    fn is_seen_to_follow(&self, guard: usize) -> bool {
-        self.manifold
-            .as_ref()
-            .is_some_and(|manifold| manifold.is_seen_by(guard))
+        let guards = flow.guard_matrix();
+        let manifold = |&k: &usize| {
+            let components: Vec<usize> = faster(k).iter().map(|f| f.component).collect();
+            Manifold::new(
+                flow.generator(),
+                (&guards, flow.sizes()),
+                &components,
+                ORDERS,
+            )
+        };
+        self.manifolds = levels.iter().filter_map(manifold).collect();
     }
 
     /// How large w was so far, if it has grown by this: the state, the sources.
@@ -144,6 +160,7 @@ impl Inspector {
         self.w.resize(dim + 2 * mode.flow.guards(), 0.0);
         self.w[..mode.n].copy_from_slice(&self.x);
         self.w[mode.n..dim].copy_from_slice(z);
+        mode.settle(&mut self.w[..dim], &mut self.work);
     }
 
     /// The storage that `mode` would have after taking over storage `s` by conservation of charge and flux.
@@ -174,9 +191,13 @@ impl Inspector {
             } else {
                 self.s_later.clone_from(&self.s);
             }
+            self.sizes.clear();
+            self.sizes.extend(self.w.iter().map(|w| w.abs()));
+            mode.storage.largest(&self.sizes, &mut self.s_sizes);
             let moved = (0..s.len()).any(|i| {
                 let drift = (self.s_later[i] - self.s[i]).abs();
-                (self.s[i] - s[i]).abs() > CONSISTENT * scale[i] + drift
+                let rounding = NOISE * f64::EPSILON * self.s_sizes[i];
+                (self.s[i] - s[i]).abs() > CONSISTENT * scale[i] + drift + rounding
             });
             if moved {
                 return Finding::Inconsistent;
@@ -226,6 +247,7 @@ impl Inspector {
             mode.flow.noise(&familiar.sizes, &mut familiar.noise);
             familiar.find_followers(&mode.flow);
         }
+        self.read_drifts(mode, time);
         self.read_jets(mode);
         let mut leaving = Vec::new();
         for i in 0..mode.flow.guards() {
@@ -242,6 +264,30 @@ impl Inspector {
     /// Forgets what passed zero at an instant before.
     pub(crate) fn forget_slips(&mut self) {
         self.slips.clear();
+    }
+
+    /// Notes how fast the storage comes to this instant along `mode` at w.
+    pub(crate) fn note_pace(&mut self, mode: &Mode, w: &[f64]) {
+        mode.storage_rates(w, &mut self.pace, &mut self.work);
+    }
+
+    /// The storage did not come to where it is by a motion.
+    pub(crate) fn forget_pace(&mut self) {
+        self.pace.clear();
+    }
+
+    /// w' of the pace in `mode`, and how far the guards and their derivatives move with it within the resolution of the time. Where a
+    /// transient begins with the mode, its slope says nothing of the past.
+    fn read_drifts(&mut self, mode: &Mode, time: f64) {
+        self.rates.clear();
+        if self.pace.is_empty() {
+            return;
+        }
+        mode.rates_from(&self.pace, &self.w, &mut self.rates, &mut self.work);
+        for rate in &mut self.rates {
+            *rate *= time;
+        }
+        mode.jets.values(&self.rates, &mut self.drifts);
     }
 
     /// Notes that the quantity of this owner passes zero at t with this slope: in the mode that follows, where it may change much
@@ -265,6 +311,7 @@ impl Inspector {
         for (size, known) in self.sizes.iter_mut().zip(&mode.familiar.sizes) {
             *size = size.max(*known);
         }
+        self.rates.clear();
         self.read_jets(mode);
     }
 
@@ -273,13 +320,11 @@ impl Inspector {
         let w = &self.w[..mode.flow.dim()];
         mode.jets.values(w, &mut self.jets);
         mode.jets.largest(&self.sizes, &mut self.jet_sizes);
-        let manifold = mode.familiar.manifold.as_ref();
-        self.settled = false;
-        if let Some(manifold) = manifold
-            && manifold.holds(w, &self.sizes, GROUP * f64::EPSILON)
-        {
-            manifold.jets(w, &self.sizes, &mut self.slow, &mut self.slow_sizes);
-            self.settled = true;
+        let manifolds = &mode.familiar.manifolds;
+        let holds = |m: &Manifold| m.holds(w, &self.sizes, GROUP * f64::EPSILON, &self.rates);
+        self.settled = manifolds.iter().rposition(holds);
+        if let Some(at) = self.settled {
+            manifolds[at].jets(w, &self.sizes, &mut self.slow, &mut self.slow_sizes);
         }
     }
 
@@ -289,11 +334,18 @@ impl Inspector {
     pub(crate) fn leaves(&self, mode: &Mode, i: usize, t: f64) -> bool {
         let time = resolution(t);
         let m = mode.flow.guards();
-        let (g, slope) = (self.jets[i], self.jets[m + i]);
+        let drift = |k: usize| {
+            if self.rates.is_empty() {
+                time * self.jets[(k + 1) * m + i].abs()
+            } else {
+                self.drifts[k * m + i].abs()
+            }
+        };
+        let g = self.jets[i];
         // What of a guard is a transient that is rounding decides nothing.
-        let slow = self.settled
-            && mode.familiar.is_seen_to_follow(i)
-            && g.abs() <= GROUP * f64::EPSILON * self.jet_sizes[i] + time * slope.abs();
+        let manifold = self.settled.map(|at| &mode.familiar.manifolds[at]);
+        let slow = manifold.is_some_and(|manifold| manifold.is_seen_by(i))
+            && g.abs() <= GROUP * f64::EPSILON * self.jet_sizes[i] + drift(0);
         let (jets, sizes) = if slow {
             (&self.slow, &self.slow_sizes)
         } else {
@@ -306,7 +358,7 @@ impl Inspector {
             let mut noise = GROUP * f64::EPSILON * whole;
             if k + 1 < ORDERS {
                 next = dot(k + 1);
-                noise += time * next.0.abs();
+                noise += if slow { time * next.0.abs() } else { drift(k) };
             }
             if k == 0 {
                 noise += self.slip(mode.owner(i));

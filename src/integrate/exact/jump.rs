@@ -172,7 +172,14 @@ impl Exact {
         let t = self.motion.t;
         let u = self.inputs(t);
         let free = self.plant.free(key)?;
-        let s = free.storage(after, &u);
+        let mut s = free.storage(after, &u);
+        // What fast and slow states of another basis add up to nothing is no change.
+        let rounding = free.storage_rounding(after, &u);
+        for ((new, old), rounding) in s.iter_mut().zip(&self.storage).zip(&rounding) {
+            if (*new - old).abs() <= *rounding {
+                *new = *old;
+            }
+        }
         let joined = free.storage(x, &self.before);
         let lcs = &free.lcs;
         self.balance
@@ -198,6 +205,9 @@ impl Exact {
             .zip(&self.scale)
             .any(|((a, b), scale)| (a - b).abs() > ROUNDING * scale.max(a.abs()));
         self.storage.copy_from_slice(s.as_slice());
+        if moved {
+            self.inspector.forget_pace();
+        }
         self.rescale();
         Ok(moved)
     }

@@ -5,6 +5,7 @@ mod accumulation;
 mod ahead;
 mod assembler;
 mod clock;
+mod decouple;
 mod dense;
 mod eigenvalues;
 mod exosystem;

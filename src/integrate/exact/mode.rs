@@ -6,9 +6,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::ahead;
 use super::clock::Clock;
+use super::decouple::decoupled;
 use super::exosystem::Exosystem;
 use super::flow::Flow;
-use super::inspect::Familiar;
+use super::inspect::{Familiar, ORDERS};
 use super::kernel::Kernel;
 use super::rays;
 use super::schedule::Drive;
@@ -101,6 +102,14 @@ impl Map {
         }
     }
 
+    /// As [`Self::new`], with what the entries were summed from.
+    pub(super) fn with_sizes(matrix: &DMatrix<f64>, sizes: &DMatrix<f64>) -> Self {
+        Self {
+            map: Kernel::new(matrix),
+            sizes: Kernel::new(sizes),
+        }
+    }
+
     /// `values` = map · w.
     pub(crate) fn values(&self, w: &[f64], values: &mut Vec<f64>) {
         values.resize(self.map.rows(), 0.0);
@@ -111,6 +120,40 @@ impl Map {
     pub(crate) fn largest(&self, sizes: &[f64], largest: &mut Vec<f64>) {
         largest.resize(self.map.rows(), 0.0);
         self.sizes.apply(sizes, largest);
+    }
+}
+
+/// What the entries of a mode's matrices were summed from, where that is more than the entries themselves.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Sizes {
+    /// Of the guards' rows.
+    pub(crate) guards: DMatrix<f64>,
+    /// Of 𝒜.
+    pub(crate) summed: DMatrix<f64>,
+}
+
+impl Sizes {
+    /// Guards and below them their derivatives along w' = 𝒜 w, so many orders, and the sums of magnitudes that their entries come from.
+    pub(crate) fn jets(
+        &self,
+        guards: &DMatrix<f64>,
+        generator: &DMatrix<f64>,
+        orders: usize,
+    ) -> (DMatrix<f64>, DMatrix<f64>) {
+        let (m, dim) = guards.shape();
+        let (mut jets, mut whole) = (
+            DMatrix::zeros(orders * m, dim),
+            DMatrix::zeros(orders * m, dim),
+        );
+        let (mut rows, mut sizes) = (guards.clone(), self.guards.clone());
+        for k in 0..orders {
+            jets.rows_mut(k * m, m).copy_from(&rows);
+            whole.rows_mut(k * m, m).copy_from(&sizes);
+            let next = &rows * generator;
+            sizes = next.abs().sup(&(rows.abs() * &self.summed));
+            rows = next;
+        }
+        (jets, whole)
     }
 }
 
@@ -143,6 +186,10 @@ pub(crate) struct Mode {
     pub(crate) keeps: bool,
     /// x = inject · s + inject_one, n×q.
     pub(crate) inject: Map,
+    /// Whether states of different rates are [apart](crate::lcs::reduce): where the energy of the states is known, and the basis exists.
+    is_apart: bool,
+    /// w in the basis of the flow, where that is another one than [x; z].
+    settled: Option<Kernel>,
     /// n.
     pub(crate) inject_one: DVector<f64>,
     /// Probe rows over w.
@@ -288,20 +335,41 @@ impl Mode {
             guards.set_row(after + 2 * k, &((&v - &i * ron) * sign));
             guards.set_row(after + 2 * k + 1, &((&i - &v * goff) * sign));
         }
-        let first = &guards * &generator;
-        let second = &first * &generator;
-        let third = &second * &generator;
-        let m = guards.nrows();
-        let mut jets = DMatrix::zeros(4 * m, dim);
-        for (k, rows) in [&guards, &first, &second, &third].into_iter().enumerate() {
-            jets.rows_mut(k * m, m).copy_from(rows);
+        // What symmetrical sources add up to nothing is rounding of each of them.
+        let mut summed = DMatrix::zeros(dim, dim);
+        let mut inputs = lcs.e.abs() * exosystem.output().abs();
+        let mut constant = inputs.column_mut(0);
+        constant += lcs.e0.abs();
+        summed.view_mut((0, n), (n, dz)).copy_from(&inputs);
+        let decoupled = (!lcs.fast.is_empty())
+            .then(|| decoupled(&generator, &lcs.fast))
+            .flatten();
+        let basis = |rows: DMatrix<f64>| match &decoupled {
+            Some(decoupled) => rows * &decoupled.to,
+            None => rows,
+        };
+        let (mut fast, mut guard_sizes): (&[usize], _) = (&[], guards.abs());
+        if let Some(decoupled) = &decoupled {
+            generator.copy_from(&decoupled.generator);
+            summed = summed.sup(&decoupled.sizes);
+            guard_sizes *= decoupled.to.abs();
+            fast = &lcs.fast;
         }
-        let mut flow = Flow::new(generator, n, &guards, h, exosystem.rates())?;
+        let guards = basis(guards);
+        let sizes = Sizes {
+            guards: guard_sizes,
+            summed,
+        };
+        let (jets, jet_sizes) = sizes.jets(&guards, &generator, ORDERS);
+        let mut flow = Flow::new(generator, n, fast, &guards, h, exosystem.rates())?;
+        flow.set_sizes(sizes);
         if energy {
-            flow.set_work(work(lcs, n, exosystem));
+            let [v, i] = [&lcs.outputs.power_v, &lcs.outputs.power_i];
+            let [v, i] = [v, i].map(|rows| basis(over_w(rows, n, exosystem)));
+            flow.set_work(work(lcs, &v, &i));
         }
 
-        let c0 = over_w(&lcs.held.constraints, n, exosystem);
+        let c0 = basis(over_w(&lcs.held.constraints, n, exosystem));
         let c1 = &c0 * flow.generator();
         let c2 = &c1 * flow.generator();
         let rows = c0.nrows();
@@ -319,6 +387,7 @@ impl Mode {
         let mut ones = storage.column_mut(n);
         ones += &map.one;
 
+        let storage = basis(storage);
         let driven = rows > 0 || map.u.iter().any(|u| *u != 0.0);
         let one = |m: &DMatrix<f64>| *m == DMatrix::identity(n, n);
         let shifted = map.one.iter().chain(&map.inject_one).any(|v| *v != 0.0);
@@ -326,7 +395,7 @@ impl Mode {
 
         Some(Self {
             n,
-            jets: Map::new(&jets),
+            jets: Map::with_sizes(&jets, &jet_sizes),
             device_guards,
             controlled_by_sources: guarded_switches
                 .iter()
@@ -344,7 +413,10 @@ impl Mode {
             storage: Map::new(&storage),
             inject: Map::new(&map.inject),
             inject_one: map.inject_one.clone(),
-            outputs: Kernel::new(&over_w(&lcs.outputs.rows, n, exosystem)),
+            outputs: Kernel::new(&basis(over_w(&lcs.outputs.rows, n, exosystem))),
+            is_apart: (0..n).all(|k| lcs.energy.get((k, k)).is_some_and(|e| *e > 0.0))
+                && decoupled.is_some() != lcs.fast.is_empty(),
+            settled: decoupled.map(|decoupled| Kernel::new(&decoupled.from)),
             rows: ahead::Rows::new(lcs.outputs.names.len(), dim),
             shared,
             familiar: Familiar::default(),
@@ -383,10 +455,13 @@ impl Mode {
     }
 
     /// The fastest rate at which several states move each other, 1/s: their sum is fast, and what is slow stands in the difference of
-    /// large entries. `None` where every fast state is fast by itself.
+    /// large entries. `None` where every fast state is fast by itself, or apart from the others.
     pub(crate) fn fast_sum(&self) -> Option<f64> {
         /// Entries of a row above this part of the largest of all belong to the fast rate.
         const FAST: f64 = 1e-6;
+        if self.is_apart {
+            return None;
+        }
         let a = self.flow.generator().view((0, 0), (self.n, self.n));
         let largest = a.amax();
         let several = |row: usize| {
@@ -405,6 +480,15 @@ impl Mode {
         k.is_some_and(|k| self.off_at_rest.get(k).copied().unwrap_or(false))
     }
 
+    /// Takes w = [x; z] to the basis of the flow.
+    pub(crate) fn settle(&self, w: &mut [f64], work: &mut Vec<f64>) {
+        if let Some(settled) = &self.settled {
+            work.clear();
+            work.extend_from_slice(w);
+            settled.apply(work, w);
+        }
+    }
+
     /// The storage at w.
     pub(crate) fn storage_at(&self, w: &[f64], s: &mut Vec<f64>) {
         if self.keeps {
@@ -413,6 +497,31 @@ impl Mode {
         } else {
             self.storage.values(w, s);
         }
+    }
+
+    /// How fast the storage moves at w.
+    pub(crate) fn storage_rates(&self, w: &[f64], s: &mut Vec<f64>, work: &mut Vec<f64>) {
+        self.flow.rates_of(w, work);
+        self.storage_at(work, s);
+    }
+
+    /// w' at w where the storage moves as fast as this.
+    pub(crate) fn rates_from(
+        &self,
+        storage: &[f64],
+        w: &[f64],
+        rates: &mut Vec<f64>,
+        work: &mut Vec<f64>,
+    ) {
+        if self.keeps {
+            rates.clear();
+            rates.extend_from_slice(storage);
+        } else {
+            self.inject.values(storage, rates);
+        }
+        self.flow.rates_of(w, work);
+        rates.extend_from_slice(&work[self.n..]);
+        self.settle(rates, work);
     }
 
     /// The state that conserves charge and flux from storage s.
@@ -449,16 +558,14 @@ fn distinct(rows: &DMatrix<f64>) -> Vec<usize> {
     kept.into_iter().map(|(i, _)| i).collect()
 }
 
-/// What sources deliver and what dissipates, over w.
-fn work(lcs: &Lcs, n: usize, exosystem: &Exosystem) -> Vec<Term> {
-    let v = over_w(&lcs.outputs.power_v, n, exosystem);
-    let i = over_w(&lcs.outputs.power_i, n, exosystem);
+/// What sources deliver and what dissipates, of these rows of voltages and currents over w.
+fn work(lcs: &Lcs, v: &DMatrix<f64>, i: &DMatrix<f64>) -> Vec<Term> {
     let row = |m: &DMatrix<f64>, k: usize| m.row(k).iter().copied().collect();
     let terms = lcs.outputs.power.iter().enumerate();
     terms
         .map(|(k, term)| Term {
-            v: row(&v, k),
-            i: row(&i, k),
+            v: row(v, k),
+            i: row(i, k),
             source: term.kind == PowerKind::Source,
         })
         .collect()

@@ -412,6 +412,8 @@ impl Motion {
                 if clear {
                     self.accept(flow, exosystem, level, end);
                     needed = needed.saturating_sub(1);
+                } else if let Some(guard) = self.fallen(flow, flow.step(level)) {
+                    return Arrival::Fired(guard);
                 } else if level == bottom {
                     match self.taylor(flow, exosystem, unit, end) {
                         Arrival::Reached => barrier = 0,
@@ -515,6 +517,19 @@ impl Motion {
         } else {
             Verdict::Unclear
         }
+    }
+
+    /// A guard that falls and is zero to its rounding, where a step of h seconds is none to the time, but not for what may still be a
+    /// transient that began with the mode: such steps move nothing, and could go on without end.
+    fn fallen(&self, flow: &Flow, h: f64) -> Option<usize> {
+        let ulp = f64::EPSILON * self.t.abs();
+        if h > 0.25 * ulp || self.age <= ulp {
+            return None;
+        }
+        let (g, slopes) = self.now[flow.dim()..].split_at(flow.guards());
+        let (floors, slope_floors) = self.floors.split_at(flow.guards());
+        let falls = |&i: &usize| g[i] <= floors[i] && slopes[i] < -slope_floors[i];
+        (0..flow.guards()).find(falls)
     }
 
     /// The part of the step from `now` to `next` after which the first guard falls through zero, by the cubics through values and

@@ -72,6 +72,7 @@ impl Exact {
         self.take_storage();
         self.left_here.clear();
         self.inspector.forget_slips();
+        self.inspector.forget_pace();
         let t = self.motion.t;
         let Some(piece) = source.piece(t) else {
             return Err(self.fail(Reason::Unsupported("a source has no closed form".into())));
@@ -132,6 +133,7 @@ impl Exact {
             switches[i] ^= clock.leaves(&self.plant.thresholds[i], switches[i], place.t);
         }
         self.inspector.forget_slips();
+        self.inspector.forget_pace();
         self.left_here.clear();
         self.exosystem.write(place.t, &mut self.z);
         // Its edges have acted.

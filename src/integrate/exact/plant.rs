@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::assembler::{Assembler, Step};
 use super::clock::Clock;
 use super::exosystem::Exosystem;
+use super::flow::longest_step;
 use super::free::Free;
 use super::mode::{Key, Mode, SwitchFacts};
 use super::schedule::Drive;
@@ -45,7 +46,7 @@ impl Plant {
             pairs: assembler.pairs(),
             valves: thresholds.iter().map(valve).collect(),
             thresholds,
-            assembler,
+            assembler: assembler.with_span(longest_step(h)),
             drives: Vec::new(),
             clocks: Vec::new(),
             h,

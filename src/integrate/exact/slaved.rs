@@ -13,7 +13,7 @@
 
 use nalgebra::DMatrix;
 
-use super::mode::Map;
+use super::mode::{Map, Sizes};
 
 /// Sweeps over the components that follow each other.
 const SWEEPS: usize = 64;
@@ -113,7 +113,7 @@ impl Manifold {
     /// That of these components, with as many orders of the guards; `None` where they do not follow (𝒜_FF is singular).
     pub(crate) fn new(
         generator: &DMatrix<f64>,
-        guards: &DMatrix<f64>,
+        (guards, sizes): (&DMatrix<f64>, &Sizes),
         followers: &[usize],
         orders: usize,
     ) -> Option<Self> {
@@ -143,14 +143,19 @@ impl Manifold {
         for (mut row, scale) in drift.row_iter_mut().zip(&scale) {
             row /= -scale;
         }
-        let flow = slow(generator);
-        let m = guards.nrows();
-        let mut jets = DMatrix::zeros(orders * m, dim);
-        let mut rows = slow(guards);
-        for k in 0..orders {
-            jets.rows_mut(k * m, m).copy_from(&rows);
-            rows = slow(&(&rows * &flow));
-        }
+        let magnitudes = slaves.abs();
+        let added = |rows: &DMatrix<f64>, sizes: &DMatrix<f64>| {
+            let mut added = sizes + rows.select_columns(followers).abs() * &magnitudes;
+            for &j in followers {
+                added.column_mut(j).fill(0.0);
+            }
+            added
+        };
+        let sizes = Sizes {
+            guards: added(guards, &sizes.guards),
+            summed: added(generator, &sizes.summed),
+        };
+        let (jets, whole) = sizes.jets(&slow(guards), &slow(generator), orders);
         let sees = guards
             .row_iter()
             .map(|row| followers.iter().any(|&j| row[j] != 0.0));
@@ -160,7 +165,7 @@ impl Manifold {
             follows,
             slaves,
             drift,
-            jets: Map::new(&jets),
+            jets: Map::with_sizes(&jets, &whole),
         })
     }
 
@@ -170,9 +175,9 @@ impl Manifold {
             && followers.iter().all(|f| self.follows[f.component])
     }
 
-    /// Whether w is on it and stays there, up to this part of the sizes of its components: a quantity that passes zero may be the
-    /// difference from the manifold itself, and then its rate is none of the manifold's.
-    pub(crate) fn holds(&self, w: &[f64], sizes: &[f64], rounding: f64) -> bool {
+    /// Whether w is on it and stays there, up to this part of the sizes of its components and what each is not `known` to besides, if
+    /// anything: a quantity that passes zero may be the difference from the manifold itself, and then its rate is none of the manifold's.
+    pub(crate) fn holds(&self, w: &[f64], sizes: &[f64], rounding: f64, known: &[f64]) -> bool {
         self.followers.iter().enumerate().all(|(k, &j)| {
             let row = self.slaves.row(k);
             let (value, size) = row
@@ -183,7 +188,8 @@ impl Manifold {
                     (value + s * w, whole + (s * size).abs())
                 });
             let drift: f64 = self.drift.row(k).iter().zip(w).map(|(d, w)| d * w).sum();
-            (w[j] - value).abs() <= rounding * size && drift.abs() <= rounding * size
+            let near = rounding * size + known.get(j).map_or(0.0, |known| known.abs());
+            (w[j] - value).abs() <= near && drift.abs() <= near
         })
     }
 
@@ -208,6 +214,14 @@ impl Manifold {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Those of entries that are no sums.
+    fn sizes(guards: &DMatrix<f64>) -> Sizes {
+        Sizes {
+            guards: guards.abs(),
+            summed: DMatrix::zeros(guards.ncols(), guards.ncols()),
+        }
+    }
 
     fn of(generator: &DMatrix<f64>, n: usize, sizes: &[f64]) -> Vec<Follower> {
         let mut found = Vec::new();
@@ -251,10 +265,10 @@ mod tests {
         a[(1, 2)] = 314.0;
         a[(2, 1)] = -314.0;
         let guard = DMatrix::from_row_slice(1, 3, &[roff, 0.0, 0.0]);
-        let manifold = Manifold::new(&a, &guard, &[0], 3).unwrap();
+        let manifold = Manifold::new(&a, (&guard, &sizes(&guard)), &[0], 3).unwrap();
         let (w, sizes) = ([1e-17, 1e-20, 5.0], [10.0, 5.0, 5.0]);
-        assert!(manifold.holds(&w, &sizes, 1e-14));
-        assert!(!manifold.holds(&[1e-12, 0.0, 5.0], &sizes, 1e-14));
+        assert!(manifold.holds(&w, &sizes, 1e-14, &[]));
+        assert!(!manifold.holds(&[1e-12, 0.0, 5.0], &sizes, 1e-14, &[]));
         let (mut values, mut whole) = (Vec::new(), Vec::new());
         manifold.jets(&w, &sizes, &mut values, &mut whole);
         let expected = [1e-20, 314.0 * 5.0, -314.0 * 314.0 * 1e-20];
@@ -270,8 +284,8 @@ mod tests {
     fn what_passes_through_the_manifold_is_not_on_it() {
         let a = DMatrix::from_row_slice(2, 2, &[-33.0, -33.0, -33.0, -66.0]);
         let guard = DMatrix::from_row_slice(1, 2, &[-10.0, -20.0]);
-        let manifold = Manifold::new(&a, &guard, &[1], 3).unwrap();
-        assert!(!manifold.holds(&[-0.24, 0.12], &[0.53, 0.53], 1e-14));
+        let manifold = Manifold::new(&a, (&guard, &sizes(&guard)), &[1], 3).unwrap();
+        assert!(!manifold.holds(&[-0.24, 0.12], &[0.53, 0.53], 1e-14, &[]));
     }
 
     #[test]

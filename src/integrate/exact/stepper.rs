@@ -9,7 +9,7 @@ use super::ahead::Ahead;
 use super::assembler::{Assembler, Step};
 use super::clock::Clock;
 use super::exosystem::Exosystem;
-use super::inspect::Inspector;
+use super::inspect::{Inspector, resolution};
 use super::metric::Metric;
 use super::mode::{Key, Owner};
 use super::motion::{Arrival, Motion};
@@ -281,6 +281,16 @@ impl Exact {
         }
     }
 
+    /// Reads how fast the storage moves, unless the mode was entered at this very instant: it then came here before.
+    fn take_pace(&mut self) {
+        if let Some(at) = self.mode
+            && self.motion.age > resolution(self.motion.t)
+        {
+            let mode = &self.plant.modes[at];
+            self.inspector.note_pace(mode, &self.motion.now);
+        }
+    }
+
     /// Notes the stored energy.
     pub(super) fn note_stored(&mut self) {
         if self.energy {
@@ -299,6 +309,7 @@ impl Exact {
             self.left_here.clear();
         }
         self.take_storage();
+        self.take_pace();
         let known = self.next_stop <= near;
         self.inspector.forget_slips();
         self.corner = self.next_piece <= near;

@@ -405,6 +405,13 @@ impl Exact {
                 return Ok(Some(found));
             }
         }
+        // Where the steps have no solution to the digits the present devices are the proposal.
+        if tried.is_empty() {
+            tried.push(key.closed.clone());
+            if let Some(found) = self.try_key(key) {
+                return Ok(Some(found));
+            }
+        }
         // Neighbours of the first proposal, then far ones, then all others.
         let (mut next, proposed) = (0, tried.len());
         while next < tried.len() && tried.len() < MOST_NEIGHBOURS {

@@ -8,7 +8,7 @@
 use nalgebra::DMatrix;
 
 use super::dense::Dense;
-use super::expm::{self, Ladder};
+use super::expm::{self, Ladders};
 use super::kernel::Kernel;
 use super::series::Series;
 
@@ -26,6 +26,8 @@ const LONGEST: u32 = 8;
 const HARMLESS: f64 = 1e-13;
 /// Amplitudes below this part of the largest count as this large.
 const SMALLEST: f64 = 1e-60;
+/// Forms are made anew for amplitudes so many times those that they were made for.
+const OUTGROWN: f64 = 1e3;
 /// Rows below this part of the largest are rounding.
 const NOTHING: f64 = 1e-13;
 
@@ -118,6 +120,8 @@ pub(crate) struct Term {
 #[derive(Debug, Clone)]
 pub(crate) struct Work {
     terms: Vec<Term>,
+    /// The states that are coupled with none but each other.
+    fast: Vec<usize>,
     /// The components of w that they see.
     seen: Vec<usize>,
     /// For each of these the columns of v and i of all terms in turn.
@@ -137,6 +141,12 @@ pub(crate) struct Work {
 struct Forms {
     to_y: Kernel,
     y: Vec<f64>,
+    /// The amplitudes they were made for.
+    amplitude: Vec<f64>,
+    /// Whether spans that recur are prepared over their y.
+    lasts: bool,
+    /// See [`Work`].
+    fast: Vec<usize>,
     /// The generator over y, power out of sources, power dissipated.
     generator: DMatrix<f64>,
     powers: [Dense; 2],
@@ -155,7 +165,7 @@ struct Forms {
 #[derive(Debug, Clone)]
 struct Doubling {
     /// exp(𝒜 longest/2^k) − I.
-    ladder: Ladder,
+    ladder: Ladders,
     /// t is the longest over 2^k.
     k: u32,
     /// exp(𝒜t) − I.
@@ -166,7 +176,7 @@ struct Doubling {
 
 impl Work {
     /// For a mode whose table of steps ends at h/2^`bottom`. `None` where nothing takes or gives power.
-    pub(crate) fn new(terms: Vec<Term>, h: f64, bottom: u32) -> Option<Self> {
+    pub(crate) fn new(terms: Vec<Term>, fast: &[usize], h: f64, bottom: u32) -> Option<Self> {
         let terms: Vec<Term> = terms
             .into_iter()
             .filter(|t| [&t.v, &t.i].iter().all(|row| row.iter().any(|r| *r != 0.0)))
@@ -178,6 +188,7 @@ impl Work {
             factors: seen.iter().flat_map(|&j| column(j)).collect(),
             seen,
             at_nodes: Vec::new(),
+            fast: fast.to_vec(),
             terms,
             unit: h * (-f64::from(bottom)).exp2(),
             bottom,
@@ -187,9 +198,12 @@ impl Work {
     }
 
     fn forms(&mut self, generator: &DMatrix<f64>, sizes: Sizes<'_>) -> &mut Forms {
-        let (terms, unit, longest) = (&self.terms, self.unit, self.bottom + LONGEST);
+        let (terms, fast) = (&self.terms, &self.fast);
+        let (unit, longest) = (self.unit, self.bottom + LONGEST);
         self.forms
-            .get_or_insert_with(|| Forms::new(terms, generator, sizes, unit, longest))
+            .take_if(|forms| forms.are_outgrown(sizes.amplitude));
+        self.forms
+            .get_or_insert_with(|| Forms::new(terms, fast, generator, sizes, unit, longest))
     }
 
     /// (from sources, dissipated) over 2^k units from w, J.
@@ -216,7 +230,9 @@ impl Work {
         generator: &DMatrix<f64>,
         sizes: Sizes<'_>,
     ) -> [Kernel; 2] {
-        self.forms(generator, sizes).span(t)
+        let forms = self.forms(generator, sizes);
+        forms.lasts = true;
+        forms.span(t)
     }
 
     /// (from sources, dissipated) from w over the span of these forms and `off` seconds more, J.
@@ -303,6 +319,7 @@ impl Work {
 impl Forms {
     fn new(
         terms: &[Term],
+        fast: &[usize],
         generator: &DMatrix<f64>,
         sizes: Sizes<'_>,
         unit: f64,
@@ -318,7 +335,7 @@ impl Forms {
             .collect();
         // Voltages and currents in the sizes that w takes, of one magnitude each.
         let count = 2 * terms.len();
-        let mut rows = DMatrix::zeros(count.max(dim), dim);
+        let mut rows = DMatrix::zeros(count, dim);
         for (k, term) in terms.iter().enumerate() {
             let norm = |row: &[f64]| {
                 row.iter()
@@ -332,42 +349,23 @@ impl Forms {
                 rows[(2 * k + 1, j)] = term.i[j] / alpha * size[j];
             }
         }
-        let qr = rows.clone().col_piv_qr();
-        let mut triangle = qr.r();
-        let mut order = DMatrix::identity(dim, dim);
-        qr.p().permute_columns(&mut order);
-        // What is rounding of a column couples nothing: sizes that were taken at the start of a run may be far from what comes.
-        for mut column in triangle.column_iter_mut() {
-            let rounding = dim as f64 * f64::EPSILON * column.norm();
-            column.apply(|r| *r = if r.abs() <= rounding { 0.0 } else { *r });
-        }
-        // Unit rows: the coordinates are scaled below. Where rounding does no harm the coordinates stay those of w, in which
-        // the flow of a graded circuit is accurate.
-        let least = if sizes.power > 0.0 {
-            (HARMLESS * sizes.power / f64::EPSILON).sqrt()
-        } else {
-            NOTHING * triangle[(0, 0)].abs()
-        };
-        for j in 0..dim {
-            let pivot = triangle[(j, j)];
-            let mut row = triangle.row_mut(j);
-            if pivot.abs() > least {
-                row /= pivot;
-            } else {
-                row.fill(0.0);
-                row[j] = 1.0;
+        // Where rounding does no harm the coordinates stay those of w, in which the flow of a graded circuit is accurate.
+        let least = (sizes.power > 0.0).then(|| (HARMLESS * sizes.power / f64::EPSILON).sqrt());
+        let (mut to_y, mut from_y) = (DMatrix::zeros(dim, dim), DMatrix::zeros(dim, dim));
+        let slow: Vec<usize> = (0..dim).filter(|j| !fast.contains(j)).collect();
+        for part in [&slow[..], fast] {
+            let (to, from) = coordinates(&rows.select_columns(part), least);
+            for (i, &row) in part.iter().enumerate() {
+                for (j, &column) in part.iter().enumerate() {
+                    (to_y[(row, column)], from_y[(row, column)]) = (to[(i, j)], from[(i, j)]);
+                }
             }
         }
-        let back = triangle
-            .solve_upper_triangular(&DMatrix::identity(dim, dim))
-            .unwrap_or_else(|| DMatrix::identity(dim, dim));
-        let mut to_y = &triangle * order.transpose();
-        let mut from_y = &order * &back;
+        let mut seen = rows * &from_y;
         for (j, &size) in size.iter().enumerate() {
             to_y.column_mut(j).unscale_mut(size);
             from_y.row_mut(j).scale_mut(size);
         }
-        let mut seen = rows * &order * back;
         let moved = &to_y * generator * from_y;
         let d = expm::balance(&moved, unit);
         for (j, &d) in d.iter().enumerate() {
@@ -387,6 +385,9 @@ impl Forms {
         Self {
             to_y: Kernel::new(&to_y),
             y: vec![0.0; dim],
+            amplitude: size,
+            lasts: false,
+            fast: fast.to_vec(),
             generator: moved,
             powers,
             unit,
@@ -395,6 +396,12 @@ impl Forms {
             products: vec![0.0; 2 * dim],
             latest: None,
         }
+    }
+
+    /// Whether they were made for amplitudes at the start of a run that say nothing of what came: T may mix what is apart.
+    fn are_outgrown(&self, amplitude: &[f64]) -> bool {
+        let mut pairs = self.amplitude.iter().zip(amplitude);
+        !self.lasts && pairs.any(|(then, now)| *now > OUTGROWN * then)
     }
 
     /// Takes w over into y.
@@ -414,7 +421,7 @@ impl Forms {
             0
         };
         let k = after + halvings;
-        let mut latest = Doubling::new(&self.generator, &self.powers, longest, k);
+        let mut latest = Doubling::new((&self.generator, &self.fast), &self.powers, longest, k);
         for _ in 0..halvings {
             latest.double();
         }
@@ -453,6 +460,38 @@ impl Forms {
     }
 }
 
+/// T and T⁻¹ for these rows over amplitudes: triangular factors of unit diagonal in the order of their pivots, the unit vector where
+/// a pivot is below `least` (rounding of the largest if that is not known).
+fn coordinates(rows: &DMatrix<f64>, least: Option<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+    let dim = rows.ncols();
+    let filled = rows.clone().resize_vertically(rows.nrows().max(dim), 0.0);
+    let qr = filled.col_piv_qr();
+    let mut triangle = qr.r();
+    let mut order = DMatrix::identity(dim, dim);
+    qr.p().permute_columns(&mut order);
+    // What is rounding of a column couples nothing: sizes that were taken at the start of a run may be far from what comes.
+    for mut column in triangle.column_iter_mut() {
+        let rounding = dim as f64 * f64::EPSILON * column.norm();
+        column.apply(|r| *r = if r.abs() <= rounding { 0.0 } else { *r });
+    }
+    // Unit rows: the coordinates are scaled by the caller.
+    for j in 0..dim {
+        let least = least.unwrap_or_else(|| NOTHING * triangle[(0, 0)].abs());
+        let pivot = triangle[(j, j)];
+        let mut row = triangle.row_mut(j);
+        if pivot.abs() > least {
+            row /= pivot;
+        } else {
+            row.fill(0.0);
+            row[j] = 1.0;
+        }
+    }
+    let back = triangle
+        .solve_upper_triangular(&DMatrix::identity(dim, dim))
+        .unwrap_or_else(|| DMatrix::identity(dim, dim));
+    (&triangle * order.transpose(), order * back)
+}
+
 /// (y · Γ₀y, y · Γ₁y) for [Γ₀; Γ₁].
 #[inline]
 fn products(forms: &Kernel, y: &[f64], products: &mut [f64]) -> [f64; 2] {
@@ -466,7 +505,12 @@ fn products(forms: &Kernel, y: &[f64], products: &mut [f64]) -> [f64; 2] {
 
 impl Doubling {
     /// From 2^−`k` of the longest time on, with ‖𝒜‖ t ≤ [`expm::SERIES`]: Q_{j+1} = (𝒜ᵀ Q_j + Q_j 𝒜) t/(j + 1).
-    fn new(generator: &DMatrix<f64>, powers: &[Dense; 2], longest: f64, k: u32) -> Self {
+    fn new(
+        (generator, fast): (&DMatrix<f64>, &[usize]),
+        powers: &[Dense; 2],
+        longest: f64,
+        k: u32,
+    ) -> Self {
         let dim = generator.nrows();
         let t = longest * (-f64::from(k)).exp2();
         let a = Dense::from_fn(dim, dim, |i, j| generator[(i, j)] * t);
@@ -484,7 +528,7 @@ impl Doubling {
         };
         let grams = powers.each_ref().map(&mut series);
         let mut doubling = Self {
-            ladder: Ladder::new(generator, longest, STIFF, 0),
+            ladder: Ladders::new(generator, fast, longest, STIFF, 0),
             increment: Dense::zeros(dim, dim),
             k,
             grams,
@@ -554,7 +598,7 @@ mod tests {
         let exact = |h: f64| -9.0 * tau / 2.0 * (-2.0 * h / tau).exp_m1();
         let h = 1.5e-3;
         let terms = vec![term(&[1.0], &[1.0], true), term(&[2.0], &[1.0], false)];
-        let mut work = Work::new(terms, h, 0).unwrap();
+        let mut work = Work::new(terms, &[], h, 0).unwrap();
         for k in 0..6 {
             let [source, dissipated] = work.over(k, &[3.0], &a, sizes(&[3.0]));
             let expected = exact(h * f64::from(1 << k));
@@ -585,7 +629,7 @@ mod tests {
     #[test]
     fn growth_ends_the_joining() {
         let a = DMatrix::from_element(1, 1, 1.0);
-        let mut work = Work::new(vec![term(&[1.0], &[1.0], false)], 1.0, 0).unwrap();
+        let mut work = Work::new(vec![term(&[1.0], &[1.0], false)], &[], 1.0, 0).unwrap();
         let joined = (0..12)
             .take_while(|&k| (0..PATIENCE).any(|_| work.may_join(k, &a, sizes(&[1.0]))))
             .count();
@@ -602,7 +646,7 @@ mod tests {
         // x₁' = −slow x₁, v' = −fast v + …: in x₂ = v − gain x₁.
         let a = DMatrix::from_row_slice(2, 2, &[-slow, 0.0, gain * (slow - fast), -fast]);
         let terms = vec![term(&[gain, 1.0], &[gain, 1.0], false)];
-        let mut work = Work::new(terms, 1e-3, 20).unwrap();
+        let mut work = Work::new(terms, &[], 1e-3, 20).unwrap();
         // v = x₂ + gain x₁ obeys v' = −fast v exactly: ∫ v² = v₀²/(2 fast).
         let w = [1.0, 1e-3 - gain];
         let v = w[1] + gain;

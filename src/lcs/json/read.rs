@@ -297,6 +297,7 @@ pub fn read(text: &str) -> Result<SystemFile, JsonError> {
             initial: x0.clone(),
         },
         states,
+        fast: Vec::new(),
         inputs,
         ports,
         shift,

@@ -19,6 +19,7 @@ mod exchange;
 mod flow;
 mod frame;
 mod publish;
+mod separate;
 mod system;
 
 use crate::algebra::Field;
@@ -28,6 +29,7 @@ use crate::mna::{Behaviour, Reduced};
 use super::{Hold, Lcs, Role};
 use eliminated::Eliminated;
 use publish::publish;
+pub(crate) use separate::is_coupled;
 
 /// What each device and switch is held as.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -161,14 +163,46 @@ fn conflict(elements: &[String]) -> String {
 /// # Errors
 /// [`ReduceError`], naming elements, where the position has no such system.
 pub fn reduce(behaviour: &Behaviour, position: &Position) -> Result<Lcs, ReduceError> {
+    reduce_in(behaviour, position, None)
+}
+
+/// As [`reduce`], with fast states apart from slow ones, those that move within `span` seconds: x is another basis than that of its
+/// names. What reads x through [`Storage`](super::Storage) and rows sees no difference but digits.
+///
+/// # Errors
+/// As [`reduce`].
+pub(crate) fn reduce_apart(
+    behaviour: &Behaviour,
+    position: &Position,
+    span: f64,
+) -> Result<Lcs, ReduceError> {
+    reduce_in(behaviour, position, Some(span))
+}
+
+fn reduce_in(
+    behaviour: &Behaviour,
+    position: &Position,
+    apart: Option<f64>,
+) -> Result<Lcs, ReduceError> {
     check(behaviour, position)?;
-    let balls = in_some_order(behaviour, behaviour.ball(), position)?;
-    let (lcs, precise) = publish(behaviour, position, &balls);
+    let (lcs, precise) = published(behaviour, behaviour.ball(), position, apart)?;
     if precise || behaviour.inexact {
         return Ok(lcs);
     }
-    let exact = in_some_order(behaviour, behaviour.rational(), position)?;
-    Ok(publish(behaviour, position, &exact).0)
+    Ok(published(behaviour, behaviour.rational(), position, apart)?.0)
+}
+
+fn published<F: Field>(
+    behaviour: &Behaviour,
+    reduced: &Reduced<F>,
+    position: &Position,
+    apart: Option<f64>,
+) -> Result<(Lcs, bool), ReduceError> {
+    let mut reduction = in_some_order(behaviour, reduced, position)?;
+    if let Some(span) = apart {
+        reduction.separate(span);
+    }
+    Ok(publish(behaviour, position, &reduction))
 }
 
 fn check(behaviour: &Behaviour, position: &Position) -> Result<(), ReduceError> {
@@ -246,6 +280,8 @@ type Constraint<F> = (Vec<F>, Vec<String>);
 struct Reduction<F> {
     /// Storage indices of the states.
     states: Vec<usize>,
+    /// States that stand for what decays fast, in order of elimination.
+    fast: Vec<usize>,
     /// The free pairs and their roles.
     pairs: Vec<(usize, Role)>,
     /// Rows over [x | λ | u | u' | 1]: x', one per state.

@@ -144,6 +144,7 @@ pub(super) fn publish<F: Field>(
     };
     let lcs = Lcs {
         title: behaviour.title.clone(),
+        fast: r.fast.clone(),
         states: r.states.iter().map(|&k| state(behaviour, k)).collect(),
         inputs: behaviour.sources.iter().map(|s| s.input.clone()).collect(),
         ports: r

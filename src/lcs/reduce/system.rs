@@ -80,6 +80,7 @@ impl<F: Field> Eliminated<'_, F> {
             energy,
             s: s.iter().map(|row| flow.finish(&frame, row).0).collect(),
             states: frame.states,
+            fast: Vec::new(),
             pairs: frame.pairs,
             metric: self.reduced.metric.clone(),
             notes,
