@@ -71,6 +71,10 @@ const GUARD_ROUNDING: f64 = 1e-12;
 /// part of the step's, the amplified rounding of the state 2¹² ε.
 pub(crate) const SHORT: f64 = 1.0 / 4096.0;
 
+/// A λ that is a derivative is made of magnitudes 1/SHORT times as large in a short step as in a whole one, another one of the same: what
+/// lies between these belongs to the latter up to here.
+const DIRECT: f64 = 16.0;
+
 /// Columns of z.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Columns {
@@ -161,6 +165,8 @@ pub(crate) struct StepMatrices {
     /// The solvers for M.
     pub driver: Driver,
     modes: Vec<FusedMode>,
+    /// See [`Self::back`], by active set.
+    back: Vec<(Vec<bool>, DMatrix<f64>)>,
 }
 
 /// K for one active set.
@@ -239,7 +245,50 @@ impl StepMatrices {
             after,
             driver,
             modes: Vec::new(),
+            back: Vec::new(),
         })
+    }
+
+    /// What a λ of this implicit step lacks to be that at its start, as rows over z: where λ follows from x and u at every instant,
+    /// D_aa λ + C x + G u + F = 0, the step has moved these by h(C x' + G u'), and a small resistance makes much of it. Where λ is what keeps
+    /// a constraint, it is that of a step. With M = D + h C W B the product M⁻¹ D M⁻¹ h(C x' + G u') is right for both.
+    pub(crate) fn back(&mut self, lcs: &Lcs, columns: &Columns, active: &[bool]) -> &DMatrix<f64> {
+        let at = self.back.iter().position(|(known, _)| known == active);
+        let at = at.unwrap_or_else(|| {
+            if self.back.len() == KEPT_MODES {
+                self.back.clear();
+            }
+            let rows = self.back_rows(lcs, columns, active);
+            self.back.push((active.to_vec(), rows));
+            self.back.len() - 1
+        });
+        &self.back[at].1
+    }
+
+    fn back_rows(&self, lcs: &Lcs, columns: &Columns, active: &[bool]) -> DMatrix<f64> {
+        let (lambda, solve) = self.lambda_rows(active);
+        let mut rows = DMatrix::zeros(self.m.nrows(), self.q.ncols());
+        if !solve.regular {
+            return rows;
+        }
+        let scale = DVector::from_iterator(
+            solve.indices.len(),
+            solve.indices.iter().map(|&j| self.scaling.d[j]),
+        );
+        let scale = DMatrix::from_diagonal(&scale);
+        let inverse = &scale * &solve.inverse * &scale;
+        let before = columns.rows(&lcs.c, &lcs.g, 0.0, &lcs.f);
+        let moved = &self.q - before + (&self.m - &lcs.d) * lambda;
+        let moved = moved.select_rows(&solve.indices);
+        let direct = lcs
+            .d
+            .select_rows(&solve.indices)
+            .select_columns(&solve.indices);
+        let back = &inverse * (direct * (&inverse * moved));
+        for (row, &j) in back.row_iter().zip(&solve.indices) {
+            rows.set_row(j, &row);
+        }
+        rows
     }
 
     /// The index of the fused mode of an active set, computed at its first use; and whether it was computed now.
@@ -298,18 +347,26 @@ impl StepMatrices {
         let x_next = &self.phi + &self.response * &lambda;
         let y = &self.m * &lambda + &self.q;
         // Blocking ports are tested at the end of the step, conducting ones by their λ. For γ < 1 that is not where y and λ
-        // belong: there y is that of a very short implicit step from the end.
+        // belong: there both are those of a very short implicit step from the end, but for a λ that makes a derivative, which
+        // would be made of its rounding.
         let y_size = self.m.abs() * lambda.abs() + self.q.abs();
+        let mut guards = (lambda.clone(), self.lambda_sizes(&solve));
         let (y_end, y_end_size) = match &self.after {
             None => (y.clone(), y_size.clone()),
             Some(after) => {
-                let (lambda, _) = after.lambda_rows(active);
+                let (lambda, solve) = after.lambda_rows(active);
                 let end = columns.end_rows(&x_next);
+                let lambda_size = after.lambda_sizes(&solve) * end.abs();
+                for &j in &solve.indices {
+                    if lambda_size.row(j).amax() <= DIRECT * guards.1.row(j).amax() {
+                        guards.0.set_row(j, &(lambda.row(j) * &end));
+                        guards.1.set_row(j, &lambda_size.row(j));
+                    }
+                }
                 let size = (after.m.abs() * lambda.abs() + after.q.abs()) * end.abs();
                 ((&after.m * lambda + &after.q) * end, size)
             }
         };
-        let lambda_size = self.lambda_sizes(&solve);
         let extra = if solve.regular {
             0
         } else {
@@ -320,7 +377,7 @@ impl StepMatrices {
         (0..n).for_each(|i| k.extend(x_next.row(i).iter()));
         for (j, &conducts) in active.iter().enumerate().take(m) {
             let (guard, size) = if conducts {
-                (&lambda, &lambda_size)
+                (&guards.0, &guards.1)
             } else {
                 (&y_end, &y_end_size)
             };

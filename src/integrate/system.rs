@@ -104,6 +104,21 @@ impl System {
         self.matrices[step].mode(&self.lcs, &self.columns, active)
     }
 
+    /// Takes λ of a short implicit step from z on an active set back to its start, see [`StepMatrices::back`].
+    pub(crate) fn take_back(
+        &mut self,
+        step: usize,
+        active: &[bool],
+        z: &[f64],
+        lambda: &mut [f64],
+    ) {
+        let back = self.matrices[step].back(&self.lcs, &self.columns, active);
+        for (j, l) in lambda.iter_mut().enumerate().filter(|(j, _)| active[*j]) {
+            let change: f64 = back.row(j).iter().zip(z).map(|(a, b)| a * b).sum();
+            *l = (*l + change).max(0.0);
+        }
+    }
+
     /// The physical storage vector s of a state.
     pub(crate) fn storage(&self, x: &[f64], u: &[f64]) -> DVector<f64> {
         let storage = &self.lcs.storage;

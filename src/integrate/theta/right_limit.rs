@@ -126,10 +126,13 @@ impl Theta {
         let noise = |k| amplitudes.rounding(&system.lcs, k);
         if fused.step(z, n, out, noise) && fused.is_strict(z, &out[n..]) {
             fused.lambda(&out[n..], lambda);
+            system.take_back(step, &now.active, z, lambda);
             return Ok(());
         }
         let solution = self.right_limit()?;
         self.lambda.copy_from_slice(solution.lambda.as_slice());
+        let system = &mut self.plant.systems[self.now.system].1;
+        system.take_back(step, &solution.basis, &self.z, &mut self.lambda);
         Ok(())
     }
 
