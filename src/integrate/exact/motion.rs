@@ -421,7 +421,10 @@ impl Motion {
                     }
                 } else {
                     match self.crossing(flow, flow.step(level)) {
-                        Some(part) => barrier = units - (part * span as f64) as u128,
+                        // A part of 1 and rounding may be more units than are left.
+                        Some(part) => {
+                            barrier = units.saturating_sub((part * span as f64) as u128);
+                        }
                         None => needed = level + 1,
                     }
                     level += 1;
