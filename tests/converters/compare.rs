@@ -503,17 +503,24 @@ pub(crate) fn resumed(case: &Case, base: &Base, seed: u64) -> Outcome {
             "steps are further off than they state, finer ones agree".into(),
         );
     }
-    if difference <= AGREES + 2.0 * stated {
+    with_itself(
+        difference,
+        2.0 * stated,
+        format!("taken up again: {what} ({method})"),
+        method,
+    )
+}
+
+/// The outcome of `circ` against itself, where both runs state so much error together.
+fn with_itself(difference: f64, stated: f64, what: String, method: String) -> Outcome {
+    if difference <= AGREES + stated {
         Outcome::Agrees {
             difference,
             error: 0.0,
             method,
         }
     } else {
-        Outcome::Differs {
-            difference,
-            what: format!("taken up again: {what} ({method})"),
-        }
+        Outcome::Differs { difference, what }
     }
 }
 
@@ -564,16 +571,6 @@ pub(crate) fn unchanged(
     let (difference, what) = difference(&other, &rows, &signals, floors(circuit));
     let ((one, error), (two, other_error)) = (method(&base.run), method(&second));
     let method = format!("{one}, {two}");
-    Some(if difference <= AGREES + error + other_error {
-        Outcome::Agrees {
-            difference,
-            error: 0.0,
-            method,
-        }
-    } else {
-        Outcome::Differs {
-            difference,
-            what: format!("{}: {what} ({method})\n{}", change.name, change.text),
-        }
-    })
+    let what = format!("{}: {what} ({method})\n{}", change.name, change.text);
+    Some(with_itself(difference, error + other_error, what, method))
 }
