@@ -71,9 +71,10 @@ pub(super) fn all(facts: &Facts) -> Option<Vec<Equilibrium>> {
             Status::Infeasible(_) => return Some(Vec::new()),
             Status::Failed => return None,
         }
-        let (lambda, only) = driver.least_norm(&lcp.q, &solution);
+        let least = driver.least_norm(&lcp.q, &solution);
+        let lambda = least.solution.lambda;
         let x = at(&lambda);
-        let unique = if driver.is_monotone() && only {
+        let unique = if driver.is_monotone() && least.unique {
             Some(true)
         } else {
             unique(1)

@@ -26,6 +26,26 @@ impl Note {
     }
 }
 
+impl Note {
+    /// These devices share a current or a voltage in a proportion that the ideal model leaves open.
+    pub(crate) fn shared(devices: &[String]) -> Self {
+        let text = format!(
+            "voltages or currents of {} are not determined by the ideal model; the least-norm choice is shown",
+            devices.join(", ")
+        );
+        Self::of(devices, text)
+    }
+}
+
+/// Adds what was not said yet.
+pub(super) fn append(notes: &mut Vec<Note>, more: Vec<Note>) {
+    for note in more {
+        if !notes.contains(&note) {
+            notes.push(note);
+        }
+    }
+}
+
 /// Something about the run as a whole.
 impl From<String> for Note {
     fn from(text: String) -> Self {

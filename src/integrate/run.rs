@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::circuit::Tran;
 use crate::diagnostic::Internal;
 use crate::integrate::event::{Change, Event};
+use crate::integrate::note;
 use crate::integrate::rows::{Asked, RowKind, Sheet};
 use crate::integrate::{Energy, Impulse, Note, Run, StateJump, StateJumps, StatedError, Stats};
 use crate::lcs::ReduceError;
@@ -578,9 +579,9 @@ pub(crate) fn attempt(
             report(times.at(k - 1));
         }
     }
-    let mut outcome = stepper.finish();
+    let outcome = stepper.finish();
     let mut all_notes = notes;
-    all_notes.append(&mut outcome.notes);
+    note::append(&mut all_notes, outcome.notes);
     if log.events.len() == Log::LISTED {
         all_notes.push(format!("the first {} events are listed", Log::LISTED).into());
     }

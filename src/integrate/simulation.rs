@@ -11,6 +11,7 @@ use crate::integrate::energy::Balance;
 use crate::integrate::event::Event;
 use crate::integrate::exact::Place;
 use crate::integrate::handover::Handover;
+use crate::integrate::note;
 use crate::integrate::run::{Log, Reason, SimError, Stepper};
 use crate::integrate::simulate::{Method, Problem, SimOptions, check, controlled};
 use crate::integrate::stats::{Impulse, Run, StateJumps, Stats};
@@ -418,7 +419,7 @@ impl Simulation {
         way.carry_on(self.way.balance());
         let outcome = self.way.stepper().finish();
         self.spent.add(&outcome.stats);
-        self.notes.extend(outcome.notes);
+        note::append(&mut self.notes, outcome.notes);
         (self.way, self.problem) = (way, problem);
         self.take(log);
         Ok(())
@@ -487,9 +488,9 @@ impl Simulation {
     /// Counters, energy, jumps and notes of all that was simulated; without rows and events, which the caller has.
     #[must_use]
     pub fn finish(mut self) -> Run {
-        let mut outcome = self.way.stepper().finish();
+        let outcome = self.way.stepper().finish();
         self.spent.add(&outcome.stats);
-        self.notes.append(&mut outcome.notes);
+        note::append(&mut self.notes, outcome.notes);
         Run {
             method: match self.way {
                 Way::Exact(_) => Method::Exact.name().into(),

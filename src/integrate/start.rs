@@ -351,12 +351,12 @@ fn devices(
             return Err(SimError::before(reason).device(device));
         }
     }
-    let (lambda, unique) = driver.least_norm(q, &solution);
-    if !unique {
-        let text = "voltages or currents of devices are not determined by the ideal model; the least-norm choice is shown";
-        notes.push(text.to_string().into());
+    let least = driver.least_norm(q, &solution);
+    if !least.chosen.is_empty() {
+        let devices = least.chosen.iter().map(|&j| lcs.ports[j].device.clone());
+        notes.push(Note::shared(&devices.collect::<Vec<_>>()));
     }
-    Ok((lambda, solution.active))
+    Ok((least.solution.lambda, least.solution.active))
 }
 
 fn check_constraints(lcs: &Lcs, at: Point<'_>) -> Result<(), SimError> {

@@ -32,6 +32,17 @@ pub struct Driver {
     pub factorisations: u64,
 }
 
+/// See [`Driver::least_norm`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct LeastNorm {
+    /// The least-norm member.
+    pub solution: Solution,
+    /// Whether there is no other.
+    pub unique: bool,
+    /// The ports with a positive λ or y that another member has otherwise: what the ideal model leaves open.
+    pub chosen: Vec<usize>,
+}
+
 /// A residual at which no other method is asked for a better one: a few roundings of a solve.
 const ROUNDING: f64 = 1e-13;
 
@@ -180,25 +191,44 @@ impl Driver {
         best
     }
 
-    /// The least-norm member of the solution set that `solution` belongs to, and whether the set is a single point. For
-    /// matrices that are not monotone the solution is returned as it is, and counted as unique where M_aa is regular; with curved laws
-    /// it is returned as it is.
+    /// The member with the least Σ λ_j² + y_j² of the solution set that `solution` belongs to. For matrices that are not monotone the
+    /// solution is returned as it is, and counted as unique where M_aa is regular; with curved laws it is returned as it is.
     #[must_use]
-    pub fn least_norm(&mut self, q: &DVector<f64>, solution: &Solution) -> (DVector<f64>, bool) {
+    pub fn least_norm(&mut self, q: &DVector<f64>, solution: &Solution) -> LeastNorm {
+        let ones = DVector::from_element(self.size(), 1.0);
+        self.least_norm_in(&ones, q, solution)
+    }
+
+    /// The same where λ_j is `units[j]` and y_j is 1/`units[j]` of what the norm is to see.
+    pub(super) fn least_norm_in(
+        &mut self,
+        units: &DVector<f64>,
+        q: &DVector<f64>,
+        solution: &Solution,
+    ) -> LeastNorm {
+        let as_it_is = |unique| LeastNorm {
+            solution: solution.clone(),
+            unique,
+            chosen: Vec::new(),
+        };
         if self.lawful.is_some() {
-            return (solution.lambda.clone(), true);
+            return as_it_is(true);
         }
         self.scaled.q = q.component_mul(&self.scaling.d);
         let scaled = solution.lambda.component_div(&self.scaling.d);
         let y = self.scaled.y(&scaled);
+        let units = units.component_mul(&self.scaling.d);
         if let Some(parts) = &mut self.parts {
             let solution = Solution {
                 lambda: scaled,
                 y,
                 ..solution.clone()
             };
-            let (lambda, unique) = parts.least_norm(&self.scaled.q, &solution);
-            return (self.scaling.unscale(&lambda), unique);
+            let found = parts.least_norm(&units, &self.scaled.q, &solution);
+            return LeastNorm {
+                solution: self.in_own_units(found.solution),
+                ..found
+            };
         }
         let scale = scaled.amax().max(self.scaled.q.amax());
         let strict = scaled
@@ -207,16 +237,21 @@ impl Driver {
             .all(|(l, w)| l.max(*w) > self.tolerance * scale);
         let regular = self.on_set(&solution.basis).regular;
         if !self.monotone || (strict && regular) {
-            return (solution.lambda.clone(), regular);
+            return as_it_is(regular);
         }
-        let (lambda, unique) = norm::least(&self.scaled, &scaled);
-        let lambda = self.scaling.unscale(&lambda);
+        let least = norm::least(&self.scaled, &scaled, &units);
         let basis = solution.basis.clone();
-        let found = self.candidate(lambda.component_div(&self.scaling.d), basis, solution.by);
-        if found.residual <= self.tolerance {
-            (found.lambda, unique)
-        } else {
-            (solution.lambda.clone(), unique)
+        let found = self.candidate(least.lambda, basis, solution.by);
+        if least.chosen.is_empty() && least.unique || found.residual > self.tolerance {
+            return as_it_is(least.unique);
+        }
+        LeastNorm {
+            solution: Solution {
+                status: Status::Solved,
+                ..found
+            },
+            unique: least.unique,
+            chosen: least.chosen,
         }
     }
 

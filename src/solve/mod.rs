@@ -26,6 +26,6 @@ pub mod norm;
 mod parts;
 pub mod pivot;
 
-pub use driver::Driver;
+pub use driver::{Driver, LeastNorm};
 pub use lawful::PortLaw;
 pub use lcp::{Answered, Lcp, Solution, Status};

@@ -2,8 +2,8 @@
 //!
 //! Parallel diodes share a current in any proportion. For M + Mᵀ ⪰ 0 the solution set is the polyhedron
 //! {λ ≥ 0, Mλ + q ≥ 0, (M + Mᵀ)(λ − λ*) = 0, qᵀ(λ − λ*) = 0} (Cottle-Pang-Stone 3.1.7): every λ* + Z w with Z a basis of the
-//! common kernel. Its point of least norm is a least-distance problem, solved by nonnegative least squares
-//! (Lawson-Hanson, chapter 23).
+//! common kernel. Of these the one with the least Σ λ_j² + y_j² is taken: which of two equal devices has its current in λ and which in
+//! y makes no difference to it. It is a least-distance problem, solved by nonnegative least squares (Lawson-Hanson, chapter 23).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -12,15 +12,29 @@ use super::lcp::Lcp;
 /// Singular values below this multiple of the largest count as zero (M equilibrated).
 const RANK: f64 = 1e-10;
 
-/// The least-norm solution, and whether it is the only one. `lcp` is equilibrated and monotone, `lambda` solves it.
-///
-/// The norm is that of the equilibrated λ, which within ports of equal scale (parallel devices) is the plain one.
-#[must_use]
-pub fn least(lcp: &Lcp, lambda: &DVector<f64>) -> (DVector<f64>, bool) {
+/// The least-norm member of a solution set.
+#[derive(Debug, Clone)]
+pub(super) struct Least {
+    /// It.
+    pub lambda: DVector<f64>,
+    /// Whether the set has no other.
+    pub unique: bool,
+    /// The ports with a positive λ or y that another member has otherwise: what the norm has chosen.
+    pub chosen: Vec<usize>,
+}
+
+/// The least-norm solution. `lcp` is equilibrated and monotone, `lambda` solves it; λ_j and y_j in their own units are `units[j]` and
+/// 1/`units[j]` times what stands here.
+pub(super) fn least(lcp: &Lcp, lambda: &DVector<f64>, units: &DVector<f64>) -> Least {
     let m = lcp.size();
+    let as_it_is = |unique| Least {
+        lambda: lambda.clone(),
+        unique,
+        chosen: Vec::new(),
+    };
     let scale = lambda.amax().max(lcp.q.amax());
     if scale == 0.0 {
-        return (lambda.clone(), true);
+        return as_it_is(true);
     }
     let mut equations = DMatrix::zeros(m + 1, m);
     equations
@@ -29,38 +43,66 @@ pub fn least(lcp: &Lcp, lambda: &DVector<f64>) -> (DVector<f64>, bool) {
     equations.set_row(m, &(lcp.q.transpose() / scale));
     let z = kernel(&equations);
     if z.ncols() == 0 {
-        return (lambda.clone(), true);
+        return as_it_is(true);
     }
-    // In units of `scale`: λ = base + Z w with base ⟂ Z, so ‖λ‖ is least where ‖w‖ is.
-    let base = (lambda - &z * (z.transpose() * lambda)) / scale;
-    let mut g = DMatrix::zeros(2 * m, z.ncols());
-    g.rows_mut(0, m).copy_from(&z);
-    g.rows_mut(m, m).copy_from(&(&lcp.m * &z));
-    let mut h = DVector::zeros(2 * m);
-    h.rows_mut(0, m).copy_from(&(-&base));
-    h.rows_mut(m, m)
-        .copy_from(&(-(&lcp.m * &base + &lcp.q / scale)));
-    // Entries at rounding level are zeros of λ or y: as inequalities they may not be contradicted by noise.
-    h.iter_mut()
-        .filter(|v| v.abs() < RANK)
-        .for_each(|v| *v = 0.0);
-    let Some(w) = least_distance(&g, &h) else {
-        return (lambda.clone(), false);
+    // In units of `scale`: (λ, y) = here + G w, of which nothing may be negative. Entries at rounding level are zeros: as inequalities
+    // they may not be contradicted by noise.
+    let stacked = |upper: &DMatrix<f64>, lower: &DMatrix<f64>| {
+        let mut all = upper.clone().resize_vertically(2 * m, 0.0);
+        all.rows_mut(m, m).copy_from(lower);
+        all
     };
-    let least = (base + &z * &w) * scale;
-    let here = z.transpose() * lambda / scale;
+    let g = stacked(&z, &(&lcp.m * &z));
+    let here = DVector::from_fn(2 * m, |i, _| {
+        let value = if i < m {
+            lambda[i]
+        } else {
+            lcp.m.row(i - m).transpose().dot(lambda) + lcp.q[i - m]
+        };
+        let value = value / scale;
+        if value.abs() < RANK { 0.0 } else { value }
+    });
+    // ‖W (here + G w)‖ = ‖R w + c‖ up to what w cannot change, with W G = Q R; v = R w + c.
+    let weight = DVector::from_fn(2 * m, |i, _| {
+        if i < m {
+            units[i]
+        } else {
+            units[i - m].recip()
+        }
+    });
+    let mut weighted = g.clone();
+    for mut column in weighted.column_iter_mut() {
+        column.component_mul_assign(&weight);
+    }
+    let qr = weighted.qr();
+    let (Some(inverse), c) = (
+        qr.r().try_inverse(),
+        qr.q().transpose() * here.component_mul(&weight),
+    ) else {
+        return as_it_is(false);
+    };
+    let to_v = &g * &inverse;
+    let Some(v) = least_distance(&to_v, &(&to_v * &c - &here)) else {
+        return as_it_is(false);
+    };
+    let w = inverse * (v - c);
+    let both = &here + &g * &w;
     // Unique if no direction of the kernel is feasible from the least-norm point (checked by its mirror problem).
-    let unique = (&w - &here).amax() < RANK && is_vertex(&g, &h, &w);
-    (
-        least.map(|v| {
-            if v.abs() < RANK * scale {
-                v.max(0.0)
+    let unique = w.amax() < RANK && is_vertex(&g, &-&here, &w);
+    let varies = |i: usize| both[i] > RANK && g.row(i).amax() > RANK;
+    Least {
+        lambda: DVector::from_fn(m, |j, _| {
+            if both[j].abs() < RANK {
+                0.0
             } else {
-                v
+                both[j] * scale
             }
         }),
         unique,
-    )
+        chosen: (0..m)
+            .filter(|&j| !unique && (varies(j) || varies(m + j)))
+            .collect(),
+    }
 }
 
 /// Whether {w : G w ≥ h} has no other point: the tight rows positively span the space. Decided by asking for the point of
@@ -190,29 +232,60 @@ mod tests {
     use super::*;
     use nalgebra::{dmatrix, dvector};
 
+    fn least_in_own_units(lcp: &Lcp, lambda: &DVector<f64>) -> Least {
+        least(lcp, lambda, &DVector::from_element(lambda.len(), 1.0))
+    }
+
     #[test]
     fn parallel_diodes_share_equally() {
         let lcp = Lcp {
             m: dmatrix![1.0, 1.0; 1.0, 1.0],
             q: dvector![-2.0, -2.0],
         };
-        let (lambda, unique) = least(&lcp, &dvector![2.0, 0.0]);
-        assert!((lambda - dvector![1.0, 1.0]).norm() < 1e-12);
-        assert!(!unique);
+        let found = least_in_own_units(&lcp, &dvector![2.0, 0.0]);
+        assert!((found.lambda - dvector![1.0, 1.0]).norm() < 1e-12);
+        assert!(!found.unique);
+        assert_eq!(found.chosen, [0, 1]);
     }
 
     #[test]
-    fn skew_segment_shrinks_to_its_end() {
-        // λ2 = 0, 0 ≤ λ1 ≤ 1.
+    fn parallel_diodes_share_equally_whichever_quantity_is_lambda() {
+        // λ2 = 0, 0 ≤ λ1 ≤ 1 is the current of one, y2 = 1 − λ1 that of the other.
         let lcp = Lcp {
             m: dmatrix![0.0, 1.0; -1.0, 0.0],
             q: dvector![0.0, 1.0],
         };
-        let (lambda, unique) = least(&lcp, &dvector![1.0, 0.0]);
-        assert!(lambda.norm() < 1e-12);
-        assert!(!unique);
-        // From the end itself the set is still a segment.
-        assert!(!least(&lcp, &dvector![0.0, 0.0]).1);
+        let found = least_in_own_units(&lcp, &dvector![1.0, 0.0]);
+        assert!((found.lambda - dvector![0.5, 0.0]).norm() < 1e-12);
+        assert!(!found.unique);
+        assert_eq!(found.chosen, [0, 1]);
+        // From an end the set is still a segment.
+        assert!(!least_in_own_units(&lcp, &dvector![0.0, 0.0]).unique);
+        // A current in milliamperes beside one in amperes: λ1 = 0.2 mA per unit, y2 = 1 / 0.2 of its unit.
+        let units = dvector![0.2, 5.0];
+        let scaled = Lcp {
+            m: dmatrix![0.0, 1.0; -1.0, 0.0],
+            q: dvector![0.0, 5.0],
+        };
+        let found = least(&scaled, &dvector![5.0, 0.0], &units);
+        assert!((found.lambda - dvector![2.5, 0.0]).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_diode_across_a_closed_switch_carries_nothing() {
+        // λ may be any current ≥ 0 that the switch beside it gives back: of that nothing is known here.
+        let lcp = Lcp {
+            m: dmatrix![0.0],
+            q: dvector![0.0],
+        };
+        let two = Lcp {
+            m: dmatrix![0.0, 0.0; 0.0, 1.0],
+            q: dvector![0.0, -1.0],
+        };
+        assert!(least_in_own_units(&lcp, &dvector![0.0]).chosen.is_empty());
+        let found = least_in_own_units(&two, &dvector![3.0, 1.0]);
+        assert!((found.lambda - dvector![0.0, 1.0]).norm() < 1e-12);
+        assert!(!found.unique && found.chosen.is_empty());
     }
 
     #[test]
@@ -221,9 +294,9 @@ mod tests {
             m: dmatrix![0.0, -1.0; 1.0, 0.0],
             q: dvector![2.0, -3.0],
         };
-        let (lambda, unique) = least(&lcp, &dvector![3.0, 2.0]);
-        assert!((lambda - dvector![3.0, 2.0]).norm() < 1e-12);
-        assert!(unique);
+        let found = least_in_own_units(&lcp, &dvector![3.0, 2.0]);
+        assert!((found.lambda - dvector![3.0, 2.0]).norm() < 1e-12);
+        assert!(found.unique && found.chosen.is_empty());
     }
 
     #[test]

@@ -4,7 +4,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Driver;
+use super::driver::{Driver, LeastNorm};
 use super::lcp::{Answered, Solution, Status};
 
 /// The drivers of the parts of M, with the ports each has; none where M is one part.
@@ -84,13 +84,18 @@ impl Parts {
         whole
     }
 
-    /// See [`Driver::least_norm`].
+    /// See [`Driver::least_norm_in`].
     pub(super) fn least_norm(
         &mut self,
+        units: &DVector<f64>,
         q: &DVector<f64>,
         solution: &Solution,
-    ) -> (DVector<f64>, bool) {
-        let (mut lambda, mut unique) = (solution.lambda.clone(), true);
+    ) -> LeastNorm {
+        let mut whole = LeastNorm {
+            solution: solution.clone(),
+            unique: true,
+            chosen: Vec::new(),
+        };
         for (group, driver) in &mut self.0 {
             let part = Solution {
                 status: Status::Solved,
@@ -101,14 +106,17 @@ impl Parts {
                 basis: group.iter().map(|&j| solution.basis[j]).collect(),
                 by: solution.by,
             };
-            let (least, alone) = driver.least_norm(&q.select_rows(&*group), &part);
-            group
-                .iter()
-                .zip(least.iter())
-                .for_each(|(&j, v)| lambda[j] = *v);
-            unique &= alone;
+            let [units, q] = [units, q].map(|all| all.select_rows(&*group));
+            let found = driver.least_norm_in(&units, &q, &part);
+            for (k, &j) in group.iter().enumerate() {
+                whole.solution.lambda[j] = found.solution.lambda[k];
+                whole.solution.y[j] = found.solution.y[k];
+                whole.solution.active[j] = found.solution.active[k];
+            }
+            whole.unique &= found.unique;
+            whole.chosen.extend(found.chosen.iter().map(|&k| group[k]));
         }
-        (lambda, unique)
+        whole
     }
 
     /// Factorisations computed so far.
@@ -170,11 +178,14 @@ mod tests {
             basis: vec![true, true],
             ..found
         };
-        assert_eq!(driver.least_norm(&q, &another), (dvector![0.0, 4.0], false));
+        let least = driver.least_norm(&q, &another);
+        assert_eq!(least.solution.lambda, dvector![0.0, 4.0]);
+        assert!(!least.unique && least.chosen.is_empty());
         let mut regular = Driver::new(dmatrix![1.0, 0.0; 0.0, 2.0], 1e-9);
         let found = regular.solve(&dvector![-1.0, -8.0]);
         let least = regular.least_norm(&dvector![-1.0, -8.0], &found);
-        assert_eq!(least, (dvector![1.0, 4.0], true));
+        assert_eq!(least.solution.lambda, dvector![1.0, 4.0]);
+        assert!(least.unique);
     }
 
     #[test]

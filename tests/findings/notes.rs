@@ -113,3 +113,38 @@ fn a_run_made_in_steps_in_the_place_of_exact_integration_says_so() {
         "{distance:e} {stated:e}"
     );
 }
+
+/// Two windings with k = 1 lie beside a diode: what it shares with the other one is not determined, and is the least-norm choice by
+/// every method; a symmetric pair of diodes shares equally, whatever the rest of the circuit makes of them.
+#[test]
+fn what_devices_share_is_the_least_norm_choice_by_every_method_and_is_said() {
+    let [exact, theta] =
+        [Method::Exact, Method::Theta].map(|method| changed("windings_share", &[], method));
+    for run in [&exact, &theta] {
+        let said = run
+            .notes
+            .iter()
+            .any(|note| note.elements == ["d1", "d3"] && note.text.contains("least-norm choice"));
+        assert!(said, "{:?}", run.notes);
+    }
+    let [by_events, by_steps] = [&exact, &theta].map(|run| column(run, "i(l5)"));
+    let largest = by_events.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    assert!(largest > 2.0, "{largest}");
+    for (a, b) in by_events.iter().zip(&by_steps) {
+        assert!((a - b).abs() < 1e-5 * largest, "{a} {b}");
+    }
+
+    for method in [Method::Exact, Method::Theta, Method::Euler] {
+        let run = changed("diodes_share", &[], method);
+        let [d1, d2, d3, d4] =
+            ["i(d1)", "i(d2)", "i(d3)", "i(d4)"].map(|probe| column(&run, probe));
+        for k in 0..d1.len() {
+            assert!(
+                (d1[k] - d2[k]).abs() < 1e-6 && (d3[k] - d4[k]).abs() < 1e-12,
+                "{method:?} {k}"
+            );
+            assert!((d3[k] - 0.5).abs() < 1e-12, "{method:?} {k}");
+        }
+        assert!(d1[2] > 0.1, "{method:?} {}", d1[2]);
+    }
+}

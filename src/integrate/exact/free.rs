@@ -134,7 +134,8 @@ impl Free {
         if solution.status != Status::Solved {
             return None;
         }
-        let pairs = lcs.ports.iter().zip(&solution.active);
+        let active = driver.least_norm(&q, &solution).solution.active;
+        let pairs = lcs.ports.iter().zip(&active);
         let conducts =
             pairs.map(|(port, active)| active.map(|active| active == (port.role != Role::Voltage)));
         Some(Proposal(conducts.collect()))

@@ -196,8 +196,8 @@ pub(crate) struct Mode {
     pub(crate) outputs: Kernel,
     /// The rows that follow.
     pub(crate) rows: ahead::Rows,
-    /// Whether devices share currents or voltages that the ideal model does not determine.
-    pub(crate) shared: bool,
+    /// Pairs that share currents or voltages in a proportion that the ideal model does not determine.
+    pub(crate) shared: Vec<usize>,
     /// See [`Inspector`](super::inspect::Inspector).
     pub(crate) familiar: Familiar,
     /// What followed: why it was left and for which mode, the latest first.
@@ -257,8 +257,10 @@ impl Mode {
             .copy_from(exosystem.generator());
 
         let held = over_w(&lcs.held.guard, n, exosystem);
-        let shared = lcs.held.kernel.ncols() > 0;
-        let rays = shared.then(|| rays::extreme_rays(&lcs.held.kernel));
+        let kernel = &lcs.held.kernel;
+        let in_kernel = |&pair: &usize| kernel.row(pair).iter().any(|v| *v != 0.0);
+        let shared: Vec<usize> = (0..kernel.nrows()).filter(in_kernel).collect();
+        let rays = (kernel.ncols() > 0).then(|| rays::extreme_rays(kernel));
         let devices = match rays {
             Some(ref rays) => rays.as_ref()? * held,
             None => held,

@@ -45,14 +45,14 @@ impl Exact {
             let ended = self.accumulation.event(self.motion.t);
             self.notes.extend(ended.map(Note::from));
         }
-        if self.plant.modes[at].shared && !self.noted_shared {
+        if !self.plant.modes[at].shared.is_empty() && !self.noted_shared {
             self.noted_shared = true;
-            let text = format!(
-                "at t = {:e} s the ideal model leaves a current among conducting devices or a voltage among blocking ones \
-                 undetermined: the least-norm choice is shown",
-                self.motion.t
-            );
-            self.notes.push(text.into());
+            let pairs = self.plant.modes[at].shared.iter();
+            let mut devices: Vec<String> = pairs
+                .filter_map(|&pair| Some(self.plant.device(pair)?.to_string()))
+                .collect();
+            devices.dedup();
+            self.notes.push(Note::shared(&devices));
         }
         if jumped || !changes.is_empty() {
             log.event(self.motion.t, changes, jumped);

@@ -532,12 +532,8 @@ impl Stepper for Theta {
         self.stats.modes = self.modes.len().max(1) as u64;
         let mut notes = self.notes.clone();
         if !self.not_unique.is_empty() {
-            let names: Vec<&str> = self.not_unique.iter().map(String::as_str).collect();
-            let text = format!(
-                "voltages or currents of {} are not determined by the ideal model; the least-norm choice is shown",
-                names.join(", ")
-            );
-            notes.push(Note::of(names, text));
+            let devices: Vec<String> = self.not_unique.iter().cloned().collect();
+            notes.push(Note::shared(&devices));
         }
         self.settle_estimate();
         Outcome {

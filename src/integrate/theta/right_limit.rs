@@ -86,13 +86,12 @@ impl Theta {
             return Err(error);
         }
         let matrices = plant.systems[now.system].1.step_mut(step);
-        let (least, unique) = matrices.driver.least_norm(&q, &solution);
-        if !unique {
-            let lcs = &plant.systems[now.system].1.lcs;
-            let differs = (0..lcs.m()).filter(|&j| least[j] > 0.0 || solution.lambda[j] > 0.0);
-            self.not_unique
-                .extend(differs.map(|j| lcs.ports[j].device.clone()));
-            solution.lambda = least;
+        let least = matrices.driver.least_norm(&q, &solution);
+        if !least.unique {
+            let ports = &plant.systems[now.system].1.lcs.ports;
+            let chosen = least.chosen.iter().map(|&j| ports[j].device.clone());
+            self.not_unique.extend(chosen);
+            solution.lambda = least.solution.lambda;
         }
         Ok(solution)
     }
