@@ -217,12 +217,16 @@ fn nothing_is_accepted_that_is_no_solution() {
     assert!(solution.residual > 0.1);
 }
 
-/// A problem of a passive circuit: M = S + K with S ⪰ 0 of low rank, K skew with entries 0, ±1, and a known solution.
-fn passive(size: usize) -> impl Strategy<Value = (DMatrix<f64>, DVector<f64>, DVector<f64>)> {
+/// A problem of a passive circuit: M = S + K with S ⪰ 0 of low rank, K skew with entries 0, ±1, and a known solution; in units that
+/// differ by up to 2^(6 reach) in each port.
+fn passive(
+    size: usize,
+    reach: i32,
+) -> impl Strategy<Value = (DMatrix<f64>, DVector<f64>, DVector<f64>)> {
     let entries = proptest::collection::vec(-1.0..1.0_f64, size * size.div_ceil(2));
     let signs = proptest::collection::vec(-1..=1_i32, size * size);
     let parts = proptest::collection::vec((0..3_u8, 0.1..10.0_f64), size);
-    let scales = proptest::collection::vec(-6..7_i32, size);
+    let scales = proptest::collection::vec(-reach..=reach, size);
     (entries, signs, parts, scales).prop_map(move |(entries, signs, parts, scales)| {
         let f = DMatrix::from_iterator(size, size.div_ceil(2), entries);
         let k = DMatrix::from_fn(size, size, |i, j| match i.cmp(&j) {
@@ -255,7 +259,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: Some(Box::new(proptest::test_runner::FileFailurePersistence::WithSource("regressions"))), ..ProptestConfig::default() })]
 
     #[test]
-    fn passive_problems_are_solved_to_rounding((m, q, known) in (1..9_usize).prop_flat_map(passive)) {
+    fn passive_problems_are_solved_to_rounding((m, q, known) in (1..9_usize).prop_flat_map(|size| passive(size, 6))) {
         let solution = Driver::new(m.clone(), TOLERANCE).solve(&q);
         prop_assert_eq!(&solution.status, &Status::Solved);
         prop_assert!(solution.residual < 1e-11, "{}", solution.residual);
@@ -268,21 +272,24 @@ proptest! {
     }
 
     #[test]
-    fn the_oracle_agrees((m, q, _) in (1..6_usize).prop_flat_map(passive)) {
+    fn the_oracle_agrees((m, q, _) in (1..6_usize).prop_flat_map(|size| passive(size, 3))) {
         let mut driver = Driver::new(m.clone(), TOLERANCE);
         let solution = driver.solve(&q);
         let found = driver.least_norm(&q, &solution);
         let least = found.solution.lambda;
         let lcp = Lcp { m: m.clone(), q };
-        let all = enumerate::solve(&lcp, 1e-10);
+        let mut all = enumerate::solve(&lcp, 1e-10);
         prop_assert!(!all.is_empty());
+        // What solves to fewer digits may lie elsewhere.
+        let scaling = Scaling::of(&m);
+        all.retain(|l| scaling.residual(&lcp, l, &lcp.y(l)) < 1e-12);
         let both = |l: &DVector<f64>| l.norm().hypot(lcp.y(l).norm());
         let smallest = all.iter().map(both).fold(f64::INFINITY, f64::min);
         // Rounding is that of the equilibrated problem; the least norm is in its own units.
-        let d = Scaling::of(&m).d;
+        let d = scaling.d;
         let largest = least.component_div(&d).amax().max(lcp.q.component_mul(&d).amax());
         let rounding = 1e-9 * largest * d.amax().max(1.0 / d.amin());
-        prop_assert!(both(&least) <= smallest * (1.0 + 1e-6) + rounding, "{} {smallest}", both(&least));
+        prop_assert!(both(&least) <= smallest * (1.0 + 1e-7) + rounding, "{} {smallest}", both(&least));
         let size = |l: &DVector<f64>| l.component_div(&d).norm();
         if found.unique {
             prop_assert!(found.chosen.is_empty());
@@ -293,7 +300,7 @@ proptest! {
     }
 
     #[test]
-    fn least_norm_solves((m, q, _) in (1..8_usize).prop_flat_map(passive)) {
+    fn least_norm_solves((m, q, _) in (1..8_usize).prop_flat_map(|size| passive(size, 6))) {
         let mut driver = Driver::new(m.clone(), TOLERANCE);
         let solution = driver.solve(&q);
         let least = driver.least_norm(&q, &solution).solution.lambda;

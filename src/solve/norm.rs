@@ -52,7 +52,9 @@ pub(super) fn least(lcp: &Lcp, lambda: &DVector<f64>, units: &DVector<f64>) -> L
         all.rows_mut(m, m).copy_from(lower);
         all
     };
-    let g = stacked(&z, &(&lcp.m * &z));
+    let mut g = stacked(&z, &(&lcp.m * &z));
+    let rounding = g.iter_mut().filter(|v| v.abs() < RANK);
+    rounding.for_each(|v| *v = 0.0);
     let here = DVector::from_fn(2 * m, |i, _| {
         let value = if i < m {
             lambda[i]
@@ -82,10 +84,11 @@ pub(super) fn least(lcp: &Lcp, lambda: &DVector<f64>, units: &DVector<f64>) -> L
         return as_it_is(false);
     };
     let to_v = &g * &inverse;
-    let Some(v) = least_distance(&to_v, &(&to_v * &c - &here)) else {
-        return as_it_is(false);
-    };
-    let w = inverse * (v - c);
+    let nearest = least_distance(&to_v, &(&to_v * &c - &here));
+    // Where no point is found in units this far apart, the solution stands, as one of several.
+    let w = nearest
+        .as_ref()
+        .map_or(DVector::zeros(c.len()), |v| inverse * (v - c));
     let both = &here + &g * &w;
     // Unique if no direction of the kernel is feasible from the least-norm point (checked by its mirror problem).
     let unique = w.amax() < RANK && is_vertex(&g, &-&here, &w);
@@ -147,9 +150,19 @@ pub fn kernel(a: &DMatrix<f64>) -> DMatrix<f64> {
 #[must_use]
 pub fn least_distance(g: &DMatrix<f64>, h: &DVector<f64>) -> Option<DVector<f64>> {
     let (rows, n) = g.shape();
+    // An inequality holds at any length of its row, and w may be in any unit: rows of length 1, the largest distance 1.
+    let lengths = DVector::from_fn(rows, |i, _| match g.row(i).norm() {
+        0.0 => 1.0,
+        length => length,
+    });
+    let far = h.component_div(&lengths);
+    let unit = if far.amax() > 0.0 { far.amax() } else { 1.0 };
     let mut e = DMatrix::zeros(n + 1, rows);
-    e.rows_mut(0, n).copy_from(&g.transpose());
-    e.set_row(n, &h.transpose());
+    for i in 0..rows {
+        e.view_mut((0, i), (n, 1))
+            .tr_copy_from(&(g.row(i) / lengths[i]));
+        e[(n, i)] = far[i] / unit;
+    }
     let mut f = DVector::zeros(n + 1);
     f[n] = 1.0;
     let u = nonnegative_least_squares(&e, &f);
@@ -157,7 +170,7 @@ pub fn least_distance(g: &DMatrix<f64>, h: &DVector<f64>) -> Option<DVector<f64>
     if r.norm() < RANK.sqrt() {
         return None;
     }
-    Some(-r.rows(0, n) / r[n])
+    Some(-r.rows(0, n) * (unit / r[n]))
 }
 
 /// min ‖E u − f‖ subject to u ≥ 0 (Lawson-Hanson, algorithm NNLS).
