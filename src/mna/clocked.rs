@@ -1,10 +1,10 @@
-//! Switches whose controls are sources that act on nothing else.
+//! Switches whose controls are straight sources alone.
 
-use super::{Behaviour, Column};
+use super::{Behaviour, Column, SourcePort};
 use crate::algebra::Field;
 use crate::circuit::source::Wave;
 
-/// A control that is a constant plus multiples of straight sources which drive nothing but switches.
+/// A control that is a constant plus multiples of piecewise straight sources, whatever the position.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SourceControl {
     /// The switch.
@@ -16,7 +16,7 @@ pub(crate) struct SourceControl {
 }
 
 impl Behaviour {
-    /// Which sources act through such controls alone, whatever the position, and those controls.
+    /// The controls of switches that are straight sources alone, and by source whether it acts through such controls and nowhere else.
     pub(crate) fn source_controls(&self) -> (Vec<bool>, Vec<SourceControl>) {
         let reduced = self.ball();
         let matrix = &reduced.matrix;
@@ -42,32 +42,21 @@ impl Behaviour {
             let controls = self.switches.iter().any(|s| s.control == k);
             k >= self.probes && power.all(|vanishes| vanishes) && (controls || self.is_power(k))
         };
-        let mut silent: Vec<bool> = self
-            .sources
-            .iter()
-            .map(|source| {
-                let (value, rate) = (place(source.value), source.rate.and_then(place));
-                let wave = &source.input.source.wave;
-                matches!(wave, Wave::Dc(_) | Wave::Pulse { .. } | Wave::Pwl { .. })
-                    && (0..reduced.equations).all(|row| !reads(row, value) && !reads(row, rate))
-                    && readings.clone().all(|row| !reads(row, rate))
-                    && readings.clone().all(|row| !reads(row, value) || idle(row))
-            })
-            .collect();
-        // The control of a switch as such a combination.
-        let control = |silent: &[bool], switch: usize| -> Option<SourceControl> {
+        let is_straight =
+            |wave: &Wave| matches!(wave, Wave::Dc(_) | Wave::Pulse { .. } | Wave::Pwl { .. });
+        let straight = |k: usize| is_straight(&self.sources[k].input.source.wave);
+        let control = |switch: usize| -> Option<SourceControl> {
             if self.switches[switch].latch.is_some() {
                 return None;
             }
             let row = reading(self.switches[switch].control);
             let (mut constant, mut terms) = (0.0, Vec::new());
             for c in nonzero(row) {
-                let is = |k: &usize| silent[*k] && place(self.sources[*k].value) == Some(c);
-                let input = (0..silent.len()).find(is);
-                match input {
+                let is = |&k: &usize| straight(k) && place(self.sources[k].value) == Some(c);
+                match (0..self.sources.len()).find(is) {
                     Some(input) => terms.push((input, matrix.at(row, c).to_f64())),
                     None if place(Behaviour::ONE) == Some(c) => {
-                        constant = matrix.at(row, c).to_f64()
+                        constant = matrix.at(row, c).to_f64();
                     }
                     None => return None,
                 }
@@ -79,26 +68,21 @@ impl Behaviour {
             })
         };
         let switches = 0..self.switches.len();
-        loop {
-            let found: Vec<SourceControl> = switches
-                .clone()
-                .filter_map(|switch| control(&silent, switch))
-                .collect();
-            let mixed = |input: usize| {
-                let value = place(self.sources[input].value);
-                switches.clone().any(|switch| {
-                    reads(reading(self.switches[switch].control), value)
-                        && !found.iter().any(|control| control.switch == switch)
-                })
-            };
-            let kept: Vec<bool> = (0..silent.len())
-                .map(|input| silent[input] && !mixed(input))
-                .collect();
-            if kept == silent {
-                return (silent, found);
-            }
-            silent = kept;
-        }
+        let controls: Vec<SourceControl> = switches.clone().filter_map(control).collect();
+        let silent = |(k, source): (usize, &SourcePort)| {
+            let (value, rate) = (place(source.value), source.rate.and_then(place));
+            let guarded = switches.clone().any(|switch| {
+                reads(reading(self.switches[switch].control), value)
+                    && controls.iter().all(|control| control.switch != switch)
+            });
+            straight(k)
+                && !guarded
+                && (0..reduced.equations).all(|row| !reads(row, value) && !reads(row, rate))
+                && readings.clone().all(|row| !reads(row, rate))
+                && readings.clone().all(|row| !reads(row, value) || idle(row))
+        };
+        let silent = self.sources.iter().enumerate().map(silent).collect();
+        (silent, controls)
     }
 
     fn is_power(&self, k: usize) -> bool {
@@ -141,26 +125,31 @@ mod tests {
         let (silent, controls) = found([&[("g", "2")], &[("d", "1")]], None);
         // vd has a load.
         assert_eq!(silent, [true, false]);
-        let gate = SourceControl {
-            switch: 0,
+        assert_eq!(controls, [control(0, &[(0, 2.0)]), control(1, &[(1, 1.0)])]);
+    }
+
+    fn control(switch: usize, terms: &[(usize, f64)]) -> SourceControl {
+        SourceControl {
+            switch,
             constant: 0.0,
-            terms: vec![(0, 2.0)],
-        };
-        assert_eq!(controls, [gate]);
+            terms: terms.to_vec(),
+        }
     }
 
     #[test]
-    fn a_gate_that_is_seen_elsewhere_is_none() {
-        let none = (vec![false, false], vec![]);
-        // A control that also reads a state, or a loaded source.
+    fn a_gate_that_is_seen_elsewhere_is_part_of_the_flow() {
+        let gate = control(0, &[(0, 1.0)]);
+        // By a control that also reads a state.
+        let both = found([&[("g", "1")], &[("g", "1"), ("a", "1")]], None);
+        assert_eq!(both, (vec![false, false], vec![gate.clone()]));
+        // By a probe.
+        let probed = found([&[("g", "1")], &[("a", "1")]], Some("v(g)"));
+        assert_eq!(probed, (vec![false, false], vec![gate]));
+        // Not where a control adds it to a loaded source.
+        let sum = found([&[("g", "1"), ("d", "1")], &[("a", "1")]], None);
         assert_eq!(
-            found([&[("g", "1")], &[("g", "1"), ("a", "1")]], None),
-            none
+            sum,
+            (vec![true, false], vec![control(0, &[(0, 1.0), (1, 1.0)])])
         );
-        assert_eq!(
-            found([&[("g", "1"), ("d", "1")], &[("a", "1")]], None),
-            none
-        );
-        assert_eq!(found([&[("g", "1")], &[("a", "1")]], Some("v(g)")), none);
     }
 }

@@ -8,8 +8,6 @@ use crate::integrate::run::Times;
 
 /// Rows of a long step at most.
 const MOST: usize = 1 << LONG;
-/// Rows of a step from one event to the next at most.
-const MOST_BETWEEN: f64 = 64.0;
 /// A mode's rows are tabulated after so many single ones for each dimension of w: before, that is more work than it spares.
 const PATIENCE: usize = 6;
 /// Entries of a table at most; rows of larger circuits cost so much that long steps spare little.
@@ -73,8 +71,6 @@ pub(super) struct Ahead {
     values: Vec<f64>,
     /// The time last asked for, s.
     pub(super) t: f64,
-    /// Where the step ends, s, and its energy, if it is one to where something is known to happen.
-    stop: Option<(f64, [f64; 2])>,
 }
 
 impl Ahead {
@@ -132,74 +128,26 @@ impl Exact {
         }
         let has = self.ahead.take(t, self.plant.output_step());
         if !has {
-            self.end_ahead(t);
+            self.end_ahead();
         }
         has
     }
 
-    /// Stands at the last row that was asked for, or at the end of the step where that is no later than `t`.
-    pub(super) fn end_ahead(&mut self, t: f64) {
+    /// Stands at the last row that was asked for.
+    pub(super) fn end_ahead(&mut self) {
         let Ahead { count, taken, .. } = self.ahead;
         self.ahead.count = 0;
         self.ahead.taken = 0;
-        let (last, stop) = (self.ahead.t, self.ahead.stop.take());
         if let (true, Some(at)) = (count > 0, self.mode) {
             let flow = &mut self.plant.modes[at].flow;
-            match stop {
-                None => self
-                    .motion
-                    .arrive(flow, &self.exosystem, taken, count, last),
-                Some((stop, energy)) if stop <= t + GRID_ULPS * f64::EPSILON * t.abs() => {
-                    self.motion
-                        .arrive_again(flow, &self.exosystem, stop, energy);
-                }
-                // It was clear as part of the long step.
-                Some(_) => {
-                    self.motion.travel(flow, &self.exosystem, last);
-                }
-            }
+            let last = self.ahead.t;
+            self.motion
+                .arrive(flow, &self.exosystem, taken, count, last);
         }
-    }
-
-    /// Steps from an event to where something is known to happen `next`, if that span recurs, over all rows between, `t` the first of
-    /// them.
-    fn stretch_ahead(&mut self, at: usize, t: f64, next: f64) -> bool {
-        let negligible = GRID_ULPS * f64::EPSILON * next.abs();
-        if self.motion.age > 0.0
-            || t <= self.motion.t + negligible
-            || next <= t + negligible
-            || next > self.until + negligible
-        {
-            return false;
-        }
-        let mode = &mut self.plant.modes[at];
-        let (flow, outputs, rows) = (&mut mode.flow, &mode.outputs, &mut mode.rows);
-        let h = flow.step(LONG);
-        let between = ((next - negligible - t) / h).floor();
-        if between >= MOST_BETWEEN || !rows.fits {
-            return false;
-        }
-        let count = between as usize + 1;
-        let (first, way) = (t - self.motion.t, rows.way(outputs, count));
-        let Some((span, energy)) = self.motion.leap_again(flow, next, first, Some(way)) else {
-            return false;
-        };
-        let ahead = &mut self.ahead;
-        ahead.values.resize(count * rows.columns, 0.0);
-        let w = &self.motion.now[..flow.dim()];
-        if !flow.rows_again(span, first, w, &mut ahead.values) {
-            return false;
-        }
-        (ahead.begin, ahead.t, ahead.stop) = (t - h, t, Some((next, energy)));
-        (ahead.count, ahead.taken) = (count, 1);
-        true
     }
 
     /// Steps over as many rows as nothing can happen on, `t` the first of them and `next` when something is known to happen.
     pub(super) fn step_ahead(&mut self, at: usize, t: f64, next: f64) -> bool {
-        if self.stretch_ahead(at, t, next) {
-            return true;
-        }
         let mode = &mut self.plant.modes[at];
         let (flow, outputs, rows) = (&mut mode.flow, &mode.outputs, &mut mode.rows);
         let h = flow.step(LONG);
@@ -251,8 +199,8 @@ mod tests {
         let clocked = |width| CLOCKED.replace("WIDTH", width);
         for (netlist, most) in [
             (RINGING.to_string(), 1000),
-            (clocked("4.7u"), 900),
-            (clocked("4.5u"), 900),
+            (clocked("4.7u"), 2600),
+            (clocked("4.5u"), 2600),
         ] {
             let circuit = circuit(&netlist);
             let run = |odd: usize| {

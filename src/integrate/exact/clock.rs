@@ -1,5 +1,4 @@
-//! Switches controlled by sources that act on nothing else: when they move is known before the run, and their sources have no
-//! part in the flow.
+//! Switches controlled by straight sources alone: when they move is known before the run, and no guard watches them.
 
 use super::stepper::SAME_TIME_ULPS;
 use crate::circuit::Source;
@@ -27,7 +26,7 @@ impl Line {
     }
 }
 
-/// A switch whose control is a constant plus multiples of straight sources that drive nothing but switches.
+/// A switch whose control is a constant plus multiples of straight sources.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Clock {
     /// The switch.

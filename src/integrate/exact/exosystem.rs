@@ -216,14 +216,6 @@ impl Exosystem {
         }
     }
 
-    /// Whether column k of z is a straight line between breakpoints.
-    pub(crate) fn is_straight(&self, k: usize) -> bool {
-        !matches!(
-            self.columns[k],
-            Column::Wave { .. } | Column::Quadrature | Column::Shared { .. }
-        )
-    }
-
     /// Length of z; z[0] = 1.
     pub(crate) fn dim(&self) -> usize {
         self.columns.len()

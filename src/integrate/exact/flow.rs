@@ -5,9 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use super::dense::Dense;
 use super::expm::{self, Ladders};
 use super::inspect::GROUP;
-use super::kernel::{BLOCK, Block, Kernel, SparseKernel};
+use super::kernel::{BLOCK, Kernel, SparseKernel};
 use super::mode::Sizes as RowSizes;
-use super::recurring::{Prepared, Recurring};
 use super::series::{MAX_DEGREE, Series};
 use super::spectrum::{Rate, Spectrum};
 use super::work::{Sizes, Term, Work};
@@ -52,10 +51,6 @@ pub(crate) struct Flow {
     steps: Vec<f64>,
     ladder: Ladders,
     levels: Vec<Option<Kernel>>,
-    recurring: Recurring,
-    /// Work space of spans that recur.
-    moved: Vec<f64>,
-    slopes: Vec<Block>,
     spectrum: Spectrum,
     work: Option<Work>,
     sizes: RowSizes,
@@ -110,9 +105,6 @@ impl Flow {
                 .collect(),
             ladder,
             levels: vec![None; bottom as usize + 1],
-            recurring: Recurring::default(),
-            moved: Vec::new(),
-            slopes: Vec::new(),
             spectrum,
             work: None,
             sizes: RowSizes::default(),
@@ -198,101 +190,6 @@ impl Flow {
         true
     }
 
-    /// Whether `t`, and where in it the first row is, recurs: the place of the span. Times within `same` are one where the second order
-    /// of what they differ by is rounding.
-    #[inline]
-    pub(crate) fn recurs(&mut self, t: [f64; 2], same: f64) -> Option<usize> {
-        let unit = self.steps[self.bottom as usize];
-        self.recurring.find(t, same.min(f64::EPSILON.sqrt() * unit))
-    }
-
-    /// Something happened on a span that recurs.
-    pub(crate) fn refuse(&mut self, span: usize) {
-        self.recurring.refuse(span);
-    }
-
-    /// As [`Self::leap`] over `t` seconds, which a span stands for that recurs, with these rows on the way; returns the energy (from
-    /// sources, dissipated), J.
-    pub(crate) fn leap_again(
-        &mut self,
-        span: usize,
-        t: f64,
-        rows: Option<Way<'_>>,
-        (w, next): (&[f64], &mut [f64]),
-        sizes: Sizes<'_>,
-    ) -> Option<[f64; 2]> {
-        let (generator, fast, ladder, work, loss) = (
-            &self.generator,
-            &self.fast,
-            &mut self.ladder,
-            &mut self.work,
-            &mut self.loss,
-        );
-        let dim = self.dim;
-        let ([time, _], prepared) = self.recurring.get(span, |[t, first]| {
-            let (increment, lost) =
-                Ladders::new(generator, fast, t, expm::SQUARED, 0).increment(0)?;
-            *loss = loss.max(lost.unwrap_or(0.0));
-            let energy = work.as_mut().map(|work| work.span(t, generator, sizes));
-            let mut whole = increment.clone();
-            whole.shift(1.0);
-            let mut slope = Dense::zeros(dim, dim);
-            slope.set_product(&Dense::of(generator), &whole);
-            let flow = Kernel::stacked(&[&increment, &slope]);
-            let rows = match rows {
-                Some(way) => {
-                    let step = ladder.increment(LONG)?.0;
-                    let mut ladder = Ladders::new(generator, fast, first, expm::SQUARED, 0);
-                    followed(way, &ladder.increment(0)?.0, &step)
-                }
-                None => Kernel::default(),
-            };
-            Some(Prepared { flow, energy, rows })
-        })?;
-        let off = t - time;
-        self.moved.resize(2 * dim, 0.0);
-        prepared.flow.apply(w, &mut self.moved);
-        let (increment, slope) = self.moved.split_at(dim);
-        let (next, guards) = next.split_at_mut(dim);
-        for (next, ((increment, slope), w)) in
-            next.iter_mut().zip(increment.iter().zip(slope).zip(w))
-        {
-            *next = w + (increment + off * slope);
-        }
-        self.rows_kernel.apply(next, guards);
-        Some(match (work, &prepared.energy) {
-            (Some(work), Some(forms)) => work.along_span(forms, off, w, generator, sizes),
-            _ => [0.0; 2],
-        })
-    }
-
-    /// The rows on the way of a span that was leapt over from w, the first of them after `first` seconds; `false` if it has other rows.
-    pub(crate) fn rows_again(
-        &mut self,
-        span: usize,
-        first: f64,
-        w: &[f64],
-        rows: &mut [f64],
-    ) -> bool {
-        let Some(([_, time], prepared)) = self.recurring.get(span, |_| None) else {
-            return false;
-        };
-        if prepared.rows.rows() != rows.len() {
-            return false;
-        }
-        // exp(𝒜 first) w = exp(𝒜 time) exp(𝒜 off) w
-        let off = first - time;
-        let blocks = self.dim.div_ceil(BLOCK);
-        self.slopes.resize(blocks, [0.0; BLOCK]);
-        self.generator_kernel.apply(w, &mut self.slopes);
-        self.moved.clear();
-        let slopes = self.slopes.as_flattened();
-        self.moved
-            .extend(w.iter().zip(slopes).map(|(w, slope)| w + off * slope));
-        prepared.rows.apply(&self.moved, rows);
-        true
-    }
-
     /// w' at w.
     pub(crate) fn rates_of(&self, w: &[f64], rates: &mut Vec<f64>) {
         rates.resize(self.dim.next_multiple_of(BLOCK), 0.0);
@@ -328,21 +225,12 @@ impl Flow {
         self.work.is_some()
     }
 
-    /// (from sources, dissipated) over 2^k steps of the deepest level from w, J.
-    pub(crate) fn energy(&mut self, k: u32, w: &[f64], sizes: Sizes<'_>) -> [f64; 2] {
-        let generator = &self.generator;
+    /// (from sources, dissipated) over h/2^level from w, J.
+    pub(crate) fn energy(&mut self, level: u32, w: &[f64], sizes: Sizes<'_>) -> [f64; 2] {
+        let (generator, k) = (&self.generator, self.bottom - level);
         self.work
             .as_mut()
             .map_or([0.0; 2], |work| work.over(k, w, generator, sizes))
-    }
-
-    /// See [`Work::may_join`].
-    #[inline]
-    pub(crate) fn may_join(&mut self, k: u32, sizes: Sizes<'_>) -> bool {
-        let generator = &self.generator;
-        self.work
-            .as_mut()
-            .is_some_and(|work| work.may_join(k, generator, sizes))
     }
 
     /// (from sources, dissipated) along the first `t` seconds of a Taylor series, `part` of its step, J.
@@ -551,57 +439,5 @@ mod tests {
         assert_eq!(values[..2], polynomial[2..4]);
         let rest = polynomial[4..].iter().map(|c| c.abs()).sum::<f64>();
         assert!((values[2] - rest).abs() < 1e-15);
-    }
-
-    /// So are the rows on its way, whatever the time of the first.
-    #[test]
-    fn a_span_that_recurs_is_travelled_to_rounding_whatever_its_time() {
-        let mut flow = oscillator(1e-3);
-        flow.set_work(vec![Term {
-            v: vec![1.0, 0.0],
-            i: vec![1.0, 0.0],
-            source: false,
-        }]);
-        let t: f64 = 3e-4;
-        let (first, outputs) = (2e-5, Kernel::new(&DMatrix::identity(2, 2)));
-        let rows = Way {
-            outputs: &outputs,
-            columns: 2,
-            rows: 3,
-        };
-        let span = (0..100)
-            .find_map(|_| flow.recurs([t, first], 1e-15))
-            .expect("a span");
-        let (mut next, amplitude) = (vec![0.0; 4], [1.0, 1.0]);
-        let sizes = Sizes {
-            amplitude: &amplitude,
-            power: 0.0,
-        };
-        for t in [t, t - 1e-13, t + 1e-13] {
-            let [_, dissipated] = flow
-                .leap_again(span, t, Some(rows), (&[1.0, 0.0], &mut next), sizes)
-                .unwrap();
-            let angle = 1e4 * t;
-            let (s, c) = angle.sin_cos();
-            for (a, b) in next.iter().zip([c, s, c, -1e4 * s]) {
-                assert!((a - b).abs() < 4e-15 * b.abs().max(1.0), "{a} {b}");
-            }
-            // ∫ cos² = (t + sin cos/ω)/2
-            let exact = 0.5 * (t + s * c * 1e-4);
-            assert!(
-                (dissipated - exact).abs() < 4e-15 * exact,
-                "{dissipated:e} {exact:e}"
-            );
-        }
-        let mut rows = [0.0; 6];
-        for first in [first, first - 1e-13, first + 1e-13] {
-            assert!(flow.rows_again(span, first, &[1.0, 0.0], &mut rows));
-            assert!(!flow.rows_again(span, first, &[1.0, 0.0], &mut [0.0; 4]));
-            for (k, row) in rows.as_chunks::<2>().0.iter().enumerate() {
-                let (s, c) = (1e4 * (first + k as f64 * 1e-3)).sin_cos();
-                let far = (row[0] - c).abs().max((row[1] - s).abs());
-                assert!(far < 1e-14, "{far:e}");
-            }
-        }
     }
 }

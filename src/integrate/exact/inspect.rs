@@ -14,8 +14,6 @@ pub(super) const GROUP: f64 = 128.0;
 pub(super) const SIMULTANEOUS: f64 = GROUP / NOISE;
 /// Event times are known to this many units in the last place.
 const TIME_ULPS: f64 = 8.0;
-/// Inspections after which the sizes of a mode are taken anew.
-const USES: u32 = 64;
 /// Ages from which on states follow the others that differ by this factor are of different levels: when the faster ones follow, the
 /// others still move.
 const LEVEL: f64 = 1e3;
@@ -68,13 +66,9 @@ pub(crate) struct Inspector {
     settled: Option<usize>,
 }
 
-/// How large things were when a mode was last looked at closely.
+/// How large things were when a mode was last inspected.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Familiar {
-    /// Amplitudes of the storage.
-    scale: Vec<f64>,
-    /// Those of x that come of them.
-    amplitude: Vec<f64>,
+pub(crate) struct Magnitudes {
     /// Amplitudes of w.
     pub(crate) sizes: Vec<f64>,
     /// Rounding of g and g' that comes of them.
@@ -83,27 +77,9 @@ pub(crate) struct Familiar {
     pub(crate) followers: Vec<Follower>,
     /// Where they do: one manifold for each [level](LEVEL) of their ages, the fastest alone first.
     manifolds: Vec<Manifold>,
-    /// How often it was enough to look at these.
-    uses: u32,
-    /// |w| that the storage's amplitudes have taken account of.
-    reached: Vec<f64>,
 }
 
-impl Familiar {
-    /// Whether w is as large as it was; now and then it is looked at closely again.
-    fn covers(&mut self, w: &[f64]) -> bool {
-        self.uses = (self.uses + 1) % USES;
-        let mut sizes = w.iter().zip(&self.sizes);
-        self.uses > 0 && self.sizes.len() == w.len() && sizes.all(|(w, size)| w.abs() <= *size)
-    }
-
-    /// Whether all guards of `[g | g']` are positive by more than noise, where times are known to `time`.
-    fn clear(&self, guards: &[f64], time: f64) -> bool {
-        let (g, slopes) = guards.split_at(guards.len() / 2);
-        let mut guards = g.iter().zip(slopes).zip(&self.noise);
-        guards.all(|((g, slope), noise)| *g > SIMULTANEOUS * noise + time * slope.abs())
-    }
-
+impl Magnitudes {
     /// Finds which states follow the others.
     fn find_followers(&mut self, flow: &Flow) {
         followers(
@@ -132,23 +108,6 @@ impl Familiar {
             )
         };
         self.manifolds = levels.iter().filter_map(manifold).collect();
-    }
-
-    /// How large w was so far, if it has grown by this: the state, the sources.
-    pub(crate) fn grown(&mut self, [x, z]: [&[f64]; 2]) -> Option<&[f64]> {
-        self.reached.resize(x.len() + z.len(), 0.0);
-        let (known_x, known_z) = self.reached.split_at_mut(x.len());
-        let within =
-            |now: &[f64], known: &[f64]| now.iter().zip(known).all(|(now, known)| now <= known);
-        if within(x, known_x) && within(z, known_z) {
-            return None;
-        }
-        for (known, now) in [(known_x, x), (known_z, z)] {
-            for (known, now) in known.iter_mut().zip(now) {
-                *known = known.max(*now);
-            }
-        }
-        Some(&self.reached)
     }
 }
 
@@ -203,28 +162,12 @@ impl Inspector {
                 return Finding::Inconsistent;
             }
         }
-        if mode.familiar.scale != scale {
-            let familiar = &mut mode.familiar;
-            familiar.scale.clear();
-            familiar.scale.extend_from_slice(scale);
-            mode.inject.largest(scale, &mut familiar.amplitude);
-            familiar.sizes.clear();
-        }
         mode.flow.read_guards(&mut self.w);
-        let (w, guards) = self.w.split_at(mode.flow.dim());
-        let known = mode.familiar.covers(w);
-        if known
-            && mode.constraints.is_empty()
-            && self.slips.is_empty()
-            && mode.familiar.clear(guards, time)
-        {
-            return Finding::Holds(Vec::new());
-        }
-        let (later, sizes) = (&self.later, &mut self.sizes);
-        sizes.clear();
-        sizes.extend(w.iter().map(|w| w.abs()));
-        for (size, amplitude) in sizes.iter_mut().zip(&mode.familiar.amplitude) {
-            *size = size.max(*amplitude);
+        mode.inject.largest(scale, &mut self.sizes);
+        self.sizes.resize(mode.flow.dim(), 0.0);
+        let (w, later, sizes) = (&self.w[..mode.flow.dim()], &self.later, &mut self.sizes);
+        for (size, w) in sizes.iter_mut().zip(w) {
+            *size = size.max(w.abs());
         }
         let broken = mode.constraints.row_iter().any(|row| {
             let value = |w: &[f64]| row.iter().zip(w).map(|(c, w)| c * w).sum::<f64>();
@@ -239,14 +182,12 @@ impl Inspector {
         if broken {
             return Finding::Inconsistent;
         }
-        if !known {
-            let familiar = &mut mode.familiar;
-            familiar.sizes.clone_from(sizes);
-            // Waves count with their amplitudes: they come back.
-            exosystem.envelope(z, &mut familiar.sizes[mode.n..]);
-            mode.flow.noise(&familiar.sizes, &mut familiar.noise);
-            familiar.find_followers(&mode.flow);
-        }
+        let magnitudes = &mut mode.magnitudes;
+        magnitudes.sizes.clone_from(sizes);
+        // Waves count with their amplitudes: they come back.
+        exosystem.envelope(z, &mut magnitudes.sizes[mode.n..]);
+        mode.flow.noise(&magnitudes.sizes, &mut magnitudes.noise);
+        magnitudes.find_followers(&mode.flow);
         self.read_drifts(mode, time);
         self.read_jets(mode);
         let mut leaving = Vec::new();
@@ -308,7 +249,7 @@ impl Inspector {
         self.w.extend_from_slice(z);
         self.sizes.clear();
         self.sizes.extend(self.w.iter().map(|w| w.abs()));
-        for (size, known) in self.sizes.iter_mut().zip(&mode.familiar.sizes) {
+        for (size, known) in self.sizes.iter_mut().zip(&mode.magnitudes.sizes) {
             *size = size.max(*known);
         }
         self.rates.clear();
@@ -320,7 +261,7 @@ impl Inspector {
         let w = &self.w[..mode.flow.dim()];
         mode.jets.values(w, &mut self.jets);
         mode.jets.largest(&self.sizes, &mut self.jet_sizes);
-        let manifolds = &mode.familiar.manifolds;
+        let manifolds = &mode.magnitudes.manifolds;
         let holds = |m: &Manifold| m.holds(w, &self.sizes, GROUP * f64::EPSILON, &self.rates);
         self.settled = manifolds.iter().rposition(holds);
         if let Some(at) = self.settled {
@@ -343,7 +284,7 @@ impl Inspector {
         };
         let g = self.jets[i];
         // What of a guard is a transient that is rounding decides nothing.
-        let manifold = self.settled.map(|at| &mode.familiar.manifolds[at]);
+        let manifold = self.settled.map(|at| &mode.magnitudes.manifolds[at]);
         let slow = manifold.is_some_and(|manifold| manifold.is_seen_by(i))
             && g.abs() <= GROUP * f64::EPSILON * self.jet_sizes[i] + drift(0);
         let (jets, sizes) = if slow {

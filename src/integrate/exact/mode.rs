@@ -9,10 +9,9 @@ use super::clock::Clock;
 use super::decouple::decoupled;
 use super::exosystem::Exosystem;
 use super::flow::Flow;
-use super::inspect::{Familiar, ORDERS};
+use super::inspect::{Magnitudes, ORDERS};
 use super::kernel::Kernel;
 use super::rays;
-use super::schedule::Drive;
 use super::transition::Trigger;
 use super::work::Term;
 use crate::integrate::event::Change;
@@ -79,9 +78,7 @@ pub(crate) struct SwitchFacts<'a> {
     pub(crate) thresholds: &'a [Threshold],
     /// Ron and 1/Roff of each sliding switch.
     pub(crate) limits: &'a [(f64, f64)],
-    /// Switches that sources alone drive.
-    pub(crate) drives: &'a [Drive],
-    /// Those whose sources do nothing else.
+    /// Switches that straight sources alone control.
     pub(crate) clocks: &'a [Clock],
 }
 
@@ -198,8 +195,8 @@ pub(crate) struct Mode {
     pub(crate) rows: ahead::Rows,
     /// Pairs that share currents or voltages in a proportion that the ideal model does not determine.
     pub(crate) shared: Vec<usize>,
-    /// See [`Inspector`](super::inspect::Inspector).
-    pub(crate) familiar: Familiar,
+    /// Of the latest inspection.
+    pub(crate) magnitudes: Magnitudes,
     /// What followed: why it was left and for which mode, the latest first.
     pub(crate) successors: Vec<(Trigger, usize)>,
     /// What the log says about a change from here to other modes.
@@ -241,7 +238,6 @@ impl Mode {
         let SwitchFacts {
             thresholds,
             limits,
-            drives,
             clocks,
         } = *switches;
         let (n, dz) = (lcs.n(), exosystem.dim());
@@ -282,20 +278,11 @@ impl Mode {
         for (k, row) in over_w(&lcs.controls, n, exosystem).row_iter().enumerate() {
             controls.set_row(published[k], &row);
         }
-        let driven = |i: usize| {
-            clocks.iter().any(|clock| clock.switch == i)
-                || drives.iter().any(|drive| {
-                    let row = controls.row(i);
-                    let (x, z) = row.columns_range_pair(..n, n..);
-                    drive.switch == i
-                        && x.iter().all(|v| *v == 0.0)
-                        && drive.is(z.clone_owned().as_slice())
-                })
-        };
+        let clocked = |i: usize| clocks.iter().any(|clock| clock.switch == i);
         let guarded = |i: &usize| {
             let threshold = &thresholds[*i];
             match threshold.latch {
-                None => !driven(*i),
+                None => !clocked(*i),
                 // Without a holding current the valve's guard is that of its current.
                 Some(_) => {
                     threshold.off_below > 0.0 && threshold.holds(key.switches[*i], &key.switches)
@@ -421,7 +408,7 @@ impl Mode {
             settled: decoupled.map(|decoupled| Kernel::new(&decoupled.from)),
             rows: ahead::Rows::new(lcs.outputs.names.len(), dim),
             shared,
-            familiar: Familiar::default(),
+            magnitudes: Magnitudes::default(),
             successors: Vec::new(),
             labels: Vec::new(),
             flow,

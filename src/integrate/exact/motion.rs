@@ -1,12 +1,11 @@
 //! Moving along a mode until a time or until a guard falls through zero.
 
 use super::exosystem::Exosystem;
-use super::flow::{Flow, LONG, Way};
-use super::inspect::{Familiar, SIMULTANEOUS, resolution};
+use super::flow::{Flow, LONG};
+use super::inspect::{Magnitudes, SIMULTANEOUS, resolution};
 use super::polynomial;
 use super::series::Series;
 use super::slaved::Follower;
-use super::spans::Spans;
 use super::work::Sizes;
 
 /// Table steps after which the exosystem is set from its closed form again.
@@ -28,6 +27,9 @@ fn larger(a: f64, b: f64) -> f64 {
 fn smaller(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
+
+/// Steps whose energy waits for the end of the mode, at most.
+const MOST_WAITING: usize = 1024;
 
 /// How a stretch ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,7 +67,10 @@ pub(crate) struct Motion {
     pub(crate) most: u64,
     /// Energy from sources and energy dissipated on Taylor's steps since last taken, J.
     energy: [f64; 2],
-    spans: Spans,
+    /// Levels of the steps of the table since then, and the states w that they began at: their energy waits for the amplitudes of the
+    /// whole way.
+    levels: Vec<u32>,
+    begins: Vec<f64>,
     /// Energy of the run over its duration, W.
     pub(crate) power: f64,
     next: Vec<f64>,
@@ -103,7 +108,7 @@ impl Motion {
     }
 
     /// Enters a mode at `t` at `[w | g | g']`.
-    pub(crate) fn enter(&mut self, flow: &Flow, t: f64, w: &[f64], familiar: &Familiar) {
+    pub(crate) fn enter(&mut self, flow: &Flow, t: f64, w: &[f64], magnitudes: &Magnitudes) {
         let dim = flow.dim();
         self.t = t;
         self.age = 0.0;
@@ -113,17 +118,17 @@ impl Motion {
         self.steady = flow.guards() == 0 && flow.step_limit(0.0) >= flow.step(LONG);
         self.barrier = f64::INFINITY;
         self.amplitude.clear();
-        self.amplitude.extend_from_slice(&familiar.sizes);
+        self.amplitude.extend_from_slice(&magnitudes.sizes);
         self.peak.clear();
         self.peak.extend(w[..flow.states()].iter().map(|v| v.abs()));
         let guards = &w[dim..dim + flow.guards()];
         self.slack.clear();
         self.slack.extend(guards.iter().map(|g| larger(-g, 0.0)));
-        self.followers.clone_from(&familiar.followers);
+        self.followers.clone_from(&magnitudes.followers);
         self.following = 0;
         self.note_next_follower();
         self.floors.clear();
-        self.floors.extend_from_slice(&familiar.noise);
+        self.floors.extend_from_slice(&magnitudes.noise);
         self.add_slack();
     }
 
@@ -134,7 +139,13 @@ impl Motion {
             amplitude: &self.amplitude,
             power: self.power,
         };
-        self.spans.drain(flow, sizes, &mut energy);
+        for (&level, w) in self.levels.iter().zip(self.begins.chunks_exact(flow.dim())) {
+            let [source, dissipated] = flow.energy(level, w, sizes);
+            energy[0] += source;
+            energy[1] += dissipated;
+        }
+        self.levels.clear();
+        self.begins.clear();
         energy
     }
 
@@ -198,9 +209,10 @@ impl Motion {
         value <= noise
     }
 
-    /// How large w can have been on the way here: the state, the sources.
-    pub(crate) fn reach(&self) -> [&[f64]; 2] {
-        [&self.peak, &self.amplitude[self.peak.len()..]]
+    /// How large w can have been on the way here.
+    pub(crate) fn reach(&self, reach: &mut Vec<f64>) {
+        reach.clone_from(&self.amplitude);
+        reach[..self.peak.len()].copy_from_slice(&self.peak);
     }
 
     /// Moves to `stop` or to the first guard that falls through zero before it.
@@ -274,84 +286,17 @@ impl Motion {
         if stop <= self.t {
             return Arrival::Reached;
         }
-        if !self.travel_again(flow, exosystem, stop) {
-            let arrival = self.climb(flow, exosystem, stop);
-            if arrival != Arrival::Reached {
-                return arrival;
-            }
+        let arrival = self.climb(flow, exosystem, stop);
+        if arrival == Arrival::Reached {
+            self.settles(flow);
         }
-        self.settles(flow);
-        Arrival::Reached
+        arrival
     }
 
     /// Whether steps of the output grid are short enough from here on.
     fn settles(&mut self, flow: &Flow) -> bool {
         self.steady |= flow.step_limit(self.age) >= flow.step(LONG);
         self.steady
-    }
-
-    /// One step to `stop` if that span recurs and nothing happens on it.
-    fn travel_again(&mut self, flow: &mut Flow, exosystem: &Exosystem, stop: f64) -> bool {
-        let same = GRID_ULPS * f64::EPSILON * stop.abs();
-        // The output step is in the table.
-        if (stop - self.t - flow.step(LONG)).abs() <= same {
-            return false;
-        }
-        let again = self.leap_again(flow, stop, 0.0, None);
-        if let Some((_, energy)) = again {
-            self.arrive_again(flow, exosystem, stop, energy);
-        }
-        again.is_some()
-    }
-
-    /// A step to `stop` if that span recurs, with these rows on the way, the first of them after `first` seconds, and nothing happens
-    /// on it: its place and its energy (from sources, dissipated). The motion stays where it is until [`Self::arrive_again`].
-    pub(crate) fn leap_again(
-        &mut self,
-        flow: &mut Flow,
-        stop: f64,
-        first: f64,
-        rows: Option<Way<'_>>,
-    ) -> Option<(usize, [f64; 2])> {
-        let rest = stop - self.t;
-        if rest > flow.step_limit(self.age) {
-            return None;
-        }
-        let same = GRID_ULPS * f64::EPSILON * stop.abs();
-        let span = flow.recurs([rest, first], same)?;
-        let sizes = Sizes {
-            amplitude: &self.amplitude,
-            power: self.power,
-        };
-        let ends = (&self.now[..], &mut self.next[..]);
-        let energy = flow.leap_again(span, rest, rows, ends, sizes)?;
-        if self.judge(flow, rest) == Verdict::Clear {
-            return Some((span, energy));
-        }
-        flow.refuse(span);
-        None
-    }
-
-    /// Ends [`Self::leap_again`].
-    pub(crate) fn arrive_again(
-        &mut self,
-        flow: &Flow,
-        exosystem: &Exosystem,
-        stop: f64,
-        energy: [f64; 2],
-    ) {
-        self.part(energy);
-        let steps = ((stop - self.t) / flow.step(LONG)).ceil();
-        self.age += stop - self.t;
-        self.take_next(flow, exosystem, stop, steps as u32);
-    }
-
-    /// Adds the energy (from sources, dissipated) of a step that is no span of the table.
-    fn part(&mut self, energy: [f64; 2]) {
-        for (sum, energy) in self.energy.iter_mut().zip(energy) {
-            *sum += energy;
-        }
-        self.spans.part();
     }
 
     /// Taylor's series for what the table of halved steps does not cover, then table steps that grow from small to large, each halved
@@ -480,7 +425,9 @@ impl Motion {
         };
         if flow.works() {
             let energy = flow.energy_of_series(&self.series, s, s * dt);
-            self.part(energy);
+            for (sum, energy) in self.energy.iter_mut().zip(energy) {
+                *sum += energy;
+            }
         }
         if fired.is_some() {
             self.series.at(s, &mut self.next[..dim]);
@@ -552,12 +499,11 @@ impl Motion {
     #[inline]
     fn accept(&mut self, flow: &mut Flow, exosystem: &Exosystem, level: u32, t: f64) {
         if flow.works() {
-            let k = flow.bottom() - level;
-            let sizes = Sizes {
-                amplitude: &self.amplitude,
-                power: self.power,
-            };
-            self.spans.push(k, &self.now, flow, sizes);
+            if self.levels.len() == MOST_WAITING {
+                self.energy = self.take_energy(flow);
+            }
+            self.levels.push(level);
+            self.begins.extend_from_slice(&self.now[..flow.dim()]);
         }
         self.age += flow.step(level);
         self.take_next(flow, exosystem, t, 1_u32 << LONG.saturating_sub(level));

@@ -26,7 +26,7 @@ pub(crate) struct Place {
 impl Exact {
     /// Where the run stands.
     pub(crate) fn stand(&mut self) -> Place {
-        self.end_ahead(f64::NEG_INFINITY);
+        self.end_ahead();
         self.take_storage();
         Place {
             t: self.motion.t,
@@ -68,7 +68,7 @@ impl Exact {
         if !self.started {
             self.start(log)?;
         }
-        self.end_ahead(f64::NEG_INFINITY);
+        self.end_ahead();
         self.take_storage();
         self.left_here.clear();
         self.inspector.forget_slips();
@@ -85,14 +85,9 @@ impl Exact {
             let i = clock.switch;
             clock.stand_at(&self.sources, t);
             key.switches[i] ^= clock.leaves(&self.plant.thresholds[i], key.switches[i], t);
-            clock.next = f64::INFINITY;
         }
         key.sliding.clear();
         self.corner = true;
-        self.move_driven(&mut key, t);
-        for clock in &mut self.plant.clocks {
-            clock.next = f64::NEG_INFINITY;
-        }
         self.move_guarded(&mut key, None, true);
         fire(&self.plant.thresholds, &mut key.switches);
         self.change(key, true, Trigger::Sources, log)
@@ -100,7 +95,7 @@ impl Exact {
 
     /// Ends in the present mode and tells where the run stands.
     pub(crate) fn leave(&mut self) -> Place {
-        self.end_ahead(f64::NEG_INFINITY);
+        self.end_ahead();
         self.take_storage();
         self.close_slides();
         self.mode = None;

@@ -8,7 +8,6 @@ use super::exosystem::Exosystem;
 use super::flow::longest_step;
 use super::free::Free;
 use super::mode::{Key, Mode, SwitchFacts};
-use super::schedule::Drive;
 use crate::integrate::run::SimError;
 use crate::integrate::switching::Threshold;
 use crate::lcs::Hold;
@@ -22,9 +21,7 @@ pub(crate) struct Plant {
     pub(crate) thresholds: Vec<Threshold>,
     /// By switch: the pair in series with a thyristor's.
     pub(crate) valves: Vec<Option<usize>>,
-    /// Switches that sources alone drive.
-    pub(crate) drives: Vec<Drive>,
-    /// Those whose sources do nothing else.
+    /// Switches that straight sources alone control.
     pub(crate) clocks: Vec<Clock>,
     h: f64,
     energy: bool,
@@ -47,7 +44,6 @@ impl Plant {
             valves: thresholds.iter().map(valve).collect(),
             thresholds,
             assembler: assembler.with_span(longest_step(h)),
-            drives: Vec::new(),
             clocks: Vec::new(),
             h,
             energy,
@@ -100,7 +96,6 @@ impl Plant {
             let facts = SwitchFacts {
                 thresholds: &self.thresholds,
                 limits: &limits,
-                drives: &self.drives,
                 clocks: &self.clocks,
             };
             Mode::new(key.clone(), &lcs, exosystem, &facts, self.h, self.energy)

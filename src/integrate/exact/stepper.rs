@@ -15,7 +15,6 @@ use super::mode::{Key, Owner};
 use super::motion::{Arrival, Motion};
 use super::plant::Plant;
 use super::report::{MOST_LOSS, Slides};
-use super::schedule::drives;
 use super::transition::{PATIENCE, PROPOSALS, Trigger};
 use crate::circuit::Source;
 use crate::integrate::Note;
@@ -67,8 +66,9 @@ pub struct Exact {
     pub(super) scale: Vec<f64>,
     /// ½ sᵀ M s of these, J.
     pub(super) capacity: f64,
-    /// How large the storage can have been since the last event.
+    /// How large w and the storage can have been since the last event.
     reach: Vec<f64>,
+    largest: Vec<f64>,
     pub(super) volts: Vec<bool>,
     /// By storage element: its name, and the unit of its state.
     pub(super) elements: Vec<String>,
@@ -154,15 +154,8 @@ impl Exact {
             .map(|control| Clock::new(control, &sources, t))
             .collect::<Option<_>>()
             .ok_or_else(unsupported)?;
-        plant.drives = drives(&lcs, &exosystem, &plant.clocks);
-        let latches = |i: usize| plant.thresholds[i].latch.is_some();
-        plant.drives.retain(|drive| !latches(drive.switch));
         let mut z = vec![0.0; exosystem.dim()];
         exosystem.write(t, &mut z);
-        for drive in &plant.drives {
-            let i = drive.switch;
-            position[i] ^= drive.leaves(&plant.thresholds[i], position[i], t, &z);
-        }
         for clock in &plant.clocks {
             let i = clock.switch;
             position[i] ^= clock.leaves(&plant.thresholds[i], position[i], t);
@@ -186,6 +179,7 @@ impl Exact {
             scale: vec![0.0; start.len()],
             capacity: 0.0,
             reach: vec![],
+            largest: vec![],
             volts,
             elements,
             units,
@@ -270,13 +264,12 @@ impl Exact {
             self.balance.add((source, dissipated));
             mode.storage_at(&self.motion.now, &mut self.storage);
             // An event often finds a current at zero: its size is what it was on the way.
-            if let Some(reach) = mode.familiar.grown(self.motion.reach()) {
-                mode.storage.largest(reach, &mut self.reach);
-                for (scale, reach) in self.scale.iter_mut().zip(&self.reach) {
-                    *scale = scale.max(*reach);
-                }
-                self.rescale();
+            self.motion.reach(&mut self.reach);
+            mode.storage.largest(&self.reach, &mut self.largest);
+            for (scale, largest) in self.scale.iter_mut().zip(&self.largest) {
+                *scale = scale.max(*largest);
             }
+            self.rescale();
             self.note_stored();
         }
     }
@@ -317,7 +310,7 @@ impl Exact {
         self.exosystem.write(t, &mut self.z);
         let mut key = std::mem::take(&mut self.key);
         if known {
-            discontinuous |= self.move_driven(&mut key, near);
+            discontinuous |= self.move_clocked(&mut key, near);
         }
         if discontinuous {
             key.sliding.clear();
@@ -343,20 +336,9 @@ impl Exact {
         Ok(())
     }
 
-    /// Moves the switches that sources alone drive and that are due before `near`; whether one moved.
-    pub(super) fn move_driven(&mut self, key: &mut Key, near: f64) -> bool {
+    /// Moves the switches that sources alone control and that are due before `near`; whether one moved.
+    pub(super) fn move_clocked(&self, key: &mut Key, near: f64) -> bool {
         let mut moved = false;
-        let guarded: &[usize] = self
-            .mode
-            .map_or(&[], |at| &self.plant.modes[at].guarded_switches);
-        for drive in &self.plant.drives {
-            let (i, on) = (drive.switch, key.switches[drive.switch]);
-            let leaves = || drive.leaves(&self.plant.thresholds[i], on, self.motion.t, &self.z);
-            if !guarded.contains(&i) && (drive.next <= near || leaves()) {
-                key.switches[i] = !on;
-                moved = true;
-            }
-        }
         for clock in &self.plant.clocks {
             if clock.next <= near {
                 key.switches[clock.switch] = !key.switches[clock.switch];
@@ -468,12 +450,6 @@ impl Exact {
     pub(super) fn look_ahead(&mut self) {
         let end = self.exosystem.next_breakpoint();
         (self.next_piece, self.next_stop) = (end, end);
-        for drive in &mut self.plant.drives {
-            let i = drive.switch;
-            let threshold = &self.plant.thresholds[i];
-            drive.look_ahead(threshold, self.key.switches[i], self.motion.t, &self.z, end);
-            self.next_stop = self.next_stop.min(drive.next);
-        }
         for clock in &mut self.plant.clocks {
             let i = clock.switch;
             let (threshold, on) = (&self.plant.thresholds[i], self.key.switches[i]);
@@ -578,7 +554,7 @@ impl Stepper for Exact {
     }
 
     fn finish(&mut self) -> Outcome {
-        self.end_ahead(f64::NEG_INFINITY);
+        self.end_ahead();
         self.take_storage();
         self.note_end();
         let mut outcome = Outcome {

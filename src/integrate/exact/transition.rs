@@ -4,7 +4,6 @@ use nalgebra::DVector;
 
 use super::inspect::Finding;
 use super::mode::{Key, Mode, Owner};
-use super::schedule::Drive;
 use super::stepper::Exact;
 use crate::integrate::run::{Log, Reason, SimError};
 use crate::integrate::settle;
@@ -46,7 +45,6 @@ impl Exact {
         let followed = self.follow(&key, trigger);
         if let Some((at, guards)) = &followed
             && guards.is_empty()
-            && self.misplaced(*at).next().is_none()
             && self.let_go(*at).next().is_none()
         {
             let at = *at;
@@ -134,7 +132,6 @@ impl Exact {
                 return Err(self.fail(Reason::Infeasible).devices(device));
             };
             key.closed.clone_from(&self.plant.modes[at].key.closed);
-            leaving.extend(self.misplaced(at));
             leaving.extend(self.let_go(at));
             leaving.sort_unstable();
             leaving.dedup();
@@ -147,6 +144,8 @@ impl Exact {
             {
                 leaving = first;
             }
+            // Settling may lead back to a position that was left.
+            let again = positions.contains(&key.switches);
             closed_sets.push(key.closed.clone());
             positions.push(key.switches.clone());
             for &i in &leaving {
@@ -156,12 +155,14 @@ impl Exact {
                 }
             }
             fire(&self.plant.thresholds, &mut key.switches);
-            if positions.contains(&key.switches) {
+            if again || positions.contains(&key.switches) {
                 // The switches that moved last contradict themselves, or all that moved contradict each other.
                 entry = self
                     .slide(key, &leaving, &closed_sets)
                     .or_else(|| self.slide(key, &moving, &closed_sets));
-                break;
+                if !again || entry.is_some() {
+                    break;
+                }
             }
             discontinuous = true;
         }
@@ -219,8 +220,10 @@ impl Exact {
         if self.energy {
             self.motion.power = self.capacity.max(self.balance.largest()) / self.duration;
         }
-        let Mode { flow, familiar, .. } = &self.plant.modes[at];
-        self.motion.enter(flow, t, &self.inspector.w, familiar);
+        let Mode {
+            flow, magnitudes, ..
+        } = &self.plant.modes[at];
+        self.motion.enter(flow, t, &self.inspector.w, magnitudes);
         self.look_ahead();
         if jumped {
             self.jumps += 1;
@@ -237,24 +240,6 @@ impl Exact {
                 log.corner(t, &self.row);
             }
         }
-    }
-
-    /// Switches that the sources alone move in mode `at` and that cannot stay as they are: in another position the control
-    /// was another one.
-    fn misplaced(&self, at: usize) -> impl Iterator<Item = usize> {
-        let mode = &self.plant.modes[at];
-        let wrong = move |i: usize, drive: &Drive| {
-            let on = mode.key.switches[i];
-            drive.leaves(&self.plant.thresholds[i], on, self.motion.t, &self.z)
-        };
-        let drives = self.plant.drives.iter().map(|drive| (drive.switch, drive));
-        drives
-            .filter(move |(i, drive)| {
-                !mode.guarded_switches.contains(i)
-                    && !mode.key.sliding.iter().any(|s| s.0 == *i)
-                    && wrong(*i, drive)
-            })
-            .map(|(i, _)| i)
     }
 
     /// Thyristors that hold themselves in mode `at` although their valves block.

@@ -16,12 +16,6 @@ use super::series::Series;
 const TERMS: usize = 15;
 /// ‖𝒜‖ t beyond which exp(𝒜t) is no longer squared but computed anew: what squaring loses is 2⁻⁵³ ‖𝒜‖ t.
 const STIFF: f64 = 1e5;
-/// Spans are joined while no coordinate can grow by more than this over them.
-const GROWTH: f64 = 1e6;
-/// Longer spans than so far are prepared when this many could have been joined to them: before, that is more work than it spares.
-const PATIENCE: u32 = 16;
-/// Spans are joined up to 2^this times the longest step.
-const LONGEST: u32 = 8;
 /// Rounding of a power below this part of the run's is no loss.
 const HARMLESS: f64 = 1e-13;
 /// Amplitudes below this part of the largest count as this large.
@@ -31,70 +25,30 @@ const OUTGROWN: f64 = 1e3;
 /// Rows below this part of the largest are rounding.
 const NOTHING: f64 = 1e-13;
 
-/// The rule of Gauss and Legendre with `P` points on [0, 1].
-struct Gauss<const P: usize> {
-    nodes: [f64; P],
-    weights: [f64; P],
-}
-
-/// Degrees up to which four and six points do. Where Taylor's series of this degree is exact to rounding its coefficients fall like those
-/// of an exponential, so that half the points that a product of two such polynomials takes in general integrate it to rounding.
-const SHORT: usize = 8;
-const MIDDLE: usize = 16;
-const FOUR: Gauss<4> = Gauss {
-    nodes: [
-        0.06943184420297371,
-        0.33000947820757187,
-        0.6699905217924281,
-        0.9305681557970263,
-    ],
-    weights: [
-        0.17392742256872692,
-        0.32607257743127305,
-        0.32607257743127305,
-        0.17392742256872692,
-    ],
-};
-const SIX: Gauss<6> = Gauss {
-    nodes: [
-        0.03376524289842399,
-        0.16939530676686773,
-        0.38069040695840156,
-        0.6193095930415985,
-        0.8306046932331322,
-        0.966234757101576,
-    ],
-    weights: [
-        0.08566224618958518,
-        0.1803807865240693,
-        0.23395696728634552,
-        0.23395696728634552,
-        0.1803807865240693,
-        0.08566224618958518,
-    ],
-};
-const EIGHT: Gauss<8> = Gauss {
-    nodes: [
-        0.019855071751231884,
-        0.10166676129318664,
-        0.2372337950418355,
-        0.4082826787521751,
-        0.591717321247825,
-        0.7627662049581645,
-        0.8983332387068134,
-        0.9801449282487681,
-    ],
-    weights: [
-        0.05061426814518813,
-        0.11119051722668724,
-        0.15685332293894363,
-        0.181341891689181,
-        0.181341891689181,
-        0.15685332293894363,
-        0.11119051722668724,
-        0.05061426814518813,
-    ],
-};
+/// Nodes and weights of the rule of Gauss and Legendre on [0, 1] with eight points. Where Taylor's series is exact to rounding its
+/// coefficients fall like those of an exponential, so that half the points that a product of two such polynomials takes in general
+/// integrate it to rounding.
+const POINTS: usize = 8;
+const NODES: [f64; POINTS] = [
+    0.019855071751231884,
+    0.10166676129318664,
+    0.2372337950418355,
+    0.4082826787521751,
+    0.591717321247825,
+    0.7627662049581645,
+    0.8983332387068134,
+    0.9801449282487681,
+];
+const WEIGHTS: [f64; POINTS] = [
+    0.05061426814518813,
+    0.11119051722668724,
+    0.15685332293894363,
+    0.181341891689181,
+    0.181341891689181,
+    0.15685332293894363,
+    0.11119051722668724,
+    0.05061426814518813,
+];
 
 /// How large things are in a run.
 #[derive(Debug, Clone, Copy)]
@@ -131,8 +85,6 @@ pub(crate) struct Work {
     /// ‖𝒜‖ is that of the mode; unit of time: h/2^bottom, s.
     unit: f64,
     bottom: u32,
-    /// How many spans could have been joined to longer ones than there are forms for.
-    asked: u32,
     forms: Option<Forms>,
 }
 
@@ -143,22 +95,12 @@ struct Forms {
     y: Vec<f64>,
     /// The amplitudes they were made for.
     amplitude: Vec<f64>,
-    /// Whether spans that recur are prepared over their y.
-    lasts: bool,
-    /// See [`Work`].
-    fast: Vec<usize>,
-    /// The generator over y, power out of sources, power dissipated.
-    generator: DMatrix<f64>,
-    powers: [Dense; 2],
-    /// A unit, and 2^this times it the longest span, s.
-    unit: f64,
-    longest: u32,
-    /// Their integrals over 2^k units, [Γ₀; Γ₁].
+    /// The integrals of power out of sources and power dissipated over 2^k units, [Γ₀; Γ₁].
     over: Vec<Kernel>,
     /// Γ y.
     products: Vec<f64>,
-    /// Where `over` ends, once it has begun.
-    latest: Option<Doubling>,
+    /// Where `over` ends.
+    latest: Doubling,
 }
 
 /// ∫₀ᵗ exp(𝒜ᵀs) Q exp(𝒜s) ds over y, for t that doubles.
@@ -192,18 +134,17 @@ impl Work {
             terms,
             unit: h * (-f64::from(bottom)).exp2(),
             bottom,
-            asked: 0,
             forms: None,
         })
     }
 
     fn forms(&mut self, generator: &DMatrix<f64>, sizes: Sizes<'_>) -> &mut Forms {
         let (terms, fast) = (&self.terms, &self.fast);
-        let (unit, longest) = (self.unit, self.bottom + LONGEST);
+        let (unit, bottom) = (self.unit, self.bottom);
         self.forms
             .take_if(|forms| forms.are_outgrown(sizes.amplitude));
         self.forms
-            .get_or_insert_with(|| Forms::new(terms, fast, generator, sizes, unit, longest))
+            .get_or_insert_with(|| Forms::new(terms, fast, generator, sizes, unit, bottom))
     }
 
     /// (from sources, dissipated) over 2^k units from w, J.
@@ -216,92 +157,23 @@ impl Work {
         sizes: Sizes<'_>,
     ) -> [f64; 2] {
         let forms = self.forms(generator, sizes);
-        if forms.over.len() <= k as usize {
-            forms.double_to(k);
-        }
+        forms.double_to(k);
         forms.y_of(w);
         products(&forms.over[k as usize], &forms.y, &mut forms.products)
     }
 
-    /// The forms of the energy over a span of `t` seconds and of the power at its end, for [`Self::along_span`].
-    pub(crate) fn span(
-        &mut self,
-        t: f64,
-        generator: &DMatrix<f64>,
-        sizes: Sizes<'_>,
-    ) -> [Kernel; 2] {
-        let forms = self.forms(generator, sizes);
-        forms.lasts = true;
-        forms.span(t)
-    }
-
-    /// (from sources, dissipated) from w over the span of these forms and `off` seconds more, J.
-    #[inline]
-    pub(crate) fn along_span(
-        &mut self,
-        span: &[Kernel; 2],
-        off: f64,
-        w: &[f64],
-        generator: &DMatrix<f64>,
-        sizes: Sizes<'_>,
-    ) -> [f64; 2] {
-        let forms = self.forms(generator, sizes);
-        forms.y_of(w);
-        let energy = products(&span[0], &forms.y, &mut forms.products);
-        let power = products(&span[1], &forms.y, &mut forms.products);
-        std::array::from_fn(|i| energy[i] + off * power[i])
-    }
-
-    /// Whether two spans of 2^k units may be taken as one of twice the length.
-    pub(crate) fn may_join(&mut self, k: u32, generator: &DMatrix<f64>, sizes: Sizes<'_>) -> bool {
-        let ready = self.forms.as_ref().map_or(0, |forms| forms.over.len());
-        if (k as usize) + 1 < ready {
-            return true;
-        }
-        if k >= self.bottom + LONGEST {
-            return false;
-        }
-        self.asked += 1;
-        if self.asked < PATIENCE {
-            return false;
-        }
-        self.asked = 0;
-        let forms = self.forms(generator, sizes);
-        let calm = forms.double_to(k).increment.amax() <= GROWTH;
-        if calm {
-            forms.double_to(k + 1);
-        }
-        calm
-    }
-
     /// ∫ v·i dt along the first `t` seconds of a Taylor series, `part` of its step.
     pub(crate) fn along_series(&mut self, series: &Series, part: f64, t: f64) -> [f64; 2] {
-        if series.degree() <= SHORT {
-            self.along(series, part, t, &FOUR)
-        } else if series.degree() <= MIDDLE {
-            self.along(series, part, t, &SIX)
-        } else {
-            self.along(series, part, t, &EIGHT)
-        }
-    }
-
-    fn along<const P: usize>(
-        &mut self,
-        series: &Series,
-        part: f64,
-        t: f64,
-        rule: &Gauss<P>,
-    ) -> [f64; 2] {
         let factors = 2 * self.terms.len();
-        let s = rule.nodes.map(|node| node * part);
+        let s = NODES.map(|node| node * part);
         self.at_nodes.clear();
-        self.at_nodes.resize(P * factors, 0.0);
-        let (values, _) = self.at_nodes.as_chunks_mut::<P>();
+        self.at_nodes.resize(POINTS * factors, 0.0);
+        let (values, _) = self.at_nodes.as_chunks_mut::<POINTS>();
         for (&j, column) in self.seen.iter().zip(self.factors.chunks_exact(factors)) {
             // w_j at the nodes, then its part of the factors.
             let w = series.component(j, s);
             for (value, &factor) in values.iter_mut().zip(column) {
-                for p in 0..P {
+                for p in 0..POINTS {
                     value[p] += factor * w[p];
                 }
             }
@@ -309,7 +181,7 @@ impl Work {
         let mut energy = [0.0; 2];
         let (pairs, _) = values.as_chunks::<2>();
         for (term, [v, i]) in self.terms.iter().zip(pairs) {
-            let power = (0..P).map(|p| rule.weights[p] * v[p] * i[p]);
+            let power = (0..POINTS).map(|p| WEIGHTS[p] * v[p] * i[p]);
             energy[usize::from(!term.source)] += power.sum::<f64>();
         }
         [-t * energy[0], t * energy[1]]
@@ -323,7 +195,7 @@ impl Forms {
         generator: &DMatrix<f64>,
         sizes: Sizes<'_>,
         unit: f64,
-        longest: u32,
+        bottom: u32,
     ) -> Self {
         let dim = generator.nrows();
         // At the start of a long chain amplitudes are so small that their products vanish.
@@ -382,26 +254,26 @@ impl Forms {
             power.ger(sign, &i.transpose(), &v.transpose(), 1.0);
         }
         let powers = powers.each_ref().map(Dense::of);
+        let latest = Doubling::new(
+            (&moved, fast),
+            &powers,
+            unit * f64::from(bottom).exp2(),
+            bottom,
+        );
         Self {
             to_y: Kernel::new(&to_y),
             y: vec![0.0; dim],
             amplitude: size,
-            lasts: false,
-            fast: fast.to_vec(),
-            generator: moved,
-            powers,
-            unit,
-            longest,
-            over: Vec::new(),
+            over: vec![latest.forms()],
             products: vec![0.0; 2 * dim],
-            latest: None,
+            latest,
         }
     }
 
     /// Whether they were made for amplitudes at the start of a run that say nothing of what came: T may mix what is apart.
     fn are_outgrown(&self, amplitude: &[f64]) -> bool {
         let mut pairs = self.amplitude.iter().zip(amplitude);
-        !self.lasts && pairs.any(|(then, now)| *now > OUTGROWN * then)
+        pairs.any(|(then, now)| *now > OUTGROWN * then)
     }
 
     /// Takes w over into y.
@@ -410,53 +282,12 @@ impl Forms {
         self.to_y.apply(w, &mut self.y);
     }
 
-    /// The doubling at 2^−`after` of the longest time, which it can go on to.
-    fn begin(&self, longest: f64, after: u32) -> Doubling {
-        let t = longest * (-f64::from(after)).exp2();
-        let norm = Dense::of(&self.generator).norm_1();
-        let halvings = (norm * t / expm::SERIES).log2().ceil();
-        let halvings = if halvings > 0.0 {
-            halvings.min(1e3) as u32
-        } else {
-            0
-        };
-        let k = after + halvings;
-        let mut latest = Doubling::new((&self.generator, &self.fast), &self.powers, longest, k);
-        for _ in 0..halvings {
-            latest.double();
-        }
-        latest
-    }
-
-    /// The integrals over `t` seconds and their derivatives Φᵀ Q Φ.
-    fn span(&self, t: f64) -> [Kernel; 2] {
-        let mut doubling = self.begin(t, 0);
-        let integrals = doubling.forms();
-        doubling.increment.shift(1.0);
-        let flow = &doubling.increment;
-        let [product, _, transposed] = &mut doubling.buffers;
-        transposed.set_transposed(flow);
-        for (gram, power) in doubling.grams.iter_mut().zip(&self.powers) {
-            product.set_product(power, flow);
-            gram.set_product(transposed, product);
-        }
-        [integrals, doubling.forms()]
-    }
-
-    /// Has the integrals up to 2^k units; returns where they end.
-    fn double_to(&mut self, k: u32) -> &Doubling {
-        let begun = self.latest.take();
-        let mut latest = begun.unwrap_or_else(|| {
-            let longest = self.unit * f64::from(self.longest).exp2();
-            let latest = self.begin(longest, self.longest);
-            self.over.push(latest.forms());
-            latest
-        });
+    /// Has the integrals up to 2^k units.
+    fn double_to(&mut self, k: u32) {
         while self.over.len() <= k as usize {
-            latest.double();
-            self.over.push(latest.forms());
+            self.latest.double();
+            self.over.push(self.latest.forms());
         }
-        self.latest.insert(latest)
     }
 }
 
@@ -504,7 +335,7 @@ fn products(forms: &Kernel, y: &[f64], products: &mut [f64]) -> [f64; 2] {
 }
 
 impl Doubling {
-    /// From 2^−`k` of the longest time on, with ‖𝒜‖ t ≤ [`expm::SERIES`]: Q_{j+1} = (𝒜ᵀ Q_j + Q_j 𝒜) t/(j + 1).
+    /// Over 2^−`k` of the longest time, doubled from where ‖𝒜‖ t ≤ [`expm::SERIES`]: Q_{j+1} = (𝒜ᵀ Q_j + Q_j 𝒜) t/(j + 1).
     fn new(
         (generator, fast): (&DMatrix<f64>, &[usize]),
         powers: &[Dense; 2],
@@ -512,7 +343,9 @@ impl Doubling {
         k: u32,
     ) -> Self {
         let dim = generator.nrows();
-        let t = longest * (-f64::from(k)).exp2();
+        let norm = Dense::of(generator).norm_1() * longest * (-f64::from(k)).exp2();
+        let halvings = (norm / expm::SERIES).log2().ceil().clamp(0.0, 1e3) as u32;
+        let t = longest * (-f64::from(k + halvings)).exp2();
         let a = Dense::from_fn(dim, dim, |i, j| generator[(i, j)] * t);
         let mut buffer = Dense::zeros(dim, dim);
         let mut series = |power: &Dense| {
@@ -530,11 +363,14 @@ impl Doubling {
         let mut doubling = Self {
             ladder: Ladders::new(generator, fast, longest, STIFF, 0),
             increment: Dense::zeros(dim, dim),
-            k,
+            k: k + halvings,
             grams,
             buffers: [buffer.clone(), buffer.clone(), buffer],
         };
         doubling.renew();
+        for _ in 0..halvings {
+            doubling.double();
+        }
         doubling
     }
 
@@ -598,15 +434,13 @@ mod tests {
         let exact = |h: f64| -9.0 * tau / 2.0 * (-2.0 * h / tau).exp_m1();
         let h = 1.5e-3;
         let terms = vec![term(&[1.0], &[1.0], true), term(&[2.0], &[1.0], false)];
-        let mut work = Work::new(terms, &[], h, 0).unwrap();
+        let mut work = Work::new(terms, &[], 32.0 * h, 5).unwrap();
         for k in 0..6 {
             let [source, dissipated] = work.over(k, &[3.0], &a, sizes(&[3.0]));
             let expected = exact(h * f64::from(1 << k));
             assert!((source / expected + 1.0).abs() < 1e-15, "{k}");
             assert!((dissipated / expected - 2.0).abs() < 1e-15, "{k}");
-            assert!((0..PATIENCE).any(|_| work.may_join(k, &a, sizes(&[3.0]))));
         }
-        let mut rules = [false; 3];
         for (dt, part) in [
             (h, 0.4),
             (h, 1.0),
@@ -617,26 +451,10 @@ mod tests {
             let mut series = Series::default();
             series.expand(&SparseKernel::new(&a), &[3.0], dt);
             let (degree, t) = (series.degree(), part * dt);
-            rules[usize::from(degree > SHORT) + usize::from(degree > MIDDLE)] = true;
             let [source, dissipated] = work.along_series(&series, part, t);
             assert!((source / exact(t) + 1.0).abs() < 1e-14, "{degree}");
             assert!((dissipated / exact(t) - 2.0).abs() < 1e-14, "{degree}");
         }
-        assert_eq!(rules, [true; 3]);
-    }
-
-    /// A growing mode is not followed over spans that its coordinates outgrow.
-    #[test]
-    fn growth_ends_the_joining() {
-        let a = DMatrix::from_element(1, 1, 1.0);
-        let mut work = Work::new(vec![term(&[1.0], &[1.0], false)], &[], 1.0, 0).unwrap();
-        let joined = (0..12)
-            .take_while(|&k| (0..PATIENCE).any(|_| work.may_join(k, &a, sizes(&[1.0]))))
-            .count();
-        // e^16 > 1e6
-        assert_eq!(joined, 4);
-        let [_, found] = work.over(4, &[1.0], &a, sizes(&[1.0]));
-        assert!((found / (0.5 * 32_f64.exp_m1()) - 1.0).abs() < 1e-14);
     }
 
     /// An amplifier: x₂ follows −10⁶ x₁ within 10⁻⁹ s, and v = x₂ + 10⁶ x₁ is the small difference that drives it.
