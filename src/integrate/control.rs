@@ -33,6 +33,9 @@ pub struct Verdict {
 /// edge cut short says nothing against the next one.
 const ROOM: f64 = 2.0;
 
+/// A step that does not see its start is made so many times shorter at once, at most.
+const SHORTEN: f64 = 16.0;
+
 /// The part of the tolerance that is granted where the solution has corners (a diode that turns on): they are few, and shorter
 /// steps only there would not pay.
 pub const CORNER: f64 = 1e-5;
@@ -57,13 +60,19 @@ impl Control {
         self.smallest
     }
 
-    /// Judges a step of length h whose halves differ from it by `difference`, relative to the amplitude.
+    /// Judges a step of length h whose halves differ from it by `difference`, and that may not have seen as much as `unseen` of its start,
+    /// both relative to the amplitude. What is not seen shrinks with h at least.
     #[must_use]
-    pub fn judge(&self, h: f64, difference: f64) -> Verdict {
-        let error = difference / (2_f64.powi(self.order) - 1.0);
+    pub fn judge(&self, h: f64, difference: f64, unseen: f64) -> Verdict {
+        let error = (difference / (2_f64.powi(self.order) - 1.0)).max(unseen);
         let allowed = self.tol * (h / self.span).max(self.grant);
         let accept = error <= allowed;
-        let mut next = if accept { h } else { 0.5 * h };
+        let shorter = (unseen / allowed).log2().ceil().exp2();
+        let mut next = if accept {
+            h
+        } else {
+            h / shorter.clamp(2.0, SHORTEN)
+        };
         if accept {
             let doubled = 2_f64.powi(self.order);
             let mut expected = error * ROOM * doubled;
@@ -193,9 +202,9 @@ mod tests {
         let control = Control::new(2, CORNER, &Settings::default(), 1.0);
         let h = 0.01;
         // tol·h = 1e-6; the estimate is a third of the difference.
-        assert!(!control.judge(h, 4e-6).accept);
-        let fair = control.judge(h, 2e-6);
+        assert!(!control.judge(h, 4e-6, 0.0).accept);
+        let fair = control.judge(h, 2e-6, 0.0);
         assert!(fair.accept && fair.next == h);
-        assert_eq!(control.judge(h, 1e-7).next, 2.0 * h);
+        assert_eq!(control.judge(h, 1e-7, 0.0).next, 2.0 * h);
     }
 }

@@ -166,6 +166,8 @@ impl Theta {
             let loss = fused.power.numerical(&self.z, &self.out, n);
             self.now.balance.add_numerical(loss);
         }
+        self.now.slope.clone_from(&self.attempt.slope);
+        self.now.unseen.clone_from(&self.attempt.unseen);
         self.now.turned_off = self.attempt.turned_off;
         self.now.settle = self.now.turned_off;
         self.now.x.copy_from_slice(&self.out[..n]);

@@ -29,6 +29,7 @@ impl Theta {
 
     /// At a breakpoint: inputs take their right limits, the state jumps if it must.
     pub(super) fn edge(&mut self, t: f64, log: &mut Log) -> Result<(), SimError> {
+        self.forget_slope();
         let mut u = self.now.u.clone();
         self.inputs.right(t, &mut u);
         if u == self.now.u {
@@ -57,9 +58,16 @@ impl Theta {
         Ok(())
     }
 
+    /// The motion goes on from here with another slope.
+    fn forget_slope(&mut self) {
+        self.now.slope.clear();
+        self.looks.forget();
+    }
+
     /// The jump from inputs `old` to the present ones at the present time.
     pub(super) fn jump(&mut self, old: &[f64], log: &mut Log) -> Result<(), SimError> {
         self.now.settle = true;
+        self.forget_slope();
         self.attempt.h = f64::NAN;
         let t = self.now.t;
         let x = DVector::from_column_slice(&self.now.x);

@@ -148,7 +148,8 @@ impl Theta {
                     Tried::Switched => return Ok(self.now.t == end),
                     Tried::Halve => {
                         self.stats.rejected += 1;
-                        level += 1;
+                        let wanted = (base / self.preferred).log2().ceil();
+                        level = (level + 1).max(wanted.min(f64::from(FINEST) - 1.0) as u32);
                     }
                 }
             }
@@ -293,14 +294,18 @@ impl Theta {
         impulse: &mut bool,
     ) -> Result<Verdict, SimError> {
         let turned_off = self.now.turned_off;
+        self.now.unseen.clear();
+        self.look_closer(0.5 * h);
         self.attempt(h, t1)?;
         let mut changed = self.attempt.solved.is_some();
         let n = self.now.x.len();
         self.coarse.copy_from_slice(&self.out[..n]);
+        let whole = std::mem::take(&mut self.attempt.unseen);
         let middle = self.now.t + 0.5 * (t1 - self.now.t);
         self.attempt(0.5 * h, middle)?;
         changed |= self.attempt.solved.is_some();
         self.commit(middle)?;
+        unseen::without_smooth(&whole, &mut self.now.unseen);
         self.now.turned_off |= turned_off;
         self.now.settle = self.damped || self.now.turned_off;
         self.attempt(0.5 * h, t1)?;
@@ -318,8 +323,9 @@ impl Theta {
             .amplitudes
             .error(&self.system().lcs, &self.coarse, &self.now.x);
         let smooth = self.system().curved || !changed;
+        let unseen = self.size_of(&self.now.unseen);
         let mut verdict = match &self.control {
-            Some(control) => control.judge(h, error),
+            Some(control) => control.judge(h, error, unseen),
             None => Verdict {
                 accept: true,
                 next: h,

@@ -14,6 +14,7 @@ mod right_limit;
 mod stages;
 #[cfg(test)]
 mod tests;
+mod unseen;
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -37,6 +38,7 @@ use crate::lcs::{Lcs, Port, Role};
 use crate::settings::Settings;
 use crate::solve::{Solution, Status};
 use stages::Tableau;
+use unseen::Looks;
 
 /// How steps are chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -128,6 +130,7 @@ pub struct Theta {
     /// Buffer for s.
     stock: Vec<f64>,
     control: Option<Control>,
+    looks: Looks,
     stats: Stats,
     modes: BTreeSet<(usize, Vec<bool>)>,
     not_unique: BTreeSet<String>,
@@ -162,6 +165,10 @@ struct Now {
     balance: Balance,
     /// The error so far, where it is asked for.
     estimate: Option<Estimate>,
+    /// x' at the end of the last step; empty after a breakpoint, and where the method has no stages.
+    slope: Vec<f64>,
+    /// What the last step did not see, see [`unseen`]; empty at the start of a step under error control.
+    unseen: Vec<f64>,
 }
 
 impl Now {
@@ -185,6 +192,8 @@ impl Now {
         self.turned_off = other.turned_off;
         self.system = other.system;
         self.balance = other.balance;
+        self.slope.clone_from(&other.slope);
+        self.unseen.clone_from(&other.unseen);
         if let (Some(mine), Some(other)) = (&mut self.estimate, &other.estimate) {
             mine.copy_from(other);
         }
@@ -207,6 +216,10 @@ struct Attempt {
     work: Option<((f64, f64), f64)>,
     /// What the stages tell of the error, where it is asked for.
     error: Option<stages::StepError>,
+    /// x' at the end, where the method has stages.
+    slope: Vec<f64>,
+    /// What the stages did not see.
+    unseen: Vec<f64>,
 }
 
 impl Theta {
@@ -265,6 +278,8 @@ impl Theta {
             system: at,
             balance,
             estimate: None,
+            slope: Vec::new(),
+            unseen: Vec::new(),
         };
         let amplitudes = Amplitudes::new(&system.lcs, &inputs);
         let switches = Switches::new(position, thresholds, &system.lcs);
@@ -307,6 +322,7 @@ impl Theta {
             rounding: Vec::new(),
             stock: Vec::new(),
             control,
+            looks: Looks::default(),
             stats: Stats::default(),
             modes: BTreeSet::new(),
             not_unique: BTreeSet::new(),

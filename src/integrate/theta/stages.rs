@@ -19,7 +19,7 @@ const ROUNDING: f64 = 1e-11;
 
 /// A motion has ended within a step where its last stage moves by less than this part of its first; and what a first stage moves is of interest
 /// above this part of the tolerance, or of the amplitude where steps are prescribed.
-const SUDDEN: f64 = 0.1;
+pub(super) const SUDDEN: f64 = 0.1;
 
 /// The coefficients of a method.
 #[derive(Debug)]
@@ -32,6 +32,8 @@ pub(super) struct Tableau {
     lower: &'static [&'static [f64]],
     /// x⁺ less the solution that the same stages give with one order less, as a sum of the h f(X_j): b_j − b̂_j.
     embedded: &'static [f64],
+    /// h P'(0) of the polynomial P' through the slopes at the stages, as a sum of the h f(X_j).
+    pub(super) at_start: &'static [f64],
     /// The error of the step over the change of that difference from the step before, for x' = λx and hλ → 0.
     constant: f64,
 }
@@ -51,11 +53,12 @@ pub(super) struct StepError {
 }
 
 /// Moreau's scheme.
-static EULER: Tableau = Tableau {
+pub(super) static EULER: Tableau = Tableau {
     order: 1,
     gamma: 1.0,
     lower: &[&[]],
     embedded: &[1.0],
+    at_start: &[1.0],
     constant: 0.5,
 };
 
@@ -70,6 +73,12 @@ static ALEXANDER: Tableau = Tableau {
         B2 - (1.0 - 2.0 * GAMMA) / (1.0 - GAMMA),
         GAMMA,
     ],
+    // Lagrange's weights at 0 of the nodes γ, (1 + γ)/2 and 1.
+    at_start: &[
+        (1.0 + GAMMA) / ((1.0 - GAMMA) * (1.0 - GAMMA)),
+        -4.0 * GAMMA / ((1.0 - GAMMA) * (1.0 - GAMMA)),
+        GAMMA * (1.0 + GAMMA) / ((1.0 - GAMMA) * (1.0 - GAMMA)),
+    ],
     // e^z − R(z) = 0.025897 z⁴ and R(z) − R̂(z) = −0.079220 z³ + …
     constant: 0.326_899,
 };
@@ -78,6 +87,11 @@ const B2: f64 = 0.25 * (6.0 * GAMMA * GAMMA - 20.0 * GAMMA + 5.0);
 const GAMMA: f64 = 0.435_866_521_508_459;
 
 impl Tableau {
+    /// Where the first stage is, as a part of the step.
+    pub(super) fn first(&self) -> f64 {
+        self.gamma
+    }
+
     /// The method for a system: `None` where all laws consist of straight pieces and the (θ, γ) step serves.
     pub(super) fn of(system: &System, scheme: Scheme) -> Option<&'static Self> {
         system.curved.then_some(match scheme {
@@ -128,7 +142,7 @@ impl Theta {
     }
 
     /// The step by one method; the h f(X_j) of its stages.
-    fn attempt_tableau(
+    pub(super) fn attempt_tableau(
         &mut self,
         tableau: &'static Tableau,
         h: f64,
@@ -230,6 +244,16 @@ impl Theta {
         let Some((x, solution)) = last else {
             return Ok(slopes);
         };
+        let unseen = if self.control.is_some() {
+            let matrices = self.system().step(step);
+            self.unseen(tableau, h, &slopes, |change| {
+                let carried = matrices.carried(change, &solution.lambda, &solution.y);
+                carried.unwrap_or_else(|| change.clone())
+            })
+        } else {
+            Vec::new()
+        };
+        let slope = slopes.last().map(|s| s.iter().map(|s| s / h).collect());
         let loss = loss.of_step(
             &self.system().lcs,
             (&self.now.x, &self.now.u),
@@ -251,6 +275,8 @@ impl Theta {
             turned_off: false,
             work: Some((work, loss)),
             error,
+            slope: slope.unwrap_or_default(),
+            unseen,
         };
         Ok(slopes)
     }

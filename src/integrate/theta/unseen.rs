@@ -1,0 +1,146 @@
+//! Motions that end before the first stage of a step, with curved laws: no stage sees them, nor do the stages of half the step, so that
+//! error control by halves has both agree on a current that stopped at once and on no charge that it brought.
+//!
+//! The slope f₀ at the start of a step does see them. The stages' polynomial has the slope P'(0) there, and what is not seen moves the
+//! state by w h (f₀ − f₁) at most, w = c₁/2, if it goes on for as long as the first stage is away; f₁ is what comes nearest to f₀ between
+//! P'(0) and the slope of the first stage. In a smooth motion that is of the order of the error of the step. A stage is the implicit Euler step: what a state forgets until then is no error, and the
+//! derivative of the last stage tells it.
+//!
+//! Behind a step f₀ is the slope of its last stage. After a breakpoint there is none: layers that decay in no time and currents that end
+//! soon begin together. Implicit Euler steps from the same start, each [`CLOSER`] times shorter than the last, tell the slopes
+//! s₁, s₂, … at all distances δ₁ > δ₂ > …; in between as much as δ_k (s_{k+1} − s_k) may be hidden.
+
+use super::stages::{GRANT, SUDDEN, Tableau};
+use super::*;
+
+/// The ratio of one look's distance to the next one's: what is hidden between two is overestimated by it.
+const CLOSER: f64 = 8.0;
+/// The closest look is this many roundings of the time away.
+const CLOSEST: f64 = 64.0;
+
+/// The slopes right after a breakpoint.
+#[derive(Debug, Default)]
+pub(super) struct Looks {
+    /// Where they were looked at, s.
+    t: f64,
+    /// δ_k and s_k, by falling δ.
+    slopes: Vec<(f64, DVector<f64>)>,
+}
+
+impl Looks {
+    /// What is known is of the past.
+    pub(super) fn forget(&mut self) {
+        self.slopes.clear();
+    }
+}
+
+impl Theta {
+    /// The error that is granted to a step, relative to amplitudes.
+    fn granted(&self) -> f64 {
+        GRANT * self.settings.tol
+    }
+
+    /// Looks at the slopes after a breakpoint, before a step of length `h` from there.
+    pub(super) fn look_closer(&mut self, h: f64) {
+        let Stepping::Controlled { span, .. } = self.stepping else {
+            return;
+        };
+        if !self.system().curved || !self.now.slope.is_empty() {
+            return;
+        }
+        if !self.looks.slopes.is_empty() && self.looks.t == self.now.t {
+            return;
+        }
+        let t = self.now.t;
+        let mut slopes = Vec::new();
+        // Few lengths for all steps: their matrices are kept.
+        let mut distance = span;
+        while distance > h / CLOSER {
+            distance /= CLOSER;
+        }
+        while distance > CLOSEST * Self::slack(t) {
+            let Ok(found) = self.attempt_tableau(&stages::EULER, distance, t + distance) else {
+                break;
+            };
+            let n = self.now.x.len();
+            let lcs = &self.plant.systems[self.now.system].1.lcs;
+            let moved = (self.amplitudes).error(lcs, &self.now.x, &self.out[..n]);
+            slopes.extend(found.into_iter().map(|s| (distance, s / distance)));
+            if moved <= SUDDEN * self.granted() {
+                break;
+            }
+            distance /= CLOSER;
+        }
+        self.looks = Looks { t, slopes };
+    }
+
+    /// What the stages of a step of length h by their h f(X_j) do not see of its start, with what was not seen before it.
+    pub(super) fn unseen(
+        &self,
+        tableau: &Tableau,
+        h: f64,
+        slopes: &[DVector<f64>],
+        carry: impl Fn(&DVector<f64>) -> DVector<f64>,
+    ) -> Vec<f64> {
+        let weight = 0.5 * tableau.first();
+        let mut change = DVector::zeros(self.now.x.len());
+        let mut start = None;
+        if !self.now.slope.is_empty() {
+            start = Some(DVector::from_column_slice(&self.now.slope));
+        } else if self.looks.t == self.now.t {
+            let mut looks = self.looks.slopes.iter();
+            let mut before = looks.find(|look| look.0 <= h / CLOSER);
+            start = before.map(|look| look.1.clone());
+            for look in looks {
+                if let Some((distance, slope)) = before {
+                    change += (&look.1 - slope) * (weight * distance);
+                }
+                before = Some(look);
+            }
+        }
+        if let Some(start) = start {
+            for k in 0..change.len() {
+                let ahead: f64 = (tableau.at_start.iter().zip(slopes))
+                    .map(|(weight, slope)| weight * slope[k])
+                    .sum();
+                // Between the first stage's and what it goes on to is a motion that the stages follow.
+                let (low, high) = (ahead.min(slopes[0][k]), ahead.max(slopes[0][k]));
+                let slope = h * start[k];
+                change[k] += weight * (slope - slope.clamp(low, high));
+            }
+        }
+        if !self.now.unseen.is_empty() {
+            change += DVector::from_column_slice(&self.now.unseen);
+        }
+        for (change, rounding) in change.iter_mut().zip(&self.rounding) {
+            if change.abs() <= *rounding {
+                *change = 0.0;
+            }
+        }
+        if self.size_of(change.as_slice()) <= SUDDEN * self.granted() {
+            change.fill(0.0);
+        } else {
+            change = carry(&change);
+        }
+        change.as_slice().to_vec()
+    }
+
+    /// A change of the present state, relative to amplitudes; none is zero.
+    pub(super) fn size_of(&self, change: &[f64]) -> f64 {
+        if change.is_empty() {
+            return 0.0;
+        }
+        let moved: Vec<f64> = self.now.x.iter().zip(change).map(|(x, d)| x + d).collect();
+        let lcs = &self.plant.systems[self.now.system].1.lcs;
+        self.amplitudes.error(lcs, &moved, &self.now.x)
+    }
+}
+
+/// Takes out of e₁, what the first half of a step does not see, and e₂, which it shall be added to, what a smooth motion makes of them. It
+/// shrinks with h³ (as stages are of first order), what is hidden with h: e₀ = s + d of the whole step and e₁ = s/8 + d/2 tell s,
+/// and the two halves have a quarter of it.
+pub(super) fn without_smooth(whole: &[f64], half: &mut [f64]) {
+    for (half, whole) in half.iter_mut().zip(whole) {
+        *half = (5.0 * *half - whole) / 3.0;
+    }
+}
