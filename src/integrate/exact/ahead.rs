@@ -1,9 +1,10 @@
 //! Rows ahead: where a mode is calm, one long step passes several output times, and their rows follow from its begin.
 
+use super::exosystem::Exosystem;
 use super::flow::{Flow, LONG, Way};
 use super::kernel::Kernel;
-use super::motion::GRID_ULPS;
-use super::stepper::Exact;
+use super::mode::Mode;
+use super::motion::{GRID_ULPS, Motion};
 use crate::integrate::run::Times;
 
 /// Rows of a long step at most.
@@ -62,7 +63,7 @@ impl Rows {
 
 /// Rows that were computed and not asked for yet.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Ahead {
+pub(super) struct DenseOutput {
     /// An output step before the first row, s.
     begin: f64,
     /// Rows of the step, and how many of them were asked for; none without a step.
@@ -73,7 +74,7 @@ pub(super) struct Ahead {
     pub(super) t: f64,
 }
 
-impl Ahead {
+impl DenseOutput {
     /// Whether rows are left.
     fn pending(&self) -> bool {
         self.taken < self.count
@@ -91,7 +92,7 @@ impl Ahead {
     }
 
     /// Whether `t` is the time of the next row of the output step `h`, which is taken then.
-    fn take(&mut self, t: f64, h: f64) -> bool {
+    pub(super) fn take(&mut self, t: f64, h: f64) -> bool {
         let off = t - self.begin - (self.taken + 1) as f64 * h;
         let next = self.pending() && off.abs() <= GRID_ULPS * f64::EPSILON * t.abs();
         if next {
@@ -100,78 +101,48 @@ impl Ahead {
         }
         next
     }
-}
 
-impl Exact {
-    /// See [`Stepper::rows_ahead`](crate::integrate::run::Stepper::rows_ahead).
-    pub(super) fn take_rows(&mut self, times: &Times, k: usize) -> &[f64] {
-        let ahead = &mut self.ahead;
+    /// See [`Stepper::rows_ahead`](crate::integrate::run::Stepper::rows_ahead), of so many columns, an output step `h` apart.
+    pub(super) fn take_all(&mut self, times: &Times, k: usize, columns: usize, h: f64) -> &[f64] {
         // The last output time need not be a step away from the one before.
-        let count = (ahead.count - ahead.taken).min(times.len.saturating_sub(k + 1));
-        let before = ahead.taken;
+        let count = (self.count - self.taken).min(times.len.saturating_sub(k + 1));
+        let before = self.taken;
         if count > 0 {
-            ahead.taken += count - 1;
-            let t = times.at(k + count - 1);
-            if !ahead.take(t, self.plant.output_step()) {
-                ahead.taken = before;
+            self.taken += count - 1;
+            if !self.take(times.at(k + count - 1), h) {
+                self.taken = before;
             }
         }
-        let columns = self.row.len();
-        &ahead.values[before * columns..ahead.taken * columns]
+        &self.values[before * columns..self.taken * columns]
     }
 
-    /// Whether the row at `t` is there already.
-    #[inline]
-    pub(super) fn has_row(&mut self, t: f64) -> bool {
-        if self.ahead.count == 0 {
-            return false;
+    /// Has the motion stand at the last row that was asked for.
+    pub(super) fn end(&mut self, motion: &mut Motion, flow: &mut Flow, exosystem: &Exosystem) {
+        if self.leads() {
+            motion.arrive(flow, exosystem, self.taken, self.count, self.t);
         }
-        let has = self.ahead.take(t, self.plant.output_step());
-        if !has {
-            self.end_ahead();
-        }
-        has
+        self.count = 0;
+        self.taken = 0;
     }
 
-    /// Stands at the last row that was asked for.
-    pub(super) fn end_ahead(&mut self) {
-        let Ahead { count, taken, .. } = self.ahead;
-        self.ahead.count = 0;
-        self.ahead.taken = 0;
-        if let (true, Some(at)) = (count > 0, self.mode) {
-            let flow = &mut self.plant.modes[at].flow;
-            let last = self.ahead.t;
-            self.motion
-                .arrive(flow, &self.exosystem, taken, count, last);
-        }
-    }
-
-    /// Steps over as many rows as nothing can happen on, `t` the first of them and `next` when something is known to happen.
-    pub(super) fn step_ahead(&mut self, at: usize, t: f64, next: f64) -> bool {
-        let mode = &mut self.plant.modes[at];
+    /// Steps over as many rows as nothing can happen on, `t` the first of them and `end` when something is known to happen.
+    pub(super) fn step(&mut self, motion: &mut Motion, mode: &mut Mode, t: f64, end: f64) -> bool {
         let (flow, outputs, rows) = (&mut mode.flow, &mode.outputs, &mut mode.rows);
         let h = flow.step(LONG);
         let negligible = GRID_ULPS * f64::EPSILON * (t + MOST as f64 * h).abs();
-        if !self.motion.steady
-            || (t - self.motion.t - h).abs() > negligible
-            || !rows.ready(flow, outputs)
-        {
+        if !motion.steady || (t - motion.t - h).abs() > negligible || !rows.ready(flow, outputs) {
             return false;
         }
-        // What happens at the end of a step is left to the step that arrives there.
-        let end = (next - negligible).min(self.until + negligible);
-        let Some(count) = self.motion.leap_ahead(flow, end) else {
+        let Some(count) = motion.leap_ahead(flow, end) else {
             return false;
         };
         let Some(table) = &rows.table else {
             return false;
         };
-        let columns = rows.columns;
-        let ahead = &mut self.ahead;
-        ahead.values.resize(MOST * columns, 0.0);
-        table.apply_first(count * columns, self.motion.before(), &mut ahead.values);
-        (ahead.begin, ahead.t) = (self.motion.t, t);
-        (ahead.count, ahead.taken) = (count, 1);
+        self.values.resize(MOST * rows.columns, 0.0);
+        table.apply_first(count * rows.columns, motion.before(), &mut self.values);
+        (self.begin, self.t) = (motion.t, t);
+        (self.count, self.taken) = (count, 1);
         true
     }
 }
@@ -252,7 +223,7 @@ mod tests {
             exact.advance(t, &mut log).expect("a run");
             exact.read(&mut row);
         }
-        assert!(exact.ahead.leads());
+        assert!(exact.dense.leads());
         let energy = exact.finish().energy;
         let stored = 0.5 * (20e-6 * row[0] * row[0] + 40e-6 * row[1] * row[1]);
         assert!((energy.stored / stored - 1.0).abs() < 1e-12);

@@ -1,9 +1,11 @@
 //! Switches controlled by straight sources alone: when they move is known before the run, and no guard watches them.
 
-use super::stepper::SAME_TIME_ULPS;
 use crate::circuit::Source;
 use crate::integrate::switching::{Known, ROUNDINGS, Threshold};
 use crate::mna::SourceControl;
+
+/// Times closer than this many units in the last place are one time.
+pub(super) const SAME_TIME_ULPS: f64 = 4.0;
 
 /// constant + slope (t − origin) until `end`: a piece of a straight source.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,17 +4,14 @@ use nalgebra::DVector;
 
 use super::inspect::Finding;
 use super::mode::Key;
-use super::stepper::Exact;
-use super::transition::{PROPOSALS, Trigger};
+use super::storage::ROUNDING;
+use super::transition::{PROPOSALS, Transition, Trigger};
 use crate::integrate::energy::{self, Balance};
 use crate::integrate::impulses;
 use crate::integrate::jump::rivals_note;
 use crate::integrate::run::{Log, Reason, SimError};
 use crate::integrate::settle;
-use crate::integrate::stats::{JumpReason, StateJump};
-
-/// Movements of the storage below this part of its amplitude are rounding and no jump.
-const ROUNDING: f64 = 1e-12;
+use crate::integrate::stats::JumpReason;
 
 /// What stood before a jump.
 pub(super) struct Before {
@@ -24,12 +21,12 @@ pub(super) struct Before {
     impulses: usize,
 }
 
-impl Exact {
+impl Transition<'_> {
     /// What stands before a jump from here.
     pub(super) fn before_jump(&self, log: &Log) -> Before {
         Before {
-            storage: self.storage.clone(),
-            balance: self.balance,
+            storage: self.storage.values.clone(),
+            balance: self.storage.balance,
             impulses: log.impulses.len(),
         }
     }
@@ -47,12 +44,13 @@ impl Exact {
         if !left.sliding.is_empty() || !key.sliding.is_empty() {
             return Ok(None);
         }
-        let u = self.inputs(self.motion.t);
-        let [start, end] = [&before.storage, &self.storage].map(|s| DVector::from_column_slice(s));
-        let left = self.plant.free(&left)?.lcs.clone();
-        let thresholds = self.plant.thresholds.clone();
+        let u = self.sources.inputs(self.t);
+        let [start, end] =
+            [&before.storage, &self.storage.values].map(|s| DVector::from_column_slice(s));
+        let left = self.table.free(&left)?.lcs.clone();
+        let thresholds = self.table.thresholds.clone();
         let found = settle::interruption(
-            (&left, &self.plant.free(key)?.lcs),
+            (&left, &self.table.free(key)?.lcs),
             &thresholds,
             (&key.switches, leaving),
             (&start, &end),
@@ -62,9 +60,12 @@ impl Exact {
             return Ok(None);
         };
         let change = end - &start;
-        let square = self.metric.stored(change.as_slice());
-        self.balance.take_part(&before.balance, part, square);
+        let square = self.storage.stored(change.as_slice());
         self.storage
+            .balance
+            .take_part(&before.balance, part, square);
+        self.storage
+            .values
             .copy_from_slice((start + change * part).as_slice());
         for impulse in &mut log.impulses[before.impulses..] {
             impulse.area *= part;
@@ -75,26 +76,26 @@ impl Exact {
     /// The devices' impulse at the present storage in a switch position, by projection in the energy metric. Returns
     /// whether the storage moved.
     pub(super) fn project(&mut self, key: &Key, log: &mut Log) -> Result<bool, SimError> {
-        let t = self.motion.t;
-        let u = self.inputs(t);
+        let t = self.t;
+        let u = self.sources.inputs(t);
         self.note_switch_rivals(key, &u);
-        let free = self.plant.free(key).map_err(|mut error| {
+        let free = self.table.free(key).map_err(|mut error| {
             error.t = error.t.or(Some(t));
             error
         })?;
-        let x = free.state_from(&self.storage);
-        self.lcp_solves += u64::from(free.lcs.m() > 0);
+        let x = free.state_from(&self.storage.values);
+        self.report.lcp_solves += u64::from(free.lcs.m() > 0);
         // Where the projection finds nothing admissible, jumps into proposed modes are tried.
         let (after, p) = match free.jump(&x, &u) {
             Ok(Some(jump)) => {
                 let checked = free.verify(&jump.p);
                 let checked = checked.map_err(|broken| SimError::at(t, Reason::Internal(broken)));
                 checked?;
-                if !self.noted_rivals
+                if !self.report.noted_rivals
                     && let Some(note) = jump.note(&free.lcs, t)
                 {
-                    self.noted_rivals = true;
-                    self.notes.push(note);
+                    self.report.noted_rivals = true;
+                    self.report.notes.push(note);
                 }
                 (jump.x, jump.p)
             }
@@ -107,7 +108,7 @@ impl Exact {
     /// two impulses takes from the other, ⟨Δs of the switches, Δs of the devices⟩ > 0 in the energy metric: with resistances the
     /// faster of them leaves less for the other, and the order of their ends depends on ratios.
     fn note_switch_rivals(&mut self, key: &Key, u: &DVector<f64>) {
-        if self.noted_rivals || self.plant.pairs == 0 || !key.sliding.is_empty() {
+        if self.report.noted_rivals || self.table.pairs == 0 || !key.sliding.is_empty() {
             return;
         }
         let moved = |i: &usize| {
@@ -123,25 +124,25 @@ impl Exact {
         for &i in &moved {
             before.switches[i] = !before.switches[i];
         }
-        let s = DVector::from_column_slice(&self.storage);
-        let Ok(free) = self.plant.free(key) else {
+        let s = DVector::from_column_slice(&self.storage.values);
+        let Ok(free) = self.table.free(key) else {
             return;
         };
-        let joining = free.storage(&free.state_from(&self.storage), u) - &s;
-        let sizes = self.scale.iter().zip(&joining);
+        let joining = free.storage(&free.state_from(&self.storage.values), u) - &s;
+        let sizes = self.storage.scale.iter().zip(&joining);
         if moved.is_empty() || sizes.clone().all(|(size, d)| d.abs() <= ROUNDING * size) {
             return;
         }
-        let Ok(free) = self.plant.free(&before) else {
+        let Ok(free) = self.table.free(&before) else {
             return;
         };
-        let x = free.state_from(&self.storage);
+        let x = free.state_from(&self.storage.values);
         let Ok(Some(jump)) = free.jump(&x, u) else {
             return;
         };
         let change = free.storage(&jump.x, u) - free.storage(&x, u);
         let [one, other, both] = [&joining, &change, &(&joining + &change)]
-            .map(|change| self.metric.stored(change.as_slice()));
+            .map(|change| self.storage.stored(change.as_slice()));
         // 2⟨a, b⟩ = ‖a + b‖² − ‖a‖² − ‖b‖²
         if both - one - other <= ROUNDING * one.max(other) {
             return;
@@ -152,12 +153,12 @@ impl Exact {
             .map(|(port, _)| port.device.clone());
         let mut names: Vec<String> = devices.collect();
         names.dedup();
-        let switches = moved.iter().map(|&i| self.plant.thresholds[i].name.clone());
+        let switches = moved.iter().map(|&i| self.table.thresholds[i].name.clone());
         names.extend(switches);
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        self.noted_rivals = true;
-        let note = rivals_note(&names, self.motion.t);
-        self.notes.push(note);
+        self.report.noted_rivals = true;
+        let note = rivals_note(&names, self.t);
+        self.report.notes.push(note);
     }
 
     /// Carries out a jump of the free state from x to `after` by impulses p, with its impulses and energies.
@@ -169,22 +170,23 @@ impl Exact {
         p: &DVector<f64>,
         log: &mut Log,
     ) -> Result<bool, SimError> {
-        let t = self.motion.t;
-        let u = self.inputs(t);
-        let free = self.plant.free(key)?;
+        let t = self.t;
+        let u = self.sources.inputs(t);
+        let free = self.table.free(key)?;
         let mut s = free.storage(after, &u);
         // What fast and slow states of another basis add up to nothing is no change.
         let rounding = free.storage_rounding(after, &u);
-        for ((new, old), rounding) in s.iter_mut().zip(&self.storage).zip(&rounding) {
+        for ((new, old), rounding) in s.iter_mut().zip(&self.storage.values).zip(&rounding) {
             if (*new - old).abs() <= *rounding {
                 *new = *old;
             }
         }
-        let joined = free.storage(x, &self.before);
+        let joined = free.storage(x, &self.sources.before);
         let lcs = &free.lcs;
-        self.balance
-            .add_jump(energy::taking_over(lcs, &self.storage, x, &joined));
-        let step = &u - &self.before;
+        self.storage
+            .balance
+            .add_jump(energy::taking_over(lcs, &self.storage.values, x, &joined));
+        let step = &u - &self.sources.before;
         for (name, area) in impulses::of_jump(lcs, p, step.as_slice()) {
             log.impulse(t, name, area);
         }
@@ -192,23 +194,23 @@ impl Exact {
             lcs,
             x.as_slice(),
             after.as_slice(),
-            self.before.as_slice(),
+            self.sources.before.as_slice(),
             u.as_slice(),
             p.as_slice(),
         );
         let loss = energy::loss_of_jump(lcs, x, after, &u, p, free.is_projected());
-        self.before = u;
-        self.balance.add_jump((source, loss));
+        self.sources.before = u;
+        self.storage.balance.add_jump((source, loss));
         let moved = s
             .iter()
-            .zip(&self.storage)
-            .zip(&self.scale)
+            .zip(&self.storage.values)
+            .zip(&self.storage.scale)
             .any(|((a, b), scale)| (a - b).abs() > ROUNDING * scale.max(a.abs()));
-        self.storage.copy_from_slice(s.as_slice());
+        self.storage.values.copy_from_slice(s.as_slice());
         if moved {
             self.inspector.forget_pace();
         }
-        self.rescale();
+        self.storage.rescale();
         Ok(moved)
     }
 
@@ -217,36 +219,18 @@ impl Exact {
         if !self.started {
             return JumpReason::Start;
         }
-        let new = &self.plant.modes[at].key.switches;
-        let thresholds = self.plant.thresholds.iter().enumerate();
+        let new = &self.table.modes[at].key.switches;
+        let thresholds = self.table.thresholds.iter().enumerate();
         let moved = thresholds
             .filter(|(i, t)| !t.is_rest() && self.key.switches.get(*i) != new.get(*i))
             .map(|(_, t)| t.name.as_str());
         let moved: Vec<&str> = moved.collect();
         match (trigger, self.mode) {
             _ if !moved.is_empty() => JumpReason::Switch(moved.join(", ")),
-            (Trigger::Guard(guard), Some(from)) => JumpReason::Device(self.owner_name(from, guard)),
+            (Trigger::Guard(guard), Some(from)) => {
+                JumpReason::Device(self.table.owner_name(from, guard))
+            }
             _ => JumpReason::SourceEdge,
-        }
-    }
-
-    /// Writes down that the storage jumped here from `before`, losing so much, J, if it did by more than rounding.
-    pub(super) fn note_jump(&self, before: &[f64], loss: f64, reason: JumpReason, log: &mut Log) {
-        let moved = |k: usize| {
-            let (a, b) = (self.storage[k], before[k]);
-            (a - b).abs() > ROUNDING * self.scale[k].max(b.abs())
-        };
-        let jumped: Vec<usize> = (0..before.len()).filter(|&k| moved(k)).collect();
-        if !jumped.is_empty() {
-            let storage = (&*self.elements, &*self.units);
-            let sizes = (loss, self.capacity);
-            log.state_jump(StateJump::new(
-                self.motion.t,
-                storage,
-                &jumped,
-                sizes,
-                reason,
-            ));
         }
     }
 
@@ -256,35 +240,40 @@ impl Exact {
         key: &Key,
         log: &mut Log,
     ) -> Result<Option<(usize, Vec<usize>)>, SimError> {
-        let t = self.motion.t;
-        let fastest = self.plant.fastest();
-        let x = self.plant.free(key)?.state_from(&self.storage);
+        let t = self.t;
+        let fastest = self.table.fastest();
+        let x = self.table.free(key)?.state_from(&self.storage.values);
         for part in PROPOSALS {
             let h = part / fastest;
-            let u = self.inputs(t + h);
-            self.lcp_solves += 1;
-            let free = self.plant.free(key)?;
+            let u = self.sources.inputs(t + h);
+            self.report.lcp_solves += 1;
+            let free = self.table.free(key)?;
             let Some(proposal) = free.propose(&x, &u, h) else {
                 continue;
             };
             let candidate = key.with_closed(proposal.open());
-            let Some(at) = self.plant.mode(&candidate, &self.exosystem) else {
+            let Some(at) = self.table.mode(&candidate, self.sources) else {
                 continue;
             };
-            let mode = &self.plant.modes[at];
-            let Some(s) = self.inspector.project(mode, &self.z, &self.storage) else {
+            let mode = &self.table.modes[at];
+            let Some(s) = self
+                .inspector
+                .project(mode, &self.sources.z, &self.storage.values)
+            else {
                 continue;
             };
-            let free = self.plant.free(key)?;
+            let free = self.table.free(key)?;
             let after = free.state_from(&s);
             let Some(p) = free.impulse_between(&x, &after, &candidate.closed) else {
                 continue;
             };
-            let mode = &mut self.plant.modes[at];
-            if let Finding::Holds(leaving) =
-                self.inspector
-                    .inspect(mode, (&self.exosystem, t, &self.z), &s, &self.scale)
-            {
+            let mode = &mut self.table.modes[at];
+            if let Finding::Holds(leaving) = self.inspector.inspect(
+                mode,
+                (&self.sources.exosystem, t, &self.sources.z),
+                &s,
+                &self.storage.scale,
+            ) {
                 self.leap(key, &x, &after, &p, log)?;
                 return Ok(Some((at, leaving)));
             }

@@ -15,10 +15,8 @@ mod free;
 mod inspect;
 mod jump;
 mod kernel;
-mod metric;
 mod mode;
 mod motion;
-mod pause;
 mod plant;
 mod polynomial;
 mod rays;
@@ -26,8 +24,10 @@ mod report;
 mod series;
 mod shifted;
 mod slaved;
+mod sources;
 mod spectrum;
 mod stepper;
+mod storage;
 mod transition;
 mod work;
 
@@ -36,5 +36,5 @@ pub(super) mod tests;
 
 pub use assembler::Assembler;
 pub(crate) use assembler::{Step, steps_of};
-pub(crate) use pause::Place;
+pub(crate) use stepper::Place;
 pub use stepper::{Exact, Setup};

@@ -3,26 +3,23 @@
 use std::collections::BTreeMap;
 
 use super::assembler::{Assembler, Step};
-use super::clock::Clock;
-use super::exosystem::Exosystem;
 use super::flow::longest_step;
 use super::free::Free;
-use super::mode::{Key, Mode, SwitchFacts};
+use super::mode::{Key, Mode, Owner, SwitchFacts};
+use super::sources::Sources;
 use crate::integrate::run::SimError;
 use crate::integrate::switching::Threshold;
 use crate::lcs::Hold;
 use crate::mna::SourceControl;
 
 /// Systems and modes, created when first visited.
-pub(crate) struct Plant {
+pub(crate) struct ModeTable {
     assembler: Assembler,
     /// Number of device pairs.
     pub(crate) pairs: usize,
     pub(crate) thresholds: Vec<Threshold>,
     /// By switch: the pair in series with a thyristor's.
     pub(crate) valves: Vec<Option<usize>>,
-    /// Switches that straight sources alone control.
-    pub(crate) clocks: Vec<Clock>,
     h: f64,
     energy: bool,
     tolerance: f64,
@@ -31,8 +28,8 @@ pub(crate) struct Plant {
     pub(crate) modes: Vec<Mode>,
 }
 
-impl Plant {
-    /// A plant without modes; `h` is the output step, `energy` asks for the balance, `tolerance` that of complementarity residuals.
+impl ModeTable {
+    /// A table without modes; `h` is the output step, `energy` asks for the balance, `tolerance` that of complementarity residuals.
     pub(crate) fn new(assembler: Assembler, h: f64, energy: bool, tolerance: f64) -> Self {
         let thresholds = assembler.thresholds();
         let valve = |t: &Threshold| {
@@ -44,7 +41,6 @@ impl Plant {
             valves: thresholds.iter().map(valve).collect(),
             thresholds,
             assembler: assembler.with_span(longest_step(h)),
-            clocks: Vec::new(),
             h,
             energy,
             tolerance,
@@ -71,13 +67,12 @@ impl Plant {
     }
 
     /// The mode of this name; `None` where the circuit has no such mode (its reduction or its numbers do not exist).
-    pub(crate) fn mode(&mut self, key: &Key, exosystem: &Exosystem) -> Option<usize> {
+    pub(super) fn mode(&mut self, key: &Key, sources: &Sources) -> Option<usize> {
         if let Some(&known) = self.index.get(key) {
             return known;
         }
         // A control that depends on nothing does not stay on its threshold.
-        let clocked = |switch: usize| self.clocks.iter().any(|clock| clock.switch == switch);
-        if key.sliding.iter().any(|s| clocked(s.0)) {
+        if key.sliding.iter().any(|s| sources.control(s.0)) {
             return None;
         }
         let holds: Vec<Hold> = key
@@ -96,9 +91,16 @@ impl Plant {
             let facts = SwitchFacts {
                 thresholds: &self.thresholds,
                 limits: &limits,
-                clocks: &self.clocks,
+                clocks: &sources.clocks,
             };
-            Mode::new(key.clone(), &lcs, exosystem, &facts, self.h, self.energy)
+            Mode::new(
+                key.clone(),
+                &lcs,
+                &sources.exosystem,
+                &facts,
+                self.h,
+                self.energy,
+            )
         });
         let at = mode.map(|mode| {
             self.modes.push(mode);
@@ -115,6 +117,26 @@ impl Plant {
             **valve == Some(pair) && threshold.holds(position[*i], position)
         });
         holding.map(|(i, _)| i).collect()
+    }
+
+    /// Thyristors that hold themselves in mode `at` although their valves block.
+    pub(crate) fn let_go(&self, at: usize) -> impl Iterator<Item = usize> {
+        let Key {
+            closed, switches, ..
+        } = &self.modes[at].key;
+        let blocks = |i: usize| self.valves[i].is_some_and(|pair| !closed[pair]);
+        let thresholds = self.thresholds.iter().enumerate();
+        let holding = thresholds.filter(|(i, t)| t.holds(switches[*i], switches));
+        holding.map(|(i, _)| i).filter(move |&i| blocks(i))
+    }
+
+    /// The device or switch of a guard of mode `at`.
+    pub(crate) fn owner_name(&self, at: usize, guard: usize) -> String {
+        let name = match self.modes[at].owner(guard) {
+            Owner::Switch(i) | Owner::Slide(i, _) => Some(self.thresholds[i].name.as_str()),
+            Owner::Device(pair) => self.device(pair),
+        };
+        name.unwrap_or_default().to_string()
     }
 
     /// See [`Assembler::controls`].

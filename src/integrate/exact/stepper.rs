@@ -1,30 +1,26 @@
 //! The event-driven stepper: travel in a mode, find the next one, repeat.
 
-use std::collections::BTreeMap;
+mod pause;
 
 use nalgebra::DVector;
 
-use super::accumulation::Accumulation;
-use super::ahead::Ahead;
+use super::ahead::DenseOutput;
 use super::assembler::{Assembler, Step};
-use super::clock::Clock;
-use super::exosystem::Exosystem;
+use super::clock::SAME_TIME_ULPS;
+use super::flow::longest_step;
 use super::inspect::{Inspector, resolution};
-use super::metric::Metric;
-use super::mode::{Key, Owner};
-use super::motion::{Arrival, Motion};
-use super::plant::Plant;
-use super::report::{MOST_LOSS, Slides};
-use super::transition::{PATIENCE, PROPOSALS, Trigger};
-use crate::circuit::Source;
-use crate::integrate::Note;
-use crate::integrate::energy::Balance;
+use super::mode::{Key, Mode, Owner};
+use super::motion::{Arrival, GRID_ULPS, Motion};
+use super::plant::ModeTable;
+use super::report::{MOST_LOSS, Report, row_jumps};
+use super::sources::Sources;
+use super::storage::Storage;
+use super::transition::{Memory, PATIENCE, Transition, Trigger};
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper, Times};
 use crate::integrate::switching::fire;
 use crate::settings::Settings;
 
-/// Times closer than this many units in the last place are one time.
-pub(super) const SAME_TIME_ULPS: f64 = 4.0;
+pub(crate) use pause::Place;
 
 /// Steps after which a run asks whether it may go on.
 const REST: u64 = 1 << 12;
@@ -53,64 +49,29 @@ pub struct Setup {
 
 /// See the [module](super).
 pub struct Exact {
-    pub(super) plant: Plant,
-    pub(super) sources: Vec<Source>,
-    pub(super) exosystem: Exosystem,
-    pub(super) motion: Motion,
-    pub(super) inspector: Inspector,
-    pub(super) mode: Option<usize>,
-    pub(super) key: Key,
-    /// Storage vector before the start or at the last change.
-    pub(super) storage: Vec<f64>,
-    /// Largest values of the storage elements so far, levelled by kind.
-    pub(super) scale: Vec<f64>,
-    /// ½ sᵀ M s of these, J.
-    pub(super) capacity: f64,
-    /// How large w and the storage can have been since the last event.
-    reach: Vec<f64>,
-    largest: Vec<f64>,
-    pub(super) volts: Vec<bool>,
-    /// By storage element: its name, and the unit of its state.
-    pub(super) elements: Vec<String>,
-    pub(super) units: Vec<&'static str>,
+    table: ModeTable,
+    sources: Sources,
+    storage: Storage,
+    motion: Motion,
+    pub(super) dense: DenseOutput,
+    inspector: Inspector,
+    memory: Memory,
+    report: Report,
+    /// The mode, and its name or what it is to be.
+    mode: Option<usize>,
+    key: Key,
     /// Where the switches would stand after a change that failed.
-    pub(super) wanted: Option<Vec<bool>>,
-    /// z at the last change or breakpoint.
-    pub(super) z: Vec<f64>,
-    /// u before a jump: at the end of the mode that is left, or before the start.
-    pub(super) before: DVector<f64>,
-    /// [`PROPOSALS`], the latest successful first.
-    pub(super) proposals: [f64; PROPOSALS.len()],
-    /// Modes left at the present instant.
-    pub(super) left_here: Vec<usize>,
-    pub(super) metric: Metric,
-    /// From start to end, s.
-    pub(super) duration: f64,
-    pub(super) until: f64,
-    pub(super) ahead: Ahead,
-    pub(super) started: bool,
-    /// When the next piece of a source ends, s.
-    next_piece: f64,
-    /// The next time at which something is known to happen, s.
-    next_stop: f64,
+    wanted: Option<Vec<bool>>,
+    /// From start to end, s, and the end.
+    duration: f64,
+    until: f64,
+    started: bool,
     /// A piece ended when the mode was last left.
-    pub(super) corner: bool,
-    pub(super) settings: Settings,
-    pub(super) energy: bool,
-    pub(super) balance: Balance,
-    pub(super) events: u64,
-    pub(super) jumps: u64,
-    pub(super) lcp_solves: u64,
-    pub(super) notes: Vec<Note>,
-    pub(super) accumulation: Accumulation,
-    pub(super) noted_shared: bool,
-    /// Whether a jump between rivals has been noted.
-    pub(super) noted_rivals: bool,
-    /// By switch, then by step of a function block: when it slid.
-    pub(super) slides: BTreeMap<usize, Slides>,
-    pub(super) row: Vec<f64>,
+    corner: bool,
+    settings: Settings,
+    row: Vec<f64>,
     /// By probe: a voltage.
-    pub(super) row_is_volts: Vec<bool>,
+    row_is_volts: Vec<bool>,
 }
 
 impl Exact {
@@ -121,7 +82,7 @@ impl Exact {
     pub fn new(setup: Setup) -> Result<Self, SimError> {
         let Setup {
             assembler,
-            mut position,
+            position,
             t,
             until,
             start,
@@ -130,88 +91,41 @@ impl Exact {
             free,
             settings,
         } = setup;
-        let mut plant = Plant::new(assembler, h, energy, settings.lcp_residual);
+        let mut table = ModeTable::new(assembler, h, energy, settings.lcp_residual);
         let mut key = Key {
-            closed: vec![false; plant.pairs],
-            switches: position.clone(),
+            closed: vec![false; table.pairs],
+            switches: position,
             sliding: Vec::new(),
         };
-        let lcs = plant.free(&key)?.lcs.clone();
-        let sources: Vec<Source> = lcs.inputs.iter().map(|i| i.source.clone()).collect();
-        let unsupported = || {
-            SimError::before(Reason::Unsupported(
-                "a source has no closed form as a linear system".to_string(),
-            ))
-        };
-        let (silent, controls) = plant.controls();
-        let before = sources.iter().zip(&silent);
-        let before = before.map(|(s, silent)| if *silent { 0.0 } else { s.value_left(t) });
-        let before = DVector::from_iterator(sources.len(), before);
-        let exosystem =
-            Exosystem::of(&sources, silent, (t, until), free).ok_or_else(unsupported)?;
-        plant.clocks = controls
-            .into_iter()
-            .map(|control| Clock::new(control, &sources, t))
-            .collect::<Option<_>>()
-            .ok_or_else(unsupported)?;
-        let mut z = vec![0.0; exosystem.dim()];
-        exosystem.write(t, &mut z);
-        for clock in &plant.clocks {
-            let i = clock.switch;
-            position[i] ^= clock.leaves(&plant.thresholds[i], position[i], t);
-        }
-        fire(&plant.thresholds, &mut position);
-        key.switches = position;
-        let volts = lcs.storage.units.iter().map(|unit| *unit == "V").collect();
-        let (elements, units) = (lcs.storage.elements.clone(), lcs.storage.units.clone());
-        let metric = Metric::new(&lcs.storage.metric);
-        let stored = metric.stored(start.as_slice());
-        let columns = lcs.outputs.names.len();
-        let mut exact = Self {
-            plant,
+        let controls = table.controls();
+        let lcs = &table.free(&key)?.lcs;
+        let all = lcs.inputs.iter().map(|i| i.source.clone()).collect();
+        let mut sources = Sources::new(all, controls, (t, until), free)?;
+        let storage = Storage::new(lcs, start.as_slice(), energy);
+        let row = vec![0.0; lcs.outputs.names.len()];
+        let row_is_volts = lcs.outputs.units.iter().map(|u| *u == "V").collect();
+        sources.position(&table.thresholds, &mut key.switches, t);
+        fire(&table.thresholds, &mut key.switches);
+        Ok(Self {
+            table,
             sources,
-            exosystem,
+            storage,
             motion: Motion::at(t),
+            dense: DenseOutput::default(),
             inspector: Inspector::default(),
+            memory: Memory::new(),
+            report: Report::new(t),
             mode: None,
             key,
-            storage: start.as_slice().to_vec(),
-            scale: vec![0.0; start.len()],
-            capacity: 0.0,
-            reach: vec![],
-            largest: vec![],
-            volts,
-            elements,
-            units,
             wanted: None,
-            z,
-            before,
-            proposals: PROPOSALS,
-            left_here: Vec::new(),
-            metric,
             duration: until - t,
             until,
-            ahead: Ahead::default(),
             started: false,
-            next_piece: f64::NEG_INFINITY,
-            next_stop: f64::NEG_INFINITY,
             corner: false,
             settings,
-            energy,
-            balance: Balance::new(stored),
-            events: 0,
-            jumps: 0,
-            lcp_solves: 0,
-            notes: Vec::new(),
-            accumulation: Accumulation::new(t),
-            noted_shared: false,
-            noted_rivals: false,
-            slides: BTreeMap::new(),
-            row: vec![0.0; columns],
-            row_is_volts: lcs.outputs.units.iter().map(|u| *u == "V").collect(),
-        };
-        exact.rescale();
-        Ok(exact)
+            row,
+            row_is_volts,
+        })
     }
 
     /// Tells which pairs conducted before the start: of several modes that hold, the first one tried.
@@ -221,56 +135,19 @@ impl Exact {
         }
     }
 
-    /// Raises the amplitudes to the present storage; elements of one kind share the largest.
-    pub(super) fn rescale(&mut self) {
-        let mut largest = [0.0_f64; 2];
-        for ((&volts, s), &scale) in self.volts.iter().zip(&self.storage).zip(&self.scale) {
-            let largest = &mut largest[usize::from(volts)];
-            *largest = largest.max(s.abs()).max(scale);
-        }
-        for (&volts, scale) in self.volts.iter().zip(&mut self.scale) {
-            *scale = largest[usize::from(volts)];
-        }
-        self.capacity = self.metric.stored(&self.scale);
-    }
-
     fn ulps(&self) -> f64 {
         SAME_TIME_ULPS * f64::EPSILON * self.motion.t.abs()
     }
 
-    pub(super) fn fail(&self, reason: Reason) -> SimError {
+    fn fail(&self, reason: Reason) -> SimError {
         SimError::at(self.motion.t, reason)
     }
 
-    /// u at the current time on the current pieces.
-    pub(super) fn inputs(&self, t: f64) -> DVector<f64> {
-        let mut z = DVector::zeros(self.exosystem.dim());
-        self.exosystem.write(t, z.as_mut_slice());
-        self.exosystem.output() * z
-    }
-
-    /// u at the end of mode `at`.
-    pub(super) fn inputs_at_end_of(&self, at: usize) -> DVector<f64> {
-        let n = self.plant.modes[at].n;
-        let z = &self.motion.now[n..n + self.exosystem.dim()];
-        self.exosystem.output() * DVector::from_column_slice(z)
-    }
-
     /// Reads the storage vector at the current state.
-    pub(super) fn take_storage(&mut self) {
+    fn take_storage(&mut self) {
         if let Some(at) = self.mode {
-            let mode = &mut self.plant.modes[at];
-            let [source, dissipated] = self.motion.take_energy(&mut mode.flow);
-            self.balance.add((source, dissipated));
-            mode.storage_at(&self.motion.now, &mut self.storage);
-            // An event often finds a current at zero: its size is what it was on the way.
-            self.motion.reach(&mut self.reach);
-            mode.storage.largest(&self.reach, &mut self.largest);
-            for (scale, largest) in self.scale.iter_mut().zip(&self.largest) {
-                *scale = scale.max(*largest);
-            }
-            self.rescale();
-            self.note_stored();
+            self.storage
+                .take(&mut self.table.modes[at], &mut self.motion);
         }
     }
 
@@ -279,15 +156,8 @@ impl Exact {
         if let Some(at) = self.mode
             && self.motion.age > resolution(self.motion.t)
         {
-            let mode = &self.plant.modes[at];
+            let mode = &self.table.modes[at];
             self.inspector.note_pace(mode, &self.motion.now);
-        }
-    }
-
-    /// Notes the stored energy.
-    pub(super) fn note_stored(&mut self) {
-        if self.energy {
-            self.balance.note(self.metric.stored(&self.storage));
         }
     }
 
@@ -299,24 +169,24 @@ impl Exact {
         if let (Some(at), Some(guard)) = (self.mode, fired) {
             self.leave_here(at, guard)?;
         } else {
-            self.left_here.clear();
+            self.memory.left_here.clear();
         }
         self.take_storage();
         self.take_pace();
-        let known = self.next_stop <= near;
+        let (corner, known) = self.sources.due(near);
         self.inspector.forget_slips();
-        self.corner = self.next_piece <= near;
-        let mut discontinuous = self.corner && self.take_pieces(near)?;
-        self.exosystem.write(t, &mut self.z);
+        self.corner = corner;
+        let mut discontinuous = corner && self.sources.take_pieces(t, near)?;
+        self.sources.stand(t);
         let mut key = std::mem::take(&mut self.key);
         if known {
-            discontinuous |= self.move_clocked(&mut key, near);
+            discontinuous |= self.sources.move_clocked(&mut key, near);
         }
         if discontinuous {
             key.sliding.clear();
         }
         discontinuous |= self.move_guarded(&mut key, fired, self.corner);
-        fire(&self.plant.thresholds, &mut key.switches);
+        fire(&self.table.thresholds, &mut key.switches);
         let trigger = fired.map_or(Trigger::Sources, Trigger::Guard);
         self.change(key, discontinuous, trigger, log)
     }
@@ -324,48 +194,33 @@ impl Exact {
     /// Takes note that mode `at` is left by a guard. One that is left at the instant at which it was entered was found by rounding:
     /// after [`PATIENCE`] of them none is entered again at this instant, and an instant without end is an internal error.
     fn leave_here(&mut self, at: usize, guard: usize) -> Result<(), SimError> {
-        if self.motion.age > f64::EPSILON * self.plant.modes[at].flow.shortest() {
-            self.left_here.clear();
+        if self.motion.age > f64::EPSILON * self.table.modes[at].flow.shortest() {
+            self.memory.left_here.clear();
         }
-        self.left_here.push(at);
-        if self.left_here.len() > PATIENCE + 2 * (self.plant.pairs + self.plant.thresholds.len()) {
+        self.memory.left_here.push(at);
+        if self.memory.left_here.len()
+            > PATIENCE + 2 * (self.table.pairs + self.table.thresholds.len())
+        {
             let what = "modes are left at the instant at which they were entered, without end";
             let reason = Reason::internal("integrate::exact", what);
-            return Err(self.fail(reason).device(self.owner_name(at, guard)));
+            return Err(self.fail(reason).device(self.table.owner_name(at, guard)));
         }
         Ok(())
     }
 
-    /// Moves the switches that sources alone control and that are due before `near`; whether one moved.
-    pub(super) fn move_clocked(&self, key: &mut Key, near: f64) -> bool {
-        let mut moved = false;
-        for clock in &self.plant.clocks {
-            if clock.next <= near {
-                key.switches[clock.switch] = !key.switches[clock.switch];
-                moved = true;
-            }
-        }
-        moved
-    }
-
     /// Moves the switches whose guards end the mode now: the one that `fired` and all that pass their thresholds with it, in the
     /// present mode with the sources as they go on after a `corner`. Whether one moved.
-    pub(super) fn move_guarded(
-        &mut self,
-        key: &mut Key,
-        fired: Option<usize>,
-        corner: bool,
-    ) -> bool {
+    fn move_guarded(&mut self, key: &mut Key, fired: Option<usize>, corner: bool) -> bool {
         let Some(at) = self.mode else { return false };
         let mut moved = false;
-        let owner = fired.map(|guard| self.plant.modes[at].owner(guard));
+        let owner = fired.map(|guard| self.table.modes[at].owner(guard));
         if let Some(guard) = fired {
             self.note_slip(at, guard);
         }
         match owner {
             // A thyristor's current ends, and no gate holds it.
             Some(Owner::Device(pair)) => {
-                for i in self.plant.released(pair, &key.switches) {
+                for i in self.table.released(pair, &key.switches) {
                     key.switches[i] = false;
                 }
             }
@@ -380,7 +235,7 @@ impl Exact {
             }
             Some(Owner::Switch(_)) | None => {}
         }
-        let mode = &self.plant.modes[at];
+        let mode = &self.table.modes[at];
         let first = mode.device_guards.len();
         let may_pass = |k: usize| {
             let decided = !corner && fired == Some(first + k);
@@ -392,9 +247,9 @@ impl Exact {
             .collect();
         if !candidates.is_empty() {
             let now = &self.motion.now[..mode.n];
-            self.inspector.look(mode, now, &self.z);
+            self.inspector.look(mode, now, &self.sources.z);
             for k in candidates {
-                let mode = &self.plant.modes[at];
+                let mode = &self.table.modes[at];
                 if self.inspector.leaves(mode, first + k, self.motion.t) {
                     let i = mode.guarded_switches[k];
                     key.switches[i] = !key.switches[i];
@@ -409,14 +264,14 @@ impl Exact {
     /// Notes that a guard of mode `at` passes zero now, where its quantity goes on in the next mode: the control of a switch, the input of
     /// a function block on a step. Of a diode's current and voltage one begins where the other ends.
     fn note_slip(&mut self, at: usize, guard: usize) {
-        let mode = &self.plant.modes[at];
+        let mode = &self.table.modes[at];
         let slope = self.motion.now[mode.flow.dim() + mode.flow.guards() + guard];
         let t = self.motion.t;
         match mode.owner(guard) {
             owner @ Owner::Switch(_) => self.inspector.note_slip(owner, t, slope),
             Owner::Device(pair) => {
                 let step = |step: &&Step| pair == step.pair || pair == step.pair + 1;
-                if let Some(step) = self.plant.steps().iter().find(step) {
+                if let Some(step) = self.table.steps().iter().find(step) {
                     for pair in [step.pair, step.pair + 1] {
                         self.inspector.note_slip(Owner::Device(pair), t, slope);
                     }
@@ -426,47 +281,150 @@ impl Exact {
         }
     }
 
-    /// Sources whose pieces end go on along the next ones; returns whether one of them jumps.
-    fn take_pieces(&mut self, near: f64) -> Result<bool, SimError> {
-        let mut edge = false;
-        for i in 0..self.sources.len() {
-            let old = self.exosystem.piece(i);
-            let end = old.end;
-            if end <= near {
-                let last = old.value(end);
-                let Some(piece) = self.sources[i].piece(end.max(self.motion.t)) else {
-                    return Err(
-                        self.fail(Reason::Unsupported("a source lost its closed form".into()))
-                    );
-                };
-                edge |= last != piece.value(end);
-                self.exosystem.set_piece(i, piece);
+    /// What a change of mode from here may look at and move.
+    fn transition(&mut self) -> Transition<'_> {
+        Transition {
+            t: self.motion.t,
+            mode: self.mode,
+            key: &self.key,
+            started: self.started,
+            table: &mut self.table,
+            sources: &mut self.sources,
+            storage: &mut self.storage,
+            inspector: &mut self.inspector,
+            report: &mut self.report,
+            memory: &mut self.memory,
+        }
+    }
+
+    /// Enters the mode from here on. Where there is none, everything is as it was before.
+    fn change(
+        &mut self,
+        mut key: Key,
+        discontinuous: bool,
+        trigger: Trigger,
+        log: &mut Log,
+    ) -> Result<(), SimError> {
+        self.wanted = None;
+        let left_row = (log.wants_rows() && self.started).then(|| {
+            self.read_row();
+            self.row.clone()
+        });
+        // Most changes are like one before.
+        let followed = self.transition().follow(&key, trigger);
+        if let Some((at, guards)) = &followed
+            && guards.is_empty()
+            && self.table.let_go(*at).next().is_none()
+        {
+            let at = *at;
+            key.closed.clone_from(&self.table.modes[at].key.closed);
+            self.enter(at, key, false, trigger, left_row, log);
+            return Ok(());
+        }
+        let left = self.mode.map(|at| self.table.modes[at].key.clone());
+        self.key = left.unwrap_or_else(|| key.clone());
+        let (values, scale) = (self.storage.values.clone(), self.storage.scale.clone());
+        let (balance, switches) = (self.storage.balance, key.switches.clone());
+        let (events, impulses) = (log.events.len(), log.impulses.len());
+        if let Some(at) = self.mode {
+            self.sources.leave(self.table.modes[at].n, &self.motion.now);
+        }
+        let mut transition = self.transition();
+        let found = transition.search(&mut key, discontinuous, trigger, followed, log);
+        match found {
+            Ok((at, jumped)) => {
+                if jumped {
+                    let reason = transition.jump_reason(at, trigger);
+                    let loss = self.storage.balance.lost_in_jumps() - balance.lost_in_jumps();
+                    self.storage
+                        .note_jump(self.motion.t, &values, loss, reason, log);
+                }
+                key.copy_from(&self.table.modes[at].key);
+                self.enter(at, key, jumped, trigger, left_row, log);
+                Ok(())
+            }
+            Err(error) => {
+                (self.storage.values, self.storage.scale) = (values, scale);
+                (self.storage.balance, self.wanted) = (balance, Some(switches));
+                log.back_to(events, impulses);
+                Err(error)
             }
         }
-        Ok(edge)
     }
 
-    /// When the driven switches move next on the present pieces, and what is known to happen first.
-    pub(super) fn look_ahead(&mut self) {
-        let end = self.exosystem.next_breakpoint();
-        (self.next_piece, self.next_stop) = (end, end);
-        for clock in &mut self.plant.clocks {
-            let i = clock.switch;
-            let (threshold, on) = (&self.plant.thresholds[i], self.key.switches[i]);
-            clock.look_ahead(threshold, on, (self.motion.t, self.until), &self.sources);
-            self.next_stop = self.next_stop.min(clock.next);
+    /// Enters mode `at`, which was inspected last, under its key.
+    fn enter(
+        &mut self,
+        at: usize,
+        key: Key,
+        jumped: bool,
+        trigger: Trigger,
+        left_row: Option<Vec<f64>>,
+        log: &mut Log,
+    ) {
+        let t = self.motion.t;
+        if let (Some(from), false) = (self.mode, jumped) {
+            self.table.modes[from].remember(trigger, at);
+        }
+        let same = self.mode == Some(at);
+        let from = self.mode.filter(|_| self.started);
+        self.report
+            .enter(&mut self.table, (from, at), t, jumped, log);
+        self.mode = Some(at);
+        self.key = key;
+        self.motion.power = self.storage.power(self.duration);
+        let Mode {
+            flow, magnitudes, ..
+        } = &self.table.modes[at];
+        self.motion.enter(flow, t, &self.inspector.w, magnitudes);
+        let span = (t, self.until);
+        self.sources
+            .look_ahead(&self.table.thresholds, &self.key.switches, span);
+        if jumped {
+            self.report.jumps += 1;
+        }
+        if let Some(before) = left_row {
+            self.read_row();
+            let jumped = row_jumps(&before, &self.row, &self.row_is_volts);
+            if jumped {
+                log.row(t, &before);
+            }
+            if jumped || !same {
+                log.row(t, &self.row);
+            } else if self.corner {
+                log.corner(t, &self.row);
+            }
         }
     }
 
-    pub(super) fn read_row(&mut self) {
+    /// Steps over as many rows as nothing can happen on, `t` the first of them and `next` when something is known to happen.
+    fn step_ahead(&mut self, at: usize, t: f64, next: f64) -> bool {
+        // What happens at the end of a step is left to the step that arrives there.
+        let longest = longest_step(self.table.output_step());
+        let negligible = GRID_ULPS * f64::EPSILON * (t + longest).abs();
+        let end = (next - negligible).min(self.until + negligible);
+        let mode = &mut self.table.modes[at];
+        self.dense.step(&mut self.motion, mode, t, end)
+    }
+
+    /// Stands at the last row that was asked for.
+    fn end_ahead(&mut self) {
         if let Some(at) = self.mode {
-            let mode = &self.plant.modes[at];
+            let flow = &mut self.table.modes[at].flow;
+            self.dense
+                .end(&mut self.motion, flow, &self.sources.exosystem);
+        }
+    }
+
+    fn read_row(&mut self) {
+        if let Some(at) = self.mode {
+            let mode = &self.table.modes[at];
             mode.outputs.apply(&self.motion.now, &mut self.row);
         }
     }
 
-    pub(super) fn start(&mut self, log: &mut Log) -> Result<(), SimError> {
-        self.exosystem.write(self.motion.t, &mut self.z);
+    fn start(&mut self, log: &mut Log) -> Result<(), SimError> {
+        self.sources.stand(self.motion.t);
         let key = std::mem::take(&mut self.key);
         self.change(key, true, Trigger::Sources, log)?;
         self.started = true;
@@ -476,8 +434,8 @@ impl Exact {
 
 impl Stepper for Exact {
     fn time(&self) -> f64 {
-        if self.ahead.leads() {
-            self.ahead.t
+        if self.dense.leads() {
+            self.dense.t
         } else {
             self.motion.t
         }
@@ -487,17 +445,20 @@ impl Stepper for Exact {
         if !self.started {
             self.start(log)?;
         }
-        if self.has_row(t) {
-            return Ok(());
+        if self.dense.leads() {
+            if self.dense.take(t, self.table.output_step()) {
+                return Ok(());
+            }
+            self.end_ahead();
         }
         loop {
-            let next = self.next_stop;
+            let next = self.sources.next_stop;
             let due = next <= t + SAME_TIME_ULPS * f64::EPSILON * t.abs();
             let stop = if due { next.min(t) } else { t };
             let Some(at) = self.mode else {
                 return Err(self.fail(Reason::internal("integrate::exact", "a run in no mode")));
             };
-            let flow = &self.plant.modes[at].flow;
+            let flow = &self.table.modes[at].flow;
             if flow.loss > MOST_LOSS && flow.guards() > 0 {
                 return Err(self.fail(Reason::NotGraded { loss: flow.loss }));
             }
@@ -506,25 +467,26 @@ impl Stepper for Exact {
             }
             let (from, rest) = (self.motion.t, self.motion.steps + REST);
             self.motion.most = self.settings.max_steps.min(rest);
-            match self
-                .motion
-                .travel(&mut self.plant.modes[at].flow, &self.exosystem, stop)
-            {
+            match self.motion.travel(
+                &mut self.table.modes[at].flow,
+                &self.sources.exosystem,
+                stop,
+            ) {
                 Arrival::Reached if due => self.instant(None, log)?,
                 Arrival::Reached => return Ok(()),
                 Arrival::Fired(guard) => {
                     self.instant(Some(guard), log)?;
-                    let (t, h) = (self.motion.t, self.plant.output_step());
-                    if let Some((events, span)) = self.accumulation.burst(t, h) {
+                    let (t, h) = (self.motion.t, self.table.output_step());
+                    if let Some((events, span)) = self.report.accumulation.burst(t, h) {
                         let error = self.fail(Reason::EventsAccumulate { events, span });
-                        return Err(error.device(self.owner_name(at, guard)));
+                        return Err(error.device(self.table.owner_name(at, guard)));
                     }
                 }
                 Arrival::Overflow => return Err(self.fail(Reason::Overflow)),
                 // A guard that rounding keeps near zero allows only steps of the fastest time constant, hidden from the output.
                 Arrival::Resting => {
                     let (span, runs) = (self.motion.t - from, self.settings.max_steps / REST);
-                    if self.motion.steps > rest && span * (runs as f64) < self.plant.output_step() {
+                    if self.motion.steps > rest && span * (runs as f64) < self.table.output_step() {
                         return Err(self.fail(Reason::NoProgress { steps: REST, span }));
                     }
                 }
@@ -542,32 +504,25 @@ impl Stepper for Exact {
     }
 
     fn read(&mut self, row: &mut [f64]) {
-        if let Some(values) = self.ahead.row(row.len()) {
+        if let Some(values) = self.dense.row(row.len()) {
             row.copy_from_slice(values);
         } else if let Some(at) = self.mode {
-            self.plant.modes[at].outputs.apply(&self.motion.now, row);
+            self.table.modes[at].outputs.apply(&self.motion.now, row);
         }
     }
 
     fn rows_ahead(&mut self, times: &Times, k: usize) -> &[f64] {
-        self.take_rows(times, k)
+        let (columns, h) = (self.row.len(), self.table.output_step());
+        self.dense.take_all(times, k, columns, h)
     }
 
     fn finish(&mut self) -> Outcome {
         self.end_ahead();
         self.take_storage();
-        self.note_end();
-        let mut outcome = Outcome {
-            notes: std::mem::take(&mut self.notes),
-            ..Outcome::default()
-        };
+        let (t, duration) = (self.motion.t, self.duration);
+        let mut outcome = self.report.finish(&self.table, t, duration);
         outcome.stats.steps = self.motion.steps;
-        outcome.stats.events = self.events;
-        outcome.stats.jumps = self.jumps;
-        outcome.stats.modes = self.plant.modes.len() as u64;
-        outcome.stats.lcp_solves = self.lcp_solves;
-        outcome.stats.factorisations = self.plant.factorisations();
-        outcome.energy = self.balance.energy();
+        outcome.energy = self.storage.balance.energy();
         outcome
     }
 }

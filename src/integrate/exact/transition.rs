@@ -2,9 +2,12 @@
 
 use nalgebra::DVector;
 
-use super::inspect::Finding;
-use super::mode::{Key, Mode, Owner};
-use super::stepper::Exact;
+use super::inspect::{Finding, Inspector};
+use super::mode::{Key, Owner};
+use super::plant::ModeTable;
+use super::report::Report;
+use super::sources::Sources;
+use super::storage::Storage;
 use crate::integrate::run::{Log, Reason, SimError};
 use crate::integrate::settle;
 use crate::integrate::switching::fire;
@@ -27,63 +30,53 @@ pub(crate) enum Trigger {
     Sources,
 }
 
-impl Exact {
-    /// Enters the mode from here on. Where there is none, everything is as it was before.
-    pub(super) fn change(
-        &mut self,
-        mut key: Key,
-        discontinuous: bool,
-        trigger: Trigger,
-        log: &mut Log,
-    ) -> Result<(), SimError> {
-        self.wanted = None;
-        let left_row = (log.wants_rows() && self.started).then(|| {
-            self.read_row();
-            self.row.clone()
-        });
-        // Most changes are like one before.
-        let followed = self.follow(&key, trigger);
-        if let Some((at, guards)) = &followed
-            && guards.is_empty()
-            && self.let_go(*at).next().is_none()
-        {
-            let at = *at;
-            key.closed.clone_from(&self.plant.modes[at].key.closed);
-            self.enter(at, key, false, trigger, left_row, log);
-            return Ok(());
+/// What is remembered from one change of mode to the next.
+pub(super) struct Memory {
+    /// [`PROPOSALS`], the latest successful first.
+    proposals: [f64; PROPOSALS.len()],
+    /// Modes left at the present instant.
+    pub(super) left_here: Vec<usize>,
+}
+
+impl Memory {
+    pub(super) const fn new() -> Self {
+        Self {
+            proposals: PROPOSALS,
+            left_here: Vec::new(),
         }
-        let left = self.mode.map(|at| self.plant.modes[at].key.clone());
-        self.key = left.unwrap_or_else(|| key.clone());
-        let (storage, scale) = (self.storage.clone(), self.scale.clone());
-        let (balance, switches) = (self.balance, key.switches.clone());
-        let (events, impulses) = (log.events.len(), log.impulses.len());
-        if let Some(at) = self.mode {
-            self.before = self.inputs_at_end_of(at);
-        }
-        let found = self.search(&mut key, discontinuous, trigger, followed, log);
-        match found {
-            Ok((at, jumped)) => {
-                if jumped {
-                    let loss = self.balance.lost_in_jumps() - balance.lost_in_jumps();
-                    let reason = self.jump_reason(at, trigger);
-                    self.note_jump(&storage, loss, reason, log);
-                }
-                key.copy_from(&self.plant.modes[at].key);
-                self.enter(at, key, jumped, trigger, left_row, log);
-                Ok(())
-            }
-            Err(error) => {
-                (self.storage, self.scale) = (storage, scale);
-                (self.balance, self.wanted) = (balance, Some(switches));
-                log.back_to(events, impulses);
-                Err(error)
-            }
-        }
+    }
+
+    /// Whether a mode was left at this instant too often to be entered again.
+    fn is_barred(&self, at: usize) -> bool {
+        self.left_here.len() > PATIENCE && self.left_here.contains(&at)
+    }
+}
+
+/// A change of mode: from where, and what it may move.
+pub(super) struct Transition<'a> {
+    /// Time, s.
+    pub(super) t: f64,
+    /// The mode that is left, if any, and what stood in it.
+    pub(super) mode: Option<usize>,
+    pub(super) key: &'a Key,
+    /// Whether there was a mode before.
+    pub(super) started: bool,
+    pub(super) table: &'a mut ModeTable,
+    pub(super) sources: &'a mut Sources,
+    pub(super) storage: &'a mut Storage,
+    pub(super) inspector: &'a mut Inspector,
+    pub(super) report: &'a mut Report,
+    pub(super) memory: &'a mut Memory,
+}
+
+impl Transition<'_> {
+    pub(super) fn fail(&self, reason: Reason) -> SimError {
+        SimError::at(self.t, reason)
     }
 
     /// Finds the mode and whether the state jumps into it: positions of the switches, impulse of the devices, conducting devices.
     /// `followed` is what [`Self::follow`] found.
-    fn search(
+    pub(super) fn search(
         &mut self,
         key: &mut Key,
         mut discontinuous: bool,
@@ -97,7 +90,7 @@ impl Exact {
         let mut entry = None;
         let mut moving: Vec<usize> = Vec::new();
         let mut followed = Some(followed);
-        for _ in 0..3 + 2 * self.plant.thresholds.len() {
+        for _ in 0..3 + 2 * self.table.thresholds.len() {
             if discontinuous && self.settle(key)? {
                 followed = None;
             }
@@ -123,7 +116,7 @@ impl Exact {
                 }
                 found = self.find_mode(key, trigger)?;
             }
-            if found.is_none() && self.plant.pairs > 0 {
+            if found.is_none() && self.table.pairs > 0 {
                 found = self.jump_into(key, log)?;
                 jumped |= found.is_some();
             }
@@ -131,8 +124,8 @@ impl Exact {
                 let device = self.culprit(key, trigger);
                 return Err(self.fail(Reason::Infeasible).devices(device));
             };
-            key.closed.clone_from(&self.plant.modes[at].key.closed);
-            leaving.extend(self.let_go(at));
+            key.closed.clone_from(&self.table.modes[at].key.closed);
+            leaving.extend(self.table.let_go(at));
             leaving.sort_unstable();
             leaving.dedup();
             if leaving.is_empty() {
@@ -154,7 +147,7 @@ impl Exact {
                     moving.push(i);
                 }
             }
-            fire(&self.plant.thresholds, &mut key.switches);
+            fire(&self.table.thresholds, &mut key.switches);
             if again || positions.contains(&key.switches) {
                 // The switches that moved last contradict themselves, or all that moved contradict each other.
                 entry = self
@@ -169,7 +162,7 @@ impl Exact {
         let at = entry.ok_or_else(|| {
             let names = moving
                 .iter()
-                .map(|&i| self.plant.thresholds[i].name.as_str());
+                .map(|&i| self.table.thresholds[i].name.as_str());
             self.fail(Reason::SwitchesDoNotSettle).devices(names)
         })?;
         Ok((at, jumped))
@@ -180,9 +173,9 @@ impl Exact {
         if !key.sliding.is_empty() || key.switches.len() < 2 {
             return Ok(false);
         }
-        let u = self.inputs(self.motion.t);
-        let s = DVector::from_column_slice(&self.storage);
-        let thresholds = self.plant.thresholds.clone();
+        let u = self.sources.inputs(self.t);
+        let s = DVector::from_column_slice(&self.storage.values);
+        let thresholds = self.table.thresholds.clone();
         let mut candidate = key.clone();
         settle::settle(
             &thresholds,
@@ -190,75 +183,20 @@ impl Exact {
             &mut key.switches,
             |position| {
                 candidate.switches.copy_from_slice(position);
-                let lcs = &self.plant.free(&candidate)?.lcs;
+                let lcs = &self.table.free(&candidate)?.lcs;
                 let mut asking = settle::asking(lcs, &thresholds, position, &s, &u);
-                asking.retain(|i| self.plant.clocks.iter().all(|clock| clock.switch != *i));
+                asking.retain(|&i| !self.sources.control(i));
                 Ok(asking)
             },
         )
     }
 
-    /// Enters mode `at`, which was inspected last, under its key.
-    fn enter(
-        &mut self,
-        at: usize,
-        key: Key,
-        jumped: bool,
-        trigger: Trigger,
-        left_row: Option<Vec<f64>>,
-        log: &mut Log,
-    ) {
-        let t = self.motion.t;
-        if let (Some(from), false) = (self.mode, jumped) {
-            self.plant.modes[from].remember(trigger, at);
-        }
-        let same = self.mode == Some(at);
-        self.report(at, jumped, log);
-        self.note_slides(at);
-        self.mode = Some(at);
-        self.key = key;
-        if self.energy {
-            self.motion.power = self.capacity.max(self.balance.largest()) / self.duration;
-        }
-        let Mode {
-            flow, magnitudes, ..
-        } = &self.plant.modes[at];
-        self.motion.enter(flow, t, &self.inspector.w, magnitudes);
-        self.look_ahead();
-        if jumped {
-            self.jumps += 1;
-        }
-        if let Some(before) = left_row {
-            self.read_row();
-            let jumped = self.row_jumps(&before);
-            if jumped {
-                log.row(t, &before);
-            }
-            if jumped || !same {
-                log.row(t, &self.row);
-            } else if self.corner {
-                log.corner(t, &self.row);
-            }
-        }
-    }
-
-    /// Thyristors that hold themselves in mode `at` although their valves block.
-    fn let_go(&self, at: usize) -> impl Iterator<Item = usize> {
-        let Key {
-            closed, switches, ..
-        } = &self.plant.modes[at].key;
-        let blocks = |i: usize| self.plant.valves[i].is_some_and(|pair| !closed[pair]);
-        let thresholds = self.plant.thresholds.iter().enumerate();
-        let holding = thresholds.filter(|(i, t)| t.holds(switches[*i], switches));
-        holding.map(|(i, _)| i).filter(move |&i| blocks(i))
-    }
-
     /// The device or switches at which no mode goes on.
     fn culprit(&mut self, key: &Key, trigger: Trigger) -> Vec<String> {
         let moved: Vec<String> = (0..key.switches.len())
-            .filter(|&i| !self.plant.thresholds[i].is_rest())
+            .filter(|&i| !self.table.thresholds[i].is_rest())
             .filter(|&i| self.key.switches.get(i) != key.switches.get(i))
-            .map(|i| self.plant.thresholds[i].name.clone())
+            .map(|i| self.table.thresholds[i].name.clone())
             .collect();
         if !moved.is_empty() {
             return moved;
@@ -266,28 +204,19 @@ impl Exact {
         let guard = match (trigger, self.mode) {
             (Trigger::Guard(guard), Some(from)) => Some((from, guard)),
             _ => self
-                .plant
-                .mode(key, &self.exosystem)
+                .table
+                .mode(key, self.sources)
                 .and_then(|at| match self.inspect(at) {
                     Finding::Refused(guard) => Some((at, guard)),
                     Finding::Inconsistent | Finding::Holds(_) => None,
                 }),
         };
-        let first = || self.plant.device(0).map(String::from);
+        let first = || self.table.device(0).map(String::from);
         guard
-            .map(|(at, guard)| self.owner_name(at, guard))
+            .map(|(at, guard)| self.table.owner_name(at, guard))
             .or_else(first)
             .into_iter()
             .collect()
-    }
-
-    /// The device or switch of a guard of mode `at`.
-    pub(super) fn owner_name(&self, at: usize, guard: usize) -> String {
-        let name = match self.plant.modes[at].owner(guard) {
-            Owner::Switch(i) | Owner::Slide(i, _) => Some(self.plant.thresholds[i].name.as_str()),
-            Owner::Device(pair) => self.plant.device(pair),
-        };
-        name.unwrap_or_default().to_string()
     }
 
     /// The mode in which these switches stay on their thresholds, where closing and opening contradict each other.
@@ -295,7 +224,7 @@ impl Exact {
         // A latch has no position between on and off.
         if switches
             .iter()
-            .any(|&i| self.plant.thresholds[i].latch.is_some())
+            .any(|&i| self.table.thresholds[i].latch.is_some())
         {
             return None;
         }
@@ -325,10 +254,10 @@ impl Exact {
             candidate.switches[i] = false;
         }
         for _ in 0..=switches.len() {
-            let at = self.plant.mode(&candidate, &self.exosystem)?;
+            let at = self.table.mode(&candidate, self.sources)?;
             let refused = match self.inspect(at) {
                 Finding::Holds(leaving) => return leaving.is_empty().then_some(at),
-                Finding::Refused(guard) => self.plant.modes[at].owner(guard),
+                Finding::Refused(guard) => self.table.modes[at].owner(guard),
                 Finding::Inconsistent => return None,
             };
             let Owner::Slide(i, _) = refused else {
@@ -341,24 +270,19 @@ impl Exact {
     }
 
     /// The mode that followed the same trigger before, if it holds now.
-    fn follow(&mut self, key: &Key, trigger: Trigger) -> Option<(usize, Vec<usize>)> {
+    pub(super) fn follow(&mut self, key: &Key, trigger: Trigger) -> Option<(usize, Vec<usize>)> {
         let from = self.mode?;
-        for k in 0..self.plant.modes[from].successors.len() {
-            let (why, at) = self.plant.modes[from].successors[k];
+        for k in 0..self.table.modes[from].successors.len() {
+            let (why, at) = self.table.modes[from].successors[k];
             if why == trigger
-                && self.plant.modes[at].key.same_switches(key)
-                && !self.is_barred(at)
+                && self.table.modes[at].key.same_switches(key)
+                && !self.memory.is_barred(at)
                 && let Some(leaving) = self.try_mode(at)
             {
                 return Some((at, leaving));
             }
         }
         None
-    }
-
-    /// Whether a mode was left at this instant too often to be entered again.
-    fn is_barred(&self, at: usize) -> bool {
-        self.left_here.len() > PATIENCE && self.left_here.contains(&at)
     }
 
     /// A mode that holds on some interval after now: from one implicit step of the complementarity system at several
@@ -370,16 +294,16 @@ impl Exact {
         trigger: Trigger,
     ) -> Result<Option<(usize, Vec<usize>)>, SimError> {
         let mut tried: Vec<Vec<bool>> = Vec::new();
-        if trigger == Trigger::Sources || self.plant.pairs == 0 {
+        if trigger == Trigger::Sources || self.table.pairs == 0 {
             tried.push(key.closed.clone());
             if let Some(found) = self.try_key(key) {
                 return Ok(Some(found));
             }
         }
-        if self.plant.pairs == 0 {
+        if self.table.pairs == 0 {
             return Ok(None);
         }
-        if key.sliding.is_empty() || self.plant.free(key).is_ok() {
+        if key.sliding.is_empty() || self.table.free(key).is_ok() {
             if let Some(found) = self.try_proposals(key, &mut tried)? {
                 return Ok(Some(found));
             }
@@ -420,7 +344,7 @@ impl Exact {
         which: usize,
         tried: &mut Vec<Vec<bool>>,
     ) -> Option<(usize, Vec<usize>)> {
-        for j in 0..self.plant.pairs {
+        for j in 0..self.table.pairs {
             let mut closed = tried[which].clone();
             closed[j] = !closed[j];
             if tried.contains(&closed) {
@@ -446,15 +370,15 @@ impl Exact {
     ) -> Option<(usize, Vec<usize>)> {
         for start in 0..proposed {
             let mut closed = tried[start].clone();
-            for _ in 0..2 * self.plant.pairs {
+            for _ in 0..2 * self.table.pairs {
                 let candidate = key.with_closed(closed.clone());
-                let Some(at) = self.plant.mode(&candidate, &self.exosystem) else {
+                let Some(at) = self.table.mode(&candidate, self.sources) else {
                     break;
                 };
                 match self.inspect(at) {
                     Finding::Holds(leaving) => return Some((at, leaving)),
                     Finding::Refused(guard) => {
-                        let Owner::Device(pair) = self.plant.modes[at].owner(guard) else {
+                        let Owner::Device(pair) = self.table.modes[at].owner(guard) else {
                             break;
                         };
                         // The pair of a switch on its threshold stays closed.
@@ -480,15 +404,15 @@ impl Exact {
         key: &Key,
         tried: &mut Vec<Vec<bool>>,
     ) -> Result<Option<(usize, Vec<usize>)>, SimError> {
-        let t = self.motion.t;
-        let fastest = self.plant.fastest();
-        let free = self.plant.free(key)?;
-        let x = free.state_from(&self.storage);
-        for (k, part) in self.proposals.into_iter().enumerate() {
+        let t = self.t;
+        let fastest = self.table.fastest();
+        let free = self.table.free(key)?;
+        let x = free.state_from(&self.storage.values);
+        for (k, part) in self.memory.proposals.into_iter().enumerate() {
             let h = part / fastest;
-            let u = self.inputs(t + h);
-            self.lcp_solves += 1;
-            let Some(proposal) = self.plant.free(key)?.propose(&x, &u, h) else {
+            let u = self.sources.inputs(t + h);
+            self.report.lcp_solves += 1;
+            let Some(proposal) = self.table.free(key)?.propose(&x, &u, h) else {
                 continue;
             };
             for closed in [proposal.open(), proposal.as_before(&key.closed)] {
@@ -499,7 +423,7 @@ impl Exact {
                 let candidate = key.with_closed(closed);
                 if let Some(found) = self.try_key(&candidate) {
                     // What was found once is tried first from now on.
-                    self.proposals[..=k].rotate_right(1);
+                    self.memory.proposals[..=k].rotate_right(1);
                     return Ok(Some(found));
                 }
             }
@@ -508,8 +432,8 @@ impl Exact {
     }
 
     pub(super) fn try_key(&mut self, key: &Key) -> Option<(usize, Vec<usize>)> {
-        let at = self.plant.mode(key, &self.exosystem)?;
-        if self.is_barred(at) {
+        let at = self.table.mode(key, self.sources)?;
+        if self.memory.is_barred(at) {
             return None;
         }
         self.try_mode(at).map(|leaving| (at, leaving))
@@ -517,10 +441,10 @@ impl Exact {
 
     fn inspect(&mut self, at: usize) -> Finding {
         self.inspector.inspect(
-            &mut self.plant.modes[at],
-            (&self.exosystem, self.motion.t, &self.z),
-            &self.storage,
-            &self.scale,
+            &mut self.table.modes[at],
+            (&self.sources.exosystem, self.t, &self.sources.z),
+            &self.storage.values,
+            &self.storage.scale,
         )
     }
 

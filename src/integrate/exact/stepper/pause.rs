@@ -2,14 +2,14 @@
 
 use nalgebra::DVector;
 
-use super::accumulation::Accumulation;
-use super::mode::Key;
-use super::stepper::Exact;
-use super::transition::Trigger;
+use super::Exact;
 use crate::circuit::Source;
 use crate::integrate::Energy;
 use crate::integrate::energy::Balance;
-use crate::integrate::run::{Log, Reason, SimError};
+use crate::integrate::exact::accumulation::Accumulation;
+use crate::integrate::exact::mode::Key;
+use crate::integrate::exact::transition::Trigger;
+use crate::integrate::run::{Log, SimError};
 use crate::integrate::switching::fire;
 
 /// Where one method leaves a run and another goes on.
@@ -30,7 +30,7 @@ impl Exact {
         self.take_storage();
         Place {
             t: self.motion.t,
-            storage: DVector::from_column_slice(&self.storage),
+            storage: DVector::from_column_slice(&self.storage.values),
             switches: self.key.switches.clone(),
         }
     }
@@ -42,17 +42,17 @@ impl Exact {
 
     /// Events seen so far say nothing about those to come.
     pub(crate) fn forget_events(&mut self) {
-        self.accumulation = Accumulation::new(f64::NEG_INFINITY);
+        self.report.accumulation = Accumulation::new(f64::NEG_INFINITY);
     }
 
     /// The balance so far; another one to go on with.
     pub(crate) const fn balance(&mut self) -> &mut Balance {
-        &mut self.balance
+        &mut self.storage.balance
     }
 
     /// A source has another waveform from here on; what that makes happen is left to [`Self::resume`].
     pub(crate) fn replace_source(&mut self, input: usize, source: Source) {
-        self.sources[input] = source;
+        self.sources.replace(input, source);
     }
 
     /// A source has another waveform from here on: an edge now. For an integrator made for sources that are free.
@@ -70,26 +70,19 @@ impl Exact {
         }
         self.end_ahead();
         self.take_storage();
-        self.left_here.clear();
+        self.memory.left_here.clear();
         self.inspector.forget_slips();
         self.inspector.forget_pace();
         let t = self.motion.t;
-        let Some(piece) = source.piece(t) else {
-            return Err(self.fail(Reason::Unsupported("a source has no closed form".into())));
-        };
-        self.sources[input] = source;
-        self.exosystem.set_piece(input, piece);
-        self.exosystem.write(t, &mut self.z);
+        self.sources.replace(input, source);
+        self.sources.take_piece(input, t)?;
         let mut key = std::mem::take(&mut self.key);
-        for clock in &mut self.plant.clocks {
-            let i = clock.switch;
-            clock.stand_at(&self.sources, t);
-            key.switches[i] ^= clock.leaves(&self.plant.thresholds[i], key.switches[i], t);
-        }
+        let thresholds = &self.table.thresholds;
+        self.sources.position(thresholds, &mut key.switches, t);
         key.sliding.clear();
         self.corner = true;
         self.move_guarded(&mut key, None, true);
-        fire(&self.plant.thresholds, &mut key.switches);
+        fire(&self.table.thresholds, &mut key.switches);
         self.change(key, true, Trigger::Sources, log)
     }
 
@@ -97,11 +90,12 @@ impl Exact {
     pub(crate) fn leave(&mut self) -> Place {
         self.end_ahead();
         self.take_storage();
-        self.close_slides();
+        self.report.close_slides(self.motion.t);
+        self.key.sliding.clear();
         self.mode = None;
         Place {
             t: self.motion.t,
-            storage: DVector::from_column_slice(&self.storage),
+            storage: DVector::from_column_slice(&self.storage.values),
             switches: self
                 .wanted
                 .take()
@@ -115,24 +109,15 @@ impl Exact {
     /// No mode holds there; the run may be taken up at a later place.
     pub(crate) fn resume(&mut self, place: &Place, energy: &Energy) -> Result<(), SimError> {
         self.stand_at(place, energy);
-        for i in 0..self.sources.len() {
-            let Some(piece) = self.sources[i].piece(place.t) else {
-                return Err(self.fail(Reason::Unsupported("a source has no closed form".into())));
-            };
-            self.exosystem.set_piece(i, piece);
-        }
+        self.sources.resume(place.t)?;
         let mut switches = place.switches.clone();
-        for clock in &mut self.plant.clocks {
-            let i = clock.switch;
-            clock.stand_at(&self.sources, place.t);
-            switches[i] ^= clock.leaves(&self.plant.thresholds[i], switches[i], place.t);
-        }
+        let thresholds = &self.table.thresholds;
+        self.sources.position(thresholds, &mut switches, place.t);
         self.inspector.forget_slips();
         self.inspector.forget_pace();
-        self.left_here.clear();
-        self.exosystem.write(place.t, &mut self.z);
+        self.memory.left_here.clear();
         // Its edges have acted.
-        self.before = self.inputs(place.t);
+        self.sources.before = self.sources.inputs(place.t);
         let key = Key {
             closed: self.key.closed.clone(),
             switches,
@@ -140,20 +125,19 @@ impl Exact {
         };
         // Its state satisfies the constraints up to rounding; what is left of a jump is not worth a word.
         let mut log = Log::new(0, f64::INFINITY, false);
-        let jumps = self.jumps;
+        let jumps = self.report.jumps;
         self.started = false;
         let result = self.change(key, true, Trigger::Sources, &mut log);
         self.started = true;
-        self.jumps = jumps;
+        self.report.jumps = jumps;
         result
     }
 
     /// Takes over a place, without a mode, with the energy spent since [`Self::leave`].
     pub(crate) fn stand_at(&mut self, place: &Place, energy: &Energy) {
         self.motion.t = place.t;
-        self.storage.copy_from_slice(place.storage.as_slice());
-        self.rescale();
-        self.balance.add_part(energy);
-        self.note_stored();
+        self.storage.set(place.storage.as_slice());
+        self.storage.balance.add_part(energy);
+        self.storage.note_stored();
     }
 }

@@ -1,0 +1,147 @@
+//! Charges and fluxes: where they stand, how large they have been, and their energy.
+
+use nalgebra::DMatrix;
+
+use super::mode::Mode;
+use super::motion::Motion;
+use crate::integrate::energy::Balance;
+use crate::integrate::run::Log;
+use crate::integrate::stats::{JumpReason, StateJump};
+use crate::lcs::Lcs;
+
+/// Movements of the storage below this part of its amplitude are rounding and no jump.
+pub(super) const ROUNDING: f64 = 1e-12;
+
+/// The storage vector s of a run.
+pub(super) struct Storage {
+    /// s before the start or at the last change.
+    pub(super) values: Vec<f64>,
+    /// Largest values so far, those of one kind levelled.
+    pub(super) scale: Vec<f64>,
+    /// ½ sᵀ M s of these, J.
+    pub(super) capacity: f64,
+    /// M by what is not zero in it.
+    metric: Vec<(usize, usize, f64)>,
+    /// By element: a voltage.
+    volts: Vec<bool>,
+    /// By element: its name, and the unit of its state.
+    elements: Vec<String>,
+    units: Vec<&'static str>,
+    /// Whether the balance is asked for.
+    balanced: bool,
+    pub(super) balance: Balance,
+    /// Work space: how large w and s can have been since the last event.
+    reach: Vec<f64>,
+    largest: Vec<f64>,
+}
+
+/// ½ sᵀ M s, J.
+fn stored(metric: &[(usize, usize, f64)], s: &[f64]) -> f64 {
+    let terms = metric.iter().map(|&(i, j, m)| m * s[i] * s[j]);
+    0.5 * terms.sum::<f64>()
+}
+
+/// What is not zero in a matrix.
+fn entries(matrix: &DMatrix<f64>) -> Vec<(usize, usize, f64)> {
+    let columns = (0..matrix.ncols()).flat_map(|j| (0..matrix.nrows()).map(move |i| (i, j)));
+    let entries = columns.map(|(i, j)| (i, j, matrix[(i, j)]));
+    entries.filter(|(.., m)| *m != 0.0).collect()
+}
+
+impl Storage {
+    /// Of a system that starts from s; `balanced` asks for the energy balance.
+    pub(super) fn new(lcs: &Lcs, s: &[f64], balanced: bool) -> Self {
+        let metric = entries(&lcs.storage.metric);
+        let mut storage = Self {
+            values: s.to_vec(),
+            scale: vec![0.0; s.len()],
+            capacity: 0.0,
+            volts: lcs.storage.units.iter().map(|unit| *unit == "V").collect(),
+            elements: lcs.storage.elements.clone(),
+            units: lcs.storage.units.clone(),
+            balanced,
+            balance: Balance::new(stored(&metric, s)),
+            metric,
+            reach: Vec::new(),
+            largest: Vec::new(),
+        };
+        storage.rescale();
+        storage
+    }
+
+    /// ½ sᵀ M s of another s, J.
+    pub(super) fn stored(&self, s: &[f64]) -> f64 {
+        stored(&self.metric, s)
+    }
+
+    /// Raises the amplitudes to the present values; elements of one kind share the largest.
+    pub(super) fn rescale(&mut self) {
+        let mut largest = [0.0_f64; 2];
+        for ((&volts, s), &scale) in self.volts.iter().zip(&self.values).zip(&self.scale) {
+            let largest = &mut largest[usize::from(volts)];
+            *largest = largest.max(s.abs()).max(scale);
+        }
+        for (&volts, scale) in self.volts.iter().zip(&mut self.scale) {
+            *scale = largest[usize::from(volts)];
+        }
+        self.capacity = stored(&self.metric, &self.scale);
+    }
+
+    /// Reads s and the energy spent where the motion stands in this mode.
+    pub(super) fn take(&mut self, mode: &mut Mode, motion: &mut Motion) {
+        let [source, dissipated] = motion.take_energy(&mut mode.flow);
+        self.balance.add((source, dissipated));
+        mode.storage_at(&motion.now, &mut self.values);
+        // An event often finds a current at zero: its size is what it was on the way.
+        motion.reach(&mut self.reach);
+        mode.storage.largest(&self.reach, &mut self.largest);
+        for (scale, largest) in self.scale.iter_mut().zip(&self.largest) {
+            *scale = scale.max(*largest);
+        }
+        self.rescale();
+        self.note_stored();
+    }
+
+    /// Takes over the values of another method.
+    pub(super) fn set(&mut self, s: &[f64]) {
+        self.values.copy_from_slice(s);
+        self.rescale();
+    }
+
+    /// Notes the stored energy.
+    pub(super) fn note_stored(&mut self) {
+        if self.balanced {
+            self.balance.note(self.stored(&self.values));
+        }
+    }
+
+    /// The power that energies of a run of `duration` seconds are measured by, W; 0 where no balance is asked for.
+    pub(super) fn power(&self, duration: f64) -> f64 {
+        if self.balanced {
+            self.capacity.max(self.balance.largest()) / duration
+        } else {
+            0.0
+        }
+    }
+
+    /// Writes down that s jumped at t from `before`, losing so much, J, if it did by more than rounding.
+    pub(super) fn note_jump(
+        &self,
+        t: f64,
+        before: &[f64],
+        loss: f64,
+        reason: JumpReason,
+        log: &mut Log,
+    ) {
+        let moved = |k: usize| {
+            let (a, b) = (self.values[k], before[k]);
+            (a - b).abs() > ROUNDING * self.scale[k].max(b.abs())
+        };
+        let jumped: Vec<usize> = (0..before.len()).filter(|&k| moved(k)).collect();
+        if !jumped.is_empty() {
+            let storage = (&*self.elements, &*self.units);
+            let sizes = (loss, self.capacity);
+            log.state_jump(StateJump::new(t, storage, &jumped, sizes, reason));
+        }
+    }
+}
