@@ -1,65 +1,11 @@
 //! Rows ahead: where a mode is calm, one long step passes several output times, and their rows follow from its begin.
 
 use super::exosystem::Exosystem;
-use super::flow::{Flow, LONG, Way};
-use super::kernel::Kernel;
+use super::flow::{Flow, LONG};
 use super::mode::Mode;
 use super::motion::{GRID_ULPS, Motion};
+use super::sampled::MOST;
 use crate::integrate::run::Times;
-
-/// Rows of a long step at most.
-const MOST: usize = 1 << LONG;
-/// A mode's rows are tabulated after so many single ones for each dimension of w: before, that is more work than it spares.
-const PATIENCE: usize = 6;
-/// Entries of a table at most; rows of larger circuits cost so much that long steps spare little.
-const LARGEST: usize = 1 << 16;
-
-/// The output rows that follow one state of a mode.
-#[derive(Debug, Clone)]
-pub(crate) struct Rows {
-    columns: usize,
-    /// Whether tables are worth their entries.
-    fits: bool,
-    /// Single rows so far, and after how many there is a table.
-    singles: usize,
-    patience: usize,
-    /// C exp(𝒜kh) for k = 1…MOST, one below the other, once tabulated.
-    table: Option<Kernel>,
-}
-
-impl Rows {
-    /// For `columns` outputs over w of length `dim`.
-    pub(crate) fn new(columns: usize, dim: usize) -> Self {
-        let fits = MOST * columns * dim <= LARGEST;
-        Self {
-            columns,
-            fits,
-            singles: 0,
-            patience: PATIENCE * dim,
-            table: None,
-        }
-    }
-
-    /// So many rows on the way.
-    fn way<'a>(&self, outputs: &'a Kernel, rows: usize) -> Way<'a> {
-        Way {
-            outputs,
-            columns: self.columns,
-            rows,
-        }
-    }
-
-    /// Whether there is a table, made once it is worth it.
-    fn ready(&mut self, flow: &mut Flow, outputs: &Kernel) -> bool {
-        if self.table.is_none() && self.fits {
-            self.singles += 1;
-            if self.singles >= self.patience {
-                self.table = flow.followed(self.way(outputs, MOST));
-            }
-        }
-        self.table.is_some()
-    }
-}
 
 /// Rows that were computed and not asked for yet.
 #[derive(Debug, Clone, Default)]

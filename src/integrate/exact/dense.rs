@@ -3,7 +3,10 @@
 
 use nalgebra::DMatrix;
 
-use super::kernel::{BLOCK, Block};
+/// Rows computed together: four independent accumulators keep the adders of any x86-64 or ARM64 core busy.
+pub(super) const BLOCK: usize = 4;
+/// Rows computed together.
+pub(super) type Block = [f64; BLOCK];
 
 /// A matrix in blocks of four rows, column by column; rows beyond the last are zero.
 #[derive(Debug, Clone, Default)]

@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::dense::Dense;
+use super::dense::{BLOCK, Dense};
 use super::expm::{self, Ladders};
-use super::inspect::GROUP;
-use super::kernel::{BLOCK, Kernel, SparseKernel};
-use super::mode::Sizes as RowSizes;
+use super::kernel::{Kernel, SparseKernel};
+use super::map::Sizes as RowSizes;
+use super::rounding::{GROUP, NOISE};
 use super::series::{MAX_DEGREE, Series};
 use super::spectrum::{Rate, Spectrum};
 use super::work::{Sizes, Term, Work};
@@ -21,9 +21,6 @@ pub(crate) fn longest_step(output_step: f64) -> f64 {
 
 /// Halvings of the longest step that a table may hold; below it Taylor's series takes over in any case.
 const DEEPEST: u32 = 62 + LONG;
-
-/// Rounding of a computed guard, in units of 2⁻⁵³ Σ |row| |w|.
-pub(super) const NOISE: f64 = 16.0;
 
 /// exp(𝒜 h/2^k) for the levels k that were needed, h the longest step, Taylor's series below, and guard rows with their
 /// derivative. Level [`LONG`] is the output step.
@@ -198,10 +195,9 @@ impl Flow {
         rates.truncate(self.dim);
     }
 
-    /// These rows, the first after an output step, one below the other; `None` beyond doubles.
-    pub(crate) fn followed(&mut self, way: Way<'_>) -> Option<Kernel> {
-        let (step, _) = self.ladder.increment(LONG)?;
-        Some(followed(way, &step, &step))
+    /// exp(𝒜h) − I for the output step h; `None` beyond doubles.
+    pub(crate) fn increment(&mut self) -> Option<Dense> {
+        Some(self.ladder.increment(LONG)?.0)
     }
 
     /// Has the energy of these products integrated along the flow.
@@ -351,43 +347,6 @@ impl Flow {
         }
         polynomial
     }
-}
-
-/// Output rows on the way.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Way<'a> {
-    /// Over w.
-    pub(crate) outputs: &'a Kernel,
-    /// Outputs of a row.
-    pub(crate) columns: usize,
-    /// Their number.
-    pub(crate) rows: usize,
-}
-
-/// The rows after exp(𝒜t) − I = `first` and every further `step`, one below the other.
-fn followed(way: Way<'_>, first: &Dense, step: &Dense) -> Kernel {
-    let Way {
-        outputs,
-        columns,
-        rows,
-    } = way;
-    let dim = step.columns();
-    let (mut increment, mut product) = (first.clone(), Dense::zeros(dim, dim));
-    let mut table = Dense::zeros(rows * columns, dim);
-    let (mut column, mut output) = (vec![0.0; dim], vec![0.0; columns]);
-    for k in 0..rows {
-        for j in 0..dim {
-            column.copy_from_slice(increment.column(j));
-            column[j] += 1.0;
-            outputs.apply(&column, &mut output);
-            table.column_mut(j)[k * columns..(k + 1) * columns].copy_from_slice(&output);
-        }
-        // (I + E)(I + F) = I + E + F + E F
-        product.set_product(&increment, step);
-        increment.combine(1.0, 1.0, step);
-        increment.combine(1.0, 1.0, &product);
-    }
-    Kernel::stacked(&[&table])
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::flow::NOISE;
+use super::rounding::NOISE;
 use crate::diagnostic::Internal;
 use crate::integrate::jump::{Infeasible, Jump, JumpProblem};
 use crate::lcs::{Lcs, Role};

@@ -1,30 +1,14 @@
 //! Whether a mode can be entered: what it conserves, what must vanish, and on which side of zero its guards leave.
 
 use super::exosystem::Exosystem;
-use super::flow::{Flow, NOISE};
-use super::mode::{Mode, Owner};
-use super::slaved::{Follower, Manifold, followers};
+use super::key::Owner;
+use super::magnitudes::ORDERS;
+use super::mode::Mode;
+use super::rounding::{GROUP, NOISE, resolution};
+use super::slaved::Manifold;
 
 /// A mode may move the storage vector by no more than this part of its amplitude; more is a jump and needs an impulse.
 const CONSISTENT: f64 = 1e-9;
-/// Guards within this many times the rounding noise of one evaluation are taken together as zero: simultaneous events of
-/// symmetric circuits differ by the roundings of a few operations.
-pub(super) const GROUP: f64 = 128.0;
-/// The same in units of a guard's [noise](super::flow::Flow::noise).
-pub(super) const SIMULTANEOUS: f64 = GROUP / NOISE;
-/// Event times are known to this many units in the last place.
-const TIME_ULPS: f64 = 8.0;
-/// Ages from which on states follow the others that differ by this factor are of different levels: when the faster ones follow, the
-/// others still move.
-const LEVEL: f64 = 1e3;
-/// Derivatives looked at: g, g', g'', g'''.
-pub(super) const ORDERS: usize = 4;
-
-/// What event times near t are known to, s.
-pub(super) fn resolution(t: f64) -> f64 {
-    TIME_ULPS * f64::EPSILON * t.abs()
-}
-
 /// What was found.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Finding {
@@ -64,51 +48,6 @@ pub(crate) struct Inspector {
     slow: Vec<f64>,
     slow_sizes: Vec<f64>,
     settled: Option<usize>,
-}
-
-/// How large things were when a mode was last inspected.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Magnitudes {
-    /// Amplitudes of w.
-    pub(crate) sizes: Vec<f64>,
-    /// Rounding of g and g' that comes of them.
-    pub(crate) noise: Vec<f64>,
-    /// The states that are small beside their amplitudes once they follow the others.
-    pub(crate) followers: Vec<Follower>,
-    /// Where they do: one manifold for each [level](LEVEL) of their ages, the fastest alone first.
-    manifolds: Vec<Manifold>,
-}
-
-impl Magnitudes {
-    /// Finds which states follow the others.
-    fn find_followers(&mut self, flow: &Flow) {
-        followers(
-            flow.generator(),
-            flow.states(),
-            &self.sizes,
-            &mut self.followers,
-        );
-        let faster = |k: usize| &self.followers[..k];
-        let ages = self.followers.windows(2).enumerate();
-        let apart = ages.filter(|(_, pair)| pair[1].age > LEVEL * pair[0].age);
-        let mut levels: Vec<usize> = apart.map(|(k, _)| k + 1).collect();
-        levels.extend((!self.followers.is_empty()).then_some(self.followers.len()));
-        let known = self.manifolds.iter().zip(&levels);
-        if self.manifolds.len() == levels.len() && known.clone().all(|(m, &k)| m.is_of(faster(k))) {
-            return;
-        }
-        let guards = flow.guard_matrix();
-        let manifold = |&k: &usize| {
-            let components: Vec<usize> = faster(k).iter().map(|f| f.component).collect();
-            Manifold::new(
-                flow.generator(),
-                (&guards, flow.sizes()),
-                &components,
-                ORDERS,
-            )
-        };
-        self.manifolds = levels.iter().filter_map(manifold).collect();
-    }
 }
 
 impl Inspector {

@@ -3,9 +3,9 @@
 use nalgebra::DVector;
 
 use super::inspect::Finding;
-use super::mode::Key;
+use super::key::{Key, Trigger};
 use super::storage::ROUNDING;
-use super::transition::{PROPOSALS, Transition, Trigger};
+use super::transition::{PROPOSALS, Transition};
 use crate::integrate::energy::{self, Balance};
 use crate::integrate::impulses;
 use crate::integrate::jump::rivals_note;

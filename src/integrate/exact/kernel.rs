@@ -2,12 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::dense::Dense;
-
-/// Rows computed together: four independent accumulators keep the adders of any x86-64 or ARM64 core busy.
-pub(super) const BLOCK: usize = 4;
-/// Rows computed together.
-pub(super) type Block = [f64; BLOCK];
+use super::dense::{BLOCK, Block, Dense};
 
 /// A dense matrix in blocks of four rows, each block column by column, for y = K w without allocation.
 #[derive(Debug, Clone, Default)]

@@ -4,15 +4,16 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::ahead;
 use super::clock::Clock;
 use super::decouple::decoupled;
 use super::exosystem::Exosystem;
 use super::flow::Flow;
-use super::inspect::{Magnitudes, ORDERS};
 use super::kernel::Kernel;
+use super::key::{Key, Owner, Trigger};
+use super::magnitudes::{Magnitudes, ORDERS};
+use super::map::{Map, Sizes};
 use super::rays;
-use super::transition::Trigger;
+use super::sampled::SampledRows;
 use super::work::Term;
 use crate::integrate::event::Change;
 use crate::integrate::switching::Threshold;
@@ -20,56 +21,6 @@ use crate::lcs::{Lcs, PowerKind, Rows};
 
 /// Successors of a mode that are remembered; the oldest goes first.
 const MOST_SUCCESSORS: usize = 64;
-
-/// Which devices conduct and where the switches stand.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Default)]
-pub(crate) struct Key {
-    /// By pair: conducting.
-    pub(crate) closed: Vec<bool>,
-    /// By switch: on.
-    pub(crate) switches: Vec<bool>,
-    /// Switches on their thresholds, in order, and whether their voltage and current are positive.
-    pub(crate) sliding: Vec<(usize, bool)>,
-}
-
-impl Key {
-    /// Takes over another key without allocating.
-    pub(crate) fn copy_from(&mut self, other: &Self) {
-        self.closed.clone_from(&other.closed);
-        self.switches.clone_from(&other.switches);
-        self.sliding.clone_from(&other.sliding);
-    }
-
-    /// The same switch positions with other conducting devices.
-    pub(crate) fn with_closed(&self, closed: Vec<bool>) -> Self {
-        Self {
-            closed,
-            switches: self.switches.clone(),
-            sliding: self.sliding.clone(),
-        }
-    }
-
-    /// Switches on their thresholds.
-    pub(crate) fn sliding_switches(&self) -> Vec<usize> {
-        self.sliding.iter().map(|s| s.0).collect()
-    }
-
-    /// Whether the switches of another key stand as here.
-    pub(crate) fn same_switches(&self, other: &Self) -> bool {
-        self.switches == other.switches && self.sliding == other.sliding
-    }
-}
-
-/// Who ends the mode when a guard falls through zero.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Owner {
-    /// A device: this pair, or several with it as the first.
-    Device(usize),
-    /// A switch.
-    Switch(usize),
-    /// A switch on its threshold, which ends fully on or off.
-    Slide(usize, bool),
-}
 
 /// What a mode's guards need to know of the switches.
 #[derive(Debug, Clone, Copy)]
@@ -80,78 +31,6 @@ pub(crate) struct SwitchFacts<'a> {
     pub(crate) limits: &'a [(f64, f64)],
     /// Switches that straight sources alone control.
     pub(crate) clocks: &'a [Clock],
-}
-
-/// A map, and how large its values can be.
-#[derive(Debug, Clone)]
-pub(crate) struct Map {
-    map: Kernel,
-    /// |map|.
-    sizes: Kernel,
-}
-
-impl Map {
-    pub(super) fn new(matrix: &DMatrix<f64>) -> Self {
-        let map = Kernel::new(matrix);
-        Self {
-            sizes: map.map(f64::abs),
-            map,
-        }
-    }
-
-    /// As [`Self::new`], with what the entries were summed from.
-    pub(super) fn with_sizes(matrix: &DMatrix<f64>, sizes: &DMatrix<f64>) -> Self {
-        Self {
-            map: Kernel::new(matrix),
-            sizes: Kernel::new(sizes),
-        }
-    }
-
-    /// `values` = map · w.
-    pub(crate) fn values(&self, w: &[f64], values: &mut Vec<f64>) {
-        values.resize(self.map.rows(), 0.0);
-        self.map.apply(w, values);
-    }
-
-    /// `largest` = |map| · sizes.
-    pub(crate) fn largest(&self, sizes: &[f64], largest: &mut Vec<f64>) {
-        largest.resize(self.map.rows(), 0.0);
-        self.sizes.apply(sizes, largest);
-    }
-}
-
-/// What the entries of a mode's matrices were summed from, where that is more than the entries themselves.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Sizes {
-    /// Of the guards' rows.
-    pub(crate) guards: DMatrix<f64>,
-    /// Of 𝒜.
-    pub(crate) summed: DMatrix<f64>,
-}
-
-impl Sizes {
-    /// Guards and below them their derivatives along w' = 𝒜 w, so many orders, and the sums of magnitudes that their entries come from.
-    pub(crate) fn jets(
-        &self,
-        guards: &DMatrix<f64>,
-        generator: &DMatrix<f64>,
-        orders: usize,
-    ) -> (DMatrix<f64>, DMatrix<f64>) {
-        let (m, dim) = guards.shape();
-        let (mut jets, mut whole) = (
-            DMatrix::zeros(orders * m, dim),
-            DMatrix::zeros(orders * m, dim),
-        );
-        let (mut rows, mut sizes) = (guards.clone(), self.guards.clone());
-        for k in 0..orders {
-            jets.rows_mut(k * m, m).copy_from(&rows);
-            whole.rows_mut(k * m, m).copy_from(&sizes);
-            let next = &rows * generator;
-            sizes = next.abs().sup(&(rows.abs() * &self.summed));
-            rows = next;
-        }
-        (jets, whole)
-    }
 }
 
 /// One mode over w = [x; z].
@@ -192,7 +71,7 @@ pub(crate) struct Mode {
     /// Probe rows over w.
     pub(crate) outputs: Kernel,
     /// The rows that follow.
-    pub(crate) rows: ahead::Rows,
+    pub(crate) rows: SampledRows,
     /// Pairs that share currents or voltages in a proportion that the ideal model does not determine.
     pub(crate) shared: Vec<usize>,
     /// Of the latest inspection.
@@ -406,7 +285,7 @@ impl Mode {
             is_apart: (0..n).all(|k| lcs.energy.get((k, k)).is_some_and(|e| *e > 0.0))
                 && decoupled.is_some() != lcs.fast.is_empty(),
             settled: decoupled.map(|decoupled| Kernel::new(&decoupled.from)),
-            rows: ahead::Rows::new(lcs.outputs.names.len(), dim),
+            rows: SampledRows::new(lcs.outputs.names.len(), dim),
             shared,
             magnitudes: Magnitudes::default(),
             successors: Vec::new(),

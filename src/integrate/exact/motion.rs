@@ -2,8 +2,9 @@
 
 use super::exosystem::Exosystem;
 use super::flow::{Flow, LONG};
-use super::inspect::{Magnitudes, SIMULTANEOUS, resolution};
+use super::magnitudes::Magnitudes;
 use super::polynomial;
+use super::rounding::{SIMULTANEOUS, resolution};
 use super::series::Series;
 use super::slaved::Follower;
 use super::work::Sizes;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::accumulation::Accumulation;
-use super::mode::Key;
+use super::key::Key;
 use super::plant::ModeTable;
 use crate::integrate::Note;
 use crate::integrate::event::Change;

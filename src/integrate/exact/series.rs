@@ -1,6 +1,7 @@
 //! Taylor's series of a mode's flow, w(t + s·dt) = Σ (𝒜 dt)^k w/k! · s^k: what tables of exponentials do not cover.
 
-use super::kernel::{BLOCK, Block, SparseKernel};
+use super::dense::{BLOCK, Block};
+use super::kernel::SparseKernel;
 
 /// Highest degree; where ‖𝒜‖ dt ≤ 1 the rest is below rounding.
 pub(crate) const MAX_DEGREE: usize = 20;

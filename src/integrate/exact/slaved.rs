@@ -13,7 +13,7 @@
 
 use nalgebra::DMatrix;
 
-use super::mode::{Map, Sizes};
+use super::map::{Map, Sizes};
 
 /// Sweeps over the components that follow each other.
 const SWEEPS: usize = 64;

@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use super::clock::Clock;
 use super::exosystem::Exosystem;
-use super::mode::Key;
+use super::key::Key;
 use crate::circuit::Source;
 use crate::integrate::run::{Reason, SimError};
 use crate::integrate::switching::Threshold;

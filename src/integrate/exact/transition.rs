@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::inspect::{Finding, Inspector};
-use super::mode::{Key, Owner};
+use super::key::{Key, Owner, Trigger};
 use super::plant::ModeTable;
 use super::report::Report;
 use super::sources::Sources;
@@ -20,15 +20,6 @@ const MOST_NEIGHBOURS: usize = 400;
 
 /// Modes left at the instant at which they were entered after which none of them is entered again there.
 pub(super) const PATIENCE: usize = 2;
-
-/// Why a mode is left.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Trigger {
-    /// This guard fell through zero.
-    Guard(usize),
-    /// Sources or switches they drive changed.
-    Sources,
-}
 
 /// What is remembered from one change of mode to the next.
 pub(super) struct Memory {

@@ -7,8 +7,7 @@ use crate::circuit::Source;
 use crate::integrate::Energy;
 use crate::integrate::energy::Balance;
 use crate::integrate::exact::accumulation::Accumulation;
-use crate::integrate::exact::mode::Key;
-use crate::integrate::exact::transition::Trigger;
+use crate::integrate::exact::key::{Key, Trigger};
 use crate::integrate::run::{Log, SimError};
 use crate::integrate::switching::fire;
 
