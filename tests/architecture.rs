@@ -288,6 +288,41 @@ fn the_plan_itself_has_no_back_edges() {
     }
 }
 
+/// By file of the exact integrator: the files beside it that it names as `super::file`.
+fn exact_files() -> BTreeMap<String, BTreeSet<String>> {
+    let texts: Vec<(String, String)> = files()
+        .into_iter()
+        .filter_map(|(path, text)| {
+            let name = path.strip_prefix("integrate/exact/")?.strip_suffix(".rs")?;
+            (!name.contains('/') && name != "mod").then(|| (name.to_string(), text))
+        })
+        .collect();
+    let names: BTreeSet<&String> = texts.iter().map(|(name, _)| name).collect();
+    let named = |text: &str| {
+        let named = text.match_indices("super::");
+        let named = named.map(|(at, _)| identifier(&text[at + "super::".len()..]));
+        named.filter(|name| names.contains(name)).collect()
+    };
+    texts
+        .iter()
+        .map(|(name, text)| (name.clone(), named(text)))
+        .collect()
+}
+
+#[test]
+fn files_of_the_exact_integrator_import_in_one_direction() {
+    let mut left = exact_files();
+    assert!(left.len() > 20, "the files are found");
+    while let Some(free) = left
+        .iter()
+        .find(|(name, named)| named.iter().all(|n| n == *name || !left.contains_key(n)))
+    {
+        let free = free.0.clone();
+        left.remove(&free);
+    }
+    assert!(left.is_empty(), "in or behind a circle: {:?}", left.keys());
+}
+
 #[test]
 fn matrices_and_spice_stay_in_their_rooms() {
     for (path, text) in files() {
