@@ -297,43 +297,38 @@ fn the_law_survives_its_file() {
     assert!(json::read(&broken).is_err());
 }
 
-/// Circuits with curved laws and their storage elements, and the step to begin with.
-const ESTIMATED: [(&str, &str, &[&str], f64); 5] = [
+/// Circuits with curved laws, and the step to begin with.
+const ESTIMATED: [(&str, &str, f64); 5] = [
     (
         "charging",
         "vs in 0 sin(1 1 1k)\nr1 in a 1k\nd1 a out dm\nc1 out 0 100n\nrl out 0 10k\n.model dm d(is=1e-9 n=2)\n.tran 20u 2m uic\n",
-        &["v(out)"],
         1e-5,
     ),
     (
         "half wave",
         "vs in 0 sin(0 10 50)\nd1 in out dm\nc1 out 0 100u\nrl out 0 1k\n.model dm d(is=1e-14 rs=1)\n.tran 200u 30m uic\n",
-        &["v(out)"],
         1e-4,
     ),
     (
         "clamp",
         "vs in 0 sin(0 5 1k)\nc1 in a 100n\nr1 a 0 100k\nd1 0 a dm\n.model dm d(is=1e-12 rs=10)\n.tran 10u 1m uic\n.save v(in,a)\n",
-        &["v(in,a)"],
         2e-6,
     ),
     (
         "resonant",
         "vs in 0 pulse(0 5 0 10u 10u 200u 500u)\nl1 in a 1m\nr1 a b 20\nd1 b out dm\nc1 out 0 1u\nrl out 0 100\n.model dm d(is=1e-12 rs=0.1)\n.tran 10u 1m uic\n",
-        &["v(out)", "i(l1)"],
         2e-6,
     ),
     (
         "bridge",
         "vs a b sin(0 10 1k)\nr0 b 0 1meg\nd1 a p dm\nd2 b p dm\nd3 0 a dm\nd4 0 b dm\nc1 p 0 10u\nrl p 0 500\n.model dm d(is=1e-12 rs=1)\n.tran 10u 2m uic\n",
-        &["v(p)"],
         2e-6,
     ),
 ];
 
-/// The largest error of the storage elements at the rows, relative to their amplitudes in the reference.
-fn error(found: &Run, reference: &Run, storage: &[&str]) -> f64 {
-    let errors = storage.iter().map(|probe| {
+/// The largest error of any column at the rows, relative to its amplitude in the reference.
+fn error(found: &Run, reference: &Run) -> f64 {
+    let errors = found.waveforms.names.iter().map(|probe| {
         let (a, b) = (column(found, probe), column(reference, probe));
         let amplitude = b.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         let differences = a.iter().zip(&b).map(|(a, b)| (a - b).abs());
@@ -344,7 +339,7 @@ fn error(found: &Run, reference: &Run, storage: &[&str]) -> f64 {
 
 #[test]
 fn prescribed_steps_tell_their_error() {
-    for (name, cards, storage, h) in ESTIMATED {
+    for (name, cards, h) in ESTIMATED {
         let text = format!("{name}\n{cards}.end\n");
         let stepped = |method, step| {
             let options = SimOptions {
@@ -358,10 +353,11 @@ fn prescribed_steps_tell_their_error() {
         for method in [Method::Theta, Method::Euler] {
             for step in [h, h / 3.0] {
                 let found = stepped(method, step);
-                let error = error(&found, &reference, storage);
+                let error = error(&found, &reference);
                 let ratio = found.error.max.unwrap() / error;
+                // 10 times were the order always 3; where it is less, the statement must hold too.
                 assert!(
-                    (1.0..10.0).contains(&ratio),
+                    (1.0..50.0).contains(&ratio),
                     "{name} {method:?} {step:e}: {ratio} of {error:e}"
                 );
             }

@@ -94,6 +94,9 @@ pub struct MethodArgs {
     /// Relative tolerance of the error-controlled step [default: 1e-4]
     #[arg(long, value_name = "R", value_parser = positive)]
     pub tol: Option<f64>,
+    /// Make no coarser runs beside one in steps: it takes less time, and its error is not known
+    #[arg(long)]
+    pub no_estimate: bool,
 }
 
 /// Integration methods.

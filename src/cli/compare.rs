@@ -327,6 +327,7 @@ fn simulated(
         step,
         tol: Some(TOL),
         events: true,
+        unestimated: true,
     };
     let divisions = (ROWS * tran.tstep / (tran.tstop - tran.tstart))
         .ceil()

@@ -350,6 +350,8 @@ pub struct Request {
     pub tol: Option<f64>,
     /// Rows at events.
     pub events: bool,
+    /// No coarser runs beside one in steps, whose error is then not known.
+    pub unestimated: bool,
 }
 
 impl Request {
@@ -394,6 +396,7 @@ impl Request {
             step,
             tol,
             events,
+            unestimated: args.no_estimate,
         })
     }
 }
@@ -475,6 +478,7 @@ fn with_options<R>(
         discard: route.discard,
         cancel: route.cancel,
         settings,
+        unestimated: request.unestimated,
         progress: (!bar.is_hidden()).then_some(&mut report),
     });
     bar.finish_and_clear();

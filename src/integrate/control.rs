@@ -25,8 +25,6 @@ pub struct Verdict {
     pub accept: bool,
     /// The step to try next, s.
     pub next: f64,
-    /// The error of the step, relative to the amplitude.
-    pub error: f64,
 }
 
 /// A step is doubled, and doubled again, where the error of the longer one would still leave this factor of room: a step that an
@@ -81,11 +79,7 @@ impl Control {
                 expected *= doubled;
             }
         }
-        Verdict {
-            accept,
-            next,
-            error,
-        }
+        Verdict { accept, next }
     }
 }
 

@@ -55,7 +55,7 @@ pub(crate) struct Handover {
     interruptions: Vec<Interruption>,
     stats: Stats,
     notes: Vec<Note>,
-    /// The estimated error of all steps, relative to amplitudes: the exact integration adds none.
+    /// How far the steps let expect that events are aside: the exact integration knows its own.
     error: StatedError,
 }
 
@@ -90,8 +90,7 @@ impl Handover {
             self.shortest
         };
         self.interrupt(error, place.t);
-        let mut theta = (self.takeover)(&place)?;
-        theta.estimate_errors();
+        let theta = (self.takeover)(&place)?;
         self.stepping = Some(Stepping {
             theta,
             since: place.t,
@@ -152,15 +151,8 @@ impl Handover {
             error,
             ..
         } = outcome;
-        // The exact integration adds none: what several parts err adds up at most.
-        for (sum, part) in [
-            (&mut self.error.max, error.max),
-            (&mut self.error.rms, error.rms),
-        ] {
-            if let Some(part) = part {
-                *sum.get_or_insert(0.0) += part;
-            }
-        }
+        let both = self.error.event_time.into_iter().chain(error.event_time);
+        self.error.event_time = both.reduce(f64::max);
         // Modes are those of the exact integration.
         self.stats.add(&Stats { modes: 0, ..stats });
         for note in notes {
@@ -273,8 +265,7 @@ impl Handover {
         if let Some(stepping) = &mut self.stepping {
             self.exact.replace_source(input, source);
             let place = stepping.theta.place();
-            let mut theta = (self.takeover)(&place)?;
-            theta.estimate_errors();
+            let theta = (self.takeover)(&place)?;
             let (since, outcome) = (stepping.since, stepping.theta.finish());
             self.exact.stand_at(&place, &outcome.energy);
             (stepping.theta, stepping.since) = (theta, place.t);
@@ -326,6 +317,10 @@ impl Stepper for Handover {
             Some(_) => &[],
             None => self.exact.rows_ahead(times, k),
         }
+    }
+
+    fn has_stepped(&self) -> bool {
+        !self.interruptions.is_empty()
     }
 
     fn finish(&mut self) -> Outcome {

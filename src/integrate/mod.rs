@@ -1,6 +1,8 @@
 //! From a complementarity system to waveforms.
 
 pub mod aliasing;
+mod coarser;
+mod companion;
 pub mod control;
 mod cpu;
 pub mod energy;

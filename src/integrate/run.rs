@@ -250,6 +250,10 @@ pub trait Stepper {
     fn rows_ahead(&mut self, _times: &Times, _k: usize) -> &[f64] {
         &[]
     }
+    /// Whether steps have been made that err.
+    fn has_stepped(&self) -> bool {
+        true
+    }
     /// Counters, energy, notes.
     fn finish(&mut self) -> Outcome;
 }

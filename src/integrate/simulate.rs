@@ -9,6 +9,7 @@ use crate::integrate::cpu::ThreadTime;
 use nalgebra::DVector;
 
 use crate::circuit::{self, Circuit, ElementId, Source, Tran};
+use crate::integrate::companion::Accompanied;
 use crate::integrate::control::Amplitudes;
 use crate::integrate::exact::{self, Exact, Place};
 use crate::integrate::handover::Handover;
@@ -74,6 +75,8 @@ pub struct SimOptions<'a> {
     pub discard: bool,
     /// Ends the run when set, with [`Reason::Interrupted`] and all rows so far.
     pub cancel: Option<&'a AtomicBool>,
+    /// No coarser runs beside one in steps, which tell its error: the run takes less time, and its error is not known.
+    pub unestimated: bool,
     /// Tolerances.
     pub settings: Settings,
     /// Called with the time reached, s.
@@ -490,7 +493,7 @@ impl Problem {
 }
 
 /// Moreau's steps in an output step where they take the place of exact integration.
-const HANDOVER_STEPS: f64 = 128.0;
+pub(super) const HANDOVER_STEPS: f64 = 128.0;
 
 impl Problem {
     /// Exact integration with Moreau's steps where it cannot go on.
@@ -499,9 +502,10 @@ impl Problem {
         tran: &Tran,
         lcs: &Lcs,
         settings: &Settings,
+        steps: f64,
     ) -> Result<Handover, SimError> {
         // An error control would follow every switching of a chattering circuit.
-        let step = tran.tstep / HANDOVER_STEPS;
+        let step = tran.tstep / steps;
         let stepping = Stepping::Fixed(step);
         let (problem, span, settings_of_steps) = (self.clone(), *tran, settings.clone());
         Ok(Handover::new(
@@ -516,11 +520,14 @@ impl Problem {
     }
 }
 
+/// The part of a print step that the first of chosen steps is tried at.
+pub(super) const FIRST: f64 = 1.0 / 64.0;
+
 /// Steps chosen by their error.
 pub(super) fn controlled(tran: &Tran) -> Stepping {
     Stepping::Controlled {
         span: tran.tstop,
-        first: tran.tstep / 64.0,
+        first: FIRST * tran.tstep,
     }
 }
 
@@ -600,8 +607,18 @@ fn dispatch(
             progress: progress.as_mut().map(|p| &mut **p as &mut dyn FnMut(f64)),
             ..frame(method, notes.clone())
         };
-        let handover = problem.handover(&tran, &lcs, settings);
-        match handover.and_then(|mut both| attempt(&mut both, frame, &mut log, false)) {
+        let coarser = if options.unestimated {
+            vec![]
+        } else {
+            problem.coarser_handover(&tran, &lcs, settings)
+        };
+        let handover = problem.handover(&tran, &lcs, settings, HANDOVER_STEPS);
+        let attempted = handover.and_then(|mut both| {
+            let units = &lcs.outputs.units;
+            let mut all = Accompanied::new(&mut both, coarser, units, tran.tstop, options.cancel);
+            attempt(&mut all, frame, &mut log, false)
+        });
+        match attempted {
             Ok(run) => return Ok(run),
             Err(error) if is_final(&error) => return Err(error),
             Err(error) => {
@@ -620,14 +637,22 @@ fn dispatch(
     }
     let stepping = options.step.map_or(controlled(&tran), Stepping::Fixed);
     let mut theta = problem.stepper(problem.start.clone(), &tran, scheme, stepping, settings)?;
-    if options.step.is_none()
-        && let Some(amplitudes) = problem.scout(&tran, settings)
-    {
-        theta.expect_amplitudes(amplitudes);
+    let amplitudes = match options.step {
+        Some(_) => None,
+        None => problem.scout(&tran, settings),
+    };
+    if let Some(amplitudes) = &amplitudes {
+        theta.expect_amplitudes(amplitudes.clone());
     }
-    theta.estimate_errors();
     let frame = frame(method, notes);
-    run(&mut theta, Frame { progress, ..frame }, log)
+    let coarser = match options.step {
+        _ if options.unestimated => vec![],
+        Some(h) => problem.coarser_fixed(&tran, scheme, h, settings),
+        None => problem.coarser_controlled(&tran, scheme, amplitudes.as_ref(), settings),
+    };
+    let units = &lcs.outputs.units;
+    let mut all = Accompanied::new(&mut theta, coarser, units, tran.tstop, options.cancel);
+    run(&mut all, Frame { progress, ..frame }, log)
 }
 
 pub(super) fn check(tran: &Tran, options: &SimOptions<'_>) -> Result<(), SimError> {

@@ -13,7 +13,7 @@ use crate::integrate::exact::Place;
 use crate::integrate::handover::Handover;
 use crate::integrate::note;
 use crate::integrate::run::{Log, Reason, SimError, Stepper};
-use crate::integrate::simulate::{Method, Problem, SimOptions, check, controlled};
+use crate::integrate::simulate::{HANDOVER_STEPS, Method, Problem, SimOptions, check, controlled};
 use crate::integrate::stats::{Impulse, Run, StateJumps, Stats};
 use crate::integrate::step::Scheme;
 use crate::integrate::theta::{Stepping, Theta};
@@ -106,7 +106,7 @@ impl Way {
         let plan = plan(lcs, &options.as_asked());
         let start = problem.start.t;
         if plan.method == Method::Exact {
-            let exact = problem.handover(tran, lcs, settings);
+            let exact = problem.handover(tran, lcs, settings, HANDOVER_STEPS);
             match exact.and_then(|mut exact| exact.advance(start, log).map(|()| exact)) {
                 Ok(exact) => return Ok(Self::Exact(Box::new(exact))),
                 Err(error) if *method == Method::Exact => return Err(error),
@@ -566,7 +566,6 @@ fn steps(
     {
         theta.expect_amplitudes(amplitudes);
     }
-    theta.estimate_errors();
     Ok(theta)
 }
 

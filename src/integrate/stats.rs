@@ -204,6 +204,9 @@ pub struct StatedError {
     pub max: Option<f64>,
     /// Root mean square over the run, of the worst quantity.
     pub rms: Option<f64>,
+    /// How far events may be aside, s. A row that an event passes by less than this and less than its distance to the next row is no error of
+    /// [`Self::max`].
+    pub event_time: Option<f64>,
 }
 
 impl StatedError {
@@ -214,6 +217,7 @@ impl StatedError {
         Self {
             max: both(self.max, other.max),
             rms: both(self.rms, other.rms),
+            event_time: both(self.event_time, other.event_time),
         }
     }
 }

@@ -500,11 +500,6 @@ impl FusedMode {
             })
     }
 
-    /// The rows of x⁺ over z, and how long each is.
-    pub(crate) fn flow(&self, n: usize) -> (&[f64], usize) {
-        (&self.k[..n * self.width], self.width)
-    }
-
     /// λ of this mode from the guards of a step.
     pub(crate) fn lambda(&self, guards: &[f64], lambda: &mut [f64]) {
         for ((l, &guard), &on) in lambda.iter_mut().zip(guards).zip(&self.active) {

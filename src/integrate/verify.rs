@@ -109,6 +109,7 @@ fn second(
         simulate(SimOptions {
             method,
             corners: true,
+            unestimated: true,
             settings: Settings {
                 tol,
                 ..options.settings.clone()

@@ -157,6 +157,7 @@ mod tests {
             error: StatedError {
                 max: Some(1e-4),
                 rms: None,
+                event_time: None,
             },
             impulses: vec![Impulse {
                 t: 0.001,
@@ -171,7 +172,7 @@ mod tests {
             "{\"method\":\"exact\",\"plan\":[\"piecewise linear\"],\"steps\":7,\"rejected\":0,\"events\":2,\"jumps\":0,\
              \"modes\":0,\"lcp_solves\":0,\"pivotings\":0,\"factorisations\":0,\"cpu_seconds\":0.0,\
              \"energy\":{\"source\":1.5,\"dissipated\":1.0,\"stored\":0.25,\"jumps\":0.25,\"numerical\":0.0,\"residual\":0.0,\
-             \"residual_relative\":0.0},\"error\":{\"max\":0.0001,\"rms\":null},\"notes\":[],\
+             \"residual_relative\":0.0},\"error\":{\"max\":0.0001,\"rms\":null,\"event_time\":null},\"notes\":[],\
              \"impulses\":[{\"t\":0.001,\"name\":\"i(d1)\",\"area\":-2e-6}],\
              \"state_jumps\":[{\"t\":0.001,\"elements\":[\"l1\"],\"loss\":0.25,\"reason\":\"switch s1\"}],\
              \"state_jumps_total\":{\"count\":1,\"loss\":0.25},\

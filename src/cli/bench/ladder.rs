@@ -38,6 +38,7 @@ pub(super) fn rungs(tran: Tran) -> Vec<Rung> {
         step: None,
         tol: None,
         events: false,
+        unestimated: true,
     };
     let exact = |rows: Option<f64>| Rung {
         method: "exact",

@@ -113,6 +113,7 @@ impl Bench<'_> {
             step: None,
             tol: None,
             events: true,
+            unestimated: true,
         };
         if let Ok(run) = sim::run(self.subject, &request, tstep, &self.silent) {
             return Ok(Reference {

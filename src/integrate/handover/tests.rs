@@ -75,11 +75,6 @@ fn steps_take_over_where_no_mode_is_found_and_give_back() {
              one-step complementarity problem has no solution (no state of the devices satisfies the circuit equations)"
         )]
     );
-    let estimate = outcome.error.max.unwrap();
-    assert!(
-        (largest..10.0 * largest).contains(&estimate),
-        "{estimate:e} of {largest:e}"
-    );
     assert!(outcome.stats.steps > 200);
     assert!(
         outcome.energy.residual_relative < 1e-3,

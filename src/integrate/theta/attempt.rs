@@ -154,9 +154,6 @@ impl Theta {
             };
             return Err(SimError::at(self.now.t, reason));
         }
-        if self.now.estimate.is_some() && self.control.is_none() {
-            self.carry_error();
-        }
         if let Some((basis, pattern)) = self.attempt.solved.take() {
             self.commit_solved(basis, pattern, t1);
         } else {
@@ -177,46 +174,16 @@ impl Theta {
         self.send_waves()
     }
 
-    /// The error after the attempted step.
-    fn carry_error(&mut self) {
-        let Self {
-            plant,
-            now,
-            attempt,
-            out,
-            scheme,
-            ..
-        } = self;
-        let Some(estimate) = &mut now.estimate else {
-            return;
-        };
-        if now.settle {
-            estimate.restart();
-        }
-        let n = now.x.len();
-        if let Some(error) = attempt.error.take() {
-            estimate.stages(attempt.h, &out[..n], error);
-            return;
-        }
-        let fused = || {
-            plant.systems[now.system]
-                .1
-                .step(attempt.step)
-                .fused(attempt.mode)
-        };
-        let map = attempt.solved.is_none().then(|| fused().flow(n));
-        let second_order = scheme.order() == 2 && !attempt.settle;
-        estimate.step(attempt.h, &now.x, &out[..n], map, second_order);
-    }
-
     #[cold]
     pub(super) fn commit_solved(&mut self, basis: Vec<bool>, pattern: Vec<Option<bool>>, t1: f64) {
         let n = self.now.x.len();
         let h = self.attempt.h;
+        let known = self.pending.len();
         if let Some((work, loss)) = self.attempt.work {
             self.now.balance.add(work);
             self.now.balance.add_numerical(loss);
             self.take_pattern(basis, &pattern, t1);
+            self.note_event_step(known, h);
             self.attempt.h = f64::NAN;
             return;
         }
@@ -236,7 +203,15 @@ impl Theta {
         self.now.balance.add((source, dissipated));
         self.now.balance.add_numerical(loss);
         self.take_pattern(basis, &pattern, t1);
+        self.note_event_step(known, h);
         self.attempt.h = f64::NAN;
+    }
+
+    /// A step of h in which a device changed, if there are more than `known` events.
+    fn note_event_step(&mut self, known: usize, h: f64) {
+        if self.pending.len() > known {
+            self.now.event_step = self.now.event_step.max(h);
+        }
     }
 
     /// Takes over what the devices do; a change between conducting (a current flows) and blocking is an event.

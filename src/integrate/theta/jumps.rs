@@ -353,12 +353,6 @@ impl Theta {
 
     /// Takes storage s over into the system of the present switch position.
     fn change_position(&mut self, s: &DVector<f64>, log: &mut Log) -> Result<(), SimError> {
-        let old = self.system();
-        let carried = self.now.estimate.as_ref().map(|estimate| {
-            let error = estimate.error();
-            old.lcs.storage.x.columns(0, error.len()) * DVector::from_column_slice(error)
-        });
-        self.settle_estimate();
         let position = self.switches.position().to_vec();
         let at = self
             .plant
@@ -372,11 +366,6 @@ impl Theta {
         let x = system.state_from(s);
         self.now.x.clear();
         self.now.x.extend(x.iter());
-        if let (Some(estimate), Some(carried), None) =
-            (&mut self.now.estimate, carried, &self.control)
-        {
-            estimate.enter((&system.lcs.storage.inject * carried).iter().copied());
-        }
         if self.now.active.len() != system.lcs.m() {
             self.now.active = vec![false; system.lcs.m()];
             self.now.pattern = vec![false; system.lcs.m()];

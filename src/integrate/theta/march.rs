@@ -61,9 +61,6 @@ impl Theta {
         self.attempt(0.5 * h, middle)?;
         self.commit(middle)?;
         self.now.settle = true;
-        if let Some(estimate) = &mut self.now.estimate {
-            estimate.pair();
-        }
         self.attempt(0.5 * h, t1)?;
         Ok(0.5 * h)
     }
@@ -188,10 +185,6 @@ impl Theta {
             if change == Demand::Passage && may_locate {
                 self.locate(finest, steps, &mut impulse, log)?;
             }
-            let late = change == Demand::Passage;
-            if let (true, Some(estimate), None) = (late, &mut self.now.estimate, &self.control) {
-                estimate.switched_late(&self.kept.x, &self.now.x);
-            }
             self.report(log);
             self.switch(&[], log)?;
             tried = Tried::Switched;
@@ -234,9 +227,6 @@ impl Theta {
             self.damped = true;
             verdict = self.controlled(h, t1, last_chance, impulse)?;
             self.damped = false;
-        }
-        if let Some(estimate) = &mut self.now.estimate {
-            estimate.add(verdict.error, h);
         }
         Ok(verdict.accept || last_chance)
     }
@@ -294,16 +284,15 @@ impl Theta {
         impulse: &mut bool,
     ) -> Result<Verdict, SimError> {
         let turned_off = self.now.turned_off;
+        let steps = self.stats.steps;
         self.now.unseen.clear();
         self.look_closer(0.5 * h);
         self.attempt(h, t1)?;
-        let mut changed = self.attempt.solved.is_some();
         let n = self.now.x.len();
         self.coarse.copy_from_slice(&self.out[..n]);
         let whole = std::mem::take(&mut self.attempt.unseen);
         let middle = self.now.t + 0.5 * (t1 - self.now.t);
         self.attempt(0.5 * h, middle)?;
-        changed |= self.attempt.solved.is_some();
         self.commit(middle)?;
         unseen::without_smooth(&whole, &mut self.now.unseen);
         self.now.turned_off |= turned_off;
@@ -312,7 +301,6 @@ impl Theta {
         if last_chance && self.attempt.solved.is_some() {
             *impulse = self.impulsive(0.5 * h)?;
         }
-        changed |= self.attempt.solved.is_some();
         self.commit(t1)?;
         for (k, coarse) in self.coarse.iter_mut().enumerate() {
             if (*coarse - self.now.x[k]).abs() <= self.rounding[k] {
@@ -322,20 +310,19 @@ impl Theta {
         let error = self
             .amplitudes
             .error(&self.system().lcs, &self.coarse, &self.now.x);
-        let smooth = self.system().curved || !changed;
         let unseen = self.size_of(&self.now.unseen);
-        let mut verdict = match &self.control {
+        let verdict = match &self.control {
             Some(control) => control.judge(h, error, unseen),
             None => Verdict {
                 accept: true,
                 next: h,
-                error,
             },
         };
         self.preferred = verdict.next;
-        if !smooth {
-            // Of first order, whose halves err as much as they differ from the whole.
-            verdict.error = error;
+        if self.whole && (verdict.accept || last_chance) {
+            self.back(steps);
+            self.attempt(h, t1)?;
+            self.commit(t1)?;
         }
         Ok(verdict)
     }

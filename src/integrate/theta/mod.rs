@@ -6,7 +6,6 @@
 //! and a sign test. Where that fails, the step is solved with γ = 1 by the [`Driver`](crate::solve::Driver).
 
 mod attempt;
-mod estimate;
 mod jumps;
 mod lines;
 mod march;
@@ -21,7 +20,6 @@ use std::sync::Arc;
 
 use nalgebra::DVector;
 
-use self::estimate::Estimate;
 use crate::integrate::Note;
 use crate::integrate::control::{Amplitudes, CORNER, Control};
 use crate::integrate::energy::{self, Balance};
@@ -114,7 +112,11 @@ pub struct Theta {
     start: DVector<f64>,
     /// Settling steps of the midpoint rule are Moreau's for now.
     damped: bool,
+    /// See [`Self::keep_whole_steps`].
+    whole: bool,
     preferred: f64,
+    /// See [`Self::read_coarsely`].
+    reading: f64,
     last_h: f64,
     u_next: Vec<f64>,
     du: Vec<f64>,
@@ -163,8 +165,8 @@ struct Now {
     turned_off: bool,
     system: usize,
     balance: Balance,
-    /// The error so far, where it is asked for.
-    estimate: Option<Estimate>,
+    /// The longest step in which a device changed, s: it did so somewhere in it.
+    event_step: f64,
     /// x' at the end of the last step; empty after a breakpoint, and where the method has no stages.
     slope: Vec<f64>,
     /// What the last step did not see, see [`unseen`]; empty at the start of a step under error control.
@@ -194,9 +196,7 @@ impl Now {
         self.balance = other.balance;
         self.slope.clone_from(&other.slope);
         self.unseen.clone_from(&other.unseen);
-        if let (Some(mine), Some(other)) = (&mut self.estimate, &other.estimate) {
-            mine.copy_from(other);
-        }
+        self.event_step = other.event_step;
     }
 }
 
@@ -214,8 +214,6 @@ struct Attempt {
     solved: Option<(Vec<bool>, Vec<Option<bool>>)>,
     /// Energy from sources, into resistors and devices, and lost by the method, J, where the stages tell it.
     work: Option<((f64, f64), f64)>,
-    /// What the stages tell of the error, where it is asked for.
-    error: Option<stages::StepError>,
     /// x' at the end, where the method has stages.
     slope: Vec<f64>,
     /// What the stages did not see.
@@ -277,7 +275,7 @@ impl Theta {
             turned_off: false,
             system: at,
             balance,
-            estimate: None,
+            event_step: 0.0,
             slope: Vec::new(),
             unseen: Vec::new(),
         };
@@ -311,7 +309,9 @@ impl Theta {
             started: false,
             start: storage.clone(),
             damped: false,
+            whole: false,
             preferred,
+            reading: 1.0,
             last_h: 0.0,
             z: Vec::new(),
             out: Vec::new(),
@@ -350,14 +350,14 @@ impl Theta {
         }
     }
 
-    /// Has the error estimated along the run.
-    pub fn estimate_errors(&mut self) {
-        let mut estimate = Estimate::default();
-        if self.control.is_none() {
-            estimate.enter(self.now.x.iter().map(|_| 0.0));
-        }
-        self.kept.estimate = Some(estimate.clone());
-        self.now.estimate = Some(estimate);
+    /// Has steps whose error is controlled made whole in place of their halves: the same steps with a larger error.
+    pub(crate) fn keep_whole_steps(&mut self) {
+        self.whole = true;
+    }
+
+    /// Has λ of curved laws read by a step longer by a factor, whose error is larger by it.
+    pub(crate) fn read_coarsely(&mut self, factor: f64) {
+        self.reading = factor;
     }
 
     /// The amplitudes seen so far.
@@ -449,13 +449,6 @@ impl Theta {
 
     fn system(&self) -> &System {
         &self.plant.systems[self.now.system].1
-    }
-
-    fn settle_estimate(&mut self) {
-        if let (Some(estimate), None) = (&mut self.now.estimate, &self.control) {
-            let lcs = &self.plant.systems[self.now.system].1.lcs;
-            estimate.settle(lcs, &mut self.amplitudes);
-        }
     }
 
     /// Buffers for the present system.
@@ -551,9 +544,11 @@ impl Stepper for Theta {
             let devices: Vec<String> = self.not_unique.iter().cloned().collect();
             notes.push(Note::shared(&devices));
         }
-        self.settle_estimate();
         Outcome {
-            error: (self.now.estimate.as_ref()).map_or(StatedError::default(), Estimate::stated),
+            error: StatedError {
+                event_time: Some(self.now.event_step),
+                ..StatedError::default()
+            },
             stats: self.stats.clone(),
             energy: self.now.balance.energy(),
             notes,

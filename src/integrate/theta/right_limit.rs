@@ -29,7 +29,7 @@ impl Theta {
     fn reading_step(&self) -> f64 {
         let short = self.read_step();
         if self.system().curved {
-            short * SHORT
+            short * SHORT * self.reading
         } else if !self.ports.is_empty() {
             short * SHORT_ON_LINES
         } else {

@@ -30,26 +30,8 @@ pub(super) struct Tableau {
     gamma: f64,
     /// a_jk for k < j, row by row.
     lower: &'static [&'static [f64]],
-    /// x⁺ less the solution that the same stages give with one order less, as a sum of the h f(X_j): b_j − b̂_j.
-    embedded: &'static [f64],
     /// h P'(0) of the polynomial P' through the slopes at the stages, as a sum of the h f(X_j).
     pub(super) at_start: &'static [f64],
-    /// The error of the step over the change of that difference from the step before, for x' = λx and hλ → 0.
-    constant: f64,
-}
-
-/// What the stages tell of the error of a step, in x.
-#[derive(Debug, Clone, Default)]
-pub(super) struct StepError {
-    /// What the error before it has become: the product of the stages' derivatives.
-    pub(super) carried: DVector<f64>,
-    /// The difference from the embedded solution, damped like an implicit Euler step where the problem is stiff (L. F. Shampine,
-    /// "Implementation of implicit formulas for the solution of ODEs", SIAM J. Sci. Stat. Comput. 1, 1980).
-    pub(super) embedded: DVector<f64>,
-    /// See [`Tableau`].
-    pub(super) constant: f64,
-    /// The order of the method.
-    pub(super) order: i32,
 }
 
 /// Moreau's scheme.
@@ -57,9 +39,7 @@ pub(super) static EULER: Tableau = Tableau {
     order: 1,
     gamma: 1.0,
     lower: &[&[]],
-    embedded: &[1.0],
     at_start: &[1.0],
-    constant: 0.5,
 };
 
 /// Alexander's method; γ is the root of γ³ − 3γ² + 3γ/2 = 1/6 near 0.436.
@@ -67,20 +47,12 @@ static ALEXANDER: Tableau = Tableau {
     order: 3,
     gamma: GAMMA,
     lower: &[&[], &[0.5 * (1.0 - GAMMA)], &[B1, B2]],
-    // b̂ = (γ, 1 − 2γ, 0)/(1 − γ), the one formula of order 2 on the first two stages.
-    embedded: &[
-        B1 - GAMMA / (1.0 - GAMMA),
-        B2 - (1.0 - 2.0 * GAMMA) / (1.0 - GAMMA),
-        GAMMA,
-    ],
     // Lagrange's weights at 0 of the nodes γ, (1 + γ)/2 and 1.
     at_start: &[
         (1.0 + GAMMA) / ((1.0 - GAMMA) * (1.0 - GAMMA)),
         -4.0 * GAMMA / ((1.0 - GAMMA) * (1.0 - GAMMA)),
         GAMMA * (1.0 + GAMMA) / ((1.0 - GAMMA) * (1.0 - GAMMA)),
     ],
-    // e^z − R(z) = 0.025897 z⁴ and R(z) − R̂(z) = −0.079220 z³ + …
-    constant: 0.326_899,
 };
 const B1: f64 = -0.25 * (6.0 * GAMMA * GAMMA - 16.0 * GAMMA + 1.0);
 const B2: f64 = 0.25 * (6.0 * GAMMA * GAMMA - 20.0 * GAMMA + 5.0);
@@ -164,9 +136,6 @@ impl Theta {
         // (X_k − B_k)/γ = h f(X_k).
         let mut slopes: Vec<DVector<f64>> = Vec::with_capacity(count);
         let (mut work, mut loss) = ((0.0, 0.0), StageLoss::default());
-        let mut error = self.error_before(tableau);
-        // (δX_k − δB_k)/γ for the error δx before the step.
-        let mut error_slopes: Vec<DVector<f64>> = Vec::with_capacity(count);
         let mut last = None;
         let last_row = tableau.lower[count - 1];
         for (j, row) in tableau.lower.iter().enumerate() {
@@ -215,30 +184,6 @@ impl Theta {
             let slope = (&x - base) / tableau.gamma;
             loss.stage(&system.lcs, weight, at, &slope, h);
             slopes.push(slope);
-            if let Some(error) = &mut error {
-                let matrices = self.system().step(step);
-                let carry = |change: &DVector<f64>| {
-                    // A passive network at least does not enlarge it.
-                    matrices
-                        .carried(change, &solution.lambda, &solution.y)
-                        .unwrap_or_else(|| change.clone())
-                };
-                let mut base = error.carried.clone();
-                for (a, slope) in row.iter().zip(&error_slopes) {
-                    base.axpy(*a, slope, 1.0);
-                }
-                let changed = carry(&base);
-                error_slopes.push((&changed - base) / tableau.gamma);
-                if at_end {
-                    error.carried = changed;
-                    for (weight, slope) in tableau.embedded.iter().zip(&slopes) {
-                        error.embedded.axpy(*weight, slope, 1.0);
-                    }
-                    if tableau.order > 1 {
-                        error.embedded = carry(&error.embedded);
-                    }
-                }
-            }
             last = Some((x, solution));
         }
         let Some((x, solution)) = last else {
@@ -274,21 +219,9 @@ impl Theta {
             solved: Some((solution.basis, solution.active)),
             turned_off: false,
             work: Some((work, loss)),
-            error,
             slope: slope.unwrap_or_default(),
             unseen,
         };
         Ok(slopes)
-    }
-
-    /// The error before the step, where it is asked for.
-    fn error_before(&self, tableau: &Tableau) -> Option<StepError> {
-        let estimate = self.now.estimate.as_ref()?;
-        self.control.is_none().then(|| StepError {
-            carried: DVector::from_column_slice(estimate.error()),
-            embedded: DVector::zeros(estimate.error().len()),
-            constant: tableau.constant,
-            order: tableau.order,
-        })
     }
 }

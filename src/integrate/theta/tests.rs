@@ -4,7 +4,7 @@ use nalgebra::{DVector, dvector};
 
 use crate::integrate::Run;
 use crate::integrate::fixtures;
-use crate::integrate::run::{Frame, Grid, Log, Stepper, run};
+use crate::integrate::run::{Frame, Grid, Log, run};
 use crate::integrate::step::Scheme;
 use crate::integrate::theta::{Setup, Start, Stepping, Theta};
 use crate::lcs::Lcs;
@@ -291,40 +291,5 @@ fn jump_of_a_network_that_is_not_passive_is_the_limit_of_the_step() {
         assert_eq!(run.stats.jumps, 1);
         let impulse = run.impulses.iter().find(|i| i.name == "i(d1)").unwrap();
         close(impulse.area, 3e-6, 1e-13);
-    }
-}
-
-#[test]
-fn the_error_is_estimated_from_the_steps() {
-    let lcs = fixtures::bridge();
-    let tstop = 2e-3;
-    let end = |scheme: Scheme, h: f64| {
-        let x = DVector::from_column_slice(&[10.0, 0.0]);
-        let mut theta = stepper(&lcs, x, scheme, Stepping::Fixed(h));
-        theta.estimate_errors();
-        let mut log = Log::new(0, f64::INFINITY, false);
-        let mut worst = Vec::new();
-        for k in 1..=20 {
-            theta
-                .advance(tstop * f64::from(k) / 20.0, &mut log)
-                .unwrap();
-            worst.push(theta.state()[0]);
-        }
-        (worst, theta.finish().error.max.unwrap())
-    };
-    let (exact, _) = end(Scheme::MIDPOINT, 1e-8);
-    for (scheme, h) in [
-        (Scheme::MOREAU, 5e-7),
-        (SICONOS, 5e-7),
-        (Scheme::MIDPOINT, 2e-6),
-    ] {
-        let (found, estimate) = end(scheme, h);
-        let differences = found.iter().zip(&exact).map(|(a, b)| (a - b).abs() / 10.0);
-        let error = differences.fold(0.0, f64::max);
-        let above = if scheme == SICONOS { 100.0 } else { 6.0 };
-        assert!(
-            estimate > error && estimate < above * error,
-            "{scheme:?}: {estimate:e} for {error:e}"
-        );
     }
 }

@@ -1,0 +1,126 @@
+//! Which coarser runs go beside one in steps.
+
+use crate::circuit::Tran;
+use crate::integrate::companion::Coarser;
+use crate::integrate::control::Amplitudes;
+use crate::integrate::run::Grid;
+use crate::integrate::simulate::{FIRST, HANDOVER_STEPS, Problem, controlled};
+use crate::integrate::step::Scheme;
+use crate::integrate::theta::Stepping;
+use crate::lcs::Lcs;
+use crate::settings::Settings;
+
+/// Prescribed steps of companions, over those of the run.
+const COARSER: [f64; 2] = [2.0, 4.0];
+/// The error of a run of first order over what these differ by: 1 and 1/3 were the errors smooth; those of events are not.
+const FIRST_ORDER: [f64; 2] = [2.0, 0.5];
+/// The same for methods of order 2 and 3: 1/3 and 1/15 or less were they smooth.
+const HIGHER_ORDER: [f64; 2] = [1.5, 0.125];
+/// Tolerance of the companion of a run whose steps are chosen, over that of the run. It makes its steps whole where the run makes them in
+/// halves, so that they are longer even where rows and edges choose them.
+const LOOSER: f64 = 2.0;
+/// The error of the run over what that companion differs by: 1/3 or less were the errors smooth.
+const LOOSER_SHARE: f64 = 1.0;
+/// Steps by which companions read what flows at an instant where laws are curved, over those of the run: their error is of first order.
+const READING: f64 = 4.0;
+/// More rows than these would choose the steps of that companion, which stops at one of [`FEWER`] then.
+const MANY_ROWS: f64 = 200.0;
+/// Odd, as an even number of rows would see a clock in one phase alone.
+const FEWER: usize = 5;
+
+impl Problem {
+    /// Beside an exact run, from where steps take over.
+    pub(super) fn coarser_handover<'a>(
+        &'a self,
+        tran: &'a Tran,
+        lcs: &'a Lcs,
+        settings: &'a Settings,
+    ) -> Vec<Coarser<'a>> {
+        let companion = |(coarser, share): (f64, f64)| Coarser {
+            make: Box::new(move || {
+                let both = self.handover(tran, lcs, settings, HANDOVER_STEPS / coarser)?;
+                Ok(Box::new(both))
+            }),
+            stride: 1,
+            start: 0.0,
+            share,
+        };
+        COARSER
+            .into_iter()
+            .zip(FIRST_ORDER)
+            .map(companion)
+            .collect()
+    }
+
+    /// Beside a run in steps of h, s.
+    pub(super) fn coarser_fixed<'a>(
+        &'a self,
+        tran: &Tran,
+        scheme: Scheme,
+        h: f64,
+        settings: &'a Settings,
+    ) -> Vec<Coarser<'a>> {
+        // Rows are stops.
+        let h = h.min(tran.tmax.unwrap_or(f64::INFINITY));
+        let h = tran.tstep / (tran.tstep / h).ceil().max(1.0);
+        let tran = Tran {
+            tmax: None,
+            ..*tran
+        };
+        let shares = match scheme.order() {
+            1 => FIRST_ORDER,
+            _ => HIGHER_ORDER,
+        };
+        let companion = |(coarser, share): (f64, f64)| {
+            // An even number of rows would see a clock in one phase alone.
+            let stride = (coarser * h / tran.tstep).ceil() as usize | 1;
+            let longer = match stride {
+                1 => coarser * h,
+                _ => stride as f64 * tran.tstep,
+            };
+            Coarser {
+                make: Box::new(move || {
+                    let (start, stepping) = (self.start.clone(), Stepping::Fixed(longer));
+                    let mut theta = self.stepper(start, &tran, scheme, stepping, settings)?;
+                    theta.read_coarsely(READING);
+                    Ok(Box::new(theta))
+                }),
+                stride,
+                start: h,
+                share: share * coarser * h / longer,
+            }
+        };
+        COARSER.into_iter().zip(shares).map(companion).collect()
+    }
+
+    /// Beside a run whose steps are chosen.
+    pub(super) fn coarser_controlled<'a>(
+        &'a self,
+        tran: &Tran,
+        scheme: Scheme,
+        amplitudes: Option<&'a Amplitudes>,
+        settings: &Settings,
+    ) -> Vec<Coarser<'a>> {
+        let tran = *tran;
+        let many = Grid::of(&tran).count() > MANY_ROWS;
+        let settings = Settings {
+            tol: LOOSER * settings.tol,
+            ..settings.clone()
+        };
+        vec![Coarser {
+            make: Box::new(move || {
+                let start = self.start.clone();
+                let mut theta = self.stepper(start, &tran, scheme, controlled(&tran), &settings)?;
+                if let Some(amplitudes) = amplitudes {
+                    theta.expect_amplitudes(amplitudes.clone());
+                }
+                theta.keep_whole_steps();
+                theta.read_coarsely(READING);
+                Ok(Box::new(theta))
+            }),
+            stride: if many { FEWER } else { 1 },
+            start: FIRST * tran.tstep,
+            share: LOOSER_SHARE,
+        }]
+    }
+}
