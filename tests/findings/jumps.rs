@@ -286,3 +286,18 @@ fn a_jump_that_would_create_energy_is_none() {
         assert_eq!(run.state_jumps.all.0, 0, "{method:?}");
     }
 }
+
+/// Sources move on with the edge of the last row, and so do the switches that they control: v(4) follows v(2).
+#[test]
+fn an_edge_on_the_last_row_moves_source_and_switch() {
+    for method in [Method::Exact, Method::Theta] {
+        let run = changed("edge_on_the_last_row", &[], method);
+        let last = |probe: &str| column(&run, probe).last().copied().expect("rows");
+        assert!((last("v(2)") - 15.0).abs() < 1e-12, "{method:?}");
+        assert!(
+            (last("v(4)") - 12.0).abs() < 1e-12,
+            "{method:?} {}",
+            last("v(4)")
+        );
+    }
+}
