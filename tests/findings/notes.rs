@@ -148,3 +148,18 @@ fn what_devices_share_is_the_least_norm_choice_by_every_method_and_is_said() {
         assert!(d1[2] > 0.1, "{method:?} {}", d1[2]);
     }
 }
+
+/// With 1e9 Ω the diode conducts 25 ns after the other one blocks; with 1e15 Ω its voltage of 0.4 mV is less than the rounding of Roff · i.
+#[test]
+fn a_device_that_rounding_holds_on_the_wrong_side_is_named() {
+    let hidden = |run: &circ::integrate::Run| {
+        run.notes
+            .iter()
+            .any(|note| note.elements == ["d2"] && note.text.contains("of the wrong sign"))
+    };
+    let large = changed("forward_hidden_guard", &[], Method::Exact);
+    assert!(hidden(&large), "{:?}", large.notes);
+    let roff = [("roff=1e15", "roff=1e9")];
+    let ordinary = changed("forward_hidden_guard", &roff, Method::Exact);
+    assert!(!hidden(&ordinary), "{:?}", ordinary.notes);
+}

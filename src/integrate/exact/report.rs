@@ -19,6 +19,10 @@ pub(super) const MOST_LOSS: f64 = 1e-8;
 /// 1e15 was wrong.
 const SLOW_PART: f64 = 1e-3;
 
+/// A device whose voltage (current) has the wrong sign by more than this part of the largest voltage across blocking devices and capacitors
+/// (current of conducting ones and inductors) so far stands wrongly: no rounding of voltages of one size does that.
+const WRONG: f64 = 1e-6;
+
 /// When a switch stayed on its threshold.
 #[derive(Debug, Clone, Copy, Default)]
 struct Slides {
@@ -33,6 +37,9 @@ pub(super) struct Report {
     pub(super) notes: Vec<Note>,
     pub(super) accumulation: Accumulation,
     noted_shared: bool,
+    noted_hidden: bool,
+    /// The largest current of a conducting device or inductor and voltage of a blocking device or capacitor so far, A and V.
+    largest: [f64; 2],
     /// Whether a jump between rivals has been noted.
     pub(super) noted_rivals: bool,
     /// By switch, then by step of a function block: when it slid.
@@ -49,6 +56,8 @@ impl Report {
             notes: Vec::new(),
             accumulation: Accumulation::new(t),
             noted_shared: false,
+            noted_hidden: false,
+            largest: [0.0; 2],
             noted_rivals: false,
             slides: BTreeMap::new(),
             events: 0,
@@ -93,6 +102,46 @@ impl Report {
             log.event(t, changes, jumped);
         }
         self.note_slides(table, at, t);
+    }
+
+    /// Notes the first device that stands wrongly at the end of mode `at`, at t: `sides` has pairs and guards, which are negative there. A
+    /// guard that rounding hides has not ended the mode. `stored` are the largest current and voltage of the storage.
+    pub(super) fn note_hidden(
+        &mut self,
+        table: &ModeTable,
+        at: usize,
+        sides: impl Iterator<Item = (usize, f64)> + Clone,
+        stored: [f64; 2],
+        t: f64,
+    ) {
+        if self.noted_hidden {
+            return;
+        }
+        let closed = &table.modes[at].key.closed;
+        let is = |pair: usize| closed.get(pair).copied().unwrap_or(true);
+        for (k, side) in [true, false].into_iter().enumerate() {
+            let guards = sides.clone().filter(|(pair, _)| is(*pair) == side);
+            let start = self.largest[k].max(stored[k]);
+            let largest = guards.clone().fold(start, |a, (_, g)| a.max(g.abs()));
+            self.largest[k] = largest;
+            let mut wrong = guards.filter(|(_, g)| *g < -WRONG * largest);
+            let Some((device, g)) = wrong.find_map(|(pair, g)| Some((table.device(pair)?, g)))
+            else {
+                continue;
+            };
+            self.noted_hidden = true;
+            let (stands, unit) = if side {
+                ("conducts", "A")
+            } else {
+                ("blocks", "V")
+            };
+            let text = format!(
+                "until t = {t:e} s {device} {stands} with {:.1e} {unit} of the wrong sign, which rounding beside an enormous Roff or a tiny Ron \
+                 hides: the values may be wrong by as much, and a Roff a thousand times smaller tells",
+                -g
+            );
+            self.notes.push(Note::of([device], text));
+        }
     }
 
     /// Keeps account of what starts or ends to slide on entering mode `at`: switches on their thresholds, function blocks on

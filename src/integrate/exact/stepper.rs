@@ -283,6 +283,21 @@ impl Exact {
         }
     }
 
+    /// Tells the report how the devices stand in the present mode, but for the one that `fired`.
+    fn look_back(&mut self, fired: Option<usize>) {
+        let Some(at) = self.mode.filter(|_| self.started) else {
+            return;
+        };
+        let mode = &self.table.modes[at];
+        let guards = &self.motion.now[mode.flow.dim()..];
+        let devices = mode.device_guards.iter().zip(guards).enumerate();
+        let others = devices.filter(|(guard, _)| fired != Some(*guard));
+        let sides = others.map(|(_, (&pair, g))| (pair, *g));
+        let stored = self.storage.amplitudes();
+        self.report
+            .note_hidden(&self.table, at, sides, stored, self.motion.t);
+    }
+
     /// What a change of mode from here may look at and move.
     fn transition(&mut self) -> Transition<'_> {
         Transition {
@@ -308,6 +323,10 @@ impl Exact {
         log: &mut Log,
     ) -> Result<(), SimError> {
         self.wanted = None;
+        self.look_back(match trigger {
+            Trigger::Guard(guard) => Some(guard),
+            _ => None,
+        });
         let left_row = (log.wants_rows() && self.started).then(|| {
             self.read_row();
             self.row.clone()

@@ -49,6 +49,15 @@ fn entries(matrix: &DMatrix<f64>) -> Vec<(usize, usize, f64)> {
 }
 
 impl Storage {
+    /// The largest current and the largest voltage so far, A and V.
+    pub(super) fn amplitudes(&self) -> [f64; 2] {
+        [false, true].map(|volts| {
+            let kind = self.scale.iter().zip(&self.volts);
+            let kind = kind.filter(|(_, v)| **v == volts);
+            kind.fold(0.0, |a, (scale, _)| scale.max(a))
+        })
+    }
+
     /// Of a system that starts from s; `balanced` asks for the energy balance.
     pub(super) fn new(lcs: &Lcs, s: &[f64], balanced: bool) -> Self {
         let metric = entries(&lcs.storage.metric);
