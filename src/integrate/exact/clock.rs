@@ -155,7 +155,7 @@ impl Clock {
                 t = end;
             }
             // An edge on the last row is due there, on whichever side of it rounding has put the time.
-            if t > until + SAME_TIME_ULPS * f64::EPSILON * t.abs() {
+            if t > until + SAME_TIME_ULPS * f64::EPSILON * until.abs() {
                 return f64::INFINITY;
             }
             for (input, _, line) in &mut self.terms {
