@@ -355,9 +355,14 @@ fn prescribed_steps_tell_their_error() {
                 let found = stepped(method, step);
                 let error = error(&found, &reference);
                 let ratio = found.error.max.unwrap() / error;
-                // 10 times were the order always 3; where it is less, the statement must hold too.
+                // An eighth of what steps 4 times as long differ by is the error of order 2; of a smooth motion with stages of order 3 it is a
+                // twentieth of that.
+                let most = match method {
+                    Method::Euler => 3.0,
+                    _ => 25.0,
+                };
                 assert!(
-                    (1.0..50.0).contains(&ratio),
+                    (1.0..most).contains(&ratio),
                     "{name} {method:?} {step:e}: {ratio} of {error:e}"
                 );
             }

@@ -151,6 +151,10 @@ impl<'a> Accompanied<'a> {
             }
             let share = companion.by.share;
             let (largest, mean) = companion.difference.over(&scales);
+            // Nothing was compared.
+            if companion.difference.rows == 0 {
+                return own;
+            }
             max = max.max(share * largest);
             rms = rms.max(share * mean);
             time = time.max(share * companion.difference.shift);

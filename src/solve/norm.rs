@@ -47,23 +47,14 @@ pub(super) fn least(lcp: &Lcp, lambda: &DVector<f64>, units: &DVector<f64>) -> L
     }
     // In units of `scale`: (λ, y) = here + G w, of which nothing may be negative. Entries at rounding level are zeros: as inequalities
     // they may not be contradicted by noise.
-    let stacked = |upper: &DMatrix<f64>, lower: &DMatrix<f64>| {
-        let mut all = upper.clone().resize_vertically(2 * m, 0.0);
-        all.rows_mut(m, m).copy_from(lower);
-        all
-    };
-    let mut g = stacked(&z, &(&lcp.m * &z));
+    let mut g = z.clone().resize_vertically(2 * m, 0.0);
+    g.rows_mut(m, m).copy_from(&(&lcp.m * &z));
     let rounding = g.iter_mut().filter(|v| v.abs() < RANK);
     rounding.for_each(|v| *v = 0.0);
-    let here = DVector::from_fn(2 * m, |i, _| {
-        let value = if i < m {
-            lambda[i]
-        } else {
-            lcp.m.row(i - m).transpose().dot(lambda) + lcp.q[i - m]
-        };
-        let value = value / scale;
-        if value.abs() < RANK { 0.0 } else { value }
-    });
+    let mut here = lambda.clone().resize_vertically(2 * m, 0.0) / scale;
+    here.rows_mut(m, m).copy_from(&(lcp.y(lambda) / scale));
+    let rounding = here.iter_mut().filter(|v| v.abs() < RANK);
+    rounding.for_each(|v| *v = 0.0);
     // ‖W (here + G w)‖ = ‖R w + c‖ up to what w cannot change, with W G = Q R; v = R w + c.
     let weight = DVector::from_fn(2 * m, |i, _| {
         if i < m {

@@ -5,11 +5,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-use circ::circuit::{ElaborateOptions, elaborate};
-use circ::diagnostic::SourceMap;
-use circ::integrate::{Method, Run, SimOptions, simulate};
-use circ::mna::behaviour;
-use circ::netlist::parse;
+use circ::Model;
+use circ::integrate::{Method, Run, SimOptions};
 use circ::settings::Settings;
 
 use crate::changes::change;
@@ -73,14 +70,7 @@ fn run_to(text: &str, method: Method, tol: f64) -> Result<Run, String> {
 fn attempt(text: &str, method: Method, tol: f64) -> Result<Run, String> {
     let end = Instant::now() + LONGEST;
     let guarded = catch_unwind(AssertUnwindSafe(|| {
-        let mut sources = SourceMap::default();
-        let root = sources.add("random.cir", text);
-        let (netlist, findings) = parse(&mut sources, root, &|_| {
-            Err(std::io::ErrorKind::NotFound.into())
-        });
-        let (circuit, more) = elaborate(&netlist, &ElaborateOptions::default());
-        let circuit = circuit.ok_or_else(|| format!("not read: {findings:?} {more:?}"))?;
-        let behaviour = behaviour(&circuit).map_err(|e| format!("no behaviour: {e:?}"))?;
+        let model = Model::parse(text, "random.cir").map_err(|e| format!("not read: {e}"))?;
         let mut progress = |t: f64| assert!(Instant::now() < end, "hang: at {t:e} s");
         let options = SimOptions {
             method,
@@ -92,7 +82,7 @@ fn attempt(text: &str, method: Method, tol: f64) -> Result<Run, String> {
             },
             ..SimOptions::default()
         };
-        simulate(&circuit, &behaviour, options).map_err(|e| e.to_string())
+        model.transient(options).map_err(|e| e.to_string())
     }));
     guarded.unwrap_or_else(|e| Err(said(e.as_ref())))
 }

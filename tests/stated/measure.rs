@@ -3,11 +3,9 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
 
-use circ::circuit::{Circuit, ElaborateOptions, Tran, elaborate};
-use circ::diagnostic::SourceMap;
+use circ::Model;
+use circ::circuit::Tran;
 use circ::integrate::{Method, Run, SimOptions, simulate};
-use circ::mna::{Behaviour, behaviour};
-use circ::netlist::parse;
 use circ::settings::Settings;
 use circ::waveform::Waveforms;
 
@@ -85,23 +83,6 @@ pub(crate) fn netlist(seed: u64, curved: bool) -> String {
     circuit.text_saving(&saved, rows)
 }
 
-struct Subject {
-    circuit: Circuit,
-    behaviour: Behaviour,
-}
-
-fn subject(text: &str) -> Result<Subject, String> {
-    let mut sources = SourceMap::default();
-    let root = sources.add("random.cir", text);
-    let (netlist, findings) = parse(&mut sources, root, &|_| {
-        Err(std::io::ErrorKind::NotFound.into())
-    });
-    let (circuit, more) = elaborate(&netlist, &ElaborateOptions::default());
-    let circuit = circuit.ok_or_else(|| format!("not read: {findings:?} {more:?}"))?;
-    let behaviour = behaviour(&circuit).map_err(|e| format!("no behaviour: {e:?}"))?;
-    Ok(Subject { circuit, behaviour })
-}
-
 /// What a run is asked for.
 struct Asked {
     method: Method,
@@ -114,8 +95,8 @@ struct Asked {
 /// A run that takes more steps says nothing.
 const MOST_STEPS: u64 = 300_000;
 
-fn run(subject: &Subject, asked: &Asked, finer: f64) -> Result<Run, String> {
-    let mut circuit = subject.circuit.clone();
+fn run(model: &Model, asked: &Asked, finer: f64) -> Result<Run, String> {
+    let mut circuit = model.circuit().clone();
     circuit.tran = circuit.tran.map(|tran| Tran {
         tstep: tran.tstep / finer,
         ..tran
@@ -133,7 +114,7 @@ fn run(subject: &Subject, asked: &Asked, finer: f64) -> Result<Run, String> {
         ..SimOptions::default()
     };
     let guarded = catch_unwind(AssertUnwindSafe(|| {
-        simulate(&circuit, &subject.behaviour, options)
+        simulate(&circuit, model.multiport(), options)
     }));
     guarded
         .unwrap_or_else(|_| panic!("panic"))
@@ -156,11 +137,8 @@ pub(crate) fn measure(setting: &Setting, seed: u64) -> Found {
 
 /// A netlist; the seed chooses the step where one is prescribed.
 pub(crate) fn of_text(setting: &Setting, text: &str, seed: u64) -> Found {
-    let subject = match subject(text) {
-        Ok(subject) => subject,
-        Err(error) => panic!("{error}\n{text}"),
-    };
-    let tran = subject.circuit.tran.expect("a transient");
+    let model = Model::parse(text, "random.cir").unwrap_or_else(|e| panic!("{e}\n{text}"));
+    let tran = model.circuit().tran.expect("a transient");
     let mut random = Random::new(seed ^ 0x5747_a7ed);
     let step = setting
         .steps
@@ -185,20 +163,20 @@ pub(crate) fn of_text(setting: &Setting, text: &str, seed: u64) -> Found {
             corners: true,
             unestimated: true,
         };
-        run(&subject, &asked, FINER)
+        run(&model, &asked, FINER)
     };
     let Ok(reference) = better(CURVED[1]) else {
         return Found::Nothing("no reference");
     };
     let undetermined = |run: &Run| run.notes.iter().any(|n| n.text.contains("not determined"));
-    let found = match run(&subject, &asked(false), 1.0) {
+    let found = match run(&model, &asked(false), 1.0) {
         Ok(found) => found,
         Err(error) => return Found::Refused(error),
     };
     if undetermined(&reference) || undetermined(&found) {
         return Found::Nothing("undetermined");
     }
-    let alone = match run(&subject, &asked(true), 1.0) {
+    let alone = match run(&model, &asked(true), 1.0) {
         Ok(alone) => alone,
         Err(error) => return Found::Refused(error),
     };

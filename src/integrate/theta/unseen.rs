@@ -3,8 +3,8 @@
 //!
 //! The slope f₀ at the start of a step does see them. The stages' polynomial has the slope P'(0) there, and what is not seen moves the
 //! state by w h (f₀ − f₁) at most, w = c₁/2, if it goes on for as long as the first stage is away; f₁ is what comes nearest to f₀ between
-//! P'(0) and the slope of the first stage. In a smooth motion that is of the order of the error of the step. A stage is the implicit Euler step: what a state forgets until then is no error, and the
-//! derivative of the last stage tells it.
+//! P'(0) and the slope of the first stage. In a smooth motion that is of the order of the error of the step. A stage is an implicit Euler
+//! step: what a state forgets until then is no error, and the derivative of the last stage tells it.
 //!
 //! Behind a step f₀ is the slope of its last stage. After a breakpoint there is none: layers that decay in no time and currents that end
 //! soon begin together. Implicit Euler steps from the same start, each [`CLOSER`] times shorter than the last, tell the slopes
