@@ -57,6 +57,7 @@ pub mod forms;
 pub mod integrate;
 pub mod law;
 pub mod lcs;
+mod linalg;
 pub mod measure;
 pub mod mna;
 pub mod model;

@@ -2,14 +2,14 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::dense::{BLOCK, Dense};
-use super::expm::{self, Ladders};
-use super::kernel::{Kernel, SparseKernel};
 use super::map::Sizes as RowSizes;
 use super::rounding::{GROUP, NOISE};
-use super::series::{MAX_DEGREE, Series};
 use super::spectrum::{Rate, Spectrum};
 use super::work::{Sizes, Term, Work};
+use crate::linalg::dense::{BLOCK, Dense};
+use crate::linalg::expm::{self, Ladders};
+use crate::linalg::kernel::{Kernel, SparseKernel};
+use crate::linalg::series::{MAX_DEGREE, Series};
 
 /// The longest step is 2^LONG output steps.
 pub(crate) const LONG: u32 = 4;

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::kernel::Kernel;
+use crate::linalg::kernel::Kernel;
 
 /// A map, and how large its values can be.
 #[derive(Debug, Clone)]

@@ -5,19 +5,19 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::clock::Clock;
-use super::decouple::decoupled;
 use super::exosystem::Exosystem;
 use super::flow::Flow;
-use super::kernel::Kernel;
 use super::key::{Key, Owner, Trigger};
 use super::magnitudes::{Magnitudes, ORDERS};
 use super::map::{Map, Sizes};
-use super::rays;
 use super::sampled::SampledRows;
 use super::work::Term;
 use crate::integrate::event::Change;
 use crate::integrate::switching::Threshold;
 use crate::lcs::{Lcs, PowerKind, Rows};
+use crate::linalg::decouple::decoupled;
+use crate::linalg::kernel::Kernel;
+use crate::linalg::rays;
 
 /// Successors of a mode that are remembered; the oldest goes first.
 const MOST_SUCCESSORS: usize = 64;

@@ -3,11 +3,11 @@
 use super::exosystem::Exosystem;
 use super::flow::{Flow, LONG};
 use super::magnitudes::Magnitudes;
-use super::polynomial;
 use super::rounding::{SIMULTANEOUS, resolution};
-use super::series::Series;
 use super::slaved::Follower;
 use super::work::Sizes;
+use crate::linalg::polynomial;
+use crate::linalg::series::Series;
 
 /// Table steps after which the exosystem is set from its closed form again.
 const REFRESH: u32 = 64;

@@ -1,8 +1,8 @@
 //! Output rows that follow a state of a calm mode, an output step apart.
 
-use super::dense::Dense;
 use super::flow::{Flow, LONG};
-use super::kernel::Kernel;
+use crate::linalg::dense::Dense;
+use crate::linalg::kernel::Kernel;
 
 /// Rows of a long step at most.
 pub(super) const MOST: usize = 1 << LONG;

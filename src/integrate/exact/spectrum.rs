@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::eigenvalues::eigenvalues;
-use super::expm;
+use crate::linalg::eigenvalues::eigenvalues;
+use crate::linalg::expm;
 
 /// A transient e^{−at} is below the rounding of what it started from once a·t exceeds −ln(2⁻⁵³).
 const EXTINCT: f64 = 37.0;

@@ -7,10 +7,10 @@
 
 use nalgebra::DMatrix;
 
-use super::dense::Dense;
-use super::expm::{self, Ladders};
-use super::kernel::Kernel;
-use super::series::Series;
+use crate::linalg::dense::Dense;
+use crate::linalg::expm::{self, Ladders};
+use crate::linalg::kernel::Kernel;
+use crate::linalg::series::Series;
 
 /// Terms of the series over a step with ‖𝒜‖ h ≤ [`expm::SERIES`]; (2·0.125)^k/k! is below rounding beyond, in every entry: their sizes are not comparable.
 const TERMS: usize = 15;
@@ -409,7 +409,7 @@ impl Doubling {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::integrate::exact::kernel::SparseKernel;
+    use crate::linalg::kernel::SparseKernel;
 
     fn sizes(amplitude: &[f64]) -> Sizes<'_> {
         Sizes {

@@ -26,7 +26,7 @@ use crate::lcs::Lcs;
 use super::Reduction;
 
 /// Fast states are separated from those that are slower by this factor: below, exponentials over long steps are products of short
-/// ones, which lose nothing (‖A h‖ = 10³, `integrate::exact::expm`); above, they lose 2⁻⁵³ of its square.
+/// ones, which lose nothing (‖A h‖ = 10³, `linalg::expm`); above, they lose 2⁻⁵³ of its square.
 const APART: f64 = 1e3;
 
 /// Whether a system, as it was reduced in the basis of its names, has fast states to be taken apart from slow ones.

@@ -23,7 +23,7 @@ impl Kernel {
     }
 
     /// These matrices of equally many columns, one below the other.
-    pub(super) fn stacked(parts: &[&Dense]) -> Self {
+    pub(crate) fn stacked(parts: &[&Dense]) -> Self {
         let columns = parts.first().map_or(0, |part| part.columns());
         let mut kernel = Self::zeros(parts.iter().map(|part| part.rows()).sum(), columns);
         let mut first = 0;
@@ -52,7 +52,7 @@ impl Kernel {
     }
 
     /// Number of rows.
-    pub(super) fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.rows
     }
 
@@ -95,7 +95,7 @@ impl Kernel {
 
 /// A matrix with many zeros, whose blocks of four rows and one column are left out where they are zero.
 #[derive(Debug, Clone, Default)]
-pub(super) struct SparseKernel {
+pub(crate) struct SparseKernel {
     /// By block of rows: where its blocks end.
     ends: Vec<usize>,
     /// (column, entries).
@@ -104,7 +104,7 @@ pub(super) struct SparseKernel {
 
 impl SparseKernel {
     /// Repacks a matrix.
-    pub(super) fn new(matrix: &DMatrix<f64>) -> Self {
+    pub(crate) fn new(matrix: &DMatrix<f64>) -> Self {
         let dense = Kernel::new(matrix);
         let mut sparse = Self::default();
         for k in 0..dense.rows.div_ceil(BLOCK) {
@@ -120,7 +120,7 @@ impl SparseKernel {
 
     /// y = K w in whole blocks, zeros behind the last row.
     #[inline]
-    pub(super) fn apply(&self, w: &[f64], y: &mut [Block]) {
+    pub(crate) fn apply(&self, w: &[f64], y: &mut [Block]) {
         let mut begin = 0;
         for (&end, y) in self.ends.iter().zip(y) {
             let mut sums = [0.0; BLOCK];

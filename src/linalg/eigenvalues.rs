@@ -16,7 +16,7 @@ const SHIFT: (f64, f64) = (0.75, -0.4375);
 
 /// All eigenvalues of a square matrix, in no particular order; `None` where its entries are not finite or the iteration does
 /// not converge.
-pub(super) fn eigenvalues(matrix: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
+pub(crate) fn eigenvalues(matrix: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     let n = matrix.nrows();
     if !matrix.iter().all(|v| v.is_finite()) {
         return None;

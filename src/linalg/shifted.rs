@@ -6,7 +6,7 @@ use super::dense::Dense;
 
 /// Work space for n×n.
 #[derive(Debug, Clone)]
-pub(super) struct Shifted {
+pub(crate) struct Shifted {
     n: usize,
     /// Rows of [Z − p, B], each with its real parts first: 4n numbers.
     rows: Vec<f64>,
@@ -28,7 +28,7 @@ fn subtract(target: &mut [f64], factor: Complex<f64>, row: &[f64], from: usize) 
 }
 
 impl Shifted {
-    pub(super) fn new(n: usize) -> Self {
+    pub(crate) fn new(n: usize) -> Self {
         Self {
             n,
             rows: vec![0.0; 4 * n * n],
@@ -55,7 +55,7 @@ impl Shifted {
     }
 
     /// Real and imaginary part of (Z − p)⁻¹; `None` where it does not exist.
-    pub(super) fn inverse(&mut self, z: &Dense, pole: Complex<f64>) -> Option<&[Dense; 2]> {
+    pub(crate) fn inverse(&mut self, z: &Dense, pole: Complex<f64>) -> Option<&[Dense; 2]> {
         let n = self.n;
         self.rows.fill(0.0);
         for j in 0..n {

@@ -4,13 +4,13 @@
 use nalgebra::DMatrix;
 
 /// Rows computed together: four independent accumulators keep the adders of any x86-64 or ARM64 core busy.
-pub(super) const BLOCK: usize = 4;
+pub(crate) const BLOCK: usize = 4;
 /// Rows computed together.
-pub(super) type Block = [f64; BLOCK];
+pub(crate) type Block = [f64; BLOCK];
 
 /// A matrix in blocks of four rows, column by column; rows beyond the last are zero.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Dense {
+pub(crate) struct Dense {
     rows: usize,
     columns: usize,
     /// Blocks in a column.
@@ -19,7 +19,7 @@ pub(super) struct Dense {
 }
 
 impl Dense {
-    pub(super) fn zeros(rows: usize, columns: usize) -> Self {
+    pub(crate) fn zeros(rows: usize, columns: usize) -> Self {
         let blocks = rows.div_ceil(BLOCK);
         Self {
             rows,
@@ -29,7 +29,7 @@ impl Dense {
         }
     }
 
-    pub(super) fn from_fn(
+    pub(crate) fn from_fn(
         rows: usize,
         columns: usize,
         entry: impl Fn(usize, usize) -> f64,
@@ -43,30 +43,30 @@ impl Dense {
         dense
     }
 
-    pub(super) fn of(matrix: &DMatrix<f64>) -> Self {
+    pub(crate) fn of(matrix: &DMatrix<f64>) -> Self {
         Self::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)])
     }
 
-    pub(super) fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.rows
     }
 
-    pub(super) fn columns(&self) -> usize {
+    pub(crate) fn columns(&self) -> usize {
         self.columns
     }
 
-    pub(super) fn column(&self, j: usize) -> &[f64] {
+    pub(crate) fn column(&self, j: usize) -> &[f64] {
         let column = &self.data[j * self.blocks..(j + 1) * self.blocks];
         &column.as_flattened()[..self.rows]
     }
 
-    pub(super) fn column_mut(&mut self, j: usize) -> &mut [f64] {
+    pub(crate) fn column_mut(&mut self, j: usize) -> &mut [f64] {
         let column = &mut self.data[j * self.blocks..(j + 1) * self.blocks];
         &mut column.as_flattened_mut()[..self.rows]
     }
 
     /// self ← a b, all of matching sizes.
-    pub(super) fn set_product(&mut self, a: &Self, b: &Self) {
+    pub(crate) fn set_product(&mut self, a: &Self, b: &Self) {
         debug_assert_eq!((self.rows, self.columns), (a.rows, b.columns));
         debug_assert_eq!(a.columns, b.rows);
         match a.blocks {
@@ -110,7 +110,7 @@ impl Dense {
     }
 
     /// self ← aᵀ, of matching size.
-    pub(super) fn set_transposed(&mut self, a: &Self) {
+    pub(crate) fn set_transposed(&mut self, a: &Self) {
         for i in 0..self.rows {
             let (block, lane) = (i / BLOCK, i % BLOCK);
             let rows = self.data.iter_mut().skip(block);
@@ -122,13 +122,13 @@ impl Dense {
     }
 
     /// self ← factor (a + aᵀ), square and of matching size.
-    pub(super) fn set_symmetric(&mut self, factor: f64, a: &Self) {
+    pub(crate) fn set_symmetric(&mut self, factor: f64, a: &Self) {
         self.set_transposed(a);
         self.combine(factor, factor, a);
     }
 
     /// self ← self · scale + other · factor.
-    pub(super) fn combine(&mut self, scale: f64, factor: f64, other: &Self) {
+    pub(crate) fn combine(&mut self, scale: f64, factor: f64, other: &Self) {
         let theirs = other.data.as_flattened();
         for (a, b) in self.data.as_flattened_mut().iter_mut().zip(theirs) {
             *a = *a * scale + b * factor;
@@ -141,25 +141,25 @@ impl Dense {
     }
 
     /// Largest absolute entry.
-    pub(super) fn amax(&self) -> f64 {
+    pub(crate) fn amax(&self) -> f64 {
         self.entries().iter().fold(0.0, |m, v| v.abs().max(m))
     }
 
     /// Largest absolute column sum.
-    pub(super) fn norm_1(&self) -> f64 {
+    pub(crate) fn norm_1(&self) -> f64 {
         (0..self.columns)
             .map(|j| self.column(j).iter().map(|v| v.abs()).sum::<f64>())
             .fold(0.0, f64::max)
     }
 
     /// Adds to the diagonal.
-    pub(super) fn shift(&mut self, by: f64) {
+    pub(crate) fn shift(&mut self, by: f64) {
         for j in 0..self.columns.min(self.rows) {
             self.column_mut(j)[j] += by;
         }
     }
 
-    pub(super) fn is_finite(&self) -> bool {
+    pub(crate) fn is_finite(&self) -> bool {
         self.entries().iter().all(|v| v.is_finite())
     }
 }

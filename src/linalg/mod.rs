@@ -1,0 +1,12 @@
+//! Dense linear algebra of the sizes of circuits: what the exact integrator needs and general-purpose libraries do not have, each a
+//! function of matrices that knows nothing of circuits.
+
+pub(crate) mod decouple;
+pub(crate) mod dense;
+pub(crate) mod eigenvalues;
+pub(crate) mod expm;
+pub(crate) mod kernel;
+pub(crate) mod polynomial;
+pub(crate) mod rays;
+pub(crate) mod series;
+pub(crate) mod shifted;
