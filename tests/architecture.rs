@@ -7,20 +7,30 @@ use std::path::{Path, PathBuf};
 /// Each room and the rooms it may import, in the order in which data flows.
 const ROOMS: [(&str, &[&str]); 21] = [
     ("settings", &[]),
-    ("algebra", &[]),
-    ("linalg", &[]),
+    ("algebra", &["settings"]),
+    ("linalg", &["settings"]),
     ("diagnostic", &[]),
-    ("law", &["algebra"]),
-    ("measure", &[]),
+    ("law", &["algebra", "settings"]),
+    ("measure", &["settings"]),
     ("netlist", &["algebra", "diagnostic", "measure"]),
     (
         "circuit",
-        &["algebra", "diagnostic", "law", "measure", "netlist"],
+        &[
+            "algebra",
+            "diagnostic",
+            "law",
+            "measure",
+            "netlist",
+            "settings",
+        ],
     ),
     ("mna", &["algebra", "circuit", "diagnostic", "law"]),
-    ("lcs", &["algebra", "circuit", "diagnostic", "law", "mna"]),
+    (
+        "lcs",
+        &["algebra", "circuit", "diagnostic", "law", "mna", "settings"],
+    ),
     ("solve", &["law", "settings"]),
-    ("waveform", &[]),
+    ("waveform", &["settings"]),
     ("plan", &["lcs", "settings", "solve"]),
     (
         "integrate",
@@ -153,6 +163,70 @@ const CONFINED: [(&str, &[&str], &str); 6] = [
         "the library opens no files but netlists",
     ),
 ];
+
+/// Constants of type f64 that decide nothing, outside `settings/tolerances/`: (file, names, why).
+const NO_TOLERANCES: [(&str, &[&str], &str); 19] = [
+    (
+        "algebra/ball.rs",
+        &["EXACT_INTEGERS", "UP"],
+        "bounds of the arithmetic of doubles",
+    ),
+    (
+        "algebra/double.rs",
+        &["ROUNDING", "SPLITTER"],
+        "bounds of the arithmetic of doubles",
+    ),
+    ("circuit/bipolar.rs", &["NOMINAL", "RATED"], DEFAULT),
+    ("circuit/drive.rs", &["STARTUP"], DEFAULT),
+    ("circuit/exponential.rs", &["NOMINAL"], DEFAULT),
+    (
+        "circuit/held.rs",
+        &["BETWEEN", "OFF", "ON"],
+        "the values of a control that is set by hand",
+    ),
+    ("circuit/line.rs", &["QUARTER"], DEFAULT),
+    (
+        "circuit/measurement.rs",
+        &["MAX_HARMONICS"],
+        "the most that is read",
+    ),
+    (
+        "circuit/model.rs",
+        &["LEVELS"],
+        "numbers of models in other programs",
+    ),
+    ("circuit/thyristor.rs", &["JUNCTIONS"], DEFAULT),
+    (
+        "circuit/transistor.rs",
+        &["JUNCTION", "OXIDE", "SIDE"],
+        DEFAULT,
+    ),
+    ("circuit/transistor/drive.rs", &["DRIVE"], DEFAULT),
+    ("forms/nonlinear.rs", &["GAUSS"], "a quadrature"),
+    (
+        "integrate/exact/work.rs",
+        &["NODES", "WEIGHTS"],
+        "a quadrature",
+    ),
+    (
+        "integrate/theta/stages.rs",
+        &["B1", "B2", "GAMMA"],
+        "a tableau",
+    ),
+    ("law/exponential.rs", &["BOLTZMANN"], "physics"),
+    ("linalg/eigenvalues.rs", &["SHIFT"], "a known shift"),
+    (
+        "linalg/expm.rs",
+        &["LAST", "PAIRS"],
+        "poles of an approximant",
+    ),
+    (
+        "netlist/card/controlled.rs",
+        &["MAX_POLY"],
+        "the most that is read",
+    ),
+];
+const DEFAULT: &str = "what a card means that does not say it";
 
 fn source() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
@@ -343,6 +417,104 @@ fn matrices_and_spice_stay_in_their_rooms() {
             }
         }
     }
+}
+
+/// Names of the constants with an f64 in their type.
+fn float_constants(text: &str) -> Vec<String> {
+    let declared = text.match_indices("const ").filter_map(|(at, word)| {
+        let (name, rest) = text[at + word.len()..].split_once(':')?;
+        let kind = rest.split('=').next()?;
+        let is_parameter = text[..at].ends_with('<');
+        let is_name = !name.is_empty() && name == identifier(name) && !is_parameter;
+        (is_name && kind.contains("f64") && !kind.contains("fn")).then(|| name.to_string())
+    });
+    declared.collect()
+}
+
+/// Literals below one in scientific notation, as tolerances are written.
+fn small_literals(text: &str) -> Vec<String> {
+    let words = text.split(|c: char| !(c.is_alphanumeric() || "._-".contains(c)));
+    let small = words.filter(|word| {
+        let (digits, exponent) = word.split_once("e-").unwrap_or_default();
+        let is_number = |text: &str| text.starts_with(|c: char| c.is_ascii_digit());
+        is_number(digits) && is_number(exponent)
+    });
+    small.map(str::to_owned).collect()
+}
+
+#[test]
+fn what_decides_something_stands_among_the_tolerances() {
+    let mut faults = Vec::new();
+    let mut found = BTreeMap::<String, BTreeSet<String>>::new();
+    for (path, text) in files() {
+        // Figures, tables and the command line decide what is shown.
+        if ["settings", "cli", "report"].contains(&room(&path).as_str()) {
+            continue;
+        }
+        let listed = NO_TOLERANCES.iter().find(|n| n.0 == path);
+        let listed = listed.map_or(&[][..], |n| n.1);
+        for name in float_constants(&text) {
+            if listed.contains(&name.as_str()) {
+                found.entry(path.clone()).or_default().insert(name);
+            } else {
+                faults.push(format!("{path}: {name}"));
+            }
+        }
+        // Defaults of model parameters, and the sizes at which numbers are written with an exponent.
+        let is_text = path.starts_with("circuit/") || path == "lcs/format.rs";
+        if !is_text && listed.is_empty() && path != "lcs/json/read.rs" && path != "integrate/run.rs"
+        {
+            faults.extend(
+                small_literals(&text)
+                    .into_iter()
+                    .map(|l| format!("{path}: {l}")),
+            );
+        }
+    }
+    let advice = "belongs into settings/tolerances/, or into the list of what decides nothing";
+    assert!(faults.is_empty(), "{advice}:\n{}", faults.join("\n"));
+    for (path, names, _) in NO_TOLERANCES {
+        let names: BTreeSet<String> = names.iter().map(|n| (*n).to_string()).collect();
+        assert_eq!(
+            found.get(path),
+            Some(&names),
+            "{path} no longer has one of these"
+        );
+    }
+}
+
+#[test]
+fn every_tolerance_has_its_reason_and_its_use() {
+    let folder = source().join("settings/tolerances");
+    let rest: String = files().into_iter().map(|(_, text)| text).collect();
+    let mut names = BTreeSet::new();
+    for entry in std::fs::read_dir(folder).expect("a folder") {
+        let text = std::fs::read_to_string(entry.expect("an entry").path()).expect("a file");
+        let lines: Vec<&str> = text.lines().collect();
+        for (k, line) in lines.iter().enumerate() {
+            let Some(declared) = line.strip_prefix("pub(crate) const ") else {
+                continue;
+            };
+            let name = identifier(declared);
+            assert!(
+                k > 0 && lines[k - 1].starts_with("///"),
+                "{name} without a reason"
+            );
+            assert!(rest.matches(&name).count() > 1, "{name} is not used");
+            assert!(
+                names.insert(name.clone()),
+                "two tolerances are called {name}"
+            );
+        }
+    }
+    assert!(names.len() > 100, "the tolerances are found");
+}
+
+#[test]
+fn constants_and_literals_are_read() {
+    let text = "const A: f64 = 1e-9;\n  pub(crate) const B: [f64; 2] = [2.0, 3e-4];\nconst N: usize = 3;\nconst fn f(x: f64) {}\nfn g<const P: usize>(s: [f64; P]) {}";
+    assert_eq!(float_constants(text), ["A", "B"]);
+    assert_eq!(small_literals(text), ["1e-9", "3e-4"]);
 }
 
 #[test]

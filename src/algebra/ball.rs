@@ -5,6 +5,7 @@ use num_traits::{Signed, ToPrimitive};
 
 use super::double::ROUNDING;
 use super::{Double, Field, Rational, Value, rational};
+use crate::settings::tolerances::ranks::BALL_KNOWN;
 
 /// An element of ℚ known by its residue modulo p = 2⁶¹ − 1 and by an interval.
 ///
@@ -62,9 +63,6 @@ fn residue_of(n: &BigInt) -> u64 {
     let r = (n.abs() % P).to_u64().unwrap_or(0);
     if n.is_negative() { neg_mod(r) } else { r }
 }
-
-/// Relative radius up to which a ball counts as known.
-const PRECISION: f64 = 1e-14;
 
 impl Ball {
     const ZERO: Self = Self {
@@ -265,7 +263,7 @@ impl Field for Ball {
 
     fn is_precise(&self) -> bool {
         let size = self.value.hi.abs();
-        self.residue == INEXACT && size.is_finite() || self.radius <= PRECISION * size
+        self.residue == INEXACT && size.is_finite() || self.radius <= BALL_KNOWN * size
     }
 }
 

@@ -1,12 +1,10 @@
 //! Elimination on sparse rows: node potentials and internal currents, once per circuit.
 
 use super::Field;
+use crate::settings::tolerances::ranks::PIVOT_CHOICE;
 
 /// Entries (column, value) of a row, columns increasing, no zeros.
 pub type SparseRow<F> = Vec<(usize, F)>;
-
-/// A pivot must be at least this fraction of the largest candidate, relative to its row; among those the shortest row wins.
-const PIVOT_THRESHOLD: f64 = 1e-2;
 
 /// Eliminates the columns below `columns` from all rows and removes the rows that held the pivots.
 ///
@@ -109,7 +107,7 @@ fn pivot_row<F: Field>(
     let largest = candidates.iter().fold(0.0, |m: f64, c| m.max(c.1));
     candidates
         .into_iter()
-        .filter(|c| c.1 >= PIVOT_THRESHOLD * largest)
+        .filter(|c| c.1 >= PIVOT_CHOICE * largest)
         .map(|(r, _)| (rows[r].len(), r))
         .min()
         .map(|(_, r)| r)

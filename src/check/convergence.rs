@@ -6,11 +6,8 @@ use super::equilibria::Equilibrium;
 use super::facts::{Facts, Swap};
 use super::limit::{self, Known, LimitSet};
 use crate::passivity::{lmi, scale};
-
-/// Relative size below which a λ or y of the equilibrium is zero, and above which it is not; between them nothing is
-/// concluded from it.
-const ZERO: f64 = 1e-9;
-const POSITIVE: f64 = 1e-5;
+use crate::settings::tolerances::ranks::RANK;
+use crate::settings::tolerances::theorems::{AT_ZERO, NOT_AT_ZERO};
 
 /// What is certified of the long run.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -82,11 +79,11 @@ fn relations(facts: &Facts, equilibrium: &Equilibrium) -> Vec<Known> {
             };
         }
         let (lambda, y) = (size(lambda[j], lambda_size), size(y[j], y_size[j]));
-        if lambda <= ZERO && y <= ZERO {
+        if lambda <= AT_ZERO && y <= AT_ZERO {
             Known::Signs
-        } else if y > POSITIVE {
+        } else if y > NOT_AT_ZERO {
             Known::Lambda
-        } else if lambda > POSITIVE {
+        } else if lambda > NOT_AT_ZERO {
             Known::Y
         } else {
             Known::Nothing
@@ -125,6 +122,6 @@ pub(super) fn lossless_pairs(facts: &Facts) -> usize {
         let d = scale::equilibrate(&lmi::magnitude(&facts.system, &certificate.p));
         let q = scale::scaled(&lmi::matrix(&facts.system, &certificate.p), &d, &d);
         let (values, _) = scale::eigen(&q);
-        values.iter().filter(|v| v.abs() <= scale::RANK).count()
+        values.iter().filter(|v| v.abs() <= RANK).count()
     })
 }

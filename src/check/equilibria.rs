@@ -6,6 +6,7 @@ use super::facts::Facts;
 use super::program;
 use crate::passivity::scale;
 use crate::settings::Settings;
+use crate::settings::tolerances::theorems::ROUGH_EQUILIBRIUM;
 use crate::solve::enumerate;
 use crate::solve::{Driver, Lcp, Status};
 
@@ -19,9 +20,6 @@ pub struct Equilibrium {
     /// Whether x is the only one; `null` if that was not settled.
     pub unique: Option<bool>,
 }
-
-/// Residual in balanced units at which the interior point method's answer counts as an equilibrium.
-const ROUGH: f64 = 1e-7;
 
 /// The equilibria of an autonomous system of complementary pairs: all of them where A is regular and m ≤ 16, else one; of a
 /// system with other laws x = 0 where it is one. `None` where nothing is known, an empty list where there is none.
@@ -171,5 +169,5 @@ fn singular(facts: &Facts) -> Option<(DVector<f64>, DVector<f64>)> {
             .component_mul(&balanced.ports)
             * size,
     );
-    (rest.max(sides) <= ROUGH * z.amax().max(1.0)).then_some(found)
+    (rest.max(sides) <= ROUGH_EQUILIBRIUM * z.amax().max(1.0)).then_some(found)
 }

@@ -1,5 +1,6 @@
 //! What kind of matrix the feedthrough D is: it decides whether λ is determined by the state and whether states can jump.
 
+use crate::settings::tolerances::ranks::RANK;
 use nalgebra::DMatrix;
 use petgraph::algo::tarjan_scc;
 use petgraph::graph::DiGraph;
@@ -11,10 +12,6 @@ const EXACT_ORDER: usize = 14;
 /// most this many operations (m³ each).
 const RANDOM_MINORS: usize = 4000;
 const OPERATIONS: usize = 200_000_000;
-
-/// Size, relative to the Hadamard bound of the equilibrated matrix, below which a minor or eigenvalue counts as zero.
-/// Entries carry up to 1e-12; larger: regular matrices are called singular; smaller: rounding gets a sign.
-const ZERO: f64 = 1e-10;
 
 /// The class of D (m×m). `None` is "not decided".
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -50,8 +47,8 @@ impl Feedthrough {
         } else {
             symmetric.clone().symmetric_eigenvalues().min()
         };
-        let psd = smallest >= -ZERO * m as f64;
-        let pd = m > 0 && smallest > ZERO * m as f64;
+        let psd = smallest >= -RANK * m as f64;
+        let pd = m > 0 && smallest > RANK * m as f64;
         let singular = if m == 0 {
             Vec::new()
         } else {
@@ -67,8 +64,8 @@ impl Feedthrough {
             zero: d.amax() == 0.0 || m == 0,
             psd,
             pd: pd || m == 0,
-            skew: symmetric.amax() <= ZERO,
-            rank: singular.iter().filter(|&&s| s > ZERO * top).count(),
+            skew: symmetric.amax() <= RANK,
+            rank: singular.iter().filter(|&&s| s > RANK * top).count(),
             p_matrix,
             p0_matrix,
         }
@@ -153,7 +150,7 @@ fn sign(d: &DMatrix<f64>, set: &[usize]) -> i8 {
     let sub = d.select_rows(set).select_columns(set);
     let bound: f64 = sub.row_iter().map(|row| row.norm()).product();
     let value = sub.determinant();
-    if value.abs() <= ZERO * bound {
+    if value.abs() <= RANK * bound {
         0
     } else if value > 0.0 {
         1

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::facts::Facts;
 use super::program::Inequalities;
 use crate::passivity::scale;
+use crate::settings::tolerances::ranks::RANK;
 
 /// Which impulses the devices can carry and which states they move.
 #[derive(Debug, Clone, Default, PartialEq, Eq, serde::Serialize)]
@@ -47,21 +48,14 @@ pub(super) fn find(facts: &Facts) -> Jumps {
     }
     let (values, vectors) = scale::eigen(&(&system.d + system.d.transpose()));
     let size = system.d.amax();
-    let kernel: Vec<usize> = (0..m)
-        .filter(|&k| values[k].abs() <= scale::RANK * size)
-        .collect();
+    let kernel: Vec<usize> = (0..m).filter(|&k| values[k].abs() <= RANK * size).collect();
     let basis = vectors.select_columns(&kernel);
     let mut g = DMatrix::zeros(2 * m, basis.ncols());
     g.view_mut((0, 0), basis.shape()).copy_from(&basis);
     // Dλ for λ in the kernel, cleaned of rounding so that its signs mean something.
     let image = &system.d * &basis;
-    g.view_mut((m, 0), basis.shape()).copy_from(&image.map(|v| {
-        if v.abs() <= scale::RANK * size {
-            0.0
-        } else {
-            v
-        }
-    }));
+    g.view_mut((m, 0), basis.shape())
+        .copy_from(&image.map(|v| if v.abs() <= RANK * size { 0.0 } else { v }));
     for j in 0..m {
         let mut strict = vec![false; 2 * m];
         strict[j] = true;
@@ -70,7 +64,7 @@ pub(super) fn find(facts: &Facts) -> Jumps {
             h: DVector::zeros(2 * m),
             strict,
         };
-        if basis.row(j).amax() > scale::RANK && cone.widest().is_some_and(|p| p.is_strict()) {
+        if basis.row(j).amax() > RANK && cone.widest().is_some_and(|p| p.is_strict()) {
             jumps.devices.push(facts.laws[j].device.clone());
             for i in 0..n {
                 if system.b[(i, j)] != 0.0 && !jumps.states.contains(&facts.state_names[i]) {

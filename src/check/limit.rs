@@ -20,12 +20,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::program;
 use crate::passivity::{System, lmi, scale, witness};
-
-/// Size, in balanced units, below which a constraint on the limit set is not counted: larger sets are the safe side.
-const FAINT: f64 = 1e-9;
-
-/// What the linear program must say of a row, between 0 and 1, for the row to vanish.
-const VANISHES: f64 = 1e-6;
+use crate::settings::tolerances::ranks::RANK;
+use crate::settings::tolerances::theorems::{FAINT_CONSTRAINT, VANISHES};
 
 /// What is known of a port's deviations from the equilibrium on a limit set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,9 +66,7 @@ pub(super) fn set(system: &System, p: &DMatrix<f64>, known: &[Known]) -> LimitSe
     let d = scale::equilibrate(&lmi::magnitude(system, &p));
     let q = scale::scaled(&lmi::matrix(system, &p), &d, &d);
     let (values, vectors) = scale::eigen(&q);
-    let lossy: Vec<usize> = (0..n + m)
-        .filter(|&k| values[k].abs() > scale::RANK)
-        .collect();
+    let lossy: Vec<usize> = (0..n + m).filter(|&k| values[k].abs() > RANK).collect();
     let mut flow = joined(&system.a, &system.b, &d);
     for (mut row, d) in flow.row_iter_mut().zip(d.iter()) {
         row /= *d;
@@ -108,7 +102,7 @@ pub(super) fn set(system: &System, p: &DMatrix<f64>, known: &[Known]) -> LimitSe
             }
         }
         signs = others;
-        let span = scale::split(&space.0.rows(0, n).into_owned(), FAINT);
+        let span = scale::split(&space.0.rows(0, n).into_owned(), FAINT_CONSTRAINT);
         space.constrain(&units(&(span.left_kernel.transpose() * &flow)));
         if space.dimension() == before {
             return describe(&space, &span, &flow, balanced.omega);
@@ -119,14 +113,14 @@ pub(super) fn set(system: &System, p: &DMatrix<f64>, known: &[Known]) -> LimitSe
 fn describe(space: &Space, span: &scale::Split, flow: &DMatrix<f64>, omega: f64) -> LimitSet {
     let visible = units(flow) * &space.0;
     let moving: Vec<usize> = (0..visible.nrows())
-        .filter(|&k| visible.row(k).amax() > FAINT)
+        .filter(|&k| visible.row(k).amax() > FAINT_CONSTRAINT)
         .collect();
     let rates = flow * &space.0;
     // x' as a function of x on the set, where λ does not move x by itself.
     let x = space.0.rows(0, rates.nrows()).into_owned();
-    let still = &rates * scale::split(&x, FAINT).kernel;
-    let frequencies = if still.amax() <= FAINT && !moving.is_empty() {
-        let back = scale::split(&x, FAINT);
+    let still = &rates * scale::split(&x, FAINT_CONSTRAINT).kernel;
+    let frequencies = if still.amax() <= FAINT_CONSTRAINT && !moving.is_empty() {
+        let back = scale::split(&x, FAINT_CONSTRAINT);
         let inverse = &back.row_space
             * DMatrix::from_diagonal(&back.values.map(f64::recip))
             * back.range.transpose();
@@ -134,10 +128,10 @@ fn describe(space: &Space, span: &scale::Split, flow: &DMatrix<f64>, omega: f64)
         let mut found: Vec<f64> = witness::eigenvalues(&map)
             .iter()
             .map(|s| s.im * omega)
-            .filter(|&w| w > FAINT * omega)
+            .filter(|&w| w > FAINT_CONSTRAINT * omega)
             .collect();
         found.sort_by(f64::total_cmp);
-        found.dedup_by(|a, b| (*a - *b).abs() <= FAINT * b.abs());
+        found.dedup_by(|a, b| (*a - *b).abs() <= FAINT_CONSTRAINT * b.abs());
         found
     } else {
         Vec::new()
@@ -180,7 +174,7 @@ impl Space {
     /// Keeps the z with rows·z = 0.
     fn constrain(&mut self, rows: &DMatrix<f64>) {
         if rows.nrows() > 0 && self.dimension() > 0 {
-            self.0 = &self.0 * scale::split(&(rows * &self.0), FAINT).kernel;
+            self.0 = &self.0 * scale::split(&(rows * &self.0), FAINT_CONSTRAINT).kernel;
         }
     }
 

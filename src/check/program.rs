@@ -1,17 +1,12 @@
 //! Small linear and quadratic programs: feasibility questions that the hypotheses of theorems come down to.
 
+use crate::settings::tolerances::theorems::{INTERIOR_POINT, STRICT};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
     DefaultSettings, DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT,
     SolverStatus, SupportedConeT, ZeroConeT,
 };
 use nalgebra::{DMatrix, DVector};
-
-/// Slack above which a strict inequality counts as satisfied (rows are scaled to size one, the slack is at most one).
-const SLACK: f64 = 1e-7;
-
-/// Duality gap and feasibility asked of the interior point method.
-const ACCURACY: f64 = 1e-10;
 
 /// Minimises ½xᵀPx + qᵀx subject to Ax + b = 0 on the first `equalities` rows and ≥ 0 on the rest.
 /// `None` if it is infeasible or unbounded.
@@ -35,9 +30,9 @@ pub fn minimise(
         vec![ZeroConeT(equalities), NonnegativeConeT(rows - equalities)];
     let settings: DefaultSettings<f64> = DefaultSettingsBuilder::default()
         .verbose(false)
-        .tol_feas(ACCURACY)
-        .tol_gap_abs(ACCURACY)
-        .tol_gap_rel(ACCURACY)
+        .tol_feas(INTERIOR_POINT)
+        .tol_gap_abs(INTERIOR_POINT)
+        .tol_gap_rel(INTERIOR_POINT)
         .build()
         .ok()?;
     let mut solver = DefaultSolver::new(
@@ -99,13 +94,13 @@ impl Point {
     /// Whether all strict rows hold strictly.
     #[must_use]
     pub fn is_strict(&self) -> bool {
-        self.slack > SLACK
+        self.slack > STRICT
     }
 
     /// Whether the inequalities hold at all.
     #[must_use]
     pub fn is_feasible(&self) -> bool {
-        self.slack > -SLACK
+        self.slack > -STRICT
     }
 }
 

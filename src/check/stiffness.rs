@@ -3,6 +3,8 @@
 use nalgebra::DMatrix;
 
 use crate::passivity::{System, scale, witness};
+use crate::settings::tolerances::ranks::EIGENVALUE;
+use crate::settings::tolerances::ranks::RANK;
 
 /// Ports up to which all 2ᵐ modes are looked at; beyond it: all blocking, all conducting, and one at a time.
 const ALL_MODES: usize = 8;
@@ -10,9 +12,6 @@ const ALL_MODES: usize = 8;
 /// Largest n³·modes that is spent, and largest n at all.
 const WORK: usize = 3_000_000_000;
 const LARGEST: usize = 300;
-
-/// Eigenvalues below this times the largest of their mode count as zero (rounding of the eigenvalue computation).
-const ZERO: f64 = 1e-11;
 
 /// Shortest and longest time constant 1/|s| over the modes looked at.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -49,7 +48,7 @@ pub(super) fn over_modes(system: &System) -> Stiffness {
             continue;
         };
         let top = rates.iter().copied().fold(0.0, f64::max);
-        for rate in rates.into_iter().filter(|&r| r > ZERO * top) {
+        for rate in rates.into_iter().filter(|&r| r > EIGENVALUE * top) {
             let rate = rate * balanced.omega;
             let (low, high) = range.unwrap_or((rate, rate));
             range = Some((low.min(rate), high.max(rate)));
@@ -71,15 +70,15 @@ fn mode(system: &System, on: &[usize]) -> Option<Vec<f64>> {
     let mut d = system.d.select_rows(on).select_columns(on);
     for _ in 0..=system.n() {
         // λ = V₁α + V₂β with D = U₁ΣV₁ᵀ: α is determined, β is free, U₂ᵀCx = 0 is a constraint.
-        let parts = scale::split(&d, scale::RANK);
+        let parts = scale::split(&d, RANK);
         let sigma = DMatrix::from_diagonal(&parts.values.map(f64::recip));
         let feedback = &b * &parts.row_space * sigma * parts.range.transpose();
         a -= feedback * &c;
         b *= &parts.kernel;
         c = parts.left_kernel.transpose() * &c;
-        let constraint = scale::split(&c, scale::RANK);
+        let constraint = scale::split(&c, RANK);
         if constraint.values.is_empty() {
-            return (b.amax() <= scale::RANK)
+            return (b.amax() <= RANK)
                 .then(|| witness::eigenvalues(&a).iter().map(|s| s.norm()).collect());
         }
         // Independent constraints only; their derivative joins the next round.

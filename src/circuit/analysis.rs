@@ -6,6 +6,7 @@ use super::{Kind, NodeId, Tran};
 use crate::algebra::Value;
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::netlist::ast::{self, Expr, Signal};
+use crate::settings::tolerances::times::SPAN_PARTS;
 
 impl<'n> Builder<'n, '_> {
     /// The transient analysis: the last card, or else the command inside `.control`.
@@ -52,7 +53,7 @@ impl<'n> Builder<'n, '_> {
         let tstep = if step > 0.0 {
             step
         } else {
-            (tstop - tstart) / 1000.0
+            (tstop - tstart) / SPAN_PARTS
         };
         let tmax = times.get(3).copied().filter(|t| *t > 0.0);
         Some(Tran {

@@ -10,9 +10,7 @@ use crate::algebra::Value;
 use crate::diagnostic::Diagnostic;
 use crate::law::{Corner, Curve, Law, Rounded, Side};
 use crate::netlist::ast::{self, Assign, Expr, Name};
-
-/// A diode whose emission coefficient is this small is taken as ideal.
-const IDEAL_EMISSION: f64 = 0.05;
+use crate::settings::tolerances::netlists::IDEAL_EMISSION;
 
 impl<'n> Builder<'n, '_> {
     pub(super) fn diode(

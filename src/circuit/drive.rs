@@ -7,6 +7,7 @@ use super::source::{Form, Source, Wave};
 use super::{Element, Kind};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{self, Assign, Expr, WaveCall};
+use crate::settings::tolerances::times::SAME_TIME;
 
 #[cfg(test)]
 mod tests;
@@ -214,7 +215,7 @@ impl<'n> Builder<'n, '_> {
             }
         }
         // Defaults of omitted values may overlap; only what was written is worth a warning.
-        if x.len() > 6 && rise + width + fall > period * (1.0 + 4.0 * f64::EPSILON) {
+        if x.len() > 6 && rise + width + fall > period * (1.0 + SAME_TIME) {
             let message = "rise time, width and fall time add up to more than the period";
             self.tell(
                 Diagnostic::warning("pulse-overfull", call.name.span, message)

@@ -4,6 +4,7 @@ use super::model::{ONE, ZERO};
 use super::piecewise::Piecewise;
 use super::{Affine, Quantity};
 use crate::algebra::Value;
+use crate::settings::tolerances::netlists::SAME_GAIN;
 
 /// `constant + Σ gain · quantity + Σ f(Σ gain · quantity)`, exact where the text was.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,9 +25,6 @@ pub(super) struct Ridge {
 
 /// A sum of quantities, the gain of the first being 1.
 pub(super) type Direction = Vec<(Value, Quantity)>;
-
-/// Two gains are one if they differ by less than so many roundings.
-const ROUNDINGS: f64 = 8.0;
 
 impl Form {
     pub(super) fn number(value: impl Into<Value>) -> Self {
@@ -176,7 +174,7 @@ pub(super) fn direction(terms: &[(Value, Quantity)]) -> Option<(Direction, f64)>
 pub(super) fn parallel(a: &[(Value, Quantity)], b: &[(Value, Quantity)]) -> bool {
     a.len() == b.len()
         && a.iter().zip(b).all(|((g, q), (h, r))| {
-            q == r && (g.f64 - h.f64).abs() <= ROUNDINGS * f64::EPSILON * g.f64.abs()
+            q == r && (g.f64 - h.f64).abs() <= SAME_GAIN * f64::EPSILON * g.f64.abs()
         })
 }
 

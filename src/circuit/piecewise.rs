@@ -1,5 +1,7 @@
 //! Piecewise-linear functions of one variable, with jumps: composed, multiplied, and split into monotone curves.
 
+use crate::settings::tolerances::netlists::SAME_KNOT;
+
 mod monotone;
 
 #[cfg(test)]
@@ -7,8 +9,6 @@ mod tests;
 
 /// Most knots of one function.
 const MAX_KNOTS: usize = 1_000;
-/// Two lines meet in a knot, or have one slope, if they differ by less than so many roundings.
-const ROUNDINGS: f64 = 64.0;
 
 /// One affine piece between two knots.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -283,7 +283,7 @@ impl Piecewise {
             let size = last.right.abs()
                 + next.left.abs()
                 + (last.slope.abs() + next.slope.abs()) * u.abs();
-            let continuous = (last.right - next.left).abs() <= ROUNDINGS * f64::EPSILON * size;
+            let continuous = (last.right - next.left).abs() <= SAME_KNOT * f64::EPSILON * size;
             if continuous {
                 if next.right == next.left {
                     next.right = last.right;
@@ -292,7 +292,7 @@ impl Piecewise {
             }
             let bend = (last.slope - next.slope).abs();
             if continuous
-                && bend <= ROUNDINGS * f64::EPSILON * (last.slope.abs() + next.slope.abs())
+                && bend <= SAME_KNOT * f64::EPSILON * (last.slope.abs() + next.slope.abs())
             {
                 last.right = next.right;
                 if knots.is_empty() {

@@ -6,9 +6,7 @@
 //! that its own voltage v controls is no switch but a law, i = v G(v): a table with two points for every step.
 
 use crate::law::Curve;
-
-/// Largest ratio of the conductances of two steps.
-const RATIO: f64 = 10.0;
+use crate::settings::tolerances::netlists::STAIR;
 
 /// x with ½ + 3/2 x − 2x³ = part, as 3 sin a − 4 sin³ a = sin 3a.
 fn place(part: f64) -> f64 {
@@ -40,7 +38,7 @@ pub(super) fn stairs(
         return None;
     }
     // An even number, so that the middle of one step is at the threshold.
-    let half = ((roff / ron).ln() / RATIO.ln() / 2.0).ceil().max(1.0);
+    let half = ((roff / ron).ln() / STAIR.ln() / 2.0).ceil().max(1.0);
     let count = 2.0 * half;
     let conductance = |k: f64| (roff / ron).powf(k / count) / roff;
     let step = |k: u32| {

@@ -5,11 +5,10 @@ use super::scope::ScopeId;
 use crate::algebra::Value;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::netlist::ast::{self, Alter, Name, Points, Target};
+use crate::settings::tolerances::times::WHOLE;
 
 /// Most runs or operating points of all sweeps together.
 const MOST: usize = 100_000;
-/// A value this close to the last one, relative to the increment, still counts (decimal steps in binary).
-const CLOSE: f64 = 1e-9;
 
 /// A quantity and the values it takes.
 #[derive(Debug, Clone, PartialEq)]
@@ -212,7 +211,7 @@ impl<'n> Builder<'n, '_> {
             Points::Linear([start, stop, increment]) => {
                 let (start, stop, increment) = (number(start)?, number(stop)?, number(increment)?);
                 // LTspice and ngspice both go from the first to the last value, whatever the sign.
-                let count = ((stop - start) / increment).abs() + CLOSE;
+                let count = ((stop - start) / increment).abs() + WHOLE;
                 if start == stop {
                     return Some(vec![start]);
                 } else if increment == 0.0 {
@@ -229,7 +228,7 @@ impl<'n> Builder<'n, '_> {
                 let [start, stop, per] = range;
                 let (start, stop, per) = (number(start)?, number(stop)?, number(per)?);
                 let base = f64::from(*base);
-                let count = (stop / start).log(base).abs() * per + CLOSE;
+                let count = (stop / start).log(base).abs() * per + WHOLE;
                 if !(start * stop > 0.0 && per >= 1.0) {
                     let what = "a logarithmic sweep needs values of one sign, and at least one per decade or octave";
                     (what, "no such sweep")

@@ -3,9 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::{FormError, Linear, require};
-
-/// Residual of D = VD̄Vᵀ, relative to |V||D̄||V|ᵀ.
-const FACTORED: f64 = 1e-10;
+use crate::settings::tolerances::theorems::FACTORED;
 
 /// x' = Ax + e + BW⁻¹ζ̄, C_{W⁻¹} ∋ ζ̄ ⟂ w̄ = V⁻¹(Cx + f) + D̄ζ̄ ∈ C_V with V = Wᵀ, D = VD̄W, D̄ = diag(D₁, 0).
 #[derive(Debug, Clone)]

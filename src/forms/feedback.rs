@@ -14,12 +14,8 @@ use super::FormError;
 use super::observer::{blocks, bounded, combine, expose_lossless, units};
 use crate::passivity::facial::Face;
 use crate::passivity::{Residuals, System, barrier, lmi, scale, verify};
-
-/// Bound on S̃ and G: larger feedback is not looked for.
-const LARGEST_GAIN: f64 = 1e4;
-
-/// Residual of P1, relative to its terms, at which it counts as solved.
-const MATCHED: f64 = 1e-9;
+use crate::settings::tolerances::passivity::MATCHED;
+use crate::settings::tolerances::theorems::LARGEST_GAIN;
 
 /// A feedback with the certificate of the closed loop.
 #[derive(Debug, Clone, PartialEq)]

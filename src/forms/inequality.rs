@@ -8,6 +8,7 @@ use super::{FormError, require};
 use crate::check::Feedthrough;
 use crate::passivity::gradient;
 use crate::settings::Settings;
+use crate::settings::tolerances::ranks::ENTRY;
 use crate::solve::{Driver, Status};
 
 /// ⟨X' − VAV⁻¹X − Λ(X) − Vf(t), v − X⟩ + Ξ(v) − Ξ(X) ≥ 0 for all v, with X = Vx, Ξ = Φ_I ∘ C_I V⁻¹ and the Lipschitz
@@ -26,9 +27,6 @@ pub struct VariationalInequality {
     pub single: Vec<usize>,
 }
 
-/// Relative size below which entries of D count as zero.
-const ZERO: f64 = 1e-12;
-
 impl VariationalInequality {
     /// Section 3.1.1: W²B_I = C_Iᵀ (Assumption 2) and D_II ≻ 0 or, for complementary pairs, a P-matrix (Assumption 4 by
     /// Propositions 1 and 2).
@@ -41,7 +39,7 @@ impl VariationalInequality {
         let n = system.n();
         let d = &system.d;
         let (multivalued, single): (Vec<usize>, Vec<usize>) = (0..d.nrows())
-            .partition(|&j| d.row(j).amax().max(d.column(j).amax()) <= ZERO * d.amax());
+            .partition(|&j| d.row(j).amax().max(d.column(j).amax()) <= ENTRY * d.amax());
         let d_ii = d.select_rows(&single).select_columns(&single);
         let class = Feedthrough::of(&d_ii);
         let pairs = single.iter().all(|&j| lure.phi[j] == Phi::HalfLine);

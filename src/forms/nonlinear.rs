@@ -14,6 +14,8 @@ use nalgebra::{DMatrix, DVector};
 use super::projected::{Map, MatrixField};
 use super::sweeping::square_root;
 use super::{Complementarity, FormError, Signal, require};
+use crate::settings::tolerances::passivity::MATCHED;
+use crate::settings::tolerances::theorems::MAP_INVERTED;
 
 /// A vector field that depends on time.
 pub type Field = Rc<dyn Fn(f64, &DVector<f64>) -> DVector<f64>>;
@@ -21,15 +23,11 @@ pub type Field = Rc<dyn Fn(f64, &DVector<f64>) -> DVector<f64>>;
 /// Its Jacobian in x.
 pub type FieldJacobian = Rc<dyn Fn(f64, &DVector<f64>) -> DMatrix<f64>>;
 
-/// Residual of (35), relative to its terms.
-const MATCHED: f64 = 1e-9;
-
 /// Ports up to which the constant of (38) is computed exactly, over all faces of the orthant.
 const MAX_PORTS: usize = 12;
 
 /// Newton steps and relative change of the inversion of the state map.
 const NEWTON_STEPS: usize = 50;
-const STILL: f64 = 1e-14;
 
 /// A nonlinear complementarity system with storage function V.
 #[derive(Clone)]
@@ -114,7 +112,7 @@ impl NonlinearComplementarity {
             let (_, inverse) = square_root(&(self.hessian)(&x))?;
             let step = inverse * residual;
             x += &step;
-            if step.amax() <= STILL * (1.0 + x.amax()) {
+            if step.amax() <= MAP_INVERTED * (1.0 + x.amax()) {
                 return Some(x);
             }
         }

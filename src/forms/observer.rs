@@ -14,9 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use super::{FormError, Linear};
 use crate::passivity::facial::Face;
 use crate::passivity::{Residuals, System, barrier, lmi, scale, verify};
-
-/// Bound on the gain of the balanced problem: faster observers than that are not looked for.
-const LARGEST_GAIN: f64 = 1e4;
+use crate::settings::tolerances::theorems::LARGEST_GAIN;
 
 /// A gain with its certificate.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,10 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use super::FormError;
 use crate::check::program;
 use crate::settings::Settings;
+use crate::settings::tolerances::theorems::ACTIVE;
 use crate::solve::{Driver, Status};
-
-/// A constraint counts as active when it is met with equality to this accuracy, relative to its terms.
-const ACTIVE: f64 = 1e-9;
 
 /// {z ∈ Rⁿ : Gz + h ≥ 0}.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,6 +7,8 @@ use std::rc::Rc;
 use nalgebra::{DMatrix, DVector};
 
 use super::{Complementarity, FormError, Polyhedron, require};
+use crate::settings::tolerances::ranks::RANK;
+use crate::settings::tolerances::theorems::ACTIVE;
 
 /// A vector that depends on the state.
 pub type VectorField = Rc<dyn Fn(&DVector<f64>) -> DVector<f64>>;
@@ -68,12 +70,6 @@ pub struct ProjectedSystem {
     n: usize,
     m: usize,
 }
-
-/// A constraint counts as active below this value, relative to 1 + |x|.
-const ACTIVE: f64 = 1e-9;
-
-/// Smallest singular value of the active gradients (relative) that counts as full row rank.
-const RANK: f64 = 1e-10;
 
 impl ProjectedSystem {
     /// From F and h on Rⁿ.

@@ -12,13 +12,11 @@ use nalgebra::{DMatrix, DVector};
 
 use super::FormError;
 use crate::settings::Settings;
+use crate::settings::tolerances::theorems::LINEARISED;
 use crate::solve::{Driver, Status};
 
 /// Iterations of the linearisation.
 const ITERATIONS: usize = 50;
-
-/// Change of the iterate, relative to its size, at which it stands still.
-const STILL: f64 = 1e-12;
 
 /// A system of complementary pairs with n states and m ports.
 pub trait Complementarity {
@@ -96,7 +94,7 @@ pub fn step(
             return Err(fail("the iteration diverged"));
         }
         at = next;
-        if system.is_affine() || change <= STILL * size {
+        if system.is_affine() || change <= LINEARISED * size {
             let y = system.constraint(t, &at) + system.feedthrough() * &lambda;
             return Ok(Step { x: at, lambda, y });
         }

@@ -6,10 +6,8 @@ use super::{Complementarity, FormError, Linear, Polyhedron, require};
 use crate::check::Feedthrough;
 use crate::passivity::{gradient, verify};
 use crate::settings::Settings;
+use crate::settings::tolerances::ranks::ENTRY;
 use crate::solve::{Driver, Status};
-
-/// Relative size below which entries of D count as zero.
-const ZERO: f64 = 1e-12;
 
 /// S(t) = {z : Hz + w(t) ≥ 0}, z = Rx, −f(t, z) = RAR⁻¹z + R e(t) + RB₁ζ₁, where ζ₁ solves the P-matrix problem of the
 /// ports with feedthrough (none in (15)).
@@ -62,7 +60,7 @@ impl SweepingProcess {
         const STATEMENT: &str = "Brogliato-Thibault section 3.3";
         let d = &linear.system.d;
         let (free, fed): (Vec<usize>, Vec<usize>) = (0..d.nrows())
-            .partition(|&j| d.row(j).amax().max(d.column(j).amax()) <= ZERO * d.amax());
+            .partition(|&j| d.row(j).amax().max(d.column(j).amax()) <= ENTRY * d.amax());
         let d1 = d.select_rows(&fed).select_columns(&fed);
         let p_matrix = Feedthrough::of(&d1).p_matrix;
         require(

@@ -6,6 +6,7 @@ use crate::circuit::Tran;
 use crate::circuit::source::Wave;
 use crate::integrate::event::{Change, Event};
 use crate::integrate::stats::Run;
+use crate::settings::tolerances::times::WHOLE;
 
 /// Something that repeats faster than the output times can show.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,8 +25,6 @@ pub struct Aliased {
 
 /// Periods of events in a row that make a period of the run.
 const REPEATED: usize = 8;
-/// A print step is half a period if it differs from it by this part: decimal fractions are not exact.
-const ROUNDING: f64 = 1e-9;
 
 /// The fastest of sources and events whose period is shorter than twice the print step, or just that.
 ///
@@ -38,7 +37,7 @@ pub fn aliased<'a>(
     run: &Run,
 ) -> Option<Aliased> {
     let span = tran.tstop - tran.tstart;
-    let too_fast = |period: f64| period * (1.0 - ROUNDING) <= 2.0 * tran.tstep;
+    let too_fast = |period: f64| period * (1.0 - WHOLE) <= 2.0 * tran.tstep;
     let sources = sources.filter_map(|(name, wave)| {
         let period = wave.period().filter(|period| *period < span)?;
         (tran.prints || !wave.has_corners()).then(|| (name.to_string(), period, true))

@@ -4,27 +4,16 @@ use crate::circuit::Tran;
 use crate::integrate::companion::Coarser;
 use crate::integrate::control::Amplitudes;
 use crate::integrate::run::Grid;
-use crate::integrate::simulate::{FIRST, HANDOVER_STEPS, Problem, controlled};
+use crate::integrate::simulate::{Problem, controlled};
 use crate::integrate::step::Scheme;
 use crate::integrate::theta::Stepping;
 use crate::lcs::Lcs;
 use crate::settings::Settings;
+use crate::settings::tolerances::stated::{
+    COARSER, FIRST_ORDER, HIGHER_ORDER, LOOSER, LOOSER_SHARE, MANY_ROWS, READING,
+};
+use crate::settings::tolerances::steps::{FIRST, HANDOVER_STEPS};
 
-/// Prescribed steps of companions, over those of the run.
-const COARSER: [f64; 2] = [2.0, 4.0];
-/// The error of a run of first order over what these differ by: 1 and 1/3 were the errors smooth; those of events are not.
-const FIRST_ORDER: [f64; 2] = [2.0, 0.5];
-/// The same for methods of order 2 and 3: 1/3 and 1/15 or less were they smooth.
-const HIGHER_ORDER: [f64; 2] = [1.5, 0.125];
-/// Tolerance of the companion of a run whose steps are chosen, over that of the run. It makes its steps whole where the run makes them in
-/// halves, so that they are longer even where rows and edges choose them.
-const LOOSER: f64 = 2.0;
-/// The error of the run over what that companion differs by: 1/3 or less were the errors smooth.
-const LOOSER_SHARE: f64 = 1.0;
-/// Steps by which companions read what flows at an instant where laws are curved, over those of the run: their error is of first order.
-const READING: f64 = 4.0;
-/// More rows than these would choose the steps of that companion, which stops at one of [`FEWER`] then.
-const MANY_ROWS: f64 = 200.0;
 /// Odd, as an even number of rows would see a clock in one phase alone.
 const FEWER: usize = 5;
 

@@ -14,12 +14,10 @@ use crate::integrate::event::{Change, Event};
 use crate::integrate::rows::Asked;
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper, Times};
 use crate::integrate::stats::StatedError;
+use crate::settings::tolerances::steps::FAINT;
 
 /// A companion begins with steps that double from this part of its first one on: what has ended within the first step of the run is seen.
 const GRADED: i32 = 24;
-
-/// What a probe is related to is no less than this part of the largest of its unit: the leakage of a blocking device is no signal.
-const FLOOR: f64 = 1e-3;
 
 /// How a companion is made and what it tells.
 pub(crate) struct Coarser<'a> {
@@ -137,7 +135,7 @@ impl<'a> Accompanied<'a> {
             let same = of.clone().filter(|(_, other)| **other == unit);
             same.fold(0.0_f64, |m, (a, _)| m.max(*a))
         };
-        let scale = |(a, unit): (&f64, &&str)| a.max(FLOOR * largest(unit));
+        let scale = |(a, unit): (&f64, &&str)| a.max(FAINT * largest(unit));
         of.clone().map(scale).collect()
     }
 

@@ -7,6 +7,7 @@
 use crate::integrate::inputs::Inputs;
 use crate::lcs::Lcs;
 use crate::settings::Settings;
+use crate::settings::tolerances::steps::{FAINT, ROOM, SHORTEN, STATE_ROUNDING};
 
 /// Accepts or halves steps.
 #[derive(Debug, Clone)]
@@ -26,17 +27,6 @@ pub struct Verdict {
     /// The step to try next, s.
     pub next: f64,
 }
-
-/// A step is doubled, and doubled again, where the error of the longer one would still leave this factor of room: a step that an
-/// edge cut short says nothing against the next one.
-const ROOM: f64 = 2.0;
-
-/// A step that does not see its start is made so many times shorter at once, at most.
-const SHORTEN: f64 = 16.0;
-
-/// The part of the tolerance that is granted where the solution has corners (a diode that turns on): they are few, and shorter
-/// steps only there would not pay.
-pub const CORNER: f64 = 1e-5;
 
 impl Control {
     /// Control of a method of an order, over a span, s; steps shorter than the part `grant` of the span are granted that part
@@ -93,12 +83,6 @@ pub struct Amplitudes {
     branches: (f64, f64),
 }
 
-/// A state is known to this part of its amplitude: a few roundings.
-const ROUNDING: f64 = 8.0 * f64::EPSILON;
-
-/// A quantity smaller than this part of the largest one of its unit is judged by that part.
-const FLOOR: f64 = 1e-3;
-
 impl Amplitudes {
     /// Nothing seen yet but what the inputs can reach.
     #[must_use]
@@ -144,7 +128,7 @@ impl Amplitudes {
     #[must_use]
     pub fn rounding(&self, lcs: &Lcs, k: usize) -> f64 {
         let at = self.position(k, &lcs.states[k].name);
-        ROUNDING * at.map_or(0.0, |at| self.values[at])
+        STATE_ROUNDING * at.map_or(0.0, |at| self.values[at])
     }
 
     fn position(&self, guess: usize, name: &str) -> Option<usize> {
@@ -176,7 +160,7 @@ impl Amplitudes {
             let seen = self
                 .position(k, &state.name)
                 .map_or(0.0, |at| self.values[at]);
-            let floor = FLOOR * if state.unit == "V" { volts } else { amperes };
+            let floor = FAINT * if state.unit == "V" { volts } else { amperes };
             let scale = seen.max(floor).max(b[k].abs());
             let difference = (a[k] - b[k]).abs();
             if difference > 0.0 {
@@ -190,6 +174,7 @@ impl Amplitudes {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::tolerances::steps::CORNER;
 
     #[test]
     fn order_decides_the_growth() {

@@ -20,6 +20,7 @@ use crate::integrate::Energy;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::step::{Columns, Scheme};
 use crate::lcs::{Lcs, PowerKind, Role, Rows};
+use crate::settings::tolerances::ranks::RANK;
 use crate::solve::lcp::Scaling;
 use crate::solve::norm;
 
@@ -265,7 +266,7 @@ fn towards_set(lcs: &Lcs, active: &[bool], y: &DMatrix<f64>) -> DMatrix<f64> {
     let through = &d * lcs.d.select_rows(&set).select_columns(&set) * &d * &idle;
     if let Ok(w) = through
         .svd(true, true)
-        .solve(&(&d * y.select_rows(&set)), SINGULAR)
+        .solve(&(&d * y.select_rows(&set)), RANK)
     {
         for (row, &j) in (d * idle * w).row_iter().zip(&set) {
             nearer.set_row(j, &-row);
@@ -273,9 +274,6 @@ fn towards_set(lcs: &Lcs, active: &[bool], y: &DMatrix<f64>) -> DMatrix<f64> {
     }
     nearer
 }
-
-/// Singular values of the equilibrated D below this are rounding of zeros.
-const SINGULAR: f64 = 1e-10;
 
 /// What the stages of a step lose, J: Σ b_j s_jᵀ M ds_j at its stages less what is stored, with ds_j = X h f_j + U Δu.
 #[derive(Debug, Default)]

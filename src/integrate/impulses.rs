@@ -4,9 +4,7 @@ use nalgebra::DVector;
 
 use super::reading;
 use crate::lcs::{Lcs, Outputs, Role, Rows};
-
-/// Areas below this part of the largest of their kind, or of the terms they are a sum of, are rounding.
-const ROUNDING: f64 = 1e-12;
+use crate::settings::tolerances::jumps::NO_JUMP;
 
 /// Areas (A s, V s) in a jump by port impulses p and steps Δu of the inputs, each name once: of the devices their currents, then their
 /// voltages; of independent sources and outputs what a step across a capacitor, or through an inductor, adds to those.
@@ -18,7 +16,7 @@ pub(crate) fn of_jump(lcs: &Lcs, p: &DVector<f64>, step: &[f64]) -> Vec<(String,
     } = outputs;
     let mut add = |name: String, rows: &Rows, i: usize| {
         let area = reading::impulse(rows, i, p.as_slice(), step);
-        if area.abs() > ROUNDING * largest_term(rows, i, p, step)
+        if area.abs() > NO_JUMP * largest_term(rows, i, p, step)
             && all.iter().all(|(other, _)| *other != name)
         {
             all.push((name, area));
@@ -84,7 +82,7 @@ fn of_devices(lcs: &Lcs, p: &DVector<f64>) -> Vec<(String, f64)> {
     for kind in [currents, voltages] {
         let largest = kind.iter().fold(0.0_f64, |a, (_, area)| a.max(area.abs()));
         for (name, area) in kind {
-            if area.abs() > ROUNDING * largest && !all.iter().any(|(n, _)| *n == name) {
+            if area.abs() > NO_JUMP * largest && !all.iter().any(|(n, _)| *n == name) {
                 all.push((name, area));
             }
         }

@@ -4,6 +4,7 @@ use crate::circuit::Source;
 use crate::circuit::source::{Rest, Wave, crossings};
 use crate::integrate::line::{Line, Lines};
 use crate::lcs::Input;
+use crate::settings::tolerances::steps::STEPS_PER_PERIOD;
 
 /// All inputs u(t) with their one-sided limits and breakpoints.
 #[derive(Debug, Clone)]
@@ -25,9 +26,6 @@ pub enum Passage {
     /// Downwards, or down to rest on the level.
     FallingOrRest,
 }
-
-/// Steps of the error-controlled steppers per period of the fastest sine: an error estimate must not alias.
-const STEPS_PER_PERIOD: f64 = 8.0;
 
 impl Inputs {
     /// The inputs of a system.

@@ -33,6 +33,8 @@ use nalgebra::{DMatrix, DVector};
 use crate::diagnostic::Internal;
 use crate::integrate::{Note, energy};
 use crate::lcs::{Lcs, Role};
+use crate::settings::tolerances::jumps::{FORWARD, NO_JUMP, RIVAL};
+use crate::settings::tolerances::ranks::{EIGENVALUE, ENTRY};
 use crate::solve::lcp::Scaling;
 use crate::solve::{Driver, Status};
 
@@ -90,12 +92,6 @@ pub(crate) fn rivals_note(names: &[&str], t: f64) -> Note {
     );
     Note::of(names.iter().copied(), text)
 }
-
-/// Changes below this, relative to the quantities they are computed from, are rounding and no jump.
-const ROUNDING: f64 = 1e-12;
-/// A forward impulse of voltage below this part of the largest impulse, in equilibrated variables, is the residual that a solution
-/// may have.
-const FORWARD: f64 = 1e-6;
 
 impl JumpProblem {
     /// Prepares the jump problem; `None` where no impulse can flow (D + Dᵀ positive definite, or no ports): then the plan
@@ -190,7 +186,7 @@ impl JumpProblem {
         let z = solution.lambda.rows(0, k);
         let p = &self.basis * z * self.sigma;
         let change = &lcs.b * &p;
-        let moved = |i: usize| change[i].abs() > ROUNDING * x[i].abs().max(change.amax());
+        let moved = |i: usize| change[i].abs() > NO_JUMP * x[i].abs().max(change.amax());
         if !(0..x.len()).any(moved) || self.is_rounding(lcs, x, u, &p) {
             return Ok(None);
         }
@@ -214,15 +210,13 @@ impl JumpProblem {
     /// solution of the complementarity problem, whatever the R. Where H_ij > 0, what i conducts takes from j, and the first may have
     /// conducted more than the projection says.
     fn rivals(&self, z: &[f64], q: &DVector<f64>) -> Vec<usize> {
-        /// In parts of √(H_ii H_jj), and of the largest z and q.
-        const ROUNDING: f64 = 1e-9;
         let h = &self.coupling;
         let largest = z.iter().fold(0.0_f64, |a, z| a.max(*z));
-        let moves = |i: &usize| z[*i] > ROUNDING * largest || q[*i] < -ROUNDING * q.amax();
+        let moves = |i: &usize| z[*i] > RIVAL * largest || q[*i] < -RIVAL * q.amax();
         let moving: Vec<usize> = (0..z.len()).filter(moves).collect();
         let competes = |&i: &usize| {
             let with =
-                |&j: &usize| i != j && h[(i, j)] > ROUNDING * (h[(i, i)] * h[(j, j)]).abs().sqrt();
+                |&j: &usize| i != j && h[(i, j)] > RIVAL * (h[(i, i)] * h[(j, j)]).abs().sqrt();
             moving.iter().any(with)
         };
         let competing: Vec<usize> = moving.iter().copied().filter(competes).collect();
@@ -264,7 +258,7 @@ impl JumpProblem {
         corrected
             .iter()
             .zip(terms.iter())
-            .all(|(c, t)| c.abs() <= ROUNDING * t)
+            .all(|(c, t)| c.abs() <= NO_JUMP * t)
     }
 }
 
@@ -312,7 +306,7 @@ pub struct Infeasible {
 /// coordinates are components. What falls below rounding is zero, else noise would pass for a constraint.
 fn kernel(mut s: DMatrix<f64>) -> DMatrix<f64> {
     let m = s.nrows();
-    let zero = ROUNDING * s.amax();
+    let zero = ENTRY * s.amax();
     let mut free: Vec<usize> = (0..m).collect();
     while let Some(&i) = free
         .iter()
@@ -346,7 +340,7 @@ fn reduced(
         let rows: Vec<usize> = (0..ends.len())
             .filter(|&j| ends[j].lambda.is_some() == bounded)
             .collect();
-        (d.select_rows(&rows) * kernel).map(|v| if v.abs() < ROUNDING { 0.0 } else { v })
+        (d.select_rows(&rows) * kernel).map(|v| if v.abs() < ENTRY { 0.0 } else { v })
     };
     let equations = through(&kernel, false);
     if equations.amax() > 0.0 {
@@ -377,7 +371,7 @@ fn reduced(
 /// A basis of the kernel of E (entries near 1), by elimination with complete pivoting: column j has 1 in a row of its own.
 fn null(mut e: DMatrix<f64>) -> DMatrix<f64> {
     let m = e.ncols();
-    let zero = ROUNDING * e.amax();
+    let zero = ENTRY * e.amax();
     let mut free: Vec<usize> = (0..m).collect();
     let mut open: Vec<usize> = (0..e.nrows()).collect();
     let mut pivots = Vec::new();
@@ -407,7 +401,7 @@ fn null(mut e: DMatrix<f64>) -> DMatrix<f64> {
 
 fn is_semidefinite(symmetric: &DMatrix<f64>) -> bool {
     let eigenvalues = symmetric.symmetric_eigenvalues();
-    eigenvalues.min() >= -ROUNDING * eigenvalues.amax()
+    eigenvalues.min() >= -EIGENVALUE * eigenvalues.amax()
 }
 
 /// |D| with the rows and columns that are zero taken from CB.

@@ -4,6 +4,8 @@
 //! one delay later. It is recorded at every step and straight in between, which is of second order in the step; a jump is two
 //! records at one time. Times are those of arrival, so that an edge arrives at the very time at which it is a breakpoint.
 
+use crate::settings::tolerances::steps::{FOLLOWED, KINK, STEPS_PER_DELAY};
+use crate::settings::tolerances::times::ARRIVED;
 use std::collections::VecDeque;
 
 /// A line as a run needs it; the elements are given by their names.
@@ -29,15 +31,6 @@ impl Line {
     }
 }
 
-/// A step is no longer than this part of a delay: what arrives at its end has left before its start, and enough records lie
-/// between the two for straight lines.
-const STEPS_PER_DELAY: f64 = 8.0;
-/// Jumps and kinks below this part of the largest wave are not followed; a kink's is its change of slope times the delay.
-const FOLLOWED: f64 = 1e-9;
-/// A kink stands out from the curvature beside it by this factor.
-const KINK: f64 = 4.0;
-/// Times this part of themselves apart are one time.
-const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// Records kept beyond need before they are dropped together.
 const SPARE: usize = 4096;
 
@@ -65,12 +58,12 @@ impl Track {
 
     /// Stops and arrivals that differ by rounding are one time: before it the value before a jump, after it the one after.
     fn right(&self, t: f64) -> f64 {
-        let late = t + ROUNDING * t.abs();
+        let late = t + ARRIVED * t.abs();
         self.before(self.records.partition_point(|r| r.0 <= late), t)
     }
 
     fn left(&self, t: f64) -> f64 {
-        let early = t - ROUNDING * t.abs();
+        let early = t - ARRIVED * t.abs();
         self.before(self.records.partition_point(|r| r.0 < early), t)
     }
 
@@ -81,7 +74,7 @@ impl Track {
     }
 
     fn slope(&self, t: f64) -> f64 {
-        let late = t + ROUNDING * t.abs();
+        let late = t + ARRIVED * t.abs();
         let next = self.records.partition_point(|r| r.0 <= late);
         let last = next.checked_sub(1);
         last.and_then(|k| self.slope_of(k)).unwrap_or(0.0)

@@ -5,21 +5,16 @@
 //! rates of A span so much that the slow ones would be noise.
 
 use crate::lcs::Lcs;
-
-/// A fastest rate that does less than this in the simulated span leaves the slow ones at least four digits.
-const LOST: f64 = 1e12;
-
-/// Other roles are taken where they bring the fastest rate down by this much.
-const GAIN: f64 = 1e-3;
+use crate::settings::tolerances::steps::{ROLES_GAIN, ROLES_LOST};
 
 /// Whether the system is so fast that other roles are worth a look; `span` in s.
 pub(crate) fn doubtful(lcs: &Lcs, span: f64) -> bool {
-    fastest(lcs) * span > LOST
+    fastest(lcs) * span > ROLES_LOST
 }
 
 /// Whether `other`, the same circuit in other roles, keeps more of A.
 pub(crate) fn better(lcs: &Lcs, other: &Lcs) -> bool {
-    fastest(other) < GAIN * fastest(lcs)
+    fastest(other) < ROLES_GAIN * fastest(lcs)
 }
 
 /// The largest entry of A in coordinates of equal energy, 1/s.

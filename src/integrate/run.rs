@@ -9,6 +9,7 @@ use crate::integrate::note;
 use crate::integrate::rows::{Asked, RowKind, Sheet};
 use crate::integrate::{Energy, Impulse, Note, Run, StateJump, StateJumps, StatedError, Stats};
 use crate::lcs::ReduceError;
+use crate::settings::tolerances::times::LAST_ROW;
 use crate::waveform::Waveforms;
 
 /// A simulation that ended early: when, at which device, and why, with everything computed so far.
@@ -400,10 +401,6 @@ pub struct Grid {
     pub tstop: f64,
 }
 
-/// Relative to one step: a grid point this close before `tstop` is `tstop` itself (decimal steps do not divide spans
-/// exactly in binary).
-const GRID_CLOSE: f64 = 1e-6;
-
 impl Grid {
     /// The output times of a transient analysis.
     #[must_use]
@@ -428,7 +425,7 @@ impl Grid {
         if !(span > 0.0 && self.tstep > 0.0) {
             return 1.0;
         }
-        (span / self.tstep - GRID_CLOSE).ceil().max(1.0) + 1.0
+        (span / self.tstep - LAST_ROW).ceil().max(1.0) + 1.0
     }
 
     /// # Errors

@@ -10,10 +10,7 @@ use crate::integrate::reading::{self, Point};
 use crate::integrate::run::SimError;
 use crate::integrate::switching::{Threshold, fire};
 use crate::lcs::Lcs;
-
-/// A control beyond its threshold by less than this part of its terms decides nothing here, and storage that moves by less than
-/// this part of its energy's square root stays.
-pub(crate) const DECISIVE: f64 = 1e-9;
+use crate::settings::tolerances::events::DECISIVE;
 
 /// Moves the switches whose controls ask for it in the `position` reached, until none does; whether one moved. `left` is the
 /// position before this instant: a switch that has moved at this instant stays. `asking` says which switches a position's

@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::integrate::cpu::ThreadTime;
+use crate::settings::tolerances::steps::{FIRST, HANDOVER_STEPS, SCOUT_STEPS};
 use nalgebra::DVector;
 
 use crate::circuit::{self, Circuit, ElementId, Source, Tran};
@@ -229,8 +230,6 @@ pub(super) struct Problem {
     free_sources: bool,
 }
 
-/// Steps of the run that finds the amplitudes beforehand.
-const SCOUT_STEPS: f64 = 256.0;
 /// The scout gives up after this many steps (trains of many pulses); what it has seen by then is used.
 const SCOUT_LIMIT: u64 = 20_000;
 
@@ -492,9 +491,6 @@ impl Problem {
     }
 }
 
-/// Moreau's steps in an output step where they take the place of exact integration.
-pub(super) const HANDOVER_STEPS: f64 = 128.0;
-
 impl Problem {
     /// Exact integration with Moreau's steps where it cannot go on.
     pub(super) fn handover(
@@ -519,9 +515,6 @@ impl Problem {
         ))
     }
 }
-
-/// The part of a print step that the first of chosen steps is tried at.
-pub(super) const FIRST: f64 = 1.0 / 64.0;
 
 /// Steps chosen by their error.
 pub(super) fn controlled(tran: &Tran) -> Stepping {

@@ -13,7 +13,7 @@ use crate::integrate::exact::Place;
 use crate::integrate::handover::Handover;
 use crate::integrate::note;
 use crate::integrate::run::{Log, Reason, SimError, Stepper};
-use crate::integrate::simulate::{HANDOVER_STEPS, Method, Problem, SimOptions, check, controlled};
+use crate::integrate::simulate::{Method, Problem, SimOptions, check, controlled};
 use crate::integrate::stats::{Impulse, Run, StateJumps, Stats};
 use crate::integrate::step::Scheme;
 use crate::integrate::theta::{Stepping, Theta};
@@ -21,6 +21,8 @@ use crate::lcs::Lcs;
 use crate::mna::{Behaviour, behaviour};
 use crate::plan::{not_exact, plan};
 use crate::settings::Settings;
+use crate::settings::tolerances::steps::HANDOVER_STEPS;
+use crate::settings::tolerances::times::SPAN_PARTS;
 use crate::waveform::canonical_name;
 
 /// What a simulation may be asked for.
@@ -527,10 +529,8 @@ impl SimulationOptions {
 
 /// The span of a simulation: that of `.tran`, unless it is to end elsewhere.
 fn transient(tran: Option<Tran>, until: Option<f64>) -> Result<Tran, SimError> {
-    /// Parts of a span that no card divides.
-    const PARTS: f64 = 1000.0;
     let of_span = |tstop: f64| Tran {
-        tstep: tstop / PARTS,
+        tstep: tstop / SPAN_PARTS,
         prints: true,
         tstop,
         tstart: 0.0,

@@ -16,6 +16,7 @@ use crate::integrate::switching::at_start;
 use crate::lcs::{Hold, Lcs, Position, ReduceError, Role, StorageHold, reduce};
 use crate::mna::{Behaviour, behaviour};
 use crate::settings::Settings;
+use crate::settings::tolerances::jumps::CONSISTENT;
 use crate::solve::Status;
 
 /// The state of a circuit before t = 0+.
@@ -180,14 +181,14 @@ fn at_rest(
             let count = circuit.nodes.len() - 1;
             let (currents, ties) = point.readings[count..].split_at(circuit.elements.len());
             let largest = currents.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
-            if let Some(k) = (0..ties.len()).find(|&k| ties[k].abs() > ROUNDING * largest) {
+            if let Some(k) = (0..ties.len()).find(|&k| ties[k].abs() > CONSISTENT * largest) {
                 let names = feeding(circuit, tied[k]);
                 return Err(no_rest(NoRest::Floating).devices(names));
             }
             let volts = |id: NodeId| id.index().checked_sub(1).map_or(0.0, |k| point.readings[k]);
             let across = |e: &&Element| {
                 let (a, b) = (volts(e.p), volts(e.n));
-                (a - b).abs() > ROUNDING * a.abs().max(b.abs())
+                (a - b).abs() > CONSISTENT * a.abs().max(b.abs())
             };
             if let Some(inductor) = without_current
                 .iter()
@@ -257,9 +258,6 @@ struct Static {
     storage: Vec<f64>,
     notes: Vec<Note>,
 }
-
-/// A constraint of the static circuit may be off by this part of its terms (rounding).
-const ROUNDING: f64 = 1e-9;
 
 fn static_solution(
     behaviour: &Behaviour,
@@ -364,7 +362,7 @@ fn check_constraints(lcs: &Lcs, at: Point<'_>) -> Result<(), SimError> {
     for i in 0..rows.one.len() {
         let value = reading::value(rows, i, at);
         let terms = (0..at.u.len()).map(|j| (rows.u[(i, j)] * at.u[j]).abs());
-        if value.abs() > ROUNDING * terms.fold(rows.one[i].abs(), f64::max) {
+        if value.abs() > CONSISTENT * terms.fold(rows.one[i].abs(), f64::max) {
             let names: Vec<&str> = (0..at.u.len())
                 .filter(|&j| rows.u[(i, j)] != 0.0)
                 .map(|j| lcs.inputs[j].name.as_str())

@@ -5,6 +5,7 @@ use crate::integrate::aliasing::Aliased;
 use crate::integrate::event::Event;
 use crate::integrate::rows::RowKind;
 use crate::integrate::verify::Verified;
+use crate::settings::tolerances::jumps::DESTROYED;
 use crate::waveform::Waveforms;
 
 /// Counters of one run; deterministic except `cpu_seconds`.
@@ -120,10 +121,6 @@ pub struct StateJump {
     #[serde(skip)]
     pub destroys: bool,
 }
-
-/// A jump that loses more than this part of the energy at hand destroys a current or a charge; below it lies a current of 3e-5
-/// of its amplitude, as a switch that opens where a current is meant to be zero finds it.
-const DESTROYED: f64 = 1e-9;
 
 impl StateJump {
     /// The jump at `t` of the storage elements `moved`, which lost `loss`, J, where `energy`, J, is at hand. At an edge of a source

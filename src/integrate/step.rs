@@ -18,6 +18,8 @@ use nalgebra::{DMatrix, DVector};
 use crate::integrate::energy::PowerForms;
 use crate::integrate::lawful;
 use crate::lcs::Lcs;
+use crate::settings::tolerances::events::STEP_GUARD;
+use crate::settings::tolerances::steps::{DIRECT, SHORT};
 use crate::solve::Driver;
 use crate::solve::active::{ActiveSolve, equilibrated_inverse};
 use crate::solve::lcp::{Lcp, Scaling};
@@ -63,17 +65,6 @@ impl Scheme {
         }
     }
 }
-
-/// A guard this far below zero, relative to the sum of the magnitudes it was computed from, is zero: rounding of K.
-const GUARD_ROUNDING: f64 = 1e-12;
-
-/// The implicit step that tells y and λ at the right limit of an instant, relative to the last step: 2⁻¹². Its own error is that
-/// part of the step's, the amplified rounding of the state 2¹² ε.
-pub(crate) const SHORT: f64 = 1.0 / 4096.0;
-
-/// A λ that is a derivative is made of magnitudes 1/SHORT times as large in a short step as in a whole one, another one of the same: what
-/// lies between these belongs to the latter up to here.
-const DIRECT: f64 = 16.0;
 
 /// Columns of z.
 #[derive(Debug, Clone, PartialEq)]
@@ -406,13 +397,13 @@ impl StepMatrices {
 
     /// Has the solvers know what rounding leaves uncertain in q(z), where `noise(k)` is what state k may be off.
     pub(crate) fn blur(&mut self, lcs: &Lcs, z: &[f64], noise: impl Fn(usize) -> f64) {
-        // In units of GUARD_ROUNDING, so that one product does for both.
+        // In units of STEP_GUARD, so that one product does for both.
         let z = DVector::from_iterator(
             z.len(),
             z.iter().enumerate().map(|(k, v)| {
                 v.abs()
                     + if k < lcs.n() {
-                        noise(k) / GUARD_ROUNDING
+                        noise(k) / STEP_GUARD
                     } else {
                         0.0
                     }
@@ -420,7 +411,7 @@ impl StepMatrices {
         );
         // q is what is left of C x⁺ and the rest.
         let size = self.q.abs() * &z + lcs.c.abs() * (self.phi.abs() * &z);
-        self.driver.blur(&(size * GUARD_ROUNDING));
+        self.driver.blur(&(size * STEP_GUARD));
     }
 
     /// The sums of the magnitudes that x⁺ is computed from.
@@ -484,7 +475,7 @@ impl FusedMode {
                 Some(guard) => -guard,
                 None => row.iter().zip(z).map(|(a, b)| a * b).sum::<f64>().abs(),
             };
-            if negative > GUARD_ROUNDING * rounding + inherited || negative.is_nan() {
+            if negative > STEP_GUARD * rounding + inherited || negative.is_nan() {
                 return false;
             }
         }
@@ -496,7 +487,7 @@ impl FusedMode {
         let sizes = self.sizes.chunks_exact(self.width);
         self.regular
             && guards.iter().zip(sizes).all(|(&guard, size)| {
-                guard > GUARD_ROUNDING * size.iter().zip(z).map(|(a, b)| a * b.abs()).sum::<f64>()
+                guard > STEP_GUARD * size.iter().zip(z).map(|(a, b)| a * b.abs()).sum::<f64>()
             })
     }
 

@@ -9,9 +9,11 @@ use crate::integrate::event::Change;
 use crate::integrate::inputs::{Inputs, Passage};
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::SimError;
-use crate::integrate::settle::{DECISIVE, settle};
+use crate::integrate::settle::settle;
 use crate::lcs::Lcs;
 use crate::mna::{LatchPort, SwitchPort};
+use crate::settings::tolerances::events::CONTROL_ROUNDINGS;
+use crate::settings::tolerances::events::DECISIVE;
 
 /// Thresholds of one switch.
 #[derive(Debug, Clone, PartialEq)]
@@ -136,9 +138,6 @@ impl Threshold {
     }
 }
 
-/// Roundings of a control and of the time at which it passes its threshold, in units of the last place of its terms.
-pub(crate) const ROUNDINGS: f64 = 64.0;
-
 /// A value with the bound of its rounding.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Known {
@@ -258,7 +257,7 @@ impl Switches {
         };
         let known = |value: f64, size: f64| Known {
             value,
-            noise: ROUNDINGS * f64::EPSILON * size,
+            noise: CONTROL_ROUNDINGS * f64::EPSILON * size,
         };
         let wrong = |&i: &usize| {
             let value = reading::value(&lcs.controls, i, at);

@@ -18,6 +18,9 @@ use crate::integrate::stats::Run;
 use crate::lcs::Lcs;
 use crate::mna::Behaviour;
 use crate::settings::Settings;
+use crate::settings::tolerances::stated::{
+    ASIDE, ENOUGH, EXACT, MOST_LEFT_OUT, SAFETY, TOLERANCES,
+};
 use crate::waveform::compare::{Tube, tubes};
 
 /// What the second run found.
@@ -52,20 +55,6 @@ pub struct VerifyOptions<'a> {
     /// As [`SimOptions::cancel`].
     pub cancel: Option<&'a AtomicBool>,
 }
-
-/// The error of exact runs, relative to amplitudes: rounding in stiff circuits.
-const EXACT: f64 = 1e-9;
-/// Tolerances of the verifying steps, one after the other until they know enough. Their own error is no less than that.
-const TOLERANCES: [f64; 3] = [1e-4, 1e-5, 1e-6];
-/// An error of the verifying steps, relative to amplitudes, below which they know enough.
-const ENOUGH: f64 = 3e-3;
-/// The distance of two runs of steps may be smaller than the error of the finer one.
-const SAFETY: f64 = 2.0;
-/// Events of the two methods may be apart by this part of an output step where the events of the verifying runs agree better, and output
-/// times so close to an event are left out: what decays within an instant is not followed by steps.
-const ASIDE: f64 = 0.01;
-/// Where more than this part of the output times were left out (a print step of a clock's period), all are compared.
-const MOST_LEFT_OUT: f64 = 0.5;
 
 /// Makes the run of a circuit a second time; `run` has its rows at the output times, and at events and corners too if it was made with
 /// [`SimOptions::corners`].

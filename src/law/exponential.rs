@@ -10,6 +10,7 @@
 //! added by Newton's method where it is not below rounding.
 
 use super::Resolvent;
+use crate::settings::tolerances::exponentials::EXTINCT;
 
 /// k/q, V/K.
 const BOLTZMANN: f64 = 1.380_649e-23 / 1.602_176_634e-19;
@@ -244,7 +245,7 @@ fn alone(current: f64, a: f64, r: f64, z: f64) -> (f64, f64) {
 /// is of fourth order.
 #[must_use]
 pub fn wright_omega(x: f64) -> f64 {
-    if x < -37.0 {
+    if x < -EXTINCT {
         return x.exp();
     }
     let mut w = if x > 1.0 {

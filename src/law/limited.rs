@@ -5,9 +5,7 @@
 
 use super::{Curve, ONE, ZERO};
 use crate::algebra::Value;
-
-/// Where the tangents touch, besides 0 and infinity: the choice with the least largest error.
-const TOUCHING: [f64; 3] = [0.63, 1.11, 1.79];
+use crate::settings::tolerances::netlists::TANGENTS;
 
 /// One conducting side of the diode.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,7 +41,7 @@ fn tangents() -> Vec<(f64, f64)> {
         (slope, x.tanh() - slope * x)
     };
     let mut before = line(0.0);
-    let after = TOUCHING.iter().map(|&x| line(x)).chain([(0.0, 1.0)]);
+    let after = TANGENTS.iter().map(|&x| line(x)).chain([(0.0, 1.0)]);
     after
         .map(|(slope, offset)| {
             let x = (offset - before.1) / (before.0 - slope);

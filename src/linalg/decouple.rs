@@ -12,12 +12,11 @@
 //! manifold w_F = Q w_S; G. W. Stewart, SIAM Review 15 (1973)). In ξ what is fast decays to nothing, so that neither guards nor
 //! exponentials are differences of large numbers.
 
+use crate::settings::tolerances::exponentials::DECOUPLED;
 use nalgebra::DMatrix;
 
 /// Rounds of either iteration; S and F are apart by 10³ at least.
 const ROUNDS: usize = 12;
-/// A round that changes a row by no more than this part of its largest entry ends the iteration.
-const SETTLED: f64 = 1e-13;
 
 /// The change of basis.
 #[derive(Debug, Clone)]
@@ -96,7 +95,7 @@ fn settled(
         let y = next(&x)?;
         let still = y.row_iter().zip(x.row_iter()).all(|(y, x)| {
             let size = y.amax();
-            size.is_finite() && (y - x).amax() <= SETTLED * size
+            size.is_finite() && (y - x).amax() <= DECOUPLED * size
         });
         x = y;
         if still {

@@ -7,12 +7,7 @@ use nalgebra::{Complex, DMatrix};
 
 use super::dense::Dense;
 use super::shifted::Shifted;
-
-/// ‖A h‖₁ up to which shorter steps are squared: what that loses, about 2.5e-17·‖A h‖, stays near rounding below this.
-pub(crate) const SQUARED: f64 = 1e3;
-
-/// ‖A h‖₁ up to which the series is summed; longer steps begin with a part of this size.
-pub(crate) const SERIES: f64 = 0.125;
+use crate::settings::tolerances::exponentials::SERIES;
 
 /// Terms of the series: 0.125^k/k! is below rounding beyond, in every entry; their sizes are not comparable.
 const TERMS: u32 = 14;
@@ -300,6 +295,7 @@ fn subdiagonal(whole: &Dense, k: u32) -> Option<Dense> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::tolerances::exponentials::SQUARED;
 
     fn matrix(dense: &Dense) -> DMatrix<f64> {
         DMatrix::from_fn(dense.rows(), dense.columns(), |i, j| dense.column(j)[i])

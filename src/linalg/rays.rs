@@ -1,11 +1,10 @@
 //! Guards where the ideal model leaves a current or voltage undetermined.
 
+use crate::settings::tolerances::ranks::ENTRY;
 use nalgebra::{DMatrix, DVector};
 
 /// Rays kept before the description counts as too large.
 const MOST_RAYS: usize = 256;
-/// Entries below this, relative to a ray's largest, are rounding.
-const ZERO: f64 = 1e-12;
 
 /// Extreme rays r ≥ 0 of {r : Kᵀ r = 0}, one per row (double description method, Motzkin et al. 1953).
 ///
@@ -23,7 +22,7 @@ pub(crate) fn extreme_rays(kernel: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         }
         let values: Vec<f64> = rays.iter().map(|r| column.dot(r)).collect();
         let sign = |i: usize| {
-            if values[i].abs() <= ZERO * size {
+            if values[i].abs() <= ENTRY * size {
                 0.0
             } else {
                 values[i].signum()
@@ -38,7 +37,7 @@ pub(crate) fn extreme_rays(kernel: &DMatrix<f64>) -> Option<DMatrix<f64>> {
                 let mut ray = &rays[n] * values[p] - &rays[p] * values[n];
                 ray /= ray.amax();
                 ray.iter_mut()
-                    .filter(|v| v.abs() <= ZERO)
+                    .filter(|v| v.abs() <= ENTRY)
                     .for_each(|v| *v = 0.0);
                 next.push(ray);
             }

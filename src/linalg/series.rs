@@ -2,11 +2,10 @@
 
 use super::dense::{BLOCK, Block};
 use super::kernel::SparseKernel;
+use crate::settings::tolerances::exponentials::TERM_IS_NOTHING;
 
 /// Highest degree; where ‖𝒜‖ dt ≤ 1 the rest is below rounding.
 pub(crate) const MAX_DEGREE: usize = 20;
-/// A term is nothing where every component is below this part of the largest that it had so far.
-const NOTHING: f64 = 0.1 * f64::EPSILON;
 
 /// The terms of one step, in blocks of four with zeros behind the last component.
 #[derive(Debug, Clone, Default)]
@@ -106,7 +105,7 @@ fn settle(term: &mut [Block], largest: &mut [Block], factor: f64) -> bool {
         for ((value, largest), beyond) in term.iter_mut().zip(largest).zip(&mut beyond) {
             *value *= factor;
             let size = value.abs();
-            let by = size - NOTHING * *largest;
+            let by = size - TERM_IS_NOTHING * *largest;
             // As `f64::max` where neither is NaN, in one instruction.
             *beyond = if *beyond > by { *beyond } else { by };
             *largest = if *largest > size { *largest } else { size };

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::{Line, MeasureError, Trace};
+use crate::settings::tolerances::netlists::SMALL_ANGLE;
 
 /// One harmonic, magnitude·sin(2π k f t + phase) with t from the start of the period, as in SPICE.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,9 +95,6 @@ fn moments(line: &Line, omega: f64, origin: f64) -> (f64, f64) {
     let (even, odd) = (2.0 * half * middle * even, 2.0 * half * rise * odd);
     (even * cos - odd * sin, even * sin + odd * cos)
 }
-
-/// Below this angle the series to θ⁴ is exact to rounding.
-const SMALL_ANGLE: f64 = 1e-2;
 
 #[cfg(test)]
 mod tests {

@@ -10,22 +10,8 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::facial::Face;
-
-/// Bound ρ on P relative to its start, in balanced units: solutions beyond it are not looked for.
-const RADIUS: f64 = 1e5;
-
-/// μ is divided by this between centrings.
-const SHRINK: f64 = 8.0;
-
-/// The duality gap at which a margin is final. Larger: margins that are truly positive are taken for zero; smaller:
-/// rounding of the Newton systems decides.
-const GAP: f64 = 1e-11;
-
-/// A margin below gap times this is zero; above it, it has a sign.
-const ZERO: f64 = 30.0;
-
-/// Newton decrement at which a point counts as centred.
-const CENTRED: f64 = 1e-3;
+use crate::settings::tolerances::passivity::SHORTEST_STEP;
+use crate::settings::tolerances::passivity::{CENTRED, GAP, RADIUS, SHRINK, SIGN};
 
 /// Newton steps of one centring.
 const NEWTON_STEPS: usize = 60;
@@ -151,7 +137,7 @@ pub fn maximise(face: &Face) -> Outcome {
         if t > gap {
             return Outcome::Interior { z, margin: t };
         }
-        if t + gap < 0.0 && t < -ZERO * gap {
+        if t + gap < 0.0 && t < -SIGN * gap {
             return judge(&blocks, z, t, mu, weight);
         }
         if gap < GAP {
@@ -168,7 +154,7 @@ fn judge(blocks: &[Block; 3], z: DVector<f64>, t: f64, mu: f64, weight: f64) -> 
     }
     let dual = blocks[0].factor(&z, t).map(|f| f.inverse() * mu);
     match dual {
-        dual if t < -ZERO * gap => Outcome::Infeasible {
+        dual if t < -SIGN * gap => Outcome::Infeasible {
             z,
             margin: t,
             dual: dual.unwrap_or_default(),
@@ -243,7 +229,7 @@ fn centre(blocks: &[Block; 3], z: &mut DVector<f64>, t: &mut f64, mu: f64) -> bo
                 break;
             }
             length *= 0.5;
-            if length < 1e-12 {
+            if length < SHORTEST_STEP {
                 return false;
             }
         }

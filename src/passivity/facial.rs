@@ -13,16 +13,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::{System, Witness, lmi, scale};
-
-/// Size, in balanced units, above which an inconsistency of the equalities counts as real.
-const INCONSISTENT: f64 = 1e-8;
-
-/// Dual eigenvalues (relative to the largest) above which a direction is exposed: the dual of a margin that is zero is
-/// of rank one or more, with a gap of many decades below.
-const EXPOSED: f64 = 1e-5;
-
-/// Eigenvalues of F at a solution (relative to the largest) that count as zero when the exposed face is sharpened.
-const NEARLY_NULL: f64 = 1e-7;
+use crate::settings::tolerances::passivity::{EXPOSED, INCONSISTENT, NEARLY_NULL};
+use crate::settings::tolerances::ranks::RANK;
 
 /// A margin problem: F(z) = F₀ + Σ zₖFₖ and P(z) = P₀ + Σ zₖPₖ, both to be made positive definite.
 ///
@@ -178,7 +170,7 @@ impl Face {
         for (k, fk) in self.f.iter().enumerate() {
             columns.set_column(k, &DVector::from_column_slice((fk * &v).as_slice()));
         }
-        let parts = scale::split(&columns, scale::RANK);
+        let parts = scale::split(&columns, RANK);
         let target = DVector::from_column_slice(rhs.as_slice());
         let along = parts.range.transpose() * &target;
         if (&target - &parts.range * &along).amax() > INCONSISTENT {
@@ -211,7 +203,7 @@ pub(super) fn lossless(d: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
     let (values, vectors) = scale::eigen(&(d + d.transpose()));
     let size = d.amax().max(f64::MIN_POSITIVE);
     let (kernel, rest): (Vec<usize>, Vec<usize>) =
-        (0..values.len()).partition(|&i| values[i].abs() <= scale::RANK * size);
+        (0..values.len()).partition(|&i| values[i].abs() <= RANK * size);
     (
         vectors.select_columns(&kernel),
         vectors.select_columns(&rest),
@@ -229,7 +221,7 @@ pub(super) fn equalities(
         return Ok((DMatrix::zeros(n, n), DMatrix::identity(n, n)));
     }
     let size = m.amax().max(r.amax()).max(f64::MIN_POSITIVE);
-    let parts = scale::split(m, scale::RANK * size);
+    let parts = scale::split(m, RANK * size);
     let unseen = r * &parts.kernel;
     if unseen.amax() > INCONSISTENT * size {
         let port = null * &parts.kernel;

@@ -3,9 +3,8 @@
 use nalgebra::DMatrix;
 
 use super::{System, facial, scale, verify};
-
-/// Residual, relative to the terms it is the difference of, at which PB = Cᵀ counts as satisfied.
-pub const RESIDUAL: f64 = 1e-9;
+use crate::settings::tolerances::passivity::MATCHED;
+use crate::settings::tolerances::ranks::RANK;
 
 /// States beyond which only the candidate is tried: constructing P takes a full singular value decomposition.
 const LARGEST: usize = 200;
@@ -20,7 +19,7 @@ pub fn residual(p: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> f64 {
         .iter()
         .zip(size.iter())
         .map(|(d, s)| {
-            if *s > scale::RANK * largest {
+            if *s > RANK * largest {
                 d.abs() / s
             } else {
                 0.0
@@ -36,7 +35,7 @@ pub fn storage(
     c: &DMatrix<f64>,
     candidate: Option<&DMatrix<f64>>,
 ) -> Option<DMatrix<f64>> {
-    let fits = |p: &DMatrix<f64>| verify::definite(p).is_ok() && residual(p, b, c) <= RESIDUAL;
+    let fits = |p: &DMatrix<f64>| verify::definite(p).is_ok() && residual(p, b, c) <= MATCHED;
     if let Some(p) = candidate.filter(|p| p.shape() == (b.nrows(), b.nrows()) && fits(p)) {
         return Some(p.clone());
     }

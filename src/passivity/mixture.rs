@@ -10,9 +10,10 @@
 //! G ⪰ 0 and σ < 0 contradict every P ⪰ 0 at once. Σ (x_k, v_k)(x_k, v_k)ᵀ is a dual solution of the inequality; the barrier finds one
 //! whenever its margin is negative, also where no single motion at one complex frequency gains energy.
 
+use crate::settings::tolerances::passivity::ENTRIES;
+use crate::settings::tolerances::ranks::RANK;
 use nalgebra::DMatrix;
 
-use super::witness::ENTRIES;
 use super::{System, facial, scale};
 
 /// Pairs (x_k, v_k) in the columns of two matrices.
@@ -91,7 +92,7 @@ impl Mixture {
         let lossy = rest * lower.rows(n, lower.nrows() - n);
         let start = Self::new(system, states.clone(), lossy.clone());
         let given = start.growth(system);
-        let reach = scale::split(&(&system.b * &null), scale::RANK * system.b.amax());
+        let reach = scale::split(&(&system.b * &null), RANK * system.b.amax());
         let (u1, u2) = (&reach.range, &reach.left_kernel);
         let free = u2 * u2.transpose() * &given * u2 * u2.transpose();
         let with = |tau: f64| -> Option<Self> {

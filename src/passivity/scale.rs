@@ -3,13 +3,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::System;
+use crate::settings::tolerances::ranks::RANK;
 
 /// Sweeps of the balancing iterations; each halves the logarithm of what is left to balance.
 const SWEEPS: usize = 24;
-
-/// Relative size below which a singular value counts as zero. Entries of a circuit's matrices are accurate to about
-/// 1e-12; larger: independent ports merged; smaller: rounding mistaken for rank.
-pub(crate) const RANK: f64 = 1e-10;
 
 /// A system in balanced units: x = T x̂, t̂ = ω t, λ = √ω S λ̂, all powers of two; Q̂(P̂) is congruent to Q(P).
 #[derive(Debug, Clone)]

@@ -19,12 +19,9 @@ use nalgebra::{DMatrix, DVector};
 use super::barrier::Outcome;
 use super::facial::Face;
 use super::{Certificate, System, lmi};
-
-/// Accuracy asked of the interior point method; a margin within 30 times it is zero.
-const ACCURACY: f64 = 1e-10;
-
-/// Bound on the unknowns, in balanced units.
-const RADIUS: f64 = 1e5;
+use crate::settings::tolerances::passivity::RADIUS;
+use crate::settings::tolerances::passivity::SIGN;
+use crate::settings::tolerances::theorems::INTERIOR_POINT;
 
 /// Solves (45) like [`lmi::solve`], with clarabel in place of the barrier.
 ///
@@ -109,9 +106,9 @@ fn maximise(face: &Face) -> Outcome {
     ];
     let settings: Option<DefaultSettings<f64>> = DefaultSettingsBuilder::default()
         .verbose(false)
-        .tol_feas(ACCURACY)
-        .tol_gap_abs(ACCURACY)
-        .tol_gap_rel(ACCURACY)
+        .tol_feas(INTERIOR_POINT)
+        .tol_gap_abs(INTERIOR_POINT)
+        .tol_gap_rel(INTERIOR_POINT)
         .build()
         .ok();
     let quadratic = CscMatrix::zeros((unknowns + 1, unknowns + 1));
@@ -134,9 +131,9 @@ fn maximise(face: &Face) -> Outcome {
     let z = DVector::from_column_slice(&solver.solution.x[..unknowns]);
     let margin = solver.solution.x[unknowns];
     let dual = square(&solver.solution.z[..fq], q);
-    if margin > 30.0 * ACCURACY {
+    if margin > SIGN * INTERIOR_POINT {
         Outcome::Interior { z, margin }
-    } else if margin < -30.0 * ACCURACY {
+    } else if margin < -SIGN * INTERIOR_POINT {
         Outcome::Infeasible { z, margin, dual }
     } else {
         Outcome::Boundary { z, margin, dual }

@@ -3,9 +3,8 @@
 use nalgebra::DMatrix;
 
 use super::{Origin, System, facial, lmi, scale, verify, witness};
-
-/// Relative width at which the bisection on the rate stops.
-const WIDTH: f64 = 1e-6;
+use crate::settings::tolerances::passivity::RATE_WIDTH;
+use crate::settings::tolerances::ranks::RANK;
 
 /// States beyond which the rate is only computed for the given P.
 const LARGEST: usize = 30;
@@ -53,9 +52,9 @@ pub fn maximise(system: &System, p: &DMatrix<f64>, from: Origin) -> Strict {
     }
     let certified = |alpha: f64| alpha > 0.0 && verify::check(&system.shifted(alpha), p).is_ok();
     if let Some(rate) = fixed(system, p)
-        && certified(rate * (1.0 - WIDTH))
+        && certified(rate * (1.0 - RATE_WIDTH))
     {
-        best.decay_rate = rate * (1.0 - WIDTH);
+        best.decay_rate = rate * (1.0 - RATE_WIDTH);
     }
     if system.n() > LARGEST {
         return best;
@@ -77,7 +76,7 @@ pub fn maximise(system: &System, p: &DMatrix<f64>, from: Origin) -> Strict {
         lmi::solve(&system.shifted(alpha)).ok()
     });
     if let Some((alpha, certificate)) = solved
-        && alpha > best.decay_rate * (1.0 + WIDTH)
+        && alpha > best.decay_rate * (1.0 + RATE_WIDTH)
     {
         best = Strict {
             decay_rate: alpha,
@@ -97,7 +96,7 @@ fn fixed(system: &System, p: &DMatrix<f64>) -> Option<f64> {
     let (values, vectors) = scale::eigen(&q.view((n, n), (m, m)).into_owned());
     let size = values.amax();
     let lossy: Vec<usize> = (0..values.len())
-        .filter(|&k| values[k].abs() > scale::RANK * size)
+        .filter(|&k| values[k].abs() > RANK * size)
         .collect();
     let reach = coupling * vectors.select_columns(&lossy);
     let inverse = DMatrix::from_diagonal(&values.select_rows(&lossy).map(f64::recip));
@@ -122,13 +121,13 @@ fn bisect<T>(
 ) -> Option<(f64, T)> {
     let mut best = None;
     // The limit itself is attained by symmetric networks (RC): try just below it first.
-    let first = high * (1.0 - WIDTH);
+    let first = high * (1.0 - RATE_WIDTH);
     if first > low
         && let Some(found) = certify(first)
     {
         return Some((first, found));
     }
-    while high - low > WIDTH * scale {
+    while high - low > RATE_WIDTH * scale {
         let middle = 0.5 * (low + high);
         match certify(middle) {
             Some(found) => {

@@ -2,6 +2,7 @@
 
 use super::System;
 use super::witness::{C, Witness, complex, eigenvalues, resolvent};
+use crate::settings::tolerances::passivity::{BAND, POLE_AT_REST, SEARCHED_AROUND};
 
 /// Points of the frequency sweep per decade.
 const PER_DECADE: usize = 6;
@@ -41,9 +42,9 @@ pub(super) fn violation(
         return None;
     }
     let poles = eigenvalues(&system.a);
-    let sizes = || poles.iter().map(|p| p.norm()).filter(|&v| v > 1e-12);
-    let low = sizes().fold(1.0, f64::min) * 1e-3;
-    let high = sizes().fold(1.0, f64::max) * 1e3;
+    let sizes = || poles.iter().map(|p| p.norm()).filter(|&v| v > POLE_AT_REST);
+    let low = sizes().fold(1.0, f64::min) * BAND.0;
+    let high = sizes().fold(1.0, f64::max) * BAND.1;
     let count = ((high / low).log10() * PER_DECADE as f64).ceil() as usize + 1;
     let mut grid: Vec<f64> = (0..count)
         .map(|k| low * (high / low).powf(k as f64 / (count - 1).max(1) as f64))
@@ -80,7 +81,7 @@ pub(super) fn violation(
         found.extend(at(system, C::new(w, 0.0)));
     }
     for p in &poles {
-        for radius in [1e-4, 1e-2, 1.0] {
+        for radius in SEARCHED_AROUND {
             found.extend(at(system, C::new(radius * p.norm().max(low), p.im)));
         }
     }

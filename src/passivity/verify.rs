@@ -3,19 +3,8 @@
 use nalgebra::DMatrix;
 
 use super::{System, lmi, scale};
-
-/// How positive the largest eigenvalue of the equilibrated (45) may be, per row. The entries of a circuit's matrices
-/// carry relative errors up to 1e-12; larger: systems with a real (tiny) source of energy pass; smaller: lossless
-/// networks are refused for rounding.
-pub const LMI: f64 = 1e-11;
-
-/// How far PBN may be from CᵀN on N = ker(D + Dᵀ), and likewise the coupling on the lossless states, relative to the
-/// terms it is computed from. [`LMI`] alone would let √LMI pass there.
-pub const KERNEL: f64 = 1e-9;
-
-/// Smallest eigenvalue that P, scaled to unit diagonal, must have: larger refuses stiffly coupled storage, smaller
-/// accepts rounding as definiteness.
-pub const DEFINITE: f64 = 1e-13;
+use crate::settings::tolerances::passivity::{DEFINITE, KERNEL, LMI};
+use crate::settings::tolerances::ranks::RANK;
 
 /// By how much a P fulfils (45).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -110,7 +99,7 @@ pub fn definite(p: &DMatrix<f64>) -> Result<f64, Failure> {
 fn null_space(block: &DMatrix<f64>) -> DMatrix<f64> {
     let (values, vectors) = scale::eigen(block);
     let kernel: Vec<usize> = (0..values.len())
-        .filter(|&i| values[i].abs() <= scale::RANK)
+        .filter(|&i| values[i].abs() <= RANK)
         .collect();
     vectors.select_columns(&kernel)
 }

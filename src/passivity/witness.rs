@@ -8,13 +8,11 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use super::mixture::Mixture;
 use super::scale::{self, Balanced};
-use super::{System, sweep, verify};
+use super::{System, sweep};
+use crate::settings::tolerances::passivity::ENTRIES;
+use crate::settings::tolerances::passivity::KERNEL;
 
 pub(super) type C = Complex<f64>;
-
-/// Relative error assumed in every entry of A, B, C, D when a witness is verified: it must stand for all matrices within
-/// it. Larger: weakly active networks are not recognised; smaller: rounding is taken for activity.
-pub(super) const ENTRIES: f64 = 1e-11;
 
 /// States beyond which only the feedthrough is searched: the sweep takes hundreds of factorisations.
 const LARGEST: usize = 150;
@@ -112,10 +110,9 @@ impl Witness {
                     let size = system.b.abs() * v.abs();
                     let seen = system.c.transpose() * &v;
                     let seen_size = system.c.abs().transpose() * v.abs();
-                    (0..reached.len()).all(|i| reached[i].abs() <= verify::KERNEL * size[i])
-                        && (0..seen.len()).any(|i| {
-                            seen[i].abs() > verify::KERNEL.sqrt() * seen_size[i] && seen[i] != 0.0
-                        })
+                    (0..reached.len()).all(|i| reached[i].abs() <= KERNEL * size[i])
+                        && (0..seen.len())
+                            .any(|i| seen[i].abs() > KERNEL.sqrt() * seen_size[i] && seen[i] != 0.0)
                 }
             }
             Self::Asymmetric { ports } => {
@@ -125,7 +122,7 @@ impl Witness {
                 let value = gram(&system.b, &system.c, ports);
                 let size = gram(&system.b.abs(), &system.c.abs(), &ports.abs());
                 let difference = &value - value.transpose();
-                let bound = (&size + size.transpose()) * verify::KERNEL;
+                let bound = (&size + size.transpose()) * KERNEL;
                 shape(ports.nrows())
                     && (0..ports.ncols()).all(|j| lossless(system, &ports.column(j).into_owned()))
                     && difference
@@ -137,7 +134,7 @@ impl Witness {
                 let v = DVector::from_column_slice(direction);
                 let value = v.dot(&(&system.c * (&system.b * &v)));
                 let size = v.abs().dot(&(system.c.abs() * (system.b.abs() * v.abs())));
-                shape(v.len()) && lossless(system, &v) && value < -verify::KERNEL * size
+                shape(v.len()) && lossless(system, &v) && value < -KERNEL * size
             }
             Self::Mixture(mixture) => mixture.verify(system),
         }
@@ -196,7 +193,7 @@ impl Witness {
 /// vᵀ(D + Dᵀ)v = 0 to rounding.
 fn lossless(system: &System, v: &DVector<f64>) -> bool {
     let loss = (&system.d * v).dot(v).abs();
-    loss <= verify::KERNEL * v.abs().dot(&(system.d.abs() * v.abs()))
+    loss <= KERNEL * v.abs().dot(&(system.d.abs() * v.abs()))
 }
 
 pub(super) fn complex(m: &DMatrix<f64>) -> DMatrix<C> {

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::lcp::Lcp;
+use crate::settings::tolerances::ranks::INVERSE;
 
 /// How λ_a depends on q_a for one active set of one matrix M.
 #[derive(Debug, Clone)]
@@ -14,9 +15,6 @@ pub struct ActiveSolve {
     /// Whether M_aa has full numerical rank. If not, λ_a is the least-norm choice and M_aa λ_a = −q_a must be checked.
     pub regular: bool,
 }
-
-/// Singular values below this multiple of the largest count as zero (M equilibrated).
-const RANK: f64 = 1e-11;
 
 impl ActiveSolve {
     /// Factors M_aa of an *equilibrated* matrix.
@@ -68,12 +66,12 @@ impl ActiveSolve {
     }
 }
 
-/// The inverse by LU with one Newton step X ← X (2I − A X), `None` where A is singular to `RANK`.
+/// The inverse by LU with one Newton step X ← X (2I − A X), `None` where A is singular to `INVERSE`.
 #[must_use]
 pub fn refined_inverse(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let k = a.nrows();
     let inverse = a.clone().lu().try_inverse()?;
-    if !inverse.iter().all(|v| v.is_finite()) || norm1(a) * norm1(&inverse) * RANK > 1.0 {
+    if !inverse.iter().all(|v| v.is_finite()) || norm1(a) * norm1(&inverse) * INVERSE > 1.0 {
         return None;
     }
     let residual = DMatrix::identity(k, k) * 2.0 - a * &inverse;
@@ -108,13 +106,13 @@ pub fn equilibrated_inverse(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 /// Sweeps of the equilibration; each takes the square root of what is left of the imbalance.
 const SWEEPS: usize = 8;
 
-/// The Moore-Penrose inverse with rank decided at `RANK`.
+/// The Moore-Penrose inverse with rank decided at `INVERSE`.
 #[must_use]
 pub fn pseudo_inverse(a: &DMatrix<f64>) -> DMatrix<f64> {
     let svd = a.clone().svd(true, true);
     let largest = svd.singular_values.max();
     // `pseudo_inverse` fails only for a negative threshold.
-    svd.pseudo_inverse(largest * RANK)
+    svd.pseudo_inverse(largest * INVERSE)
         .unwrap_or_else(|_| DMatrix::zeros(a.ncols(), a.nrows()))
 }
 

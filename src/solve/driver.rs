@@ -8,6 +8,8 @@ use super::lcp::{Answered, Lcp, Scaling, Solution, Status};
 use super::lemke::{self, Lemke};
 use super::parts::Parts;
 use super::{convex, norm, pivot};
+use crate::settings::tolerances::complementarity::{NOTHING_TO_GAIN, SLACK};
+use crate::settings::tolerances::ranks::EIGENVALUE;
 
 /// Factored active sets kept per matrix; the oldest goes first.
 const KEPT_SETS: usize = 64;
@@ -42,12 +44,6 @@ pub struct LeastNorm {
     /// The ports with a positive λ or y that another member has otherwise: what the ideal model leaves open.
     pub chosen: Vec<usize>,
 }
-
-/// A residual at which no other method is asked for a better one: a few roundings of a solve.
-const ROUNDING: f64 = 1e-13;
-
-/// Violations below this multiple of the problem's size count as zero inside the pivoting methods (rounding of one solve).
-const SLACK: f64 = 1e-14;
 
 impl Driver {
     /// Prepares M; `tolerance` is the scaled residual at which a solution is accepted.
@@ -164,14 +160,14 @@ impl Driver {
                 break;
             }
             if let Some(found) = method(self, slack) {
-                if found.residual <= ROUNDING {
+                if found.residual <= NOTHING_TO_GAIN {
                     return self.accept(found);
                 }
                 if found.residual < best.residual {
                     best = found;
                 }
             }
-            if best.residual <= ROUNDING {
+            if best.residual <= NOTHING_TO_GAIN {
                 return self.accept(best);
             }
             // Lemke's ray ends the search where it is a verified proof.
@@ -439,12 +435,11 @@ fn covers(size: usize) -> [DVector<f64>; 3] {
     ]
 }
 
-/// Whether M + Mᵀ has no eigenvalue below −`ROUNDING` times its largest.
+/// Whether M + Mᵀ has no eigenvalue below −[`EIGENVALUE`] times its largest.
 fn is_monotone(m: &DMatrix<f64>) -> bool {
-    const ROUNDING: f64 = 1e-12;
     if m.is_empty() {
         return true;
     }
     let eigenvalues = (m + m.transpose()).symmetric_eigenvalues();
-    eigenvalues.min() >= -ROUNDING * m.amax().max(eigenvalues.amax())
+    eigenvalues.min() >= -EIGENVALUE * m.amax().max(eigenvalues.amax())
 }

@@ -27,6 +27,10 @@ use nalgebra::{DMatrix, DVector};
 use super::driver::Driver;
 use super::lcp::{Answered, Scaling, Solution, Status};
 use crate::law::{Law, Resolvent};
+use crate::settings::tolerances::complementarity::{
+    BLOCKED, CONTINUED, CONTINUED_RATIO, DECREASE, MONOTONE, NEWTON_ENDS, PROXIMAL, SMALL_PORT,
+    UNDETERMINED,
+};
 
 /// The law of a port and which of its quantities is λ.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,42 +72,25 @@ struct Point {
     slope: DVector<f64>,
     rest: DVector<f64>,
     residual: DVector<f64>,
-    /// max_j |R_j| relative to its largest term, what w's rounding makes of them, or [`SMALL`] of the largest entry of q' or bend
+    /// max_j |R_j| relative to its largest term, what w's rounding makes of them, or [`SMALL_PORT`] of the largest entry of q' or bend
     /// of a law.
     size: f64,
     /// (I + M')⁻¹R.
     step: DVector<f64>,
 }
 
-/// A residual that is rounding: no iteration improves on it.
-const ROUNDING: f64 = 1e-15;
-/// What counts as small beside the largest quantity: its tolerated residual is this part of that of the largest.
-const SMALL: f64 = 1e-5;
 /// Steps from one start: those on corners are bounded by the number of ports, those on curves converge quadratically.
 const STEPS: usize = 60;
-/// Halvings of a step in the line search, and the part of the decrease that a linear function would have.
+/// Halvings of a step in the line search.
 const HALVINGS: u32 = 12;
-const DECREASE: f64 = 0.1;
 /// Full Newton steps that may go astray before the line search takes over: coming down an exponential each lowers v by one
 /// slope.
 const CHAIN: u32 = 60;
 /// Rounds of splitting, from w = 0 on, each followed by Newton; each takes twice as many iterations as the one before.
 const ROUNDS: u32 = 11;
 const SPLITTINGS: u32 = 8;
-/// μ of the proximal points, and how many there are at most.
-const PROXIMAL: f64 = 1e-4;
+/// Proximal points at most.
 const PROXIMAL_STEPS: u32 = 50;
-/// Largest μ of the continuation, and what each is to the one before.
-const CONTINUED: f64 = 10.0;
-const CONTINUED_RATIO: f64 = 0.25;
-/// A pivot of R' this small is a direction that neither the network nor the laws determine.
-const SINGULAR: f64 = 1e-10;
-/// Added to M' in Newton's matrix: rounding leaves M' an eigenvalue of −1e-16 in place of 0, and along its vector the step would
-/// go the wrong way; the bound of what it takes from the speed of convergence is far below the tolerance.
-const MONOTONE: f64 = 1e-13;
-
-/// Least −dy'/dw in the second method: a blocking junction has next to none, and a loop of such ports no regular matrix.
-const BLOCKED: f64 = 1e-8;
 
 impl Lawful {
     /// Prepares M.
@@ -213,7 +200,7 @@ impl Lawful {
     fn descend(&self, start: Point, q: &DVector<f64>) -> Point {
         let mut now = start;
         for _ in 0..STEPS {
-            if now.size <= ROUNDING {
+            if now.size <= NEWTON_ENDS {
                 break;
             }
             // What has been accepted gains by single steps.
@@ -327,7 +314,7 @@ impl Lawful {
         }
         point.residual = &self.m * &point.lambda + q - &point.y;
         point.step = &self.averaged * &point.residual;
-        let floor = SMALL * q.amax().max(self.bend);
+        let floor = SMALL_PORT * q.amax().max(self.bend);
         for j in 0..size {
             let known =
                 |value: f64, slope: f64, k: usize| value.abs().max(slope * point.w[k].abs());
@@ -445,13 +432,13 @@ impl Lawful {
     }
 }
 
-/// The solution of a system whose matrix may be nearly singular: then every pivot is raised by [`SINGULAR`] of the largest entry.
+/// The solution of a system whose matrix may be nearly singular: then every pivot is raised by [`UNDETERMINED`] of the largest entry.
 fn solved(matrix: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     let finite = |x: &DVector<f64>| x.iter().all(|x| x.is_finite());
     if let Some(x) = matrix.clone().lu().solve(right).filter(finite) {
         return Some(x);
     }
-    let raised = SINGULAR * matrix.amax().max(1.0);
+    let raised = UNDETERMINED * matrix.amax().max(1.0);
     let size = matrix.nrows();
     (matrix + DMatrix::identity(size, size) * raised)
         .lu()

@@ -8,6 +8,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::lcp::Lcp;
+use crate::settings::tolerances::complementarity::{TABLEAU_NOISE, TIE};
+use crate::settings::tolerances::ranks::INVERSE;
 
 /// How Lemke ended.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,15 +24,6 @@ pub enum Lemke {
 
 /// Pivots allowed per port: small circuit problems take about m, Murty's example 2^m for m up to 12.
 const PIVOTS_PER_PORT: usize = 400;
-
-/// Entries of the entering column below this multiple of its largest are not pivots (entries of the problem are near 1).
-const PIVOT: f64 = 1e-11;
-
-/// Ratios closer than this, relative to the larger, tie and are decided by the next lexicographic column.
-const TIE: f64 = 1e-12;
-
-/// Entries of a column of the tableau are known to this part of its largest.
-const NOISE: f64 = 1e-15;
 
 /// Runs Lemke on an equilibrated problem with covering vector `cover` > 0.
 #[must_use]
@@ -71,7 +64,7 @@ pub fn solve(lcp: &Lcp, cover: &DVector<f64>) -> Lemke {
     for _ in 0..PIVOTS_PER_PORT * m + 100 {
         let entering = complement(leaving);
         let column = t.column(entering);
-        let limit = PIVOT * column.amax().max(f64::MIN_POSITIVE);
+        let limit = INVERSE * column.amax().max(f64::MIN_POSITIVE);
         let candidates: Vec<usize> = (0..m).filter(|&i| t[(i, entering)] > limit).collect();
         if candidates.is_empty() {
             let mut ray = DVector::zeros(m);
@@ -114,7 +107,7 @@ fn lexicographic_minimum(
     let size = basis.len();
     for k in 0..=size {
         let column = if k == 0 { rhs } else { k - 1 };
-        let noise = NOISE * t.column(column).amax();
+        let noise = TABLEAU_NOISE * t.column(column).amax();
         let ratio = |i: usize| (t[(i, column)] / t[(i, entering)], noise / t[(i, entering)]);
         let (least, blur) = tied
             .iter()

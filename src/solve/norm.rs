@@ -8,9 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::lcp::Lcp;
-
-/// Singular values below this multiple of the largest count as zero (M equilibrated).
-const RANK: f64 = 1e-10;
+use crate::settings::tolerances::ranks::RANK;
 
 /// The least-norm member of a solution set.
 #[derive(Debug, Clone)]

@@ -10,10 +10,7 @@ mod tests;
 
 use self::curve::{Curve, difference_norms, tube_distance};
 use super::{Waveforms, canonical_name};
-
-/// The smallest amplitude that errors are related to, as a part of the largest amplitude of the same unit: a signal below it
-/// is the rounding or leakage of its neighbours.
-const AMPLITUDE_FLOOR: f64 = 1e-9;
+use crate::settings::tolerances::stated::AMPLITUDE_FLOOR;
 
 /// Where two sides are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,9 +2,10 @@
 
 use nalgebra::DVector;
 
-use super::{Hypotheses, Theorem, ZERO, half_lines, lossless, passive};
+use super::{Hypotheses, Theorem, half_lines, lossless, passive};
 use crate::check::facts::Facts;
 use crate::check::feedthrough::Feedthrough;
+use crate::settings::tolerances::ranks::RANK;
 
 /// Camlibel-Heemels-Schumacher 2002, passive systems with inputs.
 pub(super) fn inputs(facts: &Facts) -> Theorem {
@@ -26,7 +27,7 @@ pub(super) fn inputs(facts: &Facts) -> Theorem {
     } else {
         bn.clone().singular_values()
     };
-    let rank = values.iter().filter(|&&s| s > ZERO * values.max()).count();
+    let rank = values.iter().filter(|&&s| s > RANK * values.max()).count();
     let full = rank == n.ncols();
     h.need(
         full,

@@ -2,10 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Hypotheses, Theorem, ZERO, everything, input_output, lossless, over_swaps, split};
+use super::{Hypotheses, Theorem, everything, input_output, lossless, over_swaps, split};
 use crate::check::facts::{Facts, Swap};
 use crate::check::feedthrough::Feedthrough;
 use crate::check::program::Inequalities;
+use crate::settings::tolerances::ranks::RANK;
 
 fn undriven_output(facts: &Facts, h: &mut Hypotheses) {
     if facts.drives_y() {
@@ -85,7 +86,7 @@ fn leaves(inner: &DMatrix<f64>, outer: &DMatrix<f64>) -> f64 {
     let Some(u) = svd.u else { return 1.0 };
     let top = svd.singular_values.max();
     let basis: Vec<usize> = (0..svd.singular_values.len())
-        .filter(|&k| svd.singular_values[k] > ZERO * top)
+        .filter(|&k| svd.singular_values[k] > RANK * top)
         .collect();
     let q = u.select_columns(&basis);
     (&inner - &q * (q.transpose() * &inner))
@@ -163,7 +164,7 @@ fn assumption_4(swap: &Swap, fed: &[usize], h: &mut Hypotheses) {
         },
     );
     h.need(
-        range <= ZERO.sqrt() && kernel <= ZERO.sqrt(),
+        range <= RANK.sqrt() && kernel <= RANK.sqrt(),
         format!("(21) R(C_II) ⊂ R(D_II + D_IIᵀ) and ker(D_II + D_IIᵀ) ⊂ ker(B_II) up to {range:.1e} and {kernel:.1e}"),
     );
 }

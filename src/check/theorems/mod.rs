@@ -10,9 +10,8 @@ use nalgebra::DMatrix;
 use super::equilibria::Equilibrium;
 use super::facts::{Facts, Swap};
 use crate::passivity::{gradient, scale};
-
-/// Relative size at which a constant term or the kernel of a matrix counts as zero.
-const ZERO: f64 = 1e-10;
+use crate::settings::tolerances::passivity::MATCHED;
+use crate::settings::tolerances::ranks::RANK;
 
 /// One statement of the literature, applied to this system.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -135,7 +134,7 @@ fn input_output(facts: &Facts, swap: &Swap, ports: &[usize], h: &mut Hypotheses)
     let c = swap.system.c.select_rows(ports);
     match facts.storage(swap, ports) {
         Some(p) => {
-            let from = if gradient::residual(&facts.energy, &b, &c) <= gradient::RESIDUAL && p == facts.energy {
+            let from = if gradient::residual(&facts.energy, &b, &c) <= MATCHED && p == facts.energy {
                 "the stored energy"
             } else {
                 "some P ≻ 0"
@@ -173,14 +172,14 @@ fn everything(swap: &Swap) -> Vec<usize> {
 /// Ports whose rows and columns of D vanish (I), and the others (II): RR-7158 (6), Brogliato-Thibault (27).
 fn split(d: &DMatrix<f64>) -> (Vec<usize>, Vec<usize>) {
     let size = d.amax();
-    (0..d.nrows()).partition(|&j| d.row(j).amax().max(d.column(j).amax()) <= ZERO * size)
+    (0..d.nrows()).partition(|&j| d.row(j).amax().max(d.column(j).amax()) <= RANK * size)
 }
 /// An orthonormal basis of ker(D + Dᵀ).
 fn lossless(d: &DMatrix<f64>) -> DMatrix<f64> {
     let (values, vectors) = scale::eigen(&(d + d.transpose()));
     let size = d.amax();
     let kernel: Vec<usize> = (0..values.len())
-        .filter(|&k| values[k].abs() <= ZERO * size)
+        .filter(|&k| values[k].abs() <= RANK * size)
         .collect();
     vectors.select_columns(&kernel)
 }

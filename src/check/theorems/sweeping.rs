@@ -3,11 +3,12 @@
 use nalgebra::DVector;
 
 use super::{
-    Hypotheses, Theorem, ZERO, everything, half_lines, input_output, over_swaps, regularity, split,
+    Hypotheses, Theorem, everything, half_lines, input_output, over_swaps, regularity, split,
 };
 use crate::check::facts::{Facts, Swap};
 use crate::check::feedthrough::Feedthrough;
 use crate::check::program::Inequalities;
+use crate::settings::tolerances::ranks::RANK;
 
 /// Corners of the box of source values up to which "S(t) is nonempty" is checked one by one.
 const MAX_CORNERS: usize = 1 << 10;
@@ -86,7 +87,7 @@ pub(super) fn sweeping(facts: &Facts) -> Theorem {
     let gives = regularity(facts, &mut Hypotheses::default());
     over_swaps(facts, |swap, h| {
         half_lines(swap, h);
-        let zero = swap.system.d.amax() <= ZERO * (1.0 + swap.system.b.amax().min(1.0));
+        let zero = swap.system.d.amax() <= RANK * (1.0 + swap.system.b.amax().min(1.0));
         h.need(
             zero,
             if zero {

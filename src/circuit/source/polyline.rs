@@ -2,10 +2,7 @@
 
 use super::Side;
 use super::piece::{Piece, Segment};
-
-/// A corner this close to the period, relative to it, is the period itself: TR + PW + TF = PER in decimals need not hold in
-/// doubles. Larger: real gaps vanish; smaller: sums of three times leave slivers.
-const PERIOD_ROUNDING: f64 = 8.0 * f64::EPSILON;
+use crate::settings::tolerances::times::SAME_TIME;
 
 /// Corner points (time, value), shifted, repeated and stopped.
 pub(super) struct Polyline<'a> {
@@ -37,18 +34,18 @@ pub(super) fn pulse_corners(
         corners[4].0 = corners[3].0;
         return corners;
     }
-    if corners[3].0 < period * (1.0 - PERIOD_ROUNDING) {
+    if corners[3].0 < period * (1.0 - SAME_TIME) {
         return corners;
     }
     for k in 1..5 {
         let (before, corner) = (corners[k - 1], corners[k]);
-        if corner.0 > period * (1.0 + PERIOD_ROUNDING) {
+        if corner.0 > period * (1.0 + SAME_TIME) {
             let cut =
                 before.1 + (corner.1 - before.1) * ((period - before.0) / (corner.0 - before.0));
             corners[k..].fill((period, cut));
             break;
         }
-        if corner.0 >= period * (1.0 - PERIOD_ROUNDING) {
+        if corner.0 >= period * (1.0 - SAME_TIME) {
             corners[k].0 = period;
         }
     }

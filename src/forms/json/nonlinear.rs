@@ -26,6 +26,7 @@ use crate::forms::nonlinear::NonlinearComplementarity;
 use crate::forms::projected::{Map, ProjectedSystem};
 use crate::forms::unilateral::Unilateral;
 use crate::forms::{Complementarity, FormError, Trajectory, integrate};
+use crate::settings::tolerances::times::WHOLE;
 
 /// Halvings of the step after which the error that is left is reported as it is.
 const HALVINGS: usize = 12;
@@ -249,7 +250,7 @@ impl NonlinearFile {
         step: Option<f64>,
         tol: f64,
     ) -> Result<NonlinearRun, FormError> {
-        let rows = (self.tstop / self.tstep * (1.0 - 1e-9)).ceil().max(1.0) as usize;
+        let rows = (self.tstop / self.tstep * (1.0 - WHOLE)).ceil().max(1.0) as usize;
         let run = |per_row: usize| -> Result<NonlinearRun, FormError> {
             let whole = integrate(system, (0.0, self.tstop), &self.x0, rows * per_row)?;
             let every = |list: &[DVector<f64>]| list.iter().step_by(per_row).cloned().collect();
@@ -267,7 +268,7 @@ impl NonlinearFile {
         };
         if let Some(h) = step {
             let row = self.tstop / rows as f64;
-            return run((row / h * (1.0 - 1e-9)).ceil().max(1.0) as usize);
+            return run((row / h * (1.0 - WHOLE)).ceil().max(1.0) as usize);
         }
         let mut coarse = run(1)?;
         for k in 1..=HALVINGS {

@@ -1,15 +1,14 @@
 //! Events that accumulate at one time (Zeno): the state reaches the point of accumulation to rounding after finitely many,
 //! or, where it does not, the events come in a burst without end.
 
+use crate::settings::tolerances::events::{ACCUMULATES, BURST};
 use std::collections::VecDeque;
 
-/// Shrinking intervals in a row, and their total shrinkage, that count as an accumulation.
+/// Shrinking intervals in a row that count as an accumulation where they shrink to [`ACCUMULATES`].
 const EVENTS: u32 = 12;
-const SHRINKAGE: f64 = 1e-3;
 
-/// So many events within this part of an output step are a burst that does not end by itself.
-const BURST: usize = 1024;
-const BURST_SPAN: f64 = 1e-4;
+/// So many events within [`BURST`] of an output step are a burst that does not end by itself.
+const EVENTS_OF_BURST: usize = 1024;
 
 /// Watches the intervals between events.
 #[derive(Debug, Clone)]
@@ -32,17 +31,17 @@ impl Accumulation {
             first_interval: f64::INFINITY,
             interval: f64::INFINITY,
             count: 0,
-            latest: VecDeque::with_capacity(BURST),
+            latest: VecDeque::with_capacity(EVENTS_OF_BURST),
         }
     }
 
     /// The number of events and their span, s, where an event at t belongs to a burst, with output steps of length h.
     pub(crate) fn burst(&mut self, t: f64, h: f64) -> Option<(usize, f64)> {
-        if self.latest.len() == BURST {
+        if self.latest.len() == EVENTS_OF_BURST {
             let span = t - self.latest.pop_front()?;
-            if span <= BURST_SPAN * h {
+            if span <= BURST * h {
                 self.latest.clear();
-                return Some((BURST, span));
+                return Some((EVENTS_OF_BURST, span));
             }
         }
         self.latest.push_back(t);
@@ -71,7 +70,7 @@ impl Accumulation {
 
     /// The note of an accumulation in progress, which ends.
     pub(crate) fn end(&mut self) -> Option<String> {
-        let found = self.count >= EVENTS && self.interval < SHRINKAGE * self.first_interval;
+        let found = self.count >= EVENTS && self.interval < ACCUMULATES * self.first_interval;
         let note = found.then(|| {
             format!(
                 "events accumulate between t = {:e} s and t = {:e} s ({} events in shrinking intervals); the solution goes on \
@@ -92,7 +91,7 @@ mod tests {
     fn a_burst_is_told_from_a_clock() {
         let mut watch = Accumulation::new(0.0);
         let bursts = |watch: &mut Accumulation, dt: f64| {
-            (0..3 * BURST)
+            (0..3 * EVENTS_OF_BURST)
                 .filter(|&k| watch.burst(1.0 + k as f64 * dt, 1e-3).is_some())
                 .count()
         };

@@ -3,9 +3,10 @@
 use super::exosystem::Exosystem;
 use super::flow::{Flow, LONG};
 use super::mode::Mode;
-use super::motion::{GRID_ULPS, Motion};
+use super::motion::Motion;
 use super::sampled::MOST;
 use crate::integrate::run::Times;
+use crate::settings::tolerances::times::SAME_TIME;
 
 /// Rows that were computed and not asked for yet.
 #[derive(Debug, Clone, Default)]
@@ -40,7 +41,7 @@ impl DenseOutput {
     /// Whether `t` is the time of the next row of the output step `h`, which is taken then.
     pub(super) fn take(&mut self, t: f64, h: f64) -> bool {
         let off = t - self.begin - (self.taken + 1) as f64 * h;
-        let next = self.pending() && off.abs() <= GRID_ULPS * f64::EPSILON * t.abs();
+        let next = self.pending() && off.abs() <= SAME_TIME * t.abs();
         if next {
             self.taken += 1;
             self.t = t;
@@ -75,7 +76,7 @@ impl DenseOutput {
     pub(super) fn step(&mut self, motion: &mut Motion, mode: &mut Mode, t: f64, end: f64) -> bool {
         let (flow, outputs, rows) = (&mut mode.flow, &mode.outputs, &mut mode.rows);
         let h = flow.step(LONG);
-        let negligible = GRID_ULPS * f64::EPSILON * (t + MOST as f64 * h).abs();
+        let negligible = SAME_TIME * (t + MOST as f64 * h).abs();
         if !motion.steady || (t - motion.t - h).abs() > negligible || !rows.ready(flow, outputs) {
             return false;
         }

@@ -1,11 +1,10 @@
 //! Switches controlled by straight sources alone: when they move is known before the run, and no guard watches them.
 
 use crate::circuit::Source;
-use crate::integrate::switching::{Known, ROUNDINGS, Threshold};
+use crate::integrate::switching::{Known, Threshold};
 use crate::mna::SourceControl;
-
-/// Times closer than this many units in the last place are one time.
-pub(super) const SAME_TIME_ULPS: f64 = 4.0;
+use crate::settings::tolerances::events::CONTROL_ROUNDINGS;
+use crate::settings::tolerances::times::SAME_TIME;
 
 /// constant + slope (t − origin) until `end`: a piece of a straight source.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -97,11 +96,11 @@ impl Clock {
         }
         let control = Known {
             value: self.control(t),
-            noise: ROUNDINGS * f64::EPSILON * (size + steepness * t.abs()),
+            noise: CONTROL_ROUNDINGS * f64::EPSILON * (size + steepness * t.abs()),
         };
         let slope = Known {
             value: self.slope(),
-            noise: ROUNDINGS * f64::EPSILON * steepness,
+            noise: CONTROL_ROUNDINGS * f64::EPSILON * steepness,
         };
         threshold.leaves(on, control, slope)
     }
@@ -123,7 +122,7 @@ impl Clock {
             return;
         }
         // The pieces stand where the last move was expected.
-        if (t - self.next).abs() > SAME_TIME_ULPS * f64::EPSILON * t.abs() {
+        if (t - self.next).abs() > SAME_TIME * t.abs() {
             self.stand_at(sources, t);
         }
         self.on = on;
@@ -155,7 +154,7 @@ impl Clock {
                 t = end;
             }
             // An edge on the last row is due there, on whichever side of it rounding has put the time.
-            if t > until + SAME_TIME_ULPS * f64::EPSILON * until.abs() {
+            if t > until + SAME_TIME * until.abs() {
                 return f64::INFINITY;
             }
             for (input, _, line) in &mut self.terms {

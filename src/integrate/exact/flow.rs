@@ -3,13 +3,14 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::map::Sizes as RowSizes;
-use super::rounding::{GROUP, NOISE};
 use super::spectrum::{Rate, Spectrum};
 use super::work::{Sizes, Term, Work};
 use crate::linalg::dense::{BLOCK, Dense};
-use crate::linalg::expm::{self, Ladders};
+use crate::linalg::expm::Ladders;
 use crate::linalg::kernel::{Kernel, SparseKernel};
 use crate::linalg::series::{MAX_DEGREE, Series};
+use crate::settings::tolerances::events::{GROUP, NOISE};
+use crate::settings::tolerances::exponentials::SQUARED;
 
 /// The longest step is 2^LONG output steps.
 pub(crate) const LONG: u32 = 4;
@@ -81,7 +82,7 @@ impl Flow {
             }
         });
         let rows_kernel = Kernel::stacked(&[&rows]);
-        let ladder = Ladders::new(&generator, fast, h, expm::SQUARED, LONG);
+        let ladder = Ladders::new(&generator, fast, h, SQUARED, LONG);
         let bottom = (ladder.norm().log2().ceil().max(0.0) as u32).clamp(LONG, DEEPEST);
         let spectrum = Spectrum::new(&generator.view((0, 0), (n, n)).into_owned(), sources);
         Some(Self {

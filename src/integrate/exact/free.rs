@@ -2,10 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::rounding::NOISE;
 use crate::diagnostic::Internal;
 use crate::integrate::jump::{Infeasible, Jump, JumpProblem};
 use crate::lcs::{Lcs, Role};
+use crate::settings::tolerances::events::NOISE;
+use crate::settings::tolerances::jumps::CONSISTENT;
 use crate::solve::{Driver, Status, norm};
 
 /// One implicit step prepared: λ solves LCP(M, q) with M = D + hC W⁻¹B, W = I − hA.
@@ -150,8 +151,6 @@ impl Free {
         after: &DVector<f64>,
         closed: &[bool],
     ) -> Option<DVector<f64>> {
-        /// Residual and sign violations below this part of the impulse's size are rounding.
-        const ROUNDING: f64 = 1e-9;
         let lcs = &self.lcs;
         let (n, m) = (lcs.n(), lcs.m());
         let active: Vec<usize> = (0..m)
@@ -188,7 +187,7 @@ impl Free {
             f[i] = weight(i) * (after[i] - x[i]);
         }
         let scaled = norm::nonnegative_least_squares(&e, &f);
-        if (&e * &scaled - &f).norm() > ROUNDING * f.norm() {
+        if (&e * &scaled - &f).norm() > CONSISTENT * f.norm() {
             return None;
         }
         let mut p = DVector::zeros(m);
@@ -196,7 +195,7 @@ impl Free {
             p[j] = scaled[k] / length(j);
         }
         let through = &lcs.d * &p;
-        let least = -ROUNDING * lcs.d.amax() * p.amax();
+        let least = -CONSISTENT * lcs.d.amax() * p.amax();
         through.iter().all(|&v| v >= least).then_some(p)
     }
 

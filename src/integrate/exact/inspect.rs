@@ -4,11 +4,11 @@ use super::exosystem::Exosystem;
 use super::key::Owner;
 use super::magnitudes::ORDERS;
 use super::mode::Mode;
-use super::rounding::{GROUP, NOISE, resolution};
+use super::rounding::resolution;
 use super::slaved::Manifold;
+use crate::settings::tolerances::events::{GROUP, NOISE};
+use crate::settings::tolerances::jumps::CONSISTENT;
 
-/// A mode may move the storage vector by no more than this part of its amplitude; more is a jump and needs an impulse.
-const CONSISTENT: f64 = 1e-9;
 /// What was found.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Finding {

@@ -4,14 +4,15 @@ use nalgebra::DVector;
 
 use super::inspect::Finding;
 use super::key::{Key, Trigger};
-use super::storage::ROUNDING;
-use super::transition::{PROPOSALS, Transition};
+use super::transition::Transition;
 use crate::integrate::energy::{self, Balance};
 use crate::integrate::impulses;
 use crate::integrate::jump::rivals_note;
 use crate::integrate::run::{Log, Reason, SimError};
 use crate::integrate::settle;
 use crate::integrate::stats::JumpReason;
+use crate::settings::tolerances::exponentials::PROPOSALS;
+use crate::settings::tolerances::jumps::NO_JUMP;
 
 /// What stood before a jump.
 pub(super) struct Before {
@@ -130,7 +131,7 @@ impl Transition<'_> {
         };
         let joining = free.storage(&free.state_from(&self.storage.values), u) - &s;
         let sizes = self.storage.scale.iter().zip(&joining);
-        if moved.is_empty() || sizes.clone().all(|(size, d)| d.abs() <= ROUNDING * size) {
+        if moved.is_empty() || sizes.clone().all(|(size, d)| d.abs() <= NO_JUMP * size) {
             return;
         }
         let Ok(free) = self.table.free(&before) else {
@@ -144,7 +145,7 @@ impl Transition<'_> {
         let [one, other, both] = [&joining, &change, &(&joining + &change)]
             .map(|change| self.storage.stored(change.as_slice()));
         // 2⟨a, b⟩ = ‖a + b‖² − ‖a‖² − ‖b‖²
-        if both - one - other <= ROUNDING * one.max(other) {
+        if both - one - other <= NO_JUMP * one.max(other) {
             return;
         }
         let ports = free.lcs.ports.iter().zip(&jump.p);
@@ -205,7 +206,7 @@ impl Transition<'_> {
             .iter()
             .zip(&self.storage.values)
             .zip(&self.storage.scale)
-            .any(|((a, b), scale)| (a - b).abs() > ROUNDING * scale.max(a.abs()));
+            .any(|((a, b), scale)| (a - b).abs() > NO_JUMP * scale.max(a.abs()));
         self.storage.values.copy_from_slice(s.as_slice());
         if moved {
             self.inspector.forget_pace();

@@ -2,10 +2,8 @@
 
 use super::flow::Flow;
 use super::slaved::{Follower, Manifold, followers};
+use crate::settings::tolerances::exponentials::LEVEL;
 
-/// Ages from which on states follow the others that differ by this factor are of different levels: when the faster ones follow, the
-/// others still move.
-const LEVEL: f64 = 1e3;
 /// Derivatives looked at: g, g', g'', g'''.
 pub(super) const ORDERS: usize = 4;
 

@@ -18,6 +18,7 @@ use crate::lcs::{Lcs, PowerKind, Rows};
 use crate::linalg::decouple::decoupled;
 use crate::linalg::kernel::Kernel;
 use crate::linalg::rays;
+use crate::settings::tolerances::exponentials::{EQUAL, FAST_ENTRY};
 
 /// Successors of a mode that are remembered; the oldest goes first.
 const MOST_SUCCESSORS: usize = 64;
@@ -325,8 +326,6 @@ impl Mode {
     /// The fastest rate at which several states move each other, 1/s: their sum is fast, and what is slow stands in the difference of
     /// large entries. `None` where every fast state is fast by itself, or apart from the others.
     pub(crate) fn fast_sum(&self) -> Option<f64> {
-        /// Entries of a row above this part of the largest of all belong to the fast rate.
-        const FAST: f64 = 1e-6;
         if self.is_apart {
             return None;
         }
@@ -335,7 +334,7 @@ impl Mode {
         let several = |row: usize| {
             a.row(row)
                 .iter()
-                .filter(|v| v.abs() > FAST * largest)
+                .filter(|v| v.abs() > FAST_ENTRY * largest)
                 .count()
                 > 1
         };
@@ -408,8 +407,6 @@ impl Mode {
 
 /// The rows that are no positive multiple of an earlier one: equal guards fall together.
 fn distinct(rows: &DMatrix<f64>) -> Vec<usize> {
-    /// Entries that agree to this part of themselves are equal.
-    const EQUAL: f64 = 1e-14;
     let mut kept: Vec<(usize, f64)> = Vec::new();
     for i in 0..rows.nrows() {
         let size = rows.row(i).amax();

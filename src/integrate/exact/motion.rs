@@ -3,19 +3,17 @@
 use super::exosystem::Exosystem;
 use super::flow::{Flow, LONG};
 use super::magnitudes::Magnitudes;
-use super::rounding::{SIMULTANEOUS, resolution};
+use super::rounding::resolution;
 use super::slaved::Follower;
 use super::work::Sizes;
 use crate::linalg::polynomial;
 use crate::linalg::series::Series;
+use crate::settings::tolerances::events::CLEAR_OF_ZERO;
+use crate::settings::tolerances::events::SIMULTANEOUS;
+use crate::settings::tolerances::times::SAME_TIME;
 
 /// Table steps after which the exosystem is set from its closed form again.
 const REFRESH: u32 = 64;
-/// A step is the output step if it differs by no more than this many units in the last place of the time.
-pub(super) const GRID_ULPS: f64 = 8.0;
-/// Required distance of a guard's control polygon from zero, relative to its spread: the error of the cubic through
-/// values and slopes, (ωh)²/48 of the spread at ωh = 0.7, is below it.
-const MARGIN: f64 = 0.02;
 
 /// As [`f64::max`] where neither is NaN, in one instruction.
 #[inline]
@@ -220,7 +218,7 @@ impl Motion {
     #[inline]
     pub(crate) fn travel(&mut self, flow: &mut Flow, exosystem: &Exosystem, stop: f64) -> Arrival {
         let off = stop - self.t - flow.step(LONG);
-        if off.abs() <= GRID_ULPS * f64::EPSILON * stop.abs() && self.settles(flow) {
+        if off.abs() <= SAME_TIME * stop.abs() && self.settles(flow) {
             if !flow.leap(LONG, &self.now, &mut self.next) {
                 return Arrival::Overflow;
             }
@@ -308,7 +306,7 @@ impl Motion {
         let rest = stop - self.t;
         let mut units = (rest / unit).floor();
         let mut fraction = rest - units * unit;
-        let negligible = GRID_ULPS * f64::EPSILON * stop.abs();
+        let negligible = SAME_TIME * stop.abs();
         if unit - fraction <= negligible {
             units += 1.0;
             fraction = 0.0;
@@ -461,7 +459,7 @@ impl Motion {
             let high = larger(larger(b1, b2), larger(b0, b3));
             let spread = high - smaller(low, smaller(b0, b3));
             let noise = floor[i] + third * slope_floor[i];
-            clear &= b3 >= -floor[i] && low + noise >= MARGIN * spread;
+            clear &= b3 >= -floor[i] && low + noise >= CLEAR_OF_ZERO * spread;
         }
         if clear {
             Verdict::Clear

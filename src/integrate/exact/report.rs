@@ -9,19 +9,9 @@ use super::plant::ModeTable;
 use crate::integrate::Note;
 use crate::integrate::event::Change;
 use crate::integrate::run::{Log, Outcome};
-
-/// Estimated relative loss of an exponential above which it is reported.
-const LOSS: f64 = 1e-10;
-/// Estimated relative loss of an exponential above which the signs of guards are not known: steps take over.
-pub(super) const MOST_LOSS: f64 = 1e-8;
-
-/// The part of a state that the rounding of a fast rate may move over the run above which that is said: Roff = 1e12 passed where
-/// 1e15 was wrong.
-const SLOW_PART: f64 = 1e-3;
-
-/// A device whose voltage (current) has the wrong sign by more than this part of the largest voltage across blocking devices and capacitors
-/// (current of conducting ones and inductors) so far stands wrongly: no rounding of voltages of one size does that.
-const WRONG: f64 = 1e-6;
+use crate::settings::tolerances::events::WRONG_SIDE;
+use crate::settings::tolerances::exponentials::{LOSS, SLOW_PART};
+use crate::settings::tolerances::jumps::CONSISTENT;
 
 /// When a switch stayed on its threshold.
 #[derive(Debug, Clone, Copy, Default)]
@@ -124,7 +114,7 @@ impl Report {
             let start = self.largest[k].max(stored[k]);
             let largest = guards.clone().fold(start, |a, (_, g)| a.max(g.abs()));
             self.largest[k] = largest;
-            let mut wrong = guards.filter(|(_, g)| *g < -WRONG * largest);
+            let mut wrong = guards.filter(|(_, g)| *g < -WRONG_SIDE * largest);
             let Some((device, g)) = wrong.find_map(|(pair, g)| Some((table.device(pair)?, g)))
             else {
                 continue;
@@ -279,8 +269,6 @@ fn label(table: &ModeTable, from: usize, to: usize) -> Arc<[Change]> {
 
 /// Whether some probe has another value `after` than `before`, by more than rounding.
 pub(super) fn row_jumps(before: &[f64], after: &[f64], is_volts: &[bool]) -> bool {
-    /// Relative to the largest value of one kind in both rows.
-    const ROUNDING: f64 = 1e-9;
     [true, false].into_iter().any(|volts| {
         let of_kind = || {
             let rows = before.iter().zip(after).zip(is_volts);
@@ -288,6 +276,6 @@ pub(super) fn row_jumps(before: &[f64], after: &[f64], is_volts: &[bool]) -> boo
                 .map(|(pair, _)| pair)
         };
         let largest = of_kind().fold(0.0_f64, |m, (a, b)| m.max(a.abs()).max(b.abs()));
-        of_kind().any(|(a, b)| (a - b).abs() > ROUNDING * largest)
+        of_kind().any(|(a, b)| (a - b).abs() > CONSISTENT * largest)
     })
 }

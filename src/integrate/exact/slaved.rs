@@ -14,17 +14,10 @@
 use nalgebra::DMatrix;
 
 use super::map::{Map, Sizes};
+use crate::settings::tolerances::exponentials::{FORGOTTEN, MOST_COUPLED, SHRINKS, SLAVED};
 
 /// Sweeps over the components that follow each other.
 const SWEEPS: usize = 64;
-/// A sweep goes on where it takes a size to less than this part.
-const SHRINKS: f64 = 0.9;
-/// A component is slaved where it is at most this part of its amplitude: otherwise the amplitude is good enough.
-const WORTH: f64 = 1.0 / 64.0;
-/// So many time constants leave nothing of what a component was before: e^−100 = 4e-44.
-const EXTINCT: f64 = 100.0;
-/// The largest part of its decay that a component may owe to others that decay as well.
-const MOST_COUPLED: f64 = 0.9;
 
 /// A component that follows others.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,7 +58,7 @@ pub(crate) fn followers(
         }
     }
     let Some(settled) = settled else { return };
-    let slaved = |j: usize| j < n && settled[j] <= WORTH * sizes[j];
+    let slaved = |j: usize| j < n && settled[j] <= SLAVED * sizes[j];
     for j in (0..n).filter(|&j| slaved(j)) {
         let decay = -generator[(j, j)];
         let part = coupled(generator, j, sizes, slaved) / (decay * sizes[j]);
@@ -73,7 +66,7 @@ pub(crate) fn followers(
             found.push(Follower {
                 component: j,
                 size: settled[j],
-                age: EXTINCT / (decay * (1.0 - part)),
+                age: FORGOTTEN / (decay * (1.0 - part)),
             });
         }
     }

@@ -4,18 +4,8 @@ use nalgebra::DMatrix;
 
 use crate::linalg::eigenvalues::eigenvalues;
 use crate::linalg::expm;
-
-/// A transient e^{−at} is below the rounding of what it started from once a·t exceeds −ln(2⁻⁵³).
-const EXTINCT: f64 = 37.0;
-/// ωh up to which a cubic through values and slopes at both ends follows an oscillation to (ωh)⁴/384 of its amplitude.
-const RESOLVED: f64 = 0.7;
-/// λh up to which the exponentials follow a solution that grows as e^{λt}: those of long stiff steps are meant for decay and take
-/// any e^{λh} to 0.
-const GROWN: f64 = 1.0;
-/// Real parts of eigenvalues below this part of the largest eigenvalue are rounding.
-const ROUNDING: f64 = 1e-12;
-/// First step after a change of mode, relative to the fastest rate.
-const FIRST: f64 = 0.5;
+use crate::settings::tolerances::exponentials::{EXTINCT, FIRST_LOOK, GROWN, RESOLVED};
+use crate::settings::tolerances::ranks::EIGENVALUE;
 
 /// One eigenvalue −decay ± i·frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,7 +48,7 @@ impl Spectrum {
                 Some(found) => {
                     let largest = found.iter().map(|v| v.norm()).fold(0.0, f64::max);
                     let fastest = found.iter().map(|v| v.re).fold(0.0, f64::max);
-                    if fastest > ROUNDING * largest {
+                    if fastest > EIGENVALUE * largest {
                         growth = fastest;
                     }
                     rates.extend(found.iter().map(|v| Rate {
@@ -87,7 +77,7 @@ impl Spectrum {
                     f64::INFINITY
                 },
                 resolved: slower.resolved.min(RESOLVED / rate.frequency),
-                first: FIRST / fastest,
+                first: FIRST_LOOK / fastest,
             });
         }
         limits.reverse();

@@ -6,14 +6,13 @@ use nalgebra::DVector;
 
 use super::ahead::DenseOutput;
 use super::assembler::{Assembler, Step};
-use super::clock::SAME_TIME_ULPS;
 use super::flow::longest_step;
 use super::inspect::Inspector;
 use super::key::{Key, Owner, Trigger};
 use super::mode::Mode;
-use super::motion::{Arrival, GRID_ULPS, Motion};
+use super::motion::{Arrival, Motion};
 use super::plant::ModeTable;
-use super::report::{MOST_LOSS, Report, row_jumps};
+use super::report::{Report, row_jumps};
 use super::rounding::resolution;
 use super::sources::Sources;
 use super::storage::Storage;
@@ -21,6 +20,8 @@ use super::transition::{Memory, PATIENCE, Transition};
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper, Times};
 use crate::integrate::switching::fire;
 use crate::settings::Settings;
+use crate::settings::tolerances::exponentials::MOST_LOSS;
+use crate::settings::tolerances::times::SAME_TIME;
 
 pub(crate) use pause::Place;
 
@@ -138,7 +139,7 @@ impl Exact {
     }
 
     fn ulps(&self) -> f64 {
-        SAME_TIME_ULPS * f64::EPSILON * self.motion.t.abs()
+        SAME_TIME * self.motion.t.abs()
     }
 
     fn fail(&self, reason: Reason) -> SimError {
@@ -422,7 +423,7 @@ impl Exact {
     fn step_ahead(&mut self, at: usize, t: f64, next: f64) -> bool {
         // What happens at the end of a step is left to the step that arrives there.
         let longest = longest_step(self.table.output_step());
-        let negligible = GRID_ULPS * f64::EPSILON * (t + longest).abs();
+        let negligible = SAME_TIME * (t + longest).abs();
         let end = (next - negligible).min(self.until + negligible);
         let mode = &mut self.table.modes[at];
         self.dense.step(&mut self.motion, mode, t, end)
@@ -474,7 +475,7 @@ impl Stepper for Exact {
         }
         loop {
             let next = self.sources.next_stop;
-            let due = next <= t + SAME_TIME_ULPS * f64::EPSILON * t.abs();
+            let due = next <= t + SAME_TIME * t.abs();
             let stop = if due { next.min(t) } else { t };
             let Some(at) = self.mode else {
                 return Err(self.fail(Reason::internal("integrate::exact", "a run in no mode")));

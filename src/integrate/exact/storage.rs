@@ -8,9 +8,7 @@ use crate::integrate::energy::Balance;
 use crate::integrate::run::Log;
 use crate::integrate::stats::{JumpReason, StateJump};
 use crate::lcs::Lcs;
-
-/// Movements of the storage below this part of its amplitude are rounding and no jump.
-pub(super) const ROUNDING: f64 = 1e-12;
+use crate::settings::tolerances::jumps::NO_JUMP;
 
 /// The storage vector s of a run.
 pub(super) struct Storage {
@@ -144,7 +142,7 @@ impl Storage {
     ) {
         let moved = |k: usize| {
             let (a, b) = (self.values[k], before[k]);
-            (a - b).abs() > ROUNDING * self.scale[k].max(b.abs())
+            (a - b).abs() > NO_JUMP * self.scale[k].max(b.abs())
         };
         let jumped: Vec<usize> = (0..before.len()).filter(|&k| moved(k)).collect();
         if !jumped.is_empty() {

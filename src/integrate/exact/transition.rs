@@ -11,10 +11,8 @@ use super::storage::Storage;
 use crate::integrate::run::{Log, Reason, SimError};
 use crate::integrate::settle;
 use crate::integrate::switching::fire;
+use crate::settings::tolerances::exponentials::PROPOSALS;
 
-/// Lengths of the implicit step that proposes the next mode, in units of the fastest time constant seen. The long ones are for stiff
-/// circuits: a current that starts without a slope is no more than rounding on the others.
-pub(super) const PROPOSALS: [f64; 9] = [1e-6, 1e-4, 1e-8, 1e-2, 1e-10, 1.0, 1e2, 1e4, 1e6];
 /// Modes tried around the proposals before the search ends.
 const MOST_NEIGHBOURS: usize = 400;
 

@@ -11,19 +11,13 @@ use crate::linalg::dense::Dense;
 use crate::linalg::expm::{self, Ladders};
 use crate::linalg::kernel::Kernel;
 use crate::linalg::series::Series;
+use crate::settings::tolerances::exponentials::SERIES;
+use crate::settings::tolerances::exponentials::{
+    ENERGY_SQUARED, HARMLESS_POWER, OUTGROWN, POWER_ROW, SMALLEST_AMPLITUDE,
+};
 
-/// Terms of the series over a step with ‖𝒜‖ h ≤ [`expm::SERIES`]; (2·0.125)^k/k! is below rounding beyond, in every entry: their sizes are not comparable.
+/// Terms of the series over a step with ‖𝒜‖ h ≤ [`SERIES`]; (2·0.125)^k/k! is below rounding beyond, in every entry: their sizes are not comparable.
 const TERMS: usize = 15;
-/// ‖𝒜‖ t beyond which exp(𝒜t) is no longer squared but computed anew: what squaring loses is 2⁻⁵³ ‖𝒜‖ t.
-const STIFF: f64 = 1e5;
-/// Rounding of a power below this part of the run's is no loss.
-const HARMLESS: f64 = 1e-13;
-/// Amplitudes below this part of the largest count as this large.
-const SMALLEST: f64 = 1e-60;
-/// Forms are made anew for amplitudes so many times those that they were made for.
-const OUTGROWN: f64 = 1e3;
-/// Rows below this part of the largest are rounding.
-const NOTHING: f64 = 1e-13;
 
 /// Nodes and weights of the rule of Gauss and Legendre on [0, 1] with eight points. Where Taylor's series is exact to rounding its
 /// coefficients fall like those of an exponential, so that half the points that a product of two such polynomials takes in general
@@ -199,7 +193,7 @@ impl Forms {
     ) -> Self {
         let dim = generator.nrows();
         // At the start of a long chain amplitudes are so small that their products vanish.
-        let least = SMALLEST * sizes.amplitude.iter().fold(0.0, |m: f64, a| m.max(*a));
+        let least = SMALLEST_AMPLITUDE * sizes.amplitude.iter().fold(0.0, |m: f64, a| m.max(*a));
         let size: Vec<f64> = sizes
             .amplitude
             .iter()
@@ -222,7 +216,8 @@ impl Forms {
             }
         }
         // Where rounding does no harm the coordinates stay those of w, in which the flow of a graded circuit is accurate.
-        let least = (sizes.power > 0.0).then(|| (HARMLESS * sizes.power / f64::EPSILON).sqrt());
+        let least =
+            (sizes.power > 0.0).then(|| (HARMLESS_POWER * sizes.power / f64::EPSILON).sqrt());
         let (mut to_y, mut from_y) = (DMatrix::zeros(dim, dim), DMatrix::zeros(dim, dim));
         let slow: Vec<usize> = (0..dim).filter(|j| !fast.contains(j)).collect();
         for part in [&slow[..], fast] {
@@ -307,7 +302,7 @@ fn coordinates(rows: &DMatrix<f64>, least: Option<f64>) -> (DMatrix<f64>, DMatri
     }
     // Unit rows: the coordinates are scaled by the caller.
     for j in 0..dim {
-        let least = least.unwrap_or_else(|| NOTHING * triangle[(0, 0)].abs());
+        let least = least.unwrap_or_else(|| POWER_ROW * triangle[(0, 0)].abs());
         let pivot = triangle[(j, j)];
         let mut row = triangle.row_mut(j);
         if pivot.abs() > least {
@@ -335,7 +330,7 @@ fn products(forms: &Kernel, y: &[f64], products: &mut [f64]) -> [f64; 2] {
 }
 
 impl Doubling {
-    /// Over 2^−`k` of the longest time, doubled from where ‖𝒜‖ t ≤ [`expm::SERIES`]: Q_{j+1} = (𝒜ᵀ Q_j + Q_j 𝒜) t/(j + 1).
+    /// Over 2^−`k` of the longest time, doubled from where ‖𝒜‖ t ≤ [`SERIES`]: Q_{j+1} = (𝒜ᵀ Q_j + Q_j 𝒜) t/(j + 1).
     fn new(
         (generator, fast): (&DMatrix<f64>, &[usize]),
         powers: &[Dense; 2],
@@ -344,7 +339,7 @@ impl Doubling {
     ) -> Self {
         let dim = generator.nrows();
         let norm = Dense::of(generator).norm_1() * longest * (-f64::from(k)).exp2();
-        let halvings = (norm / expm::SERIES).log2().ceil().clamp(0.0, 1e3) as u32;
+        let halvings = (norm / SERIES).log2().ceil().clamp(0.0, 1e3) as u32;
         let t = longest * (-f64::from(k + halvings)).exp2();
         let a = Dense::from_fn(dim, dim, |i, j| generator[(i, j)] * t);
         let mut buffer = Dense::zeros(dim, dim);
@@ -361,7 +356,7 @@ impl Doubling {
         };
         let grams = powers.each_ref().map(&mut series);
         let mut doubling = Self {
-            ladder: Ladders::new(generator, fast, longest, STIFF, 0),
+            ladder: Ladders::new(generator, fast, longest, ENERGY_SQUARED, 0),
             increment: Dense::zeros(dim, dim),
             k: k + halvings,
             grams,

@@ -4,6 +4,7 @@ use super::statics::source;
 use crate::circuit::{Circuit, Element, Kind, NodeId, Output, Quantity, Source};
 use crate::integrate::Note;
 use crate::integrate::start::OperatingPoint;
+use crate::settings::tolerances::jumps::CONSISTENT;
 
 /// v(a) − v(b), V.
 pub(super) type Voltage = (NodeId, NodeId, f64);
@@ -93,10 +94,8 @@ impl Guess {
 
     /// Whether both are one but for rounding.
     pub(super) fn agrees(&self, other: &Self) -> bool {
-        /// Relative to the larger one.
-        const ROUNDING: f64 = 1e-9;
         let size = self.volts.abs().max(other.volts.abs());
-        (self.volts - other.volts).abs() <= ROUNDING * size
+        (self.volts - other.volts).abs() <= CONSISTENT * size
     }
 
     /// What to say where the operating point has another voltage.

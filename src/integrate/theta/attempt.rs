@@ -1,11 +1,12 @@
 //! One step: tried with the present active set, else solved, then committed.
 
 use super::*;
+use crate::settings::tolerances::times::SAME_TIME;
 
 impl Theta {
     /// Rounding of the difference of two times near `t`.
     pub(super) fn slack(t: f64) -> f64 {
-        8.0 * f64::EPSILON * t.abs()
+        SAME_TIME * t.abs()
     }
 
     /// Computes the step from now to t1 = now + h into `out` without committing it.

@@ -5,6 +5,8 @@ use crate::integrate::impulses;
 use crate::integrate::jump::Jump;
 use crate::integrate::settle;
 use crate::integrate::stats::{JumpReason, StateJump};
+use crate::settings::tolerances::jumps::{IMPULSE_RATIO, NO_JUMP};
+use crate::settings::tolerances::steps::SHORT;
 
 impl Theta {
     /// The first jump: from inconsistent initial values, by edges of the sources at the start.
@@ -109,11 +111,11 @@ impl Theta {
         let lcs = &self.plant.systems[self.now.system].1.lcs;
         let size = self.amplitudes.error(lcs, x.as_slice(), after.as_slice());
         self.now.x.copy_from_slice(after.as_slice());
-        if size > JUMP {
+        if size > NO_JUMP {
             self.stats.jumps += 1;
             log.event(t, Arc::default(), true);
         }
-        if size > JUMP || step.iter().any(|s| *s != 0.0) {
+        if size > NO_JUMP || step.iter().any(|s| *s != 0.0) {
             self.log_impulses(t, p, &step, log);
         }
         Ok(())
@@ -139,7 +141,7 @@ impl Theta {
             same.map(size).fold(0.0, f64::max)
         };
         let jumped: Vec<usize> = (0..after.len())
-            .filter(|&k| (after[k] - before[k]).abs() > JUMP * kind(k))
+            .filter(|&k| (after[k] - before[k]).abs() > NO_JUMP * kind(k))
             .collect();
         if !jumped.is_empty() {
             let balance = &self.now.balance;
@@ -164,10 +166,10 @@ impl Theta {
             same.map(|j| moved[j].abs()).fold(0.0, f64::max)
         };
         let jumped: Vec<usize> = (0..moved.len())
-            .filter(|&k| moved[k].abs() > JUMP * kind(k))
+            .filter(|&k| moved[k].abs() > NO_JUMP * kind(k))
             .collect();
         let devices: Vec<&str> = (0..lcs.m())
-            .filter(|&j| p[j].abs() > JUMP * p.amax())
+            .filter(|&j| p[j].abs() > NO_JUMP * p.amax())
             .map(|j| lcs.ports[j].device.as_str())
             .collect();
         let reason = JumpReason::Device(devices.join(", "));

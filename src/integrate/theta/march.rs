@@ -2,6 +2,8 @@
 
 use super::*;
 use crate::integrate::control::Verdict;
+use crate::settings::tolerances::jumps::IMPULSE_RATIO;
+use crate::settings::tolerances::times::WHOLE;
 
 /// What became of a part of a base step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,7 +25,7 @@ impl Theta {
             Stepping::Controlled { .. } => self.longest.min(self.inputs.largest_step()),
         };
         // A quotient within rounding of an integer is that integer.
-        let count = (span / longest * (1.0 - 1e-9)).ceil().max(1.0);
+        let count = (span / longest * (1.0 - WHOLE)).ceil().max(1.0);
         let h = span / count;
         let simple = self.control.is_none() && !self.switches.watch();
         for k in 1..=count as u64 {

@@ -21,7 +21,7 @@ use std::sync::Arc;
 use nalgebra::DVector;
 
 use crate::integrate::Note;
-use crate::integrate::control::{Amplitudes, CORNER, Control};
+use crate::integrate::control::{Amplitudes, Control};
 use crate::integrate::energy::{self, Balance};
 use crate::integrate::event::Change;
 use crate::integrate::exact::Place;
@@ -29,11 +29,12 @@ use crate::integrate::inputs::Inputs;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
 use crate::integrate::stats::{StatedError, Stats};
-use crate::integrate::step::{SHORT, Scheme};
+use crate::integrate::step::Scheme;
 use crate::integrate::switching::{Demand, Switches, Threshold};
 use crate::integrate::system::{Plant, Reduce, System};
 use crate::lcs::{Lcs, Port, Role};
 use crate::settings::Settings;
+use crate::settings::tolerances::steps::{CORNER, GRANT};
 use crate::solve::{Solution, Status};
 use stages::Tableau;
 use unseen::Looks;
@@ -90,11 +91,6 @@ const LOCATE: i32 = 24;
 /// Switchings in one base step after which they are no longer located but taken at the ends of whole base steps
 /// (chattering: the base step then decides how fast a sliding switch switches).
 const CHATTER: u32 = 32;
-/// Jumps below this part of a state's amplitude are rounding.
-const JUMP: f64 = 1e-12;
-/// A spontaneous impulse is recognised by p = hλ that does not shrink with h: p(h/2) above this part of p(h), where
-/// a finite λ gives at most one half.
-const IMPULSE_RATIO: f64 = 0.75;
 
 /// See the [module](self).
 pub struct Theta {
@@ -283,11 +279,7 @@ impl Theta {
         let switches = Switches::new(position, thresholds, &system.lcs);
         let tableau = Tableau::of(system, scheme);
         let order = tableau.map_or(scheme.order(), |t| t.order);
-        let corner = if tableau.is_some() {
-            stages::GRANT
-        } else {
-            CORNER
-        };
+        let corner = if tableau.is_some() { GRANT } else { CORNER };
         let (control, preferred) = match stepping {
             Stepping::Fixed(_) => (None, f64::INFINITY),
             Stepping::Controlled { span, first } => {

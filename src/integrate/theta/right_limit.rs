@@ -2,10 +2,8 @@
 
 use super::attempt::unsolved;
 use super::*;
-
-/// What is read goes on along a line, so that its error adds up with every reflection: it is read by a step shorter by this
-/// part, where the rounding of the state grows to 2¹⁸ε.
-const SHORT_ON_LINES: f64 = 1.0 / 64.0;
+use crate::settings::tolerances::steps::SHORT;
+use crate::settings::tolerances::steps::SHORT_ON_LINES;
 
 impl Theta {
     /// The step by which λ at the right limit is found, s.

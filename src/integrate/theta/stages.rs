@@ -11,15 +11,7 @@
 use super::attempt::unsolved;
 use super::*;
 use crate::integrate::energy::StageLoss;
-
-/// The part of the tolerance granted to every step: resistive laws forget errors instead of adding them up.
-pub(super) const GRANT: f64 = 1e-3;
-/// Differences below this part of the terms a state is a sum of are rounding, and no error of the step.
-const ROUNDING: f64 = 1e-11;
-
-/// A motion has ended within a step where its last stage moves by less than this part of its first; and what a first stage moves is of interest
-/// above this part of the tolerance, or of the amplitude where steps are prescribed.
-pub(super) const SUDDEN: f64 = 0.1;
+use crate::settings::tolerances::steps::{STAGE_ROUNDING, SUDDEN};
 
 /// The coefficients of a method.
 #[derive(Debug)]
@@ -169,7 +161,8 @@ impl Theta {
             self.worst_residual = self.worst_residual.max(solution.residual);
             if at_end {
                 let sizes = system.step(step).x_sizes(&self.z, &solution.lambda);
-                self.rounding.copy_from_slice((sizes * ROUNDING).as_slice());
+                self.rounding
+                    .copy_from_slice((sizes * STAGE_ROUNDING).as_slice());
             }
             let weight = last_row.get(j).copied().unwrap_or(tableau.gamma);
             let at = Point {

@@ -10,13 +10,9 @@
 //! soon begin together. Implicit Euler steps from the same start, each [`CLOSER`] times shorter than the last, tell the slopes
 //! s₁, s₂, … at all distances δ₁ > δ₂ > …; in between as much as δ_k (s_{k+1} − s_k) may be hidden.
 
-use super::stages::{GRANT, SUDDEN, Tableau};
+use super::stages::Tableau;
 use super::*;
-
-/// The ratio of one look's distance to the next one's: what is hidden between two is overestimated by it.
-const CLOSER: f64 = 8.0;
-/// The closest look is this many roundings of the time away.
-const CLOSEST: f64 = 64.0;
+use crate::settings::tolerances::steps::{CLOSER, CLOSEST, GRANT, SUDDEN};
 
 /// The slopes right after a breakpoint.
 #[derive(Debug, Default)]

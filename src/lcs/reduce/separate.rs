@@ -22,12 +22,9 @@ use nalgebra::DMatrix;
 
 use crate::algebra::Field;
 use crate::lcs::Lcs;
+use crate::settings::tolerances::exponentials::APART;
 
 use super::Reduction;
-
-/// Fast states are separated from those that are slower by this factor: below, exponentials over long steps are products of short
-/// ones, which lose nothing (‖A h‖ = 10³, `linalg::expm`); above, they lose 2⁻⁵³ of its square.
-const APART: f64 = 1e3;
 
 /// Whether a system, as it was reduced in the basis of its names, has fast states to be taken apart from slow ones.
 pub(crate) fn is_coupled(lcs: &Lcs, span: f64) -> bool {

@@ -1,6 +1,9 @@
-//! Every tolerance and limit, once: name, default, unit, scale, and what either direction costs.
+//! Every tolerance and limit, once: name, default, unit, scale, and what either direction costs. Users choose [`Settings`]; what else decides
+//! something stands in `tolerances`.
 
-/// Numerical settings of a simulation. Nothing else in the crate holds a tolerance.
+pub(crate) mod tolerances;
+
+/// Numerical settings of a simulation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Target of the error-controlled steppers: local error relative to each signal's amplitude so far

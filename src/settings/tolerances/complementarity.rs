@@ -1,0 +1,48 @@
+//! Inside the solvers of one complementarity problem; what they give is judged by `Settings::lcp_residual` alone.
+
+/// A residual at which no other method is asked for a better one: a few roundings of a solve. Larger: worse solutions; smaller: methods in
+/// vain.
+pub(crate) const NOTHING_TO_GAIN: f64 = 1e-13;
+
+/// Violations below this part of the problem's size count as zero inside the pivoting methods (rounding of one solve). Larger: wrong sets are
+/// offered; smaller: cycles of rounding.
+pub(crate) const SLACK: f64 = 1e-14;
+
+/// Ratios closer than this, relative to the larger, tie in Lemke's method and are decided by the next lexicographic column. Larger: wrong
+/// rows leave; smaller: cycles.
+pub(crate) const TIE: f64 = 1e-12;
+
+/// Entries of a column of Lemke's tableau are known to this part of its largest.
+pub(crate) const TABLEAU_NOISE: f64 = 1e-15;
+
+/// A residual of Newton's method on resolvents that is rounding: no iteration improves on it.
+pub(crate) const NEWTON_ENDS: f64 = 1e-15;
+
+/// What counts as small beside the largest quantity: its tolerated residual is this part of that of the largest. Larger: leakage loses
+/// digits; smaller: it decides when Newton ends.
+pub(crate) const SMALL_PORT: f64 = 1e-5;
+
+/// The part of the decrease that a linear function would have which a step of the line search must bring (Armijo). Larger: shorter steps;
+/// smaller: steps that hardly help.
+pub(crate) const DECREASE: f64 = 0.1;
+
+/// μ of the proximal points, in equilibrated units. Larger: more of them; smaller: each as hard as the problem itself.
+pub(crate) const PROXIMAL: f64 = 1e-4;
+
+/// Largest μ of the continuation, in equilibrated units: there M' + μI is well conditioned.
+pub(crate) const CONTINUED: f64 = 10.0;
+
+/// What each μ of the continuation is to the one before. Larger: more of them; smaller: Newton loses its way between two.
+pub(crate) const CONTINUED_RATIO: f64 = 0.25;
+
+/// A pivot of R' this small, beside its largest entry, is a direction that neither the network nor the laws determine; pivots are raised to
+/// it. Larger: slower convergence; smaller: steps far along such directions.
+pub(crate) const UNDETERMINED: f64 = 1e-10;
+
+/// Added to M' in Newton's matrix: rounding leaves M' an eigenvalue of −1e-16 in place of 0, and along its vector the step would go the wrong
+/// way; the bound of what it takes from the speed of convergence is far below the tolerance.
+pub(crate) const MONOTONE: f64 = 1e-13;
+
+/// Least −dy'/dw in the second method: a blocking junction has next to none, and a loop of such ports no regular matrix. Larger: slower
+/// convergence; smaller: singular matrices.
+pub(crate) const BLOCKED: f64 = 1e-8;

@@ -1,0 +1,25 @@
+//! Which numbers are zero, beside which others.
+
+/// A singular value, eigenvalue or minor of an equilibrated matrix below this part of the largest is zero. Entries of a circuit's matrices are
+/// accurate to about 1e-12. Larger: independent ports merged, regular matrices called singular; smaller: rounding mistaken for rank.
+pub(crate) const RANK: f64 = 1e-10;
+
+/// 1/cond₁ of an equilibrated active block, and a pivot beside its column's largest entry, from which on an inverse is trusted: a decade beyond
+/// [`RANK`], because a residual test follows. Larger: least squares where a solve would do; smaller: residuals fail.
+pub(crate) const INVERSE: f64 = 1e-11;
+
+/// An entry of D, of a constraint or of a ray this far below the largest is rounding of a zero. Larger: weak couplings are lost; smaller: rounding couples
+/// ports.
+pub(crate) const ENTRY: f64 = 1e-12;
+
+/// Real parts of eigenvalues below this part of the largest eigenvalue are rounding of the eigenvalue computation. Larger: slow growth and
+/// decay are not seen; smaller: rounding gets a sign.
+pub(crate) const EIGENVALUE: f64 = 1e-12;
+
+/// A pivot of exact elimination must be at least this fraction of the largest candidate, relative to its row; among those the shortest row
+/// wins. Larger: more fill; smaller: radii grow.
+pub(crate) const PIVOT_CHOICE: f64 = 1e-2;
+
+/// Relative radius up to which a ball counts as known. Larger: digits of the matrices are lost; smaller: rationals where double-doubles
+/// would do.
+pub(crate) const BALL_KNOWN: f64 = 1e-14;

@@ -1,0 +1,50 @@
+//! What a run says of its own error, and the second run that verifies it.
+
+/// Prescribed steps of companions, over those of the run. Larger: the distance says less of the run's own error; smaller: dearer.
+pub(crate) const COARSER: [f64; 2] = [2.0, 4.0];
+
+/// The error of a run of first order over what these differ by: 1 and 1/3 were the errors smooth; those of events are not. Larger: errors
+/// stated larger than they are; smaller: the statement no longer bounds the error (`tests/stated/`).
+pub(crate) const FIRST_ORDER: [f64; 2] = [2.0, 0.5];
+
+/// The same for methods of order 2 and 3: 1/3 and 1/15 or less were they smooth.
+pub(crate) const HIGHER_ORDER: [f64; 2] = [1.5, 0.125];
+
+/// Tolerance of the companion of a run whose steps are chosen, over that of the run. It makes its steps whole where the run makes them in
+/// halves, so that they are longer even where rows and edges choose them.
+pub(crate) const LOOSER: f64 = 2.0;
+
+/// The error of the run over what that companion differs by: 1/3 or less were the errors smooth. Larger and smaller as [`FIRST_ORDER`].
+pub(crate) const LOOSER_SHARE: f64 = 1.0;
+
+/// Steps by which companions read what flows at an instant where laws are curved, over those of the run: their error is of first order.
+pub(crate) const READING: f64 = 4.0;
+
+/// More rows than these would choose the steps of that companion, which stops at some of them only. Larger: its steps are those of the run and
+/// it sees no error; smaller: rows are compared where it has none.
+pub(crate) const MANY_ROWS: f64 = 200.0;
+
+/// The error of exact runs, relative to amplitudes: rounding in stiff circuits. Larger: a wrong run is confirmed; smaller: right ones are not.
+pub(crate) const EXACT: f64 = 1e-9;
+
+/// Tolerances of the verifying steps, one after the other until they know enough. Their own error is no less than that.
+pub(crate) const TOLERANCES: [f64; 3] = [1e-4, 1e-5, 1e-6];
+
+/// An error of the verifying steps, relative to amplitudes, below which they know enough. Larger: a verdict that says little; smaller: dearer.
+pub(crate) const ENOUGH: f64 = 3e-3;
+
+/// The distance of two runs of steps may be smaller than the error of the finer one by this factor. Larger: a verdict that says little;
+/// smaller: right runs are called wrong.
+pub(crate) const SAFETY: f64 = 2.0;
+
+/// Events of the two methods may be apart by this part of a print step where the events of the verifying runs agree better, and rows so close
+/// to an event are left out: what decays within an instant is not followed by steps. Larger: less is compared; smaller: the steps' own event
+/// times are held against the run.
+pub(crate) const ASIDE: f64 = 0.01;
+
+/// Where more than this part of the rows would be left out (a print step of a clock's period), all are compared.
+pub(crate) const MOST_LEFT_OUT: f64 = 0.5;
+
+/// The smallest amplitude that errors of a comparison are related to, as a part of the largest amplitude of the same unit: a signal below it
+/// is the rounding or leakage of its neighbours. Larger: small signals may differ; smaller: rounding counts as a difference.
+pub(crate) const AMPLITUDE_FLOOR: f64 = 1e-9;

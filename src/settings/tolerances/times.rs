@@ -1,0 +1,20 @@
+//! When two times are one, and how many steps make a span.
+
+/// Two times are one where they differ by no more than this part of themselves: event times, corners, clocks, rows and the ends of steps.
+/// Sums of two or three times carry that. Larger: distinct edges fall together; smaller: steps and pulses of a rounding's length.
+pub(crate) const SAME_TIME: f64 = 8.0 * f64::EPSILON;
+
+/// The same for what arrives over a line: its time is a sum of a delay and a time that was a sum already. Larger: waves that follow each
+/// other closely arrive as one; smaller: the two sides of a jump are told apart by rounding.
+pub(crate) const ARRIVED: f64 = 16.0 * f64::EPSILON;
+
+/// A count of steps is whole where it is whole to this part: decimal fractions are not exact in binary. Larger: a short last step is left
+/// out; smaller: a step of rounding is added.
+pub(crate) const WHOLE: f64 = 1e-9;
+
+/// A row this close before the end, in parts of a print step, is the last one; unlike [`WHOLE`] it is no part of the count,
+/// which carries its roundings. Larger: a last interval that was meant is left out; smaller: two rows at the end.
+pub(crate) const LAST_ROW: f64 = 1e-6;
+
+/// Print steps in a span where nothing says how many. Larger: rows that nobody asked for; smaller: coarse pictures.
+pub(crate) const SPAN_PARTS: f64 = 1000.0;
