@@ -11,7 +11,7 @@ use crate::integrate::{
     Values, operating_point, simulate,
 };
 use crate::lcs::{Lcs, Position, ReduceError, reduce};
-use crate::mna::{self, Behaviour};
+use crate::mna::{self, StaticMultiport};
 use crate::netlist::{self, Netlist};
 use crate::settings::Settings;
 
@@ -35,7 +35,7 @@ pub struct Model {
     sources: SourceMap,
     options: ElaborateOptions,
     circuit: Circuit,
-    multiport: Behaviour,
+    multiport: StaticMultiport,
     findings: Vec<Diagnostic>,
 }
 
@@ -255,7 +255,7 @@ impl Model {
 
     /// Its static multiport: the circuit without storage, sources and devices.
     #[must_use]
-    pub const fn multiport(&self) -> &Behaviour {
+    pub const fn multiport(&self) -> &StaticMultiport {
         &self.multiport
     }
 

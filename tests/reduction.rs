@@ -149,7 +149,7 @@ fn a_system_file_reads_back_and_reduces_to_itself() {
         (&file.lcs.a, &file.lcs.b, &file.lcs.c, &file.lcs.d),
         (&lcs.a, &lcs.b, &lcs.c, &lcs.d)
     );
-    let again = circ::mna::Behaviour::from_lcs(&file.lcs);
+    let again = circ::mna::StaticMultiport::from_lcs(&file.lcs);
     let same = reduce(&again, &Position::free(&again, vec![])).unwrap();
     assert_eq!(
         (&same.a, &same.b, &same.c, &same.d),

@@ -7,7 +7,7 @@ use crate::algebra::Value;
 use crate::circuit::Source;
 use crate::circuit::source::Wave;
 use crate::law::Law;
-use crate::lcs::{Input, Port, Role, State};
+use crate::lcs::{Input, LcsParts, Port, Role, State, Storage};
 
 mod report;
 mod rest;
@@ -33,7 +33,7 @@ pub(super) fn lcs(
         y: String::new(),
         law: Law::ideal_diode(),
     };
-    Lcs {
+    Lcs::new(LcsParts {
         states: (0..n)
             .map(|k| State {
                 name: format!("x{}", k + 1),
@@ -51,22 +51,36 @@ pub(super) fn lcs(
         c,
         d,
         energy,
-        ..Lcs::default()
-    }
+        storage: Storage {
+            inject_one: DVector::zeros(n),
+            ..Storage::default()
+        },
+        ..LcsParts::default()
+    })
+    .unwrap()
+}
+
+/// Changes parts of a system.
+pub(super) fn change(lcs: &mut Lcs, change: impl FnOnce(&mut LcsParts)) {
+    *lcs = std::mem::take(lcs).changed(change).unwrap();
 }
 
 /// Adds a source with columns (E, G).
 pub(super) fn drive(lcs: &mut Lcs, name: &str, wave: Wave, e: &[f64], g: &[f64]) {
     let p = lcs.p();
-    lcs.inputs.push(Input {
-        name: name.into(),
-        unit: "V",
-        source: Source { dc: 0.0, wave },
+    let driven = std::mem::take(lcs).changed(|parts| {
+        parts.inputs.push(Input {
+            name: name.into(),
+            unit: "V",
+            source: Source { dc: 0.0, wave },
+        });
+        parts.e = parts.e.clone().insert_column(p, 0.0);
+        parts.g = parts.g.clone().insert_column(p, 0.0);
+        parts.shift = parts.shift.clone().insert_column(p, 0.0);
+        parts.e.column_mut(p).copy_from_slice(e);
+        parts.g.column_mut(p).copy_from_slice(g);
     });
-    lcs.e = lcs.e.clone().insert_column(p, 0.0);
-    lcs.g = lcs.g.clone().insert_column(p, 0.0);
-    lcs.e.column_mut(p).copy_from_slice(e);
-    lcs.g.column_mut(p).copy_from_slice(g);
+    *lcs = driven.unwrap();
 }
 
 const C: f64 = 1e-6;
@@ -258,8 +272,10 @@ fn verdicts_do_not_depend_on_roles() {
     );
     let pivoted = crate::passivity::System::of(&current).pivot(&[0]).unwrap();
     let mut voltage = current.clone();
-    (voltage.a, voltage.b, voltage.c, voltage.d) = (pivoted.a, pivoted.b, pivoted.c, pivoted.d);
-    voltage.ports[0].role = Role::Voltage;
+    change(&mut voltage, |s| {
+        (s.a, s.b, s.c, s.d) = (pivoted.a, pivoted.b, pivoted.c, pivoted.d)
+    });
+    change(&mut voltage, |s| s.ports[0].role = Role::Voltage);
     let (one, other) = (system(&current), system(&voltage));
     assert_eq!(one.passive, other.passive);
     for (t, s) in one.theorems.iter().zip(&other.theorems) {
@@ -287,8 +303,9 @@ fn colpitts_has_unique_steps_and_no_certificate() {
         DMatrix::zeros(2, 2),
         DMatrix::from_diagonal(&DVector::from_column_slice(&[c1, c2, l])),
     );
-    colpitts.e0 =
+    let e0 =
         DVector::from_column_slice(&[10.0 / (rc * c1), (10.0 / rc - 20.0 / re) / c2, 10.0 / l]);
+    change(&mut colpitts, |s| s.e0 = e0);
     let report = system(&colpitts);
     assert_ne!(report.passive, Some(true), "{report}");
     assert_eq!(
@@ -318,11 +335,13 @@ fn forward_drops_make_theorem_5_apply() {
         theorem(&system(&circuit), "RR-7158 Theorem 5").holds,
         Some(false)
     );
-    circuit.ports[0].law = Law::Diode {
-        vfwd: Value::binary(0.7),
-        ron: Value::binary(0.0),
-        roff: None,
-    };
+    change(&mut circuit, |s| {
+        s.ports[0].law = Law::Diode {
+            vfwd: Value::binary(0.7),
+            ron: Value::binary(0.0),
+            roff: None,
+        }
+    });
     let report = system(&circuit);
     let five = theorem(&report, "RR-7158 Theorem 5");
     assert_eq!(five.holds, Some(true), "{report}");
@@ -341,7 +360,7 @@ fn forward_drops_make_theorem_5_apply() {
         "{long_run:?}"
     );
     // A resistor across the tank brings it to rest.
-    circuit.a[(0, 0)] = -1.0 / (R * C);
+    change(&mut circuit, |s| s.a[(0, 0)] = -1.0 / (R * C));
     let report = system(&circuit);
     assert_eq!(report.convergence.unwrap().to, Some(vec![0.0, 0.0]));
     assert!(

@@ -15,7 +15,7 @@ use crate::forms::json;
 use crate::integrate::{Places, SimError, start};
 use crate::lcs::json::SystemFile;
 use crate::lcs::{Lcs, Position, reduce};
-use crate::mna::Behaviour;
+use crate::mna::StaticMultiport;
 use crate::model::{Faults, Model};
 use crate::netlist::{self, Loaded};
 use crate::report::steps;
@@ -123,7 +123,7 @@ pub fn open(
 ) -> Result<Subject, Failure> {
     files::spare(outputs, [input.file.as_path()])?;
     if let Some(mut system) = system(input)? {
-        keep_outputs(&mut system.lcs, probes)?;
+        system.lcs = keep_outputs(system.lcs, probes)?;
         return Ok(Subject::System(Box::new(system)));
     }
     let Loaded {
@@ -248,7 +248,7 @@ pub fn start_system(
 /// # Errors
 /// [`Failure::Message`] for an unknown switch.
 pub fn positions(
-    behaviour: &Behaviour,
+    behaviour: &StaticMultiport,
     wanted: &[(String, bool)],
 ) -> Result<Vec<(usize, bool)>, Failure> {
     let known: Vec<&str> = behaviour.switches.iter().map(|s| s.name.as_str()).collect();
@@ -324,9 +324,9 @@ fn faults(input: &Input, diagnostics: &[Diagnostic]) -> Failure {
     Failure::Faults(format!("{}: {count} {noun}", input.file.display()))
 }
 
-fn keep_outputs(lcs: &mut Lcs, probes: &[String]) -> Result<(), Failure> {
+fn keep_outputs(lcs: Lcs, probes: &[String]) -> Result<Lcs, Failure> {
     if probes.is_empty() {
-        return Ok(());
+        return Ok(lcs);
     }
     let names: Vec<String> = lcs
         .outputs
@@ -349,14 +349,6 @@ fn keep_outputs(lcs: &mut Lcs, probes: &[String]) -> Result<(), Failure> {
                 .ok_or_else(known)
         })
         .collect::<Result<Vec<usize>, _>>()?;
-    let outputs = &mut lcs.outputs;
-    outputs.names = kept.iter().map(|&k| outputs.names[k].clone()).collect();
-    outputs.units = kept.iter().map(|&k| outputs.units[k]).collect();
-    let rows = &mut outputs.rows;
-    rows.x = rows.x.select_rows(&kept);
-    rows.lambda = rows.lambda.select_rows(&kept);
-    rows.u = rows.u.select_rows(&kept);
-    rows.du = rows.du.select_rows(&kept);
-    rows.one = rows.one.select_rows(&kept);
-    Ok(())
+    let changed = lcs.changed(|parts| parts.outputs.keep(&kept));
+    changed.map_err(|error| Failure::Message(error.to_string()))
 }

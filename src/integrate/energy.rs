@@ -599,14 +599,18 @@ mod tests {
     use super::*;
     use crate::integrate::fixtures;
     use crate::integrate::jump::JumpProblem;
-    use nalgebra::dvector;
+    use crate::lcs::Rows;
+    use nalgebra::{dmatrix, dvector};
 
     /// What a jump of the bridge with a capacitor filter, 1 µF at 10 V onto 0.3 µF at 0 V, leaves unexplained when its state and
     /// impulse are multiplied by `part`, relative to the energy before it.
     fn residual_of_jump(part: f64) -> f64 {
-        let mut lcs = fixtures::bridge_cap_filter();
         // Of its elements it names the resistor's power alone.
-        lcs.outputs.power.clear();
+        let lcs = fixtures::bridge_cap_filter().changed(|parts| {
+            parts.outputs.power.clear();
+            (parts.outputs.power_v, parts.outputs.power_i) = (Rows::default(), Rows::default());
+        });
+        let lcs = lcs.unwrap();
         let (x, u) = (dvector![10.0, 0.0, 0.0], DVector::zeros(0));
         let mut problem = JumpProblem::new(&lcs, 1e-9).unwrap();
         let jump = problem.solve(&lcs, &x, &u).unwrap().unwrap();
@@ -635,9 +639,17 @@ mod tests {
     /// anywhere else, where charge is not conserved.
     #[test]
     fn storage_taken_over_wrongly_leaves_a_residual() {
-        let mut lcs = Lcs::default();
-        lcs.storage.metric = DMatrix::from_diagonal(&dvector![1e-6, 3e-6]);
-        lcs.storage.x = DMatrix::from_element(2, 1, 1.0);
+        let lcs = fixtures::clamped_capacitor().changed(|parts| {
+            let storage = &mut parts.storage;
+            storage.names = vec!["v(c1)".into(), "v(c2)".into()];
+            storage.metric = DMatrix::from_diagonal(&dvector![1e-6, 3e-6]);
+            storage.x = DMatrix::from_element(2, 1, 1.0);
+            storage.lambda = DMatrix::zeros(2, 1);
+            storage.u = DMatrix::zeros(2, 0);
+            storage.inject = dmatrix![0.25, 0.75];
+            (storage.one, storage.initial) = (DVector::zeros(2), DVector::zeros(2));
+        });
+        let lcs = lcs.unwrap();
         let residual = |v: f64| {
             let mut balance = Balance::new(50e-6);
             balance.add_jump(taking_over(

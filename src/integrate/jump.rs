@@ -422,6 +422,7 @@ mod tests {
     use super::*;
     use crate::integrate::fixtures;
     use crate::law::{Breakdown, Exponential, Law};
+    use crate::lcs::{Outputs, Storage};
     use nalgebra::{dmatrix, dvector};
 
     #[test]
@@ -471,7 +472,7 @@ mod tests {
     /// An inductor of 1 mH whose current comes out of the anodes of devices in parallel: λ is the current of the first and the voltage of
     /// the last.
     fn inductor_into(laws: [Law; 2]) -> Lcs {
-        let mut lcs = fixtures::bridge();
+        let lcs = fixtures::bridge();
         // x' = (−v)/L, v = −λ₂; y₁ = −v = λ₂, y₂ = x − λ₁.
         let [first, last] = laws;
         let port = |law: Law, role| crate::lcs::Port {
@@ -480,15 +481,25 @@ mod tests {
             ..lcs.ports[0].clone()
         };
         let ports = vec![port(first, Role::Current), port(last, Role::Voltage)];
-        lcs.ports = ports;
-        lcs.b = dmatrix![0.0, 1e3];
-        lcs.c = dmatrix![0.0; 1.0];
-        lcs.d = dmatrix![0.0, 1.0; -1.0, 0.0];
-        lcs.g = DMatrix::zeros(2, 0);
-        lcs.f = DVector::zeros(2);
-        lcs.energy = dmatrix![1e-3];
-        lcs.storage.metric = DMatrix::zeros(0, 0);
-        lcs
+        let changed = lcs.changed(|parts| {
+            parts.ports = ports;
+            parts.states.truncate(1);
+            parts.a = dmatrix![0.0];
+            (parts.e, parts.shift) = (DMatrix::zeros(1, 0), DMatrix::zeros(1, 0));
+            parts.e0 = DVector::zeros(1);
+            parts.b = dmatrix![0.0, 1e3];
+            parts.c = dmatrix![0.0; 1.0];
+            parts.d = dmatrix![0.0, 1.0; -1.0, 0.0];
+            parts.g = DMatrix::zeros(2, 0);
+            parts.f = DVector::zeros(2);
+            parts.energy = dmatrix![1e-3];
+            parts.storage = Storage {
+                inject_one: DVector::zeros(1),
+                ..Storage::default()
+            };
+            parts.outputs = Outputs::default();
+        });
+        changed.unwrap()
     }
 
     fn exponential(is: f64, bv: Option<f64>) -> Law {
@@ -541,7 +552,7 @@ mod tests {
 
     #[test]
     fn a_curved_law_joins_no_capacitors_in_no_time() {
-        let mut lcs = fixtures::clamped_capacitor();
+        let lcs = fixtures::clamped_capacitor();
         let at = |lcs: &Lcs| {
             let x = dvector![3.0];
             JumpProblem::new(lcs, 1e-9)?
@@ -549,8 +560,8 @@ mod tests {
                 .unwrap()
         };
         assert!(at(&lcs).is_some());
-        lcs.ports[0].law = exponential(1e-14, None);
-        assert_eq!(at(&lcs), None);
+        let curved = lcs.changed(|parts| parts.ports[0].law = exponential(1e-14, None));
+        assert_eq!(at(&curved.unwrap()), None);
     }
 
     #[test]

@@ -264,6 +264,11 @@ fn no_system(error: &ReduceError, elements: &[&Element]) -> Told {
             error.to_string(),
             "inductors coupled with k = 1 share one flux: a k below 1, or a resistor across one of them, decides",
         ),
+        ReduceError::Unfit(_) => told(
+            "out-of-range",
+            error.to_string(),
+            "values that are closer to those of real elements stay within what doubles hold",
+        ),
         ReduceError::Position { .. } | ReduceError::NotIdeal { .. } | ReduceError::Internal(_) => {
             Told {
                 code: "internal",

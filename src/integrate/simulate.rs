@@ -24,7 +24,7 @@ use crate::integrate::theta::{Setup, Start, Stepping, Theta};
 use crate::integrate::{Note, Run};
 use crate::integrate::{reading, roles, start};
 use crate::lcs::{Input, Lcs, Position, reduce};
-use crate::mna::{Behaviour, SwitchPort};
+use crate::mna::{StandardMultiport, StaticMultiport, SwitchPort};
 use crate::plan::{Plan, not_exact, plan};
 use crate::settings::Settings;
 
@@ -92,7 +92,7 @@ pub struct SimOptions<'a> {
 /// See [`Reason`]; the run so far is in [`SimError::partial`].
 pub fn simulate(
     circuit: &Circuit,
-    behaviour: &Behaviour,
+    behaviour: &StaticMultiport,
     options: SimOptions<'_>,
 ) -> Result<Run, SimError> {
     let tran = circuit.tran.ok_or_else(|| {
@@ -145,7 +145,7 @@ fn lines(circuit: &Circuit, waves: &[[f64; 2]]) -> Vec<Line> {
 #[derive(Debug, Clone)]
 pub(super) struct Systems {
     /// All laws as ideal pairs.
-    pub(super) behaviour: Arc<Behaviour>,
+    pub(super) multiport: Arc<StandardMultiport>,
     known: Arc<Mutex<Known>>,
 }
 
@@ -159,18 +159,14 @@ struct Known {
 impl Known {
     /// With the sources as they are now.
     fn adapted(&self, lcs: &Lcs) -> Lcs {
-        let mut lcs = lcs.clone();
-        for (input, source) in &self.replaced {
-            lcs.inputs[*input].source = source.clone();
-        }
-        lcs
+        lcs.with_sources(&self.replaced)
     }
 }
 
 impl Systems {
-    fn of(behaviour: Behaviour) -> Self {
+    fn of(multiport: StandardMultiport) -> Self {
         Self {
-            behaviour: Arc::new(behaviour),
+            multiport: Arc::new(multiport),
             known: Arc::default(),
         }
     }
@@ -182,8 +178,8 @@ impl Systems {
         if let Some((_, lcs)) = found {
             return Ok(known.adapted(lcs));
         }
-        let position = Position::free(&self.behaviour, switches.to_vec());
-        let lcs = reduce(&self.behaviour, &position).map_err(|e| SimError::before(e.into()))?;
+        let position = Position::free(&self.multiport, switches.to_vec());
+        let lcs = reduce(&self.multiport, &position).map_err(|e| SimError::before(e.into()))?;
         let adapted = known.adapted(&lcs);
         known.systems.push((switches.to_vec(), lcs));
         Ok(adapted)
@@ -237,7 +233,7 @@ impl Problem {
     /// The transient of a circuit, from its initial conditions if `uic`, else from its operating point.
     pub(super) fn of_circuit(
         circuit: &Circuit,
-        behaviour: &Behaviour,
+        behaviour: &StaticMultiport,
         uic: bool,
         settings: &Settings,
     ) -> Result<Self, SimError> {
@@ -265,7 +261,7 @@ impl Problem {
 
     /// The transient of a system from state x.
     pub(super) fn of_system(lcs: &Lcs, x: &DVector<f64>) -> Self {
-        let original = Behaviour::from_lcs(lcs);
+        let original = StaticMultiport::from_lcs(lcs);
         let behaviour = original.standard();
         let mut storage = DVector::zeros(behaviour.storage.len());
         storage.rows_mut(0, x.len()).copy_from(x);
@@ -317,7 +313,7 @@ impl Problem {
     }
 
     fn switches(&self) -> &[SwitchPort] {
-        &self.systems.behaviour.switches
+        &self.systems.multiport.switches
     }
 
     fn thresholds(&self) -> Vec<Threshold> {
@@ -327,7 +323,7 @@ impl Problem {
     /// `lcs` is the system of the start position.
     fn exact(&self, tran: &Tran, lcs: &Lcs, settings: &Settings) -> Result<Exact, SimError> {
         let mut exact = Exact::new(exact::Setup {
-            assembler: exact::Assembler::new(Arc::clone(&self.systems.behaviour))
+            assembler: exact::Assembler::new(Arc::clone(&self.systems.multiport))
                 .with_steps(self.steps.clone())
                 .knowing(&self.start.switches, lcs),
             position: self.start.switches.clone(),
@@ -372,7 +368,7 @@ impl Problem {
     fn choose_roles(&mut self, tran: &Tran) -> Result<Lcs, SimError> {
         let lcs = self.systems.free(&self.start.switches)?;
         if roles::doubtful(&lcs, tran.tstop) {
-            let others = Systems::of(self.systems.behaviour.in_other_roles());
+            let others = Systems::of(self.systems.multiport.in_other_roles());
             if let Ok(other) = others.free(&self.start.switches)
                 && roles::better(&lcs, &other)
             {

@@ -18,7 +18,7 @@ use crate::integrate::stats::{Impulse, Run, StateJumps, Stats};
 use crate::integrate::step::Scheme;
 use crate::integrate::theta::{Stepping, Theta};
 use crate::lcs::Lcs;
-use crate::mna::{Behaviour, behaviour};
+use crate::mna::{StaticMultiport, behaviour};
 use crate::plan::{not_exact, plan};
 use crate::settings::Settings;
 use crate::settings::tolerances::steps::HANDOVER_STEPS;
@@ -206,7 +206,7 @@ impl Simulation {
     /// As [`simulate`](crate::integrate::simulate()) before its first row.
     pub fn new(
         circuit: &Circuit,
-        multiport: &Behaviour,
+        multiport: &StaticMultiport,
         options: SimulationOptions,
     ) -> Result<Self, SimError> {
         let tran = transient(circuit.tran, options.until)?;
@@ -337,7 +337,7 @@ impl Simulation {
     /// Names of the switches.
     #[must_use]
     pub fn switches(&self) -> Vec<&str> {
-        let switches = self.problem.systems.behaviour.switches.iter();
+        let switches = self.problem.systems.multiport.switches.iter();
         switches.map(|switch| switch.name.as_str()).collect()
     }
 
@@ -346,7 +346,7 @@ impl Simulation {
     /// # Errors
     /// There is no such source; else as [`Self::advance_to`].
     pub fn set_source(&mut self, name: &str, value: f64) -> Result<Vec<Event>, SimError> {
-        let sources = &self.problem.systems.behaviour.sources;
+        let sources = &self.problem.systems.multiport.sources;
         let Some(input) = sources.iter().position(|s| s.input.name == name) else {
             return Err(unknown(
                 "source",
@@ -469,10 +469,14 @@ impl Simulation {
         } = checkpoint;
         problem.systems.replace_sources(replaced.clone());
         self.circuit = Arc::clone(circuit);
-        let same = Arc::ptr_eq(&problem.systems.behaviour, &self.problem.systems.behaviour);
+        let same = Arc::ptr_eq(&problem.systems.multiport, &self.problem.systems.multiport);
         let back = match &mut self.way {
             Way::Exact(exact) if same => {
-                let inputs = problem.systems.free(&problem.start.switches)?.inputs;
+                let inputs = problem
+                    .systems
+                    .free(&problem.start.switches)?
+                    .into_parts()
+                    .inputs;
                 let sources = inputs.into_iter().map(|input| input.source);
                 exact.restore(&problem.start, &problem.conducting, sources)
             }

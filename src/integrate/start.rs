@@ -14,7 +14,7 @@ use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{NoRest, Reason, SimError};
 use crate::integrate::switching::at_start;
 use crate::lcs::{Hold, Lcs, Position, ReduceError, Role, StorageHold, reduce};
-use crate::mna::{Behaviour, behaviour};
+use crate::mna::{StandardMultiport, StaticMultiport, behaviour};
 use crate::settings::Settings;
 use crate::settings::tolerances::jumps::CONSISTENT;
 use crate::solve::Status;
@@ -62,7 +62,7 @@ pub enum Values {
 
 /// Storage values from `IC=` cards, else from differences of `.ic` node voltages for capacitors, else 0 (`uic`).
 #[must_use]
-pub fn from_initial_conditions(circuit: &Circuit, behaviour: &Behaviour) -> DVector<f64> {
+pub fn from_initial_conditions(circuit: &Circuit, behaviour: &StaticMultiport) -> DVector<f64> {
     let known = node_voltages(circuit);
     let value = |k: usize| -> f64 {
         let storage = &behaviour.storage[k];
@@ -227,7 +227,7 @@ fn at_rest(
 }
 
 /// The positions that the cards of the switches name, off where they name none.
-fn of_cards(behaviour: &Behaviour) -> Vec<bool> {
+fn of_cards(behaviour: &StaticMultiport) -> Vec<bool> {
     let named = behaviour.switches.iter();
     let asked = named.map(|s| s.initial.unwrap_or(false)).collect();
     at_start(&behaviour.switches, asked)
@@ -260,7 +260,7 @@ struct Static {
 }
 
 fn static_solution(
-    behaviour: &Behaviour,
+    behaviour: &StandardMultiport,
     switches: &[bool],
     values: Values,
     settings: &Settings,
@@ -391,7 +391,7 @@ fn no_point(error: ReduceError) -> SimError {
 /// Those of [`operating_point`].
 pub fn initial(
     circuit: &Circuit,
-    behaviour: &Behaviour,
+    behaviour: &StaticMultiport,
     uic: bool,
     settings: &Settings,
 ) -> Result<Initial, SimError> {

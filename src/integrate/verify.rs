@@ -16,7 +16,7 @@ use crate::integrate::run::{Reason, SimError};
 use crate::integrate::simulate::{Method, SimOptions, simulate, simulate_system};
 use crate::integrate::stats::Run;
 use crate::lcs::Lcs;
-use crate::mna::Behaviour;
+use crate::mna::StaticMultiport;
 use crate::settings::Settings;
 use crate::settings::tolerances::stated::{
     ASIDE, ENOUGH, EXACT, MOST_LEFT_OUT, SAFETY, TOLERANCES,
@@ -63,7 +63,7 @@ pub struct VerifyOptions<'a> {
 /// The second run's.
 pub fn verify(
     circuit: &Circuit,
-    behaviour: &Behaviour,
+    behaviour: &StaticMultiport,
     run: &Run,
     options: &VerifyOptions<'_>,
 ) -> Result<Verified, SimError> {

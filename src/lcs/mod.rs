@@ -1,11 +1,13 @@
 //! The complementarity system of a circuit, with names and units for every row and column.
 
+mod checked;
 pub mod format;
 pub mod json;
 pub mod reduce;
 #[cfg(test)]
 mod tests;
 
+pub use checked::{Lcs, LcsError};
 pub use reduce::{Position, ReduceError, StorageHold, reduce};
 pub(crate) use reduce::{is_coupled, reduce_apart};
 
@@ -14,12 +16,13 @@ use nalgebra::{DMatrix, DVector};
 use crate::circuit::Source;
 use crate::law::Law;
 
-/// x' = A x + B λ + E u + e,  y = C x + D λ + G u + F,  −λ_j ∈ ∂φ_j(y_j).
+/// What an [`Lcs`] is made of: x' = A x + B λ + E u + e,  y = C x + D λ + G u + F,  −λ_j ∈ ∂φ_j(y_j).
 ///
 /// Power into the linear network is yᵀλ for device ports whatever their roles. `x` is the *shifted* state: the physical
 /// value of state k is `x[k] + shift.row(k)·u` (only capacitor loops with sources and inductor cut-sets have a shift).
+/// n states, m ports, p inputs, q storage elements; a matrix without entries may have any shape.
 #[derive(Debug, Clone, Default)]
-pub struct Lcs {
+pub struct LcsParts {
     /// The netlist's title.
     pub title: String,
     /// Names and units of x.
@@ -48,7 +51,7 @@ pub struct Lcs {
     pub f: DVector<f64>,
     /// n×p: physical state = x + shift·u.
     pub shift: DMatrix<f64>,
-    /// n×n symmetric: stored energy at u = 0 is ½ xᵀ P x (folded capacitors and inductors included).
+    /// n×n symmetric: stored energy at u = 0 is ½ xᵀ P x (folded capacitors and inductors included). Empty where it is not known.
     pub energy: DMatrix<f64>,
     /// Everything that can be read from the system, as rows over [x | λ | u | u' | 1].
     pub outputs: Outputs,
@@ -221,7 +224,7 @@ pub struct Storage {
     pub initial: DVector<f64>,
 }
 
-impl Lcs {
+impl LcsParts {
     /// Number of states n.
     #[must_use]
     pub fn n(&self) -> usize {
@@ -238,5 +241,22 @@ impl Lcs {
     #[must_use]
     pub fn p(&self) -> usize {
         self.inputs.len()
+    }
+}
+
+impl Outputs {
+    /// Leaves the probes with these numbers, in this order.
+    pub(crate) fn keep(&mut self, kept: &[usize]) {
+        self.names = kept.iter().map(|&k| self.names[k].clone()).collect();
+        self.units = kept.iter().map(|&k| self.units[k]).collect();
+        let rows = &mut self.rows;
+        rows.x = rows.x.select_rows(kept);
+        rows.lambda = rows.lambda.select_rows(kept);
+        rows.u = rows.u.select_rows(kept);
+        rows.du = rows.du.select_rows(kept);
+        rows.one = rows.one.select_rows(kept);
+        if !self.impulse.is_empty() {
+            self.impulse = self.impulse.select_rows(kept);
+        }
     }
 }

@@ -2,8 +2,8 @@
 
 use super::couple::{self, Winding};
 use super::{
-    Behaviour, Coefficient, Column, Equation, LatchPort, Pair, SourcePort, StoragePort, SwitchPort,
-    topology,
+    Coefficient, Column, Equation, LatchPort, Pair, SourcePort, StaticMultiport, StoragePort,
+    SwitchPort, topology,
 };
 use crate::circuit::{Circuit, ElementId, Kind, Latch, NodeId, Output, Quantity};
 use crate::diagnostic::{Diagnostic, Severity};
@@ -18,7 +18,7 @@ pub(super) struct Branch {
 
 pub(super) struct Assembly<'a> {
     pub(super) circuit: &'a Circuit,
-    pub(super) out: Behaviour,
+    pub(super) out: StaticMultiport,
     pub(super) potential: Vec<Option<Column>>,
     pub(super) branches: Vec<Branch>,
     kcl: Vec<Equation>,
@@ -29,12 +29,12 @@ pub(super) struct Assembly<'a> {
 /// # Errors
 ///
 /// Every fault of the circuit that needs no reduction to see: no ground, impossible couplings.
-pub fn behaviour(circuit: &Circuit) -> Result<Behaviour, Vec<Diagnostic>> {
+pub fn behaviour(circuit: &Circuit) -> Result<StaticMultiport, Vec<Diagnostic>> {
     let mut faults = Vec::new();
-    let mut out = Behaviour {
+    let mut out = StaticMultiport {
         title: circuit.title.clone(),
         graph: topology::edges(circuit),
-        ..Behaviour::default()
+        ..StaticMultiport::default()
     };
     out.column("1");
     let reference = references(circuit, &mut out.notes);

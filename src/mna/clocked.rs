@@ -1,6 +1,6 @@
 //! Switches whose controls are straight sources alone.
 
-use super::{Behaviour, Column, SourcePort};
+use super::{Column, SourcePort, StaticMultiport};
 use crate::algebra::Field;
 use crate::circuit::source::Wave;
 
@@ -15,7 +15,7 @@ pub(crate) struct SourceControl {
     pub(crate) terms: Vec<(usize, f64)>,
 }
 
-impl Behaviour {
+impl StaticMultiport {
     /// The controls of switches that are straight sources alone, and by source whether it acts through such controls and nowhere else.
     pub(crate) fn source_controls(&self) -> (Vec<bool>, Vec<SourceControl>) {
         let reduced = self.ball();
@@ -55,7 +55,7 @@ impl Behaviour {
                 let is = |&k: &usize| straight(k) && place(self.sources[k].value) == Some(c);
                 match (0..self.sources.len()).find(is) {
                     Some(input) => terms.push((input, matrix.at(row, c).to_f64())),
-                    None if place(Behaviour::ONE) == Some(c) => {
+                    None if place(StaticMultiport::ONE) == Some(c) => {
                         constant = matrix.at(row, c).to_f64();
                     }
                     None => return None,

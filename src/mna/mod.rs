@@ -24,6 +24,7 @@ use crate::lcs::{Input, Port, PowerKind, Role};
 
 pub use assemble::behaviour;
 pub(crate) use clocked::SourceControl;
+pub use standard::StandardMultiport;
 
 /// An exact coefficient of an equation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -211,7 +212,7 @@ pub struct Power {
 
 /// The static multiport with its ports, `N [ports; 1] = 0`.
 #[derive(Debug, Clone, Default)]
-pub struct Behaviour {
+pub struct StaticMultiport {
     /// The netlist's title.
     pub title: String,
     /// All columns, by name, for messages; column 0 is the constant 1.
@@ -263,7 +264,7 @@ pub(crate) struct Reduced<F> {
     pub(crate) switches: Vec<(F, Option<F>)>,
 }
 
-impl Behaviour {
+impl StaticMultiport {
     /// The constant-1 column.
     pub const ONE: Column = 0;
 

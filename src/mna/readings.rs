@@ -1,7 +1,7 @@
 //! What is controlled and what is read: affine functions of potentials and currents.
 
 use super::assemble::Assembly;
-use super::{Behaviour, Coefficient, Equation, Observed, Power};
+use super::{Coefficient, Equation, Observed, Power, StaticMultiport};
 use crate::algebra::Value;
 use crate::circuit::{Affine, ElementId, Kind, Output, Probed, Quantity};
 use crate::lcs::PowerKind;
@@ -29,7 +29,7 @@ impl Assembly<'_> {
         if affine.constant != 0.0 {
             equation.push((
                 Coefficient::Plus(Value::binary(affine.constant)),
-                Behaviour::ONE,
+                StaticMultiport::ONE,
             ));
         }
         equation

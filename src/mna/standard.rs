@@ -1,12 +1,27 @@
-//! Piecewise-linear laws as ideal complementarity pairs, stated on the behaviour itself.
+//! Piecewise-linear laws as ideal complementarity pairs, stated on the multiport itself.
 
-use super::{Behaviour, Coefficient, Equation, Pair};
+use std::ops::Deref;
+
+use super::{Coefficient, Equation, Pair, StaticMultiport};
 use crate::algebra::Value;
 use crate::law::{Curve, Law};
 use crate::lcs::Role;
 
-impl Behaviour {
-    /// The same behaviour with every piecewise-linear law replaced by ideal pairs 0 ≤ p ⟂ q ≥ 0; other laws stay as they are.
+/// A static multiport whose piecewise-linear laws are ideal pairs: what the reductions of modes, the steppers and the exact integrator take.
+/// [`StaticMultiport::standard`] alone makes one, so that no other multiport is mistaken for it.
+#[derive(Debug, Clone)]
+pub struct StandardMultiport(pub(super) StaticMultiport);
+
+impl Deref for StandardMultiport {
+    type Target = StaticMultiport;
+
+    fn deref(&self) -> &StaticMultiport {
+        &self.0
+    }
+}
+
+impl StaticMultiport {
+    /// The same multiport with every piecewise-linear law replaced by ideal pairs 0 ≤ p ⟂ q ≥ 0; other laws stay as they are.
     ///
     /// A curve with corners V_1 … V_K, a first ray d_0, segments V_{k+1} − V_k = T_k d_k and a last ray d_K is
     ///
@@ -22,7 +37,7 @@ impl Behaviour {
     /// diode, a source and a resistor in parallel for every corner: a circuit, so that λ_k y_k is power and D + Dᵀ ⪰ 0 for any
     /// number of corners.
     #[must_use]
-    pub fn standard(&self) -> Self {
+    pub fn standard(&self) -> StandardMultiport {
         let mut out = Self {
             ball: std::sync::OnceLock::new(),
             rational: std::sync::OnceLock::new(),
@@ -40,16 +55,16 @@ impl Behaviour {
                 _ => out.pairs.push(pair.clone()),
             }
         }
-        out
+        StandardMultiport(out)
     }
 }
 
-impl Behaviour {
-    /// The same behaviour with the other quantity of every device preferred as λ.
+impl StandardMultiport {
+    /// The same multiport with the other quantity of every device preferred as λ.
     #[must_use]
     pub fn in_other_roles(&self) -> Self {
         let mut out = self.clone();
-        for pair in out.pairs.iter_mut().filter(|pair| !pair.fixed_role) {
+        for pair in out.0.pairs.iter_mut().filter(|pair| !pair.fixed_role) {
             pair.port.role = match pair.port.role {
                 Role::Voltage => Role::Current,
                 Role::Current => Role::Voltage,
@@ -137,7 +152,7 @@ fn middle(curve: &Curve) -> Option<usize> {
 
 /// The middle segment as a resistor, and for every corner V_k, with the growth G_k of the conductance beyond it,
 /// 0 ≤ i_k ⟂ V_k + i_k/G_k − v ≥ 0 above and 0 ≤ i_k ⟂ v − V_k + i_k/G_k ≥ 0 below; i is the sum.
-fn branches(out: &mut Behaviour, pair: &Pair, curve: &Curve, middle: usize) {
+fn branches(out: &mut StaticMultiport, pair: &Pair, curve: &Curve, middle: usize) {
     let device = &pair.port.device;
     out.internal.push(pair.reverse);
     out.internal.push(pair.forward);
@@ -148,7 +163,7 @@ fn branches(out: &mut Behaviour, pair: &Pair, curve: &Curve, middle: usize) {
     let mut v: Equation = vec![(Coefficient::ONE, pair.reverse)];
     let mut i: Equation = vec![(Coefficient::MINUS_ONE, pair.forward)];
     for (equation, from, to) in [(&mut v, v0, v1), (&mut i, i0, i1)] {
-        equation.push((Coefficient::Plus(from), Behaviour::ONE));
+        equation.push((Coefficient::Plus(from), StaticMultiport::ONE));
         equation.push((Coefficient::Plus(to), along));
         equation.push((Coefficient::Minus(from), along));
     }
@@ -169,11 +184,11 @@ fn branches(out: &mut Behaviour, pair: &Pair, curve: &Curve, middle: usize) {
             branch.push((Coefficient::Plus(Value::binary(growth.recip())), forward));
         }
         if above {
-            branch.push((Coefficient::Plus(corner), Behaviour::ONE));
+            branch.push((Coefficient::Plus(corner), StaticMultiport::ONE));
             branch.push((Coefficient::ONE, pair.reverse));
             i.push((Coefficient::ONE, forward));
         } else {
-            branch.push((Coefficient::Minus(corner), Behaviour::ONE));
+            branch.push((Coefficient::Minus(corner), StaticMultiport::ONE));
             branch.push((Coefficient::MINUS_ONE, pair.reverse));
             i.push((Coefficient::MINUS_ONE, forward));
         }
@@ -185,7 +200,12 @@ fn branches(out: &mut Behaviour, pair: &Pair, curve: &Curve, middle: usize) {
 }
 
 /// Adds an ideal pair between these columns to the law of `pair`, which it is a part of.
-fn push_ideal(out: &mut Behaviour, pair: &Pair, name: String, (reverse, forward): (usize, usize)) {
+fn push_ideal(
+    out: &mut StaticMultiport,
+    pair: &Pair,
+    name: String,
+    (reverse, forward): (usize, usize),
+) {
     let mut port = pair.port.clone();
     port.law = Law::ideal_diode();
     port.role = Role::Voltage;
@@ -201,7 +221,7 @@ fn push_ideal(out: &mut Behaviour, pair: &Pair, name: String, (reverse, forward)
     });
 }
 
-fn expand(out: &mut Behaviour, pair: &Pair, curve: Curve) {
+fn expand(out: &mut StaticMultiport, pair: &Pair, curve: Curve) {
     let shape = shape(curve);
     let count = shape.pieces.len();
     let device = &pair.port.device;
@@ -213,10 +233,13 @@ fn expand(out: &mut Behaviour, pair: &Pair, curve: Curve) {
     } else {
         Coefficient::ONE
     };
-    let mut v: Equation = vec![(along_v, pair.reverse), (shape.corner.0, Behaviour::ONE)];
+    let mut v: Equation = vec![
+        (along_v, pair.reverse),
+        (shape.corner.0, StaticMultiport::ONE),
+    ];
     let mut i: Equation = vec![
         (Coefficient::MINUS_ONE, pair.forward),
-        (shape.corner.1, Behaviour::ONE),
+        (shape.corner.1, StaticMultiport::ONE),
     ];
     let mut slack = out.column(format!("{device}.a"));
     v.push((shape.first.0.negated(), slack));
@@ -235,7 +258,7 @@ fn expand(out: &mut Behaviour, pair: &Pair, curve: Curve) {
             out.equations.push(vec![
                 (Coefficient::ONE, slack),
                 (Coefficient::ONE, t),
-                (Coefficient::Minus(length), Behaviour::ONE),
+                (Coefficient::Minus(length), StaticMultiport::ONE),
             ]);
         }
     }

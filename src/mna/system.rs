@@ -2,11 +2,11 @@
 
 use nalgebra::DMatrix;
 
-use super::{Behaviour, Coefficient, Equation, Observed, Pair, SourcePort, StoragePort};
+use super::{Coefficient, Equation, Observed, Pair, SourcePort, StaticMultiport, StoragePort};
 use crate::algebra::Value;
 use crate::lcs::{Lcs, Role};
 
-impl Behaviour {
+impl StaticMultiport {
     /// The behaviour x' = A x + B λ + E u + e, y = C x + D λ + G u + F, with the stored energy as metric where it is
     /// positive definite, else the identity.
     ///

@@ -11,7 +11,7 @@
 use nalgebra::{DMatrix, DVector, dmatrix};
 
 use circ::law::Law;
-use circ::lcs::{Lcs, Outputs, Port, PowerKind, PowerTerm, Role, Rows, State, Storage};
+use circ::lcs::{Lcs, LcsParts, Outputs, Port, PowerKind, PowerTerm, Role, Rows, State, Storage};
 
 pub const R: f64 = 1e3;
 pub const C: f64 = 1e-6;
@@ -28,7 +28,7 @@ pub fn system(
 ) -> Lcs {
     let (n, m) = (a.nrows(), d.nrows());
     let metric = DMatrix::from_diagonal(&DVector::from_row_slice(stored));
-    Lcs {
+    Lcs::new(LcsParts {
         states: states
             .iter()
             .map(|(s, unit)| State {
@@ -72,8 +72,9 @@ pub fn system(
             inject_one: DVector::zeros(n),
             initial: DVector::zeros(n),
         },
-        ..Lcs::default()
-    }
+        ..LcsParts::default()
+    })
+    .expect("parts that fit")
 }
 
 fn port(name: &str, role: Role) -> Port {
@@ -93,7 +94,7 @@ fn port(name: &str, role: Role) -> Port {
 }
 
 /// Adds a resistor to the energy balance whose voltage is `weights`·λ.
-fn resistor(mut lcs: Lcs, ohms: f64, weights: &[f64], x: &[f64]) -> Lcs {
+fn resistor(lcs: Lcs, ohms: f64, weights: &[f64], x: &[f64]) -> Lcs {
     let row = |scale: f64| Rows {
         x: DMatrix::from_row_slice(1, x.len(), x) * scale,
         lambda: DMatrix::from_row_slice(1, weights.len(), weights) * scale,
@@ -101,13 +102,15 @@ fn resistor(mut lcs: Lcs, ohms: f64, weights: &[f64], x: &[f64]) -> Lcs {
         du: DMatrix::zeros(1, 0),
         one: DVector::zeros(1),
     };
-    lcs.outputs.power = vec![PowerTerm {
-        element: "r1".into(),
-        kind: PowerKind::Dissipated,
-    }];
-    lcs.outputs.power_v = row(1.0);
-    lcs.outputs.power_i = row(1.0 / ohms);
-    lcs
+    lcs.changed(|parts| {
+        parts.outputs.power = vec![PowerTerm {
+            element: "r1".into(),
+            kind: PowerKind::Dissipated,
+        }];
+        parts.outputs.power_v = row(1.0);
+        parts.outputs.power_i = row(1.0 / ohms);
+    })
+    .expect("rows that fit")
 }
 
 /// Half-wave rectifier RLCD: x = (v_C, i_L), λ = i_D.

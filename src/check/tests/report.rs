@@ -67,8 +67,8 @@ fn circuits_without_states_or_ports_are_reported_too() {
 
 #[test]
 fn an_energy_that_is_not_given_is_looked_for() {
-    let mut circuit = bridge();
-    circuit.energy = DMatrix::zeros(0, 0);
+    let unknown = bridge().changed(|parts| parts.energy = DMatrix::zeros(0, 0));
+    let circuit = unknown.unwrap();
     let report = system(&circuit);
     assert_eq!((report.passive, report.p_from), (Some(true), Some("lmi")));
     assert_eq!(

@@ -30,7 +30,7 @@ fn a_negative_resistor_with_a_diode_rests_in_two_states() {
         dmatrix![-1.5],
         dmatrix![1.0],
     );
-    circuit.e0[0] = 0.5;
+    change(&mut circuit, |s| s.e0[0] = 0.5);
     let report = system(&circuit);
     assert_eq!(report.passive, Some(false));
     let equilibria = report.equilibria.clone().unwrap();
@@ -55,8 +55,8 @@ fn circuits_without_states_show_their_solutions_or_that_there_is_none() {
         dmatrix![-R],
         none,
     );
-    circuit.ports[0].lambda = "i(d1)".into();
-    circuit.f[0] = 1.0;
+    change(&mut circuit, |s| s.ports[0].lambda = "i(d1)".into());
+    change(&mut circuit, |s| s.f[0] = 1.0);
     let report = system(&circuit);
     let currents: Vec<f64> = report
         .equilibria
@@ -71,7 +71,7 @@ fn circuits_without_states_show_their_solutions_or_that_there_is_none() {
             .contains("equilibrium   i(d1) = 1.000000e-3"),
         "{report}"
     );
-    circuit.f[0] = -1.0;
+    change(&mut circuit, |s| s.f[0] = -1.0);
     let report = system(&circuit);
     assert_eq!(report.equilibria, Some(Vec::new()));
     assert!(
@@ -104,7 +104,7 @@ fn dissipation_decides_where_a_circuit_with_ideal_diodes_comes_to_rest() {
         dmatrix![R],
         dmatrix![C],
     );
-    detector.f[0] = -5.0;
+    change(&mut detector, |s| s.f[0] = -5.0);
     let report = system(&detector);
     let long_run = report.convergence.unwrap();
     assert_eq!(
@@ -115,7 +115,7 @@ fn dissipation_decides_where_a_circuit_with_ideal_diodes_comes_to_rest() {
     );
     assert!(long_run.moving.is_empty());
     // With a load across C the diode conducts at rest: (5 − v)/R = v/R.
-    detector.a[(0, 0)] = -1.0 / (R * C);
+    change(&mut detector, |s| s.a[(0, 0)] = -1.0 / (R * C));
     let report = system(&detector);
     let to = report.convergence.unwrap().to.unwrap();
     assert!((to[0] - 2.5).abs() < 1e-9, "{to:?}");
@@ -169,8 +169,8 @@ fn comparators_are_read_with_the_sign_of_their_feedback() {
         dmatrix![0.0],
         dmatrix![1.0],
     );
-    relay.ports[0].role = Role::Function;
-    relay.ports[0].law = Law::Curve(curve);
+    change(&mut relay, |s| s.ports[0].role = Role::Function);
+    change(&mut relay, |s| s.ports[0].law = Law::Curve(curve));
     let report = system(&relay);
     assert_eq!(
         theorem(&report, "RR-7158 Theorem 2").holds,
@@ -179,7 +179,7 @@ fn comparators_are_read_with_the_sign_of_their_feedback() {
     );
     assert!(theorem(&report, "RR-7158 Remark 7").gives.contains("1/2"));
     // With positive feedback there is no P with PB = Cᵀ.
-    relay.c = dmatrix![1.0];
+    change(&mut relay, |s| s.c = dmatrix![1.0]);
     assert_eq!(
         theorem(&system(&relay), "RR-7158 Theorem 2").holds,
         Some(false)

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::integrate::run::{Reason, SimError};
 use crate::integrate::switching::Threshold;
 use crate::lcs::{Hold, Lcs, Position, StorageHold, is_coupled, reduce_apart};
-use crate::mna::{Behaviour, SourceControl};
+use crate::mna::{SourceControl, StandardMultiport, StaticMultiport};
 
 /// A jump of a function block's output at one value of its input: while the first pair conducts and the second does not, the
 /// output is between the two levels and the input stays.
@@ -17,8 +17,8 @@ pub(crate) struct Step {
     pub(crate) pair: usize,
 }
 
-/// Where the function blocks of a behaviour jump; pairs are those of its [standard form](Behaviour::standard).
-pub(crate) fn steps_of(original: &Behaviour) -> Vec<Step> {
+/// Where the function blocks of a multiport jump; pairs are those of its [standard form](StaticMultiport::standard).
+pub(crate) fn steps_of(original: &StaticMultiport) -> Vec<Step> {
     let mut steps = Vec::new();
     let mut first = 0;
     for pair in &original.pairs {
@@ -39,12 +39,12 @@ pub(crate) fn steps_of(original: &Behaviour) -> Vec<Step> {
     steps
 }
 
-/// Reduces one behaviour (with ideal pairs) for its modes.
+/// Reduces one multiport for its modes.
 #[derive(Debug)]
 pub struct Assembler {
-    behaviour: Arc<Behaviour>,
-    /// The behaviours with some switches on their thresholds.
-    sliding: Vec<(Vec<usize>, Behaviour)>,
+    multiport: Arc<StandardMultiport>,
+    /// The multiports with some switches on their thresholds.
+    sliding: Vec<(Vec<usize>, StandardMultiport)>,
     steps: Vec<Step>,
     /// The longest step, s.
     span: f64,
@@ -53,11 +53,11 @@ pub struct Assembler {
 }
 
 impl Assembler {
-    /// For a behaviour whose laws are ideal pairs, see [`Behaviour::standard`].
+    /// For one multiport.
     #[must_use]
-    pub fn new(behaviour: Arc<Behaviour>) -> Self {
+    pub fn new(multiport: Arc<StandardMultiport>) -> Self {
         Self {
-            behaviour,
+            multiport,
             sliding: Vec::new(),
             steps: Vec::new(),
             span: f64::INFINITY,
@@ -90,30 +90,30 @@ impl Assembler {
         &self.steps
     }
 
-    /// See [`Behaviour::source_controls`].
+    /// See [`StaticMultiport::source_controls`].
     pub(crate) fn controls(&self) -> (Vec<bool>, Vec<SourceControl>) {
-        self.behaviour.source_controls()
+        self.multiport.source_controls()
     }
 
     /// Number of device pairs.
     pub(crate) fn pairs(&self) -> usize {
-        self.behaviour.pairs.len()
+        self.multiport.pairs.len()
     }
 
     /// The device of a pair.
     pub(crate) fn device(&self, pair: usize) -> Option<&str> {
-        let pair = self.behaviour.pairs.get(pair)?;
+        let pair = self.multiport.pairs.get(pair)?;
         Some(&pair.port.device)
     }
 
     /// The switches' thresholds.
     pub(crate) fn thresholds(&self) -> Vec<Threshold> {
-        self.behaviour.switches.iter().map(Threshold::of).collect()
+        self.multiport.switches.iter().map(Threshold::of).collect()
     }
 
     /// Ron and 1/Roff of a switch.
     pub(crate) fn limits(&self, switch: usize) -> (f64, f64) {
-        let switch = &self.behaviour.switches[switch];
+        let switch = &self.multiport.switches[switch];
         (switch.ron.f64, switch.roff.map_or(0.0, |r| 1.0 / r.f64))
     }
 
@@ -137,23 +137,23 @@ impl Assembler {
                 switches: switches.to_vec(),
                 storage: StorageHold::Dynamic,
             };
-            return reduce_apart(&self.behaviour, &position, self.span)
+            return reduce_apart(&self.multiport, &position, self.span)
                 .map_err(|e| SimError::before(e.into()));
         }
         let at = match self.sliding.iter().position(|(s, _)| s == sliding) {
             Some(at) => at,
             None => {
-                let mut behaviour = Behaviour::clone(&self.behaviour);
+                let mut multiport = StandardMultiport::clone(&self.multiport);
                 // From the last on, so that the indices before stay.
                 for &k in sliding.iter().rev() {
-                    let switch = &self.behaviour.switches[k];
+                    let switch = &self.multiport.switches[k];
                     let level = 0.5 * (switch.on_above + switch.off_below);
-                    behaviour = behaviour.sliding(k, level).ok_or_else(|| {
+                    multiport = multiport.sliding(k, level).ok_or_else(|| {
                         let what = format!("{} cannot slide", switch.name);
                         SimError::before(Reason::internal("integrate::exact", what))
                     })?;
                 }
-                self.sliding.push((sliding.to_vec(), behaviour));
+                self.sliding.push((sliding.to_vec(), multiport));
                 self.sliding.len() - 1
             }
         };

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub use read::read;
 pub use write::write;
 
-use super::Lcs;
+use super::{Lcs, LcsError};
 use crate::circuit::Tran;
 use crate::circuit::source::{Form, WaveError};
 use crate::law::CurveError;
@@ -50,6 +50,9 @@ pub enum JsonError {
     /// An entry that is not finite.
     #[error("{0} has an entry that is not finite")]
     NotFinite(&'static str),
+    /// Parts that make no system.
+    #[error(transparent)]
+    Unfit(#[from] LcsError),
     /// A port whose two names fit no role.
     #[error("port `{0}`: λ must be `i(NAME)` or `-v(NAME)` with y the other, or a block's output")]
     Role(String),

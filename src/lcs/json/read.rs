@@ -7,7 +7,7 @@ use crate::algebra::Value;
 use crate::circuit::Tran;
 use crate::circuit::source::Source;
 use crate::law::{Breakdown, Corner, Curve, Exponential, Law, Rounded};
-use crate::lcs::{Input, Lcs, Outputs, Port, Role, Rows, State, Storage};
+use crate::lcs::{Input, Lcs, LcsParts, Outputs, Port, Role, Rows, State, Storage};
 
 fn unit(text: &str) -> &'static str {
     match text {
@@ -273,7 +273,7 @@ pub fn read(text: &str) -> Result<SystemFile, JsonError> {
         }
     };
     let x0 = vector("x0", &doc.x0, n)?;
-    let lcs = Lcs {
+    let lcs = Lcs::new(LcsParts {
         title: doc.title.clone(),
         a: matrix("A", &doc.a, (n, n))?,
         b: optional("B", &doc.b, (n, m))?,
@@ -303,7 +303,7 @@ pub fn read(text: &str) -> Result<SystemFile, JsonError> {
         shift,
         energy,
         outputs,
-        ..Lcs::default()
-    };
+        ..LcsParts::default()
+    })?;
     Ok(SystemFile { lcs, x0, tran })
 }

@@ -2,7 +2,7 @@
 
 use crate::algebra::{Elimination, Field, Matrix};
 use crate::diagnostic::Internal;
-use crate::mna::{Behaviour, Column, Reduced};
+use crate::mna::{Column, Reduced, StaticMultiport};
 
 use super::{ClassOrder, Hold, Position, ReduceError, StorageHold};
 
@@ -29,7 +29,7 @@ pub(super) enum Columns {
 
 /// A behaviour after the elimination in class order.
 pub(super) struct Eliminated<'b, F> {
-    pub(super) behaviour: &'b Behaviour,
+    pub(super) behaviour: &'b StaticMultiport,
     pub(super) reduced: &'b Reduced<F>,
     pub(super) position: &'b Position,
     pub(super) matrix: Matrix<F>,
@@ -50,7 +50,7 @@ pub(super) struct Eliminated<'b, F> {
 
 impl<'b, F: Field> Eliminated<'b, F> {
     pub(super) fn new(
-        behaviour: &'b Behaviour,
+        behaviour: &'b StaticMultiport,
         reduced: &'b Reduced<F>,
         position: &'b Position,
         order: ClassOrder,
@@ -164,7 +164,7 @@ impl<'b, F: Field> Eliminated<'b, F> {
         for &c in &self.reduced.free {
             self.unknown.push((place(c)?, behaviour.columns[c].clone()));
         }
-        self.columns[place(Behaviour::ONE)?] = Columns::One;
+        self.columns[place(StaticMultiport::ONE)?] = Columns::One;
         Ok(())
     }
 

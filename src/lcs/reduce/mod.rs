@@ -24,9 +24,9 @@ mod system;
 
 use crate::algebra::Field;
 use crate::diagnostic::Internal;
-use crate::mna::{Behaviour, Reduced};
+use crate::mna::{Reduced, StaticMultiport};
 
-use super::{Hold, Lcs, Role};
+use super::{Hold, Lcs, LcsError, LcsParts, Role};
 use eliminated::Eliminated;
 use publish::publish;
 pub(crate) use separate::is_coupled;
@@ -55,7 +55,7 @@ pub enum StorageHold {
 impl Position {
     /// All devices free, the given switch positions.
     #[must_use]
-    pub fn free(behaviour: &Behaviour, switches: Vec<bool>) -> Self {
+    pub fn free(behaviour: &StaticMultiport, switches: Vec<bool>) -> Self {
         Self {
             devices: vec![Hold::Free; behaviour.pairs.len()],
             switches,
@@ -117,6 +117,9 @@ pub enum ReduceError {
         /// Storage labels.
         elements: Vec<String>,
     },
+    /// Its matrices are none that doubles hold.
+    #[error(transparent)]
+    Unfit(#[from] LcsError),
     /// A broken invariant.
     #[error("{0}")]
     Internal(Internal),
@@ -127,7 +130,7 @@ impl ReduceError {
     #[must_use]
     pub fn elements(&self) -> Vec<&str> {
         let (first, rest): (Option<&str>, &[String]) = match self {
-            Self::Position { .. } | Self::Internal(_) => (None, &[]),
+            Self::Position { .. } | Self::Unfit(_) | Self::Internal(_) => (None, &[]),
             Self::NotIdeal { device } => (Some(device), &[]),
             Self::Sources { elements } | Self::Port { elements } => (None, elements),
             Self::Feedthrough { storage, ports } => (Some(storage), ports),
@@ -158,11 +161,11 @@ fn conflict(elements: &[String]) -> String {
 /// Reduces a behaviour to the system of one position.
 ///
 /// With all devices [`Hold::Free`] this is the complementarity system; with all held it is the linear system of that
-/// mode, whose guards stand in [`Lcs::held`].
+/// mode, whose guards stand in [`held`](LcsParts::held).
 ///
 /// # Errors
 /// [`ReduceError`], naming elements, where the position has no such system.
-pub fn reduce(behaviour: &Behaviour, position: &Position) -> Result<Lcs, ReduceError> {
+pub fn reduce(behaviour: &StaticMultiport, position: &Position) -> Result<Lcs, ReduceError> {
     reduce_in(behaviour, position, None)
 }
 
@@ -172,7 +175,7 @@ pub fn reduce(behaviour: &Behaviour, position: &Position) -> Result<Lcs, ReduceE
 /// # Errors
 /// As [`reduce`].
 pub(crate) fn reduce_apart(
-    behaviour: &Behaviour,
+    behaviour: &StaticMultiport,
     position: &Position,
     span: f64,
 ) -> Result<Lcs, ReduceError> {
@@ -180,24 +183,26 @@ pub(crate) fn reduce_apart(
 }
 
 fn reduce_in(
-    behaviour: &Behaviour,
+    behaviour: &StaticMultiport,
     position: &Position,
     apart: Option<f64>,
 ) -> Result<Lcs, ReduceError> {
     check(behaviour, position)?;
-    let (lcs, precise) = published(behaviour, behaviour.ball(), position, apart)?;
-    if precise || behaviour.inexact {
-        return Ok(lcs);
-    }
-    Ok(published(behaviour, behaviour.rational(), position, apart)?.0)
+    let (parts, precise) = published(behaviour, behaviour.ball(), position, apart)?;
+    let parts = if precise || behaviour.inexact {
+        parts
+    } else {
+        published(behaviour, behaviour.rational(), position, apart)?.0
+    };
+    Ok(Lcs::new(parts)?)
 }
 
 fn published<F: Field>(
-    behaviour: &Behaviour,
+    behaviour: &StaticMultiport,
     reduced: &Reduced<F>,
     position: &Position,
     apart: Option<f64>,
-) -> Result<(Lcs, bool), ReduceError> {
+) -> Result<(LcsParts, bool), ReduceError> {
     let mut reduction = in_some_order(behaviour, reduced, position)?;
     if let Some(span) = apart {
         reduction.separate(span);
@@ -205,7 +210,7 @@ fn published<F: Field>(
     Ok(publish(behaviour, position, &reduction))
 }
 
-fn check(behaviour: &Behaviour, position: &Position) -> Result<(), ReduceError> {
+fn check(behaviour: &StaticMultiport, position: &Position) -> Result<(), ReduceError> {
     let counts = [
         ("devices", position.devices.len(), behaviour.pairs.len()),
         (
@@ -249,7 +254,7 @@ enum ClassOrder {
 
 /// The reduction over one field.
 fn in_some_order<F: Field>(
-    behaviour: &Behaviour,
+    behaviour: &StaticMultiport,
     reduced: &Reduced<F>,
     position: &Position,
 ) -> Result<Reduction<F>, ReduceError> {
@@ -314,11 +319,11 @@ struct Reduction<F> {
 pub(super) mod oracle {
     use super::*;
 
-    type Published = Result<(Lcs, bool), ReduceError>;
+    type Published = Result<(LcsParts, bool), ReduceError>;
 
     /// The system over balls (with whether it is precise) and over rationals.
     pub(in crate::lcs) fn both(
-        behaviour: &Behaviour,
+        behaviour: &StaticMultiport,
         position: &Position,
     ) -> (Published, Published) {
         let ball = in_some_order(behaviour, behaviour.ball(), position);
@@ -331,7 +336,7 @@ pub(super) mod oracle {
 
     /// Whether the standard order of classes suffices.
     pub(in crate::lcs) fn standard_order_suffices(
-        behaviour: &Behaviour,
+        behaviour: &StaticMultiport,
         position: &Position,
     ) -> bool {
         let order = ClassOrder::Standard;

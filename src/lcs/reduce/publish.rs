@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::algebra::Field;
-use crate::lcs::{Held, Hold, Lcs, Outputs, Port, PowerTerm, Role, Rows, State, Storage};
-use crate::mna::Behaviour;
+use crate::lcs::{Held, Hold, LcsParts, Outputs, Port, PowerTerm, Role, Rows, State, Storage};
+use crate::mna::StaticMultiport;
 
 use super::{Position, Reduction};
 
@@ -54,10 +54,10 @@ fn slices<F>(rows: &[Vec<F>]) -> Vec<&[F]> {
 
 /// The system as doubles, and whether every entry is within 1e-14 of the exact one.
 pub(super) fn publish<F: Field>(
-    behaviour: &Behaviour,
+    behaviour: &StaticMultiport,
     position: &Position,
     reduction: &Reduction<F>,
-) -> (Lcs, bool) {
+) -> (LcsParts, bool) {
     let r = reduction;
     let (n, m, p, q) = (
         r.states.len(),
@@ -142,7 +142,7 @@ pub(super) fn publish<F: Field>(
             behaviour.storage.iter().map(|s| s.initial.unwrap_or(0.0)),
         ),
     };
-    let lcs = Lcs {
+    let parts = LcsParts {
         title: behaviour.title.clone(),
         fast: r.fast.clone(),
         states: r.states.iter().map(|&k| state(behaviour, k)).collect(),
@@ -174,10 +174,10 @@ pub(super) fn publish<F: Field>(
         held,
         notes: r.notes.clone(),
     };
-    (lcs, round.precise)
+    (parts, round.precise)
 }
 
-fn state(behaviour: &Behaviour, k: usize) -> State {
+fn state(behaviour: &StaticMultiport, k: usize) -> State {
     let storage = &behaviour.storage[k];
     State {
         name: storage.name.clone(),
@@ -185,7 +185,7 @@ fn state(behaviour: &Behaviour, k: usize) -> State {
     }
 }
 
-fn port(behaviour: &Behaviour, k: usize, role: Role) -> Port {
+fn port(behaviour: &StaticMultiport, k: usize, role: Role) -> Port {
     let pair = &behaviour.pairs[k];
     let (lambda, y) = match role {
         Role::Voltage => (&pair.reverse_name, &pair.forward_name),

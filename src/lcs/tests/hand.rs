@@ -1,7 +1,7 @@
 //! Systems derived by hand.
 
 use super::*;
-use crate::mna::Behaviour;
+use crate::mna::StaticMultiport;
 
 const C: f64 = 1e-6;
 const L: f64 = 10e-3;
@@ -209,13 +209,20 @@ fn a_conflict_names_what_joins_the_sources() {
         "i1 s1"
     );
     // At an operating point the source's value at that instant decides.
-    let operating_point = |text: &str| at(text, &[], StorageHold::Static).unwrap().held;
+    let operating_point = |text: &str| {
+        at(text, &[], StorageHold::Static)
+            .unwrap()
+            .into_parts()
+            .held
+    };
     let found = operating_point("v1 1 0 5\n l1 1 2 1m\n l2 2 0 1m");
     assert_eq!(found.constrained, [["v1", "l1", "l2"]]);
     assert_matrix("v1 = 0", &found.constraints.u, &[&[1.0]]);
     let found = operating_point("i1 0 1 5\n c1 1 2 1u\n r1 2 0 1");
     assert_eq!(found.constrained, [["i1", "c1"]]);
-    let found = held("v1 1 0 5\n d1 1 2\n d2 2 0\n r1 1 2 1", "cc").held;
+    let found = held("v1 1 0 5\n d1 1 2\n d2 2 0\n r1 1 2 1", "cc")
+        .into_parts()
+        .held;
     assert_eq!(found.constrained, [["v1", "d1", "d2"]]);
 }
 
@@ -316,7 +323,7 @@ fn measured_matrices_reduce_like_the_circuit_they_came_from() {
         &Position::free(&circuit_behaviour, Vec::new()),
     )
     .unwrap();
-    let matrices = Behaviour::from_lcs(&s);
+    let matrices = StaticMultiport::from_lcs(&s);
     let again = reduce(&matrices, &Position::free(&matrices, Vec::new())).unwrap();
     assert_eq!(
         (&again.a, &again.b, &again.c, &again.d),

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::*;
 use crate::circuit::load::load;
 use crate::circuit::{Circuit, ElaborateOptions};
+use crate::lcs::LcsParts;
 use crate::lcs::format::{Format, format};
 
 pub(super) fn netlist(name: &str) -> Circuit {
@@ -26,7 +27,7 @@ fn system(name: &str) -> Lcs {
 }
 
 /// Exchanges λ and y of one port: a principal pivot.
-fn exchange(s: &mut Lcs, j: usize) {
+fn exchange(s: &mut LcsParts, j: usize) {
     let pivot = s.d[(j, j)];
     let (row_c, row_d, row_g, f) = (
         s.c.row(j).into_owned(),
@@ -74,7 +75,7 @@ fn exchange(s: &mut Lcs, j: usize) {
 }
 
 /// Exchanges λ and y of two ports at once, where each alone has a zero pivot.
-fn exchange_both(s: &mut Lcs, j: usize, k: usize) {
+fn exchange_both(s: &mut LcsParts, j: usize, k: usize) {
     // A mixing of the two rows makes both pivots nonzero: pivot on (j, k) and (k, j), then swap the names.
     let (djk, dkj) = (s.d[(j, k)], s.d[(k, j)]);
     assert!(djk != 0.0 && dkj != 0.0, "no pivot");
@@ -138,7 +139,8 @@ fn exchange_both(s: &mut Lcs, j: usize, k: usize) {
 }
 
 /// Brings the ports into the order and roles that `lambda` names.
-fn arranged(mut s: Lcs, lambda: &[&str]) -> Lcs {
+fn arranged(s: Lcs, lambda: &[&str]) -> Lcs {
+    let mut s = s.into_parts();
     loop {
         let wrong: Vec<usize> = (0..s.m())
             .filter(|&j| !lambda.contains(&s.ports[j].lambda.as_str()))
@@ -169,7 +171,7 @@ fn arranged(mut s: Lcs, lambda: &[&str]) -> Lcs {
     s.g = s.g.select_rows(&order);
     s.f = DVector::from_iterator(order.len(), order.iter().map(|&j| s.f[j]));
     s.ports = order.iter().map(|&j| s.ports[j].clone()).collect();
-    s
+    Lcs::new(s).unwrap()
 }
 
 const C: f64 = 1e-6;

@@ -23,3 +23,7 @@ pub(crate) const PIVOT_CHOICE: f64 = 1e-2;
 /// Relative radius up to which a ball counts as known. Larger: digits of the matrices are lost; smaller: rationals where double-doubles
 /// would do.
 pub(crate) const BALL_KNOWN: f64 = 1e-14;
+
+/// A matrix of stored energy is symmetric to this part of its largest entry. Larger: energies that are none pass; smaller: rounding of a product
+/// refuses them.
+pub(crate) const SYMMETRIC: f64 = 1e-12;

@@ -68,8 +68,8 @@ fn simulate_circuit(circuit: &Circuit) -> Result<Run, SimError> {
     let columns = lcs.outputs.names.len();
     let frame = Frame {
         title: String::new(),
-        names: lcs.outputs.names,
-        units: lcs.outputs.units,
+        names: lcs.outputs.names.clone(),
+        units: lcs.outputs.units.clone(),
         grid: Grid {
             tstart: tran.tstart,
             tstep: tran.tstep,
