@@ -1,6 +1,6 @@
 //! What is wrong with the input, as data. Rendering is the command line's business.
 
-use std::fmt;
+use std::fmt::{self, Display, Formatter};
 
 /// How bad a finding is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
@@ -216,6 +216,41 @@ impl fmt::Display for Diagnostic {
         f.write_str(&self.message)
     }
 }
+
+/// Everything that is wrong with a netlist; prints a line a finding, `file:line:column: message`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Faults {
+    /// The findings, those that are no errors included.
+    pub findings: Vec<Diagnostic>,
+    /// The files they point into.
+    pub sources: SourceMap,
+}
+
+impl Display for Faults {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let errors = self
+            .findings
+            .iter()
+            .filter(|d| d.severity == Severity::Error);
+        for (k, finding) in errors.enumerate() {
+            if k > 0 {
+                writeln!(f)?;
+            }
+            if let Some(span) = finding.span {
+                let (line, column) = self.sources.line_column(span);
+                write!(
+                    f,
+                    "{}:{line}:{column}: ",
+                    self.sources.files[span.file.0 as usize].path
+                )?;
+            }
+            write!(f, "{}", finding.message)?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for Faults {}
 
 #[cfg(test)]
 mod tests {

@@ -73,13 +73,13 @@ pub mod waveform;
 pub mod cli;
 
 pub use circuit::{Circuit, Diodes, ElaborateOptions};
-pub use diagnostic::{Diagnostic, Severity};
+pub use diagnostic::{Diagnostic, Faults, Severity};
 pub use integrate::{
     Change, Checkpoint, Event, Method, OperatingPoint, Run, SimError, SimOptions, Simulation,
     SimulationOptions, Stop, StopReason,
 };
 pub use lcs::Lcs;
-pub use model::{Faults, Model};
+pub use model::Model;
 pub use waveform::Waveforms;
 
 /// Compiles and runs the README's example.

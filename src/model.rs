@@ -1,16 +1,15 @@
 //! A circuit to be analysed again and again, with other values.
 
-use std::fmt::{self, Display, Formatter};
 use std::path::Path;
 
 use crate::circuit::source::Wave;
 use crate::circuit::{Circuit, ElaborateOptions, Element, Kind, Sweep, elaborate, load};
-use crate::diagnostic::{Diagnostic, Severity, SourceMap};
+use crate::diagnostic::{Diagnostic, Faults, SourceMap};
 use crate::integrate::{
-    OperatingPoint, Places, Reason, Run, SimError, SimOptions, Simulation, SimulationOptions,
-    Values, operating_point, simulate,
+    OperatingPoint, Places, Run, SimError, SimOptions, Simulation, SimulationOptions, Values,
+    operating_point, simulate,
 };
-use crate::lcs::{Lcs, Position, ReduceError, reduce};
+use crate::lcs::{Lcs, Position, reduce};
 use crate::mna::{self, StaticMultiport};
 use crate::netlist::{self, Netlist};
 use crate::settings::Settings;
@@ -43,8 +42,8 @@ impl Model {
     /// Reads a netlist file and what it includes.
     ///
     /// # Errors
-    /// [`Faults`]: everything that is wrong with it.
-    pub fn load(path: impl AsRef<Path>, options: ElaborateOptions) -> Result<Self, Faults> {
+    /// Everything that is wrong with it, in [`SimError::findings`].
+    pub fn load(path: impl AsRef<Path>, options: ElaborateOptions) -> Result<Self, SimError> {
         let load::Loaded {
             sources,
             netlist,
@@ -52,13 +51,14 @@ impl Model {
             diagnostics,
         } = load::load(path.as_ref(), &options);
         match (netlist, circuit) {
-            (Some(netlist), Some(circuit)) => {
-                Self::of(Some(netlist), sources, options, circuit, diagnostics)
-            }
-            _ => Err(Faults {
-                findings: diagnostics,
+            (Some(netlist), Some(circuit)) => Ok(Self::of(
+                Some(netlist),
                 sources,
-            }),
+                options,
+                circuit,
+                diagnostics,
+            )?),
+            _ => Err(refused(diagnostics, sources)),
         }
     }
 
@@ -66,7 +66,7 @@ impl Model {
     ///
     /// # Errors
     /// As [`Self::load`].
-    pub fn parse(text: &str, name: &str) -> Result<Self, Faults> {
+    pub fn parse(text: &str, name: &str) -> Result<Self, SimError> {
         Self::parse_with(text, name, ElaborateOptions::default())
     }
 
@@ -74,25 +74,31 @@ impl Model {
     ///
     /// # Errors
     /// As [`Self::load`].
-    pub fn parse_with(text: &str, name: &str, options: ElaborateOptions) -> Result<Self, Faults> {
+    pub fn parse_with(text: &str, name: &str, options: ElaborateOptions) -> Result<Self, SimError> {
         let mut sources = SourceMap::default();
         let root = sources.add(name, text);
         let (netlist, mut findings) = netlist::parse(&mut sources, root, &|path| load::read(path));
         let (circuit, more) = elaborate(&netlist, &options);
         findings.extend(more);
         match circuit {
-            Some(circuit) => Self::of(Some(netlist), sources, options, circuit, findings),
-            None => Err(Faults { findings, sources }),
+            Some(circuit) => Ok(Self::of(
+                Some(netlist),
+                sources,
+                options,
+                circuit,
+                findings,
+            )?),
+            None => Err(refused(findings, sources)),
         }
     }
 
     /// A circuit that a program built.
     ///
     /// # Errors
-    /// [`Faults`] of its topology: shorts and open branches that contradict each other.
-    pub fn of_circuit(circuit: Circuit) -> Result<Self, Faults> {
+    /// Findings on its topology: shorts and open branches that contradict each other.
+    pub fn of_circuit(circuit: Circuit) -> Result<Self, SimError> {
         let (sources, options) = (SourceMap::default(), ElaborateOptions::default());
-        Self::of(None, sources, options, circuit, vec![])
+        Ok(Self::of(None, sources, options, circuit, vec![])?)
     }
 
     pub(crate) fn of(
@@ -123,7 +129,7 @@ impl Model {
     ///
     /// # Errors
     /// There is no such element or parameter, or the circuit is none with that value; the model stays as it was.
-    pub fn set(&mut self, name: &str, value: f64) -> Result<(), Faults> {
+    pub fn set(&mut self, name: &str, value: f64) -> Result<(), SimError> {
         let name = name.to_lowercase();
         let mut options = self.options.clone();
         let values = match self.circuit.element(&name) {
@@ -170,7 +176,7 @@ impl Model {
     ///
     /// # Errors
     /// The netlist is no circuit with them, or there is no netlist.
-    pub fn at(&self, sweeps: &[Sweep], values: &[f64]) -> Result<Self, Faults> {
+    pub fn at(&self, sweeps: &[Sweep], values: &[f64]) -> Result<Self, SimError> {
         let circuit = self.circuit_at(sweeps, values)?;
         match mna::behaviour(&circuit) {
             Ok(multiport) => Ok(Self {
@@ -186,7 +192,7 @@ impl Model {
     }
 
     /// The circuit of that model, with the probes of this one.
-    pub(crate) fn circuit_at(&self, sweeps: &[Sweep], values: &[f64]) -> Result<Circuit, Faults> {
+    pub(crate) fn circuit_at(&self, sweeps: &[Sweep], values: &[f64]) -> Result<Circuit, SimError> {
         let Some(netlist) = &self.netlist else {
             let message = "a circuit without a netlist has no sweeps";
             return Err(self.faults(vec![Diagnostic::error("sweep", None, message)]));
@@ -211,18 +217,12 @@ impl Model {
                 multiport,
                 ..self.clone()
             }),
-            Err(findings) => {
-                let reason = self.faults(findings).to_string();
-                Err(SimError::before(Reason::Unsupported(reason)))
-            }
+            Err(findings) => Err(self.faults(findings)),
         }
     }
 
-    fn faults(&self, findings: Vec<Diagnostic>) -> Faults {
-        Faults {
-            findings,
-            sources: self.sources.clone(),
-        }
+    fn faults(&self, findings: Vec<Diagnostic>) -> SimError {
+        refused(findings, self.sources.clone())
     }
 
     /// Warnings and notes of the netlist.
@@ -287,11 +287,16 @@ impl Model {
     ///
     /// # Errors
     /// Shorts and open branches contradict each other.
-    pub fn lcs(&self) -> Result<Lcs, ReduceError> {
+    pub fn lcs(&self) -> Result<Lcs, SimError> {
         let switches = self.multiport.switches.iter();
         let start = switches.map(|s| s.initial.unwrap_or(false)).collect();
-        reduce(&self.multiport, &Position::free(&self.multiport, start))
+        let position = Position::free(&self.multiport, start);
+        reduce(&self.multiport, &position).map_err(|error| SimError::before(error.into()))
     }
+}
+
+fn refused(findings: Vec<Diagnostic>, sources: SourceMap) -> SimError {
+    Faults { findings, sources }.into()
 }
 
 /// Why an element has no value that can be replaced.
@@ -308,38 +313,3 @@ fn not_settable(element: &Element) -> Option<&'static str> {
         _ => Some("it is neither a resistor, capacitor, inductor nor a source"),
     }
 }
-
-/// Everything that is wrong with a netlist; prints a line a finding, `file:line:column: message`.
-#[derive(Debug, Clone)]
-pub struct Faults {
-    /// The findings, those that are no errors included.
-    pub findings: Vec<Diagnostic>,
-    /// The files they point into.
-    pub sources: SourceMap,
-}
-
-impl Display for Faults {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let errors = self
-            .findings
-            .iter()
-            .filter(|d| d.severity == Severity::Error);
-        for (k, finding) in errors.enumerate() {
-            if k > 0 {
-                writeln!(f)?;
-            }
-            if let Some(span) = finding.span {
-                let (line, column) = self.sources.line_column(span);
-                write!(
-                    f,
-                    "{}:{line}:{column}: ",
-                    self.sources.files[span.file.0 as usize].path
-                )?;
-            }
-            write!(f, "{}", finding.message)?;
-        }
-        Ok(())
-    }
-}
-
-impl std::error::Error for Faults {}

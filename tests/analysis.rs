@@ -6,7 +6,7 @@
     reason = "tests"
 )]
 
-use circ::analysis::{Finished, Unsolved, dc, each, transient, variants};
+use circ::analysis::{Finished, dc, each, transient, variants};
 use circ::{Method, Model, SimOptions};
 
 fn model(cards: &str) -> Model {
@@ -38,10 +38,10 @@ fn a_characteristic_has_a_row_for_every_pair_of_values() {
 #[test]
 fn a_point_that_is_no_circuit_says_what_is_wrong() {
     let model = model("v1 a 0 1\nr1 a b 1\nr2 b 0 {1/x}\n.param x=1\n.dc param x 1 0 -1\n");
-    match dc(&model).unwrap_err() {
-        Unsolved::Circuit { faults } => assert!(faults.to_string().contains("test.cir:4")),
-        Unsolved::Point { error, .. } => panic!("{error}"),
-    }
+    let unsolved = dc(&model).unwrap_err();
+    assert!(unsolved.circuit.is_none() && !unsolved.error.findings().is_empty());
+    assert!(unsolved.error.to_string().contains("test.cir:4"));
+    assert_eq!(unsolved.at, [("x".to_string(), 0.0)]);
 }
 
 #[test]

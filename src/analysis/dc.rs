@@ -3,7 +3,7 @@
 use super::sweep::{Variant, each, variants};
 use crate::circuit::{Circuit, Probed};
 use crate::integrate::{OperatingPoint, SimError, Values, operating_point};
-use crate::model::{Faults, Model};
+use crate::model::Model;
 use crate::settings::Settings;
 
 /// Operating points over swept quantities.
@@ -15,23 +15,16 @@ pub struct Characteristic {
     pub rows: Vec<Vec<f64>>,
 }
 
-/// Why a point of a sweep has no answer.
-#[derive(Debug)]
-pub enum Unsolved {
-    /// The netlist is no circuit with these values.
-    Circuit {
-        /// What is wrong with it.
-        faults: Faults,
-    },
-    /// The circuit has no operating point, or none was found.
-    Point {
-        /// The values of the sweeps.
-        at: Vec<(String, f64)>,
-        /// The circuit with them.
-        circuit: Box<Circuit>,
-        /// Why.
-        error: Box<SimError>,
-    },
+/// A point of a sweep that has no answer.
+#[derive(Debug, thiserror::Error)]
+#[error("{error}")]
+pub struct Unsolved {
+    /// The values of the sweeps.
+    pub at: Vec<(String, f64)>,
+    /// The circuit with them; none where the netlist is no circuit with these values.
+    pub circuit: Option<Box<Circuit>>,
+    /// Why.
+    pub error: Box<SimError>,
 }
 
 /// Carries out the `.dc` sweeps of a netlist.
@@ -50,19 +43,18 @@ pub fn dc(model: &Model) -> Result<Characteristic, Unsolved> {
 }
 
 fn point(variant: &Variant<'_>) -> Result<Vec<f64>, Unsolved> {
-    let circuit = variant
-        .circuit()
-        .map_err(|faults| Unsolved::Circuit { faults })?;
+    let unsolved = |circuit: Option<Circuit>, error: SimError| Unsolved {
+        at: variant.named(),
+        circuit: circuit.map(Box::new),
+        error: Box::new(error),
+    };
+    let circuit = variant.circuit().map_err(|error| unsolved(None, error))?;
     match operating_point(&circuit, Values::Dc, false, &Settings::default()) {
         Ok(point) => {
             let values = variant.values().iter().copied();
             Ok(values.chain(readings(&circuit, &point)).collect())
         }
-        Err(error) => Err(Unsolved::Point {
-            at: variant.named(),
-            circuit: Box::new(circuit),
-            error: Box::new(error),
-        }),
+        Err(error) => Err(unsolved(Some(circuit), error)),
     }
 }
 

@@ -26,13 +26,13 @@ pub(super) fn sim(args: &SimArgs, model: &Model, streams: &Streams) -> Result<Ex
     if !model.circuit().steps.is_empty() {
         streams.say("note: `.step` is left out: `.dc` is computed with the values as they stand");
     }
-    let found = analysis::dc(model).map_err(|unsolved| match unsolved {
-        Unsolved::Circuit { faults } => input::refused(&args.input, &faults, streams),
-        Unsolved::Point { at, circuit, error } => {
-            let places = Places(Some((&circuit, model.sources())));
-            let failure = input::broke_off(&args.input, &error, places, streams);
-            Failure::Faults(format!("{failure} at {}", steps::label(&at)))
-        }
+    let found = analysis::dc(model).map_err(|Unsolved { at, circuit, error }| {
+        let Some(circuit) = &circuit else {
+            return input::refused(&args.input, &error, streams);
+        };
+        let places = Places(Some((circuit, model.sources())));
+        let failure = input::broke_off(&args.input, &error, places, streams);
+        Failure::Faults(format!("{failure} at {}", steps::label(&at)))
     })?;
     let mut text = Vec::new();
     if let Some((axis, others)) = found.names.split_first() {

@@ -12,11 +12,11 @@ use crate::analysis::Variant;
 use crate::circuit::{self, Circuit, ElaborateOptions, Tran};
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 use crate::forms::json;
-use crate::integrate::{Places, SimError, start};
+use crate::integrate::{Places, Reason, SimError, start};
 use crate::lcs::json::SystemFile;
 use crate::lcs::{Lcs, Position, reduce};
 use crate::mna::StaticMultiport;
-use crate::model::{Faults, Model};
+use crate::model::Model;
 use crate::netlist::{self, Loaded};
 use crate::report::steps;
 use crate::settings::Settings;
@@ -137,7 +137,7 @@ pub fn open(
     let mut circuit = circuit.ok_or_else(|| faults(input, &diagnostics))?;
     keep_probes(&mut circuit, probes)?;
     let model = Model::of(netlist, sources, choices(input), circuit, Vec::new())
-        .map_err(|faults| refused(input, &faults, streams))?;
+        .map_err(|faults| refused(input, &faults.into(), streams))?;
     Ok(Subject::Circuit(Box::new(model)))
 }
 
@@ -150,16 +150,21 @@ pub(super) fn variant(
     variant: &Variant<'_>,
     streams: &Streams,
 ) -> Result<Model, Failure> {
-    variant.model().map_err(|faults| {
-        let failure = refused(input, &faults, streams);
+    variant.model().map_err(|error| {
+        let failure = refused(input, &error, streams);
         Failure::Faults(format!("{failure} at {}", steps::label(&variant.named())))
     })
 }
 
 /// A netlist that is no circuit: shows why.
-pub(super) fn refused(input: &Input, faults: &Faults, streams: &Streams) -> Failure {
-    show(&faults.findings, &faults.sources, streams);
-    self::faults(input, &faults.findings)
+pub(super) fn refused(input: &Input, error: &SimError, streams: &Streams) -> Failure {
+    match &error.reason {
+        Reason::Netlist(faults) => {
+            show(&faults.findings, &faults.sources, streams);
+            self::faults(input, &faults.findings)
+        }
+        _ => Failure::Message(error.to_string()),
+    }
 }
 
 /// Leaves exactly the probes named on the command line, if there are any.

@@ -142,6 +142,7 @@ fn told(error: &SimError, elements: &[&Element]) -> Told {
         ),
         Reason::RowsTooDense { .. } => plain("rows-too-dense", Some("`.tran tstep tstop`: a longer tstep".into())),
         Reason::Interrupted => plain("interrupted", None),
+        Reason::Netlist(_) => plain("netlist", None),
         Reason::Unsupported(_) => plain("unsupported", None),
         Reason::Internal(_) => plain("internal", None),
     }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::circuit::Tran;
-use crate::diagnostic::Internal;
+use crate::diagnostic::{Diagnostic, Faults, Internal};
 use crate::integrate::event::{Change, Event};
 use crate::integrate::note;
 use crate::integrate::rows::{Asked, RowKind, Sheet};
@@ -107,6 +107,9 @@ pub enum Reason {
     /// The circuit has no operating point.
     #[error("no operating point: {0}; `uic` starts from initial conditions instead")]
     NoOperatingPoint(NoRest),
+    /// What was read is no circuit.
+    #[error("{0}")]
+    Netlist(Faults),
     /// The circuit in this switch position is not a system.
     #[error("{0}")]
     Circuit(ReduceError),
@@ -192,12 +195,27 @@ impl From<ReduceError> for Reason {
     }
 }
 
+impl From<Faults> for SimError {
+    fn from(faults: Faults) -> Self {
+        Self::before(Reason::Netlist(faults))
+    }
+}
+
 /// The memory of so many rows.
 fn gigabytes(rows: f64, columns: usize) -> f64 {
     rows * (columns + 1) as f64 * size_of::<f64>() as f64 * 1e-9
 }
 
 impl SimError {
+    /// What is wrong with a netlist, with places in the files of [`Reason::Netlist`]; empty where the circuit itself is at fault.
+    #[must_use]
+    pub fn findings(&self) -> &[Diagnostic] {
+        match &self.reason {
+            Reason::Netlist(faults) => &faults.findings,
+            _ => &[],
+        }
+    }
+
     /// A failure before the run.
     #[must_use]
     pub fn before(reason: Reason) -> Self {
