@@ -3,8 +3,9 @@
 use crate::circuit::Tran;
 use crate::integrate::companion::Coarser;
 use crate::integrate::control::Amplitudes;
+use crate::integrate::problem::Problem;
 use crate::integrate::run::Grid;
-use crate::integrate::simulate::{Problem, controlled};
+use crate::integrate::simulate::controlled;
 use crate::integrate::step::Scheme;
 use crate::integrate::theta::Stepping;
 use crate::lcs::Lcs;

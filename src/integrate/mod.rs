@@ -19,6 +19,7 @@ mod lawful;
 pub mod line;
 mod located;
 mod note;
+mod problem;
 pub mod reading;
 mod roles;
 pub mod rows;

@@ -3,25 +3,24 @@
 //! The methods, events, jumps and energies are those of [`simulate`](crate::integrate::simulate()); what differs is who asks for the
 //! next time. A simulation owns all it needs and may be sent to another thread.
 
+mod way;
+
 use std::sync::Arc;
+
+use self::way::Way;
 
 use crate::circuit::{Circuit, Source, Tran, held_at, holder};
 use crate::integrate::Note;
 use crate::integrate::energy::Balance;
 use crate::integrate::event::Event;
-use crate::integrate::exact::Place;
-use crate::integrate::handover::Handover;
 use crate::integrate::note;
-use crate::integrate::run::{Log, Reason, SimError, Stepper};
-use crate::integrate::simulate::{Method, Problem, SimOptions, check, controlled};
+use crate::integrate::problem::Problem;
+use crate::integrate::run::{Log, Reason, SimError};
+use crate::integrate::simulate::{Method, SimOptions, check};
 use crate::integrate::stats::{Impulse, Run, StateJumps, Stats};
-use crate::integrate::step::Scheme;
-use crate::integrate::theta::{Stepping, Theta};
 use crate::lcs::Lcs;
 use crate::mna::{StaticMultiport, behaviour};
-use crate::plan::{not_exact, plan};
 use crate::settings::Settings;
-use crate::settings::tolerances::steps::HANDOVER_STEPS;
 use crate::settings::tolerances::times::SPAN_PARTS;
 use crate::waveform::canonical_name;
 
@@ -79,92 +78,6 @@ impl Checkpoint {
     #[must_use]
     pub const fn time(&self) -> f64 {
         self.problem.start.t
-    }
-}
-
-/// The stepper of a simulation.
-enum Way {
-    Exact(Box<Handover>),
-    Steps(Box<Theta>),
-}
-
-impl Way {
-    /// The stepper that the plan chooses, at the start of the problem.
-    fn of(
-        problem: &Problem,
-        lcs: &Lcs,
-        tran: &Tran,
-        options: &SimulationOptions,
-        notes: &mut Vec<Note>,
-        log: &mut Log<'_>,
-    ) -> Result<Self, SimError> {
-        let SimulationOptions {
-            method, settings, ..
-        } = options;
-        if let (Method::Exact, Some(obstacle)) = (method, not_exact(lcs)) {
-            let what = format!("no exact integration: {obstacle}");
-            return Err(SimError::before(Reason::Unsupported(what)));
-        }
-        let plan = plan(lcs, &options.as_asked());
-        let start = problem.start.t;
-        if plan.method == Method::Exact {
-            let exact = problem.handover(tran, lcs, settings, HANDOVER_STEPS);
-            match exact.and_then(|mut exact| exact.advance(start, log).map(|()| exact)) {
-                Ok(exact) => return Ok(Self::Exact(Box::new(exact))),
-                Err(error) if *method == Method::Exact => return Err(error),
-                Err(error) => {
-                    let text = format!("steps are made in place of exact integration: {error}");
-                    notes.push(text.into());
-                }
-            }
-            *log = Log::default();
-        }
-        let mut theta = steps(problem, tran, plan.scheme, options)?;
-        theta.advance(start, log)?;
-        Ok(Self::Steps(Box::new(theta)))
-    }
-
-    fn stepper(&mut self) -> &mut dyn Stepper {
-        match self {
-            Self::Exact(exact) => &mut **exact,
-            Self::Steps(theta) => &mut **theta,
-        }
-    }
-
-    fn place(&mut self) -> Place {
-        match self {
-            Self::Exact(exact) => exact.place(),
-            Self::Steps(theta) => theta.place(),
-        }
-    }
-
-    fn balance(&mut self) -> Balance {
-        match self {
-            Self::Exact(exact) => exact.balance(),
-            Self::Steps(theta) => theta.balance(),
-        }
-    }
-
-    /// Which ideal pairs conduct; empty where not known.
-    fn conducting(&self) -> Vec<bool> {
-        match self {
-            Self::Exact(exact) => exact.conducting().to_vec(),
-            Self::Steps(_) => vec![],
-        }
-    }
-
-    /// Goes on with the energy balance of another stepper that came to where this one starts, its first jump included.
-    fn carry_on(&mut self, mut balance: Balance) {
-        balance.add_part(&self.balance().energy());
-        self.start_balance(balance);
-    }
-
-    /// Has another balance from here on.
-    fn start_balance(&mut self, balance: Balance) {
-        match self {
-            Self::Exact(exact) => exact.set_balance(balance),
-            Self::Steps(theta) => theta.set_balance(balance),
-        }
     }
 }
 
@@ -553,24 +466,6 @@ fn transient(tran: Option<Tran>, until: Option<f64>) -> Result<Tran, SimError> {
             Err(SimError::before(Reason::Unsupported(what.into())))
         }
     }
-}
-
-/// Steps from the start of a problem.
-fn steps(
-    problem: &Problem,
-    tran: &Tran,
-    scheme: Scheme,
-    options: &SimulationOptions,
-) -> Result<Theta, SimError> {
-    let stepping = options.step.map_or(controlled(tran), Stepping::Fixed);
-    let settings = &options.settings;
-    let mut theta = problem.stepper(problem.start.clone(), tran, scheme, stepping, settings)?;
-    if options.step.is_none()
-        && let Some(amplitudes) = problem.scout(tran, settings)
-    {
-        theta.expect_amplitudes(amplitudes);
-    }
-    Ok(theta)
 }
 
 fn unknown<'a>(what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> SimError {

@@ -250,4 +250,14 @@ mod tests {
         assert_eq!(changed(|s| s.fast = vec![2]), LcsError::NoState(2, 2));
         assert!(fixtures::rlcd().changed(|s| s.a *= 2.0).is_ok());
     }
+
+    /// 1/RC of a resistor of 1e-160 Ω and a capacitor of 1e-160 F is none.
+    #[test]
+    fn a_circuit_beyond_doubles_is_refused_by_name() {
+        let netlist = "t\nv1 1 0 1\nr1 1 2 1e-160\nc1 2 0 1e-160\n.end\n";
+        let refused = crate::Model::parse(netlist, "t").unwrap().lcs();
+        let reason = refused.unwrap_err().reason;
+        let unfit = crate::lcs::ReduceError::Unfit(LcsError::NotFinite { part: "A" });
+        assert_eq!(reason, crate::integrate::Reason::Circuit(unfit));
+    }
 }

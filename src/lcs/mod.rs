@@ -245,8 +245,8 @@ impl LcsParts {
 }
 
 impl Outputs {
-    /// Leaves the probes with these numbers, in this order.
-    pub(crate) fn keep(&mut self, kept: &[usize]) {
+    /// Leaves the probes with these numbers (each below the number of names), in this order.
+    pub fn keep(&mut self, kept: &[usize]) {
         self.names = kept.iter().map(|&k| self.names[k].clone()).collect();
         self.units = kept.iter().map(|&k| self.units[k]).collect();
         let rows = &mut self.rows;
