@@ -262,7 +262,7 @@ impl Model {
     /// Simulates the transient that `.tran` asks for.
     ///
     /// # Errors
-    /// See [`Reason`]; the run so far is in [`SimError::partial`].
+    /// See [`Reason`](crate::integrate::Reason); the run so far is in [`SimError::partial`].
     pub fn transient(&self, options: SimOptions<'_>) -> Result<Run, SimError> {
         simulate(&self.circuit, &self.multiport, options)
     }
