@@ -7,6 +7,7 @@
 
 mod curved;
 mod energy;
+mod entered;
 mod front;
 mod jumps;
 mod notes;

@@ -7,7 +7,7 @@ use crate::runs::column;
 use crate::{attempt_changed, changed, changed_by, run};
 
 /// The largest difference of a column of two runs on the same grid, relative to its amplitude.
-fn difference(a: &Run, b: &Run, probe: &str) -> f64 {
+pub(super) fn difference(a: &Run, b: &Run, probe: &str) -> f64 {
     assert_eq!(a.waveforms.time, b.waveforms.time);
     let (a, b) = (column(a, probe), column(b, probe));
     let amplitude = a.iter().fold(0.0_f64, |m, v| m.max(v.abs()));

@@ -285,19 +285,20 @@ impl Flow {
 
     /// Of guard i, which stands on zero, the first coefficient of its [polynomial](Self::guard_polynomial) over `dt` that is more than
     /// rounding, and than what an error `time` of the time makes of the next one, decides as where a mode is inspected: where it is
-    /// positive the guard rises, and no coefficient before it that rounding makes negative turns it around. `sizes` are those that w
-    /// can have had.
+    /// positive the guard rises, and no coefficient before it that rounding makes negative turns it around; nor does a slope that the curvature
+    /// turns around before the guard has left `floor`. `sizes` are those that w can have had.
     pub(crate) fn settle_polynomial(
         &self,
         i: usize,
         polynomial: &mut [f64],
         sizes: &[f64],
-        [dt, time]: [f64; 2],
+        ([dt, time], floor): ([f64; 2], f64),
         (term, next): (&mut Vec<f64>, &mut Vec<f64>),
     ) {
         let row = &self.guard_rows[i * self.dim..(i + 1) * self.dim];
         term.clear();
         term.extend_from_slice(&sizes[..self.dim]);
+        let mut dips = false;
         for k in 1..polynomial.len() {
             next.clear();
             next.extend((0..self.dim).map(|row| {
@@ -307,14 +308,22 @@ impl Flow {
             }));
             std::mem::swap(term, next);
             let whole: f64 = row.iter().zip(&*term).map(|(g, w)| g.abs() * w).sum();
-            let after = polynomial.get(k + 1).copied().unwrap_or(0.0);
+            let (value, after) = (polynomial[k], polynomial.get(k + 1).copied().unwrap_or(0.0));
             let noise = GROUP * f64::EPSILON * whole + time / dt * (k + 1) as f64 * after.abs();
-            if polynomial[k].abs() > noise {
-                if polynomial[k] > 0.0 {
-                    for earlier in &mut polynomial[1..k] {
-                        *earlier = earlier.max(0.0);
-                    }
+            if value.abs() <= noise {
+                if dips {
+                    return;
                 }
+                continue;
+            }
+            if value > 0.0 {
+                for earlier in &mut polynomial[1..k] {
+                    *earlier = earlier.max(0.0);
+                }
+                return;
+            }
+            dips = k == 1 && after > 0.0 && value.powi(2) <= 2.0 * floor * after;
+            if !dips {
                 return;
             }
         }

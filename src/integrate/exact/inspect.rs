@@ -231,6 +231,8 @@ impl Inspector {
         } else {
             (&self.jets, &self.jet_sizes)
         };
+        // What it is off the manifold is there until then: a value that the slope moves that far in the meantime decides nothing.
+        let gone = manifold.map_or(0.0, |manifold| mode.magnitudes.age_of(manifold));
         let dot = |k: usize| (jets[k * m + i], sizes[k * m + i]);
         let (mut next, mut floor) = (dot(0), 0.0);
         let first = (0..ORDERS).find_map(|k| {
@@ -242,6 +244,10 @@ impl Inspector {
             }
             if k == 0 {
                 noise += self.slip(mode.owner(i));
+                let off = (value - g).abs();
+                if slow && off <= gone * next.0.abs() {
+                    noise += off;
+                }
                 floor = noise;
             }
             let turned = k > 0

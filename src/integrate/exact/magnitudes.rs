@@ -21,6 +21,13 @@ pub(crate) struct Magnitudes {
 }
 
 impl Magnitudes {
+    /// How long it takes until the states of one of the manifolds follow, s.
+    pub(super) fn age_of(&self, manifold: &Manifold) -> f64 {
+        let slowest = manifold.len().checked_sub(1);
+        let slowest = slowest.and_then(|k| self.followers.get(k));
+        slowest.map_or(0.0, |follower| follower.age)
+    }
+
     /// Finds which states follow the others.
     pub(super) fn find_followers(&mut self, flow: &Flow) {
         followers(

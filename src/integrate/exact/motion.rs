@@ -409,7 +409,8 @@ impl Motion {
             if g <= floor {
                 let work = (&mut self.term, &mut self.next_term);
                 let times = [dt, resolution(self.t)];
-                flow.settle_polynomial(i, coefficients, &self.amplitude, times, work);
+                let zero = (times, SIMULTANEOUS * floor);
+                flow.settle_polynomial(i, coefficients, &self.amplitude, zero, work);
             }
             let crossing = polynomial::first_crossing(coefficients, floor);
             if let Some(s) = crossing.filter(|&s| s < first.0 || first.1.is_none()) {

@@ -186,6 +186,11 @@ impl Manifold {
         })
     }
 
+    /// Number of components that follow.
+    pub(crate) fn len(&self) -> usize {
+        self.followers.len()
+    }
+
     /// Whether a guard sees a component that follows.
     pub(crate) fn is_seen_by(&self, guard: usize) -> bool {
         self.sees[guard]

@@ -200,7 +200,7 @@ impl Exact {
         if self.motion.age > f64::EPSILON * self.table.modes[at].flow.shortest() {
             self.memory.left_here.clear();
         }
-        self.memory.left_here.push(at);
+        self.memory.left_here.push((at, guard));
         if self.memory.left_here.len()
             > PATIENCE + 2 * (self.table.pairs + self.table.thresholds.len())
         {

@@ -23,8 +23,8 @@ pub(super) const PATIENCE: usize = 2;
 pub(super) struct Memory {
     /// [`PROPOSALS`], the latest successful first.
     proposals: [f64; PROPOSALS.len()],
-    /// Modes left at the present instant.
-    pub(super) left_here: Vec<usize>,
+    /// Modes left at the present instant, and by which guards.
+    pub(super) left_here: Vec<(usize, usize)>,
 }
 
 impl Memory {
@@ -35,9 +35,11 @@ impl Memory {
         }
     }
 
-    /// Whether a mode was left at this instant too often to be entered again.
-    fn is_barred(&self, at: usize) -> bool {
-        self.left_here.len() > PATIENCE && self.left_here.contains(&at)
+    /// The guard that bars a mode from being entered again at this instant, as it ended it here and modes were left too often.
+    fn bar(&self, at: usize) -> Option<usize> {
+        let mut left = self.left_here.iter().rev();
+        let (_, guard) = left.find(|(mode, _)| *mode == at)?;
+        (self.left_here.len() > PATIENCE).then_some(*guard)
     }
 }
 
@@ -265,7 +267,6 @@ impl Transition<'_> {
             let (why, at) = self.table.modes[from].successors[k];
             if why == trigger
                 && self.table.modes[at].key.same_switches(key)
-                && !self.memory.is_barred(at)
                 && let Some(leaving) = self.try_mode(at)
             {
                 return Some((at, leaving));
@@ -357,9 +358,14 @@ impl Transition<'_> {
         proposed: usize,
         tried: &mut Vec<Vec<bool>>,
     ) -> Option<(usize, Vec<usize>)> {
+        let mut walked: Vec<Vec<bool>> = Vec::new();
         for start in 0..proposed {
             let mut closed = tried[start].clone();
             for _ in 0..2 * self.table.pairs {
+                if walked.contains(&closed) {
+                    break;
+                }
+                walked.push(closed.clone());
                 let candidate = key.with_closed(closed.clone());
                 let Some(at) = self.table.mode(&candidate, self.sources) else {
                     break;
@@ -378,10 +384,11 @@ impl Transition<'_> {
                     }
                     Finding::Inconsistent => break,
                 }
-                if tried.contains(&closed) {
-                    break;
-                }
-                tried.push(closed.clone());
+            }
+        }
+        for closed in walked {
+            if !tried.contains(&closed) {
+                tried.push(closed);
             }
         }
         None
@@ -422,13 +429,13 @@ impl Transition<'_> {
 
     pub(super) fn try_key(&mut self, key: &Key) -> Option<(usize, Vec<usize>)> {
         let at = self.table.mode(key, self.sources)?;
-        if self.memory.is_barred(at) {
-            return None;
-        }
         self.try_mode(at).map(|leaving| (at, leaving))
     }
 
     fn inspect(&mut self, at: usize) -> Finding {
+        if let Some(guard) = self.memory.bar(at) {
+            return Finding::Refused(guard);
+        }
         self.inspector.inspect(
             &mut self.table.modes[at],
             (&self.sources.exosystem, self.t, &self.sources.z),

@@ -1,0 +1,52 @@
+//! Modes that rounding finds are not left at the instant at which they are entered, without end: exact integration goes on.
+
+use circ::integrate::{Method, Run, SimOptions};
+use circ::settings::Settings;
+
+use super::numbers::difference;
+use super::{changed, changed_by};
+
+/// By the midpoint rule to 1e-8.
+fn steps(name: &str) -> Run {
+    let options = SimOptions {
+        method: Method::Theta,
+        settings: Settings {
+            tol: 1e-8,
+            ..Settings::default()
+        },
+        ..SimOptions::default()
+    };
+    changed_by(name, &[], options)
+}
+
+/// The run is exact to its end, and what it gives is that of another run.
+fn goes_on(name: &str, probes: &[&str], other: &Run) {
+    let exact = changed(name, &[], Method::Auto);
+    let mut notes = exact.notes.iter();
+    let gave_way = notes.find(|n| n.text.contains("exact integration"));
+    assert!(gave_way.is_none(), "{name}: {gave_way:?}");
+    for probe in probes {
+        let distance = difference(&exact, other, probe);
+        assert!(distance < 1e-6, "{name} {probe}: {distance:e}");
+    }
+}
+
+#[test]
+fn where_a_guard_dips_by_less_than_its_rounding() {
+    let name = "guard_dips_in_rounding";
+    goes_on(name, &["i(l4)", "v(8)"], &steps(name));
+}
+
+#[test]
+fn where_devices_turn_on_together_and_rounding_tells_which() {
+    let name = "pair_in_rounding";
+    // Less blocking resistance, of which 1e-7 of the amplitude leaks.
+    let plain = changed(name, &[("roff=1e15", "roff=1e8")], Method::Exact);
+    goes_on(name, &["i(l1)", "v(3,4)"], &plain);
+}
+
+#[test]
+fn where_a_guard_falls_before_its_transient_has_ended() {
+    let name = "event_before_followers";
+    goes_on(name, &["i(l5)", "v(6)"], &steps(name));
+}
