@@ -6,12 +6,12 @@ use circ::settings::Settings;
 use super::numbers::difference;
 use super::{changed, changed_by};
 
-/// By the midpoint rule to 1e-8.
+/// By the midpoint rule to 1e-6, from which 1e-8 differs by 1e-9.
 fn steps(name: &str) -> Run {
     let options = SimOptions {
         method: Method::Theta,
         settings: Settings {
-            tol: 1e-8,
+            tol: 1e-6,
             ..Settings::default()
         },
         ..SimOptions::default()
@@ -49,4 +49,11 @@ fn where_devices_turn_on_together_and_rounding_tells_which() {
 fn where_a_guard_falls_before_its_transient_has_ended() {
     let name = "event_before_followers";
     goes_on(name, &["i(l5)", "v(6)"], &steps(name));
+}
+
+#[test]
+fn where_a_first_charge_is_rounding_of_the_leaks() {
+    let name = "bridge_starts";
+    let plain = changed(name, &[("roff=1e9", "roff=1e7")], Method::Exact);
+    goes_on(name, &["i(l1)", "i(l2)"], &plain);
 }

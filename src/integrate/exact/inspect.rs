@@ -89,8 +89,7 @@ impl Inspector {
             } else {
                 self.s_later.clone_from(&self.s);
             }
-            self.sizes.clear();
-            self.sizes.extend(self.w.iter().map(|w| w.abs()));
+            mode.sizes_from(s, z, &mut self.sizes, &mut self.work);
             mode.storage.largest(&self.sizes, &mut self.s_sizes);
             let moved = (0..s.len()).any(|i| {
                 let drift = (self.s_later[i] - self.s[i]).abs();

@@ -67,6 +67,8 @@ pub(crate) struct Mode {
     is_apart: bool,
     /// w in the basis of the flow, where that is another one than [x; z].
     settled: Option<Kernel>,
+    /// Its magnitudes.
+    settled_sizes: Option<Kernel>,
     /// n.
     pub(crate) inject_one: DVector<f64>,
     /// Probe rows over w.
@@ -285,6 +287,7 @@ impl Mode {
             outputs: Kernel::new(&basis(over_w(&lcs.outputs.rows, n, exosystem))),
             is_apart: (0..n).all(|k| lcs.energy.get((k, k)).is_some_and(|e| *e > 0.0))
                 && decoupled.is_some() != lcs.fast.is_empty(),
+            settled_sizes: decoupled.as_ref().map(|d| Kernel::new(&d.from.abs())),
             settled: decoupled.map(|decoupled| Kernel::new(&decoupled.from)),
             rows: SampledRows::new(lcs.outputs.names.len(), dim),
             shared,
@@ -353,6 +356,29 @@ impl Mode {
             work.clear();
             work.extend_from_slice(w);
             settled.apply(work, w);
+        }
+    }
+
+    /// How large what w is summed from can be where it follows from storage s and the exosystem z: currents that a large resistance makes
+    /// equal leave nothing but the rounding of each.
+    pub(crate) fn sizes_from(
+        &self,
+        s: &[f64],
+        z: &[f64],
+        sizes: &mut Vec<f64>,
+        work: &mut Vec<f64>,
+    ) {
+        work.clear();
+        work.extend(s.iter().map(|v| v.abs()));
+        self.inject.largest(work, sizes);
+        for (size, one) in sizes.iter_mut().zip(self.inject_one.iter()) {
+            *size += one.abs();
+        }
+        sizes.extend(z.iter().map(|v| v.abs()));
+        if let Some(settled) = &self.settled_sizes {
+            work.clear();
+            work.extend_from_slice(sizes);
+            settled.apply(work, sizes);
         }
     }
 

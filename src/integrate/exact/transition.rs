@@ -359,8 +359,8 @@ impl Transition<'_> {
         tried: &mut Vec<Vec<bool>>,
     ) -> Option<(usize, Vec<usize>)> {
         let mut walked: Vec<Vec<bool>> = Vec::new();
-        for start in 0..proposed {
-            let mut closed = tried[start].clone();
+        for start in tried.iter().take(proposed) {
+            let mut closed = start.clone();
             for _ in 0..2 * self.table.pairs {
                 if walked.contains(&closed) {
                     break;
