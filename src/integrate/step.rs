@@ -94,13 +94,15 @@ impl Columns {
         z[self.n + 2 * p] = 1.0;
     }
 
-    /// z at the end of a step as rows over z at its start, where x⁺ = `x_next` z; both ends of u are u⁺.
+    /// z of a step [`SHORT`] times as long from the end of a step, as rows over z at the start of that one, where x⁺ = `x_next` z. The
+    /// sources go on with their slopes: a λ that keeps a constraint on the state is made of these.
     fn end_rows(&self, x_next: &DMatrix<f64>) -> DMatrix<f64> {
         let p = self.varying.len();
         let mut rows = DMatrix::zeros(self.len(), self.len());
         rows.rows_mut(0, self.n).copy_from(x_next);
         for k in self.n..self.n + p {
-            rows[(k, k)] = 1.0;
+            rows[(k, k)] = 1.0 + SHORT;
+            rows[(k, k + p)] = -SHORT;
             rows[(k + p, k)] = 1.0;
         }
         rows[(self.len() - 1, self.len() - 1)] = 1.0;
@@ -339,23 +341,30 @@ impl StepMatrices {
         let y = &self.m * &lambda + &self.q;
         // Blocking ports are tested at the end of the step, conducting ones by their λ. For γ < 1 that is not where y and λ
         // belong: there both are those of a very short implicit step from the end, but for a λ that makes a derivative, which
-        // would be made of its rounding.
+        // would be made of its rounding. y is that of the λ that are tested.
         let y_size = self.m.abs() * lambda.abs() + self.q.abs();
         let mut guards = (lambda.clone(), self.lambda_sizes(&solve));
         let (y_end, y_end_size) = match &self.after {
             None => (y.clone(), y_size.clone()),
             Some(after) => {
-                let (lambda, solve) = after.lambda_rows(active);
+                let (short, solve) = after.lambda_rows(active);
                 let end = columns.end_rows(&x_next);
-                let lambda_size = after.lambda_sizes(&solve) * end.abs();
+                let short = short * &end;
+                let short_size = after.lambda_sizes(&solve) * end.abs();
                 for &j in &solve.indices {
-                    if lambda_size.row(j).amax() <= DIRECT * guards.1.row(j).amax() {
-                        guards.0.set_row(j, &(lambda.row(j) * &end));
-                        guards.1.set_row(j, &lambda_size.row(j));
+                    if short_size.row(j).amax() <= DIRECT * guards.1.row(j).amax() {
+                        guards.0.set_row(j, &short.row(j));
+                        guards.1.set_row(j, &short_size.row(j));
                     }
                 }
-                let size = (after.m.abs() * lambda.abs() + after.q.abs()) * end.abs();
-                ((&after.m * lambda + &after.q) * end, size)
+                let through_state = &after.m - &lcs.d;
+                let size = through_state.abs() * short.abs()
+                    + lcs.d.abs() * &guards.1
+                    + after.q.abs() * end.abs();
+                (
+                    through_state * short + &lcs.d * &guards.0 + &after.q * end,
+                    size,
+                )
             }
         };
         let extra = if solve.regular {

@@ -75,3 +75,32 @@ fn turning_off_dissipates_what_the_resistances_take() {
         }
     }
 }
+
+/// The current of c1 is C dv/dt of the source while both diodes conduct, and d1 turns off when that is more than the load takes: at the
+/// end of a step this is known from the slope of the source alone. A step that held the source there saw no current in c1.
+#[test]
+fn a_source_that_moves_takes_the_current_from_a_diode() {
+    let name = "follower_turns_off";
+    let exact = changed_by(name, &[], SimOptions::default());
+    assert_eq!(exact.method, "exact");
+    for step in [100e-9, 10e-9] {
+        let options = SimOptions {
+            method: Method::Theta,
+            step: Some(step),
+            ..SimOptions::default()
+        };
+        let run = changed_by(name, &[], options);
+        for (probe, amplitude) in [
+            ("v(2)", 6.4),
+            ("v(3)", 6.4),
+            ("i(d1)", 4.1),
+            ("i(d2)", 0.36),
+        ] {
+            let rows = column(&run, probe).into_iter().zip(column(&exact, probe));
+            let off = rows.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            // An event is taken at the end of its step.
+            let share = 1e-2 * step / 100e-9;
+            assert!(off < share * amplitude, "{step:e}: {probe} is {off:e} off");
+        }
+    }
+}
