@@ -163,3 +163,15 @@ fn a_device_that_rounding_holds_on_the_wrong_side_is_named() {
     let ordinary = changed("forward_hidden_guard", &roff, Method::Exact);
     assert!(!hidden(&ordinary), "{:?}", ordinary.notes);
 }
+
+/// Node 2 stands between two open switches and a diode that blocks: no current tells its voltage. The diode's own voltage beyond its
+/// threshold is the least there is, by every method; the switches would have it at a third of that.
+#[test]
+fn a_node_that_floats_beside_a_blocking_diode_is_the_same_by_every_method() {
+    for method in [Method::Exact, Method::Theta, Method::Euler] {
+        let run = changed("floating_between_switches", &[], method);
+        for volts in column(&run, "v(2)") {
+            assert!((volts - 0.7).abs() < 1e-9 * 5.0, "{method:?}: {volts} V");
+        }
+    }
+}

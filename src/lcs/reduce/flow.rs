@@ -173,12 +173,12 @@ impl<F: Field> Flow<F> {
         inject
     }
 
-    /// Chooses the undetermined quantities z so that the sum of squares of the objective is least: GᵀG z = −Gᵀ g₀.
-    /// Returns those that the objective sees, and notes that name what was chosen.
+    /// Chooses the undetermined quantities z so that the sum of squares of an objective is least, GᵀG z = −Gᵀ g₀; what the first one leaves
+    /// open the next one chooses. Returns those that the objectives see, and notes that name what was chosen.
     pub(super) fn least_norm(
         &mut self,
         frame: &Frame,
-        objective: &[(String, Vec<F>)],
+        objectives: &[Vec<(String, Vec<F>)>],
     ) -> (Vec<usize>, Vec<String>) {
         let nz = self.on_loose.first().map_or(0, Vec::len);
         let all: Vec<usize> = (0..nz).collect();
@@ -186,33 +186,50 @@ impl<F: Field> Flow<F> {
             return (Vec::new(), Vec::new());
         }
         let width = frame.base + self.q;
-        let mut normal = Matrix::zeros(nz, nz + width);
-        let mut chosen = Vec::new();
-        for (name, row) in objective {
-            let g = self.along(frame, row, &all);
-            if g.iter().all(F::is_zero) {
-                continue;
-            }
-            chosen.push(name.clone());
-            let rest = self.substitute(frame, row);
-            for (z, x) in g.iter().enumerate().filter(|(_, x)| !x.is_zero()) {
-                let target = normal.row_mut(z);
-                add_scaled(&mut target[..nz], x, &g);
-                add_scaled(&mut target[nz..], x, &rest);
-            }
-        }
-        let mut found = Elimination::new(nz, nz + width);
+        // z over [what is still open of it | the rest].
+        let mut values: Vec<Vec<F>> = Vec::with_capacity(nz);
         for z in 0..nz {
-            normal.eliminate(z, &mut found);
+            let mut value = vec![F::zero(); nz + width];
+            value[z] = F::one();
+            values.push(value);
         }
-        for (f, on_loose) in self.f.iter_mut().zip(&self.on_loose) {
-            for (z, x) in on_loose.iter().enumerate().filter(|(_, x)| !x.is_zero()) {
-                if let Some(r) = found.pivot[z] {
-                    add_scaled(f, &x.neg(), &normal.row(r)[nz..]);
+        let mut seen = Vec::new();
+        let mut chosen = Vec::new();
+        for objective in objectives {
+            let mut normal = Matrix::zeros(nz, nz + width);
+            for (name, row) in objective {
+                let g = self.along(frame, row, &all);
+                if g.iter().all(F::is_zero) {
+                    continue;
+                }
+                chosen.push(name.clone());
+                let mut whole = vec![F::zero(); nz];
+                whole.extend(self.substitute(frame, row));
+                for (x, value) in g.iter().zip(&values).filter(|(x, _)| !x.is_zero()) {
+                    add_scaled(&mut whole, x, value);
+                }
+                for (z, x) in whole[..nz].iter().enumerate().filter(|(_, x)| !x.is_zero()) {
+                    add_scaled(normal.row_mut(z), x, &whole);
+                }
+            }
+            let mut found = Elimination::new(nz, nz + width);
+            for z in 0..nz {
+                normal.eliminate(z, &mut found);
+            }
+            for (z, r) in (0..nz).filter_map(|z| Some((z, found.pivot[z]?))) {
+                seen.push(z);
+                for value in values.iter_mut().filter(|value| !value[z].is_zero()) {
+                    let part = value[z].neg();
+                    add_scaled(value, &part, normal.row(r));
                 }
             }
         }
-        let seen = (0..nz).filter(|&z| found.pivot[z].is_some()).collect();
+        for (f, on_loose) in self.f.iter_mut().zip(&self.on_loose) {
+            for (x, value) in on_loose.iter().zip(&values).filter(|(x, _)| !x.is_zero()) {
+                add_scaled(f, x, &value[nz..]);
+            }
+        }
+        seen.sort_unstable();
         let notes = if chosen.is_empty() {
             Vec::new()
         } else {

@@ -25,8 +25,8 @@ impl<F: Field> Eliminated<'_, F> {
             self.check_storage(&frame, &s)?;
         }
         let mut flow = Flow::solve(&self, &frame, &s, is_static)?;
-        let objective = self.objective(&frame, is_static);
-        let (undetermined, notes) = flow.least_norm(&frame, &objective);
+        let objectives = self.objectives(&frame, is_static);
+        let (undetermined, notes) = flow.least_norm(&frame, &objectives);
         let guards: Vec<Vec<F>> = self
             .held
             .iter()
@@ -211,26 +211,28 @@ impl<F: Field> Eliminated<'_, F> {
         Ok(())
     }
 
-    /// The quantities whose squares a least-norm choice minimises, with names: everything a position leaves unknown; in an
-    /// operating point what is observed (node potentials) as well.
-    fn objective(&self, frame: &Frame, is_static: bool) -> Vec<(String, Vec<F>)> {
+    /// The quantities whose squares a least-norm choice minimises, with names: first what the position leaves unknown of its devices, as the
+    /// complementarity problem with these devices free chooses it; then everything else that it leaves unknown, in an operating
+    /// point what is observed (node potentials) as well.
+    fn objectives(&self, frame: &Frame, is_static: bool) -> Vec<Vec<(String, Vec<F>)>> {
         if frame.f.is_empty() {
             return Vec::new();
         }
-        let unknown = self.unknown.iter();
-        let mut rows: Vec<(String, Vec<F>)> = unknown
-            .map(|(c, name)| (name.clone(), frame.express(self, *c)))
-            .collect();
+        let guards: Vec<usize> = self.held.iter().map(|&k| self.guard_column(k)).collect();
+        let row = |(c, name): &(usize, String)| (name.clone(), frame.express(self, *c));
+        let (devices, others): (Vec<_>, Vec<_>) =
+            self.unknown.iter().partition(|(c, _)| guards.contains(c));
+        let mut rest: Vec<(String, Vec<F>)> = others.into_iter().map(row).collect();
         if is_static {
             for (k, observed) in self.behaviour.observed.iter().enumerate() {
                 if self.unknown.iter().any(|(_, name)| *name == observed.name) {
                     continue;
                 }
                 let row = self.matrix.row(self.found.equations + k);
-                rows.push((observed.name.clone(), frame.gather(row, false, None)));
+                rest.push((observed.name.clone(), frame.gather(row, false, None)));
             }
         }
-        rows
+        vec![devices.into_iter().map(row).collect(), rest]
     }
 }
 
