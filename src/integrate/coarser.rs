@@ -1,7 +1,7 @@
 //! Which coarser runs go beside one in steps.
 
 use crate::circuit::Tran;
-use crate::integrate::companion::Coarser;
+use crate::integrate::companion::{Coarser, Share};
 use crate::integrate::control::Amplitudes;
 use crate::integrate::problem::Problem;
 use crate::integrate::run::Grid;
@@ -11,7 +11,8 @@ use crate::integrate::theta::Stepping;
 use crate::lcs::Lcs;
 use crate::settings::Settings;
 use crate::settings::tolerances::stated::{
-    COARSER, FIRST_ORDER, HIGHER_ORDER, LOOSER, LOOSER_SHARE, MANY_ROWS, READING,
+    COARSER, FIRST_ORDER, HIGHER_ORDER, HIGHER_ORDER_EVENTS, LOOSER, LOOSER_SHARE, MANY_ROWS,
+    READING,
 };
 use crate::settings::tolerances::steps::{FIRST, HANDOVER_STEPS};
 
@@ -33,7 +34,7 @@ impl Problem {
             }),
             stride: 1,
             start: 0.0,
-            share,
+            share: Share::always(share),
         };
         COARSER
             .into_iter()
@@ -57,11 +58,11 @@ impl Problem {
             tmax: None,
             ..*tran
         };
-        let shares = match scheme.order() {
-            1 => FIRST_ORDER,
-            _ => HIGHER_ORDER,
+        let (smooth, events) = match scheme.order() {
+            1 => (FIRST_ORDER, FIRST_ORDER),
+            _ => (HIGHER_ORDER, HIGHER_ORDER_EVENTS),
         };
-        let companion = |(coarser, share): (f64, f64)| {
+        let companion = |(coarser, (smooth, events)): (f64, (f64, f64))| {
             // An even number of rows would see a clock in one phase alone.
             let stride = (coarser * h / tran.tstep).ceil() as usize | 1;
             let longer = match stride {
@@ -72,14 +73,16 @@ impl Problem {
                 make: Box::new(move || {
                     let (start, stepping) = (self.start.clone(), Stepping::Fixed(longer));
                     let mut theta = self.stepper(start, &tran, scheme, stepping, settings)?;
+                    theta.keep_whole_steps();
                     theta.read_coarsely(READING);
                     Ok(Box::new(theta))
                 }),
                 stride,
                 start: h,
-                share: share * coarser * h / longer,
+                share: Share { smooth, events }.times(coarser * h / longer),
             }
         };
+        let shares = smooth.into_iter().zip(events);
         COARSER.into_iter().zip(shares).map(companion).collect()
     }
 
@@ -110,7 +113,7 @@ impl Problem {
             }),
             stride: if many { FEWER } else { 1 },
             start: FIRST * tran.tstep,
-            share: LOOSER_SHARE,
+            share: Share::always(LOOSER_SHARE),
         }]
     }
 }

@@ -5,6 +5,7 @@ mod coarser;
 mod companion;
 pub mod control;
 mod cpu;
+mod difference;
 pub mod energy;
 pub mod event;
 pub mod exact;

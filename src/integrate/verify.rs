@@ -2,8 +2,8 @@
 //!
 //! Exact integration and implicit steps share the reduced systems and nothing of the way through time: one finds events and modes, the
 //! other solves a complementarity problem at every step. The steps are made at two tolerances, whose distance tells what they know
-//! themselves. Signals are compared at the output times as curves with their jumps, where an edge may stand as far aside as events of the
-//! verifying runs do among each other.
+//! themselves. Rows are compared as those of companions are ([`crate::integrate::difference`]), where an event may stand as far aside as
+//! those of the verifying runs do among each other.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
@@ -11,6 +11,7 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::DVector;
 
 use crate::circuit::{Circuit, Tran};
+use crate::integrate::difference::{Difference, grow, scales};
 use crate::integrate::rows::RowKind;
 use crate::integrate::run::{Reason, SimError};
 use crate::integrate::simulate::{Method, SimOptions, simulate, simulate_system};
@@ -21,7 +22,6 @@ use crate::settings::Settings;
 use crate::settings::tolerances::stated::{
     ASIDE, ENOUGH, EXACT, MOST_LEFT_OUT, SAFETY, TOLERANCES,
 };
-use crate::waveform::compare::{Tube, tubes};
 
 /// What the second run found.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -113,13 +113,14 @@ fn second(
         None if is_exact => EXACT,
         None => options.settings.tol,
     };
+    let known = run.error.event_time.unwrap_or(0.0);
     if !is_exact {
         match again(Method::Exact, options.settings.tol) {
             Ok(exact) => {
-                let aside = apart(run, &exact).min(ASIDE * step);
+                let aside = known.max(apart(run, &exact).min(ASIDE * step));
                 let times = quiet_times(run, &[run, &exact], ASIDE * step);
-                let found = tubes(&run.waveforms, &exact.waveforms, &times, aside);
-                let judged = found.into_iter().map(|tube| (tube, stated + EXACT));
+                let found = compared(run, &exact, &times, aside);
+                let judged = found.into_iter().map(|signal| (signal, stated + EXACT));
                 return Ok(worst(Method::Exact.name().into(), judged));
             }
             Err(error) if error.reason == Reason::Interrupted => return Err(error),
@@ -144,14 +145,14 @@ fn second(
             },
         };
         let itself = SAFETY * apart(&coarse, &fine);
-        let aside = itself.max(apart(run, &fine).min(ASIDE * step));
+        let aside = itself.max(known).max(apart(run, &fine).min(ASIDE * step));
         let times = quiet_times(run, &[run, &coarse, &fine], itself.max(ASIDE * step));
-        let own = tubes(&coarse.waveforms, &fine.waveforms, &times, itself);
-        let own: BTreeMap<&str, f64> = own.iter().map(|t| (t.name.as_str(), t.distance)).collect();
-        let judged = tubes(&run.waveforms, &fine.waveforms, &times, aside);
-        let judged = judged.into_iter().map(|tube| {
-            let own = own.get(tube.name.as_str()).copied().unwrap_or(0.0);
-            (tube, stated + tol.max(SAFETY * own))
+        let own = compared(&coarse, &fine, &times, itself);
+        let own: BTreeMap<&str, f64> = own.iter().map(|s| (s.name, s.distance)).collect();
+        let judged = compared(run, &fine, &times, aside);
+        let judged = judged.into_iter().map(|signal| {
+            let own = own.get(signal.name).copied().unwrap_or(0.0);
+            (signal, stated + tol.max(SAFETY * own))
         });
         let found = worst(
             format!("{} at a tolerance of {tol:e}", method.name()),
@@ -172,18 +173,81 @@ fn second(
     })
 }
 
+/// How far a signal of two runs is apart.
+#[derive(Debug, Clone, Copy, Default)]
+struct Signal<'a> {
+    name: &'a str,
+    /// The largest difference, relative to the signal's amplitude.
+    distance: f64,
+    /// Where that is, s.
+    time: f64,
+}
+
+/// How far the signals of a run are from those of another at these times, rows of both; events may be `aside`, s.
+fn compared<'a>(run: &'a Run, other: &Run, times: &[f64], aside: f64) -> Vec<Signal<'a>> {
+    let (waves, others) = (&run.waveforms, &other.waveforms);
+    let names = waves.names.iter().enumerate();
+    let pairs: Vec<(usize, usize)> = names
+        .filter_map(|(j, name)| Some((j, others.find(name)?)))
+        .collect();
+    let mut difference = Difference::new(pairs.len(), aside);
+    let mut amplitude = vec![0.0; pairs.len()];
+    let mut theirs = vec![0.0; pairs.len()];
+    for k in 0..others.len() {
+        pick(others.row(k), pairs.iter().map(|pair| pair.1), &mut theirs);
+        grow(&mut amplitude, &theirs);
+    }
+    let mut ours = vec![0.0; pairs.len()];
+    let (mut events, mut other_events) =
+        (run.events.iter().peekable(), other.events.iter().peekable());
+    for &t in times {
+        // The last of several rows at one time holds the values after a jump.
+        let row = |time: &[f64]| time.partition_point(|s| *s <= t).checked_sub(1);
+        let rows = row(&waves.time).zip(row(&others.time));
+        let Some((k, l)) = rows.filter(|(k, l)| waves.time[*k] == t && others.time[*l] == t) else {
+            continue;
+        };
+        while let Some(event) = events.next_if(|event| event.t <= t) {
+            difference.see(event, true);
+        }
+        while let Some(event) = other_events.next_if(|event| event.t <= t) {
+            difference.see(event, false);
+        }
+        pick(waves.row(k), pairs.iter().map(|pair| pair.0), &mut ours);
+        pick(others.row(l), pairs.iter().map(|pair| pair.1), &mut theirs);
+        difference.compare(t, &ours, &theirs);
+    }
+    let units: Vec<&'static str> = pairs.iter().map(|(j, _)| waves.units[*j]).collect();
+    let columns = difference.columns(&scales(&amplitude, &units));
+    // Without a common row nothing is known.
+    let known = difference.rows() > 0;
+    let signal = |((j, _), (distance, time)): (&(usize, usize), (f64, f64))| Signal {
+        name: &waves.names[*j],
+        distance: if known { distance } else { f64::INFINITY },
+        time,
+    };
+    pairs.iter().zip(columns).map(signal).collect()
+}
+
+/// These columns of a row.
+fn pick(row: &[f64], columns: impl Iterator<Item = usize>, picked: &mut [f64]) {
+    for (value, column) in picked.iter_mut().zip(columns) {
+        *value = row[column];
+    }
+}
+
 /// The signal whose difference is the largest part of what is tolerated.
-fn worst(method: String, judged: impl Iterator<Item = (Tube, f64)>) -> Verified {
-    let part = |(tube, tolerance): &(Tube, f64)| tube.distance / tolerance;
-    let (tube, tolerance) = judged
+fn worst<'a>(method: String, judged: impl Iterator<Item = (Signal<'a>, f64)>) -> Verified {
+    let part = |(signal, tolerance): &(Signal<'_>, f64)| signal.distance / tolerance;
+    let (signal, tolerance) = judged
         .max_by(|a, b| part(a).total_cmp(&part(b)))
         .unwrap_or_default();
     Verified {
         method,
-        max_difference: tube.distance,
+        max_difference: signal.distance,
         tolerance,
-        signal: tube.name,
-        time: tube.time,
+        signal: signal.name.into(),
+        time: signal.time,
     }
 }
 

@@ -182,57 +182,6 @@ pub fn compare(
     })
 }
 
-/// How far a signal of two runs is apart at certain times.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Tube {
-    /// Its name.
-    pub name: String,
-    /// The largest distance of either curve from the other one's values within ± shift, relative to the amplitude: the largest |value| of
-    /// the reference in any row, at least 1e-9 of the largest of its unit.
-    pub distance: f64,
-    /// Where that is, s.
-    pub time: f64,
-}
-
-/// The distances of all signals that both sides have under one name, at these times alone: between them the sides need not have the same
-/// rows. `shift` (s) is how far aside an edge may stand.
-///
-/// # Cost
-/// O(N log N) per signal for N rows.
-#[must_use]
-pub fn tubes(waves: &Waveforms, reference: &Waveforms, times: &[f64], shift: f64) -> Vec<Tube> {
-    let (Ok((pairs, _)), false) = (paired(waves, reference), times.is_empty()) else {
-        return Vec::new();
-    };
-    if waves.is_empty() || reference.is_empty() {
-        return Vec::new();
-    }
-    let largest = |curve: &Curve<'_>| curve.values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-    let floor = |unit: &str| {
-        let same_unit = pairs.iter().filter(|(j, _)| waves.units[*j] == unit);
-        AMPLITUDE_FLOOR * same_unit.map(|(_, b)| largest(b)).fold(0.0, f64::max)
-    };
-    let tube = |(j, b): &Pair<'_>| {
-        let a = Curve::of(waves, *j);
-        let mut amplitude = largest(b).max(floor(waves.units[*j]));
-        if amplitude == 0.0 {
-            amplitude = largest(&a);
-        }
-        let (there, back) = (
-            tube_distance(&a, b, times, shift),
-            tube_distance(b, &a, times, shift),
-        );
-        let (distance, time) = if back.0 > there.0 { back } else { there };
-        let scale = if amplitude > 0.0 { amplitude } else { 1.0 };
-        Tube {
-            name: waves.names[*j].clone(),
-            distance: distance / scale,
-            time,
-        }
-    };
-    pairs.iter().map(tube).collect()
-}
-
 /// The common signals of both sides, `waves` minus `reference`, on the union of their grids with a row pair at each jump.
 ///
 /// # Errors

@@ -181,12 +181,12 @@ pub(crate) fn of_text(setting: &Setting, text: &str, seed: u64) -> Found {
         Err(error) => return Found::Refused(error),
     };
     let aside = found.error.event_time.unwrap_or(0.0);
-    let (truth, place) = distance(&found.waveforms, &reference.waveforms, aside);
+    let (truth, place) = distance(&found, &reference, aside);
     if setting.curved {
         let Ok(other) = better(CURVED[0]) else {
             return Found::Nothing("no reference");
         };
-        let own = distance(&other.waveforms, &reference.waveforms, aside).0;
+        let own = distance(&other, &reference, aside).0;
         if own > SURE * truth.max(ROUNDING) {
             return Found::Nothing("no sure reference");
         }
@@ -202,8 +202,13 @@ pub(crate) fn of_text(setting: &Setting, text: &str, seed: u64) -> Found {
 /// The least amplitude that counts, over the largest of the same unit.
 const FLOOR: f64 = 1e-3;
 
-/// The largest distance of a value from the reference's within ± `aside`, s, over all columns and rows, relative to the amplitude; and where.
-fn distance(waves: &Waveforms, reference: &Waveforms, aside: f64) -> (f64, String) {
+/// The largest distance of a value from the reference's over all columns and rows, relative to the amplitude; and where. A row that an
+/// event is no further from than `aside`, s, is compared with all values of the reference within ± `aside`.
+fn distance(found: &Run, reference: &Run, aside: f64) -> (f64, String) {
+    let events = found.events.iter().chain(&reference.events);
+    let mut events: Vec<f64> = events.map(|event| event.t).collect();
+    events.sort_by(f64::total_cmp);
+    let (waves, reference) = (&found.waveforms, &reference.waveforms);
     let columns: Vec<(usize, usize)> = (waves.names.iter().enumerate())
         .map(|(j, name)| (j, reference.find(name).expect("the same columns")))
         .collect();
@@ -213,8 +218,12 @@ fn distance(waves: &Waveforms, reference: &Waveforms, aside: f64) -> (f64, Strin
         .collect();
     let mut worst = (0.0, String::new());
     for (row, &t) in waves.time.iter().enumerate() {
-        let (low, high) = (t - aside - 1e-9 * aside, t + aside + 1e-9 * aside);
-        let (low, high) = (low - 4.0 * f64::EPSILON * t, high + 4.0 * f64::EPSILON * t);
+        let rounding = 4.0 * f64::EPSILON * t;
+        let wide = aside * (1.0 + 1e-9) + rounding;
+        let next = events.partition_point(|event| *event < t - wide);
+        let near = events.get(next).is_some_and(|event| *event <= t + wide);
+        let width = if near { wide } else { rounding };
+        let (low, high) = (t - width, t + width);
         let from = reference.time.partition_point(|s| *s < low);
         let to = reference.time.partition_point(|s| *s <= high);
         for (n, (j, k)) in columns.iter().enumerate() {

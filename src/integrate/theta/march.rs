@@ -55,7 +55,7 @@ impl Theta {
     /// faster than the step, undamped; it starts with two halves of Moreau's scheme instead, which are damped and leave it
     /// its order (Rannacher 1984). Returns the length of the last part.
     fn fixed_step(&mut self, h: f64, t1: f64) -> Result<f64, SimError> {
-        if !(self.now.settle && self.starts_damped()) {
+        if !(self.now.settle && self.starts_damped()) || self.whole && self.is_cut(h) {
             self.attempt(h, t1)?;
             return Ok(h);
         }
@@ -65,6 +65,11 @@ impl Theta {
         self.now.settle = true;
         self.attempt(0.5 * h, t1)?;
         Ok(0.5 * h)
+    }
+
+    /// Whether a prescribed step is cut short by a row or an edge so much that it would be the same in a run of steps half as long.
+    fn is_cut(&self, h: f64) -> bool {
+        matches!(self.stepping, Stepping::Fixed(prescribed) if 2.0 * h <= prescribed)
     }
 
     /// Whether steps after edges and jumps are Moreau's: those of the midpoint rule with prescribed steps, where error control would not

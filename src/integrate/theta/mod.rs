@@ -342,7 +342,8 @@ impl Theta {
         }
     }
 
-    /// Has steps whose error is controlled made whole in place of their halves: the same steps with a larger error.
+    /// Has steps whose error is controlled made whole in place of their halves, and so the first ones after edges and jumps where they are
+    /// prescribed and cut short: the same steps with a larger error.
     pub(crate) fn keep_whole_steps(&mut self) {
         self.whole = true;
     }

@@ -10,6 +10,10 @@ pub(crate) const FIRST_ORDER: [f64; 2] = [2.0, 0.5];
 /// The same for methods of order 2 and 3: 1/3 and 1/15 or less were they smooth.
 pub(crate) const HIGHER_ORDER: [f64; 2] = [1.5, 0.125];
 
+/// The same where devices change within steps: such a step errs by h² times a part that depends on where in the step the change is, in each
+/// run another one, so that the differences may be smaller by chance. Larger and smaller as [`FIRST_ORDER`].
+pub(crate) const HIGHER_ORDER_EVENTS: [f64; 2] = [2.0, 0.25];
+
 /// Tolerance of the companion of a run whose steps are chosen, over that of the run. It makes its steps whole where the run makes them in
 /// halves, so that they are longer even where rows and edges choose them.
 pub(crate) const LOOSER: f64 = 2.0;
