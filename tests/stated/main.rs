@@ -44,6 +44,13 @@ fn the_stated_error_bounds_the_true_one() {
     }
 }
 
+/// Seed 66 has a row 0.25 time constants after an edge: the first step there is the same in coarser runs, unless these make it in one part.
+#[test]
+fn a_step_that_a_row_cuts_short_after_an_edge_is_seen() {
+    let row = Row::of(&SETTINGS[1], 66, 1);
+    assert_eq!((row.told, row.bounded), (1, 1), "{row}");
+}
+
 /// The table of docs/running.md.
 #[test]
 fn table_of_many_circuits() {
