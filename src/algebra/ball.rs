@@ -265,6 +265,10 @@ impl Field for Ball {
         let size = self.value.hi.abs();
         self.residue == INEXACT && size.is_finite() || self.radius <= BALL_KNOWN * size
     }
+
+    fn radius(&self) -> f64 {
+        self.radius
+    }
 }
 
 #[cfg(test)]

@@ -30,4 +30,6 @@ pub trait Field: Clone + std::fmt::Debug {
     fn to_f64(&self) -> f64;
     /// Whether [`to_f64`](Self::to_f64) is within 1e-14 of the exact number, relative to it.
     fn is_precise(&self) -> bool;
+    /// Bound on what the computation may have lost of the number, besides the rounding to the nearest double.
+    fn radius(&self) -> f64;
 }

@@ -88,6 +88,10 @@ impl Field for Rational {
     fn is_precise(&self) -> bool {
         true
     }
+
+    fn radius(&self) -> f64 {
+        0.0
+    }
 }
 
 #[cfg(test)]

@@ -65,10 +65,10 @@ pub fn aliased<'a>(
 
 /// Names of events that repeat, and their periods, s.
 fn periods(run: &Run) -> Vec<(String, f64)> {
-    let mut times: BTreeMap<String, (&Event, Vec<f64>)> = BTreeMap::new();
+    let mut times: BTreeMap<(&[Change], bool), (&Event, Vec<f64>)> = BTreeMap::new();
     for event in &run.events {
         let (_, times) = times
-            .entry(event.to_string())
+            .entry((&event.changes, event.jump))
             .or_insert((event, Vec::new()));
         times.push(event.t);
     }

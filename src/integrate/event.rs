@@ -4,7 +4,7 @@ use std::fmt::{Display, Formatter, Result};
 use std::sync::Arc;
 
 /// A switch or device that changed its state.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Change {
     /// A switch moved.
     Switch {

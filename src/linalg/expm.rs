@@ -7,10 +7,7 @@ use nalgebra::{Complex, DMatrix};
 
 use super::dense::Dense;
 use super::shifted::Shifted;
-use crate::settings::tolerances::exponentials::SERIES;
-
-/// Terms of the series: 0.125^k/k! is below rounding beyond, in every entry; their sizes are not comparable.
-const TERMS: u32 = 14;
+use crate::settings::tolerances::exponentials::{MISSING, SERIES};
 
 /// Conjugate pairs (zero, pole) of the sub-diagonal approximant [7/8] of exp.
 const PAIRS: [(Complex<f64>, Complex<f64>); 3] = [
@@ -138,14 +135,20 @@ impl Ladder {
         self.rungs[k as usize].as_ref()
     }
 
-    /// Σ Z^j/j! − I by Horner's rule.
+    /// Σ Z^j/j! − I by Horner's rule, up to terms below [`MISSING`].
     fn series(&self, k: u32) -> Dense {
         let n = self.whole.columns();
+        let norm = self.norm_at(k);
+        let (mut terms, mut left) = (1, norm * norm / 2.0);
+        while left > MISSING {
+            terms += 1;
+            left *= norm / f64::from(terms + 1);
+        }
         let mut z = self.whole.clone();
         z.combine((-f64::from(k)).exp2(), 0.0, &self.whole);
         let mut sum = z.clone();
         let mut product = Dense::zeros(n, n);
-        for j in (2..=TERMS).rev() {
+        for j in (2..=terms).rev() {
             // sum ← Z + Z sum/j
             product.set_product(&z, &sum);
             sum.combine(0.0, 1.0, &z);

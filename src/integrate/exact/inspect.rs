@@ -103,9 +103,14 @@ impl Inspector {
         mode.flow.read_guards(&mut self.w);
         mode.inject.largest(scale, &mut self.sizes);
         self.sizes.resize(mode.flow.dim(), 0.0);
-        let (w, later, sizes) = (&self.w[..mode.flow.dim()], &self.later, &mut self.sizes);
+        let (w, guards) = self.w.split_at(mode.flow.dim());
+        let (later, sizes) = (&self.later, &mut self.sizes);
         for (size, w) in sizes.iter_mut().zip(w) {
             *size = size.max(w.abs());
+        }
+        let undisturbed = mode.constraints.is_empty() && self.slips.is_empty();
+        if undisturbed && mode.magnitudes.cover(sizes) && mode.magnitudes.clear(guards, time) {
+            return Finding::Holds(Vec::new());
         }
         let broken = mode.constraints.row_iter().any(|row| {
             let value = |w: &[f64]| row.iter().zip(w).map(|(c, w)| c * w).sum::<f64>();
@@ -125,6 +130,7 @@ impl Inspector {
         // Waves count with their amplitudes: they come back.
         exosystem.envelope(z, &mut magnitudes.sizes[mode.n..]);
         mode.flow.noise(&magnitudes.sizes, &mut magnitudes.noise);
+        magnitudes.uses = 0;
         magnitudes.find_followers(&mode.flow);
         self.read_drifts(mode, time);
         self.read_jets(mode);

@@ -2,12 +2,15 @@
 
 use super::flow::Flow;
 use super::slaved::{Follower, Manifold, followers};
+use crate::settings::tolerances::events::SIMULTANEOUS;
 use crate::settings::tolerances::exponentials::LEVEL;
 
+/// Inspections after which the sizes of a mode are taken anew: what was large may have become small.
+const USES: u32 = 64;
 /// Derivatives looked at: g, g', g'', g'''.
 pub(super) const ORDERS: usize = 4;
 
-/// How large things were when a mode was last inspected.
+/// How large things were when a mode was last inspected closely.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Magnitudes {
     /// Amplitudes of w.
@@ -18,6 +21,8 @@ pub(crate) struct Magnitudes {
     pub(crate) followers: Vec<Follower>,
     /// Where they do: one manifold for each [level](LEVEL) of their ages, the fastest alone first.
     pub(crate) manifolds: Vec<Manifold>,
+    /// How often it was enough to look at these since.
+    pub(super) uses: u32,
 }
 
 impl Magnitudes {
@@ -26,6 +31,20 @@ impl Magnitudes {
         let slowest = manifold.len().checked_sub(1);
         let slowest = slowest.and_then(|k| self.followers.get(k));
         slowest.map_or(0.0, |follower| follower.age)
+    }
+
+    /// Whether w is of no other size than it was.
+    pub(super) fn cover(&mut self, sizes: &[f64]) -> bool {
+        self.uses += 1;
+        let mut pairs = sizes.iter().zip(&self.sizes);
+        self.uses < USES && self.sizes.len() == sizes.len() && pairs.all(|(now, then)| now <= then)
+    }
+
+    /// Whether all guards of `[g | g']` are positive by more than noise, where times are known to `time`.
+    pub(super) fn clear(&self, guards: &[f64], time: f64) -> bool {
+        let (g, slopes) = guards.split_at(guards.len() / 2);
+        let mut guards = g.iter().zip(slopes).zip(&self.noise);
+        guards.all(|((g, slope), noise)| *g > SIMULTANEOUS * noise + time * slope.abs())
     }
 
     /// Finds which states follow the others.

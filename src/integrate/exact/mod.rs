@@ -16,6 +16,7 @@ mod map;
 mod mode;
 mod motion;
 mod plant;
+mod recurring;
 mod report;
 mod rounding;
 mod sampled;

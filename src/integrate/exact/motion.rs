@@ -5,7 +5,7 @@ use super::flow::{Flow, LONG};
 use super::magnitudes::Magnitudes;
 use super::rounding::resolution;
 use super::slaved::Follower;
-use super::work::Sizes;
+use super::work::{Sizes, Stretch};
 use crate::linalg::polynomial;
 use crate::linalg::series::Series;
 use crate::settings::tolerances::events::CLEAR_OF_ZERO;
@@ -66,9 +66,9 @@ pub(crate) struct Motion {
     pub(crate) most: u64,
     /// Energy from sources and energy dissipated on Taylor's steps since last taken, J.
     energy: [f64; 2],
-    /// Levels of the steps of the table since then, and the states w that they began at: their energy waits for the amplitudes of the
+    /// The steps of the table and spans since then, and the states w that they began at: their energy waits for the amplitudes of the
     /// whole way.
-    levels: Vec<u32>,
+    waiting: Vec<Stretch>,
     begins: Vec<f64>,
     /// Energy of the run over its duration, W.
     pub(crate) power: f64,
@@ -133,17 +133,19 @@ impl Motion {
 
     /// Energy from sources and energy dissipated since last taken, J.
     pub(crate) fn take_energy(&mut self, flow: &mut Flow) -> [f64; 2] {
-        let mut energy = std::mem::take(&mut self.energy);
+        if self.waiting.is_empty() {
+            return std::mem::take(&mut self.energy);
+        }
         let sizes = Sizes {
             amplitude: &self.amplitude,
             power: self.power,
         };
-        for (&level, w) in self.levels.iter().zip(self.begins.chunks_exact(flow.dim())) {
-            let [source, dissipated] = flow.energy(level, w, sizes);
-            energy[0] += source;
-            energy[1] += dissipated;
-        }
-        self.levels.clear();
+        let begins = self.begins.chunks_exact(flow.dim());
+        let stretches = self.waiting.iter().copied().zip(begins);
+        let [source, dissipated] = flow.energy(stretches, sizes);
+        let energy = [self.energy[0] + source, self.energy[1] + dissipated];
+        self.energy = [0.0; 2];
+        self.waiting.clear();
         self.begins.clear();
         energy
     }
@@ -285,11 +287,44 @@ impl Motion {
         if stop <= self.t {
             return Arrival::Reached;
         }
-        let arrival = self.climb(flow, exosystem, stop);
-        if arrival == Arrival::Reached {
-            self.settles(flow);
+        if !self.leap_span(flow, exosystem, stop) {
+            let arrival = self.climb(flow, exosystem, stop);
+            if arrival != Arrival::Reached {
+                return arrival;
+            }
         }
-        arrival
+        self.settles(flow);
+        Arrival::Reached
+    }
+
+    /// One step to `stop` if that span recurs and nothing happens on it.
+    fn leap_span(&mut self, flow: &mut Flow, exosystem: &Exosystem, stop: f64) -> bool {
+        let rest = stop - self.t;
+        let same = SAME_TIME * stop.abs();
+        // The output step is in the table.
+        if rest > flow.step_limit(self.age) || (rest - flow.step(LONG)).abs() <= same {
+            return false;
+        }
+        let Some(span) = flow.recurs(rest, same) else {
+            return false;
+        };
+        let clear = flow.leap_span(span, rest, &self.now, &mut self.next);
+        let clear = clear.filter(|_| self.judge(flow, rest) == Verdict::Clear);
+        let Some(off) = clear else {
+            flow.refuse(span);
+            return false;
+        };
+        if off != 0.0 && flow.works() {
+            let power = flow.power(&self.next);
+            for (sum, power) in self.energy.iter_mut().zip(power) {
+                *sum += off * power;
+            }
+        }
+        self.wait_for_energy(flow, Stretch::Span(span));
+        self.age += rest;
+        let steps = (rest / flow.step(LONG)).ceil();
+        self.take_next(flow, exosystem, stop, steps as u32);
+        true
     }
 
     /// Whether steps of the output grid are short enough from here on.
@@ -498,15 +533,21 @@ impl Motion {
 
     #[inline]
     fn accept(&mut self, flow: &mut Flow, exosystem: &Exosystem, level: u32, t: f64) {
-        if flow.works() {
-            if self.levels.len() == MOST_WAITING {
-                self.energy = self.take_energy(flow);
-            }
-            self.levels.push(level);
-            self.begins.extend_from_slice(&self.now[..flow.dim()]);
-        }
+        self.wait_for_energy(flow, Stretch::Table(level));
         self.age += flow.step(level);
         self.take_next(flow, exosystem, t, 1_u32 << LONG.saturating_sub(level));
+    }
+
+    /// Remembers that the energy of a stretch from `now` is to be taken.
+    #[inline]
+    fn wait_for_energy(&mut self, flow: &mut Flow, stretch: Stretch) {
+        if flow.works() {
+            if self.waiting.len() == MOST_WAITING {
+                self.energy = self.take_energy(flow);
+            }
+            self.waiting.push(stretch);
+            self.begins.extend_from_slice(&self.now[..flow.dim()]);
+        }
     }
 
     /// Stands at `next` and t; what the exosystem accumulates counts as that of so many steps.

@@ -64,6 +64,15 @@ pub(crate) struct Term {
     pub(crate) source: bool,
 }
 
+/// What a run goes along in one step, besides Taylor's series.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Stretch {
+    /// A step of the table: h/2^level.
+    Table(u32),
+    /// A span that recurs, by its place.
+    Span(usize),
+}
+
 /// Energy from sources and energy dissipated along w' = 𝒜 w.
 #[derive(Debug, Clone)]
 pub(crate) struct Work {
@@ -91,6 +100,11 @@ struct Forms {
     amplitude: Vec<f64>,
     /// The integrals of power out of sources and power dissipated over 2^k units, [Γ₀; Γ₁].
     over: Vec<Kernel>,
+    /// The same over spans that recur, by place, made when first needed.
+    spans: Vec<Option<Kernel>>,
+    /// 𝒜 and the powers (out of sources, dissipated) over y.
+    generator: DMatrix<f64>,
+    powers: [Dense; 2],
     /// Γ y.
     products: Vec<f64>,
     /// Where `over` ends.
@@ -132,28 +146,33 @@ impl Work {
         })
     }
 
-    fn forms(&mut self, generator: &DMatrix<f64>, sizes: Sizes<'_>) -> &mut Forms {
+    /// The integrals over steps and spans in which things are so large.
+    pub(crate) fn integrals(
+        &mut self,
+        generator: &DMatrix<f64>,
+        sizes: Sizes<'_>,
+    ) -> Integrals<'_> {
         let (terms, fast) = (&self.terms, &self.fast);
         let (unit, bottom) = (self.unit, self.bottom);
         self.forms
             .take_if(|forms| forms.are_outgrown(sizes.amplitude));
-        self.forms
-            .get_or_insert_with(|| Forms::new(terms, fast, generator, sizes, unit, bottom))
+        let forms = self
+            .forms
+            .get_or_insert_with(|| Forms::new(terms, fast, generator, sizes, unit, bottom));
+        Integrals { forms, fast }
     }
 
-    /// (from sources, dissipated) over 2^k units from w, J.
-    #[inline]
-    pub(crate) fn over(
-        &mut self,
-        k: u32,
-        w: &[f64],
-        generator: &DMatrix<f64>,
-        sizes: Sizes<'_>,
-    ) -> [f64; 2] {
-        let forms = self.forms(generator, sizes);
-        forms.double_to(k);
-        forms.y_of(w);
-        products(&forms.over[k as usize], &forms.y, &mut forms.products)
+    /// Σ v·i at w (from sources, dissipated), W.
+    pub(crate) fn power(&self, w: &[f64]) -> [f64; 2] {
+        let mut power = [0.0; 2];
+        for term in &self.terms {
+            let [v, i] = [&term.v, &term.i].map(|row| {
+                let products = self.seen.iter().map(|&j| row[j] * w[j]);
+                products.sum::<f64>()
+            });
+            power[usize::from(!term.source)] += v * i;
+        }
+        [-power[0], power[1]]
     }
 
     /// ∫ v·i dt along the first `t` seconds of a Taylor series, `part` of its step.
@@ -179,6 +198,37 @@ impl Work {
             energy[usize::from(!term.source)] += power.sum::<f64>();
         }
         [-t * energy[0], t * energy[1]]
+    }
+}
+
+/// See [`Work::integrals`].
+pub(crate) struct Integrals<'a> {
+    forms: &'a mut Forms,
+    fast: &'a [usize],
+}
+
+impl Integrals<'_> {
+    /// (from sources, dissipated) over 2^k units from w, J.
+    #[inline]
+    pub(crate) fn over(&mut self, k: u32, w: &[f64]) -> [f64; 2] {
+        let forms = &mut *self.forms;
+        forms.double_to(k);
+        forms.y_of(w);
+        products(&forms.over[k as usize], &forms.y, &mut forms.products)
+    }
+
+    /// (from sources, dissipated) from w over the span at a place, so many seconds long, J.
+    pub(crate) fn over_span(&mut self, place: usize, time: f64, w: &[f64]) -> [f64; 2] {
+        let forms = &mut *self.forms;
+        forms.y_of(w);
+        if forms.spans.len() <= place {
+            forms.spans.resize(place + 1, None);
+        }
+        let form = forms.spans[place].get_or_insert_with(|| {
+            let flow = (&forms.generator, self.fast);
+            Doubling::new(flow, &forms.powers, time, 0).forms()
+        });
+        products(form, &forms.y, &mut forms.products)
     }
 }
 
@@ -260,6 +310,9 @@ impl Forms {
             y: vec![0.0; dim],
             amplitude: size,
             over: vec![latest.forms()],
+            spans: Vec::new(),
+            generator: moved,
+            powers,
             products: vec![0.0; 2 * dim],
             latest,
         }
@@ -431,7 +484,7 @@ mod tests {
         let terms = vec![term(&[1.0], &[1.0], true), term(&[2.0], &[1.0], false)];
         let mut work = Work::new(terms, &[], 32.0 * h, 5).unwrap();
         for k in 0..6 {
-            let [source, dissipated] = work.over(k, &[3.0], &a, sizes(&[3.0]));
+            let [source, dissipated] = work.integrals(&a, sizes(&[3.0])).over(k, &[3.0]);
             let expected = exact(h * f64::from(1 << k));
             assert!((source / expected + 1.0).abs() < 1e-15, "{k}");
             assert!((dissipated / expected - 2.0).abs() < 1e-15, "{k}");
@@ -463,7 +516,7 @@ mod tests {
         // v = x₂ + gain x₁ obeys v' = −fast v exactly: ∫ v² = v₀²/(2 fast).
         let w = [1.0, 1e-3 - gain];
         let v = w[1] + gain;
-        let [_, found] = work.over(20, &w, &a, sizes(&[1.0, gain]));
+        let [_, found] = work.integrals(&a, sizes(&[1.0, gain])).over(20, &w);
         assert!(
             (found / (v * v / (2.0 * fast)) - 1.0).abs() < 1e-6,
             "{found}"

@@ -207,7 +207,7 @@ fn published<F: Field>(
     if let Some(span) = apart {
         reduction.separate(span);
     }
-    Ok(publish(behaviour, position, &reduction))
+    Ok(publish(behaviour, position, &reduction, apart))
 }
 
 fn check(behaviour: &StaticMultiport, position: &Position) -> Result<(), ReduceError> {
@@ -329,8 +329,8 @@ pub(super) mod oracle {
         let ball = in_some_order(behaviour, behaviour.ball(), position);
         let exact = in_some_order(behaviour, behaviour.rational(), position);
         (
-            ball.map(|r| publish(behaviour, position, &r)),
-            exact.map(|r| publish(behaviour, position, &r)),
+            ball.map(|r| publish(behaviour, position, &r, None)),
+            exact.map(|r| publish(behaviour, position, &r, None)),
         )
     }
 

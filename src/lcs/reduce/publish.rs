@@ -33,6 +33,26 @@ impl Rounding {
         matrix
     }
 
+    /// A over [x | …], known to 1e-14 of each entry or, where `span` is given, well enough that the flow over so many seconds is: what
+    /// the radius ρ of A_ij moves, ρ √(W_ii/W_jj) span in units of √energy, is rounding of the state.
+    fn rates<F: Field>(
+        &mut self,
+        rates: &[&[F]],
+        energy: &[&[F]],
+        span: Option<f64>,
+    ) -> DMatrix<f64> {
+        let stored = |i: usize| energy.get(i).map_or(0.0, |row| row[i].to_f64().sqrt());
+        DMatrix::from_fn(rates.len(), rates.len(), |i, j| {
+            let rate = &rates[i][j];
+            let moved = |span: f64| rate.radius() * span * stored(i) / stored(j);
+            if span.is_some_and(|span| moved(span) <= f64::EPSILON) {
+                rate.to_f64()
+            } else {
+                self.number(rate)
+            }
+        })
+    }
+
     fn vector<F: Field>(&mut self, rows: &[&[F]], column: usize) -> DVector<f64> {
         DVector::from_iterator(rows.len(), rows.iter().map(|row| self.number(&row[column])))
     }
@@ -52,11 +72,13 @@ fn slices<F>(rows: &[Vec<F>]) -> Vec<&[F]> {
     rows.iter().map(Vec::as_slice).collect()
 }
 
-/// The system as doubles, and whether every entry is within 1e-14 of the exact one.
+/// The system as doubles, and whether every entry is within 1e-14 of the exact one; of A, for a flow over `span` seconds, what such a flow
+/// sees of it.
 pub(super) fn publish<F: Field>(
     behaviour: &StaticMultiport,
     position: &Position,
     reduction: &Reduction<F>,
+    span: Option<f64>,
 ) -> (LcsParts, bool) {
     let r = reduction;
     let (n, m, p, q) = (
@@ -67,6 +89,7 @@ pub(super) fn publish<F: Field>(
     );
     let mut round = Rounding { precise: true };
     let (rates, y, s) = (slices(&r.rates), slices(&r.y), slices(&r.s));
+    let energy = slices(&r.energy);
     let (values, impulses): (Vec<&[F]>, Vec<&[F]>) = r
         .readings
         .iter()
@@ -152,7 +175,7 @@ pub(super) fn publish<F: Field>(
             .iter()
             .map(|&(k, role)| port(behaviour, k, role))
             .collect(),
-        a: round.matrix(&rates, 0..n),
+        a: round.rates(&rates, &energy, span),
         b: round.matrix(&rates, n..n + m),
         c: round.matrix(&y, 0..n),
         d: round.matrix(&y, n..n + m),
@@ -163,7 +186,7 @@ pub(super) fn publish<F: Field>(
         shift: round
             .matrix(&slices(&r.shift), 0..if n > 0 { p } else { 0 })
             .resize(n, p, 0.0),
-        energy: round.matrix(&slices(&r.energy), 0..n),
+        energy: round.matrix(&energy, 0..n),
         outputs,
         storage,
         switches: (behaviour.switches.iter())

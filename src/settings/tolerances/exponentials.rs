@@ -7,6 +7,10 @@ pub(crate) const SQUARED: f64 = 1e3;
 /// ‖A h‖₁ up to which Taylor's series is summed; longer steps begin with a part of this size. Larger: more terms; smaller: more squarings.
 pub(crate) const SERIES: f64 = 0.125;
 
+/// What may be missing of the series of an exponential, in every entry of the balanced matrix; their sizes are not comparable. 14 terms at
+/// [`SERIES`]; larger, and small entries of a chain of states lose digits.
+pub(crate) const MISSING: f64 = 2.2e-26;
+
 /// A term of a series is nothing where every component is below this part of the largest that it had so far. Larger: digits are lost;
 /// smaller: terms that add nothing.
 pub(crate) const TERM_IS_NOTHING: f64 = 0.1 * f64::EPSILON;
