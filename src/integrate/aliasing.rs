@@ -65,14 +65,13 @@ pub fn aliased<'a>(
 
 /// Names of events that repeat, and their periods, s.
 fn periods(run: &Run) -> Vec<(String, f64)> {
-    let mut times: BTreeMap<(&[Change], bool), (&Event, Vec<f64>)> = BTreeMap::new();
+    let mut alike: BTreeMap<(&[Change], bool), Vec<&Event>> = BTreeMap::new();
     for event in &run.events {
-        let (_, times) = times
-            .entry((&event.changes, event.jump))
-            .or_insert((event, Vec::new()));
-        times.push(event.t);
+        let kind = (&*event.changes, event.jump);
+        alike.entry(kind).or_default().push(event);
     }
-    let period = |(event, times): (&Event, Vec<f64>)| {
+    let period = |events: Vec<&Event>| {
+        let event = events.first()?;
         let names: Vec<&str> = event.changes.iter().map(Change::name).collect();
         let plain = if names.is_empty() {
             event.to_string()
@@ -80,15 +79,15 @@ fn periods(run: &Run) -> Vec<(String, f64)> {
             names.join(", ")
         };
         // What is on, or conducts, is so once a period; of jumps there may be one each way.
-        let events = if event.changes.is_empty() { 2 } else { 1 };
-        let pairs = times.iter().zip(times.iter().skip(events));
-        let mut periods: Vec<f64> = pairs.map(|(from, to)| to - from).collect();
-        if periods.len() < events * REPEATED {
+        let a_period = if event.changes.is_empty() { 2 } else { 1 };
+        let pairs = events.iter().zip(events.iter().skip(a_period));
+        let mut periods: Vec<f64> = pairs.map(|(from, to)| to.t - from.t).collect();
+        if periods.len() < a_period * REPEATED {
             return None;
         }
         periods.sort_by(f64::total_cmp);
         let median = periods[periods.len() / 2];
         (median > 0.0).then_some((plain, median))
     };
-    times.into_values().filter_map(period).collect()
+    alike.into_values().filter_map(period).collect()
 }
