@@ -103,22 +103,25 @@ impl Inspector {
         mode.flow.read_guards(&mut self.w);
         mode.inject.largest(scale, &mut self.sizes);
         self.sizes.resize(mode.flow.dim(), 0.0);
-        let (w, guards) = self.w.split_at(mode.flow.dim());
-        let (later, sizes) = (&self.later, &mut self.sizes);
-        for (size, w) in sizes.iter_mut().zip(w) {
+        for (size, w) in self.sizes.iter_mut().zip(&self.w) {
             *size = size.max(w.abs());
         }
+        self.read_drifts(mode, time);
         let undisturbed = mode.constraints.is_empty() && self.slips.is_empty();
-        if undisturbed && mode.magnitudes.cover(sizes) && mode.magnitudes.clear(guards, time) {
-            return Finding::Holds(Vec::new());
+        if undisturbed && mode.magnitudes.cover(&self.sizes) {
+            let (g, slopes) = self.w[mode.flow.dim()..].split_at(mode.flow.guards());
+            let drift = |i: usize| {
+                let moved = self.drifts.get(i).filter(|_| !self.rates.is_empty());
+                moved.map_or(time * slopes[i].abs(), |moved| moved.abs())
+            };
+            if mode.magnitudes.clear(g, drift) {
+                return Finding::Holds(Vec::new());
+            }
         }
+        let (w, later, sizes) = (&self.w[..mode.flow.dim()], &self.later, &self.sizes);
         let broken = mode.constraints.row_iter().any(|row| {
             let value = |w: &[f64]| row.iter().zip(w).map(|(c, w)| c * w).sum::<f64>();
-            let whole: f64 = row
-                .iter()
-                .zip(&*sizes)
-                .map(|(c, size)| c.abs() * size)
-                .sum();
+            let whole: f64 = row.iter().zip(sizes).map(|(c, size)| c.abs() * size).sum();
             let drift = (value(later) - value(w)).abs();
             value(w).abs() > CONSISTENT * whole + drift
         });
@@ -132,7 +135,6 @@ impl Inspector {
         mode.flow.noise(&magnitudes.sizes, &mut magnitudes.noise);
         magnitudes.uses = 0;
         magnitudes.find_followers(&mode.flow);
-        self.read_drifts(mode, time);
         self.read_jets(mode);
         let mut leaving = Vec::new();
         for i in 0..mode.flow.guards() {

@@ -40,11 +40,10 @@ impl Magnitudes {
         self.uses < USES && self.sizes.len() == sizes.len() && pairs.all(|(now, then)| now <= then)
     }
 
-    /// Whether all guards of `[g | g']` are positive by more than noise, where times are known to `time`.
-    pub(super) fn clear(&self, guards: &[f64], time: f64) -> bool {
-        let (g, slopes) = guards.split_at(guards.len() / 2);
-        let mut guards = g.iter().zip(slopes).zip(&self.noise);
-        guards.all(|((g, slope), noise)| *g > SIMULTANEOUS * noise + time * slope.abs())
+    /// Whether all guards g are positive by more than their noise and what the resolution of the time leaves of them.
+    pub(super) fn clear(&self, g: &[f64], drift: impl Fn(usize) -> f64) -> bool {
+        let mut guards = g.iter().zip(&self.noise).enumerate();
+        guards.all(|(i, (g, noise))| *g > SIMULTANEOUS * noise + drift(i))
     }
 
     /// Finds which states follow the others.
