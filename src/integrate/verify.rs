@@ -2,7 +2,7 @@
 //!
 //! Exact integration and implicit steps share the reduced systems and nothing of the way through time: one finds events and modes, the
 //! other solves a complementarity problem at every step. The steps are made at two tolerances, whose distance tells what they know
-//! themselves. Rows are compared as those of companions are ([`crate::integrate::difference`]), where an event may stand as far aside as
+//! themselves. Rows are compared as those of companions are (`integrate::difference`), where an event may stand as far aside as
 //! those of the verifying runs do among each other.
 
 use std::collections::BTreeMap;
