@@ -127,9 +127,17 @@ fn stated_error(run: &Run) -> Option<String> {
 /// What a user must be told by default: that a current or charge was destroyed, that rows do not show what happens between them.
 #[must_use]
 pub fn warnings(run: &Run, places: Places<'_>) -> Vec<String> {
-    let warnings = destroyed(run).into_iter();
+    let warnings = destroyed(run).into_iter().chain(unbalanced(run));
     let warnings = warnings.chain(run.aliased.as_ref().map(aliasing));
     warnings.map(|warning| places.of(&warning)).collect()
+}
+
+/// Energies beyond doubles: what grows so far is unstable, or wrong.
+fn unbalanced(run: &Run) -> Option<Note> {
+    let text = "the energies of this run are beyond the range of numbers, so that nothing checks it; unless the circuit is \
+                unstable, its values are wrong (--verify runs it a second time)";
+    let known = !run.balanced || run.energy.residual.is_finite();
+    (!known).then(|| Note::of(<[String; 0]>::default(), text))
 }
 
 fn aliasing(aliased: &Aliased) -> Note {

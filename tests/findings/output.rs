@@ -540,3 +540,11 @@ fn a_system_without_a_circuit_reports_no_energies() {
     assert!(!words.contains("energy: "), "{words}");
     assert!(words.contains("no powers to balance"), "{words}");
 }
+
+/// The solution that exact integration finds there is wrong; it must not look right.
+#[test]
+fn energies_beyond_doubles_are_a_warning() {
+    let folder = place(&["blocking_beyond_doubles"]);
+    let run = ends(folder.path(), "sim blocking_beyond_doubles.cir -o a.csv");
+    assert!(said(&run).contains("beyond the range of numbers, so that nothing checks it"));
+}
