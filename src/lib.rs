@@ -75,7 +75,7 @@ pub mod cli;
 pub use circuit::{Circuit, Diodes, ElaborateOptions};
 pub use diagnostic::{Diagnostic, Faults, Severity};
 pub use integrate::{
-    Change, Checkpoint, Event, Method, OperatingPoint, Run, SimError, SimOptions, Simulation,
+    Change, Checkpoint, Error, Event, Method, OperatingPoint, Run, SimOptions, Simulation,
     SimulationOptions, Stop, StopReason,
 };
 pub use lcs::Lcs;

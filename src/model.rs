@@ -6,7 +6,7 @@ use crate::circuit::source::Wave;
 use crate::circuit::{Circuit, ElaborateOptions, Element, Kind, Sweep, elaborate, load};
 use crate::diagnostic::{Diagnostic, Faults, SourceMap};
 use crate::integrate::{
-    OperatingPoint, Places, Run, SimError, SimOptions, Simulation, SimulationOptions, Values,
+    Error, OperatingPoint, Places, Run, SimOptions, Simulation, SimulationOptions, Values,
     operating_point, simulate,
 };
 use crate::lcs::{Lcs, Position, reduce};
@@ -42,8 +42,8 @@ impl Model {
     /// Reads a netlist file and what it includes.
     ///
     /// # Errors
-    /// Everything that is wrong with it, in [`SimError::findings`].
-    pub fn load(path: impl AsRef<Path>, options: ElaborateOptions) -> Result<Self, SimError> {
+    /// Everything that is wrong with it, in [`Error::findings`].
+    pub fn load(path: impl AsRef<Path>, options: ElaborateOptions) -> Result<Self, Error> {
         let load::Loaded {
             sources,
             netlist,
@@ -66,7 +66,7 @@ impl Model {
     ///
     /// # Errors
     /// As [`Self::load`].
-    pub fn parse(text: &str, name: &str) -> Result<Self, SimError> {
+    pub fn parse(text: &str, name: &str) -> Result<Self, Error> {
         Self::parse_with(text, name, ElaborateOptions::default())
     }
 
@@ -74,7 +74,7 @@ impl Model {
     ///
     /// # Errors
     /// As [`Self::load`].
-    pub fn parse_with(text: &str, name: &str, options: ElaborateOptions) -> Result<Self, SimError> {
+    pub fn parse_with(text: &str, name: &str, options: ElaborateOptions) -> Result<Self, Error> {
         let mut sources = SourceMap::default();
         let root = sources.add(name, text);
         let (netlist, mut findings) = netlist::parse(&mut sources, root, &|path| load::read(path));
@@ -96,7 +96,7 @@ impl Model {
     ///
     /// # Errors
     /// Findings on its topology: shorts and open branches that contradict each other.
-    pub fn of_circuit(circuit: Circuit) -> Result<Self, SimError> {
+    pub fn of_circuit(circuit: Circuit) -> Result<Self, Error> {
         let (sources, options) = (SourceMap::default(), ElaborateOptions::default());
         Ok(Self::of(None, sources, options, circuit, vec![])?)
     }
@@ -129,7 +129,7 @@ impl Model {
     ///
     /// # Errors
     /// There is no such element or parameter, or the circuit is none with that value; the model stays as it was.
-    pub fn set(&mut self, name: &str, value: f64) -> Result<(), SimError> {
+    pub fn set(&mut self, name: &str, value: f64) -> Result<(), Error> {
         let name = name.to_lowercase();
         let mut options = self.options.clone();
         let values = match self.circuit.element(&name) {
@@ -176,7 +176,7 @@ impl Model {
     ///
     /// # Errors
     /// The netlist is no circuit with them, or there is no netlist.
-    pub fn at(&self, sweeps: &[Sweep], values: &[f64]) -> Result<Self, SimError> {
+    pub fn at(&self, sweeps: &[Sweep], values: &[f64]) -> Result<Self, Error> {
         let circuit = self.circuit_at(sweeps, values)?;
         match mna::behaviour(&circuit) {
             Ok(multiport) => Ok(Self {
@@ -192,7 +192,7 @@ impl Model {
     }
 
     /// The circuit of that model, with the probes of this one.
-    pub(crate) fn circuit_at(&self, sweeps: &[Sweep], values: &[f64]) -> Result<Circuit, SimError> {
+    pub(crate) fn circuit_at(&self, sweeps: &[Sweep], values: &[f64]) -> Result<Circuit, Error> {
         let Some(netlist) = &self.netlist else {
             let message = "a circuit without a netlist has no sweeps";
             return Err(self.faults(vec![Diagnostic::error("sweep", None, message)]));
@@ -210,7 +210,7 @@ impl Model {
     ///
     /// # Errors
     /// Its equations cannot be set up.
-    pub(crate) fn with_circuit(&self, circuit: Circuit) -> Result<Self, SimError> {
+    pub(crate) fn with_circuit(&self, circuit: Circuit) -> Result<Self, Error> {
         match mna::behaviour(&circuit) {
             Ok(multiport) => Ok(Self {
                 circuit,
@@ -221,7 +221,7 @@ impl Model {
         }
     }
 
-    fn faults(&self, findings: Vec<Diagnostic>) -> SimError {
+    fn faults(&self, findings: Vec<Diagnostic>) -> Error {
         refused(findings, self.sources.clone())
     }
 
@@ -262,8 +262,8 @@ impl Model {
     /// Simulates the transient that `.tran` asks for.
     ///
     /// # Errors
-    /// See [`Reason`](crate::integrate::Reason); the run so far is in [`SimError::partial`].
-    pub fn transient(&self, options: SimOptions<'_>) -> Result<Run, SimError> {
+    /// See [`Reason`](crate::integrate::Reason); the run so far is in [`Error::partial`].
+    pub fn transient(&self, options: SimOptions<'_>) -> Result<Run, Error> {
         simulate(&self.circuit, &self.multiport, options)
     }
 
@@ -271,7 +271,7 @@ impl Model {
     ///
     /// # Errors
     /// As [`Simulation::new`].
-    pub fn simulation(&self, options: SimulationOptions) -> Result<Simulation, SimError> {
+    pub fn simulation(&self, options: SimulationOptions) -> Result<Simulation, Error> {
         Simulation::new(&self.circuit, &self.multiport, options)
     }
 
@@ -279,7 +279,7 @@ impl Model {
     ///
     /// # Errors
     /// See [`operating_point`].
-    pub fn operating_point(&self) -> Result<OperatingPoint, SimError> {
+    pub fn operating_point(&self) -> Result<OperatingPoint, Error> {
         operating_point(&self.circuit, Values::Dc, false, &Settings::default())
     }
 
@@ -287,15 +287,15 @@ impl Model {
     ///
     /// # Errors
     /// Shorts and open branches contradict each other.
-    pub fn lcs(&self) -> Result<Lcs, SimError> {
+    pub fn lcs(&self) -> Result<Lcs, Error> {
         let switches = self.multiport.switches.iter();
         let start = switches.map(|s| s.initial.unwrap_or(false)).collect();
         let position = Position::free(&self.multiport, start);
-        reduce(&self.multiport, &position).map_err(|error| SimError::before(error.into()))
+        reduce(&self.multiport, &position).map_err(|error| Error::before(error.into()))
     }
 }
 
-fn refused(findings: Vec<Diagnostic>, sources: SourceMap) -> SimError {
+fn refused(findings: Vec<Diagnostic>, sources: SourceMap) -> Error {
     Faults { findings, sources }.into()
 }
 

@@ -4,7 +4,7 @@
 
 use circ::circuit::{ElaborateOptions, elaborate};
 use circ::diagnostic::SourceMap;
-use circ::integrate::{Method, Run, SimError, SimOptions, simulate};
+use circ::integrate::{Error, Method, Run, SimOptions, simulate};
 use circ::mna::behaviour;
 use circ::netlist::parse;
 use circ::settings::Settings;
@@ -307,7 +307,7 @@ impl Nodal {
     }
 }
 
-fn run(text: &str, options: SimOptions<'_>) -> Result<Run, SimError> {
+fn run(text: &str, options: SimOptions<'_>) -> Result<Run, Error> {
     let mut sources = SourceMap::default();
     let root = sources.add("test.cir", text);
     let (netlist, _) = parse(&mut sources, root, &|_| {

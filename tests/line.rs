@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use circ::circuit::{Circuit, ElaborateOptions, elaborate};
 use circ::diagnostic::{Severity, SourceMap};
 use circ::integrate::start::{Values, operating_point};
-use circ::integrate::{Method, Run, SimError, SimOptions, simulate};
+use circ::integrate::{Error, Method, Run, SimOptions, simulate};
 use circ::mna::behaviour;
 use runs::{at, column};
 
@@ -27,7 +27,7 @@ fn circuit(text: &str) -> Circuit {
     circuit.unwrap_or_else(|| panic!("{errors:?}"))
 }
 
-fn try_run(text: &str, options: SimOptions<'_>) -> Result<Run, SimError> {
+fn try_run(text: &str, options: SimOptions<'_>) -> Result<Run, Error> {
     let circuit = circuit(text);
     let behaviour = behaviour(&circuit).expect("a sound circuit");
     simulate(&circuit, &behaviour, options)

@@ -4,7 +4,7 @@
 use circ::circuit::{ElaborateOptions, elaborate};
 use circ::diagnostic::SourceMap;
 use circ::integrate::{
-    Method, Run, SimError, SimOptions, Values, operating_point, simulate as run_simulation,
+    Error, Method, Run, SimOptions, Values, operating_point, simulate as run_simulation,
 };
 use circ::mna::behaviour;
 use circ::netlist::parse;
@@ -20,7 +20,7 @@ fn circuit(text: &str) -> circ::circuit::Circuit {
     circuit.unwrap_or_else(|| panic!("{findings:?} {more:?}"))
 }
 
-fn attempt(text: &str, options: SimOptions<'_>) -> Result<Run, SimError> {
+fn attempt(text: &str, options: SimOptions<'_>) -> Result<Run, Error> {
     let circuit = circuit(text);
     let behaviour = behaviour(&circuit).expect("a behaviour");
     run_simulation(&circuit, &behaviour, options)

@@ -2,7 +2,7 @@
 
 use super::sweep::{Variant, each, variants};
 use crate::circuit::{Circuit, Probed};
-use crate::integrate::{OperatingPoint, SimError, Values, operating_point};
+use crate::integrate::{Error, OperatingPoint, Values, operating_point};
 use crate::model::Model;
 use crate::settings::Settings;
 
@@ -24,7 +24,7 @@ pub struct Unsolved {
     /// The circuit with them; none where the netlist is no circuit with these values.
     pub circuit: Option<Box<Circuit>>,
     /// Why.
-    pub error: Box<SimError>,
+    pub error: Box<Error>,
 }
 
 /// Carries out the `.dc` sweeps of a netlist.
@@ -43,7 +43,7 @@ pub fn dc(model: &Model) -> Result<Characteristic, Unsolved> {
 }
 
 fn point(variant: &Variant<'_>) -> Result<Vec<f64>, Unsolved> {
-    let unsolved = |circuit: Option<Circuit>, error: SimError| Unsolved {
+    let unsolved = |circuit: Option<Circuit>, error: Error| Unsolved {
         at: variant.named(),
         circuit: circuit.map(Box::new),
         error: Box::new(error),

@@ -1,7 +1,7 @@
 //! A transient with its measurements: the signals they need are simulated besides those that are shown, and taken away again.
 
 use crate::circuit::{Circuit, Harmonics, Measured, Probe, Tran};
-use crate::integrate::{Block, Grid, RowKind, Run, SimError, SimOptions};
+use crate::integrate::{Block, Error, Grid, RowKind, Run, SimOptions};
 use crate::model::Model;
 use crate::waveform::Waveforms;
 
@@ -31,13 +31,13 @@ pub struct Finished {
     /// The rows, and what was measured on them.
     pub run: Option<(Run, Measurements)>,
     /// Why it ended early.
-    pub error: Option<SimError>,
+    pub error: Option<Error>,
 }
 
 impl Finished {
     /// A run without measurements.
     #[must_use]
-    pub fn of(result: Result<Run, SimError>) -> Self {
+    pub fn of(result: Result<Run, Error>) -> Self {
         let (run, error) = match result {
             Ok(run) => (Some(run), None),
             Err(mut error) => (error.partial.take().map(|run| *run), Some(error)),
@@ -106,7 +106,7 @@ impl<'a> Measuring<'a> {
     }
 
     /// The same circuit with a finer grid, and the signals of its measurements after those that are shown.
-    fn model(&self, model: &Model) -> Result<Model, SimError> {
+    fn model(&self, model: &Model) -> Result<Model, Error> {
         let mut probes = self.circuit.probes();
         for probe in &self.circuit.measured {
             if !probes.contains(probe) {

@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use crate::circuit::{Circuit, Sweep, combinations};
-use crate::integrate::SimError;
+use crate::integrate::Error;
 use crate::model::Model;
 
 /// A combination of values, and the model that it is one of.
@@ -26,7 +26,7 @@ pub struct Variant<'m> {
 /// let poles = each(&variants(&model, &model.circuit().steps), |variant| Ok(variant.model()?.lcs()?.a[(0, 0)]));
 /// let poles: Result<Vec<f64>, Box<dyn std::error::Error + Send + Sync>> = poles.into_iter().collect();
 /// assert_eq!(poles.unwrap(), [-1e3, -500.0]);
-/// # Ok::<(), circ::SimError>(())
+/// # Ok::<(), circ::Error>(())
 /// ```
 #[must_use]
 pub fn variants<'m>(base: &'m Model, sweeps: &'m [Sweep]) -> Vec<Variant<'m>> {
@@ -56,12 +56,12 @@ impl Variant<'_> {
     ///
     /// # Errors
     /// The netlist is no circuit with them.
-    pub fn model(&self) -> Result<Model, SimError> {
+    pub fn model(&self) -> Result<Model, Error> {
         self.base.at(self.sweeps, &self.values)
     }
 
     /// Its circuit alone.
-    pub(super) fn circuit(&self) -> Result<Circuit, SimError> {
+    pub(super) fn circuit(&self) -> Result<Circuit, Error> {
         self.base.circuit_at(self.sweeps, &self.values)
     }
 }

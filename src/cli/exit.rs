@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use super::signals::Signals;
-use crate::integrate::SimError;
+use crate::integrate::Error;
 use crate::report::PictureError;
 use crate::waveform::WaveformError;
 use crate::waveform::compare::CompareError;
@@ -67,7 +67,7 @@ pub enum Failure {
     Compare(#[from] CompareError),
     /// A run, or its start, could not be computed; shown at its element where the circuit is at hand.
     #[error(transparent)]
-    Run(#[from] Box<SimError>),
+    Run(#[from] Box<Error>),
     /// Anything else that the user should read.
     #[error("{0}")]
     Message(String),

@@ -12,7 +12,7 @@ use crate::analysis::Variant;
 use crate::circuit::{self, Circuit, ElaborateOptions, Tran};
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 use crate::forms::json;
-use crate::integrate::{Places, Reason, SimError, start};
+use crate::integrate::{Error, Places, Reason, start};
 use crate::lcs::json::SystemFile;
 use crate::lcs::{Lcs, Position, reduce};
 use crate::mna::StaticMultiport;
@@ -157,7 +157,7 @@ pub(super) fn variant(
 }
 
 /// A netlist that is no circuit: shows why.
-pub(super) fn refused(input: &Input, error: &SimError, streams: &Streams) -> Failure {
+pub(super) fn refused(input: &Input, error: &Error, streams: &Streams) -> Failure {
     match &error.reason {
         Reason::Netlist(faults) => {
             show(&faults.findings, &faults.sources, streams);
@@ -209,7 +209,7 @@ pub fn start_system(
     subject: &Subject,
     wanted: &[(String, bool)],
     streams: &Streams,
-) -> Result<(SystemFile, Option<SimError>), Failure> {
+) -> Result<(SystemFile, Option<Error>), Failure> {
     let (circuit, behaviour) = match subject {
         Subject::Circuit(model) => (model.circuit(), model.multiport()),
         Subject::System(system) if wanted.is_empty() => {
@@ -238,7 +238,7 @@ pub fn start_system(
         switches[k] = on;
     }
     let lcs = reduce(behaviour, &Position::free(behaviour, switches))
-        .map_err(|error| Box::new(SimError::before(error.into())))?;
+        .map_err(|error| Box::new(Error::before(error.into())))?;
     let x0 = &lcs.storage.inject * &initial.storage + &lcs.storage.inject_one;
     let system = SystemFile {
         lcs,
@@ -305,7 +305,7 @@ pub fn show(diagnostics: &[Diagnostic], sources: &SourceMap, streams: &Streams) 
 /// A run that broke off: shows why, at the card of the element where it shows.
 pub(super) fn broke_off(
     input: &Input,
-    error: &SimError,
+    error: &Error,
     places: Places<'_>,
     streams: &Streams,
 ) -> Failure {

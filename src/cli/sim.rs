@@ -18,7 +18,7 @@ use crate::analysis::{self, Finished, Measurements, is_measured};
 use crate::circuit::source::Wave;
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{
-    Block, Method, Note, Places, Reason, Run, SimError, SimOptions, Sink, Verified, VerifyOptions,
+    Block, Error, Method, Note, Places, Reason, Run, SimOptions, Sink, Verified, VerifyOptions,
     aliased, simulate, simulate_system, verify, verify_system,
 };
 use crate::lcs::Input;
@@ -256,13 +256,13 @@ impl<'a> Destination<'a> {
         }
     }
 
-    fn failure(&self, error: &SimError) -> Failure {
+    fn failure(&self, error: &Error) -> Failure {
         input::broke_off(&self.args.input, error, self.places, self.streams)
     }
 }
 
 /// Makes a run a second time.
-fn second(subject: &Subject, run: &Run, options: &VerifyOptions<'_>) -> Result<Verified, SimError> {
+fn second(subject: &Subject, run: &Run, options: &VerifyOptions<'_>) -> Result<Verified, Error> {
     match subject {
         Subject::Circuit(model) => verify(model.circuit(), model.multiport(), run, options),
         Subject::System(system) => match system.tran {
@@ -272,9 +272,9 @@ fn second(subject: &Subject, run: &Run, options: &VerifyOptions<'_>) -> Result<V
     }
 }
 
-fn no_tran() -> SimError {
+fn no_tran() -> Error {
     let reason = "the system has no \"tran\": {\"tstep\", \"tstop\"}";
-    SimError::before(Reason::Unsupported(reason.into()))
+    Error::before(Reason::Unsupported(reason.into()))
 }
 
 /// Where the rows of a run go.
@@ -404,13 +404,13 @@ impl Request {
 /// Simulates over the subject's `.tran`, with `tstep` in place of its print step if given.
 ///
 /// # Errors
-/// See [`SimError`].
+/// See [`Error`].
 pub fn run(
     subject: &Subject,
     request: &Request,
     tstep: Option<f64>,
     streams: &Streams,
-) -> Result<Run, SimError> {
+) -> Result<Run, Error> {
     run_to(subject, request, tstep, Route::default(), streams)
 }
 
@@ -421,7 +421,7 @@ fn run_to(
     tstep: Option<f64>,
     route: Route<'_>,
     streams: &Streams,
-) -> Result<Run, SimError> {
+) -> Result<Run, Error> {
     let tran = subject.tran().map(|t| Tran {
         tstep: tstep.unwrap_or(t.tstep),
         ..t

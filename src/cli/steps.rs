@@ -9,7 +9,7 @@ use super::signals::Signals;
 use super::sim::{self, Destination, Request, Route};
 use super::streams::Streams;
 use crate::analysis::{Finished, Variant, each, variants};
-use crate::integrate::{Block, Grid, Reason, SimError};
+use crate::integrate::{Block, Error, Grid, Reason};
 use crate::model::Model;
 use crate::report::figure::Figure;
 use crate::report::steps::{self, Step};
@@ -29,7 +29,7 @@ pub(super) struct Stepping<'a> {
 }
 
 /// A run as far as it came, and why and with which model not further.
-type Outcome = (Option<Step>, Option<(SimError, Model)>);
+type Outcome = (Option<Step>, Option<(Error, Model)>);
 
 impl Stepping<'_> {
     /// Runs, writes and tells.
@@ -40,7 +40,7 @@ impl Stepping<'_> {
         let held = Settings::default().max_held / variants.len().max(1);
         if let Some(tran) = circuit.tran {
             let most = held / ((columns.names.len() + 1) * size_of::<f64>());
-            let refused = |error: SimError| {
+            let refused = |error: Error| {
                 let (file, runs) = (self.args.input.file.display(), variants.len());
                 Failure::Message(format!("{file}: each of {runs} runs of `.step`: {error}"))
             };
@@ -114,7 +114,7 @@ impl Stepping<'_> {
         held: usize,
     ) -> Result<Outcome, Failure> {
         if self.signals.received().is_some() {
-            let error = SimError::before(Reason::Interrupted);
+            let error = Error::before(Reason::Interrupted);
             return Ok((None, Some((error, self.model.clone()))));
         }
         let quiet = Streams {

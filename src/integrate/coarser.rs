@@ -3,8 +3,8 @@
 use crate::circuit::Tran;
 use crate::integrate::companion::{Coarser, Share};
 use crate::integrate::control::Amplitudes;
+use crate::integrate::grid::Grid;
 use crate::integrate::problem::Problem;
-use crate::integrate::run::Grid;
 use crate::integrate::simulate::controlled;
 use crate::integrate::step::Scheme;
 use crate::integrate::theta::Stepping;

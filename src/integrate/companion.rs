@@ -9,9 +9,12 @@
 use std::sync::atomic::AtomicBool;
 
 use crate::integrate::difference::{Difference, grow, scales};
+use crate::integrate::error::{Error, Reason};
 use crate::integrate::event::Event;
+use crate::integrate::grid::Times;
+use crate::integrate::log::Log;
 use crate::integrate::rows::Asked;
-use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper, Times};
+use crate::integrate::run::{Outcome, Stepper};
 use crate::integrate::stats::StatedError;
 
 /// A companion begins with steps that double from this part of its first one on: what has ended within the first step of the run is seen.
@@ -20,7 +23,7 @@ const GRADED: i32 = 24;
 /// How a companion is made and what it tells.
 pub(crate) struct Coarser<'a> {
     /// Makes it, at its start.
-    pub(crate) make: Box<dyn Fn() -> Result<Box<dyn Stepper>, SimError> + 'a>,
+    pub(crate) make: Box<dyn Fn() -> Result<Box<dyn Stepper>, Error> + 'a>,
     /// It stops at one row of so many.
     pub(crate) stride: usize,
     /// A time, s, that its first steps divide.
@@ -75,7 +78,7 @@ struct Companion<'a> {
 
 impl Companion<'_> {
     /// Goes to `t`, row `k` of the run, whose events so far these are.
-    fn follow(&mut self, t: f64, events: &[Event]) -> Result<(), SimError> {
+    fn follow(&mut self, t: f64, events: &[Event]) -> Result<(), Error> {
         let stepper = match &mut self.stepper {
             Some(stepper) => stepper,
             none => none.insert((self.by.make)()?),
@@ -189,7 +192,7 @@ impl Stepper for Accompanied<'_> {
         self.run.time()
     }
 
-    fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), SimError> {
+    fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), Error> {
         self.run.advance(t, log)?;
         if !self.run.has_stepped() {
             return Ok(());

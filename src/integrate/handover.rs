@@ -9,13 +9,16 @@ mod tests;
 use crate::circuit::Source;
 use crate::integrate::Note;
 use crate::integrate::energy::Balance;
+use crate::integrate::error::{Error, Reason, is_final, named};
 use crate::integrate::exact::{Exact, Place};
-use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper, Times, is_final, named};
+use crate::integrate::grid::Times;
+use crate::integrate::log::Log;
+use crate::integrate::run::{Outcome, Stepper};
 use crate::integrate::stats::{Energy, StatedError, Stats};
 use crate::integrate::theta::Theta;
 
 /// Makes a stepper that starts at a place.
-pub(crate) type Takeover = Box<dyn Fn(&Place) -> Result<Theta, SimError> + Send>;
+pub(crate) type Takeover = Box<dyn Fn(&Place) -> Result<Theta, Error> + Send>;
 
 /// Kinds of interruptions told one by one; of the others only the number is.
 const MOST_NOTES: usize = 8;
@@ -78,8 +81,12 @@ impl Handover {
     }
 
     /// Steps go on from where the exact integration failed.
-    fn give_way(&mut self, error: SimError) -> Result<(), SimError> {
+    fn give_way(&mut self, error: Error) -> Result<(), Error> {
         if is_final(&error) || matches!(error.reason, Reason::TooManySteps { .. }) {
+            return Err(error);
+        }
+        // Where energies are no numbers any more nothing could check what steps make of it: they begin anew.
+        if !self.exact.balance().energy().residual.is_finite() {
             return Err(error);
         }
         let place = self.exact.leave();
@@ -99,8 +106,8 @@ impl Handover {
         Ok(())
     }
 
-    fn interrupt(&mut self, error: SimError, t: f64) {
-        let SimError {
+    fn interrupt(&mut self, error: Error, t: f64) {
+        let Error {
             elements, reason, ..
         } = error;
         let same = |i: &Interruption| {
@@ -261,7 +268,7 @@ impl Handover {
         input: usize,
         source: Source,
         log: &mut Log,
-    ) -> Result<(), SimError> {
+    ) -> Result<(), Error> {
         if let Some(stepping) = &mut self.stepping {
             self.exact.replace_source(input, source);
             let place = stepping.theta.place();
@@ -287,7 +294,7 @@ impl Stepper for Handover {
         }
     }
 
-    fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), SimError> {
+    fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), Error> {
         loop {
             let Some(stepping) = &mut self.stepping else {
                 match self.exact.advance(t, log) {

@@ -1,12 +1,12 @@
 //! Why a run ended, as a finding at the element where it shows, with the cause in the circuit's words and what to do.
 
-use super::run::{NoRest, Reason, SimError, at};
+use super::error::{Error, NoRest, Reason, at};
 use crate::circuit::{Circuit, Element, Kind};
 use crate::diagnostic::Diagnostic;
 use crate::law::Law;
 use crate::lcs::ReduceError;
 
-impl SimError {
+impl Error {
     /// The finding for the user of `circuit`: the place is the card of the first element concerned.
     #[must_use]
     pub fn diagnostic(&self, circuit: &Circuit) -> Diagnostic {
@@ -66,7 +66,7 @@ const UIC: &str = "`uic` on `.tran` starts from initial conditions instead";
 const DEVICE: &str = "a current may have no path but a device that blocks, or a voltage be shorted by one that conducts: a \
                       resistor across the device (`Roff` in its model), or in series with it (`Ron`, `RS`), decides";
 
-fn told(error: &SimError, elements: &[&Element]) -> Told {
+fn told(error: &Error, elements: &[&Element]) -> Told {
     let names: Vec<&str> = elements.iter().map(|e| e.name.as_str()).collect();
     let names = listed(&names);
     let curved = elements

@@ -7,11 +7,13 @@ pub mod control;
 mod cpu;
 mod difference;
 pub mod energy;
+mod error;
 pub mod event;
 pub mod exact;
 #[cfg(test)]
 #[path = "../../tests/systems/mod.rs"]
 pub(crate) mod fixtures;
+mod grid;
 mod handover;
 mod impulses;
 pub mod inputs;
@@ -19,6 +21,7 @@ pub mod jump;
 mod lawful;
 pub mod line;
 mod located;
+mod log;
 mod note;
 mod problem;
 pub mod reading;
@@ -37,10 +40,13 @@ pub mod theta;
 pub mod verify;
 
 pub use aliasing::{Aliased, aliased};
+pub use error::{Error, NoRest, Reason};
 pub use event::{Change, Event};
+pub use grid::Grid;
+pub use log::Log;
 pub use note::{Note, Places};
 pub use rows::{Asked, Block, RowKind, Sink};
-pub use run::{Frame, Grid, Log, NoRest, Outcome, Reason, SimError, Stepper};
+pub use run::{Frame, Outcome, Stepper};
 pub use simulate::{Method, SimOptions, simulate, simulate_system};
 pub use simulation::{Checkpoint, Simulation, SimulationOptions, Stop, StopReason};
 pub use start::{OperatingPoint, Values, operating_point};

@@ -7,11 +7,13 @@ use nalgebra::DVector;
 use crate::circuit::{self, Circuit, ElementId, Source, Tran};
 use crate::integrate::Note;
 use crate::integrate::control::Amplitudes;
+use crate::integrate::error::{Error, Reason};
 use crate::integrate::exact::{self, Exact, Place};
 use crate::integrate::handover::Handover;
 use crate::integrate::inputs::Inputs;
 use crate::integrate::line::Line;
-use crate::integrate::run::{Log, Reason, SimError, Stepper};
+use crate::integrate::log::Log;
+use crate::integrate::run::Stepper;
 use crate::integrate::step::Scheme;
 use crate::integrate::switching::{Threshold, at_start};
 use crate::integrate::theta::{Setup, Start, Stepping, Theta};
@@ -65,14 +67,14 @@ impl Systems {
     }
 
     /// The system of a position.
-    pub(super) fn free(&self, switches: &[bool]) -> Result<Lcs, SimError> {
+    pub(super) fn free(&self, switches: &[bool]) -> Result<Lcs, Error> {
         let mut known = self.known();
         let found = known.systems.iter().find(|(p, _)| p == switches);
         if let Some((_, lcs)) = found {
             return Ok(known.adapted(lcs));
         }
         let position = Position::free(&self.multiport, switches.to_vec());
-        let lcs = reduce(&self.multiport, &position).map_err(|e| SimError::before(e.into()))?;
+        let lcs = reduce(&self.multiport, &position).map_err(|e| Error::before(e.into()))?;
         let adapted = known.adapted(&lcs);
         known.systems.push((switches.to_vec(), lcs));
         Ok(adapted)
@@ -129,7 +131,7 @@ impl Problem {
         behaviour: &StaticMultiport,
         uic: bool,
         settings: &Settings,
-    ) -> Result<Self, SimError> {
+    ) -> Result<Self, Error> {
         let standard = behaviour.standard();
         let initial = start::initial(circuit, &standard, uic, settings)?;
         let of_circuit = behaviour.notes.iter().map(|note| note.message.clone());
@@ -197,7 +199,7 @@ impl Problem {
     }
 
     /// Chooses what is a state and settles the switches; returns the system of the start position.
-    pub(super) fn prepare(&mut self, tran: &Tran, settings: &Settings) -> Result<Lcs, SimError> {
+    pub(super) fn prepare(&mut self, tran: &Tran, settings: &Settings) -> Result<Lcs, Error> {
         let lcs = self.choose_roles(tran)?;
         if self.settle_switches(tran, settings)? {
             return self.systems.free(&self.start.switches);
@@ -219,7 +221,7 @@ impl Problem {
         tran: &Tran,
         lcs: &Lcs,
         settings: &Settings,
-    ) -> Result<Exact, SimError> {
+    ) -> Result<Exact, Error> {
         let mut exact = Exact::new(exact::Setup {
             assembler: exact::Assembler::new(Arc::clone(&self.systems.multiport))
                 .with_steps(self.steps.clone())
@@ -244,7 +246,7 @@ impl Problem {
         scheme: Scheme,
         stepping: Stepping,
         settings: &Settings,
-    ) -> Result<Theta, SimError> {
+    ) -> Result<Theta, Error> {
         let systems = self.systems.clone();
         let mut theta = Theta::new(Setup {
             reduce: Box::new(move |position| systems.free(position)),
@@ -263,7 +265,7 @@ impl Problem {
     }
 
     /// See [`roles`]; returns the system of the start position.
-    fn choose_roles(&mut self, tran: &Tran) -> Result<Lcs, SimError> {
+    fn choose_roles(&mut self, tran: &Tran) -> Result<Lcs, Error> {
         let lcs = self.systems.free(&self.start.switches)?;
         if roles::doubtful(&lcs, tran.tstop) {
             let others = Systems::of(self.systems.multiport.in_other_roles());
@@ -278,7 +280,7 @@ impl Problem {
     }
 
     /// Positions of switches without `ON`/`OFF` that agree with their controls at the start state; whether one moved.
-    fn settle_switches(&mut self, tran: &Tran, settings: &Settings) -> Result<bool, SimError> {
+    fn settle_switches(&mut self, tran: &Tran, settings: &Settings) -> Result<bool, Error> {
         let mut seen = Vec::new();
         while self.settle.contains(&true) {
             let lcs = self.systems.free(&self.start.switches)?;
@@ -330,7 +332,7 @@ impl Problem {
     }
 
     /// The error of a line whose delay asks for more steps than a run may take.
-    pub(super) fn too_short(&self, tran: &Tran, settings: &Settings) -> Option<SimError> {
+    pub(super) fn too_short(&self, tran: &Tran, settings: &Settings) -> Option<Error> {
         let limit = settings.max_steps;
         let asks = |line: &&Line| tran.tstop / line.longest_step() > limit as f64;
         let line = self.lines.iter().find(asks)?;
@@ -338,7 +340,7 @@ impl Problem {
             "a delay of {:e} s asks for more than {limit} steps until {:e} s; a resistor or a short may take the line's place",
             line.delay, tran.tstop
         );
-        Some(SimError::before(Reason::Unsupported(what)).device(line.sources[0].clone()))
+        Some(Error::before(Reason::Unsupported(what)).device(line.sources[0].clone()))
     }
 
     /// The error of a source with more edges and kinks than a run may take steps.
@@ -347,7 +349,7 @@ impl Problem {
         lcs: &Lcs,
         tran: &Tran,
         settings: &Settings,
-    ) -> Option<SimError> {
+    ) -> Option<Error> {
         let limit = settings.max_steps;
         let corners = |input: &Input| input.source.wave.corners(tran.tstop);
         let input = lcs.inputs.iter().find(|i| corners(i) > limit as f64)?;
@@ -356,7 +358,7 @@ impl Problem {
             corners(input),
             tran.tstop
         );
-        Some(SimError::before(Reason::Unsupported(what)).device(input.name.clone()))
+        Some(Error::before(Reason::Unsupported(what)).device(input.name.clone()))
     }
 
     /// Amplitudes from a coarse run.
@@ -398,7 +400,7 @@ impl Problem {
         lcs: &Lcs,
         settings: &Settings,
         steps: f64,
-    ) -> Result<Handover, SimError> {
+    ) -> Result<Handover, Error> {
         // An error control would follow every switching of a chattering circuit.
         let step = tran.tstep / steps;
         let stepping = Stepping::Fixed(step);

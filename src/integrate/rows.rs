@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::integrate::cpu::ThreadTime;
 
-use crate::integrate::run::{Reason, SimError, Times};
+use crate::integrate::error::{Error, Reason};
+use crate::integrate::grid::Times;
 use crate::waveform::Waveforms;
 
 /// What stands at the time of a row.
@@ -144,7 +145,7 @@ impl<'a> Sheet<'a> {
     /// # Errors
     /// [`Reason::Interrupted`], [`Reason::TooManyRows`].
     #[inline]
-    pub(super) fn go_on(&self, t: f64) -> Result<(), SimError> {
+    pub(super) fn go_on(&self, t: f64) -> Result<(), Error> {
         let cancelled = |flag: &AtomicBool| flag.load(Ordering::Relaxed);
         if self.stop.is_some() || self.asked.cancel.is_some_and(cancelled) {
             return Err(self.stopped(t));
@@ -153,7 +154,7 @@ impl<'a> Sheet<'a> {
     }
 
     #[cold]
-    fn stopped(&self, t: f64) -> SimError {
+    fn stopped(&self, t: f64) -> Error {
         let reason = match self.stop {
             Some(Stop::Full) => Reason::TooManyRows {
                 rows: self.time.len() as f64,
@@ -162,7 +163,7 @@ impl<'a> Sheet<'a> {
             },
             Some(Stop::Sink) | None => Reason::Interrupted,
         };
-        SimError::at(t, reason)
+        Error::at(t, reason)
     }
 
     /// Makes room for so many rows.
@@ -212,11 +213,11 @@ impl<'a> Sheet<'a> {
         times: &Times,
         which: Range<usize>,
         rows: &[f64],
-    ) -> Result<(), SimError> {
+    ) -> Result<(), Error> {
         if let Some(at) = not_finite(rows) {
             let bad = which.start + at / self.columns;
             self.grid(times, which.start..bad, &rows[..at - at % self.columns])?;
-            return Err(SimError::at(times.at(bad), Reason::Overflow));
+            return Err(Error::at(times.at(bad), Reason::Overflow));
         }
         let (which, rows) = self.unknown(times, which, rows);
         if self.ends_between() && self.time.last() == Some(&times.at(which.start)) {

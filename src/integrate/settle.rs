@@ -6,8 +6,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::integrate::error::Error;
 use crate::integrate::reading::{self, Point};
-use crate::integrate::run::SimError;
 use crate::integrate::switching::{Threshold, fire};
 use crate::lcs::Lcs;
 use crate::settings::tolerances::events::DECISIVE;
@@ -22,8 +22,8 @@ pub(crate) fn settle(
     thresholds: &[Threshold],
     left: &[bool],
     position: &mut [bool],
-    mut asking: impl FnMut(&[bool]) -> Result<Vec<usize>, SimError>,
-) -> Result<bool, SimError> {
+    mut asking: impl FnMut(&[bool]) -> Result<Vec<usize>, Error>,
+) -> Result<bool, Error> {
     let flip = |position: &mut [bool], which: &[usize]| {
         for &i in which {
             position[i] = !position[i];

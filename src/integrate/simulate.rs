@@ -10,9 +10,12 @@ use nalgebra::DVector;
 
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::companion::Accompanied;
+use crate::integrate::error::{Error, Reason, is_final};
+use crate::integrate::grid::Grid;
+use crate::integrate::log::Log;
 use crate::integrate::problem::Problem;
 use crate::integrate::rows::{Asked, Sink};
-use crate::integrate::run::{Frame, Grid, Log, Reason, SimError, attempt, is_final, run};
+use crate::integrate::run::{Frame, attempt, run};
 use crate::integrate::theta::Stepping;
 use crate::integrate::{Note, Run};
 use crate::lcs::Lcs;
@@ -81,14 +84,14 @@ pub struct SimOptions<'a> {
 /// `behaviour` is the circuit's, laws included; piecewise-linear laws are turned into ideal pairs here. Probes are the circuit's.
 ///
 /// # Errors
-/// See [`Reason`]; the run so far is in [`SimError::partial`].
+/// See [`Reason`]; the run so far is in [`Error::partial`].
 pub fn simulate(
     circuit: &Circuit,
     behaviour: &StaticMultiport,
     options: SimOptions<'_>,
-) -> Result<Run, SimError> {
+) -> Result<Run, Error> {
     let tran = circuit.tran.ok_or_else(|| {
-        SimError::before(Reason::Unsupported(
+        Error::before(Reason::Unsupported(
             "the netlist asks for no .tran analysis".into(),
         ))
     })?;
@@ -105,7 +108,7 @@ pub fn simulate_system(
     x: &DVector<f64>,
     tran: Tran,
     options: SimOptions<'_>,
-) -> Result<Run, SimError> {
+) -> Result<Run, Error> {
     match drive(Problem::of_system(lcs, x), tran, options) {
         Ok(run) => Ok(Run {
             balanced: false,
@@ -128,7 +131,7 @@ pub(super) fn controlled(tran: &Tran) -> Stepping {
     }
 }
 
-fn drive(problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result<Run, SimError> {
+fn drive(problem: Problem, tran: Tran, options: SimOptions<'_>) -> Result<Run, Error> {
     let begin = ThreadTime::now();
     let elsewhere = Rc::<Cell<f64>>::default();
     let mut result = dispatch(problem, tran, options, Rc::clone(&elsewhere));
@@ -148,7 +151,7 @@ fn dispatch(
     tran: Tran,
     options: SimOptions<'_>,
     elsewhere: Rc<Cell<f64>>,
-) -> Result<Run, SimError> {
+) -> Result<Run, Error> {
     check(&tran, &options)?;
     let lcs = problem.prepare(&tran, &options.settings)?;
     let Plan {
@@ -157,7 +160,7 @@ fn dispatch(
         words,
     } = plan(&lcs, &options);
     if let (Method::Exact, Some(obstacle)) = (options.method, not_exact(&lcs)) {
-        return Err(SimError::before(Reason::Unsupported(format!(
+        return Err(Error::before(Reason::Unsupported(format!(
             "no exact integration: {obstacle}"
         ))));
     }
@@ -252,8 +255,8 @@ fn dispatch(
     run(&mut all, Frame { progress, ..frame }, log)
 }
 
-pub(super) fn check(tran: &Tran, options: &SimOptions<'_>) -> Result<(), SimError> {
-    let wrong = |what: &str| Err(SimError::before(Reason::Unsupported(what.into())));
+pub(super) fn check(tran: &Tran, options: &SimOptions<'_>) -> Result<(), Error> {
+    let wrong = |what: &str| Err(Error::before(Reason::Unsupported(what.into())));
     let between = |v: Option<f64>| v.is_none_or(|v| (0.5..=1.0).contains(&v));
     if !between(options.theta) || !between(options.gamma) {
         return wrong("theta and gamma lie between 1/2 and 1");

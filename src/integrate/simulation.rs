@@ -12,10 +12,11 @@ use self::way::Way;
 use crate::circuit::{Circuit, Source, Tran, held_at, holder};
 use crate::integrate::Note;
 use crate::integrate::energy::Balance;
+use crate::integrate::error::{Error, Reason};
 use crate::integrate::event::Event;
+use crate::integrate::log::Log;
 use crate::integrate::note;
 use crate::integrate::problem::Problem;
-use crate::integrate::run::{Log, Reason, SimError};
 use crate::integrate::simulate::{Method, SimOptions, check};
 use crate::integrate::stats::{Impulse, Run, StateJumps, Stats};
 use crate::lcs::Lcs;
@@ -121,7 +122,7 @@ impl Simulation {
         circuit: &Circuit,
         multiport: &StaticMultiport,
         options: SimulationOptions,
-    ) -> Result<Self, SimError> {
+    ) -> Result<Self, Error> {
         let tran = transient(circuit.tran, options.until)?;
         check(&tran, &options.as_asked())?;
         let problem = Problem::of_circuit(circuit, multiport, tran.uic, &options.settings)?;
@@ -133,7 +134,7 @@ impl Simulation {
         problem: Problem,
         tran: Tran,
         options: SimulationOptions,
-    ) -> Result<Self, SimError> {
+    ) -> Result<Self, Error> {
         let mut problem = problem.with_free_sources();
         let lcs = problem.prepare(&tran, &options.settings)?;
         let (mut notes, mut log) = (problem.notes.clone(), Log::default());
@@ -163,7 +164,7 @@ impl Simulation {
     ///
     /// # Errors
     /// See [`Reason`]; the simulation stays at the last time it reached.
-    pub fn advance_to(&mut self, t: f64) -> Result<Stop, SimError> {
+    pub fn advance_to(&mut self, t: f64) -> Result<Stop, Error> {
         self.advance(t, false)
     }
 
@@ -171,17 +172,17 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`Self::advance_to`].
-    pub fn advance_to_event(&mut self, t: f64) -> Result<Stop, SimError> {
+    pub fn advance_to_event(&mut self, t: f64) -> Result<Stop, Error> {
         self.advance(t, true)
     }
 
-    fn advance(&mut self, t: f64, pause: bool) -> Result<Stop, SimError> {
+    fn advance(&mut self, t: f64, pause: bool) -> Result<Stop, Error> {
         let (now, end) = (self.time(), self.tran.tstop);
         if !(t >= now && t <= end) {
             let what = format!(
                 "the simulation stands at {now:e} s and ends at {end:e} s: it cannot go to {t:e} s"
             );
-            return Err(SimError::at(now, Reason::Unsupported(what)));
+            return Err(Error::at(now, Reason::Unsupported(what)));
         }
         let mut log = Log::default();
         log.pause_at_event(pause);
@@ -219,7 +220,7 @@ impl Simulation {
     ///
     /// # Errors
     /// The simulation has no such probe.
-    pub fn value(&mut self, probe: &str) -> Result<f64, SimError> {
+    pub fn value(&mut self, probe: &str) -> Result<f64, Error> {
         let name = canonical_name(probe);
         let names = &self.lcs.outputs.names;
         let Some(at) = names.iter().position(|n| canonical_name(n) == name) else {
@@ -258,7 +259,7 @@ impl Simulation {
     ///
     /// # Errors
     /// There is no such source; else as [`Self::advance_to`].
-    pub fn set_source(&mut self, name: &str, value: f64) -> Result<Vec<Event>, SimError> {
+    pub fn set_source(&mut self, name: &str, value: f64) -> Result<Vec<Event>, Error> {
         let sources = &self.problem.systems.multiport.sources;
         let Some(input) = sources.iter().position(|s| s.input.name == name) else {
             return Err(unknown(
@@ -269,7 +270,7 @@ impl Simulation {
         };
         if !value.is_finite() {
             let what = format!("{name} cannot be set to {value}");
-            return Err(SimError::before(Reason::Unsupported(what)));
+            return Err(Error::before(Reason::Unsupported(what)));
         }
         self.can_be_moved()?;
         let source = Source::constant(value);
@@ -290,7 +291,7 @@ impl Simulation {
     ///
     /// # Errors
     /// There is no such switch, or it is part of a thyristor; else as [`Self::advance_to`].
-    pub fn set_switch(&mut self, name: &str, on: bool) -> Result<Vec<Event>, SimError> {
+    pub fn set_switch(&mut self, name: &str, on: bool) -> Result<Vec<Event>, Error> {
         let source = holder(name);
         if self.circuit.element(&source).is_none() {
             self.take_switch(name)?;
@@ -299,7 +300,7 @@ impl Simulation {
     }
 
     /// Has a switch controlled by a source of its own, at first so that it stays.
-    fn take_switch(&mut self, name: &str) -> Result<(), SimError> {
+    fn take_switch(&mut self, name: &str) -> Result<(), Error> {
         self.can_be_moved()?;
         let place = self.way.place();
         let at = self.switches().iter().position(|switch| *switch == name);
@@ -313,7 +314,7 @@ impl Simulation {
         };
         let multiport = behaviour(&circuit).map_err(|_| {
             let what = format!("{name} cannot be held by a source");
-            SimError::before(Reason::internal("integrate::simulation", what))
+            Error::before(Reason::internal("integrate::simulation", what))
         })?;
         let replaced = self.problem.systems.replaced();
         let problem = Problem::of_circuit(&circuit, &multiport, true, &self.options.settings)?;
@@ -325,7 +326,7 @@ impl Simulation {
     }
 
     /// Another problem from where the present one stands.
-    fn go_on_with(&mut self, problem: Problem) -> Result<(), SimError> {
+    fn go_on_with(&mut self, problem: Problem) -> Result<(), Error> {
         let mut problem = problem;
         self.lcs = problem.prepare(&self.tran, &self.options.settings)?;
         let mut log = Log::default();
@@ -342,19 +343,19 @@ impl Simulation {
 
     /// # Errors
     /// What travels on transmission lines is part of the state, and not kept beside it.
-    fn can_be_moved(&self) -> Result<(), SimError> {
+    fn can_be_moved(&self) -> Result<(), Error> {
         if self.circuit.lines.is_empty() {
             return Ok(());
         }
         let what = "sources and switches of a circuit with transmission lines cannot be set during a run, nor can it be taken up again";
-        Err(SimError::before(Reason::Unsupported(what.into())))
+        Err(Error::before(Reason::Unsupported(what.into())))
     }
 
     /// The present state, to return to.
     ///
     /// # Errors
     /// The circuit has transmission lines.
-    pub fn checkpoint(&mut self) -> Result<Checkpoint, SimError> {
+    pub fn checkpoint(&mut self) -> Result<Checkpoint, Error> {
         self.can_be_moved()?;
         let problem = self.problem.clone();
         Ok(Checkpoint {
@@ -371,7 +372,7 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), SimError> {
+    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), Error> {
         let Checkpoint {
             circuit,
             problem,
@@ -445,7 +446,7 @@ impl SimulationOptions {
 }
 
 /// The span of a simulation: that of `.tran`, unless it is to end elsewhere.
-fn transient(tran: Option<Tran>, until: Option<f64>) -> Result<Tran, SimError> {
+fn transient(tran: Option<Tran>, until: Option<f64>) -> Result<Tran, Error> {
     let of_span = |tstop: f64| Tran {
         tstep: tstop / SPAN_PARTS,
         prints: true,
@@ -463,17 +464,17 @@ fn transient(tran: Option<Tran>, until: Option<f64>) -> Result<Tran, SimError> {
         (None, Some(until)) => Ok(of_span(until)),
         (None, None) => {
             let what = "the netlist asks for no .tran analysis: say until when a simulation may go";
-            Err(SimError::before(Reason::Unsupported(what.into())))
+            Err(Error::before(Reason::Unsupported(what.into())))
         }
     }
 }
 
-fn unknown<'a>(what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> SimError {
+fn unknown<'a>(what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> Error {
     let known: Vec<&str> = known.collect();
     let there = if known.is_empty() {
         "there is none".into()
     } else {
         format!("there are {}", known.join(" "))
     };
-    SimError::before(Reason::Unsupported(format!("no {what} `{name}`: {there}")))
+    Error::before(Reason::Unsupported(format!("no {what} `{name}`: {there}")))
 }

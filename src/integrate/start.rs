@@ -9,9 +9,9 @@ use self::prescribed::{Guess, Prescribed, Voltage, hold_voltages, open_inductors
 use self::statics::{feeding, observed_circuit, tie_floating, without_delay};
 use crate::circuit::{Circuit, Element, Kind, Line, LinePort, NodeId};
 use crate::integrate::Note;
+use crate::integrate::error::{Error, NoRest, Reason};
 use crate::integrate::lawful;
 use crate::integrate::reading::{self, Point};
-use crate::integrate::run::{NoRest, Reason, SimError};
 use crate::integrate::switching::at_start;
 use crate::lcs::{Hold, Lcs, Position, ReduceError, Role, StorageHold, reduce};
 use crate::mna::{StandardMultiport, StaticMultiport, behaviour};
@@ -118,7 +118,7 @@ pub fn operating_point(
     values: Values,
     hold_ic: bool,
     settings: &Settings,
-) -> Result<OperatingPoint, SimError> {
+) -> Result<OperatingPoint, Error> {
     let Prescribed { held, mut guesses } = Prescribed::of(circuit, hold_ic);
     let asked = guesses.clone();
     for _ in 0..GUESSES {
@@ -147,7 +147,7 @@ fn at_rest(
     (held, guesses): (&[Voltage], &[Guess]),
     values: Values,
     settings: &Settings,
-) -> Result<OperatingPoint, SimError> {
+) -> Result<OperatingPoint, Error> {
     let mut notes = Vec::new();
     let mut statics = observed_circuit(circuit);
     without_delay(&mut statics);
@@ -220,7 +220,7 @@ fn at_rest(
             let moving = names
                 .filter(|(_, (a, b))| a != b)
                 .map(|(s, _)| s.name.as_str());
-            return Err(SimError::before(Reason::SwitchesDoNotSettle).devices(moving));
+            return Err(Error::before(Reason::SwitchesDoNotSettle).devices(moving));
         }
         seen.push(std::mem::replace(&mut position, wanted));
     }
@@ -264,7 +264,7 @@ fn static_solution(
     switches: &[bool],
     values: Values,
     settings: &Settings,
-) -> Result<Static, SimError> {
+) -> Result<Static, Error> {
     let position = Position {
         devices: vec![Hold::Free; behaviour.pairs.len()],
         switches: switches.to_vec(),
@@ -296,7 +296,7 @@ fn static_solution(
             ..position
         };
         match reduce(behaviour, &moving) {
-            Err(e @ ReduceError::Sources { .. }) => SimError::before(e.into()),
+            Err(e @ ReduceError::Sources { .. }) => Error::before(e.into()),
             _ => error,
         }
     })?;
@@ -327,7 +327,7 @@ fn devices(
     q: &DVector<f64>,
     settings: &Settings,
     notes: &mut Vec<Note>,
-) -> Result<(DVector<f64>, Vec<Option<bool>>), SimError> {
+) -> Result<(DVector<f64>, Vec<Option<bool>>), Error> {
     if q.is_empty() {
         return Ok((DVector::zeros(0), Vec::new()));
     }
@@ -346,7 +346,7 @@ fn devices(
                 residual: solution.residual,
                 tolerance: settings.lcp_residual,
             };
-            return Err(SimError::before(reason).device(device));
+            return Err(Error::before(reason).device(device));
         }
     }
     let least = driver.least_norm(q, &solution);
@@ -357,7 +357,7 @@ fn devices(
     Ok((least.solution.lambda, least.solution.active))
 }
 
-fn check_constraints(lcs: &Lcs, at: Point<'_>) -> Result<(), SimError> {
+fn check_constraints(lcs: &Lcs, at: Point<'_>) -> Result<(), Error> {
     let rows = &lcs.held.constraints;
     for i in 0..rows.one.len() {
         let value = reading::value(rows, i, at);
@@ -373,13 +373,13 @@ fn check_constraints(lcs: &Lcs, at: Point<'_>) -> Result<(), SimError> {
     Ok(())
 }
 
-fn no_rest(why: NoRest) -> SimError {
-    SimError::before(Reason::NoOperatingPoint(why))
+fn no_rest(why: NoRest) -> Error {
+    Error::before(Reason::NoOperatingPoint(why))
 }
 
-fn no_point(error: ReduceError) -> SimError {
+fn no_point(error: ReduceError) -> Error {
     match error {
-        ReduceError::Internal(_) => SimError::before(error.into()),
+        ReduceError::Internal(_) => Error::before(error.into()),
         error => no_rest(NoRest::System(error)),
     }
 }
@@ -394,7 +394,7 @@ pub fn initial(
     behaviour: &StaticMultiport,
     uic: bool,
     settings: &Settings,
-) -> Result<Initial, SimError> {
+) -> Result<Initial, Error> {
     if uic {
         return Ok(Initial {
             storage: from_initial_conditions(circuit, behaviour),

@@ -5,10 +5,10 @@
 
 use std::sync::Arc;
 
+use crate::integrate::error::Error;
 use crate::integrate::event::Change;
 use crate::integrate::inputs::{Inputs, Passage};
 use crate::integrate::reading::{self, Point};
-use crate::integrate::run::SimError;
 use crate::integrate::settle::settle;
 use crate::lcs::Lcs;
 use crate::mna::{LatchPort, SwitchPort};
@@ -285,8 +285,8 @@ impl Switches {
     pub(crate) fn settle(
         &mut self,
         left: &[bool],
-        asking: impl FnMut(&[bool]) -> Result<Vec<usize>, SimError>,
-    ) -> Result<bool, SimError> {
+        asking: impl FnMut(&[bool]) -> Result<Vec<usize>, Error>,
+    ) -> Result<bool, Error> {
         settle(&self.thresholds, left, &mut self.position, asking)
     }
 

@@ -3,10 +3,10 @@
 use nalgebra::DVector;
 
 use crate::integrate::control::Amplitudes;
+use crate::integrate::error::{Error, Reason};
 use crate::integrate::inputs::Inputs;
 use crate::integrate::jump::JumpProblem;
 use crate::integrate::lawful;
-use crate::integrate::run::{Reason, SimError};
 use crate::integrate::step::{Columns, Scheme, StepMatrices};
 use crate::lcs::Lcs;
 
@@ -135,7 +135,7 @@ impl System {
 }
 
 /// Reduces the circuit for a switch position.
-pub type Reduce = Box<dyn FnMut(&[bool]) -> Result<Lcs, SimError> + Send>;
+pub type Reduce = Box<dyn FnMut(&[bool]) -> Result<Lcs, Error> + Send>;
 
 /// All switch positions visited so far.
 pub(crate) struct Plant {
@@ -160,7 +160,7 @@ impl Plant {
         position: &[bool],
         inputs: &Inputs,
         t: f64,
-    ) -> Result<usize, SimError> {
+    ) -> Result<usize, Error> {
         if let Some(at) = self.systems.iter().position(|(p, _)| p == position) {
             return Ok(at);
         }

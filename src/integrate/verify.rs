@@ -12,8 +12,8 @@ use nalgebra::DVector;
 
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::difference::{Difference, grow, scales};
+use crate::integrate::error::{Error, Reason};
 use crate::integrate::rows::RowKind;
-use crate::integrate::run::{Reason, SimError};
 use crate::integrate::simulate::{Method, SimOptions, simulate, simulate_system};
 use crate::integrate::stats::Run;
 use crate::lcs::Lcs;
@@ -66,7 +66,7 @@ pub fn verify(
     behaviour: &StaticMultiport,
     run: &Run,
     options: &VerifyOptions<'_>,
-) -> Result<Verified, SimError> {
+) -> Result<Verified, Error> {
     let step = circuit.tran.map_or(0.0, |tran| tran.tstep);
     second(run, step, options, &|options| {
         simulate(circuit, behaviour, options)
@@ -82,7 +82,7 @@ pub fn verify_system(
     tran: Tran,
     run: &Run,
     options: &VerifyOptions<'_>,
-) -> Result<Verified, SimError> {
+) -> Result<Verified, Error> {
     second(run, tran.tstep, options, &|options| {
         simulate_system(lcs, x, tran, options)
     })
@@ -92,8 +92,8 @@ fn second(
     run: &Run,
     step: f64,
     options: &VerifyOptions<'_>,
-    simulate: &dyn Fn(SimOptions<'_>) -> Result<Run, SimError>,
-) -> Result<Verified, SimError> {
+    simulate: &dyn Fn(SimOptions<'_>) -> Result<Run, Error>,
+) -> Result<Verified, Error> {
     let again = |method, tol: f64| {
         simulate(SimOptions {
             method,
@@ -166,7 +166,7 @@ fn second(
         coarse = fine;
     }
     verified.ok_or_else(|| {
-        SimError::before(Reason::internal(
+        Error::before(Reason::internal(
             "integrate::verify",
             "no tolerance to verify at",
         ))

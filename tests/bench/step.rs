@@ -6,9 +6,9 @@
 #[path = "../systems/mod.rs"]
 mod systems;
 
-use circ::integrate::run::{Log, Stepper};
 use circ::integrate::step::Scheme;
 use circ::integrate::theta::{Setup, Start, Stepping, Theta};
+use circ::integrate::{Log, Stepper};
 use circ::lcs::Lcs;
 use circ::settings::Settings;
 use cpu_time::ThreadTime;

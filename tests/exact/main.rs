@@ -10,7 +10,7 @@ mod runs;
 
 use circ::circuit::{Circuit, ElaborateOptions, elaborate};
 use circ::diagnostic::SourceMap;
-use circ::integrate::{Run, SimError, SimOptions, simulate};
+use circ::integrate::{Error, Run, SimOptions, simulate};
 use circ::mna::behaviour;
 
 /// The circuit of a netlist without title.
@@ -22,7 +22,7 @@ fn circuit(text: &str) -> Circuit {
     circuit.unwrap_or_else(|| panic!("{findings:?}"))
 }
 
-fn try_run(text: &str, options: SimOptions<'_>) -> Result<Run, SimError> {
+fn try_run(text: &str, options: SimOptions<'_>) -> Result<Run, Error> {
     let circuit = circuit(text);
     let behaviour = behaviour(&circuit).expect("a sound circuit");
     simulate(&circuit, &behaviour, options)

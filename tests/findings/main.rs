@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 
 use circ::circuit::{Circuit, ElaborateOptions, elaborate};
 use circ::diagnostic::SourceMap;
-use circ::integrate::{Method, Run, SimError, SimOptions, simulate};
+use circ::integrate::{Error, Method, Run, SimOptions, simulate};
 use circ::mna::behaviour;
 use circ::netlist::load;
 
@@ -39,7 +39,7 @@ fn circuit(name: &str) -> Circuit {
 }
 
 /// Its run by a method, with rows at events.
-fn attempt(name: &str, method: Method) -> Result<Run, SimError> {
+fn attempt(name: &str, method: Method) -> Result<Run, Error> {
     let circuit = circuit(name);
     let behaviour = behaviour(&circuit).unwrap_or_else(|e| panic!("{name}: {e:?}"));
     let options = SimOptions {
@@ -74,7 +74,7 @@ fn attempt_changed(
     name: &str,
     replacements: &[(&str, &str)],
     options: SimOptions<'_>,
-) -> Result<Run, SimError> {
+) -> Result<Run, Error> {
     let mut text = std::fs::read_to_string(path(name)).expect("a netlist");
     for (from, to) in replacements {
         assert!(text.contains(from), "{name} has no `{from}`");

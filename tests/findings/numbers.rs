@@ -355,3 +355,25 @@ fn steps_see_a_diode_at_their_end_and_read_its_current_at_the_instant() {
     let current = at(&steps, "i(d0)", 2.5752e-5);
     assert!(current.abs() < 1e-4, "{current:e}");
 }
+
+/// Time constants to 1e-32 s, 110 doublings below the distance of rows: what blocks is as good as open, and a leak of 1 GΩ takes 3e-11 V.
+#[test]
+fn a_current_is_blocked_however_fast_it_ends() {
+    for l in ["1e-10", "1e-11", "1e-14"] {
+        let of = |roff: &str| {
+            let to = [format!("param l={l}"), format!("roff={roff}")];
+            let changes = [
+                ("param l=1e-11", to[0].as_str()),
+                ("roff=1e15", to[1].as_str()),
+            ];
+            changed("blocking_1e26", &changes, Method::Exact)
+        };
+        let leaky = of("1e9");
+        for roff in ["1e15", "1e18"] {
+            let run = of(roff);
+            assert_exact(&run, 20_000);
+            let distance = difference(&run, &leaky, "v(4)");
+            assert!(distance < 1e-10, "{l} H, {roff} ohm: {distance:e}");
+        }
+    }
+}

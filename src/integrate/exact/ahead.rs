@@ -3,9 +3,9 @@
 use super::exosystem::Exosystem;
 use super::flow::{Flow, LONG};
 use super::mode::Mode;
-use super::motion::Motion;
 use super::sampled::MOST;
-use crate::integrate::run::Times;
+use super::travel::Travel;
+use crate::integrate::grid::Times;
 use crate::settings::tolerances::times::SAME_TIME;
 
 /// Rows that were computed and not asked for yet.
@@ -27,7 +27,7 @@ impl DenseOutput {
         self.taken < self.count
     }
 
-    /// Whether the motion is behind the rows.
+    /// Whether the run is behind the rows.
     pub(super) fn leads(&self) -> bool {
         self.count > 0
     }
@@ -63,32 +63,32 @@ impl DenseOutput {
         &self.values[before * columns..self.taken * columns]
     }
 
-    /// Has the motion stand at the last row that was asked for.
-    pub(super) fn end(&mut self, motion: &mut Motion, flow: &mut Flow, exosystem: &Exosystem) {
+    /// Has the run stand at the last row that was asked for.
+    pub(super) fn end(&mut self, travel: &mut Travel, flow: &mut Flow, exosystem: &Exosystem) {
         if self.leads() {
-            motion.arrive(flow, exosystem, self.taken, self.count, self.t);
+            travel.arrive(flow, exosystem, self.taken, self.count, self.t);
         }
         self.count = 0;
         self.taken = 0;
     }
 
     /// Steps over as many rows as nothing can happen on, `t` the first of them and `end` when something is known to happen.
-    pub(super) fn step(&mut self, motion: &mut Motion, mode: &mut Mode, t: f64, end: f64) -> bool {
+    pub(super) fn step(&mut self, travel: &mut Travel, mode: &mut Mode, t: f64, end: f64) -> bool {
         let (flow, outputs, rows) = (&mut mode.flow, &mode.outputs, &mut mode.rows);
         let h = flow.step(LONG);
         let negligible = SAME_TIME * (t + MOST as f64 * h).abs();
-        if !motion.steady || (t - motion.t - h).abs() > negligible || !rows.ready(flow, outputs) {
+        if !travel.steady || (t - travel.t - h).abs() > negligible || !rows.ready(flow, outputs) {
             return false;
         }
-        let Some(count) = motion.leap_ahead(flow, end) else {
+        let Some(count) = travel.leap_ahead(flow, end) else {
             return false;
         };
         let Some(table) = &rows.table else {
             return false;
         };
         self.values.resize(MOST * rows.columns, 0.0);
-        table.apply_first(count * rows.columns, motion.before(), &mut self.values);
-        (self.begin, self.t) = (motion.t, t);
+        table.apply_first(count * rows.columns, travel.before(), &mut self.values);
+        (self.begin, self.t) = (travel.t, t);
         (self.count, self.taken) = (count, 1);
         true
     }
@@ -97,7 +97,8 @@ impl DenseOutput {
 #[cfg(test)]
 mod tests {
     use crate::integrate::exact::tests::{circuit, prepare_circuit};
-    use crate::integrate::run::{Log, Stepper};
+    use crate::integrate::log::Log;
+    use crate::integrate::run::Stepper;
 
     const RINGING: &str = "v1 a 0 sin(0 10 1k)\nr1 a b 10\nl1 b c 1m ic=0.1\nc1 c 0 1u ic=-3\nd1 c e d\nr2 e 0 300\n\
         c2 e 0 2u ic=1\n.model d d(ideal)\n.tran 1u 3m uic\n";

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::integrate::run::{Reason, SimError};
+use crate::integrate::error::{Error, Reason};
 use crate::integrate::switching::Threshold;
 use crate::lcs::{Hold, Lcs, Position, StorageHold, is_coupled, reduce_apart};
 use crate::mna::{SourceControl, StandardMultiport, StaticMultiport};
@@ -123,7 +123,7 @@ impl Assembler {
         devices: &[Hold],
         switches: &[bool],
         sliding: &[usize],
-    ) -> Result<Lcs, SimError> {
+    ) -> Result<Lcs, Error> {
         if sliding.is_empty() {
             if let Some((_, lcs)) = self.known.take_if(|(known, lcs)| {
                 known == switches
@@ -138,7 +138,7 @@ impl Assembler {
                 storage: StorageHold::Dynamic,
             };
             return reduce_apart(&self.multiport, &position, self.span)
-                .map_err(|e| SimError::before(e.into()));
+                .map_err(|e| Error::before(e.into()));
         }
         let at = match self.sliding.iter().position(|(s, _)| s == sliding) {
             Some(at) => at,
@@ -150,7 +150,7 @@ impl Assembler {
                     let level = 0.5 * (switch.on_above + switch.off_below);
                     multiport = multiport.sliding(k, level).ok_or_else(|| {
                         let what = format!("{} cannot slide", switch.name);
-                        SimError::before(Reason::internal("integrate::exact", what))
+                        Error::before(Reason::internal("integrate::exact", what))
                     })?;
                 }
                 self.sliding.push((sliding.to_vec(), multiport));
@@ -165,7 +165,6 @@ impl Assembler {
             switches: left.map(|k| switches[k]).collect(),
             storage: StorageHold::Dynamic,
         };
-        reduce_apart(&self.sliding[at].1, &position, self.span)
-            .map_err(|e| SimError::before(e.into()))
+        reduce_apart(&self.sliding[at].1, &position, self.span).map_err(|e| Error::before(e.into()))
     }
 }

@@ -2,10 +2,10 @@
 
 use nalgebra::DMatrix;
 
+use super::energy_integral::{EnergyIntegral, Sizes, Stretch, Term};
 use super::map::Sizes as RowSizes;
 use super::recurring::Recurring;
 use super::spectrum::{Rate, Spectrum};
-use super::work::{Sizes, Stretch, Term, Work};
 use crate::linalg::dense::{BLOCK, Dense};
 use crate::linalg::expm::Ladders;
 use crate::linalg::kernel::{Kernel, SparseKernel};
@@ -21,8 +21,10 @@ pub(crate) fn longest_step(output_step: f64) -> f64 {
     output_step * f64::from(LONG).exp2()
 }
 
-/// Halvings of the longest step that a table may hold; below it Taylor's series takes over in any case.
-const DEEPEST: u32 = 62 + LONG;
+/// Halvings of the longest step that a table may hold: steps are counted in units of the shortest, in 128 bits, and a run may take 2²⁴ of
+/// the longest between two rows. A mode that is faster has no flow: over a step longer than its time constant Taylor's series is not its
+/// solution.
+const DEEPEST: u32 = 100 + LONG;
 
 /// exp(𝒜 h/2^k) for the levels k that were needed, h the longest step, Taylor's series below, and guard rows with their
 /// derivative. Level [`LONG`] is the output step.
@@ -56,7 +58,7 @@ pub(crate) struct Flow {
     /// Work space: w' at the end of a span.
     rates: Vec<f64>,
     spectrum: Spectrum,
-    work: Option<Work>,
+    work: Option<EnergyIntegral>,
     sizes: RowSizes,
     /// Largest loss that an exponential reported.
     pub(crate) loss: f64,
@@ -64,7 +66,7 @@ pub(crate) struct Flow {
 
 impl Flow {
     /// `generator` = [[A, EH],[0, S]] with `n` rows of A first, of which `fast` are not coupled with the others, `guards` its rows over w, `output_step` in s, `sources`
-    /// the rates of S. `None` if the entries are not finite.
+    /// the rates of S. `None` if the entries are not finite or too fast for steps to be counted.
     pub(crate) fn new(
         generator: DMatrix<f64>,
         n: usize,
@@ -89,7 +91,10 @@ impl Flow {
         });
         let rows_kernel = Kernel::stacked(&[&rows]);
         let ladder = Ladders::new(&generator, fast, h, SQUARED, LONG);
-        let bottom = (ladder.norm().log2().ceil().max(0.0) as u32).clamp(LONG, DEEPEST);
+        let bottom = (ladder.norm().log2().ceil().max(0.0) as u32).max(LONG);
+        if bottom > DEEPEST {
+            return None;
+        }
         let spectrum = Spectrum::new(&generator.view((0, 0), (n, n)).into_owned(), sources);
         Some(Self {
             dim,
@@ -258,7 +263,7 @@ impl Flow {
 
     /// Has the energy of these products integrated along the flow.
     pub(crate) fn set_work(&mut self, terms: Vec<Term>) {
-        self.work = Work::new(terms, &self.fast, self.h, self.bottom);
+        self.work = EnergyIntegral::new(terms, &self.fast, self.h, self.bottom);
     }
 
     /// Has it known what the entries of 𝒢 and 𝒜 were summed from.

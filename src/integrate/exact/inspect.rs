@@ -158,7 +158,7 @@ impl Inspector {
         mode.storage_rates(w, &mut self.pace, &mut self.work);
     }
 
-    /// The storage did not come to where it is by a motion.
+    /// The storage did not come to where it is by travelling.
     pub(crate) fn forget_pace(&mut self) {
         self.pace.clear();
     }

@@ -6,11 +6,13 @@ use super::inspect::Finding;
 use super::key::{Key, Trigger};
 use super::transition::Transition;
 use crate::integrate::energy::{self, Balance};
+use crate::integrate::error::{Error, Reason};
 use crate::integrate::impulses;
 use crate::integrate::jump::rivals_note;
-use crate::integrate::run::{Log, Reason, SimError};
+use crate::integrate::log::Log;
 use crate::integrate::settle;
 use crate::integrate::stats::JumpReason;
+use crate::settings::tolerances::events::NOISE;
 use crate::settings::tolerances::exponentials::PROPOSALS;
 use crate::settings::tolerances::jumps::NO_JUMP;
 
@@ -40,7 +42,7 @@ impl Transition<'_> {
         key: &Key,
         leaving: &[usize],
         log: &mut Log,
-    ) -> Result<Option<Vec<usize>>, SimError> {
+    ) -> Result<Option<Vec<usize>>, Error> {
         let left = self.key.clone();
         if !left.sliding.is_empty() || !key.sliding.is_empty() {
             return Ok(None);
@@ -76,7 +78,7 @@ impl Transition<'_> {
 
     /// The devices' impulse at the present storage in a switch position, by projection in the energy metric. Returns
     /// whether the storage moved.
-    pub(super) fn project(&mut self, key: &Key, log: &mut Log) -> Result<bool, SimError> {
+    pub(super) fn project(&mut self, key: &Key, log: &mut Log) -> Result<bool, Error> {
         let t = self.t;
         let u = self.sources.inputs(t);
         self.note_switch_rivals(key, &u);
@@ -90,7 +92,7 @@ impl Transition<'_> {
         let (after, p) = match free.jump(&x, &u) {
             Ok(Some(jump)) => {
                 let checked = free.verify(&jump.p);
-                let checked = checked.map_err(|broken| SimError::at(t, Reason::Internal(broken)));
+                let checked = checked.map_err(|broken| Error::at(t, Reason::Internal(broken)));
                 checked?;
                 if !self.report.noted_rivals
                     && let Some(note) = jump.note(&free.lcs, t)
@@ -170,16 +172,19 @@ impl Transition<'_> {
         after: &DVector<f64>,
         p: &DVector<f64>,
         log: &mut Log,
-    ) -> Result<bool, SimError> {
+    ) -> Result<bool, Error> {
         let t = self.t;
         let u = self.sources.inputs(t);
         let free = self.table.free(key)?;
         let mut s = free.storage(after, &u);
-        // What fast and slow states of another basis add up to nothing is no change.
+        // What fast and slow states of another basis add up to nothing is no change; what is rounding of the value before is zero, so that a
+        // circuit which comes to rest is at rest.
         let rounding = free.storage_rounding(after, &u);
         for ((new, old), rounding) in s.iter_mut().zip(&self.storage.values).zip(&rounding) {
             if (*new - old).abs() <= *rounding {
                 *new = *old;
+            } else if new.abs() <= NOISE * f64::EPSILON * old.abs() {
+                *new = 0.0;
             }
         }
         let joined = free.storage(x, &self.sources.before);
@@ -240,7 +245,7 @@ impl Transition<'_> {
         &mut self,
         key: &Key,
         log: &mut Log,
-    ) -> Result<Option<(usize, Vec<usize>)>, SimError> {
+    ) -> Result<Option<(usize, Vec<usize>)>, Error> {
         let t = self.t;
         let fastest = self.table.fastest();
         let x = self.table.free(key)?.state_from(&self.storage.values);

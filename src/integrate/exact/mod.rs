@@ -5,6 +5,7 @@ mod accumulation;
 mod ahead;
 mod assembler;
 mod clock;
+mod energy_integral;
 mod exosystem;
 mod flow;
 mod free;
@@ -14,7 +15,6 @@ mod key;
 mod magnitudes;
 mod map;
 mod mode;
-mod motion;
 mod plant;
 mod recurring;
 mod report;
@@ -26,7 +26,7 @@ mod spectrum;
 mod stepper;
 mod storage;
 mod transition;
-mod work;
+mod travel;
 
 #[cfg(test)]
 pub(super) mod tests;

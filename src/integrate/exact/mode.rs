@@ -5,13 +5,13 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::clock::Clock;
+use super::energy_integral::Term;
 use super::exosystem::Exosystem;
 use super::flow::Flow;
 use super::key::{Key, Owner, Trigger};
 use super::magnitudes::{Magnitudes, ORDERS};
 use super::map::{Map, Sizes};
 use super::sampled::SampledRows;
-use super::work::Term;
 use crate::integrate::event::Change;
 use crate::integrate::switching::Threshold;
 use crate::lcs::{Lcs, PowerKind, Rows};

@@ -8,7 +8,7 @@ use super::free::Free;
 use super::key::{Key, Owner};
 use super::mode::{Mode, SwitchFacts};
 use super::sources::Sources;
-use crate::integrate::run::SimError;
+use crate::integrate::error::Error;
 use crate::integrate::switching::Threshold;
 use crate::lcs::Hold;
 use crate::mna::SourceControl;
@@ -52,7 +52,7 @@ impl ModeTable {
     }
 
     /// The complementarity system for the switch positions of a mode.
-    pub(crate) fn free(&mut self, key: &Key) -> Result<&mut Free, SimError> {
+    pub(crate) fn free(&mut self, key: &Key) -> Result<&mut Free, Error> {
         let at = match self.frees.iter().position(|(k, _)| k.same_switches(key)) {
             Some(at) => at,
             None => {

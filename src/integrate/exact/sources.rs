@@ -6,7 +6,7 @@ use super::clock::Clock;
 use super::exosystem::Exosystem;
 use super::key::Key;
 use crate::circuit::Source;
-use crate::integrate::run::{Reason, SimError};
+use crate::integrate::error::{Error, Reason};
 use crate::integrate::switching::Threshold;
 use crate::mna::SourceControl;
 
@@ -41,11 +41,11 @@ impl Sources {
         (silent, controls): (Vec<bool>, Vec<SourceControl>),
         (from, until): (f64, f64),
         free: bool,
-    ) -> Result<Self, SimError> {
+    ) -> Result<Self, Error> {
         let before = all.iter().zip(&silent);
         let before = before.map(|(s, silent)| if *silent { 0.0 } else { s.value_left(from) });
         let before = DVector::from_iterator(all.len(), before);
-        let unsupported = || SimError::before(without_form());
+        let unsupported = || Error::before(without_form());
         let exosystem = Exosystem::of(&all, silent, (from, until), free).ok_or_else(unsupported)?;
         let clocks = controls.into_iter();
         let clocks = clocks.map(|control| Clock::new(control, &all, from));
@@ -91,7 +91,7 @@ impl Sources {
     }
 
     /// Sources whose pieces end before `near` go on from t along the next ones; returns whether one of them jumps.
-    pub(super) fn take_pieces(&mut self, t: f64, near: f64) -> Result<bool, SimError> {
+    pub(super) fn take_pieces(&mut self, t: f64, near: f64) -> Result<bool, Error> {
         let mut edge = false;
         for (i, source) in self.all.iter().enumerate() {
             let old = self.exosystem.piece(i);
@@ -99,7 +99,7 @@ impl Sources {
             if end <= near {
                 let last = old.value(end);
                 let piece = source.piece(end.max(t));
-                let piece = piece.ok_or_else(|| SimError::at(t, without_form()))?;
+                let piece = piece.ok_or_else(|| Error::at(t, without_form()))?;
                 edge |= last != piece.value(end);
                 self.exosystem.set_piece(i, piece);
             }
@@ -139,16 +139,16 @@ impl Sources {
     }
 
     /// One source goes on from t along the piece that it has there.
-    pub(super) fn take_piece(&mut self, input: usize, t: f64) -> Result<(), SimError> {
+    pub(super) fn take_piece(&mut self, input: usize, t: f64) -> Result<(), Error> {
         let piece = self.all[input].piece(t);
-        let piece = piece.ok_or_else(|| SimError::at(t, without_form()))?;
+        let piece = piece.ok_or_else(|| Error::at(t, without_form()))?;
         self.exosystem.set_piece(input, piece);
         self.stand(t);
         Ok(())
     }
 
     /// All sources go on from t.
-    pub(super) fn resume(&mut self, t: f64) -> Result<(), SimError> {
+    pub(super) fn resume(&mut self, t: f64) -> Result<(), Error> {
         (0..self.all.len()).try_for_each(|input| self.take_piece(input, t))
     }
 

@@ -10,14 +10,17 @@ use super::flow::longest_step;
 use super::inspect::Inspector;
 use super::key::{Key, Owner, Trigger};
 use super::mode::Mode;
-use super::motion::{Arrival, Motion};
 use super::plant::ModeTable;
 use super::report::{Report, row_jumps};
 use super::rounding::resolution;
 use super::sources::Sources;
 use super::storage::Storage;
 use super::transition::{Memory, PATIENCE, Transition};
-use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper, Times};
+use super::travel::{Arrival, Travel};
+use crate::integrate::error::{Error, Reason};
+use crate::integrate::grid::Times;
+use crate::integrate::log::Log;
+use crate::integrate::run::{Outcome, Stepper};
 use crate::integrate::switching::fire;
 use crate::settings::Settings;
 use crate::settings::tolerances::exponentials::MOST_LOSS;
@@ -55,7 +58,7 @@ pub struct Exact {
     table: ModeTable,
     sources: Sources,
     storage: Storage,
-    motion: Motion,
+    travel: Travel,
     pub(super) dense: DenseOutput,
     inspector: Inspector,
     memory: Memory,
@@ -82,7 +85,7 @@ impl Exact {
     ///
     /// # Errors
     /// The reduction's for the start position; sources that no finite linear system generates.
-    pub fn new(setup: Setup) -> Result<Self, SimError> {
+    pub fn new(setup: Setup) -> Result<Self, Error> {
         let Setup {
             assembler,
             position,
@@ -113,7 +116,7 @@ impl Exact {
             table,
             sources,
             storage,
-            motion: Motion::at(t),
+            travel: Travel::at(t),
             dense: DenseOutput::default(),
             inspector: Inspector::default(),
             memory: Memory::new(),
@@ -139,35 +142,35 @@ impl Exact {
     }
 
     fn ulps(&self) -> f64 {
-        SAME_TIME * self.motion.t.abs()
+        SAME_TIME * self.travel.t.abs()
     }
 
-    fn fail(&self, reason: Reason) -> SimError {
-        SimError::at(self.motion.t, reason)
+    fn fail(&self, reason: Reason) -> Error {
+        Error::at(self.travel.t, reason)
     }
 
     /// Reads the storage vector at the current state.
     fn take_storage(&mut self) {
         if let Some(at) = self.mode {
             self.storage
-                .take(&mut self.table.modes[at], &mut self.motion);
+                .take(&mut self.table.modes[at], &mut self.travel);
         }
     }
 
     /// Reads how fast the storage moves, unless the mode was entered at this very instant: it then came here before.
     fn take_pace(&mut self) {
         if let Some(at) = self.mode
-            && self.motion.age > resolution(self.motion.t)
+            && self.travel.age > resolution(self.travel.t)
         {
             let mode = &self.table.modes[at];
-            self.inspector.note_pace(mode, &self.motion.now);
+            self.inspector.note_pace(mode, &self.travel.now);
         }
     }
 
     /// Something happens now: a guard fell through zero, sources reach breakpoints, switches that sources drive move. All that
     /// happens at one instant is taken together before a mode is looked for.
-    fn instant(&mut self, fired: Option<usize>, log: &mut Log) -> Result<(), SimError> {
-        let t = self.motion.t;
+    fn instant(&mut self, fired: Option<usize>, log: &mut Log) -> Result<(), Error> {
+        let t = self.travel.t;
         let near = t + self.ulps();
         if let (Some(at), Some(guard)) = (self.mode, fired) {
             self.leave_here(at, guard)?;
@@ -196,8 +199,8 @@ impl Exact {
 
     /// Takes note that mode `at` is left by a guard. One that is left at the instant at which it was entered was found by rounding:
     /// after [`PATIENCE`] of them none is entered again at this instant, and an instant without end is an internal error.
-    fn leave_here(&mut self, at: usize, guard: usize) -> Result<(), SimError> {
-        if self.motion.age > f64::EPSILON * self.table.modes[at].flow.shortest() {
+    fn leave_here(&mut self, at: usize, guard: usize) -> Result<(), Error> {
+        if self.travel.age > f64::EPSILON * self.table.modes[at].flow.shortest() {
             self.memory.left_here.clear();
         }
         self.memory.left_here.push((at, guard));
@@ -243,17 +246,17 @@ impl Exact {
         let may_pass = |k: usize| {
             let decided = !corner && fired == Some(first + k);
             let sources_turn = corner && mode.controlled_by_sources[k];
-            !decided && (sources_turn || self.motion.is_at_zero(&mode.flow, first + k))
+            !decided && (sources_turn || self.travel.is_at_zero(&mode.flow, first + k))
         };
         let candidates: Vec<usize> = (0..mode.guarded_switches.len())
             .filter(|&k| may_pass(k))
             .collect();
         if !candidates.is_empty() {
-            let now = &self.motion.now[..mode.n];
+            let now = &self.travel.now[..mode.n];
             self.inspector.look(mode, now, &self.sources.z);
             for k in candidates {
                 let mode = &self.table.modes[at];
-                if self.inspector.leaves(mode, first + k, self.motion.t) {
+                if self.inspector.leaves(mode, first + k, self.travel.t) {
                     let i = mode.guarded_switches[k];
                     key.switches[i] = !key.switches[i];
                     moved = true;
@@ -268,8 +271,8 @@ impl Exact {
     /// a function block on a step. Of a diode's current and voltage one begins where the other ends.
     fn note_slip(&mut self, at: usize, guard: usize) {
         let mode = &self.table.modes[at];
-        let slope = self.motion.now[mode.flow.dim() + mode.flow.guards() + guard];
-        let t = self.motion.t;
+        let slope = self.travel.now[mode.flow.dim() + mode.flow.guards() + guard];
+        let t = self.travel.t;
         match mode.owner(guard) {
             owner @ Owner::Switch(_) => self.inspector.note_slip(owner, t, slope),
             Owner::Device(pair) => {
@@ -290,19 +293,19 @@ impl Exact {
             return;
         };
         let mode = &self.table.modes[at];
-        let guards = &self.motion.now[mode.flow.dim()..];
+        let guards = &self.travel.now[mode.flow.dim()..];
         let devices = mode.device_guards.iter().zip(guards).enumerate();
         let others = devices.filter(|(guard, _)| fired != Some(*guard));
         let sides = others.map(|(_, (&pair, g))| (pair, *g));
         let stored = self.storage.amplitudes();
         self.report
-            .note_hidden(&self.table, at, sides, stored, self.motion.t);
+            .note_hidden(&self.table, at, sides, stored, self.travel.t);
     }
 
     /// What a change of mode from here may look at and move.
     fn transition(&mut self) -> Transition<'_> {
         Transition {
-            t: self.motion.t,
+            t: self.travel.t,
             mode: self.mode,
             key: &self.key,
             started: self.started,
@@ -322,7 +325,7 @@ impl Exact {
         discontinuous: bool,
         trigger: Trigger,
         log: &mut Log,
-    ) -> Result<(), SimError> {
+    ) -> Result<(), Error> {
         self.wanted = None;
         self.look_back(match trigger {
             Trigger::Guard(guard) => Some(guard),
@@ -349,7 +352,7 @@ impl Exact {
         let (balance, switches) = (self.storage.balance, key.switches.clone());
         let (events, impulses) = (log.events.len(), log.impulses.len());
         if let Some(at) = self.mode {
-            self.sources.leave(self.table.modes[at].n, &self.motion.now);
+            self.sources.leave(self.table.modes[at].n, &self.travel.now);
         }
         let mut transition = self.transition();
         let found = transition.search(&mut key, discontinuous, trigger, followed, log);
@@ -359,7 +362,7 @@ impl Exact {
                     let reason = transition.jump_reason(at, trigger);
                     let loss = self.storage.balance.lost_in_jumps() - balance.lost_in_jumps();
                     self.storage
-                        .note_jump(self.motion.t, &values, loss, reason, log);
+                        .note_jump(self.travel.t, &values, loss, reason, log);
                 }
                 key.copy_from(&self.table.modes[at].key);
                 self.enter(at, key, jumped, trigger, left_row, log);
@@ -384,7 +387,7 @@ impl Exact {
         left_row: Option<Vec<f64>>,
         log: &mut Log,
     ) {
-        let t = self.motion.t;
+        let t = self.travel.t;
         if let (Some(from), false) = (self.mode, jumped) {
             self.table.modes[from].remember(trigger, at);
         }
@@ -394,11 +397,11 @@ impl Exact {
             .enter(&mut self.table, (from, at), t, jumped, log);
         self.mode = Some(at);
         self.key = key;
-        self.motion.power = self.storage.power(self.duration);
+        self.travel.power = self.storage.power(self.duration);
         let Mode {
             flow, magnitudes, ..
         } = &self.table.modes[at];
-        self.motion.enter(flow, t, &self.inspector.w, magnitudes);
+        self.travel.enter(flow, t, &self.inspector.w, magnitudes);
         let span = (t, self.until);
         self.sources
             .look_ahead(&self.table.thresholds, &self.key.switches, span);
@@ -426,7 +429,7 @@ impl Exact {
         let negligible = SAME_TIME * (t + longest).abs();
         let end = (next - negligible).min(self.until + negligible);
         let mode = &mut self.table.modes[at];
-        self.dense.step(&mut self.motion, mode, t, end)
+        self.dense.step(&mut self.travel, mode, t, end)
     }
 
     /// Stands at the last row that was asked for.
@@ -434,19 +437,19 @@ impl Exact {
         if let Some(at) = self.mode {
             let flow = &mut self.table.modes[at].flow;
             self.dense
-                .end(&mut self.motion, flow, &self.sources.exosystem);
+                .end(&mut self.travel, flow, &self.sources.exosystem);
         }
     }
 
     fn read_row(&mut self) {
         if let Some(at) = self.mode {
             let mode = &self.table.modes[at];
-            mode.outputs.apply(&self.motion.now, &mut self.row);
+            mode.outputs.apply(&self.travel.now, &mut self.row);
         }
     }
 
-    fn start(&mut self, log: &mut Log) -> Result<(), SimError> {
-        self.sources.stand(self.motion.t);
+    fn start(&mut self, log: &mut Log) -> Result<(), Error> {
+        self.sources.stand(self.travel.t);
         let key = std::mem::take(&mut self.key);
         self.change(key, true, Trigger::Sources, log)?;
         self.started = true;
@@ -459,11 +462,11 @@ impl Stepper for Exact {
         if self.dense.leads() {
             self.dense.t
         } else {
-            self.motion.t
+            self.travel.t
         }
     }
 
-    fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), SimError> {
+    fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), Error> {
         if !self.started {
             self.start(log)?;
         }
@@ -484,12 +487,12 @@ impl Stepper for Exact {
             if flow.loss > MOST_LOSS && flow.guards() > 0 {
                 return Err(self.fail(Reason::NotGraded { loss: flow.loss }));
             }
-            if (!due && t <= self.motion.t) || self.step_ahead(at, t, next) {
+            if (!due && t <= self.travel.t) || self.step_ahead(at, t, next) {
                 return Ok(());
             }
-            let (from, rest) = (self.motion.t, self.motion.steps + REST);
-            self.motion.most = self.settings.max_steps.min(rest);
-            match self.motion.travel(
+            let (from, rest) = (self.travel.t, self.travel.steps + REST);
+            self.travel.most = self.settings.max_steps.min(rest);
+            match self.travel.advance(
                 &mut self.table.modes[at].flow,
                 &self.sources.exosystem,
                 stop,
@@ -498,7 +501,7 @@ impl Stepper for Exact {
                 Arrival::Reached => return Ok(()),
                 Arrival::Fired(guard) => {
                     self.instant(Some(guard), log)?;
-                    let (t, h) = (self.motion.t, self.table.output_step());
+                    let (t, h) = (self.travel.t, self.table.output_step());
                     if let Some((events, span)) = self.report.accumulation.burst(t, h) {
                         let error = self.fail(Reason::EventsAccumulate { events, span });
                         return Err(error.device(self.table.owner_name(at, guard)));
@@ -507,17 +510,17 @@ impl Stepper for Exact {
                 Arrival::Overflow => return Err(self.fail(Reason::Overflow)),
                 // A guard that rounding keeps near zero allows only steps of the fastest time constant, hidden from the output.
                 Arrival::Resting => {
-                    let (span, runs) = (self.motion.t - from, self.settings.max_steps / REST);
-                    if self.motion.steps > rest && span * (runs as f64) < self.table.output_step() {
+                    let (span, runs) = (self.travel.t - from, self.settings.max_steps / REST);
+                    if self.travel.steps > rest && span * (runs as f64) < self.table.output_step() {
                         return Err(self.fail(Reason::NoProgress { steps: REST, span }));
                     }
                 }
             }
-            log.go_on(self.motion.t)?;
+            log.go_on(self.travel.t)?;
             if log.pauses() {
                 return Ok(());
             }
-            if self.motion.steps > self.settings.max_steps {
+            if self.travel.steps > self.settings.max_steps {
                 return Err(self.fail(Reason::TooManySteps {
                     limit: self.settings.max_steps,
                 }));
@@ -529,7 +532,7 @@ impl Stepper for Exact {
         if let Some(values) = self.dense.row(row.len()) {
             row.copy_from_slice(values);
         } else if let Some(at) = self.mode {
-            self.table.modes[at].outputs.apply(&self.motion.now, row);
+            self.table.modes[at].outputs.apply(&self.travel.now, row);
         }
     }
 
@@ -541,9 +544,9 @@ impl Stepper for Exact {
     fn finish(&mut self) -> Outcome {
         self.end_ahead();
         self.take_storage();
-        let (t, duration) = (self.motion.t, self.duration);
+        let (t, duration) = (self.travel.t, self.duration);
         let mut outcome = self.report.finish(&self.table, t, duration);
-        outcome.stats.steps = self.motion.steps;
+        outcome.stats.steps = self.travel.steps;
         outcome.energy = self.storage.balance.energy();
         outcome
     }

@@ -3,9 +3,9 @@
 use nalgebra::DMatrix;
 
 use super::mode::Mode;
-use super::motion::Motion;
+use super::travel::Travel;
 use crate::integrate::energy::Balance;
-use crate::integrate::run::Log;
+use crate::integrate::log::Log;
 use crate::integrate::stats::{JumpReason, StateJump};
 use crate::lcs::Lcs;
 use crate::settings::tolerances::jumps::NO_JUMP;
@@ -94,13 +94,13 @@ impl Storage {
         self.capacity = stored(&self.metric, &self.scale);
     }
 
-    /// Reads s and the energy spent where the motion stands in this mode.
-    pub(super) fn take(&mut self, mode: &mut Mode, motion: &mut Motion) {
-        let [source, dissipated] = motion.take_energy(&mut mode.flow);
+    /// Reads s and the energy spent where the run stands in this mode.
+    pub(super) fn take(&mut self, mode: &mut Mode, travel: &mut Travel) {
+        let [source, dissipated] = travel.take_energy(&mut mode.flow);
         self.balance.add((source, dissipated));
-        mode.storage_at(&motion.now, &mut self.values);
+        mode.storage_at(&travel.now, &mut self.values);
         // An event often finds a current at zero: its size is what it was on the way.
-        motion.reach(&mut self.reach);
+        travel.reach(&mut self.reach);
         mode.storage.largest(&self.reach, &mut self.largest);
         for (scale, largest) in self.scale.iter_mut().zip(&self.largest) {
             *scale = scale.max(*largest);

@@ -8,7 +8,8 @@ use super::plant::ModeTable;
 use super::report::Report;
 use super::sources::Sources;
 use super::storage::Storage;
-use crate::integrate::run::{Log, Reason, SimError};
+use crate::integrate::error::{Error, Reason};
+use crate::integrate::log::Log;
 use crate::integrate::settle;
 use crate::integrate::switching::fire;
 use crate::settings::tolerances::exponentials::PROPOSALS;
@@ -61,8 +62,8 @@ pub(super) struct Transition<'a> {
 }
 
 impl Transition<'_> {
-    pub(super) fn fail(&self, reason: Reason) -> SimError {
-        SimError::at(self.t, reason)
+    pub(super) fn fail(&self, reason: Reason) -> Error {
+        Error::at(self.t, reason)
     }
 
     /// Finds the mode and whether the state jumps into it: positions of the switches, impulse of the devices, conducting devices.
@@ -74,7 +75,7 @@ impl Transition<'_> {
         trigger: Trigger,
         followed: Option<(usize, Vec<usize>)>,
         log: &mut Log,
-    ) -> Result<(usize, bool), SimError> {
+    ) -> Result<(usize, bool), Error> {
         let mut jumped = false;
         let mut positions: Vec<Vec<bool>> = Vec::new();
         let mut closed_sets: Vec<Vec<bool>> = Vec::new();
@@ -160,7 +161,7 @@ impl Transition<'_> {
     }
 
     /// See [`settle`]; whether a switch moved.
-    fn settle(&mut self, key: &mut Key) -> Result<bool, SimError> {
+    fn settle(&mut self, key: &mut Key) -> Result<bool, Error> {
         if !key.sliding.is_empty() || key.switches.len() < 2 {
             return Ok(false);
         }
@@ -282,7 +283,7 @@ impl Transition<'_> {
         &mut self,
         key: &Key,
         trigger: Trigger,
-    ) -> Result<Option<(usize, Vec<usize>)>, SimError> {
+    ) -> Result<Option<(usize, Vec<usize>)>, Error> {
         let mut tried: Vec<Vec<bool>> = Vec::new();
         if trigger == Trigger::Sources || self.table.pairs == 0 {
             tried.push(key.closed.clone());
@@ -399,7 +400,7 @@ impl Transition<'_> {
         &mut self,
         key: &Key,
         tried: &mut Vec<Vec<bool>>,
-    ) -> Result<Option<(usize, Vec<usize>)>, SimError> {
+    ) -> Result<Option<(usize, Vec<usize>)>, Error> {
         let t = self.t;
         let fastest = self.table.fastest();
         let free = self.table.free(key)?;

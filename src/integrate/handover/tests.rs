@@ -38,8 +38,8 @@ fn voltage(t: f64) -> f64 {
     10.0 * (-alpha * t).exp() * ((omega * t).cos() - alpha / omega * (omega * t).sin())
 }
 
-fn no_mode(t: f64) -> SimError {
-    SimError::at(t, Reason::Infeasible).device("df1")
+fn no_mode(t: f64) -> Error {
+    Error::at(t, Reason::Infeasible).device("df1")
 }
 
 #[test]
@@ -111,7 +111,7 @@ fn an_interval_that_was_too_short_is_doubled() {
 fn too_many_steps_are_not_answered_with_more() {
     let mut run = bridge();
     run.advance(1e-3, &mut Log::new(1, 0.0, false)).unwrap();
-    let error = SimError::at(1e-3, Reason::TooManySteps { limit: 7 });
+    let error = Error::at(1e-3, Reason::TooManySteps { limit: 7 });
     assert_eq!(
         run.give_way(error).unwrap_err().reason,
         Reason::TooManySteps { limit: 7 }

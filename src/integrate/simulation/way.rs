@@ -4,10 +4,12 @@ use super::SimulationOptions;
 use crate::circuit::Tran;
 use crate::integrate::Note;
 use crate::integrate::energy::Balance;
+use crate::integrate::error::{Error, Reason};
 use crate::integrate::exact::Place;
 use crate::integrate::handover::Handover;
+use crate::integrate::log::Log;
 use crate::integrate::problem::Problem;
-use crate::integrate::run::{Log, Reason, SimError, Stepper};
+use crate::integrate::run::Stepper;
 use crate::integrate::simulate::{Method, controlled};
 use crate::integrate::step::Scheme;
 use crate::integrate::theta::{Stepping, Theta};
@@ -30,13 +32,13 @@ impl Way {
         options: &SimulationOptions,
         notes: &mut Vec<Note>,
         log: &mut Log<'_>,
-    ) -> Result<Self, SimError> {
+    ) -> Result<Self, Error> {
         let SimulationOptions {
             method, settings, ..
         } = options;
         if let (Method::Exact, Some(obstacle)) = (method, not_exact(lcs)) {
             let what = format!("no exact integration: {obstacle}");
-            return Err(SimError::before(Reason::Unsupported(what)));
+            return Err(Error::before(Reason::Unsupported(what)));
         }
         let plan = plan(lcs, &options.as_asked());
         let start = problem.start.t;
@@ -107,7 +109,7 @@ fn steps(
     tran: &Tran,
     scheme: Scheme,
     options: &SimulationOptions,
-) -> Result<Theta, SimError> {
+) -> Result<Theta, Error> {
     let stepping = options.step.map_or(controlled(tran), Stepping::Fixed);
     let settings = &options.settings;
     let mut theta = problem.stepper(problem.start.clone(), tran, scheme, stepping, settings)?;

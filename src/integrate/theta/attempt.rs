@@ -10,7 +10,7 @@ impl Theta {
     }
 
     /// Computes the step from now to t1 = now + h into `out` without committing it.
-    pub(super) fn attempt(&mut self, h: f64, t1: f64) -> Result<(), SimError> {
+    pub(super) fn attempt(&mut self, h: f64, t1: f64) -> Result<(), Error> {
         if let Some(tableau) = Tableau::of(self.system(), self.scheme) {
             return self.attempt_stages(tableau, h, t1);
         }
@@ -43,7 +43,7 @@ impl Theta {
             } else {
                 system.matrices(h, slack, scheme, tolerance)
             };
-            let (step, new) = found.map_err(|reason| SimError::at(now.t, reason))?;
+            let (step, new) = found.map_err(|reason| Error::at(now.t, reason))?;
             let (mode, fused) = system.mode(step, &now.active);
             self.stats.factorisations += u64::from(new) + u64::from(fused);
             *attempt = Attempt {
@@ -89,7 +89,7 @@ impl Theta {
 
     /// The step with γ = 1 by the solvers. Where the user's own γ = 1 > θ leaves a stiff step without solution, θ = 1 has one.
     #[cold]
-    pub(super) fn solve_step(&mut self, scheme: Scheme, h: f64, t1: f64) -> Result<(), SimError> {
+    pub(super) fn solve_step(&mut self, scheme: Scheme, h: f64, t1: f64) -> Result<(), Error> {
         self.stats.pivotings += 1;
         let first = self.solve_with(scheme, h, t1);
         if first.is_err() && scheme != Scheme::MOREAU {
@@ -98,12 +98,12 @@ impl Theta {
         first
     }
 
-    fn solve_with(&mut self, scheme: Scheme, h: f64, t1: f64) -> Result<(), SimError> {
+    fn solve_with(&mut self, scheme: Scheme, h: f64, t1: f64) -> Result<(), Error> {
         let tolerance = self.settings.lcp_residual;
         let now = &self.now;
         let system = &mut self.plant.systems[now.system].1;
         let (step, new) = change_matrices(system, h, Self::slack(t1), scheme, tolerance)
-            .map_err(|reason| SimError::at(now.t, reason))?;
+            .map_err(|reason| Error::at(now.t, reason))?;
         self.stats.factorisations += u64::from(new);
         let q = system.prepare(step, &self.z, &self.amplitudes);
         let matrices = system.step_mut(step);
@@ -113,7 +113,7 @@ impl Theta {
         self.stats.factorisations += matrices.driver.factorisations - before;
         let x = matrices.x_next(&self.z, &solution.lambda);
         if x.iter().any(|v| !v.is_finite()) {
-            return Err(SimError::at(now.t, Reason::Overflow));
+            return Err(Error::at(now.t, Reason::Overflow));
         }
         if let Some(error) = unsolved(&solution, &system.lcs, now.t, tolerance) {
             return Err(error);
@@ -146,14 +146,14 @@ impl Theta {
     }
 
     /// Makes the attempt the present.
-    pub(super) fn commit(&mut self, t1: f64) -> Result<(), SimError> {
+    pub(super) fn commit(&mut self, t1: f64) -> Result<(), Error> {
         let n = self.now.x.len();
         self.stats.steps += 1;
         if self.stats.steps > self.settings.max_steps {
             let reason = Reason::TooManySteps {
                 limit: self.settings.max_steps,
             };
-            return Err(SimError::at(self.now.t, reason));
+            return Err(Error::at(self.now.t, reason));
         }
         if let Some((basis, pattern)) = self.attempt.solved.take() {
             self.commit_solved(basis, pattern, t1);
@@ -242,7 +242,7 @@ impl Theta {
     }
 
     /// The active set and the devices' states at the right limit of now, after a start, an edge or a switching.
-    pub(super) fn find_mode(&mut self) -> Result<(), SimError> {
+    pub(super) fn find_mode(&mut self) -> Result<(), Error> {
         if self.now.active.is_empty() {
             return Ok(());
         }
@@ -270,7 +270,7 @@ fn change_matrices(
 
 /// The error of a step problem without a solution; it names the device with the largest part in the contradiction, or
 /// with the largest residual.
-pub(super) fn unsolved(solution: &Solution, lcs: &Lcs, t: f64, tolerance: f64) -> Option<SimError> {
+pub(super) fn unsolved(solution: &Solution, lcs: &Lcs, t: f64, tolerance: f64) -> Option<Error> {
     let (reason, port) = match &solution.status {
         Status::Solved => return None,
         Status::Infeasible(ray) => (Reason::Infeasible, ray.imax()),
@@ -285,5 +285,5 @@ pub(super) fn unsolved(solution: &Solution, lcs: &Lcs, t: f64, tolerance: f64) -
             )
         }
     };
-    Some(SimError::at(t, reason).device(lcs.ports[port].device.clone()))
+    Some(Error::at(t, reason).device(lcs.ports[port].device.clone()))
 }

@@ -10,7 +10,7 @@ use crate::settings::tolerances::steps::SHORT;
 
 impl Theta {
     /// The first jump: from inconsistent initial values, by edges of the sources at the start.
-    pub(super) fn begin(&mut self, log: &mut Log) -> Result<(), SimError> {
+    pub(super) fn begin(&mut self, log: &mut Log) -> Result<(), Error> {
         let u = self.inputs.all(self.now.t);
         let before = std::mem::replace(&mut self.now.u, u);
         self.jump(&before, log)?;
@@ -30,7 +30,7 @@ impl Theta {
     }
 
     /// At a breakpoint: inputs take their right limits, the state jumps if it must.
-    pub(super) fn edge(&mut self, t: f64, log: &mut Log) -> Result<(), SimError> {
+    pub(super) fn edge(&mut self, t: f64, log: &mut Log) -> Result<(), Error> {
         self.forget_slope();
         let mut u = self.now.u.clone();
         self.inputs.right(t, &mut u);
@@ -67,7 +67,7 @@ impl Theta {
     }
 
     /// The jump from inputs `old` to the present ones at the present time.
-    pub(super) fn jump(&mut self, old: &[f64], log: &mut Log) -> Result<(), SimError> {
+    pub(super) fn jump(&mut self, old: &[f64], log: &mut Log) -> Result<(), Error> {
         self.now.settle = true;
         self.forget_slope();
         self.attempt.h = f64::NAN;
@@ -79,11 +79,11 @@ impl Theta {
         let found = match jump {
             Some(problem) if problem.monotone => {
                 let found = problem.solve(lcs, &x, &u).map_err(|e| {
-                    SimError::at(t, Reason::Infeasible).device(lcs.ports[e.port].device.clone())
+                    Error::at(t, Reason::Infeasible).device(lcs.ports[e.port].device.clone())
                 })?;
                 if let Some(jump) = &found {
                     let checked = problem.verify(lcs, &jump.p);
-                    checked.map_err(|broken| SimError::at(t, Reason::Internal(broken)))?;
+                    checked.map_err(|broken| Error::at(t, Reason::Internal(broken)))?;
                     if !self.noted_rivals
                         && let Some(note) = jump.note(lcs, t)
                     {
@@ -181,9 +181,9 @@ impl Theta {
 
     /// The jump of a network that is not passive, where no projection exists: the limit of the implicit step, p = hλ at h and
     /// h/2 extrapolated. `None` where p vanishes with h.
-    fn step_limit(&mut self) -> Result<Option<Jump>, SimError> {
+    fn step_limit(&mut self) -> Result<Option<Jump>, Error> {
         let h = self.read_step();
-        let mut p = |h: f64| -> Result<DVector<f64>, SimError> {
+        let mut p = |h: f64| -> Result<DVector<f64>, Error> {
             let step = self.prepare_short(h)?;
             Ok(self.solve_short(step)?.lambda * h)
         };
@@ -210,7 +210,7 @@ impl Theta {
     }
 
     /// What the controls ask of the switches now.
-    pub(super) fn crossed(&mut self) -> Result<Demand, SimError> {
+    pub(super) fn crossed(&mut self) -> Result<Demand, Error> {
         if self.switches.needs_lambda() {
             self.read_lambda()?;
         }
@@ -220,12 +220,12 @@ impl Theta {
     }
 
     /// Whether the controls ask a switch to move now.
-    pub(super) fn asked(&mut self) -> Result<bool, SimError> {
+    pub(super) fn asked(&mut self) -> Result<bool, Error> {
         Ok(self.switches.watch() && self.crossed()? != Demand::None)
     }
 
     /// How far the controls of switches that watch the state are beyond their thresholds now.
-    pub(super) fn excess(&mut self) -> Result<Vec<f64>, SimError> {
+    pub(super) fn excess(&mut self) -> Result<Vec<f64>, Error> {
         if self.switches.needs_lambda() {
             self.read_lambda()?;
         }
@@ -235,7 +235,7 @@ impl Theta {
     }
 
     /// Flips the switches `moving`, then those whose controls ask for it until none does, with the jumps this causes.
-    pub(super) fn switch(&mut self, moving: &[usize], log: &mut Log) -> Result<(), SimError> {
+    pub(super) fn switch(&mut self, moving: &[usize], log: &mut Log) -> Result<(), Error> {
         if log.wants_rows() {
             self.log_row(log);
         }
@@ -294,11 +294,11 @@ impl Theta {
         let asking = self.asking()?;
         self.switches.toggle(&asking);
         let moving = self.switches.moved(&before);
-        Err(SimError::at(self.now.t, Reason::SwitchesDoNotSettle).devices(moving))
+        Err(Error::at(self.now.t, Reason::SwitchesDoNotSettle).devices(moving))
     }
 
     /// The switches that controls ask to move in the present position.
-    fn asking(&mut self) -> Result<Vec<usize>, SimError> {
+    fn asking(&mut self) -> Result<Vec<usize>, Error> {
         if self.switches.needs_lambda() {
             self.read_lambda()?;
         }
@@ -332,7 +332,7 @@ impl Theta {
     }
 
     /// Moves the switches that those which have left position `before` move, see [`settle`](settle::settle).
-    fn settle(&mut self, before: &[bool], s: &DVector<f64>) -> Result<(), SimError> {
+    fn settle(&mut self, before: &[bool], s: &DVector<f64>) -> Result<(), Error> {
         if before.len() < 2 {
             return Ok(());
         }
@@ -354,7 +354,7 @@ impl Theta {
     }
 
     /// Takes storage s over into the system of the present switch position.
-    fn change_position(&mut self, s: &DVector<f64>, log: &mut Log) -> Result<(), SimError> {
+    fn change_position(&mut self, s: &DVector<f64>, log: &mut Log) -> Result<(), Error> {
         let position = self.switches.position().to_vec();
         let at = self
             .plant

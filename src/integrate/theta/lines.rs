@@ -43,7 +43,7 @@ impl Theta {
     }
 
     /// Has the waves leave the ports of lines as they are now.
-    pub(super) fn send_waves(&mut self) -> Result<(), SimError> {
+    pub(super) fn send_waves(&mut self) -> Result<(), Error> {
         if self.ports.is_empty() {
             return Ok(());
         }
@@ -59,7 +59,7 @@ impl Theta {
     }
 
     /// Something happens now that may break the waves that leave: as they are after it.
-    pub(super) fn break_waves(&mut self) -> Result<(), SimError> {
+    pub(super) fn break_waves(&mut self) -> Result<(), Error> {
         self.inputs.lines_mut().note_break(self.now.t);
         self.send_waves()
     }

@@ -18,7 +18,7 @@ enum Tried {
 
 impl Theta {
     /// Advances to `stop`, which no breakpoint lies before; u is the left limit there.
-    pub(super) fn interval(&mut self, stop: f64, log: &mut Log) -> Result<(), SimError> {
+    pub(super) fn interval(&mut self, stop: f64, log: &mut Log) -> Result<(), Error> {
         let (t0, span) = (self.now.t, stop - self.now.t);
         let longest = match self.stepping {
             Stepping::Fixed(h) => h.min(self.longest),
@@ -54,7 +54,7 @@ impl Theta {
     /// A step whose length is prescribed, not committed. After an edge or a jump the midpoint rule would swing around what is
     /// faster than the step, undamped; it starts with two halves of Moreau's scheme instead, which are damped and leave it
     /// its order (Rannacher 1984). Returns the length of the last part.
-    fn fixed_step(&mut self, h: f64, t1: f64) -> Result<f64, SimError> {
+    fn fixed_step(&mut self, h: f64, t1: f64) -> Result<f64, Error> {
         if !(self.now.settle && self.starts_damped()) || self.whole && self.is_cut(h) {
             self.attempt(h, t1)?;
             return Ok(h);
@@ -84,7 +84,7 @@ impl Theta {
         t1: f64,
         impulse: bool,
         log: &mut Log,
-    ) -> Result<(), SimError> {
+    ) -> Result<(), Error> {
         if impulse {
             self.log_spontaneous(t1, log);
         }
@@ -99,12 +99,7 @@ impl Theta {
     }
 
     /// A base step with halving: for the error and to locate state-driven switchings, after which the rest is a base step of its own.
-    pub(super) fn divided_step(
-        &mut self,
-        base: f64,
-        end: f64,
-        log: &mut Log,
-    ) -> Result<(), SimError> {
+    pub(super) fn divided_step(&mut self, base: f64, end: f64, log: &mut Log) -> Result<(), Error> {
         let finest = (base / 2_f64.powi(LOCATE)).max(Self::slack(end));
         let mut base = base;
         while !self.halved_step(base, end, finest, log)? {
@@ -120,7 +115,7 @@ impl Theta {
         end: f64,
         finest: f64,
         log: &mut Log,
-    ) -> Result<bool, SimError> {
+    ) -> Result<bool, Error> {
         const WHOLE: u64 = 1 << FINEST;
         let start = self.now.t;
         let mut done = 0;
@@ -169,7 +164,7 @@ impl Theta {
         level: u32,
         finest: f64,
         log: &mut Log,
-    ) -> Result<Tried, SimError> {
+    ) -> Result<Tried, Error> {
         self.kept.copy_from(&self.now);
         let steps = self.stats.steps;
         let mut last_chance = level + 2 >= FINEST;
@@ -219,7 +214,7 @@ impl Theta {
         t1: f64,
         last_chance: bool,
         impulse: &mut bool,
-    ) -> Result<bool, SimError> {
+    ) -> Result<bool, Error> {
         if self.control.is_none() {
             self.preferred = f64::INFINITY;
             self.fixed_step(h, t1)?;
@@ -247,7 +242,7 @@ impl Theta {
         steps: u64,
         impulse: &mut bool,
         log: &mut Log,
-    ) -> Result<(), SimError> {
+    ) -> Result<(), Error> {
         let (mut end, mut beyond) = (self.now.t, self.excess()?);
         self.back(steps);
         let mut before = self.excess()?;
@@ -289,7 +284,7 @@ impl Theta {
         t1: f64,
         last_chance: bool,
         impulse: &mut bool,
-    ) -> Result<Verdict, SimError> {
+    ) -> Result<Verdict, Error> {
         let turned_off = self.now.turned_off;
         let steps = self.stats.steps;
         self.now.unseen.clear();
@@ -375,7 +370,7 @@ impl Theta {
 
     /// Whether the attempted step of a network that may jump by itself contains an impulse: p = hλ is compared with that
     /// of half the step from the same state. Passive networks jump only where sources or switches do.
-    pub(super) fn impulsive(&mut self, h: f64) -> Result<bool, SimError> {
+    pub(super) fn impulsive(&mut self, h: f64) -> Result<bool, Error> {
         let may = self
             .system()
             .jump

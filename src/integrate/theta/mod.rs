@@ -23,11 +23,13 @@ use nalgebra::DVector;
 use crate::integrate::Note;
 use crate::integrate::control::{Amplitudes, Control};
 use crate::integrate::energy::{self, Balance};
+use crate::integrate::error::{Error, Reason};
 use crate::integrate::event::Change;
 use crate::integrate::exact::Place;
 use crate::integrate::inputs::Inputs;
+use crate::integrate::log::Log;
 use crate::integrate::reading::{self, Point};
-use crate::integrate::run::{Log, Outcome, Reason, SimError, Stepper};
+use crate::integrate::run::{Outcome, Stepper};
 use crate::integrate::stats::{StatedError, Stats};
 use crate::integrate::step::Scheme;
 use crate::integrate::switching::{Demand, Switches, Threshold};
@@ -221,7 +223,7 @@ impl Theta {
     ///
     /// # Errors
     /// The reduction's for the start position.
-    pub fn new(setup: Setup) -> Result<Self, SimError> {
+    pub fn new(setup: Setup) -> Result<Self, Error> {
         let Setup {
             mut reduce,
             position,
@@ -385,7 +387,7 @@ impl Theta {
     ///
     /// # Errors
     /// As [`Stepper::advance`].
-    pub fn controls_at_start(&mut self) -> Result<Vec<f64>, SimError> {
+    pub fn controls_at_start(&mut self) -> Result<Vec<f64>, Error> {
         self.begin(&mut Log::new(0, f64::INFINITY, false))?;
         self.read_lambda()?;
         let lcs = &self.plant.systems[self.now.system].1.lcs;
@@ -468,7 +470,7 @@ impl Stepper for Theta {
         self.now.t
     }
 
-    fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), SimError> {
+    fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), Error> {
         if !self.started {
             self.begin(log)?;
             self.inputs.slopes(self.now.t, &mut self.du);

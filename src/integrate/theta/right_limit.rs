@@ -36,7 +36,7 @@ impl Theta {
     }
 
     /// z and the matrices of the short implicit step from now; slopes of the inputs go into `du`.
-    pub(super) fn prepare_short(&mut self, h: f64) -> Result<usize, SimError> {
+    pub(super) fn prepare_short(&mut self, h: f64) -> Result<usize, Error> {
         self.inputs.slopes(self.now.t, &mut self.du);
         for ((next, u), du) in self.u_next.iter_mut().zip(&self.now.u).zip(&self.du) {
             *next = u + h * du;
@@ -52,18 +52,18 @@ impl Theta {
         system.columns.fill(&now.x, &self.u_next, &now.u, z);
         let (step, _) = system
             .matrices(h, h * f64::EPSILON, Scheme::MOREAU, settings.lcp_residual)
-            .map_err(|reason| SimError::at(now.t, reason))?;
+            .map_err(|reason| Error::at(now.t, reason))?;
         Ok(step)
     }
 
     /// The complementarity problem of the right limit of now, solved.
-    pub(super) fn right_limit(&mut self) -> Result<Solution, SimError> {
+    pub(super) fn right_limit(&mut self) -> Result<Solution, Error> {
         let step = self.prepare_short(self.reading_step())?;
         self.solve_short(step)
     }
 
     /// The step prepared by [`Self::prepare_short`], with the least-norm λ.
-    pub(super) fn solve_short(&mut self, step: usize) -> Result<Solution, SimError> {
+    pub(super) fn solve_short(&mut self, step: usize) -> Result<Solution, Error> {
         let Self {
             plant,
             now,
@@ -95,7 +95,7 @@ impl Theta {
     }
 
     /// λ at the right limit of now, by one implicit step much shorter than the last.
-    pub(super) fn read_lambda(&mut self) -> Result<(), SimError> {
+    pub(super) fn read_lambda(&mut self) -> Result<(), Error> {
         let m = self.lambda.len();
         let step = self.prepare_short(self.reading_step())?;
         if m == 0 {

@@ -74,7 +74,7 @@ impl Theta {
         tableau: &'static Tableau,
         h: f64,
         t1: f64,
-    ) -> Result<(), SimError> {
+    ) -> Result<(), Error> {
         let slopes = self.attempt_tableau(tableau, h, t1)?;
         if self.now.settle && self.ends_suddenly(&slopes) {
             self.attempt_tableau(&EULER, h, t1)?;
@@ -111,14 +111,14 @@ impl Theta {
         tableau: &'static Tableau,
         h: f64,
         t1: f64,
-    ) -> Result<Vec<DVector<f64>>, SimError> {
+    ) -> Result<Vec<DVector<f64>>, Error> {
         let tolerance = self.settings.lcp_residual;
         let (t0, n) = (self.now.t, self.now.x.len());
         let slack = Self::slack(t1);
         let system = &mut self.plant.systems[self.now.system].1;
         let (step, new) = system
             .matrices(tableau.gamma * h, slack, Scheme::MOREAU, tolerance)
-            .map_err(|reason| SimError::at(t0, reason))?;
+            .map_err(|reason| Error::at(t0, reason))?;
         self.stats.factorisations += u64::from(new);
         self.inputs.left(t1, &mut self.u_next);
         for (du, (a, b)) in self.du.iter_mut().zip(self.u_next.iter().zip(&self.now.u)) {
@@ -151,7 +151,7 @@ impl Theta {
             self.stats.lcp_solves += 1;
             let x = matrices.x_next(&self.z, &solution.lambda);
             if x.iter().any(|v| !v.is_finite()) {
-                return Err(SimError::at(t0, Reason::Overflow));
+                return Err(Error::at(t0, Reason::Overflow));
             }
             if let Some(error) = unsolved(&solution, &system.lcs, t0, tolerance) {
                 return Err(error);

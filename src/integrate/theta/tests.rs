@@ -4,7 +4,9 @@ use nalgebra::{DVector, dvector};
 
 use crate::integrate::Run;
 use crate::integrate::fixtures;
-use crate::integrate::run::{Frame, Grid, Log, run};
+use crate::integrate::grid::Grid;
+use crate::integrate::log::Log;
+use crate::integrate::run::{Frame, run};
 use crate::integrate::step::Scheme;
 use crate::integrate::theta::{Setup, Start, Stepping, Theta};
 use crate::lcs::Lcs;

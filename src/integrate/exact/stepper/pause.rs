@@ -6,9 +6,10 @@ use super::Exact;
 use crate::circuit::Source;
 use crate::integrate::Energy;
 use crate::integrate::energy::Balance;
+use crate::integrate::error::Error;
 use crate::integrate::exact::accumulation::Accumulation;
 use crate::integrate::exact::key::{Key, Trigger};
-use crate::integrate::run::{Log, SimError};
+use crate::integrate::log::Log;
 use crate::integrate::switching::fire;
 
 /// Where one method leaves a run and another goes on.
@@ -28,7 +29,7 @@ impl Exact {
         self.end_ahead();
         self.take_storage();
         Place {
-            t: self.motion.t,
+            t: self.travel.t,
             storage: DVector::from_column_slice(&self.storage.values),
             switches: self.key.switches.clone(),
         }
@@ -63,7 +64,7 @@ impl Exact {
         input: usize,
         source: Source,
         log: &mut Log,
-    ) -> Result<(), SimError> {
+    ) -> Result<(), Error> {
         if !self.started {
             self.start(log)?;
         }
@@ -72,7 +73,7 @@ impl Exact {
         self.memory.left_here.clear();
         self.inspector.forget_slips();
         self.inspector.forget_pace();
-        let t = self.motion.t;
+        let t = self.travel.t;
         self.sources.replace(input, source);
         self.sources.take_piece(input, t)?;
         let mut key = std::mem::take(&mut self.key);
@@ -89,11 +90,11 @@ impl Exact {
     pub(crate) fn leave(&mut self) -> Place {
         self.end_ahead();
         self.take_storage();
-        self.report.close_slides(self.motion.t);
+        self.report.close_slides(self.travel.t);
         self.key.sliding.clear();
         self.mode = None;
         Place {
-            t: self.motion.t,
+            t: self.travel.t,
             storage: DVector::from_column_slice(&self.storage.values),
             switches: self
                 .wanted
@@ -106,7 +107,7 @@ impl Exact {
     ///
     /// # Errors
     /// No mode holds there; the run may be taken up at a later place.
-    pub(crate) fn resume(&mut self, place: &Place, energy: &Energy) -> Result<(), SimError> {
+    pub(crate) fn resume(&mut self, place: &Place, energy: &Energy) -> Result<(), Error> {
         self.stand_at(place, energy);
         self.sources.resume(place.t)?;
         let mut switches = place.switches.clone();
@@ -134,7 +135,7 @@ impl Exact {
 
     /// Takes over a place, without a mode, with the energy spent since [`Self::leave`].
     pub(crate) fn stand_at(&mut self, place: &Place, energy: &Energy) {
-        self.motion.t = place.t;
+        self.travel.t = place.t;
         self.storage.set(place.storage.as_slice());
         self.storage.balance.add_part(energy);
         self.storage.note_stored();

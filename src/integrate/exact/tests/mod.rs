@@ -8,7 +8,10 @@ use super::{Assembler, Exact, Setup};
 use crate::circuit::{Circuit, ElaborateOptions, Tran, elaborate};
 use crate::diagnostic::SourceMap;
 use crate::integrate::Run;
-use crate::integrate::run::{Frame, Grid, Log, SimError, run};
+use crate::integrate::error::Error;
+use crate::integrate::grid::Grid;
+use crate::integrate::log::Log;
+use crate::integrate::run::{Frame, run};
 use crate::lcs::{Lcs, Position, reduce};
 use crate::mna;
 use crate::settings::Settings;
@@ -59,11 +62,11 @@ pub(in crate::integrate) fn prepare_circuit(circuit: &Circuit, energy: bool) -> 
     (exact, lcs, tran)
 }
 
-fn try_simulate(text: &str) -> Result<Run, SimError> {
+fn try_simulate(text: &str) -> Result<Run, Error> {
     simulate_circuit(&circuit(text))
 }
 
-fn simulate_circuit(circuit: &Circuit) -> Result<Run, SimError> {
+fn simulate_circuit(circuit: &Circuit) -> Result<Run, Error> {
     let (mut exact, lcs, tran) = prepare_circuit(circuit, true);
     let columns = lcs.outputs.names.len();
     let frame = Frame {

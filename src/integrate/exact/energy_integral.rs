@@ -75,7 +75,7 @@ pub(crate) enum Stretch {
 
 /// Energy from sources and energy dissipated along w' = 𝒜 w.
 #[derive(Debug, Clone)]
-pub(crate) struct Work {
+pub(crate) struct EnergyIntegral {
     terms: Vec<Term>,
     /// The states that are coupled with none but each other.
     fast: Vec<usize>,
@@ -124,7 +124,7 @@ struct Doubling {
     buffers: [Dense; 3],
 }
 
-impl Work {
+impl EnergyIntegral {
     /// For a mode whose table of steps ends at h/2^`bottom`. `None` where nothing takes or gives power.
     pub(crate) fn new(terms: Vec<Term>, fast: &[usize], h: f64, bottom: u32) -> Option<Self> {
         let terms: Vec<Term> = terms
@@ -201,7 +201,7 @@ impl Work {
     }
 }
 
-/// See [`Work::integrals`].
+/// See [`EnergyIntegral::integrals`].
 pub(crate) struct Integrals<'a> {
     forms: &'a mut Forms,
     fast: &'a [usize],
@@ -482,7 +482,7 @@ mod tests {
         let exact = |h: f64| -9.0 * tau / 2.0 * (-2.0 * h / tau).exp_m1();
         let h = 1.5e-3;
         let terms = vec![term(&[1.0], &[1.0], true), term(&[2.0], &[1.0], false)];
-        let mut work = Work::new(terms, &[], 32.0 * h, 5).unwrap();
+        let mut work = EnergyIntegral::new(terms, &[], 32.0 * h, 5).unwrap();
         for k in 0..6 {
             let [source, dissipated] = work.integrals(&a, sizes(&[3.0])).over(k, &[3.0]);
             let expected = exact(h * f64::from(1 << k));
@@ -512,7 +512,7 @@ mod tests {
         // x₁' = −slow x₁, v' = −fast v + …: in x₂ = v − gain x₁.
         let a = DMatrix::from_row_slice(2, 2, &[-slow, 0.0, gain * (slow - fast), -fast]);
         let terms = vec![term(&[gain, 1.0], &[gain, 1.0], false)];
-        let mut work = Work::new(terms, &[], 1e-3, 20).unwrap();
+        let mut work = EnergyIntegral::new(terms, &[], 1e-3, 20).unwrap();
         // v = x₂ + gain x₁ obeys v' = −fast v exactly: ∫ v² = v₀²/(2 fast).
         let w = [1.0, 1e-3 - gain];
         let v = w[1] + gain;

@@ -1,11 +1,11 @@
 //! Moving along a mode until a time or until a guard falls through zero.
 
+use super::energy_integral::{Sizes, Stretch};
 use super::exosystem::Exosystem;
 use super::flow::{Flow, LONG};
 use super::magnitudes::Magnitudes;
 use super::rounding::resolution;
 use super::slaved::Follower;
-use super::work::{Sizes, Stretch};
 use crate::linalg::polynomial;
 use crate::linalg::series::Series;
 use crate::settings::tolerances::events::CLEAR_OF_ZERO;
@@ -53,7 +53,7 @@ enum Verdict {
 
 /// The state of a run inside a mode: time, `[w | g | g']`, and work space that lives as long as the run.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Motion {
+pub(crate) struct Travel {
     /// Current time, s.
     pub(crate) t: f64,
     /// `[w | g | g']` at `t`.
@@ -62,7 +62,7 @@ pub(crate) struct Motion {
     pub(crate) age: f64,
     /// Steps taken.
     pub(crate) steps: u64,
-    /// [`Self::travel`] rests here.
+    /// [`Self::advance`] rests here.
     pub(crate) most: u64,
     /// Energy from sources and energy dissipated on Taylor's steps since last taken, J.
     energy: [f64; 2],
@@ -97,8 +97,8 @@ pub(crate) struct Motion {
     since_refresh: u32,
 }
 
-impl Motion {
-    /// A motion that stands at `t` in no mode yet.
+impl Travel {
+    /// One that stands at `t` in no mode yet.
     pub(crate) fn at(t: f64) -> Self {
         Self {
             t,
@@ -218,7 +218,7 @@ impl Motion {
 
     /// Moves to `stop` or to the first guard that falls through zero before it.
     #[inline]
-    pub(crate) fn travel(&mut self, flow: &mut Flow, exosystem: &Exosystem, stop: f64) -> Arrival {
+    pub(crate) fn advance(&mut self, flow: &mut Flow, exosystem: &Exosystem, stop: f64) -> Arrival {
         let off = stop - self.t - flow.step(LONG);
         if off.abs() <= SAME_TIME * stop.abs() && self.settles(flow) {
             if !flow.leap(LONG, &self.now, &mut self.next) {
