@@ -9,6 +9,7 @@ use crate::circuit::source::Wave;
 use crate::law::Law;
 use crate::lcs::{Input, LcsParts, Port, Role, State, Storage};
 
+mod hypotheses;
 mod report;
 mod rest;
 

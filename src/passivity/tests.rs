@@ -7,6 +7,7 @@ use fixtures::{C, L, R, Random, bridge, filter};
 
 #[path = "../../tests/systems/passive.rs"]
 mod fixtures;
+mod thresholds;
 
 /// A random passive system with its energy: losses of random rank, energies over six decades.
 fn passive(random: &mut Random, n: usize, m: usize) -> (System, DMatrix<f64>) {

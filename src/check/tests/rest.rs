@@ -185,3 +185,53 @@ fn comparators_are_read_with_the_sign_of_their_feedback() {
         Some(false)
     );
 }
+
+#[test]
+fn a_leak_that_nothing_carries_away_is_no_equilibrium() {
+    // A detector that a source of δ fills further: x' = λ + δ, λ ≥ 0, y = x − 5 + λ. Beside it a capacitor that δ fills and a
+    // loaded one that rests at 1 V. Nothing rests, however small δ is.
+    for delta in [1e-3, 1e-6, 1e-8, 1e-9, 1e-10] {
+        let mut detector = lcs(
+            "i",
+            dmatrix![0.0],
+            dmatrix![1.0],
+            dmatrix![1.0],
+            dmatrix![1.0],
+            dmatrix![1.0],
+        );
+        change(&mut detector, |s| (s.e0[0], s.f[0]) = (delta, -5.0));
+        assert_eq!(system(&detector).equilibria, None, "δ = {delta}");
+        let mut leaky = lcs(
+            "i",
+            dmatrix![0.0, 0.0; 0.0, -1.0],
+            dmatrix![0.0; 1.0],
+            dmatrix![0.0, 1.0],
+            dmatrix![1.0],
+            DMatrix::identity(2, 2),
+        );
+        change(&mut leaky, |s| s.e0.copy_from_slice(&[delta, 1.0]));
+        assert_eq!(system(&leaky).equilibria, None, "δ = {delta}");
+    }
+    // Where δ is carried away, by the other diode of a channel, the rest is found: λ₂ − λ₁ = δ, |x| ≤ 5.
+    for delta in [1.0, 1e-2, 1e-4] {
+        let mut channel = lcs(
+            "ii",
+            dmatrix![0.0],
+            dmatrix![1.0, -1.0],
+            dmatrix![1.0; -1.0],
+            DMatrix::zeros(2, 2),
+            dmatrix![1.0],
+        );
+        change(&mut channel, |s| {
+            s.e0[0] = delta;
+            s.f.fill(5.0);
+        });
+        let rest = system(&channel).equilibria.unwrap_or_default();
+        let rest = rest.first().unwrap_or_else(|| panic!("δ = {delta}"));
+        assert!((rest.x[0] - 5.0).abs() < 1e-9, "{rest:?}");
+        assert!(
+            rest.lambda[0].abs() < 1e-12 && (rest.lambda[1] - delta).abs() < 1e-12,
+            "{rest:?}"
+        );
+    }
+}

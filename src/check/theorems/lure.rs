@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Hypotheses, Theorem, everything, input_output, lossless, over_swaps, split};
+use super::semidefinite::assumption_4;
+use super::{Hypotheses, Theorem, everything, input_output, over_swaps, split};
 use crate::check::facts::{Facts, Swap};
 use crate::check::feedthrough::Feedthrough;
 use crate::check::program::Inequalities;
-use crate::settings::tolerances::ranks::RANK;
 
 fn undriven_output(facts: &Facts, h: &mut Hypotheses) {
     if facts.drives_y() {
@@ -59,114 +59,6 @@ fn assumption_1(swap: &Swap, h: &mut Hypotheses) {
             format!("Assumption 1 fails at {}", points.join(", ")),
         );
     }
-}
-
-/// Largest angle by which range(inner) leaves range(outer): ‖(I − QQᵀ)inner‖ relative to ‖inner‖, column-scaled.
-fn leaves(inner: &DMatrix<f64>, outer: &DMatrix<f64>) -> f64 {
-    let unit = |m: &DMatrix<f64>| {
-        let columns: Vec<DVector<f64>> = m
-            .column_iter()
-            .filter(|c| c.amax() > 0.0)
-            .map(|c| c.normalize())
-            .collect();
-        if columns.is_empty() {
-            DMatrix::zeros(m.nrows(), 0)
-        } else {
-            DMatrix::from_columns(&columns)
-        }
-    };
-    let (inner, outer) = (unit(inner), unit(outer));
-    if inner.ncols() == 0 {
-        return 0.0;
-    }
-    if outer.ncols() == 0 {
-        return 1.0;
-    }
-    let svd = outer.clone().svd(true, false);
-    let Some(u) = svd.u else { return 1.0 };
-    let top = svd.singular_values.max();
-    let basis: Vec<usize> = (0..svd.singular_values.len())
-        .filter(|&k| svd.singular_values[k] > RANK * top)
-        .collect();
-    let q = u.select_columns(&basis);
-    (&inner - &q * (q.transpose() * &inner))
-        .column_iter()
-        .map(|c| c.norm())
-        .fold(0.0, f64::max)
-}
-/// Assumption 4 through Propositions 1, 2 or 3.
-fn assumption_4(swap: &Swap, fed: &[usize], h: &mut Hypotheses) {
-    let d = swap.system.d.select_rows(fed).select_columns(fed);
-    let class = Feedthrough::of(&d);
-    let cones = fed.iter().all(|&j| swap.laws[j].half_line);
-    if class.pd {
-        h.need(true, format!("Proposition 1: D_II ≻ 0{}", swap.note()));
-        return;
-    }
-    if cones && class.p_matrix == Some(true) {
-        h.need(
-            true,
-            format!(
-                "Proposition 2: D_II is a P-matrix and λ, y are complementary{}",
-                swap.note()
-            ),
-        );
-        return;
-    }
-    if !class.psd {
-        h.need(
-            if cones && class.p_matrix.is_none() {
-                None
-            } else {
-                Some(false)
-            },
-            "Assumption 4: D_II is neither positive semidefinite nor known to be a P-matrix",
-        );
-        return;
-    }
-    // (20): no nonzero z in ker(D + Dᵀ) ∩ K∞ with Dz ∈ K∞*; for half lines z ≥ 0, Dz ≥ 0.
-    let n = lossless(&d);
-    let unbounded = cones && {
-        let rows = 2 * fed.len() + 1;
-        let mut g = DMatrix::zeros(rows, n.ncols());
-        g.view_mut((0, 0), n.shape()).copy_from(&n);
-        g.view_mut((fed.len(), 0), n.shape()).copy_from(&(&d * &n));
-        let sum = DMatrix::from_element(1, fed.len(), 1.0) * &n;
-        g.view_mut((2 * fed.len(), 0), sum.shape()).copy_from(&sum);
-        let mut strict = vec![false; rows];
-        strict[2 * fed.len()] = true;
-        Inequalities {
-            g,
-            h: DVector::zeros(rows),
-            strict,
-        }
-        .widest()
-        .is_some_and(|p| p.is_strict())
-    };
-    let c = swap.system.c.select_rows(fed);
-    let b = swap.system.b.select_columns(fed);
-    let sum = &d + d.transpose();
-    let range = leaves(&c, &sum);
-    let size = b.amax().max(f64::MIN_POSITIVE);
-    let kernel = (&b * &n).amax() / size;
-    if !cones {
-        h.need(
-            None,
-            "Proposition 3: (20) is checked for complementary pairs only",
-        );
-    }
-    h.need(
-        !unbounded,
-        if unbounded {
-            "Proposition 3: (20) fails"
-        } else {
-            "Proposition 3: D_II ⪰ 0 and (20)"
-        },
-    );
-    h.need(
-        range <= RANK.sqrt() && kernel <= RANK.sqrt(),
-        format!("(21) R(C_II) ⊂ R(D_II + D_IIᵀ) and ker(D_II + D_IIᵀ) ⊂ ker(B_II) up to {range:.1e} and {kernel:.1e}"),
-    );
 }
 
 /// RR-7158 Theorem 1.

@@ -2,6 +2,7 @@
 
 mod complementarity;
 mod lure;
+mod semidefinite;
 mod stability;
 mod sweeping;
 
