@@ -135,6 +135,57 @@ impl ProjectedSystem {
         )
     }
 
+    /// Assumption 4.1 at points: every h_i lies under its linearisations, h(y) ≤ h(x) + ∇h(x)(y − x).
+    ///
+    /// # Errors
+    /// [`FormError::Hypothesis`] with the largest excess over all pairs.
+    pub fn concave(&self, points: &[DVector<f64>]) -> Result<(), FormError> {
+        let mut excess = 0.0_f64;
+        let mut rounding = 0.0_f64;
+        for x in points {
+            let (h, gradients) = ((self.set.value)(x), (self.set.jacobian)(x));
+            for y in points {
+                let (there, slope) = ((self.set.value)(y), &gradients * (y - x));
+                let over = &there - &h - &slope;
+                excess = over.iter().copied().fold(excess, f64::max);
+                rounding = rounding.max(there.amax().max(h.amax()).max(slope.amax()));
+            }
+        }
+        require(
+            excess <= RANK * rounding,
+            "Heemels et al. Theorem 4.7",
+            "Assumption 4.1: h is not concave, K may not be convex",
+            excess,
+        )
+    }
+
+    /// The least B with which (11) ‖F(x)‖ ≤ B(1 + ‖x‖) holds at the points (Assumption 4.4).
+    #[must_use]
+    pub fn growth(&self, points: &[DVector<f64>]) -> f64 {
+        points
+            .iter()
+            .map(|x| (self.field.value)(x).norm() / (1.0 + x.norm()))
+            .fold(0.0, f64::max)
+    }
+
+    /// The least C with which (12) ⟨F(y) − F(x), x − y⟩ ≤ C‖x − y‖² holds between the points (Assumption 4.5); −∞ for fewer
+    /// than two.
+    #[must_use]
+    pub fn one_sided(&self, points: &[DVector<f64>]) -> f64 {
+        let mut least = f64::NEG_INFINITY;
+        for (k, x) in points.iter().enumerate() {
+            for y in &points[..k] {
+                let apart = x - y;
+                let size = apart.norm_squared();
+                if size > 0.0 {
+                    let change = (self.field.value)(y) - (self.field.value)(x);
+                    least = least.max(change.dot(&apart) / size);
+                }
+            }
+        }
+        least
+    }
+
     /// The cone of admissible velocities W(x) (16).
     #[must_use]
     pub fn admissible(&self, x: &DVector<f64>) -> Polyhedron {

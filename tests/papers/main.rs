@@ -4,6 +4,7 @@
 
 mod brogliato_thibault;
 mod heemels;
+mod reference;
 mod rr5107;
 mod rr7158;
 #[path = "../systems/passive.rs"]
