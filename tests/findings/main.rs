@@ -10,6 +10,7 @@ mod energy;
 mod entered;
 mod front;
 mod jumps;
+mod leaks;
 mod notes;
 mod numbers;
 mod output;

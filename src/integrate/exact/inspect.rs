@@ -68,14 +68,14 @@ impl Inspector {
         self.s.iter().all(|v| v.is_finite()).then(|| self.s.clone())
     }
 
-    /// Inspects `mode` at storage `s`, whose amplitudes so far are `scale`, at time t on the current source pieces, where the exosystem
+    /// Inspects `mode` at storage `s`, whose amplitudes so far are `scale` and those it was rounded from `known`, at time t on the current source pieces, where the exosystem
     /// is at z.
     pub(crate) fn inspect(
         &mut self,
         mode: &mut Mode,
         (exosystem, t, z): (&Exosystem, f64, &[f64]),
         s: &[f64],
-        scale: &[f64],
+        (scale, known): (&[f64], &[f64]),
     ) -> Finding {
         self.stand(mode, z, s);
         // What the sources move within the resolution of t: at 1 V/ps that is a millivolt where t is a second.
@@ -101,7 +101,7 @@ impl Inspector {
             }
         }
         mode.flow.read_guards(&mut self.w);
-        mode.inject.largest(scale, &mut self.sizes);
+        mode.inject.largest(known, &mut self.sizes);
         self.sizes.resize(mode.flow.dim(), 0.0);
         for (size, w) in self.sizes.iter_mut().zip(&self.w) {
             *size = size.max(w.abs());

@@ -278,7 +278,7 @@ impl Transition<'_> {
                 mode,
                 (&self.sources.exosystem, t, &self.sources.z),
                 &s,
-                &self.storage.scale,
+                (&self.storage.scale, &self.storage.scale),
             ) {
                 self.leap(key, &x, &after, &p, log)?;
                 return Ok(Some((at, leaving)));

@@ -6,7 +6,14 @@
 //! |w_j(t)| ≤ e^{−dt} |w_j(0)| + Σ_{k ≠ j} |𝒜_jk| |w_k| / d,
 //! ```
 //!
-//! and an error of w obeys the same. Once the remainder has decayed, the rounding of a guard with Roff·i in it is that of the
+//! and an error of w obeys the same. Several of them, F, that push each other decay together: with D = diag(d) and u, v from
+//!
+//! ```text
+//! (D − |𝒜_FF + D|) [u, v] = [|𝒜_FS| |w_S|, D |w_F(0)|]:   |w_F(t)| ≤ v e^{−μt} + u,   μ = min_j d_j |w_j(0)| / v_j,
+//! ```
+//!
+//! wherever v > 0 exists (M-matrices; A. Berman, R. J. Plemmons, "Nonnegative Matrices in the Mathematical Sciences", ch. 6): windings
+//! with little leakage behind a Roff each. Once the remainder has decayed, the rounding of a guard with Roff·i in it is that of the
 //! voltages which i follows, and not Roff times that of the largest current of the run. With F the components that follow and S the
 //! others, w_F = K w_S with K = −𝒜_FF⁻¹ 𝒜_FS, and on that manifold w_S' = (𝒜_SS + 𝒜_SF K) w_S: where the difference from it is
 //! rounding, the sign of a guard is that of its value there, of its derivative there, and so on.
@@ -14,7 +21,9 @@
 use nalgebra::DMatrix;
 
 use super::map::{Map, Sizes};
-use crate::settings::tolerances::exponentials::{FORGOTTEN, MOST_COUPLED, SHRINKS, SLAVED};
+use crate::settings::tolerances::exponentials::{
+    FORGOTTEN, LEAST_PART, LEVEL, MOST_COUPLED, SHRINKS, SLAVED,
+};
 
 /// Sweeps over the components that follow each other.
 const SWEEPS: usize = 64;
@@ -57,20 +66,97 @@ pub(crate) fn followers(
             break;
         }
     }
-    let Some(settled) = settled else { return };
-    let slaved = |j: usize| j < n && settled[j] <= SLAVED * sizes[j];
-    for j in (0..n).filter(|&j| slaved(j)) {
-        let decay = -generator[(j, j)];
-        let part = coupled(generator, j, sizes, slaved) / (decay * sizes[j]);
-        if part <= MOST_COUPLED {
-            found.push(Follower {
-                component: j,
-                size: settled[j],
-                age: FORGOTTEN / (decay * (1.0 - part)),
-            });
+    if let Some(settled) = settled {
+        let slaved = |j: usize| j < n && settled[j] <= SLAVED * sizes[j];
+        for j in (0..n).filter(|&j| slaved(j)) {
+            let decay = -generator[(j, j)];
+            let part = coupled(generator, j, sizes, slaved) / (decay * sizes[j]);
+            if part <= MOST_COUPLED {
+                found.push(Follower {
+                    component: j,
+                    size: settled[j],
+                    age: FORGOTTEN / (decay * (1.0 - part)),
+                });
+            }
         }
     }
+    find_joint(generator, n, sizes, found);
     found.sort_by(|a, b| a.age.total_cmp(&b.age));
+}
+
+/// Adds what follows the others together with what decays as fast or faster, where one by one it does not.
+fn find_joint(generator: &DMatrix<f64>, n: usize, sizes: &[f64], found: &mut Vec<Follower>) {
+    let decay = |j: usize| -generator[(j, j)];
+    let decays = |&j: &usize| decay(j) > 0.0 && sizes[j] > 0.0;
+    let mut order: Vec<usize> = (0..n).filter(decays).collect();
+    order.sort_by(|&a, &b| decay(b).total_cmp(&decay(a)));
+    for end in 1..=order.len() {
+        let next = order.get(end).map_or(0.0, |&j| decay(j));
+        if decay(order[end - 1]) <= LEVEL * next {
+            continue;
+        }
+        let joint = &order[..end];
+        let is_known = |j: &usize| found.iter().any(|f| f.component == *j);
+        if joint.iter().all(is_known) {
+            continue;
+        }
+        let outside = |k: usize| !joint.contains(&k);
+        let pushed = |&j: &usize| coupled(generator, j, sizes, outside);
+        if joint
+            .iter()
+            .any(|j| pushed(j) > SLAVED * decay(*j) * sizes[*j])
+        {
+            return;
+        }
+        let Some((settled, slowest)) = settle_jointly(generator, joint, sizes, pushed) else {
+            return;
+        };
+        let ages = joint.iter().zip(&settled);
+        let new = ages.filter(|(j, size)| !is_known(j) && **size <= SLAVED * sizes[**j]);
+        let new: Vec<Follower> = new
+            .map(|(&component, &size)| Follower {
+                component,
+                size,
+                age: FORGOTTEN / slowest,
+            })
+            .collect();
+        found.extend(new);
+    }
+}
+
+/// How large components F are once they follow the others, and the rate μ, 1/s, at which they come to do so.
+fn settle_jointly(
+    generator: &DMatrix<f64>,
+    joint: &[usize],
+    sizes: &[f64],
+    pushed: impl Fn(&usize) -> f64,
+) -> Option<(Vec<f64>, f64)> {
+    let count = joint.len();
+    let decay = |row: usize| -generator[(joint[row], joint[row])];
+    // Rows by their diagonals: those of different Roff are decades apart.
+    let levelled = DMatrix::from_fn(count, count, |i, j| {
+        if i == j {
+            1.0
+        } else {
+            -generator[(joint[i], joint[j])].abs() / decay(i)
+        }
+    });
+    let known = DMatrix::from_fn(count, 2, |i, column| {
+        if column == 0 {
+            pushed(&joint[i]) / decay(i)
+        } else {
+            sizes[joint[i]]
+        }
+    });
+    let solved = levelled.lu().solve(&known)?;
+    let size = |row: usize| sizes[joint[row]];
+    let weight = |row: usize| solved[(row, 1)];
+    let bounds = |row: usize| weight(row) >= size(row) && size(row) >= LEAST_PART * weight(row);
+    (0..count).all(bounds).then(|| {
+        let rates = (0..count).map(|row| decay(row) * size(row) / weight(row));
+        let settled = solved.column(0).iter().copied().collect();
+        (settled, rates.fold(f64::INFINITY, f64::min))
+    })
 }
 
 /// Σ_{k ≠ j} |𝒜_jk| sizes_k over these k.
@@ -304,5 +390,25 @@ mod tests {
         // Their difference lives on: neither follows.
         let a = DMatrix::from_row_slice(2, 2, &[-rate, rate, rate, -rate]);
         assert!(of(&a, 2, &[1.0, 1.0]).is_empty());
+    }
+
+    /// Row sums are no bound where 1 % of leakage or unlike sizes are all that tells two rates from each other.
+    #[test]
+    fn windings_with_little_leakage_follow_together() {
+        let (rate, k) = (1e18, 0.99);
+        let a = DMatrix::from_row_slice(2, 3, &[-rate, k * rate, 1e3, k * rate, -rate, 1e3]);
+        for sizes in [[1.0, 1.0, 5.0], [1.0, 0.1, 5.0]] {
+            let found = of(&a, 2, &sizes);
+            assert_eq!(found.len(), 2, "{sizes:?}");
+            for follower in found {
+                assert!((1e-13..1e-12).contains(&follower.size), "{follower:?}");
+                // The slower rate is (1 − k) · rate.
+                let constants = follower.age * (1.0 - k) * rate;
+                assert!((99.0..2000.0).contains(&constants), "{follower:?}");
+            }
+        }
+        // With no leakage at all there is nothing that tells them.
+        let lives_on = DMatrix::from_row_slice(2, 2, &[-rate, rate, rate, -rate]);
+        assert!(of(&lives_on, 2, &[1.0, 0.95]).is_empty());
     }
 }

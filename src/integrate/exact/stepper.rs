@@ -349,6 +349,7 @@ impl Exact {
         let left = self.mode.map(|at| self.table.modes[at].key.clone());
         self.key = left.unwrap_or_else(|| key.clone());
         let (values, scale) = (self.storage.values.clone(), self.storage.scale.clone());
+        let known = self.storage.known.clone();
         let (balance, switches) = (self.storage.balance, key.switches.clone());
         let (events, impulses) = (log.events.len(), log.impulses.len());
         if let Some(at) = self.mode {
@@ -370,6 +371,7 @@ impl Exact {
             }
             Err(error) => {
                 (self.storage.values, self.storage.scale) = (values, scale);
+                self.storage.known = known;
                 (self.storage.balance, self.wanted) = (balance, Some(switches));
                 log.back_to(events, impulses);
                 Err(error)

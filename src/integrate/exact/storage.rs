@@ -8,6 +8,7 @@ use crate::integrate::energy::Balance;
 use crate::integrate::log::Log;
 use crate::integrate::stats::{JumpReason, StateJump};
 use crate::lcs::Lcs;
+use crate::settings::tolerances::exponentials::SLAVED;
 use crate::settings::tolerances::jumps::NO_JUMP;
 
 /// The storage vector s of a run.
@@ -16,7 +17,9 @@ pub(super) struct Storage {
     pub(super) values: Vec<f64>,
     /// Largest values so far, those of one kind levelled.
     pub(super) scale: Vec<f64>,
-    /// ½ sᵀ M s of these, J.
+    /// The same of what the present values were rounded from: a current that leaks through an enormous resistance has forgotten what it was.
+    pub(super) known: Vec<f64>,
+    /// ½ sᵀ M s of the largest values, J.
     pub(super) capacity: f64,
     /// M by what is not zero in it.
     metric: Vec<(usize, usize, f64)>,
@@ -62,6 +65,7 @@ impl Storage {
         let mut storage = Self {
             values: s.to_vec(),
             scale: vec![0.0; s.len()],
+            known: Vec::new(),
             capacity: 0.0,
             volts: lcs.storage.units.iter().map(|unit| *unit == "V").collect(),
             elements: lcs.storage.elements.clone(),
@@ -92,6 +96,7 @@ impl Storage {
             *scale = largest[usize::from(volts)];
         }
         self.capacity = stored(&self.metric, &self.scale);
+        self.known.clone_from(&self.scale);
     }
 
     /// Reads s and the energy spent where the run stands in this mode.
@@ -106,6 +111,14 @@ impl Storage {
             *scale = scale.max(*largest);
         }
         self.rescale();
+        if travel.known(&mut self.reach) {
+            mode.storage.largest(&self.reach, &mut self.largest);
+            for (known, largest) in self.known.iter_mut().zip(&self.largest) {
+                if *largest <= SLAVED * *known {
+                    *known = *largest;
+                }
+            }
+        }
         self.note_stored();
     }
 

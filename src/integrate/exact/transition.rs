@@ -441,7 +441,7 @@ impl Transition<'_> {
             &mut self.table.modes[at],
             (&self.sources.exosystem, self.t, &self.sources.z),
             &self.storage.values,
-            &self.storage.scale,
+            (&self.storage.scale, &self.storage.known),
         )
     }
 

@@ -168,12 +168,11 @@ impl Travel {
         if self.following == 0 {
             flow.noise(&self.amplitude, &mut self.floors);
         } else {
-            self.sizes.clone_from(&self.amplitude);
-            for follower in &self.followers[..self.following] {
-                let j = follower.component;
-                self.sizes[j] = larger(follower.size, self.now[j].abs());
-            }
-            flow.noise(&self.sizes, &mut self.floors);
+            let mut sizes = std::mem::take(&mut self.sizes);
+            sizes.clone_from(&self.amplitude);
+            self.take_followers(&mut sizes);
+            flow.noise(&sizes, &mut self.floors);
+            self.sizes = sizes;
         }
         self.add_slack();
     }
@@ -214,6 +213,22 @@ impl Travel {
     pub(crate) fn reach(&self, reach: &mut Vec<f64>) {
         reach.clone_from(&self.amplitude);
         reach[..self.peak.len()].copy_from_slice(&self.peak);
+    }
+
+    /// How large what w was rounded from is by now, where some states follow others: what they were before has decayed, and its rounding
+    /// with it.
+    pub(crate) fn known(&self, known: &mut Vec<f64>) -> bool {
+        known.clone_from(&self.amplitude);
+        self.take_followers(known);
+        self.following > 0
+    }
+
+    /// Takes the states that follow others by now as large as they are.
+    fn take_followers(&self, sizes: &mut [f64]) {
+        for follower in &self.followers[..self.following] {
+            let j = follower.component;
+            sizes[j] = larger(follower.size, self.now[j].abs());
+        }
     }
 
     /// Moves to `stop` or to the first guard that falls through zero before it.

@@ -93,6 +93,10 @@ pub(crate) const SLAVED: f64 = 1.0 / 64.0;
 /// The largest part of its decay that a component may owe to others that decay as well.
 pub(crate) const MOST_COUPLED: f64 = 0.9;
 
+/// Components that decay together keep at least this part of what they decay by alone. Larger: the currents of windings with little leakage
+/// count as large as they ever were; smaller: the matrix that tells has no digit left.
+pub(crate) const LEAST_PART: f64 = 1e-6;
+
 /// Lengths of the implicit step that proposes the next mode, in units of the fastest time constant seen, in the order in which they are tried.
 /// The long ones are for stiff circuits: a current that starts without a slope is no more than rounding on the others.
 pub(crate) const PROPOSALS: [f64; 9] = [1e-6, 1e-4, 1e-8, 1e-2, 1e-10, 1.0, 1e2, 1e4, 1e6];
