@@ -126,3 +126,18 @@ fn a_current_that_stops_before_a_stage_brings_its_charge() {
         assert!(off < 1e-6, "{name}: {v} V, {off:e} off");
     }
 }
+
+/// At 25 µs a sine, its negative and a triangle pass zero together: the comparator's switches move, and those that the sources alone drive
+/// move with them, once. The values are those of the converters' oracle, to 2e-9.
+#[test]
+fn switches_that_pass_their_thresholds_with_others_move_once() {
+    let found = run("crossings_together", Method::Auto);
+    let volts = super::runs::column(&found, "v(8,7)");
+    let near = |t: &f64| (t - 19.0 * 1.379_310_344_827_586_2e-6).abs() < 1e-12;
+    let row = found.waveforms.time.iter().rposition(near).expect("a row");
+    assert!(
+        (volts[row] - 324.987_617_766_116_3).abs() < 1e-2,
+        "{}",
+        volts[row]
+    );
+}

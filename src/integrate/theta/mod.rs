@@ -496,7 +496,7 @@ impl Stepper for Theta {
             } else {
                 breakpoint.min(t)
             };
-            let (known, moving) = self.switches.next_known(
+            let (known, mut moving) = self.switches.next_known(
                 &self.system().lcs,
                 &self.inputs,
                 now,
@@ -508,7 +508,11 @@ impl Stepper for Theta {
             if early {
                 stop = known;
             }
+            let before = self.switches.position().to_vec();
             self.interval(stop, log)?;
+            // What moved with another switch that passed its threshold there has moved.
+            let position = self.switches.position();
+            moving.retain(|&i| position[i] == before[i]);
             if log.pauses() && self.now.t < stop {
                 break;
             }
