@@ -61,7 +61,16 @@ const ROOMS: [(&str, &[&str]); 21] = [
     ),
     (
         "analysis",
-        &["circuit", "integrate", "model", "settings", "waveform"],
+        &[
+            "algebra",
+            "circuit",
+            "integrate",
+            "linalg",
+            "mna",
+            "model",
+            "settings",
+            "waveform",
+        ],
     ),
     ("passivity", &["lcs", "settings"]),
     (

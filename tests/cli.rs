@@ -124,7 +124,9 @@ fn waves(text: &str) -> Waveforms {
 #[test]
 fn help_names_every_command_and_flag() {
     assert_snapshot!(run("--help"));
-    for command in ["sim", "lcs", "check", "op", "bench", "compare", "graph"] {
+    for command in [
+        "sim", "pss", "lcs", "check", "op", "bench", "compare", "graph",
+    ] {
         let ran = run(&format!("{command} --help"));
         assert_eq!((ran.status, ran.err.as_str()), (0, ""));
         assert_snapshot!(format!("help_{command}"), ran.out);
@@ -734,4 +736,45 @@ fn a_reader_that_goes_away_is_no_failure() {
         .read_to_string(&mut said)
         .unwrap();
     assert_eq!((child.wait().unwrap().code(), said.as_str()), (Some(0), ""));
+}
+
+/// One period from 0 to T exactly, and the summary of INTERFACE's keys.
+#[test]
+fn pss_writes_one_period_and_its_summary() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("a.csv");
+    let netlists = concat!(env!("CARGO_MANIFEST_DIR"), "/netlists");
+    let ran = run(&format!(
+        "pss {netlists}/buck-open-loop.cir -o {} --summary json",
+        out.display()
+    ));
+    assert_eq!(ran.status, 0, "{}", ran.err);
+    let summary: serde_json::Value = serde_json::from_str(ran.err.trim()).expect("one object");
+    let pss = &summary["pss"];
+    assert_eq!(pss["period"], 1e-5);
+    assert_eq!(
+        (pss["kind"].as_str(), pss["order"].as_u64()),
+        (Some("driven"), Some(1))
+    );
+    assert_eq!(pss["stable"], true);
+    assert!(pss["residual"].as_f64().is_some_and(|r| r <= 1e-12));
+    assert!(pss["iterations"].is_u64() && pss["multipliers"][0][1].is_f64());
+    let rows = std::fs::read_to_string(&out).expect("rows");
+    let times: Vec<f64> = (rows.lines().skip(1))
+        .map(|row| {
+            row.split(',')
+                .next()
+                .and_then(|t| t.parse().ok())
+                .expect("a time")
+        })
+        .collect();
+    assert_eq!((times[0], times[times.len() - 1]), (0.0, 1e-5));
+    assert_eq!(times.len(), 11);
+    let none = run(&format!("pss {netlists}/line-mismatch.cir"));
+    assert_eq!(none.status, 2);
+    assert!(
+        none.err.contains("no periodic steady state"),
+        "{}",
+        none.err
+    );
 }

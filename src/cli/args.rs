@@ -37,6 +37,8 @@ pub struct Cli {
 pub enum Command {
     /// Simulate the transient that `.tran` asks for
     Sim(SimArgs),
+    /// Find the periodic steady state, and write one period of it
+    Pss(PssArgs),
     /// Print the complementarity system (A, B, C, D, E, F, G) with names and units
     Lcs(LcsArgs),
     /// Check topology, passivity and which theorems hold
@@ -146,6 +148,39 @@ pub struct SimArgs {
     #[arg(long)]
     pub verify: bool,
     /// Print a summary of the run on standard error
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    pub summary: Option<Summary>,
+}
+
+/// `circ pss`.
+#[derive(Debug, Args)]
+pub struct PssArgs {
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub input: Input,
+    /// Write one period to this file (repeatable); the ending chooses csv, raw, npz, json, svg, png or html
+    #[arg(short, long = "output", value_name = "OUT")]
+    pub outputs: Vec<PathBuf>,
+    /// The period, s, in place of the common one of the sources; suffixes as in netlists (`10u`)
+    #[arg(long, value_name = "T", value_parser = positive)]
+    pub period: Option<f64>,
+    /// The orbit that closes after N periods of the sources [default: 1, or that of the stable one]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub order: Option<u16>,
+    /// How well the orbit must close, relative to the amplitudes [default: 1e-9; 1e-6 where laws are curved]
+    #[arg(long, value_name = "R", value_parser = positive)]
+    pub tol: Option<f64>,
+    /// Signals to show.
+    #[arg(
+        long = "probe",
+        value_name = "NAME",
+        help = "Show exactly these signals: v(a), v(a,b), i(d1), @d1[i], v1#branch (repeatable)"
+    )]
+    pub probes: Vec<String>,
+    /// Add rows at event times: two with equal time at a jump, before and after
+    #[arg(long)]
+    pub events: bool,
+    /// Print a summary on standard error
     #[arg(long, value_enum, value_name = "FORMAT")]
     pub summary: Option<Summary>,
 }

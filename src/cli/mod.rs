@@ -6,6 +6,7 @@ mod check;
 mod compare;
 mod cpu;
 mod dc;
+mod destination;
 pub mod exit;
 mod files;
 mod forms;
@@ -15,6 +16,7 @@ mod lcs;
 pub mod ngspice;
 mod op;
 pub mod output;
+mod pss;
 mod render;
 mod rows;
 mod signals;
@@ -76,6 +78,7 @@ pub fn main() -> Exit {
 fn run(command: &Command, streams: &Streams) -> Result<Exit, Failure> {
     match command {
         Command::Sim(args) => sim::sim(args, streams),
+        Command::Pss(args) => pss::pss(args, streams),
         Command::Lcs(args) => lcs::lcs(args, streams),
         Command::Check(args) => check::check(args, streams),
         Command::Op(args) => op::op(args, streams),

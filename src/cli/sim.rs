@@ -3,18 +3,19 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use super::args::{self, MethodArgs, SimArgs, Summary};
+use super::args::{self, MethodArgs, SimArgs};
 use super::dc;
+use super::destination::{Destination, Wanted};
 use super::exit::{Exit, Failure};
 use super::files;
 use super::forms;
 use super::input::{self, Subject};
-use super::output::{Format, Outputs};
-use super::rows::{Columns, Shown};
+use super::output::Format;
+use super::rows::Columns;
 use super::signals::Signals;
 use super::steps::Stepping;
 use super::streams::Streams;
-use crate::analysis::{self, Finished, Measurements, is_measured};
+use crate::analysis::{self, Finished, is_measured};
 use crate::circuit::source::Wave;
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{
@@ -23,8 +24,6 @@ use crate::integrate::{
 };
 use crate::lcs::Input;
 use crate::model::Model;
-use crate::report::figure::Figure;
-use crate::report::{json, terminal, text};
 use crate::settings::Settings;
 
 /// Divisions of the progress bar.
@@ -46,7 +45,8 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         only_one_way(args)?;
         files::spare(&paths, [args.input.file.as_path()])?;
         let run = forms::run(&form, args)?;
-        let destination = Destination::of(args, &formats, None, Places::default(), streams);
+        let destination =
+            Destination::of(args.wanted(), &formats, None, Places::default(), streams);
         let outputs = destination.open(&Columns::of(&run.waveforms))?;
         let finished = Finished::of(Ok(run));
         return destination.finish(outputs, finished, true, None);
@@ -70,7 +70,13 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
             return stepping.sim(&formats, streams);
         }
     }
-    let destination = Destination::of(args, &formats, subject.tran(), subject.places(), streams);
+    let destination = Destination::of(
+        args.wanted(),
+        &formats,
+        subject.tran(),
+        subject.places(),
+        streams,
+    );
     let mut outputs = destination.open(&Columns::of_subject(&subject))?;
     let measures = matches!(&subject, Subject::Circuit(model) if is_measured(model.circuit()));
     let collects = outputs.hold() || destination.plots || measures || args.verify;
@@ -100,6 +106,19 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
     destination.finish(outputs, finished, measures, signals.received())
 }
 
+impl SimArgs {
+    pub(super) fn wanted(&self) -> Wanted<'_> {
+        Wanted {
+            input: &self.input,
+            outputs: &self.outputs,
+            summary: self.summary,
+            events: self.events,
+            fixed_step: self.method.step.is_some(),
+            verify: self.verify,
+        }
+    }
+}
+
 /// # Errors
 /// [`Failure::Message`] where a second run is asked for of what is no single transient run.
 fn only_one_way(args: &SimArgs) -> Result<(), Failure> {
@@ -109,156 +128,6 @@ fn only_one_way(args: &SimArgs) -> Result<(), Failure> {
         return Err(Failure::Message(format!("{file}: {message}")));
     }
     Ok(())
-}
-
-/// Where the results of a command go, and what it says.
-pub(super) struct Destination<'a> {
-    args: &'a SimArgs,
-    formats: &'a [Format],
-    tran: Option<Tran>,
-    /// Where elements stand.
-    pub(super) places: Places<'a>,
-    /// A plot on a terminal.
-    pub(super) plots: bool,
-    pub(super) streams: &'a Streams,
-}
-
-impl<'a> Destination<'a> {
-    /// As the command line asks for it.
-    pub(super) fn of(
-        args: &'a SimArgs,
-        formats: &'a [Format],
-        tran: Option<Tran>,
-        places: Places<'a>,
-        streams: &'a Streams,
-    ) -> Self {
-        Self {
-            args,
-            formats,
-            tran,
-            places,
-            plots: args.outputs.is_empty() && streams.out_is_terminal(),
-            streams,
-        }
-    }
-
-    /// Whether anything is looked at.
-    pub(super) fn has_pictures(&self) -> bool {
-        self.plots || self.formats.iter().any(|format| format.is_picture())
-    }
-
-    /// Opens files.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
-    pub(super) fn open(&self, columns: &Columns) -> Result<Outputs, Failure> {
-        let between = self.tran.is_some_and(|tran| !tran.prints);
-        let shown = Shown {
-            events: self.args.events || between,
-            corners: between,
-        };
-        let to_pipe = !self.plots;
-        Outputs::open(&self.args.outputs, self.formats, to_pipe, shown, columns)
-    }
-
-    /// Writes what a run gave, or as much of it as there is, and says why it ended early. `feeds`: the rows have not been written yet.
-    ///
-    /// # Errors
-    /// See [`Failure`].
-    pub(super) fn finish(
-        &self,
-        mut outputs: Outputs,
-        Finished { run, error }: Finished,
-        feeds: bool,
-        signal: Option<(i32, &str)>,
-    ) -> Result<Exit, Failure> {
-        let Some((run, found)) = run else {
-            return error.map_or(Ok(Exit::Done), |error| Err(self.failure(&error)));
-        };
-        if self.args.method.step.is_some() && run.method == Method::Exact.name() {
-            self.streams
-                .say("note: --step is of no use to exact integration, which has no steps");
-        }
-        if feeds {
-            // A failure is told by `finish`.
-            let _ = outputs.take(Block::of(&run.waveforms, &run.kinds));
-        }
-        let last = outputs.last().or(run.waveforms.time.last().copied());
-        let until = last.map_or("before its first row".into(), |t| format!("at {t:e} s"));
-        let incomplete = error.as_ref().map(|_| format!("incomplete: ends {until}"));
-        let files = outputs.words();
-        let figure = || Figure::of_waveforms(&run.waveforms);
-        let written = outputs.finish((&run, self.places), &figure, incomplete.as_deref());
-        summarise((&run, self.places), &found, self.args, self.streams);
-        if self.plots {
-            let (lines, columns) = self.streams.size();
-            let plot = terminal::plot(&run.waveforms, columns, lines);
-            self.streams.data(plot)?;
-        }
-        if let Err(failure) = written {
-            if let (false, Some(t)) = (failure.is_closed_pipe() || files.is_empty(), last) {
-                self.streams
-                    .say(format!("note: rows were written until {t:e} s"));
-            }
-            return Err(failure);
-        }
-        let Some(error) = error else {
-            return self.verdict(&run, signal);
-        };
-        let kept = match (files.is_empty(), last) {
-            (false, Some(t)) => format!("; the rows until {t:e} s are in {files}"),
-            _ => String::new(),
-        };
-        match signal {
-            Some((signal, name)) if error.reason == Reason::Interrupted => {
-                let file = self.args.input.file.display();
-                self.streams
-                    .error(format!("{file}: {error} by {name}{kept}"));
-                Ok(Exit::Signal(signal))
-            }
-            _ => match self.failure(&error) {
-                Failure::Faults(message) => Err(Failure::Faults(message + &kept)),
-                Failure::Message(message) => Err(Failure::Message(message + &kept)),
-                other => Err(other),
-            },
-        }
-    }
-
-    /// What the second run, if one was asked for, says of the first.
-    fn verdict(&self, run: &Run, signal: Option<(i32, &str)>) -> Result<Exit, Failure> {
-        let file = self.args.input.file.display();
-        match &run.verified {
-            Some(verified) if !verified.holds() => {
-                let Verified {
-                    method,
-                    max_difference,
-                    tolerance,
-                    signal,
-                    time,
-                } = verified;
-                self.streams.error(format!(
-                    "{file}: not verified: {signal} differs by {max_difference:.1e} of its amplitude from a second run ({method}) at \
-                     t = {time:e} s, where {tolerance:.1e} is tolerated"
-                ));
-                Ok(Exit::No)
-            }
-            None if self.args.verify => match signal {
-                Some((signal, name)) => {
-                    self.streams
-                        .error(format!("{file}: the second run was interrupted by {name}"));
-                    Ok(Exit::Signal(signal))
-                }
-                None => Err(Failure::Message(format!(
-                    "{file}: the second run failed; the rows are those of the first"
-                ))),
-            },
-            _ => Ok(Exit::Done),
-        }
-    }
-
-    fn failure(&self, error: &Error) -> Failure {
-        input::broke_off(&self.args.input, error, self.places, self.streams)
-    }
 }
 
 /// Makes a run a second time.
@@ -483,36 +352,4 @@ fn with_options<R>(
     });
     bar.finish_and_clear();
     result
-}
-
-/// On standard error: JSON where asked for; words where asked for, for a person, and with `-v`; else the notes alone.
-/// What was measured is in all of them.
-fn summarise(
-    (run, places): (&Run, Places<'_>),
-    found: &Measurements,
-    args: &SimArgs,
-    streams: &Streams,
-) {
-    let in_words = args.summary == Some(Summary::Text)
-        || args.summary.is_none() && (streams.verbose || streams.err_is_terminal());
-    if !in_words {
-        for warning in text::warnings(run, places) {
-            streams.say(format!("warning: {warning}"));
-        }
-    }
-    match args.summary {
-        Some(Summary::Json) => return streams.error(json::summary(run, found, places)),
-        Some(Summary::Text) => streams.error(text::summary(run, places, streams.verbose)),
-        None if streams.verbose || streams.err_is_terminal() => {
-            streams.say(text::summary(run, places, streams.verbose));
-        }
-        None => {
-            for note in places.all(&run.notes) {
-                streams.say(format!("note: {note}"));
-            }
-        }
-    }
-    if !found.is_empty() {
-        streams.say(found.words());
-    }
 }

@@ -1,12 +1,13 @@
 //! `.step`: a run for every combination of values, in parallel, with results in the order of the values.
 
 use super::args::{SimArgs, Summary};
+use super::destination::Destination;
 use super::exit::{Exit, Failure};
 use super::input;
 use super::output::{Format, Outputs};
 use super::rows::Columns;
 use super::signals::Signals;
-use super::sim::{self, Destination, Request, Route};
+use super::sim::{self, Request, Route};
 use super::streams::Streams;
 use crate::analysis::{Finished, Variant, each, variants};
 use crate::integrate::{Block, Error, Grid, Reason};
@@ -49,7 +50,8 @@ impl Stepping<'_> {
                 .map_err(refused)?;
         }
         let places = self.model.places();
-        let destination = Destination::of(self.args, formats, circuit.tran, places, streams);
+        let destination =
+            Destination::of(self.args.wanted(), formats, circuit.tran, places, streams);
         let outputs = destination.open(&columns)?;
         let bar = streams.progress(variants.len() as u64, "stepping");
         let outcomes: Vec<Result<Outcome, Failure>> = each(&variants, |variant| {

@@ -99,6 +99,9 @@ pub enum Reason {
     /// The circuit has no operating point.
     #[error("no operating point: {0}; `uic` starts from initial conditions instead")]
     NoOperatingPoint(NoRest),
+    /// The circuit has no periodic steady state, or none was found.
+    #[error("no periodic steady state: {0}")]
+    NoOrbit(String),
     /// What was read is no circuit.
     #[error("{0}")]
     Netlist(Faults),

@@ -142,6 +142,10 @@ fn told(error: &Error, elements: &[&Element]) -> Told {
         ),
         Reason::RowsTooDense { .. } => plain("rows-too-dense", Some("`.tran tstep tstop`: a longer tstep".into())),
         Reason::Interrupted => plain("interrupted", None),
+        Reason::NoOrbit(_) => plain(
+            "no-orbit",
+            Some("`circ sim` shows where the transient goes; `--period` names the period".into()),
+        ),
         Reason::Netlist(_) => plain("netlist", None),
         Reason::Unsupported(_) => plain("unsupported", None),
         Reason::Internal(_) => plain("internal", None),

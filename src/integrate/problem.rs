@@ -119,6 +119,8 @@ pub(super) struct Problem {
     pub(super) notes: Vec<Note>,
     /// Whether sources may be given other values on the way.
     free_sources: bool,
+    /// The start is a right limit: edges of sources there have acted.
+    after_edges: bool,
 }
 
 /// The scout gives up after this many steps (trains of many pulses); what it has seen by then is used.
@@ -151,6 +153,7 @@ impl Problem {
             steps: exact::steps_of(behaviour),
             systems: Systems::of(standard),
             free_sources: false,
+            after_edges: false,
         })
     }
 
@@ -177,6 +180,7 @@ impl Problem {
             steps: exact::steps_of(&original),
             systems: Systems::of(behaviour),
             free_sources: false,
+            after_edges: false,
         }
     }
 
@@ -194,6 +198,7 @@ impl Problem {
             settle: vec![false; start.switches.len()],
             start,
             conducting,
+            after_edges: true,
             ..self
         }
     }
@@ -236,6 +241,9 @@ impl Problem {
             settings: settings.clone(),
         })?;
         exact.expect(&self.conducting);
+        if self.after_edges {
+            exact.start_after_edges();
+        }
         Ok(exact)
     }
 

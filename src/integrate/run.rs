@@ -154,6 +154,7 @@ pub(crate) fn attempt(
         notes: all_notes,
         aliased: None,
         verified: None,
+        orbit: None,
     };
     match failure {
         None => Ok(run),

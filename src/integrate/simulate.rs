@@ -11,6 +11,7 @@ use nalgebra::DVector;
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::companion::Accompanied;
 use crate::integrate::error::{Error, Reason, is_final};
+use crate::integrate::exact::Place;
 use crate::integrate::grid::Grid;
 use crate::integrate::log::Log;
 use crate::integrate::problem::Problem;
@@ -90,13 +91,52 @@ pub fn simulate(
     behaviour: &StaticMultiport,
     options: SimOptions<'_>,
 ) -> Result<Run, Error> {
-    let tran = circuit.tran.ok_or_else(|| {
-        Error::before(Reason::Unsupported(
-            "the netlist asks for no .tran analysis".into(),
-        ))
-    })?;
+    let tran = circuit.tran.ok_or_else(no_transient)?;
     let problem = Problem::of_circuit(circuit, behaviour, tran.uic, &options.settings)?;
     drive(problem, tran, options)
+}
+
+/// Where a run begins in the course of a transient: after the edges of its time.
+#[derive(Debug, Clone)]
+pub(crate) struct Standing {
+    /// Time, s.
+    pub(crate) t: f64,
+    /// Capacitor voltages, V, and inductor currents, A.
+    pub(crate) state: Vec<f64>,
+    /// By switch: on.
+    pub(crate) switches: Vec<bool>,
+    /// By ideal pair: conducts; empty where not known.
+    pub(crate) conducting: Vec<bool>,
+}
+
+/// Simulates a circuit over its `.tran` from `tstart` on, where it stands so.
+///
+/// # Errors
+/// As [`simulate`].
+pub(crate) fn simulate_from(
+    circuit: &Circuit,
+    behaviour: &StaticMultiport,
+    standing: Standing,
+    options: SimOptions<'_>,
+) -> Result<Run, Error> {
+    let tran = circuit.tran.ok_or_else(no_transient)?;
+    let problem = Problem::of_circuit(circuit, behaviour, true, &options.settings)?;
+    let place = Place {
+        t: standing.t,
+        storage: DVector::from_vec(standing.state),
+        switches: standing.switches,
+    };
+    drive(
+        problem.standing_at(place, standing.conducting),
+        tran,
+        options,
+    )
+}
+
+fn no_transient() -> Error {
+    Error::before(Reason::Unsupported(
+        "the netlist asks for no .tran analysis".into(),
+    ))
 }
 
 /// Simulates a system without a circuit behind it (the JSON of `circ lcs`), from state `x`.

@@ -7,6 +7,8 @@ mod way;
 
 use std::sync::Arc;
 
+use nalgebra::DVector;
+
 use self::way::Way;
 
 use crate::circuit::{Circuit, Source, Tran, held_at, holder};
@@ -14,6 +16,7 @@ use crate::integrate::Note;
 use crate::integrate::energy::Balance;
 use crate::integrate::error::{Error, Reason};
 use crate::integrate::event::Event;
+use crate::integrate::exact::Place;
 use crate::integrate::log::Log;
 use crate::integrate::note;
 use crate::integrate::problem::Problem;
@@ -126,16 +129,35 @@ impl Simulation {
         let tran = transient(circuit.tran, options.until)?;
         check(&tran, &options.as_asked())?;
         let problem = Problem::of_circuit(circuit, multiport, tran.uic, &options.settings)?;
+        Self::start(
+            Arc::new(circuit.clone()),
+            problem.with_free_sources(),
+            tran,
+            options,
+        )
+    }
+
+    /// The same of a circuit whose sources keep their waveforms: those that only move switches are then no part of the state.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(crate) fn closed(
+        circuit: &Circuit,
+        multiport: &StaticMultiport,
+        options: SimulationOptions,
+    ) -> Result<Self, Error> {
+        let tran = transient(circuit.tran, options.until)?;
+        check(&tran, &options.as_asked())?;
+        let problem = Problem::of_circuit(circuit, multiport, tran.uic, &options.settings)?;
         Self::start(Arc::new(circuit.clone()), problem, tran, options)
     }
 
     fn start(
         circuit: Arc<Circuit>,
-        problem: Problem,
+        mut problem: Problem,
         tran: Tran,
         options: SimulationOptions,
     ) -> Result<Self, Error> {
-        let mut problem = problem.with_free_sources();
         let lcs = problem.prepare(&tran, &options.settings)?;
         let (mut notes, mut log) = (problem.notes.clone(), Log::default());
         let way = Way::of(&problem, &lcs, &tran, &options, &mut notes, &mut log)?;
@@ -240,6 +262,50 @@ impl Simulation {
     #[must_use]
     pub fn state(&mut self) -> Vec<f64> {
         self.way.place().storage.as_slice().to_vec()
+    }
+
+    /// Units of the state, `V` and `A`.
+    #[must_use]
+    pub fn state_units(&self) -> &[&'static str] {
+        &self.lcs.storage.units
+    }
+
+    /// Whether modes are integrated exactly, with steps at most where that is not possible.
+    pub(crate) const fn is_exact(&self) -> bool {
+        matches!(self.way, Way::Exact(_))
+    }
+
+    /// Which ideal pairs conduct; empty where not known.
+    pub(crate) fn conducting(&self) -> Vec<bool> {
+        self.way.conducting()
+    }
+
+    /// Goes to another time and state: capacitor voltages, V, and inductor currents, A, as [`Self::state`] gives them, switches as
+    /// [`Self::positions`] does. Edges of sources at that time have acted; a state that the circuit does not admit jumps.
+    ///
+    /// # Errors
+    /// As [`Self::advance_to`]; the circuit has transmission lines.
+    pub(crate) fn stand_at(
+        &mut self,
+        t: f64,
+        state: &[f64],
+        switches: &[bool],
+    ) -> Result<(), Error> {
+        self.can_be_moved()?;
+        let place = Place {
+            t,
+            storage: DVector::from_column_slice(state),
+            switches: switches.to_vec(),
+        };
+        let conducting = self.way.conducting();
+        let back = match &mut self.way {
+            Way::Exact(exact) => exact.restore(&place, &conducting, std::iter::empty()),
+            Way::Steps(_) => false,
+        };
+        if back {
+            return Ok(());
+        }
+        self.go_on_with(self.problem.clone().standing_at(place, conducting))
     }
 
     /// Switches that are on, in the order of [`Self::switches`].

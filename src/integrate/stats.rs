@@ -3,6 +3,7 @@
 use crate::integrate::Note;
 use crate::integrate::aliasing::Aliased;
 use crate::integrate::event::Event;
+use crate::integrate::orbit::Orbit;
 use crate::integrate::rows::RowKind;
 use crate::integrate::verify::Verified;
 use crate::settings::tolerances::jumps::DESTROYED;
@@ -252,4 +253,6 @@ pub struct Run {
     pub aliased: Option<Aliased>,
     /// What a second run by an independent method found, where there was one.
     pub verified: Option<Verified>,
+    /// The periodic steady state of which it is one period, if it is one.
+    pub orbit: Option<Orbit>,
 }

@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use super::text;
 use crate::analysis::Measurements;
-use crate::integrate::{Energy, Impulse, Places, Run, StateJump, StatedError, Verified};
+use crate::integrate::{Energy, Impulse, Orbit, Places, Run, StateJump, StatedError, Verified};
 
 #[derive(Serialize)]
 struct Summary<'a> {
@@ -29,6 +29,8 @@ struct Summary<'a> {
     warnings: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     verified: Option<&'a Verified>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pss: Option<&'a Orbit>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     measurements: Vec<Value>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -43,7 +45,7 @@ struct Total {
 }
 
 /// What a run did, as one JSON object on one line: method, plan, counters, energy balance, stated error, notes, impulses, jumps of the
-/// state, and what was measured.
+/// state, what was measured, and the orbit that it is a period of.
 #[must_use]
 pub fn summary(run: &Run, found: &Measurements, places: Places<'_>) -> String {
     line(&Summary::of(run, found, places))
@@ -89,6 +91,7 @@ impl<'a> Summary<'a> {
             },
             warnings: text::warnings(run, places),
             verified: run.verified.as_ref(),
+            pss: run.orbit.as_ref(),
             measurements,
             fourier,
         }

@@ -1,7 +1,7 @@
 //! Summaries in words.
 
 use super::{si, table};
-use crate::integrate::{Aliased, Method, Note, Places, Run, StateJump};
+use crate::integrate::{Aliased, Method, Note, Orbit, OrbitKind, Places, Run, StateJump};
 use crate::waveform::compare::Comparison;
 
 /// Impulses and jumps listed before the rest is only counted.
@@ -33,6 +33,7 @@ pub fn summary(run: &Run, places: Places<'_>, verbose: bool) -> String {
         stats.lcp_solves,
         si::quantity(stats.cpu_seconds, "s", 3),
     ));
+    lines.extend(run.orbit.as_ref().map(closed));
     let energy = &run.energy;
     let balance = format!(
         "energy: source {}, dissipated {}, stored {}, lost in jumps {}, by numerical damping {}, residual {} of the largest",
@@ -104,6 +105,44 @@ pub fn summary(run: &Run, places: Places<'_>, verbose: bool) -> String {
             .map(|note| format!("note: {note}")),
     );
     lines.join("\n") + "\n"
+}
+
+/// An orbit in a line.
+fn closed(orbit: &Orbit) -> String {
+    /// Multipliers shown.
+    const FIRST: usize = 6;
+    let multiplier = |[re, im]: &[f64; 2]| match *im {
+        0.0 => si::plain(*re, 4),
+        im => format!(
+            "{}{}{}i",
+            si::plain(*re, 4),
+            if im < 0.0 { "-" } else { "+" },
+            si::plain(im.abs(), 4)
+        ),
+    };
+    let first = orbit.multipliers.iter().take(FIRST).map(multiplier);
+    let more = if orbit.multipliers.len() > FIRST {
+        ", …"
+    } else {
+        ""
+    };
+    let kind = match orbit.kind {
+        OrbitKind::Driven => "driven".to_string(),
+        OrbitKind::Equilibrium => "at rest".to_string(),
+        OrbitKind::Autonomous => match &orbit.section {
+            Some(section) => format!("autonomous, beginning after `{section}`"),
+            None => "autonomous".to_string(),
+        },
+    };
+    format!(
+        "orbit: period {}, {kind}, order {}, {}, closed to {} after {} corrections, multipliers {}{more}",
+        si::quantity(orbit.period, "s", 6),
+        orbit.order,
+        if orbit.stable { "stable" } else { "unstable" },
+        si::plain(orbit.residual, 2),
+        orbit.iterations,
+        first.collect::<Vec<_>>().join(", "),
+    )
 }
 
 /// The error that a run states, or that it does not know it; nothing where there are no steps to err.

@@ -141,6 +141,11 @@ impl Exact {
         }
     }
 
+    /// Edges of the sources at the start have acted: the state is the one after them.
+    pub(crate) fn start_after_edges(&mut self) {
+        self.sources.before = self.sources.inputs(self.travel.t);
+    }
+
     fn ulps(&self) -> f64 {
         SAME_TIME * self.travel.t.abs()
     }

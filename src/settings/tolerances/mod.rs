@@ -11,6 +11,7 @@
 //! | how wrong does a run say it is | `stated` |
 //! | does a method for complementarity problems go on | `complementarity` |
 //! | is a system passive | `passivity` |
+//! | is an orbit closed, is it stable | `periodic` |
 //! | does a hypothesis of a theorem hold | `theorems` |
 //! | are two numbers of a netlist meant to be one | `netlists` |
 //!
@@ -25,6 +26,7 @@ pub(crate) mod exponentials;
 pub(crate) mod jumps;
 pub(crate) mod netlists;
 pub(crate) mod passivity;
+pub(crate) mod periodic;
 pub(crate) mod ranks;
 pub(crate) mod stated;
 pub(crate) mod steps;

@@ -16,5 +16,9 @@ pub(crate) const WHOLE: f64 = 1e-9;
 /// which carries its roundings. Larger: a last interval that was meant is left out; smaller: two rows at the end.
 pub(crate) const LAST_ROW: f64 = 1e-6;
 
+/// A period may be any fraction within this part of it: frequencies and periods are written as decimals or computed by a division or two. Larger:
+/// periods that differ become one; smaller: 1/(65 kHz) has no period in common with 50 Hz.
+pub(crate) const SAME_PERIOD: f64 = 4.0 * f64::EPSILON;
+
 /// Print steps in a span where nothing says how many. Larger: rows that nobody asked for; smaller: coarse pictures.
 pub(crate) const SPAN_PARTS: f64 = 1000.0;

@@ -1,0 +1,250 @@
+//! The periodic steady state: the orbit that transients go to, without waiting for it.
+
+mod period;
+mod search;
+mod shooting;
+
+use std::sync::atomic::AtomicBool;
+
+use crate::circuit::{Circuit, Tran};
+use crate::integrate::{
+    Error, Note, Orbit, OrbitKind, Reason, Run, SimOptions, Simulation, SimulationOptions,
+    Standing, simulate_from,
+};
+use crate::mna::{StaticMultiport, behaviour};
+use crate::model::Model;
+use crate::settings::Settings;
+use crate::settings::tolerances::periodic::{LONGEST_SEARCH, PARTS_OF_PERIOD, TABLE_STEPS};
+use crate::settings::tolerances::times::SPAN_PARTS;
+
+use search::Search;
+use shooting::{Fixed, neutral};
+
+/// What a periodic steady state may be asked for.
+#[derive(Debug, Clone, Default)]
+pub struct PeriodicOptions<'a> {
+    /// The period, s, in place of the common one of the sources.
+    pub period: Option<f64>,
+    /// Periods of the sources (returns, where there are none) after which the orbit closes; by default 1, or that of the stable orbit which the
+    /// transient goes to.
+    pub order: Option<usize>,
+    /// The largest residual relative to the amplitudes; by default 1e-9, of runs in steps 1e-6.
+    pub tol: Option<f64>,
+    /// Rows at events too.
+    pub events: bool,
+    /// Rows at events and at corners of sources too.
+    pub corners: bool,
+    /// Ends the search when set.
+    pub cancel: Option<&'a AtomicBool>,
+    /// Tolerances of the runs.
+    pub settings: Settings,
+}
+
+/// The periodic steady state of a circuit, and its waveforms over one period from 0 on.
+///
+/// With sources that vary the period is their least common one; without, an event that happens once a period closes the orbit, or the circuit
+/// is at rest. Sources that do not repeat stay at their values at 0⁻. A stable orbit is preferred: where the one of one period is not, the
+/// order of the one that the transient goes to.
+///
+/// # Errors
+/// [`Reason::NoOrbit`] where none was found, with what was seen; else as [`Model::transient`].
+///
+/// # Example
+/// A capacitor is charged and discharged over 1 kΩ in turn: it swings between 5 V ∓ 5 V tanh ¼.
+/// ```
+/// use circ::analysis::{PeriodicOptions, periodic};
+///
+/// let text = "rc\nv1 1 0 pulse(0 10 0 0 0 0.5m 1m)\nr1 1 2 1k\nc1 2 0 1u\n.tran 10u 1m\n.end\n";
+/// let model = circ::Model::parse(text, "rc.cir")?;
+/// let (orbit, run) = periodic(&model, &PeriodicOptions::default())?;
+/// let least = 5.0 * (1.0 - 0.25_f64.tanh());
+/// assert!((run.waveforms.values[1] - least).abs() < 1e-12 && orbit.stable);
+/// assert!((orbit.multipliers[0][0] - (-1.0_f64).exp()).abs() < 1e-6);
+/// # Ok::<(), circ::Error>(())
+/// ```
+pub fn periodic(model: &Model, options: &PeriodicOptions<'_>) -> Result<(Orbit, Run), Error> {
+    let (circuit, held) = period::repeating(model.circuit());
+    let none = |what: String| Error::before(Reason::NoOrbit(what));
+    if let Some(line) = circuit.lines.first() {
+        let name = &circuit.elements[line.ports[0].wave.index()].name;
+        let what = "what travels on a transmission line is no part of the state that is to repeat";
+        return Err(none(what.into()).device(name));
+    }
+    let mut period = period::common(&circuit).or_else(|what| match options.period {
+        Some(_) => Ok(period::Period::default()),
+        None => Err(none(what)),
+    })?;
+    if let Some(asked) = options.period {
+        if !(asked > 0.0 && asked.is_finite()) {
+            return Err(none(format!("{asked} s is no period")));
+        }
+        period = period.of(asked);
+    }
+    let multiport = behaviour(&circuit).map_err(|_| {
+        let what = "a circuit with sources at rest is none";
+        Error::before(Reason::internal("analysis::periodic", what))
+    })?;
+    let span = circuit.tran.map(|tran| tran.tstop);
+    let mut simulation = simulation(&circuit, &multiport, period.seconds, options)?;
+    let mut search = Search {
+        simulation: &mut simulation,
+        options,
+        corrections: 0,
+    };
+    let found = match period.seconds {
+        Some(seconds) => search.driven(seconds, period.from)?,
+        None => search.autonomous(span.ok_or_else(|| {
+            none("no source repeats, and there is no `.tran` that says how long to look".into())
+        })?)?,
+    };
+    let conducting = {
+        simulation.stand_at(
+            found.from,
+            &found.fixed.stand.state,
+            &found.fixed.stand.switches,
+        )?;
+        simulation.conducting()
+    };
+    let names = simulation.state_names().to_vec();
+    let orbit = found.orbit();
+    let mut run = rows(
+        (&circuit, &multiport),
+        (&found.fixed, found.from, conducting),
+        orbit.period,
+        options,
+    )?;
+    run.notes.extend(notes(&orbit, &found.fixed, &names, &held));
+    Ok((orbit, run))
+}
+
+/// A simulation that shoots: no rows, and an end that is never reached.
+fn simulation(
+    circuit: &Circuit,
+    multiport: &StaticMultiport,
+    period: Option<f64>,
+    options: &PeriodicOptions<'_>,
+) -> Result<Simulation, Error> {
+    let tran = circuit.tran;
+    let span = period.or(tran.map(|t| t.tstop)).unwrap_or(1.0);
+    let circuit = Circuit {
+        tran: Some(Tran {
+            tstep: span / TABLE_STEPS,
+            prints: true,
+            tstop: span * LONGEST_SEARCH,
+            tstart: 0.0,
+            tmax: tran.and_then(|t| t.tmax),
+            uic: tran.is_some_and(|t| t.uic),
+        }),
+        ..circuit.clone()
+    };
+    let of = |step: Option<f64>| {
+        let options = SimulationOptions {
+            step,
+            settings: options.settings.clone(),
+            ..SimulationOptions::default()
+        };
+        Simulation::closed(&circuit, multiport, options)
+    };
+    let simulation = of(None)?;
+    if simulation.is_exact() {
+        return Ok(simulation);
+    }
+    // Steps that an error control chooses differ from return to return, and with them what they return to.
+    of(Some(span / PARTS_OF_PERIOD))
+}
+
+/// One period of waveforms, from 0 on.
+fn rows(
+    (circuit, multiport): (&Circuit, &StaticMultiport),
+    (fixed, from, conducting): (&Fixed, f64, Vec<bool>),
+    period: f64,
+    options: &PeriodicOptions<'_>,
+) -> Result<Run, Error> {
+    let asked = circuit
+        .tran
+        .filter(|tran| tran.prints && tran.tstep < period);
+    let circuit = Circuit {
+        tran: Some(Tran {
+            tstep: asked.map_or(period / SPAN_PARTS, |tran| tran.tstep),
+            prints: asked.is_some(),
+            tstop: from + period,
+            tstart: from,
+            tmax: circuit.tran.and_then(|tran| tran.tmax),
+            uic: true,
+        }),
+        ..circuit.clone()
+    };
+    let standing = Standing {
+        t: from,
+        state: fixed.stand.state.clone(),
+        switches: fixed.stand.switches.clone(),
+        conducting,
+    };
+    let mut run = simulate_from(
+        &circuit,
+        multiport,
+        standing,
+        SimOptions {
+            events: options.events,
+            corners: options.corners,
+            cancel: options.cancel,
+            settings: options.settings.clone(),
+            ..SimOptions::default()
+        },
+    )?;
+    shift(&mut run, from);
+    Ok(run)
+}
+
+/// Has a run begin at 0.
+fn shift(run: &mut Run, from: f64) {
+    if from == 0.0 {
+        return;
+    }
+    run.waveforms.time.iter_mut().for_each(|t| *t -= from);
+    run.events.iter_mut().for_each(|event| event.t -= from);
+    run.impulses
+        .iter_mut()
+        .for_each(|impulse| impulse.t -= from);
+    run.state_jumps
+        .first
+        .iter_mut()
+        .for_each(|jump| jump.t -= from);
+}
+
+/// What the user should know of an orbit.
+fn notes(orbit: &Orbit, fixed: &Fixed, names: &[String], held: &[String]) -> Vec<Note> {
+    let mut notes = Vec::new();
+    if !held.is_empty() {
+        let text = format!(
+            "{}: held at the value at 0-, as it does not repeat",
+            held.join(", ")
+        );
+        notes.push(Note::of(held, text));
+    }
+    if !orbit.stable {
+        let [re, im] = orbit.multipliers[0];
+        notes.push(
+            format!("the orbit is unstable: a multiplier is {re:.6}{im:+.6}i; transients leave it")
+                .into(),
+        );
+    }
+    if orbit.kind != OrbitKind::Autonomous {
+        let directions = neutral(&fixed.derivative);
+        let taking_part = |j: &usize| directions.iter().any(|direction| direction.contains(j));
+        let states: Vec<&str> = (0..names.len())
+            .filter(taking_part)
+            .map(|j| names[j].as_str())
+            .collect();
+        if !states.is_empty() {
+            let text = format!(
+                "the orbit is not unique: {} may be another, as a period leaves them as they are in {} direction{}",
+                states.join(", "),
+                directions.len(),
+                if directions.len() == 1 { "" } else { "s" },
+            );
+            notes.push(text.into());
+        }
+    }
+    notes
+}

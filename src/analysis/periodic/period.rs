@@ -1,0 +1,239 @@
+//! The common period of all sources, and sources that do not repeat.
+
+use num_bigint::BigInt;
+use num_integer::Integer;
+use num_rational::BigRational;
+use num_traits::{Signed, ToPrimitive, Zero};
+
+use crate::algebra::rational;
+use crate::circuit::source::Wave;
+use crate::circuit::{Circuit, Kind, Source};
+use crate::settings::tolerances::times::SAME_PERIOD;
+
+/// The longest common period, in periods of the fastest source.
+const MOST_CYCLES: u32 = 10_000;
+
+/// When the sources of a circuit repeat.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Period {
+    /// s; `None` where no source varies for good.
+    pub(super) seconds: Option<f64>,
+    /// From here on, a multiple of the period, s.
+    pub(super) from: f64,
+    /// The last delay after which a source repeats, s.
+    latest: f64,
+}
+
+impl Period {
+    /// Another period in place of this one.
+    pub(super) fn of(self, seconds: f64) -> Self {
+        let latest = self.latest;
+        Self {
+            seconds: Some(seconds),
+            from: (latest / seconds).ceil() * seconds,
+            latest,
+        }
+    }
+}
+
+/// A circuit whose sources that do not repeat stay at their values at 0⁻; the names of these.
+pub(super) fn repeating(circuit: &Circuit) -> (Circuit, Vec<String>) {
+    let (mut held, mut names) = (circuit.clone(), Vec::new());
+    let span = circuit.tran.map_or(f64::INFINITY, |tran| tran.tstop);
+    for element in &mut held.elements {
+        let (Kind::VoltageSource(source) | Kind::CurrentSource(source)) = &mut element.kind else {
+            continue;
+        };
+        if is_once(&source.wave, span) {
+            *source = Source {
+                dc: source.dc,
+                wave: Wave::Dc(source.wave.value_left(0.0)),
+            };
+            names.push(element.name.clone());
+        }
+    }
+    (held, names)
+}
+
+/// Whether a waveform that varies does not repeat for good. A pulse whose period is longer than the run, or is the run as SPICE fills it in with
+/// its width, is a step.
+fn is_once(wave: &Wave, span: f64) -> bool {
+    match *wave {
+        Wave::Dc(_) | Wave::Arriving { .. } | Wave::Sffm { .. } | Wave::Am { .. } => false,
+        Wave::Exp { .. } => true,
+        Wave::Sin {
+            damping, cycles, ..
+        } => damping != 0.0 || cycles.is_some(),
+        Wave::Pulse {
+            width,
+            period,
+            count,
+            ..
+        } => {
+            count.is_some() || period <= 0.0 || period > span || (period == span && width >= period)
+        }
+        Wave::Pwl {
+            ref points, repeat, ..
+        } => points.len() > 1 && (repeat.is_none() || wave.period().is_none()),
+    }
+}
+
+/// The common period of the sources that vary.
+///
+/// # Errors
+/// In words: two sources without a common period of at most [`MOST_CYCLES`] periods of the fastest.
+pub(super) fn common(circuit: &Circuit) -> Result<Period, String> {
+    let mut all: Option<(BigRational, &str)> = None;
+    let (mut fastest, mut latest) = (None::<BigRational>, 0.0_f64);
+    for element in &circuit.elements {
+        let (Kind::VoltageSource(source) | Kind::CurrentSource(source)) = &element.kind else {
+            continue;
+        };
+        let (own, delay) = periods(&source.wave);
+        for period in own {
+            latest = latest.max(delay);
+            let common = match &all {
+                None => period.clone(),
+                Some((known, _)) => least_common(known, &period),
+            };
+            let least = fastest.map_or_else(|| period.clone(), |f| f.min(period.clone()));
+            if common > &least * BigInt::from(MOST_CYCLES) {
+                let other = all.map_or("", |(_, name)| name);
+                return Err(format!(
+                    "{other} and {} have no common period of at most {MOST_CYCLES} cycles; `--period` names one",
+                    element.name
+                ));
+            }
+            fastest = Some(least);
+            all = Some((common, &element.name));
+        }
+    }
+    let seconds = all.and_then(|(period, _)| period.to_f64());
+    let laps = seconds.map_or(0.0, |period| (latest / period).ceil());
+    Ok(Period {
+        seconds,
+        from: laps * seconds.unwrap_or(0.0),
+        latest,
+    })
+}
+
+/// The periods of which a waveform's is a multiple, as the simplest fractions, and the time from which on it repeats, s.
+fn periods(wave: &Wave) -> (Vec<BigRational>, f64) {
+    let of = |frequency: f64| {
+        let frequency = simplest(frequency);
+        (!frequency.is_zero()).then(|| frequency.recip())
+    };
+    match *wave {
+        Wave::Sin {
+            amplitude,
+            frequency,
+            delay,
+            ..
+        } if amplitude != 0.0 => (of(frequency).into_iter().collect(), delay),
+        Wave::Pulse {
+            v1,
+            v2,
+            delay,
+            period,
+            ..
+        } if v1 != v2 => (vec![simplest(period)], delay),
+        Wave::Pwl {
+            ref points,
+            repeat: Some(from),
+            delay,
+        } => match points.last() {
+            Some(&(last, _)) if last > from => {
+                (vec![simplest(last) - simplest(from)], delay + from)
+            }
+            _ => (vec![], 0.0),
+        },
+        Wave::Sffm {
+            amplitude,
+            carrier,
+            signal,
+            ..
+        } if amplitude != 0.0 => {
+            let both = [carrier, signal].into_iter().filter_map(of);
+            (both.collect(), 0.0)
+        }
+        Wave::Am {
+            amplitude,
+            modulation,
+            carrier,
+            delay,
+            ..
+        } if amplitude != 0.0 => {
+            let both = [carrier, modulation].into_iter().filter_map(of);
+            (both.collect(), delay)
+        }
+        _ => (vec![], 0.0),
+    }
+}
+
+/// The simplest fraction that a positive double may stand for: 1e-5 is 1/100000, and so is what 1/(100 kHz) rounds to.
+fn simplest(x: f64) -> BigRational {
+    let exact = rational(x.abs());
+    let slack = &exact * rational(SAME_PERIOD);
+    between(&exact - &slack, &exact + slack)
+}
+
+/// The fraction of the least denominator in an interval of positive numbers, by continued fractions.
+fn between(low: BigRational, high: BigRational) -> BigRational {
+    let whole = low.ceil();
+    if whole <= high {
+        return whole;
+    }
+    let floor = low.floor();
+    &floor + between((high - &floor).recip(), (low - &floor).recip()).recip()
+}
+
+/// The least common multiple of two positive numbers.
+fn least_common(a: &BigRational, b: &BigRational) -> BigRational {
+    let numerator = a.numer().lcm(b.numer());
+    BigRational::new(numerator.abs(), a.denom().gcd(b.denom()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Model;
+
+    fn period(cards: &str) -> Result<Period, String> {
+        let text = format!("* t\n{cards}\n.tran 1u 10m\n.end\n");
+        let model = Model::parse(&text, "t.cir").expect("a netlist");
+        common(&repeating(model.circuit()).0)
+    }
+
+    #[test]
+    fn periods_are_those_that_were_meant() {
+        let seconds = |cards: &str| period(cards).expect("a period").seconds;
+        let pulse = "v1 1 0 pulse(0 1 0 0 0 3u 10u)\nr1 1 0 1";
+        assert_eq!(seconds(pulse), Some(1e-5));
+        let three = format!("{pulse}\nv2 2 0 sin(0 1 50)\nr2 2 0 1\nv3 3 0 sin(0 1 60)\nr3 3 0 1");
+        assert_eq!(seconds(&three), Some(0.1));
+        assert_eq!(seconds("v1 1 0 3\nr1 1 0 1"), None);
+        // 1/65000 s has no end in decimals, and none in binary.
+        let carrier = "v1 1 0 pulse(0 1 0 {1/65k/2} {1/65k/2} 0 {1/65k})\nr1 1 0 1";
+        let line = format!("{carrier}\nv2 2 0 sin(0 1 50)\nr2 2 0 1");
+        assert_eq!(seconds(&line), Some(0.02));
+        assert_eq!(seconds("v1 1 0 sin(0 1 0.3)\nr1 1 0 1"), Some(1.0 / 0.3));
+    }
+
+    #[test]
+    fn what_does_not_repeat_is_held() {
+        let text = "* t\nv1 1 0 pulse(2 5 1m)\nr1 1 0 1\nv2 2 0 pwl(0 1 1m 3)\nr2 2 0 1\n\
+                    v3 3 0 pulse(0 1 2.5u 0 0 3u 10u)\nr3 3 0 1\n.tran 1u 10m\n.end\n";
+        let model = Model::parse(text, "t.cir").expect("a netlist");
+        let (held, names) = repeating(model.circuit());
+        assert_eq!(names, ["v1", "v2"]);
+        let found = common(&held).expect("a period");
+        assert_eq!((found.seconds, found.from), (Some(1e-5), 1e-5));
+    }
+
+    #[test]
+    fn frequencies_without_a_common_period_are_named() {
+        let error = period("v1 1 0 sin(0 1 50)\nr1 1 0 1\nv2 2 0 sin(0 1 50.0001)\nr2 2 0 1");
+        let error = error.expect_err("half a million cycles");
+        assert!(error.contains("v1 and v2"), "{error}");
+    }
+}

@@ -1,0 +1,362 @@
+//! Where Newton's method starts, and which orbit it is to find.
+
+use super::PeriodicOptions;
+use super::shooting::{Fixed, Return, Shooting, Stand, multipliers};
+use crate::integrate::{Change, Error, Event, Orbit, OrbitKind, Reason, Simulation};
+use crate::settings::tolerances::periodic::{
+    AT_REST, CLOSED, NEUTRAL, NUDGE, RETURNS, STEPPED_CLOSED,
+};
+use std::sync::atomic::Ordering;
+
+/// Periods of transient before each attempt.
+const TRANSIENTS: [usize; 5] = [8, 24, 96, 384, 1536];
+
+/// The largest order that is looked for.
+const MOST_ORDER: usize = 32;
+
+/// Parts of the span of a transient without sources, and how often it is prolonged.
+const PARTS: usize = 10;
+const PROLONGED: usize = 40;
+
+/// A search, with the simulation it moves.
+pub(super) struct Search<'a, 'o> {
+    pub(super) simulation: &'a mut Simulation,
+    pub(super) options: &'a PeriodicOptions<'o>,
+    pub(super) corrections: u32,
+}
+
+/// An orbit that was found.
+pub(super) struct Found {
+    pub(super) fixed: Fixed,
+    /// The time from which on it stands there, s.
+    pub(super) from: f64,
+    kind: OrbitKind,
+    order: usize,
+    section: Option<Change>,
+}
+
+impl Found {
+    pub(super) fn orbit(&self) -> Orbit {
+        let mut multipliers = multipliers(&self.fixed.derivative).unwrap_or_default();
+        // A return to the section takes away what moves along the orbit.
+        if self.kind == OrbitKind::Autonomous {
+            multipliers.pop();
+        }
+        Orbit {
+            period: self.fixed.seconds,
+            residual: self.fixed.residual,
+            iterations: self.fixed.corrections,
+            stable: is_stable(&self.fixed),
+            multipliers,
+            kind: self.kind,
+            order: self.order,
+            section: self.section.as_ref().map(ToString::to_string),
+        }
+    }
+}
+
+fn is_stable(fixed: &Fixed) -> bool {
+    let largest = multipliers(&fixed.derivative).and_then(|all| all.first().copied());
+    largest.is_none_or(|[re, im]| re.hypot(im) < 1.0 + NEUTRAL)
+}
+
+fn none(what: String) -> Error {
+    Error::before(Reason::NoOrbit(what))
+}
+
+impl Search<'_, '_> {
+    fn closed(&self) -> f64 {
+        let usual = if self.simulation.is_exact() {
+            CLOSED
+        } else {
+            STEPPED_CLOSED
+        };
+        self.options.tol.unwrap_or(usual)
+    }
+
+    fn go_on(&self) -> Result<(), Error> {
+        match self.options.cancel {
+            Some(cancel) if cancel.load(Ordering::Relaxed) => {
+                Err(Error::before(Reason::Interrupted))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn shooting(&mut self, from: f64, returns: Return) -> Shooting<'_> {
+        Shooting {
+            simulation: self.simulation,
+            from,
+            returns,
+            order: 1,
+            amplitudes: Vec::new(),
+            corrections: self.corrections,
+        }
+    }
+
+    /// The orbit of a circuit whose sources repeat after `period` seconds from `from` on.
+    pub(super) fn driven(&mut self, period: f64, from: f64) -> Result<Found, Error> {
+        let closed = self.closed();
+        if from > 0.0 {
+            self.simulation.advance_to(from)?;
+        }
+        let mut stand = Stand {
+            state: self.simulation.state(),
+            switches: self.simulation.positions(),
+        };
+        let asked = self.options.order;
+        let (mut last, mut seen) = (None, vec![0.0; stand.state.len()]);
+        grow(&mut seen, &stand.state);
+        for periods in TRANSIENTS {
+            let mut passed = Vec::new();
+            for _ in 0..periods {
+                self.go_on()?;
+                stand = self.shooting(from, Return::After(period)).shoot(&stand)?.0;
+                grow(&mut seen, &stand.state);
+                passed.push(stand.clone());
+            }
+            let mut shooting = self.shooting(from, Return::After(period));
+            shooting.order = asked.unwrap_or(1);
+            shooting.observe(&stand, period, &seen)?;
+            let found = shooting.solve(stand.clone(), closed);
+            let amplitudes = shooting.amplitudes.clone();
+            self.corrections = shooting.corrections;
+            match found {
+                Ok(Some(fixed)) if asked.is_some() || is_stable(&fixed) => {
+                    return Ok(self.found(fixed, from, asked.unwrap_or(1)));
+                }
+                Ok(Some(fixed)) => {
+                    let other = self.beyond(&fixed, (period, from), &amplitudes)?;
+                    return Ok(other.unwrap_or_else(|| self.found(fixed, from, 1)));
+                }
+                Ok(None) => {}
+                Err(error) => last = Some(error),
+            }
+            // Where the transient has settled on an orbit of another order, no other one need exist.
+            if let (None, Some(order)) = (asked, order_of(&passed, &amplitudes))
+                && order > 1
+                && let Some(found) = self.of_order(order, &stand, (period, from), &amplitudes)?
+            {
+                return Ok(found);
+            }
+        }
+        let periods: usize = TRANSIENTS.iter().sum();
+        Err(match last {
+            Some(error) => error,
+            None => none(format!(
+                "Newton's method does not close an orbit of {period:e} s, and {periods} periods of transient do not come to one"
+            )),
+        })
+    }
+
+    fn found(&self, fixed: Fixed, from: f64, order: usize) -> Found {
+        Found {
+            fixed,
+            from,
+            kind: OrbitKind::Driven,
+            order,
+            section: None,
+        }
+    }
+
+    /// The stable orbit to which transients go that leave an unstable one.
+    fn beyond(
+        &mut self,
+        fixed: &Fixed,
+        (period, from): (f64, f64),
+        amplitudes: &[f64],
+    ) -> Result<Option<Found>, Error> {
+        let mut stand = fixed.stand.clone();
+        for (value, amplitude) in stand.state.iter_mut().zip(amplitudes) {
+            *value += NUDGE * amplitude;
+        }
+        for periods in TRANSIENTS {
+            let mut passed = Vec::new();
+            for _ in 0..periods.max(2 * MOST_ORDER) {
+                self.go_on()?;
+                stand = self.shooting(from, Return::After(period)).shoot(&stand)?.0;
+                passed.push(stand.clone());
+            }
+            if let Some(order) = order_of(&passed, amplitudes)
+                && let Some(found) = self.of_order(order, &stand, (period, from), amplitudes)?
+                && (order > 1 || is_stable(&found.fixed))
+            {
+                return Ok(Some(found));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The orbit of this order near a place, if it is stable.
+    fn of_order(
+        &mut self,
+        order: usize,
+        stand: &Stand,
+        (period, from): (f64, f64),
+        amplitudes: &[f64],
+    ) -> Result<Option<Found>, Error> {
+        let closed = self.closed();
+        let mut shooting = self.shooting(from, Return::After(period));
+        shooting.order = order;
+        shooting.amplitudes = amplitudes.to_vec();
+        let Ok(Some(mut fixed)) = shooting.solve(stand.clone(), closed) else {
+            return Ok(None);
+        };
+        // What closes after two periods closes after four.
+        for part in (1..order).filter(|part| order.is_multiple_of(*part)) {
+            shooting.order = part;
+            if shooting.closes(&fixed.stand, closed)
+                && let Ok(Some(shorter)) = shooting.solve(fixed.stand.clone(), closed)
+            {
+                fixed = shorter;
+                break;
+            }
+            shooting.order = order;
+        }
+        let order = shooting.order;
+        self.corrections = shooting.corrections;
+        Ok(is_stable(&fixed).then(|| self.found(fixed, from, order)))
+    }
+
+    /// The orbit of a circuit in which no source varies, or its rest, after a transient of `span` seconds.
+    pub(super) fn autonomous(&mut self, span: f64) -> Result<Found, Error> {
+        let part = span / PARTS as f64;
+        let mut before = self.simulation.state();
+        let (mut amplitudes, mut last) = (vec![0.0; before.len()], None);
+        grow(&mut amplitudes, &before);
+        let mut events = Vec::new();
+        for k in 1..=PROLONGED * PARTS {
+            self.go_on()?;
+            let begin = self.simulation.time();
+            let stop = self.simulation.advance_to(begin + part)?;
+            let now = self.simulation.state();
+            grow(&mut amplitudes, &now);
+            let still = now.iter().zip(&before).zip(&amplitudes);
+            let still = still.fold(0.0_f64, |m, ((a, b), size)| {
+                m.max((a - b).abs() / size.max(f64::MIN_POSITIVE))
+            });
+            let stand = Stand {
+                state: now.clone(),
+                switches: self.simulation.positions(),
+            };
+            before = now;
+            let quiet = stop.events.is_empty();
+            events.extend(stop.events);
+            if k < PARTS {
+                continue;
+            }
+            let tried = if quiet && still <= AT_REST {
+                self.at_rest(&stand, part, &amplitudes)
+            } else if k % PARTS == 0 {
+                self.around(&std::mem::take(&mut events), (&stand, &amplitudes), span)
+            } else {
+                continue;
+            };
+            match tried {
+                Ok(Some(found)) => return Ok(found),
+                Ok(None) => {}
+                Err(error) => last = Some(error),
+            }
+            // The attempts moved the simulation.
+            self.simulation
+                .stand_at(0.0, &stand.state, &stand.switches)?;
+        }
+        Err(last.unwrap_or_else(|| {
+            none(format!(
+                "no source varies, and within {:e} s the circuit neither comes to rest nor repeats an event regularly",
+                span * PROLONGED as f64
+            ))
+        }))
+    }
+
+    /// The equilibrium near a place.
+    fn at_rest(
+        &mut self,
+        stand: &Stand,
+        seconds: f64,
+        seen: &[f64],
+    ) -> Result<Option<Found>, Error> {
+        let closed = self.closed();
+        let mut shooting = self.shooting(0.0, Return::After(seconds));
+        shooting.observe(stand, seconds, seen)?;
+        let fixed = shooting.solve(stand.clone(), closed)?;
+        self.corrections = shooting.corrections;
+        Ok(fixed.map(|fixed| Found {
+            fixed,
+            from: 0.0,
+            kind: OrbitKind::Equilibrium,
+            order: 1,
+            section: None,
+        }))
+    }
+
+    /// The orbit that repeats one of these events, the rarest of those that happened often enough, which is the one that closes it.
+    fn around(
+        &mut self,
+        events: &[Event],
+        (stand, seen): (&Stand, &[f64]),
+        seconds: f64,
+    ) -> Result<Option<Found>, Error> {
+        /// An event that repeats happened so often.
+        const OFTEN: usize = 3;
+        let (closed, order) = (self.closed(), self.options.order.unwrap_or(1));
+        let mut kinds: Vec<(usize, &Change)> = Vec::new();
+        for change in events.iter().flat_map(|event| event.changes.iter()) {
+            match kinds.iter_mut().find(|(_, known)| *known == change) {
+                Some((count, _)) => *count += 1,
+                None => kinds.push((1, change)),
+            }
+        }
+        kinds.retain(|(count, _)| *count >= OFTEN);
+        kinds.sort_by_key(|(count, _)| *count);
+        for (_, section) in kinds {
+            let mut shooting = self.shooting(0.0, Return::At(section.clone(), 2.0 * seconds));
+            let (start, _) = shooting.shoot(stand)?;
+            let (_, period) = shooting.shoot(&start)?;
+            shooting.observe(&start, period, seen)?;
+            shooting.order = order;
+            let found = shooting.solve(start, closed)?;
+            let moves = match &found {
+                Some(fixed) => shooting.moves(&fixed.stand, fixed.seconds, seen)?,
+                None => false,
+            };
+            self.corrections = shooting.corrections;
+            // Events that follow each other ever faster around a point come to rest there.
+            if let (Some(fixed), false) = (&found, moves) {
+                return self.at_rest(&fixed.stand.clone(), seconds, seen);
+            }
+            if let Some(fixed) = found {
+                return Ok(Some(Found {
+                    fixed,
+                    from: 0.0,
+                    kind: OrbitKind::Autonomous,
+                    order,
+                    section: Some(section.clone()),
+                }));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// Raises amplitudes to these states.
+fn grow(amplitudes: &mut [f64], state: &[f64]) {
+    for (amplitude, value) in amplitudes.iter_mut().zip(state) {
+        *amplitude = amplitude.max(value.abs());
+    }
+}
+
+/// After how many periods the last of these places returns, if it does.
+fn order_of(passed: &[Stand], amplitudes: &[f64]) -> Option<usize> {
+    let (last, before) = passed.split_last()?;
+    let near = |other: &Stand| {
+        let parts = last.state.iter().zip(&other.state).zip(amplitudes);
+        let apart = parts.fold(0.0_f64, |m, ((a, b), size)| m.max((a - b).abs() / size));
+        apart <= RETURNS && last.switches == other.switches
+    };
+    let latest = before.iter().rev().take(MOST_ORDER);
+    latest
+        .enumerate()
+        .find(|(_, other)| near(other))
+        .map(|(k, _)| k + 1)
+}

@@ -1,0 +1,340 @@
+//! The flow from one return to the next, its derivative, and Newton's method for its fixed points.
+//!
+//! With F(s) the storage at the return that follows s, an orbit is F(s) = s. Newton's correction of s is the least solution of
+//!
+//! ```text
+//! (I − M) δ = F(s) − s,     M = ∂F/∂s,
+//! ```
+//!
+//! in parts of the amplitudes. Columns of M are differences of F, a return each. M's eigenvalues at the orbit are its Floquet multipliers.
+//! (T. J. Aprille, T. N. Trick, Proceedings of the IEEE 60 (1972); for piecewise flows R. I. Leine, H. Nijmeijer 2004, section 8.)
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::integrate::{Change, Error, Reason, Simulation};
+use crate::settings::tolerances::periodic::{
+    DIFFERENCE, LEAST_AMPLITUDE, NEUTRAL, REUSED, STEPPED_DIFFERENCE, TAKES_PART,
+};
+
+/// Corrections of one attempt.
+const MOST_CORRECTIONS: u32 = 24;
+
+/// Halvings of a correction that makes the residual larger.
+const HALVINGS: u32 = 8;
+
+/// Points of a return at which amplitudes are read.
+const SAMPLES: u32 = 32;
+
+/// Events after which a return is given up.
+const MOST_EVENTS: u32 = 100_000;
+
+/// When the storage is compared with itself.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Return {
+    /// After so many seconds.
+    After(f64),
+    /// At the next event of this kind, after so many seconds at most.
+    At(Change, f64),
+}
+
+/// Where a return starts or ends.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Stand {
+    /// Capacitor voltages, V, and inductor currents, A.
+    pub(super) state: Vec<f64>,
+    /// By switch: on.
+    pub(super) switches: Vec<bool>,
+}
+
+/// A fixed point.
+#[derive(Debug, Clone)]
+pub(super) struct Fixed {
+    pub(super) stand: Stand,
+    /// max |F(s) − s| in parts of the amplitudes.
+    pub(super) residual: f64,
+    pub(super) corrections: u32,
+    /// M in parts of the amplitudes.
+    pub(super) derivative: DMatrix<f64>,
+    /// From one return to the next, s.
+    pub(super) seconds: f64,
+}
+
+/// A simulation whose returns are compared.
+pub(super) struct Shooting<'a> {
+    pub(super) simulation: &'a mut Simulation,
+    /// The time at which returns start, s.
+    pub(super) from: f64,
+    pub(super) returns: Return,
+    /// So many returns are one.
+    pub(super) order: usize,
+    pub(super) amplitudes: Vec<f64>,
+    /// Corrections so far.
+    pub(super) corrections: u32,
+}
+
+impl Shooting<'_> {
+    /// Goes to a place and on to the return that follows: where it is then, and how many seconds later.
+    pub(super) fn shoot(&mut self, stand: &Stand) -> Result<(Stand, f64), Error> {
+        self.simulation
+            .stand_at(self.from, &stand.state, &stand.switches)?;
+        let mut seconds = 0.0;
+        match self.returns.clone() {
+            Return::After(period) => {
+                seconds = period * self.order as f64;
+                self.simulation.advance_to(self.from + seconds)?;
+            }
+            Return::At(section, limit) => {
+                for _ in 0..self.order {
+                    seconds = self.reach(&section, limit)? - self.from;
+                }
+            }
+        }
+        let stand = Stand {
+            state: self.simulation.state(),
+            switches: self.simulation.positions(),
+        };
+        Ok((stand, seconds))
+    }
+
+    /// Goes on to the next event of this kind; its time, s.
+    fn reach(&mut self, section: &Change, limit: f64) -> Result<f64, Error> {
+        let begin = self.simulation.time();
+        for _ in 0..MOST_EVENTS {
+            let stop = self.simulation.advance_to_event(begin + limit)?;
+            let here = |change: &Change| change == section;
+            if stop.events.iter().any(|e| e.changes.iter().any(here)) {
+                return Ok(stop.time);
+            }
+            if stop.time >= begin + limit {
+                break;
+            }
+        }
+        let what = format!("{section} does not happen again within {limit:e} s");
+        Err(Error::at(begin, Reason::NoOrbit(what)))
+    }
+
+    /// Takes the amplitudes of the next `seconds` from here, each at least [`LEAST_AMPLITUDE`] of the largest of its unit that was `seen` so far.
+    pub(super) fn observe(
+        &mut self,
+        stand: &Stand,
+        seconds: f64,
+        seen: &[f64],
+    ) -> Result<(), Error> {
+        let extremes = self.extremes(stand, seconds)?;
+        self.amplitudes.clear();
+        self.amplitudes
+            .extend(extremes.iter().map(|[low, high]| high.max(-low)));
+        let units = self.simulation.state_units();
+        let largest = |unit: &str| {
+            let own = self.amplitudes.iter().zip(seen).zip(units);
+            let own = own.filter(|(_, u)| **u == unit);
+            own.fold(0.0_f64, |m, ((a, seen), _)| m.max(*a).max(*seen))
+        };
+        let least: Vec<f64> = units.iter().map(|unit| largest(unit)).collect();
+        let any = least.iter().copied().fold(0.0, f64::max);
+        for (amplitude, least) in self.amplitudes.iter_mut().zip(least) {
+            // Of a unit of which nothing was seen any amount is as good as another.
+            let least = if least > 0.0 { least } else { any.max(1.0) };
+            *amplitude = amplitude.max(LEAST_AMPLITUDE * least);
+        }
+        Ok(())
+    }
+
+    /// Whether states move by more than [`LEAST_AMPLITUDE`] of what was `seen` of them in the next `seconds` from here.
+    pub(super) fn moves(
+        &mut self,
+        stand: &Stand,
+        seconds: f64,
+        seen: &[f64],
+    ) -> Result<bool, Error> {
+        let extremes = self.extremes(stand, seconds)?;
+        let mut both = extremes.iter().zip(seen);
+        Ok(both.any(|([low, high], seen)| high - low > LEAST_AMPLITUDE * seen))
+    }
+
+    /// The least and the largest of each state at [`SAMPLES`] points in the next `seconds` from here.
+    fn extremes(&mut self, stand: &Stand, seconds: f64) -> Result<Vec<[f64; 2]>, Error> {
+        self.simulation
+            .stand_at(self.from, &stand.state, &stand.switches)?;
+        let mut extremes: Vec<[f64; 2]> = stand.state.iter().map(|v| [*v, *v]).collect();
+        for k in 0..=SAMPLES {
+            let part = f64::from(k) / f64::from(SAMPLES);
+            self.simulation.advance_to(self.from + seconds * part)?;
+            for ([low, high], value) in extremes.iter_mut().zip(self.simulation.state()) {
+                *low = low.min(value);
+                *high = high.max(value);
+            }
+        }
+        Ok(extremes)
+    }
+
+    /// (F(s) − s) in parts of the amplitudes, and where F(s) is.
+    fn residual(&mut self, stand: &Stand) -> Result<(DVector<f64>, Stand, f64), Error> {
+        let (after, seconds) = self.shoot(stand)?;
+        let parts = after.state.iter().zip(&stand.state).zip(&self.amplitudes);
+        let parts = parts.map(|((after, before), amplitude)| (after - before) / amplitude);
+        Ok((
+            DVector::from_iterator(stand.state.len(), parts),
+            after,
+            seconds,
+        ))
+    }
+
+    /// Whether a return from here leads back.
+    pub(super) fn closes(&mut self, stand: &Stand, closed: f64) -> bool {
+        let found = self.residual(stand);
+        found.is_ok_and(|(residual, after, _)| {
+            residual.amax() <= closed && after.switches == stand.switches
+        })
+    }
+
+    /// M at a place from which a return leads to `after`, in parts of the amplitudes.
+    fn derivative(&mut self, stand: &Stand, after: &Stand) -> Result<DMatrix<f64>, Error> {
+        let n = stand.state.len();
+        let part = if self.simulation.is_exact() {
+            DIFFERENCE
+        } else {
+            STEPPED_DIFFERENCE
+        };
+        let mut derivative = DMatrix::zeros(n, n);
+        for j in 0..n {
+            let mut moved = stand.clone();
+            moved.state[j] += part * self.amplitudes[j];
+            let by = (moved.state[j] - stand.state[j]) / self.amplitudes[j];
+            let (end, _) = self.shoot(&moved)?;
+            for i in 0..n {
+                derivative[(i, j)] = (end.state[i] - after.state[i]) / self.amplitudes[i] / by;
+            }
+        }
+        Ok(derivative)
+    }
+
+    /// Corrects `stand` until the residual falls no more; `None` where it does not come below `closed`.
+    pub(super) fn solve(&mut self, stand: Stand, closed: f64) -> Result<Option<Fixed>, Error> {
+        let mut stand = stand;
+        if stand.state.is_empty() {
+            return self.without_states(stand);
+        }
+        let (mut residual, mut after, mut seconds) = self.residual(&stand)?;
+        let mut derivative = self.derivative(&stand, &after)?;
+        let mut made_at = residual.amax();
+        let mut corrections = 0;
+        while corrections < MOST_CORRECTIONS && residual.amax() > f64::EPSILON {
+            corrections += 1;
+            let Some((next, found)) = self.corrected(&stand, &residual, &derivative)? else {
+                if made_at == residual.amax() {
+                    break;
+                }
+                // An old derivative may be the reason.
+                derivative = self.derivative(&stand, &after)?;
+                made_at = residual.amax();
+                continue;
+            };
+            let before = residual.amax();
+            stand = next;
+            (residual, after, seconds) = found;
+            if residual.amax() > REUSED * before && residual.amax() > closed {
+                derivative = self.derivative(&stand, &after)?;
+                made_at = residual.amax();
+            }
+        }
+        self.corrections += corrections;
+        if residual.amax() > closed || after.switches != stand.switches {
+            return Ok(None);
+        }
+        if made_at > NEUTRAL {
+            derivative = self.derivative(&stand, &after)?;
+        }
+        Ok(Some(Fixed {
+            stand,
+            residual: residual.amax(),
+            corrections: self.corrections,
+            derivative,
+            seconds,
+        }))
+    }
+
+    /// A circuit that stores nothing is what its sources and switches are.
+    fn without_states(&mut self, stand: Stand) -> Result<Option<Fixed>, Error> {
+        let (after, seconds) = self.shoot(&stand)?;
+        let closed = after.switches == stand.switches;
+        Ok(closed.then(|| Fixed {
+            stand,
+            residual: 0.0,
+            corrections: self.corrections,
+            derivative: DMatrix::zeros(0, 0),
+            seconds,
+        }))
+    }
+
+    /// The correction, or the longest half of it that makes the residual smaller.
+    #[expect(clippy::type_complexity, reason = "a place with its residual")]
+    fn corrected(
+        &mut self,
+        stand: &Stand,
+        residual: &DVector<f64>,
+        derivative: &DMatrix<f64>,
+    ) -> Result<Option<(Stand, (DVector<f64>, Stand, f64))>, Error> {
+        let n = residual.len();
+        let system = DMatrix::identity(n, n) - derivative;
+        let svd = system.svd(true, true);
+        // Directions that a return leaves as they are stay.
+        let Ok(correction) = svd.solve(residual, NEUTRAL) else {
+            return Ok(None);
+        };
+        let mut part = 1.0;
+        for _ in 0..HALVINGS {
+            let mut next = stand.clone();
+            for (j, value) in next.state.iter_mut().enumerate() {
+                *value += part * correction[j] * self.amplitudes[j];
+            }
+            // Where no circuit is the correction was too long.
+            if let Ok(found) = self.residual(&next)
+                && found.0.amax() < residual.amax()
+            {
+                return Ok(Some((next, found)));
+            }
+            part *= 0.5;
+        }
+        Ok(None)
+    }
+}
+
+/// Eigenvalues of M, the largest first; `None` where they are not found.
+pub(super) fn multipliers(derivative: &DMatrix<f64>) -> Option<Vec<[f64; 2]>> {
+    if derivative.is_empty() {
+        return Some(vec![]);
+    }
+    let found = crate::linalg::eigenvalues::eigenvalues(derivative)?;
+    let mut found: Vec<[f64; 2]> = found.iter().map(|v| [v.re, v.im]).collect();
+    let size = |v: &[f64; 2]| v[0].hypot(v[1]);
+    found.sort_by(|a, b| {
+        size(b)
+            .total_cmp(&size(a))
+            .then(b[0].total_cmp(&a[0]))
+            .then(b[1].total_cmp(&a[1]))
+    });
+    Some(found)
+}
+
+/// The states that a return leaves as they are together: by direction with multiplier 1, those that take part in it.
+pub(super) fn neutral(derivative: &DMatrix<f64>) -> Vec<Vec<usize>> {
+    let n = derivative.nrows();
+    if n == 0 {
+        return vec![];
+    }
+    let svd = (DMatrix::identity(n, n) - derivative).svd(false, true);
+    let Some(directions) = svd.v_t else {
+        return vec![];
+    };
+    let still = svd.singular_values.iter().enumerate();
+    let still = still.filter(|(_, value)| **value <= NEUTRAL);
+    let taking_part = |k: usize| {
+        let row = directions.row(k);
+        let row = row.iter().enumerate();
+        row.filter(|(_, v)| v.abs() > TAKES_PART)
+            .map(|(j, _)| j)
+            .collect()
+    };
+    still.map(|(k, _)| taking_part(k)).collect()
+}

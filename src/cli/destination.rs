@@ -1,0 +1,207 @@
+//! Where the results of a command go, and what it says of them.
+
+use std::path::PathBuf;
+
+use super::args::{Input, Summary};
+use super::exit::{Exit, Failure};
+use super::input;
+use super::output::{Format, Outputs};
+use super::rows::{Columns, Shown};
+use super::streams::Streams;
+use crate::analysis::{Finished, Measurements};
+use crate::circuit::Tran;
+use crate::integrate::{Block, Error, Method, Places, Reason, Run, Verified};
+use crate::report::figure::Figure;
+use crate::report::{json, terminal, text};
+
+/// What a command line asks of its results.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wanted<'a> {
+    pub(super) input: &'a Input,
+    pub(super) outputs: &'a [PathBuf],
+    pub(super) summary: Option<Summary>,
+    /// Rows at events.
+    pub(super) events: bool,
+    /// The step was named.
+    pub(super) fixed_step: bool,
+    /// A second run.
+    pub(super) verify: bool,
+}
+
+/// Where the results of a command go, and what it says.
+pub(super) struct Destination<'a> {
+    wanted: Wanted<'a>,
+    formats: &'a [Format],
+    tran: Option<Tran>,
+    /// Where elements stand.
+    pub(super) places: Places<'a>,
+    /// A plot on a terminal.
+    pub(super) plots: bool,
+    pub(super) streams: &'a Streams,
+}
+
+impl<'a> Destination<'a> {
+    /// As the command line asks for it.
+    pub(super) fn of(
+        wanted: Wanted<'a>,
+        formats: &'a [Format],
+        tran: Option<Tran>,
+        places: Places<'a>,
+        streams: &'a Streams,
+    ) -> Self {
+        Self {
+            wanted,
+            formats,
+            tran,
+            places,
+            plots: wanted.outputs.is_empty() && streams.out_is_terminal(),
+            streams,
+        }
+    }
+
+    /// Whether anything is looked at.
+    pub(super) fn has_pictures(&self) -> bool {
+        self.plots || self.formats.iter().any(|format| format.is_picture())
+    }
+
+    /// Opens files.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub(super) fn open(&self, columns: &Columns) -> Result<Outputs, Failure> {
+        let between = self.tran.is_some_and(|tran| !tran.prints);
+        let shown = Shown {
+            events: self.wanted.events || between,
+            corners: between,
+        };
+        let to_pipe = !self.plots;
+        Outputs::open(self.wanted.outputs, self.formats, to_pipe, shown, columns)
+    }
+
+    /// Writes what a run gave, or as much of it as there is, and says why it ended early. `feeds`: the rows have not been written yet.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub(super) fn finish(
+        &self,
+        mut outputs: Outputs,
+        Finished { run, error }: Finished,
+        feeds: bool,
+        signal: Option<(i32, &str)>,
+    ) -> Result<Exit, Failure> {
+        let Some((run, found)) = run else {
+            return error.map_or(Ok(Exit::Done), |error| Err(self.failure(&error)));
+        };
+        if self.wanted.fixed_step && run.method == Method::Exact.name() {
+            self.streams
+                .say("note: --step is of no use to exact integration, which has no steps");
+        }
+        if feeds {
+            // A failure is told by `finish`.
+            let _ = outputs.take(Block::of(&run.waveforms, &run.kinds));
+        }
+        let last = outputs.last().or(run.waveforms.time.last().copied());
+        let until = last.map_or("before its first row".into(), |t| format!("at {t:e} s"));
+        let incomplete = error.as_ref().map(|_| format!("incomplete: ends {until}"));
+        let files = outputs.words();
+        let figure = || Figure::of_waveforms(&run.waveforms);
+        let written = outputs.finish((&run, self.places), &figure, incomplete.as_deref());
+        self.summarise(&run, &found);
+        if self.plots {
+            let (lines, columns) = self.streams.size();
+            let plot = terminal::plot(&run.waveforms, columns, lines);
+            self.streams.data(plot)?;
+        }
+        if let Err(failure) = written {
+            if let (false, Some(t)) = (failure.is_closed_pipe() || files.is_empty(), last) {
+                self.streams
+                    .say(format!("note: rows were written until {t:e} s"));
+            }
+            return Err(failure);
+        }
+        let Some(error) = error else {
+            return self.verdict(&run, signal);
+        };
+        let kept = match (files.is_empty(), last) {
+            (false, Some(t)) => format!("; the rows until {t:e} s are in {files}"),
+            _ => String::new(),
+        };
+        match signal {
+            Some((signal, name)) if error.reason == Reason::Interrupted => {
+                let file = self.wanted.input.file.display();
+                self.streams
+                    .error(format!("{file}: {error} by {name}{kept}"));
+                Ok(Exit::Signal(signal))
+            }
+            _ => match self.failure(&error) {
+                Failure::Faults(message) => Err(Failure::Faults(message + &kept)),
+                Failure::Message(message) => Err(Failure::Message(message + &kept)),
+                other => Err(other),
+            },
+        }
+    }
+
+    /// What the second run, if one was asked for, says of the first.
+    fn verdict(&self, run: &Run, signal: Option<(i32, &str)>) -> Result<Exit, Failure> {
+        let file = self.wanted.input.file.display();
+        match &run.verified {
+            Some(verified) if !verified.holds() => {
+                let Verified {
+                    method,
+                    max_difference,
+                    tolerance,
+                    signal,
+                    time,
+                } = verified;
+                self.streams.error(format!(
+                    "{file}: not verified: {signal} differs by {max_difference:.1e} of its amplitude from a second run ({method}) at \
+                     t = {time:e} s, where {tolerance:.1e} is tolerated"
+                ));
+                Ok(Exit::No)
+            }
+            None if self.wanted.verify => match signal {
+                Some((signal, name)) => {
+                    self.streams
+                        .error(format!("{file}: the second run was interrupted by {name}"));
+                    Ok(Exit::Signal(signal))
+                }
+                None => Err(Failure::Message(format!(
+                    "{file}: the second run failed; the rows are those of the first"
+                ))),
+            },
+            _ => Ok(Exit::Done),
+        }
+    }
+
+    fn failure(&self, error: &Error) -> Failure {
+        input::broke_off(self.wanted.input, error, self.places, self.streams)
+    }
+
+    /// On standard error: JSON where asked for; words where asked for, for a person, and with `-v`; else the notes alone.
+    /// What was measured is in all of them.
+    fn summarise(&self, run: &Run, found: &Measurements) {
+        let (places, streams, summary) = (self.places, self.streams, self.wanted.summary);
+        let in_words = summary == Some(Summary::Text)
+            || summary.is_none() && (streams.verbose || streams.err_is_terminal());
+        if !in_words {
+            for warning in text::warnings(run, places) {
+                streams.say(format!("warning: {warning}"));
+            }
+        }
+        match summary {
+            Some(Summary::Json) => return streams.error(json::summary(run, found, places)),
+            Some(Summary::Text) => streams.error(text::summary(run, places, streams.verbose)),
+            None if streams.verbose || streams.err_is_terminal() => {
+                streams.say(text::summary(run, places, streams.verbose));
+            }
+            None => {
+                for note in places.all(&run.notes) {
+                    streams.say(format!("note: {note}"));
+                }
+            }
+        }
+        if !found.is_empty() {
+            streams.say(found.words());
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! `circ pss`.
+
+use std::path::{Path, PathBuf};
+
+use super::args::PssArgs;
+use super::destination::{Destination, Wanted};
+use super::exit::{Exit, Failure};
+use super::input;
+use super::output::Format;
+use super::rows::Columns;
+use super::signals::Signals;
+use super::streams::Streams;
+use crate::analysis::{Finished, PeriodicOptions, periodic};
+use crate::integrate::Run;
+
+/// Finds the periodic steady state and writes one period of it.
+///
+/// # Errors
+/// See [`Failure`].
+pub(super) fn pss(args: &PssArgs, streams: &Streams) -> Result<Exit, Failure> {
+    let formats = args.outputs.iter().map(|path| Format::of(path));
+    let formats: Vec<Format> = formats.collect::<Result<_, _>>()?;
+    let paths: Vec<&Path> = args.outputs.iter().map(PathBuf::as_path).collect();
+    let subject = input::open(&args.input, &args.probes, &paths, streams)?;
+    let model = input::model_of(&args.input, &subject)?;
+    if !model.circuit().steps.is_empty() {
+        streams.say("note: `.step` is left out: this is the orbit of the values as they stand");
+    }
+    let signals = Signals::watch()?;
+    let wanted = Wanted {
+        input: &args.input,
+        outputs: &args.outputs,
+        summary: args.summary,
+        events: args.events,
+        fixed_step: false,
+        verify: false,
+    };
+    let tran = model.circuit().tran;
+    let destination = Destination::of(wanted, &formats, tran, subject.places(), streams);
+    let outputs = destination.open(&Columns::of_subject(&subject))?;
+    let found = periodic(
+        model,
+        &PeriodicOptions {
+            period: args.period,
+            order: args.order.map(usize::from),
+            tol: args.tol,
+            events: args.events,
+            corners: destination.has_pictures(),
+            cancel: Some(signals.flag()),
+            ..PeriodicOptions::default()
+        },
+    );
+    let run = found.map(|(orbit, run)| Run {
+        orbit: Some(orbit),
+        ..run
+    });
+    destination.finish(outputs, Finished::of(run), true, signals.received())
+}

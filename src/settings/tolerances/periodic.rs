@@ -1,0 +1,46 @@
+//! When an orbit is closed, and what its multipliers say.
+
+/// Length of the differences that make the derivative of the flow over a period, relative to the amplitude of a state: the square root of
+/// what doubles carry, so that rounding and curvature leave as much each. Larger: an event passes between the two ends; smaller: rounding.
+pub(crate) const DIFFERENCE: f64 = 1.5e-8;
+
+/// The same where the flow is made of implicit steps, whose solutions are known to the residual of their solver.
+pub(crate) const STEPPED_DIFFERENCE: f64 = 1e-5;
+
+/// A state counts as at least this part of the largest of its unit: a current that is always zero is moved by a part of the others.
+pub(crate) const LEAST_AMPLITUDE: f64 = 1e-6;
+
+/// An orbit of exact integration is closed to this part of its amplitudes, one of steps to [`STEPPED_CLOSED`]. Larger: an orbit that still drifts
+/// passes; smaller: rounding of many events refuses one.
+pub(crate) const CLOSED: f64 = 1e-9;
+
+/// See [`CLOSED`].
+pub(crate) const STEPPED_CLOSED: f64 = 1e-6;
+
+/// A correction that leaves less than this part of the residual was good enough for its derivative to be used again.
+pub(crate) const REUSED: f64 = 1e-2;
+
+/// A multiplier within this of 1 is 1, and beyond 1 by this one is unstable: what differences leave of it. Larger: slow drifts pass for
+/// families of orbits; smaller: rounding makes orbits unstable.
+pub(crate) const NEUTRAL: f64 = 1e-6;
+
+/// A transient that returns to this part of its amplitudes after some periods is near an orbit of that order.
+pub(crate) const RETURNS: f64 = 1e-3;
+
+/// A transient whose states move less than this part of their amplitudes in a tenth of its span, without events, comes to rest.
+pub(crate) const AT_REST: f64 = 1e-3;
+
+/// A step away from an unstable orbit, relative to the amplitudes.
+pub(crate) const NUDGE: f64 = 1e-4;
+
+/// Steps of a period where laws are curved.
+pub(crate) const PARTS_OF_PERIOD: f64 = 2000.0;
+
+/// Table steps of exact integration in a period. Larger: more of them on the way through a calm mode; smaller: deeper tables.
+pub(crate) const TABLE_STEPS: f64 = 64.0;
+
+/// No search is longer than so many periods, or spans where no source varies.
+pub(crate) const LONGEST_SEARCH: f64 = 1e6;
+
+/// A state takes part in a direction of length 1 by more than this. Larger: names left out; smaller: names of what hardly moves.
+pub(crate) const TAKES_PART: f64 = 0.1;

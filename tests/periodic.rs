@@ -1,0 +1,273 @@
+//! Periodic steady states against closed forms, long transients and published bifurcations.
+#![allow(missing_docs, reason = "tests")]
+
+use std::path::Path;
+
+use circ::analysis::{Orbit, OrbitKind, PeriodicOptions, periodic};
+use circ::integrate::Reason;
+use circ::{Error, Model, Run, SimOptions};
+
+fn parsed(text: &str) -> Model {
+    Model::parse(text, "t.cir").expect("a circuit")
+}
+
+fn orbit_of(text: &str) -> (Orbit, Run) {
+    periodic(&parsed(text), &PeriodicOptions::default()).expect("an orbit")
+}
+
+fn refused(text: &str) -> Error {
+    match periodic(&parsed(text), &PeriodicOptions::default()) {
+        Err(error) => error,
+        Ok((orbit, _)) => panic!("{orbit:?}"),
+    }
+}
+
+fn size([re, im]: [f64; 2]) -> f64 {
+    re.hypot(im)
+}
+
+/// The columns of a row.
+fn row(run: &Run, at: usize) -> &[f64] {
+    let columns = run.waveforms.names.len();
+    &run.waveforms.values[at * columns..(at + 1) * columns]
+}
+
+/// Amplitudes of the columns.
+fn amplitudes(run: &Run) -> Vec<f64> {
+    let columns = run.waveforms.names.len();
+    let mut largest = vec![0.0_f64; columns];
+    for row in run.waveforms.values.chunks_exact(columns) {
+        for (largest, value) in largest.iter_mut().zip(row) {
+            *largest = largest.max(value.abs());
+        }
+    }
+    largest
+}
+
+/// Converters and rectifiers, exact, whose transient is at the orbit in reasonable time.
+const SETTLING: [&str; 30] = [
+    "netlists/buck-open-loop.cir",
+    "netlists/flyback.cir",
+    "netlists/buck.cir",
+    "netlists/cockcroft-walton.cir",
+    "netlists/capacitor-loop.cir",
+    "netlists/clamp.cir",
+    "netlists/isolated-rectifier.cir",
+    "netlists/isolated-rectifier-ideal.cir",
+    "netlists/maffezzoni.cir",
+    "netlists/maffezzoni-ideal.cir",
+    "netlists/rectifier.cir",
+    "netlists/rlc.cir",
+    "netlists/scr-bridge.cir",
+    "netlists/scr-commutation.cir",
+    "netlists/three-half-wave.cir",
+    "netlists/three-phase-rectifier.cir",
+    "netlists/triac-dimmer.cir",
+    "netlists/voltage-doubler.cir",
+    "netlists/parallel-inverters.cir",
+    "netlists/bridge-source.cir",
+    "netlists/inductor-cut-set.cir",
+    "tests/findings/aliased_rows.cir",
+    "tests/findings/complementary_sin.cir",
+    "tests/findings/dead_time.cir",
+    "tests/findings/diodes_share.cir",
+    "tests/findings/halfbridge_submodule_ideal.cir",
+    "tests/findings/multiphase_buck_8.cir",
+    "tests/findings/six_pulse_large_roff.cir",
+    "tests/findings/bridge_starts.cir",
+    "tests/findings/pvroff_2_1e12.cir",
+];
+
+/// The same text over so many periods, with a row for each.
+fn over(text: &str, period: f64, periods: u32) -> String {
+    let line = |line: &str| {
+        if !line.to_lowercase().starts_with(".tran ") {
+            return line.to_string();
+        }
+        let uic = if line.to_lowercase().contains("uic") {
+            " uic"
+        } else {
+            ""
+        };
+        format!(".tran {period:e} {:e}{uic}", period * f64::from(periods))
+    };
+    text.lines().map(line).collect::<Vec<_>>().join("\n") + "\n"
+}
+
+#[test]
+fn an_orbit_is_where_a_long_transient_ends() {
+    for name in SETTLING {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
+        let text = std::fs::read_to_string(&path).expect("a netlist");
+        let (orbit, run) = orbit_of(&text);
+        assert!(
+            orbit.kind == OrbitKind::Driven && orbit.stable,
+            "{name}: {orbit:?}"
+        );
+        assert!(orbit.residual <= 1e-12, "{name}: {:e}", orbit.residual);
+        let largest = orbit.multipliers.first().map_or(0.0, |m| size(*m));
+        assert!(largest < 0.99, "{name}: {largest}");
+        // What is left of the start is below 1e-13, and twenty periods at least.
+        let periods = (30.0 / -largest.max(1e-9).ln()).ceil().max(20.0) as u32;
+        let long = parsed(&over(&text, orbit.period, periods));
+        let long = long.transient(SimOptions::default()).expect("a transient");
+        let last = row(&long, long.waveforms.time.len() - 1);
+        let names = run.waveforms.names.iter().zip(amplitudes(&run));
+        for ((name_of, amplitude), (a, b)) in names.zip(row(&run, 0).iter().zip(last)) {
+            let apart = (a - b).abs() / amplitude.max(f64::MIN_POSITIVE);
+            assert!(apart < 1e-9, "{name} {name_of}: {a} {b}");
+        }
+    }
+}
+
+/// i rises from i₀ to i₁ = i₀ + V/L·DT at a constant v, and falls through a diode; with an ideal filter v is D·V, and the ripple of i
+/// is V D(1 − D)T/L. Resistances 0: the multipliers are those of the filter alone, e^{AT} with A = [0, −1/L; 1/C, −1/(RC)].
+#[test]
+fn a_synchronous_buck_is_linear_between_its_edges() {
+    let text = "buck\nv1 1 0 10\ns1 1 2 g 0 sw\ns2 2 0 0 g inv\nl1 2 3 100u\nc1 3 0 100u\nr1 3 0 5\n\
+                vg g 0 pulse(0 1 0 0 0 4u 10u)\n.model sw sw(vt=0.5 vh=0 ron=0 ideal=1)\n\
+                .model inv sw(vt=-0.5 vh=0 ron=0 ideal=1)\n.tran 0.1u 10u\n.end\n";
+    let (orbit, run) = orbit_of(text);
+    let (l, c, r, t) = (1e-4, 1e-4, 5.0, 1e-5);
+    let (half, square): (f64, f64) = (-1.0 / (2.0 * r * c), 1.0 / (l * c));
+    let frequency = (square - half * half).sqrt();
+    let (size_of, angle) = ((half * t).exp(), frequency * t);
+    for (found, sign) in orbit.multipliers.iter().zip([1.0, -1.0]) {
+        assert!((found[0] - size_of * angle.cos()).abs() < 1e-6, "{orbit:?}");
+        assert!(
+            (found[1] - sign * size_of * angle.sin()).abs() < 1e-6,
+            "{orbit:?}"
+        );
+    }
+    let mean = |name: &str| {
+        let at = run
+            .waveforms
+            .names
+            .iter()
+            .position(|n| n == name)
+            .expect("a column");
+        let columns = run.waveforms.names.len();
+        let values: Vec<f64> = run
+            .waveforms
+            .values
+            .iter()
+            .skip(at)
+            .step_by(columns)
+            .copied()
+            .collect();
+        let steps = values.len() - 1;
+        values.windows(2).map(|w| 0.5 * (w[0] + w[1])).sum::<f64>() / steps as f64
+    };
+    // The mean of v(2) is D V, and no voltage stands across the inductor on average.
+    assert!((mean("v(3)") - 4.0).abs() < 1e-6, "{}", mean("v(3)"));
+}
+
+/// The voltage-mode buck of F. Vasca and M. di Bernardo (eds.), Dynamics and Control of Switched Electronic Systems (2012), chapter 1: L = 20 mH,
+/// C = 47 µF, R = 22 Ω, T = 400 µs, ramp 3.8 V to 8.2 V, gain 8.4, reference 11.3 V.
+fn voltage_mode_buck(vin: f64, order: Option<usize>) -> Orbit {
+    let text = format!(
+        "* t\nv1 1 0 {vin}\ns1 1 2 ramp co sw\nd1 0 2 d\nl1 2 3 20m\nc1 3 0 47u ic=11\nr1 3 0 22\n\
+         b1 co 0 v=8.4*(v(3)-11.3)\nvr ramp 0 pulse(3.8 8.2 0 400u 0 0 400u)\n.model d d(ideal)\n\
+         .model sw sw(vt=0 vh=0 ron=0 ideal=1)\n.tran 1u 40m uic\n.end\n"
+    );
+    let options = PeriodicOptions {
+        order,
+        ..PeriodicOptions::default()
+    };
+    periodic(&parsed(&text), &options).expect("an orbit").0
+}
+
+/// Its orbit of one period loses its stability at 24.5 V by a doubling of the period, that of two at 31.1 V.
+#[test]
+fn a_voltage_mode_buck_doubles_its_period_where_it_is_known_to() {
+    for (vin, order) in [
+        (22.0, 1),
+        (24.5, 1),
+        (24.53, 2),
+        (30.0, 2),
+        (31.0, 2),
+        (31.2, 4),
+    ] {
+        let orbit = voltage_mode_buck(vin, None);
+        assert!(orbit.stable && orbit.order == order, "{vin} V: {orbit:?}");
+        assert!(orbit.residual <= 1e-12, "{vin} V: {orbit:?}");
+    }
+    for vin in [26.0, 33.0] {
+        let first = voltage_mode_buck(vin, Some(1));
+        assert!(
+            !first.stable && first.multipliers[0][0] < -1.2,
+            "{vin} V: {first:?}"
+        );
+        // Between events the divergence is −1/(RC), and no event changes a volume: det M = e^{−T/(RC)}.
+        let product = first.multipliers[0][0] * first.multipliers[1][0];
+        let expected = (-400e-6_f64 / (22.0 * 47e-6)).exp();
+        assert!((product - expected).abs() < 1e-6, "{product} {expected}");
+    }
+}
+
+/// A capacitor is charged through 10 kΩ to 7 V, and discharged to 3 V through 100 Ω: T = Σ τ ln((V∞ − V₀)/(V∞ − V₁)).
+#[test]
+fn a_relaxation_oscillator_has_the_period_of_its_closed_form() {
+    let text = "* t\nv1 1 0 10\nr1 1 2 10k\nc1 2 0 1u ic=0\ns1 2 3 2 0 sw\nr2 3 0 100\n\
+                .model sw sw(vt=5 vh=2 ron=0 ideal=1)\n.tran 1u 50m uic\n.end\n";
+    let (orbit, run) = orbit_of(text);
+    let (slow, fast) = (1e-2_f64, 1e-6 / (1e-4 + 1e-2));
+    let rest: f64 = 10.0 * 100.0 / 10_100.0;
+    let expected = slow * (7.0_f64 / 3.0).ln() + fast * ((7.0 - rest) / (3.0 - rest)).ln();
+    assert_eq!(orbit.kind, OrbitKind::Autonomous);
+    assert!(
+        (orbit.period / expected - 1.0).abs() < 1e-12,
+        "{} {expected}",
+        orbit.period
+    );
+    assert_eq!(run.waveforms.time.last(), Some(&orbit.period));
+    // The one multiplier is trivial.
+    assert!(
+        orbit.multipliers.is_empty() && orbit.section.is_some(),
+        "{orbit:?}"
+    );
+}
+
+/// A tank that rings down through a diode has events without end, and no orbit but its rest.
+#[test]
+fn what_rings_down_is_at_rest() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("netlists/bridge-resistor.cir");
+    let model = Model::load(path, circ::ElaborateOptions::default()).expect("a netlist");
+    let (orbit, _) = periodic(&model, &PeriodicOptions::default()).expect("its rest");
+    assert!(
+        orbit.kind == OrbitKind::Equilibrium && orbit.stable,
+        "{orbit:?}"
+    );
+}
+
+/// A capacitor that nothing charges keeps what it has.
+#[test]
+fn what_is_not_unique_is_named() {
+    let text = "* t\nv1 1 0 sin(0 1 1k)\nr1 1 2 1k\nc1 2 0 1u\nc2 3 0 1u ic=5\nr3 3 4 1\nc4 4 0 1u ic=1\n.tran 1u 1m uic\n.end\n";
+    let (_, run) = orbit_of(text);
+    let told = run
+        .notes
+        .iter()
+        .find(|note| note.text.contains("not unique"));
+    let told = told.expect("a note").text.clone();
+    assert!(
+        told.contains("v(c2)") && told.contains("v(c4)") && !told.contains("v(c1)"),
+        "{told}"
+    );
+}
+
+#[test]
+fn what_has_no_orbit_is_refused_with_a_reason() {
+    let no_orbit = |error: &Error| matches!(error.reason, Reason::NoOrbit(_));
+    // A tank driven at its resonance, and a source that charges a capacitor.
+    let w = 1.0 / (2.0 * std::f64::consts::PI);
+    for text in [
+        format!("* t\nv1 1 0 sin(0 1 {w:e})\nl1 1 2 1\nc1 2 0 1\n.tran 0.1 50 uic\n.end\n"),
+        "* t\ni1 0 1 pulse(0 1m 0 0 0 1u 10u)\nc1 1 0 1u\n.tran 1u 1m uic\n.end\n".to_string(),
+        "* t\nv1 1 0 sin(0 1 50)\nr1 1 0 1\nv2 2 0 sin(0 1 50.0001)\nr2 2 0 1\n.tran 1m 1\n.end\n".to_string(),
+        "* t\nv1 1 0 sin(0 1 1k)\nr1 1 2 50\nt1 2 0 3 0 z0=50 td=1u\nr2 3 0 70\n.tran 1u 1m\n.end\n".to_string(),
+    ] {
+        let error = refused(&text);
+        assert!(no_orbit(&error), "{text}{error}");
+    }
+}
