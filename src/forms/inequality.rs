@@ -1,15 +1,15 @@
 //! The evolution variational inequality of the second kind (RR-7158 (17)) behind a Lur'e system.
 
+use std::rc::Rc;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::lure::{Lure, Phi};
 use super::sweeping::square_root;
-use super::{FormError, require};
+use super::{FormError, Linear, require};
 use crate::check::Feedthrough;
-use crate::passivity::gradient;
-use crate::settings::Settings;
+use crate::passivity::{System, gradient};
 use crate::settings::tolerances::ranks::ENTRY;
-use crate::solve::{Driver, Status};
 
 /// ⟨X' − VAV⁻¹X − Λ(X) − Vf(t), v − X⟩ + Ξ(v) − Ξ(X) ≥ 0 for all v, with X = Vx, Ξ = Φ_I ∘ C_I V⁻¹ and the Lipschitz
 /// operator Λ(X) = VB_II(D_II + ∂Φ_II^{*,−})⁻¹(−C_II V⁻¹X).
@@ -25,6 +25,8 @@ pub struct VariationalInequality {
     pub multivalued: Vec<usize>,
     /// The others.
     pub single: Vec<usize>,
+    /// The system of the ports II alone.
+    fed: Lure,
 }
 
 impl VariationalInequality {
@@ -69,8 +71,10 @@ impl VariationalInequality {
             condition: "Assumption 2: W is singular",
             size: 0.0,
         })?;
+        let fed = ports_alone(lure, &single)?;
         Ok(Self {
             lure: lure.clone(),
+            fed,
             v,
             v_inverse,
             multivalued,
@@ -78,29 +82,12 @@ impl VariationalInequality {
         })
     }
 
-    /// λ_II = (D_II + ∂Φ_II^{*,−})⁻¹(−C_II x − f_II), complementary pairs.
+    /// λ_II = (D_II + ∂Φ_II^{*,−})⁻¹(−C_II x − f_II).
     ///
     /// # Errors
     /// [`FormError::Step`] if it was not found.
     pub fn lambda(&self, t: f64, x: &DVector<f64>) -> Result<DVector<f64>, FormError> {
-        let system = &self.lure.linear.system;
-        let d = system
-            .d
-            .select_rows(&self.single)
-            .select_columns(&self.single);
-        let q = system.c.select_rows(&self.single) * x
-            + (self.lure.linear.f)(t).select_rows(&self.single);
-        if q.is_empty() {
-            return Ok(q);
-        }
-        let solution = Driver::new(d, Settings::default().lcp_residual).solve(&q);
-        match solution.status {
-            Status::Solved => Ok(solution.lambda),
-            _ => Err(FormError::Step {
-                t,
-                reason: "Λ_II was not evaluated",
-            }),
-        }
+        Ok(self.fed.ports(t, x)?.0)
     }
 
     /// VAV⁻¹X + Λ(X) + Ve(t).
@@ -147,4 +134,21 @@ impl VariationalInequality {
         let force = velocity - self.drift(t, big_x)?;
         Ok(force.dot(&(v - big_x)) + self.xi(t, v, 0.0) - self.xi(t, big_x, tolerance))
     }
+}
+
+/// (A, B_II, C_II, D_II) with the laws of those ports.
+fn ports_alone(lure: &Lure, ports: &[usize]) -> Result<Lure, FormError> {
+    let (system, f) = (&lure.linear.system, lure.linear.f.clone());
+    let chosen = ports.to_vec();
+    let linear = Linear::new(
+        System {
+            a: system.a.clone(),
+            b: system.b.select_columns(ports),
+            c: system.c.select_rows(ports),
+            d: system.d.select_rows(ports).select_columns(ports),
+        },
+        lure.linear.e.clone(),
+        Rc::new(move |t| f(t).select_rows(&chosen)),
+    )?;
+    Lure::new(linear, ports.iter().map(|&j| lure.phi[j]).collect())
 }

@@ -2,8 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{FormError, Linear, Signal, Trajectory};
+use super::{Complementarity, FormError, Linear, Signal, Trajectory};
 use crate::passivity::System;
+use crate::settings::Settings;
+use crate::solve::{Driver, Status};
 
 /// A convex, proper, lower semicontinuous φ: R → R ∪ {+∞}.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -158,16 +160,7 @@ impl Lure {
         let System { a, b, c, d } = &self.linear.system;
         let (n, m) = (a.nrows(), d.nrows());
         // λ = Kλ' + … first: λ = λ' − R y for the quadratic ports (R diagonal), y = T(Cx + Dλ' + f).
-        let r = DMatrix::from_diagonal(&DVector::from_iterator(
-            m,
-            self.phi.iter().map(|phi| {
-                if let Phi::Quadratic { stiffness } = phi {
-                    *stiffness
-                } else {
-                    0.0
-                }
-            }),
-        ));
+        let r = self.stiffness();
         let loops = DMatrix::identity(m, m) + d * &r;
         let t = loops.clone().try_inverse().ok_or(FormError::Hypothesis {
             statement: "quadratic φ",
@@ -228,6 +221,71 @@ impl Lure {
         })
     }
 
+    /// λ and y at a state, where the state determines them: (D + ∂Φ^{*,−})⁻¹(−Cx − f) and Cx + Dλ + f.
+    ///
+    /// # Errors
+    /// Those of [`Lure::expand`]; [`FormError::Step`] if λ was not found.
+    pub fn ports(
+        &self,
+        t: f64,
+        x: &DVector<f64>,
+    ) -> Result<(DVector<f64>, DVector<f64>), FormError> {
+        let expansion = self.expand()?;
+        let pairs = &expansion.linear;
+        let q = pairs.constraint(t, x);
+        let mu = if q.is_empty() {
+            q
+        } else {
+            let mut driver = Driver::new(pairs.system.d.clone(), Settings::default().lcp_residual);
+            let solution = driver.solve(&q);
+            if solution.status != Status::Solved {
+                return Err(FormError::Step {
+                    t,
+                    reason: "λ of the ports was not found",
+                });
+            }
+            solution.lambda
+        };
+        self.read_back(&expansion, t, x, &mu)
+    }
+
+    /// λ and y of the ports from the μ of the pairs. For quadratic φ λ = λ' − ry with y = Cx + Dλ + f.
+    fn read_back(
+        &self,
+        expansion: &Expansion,
+        t: f64,
+        x: &DVector<f64>,
+        mu: &DVector<f64>,
+    ) -> Result<(DVector<f64>, DVector<f64>), FormError> {
+        let system = &self.linear.system;
+        let free = &expansion.map * mu + &expansion.offset;
+        let base = &system.c * x + (self.linear.f)(t);
+        let (r, m) = (self.stiffness(), system.m());
+        if m == 0 {
+            return Ok((free, base));
+        }
+        let y = (DMatrix::identity(m, m) + &system.d * &r)
+            .lu()
+            .solve(&(base + &system.d * &free))
+            .ok_or(FormError::Step {
+                t,
+                reason: "1 + DR is singular",
+            })?;
+        Ok((free - r * &y, y))
+    }
+
+    /// R, m×m: the stiffness of the quadratic φ, zero for the others.
+    fn stiffness(&self) -> DMatrix<f64> {
+        let of = |phi: &Phi| match phi {
+            Phi::Quadratic { stiffness } => *stiffness,
+            _ => 0.0,
+        };
+        DMatrix::from_diagonal(&DVector::from_iterator(
+            self.phi.len(),
+            self.phi.iter().map(of),
+        ))
+    }
+
     /// `steps` implicit steps from x₀; λ and y of the trajectory are those of the Lur'e system's own ports.
     ///
     /// # Errors
@@ -240,32 +298,10 @@ impl Lure {
     ) -> Result<Trajectory, FormError> {
         let expansion = self.expand()?;
         let mut trajectory = expansion.linear.integrate(span, x0, steps)?;
-        let system = &self.linear.system;
-        let m = system.m();
         for k in 0..trajectory.t.len() {
-            let free = &expansion.map * &trajectory.lambda[k] + &expansion.offset;
-            let x = &trajectory.x[k];
-            let base = &system.c * x + (self.linear.f)(trajectory.t[k]);
-            // The quadratic ports: λ = −r y, y = Cx + Dλ + f.
-            let r = DMatrix::from_diagonal(&DVector::from_iterator(
-                m,
-                self.phi.iter().map(|phi| {
-                    if let Phi::Quadratic { stiffness } = phi {
-                        *stiffness
-                    } else {
-                        0.0
-                    }
-                }),
-            ));
-            let loops = DMatrix::identity(m, m) + &system.d * &r;
-            let y = loops
-                .lu()
-                .solve(&(&base + &system.d * &free))
-                .ok_or(FormError::Step {
-                    t: trajectory.t[k],
-                    reason: "1 + DR is singular",
-                })?;
-            trajectory.lambda[k] = free - r * &y;
+            let (t, x, mu) = (trajectory.t[k], &trajectory.x[k], &trajectory.lambda[k]);
+            let (lambda, y) = self.read_back(&expansion, t, x, mu)?;
+            trajectory.lambda[k] = lambda;
             trajectory.y[k] = y;
         }
         Ok(trajectory)

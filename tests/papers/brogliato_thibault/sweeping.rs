@@ -10,7 +10,7 @@ use circ::passivity::System;
 use circ::solve::{Lcp, enumerate};
 use nalgebra::{DMatrix, DVector, dmatrix, dvector};
 
-use super::super::{Random, filter};
+use super::super::{Random, every_solution_of_a_step, filter};
 use super::gradient_type;
 
 /// 3(sin 3t), 2(cos 5t): sweeps a set in every direction.
@@ -272,13 +272,9 @@ fn theorem_3_5_uniqueness_by_contraction_and_absolute_continuity() {
         assert!(largest < 20.0, "{largest}");
         swept += usize::from(one.lambda.iter().any(|l| l.amax() > 0.0));
         for k in (1..steps).step_by(50) {
-            every_solution_steps_to_the_same_state(
-                &process,
-                one.t[k - 1],
-                &one.x[k - 1],
-                &one.x[k],
-                h,
-            );
+            let found = every_solution_of_a_step(&process, one.t[k - 1], &one.x[k - 1], h);
+            assert!(!found.is_empty());
+            assert!(found.iter().all(|(z, _)| (z - &one.x[k]).norm() < 1e-8));
         }
         // Moreau's catching up, explicit in the drift.
         let distance = |steps: usize| {
@@ -295,31 +291,6 @@ fn theorem_3_5_uniqueness_by_contraction_and_absolute_continuity() {
         assert!(d2 < 0.05 && (1.7..2.3).contains(&(d1 / d2)), "{d1} {d2}");
     }
     assert!(swept >= 3);
-}
-
-/// All solutions of the step's problem, by enumeration: z⁺ = (1 − hA)⁻¹(z + h(e + Bλ)).
-fn every_solution_steps_to_the_same_state(
-    process: &SweepingProcess,
-    t: f64,
-    z: &DVector<f64>,
-    next: &DVector<f64>,
-    h: f64,
-) {
-    let n = z.len();
-    let implicit = DMatrix::identity(n, n) - Complementarity::drift_jacobian(process, t, z) * h;
-    let inverse = implicit.try_inverse().unwrap();
-    let (b, zero) = (process.input(z), DVector::zeros(n));
-    let c = Complementarity::constraint_jacobian(process, t, z);
-    let free = &inverse * (z + Complementarity::drift(process, t + h, &zero) * h);
-    let problem = Lcp {
-        m: &c * &inverse * &b * h,
-        q: &c * &free + Complementarity::constraint(process, t + h, &zero),
-    };
-    let found = enumerate::solve(&problem, 1e-9);
-    assert!(!found.is_empty());
-    for lambda in found {
-        assert!((&free + &inverse * &b * lambda * h - next).norm() < 1e-8);
-    }
 }
 
 /// Remark 3.6: of Eu nothing is asked but that it is integrable. x' = e + ζ, x ≥ i(t) with e = ±1/(2√|t − s|) has the solution
