@@ -6,7 +6,7 @@ use super::facts::Facts;
 use super::program;
 use crate::passivity::scale;
 use crate::settings::Settings;
-use crate::settings::tolerances::ranks::{ENTRY, RANK};
+use crate::settings::tolerances::ranks::ENTRY;
 use crate::settings::tolerances::theorems::ROUGH_EQUILIBRIUM;
 use crate::solve::enumerate;
 use crate::solve::{Driver, Lcp, Status};
@@ -159,14 +159,9 @@ fn singular(facts: &Facts) -> Option<(DVector<f64>, DVector<f64>)> {
     let (a, b) = stack(&[(&flow, &e), (&zero.0, &zero.1), (&positive.0, &positive.1)]);
     let norm = DMatrix::from_fn(n + m, n + m, |i, k| if i == k { 1.0 } else { 0.0 });
     let z = program::minimise(&norm, &DVector::zeros(n + m), &a, &b, n + m)?;
-    let z = polished(
-        z,
-        &a.rows(0, n + m).into_owned(),
-        &b.rows(0, n + m).into_owned(),
-    );
 
     let size_of_z = z.amax().max(1.0);
-    // Each x_k' beside its own terms: a leak that nothing carries away is no rest, however small.
+    // Each x_k' beside its own terms, down to rounding: a small leak that nothing carries away is no rest.
     let rest = (&flow * &z + &e).abs();
     let terms = flow.abs() * z.abs() + e.abs();
     let rests =
@@ -181,14 +176,4 @@ fn singular(facts: &Facts) -> Option<(DVector<f64>, DVector<f64>)> {
             * size,
     );
     (rests && sides <= ROUGH_EQUILIBRIUM * size_of_z).then_some(found)
-}
-
-/// The point of Az + b = 0 next to z, as far as there is one: what the interior point method leaves open is rounding then.
-fn polished(z: DVector<f64>, a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
-    let svd = a.clone().svd(true, true);
-    let smallest = RANK * svd.singular_values.max();
-    match svd.solve(&(a * &z + b), smallest) {
-        Ok(step) => z - step,
-        Err(_) => z,
-    }
 }

@@ -2,6 +2,8 @@
 //!
 //! The systems are so small that the hypotheses can be read off their matrices; x' = −x + … is a leaky 1 F capacitor.
 
+mod complementarity;
+
 use super::*;
 use crate::law::Curve;
 
@@ -191,6 +193,11 @@ fn proposition_3_asks_for_20() {
     let crossed = leaky(&[1.0, 1.0], dmatrix![0.5, 0.5; 0.5, 0.5]);
     holds(&crossed, KATO);
     assert!(verdict(&crossed, KATO).1.contains("Proposition 3"));
+    // ker = span e₂, De₂ = ∓e₁: with the upper sign outside of the dual cone.
+    let turned = |d: f64| leaky(&[1.0, 0.0], dmatrix![1.0, -d; d, 0.0]);
+    holds(&turned(1.0), KATO);
+    assert!(verdict(&turned(1.0), KATO).1.contains("Proposition 3"));
+    fails_by(&turned(-1.0), KATO, "(20) fails");
     // I − uuᵀ with u ∝ (1, 2, 3): D u is rounding, not a direction.
     let u = DVector::from_column_slice(&[1.0, 2.0, 3.0]).normalize();
     let d = DMatrix::identity(3, 3) - &u * u.transpose();
@@ -205,6 +212,10 @@ fn proposition_3_asks_for_21() {
         KATO,
         "(21)",
     );
+    // C alone, B alone.
+    let mut circuit = leaky(&[1.0, 1.0], dmatrix![0.5, 0.5; 0.5, 0.5]);
+    change(&mut circuit, |s| s.c[(1, 0)] = 2.0);
+    fails_by(&circuit, KATO, "up to 3.2e-1 and");
     let mut circuit = leaky(&[1.0, 1.0], dmatrix![0.5, 0.5; 0.5, 0.5]);
     change(&mut circuit, |s| s.b[(0, 1)] = -1.0);
     fails_by(&circuit, KATO, "and 1.4e0");
@@ -274,77 +285,6 @@ fn theorem_2_asks_for_a_monotone_feedthrough_and_a_common_range() {
 }
 
 #[test]
-fn theorem_3_5_asks_for_a_set_that_is_never_empty() {
-    // |x| ≤ 1 − u.
-    let channel = |f: [f64; 2]| with_offsets(antiparallel(), &f);
-    holds(&channel([0.0, 0.0]), SWEEPING);
-    fails_by(&channel([-1.0, -1.0]), SWEEPING, "S(t) is empty");
-    // u ∈ [−½, ½] leaves room, u ∈ [−½, 3/2] does not at its upper end, nor −u at its lower one.
-    let swept = |wave: Wave, sign: f64| driven(channel([1.0, 1.0]), wave, 0.0, &[sign, sign]);
-    holds(&swept(sine(0.0, 0.5, 0.0), -1.0), SWEEPING);
-    fails_by(&swept(sine(0.5, 1.0, 0.0), -1.0), SWEEPING, "S(t) is empty");
-    fails_by(&swept(sine(-0.5, 1.0, 0.0), 1.0), SWEEPING, "S(t) is empty");
-    // Two sources: empty only where one is high and the other low.
-    let two = driven(
-        swept(sine(0.0, 0.6, 0.0), -1.0),
-        sine(0.0, 0.6, 0.0),
-        0.0,
-        &[1.0, 1.0],
-    );
-    fails_by(&two, SWEEPING, "S(t) is empty");
-    let two = driven(
-        swept(sine(0.0, 0.4, 0.0), -1.0),
-        sine(0.0, 0.4, 0.0),
-        0.0,
-        &[1.0, 1.0],
-    );
-    holds(&two, SWEEPING);
-    // A swing that grows leaves any channel some day: not decided by corners.
-    let (decided, because) = verdict(&swept(sine(0.0, 0.5, -1.0), -1.0), SWEEPING);
-    assert_eq!(decided, None, "{because}");
-    assert!(because.contains("v1 is unbounded"));
-    // Where (22) holds S(t) is never empty, bounded or not.
-    let free = leaky(&[1.0, 2.0], DMatrix::zeros(2, 2));
-    holds(
-        &driven(free, sine(0.0, 0.5, -1.0), 0.0, &[-1.0, 1.0]),
-        SWEEPING,
-    );
-}
-
-#[test]
-fn theorem_3_5_asks_for_complementary_pairs_and_no_feedthrough() {
-    fails_by(
-        &leaky(&[1.0], dmatrix![1.0]),
-        SWEEPING,
-        "D ≠ 0 (largest entry 1.00e0)",
-    );
-    let resistor = curve((0.0, 0.0), (1.0, 1.0), (1.0, 1.0));
-    fails_by(
-        &with_laws(leaky(&[1.0], dmatrix![0.0]), &[resistor]),
-        SWEEPING,
-        "not a complementary pair: d1",
-    );
-}
-
-#[test]
-fn section_3_3_asks_for_blocks_and_a_p_matrix() {
-    let blocks = |d: DMatrix<f64>| leaky(&[1.0, 0.5], d);
-    holds(&blocks(dmatrix![0.0, 0.0; 0.0, 1.0]), BLOCKS);
-    fails_by(&blocks(DMatrix::zeros(2, 2)), BLOCKS, "this is Theorem 3.5");
-    fails_by(
-        &blocks(dmatrix![0.0, 0.0; 0.0, -1.0]),
-        BLOCKS,
-        "D₁ (1×1) is not a P-matrix",
-    );
-    // A row of zeros without its column, and the other way round, is no block.
-    for d in [dmatrix![0.0, 0.0; 1.0, 1.0], dmatrix![0.0, 1.0; 0.0, 1.0]] {
-        fails_by(&blocks(d.clone()), BLOCKS, "D₁ (2×2) is not a P-matrix");
-        // RR-7158 (6) splits the same way: with D + Dᵀ indefinite nothing is left for Theorem 1.
-        fails_by(&blocks(d), KATO, "neither positive semidefinite");
-    }
-}
-
-#[test]
 fn assumption_7_asks_for_rest_at_zero() {
     let quiet = leaky(&[1.0], dmatrix![1.0]);
     let mut fed = quiet.clone();
@@ -371,4 +311,51 @@ fn assumption_7_asks_for_rest_at_zero() {
     // Theorem 5 needs φ* to grow: a forward drop does it, an ideal diode does not.
     holds(&with_offsets(quiet.clone(), &[1.0]), "RR-7158 Theorem 5");
     fails_by(&quiet, "RR-7158 Theorem 5", "for z ≠ 0 fails");
+}
+
+#[test]
+fn the_order_of_steps_asks_for_a_well_posed_system_and_for_cones() {
+    let order = |circuit: &Lcs| {
+        let report = system(circuit);
+        let found = theorem(&report, "RR-7158 Remark 7").clone();
+        (found.holds, found.gives)
+    };
+    let (holds, gives) = order(&leaky(&[1.0], dmatrix![1.0]));
+    assert!(
+        holds == Some(true) && gives.ends_with("with order 1"),
+        "{gives}"
+    );
+    let resistor = curve((0.0, 0.0), (1.0, 1.0), (1.0, 1.0));
+    let (holds, gives) = order(&with_laws(leaky(&[1.0], dmatrix![1.0]), &[resistor]));
+    assert!(
+        holds == Some(true) && gives.ends_with("with order 1/2 at least"),
+        "{gives}"
+    );
+    fails_by(
+        &leaky(&[1.0], dmatrix![-1.0]),
+        "RR-7158 Remark 7",
+        "none of the above applies",
+    );
+}
+
+#[test]
+fn the_dissipation_argument_asks_for_rest_and_passivity() {
+    const DISSIPATION: &str = "Dissipation argument";
+    let quiet = leaky(&[1.0], dmatrix![1.0]);
+    holds(&quiet, DISSIPATION);
+    // Driven, there is no equilibrium to ask for either.
+    let (driven_holds, because) =
+        verdict(&driven(quiet.clone(), square(), 1.0, &[0.0]), DISSIPATION);
+    assert_eq!(driven_holds, Some(false));
+    assert!(
+        because.starts_with("not autonomous: driven by v1; no equilibrium"),
+        "{because}"
+    );
+    let mut active = quiet.clone();
+    change(&mut active, |s| s.a[(0, 0)] = 1.0);
+    fails_by(&active, DISSIPATION, "not passive");
+    // A source that fills a capacitor for ever.
+    let mut filled = quiet;
+    change(&mut filled, |s| (s.a[(0, 0)], s.e0[0]) = (0.0, 1.0));
+    fails_by(&filled, DISSIPATION, "no equilibrium was found");
 }

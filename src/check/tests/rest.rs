@@ -235,3 +235,23 @@ fn a_leak_that_nothing_carries_away_is_no_equilibrium() {
         );
     }
 }
+
+#[test]
+fn a_small_part_of_a_circuit_rests_to_its_own_digits() {
+    // The detector of 5 V rests wherever it was charged; a loaded capacitor on a source of δ beside it rests at δ.
+    for delta in [1e-3, 1e-6, 1e-9] {
+        let mut circuit = lcs(
+            "i",
+            dmatrix![0.0, 0.0; 0.0, -1.0],
+            dmatrix![1.0; 0.0],
+            dmatrix![1.0, 0.0],
+            dmatrix![1.0],
+            DMatrix::identity(2, 2),
+        );
+        change(&mut circuit, |s| (s.e0[1], s.f[0]) = (delta, -5.0));
+        let found = system(&circuit).equilibria.unwrap_or_default();
+        let rest = found.first().unwrap_or_else(|| panic!("δ = {delta}"));
+        assert!((rest.x[0] - 5.0).abs() < 1e-8, "{rest:?}");
+        assert!((rest.x[1] / delta - 1.0).abs() < 1e-6, "{rest:?}");
+    }
+}

@@ -257,9 +257,8 @@ impl Exact {
             .filter(|&k| may_pass(k))
             .collect();
         if !candidates.is_empty() {
-            let mode = &mut self.table.modes[at];
-            let (t, now) = (self.travel.t, &self.travel.now[..mode.n]);
-            self.inspector.look(mode, now, (t, &self.sources.z));
+            let now = &self.travel.now[..mode.n];
+            self.inspector.look(mode, now, &self.sources.z);
             for k in candidates {
                 let mode = &self.table.modes[at];
                 if self.inspector.leaves(mode, first + k, self.travel.t) {
@@ -435,19 +434,17 @@ impl Exact {
         // What happens at the end of a step is left to the step that arrives there.
         let longest = longest_step(self.table.output_step());
         let negligible = SAME_TIME * (t + longest).abs();
-        let (before, last) = (next - negligible, self.until + negligible);
-        let next = (next <= last).then_some(next);
+        let end = (next - negligible).min(self.until + negligible);
         let mode = &mut self.table.modes[at];
-        self.dense
-            .step(&mut self.travel, mode, (t, before.min(last)), next)
+        self.dense.step(&mut self.travel, mode, t, end)
     }
 
-    /// Stands at the last row that was asked for, or where the step over the rows ends if that is no later than `t`.
-    fn end_ahead(&mut self, t: f64) {
+    /// Stands at the last row that was asked for.
+    fn end_ahead(&mut self) {
         if let Some(at) = self.mode {
             let flow = &mut self.table.modes[at].flow;
-            let exosystem = &self.sources.exosystem;
-            self.dense.end(&mut self.travel, flow, exosystem, t);
+            self.dense
+                .end(&mut self.travel, flow, &self.sources.exosystem);
         }
     }
 
@@ -484,7 +481,7 @@ impl Stepper for Exact {
             if self.dense.take(t, self.table.output_step()) {
                 return Ok(());
             }
-            self.end_ahead(t);
+            self.end_ahead();
         }
         loop {
             let next = self.sources.next_stop;
@@ -552,7 +549,7 @@ impl Stepper for Exact {
     }
 
     fn finish(&mut self) -> Outcome {
-        self.end_ahead(self.dense.t);
+        self.end_ahead();
         self.take_storage();
         let (t, duration) = (self.travel.t, self.duration);
         let mut outcome = self.report.finish(&self.table, t, duration);

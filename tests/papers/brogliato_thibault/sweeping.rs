@@ -381,6 +381,7 @@ fn section_3_3_block_feedthrough_is_a_sweeping_process() {
     assert!(SweepingProcess::with_feedthrough(&Linear::autonomous(system).unwrap(), None).is_err());
 }
 
+/// Lemma 3.8: (5) is the cone complementarity system (31), whose cones are dual.
 #[test]
 fn lemma_3_8_cone_complementarity_of_a_singular_feedthrough() {
     let mut random = Random(38);
@@ -398,16 +399,36 @@ fn lemma_3_8_cone_complementarity_of_a_singular_feedthrough() {
         let (lambda, y) = cone.original(&zeta, &w);
         assert!((lambda - &run.lambda[k]).amax() < 1e-9 && (y - &run.y[k]).amax() < 1e-9);
     }
-    // The two cones are dual: ⟨ζ̄, w̄⟩ ≥ 0 for members; the violation sees what is not one.
+    // The two cones are dual: ⟨ζ̄, w̄⟩ ≥ 0 for members, and what is outside of one makes less than 0 with a member of the other.
     for _ in 0..50 {
-        let (zeta, w) = cone.variables(
-            &random.vector(4).map(f64::abs),
-            &random.vector(4).map(f64::abs),
-        );
-        assert!(zeta.dot(&w) >= -1e-12);
+        let (lambda, y) = (random.vector(4), random.vector(4).map(f64::abs));
+        let (zeta, w) = cone.variables(&lambda, &y);
+        let (members, _) = cone.variables(&lambda.map(f64::abs), &y);
+        assert!(members.dot(&w) >= -1e-12);
+        let worst = lambda.imin();
+        if lambda[worst] < 0.0 {
+            let unit = DVector::from_fn(4, |j, _| if j == worst { 1.0 } else { 0.0 });
+            assert!(zeta.dot(&cone.variables(&lambda, &unit).1) < 0.0);
+        }
     }
-    let outside = cone.variables(&-random.vector(4).map(f64::abs), &DVector::zeros(4));
-    assert!(cone.violation(0.0, &dvector![0.0], &outside.0, &outside.1) > 1e-3);
+    // Each part of (31) by itself. At x = 0 y = Dλ is orthogonal to λ for skew D: only the cones are left to be violated.
+    for _ in 0..20 {
+        let lambda = random.vector(4);
+        let y = &linear.system.d * &lambda;
+        let (zeta, w) = cone.variables(&lambda, &y);
+        let outside = (-lambda.min()).max(-y.min()).max(0.0);
+        let found = cone.violation(0.0, &dvector![0.0], &zeta, &w);
+        assert!((found - outside).abs() < 1e-12, "{found} {outside}");
+    }
+    // λ = e₁ at x > 0: in the cones, y = Cx + Dλ ≥ 0, and λᵀy = x.
+    let x = dvector![0.4];
+    let lambda = dvector![1.0, 0.0, 0.0, 0.0];
+    let y = &linear.system.c * &x + &linear.system.d * &lambda;
+    let (zeta, w) = cone.variables(&lambda, &y);
+    assert!(y.min() >= 0.0 && (cone.violation(0.0, &x, &zeta, &w) - 0.4).abs() < 1e-12);
+    // The equation: w off by something.
+    let aside = &w + dvector![0.0, 0.3, 0.0, 0.0];
+    assert!(cone.violation(0.0, &x, &zeta, &aside) > 0.2);
     // A V that does not block-diagonalise D is refused.
     assert!(ConeComplementarity::with(&linear, &DMatrix::identity(4, 4)).is_err());
 }

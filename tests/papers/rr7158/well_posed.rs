@@ -83,6 +83,44 @@ fn section_3_1_4_theorem_1_on_the_circuit_of_figure_2() {
     assert!(VariationalInequality::of(&other, None).is_err());
 }
 
+/// (17) with a φ that is no indicator function: Ξ(v) − Ξ(X) counts. A mass on a spring with dry friction of ½; the force of friction the
+/// other way round violates it.
+#[test]
+fn equation_17_with_friction() {
+    let system = System {
+        a: dmatrix![0.0, 1.0; -1.0, 0.0],
+        b: dmatrix![0.0; 1.0],
+        c: dmatrix![0.0, 1.0],
+        d: dmatrix![0.0],
+    };
+    let friction = Phi::Relay { gain: 0.5 };
+    let lure = Lure::new(Linear::autonomous(system.clone()).unwrap(), vec![friction]).unwrap();
+    let inequality = VariationalInequality::of(&lure, None).unwrap();
+    assert!((&inequality.v - DMatrix::identity(2, 2)).amax() < 1e-12);
+    let (steps, h) = (600, 0.02);
+    let run = lure
+        .integrate((0.0, 12.0), &dvector![3.3, 0.0], steps)
+        .unwrap();
+    let mut random = Random(170);
+    let mut refused = 0;
+    for k in 1..=steps {
+        let x = &run.x[k];
+        let velocity = (x - &run.x[k - 1]) / h;
+        let reversed = &velocity - &system.b * &run.lambda[k] * 2.0;
+        for _ in 0..5 {
+            let v = x + random.vector(2);
+            let left = |velocity: &DVector<f64>| {
+                inequality
+                    .left_side(run.t[k], x, velocity, &v, 0.0)
+                    .unwrap()
+            };
+            assert!(left(&velocity) >= -1e-9);
+            refused += usize::from(left(&reversed) < -1e-3);
+        }
+    }
+    assert!(refused > steps, "{refused}");
+}
+
 /// Remark 2: X ∈ Dom(∂Ξ) iff C_I x ∈ Dom(∂Φ_I): Ξ is finite where y_I ≥ 0.
 #[test]
 fn remark_2_the_domain_in_x() {
@@ -337,6 +375,13 @@ fn remark_6_markov_parameter_is_symmetric_semidefinite() {
         let p = with_markov(&s).expect("CB ≻ 0");
         assert!(p.clone().cholesky().is_some());
         assert!((&p * &b - (&s * &left).transpose()).amax() < 1e-8 * p.amax());
+        // A candidate counts if it fits, and not otherwise.
+        let among = |candidate: &DMatrix<f64>| {
+            passivity::gradient::storage(&b, &(&s * &left), Some(candidate)).expect("CB ≻ 0")
+        };
+        assert_eq!(among(&p), p);
+        let other = among(&DMatrix::identity(4, 4));
+        assert!((&other * &b - (&s * &left).transpose()).amax() < 1e-8 * other.amax());
         let mut skewed = s.clone();
         skewed[(0, 1)] += 0.05;
         assert!(with_markov(&skewed).is_none());
