@@ -187,6 +187,23 @@ impl<'a> Accompanied<'a> {
     }
 }
 
+impl Accompanied<'_> {
+    /// Compares a row of the run with those companions that stand at its time.
+    fn compare(&mut self, row: &[f64]) {
+        let t = self.run.time();
+        let here = |c: &&mut Companion<'_>| c.stepper.as_ref().is_some_and(|s| s.time() == t);
+        for companion in self.companions.iter_mut().filter(here) {
+            let Companion {
+                difference,
+                row: other,
+                ..
+            } = companion;
+            difference.compare(t, row, other);
+            companion.next += companion.by.stride;
+        }
+    }
+}
+
 impl Stepper for Accompanied<'_> {
     fn time(&self) -> f64 {
         self.run.time()
@@ -212,16 +229,8 @@ impl Stepper for Accompanied<'_> {
 
     fn read(&mut self, row: &mut [f64]) {
         self.run.read(row);
-        let t = self.run.time();
-        let here = |c: &&mut Companion<'_>| c.stepper.as_ref().is_some_and(|s| s.time() == t);
-        for companion in self.companions.iter_mut().filter(here) {
-            let Companion {
-                difference,
-                row: other,
-                ..
-            } = companion;
-            difference.compare(t, row, other);
-            companion.next += companion.by.stride;
+        if self.run.has_stepped() {
+            self.compare(row);
         }
         grow(&mut self.amplitude, row);
         self.k += 1;
@@ -233,10 +242,10 @@ impl Stepper for Accompanied<'_> {
         }
         let (amplitude, passed) = (&mut self.amplitude, &mut self.k);
         let rows = self.run.rows_ahead(times, k);
-        for row in rows.chunks_exact(self.units.len().max(1)) {
-            grow(amplitude, row);
-            *passed += 1;
-        }
+        let columns = self.units.len().max(1);
+        rows.chunks_exact(columns)
+            .for_each(|row| grow(amplitude, row));
+        *passed += rows.len() / columns;
         rows
     }
 

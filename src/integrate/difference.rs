@@ -9,10 +9,22 @@ use std::collections::VecDeque;
 use crate::integrate::event::{Change, Event};
 use crate::settings::tolerances::steps::FAINT;
 
-/// Takes the magnitudes of a row into account.
+/// Takes the magnitudes of a row into account; what is no number has none.
+#[inline]
 pub(crate) fn grow(amplitude: &mut [f64], row: &[f64]) {
-    for (amplitude, value) in amplitude.iter_mut().zip(row) {
-        *amplitude = amplitude.max(value.abs());
+    let raise = |amplitude: &mut f64, value: f64| {
+        // As `f64::max`, in one instruction.
+        let size = value.abs();
+        *amplitude = if size > *amplitude { size } else { *amplitude };
+    };
+    let (pairs, last) = amplitude.as_chunks_mut::<2>();
+    let (values, rest) = row.as_chunks::<2>();
+    for ([a, b], [v, w]) in pairs.iter_mut().zip(values) {
+        raise(a, *v);
+        raise(b, *w);
+    }
+    if let ([a], [v]) = (last, rest) {
+        raise(a, *v);
     }
 }
 

@@ -82,6 +82,8 @@ pub struct Asked<'a> {
 const BLOCK: usize = 1024;
 /// The last rows may be taken back: of several at one instant the first and the last stay.
 const REVOCABLE: usize = 2;
+/// Rows that may come at once, with those that may be taken back.
+const AT_ONCE: usize = 64;
 /// Longer collections grow as they go.
 const RESERVED: usize = 1 << 20;
 
@@ -168,7 +170,11 @@ impl<'a> Sheet<'a> {
 
     /// Makes room for so many rows.
     pub(super) fn expect(&mut self, rows: usize) {
-        let most = if self.asked.discard { BLOCK } else { RESERVED };
+        let most = if self.asked.discard {
+            BLOCK + AT_ONCE
+        } else {
+            RESERVED
+        };
         let rows = rows.min(most);
         self.time.reserve(rows);
         self.values.reserve(rows * self.columns);

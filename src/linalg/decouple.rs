@@ -13,7 +13,7 @@
 //! exponentials are differences of large numbers.
 
 use crate::settings::tolerances::exponentials::DECOUPLED;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector, Dyn, LU};
 
 /// Rounds of either iteration; S and F are apart by 10³ at least.
 const ROUNDS: usize = 12;
@@ -39,13 +39,14 @@ pub(crate) fn decoupled(generator: &DMatrix<f64>, fast: &[usize]) -> Option<Deco
         |rows: &[usize], columns: &[usize]| generator.select_rows(rows).select_columns(columns);
     let (s, b) = (part(&slow, &slow), part(&slow, fast));
     let (c, f) = (part(fast, &slow), part(fast, fast));
+    let of_f = Levelled::new(&f);
     let q = settled(DMatrix::zeros(fast.len(), slow.len()), |q| {
-        solved(&f, &(q * &s + q * &b * q - &c))
+        of_f.solve(q * &s + q * &b * q - &c)
     })?;
     let (slow_part, fast_part) = (&s + &b * &q, &f - &q * &b);
-    let turned = fast_part.transpose();
+    let turned = Levelled::new(&fast_part.transpose());
     let p = settled(DMatrix::zeros(slow.len(), fast.len()), |p| {
-        Some(solved(&turned, &(&b + &slow_part * p).transpose())?.transpose())
+        Some(turned.solve((&b + &slow_part * p).transpose())?.transpose())
     })?;
     let slow_sizes = s.abs() + b.abs() * q.abs();
     let (mut block, mut sizes) = (DMatrix::zeros(dim, dim), DMatrix::zeros(dim, dim));
@@ -79,11 +80,32 @@ pub(crate) fn decoupled(generator: &DMatrix<f64>, fast: &[usize]) -> Option<Deco
     })
 }
 
-/// a⁻¹ b, rows by their diagonals: those of different Roff are decades apart.
-fn solved(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let levelled =
-        |m: &DMatrix<f64>| DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] / a[(i, i)]);
-    levelled(a).lu().solve(&levelled(b))
+/// A factored matrix, rows by their diagonals: those of different Roff are decades apart.
+struct Levelled {
+    diagonal: DVector<f64>,
+    factors: LU<f64, Dyn, Dyn>,
+}
+
+impl Levelled {
+    fn new(a: &DMatrix<f64>) -> Self {
+        let diagonal = a.diagonal();
+        let factors = levelled(a.clone(), &diagonal).lu();
+        Self { diagonal, factors }
+    }
+
+    /// a⁻¹ b.
+    fn solve(&self, b: DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let mut solved = levelled(b, &self.diagonal);
+        self.factors.solve_mut(&mut solved).then_some(solved)
+    }
+}
+
+/// Rows over these numbers.
+fn levelled(mut matrix: DMatrix<f64>, by: &DVector<f64>) -> DMatrix<f64> {
+    for mut column in matrix.column_iter_mut() {
+        column.component_div_assign(by);
+    }
+    matrix
 }
 
 /// The fixed point of a contraction.

@@ -92,27 +92,27 @@ impl Ladder {
         self.stiff(k) && ((k - self.doubled).is_multiple_of(ANEW) || !self.stiff(k + 1))
     }
 
-    /// exp(A h/2^k) − I, and where that is computed anew max|R(t) − R(t/2)²| relative to max(|R(t)|, 1), in the balanced coordinates.
-    /// `None` if an entry is not finite or a factor is singular.
-    pub(crate) fn increment(&mut self, k: u32) -> Option<(Dense, Option<f64>)> {
-        let twice = if self.anew(k) {
-            Some(squared(self.rung(k + 1)?))
-        } else {
-            None
-        };
-        let rung = self.rung(k)?;
-        let loss = twice.map(|mut twice| {
-            twice.combine(1.0, -1.0, rung);
-            let mut whole = rung.clone();
-            whole.shift(1.0);
-            twice.amax() / whole.amax().max(1.0)
-        });
-        let mut increment = rung.clone();
+    /// exp(A h/2^k) − I; `None` if an entry is not finite or a factor is singular.
+    pub(crate) fn increment(&mut self, k: u32) -> Option<Dense> {
+        let mut increment = self.rung(k)?.clone();
         for j in 0..self.scale.len() {
             let column = increment.column_mut(j).iter_mut().zip(&self.scale);
             column.for_each(|(value, scale)| *value *= scale / self.scale[j]);
         }
-        increment.is_finite().then_some((increment, loss))
+        increment.is_finite().then_some(increment)
+    }
+
+    /// Where exp(A h/2^k) is computed anew max|R(t) − R(t/2)²| relative to max(|R(t)|, 1), in the balanced coordinates; else 0.
+    pub(crate) fn loss(&mut self, k: u32) -> Option<f64> {
+        if !self.anew(k) {
+            return Some(0.0);
+        }
+        let mut twice = squared(self.rung(k + 1)?);
+        let rung = self.rung(k)?;
+        twice.combine(1.0, -1.0, rung);
+        let mut whole = rung.clone();
+        whole.shift(1.0);
+        Some(twice.amax() / whole.amax().max(1.0))
     }
 
     /// exp(A h/2^k) − I in the balanced coordinates.
@@ -186,21 +186,26 @@ impl Ladders {
     }
 
     /// See [`Ladder::increment`].
-    pub(crate) fn increment(&mut self, k: u32) -> Option<(Dense, Option<f64>)> {
+    pub(crate) fn increment(&mut self, k: u32) -> Option<Dense> {
         if let [(_, ladder)] = &mut self.parts[..] {
             return ladder.increment(k);
         }
         let dim = self.parts.iter().map(|(part, _)| part.len()).sum();
-        let (mut whole, mut most) = (Dense::zeros(dim, dim), None);
+        let mut whole = Dense::zeros(dim, dim);
         for (part, ladder) in &mut self.parts {
-            let (increment, loss) = ladder.increment(k)?;
+            let increment = ladder.increment(k)?;
             for (j, &column) in part.iter().enumerate() {
                 let values = part.iter().zip(increment.column(j));
                 values.for_each(|(&row, value)| whole.column_mut(column)[row] = *value);
             }
-            most = most.into_iter().chain(loss).reduce(f64::max);
         }
-        Some((whole, most))
+        Some(whole)
+    }
+
+    /// The largest [loss](Ladder::loss) of a part.
+    pub(crate) fn loss(&mut self, k: u32) -> Option<f64> {
+        let mut losses = self.parts.iter_mut().map(|(_, ladder)| ladder.loss(k));
+        losses.try_fold(0.0, |most, loss| Some(loss?.max(most)))
     }
 }
 
@@ -217,14 +222,13 @@ fn squared(x: &Dense) -> Dense {
 pub(crate) fn balance(a: &DMatrix<f64>, h: f64) -> Vec<f64> {
     /// Sweeps after which the scaling is as good as it gets for the sizes of circuits.
     const SWEEPS: usize = 40;
-    let n = a.nrows();
-    let mut d = vec![1.0; n];
-    let entry = |d: &[f64], i: usize, j: usize| (a[(i, j)] * h * d[j] / d[i]).abs();
+    let mut d = vec![1.0; a.nrows()];
+    let mut sizes = a.map(|entry| (entry * h).abs());
+    sizes.fill_diagonal(0.0);
     for _ in 0..SWEEPS {
         let mut changed = false;
-        for k in 0..n {
-            let column: f64 = (0..n).filter(|&i| i != k).map(|i| entry(&d, i, k)).sum();
-            let row: f64 = (0..n).filter(|&j| j != k).map(|j| entry(&d, k, j)).sum();
+        for (k, d) in d.iter_mut().enumerate() {
+            let (column, row) = (sizes.column(k).sum(), sizes.row(k).sum());
             let factor = if column == 0.0 {
                 1.0
             } else if row == 0.0 {
@@ -236,9 +240,11 @@ pub(crate) fn balance(a: &DMatrix<f64>, h: f64) -> Vec<f64> {
             } else {
                 power_of_two((row / column).sqrt())
             };
-            let scaled = d[k] * factor;
+            let scaled = *d * factor;
             if !(0.7..=1.5).contains(&factor) && (1e-120..1e120).contains(&scaled) {
-                d[k] = scaled;
+                *d = scaled;
+                sizes.column_mut(k).scale_mut(factor);
+                sizes.row_mut(k).unscale_mut(factor);
                 changed = true;
             }
         }
@@ -305,7 +311,7 @@ mod tests {
     }
 
     fn whole(a: &DMatrix<f64>, h: f64) -> DMatrix<f64> {
-        let (increment, _) = Ladder::new(a, h, SQUARED, 0).increment(0).unwrap();
+        let increment = Ladder::new(a, h, SQUARED, 0).increment(0).unwrap();
         matrix(&increment) + DMatrix::identity(a.nrows(), a.nrows())
     }
 
@@ -363,17 +369,17 @@ mod tests {
             let a = graded(5, 10f64.powi(decades));
             let (s, t) = (0.7e-2, 0.3e-2 + 0.001);
             let mut ladder = Ladder::new(&a, s + t, SQUARED, 0);
-            let (_, loss) = ladder.increment(0).unwrap();
+            let loss = ladder.loss(0).unwrap();
             let product = whole(&a, s) * whole(&a, t);
             let exact = whole(&a, s + t);
             let error = (&exact - product).amax() / exact.amax();
             assert!(error < 1e-12, "1e{decades}: {error:e}");
-            assert!(loss.unwrap_or(0.0) < 1e-12);
-            let (squares, _) = Ladder::new(&a, s + t, SQUARED, 4).increment(0).unwrap();
+            assert!(loss < 1e-12);
+            let squares = Ladder::new(&a, s + t, SQUARED, 4).increment(0).unwrap();
             let squares = matrix(&squares) + DMatrix::identity(5, 5);
             assert!((squares - &exact).amax() / exact.amax() < 1e-12);
             for k in 1..20 {
-                let (rung, _) = ladder.increment(k).unwrap();
+                let rung = ladder.increment(k).unwrap();
                 let anew = whole(&a, (s + t) * (-f64::from(k)).exp2());
                 let rung = matrix(&rung) + DMatrix::identity(5, 5);
                 let error = (rung - &anew).amax() / anew.amax();

@@ -7,6 +7,7 @@ pub(crate) mod eigenvalues;
 pub(crate) mod expm;
 pub(crate) mod kernel;
 pub(crate) mod polynomial;
+pub(crate) mod quadratic;
 pub(crate) mod rays;
 pub(crate) mod series;
 pub(crate) mod shifted;

@@ -16,28 +16,32 @@ pub(crate) fn first_crossing(a: &[f64], floor: f64) -> Option<f64> {
     if a[0] - rest >= -floor {
         return None;
     }
-    if let [a0, a1, a2, a3, tail @ ..] = a {
-        let tail: f64 = tail.iter().map(|v| v.abs()).sum();
-        if cubic_holds([*a0, *a1, *a2, *a3], tail, floor) {
-            return None;
-        }
+    let coefficient = |k: usize| a.get(k).copied().unwrap_or(0.0);
+    let [a0, a1, a2, a3] = [0, 1, 2, 3].map(coefficient);
+    let tail = a.iter().skip(4);
+    let size: f64 = tail.clone().map(|v| v.abs()).sum();
+    if cubic_holds([a0, a1, a2, a3], size, floor) {
+        return None;
     }
-    // Falling all the way: one crossing.
+    // Falling all the way, by Bernstein's form of the slope of the cubic and by how much the others rise at most: one crossing.
     let rise = |(k, c): (usize, &f64)| (k as f64 * c).max(0.0);
-    let steepest = a[1] + a.iter().enumerate().skip(2).map(rise).sum::<f64>();
-    if a[0] > 0.0 && steepest < 0.0 && value(a, 1.0) < -floor {
+    let rises: f64 = (4..).zip(tail).map(rise).sum();
+    let steepest = a1.max(a1 + a2).max(a1 + 2.0 * a2 + 3.0 * a3) + rises;
+    if a0 > 0.0 && steepest < 0.0 && value(a, 1.0) < -floor {
         return Some(root(a, 0.0, 1.0, f64::EPSILON));
     }
     let bernstein = to_bernstein(a);
     search(a, &bernstein[..=degree], floor, 0.0, 1.0, 0)
 }
 
-/// Whether a0 + a1 s + a2 s² + a3 s³, and a rest of at most `tail`, cannot fall below −floor on [0, 1].
+/// Whether a0 + a1 s + a2 s² + a3 s³, and further powers of s whose coefficients add up to at most `tail`, cannot fall below −floor on
+/// [0, 1]: none is less than −tail s⁴.
 #[inline]
 pub(crate) fn cubic_holds([a0, a1, a2, a3]: [f64; 4], tail: f64, floor: f64) -> bool {
-    let third = a0 + a1 / 3.0;
-    let least = a0.min(third).min(third + (a1 + a2) / 3.0);
-    least.min(a0 + a1 + a2 + a3) - tail >= -floor
+    let half = a0 + 0.5 * a1 + a2 / 6.0;
+    let least = a0.min(a0 + 0.25 * a1).min(half);
+    let third = a0 + 0.75 * a1 + 0.5 * a2 + 0.25 * a3;
+    least.min(third).min(a0 + a1 + a2 + a3 - tail) >= -floor
 }
 
 /// Nearly a zero on [0, 1] of the cubic with these values and slopes at 0 and 1, the first of them ≥ 0 and the second < 0.
@@ -182,8 +186,9 @@ mod tests {
         let a = [-0.25, 1.0, -0.25, 1.0];
         let s = zero_of_cubic([0.25, -1.5], [-1.0, -3.5]);
         assert!((s - 0.25).abs() < 1e-7);
-        let lifted = [a[0] + 0.3, a[1], a[2], a[3]];
-        assert!(cubic_holds(lifted, 0.04, 0.0) && !cubic_holds(lifted, 0.06, 0.0));
+        // What is left of further powers counts where s is large.
+        let rising = [0.0, a[1], a[2], a[3]];
+        assert!(cubic_holds(rising, 1.7, 0.0) && !cubic_holds(rising, 1.8, 0.0));
         assert!(!cubic_holds(a, 0.0, 0.2) && cubic_holds(a, 0.0, 0.3));
     }
 

@@ -192,15 +192,23 @@ impl Driver {
     #[must_use]
     pub fn least_norm(&mut self, q: &DVector<f64>, solution: &Solution) -> LeastNorm {
         let ones = DVector::from_element(self.size(), 1.0);
-        self.least_norm_in(&ones, q, solution)
+        self.least_norm_in(&ones, q, solution, true)
     }
 
-    /// The same where λ_j is `units[j]` and y_j is 1/`units[j]` of what the norm is to see.
+    /// The member alone; whether there is another is not asked.
+    #[must_use]
+    pub(crate) fn least_norm_alone(&mut self, q: &DVector<f64>, solution: &Solution) -> Solution {
+        let ones = DVector::from_element(self.size(), 1.0);
+        self.least_norm_in(&ones, q, solution, false).solution
+    }
+
+    /// [`Self::least_norm`] where λ_j is `units[j]` and y_j is 1/`units[j]` of what the norm is to see. `others` asks for the other members.
     pub(super) fn least_norm_in(
         &mut self,
         units: &DVector<f64>,
         q: &DVector<f64>,
         solution: &Solution,
+        others: bool,
     ) -> LeastNorm {
         let as_it_is = |unique| LeastNorm {
             solution: solution.clone(),
@@ -220,7 +228,7 @@ impl Driver {
                 y,
                 ..solution.clone()
             };
-            let found = parts.least_norm(&units, &self.scaled.q, &solution);
+            let found = parts.least_norm(&units, &self.scaled.q, &solution, others);
             return LeastNorm {
                 solution: self.in_own_units(found.solution),
                 ..found
@@ -235,7 +243,7 @@ impl Driver {
         if !self.monotone || (strict && regular) {
             return as_it_is(regular);
         }
-        let least = norm::least(&self.scaled, &scaled, &units);
+        let least = norm::least(&self.scaled, &scaled, &units, others);
         let basis = solution.basis.clone();
         let found = self.candidate(least.lambda, basis, solution.by);
         if least.chosen.is_empty() && least.unique || found.residual > self.tolerance {

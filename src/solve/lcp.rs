@@ -129,18 +129,19 @@ impl Scaling {
     pub fn of(m: &DMatrix<f64>) -> Self {
         let size = m.nrows();
         let mut log = vec![0.0_f64; size];
-        let exponent = |v: f64| {
-            if v == 0.0 {
-                f64::NEG_INFINITY
+        // log₂ 0 = −∞ is never the largest.
+        let exponents = DMatrix::from_fn(size, size, |i, j| {
+            if i < j {
+                0.0
             } else {
-                v.abs().log2()
+                m[(i, j)].abs().max(m[(j, i)].abs()).log2()
             }
-        };
+        });
         for _ in 0..SWEEPS {
             let largest: Vec<f64> = (0..size)
                 .map(|i| {
                     (0..size)
-                        .flat_map(|j| [exponent(m[(i, j)]) + log[j], exponent(m[(j, i)]) + log[j]])
+                        .map(|j| exponents[(i.max(j), i.min(j))] + log[j])
                         .fold(f64::NEG_INFINITY, f64::max)
                         + log[i]
                 })

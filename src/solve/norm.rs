@@ -15,15 +15,15 @@ use crate::settings::tolerances::ranks::RANK;
 pub(super) struct Least {
     /// It.
     pub lambda: DVector<f64>,
-    /// Whether the set has no other.
+    /// Whether the set has no other, as far as that was asked: else whether it is the solution that was given.
     pub unique: bool,
     /// The ports with a positive λ or y that another member has otherwise: what the norm has chosen.
     pub chosen: Vec<usize>,
 }
 
 /// The least-norm solution. `lcp` is equilibrated and monotone, `lambda` solves it; λ_j and y_j in their own units are `units[j]` and
-/// 1/`units[j]` times what stands here.
-pub(super) fn least(lcp: &Lcp, lambda: &DVector<f64>, units: &DVector<f64>) -> Least {
+/// 1/`units[j]` times what stands here. `others` asks whether there is another member.
+pub(super) fn least(lcp: &Lcp, lambda: &DVector<f64>, units: &DVector<f64>, others: bool) -> Least {
     let m = lcp.size();
     let as_it_is = |unique| Least {
         lambda: lambda.clone(),
@@ -80,7 +80,7 @@ pub(super) fn least(lcp: &Lcp, lambda: &DVector<f64>, units: &DVector<f64>) -> L
         .map_or(DVector::zeros(c.len()), |v| inverse * (v - c));
     let both = &here + &g * &w;
     // Unique if no direction of the kernel is feasible from the least-norm point (checked by its mirror problem).
-    let unique = w.amax() < RANK && is_vertex(&g, &-&here, &w);
+    let unique = w.amax() < RANK && (!others || is_vertex(&g, &-&here, &w));
     let varies = |i: usize| both[i] > RANK && g.row(i).amax() > RANK;
     Least {
         lambda: DVector::from_fn(m, |j, _| {
@@ -235,7 +235,7 @@ mod tests {
     use nalgebra::{dmatrix, dvector};
 
     fn least_in_own_units(lcp: &Lcp, lambda: &DVector<f64>) -> Least {
-        least(lcp, lambda, &DVector::from_element(lambda.len(), 1.0))
+        least(lcp, lambda, &DVector::from_element(lambda.len(), 1.0), true)
     }
 
     #[test]
@@ -269,7 +269,7 @@ mod tests {
             m: dmatrix![0.0, 1.0; -1.0, 0.0],
             q: dvector![0.0, 5.0],
         };
-        let found = least(&scaled, &dvector![5.0, 0.0], &units);
+        let found = least(&scaled, &dvector![5.0, 0.0], &units, true);
         assert!((found.lambda - dvector![2.5, 0.0]).norm() < 1e-12);
     }
 

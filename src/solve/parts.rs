@@ -90,6 +90,7 @@ impl Parts {
         units: &DVector<f64>,
         q: &DVector<f64>,
         solution: &Solution,
+        others: bool,
     ) -> LeastNorm {
         let mut whole = LeastNorm {
             solution: solution.clone(),
@@ -107,7 +108,7 @@ impl Parts {
                 by: solution.by,
             };
             let [units, q] = [units, q].map(|all| all.select_rows(&*group));
-            let found = driver.least_norm_in(&units, &q, &part);
+            let found = driver.least_norm_in(&units, &q, &part, others);
             for (k, &j) in group.iter().enumerate() {
                 whole.solution.lambda[j] = found.solution.lambda[k];
                 whole.solution.y[j] = found.solution.y[k];

@@ -1,10 +1,11 @@
-//! Rows ahead: where a mode is calm, one long step passes several output times, and their rows follow from its begin.
+//! Rows ahead: where a mode is calm, one long step passes several output times, and their rows follow from its begin; where a clock
+//! switches the circuit it goes on to where the clock is known to switch next.
 
 use super::exosystem::Exosystem;
 use super::flow::{Flow, LONG};
 use super::mode::Mode;
 use super::sampled::MOST;
-use super::travel::Travel;
+use super::travel::{Leap, Travel};
 use crate::integrate::grid::Times;
 use crate::settings::tolerances::times::SAME_TIME;
 
@@ -19,6 +20,9 @@ pub(super) struct DenseOutput {
     values: Vec<f64>,
     /// The time last asked for, s.
     pub(super) t: f64,
+    /// The step, if it is one from an event to where something is known to happen, and the state at its first row.
+    leap: Option<Leap>,
+    first: Vec<f64>,
 }
 
 impl DenseOutput {
@@ -63,34 +67,98 @@ impl DenseOutput {
         &self.values[before * columns..self.taken * columns]
     }
 
-    /// Has the run stand at the last row that was asked for.
-    pub(super) fn end(&mut self, travel: &mut Travel, flow: &mut Flow, exosystem: &Exosystem) {
-        if self.leads() {
-            travel.arrive(flow, exosystem, self.taken, self.count, self.t);
+    /// Has the run stand at the last row that was asked for, or at the end of the step where that is no later than `t`.
+    pub(super) fn end(
+        &mut self,
+        travel: &mut Travel,
+        flow: &mut Flow,
+        exosystem: &Exosystem,
+        t: f64,
+    ) {
+        let (count, mut taken) = (self.count, self.taken);
+        (self.count, self.taken) = (0, 0);
+        match self.leap.take() {
+            _ if count == 0 => {}
+            None => travel.arrive(flow, exosystem, taken, Some(count), self.t),
+            Some(leap) if leap.stop <= t + SAME_TIME * t.abs() => {
+                travel.take_span(flow, exosystem, leap);
+            }
+            // It is clear as part of the span.
+            Some(_) => {
+                if !self.first.is_empty() {
+                    taken -= 1;
+                    let first = self.t - taken as f64 * flow.step(LONG);
+                    travel.advance(flow, exosystem, first);
+                }
+                travel.arrive(flow, exosystem, taken, None, self.t);
+            }
         }
-        self.count = 0;
-        self.taken = 0;
     }
 
-    /// Steps over as many rows as nothing can happen on, `t` the first of them and `end` when something is known to happen.
-    pub(super) fn step(&mut self, travel: &mut Travel, mode: &mut Mode, t: f64, end: f64) -> bool {
-        let (flow, outputs, rows) = (&mut mode.flow, &mode.outputs, &mut mode.rows);
-        let h = flow.step(LONG);
+    /// Steps over as many rows as nothing can happen on, `t` the first of them and `end` the last time to be passed; something is known to
+    /// happen at `next` right after it.
+    pub(super) fn step(
+        &mut self,
+        travel: &mut Travel,
+        mode: &mut Mode,
+        (t, end): (f64, f64),
+        next: Option<f64>,
+    ) -> bool {
+        let h = mode.flow.step(LONG);
         let negligible = SAME_TIME * (t + MOST as f64 * h).abs();
-        if !travel.steady || (t - travel.t - h).abs() > negligible || !rows.ready(flow, outputs) {
-            return false;
-        }
-        let Some(count) = travel.leap_ahead(flow, end) else {
-            return false;
+        let off_row = (t - travel.t - h).abs() > negligible;
+        let between = ((end - t) / h).floor() + 1.0;
+        let begins = travel.age == 0.0 && t > travel.t + negligible;
+        let next = next.filter(|_| begins && (1.0..=MOST as f64).contains(&between));
+        let count = if next.is_some_and(|next| self.leap_to(travel, mode, (t, next), off_row)) {
+            between as usize
+        } else {
+            let (flow, outputs) = (&mut mode.flow, &mode.outputs);
+            if !travel.steady || off_row || !mode.rows.ready(flow, outputs) {
+                return false;
+            }
+            self.first.clear();
+            match travel.leap_ahead(flow, end) {
+                Some(count) => count,
+                None => return false,
+            }
         };
+        let (rows, columns) = (&mode.rows, mode.rows.columns);
         let Some(table) = &rows.table else {
             return false;
         };
-        self.values.resize(MOST * rows.columns, 0.0);
-        table.apply_first(count * rows.columns, travel.before(), &mut self.values);
-        (self.begin, self.t) = (travel.t, t);
+        self.values.resize(MOST * columns, 0.0);
+        if self.first.is_empty() {
+            table.apply_first(count * columns, &travel.now, &mut self.values);
+        } else {
+            let (row, values) = self.values.split_at_mut(columns);
+            mode.outputs.apply(&self.first, row);
+            table.apply_first((count - 1) * columns, &self.first, values);
+        }
+        (self.begin, self.t) = (t - h, t);
         (self.count, self.taken) = (count, 1);
         true
+    }
+
+    /// A step from an event over a span that recurs to `next`, where the first row at `t` is as far away as other times, too.
+    fn leap_to(
+        &mut self,
+        travel: &mut Travel,
+        mode: &mut Mode,
+        (t, next): (f64, f64),
+        off_row: bool,
+    ) -> bool {
+        let flow = &mut mode.flow;
+        self.first.clear();
+        if !mode.rows.fits {
+            return false;
+        }
+        // Spans are counted while there is no table yet.
+        let ready = mode.rows.ready(flow, &mode.outputs);
+        let leap = travel.leap_span(flow, next).filter(|_| ready);
+        let seen = |_: &Leap| !off_row || travel.look_ahead(flow, t, &mut self.first);
+        self.leap = leap.filter(seen);
+        self.leap.is_some()
     }
 }
 

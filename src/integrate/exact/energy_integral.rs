@@ -10,6 +10,7 @@ use nalgebra::DMatrix;
 use crate::linalg::dense::Dense;
 use crate::linalg::expm::{self, Ladders};
 use crate::linalg::kernel::Kernel;
+use crate::linalg::quadratic::Quadratics;
 use crate::linalg::series::Series;
 use crate::settings::tolerances::exponentials::SERIES;
 use crate::settings::tolerances::exponentials::{
@@ -95,18 +96,17 @@ pub(crate) struct EnergyIntegral {
 #[derive(Debug, Clone)]
 struct Forms {
     to_y: Kernel,
+    /// y, with zeros behind it.
     y: Vec<f64>,
     /// The amplitudes they were made for.
     amplitude: Vec<f64>,
-    /// The integrals of power out of sources and power dissipated over 2^k units, [Γ₀; Γ₁].
-    over: Vec<Kernel>,
+    /// The integrals of power out of sources and power dissipated over 2^k units.
+    over: Vec<Quadratics>,
     /// The same over spans that recur, by place, made when first needed.
-    spans: Vec<Option<Kernel>>,
+    spans: Vec<Option<Quadratics>>,
     /// 𝒜 and the powers (out of sources, dissipated) over y.
     generator: DMatrix<f64>,
     powers: [Dense; 2],
-    /// Γ y.
-    products: Vec<f64>,
     /// Where `over` ends.
     latest: Doubling,
 }
@@ -118,6 +118,8 @@ struct Doubling {
     ladder: Ladders,
     /// t is the longest over 2^k.
     k: u32,
+    /// From here on exp(𝒜t) is a square.
+    squared: u32,
     /// exp(𝒜t) − I.
     increment: Dense,
     grams: [Dense; 2],
@@ -163,13 +165,18 @@ impl EnergyIntegral {
     }
 
     /// Σ v·i at w (from sources, dissipated), W.
-    pub(crate) fn power(&self, w: &[f64]) -> [f64; 2] {
+    pub(crate) fn power(&mut self, w: &[f64]) -> [f64; 2] {
+        let factors = 2 * self.terms.len();
+        self.at_nodes.clear();
+        self.at_nodes.resize(factors, 0.0);
+        for (&j, column) in self.seen.iter().zip(self.factors.chunks_exact(factors)) {
+            for (value, factor) in self.at_nodes.iter_mut().zip(column) {
+                *value += factor * w[j];
+            }
+        }
         let mut power = [0.0; 2];
-        for term in &self.terms {
-            let [v, i] = [&term.v, &term.i].map(|row| {
-                let products = self.seen.iter().map(|&j| row[j] * w[j]);
-                products.sum::<f64>()
-            });
+        let (pairs, _) = self.at_nodes.as_chunks::<2>();
+        for (term, [v, i]) in self.terms.iter().zip(pairs) {
             power[usize::from(!term.source)] += v * i;
         }
         [-power[0], power[1]]
@@ -214,7 +221,7 @@ impl Integrals<'_> {
         let forms = &mut *self.forms;
         forms.double_to(k);
         forms.y_of(w);
-        products(&forms.over[k as usize], &forms.y, &mut forms.products)
+        forms.over[k as usize].at(&forms.y)
     }
 
     /// (from sources, dissipated) from w over the span at a place, so many seconds long, J.
@@ -228,7 +235,7 @@ impl Integrals<'_> {
             let flow = (&forms.generator, self.fast);
             Doubling::new(flow, &forms.powers, time, 0).forms()
         });
-        products(form, &forms.y, &mut forms.products)
+        form.at(&forms.y)
     }
 }
 
@@ -307,13 +314,12 @@ impl Forms {
         );
         Self {
             to_y: Kernel::new(&to_y),
-            y: vec![0.0; dim],
+            y: vec![0.0; Quadratics::padded(dim)],
             amplitude: size,
             over: vec![latest.forms()],
             spans: Vec::new(),
             generator: moved,
             powers,
-            products: vec![0.0; 2 * dim],
             latest,
         }
     }
@@ -327,7 +333,7 @@ impl Forms {
     /// Takes w over into y.
     #[inline]
     fn y_of(&mut self, w: &[f64]) {
-        self.to_y.apply(w, &mut self.y);
+        self.to_y.apply(w, &mut self.y[..w.len()]);
     }
 
     /// Has the integrals up to 2^k units.
@@ -371,17 +377,6 @@ fn coordinates(rows: &DMatrix<f64>, least: Option<f64>) -> (DMatrix<f64>, DMatri
     (&triangle * order.transpose(), order * back)
 }
 
-/// (y · Γ₀y, y · Γ₁y) for [Γ₀; Γ₁].
-#[inline]
-fn products(forms: &Kernel, y: &[f64], products: &mut [f64]) -> [f64; 2] {
-    forms.apply(y, products);
-    let (sources, dissipated) = products.split_at(y.len());
-    let both = sources.iter().zip(dissipated).zip(y);
-    both.fold([0.0; 2], |[sum0, sum1], ((p0, p1), y)| {
-        [sum0 + p0 * y, sum1 + p1 * y]
-    })
-}
-
 impl Doubling {
     /// Over 2^−`k` of the longest time, doubled from where ‖𝒜‖ t ≤ [`SERIES`]: Q_{j+1} = (𝒜ᵀ Q_j + Q_j 𝒜) t/(j + 1).
     fn new(
@@ -408,23 +403,31 @@ impl Doubling {
             sum
         };
         let grams = powers.each_ref().map(&mut series);
+        let k = k + halvings;
+        let mut ladder = Ladders::new(generator, fast, longest, ENERGY_SQUARED, 0);
+        let stiff = (ladder.norm() / ENERGY_SQUARED).log2();
+        let increment = ladder.increment(k).unwrap_or(Dense::zeros(dim, dim));
         let mut doubling = Self {
-            ladder: Ladders::new(generator, fast, longest, ENERGY_SQUARED, 0),
-            increment: Dense::zeros(dim, dim),
-            k: k + halvings,
+            ladder,
+            increment,
+            k,
+            squared: stiff.ceil().clamp(0.0, 1e3) as u32,
             grams,
             buffers: [buffer.clone(), buffer.clone(), buffer],
         };
-        doubling.renew();
         for _ in 0..halvings {
             doubling.double();
         }
         doubling
     }
 
-    /// exp(𝒜t) − I; nothing where it is beyond doubles, as the flow itself is then.
+    /// exp(𝒜t) − I from that of half the time; where it is computed anew and beyond doubles, as the flow itself is then, nothing.
     fn renew(&mut self) {
-        if let Some((increment, _)) = self.ladder.increment(self.k) {
+        if self.k >= self.squared {
+            let square = &mut self.buffers[0];
+            square.set_product(&self.increment, &self.increment);
+            self.increment.combine(2.0, 1.0, square);
+        } else if let Some(increment) = self.ladder.increment(self.k) {
             self.increment = increment;
         }
     }
@@ -447,10 +450,8 @@ impl Doubling {
         }
     }
 
-    /// [Γ₀; Γ₁].
-    fn forms(&self) -> Kernel {
-        let [first, second] = &self.grams;
-        Kernel::stacked(&[first, second])
+    fn forms(&self) -> Quadratics {
+        Quadratics::of(&self.grams)
     }
 }
 

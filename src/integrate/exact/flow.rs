@@ -149,6 +149,11 @@ impl Flow {
         DMatrix::from_row_slice(self.guards, self.dim, &self.guard_rows)
     }
 
+    /// A row of 𝒢.
+    pub(crate) fn guard_row(&self, guard: usize) -> &[f64] {
+        &self.guard_rows[guard * self.dim..(guard + 1) * self.dim]
+    }
+
     /// 𝒜.
     pub(crate) fn generator(&self) -> &DMatrix<f64> {
         &self.generator
@@ -190,10 +195,11 @@ impl Flow {
 
     #[cold]
     fn tabulate(&mut self, level: u32) -> bool {
-        let Some((increment, loss)) = self.ladder.increment(level) else {
+        let ladder = &mut self.ladder;
+        let (Some(increment), Some(loss)) = (ladder.increment(level), ladder.loss(level)) else {
             return false;
         };
-        self.loss = self.loss.max(loss.unwrap_or(0.0));
+        self.loss = self.loss.max(loss);
         let rows = &self.rows;
         let mut guards = rows.clone();
         guards.set_product(rows, &increment);
@@ -227,8 +233,8 @@ impl Flow {
         let (generator, fast, loss) = (&self.generator, &self.fast, &mut self.loss);
         let increment = self.recurring.increment(span, |time| {
             let mut ladder = Ladders::new(generator, fast, time, SQUARED, 0);
-            let (increment, lost) = ladder.increment(0)?;
-            *loss = loss.max(lost.unwrap_or(0.0));
+            let increment = ladder.increment(0)?;
+            *loss = loss.max(ladder.loss(0)?);
             Some(Kernel::stacked(&[&increment]))
         })?;
         increment.apply(w, &mut next[..self.dim]);
@@ -250,15 +256,18 @@ impl Flow {
 
     /// w' at w.
     pub(crate) fn rates_of(&self, w: &[f64], rates: &mut Vec<f64>) {
-        rates.resize(self.dim.next_multiple_of(BLOCK), 0.0);
-        let (blocks, _) = rates.as_chunks_mut::<BLOCK>();
-        self.generator_kernel.apply(w, blocks);
+        applied(&self.generator_kernel, w, rates);
         rates.truncate(self.dim);
+    }
+
+    /// How large the terms of w' add up to where |w| ≤ `sizes`.
+    pub(crate) fn sizes_of_rates(&self, sizes: &[f64], largest: &mut Vec<f64>) {
+        applied(&self.generator_sizes, sizes, largest);
     }
 
     /// exp(𝒜h) − I for the output step h; `None` beyond doubles.
     pub(crate) fn increment(&mut self) -> Option<Dense> {
-        Some(self.ladder.increment(LONG)?.0)
+        self.ladder.increment(LONG)
     }
 
     /// Has the energy of these products integrated along the flow.
@@ -302,8 +311,8 @@ impl Flow {
     }
 
     /// (from sources, dissipated) at w, W.
-    pub(crate) fn power(&self, w: &[f64]) -> [f64; 2] {
-        let work = self.work.as_ref();
+    pub(crate) fn power(&mut self, w: &[f64]) -> [f64; 2] {
+        let work = self.work.as_mut();
         work.map_or([0.0; 2], |work| work.power(w))
     }
 
@@ -339,7 +348,7 @@ impl Flow {
         noise: f64,
     ) -> Option<f64> {
         let dt = self.steps[self.bottom as usize];
-        let row = &self.guard_rows[i * self.dim..(i + 1) * self.dim];
+        let row = self.guard_row(i);
         let padded = |values: &[f64]| {
             let mut values = values[..self.dim].to_vec();
             values.resize(self.dim.next_multiple_of(BLOCK), 0.0);
@@ -381,7 +390,7 @@ impl Flow {
         ([dt, time], floor): ([f64; 2], f64),
         (term, next): (&mut Vec<f64>, &mut Vec<f64>),
     ) {
-        let row = &self.guard_rows[i * self.dim..(i + 1) * self.dim];
+        let row = self.guard_row(i);
         term.clear();
         term.extend_from_slice(&sizes[..self.dim]);
         let mut dips = false;
@@ -434,13 +443,20 @@ impl Flow {
     /// Guard i as a polynomial in the fraction of Taylor's step.
     pub(crate) fn guard_polynomial(&self, i: usize, series: &Series) -> [f64; MAX_DEGREE + 1] {
         let mut polynomial = [0.0; MAX_DEGREE + 1];
-        let row = &self.guard_rows[i * self.dim..(i + 1) * self.dim];
+        let row = self.guard_row(i);
         for (k, coefficient) in polynomial.iter_mut().enumerate().take(series.degree() + 1) {
             let terms = row.iter().zip(series.term(k));
             *coefficient = terms.map(|(g, term)| g * term).sum();
         }
         polynomial
     }
+}
+
+/// A matrix times w, with zeros behind the last component.
+fn applied(matrix: &SparseKernel, w: &[f64], values: &mut Vec<f64>) {
+    values.resize(w.len().next_multiple_of(BLOCK), 0.0);
+    let (blocks, _) = values.as_chunks_mut::<BLOCK>();
+    matrix.apply(w, blocks);
 }
 
 /// 𝒜 w · factor, with zeros behind the last component.

@@ -135,7 +135,7 @@ impl Free {
         if solution.status != Status::Solved {
             return None;
         }
-        let active = driver.least_norm(&q, &solution).solution.active;
+        let active = driver.least_norm_alone(&q, &solution).active;
         let pairs = lcs.ports.iter().zip(&active);
         let conducts =
             pairs.map(|(port, active)| active.map(|active| active == (port.role != Role::Voltage)));

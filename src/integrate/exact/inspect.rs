@@ -25,7 +25,6 @@ pub(crate) enum Finding {
 pub(crate) struct Inspector {
     /// `[w | g | g']` in the inspected mode.
     pub(crate) w: Vec<f64>,
-    x: Vec<f64>,
     s: Vec<f64>,
     /// w with the sources a few units in the last place of t later, and the storage there.
     later: Vec<f64>,
@@ -53,12 +52,10 @@ pub(crate) struct Inspector {
 impl Inspector {
     /// Stands at w in `mode` from storage `s`.
     fn stand(&mut self, mode: &Mode, z: &[f64], s: &[f64]) {
-        mode.state_from(s, &mut self.x);
-        let dim = mode.flow.dim();
-        self.w.resize(dim + 2 * mode.flow.guards(), 0.0);
-        self.w[..mode.n].copy_from_slice(&self.x);
-        self.w[mode.n..dim].copy_from_slice(z);
-        mode.settle(&mut self.w[..dim], &mut self.work);
+        mode.state_from(s, &mut self.w);
+        self.w.extend_from_slice(z);
+        mode.settle(&mut self.w, &mut self.work);
+        self.w.resize(mode.flow.dim() + 2 * mode.flow.guards(), 0.0);
     }
 
     /// The storage that `mode` would have after taking over storage `s` by conservation of charge and flux.
@@ -101,15 +98,19 @@ impl Inspector {
             }
         }
         mode.flow.read_guards(&mut self.w);
-        mode.inject.largest(known, &mut self.sizes);
+        mode.sizes_of_state(known, &mut self.sizes);
         self.sizes.resize(mode.flow.dim(), 0.0);
         for (size, w) in self.sizes.iter_mut().zip(&self.w) {
             *size = size.max(w.abs());
         }
-        self.read_drifts(mode, time);
+        self.read_rates(mode, time);
         let undisturbed = mode.constraints.is_empty() && self.slips.is_empty();
         if undisturbed && mode.magnitudes.cover(&self.sizes) {
             let (g, slopes) = self.w[mode.flow.dim()..].split_at(mode.flow.guards());
+            if !self.rates.is_empty() {
+                let drifts = &mut self.drifts;
+                mode.jets.first_values(g.len(), &self.rates, drifts);
+            }
             let drift = |i: usize| {
                 let moved = self.drifts.get(i).filter(|_| !self.rates.is_empty());
                 moved.map_or(time * slopes[i].abs(), |moved| moved.abs())
@@ -135,7 +136,10 @@ impl Inspector {
         mode.flow.noise(&magnitudes.sizes, &mut magnitudes.noise);
         magnitudes.uses = 0;
         magnitudes.find_followers(&mode.flow);
-        self.read_jets(mode);
+        if !self.rates.is_empty() {
+            mode.jets.values(&self.rates, &mut self.drifts);
+        }
+        self.read_jets(mode, t);
         let mut leaving = Vec::new();
         for i in 0..mode.flow.guards() {
             if self.leaves(mode, i, t) {
@@ -163,9 +167,9 @@ impl Inspector {
         self.pace.clear();
     }
 
-    /// w' of the pace in `mode`, and how far the guards and their derivatives move with it within the resolution of the time. Where a
-    /// transient begins with the mode, its slope says nothing of the past.
-    fn read_drifts(&mut self, mode: &Mode, time: f64) {
+    /// How far w moves in `mode` with the pace within the resolution of the time. Where a transient begins with the mode, its slope says
+    /// nothing of the past.
+    fn read_rates(&mut self, mode: &Mode, time: f64) {
         self.rates.clear();
         if self.pace.is_empty() {
             return;
@@ -174,7 +178,6 @@ impl Inspector {
         for rate in &mut self.rates {
             *rate *= time;
         }
-        mode.jets.values(&self.rates, &mut self.drifts);
     }
 
     /// Notes that the quantity of this owner passes zero at t with this slope: in the mode that follows, where it may change much
@@ -188,8 +191,8 @@ impl Inspector {
         own.map(|(_, slip)| *slip).fold(0.0, f64::max)
     }
 
-    /// Reads the guards of the mode in which the run stands at state x, with the sources at z, for [`Self::leaves`].
-    pub(crate) fn look(&mut self, mode: &Mode, x: &[f64], z: &[f64]) {
+    /// Reads the guards of the mode in which the run stands at state x and time t, with the sources at z, for [`Self::leaves`].
+    pub(crate) fn look(&mut self, mode: &mut Mode, x: &[f64], (t, z): (f64, &[f64])) {
         self.w.clear();
         self.w.extend_from_slice(x);
         self.w.extend_from_slice(z);
@@ -199,14 +202,22 @@ impl Inspector {
             *size = size.max(*known);
         }
         self.rates.clear();
-        self.read_jets(mode);
+        self.read_jets(mode, t);
     }
 
-    /// The guards with their derivatives at w, and where states follow the others those on their manifold.
-    fn read_jets(&mut self, mode: &Mode) {
+    /// The guards with their derivatives at w, and where states follow the others and a guard that sees them may be zero those on their
+    /// manifold.
+    fn read_jets(&mut self, mode: &mut Mode, t: f64) {
         let w = &self.w[..mode.flow.dim()];
         mode.jets.values(w, &mut self.jets);
         mode.jets.largest(&self.sizes, &mut self.jet_sizes);
+        self.settled = None;
+        let (flow, m) = (&mode.flow, mode.flow.guards());
+        let asks = |i: usize| self.may_be_zero(i, m, t) && mode.magnitudes.is_slaved(flow, i);
+        if !(0..m).any(asks) {
+            return;
+        }
+        mode.magnitudes.find_manifolds(flow);
         let manifolds = &mode.magnitudes.manifolds;
         let holds = |m: &Manifold| m.holds(w, &self.sizes, GROUP * f64::EPSILON, &self.rates);
         self.settled = manifolds.iter().rposition(holds);
@@ -215,24 +226,31 @@ impl Inspector {
         }
     }
 
+    /// What the resolution of the time leaves of derivative k of guard i of `m`.
+    fn drift(&self, k: usize, i: usize, m: usize, t: f64) -> f64 {
+        if self.rates.is_empty() {
+            resolution(t) * self.jets[(k + 1) * m + i].abs()
+        } else {
+            self.drifts[k * m + i].abs()
+        }
+    }
+
+    /// Whether guard i of `m` may be zero, by its rounding and that of the time.
+    fn may_be_zero(&self, i: usize, m: usize, t: f64) -> bool {
+        self.jets[i].abs() <= GROUP * f64::EPSILON * self.jet_sizes[i] + self.drift(0, i, m, t)
+    }
+
     /// Whether guard i, as it was read last, is negative right after t. The first derivative that is no rounding decides, the next one
     /// says what an error of the time does to it; but one that the next turns around before the guard has left its rounding
     /// decides nothing. A guard at rest on zero stays, but for that of a switch which is off there.
     pub(crate) fn leaves(&self, mode: &Mode, i: usize, t: f64) -> bool {
         let time = resolution(t);
         let m = mode.flow.guards();
-        let drift = |k: usize| {
-            if self.rates.is_empty() {
-                time * self.jets[(k + 1) * m + i].abs()
-            } else {
-                self.drifts[k * m + i].abs()
-            }
-        };
         let g = self.jets[i];
         // What of a guard is a transient that is rounding decides nothing.
         let manifold = self.settled.map(|at| &mode.magnitudes.manifolds[at]);
-        let slow = manifold.is_some_and(|manifold| manifold.is_seen_by(i))
-            && g.abs() <= GROUP * f64::EPSILON * self.jet_sizes[i] + drift(0);
+        let slow =
+            manifold.is_some_and(|manifold| manifold.is_seen_by(i)) && self.may_be_zero(i, m, t);
         let (jets, sizes) = if slow {
             (&self.slow, &self.slow_sizes)
         } else {
@@ -247,7 +265,11 @@ impl Inspector {
             let mut noise = GROUP * f64::EPSILON * whole;
             if k + 1 < ORDERS {
                 next = dot(k + 1);
-                noise += if slow { time * next.0.abs() } else { drift(k) };
+                noise += if slow {
+                    time * next.0.abs()
+                } else {
+                    self.drift(k, i, m, t)
+                };
             }
             if k == 0 {
                 noise += self.slip(mode.owner(i));

@@ -19,10 +19,11 @@ pub(crate) struct Magnitudes {
     pub(crate) noise: Vec<f64>,
     /// The states that are small beside their amplitudes once they follow the others.
     pub(crate) followers: Vec<Follower>,
-    /// Where they do: one manifold for each [level](LEVEL) of their ages, the fastest alone first.
+    /// Where they do: one manifold for each [level](LEVEL) of their ages, the fastest alone first, found when a guard asks for them.
     pub(crate) manifolds: Vec<Manifold>,
     /// How often it was enough to look at these since.
     pub(super) uses: u32,
+    work: Vec<f64>,
 }
 
 impl Magnitudes {
@@ -48,30 +49,39 @@ impl Magnitudes {
 
     /// Finds which states follow the others.
     pub(super) fn find_followers(&mut self, flow: &Flow) {
-        followers(
-            flow.generator(),
-            flow.states(),
-            &self.sizes,
-            &mut self.followers,
-        );
+        self.followers.clear();
+        flow.sizes_of_rates(&self.sizes, &mut self.work);
+        let generator = flow.generator();
+        // A bound of the first sweep that needs no look at single entries.
+        let may = |j: usize| self.work[j] < 2.0 * generator[(j, j)].abs() * self.sizes[j];
+        if (0..flow.states()).any(may) {
+            let found = &mut self.followers;
+            followers(generator, flow.states(), &self.sizes, found);
+        }
+    }
+
+    /// Whether a guard sees a state that follows others.
+    pub(super) fn is_slaved(&self, flow: &Flow, guard: usize) -> bool {
+        let row = flow.guard_row(guard);
+        self.followers.iter().any(|f| row[f.component] != 0.0)
+    }
+
+    /// Finds the manifolds of the states that follow others.
+    pub(super) fn find_manifolds(&mut self, flow: &Flow) {
         let faster = |k: usize| &self.followers[..k];
         let ages = self.followers.windows(2).enumerate();
         let apart = ages.filter(|(_, pair)| pair[1].age > LEVEL * pair[0].age);
         let mut levels: Vec<usize> = apart.map(|(k, _)| k + 1).collect();
         levels.extend((!self.followers.is_empty()).then_some(self.followers.len()));
-        let known = self.manifolds.iter().zip(&levels);
-        if self.manifolds.len() == levels.len() && known.clone().all(|(m, &k)| m.is_of(faster(k))) {
+        let mut known = self.manifolds.iter().zip(&levels);
+        if self.manifolds.len() == levels.len() && known.all(|(m, &k)| m.is_of(faster(k))) {
             return;
         }
         let guards = flow.guard_matrix();
         let manifold = |&k: &usize| {
             let components: Vec<usize> = faster(k).iter().map(|f| f.component).collect();
-            Manifold::new(
-                flow.generator(),
-                (&guards, flow.sizes()),
-                &components,
-                ORDERS,
-            )
+            let guards = (&guards, flow.sizes());
+            Manifold::new(flow.generator(), guards, &components, ORDERS)
         };
         self.manifolds = levels.iter().filter_map(manifold).collect();
     }

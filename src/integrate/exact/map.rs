@@ -35,6 +35,12 @@ impl Map {
         self.map.apply(w, values);
     }
 
+    /// The first of these values.
+    pub(super) fn first_values(&self, count: usize, w: &[f64], values: &mut Vec<f64>) {
+        values.resize(count, 0.0);
+        self.map.apply_first(count, w, values);
+    }
+
     /// `largest` = |map| · sizes.
     pub(crate) fn largest(&self, sizes: &[f64], largest: &mut Vec<f64>) {
         largest.resize(self.map.rows(), 0.0);
@@ -68,6 +74,9 @@ impl Sizes {
         for k in 0..orders {
             jets.rows_mut(k * m, m).copy_from(&rows);
             whole.rows_mut(k * m, m).copy_from(&sizes);
+            if k + 1 == orders {
+                break;
+            }
             let next = &rows * generator;
             sizes = next.abs().sup(&(rows.abs() * &self.summed));
             rows = next;

@@ -97,7 +97,8 @@ pub(crate) fn over_w(rows: &Rows, n: usize, exosystem: &Exosystem) -> DMatrix<f6
     if rows.u.nrows() == count && rows.u.ncols() == h.nrows() {
         z += &rows.u * h;
     }
-    if rows.du.nrows() == count && rows.du.ncols() == h.nrows() {
+    let moves = rows.du.iter().any(|du| *du != 0.0);
+    if moves && rows.du.nrows() == count && rows.du.ncols() == h.nrows() {
         z += &rows.du * (h * exosystem.generator());
     }
     for i in 0..count {
@@ -389,6 +390,16 @@ impl Mode {
             s.extend_from_slice(&w[..self.n]);
         } else {
             self.storage.values(w, s);
+        }
+    }
+
+    /// How large x can be where the storage has these sizes, but for what does not follow from it.
+    pub(crate) fn sizes_of_state(&self, storage: &[f64], sizes: &mut Vec<f64>) {
+        if self.keeps {
+            sizes.clear();
+            sizes.extend_from_slice(storage);
+        } else {
+            self.inject.largest(storage, sizes);
         }
     }
 

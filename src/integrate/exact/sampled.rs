@@ -16,7 +16,7 @@ const LARGEST: usize = 1 << 16;
 pub(crate) struct SampledRows {
     pub(super) columns: usize,
     /// Whether tables are worth their entries.
-    fits: bool,
+    pub(super) fits: bool,
     /// Single rows so far, and after how many there is a table.
     singles: usize,
     patience: usize,

@@ -257,8 +257,9 @@ impl Exact {
             .filter(|&k| may_pass(k))
             .collect();
         if !candidates.is_empty() {
-            let now = &self.travel.now[..mode.n];
-            self.inspector.look(mode, now, &self.sources.z);
+            let mode = &mut self.table.modes[at];
+            let (t, now) = (self.travel.t, &self.travel.now[..mode.n]);
+            self.inspector.look(mode, now, (t, &self.sources.z));
             for k in candidates {
                 let mode = &self.table.modes[at];
                 if self.inspector.leaves(mode, first + k, self.travel.t) {
@@ -434,17 +435,19 @@ impl Exact {
         // What happens at the end of a step is left to the step that arrives there.
         let longest = longest_step(self.table.output_step());
         let negligible = SAME_TIME * (t + longest).abs();
-        let end = (next - negligible).min(self.until + negligible);
+        let (before, last) = (next - negligible, self.until + negligible);
+        let next = (next <= last).then_some(next);
         let mode = &mut self.table.modes[at];
-        self.dense.step(&mut self.travel, mode, t, end)
+        self.dense
+            .step(&mut self.travel, mode, (t, before.min(last)), next)
     }
 
-    /// Stands at the last row that was asked for.
-    fn end_ahead(&mut self) {
+    /// Stands at the last row that was asked for, or where the step over the rows ends if that is no later than `t`.
+    fn end_ahead(&mut self, t: f64) {
         if let Some(at) = self.mode {
             let flow = &mut self.table.modes[at].flow;
-            self.dense
-                .end(&mut self.travel, flow, &self.sources.exosystem);
+            let exosystem = &self.sources.exosystem;
+            self.dense.end(&mut self.travel, flow, exosystem, t);
         }
     }
 
@@ -481,7 +484,7 @@ impl Stepper for Exact {
             if self.dense.take(t, self.table.output_step()) {
                 return Ok(());
             }
-            self.end_ahead();
+            self.end_ahead(t);
         }
         loop {
             let next = self.sources.next_stop;
@@ -549,7 +552,7 @@ impl Stepper for Exact {
     }
 
     fn finish(&mut self) -> Outcome {
-        self.end_ahead();
+        self.end_ahead(self.dense.t);
         self.take_storage();
         let (t, duration) = (self.travel.t, self.duration);
         let mut outcome = self.report.finish(&self.table, t, duration);

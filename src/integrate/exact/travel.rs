@@ -21,6 +21,15 @@ fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
+/// A count as a number: of 128 bits that is a call.
+#[inline]
+fn float(count: u128) -> f64 {
+    match u64::try_from(count) {
+        Ok(count) => count as f64,
+        Err(_) => count as f64,
+    }
+}
+
 /// As [`f64::min`] where neither is NaN.
 #[inline]
 fn smaller(a: f64, b: f64) -> f64 {
@@ -49,6 +58,14 @@ enum Verdict {
     Clear,
     /// Crossed, or not known without looking closer.
     Unclear,
+}
+
+/// A step over a span that recurs: its place, where it ends, and how much longer it is than what recurs, s.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Leap {
+    span: usize,
+    pub(crate) stop: f64,
+    off: f64,
 }
 
 /// The state of a run inside a mode: time, `[w | g | g']`, and work space that lives as long as the run.
@@ -247,8 +264,8 @@ impl Travel {
         self.crawl(flow, exosystem, stop)
     }
 
-    /// A step over as many output steps as nothing happens on, to `end` at most: their number, at least 2. The state before stays
-    /// in [`Self::before`] until [`Self::arrive`].
+    /// A step over as many output steps as nothing happens on, to `end` at most: their number, at least 2. The run stays where it is
+    /// until [`Self::arrive`].
     pub(crate) fn leap_ahead(&mut self, flow: &mut Flow, end: f64) -> Option<usize> {
         if self.t >= self.barrier {
             self.barrier = f64::INFINITY;
@@ -262,7 +279,6 @@ impl Travel {
             }
             let step = flow.step(level);
             if self.judge(flow, step) == Verdict::Clear {
-                std::mem::swap(&mut self.now, &mut self.next);
                 return Some(1 << (LONG - level));
             }
             let part = self.crossing(flow, step).unwrap_or(0.5);
@@ -271,22 +287,16 @@ impl Travel {
         }
     }
 
-    /// The state before [`Self::leap_ahead`].
-    pub(crate) fn before(&self) -> &[f64] {
-        &self.next
-    }
-
-    /// Ends [`Self::leap_ahead`] over `count` output steps after `taken` of them, at `t`.
+    /// Goes along `taken` output steps, to `t`: the whole step of [`Self::leap_ahead`] where that is `count` of them.
     pub(crate) fn arrive(
         &mut self,
         flow: &mut Flow,
         exosystem: &Exosystem,
         taken: usize,
-        count: usize,
+        count: Option<usize>,
         t: f64,
     ) {
-        std::mem::swap(&mut self.now, &mut self.next);
-        if taken == count {
+        if let Some(count) = count.filter(|count| *count == taken) {
             self.accept(flow, exosystem, LONG - count.ilog2(), t);
         } else {
             for left in (0..taken).rev() {
@@ -302,33 +312,49 @@ impl Travel {
         if stop <= self.t {
             return Arrival::Reached;
         }
-        if !self.leap_span(flow, exosystem, stop) {
-            let arrival = self.climb(flow, exosystem, stop);
-            if arrival != Arrival::Reached {
-                return arrival;
+        match self.leap_span(flow, stop) {
+            Some(leap) => self.take_span(flow, exosystem, leap),
+            None => {
+                let arrival = self.climb(flow, exosystem, stop);
+                if arrival != Arrival::Reached {
+                    return arrival;
+                }
             }
         }
         self.settles(flow);
         Arrival::Reached
     }
 
-    /// One step to `stop` if that span recurs and nothing happens on it.
-    fn leap_span(&mut self, flow: &mut Flow, exosystem: &Exosystem, stop: f64) -> bool {
+    /// One step to `stop` if that span recurs and nothing happens on it. The run stays where it is until [`Self::take_span`].
+    pub(crate) fn leap_span(&mut self, flow: &mut Flow, stop: f64) -> Option<Leap> {
         let rest = stop - self.t;
         let same = SAME_TIME * stop.abs();
         // The output step is in the table.
         if rest > flow.step_limit(self.age) || (rest - flow.step(LONG)).abs() <= same {
-            return false;
+            return None;
         }
-        let Some(span) = flow.recurs(rest, same) else {
-            return false;
-        };
-        let clear = flow.leap_span(span, rest, &self.now, &mut self.next);
-        let clear = clear.filter(|_| self.judge(flow, rest) == Verdict::Clear);
-        let Some(off) = clear else {
+        let span = flow.recurs(rest, same)?;
+        let off = flow.leap_span(span, rest, &self.now, &mut self.next);
+        let off = off.filter(|_| self.judge(flow, rest) == Verdict::Clear);
+        if off.is_none() {
             flow.refuse(span);
+        }
+        off.map(|off| Leap { span, stop, off })
+    }
+
+    /// `[w | g | g']` at `t` on a span that is known to be clear, if the time until then recurs.
+    pub(crate) fn look_ahead(&self, flow: &mut Flow, t: f64, w: &mut Vec<f64>) -> bool {
+        let time = t - self.t;
+        let Some(span) = flow.recurs(time, SAME_TIME * t.abs()) else {
             return false;
         };
+        w.resize(self.now.len(), 0.0);
+        flow.leap_span(span, time, &self.now, w).is_some()
+    }
+
+    /// Ends [`Self::leap_span`].
+    pub(crate) fn take_span(&mut self, flow: &mut Flow, exosystem: &Exosystem, leap: Leap) {
+        let Leap { span, stop, off } = leap;
         if off != 0.0 && flow.works() {
             let power = flow.power(&self.next);
             for (sum, power) in self.energy.iter_mut().zip(power) {
@@ -336,10 +362,10 @@ impl Travel {
             }
         }
         self.wait_for_energy(flow, Stretch::Span(span));
+        let rest = stop - self.t;
         self.age += rest;
         let steps = (rest / flow.step(LONG)).ceil();
         self.take_next(flow, exosystem, stop, steps as u32);
-        true
     }
 
     /// Whether steps of the output grid are short enough from here on.
@@ -394,7 +420,7 @@ impl Travel {
                 let end = if units == span {
                     stop
                 } else {
-                    stop - (units - span) as f64 * unit
+                    stop - float(units - span) * unit
                 };
                 let mut clear = false;
                 if span <= units - barrier {

@@ -26,7 +26,7 @@ pub(crate) struct Place {
 impl Exact {
     /// Where the run stands.
     pub(crate) fn stand(&mut self) -> Place {
-        self.end_ahead();
+        self.end_ahead(self.dense.t);
         self.take_storage();
         Place {
             t: self.travel.t,
@@ -68,7 +68,7 @@ impl Exact {
         if !self.started {
             self.start(log)?;
         }
-        self.end_ahead();
+        self.end_ahead(self.dense.t);
         self.take_storage();
         self.memory.left_here.clear();
         self.inspector.forget_slips();
@@ -88,7 +88,7 @@ impl Exact {
 
     /// Ends in the present mode and tells where the run stands.
     pub(crate) fn leave(&mut self) -> Place {
-        self.end_ahead();
+        self.end_ahead(self.dense.t);
         self.take_storage();
         self.report.close_slides(self.travel.t);
         self.key.sliding.clear();
