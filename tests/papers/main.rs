@@ -4,6 +4,7 @@
 
 mod brogliato_thibault;
 mod heemels;
+mod list;
 mod reference;
 mod rr5107;
 mod rr7158;

@@ -429,6 +429,29 @@ fn lemma_3_8_cone_complementarity_of_a_singular_feedthrough() {
     // The equation: w off by something.
     let aside = &w + dvector![0.0, 0.3, 0.0, 0.0];
     assert!(cone.violation(0.0, &x, &zeta, &aside) > 0.2);
+    // Driven systems with symmetric D of rank one: (31) along their motions, with both kinds of variables in contact.
+    let mut contacts = [0, 0];
+    for _ in 0..5 {
+        let drive: Signal = Rc::new(|t: f64| dvector![(3.0 * t).sin(), (5.0 * t).cos(), -0.2]);
+        let (linear, _) = gradient_type(&mut random, (3, 3), drive);
+        let w = random.vector(3);
+        let mut system = linear.system.clone();
+        system.d = &w * w.transpose();
+        let linear = Linear::new(system, linear.e, linear.f).unwrap();
+        let cone = ConeComplementarity::orthogonal(&linear).unwrap();
+        assert_eq!(cone.rank, 1);
+        let run = linear
+            .integrate((0.0, 2.0), &random.vector(3), 100)
+            .unwrap();
+        for k in 1..=100 {
+            let (zeta, w) = cone.variables(&run.lambda[k], &run.y[k]);
+            let size = 1.0 + run.lambda[k].amax() * (1.0 + run.y[k].amax());
+            assert!(cone.violation(run.t[k], &run.x[k], &zeta, &w) < 1e-8 * size);
+            contacts[0] += usize::from(run.lambda[k].amax() > 1e-3);
+            contacts[1] += usize::from(run.y[k].amax() > 1e-3);
+        }
+    }
+    assert!(contacts.iter().all(|&c| c > 100), "{contacts:?}");
     // A V that does not block-diagonalise D is refused.
     assert!(ConeComplementarity::with(&linear, &DMatrix::identity(4, 4)).is_err());
 }

@@ -249,3 +249,36 @@ fn theorem_1_monotone_problem_has_one_solution_and_it_is_slow() {
     assert!(off <= 8, "{off}");
     assert!(run.lambda.iter().any(|l| l[0] > 0.0) && run.lambda.iter().any(|l| l[1] > 0.0));
 }
+
+/// Section 3, first remark: regular sets that are not convex. Outside of the unit disc, carried past it by a stream: (CDS) comes to the
+/// motion of (PDS), which meets the disc, goes round it and leaves.
+#[test]
+fn a_regular_set_that_is_not_convex() {
+    let outside = Map::new(
+        |x| dvector![1.0 - x.norm_squared()],
+        |x| dmatrix![-2.0 * x[0], -2.0 * x[1]],
+    );
+    let stream = Map::affine(dmatrix![0.1, 0.0; 0.0, 0.1], dvector![-1.0, -0.1]);
+    let problem = Unilateral::new(stream, constant(dvector![0.0, 0.0]), &outside, 2).unwrap();
+    let start = dvector![-2.0, 0.1];
+    let v = |t: f64, x: &DVector<f64>| problem.free_velocity(t, x);
+    let flow = Projected {
+        v: &v,
+        c: &|x| dvector![x.norm_squared() - 1.0],
+        g: &|x| dmatrix![2.0 * x[0], 2.0 * x[1]],
+    };
+    let exact = flow.integrate(&start, 6.0, FINE);
+    let modes: Vec<&[usize]> = exact.events.iter().map(|(_, mode)| &mode[..]).collect();
+    assert_eq!(modes, [&[0][..], &[]]);
+    problem.qualified(&dvector![0.0, 1.0]).unwrap();
+    let error = |steps: usize| {
+        let run = integrate(&problem, (0.0, 6.0), &start, steps).unwrap();
+        let gap = |k: usize| (&run.x[k] - &exact.x[k * FINE / steps]).norm();
+        (0..=steps).map(gap).fold(0.0, f64::max)
+    };
+    let (e1, e2) = (error(800), error(1600));
+    assert!(
+        e2 < 1e-2 && e2 > 1e-6 && (1.7..2.3).contains(&(e1 / e2)),
+        "{e1} {e2}"
+    );
+}
