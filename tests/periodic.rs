@@ -162,7 +162,7 @@ fn a_synchronous_buck_is_linear_between_its_edges() {
     assert!((mean("v(3)") - 4.0).abs() < 1e-6, "{}", mean("v(3)"));
 }
 
-/// The voltage-mode buck of F. Vasca and M. di Bernardo (eds.), Dynamics and Control of Switched Electronic Systems (2012), chapter 1: L = 20 mH,
+/// The voltage-mode buck of E. Fossas, G. Olivar, Study of chaos in the buck converter, IEEE Trans. Circuits and Systems I 43 (1996): L = 20 mH,
 /// C = 47 µF, R = 22 Ω, T = 400 µs, ramp 3.8 V to 8.2 V, gain 8.4, reference 11.3 V.
 fn voltage_mode_buck(vin: f64, order: Option<usize>) -> Orbit {
     let text = format!(

@@ -59,6 +59,22 @@ pub(super) struct Fixed {
     pub(super) seconds: f64,
 }
 
+/// What a return made of a place.
+struct Closing {
+    /// (F(s) − s) in parts of the amplitudes.
+    residual: DVector<f64>,
+    /// F(s).
+    after: Stand,
+    /// How long it took, s.
+    seconds: f64,
+}
+
+impl Closing {
+    fn size(&self) -> f64 {
+        self.residual.amax()
+    }
+}
+
 /// A simulation whose returns are compared.
 pub(super) struct Shooting<'a> {
     pub(super) simulation: &'a mut Simulation,
@@ -168,24 +184,21 @@ impl Shooting<'_> {
         Ok(extremes)
     }
 
-    /// (F(s) − s) in parts of the amplitudes, and where F(s) is.
-    fn residual(&mut self, stand: &Stand) -> Result<(DVector<f64>, Stand, f64), Error> {
+    fn close(&mut self, stand: &Stand) -> Result<Closing, Error> {
         let (after, seconds) = self.shoot(stand)?;
         let parts = after.state.iter().zip(&stand.state).zip(&self.amplitudes);
         let parts = parts.map(|((after, before), amplitude)| (after - before) / amplitude);
-        Ok((
-            DVector::from_iterator(stand.state.len(), parts),
+        Ok(Closing {
+            residual: DVector::from_iterator(stand.state.len(), parts),
             after,
             seconds,
-        ))
+        })
     }
 
     /// Whether a return from here leads back.
     pub(super) fn closes(&mut self, stand: &Stand, closed: f64) -> bool {
-        let found = self.residual(stand);
-        found.is_ok_and(|(residual, after, _)| {
-            residual.amax() <= closed && after.switches == stand.switches
-        })
+        let found = self.close(stand);
+        found.is_ok_and(|found| found.size() <= closed && found.after.switches == stand.switches)
     }
 
     /// M at a place from which a return leads to `after`, in parts of the amplitudes.
@@ -215,42 +228,38 @@ impl Shooting<'_> {
         if stand.state.is_empty() {
             return self.without_states(stand);
         }
-        let (mut residual, mut after, mut seconds) = self.residual(&stand)?;
-        let mut derivative = self.derivative(&stand, &after)?;
-        let mut made_at = residual.amax();
+        let mut closing = self.close(&stand)?;
+        let mut derivative = self.derivative(&stand, &closing.after)?;
+        let mut made_at = closing.size();
         let mut corrections = 0;
-        while corrections < MOST_CORRECTIONS && residual.amax() > f64::EPSILON {
+        while corrections < MOST_CORRECTIONS && closing.size() > f64::EPSILON {
             corrections += 1;
-            let Some((next, found)) = self.corrected(&stand, &residual, &derivative)? else {
-                if made_at == residual.amax() {
-                    break;
-                }
+            let before = closing.size();
+            match self.corrected(&stand, &closing.residual, &derivative) {
+                Some(better) => (stand, closing) = better,
+                None if made_at == before => break,
                 // An old derivative may be the reason.
-                derivative = self.derivative(&stand, &after)?;
-                made_at = residual.amax();
-                continue;
-            };
-            let before = residual.amax();
-            stand = next;
-            (residual, after, seconds) = found;
-            if residual.amax() > REUSED * before && residual.amax() > closed {
-                derivative = self.derivative(&stand, &after)?;
-                made_at = residual.amax();
+                None => made_at = f64::INFINITY,
+            }
+            let slow = closing.size() > REUSED * before && closing.size() > closed;
+            if slow || made_at == f64::INFINITY {
+                derivative = self.derivative(&stand, &closing.after)?;
+                made_at = closing.size();
             }
         }
         self.corrections += corrections;
-        if residual.amax() > closed || after.switches != stand.switches {
+        if closing.size() > closed || closing.after.switches != stand.switches {
             return Ok(None);
         }
         if made_at > NEUTRAL {
-            derivative = self.derivative(&stand, &after)?;
+            derivative = self.derivative(&stand, &closing.after)?;
         }
         Ok(Some(Fixed {
             stand,
-            residual: residual.amax(),
+            residual: closing.size(),
             corrections: self.corrections,
             derivative,
-            seconds,
+            seconds: closing.seconds,
         }))
     }
 
@@ -267,21 +276,17 @@ impl Shooting<'_> {
         }))
     }
 
-    /// The correction, or the longest half of it that makes the residual smaller.
-    #[expect(clippy::type_complexity, reason = "a place with its residual")]
+    /// The place that the correction leads to, or the longest half of it that makes the residual smaller.
     fn corrected(
         &mut self,
         stand: &Stand,
         residual: &DVector<f64>,
         derivative: &DMatrix<f64>,
-    ) -> Result<Option<(Stand, (DVector<f64>, Stand, f64))>, Error> {
+    ) -> Option<(Stand, Closing)> {
         let n = residual.len();
-        let system = DMatrix::identity(n, n) - derivative;
-        let svd = system.svd(true, true);
+        let svd = (DMatrix::identity(n, n) - derivative).svd(true, true);
         // Directions that a return leaves as they are stay.
-        let Ok(correction) = svd.solve(residual, NEUTRAL) else {
-            return Ok(None);
-        };
+        let correction = svd.solve(residual, NEUTRAL).ok()?;
         let mut part = 1.0;
         for _ in 0..HALVINGS {
             let mut next = stand.clone();
@@ -289,14 +294,14 @@ impl Shooting<'_> {
                 *value += part * correction[j] * self.amplitudes[j];
             }
             // Where no circuit is the correction was too long.
-            if let Ok(found) = self.residual(&next)
-                && found.0.amax() < residual.amax()
+            if let Ok(found) = self.close(&next)
+                && found.size() < residual.amax()
             {
-                return Ok(Some((next, found)));
+                return Some((next, found));
             }
             part *= 0.5;
         }
-        Ok(None)
+        None
     }
 }
 
