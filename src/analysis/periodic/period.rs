@@ -222,10 +222,11 @@ mod tests {
     #[test]
     fn what_does_not_repeat_is_held() {
         let text = "* t\nv1 1 0 pulse(2 5 1m)\nr1 1 0 1\nv2 2 0 pwl(0 1 1m 3)\nr2 2 0 1\n\
-                    v3 3 0 pulse(0 1 2.5u 0 0 3u 10u)\nr3 3 0 1\n.tran 1u 10m\n.end\n";
+                    v3 3 0 pulse(0 1 2.5u 0 0 3u 10u)\nr3 3 0 1\n\
+                    v4 4 0 pulse(0 1 1m 0 0 1 2)\nr4 4 0 1\n.tran 1u 10m\n.end\n";
         let model = Model::parse(text, "t.cir").expect("a netlist");
         let (held, names) = repeating(model.circuit());
-        assert_eq!(names, ["v1", "v2"]);
+        assert_eq!(names, ["v1", "v2", "v4"]);
         let found = common(&held).expect("a period");
         assert_eq!((found.seconds, found.from), (Some(1e-5), 1e-5));
     }
