@@ -118,6 +118,20 @@ fn theorem<'r>(report: &'r Report, statement: &str) -> &'r Theorem {
         .expect("statement present")
 }
 
+/// 0 and 1 in turn, for half a second each.
+fn square() -> Wave {
+    Wave::Pulse {
+        v1: 0.0,
+        v2: 1.0,
+        delay: 0.0,
+        rise: 0.0,
+        fall: 0.0,
+        width: 0.5,
+        period: 1.0,
+        count: None,
+    }
+}
+
 #[test]
 fn bridge_of_36_and_37_is_theorem_2_with_its_stored_energy() {
     let report = system(&bridge());
@@ -201,17 +215,7 @@ fn current_source_into_an_inductor_is_example_3_1() {
         dmatrix![0.0],
         dmatrix![L],
     );
-    let square = Wave::Pulse {
-        v1: 0.0,
-        v2: 1.0,
-        delay: 0.0,
-        rise: 0.0,
-        fall: 0.0,
-        width: 0.5,
-        period: 1.0,
-        count: None,
-    };
-    drive(&mut circuit, "i1", square, &[0.0], &[-1.0]);
+    drive(&mut circuit, "i1", square(), &[0.0], &[-1.0]);
     let report = system(&circuit);
     let sweeping = theorem(&report, "Brogliato-Thibault Theorem 3.5");
     assert_eq!(sweeping.holds, Some(true), "{report}");

@@ -114,15 +114,9 @@ pub enum Method {
     Theta,
 }
 
-/// `circ sim`.
+/// Where the waveforms of a run go, which of them, and what is said of it.
 #[derive(Debug, Args)]
-pub struct SimArgs {
-    #[command(flatten)]
-    #[expect(missing_docs, reason = "documented where it is defined")]
-    pub input: Input,
-    #[command(flatten)]
-    #[expect(missing_docs, reason = "documented where it is defined")]
-    pub method: MethodArgs,
+pub struct ResultArgs {
     /// Write results to this file (repeatable); the ending chooses csv, raw, npz, json, svg, png or html
     ///
     /// A file appears when it is whole, or as far as the run came. Rows of csv and raw are written as they come; the others hold all rows,
@@ -141,15 +135,29 @@ pub struct SimArgs {
     /// Where `.tran` names no print step they are there anyway, and so are rows at corners of sources.
     #[arg(long)]
     pub events: bool,
+    /// Print a summary of the run on standard error
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    pub summary: Option<Summary>,
+}
+
+/// `circ sim`.
+#[derive(Debug, Args)]
+pub struct SimArgs {
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub input: Input,
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub method: MethodArgs,
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub results: ResultArgs,
     /// Make the run a second time by an independent method; status 1 where the two differ by more than their errors
     ///
     /// An exact run is made in steps at two tolerances, a run in steps exactly if that can be, else in steps of another scheme. The
     /// summary has the largest difference relative to a signal's amplitude, and what is tolerated.
     #[arg(long)]
     pub verify: bool,
-    /// Print a summary of the run on standard error
-    #[arg(long, value_enum, value_name = "FORMAT")]
-    pub summary: Option<Summary>,
 }
 
 /// `circ pss`.
@@ -158,9 +166,9 @@ pub struct PssArgs {
     #[command(flatten)]
     #[expect(missing_docs, reason = "documented where it is defined")]
     pub input: Input,
-    /// Write one period to this file (repeatable); the ending chooses csv, raw, npz, json, svg, png or html
-    #[arg(short, long = "output", value_name = "OUT")]
-    pub outputs: Vec<PathBuf>,
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub results: ResultArgs,
     /// The period, s, in place of the common one of the sources; suffixes as in netlists (`10u`)
     #[arg(long, value_name = "T", value_parser = positive)]
     pub period: Option<f64>,
@@ -170,19 +178,6 @@ pub struct PssArgs {
     /// How well the orbit must close, relative to the amplitudes [default: 1e-9; 1e-6 where laws are curved]
     #[arg(long, value_name = "R", value_parser = positive)]
     pub tol: Option<f64>,
-    /// Signals to show.
-    #[arg(
-        long = "probe",
-        value_name = "NAME",
-        help = "Show exactly these signals: v(a), v(a,b), i(d1), @d1[i], v1#branch (repeatable)"
-    )]
-    pub probes: Vec<String>,
-    /// Add rows at event times: two with equal time at a jump, before and after
-    #[arg(long)]
-    pub events: bool,
-    /// Print a summary on standard error
-    #[arg(long, value_enum, value_name = "FORMAT")]
-    pub summary: Option<Summary>,
 }
 
 /// Forms of the summary.

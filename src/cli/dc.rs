@@ -17,7 +17,7 @@ use crate::waveform::csv;
 /// # Errors
 /// See [`Failure`].
 pub(super) fn sim(args: &SimArgs, model: &Model, streams: &Streams) -> Result<Exit, Failure> {
-    for path in &args.outputs {
+    for path in &args.results.outputs {
         if Format::of(path)? != Format::Csv {
             let message = format!("{}: a `.dc` sweep is written as csv", path.display());
             return Err(Failure::Message(message));
@@ -43,10 +43,10 @@ pub(super) fn sim(args: &SimArgs, model: &Model, streams: &Streams) -> Result<Ex
             }
         }
     }
-    for path in &args.outputs {
+    for path in &args.results.outputs {
         files::write(path, &text)?;
     }
-    if args.outputs.is_empty() {
+    if args.results.outputs.is_empty() {
         streams.data(text)?;
     }
     Ok(Exit::Done)

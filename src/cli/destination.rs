@@ -1,8 +1,6 @@
 //! Where the results of a command go, and what it says of them.
 
-use std::path::PathBuf;
-
-use super::args::{Input, Summary};
+use super::args::{Input, ResultArgs, Summary};
 use super::exit::{Exit, Failure};
 use super::input;
 use super::output::{Format, Outputs};
@@ -18,10 +16,7 @@ use crate::report::{json, terminal, text};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wanted<'a> {
     pub(super) input: &'a Input,
-    pub(super) outputs: &'a [PathBuf],
-    pub(super) summary: Option<Summary>,
-    /// Rows at events.
-    pub(super) events: bool,
+    pub(super) results: &'a ResultArgs,
     /// The step was named.
     pub(super) fixed_step: bool,
     /// A second run.
@@ -54,7 +49,7 @@ impl<'a> Destination<'a> {
             formats,
             tran,
             places,
-            plots: wanted.outputs.is_empty() && streams.out_is_terminal(),
+            plots: wanted.results.outputs.is_empty() && streams.out_is_terminal(),
             streams,
         }
     }
@@ -71,11 +66,17 @@ impl<'a> Destination<'a> {
     pub(super) fn open(&self, columns: &Columns) -> Result<Outputs, Failure> {
         let between = self.tran.is_some_and(|tran| !tran.prints);
         let shown = Shown {
-            events: self.wanted.events || between,
+            events: self.wanted.results.events || between,
             corners: between,
         };
         let to_pipe = !self.plots;
-        Outputs::open(self.wanted.outputs, self.formats, to_pipe, shown, columns)
+        Outputs::open(
+            &self.wanted.results.outputs,
+            self.formats,
+            to_pipe,
+            shown,
+            columns,
+        )
     }
 
     /// Writes what a run gave, or as much of it as there is, and says why it ended early. `feeds`: the rows have not been written yet.
@@ -180,7 +181,7 @@ impl<'a> Destination<'a> {
     /// On standard error: JSON where asked for; words where asked for, for a person, and with `-v`; else the notes alone.
     /// What was measured is in all of them.
     fn summarise(&self, run: &Run, found: &Measurements) {
-        let (places, streams, summary) = (self.places, self.streams, self.wanted.summary);
+        let (places, streams, summary) = (self.places, self.streams, self.wanted.results.summary);
         let in_words = summary == Some(Summary::Text)
             || summary.is_none() && (streams.verbose || streams.err_is_terminal());
         if !in_words {

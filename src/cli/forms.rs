@@ -39,7 +39,7 @@ pub(super) fn run(form: &NonlinearFile, args: &SimArgs) -> Result<Run, Failure> 
     let pairs = |what: &str| (1..=m).map(|j| format!("{what}(d{j})")).collect::<Vec<_>>();
     let names = [form.states.clone(), pairs("lambda"), pairs("y")].concat();
     let units = [form.units.clone(), vec!["A"; m], vec!["V"; m]].concat();
-    let columns: Vec<usize> = if args.probes.is_empty() {
+    let columns: Vec<usize> = if args.results.probes.is_empty() {
         (0..names.len()).collect()
     } else {
         let find = |probe: &String| {
@@ -47,7 +47,11 @@ pub(super) fn run(form: &NonlinearFile, args: &SimArgs) -> Result<Run, Failure> 
             let wanted = probe.to_lowercase();
             names.iter().position(|n| *n == wanted).ok_or_else(unknown)
         };
-        args.probes.iter().map(find).collect::<Result<_, _>>()?
+        args.results
+            .probes
+            .iter()
+            .map(find)
+            .collect::<Result<_, _>>()?
     };
     let tol = args.method.tol.unwrap_or(Settings::default().tol);
     let found = form

@@ -18,10 +18,10 @@ use crate::integrate::Run;
 /// # Errors
 /// See [`Failure`].
 pub(super) fn pss(args: &PssArgs, streams: &Streams) -> Result<Exit, Failure> {
-    let formats = args.outputs.iter().map(|path| Format::of(path));
+    let formats = args.results.outputs.iter().map(|path| Format::of(path));
     let formats: Vec<Format> = formats.collect::<Result<_, _>>()?;
-    let paths: Vec<&Path> = args.outputs.iter().map(PathBuf::as_path).collect();
-    let subject = input::open(&args.input, &args.probes, &paths, streams)?;
+    let paths: Vec<&Path> = args.results.outputs.iter().map(PathBuf::as_path).collect();
+    let subject = input::open(&args.input, &args.results.probes, &paths, streams)?;
     let model = input::model_of(&args.input, &subject)?;
     if !model.circuit().steps.is_empty() {
         streams.say("note: `.step` is left out: this is the orbit of the values as they stand");
@@ -29,9 +29,7 @@ pub(super) fn pss(args: &PssArgs, streams: &Streams) -> Result<Exit, Failure> {
     let signals = Signals::watch()?;
     let wanted = Wanted {
         input: &args.input,
-        outputs: &args.outputs,
-        summary: args.summary,
-        events: args.events,
+        results: &args.results,
         fixed_step: false,
         verify: false,
     };
@@ -44,7 +42,7 @@ pub(super) fn pss(args: &PssArgs, streams: &Streams) -> Result<Exit, Failure> {
             period: args.period,
             order: args.order.map(usize::from),
             tol: args.tol,
-            events: args.events,
+            events: args.results.events,
             corners: destination.has_pictures(),
             cancel: Some(signals.flag()),
             ..PeriodicOptions::default()

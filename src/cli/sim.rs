@@ -35,12 +35,13 @@ const PROGRESS: f64 = 1000.0;
 /// See [`Failure`].
 pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
     let formats = args
+        .results
         .outputs
         .iter()
         .map(|path| Format::of(path))
         .collect::<Result<Vec<_>, _>>()?;
-    let request = Request::of(&args.method, args.events)?;
-    let paths: Vec<&Path> = args.outputs.iter().map(PathBuf::as_path).collect();
+    let request = Request::of(&args.method, args.results.events)?;
+    let paths: Vec<&Path> = args.results.outputs.iter().map(PathBuf::as_path).collect();
     if let Some(form) = forms::open(&args.input)? {
         only_one_way(args)?;
         files::spare(&paths, [args.input.file.as_path()])?;
@@ -51,7 +52,7 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         let finished = Finished::of(Ok(run));
         return destination.finish(outputs, finished, true, None);
     }
-    let subject = input::open(&args.input, &args.probes, &paths, streams)?;
+    let subject = input::open(&args.input, &args.results.probes, &paths, streams)?;
     let signals = Signals::watch()?;
     if let Subject::Circuit(model) = &subject {
         let circuit = model.circuit();
@@ -110,9 +111,7 @@ impl SimArgs {
     pub(super) fn wanted(&self) -> Wanted<'_> {
         Wanted {
             input: &self.input,
-            outputs: &self.outputs,
-            summary: self.summary,
-            events: self.events,
+            results: &self.results,
             fixed_step: self.method.step.is_some(),
             verify: self.verify,
         }

@@ -156,7 +156,7 @@ impl Stepping<'_> {
         let _ = outputs.take(Block::of(&total.waveforms, &total.kinds));
         let written = outputs.finish((&total, destination.places), &figure, incomplete);
         let wordy = streams.verbose || streams.err_is_terminal();
-        match self.args.summary {
+        match self.args.results.summary {
             Some(Summary::Json) => streams.error(steps::summary(done, destination.places)),
             Some(Summary::Text) => {
                 streams.error(text::summary(&total, destination.places, streams.verbose))
@@ -170,7 +170,7 @@ impl Stepping<'_> {
                 }
             }
         }
-        if !matches!(self.args.summary, Some(Summary::Json)) {
+        if !matches!(self.args.results.summary, Some(Summary::Json)) {
             streams.say(steps::measured(done));
         }
         if destination.plots {

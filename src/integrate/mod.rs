@@ -41,6 +41,7 @@ pub mod theta;
 pub mod verify;
 
 pub use aliasing::{Aliased, aliased};
+pub(crate) use difference::grow;
 pub use error::{Error, NoRest, Reason};
 pub use event::{Change, Event};
 pub use grid::Grid;

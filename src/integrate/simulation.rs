@@ -3,87 +3,30 @@
 //! The methods, events, jumps and energies are those of [`simulate`](crate::integrate::simulate()); what differs is who asks for the
 //! next time. A simulation owns all it needs and may be sent to another thread.
 
+mod stop;
 mod way;
 
 use std::sync::Arc;
 
 use nalgebra::DVector;
 
+pub use self::stop::{Checkpoint, SimulationOptions, Stop, StopReason};
 use self::way::Way;
 
 use crate::circuit::{Circuit, Source, Tran, held_at, holder};
 use crate::integrate::Note;
-use crate::integrate::energy::Balance;
 use crate::integrate::error::{Error, Reason};
 use crate::integrate::event::Event;
 use crate::integrate::exact::Place;
 use crate::integrate::log::Log;
 use crate::integrate::note;
 use crate::integrate::problem::Problem;
-use crate::integrate::simulate::{Method, SimOptions, check};
+use crate::integrate::simulate::{Method, check};
 use crate::integrate::stats::{Impulse, Run, StateJumps, Stats};
 use crate::lcs::Lcs;
 use crate::mna::{StaticMultiport, behaviour};
-use crate::settings::Settings;
 use crate::settings::tolerances::times::SPAN_PARTS;
 use crate::waveform::canonical_name;
-
-/// What a simulation may be asked for.
-#[derive(Debug, Clone, Default)]
-pub struct SimulationOptions {
-    /// The method.
-    pub method: Method,
-    /// θ, default ½ (1 for `euler`).
-    pub theta: Option<f64>,
-    /// γ, default ½ (1 for `euler`).
-    pub gamma: Option<f64>,
-    /// Fixed step, s; error-controlled where absent.
-    pub step: Option<f64>,
-    /// Where it ends at the latest, s; by default where the circuit's `.tran` does.
-    pub until: Option<f64>,
-    /// Tolerances.
-    pub settings: Settings,
-}
-
-/// Why [`Simulation::advance_to_event`] came back.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StopReason {
-    /// The time asked for is reached.
-    Time,
-    /// A device or switch changed its state, or the state jumped.
-    Event,
-}
-
-/// Where a simulation stands after an advance, and what happened on the way.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Stop {
-    /// Time, s.
-    pub time: f64,
-    /// Why it stands here.
-    pub reason: StopReason,
-    /// What happened since the last stop, one at this time included.
-    pub events: Vec<Event>,
-}
-
-/// A state of a simulation to return to.
-#[derive(Debug, Clone)]
-pub struct Checkpoint {
-    circuit: Arc<Circuit>,
-    problem: Problem,
-    /// Waveforms that were given to sources.
-    replaced: Vec<(usize, Source)>,
-    balance: Balance,
-    impulses: Vec<Impulse>,
-    state_jumps: StateJumps,
-}
-
-impl Checkpoint {
-    /// Its time, s.
-    #[must_use]
-    pub const fn time(&self) -> f64 {
-        self.problem.start.t
-    }
-}
 
 /// A circuit in the course of a transient. It stands at right limits: after everything that happens at its time.
 ///
@@ -126,15 +69,7 @@ impl Simulation {
         multiport: &StaticMultiport,
         options: SimulationOptions,
     ) -> Result<Self, Error> {
-        let tran = transient(circuit.tran, options.until)?;
-        check(&tran, &options.as_asked())?;
-        let problem = Problem::of_circuit(circuit, multiport, tran.uic, &options.settings)?;
-        Self::start(
-            Arc::new(circuit.clone()),
-            problem.with_free_sources(),
-            tran,
-            options,
-        )
+        Self::start(circuit, multiport, options, Problem::with_free_sources)
     }
 
     /// The same of a circuit whose sources keep their waveforms: those that only move switches are then no part of the state.
@@ -146,24 +81,25 @@ impl Simulation {
         multiport: &StaticMultiport,
         options: SimulationOptions,
     ) -> Result<Self, Error> {
-        let tran = transient(circuit.tran, options.until)?;
-        check(&tran, &options.as_asked())?;
-        let problem = Problem::of_circuit(circuit, multiport, tran.uic, &options.settings)?;
-        Self::start(Arc::new(circuit.clone()), problem, tran, options)
+        Self::start(circuit, multiport, options, |problem| problem)
     }
 
     fn start(
-        circuit: Arc<Circuit>,
-        mut problem: Problem,
-        tran: Tran,
+        circuit: &Circuit,
+        multiport: &StaticMultiport,
         options: SimulationOptions,
+        sources: impl FnOnce(Problem) -> Problem,
     ) -> Result<Self, Error> {
+        let tran = transient(circuit.tran, options.until)?;
+        check(&tran, &options.as_asked())?;
+        let problem = Problem::of_circuit(circuit, multiport, tran.uic, &options.settings)?;
+        let mut problem = sources(problem);
         let lcs = problem.prepare(&tran, &options.settings)?;
         let (mut notes, mut log) = (problem.notes.clone(), Log::default());
         let way = Way::of(&problem, &lcs, &tran, &options, &mut notes, &mut log)?;
         Ok(Self {
             row: vec![0.0; lcs.outputs.names.len()],
-            circuit,
+            circuit: Arc::new(circuit.clone()),
             problem,
             lcs,
             tran,
@@ -493,20 +429,6 @@ impl Simulation {
             state_jumps: self.state_jumps,
             notes: self.notes,
             ..Run::default()
-        }
-    }
-}
-
-impl SimulationOptions {
-    /// The same as options of a whole run.
-    fn as_asked(&self) -> SimOptions<'static> {
-        SimOptions {
-            method: self.method,
-            theta: self.theta,
-            gamma: self.gamma,
-            step: self.step,
-            settings: self.settings.clone(),
-            ..SimOptions::default()
         }
     }
 }

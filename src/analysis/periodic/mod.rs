@@ -17,7 +17,7 @@ use crate::settings::Settings;
 use crate::settings::tolerances::periodic::{LONGEST_SEARCH, PARTS_OF_PERIOD, TABLE_STEPS};
 use crate::settings::tolerances::times::SPAN_PARTS;
 
-use search::Search;
+use search::{Found, Search};
 use shooting::{Fixed, neutral};
 
 /// What a periodic steady state may be asked for.
@@ -85,43 +85,62 @@ pub fn periodic(model: &Model, options: &PeriodicOptions<'_>) -> Result<(Orbit, 
         Error::before(Reason::internal("analysis::periodic", what))
     })?;
     let span = circuit.tran.map(|tran| tran.tstop);
-    let mut simulation = simulation(&circuit, &multiport, period.seconds, options)?;
-    let mut search = Search {
-        simulation: &mut simulation,
-        options,
-        corrections: 0,
-    };
-    let found = match period.seconds {
+    let mut simulation = simulation((&circuit, &multiport), period.seconds, 1.0, options)?;
+    let mut search = Search::of(&mut simulation, options);
+    let mut found = match period.seconds {
         Some(seconds) => search.driven(seconds, period.from)?,
         None => search.autonomous(span.ok_or_else(|| {
             none("no source repeats, and there is no `.tran` that says how long to look".into())
         })?)?,
     };
-    let conducting = {
-        simulation.stand_at(
-            found.from,
-            &found.fixed.stand.state,
-            &found.fixed.stand.switches,
-        )?;
-        simulation.conducting()
+    let apart = if simulation.is_exact() {
+        Some(0.0)
+    } else {
+        refined((&circuit, &multiport), &mut found, period.seconds, options)?
     };
-    let names = simulation.state_names().to_vec();
-    let orbit = found.orbit();
-    let mut run = rows(
-        (&circuit, &multiport),
-        (&found.fixed, found.from, conducting),
-        orbit.period,
-        options,
-    )?;
-    run.notes.extend(notes(&orbit, &found.fixed, &names, &held));
+    let (stand, from) = (&found.fixed.stand, found.from);
+    simulation.stand_at(from, &stand.state, &stand.switches)?;
+    let standing = Standing {
+        t: from,
+        state: stand.state.clone(),
+        switches: stand.switches.clone(),
+        conducting: simulation.conducting(),
+    };
+    let (names, orbit) = (simulation.state_names(), found.orbit());
+    let mut run = rows((&circuit, &multiport), standing, orbit.period, options)?;
+    if !simulation.is_exact() {
+        for error in [&mut run.error.max, &mut run.error.rms] {
+            *error = error.zip(apart).map(|(error, apart)| error.max(apart));
+        }
+    }
+    run.notes.extend(notes(&orbit, &found.fixed, names, &held));
     Ok((orbit, run))
 }
 
-/// A simulation that shoots: no rows, and an end that is never reached.
-fn simulation(
-    circuit: &Circuit,
-    multiport: &StaticMultiport,
+/// Where laws are curved: the orbit of steps half as long in place of `found`, and how far the two are apart relative to the amplitudes;
+/// nothing where it is not found.
+fn refined(
+    parts: (&Circuit, &StaticMultiport),
+    found: &mut Found,
     period: Option<f64>,
+    options: &PeriodicOptions<'_>,
+) -> Result<Option<f64>, Error> {
+    let mut finer = simulation(parts, period, 0.5, options)?;
+    let Some(fixed) = Search::of(&mut finer, options).again(found)? else {
+        return Ok(None);
+    };
+    let both = fixed.stand.state.iter().zip(&found.fixed.stand.state);
+    let apart = both.zip(&found.amplitudes);
+    let apart = apart.fold(0.0_f64, |m, ((a, b), size)| m.max((a - b).abs() / size));
+    found.fixed = fixed;
+    Ok(Some(apart))
+}
+
+/// A simulation that shoots: no rows, an end that is never reached, and where laws are curved steps of `part` of the usual ones.
+fn simulation(
+    (circuit, multiport): (&Circuit, &StaticMultiport),
+    period: Option<f64>,
+    part: f64,
     options: &PeriodicOptions<'_>,
 ) -> Result<Simulation, Error> {
     let tran = circuit.tran;
@@ -150,16 +169,17 @@ fn simulation(
         return Ok(simulation);
     }
     // Steps that an error control chooses differ from return to return, and with them what they return to.
-    of(Some(span / PARTS_OF_PERIOD))
+    of(Some(part * span / PARTS_OF_PERIOD))
 }
 
 /// One period of waveforms, from 0 on.
 fn rows(
     (circuit, multiport): (&Circuit, &StaticMultiport),
-    (fixed, from, conducting): (&Fixed, f64, Vec<bool>),
+    standing: Standing,
     period: f64,
     options: &PeriodicOptions<'_>,
 ) -> Result<Run, Error> {
+    let from = standing.t;
     let asked = circuit
         .tran
         .filter(|tran| tran.prints && tran.tstep < period);
@@ -173,12 +193,6 @@ fn rows(
             uic: true,
         }),
         ..circuit.clone()
-    };
-    let standing = Standing {
-        t: from,
-        state: fixed.stand.state.clone(),
-        switches: fixed.stand.switches.clone(),
-        conducting,
     };
     let mut run = simulate_from(
         &circuit,

@@ -2,7 +2,7 @@
 
 use super::PeriodicOptions;
 use super::shooting::{Fixed, Return, Shooting, Stand, multipliers};
-use crate::integrate::{Change, Error, Event, Orbit, OrbitKind, Reason, Simulation};
+use crate::integrate::{Change, Error, Event, Orbit, OrbitKind, Reason, Simulation, grow};
 use crate::settings::tolerances::periodic::{
     AT_REST, CLOSED, NEUTRAL, NUDGE, RETURNS, STEPPED_CLOSED,
 };
@@ -20,9 +20,9 @@ const PROLONGED: usize = 40;
 
 /// A search, with the simulation it moves.
 pub(super) struct Search<'a, 'o> {
-    pub(super) simulation: &'a mut Simulation,
-    pub(super) options: &'a PeriodicOptions<'o>,
-    pub(super) corrections: u32,
+    simulation: &'a mut Simulation,
+    options: &'a PeriodicOptions<'o>,
+    corrections: u32,
 }
 
 /// An orbit that was found.
@@ -32,7 +32,8 @@ pub(super) struct Found {
     pub(super) from: f64,
     kind: OrbitKind,
     order: usize,
-    section: Option<Change>,
+    returns: Return,
+    pub(super) amplitudes: Vec<f64>,
 }
 
 impl Found {
@@ -50,8 +51,23 @@ impl Found {
             multipliers,
             kind: self.kind,
             order: self.order,
-            section: self.section.as_ref().map(ToString::to_string),
+            section: match &self.returns {
+                Return::At(section, _) => Some(section.to_string()),
+                Return::After(_) => None,
+            },
         }
+    }
+}
+
+/// An orbit that sources drive.
+fn driven(fixed: Fixed, (period, from): (f64, f64), order: usize, amplitudes: &[f64]) -> Found {
+    Found {
+        fixed,
+        from,
+        kind: OrbitKind::Driven,
+        order,
+        returns: Return::After(period),
+        amplitudes: amplitudes.to_vec(),
     }
 }
 
@@ -64,7 +80,18 @@ fn none(what: String) -> Error {
     Error::before(Reason::NoOrbit(what))
 }
 
-impl Search<'_, '_> {
+impl<'a, 'o> Search<'a, 'o> {
+    pub(super) const fn of(
+        simulation: &'a mut Simulation,
+        options: &'a PeriodicOptions<'o>,
+    ) -> Self {
+        Self {
+            simulation,
+            options,
+            corrections: 0,
+        }
+    }
+
     fn closed(&self) -> f64 {
         let usual = if self.simulation.is_exact() {
             CLOSED
@@ -94,6 +121,31 @@ impl Search<'_, '_> {
         }
     }
 
+    /// Lets so many periods pass: where each of them ends.
+    fn pass(
+        &mut self,
+        stand: &mut Stand,
+        (period, from): (f64, f64),
+        periods: usize,
+    ) -> Result<Vec<Stand>, Error> {
+        let one = |_| {
+            self.go_on()?;
+            *stand = self.shooting(from, Return::After(period)).shoot(stand)?.0;
+            Ok(stand.clone())
+        };
+        (0..periods).map(one).collect()
+    }
+
+    /// The orbit of this simulation that is near one of another, if there is one.
+    pub(super) fn again(&mut self, found: &Found) -> Result<Option<Fixed>, Error> {
+        let closed = self.closed();
+        let mut shooting = self.shooting(found.from, found.returns.clone());
+        shooting.order = found.order;
+        shooting.amplitudes.clone_from(&found.amplitudes);
+        shooting.corrections = found.fixed.corrections;
+        shooting.solve(found.fixed.stand.clone(), closed)
+    }
+
     /// The orbit of a circuit whose sources repeat after `period` seconds from `from` on.
     pub(super) fn driven(&mut self, period: f64, from: f64) -> Result<Found, Error> {
         let closed = self.closed();
@@ -108,13 +160,10 @@ impl Search<'_, '_> {
         let (mut last, mut seen) = (None, vec![0.0; stand.state.len()]);
         grow(&mut seen, &stand.state);
         for periods in TRANSIENTS {
-            let mut passed = Vec::new();
-            for _ in 0..periods {
-                self.go_on()?;
-                stand = self.shooting(from, Return::After(period)).shoot(&stand)?.0;
-                grow(&mut seen, &stand.state);
-                passed.push(stand.clone());
-            }
+            let passed = self.pass(&mut stand, (period, from), periods)?;
+            passed
+                .iter()
+                .for_each(|stand| grow(&mut seen, &stand.state));
             let mut shooting = self.shooting(from, Return::After(period));
             shooting.order = asked.unwrap_or(1);
             shooting.observe(&stand, period, &seen)?;
@@ -123,11 +172,18 @@ impl Search<'_, '_> {
             self.corrections = shooting.corrections;
             match found {
                 Ok(Some(fixed)) if asked.is_some() || is_stable(&fixed) => {
-                    return Ok(self.found(fixed, from, asked.unwrap_or(1)));
+                    return Ok(driven(
+                        fixed,
+                        (period, from),
+                        asked.unwrap_or(1),
+                        &amplitudes,
+                    ));
                 }
                 Ok(Some(fixed)) => {
                     let other = self.beyond(&fixed, (period, from), &amplitudes)?;
-                    return Ok(other.unwrap_or_else(|| self.found(fixed, from, 1)));
+                    return Ok(
+                        other.unwrap_or_else(|| driven(fixed, (period, from), 1, &amplitudes))
+                    );
                 }
                 Ok(None) => {}
                 Err(error) => last = Some(error),
@@ -149,16 +205,6 @@ impl Search<'_, '_> {
         })
     }
 
-    fn found(&self, fixed: Fixed, from: f64, order: usize) -> Found {
-        Found {
-            fixed,
-            from,
-            kind: OrbitKind::Driven,
-            order,
-            section: None,
-        }
-    }
-
     /// The stable orbit to which transients go that leave an unstable one.
     fn beyond(
         &mut self,
@@ -171,12 +217,7 @@ impl Search<'_, '_> {
             *value += NUDGE * amplitude;
         }
         for periods in TRANSIENTS {
-            let mut passed = Vec::new();
-            for _ in 0..periods.max(2 * MOST_ORDER) {
-                self.go_on()?;
-                stand = self.shooting(from, Return::After(period)).shoot(&stand)?.0;
-                passed.push(stand.clone());
-            }
+            let passed = self.pass(&mut stand, (period, from), periods.max(2 * MOST_ORDER))?;
             if let Some(order) = order_of(&passed, amplitudes)
                 && let Some(found) = self.of_order(order, &stand, (period, from), amplitudes)?
                 && (order > 1 || is_stable(&found.fixed))
@@ -215,7 +256,7 @@ impl Search<'_, '_> {
         }
         let order = shooting.order;
         self.corrections = shooting.corrections;
-        Ok(is_stable(&fixed).then(|| self.found(fixed, from, order)))
+        Ok(is_stable(&fixed).then(|| driven(fixed, (period, from), order, amplitudes)))
     }
 
     /// The orbit of a circuit in which no source varies, or its rest, after a transient of `span` seconds.
@@ -280,13 +321,15 @@ impl Search<'_, '_> {
         let mut shooting = self.shooting(0.0, Return::After(seconds));
         shooting.observe(stand, seconds, seen)?;
         let fixed = shooting.solve(stand.clone(), closed)?;
+        let (returns, amplitudes) = (shooting.returns.clone(), shooting.amplitudes.clone());
         self.corrections = shooting.corrections;
         Ok(fixed.map(|fixed| Found {
             fixed,
             from: 0.0,
             kind: OrbitKind::Equilibrium,
             order: 1,
-            section: None,
+            returns,
+            amplitudes,
         }))
     }
 
@@ -320,6 +363,7 @@ impl Search<'_, '_> {
                 Some(fixed) => shooting.moves(&fixed.stand, fixed.seconds, seen)?,
                 None => false,
             };
+            let (returns, amplitudes) = (shooting.returns.clone(), shooting.amplitudes.clone());
             self.corrections = shooting.corrections;
             // Events that follow each other ever faster around a point come to rest there.
             if let (Some(fixed), false) = (&found, moves) {
@@ -331,18 +375,12 @@ impl Search<'_, '_> {
                     from: 0.0,
                     kind: OrbitKind::Autonomous,
                     order,
-                    section: Some(section.clone()),
+                    returns,
+                    amplitudes,
                 }));
             }
         }
         Ok(None)
-    }
-}
-
-/// Raises amplitudes to these states.
-fn grow(amplitudes: &mut [f64], state: &[f64]) {
-    for (amplitude, value) in amplitudes.iter_mut().zip(state) {
-        *amplitude = amplitude.max(value.abs());
     }
 }
 

@@ -89,19 +89,6 @@ fn sine(offset: f64, amplitude: f64, damping: f64) -> Wave {
     }
 }
 
-fn square() -> Wave {
-    Wave::Pulse {
-        v1: 0.0,
-        v2: 1.0,
-        delay: 0.0,
-        rise: 0.0,
-        fall: 0.0,
-        width: 0.5,
-        period: 1.0,
-        count: None,
-    }
-}
-
 const KATO: &str = "RR-7158 Theorem 1";
 const MONOTONE: &str = "RR-7158 Theorem 2";
 const SWEEPING: &str = "Brogliato-Thibault Theorem 3.5";

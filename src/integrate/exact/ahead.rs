@@ -5,7 +5,7 @@ use super::exosystem::Exosystem;
 use super::flow::{Flow, LONG};
 use super::mode::Mode;
 use super::sampled::MOST;
-use super::travel::{Leap, Travel};
+use super::travel::{Arrival, Leap, Travel};
 use crate::integrate::grid::Times;
 use crate::settings::tolerances::times::SAME_TIME;
 
@@ -83,12 +83,14 @@ impl DenseOutput {
             Some(leap) if leap.stop <= t + SAME_TIME * t.abs() => {
                 travel.take_span(flow, exosystem, leap);
             }
-            // It is clear as part of the span.
             Some(_) => {
                 if !self.first.is_empty() {
                     taken -= 1;
                     let first = self.t - taken as f64 * flow.step(LONG);
-                    travel.advance(flow, exosystem, first);
+                    // It is clear as part of the span; where a closer look sees an event after all the run stands there.
+                    if travel.advance(flow, exosystem, first) != Arrival::Reached {
+                        return;
+                    }
                 }
                 travel.arrive(flow, exosystem, taken, None, self.t);
             }

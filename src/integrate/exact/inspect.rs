@@ -65,8 +65,8 @@ impl Inspector {
         self.s.iter().all(|v| v.is_finite()).then(|| self.s.clone())
     }
 
-    /// Inspects `mode` at storage `s`, whose amplitudes so far are `scale` and those it was rounded from `known`, at time t on the current source pieces, where the exosystem
-    /// is at z.
+    /// Inspects `mode` at storage `s`, whose amplitudes so far are `scale` and those it was rounded from `known`, at time t on the current
+    /// source pieces, where the exosystem is at z.
     pub(crate) fn inspect(
         &mut self,
         mode: &mut Mode,

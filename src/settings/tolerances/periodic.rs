@@ -33,8 +33,9 @@ pub(crate) const AT_REST: f64 = 1e-3;
 /// A step away from an unstable orbit, relative to the amplitudes.
 pub(crate) const NUDGE: f64 = 1e-4;
 
-/// Steps of a period where laws are curved.
-pub(crate) const PARTS_OF_PERIOD: f64 = 2000.0;
+/// Steps of a period where laws are curved; the orbit that is shown has twice as many, and the difference of the two is its error. Larger: time;
+/// smaller: orbits that differ by more than what is asked of a run.
+pub(crate) const PARTS_OF_PERIOD: f64 = 1000.0;
 
 /// Table steps of exact integration in a period. Larger: more of them on the way through a calm mode; smaller: deeper tables.
 pub(crate) const TABLE_STEPS: f64 = 64.0;

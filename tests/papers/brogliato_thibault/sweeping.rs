@@ -20,6 +20,16 @@ fn swing() -> Signal {
 
 /// (10)-(15): x' = Ax + Bζ + e with 0 ≤ ζ ⟂ w ≥ 0, the inclusion with N(S(t); z) and the variational inequality are the same at any
 /// point: true together, false together. x ∈ K(t) (12) iff Rx ∈ S(t) (14).
+/// x' = λ, y = x: a point that a half line pushes.
+fn half_line() -> System {
+    System {
+        a: dmatrix![0.0],
+        b: dmatrix![1.0],
+        c: dmatrix![1.0],
+        d: dmatrix![0.0],
+    }
+}
+
 #[test]
 fn equations_10_to_15_are_the_same_problem() {
     let mut random = Random(10);
@@ -106,12 +116,7 @@ fn equation_9_a_p_matrix_feedthrough_is_a_differential_equation() {
 fn example_3_1_inductor_swept_by_a_current_source() {
     // −x' ∈ N([i(t), ∞); x): x(t) = max(x₀, max over s ≤ t of i(s)).
     let source = |t: f64| (2.0 * t).sin() * (1.0 + t);
-    let system = System {
-        a: dmatrix![0.0],
-        b: dmatrix![1.0],
-        c: dmatrix![1.0],
-        d: dmatrix![0.0],
-    };
+    let system = half_line();
     let linear = Linear::new(
         system,
         constant(dvector![0.0]),
@@ -301,12 +306,7 @@ fn remark_3_6_an_integrable_drift() {
     let e = move |t: f64| -0.5 / (t - s).abs().max(1e-300).sqrt();
     let integral = move |t: f64| -s.sqrt() - (t - s).signum() * (t - s).abs().sqrt();
     let floor = |t: f64| 0.5 * (4.0 * t).sin();
-    let system = System {
-        a: dmatrix![0.0],
-        b: dmatrix![1.0],
-        c: dmatrix![1.0],
-        d: dmatrix![0.0],
-    };
+    let system = half_line();
     let linear = Linear::new(
         system,
         Rc::new(move |t| dvector![e(t)]),

@@ -83,17 +83,22 @@ fn section_3_1_4_theorem_1_on_the_circuit_of_figure_2() {
     assert!(VariationalInequality::of(&other, None).is_err());
 }
 
-/// (17) with a φ that is no indicator function: Ξ(v) − Ξ(X) counts. A mass on a spring with dry friction of ½; the force of friction the
-/// other way round violates it.
-#[test]
-fn equation_17_with_friction() {
+/// A mass on a spring, x₁' = x₂, x₂' = −x₁ + λ, y = x₂, with dry friction of ½.
+fn mass_with_friction() -> (System, Phi) {
     let system = System {
         a: dmatrix![0.0, 1.0; -1.0, 0.0],
         b: dmatrix![0.0; 1.0],
         c: dmatrix![0.0, 1.0],
         d: dmatrix![0.0],
     };
-    let friction = Phi::Relay { gain: 0.5 };
+    (system, Phi::Relay { gain: 0.5 })
+}
+
+/// (17) with a φ that is no indicator function: Ξ(v) − Ξ(X) counts. A mass on a spring with dry friction of ½; the force of friction the
+/// other way round violates it.
+#[test]
+fn equation_17_with_friction() {
+    let (system, friction) = mass_with_friction();
     let lure = Lure::new(Linear::autonomous(system.clone()).unwrap(), vec![friction]).unwrap();
     let inequality = VariationalInequality::of(&lure, None).unwrap();
     assert!((&inequality.v - DMatrix::identity(2, 2)).amax() < 1e-12);
@@ -424,13 +429,7 @@ fn remark_7_order_one_for_complementary_pairs() {
 /// √4 = 2 for a quarter of the step.
 #[test]
 fn remark_7_order_of_implicit_euler_with_friction() {
-    let system = System {
-        a: dmatrix![0.0, 1.0; -1.0, 0.0],
-        b: dmatrix![0.0; 1.0],
-        c: dmatrix![0.0, 1.0],
-        d: dmatrix![0.0],
-    };
-    let friction = Phi::Relay { gain: 0.5 };
+    let (system, friction) = mass_with_friction();
     let mass = Lure::new(Linear::autonomous(system).unwrap(), vec![friction]).unwrap();
     let exact = |t: f64| {
         let half = (t / std::f64::consts::PI).floor();
