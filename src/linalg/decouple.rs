@@ -12,8 +12,9 @@
 //! manifold w_F = Q w_S; G. W. Stewart, SIAM Review 15 (1973)). In ξ what is fast decays to nothing, so that neither guards nor
 //! exponentials are differences of large numbers.
 
+use super::levelled::Levelled;
 use crate::settings::tolerances::exponentials::DECOUPLED;
-use nalgebra::{DMatrix, DVector, Dyn, LU};
+use nalgebra::DMatrix;
 
 /// Rounds of either iteration; S and F are apart by 10³ at least.
 const ROUNDS: usize = 12;
@@ -78,34 +79,6 @@ pub(crate) fn decoupled(generator: &DMatrix<f64>, fast: &[usize]) -> Option<Deco
         to,
         from,
     })
-}
-
-/// A factored matrix, rows by their diagonals: those of different Roff are decades apart.
-struct Levelled {
-    diagonal: DVector<f64>,
-    factors: LU<f64, Dyn, Dyn>,
-}
-
-impl Levelled {
-    fn new(a: &DMatrix<f64>) -> Self {
-        let diagonal = a.diagonal();
-        let factors = levelled(a.clone(), &diagonal).lu();
-        Self { diagonal, factors }
-    }
-
-    /// a⁻¹ b.
-    fn solve(&self, b: DMatrix<f64>) -> Option<DMatrix<f64>> {
-        let mut solved = levelled(b, &self.diagonal);
-        self.factors.solve_mut(&mut solved).then_some(solved)
-    }
-}
-
-/// Rows over these numbers.
-fn levelled(mut matrix: DMatrix<f64>, by: &DVector<f64>) -> DMatrix<f64> {
-    for mut column in matrix.column_iter_mut() {
-        column.component_div_assign(by);
-    }
-    matrix
 }
 
 /// The fixed point of a contraction.

@@ -6,6 +6,7 @@ pub(crate) mod dense;
 pub(crate) mod eigenvalues;
 pub(crate) mod expm;
 pub(crate) mod kernel;
+pub(crate) mod levelled;
 pub(crate) mod polynomial;
 pub(crate) mod quadratic;
 pub(crate) mod rays;

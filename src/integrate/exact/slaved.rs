@@ -21,6 +21,7 @@
 use nalgebra::DMatrix;
 
 use super::map::{Map, Sizes};
+use crate::linalg::levelled::Levelled;
 use crate::settings::tolerances::exponentials::{
     FORGOTTEN, LEAST_PART, LEVEL, MOST_COUPLED, SHRINKS, SLAVED,
 };
@@ -133,25 +134,24 @@ fn settle_jointly(
 ) -> Option<(Vec<f64>, f64)> {
     let count = joint.len();
     let decay = |row: usize| -generator[(joint[row], joint[row])];
-    // Rows by their diagonals: those of different Roff are decades apart.
-    let levelled = DMatrix::from_fn(count, count, |i, j| {
+    let own = DMatrix::from_fn(count, count, |i, j| {
         if i == j {
-            1.0
+            decay(i)
         } else {
-            -generator[(joint[i], joint[j])].abs() / decay(i)
+            -generator[(joint[i], joint[j])].abs()
         }
     });
     let known = DMatrix::from_fn(count, 2, |i, column| {
         if column == 0 {
-            pushed(&joint[i]) / decay(i)
+            pushed(&joint[i])
         } else {
-            sizes[joint[i]]
+            decay(i) * sizes[joint[i]]
         }
     });
-    let solved = levelled.lu().solve(&known)?;
+    let solved = Levelled::new(&own).solve(known)?;
     let size = |row: usize| sizes[joint[row]];
     let weight = |row: usize| solved[(row, 1)];
-    let bounds = |row: usize| weight(row) >= size(row) && size(row) >= LEAST_PART * weight(row);
+    let bounds = |row: usize| weight(row) > 0.0 && size(row) >= LEAST_PART * weight(row);
     (0..count).all(bounds).then(|| {
         let rates = (0..count).map(|row| decay(row) * size(row) / weight(row));
         let settled = solved.column(0).iter().copied().collect();
@@ -203,14 +203,7 @@ impl Manifold {
         for &j in followers {
             fast.column_mut(j).fill(0.0);
         }
-        // Rows by their diagonals: those of different Roff are decades apart.
-        let scale: Vec<f64> = (0..own.nrows()).map(|k| own[(k, k)]).collect();
-        let levelled = |matrix: &DMatrix<f64>| {
-            DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
-                matrix[(i, j)] / scale[i]
-            })
-        };
-        let slaves = -levelled(&own).lu().solve(&levelled(&fast))?;
+        let slaves = -Levelled::new(&own).solve(fast)?;
         let slow = |rows: &DMatrix<f64>| {
             let mut slow = rows + rows.select_columns(followers) * &slaves;
             for &j in followers {
@@ -219,8 +212,8 @@ impl Manifold {
             slow
         };
         let mut drift = generator.select_rows(followers) - &slaves * generator;
-        for (mut row, scale) in drift.row_iter_mut().zip(&scale) {
-            row /= -scale;
+        for (k, mut row) in drift.row_iter_mut().enumerate() {
+            row /= -own[(k, k)];
         }
         let magnitudes = slaves.abs();
         let added = |rows: &DMatrix<f64>, sizes: &DMatrix<f64>| {
