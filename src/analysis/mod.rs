@@ -11,6 +11,7 @@ mod dc;
 mod measured;
 mod periodic;
 mod sweep;
+mod variation;
 
 pub use crate::integrate::{Orbit, OrbitKind};
 pub use dc::{Characteristic, Unsolved, dc};

@@ -102,6 +102,9 @@ pub enum Reason {
     /// The circuit has no periodic steady state, or none was found.
     #[error("no periodic steady state: {0}")]
     NoOrbit(String),
+    /// A derivative was asked for that does not exist, or is not known.
+    #[error("no derivative: {0}")]
+    NotSmooth(String),
     /// What was read is no circuit.
     #[error("{0}")]
     Netlist(Faults),

@@ -10,7 +10,7 @@ use crate::circuit::Source;
 use crate::integrate::Note;
 use crate::integrate::energy::Balance;
 use crate::integrate::error::{Error, Reason, is_final, named};
-use crate::integrate::exact::{Exact, Place};
+use crate::integrate::exact::{Exact, Passage, Place};
 use crate::integrate::grid::Times;
 use crate::integrate::log::Log;
 use crate::integrate::run::{Outcome, Stepper};
@@ -218,6 +218,18 @@ impl Handover {
     /// Which ideal pairs conducted when exact integration last held.
     pub(crate) fn conducting(&self) -> &[bool] {
         self.exact.conducting()
+    }
+
+    /// See [`Exact::keep_passages`].
+    pub(crate) fn keep_passages(&mut self) {
+        self.exact.keep_passages();
+    }
+
+    /// The changes of mode since [`Self::keep_passages`], and where the run stood when it was exact throughout; `None` where steps were made
+    /// since.
+    pub(crate) fn take_passages(&mut self) -> Option<Vec<Passage>> {
+        let passages = self.exact.take_passages();
+        self.stepping.is_none().then_some(passages)
     }
 
     /// Energy so far.

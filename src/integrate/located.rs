@@ -142,6 +142,10 @@ fn told(error: &Error, elements: &[&Element]) -> Told {
         ),
         Reason::RowsTooDense { .. } => plain("rows-too-dense", Some("`.tran tstep tstop`: a longer tstep".into())),
         Reason::Interrupted => plain("interrupted", None),
+        Reason::NotSmooth(_) => plain(
+            "no-derivative",
+            Some("other values of the elements named, so that the events part, may have one".into()),
+        ),
         Reason::NoOrbit(_) => plain(
             "no-orbit",
             Some("`circ sim` shows where the transient goes; `--period` names the period".into()),

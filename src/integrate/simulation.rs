@@ -3,6 +3,7 @@
 //! The methods, events, jumps and energies are those of [`simulate`](crate::integrate::simulate()); what differs is who asks for the
 //! next time. A simulation owns all it needs and may be sent to another thread.
 
+mod passages;
 mod stop;
 mod way;
 

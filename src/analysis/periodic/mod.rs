@@ -3,6 +3,8 @@
 mod period;
 mod search;
 mod shooting;
+#[cfg(test)]
+mod tests;
 
 use std::sync::atomic::AtomicBool;
 

@@ -110,7 +110,7 @@ impl<'a, 'o> Search<'a, 'o> {
         }
     }
 
-    fn shooting(&mut self, from: f64, returns: Return) -> Shooting<'_> {
+    pub(super) fn shooting(&mut self, from: f64, returns: Return) -> Shooting<'_> {
         Shooting {
             simulation: self.simulation,
             from,

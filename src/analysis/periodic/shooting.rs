@@ -11,6 +11,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::analysis::variation::Trajectory;
 use crate::integrate::{Change, Error, Reason, Simulation};
 use crate::settings::tolerances::periodic::{
     DIFFERENCE, LEAST_AMPLITUDE, NEUTRAL, REUSED, STEPPED_DIFFERENCE, TAKES_PART,
@@ -201,8 +202,35 @@ impl Shooting<'_> {
         found.is_ok_and(|found| found.size() <= closed && found.after.switches == stand.switches)
     }
 
-    /// M at a place from which a return leads to `after`, in parts of the amplitudes.
-    fn derivative(&mut self, stand: &Stand, after: &Stand) -> Result<DMatrix<f64>, Error> {
+    /// M at a place from which a return leads to `closing`, in parts of the amplitudes: by its variational equation, or by differences where the
+    /// flow has no derivative or is made of steps.
+    fn derivative(&mut self, stand: &Stand, closing: &Closing) -> Result<DMatrix<f64>, Error> {
+        if self.simulation.is_exact() {
+            match self.variation(stand, closing.seconds) {
+                Ok(derivative) => return Ok(derivative),
+                Err(error) if matches!(error.reason, Reason::NotSmooth(_)) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        self.differences(stand, &closing.after)
+    }
+
+    pub(super) fn variation(&mut self, stand: &Stand, seconds: f64) -> Result<DMatrix<f64>, Error> {
+        let place = (self.from, &stand.state[..], &stand.switches[..]);
+        let trajectory = Trajectory::of(self.simulation, place, self.from + seconds)?;
+        let mut derivative = match self.returns {
+            Return::After(_) => trajectory.monodromy(),
+            Return::At(..) => trajectory.return_map()?,
+        };
+        for (j, mut column) in derivative.column_iter_mut().enumerate() {
+            for (value, amplitude) in column.iter_mut().zip(&self.amplitudes) {
+                *value *= self.amplitudes[j] / amplitude;
+            }
+        }
+        Ok(derivative)
+    }
+
+    pub(super) fn differences(&mut self, stand: &Stand, after: &Stand) -> Result<DMatrix<f64>, Error> {
         let n = stand.state.len();
         let part = if self.simulation.is_exact() {
             DIFFERENCE
@@ -229,7 +257,7 @@ impl Shooting<'_> {
             return self.without_states(stand);
         }
         let mut closing = self.close(&stand)?;
-        let mut derivative = self.derivative(&stand, &closing.after)?;
+        let mut derivative = self.derivative(&stand, &closing)?;
         let mut made_at = closing.size();
         let mut corrections = 0;
         while corrections < MOST_CORRECTIONS && closing.size() > f64::EPSILON {
@@ -243,7 +271,7 @@ impl Shooting<'_> {
             }
             let slow = closing.size() > REUSED * before && closing.size() > closed;
             if slow || made_at == f64::INFINITY {
-                derivative = self.derivative(&stand, &closing.after)?;
+                derivative = self.derivative(&stand, &closing)?;
                 made_at = closing.size();
             }
         }
@@ -252,7 +280,7 @@ impl Shooting<'_> {
             return Ok(None);
         }
         if made_at > NEUTRAL {
-            derivative = self.derivative(&stand, &closing.after)?;
+            derivative = self.derivative(&stand, &closing)?;
         }
         Ok(Some(Fixed {
             stand,

@@ -49,6 +49,14 @@ impl Oscillation {
         self.envelope(s) * (self.frequency * cos - self.decay * sin)
     }
 
+    /// The second derivative at `s` after the origin.
+    #[must_use]
+    pub fn second_derivative(&self, s: f64) -> f64 {
+        let (sin, cos) = (self.frequency * s + self.phase).sin_cos();
+        let (sigma, omega) = (self.decay, self.frequency);
+        self.envelope(s) * ((sigma * sigma - omega * omega) * sin - 2.0 * sigma * omega * cos)
+    }
+
     /// Bounds of |f'| and |f''| on [a, b] after the origin.
     pub(super) fn derivative_bounds(&self, a: f64, b: f64) -> (f64, f64) {
         let envelope = self.envelope(a).abs().max(self.envelope(b).abs());
@@ -97,6 +105,13 @@ impl Piece {
         let s = t - self.origin;
         self.terms()
             .fold(self.slope, |sum, term| sum + term.derivative(s))
+    }
+
+    /// The second derivative of the closed form at `t`.
+    #[must_use]
+    pub fn second_derivative(&self, t: f64) -> f64 {
+        let s = t - self.origin;
+        self.terms().map(|term| term.second_derivative(s)).sum()
     }
 
     /// Bounds of |f'| and |f''| on [a, b].

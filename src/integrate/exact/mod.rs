@@ -15,6 +15,7 @@ mod key;
 mod magnitudes;
 mod map;
 mod mode;
+mod passage;
 mod plant;
 mod recurring;
 mod report;
@@ -33,5 +34,7 @@ pub(super) mod tests;
 
 pub use assembler::Assembler;
 pub(crate) use assembler::{Step, steps_of};
+pub(crate) use key::{Key, Owner};
+pub(crate) use passage::Passage;
 pub(crate) use stepper::Place;
 pub use stepper::{Exact, Setup};

@@ -10,6 +10,7 @@ use super::flow::longest_step;
 use super::inspect::Inspector;
 use super::key::{Key, Owner, Trigger};
 use super::mode::Mode;
+use super::passage::Passage;
 use super::plant::ModeTable;
 use super::report::{Report, row_jumps};
 use super::rounding::resolution;
@@ -78,6 +79,8 @@ pub struct Exact {
     row: Vec<f64>,
     /// By probe: a voltage.
     row_is_volts: Vec<bool>,
+    /// Changes of mode, where they are asked for.
+    passages: Option<Vec<Passage>>,
 }
 
 impl Exact {
@@ -131,6 +134,7 @@ impl Exact {
             settings,
             row,
             row_is_volts,
+            passages: None,
         })
     }
 
@@ -324,8 +328,37 @@ impl Exact {
         }
     }
 
-    /// Enters the mode from here on. Where there is none, everything is as it was before.
+    /// Enters the mode from here on, and keeps what the derivative of the flow needs to know of it. Where there is none, everything is as it
+    /// was before.
     fn change(
+        &mut self,
+        key: Key,
+        discontinuous: bool,
+        trigger: Trigger,
+        log: &mut Log,
+    ) -> Result<(), Error> {
+        let asked = self.passages.is_some();
+        let before = asked.then(|| (self.mode, self.storage.values.clone()));
+        self.change_to(key, discontinuous, trigger, log)?;
+        if let (Some((mode, before)), Some(passages)) = (before, &mut self.passages) {
+            let from = mode.map(|at| &self.table.modes[at]);
+            passages.push(Passage {
+                t: self.travel.t,
+                from: from.map(|mode| mode.key.clone()),
+                to: self.key.clone(),
+                cause: match trigger {
+                    Trigger::Guard(guard) => from.map(|mode| mode.owner(guard)),
+                    Trigger::Sources => None,
+                },
+                before,
+                after: self.storage.values.clone(),
+            });
+        }
+        Ok(())
+    }
+
+    /// Enters the mode from here on. Where there is none, everything is as it was before.
+    fn change_to(
         &mut self,
         mut key: Key,
         discontinuous: bool,

@@ -39,3 +39,15 @@ pub(crate) const ACCUMULATES: f64 = 1e-3;
 /// A thousand events within this part of a print step are a burst that does not end by itself. Larger: fast carriers are handed to steps;
 /// smaller: chattering is followed for longer.
 pub(crate) const BURST: f64 = 1e-4;
+
+/// A guard that ended a mode is at zero where it is below this part of its terms and of what it changed by in the mode. Larger: what changes sides as a
+/// consequence of an event counts as its cause; smaller: rounding of the event's time hides the cause.
+pub(crate) const AT_LEVEL: f64 = 1e-7;
+
+/// A guard whose rate at its zero is below this part of the rate's terms grazes it: there is no derivative to anything. Larger: refusals; smaller:
+/// derivatives made of rounding.
+pub(crate) const GRAZING: f64 = 1e-9;
+
+/// Guards that fall through zero at one instant are one event where the derivatives of its time agree to this part. Larger: events that part
+/// when something varies count as one; smaller: symmetric devices are told apart by rounding.
+pub(crate) const SAME_TIMING: f64 = 1e-6;

@@ -25,3 +25,7 @@ pub(crate) const IMPULSE_RATIO: f64 = 0.75;
 /// amplitude, as a switch that opens where a current is meant to be zero finds it. Larger: losses pass unsaid; smaller: notes on every
 /// switch.
 pub(crate) const DESTROYED: f64 = 1e-9;
+
+/// A jump is the one into a mode where the two lead to storages that differ by no more than this part of the largest value. Larger: jumps in
+/// several parts pass for one; smaller: rounding of a jump refuses its derivative.
+pub(crate) const FOLLOWS_JUMP: f64 = 1e-9;

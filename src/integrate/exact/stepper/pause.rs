@@ -9,6 +9,7 @@ use crate::integrate::energy::Balance;
 use crate::integrate::error::Error;
 use crate::integrate::exact::accumulation::Accumulation;
 use crate::integrate::exact::key::{Key, Trigger};
+use crate::integrate::exact::passage::Passage;
 use crate::integrate::log::Log;
 use crate::integrate::switching::fire;
 
@@ -38,6 +39,16 @@ impl Exact {
     /// Which ideal pairs conduct.
     pub(crate) fn conducting(&self) -> &[bool] {
         &self.key.closed
+    }
+
+    /// Keeps changes of mode from here on.
+    pub(crate) fn keep_passages(&mut self) {
+        self.passages = Some(Vec::new());
+    }
+
+    /// The changes of mode since [`Self::keep_passages`]; none are kept from here on.
+    pub(crate) fn take_passages(&mut self) -> Vec<Passage> {
+        self.passages.take().unwrap_or_default()
     }
 
     /// Events seen so far say nothing about those to come.

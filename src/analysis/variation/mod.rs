@@ -1,0 +1,340 @@
+//! The variational equation of a run that is exact throughout: what becomes of small changes of its state, its sources and its values.
+//!
+//! In a mode δx' = A δx + E δu; from one mode to the next stands a [saltation](saltation). The derivative of the flow from t₀ to t₁,
+//!
+//! ```text
+//! M = ∂s(t₁)/∂s(t₀) = X ∏ (e^{A τ} · saltation) J,
+//! ```
+//!
+//! is a product of exponentials and saltations, without differences.
+
+mod instant;
+mod saltation;
+mod system;
+
+use nalgebra::{DMatrix, DVector, RowDVector};
+
+use crate::integrate::exact::{Assembler, Key, Owner, Passage};
+use crate::integrate::switching::Threshold;
+use crate::integrate::{Error, Reason, Simulation};
+use crate::settings::tolerances::events::{AT_LEVEL, GRAZING, SAME_TIMING};
+use crate::settings::tolerances::jumps::FOLLOWS_JUMP;
+use crate::settings::tolerances::times::SAME_TIME;
+
+use instant::Inputs;
+use saltation::Side;
+pub(crate) use saltation::{Saltation, Timing};
+pub(crate) use system::System;
+
+/// A stretch of a run in one mode.
+#[derive(Debug, Clone)]
+pub(crate) struct Segment {
+    /// Its place among the systems.
+    pub(crate) system: usize,
+    /// From when to when, s.
+    pub(crate) from: f64,
+    pub(crate) to: f64,
+    /// e^{A (to − from)}.
+    pub(crate) propagator: DMatrix<f64>,
+    /// x where it begins.
+    pub(crate) start: DVector<f64>,
+    /// x where it ends.
+    pub(crate) end: DVector<f64>,
+}
+
+/// A run from one time to another, with what its derivative is made of.
+#[derive(Debug, Clone)]
+pub(crate) struct Trajectory {
+    pub(crate) systems: Vec<System>,
+    pub(crate) segments: Vec<Segment>,
+    /// Between each segment and the next.
+    pub(crate) saltations: Vec<Saltation>,
+    /// Times within this are one, s.
+    pub(crate) same: f64,
+}
+
+/// A run whose derivative does not exist, or is not known.
+fn not_smooth(t: f64, what: impl Into<String>) -> Error {
+    Error::at(t, Reason::NotSmooth(what.into()))
+}
+
+/// Where a run is made into a [`Trajectory`].
+struct Maker {
+    assembler: Assembler,
+    thresholds: Vec<Threshold>,
+    systems: Vec<System>,
+    /// Times within this are one, s.
+    same: f64,
+}
+
+impl Trajectory {
+    /// The run of a simulation from a place, as for [`Simulation::stand_at`], until a time.
+    ///
+    /// # Errors
+    /// [`Reason::NotSmooth`] where the derivative of the flow does not exist or is not known; else the simulation's.
+    pub(crate) fn of(
+        simulation: &mut Simulation,
+        place: (f64, &[f64], &[bool]),
+        until: f64,
+    ) -> Result<Self, Error> {
+        let from = place.0;
+        let passages = simulation.passages(place, until)?;
+        let passages = passages.ok_or_else(|| {
+            let what = "steps are made in it, and their derivative is not known";
+            not_smooth(from, what)
+        })?;
+        let end = simulation.state();
+        let assembler = simulation.assembler(until - from);
+        let maker = Maker {
+            thresholds: assembler.thresholds(),
+            assembler,
+            systems: Vec::new(),
+            same: SAME_TIME * from.abs().max(until.abs()),
+        };
+        maker.make(&passages, (until, &end))
+    }
+
+    /// M = ∂s(t₁)/∂s(t₀), q×q, at the times t₀ and t₁.
+    pub(crate) fn monodromy(&self) -> DMatrix<f64> {
+        self.last_system().lcs.storage.x.clone() * self.state_derivative().0
+    }
+
+    /// ∂s/∂s(t₀) at the event that t₁ is the time of, whenever it happens: M + ṡ⁺ ∂t₁/∂s(t₀), q×q.
+    ///
+    /// # Errors
+    /// The run does not end with an event.
+    pub(crate) fn return_map(&self) -> Result<DMatrix<f64>, Error> {
+        let (m, dt) = self.state_derivative();
+        let (Some(segment), Some(dt)) = (self.segments.last(), dt) else {
+            let what = "a run that does not end with an event";
+            return Err(Error::before(Reason::internal("analysis::variation", what)));
+        };
+        let system = self.last_system();
+        let inputs = Inputs::after(&system.lcs.inputs, segment.to, self.same);
+        let Some(inputs) = inputs else {
+            return Err(not_smooth(segment.to, "a source has no closed form"));
+        };
+        let side = Side {
+            system,
+            x: segment.end.clone(),
+            inputs,
+        };
+        Ok(&system.lcs.storage.x * m + side.storage_rate() * dt)
+    }
+
+    fn last_system(&self) -> &System {
+        &self.systems[self.segments.last().map_or(0, |segment| segment.system)]
+    }
+
+    /// ∂x(t₁)/∂s(t₀), and ∂t/∂s(t₀) of the last event where it moves.
+    fn state_derivative(&self) -> (DMatrix<f64>, Option<RowDVector<f64>>) {
+        let first = self.segments.first().map_or(0, |segment| segment.system);
+        let mut m = self.systems[first].lcs.storage.inject.clone();
+        let mut dt = None;
+        for (k, segment) in self.segments.iter().enumerate() {
+            m = &segment.propagator * m;
+            if let Some(saltation) = self.saltations.get(k) {
+                dt = saltation.timing.as_ref().map(|timing| &timing.x * &m);
+                m = &saltation.x * m;
+            }
+        }
+        (m, dt)
+    }
+}
+
+impl Maker {
+    /// The place of a mode's system.
+    fn system(&mut self, key: &Key) -> Result<usize, Error> {
+        if let Some(known) = self.systems.iter().position(|system| system.key == *key) {
+            return Ok(known);
+        }
+        self.systems.push(System::of(key, &mut self.assembler)?);
+        Ok(self.systems.len() - 1)
+    }
+
+    fn make(mut self, passages: &[Passage], end: (f64, &[f64])) -> Result<Trajectory, Error> {
+        let same = self.same;
+        let mut instants = passages.chunk_by(|a, b| b.t - a.t <= same);
+        let Some([.., first]) = instants.next() else {
+            let what = "a run in no mode";
+            return Err(Error::before(Reason::internal("analysis::variation", what)));
+        };
+        let (mut at, mut entry) = (self.system(&first.to)?, (first.t, &first.after[..]));
+        let (mut segments, mut saltations) = (Vec::new(), Vec::new());
+        for instant in instants {
+            let (first, last) = (&instant[0], &instant[instant.len() - 1]);
+            segments.push(self.segment(at, entry, (first.t, &first.before))?);
+            let next = self.system(&last.to)?;
+            saltations.push(self.saltation(instant, (at, next), first.t - entry.0)?);
+            (at, entry) = (next, (last.t, &last.after[..]));
+        }
+        segments.push(self.segment(at, entry, end)?);
+        Ok(Trajectory {
+            systems: self.systems,
+            segments,
+            saltations,
+            same: self.same,
+        })
+    }
+
+    fn segment(
+        &self,
+        system: usize,
+        (from, start): (f64, &[f64]),
+        (to, end): (f64, &[f64]),
+    ) -> Result<Segment, Error> {
+        let of = &self.systems[system];
+        let propagator = of.propagator(to - from);
+        Ok(Segment {
+            system,
+            from,
+            to,
+            propagator: propagator.ok_or_else(|| {
+                not_smooth(from, "the exponential of a mode does not exist in doubles")
+            })?,
+            start: of.state(start),
+            end: of.state(end),
+        })
+    }
+
+    /// The event that these passages at one instant make, from one mode, after so many seconds in it, to another.
+    fn saltation(
+        &mut self,
+        instant: &[Passage],
+        (from, to): (usize, usize),
+        seconds: f64,
+    ) -> Result<Saltation, Error> {
+        let (first, last) = (&instant[0], &instant[instant.len() - 1]);
+        let t = first.t;
+        let through = self.through(instant, to)?;
+        let inputs = &self.systems[from].lcs.inputs;
+        let limits = [
+            Inputs::before(inputs, t, self.same),
+            Inputs::after(inputs, t, self.same),
+        ];
+        let [Some(left), Some(right)] = limits else {
+            return Err(not_smooth(t, "a source has no closed form"));
+        };
+        let systems = &self.systems;
+        let before = Side {
+            system: &systems[from],
+            x: systems[from].state(&first.before),
+            inputs: left,
+        };
+        let after = Side {
+            system: &systems[to],
+            x: systems[to].state(&last.after),
+            inputs: right,
+        };
+        let timing = self.timing(instant, &before, seconds)?;
+        let through = through.map(|at| &systems[at]);
+        Ok(Saltation::of(t, (&before, &after), timing, through))
+    }
+
+    /// The mode in whose directions the storage jumps, where that is not the one that follows.
+    fn through(&mut self, instant: &[Passage], to: usize) -> Result<Option<usize>, Error> {
+        let (first, last) = (&instant[0], &instant[instant.len() - 1]);
+        let inputs = Inputs::after(&self.systems[to].lcs.inputs, last.t, self.same);
+        let Some(Inputs { u, .. }) = inputs else {
+            return Err(not_smooth(last.t, "a source has no closed form"));
+        };
+        let sizes = first.before.iter().zip(&last.after);
+        let size = sizes.fold(0.0_f64, |m, (a, b)| m.max(a.abs()).max(b.abs()));
+        let leads = |storage: &DVector<f64>| {
+            let apart = storage.iter().zip(&last.after).map(|(a, b)| (a - b).abs());
+            apart.fold(0.0, f64::max) <= FOLLOWS_JUMP * size
+        };
+        let target = &self.systems[to];
+        if leads(&target.storage(&target.state(&first.before), &u)) {
+            return Ok(None);
+        }
+        let own = &last.to.closed;
+        let both = |other: &[bool]| own.iter().zip(other).map(|(a, b)| a | b).collect();
+        let left = first.from.iter().map(|key| both(&key.closed));
+        let one_more = (0..own.len()).filter(|&k| !own[k]).map(|k| {
+            let mut closed = own.clone();
+            closed[k] = true;
+            closed
+        });
+        let candidates: Vec<Vec<bool>> = left.chain(one_more).collect();
+        for closed in candidates {
+            let Ok(at) = self.system(&last.to.with_closed(closed)) else {
+                continue;
+            };
+            let (jump, target) = (&self.systems[at], &self.systems[to]);
+            let storage = jump.storage(&jump.state(&first.before), &u);
+            if leads(&target.storage(&target.state(storage.as_slice()), &u)) {
+                return Ok(Some(at));
+            }
+        }
+        Err(not_smooth(
+            last.t,
+            "the state jumps in several parts, whose derivative is not known",
+        ))
+    }
+
+    /// When the event happens: by the guard that ends the mode, and by all that fall through zero with it.
+    fn timing(
+        &self,
+        instant: &[Passage],
+        before: &Side<'_>,
+        seconds: f64,
+    ) -> Result<Option<Timing>, Error> {
+        let t = instant[0].t;
+        let rate = before.system.rate(&before.x, &before.inputs.u);
+        let mut found: Option<Timing> = None;
+        let mut owners: Vec<Owner> = instant.iter().filter_map(|passage| passage.cause).collect();
+        for passage in instant {
+            let left = passage.from.as_ref().map_or(&[][..], |key| &key.switches);
+            let moved = (0..left.len()).filter(|&i| left[i] != passage.to.switches[i]);
+            owners.extend(moved.filter(|&i| !self.thresholds[i].is_rest()).map(Owner::Switch));
+        }
+        for owner in owners {
+            let limits = |i| self.assembler.limits(i);
+            for guard in before.system.guards(owner, (&self.thresholds, limits)) {
+                let (value, size) = guard.value(&before.x, &before.inputs);
+                let (slope, slopes) = guard.rate(&rate, &before.inputs);
+                // What changes sides as a consequence of another event is not at its level.
+                if value.abs() > AT_LEVEL * (size + slopes * seconds) || slopes == 0.0 {
+                    continue;
+                }
+                if slope.abs() <= GRAZING * slopes {
+                    let what = format!("{} grazes its threshold", self.name(owner));
+                    return Err(not_smooth(t, what));
+                }
+                let timing = Timing::of(&guard, slope);
+                match &found {
+                    Some(other) if !same_timing(other, &timing, seconds) => {
+                        let what = format!("{} and another event coincide", self.name(owner));
+                        return Err(not_smooth(t, what));
+                    }
+                    _ => found = Some(timing),
+                }
+            }
+        }
+        let by_itself = instant[0].cause.is_some();
+        if by_itself && found.is_none() {
+            let what = "when it happens does not follow from a guard of its mode";
+            return Err(not_smooth(t, what));
+        }
+        Ok(found)
+    }
+
+    fn name(&self, owner: Owner) -> String {
+        match owner {
+            Owner::Switch(i) | Owner::Slide(i, _) => self.thresholds[i].name.clone(),
+            Owner::Device(pair) => self.assembler.device(pair).unwrap_or_default().to_string(),
+        }
+    }
+}
+
+/// Whether two guards fall through zero together whatever varies, where nothing varies faster than in so many seconds.
+fn same_timing(a: &Timing, b: &Timing, seconds: f64) -> bool {
+    let size = [&a.x, &b.x, &a.u, &b.u].map(|part| part.amax());
+    let size = size.into_iter().fold(0.0, f64::max);
+    let parts = [(&a.x, &b.x, size), (&a.u, &b.u, size), (&a.du, &b.du, size * seconds)];
+    parts.into_iter().all(|(a, b, size)| {
+        let mut apart = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+        apart.all(|apart| apart <= SAME_TIMING * size)
+    })
+}

@@ -1,0 +1,162 @@
+//! What an event makes of a variation.
+//!
+//! At an event that a guard γ(x, u, u') = 0 decides, with rates f⁻ and f⁺ on its two sides, x⁺ = J⁺ s⁻ + j⁺ and s⁻ = X⁻ x⁻ + U⁻ u + k⁻,
+//!
+//! ```text
+//! δt  = −(γ_x δx⁻ + γ_u δu + γ_u' δu')/γ̇,
+//! δx⁺ = J⁺ (X⁻ (δx⁻ + f⁻ δt) + U⁻ (δu + u' δt)) − f⁺ δt
+//! ```
+//!
+//! at the time at which the event was without the variation (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical
+//! Systems, 2004, section 7.5). Where sources alone decide it, and jump, δt = 0.
+
+use nalgebra::{DMatrix, DVector, RowDVector};
+
+use super::instant::Inputs;
+use super::system::{Row, System};
+
+/// When an event happens: δt = x δx⁻ + u δu + u' δu'.
+#[derive(Debug, Clone)]
+pub(crate) struct Timing {
+    pub(crate) x: RowDVector<f64>,
+    pub(crate) u: RowDVector<f64>,
+    pub(crate) du: RowDVector<f64>,
+}
+
+/// δx⁺ = X δx⁻ + U δu + U' δu'.
+#[derive(Debug, Clone)]
+pub(crate) struct Saltation {
+    /// Time, s.
+    pub(crate) t: f64,
+    /// n⁺×n⁻.
+    pub(crate) x: DMatrix<f64>,
+    /// n⁺×p.
+    pub(crate) u: DMatrix<f64>,
+    /// n⁺×p.
+    pub(crate) du: DMatrix<f64>,
+    /// `None` where δt = 0.
+    pub(crate) timing: Option<Timing>,
+    /// Of the outputs: y⁻ − y⁺.
+    pub(crate) step: DVector<f64>,
+    /// Areas of the outputs' impulses, and what they are made of.
+    pub(crate) impulse: Option<Impulse>,
+}
+
+/// The areas a = I (s⁻ − s⁺) of the outputs' impulses: δa = I (δs⁻ + ṡ⁻ δt − δs⁺ − ṡ⁺ δt).
+#[derive(Debug, Clone)]
+pub(crate) struct Impulse {
+    pub(crate) areas: DVector<f64>,
+    /// I, outputs×q.
+    rows: DMatrix<f64>,
+    /// X⁻, U⁻, X⁺, U⁺.
+    storage: [DMatrix<f64>; 4],
+    /// ṡ⁻ − ṡ⁺.
+    rate: DVector<f64>,
+}
+
+/// One side of an event.
+pub(super) struct Side<'a> {
+    pub(super) system: &'a System,
+    pub(super) x: DVector<f64>,
+    pub(super) inputs: Inputs,
+}
+
+impl Side<'_> {
+    fn rate(&self) -> DVector<f64> {
+        self.system.rate(&self.x, &self.inputs.u)
+    }
+
+    /// ṡ.
+    pub(super) fn storage_rate(&self) -> DVector<f64> {
+        &self.system.lcs.storage.x * self.rate() + &self.system.storage_u * &self.inputs.du
+    }
+}
+
+impl Timing {
+    /// Of a guard that falls through zero at `rate`.
+    pub(super) fn of(guard: &Row, rate: f64) -> Self {
+        Self {
+            x: guard.x.transpose() / -rate,
+            u: guard.u.transpose() / -rate,
+            du: guard.du.transpose() / -rate,
+        }
+    }
+}
+
+impl Saltation {
+    /// The event between two sides, where the storage jumps as J⁺ s if `through` is none, else first as in that mode.
+    pub(super) fn of(
+        t: f64,
+        (before, after): (&Side<'_>, &Side<'_>),
+        timing: Option<Timing>,
+        through: Option<&System>,
+    ) -> Self {
+        let (left, right) = (&before.system.lcs, &after.system.lcs);
+        let inject = match through {
+            Some(jump) => &right.storage.inject * &jump.lcs.storage.x * &jump.lcs.storage.inject,
+            None => right.storage.inject.clone(),
+        };
+        let mut x = &inject * &left.storage.x;
+        let mut u = &inject * &before.system.storage_u;
+        if let Some(jump) = through {
+            u += &right.storage.inject * &jump.storage_u;
+        }
+        let mut du = DMatrix::zeros(x.nrows(), u.ncols());
+        if let Some(timing) = &timing {
+            let drift = &inject * before.storage_rate() - after.rate();
+            x += &drift * &timing.x;
+            u += &drift * &timing.u;
+            du += &drift * &timing.du;
+        }
+        let outputs = |side: &Side<'_>| side.system.outputs(&side.x, &side.inputs);
+        Self {
+            t,
+            x,
+            u,
+            du,
+            timing,
+            step: outputs(before) - outputs(after),
+            impulse: Impulse::of(before, after),
+        }
+    }
+}
+
+impl Impulse {
+    fn of(before: &Side<'_>, after: &Side<'_>) -> Option<Self> {
+        let rows = &after.system.lcs.outputs.impulse;
+        let storage = |side: &Side<'_>| side.system.storage(&side.x, &side.inputs.u);
+        let jump = storage(before) - storage(after);
+        if rows.is_empty() || rows.ncols() != jump.len() || jump.iter().all(|d| *d == 0.0) {
+            return None;
+        }
+        let areas = rows * &jump;
+        let parts = |side: &Side<'_>| {
+            let system = side.system;
+            [system.lcs.storage.x.clone(), system.storage_u.clone()]
+        };
+        let ([x, u], [x_after, u_after]) = (parts(before), parts(after));
+        Some(Self {
+            areas,
+            rows: rows.clone(),
+            storage: [x, u, x_after, u_after],
+            rate: before.storage_rate() - after.storage_rate(),
+        })
+    }
+
+    /// How the areas vary.
+    pub(crate) fn variation<T>(
+        &self,
+        (before, after): (&DVector<T>, &DVector<T>),
+        du: &DVector<T>,
+        dt: T,
+    ) -> DVector<T>
+    where
+        T: nalgebra::ComplexField<RealField = f64> + Copy,
+    {
+        let lift = |m: &DMatrix<f64>| m.map(T::from_real);
+        let [x, u, x_after, u_after] = &self.storage;
+        let jump = lift(x) * before + lift(u) * du - lift(x_after) * after - lift(u_after) * du
+            + self.rate.map(T::from_real) * dt;
+        lift(&self.rows) * jump
+    }
+}

@@ -1,0 +1,222 @@
+//! The linear system of a mode, with all that a variation of its state is read through.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::instant::Inputs;
+use crate::integrate::exact::{Assembler, Key, Owner};
+use crate::integrate::switching::Threshold;
+use crate::integrate::{Error, reading};
+use crate::lcs::{Hold, Lcs, Rows};
+use crate::linalg::decouple::decoupled;
+use crate::linalg::expm::Ladders;
+use crate::linalg::rays;
+use crate::settings::tolerances::exponentials::SQUARED;
+
+/// x' = A x + E u + e₀ in a mode, s = X x + U u + k its storage, x = J s + j.
+#[derive(Debug, Clone)]
+pub(crate) struct System {
+    pub(crate) key: Key,
+    pub(crate) lcs: Lcs,
+    /// U, q×p.
+    pub(super) storage_u: DMatrix<f64>,
+    /// E, n×p.
+    pub(crate) inputs: DMatrix<f64>,
+}
+
+/// A row over [x | u | u' | 1].
+#[derive(Debug, Clone)]
+pub(super) struct Row {
+    pub(super) x: DVector<f64>,
+    pub(super) u: DVector<f64>,
+    pub(super) du: DVector<f64>,
+    pub(super) one: f64,
+}
+
+impl Row {
+    /// Row k of `rows`, with n states and p inputs.
+    fn of(rows: &Rows, k: usize, (n, p): (usize, usize)) -> Self {
+        let part = |block: &DMatrix<f64>, columns: usize| {
+            if k < block.nrows() && block.ncols() == columns {
+                block.row(k).transpose()
+            } else {
+                DVector::zeros(columns)
+            }
+        };
+        Self {
+            x: part(&rows.x, n),
+            u: part(&rows.u, p),
+            du: part(&rows.du, p),
+            one: rows.one[k],
+        }
+    }
+
+    /// self + factor · other
+    fn plus(mut self, factor: f64, other: &Self) -> Self {
+        self.x.axpy(factor, &other.x, 1.0);
+        self.u.axpy(factor, &other.u, 1.0);
+        self.du.axpy(factor, &other.du, 1.0);
+        self.one += factor * other.one;
+        self
+    }
+
+    /// The value, and the sum of the magnitudes of its terms.
+    pub(super) fn value(&self, x: &DVector<f64>, inputs: &Inputs) -> (f64, f64) {
+        let parts = [
+            (&self.x, x),
+            (&self.u, &inputs.u),
+            (&self.du, &inputs.du),
+        ];
+        let terms = parts.into_iter().flat_map(|(row, values)| row.iter().zip(values));
+        terms.fold((self.one, self.one.abs()), |(sum, size), (row, value)| {
+            (sum + row * value, size + (row * value).abs())
+        })
+    }
+
+    /// The same of the rate, where x moves at `rate`.
+    pub(super) fn rate(&self, rate: &DVector<f64>, inputs: &Inputs) -> (f64, f64) {
+        let parts = [
+            (&self.x, rate),
+            (&self.u, &inputs.du),
+            (&self.du, &inputs.ddu),
+        ];
+        let terms = parts.into_iter().flat_map(|(row, values)| row.iter().zip(values));
+        terms.fold((0.0, 0.0), |(sum, size), (row, value)| {
+            (sum + row * value, size + (row * value).abs())
+        })
+    }
+}
+
+/// `block` with this shape: one without entries may have any.
+pub(crate) fn shaped(block: &DMatrix<f64>, rows: usize, columns: usize) -> DMatrix<f64> {
+    if block.shape() == (rows, columns) {
+        block.clone()
+    } else {
+        DMatrix::zeros(rows, columns)
+    }
+}
+
+impl System {
+    pub(super) fn of(key: &Key, assembler: &mut Assembler) -> Result<Self, Error> {
+        let hold = |&closed: &bool| if closed { Hold::Closed } else { Hold::Open };
+        let holds: Vec<Hold> = key.closed.iter().map(hold).collect();
+        let lcs = assembler.assemble(&holds, &key.switches, &key.sliding_switches())?;
+        let (n, p, q) = (lcs.n(), lcs.p(), lcs.storage.names.len());
+        Ok(Self {
+            key: key.clone(),
+            storage_u: shaped(&lcs.storage.u, q, p),
+            inputs: shaped(&lcs.e, n, p),
+            lcs,
+        })
+    }
+
+    /// x = J s + j.
+    pub(super) fn state(&self, storage: &[f64]) -> DVector<f64> {
+        let storage = DVector::from_column_slice(storage);
+        &self.lcs.storage.inject * storage + &self.lcs.storage.inject_one
+    }
+
+    /// s = X x + U u + k.
+    pub(super) fn storage(&self, x: &DVector<f64>, u: &DVector<f64>) -> DVector<f64> {
+        &self.lcs.storage.x * x + &self.storage_u * u + &self.lcs.storage.one
+    }
+
+    /// x' at x.
+    pub(super) fn rate(&self, x: &DVector<f64>, u: &DVector<f64>) -> DVector<f64> {
+        &self.lcs.a * x + &self.inputs * u + &self.lcs.e0
+    }
+
+    /// e^{A τ}; `None` where it does not exist in doubles.
+    pub(super) fn propagator(&self, seconds: f64) -> Option<DMatrix<f64>> {
+        let n = self.lcs.n();
+        let increment = |a: &DMatrix<f64>, fast: &[usize]| {
+            let increment = Ladders::new(a, fast, seconds, SQUARED, 0).increment(0)?;
+            let identity = |i: usize, j: usize| f64::from(u8::from(i == j));
+            Some(DMatrix::from_fn(n, n, |i, j| {
+                increment.column(j)[i] + identity(i, j)
+            }))
+        };
+        if n == 0 || seconds <= 0.0 {
+            return Some(DMatrix::identity(n, n));
+        }
+        if self.lcs.fast.is_empty() {
+            return increment(&self.lcs.a, &[]);
+        }
+        match decoupled(&self.lcs.a, &self.lcs.fast) {
+            Some(basis) => {
+                Some(basis.to * increment(&basis.generator, &self.lcs.fast)? * basis.from)
+            }
+            None => increment(&self.lcs.a, &[]),
+        }
+    }
+
+    /// The guards of an owner: what must stay positive.
+    pub(super) fn guards(
+        &self,
+        owner: Owner,
+        (thresholds, limits): (&[Threshold], impl Fn(usize) -> (f64, f64)),
+    ) -> Vec<Row> {
+        let lcs = &self.lcs;
+        let shape = (lcs.n(), lcs.p());
+        match owner {
+            Owner::Device(pair) => {
+                let Some(at) = lcs.held.pairs.iter().position(|&held| held == pair) else {
+                    return vec![];
+                };
+                let kernel = &lcs.held.kernel;
+                if kernel.ncols() == 0 || kernel.row(at).iter().all(|v| *v == 0.0) {
+                    return vec![Row::of(&lcs.held.guard, at, shape)];
+                }
+                let rays = rays::extreme_rays(kernel);
+                let rays = rays.iter().flat_map(DMatrix::row_iter);
+                let of_pair = rays.filter(|ray| ray[at] != 0.0);
+                let combined = of_pair.map(|ray| {
+                    let all = ray.iter().enumerate().filter(|(_, r)| **r != 0.0);
+                    let rows = all.map(|(k, r)| (*r, Row::of(&lcs.held.guard, k, shape)));
+                    rows.reduce(|(a, sum), (r, row)| (a, sum.plus(r / a, &row)))
+                });
+                combined.flatten().map(|(_, row)| row).collect()
+            }
+            Owner::Switch(i) => {
+                let sliding = self.key.sliding_switches();
+                let threshold = &thresholds[i];
+                let at = i - sliding.iter().filter(|&&k| k < i).count();
+                if sliding.contains(&i) || at >= lcs.controls.one.len() {
+                    return vec![];
+                }
+                let mut row = Row::of(&lcs.controls, at, shape);
+                row.one -= if self.key.switches[i] {
+                    threshold.off_below
+                } else {
+                    threshold.on_above
+                };
+                vec![row]
+            }
+            Owner::Slide(i, on) => {
+                let power = &lcs.outputs.power;
+                let Some(term) = power.iter().position(|p| p.element == thresholds[i].name) else {
+                    return vec![];
+                };
+                let v = Row::of(&lcs.outputs.power_v, term, shape);
+                let current = Row::of(&lcs.outputs.power_i, term, shape);
+                let (ron, goff) = limits(i);
+                vec![if on {
+                    v.plus(-ron, &current)
+                } else {
+                    current.plus(-goff, &v)
+                }]
+            }
+        }
+    }
+
+    /// The outputs at x, with inputs that move.
+    pub(super) fn outputs(&self, x: &DVector<f64>, inputs: &Inputs) -> DVector<f64> {
+        let rows = &self.lcs.outputs.rows;
+        let point = reading::Point {
+            x: x.as_slice(),
+            lambda: &[],
+            u: inputs.u.as_slice(),
+            du: inputs.du.as_slice(),
+        };
+        DVector::from_fn(rows.one.len(), |k, _| reading::value(rows, k, point))
+    }
+}

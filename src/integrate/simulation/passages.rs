@@ -1,0 +1,42 @@
+//! What the derivative of the flow needs to know of a run.
+
+use std::sync::Arc;
+
+use super::Simulation;
+use super::way::Way;
+use crate::integrate::error::Error;
+use crate::integrate::exact::{Assembler, Passage};
+
+impl Simulation {
+    /// The changes of mode on the way from a place, as for [`Self::stand_at`], to time `until`, s: the first is the one into the mode there.
+    /// `None` where the way is not exact throughout.
+    ///
+    /// # Errors
+    /// As [`Self::advance_to`].
+    pub(crate) fn passages(
+        &mut self,
+        (t, state, switches): (f64, &[f64], &[bool]),
+        until: f64,
+    ) -> Result<Option<Vec<Passage>>, Error> {
+        let Way::Exact(exact) = &mut self.way else {
+            return Ok(None);
+        };
+        exact.keep_passages();
+        self.stand_at(t, state, switches)?;
+        self.advance_to(until)?;
+        let passages = match &mut self.way {
+            Way::Exact(exact) => exact.take_passages(),
+            Way::Steps(_) => None,
+        };
+        let whole = |passages: &Vec<Passage>| {
+            let mut from = passages.iter().map(|passage| passage.from.is_some());
+            from.next() == Some(false) && from.all(|known| known)
+        };
+        Ok(passages.filter(whole))
+    }
+
+    /// Reduces the circuit for its modes, where no step is longer than `span`, s.
+    pub(crate) fn assembler(&self, span: f64) -> Assembler {
+        Assembler::new(Arc::clone(&self.problem.systems.multiport)).with_span(span)
+    }
+}
