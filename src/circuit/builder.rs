@@ -61,6 +61,7 @@ pub(super) struct Builder<'n, 'o> {
     pub(super) fours: Vec<(ScopeId, &'n ast::Four)>,
     pub(super) step_cards: Vec<&'n ast::Sweep>,
     pub(super) dc_cards: Option<&'n [ast::Sweep]>,
+    pub(super) ac_card: Option<&'n ast::Frequencies>,
     /// Values that `alter` sets, by element; the last one counts.
     pub(super) altered: Vec<(&'n Name, Value)>,
     /// Names of the elements of the top level.
@@ -104,6 +105,7 @@ impl<'n, 'o> Builder<'n, 'o> {
             fours: Vec::new(),
             step_cards: Vec::new(),
             dc_cards: None,
+            ac_card: None,
             altered: Vec::new(),
             root_elements: HashSet::new(),
             choices: VecDeque::new(),
@@ -137,6 +139,7 @@ impl<'n, 'o> Builder<'n, 'o> {
         self.check_altered();
         self.circuit.tran = self.transient();
         self.dc_sweeps();
+        self.frequencies();
         self.elements(&netlist.body, ScopeId::ROOT);
         if self.circuit.elements.is_empty() && read && !self.failed() {
             self.tell(
@@ -207,8 +210,9 @@ impl<'n, 'o> Builder<'n, 'o> {
         }
         match &card.device {
             Device::Passive { values, args } => self.passive(card, values, args, scope),
-            Device::Source { dc, wave, args } => {
-                self.source(card, dc.as_ref(), wave.as_ref(), args, scope)
+            Device::Source { dc, wave, ac, args } => {
+                self.source(card, dc.as_ref(), wave.as_ref(), args, scope);
+                self.stimulus(card, ac.as_deref(), scope);
             }
             Device::Coupling { inductors, k } => self.couplings.push(PendingCoupling {
                 name: self.full_name(&card.name, scope),

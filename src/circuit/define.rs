@@ -100,6 +100,10 @@ impl<'n> Builder<'n, '_> {
             Statement::Four(four) => self.fours.push((scope, four)),
             Statement::Alter(alter) => self.alter(alter),
             Statement::Step(sweep) => self.step_cards.push(sweep),
+            Statement::Ac(card) => {
+                self.other_analysis = true;
+                self.ac_card = Some(card);
+            }
             Statement::Dc(sweeps) => {
                 self.other_analysis = true;
                 self.dc_cards = Some(sweeps);

@@ -31,6 +31,7 @@ mod piecewise;
 mod place;
 mod probe;
 mod scope;
+mod small_signal;
 mod smooth;
 pub mod source;
 mod sweep;
@@ -102,6 +103,10 @@ pub struct Circuit {
     pub steps: Vec<Sweep>,
     /// `.dc`, the first sweep innermost.
     pub dc: Vec<Sweep>,
+    /// `.ac`: frequencies, Hz; none without the card.
+    pub ac: Vec<f64>,
+    /// The sources with an `AC` value, in file order.
+    pub stimuli: Vec<Stimulus>,
     /// `.meas tran`, in file order.
     pub measurements: Vec<NamedMeasurement>,
     /// `.four`, in file order.
@@ -290,6 +295,17 @@ pub struct Probe {
     pub name: String,
     /// What it is.
     pub what: Probed,
+}
+
+/// `AC magnitude phase` on a source: what it does in a small-signal analysis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stimulus {
+    /// The source.
+    pub source: ElementId,
+    /// V or A.
+    pub magnitude: f64,
+    /// Degrees.
+    pub phase: f64,
 }
 
 /// What a probe shows.

@@ -8,7 +8,7 @@ use crate::netlist::ast::{self, Alter, Name, Points, Target};
 use crate::settings::tolerances::times::WHOLE;
 
 /// Most runs or operating points of all sweeps together.
-const MOST: usize = 100_000;
+pub(super) const MOST: usize = 100_000;
 
 /// A quantity and the values it takes.
 #[derive(Debug, Clone, PartialEq)]
@@ -227,21 +227,33 @@ impl<'n> Builder<'n, '_> {
             Points::Logarithmic { base, range } => {
                 let [start, stop, per] = range;
                 let (start, stop, per) = (number(start)?, number(stop)?, number(per)?);
-                let base = f64::from(*base);
-                let count = (stop / start).log(base).abs() * per + WHOLE;
-                if !(start * stop > 0.0 && per >= 1.0) {
-                    let what = "a logarithmic sweep needs values of one sign, and at least one per decade or octave";
-                    (what, "no such sweep")
-                } else if count >= MOST as f64 {
-                    ("the sweep has too many values", "far too many values")
-                } else {
-                    let sign = (stop.abs() - start.abs()).signum();
-                    let value = |k: usize| start * base.powf(sign * k as f64 / per);
-                    return Some((0..=count as usize).map(value).collect());
+                match logarithmic(start, stop, (f64::from(*base), per)) {
+                    Ok(values) => return Some(values),
+                    Err(fault) => fault,
                 }
             }
         };
         self.tell(Diagnostic::error("bad-sweep", span, fault).label(label));
         None
+    }
+}
+
+/// So many values per factor of `base` from the first on, the last included if it is one of them; or what is wrong, and its label.
+pub(super) fn logarithmic(
+    start: f64,
+    stop: f64,
+    (base, per): (f64, f64),
+) -> Result<Vec<f64>, (&'static str, &'static str)> {
+    let count = (stop / start).log(base).abs() * per + WHOLE;
+    if !(start * stop > 0.0 && per >= 1.0) {
+        let what =
+            "a logarithmic sweep needs values of one sign, and at least one per decade or octave";
+        Err((what, "no such sweep"))
+    } else if count >= MOST as f64 {
+        Err(("the sweep has too many values", "far too many values"))
+    } else {
+        let sign = (stop.abs() - start.abs()).signum();
+        let value = |k: usize| start * base.powf(sign * k as f64 / per);
+        Ok((0..=count as usize).map(value).collect())
     }
 }

@@ -9,7 +9,7 @@ use std::fmt;
 
 pub use expr::{Binary, Expr, ExprKind, Unary};
 pub use measure::{Four, Meas};
-pub use sweep::{Points, Sweep, Target};
+pub use sweep::{Frequencies, Points, Spacing, Sweep, Target};
 
 use crate::diagnostic::{Diagnostic, Span};
 
@@ -89,6 +89,8 @@ pub enum Statement {
     Step(Sweep),
     /// `.dc`: the first sweep is the innermost.
     Dc(Vec<Sweep>),
+    /// `.ac`.
+    Ac(Frequencies),
     /// `alter` inside `.control`, before the run.
     Alter(Alter),
 }
@@ -133,6 +135,8 @@ pub enum Device {
         dc: Option<Expr>,
         /// `SIN(…)`, `PULSE(…)`, …
         wave: Option<WaveCall>,
+        /// `AC magnitude phase`: no, one or two values.
+        ac: Option<Vec<Expr>>,
         /// `Rser=`, `Cpar=`, `r=`, `td=`, `load`, …
         args: Vec<Assign>,
     },

@@ -40,3 +40,25 @@ pub enum Points {
     /// `list a b c …`.
     List(Vec<Expr>),
 }
+
+/// `.ac dec 10 1 1meg`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frequencies {
+    /// How the frequencies follow each other.
+    pub spacing: Spacing,
+    /// A number of points, the first and the last frequency; of a list the frequencies, Hz.
+    pub values: Vec<Expr>,
+    /// The whole card.
+    pub span: Span,
+}
+
+/// How frequencies follow each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Spacing {
+    /// So many points in all, with equal distances.
+    Linear,
+    /// So many points in each step by this factor: 10 or 2.
+    Logarithmic(u32),
+    /// One by one.
+    List,
+}

@@ -1,8 +1,8 @@
-//! V and I: a DC value, a waveform, an AC specification (ignored) in any order.
+//! V and I: a DC value, a waveform, an AC specification in any order.
 
 use super::{Body, assign, assignment_follows, expect_value, keyword, nodes};
 use crate::diagnostic::Diagnostic;
-use crate::netlist::ast::{Assign, Device, Name, WaveArg, WaveCall};
+use crate::netlist::ast::{Assign, Device, Expr, Name, WaveArg, WaveCall};
 use crate::netlist::lex::{
     Input, Parsed, ahead, at_end, missing, next_word, refuse, separator, symbol, tell, word,
 };
@@ -20,11 +20,11 @@ const FLAGS: [&str; 3] = ["load", "distof1", "distof2"];
 /// `V1 a b DC 5 AC 1 SIN(0 5 50) Rser=1`.
 pub(super) fn source<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
     let (mut at, nodes) = nodes(i, 2, "node")?;
-    let (mut dc, mut wave, mut args) = (None, None, Vec::new());
+    let (mut dc, mut wave, mut ac, mut args) = (None, None, None, Vec::new());
     loop {
         at = separator(at);
         if at_end(at) {
-            return Ok((at, (nodes, Device::Source { dc, wave, args })));
+            return Ok((at, (nodes, Device::Source { dc, wave, ac, args })));
         }
         if let Some(open) = symbol(at, '(')
             && let Some((_, name)) = word(open)
@@ -46,7 +46,8 @@ pub(super) fn source<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
             let (rest, value) = expect_value(rest, "the DC value")?;
             (at, dc) = (rest, Some(value));
         } else if let Some(rest) = keyword(at, "ac") {
-            at = skip_ac(symbol(rest, '=').unwrap_or(rest));
+            let (rest, values) = stimulus(symbol(rest, '=').unwrap_or(rest));
+            (at, ac) = (rest, Some(values));
         } else if starts_wave(at) {
             let (rest, name) = word(at)?;
             let (rest, call) = call(rest, name, &mut args)?;
@@ -69,7 +70,7 @@ pub(super) fn source<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
             }
             (at, dc) = (rest, Some(value));
         } else {
-            return Ok((at, (nodes, Device::Source { dc, wave, args })));
+            return Ok((at, (nodes, Device::Source { dc, wave, ac, args })));
         }
     }
 }
@@ -80,8 +81,9 @@ fn starts_wave(i: Input<'_>) -> bool {
     })
 }
 
-/// Skips magnitude and phase of an AC specification.
-fn skip_ac(mut at: Input<'_>) -> Input<'_> {
+/// Magnitude and phase of an AC specification, as far as they are given.
+fn stimulus(mut at: Input<'_>) -> (Input<'_>, Vec<Expr>) {
+    let mut values = Vec::new();
     for _ in 0..2 {
         let start = separator(at);
         if !start
@@ -90,12 +92,13 @@ fn skip_ac(mut at: Input<'_>) -> Input<'_> {
         {
             break;
         }
-        let Ok((rest, _)) = operand::item(start) else {
+        let Ok((rest, value)) = operand::item(start) else {
             break;
         };
+        values.push(value);
         at = rest;
     }
-    at
+    (at, values)
 }
 
 /// The arguments of a waveform, with or without parentheses.

@@ -137,9 +137,11 @@ pub(in crate::netlist) fn card(i: Input<'_>) -> Parsed<'_, Dot> {
         ".four" | ".fourier" => measure::four(start, rest),
         ".step" => sweep::step(rest),
         ".dc" => sweep::dc(rest),
-        ".ac" | ".noise" | ".tf" | ".sens" | ".pz" | ".disto" | ".sp" | ".pss" | ".net"
-        | ".savebias" | ".loadbias" | ".machine" | ".endmachine" | ".ferret" | ".data"
-        | ".enddata" => Ok((skip(rest), Dot::Skipped)),
+        ".ac" => Ok(sweep::ac(start, rest)),
+        ".noise" | ".tf" | ".sens" | ".pz" | ".disto" | ".sp" | ".pss" | ".net" | ".savebias"
+        | ".loadbias" | ".machine" | ".endmachine" | ".ferret" | ".data" | ".enddata" => {
+            Ok((skip(rest), Dot::Skipped))
+        }
         ".backanno" | ".wave" | ".width" | ".protect" | ".unprotect" | ".prot" | ".unprot"
         | ".endc" | ".newpage" => Ok((skip(rest), Dot::Nothing)),
         _ => {

@@ -1,11 +1,11 @@
-//! `.step`, `.dc`.
+//! `.step`, `.dc`, `.ac`.
 
-use super::Dot;
+use super::{Dot, skip};
 use crate::diagnostic::Diagnostic;
-use crate::netlist::ast::{Expr, Points, Statement, Sweep, Target};
+use crate::netlist::ast::{Expr, Frequencies, Points, Spacing, Statement, Sweep, Target};
 use crate::netlist::lex::{
     Input, Parsed, at_end, between, blank, end, expect_word, missing, next_word, refuse, separator,
-    symbol, word,
+    symbol, tell, word,
 };
 use crate::netlist::operand;
 
@@ -28,6 +28,39 @@ pub(super) fn dc(i: Input<'_>) -> Parsed<'_, Dot> {
             return Ok((at, Dot::statement(Statement::Dc(all))));
         }
     }
+}
+
+/// `.ac dec|oct|lin n f1 f2`, `.ac list f1 f2 …`. What is no such card is left out with a warning: it does not concern other analyses.
+pub(super) fn ac<'a>(start: Input<'a>, i: Input<'a>) -> (Input<'a>, Dot) {
+    let (rest, spacing) = match scale(i) {
+        Some((rest, Scale::Linear)) => (rest, Spacing::Linear),
+        Some((rest, Scale::Logarithmic(base))) => (rest, Spacing::Logarithmic(base)),
+        Some((rest, Scale::List)) => (rest, Spacing::List),
+        None => (i, Spacing::Linear),
+    };
+    let (mut values, mut at) = (Vec::new(), rest);
+    while let Ok((rest, value)) = operand::value(separator(at)) {
+        values.push(value);
+        at = rest;
+    }
+    let whole = at_end(separator(at));
+    let card = Frequencies {
+        spacing,
+        span: between(start, at),
+        values,
+    };
+    let enough = match spacing {
+        Spacing::List => !card.values.is_empty(),
+        _ => card.values.len() == 3,
+    };
+    if whole && enough {
+        return (separator(at), Dot::statement(Statement::Ac(card)));
+    }
+    let fault = Diagnostic::warning("bad-ac", card.span, "this `.ac` is left out")
+        .label("a number of points, the first and the last frequency are needed")
+        .help("write `.ac dec 20 10 1meg`");
+    tell(start, fault);
+    (skip(i), Dot::Nothing)
 }
 
 #[derive(Clone, Copy)]
