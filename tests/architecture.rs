@@ -65,6 +65,7 @@ const ROOMS: [(&str, &[&str]); 21] = [
             "algebra",
             "circuit",
             "integrate",
+            "lcs",
             "linalg",
             "mna",
             "model",

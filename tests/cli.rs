@@ -125,7 +125,7 @@ fn waves(text: &str) -> Waveforms {
 fn help_names_every_command_and_flag() {
     assert_snapshot!(run("--help"));
     for command in [
-        "sim", "pss", "lcs", "check", "op", "bench", "compare", "graph",
+        "sim", "pss", "ac", "lcs", "check", "op", "bench", "compare", "graph",
     ] {
         let ran = run(&format!("{command} --help"));
         assert_eq!((ran.status, ran.err.as_str()), (0, ""));
@@ -776,5 +776,59 @@ fn pss_writes_one_period_and_its_summary() {
         none.err.contains("no periodic steady state"),
         "{}",
         none.err
+    );
+}
+
+/// Complex columns, sidebands and ratios in the forms of INTERFACE; margins in words; `circ sim` of a netlist that asks for `.ac` alone.
+#[test]
+fn ac_writes_every_format_and_tells_the_margins_of_ratios() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let netlist = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/netlists/small-signal/buck-loop.cir"
+    );
+    let files = ["csv", "raw", "npz", "json", "svg", "png", "html"].map(|e| at(&format!("a.{e}")));
+    let ran = run(&format!(
+        "ac {netlist} --probe -v(out)/v(x) --probe v(out) -o {}",
+        files.join(" -o ")
+    ));
+    assert_eq!((ran.status, ran.out.as_str()), (0, ""), "{}", ran.err);
+    assert!(ran.err.contains("-v(out)/v(x): margin 87."), "{}", ran.err);
+    assert!(ran.err.contains("dB at 2.3"), "{}", ran.err);
+    let text = fs::read_to_string(at("a.csv")).expect("rows");
+    let mut lines = text.lines();
+    assert_eq!(
+        lines.next(),
+        Some("frequency,re(-v(out)/v(x)),im(-v(out)/v(x)),re(v(out)),im(v(out))")
+    );
+    assert_eq!(lines.count(), 148);
+    let raw = fs::read(at("a.raw")).expect("a file");
+    assert!(raw.windows(24).any(|w| w == b"Plotname: AC Analysis\nFl"));
+    let svg = fs::read_to_string(at("a.svg")).expect("a picture");
+    assert!(svg.contains("gain (dB)") && svg.contains("phase (°)") && svg.contains("10 kHz"));
+    let sidebands = run(&format!("ac {netlist} --probe v(out) --sidebands 1 -q"));
+    assert!(
+        (sidebands.out).starts_with(
+            "frequency,re(v(out)@-1),im(v(out)@-1),re(v(out)),im(v(out)),re(v(out)@1)"
+        ),
+        "{}",
+        &sidebands.out[..120]
+    );
+
+    fs::write(
+        folder.path().join("rc.cir"),
+        "rc\nv1 1 0 ac 1\nr1 1 2 1k\nc1 2 0 1u\n.ac lin 3 100 300\n.end\n",
+    )
+    .expect("a netlist");
+    let plain = run_in(folder.path(), "sim rc.cir -q");
+    assert_eq!(plain.status, 0, "{}", plain.err);
+    assert_eq!(plain.out, run_in(folder.path(), "ac rc.cir -q").out);
+    assert_eq!(plain.out.lines().count(), 4);
+    let both = run(&format!("sim {netlist} -o {}", at("t.csv")));
+    assert!(
+        both.err.contains("circ ac") && both.status != 1,
+        "{}",
+        both.err
     );
 }

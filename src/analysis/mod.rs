@@ -5,16 +5,22 @@
 //! | `.meas` and `.four` of a transient | [`transient`]: a run with its [`Measurements`] |
 //! | `.dc` | [`dc`]: a [`Characteristic`] |
 //! | the periodic steady state | [`periodic`]: its [`Orbit`] and one period of waveforms |
+//! | `.ac`, small signals about the operating point or that state | [`small_signal`]: a [`Response`] over frequency |
 //! | `.step`, or any other values | [`variants`]: a [`Variant`] for every combination of values; [`each`] asks all of them, in parallel |
 
 mod dc;
 mod measured;
 mod periodic;
+mod small_signal;
 mod sweep;
 mod variation;
 
 pub use crate::integrate::{Orbit, OrbitKind};
 pub use dc::{Characteristic, Unsolved, dc};
 pub use measured::{Finished, Measurements, is_measured, transient};
-pub use periodic::{PeriodicOptions, periodic};
+pub use periodic::{PeriodicOptions, orbit_start, periodic};
+pub use small_signal::{
+    About, Left, Margin, Ratio, Response, SmallSignalOptions, margins, ratios, small_signal,
+    unwrapped,
+};
 pub use sweep::{Variant, each, variants};

@@ -39,6 +39,8 @@ pub enum Command {
     Sim(SimArgs),
     /// Find the periodic steady state, and write one period of it
     Pss(PssArgs),
+    /// Find the response to small sines, about the operating point or the periodic steady state
+    Ac(AcArgs),
     /// Print the complementarity system (A, B, C, D, E, F, G) with names and units
     Lcs(LcsArgs),
     /// Check topology, passivity and which theorems hold
@@ -156,8 +158,11 @@ pub struct SimArgs {
     ///
     /// An exact run is made in steps at two tolerances, a run in steps exactly if that can be, else in steps of another scheme. The
     /// summary has the largest difference relative to a signal's amplitude, and what is tolerated.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "from_pss")]
     pub verify: bool,
+    /// Start at the periodic steady state, with sources that do not repeat held before 0 and running from there on
+    #[arg(long)]
+    pub from_pss: bool,
 }
 
 /// `circ pss`.
@@ -178,6 +183,45 @@ pub struct PssArgs {
     /// How well the orbit must close, relative to the amplitudes [default: 1e-9; 1e-6 where laws are curved]
     #[arg(long, value_name = "R", value_parser = positive)]
     pub tol: Option<f64>,
+}
+
+/// `circ ac`.
+#[derive(Debug, Args)]
+pub struct AcArgs {
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub input: Input,
+    /// Write the response to this file (repeatable); the ending chooses csv, raw, npz, json, svg, png or html
+    ///
+    /// Pictures show gain in dB and phase over the logarithm of the frequency, and of ratios their margins.
+    #[arg(short, long = "output", value_name = "OUT")]
+    pub outputs: Vec<PathBuf>,
+    /// Signals to show.
+    #[arg(
+        long = "probe",
+        value_name = "NAME",
+        allow_hyphen_values = true,
+        help = "Show exactly these signals and ratios: v(a), i(l1), v(a)/v(b), -v(y)/v(x) (repeatable)"
+    )]
+    pub probes: Vec<String>,
+    /// Show K sidebands on either side too, at f + k/T: `v(out)@-1`
+    #[arg(long, value_name = "K", default_value_t = 0)]
+    pub sidebands: u16,
+    /// Where the circuit is made linear [default: about the periodic steady state if it switches periodically, else the operating point]
+    #[arg(long, value_enum)]
+    pub about: Option<About>,
+    /// The period, s, in place of the common one of the sources; suffixes as in netlists (`10u`)
+    #[arg(long, value_name = "T", value_parser = positive)]
+    pub period: Option<f64>,
+}
+
+/// Where a circuit is made linear.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum About {
+    /// About the periodic steady state
+    Pss,
+    /// About the operating point
+    Op,
 }
 
 /// Forms of the summary.

@@ -1,5 +1,6 @@
 //! The command line: the only code that prints or opens files of results.
 
+mod ac;
 pub mod args;
 mod bench;
 mod check;
@@ -79,6 +80,7 @@ fn run(command: &Command, streams: &Streams) -> Result<Exit, Failure> {
     match command {
         Command::Sim(args) => sim::sim(args, streams),
         Command::Pss(args) => pss::pss(args, streams),
+        Command::Ac(args) => ac::ac(args, streams),
         Command::Lcs(args) => lcs::lcs(args, streams),
         Command::Check(args) => check::check(args, streams),
         Command::Op(args) => op::op(args, streams),

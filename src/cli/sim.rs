@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
+use super::ac;
 use super::args::{self, MethodArgs, SimArgs};
 use super::dc;
 use super::destination::{Destination, Wanted};
@@ -15,7 +16,7 @@ use super::rows::Columns;
 use super::signals::Signals;
 use super::steps::Stepping;
 use super::streams::Streams;
-use crate::analysis::{self, Finished, is_measured};
+use crate::analysis::{self, Finished, PeriodicOptions, is_measured};
 use crate::circuit::source::Wave;
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{
@@ -24,6 +25,7 @@ use crate::integrate::{
 };
 use crate::lcs::Input;
 use crate::model::Model;
+use crate::report;
 use crate::settings::Settings;
 
 /// Divisions of the progress bar.
@@ -56,6 +58,16 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
     let signals = Signals::watch()?;
     if let Subject::Circuit(model) = &subject {
         let circuit = model.circuit();
+        if circuit.tran.is_none() && !circuit.ac.is_empty() {
+            only_one_way(args)?;
+            return ac::sim(args, model, streams);
+        }
+        if !circuit.ac.is_empty() {
+            let file = args.input.file.display();
+            streams.say(format!(
+                "note: `.ac` is left out, as there is a `.tran`; `circ ac {file}` carries it out"
+            ));
+        }
         if circuit.tran.is_none() && !circuit.dc.is_empty() {
             only_one_way(args)?;
             return dc::sim(args, model, streams);
@@ -70,6 +82,11 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
             };
             return stepping.sim(&formats, streams);
         }
+    }
+    if let (true, Subject::System(_)) = (args.from_pss, &subject) {
+        let file = args.input.file.display();
+        let message = format!("{file}: `--from-pss` takes a netlist, not a system");
+        return Err(Failure::Message(message));
     }
     let destination = Destination::of(
         args.wanted(),
@@ -88,6 +105,7 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         discard: !collects,
         cancel: Some(signals.flag()),
         held: None,
+        from_orbit: args.from_pss,
     };
     let mut finished = measured_run(&subject, &request, route, streams);
     if let (true, Some((run, _)), None) = (args.verify, &mut finished.run, &finished.error) {
@@ -158,6 +176,8 @@ pub(super) struct Route<'a> {
     pub cancel: Option<&'a AtomicBool>,
     /// Bytes for rows at most, if not the usual.
     pub held: Option<usize>,
+    /// Begins at the periodic steady state.
+    pub from_orbit: bool,
 }
 
 /// Simulates, and measures where the circuit asks for it; then [`Route::sink`] gets no rows.
@@ -186,7 +206,23 @@ pub(super) fn transient(
     streams: &Streams,
 ) -> Finished {
     let tran = model.circuit().tran;
-    let run = |options: SimOptions<'_>| analysis::transient(model, options);
+    let start = if route.from_orbit {
+        let asked = PeriodicOptions {
+            cancel: route.cancel,
+            settings: request.settings(),
+            ..PeriodicOptions::default()
+        };
+        match analysis::orbit_start(model, &asked) {
+            Ok((orbit, start)) => {
+                streams.say(format!("starts at the {}", report::text::orbit(&orbit)));
+                Some(start)
+            }
+            Err(error) => return Finished::of(Err(error)),
+        }
+    } else {
+        None
+    };
+    let run = |options: SimOptions<'_>| analysis::transient(model, SimOptions { start, ..options });
     let mut finished = with_options(tran, request, route, streams, run);
     if let (Some((run, _)), Some(tran)) = (&mut finished.run, tran) {
         let inputs = model.multiport().sources.iter().map(|s| &s.input);
@@ -347,6 +383,7 @@ fn with_options<R>(
         cancel: route.cancel,
         settings,
         unestimated: request.unestimated,
+        start: None,
         progress: (!bar.is_hidden()).then_some(&mut report),
     });
     bar.finish_and_clear();

@@ -128,6 +128,7 @@ impl Stepping<'_> {
             corners: destination.has_pictures(),
             cancel: Some(self.signals.flag()),
             held: Some(held),
+            from_orbit: self.args.from_pss,
             ..Route::default()
         };
         let Finished { run, error } = sim::transient(&model, &self.request, route, &quiet);

@@ -74,6 +74,8 @@ pub struct SimOptions<'a> {
     pub cancel: Option<&'a AtomicBool>,
     /// No coarser runs beside one in steps, which tell its error: the run takes less time, and its error is not known.
     pub unestimated: bool,
+    /// Where the run begins, in place of the initial conditions or the operating point.
+    pub start: Option<Standing>,
     /// Tolerances.
     pub settings: Settings,
     /// Called with the time reached, s.
@@ -92,45 +94,32 @@ pub fn simulate(
     options: SimOptions<'_>,
 ) -> Result<Run, Error> {
     let tran = circuit.tran.ok_or_else(no_transient)?;
-    let problem = Problem::of_circuit(circuit, behaviour, tran.uic, &options.settings)?;
+    let mut options = options;
+    let start = options.start.take();
+    let uic = tran.uic || start.is_some();
+    let mut problem = Problem::of_circuit(circuit, behaviour, uic, &options.settings)?;
+    if let Some(standing) = start {
+        let place = Place {
+            t: standing.t,
+            storage: DVector::from_vec(standing.state),
+            switches: standing.switches,
+        };
+        problem = problem.standing_at(place, standing.conducting);
+    }
     drive(problem, tran, options)
 }
 
 /// Where a run begins in the course of a transient: after the edges of its time.
-#[derive(Debug, Clone)]
-pub(crate) struct Standing {
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Standing {
     /// Time, s.
-    pub(crate) t: f64,
+    pub t: f64,
     /// Capacitor voltages, V, and inductor currents, A.
-    pub(crate) state: Vec<f64>,
+    pub state: Vec<f64>,
     /// By switch: on.
-    pub(crate) switches: Vec<bool>,
+    pub switches: Vec<bool>,
     /// By ideal pair: conducts; empty where not known.
-    pub(crate) conducting: Vec<bool>,
-}
-
-/// Simulates a circuit over its `.tran` from `tstart` on, where it stands so.
-///
-/// # Errors
-/// As [`simulate`].
-pub(crate) fn simulate_from(
-    circuit: &Circuit,
-    behaviour: &StaticMultiport,
-    standing: Standing,
-    options: SimOptions<'_>,
-) -> Result<Run, Error> {
-    let tran = circuit.tran.ok_or_else(no_transient)?;
-    let problem = Problem::of_circuit(circuit, behaviour, true, &options.settings)?;
-    let place = Place {
-        t: standing.t,
-        storage: DVector::from_vec(standing.state),
-        switches: standing.switches,
-    };
-    drive(
-        problem.standing_at(place, standing.conducting),
-        tran,
-        options,
-    )
+    pub conducting: Vec<bool>,
 }
 
 fn no_transient() -> Error {

@@ -49,6 +49,8 @@ pub struct OperatingPoint {
     pub storage: Vec<f64>,
     /// By ideal pair of the devices: whether it conducts, by more than rounding.
     pub conducting: Vec<bool>,
+    /// By ideal pair and curved law of the devices: voltage, V, and current, A.
+    pub ports: Vec<(f64, f64)>,
 }
 
 /// Which values the sources have.
@@ -213,6 +215,7 @@ fn at_rest(
                 notes,
                 storage: point.storage,
                 conducting: point.conducting,
+                ports: point.points,
             });
         }
         if seen.contains(&wanted) || seen.len() > 64 {
@@ -253,6 +256,8 @@ fn waves(circuit: &Circuit, wave: impl Fn(&LinePort) -> f64) -> Vec<[f64; 2]> {
 struct Static {
     /// By port: whether it conducts.
     conducting: Vec<bool>,
+    /// By port: voltage, V, and current, A.
+    points: Vec<(f64, f64)>,
     readings: Vec<f64>,
     controls: Vec<f64>,
     storage: Vec<f64>,
@@ -309,8 +314,16 @@ fn static_solution(
     if lcs.storage.lambda.ncols() == lambda.len() {
         storage += &lcs.storage.lambda * &lambda;
     }
+    let y = &lcs.d * &lambda + &q;
     let ports = lcs.ports.iter().zip(active);
+    let values = lcs.ports.iter().zip(lambda.iter().zip(&y));
     Ok(Static {
+        points: values
+            .map(|(port, (&lambda, &y))| match port.role {
+                Role::Voltage => (-lambda, y),
+                Role::Current | Role::Function => (-y, lambda),
+            })
+            .collect(),
         conducting: ports
             .map(|(port, active)| active == Some(port.role != Role::Voltage))
             .collect(),

@@ -5,11 +5,23 @@ use crate::waveform::Waveforms;
 /// Width of a panel's plotting area in drawing units; curves are thinned to it.
 pub const PANEL_WIDTH: usize = 1400;
 
-/// Panels over one time axis, top to bottom.
+/// What stands on the common axis of a figure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Axis {
+    /// Seconds.
+    #[default]
+    Time,
+    /// The decimal logarithm of a frequency in Hz.
+    Frequency,
+}
+
+/// Panels over one axis, top to bottom.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
     /// The headline.
     pub title: String,
+    /// What the panels have in common.
+    pub axis: Axis,
     /// At least one for a picture.
     pub panels: Vec<Panel>,
 }
@@ -30,7 +42,7 @@ pub struct Panel {
 pub struct Series {
     /// For the legend.
     pub name: String,
-    /// (s, unit of the panel), times nondecreasing.
+    /// (value on the figure's axis, unit of the panel), the first nondecreasing.
     pub points: Vec<(f64, f64)>,
 }
 
@@ -72,6 +84,7 @@ impl Figure {
         let panels = [panel("voltage", "V"), panel("current", "A")];
         Self {
             title: runs.first().map_or(String::new(), |(_, w)| w.title.clone()),
+            axis: Axis::Time,
             panels: panels
                 .into_iter()
                 .filter(|p| !p.series.is_empty())
@@ -123,6 +136,7 @@ impl Figure {
         }
         Self {
             title: waves.title.clone(),
+            axis: Axis::Time,
             panels,
         }
     }

@@ -13,8 +13,6 @@ table{border-collapse:collapse}td,th{padding:.2em 1em;border-bottom:1px solid #d
 /// # Errors
 /// Those of [`svg::draw`].
 pub fn page(run: &Run, places: Places<'_>, figure: &Figure) -> Result<String, PictureError> {
-    let title = escaped(&run.waveforms.title);
-    let picture = svg::draw(figure)?;
     let summary = escaped(&text::summary(run, places, false));
     let plan: String = run
         .plan
@@ -36,11 +34,23 @@ pub fn page(run: &Run, places: Places<'_>, figure: &Figure) -> Result<String, Pi
             format!("{} {}", i.name, si::quantity(i.area, unit, 5)),
         ]
     });
-    Ok(format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title><style>{STYLE}</style></head>\n\
-         <body><h1>{title}</h1>\n{picture}\n<h2>Run</h2>\n<pre>{summary}</pre>\n<ul>{plan}</ul>\n{}{}</body></html>\n",
+    let rest = format!(
+        "<h2>Run</h2>\n<pre>{summary}</pre>\n<ul>{plan}</ul>\n{}{}",
         table("Events", ["time", "what"], events),
         table("Impulses", ["time", "area"], impulses),
+    );
+    sheet(figure, &rest)
+}
+
+/// A page with a picture and what follows it, in HTML.
+///
+/// # Errors
+/// Those of [`svg::draw`].
+pub fn sheet(figure: &Figure, rest: &str) -> Result<String, PictureError> {
+    let (title, picture) = (escaped(&figure.title), svg::draw(figure)?);
+    Ok(format!(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title><style>{STYLE}</style></head>\n\
+         <body><h1>{title}</h1>\n{picture}\n{rest}</body></html>\n",
     ))
 }
 

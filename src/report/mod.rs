@@ -11,6 +11,8 @@ pub mod table;
 pub mod text;
 
 #[cfg(feature = "plot")]
+pub mod bode;
+#[cfg(feature = "plot")]
 pub mod figure;
 #[cfg(feature = "plot")]
 pub mod graph;

@@ -4,7 +4,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::figure::{Figure, PANEL_WIDTH, Panel, Series};
+use super::figure::{Axis, Figure, PANEL_WIDTH, Panel, Series};
 use super::{PictureError, si};
 
 /// Drawing units per CSS pixel: coordinates are whole numbers, so the drawing is made larger than it is shown.
@@ -12,7 +12,7 @@ const SCALE: u32 = 2;
 const TITLE_HEIGHT: u32 = 80;
 const PANEL_HEIGHT: u32 = 440;
 const LABEL_WIDTH: u32 = 150;
-const TIME_AXIS_HEIGHT: u32 = 90;
+const AXIS_HEIGHT: u32 = 90;
 const FONT: &str = "sans-serif";
 const TEXT_SIZE: u32 = 24;
 const TITLE_SIZE: u32 = 30;
@@ -61,7 +61,7 @@ pub fn draw(figure: &Figure) -> Result<String, PictureError> {
     let legend = legend_width(names);
     let n_panels = figure.panels.len() as u32;
     let width = LABEL_WIDTH + PANEL_WIDTH as u32 + legend;
-    let height = TITLE_HEIGHT + n_panels * PANEL_HEIGHT + TIME_AXIS_HEIGHT;
+    let height = TITLE_HEIGHT + n_panels * PANEL_HEIGHT + AXIS_HEIGHT;
     on_canvas(width, height, &figure.title, |mut rest| {
         for (k, panel) in figure.panels.iter().enumerate() {
             let last = k + 1 == figure.panels.len();
@@ -70,7 +70,7 @@ pub fn draw(figure: &Figure) -> Result<String, PictureError> {
             } else {
                 rest.split_vertically(PANEL_HEIGHT)
             };
-            draw_panel(&area, panel, (start, end), legend, last)?;
+            draw_panel(&area, panel, (figure.axis, start, end), legend, last)?;
             rest = below;
         }
         Ok(())
@@ -108,13 +108,20 @@ pub(super) fn on_canvas(
 fn draw_panel(
     area: &Area,
     panel: &Panel,
-    (start, end): (f64, f64),
+    (axis, start, end): (Axis, f64, f64),
     legend: u32,
-    with_time_axis: bool,
+    with_axis: bool,
 ) -> Result<(), PictureError> {
-    let (time_factor, time_prefix) = si::prefix(start.abs().max(end.abs()));
     let (low, high) = y_range(&panel.series);
-    let (y_factor, y_prefix) = si::prefix(low.abs().max(high.abs()));
+    let ((time_factor, description), (y_factor, y_prefix)) = match axis {
+        Axis::Time => {
+            let (factor, prefix) = si::prefix(start.abs().max(end.abs()));
+            let y = si::prefix(low.abs().max(high.abs()));
+            ((factor, format!("time ({prefix}s)")), y)
+        }
+        // Decibels and degrees have no prefixes.
+        Axis::Frequency => ((1.0, "frequency".into()), (1.0, "")),
+    };
     let x_span = if end > start {
         (end - start) / time_factor
     } else {
@@ -127,7 +134,7 @@ fn draw_panel(
         .set_label_area_size(LabelAreaPosition::Left, LABEL_WIDTH)
         .set_label_area_size(
             LabelAreaPosition::Bottom,
-            if with_time_axis { TIME_AXIS_HEIGHT } else { 0 },
+            if with_axis { AXIS_HEIGHT } else { 0 },
         )
         .margin_top(12)
         .margin_left(16)
@@ -142,13 +149,16 @@ fn draw_panel(
         .bold_line_style(GRID)
         .axis_style(INK)
         .label_style(text_style(TEXT_SIZE))
-        .x_desc(if with_time_axis {
-            format!("time ({time_prefix}s)")
+        .x_desc(if with_axis {
+            description
         } else {
             String::new()
         })
         .y_desc(format!("{} ({y_prefix}{})", panel.quantity, panel.unit))
-        .x_label_formatter(&|x| tick(*x, x_span))
+        .x_label_formatter(&|x| match axis {
+            Axis::Time => tick(*x, x_span),
+            Axis::Frequency => frequency_tick(*x, x_span),
+        })
         .y_label_formatter(&|y| tick(*y, y_span))
         .draw()
         .map_err(refused)?;
@@ -236,6 +246,15 @@ fn tick(value: f64, span: f64) -> String {
         text if text.len() > 9 => si::plain(value, 4),
         text => text.into(),
     }
+}
+
+/// A tick at a decimal logarithm of a frequency; over more than two decades the whole ones alone.
+fn frequency_tick(logarithm: f64, span: f64) -> String {
+    let whole = (logarithm - logarithm.round()).abs() < 1e-6;
+    if span > 2.0 && !whole {
+        return String::new();
+    }
+    si::quantity(10f64.powf(logarithm), "Hz", 3)
 }
 
 pub(super) fn shortened(text: &str, limit: usize) -> String {

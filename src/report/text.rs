@@ -33,7 +33,7 @@ pub fn summary(run: &Run, places: Places<'_>, verbose: bool) -> String {
         stats.lcp_solves,
         si::quantity(stats.cpu_seconds, "s", 3),
     ));
-    lines.extend(run.orbit.as_ref().map(closed));
+    lines.extend(run.orbit.as_ref().map(orbit));
     let energy = &run.energy;
     let balance = format!(
         "energy: source {}, dissipated {}, stored {}, lost in jumps {}, by numerical damping {}, residual {} of the largest",
@@ -108,7 +108,9 @@ pub fn summary(run: &Run, places: Places<'_>, verbose: bool) -> String {
 }
 
 /// An orbit in a line.
-fn closed(orbit: &Orbit) -> String {
+/// What is said of an orbit, on one line.
+#[must_use]
+pub fn orbit(orbit: &Orbit) -> String {
     /// Multipliers shown.
     const FIRST: usize = 6;
     let multiplier = |[re, im]: &[f64; 2]| match *im {

@@ -7,8 +7,11 @@ pub mod compare;
 pub mod csv;
 pub mod json;
 pub mod npz;
+mod phasors;
 pub mod raw;
 mod thin;
+
+pub use phasors::Phasors;
 
 /// Results of a run: one time column and one column per probe.
 #[derive(Debug, Clone, Default, PartialEq)]

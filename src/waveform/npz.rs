@@ -8,7 +8,7 @@ use npyz::WriterBuilder;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
-use super::{WaveformError, Waveforms};
+use super::{Phasors, WaveformError, Waveforms};
 
 const FORMAT: &str = "npz";
 /// The archive's format has room for so many bytes.
@@ -34,10 +34,20 @@ pub fn write(to: impl Write + Seek, waves: &Waveforms) -> std::io::Result<()> {
     archive.finish()?.flush()
 }
 
-fn member<W: Write + Seek>(
+/// Writes one vector for `frequency` and a complex one per name.
+pub(super) fn write_phasors(to: impl Write + Seek, phasors: &Phasors) -> std::io::Result<()> {
+    let mut archive = ZipWriter::new(to);
+    member(&mut archive, "frequency", phasors.frequency.iter().copied())?;
+    for (j, name) in phasors.names.iter().enumerate() {
+        member(&mut archive, name, phasors.column(j))?;
+    }
+    archive.finish()?.flush()
+}
+
+fn member<W: Write + Seek, T: npyz::AutoSerialize>(
     archive: &mut ZipWriter<W>,
     name: &str,
-    values: impl ExactSizeIterator<Item = f64>,
+    values: impl ExactSizeIterator<Item = T>,
 ) -> std::io::Result<()> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Stored)

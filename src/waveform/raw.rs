@@ -49,10 +49,41 @@ pub fn header(
         .filter(char::is_ascii)
         .take(RESERVED)
         .collect();
+    let title = format!("{title}{note:RESERVED$}");
+    plot_header(to, &title, (PLOT, "real", "time"), (names, units), rows)
+}
+
+/// Writes the header for so many rows of complex columns over frequency.
+///
+/// # Errors
+/// Those of `to`.
+pub(super) fn complex_header(
+    to: &mut impl Write,
+    title: &str,
+    columns: (&[String], &[&'static str]),
+    rows: u64,
+) -> std::io::Result<()> {
+    let title = title.replace(char::is_control, " ");
+    plot_header(
+        to,
+        &title,
+        ("AC Analysis", "complex", "frequency"),
+        columns,
+        rows,
+    )
+}
+
+fn plot_header(
+    to: &mut impl Write,
+    title: &str,
+    (plot, flags, axis): (&str, &str, &str),
+    (names, units): (&[String], &[&'static str]),
+    rows: u64,
+) -> std::io::Result<()> {
     write!(
         to,
-        "Title: {title}{note:RESERVED$}\nDate: \nCommand: {COMMAND}\nPlotname: {PLOT}\nFlags: real\nNo. Variables: {}\n\
-         No. Points: {rows:<DIGITS$}\nVariables:\n\t0\ttime\ttime\n",
+        "Title: {title}\nDate: \nCommand: {COMMAND}\nPlotname: {plot}\nFlags: {flags}\nNo. Variables: {}\n\
+         No. Points: {rows:<DIGITS$}\nVariables:\n\t0\t{axis}\t{axis}\n",
         names.len() + 1,
     )?;
     for (j, (name, unit)) in names.iter().zip(units).enumerate() {

@@ -8,10 +8,11 @@ mod tests;
 
 use std::sync::atomic::AtomicBool;
 
+use super::variation::Trajectory;
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{
     Error, Note, Orbit, OrbitKind, Reason, Run, SimOptions, Simulation, SimulationOptions,
-    Standing, simulate_from,
+    Standing, simulate,
 };
 use crate::mna::{StaticMultiport, behaviour};
 use crate::model::Model;
@@ -65,6 +66,89 @@ pub struct PeriodicOptions<'a> {
 /// # Ok::<(), circ::Error>(())
 /// ```
 pub fn periodic(model: &Model, options: &PeriodicOptions<'_>) -> Result<(Orbit, Run), Error> {
+    let mut steady = steady(model, options)?;
+    let standing = steady.standing()?;
+    let Steady {
+        circuit,
+        multiport,
+        held,
+        simulation,
+        found,
+        apart,
+    } = steady;
+    let (names, orbit) = (simulation.state_names(), found.orbit());
+    let mut run = rows((&circuit, &multiport), standing, orbit.period, options)?;
+    if !simulation.is_exact() {
+        for error in [&mut run.error.max, &mut run.error.rms] {
+            *error = error.zip(apart).map(|(error, apart)| error.max(apart));
+        }
+    }
+    run.notes.extend(notes(&orbit, &found.fixed, names, &held));
+    Ok((orbit, run))
+}
+
+/// The orbit of [`periodic`], and where a transient begins that starts on it at t = 0, with sources that do not repeat running from there on.
+///
+/// # Errors
+/// As [`periodic`].
+pub fn orbit_start(
+    model: &Model,
+    options: &PeriodicOptions<'_>,
+) -> Result<(Orbit, Standing), Error> {
+    let mut steady = steady(model, options)?;
+    let standing = steady.standing()?;
+    let begins = Standing { t: 0.0, ..standing };
+    Ok((steady.orbit(), begins))
+}
+
+/// A circuit in its periodic steady state.
+pub(super) struct Steady {
+    pub(super) circuit: Circuit,
+    multiport: StaticMultiport,
+    /// Sources that do not repeat.
+    pub(super) held: Vec<String>,
+    pub(super) simulation: Simulation,
+    found: Found,
+    /// How far orbits of longer and shorter steps are apart, relative to the amplitudes.
+    apart: Option<f64>,
+}
+
+impl Steady {
+    /// The orbit.
+    pub(super) fn orbit(&self) -> Orbit {
+        self.found.orbit()
+    }
+
+    /// Where the orbit begins, with what conducts there.
+    fn standing(&mut self) -> Result<Standing, Error> {
+        let (stand, from) = (&self.found.fixed.stand, self.found.from);
+        self.simulation
+            .stand_at(from, &stand.state, &stand.switches)?;
+        Ok(Standing {
+            t: from,
+            state: stand.state.clone(),
+            switches: stand.switches.clone(),
+            conducting: self.simulation.conducting(),
+        })
+    }
+
+    /// The orbit with what its derivative is made of, from the time at which it begins to one period later.
+    ///
+    /// # Errors
+    /// As [`Trajectory::of`].
+    pub(super) fn trajectory(&mut self) -> Result<Trajectory, Error> {
+        let (stand, from) = (&self.found.fixed.stand, self.found.from);
+        let place = (from, &stand.state[..], &stand.switches[..]);
+        let period = self.found.orbit().period;
+        Trajectory::of(&mut self.simulation, place, from + period)
+    }
+}
+
+/// Finds the periodic steady state.
+///
+/// # Errors
+/// As [`periodic`].
+pub(super) fn steady(model: &Model, options: &PeriodicOptions<'_>) -> Result<Steady, Error> {
     let (circuit, held) = period::repeating(model.circuit());
     let none = |what: String| Error::before(Reason::NoOrbit(what));
     if let Some(line) = circuit.lines.first() {
@@ -100,23 +184,14 @@ pub fn periodic(model: &Model, options: &PeriodicOptions<'_>) -> Result<(Orbit, 
     } else {
         refined((&circuit, &multiport), &mut found, period.seconds, options)?
     };
-    let (stand, from) = (&found.fixed.stand, found.from);
-    simulation.stand_at(from, &stand.state, &stand.switches)?;
-    let standing = Standing {
-        t: from,
-        state: stand.state.clone(),
-        switches: stand.switches.clone(),
-        conducting: simulation.conducting(),
-    };
-    let (names, orbit) = (simulation.state_names(), found.orbit());
-    let mut run = rows((&circuit, &multiport), standing, orbit.period, options)?;
-    if !simulation.is_exact() {
-        for error in [&mut run.error.max, &mut run.error.rms] {
-            *error = error.zip(apart).map(|(error, apart)| error.max(apart));
-        }
-    }
-    run.notes.extend(notes(&orbit, &found.fixed, names, &held));
-    Ok((orbit, run))
+    Ok(Steady {
+        circuit,
+        multiport,
+        held,
+        simulation,
+        found,
+        apart,
+    })
 }
 
 /// Where laws are curved: the orbit of steps half as long in place of `found`, and how far the two are apart relative to the amplitudes;
@@ -147,7 +222,7 @@ fn simulation(
 ) -> Result<Simulation, Error> {
     let tran = circuit.tran;
     let span = period.or(tran.map(|t| t.tstop)).unwrap_or(1.0);
-    let circuit = Circuit {
+    let mut circuit = Circuit {
         tran: Some(Tran {
             tstep: span / TABLE_STEPS,
             prints: true,
@@ -158,20 +233,35 @@ fn simulation(
         }),
         ..circuit.clone()
     };
-    let of = |step: Option<f64>| {
+    let of = |circuit: &Circuit, step: Option<f64>| {
         let options = SimulationOptions {
             step,
             settings: options.settings.clone(),
             ..SimulationOptions::default()
         };
-        Simulation::closed(&circuit, multiport, options)
+        Simulation::closed(circuit, multiport, options)
     };
-    let simulation = of(None)?;
+    let simulation = match of(&circuit, None) {
+        Err(error) if has_no_rest(&error) => {
+            // The orbit does not depend on where the search for it starts.
+            circuit.tran = circuit.tran.map(|tran| Tran { uic: true, ..tran });
+            of(&circuit, None)?
+        }
+        simulation => simulation?,
+    };
     if simulation.is_exact() {
         return Ok(simulation);
     }
     // Steps that an error control chooses differ from return to return, and with them what they return to.
-    of(Some(part * span / PARTS_OF_PERIOD))
+    of(&circuit, Some(part * span / PARTS_OF_PERIOD))
+}
+
+/// Whether a simulation did not start for want of an operating point.
+const fn has_no_rest(error: &Error) -> bool {
+    matches!(
+        error.reason,
+        Reason::NoOperatingPoint(_) | Reason::SwitchesDoNotSettle
+    )
 }
 
 /// One period of waveforms, from 0 on.
@@ -196,11 +286,11 @@ fn rows(
         }),
         ..circuit.clone()
     };
-    let mut run = simulate_from(
+    let mut run = simulate(
         &circuit,
         multiport,
-        standing,
         SimOptions {
+            start: Some(standing),
             events: options.events,
             corners: options.corners,
             cancel: options.cancel,

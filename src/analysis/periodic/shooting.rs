@@ -230,7 +230,11 @@ impl Shooting<'_> {
         Ok(derivative)
     }
 
-    pub(super) fn differences(&mut self, stand: &Stand, after: &Stand) -> Result<DMatrix<f64>, Error> {
+    pub(super) fn differences(
+        &mut self,
+        stand: &Stand,
+        after: &Stand,
+    ) -> Result<DMatrix<f64>, Error> {
         let n = stand.state.len();
         let part = if self.simulation.is_exact() {
             DIFFERENCE

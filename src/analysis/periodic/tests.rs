@@ -44,7 +44,8 @@ fn the_variational_equation_agrees_with_differences() {
         let multiport = behaviour(&circuit).expect("a multiport");
         let seconds = period.seconds.expect("a driven circuit");
         let parts = (&circuit, &multiport);
-        let mut simulation = simulation(parts, period.seconds, 1.0, &options).expect("a simulation");
+        let mut simulation =
+            simulation(parts, period.seconds, 1.0, &options).expect("a simulation");
         let mut search = Search::of(&mut simulation, &options);
         let found = search.driven(seconds, period.from).expect("an orbit");
         let mut shooting = search.shooting(found.from, Return::After(seconds));
@@ -55,6 +56,9 @@ fn the_variational_equation_agrees_with_differences() {
         let (after, _) = shooting.shoot(stand).expect("a period");
         let by_differences = shooting.differences(stand, &after).expect("differences");
         let apart = (&by_equation - &by_differences).amax();
-        assert!(apart < 1e-5, "{name}: {apart:e}, {by_equation}{by_differences}");
+        assert!(
+            apart < 1e-5,
+            "{name}: {apart:e}, {by_equation}{by_differences}"
+        );
     }
 }

@@ -24,7 +24,7 @@ use crate::settings::tolerances::times::SAME_TIME;
 use instant::Inputs;
 use saltation::Side;
 pub(crate) use saltation::{Saltation, Timing};
-pub(crate) use system::System;
+pub(crate) use system::{System, shaped};
 
 /// A stretch of a run in one mode.
 #[derive(Debug, Clone)]
@@ -36,8 +36,6 @@ pub(crate) struct Segment {
     pub(crate) to: f64,
     /// e^{A (to − from)}.
     pub(crate) propagator: DMatrix<f64>,
-    /// x where it begins.
-    pub(crate) start: DVector<f64>,
     /// x where it ends.
     pub(crate) end: DVector<f64>,
 }
@@ -159,14 +157,14 @@ impl Maker {
             let what = "a run in no mode";
             return Err(Error::before(Reason::internal("analysis::variation", what)));
         };
-        let (mut at, mut entry) = (self.system(&first.to)?, (first.t, &first.after[..]));
+        let (mut at, mut entry) = (self.system(&first.to)?, first.t);
         let (mut segments, mut saltations) = (Vec::new(), Vec::new());
         for instant in instants {
             let (first, last) = (&instant[0], &instant[instant.len() - 1]);
             segments.push(self.segment(at, entry, (first.t, &first.before))?);
             let next = self.system(&last.to)?;
-            saltations.push(self.saltation(instant, (at, next), first.t - entry.0)?);
-            (at, entry) = (next, (last.t, &last.after[..]));
+            saltations.push(self.saltation(instant, (at, next), first.t - entry)?);
+            (at, entry) = (next, last.t);
         }
         segments.push(self.segment(at, entry, end)?);
         Ok(Trajectory {
@@ -180,7 +178,7 @@ impl Maker {
     fn segment(
         &self,
         system: usize,
-        (from, start): (f64, &[f64]),
+        from: f64,
         (to, end): (f64, &[f64]),
     ) -> Result<Segment, Error> {
         let of = &self.systems[system];
@@ -192,7 +190,6 @@ impl Maker {
             propagator: propagator.ok_or_else(|| {
                 not_smooth(from, "the exponential of a mode does not exist in doubles")
             })?,
-            start: of.state(start),
             end: of.state(end),
         })
     }
@@ -287,7 +284,11 @@ impl Maker {
         for passage in instant {
             let left = passage.from.as_ref().map_or(&[][..], |key| &key.switches);
             let moved = (0..left.len()).filter(|&i| left[i] != passage.to.switches[i]);
-            owners.extend(moved.filter(|&i| !self.thresholds[i].is_rest()).map(Owner::Switch));
+            owners.extend(
+                moved
+                    .filter(|&i| !self.thresholds[i].is_rest())
+                    .map(Owner::Switch),
+            );
         }
         for owner in owners {
             let limits = |i| self.assembler.limits(i);
@@ -332,7 +333,11 @@ impl Maker {
 fn same_timing(a: &Timing, b: &Timing, seconds: f64) -> bool {
     let size = [&a.x, &b.x, &a.u, &b.u].map(|part| part.amax());
     let size = size.into_iter().fold(0.0, f64::max);
-    let parts = [(&a.x, &b.x, size), (&a.u, &b.u, size), (&a.du, &b.du, size * seconds)];
+    let parts = [
+        (&a.x, &b.x, size),
+        (&a.u, &b.u, size),
+        (&a.du, &b.du, size * seconds),
+    ];
     parts.into_iter().all(|(a, b, size)| {
         let mut apart = a.iter().zip(b).map(|(a, b)| (a - b).abs());
         apart.all(|apart| apart <= SAME_TIMING * size)

@@ -61,12 +61,10 @@ impl Row {
 
     /// The value, and the sum of the magnitudes of its terms.
     pub(super) fn value(&self, x: &DVector<f64>, inputs: &Inputs) -> (f64, f64) {
-        let parts = [
-            (&self.x, x),
-            (&self.u, &inputs.u),
-            (&self.du, &inputs.du),
-        ];
-        let terms = parts.into_iter().flat_map(|(row, values)| row.iter().zip(values));
+        let parts = [(&self.x, x), (&self.u, &inputs.u), (&self.du, &inputs.du)];
+        let terms = parts
+            .into_iter()
+            .flat_map(|(row, values)| row.iter().zip(values));
         terms.fold((self.one, self.one.abs()), |(sum, size), (row, value)| {
             (sum + row * value, size + (row * value).abs())
         })
@@ -79,7 +77,9 @@ impl Row {
             (&self.u, &inputs.du),
             (&self.du, &inputs.ddu),
         ];
-        let terms = parts.into_iter().flat_map(|(row, values)| row.iter().zip(values));
+        let terms = parts
+            .into_iter()
+            .flat_map(|(row, values)| row.iter().zip(values));
         terms.fold((0.0, 0.0), |(sum, size), (row, value)| {
             (sum + row * value, size + (row * value).abs())
         })
@@ -118,6 +118,11 @@ impl System {
     /// s = X x + U u + k.
     pub(super) fn storage(&self, x: &DVector<f64>, u: &DVector<f64>) -> DVector<f64> {
         &self.lcs.storage.x * x + &self.storage_u * u + &self.lcs.storage.one
+    }
+
+    /// U, q×p.
+    pub(crate) const fn storage_inputs(&self) -> &DMatrix<f64> {
+        &self.storage_u
     }
 
     /// x' at x.

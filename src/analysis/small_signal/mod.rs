@@ -1,0 +1,296 @@
+//! The small-signal response: what a small sine on the sources with an `AC` value makes of the signals, about the operating point or about the
+//! periodic steady state.
+
+mod orbit;
+mod ratio;
+mod rest;
+
+use std::sync::atomic::AtomicBool;
+
+use nalgebra::{Complex, DMatrix, DVector, Dyn, LU};
+
+pub use ratio::{Left, Margin, Ratio, margins, ratios, unwrapped};
+
+use super::periodic::{PeriodicOptions, Steady, steady};
+use crate::circuit::{Circuit, Kind};
+use crate::integrate::{Error, Note, Orbit, OrbitKind, Reason};
+use crate::lcs::Input;
+use crate::model::Model;
+use crate::settings::Settings;
+use crate::waveform::{Phasors, unit_of};
+
+/// Where a circuit is made linear.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum About {
+    /// The operating point.
+    Rest,
+    /// The periodic steady state.
+    Orbit,
+}
+
+/// What a small-signal response may be asked for.
+#[derive(Debug, Clone, Default)]
+pub struct SmallSignalOptions<'a> {
+    /// Frequencies, Hz, in place of those of `.ac`.
+    pub frequencies: Vec<f64>,
+    /// Where the circuit is made linear; by default about the orbit if it switches periodically, else about the operating point.
+    pub about: Option<About>,
+    /// About an orbit: so many sidebands on either side, f + k/T.
+    pub sidebands: u16,
+    /// The period, s, in place of the common one of the sources.
+    pub period: Option<f64>,
+    /// Ends the search for the orbit when set.
+    pub cancel: Option<&'a AtomicBool>,
+    /// Tolerances.
+    pub settings: Settings,
+}
+
+/// The response of signals to the `AC` values of the sources.
+#[derive(Debug, Clone)]
+pub struct Response {
+    /// The signals as phasors relative to the unit of `AC`; the sideband at f + k/T is `v(out)@k`.
+    pub phasors: Phasors,
+    /// Where the circuit was made linear.
+    pub about: About,
+    /// The orbit about which it was.
+    pub orbit: Option<Orbit>,
+    /// Things the user should know.
+    pub notes: Vec<Note>,
+}
+
+/// The small-signal response of a circuit.
+///
+/// About the operating point, with x' = A x + E u and y = C x + G u there, it is Y(ω) = C (jωI − A)⁻¹ E û + G û. About the periodic steady state of
+/// period T
+///
+/// ```text
+/// Y_k(ω) = (1/T) [∫ δy e^{−jΩt} dt + Σ (y⁻ − y⁺) δt e^{−jΩt}],   Ω = ω + 2πk/T,
+/// ```
+///
+/// where δ is the solution of the variational equation that the sources drive and that repeats but for the factor e^{jωT}, and the sum is over the
+/// events that it shifts (N. M. Wereley, Analysis and Control of Linear Periodically Time Varying Systems, 1991). k = 0 is the transfer function.
+///
+/// # Errors
+/// No source has an `AC` value, no frequency is asked for; the operating point's or [`periodic`](super::periodic()) errors;
+/// [`Reason::NotSmooth`] where the circuit has no derivative.
+///
+/// # Example
+/// A low-pass filter at its corner frequency.
+/// ```
+/// use circ::analysis::{SmallSignalOptions, small_signal};
+///
+/// let text = "rc\nv1 1 0 dc 2 ac 1\nr1 1 2 1k\nc1 2 0 1u\n.ac list 159.15494309189535\n.end\n";
+/// let model = circ::Model::parse(text, "rc.cir")?;
+/// let response = small_signal(&model, &SmallSignalOptions::default())?;
+/// let out = response.phasors.column(1).next().unwrap();
+/// assert!((out.re - 0.5).abs() < 1e-14 && (out.im + 0.5).abs() < 1e-14);
+/// # Ok::<(), circ::Error>(())
+/// ```
+pub fn small_signal(model: &Model, options: &SmallSignalOptions<'_>) -> Result<Response, Error> {
+    let circuit = model.circuit();
+    let asked = if options.frequencies.is_empty() {
+        &circuit.ac
+    } else {
+        &options.frequencies
+    };
+    if asked.is_empty() {
+        return Err(unsupported(
+            "the netlist has no `.ac` card: `.ac dec 20 10 1meg`",
+        ));
+    }
+    if circuit.stimuli.is_empty() {
+        return Err(unsupported(
+            "no source has an `AC` value: `v1 in 0 dc 5 ac 1`",
+        ));
+    }
+    let about = match options.about {
+        Some(about) => about,
+        None if may_switch(circuit) => About::Orbit,
+        None => About::Rest,
+    };
+    let omegas: Vec<f64> = asked.iter().map(|f| f * std::f64::consts::TAU).collect();
+    let (names, units) = columns(circuit);
+    let mut response = Response {
+        phasors: Phasors {
+            title: circuit.title.clone(),
+            names,
+            units,
+            frequency: asked.clone(),
+            values: Vec::new(),
+        },
+        about,
+        orbit: None,
+        notes: Vec::new(),
+    };
+    if about == About::Orbit {
+        let asked = PeriodicOptions {
+            period: options.period,
+            cancel: options.cancel,
+            settings: options.settings.clone(),
+            ..PeriodicOptions::default()
+        };
+        let found = steady(model, &asked)?;
+        if found.orbit().kind != OrbitKind::Equilibrium {
+            about_orbit(found, &omegas, options.sidebands, &mut response)?;
+            return Ok(response);
+        }
+        if options.about.is_some() {
+            response.notes.push(
+                "the circuit comes to rest: this is the response about its operating point"
+                    .to_string()
+                    .into(),
+            );
+        }
+        response.about = About::Rest;
+    }
+    let linear = rest::linear(
+        circuit,
+        model.multiport(),
+        &options.settings,
+        &mut response.notes,
+    )?;
+    let drive = drive(circuit, &linear.inputs);
+    for omega in omegas {
+        response
+            .phasors
+            .values
+            .extend(linear.response(omega, &drive)?.iter());
+    }
+    Ok(response)
+}
+
+fn about_orbit(
+    mut found: Steady,
+    omegas: &[f64],
+    sidebands: u16,
+    response: &mut Response,
+) -> Result<(), Error> {
+    let orbit = found.orbit();
+    let trajectory = found.trajectory()?;
+    let inputs = trajectory
+        .systems
+        .first()
+        .map_or(&[][..], |system| &system.lcs.inputs);
+    let drive = drive(&found.circuit, inputs);
+    let linear = orbit::Linear::of(&trajectory, orbit.period);
+    let bands: Vec<i32> = (-i32::from(sidebands)..=i32::from(sidebands)).collect();
+    let phasors = &mut response.phasors;
+    for omega in omegas {
+        phasors
+            .values
+            .extend(linear.response(*omega, &drive, &bands)?);
+    }
+    let of_band = |name: &String, k: i32| {
+        if k == 0 {
+            name.clone()
+        } else {
+            format!("{name}@{k}")
+        }
+    };
+    let names = bands
+        .iter()
+        .flat_map(|k| phasors.names.iter().map(|name| of_band(name, *k)));
+    phasors.names = names.collect();
+    phasors.units = phasors.units.repeat(bands.len());
+    if !orbit.stable {
+        let what = "the orbit is unstable: this is the response about it, which no transient shows";
+        response.notes.push(what.to_string().into());
+    }
+    response.orbit = Some(orbit);
+    Ok(())
+}
+
+/// Whether the circuit may switch periodically: it has what changes sides, and a source that repeats; or a state that moves a switch, in a
+/// transient that shows whether it does so for good.
+fn may_switch(circuit: &Circuit) -> bool {
+    let changes = |kind: &Kind| {
+        matches!(
+            kind,
+            Kind::Switch(_) | Kind::Device(_) | Kind::Function { .. }
+        )
+    };
+    let varies = |kind: &Kind| match kind {
+        Kind::VoltageSource(source) | Kind::CurrentSource(source) => source.wave.period().is_some(),
+        _ => false,
+    };
+    let (mut changing, mut varying, mut switched) = (false, false, false);
+    for element in &circuit.elements {
+        changing |= changes(&element.kind);
+        varying |= varies(&element.kind);
+        switched |= matches!(element.kind, Kind::Switch(_) | Kind::Function { .. });
+    }
+    changing && (varying || (switched && circuit.tran.is_some()))
+}
+
+fn unsupported(what: &str) -> Error {
+    Error::before(Reason::Unsupported(what.into()))
+}
+
+/// The signals, and their units.
+fn columns(circuit: &Circuit) -> (Vec<String>, Vec<&'static str>) {
+    let names: Vec<String> = circuit
+        .probes()
+        .into_iter()
+        .map(|probe| probe.name)
+        .collect();
+    let units = names.iter().map(|name| unit_of(name)).collect();
+    (names, units)
+}
+
+/// û: the `AC` values of the sources.
+fn drive(circuit: &Circuit, inputs: &[Input]) -> DVector<Complex<f64>> {
+    let of = |input: &Input| {
+        let own = circuit
+            .stimuli
+            .iter()
+            .filter(|stimulus| circuit.elements[stimulus.source.index()].name == input.name);
+        let phasors = own.map(|s| Complex::from_polar(s.magnitude, s.phase.to_radians()));
+        phasors.sum()
+    };
+    DVector::from_iterator(inputs.len(), inputs.iter().map(of))
+}
+
+/// jωI − A, factored; its rows are levelled, as those of different resistances are decades apart.
+struct Resolvent {
+    factors: LU<Complex<f64>, Dyn, Dyn>,
+    /// 1 over the largest entry of each row.
+    levels: DVector<f64>,
+}
+
+impl Resolvent {
+    fn of(a: &DMatrix<f64>, omega: f64) -> Self {
+        let n = a.nrows();
+        let mut shifted = DMatrix::from_fn(n, n, |i, j| {
+            Complex::new(-a[(i, j)], if i == j { omega } else { 0.0 })
+        });
+        let mut levels = DVector::zeros(n);
+        for (mut row, level) in shifted.row_iter_mut().zip(levels.iter_mut()) {
+            *level = 1.0 / row.iter().fold(f64::MIN_POSITIVE, |m, v| m.max(v.norm()));
+            row *= Complex::from(*level);
+        }
+        let factors = shifted.lu();
+        Self { factors, levels }
+    }
+
+    /// (jωI − A)⁻¹ b.
+    fn solve(&self, b: DVector<Complex<f64>>) -> Option<DVector<Complex<f64>>> {
+        let levelled = b.zip_map(&self.levels, |b, level| b * level);
+        let solved = self.factors.solve(&levelled)?;
+        solved.iter().all(|v| v.is_finite()).then_some(solved)
+    }
+}
+
+/// A frequency at which nothing finite responds.
+fn resonance(omega: f64) -> Error {
+    let f = omega / std::f64::consts::TAU;
+    let what = format!(
+        "at {f:e} Hz the circuit resonates without damping; another frequency has a response"
+    );
+    Error::before(Reason::NotSmooth(what))
+}
+
+/// A real matrix times a complex vector.
+fn times(matrix: &DMatrix<f64>, vector: &DVector<Complex<f64>>) -> DVector<Complex<f64>> {
+    let parts = [vector.map(|v| v.re), vector.map(|v| v.im)].map(|part| matrix * part);
+    parts[0].zip_map(&parts[1], Complex::new)
+}

@@ -1,0 +1,135 @@
+//! `circ ac`.
+
+use std::io::{Cursor, Write};
+use std::path::{Path, PathBuf};
+
+use super::args::{About, AcArgs, Input, SimArgs};
+use super::exit::{Exit, Failure};
+use super::files;
+use super::input;
+use super::output::{self, Format};
+use super::signals::Signals;
+use super::streams::Streams;
+use crate::analysis::{self, Ratio, SmallSignalOptions, margins, ratios, small_signal};
+use crate::model::Model;
+use crate::report::{bode, html, svg, text};
+use crate::waveform::Phasors;
+
+/// Finds the small-signal response and writes it.
+///
+/// # Errors
+/// See [`Failure`].
+pub(super) fn ac(args: &AcArgs, streams: &Streams) -> Result<Exit, Failure> {
+    // An ending that is no format is told before anything is read.
+    for path in &args.outputs {
+        Format::of(path)?;
+    }
+    let asked: Vec<Ratio> = args.probes.iter().map(|text| Ratio::parse(text)).collect();
+    let mut signals: Vec<String> = Vec::new();
+    for signal in asked.iter().flat_map(Ratio::signals) {
+        if !signals.contains(signal) {
+            signals.push(signal.clone());
+        }
+    }
+    let paths: Vec<&Path> = args.outputs.iter().map(PathBuf::as_path).collect();
+    let subject = input::open(&args.input, &signals, &paths, streams)?;
+    let model = input::model_of(&args.input, &subject)?;
+    let watch = Signals::watch()?;
+    let options = SmallSignalOptions {
+        about: args.about.map(|about| match about {
+            About::Pss => analysis::About::Orbit,
+            About::Op => analysis::About::Rest,
+        }),
+        sidebands: args.sidebands,
+        period: args.period,
+        cancel: Some(watch.flag()),
+        ..SmallSignalOptions::default()
+    };
+    let phasors = phasors(&args.input, model, &options, streams)?;
+    let phasors = if asked.is_empty() {
+        phasors
+    } else {
+        ratios(&phasors, &asked).unwrap_or(phasors)
+    };
+    write(&phasors, &args.outputs, streams)?;
+    Ok(Exit::Done)
+}
+
+/// `circ sim` of a netlist with `.ac` and without `.tran`.
+///
+/// # Errors
+/// See [`Failure`].
+pub(super) fn sim(args: &SimArgs, model: &Model, streams: &Streams) -> Result<Exit, Failure> {
+    for path in &args.results.outputs {
+        Format::of(path)?;
+    }
+    let phasors = phasors(&args.input, model, &SmallSignalOptions::default(), streams)?;
+    write(&phasors, &args.results.outputs, streams)?;
+    Ok(Exit::Done)
+}
+
+/// The response of all signals; notes are told.
+fn phasors(
+    input: &Input,
+    model: &Model,
+    options: &SmallSignalOptions<'_>,
+    streams: &Streams,
+) -> Result<Phasors, Failure> {
+    if !model.circuit().steps.is_empty() {
+        streams.say("note: `.step` is left out: this is the response of the values as they stand");
+    }
+    let found = small_signal(model, options);
+    let response =
+        found.map_err(|error| input::broke_off(input, &error, model.places(), streams))?;
+    for note in model.places().all(&response.notes) {
+        streams.say(format!("note: {note}"));
+    }
+    if streams.verbose {
+        streams.say(match &response.orbit {
+            Some(orbit) => text::orbit(orbit),
+            None => "about the operating point".into(),
+        });
+    }
+    Ok(response.phasors)
+}
+
+/// The margins of ratios without a unit, in words.
+fn tell_margins(phasors: &Phasors, streams: &Streams) {
+    for (j, name) in phasors.names.iter().enumerate() {
+        if !phasors.units[j].is_empty() || name.contains('@') {
+            continue;
+        }
+        for margin in margins(phasors, j) {
+            streams.say(format!("{name}: margin {}", bode::words(&margin)));
+        }
+    }
+}
+
+/// Writes the files, or without any CSV to standard output, and tells the margins.
+fn write(phasors: &Phasors, outputs: &[PathBuf], streams: &Streams) -> Result<(), Failure> {
+    tell_margins(phasors, streams);
+    if outputs.is_empty() {
+        let mut out = streams.out();
+        phasors.write_csv(&mut out)?;
+        out.flush()?;
+    }
+    for path in outputs {
+        let mut bytes = Cursor::new(Vec::new());
+        match Format::of(path)? {
+            Format::Csv => phasors.write_csv(&mut bytes)?,
+            Format::Raw => phasors.write_raw(&mut bytes)?,
+            Format::Npz => phasors.write_npz(&mut bytes)?,
+            Format::Json => phasors.write_json(&mut bytes)?,
+            Format::Svg | Format::Png => {
+                output::picture_to_file(path, &svg::draw(&bode::figure(phasors))?)?;
+                continue;
+            }
+            Format::Html => {
+                let page = html::sheet(&bode::figure(phasors), "")?;
+                bytes.get_mut().extend_from_slice(page.as_bytes());
+            }
+        }
+        files::write(path, bytes.get_ref())?;
+    }
+    Ok(())
+}

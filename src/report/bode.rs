@@ -1,0 +1,84 @@
+//! Bode pictures: gain in decibels above, phase in degrees below, over the logarithm of the frequency.
+
+use super::figure::{Axis, Figure, Panel, Series};
+use super::si;
+use crate::analysis::{Left, Margin, margins, unwrapped};
+use crate::waveform::Phasors;
+
+/// Decibels below which a gain is drawn as this.
+const LOWEST: f64 = -400.0;
+
+/// Gain and phase of all columns; of ratios without a unit their margins, marked where they are.
+#[must_use]
+pub fn figure(of: &Phasors) -> Figure {
+    let positive = |k: &usize| of.frequency[*k] > 0.0;
+    let rows: Vec<usize> = (0..of.frequency.len()).filter(positive).collect();
+    let (mut gains, mut phases) = (Vec::new(), Vec::new());
+    for (j, name) in of.names.iter().enumerate() {
+        let gain: Vec<f64> = of
+            .column(j)
+            .map(|value| (20.0 * value.norm().log10()).max(LOWEST))
+            .collect();
+        let phase = unwrapped(of.column(j));
+        let curve = |values: &[f64]| Series {
+            name: name.clone(),
+            points: rows
+                .iter()
+                .map(|&k| (of.frequency[k].log10(), values[k]))
+                .collect(),
+        };
+        gains.push(curve(&gain));
+        phases.push(curve(&phase));
+    }
+    for (j, name) in of.names.iter().enumerate() {
+        if !of.units[j].is_empty() || name.contains('@') {
+            continue;
+        }
+        for margin in margins(of, j) {
+            let x = margin.frequency.log10();
+            let (panel, from, to) = match margin.left {
+                Left::Phase(left) => {
+                    let at = below_phase(&phases[j], x);
+                    (&mut phases, at, at - left)
+                }
+                Left::Gain(left) => (&mut gains, -left, 0.0),
+            };
+            panel.push(Series {
+                name: words(&margin),
+                points: vec![(x, from), (x, to)],
+            });
+        }
+    }
+    let panel = |quantity: &str, unit, series| Panel {
+        quantity: quantity.into(),
+        unit,
+        series,
+    };
+    Figure {
+        title: of.title.clone(),
+        axis: Axis::Frequency,
+        panels: vec![panel("gain", "dB", gains), panel("phase", "°", phases)],
+    }
+}
+
+/// A curve's value at x, by a straight line.
+fn below_phase(curve: &Series, x: f64) -> f64 {
+    let after = curve.points.iter().position(|(own, _)| *own >= x);
+    match after {
+        Some(k) if k > 0 => {
+            let ((a, from), (b, to)) = (curve.points[k - 1], curve.points[k]);
+            from + (to - from) * (x - a) / (b - a)
+        }
+        _ => curve.points.first().map_or(0.0, |(_, y)| *y),
+    }
+}
+
+/// A margin, for a legend: `52.1° at 10.2 kHz`.
+#[must_use]
+pub fn words(margin: &Margin) -> String {
+    let at = si::quantity(margin.frequency, "Hz", 4);
+    match margin.left {
+        Left::Phase(left) => format!("{}° at {at}", si::plain(left, 4)),
+        Left::Gain(left) => format!("{} dB at {at}", si::plain(left, 4)),
+    }
+}

@@ -1,0 +1,246 @@
+//! Small-signal responses against closed forms.
+#![allow(missing_docs, reason = "tests")]
+
+use circ::analysis::{
+    About, PeriodicOptions, Response, SmallSignalOptions, orbit_start, periodic, small_signal,
+};
+use circ::integrate::Reason;
+use circ::{Model, SimOptions};
+use nalgebra::Complex;
+
+fn response_of(text: &str, options: &SmallSignalOptions<'_>) -> Response {
+    let model = Model::parse(text, "t.cir").expect("a circuit");
+    small_signal(&model, options).expect("a response")
+}
+
+fn column(response: &Response, name: &str) -> Vec<Complex<f64>> {
+    let at = response.phasors.names.iter().position(|n| n == name);
+    response.phasors.column(at.expect("a column")).collect()
+}
+
+/// |found − true| at each frequency relative to the largest |true|.
+fn apart(found: &[Complex<f64>], truth: impl Fn(f64) -> Complex<f64>, at: &[f64]) -> f64 {
+    let truth: Vec<Complex<f64>> = at.iter().map(|f| truth(*f)).collect();
+    let pairs = found.iter().zip(&truth);
+    pairs.fold(0.0, |m, (a, b)| f64::max(m, (a - b).norm() / b.norm()))
+}
+
+const J: Complex<f64> = Complex::new(0.0, 1.0);
+const TAU: f64 = std::f64::consts::TAU;
+
+/// The filter of a buck, v(3)/v(2): L with its resistance in series, C with its own, R.
+fn filter(f: f64) -> Complex<f64> {
+    let s = J * (TAU * f);
+    let capacitor = 0.02 + 1.0 / (s * 10e-6);
+    let load = 1.0 / (1.0 / capacitor + 1.0 / 5.0);
+    load / (load + s * 100e-6 + 0.05)
+}
+
+/// A synchronous buck whose switches compare a control with a sawtooth: D = 0.4 at 100 kHz.
+fn buck(input: &str, control: &str, card: &str) -> String {
+    format!(
+        "buck\nv1 1 0 10 {input}\ns1 1 2 vc saw sw\ns2 2 0 saw vc sw\nl1 2 a 100u\nrl a 3 0.05\nrc 3 b 0.02\nc1 b 0 10u\nr1 3 0 5\n\
+         vc vc 0 0.4 {control}\nvsaw saw 0 pulse(0 1 0 10u 0 0 10u)\n.model sw sw(vt=0 vh=0 ron=0 ideal=1)\n\
+         .ac {card}\n.save v(3) i(l1) v(2)\n.end\n"
+    )
+}
+
+#[test]
+fn a_linear_circuit_is_its_transfer_function() {
+    let text = "rlc\nv1 2 0 0 ac 2 30\nl1 2 a 100u\nrl a 3 0.05\nrc 3 b 0.02\nc1 b 0 10u\nr1 3 0 5\n.ac dec 7 1 100meg\n.end\n";
+    let response = response_of(text, &SmallSignalOptions::default());
+    assert_eq!(
+        (response.about, response.phasors.frequency.len()),
+        (About::Rest, 57)
+    );
+    let drive = Complex::from_polar(2.0, 30f64.to_radians());
+    let out = column(&response, "v(3)");
+    let error = apart(&out, |f| drive * filter(f), &response.phasors.frequency);
+    assert!(error < 1e-12, "{error:e}");
+}
+
+/// Natural sampling moves the edge at t_k by T δd(t_k): pulses of area V T δd, whose baseband is V δd whatever the frequency.
+#[test]
+fn the_control_of_a_buck_with_natural_sampling_acts_through_its_filter_beyond_the_switching_frequency()
+ {
+    let response = response_of(
+        &buck("", "ac 1", "dec 9 10 1meg"),
+        &SmallSignalOptions::default(),
+    );
+    assert_eq!(response.about, About::Orbit);
+    let out = column(&response, "v(3)");
+    let error = apart(&out, |f| 10.0 * filter(f), &response.phasors.frequency);
+    assert!(error < 1e-9, "{error:e}");
+    // The edges of the switching node move, and nothing else of it does.
+    let node = column(&response, "v(2)");
+    let error = apart(&node, |_| Complex::from(10.0), &response.phasors.frequency);
+    assert!(error < 1e-9, "{error:e}");
+}
+
+/// The input acts through q(t) = Σ c_k e^{jkω_s t}, c_k = sin(πkD)/(πk) e^{−jπkD}.
+#[test]
+fn the_input_of_a_buck_acts_in_sidebands() {
+    let options = SmallSignalOptions {
+        sidebands: 3,
+        ..SmallSignalOptions::default()
+    };
+    let response = response_of(&buck("ac 1", "", "dec 9 10 1.1meg"), &options);
+    for k in -3..=3_i32 {
+        let name = if k == 0 {
+            "v(3)".to_string()
+        } else {
+            format!("v(3)@{k}")
+        };
+        let out = column(&response, &name);
+        let truth = |f: f64| {
+            let x = std::f64::consts::PI * f64::from(k);
+            let part = if k == 0 {
+                Complex::from(0.4)
+            } else {
+                (x * 0.4).sin() / x * (-J * x * 0.4).exp()
+            };
+            part * filter(f + f64::from(k) * 1e5)
+        };
+        let error = apart(&out, truth, &response.phasors.frequency);
+        assert!(error < 1e-9, "{k}: {error:e}");
+    }
+}
+
+/// A buck whose diode ends the current in each period.
+fn discontinuous(control: &str, last: &str) -> String {
+    format!(
+        "buck\nv1 1 0 12\ns1 1 2 vc saw sw\nd1 0 2 d\nl1 2 3 4.7u\nrc 3 b 0.03\nc1 b 0 10u\nr1 3 0 50\nvc vc 0 {control}\n\
+         vsaw saw 0 pulse(0 2 0 10u 0 0 10u)\n.model sw sw(vt=0 vh=0 ron=10m roff=1meg)\n.model d d(ron=10m roff=1meg vfwd=0.4)\n\
+         .save v(3)\n{last}\n.end\n"
+    )
+}
+
+/// What a sine of ±1e-4 V makes of an orbit of four switching periods: half the difference of the two, at its frequency.
+#[test]
+fn a_buck_in_discontinuous_conduction_responds_as_orbits_with_a_small_sine() {
+    let (f, size, periods) = (75e3, 1e-4, 4.0);
+    let response = response_of(
+        &discontinuous("0.8 ac 1", &format!(".ac list {f}")),
+        &SmallSignalOptions::default(),
+    );
+    let found = column(&response, "v(3)")[0];
+    let part = |sign: f64| {
+        let sine = format!("sin(0.8 {} {f} 0 0 0)", sign * size);
+        let model =
+            Model::parse(&discontinuous(&sine, ".tran 2.5n 1m"), "t.cir").expect("a circuit");
+        let options = PeriodicOptions {
+            events: true,
+            ..PeriodicOptions::default()
+        };
+        let (orbit, run) = periodic(&model, &options).expect("an orbit");
+        assert!(
+            (orbit.period / (periods * 1e-5) - 1.0).abs() < 1e-12,
+            "{orbit:?}"
+        );
+        let rows: Vec<(f64, Complex<f64>)> = (run.waveforms.time.iter())
+            .zip(run.waveforms.column(0))
+            .map(|(t, v)| (*t, v * (-J * TAU * f * *t).exp()))
+            .collect();
+        let trapezoids = rows
+            .windows(2)
+            .map(|w| (w[0].1 + w[1].1) * (0.5 * (w[1].0 - w[0].0)));
+        trapezoids.sum::<Complex<f64>>() / orbit.period
+    };
+    let truth = (part(1.0) - part(-1.0)) * J / size;
+    assert!(
+        (found - truth).norm() < 1e-5 * truth.norm(),
+        "{found} {truth}"
+    );
+}
+
+/// An exponential diode is its tangent: R in series with r = nV_T/(I + IS) at the current I of the operating point.
+#[test]
+fn a_diode_is_its_tangent_at_the_operating_point() {
+    let text = "d\nv1 1 0 dc 5 ac 1\nr1 1 2 1k\nd1 2 0 d\nc1 2 0 10n\n.model d d(is=1e-14 n=1.5)\n.ac dec 5 10 10meg\n.save v(2)\n.end\n";
+    let response = response_of(text, &SmallSignalOptions::default());
+    let point = Model::parse(text, "t.cir")
+        .unwrap()
+        .operating_point()
+        .unwrap();
+    let current = point
+        .currents
+        .iter()
+        .find(|(name, _)| name == "d1")
+        .unwrap()
+        .1;
+    let thermal = 1.380_649e-23 * 300.15 / 1.602_176_634e-19;
+    let diode = 1.5 * thermal / (current + 1e-14);
+    let out = column(&response, "v(2)");
+    let truth = |f: f64| 1.0 / (1.0 + 1e3 / diode + J * TAU * f * 1e3 * 10e-9);
+    let error = apart(&out, truth, &response.phasors.frequency);
+    assert!(error < 1e-9, "{error:e}");
+}
+
+/// Where the orbit ends in the operating point, or the switch does not move, the two ways are one.
+#[test]
+fn about_an_orbit_without_events_is_about_the_operating_point() {
+    let card = "r1 1 2 1k\nc1 2 0 1u\nd1 2 3 d\nr2 3 0 2k\n.model d d(ron=1 vfwd=0.5 roff=1meg)\n.ac dec 3 1 1meg\n.tran 1u 1m\n.save v(2)\n.end\n";
+    let still = format!("t\nv1 1 0 dc 5 ac 1\n{card}");
+    // A second source that repeats and does nothing makes an orbit of it.
+    let moving = format!("t\nv1 1 0 dc 5 ac 1\nv2 4 0 sin(0 1 1k)\nr4 4 0 1k\n{card}");
+    let a = response_of(&still, &SmallSignalOptions::default());
+    let b = response_of(&moving, &SmallSignalOptions::default());
+    assert_eq!((a.about, b.about), (About::Rest, About::Orbit));
+    for (a, b) in column(&a, "v(2)").iter().zip(column(&b, "v(2)")) {
+        assert!((a - b).norm() < 1e-12 * a.norm(), "{a} {b}");
+    }
+}
+
+#[test]
+fn what_has_no_response_is_refused_with_a_reason() {
+    let refused = |text: &str| {
+        let model = Model::parse(text, "t.cir").expect("a circuit");
+        match small_signal(&model, &SmallSignalOptions::default()) {
+            Err(error) => error,
+            Ok(_) => panic!("{text}"),
+        }
+    };
+    let without_card = refused("t\nv1 1 0 1 ac 1\nr1 1 0 1\n.end\n");
+    assert!(
+        without_card.to_string().contains(".ac dec"),
+        "{without_card}"
+    );
+    let without_source = refused("t\nv1 1 0 1\nr1 1 0 1\n.ac dec 1 1 10\n.end\n");
+    assert!(
+        without_source.to_string().contains("AC"),
+        "{without_source}"
+    );
+    // A tank without loss has no response at its own frequency: L = C = 1/(2π).
+    let tank = refused(
+        "t\ni1 0 1 0 ac 1\nl1 1 0 0.15915494309189535\nc1 1 0 0.15915494309189535\n.ac list 1\n.end\n",
+    );
+    assert!(matches!(tank.reason, Reason::NotSmooth(_)), "{tank}");
+    // Steps have no derivative here.
+    let curved = refused(
+        "t\nv1 1 0 sin(0 5 1k)\nv2 2 1 0 ac 1\nd1 2 3 d\nr1 3 0 1k\nc1 3 0 1u\n.model d d(is=1e-14)\n.ac dec 1 1 10\n.tran 1u 5m\n.end\n",
+    );
+    assert!(matches!(curved.reason, Reason::NotSmooth(_)), "{curved}");
+}
+
+/// A load that doubles at 20 µs: until then nothing moves from period to period.
+#[test]
+fn a_transient_starts_at_the_orbit_and_a_step_follows() {
+    let text = "buck\nv1 1 0 10\ns1 1 2 g 0 sw\nd1 0 2 d\nl1 2 3 20u\nc1 3 0 4.7u\nr1 3 0 3\ni1 3 0 pulse(0 1 200u 0 0 1 2)\n\
+                vg g 0 pulse(0 1 0 0 0 4u 10u)\n.model sw sw(vt=0.5 vh=0 ron=10m roff=1meg)\n.model d d(ron=10m roff=1meg)\n\
+                .tran 10u 400u\n.save v(3) i(l1)\n.end\n";
+    let model = Model::parse(text, "t.cir").expect("a circuit");
+    let (orbit, start) = orbit_start(&model, &PeriodicOptions::default()).expect("an orbit");
+    assert!(orbit.stable && (orbit.period - 1e-5).abs() < 1e-18);
+    let options = SimOptions {
+        start: Some(start),
+        ..SimOptions::default()
+    };
+    let run = model.transient(options).expect("a run");
+    let (first, last) = (run.waveforms.row(0), run.waveforms.row(40));
+    for k in 1..=20 {
+        for (a, b) in run.waveforms.row(k).iter().zip(first) {
+            assert!((a - b).abs() < 1e-11 * b.abs(), "{k}: {a} {b}");
+        }
+    }
+    assert!(last[1] > first[1] + 0.5, "{last:?} {first:?}");
+}
