@@ -31,7 +31,7 @@ impl Accumulation {
             first_interval: f64::INFINITY,
             interval: f64::INFINITY,
             count: 0,
-            latest: VecDeque::with_capacity(EVENTS_OF_BURST),
+            latest: VecDeque::new(),
         }
     }
 

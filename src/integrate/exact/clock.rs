@@ -27,6 +27,32 @@ impl Line {
     }
 }
 
+/// A control at one time and as it goes on.
+struct Course {
+    /// Where the first of its pieces ends, s.
+    end: f64,
+    value: f64,
+    slope: f64,
+    /// What the value, with the resolution of its time, and the slope are summed from.
+    size: f64,
+    steepness: f64,
+}
+
+impl Course {
+    /// Whether a switch leaves position `on` with it.
+    fn leaves(&self, threshold: &Threshold, on: bool) -> bool {
+        let known = |value, size| Known {
+            value,
+            noise: CONTROL_ROUNDINGS * f64::EPSILON * size,
+        };
+        threshold.leaves(
+            on,
+            known(self.value, self.size),
+            known(self.slope, self.steepness),
+        )
+    }
+}
+
 /// A switch whose control is a constant plus multiples of straight sources.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Clock {
@@ -72,42 +98,31 @@ impl Clock {
         }
     }
 
-    /// The control on the present pieces.
-    pub(crate) fn control(&self, t: f64) -> f64 {
-        let terms = self
-            .terms
-            .iter()
-            .map(|(_, factor, line)| factor * (line.constant + line.slope * (t - line.origin)));
-        self.constant + terms.sum::<f64>()
-    }
-
-    fn slope(&self) -> f64 {
-        let terms = self.terms.iter();
-        terms.map(|(_, factor, line)| factor * line.slope).sum()
+    /// The control on the present pieces, from t on.
+    fn course(&self, t: f64) -> Course {
+        let mut course = Course {
+            end: f64::INFINITY,
+            value: 0.0,
+            slope: 0.0,
+            size: self.constant.abs(),
+            steepness: 0.0,
+        };
+        for (_, factor, line) in &self.terms {
+            let (slope, since) = (factor * line.slope, t - line.origin);
+            course.value += factor * (line.constant + line.slope * since);
+            course.slope += slope;
+            course.size += (factor * line.constant).abs() + (slope * since).abs();
+            course.steepness += slope.abs();
+            course.end = course.end.min(line.end);
+        }
+        course.value += self.constant;
+        course.size += course.steepness * t.abs();
+        course
     }
 
     /// Whether the switch leaves position `on` right after t on the present pieces.
     pub(crate) fn leaves(&self, threshold: &Threshold, on: bool, t: f64) -> bool {
-        let (mut size, mut steepness) = (self.constant.abs(), 0.0);
-        for (_, factor, line) in &self.terms {
-            let slope = (factor * line.slope).abs();
-            size += (factor * line.constant).abs() + slope * (t - line.origin).abs();
-            steepness += slope;
-        }
-        let control = Known {
-            value: self.control(t),
-            noise: CONTROL_ROUNDINGS * f64::EPSILON * (size + steepness * t.abs()),
-        };
-        let slope = Known {
-            value: self.slope(),
-            noise: CONTROL_ROUNDINGS * f64::EPSILON * steepness,
-        };
-        threshold.leaves(on, control, slope)
-    }
-
-    fn end(&self) -> f64 {
-        let ends = self.terms.iter().map(|(_, _, line)| line.end);
-        ends.fold(f64::INFINITY, f64::min)
+        self.course(t).leaves(threshold, on)
     }
 
     /// Finds when the switch next moves after t, if that is not known; nothing matters after `until`.
@@ -136,17 +151,19 @@ impl Clock {
         (mut t, until): (f64, f64),
         sources: &[Source],
     ) -> f64 {
+        let mut course = self.course(t);
         loop {
-            let end = self.end();
+            let Course {
+                end, value, slope, ..
+            } = course;
             if end > t {
-                let slope = self.slope();
                 let (level, towards) = if self.on {
                     (threshold.off_below, slope < 0.0)
                 } else {
                     (threshold.on_above, slope > 0.0)
                 };
                 if towards {
-                    let passage = t + ((level - self.control(t)) / slope).max(0.0);
+                    let passage = t + ((level - value) / slope).max(0.0);
                     if passage < end {
                         return passage;
                     }
@@ -166,7 +183,8 @@ impl Clock {
                     }
                 }
             }
-            if self.leaves(threshold, self.on, t) {
+            course = self.course(t);
+            if course.leaves(threshold, self.on) {
                 return t;
             }
         }
@@ -272,7 +290,7 @@ mod tests {
         assert_eq!(moves, [1.25, 3.5, 6.25, 8.5, 11.25]);
         // From another position at another time.
         clock.stand_at(&sources, 2.0);
-        assert_eq!(clock.control(2.0), 1.0);
+        assert_eq!(clock.course(2.0).value, 1.0);
         clock.look_ahead(&threshold, true, (2.0, 12.0), &sources);
         assert_eq!(clock.next, 3.5);
     }

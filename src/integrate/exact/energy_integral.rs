@@ -192,7 +192,8 @@ impl EnergyIntegral {
         for (&j, column) in self.seen.iter().zip(self.factors.chunks_exact(factors)) {
             // w_j at the nodes, then its part of the factors.
             let w = series.component(j, s);
-            for (value, &factor) in values.iter_mut().zip(column) {
+            let factors = values.iter_mut().zip(column);
+            for (value, &factor) in factors.filter(|(_, factor)| **factor != 0.0) {
                 for p in 0..POINTS {
                     value[p] += factor * w[p];
                 }

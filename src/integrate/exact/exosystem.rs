@@ -236,6 +236,26 @@ impl Exosystem {
         &self.rates
     }
 
+    /// Appends z' = S z.
+    pub(crate) fn rates_at(&self, z: &[f64], rates: &mut Vec<f64>) {
+        let rate = |k: usize| match self.columns[k] {
+            Column::Line { .. } => z[k + 1],
+            Column::Wave { damping, omega, .. } | Column::Shared { damping, omega } => {
+                let turned = if omega == 0.0 { 0.0 } else { omega * z[k + 1] };
+                turned - damping * z[k]
+            }
+            // Of the wave before it.
+            Column::Quadrature => match self.columns[k - 1] {
+                Column::Wave { damping, omega, .. } | Column::Shared { damping, omega } => {
+                    -omega * z[k - 1] - damping * z[k]
+                }
+                _ => 0.0,
+            },
+            Column::One | Column::Step { .. } | Column::Slope { .. } => 0.0,
+        };
+        rates.extend((0..self.columns.len()).map(rate));
+    }
+
     /// The piece that input i stands on.
     pub(crate) fn piece(&self, input: usize) -> &Piece {
         &self.pieces[input]
@@ -374,7 +394,13 @@ mod tests {
             }
             exosystem.write(t, z.as_mut_slice());
             let u = exosystem.output() * &z;
-            let du = exosystem.output() * (exosystem.generator() * &z);
+            let dz = exosystem.generator() * &z;
+            let mut rates = Vec::new();
+            exosystem.rates_at(z.as_slice(), &mut rates);
+            for (rate, expected) in rates.iter().zip(dz.iter()) {
+                assert!((rate - expected).abs() <= 1e-15 * expected.abs(), "{rate}");
+            }
+            let du = exosystem.output() * dz;
             for (i, source) in sources.iter().enumerate() {
                 assert!(
                     (u[i] - source.value(t)).abs() < 1e-14 * 8.0,

@@ -103,7 +103,7 @@ impl Inspector {
         for (size, w) in self.sizes.iter_mut().zip(&self.w) {
             *size = size.max(w.abs());
         }
-        self.read_rates(mode, time);
+        self.read_rates(mode, (exosystem, z), time);
         let undisturbed = mode.constraints.is_empty() && self.slips.is_empty();
         if undisturbed && mode.magnitudes.cover(&self.sizes) {
             let (g, slopes) = self.w[mode.flow.dim()..].split_at(mode.flow.guards());
@@ -129,13 +129,9 @@ impl Inspector {
         if broken {
             return Finding::Inconsistent;
         }
-        let magnitudes = &mut mode.magnitudes;
-        magnitudes.sizes.clone_from(sizes);
         // Waves count with their amplitudes: they come back.
-        exosystem.envelope(z, &mut magnitudes.sizes[mode.n..]);
-        mode.flow.noise(&magnitudes.sizes, &mut magnitudes.noise);
-        magnitudes.uses = 0;
-        magnitudes.find_followers(&mode.flow);
+        let waves = |sizes: &mut [f64]| exosystem.envelope(z, sizes);
+        mode.magnitudes.take(&mode.flow, sizes, waves);
         if !self.rates.is_empty() {
             mode.jets.values(&self.rates, &mut self.drifts);
         }
@@ -169,12 +165,12 @@ impl Inspector {
 
     /// How far w moves in `mode` with the pace within the resolution of the time. Where a transient begins with the mode, its slope says
     /// nothing of the past.
-    fn read_rates(&mut self, mode: &Mode, time: f64) {
+    fn read_rates(&mut self, mode: &Mode, sources: (&Exosystem, &[f64]), time: f64) {
         self.rates.clear();
         if self.pace.is_empty() {
             return;
         }
-        mode.rates_from(&self.pace, &self.w, &mut self.rates, &mut self.work);
+        mode.rates_from(&self.pace, sources, &mut self.rates, &mut self.work);
         for rate in &mut self.rates {
             *rate *= time;
         }

@@ -22,7 +22,9 @@ pub(crate) struct Magnitudes {
     /// Where they do: one manifold for each [level](LEVEL) of their ages, the fastest alone first, found when a guard asks for them.
     pub(crate) manifolds: Vec<Manifold>,
     /// How often it was enough to look at these since.
-    pub(super) uses: u32,
+    uses: u32,
+    /// What they were taken from.
+    taken: Vec<f64>,
     work: Vec<f64>,
 }
 
@@ -32,6 +34,21 @@ impl Magnitudes {
         let slowest = manifold.len().checked_sub(1);
         let slowest = slowest.and_then(|k| self.followers.get(k));
         slowest.map_or(0.0, |follower| follower.age)
+    }
+
+    /// Takes them from |w| ≤ `sizes`, of which `waves` raises those of the sources to what they come back to. The same sizes make the same.
+    pub(super) fn take(&mut self, flow: &Flow, sizes: &[f64], waves: impl Fn(&mut [f64])) {
+        self.uses = 0;
+        if self.taken == sizes {
+            return;
+        }
+        for known in [&mut self.taken, &mut self.sizes] {
+            known.clear();
+            known.extend_from_slice(sizes);
+        }
+        waves(&mut self.sizes[flow.states()..]);
+        flow.noise(&self.sizes, &mut self.noise);
+        self.find_followers(flow);
     }
 
     /// Whether w is of no other size than it was.
@@ -48,7 +65,7 @@ impl Magnitudes {
     }
 
     /// Finds which states follow the others.
-    pub(super) fn find_followers(&mut self, flow: &Flow) {
+    fn find_followers(&mut self, flow: &Flow) {
         self.followers.clear();
         flow.sizes_of_rates(&self.sizes, &mut self.work);
         let generator = flow.generator();

@@ -393,6 +393,16 @@ impl Mode {
         }
     }
 
+    /// How large the storage can be where w has these sizes.
+    pub(crate) fn sizes_of_storage(&self, sizes: &[f64], largest: &mut Vec<f64>) {
+        if self.keeps {
+            largest.clear();
+            largest.extend_from_slice(&sizes[..self.n]);
+        } else {
+            self.storage.largest(sizes, largest);
+        }
+    }
+
     /// How large x can be where the storage has these sizes, but for what does not follow from it.
     pub(crate) fn sizes_of_state(&self, storage: &[f64], sizes: &mut Vec<f64>) {
         if self.keeps {
@@ -409,11 +419,11 @@ impl Mode {
         self.storage_at(work, s);
     }
 
-    /// w' at w where the storage moves as fast as this.
+    /// w' where the storage moves as fast as this and the exosystem is at z.
     pub(crate) fn rates_from(
         &self,
         storage: &[f64],
-        w: &[f64],
+        (exosystem, z): (&Exosystem, &[f64]),
         rates: &mut Vec<f64>,
         work: &mut Vec<f64>,
     ) {
@@ -423,8 +433,7 @@ impl Mode {
         } else {
             self.inject.values(storage, rates);
         }
-        self.flow.rates_of(w, work);
-        rates.extend_from_slice(&work[self.n..]);
+        exosystem.rates_at(z, rates);
         self.settle(rates, work);
     }
 

@@ -110,11 +110,20 @@ impl Report {
         }
         let closed = &table.modes[at].key.closed;
         let is = |pair: usize| closed.get(pair).copied().unwrap_or(true);
-        for (k, side) in [true, false].into_iter().enumerate() {
+        for (largest, stored) in self.largest.iter_mut().zip(stored) {
+            *largest = largest.max(stored);
+        }
+        let mut negative = false;
+        for (pair, g) in sides.clone() {
+            let largest = &mut self.largest[usize::from(!is(pair))];
+            *largest = largest.max(g.abs());
+            negative |= g < 0.0;
+        }
+        if !negative {
+            return;
+        }
+        for (side, largest) in [true, false].into_iter().zip(self.largest) {
             let guards = sides.clone().filter(|(pair, _)| is(*pair) == side);
-            let start = self.largest[k].max(stored[k]);
-            let largest = guards.clone().fold(start, |a, (_, g)| a.max(g.abs()));
-            self.largest[k] = largest;
             let mut wrong = guards.filter(|(_, g)| *g < -WRONG_SIDE * largest);
             let Some((device, g)) = wrong.find_map(|(pair, g)| Some((table.device(pair)?, g)))
             else {

@@ -409,8 +409,7 @@ impl Exact {
                 Ok(())
             }
             Err(error) => {
-                (self.storage.values, self.storage.scale) = (values, scale);
-                self.storage.known = known;
+                self.storage.restore(values, scale, known);
                 (self.storage.balance, self.wanted) = (balance, Some(switches));
                 log.back_to(events, impulses);
                 Err(error)

@@ -92,10 +92,15 @@ impl Storage {
             let largest = &mut largest[usize::from(volts)];
             *largest = largest.max(s.abs()).max(scale);
         }
+        let mut raised = false;
         for (&volts, scale) in self.volts.iter().zip(&mut self.scale) {
-            *scale = largest[usize::from(volts)];
+            let largest = largest[usize::from(volts)];
+            raised |= *scale != largest;
+            *scale = largest;
         }
-        self.capacity = stored(&self.metric, &self.scale);
+        if raised {
+            self.capacity = stored(&self.metric, &self.scale);
+        }
         self.known.clone_from(&self.scale);
     }
 
@@ -106,13 +111,13 @@ impl Storage {
         mode.storage_at(&travel.now, &mut self.values);
         // An event often finds a current at zero: its size is what it was on the way.
         travel.reach(&mut self.reach);
-        mode.storage.largest(&self.reach, &mut self.largest);
+        mode.sizes_of_storage(&self.reach, &mut self.largest);
         for (scale, largest) in self.scale.iter_mut().zip(&self.largest) {
             *scale = scale.max(*largest);
         }
         self.rescale();
         if travel.known(&mut self.reach) {
-            mode.storage.largest(&self.reach, &mut self.largest);
+            mode.sizes_of_storage(&self.reach, &mut self.largest);
             for (known, largest) in self.known.iter_mut().zip(&self.largest) {
                 if *largest <= SLAVED * *known {
                     *known = *largest;
@@ -120,6 +125,12 @@ impl Storage {
             }
         }
         self.note_stored();
+    }
+
+    /// Stands where it stood before.
+    pub(super) fn restore(&mut self, values: Vec<f64>, scale: Vec<f64>, known: Vec<f64>) {
+        self.capacity = stored(&self.metric, &scale);
+        (self.values, self.scale, self.known) = (values, scale, known);
     }
 
     /// Takes over the values of another method.

@@ -21,13 +21,11 @@ fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// A count as a number: of 128 bits that is a call.
+/// A count as a number: of 128 bits at once that is a call.
 #[inline]
 fn float(count: u128) -> f64 {
-    match u64::try_from(count) {
-        Ok(count) => count as f64,
-        Err(_) => count as f64,
-    }
+    let [low, high] = [count as u64, (count >> u64::BITS) as u64];
+    high as f64 * (1_u128 << u64::BITS) as f64 + low as f64
 }
 
 /// As [`f64::min`] where neither is NaN.
@@ -235,9 +233,12 @@ impl Travel {
     /// How large what w was rounded from is by now, where some states follow others: what they were before has decayed, and its rounding
     /// with it.
     pub(crate) fn known(&self, known: &mut Vec<f64>) -> bool {
+        if self.following == 0 {
+            return false;
+        }
         known.clone_from(&self.amplitude);
         self.take_followers(known);
-        self.following > 0
+        true
     }
 
     /// Takes the states that follow others by now as large as they are.
