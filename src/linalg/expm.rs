@@ -237,6 +237,9 @@ pub(crate) fn balance(a: &DMatrix<f64>, h: f64) -> Vec<f64> {
                 } else {
                     1.0
                 }
+            } else if (0.6..=1.6).contains(&(row / column)) {
+                // Nearest to the power 0.
+                1.0
             } else {
                 power_of_two((row / column).sqrt())
             };

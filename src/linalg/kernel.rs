@@ -46,8 +46,13 @@ impl Kernel {
 
     /// The entries of column j from row `first` on.
     fn set_column(&mut self, first: usize, j: usize, values: &[f64]) {
-        for (i, &value) in (first..).zip(values) {
-            self.blocks[i / BLOCK * self.columns + j][i % BLOCK] = value;
+        let (mut at, mut lane) = (first / BLOCK * self.columns + j, first % BLOCK);
+        for &value in values {
+            self.blocks[at][lane] = value;
+            lane += 1;
+            if lane == BLOCK {
+                (at, lane) = (at + self.columns, 0);
+            }
         }
     }
 

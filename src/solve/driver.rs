@@ -9,7 +9,7 @@ use super::lemke::{self, Lemke};
 use super::parts::Parts;
 use super::{convex, norm, pivot};
 use crate::settings::tolerances::complementarity::{NOTHING_TO_GAIN, SLACK};
-use crate::settings::tolerances::ranks::EIGENVALUE;
+use crate::settings::tolerances::ranks::{EIGENVALUE, RANK};
 
 /// Factored active sets kept per matrix; the oldest goes first.
 const KEPT_SETS: usize = 64;
@@ -24,6 +24,8 @@ pub struct Driver {
     /// What q' is uncertain by.
     noise: DVector<f64>,
     monotone: bool,
+    /// Whether M + Mᵀ ≻ 0 so clearly that no solution has another beside it.
+    definite: bool,
     warm: Vec<bool>,
     sets: Vec<(Vec<bool>, ActiveSolve)>,
     /// Where M falls into parts; these then do everything.
@@ -55,7 +57,7 @@ impl Driver {
             m,
             q: DVector::zeros(size),
         });
-        let monotone = is_monotone(&scaled.m);
+        let (monotone, definite) = definiteness(&scaled.m);
         Self {
             parts: Parts::of(&scaled.m, tolerance),
             scaled,
@@ -63,6 +65,7 @@ impl Driver {
             tolerance,
             noise: DVector::zeros(size),
             monotone,
+            definite,
             warm: vec![false; size],
             sets: Vec::new(),
             lawful: None,
@@ -242,6 +245,9 @@ impl Driver {
         let regular = self.on_set(&solution.basis).regular;
         if !self.monotone || (strict && regular) {
             return as_it_is(regular);
+        }
+        if self.definite {
+            return as_it_is(true);
         }
         let least = norm::least(&self.scaled, &scaled, &units, others);
         let basis = solution.basis.clone();
@@ -443,11 +449,17 @@ fn covers(size: usize) -> [DVector<f64>; 3] {
     ]
 }
 
-/// Whether M + Mᵀ has no eigenvalue below −[`EIGENVALUE`] times its largest.
-fn is_monotone(m: &DMatrix<f64>) -> bool {
+/// Whether M + Mᵀ has no eigenvalue below −[`EIGENVALUE`] times its largest, and whether the [kernel](norm) of it and of any q in its
+/// units, |q_j| ≤ 1, is empty: then the least singular value of both is above [`RANK`] times the largest.
+fn definiteness(m: &DMatrix<f64>) -> (bool, bool) {
     if m.is_empty() {
-        return true;
+        return (true, true);
     }
     let eigenvalues = (m + m.transpose()).symmetric_eigenvalues();
-    eigenvalues.min() >= -EIGENVALUE * m.amax().max(eigenvalues.amax())
+    let (least, largest) = (eigenvalues.min(), eigenvalues.amax());
+    let with_q = largest + (m.nrows() as f64).sqrt();
+    (
+        least >= -EIGENVALUE * m.amax().max(largest),
+        least > RANK * with_q,
+    )
 }

@@ -116,7 +116,8 @@ impl<F: Field> Flow<F> {
 
     /// A frame row with f put in: over [x | λ | u | u' | 1 | s⁻], physical x.
     fn substitute(&self, frame: &Frame, row: &[F]) -> Vec<F> {
-        let mut result = row[..frame.base].to_vec();
+        let mut result = Vec::with_capacity(frame.base + self.q);
+        result.extend_from_slice(&row[..frame.base]);
         result.resize(frame.base + self.q, F::zero());
         for (x, f) in row[frame.base..]
             .iter()
