@@ -24,7 +24,10 @@ const ROOMS: [(&str, &[&str]); 21] = [
             "settings",
         ],
     ),
-    ("mna", &["algebra", "circuit", "diagnostic", "law"]),
+    (
+        "mna",
+        &["algebra", "circuit", "diagnostic", "law", "settings"],
+    ),
     (
         "lcs",
         &["algebra", "circuit", "diagnostic", "law", "mna", "settings"],

@@ -6,6 +6,7 @@ use super::{Coefficient, Equation, Pair, StaticMultiport};
 use crate::algebra::Value;
 use crate::law::{Curve, Law};
 use crate::lcs::Role;
+use crate::settings::tolerances::ranks::ON_RAY;
 
 /// A static multiport whose piecewise-linear laws are ideal pairs: what the reductions of modes, the steppers and the exact integrator take.
 /// [`StaticMultiport::standard`] alone makes one, so that no other multiport is mistaken for it.
@@ -121,11 +122,23 @@ fn shape(curve: Curve) -> Shape {
         pieces.push((terms, length));
     }
     let (v, i) = vertices.first().copied().unwrap_or(origin);
+    let corner = on_ray((v, i), first).map_or_else(
+        || (Coefficient::Plus(v), Coefficient::Plus(i)),
+        |part| plus(first, part),
+    );
     Shape {
-        corner: (Coefficient::Plus(v), Coefficient::Plus(i)),
+        corner,
         first: plus(first, unit),
         pieces,
     }
+}
+
+/// The part of a ray from zero that reaches to a corner on it: a diode that blocks leaks nothing at 0 V, while the products of rounded
+/// numbers leave a current of their rounding there.
+fn on_ray((v, i): (Value, Value), (dv, di): (Value, Value)) -> Option<Value> {
+    let (along, across) = (v.f64 * di.f64, i.f64 * dv.f64);
+    let is_on = along != 0.0 && (along - across).abs() <= ON_RAY * along.abs();
+    is_on.then(|| Value::binary(di.f64 / i.f64))
 }
 
 /// Conductances of the pieces, infinite where they are vertical.

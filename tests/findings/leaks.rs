@@ -7,7 +7,7 @@ use super::changed;
 use crate::runs::column;
 
 /// The run is exact to its end, names no device of a wrong sign, and has these values on its row at t, to 1e-9 of the amplitude.
-fn meets(name: &str, values: &[(&str, f64, f64)]) {
+pub(super) fn meets(name: &str, values: &[(&str, f64, f64)]) {
     let run = changed(name, &[], Method::Auto);
     let told = |n: &&circ::integrate::Note| {
         n.text.contains("wrong sign") || n.text.contains("exact integration")

@@ -6,6 +6,7 @@
 #![allow(dead_code, reason = "each module uses its part")]
 
 mod curved;
+mod decades;
 mod energy;
 mod entered;
 mod front;

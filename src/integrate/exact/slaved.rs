@@ -15,8 +15,9 @@
 //! wherever v > 0 exists (M-matrices; A. Berman, R. J. Plemmons, "Nonnegative Matrices in the Mathematical Sciences", ch. 6): windings
 //! with little leakage behind a Roff each. Once the remainder has decayed, the rounding of a guard with Roff·i in it is that of the
 //! voltages which i follows, and not Roff times that of the largest current of the run. With F the components that follow and S the
-//! others, w_F = K w_S with K = −𝒜_FF⁻¹ 𝒜_FS, and on that manifold w_S' = (𝒜_SS + 𝒜_SF K) w_S: where the difference from it is
-//! rounding, the sign of a guard is that of its value there, of its derivative there, and so on.
+//! others, w_F = K w_S with 𝒜_FF K + 𝒜_FS = K (𝒜_SS + 𝒜_SF K), and on that manifold w_S' = (𝒜_SS + 𝒜_SF K) w_S: where the difference
+//! from it is rounding, the sign of a guard is that of its value there, of its derivative there, and so on. K comes from −𝒜_FF⁻¹ 𝒜_FS,
+//! which is right to the ratio of the rates: the current of a capacitor behind a small resistance is all that it leaves out.
 
 use nalgebra::DMatrix;
 
@@ -25,6 +26,9 @@ use crate::linalg::levelled::Levelled;
 use crate::settings::tolerances::exponentials::{
     FORGOTTEN, LEAST_PART, LEVEL, MOST_COUPLED, SHRINKS, SLAVED,
 };
+
+/// Sweeps towards the invariant manifold; each gains the ratio of the rates.
+const INVARIANT: usize = 2;
 
 /// Sweeps over the components that follow each other.
 const SWEEPS: usize = 64;
@@ -182,6 +186,8 @@ pub(crate) struct Manifold {
     slaves: DMatrix<f64>,
     /// The rate of w_F − K w_S over w, by row in units of the follower's decay −𝒜_jj: zero to rounding where w stays there.
     drift: DMatrix<f64>,
+    /// |𝒜_FF|, by row in the same units.
+    own: DMatrix<f64>,
     /// By guard: whether it sees F.
     sees: Vec<bool>,
     /// Guards over w_S and below them their derivatives, as many as there are orders.
@@ -203,17 +209,25 @@ impl Manifold {
         for &j in followers {
             fast.column_mut(j).fill(0.0);
         }
-        let slaves = -Levelled::new(&own).solve(fast)?;
-        let slow = |rows: &DMatrix<f64>| {
-            let mut slow = rows + rows.select_columns(followers) * &slaves;
+        let restricted = |rows: &DMatrix<f64>, slaves: &DMatrix<f64>| {
+            let mut slow = rows + rows.select_columns(followers) * slaves;
             for &j in followers {
                 slow.column_mut(j).fill(0.0);
             }
             slow
         };
+        let inverse = Levelled::new(&own);
+        let mut slaves = -inverse.solve(fast.clone())?;
+        for _ in 0..INVARIANT {
+            let moves = &slaves * restricted(generator, &slaves);
+            slaves = inverse.solve(moves - &fast)?;
+        }
+        let slow = |rows: &DMatrix<f64>| restricted(rows, &slaves);
         let mut drift = generator.select_rows(followers) - &slaves * generator;
-        for (k, mut row) in drift.row_iter_mut().enumerate() {
-            row /= -own[(k, k)];
+        let mut own = own.abs();
+        for (k, &j) in followers.iter().enumerate() {
+            drift.row_mut(k).unscale_mut(-generator[(j, j)]);
+            own.row_mut(k).unscale_mut(-generator[(j, j)]);
         }
         let magnitudes = slaves.abs();
         let added = |rows: &DMatrix<f64>, sizes: &DMatrix<f64>| {
@@ -237,6 +251,7 @@ impl Manifold {
             follows,
             slaves,
             drift,
+            own,
             jets: Map::with_sizes(&jets, &whole),
         })
     }
@@ -250,18 +265,18 @@ impl Manifold {
     /// Whether w is on it and stays there, up to this part of the sizes of its components and what each is not `known` to besides, if
     /// anything: a quantity that passes zero may be the difference from the manifold itself, and then its rate is none of the manifold's.
     pub(crate) fn holds(&self, w: &[f64], sizes: &[f64], rounding: f64, known: &[f64]) -> bool {
+        let near = |(k, &j): (usize, &usize)| {
+            let row = self.slaves.row(k).into_iter().zip(sizes);
+            let size = row.fold(sizes[j], |whole, (s, size)| whole + (s * size).abs());
+            rounding * size + known.get(j).map_or(0.0, |known| known.abs())
+        };
+        let near: Vec<f64> = self.followers.iter().enumerate().map(near).collect();
+        let over =
+            |row: &DMatrix<f64>, k| row.row(k).iter().zip(w).map(|(a, w)| a * w).sum::<f64>();
         self.followers.iter().enumerate().all(|(k, &j)| {
-            let row = self.slaves.row(k);
-            let (value, size) = row
-                .iter()
-                .zip(w)
-                .zip(sizes)
-                .fold((0.0, sizes[j]), |(value, whole), ((s, w), size)| {
-                    (value + s * w, whole + (s * size).abs())
-                });
-            let drift: f64 = self.drift.row(k).iter().zip(w).map(|(d, w)| d * w).sum();
-            let near = rounding * size + known.get(j).map_or(0.0, |known| known.abs());
-            (w[j] - value).abs() <= near && drift.abs() <= near
+            // Those that are off push each other.
+            let pushed: f64 = self.own.row(k).iter().zip(&near).map(|(a, n)| a * n).sum();
+            (w[j] - over(&self.slaves, k)).abs() <= near[k] && over(&self.drift, k).abs() <= pushed
         })
     }
 
@@ -348,11 +363,29 @@ mod tests {
         assert!(!manifold.holds(&[1e-12, 0.0, 5.0], &sizes, 1e-14, &[]));
         let (mut values, mut whole) = (Vec::new(), Vec::new());
         manifold.jets(&w, &sizes, &mut values, &mut whole);
-        let expected = [1e-20, 314.0 * 5.0, -314.0 * 314.0 * 1e-20];
+        // v − τ v' + τ² v'' … with τ = L/Roff.
+        let (tau, v, slope) = (l / roff, 1e-20, 314.0 * 5.0);
+        let expected = [v - tau * slope, slope, -314.0 * 314.0 * (v - tau * slope)];
         for (found, expected) in values.iter().zip(expected) {
             assert!((found / expected - 1.0).abs() < 1e-12, "{found} {expected}");
         }
         assert!((whole[0] / 5.0 - 1.0).abs() < 1e-12 && manifold.is_seen_by(0));
+    }
+
+    /// A capacitor behind a small resistance follows a voltage that falls: what it gives back passes the resistance.
+    #[test]
+    fn on_the_manifold_a_capacitor_has_a_current() {
+        let (fast, slow) = (1e12, 1e5);
+        let a = DMatrix::from_row_slice(2, 2, &[-fast, fast, 0.0, -slow]);
+        let guard = DMatrix::from_row_slice(1, 2, &[1.0, -1.0]);
+        let manifold = Manifold::new(&a, (&guard, &sizes(&guard)), &[0], 2).unwrap();
+        let (mut values, mut whole) = (Vec::new(), Vec::new());
+        manifold.jets(&[5.0, 5.0], &[5.0, 5.0], &mut values, &mut whole);
+        let expected = 5.0 * slow / (fast - slow);
+        assert!(
+            (values[0] / expected - 1.0).abs() < 1e-6,
+            "{values:?} {expected}"
+        );
     }
 
     /// Two currents decay with rates of one size, i₁ towards −i₀/2, and the guard is their difference from that: where it passes zero

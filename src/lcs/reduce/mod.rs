@@ -19,6 +19,7 @@ mod exchange;
 mod flow;
 mod frame;
 mod publish;
+mod roles;
 mod separate;
 mod system;
 
@@ -204,6 +205,11 @@ fn published<F: Field>(
     apart: Option<f64>,
 ) -> Result<(LcsParts, bool), ReduceError> {
     let mut reduction = in_some_order(behaviour, reduced, position)?;
+    if let Some(lost) = roles::lost(&reduction)
+        && let Ok(other) = in_some_order(&roles::exchanged(behaviour, &lost), reduced, position)
+    {
+        reduction = other;
+    }
     if let Some(span) = apart {
         reduction.separate(span);
     }

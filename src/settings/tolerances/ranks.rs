@@ -8,6 +8,14 @@ pub(crate) const RANK: f64 = 1e-10;
 /// [`RANK`], because a residual test follows. Larger: least squares where a solve would do; smaller: residuals fail.
 pub(crate) const INVERSE: f64 = 1e-11;
 
+/// Two ports whose entry of D + Dᵀ with unit diagonal is larger follow each other. Larger: roles are kept that lose digits; smaller: more devices
+/// than need be change roles.
+pub(crate) const COUPLED: f64 = 0.1;
+
+/// A corner of a law is on the line through zero that its first ray is on where its coordinates, rounded three times, are so by this part.
+/// Larger: a line that passes zero at a distance is moved; smaller: a device that blocks at 0 V leaks the rounding of its corner.
+pub(crate) const ON_RAY: f64 = 4.0 * f64::EPSILON;
+
 /// An entry of D, of a constraint or of a ray this far below the largest is rounding of a zero. Larger: weak couplings are lost; smaller: rounding couples
 /// ports.
 pub(crate) const ENTRY: f64 = 1e-12;
