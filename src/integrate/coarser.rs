@@ -35,6 +35,7 @@ impl Problem {
             stride: 1,
             start: 0.0,
             share: Share::always(share),
+            steps: Some((coarser, 1)),
         };
         COARSER
             .into_iter()
@@ -80,6 +81,7 @@ impl Problem {
                 stride,
                 start: h,
                 share: Share { smooth, events }.times(coarser * h / longer),
+                steps: Some((longer / h, scheme.order().min(2))),
             }
         };
         let shares = smooth.into_iter().zip(events);
@@ -114,6 +116,7 @@ impl Problem {
             stride: if many { FEWER } else { 1 },
             start: FIRST * tran.tstep,
             share: Share::always(LOOSER_SHARE),
+            steps: None,
         }]
     }
 }

@@ -16,6 +16,7 @@ use crate::integrate::log::Log;
 use crate::integrate::rows::Asked;
 use crate::integrate::run::{Outcome, Stepper};
 use crate::integrate::stats::StatedError;
+use crate::settings::tolerances::stated::UNSETTLED;
 
 /// A companion begins with steps that double from this part of its first one on: what has ended within the first step of the run is seen.
 const GRADED: i32 = 24;
@@ -30,6 +31,8 @@ pub(crate) struct Coarser<'a> {
     pub(crate) start: f64,
     /// What the run errs at most, over what the companion differs from it.
     pub(crate) share: Share,
+    /// Its steps over those of the run, where these are prescribed, and the order of the method.
+    pub(crate) steps: Option<(f64, i32)>,
 }
 
 /// What a run errs at most, over what its companion differs from it.
@@ -160,6 +163,7 @@ impl<'a> Accompanied<'a> {
     fn stated(&mut self, own: StatedError) -> StatedError {
         let scales = scales(&self.amplitude, self.units);
         let (mut max, mut rms, mut time) = (0.0_f64, 0.0_f64, own.event_time.unwrap_or(0.0));
+        let mut unsettled = self.unsettled(&scales);
         for companion in &mut self.companions {
             if companion.lost {
                 return own;
@@ -173,6 +177,9 @@ impl<'a> Accompanied<'a> {
             if companion.difference.rows() == 0 {
                 return own;
             }
+            // The first one alone tells the size of an error that no longer grows as the steps do.
+            let share = share.max((share * unsettled).min(UNSETTLED));
+            unsettled = 1.0;
             max = max.max(share * largest);
             rms = rms.max(share * mean);
             time = time.max(share * companion.difference.shift());
@@ -188,6 +195,29 @@ impl<'a> Accompanied<'a> {
 }
 
 impl Accompanied<'_> {
+    /// How much more the run may err, over what the first of two companions in prescribed steps differs from it, than the order of the
+    /// method says: their distances d grow by the observed order q, d₂/d₁ = (r₂^q − 1)/(r₁^q − 1) with their steps r, and the error is
+    /// d₁/(r₁^q − 1). Steps that are too long for what they follow have q below the method's.
+    fn unsettled(&mut self, scales: &[f64]) -> f64 {
+        let [first, second] = self.companions.as_mut_slice() else {
+            return 1.0;
+        };
+        let (Some((near, order)), Some((far, _))) = (first.by.steps, second.by.steps) else {
+            return 1.0;
+        };
+        let (one, other) = (
+            first.difference.over(scales).0,
+            second.difference.over(scales).0,
+        );
+        if !(one > 0.0 && other.is_finite()) {
+            return 1.0;
+        }
+        let error = |steps: f64| steps.powi(order) - 1.0;
+        // As if the steps were 2 and 4 times as long, where d₂/d₁ = 2^q + 1.
+        let grows = other / one * error(near) / error(far) * error(4.0) / error(2.0);
+        error(2.0) / (grows - 2.0).max(f64::MIN_POSITIVE)
+    }
+
     /// Compares a row of the run with those companions that stand at its time.
     fn compare(&mut self, row: &[f64]) {
         let t = self.run.time();

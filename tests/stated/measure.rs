@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
 
 use circ::Model;
-use circ::circuit::Tran;
+use circ::circuit::{Kind, Tran};
 use circ::integrate::{Method, Run, SimOptions, simulate};
 use circ::settings::Settings;
 use circ::waveform::Waveforms;
@@ -99,6 +99,8 @@ fn run(model: &Model, asked: &Asked, finer: f64) -> Result<Run, String> {
     let mut circuit = model.circuit().clone();
     circuit.tran = circuit.tran.map(|tran| Tran {
         tstep: tran.tstep / finer,
+        // An event at the last row is seen by a reference that goes on.
+        tstop: tran.tstop + if finer > 1.0 { tran.tstep } else { 0.0 },
         ..tran
     });
     let options = SimOptions {
@@ -181,12 +183,12 @@ pub(crate) fn of_text(setting: &Setting, text: &str, seed: u64) -> Found {
         Err(error) => return Found::Refused(error),
     };
     let aside = found.error.event_time.unwrap_or(0.0);
-    let (truth, place) = distance(&found, &reference, aside);
+    let (truth, place) = distance(&found, &reference, (aside, ohms(&model)));
     if setting.curved {
         let Ok(other) = better(CURVED[0]) else {
             return Found::Nothing("no reference");
         };
-        let own = distance(&other, &reference, aside).0;
+        let own = distance(&other, &reference, (aside, ohms(&model))).0;
         if own > SURE * truth.max(ROUNDING) {
             return Found::Nothing("no sure reference");
         }
@@ -202,9 +204,27 @@ pub(crate) fn of_text(setting: &Setting, text: &str, seed: u64) -> Found {
 /// The least amplitude that counts, over the largest of the same unit.
 const FLOOR: f64 = 1e-3;
 
+/// Below this part of the current that the largest voltage drives through the resistors of a circuit there is none.
+const NOTHING: f64 = 1e-9;
+
+/// The geometric mean of the resistances of a circuit, Ω.
+fn ohms(model: &Model) -> f64 {
+    let logarithm = |element: &circ::circuit::Element| match &element.kind {
+        Kind::Resistor(r) if r.f64 > 0.0 => Some(r.f64.ln()),
+        _ => None,
+    };
+    let r: Vec<f64> = model
+        .circuit()
+        .elements
+        .iter()
+        .filter_map(logarithm)
+        .collect();
+    (r.iter().sum::<f64>() / r.len().max(1) as f64).exp()
+}
+
 /// The largest distance of a value from the reference's over all columns and rows, relative to the amplitude; and where. A row that an
 /// event is no further from than `aside`, s, is compared with all values of the reference within ± `aside`.
-fn distance(found: &Run, reference: &Run, aside: f64) -> (f64, String) {
+fn distance(found: &Run, reference: &Run, (aside, ohms): (f64, f64)) -> (f64, String) {
     let events = found.events.iter().chain(&reference.events);
     let mut events: Vec<f64> = events.map(|event| event.t).collect();
     events.sort_by(f64::total_cmp);
@@ -216,6 +236,11 @@ fn distance(found: &Run, reference: &Run, aside: f64) -> (f64, String) {
         .iter()
         .map(|(_, k)| reference.column(*k).fold(0.0_f64, |m, v| m.max(v.abs())))
         .collect();
+    let volts = columns
+        .iter()
+        .zip(&largest)
+        .filter(|((j, _), _)| waves.units[*j] == "V");
+    let driven = volts.fold(0.0_f64, |m, (_, a)| m.max(*a)) / ohms;
     let mut worst = (0.0, String::new());
     for (row, &t) in waves.time.iter().enumerate() {
         let rounding = 4.0 * f64::EPSILON * t;
@@ -232,8 +257,13 @@ fn distance(found: &Run, reference: &Run, aside: f64) -> (f64, String) {
                 .iter()
                 .zip(&largest)
                 .filter(|((j, _), _)| waves.units[*j] == unit);
-            let floor = FLOOR * of_unit.fold(0.0_f64, |m, (_, a)| m.max(*a));
-            let scale = largest[n].max(floor);
+            let of_all = of_unit.fold(0.0_f64, |m, (_, a)| m.max(*a));
+            // Where all currents that are recorded are nothing beside the voltages, they are rounding.
+            let scale = if unit == "A" && of_all <= NOTHING * driven {
+                driven
+            } else {
+                largest[n].max(FLOOR * of_all)
+            };
             let value = waves.row(row)[*j];
             let inner = (from..to).map(|r| reference.row(r)[*k]);
             let ends = [at(reference, low, *k), at(reference, high, *k)];

@@ -14,6 +14,10 @@ pub(crate) const HIGHER_ORDER: [f64; 2] = [1.5, 0.125];
 /// run another one, so that the differences may be smaller by chance. Larger and smaller as [`FIRST_ORDER`].
 pub(crate) const HIGHER_ORDER_EVENTS: [f64; 2] = [2.0, 0.25];
 
+/// The largest error of a run over what the nearer of its companions differs by, where their distances grow less than the order of the method
+/// says: then the steps are too long for what they follow, and the distance no longer tells the error. Larger and smaller as [`FIRST_ORDER`].
+pub(crate) const UNSETTLED: f64 = 4.0;
+
 /// Tolerance of the companion of a run whose steps are chosen, over that of the run. It makes its steps whole where the run makes them in
 /// halves, so that they are longer even where rows and edges choose them.
 pub(crate) const LOOSER: f64 = 2.0;
