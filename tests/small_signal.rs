@@ -191,6 +191,29 @@ fn about_an_orbit_without_events_is_about_the_operating_point() {
     }
 }
 
+/// A bridge that a current of 1 A flows through commutates where the source crosses zero, once where the orbit begins: i(vs) is −sign(v), and a
+/// shift of v by δ moves both edges by δ/(Aω₀): −2/(πA) δ at every frequency.
+#[test]
+fn an_event_where_the_orbit_begins_counts_once() {
+    let text = "t\nvs a x sin(0 10 1k)\nvac x b 0 ac 1\nd1 a p d\nd2 b p d\nd3 n a d\nd4 n b d\ni1 p n 1\nrg n 0 1k\n.model d d(ideal)\n\
+                .tran 10u 1m\n.ac list 10 300 2.7k\n.save i(vs)\n.end\n";
+    for found in column(&response_of(text, &SmallSignalOptions::default()), "i(vs)") {
+        let truth = -2.0 / (10.0 * std::f64::consts::PI);
+        assert!((found - truth).norm() < 1e-9, "{found} {truth}");
+    }
+}
+
+/// A circuit without storage: the diode conducts in a part of each period, from where the sine passes 0.6 V on.
+#[test]
+fn a_clipper_without_storage_lets_through_what_its_diode_leaves() {
+    let text = "t\nv1 1 4 sin(0 5 1k)\nv2 4 0 0 ac 1\nr1 1 2 1k\nd1 2 0 d\n.model d d(ron=10 vfwd=0.6)\n.tran 1u 1m\n.ac list 10\n\
+                .save v(2)\n.end\n";
+    let found = column(&response_of(text, &SmallSignalOptions::default()), "v(2)")[0];
+    let conducts = 0.5 - (0.6_f64 / 5.0).asin() / std::f64::consts::PI;
+    let truth = 1.0 - conducts * (1.0 - 10.0 / 1010.0);
+    assert!((found - truth).norm() < 1e-9, "{found} {truth}");
+}
+
 #[test]
 fn what_has_no_response_is_refused_with_a_reason() {
     let refused = |text: &str| {

@@ -132,15 +132,26 @@ impl Steady {
         })
     }
 
-    /// The orbit with what its derivative is made of, from the time at which it begins to one period later.
+    /// One period of the orbit with what its derivative is made of, and the time from which on rows of the orbit count, s. It begins in the
+    /// middle of the longest stretch without an event, so that none stands where it ends and begins.
     ///
     /// # Errors
     /// As [`Trajectory::of`].
-    pub(super) fn trajectory(&mut self) -> Result<Trajectory, Error> {
+    pub(super) fn trajectory(&mut self) -> Result<(Trajectory, f64), Error> {
         let (stand, from) = (&self.found.fixed.stand, self.found.from);
         let place = (from, &stand.state[..], &stand.switches[..]);
         let period = self.found.orbit().period;
-        Trajectory::of(&mut self.simulation, place, from + period)
+        let whole = Trajectory::of(&mut self.simulation, place, from + period)?;
+        let Some(begin) = whole.calmest() else {
+            return Ok((whole, from));
+        };
+        self.simulation
+            .stand_at(from, &stand.state, &stand.switches)?;
+        self.simulation.advance_to(begin)?;
+        let (state, switches) = (self.simulation.state(), self.simulation.positions());
+        let place = (begin, &state[..], &switches[..]);
+        let trajectory = Trajectory::of(&mut self.simulation, place, begin + period)?;
+        Ok((trajectory, from))
     }
 }
 

@@ -207,7 +207,8 @@ impl Shooting<'_> {
     fn derivative(&mut self, stand: &Stand, closing: &Closing) -> Result<DMatrix<f64>, Error> {
         if self.simulation.is_exact() {
             match self.variation(stand, closing.seconds) {
-                Ok(derivative) => return Ok(derivative),
+                Ok(Some(derivative)) => return Ok(derivative),
+                Ok(None) => {}
                 Err(error) if matches!(error.reason, Reason::NotSmooth(_)) => {}
                 Err(error) => return Err(error),
             }
@@ -215,10 +216,16 @@ impl Shooting<'_> {
         self.differences(stand, &closing.after)
     }
 
-    pub(super) fn variation(&mut self, stand: &Stand, seconds: f64) -> Result<DMatrix<f64>, Error> {
+    /// `None` where an event stands at the end of the return or at its beginning.
+    pub(super) fn variation(
+        &mut self,
+        stand: &Stand,
+        seconds: f64,
+    ) -> Result<Option<DMatrix<f64>>, Error> {
         let place = (self.from, &stand.state[..], &stand.switches[..]);
         let trajectory = Trajectory::of(self.simulation, place, self.from + seconds)?;
         let mut derivative = match self.returns {
+            Return::After(_) if !trajectory.closes() => return Ok(None),
             Return::After(_) => trajectory.monodromy(),
             Return::At(..) => trajectory.return_map()?,
         };
@@ -227,7 +234,7 @@ impl Shooting<'_> {
                 *value *= self.amplitudes[j] / amplitude;
             }
         }
-        Ok(derivative)
+        Ok(Some(derivative))
     }
 
     pub(super) fn differences(

@@ -53,6 +53,7 @@ fn the_variational_equation_agrees_with_differences() {
         let stand = &found.fixed.stand;
         let by_equation = shooting.variation(stand, seconds);
         let by_equation = by_equation.unwrap_or_else(|error| panic!("{name}: {error}"));
+        let by_equation = by_equation.expect("a derivative");
         let (after, _) = shooting.shoot(stand).expect("a period");
         let by_differences = shooting.differences(stand, &after).expect("differences");
         let apart = (&by_equation - &by_differences).amax();

@@ -166,13 +166,13 @@ fn about_orbit(
     response: &mut Response,
 ) -> Result<(), Error> {
     let orbit = found.orbit();
-    let trajectory = found.trajectory()?;
+    let (trajectory, origin) = found.trajectory()?;
     let inputs = trajectory
         .systems
         .first()
         .map_or(&[][..], |system| &system.lcs.inputs);
     let drive = drive(&found.circuit, inputs);
-    let linear = orbit::Linear::of(&trajectory, orbit.period);
+    let linear = orbit::Linear::of(&trajectory, orbit.period, origin);
     let bands: Vec<i32> = (-i32::from(sidebands)..=i32::from(sidebands)).collect();
     let phasors = &mut response.phasors;
     for omega in omegas {
@@ -252,7 +252,8 @@ fn drive(circuit: &Circuit, inputs: &[Input]) -> DVector<Complex<f64>> {
 
 /// jωI − A, factored; its rows are levelled, as those of different resistances are decades apart.
 struct Resolvent {
-    factors: LU<Complex<f64>, Dyn, Dyn>,
+    /// None of a circuit without states.
+    factors: Option<LU<Complex<f64>, Dyn, Dyn>>,
     /// 1 over the largest entry of each row.
     levels: DVector<f64>,
 }
@@ -268,14 +269,17 @@ impl Resolvent {
             *level = 1.0 / row.iter().fold(f64::MIN_POSITIVE, |m, v| m.max(v.norm()));
             row *= Complex::from(*level);
         }
-        let factors = shifted.lu();
+        let factors = (n > 0).then(|| shifted.lu());
         Self { factors, levels }
     }
 
     /// (jωI − A)⁻¹ b.
     fn solve(&self, b: DVector<Complex<f64>>) -> Option<DVector<Complex<f64>>> {
+        let Some(factors) = &self.factors else {
+            return Some(b);
+        };
         let levelled = b.zip_map(&self.levels, |b, level| b * level);
-        let solved = self.factors.solve(&levelled)?;
+        let solved = factors.solve(&levelled)?;
         solved.iter().all(|v| v.is_finite()).then_some(solved)
     }
 }

@@ -18,7 +18,7 @@ use crate::integrate::Error;
 pub(super) struct Linear<'a> {
     trajectory: &'a Trajectory,
     period: f64,
-    from: f64,
+    origin: f64,
     monodromy: DMatrix<f64>,
     /// By system: X, U, U' of the outputs.
     outputs: Vec<[DMatrix<f64>; 3]>,
@@ -44,7 +44,8 @@ fn turned(omega: f64, a: f64, b: f64) -> Complex<f64> {
 }
 
 impl<'a> Linear<'a> {
-    pub(super) fn of(trajectory: &'a Trajectory, period: f64) -> Self {
+    /// With phases counted from the time `origin`, s.
+    pub(super) fn of(trajectory: &'a Trajectory, period: f64, origin: f64) -> Self {
         let outputs = |system: &System| {
             let (rows, n, p) = (&system.lcs.outputs.rows, system.lcs.n(), system.lcs.p());
             let k = rows.one.len();
@@ -57,10 +58,7 @@ impl<'a> Linear<'a> {
         Self {
             trajectory,
             period,
-            from: trajectory
-                .segments
-                .first()
-                .map_or(0.0, |segment| segment.from),
+            origin,
             monodromy: trajectory.monodromy(),
             outputs: trajectory.systems.iter().map(outputs).collect(),
         }
@@ -76,18 +74,11 @@ impl<'a> Linear<'a> {
         let forced = self.forced(omega, drive)?;
         let still = DVector::zeros(self.monodromy.nrows());
         let after = self.pass(omega, drive, &forced, &still, |_, _, _| Ok(()))?;
-        let q = still.len();
-        let round = turn(omega, self.period);
-        let closed = DMatrix::from_fn(q, q, |i, j| {
-            let own = if i == j { round } else { Complex::default() };
-            own - self.monodromy[(i, j)]
-        });
-        let start = closed
-            .lu()
-            .solve(&after)
-            .filter(|s| s.iter().all(|v| v.is_finite()));
-        let start = start.filter(|_| q > 0).or((q == 0).then_some(still));
-        let start = start.ok_or_else(|| resonance(omega))?;
+        let start = if still.is_empty() {
+            still
+        } else {
+            self.closed(omega, &after).ok_or_else(|| resonance(omega))?
+        };
         let width = self.outputs.first().map_or(0, |[x, ..]| x.nrows());
         let mut sums = vec![DVector::<Complex<f64>>::zeros(width); bands.len()];
         self.pass(omega, drive, &forced, &start, |k, before, after| {
@@ -107,6 +98,17 @@ impl<'a> Linear<'a> {
             .collect())
     }
 
+    /// δs₀ = (e^{jωT} − M)⁻¹ Γ û.
+    fn closed(&self, omega: f64, after: &DVector<Complex<f64>>) -> Option<DVector<Complex<f64>>> {
+        let (q, round) = (after.len(), turn(omega, self.period));
+        let closed = DMatrix::from_fn(q, q, |i, j| {
+            let own = if i == j { round } else { Complex::default() };
+            own - self.monodromy[(i, j)]
+        });
+        let start = closed.lu().solve(after)?;
+        start.iter().all(|v| v.is_finite()).then_some(start)
+    }
+
     /// By segment.
     fn forced(&self, omega: f64, drive: &DVector<Complex<f64>>) -> Result<Vec<Forced>, Error> {
         let of = |segment: &Segment| {
@@ -120,7 +122,7 @@ impl<'a> Linear<'a> {
     }
 
     fn time(&self, t: f64) -> f64 {
-        t - self.from
+        t - self.origin
     }
 
     /// Goes round from δs at the start to δs a period later, δu included; `visit` gets each segment with its δx at the beginning, and the δx

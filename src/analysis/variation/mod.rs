@@ -120,6 +120,27 @@ impl Trajectory {
         Ok(&system.lcs.storage.x * m + side.storage_rate() * dt)
     }
 
+    /// Whether it ends in the mode that it begins in: where it does not, an event at its end has not happened yet, or not yet at its start.
+    pub(crate) fn closes(&self) -> bool {
+        let ends = self.segments.first().zip(self.segments.last());
+        ends.is_some_and(|(first, last)| first.system == last.system)
+    }
+
+    /// The middle of the longest segment, s.
+    pub(crate) fn calmest(&self) -> Option<f64> {
+        let length = |segment: &&Segment| segment.to - segment.from;
+        let mut segments = self.segments.iter();
+        let first = segments.next()?;
+        let longest = segments.fold(first, |longest, segment| {
+            if length(&segment) > length(&longest) {
+                segment
+            } else {
+                longest
+            }
+        });
+        Some(0.5 * (longest.from + longest.to))
+    }
+
     fn last_system(&self) -> &System {
         &self.systems[self.segments.last().map_or(0, |segment| segment.system)]
     }
