@@ -214,6 +214,28 @@ fn a_clipper_without_storage_lets_through_what_its_diode_leaves() {
     assert!((found - truth).norm() < 1e-9, "{found} {truth}");
 }
 
+/// Inductors alone between sources keep what a slow sine puts into them for as long as a mode lasts: at 1e-7 of the switching frequency that is more
+/// than doubles carry beside what is left, and said.
+#[test]
+fn a_frequency_far_below_the_circuit_is_told_to_lose_digits() {
+    let text = |card: &str| {
+        let netlist = include_str!("../netlists/scr-bridge.cir");
+        let netlist = netlist.replace("va a 0 sin", "vd x 0 0 ac 1\nva a x sin");
+        netlist.replace(".save", &format!(".ac list {card}\n.save i(vb)\n*"))
+    };
+    let slow = response_of(&text("5e-6"), &SmallSignalOptions::default());
+    assert!(
+        slow.notes.iter().any(|note| note.text.contains("rounding")),
+        "{:?}",
+        slow.notes
+    );
+    let sound = response_of(&text("50m"), &SmallSignalOptions::default());
+    assert!(sound.notes.is_empty(), "{:?}", sound.notes);
+    // What 1 V of direct voltage in phase a makes of the mean of i(vb), by orbits with ±1 mV.
+    let found = column(&sound, "i(vb)")[0];
+    assert!((found.re + 0.024_688_36).abs() < 1e-6, "{found}");
+}
+
 #[test]
 fn what_has_no_response_is_refused_with_a_reason() {
     let refused = |text: &str| {

@@ -15,8 +15,10 @@ use super::periodic::{PeriodicOptions, Steady, steady};
 use crate::circuit::{Circuit, Kind};
 use crate::integrate::{Error, Note, Orbit, OrbitKind, Reason};
 use crate::lcs::Input;
+use crate::linalg::decouple::Decoupled;
 use crate::model::Model;
 use crate::settings::Settings;
+use crate::settings::tolerances::periodic::LOST;
 use crate::waveform::{Phasors, unit_of};
 
 /// Where a circuit is made linear.
@@ -150,12 +152,15 @@ pub fn small_signal(model: &Model, options: &SmallSignalOptions<'_>) -> Result<R
         &mut response.notes,
     )?;
     let drive = drive(circuit, &linear.inputs);
+    let mut worst = (0.0, 0.0);
     for omega in omegas {
-        response
-            .phasors
-            .values
-            .extend(linear.response(omega, &drive)?.iter());
+        let (values, loss) = linear.response(omega, &drive)?;
+        response.phasors.values.extend(values.iter());
+        worst = if loss > worst.0 { (loss, omega) } else { worst };
     }
+    response
+        .notes
+        .extend((worst.0 > LOST).then(|| lost(worst.0, worst.1)));
     Ok(response)
 }
 
@@ -175,11 +180,19 @@ fn about_orbit(
     let linear = orbit::Linear::of(&trajectory, orbit.period, origin);
     let bands: Vec<i32> = (-i32::from(sidebands)..=i32::from(sidebands)).collect();
     let phasors = &mut response.phasors;
+    let mut worst = (0.0, 0.0);
     for omega in omegas {
-        phasors
-            .values
-            .extend(linear.response(*omega, &drive, &bands)?);
+        let (values, loss) = linear.response(*omega, &drive, &bands)?;
+        phasors.values.extend(values);
+        worst = if loss > worst.0 {
+            (loss, *omega)
+        } else {
+            worst
+        };
     }
+    response
+        .notes
+        .extend((worst.0 > LOST).then(|| lost(worst.0, worst.1)));
     let of_band = |name: &String, k: i32| {
         if k == 0 {
             name.clone()
@@ -250,17 +263,19 @@ fn drive(circuit: &Circuit, inputs: &[Input]) -> DVector<Complex<f64>> {
     DVector::from_iterator(inputs.len(), inputs.iter().map(of))
 }
 
-/// jωI − A, factored; its rows are levelled, as those of different resistances are decades apart.
-struct Resolvent {
+/// jωI − A, factored in the basis in which fast states owe nothing to the others; its rows are levelled, as those of different resistances are
+/// decades apart.
+struct Resolvent<'a> {
     /// None of a circuit without states.
     factors: Option<LU<Complex<f64>, Dyn, Dyn>>,
     /// 1 over the largest entry of each row.
     levels: DVector<f64>,
+    basis: Option<&'a Decoupled>,
 }
 
-impl Resolvent {
-    fn of(a: &DMatrix<f64>, omega: f64) -> Self {
-        let n = a.nrows();
+impl<'a> Resolvent<'a> {
+    fn of(a: &DMatrix<f64>, basis: Option<&'a Decoupled>, omega: f64) -> Self {
+        let (a, n) = (basis.map_or(a, |basis| &basis.generator), a.nrows());
         let mut shifted = DMatrix::from_fn(n, n, |i, j| {
             Complex::new(-a[(i, j)], if i == j { omega } else { 0.0 })
         });
@@ -269,8 +284,11 @@ impl Resolvent {
             *level = 1.0 / row.iter().fold(f64::MIN_POSITIVE, |m, v| m.max(v.norm()));
             row *= Complex::from(*level);
         }
-        let factors = (n > 0).then(|| shifted.lu());
-        Self { factors, levels }
+        Self {
+            factors: (n > 0).then(|| shifted.lu()),
+            levels,
+            basis,
+        }
     }
 
     /// (jωI − A)⁻¹ b.
@@ -278,10 +296,35 @@ impl Resolvent {
         let Some(factors) = &self.factors else {
             return Some(b);
         };
-        let levelled = b.zip_map(&self.levels, |b, level| b * level);
-        let solved = factors.solve(&levelled)?;
+        let b = self
+            .basis
+            .map_or_else(|| b.clone(), |basis| times(&basis.from, &b));
+        let solved = factors.solve(&b.zip_map(&self.levels, |b, level| b * level))?;
+        let solved = self
+            .basis
+            .map_or_else(|| solved.clone(), |basis| times(&basis.to, &solved));
         solved.iter().all(|v| v.is_finite()).then_some(solved)
     }
+
+    /// What rounding may leave of a solution, relative to it: ε ‖(jωI − A)⁻¹‖ of the levelled matrix.
+    fn loss(&self) -> f64 {
+        let inverse = self.factors.as_ref().and_then(LU::try_inverse);
+        let sizes = inverse.iter().flat_map(|inverse| {
+            let rows = inverse.row_iter();
+            rows.map(|row| row.iter().map(|v| v.norm()).sum::<f64>())
+                .collect::<Vec<_>>()
+        });
+        f64::EPSILON * sizes.fold(0.0, f64::max)
+    }
+}
+
+/// A response in which rounding may leave too little, at a frequency.
+fn lost(loss: f64, omega: f64) -> Note {
+    let f = omega / std::f64::consts::TAU;
+    format!(
+        "at {f:e} Hz rounding may change the response by {loss:.0e}: the frequency is decades below the rates of the circuit, or at a resonance"
+    )
+    .into()
 }
 
 /// A frequency at which nothing finite responds.

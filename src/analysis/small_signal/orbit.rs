@@ -25,8 +25,8 @@ pub(super) struct Linear<'a> {
 }
 
 /// What a segment's solution is made of at one frequency.
-struct Forced {
-    resolvent: Resolvent,
+struct Forced<'a> {
+    resolvent: Resolvent<'a>,
     /// p.
     state: DVector<Complex<f64>>,
 }
@@ -64,13 +64,13 @@ impl<'a> Linear<'a> {
         }
     }
 
-    /// Y_k(ω) of the outputs for û, sideband by sideband.
+    /// Y_k(ω) of the outputs for û, sideband by sideband, and what rounding may leave of the solutions in the modes.
     pub(super) fn response(
         &self,
         omega: f64,
         drive: &DVector<Complex<f64>>,
         bands: &[i32],
-    ) -> Result<Vec<Complex<f64>>, Error> {
+    ) -> Result<(Vec<Complex<f64>>, f64), Error> {
         let forced = self.forced(omega, drive)?;
         let still = DVector::zeros(self.monodromy.nrows());
         let after = self.pass(omega, drive, &forced, &still, |_, _, _| Ok(()))?;
@@ -81,7 +81,13 @@ impl<'a> Linear<'a> {
         };
         let width = self.outputs.first().map_or(0, |[x, ..]| x.nrows());
         let mut sums = vec![DVector::<Complex<f64>>::zeros(width); bands.len()];
+        let mut loss = 0.0_f64;
         self.pass(omega, drive, &forced, &start, |k, before, after| {
+            // A forced part that is larger than what is left of it leaves its rounding.
+            let Forced { resolvent, state } = &forced[k];
+            let size = |x: &DVector<Complex<f64>>| x.iter().fold(0.0, |m: f64, v| m.max(v.norm()));
+            let part = size(state) / size(before).max(f64::MIN_POSITIVE);
+            loss = loss.max(resolvent.loss() * part.max(1.0));
             for (sum, band) in sums.iter_mut().zip(bands) {
                 let sideband = omega + f64::from(*band) * TAU / self.period;
                 *sum += self.over_segment(k, (omega, sideband), drive, &forced[k], before)?;
@@ -92,10 +98,10 @@ impl<'a> Linear<'a> {
             }
             Ok(())
         })?;
-        Ok(sums
+        let values = sums
             .iter()
-            .flat_map(|sum| sum.iter().map(|v| v / self.period))
-            .collect())
+            .flat_map(|sum| sum.iter().map(|v| v / self.period));
+        Ok((values.collect(), loss))
     }
 
     /// δs₀ = (e^{jωT} − M)⁻¹ Γ û.
@@ -110,10 +116,10 @@ impl<'a> Linear<'a> {
     }
 
     /// By segment.
-    fn forced(&self, omega: f64, drive: &DVector<Complex<f64>>) -> Result<Vec<Forced>, Error> {
+    fn forced(&self, omega: f64, drive: &DVector<Complex<f64>>) -> Result<Vec<Forced<'_>>, Error> {
         let of = |segment: &Segment| {
             let system = &self.trajectory.systems[segment.system];
-            let resolvent = Resolvent::of(&system.lcs.a, omega);
+            let resolvent = Resolvent::of(&system.lcs.a, system.basis.as_ref(), omega);
             let state = resolvent.solve(times(&system.inputs, drive));
             let state = state.ok_or_else(|| resonance(omega))?;
             Ok(Forced { resolvent, state })
@@ -131,7 +137,7 @@ impl<'a> Linear<'a> {
         &self,
         omega: f64,
         drive: &DVector<Complex<f64>>,
-        forced: &[Forced],
+        forced: &[Forced<'_>],
         start: &DVector<Complex<f64>>,
         mut visit: impl FnMut(
             usize,
@@ -175,7 +181,7 @@ impl<'a> Linear<'a> {
         &self,
         k: usize,
         omega: f64,
-        forced: &Forced,
+        forced: &Forced<'_>,
         start: &DVector<Complex<f64>>,
     ) -> DVector<Complex<f64>> {
         let segment = &self.trajectory.segments[k];
@@ -189,7 +195,7 @@ impl<'a> Linear<'a> {
         k: usize,
         (omega, sideband): (f64, f64),
         drive: &DVector<Complex<f64>>,
-        forced: &Forced,
+        forced: &Forced<'_>,
         start: &DVector<Complex<f64>>,
     ) -> Result<DVector<Complex<f64>>, Error> {
         let segment = &self.trajectory.segments[k];
@@ -201,11 +207,11 @@ impl<'a> Linear<'a> {
         let free = start - &forced.state * turn(omega, from);
         let left = times(&segment.propagator, &free) * turn(-sideband, to);
         let passed = free * turn(-sideband, from) - left;
-        let a = &self.trajectory.systems[segment.system].lcs.a;
+        let system = &self.trajectory.systems[segment.system];
         let integral = if sideband == omega {
             forced.resolvent.solve(passed)
         } else {
-            Resolvent::of(a, sideband).solve(passed)
+            Resolvent::of(&system.lcs.a, system.basis.as_ref(), sideband).solve(passed)
         };
         Ok(direct + times(x, &integral.ok_or_else(|| resonance(sideband))?))
     }

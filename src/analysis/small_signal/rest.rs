@@ -21,16 +21,18 @@ pub(super) struct Linear {
 }
 
 impl Linear {
-    /// Y(ω) for û.
+    /// Y(ω) for û, and what rounding may leave of it.
     pub(super) fn response(
         &self,
         omega: f64,
         drive: &DVector<Complex<f64>>,
-    ) -> Result<DVector<Complex<f64>>, Error> {
-        let state = Resolvent::of(&self.a, omega).solve(times(&self.e, drive));
+    ) -> Result<(DVector<Complex<f64>>, f64), Error> {
+        let resolvent = Resolvent::of(&self.a, None, omega);
+        let state = resolvent.solve(times(&self.e, drive));
         let state = state.ok_or_else(|| resonance(omega))?;
         let rates = times(&self.du, drive) * Complex::new(0.0, omega);
-        Ok(times(&self.x, &state) + times(&self.u, drive) + rates)
+        let values = times(&self.x, &state) + times(&self.u, drive) + rates;
+        Ok((values, resolvent.loss()))
     }
 }
 

@@ -7,7 +7,7 @@ use crate::integrate::exact::{Assembler, Key, Owner};
 use crate::integrate::switching::Threshold;
 use crate::integrate::{Error, reading};
 use crate::lcs::{Hold, Lcs, Rows};
-use crate::linalg::decouple::decoupled;
+use crate::linalg::decouple::{Decoupled, decoupled};
 use crate::linalg::expm::Ladders;
 use crate::linalg::rays;
 use crate::settings::tolerances::exponentials::SQUARED;
@@ -21,6 +21,8 @@ pub(crate) struct System {
     pub(super) storage_u: DMatrix<f64>,
     /// E, n×p.
     pub(crate) inputs: DMatrix<f64>,
+    /// The basis in which fast states owe nothing to the others, where there are any.
+    pub(crate) basis: Option<Decoupled>,
 }
 
 /// A row over [x | u | u' | 1].
@@ -105,6 +107,9 @@ impl System {
             key: key.clone(),
             storage_u: shaped(&lcs.storage.u, q, p),
             inputs: shaped(&lcs.e, n, p),
+            basis: (!lcs.fast.is_empty())
+                .then(|| decoupled(&lcs.a, &lcs.fast))
+                .flatten(),
             lcs,
         })
     }
@@ -143,12 +148,9 @@ impl System {
         if n == 0 || seconds <= 0.0 {
             return Some(DMatrix::identity(n, n));
         }
-        if self.lcs.fast.is_empty() {
-            return increment(&self.lcs.a, &[]);
-        }
-        match decoupled(&self.lcs.a, &self.lcs.fast) {
+        match &self.basis {
             Some(basis) => {
-                Some(basis.to * increment(&basis.generator, &self.lcs.fast)? * basis.from)
+                Some(&basis.to * increment(&basis.generator, &self.lcs.fast)? * &basis.from)
             }
             None => increment(&self.lcs.a, &[]),
         }
