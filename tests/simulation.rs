@@ -357,3 +357,16 @@ fn a_model_takes_other_values() {
     }
     assert!((at_end(&model) - settled(3.0, 1e-3)).abs() < 1e-5);
 }
+
+/// A product took 3 V and 0.4 V as numbers: what it gives would not follow.
+#[test]
+fn a_source_that_an_expression_took_as_a_number_is_not_set() {
+    let text =
+        "t\nvc c 0 0.4\nvd d 0 3\nb1 w 0 v={v(c)*v(d)}\nr1 w 0 1k\nc1 w 0 1u\n.tran 1u 1m\n.end\n";
+    let model = circ::Model::parse(text, "t.cir").expect("a circuit");
+    let mut simulation = model
+        .simulation(circ::SimulationOptions::default())
+        .expect("a simulation");
+    let error = simulation.set_source("vc", 0.8).expect_err("a refusal");
+    assert_eq!(error.elements, ["vc"]);
+}

@@ -255,6 +255,14 @@ fn what_has_no_response_is_refused_with_a_reason() {
         without_source.to_string().contains("AC"),
         "{without_source}"
     );
+    // The product took 3 V and 0.4 V as numbers: no response is better than none of it.
+    let product = refused(
+        "t\nvc c 0 0.4 ac 1\nvd d 0 3\nb1 w 0 v={v(c)*v(d)}\nr1 w 0 1k\n.ac dec 1 1 10\n.end\n",
+    );
+    assert!(
+        product.elements == ["vc"] && product.to_string().contains("number"),
+        "{product}"
+    );
     // A tank without loss has no response at its own frequency: L = C = 1/(2π).
     let tank = refused(
         "t\ni1 0 1 0 ac 1\nl1 1 0 0.15915494309189535\nc1 1 0 0.15915494309189535\n.ac list 1\n.end\n",

@@ -438,6 +438,7 @@ impl<'n, 'o> Builder<'n, 'o> {
         for (scope, list) in saves {
             self.save(list, scope);
         }
+        self.circuit.known = self.scopes.rails_read.iter().copied().collect();
         let cards = std::mem::take(&mut self.measurements);
         self.measure(&cards);
         for (scope, card) in std::mem::take(&mut self.fours) {

@@ -107,6 +107,8 @@ pub struct Circuit {
     pub ac: Vec<f64>,
     /// The sources with an `AC` value, in file order.
     pub stimuli: Vec<Stimulus>,
+    /// Nodes whose voltage against ground an expression took as known (a constant, sines): what their sources do besides is not in it.
+    pub known: Vec<NodeId>,
     /// `.meas tran`, in file order.
     pub measurements: Vec<NamedMeasurement>,
     /// `.four`, in file order.
@@ -325,6 +327,15 @@ impl Circuit {
             .iter()
             .position(|e| e.name == name)
             .map(|i| ElementId(i as u32))
+    }
+
+    /// Whether an expression took what this source does as known, so that it cannot be changed by itself.
+    #[must_use]
+    pub fn is_known(&self, source: ElementId) -> bool {
+        let Element { p, n, .. } = self.elements[source.index()];
+        let at_ground =
+            |node: NodeId, other: NodeId| other == NodeId::GROUND && self.known.contains(&node);
+        at_ground(p, n) || at_ground(n, p)
     }
 
     /// The node with this canonical name.

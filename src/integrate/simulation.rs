@@ -271,6 +271,14 @@ impl Simulation {
                 sources.iter().map(|s| s.input.name.as_str()),
             ));
         };
+        if self
+            .circuit
+            .element(name)
+            .is_some_and(|id| self.circuit.is_known(id))
+        {
+            let what = "it cannot be set during a run: an expression took its voltage as a number";
+            return Err(Error::before(Reason::Unsupported(what.into())).device(name));
+        }
         if !value.is_finite() {
             let what = format!("{name} cannot be set to {value}");
             return Err(Error::before(Reason::Unsupported(what)));

@@ -105,6 +105,12 @@ pub fn small_signal(model: &Model, options: &SmallSignalOptions<'_>) -> Result<R
             "no source has an `AC` value: `v1 in 0 dc 5 ac 1`",
         ));
     }
+    if let Some(stimulus) = circuit.stimuli.iter().find(|s| circuit.is_known(s.source)) {
+        let what =
+            "what its AC value does is not known: an expression took its voltage as a number";
+        let name = circuit.elements[stimulus.source.index()].name.clone();
+        return Err(unsupported(what).device(name));
+    }
     let about = match options.about {
         Some(about) => about,
         None if may_switch(circuit) => About::Orbit,
