@@ -275,6 +275,26 @@ fn what_has_no_response_is_refused_with_a_reason() {
     assert!(matches!(curved.reason, Reason::NotSmooth(_)), "{curved}");
 }
 
+/// What is wrong with `.ac` and `AC` does not stop a transient.
+#[test]
+fn faults_of_small_signals_are_warnings() {
+    for (source, card) in [
+        ("ac 1", ".ac dec 0 1 10"),
+        ("ac 1", ".ac dec {n} 1 10"),
+        ("ac {m}", ".ac dec 10 1 10"),
+        ("ac 1", ".ac dec 10"),
+    ] {
+        let text = format!("t\nv1 1 0 1 {source}\nr1 1 0 1\n{card}\n.tran 1u 1m\n.end\n");
+        let model = Model::parse(&text, "t.cir").expect("a circuit");
+        assert!(!model.findings().is_empty(), "{text}");
+        assert!(model.transient(SimOptions::default()).is_ok(), "{text}");
+        assert!(
+            small_signal(&model, &SmallSignalOptions::default()).is_err(),
+            "{text}"
+        );
+    }
+}
+
 /// A load that doubles at 20 µs: until then nothing moves from period to period.
 #[test]
 fn a_transient_starts_at_the_orbit_and_a_step_follows() {

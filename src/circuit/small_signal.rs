@@ -7,7 +7,8 @@ use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{self, Expr, Spacing};
 
 impl<'n> Builder<'n, '_> {
-    /// Takes in `AC magnitude phase` of a source: 1 and 0 where they are not given.
+    /// Takes in `AC magnitude phase` of a source: 1 and 0 where they are not given. What is wrong with them is a warning, as it does not concern
+    /// other analyses.
     pub(super) fn stimulus(
         &mut self,
         card: &'n ast::Element,
@@ -20,10 +21,14 @@ impl<'n> Builder<'n, '_> {
             return;
         };
         let mut given = [1.0, 0.0];
+        let known = self.scopes.findings.len();
         for (place, value) in given.iter_mut().zip(values) {
             match self.scopes.finite(value, scope) {
                 Some(value) => *place = value.f64,
-                None => return,
+                None => {
+                    let what = "; the source has no `AC` value";
+                    return self.scopes.findings.soften(known, what);
+                }
             }
         }
         let [magnitude, phase] = given;
@@ -34,11 +39,18 @@ impl<'n> Builder<'n, '_> {
         });
     }
 
-    /// Takes in the frequencies of `.ac`; of several cards the last counts.
+    /// Takes in the frequencies of `.ac`; of several cards the last counts. What is wrong with it is a warning.
     pub(super) fn frequencies(&mut self) {
-        let Some(card) = self.ac_card.take() else {
-            return;
-        };
+        if let Some(card) = self.ac_card.take() {
+            let known = self.scopes.findings.len();
+            self.frequencies_of(card);
+            self.scopes
+                .findings
+                .soften(known, "; this `.ac` is left out");
+        }
+    }
+
+    fn frequencies_of(&mut self, card: &'n ast::Frequencies) {
         let mut values = Vec::with_capacity(card.values.len());
         for value in &card.values {
             match self.scopes.finite(value, ScopeId::ROOT) {
