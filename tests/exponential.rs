@@ -356,10 +356,10 @@ fn prescribed_steps_tell_their_error() {
                 let error = error(&found, &reference);
                 let ratio = found.error.max.unwrap() / error;
                 // An eighth of what steps 4 times as long differ by is the error of order 2; of a smooth motion with stages of order 3 it is a
-                // twentieth of that.
+                // twentieth of that. Where the order that is seen is less than that of the method it counts, up to four times.
                 let most = match method {
-                    Method::Euler => 3.0,
-                    _ => 25.0,
+                    Method::Euler => 5.0,
+                    _ => 40.0,
                 };
                 assert!(
                     (1.0..most).contains(&ratio),
