@@ -12,6 +12,7 @@ use nalgebra::{Complex, DMatrix, DVector, Dyn, LU};
 pub use ratio::{Left, Margin, Ratio, margins, ratios, unwrapped};
 
 use super::periodic::{PeriodicOptions, Steady, steady};
+use super::variation::times;
 use crate::circuit::{Circuit, Kind};
 use crate::integrate::{Error, Note, Orbit, OrbitKind, Reason};
 use crate::lcs::Input;
@@ -58,6 +59,29 @@ pub struct Response {
     pub orbit: Option<Orbit>,
     /// Things the user should know.
     pub notes: Vec<Note>,
+}
+
+impl Response {
+    /// Appends a row for every frequency, rad/s, from the values there and what rounding may leave of them; where that is too little a note says
+    /// so.
+    fn sweep(
+        &mut self,
+        omegas: &[f64],
+        respond: impl Fn(f64) -> Result<(Vec<Complex<f64>>, f64), Error>,
+    ) -> Result<(), Error> {
+        let mut worst = (0.0, 0.0);
+        for &omega in omegas {
+            let (values, loss) = respond(omega)?;
+            self.phasors.values.extend(values);
+            if loss > worst.0 {
+                worst = (loss, omega);
+            }
+        }
+        if worst.0 > LOST {
+            self.notes.push(lost(worst.0, worst.1));
+        }
+        Ok(())
+    }
 }
 
 /// The small-signal response of a circuit.
@@ -158,15 +182,7 @@ pub fn small_signal(model: &Model, options: &SmallSignalOptions<'_>) -> Result<R
         &mut response.notes,
     )?;
     let drive = drive(circuit, &linear.inputs);
-    let mut worst = (0.0, 0.0);
-    for omega in omegas {
-        let (values, loss) = linear.response(omega, &drive)?;
-        response.phasors.values.extend(values.iter());
-        worst = if loss > worst.0 { (loss, omega) } else { worst };
-    }
-    response
-        .notes
-        .extend((worst.0 > LOST).then(|| lost(worst.0, worst.1)));
+    response.sweep(&omegas, |omega| linear.response(omega, &drive))?;
     Ok(response)
 }
 
@@ -185,20 +201,8 @@ fn about_orbit(
     let drive = drive(&found.circuit, inputs);
     let linear = orbit::Linear::of(&trajectory, orbit.period, origin);
     let bands: Vec<i32> = (-i32::from(sidebands)..=i32::from(sidebands)).collect();
+    response.sweep(omegas, |omega| linear.response(omega, &drive, &bands))?;
     let phasors = &mut response.phasors;
-    let mut worst = (0.0, 0.0);
-    for omega in omegas {
-        let (values, loss) = linear.response(*omega, &drive, &bands)?;
-        phasors.values.extend(values);
-        worst = if loss > worst.0 {
-            (loss, *omega)
-        } else {
-            worst
-        };
-    }
-    response
-        .notes
-        .extend((worst.0 > LOST).then(|| lost(worst.0, worst.1)));
     let of_band = |name: &String, k: i32| {
         if k == 0 {
             name.clone()
@@ -340,10 +344,4 @@ fn resonance(omega: f64) -> Error {
         "at {f:e} Hz the circuit resonates without damping; another frequency has a response"
     );
     Error::before(Reason::NotSmooth(what))
-}
-
-/// A real matrix times a complex vector.
-fn times(matrix: &DMatrix<f64>, vector: &DVector<Complex<f64>>) -> DVector<Complex<f64>> {
-    let parts = [vector.map(|v| v.re), vector.map(|v| v.im)].map(|part| matrix * part);
-    parts[0].zip_map(&parts[1], Complex::new)
 }

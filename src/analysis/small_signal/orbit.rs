@@ -10,8 +10,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::{Resolvent, resonance, times};
-use crate::analysis::variation::{Saltation, Segment, System, Trajectory, shaped};
+use super::{Resolvent, resonance};
+use crate::analysis::variation::{Saltation, Segment, System, Trajectory, shaped, times};
 use crate::integrate::Error;
 
 /// The orbit, its period, s, and its monodromy.
@@ -161,9 +161,7 @@ impl<'a> Linear<'a> {
                 visit(k, &x, None)?;
                 let system = &systems[segment.system];
                 let now = drive * turn(omega, self.time(segment.to));
-                return Ok(
-                    times(&system.lcs.storage.x, &end) + times(system.storage_inputs(), &now)
-                );
+                return Ok(times(&system.lcs.storage.x, &end) + times(&system.storage_inputs, &now));
             };
             let now = drive * turn(omega, self.time(saltation.t));
             let rates = &now * Complex::new(0.0, omega);

@@ -2,8 +2,8 @@
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::{Resolvent, resonance, times};
-use crate::analysis::variation::shaped;
+use super::{Resolvent, resonance};
+use crate::analysis::variation::{shaped, times};
 use crate::circuit::Circuit;
 use crate::integrate::{Error, Note, Values, operating_point};
 use crate::lcs::{Hold, Input, Lcs, Position, Role, StorageHold, reduce};
@@ -26,13 +26,13 @@ impl Linear {
         &self,
         omega: f64,
         drive: &DVector<Complex<f64>>,
-    ) -> Result<(DVector<Complex<f64>>, f64), Error> {
+    ) -> Result<(Vec<Complex<f64>>, f64), Error> {
         let resolvent = Resolvent::of(&self.a, None, omega);
         let state = resolvent.solve(times(&self.e, drive));
         let state = state.ok_or_else(|| resonance(omega))?;
         let rates = times(&self.du, drive) * Complex::new(0.0, omega);
         let values = times(&self.x, &state) + times(&self.u, drive) + rates;
-        Ok((values, resolvent.loss()))
+        Ok((values.iter().copied().collect(), resolvent.loss()))
     }
 }
 

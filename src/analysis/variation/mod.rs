@@ -23,7 +23,7 @@ use crate::settings::tolerances::times::SAME_TIME;
 
 use instant::Inputs;
 use saltation::Side;
-pub(crate) use saltation::{Saltation, Timing};
+pub(crate) use saltation::{Saltation, Timing, times};
 pub(crate) use system::{System, shaped};
 
 /// A stretch of a run in one mode.
@@ -48,7 +48,7 @@ pub(crate) struct Trajectory {
     /// Between each segment and the next.
     pub(crate) saltations: Vec<Saltation>,
     /// Times within this are one, s.
-    pub(crate) same: f64,
+    same: f64,
 }
 
 /// A run whose derivative does not exist, or is not known.
@@ -94,7 +94,7 @@ impl Trajectory {
 
     /// M = ∂s(t₁)/∂s(t₀), q×q, at the times t₀ and t₁.
     pub(crate) fn monodromy(&self) -> DMatrix<f64> {
-        self.last_system().lcs.storage.x.clone() * self.state_derivative().0
+        &self.last_system().lcs.storage.x * self.state_derivative().0
     }
 
     /// ∂s/∂s(t₀) at the event that t₁ is the time of, whenever it happens: M + ṡ⁺ ∂t₁/∂s(t₀), q×q.
@@ -335,6 +335,15 @@ impl Maker {
             }
         }
         let by_itself = instant[0].cause.is_some();
+        let edge = |passage: &Passage| {
+            passage.cause.is_none() && passage.from.as_ref() != Some(&passage.to)
+        };
+        if by_itself && instant.iter().any(edge) {
+            return Err(not_smooth(
+                t,
+                "an edge of a source and an event of the state coincide",
+            ));
+        }
         if by_itself && found.is_none() {
             let what = "when it happens does not follow from a guard of its mode";
             return Err(not_smooth(t, what));

@@ -10,7 +10,7 @@
 //! at the time at which the event was without the variation (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical
 //! Systems, 2004, section 7.5). Where sources alone decide it, and jump, δt = 0.
 
-use nalgebra::{DMatrix, DVector, RowDVector};
+use nalgebra::{Complex, DMatrix, DVector, RowDVector};
 
 use super::instant::Inputs;
 use super::system::{Row, System};
@@ -68,7 +68,7 @@ impl Side<'_> {
 
     /// ṡ.
     pub(super) fn storage_rate(&self) -> DVector<f64> {
-        &self.system.lcs.storage.x * self.rate() + &self.system.storage_u * &self.inputs.du
+        &self.system.lcs.storage.x * self.rate() + &self.system.storage_inputs * &self.inputs.du
     }
 }
 
@@ -97,9 +97,9 @@ impl Saltation {
             None => right.storage.inject.clone(),
         };
         let mut x = &inject * &left.storage.x;
-        let mut u = &inject * &before.system.storage_u;
+        let mut u = &inject * &before.system.storage_inputs;
         if let Some(jump) = through {
-            u += &right.storage.inject * &jump.storage_u;
+            u += &right.storage.inject * &jump.storage_inputs;
         }
         let mut du = DMatrix::zeros(x.nrows(), u.ncols());
         if let Some(timing) = &timing {
@@ -132,7 +132,7 @@ impl Impulse {
         let areas = rows * &jump;
         let parts = |side: &Side<'_>| {
             let system = side.system;
-            [system.lcs.storage.x.clone(), system.storage_u.clone()]
+            [system.lcs.storage.x.clone(), system.storage_inputs.clone()]
         };
         let ([x, u], [x_after, u_after]) = (parts(before), parts(after));
         Some(Self {
@@ -144,19 +144,27 @@ impl Impulse {
     }
 
     /// How the areas vary.
-    pub(crate) fn variation<T>(
+    pub(crate) fn variation(
         &self,
-        (before, after): (&DVector<T>, &DVector<T>),
-        du: &DVector<T>,
-        dt: T,
-    ) -> DVector<T>
-    where
-        T: nalgebra::ComplexField<RealField = f64> + Copy,
-    {
-        let lift = |m: &DMatrix<f64>| m.map(T::from_real);
+        (before, after): (&DVector<Complex<f64>>, &DVector<Complex<f64>>),
+        du: &DVector<Complex<f64>>,
+        dt: Complex<f64>,
+    ) -> DVector<Complex<f64>> {
         let [x, u, x_after, u_after] = &self.storage;
-        let jump = lift(x) * before + lift(u) * du - lift(x_after) * after - lift(u_after) * du
-            + self.rate.map(T::from_real) * dt;
-        lift(&self.rows) * jump
+        let left = times(x, before) + times(u, du);
+        let right = times(x_after, after) + times(u_after, du);
+        times(
+            &self.rows,
+            &(left - right + self.rate.map(|rate| dt * rate)),
+        )
     }
+}
+
+/// A real matrix times a complex vector.
+pub(crate) fn times(
+    matrix: &DMatrix<f64>,
+    vector: &DVector<Complex<f64>>,
+) -> DVector<Complex<f64>> {
+    let parts = [vector.map(|v| v.re), vector.map(|v| v.im)].map(|part| matrix * part);
+    parts[0].zip_map(&parts[1], Complex::new)
 }

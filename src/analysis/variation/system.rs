@@ -18,7 +18,7 @@ pub(crate) struct System {
     pub(crate) key: Key,
     pub(crate) lcs: Lcs,
     /// U, q×p.
-    pub(super) storage_u: DMatrix<f64>,
+    pub(crate) storage_inputs: DMatrix<f64>,
     /// E, n×p.
     pub(crate) inputs: DMatrix<f64>,
     /// The basis in which fast states owe nothing to the others, where there are any.
@@ -105,7 +105,7 @@ impl System {
         let (n, p, q) = (lcs.n(), lcs.p(), lcs.storage.names.len());
         Ok(Self {
             key: key.clone(),
-            storage_u: shaped(&lcs.storage.u, q, p),
+            storage_inputs: shaped(&lcs.storage.u, q, p),
             inputs: shaped(&lcs.e, n, p),
             basis: (!lcs.fast.is_empty())
                 .then(|| decoupled(&lcs.a, &lcs.fast))
@@ -122,12 +122,7 @@ impl System {
 
     /// s = X x + U u + k.
     pub(super) fn storage(&self, x: &DVector<f64>, u: &DVector<f64>) -> DVector<f64> {
-        &self.lcs.storage.x * x + &self.storage_u * u + &self.lcs.storage.one
-    }
-
-    /// U, q×p.
-    pub(crate) const fn storage_inputs(&self) -> &DMatrix<f64> {
-        &self.storage_u
+        &self.lcs.storage.x * x + &self.storage_inputs * u + &self.lcs.storage.one
     }
 
     /// x' at x.
