@@ -3,8 +3,10 @@
 
 use std::path::Path;
 
-use circ::analysis::{Orbit, OrbitKind, PeriodicOptions, periodic};
-use circ::integrate::Reason;
+use circ::analysis::{
+    Measurements, Orbit, OrbitKind, PeriodicOptions, periodic, periodic_measured, transient,
+};
+use circ::integrate::{Reason, RowKind};
 use circ::{Error, Model, Run, SimOptions};
 
 fn parsed(text: &str) -> Model {
@@ -301,4 +303,39 @@ fn an_orbit_of_steps_states_how_far_it_is_off() {
         let apart = (a - b).abs() / amplitude.max(f64::MIN_POSITIVE);
         assert!(apart <= stated, "{name}: {a} {b}, {apart:e} of {stated:e}");
     }
+}
+
+/// Measures see the orbit as a transient that began on it long ago.
+#[test]
+fn measurements_of_an_orbit_are_those_of_a_settled_transient() {
+    let text = "rc\nv1 1 0 pulse(0 10 0 0 0 0.5m 1m)\nr1 1 2 1k\nc1 2 0 1u\n.tran 10u 40.25m\n.save v(2)\n\
+        .meas tran mean avg v(2) from=20m to=30m\n.meas tran quarter find v(2) at=30.25m\n\
+        .meas tran rise trig v(2) val=5 rise=1 td=30m targ v(2) val=5 rise=2 td=30m\n\
+        .meas tran late when v(2)=5 fall=last\n.meas tran high max v(2)\n.four 1k v(2)\n.end\n";
+    let model = parsed(text);
+    let (_, run, found) = periodic_measured(&model, &PeriodicOptions::default()).expect("an orbit");
+    let grid = run.kinds.iter().filter(|kind| **kind == RowKind::Grid);
+    assert_eq!((grid.count(), run.waveforms.names.len()), (101, 1));
+    let settled = transient(&model, SimOptions::default());
+    let (_, settled) = settled.run.expect("a run");
+    let value =
+        |found: &Measurements, k: usize| found.measured[k].result.clone().expect("a value").value;
+    for k in 0..4 {
+        let (orbit, transient) = (value(&found, k), value(&settled, k));
+        // A transient that ends in the middle of a period has its last crossing there.
+        let apart = if k == 3 {
+            orbit - transient - 1e-3 * ((orbit - transient) / 1e-3).round()
+        } else {
+            orbit - transient
+        };
+        assert!(
+            apart.abs() < 2e-6 * transient,
+            "{k}: {orbit:e} {transient:e}"
+        );
+    }
+    let swing = 5.0 * 0.25_f64.tanh();
+    assert!((value(&found, 4) - 5.0 - swing).abs() < 1e-12);
+    assert!((value(&found, 0) - 5.0).abs() < 1e-6);
+    let mean = found.harmonics[0].result.clone().expect("harmonics").mean;
+    assert!((mean - 5.0).abs() < 1e-6);
 }

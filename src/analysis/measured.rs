@@ -1,12 +1,18 @@
 //! A transient with its measurements: the signals they need are simulated besides those that are shown, and taken away again.
 
+use super::periodic::{PeriodicOptions, on_grid, periodic};
+use super::table::Table;
 use crate::circuit::{Circuit, Harmonics, Measured, Probe, Tran};
-use crate::integrate::{Block, Error, Grid, RowKind, Run, SimOptions};
+use crate::integrate::{Block, Error, Grid, Orbit, RowKind, Run, SimOptions};
 use crate::model::Model;
+use crate::settings::tolerances::times::LAST_ROW;
 use crate::waveform::Waveforms;
 
 /// Rows that measurements see at least, besides those at events: a coarser print step is divided for them.
 const ROWS: usize = 2000;
+
+/// Values of an orbit that is repeated for measurements at most.
+const MOST_VALUES: usize = 4_000_000;
 
 /// The outcome of the measurements of one run.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -15,13 +21,15 @@ pub struct Measurements {
     pub measured: Vec<Measured>,
     /// Of `.four`, in file order.
     pub harmonics: Vec<Harmonics>,
+    /// The means of all elements, where they were asked for.
+    pub table: Option<Table>,
 }
 
 impl Measurements {
     /// Whether nothing was asked for.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.measured.is_empty() && self.harmonics.is_empty()
+        self.measured.is_empty() && self.harmonics.is_empty() && self.table.is_none()
     }
 }
 
@@ -85,9 +93,50 @@ pub fn transient(model: &Model, options: SimOptions<'_>) -> Finished {
     finished
 }
 
+/// The orbit of [`periodic`](super::periodic()), with what `.meas` and `.four` ask of it.
+///
+/// They see it repeated until the end of `.tran`, two periods at least, as a transient that began on it long ago would show it: windows and
+/// times mean what they mean there. Where that takes more than four million values the first periods are left out, and a note says so.
+///
+/// # Errors
+/// As [`periodic`](super::periodic()).
+pub fn periodic_measured(
+    model: &Model,
+    options: &PeriodicOptions<'_>,
+) -> Result<(Orbit, Run, Measurements), Error> {
+    let circuit = model.circuit();
+    if !is_measured(circuit) {
+        let (orbit, run) = periodic(model, options)?;
+        return Ok((orbit, run, Measurements::default()));
+    }
+    let mut measuring = Measuring::of(circuit, false);
+    let probing = measuring.probing(model, circuit.tran)?;
+    let options = PeriodicOptions {
+        corners: true,
+        ..options.clone()
+    };
+    let (orbit, mut run) = on_grid(&probing, &options, |tran| {
+        let rows = Grid::of(&tran).len();
+        measuring.divisions = ROWS.div_ceil(rows);
+        measuring.tran = Some(Tran {
+            tstart: 0.0,
+            tstop: tran.tstop - tran.tstart,
+            ..tran
+        });
+        Tran {
+            tstep: tran.tstep / measuring.divisions as f64,
+            ..tran
+        }
+    })?;
+    let found = measuring.carry_out_repeated(&mut run, orbit.period);
+    Ok((orbit, run, found))
+}
+
 /// What a circuit's measurements need, and how its results are shown without that.
 struct Measuring<'a> {
     circuit: &'a Circuit,
+    /// What the rows that are shown cover.
+    tran: Option<Tran>,
     /// Rows that are computed for each row that is shown.
     divisions: usize,
     /// Columns that are shown.
@@ -99,6 +148,7 @@ impl<'a> Measuring<'a> {
         let rows = circuit.tran.map_or(ROWS, |tran| Grid::of(&tran).len());
         Self {
             circuit,
+            tran: circuit.tran,
             // A fixed step is the user's choice of accuracy, which rows between would change.
             divisions: if fixed_step { 1 } else { ROWS.div_ceil(rows) },
             shown: circuit.probes().len(),
@@ -107,6 +157,11 @@ impl<'a> Measuring<'a> {
 
     /// The same circuit with a finer grid, and the signals of its measurements after those that are shown.
     fn model(&self, model: &Model) -> Result<Model, Error> {
+        self.probing(model, self.fine())
+    }
+
+    /// The same circuit with the signals of its measurements after those that are shown.
+    fn probing(&self, model: &Model, tran: Option<Tran>) -> Result<Model, Error> {
         let mut probes = self.circuit.probes();
         for probe in &self.circuit.measured {
             if !probes.contains(probe) {
@@ -115,14 +170,14 @@ impl<'a> Measuring<'a> {
         }
         model.with_circuit(Circuit {
             probes,
-            tran: self.fine(),
+            tran,
             ..self.circuit.clone()
         })
     }
 
     /// The transient with the print step of the run.
     fn fine(&self) -> Option<Tran> {
-        self.circuit.tran.map(|tran| Tran {
+        self.tran.map(|tran| Tran {
             tstep: tran.tstep / self.divisions as f64,
             ..tran
         })
@@ -130,22 +185,46 @@ impl<'a> Measuring<'a> {
 
     /// Measures on all rows, then leaves only what is shown.
     fn carry_out(&self, run: &mut Run) -> Measurements {
-        let waves = &run.waveforms;
+        let found = self.found(&run.waveforms, (0, 1), 0.0);
+        (run.waveforms, run.kinds) = self.cut(&run.waveforms, &run.kinds);
+        found
+    }
+
+    /// The same on rows that repeat.
+    fn carry_out_repeated(&self, run: &mut Run, period: f64) -> Measurements {
+        let until = self.circuit.tran.map_or(0.0, |tran| tran.tstop);
+        let laps = (until / period - LAST_ROW).ceil().max(2.0) as usize;
+        let kept = MOST_VALUES / run.waveforms.values.len().max(1);
+        let kept = laps.min(kept.max(2));
+        if kept < laps {
+            let text = format!(
+                "measurements see the last {kept} of the {laps} periods until the end of `.tran`"
+            );
+            run.notes.push(text.into());
+        }
+        let found = self.found(&run.waveforms, (laps - kept, laps), period);
+        (run.waveforms, run.kinds) = self.cut(&run.waveforms, &run.kinds);
+        found
+    }
+
+    /// What measurements find on rows that are repeated from one lap to another.
+    fn found(&self, waves: &Waveforms, (from, to): (usize, usize), period: f64) -> Measurements {
+        let shifted = |lap: usize| waves.time.iter().map(move |t| t + lap as f64 * period);
+        let time: Vec<f64> = (from..to).flat_map(shifted).collect();
         let column = |probe: &Probe| {
             let index = waves.names.iter().position(|name| *name == probe.name)?;
-            Some(waves.column(index).collect())
+            Some((from..to).flat_map(|_| waves.column(index)).collect())
         };
-        let found = Measurements {
-            measured: self.circuit.measure(&waves.time, &column),
-            harmonics: self.circuit.harmonics(&waves.time, &column),
-        };
-        (run.waveforms, run.kinds) = self.cut(waves, &run.kinds);
-        found
+        Measurements {
+            measured: self.circuit.measure(&time, &column),
+            harmonics: self.circuit.harmonics(&time, &column),
+            table: None,
+        }
     }
 
     /// The signals that are shown, at the print steps and between.
     fn cut(&self, waves: &Waveforms, kinds: &[RowKind]) -> (Waveforms, Vec<RowKind>) {
-        let grid = self.circuit.tran.map(|tran| Grid::of(&tran));
+        let grid = self.tran.map(|tran| Grid::of(&tran));
         let fine = self.fine().map(|tran| Grid::of(&tran).len());
         let mut kept = Waveforms {
             title: waves.title.clone(),

@@ -6,6 +6,7 @@
 //! | `.dc` | [`dc`]: a [`Characteristic`] |
 //! | the periodic steady state | [`periodic`]: its [`Orbit`] and one period of waveforms |
 //! | `.ac`, small signals about the operating point or that state | [`small_signal`]: a [`Response`] over frequency |
+//! | means, extrema and powers of all elements, efficiency, distortion | [`table()`], [`periodic_table`]: a [`Table`] |
 //! | `.step`, or any other values | [`variants`]: a [`Variant`] for every combination of values; [`each`] asks all of them, in parallel |
 
 mod dc;
@@ -13,14 +14,18 @@ mod measured;
 mod periodic;
 mod small_signal;
 mod sweep;
+mod table;
 mod variation;
 
 pub use crate::integrate::{Orbit, OrbitKind};
 pub use dc::{Characteristic, Unsolved, dc};
-pub use measured::{Finished, Measurements, is_measured, transient};
+pub use measured::{Finished, Measurements, is_measured, periodic_measured, transient};
 pub use periodic::{PeriodicOptions, orbit_start, periodic};
 pub use small_signal::{
     About, Left, Margin, Ratio, Response, SmallSignalOptions, margins, ratios, small_signal,
     unwrapped,
 };
 pub use sweep::{Variant, each, variants};
+pub use table::{
+    ElementMeans, Mean, SignalMeans, Span, Table, TableOptions, Throughput, periodic_table, table,
+};

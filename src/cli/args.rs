@@ -142,6 +142,23 @@ pub struct ResultArgs {
     pub summary: Option<Summary>,
 }
 
+/// The table of means.
+#[derive(Debug, Args)]
+pub struct TableArgs {
+    /// Print mean, rms, least and greatest current and voltage and the mean power of every element, exact where the run is
+    ///
+    /// From tstart to tstop, or over the period. With the powers of sources and loads, efficiency, and ripple and distortion of the signals
+    /// shown; in `--summary json` as `table`.
+    #[arg(long)]
+    pub table: bool,
+    /// An element whose power is input (repeatable) [default: all sources]
+    #[arg(id = "in", long = "in", value_name = "NAME", num_args = 1.., requires = "table")]
+    pub inputs: Vec<String>,
+    /// An element whose power is output (repeatable) [default: those whose current `.save` names, or resistors across voltages it names]
+    #[arg(id = "out", long = "out", value_name = "NAME", num_args = 1.., requires = "table")]
+    pub outputs: Vec<String>,
+}
+
 /// `circ sim`.
 #[derive(Debug, Args)]
 pub struct SimArgs {
@@ -163,6 +180,9 @@ pub struct SimArgs {
     /// Start at the periodic steady state, with sources that do not repeat held before 0 and running from there on
     #[arg(long)]
     pub from_pss: bool,
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub table: TableArgs,
 }
 
 /// `circ pss`.
@@ -183,6 +203,9 @@ pub struct PssArgs {
     /// How well the orbit must close, relative to the amplitudes [default: 1e-9; 1e-6 where laws are curved]
     #[arg(long, value_name = "R", value_parser = positive)]
     pub tol: Option<f64>,
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub table: TableArgs,
 }
 
 /// `circ ac`.

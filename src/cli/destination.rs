@@ -201,8 +201,13 @@ impl<'a> Destination<'a> {
                 }
             }
         }
+        let notes = found.table.iter().flat_map(|table| &table.notes);
+        for note in notes {
+            streams.say(format!("note: {}", places.of(note)));
+        }
+        // Asked for, as a summary is.
         if !found.is_empty() {
-            streams.say(found.words());
+            streams.error(found.words());
         }
     }
 }

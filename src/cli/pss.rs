@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::args::PssArgs;
+use super::args::{PssArgs, TableArgs};
 use super::destination::{Destination, Wanted};
 use super::exit::{Exit, Failure};
 use super::input;
@@ -10,7 +10,7 @@ use super::output::Format;
 use super::rows::Columns;
 use super::signals::Signals;
 use super::streams::Streams;
-use crate::analysis::{Finished, PeriodicOptions, periodic};
+use crate::analysis::{Finished, PeriodicOptions, periodic_measured, periodic_table};
 use crate::integrate::Run;
 
 /// Finds the periodic steady state and writes one period of it.
@@ -36,21 +36,36 @@ pub(super) fn pss(args: &PssArgs, streams: &Streams) -> Result<Exit, Failure> {
     let tran = model.circuit().tran;
     let destination = Destination::of(wanted, &formats, tran, subject.places(), streams);
     let outputs = destination.open(&Columns::of_subject(&subject))?;
-    let found = periodic(
-        model,
-        &PeriodicOptions {
-            period: args.period,
-            order: args.order.map(usize::from),
-            tol: args.tol,
-            events: args.results.events,
-            corners: destination.has_pictures(),
-            cancel: Some(signals.flag()),
-            ..PeriodicOptions::default()
-        },
-    );
-    let run = found.map(|(orbit, run)| Run {
-        orbit: Some(orbit),
-        ..run
+    let options = PeriodicOptions {
+        period: args.period,
+        order: args.order.map(usize::from),
+        tol: args.tol,
+        events: args.results.events,
+        corners: destination.has_pictures(),
+        cancel: Some(signals.flag()),
+        ..PeriodicOptions::default()
+    };
+    let found = periodic_measured(model, &options).and_then(|(orbit, run, mut found)| {
+        let TableArgs {
+            table,
+            inputs,
+            outputs,
+        } = &args.table;
+        if *table {
+            found.table = Some(periodic_table(model, (inputs, outputs), &options)?);
+        }
+        let run = Run {
+            orbit: Some(orbit),
+            ..run
+        };
+        Ok((run, found))
     });
-    destination.finish(outputs, Finished::of(run), true, signals.received())
+    let finished = match found {
+        Ok(run) => Finished {
+            run: Some(run),
+            error: None,
+        },
+        Err(error) => Finished::of(Err(error)),
+    };
+    destination.finish(outputs, finished, true, signals.received())
 }

@@ -16,7 +16,7 @@ use super::rows::Columns;
 use super::signals::Signals;
 use super::steps::Stepping;
 use super::streams::Streams;
-use crate::analysis::{self, Finished, PeriodicOptions, is_measured};
+use crate::analysis::{self, Finished, PeriodicOptions, TableOptions, is_measured};
 use crate::circuit::source::Wave;
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{
@@ -88,6 +88,11 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         let message = format!("{file}: `--from-pss` takes a netlist, not a system");
         return Err(Failure::Message(message));
     }
+    if let (true, Subject::System(_)) = (args.table.table, &subject) {
+        let file = args.input.file.display();
+        let message = format!("{file}: `--table` takes a netlist, not a system");
+        return Err(Failure::Message(message));
+    }
     let destination = Destination::of(
         args.wanted(),
         &formats,
@@ -108,6 +113,9 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         from_orbit: args.from_pss,
     };
     let mut finished = measured_run(&subject, &request, route, streams);
+    if let (true, None) = (args.table.table, &finished.error) {
+        tabulate(args, &subject, &request, &mut finished, signals.flag());
+    }
     if let (true, Some((run, _)), None) = (args.verify, &mut finished.run, &finished.error) {
         let options = VerifyOptions {
             settings: request.settings(),
@@ -136,9 +144,53 @@ impl SimArgs {
     }
 }
 
+/// Adds the means of all elements.
+fn tabulate(
+    args: &SimArgs,
+    subject: &Subject,
+    request: &Request,
+    finished: &mut Finished,
+    cancel: &AtomicBool,
+) {
+    let (Subject::Circuit(model), Some((_, found))) = (subject, &mut finished.run) else {
+        return;
+    };
+    let start = args.from_pss.then(|| {
+        let asked = PeriodicOptions {
+            cancel: Some(cancel),
+            settings: request.settings(),
+            ..PeriodicOptions::default()
+        };
+        analysis::orbit_start(model, &asked).map(|(_, start)| start)
+    });
+    let table = start.transpose().and_then(|start| {
+        let options = TableOptions {
+            inputs: args.table.inputs.clone(),
+            outputs: args.table.outputs.clone(),
+            start,
+            method: request.method,
+            theta: request.theta,
+            gamma: request.gamma,
+            step: request.step,
+            cancel: Some(cancel),
+            settings: request.settings(),
+        };
+        analysis::table(model, &options)
+    });
+    match table {
+        Ok(table) => found.table = Some(table),
+        Err(error) => finished.error = Some(error),
+    }
+}
+
 /// # Errors
-/// [`Failure::Message`] where a second run is asked for of what is no single transient run.
+/// [`Failure::Message`] where a second run or a table is asked for of what is no single transient run.
 fn only_one_way(args: &SimArgs) -> Result<(), Failure> {
+    if args.table.table {
+        let file = args.input.file.display();
+        let message = "`--table` takes one transient run of a circuit, without `.step`";
+        return Err(Failure::Message(format!("{file}: {message}")));
+    }
     if args.verify {
         let file = args.input.file.display();
         let message = "`--verify` takes one transient run of a circuit or system, without `.step`";

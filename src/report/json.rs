@@ -4,7 +4,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::text;
-use crate::analysis::Measurements;
+use crate::analysis::{Measurements, Table};
 use crate::integrate::{Energy, Impulse, Orbit, Places, Run, StateJump, StatedError, Verified};
 
 #[derive(Serialize)]
@@ -35,6 +35,8 @@ struct Summary<'a> {
     measurements: Vec<Value>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     fourier: Vec<Value>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    table: Option<&'a Table>,
 }
 
 /// Of all jumps, those that are not listed included.
@@ -65,7 +67,7 @@ pub(super) fn summary_object(
 }
 
 impl<'a> Summary<'a> {
-    fn of(run: &'a Run, found: &Measurements, places: Places<'_>) -> Self {
+    fn of(run: &'a Run, found: &'a Measurements, places: Places<'_>) -> Self {
         let stats = &run.stats;
         let (measurements, fourier) = found.json();
         Self {
@@ -82,7 +84,11 @@ impl<'a> Summary<'a> {
             cpu_seconds: stats.cpu_seconds,
             energy: Balance::of(run),
             error: run.error,
-            notes: places.all(&run.notes),
+            notes: [Some(&run.notes), found.table.as_ref().map(|t| &t.notes)]
+                .into_iter()
+                .flatten()
+                .flat_map(|notes| places.all(notes))
+                .collect(),
             impulses: &run.impulses,
             state_jumps: &run.state_jumps.first,
             state_jumps_total: Total {
@@ -94,6 +100,7 @@ impl<'a> Summary<'a> {
             pss: run.orbit.as_ref(),
             measurements,
             fourier,
+            table: found.table.as_ref(),
         }
     }
 }

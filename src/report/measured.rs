@@ -26,6 +26,9 @@ impl Measurements {
         for analysis in &self.harmonics {
             text.push_str(&harmonics(analysis));
         }
+        if let Some(table) = &self.table {
+            text.push_str(&table.words());
+        }
         text
     }
 
@@ -169,6 +172,7 @@ mod tests {
                     thd: Some(0.025),
                 }),
             }],
+            table: None,
         }
     }
 

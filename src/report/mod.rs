@@ -4,6 +4,7 @@
 //! font, [`html`] puts it on a page. [`text`] and [`json`] are the summaries, [`terminal`] plots with characters.
 
 pub mod json;
+pub mod means;
 pub mod measured;
 pub mod si;
 pub mod steps;

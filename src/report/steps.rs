@@ -143,6 +143,7 @@ pub fn measured(steps: &[Step]) -> String {
         let harmonics = Measurements {
             measured: Vec::new(),
             harmonics: step.found.harmonics.clone(),
+            table: None,
         };
         if !harmonics.is_empty() {
             text.push_str(&format!("{}\n{}", step.label(), harmonics.words()));

@@ -8,7 +8,7 @@ mod tests;
 
 use std::sync::atomic::AtomicBool;
 
-use super::variation::Trajectory;
+use super::variation::{Course, Trajectory};
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{
     Error, Note, Orbit, OrbitKind, Reason, Run, SimOptions, Simulation, SimulationOptions,
@@ -66,6 +66,15 @@ pub struct PeriodicOptions<'a> {
 /// # Ok::<(), circ::Error>(())
 /// ```
 pub fn periodic(model: &Model, options: &PeriodicOptions<'_>) -> Result<(Orbit, Run), Error> {
+    on_grid(model, options, |tran| tran)
+}
+
+/// As [`periodic`], on the grid that `grid` makes of that of the period.
+pub(super) fn on_grid(
+    model: &Model,
+    options: &PeriodicOptions<'_>,
+    grid: impl FnOnce(Tran) -> Tran,
+) -> Result<(Orbit, Run), Error> {
     let mut steady = steady(model, options)?;
     let standing = steady.standing()?;
     let Steady {
@@ -77,7 +86,13 @@ pub fn periodic(model: &Model, options: &PeriodicOptions<'_>) -> Result<(Orbit, 
         apart,
     } = steady;
     let (names, orbit) = (simulation.state_names(), found.orbit());
-    let mut run = rows((&circuit, &multiport), standing, orbit.period, options)?;
+    let mut run = rows(
+        (&circuit, &multiport),
+        standing,
+        orbit.period,
+        options,
+        grid,
+    )?;
     if !simulation.is_exact() {
         for error in [&mut run.error.max, &mut run.error.rms] {
             *error = error.zip(apart).map(|(error, apart)| error.max(apart));
@@ -132,6 +147,18 @@ impl Steady {
         })
     }
 
+    /// One period of the orbit, and the time at which it begins, s; `None` where steps are made in it.
+    ///
+    /// # Errors
+    /// As [`Course::of`].
+    pub(super) fn course(&mut self) -> Result<Option<(Course, f64)>, Error> {
+        let (stand, from) = (&self.found.fixed.stand, self.found.from);
+        let place = (from, &stand.state[..], &stand.switches[..]);
+        let until = from + self.found.orbit().period;
+        let course = Course::of(&mut self.simulation, place, until)?;
+        Ok(course.map(|course| (course, from)))
+    }
+
     /// One period of the orbit with what its derivative is made of, and the time from which on rows of the orbit count, s. It begins in the
     /// middle of the longest stretch without an event, so that none stands where it ends and begins.
     ///
@@ -153,6 +180,12 @@ impl Steady {
         let trajectory = Trajectory::of(&mut self.simulation, place, begin + period)?;
         Ok((trajectory, from))
     }
+}
+
+/// The common period of the sources that repeat, s.
+pub(super) fn common_period(circuit: &Circuit) -> Option<f64> {
+    let (circuit, _) = period::repeating(circuit);
+    period::common(&circuit).ok()?.seconds
 }
 
 /// Finds the periodic steady state.
@@ -281,20 +314,21 @@ fn rows(
     standing: Standing,
     period: f64,
     options: &PeriodicOptions<'_>,
+    grid: impl FnOnce(Tran) -> Tran,
 ) -> Result<Run, Error> {
     let from = standing.t;
     let asked = circuit
         .tran
         .filter(|tran| tran.prints && tran.tstep < period);
     let circuit = Circuit {
-        tran: Some(Tran {
+        tran: Some(grid(Tran {
             tstep: asked.map_or(period / SPAN_PARTS, |tran| tran.tstep),
             prints: asked.is_some(),
             tstop: from + period,
             tstart: from,
             tmax: circuit.tran.and_then(|tran| tran.tmax),
             uic: true,
-        }),
+        })),
         ..circuit.clone()
     };
     let mut run = simulate(

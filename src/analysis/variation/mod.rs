@@ -8,7 +8,9 @@
 //!
 //! is a product of exponentials and saltations, without differences.
 
+mod course;
 mod instant;
+mod linear;
 mod saltation;
 mod system;
 
@@ -21,7 +23,9 @@ use crate::settings::tolerances::events::{AT_LEVEL, GRAZING, SAME_TIMING};
 use crate::settings::tolerances::jumps::FOLLOWS_JUMP;
 use crate::settings::tolerances::times::SAME_TIME;
 
+pub(crate) use course::{Course, Leap};
 use instant::Inputs;
+pub(crate) use linear::{Linear, Motion};
 use saltation::Side;
 pub(crate) use saltation::{Saltation, Timing, times};
 pub(crate) use system::{System, shaped};

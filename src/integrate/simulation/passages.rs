@@ -6,6 +6,7 @@ use super::Simulation;
 use super::way::Way;
 use crate::integrate::error::Error;
 use crate::integrate::exact::{Assembler, Passage};
+use crate::integrate::stats::Impulse;
 
 impl Simulation {
     /// The changes of mode on the way from a place, as for [`Self::stand_at`], to time `until`, s: the first is the one into the mode there.
@@ -33,6 +34,11 @@ impl Simulation {
             from.next() == Some(false) && from.all(|known| known)
         };
         Ok(passages.filter(whole))
+    }
+
+    /// The impulses of devices and sources so far.
+    pub(crate) fn impulses(&self) -> &[Impulse] {
+        &self.impulses
     }
 
     /// Reduces the circuit for its modes, where no step is longer than `span`, s.

@@ -49,3 +49,11 @@ pub(crate) const TAKES_PART: f64 = 0.1;
 /// A small-signal response of which rounding may leave less than this is told. Larger: wrong digits unsaid; smaller: notes on what rounding does not
 /// do, as its bound is one.
 pub(crate) const LOST: f64 = 1e-6;
+
+/// An extremum that is no more than this part of the largest value beyond those known is not looked for. Larger: extrema lose digits; smaller:
+/// searches among rounding.
+pub(crate) const EXTREMUM: f64 = 1e-14;
+
+/// A fundamental below this part of a signal's root mean square is none, and the signal has no distortion. Larger: small fundamentals are
+/// denied; smaller: the rounding of a constant gets a distortion.
+pub(crate) const FUNDAMENTAL: f64 = 1e-9;

@@ -1,0 +1,152 @@
+//! The sums of a table over a run that is exact throughout.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Complex, DVector};
+
+use super::extrema::Extrema;
+use super::{Columns, Span, Sums, distortion, integrals};
+use crate::analysis::variation::{Course, Leap, Linear};
+use crate::circuit::Kind;
+use crate::integrate::Error;
+
+/// Sums over the whole span, and from some time on.
+struct Account {
+    mean: Vec<f64>,
+    square: Vec<f64>,
+    work: Vec<f64>,
+}
+
+impl Account {
+    fn of(columns: usize, elements: usize) -> Self {
+        Self {
+            mean: vec![0.0; columns],
+            square: vec![0.0; columns],
+            work: vec![0.0; elements],
+        }
+    }
+}
+
+pub(super) fn sums(
+    columns: &Columns<'_>,
+    course: &Course,
+    span: Span,
+    period: Option<f64>,
+) -> Result<Sums, Error> {
+    let (count, elements) = (columns.probes.len(), columns.elements.len());
+    // The last whole periods.
+    let whole = period.map(|period| {
+        let laps = ((span.to - span.from) / period * (1.0 + f64::EPSILON.sqrt())).floor();
+        (span.to - laps * period).max(span.from)
+    });
+    let omega = period.map(|period| TAU / period);
+    let mut all = Account::of(count, elements);
+    let mut periods = Account::of(count, 0);
+    let mut harmonics = vec![Complex::default(); count];
+    let mut extrema = Extrema::of(count);
+    let mut known = Vec::new();
+    let mut last: Vec<Option<DVector<f64>>> = vec![None; course.stretches.len()];
+    let mut first = last.clone();
+    for (k, stretch) in course.stretches.iter().enumerate() {
+        let (at, mut w) = Linear::of(&mut known, &course.systems, stretch);
+        let linear = &known[at];
+        first[k] = Some(&linear.rows[0] * &w);
+        let mut from = stretch.from;
+        let cuts = [span.from, whole.unwrap_or(span.from), stretch.to];
+        for cut in cuts {
+            let to = cut.min(stretch.to);
+            if to <= from {
+                continue;
+            }
+            let mut motion = linear.over(to - from);
+            if from >= span.from {
+                let counts = whole.is_some_and(|whole| from >= whole);
+                let integrals = integrals::over(&mut motion, &w, omega.filter(|_| counts))?;
+                let mean = &linear.rows[0] * &integrals.mean;
+                let factor = &linear.rows[0] * &integrals.factor;
+                for c in 0..count {
+                    let square = factor.row(c).norm_squared();
+                    all.mean[c] += mean[c];
+                    all.square[c] += square;
+                    if counts {
+                        periods.mean[c] += mean[c];
+                        periods.square[c] += square;
+                    }
+                }
+                for (work, (i, v)) in all.work.iter_mut().zip(&columns.elements) {
+                    *work += factor.row(*i).dot(&factor.row(*v));
+                }
+                if let (Some(harmonic), Some(omega)) = (&integrals.harmonic, omega) {
+                    let turn = Complex::from_polar(1.0, -omega * (from - span.from));
+                    for (c, sum) in harmonics.iter_mut().enumerate() {
+                        let row = linear.rows[0].row(c);
+                        let value: Complex<f64> =
+                            row.iter().zip(harmonic.iter()).map(|(r, h)| h * *r).sum();
+                        *sum += turn * value;
+                    }
+                }
+                extrema.over(&mut motion, &w)?;
+            }
+            w = motion.after(0, &w)?;
+            from = to;
+        }
+        last[k] = Some(&linear.rows[0] * &w);
+    }
+    for leap in &course.leaps {
+        if leap.t < span.from || leap.into == 0 {
+            continue;
+        }
+        let sides = (last[leap.into - 1].as_ref(), first[leap.into].as_ref());
+        if let (Some(before), Some(after)) = sides {
+            let areas = &leap.areas;
+            for c in 0..count {
+                all.mean[c] += areas[c];
+                if whole.is_some_and(|whole| leap.t >= whole) {
+                    periods.mean[c] += areas[c];
+                }
+            }
+            let sources = work_in(columns, leap, (before, after));
+            for (work, more) in all.work.iter_mut().zip(sources) {
+                *work += more;
+            }
+        }
+    }
+    let seconds = whole.map_or(0.0, |whole| span.to - whole);
+    let distortions = columns.shown.iter().map(|&c| {
+        period?;
+        let harmonic = harmonics[c].norm();
+        distortion(periods.square[c], periods.mean[c], harmonic, seconds)
+    });
+    Ok(Sums {
+        distortion: distortions.collect(),
+        mean: all.mean,
+        square: all.square,
+        work: all.work,
+        least: extrema.least,
+        greatest: extrema.greatest,
+    })
+}
+
+/// Work into sources and storage in a leap, J: the area of one factor's impulse times the other factor. That moves linearly with the charge
+/// (flux) between its values before and after in storage, and where an edge of a source acts without devices; what devices and switches take comes
+/// after the edge. What a leap loses is no element's.
+fn work_in(
+    columns: &Columns<'_>,
+    leap: &Leap,
+    (before, after): (&DVector<f64>, &DVector<f64>),
+) -> Vec<f64> {
+    let areas = &leap.areas;
+    let middle = |c: usize| 0.5 * (before[c] + after[c]);
+    let elements = columns.circuit.elements.iter().zip(&columns.elements);
+    let work = elements.map(|(element, &(i, v))| match element.kind {
+        Kind::Capacitor(_) | Kind::Inductor(_) => areas[i] * middle(v) + areas[v] * middle(i),
+        Kind::VoltageSource(_) | Kind::CurrentSource(_) => {
+            let by = |area: usize, at: usize| {
+                leap.direct[area] * middle(at) + (areas[area] - leap.direct[area]) * after[at]
+            };
+            by(i, v) + by(v, i)
+        }
+        _ => 0.0,
+    });
+    work.collect()
+}

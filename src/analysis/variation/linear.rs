@@ -1,0 +1,167 @@
+//! A stretch of a run as w' = 𝒜 w, w = [x | z] with the sources z, and what is read of it as rows over w.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::course::Stretch;
+use super::{System, not_smooth};
+use crate::integrate::Error;
+use crate::integrate::exact::{Exosystem, Shape, Spectrum, over_w};
+use crate::linalg::decouple::{Decoupled, decoupled};
+use crate::linalg::expm::Ladders;
+use crate::settings::tolerances::exponentials::{SERIES, SQUARED};
+
+/// w' = 𝒜 w, in the basis in which fast states owe nothing to the others.
+#[derive(Debug, Clone)]
+pub(crate) struct Linear {
+    /// The system, and the sources' S and H that it was made for.
+    system: usize,
+    sources: [DMatrix<f64>; 2],
+    /// 𝒜.
+    pub(crate) generator: DMatrix<f64>,
+    basis: Option<Decoupled>,
+    fast: Vec<usize>,
+    /// The outputs, their rates and the rates of these over w.
+    pub(crate) rows: [DMatrix<f64>; 3],
+    pub(crate) spectrum: Spectrum,
+}
+
+/// Motion over a span of time, halved again and again.
+pub(crate) struct Motion<'a> {
+    pub(crate) linear: &'a Linear,
+    /// s.
+    pub(crate) seconds: f64,
+    ladders: Ladders,
+    steps: Vec<Option<DMatrix<f64>>>,
+    /// Halvings after which Taylor's series holds.
+    pub(crate) bottom: u32,
+}
+
+impl Linear {
+    fn exosystem(stretch: &Stretch) -> Exosystem {
+        let shapes: Vec<Shape> = stretch.pieces.iter().map(|p| Shape::of([p])).collect();
+        Exosystem::new(&shapes, stretch.pieces.clone())
+    }
+
+    /// Of a stretch, from those that are known; and w where it begins.
+    pub(crate) fn of(
+        known: &mut Vec<Self>,
+        systems: &[System],
+        stretch: &Stretch,
+    ) -> (usize, DVector<f64>) {
+        let exosystem = Self::exosystem(stretch);
+        let sources = [exosystem.generator(), exosystem.output()];
+        let same =
+            |l: &Self| l.system == stretch.system && [&l.sources[0], &l.sources[1]] == sources;
+        let at = known.iter().position(same).unwrap_or_else(|| {
+            known.push(Self::new(
+                &systems[stretch.system],
+                stretch.system,
+                &exosystem,
+            ));
+            known.len() - 1
+        });
+        let n = stretch.start.len();
+        let mut w = stretch
+            .start
+            .clone()
+            .resize_vertically(n + exosystem.dim(), 0.0);
+        exosystem.write(stretch.from, &mut w.as_mut_slice()[n..]);
+        if let Some(basis) = &known[at].basis {
+            w = &basis.from * w;
+        }
+        (at, w)
+    }
+
+    fn new(system: &System, at: usize, exosystem: &Exosystem) -> Self {
+        let lcs = &system.lcs;
+        let (n, dz) = (lcs.n(), exosystem.dim());
+        let mut generator = DMatrix::zeros(n + dz, n + dz);
+        generator.view_mut((0, 0), (n, n)).copy_from(&lcs.a);
+        let mut input = &system.inputs * exosystem.output();
+        let mut constant = input.column_mut(0);
+        constant += &lcs.e0;
+        generator.view_mut((0, n), (n, dz)).copy_from(&input);
+        generator
+            .view_mut((n, n), (dz, dz))
+            .copy_from(exosystem.generator());
+        let basis = (!lcs.fast.is_empty())
+            .then(|| decoupled(&generator, &lcs.fast))
+            .flatten();
+        let mut rows = over_w(&lcs.outputs.rows, n, exosystem);
+        if let Some(basis) = &basis {
+            generator.copy_from(&basis.generator);
+            rows *= &basis.to;
+        }
+        let rates = &rows * &generator;
+        let second = &rates * &generator;
+        let moves = generator.view((0, 0), (n, n)).into_owned();
+        Self {
+            system: at,
+            sources: [exosystem.generator().clone(), exosystem.output().clone()],
+            fast: if basis.is_some() {
+                lcs.fast.clone()
+            } else {
+                vec![]
+            },
+            basis,
+            rows: [rows, rates, second],
+            spectrum: Spectrum::new(&moves, exosystem.rates()),
+            generator,
+        }
+    }
+
+    /// Motion over so many seconds.
+    pub(crate) fn over(&self, seconds: f64) -> Motion<'_> {
+        let ladders = Ladders::new(&self.generator, &self.fast, seconds, SQUARED, 0);
+        let halvings = (ladders.norm() / SERIES).log2().ceil();
+        Motion {
+            linear: self,
+            seconds,
+            steps: Vec::new(),
+            bottom: halvings.clamp(0.0, 1e3) as u32,
+            ladders,
+        }
+    }
+}
+
+impl Motion<'_> {
+    /// exp(𝒜 t/2^k) − I.
+    ///
+    /// # Errors
+    /// It does not exist in doubles.
+    pub(crate) fn step(&mut self, k: u32) -> Result<&DMatrix<f64>, Error> {
+        let at = k as usize;
+        if self.steps.len() <= at {
+            self.steps.resize(at + 1, None);
+        }
+        if self.steps[at].is_none() {
+            let increment = self.ladders.increment(k).ok_or_else(|| {
+                not_smooth(0.0, "the exponential of a mode does not exist in doubles")
+            })?;
+            let dim = self.linear.generator.nrows();
+            self.steps[at] = Some(DMatrix::from_fn(dim, dim, |i, j| increment.column(j)[i]));
+        }
+        Ok(self.steps[at].get_or_insert_with(DMatrix::default))
+    }
+
+    /// w after t/2^k seconds.
+    pub(crate) fn after(&mut self, k: u32, w: &DVector<f64>) -> Result<DVector<f64>, Error> {
+        Ok(w + self.step(k)? * w)
+    }
+
+    /// s at halving k.
+    pub(crate) fn part(&self, k: u32) -> f64 {
+        self.seconds * (-f64::from(k)).exp2()
+    }
+
+    /// Taylor's coefficients of w over so many seconds, at most the bottom's: w(s t) = Σ s^k w_k.
+    pub(crate) fn series(&self, w: &DVector<f64>, seconds: f64) -> Vec<DVector<f64>> {
+        /// Terms beyond which nothing is left where ‖𝒜‖ t ≤ ⅛.
+        const TERMS: usize = 16;
+        let mut terms = vec![w.clone()];
+        for k in 1..TERMS {
+            terms.push(&self.linear.generator * &terms[k - 1] * (seconds / k as f64));
+        }
+        terms
+    }
+}

@@ -1,0 +1,349 @@
+//! Tables of means and powers against closed forms, quadrature and the energy balance.
+#![allow(missing_docs, reason = "tests")]
+
+use std::f64::consts::PI;
+
+use circ::analysis::{PeriodicOptions, Table, TableOptions, periodic_table, table};
+use circ::{Method, Model, SimOptions};
+
+fn parsed(text: &str) -> Model {
+    Model::parse(text, "t.cir").expect("a circuit")
+}
+
+fn table_of(text: &str) -> Table {
+    let table = table(&parsed(text), &TableOptions::default()).expect("a table");
+    assert!(table.exact && table.notes.is_empty(), "{:?}", table.notes);
+    table
+}
+
+fn orbit_of(text: &str, (inputs, outputs): (&[String], &[String])) -> Table {
+    let table = periodic_table(
+        &parsed(text),
+        (inputs, outputs),
+        &PeriodicOptions::default(),
+    );
+    table.expect("a table")
+}
+
+fn near(found: f64, truth: f64, size: f64) {
+    let error = (found - truth).abs();
+    assert!(
+        error <= 1e-13 * size.abs().max(truth.abs()),
+        "{found:e} is not {truth:e}"
+    );
+}
+
+#[test]
+fn rectified_sines() {
+    let card = "rectifier\nv1 1 0 sin(0 10 50)\nd1 1 2 d\nr1 2 0 5\n.model d d(ideal)\n.tran 1m 60m 20m\n.save i(r1) v(1)\n.end\n";
+    let table = table_of(card);
+    let load = table.element("r1").expect("r1");
+    near(load.i.mean, 2.0 / PI, 1.0);
+    near(load.i.rms, 1.0, 1.0);
+    near(load.i.max, 2.0, 1.0);
+    near(load.i.min, 0.0, 1.0);
+    near(load.power, 5.0, 1.0);
+    let diode = table.element("d1").expect("d1");
+    near(diode.v.min, -10.0, 1.0);
+    near(diode.v.mean, -10.0 / PI, 1.0);
+    near(diode.power, 0.0, 1.0);
+    // Half sines: Y₁ = ½ of the amplitude.
+    let current = table.signal("i(r1)").expect("i(r1)");
+    let first = 0.5_f64.sqrt();
+    let truth = (1.0 - (2.0 / PI).powi(2) - first * first).sqrt() / first;
+    near(current.thd.expect("a distortion"), truth, 1.0);
+    // Of a sine rounding leaves the root of what is left of the square.
+    assert!(
+        table
+            .signal("v(1)")
+            .and_then(|s| s.thd)
+            .expect("a fundamental")
+            < 1e-7
+    );
+    near(table.power.efficiency.expect("a load"), 1.0, 1.0);
+    assert_eq!(table.power.outputs, ["r1"]);
+}
+
+/// A capacitor is charged and discharged over 1 kΩ in turn: v = 5 ∓ 5 tanh ¼, and the current starts at ±(5 + 5 tanh ¼) mA.
+#[test]
+fn the_orbit_of_a_pulsed_capacitor() {
+    let text = "rc\nv1 1 0 pulse(0 10 0 0 0 0.5m 1m)\nr1 1 2 1k\nc1 2 0 1u\n.tran 10u 1m\n.save v(2)\n.end\n";
+    let outputs = ["r1".to_string()];
+    let table = orbit_of(text, (&[], &outputs));
+    assert!(table.exact);
+    let swing = 5.0 * 0.25_f64.tanh();
+    let out = table.signal("v(2)").expect("v(2)");
+    near(out.value.mean, 5.0, 1.0);
+    near(out.value.min, 5.0 - swing, 1.0);
+    near(out.value.max, 5.0 + swing, 1.0);
+    near(out.ripple, 2.0 * swing, 1.0);
+    let (peak, decay) = ((5.0 + swing) * 1e-3, 1.0 - (-1.0_f64).exp());
+    let load = table.element("r1").expect("r1");
+    near(load.i.rms, peak * decay.sqrt(), 1e-3);
+    near(load.i.max, peak, 1e-3);
+    near(load.i.min, -peak, 1e-3);
+    near(load.power, 1e3 * peak * peak * decay, 1e-3);
+    near(table.element("c1").expect("c1").power, 0.0, 1e-2);
+    near(table.power.efficiency.expect("an output"), 1.0, 1.0);
+    // A square wave of ±5 V: its fundamental is 4/π times as high.
+    let source = table.element("v1").expect("v1");
+    near(source.v.rms, 50.0_f64.sqrt(), 1.0);
+    assert_eq!(table.fundamental, Some(1e3));
+}
+
+/// A synchronous buck without losses: its output has the mean D V. Into L and R alone the current is made of exponentials.
+#[test]
+fn a_buck_in_continuous_conduction() {
+    let switches = "v1 1 0 10\ns1 1 2 vc saw sw\ns2 2 0 saw vc sw\nvc vc 0 0.4\nvsaw saw 0 pulse(0 1 0 10u 0 0 10u)\n\
+        .model sw sw(vt=0 vh=0 ron=0 ideal=1)\n";
+    let text = format!("buck\n{switches}l1 2 3 100u\nc1 3 0 10u\nr1 3 0 5\n.save v(3)\n.end\n");
+    let outputs = ["r1".to_string()];
+    let inputs = ["v1".to_string()];
+    let table = orbit_of(&text, (&inputs, &outputs));
+    near(table.signal("v(3)").expect("v(3)").value.mean, 4.0, 1.0);
+    near(table.element("l1").expect("l1").i.mean, 0.8, 1.0);
+    near(table.power.efficiency.expect("an output"), 1.0, 10.0);
+    let text = format!("buck\n{switches}l1 2 3 100u\nr1 3 0 5\n.save v(3)\n.end\n");
+    let table = orbit_of(&text, (&inputs, &outputs));
+    // From least to greatest in D T towards V/R, back to 0 in (1 − D) T.
+    let (on, off) = ((-0.2_f64).exp(), (-0.3_f64).exp());
+    let greatest = 2.0 * (1.0 - on) / (1.0 - on * off);
+    let least = greatest * off;
+    let choke = table.element("l1").expect("l1");
+    near(choke.i.mean, 0.8, 1.0);
+    near(choke.i.max, greatest, 1.0);
+    near(choke.i.min, least, 1.0);
+    let (tau, below) = (20e-6, 2.0 - least);
+    let rising =
+        4.0 * 4e-6 - 4.0 * below * tau * (1.0 - on) + below * below * 0.5 * tau * (1.0 - on * on);
+    let falling = greatest * greatest * 0.5 * tau * (1.0 - off * off);
+    near(choke.i.rms, ((rising + falling) / 10e-6).sqrt(), 1.0);
+    near(choke.v.mean, 0.0, 1.0);
+    near(
+        table.element("s1").expect("s1").i.rms,
+        (rising / 10e-6).sqrt(),
+        1.0,
+    );
+}
+
+/// The nodes and weights of the rule of Gauss and Legendre with four points on [0, 1].
+const RULE: [(f64, f64); 4] = [
+    (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
+    (0.330_009_478_207_571_87, 0.326_072_577_431_273_07),
+    (0.669_990_521_792_428_1, 0.326_072_577_431_273_07),
+    (0.930_568_155_797_026_3, 0.173_927_422_568_726_93),
+];
+
+/// Netlists, and elements of them.
+const QUADRATURE: [(&str, &[&str]); 7] = [
+    ("netlists/bt-fig-2-2-steps.cir", &["l1", "d1", "i1"]),
+    ("netlists/bridge-capacitor-filter.cir", &[]),
+    ("netlists/jump-inductors.cir", &[]),
+    ("netlists/jump-capacitors.cir", &[]),
+    ("netlists/scr-rectifier.cir", &[]),
+    ("netlists/voltage-doubler.cir", &[]),
+    ("netlists/capacitor-loop.cir", &[]),
+];
+
+#[test]
+fn tables_are_what_fine_quadrature_finds() {
+    for (file, only) in QUADRATURE {
+        let model = Model::load(file, circ::ElaborateOptions::default()).expect(file);
+        let table = table(&model, &TableOptions::default()).expect(file);
+        assert!(table.exact, "{file}");
+        let circuit = model.circuit();
+        let elements = circuit.elements.iter();
+        let chosen = elements.filter(|e| only.is_empty() || only.contains(&e.name.as_str()));
+        let chosen: Vec<(&str, String, String)> = chosen
+            .take(4)
+            .map(|e| {
+                let node = |node: circ::circuit::NodeId| &circuit.nodes[node.index()];
+                (
+                    e.name.as_str(),
+                    format!("i({})", e.name),
+                    format!("v({},{})", node(e.p), node(e.n)),
+                )
+            })
+            .collect();
+        let probes = chosen
+            .iter()
+            .flat_map(|(_, i, v)| [i, v])
+            .map(|name| circuit.probe(name).expect("a probe"));
+        let tran = circuit.tran.expect("a transient");
+        let shown = circ::Circuit {
+            probes: probes.collect(),
+            tran: Some(circ::circuit::Tran {
+                tstep: tran.tstep.min((tran.tstop - tran.tstart) / 400.0),
+                ..tran
+            }),
+            ..circuit.clone()
+        };
+        let model = Model::of_circuit(shown).expect("a circuit");
+        let names: Vec<String> = model
+            .circuit()
+            .probes()
+            .into_iter()
+            .map(|p| p.name)
+            .collect();
+        let run = model
+            .transient(SimOptions {
+                corners: true,
+                ..SimOptions::default()
+            })
+            .expect("a run");
+        let mut simulation = model
+            .simulation(circ::SimulationOptions::default())
+            .expect("a simulation");
+        let mut sums = vec![[0.0; 3]; chosen.len()];
+        let mut squares = vec![0.0; chosen.len()];
+        for pair in run
+            .waveforms
+            .time
+            .windows(2)
+            .filter(|pair| pair[1] > pair[0])
+        {
+            // Fast transients follow events.
+            let h = pair[1] - pair[0];
+            let parts = (0..6).map(|k| {
+                (
+                    pair[0] + h * 0.25_f64.powi(6 - k),
+                    h * 0.75 * 0.25_f64.powi(5 - k),
+                )
+            });
+            let first = (pair[0], h * 0.25_f64.powi(6));
+            for (from, length) in std::iter::once(first).chain(parts) {
+                for (node, weight) in RULE {
+                    simulation
+                        .advance_to(from + node * length)
+                        .expect("an advance");
+                    let mut value = |k: usize| simulation.value(&names[k]).expect("a value");
+                    for k in 0..chosen.len() {
+                        let (i, v) = (value(2 * k), value(2 * k + 1));
+                        for (sum, part) in sums[k].iter_mut().zip([i, v, v * i]) {
+                            *sum += weight * length * part;
+                        }
+                        squares[k] += weight * length * i * i;
+                    }
+                }
+            }
+        }
+        let seconds = tran.tstop - tran.tstart;
+        for (k, (name, ..)) in chosen.iter().enumerate() {
+            let element = table.element(name).expect("an element");
+            let jumps = run.state_jumps.all.0 > 0;
+            let close = |found: f64, truth: f64, size: f64| {
+                let error = (found - truth).abs() / size.max(1e-9);
+                assert!(error < 1e-10, "{file} {name}: {found:e} is not {truth:e}");
+            };
+            let column = |c: usize| {
+                run.waveforms
+                    .column(c)
+                    .fold((f64::MAX, f64::MIN), |(a, b), y| (a.min(y), b.max(y)))
+            };
+            let (size_i, size_v) = (
+                element.i.min.abs().max(element.i.max),
+                element.v.min.abs().max(element.v.max),
+            );
+            if !jumps {
+                close(element.i.mean, sums[k][0] / seconds, size_i);
+                close(element.v.mean, sums[k][1] / seconds, size_v);
+                close(element.power, sums[k][2] / seconds, size_i * size_v);
+            }
+            close(element.i.rms, (squares[k] / seconds).sqrt(), size_i);
+            // Rows come as near to an extremum as they are dense.
+            for (mean, c) in [(element.i, 2 * k), (element.v, 2 * k + 1)] {
+                let (least, greatest) = column(c);
+                let slack = 1e-12 * mean.min.abs().max(mean.max.abs());
+                let span = 2e-2 * (mean.max - mean.min) + slack;
+                assert!(
+                    mean.min <= least + slack && mean.min >= least - span,
+                    "{file} {name} {} {least}",
+                    mean.min
+                );
+                assert!(
+                    mean.max >= greatest - slack && mean.max <= greatest + span,
+                    "{file} {name} {} {greatest}",
+                    mean.max
+                );
+            }
+        }
+    }
+}
+
+/// Without controlled sources, and without a jump at the start.
+const BALANCED: [&str; 14] = [
+    "boost.cir",
+    "bt-fig-2-2-steps.cir",
+    "capacitor-loop.cir",
+    "clamp.cir",
+    "cuk.cir",
+    "flyback.cir",
+    "isolated-rectifier.cir",
+    "jump-clamp.cir",
+    "jump-inductors.cir",
+    "jump-capacitors.cir",
+    "peak-detector.cir",
+    "rlc.cir",
+    "scr-bridge.cir",
+    "three-phase-rectifier.cir",
+];
+
+#[test]
+fn powers_add_up_to_the_energy_balance() {
+    for file in BALANCED {
+        let model = Model::load(
+            format!("netlists/{file}"),
+            circ::ElaborateOptions::default(),
+        );
+        let model = model.expect(file);
+        let tran = model.circuit().tran.map(|tran| circ::circuit::Tran {
+            tstart: 0.0,
+            ..tran
+        });
+        let circuit = circ::Circuit {
+            tran,
+            ..model.circuit().clone()
+        };
+        let model = Model::of_circuit(circuit).expect(file);
+        let energy = model.transient(SimOptions::default()).expect(file).energy;
+        let table = table(&model, &TableOptions::default()).expect(file);
+        let size = energy
+            .source
+            .abs()
+            .max(energy.dissipated)
+            .max(energy.stored.abs());
+        let seconds = table.span.to - table.span.from;
+        let input = table.power.input * seconds;
+        assert!(
+            (input - energy.source).abs() <= 1e-12 * size,
+            "{file}: {input:e} {:e}",
+            energy.source
+        );
+        // Into all elements together nothing goes but what jumps lose.
+        let all: f64 = table.elements.iter().map(|element| element.power).sum();
+        let lost = all * seconds + energy.jumps;
+        assert!(lost.abs() <= 1e-12 * size, "{file}: {lost:e}");
+    }
+}
+
+#[test]
+fn a_run_in_steps_says_so() {
+    let text = "rc\nv1 1 0 sin(0 1 50)\nr1 1 2 1k\nc1 2 0 1u\n.tran 0.1m 20m\n.end\n";
+    let exact = table_of(text);
+    let options = TableOptions {
+        method: Method::Theta,
+        ..TableOptions::default()
+    };
+    let steps = table(&parsed(text), &options).expect("a table");
+    assert!(!steps.exact && steps.notes.len() == 1);
+    for (a, b) in exact.elements.iter().zip(&steps.elements) {
+        for (a, b) in [
+            (a.i.rms, b.i.rms),
+            (a.v.rms, b.v.rms),
+            (a.v.max, b.v.max),
+            (a.power, b.power),
+        ] {
+            assert!((a - b).abs() < 1e-4 * a.abs(), "{a:e} {b:e}");
+        }
+    }
+}
