@@ -70,6 +70,7 @@ const ROOMS: [(&str, &[&str]); 21] = [
             "integrate",
             "lcs",
             "linalg",
+            "measure",
             "mna",
             "model",
             "settings",
@@ -178,7 +179,7 @@ const CONFINED: [(&str, &[&str], &str); 6] = [
 ];
 
 /// Constants of type f64 that decide nothing, outside `settings/tolerances/`: (file, names, why).
-const NO_TOLERANCES: [(&str, &[&str], &str); 19] = [
+const NO_TOLERANCES: [(&str, &[&str], &str); 21] = [
     (
         "algebra/ball.rs",
         &["EXACT_INTEGERS", "UP"],
@@ -188,6 +189,16 @@ const NO_TOLERANCES: [(&str, &[&str], &str); 19] = [
         "algebra/double.rs",
         &["ROUNDING", "SPLITTER"],
         "bounds of the arithmetic of doubles",
+    ),
+    (
+        "analysis/sensitivity.rs",
+        &["REFINED", "ROOM"],
+        "how dense rows are, and the room that they have",
+    ),
+    (
+        "analysis/variation/parameter.rs",
+        &["STEPS", "WEIGHTS"],
+        "a formula of differences",
     ),
     ("circuit/bipolar.rs", &["NOMINAL", "RATED"], DEFAULT),
     ("circuit/drive.rs", &["STARTUP"], DEFAULT),

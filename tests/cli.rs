@@ -125,7 +125,7 @@ fn waves(text: &str) -> Waveforms {
 fn help_names_every_command_and_flag() {
     assert_snapshot!(run("--help"));
     for command in [
-        "sim", "pss", "ac", "lcs", "check", "op", "bench", "compare", "graph",
+        "sim", "pss", "ac", "sens", "lcs", "check", "op", "bench", "compare", "graph",
     ] {
         let ran = run(&format!("{command} --help"));
         assert_eq!((ran.status, ran.err.as_str()), (0, ""));

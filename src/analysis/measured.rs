@@ -3,7 +3,7 @@
 use super::periodic::{PeriodicOptions, on_grid, periodic};
 use super::table::Table;
 use crate::circuit::{Circuit, Harmonics, Measured, Probe, Tran};
-use crate::integrate::{Block, Error, Grid, Orbit, RowKind, Run, SimOptions};
+use crate::integrate::{Block, Error, Grid, Note, Orbit, RowKind, Run, SimOptions};
 use crate::model::Model;
 use crate::settings::tolerances::times::LAST_ROW;
 use crate::waveform::Waveforms;
@@ -132,6 +132,22 @@ pub fn periodic_measured(
     Ok((orbit, run, found))
 }
 
+/// The periods of an orbit that measurements see, of so many values each: those until the end of `.tran`, or the last of them, and a note.
+pub(super) fn laps(
+    tran: Option<Tran>,
+    period: f64,
+    values: usize,
+) -> ((usize, usize), Option<Note>) {
+    let until = tran.map_or(0.0, |tran| tran.tstop);
+    let laps = (until / period - LAST_ROW).ceil().max(2.0) as usize;
+    let kept = laps.min((MOST_VALUES / values.max(1)).max(2));
+    let note = (kept < laps).then(|| {
+        let text = "of the periods until the end of `.tran`";
+        format!("measurements see the last {kept} {text}, which are {laps}").into()
+    });
+    ((laps - kept, laps), note)
+}
+
 /// What a circuit's measurements need, and how its results are shown without that.
 struct Measuring<'a> {
     circuit: &'a Circuit,
@@ -192,17 +208,9 @@ impl<'a> Measuring<'a> {
 
     /// The same on rows that repeat.
     fn carry_out_repeated(&self, run: &mut Run, period: f64) -> Measurements {
-        let until = self.circuit.tran.map_or(0.0, |tran| tran.tstop);
-        let laps = (until / period - LAST_ROW).ceil().max(2.0) as usize;
-        let kept = MOST_VALUES / run.waveforms.values.len().max(1);
-        let kept = laps.min(kept.max(2));
-        if kept < laps {
-            let text = format!(
-                "measurements see the last {kept} of the {laps} periods until the end of `.tran`"
-            );
-            run.notes.push(text.into());
-        }
-        let found = self.found(&run.waveforms, (laps - kept, laps), period);
+        let (laps, note) = laps(self.circuit.tran, period, run.waveforms.values.len());
+        run.notes.extend(note);
+        let found = self.found(&run.waveforms, laps, period);
         (run.waveforms, run.kinds) = self.cut(&run.waveforms, &run.kinds);
         found
     }

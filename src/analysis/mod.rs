@@ -6,12 +6,14 @@
 //! | `.dc` | [`dc`]: a [`Characteristic`] |
 //! | the periodic steady state | [`periodic`]: its [`Orbit`] and one period of waveforms |
 //! | `.ac`, small signals about the operating point or that state | [`small_signal`]: a [`Response`] over frequency |
+//! | derivatives of `.meas` to element values and parameters | [`sensitivity()`]: a [`Sensitivity`] |
 //! | means, extrema and powers of all elements, efficiency, distortion | [`table()`], [`periodic_table`]: a [`Table`] |
 //! | `.step`, or any other values | [`variants`]: a [`Variant`] for every combination of values; [`each`] asks all of them, in parallel |
 
 mod dc;
 mod measured;
 mod periodic;
+mod sensitivity;
 mod small_signal;
 mod sweep;
 mod table;
@@ -21,6 +23,7 @@ pub use crate::integrate::{Orbit, OrbitKind};
 pub use dc::{Characteristic, Unsolved, dc};
 pub use measured::{Finished, Measurements, is_measured, periodic_measured, transient};
 pub use periodic::{PeriodicOptions, orbit_start, periodic};
+pub use sensitivity::{Gradient, Sensitivity, SensitivityOptions, sensitivity};
 pub use small_signal::{
     About, Left, Margin, Ratio, Response, SmallSignalOptions, margins, ratios, small_signal,
     unwrapped,

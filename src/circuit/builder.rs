@@ -165,6 +165,7 @@ impl<'n, 'o> Builder<'n, 'o> {
                 .help("add `.tran tstep tstop` to simulate it"),
             );
         }
+        self.circuit.params = self.scopes.evaluated(ScopeId::ROOT);
         (self.circuit, self.scopes.findings.into_list())
     }
 

@@ -109,6 +109,8 @@ pub struct Circuit {
     pub stimuli: Vec<Stimulus>,
     /// Nodes whose voltage against ground an expression took as known (a constant, sines): what their sources do besides is not in it.
     pub known: Vec<NodeId>,
+    /// The parameters of the top level that something uses, with their values, by name.
+    pub params: Vec<(String, f64)>,
     /// `.meas tran`, in file order.
     pub measurements: Vec<NamedMeasurement>,
     /// `.four`, in file order.

@@ -187,6 +187,17 @@ impl<'n> Scopes<'n> {
         self.get_mut(id).params.insert(name.to_string(), param);
     }
 
+    /// The parameters declared here that have been evaluated, by name.
+    pub(super) fn evaluated(&self, id: ScopeId) -> Vec<(String, f64)> {
+        let scope = self.get(id);
+        let value = |name: &&str| match scope.params.get(*name) {
+            Some(Param::Known(value)) => Some((name.to_string(), value.f64)),
+            _ => None,
+        };
+        let names: BTreeSet<&str> = scope.declared.iter().copied().map(AsRef::as_ref).collect();
+        names.iter().filter_map(value).collect()
+    }
+
     /// The parameter a name means, and where it is defined.
     pub(super) fn param(&self, id: ScopeId, name: &str) -> Option<(ScopeId, Param<'n>)> {
         self.chain(id)

@@ -41,6 +41,8 @@ pub enum Command {
     Pss(PssArgs),
     /// Find the response to small sines, about the operating point or the periodic steady state
     Ac(AcArgs),
+    /// Find the derivatives of what `.meas` finds to values of elements and parameters
+    Sens(SensArgs),
     /// Print the complementarity system (A, B, C, D, E, F, G) with names and units
     Lcs(LcsArgs),
     /// Check topology, passivity and which theorems hold
@@ -236,6 +238,29 @@ pub struct AcArgs {
     /// The period, s, in place of the common one of the sources; suffixes as in netlists (`10u`)
     #[arg(long, value_name = "T", value_parser = positive)]
     pub period: Option<f64>,
+}
+
+/// `circ sens`.
+#[derive(Debug, Args)]
+pub struct SensArgs {
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub input: Input,
+    /// Only of this measurement (repeatable) [default: all]
+    #[arg(long, value_name = "MEAS")]
+    pub of: Vec<String>,
+    /// Only to this element's value or `.param` (repeatable) [default: all that are not 0]
+    #[arg(long, value_name = "NAME")]
+    pub to: Vec<String>,
+    /// Of the periodic steady state instead of the transient
+    #[arg(long)]
+    pub pss: bool,
+    /// The period, s, in place of the common one of the sources; suffixes as in netlists (`10u`)
+    #[arg(long, value_name = "T", value_parser = positive, requires = "pss")]
+    pub period: Option<f64>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Where a circuit is made linear.

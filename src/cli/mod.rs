@@ -20,6 +20,7 @@ pub mod output;
 mod pss;
 mod render;
 mod rows;
+mod sens;
 mod signals;
 pub mod sim;
 mod steps;
@@ -81,6 +82,7 @@ fn run(command: &Command, streams: &Streams) -> Result<Exit, Failure> {
         Command::Sim(args) => sim::sim(args, streams),
         Command::Pss(args) => pss::pss(args, streams),
         Command::Ac(args) => ac::ac(args, streams),
+        Command::Sens(args) => sens::sens(args, streams),
         Command::Lcs(args) => lcs::lcs(args, streams),
         Command::Check(args) => check::check(args, streams),
         Command::Op(args) => op::op(args, streams),

@@ -6,6 +6,7 @@
 pub mod json;
 pub mod means;
 pub mod measured;
+pub mod sensitivity;
 pub mod si;
 pub mod steps;
 pub mod table;

@@ -14,6 +14,7 @@ mod random;
 mod references;
 mod resumed;
 mod runner;
+mod sensitivities;
 mod topologies;
 
 use std::io::Write;
@@ -119,6 +120,28 @@ fn converters_are_taken_up_again() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Derivatives of measurements; 40 circuits, or as many as `CIRC_CONVERTERS` says.
+#[test]
+fn derivatives_are_differences_of_exact_runs() {
+    let count = number("CIRC_CONVERTERS").unwrap_or(40);
+    let first = number("CIRC_CONVERTERS_SEED").unwrap_or(3000);
+    let mut tally = sensitivities::Tally::default();
+    for seed in first..first + count {
+        sensitivities::compare(seed, &mut tally);
+    }
+    tell(&format!(
+        "{} derivatives of {} circuits compared, {} further apart than 1e-6, {} without known differences, {} circuits refused:\n{}",
+        tally.compared,
+        tally.circuits,
+        tally.beyond,
+        tally.unknown,
+        tally.refused.len(),
+        tally.refused.join("\n")
+    ));
+    assert!(tally.wrong.is_empty(), "{}", tally.wrong.join("\n"));
+    assert!(2 * tally.circuits as u64 >= count, "{:?}", tally.refused);
 }
 
 /// ngspice's answers; with `CIRC_CONVERTERS` all, else each seventh.

@@ -188,6 +188,26 @@ pub(super) fn common_period(circuit: &Circuit) -> Option<f64> {
     period::common(&circuit).ok()?.seconds
 }
 
+/// A simulation of a circuit near one whose steady state is known, with the period of its sources.
+///
+/// # Errors
+/// As [`periodic`].
+pub(super) fn beside(
+    model: &Model,
+    options: &PeriodicOptions<'_>,
+) -> Result<(Option<f64>, Simulation), Error> {
+    let (circuit, _) = period::repeating(model.circuit());
+    let seconds = period::common(&circuit)
+        .ok()
+        .and_then(|period| period.seconds);
+    let multiport = behaviour(&circuit).map_err(|_| {
+        let what = "a circuit with sources at rest is none";
+        Error::before(Reason::internal("analysis::periodic", what))
+    })?;
+    let simulation = simulation((&circuit, &multiport), seconds, 1.0, options)?;
+    Ok((options.period.or(seconds), simulation))
+}
+
 /// Finds the periodic steady state.
 ///
 /// # Errors

@@ -11,6 +11,7 @@
 mod course;
 mod instant;
 mod linear;
+mod parameter;
 mod saltation;
 mod system;
 
@@ -26,6 +27,7 @@ use crate::settings::tolerances::times::SAME_TIME;
 pub(crate) use course::{Course, Leap};
 use instant::Inputs;
 pub(crate) use linear::{Linear, Motion};
+pub(crate) use parameter::{Near, Parameter, STEPS, Shifted};
 use saltation::Side;
 pub(crate) use saltation::{Saltation, Timing, times};
 pub(crate) use system::{System, shaped};
@@ -38,6 +40,8 @@ pub(crate) struct Segment {
     /// From when to when, s.
     pub(crate) from: f64,
     pub(crate) to: f64,
+    /// x where it begins.
+    pub(crate) start: DVector<f64>,
     /// e^{A (to − from)}.
     pub(crate) propagator: DMatrix<f64>,
     /// x where it ends.
@@ -183,15 +187,17 @@ impl Maker {
             return Err(Error::before(Reason::internal("analysis::variation", what)));
         };
         let (mut at, mut entry) = (self.system(&first.to)?, first.t);
+        let mut start = self.systems[at].state(&first.after);
         let (mut segments, mut saltations) = (Vec::new(), Vec::new());
         for instant in instants {
             let (first, last) = (&instant[0], &instant[instant.len() - 1]);
-            segments.push(self.segment(at, entry, (first.t, &first.before))?);
+            segments.push(self.segment(at, entry, start, (first.t, &first.before))?);
             let next = self.system(&last.to)?;
             saltations.push(self.saltation(instant, (at, next), first.t - entry)?);
+            start = self.systems[next].state(&last.after);
             (at, entry) = (next, last.t);
         }
-        segments.push(self.segment(at, entry, end)?);
+        segments.push(self.segment(at, entry, start, end)?);
         Ok(Trajectory {
             systems: self.systems,
             segments,
@@ -204,6 +210,7 @@ impl Maker {
         &self,
         system: usize,
         from: f64,
+        start: DVector<f64>,
         (to, end): (f64, &[f64]),
     ) -> Result<Segment, Error> {
         let of = &self.systems[system];
@@ -212,6 +219,7 @@ impl Maker {
             system,
             from,
             to,
+            start,
             propagator: propagator.ok_or_else(|| {
                 not_smooth(from, "the exponential of a mode does not exist in doubles")
             })?,
@@ -249,8 +257,12 @@ impl Maker {
             inputs: right,
         };
         let timing = self.timing(instant, &before, seconds)?;
-        let through = through.map(|at| &systems[at]);
-        Ok(Saltation::of(t, (&before, &after), timing, through))
+        let jump = through.map(|at| &systems[at]);
+        let saltation = Saltation::of(t, (&before, &after), timing, jump);
+        Ok(Saltation {
+            through,
+            ..saltation
+        })
     }
 
     /// The mode in whose directions the storage jumps, where that is not the one that follows.
@@ -317,7 +329,8 @@ impl Maker {
         }
         for owner in owners {
             let limits = |i| self.assembler.limits(i);
-            for guard in before.system.guards(owner, (&self.thresholds, limits)) {
+            let guards = before.system.guards(owner, (&self.thresholds, limits));
+            for (k, guard) in guards.into_iter().enumerate() {
                 let (value, size) = guard.value(&before.x, &before.inputs);
                 let (slope, slopes) = guard.rate(&rate, &before.inputs);
                 // What changes sides as a consequence of another event is not at its level.
@@ -328,7 +341,7 @@ impl Maker {
                     let what = format!("{} grazes its threshold", self.name(owner));
                     return Err(not_smooth(t, what));
                 }
-                let timing = Timing::of(&guard, slope);
+                let timing = Timing::of((owner, k), &guard, slope);
                 match &found {
                     Some(other) if !same_timing(other, &timing, seconds) => {
                         let what = format!("{} and another event coincide", self.name(owner));

@@ -14,6 +14,7 @@ use nalgebra::{Complex, DMatrix, DVector, RowDVector};
 
 use super::instant::Inputs;
 use super::system::{Row, System};
+use crate::integrate::exact::Owner;
 
 /// When an event happens: δt = x δx⁻ + u δu + u' δu'.
 #[derive(Debug, Clone)]
@@ -21,6 +22,9 @@ pub(crate) struct Timing {
     pub(crate) x: RowDVector<f64>,
     pub(crate) u: RowDVector<f64>,
     pub(crate) du: RowDVector<f64>,
+    /// Whose guard it is, which of that one's, and γ̇.
+    pub(super) guard: (Owner, usize),
+    pub(super) slope: f64,
 }
 
 /// δx⁺ = X δx⁻ + U δu + U' δu'.
@@ -36,6 +40,8 @@ pub(crate) struct Saltation {
     pub(crate) du: DMatrix<f64>,
     /// `None` where δt = 0.
     pub(crate) timing: Option<Timing>,
+    /// The place of the system in whose directions the storage jumps, where that is not the one that follows.
+    pub(super) through: Option<usize>,
     /// Of the outputs: y⁻ − y⁺.
     pub(crate) step: DVector<f64>,
     /// Areas of the outputs' impulses, and what they are made of.
@@ -62,7 +68,7 @@ pub(super) struct Side<'a> {
 }
 
 impl Side<'_> {
-    fn rate(&self) -> DVector<f64> {
+    pub(super) fn rate(&self) -> DVector<f64> {
         self.system.rate(&self.x, &self.inputs.u)
     }
 
@@ -74,8 +80,10 @@ impl Side<'_> {
 
 impl Timing {
     /// Of a guard that falls through zero at `rate`.
-    pub(super) fn of(guard: &Row, rate: f64) -> Self {
+    pub(super) fn of(owner: (Owner, usize), guard: &Row, rate: f64) -> Self {
         Self {
+            guard: owner,
+            slope: rate,
             x: guard.x.transpose() / -rate,
             u: guard.u.transpose() / -rate,
             du: guard.du.transpose() / -rate,
@@ -115,6 +123,7 @@ impl Saltation {
             u,
             du,
             timing,
+            through: None,
             step: outputs(before) - outputs(after),
             impulse: Impulse::of(before, after),
         }

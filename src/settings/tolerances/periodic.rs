@@ -57,3 +57,13 @@ pub(crate) const EXTREMUM: f64 = 1e-14;
 /// A fundamental below this part of a signal's root mean square is none, and the signal has no distortion. Larger: small fundamentals are
 /// denied; smaller: the rounding of a constant gets a distortion.
 pub(crate) const FUNDAMENTAL: f64 = 1e-9;
+
+/// The difference of a value, relative to it, by which matrices and sources are differentiated to it: extrapolated differences leave 4 of its fourth powers, and
+/// rounding over it. Larger: frequencies many periods long are differentiated wrongly; smaller: rounding.
+pub(crate) const VALUE_STEP: f64 = 1e-4;
+
+/// The same of whole runs in steps, whose errors change from one to the other. Larger: curvature; smaller: the steps' errors.
+pub(crate) const RUN_STEP: f64 = 1e-2;
+
+/// How far rows are moved to differentiate what is measured on them, relative to a value. Larger: events pass rows of the grid; smaller: rounding.
+pub(crate) const MEASURE_STEP: f64 = 1e-7;

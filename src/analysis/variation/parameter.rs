@@ -1,0 +1,453 @@
+//! What becomes of a change of one value: the variational equation with a column for it.
+//!
+//! ```text
+//! δx' = A δx + E δu + A_p x + E_p u + e_p,     δt = −(γ_x δx⁻ + γ_u δu + γ_p)/γ̇,
+//! δx⁺ = J⁺ (X⁻ (δx⁻ + f⁻ δt) + U⁻ (δu + u' δt)) − f⁺ δt + ∂_p [J⁺ (X⁻ x⁻ + U⁻ u + k⁻) + j⁺]
+//! ```
+//!
+//! at the time at which the event was without the change; an edge of a source has the δt of that source. Matrices, guards and sources are
+//! differentiated by extrapolated differences of the circuits with p (1 ± h) and p (1 ± 2h), which are reduced for the same modes: they are rational
+//! functions of p, so that nothing of a run's events is in the differences.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::instant::Inputs;
+use super::saltation::Side;
+use super::{Saltation, System, Trajectory, not_smooth, shaped};
+use crate::circuit::source::Piece;
+use crate::integrate::exact::{Assembler, Exosystem, Shape};
+use crate::integrate::switching::Threshold;
+use crate::integrate::{Error, Simulation};
+use crate::linalg::expm::Ladders;
+use crate::settings::tolerances::events::SAME_TIMING;
+use crate::settings::tolerances::exponentials::SQUARED;
+use crate::settings::tolerances::periodic::VALUE_STEP;
+
+/// The circuits that are compared, in steps of p h.
+pub(crate) const STEPS: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
+
+/// (8 (f(h) − f(−h)) − (f(2h) − f(−2h)))/12h
+const WEIGHTS: [f64; 4] = [1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0];
+
+/// The circuit with p a little aside, in the modes of a trajectory.
+pub(crate) struct Near {
+    systems: Vec<System>,
+    thresholds: Vec<Threshold>,
+    assembler: Assembler,
+    /// Where its transient begins.
+    pub(crate) state: Vec<f64>,
+}
+
+impl Near {
+    /// Of its simulation.
+    pub(crate) fn of(simulation: &mut Simulation, trajectory: &Trajectory) -> Result<Self, Error> {
+        let ends = trajectory.segments.first().zip(trajectory.segments.last());
+        let span = ends.map_or(1.0, |(first, last)| last.to - first.from);
+        let state = simulation.state();
+        let mut assembler = simulation.assembler(span);
+        let mut systems = Vec::new();
+        for system in &trajectory.systems {
+            let near = System::of(&system.key, &mut assembler)?;
+            let same = near.lcs.states == system.lcs.states && near.lcs.fast == system.lcs.fast;
+            if !same {
+                return Err(not_smooth(0.0, "another value makes other states"));
+            }
+            systems.push(near);
+        }
+        Ok(Self {
+            thresholds: assembler.thresholds(),
+            systems,
+            assembler,
+            state,
+        })
+    }
+}
+
+/// A row of a run, and how it moves with ln p.
+#[derive(Debug, Clone)]
+pub(crate) struct Shifted {
+    /// Whether it is one side of an event.
+    pub(crate) event: bool,
+    /// Time, s, and its derivative.
+    pub(crate) t: f64,
+    pub(crate) dt: f64,
+    /// The outputs, and their derivatives at the time that moves.
+    pub(crate) y: DVector<f64>,
+    pub(crate) dy: DVector<f64>,
+    /// Rates of the outputs where the time moves, else empty.
+    pub(crate) rate: DVector<f64>,
+}
+
+/// Σ weights · f over the circuits, over h: the derivative with ln p.
+fn weighted(parts: [DVector<f64>; 4]) -> DVector<f64> {
+    let [a, b, c, d] = parts;
+    let sum = a * WEIGHTS[0] + b * WEIGHTS[1] + c * WEIGHTS[2] + d * WEIGHTS[3];
+    sum / VALUE_STEP
+}
+
+/// The same of matrices.
+fn weighted_matrix(parts: [DMatrix<f64>; 4]) -> DMatrix<f64> {
+    let [a, b, c, d] = parts;
+    let sum = a * WEIGHTS[0] + b * WEIGHTS[1] + c * WEIGHTS[2] + d * WEIGHTS[3];
+    sum / VALUE_STEP
+}
+
+/// The sources on a segment: their closed forms, and those of the circuits that are compared.
+struct Forms {
+    own: Vec<Piece>,
+    near: [Vec<Piece>; 4],
+}
+
+/// A trajectory and the circuits beside it.
+pub(crate) struct Parameter<'a> {
+    pub(crate) trajectory: &'a Trajectory,
+    pub(crate) near: &'a [Near; 4],
+    /// By segment.
+    forms: Vec<Forms>,
+}
+
+/// A segment as w' = 𝒢 w, w = [x | z | δx].
+struct Column {
+    generator: DMatrix<f64>,
+    /// y and δy over w.
+    rows: [DMatrix<f64>; 2],
+    w: DVector<f64>,
+    n: usize,
+}
+
+impl Column {
+    /// exp(𝒢 t) w − w.
+    fn step(&self, t: f64, seconds: f64) -> Result<DMatrix<f64>, Error> {
+        let dim = self.generator.nrows();
+        let increment = Ladders::new(&self.generator, &[], seconds, SQUARED, 0).increment(0);
+        let increment = increment
+            .ok_or_else(|| not_smooth(t, "the exponential of a mode does not exist in doubles"))?;
+        Ok(DMatrix::from_fn(dim, dim, |i, j| increment.column(j)[i]))
+    }
+
+    /// δx.
+    fn change(&self, w: &DVector<f64>) -> DVector<f64> {
+        w.rows(w.len() - self.n, self.n).into_owned()
+    }
+
+    /// The row at w, whose time moves by dt.
+    fn row(&self, w: &DVector<f64>, (t, dt): (f64, f64), event: bool) -> Shifted {
+        let [y, dy] = self.rows.each_ref().map(|rows| rows * w);
+        let rate = if dt == 0.0 {
+            DVector::zeros(y.len())
+        } else {
+            &self.rows[0] * (&self.generator * w)
+        };
+        Shifted {
+            event,
+            t,
+            dt,
+            dy: dy + &rate * dt,
+            y,
+            rate,
+        }
+    }
+}
+
+impl<'a> Parameter<'a> {
+    pub(crate) fn of(trajectory: &'a Trajectory, near: &'a [Near; 4]) -> Result<Self, Error> {
+        let forms = trajectory.segments.iter().map(|segment| {
+            // In the middle, where edges that move have not come.
+            let middle = 0.5 * (segment.from + segment.to);
+            let at = |system: &System| -> Result<Vec<Piece>, Error> {
+                let inputs = system.lcs.inputs.iter();
+                let pieces = inputs.map(|input| input.source.piece(middle));
+                let pieces: Option<Vec<Piece>> = pieces.collect();
+                pieces.ok_or_else(|| not_smooth(middle, "a source has no closed form"))
+            };
+            let [a, b, c, d] = near
+                .each_ref()
+                .map(|near| at(&near.systems[segment.system]));
+            Ok(Forms {
+                own: at(&trajectory.systems[segment.system])?,
+                near: [a?, b?, c?, d?],
+            })
+        });
+        Ok(Self {
+            forms: forms.collect::<Result<_, Error>>()?,
+            trajectory,
+            near,
+        })
+    }
+
+    /// ∂s/∂ln p of where the transients of these circuits begin.
+    pub(crate) fn weighted_states(near: &[Near; 4]) -> DVector<f64> {
+        weighted(
+            near.each_ref()
+                .map(|near| DVector::from_column_slice(&near.state)),
+        )
+    }
+
+    fn system(&self, k: usize) -> &System {
+        &self.trajectory.systems[self.trajectory.segments[k].system]
+    }
+
+    /// u and its rates at t, as segment k has them.
+    fn inputs(pieces: &[Piece], t: f64) -> Inputs {
+        let values = |value: fn(&Piece, f64) -> f64| {
+            DVector::from_iterator(pieces.len(), pieces.iter().map(|piece| value(piece, t)))
+        };
+        Inputs {
+            u: values(Piece::value),
+            du: values(Piece::derivative),
+            ddu: values(Piece::second_derivative),
+        }
+    }
+
+    /// δx at the start of the first segment, where δs is that of the storage.
+    fn start(&self, ds: &DVector<f64>) -> DVector<f64> {
+        let first = &self.trajectory.segments[0];
+        let system = &self.trajectory.systems[first.system];
+        let inputs = Self::inputs(&self.forms[0].own, first.from);
+        let storage = system.storage(&first.start, &inputs.u);
+        let moved = self
+            .near
+            .each_ref()
+            .map(|near| near.systems[first.system].state(storage.as_slice()));
+        weighted(moved) + &system.lcs.storage.inject * ds
+    }
+
+    /// δs where δx is that of the state at the end.
+    fn end(&self, dx: &DVector<f64>) -> DVector<f64> {
+        let k = self.trajectory.segments.len() - 1;
+        let last = &self.trajectory.segments[k];
+        let system = &self.trajectory.systems[last.system];
+        let parts = std::array::from_fn(|m| {
+            let inputs = Self::inputs(&self.forms[k].near[m], last.to);
+            self.near[m].systems[last.system].storage(&last.end, &inputs.u)
+        });
+        weighted(parts) + &system.lcs.storage.x * dx
+    }
+
+    fn column(&self, k: usize, dx: &DVector<f64>) -> Column {
+        let segment = &self.trajectory.segments[k];
+        let (system, forms) = (self.system(k), &self.forms[k]);
+        let (n, p) = (system.lcs.n(), forms.own.len());
+        // The sources that move have their closed forms beside them.
+        let moving: Vec<usize> = (0..p)
+            .filter(|&i| forms.near.iter().any(|near| near[i] != forms.own[i]))
+            .collect();
+        let beside = moving
+            .iter()
+            .flat_map(|&i| forms.near.iter().map(move |near| near[i]));
+        let pieces: Vec<Piece> = forms.own.iter().copied().chain(beside).collect();
+        let shapes: Vec<Shape> = pieces.iter().map(|piece| Shape::of([piece])).collect();
+        let exosystem = Exosystem::new(&shapes, pieces);
+        let dz = exosystem.dim();
+        let own = exosystem.output().rows(0, p).into_owned();
+        let mut change = DMatrix::zeros(p, dz);
+        for (j, &i) in moving.iter().enumerate() {
+            for (m, weight) in WEIGHTS.iter().enumerate() {
+                let row = exosystem.output().row(p + 4 * j + m) * (weight / VALUE_STEP);
+                let mut sum = change.row_mut(i);
+                sum += row;
+            }
+        }
+        let of_near = |f: &dyn Fn(&System) -> DMatrix<f64>| {
+            weighted_matrix(
+                self.near
+                    .each_ref()
+                    .map(|near| f(&near.systems[segment.system])),
+            )
+        };
+        let constant = |system: &System| DMatrix::from_column_slice(n, 1, system.lcs.e0.as_slice());
+        let dim = 2 * n + dz;
+        let mut generator = DMatrix::zeros(dim, dim);
+        let mut put = |i: usize, j: usize, block: &DMatrix<f64>| {
+            let mut view = generator.view_mut((i, j), block.shape());
+            view += block;
+        };
+        put(0, 0, &system.lcs.a);
+        put(0, n, &(&system.inputs * &own));
+        put(0, n, &constant(system));
+        put(n, n, exosystem.generator());
+        put(n + dz, 0, &of_near(&|s| s.lcs.a.clone()));
+        put(n + dz, n, &(of_near(&|s| s.inputs.clone()) * &own));
+        put(n + dz, n, &(&system.inputs * &change));
+        put(n + dz, n, &of_near(&constant));
+        put(n + dz, n + dz, &system.lcs.a);
+        let outputs = &system.lcs.outputs.rows;
+        let count = outputs.one.len();
+        let over = |rows: &crate::lcs::Rows, h: &DMatrix<f64>, one: bool| {
+            let mut out = DMatrix::zeros(count, n + dz);
+            out.columns_mut(0, n).copy_from(&shaped(&rows.x, count, n));
+            let slopes = shaped(&rows.du, count, p) * (h * exosystem.generator());
+            let mut z = out.columns_mut(n, dz);
+            z += shaped(&rows.u, count, p) * h + slopes;
+            if one {
+                let mut ones = out.column_mut(n);
+                ones += &rows.one;
+            }
+            out
+        };
+        let plain = over(outputs, &own, true);
+        let moved = weighted_matrix(
+            self.near
+                .each_ref()
+                .map(|near| over(&near.systems[segment.system].lcs.outputs.rows, &own, true)),
+        );
+        let by_sources = over(outputs, &change, false).columns(n, dz).into_owned();
+        let mut rows = [DMatrix::zeros(count, dim), DMatrix::zeros(count, dim)];
+        rows[0].columns_mut(0, n + dz).copy_from(&plain);
+        rows[1].columns_mut(0, n + dz).copy_from(&moved);
+        let mut z = rows[1].columns_mut(n, dz);
+        z += by_sources;
+        rows[1]
+            .columns_mut(n + dz, n)
+            .copy_from(&plain.columns(0, n));
+        let mut w = DVector::zeros(dim);
+        w.rows_mut(0, n).copy_from(&segment.start);
+        exosystem.write(segment.from, &mut w.as_mut_slice()[n..n + dz]);
+        w.rows_mut(n + dz, n).copy_from(dx);
+        Column {
+            generator,
+            rows,
+            w,
+            n,
+        }
+    }
+
+    /// Goes along the trajectory from δs: its rows at both sides of events and at these times, in order, and δs at the end.
+    pub(crate) fn along(
+        &self,
+        ds: &DVector<f64>,
+        times: &[f64],
+    ) -> Result<(Vec<Shifted>, DVector<f64>), Error> {
+        let segments = &self.trajectory.segments;
+        let mut rows = Vec::with_capacity(times.len() + 2 * segments.len());
+        let (mut dx, mut dt) = (self.start(ds), 0.0);
+        let mut next = 0;
+        for (k, segment) in segments.iter().enumerate() {
+            let column = self.column(k, &dx);
+            let (mut w, mut t) = (column.w.clone(), segment.from);
+            rows.push(column.row(&w, (t, dt), true));
+            // Times of a grid are equally far apart.
+            let mut known: Option<(f64, DMatrix<f64>)> = None;
+            while let Some(&time) = times.get(next).filter(|time| **time < segment.to) {
+                next += 1;
+                let seconds = time - t;
+                if seconds <= 0.0 {
+                    continue;
+                }
+                let same = |known: &&(f64, DMatrix<f64>)| {
+                    (known.0 - seconds).abs() <= 64.0 * f64::EPSILON * time.abs().max(seconds)
+                };
+                let step = match known.as_ref().filter(same) {
+                    Some((_, step)) => step,
+                    None => &known.insert((seconds, column.step(t, seconds)?)).1,
+                };
+                w += step * &w;
+                t = time;
+                rows.push(column.row(&w, (t, 0.0), false));
+            }
+            if segment.to > t {
+                w += column.step(t, segment.to - t)? * &w;
+            }
+            dx = column.change(&w);
+            let Some(saltation) = self.trajectory.saltations.get(k) else {
+                rows.push(column.row(&w, (segment.to, 0.0), false));
+                return Ok((rows, self.end(&dx)));
+            };
+            dt = self.shift(k, saltation, &dx)?;
+            rows.push(column.row(&w, (segment.to, dt), true));
+            dx = self.passed(k, saltation, &dx, dt);
+        }
+        Ok((rows, ds.clone()))
+    }
+
+    /// δt of the event after segment k.
+    fn shift(&self, k: usize, saltation: &Saltation, dx: &DVector<f64>) -> Result<f64, Error> {
+        let (segment, t) = (&self.trajectory.segments[k], saltation.t);
+        if let Some(timing) = &saltation.timing {
+            let (owner, which) = timing.guard;
+            let mut values = [0.0; 4];
+            for (m, value) in values.iter_mut().enumerate() {
+                let near = &self.near[m];
+                let limits = |i| near.assembler.limits(i);
+                let guards = near.systems[segment.system].guards(owner, (&near.thresholds, limits));
+                let guard = guards.get(which).ok_or_else(|| {
+                    not_smooth(t, "an event has no guard where the value is another")
+                })?;
+                *value = guard
+                    .value(&segment.end, &Self::inputs(&self.forms[k].near[m], t))
+                    .0;
+            }
+            let change: f64 = values
+                .iter()
+                .zip(WEIGHTS)
+                .map(|(value, weight)| value * weight)
+                .sum();
+            return Ok((&timing.x * dx)[0] - change / VALUE_STEP / timing.slope);
+        }
+        // The sources that jump.
+        let (own, after) = (&self.forms[k].own, &self.forms[k + 1].own);
+        let jumps = |i: &usize| {
+            let (left, right) = (own[*i].value(t), after[*i].value(t));
+            (left - right).abs() > 64.0 * f64::EPSILON * left.abs().max(right.abs())
+        };
+        let mut found: Option<f64> = None;
+        for i in (0..own.len()).filter(jumps) {
+            let ends = self.forms[k].near.each_ref().map(|pieces| pieces[i].end);
+            let change: f64 = ends
+                .iter()
+                .zip(WEIGHTS)
+                .map(|(end, weight)| end * weight)
+                .sum();
+            let change = if change.is_finite() {
+                change / VALUE_STEP
+            } else {
+                0.0
+            };
+            let length = segment.to - segment.from;
+            match found {
+                Some(other)
+                    if (other - change).abs()
+                        > SAME_TIMING * other.abs().max(change.abs()).max(SAME_TIMING * length) =>
+                {
+                    return Err(not_smooth(
+                        t,
+                        "edges of sources coincide that part when the value is another",
+                    ));
+                }
+                _ => found = Some(change),
+            }
+        }
+        Ok(found.unwrap_or(0.0))
+    }
+
+    /// δx after the event that follows segment k.
+    fn passed(&self, k: usize, saltation: &Saltation, dx: &DVector<f64>, dt: f64) -> DVector<f64> {
+        let segments = &self.trajectory.segments;
+        let (from, to) = (segments[k].system, segments[k + 1].system);
+        let (systems, t) = (&self.trajectory.systems, saltation.t);
+        let side = |at: usize, x: &DVector<f64>, pieces: &[Piece]| Side {
+            system: &systems[at],
+            x: x.clone(),
+            inputs: Self::inputs(pieces, t),
+        };
+        let before = side(from, &segments[k].end, &self.forms[k].own);
+        let after = side(to, &segments[k + 1].start, &self.forms[k + 1].own);
+        let parts = std::array::from_fn(|m| {
+            let near = &self.near[m].systems;
+            let [left, right] = [k, k + 1].map(|k| Self::inputs(&self.forms[k].near[m], t));
+            let mut storage = near[from].storage(&segments[k].end, &left.u);
+            if let Some(jump) = saltation.through {
+                storage = near[jump].storage(&near[jump].state(storage.as_slice()), &right.u);
+            }
+            near[to].state(storage.as_slice())
+        });
+        let mut inject = systems[to].lcs.storage.inject.clone();
+        let mut drift = DVector::zeros(inject.nrows());
+        if let Some(jump) = saltation.through.map(|at| &systems[at]) {
+            drift += &inject * (&jump.storage_inputs * &after.inputs.du);
+            inject = inject * &jump.lcs.storage.x * &jump.lcs.storage.inject;
+        }
+        drift += &inject * before.storage_rate() - after.rate();
+        weighted(parts) + &inject * (&systems[from].lcs.storage.x * dx) + drift * dt
+    }
+}

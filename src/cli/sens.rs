@@ -1,0 +1,44 @@
+//! `circ sens`.
+
+use super::args::SensArgs;
+use super::exit::{Exit, Failure};
+use super::input;
+use super::signals::Signals;
+use super::streams::Streams;
+use crate::analysis::{SensitivityOptions, sensitivity};
+use crate::report::json;
+
+/// Prints the derivatives of what `.meas` finds.
+///
+/// # Errors
+/// See [`Failure`].
+pub(super) fn sens(args: &SensArgs, streams: &Streams) -> Result<Exit, Failure> {
+    let subject = input::open(&args.input, &[], &[], streams)?;
+    let model = input::model_of(&args.input, &subject)?;
+    if !model.circuit().steps.is_empty() {
+        streams.say(
+            "note: `.step` is left out: these are the derivatives at the values as they stand",
+        );
+    }
+    let signals = Signals::watch()?;
+    let options = SensitivityOptions {
+        of: args.of.clone(),
+        to: args.to.clone(),
+        steady: args.pss,
+        period: args.period,
+        cancel: Some(signals.flag()),
+        ..SensitivityOptions::default()
+    };
+    let places = subject.places();
+    let found = sensitivity(model, &options)
+        .map_err(|error| input::broke_off(&args.input, &error, places, streams))?;
+    for note in places.all(&found.notes) {
+        streams.say(format!("note: {note}"));
+    }
+    if args.json {
+        streams.data(json::line(&found) + "\n")?;
+    } else {
+        streams.data(found.words())?;
+    }
+    Ok(Exit::Done)
+}

@@ -1,0 +1,41 @@
+//! Derivatives of measurements in words.
+
+use super::{si, table};
+use crate::analysis::{Gradient, Sensitivity};
+
+/// Digits shown.
+const DIGITS: usize = 6;
+
+impl Sensitivity {
+    /// For each measurement a table of values, derivatives, and what 1 % of a value changes.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let mut text = String::new();
+        for Gradient { name, value, to } in &self.of {
+            match value {
+                Ok(value) => text.push_str(&format!("{name} = {}\n", si::plain(*value, DIGITS))),
+                Err(why) => {
+                    text.push_str(&format!("{name} failed: {why}\n"));
+                    continue;
+                }
+            }
+            let rows = to
+                .iter()
+                .zip(&self.at)
+                .map(|((name, derivative), (_, at))| {
+                    let cell = |x: f64| si::plain(x, DIGITS);
+                    let known = |x: Option<f64>| x.map_or("-".into(), cell);
+                    vec![
+                        name.clone(),
+                        cell(*at),
+                        known(*derivative),
+                        known(derivative.map(|d| 0.01 * d * at)),
+                    ]
+                });
+            let rows: Vec<Vec<String>> = rows.collect();
+            let header = ["to", "value", "derivative", "by 1 %"];
+            text.push_str(&table::aligned(&header, &rows));
+        }
+        text
+    }
+}

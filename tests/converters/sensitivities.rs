@@ -1,0 +1,150 @@
+//! Derivatives of measurements of random converters against extrapolated differences of exact runs.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use circ::analysis::{SensitivityOptions, sensitivity, transient};
+use circ::{Method, Model, SimOptions};
+
+use crate::circuit::{Part, states};
+use crate::random::Random;
+use crate::topologies::{Style, plain_case};
+
+/// Derivatives agree to this part of the measurement or of its change with ln p, whichever is larger; those of means to [`OF_MEANS`], as the
+/// differences of means are those of straight lines between rows, which an event passes or does not.
+const TOLERANCE: f64 = 1e-6;
+
+/// See [`TOLERANCE`].
+const OF_MEANS: f64 = 1e-5;
+
+/// Differences of two sizes that are this far apart tell nothing: an event changes its order, or rounding shows.
+const KNOWN: f64 = 2e-7;
+
+/// Steps of the differences, relative.
+const STEPS: [f64; 2] = [4e-5, 1e-5];
+
+/// What came of the derivatives of some circuits.
+#[derive(Debug, Default)]
+pub(crate) struct Tally {
+    pub(crate) compared: usize,
+    pub(crate) circuits: usize,
+    /// Further apart than [`TOLERANCE`].
+    pub(crate) beyond: usize,
+    /// Where differences tell nothing.
+    pub(crate) unknown: usize,
+    /// Circuits without a derivative, and why.
+    pub(crate) refused: Vec<String>,
+    pub(crate) wrong: Vec<String>,
+}
+
+fn measured(model: &Model) -> Option<Vec<Option<f64>>> {
+    let options = SimOptions {
+        method: Method::Exact,
+        ..SimOptions::default()
+    };
+    let finished = transient(model, options);
+    let (_, found) = finished.run.filter(|_| finished.error.is_none())?;
+    let value = |m: &circ::circuit::Measured| m.result.as_ref().ok().map(|f| f.value);
+    Some(found.measured.iter().map(value).collect())
+}
+
+/// (8 (f(h) − f(−h)) − (f(2h) − f(−2h)))/12h by measurement.
+fn difference(model: &Model, name: &str, value: f64, h: f64) -> Option<Vec<Option<f64>>> {
+    let at = |k: f64| {
+        let mut model = model.clone();
+        model.set(name, value * (1.0 + k * h)).ok()?;
+        measured(&model)
+    };
+    let [a, b, c, d] = [at(-2.0)?, at(-1.0)?, at(1.0)?, at(2.0)?];
+    let of = |k: usize| Some((8.0 * (c[k]? - b[k]?) - (d[k]? - a[k]?)) / (12.0 * h));
+    Some((0..a.len()).map(of).collect())
+}
+
+/// Compares the derivatives of one circuit to some of its elements.
+pub(crate) fn compare(seed: u64, tally: &mut Tally) {
+    let mut random = Random::new(seed ^ 0x5e45);
+    let style = if seed.is_multiple_of(2) {
+        Style::Ideal
+    } else {
+        Style::Finite
+    };
+    let case = plain_case(seed, style);
+    let circuit = &case.circuit;
+    let signals = states(circuit);
+    let mut text = circuit.text();
+    let end = text.rfind(".end").unwrap_or(text.len());
+    text.truncate(end);
+    for (k, signal) in signals.iter().take(3).enumerate() {
+        // Of a row: between rows measurements see straight lines.
+        let at = 15.0 / 19.0 * circuit.stop;
+        text += &format!(
+            ".meas tran a{k} avg {signal}\n.meas tran r{k} rms {signal}\n\
+             .meas tran f{k} find {signal} at={at:e}\n"
+        );
+    }
+    text += ".end\n";
+    let Ok(model) = Model::parse(&text, "random.cir") else {
+        return tally.refused.push(format!("{seed}: not read"));
+    };
+    let Some(values) = measured(&model) else {
+        return tally.refused.push(format!("{seed}: no exact run"));
+    };
+    let mut elements: Vec<(&str, f64)> = circuit
+        .cards
+        .iter()
+        .filter_map(|card| match card.part {
+            Part::R(value) | Part::C(value, _) | Part::L(value, _) => Some((&*card.name, value)),
+            _ => None,
+        })
+        .collect();
+    random.shuffle(&mut elements);
+    elements.truncate(2);
+    let options = SensitivityOptions {
+        to: elements
+            .iter()
+            .map(|(name, _)| (*name).to_string())
+            .collect(),
+        ..SensitivityOptions::default()
+    };
+    let found = match catch_unwind(AssertUnwindSafe(|| sensitivity(&model, &options))) {
+        Ok(Ok(found)) if found.exact => found,
+        Ok(Ok(_)) => return tally.refused.push(format!("{seed}: in steps")),
+        Ok(Err(error)) => return tally.refused.push(format!("{seed}: {error}")),
+        Err(_) => return tally.wrong.push(format!("{seed} panicked\n{text}")),
+    };
+    tally.circuits += 1;
+    for (name, value) in elements {
+        let [coarse, fine] = STEPS.map(|h| difference(&model, name, value, h));
+        let (Some(coarse), Some(fine)) = (coarse, fine) else {
+            tally.unknown += 1;
+            continue;
+        };
+        for (k, gradient) in found.of.iter().enumerate() {
+            let (Some(a), Some(b), Some(of)) = (coarse[k], fine[k], values[k]) else {
+                continue;
+            };
+            let Some(own) = found.derivative(&gradient.name, name) else {
+                tally.wrong.push(format!(
+                    "{seed}: no derivative of {} to {name}",
+                    gradient.name
+                ));
+                continue;
+            };
+            let own = own * value;
+            let size = of.abs().max(a.abs()).max(1e-9);
+            if (a - b).abs() > KNOWN * size {
+                tally.unknown += 1;
+                continue;
+            }
+            tally.compared += 1;
+            let apart = (own - a).abs() / size;
+            tally.beyond += usize::from(apart > TOLERANCE);
+            let mean = !gradient.name.starts_with('f');
+            if apart > if mean { OF_MEANS } else { TOLERANCE } {
+                tally.wrong.push(format!(
+                    "{seed} {}: {} to {name}: {own:e}, but {a:e} and {b:e} by differences",
+                    case.stage, gradient.name
+                ));
+            }
+        }
+    }
+}

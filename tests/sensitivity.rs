@@ -1,0 +1,94 @@
+//! Derivatives of measurements against closed forms.
+#![allow(missing_docs, reason = "tests")]
+
+use circ::Model;
+use circ::analysis::{Sensitivity, SensitivityOptions, sensitivity};
+
+fn found(text: &str, steady: bool) -> Sensitivity {
+    let model = Model::parse(text, "t.cir").expect("a circuit");
+    let options = SensitivityOptions {
+        steady,
+        ..SensitivityOptions::default()
+    };
+    sensitivity(&model, &options).expect("derivatives")
+}
+
+fn near(found: &Sensitivity, of: &str, to: &str, value: f64, truth: f64, tolerance: f64) {
+    let own = found.derivative(of, to).expect("a derivative") * value;
+    let error = (own - truth).abs() / truth.abs().max(1e-12);
+    assert!(error < tolerance, "{of} to {to}: {own:e} is not {truth:e}");
+}
+
+/// v = V (1 − e^{−t/τ}): when it crosses V/2, its mean over 1 ms, its value at 1 ms.
+#[test]
+fn a_capacitor_that_is_charged() {
+    let text = "rc\nv1 1 0 {vin}\nr1 1 2 1k\nc1 2 0 {c}\n.param vin=4 c=1u\n.tran 1u 2m uic\n.meas tran half when v(2)=2\n\
+        .meas tran mean avg v(2) from=0 to=1m\n.meas tran last find v(2) at=1m\n.meas tran power rms i(r1)\n\
+        .meas tran lag trig v(2) val=1 rise=1 targ v(2) val=3 rise=1\n.end\n";
+    let found = found(text, false);
+    assert!(found.exact && found.notes.is_empty());
+    let e = (-1.0_f64).exp();
+    // The rows of `.meas` are joined by straight lines, 1 µs apart.
+    let close = 2e-6;
+    for (name, value) in [("r1", 1e3), ("c1", 1e-6), ("c", 1e-6)] {
+        near(&found, "half", name, value, 1e-3 * 2.0_f64.ln(), close);
+        near(&found, "last", name, value, -4.0 * e, close);
+        near(&found, "lag", name, value, 1e-3 * 3.0_f64.ln(), close);
+        // ⟨v⟩ = V (1 − τ/T (1 − e^{−T/τ}))
+        near(&found, "mean", name, value, -4.0 * (1.0 - 2.0 * e), close);
+    }
+    near(&found, "last", "vin", 4.0, 4.0 * (1.0 - e), close);
+    near(&found, "half", "vin", 4.0, -1e-3, close);
+}
+
+/// The mean output of a synchronous buck is D V: its duty is a parameter that moves edges.
+#[test]
+fn the_output_of_a_buck() {
+    let text = "buck\nv1 1 0 {vin}\ns1 1 2 g 0 sw\ns2 2 0 0 g sn\nvg g 0 pulse(0 1 0 0 0 {d*10u} 10u)\nl1 2 3 100u\nc1 3 0 10u\nr1 3 0 5\n\
+        .model sw sw(vt=0.5 vh=0 ron=0 ideal=1)\n.model sn sw(vt=-0.5 vh=0 ron=0 ideal=1)\n.param vin=10 d=0.4\n.save v(3)\n\
+        .tran 0.1u 20u\n.meas tran out avg v(3)\n.meas tran ripple pp i(l1)\n.end\n";
+    let found = found(text, true);
+    assert!(found.exact);
+    near(&found, "out", "vin", 10.0, 4.0, 1e-6);
+    near(&found, "out", "d", 0.4, 4.0, 1e-6);
+    for (name, value) in [("l1", 1e-4), ("c1", 1e-5), ("r1", 5.0)] {
+        let own = found.derivative("out", name).expect("a derivative") * value;
+        assert!(own.abs() < 1e-6, "{name}: {own:e}");
+    }
+}
+
+/// Into L and R alone the current swings between I = (V/R) (1 − a)/(1 − a b) and b I with a = e^{−D T/τ}, b = e^{−(1 − D) T/τ}.
+#[test]
+fn the_ripple_of_a_buck() {
+    let text = "buck\nv1 1 0 {vin}\ns1 1 2 g 0 sw\ns2 2 0 0 g sn\nvg g 0 pulse(0 1 0 0 0 {d*10u} 10u)\nl1 2 3 100u\nr1 3 0 5\n\
+        .model sw sw(vt=0.5 vh=0 ron=0 ideal=1)\n.model sn sw(vt=-0.5 vh=0 ron=0 ideal=1)\n.param vin=10 d=0.4\n.save v(3)\n\
+        .tran 0.1u 20u\n.meas tran ripple pp i(l1)\n.meas tran crest max i(l1)\n.meas tran power rms i(l1)\n.end\n";
+    let found = found(text, true);
+    let swing = |[vin, d, l, r]: [f64; 4]| {
+        let (a, b) = ((-d * 1e-5 * r / l).exp(), (-(1.0 - d) * 1e-5 * r / l).exp());
+        let crest = vin / r * (1.0 - a) / (1.0 - a * b);
+        [crest * (1.0 - b), crest]
+    };
+    let point = [10.0, 0.4, 1e-4, 5.0];
+    for (k, name) in ["vin", "d", "l1", "r1"].into_iter().enumerate() {
+        let at = |h: f64| {
+            let mut moved = point;
+            moved[k] *= 1.0 + h;
+            swing(moved)
+        };
+        let (low, high) = (at(-1e-5), at(1e-5));
+        for (j, of) in ["ripple", "crest"].into_iter().enumerate() {
+            near(&found, of, name, point[k], (high[j] - low[j]) / 2e-5, 1e-6);
+        }
+    }
+}
+
+#[test]
+fn runs_in_steps_are_differentiated_by_differences() {
+    let text = "clamp\nv1 1 0 {a}\nr1 1 2 1k\nd1 2 0 d\n.model d d(is=1e-14)\n.param a=5\n.tran 1u 100u\n.meas tran v avg v(2)\n.end\n";
+    let found = found(text, false);
+    assert!(!found.exact && found.notes.len() == 1);
+    // r_d/(R + r_d) with r_d = V_T/I.
+    let slope = found.derivative("v", "a").expect("a derivative");
+    assert!((5e-3..7e-3).contains(&slope), "{slope:e}");
+}
