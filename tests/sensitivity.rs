@@ -2,7 +2,7 @@
 #![allow(missing_docs, reason = "tests")]
 
 use circ::Model;
-use circ::analysis::{Sensitivity, SensitivityOptions, sensitivity};
+use circ::analysis::{Sensitivity, SensitivityOptions, WorstOptions, sensitivity, worst};
 
 fn found(text: &str, steady: bool) -> Sensitivity {
     let model = Model::parse(text, "t.cir").expect("a circuit");
@@ -91,4 +91,36 @@ fn runs_in_steps_are_differentiated_by_differences() {
     // r_d/(R + r_d) with r_d = V_T/I.
     let slope = found.derivative("v", "a").expect("a derivative");
     assert!((5e-3..7e-3).contains(&slope), "{slope:e}");
+}
+
+/// A divider: v = V R₂/(R₁ + R₂) is monotone in each of its values, so that its range is that of the corners.
+#[test]
+fn the_range_of_a_divider() {
+    let text = "divider\nv1 1 0 {vin}\nr1 1 2 1k tol=5\nr2 2 0 {r} m=2\n.param vin=12 r=4k\n.tran 1u 10u\n.meas tran out avg v(2)\n.end\n";
+    let model = Model::parse(text, "t.cir").expect("a circuit");
+    assert_eq!(model.circuit().tolerances, [("r1".to_string(), 0.05)]);
+    let options = WorstOptions {
+        tolerances: vec![("vin".into(), 0.01), ("r".into(), 0.02)],
+        ..WorstOptions::default()
+    };
+    let range = worst(&model, "OUT", &options).expect("a range");
+    let out = |vin: f64, r1: f64, r2: f64| vin * r2 / (r1 + r2);
+    for (bound, side) in [(&range.least, -1.0), (&range.greatest, 1.0)] {
+        let truth = out(
+            12.0 * (1.0 + 0.01 * side),
+            1e3 * (1.0 - 0.05 * side),
+            2e3 * (1.0 + 0.02 * side),
+        );
+        assert!(
+            (bound.value - truth).abs() < 1e-9,
+            "{} {truth}",
+            bound.value
+        );
+        assert!((bound.estimate - truth).abs() < 0.05 * (truth - range.nominal).abs());
+    }
+    assert!(range.notes.is_empty() && (range.nominal - 8.0).abs() < 1e-9);
+    // Twice r2 in parallel: its card's value is twice what it is in the circuit.
+    let found = found(text, false);
+    near(&found, "out", "r2", 4e3, 12.0 * 1e3 * 2e3 / 9e6, 2e-6);
+    near(&found, "out", "r", 4e3, 12.0 * 1e3 * 2e3 / 9e6, 2e-6);
 }

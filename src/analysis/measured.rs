@@ -2,6 +2,7 @@
 
 use super::periodic::{PeriodicOptions, on_grid, periodic};
 use super::table::Table;
+use super::worst::Worst;
 use crate::circuit::{Circuit, Harmonics, Measured, Probe, Tran};
 use crate::integrate::{Block, Error, Grid, Note, Orbit, RowKind, Run, SimOptions};
 use crate::model::Model;
@@ -23,13 +24,18 @@ pub struct Measurements {
     pub harmonics: Vec<Harmonics>,
     /// The means of all elements, where they were asked for.
     pub table: Option<Table>,
+    /// The ranges of measurements within tolerances, where they were asked for.
+    pub worst: Vec<Worst>,
 }
 
 impl Measurements {
     /// Whether nothing was asked for.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.measured.is_empty() && self.harmonics.is_empty() && self.table.is_none()
+        self.measured.is_empty()
+            && self.harmonics.is_empty()
+            && self.table.is_none()
+            && self.worst.is_empty()
     }
 }
 
@@ -227,6 +233,7 @@ impl<'a> Measuring<'a> {
             measured: self.circuit.measure(&time, &column),
             harmonics: self.circuit.harmonics(&time, &column),
             table: None,
+            worst: vec![],
         }
     }
 

@@ -7,6 +7,7 @@
 //! | the periodic steady state | [`periodic`]: its [`Orbit`] and one period of waveforms |
 //! | `.ac`, small signals about the operating point or that state | [`small_signal`]: a [`Response`] over frequency |
 //! | derivatives of `.meas` to element values and parameters | [`sensitivity()`]: a [`Sensitivity`] |
+//! | what tolerances make of a `.meas` | [`worst()`]: a [`Worst`] |
 //! | means, extrema and powers of all elements, efficiency, distortion | [`table()`], [`periodic_table`]: a [`Table`] |
 //! | `.step`, or any other values | [`variants`]: a [`Variant`] for every combination of values; [`each`] asks all of them, in parallel |
 
@@ -18,6 +19,7 @@ mod small_signal;
 mod sweep;
 mod table;
 mod variation;
+mod worst;
 
 pub use crate::integrate::{Orbit, OrbitKind};
 pub use dc::{Characteristic, Unsolved, dc};
@@ -32,3 +34,4 @@ pub use sweep::{Variant, each, variants};
 pub use table::{
     ElementMeans, Mean, SignalMeans, Span, Table, TableOptions, Throughput, periodic_table, table,
 };
+pub use worst::{Bound, Worst, WorstOptions, worst};

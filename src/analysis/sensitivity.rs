@@ -138,7 +138,7 @@ impl Serialize for Sensitivity {
 /// ```
 pub fn sensitivity(model: &Model, options: &SensitivityOptions<'_>) -> Result<Sensitivity, Error> {
     let circuit = model.circuit();
-    let to = values(circuit, &options.to)?;
+    let to = values(model, &options.to)?;
     let known = |name: &&String| {
         !circuit
             .measurements
@@ -179,22 +179,25 @@ fn unsupported(what: String) -> Error {
 }
 
 /// What is asked for, with its value.
-fn values(circuit: &Circuit, asked: &[String]) -> Result<Vec<(String, f64)>, Error> {
+fn values(model: &Model, asked: &[String]) -> Result<Vec<(String, f64)>, Error> {
+    let circuit = model.circuit();
     let elements = circuit.elements.iter().filter(|e| !e.name.contains('.'));
-    let elements = elements.filter_map(|element| {
-        let value = match &element.kind {
-            Kind::Resistor(value) | Kind::Capacitor(value) | Kind::Inductor(value) => value.f64,
-            Kind::VoltageSource(source) | Kind::CurrentSource(source) => match source.wave {
-                Wave::Dc(value) => value,
-                _ => return None,
-            },
-            _ => return None,
-        };
-        Some((element.name.clone(), value))
-    });
+    let elements = elements.filter_map(|e| Some((e.name.clone(), value_of(&e.kind)?)));
     let all: Vec<(String, f64)> = elements.chain(circuit.params.iter().cloned()).collect();
+    // A card's value may be multiplied (`m=2`).
+    let written = |(name, value): (String, f64)| {
+        let mut set = model.clone();
+        let Some(id) = circuit.element(&name) else {
+            return Some((name, value));
+        };
+        set.set(&name, value).ok()?;
+        let kind = &set.circuit().elements.get(id.index())?.kind;
+        let factor = value_of(kind)? / value;
+        Some((name, value / factor))
+    };
     if asked.is_empty() {
-        return Ok(all.into_iter().filter(|(_, value)| *value != 0.0).collect());
+        let some = all.into_iter().filter(|(_, value)| *value != 0.0);
+        return Ok(some.filter_map(written).collect());
     }
     let find = |name: &String| {
         let own = all.iter().find(|(own, _)| *own == name.to_lowercase());
@@ -207,9 +210,21 @@ fn values(circuit: &Circuit, asked: &[String]) -> Result<Vec<(String, f64)>, Err
                 "`{name}` is 0: a small part of it is no change"
             )));
         }
-        Ok(own)
+        written(own).ok_or_else(|| unsupported(format!("`{name}` cannot be set")))
     };
     asked.iter().map(find).collect()
+}
+
+/// The value that a card gives to an element.
+fn value_of(kind: &Kind) -> Option<f64> {
+    match kind {
+        Kind::Resistor(value) | Kind::Capacitor(value) | Kind::Inductor(value) => Some(value.f64),
+        Kind::VoltageSource(source) | Kind::CurrentSource(source) => match source.wave {
+            Wave::Dc(value) => Some(value),
+            _ => None,
+        },
+        _ => None,
+    }
 }
 
 /// The transient with so many rows at least.

@@ -111,6 +111,8 @@ pub struct Circuit {
     pub known: Vec<NodeId>,
     /// The parameters of the top level that something uses, with their values, by name.
     pub params: Vec<(String, f64)>,
+    /// `tol=5` on elements of the top level, as parts of their values (0.05).
+    pub tolerances: Vec<(String, f64)>,
     /// `.meas tran`, in file order.
     pub measurements: Vec<NamedMeasurement>,
     /// `.four`, in file order.

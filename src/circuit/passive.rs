@@ -111,6 +111,12 @@ impl<'n> Builder<'n, '_> {
         let Some(value) = self.passive_value(card, values, args, letter, scope) else {
             return;
         };
+        if let (Some(percent), ScopeId::ROOT) = (args.get(&["tol"]), scope)
+            && let Some(percent) = self.scopes.finite(percent, scope)
+        {
+            let tolerance = (card.name.text.clone(), 0.01 * percent.f64.abs());
+            self.circuit.tolerances.push(tolerance);
+        }
         let swept = self
             .swept(&card.name.text)
             .filter(|_| scope == ScopeId::ROOT);

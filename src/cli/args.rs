@@ -179,6 +179,12 @@ pub struct SimArgs {
     /// summary has the largest difference relative to a signal's amplitude, and what is tolerated.
     #[arg(long, conflicts_with = "from_pss")]
     pub verify: bool,
+    /// Bound this measurement within the tolerances of values, `tol=5` (%) on cards or `--tol-of`, and verify the bounds by runs (repeatable)
+    #[arg(long, value_name = "MEAS", conflicts_with = "from_pss")]
+    pub worst: Vec<String>,
+    /// The tolerance of an element's value or `.param` for `--worst` (repeatable)
+    #[arg(long = "tol-of", value_name = "NAME=5%", value_parser = tolerance, requires = "worst")]
+    pub tolerances: Vec<(String, f64)>,
     /// Start at the periodic steady state, with sources that do not repeat held before 0 and running from there on
     #[arg(long)]
     pub from_pss: bool,
@@ -481,6 +487,16 @@ fn implicitness(text: &str) -> Result<f64, String> {
             Err("must be in [0.5, 1]".into())
         }
     })
+}
+
+/// `r1=5%`, or the part itself, `r1=0.05`.
+fn tolerance(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or("expected NAME=5%")?;
+    let value = match value.trim().strip_suffix('%') {
+        Some(percent) => 0.01 * not_negative(percent)?,
+        None => not_negative(value.trim())?,
+    };
+    Ok((name.trim().to_lowercase(), value))
 }
 
 fn assignment(text: &str) -> Result<(String, f64), String> {

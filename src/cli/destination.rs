@@ -201,7 +201,10 @@ impl<'a> Destination<'a> {
                 }
             }
         }
-        let notes = found.table.iter().flat_map(|table| &table.notes);
+        let notes = found.table.iter().map(|table| &table.notes);
+        let notes = notes
+            .chain(found.worst.iter().map(|worst| &worst.notes))
+            .flatten();
         for note in notes {
             streams.say(format!("note: {}", places.of(note)));
         }

@@ -16,7 +16,7 @@ use super::rows::Columns;
 use super::signals::Signals;
 use super::steps::Stepping;
 use super::streams::Streams;
-use crate::analysis::{self, Finished, PeriodicOptions, TableOptions, is_measured};
+use crate::analysis::{self, Finished, PeriodicOptions, TableOptions, WorstOptions, is_measured};
 use crate::circuit::source::Wave;
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{
@@ -116,6 +116,9 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
     if let (true, None) = (args.table.table, &finished.error) {
         tabulate(args, &subject, &request, &mut finished, signals.flag());
     }
+    if finished.error.is_none() {
+        bounds(args, &subject, &request, &mut finished, signals.flag());
+    }
     if let (true, Some((run, _)), None) = (args.verify, &mut finished.run, &finished.error) {
         let options = VerifyOptions {
             settings: request.settings(),
@@ -183,9 +186,41 @@ fn tabulate(
     }
 }
 
+/// Adds the ranges of measurements.
+fn bounds(
+    args: &SimArgs,
+    subject: &Subject,
+    request: &Request,
+    finished: &mut Finished,
+    cancel: &AtomicBool,
+) {
+    let (Subject::Circuit(model), Some((_, found))) = (subject, &mut finished.run) else {
+        return;
+    };
+    let options = WorstOptions {
+        tolerances: args.tolerances.clone(),
+        cancel: Some(cancel),
+        settings: request.settings(),
+    };
+    for of in &args.worst {
+        match analysis::worst(model, of, &options) {
+            Ok(worst) => found.worst.push(worst),
+            Err(error) => {
+                finished.error = Some(error);
+                return;
+            }
+        }
+    }
+}
+
 /// # Errors
 /// [`Failure::Message`] where a second run or a table is asked for of what is no single transient run.
 fn only_one_way(args: &SimArgs) -> Result<(), Failure> {
+    if !args.worst.is_empty() {
+        let file = args.input.file.display();
+        let message = "`--worst` takes one transient run of a circuit, without `.step`";
+        return Err(Failure::Message(format!("{file}: {message}")));
+    }
     if args.table.table {
         let file = args.input.file.display();
         let message = "`--table` takes one transient run of a circuit, without `.step`";

@@ -4,7 +4,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::text;
-use crate::analysis::{Measurements, Table};
+use crate::analysis::{Measurements, Table, Worst};
 use crate::integrate::{Energy, Impulse, Orbit, Places, Run, StateJump, StatedError, Verified};
 
 #[derive(Serialize)]
@@ -37,6 +37,8 @@ struct Summary<'a> {
     fourier: Vec<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
     table: Option<&'a Table>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    worst: &'a [Worst],
 }
 
 /// Of all jumps, those that are not listed included.
@@ -84,9 +86,9 @@ impl<'a> Summary<'a> {
             cpu_seconds: stats.cpu_seconds,
             energy: Balance::of(run),
             error: run.error,
-            notes: [Some(&run.notes), found.table.as_ref().map(|t| &t.notes)]
-                .into_iter()
-                .flatten()
+            notes: std::iter::once(&run.notes)
+                .chain(found.table.iter().map(|table| &table.notes))
+                .chain(found.worst.iter().map(|worst| &worst.notes))
                 .flat_map(|notes| places.all(notes))
                 .collect(),
             impulses: &run.impulses,
@@ -101,6 +103,7 @@ impl<'a> Summary<'a> {
             measurements,
             fourier,
             table: found.table.as_ref(),
+            worst: &found.worst,
         }
     }
 }

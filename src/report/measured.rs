@@ -29,6 +29,9 @@ impl Measurements {
         if let Some(table) = &self.table {
             text.push_str(&table.words());
         }
+        for worst in &self.worst {
+            text.push_str(&worst.words());
+        }
         text
     }
 
@@ -173,6 +176,7 @@ mod tests {
                 }),
             }],
             table: None,
+            worst: vec![],
         }
     }
 

@@ -1,7 +1,7 @@
 //! Derivatives of measurements in words.
 
 use super::{si, table};
-use crate::analysis::{Gradient, Sensitivity};
+use crate::analysis::{Bound, Gradient, Sensitivity, Worst};
 
 /// Digits shown.
 const DIGITS: usize = 6;
@@ -36,6 +36,45 @@ impl Sensitivity {
             let header = ["to", "value", "derivative", "by 1 %"];
             text.push_str(&table::aligned(&header, &rows));
         }
+        text
+    }
+}
+
+impl Worst {
+    /// The range, where its ends are, and what contributes to it.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let Self {
+            measurement,
+            nominal,
+            least,
+            greatest,
+            contributions,
+            ..
+        } = self;
+        let plain = |x: f64| si::plain(x, DIGITS);
+        let mut text = format!(
+            "{measurement} = {}, from {} to {} within tolerances ({} to {} by derivatives)\n",
+            plain(*nominal),
+            plain(least.value),
+            plain(greatest.value),
+            plain(least.estimate),
+            plain(greatest.estimate),
+        );
+        let end = |bound: &Bound, k: usize| bound.at.get(k).map_or("-".into(), |(_, v)| plain(*v));
+        let rows = contributions.iter().enumerate().map(|(k, (name, part))| {
+            vec![
+                name.clone(),
+                plain(part.abs()),
+                end(least, k),
+                end(greatest, k),
+            ]
+        });
+        let rows: Vec<Vec<String>> = rows.collect();
+        text.push_str(&table::aligned(
+            &["of", "±", "at least", "at greatest"],
+            &rows,
+        ));
         text
     }
 }

@@ -144,6 +144,7 @@ pub fn measured(steps: &[Step]) -> String {
             measured: Vec::new(),
             harmonics: step.found.harmonics.clone(),
             table: None,
+            worst: vec![],
         };
         if !harmonics.is_empty() {
             text.push_str(&format!("{}\n{}", step.label(), harmonics.words()));

@@ -65,5 +65,9 @@ pub(crate) const VALUE_STEP: f64 = 1e-4;
 /// The same of whole runs in steps, whose errors change from one to the other. Larger: curvature; smaller: the steps' errors.
 pub(crate) const RUN_STEP: f64 = 1e-2;
 
+/// Where runs at the ends of tolerances are further from what derivatives let expect than this part of the range, another corner may be worse. Larger:
+/// worse corners unsaid; smaller: notes on slight curvature.
+pub(crate) const NOT_STRAIGHT: f64 = 0.1;
+
 /// How far rows are moved to differentiate what is measured on them, relative to a value. Larger: events pass rows of the grid; smaller: rounding.
-pub(crate) const MEASURE_STEP: f64 = 1e-7;
+pub(crate) const MEASURE_STEP: f64 = 3e-7;
