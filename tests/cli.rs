@@ -832,3 +832,63 @@ fn ac_writes_every_format_and_tells_the_margins_of_ratios() {
         both.err
     );
 }
+
+/// The keys of INTERFACE; a table that is asked for is told under `-q` too.
+#[test]
+fn tables_derivatives_and_ranges_are_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("buck.cir");
+    let text = "buck\nv1 1 0 10\ns1 1 2 g 0 sw\nd1 0 2 dd\nvg g 0 pulse(0 1 0 0 0 {d*10u} 10u)\nl1 2 3 100u\nc1 3 0 10u\nr1 3 0 5 tol=5\n\
+        .model sw sw(vt=0.5 vh=0 ron=10m roff=1meg)\n.model dd d(vfwd=0.5 ron=10m)\n.param d=0.4\n.save v(3)\n.tran 1u 200u\n\
+        .meas tran out avg v(3) from=100u\n.end\n";
+    std::fs::write(&file, text).expect("a netlist");
+    let (file, out) = (file.display(), folder.path().join("a.csv"));
+    let out = out.display();
+    let json =
+        |text: &str| -> serde_json::Value { serde_json::from_str(text.trim()).expect("JSON") };
+    for command in ["sim", "pss"] {
+        let ran = run(&format!(
+            "{command} {file} --table --in v1 --out r1 -o {out} --summary json"
+        ));
+        assert_eq!(ran.status, 0, "{}", ran.err);
+        let table = &json(&ran.err)["table"];
+        for key in ["mean", "rms", "min", "max"] {
+            assert!(table["l1"]["i"][key].is_f64() && table["l1"]["v"][key].is_f64());
+        }
+        assert!(table["l1"]["power"].is_f64() && table["probes"]["v(3)"]["ripple"].is_f64());
+        assert_eq!(table["power"]["inputs"][0], "v1");
+        if command == "pss" {
+            let efficiency = table["power"]["efficiency"]
+                .as_f64()
+                .expect("an efficiency");
+            assert!((0.8..1.0).contains(&efficiency), "{efficiency}");
+        }
+        let ran = run(&format!("-q {command} {file} --table -o {out}"));
+        assert!(
+            ran.err.contains("power: input") && ran.err.contains("out  "),
+            "{}",
+            ran.err
+        );
+    }
+    for steady in ["", "--pss"] {
+        let ran = run(&format!(
+            "sens {file} {steady} --of out --to l1 --to d --json"
+        ));
+        assert_eq!(ran.status, 0, "{}", ran.err);
+        let out = &json(&ran.out)["of"]["out"];
+        assert!(out["value"].is_f64() && out["to"]["l1"].is_f64() && out["to"]["d"].is_f64());
+    }
+    let ran = run(&format!(
+        "sim {file} --worst out --tol-of d=2% -o {out} --summary json"
+    ));
+    assert_eq!(ran.status, 0, "{}", ran.err);
+    let worst = &json(&ran.err)["worst"][0];
+    let [least, nominal, greatest] = [
+        &worst["least"]["value"],
+        &worst["nominal"],
+        &worst["greatest"]["value"],
+    ];
+    assert!(least.as_f64() < nominal.as_f64() && nominal.as_f64() < greatest.as_f64());
+    assert_eq!(worst["contributions"][1][0], "r1");
+    assert_eq!(run(&format!("sens {file} --to nothing")).status, 2);
+}

@@ -303,7 +303,7 @@ impl Beside<'_> {
             if !simulation.is_exact() || simulation.passages(place, tran.tstop)?.is_none() {
                 return Ok(None);
             }
-            let trajectory = Trajectory::of(&mut simulation, place, tran.tstop)?;
+            let trajectory = Trajectory::with(&mut simulation, place, tran.tstop, true)?;
             let grid = Grid::of(&tran);
             return Ok(Some(Base {
                 trajectory,

@@ -71,6 +71,8 @@ struct Maker {
     systems: Vec<System>,
     /// Times within this are one, s.
     same: f64,
+    /// Guards that fall through zero at one instant need not do so whatever varies.
+    by_chance: bool,
 }
 
 impl Trajectory {
@@ -82,6 +84,19 @@ impl Trajectory {
         simulation: &mut Simulation,
         place: (f64, &[f64], &[bool]),
         until: f64,
+    ) -> Result<Self, Error> {
+        Self::with(simulation, place, until, false)
+    }
+
+    /// The same; events that coincide `by_chance` are kept with all their guards, for a variation that tells whether they part.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub(crate) fn with(
+        simulation: &mut Simulation,
+        place: (f64, &[f64], &[bool]),
+        until: f64,
+        by_chance: bool,
     ) -> Result<Self, Error> {
         let from = place.0;
         let passages = simulation.passages(place, until)?;
@@ -95,6 +110,7 @@ impl Trajectory {
             thresholds: assembler.thresholds(),
             assembler,
             systems: Vec::new(),
+            by_chance,
             same: SAME_TIME * from.abs().max(until.abs()),
         };
         maker.make(&passages, (until, &end))
@@ -256,11 +272,12 @@ impl Maker {
             x: systems[to].state(&last.after),
             inputs: right,
         };
-        let timing = self.timing(instant, &before, seconds)?;
+        let (timing, others) = self.timing(instant, &before, seconds)?;
         let jump = through.map(|at| &systems[at]);
         let saltation = Saltation::of(t, (&before, &after), timing, jump);
         Ok(Saltation {
             through,
+            others,
             ..saltation
         })
     }
@@ -313,8 +330,9 @@ impl Maker {
         instant: &[Passage],
         before: &Side<'_>,
         seconds: f64,
-    ) -> Result<Option<Timing>, Error> {
+    ) -> Result<(Option<Timing>, Vec<Timing>), Error> {
         let t = instant[0].t;
+        let mut others = Vec::new();
         let rate = before.system.rate(&before.x, &before.inputs.u);
         let mut found: Option<Timing> = None;
         let mut owners: Vec<Owner> = instant.iter().filter_map(|passage| passage.cause).collect();
@@ -343,6 +361,9 @@ impl Maker {
                 }
                 let timing = Timing::of((owner, k), &guard, slope);
                 match &found {
+                    Some(other) if self.by_chance && !same_timing(other, &timing, seconds) => {
+                        others.push(timing);
+                    }
                     Some(other) if !same_timing(other, &timing, seconds) => {
                         let what = format!("{} and another event coincide", self.name(owner));
                         return Err(not_smooth(t, what));
@@ -365,7 +386,7 @@ impl Maker {
             let what = "when it happens does not follow from a guard of its mode";
             return Err(not_smooth(t, what));
         }
-        Ok(found)
+        Ok((found, others))
     }
 
     fn name(&self, owner: Owner) -> String {

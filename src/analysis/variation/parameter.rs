@@ -12,7 +12,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::instant::Inputs;
-use super::saltation::Side;
+use super::saltation::{Side, Timing};
 use super::{Saltation, System, Trajectory, not_smooth, shaped};
 use crate::circuit::source::Piece;
 use crate::integrate::exact::{Assembler, Exosystem, Shape};
@@ -364,27 +364,51 @@ impl<'a> Parameter<'a> {
     fn shift(&self, k: usize, saltation: &Saltation, dx: &DVector<f64>) -> Result<f64, Error> {
         let (segment, t) = (&self.trajectory.segments[k], saltation.t);
         if let Some(timing) = &saltation.timing {
-            let (owner, which) = timing.guard;
-            let mut values = [0.0; 4];
-            for (m, value) in values.iter_mut().enumerate() {
-                let near = &self.near[m];
-                let limits = |i| near.assembler.limits(i);
-                let guards = near.systems[segment.system].guards(owner, (&near.thresholds, limits));
-                let guard = guards.get(which).ok_or_else(|| {
-                    not_smooth(t, "an event has no guard where the value is another")
-                })?;
-                *value = guard
-                    .value(&segment.end, &Self::inputs(&self.forms[k].near[m], t))
-                    .0;
+            let own = self.shift_of(k, (timing, t), dx)?;
+            for other in &saltation.others {
+                let apart = (self.shift_of(k, (other, t), dx)? - own).abs();
+                if apart > SAME_TIMING * own.abs().max(segment.to - segment.from) {
+                    let what = "two events coincide that part when the value is another";
+                    return Err(not_smooth(t, what));
+                }
             }
-            let change: f64 = values
-                .iter()
-                .zip(WEIGHTS)
-                .map(|(value, weight)| value * weight)
-                .sum();
-            return Ok((&timing.x * dx)[0] - change / VALUE_STEP / timing.slope);
+            return Ok(own);
         }
-        // The sources that jump.
+        self.edge(k, t)
+    }
+
+    /// The same by one of its guards.
+    fn shift_of(
+        &self,
+        k: usize,
+        (timing, t): (&Timing, f64),
+        dx: &DVector<f64>,
+    ) -> Result<f64, Error> {
+        let segment = &self.trajectory.segments[k];
+        let (owner, which) = timing.guard;
+        let mut values = [0.0; 4];
+        for (m, value) in values.iter_mut().enumerate() {
+            let near = &self.near[m];
+            let limits = |i| near.assembler.limits(i);
+            let guards = near.systems[segment.system].guards(owner, (&near.thresholds, limits));
+            let guard = guards
+                .get(which)
+                .ok_or_else(|| not_smooth(t, "an event has no guard where the value is another"))?;
+            *value = guard
+                .value(&segment.end, &Self::inputs(&self.forms[k].near[m], t))
+                .0;
+        }
+        let change: f64 = values
+            .iter()
+            .zip(WEIGHTS)
+            .map(|(value, weight)| value * weight)
+            .sum();
+        Ok((&timing.x * dx)[0] - change / VALUE_STEP / timing.slope)
+    }
+
+    /// δt of the sources that jump after segment k.
+    fn edge(&self, k: usize, t: f64) -> Result<f64, Error> {
+        let segment = &self.trajectory.segments[k];
         let (own, after) = (&self.forms[k].own, &self.forms[k + 1].own);
         let jumps = |i: &usize| {
             let (left, right) = (own[*i].value(t), after[*i].value(t));

@@ -40,6 +40,8 @@ pub(crate) struct Saltation {
     pub(crate) du: DMatrix<f64>,
     /// `None` where δt = 0.
     pub(crate) timing: Option<Timing>,
+    /// Guards that fall through zero at the same time, and part when some source varies alone.
+    pub(super) others: Vec<Timing>,
     /// The place of the system in whose directions the storage jumps, where that is not the one that follows.
     pub(super) through: Option<usize>,
     /// Of the outputs: y⁻ − y⁺.
@@ -123,6 +125,7 @@ impl Saltation {
             u,
             du,
             timing,
+            others: Vec::new(),
             through: None,
             step: outputs(before) - outputs(after),
             impulse: Impulse::of(before, after),
