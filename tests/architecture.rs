@@ -30,9 +30,17 @@ const ROOMS: [(&str, &[&str]); 21] = [
     ),
     (
         "lcs",
-        &["algebra", "circuit", "diagnostic", "law", "mna", "settings"],
+        &[
+            "algebra",
+            "circuit",
+            "diagnostic",
+            "law",
+            "linalg",
+            "mna",
+            "settings",
+        ],
     ),
-    ("solve", &["law", "settings"]),
+    ("solve", &["law", "linalg", "settings"]),
     ("waveform", &["settings"]),
     ("plan", &["lcs", "settings", "solve"]),
     (

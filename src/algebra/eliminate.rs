@@ -1,13 +1,16 @@
-//! Dense matrices and Gauss–Jordan elimination in a given order of columns.
+//! Sparse tables and their elimination in a given order of columns.
 
 use super::Field;
+use super::sparse::{SparseRow, entry, subtract};
 
-/// A matrix over a field, row by row.
+/// Rows over a field, without their zeros, and which rows hold a column.
 #[derive(Debug, Clone)]
-pub struct Matrix<F> {
-    rows: usize,
-    cols: usize,
-    data: Vec<F>,
+pub struct Table<F> {
+    rows: Vec<SparseRow<F>>,
+    /// By column the latest link of its chain.
+    heads: Vec<Option<u32>>,
+    /// Rows that hold a column, chained: a row, and the link before. Rows may hold it no more, or stand twice; none is missing.
+    links: Vec<(u32, Option<u32>)>,
 }
 
 /// What an elimination has found so far.
@@ -19,6 +22,8 @@ pub struct Elimination {
     pub pivot: Vec<Option<usize>>,
     /// For each equation whether it holds a pivot.
     pub used: Vec<bool>,
+    /// The columns with pivots, in the order in which they got them.
+    order: Vec<usize>,
 }
 
 impl Elimination {
@@ -29,79 +34,130 @@ impl Elimination {
             equations,
             pivot: vec![None; columns],
             used: vec![false; equations],
+            order: Vec::new(),
         }
     }
 }
 
-impl<F: Field> Matrix<F> {
-    /// All zeros.
+impl<F: Field> Table<F> {
+    /// Of rows over `cols` columns.
     #[must_use]
-    pub fn zeros(rows: usize, cols: usize) -> Self {
-        Self {
+    pub fn new(rows: Vec<SparseRow<F>>, cols: usize) -> Self {
+        let mut table = Self {
             rows,
-            cols,
-            data: vec![F::zero(); rows * cols],
+            heads: vec![None; cols],
+            links: Vec::new(),
+        };
+        for r in 0..table.rows.len() {
+            for k in 0..table.rows[r].len() {
+                table.link(table.rows[r][k].0, r);
+            }
         }
+        table
+    }
+
+    /// The first `count` rows.
+    #[must_use]
+    pub fn head(&self, count: usize) -> Self {
+        Self::new(self.rows[..count].to_vec(), self.cols())
     }
 
     /// Number of rows.
     #[must_use]
     pub fn rows(&self) -> usize {
-        self.rows
+        self.rows.len()
     }
 
     /// Number of columns.
     #[must_use]
     pub fn cols(&self) -> usize {
-        self.cols
+        self.heads.len()
     }
 
     /// A row.
     #[must_use]
-    pub fn row(&self, row: usize) -> &[F] {
-        &self.data[row * self.cols..(row + 1) * self.cols]
+    pub fn row(&self, row: usize) -> &[(usize, F)] {
+        &self.rows[row]
     }
 
-    /// A row, to write.
-    pub fn row_mut(&mut self, row: usize) -> &mut [F] {
-        &mut self.data[row * self.cols..(row + 1) * self.cols]
-    }
-
-    /// An entry.
+    /// An entry, where it is not zero.
     #[must_use]
-    pub fn at(&self, row: usize, col: usize) -> &F {
-        &self.data[row * self.cols + col]
+    pub fn at(&self, row: usize, column: usize) -> Option<&F> {
+        entry(&self.rows[row], column)
     }
 
-    /// An entry, to write.
-    pub fn at_mut(&mut self, row: usize, col: usize) -> &mut F {
-        &mut self.data[row * self.cols + col]
+    /// The rows with an entry in `column`, in order.
+    #[must_use]
+    pub fn holders(&self, column: usize) -> Vec<usize> {
+        let mut next = self.heads[column];
+        let chain = std::iter::from_fn(|| {
+            let (row, before) = self.links[next? as usize];
+            next = before;
+            Some(row as usize)
+        });
+        let mut rows: Vec<usize> = chain.collect();
+        rows.sort_unstable();
+        rows.dedup();
+        rows.retain(|&r| self.at(r, column).is_some());
+        rows
     }
 
-    /// Replaces an entry.
-    pub fn set(&mut self, row: usize, col: usize, value: F) {
-        self.data[row * self.cols + col] = value;
+    fn link(&mut self, column: usize, row: usize) {
+        let latest = self.links.len() as u32;
+        self.links.push((row as u32, self.heads[column]));
+        self.heads[column] = Some(latest);
     }
 
-    /// Appends a row of the matrix's width.
-    pub fn push_row(&mut self, row: &[F]) {
-        assert_eq!(row.len(), self.cols, "a row of another width");
-        self.data.extend_from_slice(row);
-        self.rows += 1;
+    /// Makes a column zero.
+    pub fn clear(&mut self, column: usize) {
+        for r in self.holders(column) {
+            self.rows[r].retain(|(c, _)| *c != column);
+        }
+        self.heads[column] = None;
     }
 
-    /// Gives `column` a pivot if an unused equation has a nonzero entry there, and clears it from all other rows.
+    /// Adds `factor` times column `from` to column `to`, and makes `from` zero.
+    pub fn fold(&mut self, from: usize, factor: &F, to: usize) {
+        for r in self.holders(from) {
+            let row = &mut self.rows[r];
+            let Ok(at) = row.binary_search_by_key(&from, |(c, _)| *c) else {
+                continue;
+            };
+            let moved = row.remove(at).1.mul(factor);
+            if moved.is_zero() {
+                continue;
+            }
+            match row.binary_search_by_key(&to, |(c, _)| *c) {
+                Ok(at) => {
+                    row[at].1 = row[at].1.add(&moved);
+                    if row[at].1.is_zero() {
+                        row.remove(at);
+                    }
+                }
+                Err(at) => {
+                    row.insert(at, (to, moved));
+                    self.link(to, r);
+                }
+            }
+        }
+        self.heads[from] = None;
+    }
+
+    /// Gives `column` a pivot if an unused equation has a nonzero entry there, and clears it from the other unused equations; those with
+    /// pivots keep it until [`Self::settle`].
     ///
     /// Among the candidates the entry largest relative to its row is taken, the first of equals. Returns whether a
     /// pivot was found. An elimination over columns in class order makes each class depend on later ones as
     /// far as the equations allow.
     pub fn eliminate(&mut self, column: usize, state: &mut Elimination) -> bool {
-        let free = |row: &usize| !state.used[*row] && !self.at(*row, column).is_zero();
-        let mut candidates = (0..state.equations).filter(free);
+        let holders = self.holders(column);
+        let free = |row: &usize| *row < state.equations && !state.used[*row];
+        let mut candidates = holders.iter().copied().filter(free);
         let (first, second) = (candidates.next(), candidates.next());
         let relative = |row: usize| {
-            let sizes = self.row(row).iter().map(|x| x.to_f64().abs());
-            self.at(row, column).to_f64().abs() / sizes.fold(0.0, f64::max)
+            let sizes = self.row(row).iter().map(|(_, x)| x.to_f64().abs());
+            let size = self.at(row, column).map_or(0.0, |x| x.to_f64().abs());
+            size / sizes.fold(0.0, f64::max)
         };
         let mut best = first.map(|row| (row, 0.0));
         if let (Some((row, size)), Some(_)) = (&mut best, second) {
@@ -116,46 +172,79 @@ impl<F: Field> Matrix<F> {
         let Some((row, _)) = best else { return false };
         state.used[row] = true;
         state.pivot[column] = Some(row);
-        self.pivot(row, column);
+        state.order.push(column);
+        let open = holders
+            .into_iter()
+            .filter(|&r| r < state.equations && !state.used[r]);
+        self.normalise(row, column);
+        open.for_each(|r| self.clear_from(r, column, row));
         true
     }
 
+    /// Puts pivots into each other, the latest first, so that each depends on columns without pivot alone.
+    pub fn settle(&mut self, state: &Elimination) {
+        for &column in state.order.iter().rev() {
+            if let Some(row) = state.pivot[column] {
+                self.clear_from_others(column, row);
+            }
+        }
+    }
+
     /// Gives the equation of `leaving`, which has a pivot, to `entering`, which has none and a nonzero entry there; returns whether that is so.
+    /// The pivots must be [settled](Self::settle); they are so afterwards.
     pub fn exchange(&mut self, leaving: usize, entering: usize, state: &mut Elimination) -> bool {
         let Some(row) = state.pivot[leaving] else {
             return false;
         };
-        if state.pivot[entering].is_some() || self.at(row, entering).is_zero() {
+        if state.pivot[entering].is_some() || self.at(row, entering).is_none() {
             return false;
         }
         state.pivot[leaving] = None;
         state.pivot[entering] = Some(row);
-        self.pivot(row, entering);
+        state.order.retain(|&c| c != leaving);
+        state.order.push(entering);
+        self.normalise(row, entering);
+        self.clear_from_others(entering, row);
         true
     }
 
-    /// Scales `row` to 1 in `column` and subtracts it from every other row so that they are 0 there.
-    fn pivot(&mut self, row: usize, column: usize) {
-        let inverse = F::one().div(self.at(row, column));
-        let mut pivot_row = Vec::with_capacity(self.cols);
-        for (c, x) in self.row_mut(row).iter_mut().enumerate() {
-            if c == column {
-                *x = F::one();
-            } else if !x.is_zero() {
-                *x = x.mul(&inverse);
-                pivot_row.push((c, x.clone()));
-            }
+    /// Scales `row` to 1 in `column`.
+    fn normalise(&mut self, row: usize, column: usize) {
+        let row = &mut self.rows[row];
+        let Some(inverse) = entry(row, column).map(|x| F::one().div(x)) else {
+            return;
+        };
+        for (c, x) in row {
+            *x = if *c == column {
+                F::one()
+            } else {
+                x.mul(&inverse)
+            };
         }
-        for r in (0..self.rows).filter(|&r| r != row) {
-            let target = self.row_mut(r);
-            if target[column].is_zero() {
-                continue;
-            }
-            let factor = std::mem::replace(&mut target[column], F::zero());
-            for (c, x) in &pivot_row {
-                target[*c].sub_mul(&factor, x);
-            }
+    }
+
+    /// Subtracts `row`, which is 1 in `column`, from all others that hold the column.
+    fn clear_from_others(&mut self, column: usize, row: usize) {
+        let holders = self.holders(column);
+        for r in holders.into_iter().filter(|&r| r != row) {
+            self.clear_from(r, column, row);
         }
+        // No other row holds it any more.
+        self.heads[column] = None;
+        self.link(column, row);
+    }
+
+    /// Subtracts `row`, which is 1 in `column`, from row r so that it is 0 there.
+    fn clear_from(&mut self, r: usize, column: usize, row: usize) {
+        let mut filled = Vec::new();
+        let target = std::mem::take(&mut self.rows[r]);
+        self.rows[r] = match entry(&target, column) {
+            Some(factor) => subtract(&target, factor, &self.rows[row], column, |c| {
+                filled.push(c);
+            }),
+            None => target,
+        };
+        filled.into_iter().for_each(|c| self.link(c, r));
     }
 }
 
@@ -163,22 +252,21 @@ impl<F: Field> Matrix<F> {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::{Ball, Rational, rational};
+    use super::super::{Ball, Rational, rational, sparse::sparse};
     use super::*;
 
     fn eliminate_all<F: Field>(
         entries: &[Vec<Rational>],
         number: impl Fn(&Rational) -> F + Copy,
-    ) -> (Matrix<F>, Elimination) {
+    ) -> (Table<F>, Elimination) {
         let cols = entries[0].len();
-        let mut table = Matrix::zeros(0, cols);
-        for row in entries {
-            table.push_row(&row.iter().map(number).collect::<Vec<_>>());
-        }
+        let row = |row: &Vec<Rational>| sparse(row.iter().map(number));
+        let mut table = Table::new(entries.iter().map(row).collect(), cols);
         let mut state = Elimination::new(entries.len(), cols);
         for c in 0..cols {
             table.eliminate(c, &mut state);
         }
+        table.settle(&state);
         (table, state)
     }
 
@@ -197,7 +285,7 @@ mod tests {
         assert_eq!(state.pivot.iter().flatten().count(), 2);
         assert_eq!(state.pivot[2], None);
         // x0 = −1 x2, x1 = −1 x2
-        assert_eq!(m.at(state.pivot[0].unwrap(), 2).to_f64(), 1.0);
+        assert_eq!(m.at(state.pivot[0].unwrap(), 2).unwrap().to_f64(), 1.0);
     }
 
     proptest! {
@@ -220,8 +308,9 @@ mod tests {
                 let (Some(r), Some(s)) = (found.pivot[c], truth.pivot[c]) else { continue };
                 for k in 0..6 {
                     let (x, y) = (ball.at(r, k), exact.at(s, k));
-                    prop_assert_eq!(x.is_zero(), Field::is_zero(y));
-                    if x.is_precise() && !x.is_zero() {
+                    prop_assert_eq!(x.is_some(), y.is_some());
+                    let (Some(x), Some(y)) = (x, y) else { continue };
+                    if x.is_precise() {
                         let y = Field::to_f64(y);
                         prop_assert!((x.to_f64() - y).abs() <= 2e-14 * y.abs());
                     }

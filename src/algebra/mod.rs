@@ -14,8 +14,8 @@ mod value;
 
 pub use ball::Ball;
 pub use double::Double;
-pub use eliminate::{Elimination, Matrix};
+pub use eliminate::{Elimination, Table};
 pub use field::Field;
 pub use rational::{Rational, rational};
-pub use sparse::{SparseRow, eliminate_sparse};
+pub use sparse::{SparseRow, add_scaled, eliminate_sparse, entry, part, sparse, subtract};
 pub use value::Value;

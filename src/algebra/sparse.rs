@@ -1,4 +1,7 @@
-//! Elimination on sparse rows: node potentials and internal currents, once per circuit.
+//! Sparse rows, and the elimination of node potentials and internal currents, once per circuit.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 
 use super::Field;
 use crate::settings::tolerances::ranks::PIVOT_CHOICE;
@@ -6,11 +9,81 @@ use crate::settings::tolerances::ranks::PIVOT_CHOICE;
 /// Entries (column, value) of a row, columns increasing, no zeros.
 pub type SparseRow<F> = Vec<(usize, F)>;
 
+/// The entries that are not zero of a row written in full.
+pub fn sparse<F: Field>(row: impl IntoIterator<Item = F>) -> SparseRow<F> {
+    let entries = row.into_iter().enumerate();
+    entries.filter(|(_, x)| !x.is_zero()).collect()
+}
+
+/// The entry of a column, where it is not zero.
+#[must_use]
+pub fn entry<F>(row: &[(usize, F)], column: usize) -> Option<&F> {
+    row.binary_search_by_key(&column, |(c, _)| *c)
+        .ok()
+        .map(|k| &row[k].1)
+}
+
+/// The entries of these columns.
+#[must_use]
+pub fn part<F>(row: &[(usize, F)], columns: std::ops::Range<usize>) -> &[(usize, F)] {
+    let from = row.partition_point(|(c, _)| *c < columns.start);
+    let to = row.partition_point(|(c, _)| *c < columns.end);
+    &row[from..to.max(from)]
+}
+
+/// row − factor · other, without `column`; `filled` is told of columns that only `other` holds.
+#[must_use]
+pub fn subtract<F: Field>(
+    row: &[(usize, F)],
+    factor: &F,
+    other: &[(usize, F)],
+    column: usize,
+    mut filled: impl FnMut(usize),
+) -> SparseRow<F> {
+    let mut result = Vec::with_capacity(row.len() + other.len());
+    let minus = factor.neg();
+    let mut rest = row;
+    for (c, x) in other.iter().filter(|(c, _)| *c != column) {
+        let before = rest.iter().take_while(|(a, _)| a < c).count();
+        push_all(&mut result, &rest[..before], column);
+        rest = &rest[before..];
+        if let [(a, own), after @ ..] = rest
+            && a == c
+        {
+            let mut value = own.clone();
+            value.sub_mul(factor, x);
+            if !value.is_zero() {
+                result.push((*c, value));
+            }
+            rest = after;
+        } else {
+            filled(*c);
+            result.push((*c, x.mul(&minus)));
+        }
+    }
+    push_all(&mut result, rest, column);
+    result
+}
+
+/// Appends entries, but for that of `column`.
+fn push_all<F: Field>(target: &mut SparseRow<F>, entries: &[(usize, F)], column: usize) {
+    target.extend(entries.iter().filter(|(c, _)| *c != column).cloned());
+}
+
+/// target ← target + scale · row.
+pub fn add_scaled<F: Field>(target: &mut SparseRow<F>, scale: &F, row: &[(usize, F)]) {
+    if target.is_empty() {
+        target.extend(row.iter().map(|(c, x)| (*c, x.mul(scale))));
+    } else if !row.is_empty() {
+        *target = subtract(target, &scale.neg(), row, usize::MAX, |_| {});
+    }
+}
+
 /// Eliminates the columns below `columns` from all rows and removes the rows that held the pivots.
 ///
 /// Only the first `equations` rows can hold pivots; the others (readings) are rewritten. Returns the number of equations
-/// left; they stay in front. The column with the fewest candidate rows goes first, which keeps the rows short (Markowitz).
-/// A column that stays is zero in every equation left.
+/// left; they stay in front. The column with the fewest candidate rows goes first, the first of equals, which keeps the rows short
+/// (Markowitz). A column that stays is zero in every equation left.
 pub fn eliminate_sparse<F: Field>(
     rows: &mut Vec<SparseRow<F>>,
     equations: usize,
@@ -24,10 +97,24 @@ pub fn eliminate_sparse<F: Field>(
             holders[c].push(r);
         }
     }
-    let mut open: Vec<usize> = (0..columns).collect();
-    while let Some(position) = next_column(rows, &active, &mut holders, &open) {
-        let column = open.swap_remove(position);
-        let Some(pivot) = pivot_row(rows, &active, &holders[column], column) else {
+    // How many equations hold a column, and columns by that: entries of an older count are passed over.
+    let mut counts: Vec<usize> = (holders.iter())
+        .map(|list| list.iter().filter(|&&r| r < equations).count())
+        .collect();
+    let mut queue: BinaryHeap<Reverse<(usize, usize)>> = (counts.iter().enumerate())
+        .map(|(c, &n)| Reverse((n, c)))
+        .collect();
+    let mut open = vec![true; columns];
+    while let Some(Reverse((count, column))) = queue.pop() {
+        if !open[column] || count != counts[column] || count == 0 {
+            continue;
+        }
+        open[column] = false;
+        let mut list = std::mem::take(&mut holders[column]);
+        list.retain(|&r| entry(&rows[r], column).is_some());
+        list.sort_unstable();
+        list.dedup();
+        let Some(pivot) = pivot_row(rows, &active, &list, column) else {
             continue;
         };
         active[pivot] = false;
@@ -35,18 +122,47 @@ pub fn eliminate_sparse<F: Field>(
         let Some(inverse) = entry(&pivot_entries, column).map(|x| F::one().div(x)) else {
             continue;
         };
-        for r in std::mem::take(&mut holders[column]) {
+        let mut changed: Vec<usize> = Vec::new();
+        let mut recount = |c: usize, more: bool, counts: &mut Vec<usize>| {
+            counts[c] = if more { counts[c] + 1 } else { counts[c] - 1 };
+            changed.push(c);
+        };
+        let internal = |row: &[(usize, F)]| part(row, 0..columns).iter().map(|e| e.0).collect();
+        let left: Vec<usize> = internal(&pivot_entries);
+        left.into_iter()
+            .for_each(|c| recount(c, false, &mut counts));
+        for r in list.into_iter().filter(|&r| r != pivot) {
             let Some(factor) = entry(&rows[r], column).map(|x| x.mul(&inverse)) else {
                 continue;
             };
-            let updated = subtract(&rows[r], &factor, &pivot_entries, column);
-            for &(c, _) in updated.iter().take_while(|(c, _)| *c < columns) {
-                if entry(&rows[r], c).is_none() {
+            let counted = r < equations;
+            let before: Vec<usize> = if counted {
+                internal(&rows[r])
+            } else {
+                Vec::new()
+            };
+            rows[r] = subtract(&rows[r], &factor, &pivot_entries, column, |c| {
+                if c < columns {
                     holders[c].push(r);
+                    if counted {
+                        recount(c, true, &mut counts);
+                    }
+                }
+            });
+            for c in before {
+                if entry(&rows[r], c).is_none() {
+                    recount(c, false, &mut counts);
                 }
             }
-            rows[r] = updated;
         }
+        changed.sort_unstable();
+        changed.dedup();
+        queue.extend(
+            changed
+                .into_iter()
+                .filter(|&c| open[c])
+                .map(|c| Reverse((counts[c], c))),
+        );
     }
     let mut index = 0;
     rows.retain(|_| {
@@ -54,37 +170,6 @@ pub fn eliminate_sparse<F: Field>(
         index > equations || active[index - 1]
     });
     active.iter().filter(|a| **a).count()
-}
-
-fn entry<F>(row: &[(usize, F)], column: usize) -> Option<&F> {
-    row.binary_search_by_key(&column, |(c, _)| *c)
-        .ok()
-        .map(|k| &row[k].1)
-}
-
-/// The position in `open` of a column with the fewest candidate rows; `None` when no open column has any.
-fn next_column<F: Field>(
-    rows: &[SparseRow<F>],
-    active: &[bool],
-    holders: &mut [Vec<usize>],
-    open: &[usize],
-) -> Option<usize> {
-    let mut best: Option<(usize, usize, usize)> = None;
-    for (position, &column) in open.iter().enumerate() {
-        // Lists are only tidied when they could win: their length bounds the count from above, not below.
-        holders[column].retain(|&r| entry(&rows[r], column).is_some());
-        let count = holders[column]
-            .iter()
-            .filter(|&&r| r < active.len() && active[r])
-            .count();
-        if count > 0 && best.is_none_or(|(_, c, n)| (count, column) < (n, c)) {
-            best = Some((position, column, count));
-        }
-        if count == 1 {
-            break;
-        }
-    }
-    best.map(|(position, ..)| position)
 }
 
 /// The shortest row among those whose entry is large enough.
@@ -111,38 +196,6 @@ fn pivot_row<F: Field>(
         .map(|(r, _)| (rows[r].len(), r))
         .min()
         .map(|(_, r)| r)
-}
-
-/// row − factor · pivot, without `column`.
-fn subtract<F: Field>(
-    row: &[(usize, F)],
-    factor: &F,
-    pivot: &[(usize, F)],
-    column: usize,
-) -> SparseRow<F> {
-    let minus = factor.neg();
-    let mut result = Vec::with_capacity(row.len() + pivot.len());
-    let (mut i, mut j) = (0, 0);
-    while i < row.len() || j < pivot.len() {
-        let a = row.get(i).map_or(usize::MAX, |e| e.0);
-        let b = pivot.get(j).map_or(usize::MAX, |e| e.0);
-        let c = a.min(b);
-        let value = if a < b {
-            row[i].1.clone()
-        } else if b < a {
-            pivot[j].1.mul(&minus)
-        } else {
-            let mut x = row[i].1.clone();
-            x.sub_mul(factor, &pivot[j].1);
-            x
-        };
-        i += usize::from(a == c);
-        j += usize::from(b == c);
-        if c != column && !value.is_zero() {
-            result.push((c, value));
-        }
-    }
-    result
 }
 
 #[cfg(test)]

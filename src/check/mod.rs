@@ -25,7 +25,7 @@ use nalgebra::DMatrix;
 
 use crate::circuit::Circuit;
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
-use crate::lcs::Lcs;
+use crate::lcs::{Lcs, SparseLcs};
 use crate::mna::topology;
 use crate::passivity::{Residuals, Verdict};
 use facts::Facts;
@@ -146,6 +146,35 @@ pub struct Size {
 /// The report of a circuit with the system it was reduced to.
 #[must_use]
 pub fn circuit(circuit: &Circuit, lcs: &Lcs) -> Report {
+    in_circuit(circuit, system(lcs))
+}
+
+/// The report of a circuit of so many states and ports that certificates, which are dense, are left out: topology, sizes, and that a
+/// system exists.
+#[must_use]
+pub fn large(circuit: &Circuit, lcs: &SparseLcs) -> Report {
+    let size = Size {
+        n: lcs.states.len(),
+        m: lcs.ports.len(),
+        p: lcs.inputs.len(),
+    };
+    let report = Report {
+        ok: true,
+        size,
+        passive_because: Some(format!(
+            "{} states and {} ports are too many for a dense certificate",
+            size.n, size.m
+        )),
+        states: lcs.states.iter().map(|s| s.name.clone()).collect(),
+        lambdas: lcs.ports.iter().map(|port| port.lambda.clone()).collect(),
+        switches: lcs.switches.clone(),
+        ..faulty(&lcs.title, Vec::new())
+    };
+    in_circuit(circuit, report)
+}
+
+/// With what the circuit's graph tells.
+fn in_circuit(circuit: &Circuit, report: Report) -> Report {
     let (tree, links) = topology::normal_tree(circuit);
     let name = |&node: &usize| circuit.nodes[node].clone();
     Report {
@@ -154,7 +183,7 @@ pub fn circuit(circuit: &Circuit, lcs: &Lcs) -> Report {
             .map(|part| part.iter().map(name).collect())
             .collect(),
         normal_tree: NormalTree { tree, links },
-        ..system(lcs)
+        ..report
     }
 }
 

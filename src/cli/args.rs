@@ -317,6 +317,8 @@ pub enum SystemFormat {
     Matlab,
     /// LaTeX matrices
     Latex,
+    /// Matrix Market: with `-o NAME.mtx` the files NAME.A.mtx, NAME.B.mtx, …
+    Mtx,
 }
 
 /// `circ check`.

@@ -57,17 +57,24 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Report, Failure> {
     diagnostics.extend(mna::topology::findings(model.circuit()));
     input::positions(model.multiport(), &args.switches)?;
     let subject = Subject::Circuit(Box::new(model));
-    match input::start_system(&subject, &args.switches, streams) {
-        Ok((system, without)) => {
-            let mut report = match &subject {
-                Subject::Circuit(model) => {
-                    let circuit = model.circuit();
-                    // A run would be refused, too; what follows is about the start from initial conditions.
-                    diagnostics.extend(without.map(|error| error.diagnostic(circuit)));
-                    check::circuit(circuit, &system.lcs)
-                }
-                Subject::System(_) => check::system(&system.lcs),
-            };
+    let judged = match &subject {
+        Subject::Circuit(model) if input::is_large(model.multiport()) => {
+            let system = input::sparse_system(&subject, &args.switches, streams);
+            system.map(|(system, _)| check::large(model.circuit(), &system))
+        }
+        Subject::Circuit(model) => {
+            let system = input::start_system(&subject, &args.switches, streams);
+            system.map(|(system, without)| {
+                let circuit = model.circuit();
+                // A run would be refused, too; what follows is about the start from initial conditions.
+                diagnostics.extend(without.map(|error| error.diagnostic(circuit)));
+                check::circuit(circuit, &system.lcs)
+            })
+        }
+        Subject::System(system) => Ok(check::system(&system.lcs)),
+    };
+    match judged {
+        Ok(mut report) => {
             report.ok = diagnostics.iter().all(|d| d.severity < Severity::Error);
             let shown = input::most(diagnostics);
             let shown = shown.iter().map(|d| Fault::of(d, &sources));

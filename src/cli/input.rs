@@ -14,6 +14,7 @@ use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 use crate::forms::json;
 use crate::integrate::{Error, Places, Reason, start};
 use crate::lcs::json::SystemFile;
+use crate::lcs::sparse::{MANY, SparseLcs};
 use crate::lcs::{Lcs, Position, reduce};
 use crate::mna::StaticMultiport;
 use crate::model::Model;
@@ -246,6 +247,54 @@ pub fn start_system(
         tran: circuit.tran,
     };
     Ok((system, without))
+}
+
+/// Whether a circuit has so many states and ports that its system is handled without its zeros.
+pub fn is_large(behaviour: &StaticMultiport) -> bool {
+    behaviour.storage.len() + behaviour.pairs.len() > MANY
+}
+
+/// As [`start_system`], without its zeros, and the state at the start.
+///
+/// # Errors
+/// Those of the operating point and of the reduction.
+pub fn sparse_system(
+    subject: &Subject,
+    wanted: &[(String, bool)],
+    streams: &Streams,
+) -> Result<(SparseLcs, Vec<f64>), Failure> {
+    let Subject::Circuit(model) = subject else {
+        return Err(Failure::Message("a system file is not reduced".into()));
+    };
+    let (circuit, behaviour) = (model.circuit(), model.multiport());
+    let uic = circuit.tran.is_some_and(|t| t.uic);
+    let initial = start::initial(circuit, behaviour, uic, &Settings::default());
+    let initial = match initial {
+        Ok(initial) => initial,
+        Err(error) => {
+            streams.say(format!(
+                "note: {error}; the start state is the initial conditions"
+            ));
+            start::initial(circuit, behaviour, true, &Settings::default()).map_err(Box::new)?
+        }
+    };
+    for note in subject.places().all(&initial.notes) {
+        streams.say(format!("note: {note}"));
+    }
+    let mut switches = initial.switches;
+    for (k, on) in positions(behaviour, wanted)? {
+        switches[k] = on;
+    }
+    let system = SparseLcs::of(behaviour, &Position::free(behaviour, switches))
+        .map_err(|error| Box::new(Error::before(error.into())))?;
+    if system.imprecise > 0 {
+        let count = system.imprecise;
+        streams.say(format!(
+            "note: {count} entries are small differences of large numbers and not known to be within 1e-14 of the exact ones"
+        ));
+    }
+    let x0 = system.state_from(initial.storage.as_slice());
+    Ok((system, x0))
 }
 
 /// Indices and positions of the switches named on the command line.

@@ -8,7 +8,7 @@ use super::files;
 use super::input::{self, Subject};
 use super::streams::Streams;
 use crate::lcs::format::{Format, format};
-use crate::lcs::json;
+use crate::lcs::{json, sparse_format};
 
 /// Prints the complementarity system.
 ///
@@ -17,6 +17,11 @@ use crate::lcs::json;
 pub(super) fn lcs(args: &LcsArgs, streams: &Streams) -> Result<Exit, Failure> {
     let outputs: Vec<&Path> = args.output.iter().map(PathBuf::as_path).collect();
     let subject = input::open_as_it_stands(&args.input, &outputs, streams)?;
+    if let Subject::Circuit(model) = &subject
+        && (args.format == SystemFormat::Mtx || input::is_large(model.multiport()))
+    {
+        return sparse(args, &subject, streams);
+    }
     let system = input::start_system(&subject, &args.switches, streams);
     let (system, without) = system.map_err(|failure| match failure {
         Failure::Run(error) if matches!(subject, Subject::Circuit(_)) => {
@@ -35,15 +40,60 @@ pub(super) fn lcs(args: &LcsArgs, streams: &Streams) -> Result<Exit, Failure> {
         SystemFormat::Numpy => format(&system.lcs, Format::Numpy),
         SystemFormat::Matlab => format(&system.lcs, Format::Matlab),
         SystemFormat::Latex => format(&system.lcs, Format::Latex),
+        SystemFormat::Mtx => {
+            let what = "--format mtx: takes a netlist; scipy.io.mmwrite writes the matrices of a system file";
+            return Err(Failure::Message(what.into()));
+        }
     };
     let text = if text.ends_with('\n') {
         text
     } else {
         text + "\n"
     };
+    put(args, text, streams)
+}
+
+fn put(args: &LcsArgs, text: String, streams: &Streams) -> Result<Exit, Failure> {
     match &args.output {
         Some(path) => files::write(path, text.as_bytes())?,
         None => streams.data(text)?,
     }
     Ok(Exit::Done)
+}
+
+/// The system without its zeros.
+fn sparse(args: &LcsArgs, subject: &Subject, streams: &Streams) -> Result<Exit, Failure> {
+    let (system, x0) = input::sparse_system(subject, &args.switches, streams)?;
+    let tran = match subject {
+        Subject::Circuit(model) => model.circuit().tran,
+        Subject::System(_) => None,
+    };
+    let text = match args.format {
+        SystemFormat::Json => json::write_sparse(&system, &x0, tran),
+        SystemFormat::Text => sparse_format::summary(&system),
+        SystemFormat::Numpy => sparse_format::numpy(&system),
+        SystemFormat::Matlab => sparse_format::matlab(&system),
+        SystemFormat::Latex => {
+            let n = system.states.len();
+            return Err(Failure::Message(format!(
+                "--format latex: {n} states fill no page; use json, numpy, matlab or mtx"
+            )));
+        }
+        SystemFormat::Mtx => {
+            let matrices = sparse_format::matrix_market(&system);
+            let Some(path) = &args.output else {
+                let texts: Vec<String> = matrices.into_iter().map(|(_, text)| text).collect();
+                streams.data(texts.concat())?;
+                return Ok(Exit::Done);
+            };
+            for (letter, text) in matrices {
+                files::write(
+                    &path.with_extension(format!("{letter}.mtx")),
+                    text.as_bytes(),
+                )?;
+            }
+            return Ok(Exit::Done);
+        }
+    };
+    put(args, text, streams)
 }

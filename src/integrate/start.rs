@@ -3,6 +3,8 @@
 mod prescribed;
 mod statics;
 
+use std::collections::BTreeMap;
+
 use nalgebra::DVector;
 
 use self::prescribed::{Guess, Prescribed, Voltage, hold_voltages, open_inductors, read_guesses};
@@ -66,15 +68,14 @@ pub enum Values {
 #[must_use]
 pub fn from_initial_conditions(circuit: &Circuit, behaviour: &StaticMultiport) -> DVector<f64> {
     let known = node_voltages(circuit);
+    let elements = circuit.elements.iter().map(|e| (e.name.as_str(), e));
+    let elements: BTreeMap<&str, &Element> = elements.collect();
     let value = |k: usize| -> f64 {
         let storage = &behaviour.storage[k];
         if let Some(ic) = storage.initial {
             return ic;
         }
-        let element = circuit
-            .element(&storage.element)
-            .map(|id| &circuit.elements[id.index()]);
-        match element {
+        match elements.get(storage.element.as_str()) {
             Some(e) if storage.capacitor => {
                 // A capacitor between two nodes of one `.ic v(a,b)=` has that difference.
                 let pair = circuit.initial_voltages.iter().find_map(|&(a, b, v)| {

@@ -85,6 +85,23 @@ impl Lcs {
         Self(parts)
     }
 
+    /// Bytes that its matrices take, about.
+    pub(crate) fn bytes(&self) -> usize {
+        let rows = |rows: &Rows| [&rows.x, &rows.lambda, &rows.u, &rows.du].map(DMatrix::len);
+        let (outputs, storage) = (&self.outputs, &self.storage);
+        let read = [
+            &outputs.rows,
+            &outputs.power_v,
+            &outputs.power_i,
+            &self.controls,
+        ];
+        let own = [&self.a, &self.b, &self.c, &self.d, &self.e, &self.g];
+        let stored = [&self.energy, &storage.x, &storage.metric, &storage.inject];
+        let numbers = (own.iter().chain(&stored)).map(|m| m.len());
+        let numbers = numbers.chain(read.into_iter().flat_map(rows));
+        numbers.sum::<usize>() * size_of::<f64>()
+    }
+
     /// What it is made of.
     #[must_use]
     pub fn into_parts(self) -> LcsParts {
@@ -112,7 +129,7 @@ fn check(parts: &LcsParts) -> Result<(), LcsError> {
         ("storage.inject", &storage.inject, (n, q)),
     ];
     for (part, matrix, needed) in matrices {
-        let is_unknown = part == "energy" && matrix.is_empty();
+        let is_unknown = ["energy", "storage.metric"].contains(&part) && matrix.is_empty();
         if !is_unknown {
             fits(part, matrix, needed)?;
         }

@@ -4,12 +4,15 @@ mod checked;
 pub mod format;
 pub mod json;
 pub mod reduce;
+pub mod sparse;
+pub mod sparse_format;
 #[cfg(test)]
 mod tests;
 
 pub use checked::{Lcs, LcsError};
 pub use reduce::{Position, ReduceError, StorageHold, reduce};
 pub(crate) use reduce::{is_coupled, reduce_apart};
+pub use sparse::{Csr, SparseLcs};
 
 use nalgebra::{DMatrix, DVector};
 
@@ -213,7 +216,7 @@ pub struct Storage {
     pub u: DMatrix<f64>,
     /// q.
     pub one: DVector<f64>,
-    /// q×q: block-diagonal C and L; stored energy is ½ sᵀ M s.
+    /// q×q: block-diagonal C and L; stored energy is ½ sᵀ M s. Empty at an operating point, which stores nothing anew.
     pub metric: DMatrix<f64>,
     /// n×q: the state after a change to this system from storage s⁻ by conservation of charge and flux, x⁺ = J s⁻ + j.
     /// For u = 0 this is the projection in the energy metric.

@@ -79,6 +79,11 @@ impl Ladder {
         self.norm
     }
 
+    /// Gives up what was computed.
+    fn forget(&mut self) {
+        self.rungs = Vec::new();
+    }
+
     fn norm_at(&self, k: u32) -> f64 {
         self.norm * (-f64::from(k)).exp2()
     }
@@ -183,6 +188,13 @@ impl Ladders {
     pub(crate) fn norm(&self) -> f64 {
         let norms = self.parts.iter().map(|(_, ladder)| ladder.norm());
         norms.fold(0.0, f64::max)
+    }
+
+    /// Gives up what was computed: it is computed again when asked for.
+    pub(crate) fn forget(&mut self) {
+        self.parts
+            .iter_mut()
+            .for_each(|(_, ladder)| ladder.forget());
     }
 
     /// See [`Ladder::increment`].

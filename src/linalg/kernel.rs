@@ -56,19 +56,6 @@ impl Kernel {
         }
     }
 
-    /// Number of rows.
-    pub(crate) fn rows(&self) -> usize {
-        self.rows
-    }
-
-    /// Every entry through `f`, which leaves zero as it is.
-    pub(crate) fn map(&self, f: impl Fn(f64) -> f64) -> Self {
-        Self {
-            blocks: self.blocks.iter().map(|block| block.map(&f)).collect(),
-            ..*self
-        }
-    }
-
     /// y = K w; `w` must have one value per column, `y` one per row.
     #[inline]
     pub(crate) fn apply(&self, w: &[f64], y: &mut [f64]) {
@@ -101,6 +88,7 @@ impl Kernel {
 /// A matrix with many zeros, whose blocks of four rows and one column are left out where they are zero.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct SparseKernel {
+    rows: usize,
     /// By block of rows: where its blocks end.
     ends: Vec<usize>,
     /// (column, entries).
@@ -111,7 +99,10 @@ impl SparseKernel {
     /// Repacks a matrix.
     pub(crate) fn new(matrix: &DMatrix<f64>) -> Self {
         let dense = Kernel::new(matrix);
-        let mut sparse = Self::default();
+        let mut sparse = Self {
+            rows: dense.rows,
+            ..Self::default()
+        };
         for k in 0..dense.rows.div_ceil(BLOCK) {
             let rows = &dense.blocks[k * dense.columns..(k + 1) * dense.columns];
             let blocks = rows.iter().copied().enumerate();
@@ -123,22 +114,55 @@ impl SparseKernel {
         sparse
     }
 
+    /// Number of rows.
+    pub(crate) fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Every entry through `f`, which leaves zero as it is.
+    pub(crate) fn map(&self, f: impl Fn(f64) -> f64) -> Self {
+        let blocks = self.blocks.iter();
+        Self {
+            rows: self.rows,
+            ends: self.ends.clone(),
+            blocks: blocks.map(|(c, block)| (*c, block.map(&f))).collect(),
+        }
+    }
+
+    /// y = K w, the first rows as far as y reaches.
+    #[inline]
+    pub(crate) fn apply_first(&self, w: &[f64], y: &mut [f64]) {
+        let (full, tail) = y.as_chunks_mut::<BLOCK>();
+        self.apply(w, full);
+        if !tail.is_empty() {
+            let begin = full.len().checked_sub(1).map_or(0, |k| self.ends[k]);
+            let sums = sparse_product(&self.blocks[begin..self.ends[full.len()]], w);
+            tail.iter_mut().zip(sums).for_each(|(y, sum)| *y = sum);
+        }
+    }
+
     /// y = K w in whole blocks, zeros behind the last row.
     #[inline]
     pub(crate) fn apply(&self, w: &[f64], y: &mut [Block]) {
         let mut begin = 0;
         for (&end, y) in self.ends.iter().zip(y) {
-            let mut sums = [0.0; BLOCK];
-            for (column, block) in &self.blocks[begin..end] {
-                let value = w[*column];
-                for (sum, k) in sums.iter_mut().zip(block) {
-                    *sum += k * value;
-                }
-            }
-            *y = sums;
+            *y = sparse_product(&self.blocks[begin..end], w);
             begin = end;
         }
     }
+}
+
+/// Four rows times w.
+#[inline]
+fn sparse_product(blocks: &[(usize, Block)], w: &[f64]) -> Block {
+    let mut sums = [0.0; BLOCK];
+    for (column, block) in blocks {
+        let value = w[*column];
+        for (sum, k) in sums.iter_mut().zip(block) {
+            *sum += k * value;
+        }
+    }
+    sums
 }
 
 /// Four rows times w.
@@ -175,10 +199,16 @@ mod tests {
             let mut blocks = vec![[f64::NAN; BLOCK]; rows.div_ceil(BLOCK)];
             SparseKernel::new(&matrix).apply(w.as_slice(), &mut blocks);
             prop_assert_eq!(&blocks.as_flattened()[..rows], expected.as_slice());
+            for first in 0..=rows {
+                let mut y = vec![f64::NAN; first];
+                SparseKernel::new(&matrix).apply_first(w.as_slice(), &mut y);
+                prop_assert_eq!(y.as_slice(), &expected.as_slice()[..first]);
+            }
             let parts = matrix.row_iter().map(|row| Dense::of(&row.into_owned().reshape_generic(nalgebra::Dyn(1), nalgebra::Dyn(columns))));
             let parts: Vec<Dense> = parts.collect();
-            let kernel = Kernel::stacked(&parts.iter().collect::<Vec<_>>()).map(|v| 2.0 * v);
-            kernel.apply(w.as_slice(), &mut y);
+            Kernel::stacked(&parts.iter().collect::<Vec<_>>()).apply(w.as_slice(), &mut y);
+            prop_assert_eq!(y.as_slice(), expected.as_slice());
+            SparseKernel::new(&matrix).map(|v| 2.0 * v).apply_first(w.as_slice(), &mut y);
             let twice = 2.0 * expected;
             prop_assert_eq!(y.as_slice(), twice.as_slice());
         }

@@ -1,6 +1,7 @@
 //! Dense linear algebra of the sizes of circuits: what the exact integrator needs and general-purpose libraries do not have, each a
 //! function of matrices that knows nothing of circuits.
 
+pub(crate) mod blocks;
 pub(crate) mod decouple;
 pub(crate) mod dense;
 pub(crate) mod eigenvalues;

@@ -20,44 +20,56 @@ impl StaticMultiport {
     pub(crate) fn source_controls(&self) -> (Vec<bool>, Vec<SourceControl>) {
         let reduced = self.ball();
         let matrix = &reduced.matrix;
-        let nonzero =
-            |row: usize| (0..matrix.cols()).filter(move |&c| !matrix.at(row, c).is_zero());
         let place = |c: Column| reduced.place[c];
-        let reads = |row: usize, c: Option<usize>| c.is_some_and(|c| !matrix.at(row, c).is_zero());
+        let holders = |c: Option<usize>| c.map_or_else(Vec::new, |c| matrix.holders(c));
         let reading = |k: usize| reduced.equations + k;
-        let readings = reading(0)..matrix.rows();
         // Columns that an equation of their own holds at zero: the current of a source without a load.
-        let vanishing: Vec<usize> = (0..reduced.equations)
-            .filter_map(|row| {
-                let mut columns = nonzero(row);
-                columns.next().filter(|_| columns.next().is_none())
-            })
-            .collect();
-        let vanishes = |k: usize| nonzero(reading(k)).all(|c| vanishing.contains(&c));
+        let mut vanishing = vec![false; matrix.cols()];
+        for row in 0..reduced.equations {
+            if let [(c, _)] = matrix.row(row) {
+                vanishing[*c] = true;
+            }
+        }
+        let vanishes = |k: usize| matrix.row(reading(k)).iter().all(|(c, _)| vanishing[*c]);
+        // By reading: what it is multiplied with to powers, and whether it is the control of a switch.
+        let mut factors = vec![Vec::new(); self.observed.len()];
+        for power in &self.power {
+            factors[power.v].push(power.i);
+            factors[power.i].push(power.v);
+        }
+        let mut controls = vec![Vec::new(); self.observed.len()];
+        for (switch, port) in self.switches.iter().enumerate() {
+            controls[port.control].push(switch);
+        }
         // A reading is no reason to keep a source in the flow: a factor of a product that vanishes, the control of a switch.
-        let idle = |row: usize| {
-            let k = row - reduced.equations;
-            let power = self.power.iter().filter(|p| p.v == k || p.i == k);
-            let mut power = power.map(|p| vanishes(if p.v == k { p.i } else { p.v }));
-            let controls = self.switches.iter().any(|s| s.control == k);
-            k >= self.probes && power.all(|vanishes| vanishes) && (controls || self.is_power(k))
+        let idle = |k: usize| {
+            let read = !controls[k].is_empty() || !factors[k].is_empty();
+            k >= self.probes && read && factors[k].iter().all(|&other| vanishes(other))
         };
         let is_straight =
             |wave: &Wave| matches!(wave, Wave::Dc(_) | Wave::Pulse { .. } | Wave::Pwl { .. });
         let straight = |k: usize| is_straight(&self.sources[k].input.source.wave);
+        let mut straight_at = vec![None; matrix.cols()];
+        for (k, source) in self
+            .sources
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| straight(*k))
+        {
+            if let Some(c) = place(source.value) {
+                straight_at[c] = Some(k);
+            }
+        }
         let control = |switch: usize| -> Option<SourceControl> {
             if self.switches[switch].latch.is_some() {
                 return None;
             }
             let row = reading(self.switches[switch].control);
             let (mut constant, mut terms) = (0.0, Vec::new());
-            for c in nonzero(row) {
-                let is = |&k: &usize| straight(k) && place(self.sources[k].value) == Some(c);
-                match (0..self.sources.len()).find(is) {
-                    Some(input) => terms.push((input, matrix.at(row, c).to_f64())),
-                    None if place(StaticMultiport::ONE) == Some(c) => {
-                        constant = matrix.at(row, c).to_f64();
-                    }
+            for (c, x) in matrix.row(row) {
+                match straight_at[*c] {
+                    Some(input) => terms.push((input, x.to_f64())),
+                    None if place(StaticMultiport::ONE) == Some(*c) => constant = x.to_f64(),
                     None => return None,
                 }
             }
@@ -67,26 +79,18 @@ impl StaticMultiport {
                 terms,
             })
         };
-        let switches = 0..self.switches.len();
-        let controls: Vec<SourceControl> = switches.clone().filter_map(control).collect();
+        let found: Vec<Option<SourceControl>> = (0..self.switches.len()).map(control).collect();
         let silent = |(k, source): (usize, &SourcePort)| {
             let (value, rate) = (place(source.value), source.rate.and_then(place));
-            let guarded = switches.clone().any(|switch| {
-                reads(reading(self.switches[switch].control), value)
-                    && controls.iter().all(|control| control.switch != switch)
-            });
-            straight(k)
-                && !guarded
-                && (0..reduced.equations).all(|row| !reads(row, value) && !reads(row, rate))
-                && readings.clone().all(|row| !reads(row, rate))
-                && readings.clone().all(|row| !reads(row, value) || idle(row))
+            // Idle where it is read, and by no control that reads something else besides.
+            let unread = |row: usize| {
+                let k = row.checked_sub(reduced.equations);
+                k.is_some_and(|k| idle(k) && controls[k].iter().all(|&s| found[s].is_some()))
+            };
+            straight(k) && holders(rate).is_empty() && holders(value).into_iter().all(unread)
         };
         let silent = self.sources.iter().enumerate().map(silent).collect();
-        (silent, controls)
-    }
-
-    fn is_power(&self, k: usize) -> bool {
-        self.power.iter().any(|p| p.v == k || p.i == k)
+        (silent, found.into_iter().flatten().collect())
     }
 }
 

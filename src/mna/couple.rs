@@ -7,7 +7,7 @@
 use petgraph::unionfind::UnionFind;
 
 use super::Coefficient;
-use crate::algebra::{Elimination, Field, Matrix, Rational};
+use crate::algebra::{Elimination, Field, Rational, Table, sparse};
 use crate::circuit::{Circuit, ElementId, Kind};
 use crate::diagnostic::Diagnostic;
 
@@ -213,20 +213,15 @@ fn split(
 
 fn solve(k: &[Vec<Rational>], basis: &[usize], m: usize) -> Vec<Rational> {
     let n = basis.len();
-    let mut matrix = Matrix::zeros(n, n + 1);
-    for (i, &a) in basis.iter().enumerate() {
-        for (j, &b) in basis.iter().enumerate() {
-            matrix.set(i, j, k[a][b].clone());
-        }
-        matrix.set(i, n, k[a][m].clone());
-    }
+    let row = |&a: &usize| sparse(basis.iter().chain([&m]).map(|&b| k[a][b].clone()));
+    let mut table = Table::new(basis.iter().map(row).collect(), n + 1);
     let mut found = Elimination::new(n, n + 1);
     for column in 0..n {
-        matrix.eliminate(column, &mut found);
+        table.eliminate(column, &mut found);
     }
+    table.settle(&found);
+    let value = |j: usize| table.at(found.pivot[j]?, n).cloned();
     (0..n)
-        .map(|j| {
-            found.pivot[j].map_or_else(<Rational as Field>::zero, |row| matrix.at(row, n).clone())
-        })
+        .map(|j| value(j).unwrap_or_else(<Rational as Field>::zero))
         .collect()
 }

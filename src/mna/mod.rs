@@ -18,7 +18,7 @@ pub mod topology;
 
 use std::sync::OnceLock;
 
-use crate::algebra::{Ball, Field, Matrix, Rational, SparseRow, Value, eliminate_sparse};
+use crate::algebra::{Ball, Field, Rational, SparseRow, Table, Value, eliminate_sparse};
 use crate::diagnostic::Diagnostic;
 use crate::lcs::{Input, Port, PowerKind, Role};
 
@@ -253,7 +253,7 @@ pub(crate) struct Reduced<F> {
     /// Place of each column in the matrix below; `None` for columns that are gone.
     pub(crate) place: Vec<Option<usize>>,
     /// First the port equations, = 0; then one row per observed quantity: its value.
-    pub(crate) matrix: Matrix<F>,
+    pub(crate) matrix: Table<F>,
     /// How many of the rows are equations.
     pub(crate) equations: usize,
     /// Internal columns that no equation determines; they keep a place.
@@ -359,14 +359,15 @@ impl StaticMultiport {
                 loose.binary_search(&c).ok().map(|k| visible - internal + k)
             }
         };
-        let mut matrix = Matrix::zeros(rows.len(), width);
-        for (r, row) in rows.into_iter().enumerate() {
-            for (c, x) in row {
-                if let Some(k) = position(c) {
-                    matrix.set(r, k, x);
-                }
-            }
-        }
+        let placed = |row: SparseRow<F>| {
+            let entries = row.into_iter();
+            let mut row: SparseRow<F> = entries
+                .filter_map(|(c, x)| Some((position(c)?, x)))
+                .collect();
+            row.sort_unstable_by_key(|(k, _)| *k);
+            row
+        };
+        let matrix = Table::new(rows.into_iter().map(placed).collect(), width);
         let mut place = vec![None; count];
         for (k, &c) in order.iter().enumerate().take(visible) {
             place[c] = position(k);

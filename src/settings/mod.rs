@@ -19,6 +19,9 @@ pub struct Settings {
     /// Most memory for the rows of one run, bytes (default 1 GiB); a run that would need more is refused before it starts, or ends
     /// where rows at events fill it. Rows that are written as they come do not count.
     pub max_held: usize,
+    /// Bytes that the exact integrator keeps of what can be made again: exponentials and forms of energy of its modes, and as many for the
+    /// systems with free devices. What was used longest ago is given up first; the answer is the same to rounding.
+    pub max_kept: usize,
 }
 
 impl Default for Settings {
@@ -29,6 +32,7 @@ impl Default for Settings {
             min_step: 1e-12,
             max_steps: 200_000_000,
             max_held: 1 << 30,
+            max_kept: 1 << 28,
         }
     }
 }

@@ -8,6 +8,7 @@ use super::lcp::{Answered, Lcp, Scaling, Solution, Status};
 use super::lemke::{self, Lemke};
 use super::parts::Parts;
 use super::{convex, norm, pivot};
+use crate::linalg::blocks::extreme_eigenvalues;
 use crate::settings::tolerances::complementarity::{NOTHING_TO_GAIN, SLACK};
 use crate::settings::tolerances::ranks::{EIGENVALUE, RANK};
 
@@ -455,8 +456,8 @@ fn definiteness(m: &DMatrix<f64>) -> (bool, bool) {
     if m.is_empty() {
         return (true, true);
     }
-    let eigenvalues = (m + m.transpose()).symmetric_eigenvalues();
-    let (least, largest) = (eigenvalues.min(), eigenvalues.amax());
+    let [least, most] = extreme_eigenvalues(&(m + m.transpose()));
+    let largest = most.max(-least);
     let with_q = largest + (m.nrows() as f64).sqrt();
     (
         least >= -EIGENVALUE * m.amax().max(largest),

@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::driver::{Driver, LeastNorm};
 use super::lcp::{Answered, Solution, Status};
+use crate::linalg::blocks::connected;
 
 /// The drivers of the parts of M, with the ports each has; none where M is one part.
 #[derive(Debug, Clone)]
@@ -14,23 +15,7 @@ pub(super) struct Parts(Vec<(Vec<usize>, Driver)>);
 impl Parts {
     /// The parts of M, at least two of them.
     pub(super) fn of(m: &DMatrix<f64>, tolerance: f64) -> Option<Self> {
-        let size = m.nrows();
-        let mut label: Vec<usize> = (0..size).collect();
-        for i in 0..size {
-            for j in 0..i {
-                if (m[(i, j)] != 0.0 || m[(j, i)] != 0.0) && label[i] != label[j] {
-                    let (from, to) = (label[i].max(label[j]), label[i].min(label[j]));
-                    label
-                        .iter_mut()
-                        .filter(|l| **l == from)
-                        .for_each(|l| *l = to);
-                }
-            }
-        }
-        let groups: Vec<Vec<usize>> = (0..size)
-            .map(|k| (0..size).filter(|&i| label[i] == k).collect::<Vec<_>>())
-            .filter(|group| !group.is_empty())
-            .collect();
+        let groups = connected(m);
         let driver = |group: Vec<usize>| {
             let part = m.select_rows(&group).select_columns(&group);
             (group, Driver::new(part, tolerance))

@@ -46,6 +46,9 @@ pub(crate) const WEIGHTS: [f64; POINTS] = [
     0.05061426814518813,
 ];
 
+/// Matrices that the forms need besides those over steps.
+const OF_FORMS: usize = 16;
+
 /// How large things are in a run.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sizes<'a> {
@@ -58,10 +61,10 @@ pub(crate) struct Sizes<'a> {
 /// One product of a voltage and a current.
 #[derive(Debug, Clone)]
 pub(crate) struct Term {
-    /// v over w.
-    pub(crate) v: Vec<f64>,
+    /// v over w, the entries that are not zero.
+    pub(crate) v: Vec<(usize, f64)>,
     /// i over w.
-    pub(crate) i: Vec<f64>,
+    pub(crate) i: Vec<(usize, f64)>,
     /// Counts as delivered by a source (with the opposite sign) rather than as dissipated.
     pub(crate) source: bool,
 }
@@ -83,8 +86,9 @@ pub(crate) struct EnergyIntegral {
     fast: Vec<usize>,
     /// The components of w that they see.
     seen: Vec<usize>,
-    /// For each of these the columns of v and i of all terms in turn.
-    factors: Vec<f64>,
+    /// For each of these where its entries end, of the v and i of all terms in turn: (which, entry).
+    ends: Vec<usize>,
+    factors: Vec<(usize, f64)>,
     /// Their values at the points of a quadrature.
     at_nodes: Vec<f64>,
     /// ‖𝒜‖ is that of the mode; unit of time: h/2^bottom, s.
@@ -132,13 +136,30 @@ impl EnergyIntegral {
     pub(crate) fn new(terms: Vec<Term>, fast: &[usize], h: f64, bottom: u32) -> Option<Self> {
         let terms: Vec<Term> = terms
             .into_iter()
-            .filter(|t| [&t.v, &t.i].iter().all(|row| row.iter().any(|r| *r != 0.0)))
+            .filter(|t| !t.v.is_empty() && !t.i.is_empty())
             .collect();
-        let dim = terms.first()?.v.len();
-        let column = |j: usize| terms.iter().flat_map(move |term| [term.v[j], term.i[j]]);
-        let seen: Vec<usize> = (0..dim).filter(|&j| column(j).any(|f| f != 0.0)).collect();
+        terms.first()?;
+        let rows = terms.iter().flat_map(|term| [&term.v, &term.i]);
+        let mut entries: Vec<(usize, usize, f64)> = (rows.enumerate())
+            .flat_map(|(which, row)| row.iter().map(move |&(j, x)| (j, which, x)))
+            .collect();
+        entries.sort_unstable_by_key(|&(j, which, _)| (j, which));
+        let (mut seen, mut ends) = (Vec::new(), Vec::new());
+        for (k, (j, ..)) in entries.iter().enumerate() {
+            if seen.last() != Some(j) {
+                seen.push(*j);
+                ends.push(k);
+            }
+            if let Some(end) = ends.last_mut() {
+                *end = k + 1;
+            }
+        }
         Some(Self {
-            factors: seen.iter().flat_map(|&j| column(j)).collect(),
+            factors: entries
+                .into_iter()
+                .map(|(_, which, x)| (which, x))
+                .collect(),
+            ends,
             seen,
             at_nodes: Vec::new(),
             fast: fast.to_vec(),
@@ -147,6 +168,17 @@ impl EnergyIntegral {
             bottom,
             forms: None,
         })
+    }
+
+    /// Matrices of the size of w that are kept.
+    pub(crate) fn kept(&self) -> usize {
+        let forms = self.forms.as_ref();
+        forms.map_or(0, |forms| forms.over.len() + forms.spans.len() + OF_FORMS)
+    }
+
+    /// Gives up the forms: they are made again when asked for.
+    pub(crate) fn forget(&mut self) {
+        self.forms = None;
     }
 
     /// The integrals over steps and spans in which things are so large.
@@ -167,13 +199,14 @@ impl EnergyIntegral {
 
     /// Σ v·i at w (from sources, dissipated), W.
     pub(crate) fn power(&mut self, w: &[f64]) -> [f64; 2] {
-        let factors = 2 * self.terms.len();
         self.at_nodes.clear();
-        self.at_nodes.resize(factors, 0.0);
-        for (&j, column) in self.seen.iter().zip(self.factors.chunks_exact(factors)) {
-            for (value, factor) in self.at_nodes.iter_mut().zip(column) {
-                *value += factor * w[j];
+        self.at_nodes.resize(2 * self.terms.len(), 0.0);
+        let mut begin = 0;
+        for (&j, &end) in self.seen.iter().zip(&self.ends) {
+            for (which, factor) in &self.factors[begin..end] {
+                self.at_nodes[*which] += factor * w[j];
             }
+            begin = end;
         }
         let mut power = [0.0; 2];
         let (pairs, _) = self.at_nodes.as_chunks::<2>();
@@ -185,20 +218,21 @@ impl EnergyIntegral {
 
     /// ∫ v·i dt along the first `t` seconds of a Taylor series, `part` of its step.
     pub(crate) fn along_series(&mut self, series: &Series, part: f64, t: f64) -> [f64; 2] {
-        let factors = 2 * self.terms.len();
         let s = NODES.map(|node| node * part);
         self.at_nodes.clear();
-        self.at_nodes.resize(POINTS * factors, 0.0);
+        self.at_nodes.resize(POINTS * 2 * self.terms.len(), 0.0);
         let (values, _) = self.at_nodes.as_chunks_mut::<POINTS>();
-        for (&j, column) in self.seen.iter().zip(self.factors.chunks_exact(factors)) {
+        let mut begin = 0;
+        for (&j, &end) in self.seen.iter().zip(&self.ends) {
             // w_j at the nodes, then its part of the factors.
             let w = series.component(j, s);
-            let factors = values.iter_mut().zip(column);
-            for (value, &factor) in factors.filter(|(_, factor)| **factor != 0.0) {
+            for (which, factor) in &self.factors[begin..end] {
+                let value = &mut values[*which];
                 for p in 0..POINTS {
                     value[p] += factor * w[p];
                 }
             }
+            begin = end;
         }
         let mut energy = [0.0; 2];
         let (pairs, _) = values.as_chunks::<2>();
@@ -262,16 +296,16 @@ impl Forms {
         let count = 2 * terms.len();
         let mut rows = DMatrix::zeros(count, dim);
         for (k, term) in terms.iter().enumerate() {
-            let norm = |row: &[f64]| {
-                row.iter()
-                    .zip(&size)
-                    .map(|(r, s)| (r * s).abs())
-                    .sum::<f64>()
+            let norm = |row: &[(usize, f64)]| {
+                let sizes = row.iter().map(|&(j, r)| (r * size[j]).abs());
+                sizes.sum::<f64>()
             };
             let alpha = (norm(&term.i) / norm(&term.v)).sqrt();
-            for j in 0..dim {
-                rows[(2 * k, j)] = alpha * term.v[j] * size[j];
-                rows[(2 * k + 1, j)] = term.i[j] / alpha * size[j];
+            for &(j, v) in &term.v {
+                rows[(2 * k, j)] = alpha * v * size[j];
+            }
+            for &(j, i) in &term.i {
+                rows[(2 * k + 1, j)] = i / alpha * size[j];
             }
         }
         // Where rounding does no harm the coordinates stay those of w, in which the flow of a graded circuit is accurate.
@@ -471,10 +505,15 @@ mod tests {
 
     fn term(v: &[f64], i: &[f64], source: bool) -> Term {
         Term {
-            v: v.to_vec(),
-            i: i.to_vec(),
+            v: entries(v),
+            i: entries(i),
             source,
         }
+    }
+
+    fn entries(row: &[f64]) -> Vec<(usize, f64)> {
+        let entries = row.iter().copied().enumerate();
+        entries.filter(|(_, x)| *x != 0.0).collect()
     }
 
     /// x' = −x/τ: ∫₀ʰ x² dt = x₀² τ/2 (1 − e^{−2h/τ}).

@@ -42,10 +42,9 @@ pub(crate) struct Flow {
     /// |𝒜|.
     generator_sizes: SparseKernel,
     /// [𝒢; 𝒢𝒜].
-    rows: Dense,
-    rows_kernel: Kernel,
+    rows: SparseKernel,
     /// |[𝒢; 𝒢𝒜]|.
-    sizes_kernel: Kernel,
+    row_sizes: SparseKernel,
     /// 𝒢 row by row.
     guard_rows: Vec<f64>,
     h: f64,
@@ -82,14 +81,10 @@ impl Flow {
         let dim = generator.nrows();
         let m = guards.nrows();
         let first = guards * &generator;
-        let rows = Dense::from_fn(2 * m, dim, |i, j| {
-            if i < m {
-                guards[(i, j)]
-            } else {
-                first[(i - m, j)]
-            }
-        });
-        let rows_kernel = Kernel::stacked(&[&rows]);
+        let mut rows = DMatrix::zeros(2 * m, dim);
+        rows.rows_mut(0, m).copy_from(guards);
+        rows.rows_mut(m, m).copy_from(&first);
+        let rows = SparseKernel::new(&rows);
         let ladder = Ladders::new(&generator, fast, h, SQUARED, LONG);
         let bottom = (ladder.norm().log2().ceil().max(0.0) as u32).max(LONG);
         if bottom > DEEPEST {
@@ -104,8 +99,7 @@ impl Flow {
             generator_kernel: SparseKernel::new(&generator),
             generator_sizes: SparseKernel::new(&generator.abs()),
             generator,
-            sizes_kernel: rows_kernel.map(f64::abs),
-            rows_kernel,
+            row_sizes: rows.map(f64::abs),
             guard_rows: guards.transpose().as_slice().to_vec(),
             rows,
             h,
@@ -200,12 +194,37 @@ impl Flow {
             return false;
         };
         self.loss = self.loss.max(loss);
-        let rows = &self.rows;
-        let mut guards = rows.clone();
-        guards.set_product(rows, &increment);
-        guards.combine(1.0, 1.0, rows);
+        // [𝒢; 𝒢𝒜] exp(𝒜h)
+        let mut guards = Dense::zeros(self.rows.rows(), self.dim);
+        let mut column = vec![0.0; self.dim];
+        for j in 0..self.dim {
+            column.copy_from_slice(&increment.column(j)[..self.dim]);
+            column[j] += 1.0;
+            self.rows.apply_first(&column, guards.column_mut(j));
+        }
         self.levels[level as usize] = Some(Kernel::stacked(&[&increment, &guards]));
         true
+    }
+
+    /// How many bytes the exponentials and the forms of energy that were made so far take, about.
+    pub(crate) fn kept(&self) -> usize {
+        let levels = self.levels.iter().flatten().count();
+        let (guarded, work) = (
+            self.dim + 2 * self.guards,
+            self.work.as_ref().map_or(0, EnergyIntegral::kept),
+        );
+        let rows = levels * (self.dim + guarded) + (self.recurring.kept() + work) * self.dim;
+        rows * self.dim * size_of::<f64>()
+    }
+
+    /// Gives them up: they are made again when asked for.
+    pub(crate) fn forget(&mut self) {
+        self.levels.fill(None);
+        self.ladder.forget();
+        self.recurring.forget();
+        if let Some(work) = &mut self.work {
+            work.forget();
+        }
     }
 
     /// Whether a span of `time` seconds recurs: its place. Spans within `same` are one where the second order of what they differ by is
@@ -325,13 +344,13 @@ impl Flow {
     /// Fills g and g' behind w.
     pub(crate) fn read_guards(&self, state: &mut [f64]) {
         let (w, g) = state.split_at_mut(self.dim);
-        self.rows_kernel.apply(w, g);
+        self.rows.apply_first(w, g);
     }
 
     /// Rounding noise of g and g' where |w| ≤ `amplitude`.
     pub(crate) fn noise(&self, amplitude: &[f64], floors: &mut Vec<f64>) {
         floors.resize(2 * self.guards, 0.0);
-        self.sizes_kernel.apply(amplitude, floors);
+        self.row_sizes.apply_first(amplitude, floors);
         for floor in floors {
             *floor *= NOISE * f64::EPSILON;
         }
@@ -434,10 +453,10 @@ impl Flow {
         values.resize(3 * m, 0.0);
         for k in 2..=series.degree().min(3) {
             let value = &mut values[(k - 2) * m..(k - 1) * m];
-            self.rows_kernel.apply_first(m, series.term(k), value);
+            self.rows.apply_first(series.term(k), value);
         }
         series.rest(4, rest);
-        self.sizes_kernel.apply_first(m, rest, &mut values[2 * m..]);
+        self.row_sizes.apply_first(rest, &mut values[2 * m..]);
     }
 
     /// Guard i as a polynomial in the fraction of Taylor's step.
@@ -476,8 +495,8 @@ mod tests {
     fn a_span_that_recurs_is_travelled_to_rounding_whatever_its_time() {
         let mut flow = oscillator(1e-3);
         flow.set_work(vec![Term {
-            v: vec![1.0, 0.0],
-            i: vec![1.0, 0.0],
+            v: vec![(0, 1.0)],
+            i: vec![(0, 1.0)],
             source: false,
         }]);
         let t: f64 = 3e-4;

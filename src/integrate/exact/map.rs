@@ -2,19 +2,19 @@
 
 use nalgebra::DMatrix;
 
-use crate::linalg::kernel::Kernel;
+use crate::linalg::kernel::SparseKernel;
 
 /// A map, and how large its values can be.
 #[derive(Debug, Clone)]
 pub(crate) struct Map {
-    map: Kernel,
+    map: SparseKernel,
     /// |map|.
-    sizes: Kernel,
+    sizes: SparseKernel,
 }
 
 impl Map {
     pub(super) fn new(matrix: &DMatrix<f64>) -> Self {
-        let map = Kernel::new(matrix);
+        let map = SparseKernel::new(matrix);
         Self {
             sizes: map.map(f64::abs),
             map,
@@ -24,27 +24,27 @@ impl Map {
     /// As [`Self::new`], with what the entries were summed from.
     pub(super) fn with_sizes(matrix: &DMatrix<f64>, sizes: &DMatrix<f64>) -> Self {
         Self {
-            map: Kernel::new(matrix),
-            sizes: Kernel::new(sizes),
+            map: SparseKernel::new(matrix),
+            sizes: SparseKernel::new(sizes),
         }
     }
 
     /// `values` = map · w.
     pub(crate) fn values(&self, w: &[f64], values: &mut Vec<f64>) {
         values.resize(self.map.rows(), 0.0);
-        self.map.apply(w, values);
+        self.map.apply_first(w, values);
     }
 
     /// The first of these values.
     pub(super) fn first_values(&self, count: usize, w: &[f64], values: &mut Vec<f64>) {
         values.resize(count, 0.0);
-        self.map.apply_first(count, w, values);
+        self.map.apply_first(w, values);
     }
 
     /// `largest` = |map| · sizes.
     pub(crate) fn largest(&self, sizes: &[f64], largest: &mut Vec<f64>) {
         largest.resize(self.map.rows(), 0.0);
-        self.sizes.apply(sizes, largest);
+        self.sizes.apply_first(sizes, largest);
     }
 }
 

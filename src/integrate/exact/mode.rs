@@ -471,7 +471,10 @@ fn distinct(rows: &DMatrix<f64>) -> Vec<usize> {
 
 /// What sources deliver and what dissipates, of these rows of voltages and currents over w.
 fn work(lcs: &Lcs, v: &DMatrix<f64>, i: &DMatrix<f64>) -> Vec<Term> {
-    let row = |m: &DMatrix<f64>, k: usize| m.row(k).iter().copied().collect();
+    let row = |m: &DMatrix<f64>, k: usize| {
+        let entries = m.row(k).into_iter().copied().enumerate();
+        entries.filter(|(_, x)| *x != 0.0).collect::<Vec<_>>()
+    };
     let terms = lcs.outputs.power.iter().enumerate();
     terms
         .map(|(k, term)| Term {

@@ -1,6 +1,6 @@
 //! The circuit in all positions visited so far.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use super::assembler::{Assembler, Step};
 use super::flow::longest_step;
@@ -12,6 +12,10 @@ use crate::integrate::error::Error;
 use crate::integrate::switching::Threshold;
 use crate::lcs::Hold;
 use crate::mna::SourceControl;
+use crate::settings::Settings;
+
+/// Modes and systems that are kept whatever they take: those that a period of a circuit goes through by turns.
+const TURNS: usize = 8;
 
 /// Systems and modes, created when first visited.
 pub(crate) struct ModeTable {
@@ -24,14 +28,24 @@ pub(crate) struct ModeTable {
     h: f64,
     energy: bool,
     tolerance: f64,
-    frees: Vec<(Key, Free)>,
+    /// See [`Settings::max_kept`].
+    most: usize,
+    /// Those made last first.
+    frees: VecDeque<(Key, Free)>,
+    /// Bytes of their matrices, and factorisations of those given up.
+    free_bytes: usize,
+    given_up: u64,
     index: BTreeMap<Key, Option<usize>>,
     pub(crate) modes: Vec<Mode>,
+    /// By mode: when it was left last, counted in changes of mode, and the bytes that its flow kept then; their sum.
+    left: Vec<(u64, usize)>,
+    changes: u64,
+    kept: usize,
 }
 
 impl ModeTable {
-    /// A table without modes; `h` is the output step, `energy` asks for the balance, `tolerance` that of complementarity residuals.
-    pub(crate) fn new(assembler: Assembler, h: f64, energy: bool, tolerance: f64) -> Self {
+    /// A table without modes; `h` is the output step, `energy` asks for the balance.
+    pub(crate) fn new(assembler: Assembler, h: f64, energy: bool, settings: &Settings) -> Self {
         let thresholds = assembler.thresholds();
         let valve = |t: &Threshold| {
             let valve = t.valve()?;
@@ -44,10 +58,41 @@ impl ModeTable {
             assembler: assembler.with_span(longest_step(h)),
             h,
             energy,
-            tolerance,
-            frees: Vec::new(),
+            tolerance: settings.lcp_residual,
+            most: settings.max_kept,
+            frees: VecDeque::new(),
+            free_bytes: 0,
+            given_up: 0,
             index: BTreeMap::new(),
             modes: Vec::new(),
+            left: Vec::new(),
+            changes: 0,
+            kept: 0,
+        }
+    }
+
+    /// Takes note that mode `at` is left. Where modes keep more than [`Settings::max_kept`] together, those that were left longest ago give up what
+    /// can be made again.
+    pub(crate) fn leave(&mut self, at: usize) {
+        self.changes += 1;
+        self.left.resize(self.modes.len(), (0, 0));
+        let kept = self.modes[at].flow.kept();
+        self.kept = self.kept + kept - self.left[at].1;
+        self.left[at] = (self.changes, kept);
+        if self.kept <= self.most {
+            return;
+        }
+        let mut oldest: Vec<usize> = (0..self.left.len())
+            .filter(|&k| self.left[k].1 > 0)
+            .collect();
+        oldest.sort_unstable_by_key(|&k| self.left[k].0);
+        oldest.truncate(oldest.len().saturating_sub(TURNS));
+        for k in oldest {
+            if self.kept <= self.most / 2 {
+                break;
+            }
+            self.modes[k].flow.forget();
+            self.kept -= std::mem::take(&mut self.left[k].1);
         }
     }
 
@@ -59,9 +104,16 @@ impl ModeTable {
                 let free = vec![Hold::Free; self.pairs];
                 let sliding = key.sliding_switches();
                 let lcs = self.assembler.assemble(&free, &key.switches, &sliding)?;
+                self.free_bytes += lcs.bytes();
                 self.frees
-                    .push((key.clone(), Free::new(lcs, self.tolerance)));
-                self.frees.len() - 1
+                    .push_front((key.clone(), Free::new(lcs, self.tolerance)));
+                while self.free_bytes > self.most && self.frees.len() > TURNS {
+                    if let Some((_, free)) = self.frees.pop_back() {
+                        self.free_bytes -= free.lcs.bytes();
+                        self.given_up += free.factorisations();
+                    }
+                }
+                0
             }
         };
         Ok(&mut self.frees[at].1)
@@ -87,7 +139,12 @@ impl ModeTable {
             .map(|&(k, _)| self.assembler.limits(k))
             .collect();
         let sliding = key.sliding_switches();
-        let system = self.assembler.assemble(&holds, &key.switches, &sliding);
+        // Where there are no devices the system of the position is that of the mode.
+        let system = if self.pairs == 0 && sliding.is_empty() {
+            self.free(key).map(|free| free.lcs.clone())
+        } else {
+            self.assembler.assemble(&holds, &key.switches, &sliding)
+        };
         let mode = system.ok().and_then(|lcs| {
             let facts = SwitchFacts {
                 thresholds: &self.thresholds,
@@ -170,6 +227,7 @@ impl ModeTable {
 
     /// Factorisations spent in complementarity problems.
     pub(crate) fn factorisations(&self) -> u64 {
-        self.frees.iter().map(|(_, f)| f.factorisations()).sum()
+        let known = self.frees.iter().map(|(_, f)| f.factorisations());
+        self.given_up + known.sum::<u64>()
     }
 }

@@ -81,6 +81,16 @@ impl Recurring {
         }
         span.increment.as_ref()
     }
+
+    /// How many exponentials are kept.
+    pub(super) fn kept(&self) -> usize {
+        self.spans.iter().filter(|s| s.increment.is_some()).count()
+    }
+
+    /// Gives up the exponentials: they are prepared again when asked for.
+    pub(super) fn forget(&mut self) {
+        self.spans.iter_mut().for_each(|span| span.increment = None);
+    }
 }
 
 #[cfg(test)]

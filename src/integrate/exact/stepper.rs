@@ -100,7 +100,7 @@ impl Exact {
             free,
             settings,
         } = setup;
-        let mut table = ModeTable::new(assembler, h, energy, settings.lcp_residual);
+        let mut table = ModeTable::new(assembler, h, energy, &settings);
         let mut key = Key {
             closed: vec![false; table.pairs],
             switches: position,
@@ -430,6 +430,9 @@ impl Exact {
         let t = self.travel.t;
         if let (Some(from), false) = (self.mode, jumped) {
             self.table.modes[from].remember(trigger, at);
+        }
+        if let Some(from) = self.mode {
+            self.table.leave(from);
         }
         let same = self.mode == Some(at);
         let from = self.mode.filter(|_| self.started);

@@ -1,8 +1,9 @@
 //! Directions of impulses: kernels with coordinates that are components, and what bounds leave of them.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, RowDVector};
 
 use super::Ends;
+use crate::linalg::blocks::extreme_eigenvalues;
 use crate::settings::tolerances::ranks::{EIGENVALUE, ENTRY};
 
 /// A basis of the kernel of S ⪰ 0 (entries near 1), by elimination on its diagonal: column j has 1 in a row of its own, so that
@@ -19,15 +20,25 @@ pub(super) fn kernel(mut s: DMatrix<f64>) -> DMatrix<f64> {
         free.retain(|&other| other != i);
         let row = s.row(i) / s[(i, i)];
         let column = s.column(i).into_owned();
-        s -= column * &row;
-        s.apply(|v| *v = if v.abs() <= zero { 0.0 } else { *v });
+        let concerned = |v: &[f64]| -> Vec<usize> {
+            let entries = v.iter().enumerate();
+            entries
+                .filter(|(_, v)| **v != 0.0)
+                .map(|(k, _)| k)
+                .collect()
+        };
+        let below = concerned(column.as_slice());
+        for j in concerned(row.transpose().as_slice()) {
+            for &i in &below {
+                let left = s[(i, j)] - column[i] * row[j];
+                s[(i, j)] = if left.abs() <= zero { 0.0 } else { left };
+            }
+        }
         s.set_row(i, &row);
     }
-    let mut n = DMatrix::zeros(m, free.len());
+    let mut n = -s.select_columns(&free);
     for (j, &f) in free.iter().enumerate() {
-        for i in (0..m).filter(|i| !free.contains(i)) {
-            n[(i, j)] = -s[(i, f)];
-        }
+        n.set_row(f, &RowDVector::zeros(free.len()));
         n[(f, j)] = 1.0;
     }
     n
@@ -103,16 +114,17 @@ pub(super) fn null(mut e: DMatrix<f64>) -> DMatrix<f64> {
 }
 
 pub(super) fn is_semidefinite(symmetric: &DMatrix<f64>) -> bool {
-    let eigenvalues = symmetric.symmetric_eigenvalues();
-    eigenvalues.min() >= -EIGENVALUE * eigenvalues.amax()
+    let [least, largest] = extreme_eigenvalues(symmetric);
+    least >= -EIGENVALUE * largest.max(-least)
 }
 
 /// |D| with the rows and columns that are zero taken from CB.
 pub(super) fn levelled(d: &DMatrix<f64>, cb: &DMatrix<f64>) -> DMatrix<f64> {
     let m = d.nrows();
     let empty = |j: usize| d.row(j).amax() == 0.0 && d.column(j).amax() == 0.0;
+    let empty: Vec<bool> = (0..m).map(empty).collect();
     DMatrix::from_fn(m, m, |i, j| {
-        if empty(i) && empty(j) {
+        if empty[i] && empty[j] {
             cb[(i, j)]
         } else {
             d[(i, j)]

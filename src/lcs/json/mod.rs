@@ -7,9 +7,9 @@ use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 pub use read::read;
-pub use write::write;
+pub use write::{write, write_sparse};
 
-use super::{Lcs, LcsError};
+use super::{Csr, Lcs, LcsError};
 use crate::circuit::Tran;
 use crate::circuit::source::{Form, WaveError};
 use crate::law::CurveError;
@@ -85,6 +85,26 @@ pub enum JsonError {
     Tran,
 }
 
+/// A matrix, row by row or in compressed rows.
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+enum MatrixDoc {
+    Rows(Vec<Vec<f64>>),
+    Compressed(Csr),
+}
+
+impl Default for MatrixDoc {
+    fn default() -> Self {
+        Self::Rows(Vec::new())
+    }
+}
+
+impl MatrixDoc {
+    fn is_empty(&self) -> bool {
+        matches!(self, Self::Rows(rows) if rows.is_empty())
+    }
+}
+
 #[derive(Serialize, Deserialize)]
 struct Document {
     schema: String,
@@ -96,17 +116,17 @@ struct Document {
     #[serde(default)]
     ports: Vec<PortDoc>,
     #[serde(rename = "A")]
-    a: Vec<Vec<f64>>,
+    a: MatrixDoc,
     #[serde(rename = "B", default)]
-    b: Vec<Vec<f64>>,
+    b: MatrixDoc,
     #[serde(rename = "C", default)]
-    c: Vec<Vec<f64>>,
+    c: MatrixDoc,
     #[serde(rename = "D", default)]
-    d: Vec<Vec<f64>>,
+    d: MatrixDoc,
     #[serde(rename = "E", default)]
-    e: Vec<Vec<f64>>,
+    e: MatrixDoc,
     #[serde(rename = "G", default)]
-    g: Vec<Vec<f64>>,
+    g: MatrixDoc,
     #[serde(rename = "e", default)]
     e0: Vec<f64>,
     #[serde(rename = "F", default)]
@@ -114,8 +134,8 @@ struct Document {
     #[serde(default)]
     x0: Vec<f64>,
     /// Stored energy ½ xᵀ P x.
-    #[serde(rename = "P", default, skip_serializing_if = "Vec::is_empty")]
-    p: Vec<Vec<f64>>,
+    #[serde(rename = "P", default, skip_serializing_if = "MatrixDoc::is_empty")]
+    p: MatrixDoc,
     #[serde(default)]
     outputs: OutputsDoc,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -193,10 +213,10 @@ struct LawDoc {
 struct OutputsDoc {
     names: Vec<String>,
     units: Vec<String>,
-    x: Vec<Vec<f64>>,
-    lambda: Vec<Vec<f64>>,
-    u: Vec<Vec<f64>>,
-    du: Vec<Vec<f64>>,
+    x: MatrixDoc,
+    lambda: MatrixDoc,
+    u: MatrixDoc,
+    du: MatrixDoc,
     one: Vec<f64>,
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Document, JsonError, LawDoc, PortDoc, SCHEMA, SystemFile};
+use super::{Document, JsonError, LawDoc, MatrixDoc, PortDoc, SCHEMA, SystemFile};
 use crate::algebra::Value;
 use crate::circuit::Tran;
 use crate::circuit::source::Source;
@@ -18,9 +18,28 @@ fn unit(text: &str) -> &'static str {
 
 fn matrix(
     name: &'static str,
-    rows: &[Vec<f64>],
+    matrix: &MatrixDoc,
     (n, m): (usize, usize),
 ) -> Result<DMatrix<f64>, JsonError> {
+    let rows = match matrix {
+        MatrixDoc::Rows(rows) => rows,
+        MatrixDoc::Compressed(csr) if csr.shape == [n, m] && csr.is_sound() => {
+            let mut whole = DMatrix::zeros(n, m);
+            csr.entries().for_each(|(i, j, v)| whole[(i, j)] = v);
+            return if csr.data.iter().all(|v| v.is_finite()) {
+                Ok(whole)
+            } else {
+                Err(JsonError::NotFinite(name))
+            };
+        }
+        MatrixDoc::Compressed(_) => {
+            return Err(JsonError::Shape {
+                name,
+                rows: n,
+                cols: m,
+            });
+        }
+    };
     if rows.is_empty() && n * m == 0 || rows.is_empty() && name != "A" && m == 0 {
         return Ok(DMatrix::zeros(n, m));
     }
@@ -57,7 +76,7 @@ fn vector(name: &'static str, values: &[f64], n: usize) -> Result<DVector<f64>, 
 /// A matrix that may be left out (all zeros).
 fn optional(
     name: &'static str,
-    rows: &[Vec<f64>],
+    rows: &MatrixDoc,
     (n, m): (usize, usize),
 ) -> Result<DMatrix<f64>, JsonError> {
     if rows.is_empty() {

@@ -2,16 +2,63 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Document, InputDoc, LawDoc, OutputsDoc, PortDoc, SCHEMA, StateDoc, TranDoc};
+use super::{
+    Document, InputDoc, LawDoc, MatrixDoc, OutputsDoc, PortDoc, SCHEMA, StateDoc, TranDoc,
+};
 use crate::circuit::Tran;
 use crate::circuit::source::Form;
 use crate::law::Law;
-use crate::lcs::Lcs;
+use crate::lcs::{Csr, Input, Lcs, Port, SparseLcs};
 
-fn rows(m: &DMatrix<f64>) -> Vec<Vec<f64>> {
+fn rows(m: &DMatrix<f64>) -> MatrixDoc {
     // −0.0 and 0.0 are one number to a reader.
-    (0..m.nrows())
-        .map(|i| (0..m.ncols()).map(|j| m[(i, j)] + 0.0).collect())
+    let row = |i: usize| (0..m.ncols()).map(|j| m[(i, j)] + 0.0).collect();
+    MatrixDoc::Rows((0..m.nrows()).map(row).collect())
+}
+
+fn compressed(m: &Csr) -> MatrixDoc {
+    MatrixDoc::Compressed(m.clone())
+}
+
+fn numbers<'v>(values: impl IntoIterator<Item = &'v f64>) -> Vec<f64> {
+    values.into_iter().map(|v| v + 0.0).collect()
+}
+
+fn input_documents(inputs: &[Input]) -> Vec<InputDoc> {
+    let document = |input: &Input| InputDoc {
+        name: input.name.clone(),
+        unit: input.unit.to_owned(),
+        waveform: Form::from(&input.source.wave),
+        dc: Some(input.source.dc),
+    };
+    inputs.iter().map(document).collect()
+}
+
+fn port_documents(ports: &[Port]) -> Vec<PortDoc> {
+    let document = |p: &Port| PortDoc {
+        device: p.device.clone(),
+        lambda: p.lambda.clone(),
+        y: p.y.clone(),
+        law: law_document(&p.law),
+    };
+    ports.iter().map(document).collect()
+}
+
+fn tran_document(t: Tran) -> TranDoc {
+    TranDoc {
+        tstep: t.tstep,
+        tstop: t.tstop,
+        tstart: (t.tstart != 0.0).then_some(t.tstart),
+        tmax: t.tmax,
+        uic: t.uic,
+    }
+}
+
+fn positions(switches: &[(String, bool)]) -> serde_json::Map<String, serde_json::Value> {
+    let position = |on: bool| if on { "on" } else { "off" };
+    switches
+        .iter()
+        .map(|(name, on)| (name.clone(), position(*on).into()))
         .collect()
 }
 
@@ -77,35 +124,17 @@ pub fn write(lcs: &Lcs, x0: &DVector<f64>, tran: Option<Tran>) -> String {
                 shift: named(&lcs.shift.row(k).iter().copied().collect::<Vec<_>>()),
             })
             .collect(),
-        inputs: lcs
-            .inputs
-            .iter()
-            .map(|input| InputDoc {
-                name: input.name.clone(),
-                unit: input.unit.to_owned(),
-                waveform: Form::from(&input.source.wave),
-                dc: Some(input.source.dc),
-            })
-            .collect(),
-        ports: lcs
-            .ports
-            .iter()
-            .map(|p| PortDoc {
-                device: p.device.clone(),
-                lambda: p.lambda.clone(),
-                y: p.y.clone(),
-                law: law_document(&p.law),
-            })
-            .collect(),
+        inputs: input_documents(&lcs.inputs),
+        ports: port_documents(&lcs.ports),
         a: rows(&lcs.a),
         b: rows(&lcs.b),
         c: rows(&lcs.c),
         d: rows(&lcs.d),
         e: rows(&lcs.e),
         g: rows(&lcs.g),
-        e0: lcs.e0.iter().map(|v| v + 0.0).collect(),
-        f: lcs.f.iter().map(|v| v + 0.0).collect(),
-        x0: x0.iter().map(|v| v + 0.0).collect(),
+        e0: numbers(&lcs.e0),
+        f: numbers(&lcs.f),
+        x0: numbers(x0),
         p: rows(&lcs.energy),
         outputs: OutputsDoc {
             names: out.names.clone(),
@@ -114,20 +143,57 @@ pub fn write(lcs: &Lcs, x0: &DVector<f64>, tran: Option<Tran>) -> String {
             lambda: rows(&out.rows.lambda),
             u: rows(&out.rows.u),
             du: rows(&out.rows.du),
-            one: out.rows.one.iter().map(|v| v + 0.0).collect(),
+            one: numbers(&out.rows.one),
         },
-        tran: tran.map(|t| TranDoc {
-            tstep: t.tstep,
-            tstop: t.tstop,
-            tstart: (t.tstart != 0.0).then_some(t.tstart),
-            tmax: t.tmax,
-            uic: t.uic,
-        }),
-        switches: lcs
-            .switches
-            .iter()
-            .map(|(name, on)| (name.clone(), if *on { "on" } else { "off" }.into()))
+        tran: tran.map(tran_document),
+        switches: positions(&lcs.switches),
+    };
+    lines(&document)
+}
+
+/// As [`write()`], each matrix in compressed rows.
+#[must_use]
+pub fn write_sparse(lcs: &SparseLcs, x0: &[f64], tran: Option<Tran>) -> String {
+    let mut shift = vec![serde_json::Map::new(); lcs.states.len()];
+    for (k, j, value) in lcs.shift.entries() {
+        shift[k].insert(lcs.inputs[j].name.clone(), value.into());
+    }
+    let states = lcs.states.iter().zip(shift);
+    let document = Document {
+        schema: SCHEMA.to_owned(),
+        title: lcs.title.clone(),
+        states: states
+            .map(|(s, shift)| StateDoc {
+                name: s.name.clone(),
+                unit: s.unit.to_owned(),
+                shift,
+            })
             .collect(),
+        inputs: input_documents(&lcs.inputs),
+        ports: port_documents(&lcs.ports),
+        a: compressed(&lcs.a),
+        b: compressed(&lcs.b),
+        c: compressed(&lcs.c),
+        d: compressed(&lcs.d),
+        e: compressed(&lcs.e),
+        g: compressed(&lcs.g),
+        e0: numbers(&lcs.e0),
+        f: numbers(&lcs.f),
+        x0: numbers(x0),
+        p: compressed(&lcs.energy),
+        outputs: OutputsDoc {
+            names: lcs.outputs.iter().map(|(name, _)| name.clone()).collect(),
+            units: (lcs.outputs.iter())
+                .map(|(_, unit)| (*unit).to_owned())
+                .collect(),
+            x: compressed(&lcs.output_x),
+            lambda: compressed(&lcs.output_lambda),
+            u: compressed(&lcs.output_u),
+            du: compressed(&lcs.output_du),
+            one: numbers(&lcs.output_one),
+        },
+        tran: tran.map(tran_document),
+        switches: positions(&lcs.switches),
     };
     lines(&document)
 }

@@ -1,6 +1,6 @@
 //! A behaviour eliminated in class order.
 
-use crate::algebra::{Elimination, Field, Matrix};
+use crate::algebra::{Elimination, Field, SparseRow, Table, subtract};
 use crate::diagnostic::Internal;
 use crate::mna::{Column, Reduced, StaticMultiport};
 
@@ -32,7 +32,10 @@ pub(super) struct Eliminated<'b, F> {
     pub(super) behaviour: &'b StaticMultiport,
     pub(super) reduced: &'b Reduced<F>,
     pub(super) position: &'b Position,
-    pub(super) matrix: Matrix<F>,
+    /// The equations.
+    pub(super) matrix: Table<F>,
+    /// Columns that are a multiple of another one: v = R i of a switch.
+    folded: Vec<(usize, F, usize)>,
     pub(super) found: Elimination,
     /// What each column is.
     pub(super) columns: Vec<Columns>,
@@ -55,7 +58,7 @@ impl<'b, F: Field> Eliminated<'b, F> {
         position: &'b Position,
         order: ClassOrder,
     ) -> Result<Self, ReduceError> {
-        let matrix = reduced.matrix.clone();
+        let matrix = reduced.matrix.head(reduced.equations);
         // Every column but the internal ones that were eliminated has a place.
         let place = |c: Column| {
             let name = || behaviour.columns.get(c).map_or("a column", String::as_str);
@@ -72,6 +75,7 @@ impl<'b, F: Field> Eliminated<'b, F> {
             found: Elimination::new(reduced.equations, matrix.cols()),
             columns: vec![Columns::Unknown; matrix.cols()],
             matrix,
+            folded: Vec::new(),
             state: (storage.clone().map(|s| place(s.state))).collect::<Result<_, _>>()?,
             rate: storage.map(|s| place(s.flow)).collect::<Result<_, _>>()?,
             pairs: pairs
@@ -146,13 +150,9 @@ impl<'b, F: Field> Eliminated<'b, F> {
             } {
                 // v = R i
                 Some(resistance) => {
-                    for r in 0..self.matrix.rows() {
-                        let entry = self.matrix.at(r, v).mul(resistance);
-                        if !entry.is_zero() {
-                            self.matrix.set(r, i, self.matrix.at(r, i).add(&entry));
-                        }
-                    }
-                    self.drop_column(v);
+                    self.matrix.fold(v, resistance, i);
+                    self.columns[v] = Columns::Gone;
+                    self.folded.push((v, resistance.clone(), i));
                     self.unknown.push((i, format!("i({})", switch.name)));
                 }
                 None => {
@@ -165,14 +165,33 @@ impl<'b, F: Field> Eliminated<'b, F> {
             self.unknown.push((place(c)?, behaviour.columns[c].clone()));
         }
         self.columns[place(StaticMultiport::ONE)?] = Columns::One;
+        self.folded.sort_by_key(|(v, ..)| *v);
         Ok(())
+    }
+
+    /// Observed quantity k over the free columns.
+    pub(super) fn reading(&self, k: usize) -> SparseRow<F> {
+        let mut reading = SparseRow::new();
+        for (c, x) in self.reduced.matrix.row(self.reduced.equations + k) {
+            let folded = self.folded.binary_search_by_key(c, |(v, ..)| *v);
+            let (c, x) = match folded.map(|at| &self.folded[at]) {
+                Ok((_, resistance, i)) => (*i, &x.mul(resistance)),
+                Err(_) if self.columns[*c] == Columns::Gone => continue,
+                Err(_) => (*c, x),
+            };
+            let unit = [(c, F::one().neg())];
+            let (row, without) = match self.found.pivot[c] {
+                Some(r) => (self.matrix.row(r), c),
+                None => (&unit[..], usize::MAX),
+            };
+            reading = subtract(&reading, x, row, without, |_| {});
+        }
+        reading
     }
 
     fn drop_column(&mut self, column: usize) {
         self.columns[column] = Columns::Gone;
-        for r in 0..self.matrix.rows() {
-            self.matrix.set(r, column, F::zero());
-        }
+        self.matrix.clear(column);
     }
 
     /// The column of a held pair that the position leaves unknown: i of a conducting, −v of a blocking one.
@@ -191,13 +210,15 @@ impl<'b, F: Field> Eliminated<'b, F> {
         let devices_first = matches!(order, ClassOrder::DevicesFirst | ClassOrder::OtherRoleFirst);
         let other_role = matches!(order, ClassOrder::OtherRole | ClassOrder::OtherRoleFirst);
         let held: Vec<usize> = self.held.iter().map(|&k| self.guard_column(k)).collect();
+        let mut is_held = vec![false; self.columns.len()];
+        held.iter().for_each(|&c| is_held[c] = true);
         // The input of a function block is a reading like any other: it is y, whatever it reads.
         let inputs = self
             .free
             .iter()
             .filter(|&&k| self.behaviour.pairs[k].fixed_role);
         let unknown = (0..self.columns.len())
-            .filter(|c| self.columns[*c] == Columns::Unknown && !held.contains(c))
+            .filter(|c| self.columns[*c] == Columns::Unknown && !is_held[*c])
             .chain(inputs.map(|&k| self.pairs[k].0))
             .collect();
         self.eliminate(unknown);
@@ -224,6 +245,7 @@ impl<'b, F: Field> Eliminated<'b, F> {
                     .collect(),
             );
         }
+        self.matrix.settle(&self.found);
     }
 
     fn eliminate(&mut self, columns: Vec<usize>) {

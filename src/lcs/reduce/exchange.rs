@@ -12,17 +12,39 @@ use crate::algebra::Field;
 impl<F: Field> Eliminated<'_, F> {
     /// Gives devices without y one, as long as other devices can change roles for it.
     pub(super) fn exchange_roles(&mut self) {
+        if self.has_roles() {
+            return;
+        }
+        self.matrix.settle(&self.found);
         while let Some(chain) = self.chain() {
             let mut freed = None;
             for column in chain {
                 let partner = self.partner(column);
                 match freed {
-                    None => self.matrix.eliminate(column, &mut self.found),
-                    Some(before) => self.matrix.exchange(before, column, &mut self.found),
-                };
+                    None => {
+                        self.matrix.eliminate(column, &mut self.found);
+                        self.matrix.settle(&self.found);
+                    }
+                    Some(before) => {
+                        self.matrix.exchange(before, column, &mut self.found);
+                    }
+                }
                 freed = partner;
             }
         }
+    }
+
+    /// The columns of the devices of which either quantity may be y.
+    fn choices(&self) -> impl Iterator<Item = (usize, usize)> {
+        let free = self.free.iter();
+        free.filter(|&&k| !self.behaviour.pairs[k].fixed_role)
+            .map(|&k| self.pairs[k])
+    }
+
+    /// Whether every such device has its y.
+    fn has_roles(&self) -> bool {
+        let dependent = |c: usize| self.found.pivot[c].is_some();
+        self.choices().all(|(a, b)| dependent(a) || dependent(b))
     }
 
     /// The other quantity of the free device that a column belongs to.
@@ -38,20 +60,12 @@ impl<F: Field> Eliminated<'_, F> {
     /// A shortest chain of columns: the first one fits an unused equation, each further one the equation that the partner of the one
     /// before leaves, and the last one belongs to a device without y.
     fn chain(&self) -> Option<Vec<usize>> {
-        let dependent = |c: usize| self.found.pivot[c].is_some();
-        let choices: Vec<(usize, usize)> = self
-            .free
-            .iter()
-            .filter(|&&k| !self.behaviour.pairs[k].fixed_role)
-            .map(|&k| self.pairs[k])
-            .collect();
-        if choices.iter().all(|&(a, b)| dependent(a) || dependent(b)) {
+        if self.has_roles() {
             return None;
         }
-        let columns = choices
-            .iter()
-            .flat_map(|&(a, b)| [(a, b), (b, a)])
-            .filter(|&(c, _)| !dependent(c));
+        let columns = (self.choices())
+            .flat_map(|(a, b)| [(a, b), (b, a)])
+            .filter(|&(c, _)| self.found.pivot[c].is_none());
         let mut waiting: Vec<(usize, usize)> = columns.collect();
         let mut queue: VecDeque<(usize, usize)> = VecDeque::new();
         let mut before = vec![None; self.columns.len()];
@@ -59,7 +73,7 @@ impl<F: Field> Eliminated<'_, F> {
             .filter(|&r| !self.found.used[r])
             .collect();
         waiting.retain(|&(c, partner)| {
-            let fits = unused.iter().any(|&r| !self.matrix.at(r, c).is_zero());
+            let fits = unused.iter().any(|&r| self.matrix.at(r, c).is_some());
             if fits {
                 queue.push_back((c, partner));
             }
@@ -73,7 +87,7 @@ impl<F: Field> Eliminated<'_, F> {
                 return Some(path);
             };
             waiting.retain(|&(next, other)| {
-                let fits = !self.matrix.at(row, next).is_zero();
+                let fits = self.matrix.at(row, next).is_some();
                 if fits {
                     before[next] = Some(c);
                     queue.push_back((next, other));

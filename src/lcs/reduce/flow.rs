@@ -1,6 +1,6 @@
 //! The storage equations: x', the undetermined quantities, the shift and the injection.
 
-use crate::algebra::{Elimination, Field, Matrix};
+use crate::algebra::{Elimination, Field, SparseRow, Table, add_scaled, entry, part};
 
 use super::ReduceError;
 use super::eliminated::Eliminated;
@@ -11,49 +11,50 @@ pub(super) struct Flow<F> {
     /// Number of storage quantities.
     q: usize,
     /// Physical x' and x⁺.
-    states: Vec<Vec<F>>,
+    states: Vec<SparseRow<F>>,
     /// f and F; undetermined ones are 0 until [`Flow::least_norm`] has chosen.
-    f: Vec<Vec<F>>,
-    /// For each f its coefficients on the undetermined ones, and which those are.
-    on_loose: Vec<Vec<F>>,
-    /// n×p: Σ.
-    pub(super) shift: Vec<Vec<F>>,
+    f: Vec<SparseRow<F>>,
+    /// For each f its coefficients on the undetermined ones, by their number.
+    on_loose: Vec<SparseRow<F>>,
+    /// How many are undetermined.
+    loose: usize,
+    /// Σ, each row over the columns of u.
+    pub(super) shift: Vec<SparseRow<F>>,
 }
 
 impl<F: Field> Flow<F> {
     pub(super) fn solve(
         e: &Eliminated<F>,
         frame: &Frame,
-        s: &[Vec<F>],
+        s: &[SparseRow<F>],
         is_static: bool,
     ) -> Result<Self, ReduceError> {
         let (n, nf, base) = (frame.n, frame.f.len(), frame.base);
         let q = if is_static { 0 } else { s.len() };
         let known = n + nf;
-        let mut table = Matrix::zeros(q, known + base + q);
-        let image = e.times_metric(s);
-        for (j, image) in image.iter().enumerate().take(q) {
-            let rate = frame.express(e, e.rate[j]);
-            let row = table.row_mut(j);
-            row[..n].clone_from_slice(&image[..n]);
-            for k in 0..nf {
-                row[n + k] = rate[base + k].neg();
+        let mut rows: Vec<SparseRow<F>> = Vec::with_capacity(q);
+        for (j, image) in e.times_metric(s).iter().enumerate().take(q) {
+            let mut row = SparseRow::new();
+            for (c, x) in frame.express(e, e.rate[j]) {
+                let at = c.checked_sub(base).map_or(known + c, |k| n + k);
+                row.push((at, x.neg()));
             }
-            for (k, value) in rate[..base].iter().enumerate() {
-                row[known + k] = value.neg();
-            }
-            for (du, u) in frame.du().zip(frame.u()) {
-                row[known + du] = row[known + du].add(&image[u]);
-            }
+            // The rate of a source stands where the source does in P s.
+            let of_sources = part(image, frame.u()).iter();
+            let rates = of_sources.map(|(c, x)| (known + frame.p + c, x.clone()));
+            row.extend(part(image, 0..n).iter().cloned().chain(rates));
+            rows.push(row);
         }
         for (a, b, x) in e.reduced.metric.iter().filter(|_| q > 0) {
-            let entry = table.at_mut(*a, known + base + b);
-            *entry = entry.add(&x.neg());
+            rows[*a].push((known + base + b, x.neg()));
         }
+        let rows = rows.into_iter().map(summed).collect();
+        let mut table = Table::new(rows, known + base + q);
         let mut found = Elimination::new(q, table.cols());
         for c in 0..known {
             table.eliminate(c, &mut found);
         }
+        table.settle(&found);
         let singular = |rows: Vec<usize>| ReduceError::Singular {
             elements: rows.into_iter().map(|k| e.storage_label(k)).collect(),
         };
@@ -62,97 +63,99 @@ impl<F: Field> Flow<F> {
             return Err(singular(rows));
         }
         let loose: Vec<usize> = (0..nf).filter(|k| found.pivot[n + k].is_none()).collect();
-        let solution = |c: usize| -> (Vec<F>, Vec<F>) {
+        let solution = |c: usize| -> (SparseRow<F>, SparseRow<F>) {
             match found.pivot[c] {
                 Some(r) => {
                     let row = table.row(r);
+                    let given = part(row, known..known + base + q).iter();
+                    let place = |c: usize| loose.binary_search(&(c - n)).ok();
+                    let open = part(row, n..known).iter();
                     (
-                        row[known..].iter().map(F::neg).collect(),
-                        loose.iter().map(|k| row[n + k].neg()).collect(),
+                        given.map(|(c, x)| (c - known, x.neg())).collect(),
+                        open.filter_map(|(c, x)| Some((place(*c)?, x.neg())))
+                            .collect(),
                     )
                 }
                 None => {
-                    let is = |k: &usize| if n + k == c { F::one() } else { F::zero() };
-                    (vec![F::zero(); base + q], loose.iter().map(is).collect())
+                    let place = c.checked_sub(n).and_then(|k| loose.binary_search(&k).ok());
+                    (
+                        SparseRow::new(),
+                        place.map(|z| (z, F::one())).into_iter().collect(),
+                    )
                 }
             }
         };
         let mut states = Vec::with_capacity(n);
         for k in 0..n {
             let (row, on_loose) = solution(k);
-            if found.pivot[k].is_none() || on_loose.iter().any(|x| !x.is_zero()) {
+            if found.pivot[k].is_none() || !on_loose.is_empty() {
                 return Err(singular(vec![frame.states[k]]));
             }
             states.push(row);
         }
         let (f, on_loose) = (n..known).map(solution).unzip();
-        let shift = states.iter().map(|row| row[frame.du()].to_vec()).collect();
+        let shift = |row: &SparseRow<F>| {
+            let rates = part(row, frame.du()).iter();
+            rates.map(|(c, x)| (c - frame.p, x.clone())).collect()
+        };
         Ok(Self {
             q,
+            shift: states.iter().map(shift).collect(),
             states,
             f,
             on_loose,
-            shift,
+            loose: loose.len(),
         })
     }
 
     /// The coefficients of a frame row on the undetermined quantities `which`.
-    pub(super) fn along(&self, frame: &Frame, row: &[F], which: &[usize]) -> Vec<F> {
-        which
-            .iter()
-            .map(|&z| {
-                let mut sum = F::zero();
-                for (k, x) in row[frame.base..]
-                    .iter()
-                    .enumerate()
-                    .filter(|(_, x)| !x.is_zero())
-                {
-                    sum = sum.add(&x.mul(&self.on_loose[k][z]));
-                }
-                sum
-            })
+    pub(super) fn along(&self, frame: &Frame, row: &[(usize, F)], which: &[usize]) -> SparseRow<F> {
+        let mut sum = SparseRow::new();
+        for (c, x) in part(row, frame.base..usize::MAX) {
+            add_scaled(&mut sum, x, &self.on_loose[c - frame.base]);
+        }
+        let place = |z: usize| which.binary_search(&z).ok();
+        sum.into_iter()
+            .filter_map(|(z, x)| Some((place(z)?, x)))
             .collect()
     }
 
     /// A frame row with f put in: over [x | λ | u | u' | 1 | s⁻], physical x.
-    fn substitute(&self, frame: &Frame, row: &[F]) -> Vec<F> {
-        let mut result = Vec::with_capacity(frame.base + self.q);
-        result.extend_from_slice(&row[..frame.base]);
-        result.resize(frame.base + self.q, F::zero());
-        for (x, f) in row[frame.base..]
-            .iter()
-            .zip(&self.f)
-            .filter(|(x, _)| !x.is_zero())
-        {
-            add_scaled(&mut result, x, f);
+    fn substitute(&self, frame: &Frame, row: &[(usize, F)]) -> SparseRow<F> {
+        let mut result = part(row, 0..frame.base).to_vec();
+        for (c, x) in part(row, frame.base..usize::MAX) {
+            add_scaled(&mut result, x, &self.f[c - frame.base]);
         }
         result
     }
 
     /// A frame row over [x | λ | u | u' | 1] with shifted x, and its impulse over s⁻ − s⁺.
-    pub(super) fn finish(&self, frame: &Frame, row: &[F]) -> (Vec<F>, Vec<F>) {
+    pub(super) fn finish(&self, frame: &Frame, row: &[(usize, F)]) -> (SparseRow<F>, SparseRow<F>) {
         let mut result = self.substitute(frame, row);
-        let impulse = result.split_off(frame.base);
+        let impulse = result.split_off(result.partition_point(|(c, _)| *c < frame.base));
         self.shift_states(frame, &mut result);
-        (result, impulse)
+        let impulse = impulse.into_iter().map(|(c, x)| (c - frame.base, x));
+        (result, impulse.collect())
     }
 
     /// Replaces physical x by x + Σ u.
-    fn shift_states(&self, frame: &Frame, row: &mut [F]) {
-        for (k, shift) in self.shift.iter().enumerate() {
-            if !row[k].is_zero() {
-                let x = row[k].clone();
-                add_scaled(&mut row[frame.u()], &x, shift);
-            }
+    fn shift_states(&self, frame: &Frame, row: &mut SparseRow<F>) {
+        let states = part(row, 0..frame.n).iter();
+        let shifted: Vec<(usize, F)> = states
+            .filter(|(k, _)| !self.shift[*k].is_empty())
+            .cloned()
+            .collect();
+        for (k, x) in shifted {
+            add_scaled(row, &x, &self.shift[k]);
         }
     }
 
     /// x' of the shifted state.
-    pub(super) fn rates(&self, frame: &Frame) -> Vec<Vec<F>> {
+    pub(super) fn rates(&self, frame: &Frame) -> Vec<SparseRow<F>> {
         let mut rates = Vec::with_capacity(self.states.len());
         for row in &self.states {
-            let mut row = row[..frame.base].to_vec();
-            row[frame.du()].fill(F::zero());
+            let mut row = part(row, 0..frame.base).to_vec();
+            row.retain(|(c, _)| !frame.du().contains(c));
             self.shift_states(frame, &mut row);
             rates.push(row);
         }
@@ -160,15 +163,20 @@ impl<F: Field> Flow<F> {
     }
 
     /// J, and −J k as a last column.
-    pub(super) fn inject(&self, frame: &Frame, s: &[Vec<F>]) -> Vec<Vec<F>> {
+    pub(super) fn inject(&self, frame: &Frame, s: &[SparseRow<F>]) -> Vec<SparseRow<F>> {
         let mut inject = Vec::with_capacity(self.states.len());
         for row in &self.states {
-            let mut j = row[frame.base..].to_vec();
+            let given = part(row, frame.base..usize::MAX).iter();
+            let mut j: SparseRow<F> = given.map(|(c, x)| (c - frame.base, x.clone())).collect();
             let mut constant = F::zero();
-            for (x, s) in j.iter().zip(s) {
-                constant.sub_mul(x, &s[frame.one()]);
+            for (k, x) in &j {
+                if let Some(one) = entry(&s[*k], frame.one()) {
+                    constant.sub_mul(x, one);
+                }
             }
-            j.push(constant);
+            if !constant.is_zero() {
+                j.push((self.q, constant));
+            }
             inject.push(j);
         }
         inject
@@ -179,55 +187,54 @@ impl<F: Field> Flow<F> {
     pub(super) fn least_norm(
         &mut self,
         frame: &Frame,
-        objectives: &[Vec<(String, Vec<F>)>],
+        objectives: &[Vec<(String, SparseRow<F>)>],
     ) -> (Vec<usize>, Vec<String>) {
-        let nz = self.on_loose.first().map_or(0, Vec::len);
+        let nz = self.loose;
         let all: Vec<usize> = (0..nz).collect();
         if nz == 0 {
             return (Vec::new(), Vec::new());
         }
-        let width = frame.base + self.q;
         // z over [what is still open of it | the rest].
-        let mut values: Vec<Vec<F>> = Vec::with_capacity(nz);
-        for z in 0..nz {
-            let mut value = vec![F::zero(); nz + width];
-            value[z] = F::one();
-            values.push(value);
-        }
+        let mut values: Vec<SparseRow<F>> = (0..nz).map(|z| vec![(z, F::one())]).collect();
         let mut seen = Vec::new();
         let mut chosen = Vec::new();
         for objective in objectives {
-            let mut normal = Matrix::zeros(nz, nz + width);
+            let mut normal = vec![SparseRow::new(); nz];
             for (name, row) in objective {
                 let g = self.along(frame, row, &all);
-                if g.iter().all(F::is_zero) {
+                if g.is_empty() {
                     continue;
                 }
                 chosen.push(name.clone());
-                let mut whole = vec![F::zero(); nz];
-                whole.extend(self.substitute(frame, row));
-                for (x, value) in g.iter().zip(&values).filter(|(x, _)| !x.is_zero()) {
-                    add_scaled(&mut whole, x, value);
+                let rest = self.substitute(frame, row).into_iter();
+                let mut whole: SparseRow<F> = rest.map(|(c, x)| (nz + c, x)).collect();
+                for (z, x) in &g {
+                    add_scaled(&mut whole, x, &values[*z]);
                 }
-                for (z, x) in whole[..nz].iter().enumerate().filter(|(_, x)| !x.is_zero()) {
-                    add_scaled(normal.row_mut(z), x, &whole);
+                for (z, x) in part(&whole, 0..nz) {
+                    add_scaled(&mut normal[*z], x, &whole);
                 }
             }
-            let mut found = Elimination::new(nz, nz + width);
+            let mut normal = Table::new(normal, nz + frame.base + self.q);
+            let mut found = Elimination::new(nz, normal.cols());
             for z in 0..nz {
                 normal.eliminate(z, &mut found);
             }
+            normal.settle(&found);
             for (z, r) in (0..nz).filter_map(|z| Some((z, found.pivot[z]?))) {
                 seen.push(z);
-                for value in values.iter_mut().filter(|value| !value[z].is_zero()) {
-                    let part = value[z].neg();
-                    add_scaled(value, &part, normal.row(r));
+                for value in &mut values {
+                    if let Some(part) = entry(value, z).map(F::neg) {
+                        add_scaled(value, &part, normal.row(r));
+                    }
                 }
             }
         }
         for (f, on_loose) in self.f.iter_mut().zip(&self.on_loose) {
-            for (x, value) in on_loose.iter().zip(&values).filter(|(x, _)| !x.is_zero()) {
-                add_scaled(f, x, &value[nz..]);
+            for (z, x) in on_loose {
+                let value = part(&values[*z], nz..usize::MAX).iter();
+                let value: SparseRow<F> = value.map(|(c, x)| (c - nz, x.clone())).collect();
+                add_scaled(f, x, &value);
             }
         }
         seen.sort_unstable();
@@ -243,10 +250,16 @@ impl<F: Field> Flow<F> {
     }
 }
 
-/// target ← target + scale · row.
-pub(super) fn add_scaled<F: Field>(target: &mut [F], scale: &F, row: &[F]) {
-    let minus = scale.neg();
-    for (t, x) in target.iter_mut().zip(row).filter(|(_, x)| !x.is_zero()) {
-        t.sub_mul(&minus, x);
+/// A row from terms in any order, several of a column.
+fn summed<F: Field>(mut terms: Vec<(usize, F)>) -> SparseRow<F> {
+    terms.sort_by_key(|(c, _)| *c);
+    let mut row: SparseRow<F> = Vec::with_capacity(terms.len());
+    for (c, x) in terms {
+        match row.last_mut() {
+            Some(last) if last.0 == c => last.1 = last.1.add(&x),
+            _ => row.push((c, x)),
+        }
     }
+    row.retain(|(_, x)| !x.is_zero());
+    row
 }

@@ -1,6 +1,6 @@
 //! The free columns of an elimination, in the order of the published system.
 
-use crate::algebra::Field;
+use crate::algebra::{Field, SparseRow};
 
 use super::eliminated::{Columns, Eliminated};
 use super::{ReduceError, Role, StorageHold};
@@ -57,7 +57,7 @@ impl Frame {
                 Columns::GivenRate(k) => Some(n + m + p + k),
                 Columns::One => Some(base - 1),
                 Columns::Pair(k) if lambdas[k] == c => Some(n + k),
-                Columns::State(k) if !is_static => states.iter().position(|&s| s == k),
+                Columns::State(k) if !is_static => states.binary_search(&k).ok(),
                 Columns::Unknown | Columns::State(_) | Columns::Rate | Columns::Pair(_) => {
                     f.push(c);
                     Some(base + f.len() - 1)
@@ -92,39 +92,27 @@ impl Frame {
         self.base - 1
     }
 
-    pub(super) fn width(&self) -> usize {
-        self.base + self.f.len()
-    }
-
     /// A row of the table in frame order, negated if asked, without one column.
     pub(super) fn gather<F: Field>(
         &self,
-        row: &[F],
+        row: &[(usize, F)],
         negate: bool,
         without: Option<usize>,
-    ) -> Vec<F> {
-        let mut gathered = vec![F::zero(); self.width()];
-        for (c, x) in row
-            .iter()
-            .enumerate()
-            .filter(|(c, x)| !x.is_zero() && Some(*c) != without)
-        {
-            if let Some(k) = self.place[c] {
-                gathered[k] = if negate { x.neg() } else { x.clone() };
-            }
-        }
+    ) -> SparseRow<F> {
+        let entries = row.iter().filter(|(c, _)| Some(*c) != without);
+        let mut gathered: SparseRow<F> = entries
+            .filter_map(|(c, x)| Some((self.place[*c]?, if negate { x.neg() } else { x.clone() })))
+            .collect();
+        gathered.sort_unstable_by_key(|(k, _)| *k);
         gathered
     }
 
     /// A column in terms of the free ones.
-    pub(super) fn express<F: Field>(&self, e: &Eliminated<F>, column: usize) -> Vec<F> {
+    pub(super) fn express<F: Field>(&self, e: &Eliminated<F>, column: usize) -> SparseRow<F> {
         if let Some(row) = e.found.pivot[column] {
             return self.gather(e.matrix.row(row), true, Some(column));
         }
-        let mut unit = vec![F::zero(); self.width()];
-        if let Some(k) = self.place[column] {
-            unit[k] = F::one();
-        }
-        unit
+        let unit = self.place[column].map(|k| (k, F::one()));
+        unit.into_iter().collect()
     }
 }

@@ -14,6 +14,7 @@
 //! give the flow and, with the same matrix, the state x⁺ after charge and flux are conserved (F = ∫ f are the impulses).
 //! The part of x that follows u' is the shift: x_physical = x + Σ u, so that no derivative appears in x'.
 
+mod compressed;
 mod eliminated;
 mod exchange;
 mod flow;
@@ -23,11 +24,11 @@ mod roles;
 mod separate;
 mod system;
 
-use crate::algebra::Field;
+use crate::algebra::{Field, SparseRow};
 use crate::diagnostic::Internal;
 use crate::mna::{Reduced, StaticMultiport};
 
-use super::{Hold, Lcs, LcsError, LcsParts, Role};
+use super::{Hold, Lcs, LcsError, LcsParts, Role, SparseLcs};
 use eliminated::Eliminated;
 use publish::publish;
 pub(crate) use separate::is_coupled;
@@ -183,6 +184,16 @@ pub(crate) fn reduce_apart(
     reduce_in(behaviour, position, Some(span))
 }
 
+/// See [`SparseLcs::of`].
+pub(in crate::lcs) fn reduce_sparse(
+    behaviour: &StaticMultiport,
+    position: &Position,
+) -> Result<SparseLcs, ReduceError> {
+    check(behaviour, position)?;
+    let reduction = reduction(behaviour, behaviour.ball(), position)?;
+    Ok(compressed::publish(behaviour, position, &reduction))
+}
+
 fn reduce_in(
     behaviour: &StaticMultiport,
     position: &Position,
@@ -204,16 +215,26 @@ fn published<F: Field>(
     position: &Position,
     apart: Option<f64>,
 ) -> Result<(LcsParts, bool), ReduceError> {
-    let mut reduction = in_some_order(behaviour, reduced, position)?;
-    if let Some(lost) = roles::lost(&reduction)
-        && let Ok(other) = in_some_order(&roles::exchanged(behaviour, &lost), reduced, position)
-    {
-        reduction = other;
-    }
+    let mut reduction = reduction(behaviour, reduced, position)?;
     if let Some(span) = apart {
         reduction.separate(span);
     }
     Ok(publish(behaviour, position, &reduction, apart))
+}
+
+fn reduction<F: Field>(
+    behaviour: &StaticMultiport,
+    reduced: &Reduced<F>,
+    position: &Position,
+) -> Result<Reduction<F>, ReduceError> {
+    let reduction = in_some_order(behaviour, reduced, position)?;
+    match roles::lost(&reduction) {
+        Some(lost) => {
+            let other = in_some_order(&roles::exchanged(behaviour, &lost), reduced, position);
+            Ok(other.unwrap_or(reduction))
+        }
+        None => Ok(reduction),
+    }
 }
 
 fn check(behaviour: &StaticMultiport, position: &Position) -> Result<(), ReduceError> {
@@ -284,7 +305,7 @@ fn in_some_order<F: Field>(
 }
 
 /// A row over [x | λ | u | u' | 1] that must vanish, and the elements whose loop or cut-set it is.
-type Constraint<F> = (Vec<F>, Vec<String>);
+type Constraint<F> = (SparseRow<F>, Vec<String>);
 
 /// A system over a field, before it is written as doubles.
 #[derive(Debug)]
@@ -296,25 +317,27 @@ struct Reduction<F> {
     /// The free pairs and their roles.
     pairs: Vec<(usize, Role)>,
     /// Rows over [x | λ | u | u' | 1]: x', one per state.
-    rates: Vec<Vec<F>>,
+    rates: Vec<SparseRow<F>>,
     /// y, one per free pair.
-    y: Vec<Vec<F>>,
+    y: Vec<SparseRow<F>>,
     /// s, one per storage quantity.
-    s: Vec<Vec<F>>,
+    s: Vec<SparseRow<F>>,
     /// One per observed quantity, each with its impulse row over s⁻ − s⁺.
-    readings: Vec<(Vec<F>, Vec<F>)>,
+    readings: Vec<(SparseRow<F>, SparseRow<F>)>,
     /// One per held pair, in the same way.
-    guards: Vec<(Vec<F>, Vec<F>)>,
+    guards: Vec<(SparseRow<F>, SparseRow<F>)>,
     /// Guards × undetermined directions.
-    kernel: Vec<Vec<F>>,
+    kernel: Vec<SparseRow<F>>,
+    /// How many undetermined directions the objectives of a least-norm choice see.
+    undetermined: usize,
     /// Rows that must vanish, and the elements that make them.
     constraints: Vec<Constraint<F>>,
-    /// n×p.
-    shift: Vec<Vec<F>>,
+    /// n rows over the columns of u.
+    shift: Vec<SparseRow<F>>,
     /// n×(q + 1): J and the constant.
-    inject: Vec<Vec<F>>,
+    inject: Vec<SparseRow<F>>,
     /// n×n.
-    energy: Vec<Vec<F>>,
+    energy: Vec<SparseRow<F>>,
     /// q×q entries.
     metric: Vec<(usize, usize, F)>,
     /// What a least-norm choice has settled.

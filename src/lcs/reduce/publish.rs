@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::algebra::Field;
+use crate::algebra::{Field, SparseRow, entry, part};
 use crate::lcs::{Held, Hold, LcsParts, Outputs, Port, PowerTerm, Role, Rows, State, Storage};
 use crate::mna::StaticMultiport;
 
-use super::{Position, Reduction};
+use super::{Position, Reduction, StorageHold};
 
 /// Rounds numbers to doubles and remembers whether all of them were known well enough.
 struct Rounding {
@@ -23,11 +23,15 @@ impl Rounding {
     }
 
     /// Columns `columns` of some rows.
-    fn matrix<F: Field>(&mut self, rows: &[&[F]], columns: std::ops::Range<usize>) -> DMatrix<f64> {
+    fn matrix<F: Field>(
+        &mut self,
+        rows: &[&[(usize, F)]],
+        columns: std::ops::Range<usize>,
+    ) -> DMatrix<f64> {
         let mut matrix = DMatrix::zeros(rows.len(), columns.len());
         for (r, row) in rows.iter().enumerate() {
-            for (k, x) in row[columns.clone()].iter().enumerate() {
-                matrix[(r, k)] = self.number(x);
+            for (c, x) in part(row, columns.clone()) {
+                matrix[(r, c - columns.start)] = self.number(x);
             }
         }
         matrix
@@ -37,27 +41,35 @@ impl Rounding {
     /// the radius ρ of A_ij moves, ρ √(W_ii/W_jj) span in units of √energy, is rounding of the state.
     fn rates<F: Field>(
         &mut self,
-        rates: &[&[F]],
-        energy: &[&[F]],
+        rates: &[&[(usize, F)]],
+        energy: &[&[(usize, F)]],
         span: Option<f64>,
     ) -> DMatrix<f64> {
-        let stored = |i: usize| energy.get(i).map_or(0.0, |row| row[i].to_f64().sqrt());
-        DMatrix::from_fn(rates.len(), rates.len(), |i, j| {
-            let rate = &rates[i][j];
-            let moved = |span: f64| rate.radius() * span * stored(i) / stored(j);
-            if span.is_some_and(|span| moved(span) <= f64::EPSILON) {
-                rate.to_f64()
-            } else {
-                self.number(rate)
+        let n = rates.len();
+        let stored = |i: usize| {
+            let stored = energy.get(i).and_then(|row| entry(row, i));
+            stored.map_or(0.0, |stored| stored.to_f64().sqrt())
+        };
+        let mut matrix = DMatrix::zeros(n, n);
+        for (i, row) in rates.iter().enumerate() {
+            for (j, rate) in part(row, 0..n) {
+                let moved = |span: f64| rate.radius() * span * stored(i) / stored(*j);
+                matrix[(i, *j)] = if span.is_some_and(|span| moved(span) <= f64::EPSILON) {
+                    rate.to_f64()
+                } else {
+                    self.number(rate)
+                };
             }
-        })
+        }
+        matrix
     }
 
-    fn vector<F: Field>(&mut self, rows: &[&[F]], column: usize) -> DVector<f64> {
-        DVector::from_iterator(rows.len(), rows.iter().map(|row| self.number(&row[column])))
+    fn vector<F: Field>(&mut self, rows: &[&[(usize, F)]], column: usize) -> DVector<f64> {
+        let number = |row: &&[(usize, F)]| entry(row, column).map_or(0.0, |x| self.number(x));
+        DVector::from_iterator(rows.len(), rows.iter().map(number))
     }
 
-    fn rows<F: Field>(&mut self, rows: &[&[F]], n: usize, m: usize, p: usize) -> Rows {
+    fn rows<F: Field>(&mut self, rows: &[&[(usize, F)]], n: usize, m: usize, p: usize) -> Rows {
         Rows {
             x: self.matrix(rows, 0..n),
             lambda: self.matrix(rows, n..n + m),
@@ -68,7 +80,7 @@ impl Rounding {
     }
 }
 
-fn slices<F>(rows: &[Vec<F>]) -> Vec<&[F]> {
+fn slices<F>(rows: &[SparseRow<F>]) -> Vec<&[(usize, F)]> {
     rows.iter().map(Vec::as_slice).collect()
 }
 
@@ -90,21 +102,27 @@ pub(super) fn publish<F: Field>(
     let mut round = Rounding { precise: true };
     let (rates, y, s) = (slices(&r.rates), slices(&r.y), slices(&r.s));
     let energy = slices(&r.energy);
-    let (values, impulses): (Vec<&[F]>, Vec<&[F]>) = r
+    let (values, impulses): (Vec<_>, Vec<_>) = r
         .readings
         .iter()
         .map(|(row, impulse)| (row.as_slice(), impulse.as_slice()))
         .unzip();
-    let pick = |which: &mut dyn Iterator<Item = usize>| -> Vec<&[F]> {
+    let pick = |which: &mut dyn Iterator<Item = usize>| -> Vec<&[(usize, F)]> {
         which.filter_map(|k| values.get(k).copied()).collect()
     };
-    let width = |rows: &[&[F]]| rows.first().map_or(0, |row| row.len());
+    // An operating point has no impulses.
+    let stored = if position.storage == StorageHold::Static {
+        0
+    } else {
+        q
+    };
+    let width = |rows: &[&[(usize, F)]], width: usize| if rows.is_empty() { 0 } else { width };
     let probes = &behaviour.observed[..behaviour.probes];
     let outputs = Outputs {
         names: probes.iter().map(|probe| probe.name.clone()).collect(),
         units: probes.iter().map(|probe| probe.unit).collect(),
         rows: round.rows(&values[..probes.len()], n, m, p),
-        impulse: round.matrix(&impulses[..probes.len()], 0..width(&impulses)),
+        impulse: round.matrix(&impulses[..probes.len()], 0..width(&impulses, stored)),
         power: (behaviour.power.iter())
             .map(|w| PowerTerm {
                 element: w.element.clone(),
@@ -115,9 +133,9 @@ pub(super) fn publish<F: Field>(
         power_i: round.rows(&pick(&mut behaviour.power.iter().map(|w| w.i)), n, m, p),
     };
     let controls = pick(&mut behaviour.switches.iter().map(|s| s.control));
-    let guards: Vec<&[F]> = r.guards.iter().map(|g| g.0.as_slice()).collect();
-    let guard_impulses: Vec<&[F]> = r.guards.iter().map(|g| g.1.as_slice()).collect();
-    let constraints: Vec<&[F]> = r.constraints.iter().map(|c| c.0.as_slice()).collect();
+    let guards: Vec<&[(usize, F)]> = r.guards.iter().map(|g| g.0.as_slice()).collect();
+    let guard_impulses: Vec<&[(usize, F)]> = r.guards.iter().map(|g| g.1.as_slice()).collect();
+    let constraints: Vec<&[(usize, F)]> = r.constraints.iter().map(|c| c.0.as_slice()).collect();
     let kernel = slices(&r.kernel);
     let held_pairs = (position.devices.iter().enumerate())
         .filter(|(_, hold)| **hold != Hold::Free)
@@ -126,17 +144,18 @@ pub(super) fn publish<F: Field>(
     let held = Held {
         pairs: held_pairs,
         guard: round.rows(&guards, n, m, p),
-        kernel: round.matrix(&kernel, 0..width(&kernel)),
+        kernel: round.matrix(&kernel, 0..width(&kernel, r.undetermined)),
         constraints: round.rows(&constraints, n, m, p),
         constrained: r.constraints.iter().map(|c| c.1.clone()).collect(),
-        impulse: round.matrix(&guard_impulses, 0..width(&guard_impulses)),
+        impulse: round.matrix(&guard_impulses, 0..width(&guard_impulses, stored)),
     };
-    let mut metric = DMatrix::zeros(q, q);
-    for (a, b, x) in &r.metric {
+    // What is stored takes no part in an operating point.
+    let mut metric = DMatrix::zeros(stored, stored);
+    for (a, b, x) in r.metric.iter().filter(|_| stored > 0) {
         metric[(*a, *b)] = round.number(x);
     }
     let inject = slices(&r.inject);
-    let has_dynamics = width(&inject) > 0;
+    let has_dynamics = n > 0;
     let storage = Storage {
         names: behaviour.storage.iter().map(|s| s.name.clone()).collect(),
         elements: (behaviour.storage.iter())
@@ -183,9 +202,7 @@ pub(super) fn publish<F: Field>(
         g: round.matrix(&y, n + m..n + m + p),
         e0: round.vector(&rates, n + m + 2 * p),
         f: round.vector(&y, n + m + 2 * p),
-        shift: round
-            .matrix(&slices(&r.shift), 0..if n > 0 { p } else { 0 })
-            .resize(n, p, 0.0),
+        shift: round.matrix(&slices(&r.shift), n + m..n + m + p),
         energy: round.matrix(&energy, 0..n),
         outputs,
         storage,
@@ -200,7 +217,7 @@ pub(super) fn publish<F: Field>(
     (parts, round.precise)
 }
 
-fn state(behaviour: &StaticMultiport, k: usize) -> State {
+pub(super) fn state(behaviour: &StaticMultiport, k: usize) -> State {
     let storage = &behaviour.storage[k];
     State {
         name: storage.name.clone(),
@@ -208,7 +225,7 @@ fn state(behaviour: &StaticMultiport, k: usize) -> State {
     }
 }
 
-fn port(behaviour: &StaticMultiport, k: usize, role: Role) -> Port {
+pub(super) fn port(behaviour: &StaticMultiport, k: usize, role: Role) -> Port {
     let pair = &behaviour.pairs[k];
     let (lambda, y) = match role {
         Role::Voltage => (&pair.reverse_name, &pair.forward_name),
@@ -229,7 +246,6 @@ mod tests {
 
     use super::super::in_some_order;
     use super::*;
-    use crate::lcs::StorageHold;
 
     /// Three inductors share the current through 1 MΩ beside loads of 50 Ω: in what is slow the balls lose more digits than an entry is to
     /// have, and none that a run of 60 ms sees.

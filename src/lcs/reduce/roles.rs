@@ -7,7 +7,7 @@
 use nalgebra::DMatrix;
 
 use super::Reduction;
-use crate::algebra::Field;
+use crate::algebra::{Field, entry, part};
 use crate::lcs::Role;
 use crate::mna::StaticMultiport;
 use crate::settings::tolerances::ranks::{COUPLED, RANK};
@@ -15,20 +15,62 @@ use crate::settings::tolerances::ranks::{COUPLED, RANK};
 /// The pairs that others follow in D + Dᵀ but for less than [`RANK`] of themselves, which is not nothing: the independent ones of them, by the
 /// largest pivots of an exact factorisation L Δ Lᵀ. `None` where there are none.
 pub(super) fn lost<F: Field>(reduction: &Reduction<F>) -> Option<Vec<usize>> {
+    let blocks = blocks(reduction);
+    let blocks = blocks.iter().filter(|block| block.len() > 1);
+    let mut lost: Vec<usize> = blocks.flat_map(|block| lost_in(reduction, block)).collect();
+    lost.sort_unstable();
+    lost.dedup();
+    (!lost.is_empty()).then_some(lost)
+}
+
+/// The ports that D connects, in order.
+fn blocks<F: Field>(reduction: &Reduction<F>) -> Vec<Vec<usize>> {
     let (n, m) = (reduction.states.len(), reduction.pairs.len());
-    let entry = |i: usize, j: usize| reduction.y[i][n + j].add(&reduction.y[j][n + i]);
+    let mut neighbours = vec![Vec::new(); m];
+    for (i, y) in reduction.y.iter().enumerate() {
+        for (c, _) in part(y, n..n + m) {
+            neighbours[i].push(c - n);
+            neighbours[c - n].push(i);
+        }
+    }
+    let mut open = vec![true; m];
+    let mut blocks = Vec::new();
+    for first in 0..m {
+        let (mut block, mut next) = (Vec::new(), 0);
+        if std::mem::take(&mut open[first]) {
+            block.push(first);
+        }
+        while let Some(&i) = block.get(next) {
+            next += 1;
+            let others = neighbours[i].iter();
+            block.extend(others.filter(|&&j| std::mem::take(&mut open[j])));
+        }
+        block.sort_unstable();
+        blocks.push(block);
+    }
+    blocks
+}
+
+/// Those of a block, by their pairs.
+fn lost_in<F: Field>(reduction: &Reduction<F>, block: &[usize]) -> Vec<usize> {
+    let (n, m) = (reduction.states.len(), block.len());
+    let d = |i: usize, j: usize| {
+        let d = entry(&reduction.y[block[i]], n + block[j]);
+        d.cloned().unwrap_or_else(F::zero)
+    };
+    let mut rest: Vec<Vec<F>> = (0..m)
+        .map(|i| (0..m).map(|j| d(i, j).add(&d(j, i))).collect())
+        .collect();
     let unit: Vec<f64> = (0..m)
-        .map(|j| match entry(j, j).to_f64() {
+        .map(|j| match rest[j][j].to_f64() {
             d if d > 0.0 => d.sqrt().recip(),
             _ => 0.0,
         })
         .collect();
-    if !is_suspect(m, |i, j| entry(i, j).to_f64() * unit[i] * unit[j]) {
-        return None;
+    let scaled = DMatrix::from_fn(m, m, |i, j| rest[i][j].to_f64() * unit[i] * unit[j]);
+    if !is_suspect(&scaled) {
+        return Vec::new();
     }
-    let mut rest: Vec<Vec<F>> = (0..m)
-        .map(|i| (0..m).map(|j| entry(i, j)).collect())
-        .collect();
     // Part of its diagonal that is left of each pair, and pivots with their columns of L in units of the diagonals.
     let mut left: Vec<f64> = unit.iter().map(|u| f64::from(*u > 0.0)).collect();
     let mut pivots: Vec<(usize, Vec<f64>)> = Vec::new();
@@ -50,20 +92,17 @@ pub(super) fn lost<F: Field>(reduction: &Reduction<F>) -> Option<Vec<usize>> {
             let before = std::mem::replace(&mut left[j], rest[j][j].to_f64() * unit[j] * unit[j]);
             if before > RANK && left[j] <= RANK && !rest[j][j].is_zero() {
                 let followed = pivots.iter().filter(|(_, share)| share[j].abs() > COUPLED);
-                lost.extend(followed.map(|(p, _)| reduction.pairs[*p].0));
+                lost.extend(followed.map(|(p, _)| reduction.pairs[block[*p]].0));
             }
         }
     }
-    lost.sort_unstable();
-    lost.dedup();
-    (!lost.is_empty()).then_some(lost)
+    lost
 }
 
 /// Whether an eigenvalue of a matrix with unit diagonal is so small that it may be lost.
-fn is_suspect(m: usize, entry: impl Fn(usize, usize) -> f64) -> bool {
-    let scaled = DMatrix::from_fn(m, m, entry);
+fn is_suspect(scaled: &DMatrix<f64>) -> bool {
     let sound = scaled.iter().all(|v| v.is_finite());
-    m > 1 && sound && scaled.symmetric_eigenvalues().min() <= RANK * m as f64
+    sound && scaled.symmetric_eigenvalues().min() <= RANK * scaled.nrows() as f64
 }
 
 /// The behaviour with the other quantity of these devices preferred as λ.

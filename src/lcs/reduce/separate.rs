@@ -20,7 +20,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::algebra::Field;
+use crate::algebra::{Field, SparseRow, add_scaled, entry, part};
 use crate::lcs::Lcs;
 use crate::settings::tolerances::exponentials::APART;
 
@@ -93,7 +93,15 @@ impl<F: Field> Reduction<F> {
         let n = self.states.len();
         let mut slow: Vec<usize> = (0..n).collect();
         loop {
-            let of = |rows: &[Vec<F>]| DMatrix::from_fn(n, n, |i, j| rows[i][j].to_f64());
+            let of = |rows: &[SparseRow<F>]| {
+                let mut matrix = DMatrix::zeros(n, n);
+                for (i, row) in rows.iter().enumerate() {
+                    for (j, x) in part(row, 0..n) {
+                        matrix[(i, *j)] = x.to_f64();
+                    }
+                }
+                matrix
+            };
             let fast = fast_among(&slow, &of(&self.rates), &of(&self.energy), 1.0 / span);
             if fast.is_empty() {
                 return;
@@ -108,18 +116,20 @@ impl<F: Field> Reduction<F> {
 
     /// Makes state p the fast one beside these others.
     fn take_apart(&mut self, p: usize, others: &[usize]) {
-        let pivot = self.rates[p][p].clone();
-        let alpha: Vec<F> = (others.iter().map(|&j| self.rates[p][j].div(&pivot))).collect();
-        for (&j, alpha) in others.iter().zip(&alpha) {
-            self.add_to_state(p, j, alpha);
+        let share = |rates: &[SparseRow<F>], i: usize, j: usize| {
+            Some(entry(&rates[i], j)?.div(entry(&rates[p], p)?))
+        };
+        let alpha = others.iter().map(|&j| share(&self.rates, p, j));
+        for (&j, alpha) in others.iter().zip(alpha.collect::<Vec<_>>()) {
+            if let Some(alpha) = alpha {
+                self.add_to_state(p, j, &alpha);
+            }
         }
-        let pivot = self.rates[p][p].clone();
-        if pivot.is_zero() {
-            return;
-        }
-        let beta: Vec<F> = (others.iter().map(|&j| self.rates[j][p].div(&pivot))).collect();
-        for (&j, beta) in others.iter().zip(&beta) {
-            self.add_to_state(j, p, &beta.neg());
+        let beta = others.iter().map(|&j| share(&self.rates, j, p));
+        for (&j, beta) in others.iter().zip(beta.collect::<Vec<_>>()) {
+            if let Some(beta) = beta {
+                self.add_to_state(j, p, &beta.neg());
+            }
         }
     }
 
@@ -131,18 +141,10 @@ impl<F: Field> Reduction<F> {
         let minus = factor.neg();
         for rows in [&mut self.rates, &mut self.shift, &mut self.inject] {
             let row = rows[from].clone();
-            for (target, x) in rows[to].iter_mut().zip(&row).filter(|(_, x)| !x.is_zero()) {
-                target.sub_mul(&minus, x);
-            }
+            add_scaled(&mut rows[to], factor, &row);
         }
         let row = self.energy[to].clone();
-        for (target, x) in self.energy[from]
-            .iter_mut()
-            .zip(&row)
-            .filter(|(_, x)| !x.is_zero())
-        {
-            target.sub_mul(factor, x);
-        }
+        add_scaled(&mut self.energy[from], &minus, &row);
         let rows = (self.rates.iter_mut())
             .chain(&mut self.y)
             .chain(&mut self.s)
@@ -151,9 +153,8 @@ impl<F: Field> Reduction<F> {
             .chain(self.guards.iter_mut().map(|g| &mut g.0))
             .chain(self.constraints.iter_mut().map(|c| &mut c.0));
         for row in rows {
-            if !row[to].is_zero() {
-                let x = row[to].clone();
-                row[from].sub_mul(factor, &x);
+            if let Some(x) = entry(row, to).cloned() {
+                add_scaled(row, &minus, &[(from, x)]);
             }
         }
     }

@@ -1,12 +1,12 @@
 //! The system read off an elimination, and what is wrong where there is none.
 
-use crate::algebra::Field;
+use crate::algebra::{Field, SparseRow, add_scaled, entry, part};
 use crate::circuit::source::Wave;
 use crate::lcs::{Hold, Role};
 use crate::mna::topology::{Class, Edge, conflict};
 
 use super::eliminated::Eliminated;
-use super::flow::{Flow, add_scaled};
+use super::flow::Flow;
 use super::frame::Frame;
 use super::{Constraint, ReduceError, Reduction, StorageHold};
 
@@ -16,18 +16,15 @@ impl<F: Field> Eliminated<'_, F> {
         let frame = Frame::new(&self)?;
         let constraints = self.constraints(&frame)?;
         let is_static = self.position.storage == StorageHold::Static;
-        let s: Vec<Vec<F>> = self
-            .state
-            .iter()
-            .map(|&c| frame.express(&self, c))
-            .collect();
+        let storage = self.state.iter();
+        let s: Vec<SparseRow<F>> = storage.map(|&c| frame.express(&self, c)).collect();
         if !is_static {
             self.check_storage(&frame, &s)?;
         }
         let mut flow = Flow::solve(&self, &frame, &s, is_static)?;
         let objectives = self.objectives(&frame, is_static);
         let (undetermined, notes) = flow.least_norm(&frame, &objectives);
-        let guards: Vec<Vec<F>> = self
+        let guards: Vec<SparseRow<F>> = self
             .held
             .iter()
             .map(|&k| frame.express(&self, self.guard_column(k)))
@@ -45,11 +42,10 @@ impl<F: Field> Eliminated<'_, F> {
                 reverse
             };
             let row = flow.finish(&frame, &frame.express(&self, column)).0;
-            let rates = frame
-                .du()
-                .filter(|&c| !row[c].is_zero())
-                .map(|c| c - frame.du().start);
-            let sources: Vec<String> = rates.map(|j| self.source(j)).collect();
+            let rates = part(&row, frame.du()).iter();
+            let sources: Vec<String> = rates
+                .map(|(c, _)| self.source(c - frame.du().start))
+                .collect();
             if !sources.is_empty() {
                 return Err(ReduceError::SourceRate {
                     port: self.device(*k),
@@ -58,14 +54,14 @@ impl<F: Field> Eliminated<'_, F> {
             }
             y.push(row);
         }
-        let readings = (self.found.equations..self.matrix.rows())
-            .map(|r| flow.finish(&frame, &frame.gather(self.matrix.row(r), false, None)))
+        let readings = (0..self.behaviour.observed.len())
+            .map(|k| flow.finish(&frame, &frame.gather(&self.reading(k), false, None)))
             .collect();
         let image = self.times_metric(&s);
-        let mut energy = vec![vec![F::zero(); frame.n]; frame.n];
+        let mut energy = vec![SparseRow::new(); frame.n];
         for (row, image) in s.iter().zip(&image) {
-            for (target, x) in energy.iter_mut().zip(row).filter(|(_, x)| !x.is_zero()) {
-                add_scaled(target, x, &image[..frame.n]);
+            for (j, x) in part(row, 0..frame.n) {
+                add_scaled(&mut energy[*j], x, part(image, 0..frame.n));
             }
         }
         Ok(Reduction {
@@ -74,6 +70,7 @@ impl<F: Field> Eliminated<'_, F> {
             readings,
             guards: guards.iter().map(|g| flow.finish(&frame, g)).collect(),
             kernel,
+            undetermined: undetermined.len(),
             constraints,
             shift: flow.shift.clone(),
             inject: flow.inject(&frame, &s),
@@ -88,15 +85,10 @@ impl<F: Field> Eliminated<'_, F> {
     }
 
     /// P · rows.
-    pub(super) fn times_metric(&self, rows: &[Vec<F>]) -> Vec<Vec<F>> {
-        let width = rows.first().map_or(0, Vec::len);
-        let mut product = vec![vec![F::zero(); width]; rows.len()];
+    pub(super) fn times_metric(&self, rows: &[SparseRow<F>]) -> Vec<SparseRow<F>> {
+        let mut product = vec![SparseRow::new(); rows.len()];
         for (a, b, x) in &self.reduced.metric {
-            for (sum, value) in product[*a].iter_mut().zip(&rows[*b]) {
-                if !value.is_zero() {
-                    *sum = sum.add(&x.mul(value));
-                }
-            }
+            add_scaled(&mut product[*a], x, &rows[*b]);
         }
         product
     }
@@ -106,7 +98,7 @@ impl<F: Field> Eliminated<'_, F> {
         let mut constraints = Vec::new();
         for r in (0..self.found.equations).filter(|&r| !self.found.used[r]) {
             let row = frame.gather(self.matrix.row(r), false, None);
-            if row.iter().all(F::is_zero) {
+            if row.is_empty() {
                 continue;
             }
             let elements = self.pairs_in(frame, &row);
@@ -116,15 +108,15 @@ impl<F: Field> Eliminated<'_, F> {
             if self.agree(frame, &row) {
                 continue;
             }
-            let of = |c: usize| self.source(c - frame.u().start);
-            let named: Vec<String> = frame.u().filter(|&c| !row[c].is_zero()).map(of).collect();
+            let of = |(c, _): &(usize, F)| self.source(c - frame.u().start);
+            let named: Vec<String> = part(&row, frame.u()).iter().map(of).collect();
             let elements = conflict(&self.held_graph(), &named).unwrap_or(named);
             // At an operating point an inductor across a source is a constraint on its value at that instant.
             let instant = self.position.storage == StorageHold::Static;
             if self.held.is_empty() && !instant {
                 return Err(ReduceError::Sources { elements });
             }
-            constraints.push((normalised(&row[..frame.base]), elements));
+            constraints.push((normalised(part(&row, 0..frame.base)), elements));
         }
         Ok(constraints)
     }
@@ -166,34 +158,34 @@ impl<F: Field> Eliminated<'_, F> {
     }
 
     /// The devices whose λ a row contains.
-    fn pairs_in(&self, frame: &Frame, row: &[F]) -> Vec<String> {
-        let present = frame.lambda().filter(|&c| !row[c].is_zero());
+    fn pairs_in(&self, frame: &Frame, row: &[(usize, F)]) -> Vec<String> {
+        let present = part(row, frame.lambda()).iter();
         present
-            .map(|c| self.device(frame.pairs[c - frame.n].0))
+            .map(|(c, _)| self.device(frame.pairs[c - frame.n].0))
             .collect()
     }
 
     /// Whether Σ a_k u_k + c vanishes because equal waveforms and constants cancel.
-    fn agree(&self, frame: &Frame, row: &[F]) -> bool {
+    fn agree(&self, frame: &Frame, row: &[(usize, F)]) -> bool {
         let source = |j: usize| &self.behaviour.sources[j].input.source;
-        let mut constant = row[frame.one()].clone();
+        let mut constant = entry(row, frame.one()).cloned().unwrap_or_else(F::zero);
         let mut sums: Vec<(usize, F)> = Vec::new();
-        for c in frame.u().filter(|&c| !row[c].is_zero()) {
+        for (c, x) in part(row, frame.u()) {
             let j = c - frame.u().start;
             if let Wave::Dc(value) = source(j).wave {
-                constant = constant.add(&row[c].mul(&F::value(value.into())));
+                constant = constant.add(&x.mul(&F::value(value.into())));
                 continue;
             }
             match sums.iter_mut().find(|(k, _)| source(*k) == source(j)) {
-                Some((_, sum)) => *sum = sum.add(&row[c]),
-                None => sums.push((j, row[c].clone())),
+                Some((_, sum)) => *sum = sum.add(x),
+                None => sums.push((j, x.clone())),
             }
         }
         constant.is_zero() && sums.iter().all(|(_, sum)| sum.is_zero())
     }
 
     /// Dependent storage may follow other storage and sources, nothing else.
-    fn check_storage(&self, frame: &Frame, s: &[Vec<F>]) -> Result<(), ReduceError> {
+    fn check_storage(&self, frame: &Frame, s: &[SparseRow<F>]) -> Result<(), ReduceError> {
         for (k, row) in s.iter().enumerate() {
             let ports = self.pairs_in(frame, row);
             if !ports.is_empty() {
@@ -202,7 +194,7 @@ impl<F: Field> Eliminated<'_, F> {
                     ports,
                 });
             }
-            if row[frame.base..].iter().any(|x| !x.is_zero()) {
+            if !part(row, frame.base..usize::MAX).is_empty() {
                 return Err(ReduceError::Singular {
                     elements: vec![self.storage_label(k)],
                 });
@@ -214,7 +206,7 @@ impl<F: Field> Eliminated<'_, F> {
     /// The quantities whose squares a least-norm choice minimises, with names: first what the position leaves unknown of its devices, as the
     /// complementarity problem with these devices free chooses it; then everything else that it leaves unknown, in an operating
     /// point what is observed (node potentials) as well.
-    fn objectives(&self, frame: &Frame, is_static: bool) -> Vec<Vec<(String, Vec<F>)>> {
+    fn objectives(&self, frame: &Frame, is_static: bool) -> Vec<Vec<(String, SparseRow<F>)>> {
         if frame.f.is_empty() {
             return Vec::new();
         }
@@ -222,14 +214,14 @@ impl<F: Field> Eliminated<'_, F> {
         let row = |(c, name): &(usize, String)| (name.clone(), frame.express(self, *c));
         let (devices, others): (Vec<_>, Vec<_>) =
             self.unknown.iter().partition(|(c, _)| guards.contains(c));
-        let mut rest: Vec<(String, Vec<F>)> = others.into_iter().map(row).collect();
+        let mut rest: Vec<(String, SparseRow<F>)> = others.into_iter().map(row).collect();
         if is_static {
             for (k, observed) in self.behaviour.observed.iter().enumerate() {
                 if self.unknown.iter().any(|(_, name)| *name == observed.name) {
                     continue;
                 }
-                let row = self.matrix.row(self.found.equations + k);
-                rest.push((observed.name.clone(), frame.gather(row, false, None)));
+                let row = frame.gather(&self.reading(k), false, None);
+                rest.push((observed.name.clone(), row));
             }
         }
         vec![devices.into_iter().map(row).collect(), rest]
@@ -237,15 +229,12 @@ impl<F: Field> Eliminated<'_, F> {
 }
 
 /// Scales a row so that its largest entry is ±1.
-fn normalised<F: Field>(row: &[F]) -> Vec<F> {
+fn normalised<F: Field>(row: &[(usize, F)]) -> SparseRow<F> {
     let size = |x: &F| x.to_f64().abs();
-    let largest = row
-        .iter()
-        .filter(|x| !x.is_zero())
-        .max_by(|a, b| size(a).total_cmp(&size(b)));
-    match largest {
-        Some(largest) => row.iter().map(|x| x.div(largest)).collect(),
-        None => row.to_vec(),
+    let largest = row.iter().map(|(_, x)| x);
+    match largest.max_by(|a, b| size(a).total_cmp(&size(b))) {
+        Some(largest) => row.iter().map(|(c, x)| (*c, x.div(largest))).collect(),
+        None => SparseRow::new(),
     }
 }
 
@@ -256,7 +245,10 @@ mod tests {
 
     #[test]
     fn a_row_is_scaled_by_its_largest_entry() {
-        let row: Vec<_> = [2.0, -8.0, 0.0].map(rational).to_vec();
-        assert_eq!(normalised(&row), [-0.25, 1.0, 0.0].map(rational).to_vec());
+        let row = |entries: [(usize, f64); 2]| entries.map(|(c, x)| (c, rational(x))).to_vec();
+        assert_eq!(
+            normalised(&row([(0, 2.0), (2, -8.0)])),
+            row([(0, -0.25), (2, 1.0)])
+        );
     }
 }

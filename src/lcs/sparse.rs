@@ -1,0 +1,212 @@
+//! Systems of many states: matrices without their zeros.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Input, Port, Position, ReduceError, State, reduce};
+use crate::mna::StaticMultiport;
+
+/// States and ports from which on a system is written without its zeros.
+pub const MANY: usize = 1000;
+
+/// A matrix in compressed rows: the entries of row i are `data[indptr[i]..indptr[i + 1]]`, in the columns `indices[…]`, increasing.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Csr {
+    /// Rows and columns.
+    pub shape: [usize; 2],
+    /// Where each row begins, and the end.
+    pub indptr: Vec<usize>,
+    /// Columns.
+    pub indices: Vec<usize>,
+    /// Entries, none of them zero.
+    pub data: Vec<f64>,
+}
+
+impl Csr {
+    /// A matrix of no rows yet.
+    #[must_use]
+    pub fn new(columns: usize) -> Self {
+        Self {
+            shape: [0, columns],
+            indptr: vec![0],
+            ..Self::default()
+        }
+    }
+
+    /// Appends a row of entries (column, value), columns increasing.
+    pub fn push(&mut self, row: impl IntoIterator<Item = (usize, f64)>) {
+        for (column, value) in row {
+            self.indices.push(column);
+            self.data.push(value);
+        }
+        self.shape[0] += 1;
+        self.indptr.push(self.data.len());
+    }
+
+    /// The entries (row, column, value), row by row.
+    pub fn entries(&self) -> impl Iterator<Item = (usize, usize, f64)> {
+        let rows = self.indptr.windows(2).enumerate();
+        rows.flat_map(move |(i, ends)| {
+            (ends[0]..ends[1]).map(move |k| (i, self.indices[k], self.data[k]))
+        })
+    }
+
+    /// Whether the parts fit together.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        let [rows, columns] = self.shape;
+        self.indptr.len() == rows + 1
+            && self.indptr.first() == Some(&0)
+            && self.indptr.last() == Some(&self.data.len())
+            && self.indices.len() == self.data.len()
+            && self.indptr.is_sorted()
+            && self.indices.iter().all(|&j| j < columns)
+    }
+
+    /// M x.
+    ///
+    /// # Panics
+    /// Where `x` has not one value a column.
+    #[must_use]
+    pub fn times(&self, x: &[f64]) -> Vec<f64> {
+        assert_eq!(x.len(), self.shape[1], "one value a column");
+        let mut y = vec![0.0; self.shape[0]];
+        for (i, j, value) in self.entries() {
+            y[i] += value * x[j];
+        }
+        y
+    }
+}
+
+/// x' = A x + B λ + E u + e, y = C x + D λ + G u + F with −λ_j ∈ ∂φ_j(y_j), of one position of the switches; what its parts are
+/// says [`LcsParts`](super::LcsParts).
+#[derive(Debug, Clone, Default)]
+pub struct SparseLcs {
+    /// The netlist's title.
+    pub title: String,
+    /// Names and units of x.
+    pub states: Vec<State>,
+    /// Names, units and waveforms of u.
+    pub inputs: Vec<Input>,
+    /// The pairs (λ, y) and their laws.
+    pub ports: Vec<Port>,
+    /// n×n, 1/s.
+    pub a: Csr,
+    /// n×m.
+    pub b: Csr,
+    /// m×n.
+    pub c: Csr,
+    /// m×m.
+    pub d: Csr,
+    /// n×p.
+    pub e: Csr,
+    /// m×p.
+    pub g: Csr,
+    /// n: the constant term of x'.
+    pub e0: Vec<f64>,
+    /// m: the constant term of y.
+    pub f: Vec<f64>,
+    /// n×p: physical state = x + shift·u.
+    pub shift: Csr,
+    /// n×n symmetric: stored energy at u = 0 is ½ xᵀ P x.
+    pub energy: Csr,
+    /// x = inject · s + `inject_one` conserves charge and flux of all storage quantities s, n×q.
+    pub inject: Csr,
+    /// See `inject`.
+    pub inject_one: Vec<f64>,
+    /// Names and units of the probes.
+    pub outputs: Vec<(String, &'static str)>,
+    /// Their rows over x.
+    pub output_x: Csr,
+    /// Over λ.
+    pub output_lambda: Csr,
+    /// Over u.
+    pub output_u: Csr,
+    /// Over u'.
+    pub output_du: Csr,
+    /// Their constants.
+    pub output_one: Vec<f64>,
+    /// Switch names and the position the system was assembled for.
+    pub switches: Vec<(String, bool)>,
+    /// Least-norm choices.
+    pub notes: Vec<String>,
+    /// Entries that are not known to be within 1e-14 of the exact ones: differences of large numbers.
+    pub imprecise: usize,
+}
+
+impl SparseLcs {
+    /// Reduces a behaviour to the system of one position, without a dense matrix on the way.
+    ///
+    /// Ranks are exact as those of [`reduce`](super::reduce()). Entries that 106 bits do not settle to 1e-14 are counted, not computed again in
+    /// rationals.
+    ///
+    /// # Errors
+    /// [`ReduceError`], naming elements, where the position has no such system.
+    pub fn of(behaviour: &StaticMultiport, position: &Position) -> Result<Self, ReduceError> {
+        reduce::reduce_sparse(behaviour, position)
+    }
+
+    /// The (shifted) state where all capacitor voltages and inductor currents are these.
+    #[must_use]
+    pub fn state_from(&self, storage: &[f64]) -> Vec<f64> {
+        let mut x = self.inject.times(storage);
+        for (x, one) in x.iter_mut().zip(&self.inject_one) {
+            *x += one;
+        }
+        x
+    }
+
+    /// The matrices with their letters.
+    #[must_use]
+    pub fn matrices(&self) -> [(&'static str, &Csr); 6] {
+        [
+            ("A", &self.a),
+            ("B", &self.b),
+            ("C", &self.c),
+            ("D", &self.d),
+            ("E", &self.e),
+            ("G", &self.g),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lcs::reduce::reduce;
+    use crate::mna::behaviour;
+    use crate::mna::fixture::circuit;
+
+    #[test]
+    fn sparse_and_dense_are_one_system() {
+        // A capacitor loop with a source, coupled inductors, a diode bridge and a switch.
+        let netlist = "v1 a 0 10\n c1 a b 1u\n c2 b 0 2u\n r1 b c 10\n l1 c d 1m\n l2 e 0 2m\n k1 l1 l2 0.5\n r2 e 0 5\n \
+                       d1 d p\n d2 n d\n d3 0 p\n d4 n 0\n cd p n 1m\n r3 p n 50\n s1 p q 1m 1k\n r4 q n 1";
+        let behaviour = behaviour(&circuit(netlist)).unwrap();
+        for on in [false, true] {
+            let position = Position::free(&behaviour, vec![on; behaviour.switches.len()]);
+            let dense = reduce(&behaviour, &position).unwrap();
+            let sparse = SparseLcs::of(&behaviour, &position).unwrap();
+            let whole = |m: &Csr| {
+                let mut whole = nalgebra::DMatrix::zeros(m.shape[0], m.shape[1]);
+                m.entries().for_each(|(i, j, v)| whole[(i, j)] = v);
+                assert!(m.is_sound());
+                whole
+            };
+            for ((_, sparse), dense) in sparse
+                .matrices()
+                .into_iter()
+                .zip([&dense.a, &dense.b, &dense.c, &dense.d, &dense.e, &dense.g])
+            {
+                assert_eq!(&whole(sparse), dense);
+            }
+            assert_eq!(whole(&sparse.energy), dense.energy);
+            assert_eq!(whole(&sparse.shift), dense.shift);
+            assert_eq!(whole(&sparse.inject), dense.storage.inject);
+            assert_eq!(whole(&sparse.output_x), dense.outputs.rows.x);
+            assert_eq!(whole(&sparse.output_du), dense.outputs.rows.du);
+            assert_eq!(sparse.e0, dense.e0.as_slice());
+            assert_eq!(sparse.f, dense.f.as_slice());
+            assert_eq!(sparse.imprecise, 0);
+        }
+    }
+}
