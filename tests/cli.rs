@@ -163,6 +163,71 @@ fn sim_into_a_pipe_is_csv() {
 }
 
 #[test]
+fn a_file_without_a_command_is_simulated() {
+    let simulated = run("sim divider.cir");
+    for arguments in [
+        "divider.cir",
+        "-q divider.cir",
+        "--method exact divider.cir",
+    ] {
+        let ran = run(arguments);
+        assert_eq!((ran.status, &ran.out), (0, &simulated.out), "{arguments}");
+    }
+    // What is no file is no command either.
+    let ran = run("divide.cir");
+    assert_eq!(ran.status, 2);
+    assert!(ran.err.contains("divide.cir"), "{}", ran.err);
+}
+
+#[test]
+fn large_systems_are_written_without_their_zeros() {
+    let directory = place();
+    let sections: String = (0..1200)
+        .map(|k| format!("r{k} n{k} n{} 10\nc{k} n{} 0 10n\n", k + 1, k + 1))
+        .collect();
+    let netlist = format!("ladder\nv1 n0 0 sin(0 1 1k)\n{sections}.tran 1u 1m uic\n.end\n");
+    fs::write(directory.path().join("ladder.cir"), netlist).unwrap();
+    let json = run_in(directory.path(), "lcs ladder.cir --format json");
+    assert_eq!(json.status, 0, "{}", json.err);
+    let system: serde_json::Value = serde_json::from_str(&json.out).unwrap();
+    assert_eq!(system["A"]["shape"], serde_json::json!([1200, 1200]));
+    assert_eq!(system["A"]["data"].as_array().unwrap().len(), 3 * 1200 - 2);
+    let numpy = run_in(directory.path(), "lcs ladder.cir --format numpy").out;
+    assert!(
+        numpy.contains("A = sp.csr_matrix((np.array([-"),
+        "{}",
+        &numpy[..200]
+    );
+    let matlab = run_in(directory.path(), "lcs ladder.cir --format matlab").out;
+    assert!(
+        matlab.contains("A = sparse([1, 1, 2, 2, 2, 3"),
+        "{}",
+        &matlab[..200]
+    );
+    let text = run_in(directory.path(), "lcs ladder.cir").out;
+    assert!(text.contains("A: 1200×1200, 3598 entries"), "{text}");
+    let latex = run_in(directory.path(), "lcs ladder.cir --format latex");
+    assert_eq!((latex.status, latex.out.as_str()), (2, ""));
+    let market = run_in(directory.path(), "lcs ladder.cir --format mtx -o l.mtx");
+    assert_eq!(market.status, 0, "{}", market.err);
+    let a = fs::read_to_string(directory.path().join("l.A.mtx")).unwrap();
+    assert_eq!(a.lines().count(), 3 + 3598);
+    let check = run_in(directory.path(), "check ladder.cir --json");
+    let report: serde_json::Value = serde_json::from_str(&check.out).unwrap();
+    assert_eq!(
+        (check.status, &report["size"]["n"]),
+        (0, &serde_json::json!(1200))
+    );
+    assert!(report["passive"].is_null());
+    assert!(
+        report["passive_because"]
+            .as_str()
+            .unwrap()
+            .contains("too many")
+    );
+}
+
+#[test]
 fn parameters_and_probes_are_replaced() {
     assert_snapshot!(run(
         "sim divider.cir --param TOP=4k7 --probe i(r1) --probe v(in,out) --probe V1#branch --probe @r2[i] --probe out"

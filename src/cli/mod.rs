@@ -26,10 +26,12 @@ pub mod sim;
 mod steps;
 pub mod streams;
 
+use std::ffi::OsString;
 use std::panic::{self, AssertUnwindSafe};
+use std::path::Path;
 
-use clap::Parser;
 use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser};
 
 use args::{Cli, Command};
 use exit::{Exit, Failure};
@@ -40,7 +42,7 @@ pub use render::render;
 /// Carries out the command line of this process.
 #[must_use]
 pub fn main() -> Exit {
-    let cli = match Cli::try_parse() {
+    let cli = match Cli::try_parse_from(with_command(std::env::args_os())) {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version go to standard output, usage errors to standard error.
@@ -75,6 +77,21 @@ pub fn main() -> Exit {
             Exit::Failed
         }
     }
+}
+
+/// `circ FILE` is `circ sim FILE`: where no argument is a command and one is a file.
+fn with_command(args: impl Iterator<Item = OsString>) -> Vec<OsString> {
+    let mut args: Vec<OsString> = args.collect();
+    let commands = Cli::command();
+    let is_command = |arg: &OsString| {
+        let name = arg.to_str();
+        name.is_some_and(|name| name == "help" || commands.find_subcommand(name).is_some())
+    };
+    let given = args.get(1..).unwrap_or_default();
+    if !given.iter().any(is_command) && given.iter().any(|arg| Path::new(arg).is_file()) {
+        args.insert(1, "sim".into());
+    }
+    args
 }
 
 fn run(command: &Command, streams: &Streams) -> Result<Exit, Failure> {
