@@ -1,12 +1,13 @@
 //! A circuit to be analysed again and again, with other values.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use crate::circuit::source::Wave;
-use crate::circuit::{Circuit, ElaborateOptions, Element, Kind, Sweep, elaborate, load};
-use crate::diagnostic::{Diagnostic, Faults, SourceMap};
+use crate::circuit::{Circuit, ElaborateOptions, Element, Kind, Sweep, Tran, elaborate, load};
+use crate::diagnostic::{Diagnostic, Faults, SourceFile, SourceMap};
 use crate::integrate::{
-    Error, OperatingPoint, Places, Run, SimOptions, Simulation, SimulationOptions, Values,
+    Error, OperatingPoint, Places, Reason, Run, SimOptions, Simulation, SimulationOptions, Values,
     operating_point, simulate,
 };
 use crate::lcs::{Lcs, Position, reduce};
@@ -30,8 +31,8 @@ use crate::settings::Settings;
 #[derive(Debug, Clone)]
 pub struct Model {
     /// None behind a circuit that was built by a program.
-    netlist: Option<Netlist>,
-    sources: SourceMap,
+    netlist: Option<Arc<Netlist>>,
+    sources: Arc<SourceMap>,
     options: ElaborateOptions,
     circuit: Circuit,
     multiport: StaticMultiport,
@@ -75,9 +76,36 @@ impl Model {
     /// # Errors
     /// As [`Self::load`].
     pub fn parse_with(text: &str, name: &str, options: ElaborateOptions) -> Result<Self, Error> {
+        Self::read(text, name, options, &|path| load::read(path))
+    }
+
+    /// Reads a netlist from files as [`Self::sources`] gives them, the root first: those that it includes are taken from there, and from
+    /// nowhere else.
+    ///
+    /// # Errors
+    /// As [`Self::load`]; there is no file.
+    pub fn of_files(files: &[SourceFile], options: ElaborateOptions) -> Result<Self, Error> {
+        let Some((root, included)) = files.split_first() else {
+            let none = Diagnostic::error("unreadable", None, "there is no file to read");
+            return Err(refused(vec![none], SourceMap::default()));
+        };
+        Self::read(&root.text, &root.path, options, &|path| {
+            let name = path.to_string_lossy();
+            let found = included.iter().find(|file| file.path == name);
+            let missing = || std::io::Error::from(std::io::ErrorKind::NotFound);
+            Ok(found.ok_or_else(missing)?.text.clone().into_bytes())
+        })
+    }
+
+    fn read(
+        text: &str,
+        name: &str,
+        options: ElaborateOptions,
+        loader: &dyn Fn(&Path) -> std::io::Result<Vec<u8>>,
+    ) -> Result<Self, Error> {
         let mut sources = SourceMap::default();
         let root = sources.add(name, text);
-        let (netlist, mut findings) = netlist::parse(&mut sources, root, &|path| load::read(path));
+        let (netlist, mut findings) = netlist::parse(&mut sources, root, loader);
         let (circuit, more) = elaborate(&netlist, &options);
         findings.extend(more);
         match circuit {
@@ -110,8 +138,8 @@ impl Model {
     ) -> Result<Self, Faults> {
         match mna::behaviour(&circuit) {
             Ok(multiport) => Ok(Self {
-                netlist,
-                sources,
+                netlist: netlist.map(Arc::new),
+                sources: Arc::new(sources),
                 options,
                 circuit,
                 multiport,
@@ -131,6 +159,10 @@ impl Model {
     /// There is no such element or parameter, or the circuit is none with that value; the model stays as it was.
     pub fn set(&mut self, name: &str, value: f64) -> Result<(), Error> {
         let name = name.to_lowercase();
+        if !value.is_finite() {
+            let message = format!("`{name}` cannot be set to {value}: it is no number");
+            return Err(self.faults(vec![Diagnostic::error("set", None, message)]));
+        }
         let mut options = self.options.clone();
         let values = match self.circuit.element(&name) {
             Some(id) => {
@@ -181,7 +213,7 @@ impl Model {
         match mna::behaviour(&circuit) {
             Ok(multiport) => Ok(Self {
                 netlist: self.netlist.clone(),
-                sources: self.sources.clone(),
+                sources: Arc::clone(&self.sources),
                 options: self.options.at(sweeps, values),
                 circuit,
                 multiport,
@@ -221,8 +253,26 @@ impl Model {
         }
     }
 
+    /// The model with another transient, where one is given, and with these signals, where there are any.
+    ///
+    /// # Errors
+    /// [`Reason::Unknown`] for what is no signal of the circuit.
+    pub fn asked(&self, tran: Option<Tran>, probes: &[String]) -> Result<Self, Error> {
+        let mut circuit = self.circuit.clone();
+        circuit.tran = tran.or(circuit.tran);
+        if !probes.is_empty() {
+            let found = probes.iter().map(|name| {
+                let unknown = || Reason::Unknown(format!("no node or element `{name}`"));
+                let probe = self.circuit.probe(name);
+                probe.ok_or_else(|| Error::before(unknown()))
+            });
+            circuit.probes = found.collect::<Result<_, _>>()?;
+        }
+        self.with_circuit(circuit)
+    }
+
     fn faults(&self, findings: Vec<Diagnostic>) -> Error {
-        refused(findings, self.sources.clone())
+        refused(findings, SourceMap::clone(&self.sources))
     }
 
     /// Warnings and notes of the netlist.
@@ -233,8 +283,14 @@ impl Model {
 
     /// The files it was read from.
     #[must_use]
-    pub const fn sources(&self) -> &SourceMap {
+    pub fn sources(&self) -> &SourceMap {
         &self.sources
+    }
+
+    /// The choices it was elaborated with, and the values that were set since.
+    #[must_use]
+    pub const fn options(&self) -> &ElaborateOptions {
+        &self.options
     }
 
     /// Where its elements stand in them.
@@ -243,7 +299,7 @@ impl Model {
         Places(
             self.netlist
                 .as_ref()
-                .map(|_| (&self.circuit, &self.sources)),
+                .map(|_| (&self.circuit, &*self.sources)),
         )
     }
 

@@ -90,3 +90,75 @@ fn a_transient_is_measured_on_more_rows_than_it_shows() {
     let shown = run.map(|(run, found)| (run.waveforms.names, found.measured.len()));
     assert!(shown.is_none_or(|(names, measured)| names == ["v(b)"] && measured == 2));
 }
+
+#[test]
+fn a_model_refuses_what_is_no_number_and_names_what_is_unknown() {
+    let text = "rc\nv1 in 0 1\nr1 in out 1k\nc1 out 0 1u\n.tran 0.1m 1m uic\n.end\n";
+    let mut model = Model::parse(text, "rc.cir").unwrap();
+    for nothing in [f64::NAN, f64::INFINITY] {
+        let error = model.set("r1", nothing).unwrap_err();
+        assert!(error.to_string().contains("no number"), "{error}");
+    }
+    let tran = model.circuit().tran.map(|tran| circ::circuit::Tran {
+        tstop: 0.5e-3,
+        ..tran
+    });
+    let asked = model.asked(tran, &["v(out)".into()]).unwrap();
+    let run = asked.transient(circ::SimOptions::default()).unwrap();
+    assert_eq!(run.waveforms.names, ["v(out)"]);
+    assert_eq!(run.waveforms.time.last(), Some(&0.5e-3));
+    let error = model.asked(None, &["v(nowhere)".into()]).unwrap_err();
+    assert!(
+        matches!(error.reason, circ::integrate::Reason::Unknown(_)),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_model_is_read_from_the_files_that_it_was_read_from() {
+    let file = |path: &str, text: &str| circ::diagnostic::SourceFile {
+        path: path.into(),
+        text: text.into(),
+    };
+    let main = file(
+        "main.cir",
+        "main\n.include r.inc\nv1 a 0 1\nr1 a 0 {r}\n.op\n.end\n",
+    );
+    let both = [main.clone(), file("r.inc", ".param r=2k\n")];
+    let model = Model::of_files(&both, circ::ElaborateOptions::default()).unwrap();
+    let current = model.operating_point().unwrap();
+    let (_, through) = current
+        .currents
+        .iter()
+        .find(|(name, _)| name == "r1")
+        .unwrap();
+    assert!((through - 0.5e-3).abs() < 1e-15);
+    // What is included is taken from them alone.
+    assert!(Model::of_files(&[main], circ::ElaborateOptions::default()).is_err());
+    assert!(Model::of_files(&[], circ::ElaborateOptions::default()).is_err());
+}
+
+#[test]
+fn an_advance_ends_where_its_flag_is_set() {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    let text = "osc\nv1 in 0 pulse(0 1 0 0 0 5u 10u)\ns1 in out in 0 sw\nr1 out 0 1k\nc1 out 0 1n\n.model sw sw(vt=0.5)\n.tran 1u 10 uic\n.end\n";
+    let model = Model::parse(text, "osc.cir").unwrap();
+    let cancel = Arc::new(AtomicBool::new(false));
+    let options = circ::SimulationOptions {
+        cancel: Some(Arc::clone(&cancel)),
+        ..circ::SimulationOptions::default()
+    };
+    let mut simulation = model.simulation(options).unwrap();
+    simulation.advance_to(1e-4).unwrap();
+    cancel.store(true, Ordering::Relaxed);
+    let error = simulation.advance_to(10.0).unwrap_err();
+    assert!(
+        matches!(error.reason, circ::integrate::Reason::Interrupted),
+        "{error}"
+    );
+    cancel.store(false, Ordering::Relaxed);
+    let t = simulation.time();
+    assert!(t < 10.0);
+    simulation.advance_to(t + 1e-4).unwrap();
+}

@@ -144,6 +144,9 @@ pub enum Reason {
         /// The shortest distance of rows, s.
         least: f64,
     },
+    /// A name that means nothing here, and those that do.
+    #[error("{0}")]
+    Unknown(String),
     /// The method asked for does not cover the circuit.
     #[error("{0}")]
     Unsupported(String),

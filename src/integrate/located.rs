@@ -151,6 +151,7 @@ fn told(error: &Error, elements: &[&Element]) -> Told {
             Some("`circ sim` shows where the transient goes; `--period` names the period".into()),
         ),
         Reason::Netlist(_) => plain("netlist", None),
+        Reason::Unknown(_) => plain("unknown-name", None),
         Reason::Unsupported(_) => plain("unsupported", None),
         Reason::Internal(_) => plain("internal", None),
     }

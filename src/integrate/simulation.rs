@@ -22,6 +22,7 @@ use crate::integrate::exact::Place;
 use crate::integrate::log::Log;
 use crate::integrate::note;
 use crate::integrate::problem::Problem;
+use crate::integrate::rows::Asked;
 use crate::integrate::simulate::{Method, check};
 use crate::integrate::stats::{Impulse, Run, StateJumps, Stats};
 use crate::lcs::Lcs;
@@ -143,7 +144,12 @@ impl Simulation {
             );
             return Err(Error::at(now, Reason::Unsupported(what)));
         }
-        let mut log = Log::default();
+        let cancel = self.options.cancel.clone();
+        let asked = Asked {
+            cancel: cancel.as_deref(),
+            ..Asked::default()
+        };
+        let mut log = Log::of(0, 0.0, asked);
         log.pause_at_event(pause);
         let advanced = self.way.stepper().advance(t, &mut log);
         let events = self.take(log);
@@ -473,5 +479,5 @@ fn unknown<'a>(what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> 
     } else {
         format!("there are {}", known.join(" "))
     };
-    Error::before(Reason::Unsupported(format!("no {what} `{name}`: {there}")))
+    Error::before(Reason::Unknown(format!("no {what} `{name}`: {there}")))
 }

@@ -1,6 +1,7 @@
 //! What a simulation is asked for, where it stops, and where it may be taken up again.
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use crate::circuit::{Circuit, Source};
 use crate::integrate::energy::Balance;
@@ -23,6 +24,8 @@ pub struct SimulationOptions {
     pub step: Option<f64>,
     /// Where it ends at the latest, s; by default where the circuit's `.tran` does.
     pub until: Option<f64>,
+    /// Ends an advance when set, with [`Reason::Interrupted`](crate::integrate::Reason::Interrupted) and the simulation where it came to.
+    pub cancel: Option<Arc<AtomicBool>>,
     /// Tolerances.
     pub settings: Settings,
 }
