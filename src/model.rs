@@ -318,7 +318,7 @@ impl Model {
     /// Simulates the transient that `.tran` asks for.
     ///
     /// # Errors
-    /// See [`Reason`](crate::integrate::Reason); the run so far is in [`Error::partial`].
+    /// See [`Reason`]; the run so far is in [`Error::partial`].
     pub fn transient(&self, options: SimOptions<'_>) -> Result<Run, Error> {
         simulate(&self.circuit, &self.multiport, options)
     }
