@@ -49,7 +49,7 @@ def _diagnostics(error: NetlistError) -> list[dict[str, Any]]:
     return json.loads(getattr(error, "_diagnostics", "[]"))
 
 
-NetlistError.diagnostics = property(_diagnostics)  # type: ignore[attr-defined]
+NetlistError.diagnostics = property(_diagnostics)  # type: ignore[assignment]
 NetlistError._repr_html_ = lambda error: diagnostics_html(_diagnostics(error))  # type: ignore[attr-defined]
 
 

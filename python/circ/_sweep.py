@@ -56,7 +56,8 @@ def _one(model: Model, values: Mapping[str, float], measures: Sequence[str], of:
     missing = [name for name in measures if name not in found]
     if missing:
         raise KeyError(f"no .meas {', '.join(missing)}; there are {', '.join(found) or 'none'}")
-    return [float("nan") if found[name] is None else found[name] for name in measures], ""
+    values_found = [found[name] for name in measures]
+    return [float("nan") if value is None else value for value in values_found], ""
 
 
 def _many(packed: bytes, variants: Sequence[Mapping[str, float]], measures: Sequence[str], of: str) -> list[tuple[list[float], str]]:

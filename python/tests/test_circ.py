@@ -245,3 +245,23 @@ def test_memory_does_not_grow():
     for _ in range(int(os.environ.get("CIRC_PYTHON_RUNS", "2000"))):
         m.tran()
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 20_000
+
+
+def test_a_cluster_gives_the_bytes_of_threads_though_a_worker_is_killed():
+    distributed = pytest.importorskip("distributed")
+    pytest.importorskip("xarray")
+    m = circ.parse(BUCK.replace(".tran 1u 2m", ".tran 10u 20m"))
+    values = {"r1": [2.0 + 0.005 * k for k in range(100)]}
+    here = circ.sweep(m, values, ["vout"])
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        worker = next(iter(client.run(os.getpid).values()))
+        timer = threading.Timer(0.3, lambda: os.kill(worker, signal.SIGKILL))
+        timer.start()
+        there = circ.sweep(m, values, ["vout"], engine="dask", client=client)
+        timer.cancel()
+    assert there["vout"].values.tobytes() == here["vout"].values.tobytes()
+    with pytest.raises(ValueError, match="client"):
+        circ.sweep(m, values, ["vout"], engine="dask")

@@ -15,7 +15,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
     after_help = "Exit status: 0 done; 1 the answer is no (outside tolerance, faults found); 2 it could not be done; 128 + n ended by signal n."
 )]
 pub struct Cli {
-    /// Say nothing but errors
+    /// Say nothing but errors, measurements and a summary asked for
     #[arg(
         short,
         long,
