@@ -228,6 +228,32 @@ fn large_systems_are_written_without_their_zeros() {
 }
 
 #[test]
+fn findings_are_lines_or_objects_where_that_is_asked_for() {
+    let short = run("sim faulty.cir --message-format short");
+    assert_eq!(short.status, 2);
+    let first = short.err.lines().next().unwrap();
+    assert!(first.starts_with("faulty.cir:2:"), "{first}");
+    assert!(first.contains(": error["), "{first}");
+    let json = run("sim faulty.cir --message-format json");
+    let objects: Vec<serde_json::Value> = (json.err.lines())
+        .map(|line| serde_json::from_str(line).unwrap_or_else(|e| panic!("{line}: {e}")))
+        .collect();
+    assert_eq!(objects.len(), short.err.lines().count() - 1);
+    let first = &objects[0];
+    assert_eq!(
+        (&first["file"], &first["line"]),
+        (&"faulty.cir".into(), &2.into())
+    );
+    for key in ["code", "severity", "message", "column", "help"] {
+        assert!(first.get(key).is_some(), "{key}");
+    }
+    let missing = run("sim missing.cir --message-format json");
+    let failure: serde_json::Value =
+        serde_json::from_str(missing.err.lines().next().unwrap()).unwrap();
+    assert_eq!((missing.status, &failure["severity"]), (2, &"error".into()));
+}
+
+#[test]
 fn parameters_and_probes_are_replaced() {
     assert_snapshot!(run(
         "sim divider.cir --param TOP=4k7 --probe i(r1) --probe v(in,out) --probe V1#branch --probe @r2[i] --probe out"

@@ -27,9 +27,24 @@ pub struct Cli {
     /// Explain what is done and why
     #[arg(short, long, global = true, display_order = 91)]
     pub verbose: bool,
+    /// Form of findings: underlined in their text, a line each, or a JSON object each
+    #[arg(long, global = true, value_enum, value_name = "FORM", default_value_t = MessageFormat::Human, display_order = 92)]
+    pub message_format: MessageFormat,
     /// What to do
     #[command(subcommand)]
     pub command: Command,
+}
+
+/// Forms of findings on standard error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum MessageFormat {
+    /// With the text underlined
+    #[default]
+    Human,
+    /// `file:line:col: severity[code]: message`
+    Short,
+    /// One object a line: code, severity, message, file, line, column, help
+    Json,
 }
 
 /// The commands.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::args::{Diodes, Input};
+use super::args::{Diodes, Input, MessageFormat};
 use super::exit::Failure;
 use super::files;
 use super::forms;
@@ -347,7 +347,12 @@ pub fn show(diagnostics: &[Diagnostic], sources: &SourceMap, streams: &Streams) 
         .cloned()
         .collect();
     if !shown.is_empty() {
-        streams.error(render(&most(shown), sources, streams.colours()));
+        let shown = most(shown);
+        streams.error(match streams.messages {
+            MessageFormat::Human => render::render(&shown, sources, streams.colours()),
+            MessageFormat::Short => render::short(&shown, sources),
+            MessageFormat::Json => render::json(&shown, sources),
+        });
     }
 }
 

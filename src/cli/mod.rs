@@ -33,7 +33,7 @@ use std::path::Path;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
 
-use args::{Cli, Command};
+use args::{Cli, Command, MessageFormat};
 use exit::{Exit, Failure};
 use streams::Streams;
 
@@ -62,6 +62,7 @@ pub fn main() -> Exit {
     let streams = Streams {
         quiet: cli.quiet,
         verbose: cli.verbose,
+        messages: cli.message_format,
     };
     // A fault of the program itself still ends with the status for "could not be done".
     let outcome = panic::catch_unwind(AssertUnwindSafe(|| run(&cli.command, &streams)));
@@ -73,7 +74,13 @@ pub fn main() -> Exit {
         Ok(exit) => exit,
         Err(failure) if failure.is_closed_pipe() => Exit::Done,
         Err(failure) => {
-            streams.error(format!("error: {failure}"));
+            // Faults were shown one by one.
+            let told = matches!(failure, Failure::Faults(_));
+            match cli.message_format {
+                MessageFormat::Json if told => {}
+                MessageFormat::Json => streams.error(render::json_line(&failure.to_string())),
+                _ => streams.error(format!("error: {failure}")),
+            }
             Exit::Failed
         }
     }

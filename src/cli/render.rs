@@ -7,7 +7,9 @@ use miette::{
     SourceCode, SourceSpan, SpanContents,
 };
 
+use crate::check::Fault;
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
+use crate::report;
 
 /// Width of messages in columns.
 const WIDTH: usize = 100;
@@ -36,6 +38,54 @@ pub fn render(diagnostics: &[Diagnostic], sources: &SourceMap, colour: bool) -> 
         text.push('\n');
     }
     text
+}
+
+/// A line for each finding: `file:line:col: severity[code]: message`, with its help behind it.
+#[must_use]
+pub(super) fn short(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
+    let line = |diagnostic: &Diagnostic| {
+        let Fault {
+            code,
+            severity,
+            message,
+            file,
+            line,
+            column,
+            help,
+        } = Fault::of(diagnostic, sources);
+        let place = match (file, line, column) {
+            (Some(file), Some(line), Some(column)) => format!("{file}:{line}:{column}: "),
+            _ => String::new(),
+        };
+        let help = help.map_or_else(String::new, |help| format!(" ({help})"));
+        let severity = match severity {
+            Severity::Note => "note",
+            Severity::Warning => "warning",
+            Severity::Error => "error",
+        };
+        format!("{place}{severity}[{code}]: {message}{help}")
+    };
+    lines(diagnostics.iter().map(line))
+}
+
+/// A JSON object for each finding on a line of its own: code, severity, message, file, line, column, help.
+#[must_use]
+pub(super) fn json(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
+    let line = |diagnostic: &Diagnostic| report::json::line(&Fault::of(diagnostic, sources));
+    lines(diagnostics.iter().map(line))
+}
+
+/// The same of a failure without a place.
+pub(super) fn json_line(message: &str) -> String {
+    let failure = Diagnostic::error("failure", None, message);
+    report::json::line(&Fault::of(&failure, &SourceMap::default()))
+}
+
+fn lines(lines: impl Iterator<Item = String>) -> String {
+    lines
+        .map(|line| line.replace('\n', " "))
+        .collect::<Vec<_>>()
+        .join("\n")
 }
 
 /// A finding with the file it points into.

@@ -55,7 +55,7 @@ impl Stepping<'_> {
         let outputs = destination.open(&columns)?;
         let bar = streams.progress(variants.len() as u64, "stepping");
         let outcomes: Vec<Result<Outcome, Failure>> = each(&variants, |variant| {
-            let outcome = self.one(variant, &destination, held);
+            let outcome = self.one(variant, &destination, (held, streams));
             bar.inc(1);
             outcome
         });
@@ -113,7 +113,7 @@ impl Stepping<'_> {
         &self,
         variant: &Variant<'_>,
         destination: &Destination<'_>,
-        held: usize,
+        (held, streams): (usize, &Streams),
     ) -> Result<Outcome, Failure> {
         if self.signals.received().is_some() {
             let error = Error::before(Reason::Interrupted);
@@ -122,6 +122,7 @@ impl Stepping<'_> {
         let quiet = Streams {
             quiet: true,
             verbose: false,
+            ..*streams
         };
         let model = input::variant(&self.args.input, variant, &quiet)?;
         let route = Route {

@@ -7,6 +7,8 @@ use std::io::{self, IsTerminal, Write};
 use console::Term;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::args::MessageFormat;
+
 /// Lines of a terminal when it does not say.
 const DEFAULT_SIZE: (usize, usize) = (24, 80);
 
@@ -21,6 +23,8 @@ pub struct Streams {
     pub quiet: bool,
     /// Explanations on standard error.
     pub verbose: bool,
+    /// How findings are written.
+    pub messages: MessageFormat,
 }
 
 impl Streams {
@@ -36,12 +40,15 @@ impl Streams {
         io::stderr().is_terminal()
     }
 
-    /// Whether standard error shows colours: a terminal that can, unless the user's environment says otherwise (`NO_COLOR`, `CLICOLOR=0`).
+    /// Whether standard error shows colours: a terminal that can, unless the user's environment says otherwise (`NO_COLOR`, `CLICOLOR=0`), and
+    /// wherever it asks for them (`CLICOLOR_FORCE`).
     #[must_use]
     pub fn colours(&self) -> bool {
         let no_colour = env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
         let unwanted = env::var_os("CLICOLOR").is_some_and(|value| value == "0");
-        self.err_is_terminal() && !is_dumb() && !no_colour && !unwanted
+        let forced = env::var_os("CLICOLOR_FORCE").is_some_and(|value| value != "0");
+        let able = forced || (self.err_is_terminal() && !is_dumb() && !unwanted);
+        able && !no_colour
     }
 
     /// Lines and columns of the terminal on standard output.

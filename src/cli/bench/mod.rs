@@ -68,6 +68,7 @@ pub(super) fn bench(args: &BenchArgs, streams: &Streams) -> Result<Exit, Failure
         silent: Streams {
             quiet: true,
             verbose: false,
+            ..*streams
         },
     };
     let reference = bench.reference(None)?;
