@@ -110,7 +110,7 @@ impl<'a> Destination<'a> {
         self.summarise(&run, &found);
         if self.plots {
             let (lines, columns) = self.streams.size();
-            let plot = terminal::plot(&run.waveforms, columns, lines);
+            let plot = terminal::plot(&run.waveforms, columns, lines, self.streams.out_colours());
             self.streams.data(plot)?;
         }
         if let Err(failure) = written {

@@ -180,7 +180,9 @@ impl Stepping<'_> {
             for step in done {
                 streams.data(step.label() + "\n")?;
                 let room = (lines / done.len()).max(1);
-                streams.data(terminal::plot(&step.run.waveforms, columns, room))?;
+                let plot =
+                    terminal::plot(&step.run.waveforms, columns, room, streams.out_colours());
+                streams.data(plot)?;
             }
         }
         written

@@ -17,6 +17,16 @@ fn is_dumb() -> bool {
     env::var_os("TERM").is_some_and(|term| term == "dumb")
 }
 
+/// Whether a stream shows colours: a terminal that can, unless the user's environment says otherwise (`NO_COLOR`, `CLICOLOR=0`), and
+/// wherever it asks for them (`CLICOLOR_FORCE`).
+fn colours(is_terminal: bool) -> bool {
+    let no_colour = env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+    let unwanted = env::var_os("CLICOLOR").is_some_and(|value| value == "0");
+    let forced = env::var_os("CLICOLOR_FORCE").is_some_and(|value| value != "0");
+    let able = forced || (is_terminal && !is_dumb() && !unwanted);
+    able && !no_colour
+}
+
 /// Where a command writes, and how much it says.
 pub struct Streams {
     /// Only errors on standard error.
@@ -40,15 +50,16 @@ impl Streams {
         io::stderr().is_terminal()
     }
 
-    /// Whether standard error shows colours: a terminal that can, unless the user's environment says otherwise (`NO_COLOR`, `CLICOLOR=0`), and
-    /// wherever it asks for them (`CLICOLOR_FORCE`).
+    /// Whether standard error shows colours.
     #[must_use]
     pub fn colours(&self) -> bool {
-        let no_colour = env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
-        let unwanted = env::var_os("CLICOLOR").is_some_and(|value| value == "0");
-        let forced = env::var_os("CLICOLOR_FORCE").is_some_and(|value| value != "0");
-        let able = forced || (self.err_is_terminal() && !is_dumb() && !unwanted);
-        able && !no_colour
+        colours(self.err_is_terminal())
+    }
+
+    /// Whether standard output shows colours.
+    #[must_use]
+    pub fn out_colours(&self) -> bool {
+        colours(self.out_is_terminal())
     }
 
     /// Lines and columns of the terminal on standard output.

@@ -5,25 +5,29 @@ use super::si;
 use crate::analysis::{Left, Margin, margins, unwrapped};
 use crate::waveform::Phasors;
 
-/// Decibels below which a gain is drawn as this.
-const LOWEST: f64 = -400.0;
+/// Decibels below the largest gain from which on a value is no more than rounding, and has no point.
+const DEPTH: f64 = 240.0;
 
-/// Gain and phase of all columns; of ratios without a unit their margins, marked where they are.
+/// Gain and phase of all columns where they are not zero; of ratios without a unit their margins, marked where they are.
 #[must_use]
 pub fn figure(of: &Phasors) -> Figure {
     let positive = |k: &usize| of.frequency[*k] > 0.0;
     let rows: Vec<usize> = (0..of.frequency.len()).filter(positive).collect();
+    let norms = (0..of.names.len()).flat_map(|j| of.column(j).map(|value| value.norm()));
+    let lowest = norms.fold(0.0, f64::max) * 10f64.powf(-DEPTH / 20.0);
     let (mut gains, mut phases) = (Vec::new(), Vec::new());
     for (j, name) in of.names.iter().enumerate() {
         let gain: Vec<f64> = of
             .column(j)
-            .map(|value| (20.0 * value.norm().log10()).max(LOWEST))
+            .map(|value| 20.0 * value.norm().log10())
             .collect();
+        let seen: Vec<bool> = of.column(j).map(|value| value.norm() > lowest).collect();
         let phase = unwrapped(of.column(j));
         let curve = |values: &[f64]| Series {
             name: name.clone(),
             points: rows
                 .iter()
+                .filter(|&&k| seen[k])
                 .map(|&k| (of.frequency[k].log10(), values[k]))
                 .collect(),
         };
@@ -80,5 +84,26 @@ pub fn words(margin: &Margin) -> String {
     match margin.left {
         Left::Phase(left) => format!("{}° at {at}", si::plain(left, 4)),
         Left::Gain(left) => format!("{} dB at {at}", si::plain(left, 4)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Complex;
+
+    #[test]
+    fn what_is_zero_has_no_decibels_and_no_phase() {
+        let real = |re: f64| Complex::new(re, 0.0);
+        let phasors = Phasors {
+            title: String::new(),
+            names: vec!["v(a)".into(), "v(b)".into()],
+            units: vec!["V", "V"],
+            frequency: vec![1.0, 10.0],
+            values: [10.0, 0.0, 1.0, 1e-14].map(real).into(),
+        };
+        let panels = figure(&phasors).panels;
+        assert_eq!(panels[0].series[0].points, [(0.0, 20.0), (1.0, 0.0)]);
+        assert!(panels.iter().all(|p| p.series[1].points.is_empty()));
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::waveform::Waveforms;
 
-/// Width of a panel's plotting area in drawing units; curves are thinned to it.
-pub const PANEL_WIDTH: usize = 1400;
+/// Width of a panel's plotting area, px; of the rows that fall on a pixel the first, the lowest, the highest and the last are drawn.
+pub const PANEL_WIDTH: usize = 700;
 
 /// What stands on the common axis of a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -57,7 +57,7 @@ impl Series {
 }
 
 impl Figure {
-    /// Volts above, amperes below.
+    /// Volts above, amperes below, then a panel for every other unit.
     #[must_use]
     pub fn of_waveforms(waves: &Waveforms) -> Self {
         Self::of_runs(&[(String::new(), waves)])
@@ -76,19 +76,21 @@ impl Figure {
             }
             all
         };
-        let panel = |quantity: &str, unit: &'static str| Panel {
-            quantity: quantity.into(),
+        let mut units = vec!["V", "A"];
+        for unit in runs.iter().flat_map(|(_, waves)| &waves.units) {
+            if !units.contains(unit) {
+                units.push(unit);
+            }
+        }
+        let panels = units.into_iter().map(|unit| Panel {
+            quantity: quantity(unit).into(),
             unit,
             series: series(unit),
-        };
-        let panels = [panel("voltage", "V"), panel("current", "A")];
+        });
         Self {
             title: runs.first().map_or(String::new(), |(_, w)| w.title.clone()),
             axis: Axis::Time,
-            panels: panels
-                .into_iter()
-                .filter(|p| !p.series.is_empty())
-                .collect(),
+            panels: panels.filter(|p| !p.series.is_empty()).collect(),
         }
     }
 
@@ -114,12 +116,9 @@ impl Figure {
                     format!("{name} {reference_name}"),
                 ));
             }
-            let (quantity, unit) = match waves.units[ours] {
-                "A" => ("current", "A"),
-                unit => ("voltage", unit),
-            };
+            let unit = waves.units[ours];
             panels.push(Panel {
-                quantity: quantity.into(),
+                quantity: quantity(unit).into(),
                 unit,
                 series: both,
             });
@@ -153,5 +152,40 @@ impl Figure {
         let first = points().map(|p| p.0).min_by(f64::total_cmp)?;
         let last = points().map(|p| p.0).max_by(f64::total_cmp)?;
         Some((first, last))
+    }
+}
+
+/// What is measured in a unit.
+fn quantity(unit: &str) -> &'static str {
+    match unit {
+        "V" => "voltage",
+        "A" => "current",
+        "W" => "power",
+        "J" => "energy",
+        _ => "value",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_unit_has_a_panel() {
+        let waves = Waveforms {
+            title: String::new(),
+            names: ["i(r1)", "p(r1)", "v(a)", "i(v1)"]
+                .map(str::to_owned)
+                .into(),
+            units: vec!["A", "W", "V", "A"],
+            time: vec![0.0],
+            values: vec![1.0, 2.0, 3.0, 4.0],
+        };
+        let panels = Figure::of_waveforms(&waves).panels;
+        let shown: Vec<_> = panels
+            .iter()
+            .map(|p| (p.quantity.as_str(), p.series.len()))
+            .collect();
+        assert_eq!(shown, [("voltage", 1), ("current", 2), ("power", 1)]);
     }
 }

@@ -1,6 +1,7 @@
 //! One self-contained page: the picture, what the run did, events, impulses, notes.
 
 use super::figure::Figure;
+use super::sheet::escaped;
 use super::{PictureError, si, svg, text};
 use crate::integrate::{Places, Run};
 
@@ -69,13 +70,6 @@ fn table(heading: &str, header: [&str; 2], rows: impl Iterator<Item = [String; 2
     }
     let [a, b] = header;
     format!("<h2>{heading}</h2>\n<table><tr><th>{a}</th><th>{b}</th></tr>\n{rows}</table>\n")
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
 }
 
 #[cfg(test)]

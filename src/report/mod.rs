@@ -3,34 +3,29 @@
 //! A [`Figure`](figure::Figure) says what is to be seen; [`svg`] draws it, [`png`] rasterises the drawing with an embedded
 //! font, [`html`] puts it on a page. [`text`] and [`json`] are the summaries, [`terminal`] plots with characters.
 
+mod axis;
+pub mod bode;
+pub mod figure;
+pub mod html;
 pub mod json;
 pub mod means;
 pub mod measured;
 pub mod sensitivity;
+mod sheet;
 pub mod si;
 pub mod steps;
+pub mod svg;
 pub mod table;
+pub mod terminal;
 pub mod text;
+pub mod work;
 
-#[cfg(feature = "plot")]
-pub mod bode;
-#[cfg(feature = "plot")]
-pub mod figure;
 #[cfg(feature = "plot")]
 pub mod graph;
 #[cfg(feature = "plot")]
-pub mod html;
-#[cfg(feature = "plot")]
 pub mod png;
-#[cfg(feature = "plot")]
-pub mod svg;
-#[cfg(feature = "plot")]
-pub mod terminal;
-#[cfg(feature = "plot")]
-pub mod work;
 
 /// Why a picture could not be made.
-#[cfg(feature = "plot")]
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
     /// There is nothing to show.

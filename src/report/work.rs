@@ -1,14 +1,15 @@
 //! Error against run time: the work-precision picture.
 
-use plotters::prelude::*;
-
-use super::svg::{colour, draw_legend, legend_width, on_canvas, refused, text_style};
+use super::axis::Axis;
+use super::sheet::Stroke;
+use super::svg::{Legend, frame, titled};
 use super::{PictureError, si, table};
 
-const WIDTH: u32 = 1200;
-const HEIGHT: u32 = 900;
-const AXIS: u32 = 130;
-const TEXT_SIZE: u32 = 24;
+/// The corner of the plotting area and its size, px.
+const CORNER: (f64, f64) = (84.0, 40.0);
+const SIZE: (f64, f64) = (560.0, 400.0);
+const MARGIN: f64 = 12.0;
+const BELOW: f64 = 48.0;
 /// Errors and times are drawn at least this large, so that a zero has a place on a logarithmic axis.
 const SMALLEST: f64 = 1e-17;
 
@@ -231,79 +232,58 @@ fn signals_text(measurements: &[Measurement]) -> String {
     format!("\n{}", table::aligned(&header, &rows))
 }
 
-/// The picture: CPU seconds across, largest error down, both logarithmic, one colour per series. Failures have no point.
+/// The picture: CPU seconds across, largest error up, both logarithmic, one colour per series; the rungs of a ladder are joined, those of
+/// another method or setting are not. Failures have no point.
 ///
 /// # Errors
-/// [`PictureError::Empty`] when every run failed, [`PictureError::Draw`] when the drawing library refuses.
+/// [`PictureError::Empty`] when every run failed.
 pub fn draw(measurements: &[Measurement]) -> Result<String, PictureError> {
-    let points: Vec<(&str, f64, f64)> = measurements
+    let none = || PictureError::Empty("no run succeeded");
+    let done: Vec<(&Measurement, (f64, f64))> = measurements
         .iter()
         .filter_map(|m| {
-            Some((
-                m.method.as_str(),
-                m.cpu_seconds.max(SMALLEST),
-                m.max_error?.max(SMALLEST),
-            ))
+            let error = m.max_error?.max(SMALLEST).log10();
+            Some((m, (m.cpu_seconds.max(SMALLEST).log10(), error)))
         })
         .collect();
-    let mut methods: Vec<&str> = Vec::new();
-    for (method, ..) in &points {
-        if !methods.contains(method) {
-            methods.push(method);
+    let mut series: Vec<String> = Vec::new();
+    for (m, _) in &done {
+        if !series.contains(&m.series) {
+            series.push(m.series.clone());
         }
     }
-    let x_range =
-        decades(points.iter().map(|p| p.1)).ok_or(PictureError::Empty("no run succeeded"))?;
-    let y_range =
-        decades(points.iter().map(|p| p.2)).ok_or(PictureError::Empty("no run succeeded"))?;
-    let legend = legend_width(methods.iter().copied());
+    let x_range = decades(done.iter().map(|d| d.1.0)).ok_or_else(none)?;
+    let y_range = decades(done.iter().map(|d| d.1.1)).ok_or_else(none)?;
+    let (left, top) = CORNER;
+    let (right, bottom) = (left + SIZE.0, top + SIZE.1);
+    let across = ("user CPU of the solve (s)", "");
+    let across = Axis::logarithmic(x_range, (left, right), across);
+    let up = ("largest error relative to amplitude", "");
+    let up = Axis::logarithmic(y_range, (bottom, top), up);
+    let legend = Legend::of(series.clone(), SIZE.1);
     let title = measurements.first().map_or("", |m| m.circuit.as_str());
-    on_canvas(
-        WIDTH + legend,
-        HEIGHT,
-        &format!("{title}: error against run time"),
-        |body| {
-            let (plot, side) = body.split_horizontally(WIDTH);
-            let mut chart = ChartBuilder::on(&plot)
-                .set_label_area_size(LabelAreaPosition::Left, AXIS)
-                .set_label_area_size(LabelAreaPosition::Bottom, 90)
-                .margin(12)
-                .build_cartesian_2d(x_range.log_scale(), y_range.log_scale())
-                .map_err(refused)?;
-            chart
-                .configure_mesh()
-                .light_line_style(TRANSPARENT)
-                .bold_line_style(RGBColor(225, 225, 225))
-                .label_style(text_style(TEXT_SIZE))
-                .x_desc("user CPU of the solve (s)")
-                .y_desc("largest error relative to amplitude")
-                .x_label_formatter(&power)
-                .y_label_formatter(&power)
-                .draw()
-                .map_err(refused)?;
-            for (k, method) in methods.iter().enumerate() {
-                let own = points.iter().filter(|p| p.0 == *method).map(|p| (p.1, p.2));
-                chart
-                    .draw_series(LineSeries::new(own.clone(), colour(k).stroke_width(2)))
-                    .map_err(refused)?;
-                let dots = own.map(|at| Circle::new(at, 8, colour(k).filled()));
-                chart.draw_series(dots).map_err(refused)?;
-            }
-            draw_legend(&side, &methods, legend)
-        },
-    )
+    let (width, height) = (right + 2.0 * MARGIN + legend.width(), bottom + BELOW);
+    let mut sheet = titled(width, height, &format!("{title}: error against run time"));
+    frame(&mut sheet, &across, &up, true);
+    let at = |(_, (x, y)): &(&Measurement, (f64, f64))| (across.at(*x), up.at(*y));
+    let ladder = |m: &Measurement| (m.series.clone(), m.method.clone());
+    for rungs in done.chunk_by(|a, b| ladder(a.0) == ladder(b.0)) {
+        let k = series.iter().position(|s| *s == rungs[0].0.series);
+        let stroke = Stroke::curve(k.unwrap_or(0));
+        sheet.curve(rungs.iter().map(at), stroke);
+        for rung in rungs {
+            sheet.dot(at(rung), 3.5, stroke.colour);
+        }
+    }
+    legend.draw(&mut sheet, (right + MARGIN, top));
+    Ok(sheet.finish())
 }
 
-/// The whole powers of ten around some positive values.
-fn decades(values: impl Iterator<Item = f64> + Clone) -> Option<std::ops::Range<f64>> {
-    let low = values.clone().min_by(f64::total_cmp)?;
-    let high = values.max_by(f64::total_cmp)?;
-    let (low, high) = (low.log10().floor(), high.log10().ceil());
-    Some(10f64.powf(low)..10f64.powf(high.max(low + 1.0)))
-}
-
-fn power(value: &f64) -> String {
-    format!("{value:.0e}")
+/// The whole powers of ten around some logarithms.
+fn decades(values: impl Iterator<Item = f64> + Clone) -> Option<(f64, f64)> {
+    let low = values.clone().min_by(f64::total_cmp)?.floor();
+    let high = values.max_by(f64::total_cmp)?.ceil();
+    Some((low, high.max(low + 1.0)))
 }
 
 #[cfg(test)]
@@ -352,6 +332,11 @@ mod tests {
         let svg = draw(&all).unwrap();
         assert_eq!(svg.matches("<circle").count(), 3);
         assert!(svg.contains("user CPU of the solve (s)") && !svg.contains("ngspice"));
+        // A line for the ladder of two rungs, none from one method to the other.
+        let lines: Vec<&str> = svg.split(" d=\"").skip(1).collect();
+        let curves = lines.iter().filter(|l| l.contains("stroke-width=\"15\""));
+        let drawn = curves.filter(|l| l.split('"').next().is_some_and(|d| d.contains('l')));
+        assert_eq!(drawn.count(), 1, "{svg}");
         assert!(text(&all, &[]).contains("ngspice step=1e-6: Timestep too small"));
         let csv = csv(&all);
         assert_eq!(
