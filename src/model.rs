@@ -12,7 +12,7 @@ use crate::integrate::{
 };
 use crate::lcs::{Lcs, Position, reduce};
 use crate::mna::{self, StaticMultiport};
-use crate::netlist::{self, Netlist};
+use crate::netlist::{self, Files, Netlist};
 use crate::settings::Settings;
 
 /// A circuit with the netlist behind it: values are changed without parsing again.
@@ -76,7 +76,7 @@ impl Model {
     /// # Errors
     /// As [`Self::load`].
     pub fn parse_with(text: &str, name: &str, options: ElaborateOptions) -> Result<Self, Error> {
-        Self::read(text, name, options, &|path| load::read(path))
+        Self::read(text, name, options, &load::read, &load::names)
     }
 
     /// Reads a netlist from files as [`Self::sources`] gives them, the root first: those that it includes are taken from there, and from
@@ -89,23 +89,39 @@ impl Model {
             let none = Diagnostic::error("unreadable", None, "there is no file to read");
             return Err(refused(vec![none], SourceMap::default()));
         };
-        Self::read(&root.text, &root.path, options, &|path| {
+        let read = |path: &Path| {
             let name = path.to_string_lossy();
             let found = included.iter().find(|file| file.path == name);
             let missing = || std::io::Error::from(std::io::ErrorKind::NotFound);
             Ok(found.ok_or_else(missing)?.text.clone().into_bytes())
-        })
+        };
+        let names = |folder: &Path| {
+            let below = |file: &SourceFile| {
+                let inside = Path::new(&file.path).strip_prefix(folder).ok()?;
+                let first = inside.components().next()?.as_os_str().to_str()?;
+                Some(first.to_string())
+            };
+            included.iter().filter_map(below).collect()
+        };
+        Self::read(&root.text, &root.path, options, &read, &names)
     }
 
     fn read(
         text: &str,
         name: &str,
         options: ElaborateOptions,
-        loader: &dyn Fn(&Path) -> std::io::Result<Vec<u8>>,
+        read: &dyn Fn(&Path) -> std::io::Result<Vec<u8>>,
+        names: &dyn Fn(&Path) -> Vec<String>,
     ) -> Result<Self, Error> {
         let mut sources = SourceMap::default();
         let root = sources.add(name, text);
-        let (netlist, mut findings) = netlist::parse(&mut sources, root, loader);
+        let libraries = &options.libraries;
+        let search = Files {
+            read,
+            names,
+            libraries,
+        };
+        let (netlist, mut findings) = netlist::parse_among(&mut sources, root, search);
         let (circuit, more) = elaborate(&netlist, &options);
         findings.extend(more);
         match circuit {

@@ -58,6 +58,7 @@ impl<'n> Builder<'n, '_> {
             return;
         };
         let full = self.full_name(&card.name, scope);
+        self.name_pins(&full, "cbe", &pins);
         let span = Some(card.span);
         // The current of the transistor is that of its collector.
         let mut inner = [NodeId::GROUND; 3];

@@ -1,6 +1,6 @@
 //! The walk over the cards: definitions first, then elements in file order, then what refers to them.
 
-use std::collections::{HashSet, VecDeque};
+use std::collections::{HashMap, HashSet, VecDeque};
 
 use super::elaborate::ElaborateOptions;
 use super::names::Names;
@@ -80,6 +80,8 @@ pub(super) struct Builder<'n, 'o> {
     pub(super) auxiliary_nodes: Vec<Option<NodeId>>,
     /// The node whose voltage is the time, if there is one.
     pub(super) clock: Option<NodeId>,
+    /// The nodes of transistors by what their pins are called: d, g, s or c, b, e.
+    pub(super) pins: HashMap<String, Vec<(char, NodeId)>>,
 }
 
 impl<'n, 'o> Builder<'n, 'o> {
@@ -116,6 +118,7 @@ impl<'n, 'o> Builder<'n, 'o> {
             told_models: Vec::new(),
             auxiliary_nodes: Vec::new(),
             clock: None,
+            pins: HashMap::new(),
         }
     }
 
@@ -273,10 +276,11 @@ impl<'n, 'o> Builder<'n, 'o> {
             let near = self
                 .scopes
                 .near(scope, &name.text, |s| s.subckts.keys().copied());
-            self.tell(match near {
+            let fault = match near {
                 Some(near) => fault.help(format!("did you mean `{near}`?")),
-                None => fault.help("define it with `.subckt`, or include the file that does"),
-            });
+                None => fault.help("define it with `.subckt`, or include the file that does; `--lib DIR` names a folder of such files"),
+            };
+            self.scopes.findings.miss(&name.text, fault);
             return;
         };
         self.used.insert(subckt.name.span);

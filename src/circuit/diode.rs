@@ -32,12 +32,12 @@ impl<'n> Builder<'n, '_> {
         let unknown = self.scopes.model(scope, &name.text).is_none();
         let law = if unknown && self.options.diodes == Diodes::Ideal {
             let message = format!(
-                "`{}` uses unknown model `{}`: an ideal diode stands for it",
-                card.name.text, name.text
+                "an ideal diode stands for unknown model `{}` of `{}`",
+                name.text, card.name.text
             );
-            self.tell(
-                Diagnostic::warning("unknown-model", name.span, message).label("not defined"),
-            );
+            let warning = Diagnostic::warning("unknown-model", name.span, message);
+            let findings = &mut self.scopes.findings;
+            findings.miss(&name.text, warning.label("not defined"));
             Some(Law::ideal_diode())
         } else {
             self.model(card, name, scope).and_then(|chain| {

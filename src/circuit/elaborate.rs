@@ -1,5 +1,7 @@
 //! Netlist to [`Circuit`]: parameters evaluated, subcircuits expanded, models turned into laws.
 
+use std::path::PathBuf;
+
 use super::builder::Builder;
 use super::{Circuit, Sweep, Swept};
 use crate::diagnostic::{Diagnostic, Severity};
@@ -22,6 +24,8 @@ pub enum Diodes {
 pub struct ElaborateOptions {
     /// How diode models are read.
     pub diodes: Diodes,
+    /// Folders in which `.include` and `.lib` look for files after that of the netlist; used where a netlist is read.
+    pub libraries: Vec<PathBuf>,
     /// `--param NAME=VALUE`: replaces the values of `.param` at the top level.
     pub params: Vec<(String, f64)>,
     /// Values that a sweep gives to elements of the top level: sources' DC values, resistances.

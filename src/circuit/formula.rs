@@ -3,7 +3,7 @@
 use super::builder::Builder;
 use super::functions::{self, CallError, truth};
 use super::scope::ScopeId;
-use super::{NodeId, Probe, Probed};
+use super::{NodeId, Probe, Probed, pin};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::measure::Use;
 use crate::netlist::ast::{Binary, Expr, ExprKind, Name, Signal, Unary};
@@ -224,6 +224,20 @@ impl<'n> Builder<'n, '_> {
         })))
     }
 
+    fn formula_pin(
+        &mut self,
+        terms: Vec<(Probe, bool)>,
+        span: Span,
+        reading: &Reading<'_>,
+    ) -> Option<Formula> {
+        let signals = terms.into_iter().map(|(probe, positive)| {
+            let signal = self.measured(probe, span, reading)?;
+            Some((signal, positive))
+        });
+        let signals: Vec<_> = signals.collect::<Option<_>>()?;
+        Some(pin::sum(signals.into_iter()))
+    }
+
     fn formula_call(
         &mut self,
         expr: &'n Expr,
@@ -232,6 +246,16 @@ impl<'n> Builder<'n, '_> {
         reading: &mut Reading<'_>,
         locals: &[(&'n str, Formula)],
     ) -> Option<Formula> {
+        let is_function = self.scopes.func(reading.scope, &name.text).is_some();
+        let pin = (!is_function).then(|| self.pin_current(name, args, reading.scope));
+        match pin.flatten() {
+            Some(Ok(terms)) => return self.formula_pin(terms, expr.span, reading),
+            Some(Err(fault)) => {
+                self.tell(*fault);
+                return None;
+            }
+            None => {}
+        }
         let mut values = Vec::with_capacity(args.len());
         for arg in args {
             values.push(self.formula_part(arg, reading, locals)?);

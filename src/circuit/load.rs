@@ -7,7 +7,7 @@ use std::path::Path;
 use super::Circuit;
 use super::elaborate::{ElaborateOptions, elaborate};
 use crate::diagnostic::{Diagnostic, SourceMap};
-use crate::netlist::{self, Netlist};
+use crate::netlist::{self, Files, Netlist};
 
 /// What came of a netlist file.
 #[derive(Debug, Clone)]
@@ -44,6 +44,20 @@ pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// The names in a folder; none where it cannot be read.
+pub(crate) fn names(folder: &Path) -> Vec<String> {
+    let here = Path::new(".");
+    let folder = if folder.as_os_str().is_empty() {
+        here
+    } else {
+        folder
+    };
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    entries
+        .filter_map(|entry| entry.file_name().into_string().ok())
+        .collect()
+}
+
 /// Reads, parses and elaborates a netlist file.
 #[must_use]
 pub fn load(path: &Path, options: &ElaborateOptions) -> Loaded {
@@ -61,7 +75,12 @@ pub fn load(path: &Path, options: &ElaborateOptions) -> Loaded {
         }
     };
     let root = sources.add(path.to_string_lossy(), netlist::decode(&bytes));
-    let (parsed, mut diagnostics) = netlist::parse(&mut sources, root, &|path| read(path));
+    let search = Files {
+        read: &read,
+        names: &names,
+        libraries: &options.libraries,
+    };
+    let (parsed, mut diagnostics) = netlist::parse_among(&mut sources, root, search);
     let (circuit, more) = elaborate(&parsed, options);
     diagnostics.extend(more);
     Loaded {

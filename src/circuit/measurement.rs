@@ -87,6 +87,14 @@ impl<'n> Builder<'n, '_> {
 
     /// Takes in a Fourier analysis.
     pub(super) fn fourier(&mut self, card: &'n Four, scope: ScopeId) {
+        let before = self.scopes.findings.len();
+        self.fourier_card(card, scope);
+        self.scopes
+            .findings
+            .soften(before, "; its harmonics are left out");
+    }
+
+    fn fourier_card(&mut self, card: &'n Four, scope: ScopeId) {
         let Some(frequency) = self.scopes.finite(&card.frequency, scope) else {
             return;
         };
@@ -111,16 +119,12 @@ impl<'n> Builder<'n, '_> {
             }
             harmonics = count.f64 as usize;
         }
-        let before = self.scopes.findings.len();
         let mut signals = Vec::new();
         for signal in &card.signals {
             if let Some(Formula::Signal(index)) = self.signal_formula(signal, scope) {
                 signals.push(index);
             }
         }
-        self.scopes
-            .findings
-            .soften(before, "; its harmonics are left out");
         self.circuit.fourier.push(FourierAnalysis {
             frequency: frequency.f64,
             harmonics,

@@ -28,6 +28,7 @@ mod model;
 mod names;
 mod passive;
 mod piecewise;
+mod pin;
 mod place;
 mod probe;
 mod scope;

@@ -42,13 +42,19 @@ impl<'n> Builder<'n, '_> {
                 let near = self
                     .scopes
                     .near(scope, &wanted.text, |s| s.models.keys().copied());
-                self.tell(match near {
-                    Some(near) => fault.help(format!("did you mean `{near}`?")),
-                    None => fault.help(format!(
-                        "add `.model {} …`, or include the file that defines it",
+                let help = match near {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None => format!(
+                        "add `.model {} …`, or include the file that defines it; `--lib DIR` names a folder of such files",
                         wanted.text
-                    )),
-                });
+                    ),
+                };
+                let help = if card.name.text.starts_with('d') {
+                    format!("{help}\n`--diodes ideal` takes an ideal diode in its place")
+                } else {
+                    help
+                };
+                self.scopes.findings.miss(&wanted.text, fault.help(help));
                 return None;
             };
             if chain.iter().any(|m| std::ptr::eq(*m, model)) {

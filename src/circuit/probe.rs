@@ -24,6 +24,10 @@ impl<'n> Builder<'n, '_> {
                     continue;
                 }
                 Wanted::Other(Name { text, span }) => {
+                    if let Some(probe) = self.circuit.probe(text) {
+                        self.print(probe);
+                        continue;
+                    }
                     let message = format!("`{text}` cannot be printed yet");
                     let fault = Diagnostic::warning("ignored", *span, message).label("ignored");
                     self.tell(fault.help("voltages `v(a)`, `v(a,b)` and currents `i(r1)` can"));
@@ -86,7 +90,8 @@ impl Circuit {
         let current = inside("i(", ")")
             .or(inside("@", "[i]"))
             .or(inside("@", "[id]"))
-            .or(inside("", "#branch"));
+            .or(inside("", "#branch"))
+            .or_else(|| main_current(&text));
         match current {
             Some(name) => self.element_like(name).map(|id| self.current(id)),
             None => self
@@ -150,4 +155,17 @@ impl Circuit {
             _ => format!("there are {first} and {more} more"),
         }
     }
+}
+
+/// The transistor of `id(m1)` or `ic(q1)`, whose current is the one into this pin.
+fn main_current(text: &str) -> Option<&str> {
+    let (function, rest) = text.split_once('(')?;
+    let name = rest.strip_suffix(')')?;
+    let letter = name.rsplit(['.', ':']).next()?.chars().next()?;
+    let own = match function {
+        "id" => matches!(letter, 'm' | 'j' | 'z'),
+        "ic" => letter == 'q',
+        _ => false,
+    };
+    own.then_some(name)
 }

@@ -2,7 +2,7 @@
 //!
 //! A subcircuit instance sees its own definitions, then those of the instance that calls it, up to the top level.
 
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use super::NodeId;
 use super::behaviour::Auxiliary;
@@ -17,6 +17,8 @@ use crate::netlist::suggest::nearest;
 pub(super) struct Findings {
     list: Vec<Diagnostic>,
     seen: HashSet<(&'static str, Option<crate::diagnostic::Span>, String)>,
+    /// Of missing names: the place of the finding in the list, and how often it was met.
+    missing: HashMap<(&'static str, String), (usize, usize)>,
 }
 
 impl Findings {
@@ -25,6 +27,16 @@ impl Findings {
             .seen
             .insert((finding.code, finding.span, finding.message.clone()))
         {
+            self.list.push(finding);
+        }
+    }
+
+    /// Tells that a name is not defined: once, with the count of its uses.
+    pub(super) fn miss(&mut self, name: &str, finding: Diagnostic) {
+        let place = self.list.len();
+        let key = (finding.code, name.to_owned());
+        self.missing.entry(key).or_insert((place, 0)).1 += 1;
+        if self.missing[&(finding.code, name.to_owned())].1 == 1 {
             self.list.push(finding);
         }
     }
@@ -50,7 +62,12 @@ impl Findings {
         }
     }
 
-    pub(super) fn into_list(self) -> Vec<Diagnostic> {
+    pub(super) fn into_list(mut self) -> Vec<Diagnostic> {
+        let missing: BTreeMap<_, _> = self.missing.into_iter().collect();
+        for (place, uses) in missing.into_values().filter(|(_, uses)| *uses > 1) {
+            let message = &mut self.list[place].message;
+            message.push_str(&format!(", the first of {uses} that do"));
+        }
         self.list
     }
 }
@@ -156,6 +173,10 @@ impl<'n> Scopes<'n> {
 
     pub(super) fn get_mut(&mut self, id: ScopeId) -> &mut Scope<'n> {
         &mut self.list[id.0]
+    }
+
+    pub(super) fn all(&self) -> impl Iterator<Item = &Scope<'n>> {
+        self.list.iter()
     }
 
     /// A scope and those around it.

@@ -189,6 +189,16 @@ impl<'n> Builder<'n, '_> {
                 }
                 Swept::Element(name.text.clone())
             }
+            Target::Model(model, parameter) => {
+                let message = format!("there is no model `{}` to sweep", model.text);
+                let fault = Diagnostic::error("unknown-model", model.span, message);
+                let help = format!(
+                    "write the value of `{}` as `{{name}}` in the model and sweep that parameter",
+                    parameter.text
+                );
+                self.tell(fault.label("not a model of the top level").help(help));
+                return None;
+            }
             // LTspice lets a parameter stand without `param`.
             Target::Element(name) => {
                 if self.scopes.param(ScopeId::ROOT, &name.text).is_none() {

@@ -103,6 +103,7 @@ impl<'n> Builder<'n, '_> {
         };
         let span = Some(card.span);
         let full = self.full_name(&card.name, scope);
+        self.name_pins(&full, "dgs", &[drain, gate, source]);
         let inner = self.new_node(format!("{full}.d"));
         let mut part = |suffix: &str, p: NodeId, n: NodeId, kind: Kind| {
             let name = format!("{full}{suffix}");

@@ -84,6 +84,9 @@ pub struct Input {
     /// How diode models are read
     #[arg(long, value_enum, default_value_t = Diodes::Auto)]
     pub diodes: Diodes,
+    /// Look for files of `.include` and `.lib` in this folder after the netlist's own (repeatable); then in those of CIRC_LIB
+    #[arg(long = "lib", value_name = "DIR", value_parser = folder)]
+    pub libraries: Vec<PathBuf>,
 }
 
 /// How diode models are read.
@@ -519,6 +522,15 @@ fn tolerance(text: &str) -> Result<(String, f64), String> {
 fn assignment(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
     Ok((name.trim().to_lowercase(), number(value.trim())?))
+}
+
+fn folder(text: &str) -> Result<PathBuf, String> {
+    let folder = PathBuf::from(text);
+    if folder.is_dir() {
+        Ok(folder)
+    } else {
+        Err("there is no such folder".into())
+    }
 }
 
 fn position(text: &str) -> Result<(String, bool), String> {

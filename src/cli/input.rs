@@ -1,6 +1,6 @@
 //! What a file holds: a circuit from a netlist, or a system in JSON.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::args::{Diodes, Input, MessageFormat};
 use super::exit::Failure;
@@ -88,9 +88,17 @@ pub fn choices(input: &Input) -> ElaborateOptions {
     };
     ElaborateOptions {
         diodes,
+        libraries: libraries(input),
         params: input.params.clone(),
         ..ElaborateOptions::default()
     }
+}
+
+/// The folders of `--lib`, then those of the environment's `CIRC_LIB`, between which stands what stands between those of `PATH`.
+fn libraries(input: &Input) -> Vec<PathBuf> {
+    let named = std::env::var_os("CIRC_LIB").unwrap_or_default();
+    let named = std::env::split_paths(&named).filter(|folder| !folder.as_os_str().is_empty());
+    input.libraries.iter().cloned().chain(named).collect()
 }
 
 /// Reads a file as [`open`] does, for a command that takes the values as they stand and says so of a netlist with `.step`.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::ast::{Device, Element, Expr, ExprKind, WaveArg};
-use super::include::{MAX_BYTES, MAX_FILES};
+use super::include::{Found, MAX_BYTES, MAX_FILES};
 use super::read::Reader;
 use super::{decode, value};
 use crate::diagnostic::{Diagnostic, FileId, Span};
@@ -35,18 +35,24 @@ impl Reader<'_> {
             self.tell(fault.label("only a PWL without points of its own reads a file"));
             return;
         }
-        let (path, bytes) = match self.find(&written, from) {
+        let Found { path, bytes } = match self.find(&written, from) {
             Ok(Some(found)) => found,
             missing => {
+                let help = self.missing_help();
                 let why = missing
                     .err()
                     .map_or(String::new(), |error| format!(": {error}"));
                 let message = format!("cannot read `{written}`{why}");
                 let fault = Diagnostic::error("missing-file", span, message);
-                self.tell(fault.label("the points of the PWL should be in it"));
+                self.tell(
+                    fault
+                        .label("the points of the PWL should be in it")
+                        .help(help),
+                );
                 return;
             }
         };
+        self.tell_elsewhere(&written, &path, span);
         self.bytes += bytes.len();
         if self.sources.files.len() > MAX_FILES || self.bytes > MAX_BYTES {
             let fault = Diagnostic::error("too-deep", span, "too many or too large files");

@@ -275,6 +275,9 @@ fn named(start: Input<'_>) -> Parsed<'_, Expr> {
             },
         ));
     }
+    if name.text == "ix" {
+        return pin(start, open, name);
+    }
     let mut args = Vec::new();
     let mut at = open;
     if let Some(rest) = symbol(at, ')') {
@@ -300,6 +303,24 @@ fn named(start: Input<'_>) -> Parsed<'_, Expr> {
             span: between(start, at),
         },
     ))
+}
+
+/// The inside of `Ix(x1:pin)`, a name with a colon.
+fn pin<'a>(start: Input<'a>, open: Input<'a>, function: Name) -> Parsed<'a, Expr> {
+    let inside = blank(open);
+    let Some((text, _)) = inside.fragment().split_once(')') else {
+        return Err(unclosed(open, open));
+    };
+    let argument = Expr {
+        kind: ExprKind::Text(text.trim_end().to_lowercase()),
+        span: ahead(inside, text.trim_end().len()),
+    };
+    let rest = inside.take_from(text.len() + 1);
+    let call = Expr {
+        kind: ExprKind::Call(function, vec![argument]),
+        span: between(start, rest),
+    };
+    Ok((rest, call))
 }
 
 /// The inside of `v(…)` or `i(…)`: one or two names, each anything up to a comma or the closing parenthesis.

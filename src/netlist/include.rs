@@ -15,6 +15,57 @@ pub(super) const MAX_FILES: usize = 512;
 /// Most bytes in one netlist.
 pub(super) const MAX_BYTES: usize = 256 << 20;
 
+/// Where included files come from.
+#[derive(Clone, Copy)]
+pub struct Files<'a> {
+    /// The bytes of a file.
+    pub read: &'a dyn Fn(&Path) -> io::Result<Vec<u8>>,
+    /// The names in a folder, which is the working folder where its path is empty; none where they cannot be known.
+    pub names: &'a dyn Fn(&Path) -> Vec<String>,
+    /// Folders that are searched after those of the including file and of the netlist.
+    pub libraries: &'a [PathBuf],
+}
+
+/// An included file.
+pub(super) struct Found {
+    pub(super) path: PathBuf,
+    pub(super) bytes: Vec<u8>,
+}
+
+impl Files<'_> {
+    /// A file of one of these names in a folder, as written or else in other letter case.
+    fn within(&self, folder: &Path, names: &[&str]) -> io::Result<Option<Found>> {
+        let exact = names.iter().map(|name| lexical(&folder.join(name)));
+        let other = names.iter().filter_map(|name| self.any_case(folder, name));
+        for path in exact.chain(other) {
+            match (self.read)(&path) {
+                Ok(bytes) => return Ok(Some(Found { path, bytes })),
+                Err(error) if is_there(&error) => return Err(error),
+                Err(_) => {}
+            }
+        }
+        Ok(None)
+    }
+
+    /// The path below a folder with the letters that its parts have there; the first one in order where several differ in case.
+    fn any_case(&self, folder: &Path, written: &str) -> Option<PathBuf> {
+        let mut path = lexical(folder);
+        for part in lexical(Path::new(written)).components() {
+            match part {
+                Component::Normal(part) => {
+                    let part = part.to_str()?.to_lowercase();
+                    let names = (self.names)(&path);
+                    let same = names.iter().filter(|name| name.to_lowercase() == part);
+                    path.push(same.min()?);
+                }
+                Component::ParentDir => path = lexical(&path.join("..")),
+                _ => return None,
+            }
+        }
+        Some(path)
+    }
+}
+
 impl Reader<'_> {
     /// `.lib path`, `.lib path section`; a path may contain blanks.
     pub(super) fn lib(&mut self, file: &dot::Path, path: &Path) {
@@ -35,27 +86,57 @@ impl Reader<'_> {
         matches!(self.find(written, from), Ok(None))
     }
 
-    /// The path and text of an included file, tried relative to the including one, with `\` as `/` too; `None` where there is
-    /// none.
+    /// The folders in which included files are looked for, in this order.
+    fn folders<'p>(&'p self, from: &'p Path) -> impl Iterator<Item = &'p Path> {
+        let beside = [Some(from), self.files.first().map(PathBuf::as_path)];
+        let beside = beside.into_iter().flatten();
+        let beside = beside.map(|file| file.parent().unwrap_or(Path::new("")));
+        beside.chain(self.search.libraries.iter().map(PathBuf::as_path))
+    }
+
+    /// An included file, looked for beside the including one, beside the netlist and in the libraries, with `\` as `/` too and in any
+    /// letter case. Of a path from another machine, which is not there, the file name counts.
     ///
     /// # Errors
     /// Why what is there cannot be read.
-    pub(super) fn find(
-        &self,
-        written: &str,
-        from: &Path,
-    ) -> io::Result<Option<(PathBuf, Vec<u8>)>> {
-        let folder = from.parent().unwrap_or(Path::new(""));
+    pub(super) fn find(&self, written: &str, from: &Path) -> io::Result<Option<Found>> {
         let slashes = written.replace('\\', "/");
-        for name in [written, slashes.as_str()] {
-            let path = lexical(&folder.join(name));
-            match (self.loader)(&path) {
-                Ok(bytes) => return Ok(Some((path, bytes))),
-                Err(error) if is_there(&error) => return Err(error),
-                Err(_) => {}
+        for folder in self.folders(from) {
+            if let Some(found) = self.search.within(folder, &[written, &slashes])? {
+                return Ok(Some(found));
+            }
+        }
+        let Some(name) = foreign_name(&slashes) else {
+            return Ok(None);
+        };
+        for folder in self.folders(from) {
+            if let Some(found) = self.search.within(folder, &[name])? {
+                return Ok(Some(found));
             }
         }
         Ok(None)
+    }
+
+    /// Says where a file was found of which the path as written is on another machine.
+    pub(super) fn tell_elsewhere(&mut self, written: &str, found: &Path, span: Span) {
+        let slashes = written.replace('\\', "/");
+        if foreign_name(&slashes).is_some() && found != lexical(Path::new(&slashes)) {
+            let message = format!("`{written}` is not here; `{}` is read", found.display());
+            self.tell(
+                Diagnostic::note("found-elsewhere", span, message).label("found by its name"),
+            );
+        }
+    }
+
+    /// Where a file that is missing was looked for, and what to do.
+    pub(super) fn missing_help(&self) -> String {
+        let count = self.search.libraries.len();
+        let searched = match count {
+            0 => String::new(),
+            1 => " and the folder of `--lib`".into(),
+            _ => format!(" and the {count} folders of `--lib`"),
+        };
+        format!("looked for beside the netlist{searched}; `--lib DIR` names a folder to search")
     }
 
     pub(super) fn include(
@@ -65,13 +146,14 @@ impl Reader<'_> {
         span: Span,
         from: &Path,
     ) {
-        let (path, bytes) = match self.find(written, from) {
+        let Found { path, bytes } = match self.find(written, from) {
             Ok(Some(found)) => found,
             Ok(None) => {
+                let help = self.missing_help();
                 self.tell(
                     Diagnostic::warning("missing-file", span, format!("cannot read `{written}`"))
-                        .label("left out")
-                        .help("what it defines may be missing further on"),
+                        .label("left out: what it defines may be missing further on")
+                        .help(help),
                 );
                 return;
             }
@@ -88,6 +170,7 @@ impl Reader<'_> {
             );
             return;
         }
+        self.tell_elsewhere(written, &path, span);
         self.bytes += bytes.len();
         if self.files.len() > MAX_INCLUDES
             || self.sources.files.len() > MAX_FILES
@@ -143,6 +226,15 @@ fn is_there(error: &io::Error) -> bool {
         error.kind(),
         io::ErrorKind::Other | io::ErrorKind::PermissionDenied
     )
+}
+
+/// The file name in a path that names its place on some machine: `C:/…`, `/…`, `~/…`.
+fn foreign_name(slashes: &str) -> Option<&str> {
+    let (folder, name) = slashes.rsplit_once('/')?;
+    let drive =
+        folder.as_bytes().get(1) == Some(&b':') && folder.as_bytes()[0].is_ascii_alphabetic();
+    let rooted = slashes.starts_with(['/', '~']) || drive;
+    (rooted && !name.is_empty()).then_some(name)
 }
 
 /// The name of a `.lib name` line.

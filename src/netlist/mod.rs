@@ -16,12 +16,14 @@ mod include;
 mod lex;
 mod operand;
 mod read;
+mod stepped;
 pub(crate) mod suggest;
 pub mod value;
 
 pub use ast::Netlist;
 pub use decode::decode;
 pub use expr::expression;
-pub use read::parse;
+pub use include::Files;
+pub use read::{parse, parse_among};
 
 pub use crate::circuit::load::{Loaded, load};

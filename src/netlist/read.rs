@@ -7,10 +7,10 @@ use super::ast::{Block, Branch, Netlist, Statement, Subckt};
 use super::block::{Open, OpenKind};
 use super::control::Script;
 use super::dot::{self, Dot};
-use super::include::{lexical, library_sections};
+use super::include::{Files, lexical, library_sections};
 use super::lex::{Fault, Line, Parsed, State, at_end, input, logical, next_word, title};
-use super::{card, decode};
-use crate::diagnostic::{Diagnostic, FileId, SourceMap, Span};
+use super::{card, decode, stepped};
+use crate::diagnostic::{Diagnostic, FileId, Severity, SourceMap, Span};
 
 /// Reads a netlist: text to cards, includes in place. Never stops at the first fault.
 ///
@@ -21,6 +21,20 @@ pub fn parse(
     sources: &mut SourceMap,
     root: FileId,
     loader: &dyn Fn(&Path) -> io::Result<Vec<u8>>,
+) -> (Netlist, Vec<Diagnostic>) {
+    let search = Files {
+        read: loader,
+        names: &|_| Vec::new(),
+        libraries: &[],
+    };
+    parse_among(sources, root, search)
+}
+
+/// As [`parse`], with included files looked for in any letter case and in libraries too.
+pub fn parse_among(
+    sources: &mut SourceMap,
+    root: FileId,
+    search: Files<'_>,
 ) -> (Netlist, Vec<Diagnostic>) {
     let file = &sources.files[root.0 as usize];
     let (path, text) = (PathBuf::from(&file.path), file.text.clone());
@@ -49,7 +63,7 @@ pub fn parse(
     }
     let mut reader = Reader {
         sources,
-        loader,
+        search,
         open: vec![Open {
             kind: OpenKind::Root,
             block: Block::default(),
@@ -76,13 +90,14 @@ pub fn parse(
 
     netlist.title = reader.title.take().unwrap_or_default();
     netlist.body = reader.open.pop().map(|o| o.block).unwrap_or_default();
+    stepped::free(&mut netlist.body);
     let findings = netlist.body.faults.clone();
     (netlist, findings)
 }
 
 pub(super) struct Reader<'a> {
     pub(super) sources: &'a mut SourceMap,
-    pub(super) loader: &'a dyn Fn(&Path) -> io::Result<Vec<u8>>,
+    pub(super) search: Files<'a>,
     pub(super) open: Vec<Open>,
     /// The files being read, from the root inwards.
     pub(super) files: Vec<PathBuf>,
@@ -190,6 +205,11 @@ impl Reader<'_> {
             self.keep_findings(&state);
             match parsed {
                 Ok(dot) => return self.dot(dot, line, path),
+                Err(fault) if dot::is_measurement(&line.text) => self.tell(Diagnostic {
+                    severity: Severity::Warning,
+                    message: format!("{}; this measurement is left out", fault.message),
+                    ..*fault
+                }),
                 Err(fault) => self.tell(*fault),
             }
         } else {

@@ -21,6 +21,8 @@ pub enum Target {
     Param(Name),
     /// `v1`: the DC value of a source, or a resistance.
     Element(Name),
+    /// `npn 2n2222(bf)`: a parameter of a model, which is not of the top level where this is left.
+    Model(Name, Name),
     /// `temp`.
     Temperature(Span),
 }

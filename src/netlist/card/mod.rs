@@ -136,7 +136,7 @@ fn nodes<'a>(i: Input<'a>, count: usize, what: &str) -> Parsed<'a, Vec<Name>> {
 }
 
 /// Whether a word and `=` come next.
-fn assignment_follows(i: Input<'_>) -> bool {
+pub(super) fn assignment_follows(i: Input<'_>) -> bool {
     word(i).is_ok_and(|(rest, _)| symbol(rest, '=').is_some())
 }
 

@@ -2,7 +2,7 @@
 
 use nom::Input as _;
 
-use super::{Body, assignment_follows, assigns, nodes};
+use super::{Body, assignment_follows, assigns, keyword, nodes};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Device, Expr, ExprKind, Name};
 use crate::netlist::lex::{
@@ -14,7 +14,11 @@ use crate::netlist::operand;
 pub(super) fn passive<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
     let (mut at, nodes) = nodes(i, 2, "node")?;
     let mut values: Vec<Expr> = Vec::new();
-    while values.len() < 2 && !at_end(at) && !assignment_follows(at) {
+    while values.len() < 2
+        && !at_end(at)
+        && !assignment_follows(at)
+        && keyword(at, "noiseless").is_none()
+    {
         let (rest, value) = operand::value(at).map_err(|e| match e {
             nom::Err::Error(_) => missing(at, "a value"),
             e => e,

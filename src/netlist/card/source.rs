@@ -6,7 +6,7 @@ use crate::netlist::ast::{Assign, Device, Expr, Name, WaveArg, WaveCall};
 use crate::netlist::lex::{
     Input, Parsed, ahead, at_end, missing, next_word, refuse, separator, symbol, tell, word,
 };
-use crate::netlist::operand;
+use crate::netlist::{expr, operand};
 
 /// Waveforms, supported or only recognised.
 const WAVES: [&str; 12] = [
@@ -43,7 +43,7 @@ pub(super) fn source<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
                 at = rest;
                 continue;
             }
-            let (rest, value) = expect_value(rest, "the DC value")?;
+            let (rest, value) = dc_value(rest, "the DC value")?;
             (at, dc) = (rest, Some(value));
         } else if let Some(rest) = keyword(at, "ac") {
             let (rest, values) = stimulus(symbol(rest, '=').unwrap_or(rest));
@@ -57,7 +57,7 @@ pub(super) fn source<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
             args.push(one);
             at = rest;
         } else if dc.is_none() {
-            let (rest, value) = expect_value(at, "a value or waveform")?;
+            let (rest, value) = dc_value(at, "a value or waveform")?;
             if symbol(rest, '(').is_some() {
                 let known = "SIN, PULSE, PWL, EXP, SFFM, AM";
                 let fault =
@@ -73,6 +73,14 @@ pub(super) fn source<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
             return Ok((at, (nodes, Device::Source { dc, wave, ac, args })));
         }
     }
+}
+
+/// A value, which may stand in parentheses.
+fn dc_value<'a>(at: Input<'a>, what: &str) -> Parsed<'a, Expr> {
+    if symbol(at, '(').is_some() {
+        return expr::expr(at);
+    }
+    expect_value(at, what)
 }
 
 fn starts_wave(i: Input<'_>) -> bool {
@@ -108,6 +116,10 @@ fn call<'a>(i: Input<'a>, name: Name, args: &mut Vec<Assign>) -> Parsed<'a, Wave
         && let Some(rest) = keyword(at, "repeat")
     {
         at = repeat(rest, args)?.0;
+    }
+    if let Some(rest) = points_file(at, &name, args) {
+        let list = Vec::new();
+        return Ok((rest, WaveCall { name, args: list }));
     }
     if let Some(open) = symbol(at, '(') {
         return parenthesised(at, open, name, args);
@@ -165,6 +177,10 @@ fn parenthesised<'a>(
             return Ok((at, WaveCall { name, args: list }));
         } else if name.text == "pwl" && list.is_empty() && keyword(at, "repeat").is_some() {
             at = repeat(word(at)?.0, args)?.0;
+        } else if list.is_empty()
+            && let Some(rest) = points_file(at, &name, args)
+        {
+            at = rest;
         } else if name.text == "pwl" && keyword(at, "endrepeat").is_some() {
             at = word(at)?.0;
         } else if assignment_follows(at) {
@@ -175,6 +191,18 @@ fn parenthesised<'a>(
             at = argument(at, &mut list)?.0;
         }
     }
+}
+
+/// `FILE "name"` after `PWL`, without `=`.
+fn points_file<'a>(at: Input<'a>, wave: &Name, args: &mut Vec<Assign>) -> Option<Input<'a>> {
+    let (rest, name) = word(at).ok()?;
+    let wanted = wave.text == "pwl" && name.text == "file" && symbol(rest, '=').is_none();
+    let (rest, value) = operand::lenient(separator(rest)).ok().filter(|_| wanted)?;
+    args.push(Assign {
+        name,
+        value: Some(value),
+    });
+    Some(rest)
 }
 
 /// `FOREVER` or `FOR n` after `PWL REPEAT`.

@@ -3,14 +3,14 @@
 use super::Dot;
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Assign, Func, Model, Name, Statement};
-use crate::netlist::card::{assign, assigns};
+use crate::netlist::card::{assign, assignment_follows, assigns};
 use crate::netlist::expr;
 use crate::netlist::lex::{
     Input, Parsed, at_end, between, blank, end, expect_word, missing, node, refuse, separator,
     symbol, tell, word,
 };
 
-/// `.param a = 1 b={2*a} f(x)={x^2}`.
+/// `.param a = 1 b={2*a} c 3 f(x)={x^2}`.
 pub(super) fn params<'a>(i: Input<'a>, directive: &Name) -> Parsed<'a, Dot> {
     let mut all = Vec::new();
     let mut at = separator(i);
@@ -19,7 +19,14 @@ pub(super) fn params<'a>(i: Input<'a>, directive: &Name) -> Parsed<'a, Dot> {
         if symbol(rest, '(').is_some() && all.is_empty() {
             return func(at);
         }
-        let Some(rest) = symbol(rest, '=') else {
+        let bare = separator(rest);
+        let value = match symbol(rest, '=') {
+            Some(rest) => Some(expr::expr(rest)?),
+            // `.param r 100`.
+            None if at_end(bare) || assignment_follows(bare) => None,
+            None => Some(expr::expr(bare)?),
+        };
+        let Some((rest, value)) = value else {
             let fault = Diagnostic::error(
                 "missing",
                 name.span,
@@ -29,7 +36,6 @@ pub(super) fn params<'a>(i: Input<'a>, directive: &Name) -> Parsed<'a, Dot> {
                 fault.label(format!("expected `{}=value`", name.text)),
             ));
         };
-        let (rest, value) = expr::expr(rest)?;
         all.push(Assign {
             name,
             value: Some(value),
@@ -69,7 +75,7 @@ pub(super) fn func(i: Input<'_>) -> Parsed<'_, Dot> {
     ))
 }
 
-/// `.model name type (a=1 b=2 flag)`, parentheses and commas optional.
+/// `.model name type (a=1 b=2 flag)`, parentheses (or braces) and commas optional.
 pub(super) fn model(i: Input<'_>) -> Parsed<'_, Dot> {
     let (rest, name) = expect_word(i, "the name of the model")?;
     let (mut rest, mut kind) = expect_word(rest, "the type of the model")?;
@@ -99,10 +105,10 @@ pub(super) fn model(i: Input<'_>) -> Parsed<'_, Dot> {
     let mut at = rest;
     loop {
         at = separator(at);
-        if let Some(next) = symbol(at, '(') {
+        if let Some(next) = symbol(at, '(').or_else(|| symbol(at, '{')) {
             depth += 1;
             at = next;
-        } else if let Some(next) = symbol(at, ')') {
+        } else if let Some(next) = symbol(at, ')').or_else(|| symbol(at, '}')) {
             depth -= 1;
             at = next;
         } else if at_end(at) {

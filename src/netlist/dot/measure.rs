@@ -64,7 +64,7 @@ fn kind(i: Input<'_>) -> Parsed<'_, Measurement<Expr>> {
             let (rest, targ) = trigger(rest)?;
             return Ok((rest, Measurement::Delay(trig, targ)));
         }
-        "param" => {
+        "param" | "eqn" => {
             let (rest, e) = expr::expr(symbol(rest, '=').unwrap_or(rest))?;
             return Ok((rest, Measurement::Param(e)));
         }
@@ -100,12 +100,22 @@ fn keyword<'a>(i: Input<'a>, text: &str) -> Option<Input<'a>> {
         .map(|(rest, _)| rest)
 }
 
-/// `name=value`.
+/// `name=value`, `name value`.
 fn option<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Expr> {
-    let Some(rest) = symbol(i, '=') else {
-        return Err(missing(i, &format!("`{}=` and a value", name.text)));
-    };
-    expr::expr(rest)
+    let at = symbol(i, '=').unwrap_or_else(|| separator(i));
+    if at_end(at) {
+        return Err(missing(at, &format!("`{}=` and a value", name.text)));
+    }
+    expr::expr(at)
+}
+
+/// Whether an option has a value here: `=`, or a number or `LAST` alone.
+fn has_value(i: Input<'_>) -> bool {
+    symbol(i, '=').is_some()
+        || keyword(i, "last").is_some()
+        || separator(i)
+            .fragment()
+            .starts_with(|c: char| c.is_ascii_digit() || matches!(c, '.' | '-' | '+' | '{' | '\''))
 }
 
 /// `FROM=a TO=b TD=c`, `TRIG … TARG …`.
@@ -156,11 +166,11 @@ fn find_at(i: Input<'_>) -> Parsed<'_, Instant<Expr>> {
 
 /// After `TRIG` or `TARG`: `AT=t`, or `expr VAL=level …`, or `a=b …`.
 fn trigger(i: Input<'_>) -> Parsed<'_, Instant<Expr>> {
-    if let Some(rest) = keyword(i, "at")
-        && let Some(rest) = symbol(rest, '=')
+    if let Ok((rest, name)) = word(separator(i))
+        && name.text == "at"
+        && has_value(rest)
     {
-        let (rest, t) = expr::expr(rest)?;
-        return Ok((rest, Instant::At(t)));
+        return option(rest, &name).map(|(rest, t)| (rest, Instant::At(t)));
     }
     met(i, Some("val"))
 }
@@ -191,11 +201,11 @@ fn met<'a>(i: Input<'a>, level: Option<&str>) -> Parsed<'a, Instant<Expr>> {
                     edge = own;
                 }
                 // `CROSS=1 RISE`: the edge alone.
-                let Some(rest) = symbol(rest, '=') else {
+                if !has_value(rest) {
                     at = separator(rest);
                     continue;
-                };
-                let (rest, e) = expr::expr(rest)?;
+                }
+                let (rest, e) = option(rest, &name)?;
                 let last = matches!(&e.kind, ExprKind::Name(name) if name == "last");
                 number = (!last).then_some(e);
                 counted = true;

@@ -107,7 +107,7 @@ pub(in crate::netlist) fn card(i: Input<'_>) -> Parsed<'_, Dot> {
     let start = blank(i);
     let (rest, name) = word(start)?;
     match name.text.as_str() {
-        ".param" | ".params" | ".parameter" | ".csparam" => params(rest, &name),
+        ".param" | ".params" | ".parameter" | ".csparam" | ".global_param" => params(rest, &name),
         ".func" | ".function" => func(rest),
         ".model" => model(rest),
         ".subckt" | ".macro" => subckt(rest),
@@ -160,6 +160,12 @@ pub(in crate::netlist) fn card(i: Input<'_>) -> Parsed<'_, Dot> {
             }))
         }
     }
+}
+
+/// Whether a card asks for a measurement, without which a run is worth having too.
+pub(in crate::netlist) fn is_measurement(card: &str) -> bool {
+    let name = card.split_whitespace().next().unwrap_or("").to_lowercase();
+    matches!(name.as_str(), ".meas" | ".measure" | ".four" | ".fourier")
 }
 
 pub(in crate::netlist) fn skip(i: Input<'_>) -> Input<'_> {

@@ -82,6 +82,13 @@ fn scale(i: Input<'_>) -> Option<(Input<'_>, Scale)> {
     Some((rest, scale))
 }
 
+/// What follows the type in LTspice's `npn 2n2222(bf)`.
+fn model_parameter(i: Input<'_>) -> Option<(Input<'_>, Target)> {
+    let (rest, model) = word(i).ok()?;
+    let (rest, parameter) = word(symbol(rest, '(')?).ok()?;
+    Some((symbol(rest, ')')?, Target::Model(model, parameter)))
+}
+
 fn sweep(i: Input<'_>) -> Parsed<'_, Sweep> {
     let start = blank(separator(i));
     let (rest, before) = match scale(start) {
@@ -97,20 +104,10 @@ fn sweep(i: Input<'_>) -> Parsed<'_, Sweep> {
         "temp" | "temper" => (rest, Target::Temperature(name.span)),
         _ => (rest, Target::Element(name)),
     };
-    // LTspice's `npn 2n2222(vaf)`.
-    let model = |i| word(i).is_ok_and(|(rest, _)| symbol(rest, '(').is_some());
-    if symbol(rest, '(').is_some() || model(rest) {
-        let fault = Diagnostic::error(
-            "unsupported",
-            between(start, rest),
-            "a parameter of a model cannot be swept",
-        );
-        return Err(refuse(
-            fault
-                .label("recognised only")
-                .help("write `{name}` in the model and sweep that parameter"),
-        ));
-    }
+    let (rest, target) = match model_parameter(rest) {
+        Some((rest, target)) => (rest, target),
+        None => (rest, target),
+    };
     let (mut at, scale) = match (before, scale(rest)) {
         (None, Some((rest, scale))) => (rest, scale),
         (before, _) => (rest, before.unwrap_or(Scale::Linear)),

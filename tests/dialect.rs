@@ -1,0 +1,224 @@
+//! Ways to write a card that other programs accept, each beside the plain one that means the same.
+
+use circ::circuit::{Diodes, ElaborateOptions};
+use circ::diagnostic::Severity;
+use circ::{Error, Model, SimOptions};
+
+/// The model of these cards below a title.
+fn model(cards: &str) -> Result<Model, Error> {
+    Model::parse(&format!("title\n{cards}\n.end\n"), "a.cir")
+}
+
+/// The elements of these cards, a line each, and the transient.
+fn elements(cards: &str) -> String {
+    let model = model(cards).unwrap_or_else(|e| panic!("{cards}: {:?}", e.findings()));
+    let circuit = model.circuit();
+    let element = |e: &circ::circuit::Element| {
+        format!("{} {:?} {:?} {:?} {:?}", e.name, e.p, e.n, e.kind, e.ic)
+    };
+    let elements: Vec<String> = circuit.elements.iter().map(element).collect();
+    format!("{}\n{:?}", elements.join("\n"), circuit.tran)
+}
+
+/// Codes and severities of everything that is said of these cards.
+fn said(cards: &str) -> Vec<(&'static str, Severity)> {
+    let findings = match &model(cards) {
+        Ok(model) => model.findings().to_vec(),
+        Err(error) => error.findings().to_vec(),
+    };
+    findings.iter().map(|d| (d.code, d.severity)).collect()
+}
+
+/// The measurements of a run, by name; NaN where there is none.
+fn measured(cards: &str) -> Vec<(String, f64)> {
+    let model = model(cards).unwrap_or_else(|e| panic!("{cards}: {:?}", e.findings()));
+    let done = circ::analysis::transient(&model, SimOptions::default());
+    let found = done.run.unwrap().1.measured;
+    let value = |m: &circ::circuit::Measured| m.result.as_ref().map_or(f64::NAN, |f| f.value);
+    found.iter().map(|m| (m.name.clone(), value(m))).collect()
+}
+
+#[test]
+fn cards_without_their_signs() {
+    for (written, plain) in [
+        ("r1 a 0 1k noiseless\nv1 a 0 1", "r1 a 0 1k\nv1 a 0 1"),
+        ("v1 a 0 DC (5)\nr1 a 0 1", "v1 a 0 5\nr1 a 0 1"),
+        ("v1 a 0 (5)\nr1 a 0 1", "v1 a 0 5\nr1 a 0 1"),
+        ("i1 a 0 dc=(2*3)\nr1 a 0 1", "i1 a 0 6\nr1 a 0 1"),
+        (
+            "v1 a 0 1\nd1 a 0 m\n.model m D {Ron=2 Vfwd={0.5+0.1}}",
+            "v1 a 0 1\nd1 a 0 m\n.model m D(Ron=2 Vfwd={0.5+0.1})",
+        ),
+        (
+            ".param r 100 c {2*r} d=3 e -4\nv1 a 0 {e}\nr1 a 0 {r+c+d}",
+            "v1 a 0 -4\nr1 a 0 303",
+        ),
+        (
+            ".global_param r=7\n.csparam s={r}\nv1 a 0 1\nr1 a 0 {r}",
+            "v1 a 0 1\nr1 a 0 7",
+        ),
+        (
+            "v1 a 0 1\ns1 a 0 a 0 m\n.model m SW(Ron=1 Roff=2 Vt=0.5 noiseless)",
+            "v1 a 0 1\ns1 a 0 a 0 m\n.model m SW(Ron=1 Roff=2 Vt=0.5)",
+        ),
+    ] {
+        assert_eq!(elements(written), elements(plain), "{written}");
+        assert!(
+            said(written).iter().all(|(_, s)| *s == Severity::Note),
+            "{written}: {:?}",
+            said(written)
+        );
+    }
+}
+
+#[test]
+fn measurements_without_their_signs() {
+    let circuit = "v1 a 0 PULSE(0 2 1m 1m 1m 2m 8m)\nr1 a 0 1\n.tran 1u 16m\n";
+    for (written, plain) in [
+        ("avg v(a) from 0 to 4m", "avg v(a) from=0 to=4m"),
+        ("avg v(a) FROM = 1m TO = {2*2m}", "avg v(a) from=1m to=4m"),
+        ("find v(a) at 1.5m", "find v(a) at=1.5m"),
+        ("when v(a)=1 td 5m", "when v(a)=1 td=5m"),
+        ("when v(a)=1 rise 2", "when v(a)=1 rise=2"),
+        ("when v(a)=1 fall last", "when v(a)=1 fall=last"),
+        (
+            "trig v(a) val 0.5 rise 1 targ v(a) val 0.5 fall last",
+            "trig v(a) val=0.5 rise=1 targ v(a) val=0.5 fall=last",
+        ),
+        (
+            "trig at 1m targ v(a) val=1 cross=2",
+            "trig at=1m targ v(a) val=1 cross=2",
+        ),
+        ("eqn {2*3}", "param 2*3"),
+    ] {
+        let cards = format!("{circuit}.meas tran x {written}\n.measure y {plain}");
+        let found = measured(&cards);
+        assert!(found[0].1.is_finite(), "{written}: {found:?}");
+        assert_eq!(found[0].1, found[1].1, "{written}");
+        assert_eq!(said(&cards), [], "{written}");
+    }
+}
+
+#[test]
+fn a_chain_of_parameters_in_any_order() {
+    let cards = "v1 a 0 SIN(1 2 1k)\nr1 a 0 4\n.tran 1u 1m\n\
+        .meas eff param '100*pout/pin'\n.meas pout param 0.5*pin\n.meas pin avg v(a)*i(r1)";
+    let found = measured(cards);
+    let expected = [50.0, 0.5 * 0.75, 0.75];
+    for ((_, value), expected) in found.iter().zip(expected) {
+        // (1 + 2²/2)/4 W, from straight lines between 1000 rows a period.
+        assert!((value / expected - 1.0).abs() < 1e-5, "{found:?}");
+    }
+}
+
+#[test]
+fn a_faulty_measurement_is_a_warning() {
+    for faulty in [
+        ".meas tran",
+        ".meas tran x foo v(a)",
+        ".meas tran x avg",
+        ".meas tran x avg v(nowhere)",
+        ".meas tran x avg v(a) from",
+        ".meas tran x find v(a) at 1m 2m",
+        ".meas tran x trig v(a) val=1",
+        ".meas tran x param nothing*2",
+        ".meas tran x avg Ix(x1:p)",
+        ".meas tran x avg Ix(r1)",
+        ".meas tran x avg Id(r1)",
+        ".measure tran x when",
+        ".four v(a)",
+        ".four 0 v(a)",
+        ".four 1k 1.5 v(a)",
+    ] {
+        let cards = format!("v1 a 0 1\nr1 a 0 1\n.tran 1u 1m\n{faulty}\n.meas y avg v(a)");
+        let told = said(&cards);
+        assert_eq!(told.len(), 1, "{faulty}: {told:?}");
+        assert_eq!(told[0].1, Severity::Warning, "{faulty}: {told:?}");
+        let found = measured(&cards);
+        assert_eq!(found.last(), Some(&("y".into(), 1.0)), "{faulty}");
+    }
+}
+
+#[test]
+fn currents_into_pins() {
+    let cards = "v1 a 0 10\nr0 a b 1\nx1 b c part\nr2 c 0 1\n.subckt part p n\nr1 p n 8\nr2 p m 4\nr3 m n 4\n.ends\n\
+        .tran 1m 2m\n.save Ix(x1:p)\n.meas p avg Ix(x1:p)\n.meas n avg -ix(X1:n)\n.meas all avg i(r0)";
+    // 8 Ω beside 8 Ω, and 2 Ω: 10/6 A.
+    for (name, value) in measured(cards) {
+        assert!((value - 10.0 / 6.0).abs() < 1e-12, "{name} {value}");
+    }
+    assert_eq!(said(cards), [("ignored", Severity::Warning)]);
+    let bipolar = "v1 c 0 5\nrc c cc 1k\nvb bb 0 2\nrb bb b 10k\nq1 cc b e m\nre e 0 100\n.model m NPN\n.tran 1m 2m\n\
+        .meas ic avg Ic(q1)\n.meas ib avg Ib(q1)\n.meas ie avg Ie(q1)\n.meas rc avg i(rc)\n.meas rb avg i(rb)\n.meas re avg -i(re)";
+    let found = measured(bipolar);
+    for k in 0..3 {
+        let [a, b] = [found[k].1, found[k + 3].1];
+        assert!(a != 0.0 && (a - b).abs() < 1e-9 * b.abs(), "{found:?}");
+    }
+    let mos = "v1 d 0 5\nr1 d dd 9\nvg g 0 10\nm1 dd g s m\nr2 s 0 1\n.model m NMOS(Ron=0 Vto=2)\n.tran 1m 2m\n.save Id(M1)\n\
+        .meas d avg Id(m1)\n.meas g avg Ig(m1)\n.meas s avg -Is(m1)";
+    let found: Vec<f64> = measured(mos).iter().map(|(_, value)| *value).collect();
+    assert!(
+        (found[0] - 0.5).abs() < 1e-12 && found[1] == 0.0 && (found[2] - 0.5).abs() < 1e-12,
+        "{found:?}"
+    );
+    // With a pin at ground the elements inside may be there without it.
+    let grounded = "v1 a 0 1\nx1 a 0 part\n.subckt part p n\nr1 p n 8\nr2 p 0 4\n.ends\n.tran 1m 2m\n.meas n avg Ix(x1:n)";
+    assert_eq!(said(grounded), [("bad-meas", Severity::Warning)]);
+}
+
+#[test]
+fn parameters_of_models_are_swept() {
+    let cards = "v1 a 0 5\nr1 a b 1\nd1 b 0 dm\n.model dm D(Ron={2*u} Vfwd=1)\n.param u=1\n.tran 1m 2m\n.save v(b)\n";
+    let stepped = model(&format!(
+        "{cards}.step D dm(Ron) list 1 3\n.step dm dm(roff) 10 20 10"
+    ))
+    .unwrap();
+    let names: Vec<String> = stepped
+        .circuit()
+        .steps
+        .iter()
+        .map(|s| format!("{:?} {:?}", s.what, s.values))
+        .collect();
+    assert_eq!(
+        names,
+        [
+            "Param(\"dm(ron)\") [1.0, 3.0]",
+            "Param(\"dm(roff)\") [10.0, 20.0]"
+        ]
+    );
+    let at = |values: &[f64]| stepped.at(&stepped.circuit().steps, values).unwrap();
+    let law = |model: &Model| format!("{:?}", model.circuit().elements[2].kind);
+    let plain = |ron: f64, roff: f64| {
+        model(&cards.replace("{2*u}", &format!("{ron} Roff={roff}"))).unwrap()
+    };
+    // As they stand: the value on the card, and the first one of what is not there.
+    assert!(law(&stepped).contains("f64: 2.0") && law(&stepped).contains("f64: 10.0"));
+    for (ron, roff) in [(1.0, 10.0), (3.0, 20.0)] {
+        let v = |model: &Model| model.operating_point().unwrap().nodes[1].1;
+        assert_eq!(v(&at(&[ron, roff])), v(&plain(ron, roff)));
+    }
+    assert_eq!(
+        said(&format!("{cards}.step D other(Ron) list 1 3"))[0].0,
+        "unknown-model"
+    );
+}
+
+#[test]
+fn ideal_diodes_stand_for_missing_models() {
+    let options = ElaborateOptions {
+        diodes: Diodes::Ideal,
+        ..ElaborateOptions::default()
+    };
+    let text = "title\nv1 a 0 5\nd1 a b dx\nd2 a b dx\nr1 b 0 1\n.end\n";
+    let model = Model::parse_with(text, "a.cir", options).unwrap();
+    let told: Vec<&str> = model
+        .findings()
+        .iter()
+        .map(|d| d.message.as_str())
+        .collect();
+    assert!(
+        told[0].ends_with("unknown model `dx` of `d1`, the first of 2 that do"),
+        "{told:?}"
+    );
+}
