@@ -51,7 +51,7 @@ fn cards_without_their_signs() {
         ),
         (
             ".param r 100 c {2*r} d=3 e -4\nv1 a 0 {e}\nr1 a 0 {r+c+d}",
-            "v1 a 0 -4\nr1 a 0 303",
+            "v1 a 0 -4\nr1 a 0 {100+200+3}",
         ),
         (
             ".global_param r=7\n.csparam s={r}\nv1 a 0 1\nr1 a 0 {r}",
