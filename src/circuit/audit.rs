@@ -1,7 +1,7 @@
 //! What is legal and odd, or missing, once the whole circuit is known.
 
 use super::builder::Builder;
-use super::{Element, Kind, NodeId, Quantity};
+use super::{Element, Kind, NodeId, Quantity, is_inside};
 use crate::diagnostic::{Diagnostic, Severity, Span};
 use crate::netlist::ast::{Block, Statement};
 
@@ -78,6 +78,11 @@ impl<'n> Builder<'n, '_> {
                         .label("no current flows through it from outside"),
                 );
             }
+        }
+        // What nothing is connected to at an `A` device is an output that is not used.
+        for element in self.circuit.elements.iter().filter(|e| is_inside(&e.name)) {
+            terminals[element.p.index()] += 1;
+            terminals[element.n.index()] += 1;
         }
         for rail in &self.scopes.rails_read {
             terminals[rail.index()] += 1;

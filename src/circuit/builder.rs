@@ -247,6 +247,8 @@ impl<'n, 'o> Builder<'n, 'o> {
             }
             Device::Line { args, ic } => self.line(card, args, ic, scope),
             Device::Call { subckt, args } => self.call(card, subckt, args, scope),
+            // Replaced where the netlist was read, or at fault.
+            Device::Code { .. } => {}
             Device::Unsupported { what } => {
                 let message = format!(
                     "`{}` is {what}, which is recognised but not supported yet",
@@ -255,7 +257,7 @@ impl<'n, 'o> Builder<'n, 'o> {
                 self.tell(
                     Diagnostic::error("unsupported-element", card.span, message)
                         .label("not supported yet")
-                        .help("supported elements are R C L K V I E F G H B D S W M Q J Z T X"),
+                        .help("supported elements are R C L K V I E F G H B D S W M Q J Z T X A"),
                 );
             }
         }

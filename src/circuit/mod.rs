@@ -359,7 +359,12 @@ impl Circuit {
             return self.probes.clone();
         }
         let shown = |e: &Element| matches!(e.kind, Kind::VoltageSource(_) | Kind::Inductor(_));
-        self.all_voltages().chain(self.currents_of(shown)).collect()
+        let all = self.all_voltages().chain(self.currents_of(shown));
+        all.filter(|probe| match probe.what {
+            Probed::Voltage(node, _) => !is_inside(&self.nodes[node.index()]),
+            Probed::Current(id) => !is_inside(&self.elements[id.index()].name),
+        })
+        .collect()
     }
 
     /// The voltages of all nodes but ground.
@@ -383,4 +388,11 @@ impl Circuit {
             what: Probed::Current(ElementId(i as u32)),
         })
     }
+}
+
+/// Whether a node or an element is a part of an `A` device: `a1.q`, `x1.a1.q`.
+fn is_inside(name: &str) -> bool {
+    let mut parts = name.split('.');
+    parts.next_back();
+    parts.any(|part| part.starts_with('a'))
 }

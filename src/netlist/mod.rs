@@ -7,6 +7,7 @@
 pub mod ast;
 mod block;
 pub(crate) mod card;
+mod code;
 mod control;
 mod data;
 mod decode;

@@ -9,7 +9,7 @@ use super::control::Script;
 use super::dot::{self, Dot};
 use super::include::{Files, lexical, library_sections};
 use super::lex::{Fault, Line, Parsed, State, at_end, input, logical, next_word, title};
-use super::{card, decode, stepped};
+use super::{card, code, decode, stepped};
 use crate::diagnostic::{Diagnostic, FileId, Severity, SourceMap, Span};
 
 /// Reads a netlist: text to cards, includes in place. Never stops at the first fault.
@@ -91,6 +91,7 @@ pub fn parse_among(
     netlist.title = reader.title.take().unwrap_or_default();
     netlist.body = reader.open.pop().map(|o| o.block).unwrap_or_default();
     stepped::free(&mut netlist.body);
+    code::expand(&mut netlist.body, reader.sources);
     let findings = netlist.body.faults.clone();
     (netlist, findings)
 }

@@ -190,6 +190,15 @@ pub enum Device {
         /// `ic=v1,i1,v2,i2`.
         ic: Vec<Expr>,
     },
+    /// A, until the netlist is read as a whole.
+    Code {
+        /// The pins.
+        ports: Vec<PinGroup>,
+        /// The model, or LTspice's function.
+        model: Name,
+        /// LTspice's parameters.
+        args: Vec<Assign>,
+    },
     /// X.
     Call {
         /// The subcircuit.
@@ -202,6 +211,17 @@ pub enum Device {
         /// What it is: "a MOSFET", …
         what: &'static str,
     },
+}
+
+/// A pin group of an `A` card: a node, a pair, or a vector of either.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PinGroup {
+    /// `%vd`, `%i`, …, without the sign; none where nothing stands there.
+    pub sort: Option<Name>,
+    /// Its elements, of one node or two.
+    pub elements: Vec<Vec<Name>>,
+    /// Whether it stands in brackets.
+    pub vector: bool,
 }
 
 /// What a controlled element follows.

@@ -4,9 +4,10 @@ use nom::Input as _;
 
 use super::{Body, assign, assignment_follows, assigns, describe, nodes, numbers};
 use crate::diagnostic::Diagnostic;
-use crate::netlist::ast::{Control, Device, Name};
+use crate::netlist::ast::{Control, Device, Name, PinGroup};
 use crate::netlist::lex::{
-    Input, Parsed, ahead, at_end, expect_word, missing, node, refuse, separator, symbol, word,
+    Input, Parsed, ahead, at_end, blank, expect_word, missing, node, refuse, separator, symbol,
+    word,
 };
 use crate::netlist::operand;
 
@@ -147,19 +148,92 @@ pub(super) fn call<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
     Ok((at, (words, Device::Call { subckt, args })))
 }
 
-/// `A1 a k model`: a code model with two terminals, which may be ngspice's `sidiode`. Others are recognised only.
-pub(super) fn code_model<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
-    let two = nodes(i, 2, "node").and_then(|(at, two)| {
-        let (at, model) = word(separator(at))?;
-        Ok((separator(at), two, model))
-    });
-    match two {
-        Ok((at, nodes, model)) if at_end(at) => {
-            let (area, args) = (None, Vec::new());
-            Ok((at, (nodes, Device::Diode { model, area, args })))
+/// `A1 in out model`, `A1 [a b] %vd(c d) model` of XSPICE, `A1 a b c d e f g h AND Td=1n` of LTspice.
+pub(super) fn code_model<'a>(i: Input<'a>, card: &Name) -> Parsed<'a, Body> {
+    let mut ports: Vec<PinGroup> = Vec::new();
+    let (mut sort, mut open) = (None, false);
+    let mut at = i;
+    loop {
+        at = separator(at);
+        if at_end(at) || assignment_follows(at) {
+            break;
         }
-        _ => unsupported(i, name),
+        if let Some(rest) = symbol(at, ']').filter(|_| open) {
+            (at, open) = (rest, false);
+        } else if let Some(rest) = symbol(at, '[') {
+            ports.push(PinGroup {
+                sort: sort.take(),
+                elements: Vec::new(),
+                vector: true,
+            });
+            (at, open) = (rest, true);
+        } else if let Some(rest) = symbol(at, '%') {
+            // `%vd[` too.
+            let (_, word) = expect_word(rest, "the type of a port")?;
+            let start = blank(rest);
+            let whole = &start.fragment()[..word.span.end - word.span.start];
+            let length = whole.find('[').unwrap_or(whole.len());
+            let name = Name {
+                text: whole[..length].to_lowercase(),
+                span: ahead(start, length),
+            };
+            (at, sort) = (start.take_from(length), Some(name));
+        } else {
+            let (rest, nodes) = element(at, card)?;
+            at = rest;
+            match ports.last_mut().filter(|_| open) {
+                Some(port) => port.elements.push(nodes),
+                None => ports.push(PinGroup {
+                    sort: sort.take(),
+                    elements: vec![nodes],
+                    vector: false,
+                }),
+            }
+        }
     }
+    let last = ports.pop().filter(|port| !port.vector);
+    let model = last.and_then(|port| port.elements.into_iter().next()?.into_iter().next());
+    let Some(model) = model.filter(|_| !open) else {
+        return Err(missing(at, "the model name"));
+    };
+    let (at, args) = assigns(at)?;
+    let elements = ports.iter().flat_map(|port| &port.elements);
+    let nodes = elements.flatten().cloned().collect();
+    Ok((at, (nodes, Device::Code { ports, model, args })))
+}
+
+/// A node, or two in parentheses.
+fn element<'a>(at: Input<'a>, card: &Name) -> Parsed<'a, Vec<Name>> {
+    let Some(mut at) = symbol(at, '(') else {
+        return part(at, card).map(|(rest, node)| (rest, vec![node]));
+    };
+    let mut nodes = Vec::new();
+    loop {
+        at = separator(at);
+        if let Some(rest) = symbol(at, ')') {
+            return Ok((rest, nodes));
+        }
+        let (rest, node) = part(at, card)?;
+        nodes.push(node);
+        at = rest;
+    }
+}
+
+/// A name that ends at a bracket too, unless it has its own (`q[0]`).
+fn part<'a>(at: Input<'a>, card: &Name) -> Parsed<'a, Name> {
+    let (_, whole) = node(at).map_err(|_| missing(at, &format!("a node of `{}`", card.text)))?;
+    let at = blank(at);
+    let length = whole.span.end - whole.span.start;
+    let text = &at.fragment()[..length];
+    let end = match text.find(['[', ']']) {
+        Some(k) if k > 0 && text[k..].starts_with(']') => k,
+        _ => length,
+    };
+    let name = Name {
+        text: text[..end].to_lowercase(),
+        span: ahead(at, end),
+    };
+    Ok((at.take_from(end), name))
 }
 
 /// `T1 a b c d z0=50 td=10n [ic=v1,i1,v2,i2]`, or `f=1meg nl=0.25` in place of `td`.

@@ -7,7 +7,7 @@ mod source;
 
 use nom::Input as _;
 
-use super::ast::{Assign, Device, Element, Name};
+use super::ast::{Assign, Device, Element, Expr, ExprKind, Name};
 use super::lex::{
     Fault, Input, Parsed, ahead, at_end, blank, end, missing, node, refuse, separator, symbol, word,
 };
@@ -146,6 +146,11 @@ pub(super) fn assign(i: Input<'_>) -> Parsed<'_, Assign> {
     let Some(mut rest) = symbol(rest, '=') else {
         return Ok((rest, Assign { name, value: None }));
     };
+    if let Some(open) = symbol(rest, '[') {
+        let (rest, value) = vector(open)?;
+        let value = Some(value);
+        return Ok((rest, Assign { name, value }));
+    }
     let list = name.text.starts_with("tc");
     let (mut next, value) = if list {
         operand::item(rest)
@@ -170,6 +175,27 @@ pub(super) fn assign(i: Input<'_>) -> Parsed<'_, Assign> {
             value: Some(value),
         },
     ))
+}
+
+/// The values up to `]`, as a call of a function of the name `[]`.
+fn vector(open: Input<'_>) -> Parsed<'_, Expr> {
+    let Some(length) = open.fragment().find(']') else {
+        return Err(missing(open, "`]`"));
+    };
+    let inside = open.take(length);
+    let (mut list, mut at) = (Vec::new(), separator(inside));
+    while !at_end(at) {
+        let (rest, value) = operand::item(at)?;
+        list.push(value);
+        at = separator(rest);
+    }
+    let span = ahead(open, length);
+    let name = Name {
+        text: "[]".into(),
+        span,
+    };
+    let kind = ExprKind::Call(name, list);
+    Ok((open.take_from(length + 1), Expr { kind, span }))
 }
 
 /// All that is left of a card as `name=value` and flags, blanks or commas between.
