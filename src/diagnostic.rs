@@ -1,5 +1,7 @@
 //! What is wrong with the input, as data. Rendering is the command line's business.
 
+pub mod explain;
+
 use std::fmt::{self, Display, Formatter};
 
 /// How bad a finding is.

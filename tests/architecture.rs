@@ -495,8 +495,10 @@ fn what_decides_something_stands_among_the_tolerances() {
                 faults.push(format!("{path}: {name}"));
             }
         }
-        // Defaults of model parameters, and the sizes at which numbers are written with an exponent.
-        let is_text = path.starts_with("circuit/") || path == "lcs/format.rs";
+        // Defaults of model parameters, the sizes at which numbers are written with an exponent, netlists that are examples.
+        let is_text = path.starts_with("circuit/")
+            || path.starts_with("diagnostic/explain/")
+            || path == "lcs/format.rs";
         if !is_text && listed.is_empty() && path != "lcs/json/read.rs" {
             faults.extend(
                 small_literals(&text)

@@ -1,7 +1,7 @@
 //! The command `circ` as its users meet it: exit status, standard output, standard error, files.
 
 use std::fs;
-use std::io::{BufRead, BufReader, Cursor, Read};
+use std::io::{BufRead, BufReader, Cursor, Read, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -125,11 +125,145 @@ fn waves(text: &str) -> Waveforms {
 fn help_names_every_command_and_flag() {
     assert_snapshot!(run("--help"));
     for command in [
-        "sim", "pss", "ac", "sens", "lcs", "check", "op", "bench", "compare", "graph",
+        "sim",
+        "pss",
+        "ac",
+        "sens",
+        "lcs",
+        "check",
+        "op",
+        "bench",
+        "compare",
+        "graph",
+        "explain",
+        "completions",
+        "man",
     ] {
         let ran = run(&format!("{command} --help"));
         assert_eq!((ran.status, ran.err.as_str()), (0, ""));
         assert_snapshot!(format!("help_{command}"), ran.out);
+    }
+}
+
+#[test]
+fn shells_and_manuals_know_every_command_and_flag() {
+    for (shell, flag) in [
+        ("bash", "--message-format"),
+        ("zsh", "--message-format"),
+        ("fish", "-l message-format"),
+        ("powershell", "--message-format"),
+    ] {
+        let ran = run(&format!("completions {shell}"));
+        assert_eq!((ran.status, ran.err.as_str()), (0, ""));
+        for text in [flag, "explain", "compare"] {
+            assert!(ran.out.contains(text), "{shell}: {text}");
+        }
+    }
+    let directory = place();
+    let ran = run_in(directory.path(), "man .");
+    assert_eq!((ran.status, ran.out.as_str()), (0, ""), "{ran}");
+    let page = fs::read_to_string(directory.path().join("circ-sim.1")).unwrap();
+    for text in [".TH circ-sim 1", "from\\-pss", "Examples:"] {
+        assert!(page.contains(text), "{text}: {page}");
+    }
+    let whole = fs::read_to_string(directory.path().join("circ.1")).unwrap();
+    assert!(whole.contains("circ\\-explain(1)"), "{whole}");
+    assert_eq!(run("man").out, whole);
+    assert_eq!(run("man no-such-folder").status, 2);
+}
+
+#[test]
+fn netlists_come_from_standard_input_and_results_go_to_standard_output() {
+    let directory = place();
+    fs::write(directory.path().join("part.lib"), ".param top=4\n").unwrap();
+    let piped = |arguments: &str, text: &str| {
+        let mut child = circ(directory.path())
+            .args(arguments.split_whitespace())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        child
+            .stdin
+            .take()
+            .unwrap()
+            .write_all(text.as_bytes())
+            .unwrap();
+        child.wait_with_output().unwrap()
+    };
+    let csv = run("sim divider.cir").out;
+    for arguments in ["sim -", "-", "sim - -o -", "- -o - --format csv"] {
+        let ran = piped(arguments, DIVIDER);
+        assert!(ran.status.success(), "{arguments}");
+        assert_eq!(String::from_utf8(ran.stdout).unwrap(), csv, "{arguments}");
+    }
+    // Every command that reads a netlist; files that it includes are beside the current folder.
+    let including = DIVIDER.replace(".param top=10", ".include part.lib");
+    for command in ["op", "check", "lcs", "graph"] {
+        let ran = piped(&format!("{command} -"), &including);
+        assert!(ran.status.success() && !ran.stdout.is_empty(), "{command}");
+    }
+    let system = run("lcs divider.cir --format json").out;
+    assert_eq!(piped("sim -", &system).stdout, csv.as_bytes());
+    let faulty = piped("sim - --message-format short", FAULTY);
+    let said = String::from_utf8(faulty.stderr).unwrap();
+    assert!(said.starts_with("<stdin>:2:"), "{said}");
+    // Every format, the same as in a file.
+    for format in ["csv", "raw", "npz", "json", "svg", "png", "html"] {
+        let file = run_in(directory.path(), &format!("sim divider.cir -o a.{format}"));
+        assert_eq!(file.status, 0, "{file}");
+        let kept = fs::read(directory.path().join(format!("a.{format}"))).unwrap();
+        for arguments in [
+            format!("sim - --format {format}"),
+            format!("sim - -o - --format {format}"),
+        ] {
+            let ran = piped(&arguments, DIVIDER);
+            assert!(ran.status.success(), "{arguments}");
+            // A page says how long the run took.
+            let same = ran.stdout == kept;
+            let page = format == "html" && ran.stdout.starts_with(b"<!");
+            assert!(same || page, "{arguments}");
+        }
+    }
+    let both = piped("sim - -o b.csv -o - --format json", DIVIDER);
+    let waves = json::read(both.stdout.as_slice()).unwrap();
+    assert_eq!(waves.len(), 4);
+    assert_eq!(
+        fs::read_to_string(directory.path().join("b.csv")).unwrap(),
+        csv
+    );
+    let svg = run("graph divider.cir --format svg").out;
+    assert!(svg.contains("<svg "), "{svg}");
+}
+
+#[test]
+fn outputs_that_cannot_be_are_refused_before_the_run() {
+    let long = DIVIDER.replace(".tran 1m 3m", ".tran 1n 1000");
+    for (arguments, words) in [
+        ("sim long.cir -o none/a.csv", "none/a.csv: No such file"),
+        ("sim long.cir -o a.xls", "the ending chooses the format"),
+        ("sim long.cir -o - -o -", "given twice"),
+        (
+            "sim long.cir -o a.csv --format raw",
+            "--format raw: the endings of all outputs name another",
+        ),
+        ("ac divider.cir -o none/a.csv", "none/a.csv: No such file"),
+        ("compare long.cir -o a.pdf", "must be svg or png"),
+        ("compare long.cir -o none/a.svg", "none/a.svg: No such file"),
+        ("bench long.cir -o none/a.csv", "none/a.csv: No such file"),
+        ("graph long.cir -o none/a.dot", "none/a.dot: No such file"),
+        ("lcs long.cir -o none/a.json", "none/a.json: No such file"),
+    ] {
+        let directory = place();
+        fs::write(directory.path().join("long.cir"), &long).unwrap();
+        let ran = run_in(directory.path(), arguments);
+        assert_eq!(
+            (ran.status, ran.out.as_str()),
+            (2, ""),
+            "{arguments}: {ran}"
+        );
+        assert!(ran.err.contains(words), "{arguments}: {ran}");
     }
 }
 

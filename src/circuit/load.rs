@@ -33,8 +33,16 @@ pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
     if !fs::metadata(path)?.is_file() {
         return Err(io::Error::other("it is not a regular file"));
     }
+    read_all(File::open(path)?)
+}
+
+/// All bytes of a stream.
+///
+/// # Errors
+/// Those of the stream; more than 256 MB.
+pub(crate) fn read_all(stream: impl Read) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    File::open(path)?.take(MOST + 1).read_to_end(&mut bytes)?;
+    stream.take(MOST + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > MOST {
         return Err(io::Error::other(format!(
             "it has more than {} MB",
@@ -61,8 +69,14 @@ pub(crate) fn names(folder: &Path) -> Vec<String> {
 /// Reads, parses and elaborates a netlist file.
 #[must_use]
 pub fn load(path: &Path, options: &ElaborateOptions) -> Loaded {
+    load_read(path, read(path), options)
+}
+
+/// The same of what reading it gave; `path` is its name in findings, and what it includes is looked for beside it.
+#[must_use]
+pub fn load_read(path: &Path, bytes: io::Result<Vec<u8>>, options: &ElaborateOptions) -> Loaded {
     let mut sources = SourceMap::default();
-    let bytes = match read(path) {
+    let bytes = match bytes {
         Ok(bytes) => bytes,
         Err(error) => {
             let message = format!("cannot read `{}`: {error}", path.display());

@@ -21,9 +21,7 @@ use crate::waveform::Phasors;
 /// See [`Failure`].
 pub(super) fn ac(args: &AcArgs, streams: &Streams) -> Result<Exit, Failure> {
     // An ending that is no format is told before anything is read.
-    for path in &args.outputs {
-        Format::of(path)?;
-    }
+    let formats = Format::of(&args.outputs, args.format, streams)?;
     let asked: Vec<Ratio> = args.probes.iter().map(|text| Ratio::parse(text)).collect();
     let mut signals: Vec<String> = Vec::new();
     for signal in asked.iter().flat_map(Ratio::signals) {
@@ -51,7 +49,7 @@ pub(super) fn ac(args: &AcArgs, streams: &Streams) -> Result<Exit, Failure> {
     } else {
         ratios(&phasors, &asked).unwrap_or(phasors)
     };
-    write(&phasors, &args.outputs, streams)?;
+    write(&phasors, (&args.outputs, &formats), streams)?;
     Ok(Exit::Done)
 }
 
@@ -59,12 +57,14 @@ pub(super) fn ac(args: &AcArgs, streams: &Streams) -> Result<Exit, Failure> {
 ///
 /// # Errors
 /// See [`Failure`].
-pub(super) fn sim(args: &SimArgs, model: &Model, streams: &Streams) -> Result<Exit, Failure> {
-    for path in &args.results.outputs {
-        Format::of(path)?;
-    }
+pub(super) fn sim(
+    args: &SimArgs,
+    model: &Model,
+    formats: &[Format],
+    streams: &Streams,
+) -> Result<Exit, Failure> {
     let phasors = phasors(&args.input, model, &SmallSignalOptions::default(), streams)?;
-    write(&phasors, &args.results.outputs, streams)?;
+    write(&phasors, (&args.results.outputs, formats), streams)?;
     Ok(Exit::Done)
 }
 
@@ -106,22 +106,27 @@ fn tell_margins(phasors: &Phasors, streams: &Streams) {
 }
 
 /// Writes the files, or without any CSV to standard output, and tells the margins.
-fn write(phasors: &Phasors, outputs: &[PathBuf], streams: &Streams) -> Result<(), Failure> {
+fn write(
+    phasors: &Phasors,
+    (outputs, formats): (&[PathBuf], &[Format]),
+    streams: &Streams,
+) -> Result<(), Failure> {
     tell_margins(phasors, streams);
     if outputs.is_empty() {
         let mut out = streams.out();
         phasors.write_csv(&mut out)?;
         out.flush()?;
     }
-    for path in outputs {
+    for (path, format) in outputs.iter().zip(formats) {
         let mut bytes = Cursor::new(Vec::new());
-        match Format::of(path)? {
+        match format {
             Format::Csv => phasors.write_csv(&mut bytes)?,
             Format::Raw => phasors.write_raw(&mut bytes)?,
             Format::Npz => phasors.write_npz(&mut bytes)?,
             Format::Json => phasors.write_json(&mut bytes)?,
             Format::Svg | Format::Png => {
-                output::picture_to_file(path, &svg::draw(&bode::figure(phasors))?)?;
+                let drawing = svg::draw(&bode::figure(phasors))?;
+                output::picture_to_file(path, *format == Format::Png, &drawing)?;
                 continue;
             }
             Format::Html => {

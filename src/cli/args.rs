@@ -1,8 +1,13 @@
 //! What may be typed.
 
 use std::path::PathBuf;
+use std::sync::OnceLock;
 
+use clap::builder::ArgPredicate;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use super::examples;
+use super::output::Format;
 
 /// Simulates circuits with ideal diodes and switches: netlist to complementarity system to waveforms.
 #[derive(Debug, Parser)]
@@ -12,11 +17,12 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
     arg_required_else_help = true,
     subcommand_required = true,
     help_expected = true,
-    after_help = "Exit status: 0 done; 1 the answer is no (outside tolerance, faults found); 2 it could not be done; 128 + n ended by signal n."
+    after_help = examples::CIRC
 )]
 pub struct Cli {
     /// Say nothing but errors, measurements and a summary asked for
     #[arg(
+        help_heading = "Messages",
         short,
         long,
         global = true,
@@ -25,10 +31,16 @@ pub struct Cli {
     )]
     pub quiet: bool,
     /// Explain what is done and why
-    #[arg(short, long, global = true, display_order = 91)]
+    #[arg(
+        help_heading = "Messages",
+        short,
+        long,
+        global = true,
+        display_order = 91
+    )]
     pub verbose: bool,
     /// Form of findings: underlined in their text, a line each, or a JSON object each
-    #[arg(long, global = true, value_enum, value_name = "FORM", default_value_t = MessageFormat::Human, display_order = 92)]
+    #[arg(help_heading = "Messages", long, global = true, value_enum, value_name = "FORM", default_value_t = MessageFormat::Human, display_order = 92)]
     pub message_format: MessageFormat,
     /// What to do
     #[command(subcommand)]
@@ -51,41 +63,63 @@ pub enum MessageFormat {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Simulate the transient that `.tran` asks for
+    #[command(after_help = examples::SIM)]
     Sim(SimArgs),
     /// Find the periodic steady state, and write one period of it
+    #[command(after_help = examples::PSS)]
     Pss(PssArgs),
     /// Find the response to small sines, about the operating point or the periodic steady state
+    #[command(after_help = examples::AC)]
     Ac(AcArgs),
     /// Find the derivatives of what `.meas` finds to values of elements and parameters
+    #[command(after_help = examples::SENS)]
     Sens(SensArgs),
     /// Print the complementarity system (A, B, C, D, E, F, G) with names and units
+    #[command(after_help = examples::LCS)]
     Lcs(LcsArgs),
     /// Check topology, passivity and which theorems hold
+    #[command(after_help = examples::CHECK)]
     Check(CheckArgs),
     /// Solve the operating point
+    #[command(after_help = examples::OP)]
     Op(OpArgs),
     /// Measure error against run time over a ladder of steps and tolerances
+    #[command(after_help = examples::BENCH)]
     Bench(BenchArgs),
     /// Compare with ngspice or with waveforms from a file
+    #[command(after_help = examples::COMPARE)]
     Compare(CompareArgs),
     /// Draw the circuit as a graph
+    #[command(after_help = examples::GRAPH)]
     Graph(GraphArgs),
+    /// Explain a code of a finding, such as `unknown-model`, or list all
+    #[command(after_help = examples::EXPLAIN)]
+    Explain(ExplainArgs),
+    /// Print completions for a shell
+    #[command(after_help = examples::COMPLETIONS)]
+    Completions(CompletionsArgs),
+    /// Print the manual page, or write one for every command into a folder
+    #[command(after_help = examples::MAN)]
+    Man(ManArgs),
 }
 
 /// The circuit and what changes it.
 #[derive(Debug, Args)]
 pub struct Input {
-    /// SPICE netlist, or a system in the JSON of `circ lcs`
-    #[arg(value_name = "FILE")]
+    /// SPICE netlist, or a system in the JSON of `circ lcs`; `-` reads standard input
+    #[arg(value_name = "FILE", value_parser = readable)]
     pub file: PathBuf,
+    /// What was read of it.
+    #[arg(skip)]
+    pub read: OnceLock<Vec<u8>>,
     /// Replace the value of a top-level `.param` (repeatable)
-    #[arg(long = "param", value_name = "NAME=VALUE", value_parser = assignment)]
+    #[arg(display_order = 3, long = "param", value_name = "NAME=VALUE", value_parser = assignment)]
     pub params: Vec<(String, f64)>,
     /// How diode models are read
-    #[arg(long, value_enum, default_value_t = Diodes::Auto)]
+    #[arg(help_heading = "Circuit", long, value_enum, default_value_t = Diodes::Auto)]
     pub diodes: Diodes,
     /// Look for files of `.include` and `.lib` in this folder after the netlist's own (repeatable); then in those of CIRC_LIB
-    #[arg(long = "lib", value_name = "DIR", value_parser = folder)]
+    #[arg(help_heading = "Circuit", long = "lib", value_name = "DIR", value_parser = folder)]
     pub libraries: Vec<PathBuf>,
 }
 
@@ -104,22 +138,22 @@ pub enum Diodes {
 #[derive(Debug, Args)]
 pub struct MethodArgs {
     /// Integration method; auto follows the plan
-    #[arg(long, value_enum, default_value_t = Method::Auto)]
+    #[arg(help_heading = "Integration", long, value_enum, default_value_t = Method::Auto)]
     pub method: Method,
     /// θ of the state for `--method theta` (0.5 to 1; default 0.5)
-    #[arg(long, value_name = "X", value_parser = implicitness)]
+    #[arg(help_heading = "Integration", long, value_name = "X", value_parser = implicitness)]
     pub theta: Option<f64>,
     /// γ of the device quantities for `--method theta` (0.5 to 1; default 0.5)
-    #[arg(long, value_name = "X", value_parser = implicitness)]
+    #[arg(help_heading = "Integration", long, value_name = "X", value_parser = implicitness)]
     pub gamma: Option<f64>,
     /// Fixed step of euler and theta, s; suffixes as in netlists (`1u`)
-    #[arg(long, value_name = "H", value_parser = positive)]
+    #[arg(help_heading = "Integration", long, value_name = "H", value_parser = positive)]
     pub step: Option<f64>,
     /// Relative tolerance of the error-controlled step [default: 1e-4]
-    #[arg(long, value_name = "R", value_parser = positive)]
+    #[arg(help_heading = "Integration", long, value_name = "R", value_parser = positive)]
     pub tol: Option<f64>,
     /// Make no coarser runs beside one in steps: it takes less time, and its error is not known
-    #[arg(long)]
+    #[arg(help_heading = "Integration", long)]
     pub no_estimate: bool,
 }
 
@@ -139,14 +173,24 @@ pub enum Method {
 /// Where the waveforms of a run go, which of them, and what is said of it.
 #[derive(Debug, Args)]
 pub struct ResultArgs {
-    /// Write results to this file (repeatable); the ending chooses csv, raw, npz, json, svg, png or html
+    /// Write results to this file, or `-`, standard output (repeatable); the ending chooses csv, raw, npz, json, svg, png or html
     ///
     /// A file appears when it is whole, or as far as the run came. Rows of csv and raw are written as they come; the others hold all rows,
     /// 1 GiB at most. Pictures show events, jumps and corners of sources whatever the print step.
-    #[arg(short, long = "output", value_name = "OUT")]
+    #[arg(
+        display_order = 1,
+        short,
+        long = "output",
+        value_name = "OUT",
+        default_value_if("format", ArgPredicate::IsPresent, Some("-"))
+    )]
     pub outputs: Vec<PathBuf>,
+    /// Format of standard output (`-o -`, csv without it), and of files whose ending names none
+    #[arg(help_heading = "Results", long, value_enum, value_name = "FORMAT")]
+    pub format: Option<Format>,
     /// Signals to show.
     #[arg(
+        display_order = 2,
         long = "probe",
         value_name = "NAME",
         help = "Show exactly these signals: v(a), v(a,b), i(d1), @d1[i], v1#branch (repeatable)"
@@ -155,10 +199,10 @@ pub struct ResultArgs {
     /// Add rows at event times: two with equal time at a jump, before and after
     ///
     /// Where `.tran` names no print step they are there anyway, and so are rows at corners of sources.
-    #[arg(long)]
+    #[arg(help_heading = "Results", long)]
     pub events: bool,
     /// Print a summary of the run on standard error
-    #[arg(long, value_enum, value_name = "FORMAT")]
+    #[arg(help_heading = "Results", long, value_enum, value_name = "FORMAT")]
     pub summary: Option<Summary>,
 }
 
@@ -169,13 +213,13 @@ pub struct TableArgs {
     ///
     /// From tstart to tstop, or over the period. With the powers of sources and loads, efficiency, and ripple and distortion of the signals
     /// shown; in `--summary json` as `table`.
-    #[arg(long)]
+    #[arg(help_heading = "Analysis", long)]
     pub table: bool,
     /// An element whose power is input (repeatable) [default: all sources]
-    #[arg(id = "in", long = "in", value_name = "NAME", num_args = 1.., requires = "table")]
+    #[arg(help_heading = "Analysis", id = "in", long = "in", value_name = "NAME", num_args = 1.., requires = "table")]
     pub inputs: Vec<String>,
     /// An element whose power is output (repeatable) [default: those whose current `.save` names, or resistors across voltages it names]
-    #[arg(id = "out", long = "out", value_name = "NAME", num_args = 1.., requires = "table")]
+    #[arg(help_heading = "Analysis", id = "out", long = "out", value_name = "NAME", num_args = 1.., requires = "table")]
     pub outputs: Vec<String>,
 }
 
@@ -195,16 +239,21 @@ pub struct SimArgs {
     ///
     /// An exact run is made in steps at two tolerances, a run in steps exactly if that can be, else in steps of another scheme. The
     /// summary has the largest difference relative to a signal's amplitude, and what is tolerated.
-    #[arg(long, conflicts_with = "from_pss")]
+    #[arg(help_heading = "Analysis", long, conflicts_with = "from_pss")]
     pub verify: bool,
     /// Bound this measurement within the tolerances of values, `tol=5` (%) on cards or `--tol-of`, and verify the bounds by runs (repeatable)
-    #[arg(long, value_name = "MEAS", conflicts_with = "from_pss")]
+    #[arg(
+        help_heading = "Analysis",
+        long,
+        value_name = "MEAS",
+        conflicts_with = "from_pss"
+    )]
     pub worst: Vec<String>,
     /// The tolerance of an element's value or `.param` for `--worst` (repeatable)
-    #[arg(long = "tol-of", value_name = "NAME=5%", value_parser = tolerance, requires = "worst")]
+    #[arg(help_heading = "Analysis", long = "tol-of", value_name = "NAME=5%", value_parser = tolerance, requires = "worst")]
     pub tolerances: Vec<(String, f64)>,
     /// Start at the periodic steady state, with sources that do not repeat held before 0 and running from there on
-    #[arg(long)]
+    #[arg(help_heading = "Analysis", long)]
     pub from_pss: bool,
     #[command(flatten)]
     #[expect(missing_docs, reason = "documented where it is defined")]
@@ -221,13 +270,13 @@ pub struct PssArgs {
     #[expect(missing_docs, reason = "documented where it is defined")]
     pub results: ResultArgs,
     /// The period, s, in place of the common one of the sources; suffixes as in netlists (`10u`)
-    #[arg(long, value_name = "T", value_parser = positive)]
+    #[arg(help_heading = "Analysis", long, value_name = "T", value_parser = positive)]
     pub period: Option<f64>,
     /// The orbit that closes after N periods of the sources [default: 1, or that of the stable one]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(help_heading = "Analysis", long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub order: Option<u16>,
     /// How well the orbit must close, relative to the amplitudes [default: 1e-9; 1e-6 where laws are curved]
-    #[arg(long, value_name = "R", value_parser = positive)]
+    #[arg(help_heading = "Analysis", long, value_name = "R", value_parser = positive)]
     pub tol: Option<f64>,
     #[command(flatten)]
     #[expect(missing_docs, reason = "documented where it is defined")]
@@ -240,13 +289,23 @@ pub struct AcArgs {
     #[command(flatten)]
     #[expect(missing_docs, reason = "documented where it is defined")]
     pub input: Input,
-    /// Write the response to this file (repeatable); the ending chooses csv, raw, npz, json, svg, png or html
+    /// Write the response to this file, or `-`, standard output (repeatable); the ending chooses csv, raw, npz, json, svg, png or html
     ///
     /// Pictures show gain in dB and phase over the logarithm of the frequency, and of ratios their margins.
-    #[arg(short, long = "output", value_name = "OUT")]
+    #[arg(
+        display_order = 1,
+        short,
+        long = "output",
+        value_name = "OUT",
+        default_value_if("format", ArgPredicate::IsPresent, Some("-"))
+    )]
     pub outputs: Vec<PathBuf>,
+    /// Format of standard output (`-o -`, csv without it), and of files whose ending names none
+    #[arg(help_heading = "Results", long, value_enum, value_name = "FORMAT")]
+    pub format: Option<Format>,
     /// Signals to show.
     #[arg(
+        display_order = 2,
         long = "probe",
         value_name = "NAME",
         allow_hyphen_values = true,
@@ -376,9 +435,17 @@ pub struct BenchArgs {
     /// Only these methods: exact, euler, theta, siconos (θ = ½, γ = 1), ngspice
     #[arg(long, value_name = "A,B,..", value_delimiter = ',', value_parser = ["exact", "euler", "theta", "siconos", "ngspice"])]
     pub methods: Vec<String>,
-    /// Write measurements to this file (repeatable); the ending chooses csv, json, svg or png
-    #[arg(short, long = "output", value_name = "OUT")]
+    /// Write measurements to this file, or `-`, standard output (repeatable); the ending chooses csv, json, svg or png
+    #[arg(
+        short,
+        long = "output",
+        value_name = "OUT",
+        default_value_if("format", ArgPredicate::IsPresent, Some("-"))
+    )]
     pub outputs: Vec<PathBuf>,
+    /// Format of standard output (`-o -`, csv without it): csv, json, svg or png
+    #[arg(long, value_name = "FORMAT", value_parser = ["csv", "json", "svg", "png"])]
+    pub format: Option<String>,
     /// Write the errors of every signal to this csv file, a line for each
     #[arg(long, value_name = "OUT.csv")]
     pub signals: Option<PathBuf>,
@@ -424,10 +491,10 @@ pub struct CompareArgs {
 #[derive(Debug, Args)]
 pub struct CompareMethodArgs {
     /// Integration method; auto follows the plan
-    #[arg(long, value_enum, default_value_t = Method::Auto)]
+    #[arg(help_heading = "Integration", long, value_enum, default_value_t = Method::Auto)]
     pub method: Method,
     /// Fixed step of euler and theta, s
-    #[arg(long, value_name = "H", value_parser = positive)]
+    #[arg(help_heading = "Integration", long, value_name = "H", value_parser = positive)]
     pub step: Option<f64>,
 }
 
@@ -470,6 +537,31 @@ pub struct GraphArgs {
     /// Write to this file, dot, svg or png, instead of Graphviz text on standard output
     #[arg(short, long, value_name = "OUT")]
     pub output: Option<PathBuf>,
+    /// Format of standard output: dot, svg or png
+    #[arg(long, value_name = "FORMAT", value_parser = ["dot", "svg", "png"], default_value = "dot")]
+    pub format: String,
+}
+
+/// `circ explain`.
+#[derive(Debug, Args)]
+pub struct ExplainArgs {
+    /// The code, as it stands in brackets in a message [default: all, a line each]
+    pub code: Option<String>,
+}
+
+/// `circ completions`.
+#[derive(Debug, Args)]
+pub struct CompletionsArgs {
+    /// The shell
+    pub shell: clap_complete::Shell,
+}
+
+/// `circ man`.
+#[derive(Debug, Args)]
+pub struct ManArgs {
+    /// Write circ.1, circ-sim.1 and so on into this folder
+    #[arg(value_name = "DIR", value_parser = folder)]
+    pub folder: Option<PathBuf>,
 }
 
 /// A number with SPICE's suffixes: `1u`, `4k7`, `2.2e-6`.
@@ -522,6 +614,13 @@ fn tolerance(text: &str) -> Result<(String, f64), String> {
 fn assignment(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
     Ok((name.trim().to_lowercase(), number(value.trim())?))
+}
+
+/// The name of standard input in messages.
+pub const STDIN: &str = "<stdin>";
+
+fn readable(text: &str) -> Result<PathBuf, String> {
+    Ok(PathBuf::from(if text == "-" { STDIN } else { text }))
 }
 
 fn folder(text: &str) -> Result<PathBuf, String> {

@@ -56,6 +56,11 @@ pub(super) fn compare(args: &CompareArgs, streams: &Streams) -> Result<Exit, Fai
     if !with_ngspice(args) {
         files::spare(&outputs, [args.against.as_path()])?;
     }
+    if let Some(path) = &args.output
+        && !has_ending(path, &["svg", "png"])
+    {
+        return Err(output::unknown_ending(path, "svg or png"));
+    }
     let subject = input::open(&args.input, &[], &outputs, streams)?;
     if let Subject::Circuit(model) = &subject
         && !model.circuit().steps.is_empty()
@@ -342,12 +347,6 @@ fn simulated(
 
 /// The worst signals on both sides, with their difference.
 fn draw(path: &Path, found: &Found) -> Result<(), Failure> {
-    if !path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("svg") || e.eq_ignore_ascii_case("png"))
-    {
-        return Err(output::unknown_ending(path, "svg or png"));
-    }
     let (ours, theirs) = (&found.ours, &found.theirs);
     let mut worst: Vec<_> = found.comparison.signals.iter().collect();
     worst.sort_by(|a, b| b.max.total_cmp(&a.max));
@@ -355,5 +354,10 @@ fn draw(path: &Path, found: &Found) -> Result<(), Failure> {
     let delta = difference(ours, &theirs.waveforms)?;
     let label = theirs.name.split(' ').next().unwrap_or("reference");
     let figure = Figure::of_comparison(ours, &theirs.waveforms, &delta, label, &names);
-    output::picture_to_file(path, &svg::draw(&figure)?)
+    output::picture_to_file(path, has_ending(path, &["png"]), &svg::draw(&figure)?)
+}
+
+fn has_ending(path: &Path, known: &[&str]) -> bool {
+    let ending = path.extension().unwrap_or_default();
+    known.iter().any(|known| ending.eq_ignore_ascii_case(known))
 }

@@ -16,9 +16,14 @@ use crate::waveform::csv;
 ///
 /// # Errors
 /// See [`Failure`].
-pub(super) fn sim(args: &SimArgs, model: &Model, streams: &Streams) -> Result<Exit, Failure> {
-    for path in &args.results.outputs {
-        if Format::of(path)? != Format::Csv {
+pub(super) fn sim(
+    args: &SimArgs,
+    model: &Model,
+    formats: &[Format],
+    streams: &Streams,
+) -> Result<Exit, Failure> {
+    for (path, format) in args.results.outputs.iter().zip(formats) {
+        if *format != Format::Csv {
             let message = format!("{}: a `.dc` sweep is written as csv", path.display());
             return Err(Failure::Message(message));
         }

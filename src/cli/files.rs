@@ -1,14 +1,14 @@
 //! Files that appear under their names when they are whole, and never in the place of what was read.
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, Seek, SeekFrom, Write};
+use std::io::{self, Seek, SeekFrom, Stdout, Write};
 use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
 use super::exit::Failure;
 
-/// A file that is written beside its name and takes it when it is done; a pipe or a device is written to at once.
+/// A file that is written beside its name and takes it when it is done; a pipe, a device or standard output is written to at once.
 #[derive(Debug)]
 pub(super) struct Written {
     /// As it was asked for.
@@ -22,7 +22,11 @@ pub(super) struct Written {
 enum To {
     Beside(NamedTempFile),
     AtOnce(File),
+    Out(Stdout),
 }
+
+/// The name that means standard output.
+pub(super) const STDOUT: &str = "-";
 
 impl Written {
     /// A new file; what stands under its name stays until [`Self::finish`].
@@ -31,8 +35,12 @@ impl Written {
     /// Those of the folder, or of what stands there.
     pub(super) fn create(path: &Path) -> Result<Self, Failure> {
         let fail = |error| Failure::file(path, error);
-        let target = target(path).map_err(fail)?;
-        let to = To::at(&target).map_err(fail)?;
+        let (target, to) = To::of(path).map_err(fail)?;
+        if let To::AtOnce(file) = &to
+            && file.metadata().map_err(fail)?.is_file()
+        {
+            file.set_len(0).map_err(fail)?;
+        }
         Ok(Self {
             path: path.to_owned(),
             target,
@@ -50,10 +58,12 @@ impl Written {
         matches!(self.to, To::Beside(_))
     }
 
-    fn file(&mut self) -> &mut File {
+    /// What can be changed, if it can.
+    fn file(&mut self) -> io::Result<&mut File> {
         match &mut self.to {
-            To::Beside(file) => file.as_file_mut(),
-            To::AtOnce(file) => file,
+            To::Beside(file) => Ok(file.as_file_mut()),
+            To::AtOnce(file) => Ok(file),
+            To::Out(_) => Err(io::ErrorKind::NotSeekable.into()),
         }
     }
 
@@ -62,14 +72,15 @@ impl Written {
     /// # Errors
     /// Those of the file.
     pub(super) fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
-        let seeks = self.can_seek();
-        let file = self.file();
-        let before = if seeks { file.stream_position()? } else { 0 };
+        if !self.can_seek() {
+            self.write_all(bytes)?;
+            return self.flush();
+        }
+        let file = self.file()?;
+        let before = file.stream_position()?;
         file.write_all(bytes).inspect_err(|_| {
-            if seeks {
-                let _ = file.set_len(before);
-                let _ = file.seek(SeekFrom::Start(before));
-            }
+            let _ = file.set_len(before);
+            let _ = file.seek(SeekFrom::Start(before));
         })
     }
 
@@ -78,7 +89,7 @@ impl Written {
     /// # Errors
     /// Those of the file.
     pub(super) fn replace_start(&mut self, bytes: &[u8]) -> io::Result<()> {
-        let file = self.file();
+        let file = self.file()?;
         file.seek(SeekFrom::Start(0))?;
         file.write_all(bytes)?;
         file.seek(SeekFrom::End(0)).map(drop)
@@ -90,7 +101,7 @@ impl Written {
     /// Those of the folder.
     pub(super) fn finish(self) -> Result<(), Failure> {
         match self.to {
-            To::AtOnce(_) => Ok(()),
+            To::AtOnce(_) | To::Out(_) => Ok(()),
             To::Beside(file) => match file.persist(&self.target) {
                 Ok(_) => Ok(()),
                 Err(error) => Err(Failure::file(&self.path, error.error)),
@@ -101,21 +112,39 @@ impl Written {
 
 impl Write for Written {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file().write(bytes)
+        match &mut self.to {
+            To::Beside(file) => file.write(bytes),
+            To::AtOnce(file) => file.write(bytes),
+            To::Out(out) => out.write(bytes),
+        }
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.file().flush()
+        match &mut self.to {
+            To::Beside(file) => file.flush(),
+            To::AtOnce(file) => file.flush(),
+            To::Out(out) => out.flush(),
+        }
     }
 }
 
 impl Seek for Written {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.file().seek(to)
+        self.file()?.seek(to)
     }
 }
 
 impl To {
+    /// Where a path leads, and what is written to there; nothing has changed yet.
+    fn of(path: &Path) -> io::Result<(PathBuf, Self)> {
+        if path == Path::new(STDOUT) {
+            return Ok((path.to_owned(), Self::Out(io::stdout())));
+        }
+        let target = target(path)?;
+        let to = Self::at(&target)?;
+        Ok((target, to))
+    }
+
     fn at(target: &Path) -> io::Result<Self> {
         let existing = match fs::metadata(target) {
             Ok(existing) => Some(existing),
@@ -136,10 +165,7 @@ impl To {
                 Ok(Self::Beside(file))
             }
             // A file that may be written in a folder that may not.
-            Err(error) if error.kind() == io::ErrorKind::PermissionDenied => {
-                file.set_len(0)?;
-                Ok(Self::AtOnce(file))
-            }
+            Err(error) if error.kind() == io::ErrorKind::PermissionDenied => Ok(Self::AtOnce(file)),
             Err(error) => Err(error),
         }
     }
@@ -194,6 +220,15 @@ pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     file.finish()
 }
 
+/// That all of these can be written.
+///
+/// # Errors
+/// [`Failure::File`].
+pub(super) fn writable(outputs: &[&Path]) -> Result<(), Failure> {
+    let check = |path: &&Path| To::of(path).map_err(|error| Failure::file(path, error));
+    outputs.iter().try_for_each(|path| check(path).map(drop))
+}
+
 /// That none of these files is one of those that were read, under whatever name.
 ///
 /// # Errors
@@ -206,7 +241,7 @@ pub(super) fn spare<'a>(
         return Ok(());
     }
     for input in read {
-        let same = |output: &&&Path| same_file(output, input);
+        let same = |output: &&&Path| **output != Path::new(STDOUT) && same_file(output, input);
         if let Some(output) = outputs.iter().find(same) {
             let also = if *output == input {
                 String::new()

@@ -2,7 +2,7 @@
 
 use super::args::{Input, Method, SimArgs};
 use super::exit::Failure;
-use crate::circuit;
+use super::input;
 use crate::forms::json::nonlinear::{self, NonlinearFile};
 use crate::integrate::Run;
 use crate::settings::Settings;
@@ -13,10 +13,10 @@ use crate::waveform::Waveforms;
 /// # Errors
 /// [`Failure::Message`] when it is one with a fault.
 pub(super) fn open(input: &Input) -> Result<Option<NonlinearFile>, Failure> {
-    let Ok(bytes) = circuit::load::read(&input.file) else {
+    let Ok(bytes) = input::bytes(input) else {
         return Ok(None);
     };
-    let text = String::from_utf8_lossy(&bytes);
+    let text = String::from_utf8_lossy(bytes);
     if !text.trim_start().starts_with('{') {
         return Ok(None);
     }

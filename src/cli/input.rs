@@ -1,15 +1,16 @@
 //! What a file holds: a circuit from a netlist, or a system in JSON.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
-use super::args::{Diodes, Input, MessageFormat};
+use super::args::{Diodes, Input, MessageFormat, STDIN};
 use super::exit::Failure;
 use super::files;
 use super::forms;
 use super::render;
 use super::streams::Streams;
 use crate::analysis::Variant;
-use crate::circuit::{self, Circuit, ElaborateOptions, Tran};
+use crate::circuit::{self, Circuit, ElaborateOptions, Tran, load};
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 use crate::forms::json;
 use crate::integrate::{Error, Places, Reason, start};
@@ -54,10 +55,10 @@ impl Subject {
 /// # Errors
 /// [`Failure::Message`] when it is JSON but no system, with the failed hypothesis of a nonlinear form.
 pub fn system(input: &Input) -> Result<Option<SystemFile>, Failure> {
-    let Ok(bytes) = circuit::load::read(&input.file) else {
+    let Ok(bytes) = bytes(input) else {
         return Ok(None);
     };
-    let text = String::from_utf8_lossy(&bytes);
+    let text = String::from_utf8_lossy(bytes);
     if !text.trim_start().starts_with('{') {
         return Ok(None);
     }
@@ -75,7 +76,24 @@ pub fn system(input: &Input) -> Result<Option<SystemFile>, Failure> {
 /// Reads a netlist with the choices made on the command line.
 #[must_use]
 pub fn load(input: &Input) -> Loaded {
-    netlist::load(&input.file, &choices(input))
+    let bytes = bytes(input).map(<[u8]>::to_vec);
+    netlist::load_read(&input.file, bytes, &choices(input))
+}
+
+/// What the file holds; it is read once, as standard input can be.
+///
+/// # Errors
+/// Those of reading.
+pub(super) fn bytes(input: &Input) -> io::Result<&[u8]> {
+    if input.read.get().is_none() {
+        let read = if input.file == Path::new(STDIN) {
+            load::read_all(io::stdin().lock())
+        } else {
+            load::read(&input.file)
+        };
+        let _ = input.read.set(read?);
+    }
+    Ok(input.read.get().map_or(&[], Vec::as_slice))
 }
 
 /// What the command line changes in a circuit.
@@ -120,7 +138,7 @@ pub fn open_as_it_stands(
 }
 
 /// Reads a file, shows what was found in it, and keeps the named probes if there are any; none of the `outputs` may be one of the
-/// files that were read.
+/// files that were read, and all must be writable.
 ///
 /// # Errors
 /// [`Failure::Faults`] when the circuit cannot be built, [`Failure::Message`] for an unknown probe and for such an output.
@@ -132,6 +150,7 @@ pub fn open(
 ) -> Result<Subject, Failure> {
     files::spare(outputs, [input.file.as_path()])?;
     if let Some(mut system) = system(input)? {
+        files::writable(outputs)?;
         system.lcs = keep_outputs(system.lcs, probes)?;
         return Ok(Subject::System(Box::new(system)));
     }
@@ -143,6 +162,7 @@ pub fn open(
     } = load(input);
     show(&diagnostics, &sources, streams);
     files::spare(outputs, sources.files.iter().map(|f| Path::new(&f.path)))?;
+    files::writable(outputs)?;
     let mut circuit = circuit.ok_or_else(|| faults(input, &diagnostics))?;
     keep_probes(&mut circuit, probes)?;
     let model = Model::of(netlist, sources, choices(input), circuit, Vec::new())

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::args::{LcsArgs, SystemFormat};
 use super::exit::{Exit, Failure};
-use super::files;
+use super::files::{self, STDOUT};
 use super::input::{self, Subject};
 use super::streams::Streams;
 use crate::lcs::format::{Format, format};
@@ -81,7 +81,8 @@ fn sparse(args: &LcsArgs, subject: &Subject, streams: &Streams) -> Result<Exit, 
         }
         SystemFormat::Mtx => {
             let matrices = sparse_format::matrix_market(&system);
-            let Some(path) = &args.output else {
+            let to_file = |path: &&PathBuf| path.as_path() != Path::new(STDOUT);
+            let Some(path) = args.output.as_ref().filter(to_file) else {
                 let texts: Vec<String> = matrices.into_iter().map(|(_, text)| text).collect();
                 streams.data(texts.concat())?;
                 return Ok(Exit::Done);

@@ -8,7 +8,9 @@ mod compare;
 mod cpu;
 mod dc;
 mod destination;
+mod examples;
 pub mod exit;
+mod explain;
 mod files;
 mod forms;
 mod graph;
@@ -21,6 +23,7 @@ mod pss;
 mod render;
 mod rows;
 mod sens;
+mod shell;
 mod signals;
 pub mod sim;
 mod steps;
@@ -86,7 +89,7 @@ pub fn main() -> Exit {
     }
 }
 
-/// `circ FILE` is `circ sim FILE`: where no argument is a command and one is a file.
+/// `circ FILE` is `circ sim FILE`: where no argument is a command and one is a file or `-`.
 fn with_command(args: impl Iterator<Item = OsString>) -> Vec<OsString> {
     let mut args: Vec<OsString> = args.collect();
     let commands = Cli::command();
@@ -94,8 +97,9 @@ fn with_command(args: impl Iterator<Item = OsString>) -> Vec<OsString> {
         let name = arg.to_str();
         name.is_some_and(|name| name == "help" || commands.find_subcommand(name).is_some())
     };
+    let is_input = |arg: &OsString| arg == "-" || Path::new(arg).is_file();
     let given = args.get(1..).unwrap_or_default();
-    if !given.iter().any(is_command) && given.iter().any(|arg| Path::new(arg).is_file()) {
+    if !given.iter().any(is_command) && given.iter().any(is_input) {
         args.insert(1, "sim".into());
     }
     args
@@ -113,5 +117,8 @@ fn run(command: &Command, streams: &Streams) -> Result<Exit, Failure> {
         Command::Bench(args) => bench::bench(args, streams),
         Command::Compare(args) => compare::compare(args, streams),
         Command::Graph(args) => graph::graph(args, streams),
+        Command::Explain(args) => explain::explain(args, streams),
+        Command::Completions(args) => shell::completions(args, streams),
+        Command::Man(args) => shell::man(args, streams),
     }
 }

@@ -4,16 +4,19 @@ use std::io::{self, BufWriter, Cursor, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
+use clap::ValueEnum;
+
 use super::exit::Failure;
-use super::files::{self, Written};
+use super::files::{self, STDOUT, Written};
 use super::rows::{Columns, Form, Shown, Stream};
+use super::streams::Streams;
 use crate::integrate::{Block, Places, Run};
 use crate::report::figure::Figure;
 use crate::report::{PictureError, html, png, svg};
 use crate::waveform::{csv, json, npz, raw};
 
 /// Formats of a run's results.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// Comma-separated values.
     Csv,
@@ -32,11 +35,55 @@ pub enum Format {
 }
 
 impl Format {
-    /// The format that a file's ending names.
+    /// The formats of these outputs: what the ending names, else what was asked for, else CSV on standard output.
     ///
     /// # Errors
-    /// A message that lists the known endings.
-    pub fn of(path: &Path) -> Result<Self, Failure> {
+    /// A message that lists the known endings; standard output twice, or bytes for a terminal; a format that nothing takes.
+    pub(super) fn of(
+        paths: &[PathBuf],
+        asked: Option<Self>,
+        streams: &Streams,
+    ) -> Result<Vec<Self>, Failure> {
+        let to_out = |path: &&PathBuf| path.as_path() == Path::new(STDOUT);
+        if paths.iter().filter(to_out).count() > 1 {
+            return Err(Failure::Message(
+                "`-o -` is given twice: there is one standard output".into(),
+            ));
+        }
+        if let (Some(asked), true) = (
+            asked,
+            paths.iter().all(|path| Self::of_ending(path).is_ok()),
+        ) {
+            return Err(Failure::Message(format!(
+                "--format {}: the endings of all outputs name another; it is for `-o -`",
+                asked.name()
+            )));
+        }
+        let format = |path: &PathBuf| {
+            if !to_out(&path) {
+                return asked.map_or_else(|| Self::of_ending(path), Ok);
+            }
+            let format = asked.unwrap_or(Self::Csv);
+            if streams.out_is_terminal() && matches!(format, Self::Raw | Self::Npz | Self::Png) {
+                return Err(Failure::Message(format!(
+                    "`-o -`: {} is no text for a terminal; send it to a file or a pipe",
+                    format.name()
+                )));
+            }
+            Ok(format)
+        };
+        paths
+            .iter()
+            .map(|path| Self::of_ending(path).or_else(|_| format(path)))
+            .collect()
+    }
+
+    fn name(self) -> String {
+        let value = self.to_possible_value();
+        value.map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+
+    fn of_ending(path: &Path) -> Result<Self, Failure> {
         let ending = path
             .extension()
             .map(|e| e.to_string_lossy().to_ascii_lowercase());
@@ -140,7 +187,11 @@ impl Outputs {
 
     /// The files, in words.
     pub(super) fn words(&self) -> String {
-        let names: Vec<String> = self.names.iter().map(|n| n.display().to_string()).collect();
+        let name = |path: &PathBuf| match path.as_path() == Path::new(STDOUT) {
+            true => "standard output".into(),
+            false => path.display().to_string(),
+        };
+        let names: Vec<String> = self.names.iter().map(name).collect();
         names.join(", ")
     }
 
@@ -224,14 +275,11 @@ fn buffered(
     file.flush()
 }
 
-/// Writes a drawing as it is, or rasterised where the file's ending is `png`.
+/// Writes a drawing as it is, or rasterised.
 ///
 /// # Errors
 /// Those of the file and of rasterising.
-pub fn picture_to_file(path: &Path, drawing: &str) -> Result<(), Failure> {
-    let is_png = path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("png"));
+pub fn picture_to_file(path: &Path, is_png: bool, drawing: &str) -> Result<(), Failure> {
     let rasterised: Result<Vec<u8>, PictureError> = if is_png {
         png::from_svg(drawing)
     } else {

@@ -18,8 +18,7 @@ use crate::integrate::Run;
 /// # Errors
 /// See [`Failure`].
 pub(super) fn pss(args: &PssArgs, streams: &Streams) -> Result<Exit, Failure> {
-    let formats = args.results.outputs.iter().map(|path| Format::of(path));
-    let formats: Vec<Format> = formats.collect::<Result<_, _>>()?;
+    let formats = Format::of(&args.results.outputs, args.results.format, streams)?;
     let paths: Vec<&Path> = args.results.outputs.iter().map(PathBuf::as_path).collect();
     let subject = input::open(&args.input, &args.results.probes, &paths, streams)?;
     let model = input::model_of(&args.input, &subject)?;

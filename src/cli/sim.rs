@@ -36,12 +36,7 @@ const PROGRESS: f64 = 1000.0;
 /// # Errors
 /// See [`Failure`].
 pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
-    let formats = args
-        .results
-        .outputs
-        .iter()
-        .map(|path| Format::of(path))
-        .collect::<Result<Vec<_>, _>>()?;
+    let formats = Format::of(&args.results.outputs, args.results.format, streams)?;
     let request = Request::of(&args.method, args.results.events)?;
     let paths: Vec<&Path> = args.results.outputs.iter().map(PathBuf::as_path).collect();
     if let Some(form) = forms::open(&args.input)? {
@@ -60,7 +55,7 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         let circuit = model.circuit();
         if circuit.tran.is_none() && !circuit.ac.is_empty() {
             only_one_way(args)?;
-            return ac::sim(args, model, streams);
+            return ac::sim(args, model, &formats, streams);
         }
         if !circuit.ac.is_empty() {
             let file = args.input.file.display();
@@ -70,7 +65,7 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         }
         if circuit.tran.is_none() && !circuit.dc.is_empty() {
             only_one_way(args)?;
-            return dc::sim(args, model, streams);
+            return dc::sim(args, model, &formats, streams);
         }
         if !circuit.steps.is_empty() {
             only_one_way(args)?;

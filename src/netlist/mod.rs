@@ -27,4 +27,4 @@ pub use expr::expression;
 pub use include::Files;
 pub use read::{parse, parse_among};
 
-pub use crate::circuit::load::{Loaded, load};
+pub use crate::circuit::load::{Loaded, load, load_read};

@@ -12,7 +12,7 @@ use self::ladder::{Rung, rungs};
 use self::order::orders;
 use super::args::BenchArgs;
 use super::exit::{Exit, Failure};
-use super::files;
+use super::files::{self, STDOUT};
 use super::input::{self, Subject};
 use super::output;
 use super::sim::{self, Request};
@@ -35,10 +35,10 @@ const REPETITIONS: (u32, f64) = (9, 0.05);
 /// See [`Failure`].
 pub(super) fn bench(args: &BenchArgs, streams: &Streams) -> Result<Exit, Failure> {
     for path in &args.outputs {
-        ending(path)?;
+        ending(path, args)?;
     }
     if let Some(path) = &args.signals
-        && ending(path)? != "csv"
+        && ending(path, args)? != "csv"
     {
         return Err(output::unknown_ending(path, "csv"));
     }
@@ -201,7 +201,11 @@ fn errors(waves: &Waveforms, reference: &Reference, shift: f64) -> Vec<SignalErr
     found.signals.into_iter().map(error).collect()
 }
 
-fn ending(path: &Path) -> Result<String, Failure> {
+/// What the ending names, or was asked for of standard output.
+fn ending(path: &Path, args: &BenchArgs) -> Result<String, Failure> {
+    if path == Path::new(STDOUT) {
+        return Ok(args.format.clone().unwrap_or_else(|| "csv".into()));
+    }
     let ending = path
         .extension()
         .map(|e| e.to_string_lossy().to_ascii_lowercase())
@@ -225,7 +229,7 @@ fn report(
 ) -> Result<(), Failure> {
     let orders = orders(measurements);
     for path in &args.outputs {
-        match ending(path)?.as_str() {
+        match ending(path, args)?.as_str() {
             "csv" => files::write(path, work::csv(measurements).as_bytes())?,
             "json" => {
                 let document = Document {
@@ -234,7 +238,9 @@ fn report(
                 };
                 files::write(path, (json::line(&document) + "\n").as_bytes())?;
             }
-            _ => output::picture_to_file(path, &work::draw(measurements)?)?,
+            ending => {
+                output::picture_to_file(path, ending == "png", &work::draw(measurements)?)?;
+            }
         }
     }
     if let Some(path) = &args.signals {

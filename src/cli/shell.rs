@@ -1,0 +1,46 @@
+//! What a shell wants to know of the command line: completions and manual pages.
+
+use clap::CommandFactory;
+
+use super::args::{Cli, CompletionsArgs, ManArgs};
+use super::exit::{Exit, Failure};
+use super::files;
+use super::streams::Streams;
+
+/// Prints completions.
+///
+/// # Errors
+/// Those of standard output.
+pub(super) fn completions(args: &CompletionsArgs, streams: &Streams) -> Result<Exit, Failure> {
+    let mut text = Vec::new();
+    clap_complete::generate(args.shell, &mut Cli::command(), "circ", &mut text);
+    streams.data(text)?;
+    Ok(Exit::Done)
+}
+
+/// Prints the manual page, or writes those of all commands into a folder.
+///
+/// # Errors
+/// Those of standard output and of the files.
+pub(super) fn man(args: &ManArgs, streams: &Streams) -> Result<Exit, Failure> {
+    // Commands know their full names, `circ-sim`, once it is built.
+    let mut command = Cli::command();
+    command.build();
+    let Some(folder) = &args.folder else {
+        streams.data(page(command)?)?;
+        return Ok(Exit::Done);
+    };
+    let commands = command.get_subcommands().filter(|c| c.get_name() != "help");
+    for one in std::iter::once(&command).chain(commands) {
+        let name = one.get_display_name().unwrap_or(one.get_name());
+        let path = folder.join(format!("{name}.1"));
+        files::write(&path, &page(one.clone())?)?;
+    }
+    Ok(Exit::Done)
+}
+
+fn page(command: clap::Command) -> Result<Vec<u8>, Failure> {
+    let mut text = Vec::new();
+    clap_mangen::Man::new(command).render(&mut text)?;
+    Ok(text)
+}
