@@ -303,6 +303,12 @@ impl Model {
         &self.sources
     }
 
+    /// Its cards; none behind a circuit that was built by a program.
+    #[must_use]
+    pub fn netlist(&self) -> Option<&Netlist> {
+        self.netlist.as_deref()
+    }
+
     /// The choices it was elaborated with, and the values that were set since.
     #[must_use]
     pub const fn options(&self) -> &ElaborateOptions {

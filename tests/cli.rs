@@ -749,8 +749,21 @@ fn graph_writes_graphviz_and_pictures() {
     assert!(
         fs::read_to_string(directory.path().join("g.svg"))
             .unwrap()
-            .contains("d1 ideal diode")
+            .contains(">d1")
     );
+    let at = |t: &str| {
+        run_in(
+            directory.path(),
+            &format!("graph rectifier.cir --at {t} -o at.svg"),
+        )
+    };
+    assert_eq!(at("2.5m").status, 0);
+    let svg = fs::read_to_string(directory.path().join("at.svg")).unwrap();
+    assert!(
+        svg.contains("#d55e00"),
+        "the diodes of a half-wave conduct: {svg}"
+    );
+    assert_eq!(at("-1").status, 2);
     assert_eq!(
         run_in(directory.path(), "graph rectifier.cir -o g.dot").status,
         0

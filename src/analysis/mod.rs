@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `.meas` and `.four` of a transient | [`transient`]: a run with its [`Measurements`] |
 //! | `.dc` | [`dc`]: a [`Characteristic`] |
+//! | what conducts at an instant | [`conducting()`]: names of devices and switches |
 //! | the periodic steady state | [`periodic`]: its [`Orbit`] and one period of waveforms |
 //! | `.ac`, small signals about the operating point or that state | [`small_signal`]: a [`Response`] over frequency |
 //! | derivatives of `.meas` to element values and parameters | [`sensitivity()`]: a [`Sensitivity`] |
@@ -11,6 +12,7 @@
 //! | means, extrema and powers of all elements, efficiency, distortion | [`table()`], [`periodic_table`]: a [`Table`] |
 //! | `.step`, or any other values | [`variants`]: a [`Variant`] for every combination of values; [`each`] asks all of them, in parallel |
 
+mod conducting;
 mod dc;
 mod measured;
 mod periodic;
@@ -22,6 +24,7 @@ mod variation;
 mod worst;
 
 pub use crate::integrate::{Orbit, OrbitKind};
+pub use conducting::conducting;
 pub use dc::{Characteristic, Unsolved, dc};
 pub use measured::{Finished, Measurements, is_measured, periodic_measured, transient};
 pub use periodic::{PeriodicOptions, orbit_start, periodic};

@@ -89,7 +89,7 @@ pub enum Command {
     /// Compare with ngspice or with waveforms from a file
     #[command(after_help = examples::COMPARE)]
     Compare(CompareArgs),
-    /// Draw the circuit as a graph
+    /// Draw the circuit
     #[command(after_help = examples::GRAPH)]
     Graph(GraphArgs),
     /// Explain a code of a finding, such as `unknown-model`, or list all
@@ -534,12 +534,15 @@ pub struct GraphArgs {
     #[command(flatten)]
     #[expect(missing_docs, reason = "documented where it is defined")]
     pub input: Input,
-    /// Write to this file, dot, svg or png, instead of Graphviz text on standard output
+    /// Write to this file instead of Graphviz text on standard output: svg or png, a circuit picture; dot, the graph
     #[arg(short, long, value_name = "OUT")]
     pub output: Option<PathBuf>,
     /// Format of standard output: dot, svg or png
     #[arg(long, value_name = "FORMAT", value_parser = ["dot", "svg", "png"], default_value = "dot")]
     pub format: String,
+    /// Colour what conducts at this time of the transient, s
+    #[arg(long, value_name = "TIME", value_parser = positive)]
+    pub at: Option<f64>,
 }
 
 /// `circ explain`.

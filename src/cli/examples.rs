@@ -59,6 +59,7 @@ Examples:
 pub(super) const GRAPH: &str = "\
 Examples:
   circ graph buck.cir -o buck.svg
+  circ graph buck.cir --at 1.2m -o buck.png
   circ graph buck.cir | dot -Tpdf > buck.pdf";
 
 pub(super) const EXPLAIN: &str = "\

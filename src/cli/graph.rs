@@ -8,9 +8,10 @@ use super::files::{self, STDOUT};
 use super::input;
 use super::output;
 use super::streams::Streams;
-use crate::report::graph;
+use crate::analysis::conducting;
+use crate::report::{graph, schematic};
 
-/// Writes the circuit graph: Graphviz text on standard output, or a file of either form.
+/// Writes the circuit graph as Graphviz text, on standard output or to a file, or the picture of the circuit.
 ///
 /// # Errors
 /// See [`Failure`].
@@ -25,12 +26,23 @@ pub(super) fn graph(args: &GraphArgs, streams: &Streams) -> Result<Exit, Failure
     if !matches!(ending.as_str(), "dot" | "gv" | "svg" | "png") {
         return Err(output::unknown_ending(path, "dot, svg or png"));
     }
+    if args.at.is_some() && matches!(ending.as_str(), "dot" | "gv") {
+        let message = "--at colours a picture: svg or png, by -o or --format";
+        return Err(Failure::Message(message.into()));
+    }
     let outputs: Vec<&Path> = args.output.iter().map(PathBuf::as_path).collect();
     let subject = input::open_as_it_stands(&args.input, &outputs, streams)?;
-    let circuit = input::model_of(&args.input, &subject)?.circuit();
+    let model = input::model_of(&args.input, &subject)?;
     match ending.as_str() {
-        "dot" | "gv" => files::write(path, graph::dot(circuit).as_bytes())?,
-        ending => output::picture_to_file(path, ending == "png", &graph::svg(circuit)?)?,
+        "dot" | "gv" => files::write(path, graph::dot(model.circuit()).as_bytes())?,
+        ending => {
+            let live = match args.at {
+                Some(t) => conducting(model, t)
+                    .map_err(|e| input::broke_off(&args.input, &e, model.places(), streams))?,
+                None => Vec::new(),
+            };
+            output::picture_to_file(path, ending == "png", &schematic::svg(model, &live)?)?;
+        }
     }
     Ok(Exit::Done)
 }

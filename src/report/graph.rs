@@ -1,18 +1,14 @@
 //! The circuit as a graph: nets are vertices, elements are edges.
 
-use layout::backends::svg::SVGWriter;
-use layout::gv::{DotParser, GraphBuilder};
 use petgraph::dot::{Config, Dot};
 use petgraph::graph::{NodeIndex, UnGraph};
 
-use super::{PictureError, si};
+use super::si;
 use crate::circuit::{Circuit, Element, Kind, NodeId};
 use crate::law::Law;
 
 /// The name of ground.
 const GROUND: &str = "0";
-/// Elements up to which the drawing's edge crossings are minimised; beyond it that takes too long.
-const UNTANGLED: usize = 150;
 
 /// The graph in Graphviz's language: `graph { 0 [ label = "out" ] … 0 -- 1 [ label = "r1 1 kΩ" ] }`.
 #[must_use]
@@ -25,53 +21,8 @@ pub fn dot(circuit: &Circuit) -> String {
     for element in &circuit.elements {
         graph.add_edge(end(element.p), end(element.n), label(element));
     }
-    written(&graph)
-}
-
-/// The graph drawn in layers, with a ground of its own for each grounded element as in a schematic.
-///
-/// # Errors
-/// [`PictureError::Draw`] when the layout refuses the graph.
-pub fn svg(circuit: &Circuit) -> Result<String, PictureError> {
-    let mut graph = UnGraph::<&str, String>::default();
-    let nets: Vec<_> = circuit
-        .nodes
-        .iter()
-        .map(|name| graph.add_node(name))
-        .collect();
-    for element in &circuit.elements {
-        let mut end = |node: NodeId| {
-            if node == NodeId::GROUND {
-                graph.add_node(GROUND)
-            } else {
-                nets[node.index()]
-            }
-        };
-        let (p, n) = (end(element.p), end(element.n));
-        graph.add_edge(p, n, label(element));
-    }
-    graph.retain_nodes(|graph, net| graph.neighbors(net).next().is_some());
-    if graph.node_count() == 0 {
-        return Err(PictureError::Empty("no element connects two nodes"));
-    }
-    let tree = DotParser::new(&written(&graph))
-        .process()
-        .map_err(PictureError::Draw)?;
-    let mut builder = GraphBuilder::new();
-    builder.visit_graph(&tree);
-    let mut picture = SVGWriter::new();
-    builder.get().do_it(
-        false,
-        circuit.elements.len() > UNTANGLED,
-        false,
-        &mut picture,
-    );
-    Ok(picture.finalize())
-}
-
-fn written(graph: &UnGraph<&str, String>) -> String {
     let dot = Dot::with_attr_getters(
-        graph,
+        &graph,
         &[Config::EdgeNoLabel, Config::NodeNoLabel],
         &|_, edge| format!("label = \"{}\"", escaped(edge.weight())),
         &|_, (_, name)| {
@@ -149,31 +100,5 @@ mod tests {
             2 -- 0 [ label = "d1 ideal diode"]
         }
         "#);
-    }
-
-    #[test]
-    fn parallel_shorted_and_lonely_elements_are_drawn() {
-        let svg = svg(&circuit(
-            &["0", "a", "b", "c"],
-            &[("r1", 1, 0), ("r2", 1, 0), ("r3", 1, 1), ("d1", 2, 3)],
-        ));
-        let svg = svg.unwrap();
-        for name in ["r1 1 kΩ", "r2 1 kΩ", "r3 1 kΩ", "d1 ideal diode"] {
-            assert!(svg.contains(name), "{name} in {svg}");
-        }
-        assert!(matches!(
-            super::svg(&circuit(&["0"], &[])),
-            Err(PictureError::Empty(_))
-        ));
-    }
-
-    #[test]
-    fn a_ladder_of_two_hundred_sections_is_laid_out() {
-        let nodes: Vec<String> = (0..=200).map(|k| k.to_string()).collect();
-        let names: Vec<&str> = nodes.iter().map(String::as_str).collect();
-        let elements: Vec<_> = (1..=200)
-            .flat_map(|k| [("r1", k, k - 1), ("d1", k, 0)])
-            .collect();
-        assert!(svg(&circuit(&names, &elements)).unwrap().contains("200"));
     }
 }

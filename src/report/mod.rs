@@ -1,15 +1,17 @@
 //! From results to words and pictures; nothing is computed here.
 //!
 //! A [`Figure`](figure::Figure) says what is to be seen; [`svg`] draws it, [`png`] rasterises the drawing with an embedded
-//! font, [`html`] puts it on a page. [`text`] and [`json`] are the summaries, [`terminal`] plots with characters.
+//! font, [`html`] puts it on a page. [`schematic`] draws a circuit. [`text`] and [`json`] are the summaries, [`terminal`] plots with characters.
 
 mod axis;
 pub mod bode;
 pub mod figure;
+pub mod graph;
 pub mod html;
 pub mod json;
 pub mod means;
 pub mod measured;
+pub mod schematic;
 pub mod sensitivity;
 mod sheet;
 pub mod si;
@@ -21,8 +23,6 @@ pub mod text;
 pub mod work;
 
 #[cfg(feature = "plot")]
-pub mod graph;
-#[cfg(feature = "plot")]
 pub mod png;
 
 /// Why a picture could not be made.
@@ -31,9 +31,9 @@ pub enum PictureError {
     /// There is nothing to show.
     #[error("nothing to draw: {0}")]
     Empty(&'static str),
-    /// The drawing library refused.
-    #[error("the picture could not be drawn: {0}")]
-    Draw(String),
+    /// A circuit of so many parts.
+    #[error("a circuit of {0} elements is not drawn; its graph can be written as dot")]
+    Large(usize),
     /// The rasteriser refused.
     #[error("the picture could not be rasterised: {0}")]
     Raster(String),

@@ -151,6 +151,29 @@ impl Sheet {
         ));
     }
 
+    /// The same in a colour; a reader's program shows `whole` where a pointer rests on it.
+    pub(super) fn coloured(
+        &mut self,
+        text: &str,
+        whole: &str,
+        at: (f64, f64),
+        size: f64,
+        (anchor, colour): (Anchor, &str),
+    ) {
+        let title = if text == whole {
+            String::new()
+        } else {
+            format!("<title>{}</title>", escaped(whole))
+        };
+        self.raw(&format!(
+            "<text x=\"{}\" y=\"{}\" font-size=\"{size}\" text-anchor=\"{}\" fill=\"{colour}\">{}{title}</text>",
+            short(at.0),
+            short(at.1 + 0.35 * size),
+            anchor.name(),
+            escaped(text)
+        ));
+    }
+
     /// A line of text that is read upwards, its middle at the point.
     pub(super) fn upwards(&mut self, text: &str, (x, y): (f64, f64), size: f64) {
         self.raw(&format!(

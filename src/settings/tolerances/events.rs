@@ -51,3 +51,7 @@ pub(crate) const GRAZING: f64 = 1e-9;
 /// Guards that fall through zero at one instant are one event where the derivatives of its time agree to this part. Larger: events that part
 /// when something varies count as one; smaller: symmetric devices are told apart by rounding.
 pub(crate) const SAME_TIMING: f64 = 1e-6;
+
+/// A current below this part of the largest that its device carried is no conduction in a picture: what leaks through open switches is less. Larger: the end
+/// of a decay is not seen; smaller: open switches of 1 MΩ in circuits of a few hundred ohms conduct.
+pub(crate) const LEAKING: f64 = 1e-3;

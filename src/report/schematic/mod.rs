@@ -1,0 +1,45 @@
+//! The circuit as a picture for readers: symbols, orthogonal wires, words beside their elements.
+//!
+//! `part` says what is drawn, `cards` finds it in a netlist; `search` says where, by `cost` and by the wires that `grid` finds it takes; `drawing` puts it on a
+//! sheet with `symbol` and `words`.
+
+mod cards;
+mod cost;
+mod drawing;
+mod grid;
+mod part;
+mod search;
+mod symbol;
+#[cfg(test)]
+mod tests;
+mod words;
+
+use super::PictureError;
+use crate::model::Model;
+use drawing::Drawing;
+use grid::Grid;
+use part::Parts;
+
+/// The most parts that are drawn.
+const LARGEST: usize = 2000;
+
+/// Draws the circuit of a model as its netlist says it, subcircuits as boxes; what is in `conducting` (names of elements) is coloured.
+///
+/// # Errors
+/// [`PictureError::Empty`] without an element between two nodes, [`PictureError::Large`] from some thousand elements on.
+pub fn svg(model: &Model, conducting: &[String]) -> Result<String, PictureError> {
+    let circuit = model.circuit();
+    let parts = match model.netlist() {
+        Some(netlist) => cards::parts(netlist, model.sources(), circuit),
+        None => Parts::of_circuit(circuit),
+    };
+    if parts.parts.is_empty() {
+        return Err(PictureError::Empty("no element connects two nodes"));
+    }
+    if parts.parts.len() > LARGEST {
+        return Err(PictureError::Large(parts.parts.len()));
+    }
+    let plan = search::plan(&parts);
+    let grid = Grid::of(&parts.parts, parts.nets.len(), &plan);
+    Ok(Drawing::new(&parts, &plan, &grid, conducting).draw(&circuit.title))
+}
