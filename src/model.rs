@@ -198,7 +198,12 @@ impl Model {
                 let Some(mut circuit) = circuit else {
                     return Err(self.faults(findings));
                 };
-                circuit.probes.clone_from(&self.circuit.probes);
+                if self.circuit.columns.is_empty() {
+                    circuit.probes.clone_from(&self.circuit.probes);
+                    circuit.columns.clear();
+                } else {
+                    self.show_in(&mut circuit);
+                }
                 circuit
             }
             None => {
@@ -248,8 +253,13 @@ impl Model {
         let (circuit, findings) = elaborate(netlist, &self.options.at(sweeps, values));
         let mut circuit = circuit.ok_or_else(|| self.faults(findings))?;
         let probes = self.circuit.probes.iter().map(|p| circuit.probe(&p.name));
-        if let Some(probes) = probes.collect() {
+        if self.circuit.columns.is_empty()
+            && let Some(probes) = probes.collect()
+        {
             circuit.probes = probes;
+            circuit.columns.clear();
+        } else {
+            self.show_in(&mut circuit);
         }
         Ok(circuit)
     }
@@ -269,7 +279,7 @@ impl Model {
         }
     }
 
-    /// The model with another transient, where one is given, and with these signals, where there are any.
+    /// The model with another transient, where one is given, and with these signals ([`Circuit::show`]), where there are any.
     ///
     /// # Errors
     /// [`Reason::Unknown`] for what is no signal of the circuit.
@@ -277,14 +287,16 @@ impl Model {
         let mut circuit = self.circuit.clone();
         circuit.tran = tran.or(circuit.tran);
         if !probes.is_empty() {
-            let found = probes.iter().map(|name| {
-                let unknown = || Reason::Unknown(format!("no node or element `{name}`"));
-                let probe = self.circuit.probe(name);
-                probe.ok_or_else(|| Error::before(unknown()))
-            });
-            circuit.probes = found.collect::<Result<_, _>>()?;
+            let found = circuit.show(probes);
+            found.map_err(|why| Error::before(Reason::Unknown(why)))?;
         }
         self.with_circuit(circuit)
+    }
+
+    /// Shows in a circuit of other values what this one shows, where it has all of it.
+    fn show_in(&self, circuit: &mut Circuit) {
+        let names = self.circuit.columns.iter().map(|c| c.name.clone());
+        let _ = circuit.show(&names.collect::<Vec<_>>());
     }
 
     fn faults(&self, findings: Vec<Diagnostic>) -> Error {

@@ -396,8 +396,110 @@ fn parameters_and_probes_are_replaced() {
     status 2
     --- out
     --- err
-    error: --probe v(nowhere): no such node or element
+    error: --probe v(nowhere): there is no node or element `v(nowhere)`; there are v(in), v(out)
     ");
+}
+
+const HALVES: &str = "\
+halves
+.param gain=2
+.subckt half in out
+r1 in out 1k
+r2 out 0 1k
+.ends
+v1 a 0 dc {3*gain}
+x1 a mid half
+.tran 1m 1m
+";
+
+/// The columns and the last row of a run of `HALVES` with these cards and arguments.
+fn last_row(cards: &str, arguments: &str) -> (Vec<String>, Vec<f64>) {
+    let directory = place();
+    let netlist = format!("{HALVES}{cards}\n.end\n");
+    fs::write(directory.path().join("halves.cir"), netlist).unwrap();
+    let ran = run_in(directory.path(), &format!("sim halves.cir {arguments}"));
+    assert!(ran.status == 0 && !ran.err.contains("probe"), "{ran}");
+    // Several runs of `.step` follow each other: no waveforms of one time axis.
+    let read = |line: Option<&str>| {
+        let mut fields = fields_of(line.unwrap());
+        fields.remove(0);
+        fields
+    };
+    let row = read(ran.out.lines().last());
+    let row = row.iter().map(|field| field.parse().unwrap()).collect();
+    (read(ran.out.lines().next()), row)
+}
+
+/// The fields of a line, quoted or not.
+fn fields_of(line: &str) -> Vec<String> {
+    let quoted = line.split('"').enumerate();
+    let fields = quoted.flat_map(|(k, part)| match k % 2 {
+        1 => vec![part.to_owned()],
+        _ => part
+            .split(',')
+            .filter(|f| !f.is_empty())
+            .map(str::to_owned)
+            .collect(),
+    });
+    fields.collect()
+}
+
+#[test]
+fn probes_are_patterns_and_expressions_on_the_command_line_and_on_cards() {
+    for (probe, columns) in [
+        ("v(*)", &[("v(a)", 6.0), ("v(mid)", 3.0)][..]),
+        ("v(m?d)", &[("v(mid)", 3.0)]),
+        ("i(x1.*)", &[("i(x1.r1)", 3e-3), ("i(x1.r2)", 3e-3)]),
+        ("all", &[("v(a)", 6.0), ("v(mid)", 3.0), ("i(v1)", -3e-3)]),
+        ("v(a)*i(x1.r1)", &[("v(a)*i(x1.r1)", 18e-3)]),
+        ("max(v(mid),v(a)/gain)", &[("max(v(mid),v(a)/gain)", 3.0)]),
+        ("v(a)-v(mid)", &[("v(a)-v(mid)", 3.0)]),
+    ] {
+        let (names, values): (Vec<String>, Vec<f64>) =
+            columns.iter().map(|(n, v)| ((*n).to_owned(), *v)).unzip();
+        for (cards, arguments) in [
+            (String::new(), format!("--probe {probe}")),
+            (format!(".save {probe}"), String::new()),
+            (format!(".print tran {probe}"), String::new()),
+        ] {
+            let found = last_row(&cards, &arguments);
+            assert_eq!(found.0, names, "{cards} {arguments}");
+            for (own, known) in found.1.iter().zip(&values) {
+                assert!((own - known).abs() < 1e-12, "{cards} {arguments}: {own}");
+            }
+        }
+    }
+    // In the order of the command line; parameters are those of the run, those of a sweep too.
+    let (names, row) = last_row("", "--probe v(mid)/gain --probe v(a) --param gain=4");
+    assert_eq!(
+        (names, row),
+        (vec!["v(mid)/gain".into(), "v(a)".into()], vec![1.5, 12.0])
+    );
+    let (_, row) = last_row(".step param gain list 2 5", "--probe v(a)*gain");
+    assert_eq!(row, [75.0, 5.0]);
+    // Measured, verified and in periods as in a transient.
+    let (_, row) = last_row(".save v(a)*2\n.meas tran m avg v(mid)", "-q --verify");
+    assert_eq!(row, [12.0]);
+}
+
+#[test]
+fn an_unknown_probe_says_what_was_probably_meant() {
+    for (probe, words) in [
+        ("v(ot)", "did you mean `v(out)`?"),
+        ("ot", "did you mean `v(out)`?"),
+        ("i(r3)", "did you mean `i(r1)`?"),
+        ("2*v(ot)", "did you mean `v(out)`?"),
+        ("v(z*)", "there are v(in), v(out)"),
+        ("sqr(v(in))", "unknown function `sqr`; did you mean `sqrt`?"),
+        ("v(in)*", "a value is missing"),
+    ] {
+        let ran = run(&format!("sim divider.cir --probe {probe}"));
+        assert_eq!(ran.status, 2, "{ran}");
+        assert!(ran.err.contains(&format!("--probe {probe}: ")), "{ran}");
+        assert!(ran.err.contains(words), "{ran}");
+    }
+    let ran = run("ac divider.cir --probe 2*v(in)");
+    assert!(ran.err.contains("signals and ratios of two"), "{ran}");
 }
 
 #[test]

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use circ::analysis::{
     Finished, Measurements, PeriodicOptions, SensitivityOptions, SmallSignalOptions, TableOptions,
-    periodic_measured, periodic_table, sensitivity, small_signal, table, transient,
+    periodic_measured, periodic_table, sensitivity, shown, small_signal, table, transient,
 };
 use circ::circuit::{Circuit, Kind, Tran};
 use circ::diagnostic::{SourceFile, SourceMap};
@@ -164,6 +164,7 @@ fn rows<'py>(
     run: Run,
     found: &Measurements,
 ) -> PyResult<Rows<'py>> {
+    let run = shown(model.circuit(), run);
     let summary = report::json::summary(&run, found, model.places());
     let mut rest: Value =
         serde_json::from_str(&summary).map_err(|error| PyValueError::new_err(error.to_string()))?;

@@ -54,6 +54,10 @@ def test_stop_step_method_and_probes():
         m.tran(method="fast")
     with pytest.raises(KeyError, match="nowhere"):
         m.tran(probes=["v(nowhere)"])
+    w = m.tran(probes=["v(o*)", "2*v(out)"])
+    assert w.names == ["v(out)", "2*v(out)"] and (w["2*v(out)"] == 2 * w["v(out)"]).all()
+    with pytest.raises(KeyError, match="did you mean `v\\(out\\)`"):
+        m.tran(probes=["v(uot)"])
 
 
 def test_values_are_set_without_parsing():

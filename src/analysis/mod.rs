@@ -17,6 +17,7 @@ mod dc;
 mod measured;
 mod periodic;
 mod sensitivity;
+mod shown;
 mod small_signal;
 mod sweep;
 mod table;
@@ -29,6 +30,7 @@ pub use dc::{Characteristic, Unsolved, dc};
 pub use measured::{Finished, Measurements, is_measured, periodic_measured, transient};
 pub use periodic::{PeriodicOptions, orbit_start, periodic};
 pub use sensitivity::{Gradient, Sensitivity, SensitivityOptions, sensitivity};
+pub use shown::{shown, shown_values};
 pub use small_signal::{
     About, Left, Margin, Ratio, Response, SmallSignalOptions, margins, ratios, small_signal,
     unwrapped,

@@ -442,9 +442,12 @@ impl<'n, 'o> Builder<'n, 'o> {
         } else {
             std::mem::take(&mut self.dc_saves)
         };
+        // Expressions that are shown take what has a value by now.
+        self.circuit.params = self.scopes.evaluated(ScopeId::ROOT);
         for (scope, list) in saves {
             self.save(list, scope);
         }
+        self.circuit.settle_columns();
         self.circuit.known = self.scopes.rails_read.iter().copied().collect();
         let cards = std::mem::take(&mut self.measurements);
         self.measure(&cards);

@@ -32,6 +32,7 @@ mod pin;
 mod place;
 mod probe;
 mod scope;
+mod shown;
 mod small_signal;
 mod smooth;
 pub mod source;
@@ -49,6 +50,7 @@ pub use elaborate::{Diodes, ElaborateOptions, elaborate};
 pub use formula::Formula;
 pub use held::{held_at, holder};
 pub use measurement::{FourierAnalysis, Harmonics, Measured, NamedMeasurement};
+pub use shown::Column;
 pub use source::Source;
 pub use sweep::{Sweep, Swept, combinations};
 
@@ -96,6 +98,8 @@ pub struct Circuit {
     pub tran: Option<Tran>,
     /// What `.save`, `.print`, `.probe`, `.plot tran` ask for; empty means the default set.
     pub probes: Vec<Probe>,
+    /// What is shown of a transient, as functions of the probes; empty where these are shown as they are.
+    pub columns: Vec<Column>,
     /// `.ic v(n)=…` (and differences `v(a,b)=…`): nodes and volts.
     pub initial_voltages: Vec<(NodeId, NodeId, f64)>,
     /// `.nodeset v(n)=…`: nodes and volts from which the switches of the operating point are looked for.

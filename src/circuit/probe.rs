@@ -4,7 +4,7 @@ use super::builder::Builder;
 use super::names::without_letter;
 use super::scope::ScopeId;
 use super::{Circuit, ElementId, NodeId, Probe, Probed};
-use crate::diagnostic::Diagnostic;
+use crate::diagnostic::{Diagnostic, Span};
 use crate::netlist::ast::{Name, Signal, Wanted};
 use crate::netlist::suggest::nearest;
 
@@ -12,25 +12,8 @@ impl<'n> Builder<'n, '_> {
     pub(super) fn save(&mut self, list: &'n [Wanted], scope: ScopeId) {
         for wanted in list {
             let (text, span) = match wanted {
-                Wanted::All(_) => {
-                    let all = Circuit {
-                        probes: Vec::new(),
-                        ..self.circuit.clone()
-                    }
-                    .probes();
-                    for probe in all {
-                        self.print(probe);
-                    }
-                    continue;
-                }
-                Wanted::Other(Name { text, span }) => {
-                    if let Some(probe) = self.circuit.probe(text) {
-                        self.print(probe);
-                        continue;
-                    }
-                    let message = format!("`{text}` cannot be printed yet");
-                    let fault = Diagnostic::warning("ignored", *span, message).label("ignored");
-                    self.tell(fault.help("voltages `v(a)`, `v(a,b)` and currents `i(r1)` can"));
+                Wanted::All(Name { text, span }) | Wanted::Other(Name { text, span }) => {
+                    self.save_text(text, *span);
                     continue;
                 }
                 Wanted::Signal(signal) => (signal.to_string(), signal.span()),
@@ -50,7 +33,8 @@ impl<'n> Builder<'n, '_> {
                 .probe(&prefixed)
                 .or_else(|| self.circuit.probe(&text))
             {
-                Some(probe) => self.print(probe),
+                Some(probe) => self.circuit.print(probe),
+                None if prefixed.contains(['*', '?']) => self.save_text(&prefixed, span),
                 None => {
                     let message = format!("`{text}` is not in the circuit and cannot be printed");
                     let warning = Diagnostic::warning("unknown-probe", span, message);
@@ -61,9 +45,22 @@ impl<'n> Builder<'n, '_> {
         }
     }
 
-    fn print(&mut self, probe: Probe) {
-        if !self.circuit.probes.contains(&probe) {
-            self.circuit.probes.push(probe);
+    /// A pattern or an expression.
+    fn save_text(&mut self, text: &str, span: Span) {
+        let text = text.trim_matches(['{', '}', '\'']);
+        if let Err(fault) = self.circuit.print_text(text) {
+            let mut message = format!("`{text}` cannot be printed");
+            if !fault.message.ends_with(&format!("`{text}`")) {
+                message = format!("{message}: {}", fault.message);
+            }
+            let warning = if fault.code == "unknown-probe" {
+                Diagnostic::warning("unknown-probe", span, message)
+            } else {
+                Diagnostic::warning("ignored", span, message)
+            };
+            let warning = warning.label("ignored");
+            let help = "voltages `v(a)`, `v(a,b)`, currents `i(r1)` and expressions of them can";
+            self.tell(warning.help(fault.help.unwrap_or_else(|| help.to_owned())));
         }
     }
 }
@@ -134,10 +131,15 @@ impl Circuit {
     }
 
     /// The signal that was probably meant, or else the first ones of its kind.
-    fn what_there_is(&self, text: &str) -> String {
+    pub(super) fn what_there_is(&self, text: &str) -> String {
         /// More names are no help.
         const MOST: usize = 8;
         let current = text.starts_with("i(") || text.starts_with('@');
+        let written = if text.contains('(') {
+            text.to_owned()
+        } else {
+            format!("v({text})")
+        };
         let known: Vec<String> = if current {
             let elements = self.elements.iter();
             elements.map(|e| format!("i({})", e.name)).collect()
@@ -145,7 +147,7 @@ impl Circuit {
             let nodes = self.nodes.iter().skip(1);
             nodes.map(|n| format!("v({n})")).collect()
         };
-        if let Some(near) = nearest(text, known.iter().map(String::as_str)) {
+        if let Some(near) = nearest(&written, known.iter().map(String::as_str)) {
             return format!("did you mean `{near}`?");
         }
         let more = known.len().saturating_sub(MOST);

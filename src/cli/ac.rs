@@ -32,6 +32,15 @@ pub(super) fn ac(args: &AcArgs, streams: &Streams) -> Result<Exit, Failure> {
     let paths: Vec<&Path> = args.outputs.iter().map(PathBuf::as_path).collect();
     let subject = input::open(&args.input, &signals, &paths, streams)?;
     let model = input::model_of(&args.input, &subject)?;
+    if let Some(column) = model.circuit().columns.first()
+        && !asked.is_empty()
+    {
+        let message = format!(
+            "--probe {}: the response is of signals and ratios of two",
+            column.name
+        );
+        return Err(Failure::Message(message));
+    }
     let watch = Signals::watch()?;
     let options = SmallSignalOptions {
         about: args.about.map(|about| match about {

@@ -193,7 +193,7 @@ pub struct ResultArgs {
         display_order = 2,
         long = "probe",
         value_name = "NAME",
-        help = "Show exactly these signals: v(a), v(a,b), i(d1), @d1[i], v1#branch (repeatable)"
+        help = "Show exactly this: v(a), v(a,b), i(d1), @d1[i], v1#branch, patterns v(x1.*), all, expressions v(a)*i(r1) (repeatable)"
     )]
     pub probes: Vec<String>,
     /// Add rows at event times: two with equal time at a jump, before and after

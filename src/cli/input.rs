@@ -204,12 +204,8 @@ fn keep_probes(circuit: &mut Circuit, probes: &[String]) -> Result<(), Failure> 
     if probes.is_empty() {
         return Ok(());
     }
-    let found = probes.iter().map(|name| {
-        let unknown = || Failure::Message(format!("--probe {name}: no such node or element"));
-        circuit.probe(name).ok_or_else(unknown)
-    });
-    circuit.probes = found.collect::<Result<_, _>>()?;
-    Ok(())
+    let shown = circuit.show(probes);
+    shown.map_err(|why| Failure::Message(format!("--probe {why}")))
 }
 
 /// The model of a subject.

@@ -10,7 +10,7 @@ use super::output::Format;
 use super::rows::Columns;
 use super::signals::Signals;
 use super::streams::Streams;
-use crate::analysis::{Finished, PeriodicOptions, periodic_measured, periodic_table};
+use crate::analysis::{Finished, PeriodicOptions, periodic_measured, periodic_table, shown};
 use crate::integrate::Run;
 
 /// Finds the periodic steady state and writes one period of it.
@@ -55,7 +55,7 @@ pub(super) fn pss(args: &PssArgs, streams: &Streams) -> Result<Exit, Failure> {
         }
         let run = Run {
             orbit: Some(orbit),
-            ..run
+            ..shown(model.circuit(), run)
         };
         Ok((run, found))
     });

@@ -68,6 +68,13 @@ impl Columns {
 
     /// Those that a run of this circuit will have.
     pub(super) fn of_circuit(circuit: &Circuit) -> Self {
+        if !circuit.columns.is_empty() {
+            return Self {
+                title: circuit.title.clone(),
+                names: circuit.columns.iter().map(|c| c.name.clone()).collect(),
+                units: circuit.columns.iter().map(|c| c.unit).collect(),
+            };
+        }
         let names: Vec<String> = circuit.probes().into_iter().map(|p| p.name).collect();
         Self {
             title: circuit.title.clone(),

@@ -16,7 +16,9 @@ use super::rows::Columns;
 use super::signals::Signals;
 use super::steps::Stepping;
 use super::streams::Streams;
-use crate::analysis::{self, Finished, PeriodicOptions, TableOptions, WorstOptions, is_measured};
+use crate::analysis::{
+    self, Finished, PeriodicOptions, TableOptions, WorstOptions, is_measured, shown, shown_values,
+};
 use crate::circuit::source::Wave;
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{
@@ -96,9 +98,19 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         streams,
     );
     let mut outputs = destination.open(&Columns::of_subject(&subject))?;
-    let measures = matches!(&subject, Subject::Circuit(model) if is_measured(model.circuit()));
+    let circuit = match &subject {
+        Subject::Circuit(model) => Some(model.circuit()),
+        Subject::System(_) => None,
+    };
+    let measures = circuit.is_some_and(is_measured);
     let collects = outputs.hold() || destination.plots || measures || args.verify;
-    let mut take = |block: Block<'_>| outputs.take(block);
+    let mut take = |block: Block<'_>| match circuit.and_then(|c| shown_values(c, block)) {
+        Some(values) => outputs.take(Block {
+            values: &values,
+            ..block
+        }),
+        None => outputs.take(block),
+    };
     let route = Route {
         corners: destination.has_pictures() || args.verify,
         sink: Some(&mut take),
@@ -127,6 +139,11 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
                 run.notes.push(Note::of(error.elements, text));
             }
         }
+    }
+    if let Some(circuit) = circuit
+        && let Some((run, found)) = finished.run.take()
+    {
+        finished.run = Some((shown(circuit, run), found));
     }
     destination.finish(outputs, finished, measures, signals.received())
 }

@@ -9,7 +9,7 @@ use super::rows::Columns;
 use super::signals::Signals;
 use super::sim::{self, Request, Route};
 use super::streams::Streams;
-use crate::analysis::{Finished, Variant, each, variants};
+use crate::analysis::{Finished, Variant, each, shown, variants};
 use crate::integrate::{Block, Error, Grid, Reason};
 use crate::model::Model;
 use crate::report::figure::Figure;
@@ -135,7 +135,7 @@ impl Stepping<'_> {
         let Finished { run, error } = sim::transient(&model, &self.request, route, &quiet);
         let step = run.map(|(run, found)| Step {
             values: variant.named(),
-            run,
+            run: shown(model.circuit(), run),
             found,
         });
         Ok((step, error.map(|error| (error, model))))

@@ -371,7 +371,7 @@ pub enum Wanted {
     /// A bare name: a node (`.save out`) or `@d1[i]`, `v1#branch`.
     Bare(Name),
     /// `all`, `v(*)`, `alli`: the default set.
-    All(Span),
-    /// An expression or quantity that is not supported.
+    All(Name),
+    /// A pattern or an expression.
     Other(Name),
 }

@@ -58,7 +58,7 @@ fn wanted(at: Input<'_>) -> Parsed<'_, Option<Wanted>> {
         text.as_str(),
         "all" | "allv" | "alli" | "v(*)" | "i(*)" | "*"
     ) {
-        return Ok((whole, Some(Wanted::All(span))));
+        return Ok((whole, Some(Wanted::All(Name { text, span }))));
     }
     match signal(at) {
         Ok((rest, signal)) => {

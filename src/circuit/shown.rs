@@ -1,0 +1,295 @@
+//! What is shown of a run: signals by name or pattern, `all`, and expressions of them.
+
+use super::formula::Formula;
+use super::functions::{self, CallError};
+use super::{Circuit, Probe, is_inside};
+use crate::diagnostic::Diagnostic;
+use crate::netlist::ast::{Binary, Expr, ExprKind, Unary};
+use crate::netlist::expression;
+use crate::netlist::suggest::nearest;
+
+/// A column of results.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// As it is headed: `v(out)`, `v(a)*i(r1)`.
+    pub name: String,
+    /// `V`, `A`, `W`, `Ohm`, or nothing.
+    pub unit: &'static str,
+    /// A function of the time and the signals of [`Circuit::probes`], by index.
+    pub formula: Formula,
+}
+
+type Read<T> = Result<T, Box<Diagnostic>>;
+
+impl Circuit {
+    /// Shows exactly these: what [`Self::probe`] takes, patterns of them (`v(x1.*)`, `i(d?)`), `all` (what is shown by default), and
+    /// expressions in the netlist's grammar, of signals, `time`, numbers and the parameters of the top level that the circuit uses.
+    ///
+    /// # Errors
+    /// What is wrong with one of them, and what was probably meant.
+    pub fn show(&mut self, wanted: &[String]) -> Result<(), String> {
+        let mut shown = Self {
+            probes: Vec::new(),
+            columns: Vec::new(),
+            ..self.clone()
+        };
+        for text in wanted {
+            shown.print_text(text).map_err(|fault| {
+                let help = fault
+                    .help
+                    .map_or_else(String::new, |help| format!("; {help}"));
+                format!("{text}: {}{help}", fault.message)
+            })?;
+        }
+        shown.settle_columns();
+        *self = shown;
+        Ok(())
+    }
+
+    /// The values that are shown where the probes have these.
+    pub fn shown_row(&self, time: f64, probes: &[f64], into: &mut Vec<f64>) {
+        let value = |column: &Column| column.formula.value(time, probes, &[]);
+        into.extend(self.columns.iter().map(value));
+    }
+
+    /// Adds a signal to what is shown.
+    pub(super) fn print(&mut self, probe: Probe) {
+        let name = probe.name.clone();
+        let formula = self.signal(probe);
+        self.print_column(name, formula);
+    }
+
+    /// Adds what a text means.
+    pub(super) fn print_text(&mut self, text: &str) -> Read<()> {
+        let text: String = text.to_lowercase().split_whitespace().collect();
+        if let Some(probes) = self.matching(&text) {
+            if probes.is_empty() {
+                return Err(Box::new(self.unknown(&text)));
+            }
+            probes.into_iter().for_each(|probe| self.print(probe));
+            return Ok(());
+        }
+        if let Some(probe) = self.probe(&text) {
+            self.print(probe);
+            return Ok(());
+        }
+        let formula = match expression(&text) {
+            Ok(expr) if !is_name(&expr) => self.shown_formula(&expr)?,
+            Err(fault) if text.contains(['*', '/', '+', '-']) => return Err(fault),
+            _ => return Err(Box::new(self.unknown(&text))),
+        };
+        self.print_column(text, formula);
+        Ok(())
+    }
+
+    /// Where what is shown are the probes as they are, there is no more to say of it.
+    pub(super) fn settle_columns(&mut self) {
+        let plain = |(k, column): (usize, &Column)| column.formula == Formula::Signal(k);
+        if self.columns.len() == self.probes.len() && self.columns.iter().enumerate().all(plain) {
+            self.columns.clear();
+        }
+    }
+
+    fn print_column(&mut self, name: String, formula: Formula) {
+        let unit = self.unit(&formula);
+        let column = Column {
+            name,
+            unit,
+            formula,
+        };
+        if !self.columns.contains(&column) {
+            self.columns.push(column);
+        }
+    }
+
+    fn signal(&mut self, probe: Probe) -> Formula {
+        let known = self.probes.iter().position(|own| *own == probe);
+        Formula::Signal(known.unwrap_or_else(|| {
+            self.probes.push(probe);
+            self.probes.len() - 1
+        }))
+    }
+
+    /// The signals that a pattern means; `None` for what is no pattern.
+    fn matching(&self, text: &str) -> Option<Vec<Probe>> {
+        let (function, pattern) = match text {
+            "all" | "*" => {
+                let plain = Self {
+                    probes: Vec::new(),
+                    ..self.clone()
+                };
+                return Some(plain.probes());
+            }
+            "allv" => ("v", "*"),
+            "alli" => ("i", "*"),
+            _ => match text.strip_suffix(')').and_then(|t| t.split_once('(')) {
+                Some((function @ ("v" | "i"), pattern)) => (function, pattern),
+                Some(_) => return None,
+                None => ("v", text),
+            },
+        };
+        if !pattern.contains(['*', '?']) || pattern.contains(['(', ')', '+', '-', '/', ',']) {
+            return None;
+        }
+        let fits = |name: &str| !is_inside(name) && fits(pattern.as_bytes(), name.as_bytes());
+        Some(match function {
+            "v" => {
+                let all = self.nodes.iter().skip(1).filter(|name| fits(name));
+                all.filter_map(|name| self.probe(&format!("v({name})")))
+                    .collect()
+            }
+            _ => self.currents_of(|element| fits(&element.name)).collect(),
+        })
+    }
+
+    fn unknown(&self, text: &str) -> Diagnostic {
+        let message = format!("there is no node or element `{text}`");
+        Diagnostic::error("unknown-probe", None, message).help(self.what_there_is(text))
+    }
+
+    fn shown_formula(&mut self, expr: &Expr) -> Read<Formula> {
+        let mut part = |expr: &Expr| self.shown_formula(expr).map(Box::new);
+        Ok(match &expr.kind {
+            ExprKind::Number(value) => Formula::Number(value.f64),
+            ExprKind::Unary(Unary::Minus, x) => Formula::Minus(part(x)?),
+            ExprKind::Unary(Unary::Not, x) => Formula::Not(part(x)?),
+            ExprKind::Binary(op, x, y) => Formula::Binary(*op, part(x)?, part(y)?),
+            ExprKind::If(parts) => {
+                let [condition, then, otherwise] = &**parts;
+                let parts = [part(condition)?, part(then)?, part(otherwise)?];
+                Formula::If(Box::new(parts.map(|part| *part)))
+            }
+            ExprKind::Name(name) if name == "time" => Formula::Time,
+            ExprKind::Name(name) => {
+                if let Some((_, value)) = self.params.iter().find(|(own, _)| own == name) {
+                    return Ok(Formula::Number(*value));
+                }
+                let probe = self.probe(name).ok_or_else(|| self.unknown(name))?;
+                self.signal(probe)
+            }
+            ExprKind::Signal(signal) => {
+                let text = signal.to_string();
+                let probe = self.probe(&text).ok_or_else(|| self.unknown(&text))?;
+                self.signal(probe)
+            }
+            ExprKind::Call(name, args) => {
+                check_call(&name.text, args.len())?;
+                let values = args.iter().map(|arg| self.shown_formula(arg));
+                Formula::Call(name.text.clone(), values.collect::<Read<_>>()?)
+            }
+            ExprKind::Text(text) => {
+                let message = format!("`{text}` is not a number");
+                return Err(Box::new(Diagnostic::error("bad-number", None, message)));
+            }
+        })
+    }
+
+    /// The unit of a formula, as far as volts, amperes and their products and quotients go.
+    fn unit(&self, formula: &Formula) -> &'static str {
+        match formula {
+            Formula::Signal(index) => match self
+                .probes
+                .get(*index)
+                .map(|probe| probe.name.starts_with('i'))
+            {
+                Some(true) => "A",
+                _ => "V",
+            },
+            Formula::Minus(x) => self.unit(x),
+            Formula::Binary(op, x, y) => {
+                let number = |formula: &Formula| matches!(formula, Formula::Number(_));
+                match (op, self.unit(x), self.unit(y)) {
+                    (Binary::Add | Binary::Sub, a, b) if a == b => a,
+                    (Binary::Mul, "V", "A") | (Binary::Mul, "A", "V") => "W",
+                    (Binary::Div, "W", "A") => "V",
+                    (Binary::Div, "W", "V") => "A",
+                    (Binary::Div, "V", "A") => "Ohm",
+                    (Binary::Mul | Binary::Div, a, _) if number(y) => a,
+                    (Binary::Mul, _, b) if number(x) => b,
+                    _ => "",
+                }
+            }
+            Formula::Call(name, args) => match (name.as_str(), &args[..]) {
+                ("abs", [x]) => self.unit(x),
+                ("max" | "min", [x, y]) if self.unit(x) == self.unit(y) => self.unit(x),
+                _ => "",
+            },
+            _ => "",
+        }
+    }
+}
+
+fn is_name(expr: &Expr) -> bool {
+    matches!(expr.kind, ExprKind::Name(_) | ExprKind::Signal(_))
+}
+
+/// That there is such a function of so many arguments.
+fn check_call(name: &str, arguments: usize) -> Read<()> {
+    let fault = match functions::call(name, &vec![1.0; arguments]) {
+        Ok(_) | Err(CallError::Domain) => return Ok(()),
+        Err(CallError::Arity(what)) => {
+            Diagnostic::error("bad-call", None, format!("`{name}` takes {what}"))
+        }
+        Err(CallError::Unknown) => {
+            let message = format!("unknown function `{name}`");
+            let fault = Diagnostic::error("unknown-function", None, message);
+            match nearest(name, functions::NAMES) {
+                Some(near) => fault.help(format!("did you mean `{near}`?")),
+                None => fault,
+            }
+        }
+    };
+    Err(Box::new(fault))
+}
+
+/// Whether a name is one of a pattern's: `*` stands for any characters, `?` for one.
+fn fits(pattern: &[u8], name: &[u8]) -> bool {
+    let (mut p, mut n, mut star) = (0, 0, None);
+    while n < name.len() {
+        match pattern.get(p) {
+            Some(b'*') => {
+                star = Some((p, n));
+                p += 1;
+            }
+            Some(&c) if c == b'?' || c == name[n] => (p, n) = (p + 1, n + 1),
+            // The last star takes one character more.
+            _ => match &mut star {
+                Some((at, taken)) => {
+                    *taken += 1;
+                    (p, n) = (*at + 1, *taken);
+                }
+                None => return false,
+            },
+        }
+    }
+    pattern[p..].iter().all(|c| *c == b'*')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fits;
+
+    #[test]
+    fn patterns_fit_what_they_should() {
+        let fits = |pattern: &str, name: &str| fits(pattern.as_bytes(), name.as_bytes());
+        for (pattern, name) in [
+            ("*", ""),
+            ("d*", "d1"),
+            ("x1.*", "x1.a.b"),
+            ("*out", "x.outout"),
+            ("d?", "d1"),
+            ("a*b*c", "abbcbc"),
+        ] {
+            assert!(fits(pattern, name), "{pattern} {name}");
+        }
+        for (pattern, name) in [
+            ("d*", "r1"),
+            ("d?", "d"),
+            ("d?", "d12"),
+            ("a*b", "abc"),
+            ("x1.*", "x1"),
+        ] {
+            assert!(!fits(pattern, name), "{pattern} {name}");
+        }
+    }
+}
