@@ -1,5 +1,6 @@
 //! Evaluation of expressions: numbers, and piecewise-linear forms in the circuit's voltages and currents.
 
+use super::Quantity;
 use super::behaviour::{TIME, Unfit, is_time};
 use super::form::Form;
 use super::functions::{self, CallError, truth};
@@ -49,6 +50,16 @@ impl<'n> Scopes<'n> {
         resolve: Resolve<'_, 'n>,
     ) -> Option<Form> {
         self.evaluate(expr, scope, resolve, &[])
+    }
+
+    /// The form of an expression in which one name stands for a quantity.
+    pub(super) fn form_of(
+        &mut self,
+        expr: &'n Expr,
+        scope: ScopeId,
+        (name, quantity): (&'n str, Quantity),
+    ) -> Option<Form> {
+        self.evaluate(expr, scope, None, &[(name, Form::quantity(quantity))])
     }
 
     fn fault<T>(

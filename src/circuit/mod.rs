@@ -31,6 +31,7 @@ mod piecewise;
 mod pin;
 mod place;
 mod probe;
+mod saturable;
 mod scope;
 mod shown;
 mod small_signal;

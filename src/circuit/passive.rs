@@ -99,6 +99,9 @@ impl<'n> Builder<'n, '_> {
         scope: ScopeId,
     ) {
         let letter = card.name.text.chars().next().unwrap_or('r');
+        if letter != 'r' && self.saturable(card, args, scope) {
+            return;
+        }
         let own = letter.to_string();
         let parasitics = ["rser", "lser", "rpar", "cpar", "rlshunt"];
         let mut known = vec![own.as_str(), "value", "m", "scale", "ic"];
@@ -265,12 +268,7 @@ impl<'n> Builder<'n, '_> {
                 let message = format!("`{}` has no value", card.name.text);
                 let fault =
                     Diagnostic::error("missing", card.span, message).label("a value is missing");
-                let behavioural = args.get(&["q", "flux"]).is_some();
-                self.tell(if behavioural {
-                    fault.help("charge and flux expressions are not supported")
-                } else {
-                    fault
-                });
+                self.tell(fault);
                 None
             }
         }

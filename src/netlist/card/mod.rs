@@ -11,7 +11,7 @@ use super::ast::{Assign, Device, Element, Expr, ExprKind, Name};
 use super::lex::{
     Fault, Input, Parsed, ahead, at_end, blank, end, missing, node, refuse, separator, symbol, word,
 };
-use super::operand;
+use super::{expr, operand};
 use crate::diagnostic::Diagnostic;
 
 /// What an element letter stands for, as `a resistor`.
@@ -152,7 +152,9 @@ pub(super) fn assign(i: Input<'_>) -> Parsed<'_, Assign> {
         return Ok((rest, Assign { name, value }));
     }
     let list = name.text.starts_with("tc");
-    let (mut next, value) = if list {
+    let (mut next, value) = if matches!(name.text.as_str(), "flux" | "q") {
+        expr::expr(rest)
+    } else if list {
         operand::item(rest)
     } else {
         operand::lenient(rest)
