@@ -381,6 +381,36 @@ fn findings_are_lines_or_objects_where_that_is_asked_for() {
     for key in ["code", "severity", "message", "column", "help"] {
         assert!(first.get(key).is_some(), "{key}");
     }
+    // What is said of a run, with and without a place.
+    let warned = "slow\nv1 a 0 sin(0 1 50)\nr1 a 0 1k\n.tran 10m 100m\n.end\n";
+    let directory = place();
+    fs::write(directory.path().join("slow.cir"), warned).unwrap();
+    let ran = run_in(
+        directory.path(),
+        "sim slow.cir --message-format short --step 1m",
+    );
+    let lines: Vec<&str> = ran.err.lines().collect();
+    assert!(
+        lines[0].starts_with("note[run]: --step is of no use"),
+        "{ran}"
+    );
+    assert!(
+        lines[1].starts_with("slow.cir:2:1: warning[run]: the print step"),
+        "{ran}"
+    );
+    let ran = run_in(directory.path(), "sim slow.cir --message-format json");
+    let warning: serde_json::Value = serde_json::from_str(&ran.err).unwrap();
+    assert_eq!(
+        (&warning["code"], &warning["severity"], &warning["line"]),
+        (&"run".into(), &"warning".into(), &2.into())
+    );
+    let quiet = run_in(directory.path(), "sim slow.cir --message-format json -q");
+    assert_eq!((quiet.status, quiet.err.as_str()), (0, ""));
+    let missing = run("sim divider.cir --probe v(x) --message-format short");
+    assert!(
+        missing.err.starts_with("error[failure]: --probe v(x): "),
+        "{missing}"
+    );
     let missing = run("sim missing.cir --message-format json");
     let failure: serde_json::Value =
         serde_json::from_str(missing.err.lines().next().unwrap()).unwrap();

@@ -4,6 +4,7 @@ use super::builder::Builder;
 use super::{Element, Kind, NodeId, Quantity, is_inside};
 use crate::diagnostic::{Diagnostic, Severity, Span};
 use crate::netlist::ast::{Block, Statement};
+use crate::netlist::suggest::nearest;
 
 impl<'n> Builder<'n, '_> {
     /// Faults inside subcircuits that nobody uses are worth a warning only.
@@ -111,7 +112,16 @@ impl<'n> Builder<'n, '_> {
             let element = self.circuit.elements.iter().find(at_first);
             let message = format!("connected at one end only: node {shown}{more}");
             let note = Diagnostic::note("dangling", element.and_then(|e| e.span), message);
-            notes.push(note.label(format!("nothing else is at node {}", dangling[0])));
+            let note = note.label(format!("nothing else is at node {}", dangling[0]));
+            let others = self.circuit.nodes.iter().skip(1).map(String::as_str);
+            let near = nearest(
+                dangling[0],
+                others.filter(|name| !dangling[1..].contains(name)),
+            );
+            notes.push(note.help(match near {
+                Some(near) => format!("did you mean node `{near}`? an open end that is meant does no harm"),
+                None => "connect another element to this node; an open end that is meant does no harm".into(),
+            }));
         }
         let uic = self.circuit.tran.is_some_and(|t| t.uic);
         let ignored = self

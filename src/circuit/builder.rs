@@ -395,7 +395,8 @@ impl<'n, 'o> Builder<'n, 'o> {
             let message = format!("element `{}` is defined again", element.name);
             self.tell(
                 Diagnostic::error("duplicate-element", element.span, message)
-                    .label("the name is taken already"),
+                    .label("the name is taken already")
+                    .help("rename one of the two; capital letters make no difference"),
             );
             return None;
         }

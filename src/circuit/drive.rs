@@ -312,7 +312,8 @@ impl<'n> Builder<'n, '_> {
                 let message = format!("PWL goes back in time, from {before} s to {time} s");
                 self.tell(
                     Diagnostic::error("pwl-backwards", written.value.span, message)
-                        .label("earlier than the point before"),
+                        .label("earlier than the point before")
+                        .help("put the points in order of time; two of equal time make a jump"),
                 );
                 return None;
             }

@@ -7,6 +7,7 @@ use std::path::Path;
 use super::Circuit;
 use super::elaborate::{ElaborateOptions, elaborate};
 use crate::diagnostic::{Diagnostic, SourceMap};
+use crate::netlist::suggest::nearest;
 use crate::netlist::{self, Files, Netlist};
 
 /// What came of a netlist file.
@@ -80,11 +81,19 @@ pub fn load_read(path: &Path, bytes: io::Result<Vec<u8>>, options: &ElaborateOpt
         Ok(bytes) => bytes,
         Err(error) => {
             let message = format!("cannot read `{}`: {error}", path.display());
+            let unreadable = Diagnostic::error("unreadable", None, message);
+            let known = names(path.parent().unwrap_or(Path::new("")));
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            let near = nearest(&name, known.iter().map(String::as_str));
+            let help = match near {
+                Some(near) => format!("did you mean `{}`?", path.with_file_name(near).display()),
+                None => "check its name and folder".into(),
+            };
             return Loaded {
                 sources,
                 netlist: None,
                 circuit: None,
-                diagnostics: vec![Diagnostic::error("unreadable", None, message)],
+                diagnostics: vec![unreadable.help(help)],
             };
         }
     };

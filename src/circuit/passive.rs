@@ -6,6 +6,7 @@ use super::{Affine, Element, Kind, NodeId, Output};
 use crate::algebra::Value;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::netlist::ast::{self, Assign, Expr, ExprKind};
+use crate::netlist::suggest::is_unit;
 
 /// Ratings and temperature coefficients: they change nothing at the nominal temperature.
 const WITHOUT_EFFECT: [&str; 27] = [
@@ -198,16 +199,11 @@ impl<'n> Builder<'n, '_> {
                     let fault =
                         Diagnostic::error("unexpected", given.span, format!("unexpected `{name}`"))
                             .label("neither a model nor part of the value");
-                    let unit = [
-                        "ohm", "ohms", "f", "h", "uf", "nf", "pf", "mh", "uh", "k", "meg",
-                    ];
-                    self.tell(if unit.contains(&name.as_str()) {
-                        fault.help(format!(
-                            "write the unit directly after the number, as in `10{name}`"
-                        ))
+                    self.tell(fault.help(if is_unit(name) {
+                        format!("write the unit directly after the number, as in `10{name}`")
                     } else {
-                        fault
-                    });
+                        format!("take it out, or define it by `.model {name}`")
+                    }));
                     return None;
                 }
                 _ if value.is_some() => {

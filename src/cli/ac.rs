@@ -85,13 +85,13 @@ fn phasors(
     streams: &Streams,
 ) -> Result<Phasors, Failure> {
     if !model.circuit().steps.is_empty() {
-        streams.say("note: `.step` is left out: this is the response of the values as they stand");
+        streams.note("`.step` is left out: this is the response of the values as they stand");
     }
     let found = small_signal(model, options);
     let response =
         found.map_err(|error| input::broke_off(input, &error, model.places(), streams))?;
     for note in model.places().all(&response.notes) {
-        streams.say(format!("note: {note}"));
+        streams.note(note);
     }
     if streams.verbose {
         streams.say(match &response.orbit {

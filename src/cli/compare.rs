@@ -68,8 +68,7 @@ pub(super) fn compare(args: &CompareArgs, streams: &Streams) -> Result<Exit, Fai
         if with_ngspice(args) {
             return every(args, model, streams);
         }
-        streams
-            .say("note: `.step` is left out: the file is compared with the values as they stand");
+        streams.note("`.step` is left out: the file is compared with the values as they stand");
     }
     let found = Found::of(args, &subject, streams)?;
     if let Some(path) = &args.output {
@@ -200,7 +199,7 @@ impl Found {
 
     fn tell_notes(&self, streams: &Streams) {
         for note in &self.theirs.notes {
-            streams.say(format!("note: {note}"));
+            streams.note(note);
         }
     }
 }
@@ -340,7 +339,7 @@ fn simulated(
     let run = sim::run(subject, &request, Some(tran.tstep / divisions), streams)
         .map_err(|error| input::broke_off(&args.input, &error, subject.places(), streams))?;
     for note in subject.places().all(&run.notes) {
-        streams.say(format!("note: {note}"));
+        streams.note(note);
     }
     Ok(run.waveforms)
 }

@@ -29,7 +29,7 @@ pub(super) fn sim(
         }
     }
     if !model.circuit().steps.is_empty() {
-        streams.say("note: `.step` is left out: `.dc` is computed with the values as they stand");
+        streams.note("`.step` is left out: `.dc` is computed with the values as they stand");
     }
     let found = analysis::dc(model).map_err(|Unsolved { at, circuit, error }| {
         let Some(circuit) = &circuit else {

@@ -1,6 +1,6 @@
 //! Where the results of a command go, and what it says of them.
 
-use super::args::{Input, ResultArgs, Summary};
+use super::args::{Input, MessageFormat, ResultArgs, Summary};
 use super::exit::{Exit, Failure};
 use super::input;
 use super::output::{Format, Outputs};
@@ -95,7 +95,7 @@ impl<'a> Destination<'a> {
         };
         if self.wanted.fixed_step && run.method == Method::Exact.name() {
             self.streams
-                .say("note: --step is of no use to exact integration, which has no steps");
+                .note("--step is of no use to exact integration, which has no steps");
         }
         if feeds {
             // A failure is told by `finish`.
@@ -116,7 +116,7 @@ impl<'a> Destination<'a> {
         if let Err(failure) = written {
             if let (false, Some(t)) = (failure.is_closed_pipe() || files.is_empty(), last) {
                 self.streams
-                    .say(format!("note: rows were written until {t:e} s"));
+                    .note(format!("rows were written until {t:e} s"));
             }
             return Err(failure);
         }
@@ -183,21 +183,23 @@ impl<'a> Destination<'a> {
     fn summarise(&self, run: &Run, found: &Measurements) {
         let (places, streams, summary) = (self.places, self.streams, self.wanted.results.summary);
         let in_words = summary == Some(Summary::Text)
-            || summary.is_none() && (streams.verbose || streams.err_is_terminal());
+            || summary.is_none()
+                && (streams.verbose || streams.err_is_terminal())
+                && streams.messages == MessageFormat::Human;
         if !in_words {
             for warning in text::warnings(run, places) {
-                streams.say(format!("warning: {warning}"));
+                streams.warning(warning);
             }
         }
         match summary {
             Some(Summary::Json) => return streams.error(json::summary(run, found, places)),
             Some(Summary::Text) => streams.error(text::summary(run, places, streams.verbose)),
-            None if streams.verbose || streams.err_is_terminal() => {
+            None if in_words => {
                 streams.say(text::summary(run, places, streams.verbose));
             }
             None => {
                 for note in places.all(&run.notes) {
-                    streams.say(format!("note: {note}"));
+                    streams.note(note);
                 }
             }
         }
@@ -206,7 +208,7 @@ impl<'a> Destination<'a> {
             .chain(found.worst.iter().map(|worst| &worst.notes))
             .flatten();
         for note in notes {
-            streams.say(format!("note: {}", places.of(note)));
+            streams.note(places.of(note));
         }
         // Asked for, as a summary is.
         if !found.is_empty() {

@@ -132,7 +132,7 @@ pub fn open_as_it_stands(
     if let Subject::Circuit(model) = &subject
         && !model.circuit().steps.is_empty()
     {
-        streams.say("note: `.step` is left out: these are the values as they stand");
+        streams.note("`.step` is left out: these are the values as they stand");
     }
     Ok(subject)
 }
@@ -256,7 +256,7 @@ pub fn start_system(
         }
     };
     for note in subject.places().all(&initial.notes) {
-        streams.say(format!("note: {note}"));
+        streams.note(note);
     }
     let mut switches = initial.switches;
     for (k, on) in positions(behaviour, wanted)? {
@@ -296,14 +296,14 @@ pub fn sparse_system(
     let initial = match initial {
         Ok(initial) => initial,
         Err(error) => {
-            streams.say(format!(
-                "note: {error}; the start state is the initial conditions"
+            streams.note(format!(
+                "{error}; the start state is the initial conditions"
             ));
             start::initial(circuit, behaviour, true, &Settings::default()).map_err(Box::new)?
         }
     };
     for note in subject.places().all(&initial.notes) {
-        streams.say(format!("note: {note}"));
+        streams.note(note);
     }
     let mut switches = initial.switches;
     for (k, on) in positions(behaviour, wanted)? {
@@ -313,8 +313,8 @@ pub fn sparse_system(
         .map_err(|error| Box::new(Error::before(error.into())))?;
     if system.imprecise > 0 {
         let count = system.imprecise;
-        streams.say(format!(
-            "note: {count} entries are small differences of large numbers and not known to be within 1e-14 of the exact ones"
+        streams.note(format!(
+            "{count} entries are small differences of large numbers and not known to be within 1e-14 of the exact ones"
         ));
     }
     let x0 = system.state_from(initial.storage.as_slice());

@@ -30,8 +30,8 @@ pub(super) fn lcs(args: &LcsArgs, streams: &Streams) -> Result<Exit, Failure> {
         failure => failure,
     })?;
     if let Some(error) = without {
-        streams.say(format!(
-            "note: {error}; the start state is the initial conditions"
+        streams.note(format!(
+            "{error}; the start state is the initial conditions"
         ));
     }
     let text = match args.format {

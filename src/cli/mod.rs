@@ -81,8 +81,8 @@ pub fn main() -> Exit {
             let told = matches!(failure, Failure::Faults(_));
             match cli.message_format {
                 MessageFormat::Json if told => {}
-                MessageFormat::Json => streams.error(render::json_line(&failure.to_string())),
-                _ => streams.error(format!("error: {failure}")),
+                MessageFormat::Short if told => streams.error(format!("error: {failure}")),
+                form => streams.error(render::failure(&failure.to_string(), form)),
             }
             Exit::Failed
         }

@@ -58,7 +58,7 @@ pub(super) fn op(args: &OpArgs, streams: &Streams) -> Result<Exit, Failure> {
         for (values, point, notes) in &points {
             let label = steps::label(values);
             for note in notes {
-                streams.say(format!("note: {label}: {note}"));
+                streams.note(format!("{label}: {note}"));
             }
             streams.data(format!("{label}\n{}\n", words(point)))?;
         }
@@ -80,7 +80,7 @@ fn one(
         return Ok(Exit::Done);
     }
     for note in notes {
-        streams.say(format!("note: {note}"));
+        streams.note(note);
     }
     streams.data(words(point))?;
     Ok(Exit::Done)

@@ -23,7 +23,7 @@ pub(super) fn pss(args: &PssArgs, streams: &Streams) -> Result<Exit, Failure> {
     let subject = input::open(&args.input, &args.results.probes, &paths, streams)?;
     let model = input::model_of(&args.input, &subject)?;
     if !model.circuit().steps.is_empty() {
-        streams.say("note: `.step` is left out: this is the orbit of the values as they stand");
+        streams.note("`.step` is left out: this is the orbit of the values as they stand");
     }
     let signals = Signals::watch()?;
     let wanted = Wanted {

@@ -7,6 +7,7 @@ use miette::{
     SourceCode, SourceSpan, SpanContents,
 };
 
+use super::args::MessageFormat;
 use crate::check::Fault;
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 use crate::report;
@@ -58,11 +59,7 @@ pub(super) fn short(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
             _ => String::new(),
         };
         let help = help.map_or_else(String::new, |help| format!(" ({help})"));
-        let severity = match severity {
-            Severity::Note => "note",
-            Severity::Warning => "warning",
-            Severity::Error => "error",
-        };
+        let severity = word(severity);
         format!("{place}{severity}[{code}]: {message}{help}")
     };
     lines(diagnostics.iter().map(line))
@@ -75,10 +72,55 @@ pub(super) fn json(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
     lines(diagnostics.iter().map(line))
 }
 
-/// The same of a failure without a place.
-pub(super) fn json_line(message: &str) -> String {
-    let failure = Diagnostic::error("failure", None, message);
-    report::json::line(&Fault::of(&failure, &SourceMap::default()))
+/// A failure without a place, as a line.
+pub(super) fn failure(message: &str, form: MessageFormat) -> String {
+    let failure = [Diagnostic::error("failure", None, message)];
+    match form {
+        MessageFormat::Human => format!("error: {message}"),
+        MessageFormat::Short => short(&failure, &SourceMap::default()),
+        MessageFormat::Json => json(&failure, &SourceMap::default()),
+    }
+}
+
+/// What there is to say of a run, which may begin with its place, `file:line:col: `, as a line.
+pub(super) fn remark(severity: Severity, text: &str, form: MessageFormat) -> String {
+    let word = word(severity);
+    let (place, message) = placed(text);
+    match (form, place) {
+        (MessageFormat::Human, _) => format!("{word}: {text}"),
+        (MessageFormat::Short, None) => format!("{word}[run]: {text}"),
+        (MessageFormat::Short, Some((file, line, column))) => {
+            format!("{file}:{line}:{column}: {word}[run]: {message}")
+        }
+        (MessageFormat::Json, place) => report::json::line(&Fault {
+            code: "run",
+            severity,
+            message: message.to_owned(),
+            file: place.map(|(file, ..)| file.to_owned()),
+            line: place.map(|(_, line, _)| line),
+            column: place.map(|(.., column)| column),
+            help: None,
+        }),
+    }
+}
+
+/// The place that a text begins with, and the rest.
+fn placed(text: &str) -> (Option<(&str, usize, usize)>, &str) {
+    let place = text.match_indices(": ").find_map(|(at, _)| {
+        let mut parts = text[..at].rsplitn(3, ':');
+        let column = parts.next()?.parse().ok()?;
+        let line = parts.next()?.parse().ok()?;
+        Some(((parts.next()?, line, column), &text[at + 2..]))
+    });
+    place.map_or((None, text), |(place, rest)| (Some(place), rest))
+}
+
+const fn word(severity: Severity) -> &'static str {
+    match severity {
+        Severity::Note => "note",
+        Severity::Warning => "warning",
+        Severity::Error => "error",
+    }
 }
 
 fn lines(lines: impl Iterator<Item = String>) -> String {

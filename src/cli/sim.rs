@@ -61,8 +61,8 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         }
         if !circuit.ac.is_empty() {
             let file = args.input.file.display();
-            streams.say(format!(
-                "note: `.ac` is left out, as there is a `.tran`; `circ ac {file}` carries it out"
+            streams.note(format!(
+                "`.ac` is left out, as there is a `.tran`; `circ ac {file}` carries it out"
             ));
         }
         if circuit.tran.is_none() && !circuit.dc.is_empty() {

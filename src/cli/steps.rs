@@ -168,7 +168,7 @@ impl Stepping<'_> {
             }
             None => {
                 for note in destination.places.all(&total.notes) {
-                    streams.say(format!("note: {note}"));
+                    streams.note(note);
                 }
             }
         }

@@ -8,6 +8,8 @@ use console::Term;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::args::MessageFormat;
+use super::render;
+use crate::diagnostic::Severity;
 
 /// Lines of a terminal when it does not say.
 const DEFAULT_SIZE: (usize, usize) = (24, 80);
@@ -93,6 +95,24 @@ impl Streams {
         if !self.quiet {
             self.error(text);
         }
+    }
+
+    /// Says something that is worth knowing of a run, which may begin with its place, in the form of findings.
+    pub fn note(&self, text: impl Display) {
+        self.say(render::remark(
+            Severity::Note,
+            &text.to_string(),
+            self.messages,
+        ));
+    }
+
+    /// Says something of a run that is probably not what was meant, in the form of findings.
+    pub fn warning(&self, text: impl Display) {
+        self.say(render::remark(
+            Severity::Warning,
+            &text.to_string(),
+            self.messages,
+        ));
     }
 
     /// Says something even when quiet.

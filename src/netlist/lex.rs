@@ -12,6 +12,7 @@ use nom::{Err as NomErr, IResult, Input as _};
 use nom_locate::LocatedSpan;
 
 use super::ast::Name;
+use super::suggest::is_unit;
 use crate::diagnostic::{Diagnostic, FileId, Span};
 
 /// A card as it stands in its file, continuations joined.
@@ -377,17 +378,13 @@ pub(super) fn end(i: Input<'_>) -> Parsed<'_, ()> {
     let text = &i.fragment()[..span.end - span.start];
     let fault = Diagnostic::error("unexpected", span, format!("unexpected `{text}`"))
         .label("nothing should stand here");
-    let unit = [
-        "ohm", "ohms", "f", "h", "v", "a", "s", "hz", "uf", "nf", "pf", "mh", "uh", "k", "meg",
-        "ms", "us",
-    ];
-    Err(refuse(if unit.contains(&text.to_lowercase().as_str()) {
+    Err(refuse(if is_unit(text) {
         fault.help(format!(
             "write the unit directly after the number, as in `10{text}`"
         ))
     } else if text == ")" {
         fault.help("there is one closing parenthesis too many")
     } else {
-        fault
+        fault.help("take it out; a comment at the end of a card begins with `;`")
     }))
 }

@@ -17,9 +17,31 @@ pub(crate) fn nearest<'a>(
         .map(|(_, candidate)| candidate.to_string())
 }
 
+/// Whether a word is a unit, with or without a prefix: `ohm`, `kohm`, `uF`, `Meg`.
+pub(crate) fn is_unit(word: &str) -> bool {
+    const PREFIXES: [&str; 11] = ["", "t", "g", "meg", "k", "m", "u", "µ", "n", "p", "f"];
+    const UNITS: [&str; 14] = [
+        "", "ohm", "ohms", "Ω", "f", "farad", "h", "henry", "v", "volt", "a", "s", "hz", "w",
+    ];
+    let word = word.to_lowercase().replace('ω', "Ω");
+    let rest = |prefix: &&str| word.strip_prefix(*prefix).filter(|_| !word.is_empty());
+    let mut rests = PREFIXES.iter().filter_map(rest);
+    rests.any(|rest| UNITS.contains(&rest))
+}
+
 #[cfg(test)]
 mod tests {
-    use super::nearest;
+    use super::{is_unit, nearest};
+
+    #[test]
+    fn units_have_prefixes() {
+        for unit in ["ohm", "kOhm", "uF", "Meg", "megohm", "kΩ", "ms", "V", "k"] {
+            assert!(is_unit(unit), "{unit}");
+        }
+        for other in ["", "dc", "ideal", "ic", "out"] {
+            assert!(!is_unit(other), "{other}");
+        }
+    }
 
     #[test]
     fn only_what_is_near() {

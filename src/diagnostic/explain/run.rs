@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 18] = [
+pub(super) const CODES: [Explanation; 19] = [
     Explanation::of(
         "events-accumulate",
         "Switching follows switching ever faster, and time does not go on.",
@@ -93,6 +93,13 @@ pub(super) const CODES: [Explanation; 18] = [
         "A longer `tstep` on `.tran`.",
     )
     .shown("femto\nv1 a 0 1\nr1 a 0 1\n.tran 1f 1000\n"),
+    Explanation::of(
+        "run",
+        "A note or a warning of a run that was made.",
+        "A print step too long for what happens, charge that is lost in a jump, exact integration that had to end.",
+        "The message says what it means for the results; `-v` tells more of the run.",
+    )
+    .shown("a print step of half a period\nv1 a 0 sin(0 1 50)\nr1 a 0 1k\n.tran 10m 100m\n"),
     Explanation::of(
         "step-too-small",
         "The error cannot be kept within the tolerance however short the step.",
