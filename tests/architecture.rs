@@ -587,3 +587,20 @@ fn the_rooms_are_those_of_the_library() {
         );
     }
 }
+
+#[test]
+fn every_page_of_the_documentation_is_in_the_book() {
+    let docs = source().join("../docs");
+    let summary = std::fs::read_to_string(docs.join("book/SUMMARY.md")).expect("SUMMARY.md");
+    for folder in ["docs", "docs/decisions"] {
+        for entry in std::fs::read_dir(source().join("..").join(folder)).expect("a folder") {
+            let name = entry.expect("an entry").file_name();
+            let page = format!("{folder}/{}", name.to_string_lossy());
+            let is_listed = summary.contains(&format!("]({page})"));
+            assert!(
+                is_listed || !page.ends_with(".md"),
+                "{page} is not in docs/book/SUMMARY.md"
+            );
+        }
+    }
+}
