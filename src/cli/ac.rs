@@ -87,7 +87,9 @@ fn phasors(
     if !model.circuit().steps.is_empty() {
         streams.note("`.step` is left out: this is the response of the values as they stand");
     }
+    let busy = streams.busy("finding the response");
     let found = small_signal(model, options);
+    drop(busy);
     let response =
         found.map_err(|error| input::broke_off(input, &error, model.places(), streams))?;
     for note in model.places().all(&response.notes) {

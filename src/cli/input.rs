@@ -154,17 +154,20 @@ pub fn open(
         system.lcs = keep_outputs(system.lcs, probes)?;
         return Ok(Subject::System(Box::new(system)));
     }
+    let busy = streams.busy(&format!("reading {}", input.file.display()));
     let Loaded {
         sources,
         netlist,
         circuit,
         diagnostics,
     } = load(input);
+    drop(busy);
     show(&diagnostics, &sources, streams);
     files::spare(outputs, sources.files.iter().map(|f| Path::new(&f.path)))?;
     files::writable(outputs)?;
     let mut circuit = circuit.ok_or_else(|| faults(input, &diagnostics))?;
     keep_probes(&mut circuit, probes)?;
+    let _busy = streams.busy("reducing");
     let model = Model::of(netlist, sources, choices(input), circuit, Vec::new())
         .map_err(|faults| refused(input, &faults.into(), streams))?;
     Ok(Subject::Circuit(Box::new(model)))

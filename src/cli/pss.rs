@@ -44,6 +44,7 @@ pub(super) fn pss(args: &PssArgs, streams: &Streams) -> Result<Exit, Failure> {
         cancel: Some(signals.flag()),
         ..PeriodicOptions::default()
     };
+    let busy = streams.busy("looking for the periodic steady state");
     let found = periodic_measured(model, &options).and_then(|(orbit, run, mut found)| {
         let TableArgs {
             table,
@@ -59,6 +60,7 @@ pub(super) fn pss(args: &PssArgs, streams: &Streams) -> Result<Exit, Failure> {
         };
         Ok((run, found))
     });
+    drop(busy);
     let finished = match found {
         Ok(run) => Finished {
             run: Some(run),

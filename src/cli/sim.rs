@@ -27,7 +27,7 @@ use crate::integrate::{
 };
 use crate::lcs::Input;
 use crate::model::Model;
-use crate::report;
+use crate::report::{self, si::quantity};
 use crate::settings::Settings;
 
 /// Divisions of the progress bar.
@@ -120,6 +120,8 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         from_orbit: args.from_pss,
     };
     let mut finished = measured_run(&subject, &request, route, streams);
+    let more = args.table.table || args.verify || !args.worst.is_empty();
+    let busy = more.then(|| streams.busy("looking at the run again"));
     if let (true, None) = (args.table.table, &finished.error) {
         tabulate(args, &subject, &request, &mut finished, signals.flag());
     }
@@ -140,6 +142,7 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
             }
         }
     }
+    drop(busy);
     if let Some(circuit) = circuit
         && let Some((run, found)) = finished.run.take()
     {
@@ -456,7 +459,7 @@ fn with_options<R>(
 ) -> R {
     let mut sink = route.sink;
     let sink = sink.as_mut().map(|s| &mut **s as Sink<'_>);
-    let bar = streams.progress(PROGRESS as u64, "simulating");
+    let bar = streams.progress(PROGRESS as u64, "setting up");
     let span = tran.map_or(1.0, |t| t.tstop);
     let mut shown = 0;
     let mut report = |t: f64| {
@@ -464,6 +467,11 @@ fn with_options<R>(
         if position != shown {
             shown = position;
             bar.set_position(position);
+            bar.set_message(format!(
+                "simulating {} of {}",
+                quantity(t, "s", 3),
+                quantity(span, "s", 3)
+            ));
         }
     };
     let mut settings = request.settings();

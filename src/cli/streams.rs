@@ -3,14 +3,17 @@
 use std::env;
 use std::fmt::Display;
 use std::io::{self, IsTerminal, Write};
+use std::time::Duration;
 
 use console::Term;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 
 use super::args::MessageFormat;
 use super::render;
 use crate::diagnostic::Severity;
 
+/// How often a progress bar moves by itself: what takes long is still alive.
+const TICK: Duration = Duration::from_millis(120);
 /// Lines of a terminal when it does not say.
 const DEFAULT_SIZE: (usize, usize) = (24, 80);
 
@@ -123,12 +126,26 @@ impl Streams {
     /// A progress bar over `length` units on a terminal; hidden elsewhere and when quiet.
     #[must_use]
     pub fn progress(&self, length: u64, what: &str) -> ProgressBar {
+        self.bar(length, what, "{spinner} {msg} {wide_bar} {percent}% {eta}")
+    }
+
+    /// What is being done, for as long as the result lives, where nobody knows how long it takes; hidden as [`Self::progress`] is.
+    #[must_use]
+    pub fn busy(&self, what: &str) -> ProgressBar {
+        self.bar(1, what, "{spinner} {msg} {elapsed}")
+    }
+
+    fn bar(&self, length: u64, what: &str, template: &str) -> ProgressBar {
         if self.quiet || !self.err_is_terminal() || is_dumb() {
             return ProgressBar::hidden();
         }
-        let style = ProgressStyle::with_template("{msg} {wide_bar} {percent}% {eta}");
-        ProgressBar::new(length)
+        let style = ProgressStyle::with_template(template);
+        let bar = ProgressBar::new(length)
             .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
             .with_message(what.to_owned())
+            .with_finish(ProgressFinish::AndClear);
+        bar.tick();
+        bar.enable_steady_tick(TICK);
+        bar
     }
 }
