@@ -528,6 +528,15 @@ fn an_unknown_probe_says_what_was_probably_meant() {
         assert!(ran.err.contains(&format!("--probe {probe}: ")), "{ran}");
         assert!(ran.err.contains(words), "{ran}");
     }
+    let directory = place();
+    let swept = DIVIDER.replace(".tran 1m 3m", ".dc v1 0 2 1\n.save v(in)*2");
+    fs::write(directory.path().join("swept.cir"), swept).unwrap();
+    let ran = run_in(directory.path(), "sim swept.cir");
+    assert!(
+        ran.err.contains("note: `v(in)*2` is an expression"),
+        "{ran}"
+    );
+    assert_eq!(ran.out.lines().next(), Some("v1,v(in)"));
     let ran = run("ac divider.cir --probe 2*v(in)");
     assert!(ran.err.contains("signals and ratios of two"), "{ran}");
 }

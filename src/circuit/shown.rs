@@ -19,6 +19,14 @@ pub struct Column {
     pub formula: Formula,
 }
 
+impl Column {
+    /// Whether it is a signal as it is.
+    #[must_use]
+    pub const fn is_signal(&self) -> bool {
+        matches!(self.formula, Formula::Signal(_))
+    }
+}
+
 type Read<T> = Result<T, Box<Diagnostic>>;
 
 impl Circuit {

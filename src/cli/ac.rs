@@ -87,6 +87,7 @@ fn phasors(
     if !model.circuit().steps.is_empty() {
         streams.note("`.step` is left out: this is the response of the values as they stand");
     }
+    input::tell_expressions(model, streams);
     let busy = streams.busy("finding the response");
     let found = small_signal(model, options);
     drop(busy);

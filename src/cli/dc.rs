@@ -31,6 +31,7 @@ pub(super) fn sim(
     if !model.circuit().steps.is_empty() {
         streams.note("`.step` is left out: `.dc` is computed with the values as they stand");
     }
+    input::tell_expressions(model, streams);
     let found = analysis::dc(model).map_err(|Unsolved { at, circuit, error }| {
         let Some(circuit) = &circuit else {
             return input::refused(&args.input, &error, streams);

@@ -211,6 +211,16 @@ fn keep_probes(circuit: &mut Circuit, probes: &[String]) -> Result<(), Failure> 
     shown.map_err(|why| Failure::Message(format!("--probe {why}")))
 }
 
+/// A note where expressions are asked for of an analysis that shows signals alone.
+pub(super) fn tell_expressions(model: &Model, streams: &Streams) {
+    if let Some(column) = model.circuit().columns.iter().find(|c| !c.is_signal()) {
+        let name = &column.name;
+        streams.note(format!(
+            "`{name}` is an expression: shown are the signals in it"
+        ));
+    }
+}
+
 /// The model of a subject.
 ///
 /// # Errors
