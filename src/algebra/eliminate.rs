@@ -44,9 +44,9 @@ impl<F: Field> Table<F> {
     #[must_use]
     pub fn new(rows: Vec<SparseRow<F>>, cols: usize) -> Self {
         let mut table = Self {
-            rows,
             heads: vec![None; cols],
-            links: Vec::new(),
+            links: Vec::with_capacity(rows.iter().map(Vec::len).sum()),
+            rows,
         };
         for r in 0..table.rows.len() {
             for k in 0..table.rows[r].len() {
@@ -54,12 +54,6 @@ impl<F: Field> Table<F> {
             }
         }
         table
-    }
-
-    /// The first `count` rows.
-    #[must_use]
-    pub fn head(&self, count: usize) -> Self {
-        Self::new(self.rows[..count].to_vec(), self.cols())
     }
 
     /// Number of rows.

@@ -17,5 +17,5 @@ pub use double::Double;
 pub use eliminate::{Elimination, Table};
 pub use field::Field;
 pub use rational::{Rational, rational};
-pub use sparse::{SparseRow, add_scaled, eliminate_sparse, entry, part, sparse, subtract};
+pub use sparse::{SparseRow, add_scaled, eliminate_sparse, entry, part, sparse, subtract, summed};
 pub use value::Value;

@@ -70,6 +70,20 @@ fn push_all<F: Field>(target: &mut SparseRow<F>, entries: &[(usize, F)], column:
     target.extend(entries.iter().filter(|(c, _)| *c != column).cloned());
 }
 
+/// A row from terms in any order, several of a column.
+pub fn summed<F: Field>(mut terms: Vec<(usize, F)>) -> SparseRow<F> {
+    terms.sort_by_key(|(c, _)| *c);
+    terms.dedup_by(|later, kept| {
+        let same = later.0 == kept.0;
+        if same {
+            kept.1 = kept.1.add(&later.1);
+        }
+        same
+    });
+    terms.retain(|(_, x)| !x.is_zero());
+    terms
+}
+
 /// target ← target + scale · row.
 pub fn add_scaled<F: Field>(target: &mut SparseRow<F>, scale: &F, row: &[(usize, F)]) {
     if target.is_empty() {

@@ -12,7 +12,8 @@ use super::signals::Signals;
 use super::streams::Streams;
 use crate::analysis::{self, Ratio, SmallSignalOptions, margins, ratios, small_signal};
 use crate::model::Model;
-use crate::report::{bode, html, svg, text};
+use crate::report::html::Page;
+use crate::report::{bode, svg, text};
 use crate::waveform::Phasors;
 
 /// Finds the small-signal response and writes it.
@@ -142,7 +143,7 @@ fn write(
                 continue;
             }
             Format::Html => {
-                let page = html::sheet(&bode::figure(phasors), "")?;
+                let page = Page::of_figure(&bode::figure(phasors)).html()?;
                 bytes.get_mut().extend_from_slice(page.as_bytes());
             }
         }

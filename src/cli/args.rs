@@ -479,7 +479,7 @@ pub struct CompareArgs {
     /// Keep the ngspice deck in this file
     #[arg(long, value_name = "DECK")]
     pub keep: Option<PathBuf>,
-    /// Draw both and their difference to this svg or png file
+    /// Draw both and their difference to this svg, png or html file
     #[arg(short, long, value_name = "OUT")]
     pub output: Option<PathBuf>,
     /// Print JSON

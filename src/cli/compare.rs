@@ -19,7 +19,8 @@ use crate::analysis::variants;
 use crate::circuit::Tran;
 use crate::integrate::Method;
 use crate::model::Model;
-use crate::report::figure::Figure;
+use crate::report::figure::{Figure, PANEL_WIDTH};
+use crate::report::html::Page;
 use crate::report::{json, steps, svg, text};
 use crate::waveform::compare::{At, Comparison, compare as compare_waveforms, difference};
 use crate::waveform::{Waveforms, csv, raw};
@@ -57,9 +58,9 @@ pub(super) fn compare(args: &CompareArgs, streams: &Streams) -> Result<Exit, Fai
         files::spare(&outputs, [args.against.as_path()])?;
     }
     if let Some(path) = &args.output
-        && !has_ending(path, &["svg", "png"])
+        && !has_ending(path, &["svg", "png", "html", "htm"])
     {
-        return Err(output::unknown_ending(path, "svg or png"));
+        return Err(output::unknown_ending(path, "svg, png or html"));
     }
     let subject = input::open(&args.input, &[], &outputs, streams)?;
     if let Subject::Circuit(model) = &subject
@@ -352,7 +353,12 @@ fn draw(path: &Path, found: &Found) -> Result<(), Failure> {
     let names: Vec<String> = worst.iter().take(DRAWN).map(|s| s.name.clone()).collect();
     let delta = difference(ours, &theirs.waveforms)?;
     let label = theirs.name.split(' ').next().unwrap_or("reference");
-    let figure = Figure::of_comparison(ours, &theirs.waveforms, &delta, label, &names);
+    let is_page = has_ending(path, &["html", "htm"]);
+    let pixels = if is_page { usize::MAX } else { PANEL_WIDTH };
+    let figure = Figure::of_comparison(ours, &theirs.waveforms, &delta, label, &names, pixels);
+    if is_page {
+        return files::write(path, Page::of_figure(&figure).html()?.as_bytes());
+    }
     output::picture_to_file(path, has_ending(path, &["png"]), &svg::draw(&figure)?)
 }
 

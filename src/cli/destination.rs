@@ -3,7 +3,7 @@
 use super::args::{Input, MessageFormat, ResultArgs, Summary};
 use super::exit::{Exit, Failure};
 use super::input;
-use super::output::{Format, Outputs};
+use super::output::{Format, Outputs, Told};
 use super::rows::{Columns, Shown};
 use super::streams::Streams;
 use crate::analysis::{Finished, Measurements};
@@ -105,8 +105,13 @@ impl<'a> Destination<'a> {
         let until = last.map_or("before its first row".into(), |t| format!("at {t:e} s"));
         let incomplete = error.as_ref().map(|_| format!("incomplete: ends {until}"));
         let files = outputs.words();
-        let figure = || Figure::of_waveforms(&run.waveforms);
-        let written = outputs.finish((&run, self.places), &figure, incomplete.as_deref());
+        let figure = |pixels| Figure::of_waveforms(&run.waveforms, pixels);
+        let told = Told {
+            run: &run,
+            found: &found,
+            places: self.places,
+        };
+        let written = outputs.finish(told, &figure, incomplete.as_deref());
         self.summarise(&run, &found);
         if self.plots {
             let (lines, columns) = self.streams.size();

@@ -34,7 +34,7 @@ use std::panic::{self, AssertUnwindSafe};
 use std::path::Path;
 
 use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser};
+use clap::{CommandFactory, FromArgMatches};
 
 use args::{Cli, Command, MessageFormat};
 use exit::{Exit, Failure};
@@ -45,7 +45,10 @@ pub use render::render;
 /// Carries out the command line of this process.
 #[must_use]
 pub fn main() -> Exit {
-    let cli = match Cli::try_parse_from(with_command(std::env::args_os())) {
+    let mut command = Cli::command();
+    let args = with_command(std::env::args_os(), &command);
+    let parsed = command.try_get_matches_from_mut(args);
+    let cli = match parsed.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version go to standard output, usage errors to standard error.
@@ -93,9 +96,8 @@ pub fn main() -> Exit {
 }
 
 /// `circ FILE` is `circ sim FILE`: where no argument is a command and one is a file or `-`.
-fn with_command(args: impl Iterator<Item = OsString>) -> Vec<OsString> {
+fn with_command(args: impl Iterator<Item = OsString>, commands: &clap::Command) -> Vec<OsString> {
     let mut args: Vec<OsString> = args.collect();
-    let commands = Cli::command();
     let is_command = |arg: &OsString| {
         let name = arg.to_str();
         name.is_some_and(|name| name == "help" || commands.find_subcommand(name).is_some())

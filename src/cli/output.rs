@@ -10,9 +10,11 @@ use super::exit::Failure;
 use super::files::{self, STDOUT, Written};
 use super::rows::{Columns, Form, Shown, Stream};
 use super::streams::Streams;
+use crate::analysis::Measurements;
 use crate::integrate::{Block, Places, Run};
-use crate::report::figure::Figure;
-use crate::report::{PictureError, html, png, svg};
+use crate::report::figure::{Figure, PANEL_WIDTH};
+use crate::report::html::Page;
+use crate::report::{PictureError, png, svg};
 use crate::waveform::{csv, json, npz, raw};
 
 /// Formats of a run's results.
@@ -119,6 +121,14 @@ pub(super) fn unknown_ending(path: &Path, known: &str) -> Failure {
     ))
 }
 
+/// A run, what was measured in it, and where its elements stand.
+#[derive(Clone, Copy)]
+pub(super) struct Told<'a> {
+    pub(super) run: &'a Run,
+    pub(super) found: &'a Measurements,
+    pub(super) places: Places<'a>,
+}
+
 /// The results of a run: those that are written as rows come, and those that need all of them.
 pub(super) struct Outputs {
     streams: Vec<Stream>,
@@ -195,14 +205,15 @@ impl Outputs {
         names.join(", ")
     }
 
-    /// Writes what needs all rows, and gives all files their names; `incomplete` says why a run ended early. Every file is tried.
+    /// Writes what needs all rows, and gives all files their names; `incomplete` says why a run ended early, `figure` what is to be seen for so
+    /// many pixels. Every file is tried.
     ///
     /// # Errors
     /// The first failure.
     pub(super) fn finish(
         self,
-        (run, places): (&Run, Places<'_>),
-        figure: &dyn Fn() -> Figure,
+        told: Told<'_>,
+        figure: &dyn Fn(usize) -> Figure,
         incomplete: Option<&str>,
     ) -> Result<(), Failure> {
         let mut first = Ok(());
@@ -214,7 +225,7 @@ impl Outputs {
             first = first.and(failure.map_or(finished, Err));
         }
         for (file, format) in self.held {
-            let written = match write((run, places), figure, self.shown, format, file, incomplete) {
+            let written = match write(told, figure, self.shown, format, file, incomplete) {
                 // A picture of a run that broke off before its first row.
                 Err(Failure::Picture(_)) if incomplete.is_some() => Ok(()),
                 written => written,
@@ -227,8 +238,8 @@ impl Outputs {
 
 /// Writes a run to a file; pictures show `figure`.
 fn write(
-    (run, places): (&Run, Places<'_>),
-    figure: &dyn Fn() -> Figure,
+    told: Told<'_>,
+    figure: &dyn Fn(usize) -> Figure,
     shown: Shown,
     format: Format,
     mut file: Written,
@@ -236,23 +247,23 @@ fn write(
 ) -> Result<(), Failure> {
     let titled =
         |title: &str| incomplete.map_or(title.to_owned(), |why| format!("{title} ({why})"));
-    let drawing = || {
-        let mut figure = figure();
+    let drawing = |pixels| {
+        let mut figure = figure(pixels);
         figure.title = titled(&figure.title);
         figure
     };
     let waves = || {
-        let mut waves = shown.of(&run.waveforms, &run.kinds);
+        let mut waves = shown.of(&told.run.waveforms, &told.run.kinds);
         waves.title = titled(&waves.title);
         waves
     };
     let result = match format {
         Format::Html => {
-            let page = html::page(run, places, &drawing())?;
-            file.append(page.as_bytes())
+            let page = Page::of_run(&drawing(usize::MAX), told.run, told.found, told.places);
+            file.append(page.html()?.as_bytes())
         }
-        Format::Svg => file.append(svg::draw(&drawing())?.as_bytes()),
-        Format::Png => file.append(&png::from_svg(&svg::draw(&drawing())?)?),
+        Format::Svg => file.append(svg::draw(&drawing(PANEL_WIDTH))?.as_bytes()),
+        Format::Png => file.append(&png::from_svg(&svg::draw(&drawing(PANEL_WIDTH))?)?),
         Format::Npz if file.can_seek() => npz::write(BufWriter::new(&mut file), &waves()),
         Format::Npz => {
             let mut bytes = Cursor::new(Vec::new());

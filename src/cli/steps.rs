@@ -4,12 +4,12 @@ use super::args::{SimArgs, Summary};
 use super::destination::Destination;
 use super::exit::{Exit, Failure};
 use super::input;
-use super::output::{Format, Outputs};
+use super::output::{Format, Outputs, Told};
 use super::rows::Columns;
 use super::signals::Signals;
 use super::sim::{self, Request, Route};
 use super::streams::Streams;
-use crate::analysis::{Finished, Variant, each, shown, variants};
+use crate::analysis::{Finished, Measurements, Variant, each, shown, variants};
 use crate::integrate::{Block, Error, Grid, Reason};
 use crate::model::Model;
 use crate::report::figure::Figure;
@@ -150,13 +150,18 @@ impl Stepping<'_> {
     ) -> Result<(), Failure> {
         let streams = destination.streams;
         let total = steps::total(done);
-        let figure = || {
+        let figure = |pixels| {
             let runs: Vec<_> = done.iter().map(|s| (s.label(), &s.run.waveforms)).collect();
-            Figure::of_runs(&runs)
+            Figure::of_runs(&runs, pixels)
         };
         // A failure is told by `finish`.
         let _ = outputs.take(Block::of(&total.waveforms, &total.kinds));
-        let written = outputs.finish((&total, destination.places), &figure, incomplete);
+        let told = Told {
+            run: &total,
+            found: &Measurements::default(),
+            places: destination.places,
+        };
+        let written = outputs.finish(told, &figure, incomplete);
         let wordy = streams.verbose || streams.err_is_terminal();
         match self.args.results.summary {
             Some(Summary::Json) => streams.error(steps::summary(done, destination.places)),

@@ -101,7 +101,8 @@ impl SparseKernel {
         let dense = Kernel::new(matrix);
         let mut sparse = Self {
             rows: dense.rows,
-            ..Self::default()
+            ends: Vec::with_capacity(dense.rows.div_ceil(BLOCK)),
+            blocks: Vec::with_capacity(dense.blocks.len()),
         };
         for k in 0..dense.rows.div_ceil(BLOCK) {
             let rows = &dense.blocks[k * dense.columns..(k + 1) * dense.columns];

@@ -19,18 +19,21 @@ impl StaticMultiport {
     /// The controls of switches that are straight sources alone, and by source whether it acts through such controls and nowhere else.
     pub(crate) fn source_controls(&self) -> (Vec<bool>, Vec<SourceControl>) {
         let reduced = self.ball();
-        let matrix = &reduced.matrix;
+        let equations = &reduced.equations;
         let place = |c: Column| reduced.place[c];
-        let holders = |c: Option<usize>| c.map_or_else(Vec::new, |c| matrix.holders(c));
-        let reading = |k: usize| reduced.equations + k;
+        // By column the readings that hold it.
+        let mut readers: Vec<Vec<usize>> = vec![Vec::new(); equations.cols()];
+        for (k, row) in reduced.readings.iter().enumerate() {
+            row.iter().for_each(|(c, _)| readers[*c].push(k));
+        }
         // Columns that an equation of their own holds at zero: the current of a source without a load.
-        let mut vanishing = vec![false; matrix.cols()];
-        for row in 0..reduced.equations {
-            if let [(c, _)] = matrix.row(row) {
+        let mut vanishing = vec![false; equations.cols()];
+        for row in 0..equations.rows() {
+            if let [(c, _)] = equations.row(row) {
                 vanishing[*c] = true;
             }
         }
-        let vanishes = |k: usize| matrix.row(reading(k)).iter().all(|(c, _)| vanishing[*c]);
+        let vanishes = |k: usize| reduced.readings[k].iter().all(|(c, _)| vanishing[*c]);
         // By reading: what it is multiplied with to powers, and whether it is the control of a switch.
         let mut factors = vec![Vec::new(); self.observed.len()];
         for power in &self.power {
@@ -49,7 +52,7 @@ impl StaticMultiport {
         let is_straight =
             |wave: &Wave| matches!(wave, Wave::Dc(_) | Wave::Pulse { .. } | Wave::Pwl { .. });
         let straight = |k: usize| is_straight(&self.sources[k].input.source.wave);
-        let mut straight_at = vec![None; matrix.cols()];
+        let mut straight_at = vec![None; equations.cols()];
         for (k, source) in self
             .sources
             .iter()
@@ -64,9 +67,9 @@ impl StaticMultiport {
             if self.switches[switch].latch.is_some() {
                 return None;
             }
-            let row = reading(self.switches[switch].control);
+            let row = &reduced.readings[self.switches[switch].control];
             let (mut constant, mut terms) = (0.0, Vec::new());
-            for (c, x) in matrix.row(row) {
+            for (c, x) in row {
                 match straight_at[*c] {
                     Some(input) => terms.push((input, x.to_f64())),
                     None if place(StaticMultiport::ONE) == Some(*c) => constant = x.to_f64(),
@@ -82,12 +85,15 @@ impl StaticMultiport {
         let found: Vec<Option<SourceControl>> = (0..self.switches.len()).map(control).collect();
         let silent = |(k, source): (usize, &SourcePort)| {
             let (value, rate) = (place(source.value), source.rate.and_then(place));
+            let loose = |c: Option<usize>| c.is_none_or(|c| equations.holders(c).is_empty());
+            let read_by = |c: Option<usize>| c.map_or(&[][..], |c| &readers[c]);
             // Idle where it is read, and by no control that reads something else besides.
-            let unread = |row: usize| {
-                let k = row.checked_sub(reduced.equations);
-                k.is_some_and(|k| idle(k) && controls[k].iter().all(|&s| found[s].is_some()))
-            };
-            straight(k) && holders(rate).is_empty() && holders(value).into_iter().all(unread)
+            let unread = |&k: &usize| idle(k) && controls[k].iter().all(|&s| found[s].is_some());
+            straight(k)
+                && loose(value)
+                && loose(rate)
+                && read_by(rate).is_empty()
+                && read_by(value).iter().all(unread)
         };
         let silent = self.sources.iter().enumerate().map(silent).collect();
         (silent, found.into_iter().flatten().collect())

@@ -252,10 +252,10 @@ pub struct StaticMultiport {
 pub(crate) struct Reduced<F> {
     /// Place of each column in the matrix below; `None` for columns that are gone.
     pub(crate) place: Vec<Option<usize>>,
-    /// First the port equations, = 0; then one row per observed quantity: its value.
-    pub(crate) matrix: Table<F>,
-    /// How many of the rows are equations.
-    pub(crate) equations: usize,
+    /// The port equations, = 0.
+    pub(crate) equations: Table<F>,
+    /// The value of each observed quantity.
+    pub(crate) readings: Vec<SparseRow<F>>,
     /// Internal columns that no equation determines; they keep a place.
     pub(crate) free: Vec<Column>,
     /// Entries of the energy matrix.
@@ -367,7 +367,8 @@ impl StaticMultiport {
             row.sort_unstable_by_key(|(k, _)| *k);
             row
         };
-        let matrix = Table::new(rows.into_iter().map(placed).collect(), width);
+        let readings = rows.split_off(equations).into_iter().map(placed).collect();
+        let equations = Table::new(rows.into_iter().map(placed).collect(), width);
         let mut place = vec![None; count];
         for (k, &c) in order.iter().enumerate().take(visible) {
             place[c] = position(k);
@@ -375,8 +376,8 @@ impl StaticMultiport {
         let resistance = |r: Value| number(Coefficient::Plus(r));
         Reduced {
             place,
-            matrix,
             equations,
+            readings,
             free: loose.iter().map(|&c| order[c]).collect(),
             metric: self
                 .metric

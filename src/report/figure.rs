@@ -2,7 +2,7 @@
 
 use crate::waveform::Waveforms;
 
-/// Width of a panel's plotting area, px; of the rows that fall on a pixel the first, the lowest, the highest and the last are drawn.
+/// Width of a panel's plotting area in a drawing, px.
 pub const PANEL_WIDTH: usize = 700;
 
 /// What stands on the common axis of a figure.
@@ -47,31 +47,32 @@ pub struct Series {
 }
 
 impl Series {
-    /// Column j, thinned to a panel's width.
-    fn column(waves: &Waveforms, j: usize, name: String) -> Self {
+    /// Column j, thinned to so many pixels.
+    fn column(waves: &Waveforms, j: usize, name: String, pixels: usize) -> Self {
         Self {
             name,
-            points: waves.thinned(j, PANEL_WIDTH),
+            points: waves.thinned(j, pixels),
         }
     }
 }
 
 impl Figure {
-    /// Volts above, amperes below, then a panel for every other unit.
+    /// Volts above, amperes below, then a panel for every other unit. Of the rows that fall on one of so many pixels the first, the lowest,
+    /// the highest and the last are points.
     #[must_use]
-    pub fn of_waveforms(waves: &Waveforms) -> Self {
-        Self::of_runs(&[(String::new(), waves)])
+    pub fn of_waveforms(waves: &Waveforms, pixels: usize) -> Self {
+        Self::of_runs(&[(String::new(), waves)], pixels)
     }
 
     /// The same with the curves of several runs, each under its label.
     #[must_use]
-    pub fn of_runs(runs: &[(String, &Waveforms)]) -> Self {
+    pub fn of_runs(runs: &[(String, &Waveforms)], pixels: usize) -> Self {
         let series = |unit: &str| {
             let mut all = Vec::new();
             for (label, waves) in runs {
                 for j in (0..waves.width()).filter(|&j| waves.units[j] == unit) {
                     let name = format!("{} {label}", waves.names[j]);
-                    all.push(Series::column(waves, j, name.trim_end().into()));
+                    all.push(Series::column(waves, j, name.trim_end().into(), pixels));
                 }
             }
             all
@@ -102,18 +103,20 @@ impl Figure {
         difference: &Waveforms,
         reference_name: &str,
         signals: &[String],
+        pixels: usize,
     ) -> Self {
         let mut panels = Vec::new();
         for name in signals {
             let Some((ours, delta)) = waves.find(name).zip(difference.find(name)) else {
                 continue;
             };
-            let mut both = vec![Series::column(waves, ours, format!("{name} circ"))];
+            let mut both = vec![Series::column(waves, ours, format!("{name} circ"), pixels)];
             if let Some(theirs) = reference.find(name) {
                 both.push(Series::column(
                     reference,
                     theirs,
                     format!("{name} {reference_name}"),
+                    pixels,
                 ));
             }
             let unit = waves.units[ours];
@@ -126,6 +129,7 @@ impl Figure {
                 difference,
                 delta,
                 format!("{name} difference"),
+                pixels,
             )];
             panels.push(Panel {
                 quantity: "difference".into(),
@@ -181,7 +185,7 @@ mod tests {
             time: vec![0.0],
             values: vec![1.0, 2.0, 3.0, 4.0],
         };
-        let panels = Figure::of_waveforms(&waves).panels;
+        let panels = Figure::of_waveforms(&waves, PANEL_WIDTH).panels;
         let shown: Vec<_> = panels
             .iter()
             .map(|p| (p.quantity.as_str(), p.series.len()))

@@ -34,6 +34,9 @@ pub enum PictureError {
     /// A circuit of so many parts.
     #[error("a circuit of {0} elements is not drawn; its graph can be written as dot")]
     Large(usize),
+    /// The data of a page are no JSON.
+    #[error("the page could not be written: {0}")]
+    Page(#[from] serde_json::Error),
     /// The rasteriser refused.
     #[error("the picture could not be rasterised: {0}")]
     Raster(String),

@@ -187,7 +187,11 @@ mod tests {
 
     #[test]
     fn a_picture_names_its_axes_with_prefixed_units() {
-        let svg = draw(&Figure::of_waveforms(&waves(&[0.0, 0.002, -0.001]))).unwrap();
+        let svg = draw(&Figure::of_waveforms(
+            &waves(&[0.0, 0.002, -0.001]),
+            PANEL_WIDTH,
+        ))
+        .unwrap();
         for text in [
             "a &lt;title&gt; &amp; more",
             "time (ms)",
@@ -214,7 +218,7 @@ mod tests {
             names,
             time,
         };
-        let svg = draw(&Figure::of_waveforms(&waves)).unwrap();
+        let svg = draw(&Figure::of_waveforms(&waves, PANEL_WIDTH)).unwrap();
         assert!(svg.len() < 350_000, "{} bytes", svg.len());
         for name in &waves.names {
             assert!(svg.contains(&format!(">{name}<")), "{name}");
@@ -248,11 +252,11 @@ mod tests {
             &[1e-30, 2e-30],
             &[-7.0, -7.0],
         ] {
-            let svg = draw(&Figure::of_waveforms(&waves(values))).unwrap();
+            let svg = draw(&Figure::of_waveforms(&waves(values), PANEL_WIDTH)).unwrap();
             assert!(!svg.contains("NaN") && !svg.contains("inf"), "{values:?}");
         }
         assert!(matches!(
-            draw(&Figure::of_waveforms(&waves(&[]))),
+            draw(&Figure::of_waveforms(&waves(&[]), PANEL_WIDTH)),
             Err(PictureError::Empty(_))
         ));
     }

@@ -9,7 +9,7 @@ pub(super) fn thinned(
 ) -> Vec<(f64, f64)> {
     let points: Vec<(f64, f64)> = time.iter().copied().zip(values).collect();
     let pixels = pixels.max(1);
-    if points.len() <= 4 * pixels {
+    if points.len() <= pixels.saturating_mul(4) {
         return points;
     }
     let (first, last) = (time[0], time[time.len() - 1]);

@@ -1,9 +1,10 @@
 //! A behaviour eliminated in class order.
 
-use crate::algebra::{Elimination, Field, SparseRow, Table, subtract};
+use crate::algebra::{Elimination, Field, SparseRow, Table, summed};
 use crate::diagnostic::Internal;
 use crate::mna::{Column, Reduced, StaticMultiport};
 
+use super::frame::Frame;
 use super::{ClassOrder, Hold, Position, ReduceError, StorageHold};
 
 /// What a column of the behaviour is in a position.
@@ -58,7 +59,7 @@ impl<'b, F: Field> Eliminated<'b, F> {
         position: &'b Position,
         order: ClassOrder,
     ) -> Result<Self, ReduceError> {
-        let matrix = reduced.matrix.head(reduced.equations);
+        let matrix = reduced.equations.clone();
         // Every column but the internal ones that were eliminated has a place.
         let place = |c: Column| {
             let name = || behaviour.columns.get(c).map_or("a column", String::as_str);
@@ -72,7 +73,7 @@ impl<'b, F: Field> Eliminated<'b, F> {
             behaviour,
             reduced,
             position,
-            found: Elimination::new(reduced.equations, matrix.cols()),
+            found: Elimination::new(matrix.rows(), matrix.cols()),
             columns: vec![Columns::Unknown; matrix.cols()],
             matrix,
             folded: Vec::new(),
@@ -169,24 +170,27 @@ impl<'b, F: Field> Eliminated<'b, F> {
         Ok(())
     }
 
-    /// Observed quantity k over the free columns.
-    pub(super) fn reading(&self, k: usize) -> SparseRow<F> {
-        let mut reading = SparseRow::new();
-        for (c, x) in self.reduced.matrix.row(self.reduced.equations + k) {
+    /// Observed quantity k in frame order.
+    pub(super) fn reading(&self, frame: &Frame, k: usize) -> SparseRow<F> {
+        let mut terms = Vec::new();
+        for (c, x) in &self.reduced.readings[k] {
             let folded = self.folded.binary_search_by_key(c, |(v, ..)| *v);
             let (c, x) = match folded.map(|at| &self.folded[at]) {
                 Ok((_, resistance, i)) => (*i, &x.mul(resistance)),
-                Err(_) if self.columns[*c] == Columns::Gone => continue,
                 Err(_) => (*c, x),
             };
-            let unit = [(c, F::one().neg())];
-            let (row, without) = match self.found.pivot[c] {
-                Some(r) => (self.matrix.row(r), c),
-                None => (&unit[..], usize::MAX),
-            };
-            reading = subtract(&reading, x, row, without, |_| {});
+            match self.found.pivot[c] {
+                Some(r) => {
+                    let minus = x.neg();
+                    let others = self.matrix.row(r).iter().filter(|(other, _)| *other != c);
+                    terms.extend(
+                        others.filter_map(|(c, part)| Some((frame.place[*c]?, part.mul(&minus)))),
+                    );
+                }
+                None => terms.extend(frame.place[c].map(|at| (at, x.clone()))),
+            }
         }
-        reading
+        summed(terms)
     }
 
     fn drop_column(&mut self, column: usize) {

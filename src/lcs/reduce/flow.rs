@@ -1,6 +1,6 @@
 //! The storage equations: x', the undetermined quantities, the shift and the injection.
 
-use crate::algebra::{Elimination, Field, SparseRow, Table, add_scaled, entry, part};
+use crate::algebra::{Elimination, Field, SparseRow, Table, add_scaled, entry, part, summed};
 
 use super::ReduceError;
 use super::eliminated::Eliminated;
@@ -121,16 +121,16 @@ impl<F: Field> Flow<F> {
     }
 
     /// A frame row with f put in: over [x | λ | u | u' | 1 | s⁻], physical x.
-    fn substitute(&self, frame: &Frame, row: &[(usize, F)]) -> SparseRow<F> {
-        let mut result = part(row, 0..frame.base).to_vec();
-        for (c, x) in part(row, frame.base..usize::MAX) {
-            add_scaled(&mut result, x, &self.f[c - frame.base]);
+    fn substitute(&self, frame: &Frame, mut row: SparseRow<F>) -> SparseRow<F> {
+        let undetermined = row.split_off(row.partition_point(|(c, _)| *c < frame.base));
+        for (c, x) in undetermined {
+            add_scaled(&mut row, &x, &self.f[c - frame.base]);
         }
-        result
+        row
     }
 
     /// A frame row over [x | λ | u | u' | 1] with shifted x, and its impulse over s⁻ − s⁺.
-    pub(super) fn finish(&self, frame: &Frame, row: &[(usize, F)]) -> (SparseRow<F>, SparseRow<F>) {
+    pub(super) fn finish(&self, frame: &Frame, row: SparseRow<F>) -> (SparseRow<F>, SparseRow<F>) {
         let mut result = self.substitute(frame, row);
         let impulse = result.split_off(result.partition_point(|(c, _)| *c < frame.base));
         self.shift_states(frame, &mut result);
@@ -206,7 +206,7 @@ impl<F: Field> Flow<F> {
                     continue;
                 }
                 chosen.push(name.clone());
-                let rest = self.substitute(frame, row).into_iter();
+                let rest = self.substitute(frame, row.clone()).into_iter();
                 let mut whole: SparseRow<F> = rest.map(|(c, x)| (nz + c, x)).collect();
                 for (z, x) in &g {
                     add_scaled(&mut whole, x, &values[*z]);
@@ -248,18 +248,4 @@ impl<F: Field> Flow<F> {
         };
         (seen, notes)
     }
-}
-
-/// A row from terms in any order, several of a column.
-fn summed<F: Field>(mut terms: Vec<(usize, F)>) -> SparseRow<F> {
-    terms.sort_by_key(|(c, _)| *c);
-    let mut row: SparseRow<F> = Vec::with_capacity(terms.len());
-    for (c, x) in terms {
-        match row.last_mut() {
-            Some(last) if last.0 == c => last.1 = last.1.add(&x),
-            _ => row.push((c, x)),
-        }
-    }
-    row.retain(|(_, x)| !x.is_zero());
-    row
 }

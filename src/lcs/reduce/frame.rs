@@ -19,7 +19,7 @@ pub(super) struct Frame {
     /// Columns of the undetermined quantities.
     pub(super) f: Vec<usize>,
     /// For every free column its place.
-    place: Vec<Option<usize>>,
+    pub(super) place: Vec<Option<usize>>,
 }
 
 impl Frame {

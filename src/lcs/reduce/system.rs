@@ -41,7 +41,7 @@ impl<F: Field> Eliminated<'_, F> {
             } else {
                 reverse
             };
-            let row = flow.finish(&frame, &frame.express(&self, column)).0;
+            let row = flow.finish(&frame, frame.express(&self, column)).0;
             let rates = part(&row, frame.du()).iter();
             let sources: Vec<String> = rates
                 .map(|(c, _)| self.source(c - frame.du().start))
@@ -55,7 +55,7 @@ impl<F: Field> Eliminated<'_, F> {
             y.push(row);
         }
         let readings = (0..self.behaviour.observed.len())
-            .map(|k| flow.finish(&frame, &frame.gather(&self.reading(k), false, None)))
+            .map(|k| flow.finish(&frame, self.reading(&frame, k)))
             .collect();
         let image = self.times_metric(&s);
         let mut energy = vec![SparseRow::new(); frame.n];
@@ -68,14 +68,18 @@ impl<F: Field> Eliminated<'_, F> {
             rates: flow.rates(&frame),
             y,
             readings,
-            guards: guards.iter().map(|g| flow.finish(&frame, g)).collect(),
+            guards: (guards.into_iter())
+                .map(|guard| flow.finish(&frame, guard))
+                .collect(),
             kernel,
             undetermined: undetermined.len(),
             constraints,
             shift: flow.shift.clone(),
             inject: flow.inject(&frame, &s),
             energy,
-            s: s.iter().map(|row| flow.finish(&frame, row).0).collect(),
+            s: (s.into_iter())
+                .map(|row| flow.finish(&frame, row).0)
+                .collect(),
             states: frame.states,
             fast: Vec::new(),
             pairs: frame.pairs,
@@ -220,7 +224,7 @@ impl<F: Field> Eliminated<'_, F> {
                 if self.unknown.iter().any(|(_, name)| *name == observed.name) {
                     continue;
                 }
-                let row = frame.gather(&self.reading(k), false, None);
+                let row = self.reading(frame, k);
                 rest.push((observed.name.clone(), row));
             }
         }

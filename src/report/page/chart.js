@@ -1,0 +1,424 @@
+// Panels over one axis: curves by uPlot, a strip of who conducts when, two cursors and the readings at them.
+
+/** Colours that stay apart for colour-blind readers (Okabe and Ito 2008), for light and dark paper. */
+const COLOURS = {
+  light: ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#5a5a5a", "#8c564b"],
+  dark: ["#4aa8e8", "#ff8a3d", "#2fc79b", "#e79bc5", "#9ad4f7", "#ffc24d", "#b4b4b4", "#c99a8c"],
+};
+const DASHES = [[], [7, 3], [2, 2.5], [9, 3, 2, 3]];
+/** CSS pixels. */
+const SIZES = { axis: 76, panel: 220, row: 16, right: 26, pixelsToDrag: 4 };
+
+/** An element with attributes and children; text is never markup. */
+function element(tag, attributes = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+    else if (value === true) made.setAttribute(name, "");
+    else if (value !== false && value != null) made.setAttribute(name, value);
+  }
+  made.append(...children);
+  return made;
+}
+
+/** What the style sheet says of a colour. */
+const themed = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+/** Whether the paper is dark. */
+const isDark = () => themed("--dark") === "1";
+
+/** State of a strip's device at t: true, false, or null before anything is known. */
+function stateAt(strip, t) {
+  const changes = rowAfter(strip.times, t);
+  return changes === 0 ? strip.start : strip.states[changes - 1];
+}
+
+/**
+ * A chart in `root` of { axis: { name, unit, log }, panels: [{ quantity, unit, curves }], strips }. `announce` gets a sentence when a cursor is
+ * placed.
+ */
+function chart(root, content, announce) {
+  const { axis, panels, strips } = content;
+  const curves = panels.flatMap((panel) => panel.curves);
+  const whole = wholeSpan(curves, axis.log);
+  const state = { view: whole, cursors: { a: null, b: null }, pointer: null, plots: [], logs: new Set() };
+  const looks = new Map(curves.map((curve, k) => [curve, k]));
+  const colour = (curve) => COLOURS[isDark() ? "dark" : "light"][looks.get(curve) % 8];
+  const dash = (curve) => DASHES[Math.floor(looks.get(curve) / 8) % 4];
+  const area = element("div", { class: "panels" });
+  const stripCanvas = element("canvas", { class: "strip", role: "img" });
+  const readings = readingsTable();
+  root.append(area, element("div", { class: "readings" }, readings.table));
+
+  const edgeOf = ([from, to], pixels) =>
+    axis.log ? (k) => from * (to / from) ** ((k + 1) / pixels) : (k) => from + ((to - from) * (k + 1)) / pixels;
+
+  /** Bounds of a panel's axis for what is seen, with a little room; positive where it is logarithmic. */
+  function boundsOf(panel) {
+    let [low, high] = [Infinity, -Infinity];
+    for (const curve of panel.curves.filter((curve) => curve.shown)) {
+      const [a, b] = boundsIn(curve, ...state.view);
+      [low, high] = [Math.min(low, a), Math.max(high, b)];
+    }
+    if (!(low <= high)) return state.logs.has(panel) ? [0.1, 10] : [-1, 1];
+    if (state.logs.has(panel)) {
+      high = Math.max(high, -low) || 1;
+      return [high * 1e-6, high * 1.5];
+    }
+    const room = high > low ? 0.06 * (high - low) : Math.abs(high) * 0.1 || 1;
+    return [low - room, high + room];
+  }
+
+  /** A path of a curve on a plot's canvas. */
+  function path(plot, curve, panel) {
+    const drawn = new Path2D();
+    const pixels = Math.max(1, Math.round(plot.bbox.width));
+    let pen = false;
+    const log = state.logs.has(panel);
+    trace(curve, state.view, pixels, edgeOf(state.view, pixels), (t, value) => {
+      const y = log ? Math.max(Math.abs(value), Number.MIN_VALUE) : value;
+      if (Number.isNaN(y)) {
+        pen = false;
+        return;
+      }
+      const at = [plot.valToPos(t, "x", true), plot.valToPos(y, "y", true)];
+      if (pen) drawn.lineTo(...at);
+      else drawn.moveTo(...at);
+      pen = true;
+    });
+    return { stroke: drawn };
+  }
+
+  function plotOf(panel, last) {
+    const ink = () => themed("--ink"), grid = () => themed("--grid");
+    const series = panel.curves.map((curve) => ({
+      label: curve.name,
+      stroke: () => colour(curve),
+      dash: dash(curve),
+      width: 1.5,
+      show: curve.shown,
+      points: { show: false },
+      paths: (plot) => path(plot, curve, panel),
+    }));
+    const holder = element("div", { class: "panel", tabindex: 0, role: "group", "aria-label": `${panel.quantity}: ${panel.curves.map((c) => c.name).join(", ")}` });
+    area.append(holder);
+    const options = {
+      width: widthOf(),
+      height: SIZES.panel,
+      padding: [8, SIZES.right, 0, 0],
+      legend: { show: false },
+      scales: { x: { time: false, auto: false, distr: axis.log ? 3 : 1 }, y: { auto: false, distr: state.logs.has(panel) ? 3 : 1 } },
+      axes: [
+        { stroke: ink, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1 }, space: 110, size: last ? 34 : 24, values: (_, splits) => ticks(splits, axis.unit) },
+        { stroke: ink, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1 }, size: SIZES.axis, values: (_, splits) => ticks(splits, panel.unit) },
+      ],
+      series: [{}, ...series],
+      cursor: { y: false, points: { show: false }, drag: { x: true, y: false, setScale: false, click: () => {} }, bind: { dblclick: () => () => show(whole) } },
+      hooks: {
+        setSelect: [
+          (plot) => {
+            const { left, width } = plot.select;
+            if (width > SIZES.pixelsToDrag) show([plot.posToVal(left, "x"), plot.posToVal(left + width, "x")]);
+            if (width > 0) plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+          },
+        ],
+        setCursor: [(plot) => point(plot)],
+        draw: [(plot) => drawCursors(plot)],
+      },
+    };
+    const plot = new uPlot(options, [whole, ...panel.curves.map(() => [null, null])], holder);
+    plot.panel = panel;
+    bind(plot, holder);
+    return plot;
+  }
+
+  const widthOf = () => Math.max(280, root.clientWidth);
+
+  function build() {
+    state.plots.forEach((plot) => plot.destroy());
+    area.replaceChildren();
+    state.plots = panels.map((panel, k) => plotOf(panel, k + 1 === panels.length));
+    if (strips.length > 0) {
+      stripCanvas.setAttribute("aria-label", `who conducts when: ${strips.map((strip) => strip.name).join(", ")}; states at the cursors stand in the table`);
+      area.append(stripCanvas);
+    }
+    show(state.view);
+  }
+
+  /** Shows a span of the axis in all panels. */
+  function show([from, to]) {
+    const least = axis.log ? from * 1e-9 : 1e-13 * Math.max(Math.abs(whole[0]), Math.abs(whole[1]));
+    if (!(to - from > least)) return;
+    state.view = [Math.max(from, whole[0]), Math.min(to, whole[1])];
+    if (!(state.view[1] > state.view[0])) state.view = whole;
+    for (const plot of state.plots) {
+      const [low, high] = boundsOf(plot.panel);
+      plot.batch(() => {
+        plot.setScale("x", { min: state.view[0], max: state.view[1] });
+        plot.setScale("y", { min: low, max: high });
+      });
+      plot.redraw(true, true);
+    }
+    drawStrips();
+    root.dispatchEvent(new CustomEvent("view", { detail: state.view }));
+  }
+
+  /** Zooms by a factor about x, which stays where it is. */
+  function zoom(factor, x) {
+    const [from, to] = state.view;
+    if (axis.log) show([x * (from / x) ** factor, x * (to / x) ** factor]);
+    else show([x + (from - x) * factor, x + (to - x) * factor]);
+  }
+
+  /** Moves the view by a part of its width. */
+  function pan(part) {
+    const [from, to] = state.view;
+    if (axis.log) {
+      const ratio = Math.min(Math.max((to / from) ** part, whole[0] / from), whole[1] / to);
+      show([from * ratio, to * ratio]);
+    } else {
+      const move = Math.min(Math.max((to - from) * part, whole[0] - from), whole[1] - to);
+      show([from + move, to + move]);
+    }
+  }
+
+  const centre = () => (axis.log ? Math.sqrt(state.view[0] * state.view[1]) : (state.view[0] + state.view[1]) / 2);
+  const guide = () => curves.find((curve) => curve.shown) ?? curves[0];
+
+  /** Puts a cursor on the row nearest to x. */
+  function place(name, x) {
+    const { x: rows } = guide();
+    state.cursors[name] = rows[nearestRow(rows, x)];
+    retell(name);
+  }
+
+  /** Moves a cursor by a row. */
+  function step(name, by) {
+    const { x: rows } = guide();
+    const t = state.cursors[name] ?? centre();
+    const next = by > 0 ? rowAfter(rows, t) : rowAt(rows, t) - 1;
+    state.cursors[name] = rows[Math.min(Math.max(next, 0), rows.length - 1)];
+    retell(name);
+  }
+
+  function retell(name) {
+    state.plots.forEach((plot) => plot.redraw(false));
+    drawStrips();
+    readings.update();
+    const t = state.cursors[name];
+    const told = curves.filter((curve) => curve.shown).map((curve) => `${curve.name} ${quantity(valueAt(curve, t), unitOf(curve))}`);
+    announce(`Cursor ${name.toUpperCase()} at ${quantity(t, axis.unit, 9)}: ${told.join(", ")}`);
+  }
+
+  const unitOf = (curve) => panels.find((panel) => panel.curves.includes(curve)).unit;
+
+  function bind(plot, holder) {
+    let dragged = null;
+    const at = (event) => plot.posToVal(event.clientX - plot.over.getBoundingClientRect().left, "x");
+    plot.over.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      if (event.shiftKey) pan(Math.sign(event.deltaY || event.deltaX) * 0.1);
+      else zoom(event.deltaY > 0 ? 1.25 : 0.8, at(event));
+    }, { passive: false });
+    // Shift and drag moves the view; a press that does not move places a cursor.
+    plot.over.addEventListener("mousedown", (event) => {
+      dragged = { x: event.clientX, from: event.clientX, shift: event.shiftKey };
+      if (event.shiftKey) event.stopImmediatePropagation();
+    }, true);
+    plot.over.addEventListener("mousemove", (event) => {
+      if (dragged?.shift && event.buttons & 1) {
+        pan((dragged.x - event.clientX) / plot.over.clientWidth);
+        dragged.x = event.clientX;
+      }
+    });
+    plot.over.addEventListener("click", (event) => {
+      if (dragged && Math.abs(event.clientX - dragged.from) <= SIZES.pixelsToDrag) place(event.shiftKey ? "b" : "a", at(event));
+      dragged = null;
+    });
+    holder.addEventListener("keydown", (event) => {
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      const x = state.pointer ?? centre();
+      const keys = {
+        "+": () => zoom(0.5, x), "=": () => zoom(0.5, x), "-": () => zoom(2, x),
+        ArrowLeft: () => pan(-0.2), ArrowRight: () => pan(0.2), Home: () => show(whole),
+        a: () => place("a", x), b: () => place("b", x),
+        ",": () => step("a", -1), ".": () => step("a", 1), "<": () => step("b", -1), ">": () => step("b", 1),
+        Escape: () => { state.cursors = { a: null, b: null }; state.plots.forEach((p) => p.redraw(false)); drawStrips(); readings.update(); },
+      };
+      if (keys[event.key]) {
+        event.preventDefault();
+        keys[event.key]();
+      }
+    });
+  }
+
+  function point(plot) {
+    const left = plot.cursor.left;
+    const x = left >= 0 ? plot.posToVal(left, "x") : null;
+    if (x === state.pointer) return;
+    state.pointer = x;
+    for (const other of state.plots) {
+      if (other !== plot) other.setCursor({ left: x === null ? -10 : left, top: 0 }, false);
+    }
+    readings.update();
+  }
+
+  function drawCursors(plot) {
+    const { ctx, bbox } = plot;
+    ctx.save();
+    for (const [name, t] of Object.entries(state.cursors)) {
+      if (t === null || t < state.view[0] || t > state.view[1]) continue;
+      const x = Math.round(plot.valToPos(t, "x", true)) + 0.5;
+      ctx.strokeStyle = ctx.fillStyle = themed(name === "a" ? "--cursor-a" : "--cursor-b");
+      ctx.lineWidth = devicePixelRatio;
+      ctx.setLineDash([4 * devicePixelRatio, 3 * devicePixelRatio]);
+      ctx.beginPath();
+      ctx.moveTo(x, bbox.top);
+      ctx.lineTo(x, bbox.top + bbox.height);
+      ctx.stroke();
+      ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+      ctx.fillText(name.toUpperCase(), x + 3 * devicePixelRatio, bbox.top + 11 * devicePixelRatio);
+    }
+    ctx.restore();
+  }
+
+  /** A bar for each device while it conducts or is on; grey while nothing is known. */
+  function drawStrips() {
+    if (strips.length === 0) return;
+    const width = widthOf(), height = strips.length * SIZES.row + 6, ratio = devicePixelRatio || 1;
+    Object.assign(stripCanvas, { width: width * ratio, height: height * ratio });
+    Object.assign(stripCanvas.style, { width: `${width}px`, height: `${height}px` });
+    const ctx = stripCanvas.getContext("2d");
+    ctx.scale(ratio, ratio);
+    ctx.font = "11px system-ui, sans-serif";
+    ctx.textBaseline = "middle";
+    const [from, to] = state.view, room = width - SIZES.axis - SIZES.right;
+    const position = (t) => SIZES.axis + (room * (t - from)) / (to - from);
+    strips.forEach((strip, k) => {
+      const middle = k * SIZES.row + SIZES.row / 2 + 2;
+      ctx.fillStyle = themed("--ink");
+      ctx.textAlign = "right";
+      ctx.fillText(strip.name, SIZES.axis - 6, middle, SIZES.axis - 8);
+      ctx.fillStyle = themed("--grid");
+      ctx.fillRect(SIZES.axis, middle - 0.5, room, 1);
+      let begin = from, on = stateAt(strip, from);
+      const last = rowAt(strip.times, to);
+      const bar = (end) => {
+        if (on === false) return;
+        ctx.fillStyle = on === null ? themed("--grid") : themed("--bar");
+        ctx.fillRect(position(begin), middle - 5, Math.max(position(end) - position(begin), 0.5), 10);
+      };
+      for (let j = rowAfter(strip.times, from); j < last; j++) {
+        bar(strip.times[j]);
+        [begin, on] = [strip.times[j], strip.states[j]];
+      }
+      bar(to);
+    });
+    for (const [name, t] of Object.entries(state.cursors)) {
+      if (t === null || t < from || t > to) continue;
+      ctx.fillStyle = themed(name === "a" ? "--cursor-a" : "--cursor-b");
+      ctx.fillRect(Math.round(position(t)), 0, 1, height);
+    }
+  }
+
+  /** The legend, which is a table of readings: at the pointer, at both cursors, and their difference. */
+  function readingsTable() {
+    const columns = ["pointer", "a", "b"];
+    const head = Object.fromEntries([...columns, "delta"].map((name) => [name, element("th", { scope: "col", "data-at": name })]));
+    const cells = new Map();
+    const body = element("tbody");
+    const row = (key, label) => {
+      const own = Object.fromEntries([...columns, "delta"].map((name) => [name, element("td", { "data-at": name })]));
+      cells.set(key, own);
+      body.append(element("tr", { "data-signal": key.name }, element("th", { scope: "row" }, label), ...Object.values(own)));
+    };
+    for (const panel of panels) {
+      for (const curve of panel.curves) {
+        const box = element("input", { type: "checkbox", checked: true, onchange: () => toggle(curve, box.checked) });
+        const swatch = element("span", { class: "swatch", "aria-hidden": "true" });
+        cells.set(swatch, curve);
+        row(curve, element("label", {}, box, swatch, curve.name));
+      }
+    }
+    for (const strip of strips) row(strip, strip.name);
+    const table = element("table", {},
+      element("caption", {}, "Readings"),
+      element("thead", {}, element("tr", {}, element("th", { scope: "col" }, "signal"), ...Object.values(head))), body);
+    const put = (cell, value, words) => {
+      cell.textContent = words;
+      if (value === null) cell.removeAttribute("data-value");
+      else cell.dataset.value = value;
+    };
+    function update() {
+      const { a, b } = state.cursors;
+      const times = { pointer: state.pointer, a, b };
+      const both = a !== null && b !== null;
+      for (const name of columns) {
+        const label = name === "pointer" ? axis.name : name.toUpperCase();
+        put(head[name], times[name], times[name] === null ? label : `${label} ${quantity(times[name], axis.unit, 9)}`);
+      }
+      const inverse = axis.unit === "s" && both && a !== b ? ` (${quantity(1 / Math.abs(b - a), "Hz")})` : "";
+      put(head.delta, both ? b - a : null, both ? `B − A ${quantity(b - a, axis.unit, 9)}${inverse}` : "B − A");
+      for (const [key, own] of cells) {
+        if (key instanceof HTMLElement) {
+          key.style.setProperty("--look", colour(own));
+          continue;
+        }
+        if (key.states) {
+          for (const name of columns) {
+            const on = times[name] === null ? null : stateAt(key, times[name]);
+            put(own[name], null, times[name] === null ? "" : on === null ? "not known" : on ? key.on : key.off);
+          }
+          continue;
+        }
+        const values = columns.map((name) => (times[name] === null ? null : valueAt(key, times[name])));
+        columns.forEach((name, k) => put(own[name], values[k], values[k] === null ? "" : quantity(values[k], unitOf(key))));
+        put(own.delta, both ? values[2] - values[1] : null, both ? quantity(values[2] - values[1], unitOf(key)) : "");
+      }
+    }
+    return { table, update };
+  }
+
+  function toggle(curve, shown) {
+    curve.shown = shown;
+    for (const plot of state.plots) {
+      const k = plot.panel.curves.indexOf(curve);
+      if (k >= 0) plot.setSeries(k + 1, { show: shown });
+    }
+    show(state.view);
+  }
+
+  /** Logarithmic or linear axes of values. */
+  function logarithmic(on) {
+    state.logs = new Set(on ? panels : []);
+    build();
+  }
+
+  const resized = new ResizeObserver(() => {
+    if (state.plots.some((plot) => plot.width !== widthOf())) {
+      state.plots.forEach((plot) => plot.setSize({ width: widthOf(), height: SIZES.panel }));
+      show(state.view);
+    }
+  });
+  build();
+  readings.update();
+  resized.observe(root);
+  return {
+    state, panels, strips, show, zoom, pan, place, logarithmic, colour, dash, boundsOf, edgeOf, axis,
+    full: () => show(whole),
+    repaint: () => { show(state.view); readings.update(); },
+    remove: () => { resized.disconnect(); state.plots.forEach((plot) => plot.destroy()); root.replaceChildren(); },
+  };
+}
+
+/** First and last x of all curves; positive for a logarithmic axis. */
+function wholeSpan(curves, log) {
+  let [from, to] = [Infinity, -Infinity];
+  for (const { x } of curves) {
+    if (x.length === 0) continue;
+    from = Math.min(from, log ? (x.find((value) => value > 0) ?? Infinity) : x[0]);
+    to = Math.max(to, x[x.length - 1]);
+  }
+  if (!(from <= to)) return log ? [1, 10] : [0, 1];
+  return from < to ? [from, to] : [from - (Math.abs(from) || 1) / 2, from + (Math.abs(from) || 1) / 2];
+}

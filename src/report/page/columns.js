@@ -1,0 +1,155 @@
+// Columns of numbers and what is asked of them: rows by time, values between rows, bounds over any span.
+
+/** Rows a block: of each the lowest and highest value are kept. */
+const BLOCK = 256;
+
+/** Numbers from base64 of little-endian doubles, or from an array. */
+function numbers(source) {
+  if (typeof source !== "string") return Float64Array.from(source);
+  if (Uint8Array.fromBase64) return new Float64Array(Uint8Array.fromBase64(source).buffer);
+  const text = atob(source);
+  const bytes = new Uint8Array(text.length);
+  for (let k = 0; k < bytes.length; k++) bytes[k] = text.charCodeAt(k);
+  return new Float64Array(bytes.buffer);
+}
+
+/** A curve: y over nondecreasing x, with bounds by block; NaN is a gap. */
+function curveOf(name, x, y) {
+  const blocks = Math.ceil(y.length / BLOCK);
+  const lows = new Float64Array(blocks).fill(Infinity);
+  const highs = new Float64Array(blocks).fill(-Infinity);
+  for (let k = 0; k < y.length; k++) {
+    const block = (k / BLOCK) | 0;
+    if (y[k] < lows[block]) lows[block] = y[k];
+    if (y[k] > highs[block]) highs[block] = y[k];
+  }
+  return { name, x, y, lows, highs, shown: true };
+}
+
+/** The first row from `from` on that is at t or later. */
+function rowAt(x, t, from = 0) {
+  let low = from, high = x.length;
+  while (low < high) {
+    const middle = (low + high) >>> 1;
+    if (x[middle] < t) low = middle + 1;
+    else high = middle;
+  }
+  return low;
+}
+
+/** The first row later than t. */
+function rowAfter(x, t) {
+  let low = 0, high = x.length;
+  while (low < high) {
+    const middle = (low + high) >>> 1;
+    if (x[middle] <= t) low = middle + 1;
+    else high = middle;
+  }
+  return low;
+}
+
+/** The row whose x is nearest to t. */
+function nearestRow(x, t) {
+  const after = Math.min(rowAt(x, t), x.length - 1);
+  return after > 0 && t - x[after - 1] < x[after] - t ? after - 1 : after;
+}
+
+/** The value at t: of a row there the last one (after a jump), between rows a straight line; NaN outside. */
+function valueAt(curve, t) {
+  const { x, y } = curve;
+  const after = rowAfter(x, t);
+  if (after === 0) return NaN;
+  if (x[after - 1] === t) return y[after - 1];
+  if (after === x.length) return NaN;
+  const part = (t - x[after - 1]) / (x[after] - x[after - 1]);
+  return y[after - 1] + part * (y[after] - y[after - 1]);
+}
+
+/** Lowest and highest value of the rows from `from` up to but not at `to`. */
+function extremes(curve, from, to) {
+  let low = Infinity, high = -Infinity;
+  const take = (a, b) => {
+    for (let k = a; k < b; k++) {
+      if (curve.y[k] < low) low = curve.y[k];
+      if (curve.y[k] > high) high = curve.y[k];
+    }
+  };
+  const first = Math.ceil(from / BLOCK), last = Math.floor(to / BLOCK);
+  if (first >= last) {
+    take(from, to);
+  } else {
+    take(from, first * BLOCK);
+    for (let block = first; block < last; block++) {
+      low = Math.min(low, curve.lows[block]);
+      high = Math.max(high, curve.highs[block]);
+    }
+    take(last * BLOCK, to);
+  }
+  return [low, high];
+}
+
+/** Bounds of what is seen of the curve in [from, to]. */
+function boundsIn(curve, from, to) {
+  const a = rowAt(curve.x, from), b = rowAfter(curve.x, to);
+  let [low, high] = extremes(curve, a, b);
+  for (const y of [valueAt(curve, from), valueAt(curve, to)]) {
+    low = Math.min(low, Number.isNaN(y) ? low : y);
+    high = Math.max(high, Number.isNaN(y) ? high : y);
+  }
+  return [low, high];
+}
+
+/**
+ * Hands on the points of what is seen of the curve: all of them, or where there are more than four a pixel the first, lowest, highest and
+ * last of each pixel. `edge(k)` is the x at which pixel k of `pixels` ends.
+ */
+function trace(curve, [from, to], pixels, edge, point) {
+  const { x, y } = curve;
+  let a = Math.max(0, rowAt(x, from) - 1);
+  const end = Math.min(x.length, rowAfter(x, to) + 1);
+  if (end - a <= 4 * pixels) {
+    for (let k = a; k < end; k++) point(x[k], y[k]);
+    return;
+  }
+  for (let pixel = 0; pixel < pixels && a < end; pixel++) {
+    const b = pixel + 1 === pixels ? end : Math.min(rowAt(x, edge(pixel), a), end);
+    if (b === a) continue;
+    point(x[a], y[a]);
+    if (b - a > 2) {
+      const [low, high] = extremes(curve, a, b);
+      point(x[a], low);
+      point(x[a], high);
+    }
+    if (b - a > 1) point(x[b - 1], y[b - 1]);
+    a = b;
+  }
+}
+
+const PREFIXES = ["f", "p", "n", "µ", "m", "", "k", "M", "G", "T"];
+
+/** The power of a thousand for a size, from −5 to 4. */
+function thousands(size) {
+  if (!(size > 0) || !Number.isFinite(size)) return 0;
+  return Math.max(-5, Math.min(4, Math.floor(Math.log10(size * (1 + 1e-12)) / 3)));
+}
+
+/** A quantity with an SI prefix, to so many digits. */
+function quantity(value, unit, digits = 6) {
+  if (Number.isNaN(value)) return "–";
+  if (unit === "" || unit === "dB" || unit === "°") return `${Number(value.toPrecision(digits))} ${unit}`.trim();
+  const power = thousands(Math.abs(value));
+  return `${Number((value / 1000 ** power).toPrecision(digits))} ${PREFIXES[power + 5]}${unit}`;
+}
+
+/** Labels of ticks under one prefix, with the decimals that tell them apart. */
+function ticks(splits, unit) {
+  const known = splits.filter((value) => value != null);
+  const size = Math.max(...known.map(Math.abs));
+  const power = unit === "dB" || unit === "°" ? 0 : thousands(size);
+  const scale = 1000 ** power;
+  const step = known.length > 1 ? Math.abs(known[1] - known[0]) / scale : 1;
+  let decimals = 0;
+  while (decimals < 12 && Math.abs(step * 10 ** decimals - Math.round(step * 10 ** decimals)) > 1e-6) decimals++;
+  const label = (value) => Number((value / scale).toFixed(decimals)).toString() + " " + PREFIXES[power + 5] + unit;
+  return splits.map((value) => (value == null ? null : label(value).trim()));
+}

@@ -1,0 +1,160 @@
+// The page: headline, controls, charts, tables and text of one result.
+
+/** Rows of a table that are written at once; the rest on request. */
+const ROWS = 500;
+
+/** Strips from lists of changes, [t, on] each. */
+function stripsOf(strips) {
+  return (strips ?? []).map((strip) => ({ ...strip, times: numbers(strip.times), states: strip.states.map(Boolean) }));
+}
+
+/** A voltage that stands at one of two levels nearly always is that of a gate, and has a panel of its own beside analogue ones. */
+function isGate(curve) {
+  const [low, high] = extremes(curve, 0, curve.y.length);
+  const near = 0.02 * (high - low);
+  if (!(high > low) || curve.y.length < 8) return false;
+  let inside = 0;
+  for (const value of curve.y) if (value > low + near && value < high - near) inside++;
+  return inside <= 0.05 * curve.y.length;
+}
+
+/** Panels of curves over the columns of the data; gates apart from other voltages. */
+function panelsOf(data) {
+  const columns = data.columns.map(numbers);
+  const panels = data.panels.map((panel) => ({
+    quantity: panel.quantity,
+    unit: panel.unit,
+    curves: panel.curves.map((curve) => curveOf(curve.name, columns[curve.x], columns[curve.y])),
+  }));
+  return panels.flatMap((panel) => {
+    const gates = panel.unit === "V" && data.axis.name === "time" ? panel.curves.filter(isGate) : [];
+    const rest = panel.curves.filter((curve) => !gates.includes(curve));
+    if (gates.length === 0 || rest.length === 0) return [panel];
+    return [{ ...panel, curves: rest }, { ...panel, quantity: "gates", curves: gates }];
+  });
+}
+
+/** A table of words; long ones show their first rows and a button for the rest. */
+function wordTable({ heading, header, rows }) {
+  const body = element("tbody");
+  const line = (cells) => element("tr", {}, ...cells.map((cell) => element("td", {}, cell)));
+  body.append(...rows.slice(0, ROWS).map(line));
+  const table = element("table", {}, element("thead", {}, element("tr", {}, ...header.map((name) => element("th", { scope: "col" }, name)))), body);
+  const section = element("details", { open: rows.length <= 40 }, element("summary", {}, `${heading} (${rows.length})`), table);
+  if (rows.length > ROWS) {
+    const more = element("button", { type: "button", onclick: () => { body.append(...rows.slice(ROWS).map(line)); more.remove(); } }, `all ${rows.length} rows`);
+    section.append(more);
+  }
+  return section;
+}
+
+/** What the chart shows as a drawing in SVG. */
+function drawing(shown, title) {
+  const { axis, panels, state } = shown;
+  const width = 900, height = 240, left = 90, right = 20, top = 40;
+  const [from, to] = state.view;
+  const clean = (text) => text.replace(/[&<>"]/g, (c) => `&#${c.charCodeAt(0)};`);
+  const across = (x) => left + (width - left - right) * (axis.log ? Math.log(x / from) / Math.log(to / from) : (x - from) / (to - from));
+  const parts = [];
+  panels.forEach((panel, k) => {
+    const [low, high] = shown.boundsOf(panel), log = state.logs.has(panel);
+    const base = top + k * height, room = height - 50;
+    const up = (y) => base + room * (1 - (log ? Math.log(Math.max(Math.abs(y), low) / low) / Math.log(high / low) : (y - low) / (high - low)));
+    const plot = state.plots[k];
+    const marks = (a, unit) => plot.axes[a]._splits.map((value, j) => [value, ticks(plot.axes[a]._splits, unit)[j]]).filter(([, label]) => label);
+    for (const [x, label] of marks(0, axis.unit)) {
+      parts.push(`<path d="M${across(x).toFixed(2)} ${base}v${room}" stroke="#ddd"/><text x="${across(x).toFixed(2)}" y="${base + room + 15}" text-anchor="middle">${clean(label)}</text>`);
+    }
+    for (const [y, label] of marks(1, panel.unit)) {
+      parts.push(`<path d="M${left} ${up(y).toFixed(2)}H${width - right}" stroke="#ddd"/><text x="${left - 6}" y="${(up(y) + 4).toFixed(2)}" text-anchor="end">${clean(label)}</text>`);
+    }
+    let column = left;
+    for (const curve of panel.curves.filter((curve) => curve.shown)) {
+      let path = "", pen = "M";
+      trace(curve, state.view, width, shown.edgeOf(state.view, width), (x, y) => {
+        if (Number.isNaN(y)) pen = "M";
+        else { path += `${pen}${across(x).toFixed(2)} ${up(y).toFixed(2)}`; pen = "L"; }
+      });
+      parts.push(`<path clip-path="url(#p${k})" d="${path}" fill="none" stroke="${shown.colour(curve)}" stroke-width="1.5" stroke-dasharray="${shown.dash(curve).join(" ")}"/>`);
+      parts.push(`<text x="${column}" y="${base - 6}" fill="${shown.colour(curve)}">${clean(curve.name)}</text>`);
+      column += 8 * curve.name.length + 14;
+    }
+    parts.push(`<clipPath id="p${k}"><rect x="${left}" y="${base}" width="${width - left - right}" height="${room}"/></clipPath>`);
+  });
+  const total = top + panels.length * height;
+  return `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${total}" viewBox="0 0 ${width} ${total}" font-family="sans-serif" font-size="12">` +
+    `<rect width="${width}" height="${total}" fill="#fff"/><text x="${left}" y="18" font-size="15">${clean(title)}</text>${parts.join("")}</svg>`;
+}
+
+/** Hands a text to the reader as a file. */
+function save(name, type, text) {
+  const link = element("a", { download: name, href: URL.createObjectURL(new Blob([text], { type })) });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+/** Shows a result in `root`; see `report::html` for what `data` holds. Returns the chart, if there are curves. */
+function circPage(root, data) {
+  const live = element("output", { class: "live", "aria-live": "polite" });
+  const announce = (words) => { live.textContent = words; };
+  const panels = panelsOf(data);
+  const area = element("section", { "aria-label": "waveforms" });
+  const spectrumArea = element("section", { "aria-label": "spectrum", hidden: true });
+  const controls = element("div", { class: "controls", role: "toolbar", "aria-label": "view" });
+  root.replaceChildren(element("h1", {}, data.title), element("p", { class: "about" }, data.about ?? ""), controls, area, live, spectrumArea);
+  let shown = null, spectrum = null;
+  const button = (words, action, title) => {
+    const made = element("button", { type: "button", title, onclick: () => action(made) }, words);
+    controls.append(made);
+    return made;
+  };
+  const pressed = (made) => {
+    const on = made.getAttribute("aria-pressed") !== "true";
+    made.setAttribute("aria-pressed", String(on));
+    return on;
+  };
+  function transformed() {
+    spectrum?.remove();
+    const of = shown.panels.map((panel) => ({
+      ...panel,
+      curves: panel.curves.filter((curve) => curve.shown).map((curve) => spectrumOf(curve, ...shown.state.view)),
+    })).filter((panel) => panel.curves.length > 0);
+    spectrumArea.hidden = false;
+    spectrumArea.replaceChildren(element("h2", {}, "Spectrum of what is seen"), element("div"));
+    spectrum = chart(spectrumArea.lastChild, { axis: { name: "frequency", unit: "Hz", log: false }, panels: of, strips: [] }, announce);
+  }
+  if (panels.some((panel) => panel.curves.length > 0)) {
+    button("−", () => shown.zoom(2, middle()), "zoom out (key −)");
+    button("+", () => shown.zoom(0.5, middle()), "zoom in (key +, wheel, drag)");
+    button("◀", () => shown.pan(-0.2), "earlier (left arrow, shift and drag)");
+    button("▶", () => shown.pan(0.2), "later (right arrow)");
+    button("all", () => shown.full(), "the whole span (key Home, double click)");
+    button("log y", (made) => shown.logarithmic(pressed(made)), "logarithmic axis of absolute values").setAttribute("aria-pressed", "false");
+    if (data.axis.name === "time") {
+      button("spectrum", (made) => {
+        if (pressed(made)) transformed();
+        else { spectrum.remove(); spectrum = null; spectrumArea.hidden = true; }
+      }, "spectrum of what is seen, by fast Fourier transform").setAttribute("aria-pressed", "false");
+    }
+    button("save SVG", () => save("circ.svg", "image/svg+xml", drawing(shown, data.title)), "what is seen as a drawing");
+  }
+  button("dark / light", () => {
+    document.documentElement.dataset.theme = isDark() ? "light" : "dark";
+    shown?.repaint();
+    spectrum?.repaint();
+  }, "colours of the page");
+  const middle = () => { const [from, to] = shown.state.view; return data.axis.log ? Math.sqrt(from * to) : (from + to) / 2; };
+  if (panels.some((panel) => panel.curves.length > 0)) {
+    shown = chart(area, { axis: data.axis, panels, strips: stripsOf(data.strips) }, announce);
+    area.addEventListener("view", () => { if (spectrum && !spectrumArea.hidden) transformed(); });
+    root.append(element("details", {}, element("summary", {}, "Keys and mouse"), element("p", {},
+      "Drag: zoom to a span. Wheel: zoom at the pointer; with shift, move. Shift and drag: move. Double click or Home: all. Click: cursor A; shift and click: cursor B. " +
+      "With a panel in focus: + − ← → Home; a, b place a cursor at the pointer (without one, in the middle); , . move A and < > move B by a row; Escape takes cursors away.")));
+  }
+  for (const table of data.tables ?? []) if (table.rows.length > 0) root.append(wordTable(table));
+  for (const { heading, text } of data.texts ?? []) {
+    root.append(element("details", { open: true }, element("summary", {}, heading), element("pre", {}, text)));
+  }
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => shown?.repaint());
+  return shown;
+}

@@ -1,0 +1,263 @@
+"""The page of a result: what it shows is what was computed, and its controls do what they say."""
+
+import math
+
+import pytest
+from conftest import ROOT, rows, run
+
+SINE = "a sine\nv1 in 0 sin(0 3 1k)\nr1 in out 1k\nc1 out 0 1n\n.tran 1u 10m\n.meas tran top max v(in)\n.end\n"
+BUCK = ROOT / "netlists/buck.cir"
+
+
+@pytest.fixture(scope="module")
+def buck(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("buck")
+    run("sim", BUCK, "-o", folder / "out.html", "-o", folder / "out.csv", "--events")
+    return folder
+
+
+def view(page):
+    return page.evaluate("window.circ.state.view")
+
+
+def reading(page, row, at):
+    """The number behind a cell of the table of readings."""
+    return cell(page, row, at).get_attribute("data-value")
+
+
+def cell(page, row, at):
+    return page.locator(f".readings tr[data-signal='{row}'] [data-at={at}]")
+
+
+def cursor(page, at):
+    return page.locator(f".readings thead [data-at={at}]").get_attribute("data-value")
+
+
+def first(page):
+    """The first panel, in focus."""
+    panel = page.locator(".panel").first
+    panel.focus()
+    return panel
+
+
+def middle(page, part=0.5):
+    """A point on the first panel's plot."""
+    box = page.locator(".panel .u-over").first.bounding_box()
+    return box["x"] + part * box["width"], box["y"] + 0.5 * box["height"]
+
+
+def test_it_shows_panels_events_and_words(buck, show):
+    page = show(buck / "out.html")
+    assert page.title() == "Buck converter, 12 V to 5 V, 50 kHz"
+    names = page.evaluate("window.circ.panels.map((p) => [p.unit, p.curves.map((c) => c.name)])")
+    assert names == [["V", ["v(out)"]], ["V", ["v(sw)"]], ["A", ["i(l1)"]]]
+    assert page.evaluate("window.circ.strips.map((s) => s.name)") == ["s1", "d1"]
+    page.get_by_text("Events (").click()
+    assert page.get_by_role("cell", name="s1 on").first.is_visible()
+    assert "exact:" in page.locator("pre").first.inner_text()
+    # Curves are drawn: the canvas is not blank.
+    colours = "(c) => new Set(new Uint32Array(c.getContext('2d').getImageData(0, 0, c.width, c.height).data.buffer)).size"
+    assert page.locator(".panel canvas").first.evaluate(colours) > 2
+
+
+def test_what_a_cursor_reads_is_what_was_computed(buck, show):
+    table = rows(buck / "out.csv")
+    page = show(buck / "out.html")
+    first(page)
+    page.keyboard.press("a")
+    exact = 0
+    for _ in range(20):
+        page.keyboard.press(".")
+        t = float(cursor(page, "a"))
+        at = [k for k, time in enumerate(table["time"]) if time == t]
+        if at:
+            exact += 1
+            for name in ("v(out)", "v(sw)", "i(l1)"):
+                assert float(reading(page, name, "a")) == table[name][at[-1]]
+    assert exact >= 15
+    assert "Cursor A at" in page.locator("output[aria-live]").inner_text()
+
+
+def test_two_cursors_and_their_difference(buck, show):
+    page = show(buck / "out.html")
+    page.mouse.click(*middle(page, 0.25))
+    page.keyboard.down("Shift")
+    page.mouse.click(*middle(page, 0.75))
+    page.keyboard.up("Shift")
+    a, b = float(cursor(page, "a")), float(cursor(page, "b"))
+    assert abs(a - 0.5e-3) < 2e-5 and abs(b - 1.5e-3) < 2e-5
+    assert float(cursor(page, "delta")) == b - a
+    assert "Hz" in page.locator(".readings thead [data-at=delta]").inner_text()
+    assert float(reading(page, "i(l1)", "delta")) == float(reading(page, "i(l1)", "b")) - float(reading(page, "i(l1)", "a"))
+    state = cell(page, "d1", "a").inner_text()
+    assert state in ("conducts", "blocks")
+
+
+def test_states_between_events(buck, show):
+    page = show(buck / "out.html")
+    table = rows(buck / "out.csv")
+    # At the middle of an on-time the switch node is at 12 V, and the switch is on.
+    first(page)
+    for part in (0.13, 0.31, 0.47, 0.62, 0.88):
+        page.mouse.click(*middle(page, part))
+        t = float(cursor(page, "a"))
+        words = cell(page, "s1", "a").inner_text()
+        value = float(reading(page, "v(sw)", "a"))
+        assert (words == "on") == (value > 11), (t, words, value)
+    assert max(table["v(sw)"]) > 11
+
+
+def test_zoom_and_pan(buck, show):
+    page = show(buck / "out.html")
+    assert view(page) == [0, 2e-3]
+    panel = first(page)
+    page.keyboard.press("+")
+    assert view(page) == pytest.approx([0.5e-3, 1.5e-3])
+    page.keyboard.press("ArrowRight")
+    assert view(page) == pytest.approx([0.7e-3, 1.7e-3])
+    page.keyboard.press("Home")
+    assert view(page) == [0, 2e-3]
+    page.mouse.move(*middle(page))
+    page.mouse.wheel(0, -100)
+    page.wait_for_function("window.circ.state.view[1] < 2e-3")
+    assert view(page) == pytest.approx([0.2e-3, 1.8e-3], rel=0.02)
+    # To a span by dragging, and back.
+    start, end = middle(page, 0.25), middle(page, 0.5)
+    page.mouse.move(*start)
+    page.mouse.down()
+    page.mouse.move(*end, steps=5)
+    page.mouse.up()
+    assert view(page) == pytest.approx([0.6e-3, 1e-3], rel=0.02)
+    page.mouse.dblclick(*middle(page))
+    assert view(page) == [0, 2e-3]
+    assert panel.evaluate("(p) => p === document.activeElement")
+
+
+def test_a_toggle_takes_a_curve_out_of_its_panel(tmp_path, show):
+    netlist = tmp_path / "two.cir"
+    netlist.write_text("two\nv1 a 0 sin(0 100 1k)\nr1 a b 1k\nr2 b 0 10\n.tran 10u 2m\n.end\n")
+    run("sim", netlist, "-o", tmp_path / "two.html")
+    page = show(tmp_path / "two.html")
+    highest = "window.circ.state.plots[0].scales.y.max"
+    assert page.evaluate(highest) > 100
+    page.get_by_role("checkbox", name="v(a)").uncheck()
+    assert 0.9 < page.evaluate(highest) < 1.2
+    page.get_by_role("checkbox", name="v(a)").check()
+    assert page.evaluate(highest) > 100
+
+
+def test_dark_and_light(buck, show):
+    paper = "getComputedStyle(document.body).backgroundColor"
+    page = show(buck / "out.html")
+    light = page.evaluate(paper)
+    page.get_by_role("button", name="dark / light").click()
+    dark = page.evaluate(paper)
+    assert light == "rgb(255, 255, 255)" and dark != light
+    page.get_by_role("button", name="dark / light").click()
+    assert page.evaluate(paper) == light
+    assert show(buck / "out.html", color_scheme="dark").evaluate(paper) == dark
+
+
+def test_the_spectrum_of_a_sine(tmp_path, show):
+    netlist = tmp_path / "sine.cir"
+    netlist.write_text(SINE)
+    run("sim", netlist, "-o", tmp_path / "sine.html")
+    page = show(tmp_path / "sine.html")
+    assert "top" in page.locator("pre").first.inner_text()
+    page.get_by_role("button", name="spectrum").click()
+    section = page.get_by_role("region", name="spectrum")
+    assert section.is_visible()
+    peak = page.evaluate(
+        "(() => { const c = spectrumOf(window.circ.panels[0].curves.find((c) => c.name === 'v(in)'), 0, 10e-3);"
+        "const k = c.y.indexOf(Math.max(...c.y)); return [c.x[k], c.y[k]]; })()"
+    )
+    assert peak == pytest.approx([1000, 3], rel=1e-3)
+    page.get_by_role("button", name="spectrum").click()
+    assert not section.is_visible()
+
+
+def test_logarithmic_values(tmp_path, show):
+    netlist = tmp_path / "decay.cir"
+    netlist.write_text("decay\nc1 out 0 1u ic=1\nr1 out 0 1k\n.tran 10u 5m uic\n.end\n")
+    run("sim", netlist, "-o", tmp_path / "decay.html")
+    page = show(tmp_path / "decay.html")
+    page.get_by_role("button", name="log y").click()
+    assert page.evaluate("window.circ.state.plots[0].scales.y.distr") == 3
+    low, high = page.evaluate("[window.circ.state.plots[0].scales.y.min, window.circ.state.plots[0].scales.y.max]")
+    assert 0 < low < math.exp(-5) and high >= 1
+
+
+def test_a_jump_is_read_after_it(tmp_path, show):
+    netlist = tmp_path / "jump.cir"
+    netlist.write_text("jump\nv1 a 0 pulse(0 5 1m 0 0 1 2)\nr1 a b 1k\nr2 b 0 1k\n.tran 0.5m 2m\n.end\n")
+    run("sim", netlist, "-o", tmp_path / "jump.html")
+    page = show(tmp_path / "jump.html")
+    rows_of_jump = page.evaluate("(() => { const c = window.circ.panels[0].curves[0]; return Array.from(c.x).map((t, k) => [t, c.y[k]]).filter(([t]) => t === 1e-3); })()")
+    assert rows_of_jump == [[1e-3, 0], [1e-3, 5]]
+    first(page)
+    page.keyboard.press("a")
+    assert (float(cursor(page, "a")), float(reading(page, "v(a)", "a"))) == (1e-3, 5)
+
+
+def test_a_bode_page(tmp_path, show):
+    netlist = tmp_path / "filter.cir"
+    netlist.write_text("filter\nv1 in 0 dc 0 ac 1\nr1 in out 1k\nc1 out 0 159.15494309189535n\n.ac dec 10 10 100k\n.end\n")
+    run("ac", netlist, "-o", tmp_path / "filter.html", "--probe", "v(out)")
+    page = show(tmp_path / "filter.html")
+    assert page.evaluate("window.circ.panels.map((p) => [p.quantity, p.unit])") == [["gain", "dB"], ["phase", "°"]]
+    first(page)
+    page.keyboard.press("a")
+    # In the middle, at 1 kHz, is the corner.
+    assert float(cursor(page, "a")) == pytest.approx(1e3)
+    gain = page.evaluate("window.circ.panels.map((p) => valueAt(p.curves[0], window.circ.state.cursors.a))")
+    assert gain == pytest.approx([-10 * math.log10(2), -45], abs=1e-9)
+
+
+def test_steps_and_comparisons_have_pages(tmp_path, show):
+    netlist = tmp_path / "steps.cir"
+    netlist.write_text("steps\nv1 in 0 1\nr1 in out {r}\nc1 out 0 1u ic=0\n.param r=1k\n.step param r list 1k 2k\n.tran 10u 1m uic\n.probe v(out)\n.end\n")
+    run("sim", netlist, "-o", tmp_path / "steps.html")
+    page = show(tmp_path / "steps.html")
+    names = page.evaluate("window.circ.panels[0].curves.map((c) => c.name)")
+    assert len(names) == 2 and all(name.startswith("v(out)") for name in names)
+    plain = tmp_path / "plain.cir"
+    plain.write_text(SINE)
+    run("sim", plain, "-o", tmp_path / "plain.csv")
+    run("compare", plain, "--against", tmp_path / "plain.csv", "-o", tmp_path / "both.html")
+    page = show(tmp_path / "both.html")
+    assert "difference" in page.evaluate("window.circ.panels.map((p) => p.quantity)")
+
+
+def test_what_is_seen_is_saved_as_a_drawing(buck, show):
+    page = show(buck / "out.html")
+    with page.expect_download() as waiting:
+        page.get_by_role("button", name="save SVG").click()
+    drawing = waiting.value.path().read_text()
+    assert drawing.startswith("<svg") and drawing.count("stroke-width=\"1.5\"") == 3 and "NaN" not in drawing
+
+
+def test_a_million_rows_of_ten_signals_open(tmp_path, show):
+    nodes = "".join(f"r{k} in n{k} {k}k\nc{k} n{k} 0 1n\n" for k in range(1, 10))
+    netlist = tmp_path / "large.cir"
+    netlist.write_text(f"large\nv1 in 0 sin(0 1 1k)\n{nodes}.tran 1u 1\n.save v(in) {' '.join(f'v(n{k})' for k in range(1, 10))}\n.end\n")
+    run("sim", netlist, "-q", "-o", tmp_path / "large.html")
+    page = show(tmp_path / "large.html")
+    assert page.evaluate("window.circ.panels.flatMap((p) => p.curves).map((c) => c.y.length)") == [1000001] * 10
+    first(page)
+    for _ in range(12):
+        page.keyboard.press("+")
+    assert view(page) == pytest.approx([0.5 - 2**-13, 0.5 + 2**-13])
+    page.keyboard.press("a")
+    t = float(cursor(page, "a"))
+    assert float(reading(page, "v(in)", "a")) == pytest.approx(math.sin(2000 * math.pi * t), abs=1e-9)
+
+
+def test_the_page_is_usable_by_keyboard_alone(buck, show):
+    page = show(buck / "out.html")
+    names = []
+    for _ in range(14):
+        page.keyboard.press("Tab")
+        names.append(page.evaluate("document.activeElement.getAttribute('aria-label') || document.activeElement.innerText || document.activeElement.type"))
+    assert any("voltage: v(out)" in name for name in names) and "spectrum" in names and "checkbox" in names
+    unnamed = page.evaluate("[...document.querySelectorAll('button, input, canvas[role=img]')].filter((e) => !(e.innerText || e.ariaLabel || e.labels?.length)).length")
+    assert unnamed == 0
