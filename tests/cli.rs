@@ -249,7 +249,7 @@ fn outputs_that_cannot_be_are_refused_before_the_run() {
             "--format raw: the endings of all outputs name another",
         ),
         ("ac divider.cir -o none/a.csv", "none/a.csv: No such file"),
-        ("compare long.cir -o a.pdf", "must be svg or png"),
+        ("compare long.cir -o a.pdf", "must be svg, png or html"),
         ("compare long.cir -o none/a.svg", "none/a.svg: No such file"),
         ("bench long.cir -o none/a.csv", "none/a.csv: No such file"),
         ("graph long.cir -o none/a.dot", "none/a.dot: No such file"),
