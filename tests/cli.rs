@@ -135,6 +135,8 @@ fn help_names_every_command_and_flag() {
         "bench",
         "compare",
         "graph",
+        "view",
+        "watch",
         "explain",
         "completions",
         "man",

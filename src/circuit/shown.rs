@@ -7,6 +7,7 @@ use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Binary, Expr, ExprKind, Unary};
 use crate::netlist::expression;
 use crate::netlist::suggest::nearest;
+use crate::waveform::is_of_pattern;
 
 /// A column of results.
 #[derive(Debug, Clone, PartialEq)]
@@ -139,7 +140,7 @@ impl Circuit {
         if !pattern.contains(['*', '?']) || pattern.contains(['(', ')', '+', '-', '/', ',']) {
             return None;
         }
-        let fits = |name: &str| !is_inside(name) && fits(pattern.as_bytes(), name.as_bytes());
+        let fits = |name: &str| !is_inside(name) && is_of_pattern(name, pattern);
         Some(match function {
             "v" => {
                 let all = self.nodes.iter().skip(1).filter(|name| fits(name));
@@ -248,56 +249,4 @@ fn check_call(name: &str, arguments: usize) -> Read<()> {
         }
     };
     Err(Box::new(fault))
-}
-
-/// Whether a name is one of a pattern's: `*` stands for any characters, `?` for one.
-fn fits(pattern: &[u8], name: &[u8]) -> bool {
-    let (mut p, mut n, mut star) = (0, 0, None);
-    while n < name.len() {
-        match pattern.get(p) {
-            Some(b'*') => {
-                star = Some((p, n));
-                p += 1;
-            }
-            Some(&c) if c == b'?' || c == name[n] => (p, n) = (p + 1, n + 1),
-            // The last star takes one character more.
-            _ => match &mut star {
-                Some((at, taken)) => {
-                    *taken += 1;
-                    (p, n) = (*at + 1, *taken);
-                }
-                None => return false,
-            },
-        }
-    }
-    pattern[p..].iter().all(|c| *c == b'*')
-}
-
-#[cfg(test)]
-mod tests {
-    use super::fits;
-
-    #[test]
-    fn patterns_fit_what_they_should() {
-        let fits = |pattern: &str, name: &str| fits(pattern.as_bytes(), name.as_bytes());
-        for (pattern, name) in [
-            ("*", ""),
-            ("d*", "d1"),
-            ("x1.*", "x1.a.b"),
-            ("*out", "x.outout"),
-            ("d?", "d1"),
-            ("a*b*c", "abbcbc"),
-        ] {
-            assert!(fits(pattern, name), "{pattern} {name}");
-        }
-        for (pattern, name) in [
-            ("d*", "r1"),
-            ("d?", "d"),
-            ("d?", "d12"),
-            ("a*b", "abc"),
-            ("x1.*", "x1"),
-        ] {
-            assert!(!fits(pattern, name), "{pattern} {name}");
-        }
-    }
 }

@@ -59,7 +59,7 @@ pub(super) fn ac(args: &AcArgs, streams: &Streams) -> Result<Exit, Failure> {
     } else {
         ratios(&phasors, &asked).unwrap_or(phasors)
     };
-    write(&phasors, (&args.outputs, &formats), streams)?;
+    write(&phasors, model, (&args.outputs, &formats), streams)?;
     Ok(Exit::Done)
 }
 
@@ -74,7 +74,7 @@ pub(super) fn sim(
     streams: &Streams,
 ) -> Result<Exit, Failure> {
     let phasors = phasors(&args.input, model, &SmallSignalOptions::default(), streams)?;
-    write(&phasors, (&args.results.outputs, formats), streams)?;
+    write(&phasors, model, (&args.results.outputs, formats), streams)?;
     Ok(Exit::Done)
 }
 
@@ -121,6 +121,7 @@ fn tell_margins(phasors: &Phasors, streams: &Streams) {
 /// Writes the files, or without any CSV to standard output, and tells the margins.
 fn write(
     phasors: &Phasors,
+    model: &Model,
     (outputs, formats): (&[PathBuf], &[Format]),
     streams: &Streams,
 ) -> Result<(), Failure> {
@@ -143,7 +144,9 @@ fn write(
                 continue;
             }
             Format::Html => {
-                let page = Page::of_figure(&bode::figure(phasors)).html()?;
+                let page = Page::of_figure(&bode::figure(phasors))
+                    .with_circuit(Some(model))
+                    .html()?;
                 bytes.get_mut().extend_from_slice(page.as_bytes());
             }
         }

@@ -1,5 +1,6 @@
 //! What may be typed.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
@@ -92,6 +93,12 @@ pub enum Command {
     /// Draw the circuit
     #[command(after_help = examples::GRAPH)]
     Graph(GraphArgs),
+    /// Show waveforms of a file, of circ, ngspice, LTspice or any other program, as a page in the browser
+    #[command(after_help = examples::VIEW)]
+    View(ViewArgs),
+    /// Carry out a command anew whenever its netlist changes, and show its page in the browser
+    #[command(after_help = examples::WATCH)]
+    Watch(WatchArgs),
     /// Explain a code of a finding, such as `unknown-model`, or list all
     #[command(after_help = examples::EXPLAIN)]
     Explain(ExplainArgs),
@@ -104,7 +111,7 @@ pub enum Command {
 }
 
 /// The circuit and what changes it.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct Input {
     /// SPICE netlist, or a system in the JSON of `circ lcs`; `-` reads standard input
     #[arg(value_name = "FILE", value_parser = readable)]
@@ -196,6 +203,9 @@ pub struct ResultArgs {
         help = "Show exactly this: v(a), v(a,b), i(d1), @d1[i], v1#branch, patterns v(x1.*), all, expressions v(a)*i(r1) (repeatable)"
     )]
     pub probes: Vec<String>,
+    /// Show the results as a page in the browser
+    #[arg(help_heading = "Results", long, conflicts_with = "format")]
+    pub open: bool,
     /// Add rows at event times: two with equal time at a jump, before and after
     ///
     /// Where `.tran` names no print step they are there anyway, and so are rows at corners of sources.
@@ -300,6 +310,9 @@ pub struct AcArgs {
         default_value_if("format", ArgPredicate::IsPresent, Some("-"))
     )]
     pub outputs: Vec<PathBuf>,
+    /// Show the results as a page in the browser
+    #[arg(help_heading = "Results", long, conflicts_with = "format")]
+    pub open: bool,
     /// Format of standard output (`-o -`, csv without it), and of files whose ending names none
     #[arg(help_heading = "Results", long, value_enum, value_name = "FORMAT")]
     pub format: Option<Format>,
@@ -460,7 +473,7 @@ pub struct CompareArgs {
     #[command(flatten)]
     #[expect(missing_docs, reason = "documented where it is defined")]
     pub integration: CompareMethodArgs,
-    /// `ngspice`, or a csv or raw file of waveforms
+    /// `ngspice`, or a csv, raw, npz or json file of waveforms
     #[arg(
         long,
         value_name = "ngspice|REF.csv|REF.raw",
@@ -543,6 +556,50 @@ pub struct GraphArgs {
     /// Colour what conducts at this time of the transient, s
     #[arg(long, value_name = "TIME", value_parser = positive)]
     pub at: Option<f64>,
+}
+
+/// `circ view`.
+#[derive(Debug, Args)]
+pub struct ViewArgs {
+    /// Waveforms: csv, npz, json, or raw of ngspice or LTspice, whatever its name; `-` reads standard input
+    #[arg(value_name = "FILE", value_parser = readable)]
+    pub file: PathBuf,
+    /// Write to this file instead of opening the browser, or to `-`, standard output (repeatable): html, svg or png
+    #[arg(
+        short,
+        long = "output",
+        value_name = "OUT",
+        default_value_if("format", ArgPredicate::IsPresent, Some("-"))
+    )]
+    pub outputs: Vec<PathBuf>,
+    /// Format of standard output: html, svg or png
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    pub format: Option<Format>,
+    /// Show this signal, or those of a pattern, v(x1.*) (repeatable)
+    #[arg(long = "probe", value_name = "NAME")]
+    pub probes: Vec<String>,
+    /// Which of several plots in a raw file
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
+    pub plot: u8,
+}
+
+/// `circ watch`.
+#[derive(Debug, Args)]
+pub struct WatchArgs {
+    /// Port of the page's address on this machine [default: one that is free]
+    #[arg(long, value_name = "N")]
+    pub port: Option<u16>,
+    /// Print the page's address alone
+    #[arg(long)]
+    pub no_open: bool,
+    /// `FILE`, or `sim`, `pss` or `ac`, with their options
+    #[arg(
+        value_name = "COMMAND",
+        required = true,
+        trailing_var_arg = true,
+        allow_hyphen_values = true
+    )]
+    pub command: Vec<OsString>,
 }
 
 /// `circ explain`.

@@ -1,7 +1,6 @@
 //! `circ compare`.
 
-use std::fs::File;
-use std::io::BufReader;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -23,7 +22,7 @@ use crate::report::figure::{Figure, PANEL_WIDTH};
 use crate::report::html::Page;
 use crate::report::{json, steps, svg, text};
 use crate::waveform::compare::{At, Comparison, compare as compare_waveforms, difference};
-use crate::waveform::{Waveforms, csv, raw};
+use crate::waveform::{Plot, Waveforms, plots};
 
 /// Rows of our side at least, so that straight lines between them do not count as error.
 const ROWS: f64 = 20_000.0;
@@ -290,18 +289,21 @@ fn from_ngspice(
 }
 
 fn from_file(path: &Path) -> Result<Theirs, Failure> {
-    let file = BufReader::new(File::open(path).map_err(|e| Failure::file(path, e))?);
-    let is_raw = path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("raw"));
-    let read = if is_raw {
-        raw::read(file)
-    } else {
-        csv::read(file)
-    };
-    let waveforms = read.map_err(|error| Failure::Waveforms {
+    let bytes = fs::read(path).map_err(|e| Failure::file(path, e))?;
+    let plots = plots(&bytes).map_err(|error| Failure::Waveforms {
         path: path.to_owned(),
         error,
+    })?;
+    let runs = plots.into_iter().find_map(|plot| match plot {
+        Plot::Time(runs) => Some(runs),
+        Plot::Frequency(_) => None,
+    });
+    let [(_, waveforms)] = <[_; 1]>::try_from(runs.unwrap_or_default()).map_err(|runs| {
+        let file = path.display();
+        Failure::Message(match runs.len() {
+            0 => format!("{file}: holds nothing over time"),
+            count => format!("{file}: holds {count} runs; a comparison takes one"),
+        })
     })?;
     Ok(Theirs {
         name: path.display().to_string(),

@@ -9,6 +9,7 @@ use super::streams::Streams;
 use crate::analysis::{Finished, Measurements};
 use crate::circuit::Tran;
 use crate::integrate::{Block, Error, Method, Places, Reason, Run, Verified};
+use crate::model::Model;
 use crate::report::figure::Figure;
 use crate::report::{json, terminal, text};
 
@@ -28,8 +29,8 @@ pub(super) struct Destination<'a> {
     wanted: Wanted<'a>,
     formats: &'a [Format],
     tran: Option<Tran>,
-    /// Where elements stand.
-    pub(super) places: Places<'a>,
+    /// Of what is simulated; a system has none.
+    pub(super) model: Option<&'a Model>,
     /// A plot on a terminal.
     pub(super) plots: bool,
     pub(super) streams: &'a Streams,
@@ -41,17 +42,22 @@ impl<'a> Destination<'a> {
         wanted: Wanted<'a>,
         formats: &'a [Format],
         tran: Option<Tran>,
-        places: Places<'a>,
+        model: Option<&'a Model>,
         streams: &'a Streams,
     ) -> Self {
         Self {
             wanted,
             formats,
             tran,
-            places,
+            model,
             plots: wanted.results.outputs.is_empty() && streams.out_is_terminal(),
             streams,
         }
+    }
+
+    /// Where elements stand.
+    pub(super) fn places(&self) -> Places<'a> {
+        self.model.map_or_else(Places::default, Model::places)
     }
 
     /// Whether anything is looked at.
@@ -109,7 +115,7 @@ impl<'a> Destination<'a> {
         let told = Told {
             run: &run,
             found: &found,
-            places: self.places,
+            model: self.model,
         };
         let written = outputs.finish(told, &figure, incomplete.as_deref());
         self.summarise(&run, &found);
@@ -180,13 +186,13 @@ impl<'a> Destination<'a> {
     }
 
     fn failure(&self, error: &Error) -> Failure {
-        input::broke_off(self.wanted.input, error, self.places, self.streams)
+        input::broke_off(self.wanted.input, error, self.places(), self.streams)
     }
 
     /// On standard error: JSON where asked for; words where asked for, for a person, and with `-v`; else the notes alone.
     /// What was measured is in all of them.
     fn summarise(&self, run: &Run, found: &Measurements) {
-        let (places, streams, summary) = (self.places, self.streams, self.wanted.results.summary);
+        let (places, streams, summary) = (self.places(), self.streams, self.wanted.results.summary);
         let in_words = summary == Some(Summary::Text)
             || summary.is_none()
                 && (streams.verbose || streams.err_is_terminal())

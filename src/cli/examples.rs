@@ -3,6 +3,7 @@
 pub(super) const CIRC: &str = "\
 Examples:
   circ buck.cir                     simulate; a plot on a terminal, CSV into a pipe
+  circ buck.cir --open              results as a page in the browser
   circ buck.cir -o buck.html        results as a page; csv, raw, npz, json, svg, png by the ending
   circ check buck.cir               what is known before it runs
   circ explain unknown-model        what a message means
@@ -61,6 +62,17 @@ Examples:
   circ graph buck.cir -o buck.svg
   circ graph buck.cir --at 1.2m -o buck.png
   circ graph buck.cir | dot -Tpdf > buck.pdf";
+
+pub(super) const VIEW: &str = "\
+Examples:
+  circ view buck.raw
+  circ view buck.raw --probe 'v(out)' --probe 'i(l*)' -o buck.html";
+
+pub(super) const WATCH: &str = "\
+Examples:
+  circ watch buck.cir
+  circ watch buck.cir --probe 'v(out)' --tol 1e-6
+  circ watch ac filter.cir";
 
 pub(super) const EXPLAIN: &str = "\
 Examples:

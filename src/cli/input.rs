@@ -41,6 +41,14 @@ impl Subject {
         }
     }
 
+    /// The model of a circuit.
+    pub fn model(&self) -> Option<&Model> {
+        match self {
+            Self::Circuit(model) => Some(model),
+            Self::System(_) => None,
+        }
+    }
+
     /// The transient that it asks for.
     pub fn tran(&self) -> Option<Tran> {
         match self {
@@ -119,10 +127,10 @@ fn libraries(input: &Input) -> Vec<PathBuf> {
     input.libraries.iter().cloned().chain(named).collect()
 }
 
-/// Reads a file as [`open`] does, for a command that takes the values as they stand and says so of a netlist with `.step`.
+/// Reads a file as [`open()`] does, for a command that takes the values as they stand and says so of a netlist with `.step`.
 ///
 /// # Errors
-/// As [`open`].
+/// As [`open()`].
 pub fn open_as_it_stands(
     input: &Input,
     outputs: &[&Path],

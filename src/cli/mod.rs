@@ -3,6 +3,7 @@
 mod ac;
 pub mod args;
 mod bench;
+mod browser;
 mod check;
 mod compare;
 mod cpu;
@@ -28,10 +29,12 @@ mod signals;
 pub mod sim;
 mod steps;
 pub mod streams;
+mod view;
+mod watch;
 
 use std::ffi::OsString;
 use std::panic::{self, AssertUnwindSafe};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches};
@@ -48,7 +51,7 @@ pub fn main() -> Exit {
     let mut command = Cli::command();
     let args = with_command(std::env::args_os(), &command);
     let parsed = command.try_get_matches_from_mut(args);
-    let cli = match parsed.and_then(|matches| Cli::from_arg_matches(&matches)) {
+    let mut cli = match parsed.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version go to standard output, usage errors to standard error.
@@ -71,7 +74,7 @@ pub fn main() -> Exit {
         messages: cli.message_format,
     };
     // A fault of the program itself still ends with the status for "could not be done".
-    let outcome = panic::catch_unwind(AssertUnwindSafe(|| run(&cli.command, &streams)));
+    let outcome = panic::catch_unwind(AssertUnwindSafe(|| opened(&mut cli.command, &streams)));
     let outcome = outcome.unwrap_or_else(|_| {
         let message = "a fault in circ itself (see above); please report it with the netlist";
         Err(Failure::Message(message.into()))
@@ -110,6 +113,27 @@ fn with_command(args: impl Iterator<Item = OsString>, commands: &clap::Command) 
     args
 }
 
+/// Carries out a command, and shows its page where it asks for that.
+fn opened(command: &mut Command, streams: &Streams) -> Result<Exit, Failure> {
+    let outputs = match command {
+        Command::Sim(args) if args.results.open => &mut args.results.outputs,
+        Command::Pss(args) if args.results.open => &mut args.results.outputs,
+        Command::Ac(args) if args.open => &mut args.outputs,
+        _ => return run(command, streams),
+    };
+    let is_page = |path: &&PathBuf| path.extension().is_some_and(|e| e == "html" || e == "htm");
+    let page = match outputs.iter().find(is_page) {
+        Some(page) => page.clone(),
+        None => {
+            outputs.push(browser::place()?);
+            outputs[outputs.len() - 1].clone()
+        }
+    };
+    let exit = run(command, streams)?;
+    browser::show(&page, streams)?;
+    Ok(exit)
+}
+
 fn run(command: &Command, streams: &Streams) -> Result<Exit, Failure> {
     match command {
         Command::Sim(args) => sim::sim(args, streams),
@@ -122,6 +146,8 @@ fn run(command: &Command, streams: &Streams) -> Result<Exit, Failure> {
         Command::Bench(args) => bench::bench(args, streams),
         Command::Compare(args) => compare::compare(args, streams),
         Command::Graph(args) => graph::graph(args, streams),
+        Command::View(args) => view::view(args, streams),
+        Command::Watch(args) => watch::watch(args, streams),
         Command::Explain(args) => explain::explain(args, streams),
         Command::Completions(args) => shell::completions(args, streams),
         Command::Man(args) => shell::man(args, streams),

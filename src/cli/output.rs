@@ -11,7 +11,8 @@ use super::files::{self, STDOUT, Written};
 use super::rows::{Columns, Form, Shown, Stream};
 use super::streams::Streams;
 use crate::analysis::Measurements;
-use crate::integrate::{Block, Places, Run};
+use crate::integrate::{Block, Run};
+use crate::model::Model;
 use crate::report::figure::{Figure, PANEL_WIDTH};
 use crate::report::html::Page;
 use crate::report::{PictureError, png, svg};
@@ -121,12 +122,12 @@ pub(super) fn unknown_ending(path: &Path, known: &str) -> Failure {
     ))
 }
 
-/// A run, what was measured in it, and where its elements stand.
+/// A run, what was measured in it, and its model.
 #[derive(Clone, Copy)]
 pub(super) struct Told<'a> {
     pub(super) run: &'a Run,
     pub(super) found: &'a Measurements,
-    pub(super) places: Places<'a>,
+    pub(super) model: Option<&'a Model>,
 }
 
 /// The results of a run: those that are written as rows come, and those that need all of them.
@@ -259,7 +260,7 @@ fn write(
     };
     let result = match format {
         Format::Html => {
-            let page = Page::of_run(&drawing(usize::MAX), told.run, told.found, told.places);
+            let page = Page::of_run(&drawing(usize::MAX), told.run, told.found, told.model);
             file.append(page.html()?.as_bytes())
         }
         Format::Svg => file.append(svg::draw(&drawing(PANEL_WIDTH))?.as_bytes()),

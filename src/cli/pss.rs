@@ -33,7 +33,7 @@ pub(super) fn pss(args: &PssArgs, streams: &Streams) -> Result<Exit, Failure> {
         verify: false,
     };
     let tran = model.circuit().tran;
-    let destination = Destination::of(wanted, &formats, tran, subject.places(), streams);
+    let destination = Destination::of(wanted, &formats, tran, Some(model), streams);
     let outputs = destination.open(&Columns::of_subject(&subject))?;
     let options = PeriodicOptions {
         period: args.period,

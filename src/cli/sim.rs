@@ -22,8 +22,8 @@ use crate::analysis::{
 use crate::circuit::source::Wave;
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{
-    Block, Error, Method, Note, Places, Reason, Run, SimOptions, Sink, Verified, VerifyOptions,
-    aliased, simulate, simulate_system, verify, verify_system,
+    Block, Error, Method, Note, Reason, Run, SimOptions, Sink, Verified, VerifyOptions, aliased,
+    simulate, simulate_system, verify, verify_system,
 };
 use crate::lcs::Input;
 use crate::model::Model;
@@ -45,8 +45,7 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         only_one_way(args)?;
         files::spare(&paths, [args.input.file.as_path()])?;
         let run = forms::run(&form, args)?;
-        let destination =
-            Destination::of(args.wanted(), &formats, None, Places::default(), streams);
+        let destination = Destination::of(args.wanted(), &formats, None, None, streams);
         let outputs = destination.open(&Columns::of(&run.waveforms))?;
         let finished = Finished::of(Ok(run));
         return destination.finish(outputs, finished, true, None);
@@ -94,14 +93,11 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         args.wanted(),
         &formats,
         subject.tran(),
-        subject.places(),
+        subject.model(),
         streams,
     );
     let mut outputs = destination.open(&Columns::of_subject(&subject))?;
-    let circuit = match &subject {
-        Subject::Circuit(model) => Some(model.circuit()),
-        Subject::System(_) => None,
-    };
+    let circuit = subject.model().map(Model::circuit);
     let measures = circuit.is_some_and(is_measured);
     let collects = outputs.hold() || destination.plots || measures || args.verify;
     let mut take = |block: Block<'_>| match circuit.and_then(|c| shown_values(c, block)) {

@@ -49,9 +49,9 @@ impl Stepping<'_> {
                 .check(columns.names.len(), Some(most))
                 .map_err(refused)?;
         }
-        let places = self.model.places();
+        let model = Some(self.model);
         let destination =
-            Destination::of(self.args.wanted(), formats, circuit.tran, places, streams);
+            Destination::of(self.args.wanted(), formats, circuit.tran, model, streams);
         let outputs = destination.open(&columns)?;
         let bar = streams.progress(variants.len() as u64, "stepping");
         let outcomes: Vec<Result<Outcome, Failure>> = each(&variants, |variant| {
@@ -148,7 +148,7 @@ impl Stepping<'_> {
         incomplete: Option<&str>,
         destination: &Destination<'_>,
     ) -> Result<(), Failure> {
-        let streams = destination.streams;
+        let (streams, places) = (destination.streams, destination.places());
         let total = steps::total(done);
         let figure = |pixels| {
             let runs: Vec<_> = done.iter().map(|s| (s.label(), &s.run.waveforms)).collect();
@@ -159,20 +159,16 @@ impl Stepping<'_> {
         let told = Told {
             run: &total,
             found: &Measurements::default(),
-            places: destination.places,
+            model: destination.model,
         };
         let written = outputs.finish(told, &figure, incomplete);
         let wordy = streams.verbose || streams.err_is_terminal();
         match self.args.results.summary {
-            Some(Summary::Json) => streams.error(steps::summary(done, destination.places)),
-            Some(Summary::Text) => {
-                streams.error(text::summary(&total, destination.places, streams.verbose))
-            }
-            None if wordy => {
-                streams.say(text::summary(&total, destination.places, streams.verbose))
-            }
+            Some(Summary::Json) => streams.error(steps::summary(done, places)),
+            Some(Summary::Text) => streams.error(text::summary(&total, places, streams.verbose)),
+            None if wordy => streams.say(text::summary(&total, places, streams.verbose)),
             None => {
-                for note in destination.places.all(&total.notes) {
+                for note in places.all(&total.notes) {
                     streams.note(note);
                 }
             }

@@ -9,9 +9,10 @@ use base64::prelude::BASE64_STANDARD;
 use serde::Serialize;
 
 use super::figure::{self, Figure};
-use super::{PictureError, sheet, si, text};
+use super::{PictureError, schematic, sheet, si, text};
 use crate::analysis::Measurements;
 use crate::integrate::{Change, Event, Places, Run};
+use crate::model::Model;
 
 const TEMPLATE: &str = include_str!("page/page.html");
 const STYLES: [&str; 2] = [
@@ -44,6 +45,8 @@ pub struct Page {
     strips: Vec<Strip>,
     tables: Vec<Table>,
     texts: Vec<Text>,
+    /// A picture of the circuit in SVG, see [`schematic::with_both_states`].
+    circuit: Option<String>,
 }
 
 /// The common axis of all panels.
@@ -152,13 +155,15 @@ impl Page {
             strips: Vec::new(),
             tables: Vec::new(),
             texts: Vec::new(),
+            circuit: None,
         }
     }
 
     /// The same with what the run did: events, impulses, measurements, energies and notes.
     #[must_use]
-    pub fn of_run(figure: &Figure, run: &Run, found: &Measurements, places: Places<'_>) -> Self {
-        let mut page = Self::of_figure(figure);
+    pub fn of_run(figure: &Figure, run: &Run, found: &Measurements, model: Option<&Model>) -> Self {
+        let places = model.map_or_else(Places::default, Model::places);
+        let mut page = Self::of_figure(figure).with_circuit(model);
         page.about = format!("{} · {}", page.about, run.method);
         let (strips, left) = strips(&run.events);
         page.strips = strips;
@@ -196,6 +201,15 @@ impl Page {
         page
     }
 
+    /// The same with a picture of the circuit, where it can be drawn.
+    #[must_use]
+    pub fn with_circuit(self, model: Option<&Model>) -> Self {
+        Self {
+            circuit: model.and_then(|model| schematic::with_both_states(model).ok()),
+            ..self
+        }
+    }
+
     /// The document, without references to anything outside itself.
     ///
     /// # Errors
@@ -216,6 +230,21 @@ impl Page {
             ],
         ))
     }
+}
+
+/// A page, where there is one, with messages above it in a block of this role (WAI-ARIA: `alert`, `note`), and a script at its end.
+#[must_use]
+pub fn with_messages(page: Option<String>, (role, messages): (&str, &str), script: &str) -> String {
+    const BARE: &str = "<!DOCTYPE html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>circ</title><link rel=\"icon\" href=\"data:,\"><style>{{style}}</style>\n\
+                        <body><main></main></body></html>\n";
+    let page = page.unwrap_or_else(|| filled(BARE, &[("style", STYLES.join("\n"))]));
+    let messages = sheet::escaped(messages.trim_end());
+    let above = if messages.is_empty() {
+        String::new()
+    } else {
+        format!("<pre role=\"{role}\" class=\"messages\">{messages}</pre>")
+    };
+    page.replacen("<main", &format!("{above}<main"), 1) + &format!("<script>{script}</script>\n")
 }
 
 const fn axis(name: &'static str, unit: &'static str, log: bool) -> Axis {
@@ -316,7 +345,7 @@ mod tests {
             ..Run::default()
         };
         let figure = Figure::of_waveforms(&run.waveforms, usize::MAX);
-        Page::of_run(&figure, &run, &Measurements::default(), Places::default())
+        Page::of_run(&figure, &run, &Measurements::default(), None)
     }
 
     #[test]

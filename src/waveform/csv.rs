@@ -2,7 +2,10 @@
 
 use std::io::{Read, Write};
 
-use super::{WaveformError, Waveforms};
+use nalgebra::Complex;
+
+use super::plot::runs;
+use super::{Phasors, Plot, WaveformError, Waveforms, phasors};
 
 const FORMAT: &str = "csv";
 
@@ -93,68 +96,128 @@ pub fn write(to: impl Write, waves: &Waveforms) -> std::io::Result<()> {
 /// [`WaveformError::Malformed`] with the line of the first cell that is not a finite number, of a row of another length, or
 /// of a time that runs backwards.
 pub fn read(from: impl Read) -> Result<Waveforms, WaveformError> {
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .flexible(true)
-        .from_reader(from);
-    let header = reader.headers().map_err(unreadable)?.clone();
-    if !header
-        .get(0)
-        .is_some_and(|name| matches!(name.to_ascii_lowercase().as_str(), "time" | "t"))
-    {
-        let found = header.get(0).unwrap_or("");
-        return Err(WaveformError::malformed(
-            FORMAT,
-            format!("the first column must be `time`, found `{found}`"),
-        ));
+    let table = Table::read(from)?;
+    let (axis, time) = (&table.names[0], &table.columns[0]);
+    if !is_time(axis) {
+        return Err(malformed(format!(
+            "the first column must be `time`, found `{axis}`"
+        )));
     }
-    let names: Vec<String> = header.iter().skip(1).map(str::to_owned).collect();
-    let mut columns = vec![Vec::new(); header.len()];
-    for record in reader.records() {
-        let record = record.map_err(unreadable)?;
-        let line = record.position().map_or(0, csv::Position::line);
-        if record.len() != header.len() {
-            let reason = format!(
-                "line {line}: {} cells where the header has {}",
-                record.len(),
-                header.len()
-            );
-            return Err(WaveformError::malformed(FORMAT, reason));
+    if let Some(k) = time.windows(2).position(|pair| pair[1] < pair[0]) {
+        let line = table.lines[k + 1];
+        return Err(malformed(format!("line {line}: time runs backwards")));
+    }
+    Ok(table.waveforms())
+}
+
+/// Reads the same, and files whose first column is frequency (Hz) before `re(…)` and `im(…)` of each signal.
+///
+/// # Errors
+/// [`WaveformError::Malformed`] as in [`read`]; a time that runs backwards begins another run.
+pub(super) fn plot(from: impl Read) -> Result<Plot, WaveformError> {
+    let table = Table::read(from)?;
+    match &table.names[0] {
+        axis if is_time(axis) => Ok(Plot::Time(runs(&table.waveforms()))),
+        axis if axis.eq_ignore_ascii_case("frequency") => table.phasors().map(Plot::Frequency),
+        axis => Err(malformed(format!(
+            "the first column must be `time` or `frequency`, found `{axis}`"
+        ))),
+    }
+}
+
+fn is_time(axis: &str) -> bool {
+    matches!(axis.to_ascii_lowercase().as_str(), "time" | "t")
+}
+
+fn malformed(reason: impl Into<String>) -> WaveformError {
+    WaveformError::malformed(FORMAT, reason)
+}
+
+/// Finite numbers under a header.
+struct Table {
+    names: Vec<String>,
+    columns: Vec<Vec<f64>>,
+    /// Of each row.
+    lines: Vec<u64>,
+}
+
+impl Table {
+    fn read(from: impl Read) -> Result<Self, WaveformError> {
+        let mut reader = csv::ReaderBuilder::new()
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .flexible(true)
+            .from_reader(from);
+        let header = reader.headers().map_err(unreadable)?;
+        let mut names: Vec<String> = header.iter().map(str::to_owned).collect();
+        if names.is_empty() {
+            names.push(String::new());
         }
-        for (cell, column) in record.iter().zip(&mut columns) {
-            match cell.parse::<f64>() {
-                Ok(value) if value.is_finite() => column.push(value),
-                _ => {
-                    let reason = format!("line {line}: `{cell}` is not a finite number");
-                    return Err(WaveformError::malformed(FORMAT, reason));
+        let mut columns = vec![Vec::new(); names.len()];
+        let mut lines = Vec::new();
+        for record in reader.records() {
+            let record = record.map_err(unreadable)?;
+            let line = record.position().map_or(0, csv::Position::line);
+            if record.len() != names.len() {
+                return Err(malformed(format!(
+                    "line {line}: {} cells where the header has {}",
+                    record.len(),
+                    names.len()
+                )));
+            }
+            for (cell, column) in record.iter().zip(&mut columns) {
+                match cell.parse::<f64>() {
+                    Ok(value) if value.is_finite() => column.push(value),
+                    _ => {
+                        return Err(malformed(format!(
+                            "line {line}: `{cell}` is not a finite number"
+                        )));
+                    }
                 }
             }
+            lines.push(line);
         }
-        if let [.., previous, last] = columns[0][..]
-            && last < previous
-        {
-            return Err(WaveformError::malformed(
-                FORMAT,
-                format!("line {line}: time runs backwards"),
-            ));
-        }
+        Ok(Self {
+            names,
+            columns,
+            lines,
+        })
     }
-    let time = columns.remove(0);
-    Ok(Waveforms::from_columns(
-        String::new(),
-        names,
-        time,
-        &columns,
-    ))
+
+    fn waveforms(mut self) -> Waveforms {
+        let time = self.columns.remove(0);
+        self.names.remove(0);
+        Waveforms::from_columns(String::new(), self.names, time, &self.columns)
+    }
+
+    fn phasors(mut self) -> Result<Phasors, WaveformError> {
+        let frequency = self.columns.remove(0);
+        let name = |pair: &[String]| {
+            let re = pair[0].strip_prefix("re(")?.strip_suffix(')')?;
+            let im = pair.get(1)?.strip_prefix("im(")?.strip_suffix(')')?;
+            (re == im).then(|| re.to_owned())
+        };
+        let pairs = self.names[1..].chunks(2);
+        let names: Option<Vec<String>> = pairs.map(name).collect();
+        let names = names.ok_or_else(|| {
+            malformed("columns over frequency must be `re(signal)` and `im(signal)` in turn")
+        })?;
+        let value = |k: usize, pair: &[Vec<f64>]| Complex::new(pair[0][k], pair[1][k]);
+        let values = (0..frequency.len())
+            .flat_map(|k| self.columns.chunks(2).map(move |pair| value(k, pair)))
+            .collect();
+        Ok(Phasors {
+            title: String::new(),
+            units: names.iter().map(|name| phasors::unit(name)).collect(),
+            names,
+            frequency,
+            values,
+        })
+    }
 }
 
 fn unreadable(error: csv::Error) -> WaveformError {
-    let reason = error.to_string();
-    match error.into_kind() {
-        csv::ErrorKind::Io(error) => WaveformError::Io(error),
-        _ => WaveformError::malformed(FORMAT, reason),
-    }
+    malformed(error.to_string())
 }
 
 #[cfg(test)]

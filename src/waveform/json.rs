@@ -6,7 +6,8 @@ use std::io::{Read, Write};
 
 use serde::{Deserialize, Serialize};
 
-use super::{WaveformError, Waveforms};
+use super::plot::runs;
+use super::{Phasors, Plot, WaveformError, Waveforms, phasors};
 
 const FORMAT: &str = "json";
 const SCHEMA: &str = "circ-waveforms/1";
@@ -17,6 +18,11 @@ struct File {
     title: String,
     time: Vec<f64>,
     signals: Vec<Signal>,
+}
+
+#[derive(Deserialize)]
+struct Schema {
+    schema: String,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -53,8 +59,7 @@ pub fn write(mut to: impl Write, waves: &Waveforms) -> std::io::Result<()> {
 /// # Errors
 /// [`WaveformError::Malformed`] when a key is missing, the schema is another, or the columns differ in length.
 pub fn read(from: impl Read) -> Result<Waveforms, WaveformError> {
-    let file: File = serde_json::from_reader(from)
-        .map_err(|e| WaveformError::malformed(FORMAT, e.to_string()))?;
+    let file: File = serde_json::from_reader(from).map_err(unreadable)?;
     if file.schema != SCHEMA {
         return Err(WaveformError::malformed(
             FORMAT,
@@ -77,6 +82,22 @@ pub fn read(from: impl Read) -> Result<Waveforms, WaveformError> {
     Ok(Waveforms::from_columns(
         file.title, names, file.time, &columns,
     ))
+}
+
+/// Reads a file of waveforms or of phasors, as its schema says.
+///
+/// # Errors
+/// See [`read`].
+pub(super) fn plot(bytes: &[u8]) -> Result<Plot, WaveformError> {
+    let schema: Schema = serde_json::from_slice(bytes).map_err(unreadable)?;
+    if schema.schema == phasors::SCHEMA {
+        return Phasors::read_json(bytes).map(Plot::Frequency);
+    }
+    read(bytes).map(|waves| Plot::Time(runs(&waves)))
+}
+
+pub(super) fn unreadable(error: serde_json::Error) -> WaveformError {
+    WaveformError::malformed(FORMAT, error.to_string())
 }
 
 #[cfg(test)]

@@ -4,11 +4,13 @@
 
 use std::io::{Read, Seek, Write};
 
+use nalgebra::Complex;
 use npyz::WriterBuilder;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
-use super::{Phasors, WaveformError, Waveforms};
+use super::plot::runs;
+use super::{Phasors, Plot, WaveformError, Waveforms, phasors};
 
 const FORMAT: &str = "npz";
 /// The archive's format has room for so many bytes.
@@ -68,42 +70,73 @@ fn member<W: Write + Seek, T: npyz::AutoSerialize>(
 /// # Errors
 /// [`WaveformError::Malformed`] when it is no archive, `time` is missing, or a member is not such a vector.
 pub fn read(from: impl Read + Seek) -> Result<Waveforms, WaveformError> {
-    let malformed = |reason: String| WaveformError::malformed(FORMAT, reason);
     let mut archive = ZipArchive::new(from).map_err(|e| malformed(e.to_string()))?;
-    let mut time = None;
-    let (mut names, mut columns) = (Vec::new(), Vec::new());
-    for k in 0..archive.len() {
-        let file = archive.by_index(k).map_err(|e| malformed(e.to_string()))?;
-        let name = file
-            .name()
-            .map_err(|e| malformed(e.to_string()))?
-            .trim_end_matches(".npy")
-            .to_owned();
-        let values = npyz::NpyFile::new(file)
-            .and_then(npyz::NpyFile::into_vec::<f64>)
-            .map_err(|e| malformed(format!("`{name}`: {e}")))?;
-        if name == "time" {
-            time = Some(values);
-        } else {
-            names.push(name);
-            columns.push(values);
-        }
-    }
-    let time = time.ok_or_else(|| malformed("no member `time`".into()))?;
-    if let Some(j) = columns.iter().position(|c| c.len() != time.len()) {
-        return Err(malformed(format!(
-            "`{}` has {} values for {} times",
-            names[j],
-            columns[j].len(),
-            time.len()
-        )));
-    }
+    let (time, names, columns) = vectors::<_, f64>(&mut archive, "time")?;
     Ok(Waveforms::from_columns(
         String::new(),
         names,
         time,
         &columns,
     ))
+}
+
+/// Reads the same, or where there is a member `frequency` complex vectors over it.
+///
+/// # Errors
+/// See [`read`].
+pub(super) fn plot(mut from: impl Read + Seek) -> Result<Plot, WaveformError> {
+    let mut archive = ZipArchive::new(&mut from).map_err(|e| malformed(e.to_string()))?;
+    if archive.index_for_name("frequency.npy").is_none() {
+        from.rewind()?;
+        return read(from).map(|waves| Plot::Time(runs(&waves)));
+    }
+    let (frequency, names, columns) = vectors::<_, Complex<f64>>(&mut archive, "frequency")?;
+    let rows = 0..frequency.len();
+    Ok(Plot::Frequency(Phasors {
+        title: String::new(),
+        units: names.iter().map(|name| phasors::unit(name)).collect(),
+        values: rows
+            .flat_map(|k| columns.iter().map(move |column| column[k]))
+            .collect(),
+        names,
+        frequency,
+    }))
+}
+
+/// The vector of this axis, then names and vectors of all other members.
+type Vectors<T> = (Vec<f64>, Vec<String>, Vec<Vec<T>>);
+
+fn vectors<R: Read + Seek, T: npyz::Deserialize>(
+    archive: &mut ZipArchive<R>,
+    axis: &str,
+) -> Result<Vectors<T>, WaveformError> {
+    let mut along = None;
+    let (mut names, mut columns) = (Vec::new(), Vec::new());
+    for k in 0..archive.len() {
+        let file = archive.by_index(k).map_err(|e| malformed(e.to_string()))?;
+        let name = file.name().map_err(|e| malformed(e.to_string()))?;
+        let name = name.trim_end_matches(".npy").to_owned();
+        let wrong = |e: std::io::Error| malformed(format!("`{name}`: {e}"));
+        let array = npyz::NpyFile::new(file).map_err(wrong)?;
+        if name == axis {
+            along = Some(array.into_vec().map_err(wrong)?);
+        } else {
+            columns.push(array.into_vec().map_err(wrong)?);
+            names.push(name);
+        }
+    }
+    let along: Vec<f64> = along.ok_or_else(|| malformed(format!("no member `{axis}`")))?;
+    if let Some(j) = columns.iter().position(|c| c.len() != along.len()) {
+        let (name, found, rows) = (&names[j], columns[j].len(), along.len());
+        return Err(malformed(format!(
+            "`{name}` has {found} values for {rows} rows of `{axis}`"
+        )));
+    }
+    Ok((along, names, columns))
+}
+
+fn malformed(reason: impl Into<String>) -> WaveformError {
+    WaveformError::malformed(FORMAT, reason)
 }
 
 #[cfg(test)]

@@ -1,11 +1,12 @@
 //! Named complex columns over frequency, and the files they are written to.
 
+use std::borrow::Cow;
 use std::io::{Seek, Write};
 
 use nalgebra::Complex;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::{csv, npz, raw};
+use super::{WaveformError, csv, json, npz, raw, unit_of};
 
 /// Responses to small sines: one frequency column and one complex column per signal.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -22,19 +23,21 @@ pub struct Phasors {
     pub values: Vec<Complex<f64>>,
 }
 
+pub(super) const SCHEMA: &str = "circ-phasors/1";
+
 /// The object of [`Phasors::write_json`].
-#[derive(Serialize)]
+#[derive(Serialize, Deserialize)]
 struct File<'a> {
-    schema: &'static str,
-    title: &'a str,
-    frequency: &'a [f64],
+    schema: Cow<'a, str>,
+    title: Cow<'a, str>,
+    frequency: Cow<'a, [f64]>,
     signals: Vec<Signal<'a>>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, Deserialize)]
 struct Signal<'a> {
-    name: &'a str,
-    unit: &'static str,
+    name: Cow<'a, str>,
+    unit: Cow<'a, str>,
     re: Vec<f64>,
     im: Vec<f64>,
 }
@@ -101,19 +104,52 @@ impl Phasors {
     /// Those of `to`.
     pub fn write_json(&self, mut to: impl Write) -> std::io::Result<()> {
         let signal = |j: usize| Signal {
-            name: &self.names[j],
-            unit: self.units[j],
+            name: (&self.names[j]).into(),
+            unit: self.units[j].into(),
             re: self.column(j).map(|value| value.re).collect(),
             im: self.column(j).map(|value| value.im).collect(),
         };
         let file = File {
-            schema: "circ-phasors/1",
-            title: &self.title,
-            frequency: &self.frequency,
+            schema: SCHEMA.into(),
+            title: (&self.title).into(),
+            frequency: (&self.frequency).into(),
             signals: (0..self.names.len()).map(signal).collect(),
         };
         serde_json::to_writer(&mut to, &file)?;
         to.write_all(b"\n")
+    }
+
+    /// Reads what [`Self::write_json`] wrote.
+    ///
+    /// # Errors
+    /// [`WaveformError::Malformed`] when a key is missing or the columns differ in length.
+    pub(super) fn read_json(bytes: &[u8]) -> Result<Self, WaveformError> {
+        let file: File<'_> = serde_json::from_slice(bytes).map_err(json::unreadable)?;
+        let rows = file.frequency.len();
+        let is_whole = |s: &Signal<'_>| (s.re.len(), s.im.len()) == (rows, rows);
+        if let Some(signal) = file.signals.iter().find(|signal| !is_whole(signal)) {
+            let reason = format!("{} has not {rows} values", signal.name);
+            return Err(WaveformError::malformed("json", reason));
+        }
+        let value = |k: usize, signal: &Signal<'_>| Complex::new(signal.re[k], signal.im[k]);
+        Ok(Self {
+            title: file.title.into_owned(),
+            units: file.signals.iter().map(|s| unit(&s.name)).collect(),
+            names: file.signals.iter().map(|s| s.name.to_string()).collect(),
+            values: (0..rows)
+                .flat_map(|k| file.signals.iter().map(move |signal| value(k, signal)))
+                .collect(),
+            frequency: file.frequency.into_owned(),
+        })
+    }
+}
+
+/// The unit of a column by its name; none of a ratio.
+pub(super) fn unit(name: &str) -> &'static str {
+    if name.contains('/') {
+        ""
+    } else {
+        unit_of(name)
     }
 }
 

@@ -28,13 +28,14 @@ def show(browser):
     """Opens a file as a page; the test fails where the console says anything."""
     said, pages = [], []
 
-    def opened(path, **options):
+    def opened(path, waits=True, **options):
         page = browser.new_page(viewport={"width": 1200, "height": 900}, **options)
         page.on("console", lambda message: said.append(message.text))
         page.on("pageerror", lambda error: said.append(str(error)))
         page.on("request", lambda request: None if request.url.startswith(("file:", "data:", "blob:", "http://127.0.0.1")) else said.append(request.url))
         page.goto(pathlib.Path(path).as_uri() if "://" not in str(path) else str(path))
-        page.wait_for_function("window.circ !== undefined")
+        if waits:
+            page.wait_for_function("window.circ !== undefined")
         pages.append(page)
         return page
 

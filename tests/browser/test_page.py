@@ -1,9 +1,10 @@
 """The page of a result: what it shows is what was computed, and its controls do what they say."""
 
 import math
+import subprocess
 
 import pytest
-from conftest import ROOT, rows, run
+from conftest import CIRC, ROOT, rows, run
 
 SINE = "a sine\nv1 in 0 sin(0 3 1k)\nr1 in out 1k\nc1 out 0 1n\n.tran 1u 10m\n.meas tran top max v(in)\n.end\n"
 BUCK = ROOT / "netlists/buck.cir"
@@ -261,3 +262,58 @@ def test_the_page_is_usable_by_keyboard_alone(buck, show):
     assert any("voltage: v(out)" in name for name in names) and "spectrum" in names and "checkbox" in names
     unnamed = page.evaluate("[...document.querySelectorAll('button, input, canvas[role=img]')].filter((e) => !(e.innerText || e.ariaLabel || e.labels?.length)).length")
     assert unnamed == 0
+
+
+def test_the_circuit_shows_what_conducts_at_the_cursor(buck, show):
+    page = show(buck / "out.html")
+    assert page.locator(".circuit svg").count() == 1
+    device = lambda name, on: page.locator(f".circuit .device[data-device={name}][data-on='{on}']").get_attribute("display")
+    assert [device("s1", 1), device("d1", 1), device("s1", 0)] == ["none", "none", "inline"]
+    seen = set()
+    first(page)
+    page.keyboard.press("a")
+    for _ in range(60):
+        page.keyboard.press(".")
+        words = [cell(page, name, "a").inner_text() for name in ("s1", "d1")]
+        states = [device("s1", 1) == "inline", device("d1", 1) == "inline"]
+        assert states == [words[0] == "on", words[1] == "conducts"]
+        assert device("d1", 0) == ("none" if states[1] else "inline")
+        seen.add(tuple(states))
+    assert {(True, False), (False, True)} <= seen
+    page.keyboard.press("Escape")
+    assert device("s1", 1) == "none"
+
+
+def test_files_of_waveforms_have_pages(buck, tmp_path, show):
+    run("view", buck / "out.csv", "-o", tmp_path / "view.html")
+    page = show(tmp_path / "view.html")
+    values = "(page) => page.panels.flatMap((p) => p.curves).map((c) => [c.name, Array.from(c.y.slice(0, 50))])"
+    assert page.evaluate(f"({values})(window.circ)") == show(buck / "out.html").evaluate(f"({values})(window.circ)")
+
+
+def test_a_watched_page_loads_anew_and_shows_the_same_part(tmp_path, show):
+    netlist = tmp_path / "sine.cir"
+    netlist.write_text(SINE)
+    watching = subprocess.Popen([CIRC, "watch", "--no-open", netlist], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    try:
+        page = show(watching.stdout.readline().strip(), waits=False)
+        page.wait_for_function("window.circ !== undefined")
+        first(page)
+        page.keyboard.press("+")
+        page.keyboard.press("a")
+        page.locator(".readings tr[data-signal='v(out)'] input").uncheck()
+        seen, at = view(page), cursor(page, "a")
+        netlist.write_text(SINE.replace("0 3 1k", "0 4 1k"))
+        page.wait_for_function("window.circ && boundsIn(window.circ.panels[0].curves[0], 0, 1)[1] > 3.5")
+        assert view(page) == seen and cursor(page, "a") == at
+        assert page.evaluate("window.circ.panels[0].curves.filter((c) => !c.shown).map((c) => c.name)") == ["v(out)"]
+        assert not page.locator(".readings tr[data-signal='v(out)'] input").is_checked()
+        netlist.write_text(SINE.replace("1n\n", "1 n\n"))
+        page.wait_for_function("document.querySelector('[role=alert]') !== null")
+        assert "sine.cir" in page.locator("[role=alert]").inner_text()
+        netlist.write_text(SINE)
+        page.wait_for_function("document.querySelector('[role=alert]') === null && window.circ !== undefined")
+        assert view(page) == seen
+    finally:
+        watching.kill()
+        watching.wait()

@@ -201,10 +201,16 @@ function chart(root, content, announce) {
     retell(name);
   }
 
-  function retell(name) {
+  /** Draws the cursors and their readings anew. */
+  function retold() {
     state.plots.forEach((plot) => plot.redraw(false));
     drawStrips();
     readings.update();
+    root.dispatchEvent(new CustomEvent("cursor"));
+  }
+
+  function retell(name) {
+    retold();
     const t = state.cursors[name];
     const told = curves.filter((curve) => curve.shown).map((curve) => `${curve.name} ${quantity(valueAt(curve, t), unitOf(curve))}`);
     announce(`Cursor ${name.toUpperCase()} at ${quantity(t, axis.unit, 9)}: ${told.join(", ")}`);
@@ -243,7 +249,7 @@ function chart(root, content, announce) {
         ArrowLeft: () => pan(-0.2), ArrowRight: () => pan(0.2), Home: () => show(whole),
         a: () => place("a", x), b: () => place("b", x),
         ",": () => step("a", -1), ".": () => step("a", 1), "<": () => step("b", -1), ">": () => step("b", 1),
-        Escape: () => { state.cursors = { a: null, b: null }; state.plots.forEach((p) => p.redraw(false)); drawStrips(); readings.update(); },
+        Escape: () => { state.cursors = { a: null, b: null }; retold(); },
       };
       if (keys[event.key]) {
         event.preventDefault();
@@ -325,7 +331,7 @@ function chart(root, content, announce) {
   function readingsTable() {
     const columns = ["pointer", "a", "b"];
     const head = Object.fromEntries([...columns, "delta"].map((name) => [name, element("th", { scope: "col", "data-at": name })]));
-    const cells = new Map();
+    const cells = new Map(), boxes = new Map();
     const body = element("tbody");
     const row = (key, label) => {
       const own = Object.fromEntries([...columns, "delta"].map((name) => [name, element("td", { "data-at": name })]));
@@ -335,6 +341,7 @@ function chart(root, content, announce) {
     for (const panel of panels) {
       for (const curve of panel.curves) {
         const box = element("input", { type: "checkbox", checked: true, onchange: () => toggle(curve, box.checked) });
+        boxes.set(curve, box);
         const swatch = element("span", { class: "swatch", "aria-hidden": "true" });
         cells.set(swatch, curve);
         row(curve, element("label", {}, box, swatch, curve.name));
@@ -376,7 +383,8 @@ function chart(root, content, announce) {
         put(own.delta, both ? values[2] - values[1] : null, both ? quantity(values[2] - values[1], unitOf(key)) : "");
       }
     }
-    return { table, update };
+    const tick = () => boxes.forEach((box, curve) => { box.checked = curve.shown; });
+    return { table, update, tick };
   }
 
   function toggle(curve, shown) {
@@ -394,6 +402,22 @@ function chart(root, content, announce) {
     build();
   }
 
+  /** What a reader chose to see, by names. */
+  const keep = () => ({
+    view: state.view[0] === whole[0] && state.view[1] === whole[1] ? null : state.view,
+    cursors: state.cursors,
+    hidden: curves.filter((curve) => !curve.shown).map((curve) => curve.name),
+  });
+
+  /** Shows that again. */
+  function restore({ view, cursors, hidden }) {
+    for (const curve of curves) if (hidden.includes(curve.name)) toggle(curve, false);
+    readings.tick();
+    state.cursors = cursors;
+    if (view) show(view);
+    retold();
+  }
+
   const resized = new ResizeObserver(() => {
     if (state.plots.some((plot) => plot.width !== widthOf())) {
       state.plots.forEach((plot) => plot.setSize({ width: widthOf(), height: SIZES.panel }));
@@ -404,7 +428,7 @@ function chart(root, content, announce) {
   readings.update();
   resized.observe(root);
   return {
-    state, panels, strips, show, zoom, pan, place, logarithmic, colour, dash, boundsOf, edgeOf, axis,
+    state, panels, strips, show, keep, restore, zoom, pan, place, logarithmic, colour, dash, boundsOf, edgeOf, axis,
     full: () => show(whole),
     repaint: () => { show(state.view); readings.update(); },
     remove: () => { resized.disconnect(); state.plots.forEach((plot) => plot.destroy()); root.replaceChildren(); },

@@ -86,6 +86,27 @@ function drawing(shown, title) {
     `<rect width="${width}" height="${total}" fill="#fff"/><text x="${left}" y="18" font-size="15">${clean(title)}</text>${parts.join("")}</svg>`;
 }
 
+/** The picture of the circuit, with what conducts at cursor A coloured. */
+function circuitOf(svg, shown, area) {
+  const picture = new DOMParser().parseFromString(svg, "image/svg+xml").documentElement;
+  const when = element("p", { class: "about" });
+  const section = element("details", { open: true, class: "circuit" }, element("summary", {}, "Circuit"), when, document.importNode(picture, true));
+  const states = section.querySelectorAll(".device");
+  const update = () => {
+    const t = shown?.state.cursors.a ?? null;
+    const strips = new Map((shown?.strips ?? []).map((strip) => [strip.name, strip]));
+    when.textContent = states.length === 0 || strips.size === 0 ? "" : t === null ? "Cursor A (a click on a curve) colours what conducts there." : `What conducts at ${quantity(t, "s", 9)} is coloured.`;
+    for (const state of states) {
+      const strip = strips.get(state.dataset.device);
+      const on = t !== null && strip !== undefined && stateAt(strip, t) === true;
+      state.setAttribute("display", on === (state.dataset.on === "1") ? "inline" : "none");
+    }
+  };
+  area.addEventListener("cursor", update);
+  update();
+  return section;
+}
+
 /** Hands a text to the reader as a file. */
 function save(name, type, text) {
   const link = element("a", { download: name, href: URL.createObjectURL(new Blob([text], { type })) });
@@ -151,6 +172,7 @@ function circPage(root, data) {
       "Drag: zoom to a span. Wheel: zoom at the pointer; with shift, move. Shift and drag: move. Double click or Home: all. Click: cursor A; shift and click: cursor B. " +
       "With a panel in focus: + − ← → Home; a, b place a cursor at the pointer (without one, in the middle); , . move A and < > move B by a row; Escape takes cursors away.")));
   }
+  if (data.circuit) root.append(circuitOf(data.circuit, shown, area));
   for (const table of data.tables ?? []) if (table.rows.length > 0) root.append(wordTable(table));
   for (const { heading, text } of data.texts ?? []) {
     root.append(element("details", { open: true }, element("summary", {}, heading), element("pre", {}, text)));

@@ -1,6 +1,6 @@
 //! A circuit picture on its sheet.
 
-use super::super::sheet::{Anchor, INK, Sheet, short, width_of};
+use super::super::sheet::{Anchor, INK, Sheet, escaped, short, width_of};
 use super::super::svg::titled;
 use super::grid::{self, COLUMN, GROUND, Grid, LEVEL, Plan, Pose, Run};
 use super::part::{Part, Parts, Symbol, brief};
@@ -20,12 +20,21 @@ const ASIDE: f64 = 96.0;
 /// From the end of a lead to a ground symbol of its own.
 const SHORT: f64 = 16.0;
 
+/// What is coloured.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum States<'a> {
+    /// Elements of these names.
+    Of(&'a [String]),
+    /// What can conduct, twice.
+    Both,
+}
+
 /// A picture that is being drawn.
 pub(super) struct Drawing<'a> {
     parts: &'a Parts,
     plan: &'a Plan,
     grid: &'a Grid,
-    conducting: &'a [String],
+    states: States<'a>,
     /// Leftmost step and highest level.
     corner: (i32, i32),
     size: (f64, f64),
@@ -36,7 +45,7 @@ impl<'a> Drawing<'a> {
         parts: &'a Parts,
         plan: &'a Plan,
         grid: &'a Grid,
-        conducting: &'a [String],
+        states: States<'a>,
     ) -> Self {
         let runs = || {
             grid.runs
@@ -65,7 +74,7 @@ impl<'a> Drawing<'a> {
             parts,
             plan,
             grid,
-            conducting,
+            states,
             corner: (left, top),
             size: (across, up),
         }
@@ -195,10 +204,23 @@ impl<'a> Drawing<'a> {
         (turn, at): (&str, (f64, f64)),
         ends: (f64, f64),
     ) {
-        let conducts = self.conducting.contains(&part.name);
         let place = format!("{} {}", short(at.0), short(at.1));
         let has_gate = part.nets.len() > 2;
-        let mut body = symbol::drawn(part.symbol, ends, conducts, has_gate);
+        let drawn = |conducts| symbol::drawn(part.symbol, ends, conducts, has_gate);
+        let mut body = match self.states {
+            States::Of(conducting) => drawn(conducting.contains(&part.name)),
+            States::Both if symbol::can_conduct(part.symbol) => {
+                let name = escaped(&part.name);
+                let group = |on: u8, hidden| {
+                    let body = drawn(on == 1);
+                    format!(
+                        "<g class=\"device\" data-device=\"{name}\" data-on=\"{on}\"{hidden}>{body}</g>"
+                    )
+                };
+                group(0, "") + &group(1, " display=\"none\"")
+            }
+            States::Both => drawn(false),
+        };
         if part.is_wound {
             body.push_str(&format!(
                 "<circle cx=\"-26\" cy=\"-9\" r=\"2.5\" fill=\"{INK}\"/>"

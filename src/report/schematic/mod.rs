@@ -16,7 +16,7 @@ mod words;
 
 use super::PictureError;
 use crate::model::Model;
-use drawing::Drawing;
+use drawing::{Drawing, States};
 use grid::Grid;
 use part::Parts;
 
@@ -28,6 +28,19 @@ const LARGEST: usize = 2000;
 /// # Errors
 /// [`PictureError::Empty`] without an element between two nodes, [`PictureError::Large`] from some thousand elements on.
 pub fn svg(model: &Model, conducting: &[String]) -> Result<String, PictureError> {
+    drawn(model, States::Of(conducting))
+}
+
+/// The same with what can conduct drawn twice, as groups of class `device` with `data-device` (its name) and `data-on` (1 where it conducts, and
+/// hidden): a page shows one of the two.
+///
+/// # Errors
+/// See [`svg`].
+pub(super) fn with_both_states(model: &Model) -> Result<String, PictureError> {
+    drawn(model, States::Both)
+}
+
+fn drawn(model: &Model, states: States<'_>) -> Result<String, PictureError> {
     let circuit = model.circuit();
     let parts = match model.netlist() {
         Some(netlist) => cards::parts(netlist, model.sources(), circuit),
@@ -41,5 +54,5 @@ pub fn svg(model: &Model, conducting: &[String]) -> Result<String, PictureError>
     }
     let plan = search::plan(&parts);
     let grid = Grid::of(&parts.parts, parts.nets.len(), &plan);
-    Ok(Drawing::new(&parts, &plan, &grid, conducting).draw(&circuit.title))
+    Ok(Drawing::new(&parts, &plan, &grid, states).draw(&circuit.title))
 }

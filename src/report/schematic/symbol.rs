@@ -54,6 +54,19 @@ pub(super) fn drawn(symbol: Symbol, ends: (f64, f64), conducts: bool, has_gate: 
     svg
 }
 
+/// Whether it is a device that conducts at times.
+pub(super) const fn can_conduct(symbol: Symbol) -> bool {
+    matches!(
+        symbol,
+        Symbol::Diode
+            | Symbol::Zener
+            | Symbol::Thyristor
+            | Symbol::Triac
+            | Symbol::Switch
+            | Symbol::Transistor(_)
+    )
+}
+
 const fn half_of(symbol: Symbol) -> f64 {
     match symbol {
         Symbol::Capacitor => 4.0,

@@ -1,0 +1,153 @@
+//! `circ view`: a page or a picture of any file of waveforms.
+
+use std::fs;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use super::args::{STDIN, ViewArgs};
+use super::browser;
+use super::exit::{Exit, Failure};
+use super::files;
+use super::output::{self, Format};
+use super::streams::Streams;
+use crate::report::figure::{Figure, PANEL_WIDTH};
+use crate::report::html::Page;
+use crate::report::{bode, svg};
+use crate::waveform::{Phasors, Plot, Waveforms, canonical_name, is_of_pattern, plots};
+
+/// Shows what a file of waveforms holds.
+///
+/// # Errors
+/// See [`Failure`].
+pub(super) fn view(args: &ViewArgs, streams: &Streams) -> Result<Exit, Failure> {
+    let formats = Format::of(&args.outputs, args.format, streams)?;
+    if let Some((path, _)) = args
+        .outputs
+        .iter()
+        .zip(&formats)
+        .find(|o| !o.1.is_picture())
+    {
+        return Err(output::unknown_ending(path, "svg, png or html"));
+    }
+    let paths: Vec<&Path> = args.outputs.iter().map(PathBuf::as_path).collect();
+    files::spare(&paths, [args.file.as_path()])?;
+    files::writable(&paths)?;
+    let plot = chosen(args, streams)?;
+    let figure = |pixels| {
+        let mut figure = match &plot {
+            Plot::Time(runs) => {
+                let runs: Vec<_> = runs.iter().map(|(label, w)| (label.clone(), w)).collect();
+                Figure::of_runs(&runs, pixels)
+            }
+            Plot::Frequency(phasors) => bode::figure(phasors),
+        };
+        if figure.title.is_empty() {
+            figure.title = args.file.display().to_string();
+        }
+        figure
+    };
+    let page = || Page::of_figure(&figure(usize::MAX)).html();
+    for (path, format) in args.outputs.iter().zip(&formats) {
+        match format {
+            Format::Html => files::write(path, page()?.as_bytes())?,
+            format => {
+                let drawing = svg::draw(&figure(PANEL_WIDTH))?;
+                output::picture_to_file(path, *format == Format::Png, &drawing)?;
+            }
+        }
+    }
+    if args.outputs.is_empty() {
+        browser::show(&browser::keep(page()?.as_bytes())?, streams)?;
+    }
+    Ok(Exit::Done)
+}
+
+/// The plot asked for, with the signals asked for.
+fn chosen(args: &ViewArgs, streams: &Streams) -> Result<Plot, Failure> {
+    let fail = |error| Failure::file(&args.file, error);
+    let mut bytes = Vec::new();
+    if args.file == Path::new(STDIN) {
+        std::io::stdin().read_to_end(&mut bytes).map_err(fail)?;
+    } else {
+        bytes = fs::read(&args.file).map_err(fail)?;
+    }
+    let mut all = plots(&bytes).map_err(|error| Failure::Waveforms {
+        path: args.file.clone(),
+        error,
+    })?;
+    let (number, file) = (usize::from(args.plot), args.file.display());
+    if number > all.len() {
+        let message = match all.len() {
+            0 => format!("{file}: holds nothing over time or frequency"),
+            count => format!("{file}: holds {count} plots over time or frequency"),
+        };
+        return Err(Failure::Message(message));
+    }
+    if all.len() > 1 {
+        let count = all.len();
+        streams.note(format!(
+            "{file}: plot {number} of {count}; `--plot N` takes another"
+        ));
+    }
+    let mut plot = all.swap_remove(number - 1);
+    let unknown = |probe: &str, names: &[String]| {
+        let known = names.join(" ");
+        Failure::Message(format!("--probe {probe}: the file has {known}"))
+    };
+    match &mut plot {
+        Plot::Time(runs) => {
+            for (_, run) in runs {
+                let kept = kept(&run.names, &args.probes);
+                *run = columns(run, &kept.map_err(|probe| unknown(probe, &run.names))?);
+            }
+        }
+        Plot::Frequency(phasors) => {
+            let kept = kept(&phasors.names, &args.probes);
+            let kept = kept.map_err(|probe| unknown(probe, &phasors.names))?;
+            *phasors = Phasors {
+                title: phasors.title.clone(),
+                names: kept.iter().map(|&j| phasors.names[j].clone()).collect(),
+                units: kept.iter().map(|&j| phasors.units[j]).collect(),
+                values: (0..phasors.frequency.len())
+                    .flat_map(|k| kept.iter().map(move |&j| (k, j)))
+                    .map(|(k, j)| phasors.values[k * phasors.names.len() + j])
+                    .collect(),
+                frequency: phasors.frequency.clone(),
+            };
+        }
+    }
+    Ok(plot)
+}
+
+/// The columns that probes mean, all without any.
+///
+/// # Errors
+/// A probe that means none.
+fn kept<'p>(names: &[String], probes: &'p [String]) -> Result<Vec<usize>, &'p str> {
+    if probes.is_empty() {
+        return Ok((0..names.len()).collect());
+    }
+    let mut kept = Vec::new();
+    for probe in probes {
+        let pattern = canonical_name(probe);
+        let means = |j: &usize| is_of_pattern(&canonical_name(&names[*j]), &pattern);
+        let before = kept.len();
+        kept.extend((0..names.len()).filter(means));
+        if kept.len() == before {
+            return Err(probe);
+        }
+    }
+    Ok(kept)
+}
+
+fn columns(waves: &Waveforms, kept: &[usize]) -> Waveforms {
+    Waveforms {
+        title: waves.title.clone(),
+        names: kept.iter().map(|&j| waves.names[j].clone()).collect(),
+        units: kept.iter().map(|&j| waves.units[j]).collect(),
+        time: waves.time.clone(),
+        values: (0..waves.len())
+            .flat_map(|k| kept.iter().map(move |&j| waves.row(k)[j]))
+            .collect(),
+    }
+}

@@ -1,0 +1,58 @@
+//! `circ watch`: carries out a command anew whenever a file that it reads changes, and shows its page in the browser.
+//!
+//! [`job`] runs the command as a process of its own, so that a run can be ended when its netlist has changed already; [`server`] hands out the
+//! page on this machine alone.
+
+mod job;
+mod server;
+
+use std::thread;
+use std::time::Duration;
+
+use super::args::WatchArgs;
+use super::exit::{Exit, Failure};
+use super::signals::Signals;
+use super::streams::Streams;
+use job::{Ended, Job, stamp};
+use server::Server;
+
+/// How often files are looked at.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Runs and shows until a signal comes.
+///
+/// # Errors
+/// See [`Failure`].
+pub(super) fn watch(args: &WatchArgs, streams: &Streams) -> Result<Exit, Failure> {
+    let job = Job::of(&args.command)?;
+    let server = Server::start(args.port)?;
+    let signals = Signals::watch()?;
+    streams.data(format!("{}\n", server.address()))?;
+    if !args.no_open && open::that_detached(server.address()).is_err() {
+        streams.note("no browser could be opened; the page is at the address above");
+    }
+    loop {
+        let files = job.files();
+        let before = stamp(&files);
+        let is_over = || signals.received().is_some() || stamp(&files) != before;
+        match job.run(is_over)? {
+            Ended::Done {
+                well,
+                page,
+                messages,
+            } => {
+                streams.say(&messages);
+                server.publish(page, (well, &messages));
+                while !is_over() {
+                    thread::sleep(LOOK);
+                }
+            }
+            Ended::Stopped => {}
+        }
+        if let Some((signal, _)) = signals.received() {
+            return Ok(Exit::Signal(signal));
+        }
+        // An editor may write a file in several steps.
+        thread::sleep(LOOK);
+    }
+}
