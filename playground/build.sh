@@ -21,6 +21,7 @@ if command -v wasm-opt >/dev/null; then
   wasm-opt -Os --all-features -o dist/opt.wasm dist/circ_playground_bg.wasm && mv dist/opt.wasm dist/circ_playground_bg.wasm
 fi
 cp -r site/. dist/
+mkdir dist/page && cp -r ../src/report/page/uplot ../src/report/page/*.js ../src/report/page/page.css dist/page/
 python3 - <<'PYTHON'
 import json, pathlib
 files = sorted(pathlib.Path("../netlists").glob("*.cir"))

@@ -7,8 +7,9 @@ use std::path::Path;
 use std::process::Command;
 
 /// Pages whose commands are run: those of blocks marked `sh` that begin with `circ`; netlists marked `title=NAME` stand in the folder.
-const PAGES: [&str; 5] = [
+const PAGES: [&str; 6] = [
     "README.md",
+    "docs/netlist.md",
     "docs/from-ltspice.md",
     "docs/from-plecs.md",
     "docs/for-researchers.md",

@@ -1,5 +1,3 @@
-import { show } from "./plot.js";
-
 // After the last keystroke, ms; and the longest that a run may take, ms.
 const PAUSE = 250;
 const PATIENCE = 20_000;
@@ -7,6 +5,8 @@ const PATIENCE = 20_000;
 const $ = (id) => document.getElementById(id);
 const text = $("text");
 let worker, timer, watch, newest = 0, busy = false;
+// The circuit of the latest netlist, and the chart of its run.
+let circuit = null, shown = null;
 
 // A worker that is still at an old netlist is ended: nothing else stops a run.
 function start() {
@@ -39,12 +39,12 @@ function take({ id, checked, ran, failure }) {
   if (id !== newest) return;
   if (checked) {
     list(checked.findings);
-    if (checked.schematic) $("schematic").innerHTML = checked.schematic;
+    circuit = checked.schematic;
+    if (!checked.runs && circuit) show({ title: checked.title, axis: { name: "time" }, columns: [], panels: [] });
   }
   if (ran) {
     list([...($("findings").of ?? []), ...ran.findings]);
-    show($("plots"), ran.signals);
-    $("summary").textContent = ran.summary;
+    if (ran.page) show(ran.page);
   }
   if (ran || !checked.runs) {
     busy = false;
@@ -53,6 +53,14 @@ function take({ id, checked, ran, failure }) {
     const wrong = $("findings").of.some((f) => f.severity === "error");
     $("state").textContent = wrong ? "refused" : ran ? "done" : "nothing to run: there is no .tran";
   }
+}
+
+// A result with its circuit; what a reader chose to see stays.
+function show(page) {
+  const kept = shown?.keep();
+  shown?.remove();
+  window.circ = shown = circPage($("right"), { ...page, circuit });
+  if (shown && kept) shown.restore(kept);
 }
 
 // Findings below the editor, and underlined in it.

@@ -2,16 +2,15 @@
 
 use circ::analysis::{Finished, transient};
 use circ::diagnostic::{SourceFile, SourceMap};
-use circ::integrate::Run;
-use circ::report::{schematic, text};
-use circ::{Diagnostic, Diodes, ElaborateOptions, Error, Event, Model, Severity, SimOptions};
+use circ::report::figure::Figure;
+use circ::report::html::Page;
+use circ::report::schematic;
+use circ::{Diagnostic, Diodes, ElaborateOptions, Error, Model, Severity, SimOptions};
 use serde::Serialize;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 /// The name under which findings speak of the text.
 const FILE: &str = "circuit.cir";
-/// Rows of a waveform that a page needs; between them the first, lowest, highest and last of each are kept.
-const COLUMNS: usize = 1500;
 
 /// A finding, with its place in the text in UTF-16 code units, as JavaScript counts.
 #[derive(Debug, Serialize)]
@@ -31,28 +30,17 @@ struct Finding {
 struct Checked {
     title: String,
     findings: Vec<Finding>,
-    /// SVG; none where there is no circuit or nothing to draw.
+    /// SVG with both states of every device; none where there is no circuit or nothing to draw.
     schematic: Option<String>,
     /// There is a transient to run.
     runs: bool,
 }
 
-/// A waveform.
-#[derive(Debug, Serialize)]
-struct Signal {
-    name: String,
-    unit: &'static str,
-    /// s and `unit`; of a jump two points of one time.
-    t: Vec<f64>,
-    y: Vec<f64>,
-}
-
 /// What a run gave, as far as it came.
 #[derive(Debug, Default, Serialize)]
 struct Ran {
-    signals: Vec<Signal>,
-    events: Vec<String>,
-    summary: String,
+    /// See [`circ::report::html`].
+    page: Option<Page>,
     findings: Vec<Finding>,
 }
 
@@ -64,7 +52,7 @@ pub fn check(netlist: &str) -> String {
         Ok(model) => Checked {
             title: model.circuit().title.clone(),
             findings: findings(model.findings(), netlist, model.sources()),
-            schematic: schematic::svg(&model, &[]).ok(),
+            schematic: schematic::with_both_states(&model).ok(),
             runs: model.circuit().tran.is_some(),
         },
         Err(error) => Checked {
@@ -116,26 +104,11 @@ fn carried_out(model: &Model, netlist: &str) -> Ran {
             ..Ran::default()
         };
     };
+    let figure = Figure::of_waveforms(&run.waveforms, usize::MAX);
     Ran {
-        signals: signals(&run),
-        events: run.events.iter().map(Event::to_string).collect(),
-        summary: text::summary(&run, model.places(), false) + &found.words(),
+        page: Some(Page::of_run(&figure, &run, &found, model.places())),
         findings,
     }
-}
-
-fn signals(run: &Run) -> Vec<Signal> {
-    let waves = &run.waveforms;
-    let of = |j: usize| {
-        let (t, y) = waves.thinned(j, COLUMNS).into_iter().unzip();
-        Signal {
-            name: waves.names[j].clone(),
-            unit: waves.units[j],
-            t,
-            y,
-        }
-    };
-    (0..waves.width()).map(of).collect()
 }
 
 fn refused(error: &Error, netlist: &str) -> Vec<Finding> {
@@ -190,18 +163,9 @@ mod tests {
             "{checked}"
         );
         let ran: serde_json::Value = serde_json::from_str(&run(BUCK)).unwrap();
-        let signals = ran["signals"].as_array().unwrap();
-        assert_eq!(signals.len(), 3);
-        let last = |k: usize| {
-            signals[k]["y"]
-                .as_array()
-                .unwrap()
-                .last()
-                .unwrap()
-                .as_f64()
-                .unwrap()
-        };
-        assert!((last(1) - 5.0).abs() < 0.1, "{}", last(1));
+        let curves = |k: usize| ran["page"]["panels"][k]["curves"].as_array().unwrap().len();
+        assert_eq!((curves(0), curves(1)), (2, 1));
+        assert!(ran["page"]["columns"].as_array().unwrap().len() == 4);
         assert_eq!(ran["findings"].as_array().unwrap().len(), 0);
     }
 

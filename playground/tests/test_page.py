@@ -50,13 +50,13 @@ def page(browser, address):
 
 
 def test_an_example_is_drawn_and_run(page):
-    assert page.locator("#schematic svg").count() == 1
-    assert page.locator("#schematic").inner_text().split().count("rload") == 1
-    # Volts and amperes.
-    assert page.locator("#plots .uplot").count() == 2
-    assert "exact" in page.locator("#summary").inner_text()
+    assert page.locator(".circuit svg").count() == 1
+    assert page.locator(".circuit").inner_text().split().count("rload") == 1
+    # Volts, the gate and amperes.
+    assert page.locator("#right .uplot").count() == 3
+    assert "exact" in page.locator("#right pre").first.inner_text()
     page.select_option("#examples", "boost")
-    expect(page.locator("#schematic")).to_contain_text("Boost converter", timeout=PATIENCE)
+    expect(page.locator(".circuit")).to_contain_text("Boost converter", timeout=PATIENCE)
 
 
 def test_what_is_wrong_is_underlined_where_it_stands(page):
@@ -77,7 +77,7 @@ def test_what_is_wrong_is_underlined_where_it_stands(page):
 
 def test_the_address_holds_the_circuit(page, browser):
     page.fill("#text", RC.replace("charging", "µ and 電"))
-    expect(page.locator("#schematic")).to_contain_text("µ and 電", timeout=PATIENCE)
+    expect(page.locator(".circuit")).to_contain_text("µ and 電", timeout=PATIENCE)
     other = browser.new_page()
     other.goto(page.url)
     expect(other.locator("#state")).to_have_text("done", timeout=PATIENCE)
@@ -90,12 +90,26 @@ def test_a_run_without_end_is_stopped_by_the_next_keystroke(page):
     page.wait_for_timeout(1000)
     page.fill("#text", RC)
     expect(page.locator("#state")).to_have_text("done", timeout=PATIENCE)
-    expect(page.locator("#schematic")).to_contain_text("charging")
+    expect(page.locator(".circuit")).to_contain_text("charging")
+
+
+def test_what_a_reader_looks_at_stays_when_the_netlist_changes(page):
+    page.fill("#text", RC)
+    expect(page.locator(".circuit")).to_contain_text("charging", timeout=PATIENCE)
+    expect(page.locator("#state")).to_have_text("done", timeout=PATIENCE)
+    page.locator(".panel").first.focus()
+    page.keyboard.press("+")
+    page.keyboard.press("a")
+    seen = page.evaluate("[window.circ.state.view, window.circ.state.cursors.a]")
+    page.fill("#text", RC.replace("r1 in out 1k", "r1 in out 2k"))
+    expect(page.locator(".circuit")).to_contain_text("2k", timeout=PATIENCE)
+    page.wait_for_function("boundsIn(window.circ.panels[0].curves[1], 0, 1)[1] < 0.95")
+    assert page.evaluate("[window.circ.state.view, window.circ.state.cursors.a]") == seen
 
 
 def test_a_netlist_is_text_not_markup(page):
     page.fill("#text", RC.replace("charging", "<img src=x onerror=document.title='taken'>"))
-    expect(page.locator("#schematic")).to_contain_text("<img", timeout=PATIENCE)
+    expect(page.locator(".circuit")).to_contain_text("<img", timeout=PATIENCE)
     assert page.title() == "circ playground"
 
 

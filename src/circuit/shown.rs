@@ -6,8 +6,7 @@ use super::{Circuit, Probe, is_inside};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Binary, Expr, ExprKind, Unary};
 use crate::netlist::expression;
-use crate::netlist::suggest::nearest;
-use crate::waveform::is_of_pattern;
+use crate::netlist::suggest::{is_of_pattern, nearest};
 
 /// A column of results.
 #[derive(Debug, Clone, PartialEq)]

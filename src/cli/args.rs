@@ -420,6 +420,9 @@ pub struct CheckArgs {
     /// Take a switch in this position (repeatable)
     #[arg(long = "switch", value_name = "NAME=on|off", value_parser = position)]
     pub switches: Vec<(String, bool)>,
+    /// Write the report to this file too (repeatable); the ending chooses json, txt or html
+    #[arg(short, long = "output", value_name = "OUT")]
+    pub outputs: Vec<PathBuf>,
     /// Print JSON
     #[arg(long)]
     pub json: bool,
@@ -448,7 +451,7 @@ pub struct BenchArgs {
     /// Only these methods: exact, euler, theta, siconos (θ = ½, γ = 1), ngspice
     #[arg(long, value_name = "A,B,..", value_delimiter = ',', value_parser = ["exact", "euler", "theta", "siconos", "ngspice"])]
     pub methods: Vec<String>,
-    /// Write measurements to this file, or `-`, standard output (repeatable); the ending chooses csv, json, svg or png
+    /// Write measurements to this file, or `-`, standard output (repeatable); the ending chooses csv, json, svg, png or html
     #[arg(
         short,
         long = "output",
@@ -456,8 +459,8 @@ pub struct BenchArgs {
         default_value_if("format", ArgPredicate::IsPresent, Some("-"))
     )]
     pub outputs: Vec<PathBuf>,
-    /// Format of standard output (`-o -`, csv without it): csv, json, svg or png
-    #[arg(long, value_name = "FORMAT", value_parser = ["csv", "json", "svg", "png"])]
+    /// Format of standard output (`-o -`, csv without it): csv, json, svg, png or html
+    #[arg(long, value_name = "FORMAT", value_parser = ["csv", "json", "svg", "png", "html"])]
     pub format: Option<String>,
     /// Write the errors of every signal to this csv file, a line for each
     #[arg(long, value_name = "OUT.csv")]

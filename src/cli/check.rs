@@ -1,14 +1,20 @@
 //! `circ check`.
 
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
 use super::args::CheckArgs;
 use super::exit::{Exit, Failure};
+use super::files;
 use super::input::{self, Subject};
+use super::output;
 use super::streams::Streams;
 use crate::check::{self, Fault, Report};
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 use crate::mna;
 use crate::model::Model;
 use crate::netlist::Loaded;
+use crate::report::html::Page;
 use crate::report::json;
 
 /// Prints faults, certificates and theorems; status 1 when there is a fault.
@@ -16,19 +22,41 @@ use crate::report::json;
 /// # Errors
 /// See [`Failure`].
 pub(super) fn check(args: &CheckArgs, streams: &Streams) -> Result<Exit, Failure> {
-    let report = report(args, streams)?;
-    let text = if args.json {
-        json::line(&report) + "\n"
+    let paths: Vec<&Path> = args.outputs.iter().map(PathBuf::as_path).collect();
+    for path in &paths {
+        let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default();
+        if !matches!(ending, "json" | "txt" | "html") {
+            return Err(output::unknown_ending(path, "json, txt or html"));
+        }
+    }
+    files::spare(&paths, [args.input.file.as_path()])?;
+    files::writable(&paths)?;
+    let (report, model) = report(args, streams)?;
+    let in_json = || json::line(&report) + "\n";
+    for path in paths {
+        let text = match path.extension().and_then(OsStr::to_str) {
+            Some("json") => in_json(),
+            Some("txt") => report.to_string(),
+            _ => Page::of_report(&report)
+                .with_circuit(model.as_deref())
+                .html()?,
+        };
+        files::write(path, text.as_bytes())?;
+    }
+    streams.data(if args.json {
+        in_json()
     } else {
         report.to_string()
-    };
-    streams.data(text)?;
+    })?;
     Ok(if report.ok { Exit::Done } else { Exit::No })
 }
 
-fn report(args: &CheckArgs, streams: &Streams) -> Result<Report, Failure> {
+/// The report, and the model where there is one.
+type Known = (Report, Option<Box<Model>>);
+
+fn report(args: &CheckArgs, streams: &Streams) -> Result<Known, Failure> {
     if let Some(system) = input::system(&args.input)? {
-        return Ok(check::system(&system.lcs));
+        return Ok((check::system(&system.lcs), None));
     }
     let Loaded {
         sources,
@@ -43,13 +71,16 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Report, Failure> {
         input::show(&diagnostics, &sources, streams);
     }
     let Some(circuit) = circuit else {
-        return Ok(faulty("", &diagnostics, &sources));
+        return Ok((faulty("", &diagnostics, &sources), None));
     };
     let title = circuit.title.clone();
     let choices = input::choices(&args.input);
     let model = match Model::of(netlist, sources, choices, circuit, diagnostics) {
         Ok(model) => model,
-        Err(faults) => return Ok(faulty(&title, &faults.findings, &faults.sources)),
+        Err(faults) => {
+            let report = faulty(&title, &faults.findings, &faults.sources);
+            return Ok((report, None));
+        }
     };
     let sources = model.sources().clone();
     let mut diagnostics = model.findings().to_vec();
@@ -73,22 +104,27 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Report, Failure> {
         }
         Subject::System(system) => Ok(check::system(&system.lcs)),
     };
-    match judged {
+    let report = match judged {
         Ok(mut report) => {
             report.ok = diagnostics.iter().all(|d| d.severity < Severity::Error);
             let shown = input::most(diagnostics);
             let shown = shown.iter().map(|d| Fault::of(d, &sources));
             report.faults.splice(0..0, shown);
-            Ok(report)
+            report
         }
         Err(failure) => {
             diagnostics.push(match (failure, &subject) {
                 (Failure::Run(error), Subject::Circuit(model)) => error.diagnostic(model.circuit()),
                 (failure, _) => Diagnostic::error("no-system", None, failure.to_string()),
             });
-            Ok(faulty(&title, &diagnostics, &sources))
+            faulty(&title, &diagnostics, &sources)
         }
-    }
+    };
+    let model = match subject {
+        Subject::Circuit(model) => Some(model),
+        Subject::System(_) => None,
+    };
+    Ok((report, model))
 }
 
 fn faulty(title: &str, diagnostics: &[Diagnostic], sources: &SourceMap) -> Report {

@@ -11,7 +11,7 @@ use super::files::{self, STDOUT, Written};
 use super::rows::{Columns, Form, Shown, Stream};
 use super::streams::Streams;
 use crate::analysis::Measurements;
-use crate::integrate::{Block, Run};
+use crate::integrate::{Block, Places, Run};
 use crate::model::Model;
 use crate::report::figure::{Figure, PANEL_WIDTH};
 use crate::report::html::Page;
@@ -260,7 +260,9 @@ fn write(
     };
     let result = match format {
         Format::Html => {
-            let page = Page::of_run(&drawing(usize::MAX), told.run, told.found, told.model);
+            let places = told.model.map_or_else(Places::default, Model::places);
+            let page = Page::of_run(&drawing(usize::MAX), told.run, told.found, places)
+                .with_circuit(told.model);
             file.append(page.html()?.as_bytes())
         }
         Format::Svg => file.append(svg::draw(&drawing(PANEL_WIDTH))?.as_bytes()),

@@ -10,10 +10,11 @@ use super::exit::{Exit, Failure};
 use super::files;
 use super::output::{self, Format};
 use super::streams::Streams;
+use crate::netlist::suggest::is_of_pattern;
 use crate::report::figure::{Figure, PANEL_WIDTH};
 use crate::report::html::Page;
 use crate::report::{bode, svg};
-use crate::waveform::{Phasors, Plot, Waveforms, canonical_name, is_of_pattern, plots};
+use crate::waveform::{Phasors, Plot, Waveforms, canonical_name, plots};
 
 /// Shows what a file of waveforms holds.
 ///

@@ -29,9 +29,34 @@ pub(crate) fn is_unit(word: &str) -> bool {
     rests.any(|rest| UNITS.contains(&rest))
 }
 
+/// Whether a name is one of a pattern's: `*` stands for any characters, `?` for one.
+#[must_use]
+pub(crate) fn is_of_pattern(name: &str, pattern: &str) -> bool {
+    let (name, pattern) = (name.as_bytes(), pattern.as_bytes());
+    let (mut p, mut n, mut star) = (0, 0, None);
+    while n < name.len() {
+        match pattern.get(p) {
+            Some(b'*') => {
+                star = Some((p, n));
+                p += 1;
+            }
+            Some(&c) if c == b'?' || c == name[n] => (p, n) = (p + 1, n + 1),
+            // The last star takes one character more.
+            _ => match &mut star {
+                Some((at, taken)) => {
+                    *taken += 1;
+                    (p, n) = (*at + 1, *taken);
+                }
+                None => return false,
+            },
+        }
+    }
+    pattern[p..].iter().all(|c| *c == b'*')
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{is_unit, nearest};
+    use super::{is_of_pattern, is_unit, nearest};
 
     #[test]
     fn units_have_prefixes() {
@@ -51,5 +76,29 @@ mod tests {
         );
         assert_eq!(nearest("zz", ["resistance", "gain"]), None);
         assert_eq!(nearest("a", ["a"]), None);
+    }
+
+    #[test]
+    fn patterns_fit_what_they_should() {
+        let fits = |pattern, name| is_of_pattern(name, pattern);
+        for (pattern, name) in [
+            ("*", ""),
+            ("d*", "d1"),
+            ("x1.*", "x1.a.b"),
+            ("*out", "x.outout"),
+            ("d?", "d1"),
+            ("a*b*c", "abbcbc"),
+        ] {
+            assert!(fits(pattern, name), "{pattern} {name}");
+        }
+        for (pattern, name) in [
+            ("d*", "r1"),
+            ("d?", "d"),
+            ("d?", "d12"),
+            ("a*b", "abc"),
+            ("x1.*", "x1"),
+        ] {
+            assert!(!fits(pattern, name), "{pattern} {name}");
+        }
     }
 }

@@ -317,3 +317,19 @@ def test_a_watched_page_loads_anew_and_shows_the_same_part(tmp_path, show):
     finally:
         watching.kill()
         watching.wait()
+
+
+def test_error_over_time_and_certificates_have_pages(tmp_path, show):
+    netlist = tmp_path / "sine.cir"
+    netlist.write_text(SINE)
+    run("bench", netlist, "--methods", "exact,theta", "-o", tmp_path / "bench.html", "-o", tmp_path / "bench.csv")
+    page = show(tmp_path / "bench.html")
+    table = [row.split(",") for row in (tmp_path / "bench.csv").read_text().splitlines()[1:]]
+    theta = sorted((float(row[4]), float(row[5])) for row in table if row[1] == "theta" and row[2].startswith("step"))
+    points = page.evaluate("(() => { const c = window.circ.panels[0].curves.find((c) => c.name === 'theta'); return Array.from(c.x, (x, k) => [x, c.y[k]]); })()")
+    assert [tuple(point) for point in points] == theta
+    assert page.evaluate("window.circ.axis.log && window.circ.state.logs.size === 2")
+    run("check", BUCK, "-o", tmp_path / "check.html")
+    page = show(tmp_path / "check.html", waits=False)
+    page.get_by_role("cell", name="RR-7158 Theorem 2").wait_for()
+    assert page.locator(".circuit svg").count() == 1 and "passive" in page.locator("pre").inner_text()

@@ -19,6 +19,7 @@ use super::sim::{self, Request};
 use super::streams::Streams;
 use crate::circuit::Tran;
 use crate::integrate::{Method, Run};
+use crate::report::html::Page;
 use crate::report::json;
 use crate::report::work::{self, Measurement, Order, SignalError};
 use crate::waveform::Waveforms;
@@ -211,8 +212,8 @@ fn ending(path: &Path, args: &BenchArgs) -> Result<String, Failure> {
         .map(|e| e.to_string_lossy().to_ascii_lowercase())
         .unwrap_or_default();
     match ending.as_str() {
-        "csv" | "json" | "svg" | "png" => Ok(ending),
-        _ => Err(output::unknown_ending(path, "csv, json, svg or png")),
+        "csv" | "json" | "svg" | "png" | "html" => Ok(ending),
+        _ => Err(output::unknown_ending(path, "csv, json, svg, png or html")),
     }
 }
 
@@ -237,6 +238,11 @@ fn report(
                     orders: &orders,
                 };
                 files::write(path, (json::line(&document) + "\n").as_bytes())?;
+            }
+            "html" => {
+                let title = args.input.file.display().to_string();
+                let page = Page::of_measurements(&title, measurements).html()?;
+                files::write(path, page.as_bytes())?;
             }
             ending => {
                 output::picture_to_file(path, ending == "png", &work::draw(measurements)?)?;

@@ -6,8 +6,10 @@ const COLOURS = {
   dark: ["#4aa8e8", "#ff8a3d", "#2fc79b", "#e79bc5", "#9ad4f7", "#ffc24d", "#b4b4b4", "#c99a8c"],
 };
 const DASHES = [[], [7, 3], [2, 2.5], [9, 3, 2, 3]];
+/** Of errors: a zero stands at this on a logarithmic axis. */
+const LEAST = 1e-17;
 /** CSS pixels. */
-const SIZES = { axis: 76, panel: 220, row: 16, right: 26, pixelsToDrag: 4 };
+const SIZES = { axis: 76, panel: 220, row: 16, right: 26, dot: 3, pixelsToDrag: 4 };
 
 /** An element with attributes and children; text is never markup. */
 function element(tag, attributes = {}, ...children) {
@@ -41,8 +43,9 @@ function chart(root, content, announce) {
   const { axis, panels, strips } = content;
   const curves = panels.flatMap((panel) => panel.curves);
   const whole = wholeSpan(curves, axis.log);
-  const state = { view: whole, cursors: { a: null, b: null }, pointer: null, plots: [], logs: new Set() };
-  const looks = new Map(curves.map((curve, k) => [curve, k]));
+  const state = { view: whole, cursors: { a: null, b: null }, pointer: null, plots: [], logs: new Set(panels.filter((panel) => panel.dots)) };
+  const names = [...new Set(curves.map((curve) => curve.name))];
+  const looks = new Map(curves.map((curve) => [curve, names.indexOf(curve.name)]));
   const colour = (curve) => COLOURS[isDark() ? "dark" : "light"][looks.get(curve) % 8];
   const dash = (curve) => DASHES[Math.floor(looks.get(curve) / 8) % 4];
   const area = element("div", { class: "panels" });
@@ -61,6 +64,10 @@ function chart(root, content, announce) {
       [low, high] = [Math.min(low, a), Math.max(high, b)];
     }
     if (!(low <= high)) return state.logs.has(panel) ? [0.1, 10] : [-1, 1];
+    if (state.logs.has(panel) && panel.dots) {
+      const seen = panel.curves.filter((curve) => curve.shown).flatMap((curve) => Array.from(curve.y));
+      return [Math.max(Math.min(...seen), LEAST) / 2, Math.max(...seen, 10 * LEAST) * 2];
+    }
     if (state.logs.has(panel)) {
       high = Math.max(high, -low) || 1;
       return [high * 1e-6, high * 1.5];
@@ -74,9 +81,10 @@ function chart(root, content, announce) {
     const drawn = new Path2D();
     const pixels = Math.max(1, Math.round(plot.bbox.width));
     let pen = false;
-    const log = state.logs.has(panel);
+    const log = state.logs.has(panel), least = panel.dots ? LEAST : Number.MIN_VALUE;
+    const dot = SIZES.dot * (devicePixelRatio || 1), dots = new Path2D();
     trace(curve, state.view, pixels, edgeOf(state.view, pixels), (t, value) => {
-      const y = log ? Math.max(Math.abs(value), Number.MIN_VALUE) : value;
+      const y = log ? Math.max(Math.abs(value), least) : value;
       if (Number.isNaN(y)) {
         pen = false;
         return;
@@ -85,7 +93,12 @@ function chart(root, content, announce) {
       if (pen) drawn.lineTo(...at);
       else drawn.moveTo(...at);
       pen = true;
+      if (panel.dots) {
+        dots.moveTo(at[0] + dot, at[1]);
+        dots.arc(...at, dot, 0, 2 * Math.PI);
+      }
     });
+    drawn.addPath(dots);
     return { stroke: drawn };
   }
 
@@ -110,7 +123,7 @@ function chart(root, content, announce) {
       scales: { x: { time: false, auto: false, distr: axis.log ? 3 : 1 }, y: { auto: false, distr: state.logs.has(panel) ? 3 : 1 } },
       axes: [
         { stroke: ink, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1 }, space: 110, size: last ? 34 : 24, values: (_, splits) => ticks(splits, axis.unit) },
-        { stroke: ink, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1 }, size: SIZES.axis, values: (_, splits) => ticks(splits, panel.unit) },
+        { ...(panel.dots ? { label: panel.quantity, labelSize: 18, splits: decades } : {}), stroke: ink, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1 }, size: SIZES.axis, values: (_, splits) => ticks(splits, panel.unit) },
       ],
       series: [{}, ...series],
       cursor: { y: false, points: { show: false }, drag: { x: true, y: false, setScale: false, click: () => {} }, bind: { dblclick: () => () => show(whole) } },
@@ -130,6 +143,14 @@ function chart(root, content, announce) {
     plot.panel = panel;
     bind(plot, holder);
     return plot;
+  }
+
+  /** Powers of ten of an axis of errors, at most a dozen. */
+  function decades(plot, k, low, high) {
+    const [first, last] = [Math.ceil(Math.log10(low)), Math.floor(Math.log10(high))];
+    if (!state.logs.has(plot.panel ?? panels[0])) return Array.from({ length: 6 }, (_, j) => low + ((high - low) * j) / 5);
+    const by = Math.max(1, Math.ceil((last - first + 1) / 12));
+    return Array.from({ length: Math.max(0, Math.floor((last - first) / by) + 1) }, (_, j) => Number(`1e${first + j * by}`));
   }
 
   const widthOf = () => Math.max(280, root.clientWidth);
@@ -427,11 +448,14 @@ function chart(root, content, announce) {
   build();
   readings.update();
   resized.observe(root);
+  const paper = matchMedia("(prefers-color-scheme: dark)");
+  const repaint = () => { show(state.view); readings.update(); };
+  paper.addEventListener("change", repaint);
   return {
     state, panels, strips, show, keep, restore, zoom, pan, place, logarithmic, colour, dash, boundsOf, edgeOf, axis,
     full: () => show(whole),
-    repaint: () => { show(state.view); readings.update(); },
-    remove: () => { resized.disconnect(); state.plots.forEach((plot) => plot.destroy()); root.replaceChildren(); },
+    repaint,
+    remove: () => { resized.disconnect(); paper.removeEventListener("change", repaint); state.plots.forEach((plot) => plot.destroy()); root.replaceChildren(); },
   };
 }
 
@@ -444,5 +468,6 @@ function wholeSpan(curves, log) {
     to = Math.max(to, x[x.length - 1]);
   }
   if (!(from <= to)) return log ? [1, 10] : [0, 1];
+  if (log) return from < to ? [from, to] : [from / 2, to * 2];
   return from < to ? [from, to] : [from - (Math.abs(from) || 1) / 2, from + (Math.abs(from) || 1) / 2];
 }

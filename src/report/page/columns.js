@@ -143,6 +143,7 @@ function quantity(value, unit, digits = 6) {
 
 /** Labels of ticks under one prefix, with the decimals that tell them apart. */
 function ticks(splits, unit) {
+  if (unit === "") return splits.map((value) => (value == null ? null : (value !== 0 && Math.abs(value) < 1e-2 ? value.toExponential() : Number(value.toPrecision(6)).toString())));
   const known = splits.filter((value) => value != null);
   const size = Math.max(...known.map(Math.abs));
   const power = unit === "dB" || unit === "°" ? 0 : thousands(size);

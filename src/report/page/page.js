@@ -24,6 +24,7 @@ function panelsOf(data) {
   const panels = data.panels.map((panel) => ({
     quantity: panel.quantity,
     unit: panel.unit,
+    dots: panel.dots,
     curves: panel.curves.map((curve) => curveOf(curve.name, columns[curve.x], columns[curve.y])),
   }));
   return panels.flatMap((panel) => {
@@ -39,7 +40,7 @@ function wordTable({ heading, header, rows }) {
   const body = element("tbody");
   const line = (cells) => element("tr", {}, ...cells.map((cell) => element("td", {}, cell)));
   body.append(...rows.slice(0, ROWS).map(line));
-  const table = element("table", {}, element("thead", {}, element("tr", {}, ...header.map((name) => element("th", { scope: "col" }, name)))), body);
+  const table = element("table", { class: "words" }, element("thead", {}, element("tr", {}, ...header.map((name) => element("th", { scope: "col" }, name)))), body);
   const section = element("details", { open: rows.length <= 40 }, element("summary", {}, `${heading} (${rows.length})`), table);
   if (rows.length > ROWS) {
     const more = element("button", { type: "button", onclick: () => { body.append(...rows.slice(ROWS).map(line)); more.remove(); } }, `all ${rows.length} rows`);
@@ -150,7 +151,7 @@ function circPage(root, data) {
     button("◀", () => shown.pan(-0.2), "earlier (left arrow, shift and drag)");
     button("▶", () => shown.pan(0.2), "later (right arrow)");
     button("all", () => shown.full(), "the whole span (key Home, double click)");
-    button("log y", (made) => shown.logarithmic(pressed(made)), "logarithmic axis of absolute values").setAttribute("aria-pressed", "false");
+    button("log y", (made) => shown.logarithmic(pressed(made)), "logarithmic axis of absolute values").setAttribute("aria-pressed", String(panels.every((panel) => panel.dots)));
     if (data.axis.name === "time") {
       button("spectrum", (made) => {
         if (pressed(made)) transformed();
@@ -177,6 +178,5 @@ function circPage(root, data) {
   for (const { heading, text } of data.texts ?? []) {
     root.append(element("details", { open: true }, element("summary", {}, heading), element("pre", {}, text)));
   }
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => shown?.repaint());
   return shown;
 }

@@ -36,7 +36,7 @@ pub fn svg(model: &Model, conducting: &[String]) -> Result<String, PictureError>
 ///
 /// # Errors
 /// See [`svg`].
-pub(super) fn with_both_states(model: &Model) -> Result<String, PictureError> {
+pub fn with_both_states(model: &Model) -> Result<String, PictureError> {
     drawn(model, States::Both)
 }
 
