@@ -152,7 +152,7 @@ fn probes_by_name() {
 fn the_example_is_read_without_findings() {
     let page = std::fs::read_to_string("docs/netlist.md").unwrap();
     let example = page
-        .split("```spice\n")
+        .split("```spice title=buck.cir\n")
         .nth(1)
         .unwrap()
         .split("```")

@@ -19,6 +19,26 @@ const OTHERS: [&str; 5] = [
     include_str!("../netlists/common-emitter.cir"),
 ];
 
+/// Lines of schematics.
+const SHEETS: [&str; 16] = [
+    "WIRE 0 16 96 16",
+    "WIRE 96 16 96 96",
+    "WIRE 0 0 80 80",
+    "FLAG 0 16 in",
+    "FLAG 96 96 0",
+    "IOPIN 0 16 In",
+    "SYMBOL res 0 0 R0",
+    "SYMBOL voltage 96 0 M90",
+    "SYMBOL Digital\\\\dflop 96 0 R270",
+    "SYMBOL nmos 0 16 M180",
+    "SYMATTR InstName R1",
+    "SYMATTR Value 10k tol=1% µ",
+    "SYMATTR SpiceLine Rser=1",
+    "SYMATTR Prefix X",
+    "TEXT 0 0 Left 2 !.tran 1m\\n+ uic\\n.param a=1",
+    "SYMATTR SpiceModel self.lib",
+];
+
 /// Reads a text as a netlist that includes itself as `self.cir`; every finding points into a file.
 fn read(bytes: &[u8]) {
     let mut sources = SourceMap::default();
@@ -196,6 +216,27 @@ proptest! {
         let words = tokens(EVERYTHING);
         let text: String = picks.iter().flat_map(|(a, b)| [words[a.index(words.len())].as_str(), " ", PIECES[b.index(PIECES.len())]]).collect();
         read(format!("t\nR1 {text}").as_bytes());
+        read(text.as_bytes());
+    }
+
+    #[test]
+    fn any_sheet(lines in prop::collection::vec((0..SHEETS.len(), any::<prop::sample::Index>(), any::<prop::sample::Index>(), any::<i16>()), 0..60)) {
+        // Lines of schematics, in part with others' words or numbers.
+        let mut text = String::from("Version 4\nSHEET 1 880 680\n");
+        for (kind, word, other, number) in lines {
+            let words: Vec<&str> = SHEETS[kind].split(' ').collect();
+            let others: Vec<&str> = SHEETS[other.index(SHEETS.len())].split(' ').collect();
+            let swapped = word.index(2 * words.len());
+            for (k, own) in words.iter().enumerate() {
+                match k == swapped {
+                    false => text += own,
+                    true if number % 3 == 0 => text += &number.to_string(),
+                    true => text += others[word.index(others.len())],
+                }
+                text += " ";
+            }
+            text += "\n";
+        }
         read(text.as_bytes());
     }
 

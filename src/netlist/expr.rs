@@ -36,6 +36,7 @@ pub fn expression(text: &str) -> Result<Expr, Box<Diagnostic>> {
         file: FileId(0),
         start: 0,
         text: text.to_owned(),
+        pieces: Vec::new(),
     };
     let state = State::default();
     let fault = match expr(input(&line, &state)) {
@@ -397,6 +398,7 @@ mod tests {
             file: FileId(0),
             start: 0,
             text: text.to_string(),
+            pieces: Vec::new(),
         };
         let state = State::default();
         match expr(input(&line, &state)) {

@@ -24,17 +24,59 @@ pub(super) struct Line {
     pub(super) start: usize,
     /// The text, with everything that is no part of the card blanked.
     pub(super) text: String,
+    /// Where its pieces stand, where it is put together from several; none where a byte of the line is a byte of the file.
+    pub(super) pieces: Vec<Piece>,
+}
+
+/// A part of a line, up to the next one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Piece {
+    /// Its first byte in the line.
+    pub(super) at: usize,
+    /// Where it stands in the file, or what it is said of.
+    pub(super) place: Range<usize>,
+    /// Its bytes are those of the file.
+    pub(super) copied: bool,
+}
+
+/// The place in the file of the bytes `from..to` of a line.
+fn place(file: FileId, start: usize, pieces: &[Piece], (from, to): (usize, usize)) -> Span {
+    let to = to.max(from);
+    if pieces.is_empty() {
+        return Span {
+            file,
+            start: start + from,
+            end: start + to,
+        };
+    }
+    let piece = |before: usize| &pieces[before.saturating_sub(1)];
+    let first = piece(pieces.partition_point(|p| p.at <= from));
+    let last = piece(pieces.partition_point(|p| p.at < to.max(from + 1)));
+    let within =
+        |p: &Piece, offset: usize| (p.place.start + offset.saturating_sub(p.at)).min(p.place.end);
+    let start = if first.copied {
+        within(first, from)
+    } else {
+        first.place.start
+    };
+    let end = if last.copied {
+        within(last, to)
+    } else {
+        last.place.end
+    };
+    Span {
+        file,
+        start,
+        end: end.max(start),
+    }
 }
 
 impl Line {
     /// The place of the card without the blanks around it.
     pub(super) fn span(&self) -> Span {
-        let start = self.start + (self.text.len() - self.text.trim_start().len());
-        Span {
-            file: self.file,
-            start,
-            end: self.start + self.text.trim_end().len(),
-        }
+        let from = self.text.len() - self.text.trim_start().len();
+        let to = self.text.trim_end().len();
+        place(self.file, self.start, &self.pieces, (from, to))
     }
 }
 
@@ -87,6 +129,7 @@ pub(super) fn logical(file: FileId, text: &str, from: usize) -> (Vec<Line>, Vec<
                 file,
                 start: range.start,
                 text: kept,
+                pieces: Vec::new(),
             });
         } else if let Some(line) = lines.last_mut() {
             let gap = range.start - (line.start + line.text.len());
@@ -167,6 +210,7 @@ pub(super) struct Origin<'a> {
     start: usize,
     /// The whole line.
     line: &'a str,
+    pieces: &'a [Piece],
     pub(super) state: &'a State,
 }
 
@@ -183,6 +227,7 @@ pub(super) fn input<'a>(line: &'a Line, state: &'a State) -> Input<'a> {
             file: line.file,
             start: line.start,
             line: &line.text,
+            pieces: &line.pieces,
             state,
         },
     )
@@ -222,25 +267,34 @@ pub(super) fn tell(i: Input<'_>, diagnostic: Diagnostic) {
     i.extra.state.findings.borrow_mut().push(diagnostic);
 }
 
+/// The text from one input to a later one.
+pub(super) fn written<'a>(from: Input<'a>, to: Input<'_>) -> &'a str {
+    &from.fragment()[..to.location_offset() - from.location_offset()]
+}
+
 /// The place from one input to a later one.
 pub(super) fn between(from: Input<'_>, to: Input<'_>) -> Span {
-    let origin = from.extra;
-    let start = origin.start + from.location_offset();
-    Span {
-        file: origin.file,
+    let Origin {
+        file,
         start,
-        end: (origin.start + to.location_offset()).max(start),
-    }
+        pieces,
+        ..
+    } = from.extra;
+    let bytes = (from.location_offset(), to.location_offset());
+    place(file, start, pieces, bytes)
 }
 
 /// The place of the next `length` bytes.
 pub(super) fn ahead(i: Input<'_>, length: usize) -> Span {
-    let start = i.extra.start + i.location_offset();
-    Span {
-        file: i.extra.file,
+    let Origin {
+        file,
         start,
-        end: start + length.min(i.fragment().len()),
-    }
+        pieces,
+        ..
+    } = i.extra;
+    let from = i.location_offset();
+    let to = from + length.min(i.fragment().len());
+    place(file, start, pieces, (from, to))
 }
 
 /// The place of the word that comes next; at the end of the card, its last word.
@@ -250,15 +304,15 @@ pub(super) fn next_word(i: Input<'_>) -> Span {
         return ahead(i, i.fragment().find(' ').unwrap_or(i.fragment().len()));
     }
     let Origin {
-        file, start, line, ..
+        file,
+        start,
+        line,
+        pieces,
+        ..
     } = i.extra;
     let used = line.trim_end_matches(' ');
     let word = used.rfind(' ').map_or(0, |at| at + 1);
-    Span {
-        file,
-        start: start + word,
-        end: start + used.len(),
-    }
+    place(file, start, pieces, (word, used.len()))
 }
 
 /// Skips blanks.
@@ -322,13 +376,11 @@ pub(super) fn node(i: Input<'_>) -> Parsed<'_, Name> {
                 .unwrap_or(rest.fragment().len()),
         );
     }
-    let span = between(start, rest);
-    let length = span.end - span.start;
     Ok((
         rest,
         Name {
-            text: start.fragment()[..length].to_lowercase(),
-            span,
+            text: written(start, rest).to_lowercase(),
+            span: between(start, rest),
         },
     ))
 }
@@ -374,9 +426,8 @@ pub(super) fn end(i: Input<'_>) -> Parsed<'_, ()> {
     if i.fragment().is_empty() {
         return Ok((i, ()));
     }
-    let span = next_word(i);
-    let text = &i.fragment()[..span.end - span.start];
-    let fault = Diagnostic::error("unexpected", span, format!("unexpected `{text}`"))
+    let text = i.fragment().split(' ').next().unwrap_or("");
+    let fault = Diagnostic::error("unexpected", next_word(i), format!("unexpected `{text}`"))
         .label("nothing should stand here");
     Err(refuse(if is_unit(text) {
         fault.help(format!(

@@ -1,4 +1,4 @@
-//! Text to a [`Netlist`]: what the cards say, with the place of every piece.
+//! Text to a [`Netlist`]: what the cards say, with the place of every piece. LTspice's schematics are read as the cards they stand for.
 //!
 //! The reader never stops at the first fault. It knows the dialects of SPICE3, ngspice, LTspice and PSpice; the
 //! accepted language is listed in `docs/netlist.md`. Nothing is evaluated here:
@@ -17,6 +17,7 @@ mod include;
 mod lex;
 mod operand;
 mod read;
+mod schematic;
 mod stepped;
 pub(crate) mod suggest;
 pub mod value;

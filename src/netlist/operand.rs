@@ -6,6 +6,7 @@ use super::ast::{Expr, ExprKind, Unary};
 use super::expr::expr;
 use super::lex::{
     Fault, Input, Parsed, ahead, at_end, between, blank, mismatch, next_word, refuse, symbol, word,
+    written,
 };
 use super::value;
 use crate::diagnostic::Diagnostic;
@@ -54,7 +55,7 @@ pub(super) fn value(i: Input<'_>) -> Parsed<'_, Expr> {
     {
         let (after, _) = word(rest.take_from(1))?;
         let span = between(start, after);
-        let text = &start.fragment()[..span.end - span.start];
+        let text = written(start, after);
         return Err(refuse(
             Diagnostic::error(
                 "decimal-comma",
@@ -90,8 +91,8 @@ pub(super) fn item(i: Input<'_>) -> Parsed<'_, Expr> {
         }
     }
     let (rest, name) = word(start)?;
-    let written = &start.fragment()[..name.span.end - name.span.start];
-    if !written.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '+' | '-' | '.')) {
+    let text = written(start, rest);
+    if !text.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '+' | '-' | '.')) {
         return Ok((
             rest,
             Expr {
@@ -100,7 +101,7 @@ pub(super) fn item(i: Input<'_>) -> Parsed<'_, Expr> {
             },
         ));
     }
-    match value::parse(written) {
+    match value::parse(text) {
         Ok(value) => Ok((
             rest,
             Expr {
@@ -110,13 +111,13 @@ pub(super) fn item(i: Input<'_>) -> Parsed<'_, Expr> {
         )),
         // `-name`: a negated parameter.
         Err(value::NumberError::NoDigits)
-            if written.len() > 1 && written[1..].starts_with(char::is_alphabetic) =>
+            if text.len() > 1 && text[1..].starts_with(char::is_alphabetic) =>
         {
             let inner = Expr {
                 kind: ExprKind::Name(name.text[1..].to_string()),
                 span: name.span,
             };
-            let kind = if written.starts_with('-') {
+            let kind = if text.starts_with('-') {
                 ExprKind::Unary(Unary::Minus, Box::new(inner))
             } else {
                 inner.kind
@@ -129,7 +130,7 @@ pub(super) fn item(i: Input<'_>) -> Parsed<'_, Expr> {
                 },
             ))
         }
-        Err(error) => Err(refuse(bad_number(start, written, error))),
+        Err(error) => Err(refuse(bad_number(start, text, error))),
     }
 }
 

@@ -9,7 +9,7 @@ use super::control::Script;
 use super::dot::{self, Dot};
 use super::include::{Files, lexical, library_sections};
 use super::lex::{Fault, Line, Parsed, State, at_end, input, logical, next_word, title};
-use super::{card, code, decode, stepped};
+use super::{card, code, decode, schematic, stepped};
 use crate::diagnostic::{Diagnostic, FileId, Severity, SourceMap, Span};
 
 /// Reads a netlist: text to cards, includes in place. Never stops at the first fault.
@@ -57,7 +57,8 @@ pub fn parse_among(
         start: first.start,
         end: first.end,
     };
-    if let Some(foreign) = decode::foreign(&text, title_span) {
+    if let Some(foreign) = decode::foreign(&text, title_span).filter(|_| !schematic::is_one(&text))
+    {
         netlist.body.faults.push(foreign.clone());
         return (netlist, vec![foreign]);
     }
@@ -75,15 +76,22 @@ pub fn parse_among(
         script: Script::default(),
         title: None,
     };
-    reader.title_line(&text, title_span);
-    let (lines, orphans) = logical(root, &text, first.end);
-    for span in orphans {
-        reader.tell(
-            Diagnostic::error("unexpected", span, "there is no card to continue")
-                .label("a line that begins with `+` continues the card above"),
-        );
+    if schematic::is_one(&text) {
+        reader.title = path
+            .file_stem()
+            .map(|name| name.to_string_lossy().into_owned());
+        reader.sheet(root, &text, &path);
+    } else {
+        reader.title_line(&text, title_span);
+        let (lines, orphans) = logical(root, &text, first.end);
+        for span in orphans {
+            reader.tell(
+                Diagnostic::error("unexpected", span, "there is no card to continue")
+                    .label("a line that begins with `+` continues the card above"),
+            );
+        }
+        reader.lines(&lines, &path);
     }
-    reader.lines(&lines, &path);
     reader.close_all();
     reader.end_script();
     reader.note_skipped();
@@ -138,6 +146,7 @@ impl Reader<'_> {
             file: span.file,
             start: span.start,
             text: text[span.start..span.end].replace('\t', " "),
+            pieces: Vec::new(),
         };
         let state = State::default();
         let is_card = if first.starts_with('.') {

@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 29] = [
+pub(super) const CODES: [Explanation; 33] = [
     Explanation::of(
         "bad-card",
         "A line is neither an element nor a directive.",
@@ -31,6 +31,20 @@ pub(super) const CODES: [Explanation; 29] = [
         "Numbers are `4.7k`, `10u`, `1e-3`; what is computed stands in braces, `{2*r}`.",
     )
     .shown("a number with an accident\nv1 a 0 1\nr1 a 0 1.2.3\n.tran 1m 5m\n"),
+    Explanation::of(
+        "bad-sheet",
+        "A line of an LTspice schematic is none that LTspice writes, or has a coordinate or orientation that is none.",
+        "The file was edited by hand, cut off, or written by another program.",
+        "Open the schematic in LTspice and save it again, or correct the line.",
+    )
+    .shown("Version 4\nSHEET 1 880 680\nWIRE 0 0 16\n"),
+    Explanation::of(
+        "bad-symbol",
+        "A symbol of a schematic has no name, so that it has no card.",
+        "The attribute `InstName` is missing or empty.",
+        "Name the symbol in LTspice, or add the line `SYMATTR InstName R1` below it.",
+    )
+    .shown("Version 4\nSHEET 1 880 680\nSYMBOL res 0 0 R0\nSYMATTR Value 1k\n"),
     Explanation::of(
         "control-left-out",
         "A command of `.control` that changes the circuit or the run is not carried out; the result is without it.",
@@ -106,6 +120,13 @@ pub(super) const CODES: [Explanation; 29] = [
     )
     .shown("(kicad_sch (version 20230121)\n"),
     Explanation::of(
+        "one-net",
+        "Two labels of a schematic name one net, which has the first name in results.",
+        "Wires join what was meant to be apart, or a net has two names on purpose.",
+        "Nothing if it is meant; use the name that the note gives in probes.",
+    )
+    .shown("Version 4\nSHEET 1 880 680\nWIRE 0 16 96 16\nFLAG 0 16 a\nFLAG 96 16 b\nFLAG 0 96 0\nSYMBOL voltage 0 0 R0\nSYMATTR InstName V1\nSYMATTR Value 1\nTEXT 0 200 Left 2 !.tran 1m 5m\n"),
+    Explanation::of(
         "skipped",
         "Directives that do not concern the analysis are left out.",
         "`.noise`, `.temp` and others of a netlist that was written for another simulator.",
@@ -180,6 +201,13 @@ pub(super) const CODES: [Explanation; 29] = [
         "Correct it; a directive that does not concern the circuit may be left out.",
     )
     .shown("slip\nv1 a 0 1\nr1 a 0 1k\n.trann 1m 5m\n"),
+    Explanation::of(
+        "unknown-symbol",
+        "A symbol of a schematic is neither one of LTspice's that circ has a model of nor a file.",
+        "A vendor's part of LTspice's library, or a symbol of one's own whose file was not copied along.",
+        "Put its `.asy` file, and the library or the `.asc` that it names, beside the schematic or into a folder of `--lib DIR`; or export the netlist with LTspice.",
+    )
+    .shown("Version 4\nSHEET 1 880 680\nSYMBOL Opamps\\\\LT1001 0 0 R0\nSYMATTR InstName U1\n"),
     Explanation::of(
         "unreadable",
         "A file cannot be read.",

@@ -7,7 +7,7 @@ use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Control, Device, Name, PinGroup};
 use crate::netlist::lex::{
     Input, Parsed, ahead, at_end, blank, expect_word, missing, node, refuse, separator, symbol,
-    word,
+    word, written,
 };
 use crate::netlist::operand;
 
@@ -169,9 +169,9 @@ pub(super) fn code_model<'a>(i: Input<'a>, card: &Name) -> Parsed<'a, Body> {
             (at, open) = (rest, true);
         } else if let Some(rest) = symbol(at, '%') {
             // `%vd[` too.
-            let (_, word) = expect_word(rest, "the type of a port")?;
+            let (after, _) = expect_word(rest, "the type of a port")?;
             let start = blank(rest);
-            let whole = &start.fragment()[..word.span.end - word.span.start];
+            let whole = written(start, after);
             let length = whole.find('[').unwrap_or(whole.len());
             let name = Name {
                 text: whole[..length].to_lowercase(),
@@ -221,13 +221,12 @@ fn element<'a>(at: Input<'a>, card: &Name) -> Parsed<'a, Vec<Name>> {
 
 /// A name that ends at a bracket too, unless it has its own (`q[0]`).
 fn part<'a>(at: Input<'a>, card: &Name) -> Parsed<'a, Name> {
-    let (_, whole) = node(at).map_err(|_| missing(at, &format!("a node of `{}`", card.text)))?;
+    let (after, _) = node(at).map_err(|_| missing(at, &format!("a node of `{}`", card.text)))?;
     let at = blank(at);
-    let length = whole.span.end - whole.span.start;
-    let text = &at.fragment()[..length];
+    let text = written(at, after);
     let end = match text.find(['[', ']']) {
         Some(k) if k > 0 && text[k..].starts_with(']') => k,
-        _ => length,
+        _ => text.len(),
     };
     let name = Name {
         text: text[..end].to_lowercase(),

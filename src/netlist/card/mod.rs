@@ -11,7 +11,7 @@ use super::ast::{Assign, Device, Element, Expr, ExprKind, Name};
 use super::lex::{
     Fault, Input, Parsed, ahead, at_end, blank, end, missing, node, refuse, separator, symbol, word,
 };
-use super::{expr, operand};
+use super::{expr, operand, value};
 use crate::diagnostic::Diagnostic;
 
 /// What an element letter stands for, as `a resistor`.
@@ -152,20 +152,23 @@ pub(super) fn assign(i: Input<'_>) -> Parsed<'_, Assign> {
         return Ok((rest, Assign { name, value }));
     }
     let list = name.text.starts_with("tc");
-    let (mut next, value) = if matches!(name.text.as_str(), "flux" | "q") {
-        expr::expr(rest)
-    } else if list {
-        operand::item(rest)
-    } else {
-        operand::lenient(rest)
-    }
-    .map_err(|e| {
-        if e == nom::Err::Error(Fault::Mismatch) {
-            missing(rest, "a value")
+    let (mut next, value) =
+        if let ("tol", Some((next, value))) = (name.text.as_str(), percent(rest)) {
+            Ok((next, value))
+        } else if matches!(name.text.as_str(), "flux" | "q") {
+            expr::expr(rest)
+        } else if list {
+            operand::item(rest)
         } else {
-            e
+            operand::lenient(rest)
         }
-    })?;
+        .map_err(|e| {
+            if e == nom::Err::Error(Fault::Mismatch) {
+                missing(rest, "a value")
+            } else {
+                e
+            }
+        })?;
     while list && let Some(comma) = symbol(next, ',') {
         rest = comma;
         next = operand::item(rest)?.0;
@@ -175,6 +178,21 @@ pub(super) fn assign(i: Input<'_>) -> Parsed<'_, Assign> {
         Assign {
             name,
             value: Some(value),
+        },
+    ))
+}
+
+/// A number with a percent sign, as LTspice writes tolerances.
+fn percent(i: Input<'_>) -> Option<(Input<'_>, Expr)> {
+    let start = blank(i);
+    let (rest, name) = word(start).ok()?;
+    let value = value::parse(name.text.strip_suffix('%')?).ok()?;
+    let kind = ExprKind::Number(value);
+    Some((
+        rest,
+        Expr {
+            kind,
+            span: name.span,
         },
     ))
 }

@@ -6,7 +6,7 @@ use super::{Body, assignment_follows, assigns, keyword, nodes};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Device, Expr, ExprKind, Name};
 use crate::netlist::lex::{
-    Input, Parsed, ahead, at_end, missing, next_word, refuse, separator, tell,
+    Input, Parsed, ahead, at_end, ends_word, missing, next_word, refuse, separator, tell,
 };
 use crate::netlist::operand;
 
@@ -52,7 +52,8 @@ pub(super) fn warn_of_suffix(at: Input<'_>, name: &Name, value: &Expr) {
     let ExprKind::Number(number) = &value.kind else {
         return;
     };
-    let written = &at.fragment()[..value.span.end - value.span.start];
+    let written = at.fragment();
+    let written = &written[..written.find(ends_word).unwrap_or(written.len())];
     let Some(last) = written.chars().next_back() else {
         return;
     };
