@@ -4,7 +4,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::circuit::source::Wave;
-use crate::circuit::{Circuit, ElaborateOptions, Element, Kind, Sweep, Tran, elaborate, load};
+use crate::circuit::{
+    Circuit, ElaborateOptions, Element, Kind, Sweep, Swept, Tran, elaborate, load,
+};
 use crate::diagnostic::{Diagnostic, Faults, SourceFile, SourceMap};
 use crate::integrate::{
     Error, OperatingPoint, Places, Reason, Run, SimOptions, Simulation, SimulationOptions, Values,
@@ -180,18 +182,7 @@ impl Model {
             return Err(self.faults(vec![Diagnostic::error("set", None, message)]));
         }
         let mut options = self.options.clone();
-        let values = match self.circuit.element(&name) {
-            Some(id) => {
-                if let Some(reason) = not_settable(&self.circuit.elements[id.index()]) {
-                    let message = format!("`{name}` cannot be set: {reason}");
-                    return Err(self.faults(vec![Diagnostic::error("set", None, message)]));
-                }
-                &mut options.values
-            }
-            None => &mut options.params,
-        };
-        values.retain(|(other, _)| *other != name);
-        values.push((name.clone(), value));
+        options.set(&self.swept(&name)?, value);
         let circuit = match &self.netlist {
             Some(netlist) => {
                 let (circuit, findings) = elaborate(netlist, &options);
@@ -225,17 +216,35 @@ impl Model {
         }
     }
 
-    /// The model with these values in place of those of the sweeps.
+    /// What a name means that a value is given to: an element of the top level, else a `.param`, which need not exist.
+    ///
+    /// # Errors
+    /// An element that has no value to be set.
+    pub fn swept(&self, name: &str) -> Result<Swept, Error> {
+        let name = name.to_lowercase();
+        let Some(id) = self.circuit.element(&name) else {
+            return Ok(Swept::Param(name));
+        };
+        match not_settable(&self.circuit.elements[id.index()]) {
+            None => Ok(Swept::Element(name)),
+            Some(reason) => {
+                let message = format!("`{name}` cannot be set: {reason}");
+                Err(self.faults(vec![Diagnostic::error("set", None, message)]))
+            }
+        }
+    }
+
+    /// The model with these values in place of those of the sweeps, and the sample that is drawn, where one is.
     ///
     /// # Errors
     /// The netlist is no circuit with them, or there is no netlist.
-    pub fn at(&self, sweeps: &[Sweep], values: &[f64]) -> Result<Self, Error> {
-        let circuit = self.circuit_at(sweeps, values)?;
+    pub fn at(&self, sweeps: &[Sweep], values: &[f64], sample: Option<u64>) -> Result<Self, Error> {
+        let circuit = self.circuit_at(sweeps, values, sample)?;
         match mna::behaviour(&circuit) {
             Ok(multiport) => Ok(Self {
                 netlist: self.netlist.clone(),
                 sources: Arc::clone(&self.sources),
-                options: self.options.at(sweeps, values),
+                options: self.options_at(sweeps, values, sample),
                 circuit,
                 multiport,
                 findings: self.findings.clone(),
@@ -245,12 +254,17 @@ impl Model {
     }
 
     /// The circuit of that model, with the probes of this one.
-    pub(crate) fn circuit_at(&self, sweeps: &[Sweep], values: &[f64]) -> Result<Circuit, Error> {
+    pub(crate) fn circuit_at(
+        &self,
+        sweeps: &[Sweep],
+        values: &[f64],
+        sample: Option<u64>,
+    ) -> Result<Circuit, Error> {
         let Some(netlist) = &self.netlist else {
             let message = "a circuit without a netlist has no sweeps";
             return Err(self.faults(vec![Diagnostic::error("sweep", None, message)]));
         };
-        let (circuit, findings) = elaborate(netlist, &self.options.at(sweeps, values));
+        let (circuit, findings) = elaborate(netlist, &self.options_at(sweeps, values, sample));
         let mut circuit = circuit.ok_or_else(|| self.faults(findings))?;
         let probes = self.circuit.probes.iter().map(|p| circuit.probe(&p.name));
         if self.circuit.columns.is_empty()
@@ -262,6 +276,19 @@ impl Model {
             self.show_in(&mut circuit);
         }
         Ok(circuit)
+    }
+
+    fn options_at(
+        &self,
+        sweeps: &[Sweep],
+        values: &[f64],
+        sample: Option<u64>,
+    ) -> ElaborateOptions {
+        let options = self.options.at(sweeps, values);
+        ElaborateOptions {
+            sample: sample.or(options.sample),
+            ..options
+        }
     }
 
     /// The model with this circuit, whose values are the same.

@@ -129,6 +129,7 @@ fn help_names_every_command_and_flag() {
         "pss",
         "ac",
         "sens",
+        "sweep",
         "lcs",
         "check",
         "op",

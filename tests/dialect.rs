@@ -187,7 +187,7 @@ fn parameters_of_models_are_swept() {
             "Param(\"dm(roff)\") [10.0, 20.0]"
         ]
     );
-    let at = |values: &[f64]| stepped.at(&stepped.circuit().steps, values).unwrap();
+    let at = |values: &[f64]| stepped.at(&stepped.circuit().steps, values, None).unwrap();
     let law = |model: &Model| format!("{:?}", model.circuit().elements[2].kind);
     let plain = |ron: f64, roff: f64| {
         model(&cards.replace("{2*u}", &format!("{ron} Roff={roff}"))).unwrap()

@@ -10,7 +10,7 @@ use circ::analysis::{
     Finished, Measurements, PeriodicOptions, SensitivityOptions, SmallSignalOptions, TableOptions,
     periodic_measured, periodic_table, sensitivity, shown, small_signal, table, transient,
 };
-use circ::circuit::{Circuit, Kind, Tran};
+use circ::circuit::{Circuit, Tran};
 use circ::diagnostic::{SourceFile, SourceMap};
 use circ::integrate::{Reason, Run};
 use circ::{
@@ -297,20 +297,7 @@ impl Core {
     /// The value of an element (Ω, F, H; V or A of a constant source) or a parameter.
     fn value(&self, name: &str) -> PyResult<f64> {
         let (name, circuit) = (name.to_lowercase(), self.model.circuit());
-        let element = circuit
-            .element(&name)
-            .map(|id| &circuit.elements[id.index()].kind);
-        let value = match element {
-            Some(Kind::Resistor(v) | Kind::Capacitor(v) | Kind::Inductor(v)) => Some(v.f64),
-            Some(Kind::VoltageSource(source) | Kind::CurrentSource(source)) => Some(source.dc),
-            Some(_) => None,
-            None => circuit
-                .params
-                .iter()
-                .find(|(own, _)| *own == name)
-                .map(|(_, v)| *v),
-        };
-        value.ok_or_else(|| {
+        circuit.value(&name).ok_or_else(|| {
             PyKeyError::new_err(format!("no element or parameter `{name}` with a value"))
         })
     }

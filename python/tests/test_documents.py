@@ -8,7 +8,7 @@ import pytest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUCK = """buck
 .param d=0.4
-vin in 0 24
+vin in 0 24 ac 1
 vg g 0 pulse(0 1 0 0 0 {d*10u} 10u)
 s1 in sw g 0 sw
 d1 0 sw ideal

@@ -11,6 +11,7 @@
 //! | what tolerances make of a `.meas` | [`worst()`]: a [`Worst`] |
 //! | means, extrema and powers of all elements, efficiency, distortion | [`table()`], [`periodic_table`]: a [`Table`] |
 //! | `.step`, or any other values | [`variants`]: a [`Variant`] for every combination of values; [`each`] asks all of them, in parallel |
+//! | tolerances and random values | [`samples`] of variants; [`sweep()`] gives a [`Row`] of `.meas` for each |
 
 mod conducting;
 mod dc;
@@ -35,7 +36,9 @@ pub use small_signal::{
     About, Left, Margin, Ratio, Response, SmallSignalOptions, margins, ratios, small_signal,
     unwrapped,
 };
-pub use sweep::{Variant, each, variants};
+pub use sweep::{
+    Row, SweepOptions, Variant, drawn_names, each, measured_names, samples, steps, sweep, variants,
+};
 pub use table::{
     ElementMeans, Mean, SignalMeans, Span, Table, TableOptions, Throughput, periodic_table, table,
 };

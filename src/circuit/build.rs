@@ -155,6 +155,22 @@ impl Circuit {
     }
 }
 
+impl Circuit {
+    /// The value of an element (Ω, F, H; V or A of a source at rest), else of a parameter that something uses.
+    #[must_use]
+    pub fn value(&self, name: &str) -> Option<f64> {
+        let Some(id) = self.element(name) else {
+            let own = self.params.iter().find(|(own, _)| own == name);
+            return own.map(|(_, value)| *value);
+        };
+        match &self.elements[id.index()].kind {
+            Kind::Resistor(v) | Kind::Capacitor(v) | Kind::Inductor(v) => Some(v.f64),
+            Kind::VoltageSource(source) | Kind::CurrentSource(source) => Some(source.dc),
+            _ => None,
+        }
+    }
+}
+
 impl Kind {
     /// Gives a resistor, capacitor, inductor or constant source another value; nothing else has one.
     pub(crate) fn set_value(&mut self, to: f64) {

@@ -2,6 +2,7 @@
 
 use std::collections::{HashMap, HashSet, VecDeque};
 
+use super::draw::{self, Draw};
 use super::elaborate::ElaborateOptions;
 use super::names::Names;
 use super::scope::{ScopeId, Scopes};
@@ -130,12 +131,13 @@ impl<'n, 'o> Builder<'n, 'o> {
             .faults
             .iter()
             .all(|d| d.severity < Severity::Error);
+        self.scopes.draw = Draw::of(self.options);
+        self.scopes.tolerances.clone_from(&self.options.tolerances);
         for (name, value) in &self.options.params {
-            self.scopes.fix(
-                ScopeId::ROOT,
-                &name.to_lowercase(),
-                Some(Value::binary(*value)),
-            );
+            let name = name.to_lowercase();
+            let value = Value::binary(*value);
+            let value = self.scopes.toleranced(value, &name, None);
+            self.scopes.fix(ScopeId::ROOT, &name, Some(value));
         }
         self.define(&netlist.body, ScopeId::ROOT);
         self.check_overrides();
@@ -169,6 +171,7 @@ impl<'n, 'o> Builder<'n, 'o> {
             );
         }
         self.circuit.params = self.scopes.evaluated(ScopeId::ROOT);
+        self.circuit.random = self.scopes.random;
         (self.circuit, self.scopes.findings.into_list())
     }
 
@@ -212,6 +215,7 @@ impl<'n, 'o> Builder<'n, 'o> {
             self.tell(Diagnostic::error("too-large", None, message));
             return;
         }
+        self.scopes.place = draw::place(&self.full_name(&card.name, scope));
         match &card.device {
             Device::Passive { values, args } => self.passive(card, values, args, scope),
             Device::Source { dc, wave, ac, args } => {

@@ -115,7 +115,26 @@ impl<'n> Builder<'n, '_> {
         }
     }
 
+    /// What is toleranced is there, where a sample is drawn.
+    fn check_tolerances(&mut self) {
+        let sampled = self.options.sample.is_some();
+        for tolerance in self.options.tolerances.iter().filter(|_| sampled) {
+            let name = tolerance.name.as_str();
+            let declared = self.scopes.get(ScopeId::ROOT).declared.contains(name);
+            let valued = name.starts_with(['r', 'c', 'l', 'v', 'i']);
+            let known = declared || valued && self.root_elements.contains(name);
+            if !known {
+                let message = format!("there is no element or parameter `{name}` with a tolerance");
+                let fault = Diagnostic::error("unknown-parameter", None, message);
+                self.tell(fault.help(
+                    "tolerances are those of R, C, L and sources of the top level, and of its parameters",
+                ));
+            }
+        }
+    }
+
     pub(super) fn check_overrides(&mut self) {
+        self.check_tolerances();
         for (name, _) in &self.options.params {
             let name = name.to_lowercase();
             let declared = &self.scopes.get(ScopeId::ROOT).declared;

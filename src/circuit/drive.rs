@@ -56,15 +56,16 @@ impl<'n> Builder<'n, '_> {
         let dc = dc.or(args.get(&["dc"]));
         let dc_value = match dc {
             Some(dc) => match self.scopes.finite(dc, scope) {
-                Some(value) => Some(value.f64),
+                Some(value) => Some(value),
                 None => return,
             },
             None => None,
         };
-        let swept = self
-            .swept(&card.name.text)
-            .filter(|_| scope == ScopeId::ROOT);
-        let dc_value = swept.map(|v| v.f64).or(dc_value);
+        let dc_value = match scope {
+            ScopeId::ROOT => self.settled(&card.name.text, dc_value, None),
+            _ => dc_value,
+        };
+        let dc_value = dc_value.map(|value| value.f64);
         let wave = match wave {
             Some(call) => match self.wave(card, call, args, scope) {
                 Some(wave) => wave,

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::builder::Builder;
+use super::draw::Tolerance;
 use super::{Circuit, Sweep, Swept};
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::netlist::Netlist;
@@ -32,6 +33,12 @@ pub struct ElaborateOptions {
     pub values: Vec<(String, f64)>,
     /// The temperature that a sweep sets, °C.
     pub temperature: Option<f64>,
+    /// The sample of random values and tolerances that is drawn; `None` is nominal.
+    pub sample: Option<u64>,
+    /// What the samples are drawn from.
+    pub seed: u64,
+    /// Tolerances besides those that cards name with `tol=`; the last of a name counts.
+    pub tolerances: Vec<Tolerance>,
 }
 
 impl ElaborateOptions {
@@ -40,13 +47,20 @@ impl ElaborateOptions {
     pub fn at(&self, sweeps: &[Sweep], values: &[f64]) -> Self {
         let mut options = self.clone();
         for (sweep, &value) in sweeps.iter().zip(values) {
-            match &sweep.what {
-                Swept::Param(name) => options.params.push((name.clone(), value)),
-                Swept::Element(name) => options.values.push((name.clone(), value)),
-                Swept::Temperature => options.temperature = Some(value),
-            }
+            options.set(&sweep.what, value);
         }
         options
+    }
+
+    /// Gives a value, in place of another one if there is.
+    pub(crate) fn set(&mut self, what: &Swept, value: f64) {
+        let (values, name) = match what {
+            Swept::Param(name) => (&mut self.params, name),
+            Swept::Element(name) => (&mut self.values, name),
+            Swept::Temperature => return self.temperature = Some(value),
+        };
+        values.retain(|(other, _)| !other.eq_ignore_ascii_case(name));
+        values.push((name.clone(), value));
     }
 }
 

@@ -326,7 +326,11 @@ impl<'n> Scopes<'n> {
                     self.evaluate(arg, scope, resolve, locals)?,
                 ));
             }
-            return self.evaluate(&func.body, scope, resolve, &inner);
+            let place = self.beneath(expr.span);
+            let outer = std::mem::replace(&mut self.place, place);
+            let value = self.evaluate(&func.body, scope, resolve, &inner);
+            self.place = outer;
+            return value;
         }
         if let ("if", [condition, then, otherwise]) = (name.text.as_str(), args) {
             return self.conditional(expr, [condition, then, otherwise], scope, resolve, locals);
@@ -337,7 +341,15 @@ impl<'n> Scopes<'n> {
         }
         let constant = values.iter().all(Form::is_constant);
         let numbers: Vec<f64> = values.iter().map(|form| form.constant.f64).collect();
-        match functions::call(&name.text, &numbers) {
+        let found = match functions::spread(&name.text, &numbers) {
+            Some(_) if !constant => {
+                let message = format!("`{}` is drawn once, from numbers", name.text);
+                return self.fault("bad-call", expr, message, "its arguments change in time");
+            }
+            Some(spread) => spread.map(|spread| self.random(expr.span, spread)),
+            None => functions::call(&name.text, &numbers),
+        };
+        match found {
             // A function of quantities: the numbers were for its name and arity only.
             Ok(_) | Err(CallError::Domain) if !constant => {
                 let form = self.behaviour(&name.text, &values);
@@ -392,7 +404,12 @@ impl<'n> Scopes<'n> {
             Some((home, Param::Unevaluated(definition))) => {
                 self.set(home, name, Param::Busy);
                 self.evaluating.push(name.to_string());
-                let value = self.number(definition, home);
+                let full_name = format!("{}{name}", self.get(home).prefix);
+                let value = self.alone(&full_name, |scopes| scopes.number(definition, home));
+                let value = value.map(|value| match home {
+                    ScopeId::ROOT => self.toleranced(value, name, None),
+                    _ => value,
+                });
                 self.evaluating.pop();
                 self.set(home, name, value.map_or(Param::Failed, Param::Known));
                 value

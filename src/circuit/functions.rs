@@ -1,5 +1,6 @@
 //! The functions and operators of expressions, on numbers.
 
+use super::draw::Spread;
 use crate::netlist::ast::Binary;
 
 /// Why a call has no value.
@@ -19,12 +20,34 @@ pub(super) const fn truth(x: f64) -> bool {
 }
 
 /// All function names, for "did you mean".
-pub(super) const NAMES: [&str; 45] = [
-    "abs", "acos", "acosh", "arccos", "arcsin", "arctan", "asin", "asinh", "atan", "atan2",
-    "atanh", "buf", "ceil", "cos", "cosh", "db", "exp", "floor", "hypot", "if", "int", "inv",
-    "limit", "ln", "log", "log10", "max", "min", "nint", "pow", "pwl", "pwr", "pwrs", "round",
-    "sgn", "sign", "sin", "sinh", "sqrt", "table", "tan", "tanh", "u", "uramp", "ustep",
+pub(super) const NAMES: [&str; 51] = [
+    "abs", "acos", "acosh", "agauss", "arccos", "arcsin", "arctan", "asin", "asinh", "atan",
+    "atan2", "atanh", "aunif", "buf", "ceil", "cos", "cosh", "db", "exp", "flat", "floor", "gauss",
+    "hypot", "if", "int", "inv", "limit", "ln", "log", "log10", "max", "mc", "min", "nint", "pow",
+    "pwl", "pwr", "pwrs", "round", "sgn", "sign", "sin", "sinh", "sqrt", "table", "tan", "tanh",
+    "u", "unif", "uramp", "ustep",
 ];
+
+/// The distribution, mean and width of a random function: those of LTspice and ngspice, `gauss` of both.
+pub(super) fn spread(name: &str, args: &[f64]) -> Option<Result<(Spread, f64, f64), CallError>> {
+    use Spread::{Extreme, Normal, Uniform};
+    let spread = match (name, args) {
+        ("mc" | "unif", [x, relative]) => (Uniform, *x, x * relative),
+        ("aunif", [x, width]) => (Uniform, *x, *width),
+        ("flat", [width]) => (Uniform, 0.0, *width),
+        ("gauss", [sigma]) => (Normal, 0.0, *sigma),
+        ("gauss", [x, relative, sigmas]) => (Normal, *x, x * relative / sigmas),
+        ("agauss", [x, width, sigmas]) => (Normal, *x, width / sigmas),
+        ("limit", [x, width]) => (Extreme, *x, *width),
+        ("mc" | "unif" | "aunif", _) => return Some(Err(CallError::Arity("two arguments"))),
+        ("flat", _) => return Some(Err(CallError::Arity("one argument"))),
+        ("gauss", _) => return Some(Err(CallError::Arity("one or three arguments"))),
+        ("agauss", _) => return Some(Err(CallError::Arity("three arguments"))),
+        _ => return None,
+    };
+    let finite = spread.1.is_finite() && spread.2.is_finite();
+    Some(finite.then_some(spread).ok_or(CallError::Domain))
+}
 
 /// The value of a function; `log` is natural, as in ngspice and LTspice.
 pub(super) fn call(name: &str, args: &[f64]) -> Result<f64, CallError> {
@@ -81,7 +104,8 @@ pub(super) fn call(name: &str, args: &[f64]) -> Result<f64, CallError> {
         ("atan2" | "hypot" | "pow" | "pwr" | "pwrs", _) => {
             return Err(CallError::Arity("two arguments"));
         }
-        ("limit" | "if", _) => return Err(CallError::Arity("three arguments")),
+        ("limit", _) => return Err(CallError::Arity("two or three arguments")),
+        ("if", _) => return Err(CallError::Arity("three arguments")),
         ("min" | "max", _) => return Err(CallError::Arity("at least one argument")),
         ("table" | "pwl", _) => return Err(CallError::Arity("x and pairs of numbers")),
         (name, _) if NAMES.contains(&name) => return Err(CallError::Arity("one argument")),

@@ -11,6 +11,7 @@ mod builder;
 mod controlled;
 mod define;
 mod diode;
+mod draw;
 mod drive;
 mod elaborate;
 mod eval;
@@ -47,6 +48,7 @@ mod transistor;
 use crate::algebra::Value;
 use crate::diagnostic::Span;
 use crate::law::Law;
+pub use draw::{Spread, Tolerance};
 pub use elaborate::{Diodes, ElaborateOptions, elaborate};
 pub use formula::Formula;
 pub use held::{held_at, holder};
@@ -119,6 +121,8 @@ pub struct Circuit {
     pub params: Vec<(String, f64)>,
     /// `tol=5` on elements of the top level, as parts of their values (0.05).
     pub tolerances: Vec<(String, f64)>,
+    /// Whether a value is drawn from a distribution by a random function, such as `mc` or `gauss`.
+    pub random: bool,
     /// `.meas tran`, in file order.
     pub measurements: Vec<NamedMeasurement>,
     /// `.four`, in file order.

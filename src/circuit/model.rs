@@ -1,7 +1,7 @@
 //! `.model` cards: looking them up, and their parameters.
 
 use super::builder::Builder;
-use super::scope::ScopeId;
+use super::scope::{ScopeId, Scopes};
 use crate::algebra::Value;
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{self, Assign, Expr, ExprKind, Model, Name};
@@ -102,7 +102,8 @@ impl<'n> Builder<'n, '_> {
         let Some(roff) = params.get("roff") else {
             return Some(None);
         };
-        let value = self.scopes.number(roff, scope)?;
+        let number = |scopes: &mut Scopes<'n>| scopes.number(roff, scope);
+        let value = self.scopes.alone("", number)?;
         Some(Some(value).filter(|v| v.f64.is_finite()))
     }
 
@@ -159,7 +160,11 @@ impl<'n> Builder<'n, '_> {
     ) -> Option<Option<Value>> {
         match params.get(name) {
             None => Some(None),
-            Some(expr) => self.scopes.finite(expr, scope).map(Some),
+            // All devices of a model have the same values.
+            Some(expr) => {
+                let value = |scopes: &mut Scopes<'n>| scopes.finite(expr, scope);
+                self.scopes.alone("", value).map(Some)
+            }
         }
     }
 }

@@ -115,16 +115,17 @@ impl<'n> Builder<'n, '_> {
         let Some(value) = self.passive_value(card, values, args, letter, scope) else {
             return;
         };
-        if let (Some(percent), ScopeId::ROOT) = (args.get(&["tol"]), scope)
-            && let Some(percent) = self.scopes.finite(percent, scope)
-        {
-            let tolerance = (card.name.text.clone(), 0.01 * percent.f64.abs());
-            self.circuit.tolerances.push(tolerance);
+        let mut value = value;
+        if scope == ScopeId::ROOT {
+            let percent = args.get(&["tol"]);
+            let percent = percent.and_then(|percent| self.scopes.finite(percent, scope));
+            let own = percent.map(|percent| 0.01 * percent.f64.abs());
+            let tolerance = own.map(|own| (card.name.text.clone(), own));
+            self.circuit.tolerances.extend(tolerance);
+            value = self
+                .settled(&card.name.text, Some(value), own)
+                .unwrap_or(value);
         }
-        let swept = self
-            .swept(&card.name.text)
-            .filter(|_| scope == ScopeId::ROOT);
-        let value = swept.unwrap_or(value);
         let multiplier = match (
             self.arg(args, &["m"], scope),
             self.arg(args, &["scale"], scope),

@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use super::NodeId;
 use super::behaviour::Auxiliary;
+use super::draw::{Draw, Tolerance};
 use super::tones::Known;
 use crate::algebra::Value;
 use crate::diagnostic::Diagnostic;
@@ -137,6 +138,14 @@ pub(super) struct Scopes<'n> {
     pub(super) tstop: f64,
     /// °C.
     pub(super) temperature: Value,
+    /// The sample of random values, where one is drawn.
+    pub(super) draw: Option<Draw>,
+    /// The tolerances given beside the netlist.
+    pub(super) tolerances: Vec<Tolerance>,
+    /// Where in the netlist the evaluation is.
+    pub(super) place: u64,
+    /// Whether a random function was met.
+    pub(super) random: bool,
 }
 
 impl<'n> Scopes<'n> {
@@ -154,6 +163,10 @@ impl<'n> Scopes<'n> {
             rails_read: BTreeSet::new(),
             tstop: 1.0,
             temperature: Value::decimal(27.0, 27, 0),
+            draw: None,
+            tolerances: Vec::new(),
+            place: 0,
+            random: false,
         }
     }
 

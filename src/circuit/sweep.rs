@@ -58,8 +58,19 @@ pub fn combinations(sweeps: &[Sweep]) -> Vec<Vec<f64>> {
 }
 
 impl<'n> Builder<'n, '_> {
+    /// The value of an element of the top level with what a sweep, an `alter` and its tolerance make of it.
+    pub(super) fn settled(
+        &self,
+        name: &str,
+        value: Option<Value>,
+        tolerance: Option<f64>,
+    ) -> Option<Value> {
+        let value = self.swept(name).or(value)?;
+        Some(self.scopes.toleranced(value, name, tolerance))
+    }
+
     /// The value that a sweep, else an `alter`, gives to an element.
-    pub(super) fn swept(&self, name: &str) -> Option<Value> {
+    fn swept(&self, name: &str) -> Option<Value> {
         let values = &self.options.values;
         let altered = || self.altered.iter().rev().find(|(own, _)| own.text == name);
         values

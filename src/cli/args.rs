@@ -75,6 +75,12 @@ pub enum Command {
     /// Find the derivatives of what `.meas` finds to values of elements and parameters
     #[command(after_help = examples::SENS)]
     Sens(SensArgs),
+    /// Measure what `.meas` asks for at many values, and at samples of random ones
+    #[command(after_help = examples::SWEEP, mut_arg("params", |arg| {
+        let arg = arg.value_name("NAME=VALUES").help("Values of an element or `.param`: `1k,2k`, `lin:1k:2k:11`, `log:1:100:7` (first, last, how many; repeatable)");
+        arg.long_help(None)
+    }))]
+    Sweep(SweepArgs),
     /// Print the complementarity system (A, B, C, D, E, F, G) with names and units
     #[command(after_help = examples::LCS)]
     Lcs(LcsArgs),
@@ -121,13 +127,47 @@ pub struct Input {
     pub read: OnceLock<Vec<u8>>,
     /// Replace the value of a top-level `.param` (repeatable)
     #[arg(display_order = 3, long = "param", value_name = "NAME=VALUE", value_parser = assignment)]
-    pub params: Vec<(String, f64)>,
+    pub params: Vec<Assigned>,
     /// How diode models are read
     #[arg(help_heading = "Circuit", long, value_enum, default_value_t = Diodes::Auto)]
     pub diodes: Diodes,
     /// Look for files of `.include` and `.lib` in this folder after the netlist's own (repeatable); then in those of CIRC_LIB
     #[arg(help_heading = "Circuit", long = "lib", value_name = "DIR", value_parser = folder)]
     pub libraries: Vec<PathBuf>,
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub random: RandomArgs,
+}
+
+/// A name and the values it is given, several in a sweep alone.
+#[derive(Debug, Clone)]
+pub struct Assigned {
+    /// In lower case.
+    pub name: String,
+    /// At least one.
+    pub values: Vec<f64>,
+}
+
+/// What is drawn from distributions.
+#[derive(Debug, Clone, Args)]
+pub struct RandomArgs {
+    /// Draw random functions (`mc`, `gauss`, …) and tolerances: sample K, as `circ sweep --mc` numbers them [default: all nominal]
+    #[arg(help_heading = "Random values", long, value_name = "K")]
+    pub sample: Option<u64>,
+    /// What samples are drawn from: another seed gives others
+    #[arg(
+        help_heading = "Random values",
+        long,
+        value_name = "S",
+        default_value_t = 1
+    )]
+    pub seed: u64,
+    /// The tolerance of an element's value or `.param`, evenly distributed, in place of `tol=5` (%) on its card (repeatable)
+    #[arg(help_heading = "Random values", long = "tol-of", value_name = "NAME=5%", value_parser = tolerance)]
+    pub tolerances: Vec<(String, f64)>,
+    /// The standard deviation of an element's value or `.param`, normally distributed (repeatable)
+    #[arg(help_heading = "Random values", long = "sigma-of", value_name = "NAME=1%", value_parser = tolerance)]
+    pub deviations: Vec<(String, f64)>,
 }
 
 /// How diode models are read.
@@ -259,9 +299,6 @@ pub struct SimArgs {
         conflicts_with = "from_pss"
     )]
     pub worst: Vec<String>,
-    /// The tolerance of an element's value or `.param` for `--worst` (repeatable)
-    #[arg(help_heading = "Analysis", long = "tol-of", value_name = "NAME=5%", value_parser = tolerance, requires = "worst")]
-    pub tolerances: Vec<(String, f64)>,
     /// Start at the periodic steady state, with sources that do not repeat held before 0 and running from there on
     #[arg(help_heading = "Analysis", long)]
     pub from_pss: bool,
@@ -357,6 +394,30 @@ pub struct SensArgs {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+}
+
+/// `circ sweep`.
+#[derive(Debug, Args)]
+pub struct SweepArgs {
+    #[command(flatten)]
+    #[expect(missing_docs, reason = "documented where it is defined")]
+    pub input: Input,
+    /// Draw so many samples of random functions and tolerances, at every combination of the values
+    #[arg(long, value_name = "N", conflicts_with = "sample", value_parser = clap::value_parser!(u64).range(1..))]
+    pub mc: Option<u64>,
+    /// Only this measurement (repeatable) [default: all]
+    #[arg(long, value_name = "MEAS")]
+    pub of: Vec<String>,
+    /// Measure the periodic steady state instead of the transient
+    #[arg(long)]
+    pub pss: bool,
+    /// Relative tolerance of the error-controlled step [default: 1e-4]
+    #[arg(long, value_name = "R", value_parser = positive)]
+    pub tol: Option<f64>,
+    /// Write a row for every run to this file, or `-`, standard output (repeatable); the ending chooses csv, jsonl or npz [default: csv to
+    /// standard output]
+    #[arg(short, long = "output", value_name = "OUT")]
+    pub outputs: Vec<PathBuf>,
 }
 
 /// Where a circuit is made linear.
@@ -674,9 +735,45 @@ fn tolerance(text: &str) -> Result<(String, f64), String> {
     Ok((name.trim().to_lowercase(), value))
 }
 
-fn assignment(text: &str) -> Result<(String, f64), String> {
-    let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
-    Ok((name.trim().to_lowercase(), number(value.trim())?))
+/// `r=1k`, `r=1k,2k`, `r=lin:1k:2k:11`, `r=log:1:100:7`.
+fn assignment(text: &str) -> Result<Assigned, String> {
+    let (name, values) = text.split_once('=').ok_or("expected NAME=VALUE")?;
+    let parts: Vec<&str> = values.split(':').collect();
+    let values = match parts[..] {
+        [kind @ ("lin" | "log"), first, last, count] => {
+            let (first, last) = (number(first.trim())?, number(last.trim())?);
+            let count = count.trim().parse::<usize>().ok().filter(|n| (2..=MOST_VALUES).contains(n));
+            let count = count.ok_or(format!("expected a number of values from 2 to {MOST_VALUES}"))?;
+            spaced(kind == "log", (first, last), count)?
+        }
+        [list] => {
+            let values = list.split(',').map(|value| number(value.trim()));
+            values.collect::<Result<_, _>>()?
+        }
+        _ => return Err("expected a value, or several as `1k,2k`, `lin:FIRST:LAST:COUNT` or `log:FIRST:LAST:COUNT`".into()),
+    };
+    let name = name.trim().to_lowercase();
+    Ok(Assigned { name, values })
+}
+
+/// Most values of one name in a sweep.
+const MOST_VALUES: usize = 1_000_000;
+
+/// So many values, the first and the last among them exactly.
+fn spaced(by_ratio: bool, (first, last): (f64, f64), count: usize) -> Result<Vec<f64>, String> {
+    if by_ratio && first * last <= 0.0 {
+        return Err("a logarithmic sweep needs values of one sign".into());
+    }
+    let value = |k: usize| {
+        let part = k as f64 / (count - 1) as f64;
+        match k {
+            0 => first,
+            k if k + 1 == count => last,
+            _ if by_ratio => first * (last / first).powf(part),
+            _ => first + (last - first) * part,
+        }
+    };
+    Ok((0..count).map(value).collect())
 }
 
 /// The name of standard input in messages.
@@ -719,7 +816,10 @@ mod tests {
     #[test]
     fn numbers_take_suffixes_and_ranges_hold() {
         assert_eq!(positive("1u"), Ok(1e-6));
-        assert_eq!(assignment("R=4k7"), Ok(("r".into(), 4700.0)));
+        let assigned = |text| assignment(text).map(|a| (a.name, a.values));
+        assert_eq!(assigned("R=4k7"), Ok(("r".into(), vec![4700.0])));
+        assert_eq!(assigned("r=lin:1:2:3").unwrap().1, [1.0, 1.5, 2.0]);
+        assert_eq!(assigned("r=log:1:4:3").unwrap().1, [1.0, 2.0, 4.0]);
         assert_eq!(position("S1=ON"), Ok(("s1".into(), true)));
         for refused in ["0", "-1u", "x", ""] {
             assert!(positive(refused).is_err(), "{refused}");

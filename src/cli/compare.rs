@@ -14,7 +14,7 @@ use super::ngspice::{self, deck};
 use super::output;
 use super::sim::{self, Request};
 use super::streams::Streams;
-use crate::analysis::variants;
+use crate::analysis::steps;
 use crate::circuit::Tran;
 use crate::integrate::Method;
 use crate::model::Model;
@@ -102,7 +102,7 @@ fn every(args: &CompareArgs, model: &Model, streams: &Streams) -> Result<Exit, F
         )));
     }
     let (mut done, mut failures) = (Vec::new(), Vec::new());
-    for variant in variants(model, &model.circuit().steps) {
+    for variant in steps(model) {
         let values = variant.named();
         let label = steps::label(&values);
         let model = input::variant(&args.input, &variant, streams)?;

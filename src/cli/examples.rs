@@ -31,6 +31,12 @@ Examples:
   circ sens buck.cir --of vout_avg --to l1 --to r1
   circ sens buck.cir --pss --json";
 
+pub(super) const SWEEP: &str = "\
+Examples:
+  circ sweep buck.cir --param d=0.3,0.5,0.7 --param l1=log:10u:1m:20
+  circ sweep buck.cir --mc 1000 --tol-of l1=10% --sigma-of r1=1% -o samples.csv
+  circ sim buck.cir --sample 17 --tol-of l1=10% --sigma-of r1=1%   one of these samples alone";
+
 pub(super) const LCS: &str = "\
 Examples:
   circ lcs buck.cir

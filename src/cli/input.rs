@@ -3,14 +3,14 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::args::{Diodes, Input, MessageFormat, STDIN};
+use super::args::{Assigned, Diodes, Input, MessageFormat, STDIN};
 use super::exit::Failure;
 use super::files;
 use super::forms;
 use super::render;
 use super::streams::Streams;
 use crate::analysis::Variant;
-use crate::circuit::{self, Circuit, ElaborateOptions, Tran, load};
+use crate::circuit::{self, Circuit, ElaborateOptions, Spread, Tolerance, Tran, load};
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 use crate::forms::json;
 use crate::integrate::{Error, Places, Reason, start};
@@ -112,10 +112,28 @@ pub fn choices(input: &Input) -> ElaborateOptions {
         Diodes::Ideal => circuit::Diodes::Ideal,
         Diodes::Exp => circuit::Diodes::Exp,
     };
+    let random = &input.random;
+    let of = |spread| {
+        move |(name, relative): &(String, f64)| Tolerance {
+            name: name.clone(),
+            spread,
+            relative: *relative,
+        }
+    };
+    let evenly = random.tolerances.iter().map(of(Spread::Uniform));
+    let normally = random.deviations.iter().map(of(Spread::Normal));
+    // Several values are those of a sweep.
+    let one = |given: &Assigned| match given.values[..] {
+        [value] => Some((given.name.clone(), value)),
+        _ => None,
+    };
     ElaborateOptions {
         diodes,
         libraries: libraries(input),
-        params: input.params.clone(),
+        params: input.params.iter().filter_map(one).collect(),
+        sample: random.sample,
+        seed: random.seed,
+        tolerances: evenly.chain(normally).collect(),
         ..ElaborateOptions::default()
     }
 }

@@ -29,6 +29,7 @@ mod signals;
 pub mod sim;
 mod steps;
 pub mod streams;
+mod sweep;
 mod view;
 mod watch;
 
@@ -37,9 +38,9 @@ use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
 
 use clap::error::ErrorKind;
-use clap::{CommandFactory, FromArgMatches};
+use clap::{ArgMatches, CommandFactory, FromArgMatches};
 
-use args::{Cli, Command, MessageFormat};
+use args::{Assigned, Cli, Command, MessageFormat};
 use exit::{Exit, Failure};
 use streams::Streams;
 
@@ -51,6 +52,7 @@ pub fn main() -> Exit {
     let mut command = Cli::command();
     let args = with_command(std::env::args_os(), &command);
     let parsed = command.try_get_matches_from_mut(args);
+    let parsed = parsed.and_then(|matches| one_value_each(matches, &mut command));
     let mut cli = match parsed.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
         Err(error) => {
@@ -113,6 +115,27 @@ fn with_command(args: impl Iterator<Item = OsString>, commands: &clap::Command) 
     args
 }
 
+/// Several values of `--param` are for a sweep alone.
+fn one_value_each(
+    matches: ArgMatches,
+    command: &mut clap::Command,
+) -> Result<ArgMatches, clap::Error> {
+    let Some((name, own)) = matches.subcommand().filter(|(name, _)| *name != "sweep") else {
+        return Ok(matches);
+    };
+    let params = own.try_get_many::<Assigned>("params").ok().flatten();
+    match params.into_iter().flatten().find(|p| p.values.len() != 1) {
+        Some(several) => {
+            let message = format!(
+                "`circ {name}` takes one value of `{}`; `circ sweep` takes several",
+                several.name
+            );
+            Err(command.error(ErrorKind::ValueValidation, message))
+        }
+        None => Ok(matches),
+    }
+}
+
 /// Carries out a command, and shows its page where it asks for that.
 fn opened(command: &mut Command, streams: &Streams) -> Result<Exit, Failure> {
     let outputs = match command {
@@ -140,6 +163,7 @@ fn run(command: &Command, streams: &Streams) -> Result<Exit, Failure> {
         Command::Pss(args) => pss::pss(args, streams),
         Command::Ac(args) => ac::ac(args, streams),
         Command::Sens(args) => sens::sens(args, streams),
+        Command::Sweep(args) => sweep::sweep(args, streams),
         Command::Lcs(args) => lcs::lcs(args, streams),
         Command::Check(args) => check::check(args, streams),
         Command::Op(args) => op::op(args, streams),

@@ -7,7 +7,7 @@ use super::args::OpArgs;
 use super::exit::{Exit, Failure};
 use super::input;
 use super::streams::Streams;
-use crate::analysis::variants;
+use crate::analysis::steps as runs;
 use crate::integrate::OperatingPoint;
 use crate::model::Model;
 use crate::report::{json, si, steps, table};
@@ -32,7 +32,7 @@ pub(super) fn op(args: &OpArgs, streams: &Streams) -> Result<Exit, Failure> {
         return one(args, &solved(model)?, streams);
     }
     let (mut points, mut failures) = (Vec::new(), Vec::new());
-    for variant in variants(model, sweeps) {
+    for variant in runs(model) {
         let values = variant.named();
         match solved(&input::variant(&args.input, &variant, streams)?) {
             Ok((point, notes)) => points.push((values, point, notes)),

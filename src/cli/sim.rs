@@ -209,7 +209,7 @@ fn bounds(
         return;
     };
     let options = WorstOptions {
-        tolerances: args.tolerances.clone(),
+        tolerances: args.input.random.tolerances.clone(),
         cancel: Some(cancel),
         settings: request.settings(),
     };

@@ -9,7 +9,7 @@ use super::rows::Columns;
 use super::signals::Signals;
 use super::sim::{self, Request, Route};
 use super::streams::Streams;
-use crate::analysis::{Finished, Measurements, Variant, each, shown, variants};
+use crate::analysis::{self, Finished, Measurements, Variant, each, shown};
 use crate::integrate::{Block, Error, Grid, Reason};
 use crate::model::Model;
 use crate::report::figure::Figure;
@@ -36,7 +36,7 @@ impl Stepping<'_> {
     /// Runs, writes and tells.
     pub(super) fn sim(&self, formats: &[Format], streams: &Streams) -> Result<Exit, Failure> {
         let circuit = self.model.circuit();
-        let variants = variants(self.model, &circuit.steps);
+        let variants = analysis::steps(self.model);
         let columns = self.columns();
         let held = Settings::default().max_held / variants.len().max(1);
         if let Some(tran) = circuit.tran {

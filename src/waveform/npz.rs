@@ -36,6 +36,21 @@ pub fn write(to: impl Write + Seek, waves: &Waveforms) -> std::io::Result<()> {
     archive.finish()?.flush()
 }
 
+/// Writes one vector of doubles per name.
+///
+/// # Errors
+/// Those of `to`.
+pub fn write_columns<'a>(
+    to: impl Write + Seek,
+    columns: impl IntoIterator<Item = (&'a str, &'a [f64])>,
+) -> std::io::Result<()> {
+    let mut archive = ZipWriter::new(to);
+    for (name, values) in columns {
+        member(&mut archive, name, values.iter().copied())?;
+    }
+    archive.finish()?.flush()
+}
+
 /// Writes one vector for `frequency` and a complex one per name.
 pub(super) fn write_phasors(to: impl Write + Seek, phasors: &Phasors) -> std::io::Result<()> {
     let mut archive = ZipWriter::new(to);

@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 27] = [
+pub(super) const CODES: [Explanation; 28] = [
     Explanation::of(
         "bad-ac",
         "The frequencies of `.ac`, or an AC value of a source, make no analysis.",
@@ -143,6 +143,13 @@ pub(super) const CODES: [Explanation; 27] = [
         "Write pairs of time and value.",
     )
     .shown("odd\nv1 a 0 pwl(0 0 1m 1 2m)\nr1 a 0 1k\n.tran 1m 5m\n"),
+    Explanation::of(
+        "random",
+        "A function that draws random values, `mc flat gauss agauss unif aunif limit`, gives its mean.",
+        "The command makes one run, of the nominal circuit.",
+        "`circ sweep FILE --mc 1000` draws 1000 samples, `--sample 3` one of them; every run of a `.step` draws anew.",
+    )
+    .shown("a spread of 5 %\nv1 a 0 1\nr1 a 0 {mc(1k, 0.05)}\n.tran 1m 5m\n"),
     Explanation::of(
         "smooth-switch",
         "A negative Vh is LTspice's switch with a smooth transition; here it switches at a threshold.",
