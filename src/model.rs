@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::circuit::source::Wave;
 use crate::circuit::{
-    Circuit, ElaborateOptions, Element, Kind, Sweep, Swept, Tran, elaborate, load,
+    Circuit, ElaborateOptions, Element, Kind, Sweep, Swept, Tolerance, Tran, elaborate, load,
 };
 use crate::diagnostic::{Diagnostic, Faults, SourceFile, SourceMap};
 use crate::integrate::{
@@ -178,8 +178,7 @@ impl Model {
     pub fn set(&mut self, name: &str, value: f64) -> Result<(), Error> {
         let name = name.to_lowercase();
         if !value.is_finite() {
-            let message = format!("`{name}` cannot be set to {value}: it is no number");
-            return Err(self.faults(vec![Diagnostic::error("set", None, message)]));
+            return Err(self.faults(vec![no_number(&name, value)]));
         }
         let mut options = self.options.clone();
         options.set(&self.swept(&name)?, value);
@@ -214,6 +213,13 @@ impl Model {
             }
             Err(findings) => Err(self.faults(findings)),
         }
+    }
+
+    /// The model whose samples are drawn from this seed, with these tolerances and those of its cards.
+    #[must_use]
+    pub fn toleranced(mut self, seed: u64, tolerances: Vec<Tolerance>) -> Self {
+        (self.options.seed, self.options.tolerances) = (seed, tolerances);
+        self
     }
 
     /// What a name means that a value is given to: an element of the top level, else a `.param`, which need not exist.
@@ -264,6 +270,10 @@ impl Model {
             let message = "a circuit without a netlist has no sweeps";
             return Err(self.faults(vec![Diagnostic::error("sweep", None, message)]));
         };
+        let given = sweeps.iter().map(|sweep| sweep.what.name()).zip(values);
+        if let Some((name, value)) = given.into_iter().find(|(_, value)| !value.is_finite()) {
+            return Err(self.faults(vec![no_number(name, *value)]));
+        }
         let (circuit, findings) = elaborate(netlist, &self.options_at(sweeps, values, sample));
         let mut circuit = circuit.ok_or_else(|| self.faults(findings))?;
         let probes = self.circuit.probes.iter().map(|p| circuit.probe(&p.name));
@@ -410,6 +420,11 @@ impl Model {
         let position = Position::free(&self.multiport, start);
         reduce(&self.multiport, &position).map_err(|error| Error::before(error.into()))
     }
+}
+
+fn no_number(name: &str, value: f64) -> Diagnostic {
+    let message = format!("`{name}` cannot be set to {value}: it is no number");
+    Diagnostic::error("set", None, message)
 }
 
 fn refused(findings: Vec<Diagnostic>, sources: SourceMap) -> Error {

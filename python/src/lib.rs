@@ -1,16 +1,18 @@
 //! Python's side of `circ`: models, simulations and their results as NumPy arrays and JSON, which `circ/__init__.py` turns into Python's own
 //! types.
 
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use circ::analysis::{
-    Finished, Measurements, PeriodicOptions, SensitivityOptions, SmallSignalOptions, TableOptions,
-    periodic_measured, periodic_table, sensitivity, shown, small_signal, table, transient,
+    Finished, Measurements, PeriodicOptions, Row, SensitivityOptions, SmallSignalOptions,
+    SweepOptions, TableOptions, Variant, drawn_names, measured_names, periodic_measured,
+    periodic_table, sensitivity, shown, small_signal, sweep, table, transient,
 };
-use circ::circuit::{Circuit, Tran};
+use circ::circuit::{Circuit, Spread, Sweep, Tolerance, Tran};
 use circ::diagnostic::{SourceFile, SourceMap};
 use circ::integrate::{Reason, Run};
 use circ::{
@@ -143,6 +145,37 @@ fn options(diodes: &str, params: Vec<(String, f64)>) -> PyResult<ElaborateOption
         ..ElaborateOptions::default()
     })
 }
+
+/// How a value is drawn, of (name, "normal" or "uniform", relative).
+fn tolerance((name, kind, relative): (String, String, f64)) -> PyResult<Tolerance> {
+    let spread = match kind.as_str() {
+        "normal" => Spread::Normal,
+        "uniform" => Spread::Uniform,
+        other => {
+            let message = format!("no distribution `{other}`: normal, uniform");
+            return Err(PyValueError::new_err(message));
+        }
+    };
+    if !(relative.is_finite() && relative >= 0.0) {
+        let message =
+            format!("a tolerance of {relative} for `{name}`: expected a number, not negative");
+        return Err(PyValueError::new_err(message));
+    }
+    let name = name.to_lowercase();
+    Ok(Tolerance {
+        name,
+        spread,
+        relative,
+    })
+}
+
+/// Values, failures, names of the columns that are measured and of those that are drawn.
+type Swept<'py> = (
+    Bound<'py, PyArray2<f64>>,
+    Vec<String>,
+    Vec<String>,
+    Vec<String>,
+);
 
 fn event(event: &Event) -> Value {
     let changes: Vec<String> = event.changes.iter().map(ToString::to_string).collect();
@@ -516,6 +549,64 @@ impl Core {
             "switches": lcs.switches,
         });
         Ok((arrays, rest.to_string()))
+    }
+
+    /// What `.meas` finds with each of these values of the names, and samples: (values, failures) of (names measured, names drawn), a row a
+    /// variant.
+    #[pyo3(signature = (names, points, of, steady, random, serial))]
+    #[allow(clippy::too_many_arguments, reason = "Python's side names them")]
+    fn sweep<'py>(
+        &self,
+        py: Python<'py>,
+        names: Vec<String>,
+        points: Vec<(Vec<f64>, Option<u64>)>,
+        of: Vec<String>,
+        steady: bool,
+        random: Option<(u64, Vec<(String, String, f64)>)>,
+        serial: bool,
+    ) -> PyResult<Swept<'py>> {
+        let (sampled, model) = (random.is_some(), self.model.clone());
+        let model = match random {
+            Some((seed, given)) => {
+                let tolerances = given.into_iter().map(tolerance);
+                let tolerances = tolerances.collect::<PyResult<_>>()?;
+                model.toleranced(seed, tolerances)
+            }
+            None => model,
+        };
+        let swept = |name: &String| {
+            let (what, values) = (model.swept(name)?, vec![]);
+            Ok(Sweep { what, values })
+        };
+        let sweeps: Result<Vec<_>, Error> = names.iter().map(swept).collect();
+        let sweeps = sweeps.map_err(|error| self.failed(py, &error))?;
+        let variant = |(values, sample)| Variant::of(&model, &sweeps, values, sample);
+        let variants: Vec<Variant<'_>> = points.into_iter().map(variant).collect();
+        let drawn = if sampled { drawn_names(&model) } else { vec![] };
+        let columns = measured_names(&model, &of).map_err(|error| self.failed(py, &error))?;
+        let (mut values, mut failures) = (vec![], vec![]);
+        let width = columns.len() + drawn.len();
+        let take = |row: Row| {
+            let found = row.measured.into_iter().chain(row.drawn).take(width);
+            values.extend(found.map(|value| value.unwrap_or(f64::NAN)));
+            failures.push(row.failed.unwrap_or_default());
+            ControlFlow::Continue(())
+        };
+        let together = if serial { 1 } else { variants.len().max(1) };
+        let swept = released(py, |cancel| {
+            let options = SweepOptions {
+                of: columns.clone(),
+                steady,
+                cancel: Some(cancel),
+                ..SweepOptions::default()
+            };
+            let mut take = take;
+            let mut chunks = variants.chunks(together);
+            chunks.try_for_each(|chunk| sweep(chunk, &options, &mut take))
+        })?;
+        swept.map_err(|error| self.failed(py, &error))?;
+        let values = PyArray1::from_vec(py, values).reshape([failures.len(), width])?;
+        Ok((values, failures, columns, drawn))
     }
 
     #[pyo3(signature = (method_name, step, until))]

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import circ
+from circ import _sweep
 
 FILTER = "filter\n.param top=1\nv1 in 0 {top}\nr1 in out 1k\nc1 out 0 1u\n.tran 0.1m 5m uic\n.meas tran last find v(out) at=5m\n.end\n"
 
@@ -205,8 +206,13 @@ def test_sweeps_are_datasets_with_failures_as_entries():
     assert float(d["vout"].sel(d=0.4, r1=3.0)) == pytest.approx(4.8, rel=0.1)
     broken = circ.sweep(m, {"r1": [3.0, float("nan")]}, measures=["vout"])
     assert broken["error"].values[0] == "" and broken["error"].values[1] != "" and np.isnan(broken["vout"].values[1])
-    with pytest.raises(KeyError, match="no .meas"):
+    with pytest.raises(KeyError, match="no `.meas` `nothing`"):
         circ.sweep(m, {"r1": [3.0]}, measures=["nothing"])
+    with pytest.raises(KeyError, match="no element or parameter `r7`"):
+        circ.sweep(m, {"r7": [3.0]}, measures=["vout"])
+    told = []
+    none_named = circ.sweep(m, {"r1": [3.0, 4.0]}, measures=[], progress=lambda done, total: told.append((done, total)))
+    assert set(none_named) == {*m.tran().measures, "error"} and told[-1] == (2, 2)
     with pytest.raises(ValueError, match="engine"):
         circ.sweep(m, {"r1": [3.0]}, measures=["vout"], engine="cloud")
 
@@ -218,6 +224,14 @@ def test_samples_depend_on_seed_and_number_alone():
     few = circ.monte_carlo(m, tolerances, n=5, seed=1, measures=["last"])
     many = circ.monte_carlo(m, tolerances, n=40, seed=1, measures=["last"])
     assert np.array_equal(few["last"], many["last"][:5])
+    alone = m.copy()
+    for name in ("c1", "r1"):
+        alone.set(name, float(many[f"value of {name}"][17]))
+    assert alone.tran().measures["last"] == float(many["last"][17])
+    with pytest.raises(ValueError, match="a tolerance of -1"):
+        circ.monte_carlo(m, {"r1": circ.normal(rel=-1.0)}, n=2, seed=1, measures=["last"])
+    about = circ.monte_carlo(m, tolerances, n=5, seed=1, measures=["last"], nominal={"r1": 2e3})
+    assert np.allclose(about["value of r1"], 2 * few["value of r1"], rtol=1e-15) and np.array_equal(about["value of c1"], few["value of c1"])
     r, c = many["value of r1"], many["value of c1"]
     assert np.allclose(many["last"], 1 - np.exp(-5e-3 / (r * c)), atol=1e-12)
     assert np.all(np.abs(r / 1e3 - 1) <= 0.1) and not np.array_equal(circ.monte_carlo(m, tolerances, n=5, seed=2, measures=["last"])["last"], few["last"])
@@ -256,7 +270,7 @@ def test_memory_does_not_grow():
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 20_000
 
 
-def test_a_cluster_gives_the_bytes_of_threads_though_a_worker_is_killed():
+def test_a_cluster_gives_the_bytes_of_threads_though_a_worker_is_killed(monkeypatch):
     distributed = pytest.importorskip("distributed")
     pytest.importorskip("xarray")
     m = circ.parse(BUCK.replace(".tran 1u 2m", ".tran 10u 20m"))
@@ -266,11 +280,27 @@ def test_a_cluster_gives_the_bytes_of_threads_though_a_worker_is_killed():
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
         distributed.Client(cluster) as client,
     ):
-        worker = next(iter(client.run(os.getpid).values()))
-        timer = threading.Timer(0.3, lambda: os.kill(worker, signal.SIGKILL))
-        timer.start()
-        there = circ.sweep(m, values, ["vout"], engine="dask", client=client)
-        timer.cancel()
+        victims = list(client.run(os.getpid).values())[:1]
+
+        def kill_once(done, total):
+            if victims and done < total:
+                os.kill(victims.pop(), signal.SIGKILL)
+
+        there = circ.sweep(m, values, ["vout"], engine="dask", client=client, progress=kill_once)
+        # A chunk that fails however often it is tried is lost, and the rest is kept.
+        whole = _sweep._timed
+
+        def lost(packed, question, points):
+            if any(values == [2.1] for values, _ in points):
+                raise OSError("no room")
+            return whole(packed, question, points)
+
+        monkeypatch.setattr(_sweep, "_timed", lost)
+        partly = circ.sweep(m, values, ["vout"], engine="dask", client=client)
+    assert not victims
     assert there["vout"].values.tobytes() == here["vout"].values.tobytes()
+    missing = np.isnan(partly["vout"].values)
+    assert missing[20] and missing.sum() <= 16 and all("no room" in error for error in partly["error"].values[missing])
+    assert np.array_equal(partly["vout"].values[~missing], here["vout"].values[~missing])
     with pytest.raises(ValueError, match="client"):
         circ.sweep(m, values, ["vout"], engine="dask")

@@ -39,12 +39,7 @@ pub struct Variant<'m> {
 /// ```
 #[must_use]
 pub fn variants<'m>(base: &'m Model, sweeps: &'m [Sweep]) -> Vec<Variant<'m>> {
-    let variant = |values| Variant {
-        base,
-        sweeps,
-        values,
-        sample: None,
-    };
+    let variant = |values| Variant::of(base, sweeps, values, None);
     combinations(sweeps).into_iter().map(variant).collect()
 }
 
@@ -73,7 +68,23 @@ pub fn samples<'m>(variants: &[Variant<'m>], count: u64) -> Vec<Variant<'m>> {
     variants.iter().flat_map(sampled).collect()
 }
 
-impl Variant<'_> {
+impl<'m> Variant<'m> {
+    /// The model with these values of the sweeps, in their order, and the sample that is drawn, where one is.
+    #[must_use]
+    pub const fn of(
+        base: &'m Model,
+        sweeps: &'m [Sweep],
+        values: Vec<f64>,
+        sample: Option<u64>,
+    ) -> Self {
+        Self {
+            base,
+            sweeps,
+            values,
+            sample,
+        }
+    }
+
     /// The values, in the order of the sweeps.
     #[must_use]
     pub fn values(&self) -> &[f64] {
