@@ -169,6 +169,9 @@ fn tolerance((name, kind, relative): (String, String, f64)) -> PyResult<Toleranc
     })
 }
 
+/// The seed of samples, and how values are drawn, as [`tolerance`] takes it.
+type Random = (u64, Vec<(String, String, f64)>);
+
 /// Values, failures, names of the columns that are measured and of those that are drawn.
 type Swept<'py> = (
     Bound<'py, PyArray2<f64>>,
@@ -562,7 +565,7 @@ impl Core {
         points: Vec<(Vec<f64>, Option<u64>)>,
         of: Vec<String>,
         steady: bool,
-        random: Option<(u64, Vec<(String, String, f64)>)>,
+        random: Option<Random>,
         serial: bool,
     ) -> PyResult<Swept<'py>> {
         let (sampled, model) = (random.is_some(), self.model.clone());

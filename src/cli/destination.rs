@@ -11,7 +11,7 @@ use crate::circuit::Tran;
 use crate::integrate::{Block, Error, Method, Places, Reason, Run, Verified};
 use crate::model::Model;
 use crate::report::figure::Figure;
-use crate::report::{json, terminal, text};
+use crate::report::{json, log, terminal, text};
 
 /// What a command line asks of its results.
 #[derive(Debug, Clone, Copy)]
@@ -223,7 +223,10 @@ impl<'a> Destination<'a> {
         }
         // Asked for, as a summary is.
         if !found.is_empty() {
-            streams.error(found.words());
+            match streams.log {
+                Some(_) => streams.error(log::run(found)),
+                None => streams.error(found.words()),
+            }
         }
     }
 }

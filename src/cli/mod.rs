@@ -2,6 +2,7 @@
 
 mod ac;
 pub mod args;
+mod batch;
 mod bench;
 mod browser;
 mod check;
@@ -41,6 +42,7 @@ use clap::error::ErrorKind;
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
 
 use args::{Assigned, Cli, Command, MessageFormat};
+use batch::Log;
 use exit::{Exit, Failure};
 use streams::Streams;
 
@@ -50,10 +52,14 @@ pub use render::render;
 #[must_use]
 pub fn main() -> Exit {
     let mut command = Cli::command();
-    let args = with_command(std::env::args_os(), &command);
-    let parsed = command.try_get_matches_from_mut(args);
-    let parsed = parsed.and_then(|matches| one_value_each(matches, &mut command));
-    let mut cli = match parsed.and_then(|matches| Cli::from_arg_matches(&matches)) {
+    let mut logged = None;
+    let parsed = batch::expanded(std::env::args_os().collect()).and_then(|(args, log)| {
+        logged = log;
+        let args = with_command(args, &command);
+        let matches = command.try_get_matches_from_mut(args)?;
+        Cli::from_arg_matches(&one_value_each(matches, &mut command)?)
+    });
+    let mut cli = match parsed {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version go to standard output, usage errors to standard error.
@@ -70,13 +76,19 @@ pub fn main() -> Exit {
             };
         }
     };
-    let streams = Streams {
+    let mut streams = Streams {
         quiet: cli.quiet,
         verbose: cli.verbose,
         messages: cli.message_format,
+        log: None,
     };
     // A fault of the program itself still ends with the status for "could not be done".
-    let outcome = panic::catch_unwind(AssertUnwindSafe(|| opened(&mut cli.command, &streams)));
+    let outcome = panic::catch_unwind(AssertUnwindSafe(|| {
+        // It lives as long as the process.
+        let log = logged.map(|logged| Log::create(&logged)).transpose()?;
+        streams.log = log.map(|log| &*Box::leak(Box::new(log)));
+        opened(&mut cli.command, &streams)
+    }));
     let outcome = outcome.unwrap_or_else(|_| {
         let message = "a fault in circ itself (see above); please report it with the netlist";
         Err(Failure::Message(message.into()))
@@ -87,10 +99,17 @@ pub fn main() -> Exit {
         Err(failure) => {
             // Faults were shown one by one.
             let told = matches!(failure, Failure::Faults(_));
-            match cli.message_format {
+            let tell = |streams: &Streams| match cli.message_format {
                 MessageFormat::Json if told => {}
                 MessageFormat::Short if told => streams.error(format!("error: {failure}")),
                 form => streams.error(render::failure(&failure.to_string(), form)),
+            };
+            tell(&streams);
+            if streams.log.is_some() {
+                tell(&Streams {
+                    log: None,
+                    ..streams
+                });
             }
             if told && cli.message_format == MessageFormat::Human && streams.err_is_terminal() {
                 streams.say("`circ explain CODE` tells more of a code above");
@@ -101,8 +120,7 @@ pub fn main() -> Exit {
 }
 
 /// `circ FILE` is `circ sim FILE`: where no argument is a command and one is a file or `-`.
-fn with_command(args: impl Iterator<Item = OsString>, commands: &clap::Command) -> Vec<OsString> {
-    let mut args: Vec<OsString> = args.collect();
+fn with_command(mut args: Vec<OsString>, commands: &clap::Command) -> Vec<OsString> {
     let is_command = |arg: &OsString| {
         let name = arg.to_str();
         name.is_some_and(|name| name == "help" || commands.find_subcommand(name).is_some())

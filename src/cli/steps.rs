@@ -14,7 +14,7 @@ use crate::integrate::{Block, Error, Grid, Reason};
 use crate::model::Model;
 use crate::report::figure::Figure;
 use crate::report::steps::{self, Step};
-use crate::report::{terminal, text};
+use crate::report::{log, terminal, text};
 use crate::settings::Settings;
 
 /// What the runs have in common.
@@ -174,7 +174,10 @@ impl Stepping<'_> {
             }
         }
         if !matches!(self.args.results.summary, Some(Summary::Json)) {
-            streams.say(steps::measured(done));
+            match streams.log {
+                Some(_) => streams.say(log::steps(done)),
+                None => streams.say(steps::measured(done)),
+            }
         }
         if destination.plots {
             let (lines, columns) = streams.size();

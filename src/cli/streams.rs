@@ -9,6 +9,7 @@ use console::Term;
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 
 use super::args::MessageFormat;
+use super::batch::Log;
 use super::render;
 use crate::diagnostic::Severity;
 
@@ -40,6 +41,8 @@ pub struct Streams {
     pub verbose: bool,
     /// How findings are written.
     pub messages: MessageFormat,
+    /// What is written in place of standard error.
+    pub log: Option<&'static Log>,
 }
 
 impl Streams {
@@ -52,7 +55,7 @@ impl Streams {
     /// Whether a person reads standard error.
     #[must_use]
     pub fn err_is_terminal(&self) -> bool {
-        io::stderr().is_terminal()
+        self.log.is_none() && io::stderr().is_terminal()
     }
 
     /// Whether standard error shows colours.
@@ -120,7 +123,11 @@ impl Streams {
 
     /// Says something even when quiet.
     pub fn error(&self, text: impl Display) {
-        let _ = writeln!(io::stderr().lock(), "{}", text.to_string().trim_end());
+        let text = text.to_string();
+        let _ = match self.log {
+            Some(log) => log.write(&text),
+            None => writeln!(io::stderr().lock(), "{}", text.trim_end()),
+        };
     }
 
     /// A progress bar over `length` units on a terminal; hidden elsewhere and when quiet.

@@ -9,6 +9,7 @@ pub mod figure;
 pub mod graph;
 pub mod html;
 pub mod json;
+pub mod log;
 pub mod means;
 pub mod measured;
 pub mod schematic;

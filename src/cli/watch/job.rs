@@ -52,7 +52,7 @@ impl Job {
     /// [`Failure::Message`] for a command that cannot be carried out or has no page.
     pub(super) fn of(typed: &[OsString]) -> Result<Self, Failure> {
         let typed = [OsString::from("circ")].into_iter().chain(typed.to_vec());
-        let arguments = with_command(typed, &Cli::command());
+        let arguments = with_command(typed.collect(), &Cli::command());
         let cli = Cli::try_parse_from(&arguments);
         let cli = cli.map_err(|error| Failure::Message(error.to_string()))?;
         let input = match cli.command {
