@@ -248,6 +248,11 @@ class Response:
         except ValueError:
             raise KeyError(f"no signal {name!r}; there are {', '.join(self.names)}") from None
 
+    def to_control(self, name: str) -> Any:
+        """A column as a `control.FrequencyResponseData` of python-control: for Bode plots, margins, and loops with a controller."""
+        control = _optional("control")
+        return control.frd(self[name], 2 * np.pi * self.frequency)
+
 
 class System:
     """x' = A x + B λ + E u + e, y = C x + D λ + G u + F with −λ_j ∈ ∂φ_j(y_j).
@@ -273,6 +278,24 @@ class System:
         described = json.loads(rest)
         self.states, self.inputs, self.ports = described["states"], described["inputs"], described["ports"]
         self.switches = {name: "on" if on else "off" for name, on in described["switches"]}
+
+    def to_scipy(self) -> Any:
+        """The linear part as a `scipy.signal.StateSpace`: inputs (λ, u), outputs y; the constants e and F are not in it."""
+        signal = _optional("scipy.signal")
+        return signal.StateSpace(self.A, np.hstack([self.B, self.E]), self.C, np.hstack([self.D, self.G]))
+
+    def to_control(self) -> Any:
+        """The same as a `control.StateSpace` of python-control, with the names of states, ports and sources."""
+        control = _optional("control")
+        return control.ss(
+            self.A,
+            np.hstack([self.B, self.E]),
+            self.C,
+            np.hstack([self.D, self.G]),
+            states=[state["name"] for state in self.states],
+            inputs=[port["lambda"] for port in self.ports] + [source["name"] for source in self.inputs],
+            outputs=[port["y"] for port in self.ports],
+        )
 
     def _repr_html_(self) -> str:
         return system_html(self)

@@ -245,6 +245,45 @@ def test_conversions():
     assert p["v(out)"].iloc[-1] == w["v(out)"][-1]
 
 
+LINEAR = """band pass with a blocking diode
+vin in 0 dc 1 ac 1
+l1 in a 1m
+c1 a out 1u
+r1 out 0 10
+c2 out 0 10u
+d1 0 out ideal
+.model ideal d(ideal)
+.tran 1u 1m
+.save v(out)
+.end
+"""
+
+
+def test_systems_and_responses_go_to_scipy_and_python_control():
+    signal, control = pytest.importorskip("scipy.signal"), pytest.importorskip("control")
+    m = circ.parse(LINEAR)
+    l = m.lcs()
+    assert [(port["lambda"], port["y"]) for port in l.ports] == [("i(d1)", "-v(d1)")]
+    f = np.array([1e2, 5e3, 1e5])
+    w = 2 * np.pi * f
+    # While the diode blocks, λ = 0 and y = −v(d1) = v(out): a band pass.
+    s = 1j * w
+    load = 1 / (1 / 10 + s * 10e-6)
+    expected = load / (load + s * 1e-3 + 1 / (s * 1e-6))
+    ours = m.ac(f)
+    assert np.allclose(ours["v(out)"], expected, rtol=1e-9)
+    scipy_side = l.to_scipy()
+    direct = [scipy_side.C @ np.linalg.solve(x * np.eye(3) - scipy_side.A, scipy_side.B) + scipy_side.D for x in s]
+    assert np.allclose([h[0, 1] for h in direct], expected, rtol=1e-9)
+    _, out, _ = signal.lsim(scipy_side, np.column_stack([np.zeros(2001), np.ones(2001)]), np.linspace(0, 1e-3, 2001))
+    assert np.isfinite(out).all()
+    system = l.to_control()
+    assert system.input_labels == ["i(d1)", "vin"] and system.output_labels == ["-v(d1)"] and system.state_labels == [x["name"] for x in l.states]
+    assert np.allclose(system(s[1])[0, 1], expected[1], rtol=1e-9)
+    data = ours.to_control("v(out)")
+    assert np.allclose(data.omega, w) and np.allclose(data(1j * w[1]), expected[1], rtol=1e-6)
+
+
 def test_ctrl_c_ends_a_long_run():
     m = circ.parse(BUCK)
     # A shell that starts a job in the background lets it ignore the signal.

@@ -468,6 +468,8 @@ pub enum SystemFormat {
     Matlab,
     /// LaTeX matrices
     Latex,
+    /// A Python script that Siconos runs: ideal diodes, switches as they stand
+    Siconos,
     /// Matrix Market: with `-o NAME.mtx` the files NAME.A.mtx, NAME.B.mtx, …
     Mtx,
 }

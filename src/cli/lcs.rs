@@ -8,6 +8,7 @@ use super::files::{self, STDOUT};
 use super::input::{self, Subject};
 use super::streams::Streams;
 use crate::lcs::format::{Format, format};
+use crate::lcs::siconos::siconos;
 use crate::lcs::{json, sparse_format};
 
 /// Prints the complementarity system.
@@ -40,6 +41,11 @@ pub(super) fn lcs(args: &LcsArgs, streams: &Streams) -> Result<Exit, Failure> {
         SystemFormat::Numpy => format(&system.lcs, Format::Numpy),
         SystemFormat::Matlab => format(&system.lcs, Format::Matlab),
         SystemFormat::Latex => format(&system.lcs, Format::Latex),
+        SystemFormat::Siconos => {
+            let script = siconos(&system.lcs, &system.x0, system.tran);
+            let file = args.input.file.display();
+            script.map_err(|why| Failure::Message(format!("{file}: --format siconos: {why}")))?
+        }
         SystemFormat::Mtx => {
             let what = "--format mtx: takes a netlist; scipy.io.mmwrite writes the matrices of a system file";
             return Err(Failure::Message(what.into()));
@@ -73,10 +79,11 @@ fn sparse(args: &LcsArgs, subject: &Subject, streams: &Streams) -> Result<Exit, 
         SystemFormat::Text => sparse_format::summary(&system),
         SystemFormat::Numpy => sparse_format::numpy(&system),
         SystemFormat::Matlab => sparse_format::matlab(&system),
-        SystemFormat::Latex => {
+        SystemFormat::Latex | SystemFormat::Siconos => {
             let n = system.states.len();
+            let what = "--format latex and siconos take small systems";
             return Err(Failure::Message(format!(
-                "--format latex: {n} states fill no page; use json, numpy, matlab or mtx"
+                "{what}, not one of {n} states; use json, numpy, matlab or mtx"
             )));
         }
         SystemFormat::Mtx => {

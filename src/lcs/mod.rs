@@ -4,6 +4,7 @@ mod checked;
 pub mod format;
 pub mod json;
 pub mod reduce;
+pub mod siconos;
 pub mod sparse;
 pub mod sparse_format;
 #[cfg(test)]
