@@ -1,8 +1,10 @@
 //! Derivatives of measurements against closed forms.
 #![allow(missing_docs, reason = "tests")]
 
-use circ::Model;
-use circ::analysis::{Sensitivity, SensitivityOptions, WorstOptions, sensitivity, worst};
+use circ::analysis::{
+    Sensitivity, SensitivityOptions, WorstOptions, sensitivity, transient, worst,
+};
+use circ::{Model, SimOptions};
 
 fn found(text: &str, steady: bool) -> Sensitivity {
     let model = Model::parse(text, "t.cir").expect("a circuit");
@@ -41,19 +43,49 @@ fn a_capacitor_that_is_charged() {
     near(&found, "half", "vin", 4.0, -1e-3, close);
 }
 
-/// The mean output of a synchronous buck is D V: its duty is a parameter that moves edges.
+/// The mean output of a synchronous buck is D V: its duty is a parameter that moves edges, upright or as the middles of ramps.
 #[test]
 fn the_output_of_a_buck() {
-    let text = "buck\nv1 1 0 {vin}\ns1 1 2 g 0 sw\ns2 2 0 0 g sn\nvg g 0 pulse(0 1 0 0 0 {d*10u} 10u)\nl1 2 3 100u\nc1 3 0 10u\nr1 3 0 5\n\
-        .model sw sw(vt=0.5 vh=0 ron=0 ideal=1)\n.model sn sw(vt=-0.5 vh=0 ron=0 ideal=1)\n.param vin=10 d=0.4\n.save v(3)\n\
-        .tran 0.1u 20u\n.meas tran out avg v(3)\n.meas tran ripple pp i(l1)\n.end\n";
-    let found = found(text, true);
-    assert!(found.exact);
-    near(&found, "out", "vin", 10.0, 4.0, 1e-6);
-    near(&found, "out", "d", 0.4, 4.0, 1e-6);
-    for (name, value) in [("l1", 1e-4), ("c1", 1e-5), ("r1", 5.0)] {
-        let own = found.derivative("out", name).expect("a derivative") * value;
-        assert!(own.abs() < 1e-6, "{name}: {own:e}");
+    for gate in ["0 0 {d*10u}", "10n 10n {d*10u-10n}"] {
+        let text = format!(
+            "buck\nv1 1 0 {{vin}}\ns1 1 2 g 0 sw\ns2 2 0 0 g sn\nvg g 0 pulse(0 1 0 {gate} 10u)\nl1 2 3 100u\nc1 3 0 10u\nr1 3 0 5\n\
+            .model sw sw(vt=0.5 vh=0 ron=0 ideal=1)\n.model sn sw(vt=-0.5 vh=0 ron=0 ideal=1)\n.param vin=10 d=0.4\n.save v(3)\n\
+            .tran 0.1u 20u\n.meas tran out avg v(3)\n.meas tran ripple pp i(l1)\n.end\n"
+        );
+        let found = found(&text, true);
+        assert!(found.exact);
+        near(&found, "out", "vin", 10.0, 4.0, 1e-6);
+        near(&found, "out", "d", 0.4, 4.0, 1e-6);
+        for (name, value) in [("l1", 1e-4), ("c1", 1e-5), ("r1", 5.0)] {
+            let own = found.derivative("out", name).expect("a derivative") * value;
+            assert!(own.abs() < 1e-6, "{name}: {own:e}");
+        }
+    }
+}
+
+/// A period that changes moves the edges of the hundredth pulse by many times their rise: as sources of a filter and as gates of its switches.
+#[test]
+fn edges_that_move_far() {
+    for head in [
+        "v1 1 0 pulse(0 1 0 10n 10n {t/2} {t})\n",
+        "v2 2 0 1\ns1 2 1 g 0 sw\ns2 1 0 0 g sn\nvg g 0 pulse(0 1 0 10n 10n {t/2} {t})\n",
+    ] {
+        let text = format!(
+            "filter\n{head}r1 1 out 1k\nc1 out 0 100n\n.model sw sw(vt=0.5 vh=0 ron=0 ideal=1)\n\
+            .model sn sw(vt=-0.5 vh=0 ron=0 ideal=1)\n.param t=10u\n.tran 0.1u 1003u\n.save v(out)\n.meas tran last find v(out) at=1003u\n.end\n"
+        );
+        let found = found(&text, false);
+        assert!(found.exact);
+        let last = |t: f64| {
+            let mut model = Model::parse(&text, "t.cir").expect("a circuit");
+            model.set("t", t).expect("a period");
+            let run = transient(&model, SimOptions::default());
+            let (_, found) = run.run.expect("a run");
+            found.measured[0].result.as_ref().expect("a value").value
+        };
+        let slope = (last(1e-5 * (1.0 + 1e-7)) - last(1e-5 * (1.0 - 1e-7))) / 2e-7;
+        assert!(slope.abs() > 0.1, "{slope}");
+        near(&found, "last", "t", 1e-5, slope, 1e-6);
     }
 }
 

@@ -14,6 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use super::instant::Inputs;
 use super::saltation::{Side, Timing};
 use super::{Saltation, System, Trajectory, not_smooth, shaped};
+use crate::circuit::Source;
 use crate::circuit::source::Piece;
 use crate::integrate::exact::{Assembler, Exosystem, Shape};
 use crate::integrate::switching::Threshold;
@@ -98,6 +99,67 @@ struct Forms {
     near: [Vec<Piece>; 4],
 }
 
+/// The sources on their way from t = 0. Those of the circuits that are compared stand on the pieces of the same number, wherever their edges have
+/// moved to.
+struct Walk<'a> {
+    sources: Vec<[&'a Source; 5]>,
+    own: Vec<Piece>,
+    near: [Vec<Piece>; 4],
+}
+
+impl<'a> Walk<'a> {
+    fn of(trajectory: &'a Trajectory, near: &'a [Near; 4]) -> Result<Self, Error> {
+        let own = trajectory.systems.first().map(|system| &system.lcs.inputs);
+        let near = near.each_ref().map(|near| near.systems.first());
+        let sources = (0..own.map_or(0, Vec::len)).filter_map(|i| {
+            let [a, b, c, d] = near.map(|system| Some(&system?.lcs.inputs[i].source));
+            Some([&own?[i].source, a?, b?, c?, d?])
+        });
+        let sources: Vec<[&Source; 5]> = sources.collect();
+        let at_start = |m: usize| -> Result<Vec<Piece>, Error> {
+            let pieces = sources.iter().map(|source| piece(source[m], 0.0));
+            pieces.collect()
+        };
+        Ok(Self {
+            own: at_start(0)?,
+            near: [at_start(1)?, at_start(2)?, at_start(3)?, at_start(4)?],
+            sources,
+        })
+    }
+
+    /// To the pieces at t, no earlier than the time before.
+    fn advance(&mut self, t: f64) -> Result<(), Error> {
+        for (i, sources) in self.sources.iter().enumerate() {
+            while self.own[i].end <= t {
+                let [a, b, c, d] = &mut self.near;
+                let pieces = [&mut self.own[i], &mut a[i], &mut b[i], &mut c[i], &mut d[i]];
+                for (source, standing) in sources.iter().zip(pieces) {
+                    *standing = following(source, standing)?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn piece(source: &Source, t: f64) -> Result<Piece, Error> {
+    let piece = source.piece(t);
+    piece.ok_or_else(|| not_smooth(t, "a source has no closed form"))
+}
+
+/// The piece after one: the last is followed by itself.
+fn following(source: &Source, standing: &Piece) -> Result<Piece, Error> {
+    let mut t = standing.end;
+    while t.is_finite() {
+        let next = piece(source, t)?;
+        if next.end > standing.end {
+            return Ok(next);
+        }
+        t = t.next_up();
+    }
+    Ok(*standing)
+}
+
 /// A trajectory and the circuits beside it.
 pub(crate) struct Parameter<'a> {
     pub(crate) trajectory: &'a Trajectory,
@@ -151,21 +213,12 @@ impl Column {
 
 impl<'a> Parameter<'a> {
     pub(crate) fn of(trajectory: &'a Trajectory, near: &'a [Near; 4]) -> Result<Self, Error> {
+        let mut walk = Walk::of(trajectory, near)?;
         let forms = trajectory.segments.iter().map(|segment| {
-            // In the middle, where edges that move have not come.
-            let middle = 0.5 * (segment.from + segment.to);
-            let at = |system: &System| -> Result<Vec<Piece>, Error> {
-                let inputs = system.lcs.inputs.iter();
-                let pieces = inputs.map(|input| input.source.piece(middle));
-                let pieces: Option<Vec<Piece>> = pieces.collect();
-                pieces.ok_or_else(|| not_smooth(middle, "a source has no closed form"))
-            };
-            let [a, b, c, d] = near
-                .each_ref()
-                .map(|near| at(&near.systems[segment.system]));
+            walk.advance(0.5 * (segment.from + segment.to))?;
             Ok(Forms {
-                own: at(&trajectory.systems[segment.system])?,
-                near: [a?, b?, c?, d?],
+                own: walk.own.clone(),
+                near: walk.near.clone(),
             })
         });
         Ok(Self {

@@ -24,6 +24,8 @@ pub(super) struct Sources {
     next_piece: f64,
     /// The next time at which something is known to happen, s.
     pub(super) next_stop: f64,
+    /// Whether the run stops at corners of sources too that act through controls alone.
+    pub(super) at_all_corners: bool,
 }
 
 fn without_form() -> Reason {
@@ -57,6 +59,7 @@ impl Sources {
             before,
             next_piece: f64::NEG_INFINITY,
             next_stop: f64::NEG_INFINITY,
+            at_all_corners: false,
         };
         sources.stand(from);
         Ok(sources)
@@ -130,6 +133,12 @@ impl Sources {
             let i = clock.switch;
             clock.look_ahead(&thresholds[i], switches[i], span, &self.all);
             self.next_stop = self.next_stop.min(clock.next);
+        }
+        if self.at_all_corners {
+            let t = span.0;
+            let ends = self.all.iter().filter_map(|source| source.piece(t));
+            let ends = ends.map(|piece| piece.end).filter(|end| *end > t);
+            self.next_stop = ends.fold(self.next_stop, f64::min);
         }
     }
 

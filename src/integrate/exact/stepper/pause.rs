@@ -41,13 +41,15 @@ impl Exact {
         &self.key.closed
     }
 
-    /// Keeps changes of mode from here on.
+    /// Keeps changes of mode and corners of sources from here on.
     pub(crate) fn keep_passages(&mut self) {
         self.passages = Some(Vec::new());
+        self.sources.at_all_corners = true;
     }
 
-    /// The changes of mode since [`Self::keep_passages`]; none are kept from here on.
+    /// The changes of mode and corners since [`Self::keep_passages`]; none are kept from here on.
     pub(crate) fn take_passages(&mut self) -> Vec<Passage> {
+        self.sources.at_all_corners = false;
         self.passages.take().unwrap_or_default()
     }
 
