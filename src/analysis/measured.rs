@@ -78,11 +78,20 @@ pub fn is_measured(circuit: &Circuit) -> bool {
 /// A run that broke off as far as it came, measured.
 #[must_use]
 pub fn transient(model: &Model, options: SimOptions<'_>) -> Finished {
-    let circuit = model.circuit();
-    if !is_measured(circuit) {
+    if !is_measured(model.circuit()) {
         return Finished::of(model.transient(options));
     }
-    let measuring = Measuring::of(circuit, options.step.is_some());
+    let measuring = Measuring::of(model.circuit(), options.step.is_some());
+    let mut finished = measured(model, options);
+    if let Some((run, _)) = &mut finished.run {
+        (run.waveforms, run.kinds) = measuring.cut(&run.waveforms, &run.kinds);
+    }
+    finished
+}
+
+/// The same with the rows and signals that the measurements saw.
+pub(super) fn measured(model: &Model, options: SimOptions<'_>) -> Finished {
+    let measuring = Measuring::of(model.circuit(), options.step.is_some());
     let measured = match measuring.model(model) {
         Ok(measured) => measured,
         Err(error) => return Finished::of(Err(error)),
@@ -94,7 +103,7 @@ pub fn transient(model: &Model, options: SimOptions<'_>) -> Finished {
         ..options
     }));
     if let Some((run, found)) = &mut finished.run {
-        *found = measuring.carry_out(run);
+        *found = measuring.found(&run.waveforms, (0, 1), 0.0);
     }
     finished
 }
@@ -205,14 +214,7 @@ impl<'a> Measuring<'a> {
         })
     }
 
-    /// Measures on all rows, then leaves only what is shown.
-    fn carry_out(&self, run: &mut Run) -> Measurements {
-        let found = self.found(&run.waveforms, (0, 1), 0.0);
-        (run.waveforms, run.kinds) = self.cut(&run.waveforms, &run.kinds);
-        found
-    }
-
-    /// The same on rows that repeat.
+    /// Measures on all rows, which repeat, then leaves only what is shown.
     fn carry_out_repeated(&self, run: &mut Run, period: f64) -> Measurements {
         let (laps, note) = laps(self.circuit.tran, period, run.waveforms.values.len());
         run.notes.extend(note);

@@ -6,7 +6,8 @@ use std::sync::atomic::AtomicBool;
 #[cfg(feature = "parallel")]
 use rayon::prelude::*;
 
-use super::{PeriodicOptions, periodic_measured, transient};
+use super::measured::measured;
+use super::{PeriodicOptions, periodic_measured};
 use crate::circuit::{Circuit, Measured, Sweep, combinations};
 use crate::integrate::{Error, Reason, SimOptions};
 use crate::model::Model;
@@ -281,9 +282,10 @@ impl Wanted<'_> {
     /// What the measurements of a model find; a run that breaks off measures nothing.
     fn found(&self, model: &Model) -> Result<Vec<Measured>, Error> {
         let (settings, cancel) = (self.options.settings.clone(), self.options.cancel);
-        // They bring the signals that they need.
+        let circuit = model.circuit();
+        // None would be all.
         let model = model.with_circuit(Circuit {
-            probes: vec![],
+            probes: circuit.measured.clone(),
             columns: vec![],
             ..model.circuit().clone()
         })?;
@@ -295,7 +297,7 @@ impl Wanted<'_> {
             };
             return Ok(periodic_measured(&model, &options)?.2.measured);
         }
-        let finished = transient(
+        let finished = measured(
             &model,
             SimOptions {
                 cancel,
