@@ -5,6 +5,7 @@ use nalgebra::DVector;
 use super::clock::Clock;
 use super::exosystem::Exosystem;
 use super::key::Key;
+use super::rounding::resolution;
 use crate::circuit::Source;
 use crate::integrate::error::{Error, Reason};
 use crate::integrate::switching::Threshold;
@@ -135,9 +136,10 @@ impl Sources {
             self.next_stop = self.next_stop.min(clock.next);
         }
         if self.at_all_corners {
-            let t = span.0;
-            let ends = self.all.iter().filter_map(|source| source.piece(t));
-            let ends = ends.map(|piece| piece.end).filter(|end| *end > t);
+            // A corner that rounding puts right behind this instant is taken with it.
+            let near = span.0 + resolution(span.0);
+            let ends = self.all.iter().filter_map(|source| source.piece(near));
+            let ends = ends.map(|piece| piece.end).filter(|end| *end > near);
             self.next_stop = ends.fold(self.next_stop, f64::min);
         }
     }

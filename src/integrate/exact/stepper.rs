@@ -542,7 +542,13 @@ impl Stepper for Exact {
                 &self.sources.exosystem,
                 stop,
             ) {
-                Arrival::Reached if due => self.instant(None, log)?,
+                Arrival::Reached if due => {
+                    self.instant(None, log)?;
+                    if self.sources.next_stop <= next {
+                        let what = "sources stop a run at one instant without end";
+                        return Err(self.fail(Reason::internal("integrate::exact", what)));
+                    }
+                }
                 Arrival::Reached => return Ok(()),
                 Arrival::Fired(guard) => {
                     self.instant(Some(guard), log)?;
