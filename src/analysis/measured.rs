@@ -225,11 +225,17 @@ impl<'a> Measuring<'a> {
 
     /// What measurements find on rows that are repeated from one lap to another.
     fn found(&self, waves: &Waveforms, (from, to): (usize, usize), period: f64) -> Measurements {
-        let shifted = |lap: usize| waves.time.iter().map(move |t| t + lap as f64 * period);
-        let time: Vec<f64> = (from..to).flat_map(shifted).collect();
+        let repeated = |lap: &dyn Fn(usize, &mut Vec<f64>)| {
+            let mut all = Vec::with_capacity((to - from) * waves.time.len());
+            (from..to).for_each(|k| lap(k, &mut all));
+            all
+        };
+        let time = repeated(&|lap, all| {
+            all.extend(waves.time.iter().map(|t| t + lap as f64 * period));
+        });
         let column = |probe: &Probe| {
             let index = waves.names.iter().position(|name| *name == probe.name)?;
-            Some((from..to).flat_map(|_| waves.column(index)).collect())
+            Some(repeated(&|_, all| all.extend(waves.column(index))))
         };
         Measurements {
             measured: self.circuit.measure(&time, &column),

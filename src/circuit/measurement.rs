@@ -1,5 +1,6 @@
 //! `.meas` and `.four`: what is measured, and carried out on the waveforms of a run.
 
+use std::borrow::Cow;
 use std::cell::RefCell;
 
 use super::builder::Builder;
@@ -175,6 +176,13 @@ impl Circuit {
                 };
                 let trace = |formula: &Formula| {
                     known(formula)?;
+                    if let Formula::Signal(index) = formula {
+                        let all = &columns[*index];
+                        let finite = all.iter().all(|value| value.is_finite());
+                        return finite
+                            .then_some(Cow::Borrowed(&all[..]))
+                            .ok_or(MeasureError::NotFinite);
+                    }
                     let mut row = vec![0.0; columns.len()];
                     let mut all = Vec::with_capacity(time.len());
                     for (k, &t) in time.iter().enumerate() {
@@ -187,7 +195,7 @@ impl Circuit {
                         }
                         all.push(value);
                     }
-                    Ok(all)
+                    Ok(Cow::Owned(all))
                 };
                 let single = |formula: &Formula| {
                     known(formula)?;
@@ -228,6 +236,9 @@ impl Circuit {
         time: &[f64],
         column: &dyn Fn(&Probe) -> Option<Vec<f64>>,
     ) -> Vec<Harmonics> {
+        if self.fourier.is_empty() {
+            return vec![];
+        }
         let columns = self.columns(time, column);
         let mut all = Vec::new();
         for analysis in &self.fourier {

@@ -40,8 +40,7 @@ pub fn fourier(trace: Trace<'_>, frequency: f64, count: usize) -> Result<Spectru
         return Err(MeasureError::Window { from, to });
     }
     let lines: Vec<Line> = trace
-        .lines()
-        .filter_map(|l| l.clipped(from, to))
+        .lines_within(from, to)
         .filter(|l| l.t1 > l.t0)
         .collect();
     let mean = lines

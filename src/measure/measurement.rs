@@ -1,5 +1,7 @@
 //! One measurement, as `.meas tran` describes it, over expressions of any kind `E`.
 
+use std::borrow::Cow;
+
 use super::{Edge, MeasureError, Over, Trace, Which};
 
 /// What is measured.
@@ -130,12 +132,15 @@ pub struct Found {
     pub at: Vec<(&'static str, f64)>,
 }
 
+/// The values of an expression at the output times, or why there are none.
+pub(super) type Values<'a> = Result<Cow<'a, [f64]>, MeasureError>;
+
 /// A run as measurements see it.
 pub struct Scene<'a, E> {
     /// Output times, s, nondecreasing.
     pub time: &'a [f64],
     /// The values of an expression at these times.
-    pub trace: &'a dyn Fn(&E) -> Result<Vec<f64>, MeasureError>,
+    pub trace: &'a dyn Fn(&E) -> Values<'a>,
     /// The value of an expression without signals.
     pub number: &'a dyn Fn(&E) -> Result<f64, MeasureError>,
 }
@@ -215,7 +220,7 @@ impl<E> Scene<'_, E> {
                 let fixed = level.first().copied();
                 let fixed = fixed.filter(|first| level.iter().all(|l| l == first));
                 if fixed.is_none() {
-                    for (value, level) in values.iter_mut().zip(&level) {
+                    for (value, level) in values.to_mut().iter_mut().zip(&*level) {
                         *value -= level;
                     }
                 }
@@ -249,11 +254,11 @@ mod tests {
     fn measure(what: &Measurement<&'static str>) -> Result<Found, MeasureError> {
         let time = [0.0, 1.0, 2.0, 3.0, 4.0];
         let trace = |e: &&str| match *e {
-            "ramp" => Ok(time.to_vec()),
-            "triangle" => Ok(vec![0.0, 1.0, 2.0, 1.0, 0.0]),
+            "ramp" => Ok(time.to_vec().into()),
+            "triangle" => Ok(vec![0.0, 1.0, 2.0, 1.0, 0.0].into()),
             level => level
                 .parse()
-                .map(|x| vec![x; 5])
+                .map(|x| vec![x; 5].into())
                 .map_err(|_| MeasureError::NotFinite),
         };
         let number = |e: &&str| e.parse().map_err(|_| MeasureError::NotFinite);

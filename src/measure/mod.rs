@@ -135,7 +135,7 @@ impl Line {
 }
 
 impl<'a> Trace<'a> {
-    fn lines(&self) -> impl Iterator<Item = Line> + 'a {
+    fn lines(&self) -> impl Iterator<Item = Line> + Clone + use<'a> {
         let (time, values) = (self.time, self.values);
         time.windows(2).zip(values.windows(2)).map(|(t, y)| Line {
             t0: t[0],
@@ -145,21 +145,40 @@ impl<'a> Trace<'a> {
         })
     }
 
+    /// The pieces of from ≤ t ≤ to, those at its ends cut.
+    fn lines_within(&self, from: f64, to: f64) -> impl Iterator<Item = Line> + Clone + use<'a> {
+        let first = self.time.partition_point(|t| *t < from).saturating_sub(1);
+        let after = self.time.partition_point(|t| *t <= to) + 1;
+        let inside = first..after.min(self.time.len()).max(first);
+        let part = Self {
+            time: &self.time[inside.clone()],
+            values: &self.values[inside],
+        };
+        part.lines().filter_map(move |line| line.clipped(from, to))
+    }
+
     /// A measure over from ≤ t ≤ to.
     ///
     /// # Errors
     /// [`MeasureError::Window`] where the run has no piece of positive length there.
     pub fn over(&self, what: Over, from: f64, to: f64) -> Result<f64, MeasureError> {
-        let lines: Vec<Line> = self.lines().filter_map(|l| l.clipped(from, to)).collect();
-        let length: f64 = lines.iter().map(|l| l.t1 - l.t0).sum();
+        let lines = self.lines_within(from, to);
+        let length: f64 = lines.clone().map(|l| l.t1 - l.t0).sum();
         if length.is_nan() || length <= 0.0 {
             return Err(MeasureError::Window { from, to });
         }
-        let sum = |f: fn(&Line) -> f64| lines.iter().map(|l| (l.t1 - l.t0) * f(l)).sum::<f64>();
+        let sum = |f: fn(&Line) -> f64| lines.clone().map(|l| (l.t1 - l.t0) * f(&l)).sum::<f64>();
         let integral = || sum(|l| 0.5 * (l.y0 + l.y1));
-        let ends = || lines.iter().flat_map(|l| [l.y0, l.y1]);
-        let least = || ends().fold(f64::INFINITY, f64::min);
-        let greatest = || ends().fold(f64::NEG_INFINITY, f64::max);
+        let least = || {
+            lines
+                .clone()
+                .fold(f64::INFINITY, |m, l| m.min(l.y0).min(l.y1))
+        };
+        let greatest = || {
+            lines
+                .clone()
+                .fold(f64::NEG_INFINITY, |m, l| m.max(l.y0).max(l.y1))
+        };
         Ok(match what {
             Over::Average => integral() / length,
             Over::Integral => integral(),
@@ -167,8 +186,8 @@ impl<'a> Trace<'a> {
             Over::Minimum => least(),
             Over::Maximum => greatest(),
             Over::PeakToPeak => greatest() - least(),
-            Over::WhenMinimum => reached(&lines, least()),
-            Over::WhenMaximum => reached(&lines, greatest()),
+            Over::WhenMinimum => reached(lines.clone(), least()),
+            Over::WhenMaximum => reached(lines.clone(), greatest()),
         })
     }
 
@@ -219,7 +238,7 @@ impl<'a> Trace<'a> {
         let mut found = Vec::new();
         // The side of the level the waveform came from, kept while it runs along it.
         let mut side = 0.0;
-        for line in self.lines().filter_map(|l| l.clipped(within.0, within.1)) {
+        for line in self.lines_within(within.0, within.1) {
             let (a, b) = (line.y0 - level, line.y1 - level);
             if a != 0.0 {
                 side = a.signum();
@@ -255,11 +274,9 @@ impl<'a> Trace<'a> {
 }
 
 /// The first end of a piece that has this value.
-fn reached(lines: &[Line], value: f64) -> f64 {
-    let ends = lines.iter().flat_map(|l| [(l.t0, l.y0), (l.t1, l.y1)]);
-    ends.into_iter()
-        .find(|&(_, y)| y == value)
-        .map_or(f64::NAN, |(t, _)| t)
+fn reached(lines: impl Iterator<Item = Line>, value: f64) -> f64 {
+    let mut ends = lines.flat_map(|l| [(l.t0, l.y0), (l.t1, l.y1)]);
+    ends.find(|&(_, y)| y == value).map_or(f64::NAN, |(t, _)| t)
 }
 
 #[cfg(test)]
