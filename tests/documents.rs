@@ -7,8 +7,9 @@ use std::path::Path;
 use std::process::Command;
 
 /// Pages whose commands are run: those of blocks marked `sh` that begin with `circ`; netlists marked `title=NAME` stand in the folder.
-const PAGES: [&str; 6] = [
+const PAGES: [&str; 7] = [
     "README.md",
+    "docs/running.md",
     "docs/netlist.md",
     "docs/from-ltspice.md",
     "docs/from-plecs.md",
@@ -84,4 +85,60 @@ fn blocks_are_read() {
             ("spice title=b.cir", "b\n".to_owned())
         ]
     );
+}
+
+/// A page without the breaks of its lines.
+fn flowing(page: &str) -> String {
+    page.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// What stands between backquotes.
+fn quoted(cell: &str) -> impl Iterator<Item = &str> {
+    cell.split('`').skip(1).step_by(2)
+}
+
+/// docs/claims.md quotes what its pages say, and names files and tests that are there.
+#[test]
+fn every_claim_is_kept_by_what_it_names() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let read = |path: &str| fs::read_to_string(root.join(path)).ok();
+    let claims = read("docs/claims.md").expect("a page");
+    let rows = claims.lines().filter(|line| line.starts_with("| ")).skip(1);
+    let (mut count, mut faults) = (0, Vec::new());
+    for row in rows {
+        count += 1;
+        let cells: Vec<String> = row
+            .replace("\\|", "\u{0}")
+            .split(" | ")
+            .map(|cell| {
+                cell.replace('\u{0}', "|")
+                    .trim_matches(['|', ' '])
+                    .to_string()
+            })
+            .collect();
+        let [page, words, by] = &cells[..] else {
+            faults.push(format!("not three cells: {row}"));
+            continue;
+        };
+        if !read(page).is_some_and(|text| flowing(&text).contains(words)) {
+            faults.push(format!("{page} does not say: {words}"));
+        }
+        let files: Vec<String> = quoted(by).filter_map(read).collect();
+        if files.is_empty() {
+            faults.push(format!("no file keeps: {words}"));
+        }
+        let tests = quoted(by).filter(|name| name.contains('_') && !name.contains(['/', '=']));
+        for test in tests {
+            let defined = |file: &String| {
+                [format!("fn {test}("), format!("def {test}(")]
+                    .iter()
+                    .any(|definition| file.contains(definition))
+            };
+            if !files.iter().any(defined) {
+                faults.push(format!("no test `{test}` where it is looked for: {words}"));
+            }
+        }
+    }
+    assert!(count > 30, "{count} claims are read");
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
 }

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """The documentation as a book in target/book/html: `python3 docs/book/build.py` (needs mdbook: `cargo install mdbook`).
 
-The pages are those of SUMMARY.md, with the files that they link to; the gallery shows the circuits of netlists/ as `circ` draws them.
+The pages are those of SUMMARY.md, with the files that they link to; the gallery shows the circuits of netlists/ as `circ` draws them; the playground is
+what playground/build.sh makes, where Rust can compile for browsers.
 `CIRC=path` names a program that is built already.
 """
 
@@ -60,6 +61,21 @@ def gallery(program):
     (SOURCE / "gallery.md").write_text("\n".join(page) + "\n")
 
 
+def playground():
+    """The playground's files, or nothing where Rust has no target for browsers; a page that shows them."""
+    built = subprocess.run([ROOT / "playground" / "build.sh"])
+    if built.returncode not in (0, 3):
+        built.check_returncode()
+    page = ["# Playground", ""]
+    if built.returncode == 0:
+        shutil.copytree(ROOT / "playground" / "dist", SOURCE / "playground")
+        page += ["A netlist on the left, what it does on the right; [on a page of its own](playground/index.html).", ""]
+        page += ['<iframe src="playground/index.html" title="playground" style="width: 100%; height: 80vh; border: 1px solid"></iframe>']
+    else:
+        page += ["Left out of this book: the Rust that built it cannot compile for browsers (`wasm32-unknown-unknown`)."]
+    (SOURCE / "playground.md").write_text("\n".join(page) + "\n")
+
+
 def broken():
     """Links of the book that lead nowhere."""
     html = BOOK / "html"
@@ -78,9 +94,10 @@ def main():
     summary = (OWN / "SUMMARY.md").read_text()
     (SOURCE / "SUMMARY.md").write_text(summary)
     for page in LINK.findall(summary):
-        if page != "gallery.md":
+        if page not in ("gallery.md", "playground.md"):
             copied(pathlib.Path(page))
     gallery(circ())
+    playground()
     subprocess.run(["mdbook", "build", "-d", str(BOOK / "html"), str(BOOK)], check=True)
     faults = list(broken())
     print("\n".join(faults) or f"{BOOK / 'html' / 'index.html'}")
