@@ -1161,6 +1161,50 @@ fn pss_writes_one_period_and_its_summary() {
     );
 }
 
+/// `.pss` alone is one period, `.tran … steady` begins on the orbit, and where there is none begins as usual, with a warning. The capacitor swings
+/// between 5 V ∓ 5 V tanh ¼.
+#[test]
+fn cards_ask_for_the_steady_state() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let netlist = folder.path().join("a.cir");
+    let rows = |cards: &str, card: &str, command: &str| {
+        let text = format!("title\n{cards}\nc1 2 0 1u\n{card}\n.save v(2)\n.end\n");
+        std::fs::write(&netlist, text).expect("a netlist");
+        let ran = run(&format!("{command} {}", netlist.display()));
+        assert_eq!(ran.status, 0, "{card}: {}", ran.err);
+        let rows: Vec<(f64, f64)> = (ran.out.lines().skip(1))
+            .map(|row| {
+                let (t, v) = row.split_once(',').expect("two columns");
+                (t.parse().expect("a time"), v.parse().expect("a value"))
+            })
+            .collect();
+        (rows, ran.err)
+    };
+    let square = "v1 1 0 pulse(0 10 0 0 0 0.5m 1m)\nr1 1 2 1k";
+    let least = 5.0 - 5.0 * 0.25_f64.tanh();
+    for command in ["sim", "pss"] {
+        for card in [".pss 1k 5m 2 100 10", ".pss 1k 0 out 100 10 50 1e-3 uic"] {
+            let (rows, _) = rows(square, card, command);
+            assert_eq!((rows.len(), rows[100].0), (101, 1e-3), "{card}");
+            for row in [rows[0], rows[100]] {
+                assert!((row.1 - least).abs() < 1e-12, "{card}: {row:?}");
+            }
+        }
+    }
+    let (steady, said) = rows(square, ".tran 0.5m 2m 0 steady", "sim");
+    let found: Vec<f64> = steady.iter().map(|row| row.1).collect();
+    let swing = [least, 10.0 - least, least, 10.0 - least, least];
+    assert!(
+        found.iter().zip(swing).all(|(a, b)| (a - b).abs() < 1e-12),
+        "{found:?}"
+    );
+    assert!(said.contains("starts at the orbit"), "{said}");
+    // A capacitor that is charged without end does not repeat: the run begins as usual.
+    let (usual, said) = rows("i1 0 2 1m", ".tran 0.5m 2m uic steady", "sim");
+    assert!((usual[4].1 - 2.0).abs() < 1e-12, "{usual:?}");
+    assert!(said.contains("`steady` of `.tran` is left out: "), "{said}");
+}
+
 /// Complex columns, sidebands and ratios in the forms of INTERFACE; margins in words; `circ sim` of a netlist that asks for `.ac` alone.
 #[test]
 fn ac_writes_every_format_and_tells_the_margins_of_ratios() {

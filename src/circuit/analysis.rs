@@ -2,7 +2,7 @@
 
 use super::builder::Builder;
 use super::scope::ScopeId;
-use super::{Kind, NodeId, Tran};
+use super::{Kind, NodeId, SteadyState, Tran};
 use crate::algebra::Value;
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::netlist::ast::{self, Expr, Signal};
@@ -64,6 +64,47 @@ impl<'n> Builder<'n, '_> {
             tmax,
             uic: tran.uic,
         })
+    }
+
+    /// `.tran … steady`, and `.pss` where there is no `.tran`.
+    pub(super) fn steady(&mut self) {
+        if !self.trans.is_empty() {
+            let begins = self.trans.iter().any(|t| t.steady);
+            self.circuit.steady = begins.then_some(SteadyState::Start);
+            if let Some(card) = self.pss_card {
+                let message = "skipped, as there is a `.tran`: .pss";
+                let note = Diagnostic::note("skipped", card.span, message);
+                self.tell(note.help("`circ pss FILE` finds the periodic steady state"));
+            }
+        } else if let Some(card) = self.pss_card {
+            self.circuit.tran = self.orbit(card);
+            self.circuit.steady = self.circuit.tran.map(|_| SteadyState::Orbit);
+        }
+    }
+
+    /// The rows of a period, and how long an orbit without sources is looked for.
+    fn orbit(&mut self, card: &'n ast::Pss) -> Option<Tran> {
+        let mut number = |e| self.scopes.finite(e, ScopeId::ROOT).map(|v| v.f64);
+        let (frequency, settling) = (number(&card.frequency)?, number(&card.settling)?);
+        let points = number(&card.points)?;
+        let (period, rows) = (frequency.recip(), points.round());
+        let found = Tran {
+            tstep: period / rows,
+            prints: true,
+            tstop: settling + period,
+            tstart: 0.0,
+            tmax: None,
+            uic: card.uic,
+        };
+        if period > 0.0 && rows >= 1.0 && settling >= 0.0 && found.tstep > 0.0 {
+            return Some(found);
+        }
+        let message = "`.pss` needs a frequency and a number of points above zero";
+        let fault = Diagnostic::error("bad-tran", card.span, message).label("no such period");
+        self.tell(fault.help(
+            "write `.pss 1k 10m out 100 10`: frequency, time to settle, node, points, harmonics",
+        ));
+        None
     }
 
     /// Whether `.tran … startup` asks for supplies that ramp up.

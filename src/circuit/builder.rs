@@ -63,6 +63,7 @@ pub(super) struct Builder<'n, 'o> {
     pub(super) step_cards: Vec<&'n ast::Sweep>,
     pub(super) dc_cards: Option<&'n [ast::Sweep]>,
     pub(super) ac_card: Option<&'n ast::Frequencies>,
+    pub(super) pss_card: Option<&'n ast::Pss>,
     /// Values that `alter` sets, by element; the last one counts.
     pub(super) altered: Vec<(&'n Name, Value)>,
     /// Names of the elements of the top level.
@@ -109,6 +110,7 @@ impl<'n, 'o> Builder<'n, 'o> {
             step_cards: Vec::new(),
             dc_cards: None,
             ac_card: None,
+            pss_card: None,
             altered: Vec::new(),
             root_elements: HashSet::new(),
             choices: VecDeque::new(),
@@ -143,6 +145,7 @@ impl<'n, 'o> Builder<'n, 'o> {
         self.check_overrides();
         self.check_altered();
         self.circuit.tran = self.transient();
+        self.steady();
         self.dc_sweeps();
         self.frequencies();
         self.elements(&netlist.body, ScopeId::ROOT);

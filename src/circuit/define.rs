@@ -104,6 +104,10 @@ impl<'n> Builder<'n, '_> {
                 self.other_analysis = true;
                 self.ac_card = Some(card);
             }
+            Statement::Pss(card) => {
+                self.other_analysis = true;
+                self.pss_card = Some(card);
+            }
             Statement::Dc(sweeps) => {
                 self.other_analysis = true;
                 self.dc_cards = Some(sweeps);

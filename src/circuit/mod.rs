@@ -99,6 +99,8 @@ pub struct Circuit {
     pub lines: Vec<Line>,
     /// The transient analysis asked for.
     pub tran: Option<Tran>,
+    /// Whether the netlist asks for the periodic steady state.
+    pub steady: Option<SteadyState>,
     /// What `.save`, `.print`, `.probe`, `.plot tran` ask for; empty means the default set.
     pub probes: Vec<Probe>,
     /// What is shown of a transient, as functions of the probes; empty where these are shown as they are.
@@ -302,6 +304,15 @@ pub struct Tran {
     pub tmax: Option<f64>,
     /// Start from initial conditions instead of the operating point.
     pub uic: bool,
+}
+
+/// What a netlist wants of its periodic steady state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SteadyState {
+    /// `.tran … steady`: the transient begins on it.
+    Start,
+    /// `.pss` without `.tran`: one period of it, with rows and a span of search as [`Circuit::tran`] has them.
+    Orbit,
 }
 
 /// A column of the output.

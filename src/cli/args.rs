@@ -218,7 +218,7 @@ pub enum Method {
 }
 
 /// Where the waveforms of a run go, which of them, and what is said of it.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct ResultArgs {
     /// Write results to this file, or `-`, standard output (repeatable); the ending chooses csv, raw, npz, json, svg, png or html
     ///
@@ -257,7 +257,7 @@ pub struct ResultArgs {
 }
 
 /// The table of means.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct TableArgs {
     /// Print mean, rms, least and greatest current and voltage and the mean power of every element, exact where the run is
     ///

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::args::{PssArgs, TableArgs};
 use super::destination::{Destination, Wanted};
 use super::exit::{Exit, Failure};
-use super::input;
+use super::input::{self, Subject};
 use super::output::Format;
 use super::rows::Columns;
 use super::signals::Signals;
@@ -21,11 +21,25 @@ pub(super) fn pss(args: &PssArgs, streams: &Streams) -> Result<Exit, Failure> {
     let formats = Format::of(&args.results.outputs, args.results.format, streams)?;
     let paths: Vec<&Path> = args.results.outputs.iter().map(PathBuf::as_path).collect();
     let subject = input::open(&args.input, &args.results.probes, &paths, streams)?;
-    let model = input::model_of(&args.input, &subject)?;
+    let signals = Signals::watch()?;
+    orbit(args, &subject, &formats, &signals, streams)
+}
+
+/// The same of what was opened.
+///
+/// # Errors
+/// See [`Failure`].
+pub(super) fn orbit(
+    args: &PssArgs,
+    subject: &Subject,
+    formats: &[Format],
+    signals: &Signals,
+    streams: &Streams,
+) -> Result<Exit, Failure> {
+    let model = input::model_of(&args.input, subject)?;
     if !model.circuit().steps.is_empty() {
         streams.note("`.step` is left out: this is the orbit of the values as they stand");
     }
-    let signals = Signals::watch()?;
     let wanted = Wanted {
         input: &args.input,
         results: &args.results,
@@ -33,8 +47,8 @@ pub(super) fn pss(args: &PssArgs, streams: &Streams) -> Result<Exit, Failure> {
         verify: false,
     };
     let tran = model.circuit().tran;
-    let destination = Destination::of(wanted, &formats, tran, Some(model), streams);
-    let outputs = destination.open(&Columns::of_subject(&subject))?;
+    let destination = Destination::of(wanted, formats, tran, Some(model), streams);
+    let outputs = destination.open(&Columns::of_subject(subject))?;
     let options = PeriodicOptions {
         period: args.period,
         order: args.order.map(usize::from),

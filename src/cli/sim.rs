@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use super::ac;
-use super::args::{self, MethodArgs, SimArgs};
+use super::args::{self, MethodArgs, PssArgs, SimArgs};
 use super::dc;
 use super::destination::{Destination, Wanted};
 use super::exit::{Exit, Failure};
@@ -12,6 +12,7 @@ use super::files;
 use super::forms;
 use super::input::{self, Subject};
 use super::output::Format;
+use super::pss;
 use super::rows::Columns;
 use super::signals::Signals;
 use super::steps::Stepping;
@@ -20,10 +21,10 @@ use crate::analysis::{
     self, Finished, PeriodicOptions, TableOptions, WorstOptions, is_measured, shown, shown_values,
 };
 use crate::circuit::source::Wave;
-use crate::circuit::{Circuit, Tran};
+use crate::circuit::{Circuit, SteadyState, Tran};
 use crate::integrate::{
-    Block, Error, Method, Note, Reason, Run, SimOptions, Sink, Verified, VerifyOptions, aliased,
-    simulate, simulate_system, verify, verify_system,
+    Block, Error, Method, Note, Orbit, Reason, Run, SimOptions, Sink, Standing, Verified,
+    VerifyOptions, aliased, simulate, simulate_system, verify, verify_system,
 };
 use crate::lcs::Input;
 use crate::model::Model;
@@ -54,7 +55,8 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
     let signals = Signals::watch()?;
     if let Subject::Circuit(model) = &subject {
         let circuit = model.circuit();
-        if circuit.tran.is_none() && !circuit.ac.is_empty() {
+        let transient = circuit.tran.is_some() && circuit.steady != Some(SteadyState::Orbit);
+        if !transient && !circuit.ac.is_empty() {
             only_one_way(args)?;
             return ac::sim(args, model, &formats, streams);
         }
@@ -64,9 +66,23 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
                 "`.ac` is left out, as there is a `.tran`; `circ ac {file}` carries it out"
             ));
         }
-        if circuit.tran.is_none() && !circuit.dc.is_empty() {
+        if !transient && !circuit.dc.is_empty() {
             only_one_way(args)?;
             return dc::sim(args, model, &formats, streams);
+        }
+        if circuit.steady == Some(SteadyState::Orbit) {
+            if !args.worst.is_empty() || args.verify {
+                only_one_way(args)?;
+            }
+            let asked = PssArgs {
+                input: args.input.clone(),
+                results: args.results.clone(),
+                period: None,
+                order: None,
+                tol: None,
+                table: args.table.clone(),
+            };
+            return pss::orbit(&asked, &subject, &formats, &signals, streams);
         }
         if !circuit.steps.is_empty() {
             only_one_way(args)?;
@@ -169,15 +185,12 @@ fn tabulate(
     let (Subject::Circuit(model), Some((_, found))) = (subject, &mut finished.run) else {
         return;
     };
-    let start = args.from_pss.then(|| {
-        let asked = PeriodicOptions {
-            cancel: Some(cancel),
-            settings: request.settings(),
-            ..PeriodicOptions::default()
+    let start = begin(model, args.from_pss, request, Some(cancel));
+    let table = start.and_then(|begin| {
+        let start = match begin {
+            Begin::Orbit(_, start) => Some(start),
+            Begin::Usual | Begin::NoOrbit(_) => None,
         };
-        analysis::orbit_start(model, &asked).map(|(_, start)| start)
-    });
-    let table = start.transpose().and_then(|start| {
         let options = TableOptions {
             inputs: args.table.inputs.clone(),
             outputs: args.table.outputs.clone(),
@@ -296,6 +309,40 @@ fn measured_run(
     finished
 }
 
+/// Where a transient begins.
+enum Begin {
+    /// At its initial conditions or operating point.
+    Usual,
+    /// On this orbit.
+    Orbit(Orbit, Standing),
+    /// As usual, as there is not the orbit that `.tran … steady` asks for.
+    NoOrbit(Error),
+}
+
+/// Where a transient is to begin; that an orbit is not there is an error where `--from-pss` asks for it.
+fn begin(
+    model: &Model,
+    from_pss: bool,
+    request: &Request,
+    cancel: Option<&AtomicBool>,
+) -> Result<Begin, Error> {
+    if !from_pss && model.circuit().steady != Some(SteadyState::Start) {
+        return Ok(Begin::Usual);
+    }
+    let asked = PeriodicOptions {
+        cancel,
+        settings: request.settings(),
+        ..PeriodicOptions::default()
+    };
+    match analysis::orbit_start(model, &asked) {
+        Ok((orbit, start)) => Ok(Begin::Orbit(orbit, start)),
+        Err(error) if !from_pss && !matches!(error.reason, Reason::Interrupted) => {
+            Ok(Begin::NoOrbit(error))
+        }
+        Err(error) => Err(error),
+    }
+}
+
 /// The same of a circuit.
 pub(super) fn transient(
     model: &Model,
@@ -304,21 +351,17 @@ pub(super) fn transient(
     streams: &Streams,
 ) -> Finished {
     let tran = model.circuit().tran;
-    let start = if route.from_orbit {
-        let asked = PeriodicOptions {
-            cancel: route.cancel,
-            settings: request.settings(),
-            ..PeriodicOptions::default()
-        };
-        match analysis::orbit_start(model, &asked) {
-            Ok((orbit, start)) => {
-                streams.say(format!("starts at the {}", report::text::orbit(&orbit)));
-                Some(start)
-            }
-            Err(error) => return Finished::of(Err(error)),
+    let start = match begin(model, route.from_orbit, request, route.cancel) {
+        Ok(Begin::Orbit(orbit, start)) => {
+            streams.say(format!("starts at the {}", report::text::orbit(&orbit)));
+            Some(start)
         }
-    } else {
-        None
+        Ok(Begin::Usual) => None,
+        Ok(Begin::NoOrbit(error)) => {
+            streams.warning(format!("`steady` of `.tran` is left out: {error}"));
+            None
+        }
+        Err(error) => return Finished::of(Err(error)),
     };
     let run = |options: SimOptions<'_>| analysis::transient(model, SimOptions { start, ..options });
     let mut finished = with_options(tran, request, route, streams, run);

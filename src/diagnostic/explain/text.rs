@@ -85,7 +85,7 @@ pub(super) const CODES: [Explanation; 33] = [
         "An option of another simulator that circ does not have.",
         "Leave it out, or write in another way what it stands for; docs/netlist.md says what is supported.",
     )
-    .shown("steady\nv1 a 0 1\nr1 a 0 1k\n.tran 1m 5m steady\n"),
+    .shown("start\nv1 a 0 1\nr1 a 0 1k\n.tran 1m 5m nodiscard\n"),
     Explanation::of(
         "include-loop",
         "A file includes itself, directly or through others.",

@@ -91,6 +91,8 @@ pub enum Statement {
     Dc(Vec<Sweep>),
     /// `.ac`.
     Ac(Frequencies),
+    /// `.pss`.
+    Pss(Pss),
     /// `alter` inside `.control`, before the run.
     Alter(Alter),
 }
@@ -321,8 +323,25 @@ pub struct Tran {
     pub uic: bool,
     /// LTspice's `startup`.
     pub startup: bool,
+    /// LTspice's `steady`.
+    pub steady: bool,
     /// Written as a command inside `.control`.
     pub command: bool,
+    /// The whole card.
+    pub span: Span,
+}
+
+/// ngspice's `.pss gfreq tstab oscnob psspoints harms sciter steadycoeff uic`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pss {
+    /// About how often the circuit repeats, Hz.
+    pub frequency: Expr,
+    /// How long a transient without sources is looked at, s.
+    pub settling: Expr,
+    /// Rows of a period.
+    pub points: Expr,
+    /// `uic`.
+    pub uic: bool,
     /// The whole card.
     pub span: Span,
 }

@@ -138,7 +138,8 @@ pub(in crate::netlist) fn card(i: Input<'_>) -> Parsed<'_, Dot> {
         ".step" => sweep::step(rest),
         ".dc" => sweep::dc(rest),
         ".ac" => Ok(sweep::ac(start, rest)),
-        ".noise" | ".tf" | ".sens" | ".pz" | ".disto" | ".sp" | ".pss" | ".net" | ".savebias"
+        ".pss" => Ok(sweep::pss(start, rest)),
+        ".noise" | ".tf" | ".sens" | ".pz" | ".disto" | ".sp" | ".net" | ".savebias"
         | ".loadbias" | ".machine" | ".endmachine" | ".ferret" | ".data" | ".enddata" => {
             Ok((skip(rest), Dot::Skipped))
         }
@@ -219,7 +220,7 @@ pub(in crate::netlist) fn tran<'a>(
     i: Input<'a>,
     command: bool,
 ) -> Parsed<'a, Tran> {
-    let (mut uic, mut startup) = (false, false);
+    let (mut uic, mut startup, mut steady) = (false, false, false);
     let mut args = Vec::new();
     let mut at = i;
     loop {
@@ -231,7 +232,8 @@ pub(in crate::netlist) fn tran<'a>(
             match name.text.as_str() {
                 "uic" => uic = true,
                 "startup" => startup = true,
-                "steady" | "nodiscard" | "step" => tell(
+                "steady" => steady = true,
+                "nodiscard" | "step" => tell(
                     at,
                     Diagnostic::warning(
                         "ignored",
@@ -279,6 +281,7 @@ pub(in crate::netlist) fn tran<'a>(
             args,
             uic,
             startup,
+            steady,
             command,
             span,
         },

@@ -1,8 +1,8 @@
-//! `.step`, `.dc`, `.ac`.
+//! `.step`, `.dc`, `.ac`, `.pss`.
 
 use super::{Dot, skip};
 use crate::diagnostic::Diagnostic;
-use crate::netlist::ast::{Expr, Frequencies, Points, Spacing, Statement, Sweep, Target};
+use crate::netlist::ast::{Expr, Frequencies, Points, Pss, Spacing, Statement, Sweep, Target};
 use crate::netlist::lex::{
     Input, Parsed, at_end, between, blank, end, expect_word, missing, next_word, refuse, separator,
     symbol, tell, word,
@@ -160,4 +160,39 @@ fn sweep(i: Input<'_>) -> Parsed<'_, Sweep> {
             span,
         },
     ))
+}
+
+/// `.pss gfreq tstab oscnob psspoints …`. What is no such card is left out, as other analyses are that do not change a transient.
+pub(super) fn pss<'a>(start: Input<'a>, i: Input<'a>) -> (Input<'a>, Dot) {
+    let value = |at| operand::value(separator(at)).ok();
+    let node = |at| {
+        let named = word(separator(at)).map(|(rest, _)| rest).ok();
+        named.or_else(|| Some(value(at)?.0))
+    };
+    let card = || {
+        let (rest, frequency) = value(i)?;
+        let (rest, settling) = value(rest)?;
+        let (mut at, points) = value(node(rest)?)?;
+        let mut uic = false;
+        // The number of harmonics and how ngspice iterates.
+        while !at_end(separator(at)) {
+            at = match word(separator(at)) {
+                Ok((rest, name)) if name.text == "uic" => {
+                    uic = true;
+                    rest
+                }
+                _ => value(at)?.0,
+            };
+        }
+        let span = between(start, at);
+        let card = Pss {
+            frequency,
+            settling,
+            points,
+            uic,
+            span,
+        };
+        Some((separator(at), Dot::statement(Statement::Pss(card))))
+    };
+    card().unwrap_or_else(|| (skip(i), Dot::Skipped))
 }
