@@ -1198,7 +1198,10 @@ fn cards_ask_for_the_steady_state() {
         found.iter().zip(swing).all(|(a, b)| (a - b).abs() < 1e-12),
         "{found:?}"
     );
-    assert!(said.contains("starts at the orbit"), "{said}");
+    assert!(
+        said.contains("the run begins at its periodic steady state"),
+        "{said}"
+    );
     // A capacitor that is charged without end does not repeat: the run begins as usual.
     let (usual, said) = rows("i1 0 2 1m", ".tran 0.5m 2m uic steady", "sim");
     assert!((usual[4].1 - 2.0).abs() < 1e-12, "{usual:?}");

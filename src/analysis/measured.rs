@@ -1,6 +1,7 @@
 //! A transient with its measurements: the signals they need are simulated besides those that are shown, and taken away again.
 
 use super::periodic::{PeriodicOptions, on_grid, periodic};
+use super::start::beginning;
 use super::table::Table;
 use super::worst::Worst;
 use crate::circuit::{Circuit, Harmonics, Measured, Probe, Tran};
@@ -72,19 +73,37 @@ pub fn is_measured(circuit: &Circuit) -> bool {
 /// The transient that `.tran` asks for, with what `.meas` and `.four` ask of it.
 ///
 /// Measurements see the rows at events and at corners of sources too, and at least 2000 of the grid unless the step is fixed. Where
-/// there are any, [`SimOptions::rows`] and [`SimOptions::discard`] are not heeded: the rows are those of the run.
+/// there are any, [`SimOptions::rows`] and [`SimOptions::discard`] are not heeded: the rows are those of the run. `.tran … steady` begins at the
+/// periodic steady state unless [`SimOptions::start`] says where.
 ///
 /// # Returns
 /// A run that broke off as far as it came, measured.
 #[must_use]
 pub fn transient(model: &Model, options: SimOptions<'_>) -> Finished {
     if !is_measured(model.circuit()) {
-        return Finished::of(model.transient(options));
+        return begun(model, model, options);
     }
     let measuring = Measuring::of(model.circuit(), options.step.is_some());
     let mut finished = measured(model, options);
     if let Some((run, _)) = &mut finished.run {
         (run.waveforms, run.kinds) = measuring.cut(&run.waveforms, &run.kinds);
+    }
+    finished
+}
+
+/// The transient of `shown`, which is `model` with other signals, from where `model` has it begin.
+fn begun(model: &Model, shown: &Model, mut options: SimOptions<'_>) -> Finished {
+    let asked = (options.cancel, &options.settings);
+    let note = match beginning(model, options.start.take(), asked) {
+        Ok((start, note)) => {
+            options.start = start;
+            note
+        }
+        Err(error) => return Finished::of(Err(error)),
+    };
+    let mut finished = Finished::of(shown.transient(options));
+    if let Some((run, _)) = &mut finished.run {
+        run.notes.extend(note);
     }
     finished
 }
@@ -96,12 +115,13 @@ pub(super) fn measured(model: &Model, options: SimOptions<'_>) -> Finished {
         Ok(measured) => measured,
         Err(error) => return Finished::of(Err(error)),
     };
-    let mut finished = Finished::of(measured.transient(SimOptions {
+    let options = SimOptions {
         corners: true,
         rows: None,
         discard: false,
         ..options
-    }));
+    };
+    let mut finished = begun(model, &measured, options);
     if let Some((run, found)) = &mut finished.run {
         *found = measuring.found(&run.waveforms, (0, 1), 0.0);
     }

@@ -20,6 +20,7 @@ mod periodic;
 mod sensitivity;
 mod shown;
 mod small_signal;
+mod start;
 mod sweep;
 mod table;
 mod variation;

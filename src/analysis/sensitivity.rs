@@ -9,7 +9,7 @@ use serde::ser::{SerializeMap, Serializer};
 use super::measured::{laps, periodic_measured, transient};
 use super::periodic::{PeriodicOptions, beside, steady};
 use super::variation::{Near, Parameter, STEPS, Shifted, Trajectory};
-use crate::circuit::{Circuit, Formula, Kind, Measured, Probe, Tran, source::Wave};
+use crate::circuit::{Circuit, Formula, Kind, Measured, Probe, SteadyState, Tran, source::Wave};
 use crate::integrate::{
     Error, Grid, Note, OrbitKind, Reason, SimOptions, Simulation, SimulationOptions,
 };
@@ -32,7 +32,7 @@ pub struct SensitivityOptions<'a> {
     /// Names of elements and parameters; by default all resistances, capacitances, inductances and constant sources of the top level and all
     /// parameters that something uses, unless they are 0.
     pub to: Vec<String>,
-    /// Of the periodic steady state instead of the transient.
+    /// Of the periodic steady state instead of the transient; `.tran … steady` asks for it too.
     pub steady: bool,
     /// The period of it, s, in place of the common one of the sources.
     pub period: Option<f64>,
@@ -138,6 +138,10 @@ impl Serialize for Sensitivity {
 /// ```
 pub fn sensitivity(model: &Model, options: &SensitivityOptions<'_>) -> Result<Sensitivity, Error> {
     let circuit = model.circuit();
+    let options = &SensitivityOptions {
+        steady: options.steady || circuit.steady == Some(SteadyState::Start),
+        ..options.clone()
+    };
     let to = values(model, &options.to)?;
     let known = |name: &&String| {
         !circuit

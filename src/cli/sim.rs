@@ -23,8 +23,8 @@ use crate::analysis::{
 use crate::circuit::source::Wave;
 use crate::circuit::{Circuit, SteadyState, Tran};
 use crate::integrate::{
-    Block, Error, Method, Note, Orbit, Reason, Run, SimOptions, Sink, Standing, Verified,
-    VerifyOptions, aliased, simulate, simulate_system, verify, verify_system,
+    Block, Error, Method, Note, Reason, Run, SimOptions, Sink, Verified, VerifyOptions, aliased,
+    simulate, simulate_system, verify, verify_system,
 };
 use crate::lcs::Input;
 use crate::model::Model;
@@ -83,6 +83,11 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
                 table: args.table.clone(),
             };
             return pss::orbit(&asked, &subject, &formats, &signals, streams);
+        }
+        if circuit.steady == Some(SteadyState::Start) && args.verify {
+            let file = args.input.file.display();
+            let message = "`--verify` takes a run from its usual start, without `steady`";
+            return Err(Failure::Message(format!("{file}: {message}")));
         }
         if !circuit.steps.is_empty() {
             only_one_way(args)?;
@@ -185,12 +190,15 @@ fn tabulate(
     let (Subject::Circuit(model), Some((_, found))) = (subject, &mut finished.run) else {
         return;
     };
-    let start = begin(model, args.from_pss, request, Some(cancel));
-    let table = start.and_then(|begin| {
-        let start = match begin {
-            Begin::Orbit(_, start) => Some(start),
-            Begin::Usual | Begin::NoOrbit(_) => None,
+    let start = args.from_pss.then(|| {
+        let asked = PeriodicOptions {
+            cancel: Some(cancel),
+            settings: request.settings(),
+            ..PeriodicOptions::default()
         };
+        analysis::orbit_start(model, &asked).map(|(_, start)| start)
+    });
+    let table = start.transpose().and_then(|start| {
         let options = TableOptions {
             inputs: args.table.inputs.clone(),
             outputs: args.table.outputs.clone(),
@@ -309,40 +317,6 @@ fn measured_run(
     finished
 }
 
-/// Where a transient begins.
-enum Begin {
-    /// At its initial conditions or operating point.
-    Usual,
-    /// On this orbit.
-    Orbit(Orbit, Standing),
-    /// As usual, as there is not the orbit that `.tran … steady` asks for.
-    NoOrbit(Error),
-}
-
-/// Where a transient is to begin; that an orbit is not there is an error where `--from-pss` asks for it.
-fn begin(
-    model: &Model,
-    from_pss: bool,
-    request: &Request,
-    cancel: Option<&AtomicBool>,
-) -> Result<Begin, Error> {
-    if !from_pss && model.circuit().steady != Some(SteadyState::Start) {
-        return Ok(Begin::Usual);
-    }
-    let asked = PeriodicOptions {
-        cancel,
-        settings: request.settings(),
-        ..PeriodicOptions::default()
-    };
-    match analysis::orbit_start(model, &asked) {
-        Ok((orbit, start)) => Ok(Begin::Orbit(orbit, start)),
-        Err(error) if !from_pss && !matches!(error.reason, Reason::Interrupted) => {
-            Ok(Begin::NoOrbit(error))
-        }
-        Err(error) => Err(error),
-    }
-}
-
 /// The same of a circuit.
 pub(super) fn transient(
     model: &Model,
@@ -351,17 +325,21 @@ pub(super) fn transient(
     streams: &Streams,
 ) -> Finished {
     let tran = model.circuit().tran;
-    let start = match begin(model, route.from_orbit, request, route.cancel) {
-        Ok(Begin::Orbit(orbit, start)) => {
-            streams.say(format!("starts at the {}", report::text::orbit(&orbit)));
-            Some(start)
+    let start = if route.from_orbit {
+        let asked = PeriodicOptions {
+            cancel: route.cancel,
+            settings: request.settings(),
+            ..PeriodicOptions::default()
+        };
+        match analysis::orbit_start(model, &asked) {
+            Ok((orbit, start)) => {
+                streams.say(format!("starts at the {}", report::text::orbit(&orbit)));
+                Some(start)
+            }
+            Err(error) => return Finished::of(Err(error)),
         }
-        Ok(Begin::Usual) => None,
-        Ok(Begin::NoOrbit(error)) => {
-            streams.warning(format!("`steady` of `.tran` is left out: {error}"));
-            None
-        }
-        Err(error) => return Finished::of(Err(error)),
+    } else {
+        None
     };
     let run = |options: SimOptions<'_>| analysis::transient(model, SimOptions { start, ..options });
     let mut finished = with_options(tran, request, route, streams, run);

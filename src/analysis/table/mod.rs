@@ -11,6 +11,7 @@ use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
 use super::periodic::{PeriodicOptions, common_period, on_grid, steady};
+use super::start::beginning;
 use super::variation::Course;
 use crate::circuit::{Circuit, Element, Kind, NodeId, Probe, Probed, Tran};
 use crate::integrate::{
@@ -210,8 +211,10 @@ pub fn table(model: &Model, options: &TableOptions<'_>) -> Result<Table, Error> 
         let what = "the netlist asks for no .tran analysis";
         return Err(Error::before(Reason::Unsupported(what.into())));
     };
+    let asked = (options.cancel, &options.settings);
+    let (start, _) = beginning(model, options.start.clone(), asked)?;
     let span = Span {
-        from: options.start.as_ref().map_or(0.0, |s| s.t).max(tran.tstart),
+        from: start.as_ref().map_or(0.0, |s| s.t).max(tran.tstart),
         to: tran.tstop,
     };
     let period = common_period(model.circuit()).filter(|period| *period <= span.to - span.from);
@@ -224,7 +227,7 @@ pub fn table(model: &Model, options: &TableOptions<'_>) -> Result<Table, Error> 
         let (circuit, multiport) = (probing.circuit(), probing.multiport());
         let mut simulation = Simulation::closed(circuit, multiport, simulation)?;
         if simulation.is_exact() {
-            let (t, state, switches) = match &options.start {
+            let (t, state, switches) = match &start {
                 Some(start) => (start.t, start.state.clone(), start.switches.clone()),
                 None => (0.0, simulation.state(), simulation.positions()),
             };
@@ -252,7 +255,7 @@ pub fn table(model: &Model, options: &TableOptions<'_>) -> Result<Table, Error> 
         step: options.step,
         corners: true,
         cancel: options.cancel,
-        start: options.start.clone(),
+        start,
         settings: options.settings.clone(),
         unestimated: true,
         ..SimOptions::default()
