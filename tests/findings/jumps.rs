@@ -115,6 +115,19 @@ fn a_hysteretic_switch_that_slides_is_a_choice_and_says_so() {
     assert!(sliding.notes.iter().any(told), "{:?}", sliding.notes);
 }
 
+/// The current stays at the limit, 0.76 V / 0.16 Ω, until the clock ends; where the switch's current was negative the run was refused.
+#[test]
+fn a_switch_slides_whichever_way_it_stands() {
+    for terminals in ["s1 4 1", "s1 1 4"] {
+        let replaced = [("s1 4 1", terminals)];
+        let found = changed("peak_current_slides", &replaced, Method::Exact);
+        let slides = |n: &Note| n.text.contains("s1 slides between its thresholds");
+        assert!(found.notes.iter().any(slides), "{:?}", found.notes);
+        let limit = super::runs::at(&found, "i(l1)", 10.0 * 1.081_081_081_081_081_2e-6);
+        assert!((limit - 4.75).abs() < 1e-12, "{limit} A");
+    }
+}
+
 #[test]
 fn a_pair_of_switches_moves_together_on_a_steep_edge() {
     // The saw tooth returns at 10⁸ V/s: the rounding of the time is more than that of the control.

@@ -135,8 +135,13 @@ impl Mode {
             .view_mut((n, n), (dz, dz))
             .copy_from(exosystem.generator());
 
-        let held = over_w(&lcs.held.guard, n, exosystem);
-        let kernel = &lcs.held.kernel;
+        // The pairs of sliding switches come last; their currents have either sign.
+        let slides = key.sliding_switches();
+        let count = lcs.held.kernel.nrows().saturating_sub(slides.len());
+        let held = over_w(&lcs.held.guard, n, exosystem)
+            .rows(0, count)
+            .into_owned();
+        let kernel = &lcs.held.kernel.rows(0, count).into_owned();
         let in_kernel = |&pair: &usize| kernel.row(pair).iter().any(|v| *v != 0.0);
         let shared: Vec<usize> = (0..kernel.nrows()).filter(in_kernel).collect();
         let rays = (kernel.ncols() > 0).then(|| rays::extreme_rays(kernel));
@@ -153,7 +158,6 @@ impl Mode {
             }
             _ => kept,
         };
-        let slides = key.sliding_switches();
         let published: Vec<usize> = (0..thresholds.len())
             .filter(|i| !slides.contains(i))
             .collect();

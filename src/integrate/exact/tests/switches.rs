@@ -184,10 +184,20 @@ fn flux_is_shared_through_an_opening_switch() {
 /// A two-point controller without hysteresis keeps its output on a reference that stands, rises too fast, and stands.
 #[test]
 fn a_controller_slides_on_its_threshold() {
-    let run = simulate(
-        "V1 1 0 10\nS1 1 2 ref out sw OFF\nR1 2 out 1k\nC1 out 0 1u IC=0\nR2 out 0 10k\n\
+    slides_on_its_threshold("1 2", 1.0);
+}
+
+#[test]
+fn a_controller_slides_whose_switch_stands_the_other_way() {
+    slides_on_its_threshold("2 1", -1.0);
+}
+
+/// With the switch between these terminals, whose current has this sign.
+fn slides_on_its_threshold(terminals: &str, sign: f64) {
+    let run = simulate(&format!(
+        "V1 1 0 10\nS1 {terminals} ref out sw OFF\nR1 2 out 1k\nC1 out 0 1u IC=0\nR2 out 0 10k\n\
          Vref ref 0 PWL(0 5 10m 5 11m 8)\n.model sw SW(ideal Vt=0 Vh=0)\n.tran 0.1m 20m uic\n.save v(out) i(S1) v(1,2)",
-    );
+    ));
     // Closed: v' = 10⁴ − 1100 v.
     let (rest, rate): (f64, f64) = (1e4 / 1.1e3, 1.1e3);
     let reach = -(1.0 - 5.0 / rest).ln() / rate;
@@ -201,7 +211,7 @@ fn a_controller_slides_on_its_threshold() {
     }
     assert_eq!(times.len(), 3, "{:?}", run.events);
     assert!((at(&run, 9e-3, "v(out)") - 5.0).abs() < 1e-13);
-    assert!((at(&run, 9e-3, "i(s1)") - 0.5e-3).abs() < 1e-15);
+    assert!((at(&run, 9e-3, "i(s1)") - sign * 0.5e-3).abs() < 1e-15);
     assert!((at(&run, 9e-3, "v(1,2)") - 4.5).abs() < 1e-12);
     assert!((at(&run, 10.2e-3, "v(out)") - 5.6).abs() < 1e-12);
     assert!((at(&run, 20e-3, "v(out)") - 8.0).abs() < 1e-12);
