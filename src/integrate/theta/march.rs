@@ -186,6 +186,9 @@ impl Theta {
             let may_locate = h > finest && !last_chance && !self.switches.chattering(CHATTER);
             if change == Demand::Passage && may_locate {
                 self.locate(finest, steps, &mut impulse, log)?;
+                // The right limit is read as behind a step that ends there by itself: in a shorter one what sources move is rounding to the
+                // solvers, and a control on its threshold decides nothing.
+                self.last_h = h;
             }
             self.report(log);
             self.switch(&[], log)?;

@@ -88,8 +88,9 @@ pub enum Start {
 
 /// Sub-steps of a base step are multiples of 2^−FINEST of it.
 const FINEST: u32 = 40;
-/// State-driven switching times are located to 2^−LOCATE of a base step.
-const LOCATE: i32 = 24;
+/// State-driven switching times are located to 2^−LOCATE of a base step: a transient that the switch starts is off by what that is of its time
+/// constant. Controls that a solver decides are not known much better.
+const LOCATE: i32 = 32;
 /// Switchings in one base step after which they are no longer located but taken at the ends of whole base steps
 /// (chattering: the base step then decides how fast a sliding switch switches).
 const CHATTER: u32 = 32;
