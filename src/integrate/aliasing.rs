@@ -65,10 +65,19 @@ pub fn aliased<'a>(
 
 /// Names of events that repeat, and their periods, s.
 fn periods(run: &Run) -> Vec<(String, f64)> {
-    let mut alike: BTreeMap<(&[Change], bool), Vec<&Event>> = BTreeMap::new();
+    // What recurs is one list in memory, as a rule: what lists say is compared once for each of them.
+    let mut lists: BTreeMap<(*const Change, bool), Vec<&Event>> = BTreeMap::new();
     for event in &run.events {
-        let kind = (&*event.changes, event.jump);
-        alike.entry(kind).or_default().push(event);
+        let list = (event.changes.as_ptr(), event.jump);
+        lists.entry(list).or_default().push(event);
+    }
+    let mut alike: BTreeMap<(&[Change], bool), Vec<&Event>> = BTreeMap::new();
+    for ((_, jump), events) in lists {
+        let kind = (&*events[0].changes, jump);
+        alike.entry(kind).or_default().extend(events);
+    }
+    for events in alike.values_mut() {
+        events.sort_by(|one, other| one.t.total_cmp(&other.t));
     }
     let period = |events: Vec<&Event>| {
         let event = events.first()?;
