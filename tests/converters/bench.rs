@@ -1,6 +1,8 @@
 //! What converters are put together from: sources, gates, switches and diodes in one of many styles.
 
-use crate::circuit::{Card, Circuit, DiodeModel, MosModel, Part, SwitchModel, Wave, Writing};
+use crate::circuit::{
+    Card, Circuit, Core, DiodeModel, MosModel, Part, SwitchModel, ThyristorModel, Wave, Writing,
+};
 use crate::random::{Random, digits};
 
 /// How a circuit's switches are modelled; resistances in Ω.
@@ -66,6 +68,10 @@ pub(crate) struct Bench<'r> {
     pub(crate) period: f64,
     pub(crate) switches: Switches,
     pub(crate) diodes: DiodeModel,
+    /// What every second diode is instead.
+    pub(crate) others: Option<DiodeModel>,
+    /// Whether some chokes saturate.
+    pub(crate) saturates: bool,
     nodes: usize,
 }
 
@@ -77,6 +83,8 @@ impl<'r> Bench<'r> {
         Self {
             switches: Switches::Sw(0.0, f64::INFINITY),
             diodes: DiodeModel::Lines(0.0, 0.0, f64::INFINITY),
+            others: None,
+            saturates: false,
             random,
             circuit: Circuit::default(),
             volts,
@@ -154,8 +162,31 @@ impl<'r> Bench<'r> {
 
     /// A diode of the circuit's style.
     pub(crate) fn diode(&mut self, anode: &str, cathode: &str) {
-        let model = self.diodes;
+        let model = match self.others {
+            Some(other) if self.random.one_in(2) => other,
+            _ => self.diodes,
+        };
         self.add('d', &[anode, cathode], Part::D(model));
+    }
+
+    /// A thyristor whose gate is on from `delay` on for `width` (fractions of the period); its diode is of the circuit's style.
+    pub(crate) fn thyristor(&mut self, anode: &str, cathode: &str, delay: f64, width: f64) {
+        let lines = match self.diodes {
+            DiodeModel::Lines(vfwd, ron, roff) => [vfwd, ron, roff],
+            DiodeModel::Curved(..) => [0.7, 1e-3 * self.ohms, 1e6 * self.ohms],
+        };
+        let (gate, period) = (self.node(), self.period);
+        let wave = Wave::Pulse {
+            levels: [0.0, 2.0],
+            delay: digits(delay * period, 6),
+            rise: 0.0,
+            fall: 0.0,
+            width: digits(width * period, 6),
+            period,
+        };
+        self.v(&gate, cathode, wave);
+        let model = ThyristorModel { lines, vgt: 1.0 };
+        self.add('x', &[anode, cathode, &gate], Part::Thyristor(model));
     }
 
     /// A switch of the circuit's style; as a MOSFET it conducts backwards, from `b` to `a`, too.
@@ -472,6 +503,21 @@ impl<'r> Bench<'r> {
     pub(crate) fn choke(&mut self, a: &str, b: &str) {
         let (henries, whole) = (self.henries(), self.amps());
         let ic = self.start(whole);
+        if self.saturates && self.random.one_in(2) {
+            let knee = digits(whole * self.random.even(0.2, 1.5), 2);
+            let saturated = digits(henries * self.random.pick(&[0.02, 0.1, 0.5]), 2);
+            let core = Core {
+                henries,
+                knee,
+                saturated,
+                ic,
+            };
+            self.add('l', &[a, b], Part::Core(core));
+            // In series with another inductor its flux has no other way to move by itself.
+            let across = digits(1e4 * self.ohms, 2);
+            self.r(a, b, across);
+            return;
+        }
         if self.random.one_in(4) {
             let (inner, ohms) = (self.node(), digits(self.ohms * 0.01, 2));
             self.l(a, &inner, henries, ic);

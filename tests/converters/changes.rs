@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::circuit::{Card, Circuit, DiodeModel, Part, Wave, states, wholly_coupled};
+use crate::circuit::{Card, Circuit, Core, DiodeModel, Part, Wave, states, wholly_coupled};
 use crate::random::Random;
 
 /// Another netlist of the same circuit.
@@ -72,7 +72,7 @@ pub(crate) fn change(circuit: &Circuit, kind: usize, random: &mut Random) -> Opt
         }
         4 => renamed(changed, random),
         5 => {
-            mirror(&mut changed);
+            mirror(&mut changed)?;
             of(name, changed, own.into_iter().map(|n| (n, -1.0)).collect())
         }
         6 => {
@@ -175,7 +175,7 @@ fn renamed(mut circuit: Circuit, random: &mut Random) -> Change {
                 card.nodes.reverse();
                 false
             }
-            Part::C(_, ic) | Part::L(_, ic) => {
+            Part::C(_, ic) | Part::L(_, ic) | Part::Core(Core { ic, .. }) => {
                 if turned {
                     card.nodes.reverse();
                     *ic = 0.0 - *ic;
@@ -227,11 +227,12 @@ fn scale_wave(wave: &mut Wave, factor: f64) {
     }
 }
 
-/// All voltages and currents the other way round.
-fn mirror(circuit: &mut Circuit) {
+/// All voltages and currents the other way round; there is no thyristor whose gate is at its anode.
+fn mirror(circuit: &mut Circuit) -> Option<()> {
     for card in &mut circuit.cards {
         match &mut card.part {
-            Part::C(_, ic) | Part::L(_, ic) => *ic = 0.0 - *ic,
+            Part::C(_, ic) | Part::L(_, ic) | Part::Core(Core { ic, .. }) => *ic = 0.0 - *ic,
+            Part::Thyristor(_) => return None,
             Part::V(wave) | Part::I(wave) => scale_wave(wave, -1.0),
             Part::D(_) => card.nodes.reverse(),
             Part::S(_) => card.nodes.swap(2, 3),
@@ -246,6 +247,7 @@ fn mirror(circuit: &mut Circuit) {
             Part::R(_) | Part::K(..) | Part::Gain(_) => {}
         }
     }
+    Some(())
 }
 
 fn scale_volts(circuit: &mut Circuit, factor: f64) -> Option<()> {
@@ -258,6 +260,8 @@ fn scale_volts(circuit: &mut Circuit, factor: f64) -> Option<()> {
             Part::S(m) => (m.vt, m.vh) = (m.vt * factor, m.vh * factor),
             Part::Comparator(levels, _) => levels.iter_mut().for_each(|v| *v *= factor),
             Part::M(m) => m.vto *= factor,
+            Part::Thyristor(t) => (t.lines[0], t.vgt) = (t.lines[0] * factor, t.vgt * factor),
+            Part::Core(core) => (core.knee, core.ic) = (core.knee * factor, core.ic * factor),
             Part::R(_) | Part::K(..) | Part::Gain(_) => {}
         }
     }
@@ -280,6 +284,11 @@ fn scale_ohms(circuit: &mut Circuit, factor: f64) {
                 (m.ron, m.roff) = (m.ron * factor, m.roff * factor);
                 m.rb *= factor;
             }
+            Part::Thyristor(t) => t.lines[1..].iter_mut().for_each(|r| *r *= factor),
+            Part::Core(core) => {
+                (core.knee, core.ic) = (core.knee / factor, core.ic / factor);
+                (core.henries, core.saturated) = (core.henries * factor, core.saturated * factor);
+            }
             Part::K(..) | Part::V(_) | Part::Gain(_) | Part::Comparator(..) => {}
         }
     }
@@ -291,6 +300,9 @@ fn scale_seconds(circuit: &mut Circuit, factor: f64) {
         match &mut card.part {
             Part::C(c, _) => *c *= factor,
             Part::L(l, _) => *l *= factor,
+            Part::Core(core) => {
+                (core.henries, core.saturated) = (core.henries * factor, core.saturated * factor);
+            }
             Part::V(wave) | Part::I(wave) => match wave {
                 Wave::Dc(_) => {}
                 Wave::Sin(_, _, f, _) => *f /= factor,
@@ -343,6 +355,11 @@ fn split(circuit: &mut Circuit, random: &mut Random) {
             (Part::C(a, _), Part::C(b, _)) => {
                 (*a, *b) = (*a * 0.5, *b * 0.5);
                 false
+            }
+            (Part::Core(a), Part::Core(b)) => {
+                (a.henries, a.saturated) = (a.henries * 0.5, a.saturated * 0.5);
+                *b = *a;
+                true
             }
             (Part::S(a), Part::S(b)) => {
                 (a.ron, a.roff) = (a.ron * 2.0, a.roff * 2.0);

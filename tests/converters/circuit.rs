@@ -71,6 +71,23 @@ pub(crate) struct MosModel {
     pub(crate) rb: f64,
 }
 
+/// A thyristor whose gate draws nothing: Vfwd, Ron, Roff of its diode, and what its gate needs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ThyristorModel {
+    pub(crate) lines: [f64; 3],
+    pub(crate) vgt: f64,
+}
+
+/// An inductor that saturates: its inductance up to a current of either sign, and beyond.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Core {
+    pub(crate) henries: f64,
+    pub(crate) knee: f64,
+    pub(crate) saturated: f64,
+    /// A at the start.
+    pub(crate) ic: f64,
+}
+
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Part {
     R(f64),
@@ -92,6 +109,9 @@ pub(crate) enum Part {
     D(DiodeModel),
     /// Nodes drain, gate, source.
     M(MosModel),
+    /// Nodes anode, cathode, gate.
+    Thyristor(ThyristorModel),
+    Core(Core),
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -116,6 +136,8 @@ pub(crate) fn states(circuit: &Circuit) -> Vec<String> {
     let state = |card: &Card| match card.part {
         Part::C(..) => Some(voltage(&card.nodes[0], &card.nodes[1])),
         Part::L(..) if !coupled.contains(&card.name) => Some(format!("i({})", card.name)),
+        // Its flux, as the current that it would have in the inductance of small ones.
+        Part::Core(..) => Some(format!("i({}.flux)", card.name)),
         _ => None,
     };
     circuit.cards.iter().filter_map(state).collect()
@@ -227,6 +249,31 @@ fn card_text(card: &Card, models: &mut Vec<String>) -> String {
         Part::D(DiodeModel::Curved(is, n, rs)) => {
             let text = format!("d(is={is:e} n={n} rs={rs:e})");
             format!("{name} {nodes} {}", model(models, text))
+        }
+        Part::Thyristor(t) => {
+            let [vfwd, ron, roff] = t.lines;
+            let text = format!(
+                "scr(vgt={:e} vfwd={vfwd:e} ron={ron:e}{})",
+                t.vgt,
+                if roff.is_finite() {
+                    ohms("roff", roff)
+                } else {
+                    String::new()
+                }
+            );
+            let [anode, cathode, gate] = [0, 1, 2].map(|k| &card.nodes[k]);
+            format!("{name} {anode} {gate} {cathode} {}", model(models, text))
+        }
+        Part::Core(core) => {
+            let (i, flux) = (core.knee, core.knee * core.henries);
+            let [i2, flux2] = [2.0 * i, flux + i * core.saturated];
+            let points = [(-i2, -flux2), (-i, -flux), (i, flux), (i2, flux2)];
+            let points = points.map(|(i, flux)| format!("{i:e},{flux:e}"));
+            format!(
+                "{name} {nodes} flux=pwl(x,{}) ic={:e}",
+                points.join(","),
+                core.ic
+            )
         }
         Part::M(m) => {
             let kind = if m.p_channel { "pmos" } else { "nmos" };

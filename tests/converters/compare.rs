@@ -10,7 +10,7 @@ use circ::integrate::{Method, Run, SimOptions};
 use circ::settings::Settings;
 
 use crate::changes::change;
-use crate::circuit::{Card, Circuit, DiodeModel, Part, states};
+use crate::circuit::{Card, Circuit, Core, DiodeModel, Part, ThyristorModel, states};
 use crate::oracle::{self, Answer, COARSE, FINE};
 use crate::random::Random;
 use crate::resumed;
@@ -129,7 +129,7 @@ fn floors(circuit: &Circuit) -> (f64, f64) {
     for card in &circuit.cards {
         match &card.part {
             Part::C(_, ic) => volts = volts.max(ic.abs()),
-            Part::L(_, ic) => amps = amps.max(ic.abs()),
+            Part::L(_, ic) | Part::Core(Core { ic, .. }) => amps = amps.max(ic.abs()),
             Part::V(wave) => volts = volts.max(wave.largest()),
             Part::I(wave) => amps = amps.max(wave.largest()),
             _ => {}
@@ -206,6 +206,7 @@ fn is_plain(circuit: &Circuit) -> bool {
         Part::S(m) => m.ron >= 1e-5 && m.roff <= 1e9,
         Part::M(m) => m.rb >= 1e-5 && m.ron >= 1e-5 && m.roff <= 1e9,
         Part::D(DiodeModel::Lines(_, ron, roff)) => ron >= 1e-5 && roff <= 1e9,
+        Part::Thyristor(t) => t.lines[1] >= 1e-5 && t.lines[2] <= 1e9,
         _ => true,
     })
 }
@@ -218,6 +219,12 @@ pub(crate) fn realised(circuit: &Circuit, ron: f64, roff: f64) -> Circuit {
         match &mut card.part {
             Part::S(m) => (m.ron, m.roff) = (m.ron + ron, across(m.roff)),
             Part::D(DiodeModel::Lines(_, on, off)) => (*on, *off) = (*on + ron, across(*off)),
+            Part::Thyristor(ThyristorModel {
+                lines: [_, on, off],
+                ..
+            }) => {
+                (*on, *off) = (*on + ron, across(*off));
+            }
             Part::M(m) => {
                 (m.ron, m.roff) = (m.ron + ron, across(m.roff));
                 m.rb += ron;
@@ -238,10 +245,13 @@ fn shunted(circuit: &Circuit, ohms: f64) -> Circuit {
     let mut circuit = circuit.clone();
     let mut shunts = Vec::new();
     for card in &circuit.cards {
-        if matches!(card.part, Part::L(..) | Part::D(DiodeModel::Curved(..))) {
+        if matches!(
+            card.part,
+            Part::L(..) | Part::Core(_) | Part::D(DiodeModel::Curved(..))
+        ) {
             shunts.push(Card {
                 name: format!("rshunt{}", card.name),
-                nodes: card.nodes.clone(),
+                nodes: card.nodes[..2].to_vec(),
                 part: Part::R(ohms),
             });
         }

@@ -19,6 +19,8 @@ pub(crate) enum Style {
     Mixed,
     /// Exponential diodes.
     Curved,
+    /// Exponential diodes beside ones of lines.
+    Both,
 }
 
 /// A power stage.
@@ -56,6 +58,18 @@ const STAGES: [(&str, Stage); 28] = [
     ("interleaved buck", interleaved_buck),
 ];
 
+/// Further ones.
+const MORE_STAGES: [(&str, Stage); 5] = [
+    ("controlled half wave", controlled_half_wave),
+    ("controlled bridge", controlled_bridge),
+    ("controlled six-pulse", controlled_six_pulse),
+    ("dimmer", dimmer),
+    ("freewheeling leg", freewheeling_leg),
+];
+
+/// Seeds from here on draw from further stages, styles and devices too; the earlier ones are as they were, as findings name them.
+const FURTHER: u64 = 8_000_000;
+
 /// A circuit and how it came to be.
 #[derive(Debug, Clone)]
 pub(crate) struct Case {
@@ -66,8 +80,12 @@ pub(crate) struct Case {
 
 /// The case of a seed.
 pub(crate) fn case(seed: u64) -> Case {
-    use Style::{Curved, Extreme, Finite, Ideal, Mixed};
+    use Style::{Both, Curved, Extreme, Finite, Ideal, Mixed};
     let mut random = Random::new(seed);
+    if seed >= FURTHER {
+        let style = random.pick(&[Ideal, Ideal, Finite, Extreme, Mixed, Curved, Both]);
+        return build(seed, style, &mut random);
+    }
     let style = random.pick(&[
         Ideal, Ideal, Ideal, Ideal, Ideal, Finite, Finite, Finite, Extreme, Extreme, Mixed, Mixed,
         Curved,
@@ -135,9 +153,17 @@ pub(crate) fn plain_case(seed: u64, style: Style) -> Case {
 }
 
 fn build(seed: u64, style: Style, random: &mut Random) -> Case {
-    let (stage, build) = random.pick(&STAGES);
+    let is_further = seed >= FURTHER;
+    let (stage, build) = if is_further && random.one_in(2) {
+        random.pick(&MORE_STAGES)
+    } else {
+        random.pick(&STAGES)
+    };
     let mut bench = Bench::new(random);
     devices(&mut bench, style);
+    // Where ideal devices leave a saturable inductor's current no path but itself, its flux is refused.
+    let is_finite = matches!(style, Style::Finite | Style::Curved | Style::Both);
+    bench.saturates = is_further && is_finite && bench.random.one_in(2);
     build(&mut bench);
     let periods = bench.random.pick(&[2.0, 3.0, 4.0, 5.0]);
     // Odd, so that rows seldom meet edges.
@@ -169,7 +195,7 @@ fn devices(b: &mut Bench<'_>, style: Style) {
     };
     let pair = |random: &mut Random| match style {
         Style::Ideal => ideal,
-        Style::Finite | Style::Curved => finite(random),
+        Style::Finite | Style::Curved | Style::Both => finite(random),
         Style::Extreme => extreme(random),
         Style::Mixed => match random.below(4) {
             0 => ideal,
@@ -189,14 +215,18 @@ fn devices(b: &mut Bench<'_>, style: Style) {
         Style::Ideal => b.random.pick(&[0.0, 0.0, 0.0, 0.7]),
         _ => b.random.pick(&[0.0, 0.3, 0.7]),
     };
-    b.diodes = if style == Style::Curved {
+    let lines = DiodeModel::Lines(drop, ron, roff);
+    b.diodes = if matches!(style, Style::Curved | Style::Both) {
         let is = b.random.pick(&[1e-14, 1e-12, 1e-9, 1e-6]);
         let n = b.random.pick(&[1.0, 1.05, 1.8]);
         let rs = b.random.pick(&[0.0, 1e-3, 1e-2]);
         DiodeModel::Curved(is, n, rs * z)
     } else {
-        DiodeModel::Lines(drop, ron, roff)
+        lines
     };
+    if style == Style::Both {
+        b.others = Some(lines);
+    }
 }
 
 fn buck(b: &mut Bench<'_>) {
@@ -851,6 +881,88 @@ fn switched_capacitor(b: &mut Bench<'_>) {
     b.r(&a, &x, series);
     b.c(&x, &c, farads, ic);
     b.output(&out, "0", half);
+}
+
+/// The angle at which thyristors fire and for how long their gates stay on, in parts of the period; without pulses that begin at a natural
+/// commutation.
+fn firing(b: &mut Bench<'_>) -> (f64, f64) {
+    let angle = b.random.pick(&[0.03, 0.1, 0.17, 0.25, 0.32, 0.41]);
+    let width = b.random.pick(&[1e-3, 0.01, 0.05, 0.2, 0.5 - angle]);
+    (angle, width)
+}
+
+fn controlled_half_wave(b: &mut Bench<'_>) {
+    let kind = b.random.below(3);
+    let x = mains(b, 0.0, "0");
+    let (y, p) = (line_part(b, kind, x), b.node());
+    let (angle, width) = firing(b);
+    b.thyristor(&y, &p, angle, width);
+    if b.random.one_in(2) {
+        b.diode("0", &p);
+    }
+    rectified_load(b, &p, "0");
+}
+
+/// Four thyristors, or two and two diodes.
+fn controlled_bridge(b: &mut Bench<'_>) {
+    let kind = b.random.below(3);
+    let x = mains(b, 0.0, "0");
+    let (y, p, n) = (line_part(b, kind, x), b.node(), b.node());
+    let (angle, width) = firing(b);
+    b.thyristor(&y, &p, angle, width);
+    b.thyristor("0", &p, angle + 0.5, width);
+    if b.random.one_in(2) {
+        b.diode(&n, &y);
+        b.diode(&n, "0");
+    } else {
+        b.thyristor(&n, "0", angle, width);
+        b.thyristor(&n, &y, angle + 0.5, width);
+    }
+    rectified_load(b, &p, &n);
+}
+
+fn controlled_six_pulse(b: &mut Bench<'_>) {
+    let (p, n, kind) = (b.node(), b.node(), b.random.below(3));
+    let (angle, width) = firing(b);
+    let width = width.max(0.2);
+    for (k, phase) in [0.0, -120.0, 120.0].into_iter().enumerate() {
+        let x = mains(b, phase, "0");
+        let y = line_part(b, kind, x);
+        let delay = angle + 1.0 / 12.0 + k as f64 / 3.0;
+        b.thyristor(&y, &p, delay, width);
+        b.thyristor(&n, &y, delay + 0.5, width);
+    }
+    rectified_load(b, &p, &n);
+}
+
+/// Two thyristors back to back before a load.
+fn dimmer(b: &mut Bench<'_>) {
+    let kind = b.random.below(3);
+    let x = mains(b, 0.0, "0");
+    let (y, z) = (line_part(b, kind, x), b.node());
+    let (angle, width) = firing(b);
+    b.thyristor(&y, &z, angle, width);
+    b.thyristor(&z, &y, angle + 0.5, width);
+    load(b, &z, "0");
+}
+
+/// An inductor that a switch leaves to several diodes in parallel and in series, each of its own kind.
+fn freewheeling_leg(b: &mut Bench<'_>) {
+    let (sw, out, m) = (b.node(), b.node(), b.node());
+    let input = b.supply();
+    let gate = b.open_gate();
+    b.switch(&input, &sw, &gate);
+    b.diode("0", &sw);
+    if b.random.one_in(2) {
+        b.diode("0", &m);
+        b.diode(&m, &sw);
+    }
+    if b.random.one_in(2) {
+        b.diode("0", &sw);
+    }
+    b.choke(&sw, &out);
+    let whole = 0.5 * b.volts;
+    b.output(&out, "0", whole);
 }
 
 /// A driven tree of resistors with everything across it.

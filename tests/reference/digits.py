@@ -111,9 +111,10 @@ class Network:
             return 1 / self.eps
         return ohms if self.eps is None else 1 / (1 / ohms + self.eps)
 
-    def diode(self, nodes, vfwd, ron, roff, name):
+    def diode(self, nodes, vfwd, ron, roff, name, gate=None):
+        """Of a thyristor `gate` is the device without which it stays off."""
         current = vfwd / (roff - ron)
-        self.devices.append(("diode", len(self.branches), roff * current, current, name))
+        self.devices.append(("diode", len(self.branches), roff * current, current, gate, name))
         self.add(nodes, ("diode", len(self.devices) - 1, vfwd, ron, roff), name)
 
     def switch(self, nodes, control, levels, ohms, name):
@@ -159,6 +160,15 @@ class Network:
             assert "is=" not in text, "exponential diodes"
             vfwd, ron = value(text, "vfwd", arb(0)), value(text, "ron", arb(0))
             self.diode(nodes, vfwd, self.on(ron), self.off(value(text, "roff")), name)
+        elif kind == "x":
+            nodes, control = (nodes[0], self.node(parts[3])), (nodes[1], self.node(parts[3]))
+            text = models[parts[4]][1]
+            ron, roff = self.on(value(text, "ron")), self.off(value(text, "roff"))
+            # Roff stands across the whole of it.
+            part = roff / (ron + roff)
+            self.diode(nodes, value(text, "vfwd") * part, ron * part, roff, name, len(self.devices) + 1)
+            level = value(text, "vgt")
+            self.devices.append(("switch", control, level, level, name + ".gate"))
         elif kind == "m":
             polarity, text = models[parts[4]]
             drain, gate, source = (self.node(n) for n in parts[1:4])
@@ -254,6 +264,8 @@ class Network:
                 row, level = volts_of(device[1]), arb(0)
             elif on:
                 row, level = quantity(free + device[1]), device[3]
+            elif device[4] is not None and not position[device[4]]:
+                row, level = [arb(0)] * width, arb(1)
             else:
                 row, level = volts_of(self.branches[device[1]][0]), device[2]
             row[-1] = row[-1] - level

@@ -29,6 +29,13 @@ enum Branch {
     Switch(usize, [f64; 2]),
     /// On: v = vfwd + ron i, off: v = roff i.
     Diode(usize, [f64; 3]),
+    /// i = state, and `more` of what it is beyond the level of either of two devices.
+    Core {
+        state: usize,
+        beyond: [usize; 2],
+        level: f64,
+        more: f64,
+    },
     /// i = current of an exponential diode, in series with a resistance.
     Curved(usize, f64),
     /// The first winding of a transformer without leakage: i + Σ ratio·i(others) = state.
@@ -55,10 +62,18 @@ pub(super) enum Device {
     Comparator {
         control: [usize; 2],
     },
-    /// Branch; voltage and current of the corner.
+    /// Branch; voltage and current of the corner. Of a thyristor the device that stands where its gate does: while that is off a diode that
+    /// is off stays so.
     Diode {
         wire: usize,
         corner: [f64; 2],
+        gate: Option<usize>,
+    },
+    /// Whether a state, in the direction of the sign, is above a level.
+    Level {
+        state: usize,
+        sign: f64,
+        level: f64,
     },
 }
 
@@ -178,6 +193,22 @@ impl Network {
                     ohms = 1.0;
                     known = Some((*x, 1.0));
                 }
+                Branch::Core {
+                    state,
+                    beyond,
+                    level,
+                    more,
+                } => {
+                    ohms = 1.0;
+                    let parts = beyond.iter().zip([1.0, -1.0]);
+                    let parts = parts.filter(|(device, _)| positions[**device]);
+                    let mut factor = 1.0;
+                    for (_, sign) in parts {
+                        factor += more;
+                        b[width - 1][current] -= sign * more * level;
+                    }
+                    known = Some((*state, factor));
+                }
                 Branch::Voltage(u) => {
                     volts(wire.nodes, 1.0);
                     known = Some((sources + u, 1.0));
@@ -269,9 +300,17 @@ impl Network {
                     if on { *below } else { *above },
                 ),
                 Device::Comparator { control } => (row(&|c| volts(c, *control)), 0.0),
-                Device::Diode { wire, corner } if on => (row(&|c| c[free + wire].0), corner[1]),
-                Device::Diode { wire, corner } => {
+                Device::Diode { wire, corner, .. } if on => (row(&|c| c[free + wire].0), corner[1]),
+                Device::Diode {
+                    gate: Some(gate), ..
+                } if !positions[*gate] => (vec![0.0; columns.len()], 1.0),
+                Device::Diode { wire, corner, .. } => {
                     (row(&|c| volts(c, self.wires[*wire].nodes)), corner[0])
+                }
+                Device::Level { state, sign, level } => {
+                    let mut row = vec![0.0; columns.len()];
+                    row[*state] = *sign;
+                    (row, *level)
                 }
             };
             if let Some(constant) = row.last_mut() {
@@ -319,7 +358,10 @@ impl Builder<'_> {
         let device = self.network.devices.len();
         let wire = self.wire(nodes, Branch::Diode(device, [vfwd, ron, roff]));
         let corner = [v, i];
-        self.network.devices.push(Device::Diode { wire, corner });
+        let gate = None;
+        self.network
+            .devices
+            .push(Device::Diode { wire, corner, gate });
     }
 
     fn switch(&mut self, nodes: [usize; 2], control: [usize; 2], levels: [f64; 2], ohms: [f64; 2]) {
@@ -383,6 +425,50 @@ impl Builder<'_> {
                 let d = self.network.curved.len();
                 self.network.curved.push((*is, *n));
                 self.wire(nodes, Branch::Curved(d, *rs));
+            }
+            Part::Thyristor(t) => {
+                let control = [self.node(&card.nodes[2]), nodes[1]];
+                // Roff stands across the whole of it: on, the lines are those of both.
+                let [vfwd, ron, roff] = t.lines;
+                let part = if roff.is_finite() {
+                    roff / (ron + roff)
+                } else {
+                    1.0
+                };
+                self.diode(nodes, [vfwd * part, ron * part, roff]);
+                let place = self.network.devices.len();
+                let (on, off) = (t.vgt, t.vgt);
+                self.network
+                    .devices
+                    .push(Device::Switch { control, on, off });
+                if let Device::Diode { gate, .. } = &mut self.network.devices[place - 1] {
+                    *gate = Some(place);
+                }
+            }
+            Part::Core(core) => {
+                let (x, device) = (self.network.states(), self.network.devices.len());
+                let ratio = core.henries / core.saturated;
+                let branch = Branch::Core {
+                    state: x,
+                    beyond: [device, device + 1],
+                    level: core.knee,
+                    more: ratio - 1.0,
+                };
+                let wire = self.wire(nodes, branch);
+                for sign in [1.0, -1.0] {
+                    self.network.devices.push(Device::Level {
+                        state: x,
+                        sign,
+                        level: core.knee,
+                    });
+                }
+                let beyond = (core.ic.abs() - core.knee).max(0.0);
+                let flux = core.ic - core.ic.signum() * beyond * (1.0 - 1.0 / ratio);
+                self.network.start.push(flux);
+                self.network
+                    .storage
+                    .push(Stored::Flux(vec![(wire, 1.0 / core.henries)]));
+                self.network.shown.push(x);
             }
             Part::M(m) => {
                 let [drain, gate] = nodes;
