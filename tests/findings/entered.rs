@@ -57,3 +57,13 @@ fn where_a_first_charge_is_rounding_of_the_leaks() {
     let plain = changed(name, &[("roff=1e9", "roff=1e7")], Method::Exact);
     goes_on(name, &["i(l1)", "i(l2)"], &plain);
 }
+
+/// Where the line's current reverses both diodes of a half-controlled bridge conduct, and a thyristor fires with nothing but ideal devices
+/// around it: it has its share of the current, and holds itself by that when its gate's pulse of 1 µs ends. It was left without, and the bridge never
+/// commutated again. From 120 digits (`tests/reference/digits.py --ideal`), extrapolated from 1e-6 Ω and 1e-8 Ω.
+#[test]
+fn a_thyristor_that_fires_across_a_short_has_its_share() {
+    let found = super::run("thyristor_shares", Method::Exact);
+    let current = super::runs::at(&found, "i(l1)", 32.0 * 1.081_081_081_081_081_1e-4);
+    assert!((current - 1.738_595_265).abs() < 1e-7, "{current} A");
+}

@@ -177,6 +177,13 @@ impl ModeTable {
         holding.map(|(i, _)| i).collect()
     }
 
+    /// Whether a thyristor's latch is on in position `after` and was off in `before`.
+    pub(crate) fn fires(&self, before: &[bool], after: &[bool]) -> bool {
+        let pairs = before.iter().zip(after).zip(&self.valves);
+        let mut fired = pairs.map(|((before, after), valve)| valve.is_some() && !before && *after);
+        fired.any(|fires| fires)
+    }
+
     /// Thyristors that hold themselves in mode `at` although their valves block.
     pub(crate) fn let_go(&self, at: usize) -> impl Iterator<Item = usize> {
         let Key {

@@ -285,7 +285,10 @@ impl Transition<'_> {
         trigger: Trigger,
     ) -> Result<Option<(usize, Vec<usize>)>, Error> {
         let mut tried: Vec<Vec<bool>> = Vec::new();
-        if trigger == Trigger::Sources || self.table.pairs == 0 {
+        // A thyristor that fires where ideal devices short it has its share of their current, by which it holds itself when the gate ends: the
+        // mode before holds without it, too.
+        let fires = self.table.fires(&self.key.switches, &key.switches);
+        if trigger == Trigger::Sources && !fires || self.table.pairs == 0 {
             tried.push(key.closed.clone());
             if let Some(found) = self.try_key(key) {
                 return Ok(Some(found));
