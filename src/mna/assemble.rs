@@ -1,5 +1,7 @@
 //! From the circuit to the equations of its static multiport.
 
+use std::collections::BTreeMap;
+
 use super::couple::{self, Winding};
 use super::{
     Coefficient, Column, Equation, LatchPort, Pair, SourcePort, StaticMultiport, StoragePort,
@@ -371,16 +373,13 @@ impl Assembly<'_> {
         // The metric of the inductors, in the order in which the basis windings were pushed.
         let first =
             self.out.storage.len() - windings.iter().filter(|w| w.transformer.is_none()).count();
-        let basis: Vec<&Winding> = windings
-            .iter()
-            .filter(|w| w.transformer.is_none())
+        let is_basis = |winding: &&Winding| winding.transformer.is_none();
+        let place: BTreeMap<ElementId, usize> = (windings.iter().filter(is_basis).enumerate())
+            .map(|(k, winding)| (winding.element, k))
             .collect();
-        for (a, winding) in basis.iter().enumerate() {
+        for (a, winding) in windings.iter().filter(is_basis).enumerate() {
             for &(value, j) in &winding.inductance {
-                let b = basis
-                    .iter()
-                    .position(|w| w.element == windings[j].element)
-                    .unwrap_or(a);
+                let b = place.get(&windings[j].element).copied().unwrap_or(a);
                 self.out.metric.push((first + a, first + b, value));
             }
         }

@@ -4,6 +4,8 @@
 //! decided exactly on the k's as written. A winding d in the span of the basis windings j obeys
 //! v_d = Σ t_dj v_j, t_dj = c_dj √(L_d/L_j), and adds its current to their flux: i_mj = i_j + Σ_d t_dj i_d.
 
+use std::collections::BTreeMap;
+
 use petgraph::unionfind::UnionFind;
 
 use super::Coefficient;
@@ -38,11 +40,8 @@ pub(super) fn couple(circuit: &Circuit) -> Result<Vec<Winding>, Vec<Diagnostic>>
         })
         .collect();
     let n = inductors.len();
-    let place = |id: ElementId| inductors.iter().position(|(e, _, _)| *e == id);
-    let mut k = vec![vec![<Rational as Field>::zero(); n]; n];
-    for (i, row) in k.iter_mut().enumerate() {
-        row[i] = Field::one();
-    }
+    let place = |id: ElementId| inductors.binary_search_by_key(&id, |(e, _, _)| *e).ok();
+    let mut k = Coefficients::default();
     let mut groups = UnionFind::<usize>::new(n);
     let mut faults = Vec::new();
     for coupling in &circuit.couplings {
@@ -63,8 +62,8 @@ pub(super) fn couple(circuit: &Circuit) -> Result<Vec<Winding>, Vec<Diagnostic>>
             );
         }
         groups.union(a, b);
-        k[a][b] = Rational::value(coupling.k);
-        k[b][a] = k[a][b].clone();
+        k.0.insert((a, b), Rational::value(coupling.k));
+        k.0.insert((b, a), Rational::value(coupling.k));
     }
     if !faults.is_empty() {
         return Err(faults);
@@ -79,13 +78,14 @@ pub(super) fn couple(circuit: &Circuit) -> Result<Vec<Winding>, Vec<Diagnostic>>
             initial,
         })
         .collect();
-    for root in 0..n {
-        let members: Vec<usize> = (0..n)
-            .filter(|&i| groups.find(i) == groups.find(root))
-            .collect();
-        if members.first() != Some(&root) {
-            continue;
-        }
+    // Groups in the order of their first members.
+    let mut members_of: Vec<Vec<usize>> = vec![Vec::new(); n];
+    let mut first_of = vec![None; n];
+    for i in 0..n {
+        let first = *first_of[groups.find(i)].get_or_insert(i);
+        members_of[first].push(i);
+    }
+    for members in members_of.into_iter().filter(|members| !members.is_empty()) {
         let Some((basis, combos)) = split(&k, &members) else {
             let names: Vec<&str> = members
                 .iter()
@@ -124,7 +124,7 @@ pub(super) fn couple(circuit: &Circuit) -> Result<Vec<Winding>, Vec<Diagnostic>>
         }
         for &a in &basis {
             for &b in &basis {
-                if !Field::is_zero(&k[a][b]) {
+                if !Field::is_zero(&k.at(a, b)) {
                     windings[a]
                         .inductance
                         .push((mutual(circuit, &inductors, &k, a, b), b));
@@ -139,11 +139,25 @@ pub(super) fn couple(circuit: &Circuit) -> Result<Vec<Winding>, Vec<Diagnostic>>
     }
 }
 
+/// The matrix K of coupling coefficients, but for its diagonal of ones and its zeros.
+#[derive(Debug, Default)]
+struct Coefficients(BTreeMap<(usize, usize), Rational>);
+
+impl Coefficients {
+    fn at(&self, a: usize, b: usize) -> Rational {
+        if a == b {
+            return Field::one();
+        }
+        let known = self.0.get(&(a, b)).cloned();
+        known.unwrap_or_else(<Rational as Field>::zero)
+    }
+}
+
 /// k √(L_a L_b) to about 30 digits.
 fn mutual(
     circuit: &Circuit,
     inductors: &[(ElementId, f64, Option<f64>)],
-    k: &[Vec<Rational>],
+    k: &Coefficients,
     a: usize,
     b: usize,
 ) -> Coefficient {
@@ -161,7 +175,7 @@ fn mutual(
     let two = <Rational as Field>::one().add(&Field::one());
     let refined = r
         .add(&product.sub(&r.mul(&r)).div(&two.mul(&r)))
-        .mul(&k[a][b]);
+        .mul(&k.at(a, b));
     let hi = refined.to_f64();
     let lo = refined.sub(&Rational::value(hi.into())).to_f64();
     Coefficient::Pair(hi, lo)
@@ -170,10 +184,7 @@ fn mutual(
 /// Splits a group into a basis and, for every other winding, its combination c of basis windings; `None` if K is
 /// indefinite.
 #[allow(clippy::type_complexity)]
-fn split(
-    k: &[Vec<Rational>],
-    members: &[usize],
-) -> Option<(Vec<usize>, Vec<(usize, Vec<Rational>)>)> {
+fn split(k: &Coefficients, members: &[usize]) -> Option<(Vec<usize>, Vec<(usize, Vec<Rational>)>)> {
     let mut basis: Vec<usize> = Vec::new();
     let mut combos = Vec::new();
     for &m in members {
@@ -183,7 +194,7 @@ fn split(
             .iter()
             .zip(&c)
             .fold(<Rational as Field>::one(), |s, (&b, c)| {
-                s.sub(&k[m][b].mul(c))
+                s.sub(&k.at(m, b).mul(c))
             });
         if Field::is_zero(&schur) {
             combos.push((m, c));
@@ -201,9 +212,9 @@ fn split(
                 .iter()
                 .zip(c.iter())
                 .fold(<Rational as Field>::zero(), |s, (&b, c)| {
-                    s.add(&k[m][b].mul(c))
+                    s.add(&k.at(m, b).mul(c))
                 });
-            if !Field::is_zero(&seen.sub(&k[m][*d])) {
+            if !Field::is_zero(&seen.sub(&k.at(m, *d))) {
                 return None;
             }
         }
@@ -211,9 +222,9 @@ fn split(
     Some((basis, combos))
 }
 
-fn solve(k: &[Vec<Rational>], basis: &[usize], m: usize) -> Vec<Rational> {
+fn solve(k: &Coefficients, basis: &[usize], m: usize) -> Vec<Rational> {
     let n = basis.len();
-    let row = |&a: &usize| sparse(basis.iter().chain([&m]).map(|&b| k[a][b].clone()));
+    let row = |&a: &usize| sparse(basis.iter().chain([&m]).map(|&b| k.at(a, b)));
     let mut table = Table::new(basis.iter().map(row).collect(), n + 1);
     let mut found = Elimination::new(n, n + 1);
     for column in 0..n {
