@@ -88,6 +88,33 @@ pub fn plan(lcs: &Lcs, options: &SimOptions) -> Plan {
     }
 }
 
+/// Decides for parts that share nothing but ground and sources, by the systems of their start positions, each of which can be integrated
+/// exactly.
+pub(crate) fn plan_of_parts<'a>(
+    systems: impl Iterator<Item = &'a Lcs>,
+    options: &SimOptions,
+) -> Plan {
+    let (mut count, mut largest): (usize, Option<&Lcs>) = (0, None);
+    for lcs in systems {
+        count += 1;
+        if largest.is_none_or(|known| lcs.n() + lcs.m() > known.n() + known.m()) {
+            largest = Some(lcs);
+        }
+    }
+    let mut words = vec![format!(
+        "{count} parts that share nothing but ground and sources: each has modes, events and steps of its own; parts that are alike share \
+         their modes. The largest:"
+    )];
+    let of_one = largest.map(|lcs| plan(lcs, options));
+    let scheme = of_one.as_ref().map_or(Scheme::MIDPOINT, |plan| plan.scheme);
+    words.extend(of_one.into_iter().flat_map(|plan| plan.words));
+    Plan {
+        method: Method::Exact,
+        scheme,
+        words,
+    }
+}
+
 /// What keeps a system from exact integration: the element and why.
 #[must_use]
 pub fn not_exact(lcs: &Lcs) -> Option<String> {

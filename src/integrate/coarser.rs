@@ -3,12 +3,13 @@
 use crate::circuit::Tran;
 use crate::integrate::companion::{Coarser, Share};
 use crate::integrate::control::Amplitudes;
+use crate::integrate::error::Error;
 use crate::integrate::grid::Grid;
 use crate::integrate::problem::Problem;
+use crate::integrate::run::Stepper;
 use crate::integrate::simulate::controlled;
 use crate::integrate::step::Scheme;
 use crate::integrate::theta::Stepping;
-use crate::lcs::Lcs;
 use crate::settings::Settings;
 use crate::settings::tolerances::stated::{
     COARSER, FIRST_ORDER, HIGHER_ORDER, HIGHER_ORDER_EVENTS, LOOSER, LOOSER_SHARE, MANY_ROWS,
@@ -19,31 +20,25 @@ use crate::settings::tolerances::steps::{FIRST, HANDOVER_STEPS};
 /// Odd, as an even number of rows would see a clock in one phase alone.
 const FEWER: usize = 5;
 
-impl Problem {
-    /// Beside an exact run, from where steps take over.
-    pub(super) fn coarser_handover<'a>(
-        &'a self,
-        tran: &'a Tran,
-        lcs: &'a Lcs,
-        settings: &'a Settings,
-    ) -> Vec<Coarser<'a>> {
-        let companion = |(coarser, share): (f64, f64)| Coarser {
-            make: Box::new(move || {
-                let both = self.handover(tran, lcs, settings, HANDOVER_STEPS / coarser)?;
-                Ok(Box::new(both))
-            }),
-            stride: 1,
-            start: 0.0,
-            share: Share::always(share),
-            steps: Some((coarser, 1)),
-        };
-        COARSER
-            .into_iter()
-            .zip(FIRST_ORDER)
-            .map(companion)
-            .collect()
-    }
+/// Beside an exact run, from where steps take over; `make` makes one with so many steps between rows.
+pub(super) fn coarser_handover<'a>(
+    make: &'a dyn Fn(f64) -> Result<Box<dyn Stepper>, Error>,
+) -> Vec<Coarser<'a>> {
+    let companion = |(coarser, share): (f64, f64)| Coarser {
+        make: Box::new(move || make(HANDOVER_STEPS / coarser)),
+        stride: 1,
+        start: 0.0,
+        share: Share::always(share),
+        steps: Some((coarser, 1)),
+    };
+    COARSER
+        .into_iter()
+        .zip(FIRST_ORDER)
+        .map(companion)
+        .collect()
+}
 
+impl Problem {
     /// Beside a run in steps of h, s.
     pub(super) fn coarser_fixed<'a>(
         &'a self,

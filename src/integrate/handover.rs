@@ -207,6 +207,16 @@ impl Handover {
 }
 
 impl Handover {
+    /// What integrates exactly.
+    pub(super) const fn integrator(&self) -> &Exact {
+        &self.exact
+    }
+
+    /// The same.
+    pub(super) const fn integrator_mut(&mut self) -> &mut Exact {
+        &mut self.exact
+    }
+
     /// Where the run stands.
     pub(crate) fn place(&mut self) -> Place {
         match &self.stepping {

@@ -1,6 +1,7 @@
 //! What a stepper tells on its way: events, jumps, impulses, rows at them.
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use crate::integrate::error::Error;
 use crate::integrate::event::{Change, Event};
@@ -77,6 +78,11 @@ impl<'a> Log<'a> {
     #[must_use]
     pub fn wants_corners(&self) -> bool {
         self.rows.wants_corners()
+    }
+
+    /// What cancels the run.
+    pub(super) fn cancel(&self) -> Option<&'a AtomicBool> {
+        self.rows.cancel()
     }
 
     /// Whether a run that stands at `t` may go on: steppers ask at every step.

@@ -59,7 +59,7 @@ impl Known {
 }
 
 impl Systems {
-    fn of(multiport: StandardMultiport) -> Self {
+    pub(super) fn of(multiport: StandardMultiport) -> Self {
         Self {
             multiport: Arc::new(multiport),
             known: Arc::default(),
@@ -107,20 +107,20 @@ impl Systems {
 pub(super) struct Problem {
     pub(super) systems: Systems,
     /// Where function blocks jump.
-    steps: Vec<exact::Step>,
+    pub(super) steps: Vec<exact::Step>,
     /// Transmission lines.
-    lines: Vec<Line>,
+    pub(super) lines: Vec<Line>,
     /// Where it starts.
     pub(super) start: Place,
     /// See [`start::Initial::conducting`]; empty where not known.
     pub(super) conducting: Vec<bool>,
     /// Switches whose start position follows from the start state.
-    settle: Vec<bool>,
+    pub(super) settle: Vec<bool>,
     pub(super) notes: Vec<Note>,
     /// Whether sources may be given other values on the way.
-    free_sources: bool,
+    pub(super) free_sources: bool,
     /// The start is a right limit: edges of sources there have acted.
-    after_edges: bool,
+    pub(super) after_edges: bool,
 }
 
 /// The scout gives up after this many steps (trains of many pulses); what it has seen by then is used.
@@ -201,6 +201,11 @@ impl Problem {
             after_edges: true,
             ..self
         }
+    }
+
+    /// Whether it has transmission lines.
+    pub(super) fn has_lines(&self) -> bool {
+        !self.lines.is_empty()
     }
 
     /// Chooses what is a state and settles the switches; returns the system of the start position.

@@ -136,6 +136,11 @@ impl<'a> Sheet<'a> {
         self.asked.events || self.asked.corners
     }
 
+    /// What cancels the run.
+    pub(super) fn cancel(&self) -> Option<&'a AtomicBool> {
+        self.asked.cancel
+    }
+
     /// Rows at corners are wanted.
     #[inline]
     pub(super) fn wants_corners(&self) -> bool {

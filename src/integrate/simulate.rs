@@ -9,19 +9,21 @@ use crate::settings::tolerances::steps::{FIRST, HANDOVER_STEPS};
 use nalgebra::DVector;
 
 use crate::circuit::{Circuit, Tran};
+use crate::integrate::coarser::coarser_handover;
 use crate::integrate::companion::Accompanied;
 use crate::integrate::error::{Error, Reason, is_final};
 use crate::integrate::exact::Place;
 use crate::integrate::grid::Grid;
 use crate::integrate::log::Log;
 use crate::integrate::problem::Problem;
+use crate::integrate::ready::ready;
 use crate::integrate::rows::{Asked, Sink};
 use crate::integrate::run::{Frame, attempt, run};
 use crate::integrate::theta::Stepping;
 use crate::integrate::{Note, Run};
 use crate::lcs::Lcs;
 use crate::mna::StaticMultiport;
-use crate::plan::{Plan, not_exact, plan};
+use crate::plan::Plan;
 use crate::settings::Settings;
 
 /// Integration methods.
@@ -182,32 +184,37 @@ fn dispatch(
     elsewhere: Rc<Cell<f64>>,
 ) -> Result<Run, Error> {
     check(&tran, &options)?;
-    let lcs = problem.prepare(&tran, &options.settings)?;
+    let circuit = ready(&mut problem, &tran, &options)?;
     let Plan {
         method,
         scheme,
         words,
-    } = plan(&lcs, &options);
-    if let (Method::Exact, Some(obstacle)) = (options.method, not_exact(&lcs)) {
+    } = circuit.plan(&options);
+    if let (Method::Exact, Some(obstacle)) = (options.method, circuit.not_exact()) {
         return Err(Error::before(Reason::Unsupported(format!(
             "no exact integration: {obstacle}"
         ))));
     }
     let grid = Grid::of(&tran);
-    let columns = lcs.outputs.names.len();
+    let Columns {
+        title,
+        names,
+        units,
+    } = Columns::of(&problem);
+    let columns = names.len();
     let most =
         (!options.discard).then(|| options.settings.max_held / ((columns + 1) * size_of::<f64>()));
     grid.check(columns, most)?;
     let endless = problem
         .too_short(&tran, &options.settings)
-        .or_else(|| problem.too_many_edges(&lcs, &tran, &options.settings));
+        .or_else(|| circuit.too_many_edges(&problem, &tran, &options.settings));
     if let Some(error) = endless {
         return Err(error);
     }
     let frame = |method: Method, notes: Vec<Note>| Frame {
-        title: lcs.title.clone(),
-        names: lcs.outputs.names.clone(),
-        units: lcs.outputs.units.clone(),
+        title: title.clone(),
+        names: names.clone(),
+        units: units.clone(),
         grid,
         method: method.name().into(),
         plan: words.clone(),
@@ -227,24 +234,23 @@ fn dispatch(
     let (mut method, mut notes) = (method, problem.notes.clone());
     let (mut progress, settings) = (options.progress, &options.settings);
     if options.method == Method::Exact {
-        let mut exact = problem.exact(&tran, &lcs, settings)?;
+        let mut exact = circuit.exact(&problem, &tran, settings)?;
         let frame = frame(method, notes);
-        return run(&mut exact, Frame { progress, ..frame }, log);
+        return run(&mut *exact, Frame { progress, ..frame }, log);
     }
     if method == Method::Exact {
         let frame = Frame {
             progress: progress.as_mut().map(|p| &mut **p as &mut dyn FnMut(f64)),
             ..frame(method, notes.clone())
         };
+        let make = |steps| circuit.handover(&problem, &tran, settings, steps);
         let coarser = if options.unestimated {
             vec![]
         } else {
-            problem.coarser_handover(&tran, &lcs, settings)
+            coarser_handover(&make)
         };
-        let handover = problem.handover(&tran, &lcs, settings, HANDOVER_STEPS);
-        let attempted = handover.and_then(|mut both| {
-            let units = &lcs.outputs.units;
-            let mut all = Accompanied::new(&mut both, coarser, units, tran.tstop, options.cancel);
+        let attempted = make(HANDOVER_STEPS).and_then(|mut both| {
+            let mut all = Accompanied::new(&mut *both, coarser, &units, tran.tstop, options.cancel);
             attempt(&mut all, frame, &mut log, false)
         });
         match attempted {
@@ -263,6 +269,9 @@ fn dispatch(
             }
         }
         method = Method::Theta;
+        if circuit.is_apart() {
+            problem.prepare(&tran, settings)?;
+        }
     }
     let stepping = options.step.map_or(controlled(&tran), Stepping::Fixed);
     let mut theta = problem.stepper(problem.start.clone(), &tran, scheme, stepping, settings)?;
@@ -279,9 +288,27 @@ fn dispatch(
         Some(h) => problem.coarser_fixed(&tran, scheme, h, settings),
         None => problem.coarser_controlled(&tran, scheme, amplitudes.as_ref(), settings),
     };
-    let units = &lcs.outputs.units;
-    let mut all = Accompanied::new(&mut theta, coarser, units, tran.tstop, options.cancel);
+    let mut all = Accompanied::new(&mut theta, coarser, &units, tran.tstop, options.cancel);
     run(&mut all, Frame { progress, ..frame }, log)
+}
+
+/// What the rows of a problem are.
+struct Columns {
+    title: String,
+    names: Vec<String>,
+    units: Vec<&'static str>,
+}
+
+impl Columns {
+    fn of(problem: &Problem) -> Self {
+        let multiport = &problem.systems.multiport;
+        let probes = &multiport.observed[..multiport.probes];
+        Self {
+            title: multiport.title.clone(),
+            names: probes.iter().map(|probe| probe.name.clone()).collect(),
+            units: probes.iter().map(|probe| probe.unit).collect(),
+        }
+    }
 }
 
 pub(super) fn check(tran: &Tran, options: &SimOptions<'_>) -> Result<(), Error> {

@@ -178,6 +178,26 @@ impl StateJumps {
         self.first.extend(other.first.iter().take(room).cloned());
     }
 
+    /// Adds the jumps of a part that goes on beside, in the order of time.
+    pub(crate) fn add_beside(&mut self, other: &Self) {
+        if other.all.0 == 0 {
+            return;
+        }
+        let earlier = |jump: &&StateJump| {
+            let known = self.destroyer.as_ref();
+            known.is_none_or(|known| jump.t < known.t)
+        };
+        if let Some(first) = other.destroyer.as_ref().filter(earlier) {
+            self.destroyer = Some(first.clone());
+        }
+        let kept = std::mem::take(&mut self.first);
+        self.extend(other);
+        self.first = kept;
+        self.first.extend(other.first.iter().cloned());
+        self.first.sort_by(|a, b| a.t.total_cmp(&b.t));
+        self.first.truncate(Self::KEPT);
+    }
+
     /// Adds a jump.
     pub fn add(&mut self, jump: StateJump) {
         let count = |(number, loss): &mut (u64, f64)| {

@@ -10,6 +10,7 @@ mod couple;
 #[cfg(test)]
 pub(crate) mod fixture;
 mod graph;
+mod parts;
 mod readings;
 mod sliding;
 mod standard;
@@ -24,6 +25,7 @@ use crate::lcs::{Input, Port, PowerKind, Role};
 
 pub use assemble::behaviour;
 pub(crate) use clocked::SourceControl;
+pub(crate) use parts::Part;
 pub use standard::StandardMultiport;
 
 /// An exact coefficient of an equation.

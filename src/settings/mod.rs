@@ -22,6 +22,9 @@ pub struct Settings {
     /// Bytes that the exact integrator keeps of what can be made again: exponentials and forms of energy of its modes, and as many for the
     /// systems with free devices. What was used longest ago is given up first; the answer is the same to rounding.
     pub max_kept: usize,
+    /// So many capacitors, inductors, ideal pairs and switches together make a circuit one that is solved in parts, where it falls into parts
+    /// that share nothing but ground and sources (default 64).
+    pub apart: usize,
 }
 
 impl Default for Settings {
@@ -33,6 +36,7 @@ impl Default for Settings {
             max_steps: 200_000_000,
             max_held: 1 << 30,
             max_kept: 1 << 28,
+            apart: 64,
         }
     }
 }

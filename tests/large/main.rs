@@ -2,6 +2,7 @@
 #![allow(missing_docs, reason = "tests")]
 
 mod families;
+mod parts;
 
 use circ::Model;
 use circ::integrate::{Method, Run, SimOptions, simulate, start};
@@ -70,14 +71,6 @@ fn what_is_kept_changes_no_answer() {
         assert!(difference < 1e-11, "{name}: {difference:e}");
         assert!(nothing.energy.residual_relative < 1e-9, "{name}");
     }
-}
-
-#[test]
-fn copies_of_a_converter_give_the_waveforms_of_one() {
-    let one = run(&families::copies(1), Settings::default());
-    let six = run(&families::copies(6), Settings::default());
-    let difference = difference(&one, &six);
-    assert!(difference < 1e-12, "{difference:e}");
 }
 
 /// RC sections: v_k' = (v_{k−1} − 2 v_k + v_{k+1})/(R C).

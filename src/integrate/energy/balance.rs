@@ -84,6 +84,18 @@ impl Balance {
         self.numerical += part.numerical;
     }
 
+    /// Adds that of a part that shares nothing with this one. The largest energies need not have been there at one time; their sum is what a
+    /// residual is measured by.
+    pub(crate) fn add_beside(&mut self, other: &Self) {
+        self.source += other.source;
+        self.dissipated += other.dissipated;
+        self.jumps += other.jumps;
+        self.numerical += other.numerical;
+        self.first += other.first;
+        self.last += other.last;
+        self.largest += other.largest;
+    }
+
     /// Notes the stored energy now, J.
     pub fn note(&mut self, stored: f64) {
         self.last = stored;

@@ -95,6 +95,12 @@ impl Assembler {
         self.multiport.source_controls()
     }
 
+    /// See [`StandardMultiport::is_alike`].
+    pub(crate) fn is_alike(&self, other: &Self) -> bool {
+        let devices = |steps: &[Step]| -> Vec<usize> { steps.iter().map(|s| s.pair).collect() };
+        devices(&self.steps) == devices(&other.steps) && self.multiport.is_alike(&other.multiport)
+    }
+
     /// Number of device pairs.
     pub(crate) fn pairs(&self) -> usize {
         self.multiport.pairs.len()

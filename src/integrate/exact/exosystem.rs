@@ -216,6 +216,13 @@ impl Exosystem {
         }
     }
 
+    /// Whether another has the same S and H, and its columns mean the same.
+    pub(crate) fn is_alike(&self, other: &Self) -> bool {
+        self.columns == other.columns
+            && self.generator == other.generator
+            && self.output == other.output
+    }
+
     /// Length of z; z[0] = 1.
     pub(crate) fn dim(&self) -> usize {
         self.columns.len()

@@ -1,7 +1,5 @@
 //! A mode: which devices conduct, where the switches stand, and the linear system that holds there.
 
-use std::sync::Arc;
-
 use nalgebra::{DMatrix, DVector};
 
 use super::clock::Clock;
@@ -12,7 +10,6 @@ use super::key::{Key, Owner, Trigger};
 use super::magnitudes::{Magnitudes, ORDERS};
 use super::map::{Map, Sizes};
 use super::sampled::SampledRows;
-use crate::integrate::event::Change;
 use crate::integrate::switching::Threshold;
 use crate::lcs::{Lcs, PowerKind, Rows};
 use crate::linalg::decouple::decoupled;
@@ -81,8 +78,6 @@ pub(crate) struct Mode {
     pub(crate) magnitudes: Magnitudes,
     /// What followed: why it was left and for which mode, the latest first.
     pub(crate) successors: Vec<(Trigger, usize)>,
-    /// What the log says about a change from here to other modes.
-    pub(crate) labels: Vec<(usize, Arc<[Change]>)>,
 }
 
 /// Rows over [x | u | u' | 1] as rows over w, with u = H z and u' = H S z.
@@ -298,7 +293,6 @@ impl Mode {
             shared,
             magnitudes: Magnitudes::default(),
             successors: Vec::new(),
-            labels: Vec::new(),
             flow,
         })
     }
@@ -312,12 +306,6 @@ impl Mode {
             self.successors.truncate(MOST_SUCCESSORS - 1);
             self.successors.insert(0, step);
         }
-    }
-
-    /// What is said of a change to mode `to`, if that is known.
-    pub(crate) fn label(&self, to: usize) -> Option<&Arc<[Change]>> {
-        let (_, label) = self.labels.iter().find(|(at, _)| *at == to)?;
-        Some(label)
     }
 
     /// Who a guard belongs to.

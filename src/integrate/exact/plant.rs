@@ -1,21 +1,21 @@
 //! The circuit in all positions visited so far.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
+use std::sync::Arc;
 
 use super::assembler::{Assembler, Step};
 use super::flow::longest_step;
 use super::free::Free;
 use super::key::{Key, Owner};
 use super::mode::{Mode, SwitchFacts};
+use super::modes::{Modes, TURNS};
 use super::sources::Sources;
 use crate::integrate::error::Error;
+use crate::integrate::event::Change;
 use crate::integrate::switching::Threshold;
 use crate::lcs::Hold;
 use crate::mna::SourceControl;
 use crate::settings::Settings;
-
-/// Modes and systems that are kept whatever they take: those that a period of a circuit goes through by turns.
-const TURNS: usize = 8;
 
 /// Systems and modes, created when first visited.
 pub(crate) struct ModeTable {
@@ -28,20 +28,21 @@ pub(crate) struct ModeTable {
     h: f64,
     energy: bool,
     tolerance: f64,
-    /// See [`Settings::max_kept`].
+    /// What modes keep at most, and what systems do, bytes: see [`Settings::max_kept`].
     most: usize,
+    most_of_systems: usize,
     /// Those made last first.
     frees: VecDeque<(Key, Free)>,
     /// Bytes of their matrices, and factorisations of those given up.
     free_bytes: usize,
     given_up: u64,
-    index: BTreeMap<Key, Option<usize>>,
-    pub(crate) modes: Vec<Mode>,
-    /// By mode: when it was left last, counted in changes of mode, and the bytes that its flow kept then; their sum.
-    left: Vec<(u64, usize)>,
-    changes: u64,
-    kept: usize,
+    pub(crate) modes: Modes,
+    /// By mode: what the log says about a change from there to other modes.
+    labels: Vec<Vec<Label>>,
 }
+
+/// What the log says about a change to this mode.
+type Label = (usize, Arc<[Change]>);
 
 impl ModeTable {
     /// A table without modes; `h` is the output step, `energy` asks for the balance.
@@ -60,40 +61,48 @@ impl ModeTable {
             energy,
             tolerance: settings.lcp_residual,
             most: settings.max_kept,
+            most_of_systems: settings.max_kept,
             frees: VecDeque::new(),
             free_bytes: 0,
             given_up: 0,
-            index: BTreeMap::new(),
-            modes: Vec::new(),
-            left: Vec::new(),
-            changes: 0,
-            kept: 0,
+            modes: Modes::default(),
+            labels: Vec::new(),
         }
     }
 
-    /// Takes note that mode `at` is left. Where modes keep more than [`Settings::max_kept`] together, those that were left longest ago give up what
-    /// can be made again.
+    /// Whether its circuit differs from another's in names and waveforms alone.
+    pub(crate) fn is_alike(&self, other: &Self) -> bool {
+        (self.h, self.energy) == (other.h, other.energy)
+            && self.assembler.is_alike(&other.assembler)
+    }
+
+    /// What modes and systems keep at most, bytes.
+    pub(crate) fn keep_at_most(&mut self, (modes, systems): (usize, usize)) {
+        (self.most, self.most_of_systems) = (modes, systems);
+    }
+
+    /// Takes note that mode `at` is left, see [`Modes::leave`].
     pub(crate) fn leave(&mut self, at: usize) {
-        self.changes += 1;
-        self.left.resize(self.modes.len(), (0, 0));
-        let kept = self.modes[at].flow.kept();
-        self.kept = self.kept + kept - self.left[at].1;
-        self.left[at] = (self.changes, kept);
-        if self.kept <= self.most {
-            return;
+        self.modes.leave(at, self.most);
+    }
+
+    /// What the log says about a change from one mode to another, found once.
+    pub(crate) fn label(
+        &mut self,
+        from: usize,
+        to: usize,
+        find: impl FnOnce(&Self) -> Arc<[Change]>,
+    ) -> Arc<[Change]> {
+        let known = self.labels.get(from).map_or(&[][..], |known| known);
+        if let Some((_, label)) = known.iter().find(|(at, _)| *at == to) {
+            return Arc::clone(label);
         }
-        let mut oldest: Vec<usize> = (0..self.left.len())
-            .filter(|&k| self.left[k].1 > 0)
-            .collect();
-        oldest.sort_unstable_by_key(|&k| self.left[k].0);
-        oldest.truncate(oldest.len().saturating_sub(TURNS));
-        for k in oldest {
-            if self.kept <= self.most / 2 {
-                break;
-            }
-            self.modes[k].flow.forget();
-            self.kept -= std::mem::take(&mut self.left[k].1);
+        let label = find(self);
+        if self.labels.len() <= from {
+            self.labels.resize(from + 1, Vec::new());
         }
+        self.labels[from].push((to, Arc::clone(&label)));
+        label
     }
 
     /// The complementarity system for the switch positions of a mode.
@@ -107,7 +116,7 @@ impl ModeTable {
                 self.free_bytes += lcs.bytes();
                 self.frees
                     .push_front((key.clone(), Free::new(lcs, self.tolerance)));
-                while self.free_bytes > self.most && self.frees.len() > TURNS {
+                while self.free_bytes > self.most_of_systems && self.frees.len() > TURNS {
                     if let Some((_, free)) = self.frees.pop_back() {
                         self.free_bytes -= free.lcs.bytes();
                         self.given_up += free.factorisations();
@@ -121,7 +130,7 @@ impl ModeTable {
 
     /// The mode of this name; `None` where the circuit has no such mode (its reduction or its numbers do not exist).
     pub(super) fn mode(&mut self, key: &Key, sources: &Sources) -> Option<usize> {
-        if let Some(&known) = self.index.get(key) {
+        if let Some(&known) = self.modes.index.get(key) {
             return known;
         }
         // A control that depends on nothing does not stay on its threshold.
@@ -160,12 +169,7 @@ impl ModeTable {
                 self.energy,
             )
         });
-        let at = mode.map(|mode| {
-            self.modes.push(mode);
-            self.modes.len() - 1
-        });
-        self.index.insert(key.clone(), at);
-        at
+        self.modes.insert(key, mode)
     }
 
     /// The switches of thyristors that hold themselves with valve `pair` in series.

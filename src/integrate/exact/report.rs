@@ -68,14 +68,7 @@ impl Report {
     ) {
         let mut changes: Arc<[Change]> = Arc::default();
         if let Some(from) = from.filter(|from| *from != at) {
-            changes = match table.modes[from].label(at) {
-                Some(label) => label.clone(),
-                None => {
-                    let label = label(table, from, at);
-                    table.modes[from].labels.push((at, label.clone()));
-                    label
-                }
-            };
+            changes = table.label(from, at, |table| label(table, from, at));
             self.events += 1;
             let ended = self.accumulation.event(t);
             self.notes.extend(ended.map(Note::from));
@@ -278,7 +271,7 @@ fn label(table: &ModeTable, from: usize, to: usize) -> Arc<[Change]> {
 }
 
 /// Whether some probe has another value `after` than `before`, by more than rounding.
-pub(super) fn row_jumps(before: &[f64], after: &[f64], is_volts: &[bool]) -> bool {
+pub(crate) fn row_jumps(before: &[f64], after: &[f64], is_volts: &[bool]) -> bool {
     [true, false].into_iter().any(|volts| {
         let of_kind = || {
             let rows = before.iter().zip(after).zip(is_volts);

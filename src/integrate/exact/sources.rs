@@ -66,6 +66,14 @@ impl Sources {
         Ok(sources)
     }
 
+    /// Whether modes see no difference to other sources.
+    pub(super) fn is_alike(&self, other: &Self) -> bool {
+        let clocks = |sources: &Self| -> Vec<usize> {
+            sources.clocks.iter().map(|clock| clock.switch).collect()
+        };
+        self.exosystem.is_alike(&other.exosystem) && clocks(self) == clocks(other)
+    }
+
     /// Reads z at t on the present pieces.
     pub(super) fn stand(&mut self, t: f64) {
         self.exosystem.write(t, &mut self.z);

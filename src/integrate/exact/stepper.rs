@@ -1,6 +1,7 @@
 //! The event-driven stepper: travel in a mode, find the next one, repeat.
 
 mod pause;
+mod sharing;
 
 use nalgebra::DVector;
 

@@ -22,3 +22,7 @@ pub(crate) const SAME_PERIOD: f64 = 4.0 * f64::EPSILON;
 
 /// Print steps in a span where nothing says how many. Larger: rows that nobody asked for; smaller: coarse pictures.
 pub(crate) const SPAN_PARTS: f64 = 1000.0;
+
+/// An event that a copy of a part has foreseen is looked for until this part of its time after it: the two have gone other steps, and their
+/// roundings differ. Larger: where rounding hides the event the part is seen so much too late; smaller: it is missed.
+pub(crate) const FORESEEN: f64 = 1e-9;

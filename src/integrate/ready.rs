@@ -1,0 +1,114 @@
+//! A problem whose start is known, whole or in parts: what plans and runs are made from.
+
+use crate::circuit::Tran;
+use crate::integrate::error::Error;
+use crate::integrate::parts::Cut;
+use crate::integrate::problem::Problem;
+use crate::integrate::run::Stepper;
+use crate::integrate::{Method, SimOptions};
+use crate::lcs::Lcs;
+use crate::plan::{Plan, not_exact, plan, plan_of_parts};
+use crate::settings::Settings;
+
+/// See the [module](self).
+pub(super) enum Ready {
+    /// By the system of its start position.
+    Whole(Lcs),
+    /// In parts, each of which has an exact integration.
+    Parts(Cut),
+}
+
+/// Decides whether a problem is solved whole or in parts.
+///
+/// # Errors
+/// The reduction's for the start position.
+pub(super) fn ready(
+    problem: &mut Problem,
+    tran: &Tran,
+    options: &SimOptions<'_>,
+) -> Result<Ready, Error> {
+    if matches!(options.method, Method::Auto | Method::Exact) {
+        let parts = problem.parts(tran, &options.settings);
+        if !parts.is_empty() {
+            let at_events = options.events || options.corners || !tran.prints;
+            let multiport = &problem.systems.multiport;
+            let probes = multiport.observed[..multiport.probes].iter();
+            let is_volts = probes.map(|probe| probe.unit == "V").collect();
+            let cut = Cut::new(parts, is_volts, *tran, at_events, &options.settings);
+            return Ok(Ready::Parts(cut));
+        }
+    }
+    Ok(Ready::Whole(problem.prepare(tran, &options.settings)?))
+}
+
+impl Ready {
+    /// Whether it is in parts.
+    pub(super) const fn is_apart(&self) -> bool {
+        matches!(self, Self::Parts(_))
+    }
+
+    /// See [`plan`].
+    pub(super) fn plan(&self, options: &SimOptions<'_>) -> Plan {
+        match self {
+            Self::Whole(lcs) => plan(lcs, options),
+            Self::Parts(cut) => plan_of_parts(cut.systems(), options),
+        }
+    }
+
+    /// See [`not_exact`].
+    pub(super) fn not_exact(&self) -> Option<String> {
+        match self {
+            Self::Whole(lcs) => not_exact(lcs),
+            Self::Parts(_) => None,
+        }
+    }
+
+    /// See [`Problem::too_many_edges`].
+    pub(super) fn too_many_edges(
+        &self,
+        problem: &Problem,
+        tran: &Tran,
+        settings: &Settings,
+    ) -> Option<Error> {
+        match self {
+            Self::Whole(lcs) => problem.too_many_edges(lcs, tran, settings),
+            Self::Parts(cut) => {
+                let mut systems = cut.systems();
+                systems.find_map(|lcs| problem.too_many_edges(lcs, tran, settings))
+            }
+        }
+    }
+
+    /// Exact integration alone.
+    ///
+    /// # Errors
+    /// See [`Exact::new`](crate::integrate::exact::Exact::new).
+    pub(super) fn exact(
+        &self,
+        problem: &Problem,
+        tran: &Tran,
+        settings: &Settings,
+    ) -> Result<Box<dyn Stepper>, Error> {
+        Ok(match self {
+            Self::Whole(lcs) => Box::new(problem.exact(tran, lcs, settings)?),
+            Self::Parts(cut) => Box::new(cut.exact()?),
+        })
+    }
+
+    /// Exact integration with Moreau's steps, so many between rows, where it cannot go on.
+    ///
+    /// # Errors
+    /// As [`Self::exact`].
+    pub(super) fn handover(
+        &self,
+        problem: &Problem,
+        tran: &Tran,
+        settings: &Settings,
+        steps: f64,
+    ) -> Result<Box<dyn Stepper>, Error> {
+        Ok(match self {
+            Self::Whole(lcs) => Box::new(problem.handover(tran, lcs, settings, steps)?),
+            Self::Parts(cut) => Box::new(cut.handover(steps)?),
+        })
+    }
+}
