@@ -56,10 +56,14 @@ pub fn plan(lcs: &Lcs, options: &SimOptions) -> Plan {
     };
     if matches!(method, Method::Euler | Method::Theta) {
         let curved = lcs.ports.iter().any(|p| !p.law.is_piecewise_linear());
-        let rule = if curved && scheme != Scheme::MOREAU {
-            "three implicit stages of order 3".to_string()
-        } else {
-            format!("θ = {}, γ = {}", scheme.theta, scheme.gamma)
+        let rule = match options.step {
+            Some(_) if curved && scheme != Scheme::MOREAU => {
+                "three implicit stages of order 3".to_string()
+            }
+            None if curved && scheme != Scheme::MOREAU => {
+                "five implicit stages of order 4".to_string()
+            }
+            _ => format!("θ = {}, γ = {}", scheme.theta, scheme.gamma),
         };
         words.push(match options.step {
             Some(h) => format!("{rule}, fixed step {h:e} s"),

@@ -72,3 +72,42 @@ fn cached_steps_do_not_allocate() {
         assert_eq!(made, 0);
     }
 }
+
+/// Steps of circuits with exponential diodes, whose lengths the error chooses: once every length has been met, only those before a stop are new.
+#[test]
+fn steps_of_curved_laws_do_not_allocate() {
+    let text = "half wave\nvs in 0 sin(0 10 50)\nd1 in out dm\nc1 out 0 100u\nr1 out 0 1k\n.model dm d(is=1e-12 n=1.5 rs=0.1)\n.tran 1m 1\n.end\n";
+    let model = circ::Model::parse(text, "half-wave.cir").expect("a netlist");
+    let lcs = model.lcs().expect("a system");
+    let owned = lcs.clone();
+    let mut theta = Theta::new(Setup {
+        reduce: Box::new(move |_| Ok(owned.clone())),
+        position: vec![],
+        thresholds: vec![],
+        t: 0.0,
+        start: Start::State(nalgebra::DVector::zeros(lcs.n())),
+        scheme: Scheme::MIDPOINT,
+        stepping: Stepping::Controlled {
+            span: 1.0,
+            first: 1e-5,
+        },
+        longest: f64::INFINITY,
+        settings: Settings::default(),
+    })
+    .expect("a stepper");
+    let mut log = Log::new(1, 0.0, false);
+    let mut made = |until: f64| {
+        let (steps, before) = (theta.stats().steps, allocations());
+        theta.advance(until, &mut log).expect("steps");
+        (theta.stats().steps - steps, allocations() - before)
+    };
+    made(0.2);
+    let (few, first) = made(0.4);
+    let (many, second) = made(1.0);
+    assert!(many > 2 * few && few > 100, "{few} and {many} steps");
+    // Matrices of the two lengths before the stop.
+    assert!(
+        second <= first.max(200),
+        "{first} and {second} allocations in {few} and {many} steps"
+    );
+}

@@ -190,7 +190,7 @@ const CONFINED: [(&str, &[&str], &str); 6] = [
 ];
 
 /// Constants of type f64 that decide nothing, outside `settings/tolerances/`: (file, names, why).
-const NO_TOLERANCES: [(&str, &[&str], &str); 21] = [
+const NO_TOLERANCES: [(&str, &[&str], &str); 22] = [
     (
         "algebra/ball.rs",
         &["EXACT_INTEGERS", "UP"],
@@ -238,6 +238,11 @@ const NO_TOLERANCES: [(&str, &[&str], &str); 21] = [
     ),
     ("circuit/transistor/drive.rs", &["DRIVE"], DEFAULT),
     ("forms/nonlinear.rs", &["GAUSS"], "a quadrature"),
+    (
+        "integrate/curved/tableau.rs",
+        &["EMBEDDED", "ERROR", "GAMMA", "LOWER", "NODES", "WEIGHTS"],
+        "a tableau",
+    ),
     (
         "integrate/exact/energy_integral.rs",
         &["NODES", "WEIGHTS"],

@@ -12,8 +12,8 @@ use crate::integrate::step::Scheme;
 use crate::integrate::theta::Stepping;
 use crate::settings::Settings;
 use crate::settings::tolerances::stated::{
-    COARSER, FIRST_ORDER, HIGHER_ORDER, HIGHER_ORDER_EVENTS, LOOSER, LOOSER_SHARE, MANY_ROWS,
-    READING,
+    COARSER, FIRST_ORDER, HIGHER_ORDER, HIGHER_ORDER_EVENTS, LOOSER, LOOSER_EMBEDDED,
+    LOOSER_EMBEDDED_SHARE, LOOSER_SHARE, MANY_ROWS, READING,
 };
 use crate::settings::tolerances::steps::{FIRST, HANDOVER_STEPS};
 
@@ -83,18 +83,24 @@ impl Problem {
         COARSER.into_iter().zip(shares).map(companion).collect()
     }
 
-    /// Beside a run whose steps are chosen.
+    /// Beside a run whose steps are chosen, by an embedded error or by halves.
     pub(super) fn coarser_controlled<'a>(
         &'a self,
         tran: &Tran,
         scheme: Scheme,
         amplitudes: Option<&'a Amplitudes>,
         settings: &Settings,
+        embedded: bool,
     ) -> Vec<Coarser<'a>> {
         let tran = *tran;
         let many = Grid::of(&tran).count() > MANY_ROWS;
+        let (looser, share) = if embedded {
+            (LOOSER_EMBEDDED, LOOSER_EMBEDDED_SHARE)
+        } else {
+            (LOOSER, LOOSER_SHARE)
+        };
         let settings = Settings {
-            tol: LOOSER * settings.tol,
+            tol: looser * settings.tol,
             ..settings.clone()
         };
         vec![Coarser {
@@ -106,11 +112,12 @@ impl Problem {
                 }
                 theta.keep_whole_steps();
                 theta.read_coarsely(READING);
+                theta.read_between_steps(tran.tstop);
                 Ok(Box::new(theta))
             }),
             stride: if many { FEWER } else { 1 },
             start: FIRST * tran.tstep,
-            share: Share::always(LOOSER_SHARE),
+            share: Share::always(share),
             steps: None,
         }]
     }

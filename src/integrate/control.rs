@@ -7,7 +7,7 @@
 use crate::integrate::inputs::Inputs;
 use crate::lcs::Lcs;
 use crate::settings::Settings;
-use crate::settings::tolerances::steps::{FAINT, ROOM, SHORTEN, STATE_ROUNDING};
+use crate::settings::tolerances::steps::{FAINT, LONGER, ROOM, SHORTEN, SHORTER, STATE_ROUNDING};
 
 /// Accepts or halves steps.
 #[derive(Debug, Clone)]
@@ -71,6 +71,22 @@ impl Control {
         }
         Verdict { accept, next }
     }
+
+    /// Judges a step of length h by what it says of its own error, relative to the amplitude. Lengths are 2^(−k/2) of the span, so that few
+    /// of them occur.
+    pub(crate) fn judge_embedded(&self, h: f64, error: f64) -> Verdict {
+        let allowed = self.tol * (h / self.span).max(self.grant);
+        let accept = error <= allowed;
+        let factor = SHORTER * (allowed / error).powf(1.0 / f64::from(self.order + 1));
+        let factor = if accept {
+            factor.clamp(0.5, LONGER)
+        } else {
+            factor.clamp(1.0 / SHORTEN, 0.5)
+        };
+        let wanted = (2.0 * (self.span / (h * factor)).log2()).ceil();
+        let next = self.span * (-0.5 * wanted).exp2();
+        Verdict { accept, next }
+    }
 }
 
 /// The size of each storage element's voltage or current so far, for relative errors.
@@ -122,6 +138,11 @@ impl Amplitudes {
     pub fn see_branch(&mut self, v: f64, i: f64) {
         let (volts, amperes) = self.branches;
         self.branches = (volts.max(v.abs()), amperes.max(i.abs()));
+    }
+
+    /// The largest source or branch quantity, (V, A).
+    pub(crate) fn branches(&self) -> (f64, f64) {
+        self.branches
     }
 
     /// What arithmetic alone leaves uncertain in state k, in its unit.

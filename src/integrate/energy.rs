@@ -68,6 +68,21 @@ impl<'a> Stock<'a> {
     }
 }
 
+/// ([X U], k, M) of the storage vector s = X x + U u + k and of its metric.
+pub(crate) fn storage_map(lcs: &Lcs) -> (DMatrix<f64>, DVector<f64>, &DMatrix<f64>) {
+    let stock = Stock::of(lcs);
+    let (n, p) = (lcs.n(), lcs.p());
+    let mut map = DMatrix::zeros(stock.x.nrows(), n + p);
+    map.columns_mut(0, n).copy_from(&*stock.x);
+    map.columns_mut(n, p).copy_from(&*stock.u);
+    let one = if lcs.storage.one.len() == map.nrows() {
+        lcs.storage.one.clone()
+    } else {
+        DVector::zeros(map.nrows())
+    };
+    (map, one, stock.metric)
+}
+
 /// (from sources, dissipated) at one instant, W.
 #[must_use]
 pub fn power(lcs: &Lcs, at: Point<'_>) -> (f64, f64) {

@@ -1,7 +1,7 @@
 //! The sources of a system, evaluated together.
 
 use crate::circuit::Source;
-use crate::circuit::source::{Rest, Wave, crossings};
+use crate::circuit::source::{Piece, Rest, Wave, crossings};
 use crate::integrate::line::{Line, Lines};
 use crate::lcs::Input;
 use crate::settings::tolerances::steps::STEPS_PER_PERIOD;
@@ -15,6 +15,10 @@ pub struct Inputs {
     arriving: Vec<Option<(usize, usize)>>,
     lines: Lines,
 }
+
+/// The closed forms of the varying inputs around the time at which they were evaluated last.
+#[derive(Debug, Default)]
+pub(crate) struct Pieces(Vec<Option<Piece>>);
 
 /// How a combination of sources passes a level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,6 +71,11 @@ impl Inputs {
         self.arriving[j].map_or_else(|| self.sources[j].value(t), |at| self.lines.right(at, t))
     }
 
+    /// The number of inputs.
+    pub(crate) fn len(&self) -> usize {
+        self.sources.len()
+    }
+
     /// Indices of the inputs that are not constant.
     #[must_use]
     pub fn varying(&self) -> &[usize] {
@@ -91,6 +100,21 @@ impl Inputs {
     pub fn right(&self, t: f64, u: &mut [f64]) {
         for &j in &self.varying {
             u[j] = self.value(j, t);
+        }
+    }
+
+    /// Writes the varying inputs, one after the other, at a time without breakpoint, by the closed forms found last where they hold there.
+    pub(crate) fn varying_at(&self, t: f64, pieces: &mut Pieces, values: &mut [f64]) {
+        pieces.0.resize(self.varying.len(), None);
+        let known = pieces.0.iter_mut().zip(&self.varying);
+        for (value, (piece, &j)) in values.iter_mut().zip(known) {
+            if piece.is_none_or(|piece| t < piece.start || t >= piece.end) {
+                *piece = match self.arriving[j] {
+                    Some(_) => None,
+                    None => self.sources[j].piece(t),
+                };
+            }
+            *value = piece.map_or_else(|| self.value(j, t), |piece| piece.value(t));
         }
     }
 

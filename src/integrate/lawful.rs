@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::lcs::{Lcs, Role};
+use crate::lcs::{Lcs, Port, Role};
 use crate::solve::{Driver, PortLaw};
 
 /// Whether a port has a law that does not consist of straight pieces. All others are ideal pairs here.
@@ -15,9 +15,14 @@ pub(crate) fn driver(lcs: &Lcs, m: DMatrix<f64>, tolerance: f64) -> Driver {
     if !is_curved(lcs) {
         return Driver::new(m, tolerance);
     }
-    let ports = lcs.ports.iter().map(|port| PortLaw {
+    Driver::with_laws(m, laws(lcs), tolerance)
+}
+
+/// The laws of the ports.
+pub(crate) fn laws(lcs: &Lcs) -> Vec<PortLaw> {
+    let law = |port: &Port| PortLaw {
         law: port.law.clone(),
         current: port.role != Role::Voltage,
-    });
-    Driver::with_laws(m, ports.collect(), tolerance)
+    };
+    lcs.ports.iter().map(law).collect()
 }

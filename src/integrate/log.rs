@@ -111,6 +111,11 @@ impl<'a> Log<'a> {
         self.impulses.truncate(impulses);
     }
 
+    /// Rows between those of the grid come before the grid's: they are put in order.
+    pub(crate) fn hold_rows(&mut self) {
+        self.rows.hold();
+    }
+
     /// A row at an event: once at a continuous event, twice (left limit, right limit) at a jump. Ignored unless
     /// [`Self::wants_rows`].
     pub fn row(&mut self, t: f64, row: &[f64]) {

@@ -5,6 +5,7 @@ mod coarser;
 mod companion;
 pub mod control;
 mod cpu;
+mod curved;
 mod difference;
 pub mod energy;
 mod error;

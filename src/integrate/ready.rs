@@ -13,7 +13,7 @@ use crate::settings::Settings;
 /// See the [module](self).
 pub(super) enum Ready {
     /// By the system of its start position.
-    Whole(Lcs),
+    Whole(Box<Lcs>),
     /// In parts, each of which has an exact integration.
     Parts(Cut),
 }
@@ -38,7 +38,8 @@ pub(super) fn ready(
             return Ok(Ready::Parts(cut));
         }
     }
-    Ok(Ready::Whole(problem.prepare(tran, &options.settings)?))
+    let lcs = problem.prepare(tran, &options.settings)?;
+    Ok(Ready::Whole(Box::new(lcs)))
 }
 
 impl Ready {

@@ -1,6 +1,7 @@
 //! The rows of a run on their way: collected, handed on as they come, or both.
 
 use std::cell::Cell;
+use std::collections::VecDeque;
 use std::ops::{ControlFlow, Range};
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -107,6 +108,8 @@ pub(super) struct Sheet<'a> {
     values: Vec<f64>,
     /// Empty where only the grid's rows are wanted.
     kinds: Vec<RowKind>,
+    /// Rows between those of the grid wait for these, where that is asked for.
+    held: Option<VecDeque<(f64, RowKind, Vec<f64>)>>,
     /// How many of the rows here the sink has.
     handed: usize,
     /// The time of the last row that the sink has, s.
@@ -202,6 +205,31 @@ impl<'a> Sheet<'a> {
         if !self.wants_events() || t < self.from || t <= self.known {
             return;
         }
+        match &mut self.held {
+            Some(held) => held.push_back((t, kind, row.to_vec())),
+            None => self.insert(t, row, kind),
+        }
+    }
+
+    /// Has rows between those of the grid wait until the grid has come to them.
+    pub(super) fn hold(&mut self) {
+        if self.held.is_none() {
+            self.held = Some(VecDeque::new());
+        }
+    }
+
+    /// Takes the rows that have waited for a row at `t`.
+    fn take_held(&mut self, t: f64) {
+        let due = |held: &mut VecDeque<(f64, RowKind, Vec<f64>)>| match held.front() {
+            Some((at, ..)) if *at <= t => held.pop_front(),
+            _ => None,
+        };
+        while let Some((at, kind, row)) = self.held.as_mut().and_then(due) {
+            self.insert(at, &row, kind);
+        }
+    }
+
+    fn insert(&mut self, t: f64, row: &[f64], kind: RowKind) {
         let at = self.time.len();
         if kind == RowKind::Corner && self.time.last() == Some(&t) {
             return;
@@ -231,6 +259,7 @@ impl<'a> Sheet<'a> {
             return Err(Error::at(times.at(bad), Reason::Overflow));
         }
         let (which, rows) = self.unknown(times, which, rows);
+        self.take_held(times.at(which.start));
         if self.ends_between() && self.time.last() == Some(&times.at(which.start)) {
             self.pop();
         }
@@ -317,12 +346,14 @@ impl<'a> Sheet<'a> {
 
     /// The sink gets what it has not got yet.
     pub(super) fn end(&mut self) {
+        self.take_held(f64::INFINITY);
         self.hand_on(0);
     }
 
     /// For another attempt from the start: rows that were handed on stay as they are and are not made again; returns the time of the
     /// last of them, s.
     pub(super) fn again(&mut self) -> Option<f64> {
+        self.held = None;
         let handed = self.last_handed > f64::NEG_INFINITY;
         if handed {
             self.hand_on(0);

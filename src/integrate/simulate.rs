@@ -282,11 +282,13 @@ fn dispatch(
     if let Some(amplitudes) = &amplitudes {
         theta.expect_amplitudes(amplitudes.clone());
     }
+    theta.read_between_steps(tran.tstop);
+    let embedded = theta.is_smooth();
     let frame = frame(method, notes);
     let coarser = match options.step {
         _ if options.unestimated => vec![],
         Some(h) => problem.coarser_fixed(&tran, scheme, h, settings),
-        None => problem.coarser_controlled(&tran, scheme, amplitudes.as_ref(), settings),
+        None => problem.coarser_controlled(&tran, scheme, amplitudes.as_ref(), settings, embedded),
     };
     let mut all = Accompanied::new(&mut theta, coarser, &units, tran.tstop, options.cancel);
     run(&mut all, Frame { progress, ..frame }, log)

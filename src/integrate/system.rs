@@ -3,6 +3,7 @@
 use nalgebra::DVector;
 
 use crate::integrate::control::Amplitudes;
+use crate::integrate::curved::Curved;
 use crate::integrate::error::{Error, Reason};
 use crate::integrate::inputs::Inputs;
 use crate::integrate::jump::JumpProblem;
@@ -21,6 +22,8 @@ pub(crate) struct System {
     pub jump: Option<JumpProblem>,
     /// Whether a law does not consist of straight pieces.
     pub curved: bool,
+    /// Tables for steps of chosen lengths, where one was made.
+    pub(crate) smooth: Option<Box<Curved>>,
     matrices: Vec<StepMatrices>,
     clock: u64,
 }
@@ -39,6 +42,7 @@ impl System {
         Self {
             columns,
             curved: lawful::is_curved(&lcs),
+            smooth: None,
             lcs,
             jump,
             matrices: Vec::new(),

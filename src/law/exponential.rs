@@ -9,7 +9,7 @@
 //! Corless, D. J. Jeffrey, "The Wright ω function", 2002), which neither overflows nor cancels; the other exponential is
 //! added by Newton's method where it is not below rounding.
 
-use super::Resolvent;
+use super::{Junction as Behind, Resolvent};
 use crate::settings::tolerances::exponentials::EXTINCT;
 
 /// k/q, V/K.
@@ -84,6 +84,12 @@ impl Exponential {
             }),
             ..self
         }
+    }
+
+    /// The junction behind its own and another resistance ρ > 0, Ω; `None` where it breaks down.
+    pub(crate) fn behind(&self, rho: f64) -> Option<Behind> {
+        let sound = self.breakdown.is_none() && (self.rs + rho).is_finite();
+        sound.then(|| Behind::new(self.is, self.slope, self.rs + rho))
     }
 
     /// The point (v, i) with v + ρ i = z, for ρ > 0 in Ω, and the slopes there.

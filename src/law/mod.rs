@@ -5,6 +5,7 @@ mod curve;
 mod dead_zone;
 mod diode;
 mod exponential;
+mod junction;
 mod limited;
 mod relay;
 mod rounded;
@@ -15,6 +16,7 @@ mod zener;
 use crate::algebra::Value;
 pub use curve::CurveError;
 pub use exponential::{Breakdown, Exponential, wright_omega};
+pub(crate) use junction::Junction;
 pub use limited::Side;
 pub use rounded::{Corner, Rounded};
 

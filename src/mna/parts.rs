@@ -7,6 +7,8 @@
 
 mod alike;
 mod cut;
+#[cfg(test)]
+mod tests;
 
 use std::collections::BTreeSet;
 
@@ -208,10 +210,10 @@ impl<'a> Columns<'a> {
             self.join_all([switch.v, switch.i, control]);
             let others: Vec<Column> = match &switch.latch {
                 None => Vec::new(),
-                Some(LatchPort::Rest(other)) => vec![*other]
-                    .into_iter()
-                    .flat_map(|k| [whole.switches[k].v, whole.switches[k].i])
-                    .collect(),
+                Some(LatchPort::Rest(other)) => {
+                    let other = &whole.switches[*other];
+                    vec![other.v, other.i]
+                }
                 Some(LatchPort::Hold { gates, valve }) => {
                     let gates = gates.iter().map(|&k| &whole.switches[k]);
                     let valves = whole.pairs.iter().filter(|p| p.port.device == *valve);

@@ -9,6 +9,7 @@
 //! | [`convex`] | clarabel on min λᵀ(Mλ + q) | M + Mᵀ ⪰ 0 |
 //! | [`enumerate`] | all index sets: the oracle of the tests | m ≤ 16 |
 //! | [`lawful`] | any maximal monotone laws: Newton, splitting | M + Mᵀ ⪰ 0 for a certain end |
+//! | `newton` | curved laws from a near guess, without allocation | steps that contract |
 //! | `parts` | decoupled parts, each solved at its own size | |
 //! | [`norm`] | the least-norm member of the solution set | |
 //! | [`driver`] | the chain warm → block → Lemke → clarabel | |
@@ -22,6 +23,7 @@ pub mod enumerate;
 pub mod lawful;
 pub mod lcp;
 pub mod lemke;
+pub(crate) mod newton;
 pub mod norm;
 mod parts;
 pub mod pivot;

@@ -1,5 +1,6 @@
 //! Curved laws: diodes and transistors that take part in jumps.
 
+use circ::Model;
 use circ::integrate::{Method, Run, SimOptions};
 use circ::measure::{Over, Trace};
 use circ::settings::Settings;
@@ -153,4 +154,55 @@ fn a_comparator_moves_when_its_sources_cross() {
         .map(|event| (event.t - 1.655_057_847_743_119_5e-4).abs());
     let off = off.fold(f64::INFINITY, f64::min);
     assert!(off < 5e-14, "{off} s");
+}
+
+/// A netlist of `netlists/` or of its converters with another print step.
+fn printed(path: &str, card: &str, other: &str) -> Run {
+    let text = std::fs::read_to_string(path).unwrap();
+    assert!(text.contains(card), "{path}");
+    let model = Model::parse(&text.replace(card, other), path).unwrap();
+    model.transient(SimOptions::default()).unwrap()
+}
+
+#[test]
+fn rows_do_not_depend_on_the_print_step() {
+    // Columns at the rows of the coarser run, relative to what each reaches; the tolerance is 1e-4.
+    for (path, card, finer, ratio) in [
+        (
+            "netlists/exponential-bridge.cir",
+            ".tran 50u 60m",
+            ".tran 1u 60m",
+            50,
+        ),
+        (
+            "netlists/exponential-clamp.cir",
+            ".tran 2u 3m",
+            ".tran 0.5u 3m",
+            4,
+        ),
+        (
+            "netlists/common-emitter.cir",
+            ".tran 10u 4m",
+            ".tran 1u 4m",
+            10,
+        ),
+    ] {
+        let (coarse, fine) = (printed(path, card, card), printed(path, card, finer));
+        let width = coarse.waveforms.names.len();
+        let rows = |run: &Run| run.waveforms.values.len() / width;
+        assert_eq!((rows(&coarse) - 1) * ratio, rows(&fine) - 1, "{path}");
+        for (column, name) in coarse.waveforms.names.iter().enumerate() {
+            let value = |run: &Run, row: usize| run.waveforms.values[row * width + column];
+            let size = (0..rows(&fine))
+                .map(|k| value(&fine, k).abs())
+                .fold(0.0, f64::max);
+            for k in 0..rows(&coarse) {
+                let off = (value(&coarse, k) - value(&fine, k * ratio)).abs();
+                assert!(off <= 1e-4 * size, "{path} {name} row {k}: {off} of {size}");
+            }
+        }
+        // Rows between choose no steps.
+        let (few, many) = (coarse.stats.steps, fine.stats.steps);
+        assert!(many < 2 * few, "{path}: {few} and {many} steps");
+    }
 }

@@ -209,7 +209,7 @@ impl Theta {
     }
 
     /// A step of h in which a device changed, if there are more than `known` events.
-    fn note_event_step(&mut self, known: usize, h: f64) {
+    pub(super) fn note_event_step(&mut self, known: usize, h: f64) {
         if self.pending.len() > known {
             self.now.event_step = self.now.event_step.max(h);
         }
@@ -248,6 +248,11 @@ impl Theta {
         }
         let found = self.right_limit()?;
         self.take_pattern(found.basis, &found.active, self.now.t);
+        if self.is_smooth() {
+            self.lambda.copy_from_slice(found.lambda.as_slice());
+            self.y.copy_from_slice(found.y.as_slice());
+            self.start_from_lambda();
+        }
         Ok(())
     }
 }

@@ -31,9 +31,13 @@ impl Theta {
 
     /// At a breakpoint: inputs take their right limits, the state jumps if it must.
     pub(super) fn edge(&mut self, t: f64, log: &mut Log) -> Result<(), Error> {
-        self.forget_slope();
         let mut u = self.now.u.clone();
         self.inputs.right(t, &mut u);
+        // Where the inputs go on with another slope alone, x' does not jump.
+        self.smooth.front.reach = 0.0;
+        if !self.is_smooth() {
+            self.forget_slope();
+        }
         if u == self.now.u {
             if log.wants_corners() {
                 let row = self.row();
@@ -64,6 +68,7 @@ impl Theta {
     fn forget_slope(&mut self) {
         self.now.slope.clear();
         self.looks.forget();
+        self.forget_start();
     }
 
     /// The jump from inputs `old` to the present ones at the present time.

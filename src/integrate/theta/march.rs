@@ -185,7 +185,7 @@ impl Theta {
         if change != Demand::None {
             let may_locate = h > finest && !last_chance && !self.switches.chattering(CHATTER);
             if change == Demand::Passage && may_locate {
-                self.locate(finest, steps, &mut impulse, log)?;
+                self.locate((finest, None), steps, &mut impulse, log)?;
                 // The right limit is read as behind a step that ends there by itself: in a shorter one what sources move is rounding to the
                 // solvers, and a control on its threshold decides nothing.
                 self.last_h = h;
@@ -218,6 +218,9 @@ impl Theta {
         last_chance: bool,
         impulse: &mut bool,
     ) -> Result<bool, Error> {
+        if self.is_smooth() {
+            return Ok(self.embedded(t1, (true, false), impulse)?.accept);
+        }
         if self.control.is_none() {
             self.preferred = f64::INFINITY;
             self.fixed_step(h, t1)?;
@@ -238,10 +241,10 @@ impl Theta {
 
     /// Goes back before a step in which switches passed their thresholds, and again to `finest` after the first of them did. The time is
     /// that of a straight line between the controls' distances at both ends of a bracket, aimed at a little behind the passage
-    /// and a little before it in turn; every third time it is the middle.
-    fn locate(
+    /// and a little before it in turn; every third time it is the middle. Where the time is `expected`, both sides of it are tried first.
+    pub(super) fn locate(
         &mut self,
-        finest: f64,
+        (finest, expected): (f64, Option<f64>),
         steps: u64,
         impulse: &mut bool,
         log: &mut Log,
@@ -252,8 +255,15 @@ impl Theta {
         let mut aside = finest;
         for count in 0_u32.. {
             let (t0, width) = (self.now.t, end - self.now.t);
+            let aim = match (expected, count) {
+                (Some(at), 0) => Some(at - finest),
+                (Some(at), 1) => Some(at + finest),
+                _ => None,
+            };
             let t1 = if width <= 2.0 * finest {
                 end
+            } else if let Some(aim) = aim {
+                aim.clamp(t0 + finest, end - finest)
             } else {
                 let part = if count % 3 == 2 {
                     0.5
@@ -262,7 +272,7 @@ impl Theta {
                 };
                 t0 + (part * width + 0.5 * aside).clamp(finest, width - finest)
             };
-            self.kept.copy_from(&self.now);
+            self.keep_place();
             let steps = self.stats.steps;
             self.advance(t1 - t0, t1, false, impulse)?;
             let excess = self.excess()?;
@@ -334,6 +344,7 @@ impl Theta {
 
     pub(super) fn back(&mut self, steps: u64) {
         self.now.copy_from(&self.kept);
+        self.back_to_kept();
         self.inputs.lines_mut().back_to(self.now.t);
         self.stats.steps = steps;
         self.pending.clear();

@@ -5,7 +5,9 @@
 //! occur and every one of them keeps its factorisations. A step first tries the active set of the last one: one fused product
 //! and a sign test. Where that fails, the step is solved with γ = 1 by the [`Driver`](crate::solve::Driver).
 
+mod ahead;
 mod attempt;
+mod embedded;
 mod jumps;
 mod lines;
 mod march;
@@ -36,8 +38,10 @@ use crate::integrate::switching::{Demand, Switches, Threshold};
 use crate::integrate::system::{Plant, Reduce, System};
 use crate::lcs::{Lcs, Port, Role};
 use crate::settings::Settings;
-use crate::settings::tolerances::steps::{CORNER, GRANT};
+use crate::settings::tolerances::steps::{CORNER, FIRST, GRANT, GRANT_EMBEDDED};
+use crate::settings::tolerances::times::SPAN_PARTS;
 use crate::solve::{Solution, Status};
+use embedded::Smooth;
 use stages::Tableau;
 use unseen::Looks;
 
@@ -132,6 +136,8 @@ pub struct Theta {
     stock: Vec<f64>,
     control: Option<Control>,
     looks: Looks,
+    /// Steps chosen by an embedded error, where laws are curved.
+    smooth: Smooth,
     stats: Stats,
     modes: BTreeSet<(usize, Vec<bool>)>,
     not_unique: BTreeSet<String>,
@@ -282,10 +288,21 @@ impl Theta {
         let switches = Switches::new(position, thresholds, &system.lcs);
         let tableau = Tableau::of(system, scheme);
         let order = tableau.map_or(scheme.order(), |t| t.order);
-        let corner = if tableau.is_some() { GRANT } else { CORNER };
+        let corner = match tableau {
+            Some(_) if scheme != Scheme::MOREAU => GRANT_EMBEDDED,
+            Some(_) => GRANT,
+            None => CORNER,
+        };
         let (control, preferred) = match stepping {
             Stepping::Fixed(_) => (None, f64::INFINITY),
             Stepping::Controlled { span, first } => {
+                // Rows between choose no steps, the first one neither.
+                let embedded = tableau.is_some() && scheme != Scheme::MOREAU;
+                let first = if embedded {
+                    FIRST * span / SPAN_PARTS
+                } else {
+                    first
+                };
                 (Some(Control::new(order, corner, &settings, span)), first)
             }
         };
@@ -318,6 +335,7 @@ impl Theta {
             stock: Vec::new(),
             control,
             looks: Looks::default(),
+            smooth: Smooth::default(),
             stats: Stats::default(),
             modes: BTreeSet::new(),
             not_unique: BTreeSet::new(),
@@ -468,7 +486,10 @@ impl Theta {
 
 impl Stepper for Theta {
     fn time(&self) -> f64 {
-        self.now.t
+        match self.smooth.until {
+            Some(_) if self.is_smooth() => self.smooth.at,
+            _ => self.now.t,
+        }
     }
 
     fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), Error> {
@@ -481,7 +502,15 @@ impl Stepper for Theta {
                 self.switch(&moving, log)?;
             }
         }
-        while self.now.t < t {
+        self.smooth.at = t;
+        while self.now.t < t && !self.is_at(t) {
+            if self.is_smooth() {
+                self.stride(t, log)?;
+                if log.pauses() {
+                    break;
+                }
+                continue;
+            }
             let now = self.now.t;
             let mut after = now;
             let breakpoint = loop {
@@ -528,12 +557,18 @@ impl Stepper for Theta {
                 break;
             }
         }
-        self.note_energy();
+        if !self.is_behind() {
+            self.note_energy();
+        }
         Ok(())
     }
 
     fn read(&mut self, row: &mut [f64]) {
-        self.read_point(row);
+        if self.is_behind() {
+            self.read_within(row);
+        } else {
+            self.read_point(row);
+        }
     }
 
     fn finish(&mut self) -> Outcome {

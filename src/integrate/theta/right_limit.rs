@@ -27,7 +27,8 @@ impl Theta {
     fn reading_step(&self) -> f64 {
         let short = self.read_step();
         if self.system().curved {
-            short * SHORT * self.reading
+            // Few lengths, so that their matrices are kept.
+            (short * SHORT * self.reading).log2().floor().exp2()
         } else if !self.ports.is_empty() {
             short * SHORT_ON_LINES
         } else {
@@ -97,6 +98,13 @@ impl Theta {
     /// λ at the right limit of now, by one implicit step much shorter than the last.
     pub(super) fn read_lambda(&mut self) -> Result<(), Error> {
         let m = self.lambda.len();
+        if self.smooth.front.known {
+            // The end of a step is on the laws.
+            self.inputs.slopes(self.now.t, &mut self.du);
+            self.lambda.copy_from_slice(&self.smooth.front.lambda);
+            self.y.copy_from_slice(&self.smooth.front.y);
+            return Ok(());
+        }
         let step = self.prepare_short(self.reading_step())?;
         if m == 0 {
             return Ok(());

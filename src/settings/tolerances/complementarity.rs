@@ -46,3 +46,11 @@ pub(crate) const MONOTONE: f64 = 1e-13;
 /// Least −dy'/dw in the second method: a blocking junction has next to none, and a loop of such ports no regular matrix. Larger: slower
 /// convergence; smaller: singular matrices.
 pub(crate) const BLOCKED: f64 = 1e-8;
+
+/// A contraction of Newton's steps below which the last one tells, by a geometric series, what is left. Larger: one step that fell short is
+/// trusted; smaller: a step more than needed.
+pub(crate) const CONTRACTS: f64 = 0.5;
+
+/// A contraction with which R' is factored anew: simplified steps have become slower than a factorisation is dear. Larger: more steps; smaller:
+/// more factorisations.
+pub(crate) const CONTRACTS_NO_MORE: f64 = 0.1;

@@ -100,3 +100,13 @@ pub(crate) const LEAST_PART: f64 = 1e-6;
 /// Lengths of the implicit step that proposes the next mode, in units of the fastest time constant seen, in the order in which they are tried.
 /// The long ones are for stiff circuits: a current that starts without a slope is no more than rounding on the others.
 pub(crate) const PROPOSALS: [f64; 9] = [1e-6, 1e-4, 1e-8, 1e-2, 1e-10, 1.0, 1e2, 1e4, 1e6];
+
+/// x below minus this has ω(x) below half the rounding of 1: a junction there is its blocking line. Larger: exponentials of what is rounding;
+/// smaller: leakage loses digits.
+pub(crate) const BLOCKED_JUNCTION: f64 = 37.0;
+
+/// A relative change of ω up to which its Taylor polynomial of second order is a start. Larger: more iterations; smaller: starts from nothing.
+pub(crate) const OMEGA_NEAR: f64 = 0.5;
+
+/// A residual of ω + ln ω = x whose fourth power, the error after one more step, is rounding. Larger: digits are lost; smaller: a step in vain.
+pub(crate) const OMEGA_ENDS: f64 = 1e-4;

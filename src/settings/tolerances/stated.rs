@@ -25,6 +25,14 @@ pub(crate) const LOOSER: f64 = 2.0;
 /// The error of the run over what that companion differs by: 1/3 or less were the errors smooth. Larger and smaller as [`FIRST_ORDER`].
 pub(crate) const LOOSER_SHARE: f64 = 1.0;
 
+/// The same for steps that tell their error themselves, in proportion to the tolerance: they are 1.7 times as long, and lengths that are powers of √2
+/// of each other are never the same. Larger: a companion that has lost what the run follows; smaller: its steps are those of the run and it
+/// sees no error.
+pub(crate) const LOOSER_EMBEDDED: f64 = 8.0;
+
+/// The error of the run over what that companion differs by: 1/7 were the errors smooth and of one sign. Larger and smaller as [`FIRST_ORDER`].
+pub(crate) const LOOSER_EMBEDDED_SHARE: f64 = 0.5;
+
 /// Steps by which companions read what flows at an instant where laws are curved, over those of the run: their error is of first order.
 pub(crate) const READING: f64 = 4.0;
 

@@ -82,3 +82,36 @@ pub(crate) const ROLES_LOST: f64 = 1e12;
 
 /// Other roles are taken where they bring the fastest rate down to this part. Larger: roles change for little; smaller: digits stay lost.
 pub(crate) const ROLES_GAIN: f64 = 1e-3;
+
+/// The same as [`GRANT`] for steps that tell their error by an embedded method, which is one order lower. Larger and smaller as there.
+pub(crate) const GRANT_EMBEDDED: f64 = 1e-2;
+
+/// A step is so much shorter than its predecessor's error allows. Larger: steps in vain; smaller: more steps.
+pub(crate) const SHORTER: f64 = 0.9;
+
+/// A step is at most so many times as long as the one before. Larger: steps in vain; smaller: more steps until they are long.
+pub(crate) const LONGER: f64 = 8.0;
+
+/// The rate at the end of a step tells the first stage of the next one where to look up to so many times that step's length. Larger: it starts
+/// far off; smaller: it starts from what was.
+pub(crate) const AHEAD: f64 = 3.0;
+
+/// The part of the error granted to a step that the last step of Newton's method at its stages may be. Larger: stages err as much as steps;
+/// smaller: one solve more a stage.
+pub(crate) const STAGE_SOLVED: f64 = 1e-3;
+
+/// The same, relative to the largest quantity, where ports are ideal: on which side of its corner one is decides when switches move. Larger: a switch
+/// moves that a moment later does not; smaller: more solves.
+pub(crate) const IDEAL_SOLVED: f64 = 1e-13;
+
+/// A stop that cuts a step so much is no reason to halve it for a coarser run to compare with: its error is that of a whole step times the
+/// fourth power of it. Larger: coarser runs make the same steps; smaller: more steps.
+pub(crate) const CUT: f64 = 0.25;
+
+/// What a row's polynomials may be off at the stages that test them, over the tolerance and the row's amplitude: it adds up with nothing. Larger: rows err more than
+/// steps; smaller: more rows are stepped to.
+pub(crate) const ROWS: f64 = 0.1;
+
+/// Switches that sources alone drive are asked so many steps ahead when they move next. Larger: passages far ahead are found again after every
+/// switching; smaller: they are asked at every step.
+pub(crate) const ASKED_AHEAD: f64 = 16.0;

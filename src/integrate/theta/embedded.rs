@@ -1,0 +1,378 @@
+//! Steps of circuits with curved laws whose lengths follow the error alone; the method stands in [`curved`](crate::integrate::curved).
+//!
+//! They go from corner to corner of the sources and from switching to switching, over any rows between: these are read from dense output.
+//! Where a caller stands still at any time it likes, steps end there.
+
+use super::ahead::Ahead;
+use super::attempt::unsolved;
+use super::*;
+use crate::integrate::control::Verdict;
+use crate::integrate::curved::tableau::GAMMA;
+use crate::integrate::curved::{Curved, Segments, Start as From, Trial, Within};
+use crate::integrate::grow;
+use crate::settings::tolerances::steps::{FAINT, GRANT_EMBEDDED, IDEAL_SOLVED, STAGE_SOLVED};
+use crate::settings::tolerances::times::SPAN_PARTS;
+
+/// What steps of chosen lengths need besides the rest.
+#[derive(Debug, Default)]
+pub(super) struct Smooth {
+    /// Where the next step starts, and where the present one did.
+    pub(super) front: From,
+    pub(super) kept: From,
+    trial: Trial,
+    /// The step to a row.
+    reader: Trial,
+    segments: Segments,
+    /// The end of the run, s, where rows are read from dense output.
+    pub(super) until: Option<f64>,
+    /// The time of the last row, s.
+    pub(super) at: f64,
+    /// Largest |λ| and |y| so far, by port of a system.
+    sizes: [Vec<f64>; 2],
+    sizes_of: Option<usize>,
+    /// The stop before which a step was halved, so that coarser runs make another one, s.
+    pub(super) halved: f64,
+    pub(super) ahead: Ahead,
+}
+
+impl Theta {
+    /// Has steps go over rows, in a run until `until`, s, that is read at rising times and never moved by hand.
+    pub(crate) fn read_between_steps(&mut self, until: f64) {
+        (self.smooth.until, self.smooth.at) = (Some(until), self.now.t);
+    }
+
+    /// Whether the steps are those of this module.
+    pub(crate) fn is_smooth(&self) -> bool {
+        self.control.is_some()
+            && self.scheme != Scheme::MOREAU
+            && self.ports.is_empty()
+            && self.system().curved
+    }
+
+    /// Whether the last row lies within the last step.
+    pub(super) fn is_behind(&self) -> bool {
+        let at = self.smooth.at;
+        self.smooth.until.is_some() && at < self.now.t - Self::slack(at)
+    }
+
+    /// Whether the steps have come to t, but for the rounding of times: a row at an edge is the one after it.
+    pub(super) fn is_at(&self, t: f64) -> bool {
+        self.smooth.until.is_some() && self.is_smooth() && t - self.now.t <= Self::slack(t)
+    }
+
+    /// When the first ideal port changed in the last step, s.
+    pub(super) fn exchange(&self) -> Option<f64> {
+        let curved = self.system().smooth.as_ref()?;
+        self.smooth.trial.exchange(curved, self.kept.t)
+    }
+
+    /// Keeps the present place for [`Self::back`].
+    pub(super) fn keep_place(&mut self) {
+        self.kept.copy_from(&self.now);
+        let Smooth { front, kept, .. } = &mut self.smooth;
+        kept.copy_from(front);
+    }
+
+    /// Goes back to the place kept.
+    pub(super) fn back_to_kept(&mut self) {
+        let Smooth {
+            front,
+            kept,
+            segments,
+            ..
+        } = &mut self.smooth;
+        front.copy_from(kept);
+        segments.back_to(self.kept.t);
+    }
+
+    /// A step to t1, committed where its error allows it or it is to be `taken` all the same; [`Verdict::accept`] says which. The smallest
+    /// one may contain an impulse, where the network may jump by itself.
+    pub(super) fn embedded(
+        &mut self,
+        t1: f64,
+        (taken, smallest): (bool, bool),
+        impulse: &mut bool,
+    ) -> Result<Verdict, Error> {
+        self.start_here()?;
+        let h = t1 - self.now.t;
+        let mut verdict = match self.try_step(t1) {
+            Ok(()) => self.judge(h),
+            Err(error) if taken => return Err(error),
+            Err(_) => Verdict {
+                accept: false,
+                next: 0.25 * h,
+            },
+        };
+        // A step that a stop cut short says nothing against a longer one.
+        self.preferred = if verdict.accept && h < self.preferred {
+            verdict.next.max(self.preferred)
+        } else {
+            verdict.next
+        };
+        if taken && !verdict.accept {
+            verdict.accept = true;
+            let jumps = self.system().jump.as_ref();
+            if smallest && jumps.is_some_and(|jump| !jump.monotone) {
+                self.attempt(h, t1)?;
+                *impulse = self.impulsive(h)?;
+                self.forget_start();
+                self.commit(t1)?;
+                return Ok(verdict);
+            }
+        }
+        if verdict.accept {
+            self.commit_trial(t1)?;
+        }
+        Ok(verdict)
+    }
+
+    /// What the next step starts from is not known any more.
+    pub(super) fn forget_start(&mut self) {
+        self.smooth.front.known = false;
+        self.smooth.ahead.known = false;
+    }
+
+    /// Finds what the next step starts from, where it is not the end of the last one.
+    fn start_here(&mut self) -> Result<(), Error> {
+        if self.smooth.front.known {
+            return Ok(());
+        }
+        self.read_lambda()?;
+        self.start_from_lambda();
+        Ok(())
+    }
+
+    /// The next step starts from the λ and y that have just been read.
+    pub(super) fn start_from_lambda(&mut self) {
+        let Self {
+            plant,
+            now,
+            smooth,
+            lambda,
+            y,
+            amplitudes,
+            ..
+        } = self;
+        let system = &mut plant.systems[now.system].1;
+        let (lcs, columns) = (&system.lcs, &system.columns);
+        let curved = (system.smooth).get_or_insert_with(|| Box::new(Curved::of(lcs, columns)));
+        let front = &mut smooth.front;
+        (front.known, front.t, front.reach) = (true, now.t, 0.0);
+        front.x.clone_from(&now.x);
+        front.u.clear();
+        front.u.extend(columns.varying.iter().map(|&j| now.u[j]));
+        front.lambda.clone_from(lambda);
+        front.y.clone_from(y);
+        front.slope.resize(now.x.len(), 0.0);
+        curved.slope(&now.x, lambda, &front.u, &mut front.slope);
+        for rate in [&mut front.lambda_rate, &mut front.y_rate] {
+            rate.clear();
+            rate.resize(lambda.len(), 0.0);
+        }
+        // What is small beside the others of its kind is judged by these.
+        let (volts, amperes) = amplitudes.branches();
+        let of_kind = |port: &Port| match port.role {
+            Role::Current => [amperes, volts],
+            Role::Voltage => [volts, amperes],
+            Role::Function => [volts.max(amperes); 2],
+        };
+        let fresh = smooth.sizes_of != Some(now.system);
+        smooth.sizes_of = Some(now.system);
+        for (kind, (sizes, values)) in smooth.sizes.iter_mut().zip([lambda, y]).enumerate() {
+            if fresh {
+                sizes.clear();
+                sizes.extend(lcs.ports.iter().map(|port| FAINT * of_kind(port)[kind]));
+            }
+            grow(sizes, values);
+        }
+    }
+
+    /// The stages of a step to t1.
+    fn try_step(&mut self, t1: f64) -> Result<(), Error> {
+        let Smooth { front, trial, .. } = &mut self.smooth;
+        let system = &mut self.plant.systems[self.now.system].1;
+        let known = (trial.solves, trial.factorisations);
+        let made = Self::make(
+            (system, &self.now.active, &self.settings),
+            &self.inputs,
+            (front, t1),
+            trial,
+        );
+        self.stats.lcp_solves += trial.solves - known.0;
+        self.stats.factorisations += trial.factorisations - known.1;
+        made
+    }
+
+    /// The stages of a step to t1 in a system.
+    fn make(
+        (system, active, settings): (&mut System, &[bool], &Settings),
+        inputs: &Inputs,
+        (start, t1): (&From, f64),
+        trial: &mut Trial,
+    ) -> Result<(), Error> {
+        let Some(mut curved) = system.smooth.take() else {
+            let reason = Reason::Singular { h: t1 - start.t };
+            return Err(Error::at(start.t, reason));
+        };
+        let slack = Self::slack(t1);
+        let g = GAMMA * (t1 - start.t);
+        let mut tolerance = STAGE_SOLVED * GRANT_EMBEDDED * settings.tol;
+        if !curved.ideal.is_empty() {
+            tolerance = tolerance.min(IDEAL_SOLVED);
+        }
+        let mut robust = |q: &[f64], lambda: &mut [f64], y: &mut [f64]| {
+            let accepted = settings.lcp_residual;
+            let (step, _) = system
+                .matrices(g, slack, Scheme::MOREAU, accepted)
+                .map_err(|reason| Error::at(start.t, reason))?;
+            let driver = &mut system.step_mut(step).driver;
+            driver.suggest(active);
+            driver.suggest_point(lambda, y);
+            let solution = driver.solve(&DVector::from_column_slice(q));
+            if let Some(error) = unsolved(&solution, &system.lcs, start.t, accepted) {
+                return Err(error);
+            }
+            lambda.copy_from_slice(solution.lambda.as_slice());
+            y.copy_from_slice(solution.y.as_slice());
+            Ok(())
+        };
+        let made = trial.make(
+            &mut curved,
+            inputs,
+            start,
+            t1,
+            (slack, tolerance),
+            &mut robust,
+        );
+        system.smooth = Some(curved);
+        made
+    }
+
+    /// What error control says of the trial step of length h.
+    fn judge(&mut self, h: f64) -> Verdict {
+        let (Some(control), Stepping::Controlled { span, .. }) = (&self.control, self.stepping)
+        else {
+            return Verdict {
+                accept: true,
+                next: h,
+            };
+        };
+        let moment = span / SPAN_PARTS;
+        let system = &self.plant.systems[self.now.system].1;
+        let Smooth { trial, sizes, .. } = &mut self.smooth;
+        let devices = match &system.smooth {
+            Some(curved) => &curved.devices[..],
+            None => &[],
+        };
+        let worst = |errors: &[f64], sizes: &[f64]| {
+            let relative = devices.iter().map(|&j| errors[j].abs() / sizes[j]);
+            relative.fold(0.0, f64::max)
+        };
+        // A mean current that is off for a part of the span counts as that part; one that is off for less than a moment as that part of it.
+        let mean = worst(&trial.mean_error, &sizes[0]) * (h / span);
+        let (lambda, y) = &trial.end_error;
+        let end = worst(lambda, &sizes[0]).max(worst(y, &sizes[1])) * (h / moment).min(1.0);
+        let of_devices = mean.max(end * (h / span).max(GRANT_EMBEDDED));
+        let verdict = |trial: &Trial, moved: &mut Vec<f64>| {
+            moved.clear();
+            moved.extend(trial.x.iter().zip(&trial.error).map(|(x, e)| x + e));
+            let error = (self.amplitudes).error(&system.lcs, moved, &trial.x);
+            control.judge_embedded(h, error.max(of_devices))
+        };
+        let first = verdict(trial, &mut self.coarse);
+        match &system.smooth {
+            Some(curved) if !first.accept => {
+                trial.forgive_rounding(curved);
+                verdict(trial, &mut self.coarse)
+            }
+            _ => first,
+        }
+    }
+
+    /// Makes the trial step the present.
+    fn commit_trial(&mut self, t1: f64) -> Result<(), Error> {
+        self.stats.steps += 1;
+        if self.stats.steps > self.settings.max_steps {
+            let reason = Reason::TooManySteps {
+                limit: self.settings.max_steps,
+            };
+            return Err(Error::at(self.now.t, reason));
+        }
+        let Smooth {
+            front,
+            trial,
+            segments,
+            sizes,
+            until,
+            ..
+        } = &mut self.smooth;
+        if until.is_some() {
+            segments.keep(front, self.now.system, trial);
+        }
+        front.take_end(t1, trial);
+        grow(&mut sizes[0], &front.lambda);
+        grow(&mut sizes[1], &front.y);
+        let now = &mut self.now;
+        now.balance.add(trial.work);
+        now.balance.add_numerical(trial.loss);
+        now.x.copy_from_slice(&front.x);
+        for (u, &j) in front.u.iter().zip(self.inputs.varying()) {
+            now.u[j] = *u;
+        }
+        now.t = t1;
+        (now.settle, now.turned_off) = (false, false);
+        self.last_h = trial.h;
+        let system = &self.plant.systems[self.now.system].1;
+        self.amplitudes.see(&system.lcs, &self.now.x);
+        let ideal = system
+            .smooth
+            .as_ref()
+            .map_or(&[][..], |curved| &curved.ideal);
+        let on = |j: usize| front.lambda[j] > front.y[j];
+        if ideal.iter().any(|&j| on(j) != self.now.active[j]) {
+            let mut basis = vec![false; front.lambda.len()];
+            let mut seen = vec![None; basis.len()];
+            for &j in ideal {
+                basis[j] = on(j);
+                seen[j] = Some(on(j));
+            }
+            let (known, h) = (self.pending.len(), trial.h);
+            self.take_pattern(basis, &seen, t1);
+            self.note_event_step(known, h);
+        }
+        Ok(())
+    }
+
+    /// The row at a time within the last steps.
+    pub(super) fn read_within(&mut self, row: &mut [f64]) {
+        let Smooth {
+            segments,
+            at,
+            reader,
+            ..
+        } = &mut self.smooth;
+        let t = *at;
+        segments.forget_before(t);
+        let Some(index) = segments.system() else {
+            return;
+        };
+        let system = &mut self.plant.systems[index].1;
+        let Some(curved) = &system.smooth else {
+            return;
+        };
+        if let Within::Step(start) = segments.within(curved, self.settings.tol) {
+            let made = Self::make(
+                (system, &self.now.active, &self.settings),
+                &self.inputs,
+                (start, t),
+                reader,
+            );
+            if let (Ok(()), Some(curved)) = (made, &system.smooth) {
+                return segments.at_end(curved, &self.inputs, (t, reader), row);
+            }
+        }
+        if let Some(curved) = &system.smooth {
+            segments.interpolate(curved, &self.inputs, t, row);
+        }
+    }
+}

@@ -1,0 +1,298 @@
+//! Newton's method on the resolvents of curved laws, without allocation: what most stages of a step need.
+//!
+//! The equation is that of [`lawful`](super::lawful), R(w) = M'λ'(w) + q' − y'(w) = 0 with R' = M' S + (I − S). Started from an extrapolation
+//! one or two steps solve it; R' stays factored as long as it contracts (simplified Newton: P. Deuflhard, "Newton Methods for Nonlinear
+//! Problems", Springer 2004, section 2.1). Where steps do not contract the caller asks the methods that always end.
+
+use nalgebra::DMatrix;
+
+use super::lawful::PortLaw;
+use super::lcp::Scaling;
+use crate::law::{Junction, Law, Resolvent};
+use crate::settings::tolerances::complementarity::{CONTRACTS, CONTRACTS_NO_MORE, MONOTONE};
+
+/// Steps from one start; those that need more are better started elsewhere.
+const STEPS: u32 = 25;
+/// Up to so many ports R' is factored at every step: that costs no more than the laws.
+const SMALL: usize = 6;
+
+/// A port as its resolvent is evaluated, in equilibrated variables.
+#[derive(Debug, Clone)]
+enum Port {
+    /// λ' = max(w, 0).
+    Ideal,
+    /// A junction: λ' = i/d where `current`, else y' = d i.
+    Junction {
+        junction: Junction,
+        /// ρ, Ω.
+        rho: f64,
+        current: bool,
+    },
+    /// Any other law.
+    Other(Box<PortLaw>),
+}
+
+/// A solver for many right-hand sides of one matrix M.
+#[derive(Debug, Clone)]
+pub(crate) struct Newton {
+    size: usize,
+    /// M', row by row.
+    m: Vec<f64>,
+    d: Vec<f64>,
+    ports: Vec<Port>,
+    w: Vec<f64>,
+    lambda: Vec<f64>,
+    y: Vec<f64>,
+    /// dλ'/dw.
+    slope: Vec<f64>,
+    q: Vec<f64>,
+    step: Vec<f64>,
+    /// R' in its factors, row by row, and the rows' order.
+    lu: Vec<f64>,
+    order: Vec<usize>,
+    factored: bool,
+    /// Factorisations of R' so far.
+    pub(crate) factorisations: u64,
+}
+
+impl Newton {
+    /// Prepares M.
+    pub(crate) fn new(m: &DMatrix<f64>, laws: &[PortLaw]) -> Self {
+        let size = m.nrows();
+        let d: Vec<f64> = Scaling::of(m).d.iter().copied().collect();
+        let port = |(law, d): (&PortLaw, &f64)| match law.law {
+            _ if law.law.is_ideal_diode() => Port::Ideal,
+            Law::Exponential(exponential) => {
+                let rho = if law.current { 1.0 / (d * d) } else { d * d };
+                match exponential.behind(rho) {
+                    Some(junction) => Port::Junction {
+                        junction,
+                        rho,
+                        current: law.current,
+                    },
+                    None => Port::Other(Box::new(law.clone())),
+                }
+            }
+            _ => Port::Other(Box::new(law.clone())),
+        };
+        let row = |k: usize| {
+            let (i, j) = (k / size, k % size);
+            d[i] * m[(i, j)] * d[j]
+        };
+        Self {
+            size,
+            m: (0..size * size).map(row).collect(),
+            ports: laws.iter().zip(&d).map(port).collect(),
+            w: vec![0.0; size],
+            lambda: vec![0.0; size],
+            y: vec![0.0; size],
+            slope: vec![0.0; size],
+            q: vec![0.0; size],
+            step: vec![0.0; size],
+            lu: vec![0.0; size * size],
+            order: (0..size).collect(),
+            factored: false,
+            factorisations: 0,
+            d,
+        }
+    }
+
+    /// Solves for one q from a guess of (λ, y), which the solution replaces; the last step is below `tolerance` of the largest w.
+    /// `false`: the steps do not contract, and what is there is no solution.
+    pub(crate) fn solve(
+        &mut self,
+        q: &[f64],
+        lambda: &mut [f64],
+        y: &mut [f64],
+        tolerance: f64,
+    ) -> bool {
+        for j in 0..self.size {
+            self.q[j] = q[j] * self.d[j];
+            self.w[j] = lambda[j] / self.d[j] - y[j] * self.d[j];
+        }
+        let found = self.descend(tolerance);
+        if found {
+            for j in 0..self.size {
+                lambda[j] = self.lambda[j] * self.d[j];
+                y[j] = self.y[j] / self.d[j];
+            }
+        }
+        found
+    }
+
+    /// dλ and dy where q moves by dq, at the solution found last and by the factors that found it.
+    pub(crate) fn response(&mut self, dq: &[f64], lambda: &mut [f64], y: &mut [f64]) {
+        if !self.factored {
+            lambda.fill(0.0);
+            y.fill(0.0);
+            return;
+        }
+        for ((step, dq), d) in self.step.iter_mut().zip(dq).zip(&self.d) {
+            *step = -dq * d;
+        }
+        self.substitute();
+        for j in 0..self.size {
+            let (dw, slope) = (self.step[j], self.slope[j]);
+            lambda[j] = self.d[j] * slope * dw;
+            y[j] = (slope - 1.0) * dw / self.d[j];
+        }
+    }
+
+    fn descend(&mut self, tolerance: f64) -> bool {
+        let largest = |values: &[f64]| values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        self.evaluate();
+        let mut before = f64::INFINITY;
+        for k in 0..STEPS {
+            let fresh = !self.factored || self.size <= SMALL;
+            if fresh && !self.factor() {
+                return false;
+            }
+            self.residual();
+            self.substitute();
+            let norm = largest(&self.step);
+            if !norm.is_finite() {
+                return false;
+            }
+            for (w, step) in self.w.iter_mut().zip(&self.step) {
+                *w += step;
+            }
+            self.evaluate();
+            let size = tolerance * largest(&self.w).max(largest(&self.q));
+            let rate = norm / before;
+            // What is left after this step is a geometric series at most.
+            if norm <= size || k > 0 && rate < CONTRACTS && norm * rate / (1.0 - rate) <= size {
+                return true;
+            }
+            if rate > CONTRACTS_NO_MORE && !fresh {
+                self.factored = false;
+            }
+            before = norm;
+        }
+        false
+    }
+
+    /// λ', y' and the slopes at w.
+    fn evaluate(&mut self) {
+        for j in 0..self.size {
+            let (w, d) = (self.w[j], self.d[j]);
+            let (lambda, y, slope) = match &mut self.ports[j] {
+                Port::Ideal => (w.max(0.0), (-w).max(0.0), if w > 0.0 { 1.0 } else { 0.0 }),
+                Port::Junction {
+                    junction,
+                    rho,
+                    current: true,
+                } => {
+                    // λ' = i/d, −y' = d v, so w/d = v + ρ i.
+                    let (i, di) = junction.at(w / d);
+                    (i / d, i / d - w, di * *rho)
+                }
+                Port::Junction {
+                    junction,
+                    rho,
+                    current: false,
+                } => {
+                    // λ' = −v/d, −y' = −d i, so −d w = v + ρ i.
+                    let (i, di) = junction.at(-w * d);
+                    (w + d * i, d * i, 1.0 - di * *rho)
+                }
+                Port::Other(port) => port.at(d, w),
+            };
+            self.lambda[j] = lambda;
+            self.y[j] = y;
+            self.slope[j] = slope;
+        }
+    }
+
+    /// −R into `step`.
+    fn residual(&mut self) {
+        for (i, row) in self.m.chunks_exact(self.size).enumerate() {
+            let sum: f64 = row.iter().zip(&self.lambda).map(|(m, l)| m * l).sum();
+            self.step[i] = self.y[i] - sum - self.q[i];
+        }
+    }
+
+    /// Factors R' with row pivoting; `false` where it is singular.
+    fn factor(&mut self) -> bool {
+        let n = self.size;
+        self.factorisations += 1;
+        self.factored = true;
+        for (row, m) in self.lu.chunks_exact_mut(n).zip(self.m.chunks_exact(n)) {
+            for ((entry, m), slope) in row.iter_mut().zip(m).zip(&self.slope) {
+                *entry = m * slope;
+            }
+        }
+        for j in 0..n {
+            self.lu[j * n + j] += 1.0 - self.slope[j] + MONOTONE * self.slope[j];
+            self.order[j] = j;
+        }
+        for k in 0..n {
+            let largest = (k..n).fold(k, |best, i| {
+                if self.lu[i * n + k].abs() > self.lu[best * n + k].abs() {
+                    i
+                } else {
+                    best
+                }
+            });
+            if largest != k {
+                self.order.swap(k, largest);
+                for j in 0..n {
+                    self.lu.swap(k * n + j, largest * n + j);
+                }
+            }
+            let (above, below) = self.lu.split_at_mut((k + 1) * n);
+            let pivot_row = &above[k * n..];
+            let pivot = pivot_row[k];
+            if pivot == 0.0 || !pivot.is_finite() {
+                self.factored = false;
+                return false;
+            }
+            for row in below.chunks_exact_mut(n) {
+                if row[k] == 0.0 {
+                    continue;
+                }
+                let factor = row[k] / pivot;
+                row[k] = factor;
+                for (entry, above) in row[k + 1..].iter_mut().zip(&pivot_row[k + 1..]) {
+                    *entry -= factor * above;
+                }
+            }
+        }
+        true
+    }
+
+    /// R'⁻¹ of `step`, in place.
+    fn substitute(&mut self) {
+        let n = self.size;
+        // y is evaluated anew after the step; until then it holds the right-hand side in the order of the pivots.
+        for (k, &row) in self.order.iter().enumerate() {
+            self.y[k] = self.step[row];
+        }
+        for i in 0..n {
+            let row = &self.lu[i * n..i * n + i];
+            let sum: f64 = row.iter().zip(&self.y).map(|(a, b)| a * b).sum();
+            self.y[i] -= sum;
+        }
+        for i in (0..n).rev() {
+            let row = &self.lu[i * n..(i + 1) * n];
+            let sum: f64 = (row[i + 1..].iter().zip(&self.y[i + 1..]))
+                .map(|(a, b)| a * b)
+                .sum();
+            self.y[i] = (self.y[i] - sum) / row[i];
+        }
+        self.step.copy_from_slice(&self.y);
+    }
+}
+
+impl PortLaw {
+    /// λ', y' and dλ'/dw at w, where λ = d λ' and y = y'/d.
+    pub(super) fn at(&self, d: f64, w: f64) -> (f64, f64, f64) {
+        if self.current {
+            let rho = 1.0 / (d * d);
+            let Resolvent { v, i, di, .. } = self.law.resolvent(rho, w / d);
+            (i / d, -v * d, di * rho)
+        } else {
+            let Resolvent { v, i, dv, .. } = self.law.resolvent(d * d, -w * d);
+            (-v / d, i * d, dv)
+        }
+    }
+}
