@@ -6,9 +6,6 @@ use crate::integrate::error::{Error, Reason};
 use crate::integrate::inputs::{Inputs, Pieces};
 use crate::settings::tolerances::steps::{AHEAD, STAGE_ROUNDING};
 
-/// The stages by their times.
-const IN_ORDER: [usize; STAGES] = [0, 2, 1, 3, 4, 5];
-
 /// Where a step starts.
 #[derive(Debug, Default)]
 pub(crate) struct Start {
@@ -138,31 +135,6 @@ impl Trial {
             buffer.clear();
             buffer.resize(len, 0.0);
         }
-    }
-
-    /// When the first ideal port whose pair has changed hands in the step did so, s: its λ or y before, on a straight line through the two stages
-    /// before the change.
-    pub(crate) fn exchange(&self, curved: &Curved, start: f64) -> Option<f64> {
-        let m = self.m;
-        let conducts =
-            |j: usize, stage: usize| self.lambdas[stage * m + j] > self.ys[stage * m + j];
-        let zero = |&j: &usize| {
-            let before = conducts(j, 0);
-            let value = |stage: usize| {
-                let values = if before { &self.lambdas } else { &self.ys };
-                values[stage * m + j]
-            };
-            let after = IN_ORDER.iter().position(|&k| conducts(j, k) != before)?;
-            let (&last, &first) = (
-                IN_ORDER.get(after.checked_sub(1)?)?,
-                IN_ORDER.get(after.checked_sub(2)?)?,
-            );
-            let slope = (value(last) - value(first)) / (NODES[last] - NODES[first]);
-            let part = NODES[last] - value(last) / slope;
-            let within = part > NODES[last] && part <= NODES[IN_ORDER[after]];
-            within.then_some(start + part * self.h)
-        };
-        curved.ideal.iter().filter_map(zero).reduce(f64::min)
     }
 
     /// x' at the end of the step.

@@ -105,7 +105,7 @@ impl Coming {
     pub(super) fn pop_instant(&mut self) -> Option<Instant> {
         let mut first = self.instants.pop_front()?;
         let end = first.t + SAME_TIME * first.t.abs();
-        while let Some(same) = self.instants.pop_front_if(|next| next.t <= end) {
+        while let Some(same) = pop_until(&mut self.instants, |next| next.t, end) {
             first.kind = first.kind.min(same.kind);
         }
         Some(first)
@@ -123,13 +123,19 @@ impl Coming {
     /// Tells what has happened by `t`.
     pub(super) fn tell(&mut self, t: f64, log: &mut Log) {
         let near = t + SAME_TIME * t.abs();
-        while let Some(event) = self.events.pop_front_if(|event| event.t <= near) {
+        while let Some(event) = pop_until(&mut self.events, |event| event.t, near) {
             log.event(event.t, event.changes, event.jump);
         }
-        while let Some(impulse) = self.impulses.pop_front_if(|impulse| impulse.t <= near) {
+        while let Some(impulse) = pop_until(&mut self.impulses, |impulse| impulse.t, near) {
             log.impulse(impulse.t, impulse.name, impulse.area);
         }
         log.state_jumps
             .add_beside(&std::mem::take(&mut self.state_jumps));
     }
+}
+
+/// The first of these, if its time is no later than `end`, s.
+fn pop_until<T>(all: &mut VecDeque<T>, time: impl Fn(&T) -> f64, end: f64) -> Option<T> {
+    let due = all.front().is_some_and(|first| time(first) <= end);
+    due.then(|| all.pop_front()).flatten()
 }

@@ -113,6 +113,7 @@ fn steps(
     let stepping = options.step.map_or(controlled(tran), Stepping::Fixed);
     let settings = &options.settings;
     let mut theta = problem.stepper(problem.start.clone(), tran, scheme, stepping, settings)?;
+    theta.move_by_hand();
     if options.step.is_none()
         && let Some(amplitudes) = problem.scout(tran, settings)
     {

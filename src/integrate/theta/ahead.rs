@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::settings::tolerances::stated::COARSER;
-use crate::settings::tolerances::steps::{ASKED_AHEAD, CUT, FIRST};
+use crate::settings::tolerances::steps::{ASKED_AHEAD, CUT, FIRST, SINE_EMBEDDED};
 use crate::settings::tolerances::times::WHOLE;
 
 /// The next stop of the steps.
@@ -117,7 +117,7 @@ impl Theta {
     }
 
     fn longest_step(&self) -> f64 {
-        let mut longest = self.longest.min(self.inputs.largest_step());
+        let mut longest = self.longest.min(SINE_EMBEDDED * self.inputs.largest_step());
         if self.whole {
             // A coarser run whose steps the sources limit as those of the run would see no error.
             longest *= COARSER[0];
@@ -176,9 +176,8 @@ impl Theta {
             let finest = (h / 2_f64.powi(LOCATE)).max(Self::slack(t1));
             let may_locate = h > finest && !self.switches.chattering(CHATTER);
             if change == Demand::Passage && may_locate {
-                // A control that jumps as an ideal port changes tells nothing of when it does; the port does.
-                let (preferred, expected) = (self.preferred, self.exchange());
-                self.locate((finest, expected), steps, &mut impulse, log)?;
+                let preferred = self.preferred;
+                self.locate(finest, steps, &mut impulse, log)?;
                 self.preferred = preferred;
             }
             self.report(log);

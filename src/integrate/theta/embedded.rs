@@ -25,6 +25,8 @@ pub(super) struct Smooth {
     segments: Segments,
     /// The end of the run, s, where rows are read from dense output.
     pub(super) until: Option<f64>,
+    /// A caller moves the run by hand: its steps are those of the halves.
+    by_hand: bool,
     /// The time of the last row, s.
     pub(super) at: f64,
     /// Largest |λ| and |y| so far, by port of a system.
@@ -41,9 +43,15 @@ impl Theta {
         (self.smooth.until, self.smooth.at) = (Some(until), self.now.t);
     }
 
+    /// Has a run that is stopped, set and taken up again go on in steps and halves.
+    pub(crate) fn move_by_hand(&mut self) {
+        self.smooth.by_hand = true;
+    }
+
     /// Whether the steps are those of this module.
     pub(crate) fn is_smooth(&self) -> bool {
         self.control.is_some()
+            && !self.smooth.by_hand
             && self.scheme != Scheme::MOREAU
             && self.ports.is_empty()
             && self.system().curved
@@ -58,12 +66,6 @@ impl Theta {
     /// Whether the steps have come to t, but for the rounding of times: a row at an edge is the one after it.
     pub(super) fn is_at(&self, t: f64) -> bool {
         self.smooth.until.is_some() && self.is_smooth() && t - self.now.t <= Self::slack(t)
-    }
-
-    /// When the first ideal port changed in the last step, s.
-    pub(super) fn exchange(&self) -> Option<f64> {
-        let curved = self.system().smooth.as_ref()?;
-        self.smooth.trial.exchange(curved, self.kept.t)
     }
 
     /// Keeps the present place for [`Self::back`].

@@ -185,7 +185,7 @@ impl Theta {
         if change != Demand::None {
             let may_locate = h > finest && !last_chance && !self.switches.chattering(CHATTER);
             if change == Demand::Passage && may_locate {
-                self.locate((finest, None), steps, &mut impulse, log)?;
+                self.locate(finest, steps, &mut impulse, log)?;
                 // The right limit is read as behind a step that ends there by itself: in a shorter one what sources move is rounding to the
                 // solvers, and a control on its threshold decides nothing.
                 self.last_h = h;
@@ -241,10 +241,10 @@ impl Theta {
 
     /// Goes back before a step in which switches passed their thresholds, and again to `finest` after the first of them did. The time is
     /// that of a straight line between the controls' distances at both ends of a bracket, aimed at a little behind the passage
-    /// and a little before it in turn; every third time it is the middle. Where the time is `expected`, both sides of it are tried first.
+    /// and a little before it in turn; every third time it is the middle.
     pub(super) fn locate(
         &mut self,
-        (finest, expected): (f64, Option<f64>),
+        finest: f64,
         steps: u64,
         impulse: &mut bool,
         log: &mut Log,
@@ -255,15 +255,8 @@ impl Theta {
         let mut aside = finest;
         for count in 0_u32.. {
             let (t0, width) = (self.now.t, end - self.now.t);
-            let aim = match (expected, count) {
-                (Some(at), 0) => Some(at - finest),
-                (Some(at), 1) => Some(at + finest),
-                _ => None,
-            };
             let t1 = if width <= 2.0 * finest {
                 end
-            } else if let Some(aim) = aim {
-                aim.clamp(t0 + finest, end - finest)
             } else {
                 let part = if count % 3 == 2 {
                     0.5

@@ -47,6 +47,10 @@ pub(crate) const FIRST: f64 = 1.0 / 64.0;
 /// a sine is stepped over.
 pub(crate) const STEPS_PER_PERIOD: f64 = 8.0;
 
+/// Steps that tell their error by an embedded method are at most this part of what [`STEPS_PER_PERIOD`] allows: where a sine drives smooth laws, eight of them
+/// in a period err by 3e-6 and the method does not see it. Larger: that error; smaller: more steps than the tolerance asks for.
+pub(crate) const SINE_EMBEDDED: f64 = 0.5;
+
 /// A step is no longer than a delay over this: what arrives at its end has left before its start, and enough records lie between the two for
 /// straight lines. Larger: more steps; smaller: waves are rounded off.
 pub(crate) const STEPS_PER_DELAY: f64 = 8.0;
@@ -110,7 +114,7 @@ pub(crate) const CUT: f64 = 0.25;
 
 /// What a row's polynomials may be off at the stages that test them, over the tolerance and the row's amplitude: it adds up with nothing. Larger: rows err more than
 /// steps; smaller: more rows are stepped to.
-pub(crate) const ROWS: f64 = 0.1;
+pub(crate) const ROWS: f64 = 0.01;
 
 /// Switches that sources alone drive are asked so many steps ahead when they move next. Larger: passages far ahead are found again after every
 /// switching; smaller: they are asked at every step.
