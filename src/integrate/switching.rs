@@ -165,6 +165,8 @@ pub(crate) struct Switches {
     driven: Vec<bool>,
     /// Whether that is so since the present system was entered.
     newly_driven: Vec<bool>,
+    /// Whether some control has depended on more than sources so far.
+    state_driven: bool,
     /// By switch: the port of a latch's valve in the present system.
     valves: Vec<Option<usize>>,
     needs_lambda: bool,
@@ -179,6 +181,7 @@ impl Switches {
             thresholds,
             driven: vec![],
             newly_driven: vec![],
+            state_driven: false,
             valves: vec![],
             needs_lambda: false,
             in_this_step: 0,
@@ -210,6 +213,7 @@ impl Switches {
             .map(|(now, before)| *now && !before)
             .collect();
         self.driven = driven;
+        self.state_driven |= self.driven.contains(&false);
         let port = |t: &Threshold| {
             let valve = t.valve()?;
             lcs.ports.iter().position(|port| port.device == valve)
@@ -232,6 +236,11 @@ impl Switches {
             !self.driven[i] && (t.latch.is_none() || t.holds(self.position[i], &self.position))
         };
         self.thresholds.iter().enumerate().any(watched)
+    }
+
+    /// Whether some control has depended on more than sources so far.
+    pub(crate) fn are_state_driven(&self) -> bool {
+        self.state_driven
     }
 
     pub(crate) fn needs_lambda(&self) -> bool {

@@ -7,8 +7,6 @@
 
 mod alike;
 mod cut;
-#[cfg(test)]
-mod tests;
 
 use std::collections::BTreeSet;
 

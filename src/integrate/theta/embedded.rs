@@ -48,12 +48,14 @@ impl Theta {
         self.smooth.by_hand = true;
     }
 
-    /// Whether the steps are those of this module.
+    /// Whether the steps are those of this module. Controls that depend on the state keep the steps in halves, whose solver knows them
+    /// closely enough to say when they pass.
     pub(crate) fn is_smooth(&self) -> bool {
         self.control.is_some()
             && !self.smooth.by_hand
             && self.scheme != Scheme::MOREAU
             && self.ports.is_empty()
+            && !self.switches.are_state_driven()
             && self.system().curved
     }
 

@@ -88,7 +88,7 @@ pub(crate) const ROLES_LOST: f64 = 1e12;
 pub(crate) const ROLES_GAIN: f64 = 1e-3;
 
 /// The same as [`GRANT`] for steps that tell their error by an embedded method, which is one order lower. Larger and smaller as there.
-pub(crate) const GRANT_EMBEDDED: f64 = 1e-2;
+pub(crate) const GRANT_EMBEDDED: f64 = 1e-3;
 
 /// A step is so much shorter than its predecessor's error allows. Larger: steps in vain; smaller: more steps.
 pub(crate) const SHORTER: f64 = 0.9;
