@@ -207,6 +207,71 @@ fn a_voltage_mode_buck_doubles_its_period_where_it_is_known_to() {
     }
 }
 
+/// The current and voltage of `netlists/small-signal/current-mode.cir` one clock period later: the current rises to its peak while the capacitor discharges,
+/// then both follow a damped oscillation about the input voltage.
+fn current_mode_map(peak: f64, [i0, v0]: [f64; 2]) -> [f64; 2] {
+    let (vin, l, c, r, period) = (10.0, 1e-3, 12e-6, 20.0, 1e-4);
+    let on = l * (peak - i0) / vin;
+    let (alpha, t) = (1.0 / (2.0 * r * c), period - on);
+    let omega = (1.0 / (l * c) - alpha * alpha).sqrt();
+    let (di, dv) = (peak - vin / r, v0 * (-on / (r * c)).exp() - vin);
+    let (sin, cos) = (omega * t).sin_cos();
+    let decay = (-alpha * t).exp();
+    [
+        vin / r + decay * (di * cos + (alpha * di - dv / l) / omega * sin),
+        vin + decay * (dv * cos + (di / c - alpha * dv) / omega * sin),
+    ]
+}
+
+/// Its period doubles at a peak of 1.7 A, and again; the multipliers of the orbit of one period are the eigenvalues of the map's derivative.
+#[test]
+fn a_current_mode_boost_has_the_multipliers_of_its_map() {
+    let netlist = include_str!("../netlists/small-signal/current-mode.cir");
+    for (peak, order) in [(1.0, 1), (1.6, 1), (2.0, 2), (2.5, 4)] {
+        let text = netlist.replace(".param ipk=1", &format!(".param ipk={peak}"));
+        let (stable, _) = orbit_of(&text);
+        assert_eq!((stable.order, stable.stable), (order, true), "{peak} A");
+        let options = PeriodicOptions {
+            order: Some(1),
+            ..PeriodicOptions::default()
+        };
+        let (orbit, run) = periodic(&parsed(&text), &options).expect("an orbit");
+        let at = |name: &str| {
+            let column = run.waveforms.names.iter().position(|n| n == name);
+            row(&run, 0)[column.expect("a signal")]
+        };
+        // The comparator has 1 µV of hysteresis.
+        let (peak, start) = (peak + 1e-6, [at("i(l1)"), at("v(out)")]);
+        let after = current_mode_map(peak, start);
+        for (a, b) in after.iter().zip(start) {
+            assert!(
+                (a - b).abs() < 1e-11 * b,
+                "{peak} A: {start:?} to {after:?}"
+            );
+        }
+        let column = |j: usize| {
+            let h = 1e-5 * start[j];
+            let ends = [-h, h].map(|h| {
+                let mut moved = start;
+                moved[j] += h;
+                current_mode_map(peak, moved)
+            });
+            [0, 1].map(|k| (ends[1][k] - ends[0][k]) / (2.0 * h))
+        };
+        let [[a, c], [b, d]] = [column(0), column(1)];
+        let (half, product) = (0.5 * (a + d), a * d - b * c);
+        let root = (half * half - product).sqrt();
+        let mut expected = [half - root, half + root];
+        expected.sort_by(|x, y| y.abs().total_cmp(&x.abs()));
+        for (found, expected) in orbit.multipliers.iter().zip(expected) {
+            assert!(
+                (found[0] - expected).abs() < 1e-8,
+                "{peak} A: {orbit:?}, {expected}"
+            );
+        }
+    }
+}
+
 /// A capacitor is charged through 10 kΩ to 7 V, and discharged to 3 V through 100 Ω: T = Σ τ ln((V∞ − V₀)/(V∞ − V₁)).
 #[test]
 fn a_relaxation_oscillator_has_the_period_of_its_closed_form() {
