@@ -10,7 +10,7 @@ use crate::integrate::event::Change;
 use crate::integrate::inputs::{Inputs, Passage};
 use crate::integrate::reading::{self, Point};
 use crate::integrate::settle::settle;
-use crate::lcs::Lcs;
+use crate::lcs::{Lcs, Role};
 use crate::mna::{LatchPort, SwitchPort};
 use crate::settings::tolerances::events::CONTROL_ROUNDINGS;
 use crate::settings::tolerances::events::DECISIVE;
@@ -167,8 +167,8 @@ pub(crate) struct Switches {
     newly_driven: Vec<bool>,
     /// Whether some control has depended on more than sources so far.
     state_driven: bool,
-    /// By switch: the port of a latch's valve in the present system.
-    valves: Vec<Option<usize>>,
+    /// By switch: the port of a latch's valve in the present system, and whether it conducts where it is in the active set.
+    valves: Vec<Option<(usize, bool)>>,
     needs_lambda: bool,
     in_this_step: u32,
 }
@@ -216,7 +216,8 @@ impl Switches {
         self.state_driven |= self.driven.contains(&false);
         let port = |t: &Threshold| {
             let valve = t.valve()?;
-            lcs.ports.iter().position(|port| port.device == valve)
+            let at = lcs.ports.iter().position(|port| port.device == valve)?;
+            Some((at, lcs.ports[at].role != Role::Voltage))
         };
         self.valves = self.thresholds.iter().map(port).collect();
         self.needs_lambda = (0..self.thresholds.len()).any(|i| !zero(&rows.lambda, i));
@@ -311,19 +312,25 @@ impl Switches {
         fire(&self.thresholds, &mut self.position);
     }
 
-    /// What controls that depend on the state ask for, where the ports in `conducting` conduct. Switches that sources alone drive
+    /// Whether the valve in series with a latch conducts, by the active set: a current far below the tolerance of the steps holds
+    /// the latch, too.
+    fn carries(&self, i: usize, active: &[bool]) -> bool {
+        self.valves[i].is_some_and(|(port, conducts)| active[port] == conducts)
+    }
+
+    /// What controls that depend on the state ask for with this active set. Switches that sources alone drive
     /// move at the times of [`Self::next_known`] only.
-    pub(crate) fn asked(&self, lcs: &Lcs, at: Point<'_>, conducting: &[bool]) -> Demand {
+    pub(crate) fn asked(&self, lcs: &Lcs, at: Point<'_>, active: &[bool]) -> Demand {
         (0..self.len())
             .filter(|&i| !self.driven[i])
-            .map(|i| self.change(i, lcs, at, conducting))
+            .map(|i| self.change(i, lcs, at, active))
             .max()
             .unwrap_or(Demand::None)
     }
 
     /// The switches that controls ask to move in a position that was just entered. One that sources alone drive since then, as the
     /// state has lost its part in the control, is asked too, if it is beyond its threshold by more than rounding.
-    pub(crate) fn asking(&self, lcs: &Lcs, at: Point<'_>, conducting: &[bool]) -> Vec<usize> {
+    pub(crate) fn asking(&self, lcs: &Lcs, at: Point<'_>, active: &[bool]) -> Vec<usize> {
         let asks = |&i: &usize| {
             let beyond = || {
                 let control = reading::value(&lcs.controls, i, at);
@@ -331,18 +338,18 @@ impl Switches {
                 self.thresholds[i].excess(self.position[i], control) > noise
             };
             let waits = self.driven[i] && !(self.newly_driven[i] && beyond());
-            !waits && self.change(i, lcs, at, conducting) != Demand::None
+            !waits && self.change(i, lcs, at, active) != Demand::None
         };
         (0..self.len()).filter(asks).collect()
     }
 
-    fn change(&self, i: usize, lcs: &Lcs, at: Point<'_>, conducting: &[bool]) -> Demand {
+    fn change(&self, i: usize, lcs: &Lcs, at: Point<'_>, active: &[bool]) -> Demand {
         let (threshold, on) = (&self.thresholds[i], self.position[i]);
         let control = || reading::value(&lcs.controls, i, at);
         match threshold.latch {
             None if threshold.position(on, control()) != on => Demand::Passage,
             Some(_) if threshold.holds(on, &self.position) => {
-                if !self.valves[i].is_some_and(|port| conducting[port]) {
+                if !self.carries(i, active) {
                     Demand::Release
                 } else if threshold.off_below > 0.0 && control() <= threshold.off_below {
                     Demand::Passage
@@ -373,15 +380,15 @@ impl Switches {
 
     /// How far each control that depends on the state is beyond its threshold, positive where the switch is to move at the passage;
     /// far below where a switch waits for nothing.
-    pub(crate) fn excess(&self, lcs: &Lcs, at: Point<'_>, conducting: &[bool]) -> Vec<f64> {
+    pub(crate) fn excess(&self, lcs: &Lcs, at: Point<'_>, active: &[bool]) -> Vec<f64> {
         let waits = |i: usize, threshold: &Threshold| {
-            let held = |port: usize| conducting[port] && threshold.off_below > 0.0;
             !self.driven[i]
                 && match threshold.latch {
                     None => true,
                     Some(_) => {
                         threshold.holds(self.position[i], &self.position)
-                            && self.valves[i].is_some_and(held)
+                            && threshold.off_below > 0.0
+                            && self.carries(i, active)
                     }
                 }
         };

@@ -67,3 +67,11 @@ fn a_thyristor_that_fires_across_a_short_has_its_share() {
     let current = super::runs::at(&found, "i(l1)", 32.0 * 1.081_081_081_081_081_1e-4);
     assert!((current - 1.738_595_265).abs() < 1e-7, "{current} A");
 }
+
+/// In steps a current far below their tolerance was none, and the thyristor let go. From `tests/reference/radau.py --tol 1e-9`.
+#[test]
+fn a_leak_far_below_the_tolerance_holds_a_thyristor() {
+    let found = super::run("held_by_a_leak", Method::Auto);
+    let voltage = super::runs::at(&found, "v(3,4)", 16.0 * 1.739_130_434_782_608_8e-6);
+    assert!((voltage - 94.046_499_8).abs() < 1e-2, "{voltage} V");
+}

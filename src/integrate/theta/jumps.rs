@@ -221,7 +221,7 @@ impl Theta {
         }
         let lcs = &self.plant.systems[self.now.system].1.lcs;
         let at = self.now.point(&self.lambda, &self.du);
-        Ok(self.switches.asked(lcs, at, &self.now.pattern))
+        Ok(self.switches.asked(lcs, at, &self.now.active))
     }
 
     /// Whether the controls ask a switch to move now.
@@ -236,7 +236,7 @@ impl Theta {
         }
         let lcs = &self.plant.systems[self.now.system].1.lcs;
         let at = self.now.point(&self.lambda, &self.du);
-        Ok(self.switches.excess(lcs, at, &self.now.pattern))
+        Ok(self.switches.excess(lcs, at, &self.now.active))
     }
 
     /// Flips the switches `moving`, then those whose controls ask for it until none does, with the jumps this causes.
@@ -309,7 +309,7 @@ impl Theta {
         }
         let lcs = &self.plant.systems[self.now.system].1.lcs;
         let at = self.now.point(&self.lambda, &self.du);
-        Ok(self.switches.asking(lcs, at, &self.now.pattern))
+        Ok(self.switches.asking(lcs, at, &self.now.active))
     }
 
     /// Where the jump from `start` (system, storage, balance) to storage `end` stops because the first of the switches `asking` pass
