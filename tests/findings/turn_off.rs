@@ -3,7 +3,8 @@
 use circ::integrate::{Method, Run, SimOptions};
 
 use super::changed_by;
-use super::runs::column;
+use super::runs::{at, column};
+use circ::settings::Settings;
 
 /// The half-wave rectifier with another blocking resistance, by the midpoint rule: with chosen or given steps.
 fn half_wave(roff: &str, step: Option<f64>) -> Run {
@@ -102,5 +103,26 @@ fn a_source_that_moves_takes_the_current_from_a_diode() {
             let share = 1e-2 * step / 100e-9;
             assert!(off < share * amplitude, "{step:e}: {probe} is {off:e} off");
         }
+    }
+}
+
+/// Where a diode's λ is its voltage the solver's active set alone decided, and the diode went on with a negative current: 2e-3 of the
+/// amplitude off at every tolerance, 3e-5 stated. The value is SciPy's Radau's on the circuit's own equations, rtol 1e-11.
+#[test]
+fn a_diode_does_not_go_on_with_a_negative_current() {
+    for tol in [1e-4, 1e-6] {
+        let options = SimOptions {
+            method: Method::Theta,
+            settings: Settings {
+                tol,
+                ..Settings::default()
+            },
+            ..SimOptions::default()
+        };
+        let run = changed_by("capacitor_follows_a_ramp", &[], options);
+        let voltage = at(&run, "v(2)", 3.104e-3);
+        let off = (voltage + 0.343_784_75).abs() / 4.28;
+        assert!(off < tol, "{off:e} at {tol:e}");
+        assert!(off < run.error.max.expect("a stated error").max(1e-8));
     }
 }

@@ -79,8 +79,10 @@ impl Theta {
         }
         let solved = self.out.clone();
         fused.step(&self.z, n, &mut self.out, |_| 0.0);
+        // A port that conducts has λ for a current, or y where its λ is a voltage.
+        let carries = |j: usize| self.now.active[j] == (system.lcs.ports[j].role != Role::Voltage);
         let as_far = |j: usize| self.out[n + j] >= 2.0 * solved[n + j].min(0.0);
-        if (0..self.now.active.len()).all(|j| !self.now.active[j] || as_far(j)) {
+        if (0..self.now.active.len()).all(|j| !carries(j) || as_far(j)) {
             self.attempt = tried;
         } else {
             self.out = solved;

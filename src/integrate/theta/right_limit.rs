@@ -25,10 +25,10 @@ impl Theta {
     /// The step by which λ is read. A curved law tells its current at the instant itself, so only the ideal ports beside it need a
     /// step, and the sources move less in a shorter one; the rounding of the state grows to 2²⁴ε.
     fn reading_step(&self) -> f64 {
-        let short = self.read_step();
+        let short = self.read_step() * self.reading;
         if self.system().curved {
             // Few lengths, so that their matrices are kept.
-            (short * SHORT * self.reading).log2().floor().exp2()
+            (short * SHORT).log2().floor().exp2()
         } else if !self.ports.is_empty() {
             short * SHORT_ON_LINES
         } else {
