@@ -244,7 +244,9 @@ impl StepMatrices {
 
     /// What a λ of this implicit step lacks to be that at its start, as rows over z: where λ follows from x and u at every instant,
     /// D_aa λ + C x + G u + F = 0, the step has moved these by h(C x' + G u'), and a small resistance makes much of it. Where λ is what keeps
-    /// a constraint, it is that of a step. With M = D + h C W B the product M⁻¹ D M⁻¹ h(C x' + G u') is right for both.
+    /// a constraint, it is that of a step. With M = D + E, E = h C W B, the former lacks D⁻¹ h(C x' + G u') = (I − K)⁻¹ M⁻¹ h(C x' + G u')
+    /// with K = M⁻¹ E, and of the latter K = I. The sum I + K + … + K⁷ = (I + K)(I + K²)(I + K⁴) times I − K⁸ is right for both, up to
+    /// 2 K⁸ where K is small.
     pub(crate) fn back(&mut self, lcs: &Lcs, columns: &Columns, active: &[bool]) -> &DMatrix<f64> {
         let at = self.back.iter().position(|(known, _)| known == active);
         let at = at.unwrap_or_else(|| {
@@ -277,7 +279,19 @@ impl StepMatrices {
             .d
             .select_rows(&solve.indices)
             .select_columns(&solve.indices);
-        let back = &inverse * (direct * (&inverse * moved));
+        let first = &inverse * direct;
+        let one = DMatrix::identity(solve.indices.len(), solve.indices.len());
+        let k = &one - &first;
+        let squared = &k * &k;
+        let fourth = &squared * &squared;
+        let eighth = &fourth * &fourth;
+        // A network that is not passive may have a K that grows.
+        let back = if eighth.amax() <= 1.0 {
+            (&one - eighth) * (&one + k) * (&one + squared) * (&one + fourth)
+        } else {
+            first
+        };
+        let back = back * (&inverse * moved);
         for (row, &j) in back.row_iter().zip(&solve.indices) {
             rows.set_row(j, &row);
         }

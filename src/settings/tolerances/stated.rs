@@ -20,7 +20,7 @@ pub(crate) const UNSETTLED: f64 = 4.0;
 
 /// Tolerance of the companion of a run whose steps are chosen, over that of the run. It makes its steps whole where the run makes them in
 /// halves, so that they are longer even where rows and edges choose them.
-pub(crate) const LOOSER: f64 = 2.0;
+pub(crate) const LOOSER: f64 = 4.0;
 
 /// The error of the run over what that companion differs by: 1/3 or less were the errors smooth. Larger and smaller as [`FIRST_ORDER`].
 pub(crate) const LOOSER_SHARE: f64 = 1.0;
