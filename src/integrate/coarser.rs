@@ -13,7 +13,7 @@ use crate::integrate::theta::Stepping;
 use crate::settings::Settings;
 use crate::settings::tolerances::stated::{
     COARSER, FIRST_ORDER, HIGHER_ORDER, HIGHER_ORDER_EVENTS, LOOSER, LOOSER_EMBEDDED,
-    LOOSER_EMBEDDED_SHARE, LOOSER_SHARE, MANY_ROWS, READING,
+    LOOSER_EMBEDDED_SHARE, LOOSER_SHARE, MANY_ROWS,
 };
 use crate::settings::tolerances::steps::{FIRST, HANDOVER_STEPS};
 
@@ -70,7 +70,7 @@ impl Problem {
                     let (start, stepping) = (self.start.clone(), Stepping::Fixed(longer));
                     let mut theta = self.stepper(start, &tran, scheme, stepping, settings)?;
                     theta.keep_whole_steps();
-                    theta.read_coarsely(READING);
+                    theta.read_coarsely();
                     Ok(Box::new(theta))
                 }),
                 stride,
@@ -111,7 +111,7 @@ impl Problem {
                     theta.expect_amplitudes(amplitudes.clone());
                 }
                 theta.keep_whole_steps();
-                theta.read_coarsely(READING);
+                theta.read_coarsely();
                 theta.read_between_steps(tran.tstop);
                 Ok(Box::new(theta))
             }),

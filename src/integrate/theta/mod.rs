@@ -119,7 +119,7 @@ pub struct Theta {
     whole: bool,
     preferred: f64,
     /// See [`Self::read_coarsely`].
-    reading: f64,
+    reads_coarsely: bool,
     last_h: f64,
     u_next: Vec<f64>,
     du: Vec<f64>,
@@ -323,7 +323,7 @@ impl Theta {
             damped: false,
             whole: false,
             preferred,
-            reading: 1.0,
+            reads_coarsely: false,
             last_h: 0.0,
             z: Vec::new(),
             out: Vec::new(),
@@ -369,9 +369,9 @@ impl Theta {
         self.whole = true;
     }
 
-    /// Has λ of curved laws read by a step longer by a factor, whose error is larger by it.
-    pub(crate) fn read_coarsely(&mut self, factor: f64) {
-        self.reading = factor;
+    /// Has λ at an instant read by a longer step, see [`READING`](crate::settings::tolerances::stated::READING), whose error is larger.
+    pub(crate) fn read_coarsely(&mut self) {
+        self.reads_coarsely = true;
     }
 
     /// The amplitudes seen so far.

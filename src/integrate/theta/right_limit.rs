@@ -2,6 +2,7 @@
 
 use super::attempt::unsolved;
 use super::*;
+use crate::settings::tolerances::stated::{READING, READING_CURVED};
 use crate::settings::tolerances::steps::SHORT;
 use crate::settings::tolerances::steps::SHORT_ON_LINES;
 
@@ -25,8 +26,14 @@ impl Theta {
     /// The step by which λ is read. A curved law tells its current at the instant itself, so only the ideal ports beside it need a
     /// step, and the sources move less in a shorter one; the rounding of the state grows to 2²⁴ε.
     fn reading_step(&self) -> f64 {
-        let short = self.read_step() * self.reading;
-        if self.system().curved {
+        let curved = self.system().curved;
+        let longer = match (self.reads_coarsely, curved) {
+            (false, _) => 1.0,
+            (true, false) => READING,
+            (true, true) => READING_CURVED,
+        };
+        let short = self.read_step() * longer;
+        if curved {
             // Few lengths, so that their matrices are kept.
             (short * SHORT).log2().floor().exp2()
         } else if !self.ports.is_empty() {
