@@ -112,9 +112,10 @@ impl<'a> Destination<'a> {
         let incomplete = error.as_ref().map(|_| format!("incomplete: ends {until}"));
         let files = outputs.words();
         let figure = |pixels| Figure::of_waveforms(&run.waveforms, pixels);
+        let measured = found.words();
         let told = Told {
             run: &run,
-            found: &found,
+            measured: &measured,
             model: self.model,
         };
         let written = outputs.finish(told, &figure, incomplete.as_deref());

@@ -10,7 +10,6 @@ use super::exit::Failure;
 use super::files::{self, STDOUT, Written};
 use super::rows::{Columns, Form, Shown, Stream};
 use super::streams::Streams;
-use crate::analysis::Measurements;
 use crate::integrate::{Block, Places, Run};
 use crate::model::Model;
 use crate::report::figure::{Figure, PANEL_WIDTH};
@@ -126,7 +125,8 @@ pub(super) fn unknown_ending(path: &Path, known: &str) -> Failure {
 #[derive(Clone, Copy)]
 pub(super) struct Told<'a> {
     pub(super) run: &'a Run,
-    pub(super) found: &'a Measurements,
+    /// In words.
+    pub(super) measured: &'a str,
     pub(super) model: Option<&'a Model>,
 }
 
@@ -261,8 +261,13 @@ fn write(
     let result = match format {
         Format::Html => {
             let places = told.model.map_or_else(Places::default, Model::places);
-            let page = Page::of_run(&drawing(usize::MAX), told.run, told.found, places)
-                .with_circuit(told.model);
+            let page = Page::of_run(
+                &drawing(usize::MAX),
+                told.run,
+                told.measured.to_owned(),
+                places,
+            )
+            .with_circuit(told.model);
             file.append(page.html()?.as_bytes())
         }
         Format::Svg => file.append(svg::draw(&drawing(PANEL_WIDTH))?.as_bytes()),

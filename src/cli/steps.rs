@@ -9,7 +9,7 @@ use super::rows::Columns;
 use super::signals::Signals;
 use super::sim::{self, Request, Route};
 use super::streams::Streams;
-use crate::analysis::{self, Finished, Measurements, Variant, each, shown};
+use crate::analysis::{self, Finished, Variant, each, shown};
 use crate::integrate::{Block, Error, Grid, Reason};
 use crate::model::Model;
 use crate::report::figure::Figure;
@@ -156,9 +156,10 @@ impl Stepping<'_> {
         };
         // A failure is told by `finish`.
         let _ = outputs.take(Block::of(&total.waveforms, &total.kinds));
+        let measured = steps::measured(done);
         let told = Told {
             run: &total,
-            found: &Measurements::default(),
+            measured: &measured,
             model: destination.model,
         };
         let written = outputs.finish(told, &figure, incomplete);
@@ -176,7 +177,7 @@ impl Stepping<'_> {
         if !matches!(self.args.results.summary, Some(Summary::Json)) {
             match streams.log {
                 Some(_) => streams.say(log::steps(done)),
-                None => streams.say(steps::measured(done)),
+                None => streams.say(measured),
             }
         }
         if destination.plots {

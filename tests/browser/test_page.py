@@ -214,13 +214,94 @@ def test_a_bode_page(tmp_path, show):
     assert gain == pytest.approx([-10 * math.log10(2), -45], abs=1e-9)
 
 
+def test_a_logarithmic_axis_shows_what_is_asked_for(tmp_path, show):
+    netlist = tmp_path / "filter.cir"
+    netlist.write_text("filter\nv1 in 0 dc 0 ac 1\nr1 in out 1k\nc1 out 0 100n\n.ac dec 20 30 70k\n.end\n")
+    run("ac", netlist, "-o", tmp_path / "filter.html", "--probe", "v(out)")
+    page = show(tmp_path / "filter.html")
+    scale = "[window.circ.state.plots[0].scales.x.min, window.circ.state.plots[0].scales.x.max]"
+    labels = "window.circ.state.plots[0].axes[0]._values.filter((label) => label)"
+    # Points of 20 a decade from 30 Hz on; the last is the one before 70 kHz.
+    assert page.evaluate(scale) == view(page) and view(page)[0] == pytest.approx(30, rel=1e-12) and 60e3 < view(page)[1] <= 70e3
+    assert {"100 Hz", "1 kHz", "10 kHz"} <= set(page.evaluate(labels))
+    first(page)
+    for _ in range(4):
+        page.keyboard.press("+")
+        assert page.evaluate(scale) == view(page)
+    low, high = view(page)
+    assert high / low < 2 and len(page.evaluate(labels)) >= 2
+    page.keyboard.press("Home")
+    page.get_by_role("button", name="log x").click()
+    assert page.evaluate("window.circ.state.plots[0].scales.x.distr") == 1
+    page.get_by_role("button", name="log x").click()
+    assert page.evaluate(scale) == view(page)
+
+
+def test_text_of_a_netlist_is_never_markup(tmp_path, show):
+    netlist = tmp_path / "odd.cir"
+    evil = "</script><!--<script>alert(1)</script>"
+    netlist.write_text(f"{evil} \"q\" & ünïcode {{{{data}}}}\nv1 a<b 0 sin(0 1 1k)\nr1 a<b {evil} 1k\nd1 {evil} 0 m\n.model m d(ideal)\n.tran 10u 2m\n.end\n")
+    run("sim", netlist, "-o", tmp_path / "odd.html")
+    page = show(tmp_path / "odd.html")
+    assert page.title().startswith(evil) and page.locator("h1").inner_text().startswith(evil)
+    names = page.evaluate("window.circ.panels.flatMap((p) => p.curves.map((c) => c.name))")
+    assert "v(a<b)" in names and f"v({evil})" in names
+    assert page.locator(".circuit svg").count() == 1 and page.locator("script").count() == 2
+
+
+def test_a_group_of_curves_is_shown_and_hidden_at_once(tmp_path, show):
+    netlist = tmp_path / "many.cir"
+    ladder = "".join(f"r{k} n{k - 1} n{k} 100\nc{k} n{k} 0 1n\n" for k in range(1, 12))
+    netlist.write_text(f"many\nv1 n0 0 sin(0 1 1k)\n{ladder}.tran 10u 2m\n.end\n")
+    run("sim", netlist, "-o", tmp_path / "many.html")
+    page = show(tmp_path / "many.html")
+    shown = "window.circ.panels.map((p) => p.curves.filter((c) => c.shown).length)"
+    assert page.evaluate(shown) == [12, 1]
+    group = page.get_by_role("checkbox", name="voltage", exact=True)
+    group.uncheck()
+    assert page.evaluate(shown) == [0, 1]
+    page.get_by_role("checkbox", name="v(n3)", exact=True).check()
+    assert page.evaluate(shown) == [1, 1] and group.evaluate("(g) => g.indeterminate")
+    # The ninth of a panel has the colour of the first, in dashes; a panel begins anew.
+    looks = page.evaluate("window.circ.panels.map((p) => p.curves.map((c) => [window.circ.colour(c), window.circ.dash(c).length]))")
+    assert looks[0][8][0] == looks[0][0][0] == looks[1][0][0] and [looks[0][0][1], looks[0][8][1], looks[1][0][1]] == [0, 2, 0]
+
+
+def test_the_spectrum_has_axes_of_its_own(buck, show):
+    page = show(buck / "out.html")
+    page.get_by_role("button", name="spectrum").click()
+    bar = page.get_by_role("toolbar", name="axes of the spectrum")
+    bar.get_by_role("button", name="log x").click()
+    bar.get_by_role("button", name="log y").click()
+    pressed = lambda: [b.get_attribute("aria-pressed") for b in bar.get_by_role("button").all()]
+    assert pressed() == ["true", "true"]
+    labels = lambda: page.get_by_role("region", name="spectrum").locator(".panel").count()
+    assert labels() == 3
+    # What was chosen stays when the span changes.
+    first(page)
+    page.keyboard.press("+")
+    assert pressed() == ["true", "true"] and labels() == 3
+
+
+def test_a_schematic_has_its_own_picture_on_the_page(tmp_path, show):
+    run("sim", ROOT / "netlists/schematics/buck.asc", "-o", tmp_path / "buck.html")
+    page = show(tmp_path / "buck.html")
+    assert page.locator(".circuit .device[data-device=d1]").count() == 2
+    first(page)
+    page.keyboard.press("a")
+    on = page.locator(".circuit .device[data-device=s1][data-on='1']").get_attribute("display")
+    assert (on == "inline") == (cell(page, "s1", "a").inner_text() == "on")
+
+
 def test_steps_and_comparisons_have_pages(tmp_path, show):
     netlist = tmp_path / "steps.cir"
-    netlist.write_text("steps\nv1 in 0 1\nr1 in out {r}\nc1 out 0 1u ic=0\n.param r=1k\n.step param r list 1k 2k\n.tran 10u 1m uic\n.probe v(out)\n.end\n")
+    netlist.write_text("steps\nv1 in 0 1\nr1 in out {r}\nc1 out 0 1u ic=0\n.param r=1k\n.step param r list 1k 2k\n.tran 10u 1m uic\n.probe v(out)\n.meas tran top max v(out)\n.end\n")
     run("sim", netlist, "-o", tmp_path / "steps.html")
     page = show(tmp_path / "steps.html")
     names = page.evaluate("window.circ.panels[0].curves.map((c) => c.name)")
     assert len(names) == 2 and all(name.startswith("v(out)") for name in names)
+    # The results of `.meas`, a line for each run.
+    assert [line.split()[0] for line in page.locator("pre").first.inner_text().splitlines()] == ["r", "1000", "2000"]
     plain = tmp_path / "plain.cir"
     plain.write_text(SINE)
     run("sim", plain, "-o", tmp_path / "plain.csv")

@@ -201,8 +201,8 @@ impl Page {
             &[
                 ("title", sheet::escaped(&self.title)),
                 ("style", STYLES.join("\n")),
-                // Within a script nothing else ends it.
-                ("data", data.replace("</", "<\\/")),
+                // Within a script a text like `</script>` ends it, and `<!--` hides its end.
+                ("data", data.replace('<', "\\u003c")),
                 ("script", SCRIPTS.join("\n")),
             ],
         ))

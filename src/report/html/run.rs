@@ -5,16 +5,15 @@ use std::collections::HashMap;
 use super::super::figure::Figure;
 use super::super::{si, text};
 use super::{Page, Strip, Table};
-use crate::analysis::Measurements;
 use crate::integrate::{Change, Event, Places, Run};
 
 /// Devices of a strip, those that change first.
 const MOST_STRIPS: usize = 40;
 
 impl Page {
-    /// The curves of a figure with what the run did: events, impulses, measurements, energies and notes.
+    /// The curves of a figure with what the run did: events, impulses, measurements in words, energies and notes.
     #[must_use]
-    pub fn of_run(figure: &Figure, run: &Run, found: &Measurements, places: Places<'_>) -> Self {
+    pub fn of_run(figure: &Figure, run: &Run, measured: String, places: Places<'_>) -> Self {
         let mut page = Self::of_figure(figure);
         page.about = format!("{} · {}", page.about, run.method);
         let (strips, left) = strips(&run.events);
@@ -34,7 +33,7 @@ impl Page {
             Table::new("Events", &["time", "what"], events),
             Table::new("Impulses", &["time", "area"], impulses),
         ];
-        page.say("Measurements", found.words());
+        page.say("Measurements", measured);
         page.say("Run", text::summary(run, places, false));
         page.say("Plan", run.plan.join("\n"));
         if left > 0 {
@@ -110,7 +109,7 @@ mod tests {
             ..Run::default()
         };
         let figure = Figure::of_waveforms(&run.waveforms, usize::MAX);
-        Page::of_run(&figure, &run, &Measurements::default(), Places::default())
+        Page::of_run(&figure, &run, String::new(), Places::default())
     }
 
     #[test]
@@ -120,6 +119,8 @@ mod tests {
         assert!(html.contains("<title>&lt;/script&gt;"));
         assert!(!html.contains("src=") && !html.contains("<link rel=\"stylesheet\""));
         assert!(!html.contains("{{"));
+        let html = page("<!--<script>").html().unwrap();
+        assert!(!html.contains("<!--") && html.matches("<script").count() == 2);
     }
 
     #[test]

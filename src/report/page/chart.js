@@ -6,10 +6,12 @@ const COLOURS = {
   dark: ["#4aa8e8", "#ff8a3d", "#2fc79b", "#e79bc5", "#9ad4f7", "#ffc24d", "#b4b4b4", "#c99a8c"],
 };
 const DASHES = [[], [7, 3], [2, 2.5], [9, 3, 2, 3]];
+/** Steps of an axis of decibels, of degrees; others have 1, 2, 2.5 and 5 times powers of ten. */
+const STEPS = { dB: [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 40, 100, 200, 500, 1000], "°": [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 5, 15, 45, 90, 180, 360, 720, 1440, 3600] };
 /** Of errors: a zero stands at this on a logarithmic axis. */
 const LEAST = 1e-17;
 /** CSS pixels. */
-const SIZES = { axis: 76, panel: 220, row: 16, right: 26, dot: 3, pixelsToDrag: 4 };
+const SIZES = { axis: 76, label: 18, panel: 220, across: 110, up: 30, row: 16, right: 26, dot: 3, pixelsToDrag: 4 };
 
 /** An element with attributes and children; text is never markup. */
 function element(tag, attributes = {}, ...children) {
@@ -29,6 +31,13 @@ const themed = (name) => getComputedStyle(document.documentElement).getPropertyV
 /** Whether the paper is dark. */
 const isDark = () => themed("--dark") === "1";
 
+/** A stretch of a line as a background: its colour, and its dashes in pixels. */
+function swatch(colour, dash) {
+  let at = 0;
+  const parts = dash.map((length, k) => `${k % 2 ? "transparent" : colour} ${at}px ${(at += length)}px`);
+  return parts.length === 0 ? colour : `repeating-linear-gradient(90deg, ${parts.join(", ")})`;
+}
+
 /** State of a strip's device at t: true, false, or null before anything is known. */
 function stateAt(strip, t) {
   const changes = rowAfter(strip.times, t);
@@ -37,15 +46,18 @@ function stateAt(strip, t) {
 
 /**
  * A chart in `root` of { axis: { name, unit, log }, panels: [{ quantity, unit, curves }], strips }. `announce` gets a sentence when a cursor is
- * placed.
+ * placed. Each panel has colours of its own where all curves together are more than there are.
  */
 function chart(root, content, announce) {
-  const { axis, panels, strips } = content;
+  const { panels, strips } = content;
+  const axis = { ...content.axis };
   const curves = panels.flatMap((panel) => panel.curves);
-  const whole = wholeSpan(curves, axis.log);
+  const isDotted = panels.some((panel) => panel.dots);
+  let whole = wholeSpan(curves, axis.log, isDotted);
   const state = { view: whole, cursors: { a: null, b: null }, pointer: null, plots: [], logs: new Set(panels.filter((panel) => panel.dots)) };
-  const names = [...new Set(curves.map((curve) => curve.name))];
-  const looks = new Map(curves.map((curve) => [curve, names.indexOf(curve.name)]));
+  const namesOf = (all) => [...new Set(all.map((curve) => curve.name))];
+  const few = namesOf(curves).length <= COLOURS.light.length;
+  const looks = new Map(panels.flatMap((panel) => panel.curves.map((curve) => [curve, namesOf(few ? curves : panel.curves).indexOf(curve.name)])));
   const colour = (curve) => COLOURS[isDark() ? "dark" : "light"][looks.get(curve) % 8];
   const dash = (curve) => DASHES[Math.floor(looks.get(curve) / 8) % 4];
   const area = element("div", { class: "panels" });
@@ -104,6 +116,7 @@ function chart(root, content, announce) {
 
   function plotOf(panel, last) {
     const ink = () => themed("--ink"), grid = () => themed("--grid");
+    const lines = { stroke: ink, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1 } };
     const series = panel.curves.map((curve) => ({
       label: curve.name,
       stroke: () => colour(curve),
@@ -120,10 +133,14 @@ function chart(root, content, announce) {
       height: SIZES.panel,
       padding: [8, SIZES.right, 0, 0],
       legend: { show: false },
-      scales: { x: { time: false, auto: false, distr: axis.log ? 3 : 1 }, y: { auto: false, distr: state.logs.has(panel) ? 3 : 1 } },
+      scales: {
+        // What is asked for, not rounded to whole decades.
+        x: { time: false, auto: false, distr: axis.log ? 3 : 1, range: (_, low, high) => [low, high] },
+        y: { auto: false, distr: state.logs.has(panel) ? 3 : 1, range: (_, low, high) => [low, high] },
+      },
       axes: [
-        { stroke: ink, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1 }, space: 110, size: last ? 34 : 24, values: (_, splits) => ticks(splits, axis.unit) },
-        { ...(panel.dots ? { label: panel.quantity, labelSize: 18, splits: decades } : {}), stroke: ink, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1 }, size: SIZES.axis, values: (_, splits) => ticks(splits, panel.unit) },
+        { ...lines, ...marks(axis.unit, axis.log, SIZES.across), size: last ? 34 : 24 },
+        { ...lines, ...marks(panel.unit, state.logs.has(panel), SIZES.up), label: panel.quantity, labelSize: SIZES.label, labelFont: "12px system-ui, sans-serif", size: SIZES.axis },
       ],
       series: [{}, ...series],
       cursor: { y: false, points: { show: false }, drag: { x: true, y: false, setScale: false, click: () => {} }, bind: { dblclick: () => () => show(whole) } },
@@ -145,12 +162,15 @@ function chart(root, content, announce) {
     return plot;
   }
 
-  /** Powers of ten of an axis of errors, at most a dozen. */
-  function decades(plot, k, low, high) {
-    const [first, last] = [Math.ceil(Math.log10(low)), Math.floor(Math.log10(high))];
-    if (!state.logs.has(plot.panel ?? panels[0])) return Array.from({ length: 6 }, (_, j) => low + ((high - low) * j) / 5);
-    const by = Math.max(1, Math.ceil((last - first + 1) / 12));
-    return Array.from({ length: Math.max(0, Math.floor((last - first) / by) + 1) }, (_, j) => Number(`1e${first + j * by}`));
+  /** Where an axis has lines and labels, at least `space` pixels apart. */
+  function marks(unit, log, space) {
+    if (!log) return { space, values: (_, splits) => ticks(splits, unit), ...(STEPS[unit] ? { incrs: STEPS[unit] } : {}) };
+    const room = (plot) => (space === SIZES.across ? plot.bbox.width : plot.bbox.height) / (devicePixelRatio || 1);
+    return {
+      splits: (plot, _, low, high) => logSplits(low, high, room(plot) / space),
+      filter: (plot, splits) => logLabels(splits, room(plot) / space),
+      values: (_, splits) => (unit === "" ? ticks(splits, unit) : splits.map((value) => (value == null ? null : quantity(value, unit)))),
+    };
   }
 
   const widthOf = () => Math.max(280, root.clientWidth);
@@ -304,6 +324,7 @@ function chart(root, content, announce) {
       ctx.lineTo(x, bbox.top + bbox.height);
       ctx.stroke();
       ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+      ctx.textAlign = "left";
       ctx.fillText(name.toUpperCase(), x + 3 * devicePixelRatio, bbox.top + 11 * devicePixelRatio);
     }
     ctx.restore();
@@ -319,15 +340,15 @@ function chart(root, content, announce) {
     ctx.scale(ratio, ratio);
     ctx.font = "11px system-ui, sans-serif";
     ctx.textBaseline = "middle";
-    const [from, to] = state.view, room = width - SIZES.axis - SIZES.right;
-    const position = (t) => SIZES.axis + (room * (t - from)) / (to - from);
+    const [from, to] = state.view, left = SIZES.label + SIZES.axis, room = width - left - SIZES.right;
+    const position = (t) => left + room * (axis.log ? Math.log(t / from) / Math.log(to / from) : (t - from) / (to - from));
     strips.forEach((strip, k) => {
       const middle = k * SIZES.row + SIZES.row / 2 + 2;
       ctx.fillStyle = themed("--ink");
       ctx.textAlign = "right";
-      ctx.fillText(strip.name, SIZES.axis - 6, middle, SIZES.axis - 8);
+      ctx.fillText(strip.name, left - 6, middle, left - 8);
       ctx.fillStyle = themed("--grid");
-      ctx.fillRect(SIZES.axis, middle - 0.5, room, 1);
+      ctx.fillRect(left, middle - 0.5, room, 1);
       let begin = from, on = stateAt(strip, from);
       const last = rowAt(strip.times, to);
       const bar = (end) => {
@@ -359,9 +380,17 @@ function chart(root, content, announce) {
       cells.set(key, own);
       body.append(element("tr", { "data-signal": key.name }, element("th", { scope: "row" }, label), ...Object.values(own)));
     };
+    const groups = [];
     for (const panel of panels) {
+      if (panels.length > 1) {
+        // All curves of a panel at once.
+        const box = element("input", { type: "checkbox", checked: true, onchange: () => { toggle(panel.curves, box.checked); tick(); } });
+        groups.push([box, panel]);
+        const heading = element("th", { scope: "rowgroup", colspan: columns.length + 2 }, element("label", {}, box, panel.quantity));
+        body.append(element("tr", { class: "group" }, heading));
+      }
       for (const curve of panel.curves) {
-        const box = element("input", { type: "checkbox", checked: true, onchange: () => toggle(curve, box.checked) });
+        const box = element("input", { type: "checkbox", checked: true, onchange: () => { toggle([curve], box.checked); tick(); } });
         boxes.set(curve, box);
         const swatch = element("span", { class: "swatch", "aria-hidden": "true" });
         cells.set(swatch, curve);
@@ -389,7 +418,7 @@ function chart(root, content, announce) {
       put(head.delta, both ? b - a : null, both ? `B − A ${quantity(b - a, axis.unit, 9)}${inverse}` : "B − A");
       for (const [key, own] of cells) {
         if (key instanceof HTMLElement) {
-          key.style.setProperty("--look", colour(own));
+          key.style.background = swatch(colour(own), dash(own));
           continue;
         }
         if (key.states) {
@@ -404,15 +433,24 @@ function chart(root, content, announce) {
         put(own.delta, both ? values[2] - values[1] : null, both ? quantity(values[2] - values[1], unitOf(key)) : "");
       }
     }
-    const tick = () => boxes.forEach((box, curve) => { box.checked = curve.shown; });
+    function tick() {
+      boxes.forEach((box, curve) => { box.checked = curve.shown; });
+      for (const [box, panel] of groups) {
+        const shown = panel.curves.filter((curve) => curve.shown).length;
+        box.checked = shown > 0;
+        box.indeterminate = shown > 0 && shown < panel.curves.length;
+      }
+    }
     return { table, update, tick };
   }
 
-  function toggle(curve, shown) {
-    curve.shown = shown;
-    for (const plot of state.plots) {
-      const k = plot.panel.curves.indexOf(curve);
-      if (k >= 0) plot.setSeries(k + 1, { show: shown });
+  function toggle(some, shown) {
+    for (const curve of some) {
+      curve.shown = shown;
+      for (const plot of state.plots) {
+        const k = plot.panel.curves.indexOf(curve);
+        if (k >= 0) plot.setSeries(k + 1, { show: shown });
+      }
     }
     show(state.view);
   }
@@ -420,6 +458,15 @@ function chart(root, content, announce) {
   /** Logarithmic or linear axes of values. */
   function logarithmic(on) {
     state.logs = new Set(on ? panels : []);
+    build();
+  }
+
+  /** A logarithmic or linear axis across; what is not positive has no place on the former. */
+  function logarithmicAcross(on) {
+    const isWhole = state.view[0] === whole[0] && state.view[1] === whole[1];
+    axis.log = on;
+    whole = wholeSpan(curves, on, isDotted);
+    if (isWhole || state.view[0] < whole[0]) state.view = [whole[0], isWhole ? whole[1] : state.view[1]];
     build();
   }
 
@@ -432,7 +479,7 @@ function chart(root, content, announce) {
 
   /** Shows that again. */
   function restore({ view, cursors, hidden }) {
-    for (const curve of curves) if (hidden.includes(curve.name)) toggle(curve, false);
+    toggle(curves.filter((curve) => hidden.includes(curve.name)), false);
     readings.tick();
     state.cursors = cursors;
     if (view) show(view);
@@ -452,15 +499,15 @@ function chart(root, content, announce) {
   const repaint = () => { show(state.view); readings.update(); };
   paper.addEventListener("change", repaint);
   return {
-    state, panels, strips, show, keep, restore, zoom, pan, place, logarithmic, colour, dash, boundsOf, edgeOf, axis,
+    state, panels, strips, show, keep, restore, zoom, pan, place, logarithmic, logarithmicAcross, colour, dash, boundsOf, edgeOf, axis,
     full: () => show(whole),
     repaint,
     remove: () => { resized.disconnect(); paper.removeEventListener("change", repaint); state.plots.forEach((plot) => plot.destroy()); root.replaceChildren(); },
   };
 }
 
-/** First and last x of all curves; positive for a logarithmic axis. */
-function wholeSpan(curves, log) {
+/** First and last x of all curves, with room for dots; positive for a logarithmic axis. */
+function wholeSpan(curves, log, dots) {
   let [from, to] = [Infinity, -Infinity];
   for (const { x } of curves) {
     if (x.length === 0) continue;
@@ -468,6 +515,7 @@ function wholeSpan(curves, log) {
     to = Math.max(to, x[x.length - 1]);
   }
   if (!(from <= to)) return log ? [1, 10] : [0, 1];
-  if (log) return from < to ? [from, to] : [from / 2, to * 2];
+  if (log) return from < to && !dots ? [from, to] : [from / 1.5, to * 1.5];
+  if (dots) return [from - 0.03 * (to - from || 1), to + 0.03 * (to - from || 1)];
   return from < to ? [from, to] : [from - (Math.abs(from) || 1) / 2, from + (Math.abs(from) || 1) / 2];
 }

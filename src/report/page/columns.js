@@ -154,3 +154,33 @@ function ticks(splits, unit) {
   const label = (value) => Number((value / scale).toFixed(decimals)).toString() + " " + PREFIXES[power + 5] + unit;
   return splits.map((value) => (value == null ? null : label(value).trim()));
 }
+
+/** Where a logarithmic axis with room for so many labels has lines: at powers of ten, 2 to 9 times them if that is not too much, or in even steps within one. */
+function logSplits(low, high, room) {
+  const decades = Math.log10(high / low);
+  if (decades < 1) {
+    const raw = (high - low) / 6, size = 10 ** Math.floor(Math.log10(raw));
+    const step = size * [1, 2, 5, 10].find((times) => times * size >= raw);
+    const first = Math.ceil(low / step), last = Math.floor(high / step);
+    return Array.from({ length: last - first + 1 }, (_, k) => Number(((first + k) * step).toPrecision(12)));
+  }
+  const all = [];
+  for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power++) {
+    for (const times of room < 1.5 * decades ? [1] : [1, 2, 3, 4, 5, 6, 7, 8, 9]) {
+      const value = Number(`${times}e${power}`);
+      if (value >= low * (1 - 1e-12) && value <= high * (1 + 1e-12)) all.push(value);
+    }
+  }
+  return all;
+}
+
+/** Which of them have labels where there is room for so many; the others are null. */
+function logLabels(splits, room) {
+  const digit = (value) => Math.round(value / 10 ** Math.floor(Math.log10(value) + 1e-9));
+  const power = (value) => Math.floor(Math.log10(value) + 1e-9);
+  const decades = Math.log10(splits[splits.length - 1] / splits[0]);
+  if (!(decades >= 0.9)) return splits;
+  const chosen = decades * 3 <= room ? [1, 2, 5] : [1];
+  const by = Math.max(1, Math.ceil(decades / room));
+  return splits.map((value) => (chosen.includes(digit(value)) && power(value) % by === 0 ? value : null));
+}

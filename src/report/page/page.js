@@ -62,11 +62,11 @@ function drawing(shown, title) {
     const base = top + k * height, room = height - 50;
     const up = (y) => base + room * (1 - (log ? Math.log(Math.max(Math.abs(y), low) / low) / Math.log(high / low) : (y - low) / (high - low)));
     const plot = state.plots[k];
-    const marks = (a, unit) => plot.axes[a]._splits.map((value, j) => [value, ticks(plot.axes[a]._splits, unit)[j]]).filter(([, label]) => label);
-    for (const [x, label] of marks(0, axis.unit)) {
+    const marks = (a) => plot.axes[a]._splits.map((value, j) => [value, plot.axes[a]._values[j]]).filter(([, label]) => label);
+    for (const [x, label] of marks(0)) {
       parts.push(`<path d="M${across(x).toFixed(2)} ${base}v${room}" stroke="#ddd"/><text x="${across(x).toFixed(2)}" y="${base + room + 15}" text-anchor="middle">${clean(label)}</text>`);
     }
-    for (const [y, label] of marks(1, panel.unit)) {
+    for (const [y, label] of marks(1)) {
       parts.push(`<path d="M${left} ${up(y).toFixed(2)}H${width - right}" stroke="#ddd"/><text x="${left - 6}" y="${(up(y) + 4).toFixed(2)}" text-anchor="end">${clean(label)}</text>`);
     }
     let column = left;
@@ -92,6 +92,9 @@ function circuitOf(svg, shown, area) {
   const picture = new DOMParser().parseFromString(svg, "image/svg+xml").documentElement;
   const when = element("p", { class: "about" });
   const section = element("details", { open: true, class: "circuit" }, element("summary", {}, "Circuit"), when, document.importNode(picture, true));
+  // A large one is not shrunk until nobody can read it: it can be moved.
+  const drawn = section.querySelector("svg");
+  drawn.style.minWidth = `${0.7 * (Number.parseFloat(drawn.getAttribute("width")) || 0)}px`;
   const states = section.querySelectorAll(".device");
   const update = () => {
     const t = shown?.state.cursors.a ?? null;
@@ -135,6 +138,17 @@ function circPage(root, data) {
     made.setAttribute("aria-pressed", String(on));
     return on;
   };
+  /** Buttons for the axes of a chart; what they say is kept in `looks` for one that is made anew. */
+  function axes(bar, of, looks) {
+    const toggle = (words, key, act, title) => {
+      const made = element("button", { type: "button", title, onclick: () => { looks[key] = pressed(made); act(of())(looks[key]); } }, words);
+      made.setAttribute("aria-pressed", String(looks[key]));
+      bar.append(made);
+    };
+    toggle("log x", "x", (chart) => chart.logarithmicAcross, "logarithmic axis across");
+    toggle("log y", "y", (chart) => chart.logarithmic, "logarithmic axis of absolute values");
+  }
+  const spectrumLooks = { x: false, y: false };
   function transformed() {
     spectrum?.remove();
     const of = shown.panels.map((panel) => ({
@@ -142,8 +156,13 @@ function circPage(root, data) {
       curves: panel.curves.filter((curve) => curve.shown).map((curve) => spectrumOf(curve, ...shown.state.view)),
     })).filter((panel) => panel.curves.length > 0);
     spectrumArea.hidden = false;
-    spectrumArea.replaceChildren(element("h2", {}, "Spectrum of what is seen"), element("div"));
-    spectrum = chart(spectrumArea.lastChild, { axis: { name: "frequency", unit: "Hz", log: false }, panels: of, strips: [] }, announce);
+    if (spectrumArea.childElementCount === 0) {
+      const bar = element("div", { class: "controls", role: "toolbar", "aria-label": "axes of the spectrum" });
+      axes(bar, () => spectrum, spectrumLooks);
+      spectrumArea.append(element("h2", {}, "Spectrum of what is seen"), bar, element("div"));
+    }
+    spectrum = chart(spectrumArea.lastChild, { axis: { name: "frequency", unit: "Hz", log: spectrumLooks.x }, panels: of, strips: [] }, announce);
+    if (spectrumLooks.y) spectrum.logarithmic(true);
   }
   if (panels.some((panel) => panel.curves.length > 0)) {
     button("−", () => shown.zoom(2, middle()), "zoom out (key −)");
@@ -151,7 +170,7 @@ function circPage(root, data) {
     button("◀", () => shown.pan(-0.2), "earlier (left arrow, shift and drag)");
     button("▶", () => shown.pan(0.2), "later (right arrow)");
     button("all", () => shown.full(), "the whole span (key Home, double click)");
-    button("log y", (made) => shown.logarithmic(pressed(made)), "logarithmic axis of absolute values").setAttribute("aria-pressed", String(panels.every((panel) => panel.dots)));
+    axes(controls, () => shown, { x: data.axis.log, y: panels.every((panel) => panel.dots) });
     if (data.axis.name === "time") {
       button("spectrum", (made) => {
         if (pressed(made)) transformed();
@@ -165,7 +184,7 @@ function circPage(root, data) {
     shown?.repaint();
     spectrum?.repaint();
   }, "colours of the page");
-  const middle = () => { const [from, to] = shown.state.view; return data.axis.log ? Math.sqrt(from * to) : (from + to) / 2; };
+  const middle = () => { const [from, to] = shown.state.view; return shown.axis.log ? Math.sqrt(from * to) : (from + to) / 2; };
   if (panels.some((panel) => panel.curves.length > 0)) {
     shown = chart(area, { axis: data.axis, panels, strips: stripsOf(data.strips) }, announce);
     area.addEventListener("view", () => { if (spectrum && !spectrumArea.hidden) transformed(); });
@@ -178,5 +197,15 @@ function circPage(root, data) {
   for (const { heading, text } of data.texts ?? []) {
     root.append(element("details", { open: true }, element("summary", {}, heading), element("pre", {}, text)));
   }
+  // On paper it is light.
+  let theme = null;
+  const themeOf = (name) => {
+    if (name === undefined) delete document.documentElement.dataset.theme;
+    else document.documentElement.dataset.theme = name;
+    shown?.repaint();
+    spectrum?.repaint();
+  };
+  addEventListener("beforeprint", () => { theme = document.documentElement.dataset.theme; themeOf("light"); });
+  addEventListener("afterprint", () => themeOf(theme));
   return shown;
 }
