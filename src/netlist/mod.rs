@@ -23,6 +23,7 @@ pub(crate) mod suggest;
 pub mod value;
 
 pub use ast::Netlist;
+pub(crate) use code::BUILT_IN;
 pub use decode::decode;
 pub use expr::expression;
 pub use include::Files;

@@ -50,6 +50,7 @@ pub fn parse_among(
         title: String::new(),
         body: Block::default(),
         end,
+        sheet: None,
     };
 
     let title_span = Span {
@@ -80,7 +81,7 @@ pub fn parse_among(
         reader.title = path
             .file_stem()
             .map(|name| name.to_string_lossy().into_owned());
-        reader.sheet(root, &text, &path);
+        netlist.sheet = Some(reader.sheet(root, &text, &path));
     } else {
         reader.title_line(&text, title_span);
         let (lines, orphans) = logical(root, &text, first.end);

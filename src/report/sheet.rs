@@ -130,6 +130,17 @@ impl Sheet {
         ));
     }
 
+    /// The box of a part, between two corners.
+    pub(super) fn boxed(&mut self, (x0, y0): (f64, f64), (x1, y1): (f64, f64)) {
+        self.raw(&format!(
+            "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" rx=\"3\" fill=\"#fafafa\" stroke=\"{INK}\" stroke-width=\"1.4\"/>",
+            short(x0),
+            short(y0),
+            short(x1 - x0),
+            short(y1 - y0)
+        ));
+    }
+
     /// A disc.
     pub(super) fn dot(&mut self, at: (f64, f64), radius: f64, colour: &str) {
         self.raw(&format!(

@@ -37,6 +37,31 @@ pub struct Netlist {
     pub body: Block,
     /// The last line of the root file, for findings about the whole.
     pub end: Span,
+    /// How it is drawn, of a schematic.
+    pub sheet: Option<Sheet>,
+}
+
+/// A place on a sheet, in LTspice's units (16 between points of its grid), y down.
+pub type Spot = (i64, i64);
+
+/// What a schematic shows.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Sheet {
+    /// Both ends of each wire.
+    pub wires: Vec<(Spot, Spot)>,
+    /// Names of nets, `0` for ground.
+    pub labels: Vec<(Spot, String)>,
+    /// What stands for cards.
+    pub symbols: Vec<PlacedSymbol>,
+}
+
+/// A symbol on a sheet.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PlacedSymbol {
+    /// The name of its card, in lower case.
+    pub name: String,
+    /// Its pins in the order of the card's nodes: of an `A` device which of its eight terminals (from 1), and where.
+    pub pins: Vec<(usize, Spot)>,
 }
 
 /// Cards that share a scope: the top level, a subcircuit or a branch of `.if`.

@@ -26,6 +26,9 @@ struct Built {
     left_out: Vec<Name>,
 }
 
+/// What the names of such subcircuits and of their files begin with; no card can name one, as there is a blank.
+pub(crate) const BUILT_IN: &str = "built-in ";
+
 /// A fault of a card.
 type Refused = Box<Diagnostic>;
 
@@ -127,7 +130,7 @@ impl Library<'_> {
         }
         let file = self
             .sources
-            .add(format!("built-in {}", built.title), text.clone());
+            .add(format!("{BUILT_IN}{}", built.title), text.clone());
         let (mut netlist, _) = parse(self.sources, file, &|_| {
             Err(std::io::ErrorKind::NotFound.into())
         });
@@ -140,8 +143,7 @@ impl Library<'_> {
                 message,
             )));
         };
-        // No card can have a name with a blank.
-        subckt.name.text = format!("built-in {}", self.made.len());
+        subckt.name.text = format!("{BUILT_IN}{}", self.made.len());
         let name = subckt.name.text.clone();
         self.made.push((text, subckt));
         Ok(name)

@@ -12,10 +12,10 @@ mod symbol;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use super::decode;
 use super::include::MAX_BYTES;
 use super::lex::{Line, logical};
 use super::read::Reader;
+use super::{ast, decode};
 use crate::diagnostic::{Diagnostic, FileId, Span};
 use cards::{Card, Instance};
 use nets::Nets;
@@ -53,24 +53,29 @@ struct Schematic<'r, 's, 'p> {
     sheets: BTreeSet<String>,
     /// Lines of the netlist as a whole: libraries of symbols, subcircuits of sheets.
     common: Vec<Line>,
+    /// What the outermost sheet shows.
+    drawn: ast::Sheet,
     depth: usize,
 }
 
 impl Reader<'_> {
-    /// Takes the cards of a schematic.
-    pub(super) fn sheet(&mut self, file: FileId, text: &str, path: &Path) {
+    /// Takes the cards of a schematic; what it shows.
+    pub(super) fn sheet(&mut self, file: FileId, text: &str, path: &Path) -> ast::Sheet {
         let mut schematic = Schematic {
             reader: self,
             path,
             symbols: BTreeMap::new(),
             sheets: BTreeSet::new(),
             common: Vec::new(),
+            drawn: ast::Sheet::default(),
             depth: 0,
         };
         let mut lines = schematic.lines(file, text);
         lines.append(&mut schematic.common);
         lines.extend(own_models(&lines));
+        let drawn = std::mem::take(&mut schematic.drawn);
         self.lines(&lines, path);
+        drawn
     }
 }
 
@@ -158,6 +163,13 @@ impl Schematic<'_, '_, '_> {
         });
         told.into_iter().for_each(|finding| self.tell(finding));
         let mut lines = Vec::new();
+        let mut shown = ast::Sheet {
+            wires: sheet.wires.clone(),
+            labels: (sheet.flags.iter())
+                .map(|flag| (flag.at, nets.name(flag.at)))
+                .collect(),
+            symbols: Vec::new(),
+        };
         for (placed, symbol) in &parts {
             let nodes: Vec<(usize, Option<String>)> = symbol
                 .pins
@@ -178,12 +190,18 @@ impl Schematic<'_, '_, '_> {
                 symbol,
             };
             match instance.card(&nodes) {
-                Ok(line) => lines.push(line),
+                Ok(line) => {
+                    shown.symbols.push(shown_symbol(&line, placed, symbol));
+                    lines.push(line);
+                }
                 Err(finding) => self.tell(*finding),
             }
             if let Some(library) = instance.library() {
                 self.library(Card::new(file, placed.place.clone()), library);
             }
+        }
+        if self.depth == 0 {
+            self.drawn = shown;
         }
         for place in &sheet.directives {
             // Byte for byte, so that places stay.
@@ -281,6 +299,17 @@ impl Schematic<'_, '_, '_> {
         self.common.extend(lines);
         self.common.push(end.line());
         Some(())
+    }
+}
+
+/// What a reader sees of a symbol that stands for a card.
+fn shown_symbol(card: &Line, placed: &Placed, symbol: &Symbol) -> ast::PlacedSymbol {
+    let name = card.text.split_whitespace().next().unwrap_or("");
+    let mut pins: Vec<&Pin> = symbol.pins.iter().collect();
+    pins.sort_by_key(|pin| pin.order);
+    ast::PlacedSymbol {
+        name: name.to_lowercase(),
+        pins: (pins.into_iter().map(|pin| (pin.order, at(placed, pin)))).collect(),
     }
 }
 

@@ -3,6 +3,7 @@
 use super::part::{Part, Parts, Shape, Symbol, Transistor};
 use crate::circuit::{Circuit, Output};
 use crate::diagnostic::{SourceMap, Span};
+use crate::netlist::BUILT_IN;
 use crate::netlist::ast::{self, Control, Device, Statement, WaveCall};
 
 /// The cards of a netlist; those of an `.if` where the circuit has them.
@@ -21,6 +22,22 @@ pub(super) fn parts(netlist: &ast::Netlist, sources: &SourceMap, circuit: &Circu
     reader.define(&netlist.body.statements);
     reader.read(&netlist.body.statements, true);
     reader.finish()
+}
+
+/// What a pin of an `A` device is called; those of other boxes have their names.
+pub(super) fn pin_of<'a>(device: &str, pin: &'a str) -> &'a str {
+    match (device, pin) {
+        ("", _) => pin,
+        ("dflop", "p1") => "d",
+        ("dflop", "p3") => "clk",
+        ("dflop", "p4") => "pre",
+        ("dflop", "p5") => "clr",
+        ("srflop", "p1") => "s",
+        ("srflop", "p2") => "r",
+        ("dflop" | "srflop", "p7") => "q",
+        ("dflop" | "srflop", "p6") => "q̄",
+        _ => pin.strip_prefix('p').unwrap_or(pin),
+    }
 }
 
 /// Reads the cards of a netlist.
@@ -161,7 +178,10 @@ impl<'a> Reader<'a> {
             Device::Call { subckt, .. } => match self.kind(&subckt.text) {
                 "scr" => (Symbol::Thyristor, first(subckt)),
                 "triac" => (Symbol::Triac, first(subckt)),
-                _ => (Symbol::Box, first(subckt)),
+                _ => (
+                    Symbol::Box,
+                    self.device(subckt).unwrap_or_else(|| first(subckt)),
+                ),
             },
             Device::Line { args, .. } => {
                 let of = |name: &str| {
@@ -179,6 +199,14 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// What an `A` device is, in lower case, where a subcircuit stands for one.
+    fn device(&self, subckt: &ast::Name) -> Option<String> {
+        let found = self.subckts.iter().find(|s| s.name.text == subckt.text)?;
+        let file = self.sources.files.get(found.name.span.file.0 as usize)?;
+        let kind = file.path.strip_prefix(BUILT_IN)?;
+        Some(kind.trim().to_lowercase())
+    }
+
     fn source(
         &self,
         card: &ast::Element,
@@ -191,7 +219,7 @@ impl<'a> Reader<'a> {
             Output::Voltage
         };
         let shape = match wave.map(|w| w.name.text.as_str()) {
-            Some("sin" | "sffm" | "am") => Shape::Sine,
+            Some("sin" | "sine" | "sffm" | "am") => Shape::Sine,
             Some("pulse") => Shape::Pulse,
             _ => Shape::Plain,
         };
@@ -244,7 +272,7 @@ impl<'a> Reader<'a> {
                 .unwrap_or_default()
         };
         match wave.name.text.as_str() {
-            "sin" => format!("{} {}Hz", arg(1), arg(2)),
+            "sin" | "sine" => format!("{} {}Hz", arg(1), arg(2)),
             "pulse" | "exp" => format!("{} … {}", arg(0), arg(1)),
             name => name.into(),
         }
@@ -282,7 +310,11 @@ impl<'a> Reader<'a> {
             _ => None,
         };
         match of_subckt {
-            Some(subckt) => subckt.nodes.iter().map(|n| n.text.clone()).collect(),
+            Some(subckt) => {
+                let device = self.device(&subckt.name).unwrap_or_default();
+                let pin = |node: &ast::Name| pin_of(&device, &node.text).to_owned();
+                subckt.nodes.iter().map(pin).collect()
+            }
             None => vec![String::new(); card.nodes.len()],
         }
     }

@@ -3,7 +3,7 @@
 use super::super::sheet::{Anchor, INK, Sheet, escaped, short, width_of};
 use super::super::svg::titled;
 use super::grid::{self, COLUMN, GROUND, Grid, LEVEL, Plan, Pose, Run};
-use super::part::{Part, Parts, Symbol, brief};
+use super::part::{Part, Parts, brief};
 use super::words::{
     ABOVE, FAINT, SMALL, TEXT, WIRE, ground, lying_words, named, upright_words, written,
 };
@@ -153,7 +153,7 @@ impl<'a> Drawing<'a> {
                 let at = self.at(x, LEVEL * level);
                 let turn = if reversed { "-1 0 0 1" } else { "1 0 0 1" };
                 let half = f64::from(COLUMN / 2) * STEP.0;
-                self.symbol(sheet, part, (turn, at), (-half, half));
+                drawn_symbol(sheet, self.states, part, (turn, at), (-half, half));
                 lying_words(sheet, part, at);
                 if part.nets.len() > 2 {
                     let gate = &self.parts.nets[part.nets[2]];
@@ -183,7 +183,7 @@ impl<'a> Drawing<'a> {
                 } else {
                     (-half, lower)
                 };
-                self.symbol(sheet, part, (turn, (cx, cy)), ends);
+                drawn_symbol(sheet, self.states, part, (turn, (cx, cy)), ends);
                 if is_grounded {
                     ground(sheet, (cx, cy + foot));
                 }
@@ -194,42 +194,6 @@ impl<'a> Drawing<'a> {
                     named(sheet, gate, (cx - symbol::GATE - 3.0, y), Anchor::End);
                 }
             }
-        }
-    }
-
-    fn symbol(
-        &self,
-        sheet: &mut Sheet,
-        part: &Part,
-        (turn, at): (&str, (f64, f64)),
-        ends: (f64, f64),
-    ) {
-        let place = format!("{} {}", short(at.0), short(at.1));
-        let has_gate = part.nets.len() > 2;
-        let drawn = |conducts| symbol::drawn(part.symbol, ends, conducts, has_gate);
-        let mut body = match self.states {
-            States::Of(conducting) => drawn(conducting.contains(&part.name)),
-            States::Both if symbol::can_conduct(part.symbol) => {
-                let name = escaped(&part.name);
-                let group = |on: u8, hidden| {
-                    let body = drawn(on == 1);
-                    format!(
-                        "<g class=\"device\" data-device=\"{name}\" data-on=\"{on}\"{hidden}>{body}</g>"
-                    )
-                };
-                group(0, "") + &group(1, " display=\"none\"")
-            }
-            States::Both => drawn(false),
-        };
-        if part.is_wound {
-            body.push_str(&format!(
-                "<circle cx=\"-26\" cy=\"-9\" r=\"2.5\" fill=\"{INK}\"/>"
-            ));
-        }
-        let glyph = symbol::glyph(part.symbol);
-        sheet.raw(&format!("<g transform=\"matrix({turn} {place})\" stroke-width=\"1.4\" stroke-linejoin=\"round\">{body}</g>"));
-        if !glyph.is_empty() {
-            sheet.raw(&format!("<path transform=\"translate({place})\" d=\"{glyph}\" fill=\"none\" stroke=\"{INK}\" stroke-width=\"1.4\"/>"));
         }
     }
 
@@ -255,14 +219,8 @@ impl<'a> Drawing<'a> {
         let inset = (8.0, 22.0);
         let (x0, y1) = self.at(left, LEVEL * slot);
         let (x1, y0) = self.at(left + COLUMN * columns, LEVEL * (slot + 1));
-        let (w, h) = (x1 - x0 - 2.0 * inset.0, y1 - y0 - 2.0 * inset.1);
-        sheet.raw(&format!(
-            "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" rx=\"3\" fill=\"#fafafa\" stroke=\"{INK}\" stroke-width=\"1.4\"/>",
-            short(x0 + inset.0),
-            short(y0 + inset.1),
-            short(w),
-            short(h)
-        ));
+        let inner = ((x0 + inset.0, y0 + inset.1), (x1 - inset.0, y1 - inset.1));
+        sheet.boxed(inner.0, inner.1);
         let middle = (f64::midpoint(x0, x1), f64::midpoint(y0, y1));
         let words = format!("{} {}", part.name, brief(&part.value, ABOVE));
         sheet.text(&words, middle, TEXT, Anchor::Middle);
@@ -329,11 +287,45 @@ impl<'a> Drawing<'a> {
     }
 }
 
+/// A part's symbol, turned and placed, with leads to `ends` on its axis.
+pub(super) fn drawn_symbol(
+    sheet: &mut Sheet,
+    states: States<'_>,
+    part: &Part,
+    (turn, at): (&str, (f64, f64)),
+    ends: (f64, f64),
+) {
+    let place = format!("{} {}", short(at.0), short(at.1));
+    let has_gate = part.nets.len() > 2;
+    let drawn = |conducts| symbol::drawn(part.symbol, ends, conducts, has_gate);
+    let mut body = match states {
+        States::Of(conducting) => drawn(conducting.contains(&part.name)),
+        States::Both if symbol::can_conduct(part.symbol) => {
+            let name = escaped(&part.name);
+            let group = |on: u8, hidden| {
+                let body = drawn(on == 1);
+                format!(
+                    "<g class=\"device\" data-device=\"{name}\" data-on=\"{on}\"{hidden}>{body}</g>"
+                )
+            };
+            group(0, "") + &group(1, " display=\"none\"")
+        }
+        States::Both => drawn(false),
+    };
+    if part.is_wound {
+        body.push_str(&format!(
+            "<circle cx=\"-26\" cy=\"-9\" r=\"2.5\" fill=\"{INK}\"/>"
+        ));
+    }
+    let glyph = symbol::glyph(part.symbol);
+    sheet.raw(&format!("<g transform=\"matrix({turn} {place})\" stroke-width=\"1.4\" stroke-linejoin=\"round\">{body}</g>"));
+    if !glyph.is_empty() {
+        sheet.raw(&format!("<path transform=\"translate({place})\" d=\"{glyph}\" fill=\"none\" stroke=\"{INK}\" stroke-width=\"1.4\"/>"));
+    }
+}
+
 /// Where a gate's lead is along the axis of its symbol, as it is turned.
 const fn gate_x(part: &Part, reversed: bool) -> f64 {
-    match part.symbol {
-        Symbol::Thyristor | Symbol::Triac if reversed => -18.0,
-        Symbol::Thyristor | Symbol::Triac => 18.0,
-        _ => 0.0,
-    }
+    let along = symbol::gate_along(part.symbol);
+    if reversed { -along } else { along }
 }

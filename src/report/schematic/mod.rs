@@ -1,13 +1,14 @@
 //! The circuit as a picture for readers: symbols, orthogonal wires, words beside their elements.
 //!
 //! `part` says what is drawn, `cards` finds it in a netlist; `search` says where, by `cost` and by the wires that `grid` finds it takes; `drawing` puts it on a
-//! sheet with `symbol` and `words`.
+//! sheet with `symbol` and `words`. A schematic has places of its own, which `placed` keeps.
 
 mod cards;
 mod cost;
 mod drawing;
 mod grid;
 mod part;
+mod placed;
 mod search;
 mod symbol;
 #[cfg(test)]
@@ -51,6 +52,9 @@ fn drawn(model: &Model, states: States<'_>) -> Result<String, PictureError> {
     }
     if parts.parts.len() > LARGEST {
         return Err(PictureError::Large(parts.parts.len()));
+    }
+    if let Some(sheet) = model.netlist().and_then(|netlist| netlist.sheet.as_ref()) {
+        return Ok(placed::draw(&parts, sheet, states, &circuit.title));
     }
     let plan = search::plan(&parts);
     let grid = Grid::of(&parts.parts, parts.nets.len(), &plan);

@@ -88,6 +88,14 @@ const fn gate(symbol: Symbol) -> &'static str {
     }
 }
 
+/// Where a gate's lead ends along the axis, px.
+pub(super) const fn gate_along(symbol: Symbol) -> f64 {
+    match symbol {
+        Symbol::Thyristor | Symbol::Triac => 18.0,
+        _ => 0.0,
+    }
+}
+
 /// The closed outline that is filled.
 const fn body(symbol: Symbol) -> &'static str {
     match symbol {

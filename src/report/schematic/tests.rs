@@ -205,3 +205,87 @@ fn a_long_ladder_is_drawn_and_more_than_anyone_reads_is_not() {
         Err(super::PictureError::Large(_))
     ));
 }
+
+/// A sheet's picture: everything between the marks of one tag.
+fn tags<'a>(svg: &'a str, tag: &'a str) -> impl Iterator<Item = &'a str> {
+    svg.split('<').filter(move |own| own.starts_with(tag))
+}
+
+#[test]
+fn a_schematic_is_drawn_where_it_stands_on_its_sheet() {
+    let buck = model("schematics/buck.asc");
+    let svg = super::svg(&buck, &[]).unwrap();
+    let sheet = buck.netlist().unwrap().sheet.clone().unwrap();
+    // Every wire of the sheet is a line of its length, and the first one is where the corner says.
+    let lines: Vec<[f64; 4]> = tags(&svg, "path fill=\"none\" d=\"M")
+        .filter_map(|path| {
+            let numbers = path.split('"').nth(3)?.replace(['M', 'L'], " ");
+            let numbers: Vec<f64> = numbers.split(' ').filter_map(|n| n.parse().ok()).collect();
+            numbers.try_into().ok()
+        })
+        .collect();
+    let all = sheet.wires.iter().flat_map(|(a, b)| [*a, *b]);
+    let all = all.chain(sheet.labels.iter().map(|l| l.0));
+    let pins = sheet
+        .symbols
+        .iter()
+        .flat_map(|s| s.pins.iter().map(|p| p.1));
+    let spots: Vec<(i64, i64)> = all.chain(pins).collect();
+    let corner = |k: fn(&(i64, i64)) -> i64| spots.iter().map(k).min().unwrap();
+    let (left, top) = (corner(|p| p.0), corner(|p| p.1));
+    let at = |(x, y): (i64, i64)| {
+        [
+            120.0 + 1.25 * (x - left) as f64,
+            76.0 + 1.25 * (y - top) as f64,
+        ]
+    };
+    assert!(sheet.wires.len() > 3);
+    for (a, b) in &sheet.wires {
+        let [a, b] = [at(*a), at(*b)];
+        assert!(lines.contains(&[a[0], a[1], b[0], b[1]]), "{a:?} {b:?}");
+    }
+    // Of a symbol between two pins the middle is half-way.
+    let l1 = sheet.symbols.iter().find(|s| s.name == "l1").unwrap();
+    let [a, b] = [at(l1.pins[0].1), at(l1.pins[1].1)];
+    let middle = format!(
+        "{} {})\"",
+        f64::midpoint(a[0], b[0]),
+        f64::midpoint(a[1], b[1])
+    );
+    assert!(svg.contains(&middle), "{middle}");
+    assert!(svg.contains(">l1") && svg.contains(">out<"));
+    // The same circuit without a sheet has its places found.
+    assert_ne!(svg, super::svg(&model("schematics/buck.cir"), &[]).unwrap());
+}
+
+#[test]
+fn every_schematic_shows_all_its_parts_and_states() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("netlists/schematics");
+    let mut n_sheets = 0;
+    for file in std::fs::read_dir(folder).unwrap() {
+        let name = file.unwrap().file_name().into_string().unwrap();
+        if !name.ends_with(".asc") || name == "stage.asc" {
+            continue;
+        }
+        n_sheets += 1;
+        let model = model(&format!("schematics/{name}"));
+        let svg = super::with_both_states(&model).unwrap();
+        for part in &parts(&model).parts {
+            assert!(svg.contains(&format!(">{}", part.name)), "{name} {part:?}");
+        }
+        assert!(!svg.contains("NaN") && !svg.contains("built-in"), "{name}");
+    }
+    assert!(n_sheets >= 10);
+}
+
+#[test]
+fn devices_have_their_own_names() {
+    let drawn = |name: &str| super::svg(&model(name), &[]).unwrap();
+    let control = drawn("peak-current.cir");
+    for words in [">a1 schmitt<", ">a2 srflop<", ">a3 buf<", ">s<", ">q<"] {
+        assert!(control.contains(words), "{words}");
+    }
+    assert!(!control.contains("built-in"));
+    let models = drawn("xspice.cir");
+    assert!(models.contains(">again gain<") && !models.contains("built-in"));
+}
