@@ -122,6 +122,29 @@ fn waves(text: &str) -> Waveforms {
 }
 
 #[test]
+fn a_word_that_is_neither_a_file_nor_a_command_is_told_so() {
+    let said = |arguments: &str| {
+        let ran = run(arguments);
+        assert_eq!((ran.status, ran.out.as_str()), (2, ""), "{ran}");
+        ran.err
+    };
+    for arguments in ["divider.cri", "divider.cri -o out.csv", "missing/buck.cir"] {
+        let word = arguments.split(' ').next().unwrap();
+        let expected = format!("`{word}` is neither a file nor a command");
+        assert!(said(arguments).contains(&expected), "{arguments}");
+    }
+    // A misspelt command is none of a file's, with a file behind it too.
+    for arguments in ["chek", "chek divider.cir"] {
+        let err = said(arguments);
+        assert!(err.contains("'chek'") && err.contains("'check'"), "{err}");
+    }
+    assert!(said("..").contains("`..` is a folder"));
+    // Options before the file are as good as behind it.
+    let ran = run("-q divider.cir");
+    assert_eq!(ran.status, 0, "{ran}");
+}
+
+#[test]
 fn help_names_every_command_and_flag() {
     assert_snapshot!(run("--help"));
     for command in [

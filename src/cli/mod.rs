@@ -38,7 +38,7 @@ use std::ffi::OsString;
 use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
 
-use clap::error::ErrorKind;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
 
 use args::{Assigned, Cli, Command, MessageFormat};
@@ -56,7 +56,8 @@ pub fn main() -> Exit {
     let parsed = batch::expanded(std::env::args_os().collect()).and_then(|(args, log)| {
         logged = log;
         let args = with_command(args, &command);
-        let matches = command.try_get_matches_from_mut(args)?;
+        let matches = command.try_get_matches_from_mut(args);
+        let matches = matches.map_err(|error| no_such_input(error, &mut command))?;
         Cli::from_arg_matches(&one_value_each(matches, &mut command)?)
     });
     let mut cli = match parsed {
@@ -119,7 +120,7 @@ pub fn main() -> Exit {
     }
 }
 
-/// `circ FILE` is `circ sim FILE`: where no argument is a command and one is a file or `-`.
+/// `circ FILE` is `circ sim FILE`: where no argument is a command and one is a file or `-`; a first word that is neither is meant as a command.
 fn with_command(mut args: Vec<OsString>, commands: &clap::Command) -> Vec<OsString> {
     let is_command = |arg: &OsString| {
         let name = arg.to_str();
@@ -127,10 +128,31 @@ fn with_command(mut args: Vec<OsString>, commands: &clap::Command) -> Vec<OsStri
     };
     let is_input = |arg: &OsString| arg == "-" || Path::new(arg).is_file();
     let given = args.get(1..).unwrap_or_default();
-    if !given.iter().any(is_command) && given.iter().any(is_input) {
+    let is_option = |arg: &OsString| arg.as_encoded_bytes().starts_with(b"-");
+    let begins = given
+        .first()
+        .is_some_and(|arg| is_option(arg) || is_input(arg));
+    if begins && !given.iter().any(is_command) && given.iter().any(is_input) {
         args.insert(1, "sim".into());
     }
     args
+}
+
+/// Says of a word that is no command, nor like one, that it is no file either.
+fn no_such_input(error: clap::Error, command: &mut clap::Command) -> clap::Error {
+    let word = match error.get(ContextKind::InvalidSubcommand) {
+        Some(ContextValue::String(word)) => word,
+        _ => return error,
+    };
+    let is_like_one = error.get(ContextKind::SuggestedSubcommand).is_some();
+    let message = if Path::new(word).is_dir() {
+        format!("`{word}` is a folder: name a netlist in it")
+    } else if is_like_one && !word.contains(['.', '/']) {
+        return error;
+    } else {
+        format!("`{word}` is neither a file nor a command")
+    };
+    command.error(ErrorKind::InvalidSubcommand, message)
 }
 
 /// Several values of `--param` are for a sweep alone.
