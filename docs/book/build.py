@@ -88,6 +88,9 @@ def broken():
 
 
 def main():
+    if shutil.which("mdbook") is None:
+        print("mdbook is not there: `cargo install mdbook` brings it", file=sys.stderr)
+        return 2
     shutil.rmtree(BOOK, ignore_errors=True)
     SOURCE.mkdir(parents=True)
     shutil.copyfile(OWN / "book.toml", BOOK / "book.toml")
