@@ -13,9 +13,10 @@ function isGate(curve) {
   const [low, high] = extremes(curve, 0, curve.y.length);
   const near = 0.02 * (high - low);
   if (!(high > low) || curve.y.length < 8) return false;
+  const [bottom, top, most] = [low + near, high - near, 0.05 * curve.y.length];
   let inside = 0;
-  for (const value of curve.y) if (value > low + near && value < high - near) inside++;
-  return inside <= 0.05 * curve.y.length;
+  for (const value of curve.y) if (value > bottom && value < top && ++inside > most) return false;
+  return true;
 }
 
 /** Panels of curves over the columns of the data; gates apart from other voltages. */
