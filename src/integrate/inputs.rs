@@ -5,6 +5,7 @@ use crate::circuit::source::{Piece, Rest, Wave, crossings};
 use crate::integrate::line::{Line, Lines};
 use crate::lcs::Input;
 use crate::settings::tolerances::steps::STEPS_PER_PERIOD;
+use crate::settings::tolerances::times::SAME_TIME;
 
 /// All inputs u(t) with their one-sided limits and breakpoints.
 #[derive(Debug, Clone)]
@@ -146,6 +147,19 @@ impl Inputs {
             .iter()
             .filter_map(|&j| self.sources[j].next_breakpoint(t))
             .fold(self.lines.next_breakpoint(t), f64::min)
+    }
+
+    /// The first edge or kink that lies after `t` by more than the rounding of times; infinite if none.
+    #[must_use]
+    pub(crate) fn next_corner(&self, t: f64) -> f64 {
+        let mut after = t;
+        loop {
+            let next = self.next_breakpoint(after);
+            if next - t > SAME_TIME * next.abs() || !next.is_finite() {
+                return next;
+            }
+            after = next;
+        }
     }
 
     /// The first time in (from, to] at which `constant + gains·u` passes `level` in this direction.

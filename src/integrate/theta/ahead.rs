@@ -88,17 +88,9 @@ impl Theta {
     fn look_ahead(&mut self) {
         let now = self.now.t;
         if !self.smooth.ahead.known {
-            let mut after = now;
-            let breakpoint = loop {
-                let next = self.inputs.next_breakpoint(after);
-                if next - now > Self::slack(next) || !next.is_finite() {
-                    break next;
-                }
-                after = next;
-            };
             let ahead = &mut self.smooth.ahead;
             ahead.known = true;
-            ahead.breakpoint = breakpoint;
+            ahead.breakpoint = self.inputs.next_corner(now);
             ahead.asked = now;
             ahead.passage = f64::INFINITY;
             ahead.moving.clear();

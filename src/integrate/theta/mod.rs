@@ -512,14 +512,7 @@ impl Stepper for Theta {
                 continue;
             }
             let now = self.now.t;
-            let mut after = now;
-            let breakpoint = loop {
-                let next = self.inputs.next_breakpoint(after);
-                if next - now > Self::slack(next) || !next.is_finite() {
-                    break next;
-                }
-                after = next;
-            };
+            let breakpoint = self.inputs.next_corner(now);
             let merged = (t - breakpoint).abs() <= Self::slack(t);
             let limit = if merged {
                 breakpoint.max(t)
