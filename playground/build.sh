@@ -11,7 +11,8 @@ PATH="$tools/bin:$PATH"
 left_out() { echo "the playground is left out: $1" >&2; exit 3; }
 [ -d "$(rustc --print sysroot)/lib/rustlib/$target" ] || timeout 300 rustup target add $target || left_out "no Rust target $target"
 if [ "$(wasm-bindgen --version 2>/dev/null)" != "wasm-bindgen $version" ]; then
-  cargo install --quiet --root "$tools" wasm-bindgen-cli --version "$version" || left_out "no wasm-bindgen $version"
+  # Built for a quick start: it runs once.
+  cargo install --quiet --debug --root "$tools" wasm-bindgen-cli --version "$version" || left_out "no wasm-bindgen $version"
 fi
 
 cargo build --release --target $target

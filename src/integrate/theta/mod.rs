@@ -369,7 +369,7 @@ impl Theta {
         self.whole = true;
     }
 
-    /// Has λ at an instant read by a longer step, see [`READING`](crate::settings::tolerances::stated::READING), whose error is larger.
+    /// Has λ of curved laws at an instant read by a longer step, see [`READING`](crate::settings::tolerances::stated::READING), whose error is larger.
     pub(crate) fn read_coarsely(&mut self) {
         self.reads_coarsely = true;
     }

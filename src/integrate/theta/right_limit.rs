@@ -2,7 +2,7 @@
 
 use super::attempt::unsolved;
 use super::*;
-use crate::settings::tolerances::stated::{READING, READING_CURVED};
+use crate::settings::tolerances::stated::READING;
 use crate::settings::tolerances::steps::SHORT;
 use crate::settings::tolerances::steps::SHORT_ON_LINES;
 
@@ -27,10 +27,10 @@ impl Theta {
     /// step, and the sources move less in a shorter one; the rounding of the state grows to 2²⁴ε.
     fn reading_step(&self) -> f64 {
         let curved = self.system().curved;
-        let longer = match (self.reads_coarsely, curved) {
-            (false, _) => 1.0,
-            (true, false) => READING,
-            (true, true) => READING_CURVED,
+        let longer = if self.reads_coarsely && curved {
+            READING
+        } else {
+            1.0
         };
         let short = self.read_step() * longer;
         if curved {

@@ -33,12 +33,9 @@ pub(crate) const LOOSER_EMBEDDED: f64 = 8.0;
 /// The error of the run over what that companion differs by: 1/7 were the errors smooth and of one sign. Larger and smaller as [`FIRST_ORDER`].
 pub(crate) const LOOSER_EMBEDDED_SHARE: f64 = 1.0;
 
-/// Steps by which companions read what flows at an instant, over those of the run: the error of a reading is of first order. Larger: errors
-/// stated larger than they are; smaller: that of a reading is not seen.
-pub(crate) const READING: f64 = 4.0;
-
-/// The same where laws are curved: a diode's voltage is the logarithm of a current that grows with the time since the instant.
-pub(crate) const READING_CURVED: f64 = 64.0;
+/// Steps by which companions read what flows at an instant where laws are curved, over those of the run: a diode's voltage is the logarithm of a
+/// current that grows with the time since the instant. Larger: errors stated larger than they are; smaller: that of a reading is not seen.
+pub(crate) const READING: f64 = 64.0;
 
 /// More rows than these would choose the steps of that companion, which stops at some of them only. Larger: its steps are those of the run and
 /// it sees no error; smaller: rows are compared where it has none.
