@@ -558,9 +558,9 @@ pub struct CompareArgs {
     /// Keep the ngspice deck in this file
     #[arg(long, value_name = "DECK")]
     pub keep: Option<PathBuf>,
-    /// Draw both and their difference to this svg, png or html file
-    #[arg(short, long, value_name = "OUT")]
-    pub output: Option<PathBuf>,
+    /// Draw both and their difference to this svg, png or html file (repeatable)
+    #[arg(short, long = "output", value_name = "OUT")]
+    pub outputs: Vec<PathBuf>,
     /// Print JSON
     #[arg(long)]
     pub json: bool,

@@ -48,17 +48,13 @@ const DRAWN: usize = 3;
 /// # Errors
 /// See [`Failure`].
 pub(super) fn compare(args: &CompareArgs, streams: &Streams) -> Result<Exit, Failure> {
-    let outputs: Vec<&Path> = [&args.output, &args.keep]
-        .into_iter()
-        .flatten()
-        .map(PathBuf::as_path)
-        .collect();
+    let written = args.outputs.iter().chain(&args.keep);
+    let outputs: Vec<&Path> = written.map(PathBuf::as_path).collect();
     if !with_ngspice(args) {
         files::spare(&outputs, [args.against.as_path()])?;
     }
-    if let Some(path) = &args.output
-        && !has_ending(path, &["svg", "png", "html", "htm"])
-    {
+    let drawn = |path: &&PathBuf| has_ending(path, &["svg", "png", "html", "htm"]);
+    if let Some(path) = args.outputs.iter().find(|path| !drawn(path)) {
         return Err(output::unknown_ending(path, "svg, png or html"));
     }
     let subject = input::open(&args.input, &[], &outputs, streams)?;
@@ -71,8 +67,8 @@ pub(super) fn compare(args: &CompareArgs, streams: &Streams) -> Result<Exit, Fai
         streams.note("`.step` is left out: the file is compared with the values as they stand");
     }
     let found = Found::of(args, &subject, streams)?;
-    if let Some(path) = &args.output {
-        draw(path, &found)?;
+    for path in &args.outputs {
+        draw(path, &found, &found.verdict(args))?;
     }
     found.tell_notes(streams);
     if args.json {
@@ -94,7 +90,7 @@ const fn exit(within: bool) -> Exit {
 
 /// The comparisons of all runs of `.step`.
 fn every(args: &CompareArgs, model: &Model, streams: &Streams) -> Result<Exit, Failure> {
-    if args.output.is_some() || args.keep.is_some() {
+    if !args.outputs.is_empty() || args.keep.is_some() {
         let message = "`-o` and `--keep` take one run, and `.step` asks for several";
         return Err(Failure::Message(format!(
             "{}: {message}",
@@ -348,7 +344,7 @@ fn simulated(
 }
 
 /// The worst signals on both sides, with their difference.
-fn draw(path: &Path, found: &Found) -> Result<(), Failure> {
+fn draw(path: &Path, found: &Found, verdict: &str) -> Result<(), Failure> {
     let (ours, theirs) = (&found.ours, &found.theirs);
     let mut worst: Vec<_> = found.comparison.signals.iter().collect();
     worst.sort_by(|a, b| b.max.total_cmp(&a.max));
@@ -359,7 +355,8 @@ fn draw(path: &Path, found: &Found) -> Result<(), Failure> {
     let pixels = if is_page { usize::MAX } else { PANEL_WIDTH };
     let figure = Figure::of_comparison(ours, &theirs.waveforms, &delta, label, &names, pixels);
     if is_page {
-        return files::write(path, Page::of_figure(&figure).html()?.as_bytes());
+        let page = Page::of_comparison(&figure, &found.comparison, verdict);
+        return files::write(path, page.html()?.as_bytes());
     }
     output::picture_to_file(path, has_ending(path, &["png"]), &svg::draw(&figure)?)
 }

@@ -2,7 +2,7 @@
 
 use super::{si, table};
 use crate::integrate::{Aliased, Method, Note, Orbit, OrbitKind, Places, Run, StateJump};
-use crate::waveform::compare::Comparison;
+use crate::waveform::compare::{Comparison, SignalError};
 
 /// Impulses and jumps listed before the rest is only counted.
 const SHOWN: usize = 8;
@@ -240,21 +240,7 @@ fn destroyed(run: &Run) -> Option<Note> {
 /// One line per signal: amplitude and its errors relative to it, with the instants of the worst points.
 #[must_use]
 pub fn comparison(found: &Comparison) -> String {
-    let rows: Vec<Vec<String>> = found
-        .signals
-        .iter()
-        .map(|s| {
-            vec![
-                s.name.clone(),
-                si::quantity(s.amplitude, s.unit, 4),
-                si::plain(s.max, 3),
-                si::quantity(s.max_time, "s", 6),
-                si::plain(s.rms, 3),
-                si::plain(s.shifted, 3),
-                si::quantity(s.shifted_time, "s", 6),
-            ]
-        })
-        .collect();
+    let rows: Vec<Vec<String>> = found.signals.iter().map(difference).collect();
     let shifted = format!("max ±{}", si::quantity(found.shift, "s", 3));
     let mut text = table::aligned(
         &["signal", "amplitude", "max", "at", "rms", &shifted, "at"],
@@ -269,12 +255,24 @@ pub fn comparison(found: &Comparison) -> String {
     text
 }
 
+/// A line of [`comparison`].
+pub(super) fn difference(s: &SignalError) -> Vec<String> {
+    vec![
+        s.name.clone(),
+        si::quantity(s.amplitude, s.unit, 4),
+        si::plain(s.max, 3),
+        si::quantity(s.max_time, "s", 6),
+        si::plain(s.rms, 3),
+        si::plain(s.shifted, 3),
+        si::quantity(s.shifted_time, "s", 6),
+    ]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::integrate::event::conducts;
     use crate::integrate::{Energy, Impulse, JumpReason, StateJumps, Stats};
-    use crate::waveform::compare::SignalError;
 
     #[test]
     fn a_run_in_words() {

@@ -305,9 +305,14 @@ def test_steps_and_comparisons_have_pages(tmp_path, show):
     plain = tmp_path / "plain.cir"
     plain.write_text(SINE)
     run("sim", plain, "-o", tmp_path / "plain.csv")
-    run("compare", plain, "--against", tmp_path / "plain.csv", "-o", tmp_path / "both.html")
+    run("compare", plain, "--against", tmp_path / "plain.csv", "-o", tmp_path / "both.html", "-o", tmp_path / "both.svg")
+    assert (tmp_path / "both.svg").read_text().startswith("<svg")
     page = show(tmp_path / "both.html")
     assert "difference" in page.evaluate("window.circ.panels.map((p) => p.quantity)")
+    # The table of differences, and whether they are within the tolerance.
+    rows = page.locator("table", has_text="edges shifted").locator("tbody tr")
+    assert [row.split()[0] for row in rows.all_inner_texts()] == ["v(in)", "v(out)", "i(v1)"]
+    assert "within the tolerance" in page.locator("pre").first.inner_text()
 
 
 def test_what_is_seen_is_saved_as_a_drawing(buck, show):

@@ -6,6 +6,7 @@
 
 mod bench;
 mod check;
+mod comparison;
 mod run;
 
 use base64::Engine;
