@@ -11,7 +11,7 @@ pub mod npz;
 mod phasors;
 mod plot;
 pub mod raw;
-mod thin;
+pub(crate) mod thin;
 
 pub use phasors::Phasors;
 pub use plot::{Plot, plots};
@@ -97,7 +97,8 @@ impl Waveforms {
     /// The points of column j for a picture `pixels` wide: of each pixel's rows the first, lowest, highest and last.
     #[must_use]
     pub fn thinned(&self, j: usize, pixels: usize) -> Vec<(f64, f64)> {
-        thin::thinned(&self.time, self.column(j), pixels)
+        let points = self.time.iter().copied().zip(self.column(j));
+        thin::thinned(points.collect(), pixels)
     }
 
     /// Puts columns that were read in any order and spelling together; units follow from the names.

@@ -337,6 +337,21 @@ def test_a_million_rows_of_ten_signals_open(tmp_path, show):
     page.keyboard.press("a")
     t = float(cursor(page, "a"))
     assert float(reading(page, "v(in)", "a")) == pytest.approx(math.sin(2000 * math.pi * t), abs=1e-9)
+    assert "reading all rows" not in page.locator("p.about").first.inner_text()
+    # While its rows are still read the page stands, and shows no value that it does not know.
+    whole = (tmp_path / "large.html").read_text()
+    (tmp_path / "part.html").write_text(whole[:whole.index('<script type="text/plain"')] + "</body></html>")
+    page = show(tmp_path / "part.html")
+    assert "reading all rows" in page.locator("p.about").first.inner_text()
+    assert page.get_by_role("button", name="spectrum").is_disabled()
+    rows = page.evaluate("window.circ.panels.flatMap((p) => p.curves).map((c) => c.y.length)")
+    assert all(1000 < some <= 4000 for some in rows)
+    first(page)
+    page.locator(".u-over").first.hover()
+    assert reading(page, "v(in)", "pointer") in ("NaN", None)
+    page.keyboard.press("a")
+    t = float(cursor(page, "a"))
+    assert float(reading(page, "v(in)", "a")) == pytest.approx(math.sin(2000 * math.pi * t), abs=1e-9)
 
 
 def test_the_page_is_usable_by_keyboard_alone(buck, show):

@@ -76,6 +76,7 @@ impl Page {
                 name: name.to_owned(),
                 x: self.column(points.iter().map(|p| p.0)),
                 y: self.column(points.iter().map(|p| p.1)),
+                overview: None,
             });
         }
         Panel {
@@ -108,7 +109,7 @@ mod tests {
         let page = Page::of_measurements("buck", &all);
         let curves = &page.panels[0].curves;
         assert_eq!(curves.len(), 1);
-        let times = super::super::Column::of([1e-3, 1e-2].into_iter());
+        let times = super::super::Column::Numbers(vec![1e-3, 1e-2]);
         assert_eq!(page.columns[curves[0].x], times);
         assert_eq!(page.tables[0].rows[2][5], "Timestep too small");
     }

@@ -7,15 +7,16 @@
 mod bench;
 mod check;
 mod comparison;
+mod curves;
 mod run;
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
-use super::figure::{self, Figure};
 use super::{PictureError, schematic, sheet};
 use crate::model::Model;
+use crate::waveform::thin::thinned;
 
 const TEMPLATE: &str = include_str!("../page/page.html");
 const STYLES: [&str; 2] = [
@@ -30,6 +31,10 @@ const SCRIPTS: [&str; 5] = [
     include_str!("../page/page.js"),
 ];
 
+/// Rows from which on a curve is drawn by an overview until the browser has read all of them.
+const LONG: usize = 50_000;
+/// Pixels of an overview.
+const OVERVIEW: usize = 1000;
 /// Rows of a table.
 const MOST_ROWS: usize = 10_000;
 
@@ -58,14 +63,27 @@ struct Axis {
     log: bool,
 }
 
-/// Little-endian doubles in base64.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-struct Column(String);
+/// Numbers, in JSON as base64 of little-endian doubles.
+#[derive(Debug, Clone, PartialEq)]
+enum Column {
+    Numbers(Vec<f64>),
+    /// Those that follow behind what draws, `null` in JSON.
+    Later,
+}
 
 impl Column {
-    fn of(values: impl Iterator<Item = f64>) -> Self {
-        let bytes: Vec<u8> = values.flat_map(f64::to_le_bytes).collect();
-        Self(BASE64_STANDARD.encode(bytes))
+    fn base64(values: &[f64]) -> String {
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        BASE64_STANDARD.encode(bytes)
+    }
+}
+
+impl Serialize for Column {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Numbers(values) => to.serialize_str(&Self::base64(values)),
+            Self::Later => to.serialize_none(),
+        }
     }
 }
 
@@ -85,6 +103,9 @@ struct Curve {
     name: String,
     x: usize,
     y: usize,
+    /// A long one has another pair, of some of its rows, by which the page draws it until all are there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    overview: Option<[usize; 2]>,
 }
 
 /// When a switch is on or a device conducts.
@@ -139,43 +160,8 @@ impl Page {
 
     /// A column more, by its number.
     fn column(&mut self, values: impl Iterator<Item = f64>) -> usize {
-        self.columns.push(Column::of(values));
+        self.columns.push(Column::Numbers(values.collect()));
         self.columns.len() - 1
-    }
-
-    /// The curves of a figure.
-    #[must_use]
-    pub fn of_figure(figure: &Figure) -> Self {
-        let (axis, place): (Axis, fn(f64) -> f64) = match figure.axis {
-            figure::Axis::Time => (axis("time", "s", false), |t| t),
-            figure::Axis::Frequency => (axis("frequency", "Hz", true), |x| 10f64.powf(x)),
-        };
-        let mut page = Self::new(&figure.title, axis);
-        // Curves of one run have one column of times.
-        let mut latest: Option<(usize, &[(f64, f64)])> = None;
-        for panel in &figure.panels {
-            let mut curves = Vec::new();
-            for series in &panel.series {
-                let points = &series.points[..];
-                let times = || points.iter().map(|p| p.0);
-                let known = latest.filter(|(_, known)| known.iter().map(|p| p.0).eq(times()));
-                let fresh = || (page.column(times().map(place)), points);
-                let (x, _) = *latest.insert(known.unwrap_or_else(fresh));
-                let y = page.column(points.iter().map(|p| p.1));
-                curves.push(Curve {
-                    name: series.name.clone(),
-                    x,
-                    y,
-                });
-            }
-            page.panels.push(Panel {
-                quantity: panel.quantity.clone(),
-                unit: panel.unit,
-                curves,
-                dots: false,
-            });
-        }
-        page
     }
 
     /// The same with a picture of the circuit, where it can be drawn.
@@ -187,6 +173,52 @@ impl Page {
         }
     }
 
+    /// The page with overviews of its long curves, and their columns for behind it: a browser draws the one while it reads the other.
+    fn apart(&self) -> (Self, String) {
+        let mut head = Self {
+            title: self.title.clone(),
+            about: self.about.clone(),
+            axis: self.axis,
+            columns: Vec::new(),
+            panels: self.panels.clone(),
+            strips: self.strips.clone(),
+            tables: self.tables.clone(),
+            texts: self.texts.clone(),
+            circuit: self.circuit.clone(),
+        };
+        let long = |column: &Column| matches!(column, Column::Numbers(v) if v.len() > LONG);
+        let mut rest = String::new();
+        for (k, column) in self.columns.iter().enumerate() {
+            head.columns.push(match column {
+                Column::Numbers(values) if long(column) => {
+                    let column = Column::base64(values);
+                    rest += &format!(
+                        "<script type=\"text/plain\" data-column=\"{k}\">{column}</script>\n"
+                    );
+                    Column::Later
+                }
+                _ => column.clone(),
+            });
+        }
+        let panels = self.panels.iter().enumerate();
+        for (p, c) in panels.flat_map(|(p, panel)| (0..panel.curves.len()).map(move |c| (p, c))) {
+            let Curve { x, y, .. } = self.panels[p].curves[c];
+            if let (Column::Numbers(x), Column::Numbers(y)) = (&self.columns[x], &self.columns[y])
+                && x.len() > LONG
+            {
+                let all = x.iter().copied().zip(y.iter().copied());
+                let some = thinned(all.collect(), OVERVIEW);
+                let x = head.column(some.iter().map(|p| p.0));
+                let y = head.column(some.iter().map(|p| p.1));
+                head.panels[p].curves[c].overview = Some([x, y]);
+            }
+        }
+        if !rest.is_empty() {
+            rest += "<script>circRest(window.circ);</script>\n";
+        }
+        (head, rest)
+    }
+
     /// The document, without references to anything outside itself.
     ///
     /// # Errors
@@ -196,7 +228,8 @@ impl Page {
         if !has_curves && self.tables.is_empty() && self.texts.is_empty() {
             return Err(PictureError::Empty("no signals"));
         }
-        let data = serde_json::to_string(self)?;
+        let (head, rest) = self.apart();
+        let data = serde_json::to_string(&head)?;
         Ok(filled(
             TEMPLATE,
             &[
@@ -205,6 +238,7 @@ impl Page {
                 // Within a script a text like `</script>` ends it, and `<!--` hides its end.
                 ("data", data.replace('<', "\\u003c")),
                 ("script", SCRIPTS.join("\n")),
+                ("rest", rest),
             ],
         ))
     }
@@ -268,6 +302,46 @@ fn filled(template: &str, values: &[(&str, String)]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::figure::{self, Figure};
+
+    /// What stands before the script that draws names overviews of some rows; all rows follow behind it.
+    #[test]
+    fn columns_of_long_curves_follow_behind_an_overview() {
+        let mut page = Page::new("long", axis("time", "s", false));
+        let rows = LONG + 1;
+        let x = page.column((0..rows).map(|k| k as f64));
+        let y = page.column((0..rows).map(|k| (k % 7) as f64));
+        let name = "v(a)".to_owned();
+        let curves = vec![Curve {
+            name,
+            x,
+            y,
+            overview: None,
+        }];
+        page.panels = vec![Panel {
+            quantity: "voltage".into(),
+            unit: "V",
+            curves,
+            dots: false,
+        }];
+        let (head, rest) = page.apart();
+        assert_eq!(head.columns[..2], [Column::Later, Column::Later]);
+        let Some([x, y]) = head.panels[0].curves[0].overview else {
+            panic!("{:?}", head.panels)
+        };
+        let (Column::Numbers(x), Column::Numbers(y)) = (&head.columns[x], &head.columns[y]) else {
+            panic!("no overview")
+        };
+        assert!(x.len() == y.len() && x.len() <= 4 * OVERVIEW);
+        assert!(x.iter().zip(y).all(|(x, y)| (*x as usize % 7) as f64 == *y));
+        assert_eq!(x.last(), Some(&(LONG as f64)));
+        let html = page.html().unwrap();
+        let at = html.find("data-column=\"1\"").unwrap();
+        assert!(
+            html.find("circPage(document").unwrap() < at
+                && html.ends_with(&format!("{rest}</body>\n</html>\n"))
+        );
+    }
 
     #[test]
     fn without_a_curve_there_is_no_page() {

@@ -131,13 +131,11 @@ mod tests {
             panic!("{:?}", page.panels)
         };
         assert!(volts.curves.iter().chain(&amperes.curves).all(|c| c.x == 0));
-        let bytes = BASE64_STANDARD
-            .decode(&page.columns[amperes.curves[0].y].0)
-            .unwrap();
-        let numbers: Vec<f64> = bytes
-            .chunks(8)
-            .map(|b| f64::from_le_bytes(b.try_into().unwrap()))
-            .collect();
+        let column = &page.columns[amperes.curves[0].y];
+        let json = serde_json::to_string(column).unwrap();
+        let bytes = BASE64_STANDARD.decode(json.trim_matches('"')).unwrap();
+        let (doubles, _) = bytes.as_chunks::<8>();
+        let numbers: Vec<f64> = doubles.iter().map(|b| f64::from_le_bytes(*b)).collect();
         assert_eq!(numbers, [0.3, 0.6]);
     }
 

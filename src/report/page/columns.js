@@ -1,7 +1,7 @@
 // Columns of numbers and what is asked of them: rows by time, values between rows, bounds over any span.
 
 /** Rows a block: of each the lowest and highest value are kept. */
-const BLOCK = 256;
+const BLOCK = 64;
 
 /** Numbers from base64 of little-endian doubles, or from an array. */
 function numbers(source) {
@@ -13,7 +13,7 @@ function numbers(source) {
   return new Float64Array(bytes.buffer);
 }
 
-/** A curve: y over nondecreasing x, with bounds by block; NaN is a gap. */
+/** A curve: y over nondecreasing x, with bounds by block; NaN is a gap. Of one that is `partial` only some rows are there. */
 function curveOf(name, x, y) {
   const blocks = Math.ceil(y.length / BLOCK);
   const lows = new Float64Array(blocks).fill(Infinity);
@@ -23,7 +23,7 @@ function curveOf(name, x, y) {
     if (y[k] < lows[block]) lows[block] = y[k];
     if (y[k] > highs[block]) highs[block] = y[k];
   }
-  return { name, x, y, lows, highs, shown: true };
+  return { name, x, y, lows, highs, shown: true, partial: false };
 }
 
 /** The first row from `from` on that is at t or later. */
@@ -54,13 +54,13 @@ function nearestRow(x, t) {
   return after > 0 && t - x[after - 1] < x[after] - t ? after - 1 : after;
 }
 
-/** The value at t: of a row there the last one (after a jump), between rows a straight line; NaN outside. */
+/** The value at t: of a row there the last one (after a jump), between rows a straight line; NaN outside and where rows are missing. */
 function valueAt(curve, t) {
   const { x, y } = curve;
   const after = rowAfter(x, t);
   if (after === 0) return NaN;
   if (x[after - 1] === t) return y[after - 1];
-  if (after === x.length) return NaN;
+  if (after === x.length || curve.partial) return NaN;
   const part = (t - x[after - 1]) / (x[after] - x[after - 1]);
   return y[after - 1] + part * (y[after] - y[after - 1]);
 }
@@ -99,14 +99,36 @@ function boundsIn(curve, from, to) {
   return [low, high];
 }
 
+/** The rows of what is seen of the curve, with one more on either side: from the first up to but not at the second. */
+const rowsIn = (curve, [from, to]) => [Math.max(0, rowAt(curve.x, from) - 1), Math.min(curve.x.length, rowAfter(curve.x, to) + 1)];
+
+/** Whether there are more than four rows a pixel. */
+function isDense(curve, view, pixels) {
+  const [a, end] = rowsIn(curve, view);
+  return end - a > 4 * pixels;
+}
+
+/** Hands on the lowest and highest value of each pixel that has rows, with those that lead to it from the pixel before. */
+function bars(curve, view, pixels, edge, bar) {
+  const { x, y } = curve;
+  let [a, end] = rowsIn(curve, view), before = NaN;
+  for (let pixel = 0; pixel < pixels && a < end; pixel++) {
+    const b = pixel + 1 === pixels ? end : Math.min(rowAt(x, edge(pixel), a), end);
+    if (b === a) continue;
+    const [low, high] = extremes(curve, a, b);
+    bar(pixel, before < low ? before : low, before > high ? before : high);
+    before = y[b - 1];
+    a = b;
+  }
+}
+
 /**
  * Hands on the points of what is seen of the curve: all of them, or where there are more than four a pixel the first, lowest, highest and
  * last of each pixel. `edge(k)` is the x at which pixel k of `pixels` ends.
  */
-function trace(curve, [from, to], pixels, edge, point) {
+function trace(curve, view, pixels, edge, point) {
   const { x, y } = curve;
-  let a = Math.max(0, rowAt(x, from) - 1);
-  const end = Math.min(x.length, rowAfter(x, to) + 1);
+  let [a, end] = rowsIn(curve, view);
   if (end - a <= 4 * pixels) {
     for (let k = a; k < end; k++) point(x[k], y[k]);
     return;

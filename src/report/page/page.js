@@ -8,32 +8,25 @@ function stripsOf(strips) {
   return (strips ?? []).map((strip) => ({ ...strip, times: numbers(strip.times), states: strip.states.map(Boolean) }));
 }
 
-/** A voltage that stands at one of two levels nearly always is that of a gate, and has a panel of its own beside analogue ones. */
-function isGate(curve) {
-  const [low, high] = extremes(curve, 0, curve.y.length);
-  const near = 0.02 * (high - low);
-  if (!(high > low) || curve.y.length < 8) return false;
-  const [bottom, top, most] = [low + near, high - near, 0.05 * curve.y.length];
-  let inside = 0;
-  for (const value of curve.y) if (value > bottom && value < top && ++inside > most) return false;
-  return true;
+/** Panels of curves over the columns of the data; curves whose columns follow later are drawn by their overviews until then. */
+function panelsOf(data) {
+  const columns = data.columns.map((column) => column && numbers(column));
+  const of = (curve) => {
+    if (columns[curve.x] && columns[curve.y]) return curveOf(curve.name, columns[curve.x], columns[curve.y]);
+    const [x, y] = curve.overview;
+    return { ...curveOf(curve.name, columns[x], columns[y]), partial: true, later: [curve.x, curve.y] };
+  };
+  return data.panels.map((panel) => ({ ...panel, curves: panel.curves.map(of) }));
 }
 
-/** Panels of curves over the columns of the data; gates apart from other voltages. */
-function panelsOf(data) {
-  const columns = data.columns.map(numbers);
-  const panels = data.panels.map((panel) => ({
-    quantity: panel.quantity,
-    unit: panel.unit,
-    dots: panel.dots,
-    curves: panel.curves.map((curve) => curveOf(curve.name, columns[curve.x], columns[curve.y])),
-  }));
-  return panels.flatMap((panel) => {
-    const gates = panel.unit === "V" && data.axis.name === "time" ? panel.curves.filter(isGate) : [];
-    const rest = panel.curves.filter((curve) => !gates.includes(curve));
-    if (gates.length === 0 || rest.length === 0) return [panel];
-    return [{ ...panel, curves: rest }, { ...panel, quantity: "gates", curves: gates }];
-  });
+/** The columns that stand behind the page are there: its curves get all their rows. */
+function circRest(shown) {
+  const columns = new Map();
+  for (const script of document.querySelectorAll("script[data-column]")) {
+    columns.set(Number(script.dataset.column), numbers(script.textContent));
+    script.remove();
+  }
+  shown.complete(columns);
 }
 
 /** A table of words; long ones show their first rows and a button for the rest. */
@@ -173,10 +166,17 @@ function circPage(root, data) {
     button("all", () => shown.full(), "the whole span (key Home, double click)");
     axes(controls, () => shown, { x: data.axis.log, y: panels.every((panel) => panel.dots) });
     if (data.axis.name === "time") {
-      button("spectrum", (made) => {
+      const spectral = button("spectrum", (made) => {
         if (pressed(made)) transformed();
         else { spectrum.remove(); spectrum = null; spectrumArea.hidden = true; }
-      }, "spectrum of what is seen, by fast Fourier transform").setAttribute("aria-pressed", "false");
+      }, "spectrum of what is seen, by fast Fourier transform");
+      spectral.setAttribute("aria-pressed", "false");
+      if (panels.some((panel) => panel.curves.some((curve) => curve.partial))) {
+        const wait = element("span", {}, " · reading all rows …");
+        root.querySelector(".about").append(wait);
+        spectral.disabled = true;
+        area.addEventListener("complete", () => { wait.remove(); spectral.disabled = false; });
+      }
     }
     button("save SVG", () => save("circ.svg", "image/svg+xml", drawing(shown, data.title)), "what is seen as a drawing");
   }
