@@ -80,6 +80,35 @@ fn definite_feedthrough_needs_no_jump_logic() {
     assert!(says(&rectifier, "no jump logic") && rectifier.stats.jumps == 0);
 }
 
+/// Over all positions: a chopper of switches alone builds no complementarity system in either of its two, a converter one in each, a
+/// feedback circuit with capacitors behind its diodes jump logic too.
+#[test]
+fn what_is_built_is_counted_over_all_positions() {
+    let of = |run: &Run| {
+        let stats = &run.stats;
+        (stats.positions, stats.systems, stats.impulsive)
+    };
+    for method in [Method::Exact, Method::Theta] {
+        let text = "chopper\nv1 in 0 10\ns1 in out g 0 sw\nr1 out 0 1\nl1 out x 1m\nr2 x 0 2\nvg g 0 pulse(0 1 0 1n 1n 5u 10u)\n\
+                    .model sw sw(vt=0.5 vh=0 ron=1m roff=1meg)\n.tran 1u 100u\n.end\n";
+        let model = circ::Model::parse(text, "chopper").expect("a sound netlist");
+        let step = (method == Method::Theta).then_some(1e-6);
+        let options = SimOptions {
+            method,
+            step,
+            ..SimOptions::default()
+        };
+        let chopper = model.transient(options).expect("a run");
+        assert_eq!(of(&chopper), (2, 0, 0), "{method:?}");
+        assert_eq!(of(&run("boost.cir", method)), (2, 2, 0), "{method:?}");
+        assert_eq!(
+            of(&run("bridge-capacitor-filter.cir", method)),
+            (1, 1, 1),
+            "{method:?}"
+        );
+    }
+}
+
 #[test]
 fn what_nobody_reads_is_not_reconstructed() {
     let circuit = netlist("three-phase-rectifier.cir");

@@ -18,7 +18,7 @@ pub use equilibria::Equilibrium;
 pub use excitation::Excitation;
 pub use feedthrough::Feedthrough;
 pub use jumps::Jumps;
-pub use stiffness::Stiffness;
+pub use stiffness::{Conditioning, Stiffness};
 pub use theorems::Theorem;
 
 use nalgebra::DMatrix;
@@ -27,7 +27,7 @@ use crate::circuit::Circuit;
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 use crate::lcs::{Lcs, SparseLcs};
 use crate::mna::topology;
-use crate::passivity::{Residuals, Verdict};
+use crate::passivity::{Residuals, System, Verdict};
 use facts::Facts;
 
 /// The answer of `circ check`, in the order of its JSON.
@@ -75,6 +75,8 @@ pub struct Report {
     pub jumps: Jumps,
     /// Time constants over the modes.
     pub stiffness: Option<Stiffness>,
+    /// Condition numbers over the modes, and the digits that they cost.
+    pub conditioning: Option<Conditioning>,
     /// Names of the states, the rows of P.
     pub states: Vec<String>,
     /// Names of the ports' λ.
@@ -210,6 +212,7 @@ pub fn system(lcs: &Lcs) -> Report {
         }
     }
     let rate = facts.strict.as_ref().map_or(0.0, |s| s.decay_rate);
+    let (stiffness, conditioning) = stiffness::over_modes(&facts.system);
     Report {
         title: lcs.title.clone(),
         ok: true,
@@ -234,11 +237,18 @@ pub fn system(lcs: &Lcs) -> Report {
         equilibria,
         convergence,
         jumps: jumps::find(&facts),
-        stiffness: Some(stiffness::over_modes(&facts.system)),
+        stiffness: Some(stiffness),
+        conditioning: Some(conditioning),
         states: facts.state_names.clone(),
         lambdas: lcs.ports.iter().map(|port| port.lambda.clone()).collect(),
         switches: lcs.switches.clone(),
     }
+}
+
+/// Condition numbers over the modes of a system, see [`Report::conditioning`].
+#[must_use]
+pub fn conditioning(lcs: &Lcs) -> Conditioning {
+    stiffness::over_modes(&System::of(lcs)).1
 }
 
 /// The report of a circuit that could not be built: its faults alone.
@@ -265,6 +275,7 @@ pub fn faulty(title: &str, faults: Vec<Fault>) -> Report {
         convergence: None,
         jumps: Jumps::default(),
         stiffness: None,
+        conditioning: None,
         states: Vec::new(),
         lambdas: Vec::new(),
         switches: Vec::new(),

@@ -212,6 +212,9 @@ impl fmt::Display for Report {
                 s.modes
             )?;
         }
+        if let Some(c) = &self.conditioning {
+            writeln!(f, "conditioning  {c}")?;
+        }
         Ok(())
     }
 }

@@ -20,6 +20,7 @@ use super::streams::Streams;
 use crate::analysis::{
     self, Finished, PeriodicOptions, TableOptions, WorstOptions, is_measured, shown, shown_values,
 };
+use crate::check;
 use crate::circuit::source::Wave;
 use crate::circuit::{Circuit, SteadyState, Tran};
 use crate::integrate::{
@@ -307,7 +308,18 @@ fn measured_run(
     streams: &Streams,
 ) -> Finished {
     let system = match subject {
-        Subject::Circuit(model) => return transient(model, request, route, streams),
+        Subject::Circuit(model) => {
+            let mut finished = transient(model, request, route, streams);
+            if streams.verbose
+                && let (Some((run, _)), Ok(lcs)) = (&mut finished.run, model.lcs())
+            {
+                run.plan.push(format!(
+                    "conditioning in the start position of the switches: {}",
+                    check::conditioning(&lcs)
+                ));
+            }
+            return finished;
+        }
         Subject::System(system) => system,
     };
     let mut finished = Finished::of(run_to(subject, request, None, route, streams));

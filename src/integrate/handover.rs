@@ -161,7 +161,7 @@ impl Handover {
         let both = self.error.event_time.into_iter().chain(error.event_time);
         self.error.event_time = both.reduce(f64::max);
         // Modes are those of the exact integration.
-        self.stats.add(&Stats { modes: 0, ..stats });
+        self.stats.add(&stats.of_shared_modes());
         for note in notes {
             if !self.notes.contains(&note) {
                 self.notes.push(note);

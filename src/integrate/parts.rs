@@ -428,7 +428,7 @@ impl<S: Modal> Stepper for Parts<S> {
             if let Some(kind) = member.kind
                 && std::mem::replace(&mut counted[kind], true)
             {
-                own.stats.modes = 0;
+                own.stats = own.stats.of_shared_modes();
             }
             whole.stats.add(&own.stats);
             balance.add_beside(member.stepper.exact_mut().balance());

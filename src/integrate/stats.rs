@@ -22,6 +22,12 @@ pub struct Stats {
     pub jumps: u64,
     /// Distinct modes (active sets, switch positions) visited.
     pub modes: u64,
+    /// Positions of the switches stood in.
+    pub positions: u64,
+    /// Complementarity systems reduced, each of one of these.
+    pub systems: u64,
+    /// Of these, the ones whose devices may need an impulse: they have jump logic.
+    pub impulsive: u64,
     /// One-step complementarity problems solved (cached active sets that were accepted included).
     pub lcp_solves: u64,
     /// Of these, the ones where the cached active set did not hold and a solver ran.
@@ -33,6 +39,18 @@ pub struct Stats {
 }
 
 impl Stats {
+    /// Without what was built once for several parts, or for the run before.
+    #[must_use]
+    pub const fn of_shared_modes(self) -> Self {
+        Self {
+            modes: 0,
+            positions: 0,
+            systems: 0,
+            impulsive: 0,
+            ..self
+        }
+    }
+
     /// Adds those of another part.
     pub fn add(&mut self, other: &Self) {
         self.steps += other.steps;
@@ -40,6 +58,9 @@ impl Stats {
         self.events += other.events;
         self.jumps += other.jumps;
         self.modes += other.modes;
+        self.positions += other.positions;
+        self.systems += other.systems;
+        self.impulsive += other.impulsive;
         self.lcp_solves += other.lcp_solves;
         self.pivotings += other.pivotings;
         self.factorisations += other.factorisations;

@@ -1,7 +1,7 @@
 //! Summaries in words.
 
 use super::{si, table};
-use crate::integrate::{Aliased, Method, Note, Orbit, OrbitKind, Places, Run, StateJump};
+use crate::integrate::{Aliased, Method, Note, Orbit, OrbitKind, Places, Run, StateJump, Stats};
 use crate::waveform::compare::{Comparison, SignalError};
 
 /// Impulses and jumps listed before the rest is only counted.
@@ -33,6 +33,9 @@ pub fn summary(run: &Run, places: Places<'_>, verbose: bool) -> String {
         stats.lcp_solves,
         si::quantity(stats.cpu_seconds, "s", 3),
     ));
+    if verbose && !run.plan.is_empty() {
+        lines.extend(built(stats));
+    }
     lines.extend(run.orbit.as_ref().map(orbit));
     let energy = &run.energy;
     let balance = format!(
@@ -105,6 +108,39 @@ pub fn summary(run: &Run, places: Places<'_>, verbose: bool) -> String {
             .map(|note| format!("note: {note}")),
     );
     lines.join("\n") + "\n"
+}
+
+/// What was needed in all positions of the switches, and what was not and therefore not built.
+fn built(stats: &Stats) -> Vec<String> {
+    let Stats {
+        modes,
+        positions,
+        systems,
+        impulsive,
+        lcp_solves,
+        jumps,
+        ..
+    } = *stats;
+    let built = format!(
+        "built: modes {modes}, positions of the switches {positions}, complementarity systems {systems} (with jump logic {impulsive})"
+    );
+    let mut left = Vec::new();
+    let mut leave = |least: bool, what: String| left.extend(least.then_some(what));
+    leave(
+        systems < positions,
+        format!(
+            "complementarity systems of positions: {}",
+            positions.saturating_sub(systems)
+        ),
+    );
+    leave(lcp_solves == 0, "complementarity solver".into());
+    leave(impulsive == 0, "jump logic".into());
+    leave(
+        impulsive > 0 && jumps == 0,
+        "impulses (none was needed)".into(),
+    );
+    let left = (!left.is_empty()).then(|| format!("left out: {}", left.join(", ")));
+    [built].into_iter().chain(left).collect()
 }
 
 /// An orbit in a line.

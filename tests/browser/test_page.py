@@ -347,7 +347,7 @@ def test_a_million_rows_of_ten_signals_open(tmp_path, show):
     rows = page.evaluate("window.circ.panels.flatMap((p) => p.curves).map((c) => c.y.length)")
     assert all(1000 < some <= 4000 for some in rows)
     first(page)
-    page.locator(".u-over").first.hover()
+    page.locator(".u-over").first.hover(position={"x": 333, "y": 50})
     assert reading(page, "v(in)", "pointer") in ("NaN", None)
     page.keyboard.press("a")
     t = float(cursor(page, "a"))

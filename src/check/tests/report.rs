@@ -22,6 +22,7 @@ fn json_has_the_contracted_keys() {
         "residuals",
         "theorems",
         "stiffness",
+        "conditioning",
     ] {
         assert!(json.get(key).is_some(), "{key}");
     }

@@ -74,6 +74,11 @@ impl Free {
         (map.x.abs() * x.abs() + map.u.abs() * u.abs() + map.one.abs()) * (NOISE * f64::EPSILON)
     }
 
+    /// Whether devices may need an impulse.
+    pub(crate) fn is_impulsive(&self) -> bool {
+        self.jump.is_some()
+    }
+
     /// Whether jumps are projections in the metric of stored energy: where no device can carry an impulse too.
     pub(crate) fn is_projected(&self) -> bool {
         self.jump.as_ref().is_none_or(|jump| jump.monotone)

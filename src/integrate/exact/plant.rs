@@ -1,6 +1,6 @@
 //! The circuit in all positions visited so far.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use super::assembler::{Assembler, Step};
@@ -12,6 +12,7 @@ use super::modes::{Modes, TURNS};
 use super::sources::Sources;
 use crate::integrate::error::Error;
 use crate::integrate::event::Change;
+use crate::integrate::stats::Stats;
 use crate::integrate::switching::Threshold;
 use crate::lcs::Hold;
 use crate::mna::SourceControl;
@@ -33,9 +34,12 @@ pub(crate) struct ModeTable {
     most_of_systems: usize,
     /// Those made last first.
     frees: VecDeque<(Key, Free)>,
-    /// Bytes of their matrices, and factorisations of those given up.
+    /// Bytes of their matrices.
     free_bytes: usize,
+    /// Factorisations of those given up.
     given_up: u64,
+    /// How many were made, and how many of them with jump logic.
+    made: (u64, u64),
     pub(crate) modes: Modes,
     /// By mode: what the log says about a change from there to other modes.
     labels: Vec<Vec<Label>>,
@@ -65,6 +69,7 @@ impl ModeTable {
             frees: VecDeque::new(),
             free_bytes: 0,
             given_up: 0,
+            made: (0, 0),
             modes: Modes::default(),
             labels: Vec::new(),
         }
@@ -114,8 +119,10 @@ impl ModeTable {
                 let sliding = key.sliding_switches();
                 let lcs = self.assembler.assemble(&free, &key.switches, &sliding)?;
                 self.free_bytes += lcs.bytes();
-                self.frees
-                    .push_front((key.clone(), Free::new(lcs, self.tolerance)));
+                let free = Free::new(lcs, self.tolerance);
+                self.made.0 += u64::from(free.lcs.m() > 0);
+                self.made.1 += u64::from(free.is_impulsive());
+                self.frees.push_front((key.clone(), free));
                 while self.free_bytes > self.most_of_systems && self.frees.len() > TURNS {
                     if let Some((_, free)) = self.frees.pop_back() {
                         self.free_bytes -= free.lcs.bytes();
@@ -237,7 +244,22 @@ impl ModeTable {
     }
 
     /// Factorisations spent in complementarity problems.
-    pub(crate) fn factorisations(&self) -> u64 {
+    pub(crate) fn made(&self) -> Stats {
+        let positions = self.modes.index.iter().filter(|(_, mode)| mode.is_some());
+        let positions: BTreeSet<_> = positions
+            .map(|(key, _)| (&key.switches, &key.sliding))
+            .collect();
+        Stats {
+            modes: self.modes.len() as u64,
+            positions: positions.len() as u64,
+            systems: self.made.0,
+            impulsive: self.made.1,
+            factorisations: self.factorisations(),
+            ..Stats::default()
+        }
+    }
+
+    fn factorisations(&self) -> u64 {
         let known = self.frees.iter().map(|(_, f)| f.factorisations());
         self.given_up + known.sum::<u64>()
     }

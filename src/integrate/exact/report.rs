@@ -10,6 +10,7 @@ use crate::integrate::Note;
 use crate::integrate::event::Change;
 use crate::integrate::log::Log;
 use crate::integrate::run::Outcome;
+use crate::integrate::stats::Stats;
 use crate::settings::tolerances::events::WRONG_SIDE;
 use crate::settings::tolerances::exponentials::{LOSS, SLOW_PART};
 use crate::settings::tolerances::jumps::CONSISTENT;
@@ -182,11 +183,12 @@ impl Report {
             notes: std::mem::take(&mut self.notes),
             ..Outcome::default()
         };
-        outcome.stats.events = self.events;
-        outcome.stats.jumps = self.jumps;
-        outcome.stats.modes = table.modes.len() as u64;
-        outcome.stats.lcp_solves = self.lcp_solves;
-        outcome.stats.factorisations = table.factorisations();
+        outcome.stats = Stats {
+            events: self.events,
+            jumps: self.jumps,
+            lcp_solves: self.lcp_solves,
+            ..table.made()
+        };
         outcome
     }
 

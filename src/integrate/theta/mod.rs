@@ -567,6 +567,11 @@ impl Stepper for Theta {
     fn finish(&mut self) -> Outcome {
         self.note_energy();
         self.stats.modes = self.modes.len().max(1) as u64;
+        let systems = self.plant.systems.iter().map(|(_, system)| system);
+        self.stats.positions = systems.len() as u64;
+        let with_pairs = systems.clone().filter(|system| system.lcs.m() > 0);
+        self.stats.systems = with_pairs.count() as u64;
+        self.stats.impulsive = systems.filter(|system| system.jump.is_some()).count() as u64;
         let mut notes = self.notes.clone();
         if !self.not_unique.is_empty() {
             let devices: Vec<String> = self.not_unique.iter().cloned().collect();

@@ -68,7 +68,7 @@ fn is_gate(series: &Series) -> bool {
     let values = || series.points.iter().map(|p| p.1);
     let low = values().fold(f64::INFINITY, f64::min);
     let high = values().fold(f64::NEG_INFINITY, f64::max);
-    if !(high > low) || series.points.len() < FEWEST {
+    if low >= high || series.points.len() < FEWEST {
         return false;
     }
     let (part, near) = (GATE.0 * series.points.len() as f64, GATE.1 * (high - low));
@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn a_gate_has_two_levels_and_a_triangle_has_none() {
-        let gate = |t: f64| (t * 10.0).fract().min(0.5).max(0.499) * 5e3;
+        let gate = |t: f64| (t * 10.0).fract().clamp(0.499, 0.5) * 5e3;
         assert!(is_gate(&series(gate)));
         assert!(!is_gate(&series(|t| (t * 10.0).fract())));
         assert!(!is_gate(&series(|_| 1.0)));

@@ -224,9 +224,10 @@ function chart(root, content, announce) {
     for (const plot of state.plots) {
       const [low, high] = boundsOf(plot.panel);
       plot.batch(() => {
+        // First: it asks for the span that was seen before.
+        plot.redraw(true, true);
         plot.setScale("x", { min: state.view[0], max: state.view[1] });
         plot.setScale("y", { min: low, max: high });
-        plot.redraw(true, true);
       });
     }
     drawStrips();
