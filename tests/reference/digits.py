@@ -24,7 +24,7 @@ ORDERS = 8  # derivatives that decide at rest
 
 
 class Source:
-    """A waveform: corners, and between two of them (t0, value, slope) or ("sin", offset, amplitude, omega, phase)."""
+    """A waveform: corners, and between two of them (t0, value, slope) or ("sin", offset, amplitude, omega, phase, damping)."""
 
     def __init__(self, text):
         match = re.match(r"(pwl|pulse|sin)\s*\((.*)\)", text.strip())
@@ -45,7 +45,7 @@ class Source:
     def piece(self, t):
         if self.kind == "sin":
             offset, amplitude, hertz = self.values[:3]
-            return "sin", offset, amplitude, 2 * arb.pi() * hertz, self.values[5] * arb.pi() / 180
+            return "sin", offset, amplitude, 2 * arb.pi() * hertz, self.values[5] * arb.pi() / 180, self.values[4]
         flat = arb(0)
         if self.kind == "dc":
             return flat, self.values[0], flat
@@ -80,7 +80,7 @@ class Network:
         self.nodes, self.branches, self.devices, self.sources = {"0": 0}, [], [], []
         self.start, self.names, self.rates, self.modes = [], [], [], {}
         inductors, couplings, models = [], [], {}
-        lines = open(path).read().splitlines()[1:]
+        lines = self.lines(path)
         for line in lines:
             if match := re.match(r"\.model (\S+) (\w+)\s*\((.*)\)", line):
                 models[match.group(1)] = match.group(2, 3)
@@ -94,6 +94,10 @@ class Network:
                     self.add(nodes, ("R", shunt), "")
         step, stop = next(line for line in lines if line.startswith(".tran")).split()[1:3]
         self.stop, self.rows = arb(stop), round(float(stop) / float(step))
+
+    def lines(self, path):
+        """The cards."""
+        return open(path).read().splitlines()[1:]
 
     def node(self, name):
         return self.nodes.setdefault(name, len(self.nodes))
@@ -292,8 +296,9 @@ class Run:
         self.sines = [k for k, p in enumerate(pieces) if p[0] == "sin"]
         w = [*self.states, arb(1), arb(0)]
         for k in self.sines:
-            angle = pieces[k][3] * self.t + pieces[k][4]
-            w += [angle.sin(), angle.cos()]
+            omega, phase, damping = pieces[k][3:]
+            angle, size = omega * self.t + phase, (-damping * self.t).exp()
+            w += [size * angle.sin(), size * angle.cos()]
         self.w = arb_mat(len(w), 1, w)
 
     def over_w(self, row):
@@ -320,8 +325,9 @@ class Run:
                     generator[i, j] = x
             generator[self.n + 1, self.n] = 1
             for q, k in enumerate(self.sines):
-                i, omega = self.n + 2 + 2 * q, self.pieces[k][3]
+                i, (omega, _, damping) = self.n + 2 + 2 * q, self.pieces[k][3:]
                 generator[i, i + 1], generator[i + 1, i] = omega, -omega
+                generator[i, i] = generator[i + 1, i + 1] = -damping
             self.systems[self.position] = generator, [arb_mat([self.over_w(g)]) for g in guards]
         return self.systems[self.position]
 
@@ -362,8 +368,12 @@ class Run:
             sys.exit("switches do not settle")
         moved = [k for k, on in enumerate(self.position) if on != before[k]]
         if moved:
-            names = [f"{self.network.devices[k][-1]} {'on' if self.position[k] else 'off'}" for k in moved]
-            print(f"{float(self.t):.17e}: {', '.join(names)}", file=sys.stderr)
+            self.tell(self.t, [(self.network.devices[k][-1], self.position[k]) for k in moved])
+
+    def tell(self, t, changes):
+        """What devices change at t, to which position."""
+        names = [f"{name} {'on' if on else 'off'}" for name, on in changes]
+        print(f"{float(t):.17e}: {', '.join(names)}", file=sys.stderr)
 
     def travel(self, stop):
         while True:
@@ -451,7 +461,7 @@ class Run:
             self.travel(stop)
             self.states, self.t = [self.w[i, 0] for i in range(self.n)], stop
             if is_row:
-                yield float(stop), [float(x) for x in self.states]
+                yield stop, self.states
 
 
 def main():
@@ -463,7 +473,7 @@ def main():
     network = Network(asked.netlist, asked.ideal, asked.shunt)
     print(",".join(["time", *(f'"{name}"' for name in network.names)]))
     for t, states in Run(network).rows():
-        print(",".join(f"{x:.16e}" for x in (t, *states)))
+        print(",".join(f"{float(x):.16e}" for x in (t, *states)))
 
 
 if __name__ == "__main__":
