@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::analysis::variation::Trajectory;
 use crate::integrate::{Change, Error, Reason, Simulation};
 use crate::settings::tolerances::periodic::{
-    DIFFERENCE, LEAST_AMPLITUDE, NEUTRAL, REUSED, STEPPED_DIFFERENCE, TAKES_PART,
+    DIFFERENCE, EVENT_AGAIN, LEAST_AMPLITUDE, NEUTRAL, REUSED, STEPPED_DIFFERENCE, TAKES_PART,
 };
 
 /// Corrections of one attempt.
@@ -223,10 +223,16 @@ impl Shooting<'_> {
         seconds: f64,
     ) -> Result<Option<DMatrix<f64>>, Error> {
         let place = (self.from, &stand.state[..], &stand.switches[..]);
-        let trajectory = Trajectory::of(self.simulation, place, self.from + seconds)?;
+        let mut until = self.from + seconds;
+        if matches!(self.returns, Return::At(..)) {
+            // The event that closes the orbit happens in this run too, an ulp later or not.
+            until += EVENT_AGAIN * until.abs();
+        }
+        let trajectory = Trajectory::of(self.simulation, place, until)?;
         let mut derivative = match self.returns {
             Return::After(_) if !trajectory.closes() => return Ok(None),
             Return::After(_) => trajectory.monodromy(),
+            Return::At(..) if !trajectory.ends_with_event(EVENT_AGAIN) => return Ok(None),
             Return::At(..) => trajectory.return_map()?,
         };
         for (j, mut column) in derivative.column_iter_mut().enumerate() {

@@ -150,6 +150,12 @@ impl Trajectory {
         ends.is_some_and(|(first, last)| first.system == last.system)
     }
 
+    /// Whether it closes with an event no longer than this part of the time before its end: one in its middle is not the one that it returns to.
+    pub(crate) fn ends_with_event(&self, part: f64) -> bool {
+        let last = self.segments.last();
+        self.closes() && last.is_some_and(|last| last.to - last.from <= 2.0 * part * last.to.abs())
+    }
+
     /// The middle of the longest segment, s.
     pub(crate) fn calmest(&self) -> Option<f64> {
         let length = |segment: &&Segment| segment.to - segment.from;

@@ -71,3 +71,7 @@ pub(crate) const NOT_STRAIGHT: f64 = 0.1;
 
 /// How far rows are moved to differentiate what is measured on them, relative to a value. Larger: events pass rows of the grid; smaller: rounding.
 pub(crate) const MEASURE_STEP: f64 = 3e-7;
+
+/// A run that is made again looks for the event that closed it until this part of its time later. Smaller: where rounding puts it an ulp behind the end it is
+/// missed, and the derivative of the return is taken by differences; larger: what follows within that time is taken for the orbit's end.
+pub(crate) const EVENT_AGAIN: f64 = 32.0 * f64::EPSILON;
