@@ -7,7 +7,7 @@ use super::worst::Worst;
 use crate::circuit::{Circuit, Harmonics, Measured, Probe, Tran};
 use crate::integrate::{Block, Error, Grid, Note, Orbit, RowKind, Run, SimOptions};
 use crate::model::Model;
-use crate::settings::tolerances::times::LAST_ROW;
+use crate::settings::tolerances::times::{LAST_ROW, NOTHING, ROWS_APART};
 use crate::waveform::Waveforms;
 
 /// Rows that measurements see at least, besides those at events: a coarser print step is divided for them.
@@ -85,7 +85,8 @@ pub fn transient(model: &Model, options: SimOptions<'_>) -> Finished {
     }
     let measuring = Measuring::of(model.circuit(), options.step.is_some());
     let mut finished = measured(model, options);
-    if let Some((run, _)) = &mut finished.run {
+    if let Some((run, found)) = &mut finished.run {
+        run.notes.extend(measuring.too_coarse(run, found));
         (run.waveforms, run.kinds) = measuring.cut(&run.waveforms, &run.kinds);
     }
     finished
@@ -263,6 +264,58 @@ impl<'a> Measuring<'a> {
             table: None,
             worst: vec![],
         }
+    }
+
+    /// Names the measurements that come out otherwise by more than [`ROWS_APART`] where two of three rows of the grid are left out: not every other one, which
+    /// a clock may hide.
+    fn too_coarse(&self, run: &Run, found: &Measurements) -> Option<Note> {
+        let mut some = Waveforms {
+            names: run.waveforms.names.clone(),
+            units: run.waveforms.units.clone(),
+            ..Waveforms::default()
+        };
+        let (mut k, last) = (0, run.waveforms.time.len());
+        for (at, (t, values, kind)) in Block::of(&run.waveforms, &run.kinds).rows().enumerate() {
+            let is_grid = kind == RowKind::Grid;
+            if !is_grid || k % 3 == 0 || at + 1 == last {
+                some.time.push(t);
+                some.values.extend_from_slice(values);
+            }
+            k += usize::from(is_grid);
+        }
+        // A mean that is zero but for rounding says nothing.
+        let largest = run
+            .waveforms
+            .values
+            .iter()
+            .fold(0.0, |m: f64, v| m.max(v.abs()));
+        let least = NOTHING * largest;
+        let coarse = self.found(&some, (0, 1), 0.0).measured;
+        let off = found
+            .measured
+            .iter()
+            .zip(&coarse)
+            .filter_map(|(fine, coarse)| {
+                let (a, b) = (
+                    fine.result.as_ref().ok()?.value,
+                    coarse.result.as_ref().ok()?.value,
+                );
+                let far = (a - b).abs() > ROWS_APART * a.abs().max(b.abs()).max(least);
+                far.then(|| {
+                    format!(
+                        "{} ({a:.4e}, and {b:.4e} with a third of the rows)",
+                        fine.name
+                    )
+                })
+            });
+        let off: Vec<String> = off.collect();
+        (!off.is_empty()).then(|| {
+            Note::from(format!(
+                "rows may be too far apart for {}: between them curves count as straight lines. A shorter print step, as in `.tran 10n 1m`, or a shorter \
+                 largest step, `.tran 0 1m 0 10n`, tells",
+                off.join(", ")
+            ))
+        })
     }
 
     /// The signals that are shown, at the print steps and between.

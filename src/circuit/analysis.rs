@@ -6,7 +6,7 @@ use super::{Kind, NodeId, SteadyState, Tran};
 use crate::algebra::Value;
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::netlist::ast::{self, Expr, Signal};
-use crate::settings::tolerances::times::SPAN_PARTS;
+use crate::settings::tolerances::times::{MOST_PARTS, SPAN_PARTS};
 
 impl<'n> Builder<'n, '_> {
     /// The transient analysis: the last card, or else the command inside `.control`.
@@ -50,12 +50,15 @@ impl<'n> Builder<'n, '_> {
                     .label("only the first and last point will be written"),
             );
         }
+        let tmax = times.get(3).copied().filter(|t| *t > 0.0);
+        let span = tstop - tstart;
         let tstep = if step > 0.0 {
             step
         } else {
-            (tstop - tstart) / SPAN_PARTS
+            // Who names a largest step alone wants to see what happens within it.
+            let most = tmax.map_or(span, |tmax| tmax.max(span / MOST_PARTS));
+            most.min(span / SPAN_PARTS)
         };
-        let tmax = times.get(3).copied().filter(|t| *t > 0.0);
         Some(Tran {
             tstep,
             prints: step > 0.0,

@@ -23,6 +23,17 @@ pub(crate) const SAME_PERIOD: f64 = 4.0 * f64::EPSILON;
 /// Print steps in a span where nothing says how many. Larger: rows that nobody asked for; smaller: coarse pictures.
 pub(crate) const SPAN_PARTS: f64 = 1000.0;
 
+/// Print steps at most where a largest step says how many, as LTspice's `.tran 0 5m 0 10n` does. Larger: files that nobody can look at; smaller: rows further
+/// apart than was asked for.
+pub(crate) const MOST_PARTS: f64 = 1e5;
+
+/// How much a measurement may change where two of three rows are left out, over its value, before a note says that rows are too far apart. Larger: wrong powers
+/// without a word; smaller: notes where the eye sees nothing.
+pub(crate) const ROWS_APART: f64 = 1e-2;
+
+/// A measurement below this part of the largest value in the rows counts as zero there. Larger: small powers are not looked at; smaller: means of what has none.
+pub(crate) const NOTHING: f64 = 1e-6;
+
 /// An event that a copy of a part has foreseen is looked for until this part of its time after it: the two have gone other steps, and their
 /// roundings differ. Larger: where rounding hides the event the part is seen so much too late; smaller: it is missed.
 pub(crate) const FORESEEN: f64 = 1e-9;
