@@ -33,7 +33,7 @@ pub fn summary(run: &Run, places: Places<'_>, verbose: bool) -> String {
         stats.lcp_solves,
         si::quantity(stats.cpu_seconds, "s", 3),
     ));
-    if verbose && !run.plan.is_empty() {
+    if verbose && stats.modes > 0 {
         lines.extend(built(stats));
     }
     lines.extend(run.orbit.as_ref().map(orbit));

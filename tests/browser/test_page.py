@@ -434,3 +434,35 @@ def test_error_over_time_and_certificates_have_pages(tmp_path, show):
     page = show(tmp_path / "check.html", waits=False)
     page.get_by_role("cell", name="RR-7158 Theorem 2").wait_for()
     assert page.locator(".circuit svg").count() == 1 and "passive" in page.locator("pre").inner_text()
+
+
+def test_names_stand_on_panels_and_keys_work_without_focus(buck, show):
+    page = show(buck / "out.html")
+    names = page.locator(".panel .names")
+    shown = page.evaluate("window.circ.panels.map((p) => p.curves.map((c) => c.name).join(' '))")
+    assert [" ".join(text.split()) for text in names.all_inner_texts()] == shown
+    page.locator(".readings input").last.uncheck()
+    assert names.last.locator("> span:visible").count() == names.last.locator("> span").count() - 1
+    whole = view(page)
+    page.get_by_role("button", name="dark / light").click()
+    page.keyboard.press("+")
+    assert view(page)[1] - view(page)[0] == pytest.approx((whole[1] - whole[0]) / 2)
+    page.keyboard.press("Home")
+    assert view(page) == pytest.approx(whole)
+    page.keyboard.press("a")
+    assert "Cursor A" in page.locator("output.live").inner_text()
+    page.keyboard.press("Escape")
+    assert page.locator("output.live").inner_text() == ""
+
+
+def test_dense_curves_have_no_gaps(tmp_path, show):
+    netlist = tmp_path / "clock.cir"
+    netlist.write_text("clock\nv1 a 0 24\nr1 a b 1\nv2 c 0 pulse(0 5 2.5m 10n 10n 0.5u 1u)\nr2 c b 1k\nc1 b 0 1u ic=0\n.tran 0 5m uic\n.save v(a) v(b)\n.end\n")
+    run("sim", netlist, "-q", "-o", tmp_path / "clock.html")
+    page = show(tmp_path / "clock.html")
+    # Of each pixel of the panel there is a bar for either curve.
+    gaps = page.evaluate("""() => window.circ.state.plots.flatMap((plot) => plot.panel.curves.map((curve) => {
+        const taken = new Set(curve.bars.map(([left]) => left));
+        return curve.bars.length === 0 ? -1 : Math.round(plot.bbox.width) - taken.size;
+    }))""")
+    assert gaps and all(0 <= gap <= 2 for gap in gaps)

@@ -3,8 +3,23 @@
 use super::{Axis, Curve, Page, Panel, axis};
 use crate::report::figure::{self, Figure, Series};
 
-/// Rows of a gate that are at neither level, at most, and how near to one a row is that counts as at it (over what is between the levels).
-const GATE: (f64, f64) = (0.05, 0.02);
+/// The part of the time that a gate is at neither level, at most, and at either, at least; how near to one a value is that counts as at it (over what
+/// is between the levels), and the least that is between them (over the larger).
+const GATE: Gate = Gate {
+    between: 0.05,
+    at_either: 0.01,
+    near: 0.02,
+    apart: 0.1,
+};
+
+/// See [`GATE`].
+struct Gate {
+    between: f64,
+    at_either: f64,
+    near: f64,
+    apart: f64,
+}
+
 /// Rows below which nothing is taken for a gate.
 const FEWEST: usize = 8;
 
@@ -68,13 +83,24 @@ fn is_gate(series: &Series) -> bool {
     let values = || series.points.iter().map(|p| p.1);
     let low = values().fold(f64::INFINITY, f64::min);
     let high = values().fold(f64::NEG_INFINITY, f64::max);
-    if low >= high || series.points.len() < FEWEST {
+    let apart = high - low;
+    if series.points.len() < FEWEST || apart <= GATE.apart * high.abs().max(low.abs()) {
         return false;
     }
-    let (part, near) = (GATE.0 * series.points.len() as f64, GATE.1 * (high - low));
-    let between = values().filter(|v| *v > low + near && *v < high - near);
+    let near = GATE.near * apart;
+    let span = series.points[series.points.len() - 1].0 - series.points[0].0;
+    // At the low level, between, at the high one.
+    let mut times = [0.0; 3];
     // The first rows tell mostly.
-    between.take(part as usize + 1).count() as f64 <= part
+    let stays = series.points.windows(2).all(|pair| {
+        let half = 0.5 * (pair[1].0 - pair[0].0);
+        for (_, v) in pair {
+            let at = usize::from(*v > low + near) + usize::from(*v >= high - near);
+            times[at] += half;
+        }
+        times[1] <= GATE.between * span
+    });
+    stays && times[0].min(times[2]) >= GATE.at_either * span
 }
 
 #[cfg(test)]
@@ -91,10 +117,20 @@ mod tests {
 
     #[test]
     fn a_gate_has_two_levels_and_a_triangle_has_none() {
-        let gate = |t: f64| (t * 10.0).fract().clamp(0.499, 0.5) * 5e3;
+        let gate = |t: f64| ((t * 10.0).fract().clamp(0.499, 0.5) - 0.499) * 5e3;
         assert!(is_gate(&series(gate)));
         assert!(!is_gate(&series(|t| (t * 10.0).fract())));
         assert!(!is_gate(&series(|_| 1.0)));
+        // A supply that sags a little is none; rows at edges take no time.
+        assert!(!is_gate(&series(
+            |t| 24.0 - 0.1 * (t * 10.0).fract().round()
+        )));
+        let mut edges = series(|t| (t * 10.0).fract().round());
+        for k in (1..1000).rev() {
+            let (t, before) = (edges.points[k].0, edges.points[k - 1].1);
+            edges.points.splice(k..k, [(t, before), (t, 0.5)]);
+        }
+        assert!(is_gate(&edges));
     }
 
     #[test]

@@ -58,8 +58,9 @@ function chart(root, content, announce) {
   const namesOf = (all) => [...new Set(all.map((curve) => curve.name))];
   const few = namesOf(curves).length <= COLOURS.light.length;
   const looks = new Map(panels.flatMap((panel) => panel.curves.map((curve) => [curve, namesOf(few ? curves : panel.curves).indexOf(curve.name)])));
-  const colour = (curve) => COLOURS[isDark() ? "dark" : "light"][looks.get(curve) % 8];
+  const colour = (curve, paper = isDark() ? "dark" : "light") => COLOURS[paper][looks.get(curve) % 8];
   const dash = (curve) => DASHES[Math.floor(looks.get(curve) / 8) % 4];
+  const isFirst = document.querySelector(".panels") === null;
   const area = element("div", { class: "panels" });
   const stripCanvas = element("canvas", { class: "strip", role: "img" });
   const readings = readingsTable();
@@ -121,7 +122,6 @@ function chart(root, content, announce) {
   function barsOf(plot, curve, log, pixels) {
     const least = SIZES.line * (devicePixelRatio || 1), all = [];
     bars(curve, state.view, pixels, edgeOf(state.view, pixels), (pixel, low, high) => {
-      if (Number.isNaN(low + high)) return;
       const sizes = log ? [low < 0 && high > 0 ? 0 : low, Math.max(-low, high)].map((y) => Math.max(Math.abs(y), Number.MIN_VALUE)) : [low, high];
       const ends = sizes.map((y) => Math.min(Math.max(plot.valToPos(y, "y", true), plot.bbox.top - 9), plot.bbox.top + plot.bbox.height + 9));
       const [top, bottom] = [Math.min(...ends), Math.max(...ends)];
@@ -155,6 +155,9 @@ function chart(root, content, announce) {
       paths: (plot) => path(plot, curve, panel),
     }));
     const holder = element("div", { class: "panel", tabindex: 0, role: "group", "aria-label": `${panel.quantity}: ${panel.curves.map((c) => c.name).join(", ")}` });
+    // Who is who stands on the panel; the table of readings below tells values.
+    const names = element("p", { class: "names", "aria-hidden": "true" }, ...panel.curves.map((curve) => element("span", {}, element("span", { class: "swatch" }), curve.name)));
+    holder.append(names);
     area.append(holder);
     const options = {
       width: widthOf(),
@@ -186,8 +189,9 @@ function chart(root, content, announce) {
       },
     };
     const plot = new uPlot(options, [whole, ...panel.curves.map(() => [null, null])], holder);
-    plot.panel = panel;
-    bind(plot, holder);
+    Object.assign(plot, { panel, names });
+    bind(plot);
+    holder.addEventListener("keydown", pressed);
     return plot;
   }
 
@@ -222,6 +226,11 @@ function chart(root, content, announce) {
     state.view = [Math.max(from, whole[0]), Math.min(to, whole[1])];
     if (!(state.view[1] > state.view[0])) state.view = whole;
     for (const plot of state.plots) {
+      plot.panel.curves.forEach((curve, k) => {
+        const name = plot.names.children[k];
+        name.hidden = !curve.shown;
+        name.firstChild.style.background = swatch(colour(curve), dash(curve));
+      });
       const [low, high] = boundsOf(plot.panel);
       plot.batch(() => {
         // First: it asks for the span that was seen before.
@@ -300,7 +309,7 @@ function chart(root, content, announce) {
 
   const unitOf = (curve) => panels.find((panel) => panel.curves.includes(curve)).unit;
 
-  function bind(plot, holder) {
+  function bind(plot) {
     let dragged = null;
     const at = (event) => plot.posToVal(event.clientX - plot.over.getBoundingClientRect().left, "x");
     plot.over.addEventListener("wheel", (event) => {
@@ -323,21 +332,27 @@ function chart(root, content, announce) {
       if (dragged && Math.abs(event.clientX - dragged.from) <= SIZES.pixelsToDrag) place(event.shiftKey ? "b" : "a", at(event));
       dragged = null;
     });
-    holder.addEventListener("keydown", (event) => {
-      if (event.ctrlKey || event.metaKey || event.altKey) return;
-      const x = state.pointer ?? centre();
-      const keys = {
-        "+": () => zoom(0.5, x), "=": () => zoom(0.5, x), "-": () => zoom(2, x),
-        ArrowLeft: () => pan(-0.2), ArrowRight: () => pan(0.2), Home: () => show(whole),
-        a: () => place("a", x), b: () => place("b", x),
-        ",": () => step("a", -1), ".": () => step("a", 1), "<": () => step("b", -1), ">": () => step("b", 1),
-        Escape: () => { state.cursors = { a: null, b: null }; retold(); },
-      };
-      if (keys[event.key]) {
-        event.preventDefault();
-        keys[event.key]();
-      }
-    });
+  }
+
+  function pressed(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) return;
+    const x = state.pointer ?? centre();
+    const keys = {
+      "+": () => zoom(0.5, x), "=": () => zoom(0.5, x), "-": () => zoom(2, x),
+      ArrowLeft: () => pan(-0.2), ArrowRight: () => pan(0.2), Home: () => show(whole),
+      a: () => place("a", x), b: () => place("b", x),
+      ",": () => step("a", -1), ".": () => step("a", 1), "<": () => step("b", -1), ">": () => step("b", 1),
+      Escape: () => { state.cursors = { a: null, b: null }; retold(); announce(""); },
+    };
+    if (keys[event.key]) {
+      event.preventDefault();
+      keys[event.key]();
+    }
+  }
+
+  /** Keys that are pressed where nothing else takes them are those of the page's first chart. */
+  function pressedOnPage(event) {
+    if (isFirst && !event.target.closest?.("input:not([type=checkbox]), textarea, select, [contenteditable], .panel")) pressed(event);
   }
 
   function point(plot) {
@@ -536,6 +551,7 @@ function chart(root, content, announce) {
   build();
   readings.update();
   resized.observe(root);
+  document.addEventListener("keydown", pressedOnPage);
   const paper = matchMedia("(prefers-color-scheme: dark)");
   const repaint = () => { show(state.view); readings.update(); };
   paper.addEventListener("change", repaint);
@@ -543,7 +559,7 @@ function chart(root, content, announce) {
     state, panels, strips, show, complete, keep, restore, zoom, pan, place, logarithmic, logarithmicAcross, colour, dash, boundsOf, edgeOf, axis,
     full: () => show(whole),
     repaint,
-    remove: () => { resized.disconnect(); paper.removeEventListener("change", repaint); state.plots.forEach((plot) => plot.destroy()); root.replaceChildren(); },
+    remove: () => { resized.disconnect(); document.removeEventListener("keydown", pressedOnPage); paper.removeEventListener("change", repaint); state.plots.forEach((plot) => plot.destroy()); root.replaceChildren(); },
   };
 }
 

@@ -108,16 +108,23 @@ function isDense(curve, view, pixels) {
   return end - a > 4 * pixels;
 }
 
-/** Hands on the lowest and highest value of each pixel that has rows, with those that lead to it from the pixel before. */
+/** Hands on the lowest and highest value of each pixel: of its rows, and of the lines that lead to it and on from it. */
 function bars(curve, view, pixels, edge, bar) {
   const { x, y } = curve;
   let [a, end] = rowsIn(curve, view), before = NaN;
   for (let pixel = 0; pixel < pixels && a < end; pixel++) {
-    const b = pixel + 1 === pixels ? end : Math.min(rowAt(x, edge(pixel), a), end);
-    if (b === a) continue;
-    const [low, high] = extremes(curve, a, b);
-    bar(pixel, before < low ? before : low, before > high ? before : high);
-    before = y[b - 1];
+    const right = edge(pixel);
+    const b = pixel + 1 === pixels ? end : Math.min(rowAt(x, right, a), end);
+    let [low, high] = extremes(curve, a, b);
+    // Where the line to the next row leaves the pixel.
+    const part = b > 0 && b < end ? (right - x[b - 1]) / (x[b] - x[b - 1]) : NaN;
+    const after = part >= 0 && part <= 1 ? y[b - 1] + part * (y[b] - y[b - 1]) : NaN;
+    for (const y of [before, after]) {
+      if (y < low) low = y;
+      if (y > high) high = y;
+    }
+    if (low <= high) bar(pixel, low, high);
+    before = b > a && Number.isNaN(after) ? y[b - 1] : after;
     a = b;
   }
 }

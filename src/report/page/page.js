@@ -70,8 +70,8 @@ function drawing(shown, title) {
         if (Number.isNaN(y)) pen = "M";
         else { path += `${pen}${across(x).toFixed(2)} ${up(y).toFixed(2)}`; pen = "L"; }
       });
-      parts.push(`<path clip-path="url(#p${k})" d="${path}" fill="none" stroke="${shown.colour(curve)}" stroke-width="1.5" stroke-dasharray="${shown.dash(curve).join(" ")}"/>`);
-      parts.push(`<text x="${column}" y="${base - 6}" fill="${shown.colour(curve)}">${clean(curve.name)}</text>`);
+      parts.push(`<path clip-path="url(#p${k})" d="${path}" fill="none" stroke="${shown.colour(curve, "light")}" stroke-width="1.5" stroke-dasharray="${shown.dash(curve).join(" ")}"/>`);
+      parts.push(`<text x="${column}" y="${base - 6}" fill="${shown.colour(curve, "light")}">${clean(curve.name)}</text>`);
       column += 8 * curve.name.length + 14;
     }
     parts.push(`<clipPath id="p${k}"><rect x="${left}" y="${base}" width="${width - left - right}" height="${room}"/></clipPath>`);
@@ -191,7 +191,7 @@ function circPage(root, data) {
     area.addEventListener("view", () => { if (spectrum && !spectrumArea.hidden) transformed(); });
     root.append(element("details", {}, element("summary", {}, "Keys and mouse"), element("p", {},
       "Drag: zoom to a span. Wheel: zoom at the pointer; with shift, move. Shift and drag: move. Double click or Home: all. Click: cursor A; shift and click: cursor B. " +
-      "With a panel in focus: + − ← → Home; a, b place a cursor at the pointer (without one, in the middle); , . move A and < > move B by a row; Escape takes cursors away.")));
+      "Keys: + − ← → Home; a, b place a cursor at the pointer (without one, in the middle); , . move A and < > move B by a row; Escape takes cursors away.")));
   }
   if (data.circuit) root.append(circuitOf(data.circuit, shown, area));
   for (const table of data.tables ?? []) if (table.rows.length > 0) root.append(wordTable(table));
