@@ -222,3 +222,117 @@ fn ideal_diodes_stand_for_missing_models() {
         "{told:?}"
     );
 }
+
+/// What LTspice's `.tran 0 Tstop 0 dTmax` asks for: rows as close as that.
+#[test]
+fn a_largest_step_alone_says_how_far_rows_are_apart() {
+    let tran = |card: &str| {
+        let model = model(&format!("v1 a 0 1\nr1 a 0 1\n{card}")).expect("a circuit");
+        let tran = model.circuit().tran.expect("a transient");
+        (tran.tstep, tran.prints)
+    };
+    assert_eq!(tran(".tran 5m"), (5e-6, false));
+    assert_eq!(tran(".tran 0 5m 0 1u"), (1e-6, false));
+    assert_eq!(tran(".tran 0 5m 0 1m"), (5e-6, false));
+    assert_eq!(tran(".tran 0 5m 0 1p"), (5e-8, false));
+    assert_eq!(tran(".tran 10u 5m 0 1u"), (1e-5, true));
+}
+
+const BUCK: &str = "v1 vin 0 48 rser=20m\nv2 gate 0 pulse(0 10 0 10n 10n 2.5u 10u)\ns1 vin sw gate 0 mysw\nd1 0 sw myd\nl1 sw out 33u rser=25m ic=0\n\
+                    c1 out 0 220u rser=12m ic=0\nc2 vin 0 10u rser=5m\nrload out 0 2.4\n.model mysw sw(ron=15m roff=10meg vt=5 vh=0)\n\
+                    .model myd d(ron=20m roff=10meg vfwd=0.5)\n.meas tran pin avg -v(vin)*i(v1) from 4m to 5m\n";
+
+/// An edge that is due at a row may stand an ulp before it.
+#[test]
+fn times_of_rows_never_go_back() {
+    for tran in [".tran 0 5m 0 1u uic", ".tran 0 5m uic", ".tran 2u 5m uic"] {
+        for events in [false, true] {
+            let model = model(&format!("{BUCK}{tran}")).expect("a circuit");
+            let options = SimOptions {
+                events,
+                ..SimOptions::default()
+            };
+            let run = model.transient(options).expect("a run");
+            let times = &run.waveforms.time;
+            assert!(times.windows(2).all(|pair| pair[0] <= pair[1]), "{tran}");
+            assert!(run.kinds.is_empty() || run.kinds.len() == times.len());
+        }
+    }
+}
+
+/// The input current flows within 0.25 µs after each edge; rows 2.5 µs apart make 67 W of 57.
+#[test]
+fn measurements_on_rows_too_far_apart_say_so() {
+    let of = |tran: &str| {
+        let model = model(&format!("{BUCK}{tran}")).expect("a circuit");
+        let (run, found) = circ::analysis::transient(&model, SimOptions::default())
+            .run
+            .expect("a run");
+        let told = run
+            .notes
+            .iter()
+            .any(|note| note.text.contains("too far apart for pin"));
+        (
+            found.measured[0].result.as_ref().expect("a value").value,
+            told,
+        )
+    };
+    let (fine, told) = of(".tran 20n 5m 0 20n uic");
+    assert!(!told);
+    let (coarse, told) = of(".tran 5m uic");
+    assert!(told && (coarse / fine - 1.0).abs() > 0.1, "{coarse} {fine}");
+    // Where nothing is between rows nothing is said.
+    let plain =
+        ".meas tran top max v(a)\n.meas tran mean avg v(a)\nv1 a 0 sin(0 1 1k)\nr1 a 0 1\n.tran 1m";
+    let (run, _) =
+        circ::analysis::transient(&model(plain).expect("a circuit"), SimOptions::default())
+            .run
+            .expect("a run");
+    assert!(run.notes.is_empty(), "{:?}", run.notes);
+}
+
+/// Parts that nobody wrote are not among the signals that are shown without being asked for.
+#[test]
+fn parasitic_parts_are_shown_where_they_are_asked_for() {
+    let names = |more: &str| {
+        let model = model(&format!("{BUCK}.tran 10u 100u uic\n{more}")).expect("a circuit");
+        model
+            .transient(SimOptions::default())
+            .expect("a run")
+            .waveforms
+            .names
+    };
+    assert_eq!(
+        names(""),
+        [
+            "v(vin)", "v(gate)", "v(sw)", "v(out)", "i(v1)", "i(v2)", "i(l1)"
+        ]
+    );
+    assert_eq!(names(".save v(l1.rser)"), ["v(l1.rser)"]);
+}
+
+#[test]
+fn a_slip_in_the_name_of_a_parameter_is_a_warning() {
+    let diode = |model: &str| {
+        said(&format!(
+            "v1 a 0 1\nd1 a b m\nd2 a b m\nr1 b 0 1\n.tran 1u 1m\n.model m {model}"
+        ))
+    };
+    let slip = [("unknown-parameter", Severity::Warning)];
+    assert_eq!(diode("d(ron=20m roff=1meg vfdw=0.45)"), slip);
+    assert_eq!(diode("d(ron=20m rof=1meg)"), slip);
+    assert_eq!(
+        diode("d(ron=20m vfwd=0.4 mfg=maker type=si vpk=100 iave=1 ilimit=3)")
+            .iter()
+            .filter(|f| f.0 == slip[0].0)
+            .count(),
+        0
+    );
+    let switch = |model: &str| {
+        said(&format!(
+            "v1 a 0 1\ns1 a b a 0 m\nr1 b 0 1\n.tran 1u 1m\n.model m {model}"
+        ))
+    };
+    assert_eq!(switch("sw(ron=1 vonn=0.5 vt=0.5)"), slip);
+    assert_eq!(switch("sw(ron=1 vt=0.5 vh=0.1)"), []);
+}

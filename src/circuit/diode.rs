@@ -12,6 +12,19 @@ use crate::law::{Corner, Curve, Law, Rounded, Side};
 use crate::netlist::ast::{self, Assign, Expr, Name};
 use crate::settings::tolerances::netlists::IDEAL_EMISSION;
 
+/// What an ideal diode of LTspice's is made of.
+const PIECEWISE: [&str; 9] = [
+    "ron",
+    "roff",
+    "vfwd",
+    "vrev",
+    "rrev",
+    "ilimit",
+    "revilimit",
+    "epsilon",
+    "revepsilon",
+];
+
 impl<'n> Builder<'n, '_> {
     pub(super) fn diode(
         &mut self,
@@ -51,7 +64,9 @@ impl<'n> Builder<'n, '_> {
                     return None;
                 }
                 let factor = self.factor(area.or(args.get(&["area"])), args, scope)?;
-                self.diode_law(card, name, &Parameters::new(&chain), args, scope)
+                let params = Parameters::new(&chain);
+                self.misspelt(name, &params, &PIECEWISE);
+                self.diode_law(card, name, &params, args, scope)
                     .map(|law| scaled(law, factor))
             })
         };

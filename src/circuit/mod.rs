@@ -380,11 +380,13 @@ impl Circuit {
         }
         let shown = |e: &Element| matches!(e.kind, Kind::VoltageSource(_) | Kind::Inductor(_));
         let all = self.all_voltages().chain(self.currents_of(shown));
-        all.filter(|probe| match probe.what {
-            Probed::Voltage(node, _) => !is_inside(&self.nodes[node.index()]),
-            Probed::Current(id) => !is_inside(&self.elements[id.index()].name),
-        })
-        .collect()
+        let name = |probe: &Probe| match probe.what {
+            Probed::Voltage(node, _) => self.nodes[node.index()].as_str(),
+            Probed::Current(id) => self.elements[id.index()].name.as_str(),
+        };
+        // What nobody wrote is shown where it is asked for.
+        all.filter(|probe| !is_inside(name(probe)) && !is_parasitic(name(probe)))
+            .collect()
     }
 
     /// The voltages of all nodes but ground.
@@ -415,4 +417,10 @@ fn is_inside(name: &str) -> bool {
     let mut parts = name.split('.');
     parts.next_back();
     parts.any(|part| part.starts_with('a'))
+}
+
+/// Whether it is a parasitic part of an element, `c1.rser`, or the node before it.
+fn is_parasitic(name: &str) -> bool {
+    name.rsplit_once('.')
+        .is_some_and(|(_, part)| passive::PARASITICS.contains(&part))
 }

@@ -6,11 +6,18 @@ use crate::algebra::Value;
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{self, Assign, Expr, ExprKind, Model, Name};
 use crate::netlist::card::describe;
+use crate::netlist::suggest::nearest;
 
 /// Zero, exactly.
 pub(super) const ZERO: Value = Value::decimal(0.0, 0, 0);
 /// One, exactly.
 pub(super) const ONE: Value = Value::decimal(1.0, 1, 0);
+
+/// Parameters of diodes and switches in SPICE's dialects that may look like others.
+const OF_MODELS: [&str; 18] = [
+    "ibv", "nbv", "isr", "ikr", "ikf", "rth0", "trs1", "trs2", "tbv1", "tbv2", "vser", "lser",
+    "vpk", "ipk", "irms", "iave", "ideal", "cjo",
+];
 
 /// What levels are called, by the letter of their elements.
 const LEVELS: [(char, f64, &str); 8] = [
@@ -147,6 +154,32 @@ impl<'n> Builder<'n, '_> {
             .any(|(known, _)| *known == what)
         {
             self.unused_parameters.push((what, name.span));
+        }
+    }
+
+    /// Warns of a parameter that is nearly the name of one that `counts`: it would be read as if it were not there. Names of two letters are near to
+    /// too many.
+    pub(super) fn misspelt(&mut self, model: &Name, params: &Parameters<'n>, counts: &[&str]) {
+        for Assign { name, .. } in &params.0 {
+            let text = name.text.as_str();
+            if text.len() < 3 || counts.contains(&text) || OF_MODELS.contains(&text) {
+                continue;
+            }
+            let told = format!("{} {text}", model.text);
+            let Some(near) = nearest(text, counts.iter().copied()) else {
+                continue;
+            };
+            if self.told_models.contains(&told) {
+                continue;
+            }
+            self.told_models.push(told);
+            let message = format!("model `{}` has no parameter `{text}`", model.text);
+            let fault = Diagnostic::warning("unknown-parameter", name.span, message);
+            self.tell(
+                fault
+                    .label("without effect")
+                    .help(format!("did you mean `{near}`?")),
+            );
         }
     }
 

@@ -39,6 +39,9 @@ const WITHOUT_EFFECT: [&str; 27] = [
     "rating",
 ];
 
+/// Parts that LTspice adds to an element: in series and across.
+pub(super) const PARASITICS: [&str; 5] = ["rser", "lser", "rpar", "cpar", "rlshunt"];
+
 /// The arguments of a card.
 #[derive(Clone, Copy)]
 pub(super) struct Args<'n>(pub(super) &'n [Assign]);
@@ -104,10 +107,9 @@ impl<'n> Builder<'n, '_> {
             return;
         }
         let own = letter.to_string();
-        let parasitics = ["rser", "lser", "rpar", "cpar", "rlshunt"];
         let mut known = vec![own.as_str(), "value", "m", "scale", "ic"];
         if letter != 'r' {
-            known.extend(parasitics);
+            known.extend(PARASITICS);
         }
         self.check_args(card, args, &known);
         let args = Args(args);
@@ -276,7 +278,7 @@ impl<'n> Builder<'n, '_> {
         let (p, n, span) = (element.p, element.n, element.span);
         let base = element.name.clone();
         let mut parts: Vec<(&str, Value)> = Vec::new();
-        for part in ["rser", "lser", "rpar", "cpar", "rlshunt"] {
+        for part in PARASITICS {
             match self.arg(args, &[part], scope) {
                 Some(Some(value)) if value.f64 != 0.0 => parts.push((part, value)),
                 Some(_) => {}

@@ -122,6 +122,10 @@ impl<'n> Builder<'n, '_> {
             return None;
         }
         let params = Parameters::new(&chain);
+        let counts = [
+            "ron", "roff", "vt", "vh", "von", "voff", "it", "ih", "ion", "ioff",
+        ];
+        self.misspelt(name, &params, &counts);
         for ignored in ["lser", "vser", "ilimit"] {
             if params.get(ignored).is_some() {
                 self.unused(format!("{ignored} of {}", name.text), name);

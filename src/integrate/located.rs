@@ -108,6 +108,16 @@ fn told(error: &Error, elements: &[&Element]) -> Told {
             "too-many-steps",
             Some("a shorter `.tran`, a larger `--tol` or a larger `--step` needs fewer".into()),
         ),
+        // A controller that regulates has no state of rest; nothing is wrong with it.
+        Reason::SwitchesDoNotSettle if error.t.is_none() => Told {
+            code: "switches-do-not-settle",
+            message: format!("there is no operating point: in no position of {names} do the controls leave the switches where they are at rest"),
+            label: "every position asks for another one".into(),
+            help: Some(format!(
+                "{UIC} (`ic=` of capacitors and inductors, else 0), as a controller that regulates by switching needs; a switch that takes away its own \
+                 control at once needs hysteresis too (`Vh` in the model)"
+            )),
+        },
         Reason::SwitchesDoNotSettle => Told {
             code: "switches-do-not-settle",
             message: format!("in no position of {names} do the controls leave the switches where they are"),

@@ -289,8 +289,8 @@ impl Reader<'_> {
             Dot::Options(temperature, others) => {
                 match &temperature {
                     Some(_) if others => self.skip_as(".options but for temp", line),
-                    Some(_) => {}
-                    None => self.skip(line),
+                    None if others => self.skip(line),
+                    _ => {}
                 }
                 if let Some(temperature) = temperature {
                     self.push(Statement::Temperature(temperature));

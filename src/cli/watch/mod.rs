@@ -6,6 +6,7 @@
 mod job;
 mod server;
 
+use std::ffi::OsString;
 use std::thread;
 use std::time::Duration;
 
@@ -24,13 +25,23 @@ const LOOK: Duration = Duration::from_millis(100);
 /// # Errors
 /// See [`Failure`].
 pub(super) fn watch(args: &WatchArgs, streams: &Streams) -> Result<Exit, Failure> {
-    let job = Job::of(&args.command)?;
+    // As one types it: `circ watch FILE --no-open`.
+    let is_ours = |word: &&OsString| word.as_os_str() == "--no-open";
+    let no_open = args.no_open || args.command.iter().any(|word| is_ours(&word));
+    let command: Vec<OsString> = args
+        .command
+        .iter()
+        .filter(|word| !is_ours(word))
+        .cloned()
+        .collect();
+    let job = Job::of(&command)?;
     let server = Server::start(args.port)?;
     let signals = Signals::watch()?;
     streams.data(format!("{}\n", server.address()))?;
-    if !args.no_open && open::that_detached(server.address()).is_err() {
+    if !no_open && open::that_detached(server.address()).is_err() {
         streams.note("no browser could be opened; the page is at the address above");
     }
+    let mut latest = None;
     loop {
         let files = job.files();
         let before = stamp(&files);
@@ -42,7 +53,9 @@ pub(super) fn watch(args: &WatchArgs, streams: &Streams) -> Result<Exit, Failure
                 messages,
             } => {
                 streams.say(&messages);
-                server.publish(page, (well, &messages));
+                // Where there is none the one before stays, below what was said.
+                latest = page.or(latest);
+                server.publish(latest.clone(), (well, &messages));
                 while !is_over() {
                     thread::sleep(LOOK);
                 }

@@ -109,8 +109,8 @@ pub(super) const CODES: [Explanation; 19] = [
     Explanation::of(
         "switches-do-not-settle",
         "Every position of the switches asks for another one.",
-        "A switch that takes away its own control, without hysteresis.",
-        "Hysteresis (`Vh` in the model), or a resistor and a capacitor in front of the control.",
+        "A controller that regulates by switching has no operating point from which to start; or a switch takes away its own control, without hysteresis.",
+        "`uic` on `.tran` starts from initial values; hysteresis (`Vh` in the model), or a resistor and a capacitor in front of the control, lets a switch settle.",
     )
     .shown("takes away its control\nv1 in 0 1\ns1 in out 0 out sm\nr1 out 0 1k\n.model sm sw(vt=-0.5)\n.tran 1u 1m\n"),
     Explanation::of(

@@ -350,6 +350,18 @@ fn temperature(i: Input<'_>) -> Parsed<'_, Dot> {
     Ok((at, statement.map_or(Dot::Nothing, Dot::statement)))
 }
 
+/// Options of LTspice's that say how its files and pictures look; nearly every netlist of its has the first.
+const OF_FILES: [&str; 8] = [
+    "plotwinsize",
+    "numdgt",
+    "measdgt",
+    "nomarch",
+    "plotreltol",
+    "plotvntol",
+    "plotabstol",
+    "fastaccess",
+];
+
 /// The temperature among options, which are names with and without values.
 fn options(i: Input<'_>) -> Dot {
     let (mut temperature, mut others) = (None, false);
@@ -368,7 +380,7 @@ fn options(i: Input<'_>) -> Dot {
         };
         match value {
             Some(value) if name.text == "temp" => temperature = Some(value),
-            _ => others = true,
+            _ => others |= !OF_FILES.contains(&name.text.as_str()),
         }
     }
     Dot::Options(temperature, others || !at_end(at))
