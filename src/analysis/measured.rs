@@ -342,7 +342,14 @@ impl<'a> Measuring<'a> {
                 time = shown.map(|k| grid.time(k));
                 next += 1;
             }
-            if let Some(time) = time {
+            if let Some(mut time) = time {
+                // The two grids put one instant an ulp apart; rows at events there stand with the row that is shown.
+                if kind == RowKind::Grid {
+                    let later = kept.time.iter_mut().rev().take_while(|late| **late > time);
+                    later.for_each(|late| *late = time);
+                } else {
+                    time = kept.time.last().map_or(time, |last| time.max(*last));
+                }
                 kept.time.push(time);
                 kept.values.extend_from_slice(&values[..self.shown]);
                 kept_kinds.push(kind);

@@ -231,8 +231,6 @@ impl<'a> Sheet<'a> {
 
     fn insert(&mut self, t: f64, row: &[f64], kind: RowKind) {
         let at = self.time.len();
-        // An edge that is due at a row may stand an ulp before it.
-        let t = self.time.last().map_or(t, |last| t.max(*last));
         if kind == RowKind::Corner && self.time.last() == Some(&t) {
             return;
         }
@@ -262,13 +260,7 @@ impl<'a> Sheet<'a> {
         }
         let (which, rows) = self.unknown(times, which, rows);
         self.take_held(times.at(which.start));
-        let begin = times.at(which.start);
-        // Or an ulp behind.
-        let later = self.kinds.iter().zip(&self.time).rev();
-        let later = later.take_while(|(kind, t)| **kind != RowKind::Grid && **t > begin);
-        let later = self.time.len() - later.count();
-        self.time[later..].fill(begin);
-        if self.ends_between() && self.time.last() == Some(&begin) {
+        if self.ends_between() && self.time.last() == Some(&times.at(which.start)) {
             self.pop();
         }
         self.time.extend(which.map(|k| times.at(k)));
