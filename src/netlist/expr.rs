@@ -9,7 +9,7 @@ use super::lex::{
     Fault, Input, Line, Parsed, State, ahead, at_end, between, blank, ends_word, input, missing,
     next_word, refuse, symbol,
 };
-use super::operand::{bad_number, braced, quoted};
+use super::operand::{bad_number, braced, quoted, warn_of_unit};
 use super::value;
 use crate::diagnostic::{Diagnostic, FileId};
 
@@ -221,6 +221,7 @@ fn number(start: Input<'_>) -> Parsed<'_, Expr> {
     match value::prefix(start.fragment()) {
         Ok((value, length)) => {
             let rest = start.take_from(length);
+            warn_of_unit(start, &start.fragment()[..length]);
             Ok((
                 rest,
                 Expr {

@@ -262,9 +262,12 @@ pub(super) fn mismatch<'a, T>() -> Parsed<'a, T> {
     Err(NomErr::Error(Fault::Mismatch))
 }
 
-/// Keeps a finding that does not stop the card.
+/// Keeps a finding that does not stop the card, once where a text is read in several ways.
 pub(super) fn tell(i: Input<'_>, diagnostic: Diagnostic) {
-    i.extra.state.findings.borrow_mut().push(diagnostic);
+    let mut findings = i.extra.state.findings.borrow_mut();
+    if !findings.contains(&diagnostic) {
+        findings.push(diagnostic);
+    }
 }
 
 /// The text from one input to a later one.

@@ -5,8 +5,8 @@ use nom::Input as _;
 use super::ast::{Expr, ExprKind, Unary};
 use super::expr::expr;
 use super::lex::{
-    Fault, Input, Parsed, ahead, at_end, between, blank, mismatch, next_word, refuse, symbol, word,
-    written,
+    Fault, Input, Parsed, ahead, at_end, between, blank, mismatch, next_word, refuse, symbol, tell,
+    word, written,
 };
 use super::value;
 use crate::diagnostic::Diagnostic;
@@ -102,13 +102,16 @@ pub(super) fn item(i: Input<'_>) -> Parsed<'_, Expr> {
         ));
     }
     match value::parse(text) {
-        Ok(value) => Ok((
-            rest,
-            Expr {
-                kind: ExprKind::Number(value),
-                span: name.span,
-            },
-        )),
+        Ok(value) => {
+            warn_of_unit(start, text);
+            Ok((
+                rest,
+                Expr {
+                    kind: ExprKind::Number(value),
+                    span: name.span,
+                },
+            ))
+        }
         // `-name`: a negated parameter.
         Err(value::NumberError::NoDigits)
             if text.len() > 1 && text[1..].starts_with(char::is_alphabetic) =>
@@ -172,6 +175,23 @@ pub(super) fn quoted(i: Input<'_>) -> Parsed<'_, Expr> {
             span: between(start, rest),
         },
     ))
+}
+
+/// Letters behind a number that are no unit change nothing: `22O` is 22.
+pub(super) fn warn_of_unit(start: Input<'_>, written: &str) {
+    let Some(letters) = value::no_unit(written) else {
+        return;
+    };
+    let counts = &written[..written.len() - letters.len()];
+    let span = ahead(start, written.len());
+    let message = format!("`{written}` is read as {counts}: `{letters}` is no unit");
+    let zero = format!("write `{counts}`, or `{counts}0` if the letter is a zero");
+    let help = match letters {
+        "o" | "O" => zero,
+        _ => format!("write `{counts}`, or a suffix (t g meg k m u n p f) and a unit"),
+    };
+    let warning = Diagnostic::warning("no-unit", span, message);
+    tell(start, warning.label("SPICE passes over it").help(help));
 }
 
 pub(super) fn bad_number(start: Input<'_>, written: &str, error: value::NumberError) -> Diagnostic {

@@ -20,8 +20,11 @@ pub(crate) fn nearest<'a>(
 /// Whether a word is a unit, with or without a prefix: `ohm`, `kohm`, `uF`, `Meg`.
 pub(crate) fn is_unit(word: &str) -> bool {
     const PREFIXES: [&str; 11] = ["", "t", "g", "meg", "k", "m", "u", "µ", "n", "p", "f"];
-    const UNITS: [&str; 14] = [
-        "", "ohm", "ohms", "Ω", "f", "farad", "h", "henry", "v", "volt", "a", "s", "hz", "w",
+    const UNITS: [&str; 40] = [
+        "", "ohm", "ohms", "Ω", "r", "f", "farad", "farads", "fd", "h", "henry", "henries",
+        "henrys", "hy", "v", "volt", "volts", "vdc", "vac", "vp", "vpk", "vpp", "vrms", "a", "amp",
+        "amps", "ampere", "amperes", "adc", "aac", "s", "sec", "second", "seconds", "hz", "hertz",
+        "w", "watts", "deg", "°c",
     ];
     let word = word.to_lowercase().replace('ω', "Ω");
     let rest = |prefix: &&str| word.strip_prefix(*prefix).filter(|_| !word.is_empty());

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::suggest::is_unit;
 use crate::algebra::Value;
 
 /// Why a text is not a number.
@@ -164,6 +165,15 @@ fn decimal(
 /// Units that may follow the digits of `4k7ohm`.
 const UNITS: [&str; 10] = ["", "ohm", "ohms", "ω", "f", "h", "v", "a", "s", "hz"];
 
+/// The letters behind a number that are no unit: the `O` of `22O`, the `u` of `33uu`.
+pub(super) fn no_unit(text: &str) -> Option<&str> {
+    let ending = text.trim_start_matches(|c: char| !c.is_alphabetic() && c != '°');
+    let (_, length) = suffix(ending);
+    let unit = &ending[length..];
+    let is_odd = !unit.is_empty() && letters(ending) == ending.len() && !is_unit(ending);
+    is_odd.then_some(unit)
+}
+
 /// The factor, power of ten and length of a suffix; `r` (as in `4r7`) counts as a decimal point before digits.
 fn suffix(text: &str) -> (Option<(i128, i64)>, usize) {
     let lower = |n: usize| text.get(..n).map(str::to_ascii_lowercase);
@@ -214,6 +224,16 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    #[test]
+    fn letters_that_are_no_unit() {
+        let odd = ["22O", "33uu", "33x", "1pk", "-4.7kk"].map(|text| no_unit(text));
+        assert_eq!(odd, [Some("O"), Some("u"), Some("x"), Some("k"), Some("k")]);
+        let usual = "4.7 10k 4k7 4k7ohm 10uF 1fF 5F 5H 3mH 1Meg 1MegOhm 5Vdc 10R 5amps 5A 1mil 25°C 50Hz 1ms 10Ω 1e3 1e-6s";
+        for text in usual.split(' ') {
+            assert_eq!(no_unit(text), None, "{text}");
+        }
+    }
 
     #[test]
     fn suffixes_and_units() {

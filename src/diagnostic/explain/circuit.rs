@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 16] = [
+pub(super) const CODES: [Explanation; 17] = [
     Explanation::of(
         "capacitor-loop",
         "Capacitors and voltage sources form a loop: their voltages are not independent of each other.",
@@ -50,6 +50,13 @@ pub(super) const CODES: [Explanation; 16] = [
         "Nothing for a circuit that is meant to be isolated; else connect it to node 0, or by a large resistor.",
     )
     .shown_by("check", "isolated\nv1 a 0 sin(0 1 50)\nl1 a 0 1m\nl2 b c 1m\nr1 b c 1\nk1 l1 l2 0.9\n.tran 1m 40m\n"),
+    Explanation::of(
+        "never-switches",
+        "The sources that control a switch never pass its threshold.",
+        "A gate of 0 to 5 V with a threshold of 10, or volts in one place and percents in the other.",
+        "Change the levels of the source, or `Vt`, `Von` or `Vto` in the model of the switch.",
+    )
+    .shown("a gate that is too low\nv1 in 0 1\nvc c 0 pulse(0 5 0 0 0 1m 2m)\ns1 in out c 0 sm\nr1 out 0 1k\n.model sm sw(ron=1 vt=10)\n.tran 1m 4m\n"),
     Explanation::of(
         "no-analysis",
         "The netlist does not say what to simulate.",

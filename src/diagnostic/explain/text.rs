@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 33] = [
+pub(super) const CODES: [Explanation; 35] = [
     Explanation::of(
         "bad-card",
         "A line is neither an element nor a directive.",
@@ -113,6 +113,13 @@ pub(super) const CODES: [Explanation; 33] = [
         "Look for the cards `.lib NAME` in the file; without a section, the whole file is read.",
     ),
     Explanation::of(
+        "no-unit",
+        "Letters behind a number are neither a suffix nor a unit.",
+        "A slip: the letter O in place of a zero, a suffix typed twice. SPICE passes over such letters, so that `22O` is 22.",
+        "Write the number that is meant, a suffix (t g meg k m u n p f) and a unit, or none.",
+    )
+    .shown("a letter for a zero\nv1 a 0 1\nr1 a 0 22O\n.tran 1m 5m\n"),
+    Explanation::of(
         "not-a-netlist",
         "The file is of another kind: a schematic, a board, a page.",
         "The schematic was given in place of the netlist that is exported from it.",
@@ -126,6 +133,13 @@ pub(super) const CODES: [Explanation; 33] = [
         "Nothing if it is meant; use the name that the note gives in probes.",
     )
     .shown("Version 4\nSHEET 1 880 680\nWIRE 0 16 96 16\nFLAG 0 16 a\nFLAG 96 16 b\nFLAG 0 96 0\nSYMBOL voltage 0 0 R0\nSYMATTR InstName V1\nSYMATTR Value 1\nTEXT 0 200 Left 2 !.tran 1m 5m\n"),
+    Explanation::of(
+        "open-pin",
+        "A pin of a part on a schematic touches no wire, label or other pin.",
+        "A wire that ends beside the pin; a part that was moved without its wires.",
+        "Draw the wire to the pin; an open end that is meant does no harm.",
+    )
+    .shown("Version 4\nSHEET 1 880 680\nWIRE 96 16 0 16\nFLAG 0 96 0\nSYMBOL voltage 0 0 R0\nSYMATTR InstName V1\nSYMATTR Value 1\nSYMBOL res 96 16 R0\nSYMATTR InstName R1\nSYMATTR Value 1k\nTEXT 0 200 Left 2 !.tran 1m 5m\n"),
     Explanation::of(
         "skipped",
         "Directives that do not concern the analysis are left out.",

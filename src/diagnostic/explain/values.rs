@@ -152,7 +152,7 @@ pub(super) const CODES: [Explanation; 28] = [
     .shown("a spread of 5 %\nv1 a 0 1\nr1 a 0 {mc(1k, 0.05)}\n.tran 1m 5m\n"),
     Explanation::of(
         "smooth-switch",
-        "A negative Vh is LTspice's switch with a smooth transition; here it switches at a threshold.",
+        "A negative Vh is LTspice's switch with a smooth transition; here its conductance changes in steps.",
         "A model of a switch written for LTspice.",
         "Nothing, if what happens within the transition does not matter; a positive Vh is a hysteresis.",
     )

@@ -105,6 +105,32 @@ fn own_models(lines: &[Line]) -> Vec<Line> {
     OWN_MODELS.iter().filter_map(model).collect()
 }
 
+/// What is said of a pin of a part that touches nothing.
+fn open_pin(
+    (part, pin, at): (&str, &Pin, Point),
+    wires: &[(Point, Point)],
+    span: Span,
+) -> Diagnostic {
+    /// Two steps of LTspice's grid.
+    const NEAR: i64 = 32;
+    let pin = match &pin.name[..] {
+        "" => pin.order.to_string(),
+        name => format!("`{name}`"),
+    };
+    let (x, y) = at;
+    let mut ends = wires.iter().flat_map(|(a, b)| [*a, *b]);
+    let near = ends.find(|end| (end.0 - x).abs() <= NEAR && (end.1 - y).abs() <= NEAR);
+    let note = Diagnostic::note(
+        "open-pin",
+        span,
+        format!("pin {pin} of `{part}` at ({x}, {y}) touches no wire"),
+    );
+    note.label("of this part").help(match near {
+        Some((x, y)) => format!("the wire that ends at ({x}, {y}) misses it"),
+        None => "draw a wire to it; an open end that is meant does no harm".into(),
+    })
+}
+
 fn place_of(line: &Line) -> Place {
     let span = line.span();
     span.start..span.end
@@ -171,18 +197,26 @@ impl Schematic<'_, '_, '_> {
             symbols: Vec::new(),
         };
         for (placed, symbol) in &parts {
+            // Of an `A` device they are functions that are not used.
+            let may_be_open = symbol.prefix == Some('a');
+            let mut open = Vec::new();
             let nodes: Vec<(usize, Option<String>)> = symbol
                 .pins
                 .iter()
                 .map(|pin| {
                     let at = at(placed, pin);
                     let is_open = nets.is_open(at);
-                    (
-                        pin.order,
-                        (!is_open || symbol.prefix != Some('a')).then(|| nets.name(at)),
-                    )
+                    if is_open && !may_be_open {
+                        open.push((pin, at));
+                    }
+                    (pin.order, (!is_open || !may_be_open).then(|| nets.name(at)))
                 })
                 .collect();
+            for (pin, at) in open {
+                let name = placed.attribute("instname");
+                let name = name.map_or(&placed.kind[..], |place| &text[place.clone()]);
+                self.tell(open_pin((name, pin, at), &sheet.wires, span(&placed.place)));
+            }
             let instance = Instance {
                 file,
                 text,
