@@ -139,6 +139,26 @@ fn a_word_that_is_neither_a_file_nor_a_command_is_told_so() {
         assert!(err.contains("'chek'") && err.contains("'check'"), "{err}");
     }
     assert!(said("..").contains("`..` is a folder"));
+    // Files of waveforms have commands of their own.
+    let folder = place();
+    run_in(folder.path(), "sim divider.cir -o w.raw -o w.csv");
+    for file in ["w.raw", "w.csv"] {
+        let ran = run_in(folder.path(), file);
+        assert!(ran.err.contains("`circ view FILE` shows it"), "{ran}");
+    }
+    let ran = run_in(folder.path(), "compare divider.cir w.csv");
+    assert!(ran.err.contains("`--against w.csv`"), "{ran}");
+    fs::create_dir(folder.path().join("netlists")).unwrap();
+    fs::copy(
+        folder.path().join("divider.cir"),
+        folder.path().join("netlists/buck.cir"),
+    )
+    .unwrap();
+    let ran = run_in(folder.path(), "check netlist/buck.cir");
+    assert!(
+        ran.err.contains("did you mean `netlists/buck.cir`?"),
+        "{ran}"
+    );
     // Options before the file are as good as behind it.
     let ran = run("-q divider.cir");
     assert_eq!(ran.status, 0, "{ran}");
@@ -185,6 +205,16 @@ fn shells_and_manuals_know_every_command_and_flag() {
             assert!(ran.out.contains(text), "{shell}: {text}");
         }
     }
+    // `circ FILE --pro<TAB>`.
+    let bash = run("completions bash").out;
+    let own = bash
+        .split("        circ)")
+        .nth(1)
+        .and_then(|text| text.lines().nth(1));
+    assert!(
+        own.is_some_and(|opts| opts.contains("--probe") && opts.contains("explain")),
+        "{own:?}"
+    );
     let directory = place();
     let ran = run_in(directory.path(), "man .");
     assert_eq!((ran.status, ran.out.as_str()), (0, ""), "{ran}");
@@ -637,7 +667,7 @@ fn files_that_cannot_be_written_are_named_before_or_after_the_run() {
     status 2
     --- out
     --- err
-    error: nowhere/out.csv: No such file or directory (os error 2)
+    error: nowhere/out.csv: No such file or directory (os error 2); there is no folder `nowhere`
     ");
 }
 

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::{Convergence, Report};
+use crate::diagnostic::Severity;
 
 fn answer(value: Option<bool>) -> &'static str {
     match value {
@@ -48,6 +49,24 @@ fn in_the_long_run(long_run: &Convergence, names: &[String]) -> String {
     )
 }
 
+impl Report {
+    /// Whether there is something to repair.
+    fn verdict(&self) -> String {
+        let count = |severity| {
+            self.faults
+                .iter()
+                .filter(|f| f.severity == severity)
+                .count()
+        };
+        let words = |n: usize, what| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
+        match (count(Severity::Error), count(Severity::Warning)) {
+            (0, 0) => "nothing to repair".into(),
+            (0, n) => format!("can run; {} above", words(n, "warning")),
+            (n, _) => format!("no run starts: {} above", words(n, "error")),
+        }
+    }
+}
+
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !self.title.is_empty() {
@@ -60,6 +79,7 @@ impl fmt::Display for Report {
             };
             writeln!(f, "{place}{:?}: {}", fault.severity, fault.message)?;
         }
+        writeln!(f, "verdict       {}", self.verdict())?;
         let Some(class) = &self.feedthrough else {
             return Ok(());
         };

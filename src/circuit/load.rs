@@ -2,7 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::Circuit;
 use super::elaborate::{ElaborateOptions, elaborate};
@@ -67,6 +67,16 @@ pub(crate) fn names(folder: &Path) -> Vec<String> {
         .collect()
 }
 
+/// A file of the same name in a folder whose name is like that of one that is missing.
+fn in_near_folder(path: &Path) -> Option<PathBuf> {
+    let folder = path.parent()?;
+    let (above, name) = (folder.parent()?, folder.file_name()?.to_string_lossy());
+    let known = names(above);
+    let near = nearest(&name, known.iter().map(String::as_str))?;
+    let file = above.join(near).join(path.file_name()?);
+    file.is_file().then_some(file)
+}
+
 /// Reads, parses and elaborates a netlist file.
 #[must_use]
 pub fn load(path: &Path, options: &ElaborateOptions) -> Loaded {
@@ -85,8 +95,10 @@ pub fn load_read(path: &Path, bytes: io::Result<Vec<u8>>, options: &ElaborateOpt
             let known = names(path.parent().unwrap_or(Path::new("")));
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             let near = nearest(&name, known.iter().map(String::as_str));
+            let near = near.map(|near| path.with_file_name(near));
+            let near = near.or_else(|| in_near_folder(path));
             let help = match near {
-                Some(near) => format!("did you mean `{}`?", path.with_file_name(near).display()),
+                Some(near) => format!("did you mean `{}`?", near.display()),
                 None => "check its name and folder".into(),
             };
             return Loaded {

@@ -65,7 +65,9 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Known, Failure> {
         diagnostics,
     } = input::load(&args.input);
     if let Some(unreadable) = diagnostics.iter().find(|d| d.code == "unreadable") {
-        return Err(Failure::Message(unreadable.message.clone()));
+        let what = &unreadable.message;
+        let help = unreadable.help.as_deref().unwrap_or_default();
+        return Err(Failure::Message(format!("{what}; {help}")));
     }
     if !args.json {
         input::show(&diagnostics, &sources, streams);

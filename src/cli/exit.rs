@@ -41,7 +41,7 @@ pub enum Failure {
     #[error("writing failed: {0}")]
     Stream(#[from] io::Error),
     /// A file could not be read or written.
-    #[error("{}: {error}", path.display())]
+    #[error("{}: {error}{}", path.display(), folder(path, error))]
     File {
         /// Which.
         path: PathBuf,
@@ -71,6 +71,15 @@ pub enum Failure {
     /// Anything else that the user should read.
     #[error("{0}")]
     Message(String),
+}
+
+/// Says where a folder is missing.
+fn folder(path: &Path, error: &io::Error) -> String {
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
+    match parent.filter(|p| error.kind() == io::ErrorKind::NotFound && !p.exists()) {
+        Some(missing) => format!("; there is no folder `{}`", missing.display()),
+        None => String::new(),
+    }
 }
 
 impl Failure {

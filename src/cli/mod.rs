@@ -138,8 +138,15 @@ fn with_command(mut args: Vec<OsString>, commands: &clap::Command) -> Vec<OsStri
     args
 }
 
-/// Says of a word that is no command, nor like one, that it is no file either.
+/// Says of a word that is no command, nor like one, that it is no file either, and of a second file of `compare` how it is named.
 fn no_such_input(error: clap::Error, command: &mut clap::Command) -> clap::Error {
+    if let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidArg)
+        && Path::new(word).is_file()
+        && std::env::args().any(|arg| arg == "compare")
+    {
+        let message = format!("a file to compare with is given as `--against {word}`");
+        return command.error(ErrorKind::UnknownArgument, message);
+    }
     let word = match error.get(ContextKind::InvalidSubcommand) {
         Some(ContextValue::String(word)) => word,
         _ => return error,

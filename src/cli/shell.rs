@@ -12,8 +12,16 @@ use super::streams::Streams;
 /// # Errors
 /// Those of standard output.
 pub(super) fn completions(args: &CompletionsArgs, streams: &Streams) -> Result<Exit, Failure> {
+    let mut command = Cli::command();
+    // `circ FILE` takes what `circ sim FILE` does.
+    let sim = command.find_subcommand("sim").into_iter();
+    let own: Vec<_> = sim
+        .flat_map(clap::Command::get_arguments)
+        .cloned()
+        .collect();
+    command = command.args(own.into_iter().filter(|arg| !arg.is_global_set()));
     let mut text = Vec::new();
-    clap_complete::generate(args.shell, &mut Cli::command(), "circ", &mut text);
+    clap_complete::generate(args.shell, &mut command, "circ", &mut text);
     streams.data(text)?;
     Ok(Exit::Done)
 }

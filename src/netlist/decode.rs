@@ -76,6 +76,13 @@ pub(super) fn foreign(text: &str, span: Span) -> Option<Diagnostic> {
             "an LTspice schematic",
             "in LTspice choose View > SPICE Netlist and save it",
         )
+    } else if (head.starts_with("title:") && start.contains("\nPlotname:"))
+        || head.starts_with("time,")
+    {
+        (
+            "a file of waveforms",
+            "`circ view FILE` shows it; to simulate, give the netlist",
+        )
     } else if start.contains('\0') {
         ("a binary file", "give a SPICE netlist, which is text")
     } else {
