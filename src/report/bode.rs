@@ -25,6 +25,7 @@ pub fn figure(of: &Phasors) -> Figure {
         let phase = unwrapped(of.column(j));
         let curve = |values: &[f64]| Series {
             name: name.clone(),
+            run: String::new(),
             points: rows
                 .iter()
                 .filter(|&&k| seen[k])
@@ -49,6 +50,7 @@ pub fn figure(of: &Phasors) -> Figure {
             };
             panel.push(Series {
                 name: words(&margin),
+                run: String::new(),
                 points: vec![(x, from), (x, to)],
             });
         }

@@ -42,6 +42,8 @@ pub struct Panel {
 pub struct Series {
     /// For the legend.
     pub name: String,
+    /// The run that it is of, where there are several; empty otherwise.
+    pub run: String,
     /// (value on the figure's axis, unit of the panel), the first nondecreasing.
     pub points: Vec<(f64, f64)>,
 }
@@ -51,6 +53,7 @@ impl Series {
     fn column(waves: &Waveforms, j: usize, name: String, pixels: usize) -> Self {
         Self {
             name,
+            run: String::new(),
             points: waves.thinned(j, pixels),
         }
     }
@@ -72,7 +75,10 @@ impl Figure {
             for (label, waves) in runs {
                 for j in (0..waves.width()).filter(|&j| waves.units[j] == unit) {
                     let name = format!("{} {label}", waves.names[j]);
-                    all.push(Series::column(waves, j, name.trim_end().into(), pixels));
+                    all.push(Series {
+                        run: label.clone(),
+                        ..Series::column(waves, j, name.trim_end().into(), pixels)
+                    });
                 }
             }
             all

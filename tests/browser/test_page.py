@@ -134,6 +134,50 @@ def test_zoom_and_pan(buck, show):
     assert panel.evaluate("(p) => p === document.activeElement")
 
 
+def drag(page, start, end):
+    page.mouse.move(*start)
+    page.mouse.down()
+    page.mouse.move(*end, steps=5)
+    page.mouse.up()
+
+
+def bounds(page, panel):
+    return page.evaluate(f"window.circ.boundsOf(window.circ.panels[{panel}])")
+
+
+def test_a_box_zooms_both_ways_and_a_height_one(buck, show):
+    page = show(buck / "out.html")
+    whole = [bounds(page, k) for k in range(3)]
+    box = page.locator(".panel .u-over").first.bounding_box()
+    at = lambda x, y: (box["x"] + x * box["width"], box["y"] + y * box["height"])
+    inner = lambda low, high: [whole[0][0] + part * (whole[0][1] - whole[0][0]) for part in (low, high)]
+    drag(page, at(0.2, 0.1), at(0.6, 0.6))
+    assert view(page) == pytest.approx([0.4e-3, 1.2e-3], rel=0.02)
+    assert bounds(page, 0) == pytest.approx(inner(0.4, 0.9), rel=0.03)
+    page.keyboard.press("Home")
+    assert view(page) == [0, 2e-3] and [bounds(page, k) for k in range(3)] == whole
+    # Upright: the span stays, and so do other panels.
+    drag(page, at(0.5, 0.25), at(0.503, 0.75))
+    assert view(page) == [0, 2e-3]
+    assert bounds(page, 0) == pytest.approx(inner(0.25, 0.75), rel=0.03)
+    assert [bounds(page, k) for k in (1, 2)] == whole[1:]
+    page.mouse.dblclick(*middle(page))
+    assert bounds(page, 0) == whole[0]
+
+
+def test_runs_of_steps_are_shown_and_hidden_at_once(tmp_path, show):
+    netlist = tmp_path / "steps.cir"
+    netlist.write_text("steps\n.param r=1k\nv1 a 0 sin(0 1 1k)\nr1 a b {r}\nc1 b 0 1u\n.step param r list 1k 2k 3k\n.tran 10u 2m\n.end\n")
+    run("sim", netlist, "-o", tmp_path / "steps.html")
+    page = show(tmp_path / "steps.html")
+    shown = "[...new Set(window.circ.panels.flatMap((p) => p.curves).filter((c) => c.shown).map((c) => c.run))]"
+    assert page.evaluate(shown) == ["r=1000", "r=2000", "r=3000"]
+    page.get_by_label("r=2000", exact=True).uncheck()
+    assert page.evaluate(shown) == ["r=1000", "r=3000"]
+    page.get_by_label("r=2000", exact=True).check()
+    assert len(page.evaluate(shown)) == 3
+
+
 def test_a_toggle_takes_a_curve_out_of_its_panel(tmp_path, show):
     netlist = tmp_path / "two.cir"
     netlist.write_text("two\nv1 a 0 sin(0 100 1k)\nr1 a b 1k\nr2 b 0 10\n.tran 10u 2m\n.end\n")

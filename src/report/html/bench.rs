@@ -74,6 +74,7 @@ impl Page {
             }
             curves.push(Curve {
                 name: name.to_owned(),
+                run: String::new(),
                 x: self.column(points.iter().map(|p| p.0)),
                 y: self.column(points.iter().map(|p| p.1)),
                 overview: None,

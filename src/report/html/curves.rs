@@ -47,20 +47,21 @@ impl Page {
                     series,
                     Curve {
                         name: series.name.clone(),
+                        run: series.run.clone(),
                         x,
                         y,
                         overview: None,
                     },
                 ));
             }
-            // Gates stand apart from other voltages.
+            // Gates and switched nodes stand apart from other voltages.
             let may_be_gates = panel.unit == "V" && figure.axis == figure::Axis::Time;
             let (gates, rest): (Vec<_>, Vec<_>) = curves
                 .into_iter()
                 .partition(|(series, _)| may_be_gates && is_gate(series));
             let quantity = match rest.is_empty() {
                 true => &panel.quantity,
-                false => "gates",
+                false => "at two levels",
             };
             for (quantity, curves) in [(panel.quantity.as_str(), rest), (quantity, gates)] {
                 if curves.is_empty() {
@@ -111,6 +112,7 @@ mod tests {
         let rows = (0..1000).map(|k| f64::from(k) / 1000.0);
         Series {
             name: "v(a)".into(),
+            run: String::new(),
             points: rows.map(|t| (t, value(t))).collect(),
         }
     }
@@ -151,6 +153,9 @@ mod tests {
             panels.collect::<Vec<_>>()
         };
         assert_eq!(page(vec![pulse()]), ["voltage"]);
-        assert_eq!(page(vec![pulse(), series(f64::sin)]), ["voltage", "gates"]);
+        assert_eq!(
+            page(vec![pulse(), series(f64::sin)]),
+            ["voltage", "at two levels"]
+        );
     }
 }

@@ -101,6 +101,9 @@ struct Panel {
 #[derive(Debug, Clone, Serialize)]
 struct Curve {
     name: String,
+    /// The run that it is of, where there are several.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    run: String,
     x: usize,
     y: usize,
     /// A long one has another pair, of some of its rows, by which the page draws it until all are there.
@@ -314,6 +317,7 @@ mod tests {
         let name = "v(a)".to_owned();
         let curves = vec![Curve {
             name,
+            run: String::new(),
             x,
             y,
             overview: None,

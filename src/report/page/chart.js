@@ -11,7 +11,7 @@ const STEPS = { dB: [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 40, 100, 
 /** Of errors: a zero stands at this on a logarithmic axis. */
 const LEAST = 1e-17;
 /** CSS pixels. */
-const SIZES = { axis: 76, label: 18, panel: 220, across: 110, up: 30, row: 16, right: 26, line: 1.5, dot: 3, pixelsToDrag: 4 };
+const SIZES = { axis: 76, label: 18, panel: 220, across: 110, up: 30, row: 16, right: 26, line: 1.5, dot: 3, pixelsToDrag: 4, box: 40 };
 
 /** An element with attributes and children; text is never markup. */
 function element(tag, attributes = {}, ...children) {
@@ -54,7 +54,7 @@ function chart(root, content, announce) {
   const curves = panels.flatMap((panel) => panel.curves);
   const isDotted = panels.some((panel) => panel.dots);
   let whole = wholeSpan(curves, axis.log, isDotted);
-  const state = { view: whole, cursors: { a: null, b: null }, pointer: null, plots: [], logs: new Set(panels.filter((panel) => panel.dots)) };
+  const state = { view: whole, cursors: { a: null, b: null }, pointer: null, plots: [], logs: new Set(panels.filter((panel) => panel.dots)), heights: new Map() };
   const namesOf = (all) => [...new Set(all.map((curve) => curve.name))];
   const few = namesOf(curves).length <= COLOURS.light.length;
   const looks = new Map(panels.flatMap((panel) => panel.curves.map((curve) => [curve, namesOf(few ? curves : panel.curves).indexOf(curve.name)])));
@@ -69,8 +69,10 @@ function chart(root, content, announce) {
   const edgeOf = ([from, to], pixels) =>
     axis.log ? (k) => from * (to / from) ** ((k + 1) / pixels) : (k) => from + ((to - from) * (k + 1)) / pixels;
 
-  /** Bounds of a panel's axis for what is seen, with a little room; positive where it is logarithmic. */
+  /** Bounds of a panel's axis: those chosen, or those of what is seen with a little room; positive where it is logarithmic. */
   function boundsOf(panel) {
+    const chosen = state.heights.get(panel);
+    if (chosen) return chosen;
     let [low, high] = [Infinity, -Infinity];
     for (const curve of panel.curves.filter((curve) => curve.shown)) {
       const [a, b] = boundsIn(curve, ...state.view);
@@ -174,12 +176,15 @@ function chart(root, content, announce) {
         { ...lines, ...marks(panel.unit, state.logs.has(panel), SIZES.up), label: panel.quantity, labelSize: SIZES.label, labelFont: "12px system-ui, sans-serif", size: SIZES.axis },
       ],
       series: [{}, ...series],
-      cursor: { y: false, points: { show: false }, drag: { x: true, y: false, setScale: false, click: () => {} }, bind: { dblclick: () => () => show(whole) } },
+      cursor: { y: false, points: { show: false }, drag: { x: true, y: true, uni: SIZES.box, setScale: false, click: () => {} }, bind: { dblclick: () => full } },
       hooks: {
         setSelect: [
           (plot) => {
-            const { left, width } = plot.select;
-            if (width > SIZES.pixelsToDrag) show([plot.posToVal(left, "x"), plot.posToVal(left + width, "x")]);
+            const { left, width, top, height } = plot.select;
+            const [isWide, isHigh] = [width < plot.over.clientWidth, height < plot.over.clientHeight];
+            const isDrag = Math.max(isWide ? width : 0, isHigh ? height : 0) > SIZES.pixelsToDrag;
+            if (isDrag && isHigh) state.heights.set(panel, [plot.posToVal(top + height, "y"), plot.posToVal(top, "y")]);
+            if (isDrag) show(isWide ? [plot.posToVal(left, "x"), plot.posToVal(left + width, "x")] : state.view);
             if (width > 0) plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
           },
         ],
@@ -241,6 +246,12 @@ function chart(root, content, announce) {
     }
     drawStrips();
     root.dispatchEvent(new CustomEvent("view", { detail: state.view }));
+  }
+
+  /** Shows the whole span of all panels. */
+  function full() {
+    state.heights.clear();
+    show(whole);
   }
 
   /** Zooms by a factor about x, which stays where it is. */
@@ -339,7 +350,7 @@ function chart(root, content, announce) {
     const x = state.pointer ?? centre();
     const keys = {
       "+": () => zoom(0.5, x), "=": () => zoom(0.5, x), "-": () => zoom(2, x),
-      ArrowLeft: () => pan(-0.2), ArrowRight: () => pan(0.2), Home: () => show(whole),
+      ArrowLeft: () => pan(-0.2), ArrowRight: () => pan(0.2), Home: full,
       a: () => place("a", x), b: () => place("b", x),
       ",": () => step("a", -1), ".": () => step("a", 1), "<": () => step("b", -1), ">": () => step("b", 1),
       Escape: () => { state.cursors = { a: null, b: null }; retold(); announce(""); },
@@ -437,14 +448,19 @@ function chart(root, content, announce) {
       body.append(element("tr", { "data-signal": key.name }, element("th", { scope: "row" }, label), ...Object.values(own)));
     };
     const groups = [];
+    // Several curves at once: those of a run, those of a panel.
+    const heading = (...all) => {
+      const labels = all.map(([words, curves]) => {
+        const box = element("input", { type: "checkbox", checked: true, onchange: () => { toggle(curves, box.checked); tick(); } });
+        groups.push([box, curves]);
+        return element("label", {}, box, words);
+      });
+      body.append(element("tr", { class: "group" }, element("th", { scope: "rowgroup", colspan: columns.length + 2 }, ...labels)));
+    };
+    const runs = [...new Set(curves.map((curve) => curve.run))];
+    if (runs.length > 1) heading(...runs.map((run) => [run, curves.filter((curve) => curve.run === run)]));
     for (const panel of panels) {
-      if (panels.length > 1) {
-        // All curves of a panel at once.
-        const box = element("input", { type: "checkbox", checked: true, onchange: () => { toggle(panel.curves, box.checked); tick(); } });
-        groups.push([box, panel]);
-        const heading = element("th", { scope: "rowgroup", colspan: columns.length + 2 }, element("label", {}, box, panel.quantity));
-        body.append(element("tr", { class: "group" }, heading));
-      }
+      if (panels.length > 1) heading([panel.quantity, panel.curves]);
       for (const curve of panel.curves) {
         const box = element("input", { type: "checkbox", checked: true, onchange: () => { toggle([curve], box.checked); tick(); } });
         boxes.set(curve, box);
@@ -491,10 +507,10 @@ function chart(root, content, announce) {
     }
     function tick() {
       boxes.forEach((box, curve) => { box.checked = curve.shown; });
-      for (const [box, panel] of groups) {
-        const shown = panel.curves.filter((curve) => curve.shown).length;
+      for (const [box, some] of groups) {
+        const shown = some.filter((curve) => curve.shown).length;
         box.checked = shown > 0;
-        box.indeterminate = shown > 0 && shown < panel.curves.length;
+        box.indeterminate = shown > 0 && shown < some.length;
       }
     }
     return { table, update, tick };
@@ -514,6 +530,7 @@ function chart(root, content, announce) {
   /** Logarithmic or linear axes of values. */
   function logarithmic(on) {
     state.logs = new Set(on ? panels : []);
+    state.heights.clear();
     build();
   }
 
@@ -529,16 +546,18 @@ function chart(root, content, announce) {
   /** What a reader chose to see, by names. */
   const keep = () => ({
     view: state.view[0] === whole[0] && state.view[1] === whole[1] ? null : state.view,
+    heights: panels.map((panel) => state.heights.get(panel) ?? null),
     cursors: state.cursors,
     hidden: curves.filter((curve) => !curve.shown).map((curve) => curve.name),
   });
 
   /** Shows that again. */
-  function restore({ view, cursors, hidden }) {
+  function restore({ view, heights, cursors, hidden }) {
     toggle(curves.filter((curve) => hidden.includes(curve.name)), false);
     readings.tick();
     state.cursors = cursors;
-    if (view) show(view);
+    heights.forEach((bounds, k) => { if (bounds && panels[k]) state.heights.set(panels[k], bounds); });
+    show(view ?? state.view);
     retold();
   }
 
@@ -557,7 +576,7 @@ function chart(root, content, announce) {
   paper.addEventListener("change", repaint);
   return {
     state, panels, strips, show, complete, keep, restore, zoom, pan, place, logarithmic, logarithmicAcross, colour, dash, boundsOf, edgeOf, axis,
-    full: () => show(whole),
+    full,
     repaint,
     remove: () => { resized.disconnect(); document.removeEventListener("keydown", pressedOnPage); paper.removeEventListener("change", repaint); state.plots.forEach((plot) => plot.destroy()); root.replaceChildren(); },
   };

@@ -12,9 +12,10 @@ function stripsOf(strips) {
 function panelsOf(data) {
   const columns = data.columns.map((column) => column && numbers(column));
   const of = (curve) => {
-    if (columns[curve.x] && columns[curve.y]) return curveOf(curve.name, columns[curve.x], columns[curve.y]);
+    const { name, run } = curve;
+    if (columns[curve.x] && columns[curve.y]) return { ...curveOf(name, columns[curve.x], columns[curve.y]), run };
     const [x, y] = curve.overview;
-    return { ...curveOf(curve.name, columns[x], columns[y]), partial: true, later: [curve.x, curve.y] };
+    return { ...curveOf(name, columns[x], columns[y]), run, partial: true, later: [curve.x, curve.y] };
   };
   return data.panels.map((panel) => ({ ...panel, curves: panel.curves.map(of) }));
 }
@@ -160,7 +161,7 @@ function circPage(root, data) {
   }
   if (panels.some((panel) => panel.curves.length > 0)) {
     button("−", () => shown.zoom(2, middle()), "zoom out (key −)");
-    button("+", () => shown.zoom(0.5, middle()), "zoom in (key +, wheel, drag)");
+    button("+", () => shown.zoom(0.5, middle()), "zoom in (key +, wheel, drag of a span, a box or a height)");
     button("◀", () => shown.pan(-0.2), "earlier (left arrow, shift and drag)");
     button("▶", () => shown.pan(0.2), "later (right arrow)");
     button("all", () => shown.full(), "the whole span (key Home, double click)");
@@ -190,7 +191,7 @@ function circPage(root, data) {
     shown = chart(area, { axis: data.axis, panels, strips: stripsOf(data.strips) }, announce);
     area.addEventListener("view", () => { if (spectrum && !spectrumArea.hidden) transformed(); });
     root.append(element("details", {}, element("summary", {}, "Keys and mouse"), element("p", {},
-      "Drag: zoom to a span. Wheel: zoom at the pointer; with shift, move. Shift and drag: move. Double click or Home: all. Click: cursor A; shift and click: cursor B. " +
+      "Drag: zoom to a span, a box or a height. Wheel: zoom at the pointer; with shift, move. Shift and drag: move. Double click or Home: all. Click: cursor A; shift and click: cursor B. " +
       "Keys: + − ← → Home; a, b place a cursor at the pointer (without one, in the middle); , . move A and < > move B by a row; Escape takes cursors away.")));
   }
   if (data.circuit) root.append(circuitOf(data.circuit, shown, area));

@@ -45,6 +45,10 @@ pub(super) fn draw(all: &Parts, sheet: &ast::Sheet, states: States<'_>, title: &
         let (x, y) = view.at(*at);
         match name.as_str() {
             "0" | "gnd" => ground(&mut drawing, (x, y)),
+            // Beside a wire that goes up from there, not on it.
+            name if goes_up(sheet, *at) => {
+                named(&mut drawing, name, (x + 4.0, y - 5.0), Anchor::Start);
+            }
             name => named(&mut drawing, name, (x, y - 5.0), Anchor::Middle),
         }
     }
@@ -87,6 +91,13 @@ fn joints(sheet: &ast::Sheet, placed: &[PlacedPart<'_>]) -> Vec<Spot> {
 fn passes(((ax, ay), (bx, by)): (Spot, Spot), (x, y): Spot) -> bool {
     let is_between = |a: i64, b: i64, v: i64| v > a.min(b) && v < a.max(b);
     (ax == bx && x == ax && is_between(ay, by, y)) || (ay == by && y == ay && is_between(ax, bx, x))
+}
+
+/// Whether a wire goes up from a spot.
+fn goes_up(sheet: &ast::Sheet, (x, y): Spot) -> bool {
+    let covers =
+        |(a, b): &(Spot, Spot)| a.0 == x && b.0 == x && a.1.min(b.1) < y && y <= a.1.max(b.1);
+    sheet.wires.iter().any(covers)
 }
 
 /// How units of the sheet become pixels.
