@@ -6,7 +6,7 @@ use std::path::Path;
 use circ::analysis::{
     Measurements, Orbit, OrbitKind, PeriodicOptions, periodic, periodic_measured, transient,
 };
-use circ::integrate::{Reason, RowKind};
+use circ::integrate::Reason;
 use circ::{Error, Model, Run, SimOptions};
 
 fn parsed(text: &str) -> Model {
@@ -415,7 +415,7 @@ fn measurements_of_an_orbit_are_those_of_a_settled_transient() {
         .meas tran late when v(2)=5 fall=last\n.meas tran high max v(2)\n.four 1k v(2)\n.end\n";
     let model = parsed(text);
     let (_, run, found) = periodic_measured(&model, &PeriodicOptions::default()).expect("an orbit");
-    let grid = run.kinds.iter().filter(|kind| **kind == RowKind::Grid);
+    let grid = run.kinds.iter().filter(|kind| kind.is_grid());
     assert_eq!((grid.count(), run.waveforms.names.len()), (101, 1));
     let settled = transient(&model, SimOptions::default());
     let (_, settled) = settled.run.expect("a run");

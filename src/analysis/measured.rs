@@ -7,7 +7,9 @@ use super::worst::Worst;
 use crate::circuit::{Circuit, Harmonics, Measured, Probe, Tran};
 use crate::integrate::{Block, Error, Grid, Note, Orbit, RowKind, Run, SimOptions};
 use crate::model::Model;
-use crate::settings::tolerances::times::{LAST_ROW, NOTHING, ROWS_APART};
+use crate::settings::tolerances::times::{
+    CROWDED, LAST_ROW, NOTHING, ROWS_APART, ROWS_CLOSE, SAME_TIME,
+};
 use crate::waveform::Waveforms;
 
 /// Rows that measurements see at least, besides those at events: a coarser print step is divided for them.
@@ -83,8 +85,7 @@ pub fn transient(model: &Model, options: SimOptions<'_>) -> Finished {
     if !is_measured(model.circuit()) {
         return begun(model, model, options);
     }
-    let measuring = Measuring::of(model.circuit(), options.step.is_some());
-    let mut finished = measured(model, options);
+    let (measuring, mut finished) = observed(model, options);
     if let Some((run, found)) = &mut finished.run {
         run.notes.extend(measuring.too_coarse(run, found));
         (run.waveforms, run.kinds) = measuring.cut(&run.waveforms, &run.kinds);
@@ -111,22 +112,40 @@ fn begun(model: &Model, shown: &Model, mut options: SimOptions<'_>) -> Finished 
 
 /// The same with the rows and signals that the measurements saw.
 pub(super) fn measured(model: &Model, options: SimOptions<'_>) -> Finished {
-    let measuring = Measuring::of(model.circuit(), options.step.is_some());
-    let measured = match measuring.model(model) {
-        Ok(measured) => measured,
-        Err(error) => return Finished::of(Err(error)),
-    };
-    let options = SimOptions {
-        corners: true,
-        rows: None,
-        discard: false,
-        ..options
-    };
-    let mut finished = begun(model, &measured, options);
-    if let Some((run, found)) = &mut finished.run {
-        *found = measuring.found(&run.waveforms, (0, 1), 0.0);
+    observed(model, options).1
+}
+
+/// The same on the first grid, whatever it hides: differences of runs need one grid.
+pub(super) fn measured_once(model: &Model, mut options: SimOptions<'_>) -> Finished {
+    Measuring::of(model.circuit(), options.step.is_some()).run(model, &mut options)
+}
+
+/// A run with its measurements, made again on closer rows where those of the first one turn out to be too far apart for them.
+fn observed<'a>(model: &'a Model, mut options: SimOptions<'_>) -> (Measuring<'a>, Finished) {
+    let mut measuring = Measuring::of(model.circuit(), options.step.is_some());
+    let mut finished = measuring.run(model, &mut options);
+    // First as many as events ask for, then as curves do.
+    for _ in 0..2 {
+        let closer = match &finished {
+            Finished {
+                run: Some((run, found)),
+                error: None,
+            } if options.step.is_none() => measuring.closer(run, found),
+            _ => None,
+        };
+        let Some(divisions) = closer else {
+            break;
+        };
+        let before = std::mem::replace(&mut measuring.divisions, divisions);
+        let again = measuring.run(model, &mut options);
+        if again.error.is_some() {
+            // Interrupted: what is there already is whole.
+            measuring.divisions = before;
+            break;
+        }
+        finished = again;
     }
-    finished
+    (measuring, finished)
 }
 
 /// The orbit of [`periodic`](super::periodic()), with what `.meas` and `.four` ask of it.
@@ -184,6 +203,12 @@ pub(super) fn laps(
     ((laps - kept, laps), note)
 }
 
+/// Twice the rows at events and corners over those of the grid.
+fn crowd(kinds: &[RowKind]) -> f64 {
+    let grid = kinds.iter().filter(|kind| kind.is_grid()).count();
+    2.0 * (kinds.len() - grid) as f64 / grid.max(1) as f64
+}
+
 /// What a circuit's measurements need, and how its results are shown without that.
 struct Measuring<'a> {
     circuit: &'a Circuit,
@@ -207,9 +232,35 @@ impl<'a> Measuring<'a> {
         }
     }
 
-    /// The same circuit with a finer grid, and the signals of its measurements after those that are shown.
-    fn model(&self, model: &Model) -> Result<Model, Error> {
-        self.probing(model, self.fine())
+    /// A run on the finer grid, with the signals of the measurements after those that are shown.
+    fn run(&self, model: &Model, options: &mut SimOptions<'_>) -> Finished {
+        let probing = match self.probing(model, self.fine()) {
+            Ok(probing) => probing,
+            Err(error) => return Finished::of(Err(error)),
+        };
+        let options = SimOptions {
+            method: options.method,
+            theta: options.theta,
+            gamma: options.gamma,
+            step: options.step,
+            events: options.events,
+            corners: true,
+            rows: None,
+            discard: false,
+            cancel: options.cancel,
+            unestimated: options.unestimated,
+            start: options.start.clone(),
+            settings: options.settings.clone(),
+            progress: match &mut options.progress {
+                Some(progress) => Some(&mut **progress),
+                None => None,
+            },
+        };
+        let mut finished = begun(model, &probing, options);
+        if let Some((run, found)) = &mut finished.run {
+            *found = self.found(&run.waveforms, (0, 1), 0.0);
+        }
+        finished
     }
 
     /// The same circuit with the signals of its measurements after those that are shown.
@@ -266,22 +317,22 @@ impl<'a> Measuring<'a> {
         }
     }
 
-    /// Names the measurements that come out otherwise by more than [`ROWS_APART`] where two of three rows of the grid are left out: not every other one, which
-    /// a clock may hide.
-    fn too_coarse(&self, run: &Run, found: &Measurements) -> Option<Note> {
+    /// The measurements that come out otherwise where two of three rows of the grid after each event or corner are left out, as they are and so, and the
+    /// difference over the larger one. (Every other row, or every third from the start on, may show all of a curve in the course of several periods.)
+    fn thinned<'m>(&self, run: &Run, found: &'m Measurements) -> Vec<(&'m str, [f64; 2], f64)> {
         let mut some = Waveforms {
             names: run.waveforms.names.clone(),
             units: run.waveforms.units.clone(),
             ..Waveforms::default()
         };
+        // Rows of the grid since the last event.
         let (mut k, last) = (0, run.waveforms.time.len());
         for (at, (t, values, kind)) in Block::of(&run.waveforms, &run.kinds).rows().enumerate() {
-            let is_grid = kind == RowKind::Grid;
-            if !is_grid || k % 3 == 0 || at + 1 == last {
+            k = if kind == RowKind::Grid { k + 1 } else { 0 };
+            if k % 3 == 0 || at == 0 || at + 1 == last {
                 some.time.push(t);
                 some.values.extend_from_slice(values);
             }
-            k += usize::from(is_grid);
         }
         // A mean that is zero but for rounding says nothing.
         let largest = run
@@ -291,24 +342,46 @@ impl<'a> Measuring<'a> {
             .fold(0.0, |m: f64, v| m.max(v.abs()));
         let least = NOTHING * largest;
         let coarse = self.found(&some, (0, 1), 0.0).measured;
-        let off = found
-            .measured
-            .iter()
-            .zip(&coarse)
-            .filter_map(|(fine, coarse)| {
-                let (a, b) = (
-                    fine.result.as_ref().ok()?.value,
-                    coarse.result.as_ref().ok()?.value,
-                );
-                let far = (a - b).abs() > ROWS_APART * a.abs().max(b.abs()).max(least);
-                far.then(|| {
-                    format!(
-                        "{} ({a:.4e}, and {b:.4e} with a third of the rows)",
-                        fine.name
-                    )
-                })
-            });
+        let pairs = found.measured.iter().zip(&coarse);
+        let both = pairs.filter_map(|(fine, coarse)| {
+            let (a, b) = (
+                fine.result.as_ref().ok()?.value,
+                coarse.result.as_ref().ok()?.value,
+            );
+            let larger = a.abs().max(b.abs()).max(least);
+            Some((&fine.name[..], [a, b], (a - b).abs() / larger))
+        });
+        both.filter(|(.., off)| *off > 0.0).collect()
+    }
+
+    /// How often the print step is to be divided for rows that are close enough: twice as many as at events and corners, beside which fewer say nothing;
+    /// and what straight lines leave out falls with the square of their length.
+    fn closer(&self, run: &Run, found: &Measurements) -> Option<usize> {
+        let crowd = crowd(&run.kinds);
+        let needed = if crowd > 1.0 {
+            crowd
+        } else {
+            let thinned = self.thinned(run, found);
+            let off = thinned.iter().map(|(.., off)| *off).fold(0.0, f64::max);
+            (off / ROWS_CLOSE).sqrt()
+        };
+        let most = MOST_VALUES / run.waveforms.values.len().max(1);
+        let factor = (needed.ceil() as usize).min(most);
+        (factor > 1).then(|| factor * self.divisions)
+    }
+
+    /// Names the measurements of which even so [`ROWS_APART`] depends on the rows.
+    fn too_coarse(&self, run: &Run, found: &Measurements) -> Option<Note> {
+        let thinned = self.thinned(run, found);
+        let off = thinned.iter().filter(|(.., off)| *off > ROWS_APART);
+        let off = off.map(|(name, [a, b], _)| {
+            format!("{name} ({a:.4e}, and {b:.4e} with a third of the rows)")
+        });
         let off: Vec<String> = off.collect();
+        if off.is_empty() && crowd(&run.kinds) > CROWDED {
+            let few = "measurements see fewer rows than half of those at events: between them curves count as straight lines; a shorter run, or fewer signals, has more";
+            return Some(Note::from(few.to_owned()));
+        }
         (!off.is_empty()).then(|| {
             Note::from(format!(
                 "rows may be too far apart for {}: between them curves count as straight lines. A shorter print step, as in `.tran 10n 1m`, or a shorter \
@@ -332,8 +405,8 @@ impl<'a> Measuring<'a> {
         // The next of the fine grid.
         let mut next = 0;
         for (t, values, kind) in Block::of(waves, kinds).rows() {
-            let mut time = Some(t);
-            if let (RowKind::Grid, Some(grid), Some(fine)) = (kind, &grid, fine) {
+            let (mut time, mut kind) = (Some(t), kind);
+            if let (true, Some(grid), Some(fine)) = (kind.is_grid(), &grid, fine) {
                 let shown = if next + 1 == fine {
                     Some(grid.len() - 1)
                 } else {
@@ -341,10 +414,27 @@ impl<'a> Measuring<'a> {
                 };
                 time = shown.map(|k| grid.time(k));
                 next += 1;
+                // Between the output times that are shown it stands for what else is there.
+                if time.is_none() && kind == RowKind::Both {
+                    (time, kind) = (Some(t), RowKind::Corner);
+                }
             }
             if let Some(mut time) = time {
+                // One row for an output time and a corner that are an ulp apart.
+                let is_last = |late: &f64| (*late - time).abs() <= SAME_TIME * time.abs();
+                if kept.time.last().is_some_and(is_last) {
+                    match (kept_kinds.last(), kind) {
+                        (Some(RowKind::Grid | RowKind::Both), RowKind::Corner) => continue,
+                        (Some(RowKind::Corner), _) if kind.is_grid() => {
+                            kept.time.pop();
+                            kept.values.truncate(kept.time.len() * self.shown);
+                            kept_kinds.pop();
+                        }
+                        _ => {}
+                    }
+                }
                 // The two grids put one instant an ulp apart; rows at events there stand with the row that is shown.
-                if kind == RowKind::Grid {
+                if kind.is_grid() {
                     let later = kept.time.iter_mut().rev().take_while(|late| **late > time);
                     later.for_each(|late| *late = time);
                 } else {

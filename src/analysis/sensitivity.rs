@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
-use super::measured::{laps, periodic_measured, transient};
+use super::measured::{laps, measured_once, periodic_measured};
 use super::periodic::{PeriodicOptions, beside, steady};
 use super::variation::{Near, Parameter, STEPS, Shifted, Trajectory};
 use crate::circuit::{Circuit, Formula, Kind, Measured, Probe, SteadyState, Tran, source::Wave};
@@ -447,7 +447,7 @@ impl Beside<'_> {
         if self.options.steady {
             return Ok(periodic_measured(&model, &self.periodic())?.2.measured);
         }
-        let finished = transient(
+        let finished = measured_once(
             &model,
             SimOptions {
                 cancel: self.options.cancel,

@@ -80,6 +80,11 @@ fn never_passes(circuit: &Circuit, element: &Element, switch: &Switch) -> Option
         return None;
     }
     let (mut low, mut high) = (switch.control.constant, switch.control.constant);
+    if let Some((a, b)) = floating(circuit, switch) {
+        low += a.min(b);
+        high += a.max(b);
+        return moved(element, switch, (low, high));
+    }
     for (gain, quantity) in &switch.control.terms {
         let Quantity::Voltage(node) = *quantity else {
             return None;
@@ -96,6 +101,33 @@ fn never_passes(circuit: &Circuit, element: &Element, switch: &Switch) -> Option
         low += a.min(b);
         high += a.max(b);
     }
+    moved(element, switch, (low, high))
+}
+
+/// The ends of the range of a control that is the voltage of one source between two nodes.
+fn floating(circuit: &Circuit, switch: &Switch) -> Option<(f64, f64)> {
+    let [(gain, Quantity::Voltage(p)), (other, Quantity::Voltage(n))] = &switch.control.terms[..]
+    else {
+        return None;
+    };
+    if gain.f64 != -other.f64 {
+        return None;
+    }
+    circuit.elements.iter().find_map(|element| {
+        let sign = match (element.p, element.n) {
+            ends if ends == (*p, *n) => gain.f64,
+            ends if ends == (*n, *p) => other.f64,
+            _ => return None,
+        };
+        let Kind::VoltageSource(source) = &element.kind else {
+            return None;
+        };
+        range(&source.wave).map(|(a, b)| (sign * a, sign * b))
+    })
+}
+
+/// What is said of a switch whose control stays in a range.
+fn moved(element: &Element, switch: &Switch, (low, high): (f64, f64)) -> Option<Diagnostic> {
     // A constant control is meant.
     if low == high {
         return None;
@@ -229,6 +261,17 @@ mod tests {
         assert_eq!(said(pulse, "SW(Ron=1 Vt=-1 Vh=0.5)"), never("off", 0, 5));
         let turned = "Vc 0 c pulse(0 5 0 1n 1n 1u 2u)";
         assert_eq!(said(turned, "SW(Ron=1 Vt=1 Vh=0)"), never("on", -5, 0));
+        // Between two nodes that float.
+        let floating = "Vc c b pulse(0 2 0 1n 1n 1u 2u)\nS2 a 0 c b ms";
+        let (_, findings) = read(
+            &format!("V1 a 0 1\nR1 b 0 1\n{floating}\n.model ms SW(Ron=1 Vt=3)"),
+            Diodes::Auto,
+        );
+        assert!(
+            findings
+                .iter()
+                .any(|f| f.message.contains("`s2` never turns on"))
+        );
         let sine = "Vc c 0 sin(1 2 1k)";
         assert_eq!(said(sine, "SW(Ron=1 Vt=4 Vh=0)"), never("on", -1, 3));
         // What passes, what is constant on purpose, and what the circuit decides.

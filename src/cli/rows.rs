@@ -21,7 +21,7 @@ pub(super) struct Shown {
 impl Shown {
     fn has(self, kind: RowKind) -> bool {
         match kind {
-            RowKind::Grid => true,
+            RowKind::Grid | RowKind::Both => true,
             RowKind::Event => self.events,
             RowKind::Corner => self.corners,
         }

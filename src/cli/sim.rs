@@ -24,12 +24,12 @@ use crate::check;
 use crate::circuit::source::Wave;
 use crate::circuit::{Circuit, SteadyState, Tran};
 use crate::integrate::{
-    Block, Error, Method, Note, Reason, Run, SimOptions, Sink, Verified, VerifyOptions, aliased,
-    simulate, simulate_system, verify, verify_system,
+    Aliased, Block, Error, Method, Note, Reason, Run, SimOptions, Sink, Verified, VerifyOptions,
+    aliased, simulate, simulate_system, verify, verify_system,
 };
 use crate::lcs::Input;
 use crate::model::Model;
-use crate::report::{self, si::quantity};
+use crate::report::{self, si::quantity, text};
 use crate::settings::Settings;
 
 /// Divisions of the progress bar.
@@ -324,7 +324,7 @@ fn measured_run(
     };
     let mut finished = Finished::of(run_to(subject, request, None, route, streams));
     if let (Some((run, _)), Some(tran)) = (&mut finished.run, system.tran) {
-        run.aliased = aliased(&tran, waves(&system.lcs.inputs), run);
+        say_aliased(run, aliased(&tran, waves(&system.lcs.inputs), run));
     }
     finished
 }
@@ -357,9 +357,17 @@ pub(super) fn transient(
     let mut finished = with_options(tran, request, route, streams, run);
     if let (Some((run, _)), Some(tran)) = (&mut finished.run, tran) {
         let inputs = model.multiport().sources.iter().map(|s| &s.input);
-        run.aliased = aliased(&tran, waves(inputs), run);
+        say_aliased(run, aliased(&tran, waves(inputs), run));
     }
     finished
+}
+
+/// A warning where rows hide what repeats, a note where they show its corners alone.
+fn say_aliased(run: &mut Run, found: Option<Aliased>) {
+    match found {
+        Some(found) if found.corners => run.notes.push(text::aliasing(&found)),
+        found => run.aliased = found,
+    }
 }
 
 /// Names and waveforms of sources.

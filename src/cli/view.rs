@@ -63,6 +63,17 @@ pub(super) fn view(args: &ViewArgs, streams: &Streams) -> Result<Exit, Failure> 
     Ok(Exit::Done)
 }
 
+/// Whether a text has an analysis of a netlist.
+fn is_netlist(bytes: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(bytes).to_lowercase();
+    let is_analysis = |line: &str| {
+        [".tran", ".ac", ".op", ".end"]
+            .iter()
+            .any(|card| line.starts_with(card))
+    };
+    text.lines().any(is_analysis) || text.starts_with("version 4")
+}
+
 /// The plot asked for, with the signals asked for.
 fn chosen(args: &ViewArgs, streams: &Streams) -> Result<Plot, Failure> {
     let fail = |error| Failure::file(&args.file, error);
@@ -72,9 +83,17 @@ fn chosen(args: &ViewArgs, streams: &Streams) -> Result<Plot, Failure> {
     } else {
         bytes = fs::read(&args.file).map_err(fail)?;
     }
-    let mut all = plots(&bytes).map_err(|error| Failure::Waveforms {
-        path: args.file.clone(),
-        error,
+    let mut all = plots(&bytes).map_err(|error| match is_netlist(&bytes) {
+        true => {
+            let file = args.file.display();
+            Failure::Message(format!(
+                "{file}: a netlist, not a file of waveforms; `circ {file} -o out.html` runs it and makes a page"
+            ))
+        }
+        false => Failure::Waveforms {
+            path: args.file.clone(),
+            error,
+        },
     })?;
     let (number, file) = (usize::from(args.plot), args.file.display());
     if number > all.len() {

@@ -21,6 +21,8 @@ pub struct Aliased {
     pub tstep: f64,
     /// Whether the netlist names it.
     pub named: bool,
+    /// Whether rows stand at its corners besides.
+    pub corners: bool,
 }
 
 /// Periods of events in a row that make a period of the run.
@@ -28,8 +30,8 @@ const REPEATED: usize = 8;
 
 /// The fastest of sources and events whose period is shorter than twice the print step, or just that.
 ///
-/// A source counts if it repeats within the run. Where the netlist names no print step, rows stand at events and at corners, and sources
-/// without corners alone count. The period of events is the median over those of one name.
+/// A source counts if it repeats within the run. Where the netlist names no print step, rows stand at events and at corners, and events do not count.
+/// The period of events is the median over those of one name.
 #[must_use]
 pub fn aliased<'a>(
     tran: &Tran,
@@ -40,7 +42,8 @@ pub fn aliased<'a>(
     let too_fast = |period: f64| period * (1.0 - WHOLE) <= 2.0 * tran.tstep;
     let sources = sources.filter_map(|(name, wave)| {
         let period = wave.period().filter(|period| *period < span)?;
-        (tran.prints || !wave.has_corners()).then(|| (name.to_string(), period, true))
+        let corners = !tran.prints && wave.has_corners();
+        Some((name.to_string(), period, true, corners))
     });
     let events = if tran.prints {
         periods(run)
@@ -49,15 +52,16 @@ pub fn aliased<'a>(
     };
     let events = events
         .into_iter()
-        .map(|(name, period)| (name, period, false));
+        .map(|(name, period)| (name, period, false, false));
     let fastest = sources
         .chain(events)
-        .filter(|(_, period, _)| too_fast(*period))
+        .filter(|(_, period, ..)| too_fast(*period))
         .min_by(|a, b| a.1.total_cmp(&b.1));
-    fastest.map(|(name, period, source)| Aliased {
+    fastest.map(|(name, period, source, corners)| Aliased {
         name,
         period,
         source,
+        corners,
         tstep: tran.tstep,
         named: tran.prints,
     })

@@ -21,6 +21,16 @@ pub enum RowKind {
     Event,
     /// A corner of a source where nothing else happens.
     Corner,
+    /// An output time of the grid at which an event or a corner is, too.
+    Both,
+}
+
+impl RowKind {
+    /// Whether the row stands at an output time of the grid.
+    #[must_use]
+    pub const fn is_grid(self) -> bool {
+        matches!(self, Self::Grid | Self::Both)
+    }
 }
 
 /// Rows that follow each other.
@@ -196,7 +206,7 @@ impl<'a> Sheet<'a> {
 
     /// Whether the last row is none of the grid's.
     fn ends_between(&self) -> bool {
-        self.kinds.last().is_some_and(|kind| *kind != RowKind::Grid)
+        self.kinds.last().is_some_and(|kind| !kind.is_grid())
     }
 
     /// A row between those of the grid. Of several at one instant the first and the last stay; a corner where there is a row adds none.
@@ -232,6 +242,9 @@ impl<'a> Sheet<'a> {
     fn insert(&mut self, t: f64, row: &[f64], kind: RowKind) {
         let at = self.time.len();
         if kind == RowKind::Corner && self.time.last() == Some(&t) {
+            if let Some(last) = self.kinds.last_mut().filter(|last| last.is_grid()) {
+                *last = RowKind::Both;
+            }
             return;
         }
         if at >= 2 && self.ends_between() && self.time[at - 2..] == [t, t] {
@@ -260,13 +273,18 @@ impl<'a> Sheet<'a> {
         }
         let (which, rows) = self.unknown(times, which, rows);
         self.take_held(times.at(which.start));
-        if self.ends_between() && self.time.last() == Some(&times.at(which.start)) {
+        let meets = self.ends_between() && self.time.last() == Some(&times.at(which.start));
+        if meets {
             self.pop();
         }
+        let first = self.time.len();
         self.time.extend(which.map(|k| times.at(k)));
         self.values.extend_from_slice(rows);
         if self.wants_events() {
             self.kinds.resize(self.time.len(), RowKind::Grid);
+        }
+        if let Some(kind) = self.kinds.get_mut(first).filter(|_| meets) {
+            *kind = RowKind::Both;
         }
         self.look();
         Ok(())

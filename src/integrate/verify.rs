@@ -256,7 +256,7 @@ fn quiet_times(run: &Run, runs: &[&Run], near: f64) -> Vec<f64> {
     let kind = |k: usize| run.kinds.get(k).copied().unwrap_or(RowKind::Grid);
     let times = run.waveforms.time.iter().enumerate();
     let all: Vec<f64> = times
-        .filter(|(k, _)| kind(*k) == RowKind::Grid)
+        .filter(|(k, _)| kind(*k).is_grid())
         .map(|(_, t)| *t)
         .collect();
     let events = runs.iter().flat_map(|run| run.events.iter().map(|e| e.t));

@@ -217,13 +217,16 @@ fn unbalanced(run: &Run) -> Option<Note> {
     (!known).then(|| Note::of(<[String; 0]>::default(), text))
 }
 
-fn aliasing(aliased: &Aliased) -> Note {
+/// That rows do not show what happens between them.
+#[must_use]
+pub fn aliasing(aliased: &Aliased) -> Note {
     let Aliased {
         name,
         period,
         source,
         tstep,
         named,
+        corners,
     } = aliased;
     let whose = if *source {
         "the period of"
@@ -235,8 +238,15 @@ fn aliasing(aliased: &Aliased) -> Note {
     } else {
         "the step of the 1,000 rows that `.tran` without a print step has"
     };
+    let (hidden, shows) = if *corners {
+        let between =
+            "between its corners and events curves are straight lines, also where they ripple";
+        (between, "shows more")
+    } else {
+        ("rows do not show its course", "does")
+    };
     let text = format!(
-        "{step}, {}, is half or more of {whose} {name}, {}: rows do not show its course; a print step below {} in `.tran` does",
+        "{step}, {}, is half or more of {whose} {name}, {}: {hidden}; a print step below {} in `.tran` {shows}",
         si::quantity(*tstep, "s", 4),
         si::quantity(*period, "s", 4),
         si::quantity(0.1 * period, "s", 2),

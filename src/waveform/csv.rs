@@ -1,6 +1,6 @@
 //! Comma-separated values: `time,v(out),…` with 17 significant digits.
 
-use std::io::{Read, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 
 use nalgebra::Complex;
 
@@ -133,6 +133,16 @@ fn malformed(reason: impl Into<String>) -> WaveformError {
     WaveformError::malformed(FORMAT, reason)
 }
 
+/// What stands between cells: a tab, as LTspice exports, or a semicolon where the first line of names has no comma.
+fn delimiter(start: &[u8]) -> u8 {
+    let mut lines = start.split(|&b| b == b'\n');
+    let header = lines
+        .find(|line| !line.starts_with(b"#"))
+        .unwrap_or_default();
+    let has = |b: &u8| header.contains(b);
+    [b',', b'\t', b';'].into_iter().find(has).unwrap_or(b',')
+}
+
 /// Finite numbers under a header.
 struct Table {
     names: Vec<String>,
@@ -143,7 +153,10 @@ struct Table {
 
 impl Table {
     fn read(from: impl Read) -> Result<Self, WaveformError> {
+        let mut from = BufReader::new(from);
+        let start = from.fill_buf().map_err(WaveformError::from)?;
         let mut reader = csv::ReaderBuilder::new()
+            .delimiter(delimiter(start))
             .comment(Some(b'#'))
             .trim(csv::Trim::All)
             .flexible(true)

@@ -69,6 +69,12 @@ pub(super) fn warn_of_suffix(at: Input<'_>, name: &Name, value: &Expr) {
             capital,
             format!("write `{digits}Meg` for {digits} MΩ, `{digits}m` for {digits} mΩ"),
         ),
+        (Some('r' | 'l'), 'F') => (
+            "suffix-f",
+            format!("`{written}` is {digits} femto"),
+            capital,
+            format!("write `{digits}`, or `{digits}f` for {digits} femto"),
+        ),
         (Some('c'), 'F') => (
             "suffix-f",
             format!("`{written}` is {digits} femto"),

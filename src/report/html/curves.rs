@@ -1,5 +1,7 @@
 //! The curves of a figure.
 
+use std::collections::HashSet;
+
 use super::{Axis, Curve, Page, Panel, axis};
 use crate::report::figure::{self, Figure, Series};
 
@@ -56,12 +58,19 @@ impl Page {
             }
             // Gates and switched nodes stand apart from other voltages.
             let may_be_gates = panel.unit == "V" && figure.axis == figure::Axis::Time;
-            let (gates, rest): (Vec<_>, Vec<_>) = curves
+            // Of several runs all say the same of a signal.
+            let others: HashSet<&str> = panel
+                .series
+                .iter()
+                .filter(|series| !may_be_gates || !is_gate(series))
+                .map(signal)
+                .collect();
+            let (rest, gates): (Vec<_>, Vec<_>) = curves
                 .into_iter()
-                .partition(|(series, _)| may_be_gates && is_gate(series));
+                .partition(|(series, _)| others.contains(signal(series)));
             let quantity = match rest.is_empty() {
                 true => &panel.quantity,
-                false => "at two levels",
+                false => "voltage at two levels",
             };
             for (quantity, curves) in [(panel.quantity.as_str(), rest), (quantity, gates)] {
                 if curves.is_empty() {
@@ -77,6 +86,11 @@ impl Page {
         }
         page
     }
+}
+
+/// The signal that a curve is of, without its run.
+fn signal(series: &Series) -> &str {
+    series.name.trim_end_matches(&series.run[..]).trim_end()
 }
 
 /// Whether a voltage stands at one of two levels nearly always.
@@ -109,9 +123,13 @@ mod tests {
     use super::*;
 
     fn series(value: impl Fn(f64) -> f64) -> Series {
+        named("v(a)", value)
+    }
+
+    fn named(name: &str, value: impl Fn(f64) -> f64) -> Series {
         let rows = (0..1000).map(|k| f64::from(k) / 1000.0);
         Series {
-            name: "v(a)".into(),
+            name: name.into(),
             run: String::new(),
             points: rows.map(|t| (t, value(t))).collect(),
         }
@@ -137,7 +155,8 @@ mod tests {
 
     #[test]
     fn gates_have_a_panel_of_their_own_beside_other_voltages() {
-        let pulse = || series(|t| f64::from(u8::from((t * 10.0).fract() > 0.5)));
+        let gate = |t: f64| f64::from(u8::from((t * 10.0).fract() > 0.5));
+        let pulse = || named("v(g)", gate);
         let page = |all: Vec<Series>| {
             let panel = figure::Panel {
                 quantity: "voltage".into(),
@@ -155,7 +174,7 @@ mod tests {
         assert_eq!(page(vec![pulse()]), ["voltage"]);
         assert_eq!(
             page(vec![pulse(), series(f64::sin)]),
-            ["voltage", "at two levels"]
+            ["voltage", "voltage at two levels"]
         );
     }
 }

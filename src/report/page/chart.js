@@ -330,7 +330,7 @@ function chart(root, content, announce) {
     }, { passive: false });
     // Shift and drag moves the view; a press that does not move places a cursor.
     plot.over.addEventListener("mousedown", (event) => {
-      dragged = { x: event.clientX, from: event.clientX, shift: event.shiftKey };
+      dragged = { x: event.clientX, from: event.clientX, top: event.clientY, shift: event.shiftKey };
       if (event.shiftKey) event.stopImmediatePropagation();
     }, true);
     plot.over.addEventListener("mousemove", (event) => {
@@ -340,7 +340,8 @@ function chart(root, content, announce) {
       }
     });
     plot.over.addEventListener("click", (event) => {
-      if (dragged && Math.abs(event.clientX - dragged.from) <= SIZES.pixelsToDrag) place(event.shiftKey ? "b" : "a", at(event));
+      const moved = dragged && Math.max(Math.abs(event.clientX - dragged.from), Math.abs(event.clientY - dragged.top));
+      if (dragged && moved <= SIZES.pixelsToDrag) place(event.shiftKey ? "b" : "a", at(event));
       dragged = null;
     });
   }

@@ -96,8 +96,10 @@ function circuitOf(svg, shown, area) {
     const strips = new Map((shown?.strips ?? []).map((strip) => [strip.name, strip]));
     when.textContent = states.length === 0 || strips.size === 0 ? "" : t === null ? "Cursor A (a click on a curve) colours what conducts there." : `What conducts at ${quantity(t, "s", 9)} is coloured.`;
     for (const state of states) {
-      const strip = strips.get(state.dataset.device);
-      const on = t !== null && strip !== undefined && stateAt(strip, t) === true;
+      // A transistor conducts where its channel or its body diode does.
+      const device = state.dataset.device;
+      const parts = [...strips.values()].filter(({ name }) => name === device || name.startsWith(`${device}.`));
+      const on = t !== null && parts.some((strip) => stateAt(strip, t) === true);
       state.setAttribute("display", on === (state.dataset.on === "1") ? "inline" : "none");
     }
   };
@@ -144,8 +146,17 @@ function circPage(root, data) {
     toggle("log y", "y", (chart) => chart.logarithmic, "logarithmic axis of absolute values");
   }
   const spectrumLooks = { x: false, y: false };
+  const spectrumWords = element("p", { class: "about" });
+  /** Straight lines between rows that are far apart make lines of their own, below half the rate of rows too. */
+  function spectrumNote() {
+    const gap = Math.max(...shown.panels.flatMap((panel) => panel.curves.filter((curve) => curve.shown)).map((curve) => widestGap(curve.x, ...shown.state.view)));
+    spectrumWords.textContent = gap > 0
+      ? `Rows are up to ${quantity(gap, "s", 3)} apart here and curves straight between them: what moves within ${quantity(10 * gap, "s", 3)} can make lines that are not there, lower ones too. A shorter print step (.tran) tells.`
+      : "";
+  }
   function transformed() {
     spectrum?.remove();
+    spectrumNote();
     const of = shown.panels.map((panel) => ({
       ...panel,
       curves: panel.curves.filter((curve) => curve.shown).map((curve) => spectrumOf(curve, ...shown.state.view)),
@@ -154,7 +165,8 @@ function circPage(root, data) {
     if (spectrumArea.childElementCount === 0) {
       const bar = element("div", { class: "controls", role: "toolbar", "aria-label": "axes of the spectrum" });
       axes(bar, () => spectrum, spectrumLooks);
-      spectrumArea.append(element("h2", {}, "Spectrum of what is seen"), bar, element("div"));
+      spectrumArea.append(element("h2", {}, "Spectrum of what is seen"), spectrumWords, bar, element("div"));
+      spectrumArea.scrollIntoView({ block: "nearest" });
     }
     spectrum = chart(spectrumArea.lastChild, { axis: { name: "frequency", unit: "Hz", log: spectrumLooks.x }, panels: of, strips: [] }, announce);
     if (spectrumLooks.y) spectrum.logarithmic(true);

@@ -31,6 +31,13 @@ function transform(re, im) {
   }
 }
 
+/** The longest time between rows in [from, to]. */
+function widestGap(x, from, to) {
+  let gap = 0;
+  for (let k = Math.max(rowAt(x, from), 1), last = rowAfter(x, to); k < last; k++) gap = Math.max(gap, x[k] - x[k - 1]);
+  return gap;
+}
+
 /**
  * Amplitudes of the curve in [from, to] over frequency, f > 0: of a sine in the span its peak value. Values between rows are straight lines;
  * the mean is taken away first, as the window would smear it.

@@ -47,9 +47,9 @@ pub(super) fn draw(all: &Parts, sheet: &ast::Sheet, states: States<'_>, title: &
             "0" | "gnd" => ground(&mut drawing, (x, y)),
             // Beside a wire that goes up from there, not on it.
             name if goes_up(sheet, *at) => {
-                named(&mut drawing, name, (x + 4.0, y - 5.0), Anchor::Start);
+                named(&mut drawing, name, (x + 4.0, y - 7.0), Anchor::Start);
             }
-            name => named(&mut drawing, name, (x, y - 5.0), Anchor::Middle),
+            name => named(&mut drawing, name, (x, y - 7.0), Anchor::Middle),
         }
     }
     let coupled = all

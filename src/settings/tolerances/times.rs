@@ -31,6 +31,14 @@ pub(crate) const MOST_PARTS: f64 = 1e5;
 /// without a word; smaller: notes where the eye sees nothing.
 pub(crate) const ROWS_APART: f64 = 1e-2;
 
+/// The same before rows are computed closer for measurements, once. As straight lines are off by the square of their length, a ninth of it is left out at
+/// most then. Larger: less exact measurements; smaller: a second run and more rows for more circuits.
+pub(crate) const ROWS_CLOSE: f64 = 1e-3;
+
+/// Twice the rows at events over those of the grid from which on a note says that measurements may see too little between events, where memory does not
+/// allow more. Larger: ripples that are not seen without a word; smaller: notes where all is seen.
+pub(crate) const CROWDED: f64 = 4.0;
+
 /// A measurement below this part of the largest value in the rows counts as zero there. Larger: small powers are not looked at; smaller: means of what has none.
 pub(crate) const NOTHING: f64 = 1e-6;
 
