@@ -28,7 +28,7 @@ pub struct Aliased {
 /// Periods of events in a row that make a period of the run.
 const REPEATED: usize = 8;
 
-/// The fastest of sources and events whose period is shorter than twice the print step, or just that.
+/// The fastest of sources and events, of those without rows at corners if there are any, whose period is shorter than twice the print step, or just that.
 ///
 /// A source counts if it repeats within the run. Where the netlist names no print step, rows stand at events and at corners, and events do not count.
 /// The period of events is the median over those of one name.
@@ -56,7 +56,8 @@ pub fn aliased<'a>(
     let fastest = sources
         .chain(events)
         .filter(|(_, period, ..)| too_fast(*period))
-        .min_by(|a, b| a.1.total_cmp(&b.1));
+        // What has no rows of its own first.
+        .min_by(|a, b| a.3.cmp(&b.3).then(a.1.total_cmp(&b.1)));
     fastest.map(|(name, period, source, corners)| Aliased {
         name,
         period,
