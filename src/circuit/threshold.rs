@@ -83,7 +83,7 @@ fn never_passes(circuit: &Circuit, element: &Element, switch: &Switch) -> Option
     if let Some((a, b)) = floating(circuit, switch) {
         low += a.min(b);
         high += a.max(b);
-        return moved(element, switch, (low, high));
+        return stays(element, switch, (low, high));
     }
     for (gain, quantity) in &switch.control.terms {
         let Quantity::Voltage(node) = *quantity else {
@@ -101,7 +101,7 @@ fn never_passes(circuit: &Circuit, element: &Element, switch: &Switch) -> Option
         low += a.min(b);
         high += a.max(b);
     }
-    moved(element, switch, (low, high))
+    stays(element, switch, (low, high))
 }
 
 /// The ends of the range of a control that is the voltage of one source between two nodes.
@@ -127,7 +127,7 @@ fn floating(circuit: &Circuit, switch: &Switch) -> Option<(f64, f64)> {
 }
 
 /// What is said of a switch whose control stays in a range.
-fn moved(element: &Element, switch: &Switch, (low, high): (f64, f64)) -> Option<Diagnostic> {
+fn stays(element: &Element, switch: &Switch, (low, high): (f64, f64)) -> Option<Diagnostic> {
     // A constant control is meant.
     if low == high {
         return None;

@@ -133,14 +133,14 @@ fn malformed(reason: impl Into<String>) -> WaveformError {
     WaveformError::malformed(FORMAT, reason)
 }
 
-/// What stands between cells: a tab, as LTspice exports, or a semicolon where the first line of names has no comma.
+/// What stands between cells: a tab where the line of names has one, as LTspice exports (`V(a,b)` is a name there), else a comma or a semicolon.
 fn delimiter(start: &[u8]) -> u8 {
     let mut lines = start.split(|&b| b == b'\n');
     let header = lines
         .find(|line| !line.starts_with(b"#"))
         .unwrap_or_default();
     let has = |b: &u8| header.contains(b);
-    [b',', b'\t', b';'].into_iter().find(has).unwrap_or(b',')
+    [b'\t', b',', b';'].into_iter().find(has).unwrap_or(b',')
 }
 
 /// Finite numbers under a header.
@@ -237,6 +237,17 @@ fn unreadable(error: csv::Error) -> WaveformError {
 mod tests {
     use super::super::tests::sample;
     use super::*;
+
+    #[test]
+    fn a_tab_or_a_semicolon_stands_between_cells() {
+        for text in [
+            "time\tV(a,b)\tI(L1)\n0\t1\t2\n1e-3\t3\t4\n",
+            "time;v(a);i(l1)\n0;1;2\n1e-3;3;4\n",
+        ] {
+            let table = Table::read(text.as_bytes()).unwrap();
+            assert_eq!(table.columns, [[0.0, 1e-3], [1.0, 3.0], [2.0, 4.0]]);
+        }
+    }
 
     #[test]
     fn what_is_written_reads_back_to_the_same_doubles() {

@@ -90,7 +90,11 @@ impl Page {
 
 /// The signal that a curve is of, without its run.
 fn signal(series: &Series) -> &str {
-    series.name.trim_end_matches(&series.run[..]).trim_end()
+    series
+        .name
+        .strip_suffix(&series.run[..])
+        .unwrap_or(&series.name)
+        .trim_end()
 }
 
 /// Whether a voltage stands at one of two levels nearly always.
@@ -176,5 +180,15 @@ mod tests {
             page(vec![pulse(), series(f64::sin)]),
             ["voltage", "voltage at two levels"]
         );
+        // A signal that is one in one run of several alone is none.
+        let runs = |second: fn(f64) -> f64| {
+            let run = |label: &str, value: fn(f64) -> f64| Series {
+                run: label.into(),
+                ..named(&format!("v(g) {label}"), value)
+            };
+            page(vec![run("r=1", gate), run("r=2", second), series(f64::sin)])
+        };
+        assert_eq!(runs(gate), ["voltage", "voltage at two levels"]);
+        assert_eq!(runs(f64::sin), ["voltage"]);
     }
 }
