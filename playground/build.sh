@@ -5,7 +5,7 @@ cd "$(dirname "$0")"
 
 version=$(sed -n 's/^wasm-bindgen = "=\(.*\)"$/\1/p' Cargo.toml)
 target=wasm32-unknown-unknown
-tools="${CIRC_TOOLS:-$PWD/target/tools}"
+tools="$PWD/../target/tools"
 PATH="$tools/bin:$PATH"
 
 left_out() { echo "the playground is left out: $1" >&2; exit 3; }
@@ -15,9 +15,9 @@ if [ "$(wasm-bindgen --version 2>/dev/null)" != "wasm-bindgen $version" ]; then
   cargo install --quiet --debug --root "$tools" wasm-bindgen-cli --version "$version" || left_out "no wasm-bindgen $version"
 fi
 
-cargo build --release --target $target
+cargo build --profile playground --target $target
 rm -rf dist && mkdir dist
-wasm-bindgen --target web --no-typescript --remove-name-section --out-dir dist "${CARGO_TARGET_DIR:-target}/$target/release/circ_playground.wasm"
+wasm-bindgen --target web --no-typescript --remove-name-section --out-dir dist "../target/$target/playground/circ_playground.wasm"
 if command -v wasm-opt >/dev/null; then
   wasm-opt -Os --all-features -o dist/opt.wasm dist/circ_playground_bg.wasm && mv dist/opt.wasm dist/circ_playground_bg.wasm
 fi
