@@ -152,7 +152,12 @@ fn tables_are_what_fine_quadrature_finds() {
         let table = table(&model, &TableOptions::default()).expect(file);
         assert!(table.exact, "{file}");
         let circuit = model.circuit();
-        let elements = circuit.elements.iter();
+        // What has parts has their power, too.
+        let is_whole = |name: &str| {
+            let inside = format!("{name}.");
+            circuit.elements.iter().any(|e| e.name.starts_with(&inside))
+        };
+        let elements = circuit.elements.iter().filter(|e| !is_whole(&e.name));
         let chosen = elements.filter(|e| only.is_empty() || only.contains(&e.name.as_str()));
         let chosen: Vec<(&str, String, String)> = chosen
             .take(4)
@@ -324,6 +329,28 @@ fn powers_add_up_to_the_energy_balance() {
         let lost = all * seconds + energy.jumps;
         assert!(lost.abs() <= 1e-12 * size, "{file}: {lost:e}");
     }
+}
+
+#[test]
+fn an_element_has_the_power_of_its_parts() {
+    let table = table_of(
+        "parts\nv1 d 0 10\nvg g s 10\nm1 d g s s n\nl1 s a 1m rser=1\nr1 a 0 4\n.model n nmos(vto=3 kp=1 rd=2)\n.tran 1m\n.end\n",
+    );
+    let power = |name: &str| table.element(name).expect(name).power;
+    let conducts = power("m1.channel");
+    assert!(conducts > 0.1);
+    near(power("m1"), conducts + power("m1.body"), conducts);
+    let (m1, channel) = (
+        table.element("m1").unwrap(),
+        table.element("m1.channel").unwrap(),
+    );
+    assert_eq!(m1.v, channel.v);
+    // At rest an inductor takes what its resistance does.
+    near(
+        power("l1"),
+        table.element("l1").unwrap().i.rms.powi(2),
+        conducts,
+    );
 }
 
 #[test]

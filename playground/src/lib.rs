@@ -1,6 +1,6 @@
 //! What the page of the playground asks of `circ`: netlist text in, JSON out.
 
-use circ::analysis::{Finished, transient};
+use circ::analysis::{Finished, pictured};
 use circ::diagnostic::{SourceFile, SourceMap};
 use circ::report::figure::Figure;
 use circ::report::html::Page;
@@ -95,7 +95,7 @@ fn carried_out(model: &Model, netlist: &str) -> Ran {
         corners: true,
         ..SimOptions::default()
     };
-    let Finished { run, error } = transient(model, options);
+    let Finished { run, error } = pictured(model, options);
     let failure = error.map(|error| error.diagnostic(model.circuit()));
     let findings = findings(failure.as_slice(), netlist, model.sources());
     let Some((run, found)) = run else {

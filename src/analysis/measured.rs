@@ -5,10 +5,10 @@ use super::start::beginning;
 use super::table::Table;
 use super::worst::Worst;
 use crate::circuit::{Circuit, Harmonics, Measured, Probe, Tran};
-use crate::integrate::{Block, Error, Grid, Note, Orbit, RowKind, Run, SimOptions};
+use crate::integrate::{Block, Error, Grid, Method, Note, Orbit, RowKind, Run, SimOptions};
 use crate::model::Model;
 use crate::settings::tolerances::times::{
-    CROWDED, LAST_ROW, NOTHING, ROWS_APART, ROWS_CLOSE, SAME_TIME,
+    CROWDED, LAST_ROW, LINES_CLOSE, NOTHING, ROWS_A_PERIOD, ROWS_APART, ROWS_CLOSE, SAME_TIME,
 };
 use crate::waveform::Waveforms;
 
@@ -17,6 +17,9 @@ const ROWS: usize = 2000;
 
 /// Values of an orbit that is repeated for measurements at most.
 const MOST_VALUES: usize = 4_000_000;
+
+/// Values of a picture between output times at most.
+const MOST_PICTURED: usize = 1_000_000;
 
 /// The outcome of the measurements of one run.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -85,9 +88,32 @@ pub fn transient(model: &Model, options: SimOptions<'_>) -> Finished {
     if !is_measured(model.circuit()) {
         return begun(model, model, options);
     }
-    let (measuring, mut finished) = observed(model, options);
+    let measuring = Measuring::of(model.circuit(), options.step.is_some());
+    shown_of(measuring, model, options)
+}
+
+/// The same for pictures, which follow curves between output times: with rows of the kind [`RowKind::Between`] where events, sources or the
+/// curves themselves are faster than the grid.
+///
+/// There are 16 rows for each period of the fastest source, and the run is made again with closer rows where fewer than twice as many as at events turn out to be
+/// between these, or where a third of them makes another line; the latter of exact runs alone, as others would take as long again. A fixed step,
+/// and memory, set limits to that.
+#[must_use]
+pub fn pictured(model: &Model, options: SimOptions<'_>) -> Finished {
+    let mut measuring = Measuring::of(model.circuit(), options.step.is_some());
+    if options.step.is_none() {
+        measuring.picture(model, options.settings.max_held / size_of::<f64>());
+    }
+    shown_of(measuring, model, options)
+}
+
+/// A run with its measurements, of which what is shown remains.
+fn shown_of(measuring: Measuring<'_>, model: &Model, options: SimOptions<'_>) -> Finished {
+    let (measuring, mut finished) = observed(measuring, model, options);
     if let Some((run, found)) = &mut finished.run {
-        run.notes.extend(measuring.too_coarse(run, found));
+        if is_measured(measuring.circuit) {
+            run.notes.extend(measuring.too_coarse(run, found));
+        }
         (run.waveforms, run.kinds) = measuring.cut(&run.waveforms, &run.kinds);
     }
     finished
@@ -112,7 +138,8 @@ fn begun(model: &Model, shown: &Model, mut options: SimOptions<'_>) -> Finished 
 
 /// The same with the rows and signals that the measurements saw.
 pub(super) fn measured(model: &Model, options: SimOptions<'_>) -> Finished {
-    observed(model, options).1
+    let measuring = Measuring::of(model.circuit(), options.step.is_some());
+    observed(measuring, model, options).1
 }
 
 /// The same on the first grid, whatever it hides: differences of runs need one grid.
@@ -121,8 +148,11 @@ pub(super) fn measured_once(model: &Model, mut options: SimOptions<'_>) -> Finis
 }
 
 /// A run with its measurements, made again on closer rows where those of the first one turn out to be too far apart for them.
-fn observed<'a>(model: &'a Model, mut options: SimOptions<'_>) -> (Measuring<'a>, Finished) {
-    let mut measuring = Measuring::of(model.circuit(), options.step.is_some());
+fn observed<'a>(
+    mut measuring: Measuring<'a>,
+    model: &Model,
+    mut options: SimOptions<'_>,
+) -> (Measuring<'a>, Finished) {
     let mut finished = measuring.run(model, &mut options);
     // First as many as events ask for, then as curves do.
     for _ in 0..2 {
@@ -197,8 +227,8 @@ pub(super) fn laps(
     let laps = (until / period - LAST_ROW).ceil().max(2.0) as usize;
     let kept = laps.min((MOST_VALUES / values.max(1)).max(2));
     let note = (kept < laps).then(|| {
-        let text = "of the periods until the end of `.tran`";
-        format!("measurements see the last {kept} {text}, which are {laps}").into()
+        format!("measurements see the last {kept} of the {laps} periods until the end of `.tran`")
+            .into()
     });
     ((laps - kept, laps), note)
 }
@@ -207,6 +237,24 @@ pub(super) fn laps(
 fn crowd(kinds: &[RowKind]) -> f64 {
     let grid = kinds.iter().filter(|kind| kind.is_grid()).count();
     2.0 * (kinds.len() - grid) as f64 / grid.max(1) as f64
+}
+
+/// First and last row of each three steps of the grid without an event or a corner. (The front after an event may be steeper than any grid.)
+fn lines(kinds: &[RowKind]) -> Vec<(usize, usize)> {
+    let smooth = kinds.chunk_by(|one, next| (*one == RowKind::Grid) == (*next == RowKind::Grid));
+    let (mut lines, mut first) = (Vec::new(), 0);
+    for rows in smooth {
+        let end = first + rows.len();
+        if rows[0] == RowKind::Grid {
+            lines.extend(
+                (first..end.saturating_sub(3))
+                    .step_by(3)
+                    .map(|k| (k, k + 3)),
+            );
+        }
+        first = end;
+    }
+    lines
 }
 
 /// What a circuit's measurements need, and how its results are shown without that.
@@ -218,6 +266,8 @@ struct Measuring<'a> {
     divisions: usize,
     /// Columns that are shown.
     shown: usize,
+    /// Values that a picture has room for, where the rows between are shown, too.
+    pictured: Option<usize>,
 }
 
 impl<'a> Measuring<'a> {
@@ -229,7 +279,29 @@ impl<'a> Measuring<'a> {
             // A fixed step is the user's choice of accuracy, which rows between would change.
             divisions: if fixed_step { 1 } else { ROWS.div_ceil(rows) },
             shown: circuit.probes().len(),
+            pictured: None,
         }
+    }
+
+    /// Shows rows between those of the grid, of so many values at most.
+    fn picture(&mut self, model: &Model, held: usize) {
+        let Some(tran) = self.circuit.tran else {
+            return;
+        };
+        let (span, rows) = (tran.tstop - tran.tstart, Grid::of(&tran).len());
+        let sources = &model.multiport().sources;
+        let periods = sources.iter().map(|s| s.input.source.wave.period());
+        let shortest = periods.flatten().fold(f64::INFINITY, f64::min);
+        // Half of what there is room for, as events have rows as well.
+        let room = MOST_PICTURED.min(held / 2);
+        let most = room / (rows * (self.shown + 1));
+        let wanted = ROWS_A_PERIOD * span / shortest / rows as f64;
+        if is_measured(self.circuit) {
+            self.divisions = self.divisions.max((wanted.ceil() as usize).min(most));
+        } else {
+            self.divisions = (wanted.ceil() as usize).min(most).max(1);
+        }
+        self.pictured = Some(room);
     }
 
     /// A run on the finer grid, with the signals of the measurements after those that are shown.
@@ -354,18 +426,56 @@ impl<'a> Measuring<'a> {
         both.filter(|(.., off)| *off > 0.0).collect()
     }
 
+    /// How far rows of the grid stand from straight lines over two of them left out, from each event on, over the extent of their signal: the most.
+    fn bent(&self, run: &Run) -> f64 {
+        let waves = &run.waveforms;
+        let lines = lines(&run.kinds);
+        let range = |j: usize| {
+            let fold = |(low, high): (f64, f64), v| (low.min(v), high.max(v));
+            waves.column(j).fold((f64::MAX, f64::MIN), fold)
+        };
+        let ranges: Vec<_> = (0..self.shown).map(range).collect();
+        let of_signal = |j: usize| {
+            let value = |k: usize| waves.values[k * waves.width() + j];
+            let (low, high) = ranges[j];
+            // What is zero but for rounding, beside others of its unit, has no line.
+            let alike = ranges.iter().zip(&waves.units);
+            let alike = alike.filter(|(_, unit)| **unit == waves.units[j]);
+            let least =
+                NOTHING * alike.fold(0.0, |m: f64, ((l, h), _)| m.max(l.abs()).max(h.abs()));
+            let off = lines.iter().flat_map(|&(from, to)| {
+                let since = move |k: usize| waves.time[k] - waves.time[from];
+                let slope = (value(to) - value(from)) / since(to);
+                (from + 1..to).map(move |k| (value(k) - value(from) - slope * since(k)).abs())
+            });
+            let extent = (high - low).max(least).max(f64::MIN_POSITIVE);
+            off.fold(0.0, f64::max) / extent
+        };
+        (0..self.shown).map(of_signal).fold(0.0, f64::max)
+    }
+
     /// How often the print step is to be divided for rows that are close enough: twice as many as at events and corners, beside which fewer say nothing;
     /// and what straight lines leave out falls with the square of their length.
     fn closer(&self, run: &Run, found: &Measurements) -> Option<usize> {
+        let measured = is_measured(self.circuit);
+        let room = match self.pictured {
+            Some(_) if !measured && run.method != Method::Exact.name() => return None,
+            Some(room) if !measured => room,
+            _ => MOST_VALUES,
+        };
         let crowd = crowd(&run.kinds);
         let needed = if crowd > 1.0 {
             crowd
         } else {
             let thinned = self.thinned(run, found);
             let off = thinned.iter().map(|(.., off)| *off).fold(0.0, f64::max);
-            (off / ROWS_CLOSE).sqrt()
+            let lines = match self.pictured {
+                Some(_) => self.bent(run) / LINES_CLOSE,
+                None => 0.0,
+            };
+            (off / ROWS_CLOSE).max(lines).sqrt()
         };
-        let most = MOST_VALUES / run.waveforms.values.len().max(1);
+        let most = room / run.waveforms.values.len().max(1);
         let factor = (needed.ceil() as usize).min(most);
         (factor > 1).then(|| factor * self.divisions)
     }
@@ -391,7 +501,7 @@ impl<'a> Measuring<'a> {
         })
     }
 
-    /// The signals that are shown, at the print steps and between.
+    /// The signals that are shown, at the print steps, at events, and for pictures between.
     fn cut(&self, waves: &Waveforms, kinds: &[RowKind]) -> (Waveforms, Vec<RowKind>) {
         let grid = self.tran.map(|tran| Grid::of(&tran));
         let fine = self.fine().map(|tran| Grid::of(&tran).len());
@@ -417,6 +527,8 @@ impl<'a> Measuring<'a> {
                 // Between the output times that are shown it stands for what else is there.
                 if time.is_none() && kind == RowKind::Both {
                     (time, kind) = (Some(t), RowKind::Corner);
+                } else if time.is_none() && self.pictured.is_some() {
+                    (time, kind) = (Some(t), RowKind::Between);
                 }
             }
             if let Some(mut time) = time {

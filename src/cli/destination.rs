@@ -65,6 +65,12 @@ impl<'a> Destination<'a> {
         self.plots || self.formats.iter().any(|format| format.is_picture())
     }
 
+    /// Whether rows are read as numbers.
+    pub(super) fn has_numbers(&self) -> bool {
+        let to_pipe = self.wanted.results.outputs.is_empty() && !self.plots;
+        to_pipe || self.formats.iter().any(|format| !format.is_picture())
+    }
+
     /// Opens files.
     ///
     /// # Errors

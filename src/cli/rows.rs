@@ -24,6 +24,7 @@ impl Shown {
             RowKind::Grid | RowKind::Both => true,
             RowKind::Event => self.events,
             RowKind::Corner => self.corners,
+            RowKind::Between => false,
         }
     }
 

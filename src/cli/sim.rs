@@ -120,8 +120,10 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
     );
     let mut outputs = destination.open(&Columns::of_subject(&subject))?;
     let circuit = subject.model().map(Model::circuit);
-    let measures = circuit.is_some_and(is_measured);
-    let collects = outputs.hold() || destination.plots || measures || args.verify;
+    let pictures = destination.has_pictures();
+    // Then rows are chosen at the end.
+    let feeds = circuit.is_some_and(|circuit| pictures || is_measured(circuit));
+    let collects = outputs.hold() || destination.plots || feeds || args.verify;
     let mut take = |block: Block<'_>| match circuit.and_then(|c| shown_values(c, block)) {
         Some(values) => outputs.take(Block {
             values: &values,
@@ -130,7 +132,9 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         None => outputs.take(block),
     };
     let route = Route {
-        corners: destination.has_pictures() || args.verify,
+        corners: pictures || args.verify,
+        pictures,
+        numbers: destination.has_numbers(),
         sink: Some(&mut take),
         discard: !collects,
         cancel: Some(signals.flag()),
@@ -166,7 +170,7 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
     {
         finished.run = Some((shown(circuit, run), found));
     }
-    destination.finish(outputs, finished, measures, signals.received())
+    destination.finish(outputs, finished, feeds, signals.received())
 }
 
 impl SimArgs {
@@ -288,6 +292,10 @@ fn no_tran() -> Error {
 pub(super) struct Route<'a> {
     /// Rows at events and corners.
     pub corners: bool,
+    /// Rows between those, which pictures want.
+    pub pictures: bool,
+    /// Rows are read as numbers.
+    pub numbers: bool,
     /// Takes rows as they come.
     pub sink: Option<Sink<'a>>,
     /// Rows are for the sink alone.
@@ -353,9 +361,21 @@ pub(super) fn transient(
     } else {
         None
     };
-    let run = |options: SimOptions<'_>| analysis::transient(model, SimOptions { start, ..options });
+    let Route {
+        pictures, numbers, ..
+    } = route;
+    let run = |options: SimOptions<'_>| {
+        let options = SimOptions { start, ..options };
+        if pictures {
+            analysis::pictured(model, options)
+        } else {
+            analysis::transient(model, options)
+        }
+    };
     let mut finished = with_options(tran, request, route, streams, run);
-    if let (Some((run, _)), Some(tran)) = (&mut finished.run, tran) {
+    // Pictures have rows enough, unless the step is the user's.
+    let told = numbers || request.step.is_some();
+    if let (true, Some((run, _)), Some(tran)) = (told, &mut finished.run, tran) {
         let inputs = model.multiport().sources.iter().map(|s| &s.input);
         say_aliased(run, aliased(&tran, waves(inputs), run));
     }

@@ -127,6 +127,8 @@ impl Stepping<'_> {
         let model = input::variant(&self.args.input, variant, &quiet)?;
         let route = Route {
             corners: destination.has_pictures(),
+            pictures: destination.has_pictures(),
+            numbers: destination.has_numbers(),
             cancel: Some(self.signals.flag()),
             held: Some(held),
             from_orbit: self.args.from_pss,

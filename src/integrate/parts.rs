@@ -349,7 +349,7 @@ impl<S: Modal> Parts<S> {
                 log.row(t, &after);
             }
             RowKind::Corner => log.corner(t, &after),
-            RowKind::Event | RowKind::Grid | RowKind::Both => log.row(t, &after),
+            RowKind::Event | RowKind::Grid | RowKind::Both | RowKind::Between => log.row(t, &after),
         }
         for (_, coming) in told {
             self.coming.add(coming.without_instants());

@@ -23,6 +23,8 @@ pub enum RowKind {
     Corner,
     /// An output time of the grid at which an event or a corner is, too.
     Both,
+    /// Between output times, where pictures follow the curve; files do not have it.
+    Between,
 }
 
 impl RowKind {

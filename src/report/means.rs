@@ -6,18 +6,37 @@ use crate::analysis::{Mean, SignalMeans, Table, Throughput};
 /// Digits shown.
 const DIGITS: usize = 4;
 
+/// Of the largest voltage or current of a table, what is shown as 0: the rounding of a difference.
+const INVISIBLE: f64 = 1e-13;
+
 impl Table {
     /// A table of the elements, one of the signals shown, and powers.
     #[must_use]
     pub fn words(&self) -> String {
+        let largest = |means: &mut dyn Iterator<Item = &Mean>| {
+            means.fold(0.0, |most: f64, mean| {
+                most.max(mean.min.abs()).max(mean.max.abs())
+            })
+        };
+        let volts = largest(&mut self.elements.iter().map(|element| &element.v));
+        let amperes = largest(&mut self.elements.iter().map(|element| &element.i));
+        let quantity = |x: f64, unit: &str| {
+            let scale = match unit {
+                "V" => volts,
+                "A" => amperes,
+                _ => volts * amperes,
+            };
+            let x = if x.abs() < INVISIBLE * scale { 0.0 } else { x };
+            si::quantity(x, unit, DIGITS)
+        };
         let cells = |mean: &Mean, unit: &str| {
-            [mean.mean, mean.rms, mean.min, mean.max].map(|x| si::quantity(x, unit, DIGITS))
+            [mean.mean, mean.rms, mean.min, mean.max].map(|x| quantity(x, unit))
         };
         let elements = self.elements.iter().map(|element| {
             let mut row = vec![element.name.clone()];
             row.extend(cells(&element.i, "A"));
             row.extend(cells(&element.v, "V"));
-            row.push(si::quantity(element.power, "W", DIGITS));
+            row.push(quantity(element.power, "W"));
             row
         });
         let header = [
@@ -42,7 +61,7 @@ impl Table {
             } = signal;
             let mut row = vec![name.clone()];
             row.extend(cells(value, unit));
-            row.push(si::quantity(*ripple, unit, DIGITS));
+            row.push(quantity(*ripple, unit));
             row.push(thd.map_or("-".into(), |thd| {
                 format!("{} %", si::plain(100.0 * thd, DIGITS))
             }));

@@ -5,6 +5,7 @@ mod extrema;
 mod integrals;
 mod rows;
 
+use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
 use serde::Serialize;
@@ -45,9 +46,9 @@ pub struct ElementMeans {
     pub name: String,
     /// The current from its first node through it to the second, A.
     pub i: Mean,
-    /// The voltage from its first node to the second, V.
+    /// The voltage from its first node to the second, V; of an inductor or a capacitor without its parasitic parts, of a transistor that of its channel.
     pub v: Mean,
-    /// Mean power into it, W.
+    /// Mean power into it and its parts (`m1.body`, `l1.rser`), W.
     pub power: f64,
 }
 
@@ -394,6 +395,21 @@ impl<'a> Columns<'a> {
         })
     }
 
+    /// What each element consists of besides itself: `m1.channel` and `m1.body` of `m1`.
+    fn parts(&self) -> Vec<Vec<usize>> {
+        let names = self.circuit.elements.iter().map(|e| e.name.as_str());
+        let known: BTreeMap<&str, usize> = names.clone().enumerate().map(|(k, n)| (n, k)).collect();
+        let mut parts = vec![Vec::new(); known.len()];
+        for (part, name) in names.enumerate() {
+            for (dot, _) in name.match_indices('.') {
+                if let Some(whole) = known.get(&name[..dot]) {
+                    parts[*whole].push(part);
+                }
+            }
+        }
+        parts
+    }
+
     /// The same circuit, which shows all that the table reads.
     fn probing(&self, model: &Model) -> Result<Model, Error> {
         model.with_circuit(Circuit {
@@ -429,11 +445,23 @@ impl<'a> Columns<'a> {
                 .collect()
         };
         let elements = self.circuit.elements.iter().zip(&self.elements).enumerate();
-        let elements = elements.map(|(k, (element, (i, v)))| ElementMeans {
-            name: element.name.clone(),
-            i: mean(*i),
-            v: mean(*v),
-            power: sums.work[k] / seconds,
+        let parts = self.parts();
+        let elements = elements.map(|(k, (element, (i, v)))| {
+            let parts = &parts[k];
+            // A transistor is known by the current into its first pin, a source without voltage.
+            let across = match parts.first() {
+                Some(&part) if sums.least[*v] == 0.0 && sums.greatest[*v] == 0.0 => {
+                    self.elements[part].1
+                }
+                _ => *v,
+            };
+            let work = sums.work[k] + parts.iter().map(|part| sums.work[*part]).sum::<f64>();
+            ElementMeans {
+                name: element.name.clone(),
+                i: mean(*i),
+                v: mean(across),
+                power: work / seconds,
+            }
         });
         let signals = self.shown.iter().zip(&sums.distortion).map(|(k, thd)| {
             let value = mean(*k);

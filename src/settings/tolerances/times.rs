@@ -35,6 +35,13 @@ pub(crate) const ROWS_APART: f64 = 1e-2;
 /// most then. Larger: less exact measurements; smaller: a second run and more rows for more circuits.
 pub(crate) const ROWS_CLOSE: f64 = 1e-3;
 
+/// Rows of a picture for each period of the fastest source. Larger: more memory and larger files for pictures; smaller: a second run for more circuits.
+pub(crate) const ROWS_A_PERIOD: f64 = 16.0;
+
+/// How far a row of a picture may stand from the straight line that two of three rows left out make, over the extent of its signal, before rows are
+/// computed closer, once; a ninth of it is what the eye sees. Larger: curves with edges; smaller: a second run and more rows for more circuits.
+pub(crate) const LINES_CLOSE: f64 = 2e-2;
+
 /// Twice the rows at events over those of the grid from which on a note says that measurements may see too little between events, where memory does not
 /// allow more. Larger: ripples that are not seen without a word; smaller: notes where all is seen.
 pub(crate) const CROWDED: f64 = 4.0;
