@@ -18,7 +18,7 @@ use crate::analysis::steps;
 use crate::circuit::Tran;
 use crate::integrate::Method;
 use crate::model::Model;
-use crate::report::figure::{Figure, PANEL_WIDTH};
+use crate::report::figure::{Figure, PANEL_COLUMNS};
 use crate::report::html::Page;
 use crate::report::{json, steps, svg, text};
 use crate::waveform::compare::{At, Comparison, compare as compare_waveforms, difference};
@@ -352,7 +352,7 @@ fn draw(path: &Path, found: &Found, verdict: &str) -> Result<(), Failure> {
     let delta = difference(ours, &theirs.waveforms)?;
     let label = theirs.name.split(' ').next().unwrap_or("reference");
     let is_page = has_ending(path, &["html", "htm"]);
-    let pixels = if is_page { usize::MAX } else { PANEL_WIDTH };
+    let pixels = if is_page { usize::MAX } else { PANEL_COLUMNS };
     let figure = Figure::of_comparison(ours, &theirs.waveforms, &delta, label, &names, pixels);
     if is_page {
         let page = Page::of_comparison(&figure, &found.comparison, verdict);

@@ -12,7 +12,7 @@ use super::rows::{Columns, Form, Shown, Stream};
 use super::streams::Streams;
 use crate::integrate::{Block, Places, Run};
 use crate::model::Model;
-use crate::report::figure::{Figure, PANEL_WIDTH};
+use crate::report::figure::{Figure, PANEL_COLUMNS};
 use crate::report::html::Page;
 use crate::report::{PictureError, png, svg};
 use crate::waveform::{csv, json, npz, raw};
@@ -270,8 +270,8 @@ fn write(
             .with_circuit(told.model);
             file.append(page.html()?.as_bytes())
         }
-        Format::Svg => file.append(svg::draw(&drawing(PANEL_WIDTH))?.as_bytes()),
-        Format::Png => file.append(&png::from_svg(&svg::draw(&drawing(PANEL_WIDTH))?)?),
+        Format::Svg => file.append(svg::draw(&drawing(PANEL_COLUMNS))?.as_bytes()),
+        Format::Png => file.append(&png::from_svg(&svg::draw(&drawing(PANEL_COLUMNS))?)?),
         Format::Npz if file.can_seek() => npz::write(BufWriter::new(&mut file), &waves()),
         Format::Npz => {
             let mut bytes = Cursor::new(Vec::new());

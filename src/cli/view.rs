@@ -11,7 +11,7 @@ use super::files;
 use super::output::{self, Format};
 use super::streams::Streams;
 use crate::netlist::suggest::is_of_pattern;
-use crate::report::figure::{Figure, PANEL_WIDTH};
+use crate::report::figure::{Figure, PANEL_COLUMNS};
 use crate::report::html::Page;
 use crate::report::{bode, svg};
 use crate::waveform::{Phasors, Plot, Waveforms, canonical_name, plots};
@@ -52,7 +52,7 @@ pub(super) fn view(args: &ViewArgs, streams: &Streams) -> Result<Exit, Failure> 
         match format {
             Format::Html => files::write(path, page()?.as_bytes())?,
             format => {
-                let drawing = svg::draw(&figure(PANEL_WIDTH))?;
+                let drawing = svg::draw(&figure(PANEL_COLUMNS))?;
                 output::picture_to_file(path, *format == Format::Png, &drawing)?;
             }
         }

@@ -5,6 +5,9 @@ use crate::waveform::Waveforms;
 /// Width of a panel's plotting area in a drawing, px.
 pub const PANEL_WIDTH: usize = 700;
 
+/// Columns into which rows fall in a drawing: half a pixel each, so that the strokes of a dense curve meet.
+pub const PANEL_COLUMNS: usize = 2 * PANEL_WIDTH;
+
 /// What stands on the common axis of a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Axis {
@@ -148,6 +151,17 @@ impl Figure {
             axis: Axis::Time,
             panels,
         }
+    }
+
+    /// The runs that its curves are of, in order; none where there is one.
+    pub(super) fn runs(&self) -> Vec<&str> {
+        let mut runs = Vec::new();
+        for series in self.panels.iter().flat_map(|panel| &panel.series) {
+            if !series.run.is_empty() && !runs.contains(&series.run.as_str()) {
+                runs.push(&series.run);
+            }
+        }
+        runs
     }
 
     /// First and last time over all curves; `None` without a point.

@@ -27,6 +27,8 @@ pub(super) struct Stroke {
     pub(super) width: f64,
     /// Lengths of strokes and gaps, px.
     pub(super) dash: &'static [f64],
+    /// What is beneath shows through.
+    pub(super) pale: bool,
 }
 
 impl Stroke {
@@ -36,15 +38,22 @@ impl Stroke {
             colour,
             width,
             dash: &[],
+            pale: false,
         }
     }
 
     /// The k-th of several curves: 32 are told apart by colour and dash.
     pub(super) const fn curve(k: usize) -> Self {
+        Self::of_run(k, k / COLOURS.len())
+    }
+
+    /// The k-th curve of a run: runs are told apart by colour, their curves by dash.
+    pub(super) const fn of_run(run: usize, k: usize) -> Self {
         Self {
-            colour: COLOURS[k % COLOURS.len()],
+            colour: COLOURS[run % COLOURS.len()],
             width: 1.5,
-            dash: DASHES[k / COLOURS.len() % DASHES.len()],
+            dash: DASHES[k % DASHES.len()],
+            pale: false,
         }
     }
 
@@ -58,6 +67,9 @@ impl Stroke {
         if !self.dash.is_empty() {
             let dash: Vec<String> = self.dash.iter().map(|d| short(d * scale)).collect();
             text.push_str(&format!(" stroke-dasharray=\"{}\"", dash.join(" ")));
+        }
+        if self.pale {
+            text.push_str(" stroke-opacity=\"0.35\"");
         }
         text
     }

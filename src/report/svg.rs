@@ -20,6 +20,8 @@ const LEGEND_LINE: f64 = 16.0;
 const SAMPLE: f64 = 26.0;
 /// Values are drawn within ±this; nothing is lost on a linear axis, and axis arithmetic stays finite.
 const LARGEST: f64 = 1e100;
+/// A curve of this filling and more is drawn pale, px/px.
+const FILLS: f64 = 30.0;
 /// The narrowest y range, relative to the values in it.
 const NARROWEST: f64 = 1e-9;
 
@@ -44,13 +46,13 @@ pub fn draw(figure: &Figure) -> Result<String, PictureError> {
             Axis::logarithmic((start, end), (left, right), ("frequency", "Hz"))
         }
     };
-    let names =
-        |panel: &Panel| -> Vec<String> { panel.series.iter().map(|s| s.name.clone()).collect() };
-    let legends: Vec<Legend> = figure
-        .panels
-        .iter()
-        .map(|panel| Legend::of(names(panel), PANEL.0))
-        .collect();
+    let runs = figure.runs();
+    let legend = |panel: &Panel| {
+        let names = panel.series.iter().map(|s| s.name.clone());
+        let strokes = strokes(panel, &runs);
+        Legend::of(names.zip(strokes).collect(), PANEL.0)
+    };
+    let legends: Vec<Legend> = figure.panels.iter().map(legend).collect();
     let beside = legends.iter().map(Legend::width).fold(0.0, f64::max);
     let n_panels = figure.panels.len() as f64;
     let width = right + MARGIN + beside + MARGIN;
@@ -61,15 +63,44 @@ pub fn draw(figure: &Figure) -> Result<String, PictureError> {
         let what = (panel.quantity.as_str(), panel.unit);
         let up = Axis::linear(y_range(&panel.series), (top + PANEL.0, top), 36.0, what);
         frame(&mut sheet, &across, &up, k + 1 == figure.panels.len());
-        for (k, series) in panel.series.iter().enumerate() {
-            let points = series.points.iter();
-            let points = points.map(|&(x, y)| (across.at(x), up.at(y.clamp(-LARGEST, LARGEST))));
-            sheet.curve(points, Stroke::curve(k));
+        let curves = panel.series.iter().zip(&legend.entries);
+        let mut curves: Vec<_> = curves
+            .map(|(series, (_, stroke))| {
+                let points = series.points.iter();
+                let at = |&(x, y): &(f64, f64)| (across.at(x), up.at(y.clamp(-LARGEST, LARGEST)));
+                let points: Vec<_> = points.map(at).collect();
+                (filling(&points), points, *stroke)
+            })
+            .collect();
+        // What fills an area lies beneath what is a line.
+        curves.sort_by(|one, other| other.0.total_cmp(&one.0));
+        for (filling, points, stroke) in curves {
+            let pale = filling > FILLS;
+            sheet.curve(points.into_iter(), Stroke { pale, ..stroke });
         }
         legend.draw(&mut sheet, (right + MARGIN, top));
         top += PANEL.0 + PANEL.1;
     }
     Ok(sheet.finish())
+}
+
+/// How the curves of a panel are drawn: by run where there are several.
+fn strokes(panel: &Panel, runs: &[&str]) -> Vec<Stroke> {
+    let mut known = vec![0; runs.len()];
+    let strokes = panel.series.iter().enumerate().map(|(k, series)| {
+        let Some(run) = runs.iter().position(|run| *run == series.run) else {
+            return Stroke::curve(k);
+        };
+        known[run] += 1;
+        Stroke::of_run(run, known[run] - 1)
+    });
+    strokes.collect()
+}
+
+/// How far a curve goes up and down, px for each pixel of the panel's width: a line has little of it, what switches fast fills an area.
+fn filling(points: &[(f64, f64)]) -> f64 {
+    let steps = points.iter().zip(points.iter().skip(1));
+    steps.map(|(a, b)| (b.1 - a.1).abs()).sum::<f64>() / PANEL_WIDTH as f64
 }
 
 /// A sheet with a headline.
@@ -110,18 +141,19 @@ pub(super) fn frame(sheet: &mut Sheet, across: &Axis, up: &Axis, labelled: bool)
 /// Names beside strokes as their curves are drawn, in as many columns as the height asks for.
 #[derive(Debug)]
 pub(super) struct Legend {
-    names: Vec<String>,
+    entries: Vec<(String, Stroke)>,
     lines: usize,
     column: f64,
 }
 
 impl Legend {
-    /// For the curves in their order.
-    pub(super) fn of(names: Vec<String>, height: f64) -> Self {
-        let widest = names.iter().map(|n| width_of(n, TEXT)).fold(0.0, f64::max);
+    /// For names and how their curves are drawn, in order.
+    pub(super) fn of(entries: Vec<(String, Stroke)>, height: f64) -> Self {
+        let widths = entries.iter().map(|(name, _)| width_of(name, TEXT));
+        let widest = widths.fold(0.0, f64::max);
         let lines = ((height / LEGEND_LINE) as usize).max(1);
         Self {
-            names,
+            entries,
             lines,
             column: SAMPLE + 8.0 + widest + MARGIN,
         }
@@ -129,17 +161,17 @@ impl Legend {
 
     /// Room that it takes, px.
     pub(super) fn width(&self) -> f64 {
-        self.column * self.names.len().div_ceil(self.lines) as f64
+        self.column * self.entries.len().div_ceil(self.lines) as f64
     }
 
     /// Draws it below and right of a point.
     pub(super) fn draw(&self, sheet: &mut Sheet, (left, top): (f64, f64)) {
-        for (k, name) in self.names.iter().enumerate() {
+        for (k, (name, stroke)) in self.entries.iter().enumerate() {
             let x = left + (k / self.lines) as f64 * self.column;
             let y = top + LEGEND_LINE * (0.5 + (k % self.lines) as f64);
             let stroke = Stroke {
                 width: 2.5,
-                ..Stroke::curve(k)
+                ..*stroke
             };
             sheet.line((x, y), (x + SAMPLE, y), stroke);
             sheet.text(name, (x + SAMPLE + 8.0, y), TEXT, Anchor::Start);
@@ -226,9 +258,50 @@ mod tests {
     }
 
     #[test]
+    fn what_fills_an_area_is_drawn_pale_and_first() {
+        let rows = 20_000;
+        let waves = Waveforms {
+            names: vec!["v(out)".into(), "v(sw)".into()],
+            units: vec!["V", "V"],
+            time: (0..rows).map(f64::from).collect(),
+            values: (0..rows)
+                .flat_map(|k| [5.0, f64::from(10 * (k % 2))])
+                .collect(),
+            ..Waveforms::default()
+        };
+        let svg = draw(&Figure::of_waveforms(&waves, figure::PANEL_COLUMNS)).unwrap();
+        let curves: Vec<&str> = svg.split("stroke-linejoin").skip(1).collect();
+        let is_pale = |curve: &str| curve[..curve.find("/>").unwrap()].contains("stroke-opacity");
+        assert_eq!(curves.len(), 2);
+        assert!(is_pale(curves[0]) && !is_pale(curves[1]));
+        // In the legend all are as they are named.
+        assert_eq!(svg.matches("stroke-opacity").count(), 1);
+    }
+
+    #[test]
+    fn a_run_has_one_colour_in_all_panels() {
+        let waves = Waveforms {
+            names: vec!["v(a)".into(), "v(b)".into(), "i(l)".into()],
+            units: vec!["V", "V", "A"],
+            time: vec![0.0, 1.0],
+            values: vec![1.0; 6],
+            ..Waveforms::default()
+        };
+        let runs = [("r=1".to_owned(), &waves), ("r=2".to_owned(), &waves)];
+        let figure = Figure::of_runs(&runs, figure::PANEL_COLUMNS);
+        let runs = figure.runs();
+        let of = |panel: usize| strokes(&figure.panels[panel], &runs);
+        assert_eq!(of(1), [Stroke::of_run(0, 0), Stroke::of_run(1, 0)]);
+        let volts = of(0);
+        assert_eq!(volts[0].colour, volts[1].colour);
+        assert_ne!(volts[0].dash, volts[1].dash);
+        assert_eq!(volts[2], of(1)[1]);
+    }
+
+    #[test]
     fn a_legend_is_on_its_sheet_however_many_curves_there_are() {
-        let names: Vec<String> = (0..100).map(|k| format!("v({k})")).collect();
-        let legend = Legend::of(names, 210.0);
+        let entries = (0..100).map(|k| (format!("v({k})"), Stroke::curve(k)));
+        let legend = Legend::of(entries.collect(), 210.0);
         let mut sheet = Sheet::new(1.0, 1.0, "");
         legend.draw(&mut sheet, (0.0, 0.0));
         let svg = sheet.finish();

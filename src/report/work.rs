@@ -260,7 +260,9 @@ pub fn draw(measurements: &[Measurement]) -> Result<String, PictureError> {
     let across = Axis::logarithmic(x_range, (left, right), across);
     let up = ("largest error relative to amplitude", "");
     let up = Axis::logarithmic(y_range, (bottom, top), up);
-    let legend = Legend::of(series.clone(), SIZE.1);
+    let entries = series.iter().enumerate();
+    let entries = entries.map(|(k, name)| (name.clone(), Stroke::curve(k)));
+    let legend = Legend::of(entries.collect(), SIZE.1);
     let title = measurements.first().map_or("", |m| m.circuit.as_str());
     let (width, height) = (right + 2.0 * MARGIN + legend.width(), bottom + BELOW);
     let mut sheet = titled(width, height, &format!("{title}: error against run time"));

@@ -364,7 +364,7 @@ def test_what_is_seen_is_saved_as_a_drawing(buck, show):
     with page.expect_download() as waiting:
         page.get_by_role("button", name="save SVG").click()
     drawing = waiting.value.path().read_text()
-    assert drawing.startswith("<svg") and drawing.count("stroke-width=\"1.5\"") == 3 and "NaN" not in drawing
+    assert drawing.startswith("<svg") and drawing.count("data-signal=") == 3 and "NaN" not in drawing
 
 
 def test_a_million_rows_of_ten_signals_open(tmp_path, show):
@@ -401,7 +401,7 @@ def test_a_million_rows_of_ten_signals_open(tmp_path, show):
 def test_the_page_is_usable_by_keyboard_alone(buck, show):
     page = show(buck / "out.html")
     names = []
-    for _ in range(14):
+    for _ in range(18):
         page.keyboard.press("Tab")
         names.append(page.evaluate("document.activeElement.getAttribute('aria-label') || document.activeElement.innerText || document.activeElement.type"))
     assert any("voltage: v(out)" in name for name in names) and "spectrum" in names and "checkbox" in names
@@ -486,7 +486,8 @@ def test_names_stand_on_panels_and_keys_work_without_focus(buck, show):
     shown = page.evaluate("window.circ.panels.map((p) => p.curves.map((c) => c.name).join(' '))")
     assert [" ".join(text.split()) for text in names.all_inner_texts()] == shown
     page.locator(".readings input").last.uncheck()
-    assert names.last.locator("> span:visible").count() == names.last.locator("> span").count() - 1
+    pressed = names.last.get_by_role("button").evaluate_all("(all) => all.map((b) => b.getAttribute('aria-pressed'))")
+    assert pressed[-1] == "false" and "false" not in pressed[:-1]
     whole = view(page)
     page.get_by_role("button", name="dark / light").click()
     page.keyboard.press("+")
@@ -510,3 +511,203 @@ def test_dense_curves_have_no_gaps(tmp_path, show):
         return curve.bars.length === 0 ? -1 : Math.round(plot.bbox.width) - taken.size;
     }))""")
     assert gaps and all(0 <= gap <= 2 for gap in gaps)
+
+
+SWITCHED = """switched, and a sine
+v1 in 0 5
+vg g 0 pulse(0 1 0 1n 1n 10u 34u)
+s1 in a g 0 sw
+v2 b 0 sin(2.5 1.5 100)
+r2 b 0 1k
+r1 a 0 1k
+.model sw sw(ron=1 roff=1meg vt=0.5)
+.tran 100u 20m
+.probe i(r2) i(r1)
+.end
+"""
+
+
+@pytest.fixture(scope="module")
+def switched(tmp_path_factory):
+    """A current that is switched about every second pixel, and a sine in its midst, in one panel."""
+    folder = tmp_path_factory.mktemp("switched")
+    (folder / "a.cir").write_text(SWITCHED)
+    run("sim", folder / "a.cir", "-q", "-o", folder / "a.html")
+    return folder / "a.html"
+
+
+def colours(canvas, y, box="0, c.width"):
+    """The colours of a row of a canvas on white paper, as [r, g, b]."""
+    return canvas.evaluate(f"""(c, y) => {{
+        const [from, to] = [{box}];
+        const paper = new OffscreenCanvas(c.width, c.height).getContext("2d", {{ willReadFrequently: true }});
+        paper.fillStyle = "#fff";
+        paper.fillRect(0, 0, c.width, c.height);
+        paper.drawImage(c, 0, 0);
+        const row = paper.getImageData(from, y, to - from, 1).data;
+        return Array.from({{ length: to - from }}, (_, k) => Array.from(row.slice(4 * k, 4 * k + 3)));
+    }}""", y)
+
+
+def share(row):
+    """The colour that most of a row has, and how much of it has it."""
+    most = max(row, key=row.count)
+    return most, row.count(most) / len(row)
+
+
+def test_what_is_dense_is_pale_and_lies_below_other_curves(switched, show):
+    page = show(switched)
+    plot = "window.circ.state.plots[0]"
+    assert page.evaluate(f"{plot}.panel.curves.map((c) => c.name)") == ["i(r2)", "i(r1)"]
+    canvas = page.locator(".panel canvas").first
+    box = f"Math.ceil({plot}.bbox.left) + 4, Math.floor({plot}.bbox.left + {plot}.bbox.width) - 4"
+    full = page.evaluate("window.circ.panels[0].curves.map((c) => window.circ.colour(c)).map((c) => [1, 3, 5].map((k) => parseInt(c.slice(k, k + 2), 16)))")
+    # Below the sine there is but the switched current, of one colour without gaps.
+    colour, part = share(colours(canvas, page.evaluate(f"Math.round({plot}.valToPos(0.5e-3, 'y', true))"), box))
+    assert part > 0.95
+    assert colour != full[1] and sum(colour) > sum(full[1]) + 100
+    # The sine is seen: at its top, and where it passes through the other's midst.
+    for t, value in ((2.5e-3, 4e-3), (7.5e-3, 1e-3)):
+        x, y = page.evaluate(f"[Math.round({plot}.valToPos({t}, 'x', true)), Math.round({plot}.valToPos({value}, 'y', true))]")
+        seen = [colours(canvas, y + k, f"{x}, {x} + 1")[0] for k in (-2, -1, 0, 1, 2)]
+        assert min(sum(abs(c - f) for c, f in zip(colour, full[0])) for colour in seen) < 40, (seen, full)
+
+
+def test_strips_that_are_dense_have_no_pattern(switched, show):
+    page = show(switched)
+    canvas = page.locator("canvas.strip")
+    left, right = page.evaluate("[window.circ.state.plots[0].bbox].map((b) => [Math.ceil(b.left) + 4, Math.floor(b.left + b.width) - 4])[0]")
+    colour, part = share(colours(canvas, 7, f"{left}, {right}"))
+    assert part > 0.95 and colour != [255, 255, 255]
+    # Where periods can be told apart there are bars and gaps.
+    first(page)
+    for _ in range(5):
+        page.keyboard.press("+")
+    assert share(colours(canvas, 7, f"{left}, {right}"))[1] < 0.8
+
+
+def test_names_on_panels_are_switches_and_tell_values(buck, show):
+    page = show(buck / "out.html")
+    name = page.locator(".panel .names").get_by_role("button", name="i(l1)")
+    box = page.locator(".readings tr[data-signal='i(l1)'] input")
+    is_shown = lambda: page.evaluate("window.circ.panels[2].curves[0].shown")
+    name.click()
+    assert not is_shown() and not box.is_checked() and name.get_attribute("aria-pressed") == "false"
+    assert name.is_visible()
+    name.focus()
+    page.keyboard.press("Space")
+    assert is_shown() and box.is_checked() and name.get_attribute("aria-pressed") == "true"
+    # What is at the pointer stands beside the name, next to the curve; without a pointer what is at the cursors.
+    beside = page.locator(".panel .names .value")
+    assert beside.all_inner_texts() == [""] * 3
+    page.mouse.move(*middle(page, 0.3))
+    assert beside.first.inner_text() == cell(page, "v(out)", "pointer").inner_text() != ""
+    page.mouse.click(*middle(page, 0.3))
+    page.mouse.move(5, 5)
+    assert beside.first.inner_text() == "A " + cell(page, "v(out)", "a").inner_text()
+    page.keyboard.down("Shift")
+    page.mouse.click(*middle(page, 0.7))
+    page.keyboard.up("Shift")
+    page.mouse.move(5, 5)
+    assert beside.first.inner_text() == "B − A " + cell(page, "v(out)", "delta").inner_text()
+    # Nothing has moved out of sight for that.
+    assert page.evaluate("scrollY") == 0 and beside.last.bounding_box()["y"] < 900
+
+
+def test_a_run_has_one_colour_in_all_panels(tmp_path, show):
+    netlist = tmp_path / "steps.cir"
+    netlist.write_text("steps\n.param r=1k\nv1 a 0 sin(0 1 1k)\nr1 a b {r}\nc1 b 0 1u\n.step param r list 1k 2k 3k\n.tran 10u 2m\n.probe v(a) v(b) i(r1)\n.end\n")
+    run("sim", netlist, "-o", tmp_path / "steps.html")
+    page = show(tmp_path / "steps.html")
+    looks = page.evaluate("window.circ.panels.flatMap((p) => p.curves.map((c) => [c.name, c.run, window.circ.colour(c), window.circ.dash(c).join(' ')]))")
+    colours_of = {run: {look[2] for look in looks if look[1] == run} for run in ("r=1000", "r=2000", "r=3000")}
+    assert len(looks) == 9 and all(len(of) == 1 for of in colours_of.values()) and len(set.union(*colours_of.values())) == 3
+    # Signals of a panel have dashes of their own, the same in all runs.
+    dashes = {signal: {look[3] for look in looks if look[0].startswith(signal)} for signal in ("v(a)", "v(b)")}
+    assert all(len(of) == 1 for of in dashes.values()) and dashes["v(a)"] != dashes["v(b)"]
+    # In the spectrum a curve looks as above, with other runs hidden too.
+    swatches = lambda of: of.locator(".names > span").evaluate_all("(all) => Object.fromEntries(all.map((s) => [s.querySelector('button').innerText, s.querySelector('.swatch').style.background]))")
+    above = swatches(page.get_by_role("region", name="waveforms"))
+    page.get_by_label("r=1000", exact=True).first.uncheck()
+    page.get_by_role("button", name="spectrum").click()
+    below = swatches(page.get_by_role("region", name="spectrum"))
+    assert len(below) == 6 and below == {name: above[name] for name in below}
+
+
+def test_long_labels_of_an_axis_have_room(buck, show):
+    page = show(buck / "out.html")
+    room = """() => window.circ.state.plots.map((plot) => {
+        const ctx = document.createElement("canvas").getContext("2d");
+        ctx.font = plot.axes[1].font[0];
+        return plot.axes[1]._size - Math.max(...plot.axes[1]._values.map((label) => (label ? ctx.measureText(label).width / devicePixelRatio : 0)));
+    })"""
+    lefts = "window.circ.state.plots.map((plot) => plot.bbox.left)"
+    before = page.evaluate(lefts)
+    page.evaluate("(() => { const c = window.circ; c.state.heights.set(c.panels[1], [5.682301, 5.682309]); c.show(c.state.view); })()")
+    assert max(map(len, page.evaluate("window.circ.state.plots[1].axes[1]._values"))) >= 10
+    # Ticks take 10 pixels, the gap to a label 5.
+    assert all(free >= 15 for free in page.evaluate(room))
+    # All panels have the same axis across, and get back what the labels took.
+    after = page.evaluate(lefts)
+    assert len(set(after)) == 1 and after[0] > before[0]
+    first(page)
+    page.keyboard.press("Home")
+    assert page.evaluate(lefts) == before
+
+
+def saved(page):
+    with page.expect_download() as waiting:
+        page.get_by_role("button", name="save SVG").click()
+    return waiting.value.path().read_text()
+
+
+def test_a_spectrum_that_is_seen_is_saved_too(buck, show):
+    page = show(buck / "out.html")
+    page.get_by_role("button", name="spectrum").click()
+    drawing = saved(page)
+    assert drawing.count("data-signal=") == 6 and ">Spectrum</text>" in drawing and "MHz</text>" in drawing and "NaN" not in drawing
+    page.get_by_role("button", name="spectrum").click()
+    drawing = saved(page)
+    assert drawing.count("data-signal=") == 3 and ">Spectrum</text>" not in drawing and "MHz</text>" not in drawing
+
+
+def test_a_drawing_shows_what_is_dense_pale(switched, show):
+    drawing = saved(show(switched))
+    assert drawing.count("fill-opacity") >= 1 and drawing.index("fill-opacity") < drawing.index("data-signal=")
+    assert len(drawing) < 1_000_000
+
+
+def test_long_tables_have_a_scroll_of_their_own(buck, show):
+    page = show(buck / "out.html")
+    page.get_by_text("Events (").click()
+    events = page.get_by_role("region", name="Events")
+    height = lambda: events.bounding_box()["height"]
+    assert height() < 450 < events.evaluate("(e) => e.scrollHeight")
+    events.focus()
+    assert events.evaluate("(e) => e === document.activeElement")
+    page.keyboard.press("End")
+    page.wait_for_function("document.querySelector('.scroll:focus').scrollTop > 0")
+    # Its heading stays.
+    assert events.locator("th").first.bounding_box()["y"] == pytest.approx(events.bounding_box()["y"], abs=1)
+    page.emulate_media(media="print")
+    assert height() > 1000
+
+
+@pytest.mark.parametrize(("a", "b"), [(0, 0), (1, 0), (0, 1), (1, 1)])
+def test_letters_of_cursors_stand_apart(buck, show, a, b):
+    page = show(buck / "out.html")
+    page.evaluate("""() => {
+        const write = CanvasRenderingContext2D.prototype.fillText;
+        window.written = {};
+        CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
+            const width = this.measureText(text).width;
+            if (text === "A" || text === "B") window.written[text] = this.textAlign === "right" ? [x - width, x] : [x, x + width];
+            return write.call(this, text, x, y);
+        };
+    }""")
+    page.evaluate(f"(() => {{ const c = window.circ; c.place('a', 1e-3 + {a} * 1e-5); c.place('b', 1e-3 + {b} * 1e-5); }})()")
+    page.wait_for_function("'A' in window.written && 'B' in window.written")
+    one, other = page.evaluate("[window.written.A, window.written.B]")
+    assert one[1] <= other[0] or other[1] <= one[0]
+    if a != b:
+        assert (one[0] < other[0]) == (a < b)

@@ -129,6 +129,8 @@ struct Table {
     heading: String,
     header: Vec<&'static str>,
     rows: Vec<Vec<String>>,
+    /// How many there are, where not all are here.
+    all: usize,
 }
 
 /// Text as it is, under a heading.
@@ -267,21 +269,17 @@ const fn axis(name: &'static str, unit: &'static str, log: bool) -> Axis {
 }
 
 impl Table {
-    /// At most [`MOST_ROWS`] rows; the heading says where there are more.
+    /// At most [`MOST_ROWS`] rows.
     fn new(
         heading: &str,
         header: &[&'static str],
         rows: impl ExactSizeIterator<Item = Vec<String>>,
     ) -> Self {
         let all = rows.len();
-        let heading = if all > MOST_ROWS {
-            format!("{heading}, the first {MOST_ROWS} of {all}")
-        } else {
-            heading.to_owned()
-        };
         Self {
-            heading,
+            heading: heading.to_owned(),
             header: header.to_vec(),
+            all,
             rows: rows.take(MOST_ROWS).collect(),
         }
     }

@@ -61,6 +61,11 @@ fn strips(events: &[Event]) -> (Vec<Strip>, usize) {
                 Change::Device { conducts, .. } => (*conducts, ["conducts", "blocks"]),
                 Change::Slides(_) => continue,
             };
+            // A corner of a function, `b1.1`, is no device.
+            let last = change.name().rsplit('.').next().unwrap_or_default();
+            if last.bytes().all(|byte| byte.is_ascii_digit()) {
+                continue;
+            }
             let place = *places.entry(change.name()).or_insert_with(|| {
                 strips.push(Strip {
                     name: change.name().to_owned(),

@@ -11,7 +11,9 @@ const STEPS = { dB: [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 40, 100, 
 /** Of errors: a zero stands at this on a logarithmic axis. */
 const LEAST = 1e-17;
 /** CSS pixels. */
-const SIZES = { axis: 76, label: 18, panel: 220, across: 110, up: 30, row: 16, right: 26, line: 1.5, dot: 3, pixelsToDrag: 4, box: 40 };
+const SIZES = { axis: 76, label: 18, tick: 22, panel: 220, across: 110, up: 30, row: 16, right: 26, line: 1.5, dot: 3, pixelsToDrag: 4, box: 40, fine: 4 };
+/** How opaque the inside of an envelope is: what lies behind it is seen. */
+const PALE = 0.35;
 
 /** An element with attributes and children; text is never markup. */
 function element(tag, attributes = {}, ...children) {
@@ -44,9 +46,13 @@ function stateAt(strip, t) {
   return changes === 0 ? strip.start : strip.states[changes - 1];
 }
 
+/** The name of a curve's signal, without the run that it is of. */
+const signalOf = ({ name, run }) => (run && name.endsWith(` ${run}`) ? name.slice(0, -run.length - 1) : name);
+
 /**
  * A chart in `root` of { axis: { name, unit, log }, panels: [{ quantity, unit, curves }], strips }. `announce` gets a sentence when a cursor is
- * placed. Each panel has colours of its own where all curves together are more than there are.
+ * placed. Colours tell runs where there are several, and dashes signals. Otherwise colours tell signals, and each panel begins anew where all
+ * curves together are more than there are colours. A curve that has a `look` (its colour and dashes, by number) keeps it.
  */
 function chart(root, content, announce) {
   const { panels, strips } = content;
@@ -54,12 +60,19 @@ function chart(root, content, announce) {
   const curves = panels.flatMap((panel) => panel.curves);
   const isDotted = panels.some((panel) => panel.dots);
   let whole = wholeSpan(curves, axis.log, isDotted);
-  const state = { view: whole, cursors: { a: null, b: null }, pointer: null, plots: [], logs: new Set(panels.filter((panel) => panel.dots)), heights: new Map() };
+  const state = { view: whole, cursors: { a: null, b: null }, pointer: null, plots: [], room: SIZES.axis, logs: new Set(panels.filter((panel) => panel.dots)), heights: new Map() };
   const namesOf = (all) => [...new Set(all.map((curve) => curve.name))];
   const few = namesOf(curves).length <= COLOURS.light.length;
-  const looks = new Map(panels.flatMap((panel) => panel.curves.map((curve) => [curve, namesOf(few ? curves : panel.curves).indexOf(curve.name)])));
-  const colour = (curve, paper = isDark() ? "dark" : "light") => COLOURS[paper][looks.get(curve) % 8];
-  const dash = (curve) => DASHES[Math.floor(looks.get(curve) / 8) % 4];
+  const runs = [...new Set(curves.map((curve) => curve.run))];
+  const lookOf = (panel, curve) => {
+    const at = namesOf(few ? curves : panel.curves).indexOf(curve.name);
+    if (!curve.run || runs.length === 1) return [at, Math.floor(at / 8)];
+    const run = runs.indexOf(curve.run), signals = [...new Set(panel.curves.map(signalOf))];
+    return [run, signals.indexOf(signalOf(curve)) + signals.length * Math.floor(run / 8)];
+  };
+  for (const panel of panels) for (const curve of panel.curves) curve.look ??= lookOf(panel, curve);
+  const colour = (curve, paper = isDark() ? "dark" : "light") => COLOURS[paper][curve.look[0] % 8];
+  const dash = (curve) => DASHES[curve.look[1] % 4];
   const isFirst = document.querySelector(".panels") === null;
   const area = element("div", { class: "panels" });
   const stripCanvas = element("canvas", { class: "strip", role: "img" });
@@ -91,17 +104,16 @@ function chart(root, content, announce) {
     return [low - room, high + room];
   }
 
-  /** A path of a curve on a plot's canvas; none where it is drawn as bars. */
+  const pixelsOf = (plot) => Math.max(1, Math.round(plot.bbox.width));
+
+  /** A path of a curve on a plot's canvas; none where it is drawn by its envelope. */
   function path(plot, curve, panel) {
+    if (isDense(curve, state.view, pixelsOf(plot))) return null;
     const drawn = new Path2D();
-    const pixels = Math.max(1, Math.round(plot.bbox.width));
-    const thick = isDense(curve, state.view, pixels);
-    curve.bars = thick ? barsOf(plot, curve, state.logs.has(panel), pixels) : [];
-    if (thick) return null;
     let pen = false;
     const log = state.logs.has(panel), least = panel.dots ? LEAST : Number.MIN_VALUE;
     const dot = SIZES.dot * (devicePixelRatio || 1), dots = new Path2D();
-    trace(curve, state.view, pixels, edgeOf(state.view, pixels), (t, value) => {
+    trace(curve, state.view, (t, value) => {
       const y = log ? Math.max(Math.abs(value), least) : value;
       if (Number.isNaN(y)) {
         pen = false;
@@ -120,27 +132,40 @@ function chart(root, content, announce) {
     return { stroke: drawn };
   }
 
-  /** Of each pixel that has rows where its bar begins, and its height. Filling these takes a hundredth of the time of a stroke of all peaks. */
-  function barsOf(plot, curve, log, pixels) {
-    const least = SIZES.line * (devicePixelRatio || 1), all = [];
-    bars(curve, state.view, pixels, edgeOf(state.view, pixels), (pixel, low, high) => {
-      const sizes = log ? [low < 0 && high > 0 ? 0 : low, Math.max(-low, high)].map((y) => Math.max(Math.abs(y), Number.MIN_VALUE)) : [low, high];
-      const ends = sizes.map((y) => Math.min(Math.max(plot.valToPos(y, "y", true), plot.bbox.top - 9), plot.bbox.top + plot.bbox.height + 9));
-      const [top, bottom] = [Math.min(...ends), Math.max(...ends)];
-      const room = Math.max(least - (bottom - top), 0) / 2;
-      all.push([plot.bbox.left + pixel, top - room, bottom - top + 2 * room]);
-    });
-    return all;
-  }
-
-  function drawBars({ ctx, bbox }, curve) {
-    if (!curve.bars?.length) return;
+  /** Draws envelopes below all other curves; filling them takes a hundredth of the time of a stroke of all peaks. */
+  function drawDense(plot) {
+    const { ctx, bbox, panel } = plot, pixels = pixelsOf(plot), ratio = devicePixelRatio || 1, line = SIZES.line * ratio;
+    const height = (y) => Math.min(Math.max(plot.valToPos(y, "y", true), bbox.top - 9), bbox.top + bbox.height + 9);
+    const ends = (low, high) => (state.logs.has(panel) ? sizesOf(low, high) : [low, high]).map(height);
+    // Kept until something else is shown, or the page moves to a finer screen.
+    if (plot.pixels !== pixels) panel.curves.forEach((curve) => { curve.bars = null; });
+    plot.pixels = pixels;
+    const barsOf = (curve) => (isDense(curve, state.view, pixels) ? envelope(curve, state.view, pixels, edgeOf(state.view, pixels), ends, line) : []);
+    const shown = panel.curves.filter((curve) => curve.shown);
+    for (const curve of shown) curve.bars ??= barsOf(curve);
     ctx.save();
     ctx.beginPath();
     ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
     ctx.clip();
-    ctx.fillStyle = colour(curve);
-    for (const [left, top, height] of curve.bars) ctx.fillRect(left, top, 1, height);
+    // Pixels side by side would leave seams where they began at parts of one.
+    const left = Math.round(bbox.left);
+    const fill = (pixel, from, to) => { if (to > from) ctx.fillRect(left + pixel, from, 1, to - from); };
+    ctx.globalAlpha = PALE;
+    for (const curve of shown) {
+      ctx.fillStyle = colour(curve);
+      for (const [pixel, , , from, to] of curve.bars) fill(pixel, from, to);
+    }
+    ctx.globalAlpha = 1;
+    for (const curve of shown) {
+      const dashes = dash(curve);
+      ctx.fillStyle = colour(curve);
+      for (const [pixel, top, bottom, from, to, isStraight] of curve.bars) {
+        // Of a curve that winds, dashes would leave nothing to see.
+        if (isStraight && bottom - top < 2 * line && isDashGap(dashes, pixel / ratio)) continue;
+        fill(pixel, top, from);
+        fill(pixel, to, bottom);
+      }
+    }
     ctx.restore();
   }
 
@@ -157,8 +182,10 @@ function chart(root, content, announce) {
       paths: (plot) => path(plot, curve, panel),
     }));
     const holder = element("div", { class: "panel", tabindex: 0, role: "group", "aria-label": `${panel.quantity}: ${panel.curves.map((c) => c.name).join(", ")}` });
-    // Who is who stands on the panel; the table of readings below tells values.
-    const names = element("p", { class: "names", "aria-hidden": "true" }, ...panel.curves.map((curve) => element("span", {}, element("span", { class: "swatch" }), curve.name)));
+    // Who is who stands on the panel, and shows and hides it, with what it is at the pointer or the cursors; the table below tells all values.
+    const turn = (curve) => () => { toggle([curve], !curve.shown); readings.tick(); };
+    const nameOf = (curve) => element("button", { type: "button", title: "show or hide", onclick: turn(curve) }, element("span", { class: "swatch", "aria-hidden": "true" }), curve.name);
+    const names = element("p", { class: "names" }, ...panel.curves.map((curve) => element("span", {}, nameOf(curve), element("span", { class: "value", "aria-hidden": "true" }))));
     holder.append(names);
     area.append(holder);
     const options = {
@@ -173,7 +200,7 @@ function chart(root, content, announce) {
       },
       axes: [
         { ...lines, ...marks(axis.unit, axis.log, SIZES.across), size: last ? 34 : 24 },
-        { ...lines, ...marks(panel.unit, state.logs.has(panel), SIZES.up), label: panel.quantity, labelSize: SIZES.label, labelFont: "12px system-ui, sans-serif", size: SIZES.axis },
+        { ...lines, ...marks(panel.unit, state.logs.has(panel), SIZES.up), label: panel.quantity, labelSize: SIZES.label, labelFont: "12px system-ui, sans-serif", size: roomOf },
       ],
       series: [{}, ...series],
       cursor: { y: false, points: { show: false }, drag: { x: true, y: true, uni: SIZES.box, setScale: false, click: () => {} }, bind: { dblclick: () => full } },
@@ -189,7 +216,7 @@ function chart(root, content, announce) {
           },
         ],
         setCursor: [(plot) => point(plot)],
-        drawSeries: [(plot, k) => drawBars(plot, panel.curves[k - 1])],
+        drawAxes: [drawDense],
         draw: [(plot) => drawCursors(plot)],
       },
     };
@@ -211,6 +238,15 @@ function chart(root, content, announce) {
     };
   }
 
+  /** Room for the labels of values: as much as the longest of all panels takes, as these have one axis across. */
+  function roomOf({ ctx, axes }, labels) {
+    ctx.save();
+    ctx.font = axes[1].font[0];
+    const widths = (labels ?? []).map((label) => (label ? ctx.measureText(label).width / (devicePixelRatio || 1) : 0));
+    ctx.restore();
+    return (state.room = Math.max(state.room, Math.ceil(Math.max(0, ...widths)) + SIZES.tick));
+  }
+
   const widthOf = () => Math.max(280, root.clientWidth);
 
   function build() {
@@ -222,6 +258,7 @@ function chart(root, content, announce) {
       area.append(stripCanvas);
     }
     show(state.view);
+    readings.update();
   }
 
   /** Shows a span of the axis in all panels. */
@@ -230,10 +267,12 @@ function chart(root, content, announce) {
     if (!(to - from > least)) return;
     state.view = [Math.max(from, whole[0]), Math.min(to, whole[1])];
     if (!(state.view[1] > state.view[0])) state.view = whole;
+    state.room = SIZES.axis;
+    for (const curve of curves) curve.bars = null;
     for (const plot of state.plots) {
       plot.panel.curves.forEach((curve, k) => {
-        const name = plot.names.children[k];
-        name.hidden = !curve.shown;
+        const name = plot.names.children[k].firstChild;
+        name.setAttribute("aria-pressed", String(curve.shown));
         name.firstChild.style.background = swatch(colour(curve), dash(curve));
       });
       const [low, high] = boundsOf(plot.panel);
@@ -244,6 +283,9 @@ function chart(root, content, announce) {
         plot.setScale("y", { min: low, max: high });
       });
     }
+    // A later panel may have longer labels than one before.
+    for (const plot of state.plots) if (plot.axes[1]._size < state.room) plot.batch(() => plot.redraw(true, true));
+    area.style.setProperty("--left", `${SIZES.label + state.room}px`);
     drawStrips();
     root.dispatchEvent(new CustomEvent("view", { detail: state.view }));
   }
@@ -381,9 +423,11 @@ function chart(root, content, announce) {
   function drawCursors(plot) {
     const { ctx, bbox } = plot;
     ctx.save();
-    for (const [name, t] of Object.entries(state.cursors)) {
-      if (t === null || t < state.view[0] || t > state.view[1]) continue;
-      const x = Math.round(plot.valToPos(t, "x", true)) + 0.5;
+    const seen = Object.entries(state.cursors).filter(([, t]) => t !== null && t >= state.view[0] && t <= state.view[1]);
+    const places = seen.map(([, t]) => Math.round(plot.valToPos(t, "x", true)) + 0.5).sort((one, other) => one - other);
+    const areClose = places[1] - places[0] < 16 * devicePixelRatio;
+    for (const [name, t] of seen.sort(([, one], [, other]) => one - other)) {
+      const x = places.shift();
       ctx.strokeStyle = ctx.fillStyle = themed(name === "a" ? "--cursor-a" : "--cursor-b");
       ctx.lineWidth = devicePixelRatio;
       ctx.setLineDash([4 * devicePixelRatio, 3 * devicePixelRatio]);
@@ -392,13 +436,15 @@ function chart(root, content, announce) {
       ctx.lineTo(x, bbox.top + bbox.height);
       ctx.stroke();
       ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
-      ctx.textAlign = "left";
-      ctx.fillText(name.toUpperCase(), x + 3 * devicePixelRatio, bbox.top + 11 * devicePixelRatio);
+      // Of two that are close the first has its letter before it.
+      const isBefore = areClose && places.length > 0;
+      ctx.textAlign = isBefore ? "right" : "left";
+      ctx.fillText(name.toUpperCase(), x + (isBefore ? -3 : 3) * devicePixelRatio, bbox.top + 11 * devicePixelRatio);
     }
     ctx.restore();
   }
 
-  /** A bar for each device while it conducts or is on; grey while nothing is known. */
+  /** A bar for each device while it conducts or is on; grey while nothing is known; paler where changes are too close to be told apart. */
   function drawStrips() {
     if (strips.length === 0) return;
     const width = widthOf(), height = strips.length * SIZES.row + 6, ratio = devicePixelRatio || 1;
@@ -408,7 +454,7 @@ function chart(root, content, announce) {
     ctx.scale(ratio, ratio);
     ctx.font = "11px system-ui, sans-serif";
     ctx.textBaseline = "middle";
-    const [from, to] = state.view, left = SIZES.label + SIZES.axis, room = width - left - SIZES.right;
+    const [from, to] = state.view, left = SIZES.label + state.room, room = width - left - SIZES.right;
     const position = (t) => left + room * (axis.log ? Math.log(t / from) / Math.log(to / from) : (t - from) / (to - from));
     strips.forEach((strip, k) => {
       const middle = k * SIZES.row + SIZES.row / 2 + 2;
@@ -419,16 +465,31 @@ function chart(root, content, announce) {
       ctx.fillRect(left, middle - 0.5, room, 1);
       let begin = from, on = stateAt(strip, from);
       const last = rowAt(strip.times, to);
+      const inks = { true: themed("--bar"), false: "transparent", null: themed("--grid") };
+      const fill = (start, end, state) => {
+        ctx.fillStyle = inks[state];
+        ctx.fillRect(start, middle - 5, Math.max(end - start, 0.5), 10);
+      };
+      let fine = [];
+      const flush = () => {
+        ctx.globalAlpha = fine.length > 3 ? PALE : 1;
+        if (fine.length > 3) fill(fine[0][0], fine[fine.length - 1][1], true);
+        else fine.forEach((piece) => fill(...piece));
+        ctx.globalAlpha = 1;
+        fine = [];
+      };
       const bar = (end) => {
-        if (on === false) return;
-        ctx.fillStyle = on === null ? themed("--grid") : themed("--bar");
-        ctx.fillRect(position(begin), middle - 5, Math.max(position(end) - position(begin), 0.5), 10);
+        const piece = [position(begin), position(end), on];
+        if (piece[1] - piece[0] < SIZES.fine && on !== null) return fine.push(piece);
+        flush();
+        fill(...piece);
       };
       for (let j = rowAfter(strip.times, from); j < last; j++) {
         bar(strip.times[j]);
         [begin, on] = [strip.times[j], strip.states[j]];
       }
       bar(to);
+      flush();
     });
     for (const [name, t] of Object.entries(state.cursors)) {
       if (t === null || t < from || t > to) continue;
@@ -458,7 +519,6 @@ function chart(root, content, announce) {
       });
       body.append(element("tr", { class: "group" }, element("th", { scope: "rowgroup", colspan: columns.length + 2 }, ...labels)));
     };
-    const runs = [...new Set(curves.map((curve) => curve.run))];
     if (runs.length > 1) heading(...runs.map((run) => [run, curves.filter((curve) => curve.run === run)]));
     for (const panel of panels) {
       if (panels.length > 1) heading([panel.quantity, panel.curves]);
@@ -479,10 +539,18 @@ function chart(root, content, announce) {
       if (value === null) cell.removeAttribute("data-value");
       else cell.dataset.value = value;
     };
+    /** What stands beside a name: the value at the pointer, without one the difference of both cursors or the value at the only one. */
+    function brief(curve, { pointer, a, b }, both) {
+      const told = (t) => quantity(valueAt(curve, t), unitOf(curve));
+      if (pointer !== null) return told(pointer);
+      if (both) return `B − A ${quantity(valueAt(curve, b) - valueAt(curve, a), unitOf(curve))}`;
+      return a !== null ? `A ${told(a)}` : b !== null ? `B ${told(b)}` : "";
+    }
     function update() {
       const { a, b } = state.cursors;
       const times = { pointer: state.pointer, a, b };
       const both = a !== null && b !== null;
+      state.plots.forEach((plot) => plot.panel.curves.forEach((curve, k) => { plot.names.children[k].lastChild.textContent = brief(curve, times, both); }));
       for (const name of columns) {
         const label = name === "pointer" ? axis.name : name.toUpperCase();
         put(head[name], times[name], times[name] === null ? label : `${label} ${quantity(times[name], axis.unit, 9)}`);
@@ -569,7 +637,6 @@ function chart(root, content, announce) {
     }
   });
   build();
-  readings.update();
   resized.observe(root);
   document.addEventListener("keydown", pressedOnPage);
   const paper = matchMedia("(prefers-color-scheme: dark)");

@@ -102,10 +102,10 @@ function boundsIn(curve, from, to) {
 /** The rows of what is seen of the curve, with one more on either side: from the first up to but not at the second. */
 const rowsIn = (curve, [from, to]) => [Math.max(0, rowAt(curve.x, from) - 1), Math.min(curve.x.length, rowAfter(curve.x, to) + 1)];
 
-/** Whether there are more than four rows a pixel. */
+/** Whether there is more than a row a pixel: then a curve is drawn by its envelope. */
 function isDense(curve, view, pixels) {
   const [a, end] = rowsIn(curve, view);
-  return end - a > 4 * pixels;
+  return end - a > pixels;
 }
 
 /** Hands on the lowest and highest value of each pixel: of its rows, and of the lines that lead to it and on from it. */
@@ -129,29 +129,82 @@ function bars(curve, view, pixels, edge, bar) {
   }
 }
 
+/** Of each place the least of the values up to `reach` places away; a place without a value stays so. */
+function least(values, reach) {
+  return values.map((own, k) => {
+    for (let j = Math.max(0, k - reach); j <= k + reach; j++) if (values[j] < own) own = values[j];
+    return own;
+  });
+}
+
+const negated = (values) => values.map((value) => -value);
+
 /**
- * Hands on the points of what is seen of the curve: all of them, or where there are more than four a pixel the first, lowest, highest and
- * last of each pixel. `edge(k)` is the x at which pixel k of `pixels` ends.
+ * How often what lies between tops and floors (which are negative) goes up or down around each pixel: its way over its height, in as many pixels
+ * as `reach` to either side has.
  */
-function trace(curve, view, pixels, edge, point) {
-  const { x, y } = curve;
-  let [a, end] = rowsIn(curve, view);
-  if (end - a <= 4 * pixels) {
-    for (let k = a; k < end; k++) point(x[k], y[k]);
-    return;
-  }
-  for (let pixel = 0; pixel < pixels && a < end; pixel++) {
-    const b = pixel + 1 === pixels ? end : Math.min(rowAt(x, edge(pixel), a), end);
-    if (b === a) continue;
-    point(x[a], y[a]);
-    if (b - a > 2) {
-      const [low, high] = extremes(curve, a, b);
-      point(x[a], low);
-      point(x[a], high);
-    }
-    if (b - a > 1) point(x[b - 1], y[b - 1]);
-    a = b;
-  }
+function turnsIn(tops, floors, reach, line) {
+  const highest = least(tops, reach), lowest = least(floors, reach), ways = [0];
+  let before = NaN;
+  tops.forEach((top, k) => {
+    const middle = (top - floors[k]) / 2;
+    ways.push(ways[k] + (Math.max(-floors[k] - top - line, Math.abs(middle - before)) || 0));
+    before = middle;
+  });
+  return Array.from(tops, (_, k) => {
+    const from = Math.max(0, k - reach), to = Math.min(tops.length, k + reach + 1);
+    return ((ways[to] - ways[from]) / (-lowest[k] - highest[k])) * ((2 * reach + 1) / (to - from));
+  });
+}
+
+/** Heights without the gaps that are narrower than twice the reach. Beyond either end they go on as they are there. */
+function closed(heights, reach) {
+  const pad = 2 * reach, all = new Float64Array(heights.length + 2 * pad).fill(heights[0]);
+  all.fill(heights[heights.length - 1], pad).set(heights, pad);
+  return negated(least(negated(least(all, reach)), reach)).subarray(pad, pad + heights.length);
+}
+
+/**
+ * The envelope of what is seen of a dense curve: of each pixel that has a part of it [pixel, top, bottom, inner top, inner bottom, straight], where
+ * what lies a line's width inside is inner; without any the last two heights are equal. `edge(k)` is the x at which pixel k of `pixels` ends,
+ * `ends` gives the heights of two values, which grow downwards. Where edges are so close that some pixels have one and some have none (about two
+ * in five pixels), gaps between them are part of it: they would make a pattern that is not there.
+ */
+function envelope(curve, view, pixels, edge, ends, line) {
+  let tops = new Float64Array(pixels).fill(NaN), floors = tops.slice();
+  bars(curve, view, pixels, edge, (pixel, low, high) => {
+    const [a, b] = ends(low, high), top = Math.min(a, b), bottom = Math.max(a, b), room = Math.max(line - (bottom - top), 0) / 2;
+    tops[pixel] = top - room;
+    floors[pixel] = -bottom - room;
+  });
+  const far = Math.round(8 * line), turns = turnsIn(tops, floors, far, line);
+  const filled = (heights) => closed(heights, Math.round(1.5 * line)).map((height, k) => (turns[k] > 1.2 * far ? height : heights[k]));
+  [tops, floors] = [filled(tops), filled(floors)];
+  const [innerTops, innerFloors] = [tops, floors].map((heights) => negated(least(negated(heights), Math.round(line / 2))));
+  const all = [];
+  tops.forEach((top, pixel) => {
+    if (Number.isNaN(top)) return;
+    const from = innerTops[pixel] + line, to = -innerFloors[pixel] - line;
+    all.push([pixel, top, -floors[pixel], ...(from < to ? [from, to] : [top, top]), turns[pixel] < 1.2]);
+  });
+  return all;
+}
+
+/** Whether a line of dashes has a gap this far from its start. */
+function isDashGap(dash, at) {
+  at %= dash.reduce((sum, part) => sum + part, 0);
+  let k = 0;
+  while (at >= dash[k]) at -= dash[k++];
+  return k % 2 === 1;
+}
+
+/** The least and the greatest size of values from low to high, for a logarithmic axis. */
+const sizesOf = (low, high) => [low < 0 && high > 0 ? 0 : Math.min(Math.abs(low), Math.abs(high)), Math.max(-low, high)].map((size) => Math.max(size, Number.MIN_VALUE));
+
+/** Hands on the points of what is seen of the curve. */
+function trace(curve, view, point) {
+  const [from, to] = rowsIn(curve, view);
+  for (let k = from; k < to; k++) point(curve.x[k], curve.y[k]);
 }
 
 const PREFIXES = ["f", "p", "n", "µ", "m", "", "k", "M", "G", "T"];

@@ -31,55 +31,81 @@ function circRest(shown) {
 }
 
 /** A table of words; long ones show their first rows and a button for the rest. */
-function wordTable({ heading, header, rows }) {
+function wordTable({ heading, header, rows, all }) {
   const body = element("tbody");
   const line = (cells) => element("tr", {}, ...cells.map((cell) => element("td", {}, cell)));
   body.append(...rows.slice(0, ROWS).map(line));
   const table = element("table", { class: "words" }, element("thead", {}, element("tr", {}, ...header.map((name) => element("th", { scope: "col" }, name)))), body);
-  const section = element("details", { open: rows.length <= 40 }, element("summary", {}, `${heading} (${rows.length})`), table);
+  const scroll = element("div", { class: "scroll", role: "region", tabindex: 0, "aria-label": heading }, table);
+  const section = element("details", { open: rows.length <= 40 }, element("summary", {}, `${heading} (${all > rows.length ? `the first ${rows.length} of ${all}` : rows.length})`), scroll);
   if (rows.length > ROWS) {
-    const more = element("button", { type: "button", onclick: () => { body.append(...rows.slice(ROWS).map(line)); more.remove(); } }, `all ${rows.length} rows`);
+    const more = element("button", { type: "button", onclick: () => { body.append(...rows.slice(ROWS).map(line)); more.remove(); } }, `${rows.length} rows`);
     section.append(more);
   }
   return section;
 }
 
-/** What the chart shows as a drawing in SVG. */
-function drawing(shown, title) {
-  const { axis, panels, state } = shown;
-  const width = 900, height = 240, left = 90, right = 20, top = 40;
-  const [from, to] = state.view;
+/** What charts show, each under its heading, as a drawing in SVG. */
+function drawing(charts) {
+  const longest = Math.max(...charts.flatMap(([shown]) => shown.state.plots.flatMap((plot) => plot.axes[1]._values.map((label) => label?.length ?? 0))));
+  const width = 900, left = Math.max(90, 7 * longest + 14), right = 20, inner = width - left - right, room = 190;
   const clean = (text) => text.replace(/[&<>"]/g, (c) => `&#${c.charCodeAt(0)};`);
-  const across = (x) => left + (width - left - right) * (axis.log ? Math.log(x / from) / Math.log(to / from) : (x - from) / (to - from));
   const parts = [];
-  panels.forEach((panel, k) => {
-    const [low, high] = shown.boundsOf(panel), log = state.logs.has(panel);
-    const base = top + k * height, room = height - 50;
-    const up = (y) => base + room * (1 - (log ? Math.log(Math.max(Math.abs(y), low) / low) / Math.log(high / low) : (y - low) / (high - low)));
-    const plot = state.plots[k];
-    const marks = (a) => plot.axes[a]._splits.map((value, j) => [value, plot.axes[a]._values[j]]).filter(([, label]) => label);
-    for (const [x, label] of marks(0)) {
-      parts.push(`<path d="M${across(x).toFixed(2)} ${base}v${room}" stroke="#ddd"/><text x="${across(x).toFixed(2)}" y="${base + room + 15}" text-anchor="middle">${clean(label)}</text>`);
-    }
-    for (const [y, label] of marks(1)) {
-      parts.push(`<path d="M${left} ${up(y).toFixed(2)}H${width - right}" stroke="#ddd"/><text x="${left - 6}" y="${(up(y) + 4).toFixed(2)}" text-anchor="end">${clean(label)}</text>`);
-    }
-    let column = left;
-    for (const curve of panel.curves.filter((curve) => curve.shown)) {
-      let path = "", pen = "M";
-      trace(curve, state.view, width, shown.edgeOf(state.view, width), (x, y) => {
-        if (Number.isNaN(y)) pen = "M";
-        else { path += `${pen}${across(x).toFixed(2)} ${up(y).toFixed(2)}`; pen = "L"; }
-      });
-      parts.push(`<path clip-path="url(#p${k})" d="${path}" fill="none" stroke="${shown.colour(curve, "light")}" stroke-width="1.5" stroke-dasharray="${shown.dash(curve).join(" ")}"/>`);
-      parts.push(`<text x="${column}" y="${base - 6}" fill="${shown.colour(curve, "light")}">${clean(curve.name)}</text>`);
-      column += 8 * curve.name.length + 14;
-    }
-    parts.push(`<clipPath id="p${k}"><rect x="${left}" y="${base}" width="${width - left - right}" height="${room}"/></clipPath>`);
-  });
-  const total = top + panels.length * height;
-  return `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${total}" viewBox="0 0 ${width} ${total}" font-family="sans-serif" font-size="12">` +
-    `<rect width="${width}" height="${total}" fill="#fff"/><text x="${left}" y="18" font-size="15">${clean(title)}</text>${parts.join("")}</svg>`;
+  let base = 0, panelsSoFar = 0;
+  for (const [shown, heading] of charts) {
+    const { axis, panels, state } = shown;
+    const [from, to] = state.view;
+    const across = (x) => left + inner * (axis.log ? Math.log(x / from) / Math.log(to / from) : (x - from) / (to - from));
+    parts.push(`<text x="${left}" y="${base + 18}" font-size="15">${clean(heading)}</text>`);
+    base += 40;
+    panels.forEach((panel, k) => {
+      const plot = state.plots[k], clip = `p${panelsSoFar++}`;
+      const curves = panel.curves.filter((curve) => curve.shown);
+      // Names, in as many lines as they take.
+      let column = left;
+      for (const curve of curves) {
+        const needs = 8 * curve.name.length + 44, colour = shown.colour(curve, "light");
+        if (column > left && column + needs > width) [column, base] = [left, base + 16];
+        parts.push(`<path d="M${column} ${base - 10}h24" stroke="${colour}" stroke-width="2" stroke-dasharray="${shown.dash(curve).join(" ")}"/>`);
+        parts.push(`<text x="${column + 30}" y="${base - 6}" fill="${colour}">${clean(curve.name)}</text>`);
+        column += needs;
+      }
+      const top = base, [low, high] = shown.boundsOf(panel), log = state.logs.has(panel);
+      const up = (y) => top + room * (1 - (log ? Math.log(Math.max(Math.abs(y), low) / low) / Math.log(high / low) : (y - low) / (high - low)));
+      const marks = (a) => plot.axes[a]._splits.map((value, j) => [value, plot.axes[a]._values[j]]).filter(([, label]) => label);
+      for (const [x, label] of marks(0)) {
+        parts.push(`<path d="M${across(x).toFixed(2)} ${top}v${room}" stroke="#ddd"/><text x="${across(x).toFixed(2)}" y="${top + room + 15}" text-anchor="middle">${clean(label)}</text>`);
+      }
+      for (const [y, label] of marks(1)) {
+        parts.push(`<path d="M${left} ${up(y).toFixed(2)}H${width - right}" stroke="#ddd"/><text x="${left - 6}" y="${(up(y) + 4).toFixed(2)}" text-anchor="end">${clean(label)}</text>`);
+      }
+      const layers = { inside: "", outline: "", line: "" };
+      for (const curve of curves) {
+        const colour = shown.colour(curve, "light"), dash = shown.dash(curve);
+        if (isDense(curve, state.view, inner)) {
+          const box = (pixel, y, end) => (end > y ? `M${left + pixel} ${y.toFixed(2)}h1V${end.toFixed(2)}h-1z` : "");
+          let inside = "", outline = "";
+          envelope(curve, state.view, inner, shown.edgeOf(state.view, inner), (a, b) => (log ? sizesOf(a, b) : [a, b]).map(up), SIZES.line).forEach(([pixel, y, end, a, b, isStraight]) => {
+            inside += box(pixel, a, b);
+            if (!isStraight || end - y >= 2 * SIZES.line || !isDashGap(dash, pixel)) outline += box(pixel, y, a) + box(pixel, b, end);
+          });
+          layers.inside += `<path d="${inside}" fill="${colour}" fill-opacity="${PALE}" shape-rendering="crispEdges"/>`;
+          layers.outline += `<path d="${outline}" fill="${colour}" data-signal="${clean(curve.name)}"/>`;
+          continue;
+        }
+        let path = "", pen = "M";
+        trace(curve, state.view, (x, y) => {
+          if (Number.isNaN(y)) pen = "M";
+          else { path += `${pen}${across(x).toFixed(2)} ${up(y).toFixed(2)}`; pen = "L"; }
+        });
+        layers.line += `<path d="${path}" fill="none" stroke="${colour}" stroke-width="1.5" stroke-dasharray="${dash.join(" ")}" data-signal="${clean(curve.name)}"/>`;
+      }
+      parts.push(`<clipPath id="${clip}"><rect x="${left}" y="${top}" width="${inner}" height="${room}"/></clipPath><g clip-path="url(#${clip})">${layers.inside}${layers.outline}${layers.line}</g>`);
+      base += room + 50;
+    });
+  }
+  return `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${base}" viewBox="0 0 ${width} ${base}" font-family="sans-serif" font-size="12">` +
+    `<rect width="${width}" height="${base}" fill="#fff"/>${parts.join("")}</svg>`;
 }
 
 /** The picture of the circuit, with what conducts at cursor A coloured. */
@@ -159,7 +185,7 @@ function circPage(root, data) {
     spectrumNote();
     const of = shown.panels.map((panel) => ({
       ...panel,
-      curves: panel.curves.filter((curve) => curve.shown).map((curve) => spectrumOf(curve, ...shown.state.view)),
+      curves: panel.curves.filter((curve) => curve.shown).map((curve) => ({ ...spectrumOf(curve, ...shown.state.view), run: curve.run, look: curve.look })),
     })).filter((panel) => panel.curves.length > 0);
     spectrumArea.hidden = false;
     if (spectrumArea.childElementCount === 0) {
@@ -191,7 +217,7 @@ function circPage(root, data) {
         area.addEventListener("complete", () => { wait.remove(); spectral.disabled = false; });
       }
     }
-    button("save SVG", () => save("circ.svg", "image/svg+xml", drawing(shown, data.title)), "what is seen as a drawing");
+    button("save SVG", () => save("circ.svg", "image/svg+xml", drawing([[shown, data.title], ...(spectrum ? [[spectrum, "Spectrum"]] : [])])), "what is seen as a drawing, the spectrum too");
   }
   button("dark / light", () => {
     document.documentElement.dataset.theme = isDark() ? "light" : "dark";
@@ -203,7 +229,7 @@ function circPage(root, data) {
     shown = chart(area, { axis: data.axis, panels, strips: stripsOf(data.strips) }, announce);
     area.addEventListener("view", () => { if (spectrum && !spectrumArea.hidden) transformed(); });
     root.append(element("details", {}, element("summary", {}, "Keys and mouse"), element("p", {},
-      "Drag: zoom to a span, a box or a height. Wheel: zoom at the pointer; with shift, move. Shift and drag: move. Double click or Home: all. Click: cursor A; shift and click: cursor B. " +
+      "Drag: zoom to a span, a box or a height. Wheel: zoom at the pointer; with shift, move. Shift and drag: move. Double click or Home: all. Click: cursor A; shift and click: cursor B; a click on a name shows or hides its curve. " +
       "Keys: + − ← → Home; a, b place a cursor at the pointer (without one, in the middle); , . move A and < > move B by a row; Escape takes cursors away.")));
   }
   if (data.circuit) root.append(circuitOf(data.circuit, shown, area));
