@@ -87,6 +87,16 @@ impl SourceMap {
             .unwrap_or("")
     }
 
+    /// The line on which a span starts.
+    fn line(&self, span: Span) -> &str {
+        let text = self.files.get(span.file.0 as usize).map_or("", |f| &f.text);
+        let at = span.start.min(text.len());
+        let (before, after) = text.split_at_checked(at).unwrap_or((text, ""));
+        let start = before.rfind('\n').map_or(0, |i| i + 1);
+        let end = after.find('\n').map_or(text.len(), |i| at + i);
+        text.get(start..end).unwrap_or("")
+    }
+
     /// The 1-based line and column (in characters) where a span starts.
     #[must_use]
     pub fn line_column(&self, span: Span) -> (usize, usize) {
@@ -120,6 +130,30 @@ pub struct Diagnostic {
     pub label: String,
     /// What would be right, or what to do.
     pub help: Option<String>,
+}
+
+/// Those of `more` that are no consequence of a card that could not be read: what such a card names is not called unknown.
+pub(crate) fn independent(
+    more: Vec<Diagnostic>,
+    read: &[Diagnostic],
+    sources: &SourceMap,
+) -> Vec<Diagnostic> {
+    let refused = read.iter().filter(|d| d.severity == Severity::Error);
+    let lines: Vec<String> = refused
+        .filter_map(|d| Some(sources.line(d.span?).to_lowercase()))
+        .collect();
+    let is_named = |name: &str| {
+        let mut words = lines
+            .iter()
+            .flat_map(|line| line.split(|c: char| !c.is_alphanumeric() && !matches!(c, '_' | '.')));
+        words.any(|word| word == name)
+    };
+    let follows = |d: &Diagnostic| {
+        let written = d.span.map_or("", |span| sources.text(span));
+        let name = written.trim_matches(['{', '}', '\'', '"', ' ']);
+        d.code.starts_with("unknown-") && is_named(&name.to_lowercase())
+    };
+    more.into_iter().filter(|d| !follows(d)).collect()
 }
 
 impl Diagnostic {

@@ -7,7 +7,7 @@ use crate::circuit::source::Wave;
 use crate::circuit::{
     Circuit, ElaborateOptions, Element, Kind, Sweep, Swept, Tolerance, Tran, elaborate, load,
 };
-use crate::diagnostic::{Diagnostic, Faults, SourceFile, SourceMap};
+use crate::diagnostic::{Diagnostic, Faults, SourceFile, SourceMap, independent};
 use crate::integrate::{
     Error, OperatingPoint, Places, Reason, Run, SimOptions, Simulation, SimulationOptions, Values,
     operating_point, simulate,
@@ -125,7 +125,7 @@ impl Model {
         };
         let (netlist, mut findings) = netlist::parse_among(&mut sources, root, search);
         let (circuit, more) = elaborate(&netlist, &options);
-        findings.extend(more);
+        findings.extend(independent(more, &findings, &sources));
         match circuit {
             Some(circuit) => Ok(Self::of(
                 Some(netlist),

@@ -139,6 +139,16 @@ fn a_word_that_is_neither_a_file_nor_a_command_is_told_so() {
         assert!(err.contains("'chek'") && err.contains("'check'"), "{err}");
     }
     assert!(said("..").contains("`..` is a folder"));
+    assert!(said("dividre.cir").contains("did you mean `divider.cir`?"));
+    // Options as other programs have them.
+    for (arguments, remedy) in [
+        ("sim divider.cir --out x.csv", "a file with `-o FILE`"),
+        ("sim divider.cir --tran 1m", "`.tran 10u 5m`"),
+        ("sim divider.cir -probe v(out)", "`--probe`"),
+    ] {
+        let err = said(arguments);
+        assert!(err.contains(remedy), "{err}");
+    }
     // Files of waveforms have commands of their own.
     let folder = place();
     run_in(folder.path(), "sim divider.cir -o w.raw -o w.csv");
@@ -962,9 +972,10 @@ fn graph_writes_graphviz_and_pictures() {
     );
     assert_eq!(at("-1").status, 2);
     assert_eq!(
-        run_in(directory.path(), "graph rectifier.cir -o g.dot").status,
+        run_in(directory.path(), "graph rectifier.cir -o g.dot -o h.svg").status,
         0
     );
+    assert!(directory.path().join("h.svg").is_file());
     assert!(
         fs::read_to_string(directory.path().join("g.dot"))
             .unwrap()

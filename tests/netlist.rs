@@ -170,6 +170,46 @@ fn the_example_is_read_without_findings() {
 }
 
 /// Each file has one fault; the whole message is the snapshot.
+/// Codes and remedies of what is wrong with these cards.
+fn mistakes(cards: &str) -> Vec<(&'static str, String)> {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("t.cir");
+    std::fs::write(&file, format!("t\n{cards}\n.end\n")).unwrap();
+    let found = circ::netlist::load(&file, &ElaborateOptions::default()).diagnostics;
+    let errors = found.into_iter().filter(|d| d.severity == Severity::Error);
+    errors
+        .map(|d| (d.code, d.help.unwrap_or_default()))
+        .collect()
+}
+
+#[test]
+fn what_a_refused_card_defines_is_not_called_unknown() {
+    let rest = "v1 a 0 {d}\nr1 a 0 1\n.tran 1m";
+    let comma = vec![("decimal-comma", "write `0.22`".to_owned())];
+    assert_eq!(mistakes(&format!(".param d=0,22\n{rest}")), comma);
+    let codes = |cards: &str| -> Vec<&str> { mistakes(cards).iter().map(|m| m.0).collect() };
+    assert_eq!(
+        codes(&format!(".param e=0,22\n{rest}")),
+        ["decimal-comma", "unknown-parameter"]
+    );
+    assert_eq!(codes(rest), ["unknown-parameter"]);
+}
+
+#[test]
+fn words_that_were_meant_otherwise_are_told() {
+    let rest = "v1 a 0 1\nr1 a 0 1";
+    for (card, meant) in [
+        (".tran 3m uicc", "did you mean `uic`?"),
+        (".tran 3m\nmeas tran x max v(a)", "did you mean `.meas`?"),
+        (".tran 3m\nparam x=3", "did you mean `.param`?"),
+        ("tran 3m", "did you mean `.tran`?"),
+    ] {
+        let found = mistakes(&format!("{rest}\n{card}"));
+        assert_eq!(found.len(), 1, "{card}: {found:?}");
+        assert!(found[0].1.contains(meant), "{card}: {found:?}");
+    }
+}
+
 #[test]
 fn bad_netlists() {
     let mut files: Vec<_> = std::fs::read_dir("netlists/bad")

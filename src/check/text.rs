@@ -159,13 +159,14 @@ impl fmt::Display for Report {
         }
         for theorem in &self.theorems {
             let mark = match theorem.holds {
-                Some(true) => "holds",
-                Some(false) => "fails",
-                None => "open ",
+                Some(true) => "applies",
+                // No fault of the circuit: a hypothesis is not fulfilled, and nothing is said.
+                Some(false) => "not met",
+                None => "open   ",
             };
             writeln!(f, "{mark}  {}: {}", theorem.statement, theorem.because)?;
             if theorem.holds == Some(true) {
-                writeln!(f, "       gives {}", theorem.gives)?;
+                writeln!(f, "         gives {}", theorem.gives)?;
             }
         }
         let equilibria = self.equilibria.as_deref().unwrap_or(&[]);

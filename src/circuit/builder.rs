@@ -14,6 +14,7 @@ use crate::netlist::Netlist;
 use crate::netlist::ast::{
     self, Assign, Block, Control, Device, Expr, Name, Signal, Statement, Subckt, Wanted,
 };
+use crate::netlist::suggest::directive;
 
 /// Most elements of a circuit.
 const MAX_ELEMENTS: usize = 1_000_000;
@@ -261,10 +262,16 @@ impl<'n, 'o> Builder<'n, 'o> {
                     "`{}` is {what}, which is recognised but not supported yet",
                     card.name.text
                 );
+                let help = match directive(&card.name.text) {
+                    Some(meant) => format!("did you mean `{meant}`?"),
+                    None => {
+                        "supported elements are R C L K V I E F G H B D S W M Q J Z T X A".into()
+                    }
+                };
                 self.tell(
                     Diagnostic::error("unsupported-element", card.span, message)
                         .label("not supported yet")
-                        .help("supported elements are R C L K V I E F G H B D S W M Q J Z T X A"),
+                        .help(help),
                 );
             }
         }

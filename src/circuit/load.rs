@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::Circuit;
 use super::elaborate::{ElaborateOptions, elaborate};
-use crate::diagnostic::{Diagnostic, SourceMap};
+use crate::diagnostic::{Diagnostic, SourceMap, independent};
 use crate::netlist::suggest::nearest;
 use crate::netlist::{self, Files, Netlist};
 
@@ -67,6 +67,15 @@ pub(crate) fn names(folder: &Path) -> Vec<String> {
         .collect()
 }
 
+/// The file with the name nearest to that of one that is missing, or of the same name in the nearest folder.
+pub(crate) fn near_file(path: &Path) -> Option<PathBuf> {
+    let known = names(path.parent().unwrap_or(Path::new("")));
+    let name = path.file_name()?.to_string_lossy();
+    let near = nearest(&name, known.iter().map(String::as_str));
+    let near = near.map(|near| path.with_file_name(near));
+    near.or_else(|| in_near_folder(path))
+}
+
 /// A file of the same name in a folder whose name is like that of one that is missing.
 fn in_near_folder(path: &Path) -> Option<PathBuf> {
     let folder = path.parent()?;
@@ -92,12 +101,7 @@ pub fn load_read(path: &Path, bytes: io::Result<Vec<u8>>, options: &ElaborateOpt
         Err(error) => {
             let message = format!("cannot read `{}`: {error}", path.display());
             let unreadable = Diagnostic::error("unreadable", None, message);
-            let known = names(path.parent().unwrap_or(Path::new("")));
-            let name = path.file_name().unwrap_or_default().to_string_lossy();
-            let near = nearest(&name, known.iter().map(String::as_str));
-            let near = near.map(|near| path.with_file_name(near));
-            let near = near.or_else(|| in_near_folder(path));
-            let help = match near {
+            let help = match near_file(path) {
                 Some(near) => format!("did you mean `{}`?", near.display()),
                 None => "check its name and folder".into(),
             };
@@ -117,7 +121,7 @@ pub fn load_read(path: &Path, bytes: io::Result<Vec<u8>>, options: &ElaborateOpt
     };
     let (parsed, mut diagnostics) = netlist::parse_among(&mut sources, root, search);
     let (circuit, more) = elaborate(&parsed, options);
-    diagnostics.extend(more);
+    diagnostics.extend(independent(more, &diagnostics, &sources));
     Loaded {
         sources,
         netlist: Some(parsed),

@@ -45,6 +45,8 @@ mod thyristor;
 mod tones;
 mod transistor;
 
+use std::collections::BTreeSet;
+
 use crate::algebra::Value;
 use crate::diagnostic::Span;
 use crate::law::Law;
@@ -384,8 +386,13 @@ impl Circuit {
             Probed::Voltage(node, _) => self.nodes[node.index()].as_str(),
             Probed::Current(id) => self.elements[id.index()].name.as_str(),
         };
+        let elements: BTreeSet<&str> = self.elements.iter().map(|e| e.name.as_str()).collect();
+        let is_part = |name: &str| {
+            let mut dots = name.match_indices('.');
+            dots.any(|(dot, _)| elements.contains(&name[..dot]))
+        };
         // What nobody wrote is shown where it is asked for.
-        all.filter(|probe| !is_inside(name(probe)) && !is_parasitic(name(probe)))
+        all.filter(|probe| !is_inside(name(probe)) && !is_part(name(probe)))
             .collect()
     }
 
@@ -417,10 +424,4 @@ fn is_inside(name: &str) -> bool {
     let mut parts = name.split('.');
     parts.next_back();
     parts.any(|part| part.starts_with('a'))
-}
-
-/// Whether it is a parasitic part of an element, `c1.rser`, or the node before it.
-fn is_parasitic(name: &str) -> bool {
-    name.rsplit_once('.')
-        .is_some_and(|(_, part)| passive::PARASITICS.contains(&part))
 }

@@ -6,7 +6,7 @@ use crate::algebra::Value;
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{self, Assign, Expr, ExprKind, Model, Name};
 use crate::netlist::card::describe;
-use crate::netlist::suggest::nearest;
+use crate::netlist::suggest::{directive, nearest};
 
 /// Zero, exactly.
 pub(super) const ZERO: Value = Value::decimal(0.0, 0, 0);
@@ -49,6 +49,7 @@ impl<'n> Builder<'n, '_> {
                 let near = self
                     .scopes
                     .near(scope, &wanted.text, |s| s.models.keys().copied());
+                let near = near.or_else(|| directive(&card.name.text).map(str::to_owned));
                 let help = match near {
                     Some(near) => format!("did you mean `{near}`?"),
                     None => format!(

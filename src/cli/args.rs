@@ -613,9 +613,9 @@ pub struct GraphArgs {
     #[command(flatten)]
     #[expect(missing_docs, reason = "documented where it is defined")]
     pub input: Input,
-    /// Write to this file instead of Graphviz text on standard output: svg or png, a circuit picture; dot, the graph
-    #[arg(short, long, value_name = "OUT")]
-    pub output: Option<PathBuf>,
+    /// Write to this file instead of Graphviz text on standard output (repeatable): svg or png, a circuit picture; dot, the graph
+    #[arg(short = 'o', long = "output", value_name = "OUT")]
+    pub outputs: Vec<PathBuf>,
     /// Format of standard output: dot, svg or png
     #[arg(long, value_name = "FORMAT", value_parser = ["dot", "svg", "png"], default_value = "dot")]
     pub format: String,
@@ -678,8 +678,8 @@ pub struct ExplainArgs {
 /// `circ completions`.
 #[derive(Debug, Args)]
 pub struct CompletionsArgs {
-    /// The shell
-    pub shell: clap_complete::Shell,
+    /// The shell; that of `SHELL` without
+    pub shell: Option<clap_complete::Shell>,
 }
 
 /// `circ man`.

@@ -16,7 +16,35 @@ use crate::report::{graph, schematic};
 /// # Errors
 /// See [`Failure`].
 pub(super) fn graph(args: &GraphArgs, streams: &Streams) -> Result<Exit, Failure> {
-    let path = args.output.as_deref().unwrap_or(Path::new(STDOUT));
+    let to_stdout = [PathBuf::from(STDOUT)];
+    let outputs = if args.outputs.is_empty() {
+        &to_stdout[..]
+    } else {
+        &args.outputs
+    };
+    let endings = outputs.iter().map(|path| ending(path, args));
+    let endings = endings.collect::<Result<Vec<_>, _>>()?;
+    let paths: Vec<&Path> = args.outputs.iter().map(PathBuf::as_path).collect();
+    let subject = input::open_as_it_stands(&args.input, &paths, streams)?;
+    let model = input::model_of(&args.input, &subject)?;
+    let live = match args.at {
+        Some(t) => conducting(model, t)
+            .map_err(|e| input::broke_off(&args.input, &e, model.places(), streams))?,
+        None => Vec::new(),
+    };
+    for (path, ending) in outputs.iter().zip(endings) {
+        match ending.as_str() {
+            "dot" | "gv" => files::write(path, graph::dot(model.circuit()).as_bytes())?,
+            ending => {
+                output::picture_to_file(path, ending == "png", &schematic::svg(model, &live)?)?;
+            }
+        }
+    }
+    Ok(Exit::Done)
+}
+
+/// What a file is to hold, by its name.
+fn ending(path: &Path, args: &GraphArgs) -> Result<String, Failure> {
     let ending = if path == Path::new(STDOUT) {
         args.format.clone()
     } else {
@@ -30,19 +58,5 @@ pub(super) fn graph(args: &GraphArgs, streams: &Streams) -> Result<Exit, Failure
         let message = "--at colours a picture: svg or png, by -o or --format";
         return Err(Failure::Message(message.into()));
     }
-    let outputs: Vec<&Path> = args.output.iter().map(PathBuf::as_path).collect();
-    let subject = input::open_as_it_stands(&args.input, &outputs, streams)?;
-    let model = input::model_of(&args.input, &subject)?;
-    match ending.as_str() {
-        "dot" | "gv" => files::write(path, graph::dot(model.circuit()).as_bytes())?,
-        ending => {
-            let live = match args.at {
-                Some(t) => conducting(model, t)
-                    .map_err(|e| input::broke_off(&args.input, &e, model.places(), streams))?,
-                None => Vec::new(),
-            };
-            output::picture_to_file(path, ending == "png", &schematic::svg(model, &live)?)?;
-        }
-    }
-    Ok(Exit::Done)
+    Ok(ending)
 }

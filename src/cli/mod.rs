@@ -46,6 +46,8 @@ use batch::Log;
 use exit::{Exit, Failure};
 use streams::Streams;
 
+use crate::circuit::load::near_file;
+
 pub use render::render;
 
 /// Carries out the command line of this process.
@@ -138,8 +140,12 @@ fn with_command(mut args: Vec<OsString>, commands: &clap::Command) -> Vec<OsStri
     args
 }
 
-/// Says of a word that is no command, nor like one, that it is no file either, and of a second file of `compare` how it is named.
+/// Says of a word that is no command, nor like one, that it is no file either, and of a second file of `compare` and of options of other programs how
+/// they are named here.
 fn no_such_input(error: clap::Error, command: &mut clap::Command) -> clap::Error {
+    if let Some(message) = named_otherwise(&error, command) {
+        return command.error(error.kind(), message);
+    }
     if let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidArg)
         && Path::new(word).is_file()
         && std::env::args().any(|arg| arg == "compare")
@@ -157,9 +163,46 @@ fn no_such_input(error: clap::Error, command: &mut clap::Command) -> clap::Error
     } else if is_like_one && !word.contains(['.', '/']) {
         return error;
     } else {
-        format!("`{word}` is neither a file nor a command")
+        let near = near_file(Path::new(word));
+        let near = near.map(|near| format!(": did you mean `{}`?", near.display()));
+        let near = near.unwrap_or_default();
+        format!("`{word}` is neither a file nor a command{near}")
     };
     command.error(ErrorKind::InvalidSubcommand, message)
+}
+
+/// What an option that is none, or that stands alone, may have been meant as.
+fn named_otherwise(error: &clap::Error, command: &clap::Command) -> Option<String> {
+    let of = |kind| match error.get(kind) {
+        Some(ContextValue::String(word)) => vec![word.as_str()],
+        Some(ContextValue::Strings(words)) => words.iter().map(String::as_str).collect(),
+        _ => vec![],
+    };
+    let missing = error.kind() == ErrorKind::MissingRequiredArgument;
+    let wrong = of(ContextKind::InvalidArg);
+    if missing && wrong.iter().any(|arg| arg.contains("--table")) {
+        return Some(
+            "`--in` and `--out` name sources and loads of `--table`; results go to a file with `-o FILE`"
+                .into(),
+        );
+    }
+    if error.kind() != ErrorKind::UnknownArgument {
+        return None;
+    }
+    if wrong.contains(&"--tran") {
+        return Some("the span of a run stands in the netlist: `.tran 10u 5m`".into());
+    }
+    // `-probe`, as other programs write it: read as `-p` and so on.
+    let long = |arg: &String| {
+        let name = arg.strip_prefix('-').filter(|name| name.len() > 1)?;
+        let name = name.split('=').next().unwrap_or(name).to_owned();
+        let mut all = command
+            .get_subcommands()
+            .flat_map(clap::Command::get_arguments);
+        all.any(|a| a.get_long() == Some(&name)).then_some(name)
+    };
+    let meant = std::env::args().skip(1).find_map(|arg| long(&arg))?;
+    Some(format!("`-{meant}` is written `--{meant}`"))
 }
 
 /// Several values of `--param` are for a sweep alone.

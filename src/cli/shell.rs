@@ -12,6 +12,10 @@ use super::streams::Streams;
 /// # Errors
 /// Those of standard output.
 pub(super) fn completions(args: &CompletionsArgs, streams: &Streams) -> Result<Exit, Failure> {
+    let Some(shell) = args.shell.or_else(clap_complete::Shell::from_env) else {
+        let message = "name a shell, as in `circ completions bash`: SHELL does not say which it is";
+        return Err(Failure::Message(message.into()));
+    };
     let mut command = Cli::command();
     // `circ FILE` takes what `circ sim FILE` does.
     let sim = command.find_subcommand("sim").into_iter();
@@ -21,7 +25,7 @@ pub(super) fn completions(args: &CompletionsArgs, streams: &Streams) -> Result<E
         .collect();
     command = command.args(own.into_iter().filter(|arg| !arg.is_global_set()));
     let mut text = Vec::new();
-    clap_complete::generate(args.shell, &mut command, "circ", &mut text);
+    clap_complete::generate(shell, &mut command, "circ", &mut text);
     streams.data(text)?;
     Ok(Exit::Done)
 }

@@ -66,12 +66,16 @@ const UIC: &str = "`uic` on `.tran` starts from initial conditions instead";
 const DEVICE: &str = "a current may have no path but a device that blocks, or a voltage be shorted by one that conducts: a \
                       resistor across the device (`Roff` in its model), or in series with it (`Ron`, `RS`), decides";
 
+const FLOATING: &str = "where the source of a transistor rises as it conducts, a gate that is driven against ground loses its voltage: drive it against the \
+                        source (`Vg g s …`), as a bootstrap or an isolated driver does";
+
 fn told(error: &Error, elements: &[&Element]) -> Told {
     let names: Vec<&str> = elements.iter().map(|e| e.name.as_str()).collect();
     let names = listed(&names);
     let curved = elements
         .iter()
         .any(|e| matches!(&e.kind, Kind::Device(Law::Exponential(_) | Law::Rounded(_))));
+    let channel = elements.iter().find(|e| e.name.ends_with(".channel"));
     let ideal = curved.then_some("`--diodes ideal` takes ideal diodes in place of curved ones");
     let or = |help: &str| match ideal {
         Some(ideal) => format!("{help}; {ideal}"),
@@ -113,18 +117,22 @@ fn told(error: &Error, elements: &[&Element]) -> Told {
             code: "switches-do-not-settle",
             message: format!("there is no operating point: in no position of {names} do the controls leave the switches where they are at rest"),
             label: "every position asks for another one".into(),
-            help: Some(format!(
-                "{UIC} (`ic=` of capacitors and inductors, else 0), as a controller that regulates by switching needs; a switch that takes away its own \
-                 control at once needs hysteresis too (`Vh` in the model)"
-            )),
+            help: Some(match channel {
+                Some(_) => FLOATING.into(),
+                None => format!(
+                    "{UIC} (`ic=` of capacitors and inductors, else 0), as a controller that regulates by switching needs; a switch that takes away its \
+                     own control at once needs hysteresis too (`Vh` in the model)"
+                ),
+            }),
         },
         Reason::SwitchesDoNotSettle => Told {
             code: "switches-do-not-settle",
             message: format!("in no position of {names} do the controls leave the switches where they are"),
             label: "every position asks for another one".into(),
-            help: Some(
+            help: Some(channel.map_or(
                 "hysteresis (`Vh` in the model), or a resistor and a capacitor in front of the control, lets them settle".into(),
-            ),
+                |_| FLOATING.into(),
+            )),
         },
         Reason::EventsAccumulate { .. } | Reason::NoProgress { .. } => plain(
             "events-accumulate",

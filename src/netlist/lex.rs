@@ -242,6 +242,16 @@ pub(super) enum Fault {
     Told(Box<Diagnostic>),
 }
 
+impl Fault {
+    /// With this as its remedy.
+    pub(super) fn helped(self, help: &str) -> Self {
+        match self {
+            Self::Mismatch => Self::Mismatch,
+            Self::Told(finding) => Self::Told(Box::new(finding.help(help))),
+        }
+    }
+}
+
 impl ParseError<Input<'_>> for Fault {
     fn from_error_kind(_: Input<'_>, _: ErrorKind) -> Self {
         Self::Mismatch

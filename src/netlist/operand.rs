@@ -50,23 +50,27 @@ pub(super) fn braced(i: Input<'_>) -> Parsed<'_, Expr> {
 pub(super) fn value(i: Input<'_>) -> Parsed<'_, Expr> {
     let start = blank(i);
     let (rest, item) = item(start)?;
-    if rest.fragment().starts_with(',')
-        && rest.fragment()[1..].starts_with(|c: char| c.is_ascii_digit())
-    {
-        let (after, _) = word(rest.take_from(1))?;
-        let span = between(start, after);
-        let text = written(start, after);
-        return Err(refuse(
-            Diagnostic::error(
-                "decimal-comma",
-                span,
-                format!("`{text}` has a decimal comma"),
-            )
+    without_comma(start, rest)?;
+    Ok((rest, item))
+}
+
+/// # Errors
+/// After what was read from `start` a comma and a digit come.
+pub(super) fn without_comma(start: Input<'_>, rest: Input<'_>) -> Result<(), nom::Err<Fault>> {
+    let digit = |c: char| c.is_ascii_digit();
+    let comma = rest.fragment().strip_prefix(',');
+    if !comma.is_some_and(|after| after.starts_with(digit)) {
+        return Ok(());
+    }
+    let (after, _) = word(rest.take_from(1))?;
+    let span = between(start, after);
+    let text = written(start, after);
+    let message = format!("`{text}` has a decimal comma");
+    Err(refuse(
+        Diagnostic::error("decimal-comma", span, message)
             .label("not a number")
             .help(format!("write `{}`", text.replace(',', "."))),
-        ));
-    }
-    Ok((rest, item))
+    ))
 }
 
 /// The same in a list, where a comma separates.

@@ -17,6 +17,12 @@ pub(crate) fn nearest<'a>(
         .map(|(_, candidate)| candidate.to_string())
 }
 
+/// The directive that a word is without its dot: `.meas` for `meas`.
+pub(crate) fn directive(word: &str) -> Option<&'static str> {
+    let mut all = super::dot::DIRECTIVES.into_iter();
+    all.find(|directive| directive.strip_prefix('.') == Some(word))
+}
+
 /// Whether a word is a unit, with or without a prefix: `ohm`, `kohm`, `uF`, `Meg`.
 pub(crate) fn is_unit(word: &str) -> bool {
     const PREFIXES: [&str; 11] = ["", "t", "g", "meg", "k", "m", "u", "µ", "n", "p", "f"];

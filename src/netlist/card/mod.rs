@@ -11,6 +11,7 @@ use super::ast::{Assign, Device, Element, Expr, ExprKind, Name};
 use super::lex::{
     Fault, Input, Parsed, ahead, at_end, blank, end, missing, node, refuse, separator, symbol, word,
 };
+use super::suggest::directive;
 use super::{expr, operand, value};
 use crate::diagnostic::Diagnostic;
 
@@ -79,8 +80,11 @@ pub(super) fn element(i: Input<'_>) -> Parsed<'_, Element> {
             ));
         }
     };
-    let (rest, (nodes, device)) = parser(rest, &name)?;
-    let (rest, ()) = end(rest)?;
+    let read = parser(rest, &name).and_then(|(rest, body)| Ok((end(rest)?.0, body)));
+    let (rest, (nodes, device)) = read.map_err(|fault| match directive(&name.text) {
+        Some(meant) => fault.map(|fault| fault.helped(&format!("did you mean `{meant}`?"))),
+        None => fault,
+    })?;
     Ok((
         rest,
         Element {

@@ -4,11 +4,11 @@ use super::Dot;
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Assign, Func, Model, Name, Statement};
 use crate::netlist::card::{assign, assignment_follows, assigns};
-use crate::netlist::expr;
 use crate::netlist::lex::{
     Input, Parsed, at_end, between, blank, end, expect_word, missing, node, refuse, separator,
     symbol, tell, word,
 };
+use crate::netlist::{expr, operand};
 
 /// `.param a = 1 b={2*a} c 3 f(x)={x^2}`.
 pub(super) fn params<'a>(i: Input<'a>, directive: &Name) -> Parsed<'a, Dot> {
@@ -20,12 +20,18 @@ pub(super) fn params<'a>(i: Input<'a>, directive: &Name) -> Parsed<'a, Dot> {
             return func(at);
         }
         let bare = separator(rest);
-        let value = match symbol(rest, '=') {
-            Some(rest) => Some(expr::expr(rest)?),
+        let written = match symbol(rest, '=') {
+            Some(rest) => Some(blank(rest)),
             // `.param r 100`.
             None if at_end(bare) || assignment_follows(bare) => None,
-            None => Some(expr::expr(bare)?),
+            None => Some(bare),
         };
+        let value = written.map(|written| {
+            let (rest, value) = expr::expr(written)?;
+            operand::without_comma(written, rest)?;
+            Ok((rest, value))
+        });
+        let value = value.transpose()?;
         let Some((rest, value)) = value else {
             let fault = Diagnostic::error(
                 "missing",

@@ -15,6 +15,7 @@ use crate::netlist::lex::{
     Fault, Input, Parsed, ahead, at_end, between, blank, end, missing, node, refuse, separator,
     symbol, tell, word,
 };
+use crate::netlist::suggest::nearest;
 use crate::netlist::{expr, operand};
 
 /// What a dot card means to the reader.
@@ -152,7 +153,7 @@ pub(in crate::netlist) fn card(i: Input<'_>) -> Parsed<'_, Dot> {
                 format!("unknown directive `{}`", name.text),
             )
             .label("not a directive");
-            let near = crate::netlist::suggest::nearest(&name.text, DIRECTIVES);
+            let near = nearest(&name.text, DIRECTIVES);
             Err(refuse(match near {
                 Some(near) => fault.help(format!("did you mean `{near}`?")),
                 None => fault.help(
@@ -242,7 +243,15 @@ pub(in crate::netlist) fn tran<'a>(
                     )
                     .label("not supported"),
                 ),
-                _ => {
+                other => {
+                    if let Some(meant) = nearest(other, ["uic", "startup", "steady"]) {
+                        let message = format!("`{other}` is no option of .tran");
+                        return Err(refuse(
+                            Diagnostic::error("unexpected", name.span, message)
+                                .label("unknown option")
+                                .help(format!("did you mean `{meant}`?")),
+                        ));
+                    }
                     let (rest, value) = operand::value(at)?;
                     args.push(value);
                     at = rest;
