@@ -1,5 +1,6 @@
 //! A transient with its measurements: the signals they need are simulated besides those that are shown, and taken away again.
 
+use super::density::{Cut, bent, crowd};
 use super::periodic::{PeriodicOptions, on_grid, periodic};
 use super::start::beginning;
 use super::table::Table;
@@ -8,7 +9,7 @@ use crate::circuit::{Circuit, Harmonics, Measured, Probe, Tran};
 use crate::integrate::{Block, Error, Grid, Method, Note, Orbit, RowKind, Run, SimOptions};
 use crate::model::Model;
 use crate::settings::tolerances::times::{
-    CROWDED, LAST_ROW, LINES_CLOSE, NOTHING, ROWS_A_PERIOD, ROWS_APART, ROWS_CLOSE, SAME_TIME,
+    CROWDED, LAST_ROW, LINES_CLOSE, NOTHING, ROWS_A_PERIOD, ROWS_APART, ROWS_CLOSE,
 };
 use crate::waveform::Waveforms;
 
@@ -114,7 +115,7 @@ fn shown_of(measuring: Measuring<'_>, model: &Model, options: SimOptions<'_>) ->
         if is_measured(measuring.circuit) {
             run.notes.extend(measuring.too_coarse(run, found));
         }
-        (run.waveforms, run.kinds) = measuring.cut(&run.waveforms, &run.kinds);
+        (run.waveforms, run.kinds) = measuring.cut(run);
     }
     finished
 }
@@ -233,30 +234,6 @@ pub(super) fn laps(
     ((laps - kept, laps), note)
 }
 
-/// Twice the rows at events and corners over those of the grid.
-fn crowd(kinds: &[RowKind]) -> f64 {
-    let grid = kinds.iter().filter(|kind| kind.is_grid()).count();
-    2.0 * (kinds.len() - grid) as f64 / grid.max(1) as f64
-}
-
-/// First and last row of each three steps of the grid without an event or a corner. (The front after an event may be steeper than any grid.)
-fn lines(kinds: &[RowKind]) -> Vec<(usize, usize)> {
-    let smooth = kinds.chunk_by(|one, next| (*one == RowKind::Grid) == (*next == RowKind::Grid));
-    let (mut lines, mut first) = (Vec::new(), 0);
-    for rows in smooth {
-        let end = first + rows.len();
-        if rows[0] == RowKind::Grid {
-            lines.extend(
-                (first..end.saturating_sub(3))
-                    .step_by(3)
-                    .map(|k| (k, k + 3)),
-            );
-        }
-        first = end;
-    }
-    lines
-}
-
 /// What a circuit's measurements need, and how its results are shown without that.
 struct Measuring<'a> {
     circuit: &'a Circuit,
@@ -363,7 +340,7 @@ impl<'a> Measuring<'a> {
         let (laps, note) = laps(self.circuit.tran, period, run.waveforms.values.len());
         run.notes.extend(note);
         let found = self.found(&run.waveforms, laps, period);
-        (run.waveforms, run.kinds) = self.cut(&run.waveforms, &run.kinds);
+        (run.waveforms, run.kinds) = self.cut(run);
         found
     }
 
@@ -426,34 +403,6 @@ impl<'a> Measuring<'a> {
         both.filter(|(.., off)| *off > 0.0).collect()
     }
 
-    /// How far rows of the grid stand from straight lines over two of them left out, from each event on, over the extent of their signal: the most.
-    fn bent(&self, run: &Run) -> f64 {
-        let waves = &run.waveforms;
-        let lines = lines(&run.kinds);
-        let range = |j: usize| {
-            let fold = |(low, high): (f64, f64), v| (low.min(v), high.max(v));
-            waves.column(j).fold((f64::MAX, f64::MIN), fold)
-        };
-        let ranges: Vec<_> = (0..self.shown).map(range).collect();
-        let of_signal = |j: usize| {
-            let value = |k: usize| waves.values[k * waves.width() + j];
-            let (low, high) = ranges[j];
-            // What is zero but for rounding, beside others of its unit, has no line.
-            let alike = ranges.iter().zip(&waves.units);
-            let alike = alike.filter(|(_, unit)| **unit == waves.units[j]);
-            let least =
-                NOTHING * alike.fold(0.0, |m: f64, ((l, h), _)| m.max(l.abs()).max(h.abs()));
-            let off = lines.iter().flat_map(|&(from, to)| {
-                let since = move |k: usize| waves.time[k] - waves.time[from];
-                let slope = (value(to) - value(from)) / since(to);
-                (from + 1..to).map(move |k| (value(k) - value(from) - slope * since(k)).abs())
-            });
-            let extent = (high - low).max(least).max(f64::MIN_POSITIVE);
-            off.fold(0.0, f64::max) / extent
-        };
-        (0..self.shown).map(of_signal).fold(0.0, f64::max)
-    }
-
     /// How often the print step is to be divided for rows that are close enough: twice as many as at events and corners, beside which fewer say nothing;
     /// and what straight lines leave out falls with the square of their length.
     fn closer(&self, run: &Run, found: &Measurements) -> Option<usize> {
@@ -470,8 +419,10 @@ impl<'a> Measuring<'a> {
             let thinned = self.thinned(run, found);
             let off = thinned.iter().map(|(.., off)| *off).fold(0.0, f64::max);
             let lines = match self.pictured {
-                Some(_) => self.bent(run) / LINES_CLOSE,
-                None => 0.0,
+                Some(_) if run.method == Method::Exact.name() => {
+                    bent(&run.waveforms, &run.kinds, self.shown) / LINES_CLOSE
+                }
+                _ => 0.0,
             };
             (off / ROWS_CLOSE).max(lines).sqrt()
         };
@@ -502,61 +453,14 @@ impl<'a> Measuring<'a> {
     }
 
     /// The signals that are shown, at the print steps, at events, and for pictures between.
-    fn cut(&self, waves: &Waveforms, kinds: &[RowKind]) -> (Waveforms, Vec<RowKind>) {
-        let grid = self.tran.map(|tran| Grid::of(&tran));
-        let fine = self.fine().map(|tran| Grid::of(&tran).len());
-        let mut kept = Waveforms {
-            title: waves.title.clone(),
-            names: waves.names[..self.shown].to_vec(),
-            units: waves.units[..self.shown].to_vec(),
-            ..Waveforms::default()
+    fn cut(&self, run: &Run) -> (Waveforms, Vec<RowKind>) {
+        let cut = Cut {
+            columns: self.shown,
+            grid: self.tran.map(|tran| Grid::of(&tran)),
+            fine: self.fine().map(|tran| Grid::of(&tran).len()),
+            divisions: self.divisions,
+            between: self.pictured.is_some(),
         };
-        let mut kept_kinds = Vec::new();
-        // The next of the fine grid.
-        let mut next = 0;
-        for (t, values, kind) in Block::of(waves, kinds).rows() {
-            let (mut time, mut kind) = (Some(t), kind);
-            if let (true, Some(grid), Some(fine)) = (kind.is_grid(), &grid, fine) {
-                let shown = if next + 1 == fine {
-                    Some(grid.len() - 1)
-                } else {
-                    (next % self.divisions == 0).then(|| next / self.divisions)
-                };
-                time = shown.map(|k| grid.time(k));
-                next += 1;
-                // Between the output times that are shown it stands for what else is there.
-                if time.is_none() && kind == RowKind::Both {
-                    (time, kind) = (Some(t), RowKind::Corner);
-                } else if time.is_none() && self.pictured.is_some() {
-                    (time, kind) = (Some(t), RowKind::Between);
-                }
-            }
-            if let Some(mut time) = time {
-                // One row for an output time and a corner that are an ulp apart.
-                let is_last = |late: &f64| (*late - time).abs() <= SAME_TIME * time.abs();
-                if kept.time.last().is_some_and(is_last) {
-                    match (kept_kinds.last(), kind) {
-                        (Some(RowKind::Grid | RowKind::Both), RowKind::Corner) => continue,
-                        (Some(RowKind::Corner), _) if kind.is_grid() => {
-                            kept.time.pop();
-                            kept.values.truncate(kept.time.len() * self.shown);
-                            kept_kinds.pop();
-                        }
-                        _ => {}
-                    }
-                }
-                // The two grids put one instant an ulp apart; rows at events there stand with the row that is shown.
-                if kind.is_grid() {
-                    let later = kept.time.iter_mut().rev().take_while(|late| **late > time);
-                    later.for_each(|late| *late = time);
-                } else {
-                    time = kept.time.last().map_or(time, |last| time.max(*last));
-                }
-                kept.time.push(time);
-                kept.values.extend_from_slice(&values[..self.shown]);
-                kept_kinds.push(kind);
-            }
-        }
-        (kept, kept_kinds)
+        cut.of(&run.waveforms, &run.kinds)
     }
 }

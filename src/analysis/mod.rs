@@ -15,6 +15,7 @@
 
 mod conducting;
 mod dc;
+mod density;
 mod measured;
 mod periodic;
 mod sensitivity;

@@ -71,6 +71,11 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
             only_one_way(args)?;
             return dc::sim(args, model, &formats, streams);
         }
+        if circuit.tran.is_none() {
+            let file = args.input.file.display();
+            let message = "nothing to simulate: the netlist asks for no .tran analysis";
+            return Err(Failure::Message(format!("{file}: {message}")));
+        }
         if circuit.steady == Some(SteadyState::Orbit) {
             if !args.worst.is_empty() || args.verify {
                 only_one_way(args)?;

@@ -9,6 +9,7 @@
 //! is a product of exponentials and saltations, without differences.
 
 mod course;
+mod flow;
 mod instant;
 mod linear;
 mod parameter;
@@ -25,9 +26,10 @@ use crate::settings::tolerances::jumps::FOLLOWS_JUMP;
 use crate::settings::tolerances::times::SAME_TIME;
 
 pub(crate) use course::{Course, Leap};
+pub(crate) use flow::Shifted;
 use instant::Inputs;
 pub(crate) use linear::{Linear, Motion};
-pub(crate) use parameter::{Near, Parameter, STEPS, Shifted};
+pub(crate) use parameter::{Near, Parameter, STEPS};
 use saltation::Side;
 pub(crate) use saltation::{Saltation, Timing, times};
 pub(crate) use system::{System, shaped};

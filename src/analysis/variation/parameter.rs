@@ -11,6 +11,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::flow::{Flows, Shifted, Sources};
 use super::instant::Inputs;
 use super::saltation::{Side, Timing};
 use super::{Saltation, System, Trajectory, not_smooth, shaped};
@@ -19,9 +20,7 @@ use crate::circuit::source::Piece;
 use crate::integrate::exact::{Assembler, Exosystem, Shape};
 use crate::integrate::switching::Threshold;
 use crate::integrate::{Error, Simulation};
-use crate::linalg::expm::Ladders;
 use crate::settings::tolerances::events::SAME_TIMING;
-use crate::settings::tolerances::exponentials::SQUARED;
 use crate::settings::tolerances::periodic::VALUE_STEP;
 
 /// The circuits that are compared, in steps of p h.
@@ -62,21 +61,6 @@ impl Near {
             state,
         })
     }
-}
-
-/// A row of a run, and how it moves with ln p.
-#[derive(Debug, Clone)]
-pub(crate) struct Shifted {
-    /// Whether it is one side of an event.
-    pub(crate) event: bool,
-    /// Time, s, and its derivative.
-    pub(crate) t: f64,
-    pub(crate) dt: f64,
-    /// The outputs, and their derivatives at the time that moves.
-    pub(crate) y: DVector<f64>,
-    pub(crate) dy: DVector<f64>,
-    /// Rates of the outputs where the time moves, else empty.
-    pub(crate) rate: DVector<f64>,
 }
 
 /// Σ weights · f over the circuits, over h: the derivative with ln p.
@@ -168,49 +152,6 @@ pub(crate) struct Parameter<'a> {
     forms: Vec<Forms>,
 }
 
-/// A segment as w' = 𝒢 w, w = [x | z | δx].
-struct Column {
-    generator: DMatrix<f64>,
-    /// y and δy over w.
-    rows: [DMatrix<f64>; 2],
-    w: DVector<f64>,
-    n: usize,
-}
-
-impl Column {
-    /// exp(𝒢 t) w − w.
-    fn step(&self, t: f64, seconds: f64) -> Result<DMatrix<f64>, Error> {
-        let dim = self.generator.nrows();
-        let increment = Ladders::new(&self.generator, &[], seconds, SQUARED, 0).increment(0);
-        let increment = increment
-            .ok_or_else(|| not_smooth(t, "the exponential of a mode does not exist in doubles"))?;
-        Ok(DMatrix::from_fn(dim, dim, |i, j| increment.column(j)[i]))
-    }
-
-    /// δx.
-    fn change(&self, w: &DVector<f64>) -> DVector<f64> {
-        w.rows(w.len() - self.n, self.n).into_owned()
-    }
-
-    /// The row at w, whose time moves by dt.
-    fn row(&self, w: &DVector<f64>, (t, dt): (f64, f64), event: bool) -> Shifted {
-        let [y, dy] = self.rows.each_ref().map(|rows| rows * w);
-        let rate = if dt == 0.0 {
-            DVector::zeros(y.len())
-        } else {
-            &self.rows[0] * (&self.generator * w)
-        };
-        Shifted {
-            event,
-            t,
-            dt,
-            dy: dy + &rate * dt,
-            y,
-            rate,
-        }
-    }
-}
-
 impl<'a> Parameter<'a> {
     pub(crate) fn of(trajectory: &'a Trajectory, near: &'a [Near; 4]) -> Result<Self, Error> {
         let mut walk = Walk::of(trajectory, near)?;
@@ -234,10 +175,6 @@ impl<'a> Parameter<'a> {
             near.each_ref()
                 .map(|near| DVector::from_column_slice(&near.state)),
         )
-    }
-
-    fn system(&self, k: usize) -> &System {
-        &self.trajectory.systems[self.trajectory.segments[k].system]
     }
 
     /// u and its rates at t, as segment k has them.
@@ -277,10 +214,11 @@ impl<'a> Parameter<'a> {
         weighted(parts) + &system.lcs.storage.x * dx
     }
 
-    fn column(&self, k: usize, dx: &DVector<f64>) -> Column {
+    /// The equation of segment k among those that are known, and w where it begins.
+    fn enter(&self, flows: &mut Flows, k: usize, dx: &DVector<f64>) -> (usize, DVector<f64>) {
         let segment = &self.trajectory.segments[k];
-        let (system, forms) = (self.system(k), &self.forms[k]);
-        let (n, p) = (system.lcs.n(), forms.own.len());
+        let forms = &self.forms[k];
+        let (n, p) = (dx.len(), forms.own.len());
         // The sources that move have their closed forms beside them.
         let moving: Vec<usize> = (0..p)
             .filter(|&i| forms.near.iter().any(|near| near[i] != forms.own[i]))
@@ -301,12 +239,28 @@ impl<'a> Parameter<'a> {
                 sum += row;
             }
         }
+        let sources = Sources {
+            own,
+            change,
+            generator: exosystem.generator().clone(),
+        };
+        let at = flows.place(segment.system, sources, |sources| {
+            self.equation(segment.system, sources)
+        });
+        let mut w = DVector::zeros(2 * n + dz);
+        w.rows_mut(0, n).copy_from(&segment.start);
+        exosystem.write(segment.from, &mut w.as_mut_slice()[n..n + dz]);
+        w.rows_mut(n + dz, n).copy_from(dx);
+        (at, w)
+    }
+
+    /// 𝒢, and y and δy over w, in a mode with these sources.
+    fn equation(&self, at: usize, sources: &Sources) -> (DMatrix<f64>, [DMatrix<f64>; 2]) {
+        let system = &self.trajectory.systems[at];
+        let (n, p) = (system.lcs.n(), sources.own.nrows());
+        let (own, change, dz) = (&sources.own, &sources.change, sources.own.ncols());
         let of_near = |f: &dyn Fn(&System) -> DMatrix<f64>| {
-            weighted_matrix(
-                self.near
-                    .each_ref()
-                    .map(|near| f(&near.systems[segment.system])),
-            )
+            weighted_matrix(self.near.each_ref().map(|near| f(&near.systems[at])))
         };
         let constant = |system: &System| DMatrix::from_column_slice(n, 1, system.lcs.e0.as_slice());
         let dim = 2 * n + dz;
@@ -316,12 +270,12 @@ impl<'a> Parameter<'a> {
             view += block;
         };
         put(0, 0, &system.lcs.a);
-        put(0, n, &(&system.inputs * &own));
+        put(0, n, &(&system.inputs * own));
         put(0, n, &constant(system));
-        put(n, n, exosystem.generator());
+        put(n, n, &sources.generator);
         put(n + dz, 0, &of_near(&|s| s.lcs.a.clone()));
-        put(n + dz, n, &(of_near(&|s| s.inputs.clone()) * &own));
-        put(n + dz, n, &(&system.inputs * &change));
+        put(n + dz, n, &(of_near(&|s| s.inputs.clone()) * own));
+        put(n + dz, n, &(&system.inputs * change));
         put(n + dz, n, &of_near(&constant));
         put(n + dz, n + dz, &system.lcs.a);
         let outputs = &system.lcs.outputs.rows;
@@ -329,7 +283,7 @@ impl<'a> Parameter<'a> {
         let over = |rows: &crate::lcs::Rows, h: &DMatrix<f64>, one: bool| {
             let mut out = DMatrix::zeros(count, n + dz);
             out.columns_mut(0, n).copy_from(&shaped(&rows.x, count, n));
-            let slopes = shaped(&rows.du, count, p) * (h * exosystem.generator());
+            let slopes = shaped(&rows.du, count, p) * (h * &sources.generator);
             let mut z = out.columns_mut(n, dz);
             z += shaped(&rows.u, count, p) * h + slopes;
             if one {
@@ -338,13 +292,13 @@ impl<'a> Parameter<'a> {
             }
             out
         };
-        let plain = over(outputs, &own, true);
+        let plain = over(outputs, own, true);
         let moved = weighted_matrix(
             self.near
                 .each_ref()
-                .map(|near| over(&near.systems[segment.system].lcs.outputs.rows, &own, true)),
+                .map(|near| over(&near.systems[at].lcs.outputs.rows, own, true)),
         );
-        let by_sources = over(outputs, &change, false).columns(n, dz).into_owned();
+        let by_sources = over(outputs, change, false).columns(n, dz).into_owned();
         let mut rows = [DMatrix::zeros(count, dim), DMatrix::zeros(count, dim)];
         rows[0].columns_mut(0, n + dz).copy_from(&plain);
         rows[1].columns_mut(0, n + dz).copy_from(&moved);
@@ -353,16 +307,7 @@ impl<'a> Parameter<'a> {
         rows[1]
             .columns_mut(n + dz, n)
             .copy_from(&plain.columns(0, n));
-        let mut w = DVector::zeros(dim);
-        w.rows_mut(0, n).copy_from(&segment.start);
-        exosystem.write(segment.from, &mut w.as_mut_slice()[n..n + dz]);
-        w.rows_mut(n + dz, n).copy_from(dx);
-        Column {
-            generator,
-            rows,
-            w,
-            n,
-        }
+        (generator, rows)
     }
 
     /// Goes along the trajectory from δs: its rows at both sides of events and at these times, in order, and δs at the end.
@@ -374,40 +319,31 @@ impl<'a> Parameter<'a> {
         let segments = &self.trajectory.segments;
         let mut rows = Vec::with_capacity(times.len() + 2 * segments.len());
         let (mut dx, mut dt) = (self.start(ds), 0.0);
+        let mut flows = Flows::default();
         let mut next = 0;
         for (k, segment) in segments.iter().enumerate() {
-            let column = self.column(k, &dx);
-            let (mut w, mut t) = (column.w.clone(), segment.from);
-            rows.push(column.row(&w, (t, dt), true));
-            // Times of a grid are equally far apart.
-            let mut known: Option<(f64, DMatrix<f64>)> = None;
+            let (at, mut w) = self.enter(&mut flows, k, &dx);
+            let flow = flows.at(at);
+            let mut t = segment.from;
+            rows.push(flow.row(&w, (t, dt), true));
             while let Some(&time) = times.get(next).filter(|time| **time < segment.to) {
                 next += 1;
-                let seconds = time - t;
-                if seconds <= 0.0 {
-                    continue;
+                if time > t {
+                    flow.advance(&mut w, (t, time))?;
+                    t = time;
+                    rows.push(flow.row(&w, (t, 0.0), false));
                 }
-                let same = |known: &&(f64, DMatrix<f64>)| {
-                    (known.0 - seconds).abs() <= 64.0 * f64::EPSILON * time.abs().max(seconds)
-                };
-                let step = match known.as_ref().filter(same) {
-                    Some((_, step)) => step,
-                    None => &known.insert((seconds, column.step(t, seconds)?)).1,
-                };
-                w += step * &w;
-                t = time;
-                rows.push(column.row(&w, (t, 0.0), false));
             }
             if segment.to > t {
-                w += column.step(t, segment.to - t)? * &w;
+                flow.advance(&mut w, (t, segment.to))?;
             }
-            dx = column.change(&w);
+            dx = w.rows(w.len() - dx.len(), dx.len()).into_owned();
             let Some(saltation) = self.trajectory.saltations.get(k) else {
-                rows.push(column.row(&w, (segment.to, 0.0), false));
+                rows.push(flow.row(&w, (segment.to, 0.0), false));
                 return Ok((rows, self.end(&dx)));
             };
             dt = self.shift(k, saltation, &dx)?;
-            rows.push(column.row(&w, (segment.to, dt), true));
+            rows.push(flow.row(&w, (segment.to, dt), true));
             dx = self.passed(k, saltation, &dx, dt);
         }
         Ok((rows, ds.clone()))

@@ -1,0 +1,129 @@
+//! Rows on a grid that is finer than the one that is shown: whether they are close enough, and which of them are kept.
+
+use crate::integrate::{Block, Grid, RowKind};
+use crate::settings::tolerances::times::{NOTHING, SAME_TIME};
+use crate::waveform::Waveforms;
+
+/// Twice the rows at events and corners over those of the grid.
+pub(super) fn crowd(kinds: &[RowKind]) -> f64 {
+    let grid = kinds.iter().filter(|kind| kind.is_grid()).count();
+    2.0 * (kinds.len() - grid) as f64 / grid.max(1) as f64
+}
+
+/// First and last row of each three steps of the grid without an event or a corner. (The front after an event may be steeper than any grid.)
+fn lines(kinds: &[RowKind]) -> Vec<(usize, usize)> {
+    let smooth = kinds.chunk_by(|one, next| (*one == RowKind::Grid) == (*next == RowKind::Grid));
+    let (mut lines, mut first) = (Vec::new(), 0);
+    for rows in smooth {
+        let end = first + rows.len();
+        if rows[0] == RowKind::Grid {
+            lines.extend(
+                (first..end.saturating_sub(3))
+                    .step_by(3)
+                    .map(|k| (k, k + 3)),
+            );
+        }
+        first = end;
+    }
+    lines
+}
+
+/// How far rows of the grid stand from straight lines over two of them left out, from each event on, over the extent of their signal: the most.
+pub(super) fn bent(waves: &Waveforms, kinds: &[RowKind], columns: usize) -> f64 {
+    let lines = lines(kinds);
+    let range = |j: usize| {
+        let fold = |(low, high): (f64, f64), v| (low.min(v), high.max(v));
+        waves.column(j).fold((f64::MAX, f64::MIN), fold)
+    };
+    let ranges: Vec<_> = (0..columns).map(range).collect();
+    let of_signal = |j: usize| {
+        let value = |k: usize| waves.values[k * waves.width() + j];
+        let (low, high) = ranges[j];
+        // What is zero but for rounding, beside others of its unit, has no line.
+        let alike = ranges.iter().zip(&waves.units);
+        let alike = alike.filter(|(_, unit)| **unit == waves.units[j]);
+        let least = NOTHING * alike.fold(0.0, |m: f64, ((l, h), _)| m.max(l.abs()).max(h.abs()));
+        let off = lines.iter().flat_map(|&(from, to)| {
+            let since = move |k: usize| waves.time[k] - waves.time[from];
+            let slope = (value(to) - value(from)) / since(to);
+            (from + 1..to).map(move |k| (value(k) - value(from) - slope * since(k)).abs())
+        });
+        let extent = (high - low).max(least).max(f64::MIN_POSITIVE);
+        off.fold(0.0, f64::max) / extent
+    };
+    (0..columns).map(of_signal).fold(0.0, f64::max)
+}
+
+/// What is shown of rows on a finer grid.
+#[derive(Debug)]
+pub(super) struct Cut {
+    /// Columns, the first ones.
+    pub(super) columns: usize,
+    /// The output times that are shown; none where all are.
+    pub(super) grid: Option<Grid>,
+    /// Rows of the finer grid.
+    pub(super) fine: Option<usize>,
+    /// Its rows for each that is shown.
+    pub(super) divisions: usize,
+    /// Rows between output times are kept as such.
+    pub(super) between: bool,
+}
+
+impl Cut {
+    /// The rows that are shown, and what they are.
+    pub(super) fn of(&self, waves: &Waveforms, kinds: &[RowKind]) -> (Waveforms, Vec<RowKind>) {
+        let mut kept = Waveforms {
+            title: waves.title.clone(),
+            names: waves.names[..self.columns].to_vec(),
+            units: waves.units[..self.columns].to_vec(),
+            ..Waveforms::default()
+        };
+        let mut kept_kinds = Vec::new();
+        // The next of the fine grid.
+        let mut next = 0;
+        for (t, values, kind) in Block::of(waves, kinds).rows() {
+            let (mut time, mut kind) = (Some(t), kind);
+            if let (true, Some(grid), Some(fine)) = (kind.is_grid(), &self.grid, self.fine) {
+                let shown = if next + 1 == fine {
+                    Some(grid.len() - 1)
+                } else {
+                    (next % self.divisions == 0).then(|| next / self.divisions)
+                };
+                time = shown.map(|k| grid.time(k));
+                next += 1;
+                // Between the output times that are shown it stands for what else is there.
+                if time.is_none() && kind == RowKind::Both {
+                    (time, kind) = (Some(t), RowKind::Corner);
+                } else if time.is_none() && self.between {
+                    (time, kind) = (Some(t), RowKind::Between);
+                }
+            }
+            if let Some(mut time) = time {
+                // One row for an output time and a corner that are an ulp apart.
+                let is_last = |late: &f64| (*late - time).abs() <= SAME_TIME * time.abs();
+                if kept.time.last().is_some_and(is_last) {
+                    match (kept_kinds.last(), kind) {
+                        (Some(RowKind::Grid | RowKind::Both), RowKind::Corner) => continue,
+                        (Some(RowKind::Corner), _) if kind.is_grid() => {
+                            kept.time.pop();
+                            kept.values.truncate(kept.time.len() * self.columns);
+                            kept_kinds.pop();
+                        }
+                        _ => {}
+                    }
+                }
+                // The two grids put one instant an ulp apart; rows at events there stand with the row that is shown.
+                if kind.is_grid() {
+                    let later = kept.time.iter_mut().rev().take_while(|late| **late > time);
+                    later.for_each(|late| *late = time);
+                } else {
+                    time = kept.time.last().map_or(time, |last| time.max(*last));
+                }
+                kept.time.push(time);
+                kept.values.extend_from_slice(&values[..self.columns]);
+                kept_kinds.push(kind);
+            }
+        }
+        (kept, kept_kinds)
+    }
+}

@@ -1,0 +1,145 @@
+//! A stretch in one mode with a change beside it, as one linear equation w' = 𝒢 w, w = [x | z | δx], z the state of the sources.
+//!
+//! A circuit that switches periodically comes to few such equations, and passes through them in few lengths of time: the exponentials that recur are kept.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::not_smooth;
+use crate::integrate::Error;
+use crate::linalg::expm::Ladders;
+use crate::settings::tolerances::exponentials::SQUARED;
+
+/// A row of a run, and how it moves with ln p.
+#[derive(Debug, Clone)]
+pub(crate) struct Shifted {
+    /// Whether it is one side of an event.
+    pub(crate) event: bool,
+    /// Time, s, and its derivative.
+    pub(crate) t: f64,
+    pub(crate) dt: f64,
+    /// The outputs, and their derivatives at the time that moves.
+    pub(crate) y: DVector<f64>,
+    pub(crate) dy: DVector<f64>,
+    /// Rates of the outputs where the time moves, else empty.
+    pub(crate) rate: DVector<f64>,
+}
+
+/// What the sources are to an equation.
+#[derive(Debug, PartialEq)]
+pub(super) struct Sources {
+    /// u over z, p×dz.
+    pub(super) own: DMatrix<f64>,
+    /// δu over z.
+    pub(super) change: DMatrix<f64>,
+    /// z' over z.
+    pub(super) generator: DMatrix<f64>,
+}
+
+/// An equation and the exponentials that were made of it.
+#[derive(Debug)]
+pub(super) struct Flow {
+    system: usize,
+    sources: Sources,
+    generator: DMatrix<f64>,
+    /// y and δy over w.
+    rows: [DMatrix<f64>; 2],
+    /// exp(𝒢 t) − 1 by t, s; the oldest first.
+    steps: Vec<(f64, DMatrix<f64>)>,
+}
+
+/// The equations so far.
+#[derive(Debug, Default)]
+pub(super) struct Flows(Vec<Flow>);
+
+impl Flows {
+    /// Values of exponentials that an equation keeps.
+    const KEPT: usize = 1 << 20;
+    /// Equations that are kept.
+    const MOST: usize = 64;
+
+    /// The place of the equation of a system with these sources, which is made where it is not known.
+    pub(super) fn place(
+        &mut self,
+        system: usize,
+        sources: Sources,
+        equation: impl FnOnce(&Sources) -> (DMatrix<f64>, [DMatrix<f64>; 2]),
+    ) -> usize {
+        let known = |flow: &Flow| flow.system == system && flow.sources == sources;
+        if let Some(at) = self.0.iter().position(known) {
+            return at;
+        }
+        if self.0.len() == Self::MOST {
+            self.0.remove(0);
+        }
+        let (generator, rows) = equation(&sources);
+        self.0.push(Flow {
+            system,
+            sources,
+            generator,
+            rows,
+            steps: Vec::new(),
+        });
+        self.0.len() - 1
+    }
+
+    pub(super) fn at(&mut self, place: usize) -> &mut Flow {
+        &mut self.0[place]
+    }
+}
+
+impl Flow {
+    /// Takes w from one time to another, s.
+    ///
+    /// # Errors
+    /// [`Reason::NotSmooth`](crate::integrate::Reason::NotSmooth) where the exponential does not exist in doubles.
+    pub(super) fn advance(
+        &mut self,
+        w: &mut DVector<f64>,
+        (t, to): (f64, f64),
+    ) -> Result<(), Error> {
+        let seconds = to - t;
+        // Differences of times are known no better.
+        let slack = 4.0 * f64::EPSILON * to.abs();
+        let near = |(known, _): &(f64, DMatrix<f64>)| (known - seconds).abs() <= slack;
+        let at = match self.steps.iter().position(near) {
+            Some(at) => at,
+            None => {
+                let step = self.step(t, seconds)?;
+                if self.steps.len() * step.len() >= Flows::KEPT {
+                    self.steps.remove(0);
+                }
+                self.steps.push((seconds, step));
+                self.steps.len() - 1
+            }
+        };
+        *w += &self.steps[at].1 * &*w;
+        Ok(())
+    }
+
+    /// exp(𝒢 t) − 1.
+    fn step(&self, t: f64, seconds: f64) -> Result<DMatrix<f64>, Error> {
+        let dim = self.generator.nrows();
+        let increment = Ladders::new(&self.generator, &[], seconds, SQUARED, 0).increment(0);
+        let increment = increment
+            .ok_or_else(|| not_smooth(t, "the exponential of a mode does not exist in doubles"))?;
+        Ok(DMatrix::from_fn(dim, dim, |i, j| increment.column(j)[i]))
+    }
+
+    /// The row at w, whose time moves by dt.
+    pub(super) fn row(&self, w: &DVector<f64>, (t, dt): (f64, f64), event: bool) -> Shifted {
+        let [y, dy] = self.rows.each_ref().map(|rows| rows * w);
+        let rate = if dt == 0.0 {
+            DVector::zeros(y.len())
+        } else {
+            &self.rows[0] * (&self.generator * w)
+        };
+        Shifted {
+            event,
+            t,
+            dt,
+            dy: dy + &rate * dt,
+            y,
+            rate,
+        }
+    }
+}
