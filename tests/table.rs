@@ -12,7 +12,12 @@ fn parsed(text: &str) -> Model {
 
 fn table_of(text: &str) -> Table {
     let table = table(&parsed(text), &TableOptions::default()).expect("a table");
-    assert!(table.exact && table.notes.is_empty(), "{:?}", table.notes);
+    let stored = |note: &circ::integrate::Note| note.text.contains("of the input");
+    assert!(
+        table.exact && table.notes.iter().all(stored),
+        "{:?}",
+        table.notes
+    );
     table
 }
 
@@ -329,6 +334,33 @@ fn powers_add_up_to_the_energy_balance() {
         let lost = all * seconds + energy.jumps;
         assert!(lost.abs() <= 1e-12 * size, "{file}: {lost:e}");
     }
+}
+
+#[test]
+fn a_battery_that_is_charged_is_no_input_and_what_is_stored_is_told() {
+    let model = parsed(
+        "charger\nv1 1 0 10\nr1 1 2 1\nv2 2 0 8\nr2 1 3 1k\nc1 3 0 1m\n.tran 1m uic\n.end\n",
+    );
+    let options = TableOptions {
+        outputs: vec!["v2".into()],
+        ..TableOptions::default()
+    };
+    let charged = table(&model, &options).expect("a table");
+    assert_eq!(charged.power.inputs, ["v1"]);
+    let efficiency = charged.power.efficiency.expect("an efficiency");
+    assert!((0.79..0.8).contains(&efficiency), "{efficiency}");
+    assert!(charged.notes.is_empty(), "{:?}", charged.notes);
+    let filter =
+        parsed("rc\nv1 1 0 10\nr1 1 2 1\nc1 2 0 1m\nr2 2 0 10\n.save i(r2)\n.tran 1m uic\n.end\n");
+    let found = table(&filter, &TableOptions::default()).expect("a table");
+    assert_eq!(found.notes.len(), 1);
+    assert!(
+        found.notes[0]
+            .text
+            .contains("% of the input went into capacitors"),
+        "{:?}",
+        found.notes
+    );
 }
 
 #[test]

@@ -1,7 +1,12 @@
 //! Rows on a grid that is finer than the one that is shown: whether they are close enough, and which of them are kept.
 
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
 use crate::integrate::{Block, Grid, RowKind};
-use crate::settings::tolerances::times::{NOTHING, SAME_TIME};
+use crate::linalg::eigenvalues::eigenvalues;
+use crate::model::Model;
+use crate::settings::tolerances::times::{NOTHING, RINGS, SAME_TIME, SPIKE};
 use crate::waveform::Waveforms;
 
 /// Twice the rows at events and corners over those of the grid.
@@ -52,6 +57,44 @@ pub(super) fn bent(waves: &Waveforms, kinds: &[RowKind], columns: usize) -> f64 
         off.fold(0.0, f64::max) / extent
     };
     (0..columns).map(of_signal).fold(0.0, f64::max)
+}
+
+/// Signal, value and time of the row at an event or corner that is [`SPIKE`] times as large as all rows of the grid in its unit: the largest.
+pub(super) fn spike(waves: &Waveforms, kinds: &[RowKind]) -> Option<(usize, f64, f64)> {
+    let mut usual: BTreeMap<&str, f64> = BTreeMap::new();
+    for (_, values, _) in Block::of(waves, kinds).rows().filter(|row| row.2.is_grid()) {
+        for (value, unit) in values.iter().zip(&waves.units) {
+            let most = usual.entry(unit).or_default();
+            *most = most.max(value.abs());
+        }
+    }
+    let mut found: Option<(usize, f64, f64)> = None;
+    for (t, values, _) in Block::of(waves, kinds)
+        .rows()
+        .filter(|row| !row.2.is_grid())
+    {
+        for (j, value) in values.iter().enumerate() {
+            let usual = usual.get(waves.units[j]).copied().unwrap_or(f64::INFINITY);
+            let larger = found.is_none_or(|(_, other, _)| value.abs() > other.abs());
+            if usual > 0.0 && value.abs() > SPIKE * usual && larger {
+                found = Some((j, *value, t));
+            }
+        }
+    }
+    found
+}
+
+/// The highest frequency at which a circuit rings, with its switches where they start, of which rows so far apart show not even two a period, Hz.
+///
+/// A pair of eigenvalues of A that turns by [`RINGS`] while it decays by e counts. Of more than 100 states nothing is said.
+#[must_use]
+pub fn ringing(model: &Model, spacing: f64) -> Option<f64> {
+    const MOST: usize = 100;
+    let lcs = model.lcs().ok().filter(|lcs| lcs.n() <= MOST)?;
+    let pairs = eigenvalues(&lcs.a)?;
+    let rings = pairs.iter().filter(|s| s.im > RINGS * s.re.abs());
+    let fastest = rings.map(|s| s.im / TAU).fold(0.0, f64::max);
+    (2.0 * fastest * spacing > 1.0).then_some(fastest)
 }
 
 /// What is shown of rows on a finer grid.

@@ -1,6 +1,6 @@
 //! A transient with its measurements: the signals they need are simulated besides those that are shown, and taken away again.
 
-use super::density::{Cut, bent, crowd};
+use super::density::{Cut, bent, crowd, spike};
 use super::periodic::{PeriodicOptions, on_grid, periodic};
 use super::start::beginning;
 use super::table::Table;
@@ -115,6 +115,15 @@ fn shown_of(measuring: Measuring<'_>, model: &Model, options: SimOptions<'_>) ->
         if is_measured(measuring.circuit) {
             run.notes.extend(measuring.too_coarse(run, found));
         }
+        let spike = spike(&run.waveforms, &run.kinds);
+        run.notes.extend(spike.map(|(j, value, t)| {
+            let (name, unit) = (&run.waveforms.names[j], run.waveforms.units[j]);
+            Note::from(format!(
+                "{name} is {value:.3e} {unit} at t = {t:e} s, and has fallen before the next row: as a rule a current that a switch or diode interrupts, which \
+                 its `Roff` has to take (a diode, a clamp or a snubber would). `.meas` takes the fall as a straight line, and means are wrong by that; \
+                 `--table` has exact ones"
+            ))
+        }));
         (run.waveforms, run.kinds) = measuring.cut(run);
     }
     finished

@@ -30,6 +30,7 @@ mod worst;
 pub use crate::integrate::{Orbit, OrbitKind};
 pub use conducting::conducting;
 pub use dc::{Characteristic, Unsolved, dc};
+pub use density::ringing;
 pub use measured::{Finished, Measurements, is_measured, periodic_measured, pictured, transient};
 pub use periodic::{PeriodicOptions, orbit_start, periodic};
 pub use sensitivity::{Gradient, Sensitivity, SensitivityOptions, sensitivity};

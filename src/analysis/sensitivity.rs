@@ -174,7 +174,6 @@ pub fn sensitivity(model: &Model, options: &SensitivityOptions<'_>) -> Result<Se
                 .any(|name| name.to_lowercase() == gradient.name)
     };
     found.of.retain(asked);
-    found.at = to;
     Ok(found)
 }
 
@@ -353,6 +352,7 @@ impl Beside<'_> {
             return Ok(None);
         };
         let mut gradients: Vec<Gradient> = Vec::new();
+        let mut left_out: Vec<String> = Vec::new();
         for (name, value) in to {
             self.go_on()?;
             let near = |step: f64| {
@@ -368,6 +368,9 @@ impl Beside<'_> {
                                     && ((own / other).round() * other - own).abs()
                                         > 1e-3 * VALUE_STEP * own
                             });
+                    if moves && self.options.to.is_empty() {
+                        return Ok(None);
+                    }
                     if moves {
                         let what = format!(
                             "`{name}` changes the period, on which the steady state depends otherwise"
@@ -382,11 +385,18 @@ impl Beside<'_> {
                     let what = format!("a switch starts on another side where `{name}` is another");
                     return Err(Error::before(Reason::NotSmooth(what)));
                 }
-                let near = Near::of(&mut simulation, &base.trajectory)?;
-                Ok(near)
+                Near::of(&mut simulation, &base.trajectory).map(Some)
             };
             let [a, b, c, d] = STEPS.map(near);
-            let near = [a?, b?, c?, d?];
+            let (Some(a), Some(b), Some(c), Some(d)) = (a?, b?, c?, d?) else {
+                let text = format!(
+                    "`{name}` is left out: it changes the period, on which the steady state depends otherwise"
+                );
+                notes.push(text.into());
+                left_out.push(name.clone());
+                continue;
+            };
+            let near = [a, b, c, d];
             if gradients.is_empty() {
                 for part in REFINED {
                     let parameter = Parameter::of(&base.trajectory, &near)?;
@@ -425,9 +435,10 @@ impl Beside<'_> {
                 gradient.to.push((name.clone(), derivative));
             }
         }
+        let at = to.iter().filter(|(name, _)| !left_out.contains(name));
         Ok(Some(Sensitivity {
             of: gradients,
-            at: vec![],
+            at: at.cloned().collect(),
             exact: true,
             notes,
         }))
@@ -486,7 +497,7 @@ impl Beside<'_> {
         let text = "the derivatives are differences of runs with values 1 and 2 % aside, as the run is not exact throughout";
         Ok(Sensitivity {
             of: gradients,
-            at: vec![],
+            at: to.to_vec(),
             exact: false,
             notes: vec![text.to_string().into()],
         })

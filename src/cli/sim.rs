@@ -380,6 +380,12 @@ pub(super) fn transient(
     let mut finished = with_options(tran, request, route, streams, run);
     // Pictures have rows enough, unless the step is the user's.
     let told = numbers || request.step.is_some();
+    if let (Some((run, _)), Some(tran)) = (&mut finished.run, tran)
+        && !input::is_large(model.multiport())
+        && let Some(frequency) = analysis::ringing(model, tran.tstep)
+    {
+        run.notes.push(text::ringing(frequency, tran.tstep));
+    }
     if let (true, Some((run, _)), Some(tran)) = (told, &mut finished.run, tran) {
         let inputs = model.multiport().sources.iter().map(|s| &s.input);
         say_aliased(run, aliased(&tran, waves(inputs), run));

@@ -8,6 +8,8 @@ mod measurement;
 
 use thiserror::Error;
 
+use crate::settings::tolerances::times::{NO_STEP, SAME_TIME};
+
 pub use fourier::{Harmonic, Spectrum, fourier};
 pub use measurement::{Found, Instant, Measurement, Scene, Use, Window};
 
@@ -238,9 +240,15 @@ impl<'a> Trace<'a> {
         let mut found = Vec::new();
         // The side of the level the waveform came from, kept while it runs along it.
         let mut side = 0.0;
+        let largest = self.values.iter().fold(level.abs(), |m, v| m.max(v.abs()));
         for line in self.lines_within(within.0, within.1) {
+            // The two rows of one event, which may stand on either side of its level by rounding, are no jump.
+            let at_once = line.t1 - line.t0 <= SAME_TIME * line.t1.abs();
+            if at_once && (line.y1 - line.y0).abs() <= NO_STEP * largest {
+                continue;
+            }
             let (a, b) = (line.y0 - level, line.y1 - level);
-            if a != 0.0 {
+            if side == 0.0 && a != 0.0 {
                 side = a.signum();
             }
             if b != 0.0 && side != 0.0 && b.signum() != side {
@@ -346,6 +354,23 @@ mod tests {
             found: 1,
         };
         assert_eq!(when(1.0, Edge::Rise, Which::Number(2)), Err(none));
+        // The two rows of an event on its level, by rounding on either side of it.
+        let event = Trace {
+            time: &[0.0, 1.0, 1.0, 2.0, 3.0, 3.0, 4.0],
+            values: &[
+                0.0,
+                5.0 + 4e-12,
+                5.0 - 7e-12,
+                7.0,
+                5.0 - 4e-12,
+                5.0 + 7e-12,
+                0.0,
+            ],
+        };
+        let when = |edge, n| event.crossing(5.0, edge, Which::Number(n), ALL);
+        assert!((when(Edge::Rise, 1).unwrap() - 1.0).abs() < 1e-9);
+        assert!((when(Edge::Fall, 1).unwrap() - 3.0).abs() < 1e-9);
+        assert!(when(Edge::Rise, 2).is_err() && when(Edge::Cross, 3).is_err());
         // Touching is no crossing; passing along the level is one.
         let touch = Trace {
             time: &[0.0, 1.0, 2.0, 3.0, 4.0],

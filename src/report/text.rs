@@ -217,6 +217,19 @@ fn unbalanced(run: &Run) -> Option<Note> {
     (!known).then(|| Note::of(<[String; 0]>::default(), text))
 }
 
+/// That a circuit rings faster than rows show.
+#[must_use]
+pub fn ringing(frequency: f64, tstep: f64) -> Note {
+    format!(
+        "with its switches where they start, the circuit rings at {}: rows that are {} apart do not show what rings down between them, and `.meas` may miss its \
+         peaks; a print step of {} shows it",
+        si::quantity(frequency, "Hz", 3),
+        si::quantity(tstep, "s", 3),
+        si::quantity(0.1 / frequency, "s", 1),
+    )
+    .into()
+}
+
 /// That rows do not show what happens between them.
 #[must_use]
 pub fn aliasing(aliased: &Aliased) -> Note {

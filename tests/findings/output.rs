@@ -315,6 +315,35 @@ fn a_full_disk_and_a_closed_pipe_end_the_run() {
 
 /// Two rows a period without a print step: the ripple of the current stands in the rows at edges and events.
 #[test]
+fn what_rows_cannot_show_is_told() {
+    let folder = place(&[]);
+    let notes = |netlist: &str| {
+        fs::write(folder.path().join("t.cir"), netlist).expect("a netlist");
+        said(&ends(folder.path(), "sim t.cir -o t.csv"))
+    };
+    // A switch interrupts the current of an inductor, which its Roff takes: 39 MV for 20 fs.
+    let chopped = "chopped\nvin in 0 48\nllk in d 20n\ns1 d sw g 0 sw\nd1 0 sw d\nl1 sw out 22u\nc1 out 0 100u\nr1 out 0 4\nvg g 0 pulse(0 10 0 5n 5n 0.8u 2u)\n\
+                   .model sw sw(ron=50m roff=1meg vt=5)\n.model d d(ron=20m roff=1meg vfwd=0.5)\n.tran 10n 100u\n.meas tran a avg v(d)\n.end\n";
+    assert!(
+        notes(chopped).contains("has fallen before the next row"),
+        "{}",
+        notes(chopped)
+    );
+    let clamped = chopped.replace("llk in d 20n", "rlk in d 1m");
+    assert!(
+        !notes(&clamped).contains("has fallen"),
+        "{}",
+        notes(&clamped)
+    );
+    // 16 MHz, of which rows 5 µs apart show nothing.
+    let rings = "rings\nv1 in 0 pulse(0 10 0 1n 1n 1 2)\nl1 in a 1u\nc1 a 0 100p\nr1 a 0 10k\n.tran TSTEP 5m\n.meas tran m max v(a)\n.end\n";
+    let coarse = notes(&rings.replace("TSTEP", "5u"));
+    assert!(coarse.contains("rings at 15.9 MHz"), "{coarse}");
+    let fine = notes(&rings.replace("TSTEP 5m", "10n 50u"));
+    assert!(!fine.contains("rings at"), "{fine}");
+}
+
+#[test]
 fn pictures_follow_curves_between_rows() {
     // At corners and events the output of a buck is at its mean: rows there alone hide its ripple, rows of the grid miss most periods.
     let buck = "buck\nv1 in 0 24\nvg g 0 pulse(0 10 0 10n 10n 2.49u 10u)\ns1 in sw g 0 sw\nd1 0 sw d\nl1 sw out 47u\nc1 out 0 47u\nr1 out 0 3\n\

@@ -388,7 +388,7 @@ fn notes(orbit: &Orbit, fixed: &Fixed, names: &[String], held: &[String]) -> Vec
     let mut notes = Vec::new();
     if !held.is_empty() {
         let text = format!(
-            "{}: held at the value at 0-, as it does not repeat",
+            "{}: held at the value at 0-, as it does not repeat (a pulse with a period longer than the run of `.tran` is a step)",
             held.join(", ")
         );
         notes.push(Note::of(held, text));

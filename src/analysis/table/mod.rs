@@ -20,7 +20,7 @@ use crate::integrate::{
 };
 use crate::model::Model;
 use crate::settings::Settings;
-use crate::settings::tolerances::periodic::FUNDAMENTAL;
+use crate::settings::tolerances::periodic::{FUNDAMENTAL, STORED};
 
 /// Rows of a run in steps at least: a coarser print step is divided.
 const ROWS: usize = 2000;
@@ -377,12 +377,13 @@ impl<'a> Columns<'a> {
         let is_source =
             |e: &Element| matches!(e.kind, Kind::VoltageSource(_) | Kind::CurrentSource(_));
         let sources = || (0..circuit.elements.len()).filter(|k| is_source(&circuit.elements[*k]));
-        let inputs = match inputs {
-            [] => sources().collect(),
+        let outputs: Vec<usize> = match outputs {
+            [] => loads(circuit),
             named => named.iter().map(find).collect::<Result<_, _>>()?,
         };
-        let outputs = match outputs {
-            [] => loads(circuit),
+        let inputs = match inputs {
+            // A battery that is charged is an output alone.
+            [] => sources().filter(|k| !outputs.contains(k)).collect(),
             named => named.iter().map(find).collect::<Result<_, _>>()?,
         };
         Ok(Self {
@@ -478,6 +479,18 @@ impl<'a> Columns<'a> {
             |all: &[usize], sign: f64| all.iter().map(|k| sign * sums.work[*k]).sum::<f64>();
         let (input, output) = (power(&self.inputs, -1.0), power(&self.outputs, 1.0));
         let known = input > 0.0 && !self.outputs.is_empty();
+        let stores = |k: &usize| {
+            let kind = &self.circuit.elements[*k].kind;
+            matches!(kind, Kind::Capacitor(_) | Kind::Inductor(_))
+        };
+        let storage: Vec<usize> = (0..self.circuit.elements.len()).filter(stores).collect();
+        let stored = power(&storage, 1.0) / input;
+        let notes = (known && stored.abs() > STORED).then(|| {
+            let (share, verb) = (100.0 * stored.abs(), if stored > 0.0 { "went into" } else { "came out of" });
+            Note::from(format!(
+                "{share:.1} % of the input {verb} capacitors and inductors: the efficiency is that of this span; `circ pss --table` has that of the steady state"
+            ))
+        });
         Table {
             span,
             exact,
@@ -491,7 +504,7 @@ impl<'a> Columns<'a> {
                 outputs: names(&self.outputs),
             },
             fundamental: period.map(f64::recip),
-            notes: vec![],
+            notes: notes.into_iter().collect(),
         }
     }
 }

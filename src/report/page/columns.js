@@ -102,10 +102,10 @@ function boundsIn(curve, from, to) {
 /** The rows of what is seen of the curve, with one more on either side: from the first up to but not at the second. */
 const rowsIn = (curve, [from, to]) => [Math.max(0, rowAt(curve.x, from) - 1), Math.min(curve.x.length, rowAfter(curve.x, to) + 1)];
 
-/** Whether there is more than a row a pixel: then a curve is drawn by its envelope. */
+/** Whether there are more than four rows a pixel: then a curve is drawn by its envelope. */
 function isDense(curve, view, pixels) {
   const [a, end] = rowsIn(curve, view);
-  return end - a > pixels;
+  return end - a > 4 * pixels;
 }
 
 /** Hands on the lowest and highest value of each pixel: of its rows, and of the lines that lead to it and on from it. */

@@ -75,3 +75,7 @@ pub(crate) const MEASURE_STEP: f64 = 3e-7;
 /// A run that is made again looks for the event that closed it until this part of its time later. Smaller: where rounding puts it an ulp behind the end it is
 /// missed, and the derivative of the return is taken by differences; larger: what follows within that time is taken for the orbit's end.
 pub(crate) const EVENT_AGAIN: f64 = 32.0 * f64::EPSILON;
+
+/// The part of a table's input that is stored from which on a note says so beside the efficiency. Larger: efficiencies of transients that are taken for those of the steady
+/// state; smaller: notes on what no digit shows.
+pub(crate) const STORED: f64 = 1e-2;

@@ -35,6 +35,18 @@ pub(crate) const ROWS_APART: f64 = 1e-2;
 /// most then. Larger: less exact measurements; smaller: a second run and more rows for more circuits.
 pub(crate) const ROWS_CLOSE: f64 = 1e-3;
 
+/// How far two rows of one time may be apart, over the largest value of their signal, and be one value. Larger: small jumps are not crossings; smaller: the
+/// rounding of an event on its level is several.
+pub(crate) const NO_STEP: f64 = 1e-9;
+
+/// How often as large as all rows of the grid of its unit a row at an event is before a note says that rows do not show its course. Larger: spikes of kilovolts
+/// without a word; smaller: notes on the peaks of converters.
+pub(crate) const SPIKE: f64 = 100.0;
+
+/// Radians by which an oscillation turns while it decays by e from which on it is said that rows do not show it. Larger: ringing of parasitics without a word;
+/// smaller: notes on what hardly overshoots.
+pub(crate) const RINGS: f64 = 4.0;
+
 /// Rows of a picture for each period of the fastest source. Larger: more memory and larger files for pictures; smaller: a second run for more circuits.
 pub(crate) const ROWS_A_PERIOD: f64 = 16.0;
 

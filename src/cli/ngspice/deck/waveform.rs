@@ -59,8 +59,11 @@ fn widen(wave: &mut Wave, edge: f64) -> bool {
                 delay: 0.0,
             };
         }
-        Wave::Pulse { rise, fall, .. } => {
-            for duration in [rise, fall] {
+        // Of no width it would last until the end.
+        Wave::Pulse {
+            rise, fall, width, ..
+        } => {
+            for duration in [rise, fall, width] {
                 if *duration == 0.0 {
                     *duration = edge;
                     stretched = true;
