@@ -440,3 +440,19 @@ fn measurements_of_an_orbit_are_those_of_a_settled_transient() {
     let mean = found.harmonics[0].result.clone().expect("harmonics").mean;
     assert!((mean - 5.0).abs() < 1e-6);
 }
+
+/// 500 carriers in a period: 2000 rows in all would be four to each of them.
+#[test]
+fn measurements_of_an_orbit_see_the_carrier_of_a_modulator() {
+    let text = "class d\nva in 0 sin(0 0.7 500)\nvt tri 0 pulse(-1 1 0 2u 2u 0 4u)\ne1 sw 0 value={if(v(in)>v(tri),30,-30)}\nl1 sw out 22u\n\
+                c1 out 0 1u\nrl out 0 4\n.tran 100u 4m 2m\n.meas pout avg v(out)*i(rl)\n.end\n";
+    let model = circ::Model::parse(text, "d.cir").expect("a circuit");
+    let options = circ::analysis::PeriodicOptions::default();
+    let (_, _, found) = circ::analysis::periodic_measured(&model, &options).expect("an orbit");
+    let table = circ::analysis::periodic_table(&model, (&[], &[]), &options).expect("a table");
+    let (rows, exact) = (
+        found.measured[0].result.as_ref().expect("a value").value,
+        table.element("rl").expect("a load").power,
+    );
+    assert!((rows / exact - 1.0).abs() < 5e-4, "{rows} of {exact}");
+}

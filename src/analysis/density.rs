@@ -86,7 +86,7 @@ pub(super) fn spike(waves: &Waveforms, kinds: &[RowKind]) -> Option<(usize, f64,
 
 /// The highest frequency at which a circuit rings, with its switches where they start, of which rows so far apart show not even two a period, Hz.
 ///
-/// A pair of eigenvalues of A that turns by [`RINGS`] while it decays by e counts. Of more than 100 states nothing is said.
+/// A pair of eigenvalues of A that turns by four radians while it decays by e counts. Of more than 100 states nothing is said.
 #[must_use]
 pub fn ringing(model: &Model, spacing: f64) -> Option<f64> {
     const MOST: usize = 100;

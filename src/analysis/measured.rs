@@ -212,7 +212,13 @@ pub fn periodic_measured(
     };
     let (orbit, mut run) = on_grid(&probing, &options, |tran| {
         let rows = Grid::of(&tran).len();
-        measuring.divisions = ROWS.div_ceil(rows);
+        // As close as those of the transient, and as the sources ask for.
+        let span = tran.tstop - tran.tstart;
+        let asked = circuit.tran.map_or(0.0, |own| span / own.tstep);
+        let wanted = (ROWS_A_PERIOD * span / shortest_period(&probing)).max(asked);
+        let most = MOST_VALUES / (probing.circuit().probes().len() + 1);
+        let wanted = (wanted.ceil() as usize).min(most).max(ROWS);
+        measuring.divisions = wanted.div_ceil(rows);
         measuring.tran = Some(Tran {
             tstart: 0.0,
             tstop: tran.tstop - tran.tstart,
@@ -241,6 +247,13 @@ pub(super) fn laps(
             .into()
     });
     ((laps - kept, laps), note)
+}
+
+/// The shortest period of its sources, s; ∞ where none repeats.
+fn shortest_period(model: &Model) -> f64 {
+    let sources = model.multiport().sources.iter();
+    let periods = sources.filter_map(|source| source.input.source.wave.period());
+    periods.fold(f64::INFINITY, f64::min)
 }
 
 /// What a circuit's measurements need, and how its results are shown without that.
@@ -275,13 +288,10 @@ impl<'a> Measuring<'a> {
             return;
         };
         let (span, rows) = (tran.tstop - tran.tstart, Grid::of(&tran).len());
-        let sources = &model.multiport().sources;
-        let periods = sources.iter().map(|s| s.input.source.wave.period());
-        let shortest = periods.flatten().fold(f64::INFINITY, f64::min);
         // Half of what there is room for, as events have rows as well.
         let room = MOST_PICTURED.min(held / 2);
         let most = room / (rows * (self.shown + 1));
-        let wanted = ROWS_A_PERIOD * span / shortest / rows as f64;
+        let wanted = ROWS_A_PERIOD * span / shortest_period(model) / rows as f64;
         if is_measured(self.circuit) {
             self.divisions = self.divisions.max((wanted.ceil() as usize).min(most));
         } else {
