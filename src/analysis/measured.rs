@@ -118,10 +118,13 @@ fn shown_of(measuring: Measuring<'_>, model: &Model, options: SimOptions<'_>) ->
         let spike = spike(&run.waveforms, &run.kinds);
         run.notes.extend(spike.map(|(j, value, t)| {
             let (name, unit) = (&run.waveforms.names[j], run.waveforms.units[j]);
+            let cause = match unit {
+                "A" => "a capacitor that a switch or diode connects, to which its `Ron` alone stands in the way",
+                _ => "a current that a switch or diode interrupts, which its `Roff` has to take (a diode, a clamp or a snubber would)",
+            };
             Note::from(format!(
-                "{name} is {value:.3e} {unit} at t = {t:e} s, and has fallen before the next row: as a rule a current that a switch or diode interrupts, which \
-                 its `Roff` has to take (a diode, a clamp or a snubber would). `.meas` takes the fall as a straight line, and means are wrong by that; \
-                 `--table` has exact ones"
+                "{name} is {value:.3e} {unit} at t = {t:e} s, and has fallen before the next row: as a rule {cause}. `.meas` takes the fall as a straight line, \
+                 and means are wrong by that; `--table` has exact ones"
             ))
         }));
         (run.waveforms, run.kinds) = measuring.cut(run);

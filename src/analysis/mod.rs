@@ -3,6 +3,8 @@
 //! | question | answer |
 //! |---|---|
 //! | `.meas` and `.four` of a transient | [`transient`]: a run with its [`Measurements`] |
+//! | a transient for a picture | [`pictured`]: the same with rows between, where curves ask for them |
+//! | what rows cannot show | [`ringing`]: a frequency of the circuit's own |
 //! | `.dc` | [`dc`]: a [`Characteristic`] |
 //! | what conducts at an instant | [`conducting()`]: names of devices and switches |
 //! | the periodic steady state | [`periodic`]: its [`Orbit`] and one period of waveforms |
