@@ -11,7 +11,7 @@ const ROOMS: [(&str, &[&str]); 21] = [
     ("linalg", &["settings"]),
     ("diagnostic", &[]),
     ("law", &["algebra", "settings"]),
-    ("measure", &["settings"]),
+    ("measure", &["linalg", "settings"]),
     ("netlist", &["algebra", "diagnostic", "measure"]),
     (
         "circuit",
@@ -202,11 +202,6 @@ const NO_TOLERANCES: [(&str, &[&str], &str); 22] = [
         "bounds of the arithmetic of doubles",
     ),
     (
-        "analysis/sensitivity.rs",
-        &["REFINED", "ROOM"],
-        "how dense rows are, and the room that they have",
-    ),
-    (
         "analysis/variation/parameter.rs",
         &["STEPS", "WEIGHTS"],
         "a formula of differences",
@@ -244,11 +239,6 @@ const NO_TOLERANCES: [(&str, &[&str], &str); 22] = [
         "a tableau",
     ),
     (
-        "integrate/exact/energy_integral.rs",
-        &["NODES", "WEIGHTS"],
-        "a quadrature",
-    ),
-    (
         "integrate/theta/stages.rs",
         &["B1", "B2", "GAMMA"],
         "a tableau",
@@ -259,6 +249,12 @@ const NO_TOLERANCES: [(&str, &[&str], &str); 22] = [
         "linalg/expm.rs",
         &["LAST", "PAIRS"],
         "poles of an approximant",
+    ),
+    ("linalg/gauss.rs", &["NODES", "WEIGHTS"], "a quadrature"),
+    (
+        "measure/curve.rs",
+        &["BARYCENTRIC", "COTES", "COTES_SUM"],
+        "a polynomial and its quadrature",
     ),
     (
         "netlist/card/controlled.rs",

@@ -208,3 +208,140 @@ r1 out 0 1k
     3              1500   0.392107   22.5   0.804738          -45
     ");
 }
+
+/// A switch interrupts 5 A, which its gigaohm turns into gigavolts for femtoseconds: the mean voltage of the inductor is L Δi/T, and the switch takes
+/// ½ L i² each time.
+#[test]
+fn a_spike_between_rows_counts() {
+    let (found, _) = sim("\
+interrupted
+v1 in 0 10
+vg g 0 pulse(0 5 0 1n 1n 5u 10u)
+s1 in out g 0 swm
+l1 out 0 10u
+.model swm sw(ron=1u roff=1g vt=2.5 vh=0)
+.tran 1u 100u
+.save v(out)
+.meas tran flux integ v(out)
+.meas tran il find i(l1) at=100u
+.meas tran heat integ v(in,out)*i(s1)
+.meas tran most min v(out)
+.meas tran top max i(l1) from=0 to=10u
+.end
+");
+    let value = |name| value(&found, name);
+    // The control passes its level half an edge of 1 ns after it begins, and so 5.001 µs later.
+    let peak = 10.0 * 5.001e-6 / 10e-6;
+    assert!(
+        (value("top") - peak).abs() < 1e-6 * peak,
+        "{}",
+        value("top")
+    );
+    let spikes = 10.0 * peak * 10e-6;
+    let flux = value("flux") - 10e-6 * value("il");
+    assert!(flux.abs() < 1e-8 * spikes, "{flux:e}");
+    let heat = 10.0 * 0.5 * 10e-6 * peak * peak;
+    assert!(
+        (value("heat") - heat).abs() < 1e-5 * heat,
+        "{}",
+        value("heat")
+    );
+    assert!((value("most") + 1e9 * peak).abs() < 1e-5 * 1e9 * peak);
+}
+
+/// 159 MHz of which 1 µs shows nothing: v = V (1 − e^{−at} (cos wt + a/w sin wt)) after a step.
+#[test]
+fn ringing_between_rows_is_measured() {
+    let (found, _) = sim("\
+ringing
+v1 in 0 pulse(0 10 1u 0 0 1 2)
+r1 in a 20m
+l1 a out 1n
+c1 out 0 1n
+.tran 1u 20u
+.save v(out)
+.meas tran top max v(out)
+.meas tran first when v(out)=10 rise=1
+.meas tran fifth when v(out)=10 rise=5
+.meas tran swing trig v(out) val=10 rise=1 targ v(out) val=10 fall=1
+.meas tran steep deriv v(out) when v(out)=10 rise=1
+.meas tran heat integ v(in,a)*i(r1)
+.meas tran away integ abs(v(out)-10) from=1u
+.end
+");
+    let (a, w0) = (0.5 * 20e-3 / 1e-9, 1e9);
+    let w = f64::sqrt(w0 * w0 - a * a);
+    let half = std::f64::consts::PI / w;
+    let near = |name: &str, expected: f64, tolerance: f64| {
+        let found = value(&found, name);
+        assert!(
+            (found - expected).abs() < tolerance * expected.abs(),
+            "{name} {found:e} {expected:e}"
+        );
+    };
+    near("top", 10.0 * (1.0 + f64::exp(-a * half)), 1e-9);
+    // cos wt + a/w sin wt = 0.
+    let rise = (std::f64::consts::FRAC_PI_2 + (a / w).atan()) / w;
+    near("first", 1e-6 + rise, 1e-11);
+    near("fifth", 1e-6 + rise + 8.0 * half, 1e-11);
+    near("swing", half, 1e-6);
+    let slope = 10.0 * w0 * w0 / w * f64::exp(-a * rise) * f64::sin(w * rise);
+    near("steep", slope, 1e-6);
+    near("heat", 0.5 * 1e-9 * 100.0, 1e-8);
+    // ∫ |e^{−at} (cos wt + a/w sin wt)| dt by pieces between zeros, of which each is e^{−aπ/w} times the one before.
+    let primitive = |t: f64| {
+        let (sin, cos) = (w * t).sin_cos();
+        f64::exp(-a * t) * (-2.0 * a * cos + (w - a * a / w) * sin) / (w0 * w0)
+    };
+    let ratio = f64::exp(-a * half);
+    let lobe = (primitive(rise + half) - primitive(rise)).abs();
+    let away = 10.0 * (primitive(rise) - primitive(0.0) + lobe / (1.0 - ratio));
+    near("away", away, 1e-7);
+}
+
+/// What a capacitor takes at the edges of a source without resistance is an impulse: its charge is in the mean of the current.
+#[test]
+fn impulses_are_in_means() {
+    let (found, _) = sim("\
+charged at once
+v1 out 0 pulse(0 5 1u 0 0 4u 10u)
+c1 out 0 1u
+r1 out 0 1k
+.tran 1u 8u
+.save v(out)
+.meas tran up integ i(c1) from=0 to=2u
+.meas tran both integ i(c1)
+.meas tran mean avg -2*i(c1)+1 from=0 to=2u
+.meas tran r avg i(r1) from=1u to=5u
+.end
+");
+    let value = |name| value(&found, name);
+    assert!((value("up") - 5e-6).abs() < 1e-18 && value("both").abs() < 1e-18);
+    assert!((value("mean") + 4.0).abs() < 1e-12 && (value("r") - 5e-3).abs() < 1e-15);
+}
+
+/// What `.meas` finds on a converter does not depend on the print step, and is what `--table` finds.
+#[test]
+fn the_print_step_does_not_matter() {
+    let buck = |tran: &str| {
+        let netlist = format!(
+            "buck\nv1 in 0 24\nvg g 0 pulse(0 5 0 1n 1n 4u 10u)\ns1 in sw g 0 swm\nd1 0 sw dm\nl1 sw out 47u\nc1 out 0 100u\n\
+             r1 out 0 5\n.model swm sw(ron=10m roff=1meg vt=2.5 vh=0)\n.model dm d(ideal)\n.tran {tran}\n.save v(out)\n\
+             .meas tran mean avg v(out) from=1m to=2m\n.meas tran ripple pp i(l1) from=1m to=2m\n.meas tran heat rms i(s1) from=1m to=2m\n\
+             .meas tran power avg v(out)*i(r1) from=1m to=2m\n.meas tran turn when i(l1)=5 fall=1\n.four 100k i(l1)\n.end\n"
+        );
+        sim(&netlist).0
+    };
+    let (coarse, fine) = (buck("100u 2m"), buck("0.1u 2m"));
+    for name in ["mean", "ripple", "heat", "power", "turn"] {
+        let [a, b] = [&coarse, &fine].map(|found| value(found, name));
+        assert!((a - b).abs() < 1e-10 * a.abs(), "{name} {a} {b}");
+    }
+    let magnitude = |found: &Value| {
+        found["fourier"][0]["harmonics"][0]["magnitude"]
+            .as_f64()
+            .unwrap()
+    };
+    let [a, b] = [&coarse, &fine].map(magnitude);
+    assert!((a - b).abs() < 1e-10 * a && a > 0.1, "{a} {b}");
+}

@@ -30,8 +30,7 @@ fn a_capacitor_that_is_charged() {
     let found = found(text, false);
     assert!(found.exact && found.notes.is_empty());
     let e = (-1.0_f64).exp();
-    // The rows of `.meas` are joined by straight lines, 1 µs apart.
-    let close = 2e-6;
+    let close = 1e-9;
     for (name, value) in [("r1", 1e3), ("c1", 1e-6), ("c", 1e-6)] {
         near(&found, "half", name, value, 1e-3 * 2.0_f64.ln(), close);
         near(&found, "last", name, value, -4.0 * e, close);

@@ -230,6 +230,31 @@ fn initial_node_voltages_are_held_and_released() {
 }
 
 #[test]
+fn initial_inductor_currents_are_held_and_released() {
+    // A freewheeling inductor: its current goes on through the diode, from where `.ic` holds it.
+    let text = format!(
+        "v1 1 0 10\nr1 1 2 10k\nl1 2 3 1m\nr2 3 0 5\nd1 0 2 di\n.ic i(l1)=2\n{IDEAL}\n.tran 10u 1m\n.save i(l1) v(3)"
+    );
+    let run = simulate(&text, SimOptions::default());
+    assert!(run.notes.is_empty(), "{:?}", run.notes);
+    close(column(&run, "i(l1)")[0], 2.0, 1e-15);
+    close(at(&run, "i(l1)", 1e-4), 2.0 * (-0.5_f64).exp(), 1e-12);
+    // With a voltage: a converter that starts where it works.
+    let text = format!(
+        "v1 1 0 10\nl1 1 2 1m\nd1 2 3 di\nc1 3 0 100u\nr1 3 0 5\n.ic i(l1)=3 v(3)=12\n{IDEAL}\n.tran 10u 1m\n.save i(l1) v(3)"
+    );
+    let run = simulate(&text, SimOptions::default());
+    close(column(&run, "i(l1)")[0], 3.0, 1e-14);
+    close(column(&run, "v(3)")[0], 12.0, 1e-14);
+    // Into a capacitor alone nothing rests.
+    let text = "v1 1 0 10\nl1 1 2 1m\nc1 2 0 1u\n.ic i(l1)=3\n.tran 10u 1m\n.save i(l1)";
+    let run = simulate(text, SimOptions::default());
+    close(column(&run, "i(l1)")[0], 0.0, 1e-15);
+    let told = |note: &circ::integrate::Note| note.text.contains("not held");
+    assert!(run.notes.iter().any(told), "{:?}", run.notes);
+}
+
+#[test]
 fn a_failure_names_the_time_and_keeps_the_rows() {
     // An ideal diode across a voltage source that turns positive: no state of the diode exists.
     let text = format!(

@@ -1,15 +1,17 @@
 //! A transient with its measurements: the signals they need are simulated besides those that are shown, and taken away again.
 
+use super::curves::curves;
 use super::density::{Cut, bent, crowd, spike};
-use super::periodic::{PeriodicOptions, on_grid, periodic};
-use super::start::beginning;
+use super::periodic::{PeriodicOptions, Steady, periodic, steady};
+use super::start::{beginning, course};
 use super::table::Table;
 use super::worst::Worst;
 use crate::circuit::{Circuit, Harmonics, Measured, Probe, Tran};
 use crate::integrate::{Block, Error, Grid, Method, Note, Orbit, RowKind, Run, SimOptions};
+use crate::measure::{Curves, Signals};
 use crate::model::Model;
 use crate::settings::tolerances::times::{
-    CROWDED, LAST_ROW, LINES_CLOSE, NOTHING, ROWS_A_PERIOD, ROWS_APART, ROWS_CLOSE,
+    CROWDED, LAST_ROW, LINES_CLOSE, MOST_STATES, NOTHING, ROWS_A_PERIOD, ROWS_APART, ROWS_CLOSE,
 };
 use crate::waveform::Waveforms;
 
@@ -78,8 +80,8 @@ pub fn is_measured(circuit: &Circuit) -> bool {
 
 /// The transient that `.tran` asks for, with what `.meas` and `.four` ask of it.
 ///
-/// Measurements see the rows at events and at corners of sources too, and at least 2000 of the grid unless the step is fixed. Where
-/// there are any, [`SimOptions::rows`] and [`SimOptions::discard`] are not heeded: the rows are those of the run. `.tran … steady` begins at the
+/// Of a run that is exact throughout they see what happens between events ([`Curves`]), else the rows, those at events and at corners of sources too, and at least
+/// 2000 of the grid unless the step is fixed. Where there are any, [`SimOptions::rows`] and [`SimOptions::discard`] are not heeded: the rows are those of the run. `.tran … steady` begins at the
 /// periodic steady state unless [`SimOptions::start`] says where.
 ///
 /// # Returns
@@ -112,9 +114,14 @@ pub fn pictured(model: &Model, options: SimOptions<'_>) -> Finished {
 fn shown_of(measuring: Measuring<'_>, model: &Model, options: SimOptions<'_>) -> Finished {
     let (measuring, mut finished) = observed(measuring, model, options);
     if let Some((run, found)) = &mut finished.run {
-        if is_measured(measuring.circuit) {
+        if measuring.by_rows() {
             run.notes.extend(measuring.too_coarse(run, found));
         }
+        let means = if measuring.by_rows() {
+            "`.meas` takes the fall as a straight line, and means are wrong by that; `--table` has exact ones"
+        } else {
+            "Means of rows would be wrong by that; `.meas` and `--table` have exact ones"
+        };
         let spike = spike(&run.waveforms, &run.kinds);
         run.notes.extend(spike.map(|(j, value, t)| {
             let (name, unit) = (&run.waveforms.names[j], run.waveforms.units[j]);
@@ -123,8 +130,7 @@ fn shown_of(measuring: Measuring<'_>, model: &Model, options: SimOptions<'_>) ->
                 _ => "a current that a switch or diode interrupts, which its `Roff` has to take (a diode, a clamp or a snubber would)",
             };
             Note::from(format!(
-                "{name} is {value:.3e} {unit} at t = {t:e} s, and has fallen before the next row: as a rule {cause}. `.meas` takes the fall as a straight line, \
-                 and means are wrong by that; `--table` has exact ones"
+                "{name} is {value:.3e} {unit} at t = {t:e} s, and has fallen before the next row: as a rule {cause}. {means}"
             ))
         }));
         (run.waveforms, run.kinds) = measuring.cut(run);
@@ -149,15 +155,44 @@ fn begun(model: &Model, shown: &Model, mut options: SimOptions<'_>) -> Finished 
     finished
 }
 
-/// The same with the rows and signals that the measurements saw.
-pub(super) fn measured(model: &Model, options: SimOptions<'_>) -> Finished {
-    let measuring = Measuring::of(model.circuit(), options.step.is_some());
-    observed(measuring, model, options).1
+/// What `.meas` finds in the transient of a model, without its rows where they are not needed.
+///
+/// # Errors
+/// The run's, wherever it breaks off.
+pub(super) fn measured(model: &Model, mut options: SimOptions<'_>) -> Result<Vec<Measured>, Error> {
+    let mut measuring = Measuring::of(model.circuit(), options.step.is_some());
+    measuring.draw(model, &mut options);
+    if let Some(curves) = &measuring.curves {
+        return Ok(model.circuit().measure(&Signals::Curves(curves)));
+    }
+    let (_, finished) = observed(measuring, model, options);
+    whole(finished)
 }
 
-/// The same on the first grid, whatever it hides: differences of runs need one grid.
-pub(super) fn measured_once(model: &Model, mut options: SimOptions<'_>) -> Finished {
-    Measuring::of(model.circuit(), options.step.is_some()).run(model, &mut options)
+/// The same; where rows are needed on the first grid, whatever it hides: differences of runs need one grid.
+///
+/// # Errors
+/// As [`measured`].
+pub(super) fn measured_once(
+    model: &Model,
+    mut options: SimOptions<'_>,
+) -> Result<Vec<Measured>, Error> {
+    let mut measuring = Measuring::of(model.circuit(), options.step.is_some());
+    measuring.draw(model, &mut options);
+    match &measuring.curves {
+        Some(curves) => Ok(model.circuit().measure(&Signals::Curves(curves))),
+        None => whole(measuring.run(model, &mut options)),
+    }
+}
+
+fn whole(finished: Finished) -> Result<Vec<Measured>, Error> {
+    match finished.error {
+        Some(error) => Err(error),
+        None => Ok(finished
+            .run
+            .map(|(_, found)| found.measured)
+            .unwrap_or_default()),
+    }
 }
 
 /// A run with its measurements, made again on closer rows where those of the first one turn out to be too far apart for them.
@@ -166,6 +201,7 @@ fn observed<'a>(
     model: &Model,
     mut options: SimOptions<'_>,
 ) -> (Measuring<'a>, Finished) {
+    let note = measuring.draw(model, &mut options);
     let mut finished = measuring.run(model, &mut options);
     // First as many as events ask for, then as curves do.
     for _ in 0..2 {
@@ -187,6 +223,9 @@ fn observed<'a>(
             break;
         }
         finished = again;
+    }
+    if let Some((run, _)) = &mut finished.run {
+        run.notes.extend(note);
     }
     (measuring, finished)
 }
@@ -213,7 +252,10 @@ pub fn periodic_measured(
         corners: true,
         ..options.clone()
     };
-    let (orbit, mut run) = on_grid(&probing, &options, |tran| {
+    let mut found = steady(&probing, &options)?;
+    let note = measuring.draw_orbit(&mut found)?;
+    let by_rows = measuring.by_rows();
+    let (orbit, mut run) = found.on_grid(&options, |tran| {
         let rows = Grid::of(&tran).len();
         // As close as those of the transient, and as the sources ask for.
         let span = tran.tstop - tran.tstart;
@@ -221,7 +263,7 @@ pub fn periodic_measured(
         let wanted = (ROWS_A_PERIOD * span / shortest_period(&probing)).max(asked);
         let most = MOST_VALUES / (probing.circuit().probes().len() + 1);
         let wanted = (wanted.ceil() as usize).min(most).max(ROWS);
-        measuring.divisions = wanted.div_ceil(rows);
+        measuring.divisions = if by_rows { wanted.div_ceil(rows) } else { 1 };
         measuring.tran = Some(Tran {
             tstart: 0.0,
             tstop: tran.tstop - tran.tstart,
@@ -232,6 +274,7 @@ pub fn periodic_measured(
             ..tran
         }
     })?;
+    run.notes.extend(note);
     let found = measuring.carry_out_repeated(&mut run, orbit.period);
     Ok((orbit, run, found))
 }
@@ -270,6 +313,8 @@ struct Measuring<'a> {
     shown: usize,
     /// Values that a picture has room for, where the rows between are shown, too.
     pictured: Option<usize>,
+    /// What the measurements see instead of rows, where the run is exact throughout.
+    curves: Option<Curves>,
 }
 
 impl<'a> Measuring<'a> {
@@ -282,7 +327,88 @@ impl<'a> Measuring<'a> {
             divisions: if fixed_step { 1 } else { ROWS.div_ceil(rows) },
             shown: circuit.probes().len(),
             pictured: None,
+            curves: None,
         }
+    }
+
+    /// Whether measurements see rows.
+    fn by_rows(&self) -> bool {
+        is_measured(self.circuit) && self.curves.is_none()
+    }
+
+    /// Takes in what happens between events, where the run is exact throughout; and has the run begin where the model says, of which a note may tell.
+    fn draw(&mut self, model: &Model, options: &mut SimOptions<'_>) -> Option<Note> {
+        if !self.by_rows() {
+            return None;
+        }
+        let asked = (options.cancel, &options.settings);
+        let (start, note) = beginning(model, options.start.take(), asked).ok()?;
+        options.start = start;
+        // What fails here fails in the run, or is measured on its rows.
+        self.curves = self.drawn(model, options).ok().flatten();
+        if self.curves.is_some() {
+            self.divisions = 1;
+        }
+        note
+    }
+
+    fn drawn(&self, model: &Model, options: &SimOptions<'_>) -> Result<Option<Curves>, Error> {
+        let own_steps =
+            options.step.is_some() || options.theta.is_some() || options.gamma.is_some();
+        let (Some(tran), false) = (self.tran, own_steps || self.is_large(model)) else {
+            return Ok(None);
+        };
+        let measured = &self.circuit.measured;
+        let probing = model.with_circuit(Circuit {
+            probes: measured.clone(),
+            columns: vec![],
+            ..self.circuit.clone()
+        })?;
+        let asked = (options.cancel, &options.settings);
+        let start = options.start.as_ref();
+        let Some(course) = course(&probing, options.method, start, tran.tstop, asked)? else {
+            return Ok(None);
+        };
+        let outputs: Vec<usize> = (0..measured.len()).collect();
+        // What is asked for at the end is seen there, too.
+        let mut stretches = course.stretches.iter().rev();
+        let last = stretches.find(|stretch| stretch.from < stretch.to);
+        let last = last.map_or(tran.tstart, |stretch| stretch.from);
+        let from = self.circuit.measured_from(tran.tstop).min(last);
+        let from = from.max(tran.tstart);
+        curves(&course, &outputs, from, MOST_VALUES)
+    }
+
+    /// The same of an orbit, repeated until the end of `.tran`.
+    ///
+    /// # Errors
+    /// The simulation's.
+    fn draw_orbit(&mut self, steady: &mut Steady) -> Result<Option<Note>, Error> {
+        let period = steady.orbit().period;
+        let outputs = self.circuit.measured.iter().map(|probe| {
+            let mut names = steady.simulation.probes().iter();
+            names.position(|name| *name == probe.name)
+        });
+        let (Some(outputs), false) = (
+            outputs.collect::<Option<Vec<usize>>>(),
+            self.circuit.measured.is_empty(),
+        ) else {
+            return Ok(None);
+        };
+        let Some((course, from)) = steady.course()? else {
+            return Ok(None);
+        };
+        let Some(curves) = curves(&course, &outputs, from, MOST_VALUES)? else {
+            return Ok(None);
+        };
+        let (laps, note) = laps(self.circuit.tran, period, curves.values());
+        self.curves = Some(curves.repeated(laps, period, from));
+        Ok(note)
+    }
+
+    /// Whether rows cost less than the exponentials of every mode besides those of the run.
+    fn is_large(&self, model: &Model) -> bool {
+        self.circuit.measured.is_empty() || model.multiport().storage.len() > MOST_STATES
     }
 
     /// Shows rows between those of the grid, of so many values at most.
@@ -295,7 +421,7 @@ impl<'a> Measuring<'a> {
         let room = MOST_PICTURED.min(held / 2);
         let most = room / (rows * (self.shown + 1));
         let wanted = ROWS_A_PERIOD * span / shortest_period(model) / rows as f64;
-        if is_measured(self.circuit) {
+        if self.by_rows() {
             self.divisions = self.divisions.max((wanted.ceil() as usize).min(most));
         } else {
             self.divisions = (wanted.ceil() as usize).min(most).max(1);
@@ -337,7 +463,8 @@ impl<'a> Measuring<'a> {
     /// The same circuit with the signals of its measurements after those that are shown.
     fn probing(&self, model: &Model, tran: Option<Tran>) -> Result<Model, Error> {
         let mut probes = self.circuit.probes();
-        for probe in &self.circuit.measured {
+        let measured = self.circuit.measured.iter().filter(|_| self.by_rows());
+        for probe in measured {
             if !probes.contains(probe) {
                 probes.push(probe.clone());
             }
@@ -359,15 +486,21 @@ impl<'a> Measuring<'a> {
 
     /// Measures on all rows, which repeat, then leaves only what is shown.
     fn carry_out_repeated(&self, run: &mut Run, period: f64) -> Measurements {
-        let (laps, note) = laps(self.circuit.tran, period, run.waveforms.values.len());
+        let (mut repeated, mut note) = ((0, 1), None);
+        if self.by_rows() {
+            (repeated, note) = laps(self.circuit.tran, period, run.waveforms.values.len());
+        }
         run.notes.extend(note);
-        let found = self.found(&run.waveforms, laps, period);
+        let found = self.found(&run.waveforms, repeated, period);
         (run.waveforms, run.kinds) = self.cut(run);
         found
     }
 
     /// What measurements find on rows that are repeated from one lap to another.
     fn found(&self, waves: &Waveforms, (from, to): (usize, usize), period: f64) -> Measurements {
+        if let Some(curves) = &self.curves {
+            return self.seen(&Signals::Curves(curves));
+        }
         let repeated = |lap: &dyn Fn(usize, &mut Vec<f64>)| {
             let mut all = Vec::with_capacity((to - from) * waves.time.len());
             (from..to).for_each(|k| lap(k, &mut all));
@@ -380,9 +513,13 @@ impl<'a> Measuring<'a> {
             let index = waves.names.iter().position(|name| *name == probe.name)?;
             Some(repeated(&|_, all| all.extend(waves.column(index))))
         };
+        self.seen(&self.circuit.seen(&time, &column))
+    }
+
+    fn seen(&self, signals: &Signals<'_>) -> Measurements {
         Measurements {
-            measured: self.circuit.measure(&time, &column),
-            harmonics: self.circuit.harmonics(&time, &column),
+            measured: self.circuit.measure(signals),
+            harmonics: self.circuit.harmonics(signals),
             table: None,
             worst: vec![],
         }
@@ -428,7 +565,7 @@ impl<'a> Measuring<'a> {
     /// How often the print step is to be divided for rows that are close enough: twice as many as at events and corners, beside which fewer say nothing;
     /// and what straight lines leave out falls with the square of their length.
     fn closer(&self, run: &Run, found: &Measurements) -> Option<usize> {
-        let measured = is_measured(self.circuit);
+        let measured = self.by_rows();
         let room = match self.pictured {
             Some(_) if !measured && run.method != Method::Exact.name() => return None,
             Some(room) if !measured => room,
@@ -438,7 +575,11 @@ impl<'a> Measuring<'a> {
         let needed = if crowd > 1.0 {
             crowd
         } else {
-            let thinned = self.thinned(run, found);
+            let thinned = if measured {
+                self.thinned(run, found)
+            } else {
+                vec![]
+            };
             let off = thinned.iter().map(|(.., off)| *off).fold(0.0, f64::max);
             let lines = match self.pictured {
                 Some(_) if run.method == Method::Exact.name() => {

@@ -16,6 +16,7 @@
 //! | tolerances and random values | [`samples`] of variants; [`sweep()`] gives a [`Row`] of `.meas` for each |
 
 mod conducting;
+mod curves;
 mod dc;
 mod density;
 mod measured;

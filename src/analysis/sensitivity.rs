@@ -8,21 +8,16 @@ use serde::ser::{SerializeMap, Serializer};
 
 use super::measured::{laps, measured_once, periodic_measured};
 use super::periodic::{PeriodicOptions, beside, steady};
-use super::variation::{Near, Parameter, STEPS, Shifted, Trajectory};
-use crate::circuit::{Circuit, Formula, Kind, Measured, Probe, SteadyState, Tran, source::Wave};
-use crate::integrate::{
-    Error, Grid, Note, OrbitKind, Reason, SimOptions, Simulation, SimulationOptions,
-};
-use crate::measure::{Instant, Measurement, Over};
+use super::variation::{Near, Parameter, STEPS, Sight, Trajectory};
+use crate::circuit::{Circuit, Kind, Measured, SteadyState, source::Wave};
+use crate::integrate::{Error, Note, OrbitKind, Reason, SimOptions, Simulation, SimulationOptions};
+use crate::measure::{Curves, Signals};
 use crate::model::Model;
 use crate::settings::Settings;
-use crate::settings::tolerances::periodic::{MEASURE_STEP, RUN_STEP, VALUE_STEP};
+use crate::settings::tolerances::periodic::{PERIOD_MOVES, RUN_STEP, VALUE_STEP};
 
-/// Rows that measurements see at least, besides those at events.
-const ROWS: usize = 2000;
-
-/// Parts of the distance of rows in which they stand about the instants that are measured, one after the other.
-const REFINED: [f64; 2] = [0.05, 0.0025];
+/// Values of a run that is moved at most.
+const MOST_VALUES: usize = 4_000_000;
 
 /// What derivatives may be asked for.
 #[derive(Debug, Clone, Default)]
@@ -115,10 +110,10 @@ impl Serialize for Sensitivity {
 
 /// The derivatives of what `.meas` finds to the values of elements and to parameters.
 ///
-/// The rows of the run, at the steps of the grid and on both sides of events, move with a value p as the variational equation says: their values by
-/// ∂y/∂p, those at events in time too. What `.meas` finds on rows that are moved by ± a little differs by its derivative. In the steady state
+/// What happens between events moves with a value p as the variational equation says: its values by ∂y/∂p, its ends in time too. What `.meas` finds where it is
+/// moved by ± a little differs by its derivative. In the steady state
 /// ∂s₀/∂p = (I − M)⁻¹ φ_p with the monodromy M and what a period makes of the change alone. Where steps are made, differences of runs
-/// with p (1 ± h) and p (1 ± 2h) stand for it, and a note says so.
+/// with p (1 ± h) and p (1 ± 2h) stand for it, and a note says so; they do as well where impulses are measured.
 ///
 /// # Errors
 /// A name that is not there; [`Reason::NotSmooth`] where the derivative does not exist; the errors of the run.
@@ -157,11 +152,7 @@ pub fn sensitivity(model: &Model, options: &SensitivityOptions<'_>) -> Result<Se
             "the netlist has no `.meas` to differentiate".into(),
         ));
     }
-    let beside = Beside {
-        model,
-        options,
-        fine: fine(circuit, options),
-    };
+    let beside = Beside { model, options };
     let mut found = match beside.exact(&to)? {
         Some(found) => found,
         None => beside.differences(&to)?,
@@ -230,35 +221,28 @@ fn value_of(kind: &Kind) -> Option<f64> {
     }
 }
 
-/// The transient with so many rows at least.
-fn fine(circuit: &Circuit, options: &SensitivityOptions<'_>) -> Option<Tran> {
-    let tran = circuit.tran.filter(|_| !options.steady)?;
-    let rows = Grid::of(&tran).len();
-    Some(Tran {
-        tstep: tran.tstep / ROWS.div_ceil(rows) as f64,
-        ..tran
-    })
-}
-
 /// A model and those near it.
 struct Beside<'a> {
     model: &'a Model,
     options: &'a SensitivityOptions<'a>,
-    fine: Option<Tran>,
 }
 
-/// A run that is differentiated, and how measurements see its rows.
+/// A run that is differentiated, and which part of it measurements see.
 struct Base {
     trajectory: Trajectory,
     /// Where it begins.
     positions: Vec<bool>,
-    /// Times of rows besides those at events.
-    times: Vec<f64>,
-    /// Their distance.
-    spacing: f64,
-    /// Of an orbit: its monodromy, its period, and from when on its rows count.
-    orbit: Option<(DMatrix<f64>, f64, f64)>,
-    /// The periods that measurements see.
+    sight: Sight,
+    orbit: Option<Orbit>,
+}
+
+/// An orbit as measurements see it.
+struct Orbit {
+    monodromy: DMatrix<f64>,
+    /// s.
+    period: f64,
+    /// From when on it counts, s.
+    from: f64,
     laps: (usize, usize),
 }
 
@@ -280,7 +264,7 @@ impl Beside<'_> {
         }
         let circuit = Circuit {
             probes: model.circuit().measured.clone(),
-            tran: self.fine.or(model.circuit().tran),
+            columns: vec![],
             ..model.circuit().clone()
         };
         model.with_circuit(circuit)
@@ -294,28 +278,25 @@ impl Beside<'_> {
         Simulation::closed(model.circuit(), model.multiport(), options)
     }
 
-    /// The run, where it is exact throughout.
-    fn base(&self, model: &Model, notes: &mut Vec<Note>) -> Result<Option<Base>, Error> {
+    /// The run, where it is exact throughout and nothing that is measured has an impulse.
+    fn base(&self, model: &Model) -> Result<Option<Base>, Error> {
+        let circuit = model.circuit();
         if !self.options.steady {
-            let Some(tran) = self.fine else {
+            let Some(tran) = circuit.tran else {
                 return Err(unsupported("the netlist asks for no .tran analysis".into()));
             };
             let mut simulation = self.simulation(model)?;
             let (state, positions) = (simulation.state(), simulation.positions());
             let place = (0.0, &state[..], &positions[..]);
-            if !simulation.is_exact() || simulation.passages(place, tran.tstop)?.is_none() {
+            let cancel = self.options.cancel;
+            if !simulation.is_exact() || simulation.passages(place, tran.tstop, cancel)?.is_none() {
                 return Ok(None);
             }
             let trajectory = Trajectory::with(&mut simulation, place, tran.tstop, true)?;
-            let grid = Grid::of(&tran);
-            return Ok(Some(Base {
-                trajectory,
-                positions,
-                times: (0..grid.len()).map(|k| grid.time(k)).collect(),
-                spacing: tran.tstep,
-                orbit: None,
-                laps: (0, 1),
-            }));
+            let last = trajectory.segments.iter().rev().find(|s| s.from < s.to);
+            let last = last.map_or(tran.tstart, |segment| segment.from);
+            let from = circuit.measured_from(tran.tstop).min(last).max(tran.tstart);
+            return Ok(Base::of(trajectory, positions, from, None));
         }
         let mut found = steady(model, &self.periodic())?;
         let orbit = found.orbit();
@@ -324,34 +305,24 @@ impl Beside<'_> {
             return Ok(None);
         }
         let (trajectory, from) = found.trajectory()?;
-        let begin = trajectory
-            .segments
-            .first()
-            .map_or(from, |segment| segment.from);
-        let step = orbit.period / ROWS as f64;
-        let times = (0..=2 * ROWS).map(|k| from + k as f64 * step);
-        let inside = |t: &f64| *t > begin && *t < begin + orbit.period;
-        let signals = model.circuit().measured.len() + 1;
-        let (laps, note) = laps(model.circuit().tran, orbit.period, ROWS * signals);
-        notes.extend(note);
-        Ok(Some(Base {
-            positions: vec![],
-            times: times.filter(inside).collect(),
-            spacing: step,
-            orbit: Some((trajectory.monodromy(), orbit.period, from)),
-            laps,
-            trajectory,
-        }))
+        let orbit = Orbit {
+            monodromy: trajectory.monodromy(),
+            period: orbit.period,
+            from,
+            // What is left out of many laps is told where they are measured.
+            laps: laps(circuit.tran, orbit.period, MOST_VALUES / 1000).0,
+        };
+        Ok(Base::of(trajectory, vec![], f64::NEG_INFINITY, Some(orbit)))
     }
 
     /// By the variational equation; `None` where steps are made.
     fn exact(&self, to: &[(String, f64)]) -> Result<Option<Sensitivity>, Error> {
         let own = self.with(None)?;
         let mut notes = Vec::new();
-        let Some(mut base) = self.base(&own, &mut notes)? else {
+        let Some(base) = self.base(&own)? else {
             return Ok(None);
         };
-        let mut gradients: Vec<Gradient> = Vec::new();
+        let mut gradients = started(&self.measured(None)?);
         let mut left_out: Vec<String> = Vec::new();
         for (name, value) in to {
             self.go_on()?;
@@ -359,15 +330,10 @@ impl Beside<'_> {
                 let model = self.with(Some((name, value * (1.0 + step * VALUE_STEP))))?;
                 let mut simulation = if self.options.steady {
                     let (period, simulation) = beside(&model, &self.periodic())?;
-                    let moves =
-                        base.orbit
-                            .as_ref()
-                            .zip(period)
-                            .is_some_and(|((_, own, ..), other)| {
-                                (own / other).round() * other != *own
-                                    && ((own / other).round() * other - own).abs()
-                                        > 1e-3 * VALUE_STEP * own
-                            });
+                    let moves = base.orbit.as_ref().zip(period).is_some_and(|(own, other)| {
+                        let laps = (own.period / other).round() * other;
+                        (laps - own.period).abs() > PERIOD_MOVES * VALUE_STEP * own.period
+                    });
                     if moves && self.options.to.is_empty() {
                         return Ok(None);
                     }
@@ -397,41 +363,34 @@ impl Beside<'_> {
                 continue;
             };
             let near = [a, b, c, d];
-            if gradients.is_empty() {
-                for part in REFINED {
-                    let parameter = Parameter::of(&base.trajectory, &near)?;
-                    let instants = base.instants(&parameter, own.circuit(), self.fine)?;
-                    base.refine(&instants, part);
-                }
-            }
             let parameter = Parameter::of(&base.trajectory, &near)?;
             let start = match &base.orbit {
                 None => Parameter::weighted_states(&near),
-                Some((m, ..)) => {
+                Some(Orbit { monodromy: m, .. }) => {
                     let still = DVector::zeros(m.nrows());
-                    let (_, forced) = parameter.along(&still, &[])?;
+                    let forced = parameter.along(&still, None)?.map(|(_, end)| end);
                     let closed = DMatrix::identity(m.nrows(), m.nrows()) - m;
-                    closed.lu().solve(&forced).ok_or_else(|| {
+                    let found = forced.and_then(|forced| closed.lu().solve(&forced));
+                    found.ok_or_else(|| {
                         let what = "the orbit is one of a family: where it moves is not determined";
                         Error::before(Reason::NotSmooth(what.into()))
                     })?
                 }
             };
-            let (rows, _) = parameter.along(&start, &base.times)?;
-            let rows = base.seen(base.ordered(rows), self.fine);
-            let measure = |circuit: &Circuit, h: f64| rows.measure(circuit, own.circuit(), h);
-            if gradients.is_empty() {
-                gradients = started(&measure(own.circuit(), 0.0));
-            }
+            let Some((seen, _)) = parameter.along(&start, Some(base.sight))? else {
+                return Ok(None);
+            };
+            let h = seen.small();
             let moved = |h: f64| {
                 let model = self.with(Some((name, value * (1.0 + h))))?;
-                Ok::<_, Error>(measure(model.circuit(), h))
+                let curves = base.seen(seen.at(h));
+                Ok::<_, Error>(model.circuit().measure(&Signals::Curves(&curves)))
             };
-            let (low, high) = (moved(-MEASURE_STEP)?, moved(MEASURE_STEP)?);
+            let (low, high) = (moved(-h)?, moved(h)?);
             for (gradient, (low, high)) in gradients.iter_mut().zip(low.iter().zip(&high)) {
                 let both = low.result.as_ref().ok().zip(high.result.as_ref().ok());
                 let derivative =
-                    both.map(|(low, high)| (high.value - low.value) / (2.0 * MEASURE_STEP * value));
+                    both.map(|(low, high)| (high.value - low.value) / (2.0 * h * value));
                 gradient.to.push((name.clone(), derivative));
             }
         }
@@ -458,20 +417,13 @@ impl Beside<'_> {
         if self.options.steady {
             return Ok(periodic_measured(&model, &self.periodic())?.2.measured);
         }
-        let finished = measured_once(
-            &model,
-            SimOptions {
-                cancel: self.options.cancel,
-                settings: self.options.settings.clone(),
-                unestimated: true,
-                ..SimOptions::default()
-            },
-        );
-        match (finished.run, finished.error) {
-            (Some((_, found)), None) => Ok(found.measured),
-            (_, Some(error)) => Err(error),
-            (None, None) => Ok(vec![]),
-        }
+        let asked = SimOptions {
+            cancel: self.options.cancel,
+            settings: self.options.settings.clone(),
+            unestimated: true,
+            ..SimOptions::default()
+        };
+        measured_once(&model, asked)
     }
 
     /// By extrapolated differences of runs.
@@ -494,7 +446,7 @@ impl Beside<'_> {
                 gradient.to.push((name.clone(), derivative));
             }
         }
-        let text = "the derivatives are differences of runs with values 1 and 2 % aside, as the run is not exact throughout";
+        let text = "the derivatives are differences of runs with values 1 and 2 % aside, as the run is not exact throughout or signals have impulses";
         Ok(Sensitivity {
             of: gradients,
             at: to.to_vec(),
@@ -517,164 +469,49 @@ fn started(measured: &[Measured]) -> Vec<Gradient> {
     measured.iter().map(of).collect()
 }
 
-/// Rows as measurements see them: again and again from one lap to another, with so many seconds to a lap.
-struct Seen {
-    rows: Vec<Shifted>,
-    laps: (usize, usize),
-    period: f64,
-}
-
-impl Seen {
-    /// By lap and row, and the row that ends the last lap.
-    fn all(&self) -> impl Iterator<Item = (f64, &Shifted)> {
-        let Self { rows, laps, period } = self;
-        let lap = move |k: usize| rows.iter().map(move |row| (k as f64 * period, row));
-        let last = rows.first().filter(|_| *period > 0.0);
-        let last = last.map(|row| (laps.1 as f64 * period, row));
-        (laps.0..laps.1).flat_map(lap).chain(last)
-    }
-
-    /// What a circuit's measurements find on rows that are moved by so much; the columns are the signals that `own` measures.
-    fn measure(&self, circuit: &Circuit, own: &Circuit, h: f64) -> Vec<Measured> {
-        let time = self.all().map(|(shift, row)| shift + row.t + h * row.dt);
-        let time: Vec<f64> = time.collect();
-        let column = |probe: &Probe| {
-            let mut measured = own.measured.iter();
-            let at = measured.position(|other| other.name == probe.name)?;
-            let values = self.all().map(|(_, row)| row.y[at] + h * row.dy[at]);
-            Some(values.collect())
-        };
-        circuit.measure(&time, &column)
-    }
-}
-
 impl Base {
-    /// Rows of the grid that an event passes when all are moved give way to it. One that would pass another event stays where it is.
-    fn ordered(&self, mut rows: Vec<Shifted>) -> Vec<Shifted> {
-        /// Moves of a row for which there is room.
-        const ROOM: f64 = 4.0;
-        let events: Vec<f64> = rows
+    /// `None` where an output has an impulse: of that the variation is not carried along.
+    fn of(
+        trajectory: Trajectory,
+        positions: Vec<bool>,
+        from: f64,
+        orbit: Option<Orbit>,
+    ) -> Option<Self> {
+        let impulses = trajectory
+            .saltations
             .iter()
-            .filter(|row| row.event)
-            .map(|row| row.t)
-            .collect();
-        let reach = |row: &Shifted| ROOM * MEASURE_STEP * row.dt.abs();
-        for row in rows.iter_mut().filter(|row| row.dt != 0.0) {
-            let below = events[..events.partition_point(|t| *t < row.t)].last();
-            let above = events.get(events.partition_point(|t| *t <= row.t));
-            let others = below.into_iter().chain(above);
-            let room = others.fold(self.spacing, |room, t| room.min((t - row.t).abs()));
-            if reach(row) > room {
-                row.dy -= &row.rate * row.dt;
-                row.dt = 0.0;
-            }
+            .filter_map(|s| s.impulse.as_ref());
+        let mut areas = impulses.flat_map(|impulse| impulse.areas.iter());
+        if areas.any(|area| *area != 0.0) {
+            return None;
         }
-        let moving: Vec<(f64, f64)> = rows
-            .iter()
-            .filter(|row| row.dt != 0.0)
-            .map(|row| (row.t, reach(row)))
-            .collect();
-        let passed = |row: &Shifted| {
-            let at = moving.partition_point(|(t, _)| *t < row.t);
-            let beside = moving[..at].last().into_iter().chain(moving.get(at));
-            beside
-                .into_iter()
-                .any(|(t, reach)| (row.t - t).abs() < *reach)
-        };
-        rows.retain(|row| row.event || !passed(row));
-        rows
-    }
-
-    /// When measurements find what they find.
-    fn instants(
-        &self,
-        parameter: &Parameter<'_>,
-        circuit: &Circuit,
-        tran: Option<Tran>,
-    ) -> Result<Vec<f64>, Error> {
-        let states = self.trajectory.systems.first();
-        let still = DVector::zeros(states.map_or(0, |system| system.lcs.storage.names.len()));
-        let rows = self.seen(parameter.along(&still, &self.times)?.0, tran);
-        let mut instants = Vec::new();
-        for extremum in [Over::WhenMaximum, Over::WhenMinimum] {
-            let mut asked = circuit.clone();
-            for named in &mut asked.measurements {
-                if let Some(Measurement::Over(over, ..)) = &mut named.what
-                    && matches!(over, Over::Maximum | Over::Minimum | Over::PeakToPeak)
-                {
-                    *over = extremum;
-                }
-            }
-            let all = rows.measure(&asked, circuit, 0.0);
-            for (named, measured) in asked.measurements.iter().zip(&all) {
-                let Ok(found) = &measured.result else {
-                    continue;
-                };
-                // Between rows the ends of windows that are given move nothing.
-                let crossing =
-                    |end: &Option<Instant<Formula>>| matches!(end, Some(Instant::Crossing { .. }));
-                let at = found.at.iter().map(|(_, t)| *t);
-                match &named.what {
-                    Some(Measurement::Over(over, _, window)) => {
-                        let sought = crossing(&window.from) || crossing(&window.to);
-                        instants.extend(at.filter(|_| sought));
-                        let time = matches!(over, Over::WhenMaximum | Over::WhenMinimum);
-                        instants.extend(time.then_some(found.value));
-                    }
-                    Some(Measurement::When(_)) => instants.push(found.value),
-                    Some(Measurement::Find {
-                        when: Instant::At(_),
-                        ..
-                    }) => {}
-                    _ => instants.extend(at),
-                }
-            }
-        }
-        Ok(instants)
-    }
-
-    /// Rows at these instants, and about them in this part of their distance.
-    fn refine(&mut self, instants: &[f64], part: f64) {
-        /// Rows on either side.
-        const ABOUT: i32 = 20;
-        let ends = self
-            .trajectory
+        let lengths = trajectory
             .segments
-            .first()
-            .zip(self.trajectory.segments.last());
-        let Some((first, last)) = ends else { return };
-        let (begin, end) = (first.from, last.to);
-        for instant in instants {
-            let t = match &self.orbit {
-                None => *instant,
-                Some((_, period, from)) => begin + (from + instant - begin).rem_euclid(*period),
-            };
-            let about = (-ABOUT..=ABOUT).map(|k| t + f64::from(k) * part * self.spacing);
-            self.times.extend(about.filter(|t| *t > begin && *t < end));
-        }
-        self.times.sort_by(f64::total_cmp);
-        self.times.dedup();
+            .iter()
+            .map(|segment| segment.to - segment.from);
+        let sight = Sight {
+            from,
+            unit: lengths.fold(0.0, f64::max).log2().ceil().exp2(),
+            most: MOST_VALUES,
+        };
+        Some(Self {
+            trajectory,
+            positions,
+            sight,
+            orbit,
+        })
     }
 
-    /// The rows as measurements see them: from tstart on, or the orbit from its beginning.
-    fn seen(&self, mut rows: Vec<Shifted>, tran: Option<Tran>) -> Seen {
-        let seen = |rows: Vec<Shifted>, period: f64| Seen {
-            rows,
-            laps: self.laps,
-            period,
+    /// A run as measurements see it: an orbit again and again, from its beginning, which is not that of the trajectory.
+    fn seen(&self, curves: Curves) -> Curves {
+        let Some(Orbit {
+            period, from, laps, ..
+        }) = &self.orbit
+        else {
+            return curves;
         };
-        let Some((_, period, from)) = &self.orbit else {
-            let start = tran.map_or(0.0, |tran| tran.tstart);
-            rows.retain(|row| row.t >= start);
-            return seen(rows, 0.0);
-        };
-        // What is beyond the end of the period stands at its beginning.
-        let end = from + period;
-        let at = rows.iter().position(|row| row.t >= end);
-        rows.rotate_left(at.unwrap_or(0));
-        for row in &mut rows {
-            row.t -= if row.t >= end { end } else { *from };
-        }
-        seen(rows, *period)
+        let [begin, end] = [laps.0, laps.1].map(|lap| lap as f64 * period);
+        let all = curves.repeated((0, laps.1 - laps.0 + 1), *period, *from + period - begin);
+        all.within((begin, end))
     }
 }

@@ -1,10 +1,11 @@
-//! Where a transient begins.
+//! Where a transient begins, and its course where it is exact throughout.
 
 use std::sync::atomic::AtomicBool;
 
 use super::periodic::{PeriodicOptions, orbit_start};
+use super::variation::Course;
 use crate::circuit::SteadyState;
-use crate::integrate::{Error, Note, Reason, Standing};
+use crate::integrate::{Error, Method, Note, Reason, Simulation, SimulationOptions, Standing};
 use crate::model::Model;
 use crate::settings::Settings;
 
@@ -37,4 +38,34 @@ pub(super) fn beginning(
             Ok((None, Some(Note::of(error.elements, text))))
         }
     }
+}
+
+/// The transient of a model until a time, s, from where it begins; `None` where steps are made in it, or another method is asked for.
+///
+/// # Errors
+/// The simulation's.
+pub(super) fn course(
+    model: &Model,
+    method: Method,
+    start: Option<&Standing>,
+    until: f64,
+    (cancel, settings): (Option<&AtomicBool>, &Settings),
+) -> Result<Option<Course>, Error> {
+    if !matches!(method, Method::Auto | Method::Exact) {
+        return Ok(None);
+    }
+    let options = SimulationOptions {
+        method,
+        settings: settings.clone(),
+        ..SimulationOptions::default()
+    };
+    let mut simulation = Simulation::closed(model.circuit(), model.multiport(), options)?;
+    if !simulation.is_exact() {
+        return Ok(None);
+    }
+    let (t, state, switches) = match start {
+        Some(start) => (start.t, start.state.clone(), start.switches.clone()),
+        None => (0.0, simulation.state(), simulation.positions()),
+    };
+    Course::of(&mut simulation, (t, &state, &switches), until, cancel)
 }

@@ -297,18 +297,11 @@ impl Wanted<'_> {
             };
             return Ok(periodic_measured(&model, &options)?.2.measured);
         }
-        let finished = measured(
-            &model,
-            SimOptions {
-                cancel,
-                settings,
-                ..SimOptions::default()
-            },
-        );
-        if let Some(error) = finished.error {
-            return Err(error);
-        }
-        let run = finished.run.map(|(_, found)| found.measured);
-        Ok(run.unwrap_or_default())
+        let options = SimOptions {
+            cancel,
+            settings,
+            ..SimOptions::default()
+        };
+        measured(&model, options)
     }
 }

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use serde::Serialize;
 
-use super::measured::transient;
+use super::measured::measured;
 use super::sensitivity::{SensitivityOptions, sensitivity};
 use crate::integrate::{Error, Note, Reason, SimOptions};
 use crate::model::Model;
@@ -111,7 +111,7 @@ pub fn worst(model: &Model, of: &str, options: &WorstOptions<'_>) -> Result<Wors
         }
         Ok::<_, Error>(Bound {
             estimate: nominal + side * reach,
-            value: measured(&corner, &of, options)?,
+            value: value(&corner, &of, options)?,
             at,
         })
     };
@@ -135,23 +135,14 @@ pub fn worst(model: &Model, of: &str, options: &WorstOptions<'_>) -> Result<Wors
 }
 
 /// What `.meas` finds in a run.
-fn measured(model: &Model, of: &str, options: &WorstOptions<'_>) -> Result<f64, Error> {
-    let finished = transient(
-        model,
-        SimOptions {
-            cancel: options.cancel,
-            settings: options.settings.clone(),
-            unestimated: true,
-            ..SimOptions::default()
-        },
-    );
-    if let Some(error) = finished.error {
-        return Err(error);
-    }
-    let found = finished
-        .run
-        .map(|(_, found)| found.measured)
-        .unwrap_or_default();
+fn value(model: &Model, of: &str, options: &WorstOptions<'_>) -> Result<f64, Error> {
+    let asked = SimOptions {
+        cancel: options.cancel,
+        settings: options.settings.clone(),
+        unestimated: true,
+        ..SimOptions::default()
+    };
+    let found = measured(model, asked)?;
     let found = found.iter().find(|measured| measured.name == of);
     let result = found.map(|measured| &measured.result);
     match result {

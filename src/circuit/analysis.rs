@@ -198,6 +198,7 @@ impl<'n> Builder<'n, '_> {
                     ));
                 }
                 element.ic = Some(value);
+                self.circuit.initial_currents.push((id, value));
             }
         }
         Ok(())

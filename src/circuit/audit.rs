@@ -124,11 +124,14 @@ impl<'n> Builder<'n, '_> {
             }));
         }
         let uic = self.circuit.tran.is_some_and(|t| t.uic);
-        let ignored = self
-            .circuit
-            .elements
-            .iter()
-            .find(|e| e.ic.is_some_and(|ic| ic != 0.0));
+        // Currents of `.ic` are held at the operating point.
+        let held = |k: usize| {
+            let mut currents = self.circuit.initial_currents.iter();
+            currents.any(|(id, _)| id.index() == k)
+        };
+        let elements = self.circuit.elements.iter().enumerate();
+        let mut ignored = elements.filter(|(_, e)| e.ic.is_some_and(|ic| ic != 0.0));
+        let ignored = ignored.find(|(k, _)| !held(*k)).map(|(_, element)| element);
         if let (false, Some(_), Some(element)) = (uic, self.circuit.tran, ignored) {
             let message = format!(
                 "`IC=` of `{}` has no effect: the run starts from the operating point",
@@ -137,7 +140,7 @@ impl<'n> Builder<'n, '_> {
             notes.push(
                 Diagnostic::warning("ic-without-uic", element.span, message)
                     .label("ignored without `uic`")
-                    .help("add `uic` to `.tran`, or set node voltages with `.ic`"),
+                    .help("add `uic` to `.tran`, or set node voltages and inductor currents with `.ic`"),
             );
         }
         for note in notes {

@@ -65,6 +65,30 @@ impl Formula {
         }
     }
 
+    /// Whether it is an affine function of the signals, with numbers and results as coefficients.
+    pub(super) fn is_affine(&self) -> bool {
+        match self {
+            Self::Number(_) | Self::Time | Self::Signal(_) | Self::Result(_) => true,
+            Self::Not(_) | Self::If(_) | Self::Call(..) => false,
+            Self::Minus(x) => x.is_affine(),
+            Self::Binary(op, x, y) => match op {
+                Binary::Add | Binary::Sub => x.is_affine() && y.is_affine(),
+                Binary::Mul => x.is_affine() && y.is_affine() && (x.is_number() || y.is_number()),
+                Binary::Div => x.is_affine() && y.is_number(),
+                _ => false,
+            },
+        }
+    }
+
+    fn is_number(&self) -> bool {
+        match self {
+            Self::Number(_) | Self::Result(_) => true,
+            Self::Time | Self::Signal(_) | Self::If(_) | Self::Call(..) => false,
+            Self::Minus(x) | Self::Not(x) => x.is_number(),
+            Self::Binary(_, x, y) => x.is_number() && y.is_number(),
+        }
+    }
+
     /// The measurements it needs.
     pub(super) fn needs(&self, all: &mut Vec<usize>) {
         match self {

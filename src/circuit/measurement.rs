@@ -1,6 +1,5 @@
 //! `.meas` and `.four`: what is measured, and carried out on the waveforms of a run.
 
-use std::borrow::Cow;
 use std::cell::RefCell;
 
 use super::builder::Builder;
@@ -8,8 +7,9 @@ use super::formula::Formula;
 use super::scope::ScopeId;
 use super::{Circuit, Probe};
 use crate::diagnostic::Diagnostic;
-use crate::measure::{Found, MeasureError, Measurement, Scene, Spectrum, Trace, fourier};
+use crate::measure::{Found, MeasureError, Measurement, Scene, Signals, Spectrum, fourier};
 use crate::netlist::ast::{Four, Meas};
+use crate::settings::tolerances::times::SAME_TIME;
 
 /// Harmonics of `.four` where it names no number.
 const HARMONICS: usize = 9;
@@ -135,16 +135,40 @@ impl<'n> Builder<'n, '_> {
 }
 
 impl Circuit {
-    /// Carries out the measurements on the rows of a run.
-    ///
-    /// `time` in s, nondecreasing; `column` gives as many values of a signal of [`Self::measured`].
+    /// The rows of a run as [`Self::measure`] sees them: times in s, nondecreasing, and as many values of each signal of [`Self::measured`] from
+    /// `column`.
     #[must_use]
-    pub fn measure(
+    pub fn seen<'t>(
         &self,
-        time: &[f64],
+        time: &'t [f64],
         column: &dyn Fn(&Probe) -> Option<Vec<f64>>,
-    ) -> Vec<Measured> {
-        let columns = self.columns(time, column);
+    ) -> Signals<'t> {
+        let columns = self.measured.iter();
+        let columns =
+            columns.map(|probe| column(probe).unwrap_or_else(|| vec![f64::NAN; time.len()]));
+        Signals::Lines {
+            time,
+            columns: columns.collect(),
+        }
+    }
+
+    /// The time before which [`Self::measure`] and [`Self::harmonics`] need to see nothing of a run that ends at `tstop`, s.
+    pub(crate) fn measured_from(&self, tstop: f64) -> f64 {
+        let number = |formula: &Formula| formula.value(f64::NAN, &[], &[]);
+        let measurements = self.measurements.iter().filter_map(|m| m.what.as_ref());
+        let begins = measurements.map(|what| what.begins(&number));
+        let periods = self
+            .fourier
+            .iter()
+            .map(|four| tstop - four.frequency.recip());
+        // What rounding leaves of a period before the start is none.
+        let periods = periods.map(|t| t - SAME_TIME * tstop);
+        begins.chain(periods).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Carries out the measurements on the signals of [`Self::measured`].
+    #[must_use]
+    pub fn measure(&self, signals: &Signals<'_>) -> Vec<Measured> {
         let count = self.measurements.len();
         let mut results: Vec<Option<Result<Found, MeasureError>>> = vec![None; count];
         // A measurement may use one that stands below it: go round until nothing new is found.
@@ -174,35 +198,25 @@ impl Circuit {
                     }
                     Ok(())
                 };
-                let trace = |formula: &Formula| {
+                let trace = |formula: &Formula, less: Option<&Formula>| {
                     known(formula)?;
-                    if let Formula::Signal(index) = formula {
-                        let all = &columns[*index];
-                        let finite = all.iter().all(|value| value.is_finite());
-                        return finite
-                            .then_some(Cow::Borrowed(&all[..]))
-                            .ok_or(MeasureError::NotFinite);
+                    less.map_or(Ok(()), known)?;
+                    if let (Formula::Signal(index), None) = (formula, less) {
+                        return signals.signal(*index);
                     }
-                    let mut row = vec![0.0; columns.len()];
-                    let mut all = Vec::with_capacity(time.len());
-                    for (k, &t) in time.iter().enumerate() {
-                        for (value, column) in row.iter_mut().zip(&columns) {
-                            *value = column[k];
-                        }
-                        let value = formula.value(t, &row, &values);
-                        if !value.is_finite() {
-                            return Err(MeasureError::NotFinite);
-                        }
-                        all.push(value);
-                    }
-                    Ok(Cow::Owned(all))
+                    let value = |t: f64, row: &[f64]| {
+                        let less = less.map_or(0.0, |less| less.value(t, row, &values));
+                        formula.value(t, row, &values) - less
+                    };
+                    let affine = formula.is_affine() && less.is_none_or(Formula::is_affine);
+                    signals.trace(&value, affine)
                 };
                 let single = |formula: &Formula| {
                     known(formula)?;
                     Ok(formula.value(f64::NAN, &[], &values))
                 };
                 let scene = Scene {
-                    time,
+                    span: signals.span(),
                     trace: &trace,
                     number: &single,
                 };
@@ -231,37 +245,19 @@ impl Circuit {
 
     /// Carries out the Fourier analyses, as [`Self::measure`] does the measurements.
     #[must_use]
-    pub fn harmonics(
-        &self,
-        time: &[f64],
-        column: &dyn Fn(&Probe) -> Option<Vec<f64>>,
-    ) -> Vec<Harmonics> {
-        if self.fourier.is_empty() {
-            return vec![];
-        }
-        let columns = self.columns(time, column);
+    pub fn harmonics(&self, signals: &Signals<'_>) -> Vec<Harmonics> {
+        let of = |analysis: &FourierAnalysis, signal: usize| Harmonics {
+            signal: self.measured[signal].name.clone(),
+            frequency: analysis.frequency,
+            result: signals
+                .signal(signal)
+                .and_then(|trace| fourier(&trace, analysis.frequency, analysis.harmonics)),
+        };
         let mut all = Vec::new();
         for analysis in &self.fourier {
-            for &signal in &analysis.signals {
-                let trace = Trace {
-                    time,
-                    values: &columns[signal],
-                };
-                all.push(Harmonics {
-                    signal: self.measured[signal].name.clone(),
-                    frequency: analysis.frequency,
-                    result: fourier(trace, analysis.frequency, analysis.harmonics),
-                });
-            }
+            all.extend(analysis.signals.iter().map(|signal| of(analysis, *signal)));
         }
         all
-    }
-
-    fn columns(&self, time: &[f64], column: &dyn Fn(&Probe) -> Option<Vec<f64>>) -> Vec<Vec<f64>> {
-        self.measured
-            .iter()
-            .map(|probe| column(probe).unwrap_or_else(|| vec![f64::NAN; time.len()]))
-            .collect()
     }
 }
 

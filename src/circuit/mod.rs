@@ -109,6 +109,8 @@ pub struct Circuit {
     pub columns: Vec<Column>,
     /// `.ic v(n)=…` (and differences `v(a,b)=…`): nodes and volts.
     pub initial_voltages: Vec<(NodeId, NodeId, f64)>,
+    /// `.ic i(l)=…`: inductors and amperes; they stand as [`Element::ic`] too.
+    pub initial_currents: Vec<(ElementId, f64)>,
     /// `.nodeset v(n)=…`: nodes and volts from which the switches of the operating point are looked for.
     pub nodesets: Vec<(NodeId, NodeId, f64)>,
     /// `.step`, the first one innermost; the circuit has the values as they stand.
@@ -148,7 +150,7 @@ pub struct Element {
     pub n: NodeId,
     /// What it is.
     pub kind: Kind,
-    /// `IC=` on the card: volts for a capacitor, amperes for an inductor.
+    /// `IC=` on the card, or `.ic` of an inductor's current: volts for a capacitor, amperes for an inductor.
     pub ic: Option<f64>,
     /// The card it comes from.
     pub span: Option<Span>,
@@ -387,10 +389,7 @@ impl Circuit {
             Probed::Current(id) => self.elements[id.index()].name.as_str(),
         };
         let elements: BTreeSet<&str> = self.elements.iter().map(|e| e.name.as_str()).collect();
-        let is_part = |name: &str| {
-            let mut dots = name.match_indices('.');
-            dots.any(|(dot, _)| elements.contains(&name[..dot]))
-        };
+        let is_part = |name: &str| wholes(name).any(|whole| elements.contains(whole));
         // What nobody wrote is shown where it is asked for.
         all.filter(|probe| !is_inside(name(probe)) && !is_part(name(probe)))
             .collect()
@@ -417,6 +416,11 @@ impl Circuit {
             what: Probed::Current(ElementId(i as u32)),
         })
     }
+}
+
+/// What an element or node of this name may be a part of: `x1` and `x1.m1` of `x1.m1.body`.
+pub(crate) fn wholes(name: &str) -> impl Iterator<Item = &str> {
+    name.match_indices('.').map(|(dot, _)| &name[..dot])
 }
 
 /// Whether a node or an element is a part of an `A` device: `a1.q`, `x1.a1.q`.

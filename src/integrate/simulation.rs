@@ -8,6 +8,7 @@ mod stop;
 mod way;
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use nalgebra::DVector;
 
@@ -125,7 +126,8 @@ impl Simulation {
     /// # Errors
     /// See [`Reason`]; the simulation stays at the last time it reached.
     pub fn advance_to(&mut self, t: f64) -> Result<Stop, Error> {
-        self.advance(t, false)
+        let cancel = self.options.cancel.clone();
+        self.advance(t, false, cancel.as_deref())
     }
 
     /// Advances to the next event, to `t` at most.
@@ -133,10 +135,11 @@ impl Simulation {
     /// # Errors
     /// As [`Self::advance_to`].
     pub fn advance_to_event(&mut self, t: f64) -> Result<Stop, Error> {
-        self.advance(t, true)
+        let cancel = self.options.cancel.clone();
+        self.advance(t, true, cancel.as_deref())
     }
 
-    fn advance(&mut self, t: f64, pause: bool) -> Result<Stop, Error> {
+    fn advance(&mut self, t: f64, pause: bool, cancel: Option<&AtomicBool>) -> Result<Stop, Error> {
         let (now, end) = (self.time(), self.tran.tstop);
         if !(t >= now && t <= end) {
             let what = format!(
@@ -144,9 +147,8 @@ impl Simulation {
             );
             return Err(Error::at(now, Reason::Unsupported(what)));
         }
-        let cancel = self.options.cancel.clone();
         let asked = Asked {
-            cancel: cancel.as_deref(),
+            cancel,
             ..Asked::default()
         };
         let mut log = Log::of(0, 0.0, asked);

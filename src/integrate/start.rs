@@ -7,7 +7,9 @@ use std::collections::BTreeMap;
 
 use nalgebra::DVector;
 
-use self::prescribed::{Guess, Prescribed, Voltage, hold_voltages, open_inductors, read_guesses};
+use self::prescribed::{
+    Guess, Held, Prescribed, hold_currents, hold_voltages, open_inductors, read_guesses,
+};
 use self::statics::{feeding, observed_circuit, tie_floating, without_delay};
 use crate::circuit::{Circuit, Element, Kind, Line, LinePort, NodeId};
 use crate::integrate::Note;
@@ -110,7 +112,7 @@ fn node_voltages(circuit: &Circuit) -> Vec<Option<f64>> {
 }
 
 /// Solves the operating point: capacitors open, inductors short, devices by their complementarity problem y = Dλ + q with the
-/// least-norm λ, switch positions iterated; with `hold_ic` the `.ic` node voltages are held. Where something drives the node already,
+/// least-norm λ, switch positions iterated; with `hold_ic` the `.ic` node voltages and inductor currents are held. Where something drives the node already,
 /// they (and those of `.nodeset`) choose among several solutions, as a latch has.
 ///
 /// # Errors
@@ -122,10 +124,35 @@ pub fn operating_point(
     hold_ic: bool,
     settings: &Settings,
 ) -> Result<OperatingPoint, Error> {
-    let Prescribed { held, mut guesses } = Prescribed::of(circuit, hold_ic);
+    let Prescribed { held, guesses } = Prescribed::of(circuit, hold_ic);
+    match guessed(circuit, (&held, guesses.clone()), values, settings) {
+        Err(error) if !held.currents.is_empty() => {
+            let voltages = held.voltages;
+            let held = Held {
+                voltages,
+                ..Held::default()
+            };
+            let mut point = guessed(circuit, (&held, guesses), values, settings)?;
+            let text = format!(
+                "currents of `.ic` are not held, as there is no operating point with them: {error}"
+            );
+            point.notes.push(Note::of(&error.elements, text));
+            Ok(point)
+        }
+        result => result,
+    }
+}
+
+/// The [`operating_point`] with these held, of several solutions the one with these guesses.
+fn guessed(
+    circuit: &Circuit,
+    (held, mut guesses): (&Held, Vec<Guess>),
+    values: Values,
+    settings: &Settings,
+) -> Result<OperatingPoint, Error> {
     let asked = guesses.clone();
     for _ in 0..GUESSES {
-        let Ok(mut point) = at_rest(circuit, (&held, &guesses), values, settings) else {
+        let Ok(mut point) = at_rest(circuit, (held, &guesses), values, settings) else {
             break;
         };
         let found: Vec<Guess> = guesses.iter().map(|guess| guess.found(&point)).collect();
@@ -138,24 +165,25 @@ pub fn operating_point(
         }
         guesses = found;
     }
-    at_rest(circuit, (&held, &[]), values, settings)
+    at_rest(circuit, (held, &[]), values, settings)
 }
 
 /// Times that guessed voltages are replaced by what follows from them. A latch needs one.
 const GUESSES: usize = 8;
 
-/// The [`operating_point`] with these node voltages held, where controls see the guesses in place of the voltages of their nodes.
+/// The [`operating_point`] with these voltages and currents held, where controls see the guesses in place of the voltages of their nodes.
 fn at_rest(
     circuit: &Circuit,
-    (held, guesses): (&[Voltage], &[Guess]),
+    (held, guesses): (&Held, &[Guess]),
     values: Values,
     settings: &Settings,
 ) -> Result<OperatingPoint, Error> {
     let mut notes = Vec::new();
     let mut statics = observed_circuit(circuit);
     without_delay(&mut statics);
-    let tied = tie_floating(circuit, &mut statics, held, &mut notes);
-    hold_voltages(held, &mut statics);
+    let tied = tie_floating(circuit, &mut statics, &held.voltages, &mut notes);
+    hold_voltages(&held.voltages, &mut statics);
+    hold_currents(&held.currents, &mut statics);
     let without_current = open_inductors(circuit, held, &mut statics);
     read_guesses(guesses, &mut statics);
     let behaviour = behaviour(&statics).map_err(|faults| {
@@ -425,7 +453,13 @@ pub fn initial(
     }
     let point = operating_point(circuit, Values::BeforeZero, true, settings)?;
     let mut notes = point.notes;
-    for s in behaviour.storage.iter().filter(|s| s.initial.is_some()) {
+    let held: Vec<&str> = circuit
+        .initial_currents
+        .iter()
+        .map(|(id, _)| &circuit.elements[id.index()].name[..])
+        .collect();
+    let ignored = behaviour.storage.iter().filter(|s| s.initial.is_some());
+    for s in ignored.filter(|s| !held.contains(&&s.element[..])) {
         let text = format!("IC= of {} is ignored without uic", s.element);
         notes.push(Note::of([&s.element], text));
     }

@@ -6,6 +6,7 @@ pub(crate) mod decouple;
 pub(crate) mod dense;
 pub(crate) mod eigenvalues;
 pub(crate) mod expm;
+pub(crate) mod gauss;
 pub(crate) mod kernel;
 pub(crate) mod levelled;
 pub(crate) mod polynomial;

@@ -1,7 +1,5 @@
 //! One measurement, as `.meas tran` describes it, over expressions of any kind `E`.
 
-use std::borrow::Cow;
-
 use super::{Edge, MeasureError, Over, Trace, Which};
 
 /// What is measured.
@@ -67,6 +65,24 @@ pub enum Use {
 }
 
 impl<E> Measurement<E> {
+    /// The time before which it needs to see nothing, s, where `number` gives that of an expression; −∞ where that is not known.
+    pub(crate) fn begins(&self, number: &dyn Fn(&E) -> f64) -> f64 {
+        let at = |t: Option<&E>| {
+            let t = t.map(number).filter(|t| t.is_finite());
+            t.unwrap_or(f64::NEG_INFINITY)
+        };
+        let of = |instant: &Instant<E>| match instant {
+            Instant::At(t) => at(Some(t)),
+            Instant::Crossing { from, .. } => at(from.as_ref()),
+        };
+        match self {
+            Self::Over(_, _, Window { from, .. }) => from.as_ref().map_or(f64::NEG_INFINITY, of),
+            Self::Find { when, .. } | Self::When(when) => of(when),
+            Self::Delay(trig, targ) => of(trig).min(of(targ)),
+            Self::Param(_) => f64::INFINITY,
+        }
+    }
+
     /// The same measurement over other expressions; `None` as soon as `f` gives none.
     pub fn map<'a, F>(
         &'a self,
@@ -132,15 +148,15 @@ pub struct Found {
     pub at: Vec<(&'static str, f64)>,
 }
 
-/// The values of an expression at the output times, or why there are none.
-pub(super) type Values<'a> = Result<Cow<'a, [f64]>, MeasureError>;
+/// The waveform of an expression, less that of another one.
+type Waveform<'a, E> = dyn Fn(&E, Option<&E>) -> Result<Trace<'a>, MeasureError> + 'a;
 
 /// A run as measurements see it.
 pub struct Scene<'a, E> {
-    /// Output times, s, nondecreasing.
-    pub time: &'a [f64],
-    /// The values of an expression at these times.
-    pub trace: &'a dyn Fn(&E) -> Values<'a>,
+    /// Where it begins and ends, s.
+    pub span: (f64, f64),
+    /// The waveform of an expression, less that of another one.
+    pub trace: &'a Waveform<'a, E>,
     /// The value of an expression without signals.
     pub number: &'a dyn Fn(&E) -> Result<f64, MeasureError>,
 }
@@ -153,23 +169,21 @@ impl<E> Scene<'_, E> {
     pub fn measure(&self, what: &Measurement<E>) -> Result<Found, MeasureError> {
         let found = match what {
             Measurement::Over(over, of, window) => {
-                let values = (self.trace)(of)?;
-                let start = self.time.first().copied().unwrap_or(0.0);
-                let stop = self.time.last().copied().unwrap_or(0.0);
+                let trace = (self.trace)(of, None)?;
+                let (start, stop) = self.span;
                 let end = |end: &Option<Instant<E>>, or: f64| {
                     end.as_ref().map_or(Ok(or), |instant| self.when(instant))
                 };
                 let from = end(&window.from, start)?.max(start);
                 let to = end(&window.to, stop)?.min(stop);
                 Found {
-                    value: self.of(&values).over(*over, from, to)?,
+                    value: trace.over(*over, from, to)?,
                     at: vec![("from", from), ("to", to)],
                 }
             }
             Measurement::Find { of, slope, when } => {
-                let values = (self.trace)(of)?;
+                let trace = (self.trace)(of, None)?;
                 let t = self.when(when)?;
-                let trace = self.of(&values);
                 Found {
                     value: if *slope { trace.slope(t) } else { trace.at(t) }?,
                     at: vec![("at", t)],
@@ -198,13 +212,6 @@ impl<E> Scene<'_, E> {
         }
     }
 
-    fn of<'v>(&'v self, values: &'v [f64]) -> Trace<'v> {
-        Trace {
-            time: self.time,
-            values,
-        }
-    }
-
     fn when(&self, instant: &Instant<E>) -> Result<f64, MeasureError> {
         match instant {
             Instant::At(t) => (self.number)(t),
@@ -216,22 +223,17 @@ impl<E> Scene<'_, E> {
                 from,
                 to,
             } => {
-                let (mut values, level) = ((self.trace)(left)?, (self.trace)(right)?);
-                let fixed = level.first().copied();
-                let fixed = fixed.filter(|first| level.iter().all(|l| l == first));
-                if fixed.is_none() {
-                    for (value, level) in values.to_mut().iter_mut().zip(&*level) {
-                        *value -= level;
-                    }
-                }
+                let fixed = (self.trace)(right, None)?.constant();
+                let moving = Some(right).filter(|_| fixed.is_none());
+                let trace = (self.trace)(left, moving)?;
                 let bound = |e: &Option<E>, or: f64| e.as_ref().map_or(Ok(or), self.number);
                 let which = match number {
                     None => Which::Last,
                     Some(e) => Which::Number(count((self.number)(e)?)?),
                 };
-                let within = (bound(from, 0.0)?, bound(to, f64::INFINITY)?);
-                self.of(&values)
-                    .crossing(fixed.unwrap_or(0.0), *edge, which, within)
+                let (start, stop) = self.span;
+                let within = (bound(from, start)?.max(start), bound(to, stop)?.min(stop));
+                trace.crossing(fixed.unwrap_or(0.0), *edge, which, within)
             }
         }
     }
@@ -253,17 +255,22 @@ mod tests {
     /// A ramp 0 → 4 over 4 s, and a triangle 0 → 2 → 0.
     fn measure(what: &Measurement<&'static str>) -> Result<Found, MeasureError> {
         let time = [0.0, 1.0, 2.0, 3.0, 4.0];
-        let trace = |e: &&str| match *e {
-            "ramp" => Ok(time.to_vec().into()),
-            "triangle" => Ok(vec![0.0, 1.0, 2.0, 1.0, 0.0].into()),
-            level => level
-                .parse()
-                .map(|x| vec![x; 5].into())
-                .map_err(|_| MeasureError::NotFinite),
+        let values = |e: &str| match e {
+            "ramp" => Ok(time.to_vec()),
+            "triangle" => Ok(vec![0.0, 1.0, 2.0, 1.0, 0.0]),
+            level => {
+                let level = level.parse().map(|x| vec![x; 5]);
+                level.map_err(|_| MeasureError::NotFinite)
+            }
+        };
+        let trace = |e: &&str, less: Option<&&str>| {
+            let less = values(less.copied().unwrap_or("0"))?;
+            let own = values(e)?.into_iter().zip(less).map(|(a, b)| a - b);
+            Ok(Trace::lines(&time, own.collect::<Vec<_>>()))
         };
         let number = |e: &&str| e.parse().map_err(|_| MeasureError::NotFinite);
         Scene {
-            time: &time,
+            span: (0.0, 4.0),
             trace: &trace,
             number: &number,
         }
@@ -292,6 +299,13 @@ mod tests {
         let average = |w| measure(&Measurement::Over(Over::Average, "ramp", w));
         let whole = average(window(None, Some(Instant::At("9")))).unwrap();
         assert_eq!((whole.value, whole.at[1]), (2.0, ("to", 4.0)));
+        let begins =
+            |w| Measurement::Over(Over::Average, "ramp", w).begins(&|e| e.parse().unwrap());
+        assert_eq!(begins(window(Some(Instant::At("2")), None)), 2.0);
+        assert_eq!(
+            begins(window(None, Some(Instant::At("2")))),
+            f64::NEG_INFINITY
+        );
         // From the triangle's 1.5 on the way up (t = 1.5) to the one on the way down (t = 2.5).
         let from = Some(meets("triangle", "1.5", Edge::Rise, Some("1")));
         let to = Some(meets("triangle", "1.5", Edge::Fall, None));

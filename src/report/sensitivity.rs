@@ -6,8 +6,11 @@ use crate::analysis::{Bound, Gradient, Sensitivity, Worst};
 /// Digits shown.
 const DIGITS: usize = 6;
 
+/// Of the measurement and of what 1 % of the value that counts most changes, what counts as no influence: the rounding of a difference.
+const NO_INFLUENCE: f64 = 1e-9;
+
 impl Sensitivity {
-    /// For each measurement a table of values, derivatives, and what 1 % of a value changes.
+    /// For each measurement a table of values, derivatives, and what 1 % of a value changes, the most first; and what has no influence.
     #[must_use]
     pub fn words(&self) -> String {
         let mut text = String::new();
@@ -19,22 +22,45 @@ impl Sensitivity {
                     continue;
                 }
             }
-            let rows = to
+            let all = to
                 .iter()
                 .zip(&self.at)
                 .map(|((name, derivative), (_, at))| {
+                    let change = derivative.map(|d| 0.01 * d * at);
+                    (name, *at, *derivative, change)
+                });
+            let mut all: Vec<_> = all.collect();
+            // Those without a derivative come first.
+            let size = |change: Option<f64>| change.map_or(f64::INFINITY, f64::abs);
+            all.sort_by(|a, b| size(b.3).total_cmp(&size(a.3)));
+            let changes = all.iter().filter_map(|(.., change)| *change);
+            let own = value.as_ref().map_or(0.0, |value| 0.01 * value.abs());
+            let least = NO_INFLUENCE * changes.fold(own, |m, change| m.max(change.abs()));
+            let counting = all.partition_point(|(.., change)| size(*change) > least);
+            let rows = all[..counting]
+                .iter()
+                .map(|(name, at, derivative, change)| {
                     let cell = |x: f64| si::plain(x, DIGITS);
                     let known = |x: Option<f64>| x.map_or("-".into(), cell);
                     vec![
-                        name.clone(),
+                        (*name).clone(),
                         cell(*at),
                         known(*derivative),
-                        known(derivative.map(|d| 0.01 * d * at)),
+                        known(*change),
                     ]
                 });
             let rows: Vec<Vec<String>> = rows.collect();
-            let header = ["to", "value", "derivative", "by 1 %"];
-            text.push_str(&table::aligned(&header, &rows));
+            if !rows.is_empty() {
+                let header = ["to", "value", "derivative", "by 1 %"];
+                text.push_str(&table::aligned(&header, &rows));
+            }
+            let others: Vec<&str> = all[counting..]
+                .iter()
+                .map(|(name, ..)| name.as_str())
+                .collect();
+            if !others.is_empty() {
+                text.push_str(&format!("no influence: {}\n", others.join(", ")));
+            }
         }
         text
     }

@@ -221,8 +221,7 @@ fn unbalanced(run: &Run) -> Option<Note> {
 #[must_use]
 pub fn ringing(frequency: f64, tstep: f64) -> Note {
     format!(
-        "with its switches where they start, the circuit rings at {}: rows that are {} apart do not show what rings down between them, and `.meas` may miss its \
-         peaks; a print step of {} shows it",
+        "with its switches where they start, the circuit rings at {}: rows that are {} apart do not show what rings down between them; a print step of {} does",
         si::quantity(frequency, "Hz", 3),
         si::quantity(tstep, "s", 3),
         si::quantity(0.1 / frequency, "s", 1),

@@ -9,12 +9,8 @@ use crate::circuit::{Part, states};
 use crate::random::Random;
 use crate::topologies::{Style, plain_case};
 
-/// Derivatives agree to this part of the measurement or of its change with ln p, whichever is larger; those of means to [`OF_MEANS`], as the
-/// differences of means are those of straight lines between rows, which an event passes or does not.
+/// Derivatives agree to this part of the measurement or of its change with ln p, whichever is larger.
 const TOLERANCE: f64 = 1e-6;
-
-/// See [`TOLERANCE`].
-const OF_MEANS: f64 = 1e-5;
 
 /// Differences of two sizes that are this far apart tell nothing: an event changes its order, or rounding shows.
 const KNOWN: f64 = 2e-7;
@@ -27,10 +23,6 @@ const STEPS: [f64; 2] = [4e-5, 1e-5];
 pub(crate) struct Tally {
     pub(crate) compared: usize,
     pub(crate) circuits: usize,
-    /// Further apart than [`TOLERANCE`].
-    pub(crate) beyond: usize,
-    /// Circuits that were compared again with more rows.
-    pub(crate) again: usize,
     /// Where differences tell nothing.
     pub(crate) unknown: usize,
     /// Circuits without a derivative, and why.
@@ -61,44 +53,25 @@ fn difference(model: &Model, name: &str, value: f64, h: f64) -> Option<Vec<Optio
     Some((0..a.len()).map(of).collect())
 }
 
-/// Compares the derivatives of one circuit to some of its elements; where they differ, again with many more rows, which leave less to the straight
-/// lines between them.
+/// Compares the derivatives of one circuit to some of its elements.
 pub(crate) fn compare(seed: u64, tally: &mut Tally) {
-    let mut own = Tally::default();
-    compare_rows(seed, 1, &mut own);
-    if !own.wrong.is_empty() {
-        tally.again += 1;
-        own = Tally::default();
-        compare_rows(seed, 2000, &mut own);
-    }
-    tally.compared += own.compared;
-    tally.circuits += own.circuits;
-    tally.beyond += own.beyond;
-    tally.unknown += own.unknown;
-    tally.refused.append(&mut own.refused);
-    tally.wrong.append(&mut own.wrong);
-}
-
-fn compare_rows(seed: u64, rows: usize, tally: &mut Tally) {
     let mut random = Random::new(seed ^ 0x5e45);
     let style = if seed.is_multiple_of(2) {
         Style::Ideal
     } else {
         Style::Finite
     };
-    let mut case = plain_case(seed, style);
-    case.circuit.rows *= rows;
+    let case = plain_case(seed, style);
     let circuit = &case.circuit;
     let signals = states(circuit);
     let mut text = circuit.text();
     let end = text.rfind(".end").unwrap_or(text.len());
     text.truncate(end);
     for (k, signal) in signals.iter().take(3).enumerate() {
-        // Of a row: between rows measurements see straight lines.
-        let at = 15.0 / 19.0 * circuit.stop;
+        let at = 0.79 * circuit.stop;
         text += &format!(
             ".meas tran a{k} avg {signal}\n.meas tran r{k} rms {signal}\n\
-             .meas tran f{k} find {signal} at={at:e}\n"
+             .meas tran f{k} find {signal} at={at:e}\n.meas tran p{k} pp {signal}\n"
         );
     }
     text += ".end\n";
@@ -157,9 +130,7 @@ fn compare_rows(seed: u64, rows: usize, tally: &mut Tally) {
             }
             tally.compared += 1;
             let apart = (own - a).abs() / size;
-            tally.beyond += usize::from(apart > TOLERANCE);
-            let mean = !gradient.name.starts_with('f');
-            if apart > if mean { OF_MEANS } else { TOLERANCE } {
+            if apart > TOLERANCE {
                 tally.wrong.push(format!(
                     "{seed} {}: {} to {name}: {own:e}, but {a:e} and {b:e} by differences",
                     case.stage, gradient.name

@@ -9,10 +9,7 @@ use super::run;
 
 fn average(run: &Run, probe: &str, from: f64, to: f64) -> f64 {
     let values: Vec<f64> = super::runs::column(run, probe);
-    let trace = Trace {
-        time: &run.waveforms.time,
-        values: &values,
-    };
+    let trace = Trace::lines(&run.waveforms.time, values);
     trace.over(Over::Average, from, to).unwrap()
 }
 

@@ -66,40 +66,7 @@ pub struct PeriodicOptions<'a> {
 /// # Ok::<(), circ::Error>(())
 /// ```
 pub fn periodic(model: &Model, options: &PeriodicOptions<'_>) -> Result<(Orbit, Run), Error> {
-    on_grid(model, options, |tran| tran)
-}
-
-/// As [`periodic`], on the grid that `grid` makes of that of the period.
-pub(super) fn on_grid(
-    model: &Model,
-    options: &PeriodicOptions<'_>,
-    grid: impl FnOnce(Tran) -> Tran,
-) -> Result<(Orbit, Run), Error> {
-    let mut steady = steady(model, options)?;
-    let standing = steady.standing()?;
-    let Steady {
-        circuit,
-        multiport,
-        held,
-        simulation,
-        found,
-        apart,
-    } = steady;
-    let (names, orbit) = (simulation.state_names(), found.orbit());
-    let mut run = rows(
-        (&circuit, &multiport),
-        standing,
-        orbit.period,
-        options,
-        grid,
-    )?;
-    if !simulation.is_exact() {
-        for error in [&mut run.error.max, &mut run.error.rms] {
-            *error = error.zip(apart).map(|(error, apart)| error.max(apart));
-        }
-    }
-    run.notes.extend(notes(&orbit, &found.fixed, names, &held));
-    Ok((orbit, run))
+    steady(model, options)?.on_grid(options, |tran| tran)
 }
 
 /// The orbit of [`periodic`], and where a transient begins that starts on it at t = 0, with sources that do not repeat running from there on.
@@ -134,6 +101,38 @@ impl Steady {
         self.found.orbit()
     }
 
+    /// The orbit, and one period of it on the grid that `grid` makes of that of the period.
+    pub(super) fn on_grid(
+        mut self,
+        options: &PeriodicOptions<'_>,
+        grid: impl FnOnce(Tran) -> Tran,
+    ) -> Result<(Orbit, Run), Error> {
+        let standing = self.standing()?;
+        let Self {
+            circuit,
+            multiport,
+            held,
+            simulation,
+            found,
+            apart,
+        } = self;
+        let (names, orbit) = (simulation.state_names(), found.orbit());
+        let mut run = rows(
+            (&circuit, &multiport),
+            standing,
+            orbit.period,
+            options,
+            grid,
+        )?;
+        if !simulation.is_exact() {
+            for error in [&mut run.error.max, &mut run.error.rms] {
+                *error = error.zip(apart).map(|(error, apart)| error.max(apart));
+            }
+        }
+        run.notes.extend(notes(&orbit, &found.fixed, names, &held));
+        Ok((orbit, run))
+    }
+
     /// Where the orbit begins, with what conducts there.
     fn standing(&mut self) -> Result<Standing, Error> {
         let (stand, from) = (&self.found.fixed.stand, self.found.from);
@@ -155,7 +154,7 @@ impl Steady {
         let (stand, from) = (&self.found.fixed.stand, self.found.from);
         let place = (from, &stand.state[..], &stand.switches[..]);
         let until = from + self.found.orbit().period;
-        let course = Course::of(&mut self.simulation, place, until)?;
+        let course = Course::of(&mut self.simulation, place, until, None)?;
         Ok(course.map(|course| (course, from)))
     }
 

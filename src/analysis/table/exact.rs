@@ -34,11 +34,8 @@ pub(super) fn sums(
     period: Option<f64>,
 ) -> Result<Sums, Error> {
     let (count, elements) = (columns.probes.len(), columns.elements.len());
-    // The last whole periods.
-    let whole = period.map(|period| {
-        let laps = ((span.to - span.from) / period * (1.0 + f64::EPSILON.sqrt())).floor();
-        (span.to - laps * period).max(span.from)
-    });
+    // The last period: in those before it a circuit may still settle.
+    let whole = period.map(|period| (span.to - period).max(span.from));
     let omega = period.map(|period| TAU / period);
     let mut all = Account::of(count, elements);
     let mut periods = Account::of(count, 0);

@@ -15,7 +15,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::analysis::variation::{Motion, times};
 use crate::integrate::Error;
-use crate::integrate::exact::{NODES, POINTS, WEIGHTS};
+use crate::linalg::gauss::{NODES, POINTS, WEIGHTS};
 use crate::settings::tolerances::exponentials::SERIES;
 
 /// The integrals of w over a stretch.

@@ -11,13 +11,11 @@ use std::sync::atomic::AtomicBool;
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
-use super::periodic::{PeriodicOptions, common_period, on_grid, steady};
-use super::start::beginning;
+use super::periodic::{PeriodicOptions, common_period, steady};
+use super::start::{beginning, course};
 use super::variation::Course;
-use crate::circuit::{Circuit, Element, Kind, NodeId, Probe, Probed, Tran};
-use crate::integrate::{
-    Error, Method, Note, Reason, Run, SimOptions, Simulation, SimulationOptions, Standing,
-};
+use crate::circuit::{Circuit, Element, Kind, NodeId, Probe, Probed, Tran, wholes};
+use crate::integrate::{Error, Method, Note, Reason, Run, SimOptions, Standing};
 use crate::model::Model;
 use crate::settings::Settings;
 use crate::settings::tolerances::periodic::{FUNDAMENTAL, STORED};
@@ -66,8 +64,8 @@ pub struct SignalMeans {
     pub value: Mean,
     /// Greatest minus least value.
     pub ripple: f64,
-    /// √(Y_rms² − mean² − Y₁²)/Y₁ with Y₁ the root mean square of its part at the frequency at which the circuit repeats, over its last whole
-    /// periods; none where it does not repeat or has no such part.
+    /// √(Y_rms² − mean² − Y₁²)/Y₁ with Y₁ the root mean square of its part at the frequency at which the circuit repeats, over its last
+    /// period; none where it does not repeat or has no such part.
     pub thd: Option<f64>,
 }
 
@@ -219,24 +217,8 @@ pub fn table(model: &Model, options: &TableOptions<'_>) -> Result<Table, Error> 
         to: tran.tstop,
     };
     let period = common_period(model.circuit()).filter(|period| *period <= span.to - span.from);
-    if matches!(options.method, Method::Auto | Method::Exact) {
-        let simulation = SimulationOptions {
-            method: options.method,
-            settings: options.settings.clone(),
-            ..SimulationOptions::default()
-        };
-        let (circuit, multiport) = (probing.circuit(), probing.multiport());
-        let mut simulation = Simulation::closed(circuit, multiport, simulation)?;
-        if simulation.is_exact() {
-            let (t, state, switches) = match &start {
-                Some(start) => (start.t, start.state.clone(), start.switches.clone()),
-                None => (0.0, simulation.state(), simulation.positions()),
-            };
-            let place = (t, &state[..], &switches[..]);
-            if let Some(course) = Course::of(&mut simulation, place, tran.tstop)? {
-                return columns.exact(&course, span, period);
-            }
-        }
+    if let Some(course) = course(&probing, options.method, start.as_ref(), tran.tstop, asked)? {
+        return columns.exact(&course, span, period);
     }
     let rows = |tran: Tran| {
         if options.step.is_none() {
@@ -294,7 +276,7 @@ pub fn periodic_table(
         corners: true,
         ..options.clone()
     };
-    let (orbit, run) = on_grid(&probing, &options, finer)?;
+    let (orbit, run) = found.on_grid(&options, finer)?;
     let span = Span {
         from: 0.0,
         to: orbit.period,
@@ -333,7 +315,7 @@ struct Sums {
     greatest: Vec<f64>,
     /// Of v i, by element.
     work: Vec<f64>,
-    /// Over the last whole periods, by signal shown.
+    /// Over the last period, by signal shown.
     distortion: Vec<Option<f64>>,
 }
 
@@ -402,10 +384,8 @@ impl<'a> Columns<'a> {
         let known: BTreeMap<&str, usize> = names.clone().enumerate().map(|(k, n)| (n, k)).collect();
         let mut parts = vec![Vec::new(); known.len()];
         for (part, name) in names.enumerate() {
-            for (dot, _) in name.match_indices('.') {
-                if let Some(whole) = known.get(&name[..dot]) {
-                    parts[*whole].push(part);
-                }
+            for whole in wholes(name).filter_map(|whole| known.get(whole)) {
+                parts[*whole].push(part);
             }
         }
         parts

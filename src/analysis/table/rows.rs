@@ -18,10 +18,7 @@ pub(super) fn sums(columns: &Columns<'_>, run: &Run, span: Span, period: Option<
         work: vec![0.0; columns.elements.len()],
         distortion: vec![None; columns.shown.len()],
     };
-    let laps = period.map_or(0.0, |period| {
-        ((span.to - span.from) / period * (1.0 + f64::EPSILON.sqrt())).floor()
-    });
-    let seconds = period.map_or(0.0, |period| laps * period);
+    let seconds = period.unwrap_or(0.0);
     let whole = (span.to - seconds).max(span.from);
     let mut parts = vec![(0.0, 0.0, Complex::<f64>::default()); count];
     let mut rows = waves.time.iter().zip(waves.values.chunks_exact(count));

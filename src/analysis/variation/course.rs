@@ -1,5 +1,7 @@
 //! A run that is exact throughout, as stretches in one mode and on one piece of every source.
 
+use std::sync::atomic::AtomicBool;
+
 use nalgebra::DVector;
 
 use super::instant::Inputs;
@@ -46,7 +48,7 @@ pub(crate) struct Course {
 }
 
 impl Course {
-    /// The run of a simulation from a place, as for [`Simulation::stand_at`], until a time; `None` where steps are made in it.
+    /// The run of a simulation from a place, as for [`Simulation::stand_at`], until a time or until `cancel` is set; `None` where steps are made in it.
     ///
     /// # Errors
     /// The simulation's.
@@ -54,9 +56,10 @@ impl Course {
         simulation: &mut Simulation,
         place: (f64, &[f64], &[bool]),
         until: f64,
+        cancel: Option<&AtomicBool>,
     ) -> Result<Option<Self>, Error> {
         let (from, told) = (place.0, simulation.impulses().len());
-        let Some(passages) = simulation.passages(place, until)? else {
+        let Some(passages) = simulation.passages(place, until, cancel)? else {
             return Ok(None);
         };
         let mut course = Self::default();

@@ -4,25 +4,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::moved::Sample;
 use super::not_smooth;
 use crate::integrate::Error;
+use crate::integrate::exact::Spectrum;
 use crate::linalg::expm::Ladders;
 use crate::settings::tolerances::exponentials::SQUARED;
-
-/// A row of a run, and how it moves with ln p.
-#[derive(Debug, Clone)]
-pub(crate) struct Shifted {
-    /// Whether it is one side of an event.
-    pub(crate) event: bool,
-    /// Time, s, and its derivative.
-    pub(crate) t: f64,
-    pub(crate) dt: f64,
-    /// The outputs, and their derivatives at the time that moves.
-    pub(crate) y: DVector<f64>,
-    pub(crate) dy: DVector<f64>,
-    /// Rates of the outputs where the time moves, else empty.
-    pub(crate) rate: DVector<f64>,
-}
 
 /// What the sources are to an equation.
 #[derive(Debug, PartialEq)]
@@ -43,6 +30,7 @@ pub(super) struct Flow {
     generator: DMatrix<f64>,
     /// y and δy over w.
     rows: [DMatrix<f64>; 2],
+    pub(super) spectrum: Spectrum,
     /// exp(𝒢 t) − 1 by t, s; the oldest first.
     steps: Vec<(f64, DMatrix<f64>)>,
 }
@@ -62,7 +50,7 @@ impl Flows {
         &mut self,
         system: usize,
         sources: Sources,
-        equation: impl FnOnce(&Sources) -> (DMatrix<f64>, [DMatrix<f64>; 2]),
+        equation: impl FnOnce(&Sources) -> (DMatrix<f64>, [DMatrix<f64>; 2], Spectrum),
     ) -> usize {
         let known = |flow: &Flow| flow.system == system && flow.sources == sources;
         if let Some(at) = self.0.iter().position(known) {
@@ -71,12 +59,13 @@ impl Flows {
         if self.0.len() == Self::MOST {
             self.0.remove(0);
         }
-        let (generator, rows) = equation(&sources);
+        let (generator, rows, spectrum) = equation(&sources);
         self.0.push(Flow {
             system,
             sources,
             generator,
             rows,
+            spectrum,
             steps: Vec::new(),
         });
         self.0.len() - 1
@@ -88,23 +77,21 @@ impl Flows {
 }
 
 impl Flow {
-    /// Takes w from one time to another, s.
+    /// Takes w so many seconds further, with what is known for a time that differs by no more than `same`, s.
     ///
     /// # Errors
     /// [`Reason::NotSmooth`](crate::integrate::Reason::NotSmooth) where the exponential does not exist in doubles.
     pub(super) fn advance(
         &mut self,
         w: &mut DVector<f64>,
-        (t, to): (f64, f64),
+        seconds: f64,
+        same: f64,
     ) -> Result<(), Error> {
-        let seconds = to - t;
-        // Differences of times are known no better.
-        let slack = 4.0 * f64::EPSILON * to.abs();
-        let near = |(known, _): &(f64, DMatrix<f64>)| (known - seconds).abs() <= slack;
+        let near = |(known, _): &(f64, DMatrix<f64>)| (known - seconds).abs() <= same;
         let at = match self.steps.iter().position(near) {
             Some(at) => at,
             None => {
-                let step = self.step(t, seconds)?;
+                let step = self.step(seconds)?;
                 if self.steps.len() * step.len() >= Flows::KEPT {
                     self.steps.remove(0);
                 }
@@ -117,29 +104,22 @@ impl Flow {
     }
 
     /// exp(𝒢 t) − 1.
-    fn step(&self, t: f64, seconds: f64) -> Result<DMatrix<f64>, Error> {
+    fn step(&self, seconds: f64) -> Result<DMatrix<f64>, Error> {
         let dim = self.generator.nrows();
         let increment = Ladders::new(&self.generator, &[], seconds, SQUARED, 0).increment(0);
-        let increment = increment
-            .ok_or_else(|| not_smooth(t, "the exponential of a mode does not exist in doubles"))?;
+        let increment = increment.ok_or_else(|| {
+            not_smooth(0.0, "the exponential of a mode does not exist in doubles")
+        })?;
         Ok(DMatrix::from_fn(dim, dim, |i, j| increment.column(j)[i]))
     }
 
-    /// The row at w, whose time moves by dt.
-    pub(super) fn row(&self, w: &DVector<f64>, (t, dt): (f64, f64), event: bool) -> Shifted {
+    /// What is seen at w.
+    pub(super) fn sample(&self, w: &DVector<f64>) -> Sample {
         let [y, dy] = self.rows.each_ref().map(|rows| rows * w);
-        let rate = if dt == 0.0 {
-            DVector::zeros(y.len())
-        } else {
-            &self.rows[0] * (&self.generator * w)
-        };
-        Shifted {
-            event,
-            t,
-            dt,
-            dy: dy + &rate * dt,
+        Sample {
             y,
-            rate,
+            dy,
+            rate: &self.rows[0] * (&self.generator * w),
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::integrate::Error;
 use crate::integrate::exact::{Exosystem, Shape, Spectrum, over_w};
 use crate::linalg::decouple::{Decoupled, decoupled};
 use crate::linalg::expm::Ladders;
-use crate::settings::tolerances::exponentials::{SERIES, SQUARED};
+use crate::settings::tolerances::exponentials::{CURVED, SERIES, SQUARED};
 
 /// w' = 𝒜 w, in the basis in which fast states owe nothing to the others.
 #[derive(Debug, Clone)]
@@ -34,6 +34,15 @@ pub(crate) struct Motion<'a> {
     steps: Vec<Option<DMatrix<f64>>>,
     /// Halvings after which Taylor's series holds.
     pub(crate) bottom: u32,
+}
+
+/// How often `unit` is halved for a step of a piece, s, at an age in a mode of which so many seconds are left: steps double with the age and resolve what still
+/// turns, as those of the integrator do. No shorter than what is left, where that is allowed.
+pub(crate) fn halvings(spectrum: &Spectrum, unit: f64, (age, left): (f64, f64)) -> u32 {
+    let limit = CURVED * spectrum.step_limit(age);
+    let level = (unit / limit.min(left)).log2().floor().max(0.0);
+    let beyond = unit * (-level).exp2() > limit;
+    level as u32 + u32::from(beyond)
 }
 
 impl Linear {

@@ -12,6 +12,7 @@ mod course;
 mod flow;
 mod instant;
 mod linear;
+mod moved;
 mod parameter;
 mod saltation;
 mod system;
@@ -26,9 +27,9 @@ use crate::settings::tolerances::jumps::FOLLOWS_JUMP;
 use crate::settings::tolerances::times::SAME_TIME;
 
 pub(crate) use course::{Course, Leap};
-pub(crate) use flow::Shifted;
 use instant::Inputs;
-pub(crate) use linear::{Linear, Motion};
+pub(crate) use linear::{Linear, Motion, halvings};
+pub(crate) use moved::Sight;
 pub(crate) use parameter::{Near, Parameter, STEPS};
 use saltation::Side;
 pub(crate) use saltation::{Saltation, Timing, times};
@@ -101,7 +102,7 @@ impl Trajectory {
         by_chance: bool,
     ) -> Result<Self, Error> {
         let from = place.0;
-        let passages = simulation.passages(place, until)?;
+        let passages = simulation.passages(place, until, None)?;
         let passages = passages.ok_or_else(|| {
             let what = "steps are made in it, and their derivative is not known";
             not_smooth(from, what)

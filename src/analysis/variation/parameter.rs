@@ -11,17 +11,21 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::flow::{Flows, Shifted, Sources};
+use super::flow::{Flow, Flows, Sources};
 use super::instant::Inputs;
+use super::linear::halvings;
+use super::moved::{Moved, Sight};
 use super::saltation::{Side, Timing};
 use super::{Saltation, System, Trajectory, not_smooth, shaped};
 use crate::circuit::Source;
 use crate::circuit::source::Piece;
-use crate::integrate::exact::{Assembler, Exosystem, Shape};
+use crate::integrate::exact::{Assembler, Exosystem, Shape, Spectrum};
 use crate::integrate::switching::Threshold;
 use crate::integrate::{Error, Simulation};
+use crate::measure::INTERVALS;
 use crate::settings::tolerances::events::SAME_TIMING;
 use crate::settings::tolerances::periodic::VALUE_STEP;
+use crate::settings::tolerances::times::SAME_LENGTH;
 
 /// The circuits that are compared, in steps of p h.
 pub(crate) const STEPS: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
@@ -152,6 +156,35 @@ pub(crate) struct Parameter<'a> {
     forms: Vec<Forms>,
 }
 
+/// Sees a segment from w on; whether that is all of it.
+fn see(
+    flow: &mut Flow,
+    (begin, seconds): (f64, f64),
+    w: &DVector<f64>,
+    sight: Sight,
+    (segment, moved): (usize, &mut Moved),
+) -> Result<bool, Error> {
+    let (mut w, mut age) = (w.clone(), (sight.from - begin).max(0.0));
+    if age > 0.0 {
+        flow.advance(&mut w, age, 0.0)?;
+    }
+    while age < seconds {
+        if moved.values() > sight.most {
+            return Ok(false);
+        }
+        let level = halvings(&flow.spectrum, sight.unit, (age, seconds - age));
+        let step = sight.unit * (-f64::from(level)).exp2();
+        let mut samples = vec![flow.sample(&w)];
+        for _ in 0..INTERVALS {
+            flow.advance(&mut w, step / INTERVALS as f64, 0.0)?;
+            samples.push(flow.sample(&w));
+        }
+        moved.push(segment, (begin, seconds), (age, step), &samples);
+        age += step;
+    }
+    Ok(true)
+}
+
 impl<'a> Parameter<'a> {
     pub(crate) fn of(trajectory: &'a Trajectory, near: &'a [Near; 4]) -> Result<Self, Error> {
         let mut walk = Walk::of(trajectory, near)?;
@@ -245,7 +278,9 @@ impl<'a> Parameter<'a> {
             generator: exosystem.generator().clone(),
         };
         let at = flows.place(segment.system, sources, |sources| {
-            self.equation(segment.system, sources)
+            let (generator, rows) = self.equation(segment.system, sources);
+            let a = &self.trajectory.systems[segment.system].lcs.a;
+            (generator, rows, Spectrum::new(a, exosystem.rates()))
         });
         let mut w = DVector::zeros(2 * n + dz);
         w.rows_mut(0, n).copy_from(&segment.start);
@@ -310,43 +345,44 @@ impl<'a> Parameter<'a> {
         (generator, rows)
     }
 
-    /// Goes along the trajectory from δs: its rows at both sides of events and at these times, in order, and δs at the end.
+    /// Goes along the trajectory from δs: what is seen of it, and δs at the end. Nothing where that takes too many values.
+    ///
+    /// # Errors
+    /// The derivative does not exist.
     pub(crate) fn along(
         &self,
         ds: &DVector<f64>,
-        times: &[f64],
-    ) -> Result<(Vec<Shifted>, DVector<f64>), Error> {
+        sight: Option<Sight>,
+    ) -> Result<Option<(Moved, DVector<f64>)>, Error> {
         let segments = &self.trajectory.segments;
-        let mut rows = Vec::with_capacity(times.len() + 2 * segments.len());
-        let (mut dx, mut dt) = (self.start(ds), 0.0);
+        let outputs = self.trajectory.systems.first();
+        let mut moved = Moved::of(outputs.map_or(0, |system| system.lcs.outputs.names.len()));
+        let mut dx = self.start(ds);
+        let (mut lengths, mut ends) = (Vec::new(), vec![0.0]);
         let mut flows = Flows::default();
-        let mut next = 0;
         for (k, segment) in segments.iter().enumerate() {
             let (at, mut w) = self.enter(&mut flows, k, &dx);
             let flow = flows.at(at);
-            let mut t = segment.from;
-            rows.push(flow.row(&w, (t, dt), true));
-            while let Some(&time) = times.get(next).filter(|time| **time < segment.to) {
-                next += 1;
-                if time > t {
-                    flow.advance(&mut w, (t, time))?;
-                    t = time;
-                    rows.push(flow.row(&w, (t, 0.0), false));
-                }
+            let seconds = segment.to - segment.from;
+            lengths.push(seconds);
+            if let Some(sight) = sight.filter(|sight| segment.to > sight.from)
+                && !see(flow, (segment.from, seconds), &w, sight, (k, &mut moved))?
+            {
+                return Ok(None);
             }
-            if segment.to > t {
-                flow.advance(&mut w, (t, segment.to))?;
-            }
+            flow.advance(&mut w, seconds, SAME_LENGTH * segment.to.abs())?;
             dx = w.rows(w.len() - dx.len(), dx.len()).into_owned();
             let Some(saltation) = self.trajectory.saltations.get(k) else {
-                rows.push(flow.row(&w, (segment.to, 0.0), false));
-                return Ok((rows, self.end(&dx)));
+                ends.push(0.0);
+                dx = self.end(&dx);
+                break;
             };
-            dt = self.shift(k, saltation, &dx)?;
-            rows.push(flow.row(&w, (segment.to, dt), true));
+            let dt = self.shift(k, saltation, &dx)?;
+            ends.push(dt);
             dx = self.passed(k, saltation, &dx, dt);
         }
-        Ok((rows, ds.clone()))
+        moved.stretch(&lengths, &ends);
+        Ok(Some((moved, dx)))
     }
 
     /// δt of the event after segment k.

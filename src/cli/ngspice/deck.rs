@@ -98,9 +98,10 @@ pub fn deck(circuit: &Circuit, options: &Options) -> Result<Deck, DeckError> {
     for line in &circuit.lines {
         writer.transmission_line(line);
     }
-    for k in &circuit.couplings {
+    for (number, k) in circuit.couplings.iter().enumerate() {
         let (a, b) = (writer.card('l', k.a), writer.card('l', k.b));
-        writer.line(format!("k{} {a} {b} {:e}", k.name, k.k.f64));
+        // A card that couples several windings is as many here.
+        writer.line(format!("k{number}_{} {a} {b} {:e}", k.name, k.k.f64));
     }
     let probes: Vec<_> = circuit
         .probes()
@@ -482,6 +483,10 @@ impl Writer<'_> {
                 self.notes
                     .insert("an `.ic` between two nodes is left out".into());
             }
+        }
+        if !self.circuit.initial_currents.is_empty() && !self.tran.uic {
+            self.notes
+                .insert("currents of `.ic` are left out: ngspice has them with `uic` alone".into());
         }
         let Tran {
             tstep,

@@ -91,7 +91,7 @@ pub(super) const CODES: [Explanation; 28] = [
         "ic-without-uic",
         "`IC=` of an element has no effect, as the run starts from the operating point.",
         "`uic` is missing on `.tran`.",
-        "Add `uic`, or set node voltages with `.ic`.",
+        "Add `uic`, or set node voltages and inductor currents with `.ic`.",
     )
     .shown("ic\nv1 a 0 1\nr1 a b 1k\nc1 b 0 1u ic=5\n.tran 1m 5m\n"),
     Explanation::of(

@@ -9,6 +9,7 @@ use nalgebra::DMatrix;
 
 use crate::linalg::dense::Dense;
 use crate::linalg::expm::{self, Ladders};
+use crate::linalg::gauss::{NODES, POINTS, WEIGHTS};
 use crate::linalg::kernel::Kernel;
 use crate::linalg::quadratic::Quadratics;
 use crate::linalg::series::Series;
@@ -19,32 +20,6 @@ use crate::settings::tolerances::exponentials::{
 
 /// Terms of the series over a step with ‖𝒜‖ h ≤ [`SERIES`]; (2·0.125)^k/k! is below rounding beyond, in every entry: their sizes are not comparable.
 const TERMS: usize = 15;
-
-/// Points of the rule below.
-pub(crate) const POINTS: usize = 8;
-/// Nodes and weights of the rule of Gauss and Legendre on [0, 1] with eight points. Where Taylor's series is exact to rounding its
-/// coefficients fall like those of an exponential, so that half the points that a product of two such polynomials takes in general
-/// integrate it to rounding.
-pub(crate) const NODES: [f64; POINTS] = [
-    0.019855071751231884,
-    0.10166676129318664,
-    0.2372337950418355,
-    0.4082826787521751,
-    0.591717321247825,
-    0.7627662049581645,
-    0.8983332387068134,
-    0.9801449282487681,
-];
-pub(crate) const WEIGHTS: [f64; POINTS] = [
-    0.05061426814518813,
-    0.11119051722668724,
-    0.15685332293894363,
-    0.181341891689181,
-    0.181341891689181,
-    0.15685332293894363,
-    0.11119051722668724,
-    0.05061426814518813,
-];
 
 /// Matrices that the forms need besides those over steps.
 const OF_FORMS: usize = 16;

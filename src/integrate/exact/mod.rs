@@ -35,7 +35,6 @@ pub(super) mod tests;
 
 pub use assembler::Assembler;
 pub(crate) use assembler::{Step, steps_of};
-pub(crate) use energy_integral::{NODES, POINTS, WEIGHTS};
 pub(crate) use exosystem::{Exosystem, Shape};
 pub(crate) use key::{Key, Owner};
 pub(crate) use mode::over_w;

@@ -1,6 +1,7 @@
 //! What the derivative of the flow needs to know of a run.
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use super::Simulation;
 use super::way::Way;
@@ -10,7 +11,7 @@ use crate::integrate::stats::Impulse;
 
 impl Simulation {
     /// The changes of mode on the way from a place, as for [`Self::stand_at`], to time `until`, s: the first is the one into the mode there.
-    /// `None` where the way is not exact throughout.
+    /// `None` where the way is not exact throughout. It ends when `cancel` is set.
     ///
     /// # Errors
     /// As [`Self::advance_to`].
@@ -18,13 +19,14 @@ impl Simulation {
         &mut self,
         (t, state, switches): (f64, &[f64], &[bool]),
         until: f64,
+        cancel: Option<&AtomicBool>,
     ) -> Result<Option<Vec<Passage>>, Error> {
         let Way::Exact(exact) = &mut self.way else {
             return Ok(None);
         };
         exact.keep_passages();
         self.stand_at(t, state, switches)?;
-        self.advance_to(until)?;
+        self.advance(until, false, cancel)?;
         let passages = match &mut self.way {
             Way::Exact(exact) => exact.take_passages(),
             Way::Steps(_) => None,

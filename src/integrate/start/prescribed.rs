@@ -1,4 +1,4 @@
-//! Voltages that a netlist prescribes for the operating point: held by a source, or guessed where something drives the node.
+//! What a netlist prescribes for the operating point: voltages held by a source, or guessed where something drives the node, and currents of inductors.
 
 use super::statics::source;
 use crate::circuit::{Circuit, Element, Kind, NodeId, Output, Quantity, Source};
@@ -9,10 +9,18 @@ use crate::settings::tolerances::jumps::CONSISTENT;
 /// v(a) − v(b), V.
 pub(super) type Voltage = (NodeId, NodeId, f64);
 
+/// What sources hold.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Held {
+    pub(super) voltages: Vec<Voltage>,
+    /// Of inductors, as places among the elements: A.
+    pub(super) currents: Vec<(usize, f64)>,
+}
+
 /// What `.ic` and `.nodeset` ask for.
 pub(super) struct Prescribed {
     /// Held by sources.
-    pub(super) held: Vec<Voltage>,
+    pub(super) held: Held,
     /// Looked for: sources drive these nodes already.
     pub(super) guesses: Vec<Guess>,
 }
@@ -50,8 +58,14 @@ impl Prescribed {
                 guesses.push(guess);
             }
         }
+        let currents = circuit.initial_currents.iter().filter(|_| hold_ic);
         Self {
-            held: held.into_iter().copied().collect(),
+            held: Held {
+                voltages: held.into_iter().copied().collect(),
+                currents: currents
+                    .map(|(id, amperes)| (id.index(), *amperes))
+                    .collect(),
+            },
             guesses,
         }
     }
@@ -120,23 +134,39 @@ pub(super) fn hold_voltages(held: &[Voltage], statics: &mut Circuit) {
     }
 }
 
+/// Puts a source of its current in series with every inductor whose current is held.
+pub(super) fn hold_currents(currents: &[(usize, f64)], statics: &mut Circuit) {
+    for &(k, amperes) in currents {
+        in_series(k, amperes, statics);
+    }
+}
+
+fn in_series(k: usize, amperes: f64, statics: &mut Circuit) {
+    let node = NodeId(statics.nodes.len() as u32);
+    let name = format!("series:{}", statics.elements[k].name);
+    statics.nodes.push(name.clone());
+    let end = std::mem::replace(&mut statics.elements[k].n, node);
+    statics.elements.push(Element {
+        kind: Kind::CurrentSource(Source::constant(amperes)),
+        ..source(name, node, end, 0.0)
+    });
+}
+
 /// Takes the current from every inductor that would share it with a source which holds a voltage: the source has it all, as in
 /// ngspice, so that it ends with the source. Returns these inductors.
-pub(super) fn open_inductors(
-    circuit: &Circuit,
-    held: &[Voltage],
-    statics: &mut Circuit,
-) -> Vec<usize> {
-    if held.is_empty() {
+pub(super) fn open_inductors(circuit: &Circuit, held: &Held, statics: &mut Circuit) -> Vec<usize> {
+    if held.voltages.is_empty() {
         return Vec::new();
     }
+    let is_given = |k: usize| held.currents.iter().any(|current| current.0 == k);
+    let held = &held.voltages[..];
     let mut without = driven(circuit);
     let mut with = without.clone();
     for &(a, b, _) in held {
         join(&mut with, a, b);
     }
     let elements = circuit.elements.iter().enumerate();
-    let inductors = elements.filter(|(_, e)| matches!(e.kind, Kind::Inductor(_)));
+    let inductors = elements.filter(|(k, e)| matches!(e.kind, Kind::Inductor(_)) && !is_given(*k));
     // Of several in one loop those at the held nodes.
     let is_held =
         |node: NodeId| node != NodeId::GROUND && held.iter().any(|h| h.0 == node || h.1 == node);
@@ -151,14 +181,7 @@ pub(super) fn open_inductors(
         }
     }
     for &k in &opened {
-        let node = NodeId(statics.nodes.len() as u32);
-        let name = format!("open:{}", statics.elements[k].name);
-        statics.nodes.push(name.clone());
-        let end = std::mem::replace(&mut statics.elements[k].n, node);
-        statics.elements.push(Element {
-            kind: Kind::CurrentSource(Source::constant(0.0)),
-            ..source(name, node, end, 0.0)
-        });
+        in_series(k, 0.0, statics);
     }
     opened
 }

@@ -69,7 +69,15 @@ pub(crate) const RUN_STEP: f64 = 1e-2;
 /// worse corners unsaid; smaller: notes on slight curvature.
 pub(crate) const NOT_STRAIGHT: f64 = 0.1;
 
-/// How far rows are moved to differentiate what is measured on them, relative to a value. Larger: events pass rows of the grid; smaller: rounding.
+/// A period changes with a value where it does so by more than this part of what the value does. Larger: orbits of another period are taken for one; smaller: rounding of
+/// periods.
+pub(crate) const PERIOD_MOVES: f64 = 1e-3;
+
+/// How far pieces of a run are moved to differentiate what is measured on them, as a part of their lengths and values, and of the value that moves them. Larger:
+/// curvature; smaller: rounding, and corners of expressions that are looked for otherwise on either side.
+pub(crate) const MOVED: f64 = 1e-5;
+
+/// The same relative to the value, at least. Larger: edges that move by their own length; smaller: rounding.
 pub(crate) const MEASURE_STEP: f64 = 3e-7;
 
 /// A run that is made again looks for the event that closed it until this part of its time later. Smaller: where rounding puts it an ulp behind the end it is

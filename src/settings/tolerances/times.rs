@@ -4,6 +4,10 @@
 /// Sums of two or three times carry that. Larger: distinct edges fall together; smaller: steps and pulses of a rounding's length.
 pub(crate) const SAME_TIME: f64 = 8.0 * f64::EPSILON;
 
+/// Two lengths of time are one where they differ by no more than this part of the times between which they lie: their difference is known no better. Larger: an exponential
+/// stands for one that is another; smaller: each is made again.
+pub(crate) const SAME_LENGTH: f64 = 4.0 * f64::EPSILON;
+
 /// The same for what arrives over a line: its time is a sum of a delay and a time that was a sum already. Larger: waves that follow each
 /// other closely arrive as one; smaller: the two sides of a jump are told apart by rounding.
 pub(crate) const ARRIVED: f64 = 16.0 * f64::EPSILON;
@@ -34,6 +38,14 @@ pub(crate) const ROWS_APART: f64 = 1e-2;
 /// The same before rows are computed closer for measurements, once. As straight lines are off by the square of their length, a ninth of it is left out at
 /// most then. Larger: less exact measurements; smaller: a second run and more rows for more circuits.
 pub(crate) const ROWS_CLOSE: f64 = 1e-3;
+
+/// States of a circuit up to which measurements of an exact run see what happens between events and not its rows: the exponentials of its modes cost their cube.
+/// Larger: measurements that take longer than the run; smaller: more measurements on straight lines.
+pub(crate) const MOST_STATES: usize = 32;
+
+/// How far the polynomial of an expression may stand from it where it has no values, over the largest value of the expression. Larger: less exact measurements; smaller:
+/// more pieces about corners of `abs` and the like.
+pub(crate) const CURVE_CLOSE: f64 = 1e-10;
 
 /// How far two rows of one time may be apart, over the largest value of their signal, and be one value. Larger: small jumps are not crossings; smaller: the
 /// rounding of an event on its level is several.
