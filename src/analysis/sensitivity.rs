@@ -233,6 +233,8 @@ struct Base {
     /// Where it begins.
     positions: Vec<bool>,
     sight: Sight,
+    /// s.
+    span: (f64, f64),
     orbit: Option<Orbit>,
 }
 
@@ -293,10 +295,9 @@ impl Beside<'_> {
                 return Ok(None);
             }
             let trajectory = Trajectory::with(&mut simulation, place, tran.tstop, true)?;
-            let last = trajectory.segments.iter().rev().find(|s| s.from < s.to);
-            let last = last.map_or(tran.tstart, |segment| segment.from);
-            let from = circuit.measured_from(tran.tstop).min(last).max(tran.tstart);
-            return Ok(Base::of(trajectory, positions, from, None));
+            let from = circuit.measured_from(tran.tstop);
+            let span = (from.clamp(tran.tstart, tran.tstop), tran.tstop);
+            return Ok(Base::of(trajectory, positions, span, None));
         }
         let mut found = steady(model, &self.periodic())?;
         let orbit = found.orbit();
@@ -312,7 +313,8 @@ impl Beside<'_> {
             // What is left out of many laps is told where they are measured.
             laps: laps(circuit.tran, orbit.period, MOST_VALUES / 1000).0,
         };
-        Ok(Base::of(trajectory, vec![], f64::NEG_INFINITY, Some(orbit)))
+        let always = (f64::NEG_INFINITY, f64::INFINITY);
+        Ok(Base::of(trajectory, vec![], always, Some(orbit)))
     }
 
     /// By the variational equation; `None` where steps are made.
@@ -474,7 +476,7 @@ impl Base {
     fn of(
         trajectory: Trajectory,
         positions: Vec<bool>,
-        from: f64,
+        span: (f64, f64),
         orbit: Option<Orbit>,
     ) -> Option<Self> {
         let impulses = trajectory
@@ -489,8 +491,10 @@ impl Base {
             .segments
             .iter()
             .map(|segment| segment.to - segment.from);
+        // The segment before moves into what is seen.
+        let first = trajectory.segments.iter().rev().find(|segment| segment.to < span.0);
         let sight = Sight {
-            from,
+            from: first.map_or(f64::NEG_INFINITY, |segment| segment.from),
             unit: lengths.fold(0.0, f64::max).log2().ceil().exp2(),
             most: MOST_VALUES,
         };
@@ -498,6 +502,7 @@ impl Base {
             trajectory,
             positions,
             sight,
+            span,
             orbit,
         })
     }
@@ -508,7 +513,7 @@ impl Base {
             period, from, laps, ..
         }) = &self.orbit
         else {
-            return curves;
+            return curves.within(self.span);
         };
         let [begin, end] = [laps.0, laps.1].map(|lap| lap as f64 * period);
         let all = curves.repeated((0, laps.1 - laps.0 + 1), *period, *from + period - begin);

@@ -354,7 +354,12 @@ impl Maker {
                     .map(Owner::Switch),
             );
         }
-        for owner in owners {
+        let causes = owners.len();
+        if self.by_chance {
+            // One that falls through zero with them may rest there afterwards, as a diode beside another one of a ladder does.
+            owners.extend((0..instant[0].to.closed.len()).map(Owner::Device));
+        }
+        for (number, owner) in owners.into_iter().enumerate() {
             let limits = |i| self.assembler.limits(i);
             let guards = before.system.guards(owner, (&self.thresholds, limits));
             for (k, guard) in guards.into_iter().enumerate() {
@@ -362,6 +367,9 @@ impl Maker {
                 let (slope, slopes) = guard.rate(&rate, &before.inputs);
                 // What changes sides as a consequence of another event is not at its level.
                 if value.abs() > AT_LEVEL * (size + slopes * seconds) || slopes == 0.0 {
+                    continue;
+                }
+                if number >= causes && slope >= -GRAZING * slopes {
                     continue;
                 }
                 if slope.abs() <= GRAZING * slopes {

@@ -22,7 +22,7 @@ struct Piece {
 /// Which part of a run is seen, and in which steps.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sight {
-    /// From when on, s.
+    /// Segments that end later, s.
     pub(crate) from: f64,
     /// Steps are halvings of it, s.
     pub(crate) unit: f64,

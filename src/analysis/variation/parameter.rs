@@ -164,10 +164,7 @@ fn see(
     sight: Sight,
     (segment, moved): (usize, &mut Moved),
 ) -> Result<bool, Error> {
-    let (mut w, mut age) = (w.clone(), (sight.from - begin).max(0.0));
-    if age > 0.0 {
-        flow.advance(&mut w, age, 0.0)?;
-    }
+    let (mut w, mut age) = (w.clone(), 0.0);
     while age < seconds {
         if moved.values() > sight.most {
             return Ok(false);
