@@ -492,7 +492,11 @@ impl Base {
             .iter()
             .map(|segment| segment.to - segment.from);
         // The segment before moves into what is seen.
-        let first = trajectory.segments.iter().rev().find(|segment| segment.to < span.0);
+        let first = trajectory
+            .segments
+            .iter()
+            .rev()
+            .find(|segment| segment.to < span.0);
         let sight = Sight {
             from: first.map_or(f64::NEG_INFINITY, |segment| segment.from),
             unit: lengths.fold(0.0, f64::max).log2().ceil().exp2(),
