@@ -11,7 +11,8 @@ use crate::integrate::{Block, Error, Grid, Method, Note, Orbit, RowKind, Run, Si
 use crate::measure::{Curves, Signals};
 use crate::model::Model;
 use crate::settings::tolerances::times::{
-    CROWDED, LAST_ROW, LINES_CLOSE, MOST_STATES, NOTHING, ROWS_A_PERIOD, ROWS_APART, ROWS_CLOSE,
+    CROWDED, LAST_ROW, LINES_CLOSE, MOST_PERIODS, MOST_STATES, NOTHING, ROWS_A_PERIOD, ROWS_APART,
+    ROWS_CLOSE,
 };
 use crate::waveform::Waveforms;
 
@@ -253,7 +254,7 @@ pub fn periodic_measured(
         ..options.clone()
     };
     let mut found = steady(&probing, &options)?;
-    let note = measuring.draw_orbit(&mut found)?;
+    let note = measuring.draw_orbit(&mut found);
     let by_rows = measuring.by_rows();
     let (orbit, mut run) = found.on_grid(&options, |tran| {
         let rows = Grid::of(&tran).len();
@@ -346,7 +347,7 @@ impl<'a> Measuring<'a> {
         options.start = start;
         // What fails here fails in the run, or is measured on its rows.
         self.curves = self.drawn(model, options).ok().flatten();
-        if self.curves.is_some() {
+        if self.curves.is_some() && self.pictured.is_none() {
             self.divisions = 1;
         }
         note
@@ -380,35 +381,29 @@ impl<'a> Measuring<'a> {
     }
 
     /// The same of an orbit, repeated until the end of `.tran`.
-    ///
-    /// # Errors
-    /// The simulation's.
-    fn draw_orbit(&mut self, steady: &mut Steady) -> Result<Option<Note>, Error> {
+    fn draw_orbit(&mut self, steady: &mut Steady) -> Option<Note> {
         let period = steady.orbit().period;
         let outputs = self.circuit.measured.iter().map(|probe| {
             let mut names = steady.simulation.probes().iter();
             names.position(|name| *name == probe.name)
         });
-        let (Some(outputs), false) = (
-            outputs.collect::<Option<Vec<usize>>>(),
-            self.circuit.measured.is_empty(),
-        ) else {
-            return Ok(None);
-        };
-        let Some((course, from)) = steady.course()? else {
-            return Ok(None);
-        };
-        let Some(curves) = curves(&course, &outputs, from, MOST_VALUES)? else {
-            return Ok(None);
-        };
+        let outputs: Vec<usize> = outputs.collect::<Option<_>>()?;
+        if outputs.is_empty() {
+            return None;
+        }
+        let (course, from) = steady.course().ok()??;
+        let curves = curves(&course, &outputs, from, MOST_VALUES).ok()??;
         let (laps, note) = laps(self.circuit.tran, period, curves.values());
         self.curves = Some(curves.repeated(laps, period, from));
-        Ok(note)
+        note
     }
 
-    /// Whether rows cost less than the exponentials of every mode besides those of the run.
+    /// Whether rows cost less than the exponentials of every mode and all changes of mode.
     fn is_large(&self, model: &Model) -> bool {
-        self.circuit.measured.is_empty() || model.multiport().storage.len() > MOST_STATES
+        let seconds = self.tran.map_or(0.0, |tran| tran.tstop);
+        self.circuit.measured.is_empty()
+            || model.multiport().storage.len() > MOST_STATES
+            || seconds / shortest_period(model) > MOST_PERIODS
     }
 
     /// Shows rows between those of the grid, of so many values at most.

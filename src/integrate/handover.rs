@@ -235,11 +235,11 @@ impl Handover {
         self.exact.keep_passages();
     }
 
-    /// The changes of mode since [`Self::keep_passages`], and where the run stood when it was exact throughout; `None` where steps were made
+    /// The changes of mode since [`Self::keep_passages`], and where the run stood when it was exact throughout; `None` where there are too many or steps were made
     /// since.
     pub(crate) fn take_passages(&mut self) -> Option<Vec<Passage>> {
         let passages = self.exact.take_passages();
-        self.stepping.is_none().then_some(passages)
+        passages.filter(|_| self.stepping.is_none())
     }
 
     /// Energy so far.

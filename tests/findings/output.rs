@@ -370,6 +370,15 @@ fn pictures_follow_curves_between_rows() {
         "{} of {right}",
         ripple(&run)
     );
+    // It does where something is measured, too.
+    let measured = buck.replace(".end", ".meas tran m pp v(out) from=19m\n.end");
+    let measured = circ::Model::parse(&measured, "buck.cir").expect("a circuit");
+    let finished = circ::analysis::pictured(&measured, asked());
+    let (pictured, found) = finished.run.expect("a run");
+    let value = found.measured[0].result.as_ref().expect("a value").value;
+    for ripple in [ripple(&pictured), value] {
+        assert!((ripple / right - 1.0).abs() < 0.1, "{ripple} of {right}");
+    }
     let rows = model.transient(asked()).expect("a run");
     assert!(ripple(&rows) < 0.1 * right, "{}", ripple(&rows));
     // Files have the rows that they have without a picture.

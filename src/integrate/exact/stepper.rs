@@ -30,6 +30,9 @@ use crate::settings::tolerances::times::SAME_TIME;
 
 pub(crate) use pause::Place;
 
+/// Changes of mode that are kept for what the derivative of the flow or a measurement needs to know, at most.
+pub(super) const MOST_PASSAGES: usize = 1_000_000;
+
 /// Steps after which a run asks whether it may go on.
 const REST: u64 = 1 << 12;
 
@@ -341,7 +344,11 @@ impl Exact {
         let asked = self.passages.is_some();
         let before = asked.then(|| (self.mode, self.storage.values.clone()));
         self.change_to(key, discontinuous, trigger, log)?;
-        if let (Some((mode, before)), Some(passages)) = (before, &mut self.passages) {
+        let room = self
+            .passages
+            .as_mut()
+            .filter(|all| all.len() < MOST_PASSAGES);
+        if let (Some((mode, before)), Some(passages)) = (before, room) {
             let from = mode.map(|at| &self.table.modes[at]);
             passages.push(Passage {
                 t: self.travel.t,

@@ -43,6 +43,9 @@ pub(crate) const ROWS_CLOSE: f64 = 1e-3;
 /// Larger: measurements that take longer than the run; smaller: more measurements on straight lines.
 pub(crate) const MOST_STATES: usize = 32;
 
+/// Periods of the fastest source up to which they do: a kilobyte each for its changes of mode. Larger: more memory; smaller: long runs are measured on rows.
+pub(crate) const MOST_PERIODS: f64 = 1e5;
+
 /// How far the polynomial of an expression may stand from it where it has no values, over the largest value of the expression. Larger: less exact measurements; smaller:
 /// more pieces about corners of `abs` and the like.
 pub(crate) const CURVE_CLOSE: f64 = 1e-10;

@@ -3,6 +3,7 @@
 use nalgebra::DVector;
 
 use super::Exact;
+use super::MOST_PASSAGES;
 use crate::circuit::Source;
 use crate::integrate::Energy;
 use crate::integrate::energy::Balance;
@@ -41,16 +42,16 @@ impl Exact {
         &self.key.closed
     }
 
-    /// Keeps changes of mode and corners of sources from here on.
+    /// Keeps changes of mode and corners of sources from here on, [`MOST_PASSAGES`] at most.
     pub(crate) fn keep_passages(&mut self) {
         self.passages = Some(Vec::new());
         self.sources.at_all_corners = true;
     }
 
-    /// The changes of mode and corners since [`Self::keep_passages`]; none are kept from here on.
-    pub(crate) fn take_passages(&mut self) -> Vec<Passage> {
+    /// The changes of mode and corners since [`Self::keep_passages`], unless there are too many to keep; none are kept from here on.
+    pub(crate) fn take_passages(&mut self) -> Option<Vec<Passage>> {
         self.sources.at_all_corners = false;
-        self.passages.take().unwrap_or_default()
+        self.passages.take().filter(|all| all.len() < MOST_PASSAGES)
     }
 
     /// Events seen so far say nothing about those to come.
