@@ -49,6 +49,8 @@ pub(crate) struct Segment {
     pub(crate) propagator: DMatrix<f64>,
     /// x where it ends.
     pub(crate) end: DVector<f64>,
+    /// Guards of devices that are zero there and stay so, where events that coincide by chance are kept.
+    resting: Vec<(Owner, usize)>,
 }
 
 /// A run from one time to another, with what its derivative is made of.
@@ -240,7 +242,9 @@ impl Maker {
     ) -> Result<Segment, Error> {
         let of = &self.systems[system];
         let propagator = of.propagator(to - from);
+        let end = of.state(end);
         Ok(Segment {
+            resting: self.resting(of, to, &end),
             system,
             from,
             to,
@@ -248,8 +252,31 @@ impl Maker {
             propagator: propagator.ok_or_else(|| {
                 not_smooth(from, "the exponential of a mode does not exist in doubles")
             })?,
-            end: of.state(end),
+            end,
         })
+    }
+
+    /// Guards of devices that are zero in a mode and stay so: a change of a value may move them off to one side alone.
+    fn resting(&self, system: &System, t: f64, x: &DVector<f64>) -> Vec<(Owner, usize)> {
+        let inputs = Inputs::before(&system.lcs.inputs, t, self.same);
+        let Some(inputs) = inputs.filter(|_| self.by_chance) else {
+            return Vec::new();
+        };
+        let rate = system.rate(x, &inputs.u);
+        let mut found = Vec::new();
+        for owner in (0..system.key.closed.len()).map(Owner::Device) {
+            let limits = |i| self.assembler.limits(i);
+            let guards = system.guards(owner, (&self.thresholds, limits));
+            for (k, guard) in guards.iter().enumerate() {
+                let ((value, size), (slope, slopes)) =
+                    (guard.value(x, &inputs), guard.rate(&rate, &inputs));
+                let rests = value.abs() <= GRAZING * size && slope.abs() <= GRAZING * slopes;
+                if rests && slopes > 0.0 {
+                    found.push((owner, k));
+                }
+            }
+        }
+        found
     }
 
     /// The event that these passages at one instant make, from one mode, after so many seconds in it, to another.

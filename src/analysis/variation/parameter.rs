@@ -19,7 +19,7 @@ use super::saltation::{Side, Timing};
 use super::{Saltation, System, Trajectory, not_smooth, shaped};
 use crate::circuit::Source;
 use crate::circuit::source::Piece;
-use crate::integrate::exact::{Assembler, Exosystem, Shape, Spectrum};
+use crate::integrate::exact::{Assembler, Exosystem, Owner, Shape, Spectrum};
 use crate::integrate::switching::Threshold;
 use crate::integrate::{Error, Simulation};
 use crate::measure::INTERVALS;
@@ -369,6 +369,9 @@ impl<'a> Parameter<'a> {
             }
             flow.advance(&mut w, seconds, SAME_LENGTH * segment.to.abs())?;
             dx = w.rows(w.len() - dx.len(), dx.len()).into_owned();
+            if sight.is_some() {
+                self.stays(k, &dx)?;
+            }
             let Some(saltation) = self.trajectory.saltations.get(k) else {
                 ends.push(0.0);
                 dx = self.end(&dx);
@@ -380,6 +383,33 @@ impl<'a> Parameter<'a> {
         }
         moved.stretch(&lengths, &ends);
         Ok(Some((moved, dx)))
+    }
+
+    /// Whether what rests at its threshold in segment k stays there, so that both signs of a change have the same derivative.
+    fn stays(&self, k: usize, dx: &DVector<f64>) -> Result<(), Error> {
+        let segment = &self.trajectory.segments[k];
+        let near = &self.near[0];
+        for (owner, which) in &segment.resting {
+            let system = &self.trajectory.systems[segment.system];
+            let guards = system.guards(*owner, (&near.thresholds, |i| near.assembler.limits(i)));
+            let Some(guard) = guards.get(*which) else {
+                continue;
+            };
+            let inputs = Self::inputs(&self.forms[k].own, segment.to);
+            let size = guard.value(&segment.end, &inputs).1;
+            let change = self.guard_change(k, (*owner, *which), segment.to)? + guard.x.dot(dx);
+            if change.abs() > SAME_TIMING * size {
+                let name = match owner {
+                    Owner::Device(pair) => near.assembler.device(*pair).unwrap_or_default(),
+                    Owner::Switch(i) | Owner::Slide(i, _) => &near.thresholds[*i].name,
+                };
+                let what = format!(
+                    "{name} rests at its threshold, which it leaves on one side of this value alone"
+                );
+                return Err(not_smooth(segment.to, what));
+            }
+        }
+        Ok(())
     }
 
     /// δt of the event after segment k.
@@ -406,8 +436,13 @@ impl<'a> Parameter<'a> {
         (timing, t): (&Timing, f64),
         dx: &DVector<f64>,
     ) -> Result<f64, Error> {
+        let change = self.guard_change(k, timing.guard, t)?;
+        Ok((&timing.x * dx)[0] - change / timing.slope)
+    }
+
+    /// Derivative of a guard with ln p where the state stays as it is at the end of segment k.
+    fn guard_change(&self, k: usize, (owner, which): (Owner, usize), t: f64) -> Result<f64, Error> {
         let segment = &self.trajectory.segments[k];
-        let (owner, which) = timing.guard;
         let mut values = [0.0; 4];
         for (m, value) in values.iter_mut().enumerate() {
             let near = &self.near[m];
@@ -425,7 +460,7 @@ impl<'a> Parameter<'a> {
             .zip(WEIGHTS)
             .map(|(value, weight)| value * weight)
             .sum();
-        Ok((&timing.x * dx)[0] - change / VALUE_STEP / timing.slope)
+        Ok(change / VALUE_STEP)
     }
 
     /// δt of the sources that jump after segment k.
