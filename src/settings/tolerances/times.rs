@@ -41,7 +41,7 @@ pub(crate) const ROWS_CLOSE: f64 = 1e-3;
 
 /// States of a circuit up to which measurements of an exact run see what happens between events and not its rows: the exponentials of its modes cost their cube.
 /// Larger: measurements that take longer than the run; smaller: more measurements on straight lines.
-pub(crate) const MOST_STATES: usize = 32;
+pub(crate) const MOST_STATES: usize = 12;
 
 /// Periods of the fastest source up to which they do: a kilobyte each for its changes of mode. Larger: more memory; smaller: long runs are measured on rows.
 pub(crate) const MOST_PERIODS: f64 = 1e5;
