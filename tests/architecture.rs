@@ -202,6 +202,11 @@ const NO_TOLERANCES: [(&str, &[&str], &str); 22] = [
         "bounds of the arithmetic of doubles",
     ),
     (
+        "analysis/variation/moved.rs",
+        &["ROOM"],
+        "the room that moves have",
+    ),
+    (
         "analysis/variation/parameter.rs",
         &["STEPS", "WEIGHTS"],
         "a formula of differences",
