@@ -190,7 +190,7 @@ const CONFINED: [(&str, &[&str], &str); 6] = [
 ];
 
 /// Constants of type f64 that decide nothing, outside `settings/tolerances/`: (file, names, why).
-const NO_TOLERANCES: [(&str, &[&str], &str); 22] = [
+const NO_TOLERANCES: [(&str, &[&str], &str); 23] = [
     (
         "algebra/ball.rs",
         &["EXACT_INTEGERS", "UP"],
