@@ -53,9 +53,9 @@ pub(crate) const FORGOTTEN: f64 = 100.0;
 /// between two points is missed; smaller: more steps.
 pub(crate) const RESOLVED: f64 = 0.7;
 
-/// The part of the longest step that hides nothing over which a polynomial of degree 8 follows a mode: a decay, on steps that double, to 1e-8 of what it began with at
-/// most, an oscillation to 1e-14. Larger: less exact measurements; smaller: more values for them.
-pub(crate) const CURVED: f64 = 0.5;
+/// The part of the longest step that hides nothing over which a polynomial of degree 8 follows a mode: a decay, on steps that double, to 1e-13 of what it began with at
+/// most, an oscillation to rounding. Larger: less exact measurements; smaller: more values for them.
+pub(crate) const CURVED: f64 = 0.1;
 
 /// λh up to which the exponentials follow a solution that grows as e^{λt}: those of long stiff steps are meant for decay and take any e^{λh}
 /// to 0.
