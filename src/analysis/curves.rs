@@ -2,62 +2,141 @@
 
 use nalgebra::DVector;
 
-use super::variation::{Course, Linear, Motion, halvings};
-use crate::integrate::Error;
+use super::periodic::Steady;
+use super::start::course;
+use super::variation::{Course, Linear, Motion, parts, unit};
+use crate::circuit::{Circuit, Tran};
+use crate::integrate::{Error, Note, SimOptions};
 use crate::measure::{Curves, INTERVALS};
+use crate::model::Model;
+use crate::settings::tolerances::times::{LAST_ROW, MOST_PERIODS, MOST_STATES};
+
+/// Values that measurements see of a run at most.
+pub(super) const MOST_VALUES: usize = 4_000_000;
 
 /// Halvings of a piece that lead from one of its values to the next.
 const LEVELS: u32 = INTERVALS.ilog2();
 
-/// Pieces of these outputs from a time on, of at most so many values; `None` where that takes more.
-///
-/// Their lengths are halvings of one span, so that few exponentials of a mode are needed whatever happens in it. The last step of a stretch ends beyond it.
+/// What the measurements of a transient see, which begins where the options say. `None` where it is not exact throughout, or rows cost less.
 ///
 /// # Errors
-/// An exponential does not exist in doubles.
-pub(super) fn curves(
-    course: &Course,
-    outputs: &[usize],
-    from: f64,
-    most: usize,
+/// The run's; an exponential does not exist in doubles.
+pub(super) fn transient_curves(
+    model: &Model,
+    options: &SimOptions<'_>,
 ) -> Result<Option<Curves>, Error> {
+    let circuit = model.circuit();
+    let own_steps = options.step.is_some() || options.theta.is_some() || options.gamma.is_some();
+    let Some(tran) = circuit
+        .tran
+        .filter(|tran| !own_steps && !is_large(model, tran))
+    else {
+        return Ok(None);
+    };
+    let measured = &circuit.measured;
+    let probing = model.with_circuit(Circuit {
+        probes: measured.clone(),
+        columns: vec![],
+        ..circuit.clone()
+    })?;
+    let asked = (options.cancel, &options.settings);
+    let start = options.start.as_ref();
+    let Some(course) = course(&probing, options.method, start, tran.tstop, asked)? else {
+        return Ok(None);
+    };
+    let outputs: Vec<usize> = (0..measured.len()).collect();
+    // What is asked for at the end is seen there, too.
+    let mut stretches = course.stretches.iter().rev();
+    let last = stretches.find(|stretch| stretch.from < stretch.to);
+    let last = last.map_or(tran.tstart, |stretch| stretch.from);
+    let from = circuit.measured_from(&tran).min(last).max(tran.tstart);
+    curves(&course, &outputs, from)
+}
+
+/// What the measurements of an orbit see, repeated until the end of `.tran`, and a note where that is not all of it.
+pub(super) fn orbit_curves(
+    circuit: &Circuit,
+    steady: &mut Steady,
+) -> Option<(Curves, Option<Note>)> {
+    let period = steady.orbit().period;
+    let outputs = circuit.measured.iter().map(|probe| {
+        let mut names = steady.simulation.probes().iter();
+        names.position(|name| *name == probe.name)
+    });
+    let outputs: Vec<usize> = outputs.collect::<Option<_>>()?;
+    if outputs.is_empty() {
+        return None;
+    }
+    let (course, from) = steady.course().ok()??;
+    let curves = curves(&course, &outputs, from).ok()??;
+    let (laps, note) = laps(circuit.tran, period, curves.values());
+    Some((curves.repeated(laps, period, from), note))
+}
+
+/// The periods of an orbit that measurements see, of so many values each: those until the end of `.tran`, or the last of them, and a note.
+pub(super) fn laps(
+    tran: Option<Tran>,
+    period: f64,
+    values: usize,
+) -> ((usize, usize), Option<Note>) {
+    let until = tran.map_or(0.0, |tran| tran.tstop);
+    let laps = (until / period - LAST_ROW).ceil().max(2.0) as usize;
+    let kept = laps.min((MOST_VALUES / values.max(1)).max(2));
+    let note = (kept < laps).then(|| {
+        format!("measurements see the last {kept} of the {laps} periods until the end of `.tran`")
+            .into()
+    });
+    ((laps - kept, laps), note)
+}
+
+/// The shortest period of its sources, s; ∞ where none repeats.
+pub(super) fn shortest_period(model: &Model) -> f64 {
+    let sources = model.multiport().sources.iter();
+    let periods = sources.filter_map(|source| source.input.source.wave.period());
+    periods.fold(f64::INFINITY, f64::min)
+}
+
+/// Whether rows cost less than the exponentials of every mode and all changes of mode.
+fn is_large(model: &Model, tran: &Tran) -> bool {
+    model.circuit().measured.is_empty()
+        || model.multiport().storage.len() > MOST_STATES
+        || tran.tstop / shortest_period(model) > MOST_PERIODS
+}
+
+/// Pieces of these outputs from a time on; `None` where they are too many. Few exponentials of a mode are needed whatever happens in it.
+fn curves(course: &Course, outputs: &[usize], from: f64) -> Result<Option<Curves>, Error> {
     let columns = outputs.len();
     let seen = course.stretches.iter().filter(|stretch| stretch.to > from);
-    let longest = seen.clone().map(|s| s.to - s.from).fold(0.0, f64::max);
-    let unit = longest.log2().ceil().exp2();
+    let unit = unit(seen.clone().map(|s| s.to - s.from).fold(0.0, f64::max));
     let (mut known, mut starts) = (Vec::new(), Vec::new());
     for stretch in seen.clone() {
         starts.push(Linear::of(&mut known, &course.systems, stretch));
     }
     let mut motions: Vec<Motion<'_>> = known.iter().map(|linear| linear.over(unit)).collect();
     let mut found = Curves::of(columns);
-    let room = most / (columns * (INTERVALS + 1)).max(1);
+    let room = MOST_VALUES / (columns * (INTERVALS + 1)).max(1);
     for (stretch, (at, mut w)) in seen.zip(starts) {
-        let (length, mut age) = (stretch.to - stretch.from, (from - stretch.from).max(0.0));
+        let (seconds, age) = (stretch.to - stretch.from, (from - stretch.from).max(0.0));
         if age > 0.0 {
             w = known[at].over(age).after(0, &w)?;
         }
         let motion = &mut motions[at];
-        while age < length {
+        for part in parts(&known[at].spectrum, unit, (age, seconds)) {
             if found.len() >= room {
                 return Ok(None);
             }
-            let left = length - age;
-            let level = halvings(&motion.linear.spectrum, unit, (age, left));
-            let step = motion.part(level);
             let mut values = vec![[0.0; INTERVALS + 1]; columns];
             for k in 0..=INTERVALS {
                 if k > 0 {
-                    w = motion.after(level + LEVELS, &w)?;
+                    w = motion.after(part.level + LEVELS, &w)?;
                 }
                 let row: DVector<f64> = &motion.linear.rows[0] * &w;
                 for (values, output) in values.iter_mut().zip(outputs) {
                     values[k] = row[*output];
                 }
             }
-            let until = (left / step).min(1.0);
-            found.push((stretch.from + age, step, until), &values);
-            age += step;
+            let until = ((seconds - part.age) / part.length).min(1.0);
+            found.push((stretch.from + part.age, part.length, until), &values);
         }
     }
     for leap in course.leaps.iter().filter(|leap| leap.t >= from) {

@@ -59,29 +59,46 @@ pub(super) fn bent(waves: &Waveforms, kinds: &[RowKind], columns: usize) -> f64 
     (0..columns).map(of_signal).fold(0.0, f64::max)
 }
 
-/// Signal, value and time of the row at an event or corner that is [`SPIKE`] times as large as all rows of the grid in its unit: the largest.
-pub(super) fn spike(waves: &Waveforms, kinds: &[RowKind]) -> Option<(usize, f64, f64)> {
-    let mut usual: BTreeMap<&str, f64> = BTreeMap::new();
-    for (_, values, _) in Block::of(waves, kinds).rows().filter(|row| row.2.is_grid()) {
-        for (value, unit) in values.iter().zip(&waves.units) {
-            let most = usual.entry(unit).or_default();
-            *most = most.max(value.abs());
-        }
-    }
-    let mut found: Option<(usize, f64, f64)> = None;
-    for (t, values, _) in Block::of(waves, kinds)
-        .rows()
-        .filter(|row| !row.2.is_grid())
-    {
-        for (j, value) in values.iter().enumerate() {
-            let usual = usual.get(waves.units[j]).copied().unwrap_or(f64::INFINITY);
-            let larger = found.is_none_or(|(_, other, _)| value.abs() > other.abs());
-            if usual > 0.0 && value.abs() > SPIKE * usual && larger {
-                found = Some((j, *value, t));
+/// What rows at events and corners have that those of the grid do not show.
+#[derive(Debug, Default)]
+pub(super) struct Spikes {
+    /// The largest value of rows of the grid, by unit.
+    usual: BTreeMap<&'static str, f64>,
+    /// The largest value of the other rows and its time, s, by column.
+    largest: Vec<(f64, f64)>,
+}
+
+impl Spikes {
+    /// Looks at rows whose columns have these units.
+    pub(super) fn see(&mut self, units: &[&'static str], block: Block<'_>) {
+        self.largest.resize(units.len(), (0.0, 0.0));
+        for (t, values, kind) in block.rows() {
+            for (j, (value, unit)) in values.iter().zip(units).enumerate() {
+                if kind.is_grid() {
+                    let most = self.usual.entry(unit).or_default();
+                    *most = most.max(value.abs());
+                } else if value.abs() > self.largest[j].0.abs() {
+                    self.largest[j] = (*value, t);
+                }
             }
         }
     }
-    found
+
+    /// Signal, value and time of the row at an event or corner that is [`SPIKE`] times as large as all rows of the grid in its unit: the largest.
+    pub(super) fn found(&self, units: &[&'static str]) -> Option<(usize, f64, f64)> {
+        let stands_out = |(j, (value, t)): (usize, &(f64, f64))| {
+            let usual = self.usual.get(units[j]).copied().unwrap_or(f64::INFINITY);
+            (usual > 0.0 && value.abs() > SPIKE * usual).then_some((j, *value, *t))
+        };
+        let all = self.largest.iter().enumerate().filter_map(stands_out);
+        all.reduce(|one, other| {
+            if other.1.abs() > one.1.abs() {
+                other
+            } else {
+                one
+            }
+        })
+    }
 }
 
 /// The highest frequency at which a circuit rings, with its switches where they start, of which rows so far apart show not even two a period, Hz.

@@ -1,9 +1,11 @@
 //! A transient with its measurements: the signals they need are simulated besides those that are shown, and taken away again.
 
-use super::curves::curves;
-use super::density::{Cut, bent, crowd, spike};
-use super::periodic::{PeriodicOptions, Steady, periodic, steady};
-use super::start::{beginning, course};
+use std::ops::ControlFlow;
+
+use super::curves::{MOST_VALUES, laps, orbit_curves, shortest_period, transient_curves};
+use super::density::{Cut, Spikes, bent, crowd};
+use super::periodic::{PeriodicOptions, periodic, steady};
+use super::start::beginning;
 use super::table::Table;
 use super::worst::Worst;
 use crate::circuit::{Circuit, Harmonics, Measured, Probe, Tran};
@@ -11,16 +13,12 @@ use crate::integrate::{Block, Error, Grid, Method, Note, Orbit, RowKind, Run, Si
 use crate::measure::{Curves, Signals};
 use crate::model::Model;
 use crate::settings::tolerances::times::{
-    CROWDED, LAST_ROW, LINES_CLOSE, MOST_PERIODS, MOST_STATES, NOTHING, ROWS_A_PERIOD, ROWS_APART,
-    ROWS_CLOSE,
+    CROWDED, LINES_CLOSE, NOTHING, ROWS_A_PERIOD, ROWS_APART, ROWS_CLOSE,
 };
 use crate::waveform::Waveforms;
 
 /// Rows that measurements see at least, besides those at events: a coarser print step is divided for them.
 const ROWS: usize = 2000;
-
-/// Values of an orbit that is repeated for measurements at most.
-const MOST_VALUES: usize = 4_000_000;
 
 /// Values of a picture between output times at most.
 const MOST_PICTURED: usize = 1_000_000;
@@ -90,7 +88,7 @@ pub fn is_measured(circuit: &Circuit) -> bool {
 #[must_use]
 pub fn transient(model: &Model, options: SimOptions<'_>) -> Finished {
     if !is_measured(model.circuit()) {
-        return begun(model, model, options);
+        return unmeasured(model, options);
     }
     let measuring = Measuring::of(model.circuit(), options.step.is_some());
     shown_of(measuring, model, options)
@@ -118,23 +116,57 @@ fn shown_of(measuring: Measuring<'_>, model: &Model, options: SimOptions<'_>) ->
         if measuring.by_rows() {
             run.notes.extend(measuring.too_coarse(run, found));
         }
-        let means = if measuring.by_rows() {
-            "`.meas` takes the fall as a straight line, and means are wrong by that; `--table` has exact ones"
-        } else {
-            "Means of rows would be wrong by that; `.meas` and `--table` have exact ones"
-        };
-        let spike = spike(&run.waveforms, &run.kinds);
-        run.notes.extend(spike.map(|(j, value, t)| {
-            let (name, unit) = (&run.waveforms.names[j], run.waveforms.units[j]);
-            let cause = match unit {
-                "A" => "a capacitor that a switch or diode connects, to which its `Ron` alone stands in the way",
-                _ => "a current that a switch or diode interrupts, which its `Roff` has to take (a diode, a clamp or a snubber would)",
-            };
-            Note::from(format!(
-                "{name} is {value:.3e} {unit} at t = {t:e} s, and has fallen before the next row: as a rule {cause}. {means}"
-            ))
-        }));
+        let mut spikes = Spikes::default();
+        spikes.see(&run.waveforms.units, Block::of(&run.waveforms, &run.kinds));
+        let note = spike(&spikes, &run.waveforms, measuring.by_rows());
+        run.notes.extend(note);
         (run.waveforms, run.kinds) = measuring.cut(run);
+    }
+    finished
+}
+
+/// Tells of a spike in rows with these columns; `by_rows`: measurements see them.
+fn spike(spikes: &Spikes, waves: &Waveforms, by_rows: bool) -> Option<Note> {
+    let (j, value, t) = spikes.found(&waves.units)?;
+    let (name, unit) = (&waves.names[j], waves.units[j]);
+    let cause = match unit {
+        "A" => {
+            "a capacitor that a switch or diode connects, to which its `Ron` alone stands in the way"
+        }
+        _ => {
+            "a current that a switch or diode interrupts, which its `Roff` has to take (a diode, a clamp or a snubber would)"
+        }
+    };
+    let means = if by_rows {
+        "`.meas` takes the fall as a straight line, and means are wrong by that; `--table` has exact ones"
+    } else {
+        "Means of rows would be wrong by that; `.meas` and `--table` have exact ones"
+    };
+    Some(Note::from(format!(
+        "{name} is {value:.3e} {unit} at t = {t:e} s, and has fallen before the next row: as a rule {cause}. {means}"
+    )))
+}
+
+/// The transient of a circuit without measurements, whose rows are looked at as they pass.
+fn unmeasured(model: &Model, mut options: SimOptions<'_>) -> Finished {
+    let multiport = model.multiport();
+    let probes = multiport.observed[..multiport.probes].iter();
+    let units: Vec<&str> = probes.map(|probe| probe.unit).collect();
+    let mut spikes = Spikes::default();
+    let mut sink = options.rows.take();
+    let mut take = |block: Block<'_>| {
+        spikes.see(&units, block);
+        sink.as_mut()
+            .map_or(ControlFlow::Continue(()), |sink| sink(block))
+    };
+    let asked = SimOptions {
+        rows: Some(&mut take),
+        ..options.again()
+    };
+    let mut finished = begun(model, model, asked);
+    if let Some((run, _)) = &mut finished.run {
+        let note = spike(&spikes, &run.waveforms, false);
+        run.notes.extend(note);
     }
     finished
 }
@@ -156,34 +188,26 @@ fn begun(model: &Model, shown: &Model, mut options: SimOptions<'_>) -> Finished 
     finished
 }
 
-/// What `.meas` finds in the transient of a model, without its rows where they are not needed.
+/// What `.meas` finds in the transient of a model, without its rows where they are not needed; where they are, those of the first grid, or `closer` ones where
+/// they turn out to be too far apart.
 ///
 /// # Errors
 /// The run's, wherever it breaks off.
-pub(super) fn measured(model: &Model, mut options: SimOptions<'_>) -> Result<Vec<Measured>, Error> {
+pub(super) fn measured(
+    model: &Model,
+    mut options: SimOptions<'_>,
+    closer: bool,
+) -> Result<Vec<Measured>, Error> {
     let mut measuring = Measuring::of(model.circuit(), options.step.is_some());
     measuring.draw(model, &mut options);
     if let Some(curves) = &measuring.curves {
         return Ok(model.circuit().measure(&Signals::Curves(curves)));
     }
-    let (_, finished) = observed(measuring, model, options);
-    whole(finished)
-}
-
-/// The same; where rows are needed on the first grid, whatever it hides: differences of runs need one grid.
-///
-/// # Errors
-/// As [`measured`].
-pub(super) fn measured_once(
-    model: &Model,
-    mut options: SimOptions<'_>,
-) -> Result<Vec<Measured>, Error> {
-    let mut measuring = Measuring::of(model.circuit(), options.step.is_some());
-    measuring.draw(model, &mut options);
-    match &measuring.curves {
-        Some(curves) => Ok(model.circuit().measure(&Signals::Curves(curves))),
-        None => whole(measuring.run(model, &mut options)),
-    }
+    whole(if closer {
+        observed(measuring, model, options).1
+    } else {
+        measuring.run(model, &mut options)
+    })
 }
 
 fn whole(finished: Finished) -> Result<Vec<Measured>, Error> {
@@ -254,7 +278,9 @@ pub fn periodic_measured(
         ..options.clone()
     };
     let mut found = steady(&probing, &options)?;
-    let note = measuring.draw_orbit(&mut found);
+    let drawn = orbit_curves(circuit, &mut found);
+    let (curves, note) = drawn.map_or((None, None), |(curves, note)| (Some(curves), note));
+    measuring.curves = curves;
     let by_rows = measuring.by_rows();
     let (orbit, mut run) = found.on_grid(&options, |tran| {
         let rows = Grid::of(&tran).len();
@@ -278,29 +304,6 @@ pub fn periodic_measured(
     run.notes.extend(note);
     let found = measuring.carry_out_repeated(&mut run, orbit.period);
     Ok((orbit, run, found))
-}
-
-/// The periods of an orbit that measurements see, of so many values each: those until the end of `.tran`, or the last of them, and a note.
-pub(super) fn laps(
-    tran: Option<Tran>,
-    period: f64,
-    values: usize,
-) -> ((usize, usize), Option<Note>) {
-    let until = tran.map_or(0.0, |tran| tran.tstop);
-    let laps = (until / period - LAST_ROW).ceil().max(2.0) as usize;
-    let kept = laps.min((MOST_VALUES / values.max(1)).max(2));
-    let note = (kept < laps).then(|| {
-        format!("measurements see the last {kept} of the {laps} periods until the end of `.tran`")
-            .into()
-    });
-    ((laps - kept, laps), note)
-}
-
-/// The shortest period of its sources, s; ∞ where none repeats.
-fn shortest_period(model: &Model) -> f64 {
-    let sources = model.multiport().sources.iter();
-    let periods = sources.filter_map(|source| source.input.source.wave.period());
-    periods.fold(f64::INFINITY, f64::min)
 }
 
 /// What a circuit's measurements need, and how its results are shown without that.
@@ -346,64 +349,11 @@ impl<'a> Measuring<'a> {
         let (start, note) = beginning(model, options.start.take(), asked).ok()?;
         options.start = start;
         // What fails here fails in the run, or is measured on its rows.
-        self.curves = self.drawn(model, options).ok().flatten();
+        self.curves = transient_curves(model, options).ok().flatten();
         if self.curves.is_some() && self.pictured.is_none() {
             self.divisions = 1;
         }
         note
-    }
-
-    fn drawn(&self, model: &Model, options: &SimOptions<'_>) -> Result<Option<Curves>, Error> {
-        let own_steps =
-            options.step.is_some() || options.theta.is_some() || options.gamma.is_some();
-        let (Some(tran), false) = (self.tran, own_steps || self.is_large(model)) else {
-            return Ok(None);
-        };
-        let measured = &self.circuit.measured;
-        let probing = model.with_circuit(Circuit {
-            probes: measured.clone(),
-            columns: vec![],
-            ..self.circuit.clone()
-        })?;
-        let asked = (options.cancel, &options.settings);
-        let start = options.start.as_ref();
-        let Some(course) = course(&probing, options.method, start, tran.tstop, asked)? else {
-            return Ok(None);
-        };
-        let outputs: Vec<usize> = (0..measured.len()).collect();
-        // What is asked for at the end is seen there, too.
-        let mut stretches = course.stretches.iter().rev();
-        let last = stretches.find(|stretch| stretch.from < stretch.to);
-        let last = last.map_or(tran.tstart, |stretch| stretch.from);
-        let from = self.circuit.measured_from(tran.tstop).min(last);
-        let from = from.max(tran.tstart);
-        curves(&course, &outputs, from, MOST_VALUES)
-    }
-
-    /// The same of an orbit, repeated until the end of `.tran`.
-    fn draw_orbit(&mut self, steady: &mut Steady) -> Option<Note> {
-        let period = steady.orbit().period;
-        let outputs = self.circuit.measured.iter().map(|probe| {
-            let mut names = steady.simulation.probes().iter();
-            names.position(|name| *name == probe.name)
-        });
-        let outputs: Vec<usize> = outputs.collect::<Option<_>>()?;
-        if outputs.is_empty() {
-            return None;
-        }
-        let (course, from) = steady.course().ok()??;
-        let curves = curves(&course, &outputs, from, MOST_VALUES).ok()??;
-        let (laps, note) = laps(self.circuit.tran, period, curves.values());
-        self.curves = Some(curves.repeated(laps, period, from));
-        note
-    }
-
-    /// Whether rows cost less than the exponentials of every mode and all changes of mode.
-    fn is_large(&self, model: &Model) -> bool {
-        let seconds = self.tran.map_or(0.0, |tran| tran.tstop);
-        self.circuit.measured.is_empty()
-            || model.multiport().storage.len() > MOST_STATES
-            || seconds / shortest_period(model) > MOST_PERIODS
     }
 
     /// Shows rows between those of the grid, of so many values at most.
@@ -431,22 +381,9 @@ impl<'a> Measuring<'a> {
             Err(error) => return Finished::of(Err(error)),
         };
         let options = SimOptions {
-            method: options.method,
-            theta: options.theta,
-            gamma: options.gamma,
-            step: options.step,
-            events: options.events,
             corners: true,
-            rows: None,
             discard: false,
-            cancel: options.cancel,
-            unestimated: options.unestimated,
-            start: options.start.clone(),
-            settings: options.settings.clone(),
-            progress: match &mut options.progress {
-                Some(progress) => Some(&mut **progress),
-                None => None,
-            },
+            ..options.again()
         };
         let mut finished = begun(model, &probing, options);
         if let Some((run, found)) = &mut finished.run {

@@ -6,18 +6,16 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
-use super::measured::{laps, measured_once, periodic_measured};
+use super::curves::{MOST_VALUES, laps};
+use super::measured::{measured, periodic_measured};
 use super::periodic::{PeriodicOptions, beside, steady};
-use super::variation::{Near, Parameter, STEPS, Sight, Trajectory};
-use crate::circuit::{Circuit, Kind, Measured, SteadyState, source::Wave};
+use super::variation::{Near, Parameter, STEPS, Sight, Trajectory, unit};
+use crate::circuit::{Circuit, Kind, Measured, SteadyState, Tran, source::Wave};
 use crate::integrate::{Error, Note, OrbitKind, Reason, SimOptions, Simulation, SimulationOptions};
 use crate::measure::{Curves, Signals};
 use crate::model::Model;
 use crate::settings::Settings;
 use crate::settings::tolerances::periodic::{PERIOD_MOVES, RUN_STEP, VALUE_STEP};
-
-/// Values of a run that is moved at most.
-const MOST_VALUES: usize = 4_000_000;
 
 /// What derivatives may be asked for.
 #[derive(Debug, Clone, Default)]
@@ -235,17 +233,17 @@ struct Base {
     sight: Sight,
     /// s.
     span: (f64, f64),
-    orbit: Option<Orbit>,
+    orbit: Option<Repeated>,
 }
 
-/// An orbit as measurements see it.
-struct Orbit {
+/// An orbit as measurements see it: repeated until the end of `.tran`.
+struct Repeated {
     monodromy: DMatrix<f64>,
     /// s.
     period: f64,
     /// From when on it counts, s.
     from: f64,
-    laps: (usize, usize),
+    tran: Option<Tran>,
 }
 
 impl Beside<'_> {
@@ -295,8 +293,7 @@ impl Beside<'_> {
                 return Ok(None);
             }
             let trajectory = Trajectory::with(&mut simulation, place, tran.tstop, true)?;
-            let from = circuit.measured_from(tran.tstop);
-            let span = (from.clamp(tran.tstart, tran.tstop), tran.tstop);
+            let span = (circuit.measured_from(&tran), tran.tstop);
             return Ok(Base::of(trajectory, positions, span, None));
         }
         let mut found = steady(model, &self.periodic())?;
@@ -306,12 +303,11 @@ impl Beside<'_> {
             return Ok(None);
         }
         let (trajectory, from) = found.trajectory()?;
-        let orbit = Orbit {
+        let orbit = Repeated {
             monodromy: trajectory.monodromy(),
             period: orbit.period,
             from,
-            // What is left out of many laps is told where they are measured.
-            laps: laps(circuit.tran, orbit.period, MOST_VALUES / 1000).0,
+            tran: circuit.tran,
         };
         let always = (f64::NEG_INFINITY, f64::INFINITY);
         Ok(Base::of(trajectory, vec![], always, Some(orbit)))
@@ -368,7 +364,7 @@ impl Beside<'_> {
             let parameter = Parameter::of(&base.trajectory, &near)?;
             let start = match &base.orbit {
                 None => Parameter::weighted_states(&near),
-                Some(Orbit { monodromy: m, .. }) => {
+                Some(Repeated { monodromy: m, .. }) => {
                     let still = DVector::zeros(m.nrows());
                     let forced = parameter.along(&still, None)?.map(|(_, end)| end);
                     let closed = DMatrix::identity(m.nrows(), m.nrows()) - m;
@@ -425,7 +421,8 @@ impl Beside<'_> {
             unestimated: true,
             ..SimOptions::default()
         };
-        measured_once(&model, asked)
+        // Differences of runs need one grid.
+        measured(&model, asked, false)
     }
 
     /// By extrapolated differences of runs.
@@ -477,7 +474,7 @@ impl Base {
         trajectory: Trajectory,
         positions: Vec<bool>,
         span: (f64, f64),
-        orbit: Option<Orbit>,
+        orbit: Option<Repeated>,
     ) -> Option<Self> {
         let impulses = trajectory
             .saltations
@@ -499,7 +496,7 @@ impl Base {
             .find(|segment| segment.to < span.0);
         let sight = Sight {
             from: first.map_or(f64::NEG_INFINITY, |segment| segment.from),
-            unit: lengths.fold(0.0, f64::max).log2().ceil().exp2(),
+            unit: unit(lengths.fold(0.0, f64::max)),
             most: MOST_VALUES,
         };
         Some(Self {
@@ -513,14 +510,14 @@ impl Base {
 
     /// A run as measurements see it: an orbit again and again, from its beginning, which is not that of the trajectory.
     fn seen(&self, curves: Curves) -> Curves {
-        let Some(Orbit {
-            period, from, laps, ..
-        }) = &self.orbit
-        else {
+        let Some(orbit) = &self.orbit else {
             return curves.within(self.span);
         };
+        let (period, from) = (orbit.period, orbit.from);
+        // What is left out of many laps is told where they are measured.
+        let (laps, _) = laps(orbit.tran, period, curves.values());
         let [begin, end] = [laps.0, laps.1].map(|lap| lap as f64 * period);
-        let all = curves.repeated((0, laps.1 - laps.0 + 1), *period, *from + period - begin);
+        let all = curves.repeated((0, laps.1 - laps.0 + 1), period, from + period - begin);
         all.within((begin, end))
     }
 }

@@ -302,6 +302,6 @@ impl Wanted<'_> {
             settings,
             ..SimOptions::default()
         };
-        measured(&model, options)
+        measured(&model, options, true)
     }
 }

@@ -142,7 +142,7 @@ fn value(model: &Model, of: &str, options: &WorstOptions<'_>) -> Result<f64, Err
         unestimated: true,
         ..SimOptions::default()
     };
-    let found = measured(model, asked)?;
+    let found = measured(model, asked, true)?;
     let found = found.iter().find(|measured| measured.name == of);
     let result = found.map(|measured| &measured.result);
     match result {

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use super::builder::Builder;
 use super::formula::Formula;
 use super::scope::ScopeId;
-use super::{Circuit, Probe};
+use super::{Circuit, Probe, Tran};
 use crate::diagnostic::Diagnostic;
 use crate::measure::{Found, MeasureError, Measurement, Scene, Signals, Spectrum, fourier};
 use crate::netlist::ast::{Four, Meas};
@@ -152,8 +152,9 @@ impl Circuit {
         }
     }
 
-    /// The time before which [`Self::measure`] and [`Self::harmonics`] need to see nothing of a run that ends at `tstop`, s.
-    pub(crate) fn measured_from(&self, tstop: f64) -> f64 {
+    /// The time before which [`Self::measure`] and [`Self::harmonics`] need to see nothing of a transient, s.
+    pub(crate) fn measured_from(&self, tran: &Tran) -> f64 {
+        let Tran { tstart, tstop, .. } = *tran;
         let number = |formula: &Formula| formula.value(f64::NAN, &[], &[]);
         let measurements = self.measurements.iter().filter_map(|m| m.what.as_ref());
         let begins = measurements.map(|what| what.begins(&number));
@@ -163,7 +164,8 @@ impl Circuit {
             .map(|four| tstop - four.frequency.recip());
         // What rounding leaves of a period before the start is none.
         let periods = periods.map(|t| t - SAME_TIME * tstop);
-        begins.chain(periods).fold(f64::INFINITY, f64::min)
+        let first = begins.chain(periods).fold(f64::INFINITY, f64::min);
+        first.clamp(tstart, tstop)
     }
 
     /// Carries out the measurements on the signals of [`Self::measured`].

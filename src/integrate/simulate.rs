@@ -84,6 +84,22 @@ pub struct SimOptions<'a> {
     pub progress: Option<&'a mut dyn FnMut(f64)>,
 }
 
+impl SimOptions<'_> {
+    /// The same once more, without what takes the rows.
+    pub(crate) fn again(&mut self) -> SimOptions<'_> {
+        SimOptions {
+            rows: None,
+            progress: match &mut self.progress {
+                Some(progress) => Some(&mut **progress),
+                None => None,
+            },
+            start: self.start.clone(),
+            settings: self.settings.clone(),
+            ..*self
+        }
+    }
+}
+
 /// Simulates a circuit over its `.tran`.
 ///
 /// `behaviour` is the circuit's, laws included; piecewise-linear laws are turned into ideal pairs here. Probes are the circuit's.

@@ -4,8 +4,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::linear::beyond_doubles;
 use super::moved::Sample;
-use super::not_smooth;
 use crate::integrate::Error;
 use crate::integrate::exact::Spectrum;
 use crate::linalg::expm::Ladders;
@@ -107,9 +107,7 @@ impl Flow {
     fn step(&self, seconds: f64) -> Result<DMatrix<f64>, Error> {
         let dim = self.generator.nrows();
         let increment = Ladders::new(&self.generator, &[], seconds, SQUARED, 0).increment(0);
-        let increment = increment.ok_or_else(|| {
-            not_smooth(0.0, "the exponential of a mode does not exist in doubles")
-        })?;
+        let increment = increment.ok_or_else(beyond_doubles)?;
         Ok(DMatrix::from_fn(dim, dim, |i, j| increment.column(j)[i]))
     }
 

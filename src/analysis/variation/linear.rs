@@ -2,10 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::System;
 use super::course::Stretch;
-use super::{System, not_smooth};
-use crate::integrate::Error;
 use crate::integrate::exact::{Exosystem, Shape, Spectrum, over_w};
+use crate::integrate::{Error, Reason};
 use crate::linalg::decouple::{Decoupled, decoupled};
 use crate::linalg::expm::Ladders;
 use crate::settings::tolerances::exponentials::{CURVED, SERIES, SQUARED};
@@ -36,13 +36,43 @@ pub(crate) struct Motion<'a> {
     pub(crate) bottom: u32,
 }
 
-/// How often `unit` is halved for a step of a piece, s, at an age in a mode of which so many seconds are left: steps double with the age and resolve what still
-/// turns, as those of the integrator do. No shorter than what is left, where that is allowed.
-pub(crate) fn halvings(spectrum: &Spectrum, unit: f64, (age, left): (f64, f64)) -> u32 {
-    let limit = CURVED * spectrum.step_limit(age);
-    let level = (unit / limit.min(left)).log2().floor().max(0.0);
-    let beyond = unit * (-level).exp2() > limit;
-    level as u32 + u32::from(beyond)
+/// A piece of a stretch in one mode that outputs are seen in.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Part {
+    /// Since the mode began, s.
+    pub(crate) age: f64,
+    /// How often the unit of all pieces is halved for its length.
+    pub(crate) level: u32,
+    /// Its length, s; the last one ends beyond the stretch.
+    pub(crate) length: f64,
+}
+
+/// The pieces of a stretch of so many seconds from an age on: their lengths are halvings of `unit`, which double with the age and resolve what still turns, as steps
+/// of the integrator do, and are no shorter than what is left where that is allowed.
+pub(crate) fn parts(
+    spectrum: &Spectrum,
+    unit: f64,
+    (from, seconds): (f64, f64),
+) -> impl Iterator<Item = Part> {
+    let at = move |age: f64| {
+        let limit = CURVED * spectrum.step_limit(age);
+        let level = (unit / limit.min(seconds - age)).log2().floor().max(0.0);
+        let beyond = unit * (-level).exp2() > limit;
+        let level = level as u32 + u32::from(beyond);
+        let length = unit * (-f64::from(level)).exp2();
+        (age < seconds).then_some(Part { age, level, length })
+    };
+    std::iter::successors(at(from), move |part| at(part.age + part.length))
+}
+
+/// The span of which all lengths of pieces are halvings, s, where the longest stretch takes so many seconds.
+pub(crate) fn unit(longest: f64) -> f64 {
+    longest.log2().ceil().exp2()
+}
+
+pub(super) fn beyond_doubles() -> Error {
+    let what = "the exponential of a mode does not exist in doubles";
+    Error::before(Reason::NotSmooth(what.into()))
 }
 
 impl Linear {
@@ -144,9 +174,7 @@ impl Motion<'_> {
             self.steps.resize(at + 1, None);
         }
         if self.steps[at].is_none() {
-            let increment = self.ladders.increment(k).ok_or_else(|| {
-                not_smooth(0.0, "the exponential of a mode does not exist in doubles")
-            })?;
+            let increment = self.ladders.increment(k).ok_or_else(beyond_doubles)?;
             let dim = self.linear.generator.nrows();
             self.steps[at] = Some(DMatrix::from_fn(dim, dim, |i, j| increment.column(j)[i]));
         }

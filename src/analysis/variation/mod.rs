@@ -28,7 +28,7 @@ use crate::settings::tolerances::times::SAME_TIME;
 
 pub(crate) use course::{Course, Leap};
 use instant::Inputs;
-pub(crate) use linear::{Linear, Motion, halvings};
+pub(crate) use linear::{Linear, Motion, parts, unit};
 pub(crate) use moved::Sight;
 pub(crate) use parameter::{Near, Parameter, STEPS};
 use saltation::Side;

@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::flow::{Flow, Flows, Sources};
 use super::instant::Inputs;
-use super::linear::halvings;
+use super::linear::parts;
 use super::moved::{Moved, Sight};
 use super::saltation::{Side, Timing};
 use super::{Saltation, System, Trajectory, not_smooth, shaped};
@@ -164,20 +164,17 @@ fn see(
     sight: Sight,
     (segment, moved): (usize, &mut Moved),
 ) -> Result<bool, Error> {
-    let (mut w, mut age) = (w.clone(), 0.0);
-    while age < seconds {
+    let (mut w, spectrum) = (w.clone(), flow.spectrum.clone());
+    for part in parts(&spectrum, sight.unit, (0.0, seconds)) {
         if moved.values() > sight.most {
             return Ok(false);
         }
-        let level = halvings(&flow.spectrum, sight.unit, (age, seconds - age));
-        let step = sight.unit * (-f64::from(level)).exp2();
         let mut samples = vec![flow.sample(&w)];
         for _ in 0..INTERVALS {
-            flow.advance(&mut w, step / INTERVALS as f64, 0.0)?;
+            flow.advance(&mut w, part.length / INTERVALS as f64, 0.0)?;
             samples.push(flow.sample(&w));
         }
-        moved.push(segment, (begin, seconds), (age, step), &samples);
-        age += step;
+        moved.push(segment, (begin, seconds), (part.age, part.length), &samples);
     }
     Ok(true)
 }
