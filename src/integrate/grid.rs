@@ -1,5 +1,7 @@
 //! Output times.
 
+use std::ops::Range;
+
 use crate::circuit::Tran;
 use crate::integrate::error::{Error, Reason};
 use crate::settings::tolerances::times::LAST_ROW;
@@ -114,6 +116,16 @@ impl Times {
             tstop
         } else {
             tstart + k as f64 * tstep
+        }
+    }
+
+    /// Adds some of them.
+    pub(crate) fn extend(&self, which: Range<usize>, to: &mut Vec<f64>) {
+        let Grid { tstart, tstep, .. } = self.grid;
+        let ends = which.end >= self.len && !which.is_empty();
+        to.extend(which.map(|k| tstart + k as f64 * tstep));
+        if let Some(last) = to.last_mut().filter(|_| ends) {
+            *last = self.grid.tstop;
         }
     }
 }

@@ -280,7 +280,7 @@ impl<'a> Sheet<'a> {
             self.pop();
         }
         let first = self.time.len();
-        self.time.extend(which.map(|k| times.at(k)));
+        times.extend(which, &mut self.time);
         self.values.extend_from_slice(rows);
         if self.wants_events() {
             self.kinds.resize(self.time.len(), RowKind::Grid);

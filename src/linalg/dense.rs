@@ -135,6 +135,14 @@ impl Dense {
         }
     }
 
+    /// self ← self + other, of matching size.
+    pub(crate) fn add(&mut self, other: &Self) {
+        let theirs = other.data.as_flattened();
+        for (a, b) in self.data.as_flattened_mut().iter_mut().zip(theirs) {
+            *a += b;
+        }
+    }
+
     /// Every entry, zeros beyond the last row included.
     fn entries(&self) -> &[f64] {
         self.data.as_flattened()

@@ -234,13 +234,16 @@ fn squared(x: &Dense) -> Dense {
 pub(crate) fn balance(a: &DMatrix<f64>, h: f64) -> Vec<f64> {
     /// Sweeps after which the scaling is as good as it gets for the sizes of circuits.
     const SWEEPS: usize = 40;
-    let mut d = vec![1.0; a.nrows()];
+    let n = a.nrows();
+    let mut d = vec![1.0; n];
     let mut sizes = a.map(|entry| (entry * h).abs());
     sizes.fill_diagonal(0.0);
     for _ in 0..SWEEPS {
         let mut changed = false;
         for (k, d) in d.iter_mut().enumerate() {
-            let (column, row) = (sizes.column(k).sum(), sizes.row(k).sum());
+            let entries = sizes.as_slice();
+            let column: f64 = entries[k * n..(k + 1) * n].iter().sum();
+            let row: f64 = entries[k..].iter().step_by(n).sum();
             let factor = if column == 0.0 {
                 1.0
             } else if row == 0.0 {
@@ -305,7 +308,7 @@ fn subdiagonal(whole: &Dense, k: u32) -> Option<Dense> {
         m_re.shift(1.0);
         square.set_product(&m_re, &m_re);
         product.set_product(&m_im, &m_im);
-        square.combine(1.0, 1.0, &product);
+        square.add(&product);
         product.set_product(&square, &r);
         r.combine(0.0, pole.norm_sqr() / zero.norm_sqr(), &product);
     }

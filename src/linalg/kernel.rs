@@ -47,7 +47,16 @@ impl Kernel {
     /// The entries of column j from row `first` on.
     fn set_column(&mut self, first: usize, j: usize, values: &[f64]) {
         let (mut at, mut lane) = (first / BLOCK * self.columns + j, first % BLOCK);
-        for &value in values {
+        let mut rest = values;
+        if lane == 0 {
+            let (blocks, last) = values.as_chunks::<BLOCK>();
+            for block in blocks {
+                self.blocks[at] = *block;
+                at += self.columns;
+            }
+            rest = last;
+        }
+        for &value in rest {
             self.blocks[at][lane] = value;
             lane += 1;
             if lane == BLOCK {

@@ -409,7 +409,7 @@ impl Doubling {
             for j in 2..TERMS {
                 buffer.set_product(&term, &a);
                 term.set_symmetric(1.0 / j as f64, &buffer);
-                sum.combine(1.0, 1.0, &term);
+                sum.add(&term);
             }
             sum
         };
@@ -450,10 +450,10 @@ impl Doubling {
         transposed.set_transposed(e);
         for gram in &mut self.grams {
             first.set_product(gram, e);
-            first.combine(1.0, 1.0, gram);
+            first.add(gram);
             second.set_product(transposed, first);
-            gram.combine(1.0, 1.0, first);
-            gram.combine(1.0, 1.0, second);
+            gram.add(first);
+            gram.add(second);
         }
         if self.k > 0 {
             self.k -= 1;

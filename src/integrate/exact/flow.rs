@@ -53,6 +53,8 @@ pub(crate) struct Flow {
     steps: Vec<f64>,
     ladder: Ladders,
     levels: Vec<Option<Kernel>>,
+    /// How many levels there are by now.
+    tabulated: usize,
     recurring: Recurring,
     /// Work space: w' at the end of a span.
     rates: Vec<f64>,
@@ -109,6 +111,7 @@ impl Flow {
                 .collect(),
             ladder,
             levels: vec![None; bottom as usize + 1],
+            tabulated: 0,
             recurring: Recurring::default(),
             rates: Vec::new(),
             spectrum,
@@ -203,23 +206,25 @@ impl Flow {
             self.rows.apply_first(&column, guards.column_mut(j));
         }
         self.levels[level as usize] = Some(Kernel::stacked(&[&increment, &guards]));
+        self.tabulated += 1;
         true
     }
 
     /// How many bytes the exponentials and the forms of energy that were made so far take, about.
     pub(crate) fn kept(&self) -> usize {
-        let levels = self.levels.iter().flatten().count();
         let (guarded, work) = (
             self.dim + 2 * self.guards,
             self.work.as_ref().map_or(0, EnergyIntegral::kept),
         );
-        let rows = levels * (self.dim + guarded) + (self.recurring.kept() + work) * self.dim;
+        let rows =
+            self.tabulated * (self.dim + guarded) + (self.recurring.kept() + work) * self.dim;
         rows * self.dim * size_of::<f64>()
     }
 
     /// Gives them up: they are made again when asked for.
     pub(crate) fn forget(&mut self) {
         self.levels.fill(None);
+        self.tabulated = 0;
         self.ladder.forget();
         self.recurring.forget();
         if let Some(work) = &mut self.work {
@@ -276,7 +281,6 @@ impl Flow {
     /// w' at w.
     pub(crate) fn rates_of(&self, w: &[f64], rates: &mut Vec<f64>) {
         applied(&self.generator_kernel, w, rates);
-        rates.truncate(self.dim);
     }
 
     /// How large the terms of w' add up to where |w| ≤ `sizes`.
@@ -471,11 +475,10 @@ impl Flow {
     }
 }
 
-/// A matrix times w, with zeros behind the last component.
+/// A matrix times w.
 fn applied(matrix: &SparseKernel, w: &[f64], values: &mut Vec<f64>) {
-    values.resize(w.len().next_multiple_of(BLOCK), 0.0);
-    let (blocks, _) = values.as_chunks_mut::<BLOCK>();
-    matrix.apply(w, blocks);
+    values.resize(matrix.rows(), 0.0);
+    matrix.apply_first(w, values);
 }
 
 /// 𝒜 w · factor, with zeros behind the last component.

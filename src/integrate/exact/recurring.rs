@@ -24,6 +24,8 @@ pub(super) struct Recurring {
     spans: Vec<Span>,
     /// The place of the next new span once all are taken.
     next: usize,
+    /// How many exponentials are kept.
+    kept: usize,
 }
 
 impl Recurring {
@@ -78,18 +80,20 @@ impl Recurring {
         let span = &mut self.spans[at];
         if span.increment.is_none() {
             span.increment = prepare(span.time);
+            self.kept += usize::from(span.increment.is_some());
         }
         span.increment.as_ref()
     }
 
     /// How many exponentials are kept.
     pub(super) fn kept(&self) -> usize {
-        self.spans.iter().filter(|s| s.increment.is_some()).count()
+        self.kept
     }
 
     /// Gives up the exponentials: they are prepared again when asked for.
     pub(super) fn forget(&mut self) {
         self.spans.iter_mut().for_each(|span| span.increment = None);
+        self.kept = 0;
     }
 }
 

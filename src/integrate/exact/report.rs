@@ -30,7 +30,7 @@ pub(super) struct Report {
     pub(super) accumulation: Accumulation,
     noted_shared: bool,
     noted_hidden: bool,
-    /// The largest current of a conducting device or inductor and voltage of a blocking device or capacitor so far, A and V.
+    /// The largest current of a conducting device and voltage of a blocking device so far, A and V.
     largest: [f64; 2],
     /// Whether a jump between rivals has been noted.
     pub(super) noted_rivals: bool,
@@ -90,13 +90,13 @@ impl Report {
     }
 
     /// Notes the first device that stands wrongly at the end of mode `at`, at t: `sides` has pairs and guards, which are negative there. A
-    /// guard that rounding hides has not ended the mode. `stored` are the largest current and voltage of the storage.
+    /// guard that rounding hides has not ended the mode. `stored` are the largest current and voltage of the storage so far.
     pub(super) fn note_hidden(
         &mut self,
         table: &ModeTable,
         at: usize,
         sides: impl Iterator<Item = (usize, f64)> + Clone,
-        stored: [f64; 2],
+        stored: impl Fn() -> [f64; 2],
         t: f64,
     ) {
         if self.noted_hidden {
@@ -104,9 +104,6 @@ impl Report {
         }
         let closed = &table.modes[at].key.closed;
         let is = |pair: usize| closed.get(pair).copied().unwrap_or(true);
-        for (largest, stored) in self.largest.iter_mut().zip(stored) {
-            *largest = largest.max(stored);
-        }
         let mut negative = false;
         for (pair, g) in sides.clone() {
             let largest = &mut self.largest[usize::from(!is(pair))];
@@ -116,7 +113,11 @@ impl Report {
         if !negative {
             return;
         }
-        for (side, largest) in [true, false].into_iter().zip(self.largest) {
+        for (side, (largest, stored)) in [true, false]
+            .into_iter()
+            .zip(self.largest.into_iter().zip(stored()))
+        {
+            let largest = largest.max(stored);
             let guards = sides.clone().filter(|(pair, _)| is(*pair) == side);
             let mut wrong = guards.filter(|(_, g)| *g < -WRONG_SIDE * largest);
             let Some((device, g)) = wrong.find_map(|(pair, g)| Some((table.device(pair)?, g)))

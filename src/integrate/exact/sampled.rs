@@ -66,8 +66,8 @@ fn followed(outputs: &Kernel, columns: usize, step: &Dense) -> Kernel {
         }
         // (I + E)(I + F) = I + E + F + E F
         product.set_product(&increment, step);
-        increment.combine(1.0, 1.0, step);
-        increment.combine(1.0, 1.0, &product);
+        increment.add(step);
+        increment.add(&product);
     }
     Kernel::stacked(&[&table])
 }

@@ -17,18 +17,17 @@ pub(crate) struct Rate {
 }
 
 /// All rates of a mode: what limits steps while a transient and all slower ones live, the fastest first.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(crate) struct Spectrum {
     limits: Vec<Limit>,
-    /// The fastest growth, 1/s.
-    growth: f64,
+    growth_limit: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Limit {
     /// The age at which the transient is extinct, s.
     until: f64,
-    /// What oscillations allow, s.
+    /// What oscillations and growth allow, s.
     resolved: f64,
     /// The first step after a change of mode, s.
     first: f64,
@@ -81,22 +80,33 @@ impl Spectrum {
             });
         }
         limits.reverse();
-        Self { limits, growth }
+        let growth_limit = GROWN / growth;
+        for limit in &mut limits {
+            limit.resolved = limit.resolved.min(growth_limit);
+        }
+        Self {
+            limits,
+            growth_limit,
+        }
     }
 
     /// The longest step that hides nothing `age` seconds after the last change of mode: dead transients no longer count,
     /// decays are followed on steps that double, oscillations are resolved while they last.
     pub(crate) fn step_limit(&self, age: f64) -> f64 {
         let living = self.limits.iter().find(|limit| age <= limit.until);
-        let limit = living.map_or(f64::INFINITY, |limit| {
-            limit.resolved.min(age.max(limit.first))
-        });
-        limit.min(self.growth_limit())
+        living.map_or(self.growth_limit, |limit| {
+            let follows = if age > limit.first { age } else { limit.first };
+            if follows < limit.resolved {
+                follows
+            } else {
+                limit.resolved
+            }
+        })
     }
 
     /// The longest step that follows what grows, s; infinite in a mode without growth.
     pub(crate) fn growth_limit(&self) -> f64 {
-        GROWN / self.growth
+        self.growth_limit
     }
 }
 
@@ -135,7 +145,10 @@ mod tests {
             "the decay is extinct"
         );
         assert!((spectrum.step_limit(1.0) / 0.7e-3 - 1.0).abs() < 1e-9);
-        assert_eq!(Spectrum::default().step_limit(0.0), f64::INFINITY);
+        assert_eq!(
+            Spectrum::new(&DMatrix::zeros(0, 0), &[]).step_limit(0.0),
+            f64::INFINITY
+        );
     }
 
     #[test]

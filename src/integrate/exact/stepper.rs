@@ -311,7 +311,7 @@ impl Exact {
         let devices = mode.device_guards.iter().zip(guards).enumerate();
         let others = devices.filter(|(guard, _)| fired != Some(*guard));
         let sides = others.map(|(_, (&pair, g))| (pair, *g));
-        let stored = self.storage.amplitudes();
+        let stored = || self.storage.amplitudes();
         self.report
             .note_hidden(&self.table, at, sides, stored, self.travel.t);
     }
