@@ -133,6 +133,10 @@ pub(crate) fn attempt(
     };
     log.rows.end();
     let (time, values, kinds) = log.rows.collected();
+    let (mut stats, mut state_jumps) = (outcome.stats, std::mem::take(&mut log.state_jumps));
+    if state_jumps.forget_rounding(outcome.energy.at_hand()) {
+        stats.jumps = stats.jumps.saturating_sub(1);
+    }
     let run = Run {
         waveforms: Waveforms {
             title,
@@ -144,13 +148,13 @@ pub(crate) fn attempt(
         kinds,
         method,
         plan,
-        stats: outcome.stats,
+        stats,
         energy: outcome.energy,
         balanced: true,
         error: outcome.error,
         impulses: std::mem::take(&mut log.impulses),
         events: std::mem::take(&mut log.events),
-        state_jumps: std::mem::take(&mut log.state_jumps),
+        state_jumps,
         notes: all_notes,
         aliased: None,
         verified: None,

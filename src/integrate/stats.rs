@@ -6,7 +6,7 @@ use crate::integrate::event::Event;
 use crate::integrate::orbit::Orbit;
 use crate::integrate::rows::RowKind;
 use crate::integrate::verify::Verified;
-use crate::settings::tolerances::jumps::DESTROYED;
+use crate::settings::tolerances::jumps::{DESTROYED, NO_JUMP};
 use crate::waveform::Waveforms;
 
 /// Counters of one run; deterministic except `cpu_seconds`.
@@ -85,6 +85,13 @@ pub struct Energy {
     pub residual: f64,
     /// |residual| relative to the largest energy seen.
     pub residual_relative: f64,
+}
+
+impl Energy {
+    /// What was at hand in the course of the run, J.
+    pub(crate) fn at_hand(&self) -> f64 {
+        self.source.abs() + self.dissipated.abs() + self.stored.abs()
+    }
 }
 
 /// A current (or voltage) impulse.
@@ -219,6 +226,28 @@ impl StateJumps {
         self.first.truncate(Self::KEPT);
     }
 
+    /// Takes back the jump at the start that is rounding beside the energy of the whole run, J: there nothing is known of sizes yet. Whether there was
+    /// one.
+    pub(crate) fn forget_rounding(&mut self, energy: f64) -> bool {
+        let is = |jump: &StateJump| {
+            jump.reason == JumpReason::Start && jump.loss <= NO_JUMP * NO_JUMP * energy
+        };
+        let Some(at) = self.first.iter().position(is) else {
+            return false;
+        };
+        let jump = self.first.remove(at);
+        let less = |(number, loss): &mut (u64, f64)| {
+            *number -= 1;
+            *loss -= jump.loss;
+        };
+        less(&mut self.all);
+        if jump.destroys {
+            less(&mut self.destroying);
+            self.destroyer = self.first.iter().find(|other| other.destroys).cloned();
+        }
+        true
+    }
+
     /// Adds a jump.
     pub fn add(&mut self, jump: StateJump) {
         let count = |(number, loss): &mut (u64, f64)| {
@@ -296,4 +325,27 @@ pub struct Run {
     pub verified: Option<Verified>,
     /// The periodic steady state of which it is one period, if it is one.
     pub orbit: Option<Orbit>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn jump(loss: f64, reason: JumpReason) -> StateJump {
+        let storage = (&["l1".to_owned()][..], &["A"][..]);
+        StateJump::new(0.0, storage, &[0], (loss, loss), reason)
+    }
+
+    /// At the start a current of rounding is the largest there has been; beside the energy of the run it is nothing.
+    #[test]
+    fn a_jump_of_rounding_at_the_start_is_none() {
+        let mut jumps = StateJumps::default();
+        jumps.add(jump(1e-33, JumpReason::Start));
+        jumps.add(jump(1e-3, JumpReason::Switch("s1".into())));
+        assert_eq!(jumps.destroying, (2, 1e-33 + 1e-3));
+        assert!(!jumps.forget_rounding(1e-10));
+        assert!(jumps.forget_rounding(1.0));
+        assert_eq!((jumps.all, jumps.destroying), ((1, 1e-3), (1, 1e-3)));
+        assert_eq!(jumps.destroyer.map(|jump| jump.loss), Some(1e-3));
+    }
 }

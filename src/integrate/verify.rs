@@ -20,7 +20,7 @@ use crate::lcs::Lcs;
 use crate::mna::StaticMultiport;
 use crate::settings::Settings;
 use crate::settings::tolerances::stated::{
-    ASIDE, ENOUGH, EXACT, MOST_LEFT_OUT, SAFETY, TOLERANCES,
+    ASIDE, ENOUGH, EXACT, MOST_LEFT_OUT, MOST_STEPS, SAFETY, TOLERANCES,
 };
 
 /// What the second run found.
@@ -101,6 +101,7 @@ fn second(
             unestimated: true,
             settings: Settings {
                 tol,
+                max_steps: options.settings.max_steps.min(MOST_STEPS),
                 ..options.settings.clone()
             },
             cancel: options.cancel,
