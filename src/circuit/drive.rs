@@ -200,8 +200,8 @@ impl<'n> Builder<'n, '_> {
         let at = |k: usize| x.get(k).copied().unwrap_or(0.0);
         let or = |k: usize, default: f64| x.get(k).copied().unwrap_or(default);
         let (rise, fall, width) = (or(3, tstep), or(4, tstep), or(5, tstop));
-        let period = or(6, tstop);
-        let period = if period == 0.0 { tstop } else { period };
+        // Without a period it comes once: what ngspice has begin again at the end of the run would be an edge on the last row.
+        let period = or(6, 0.0);
         for (k, value) in [(3, rise), (4, fall), (5, width), (6, period)] {
             if value < 0.0 {
                 let message = format!(
@@ -216,7 +216,7 @@ impl<'n> Builder<'n, '_> {
             }
         }
         // Defaults of omitted values may overlap; only what was written is worth a warning.
-        if x.len() > 6 && rise + width + fall > period * (1.0 + SAME_TIME) {
+        if period > 0.0 && rise + width + fall > period * (1.0 + SAME_TIME) {
             let message = "rise time, width and fall time add up to more than the period";
             self.tell(
                 Diagnostic::warning("pulse-overfull", call.name.span, message)

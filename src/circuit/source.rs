@@ -62,7 +62,7 @@ pub enum Wave {
         fall: f64,
         /// Pulse width, s.
         width: f64,
-        /// Period, s.
+        /// Period, s; 0: it comes once.
         period: f64,
         /// Number of periods; `None` is without end.
         count: Option<f64>,

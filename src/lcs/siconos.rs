@@ -195,7 +195,7 @@ fn wave(wave: &Wave, end: f64) -> Option<String> {
             period,
             count,
         } => {
-            let period = if period.is_finite() {
+            let period = if period > 0.0 && period.is_finite() {
                 period
             } else {
                 delay.abs() + 2.0 * end

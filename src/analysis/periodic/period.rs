@@ -136,7 +136,7 @@ fn periods(wave: &Wave) -> (Vec<BigRational>, f64) {
             delay,
             period,
             ..
-        } if v1 != v2 => (vec![simplest(period)], delay),
+        } if v1 != v2 && period > 0.0 => (vec![simplest(period)], delay),
         Wave::Pwl {
             ref points,
             repeat: Some(from),

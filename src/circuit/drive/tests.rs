@@ -27,10 +27,10 @@ fn source(card: &str, tran: &str) -> Source {
 }
 
 #[test]
-fn omitted_values_take_the_defaults_of_ngspice() {
+fn omitted_values_take_the_defaults_of_ngspice_but_for_the_period() {
     let tran = ".tran 1u 100u";
     let pulse = source("V1 a 0 PULSE(0 5 1u)", tran).wave;
-    let (rise, fall, width, period) = (1e-6, 1e-6, 1e-4, 1e-4);
+    let (rise, fall, width, period) = (1e-6, 1e-6, 1e-4, 0.0);
     assert_eq!(
         pulse,
         Wave::Pulse {
@@ -177,4 +177,17 @@ fn pwl_repeats_a_number_of_times() {
             delay: 0.0,
         }
     );
+}
+
+/// Without a period there is no edge on the last row, where ngspice's period of the whole run would have it begin again.
+#[test]
+fn a_pulse_without_a_period_comes_once() {
+    for card in [
+        "V1 a 0 PULSE(0 5 0 10n)",
+        "V1 a 0 PULSE(0 5 0 10n 10n 2m 0)",
+    ] {
+        let wave = source(card, ".tran 1u 1m").wave;
+        assert_eq!(wave.value(1e-3), 5.0, "{card}");
+        assert_eq!(wave.period(), None, "{card}");
+    }
 }
