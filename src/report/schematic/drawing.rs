@@ -2,7 +2,7 @@
 
 use super::super::sheet::{Anchor, INK, Sheet, escaped, short, width_of};
 use super::super::svg::titled;
-use super::grid::{self, COLUMN, GROUND, Grid, LEVEL, Plan, Pose, Run};
+use super::grid::{self, COLUMN, GROUND, Grid, LEVEL, Plan, Pose, Rise, Run};
 use super::part::{Part, Parts, brief};
 use super::words::{
     ABOVE, FAINT, SMALL, TEXT, WIRE, ground, lying_words, named, upright_words, written,
@@ -267,14 +267,24 @@ impl<'a> Drawing<'a> {
         sheet.text(&words.join("   "), at, SMALL, Anchor::Start);
     }
 
-    /// Names of the nets, each above the widest gap of its trunk.
+    /// Names of the nets, each above the widest gap of its trunk between what meets or crosses it.
     fn nets(&self, sheet: &mut Sheet) {
         for run in &self.grid.runs {
             let Some(net) = run.net.filter(|net| *net != GROUND) else {
                 continue;
             };
-            let gaps = self.grid.pins[net].windows(2);
-            let widest = gaps.max_by_key(|gap| (gap[1] - gap[0], -gap[0]));
+            let (level, inside) = (LEVEL * run.level, run.x.0 + 1..run.x.1);
+            let crosses = |rise: &&Rise| {
+                inside.contains(&rise.x.0) && (rise.y.0 + 1..rise.y.1).contains(&level)
+            };
+            let crossings = self.grid.rises.iter().filter(crosses).map(|rise| rise.x.0);
+            let mut stops: Vec<i32> = crossings
+                .chain(self.grid.pins[net].iter().copied())
+                .collect();
+            stops.sort_unstable();
+            let widest = stops
+                .windows(2)
+                .max_by_key(|gap| (gap[1] - gap[0], -gap[0]));
             let (x, anchor, aside) = match widest {
                 Some(gap) if gap[1] > gap[0] => (gap, Anchor::Middle, 0.0),
                 _ => (&[run.x.0, run.x.0][..], Anchor::Start, 5.0),

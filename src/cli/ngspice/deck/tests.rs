@@ -90,3 +90,27 @@ fn without_a_transient_there_is_no_deck() {
     let error = deck(&Circuit::default(), &options(Realisation::Default)).unwrap_err();
     assert_eq!(error, DeckError::NoTran);
 }
+
+/// ngspice couples two inductors with a card, whose name it wants once.
+#[test]
+fn three_windings_on_one_card_are_three_cards_with_names_of_their_own() {
+    let circuit = circuit(
+        "transformer\n\
+         v1 a 0 sin(0 1 50)\n\
+         l1 a 0 1m\n\
+         l2 b 0 4m\n\
+         l3 c 0 9m\n\
+         r2 b 0 1\n\
+         r3 c 0 1\n\
+         k1 l1 l2 l3 0.9\n\
+         .tran 1u 1m uic\n\
+         .end\n",
+    );
+    let deck = deck(&circuit, &options(Realisation::N001)).unwrap();
+    let cards = deck.text.lines().filter(|line| line.starts_with('k'));
+    let cards: Vec<Vec<&str>> = cards.map(|card| card.split(' ').collect()).collect();
+    let pairs: Vec<&[&str]> = cards.iter().map(|card| &card[1..3]).collect();
+    assert_eq!(pairs, [["l1", "l2"], ["l1", "l3"], ["l2", "l3"]]);
+    let names: BTreeSet<&str> = cards.iter().map(|card| card[0]).collect();
+    assert_eq!(names.len(), 3, "{names:?}");
+}
