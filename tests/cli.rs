@@ -607,6 +607,46 @@ fn an_unknown_probe_says_what_was_probably_meant() {
     assert!(ran.err.contains("signals and ratios of two"), "{ran}");
 }
 
+/// A name of an element is no signal, and a transistor's current has LTspice's name in expressions too.
+#[test]
+fn probes_may_name_what_an_element_carries() {
+    let ran = run("sim divider.cir --probe R1");
+    assert_eq!(ran.status, 2, "{ran}");
+    assert!(ran.err.contains("write `i(r1)` for its current"), "{ran}");
+    let mos = "vd d 0 10\nvh h 0 10\nrd d a 9\nm1 a h 0 0 mn\n.model mn nmos(ron=1 vto=2)";
+    let (names, values) = last_row(mos, "--probe v(a)*Id(M1) --probe i(m1) -q");
+    assert_eq!(names.len(), 2, "{names:?}");
+    assert!((values[0] - 1.0).abs() < 1e-9, "{values:?}");
+    assert!((values[1] - 1.0).abs() < 1e-9, "{values:?}");
+}
+
+/// A current that a switch interrupts meets its `Roff` in a row at the event alone: rows that are written as they come are looked at too.
+#[test]
+fn a_spike_is_told_of_in_rows_that_pass_by() {
+    let place = place();
+    let interrupted = "interrupted\nv1 in 0 12\nl1 in sw 100u\ns1 sw 0 g 0 sm\nvg g 0 pulse(0 1 10u 1n 1n 40u 100u)\n\
+        .model sm sw(ron=10m roff=1meg vt=.5)\n.tran 0 200u 0 3u\n.end\n";
+    fs::write(place.path().join("interrupted.cir"), interrupted).unwrap();
+    let ran = run_in(place.path(), "sim interrupted.cir -o rows.csv");
+    assert!(
+        ran.err.contains("has fallen before the next row"),
+        "{}",
+        ran.err
+    );
+}
+
+/// What is measured is a result, which `-q` does not hide, of several runs as of one.
+#[test]
+fn quiet_runs_tell_what_they_measured() {
+    let place = place();
+    for step in ["", ".step param top list 2 10\n"] {
+        let text = DIVIDER.replace(".end", &format!("{step}.meas tran most max v(out)\n.end"));
+        fs::write(place.path().join("measured.cir"), text).unwrap();
+        let ran = run_in(place.path(), "sim measured.cir -q -o rows.csv");
+        assert!(ran.err.contains("most"), "{step}: {ran}");
+    }
+}
+
 #[test]
 fn all_files_of_a_run_hold_the_same_numbers() {
     let directory = place();

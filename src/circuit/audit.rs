@@ -45,7 +45,7 @@ impl<'n> Builder<'n, '_> {
             self.tell(
                 Diagnostic::error("no-ground", end, "the circuit has no ground")
                     .label("no element up to here is connected to node `0`")
-                    .help("call one node `0` (or `gnd`)"),
+                    .help("call one node `0` (or `gnd`); in a schematic, place a ground symbol"),
             );
         }
     }

@@ -149,10 +149,14 @@ impl<'n> Builder<'n, '_> {
                     format!("the netlist has no parameter `{name}` to set"),
                 );
                 let near = nearest(&name, declared.iter().copied());
-                self.tell(match near {
-                    Some(near) => fault.help(format!("did you mean `{near}`?")),
-                    None => fault,
-                });
+                let mut names: Vec<&str> = declared.iter().copied().collect();
+                names.sort_unstable();
+                let help = match (near, &names[..]) {
+                    (Some(near), _) => format!("did you mean `{near}`?"),
+                    (None, []) => format!("define it, `.param {name}=1`, and use it, `{{{name}}}`"),
+                    (None, names) => format!("there are {}", names.join(", ")),
+                };
+                self.tell(fault.help(help));
             }
         }
     }

@@ -43,6 +43,14 @@ impl<'n> Builder<'n, '_> {
         let mut wanted = name.clone();
         loop {
             let Some(model) = self.scopes.model(scope, &wanted.text) else {
+                if card.nodes.iter().any(|node| node.text == wanted.text) {
+                    let message = format!("`{}` names no model", card.name.text);
+                    let fault = Diagnostic::error("unknown-model", wanted.span, message)
+                        .label("a node of it")
+                        .help("write the name of a model behind the nodes");
+                    self.tell(fault);
+                    return None;
+                }
                 let message = format!("`{}` uses unknown model `{}`", card.name.text, wanted.text);
                 let fault =
                     Diagnostic::error("unknown-model", wanted.span, message).label("not defined");

@@ -151,6 +151,11 @@ impl Circuit {
     }
 
     fn unknown(&self, text: &str) -> Diagnostic {
+        if self.element(text).is_some() {
+            let message = format!("`{text}` is an element, and no node");
+            return Diagnostic::error("unknown-probe", None, message)
+                .help(format!("write `i({text})` for its current"));
+        }
         let message = format!("there is no node or element `{text}`");
         Diagnostic::error("unknown-probe", None, message).help(self.what_there_is(text))
     }
@@ -181,6 +186,17 @@ impl Circuit {
                 self.signal(probe)
             }
             ExprKind::Call(name, args) => {
+                // A transistor's current as LTspice calls it.
+                if let [
+                    Expr {
+                        kind: ExprKind::Name(own),
+                        ..
+                    },
+                ] = &args[..]
+                    && let Some(probe) = self.probe(&format!("{}({own})", name.text))
+                {
+                    return Ok(self.signal(probe));
+                }
                 check_call(&name.text, args.len())?;
                 let values = args.iter().map(|arg| self.shown_formula(arg));
                 Formula::Call(name.text.clone(), values.collect::<Read<_>>()?)

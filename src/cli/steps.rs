@@ -179,7 +179,9 @@ impl Stepping<'_> {
         if !matches!(self.args.results.summary, Some(Summary::Json)) {
             match streams.log {
                 Some(_) => streams.say(log::steps(done)),
-                None => streams.say(measured),
+                // Results, which `-q` does not hide.
+                None if !measured.is_empty() => streams.error(measured),
+                None => {}
             }
         }
         if destination.plots {

@@ -32,13 +32,16 @@ pub struct Spectrum {
 /// The first `count` harmonics of `frequency` over the last period of a waveform, exactly for its lines and polynomials.
 ///
 /// # Errors
-/// [`MeasureError::Window`] where the run is shorter than a period.
+/// [`MeasureError::Period`] where the run is shorter than a period.
 pub fn fourier(trace: &Trace<'_>, frequency: f64, count: usize) -> Result<Spectrum, MeasureError> {
     let period = frequency.recip();
     let (first, to) = trace.span().unwrap_or_default();
     let from = to - period;
     if !(period.is_finite() && period > 0.0) || first - from > f64::EPSILON * to.abs() {
-        return Err(MeasureError::Window { from, to });
+        return Err(MeasureError::Period {
+            frequency,
+            seconds: to - first,
+        });
     }
     let mut parts: Vec<Part> = vec![];
     trace.pieces((from, to), |piece| {

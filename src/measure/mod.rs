@@ -22,12 +22,20 @@ pub use trace::Trace;
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum MeasureError {
     /// The window from … to … holds no piece of the waveform.
-    #[error("no part of the run lies between {from} s and {to} s")]
+    #[error("no part of the run lies between {} s and {} s", short(*.from), short(*.to))]
     Window {
         /// Its start, s.
         from: f64,
         /// Its end, s.
         to: f64,
+    },
+    /// The run is shorter than a period.
+    #[error("a period of {} Hz takes {} s, and the run no more than {} s", short(*.frequency), short(.frequency.recip()), short(*.seconds))]
+    Period {
+        /// Hz.
+        frequency: f64,
+        /// Of the run.
+        seconds: f64,
     },
     /// The crossing asked for does not happen.
     #[error("{}", crossings(*.level, *.found))]
@@ -52,6 +60,11 @@ pub enum MeasureError {
     /// The measurement needs its own result.
     #[error("its own result is needed first")]
     Circular,
+}
+
+/// A number without the last digits, which rounding makes.
+fn short(value: f64) -> f64 {
+    format!("{value:.12e}").parse().unwrap_or(value)
 }
 
 fn crossings(level: f64, found: usize) -> String {

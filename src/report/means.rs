@@ -6,6 +6,9 @@ use crate::analysis::{Mean, SignalMeans, Table, Throughput};
 /// Digits shown.
 const DIGITS: usize = 4;
 
+/// Distortion beyond which a signal has no fundamental to speak of: a voltage that is meant to be constant.
+const NO_FUNDAMENTAL: f64 = 10.0;
+
 /// Of the largest voltage or current of a table, what is shown as 0: the rounding of a difference.
 const INVISIBLE: f64 = 1e-13;
 
@@ -62,7 +65,8 @@ impl Table {
             let mut row = vec![name.clone()];
             row.extend(cells(value, unit));
             row.push(quantity(*ripple, unit));
-            row.push(thd.map_or("-".into(), |thd| {
+            let distorted = thd.filter(|thd| *thd <= NO_FUNDAMENTAL);
+            row.push(distorted.map_or("-".into(), |thd| {
                 format!("{} %", si::plain(100.0 * thd, DIGITS))
             }));
             row
@@ -96,6 +100,8 @@ impl Table {
         if let Some(efficiency) = efficiency {
             let percent = si::plain(100.0 * efficiency, DIGITS);
             text.push_str(&format!(", efficiency {percent} %"));
+        } else if outputs.is_empty() {
+            text.push_str("; `--out` with the names of loads adds output and efficiency");
         }
         text.push('\n');
         text

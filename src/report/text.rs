@@ -188,16 +188,16 @@ fn stated_error(run: &Run) -> Option<String> {
     let part = |error: f64| si::plain(error, 2);
     match (run.error.max, run.error.rms) {
         (Some(max), Some(rms)) => Some(format!(
-            "error: {} of the amplitudes at most, {} RMS, as the steps let expect",
+            "stated error: {} of the amplitudes at most, {} RMS, as the steps let expect",
             part(max),
             part(rms)
         )),
         (Some(max), None) => Some(format!(
-            "error: {} of the amplitudes, as the steps let expect",
+            "stated error: {} of the amplitudes, as the steps let expect",
             part(max)
         )),
         _ if run.method == Method::Exact.name() => None,
-        _ => Some("error: not known".into()),
+        _ => Some("stated error: not known".into()),
     }
 }
 
@@ -382,7 +382,7 @@ mod tests {
         plan: no devices: linear
         theta: 1200 steps (3 rejected), 4 events, 0 jumps, 0 modes, 0 LCP solves, 1.5 ms CPU
         energy: source 12.5 mJ, dissipated 10 mJ, stored 1.5 mJ, lost in jumps 1 mJ, by numerical damping 0 J, residual 3.1e-7 of the largest
-        error: not known
+        stated error: not known
         jump: l1 at 1 ms (switch s1), 1 mJ lost
         impulse: i(d1) at 1 ms, area 2 µA·s
         impulse: i(d1) at 1 ms, area 2 µA·s

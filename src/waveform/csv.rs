@@ -126,7 +126,15 @@ pub(super) fn plot(from: impl Read) -> Result<Plot, WaveformError> {
 }
 
 fn is_time(axis: &str) -> bool {
-    matches!(axis.to_ascii_lowercase().as_str(), "time" | "t")
+    // With its unit, as oscilloscopes write it: `Time (s)`, `time[s]`.
+    let lower = axis.to_ascii_lowercase();
+    let name = lower
+        .trim_end_matches(|c: char| matches!(c, ')' | ']' | 's'))
+        .trim_end();
+    let name = name
+        .strip_suffix(['(', '['])
+        .map_or(lower.as_str(), str::trim_end);
+    matches!(name, "time" | "t")
 }
 
 fn malformed(reason: impl Into<String>) -> WaveformError {

@@ -21,8 +21,14 @@ pub(super) fn by_voltage<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
         (at, Some(control)) => (at, control),
         (at, None) => {
             let (at, pair) = nodes(at, 2, "controlling node")?;
-            let (at, gain) = expect_value(separator(at), "the gain")?;
-            (at, Control::Nodes(pairs(pair), linear(gain)))
+            match special(at, true)? {
+                // `LAPLACE=` stands behind the nodes.
+                (rest, Some(other @ Control::Other(_))) => (rest, other),
+                _ => {
+                    let (at, gain) = expect_value(separator(at), "the gain")?;
+                    (at, Control::Nodes(pairs(pair), linear(gain)))
+                }
+            }
         }
     };
     finish(at, own, voltage, control)

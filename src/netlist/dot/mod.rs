@@ -141,11 +141,11 @@ pub(in crate::netlist) fn card(i: Input<'_>) -> Parsed<'_, Dot> {
         ".ac" => Ok(sweep::ac(start, rest)),
         ".pss" => Ok(sweep::pss(start, rest)),
         ".noise" | ".tf" | ".sens" | ".pz" | ".disto" | ".sp" | ".net" | ".savebias"
-        | ".loadbias" | ".machine" | ".endmachine" | ".ferret" | ".data" | ".enddata" => {
+        | ".loadbias" | ".wave" | ".machine" | ".endmachine" | ".ferret" | ".data" | ".enddata" => {
             Ok((skip(rest), Dot::Skipped))
         }
-        ".backanno" | ".wave" | ".width" | ".protect" | ".unprotect" | ".prot" | ".unprot"
-        | ".endc" | ".newpage" => Ok((skip(rest), Dot::Nothing)),
+        ".backanno" | ".width" | ".protect" | ".unprotect" | ".prot" | ".unprot" | ".endc"
+        | ".newpage" => Ok((skip(rest), Dot::Nothing)),
         _ => {
             let fault = Diagnostic::error(
                 "unknown-directive",
