@@ -165,6 +165,42 @@ fn infeasible_problems_carry_a_certificate() {
     }
 }
 
+/// λ = (0, 2) has Mλ + q = (0, 1) ≥ 0, but nothing is complementary. Lemke ends on the ray (1, 0) with qᵀv = −2, which proves nothing:
+/// Mᵀv = (−1, 1).
+#[test]
+fn a_ray_that_proves_nothing_is_no_certificate() {
+    let (m, q) = (dmatrix![-1.0, 1.0; -1.0, 1.0], dvector![-2.0, -1.0]);
+    assert!((&m * dvector![0.0, 2.0] + &q).min() >= 0.0);
+    let ray = lemke::solve(
+        &Lcp {
+            m: m.clone(),
+            q: q.clone(),
+        },
+        &dvector![1.0, 1.0],
+    );
+    assert_eq!(ray, Lemke::Ray(dvector![1.0, 0.0]));
+    assert_eq!(Driver::new(m, TOLERANCE).solve(&q).status, Status::Failed);
+}
+
+/// The kernel of a matrix with fewer rows than columns, and of one with more.
+#[test]
+fn kernels_have_what_rows_leave() {
+    for (a, dimension) in [
+        (dmatrix![1.0, 1.0, 0.0], 2),
+        (dmatrix![1.0, 2.0; 2.0, 4.0; 3.0, 6.0], 1),
+        (dmatrix![1.0, 2.0; 2.0, 1.0], 0),
+    ] {
+        let kernel = norm::kernel(&a);
+        assert_eq!(kernel.ncols(), dimension, "{a}");
+        assert!(
+            (&a * &kernel).iter().all(|v| v.abs() < 1e-14),
+            "{a}{kernel}"
+        );
+        let unit = kernel.transpose() * &kernel - DMatrix::identity(dimension, dimension);
+        assert!(unit.iter().all(|v| v.abs() < 1e-14), "{kernel}");
+    }
+}
+
 /// Three diodes in a ring: M is singular but for rounding.
 #[test]
 fn degenerate_ports_leave_a_singular_set() {

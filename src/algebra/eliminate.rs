@@ -282,6 +282,28 @@ mod tests {
         assert_eq!(m.at(state.pivot[0].unwrap(), 2).unwrap().to_f64(), 1.0);
     }
 
+    #[test]
+    fn a_pivot_goes_to_a_column_that_is_free_and_depends_on_it() {
+        // x0 + 2 x2 = 0, x1 + 3 x3 = 0.
+        let rows = [[1.0, 0.0, 2.0, 0.0], [0.0, 1.0, 0.0, 3.0]];
+        let exact: Vec<Vec<Rational>> = rows
+            .iter()
+            .map(|row| row.iter().map(|&x| rational(x)).collect())
+            .collect();
+        let (mut m, mut state) = eliminate_all(&exact, Rational::clone);
+        let before = state.pivot.clone();
+        for (leaving, entering) in [(0, 1), (0, 3), (2, 0)] {
+            assert!(
+                !m.exchange(leaving, entering, &mut state),
+                "{leaving} {entering}"
+            );
+            assert_eq!(state.pivot, before);
+        }
+        assert!(m.exchange(0, 2, &mut state));
+        assert_eq!((state.pivot[0], state.pivot[2]), (None, before[0]));
+        assert_eq!(m.at(before[0].unwrap(), 0).unwrap().to_f64(), 0.5);
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig { cases: 64, failure_persistence: Some(Box::new(proptest::test_runner::FileFailurePersistence::WithSource("regressions"))), ..Default::default() })]
         #[test]

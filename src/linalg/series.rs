@@ -119,6 +119,16 @@ mod tests {
     use super::*;
     use nalgebra::DMatrix;
 
+    #[test]
+    fn a_term_that_grows_smaller_leaves_the_largest() {
+        let (mut term, mut largest) = ([[1.0; BLOCK]], [[2.0; BLOCK]]);
+        assert!(!settle(&mut term, &mut largest, 0.5));
+        assert_eq!((term, largest), ([[0.5; BLOCK]], [[2.0; BLOCK]]));
+        assert!(!settle(&mut term, &mut largest, 6.0));
+        assert_eq!(largest, [[3.0; BLOCK]]);
+        assert!(settle(&mut term, &mut largest, 0.1 * TERM_IS_NOTHING));
+    }
+
     /// Rotations at rates 1, 2, … beside a constant: any number of blocks, the same series.
     #[test]
     fn rotations_of_any_dimension() {

@@ -232,6 +232,13 @@ mod tests {
     use nalgebra::{dmatrix, dvector};
 
     #[test]
+    fn equilibration_asks_for_sizes_and_not_for_signs() {
+        let m = dmatrix![1.0, -4096.0; 1.0, 1.0];
+        assert_eq!(Scaling::of(&m).d, Scaling::of(&m.abs()).d);
+        assert_eq!(Scaling::of(&m.transpose()).d, Scaling::of(&m.abs()).d);
+    }
+
+    #[test]
     fn equilibration_keeps_every_digit_and_levels_the_entries() {
         let m = dmatrix![1e-12, 3.0; -3.0, 1e9];
         let scaling = Scaling::of(&m);

@@ -196,6 +196,15 @@ mod tests {
         assert!(ray[0] > 0.0);
     }
 
+    /// At λ = (1, 1, 0) z₀ reaches 0 together with another variable: leaving with that one instead ends on a ray, though M λ + q = 0.
+    #[test]
+    fn the_cover_leaves_first_where_it_ties() {
+        let m = dmatrix![1.0, 0.0, 1.0; 0.0, 1.0, -1.0; 1.0, -1.0, 1.0];
+        let q = dvector![-1.0, -1.0, 0.0];
+        assert_eq!(&m * dvector![1.0, 1.0, 0.0] + &q, DVector::zeros(3));
+        assert_eq!(run(m, q), Lemke::Basis(vec![true, true, false]));
+    }
+
     #[test]
     fn murtys_example_takes_exponentially_many_pivots_and_still_ends() {
         // M lower triangular with 1 on and 2 below the diagonal, q = −1: λ = (1, 0, …, 0).

@@ -296,3 +296,56 @@ impl PortLaw {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::{Breakdown, Exponential};
+
+    /// λ' − y' = w on the curve i(v), where λ' = λ/d and y' = d y are (i/d, −d v), or (−v/d, d i); and the slope is a difference.
+    #[test]
+    fn a_port_is_on_its_curve_whichever_quantity_is_lambda() {
+        let law = Law::Exponential(Exponential {
+            is: 1e-3,
+            slope: 0.1,
+            rs: 0.0,
+            breakdown: Some(Breakdown {
+                bv: 2.0,
+                ibv: 1e-3,
+                slope: 0.1,
+            }),
+        });
+        let current_at = |v: f64| match &law {
+            Law::Exponential(diode) => diode.current(v),
+            _ => unreachable!("it is one"),
+        };
+        for current in [true, false] {
+            let port = PortLaw {
+                law: law.clone(),
+                current,
+            };
+            for d in [0.25, 1.0, 4.0] {
+                for w in [-2.0, -0.1, 0.3, 2.0] {
+                    let (lambda, y, slope) = port.at(d, w);
+                    assert!((lambda - y - w).abs() < 1e-14, "{current} {d} {w}");
+                    let (v, i) = if current {
+                        (-y / d, lambda * d)
+                    } else {
+                        (-lambda * d, y / d)
+                    };
+                    let law = current_at(v);
+                    assert!(
+                        (i - law).abs() < 1e-11 * (1.0 + law.abs()),
+                        "{current} {d} {w}: {i} {law}"
+                    );
+                    let h = 1e-6;
+                    let change = (port.at(d, w + h).0 - port.at(d, w - h).0) / (2.0 * h);
+                    assert!(
+                        (slope - change).abs() < 1e-6,
+                        "{current} {d} {w}: {slope} {change}"
+                    );
+                }
+            }
+        }
+    }
+}
