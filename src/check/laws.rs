@@ -205,3 +205,38 @@ pub(super) fn port_law(device: &str, role: Role, law: &Law) -> PortLaw {
         strictly_swapped: only_zero(swapped),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::{Corner, Rounded};
+
+    #[test]
+    fn the_corners_of_a_rounded_diode_lie_on_its_leakage() {
+        let corner = |v, g| Corner { v, g, width: 0.1 };
+        let law = Law::Rounded(Rounded {
+            g: 1e-3,
+            forward: corner(0.7, 10.0),
+            reverse: Some(corner(5.0, 2.0)),
+        });
+        let graph = Graph::of(&law);
+        assert_eq!(graph.vertices, [(-5.0, -5e-3), (0.7, 0.7 * 1e-3)]);
+        assert_eq!((graph.first, graph.last), ((1.0, 2.0), (1.0, 10.0)));
+    }
+
+    /// A conductance of 1 S behind a source of 1 MA: the only corner lies at −1 MA, and no current flows at 1 MV.
+    #[test]
+    fn a_ray_reaches_beyond_the_largest_coordinate_of_either_sign() {
+        for sign in [-1.0, 1.0] {
+            let graph = Graph {
+                first: (1.0, 1.0),
+                vertices: vec![(0.0, sign * 1e6)],
+                last: (1.0, 1.0),
+            };
+            let open = graph.zeros(|p| p.1, |p| p.0).expect("it crosses");
+            for end in [open.0, open.1] {
+                assert!((end + sign * 1e6).abs() < 1e-3, "{open:?}");
+            }
+        }
+    }
+}

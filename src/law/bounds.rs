@@ -70,15 +70,12 @@ mod tests {
                 breakdown,
             })
         };
-        let rounded = |g| {
+        let conducts = |v, g| Corner { v, g, width: 0.1 };
+        let rounded = |g, reverse| {
             Law::Rounded(Rounded {
                 g,
-                forward: Corner {
-                    v: 0.7,
-                    g: 10.0,
-                    width: 0.1,
-                },
-                reverse: None,
+                forward: conducts(0.7, 10.0),
+                reverse,
             })
         };
         let drop = Law::Diode {
@@ -96,8 +93,9 @@ mod tests {
             (drop, Some(0.0), Some(0.7)),
             (exponential(None), Some(-1e-6), None),
             (exponential(Some(breakdown)), None, None),
-            (rounded(0.0), Some(0.0), None),
-            (rounded(1e-3), None, None),
+            (rounded(0.0, None), Some(0.0), None),
+            (rounded(1e-3, None), None, None),
+            (rounded(0.0, Some(conducts(5.0, 10.0))), None, None),
         ];
         for (law, current, voltage) in laws {
             assert_eq!(

@@ -299,6 +299,43 @@ mod tests {
             })
     }
 
+    /// φ(v) = ∫₀ᵛ i dv, by Simpson's rule, with a breakdown so near that a current flows at 0 V.
+    #[test]
+    fn the_potential_is_the_integral_of_the_current_from_0() {
+        let near = Breakdown {
+            bv: 0.1,
+            ibv: 1e-3,
+            slope: 0.05,
+        };
+        let diode = Exponential {
+            is: 1e-3,
+            slope: 0.05,
+            rs: 0.0,
+            breakdown: Some(near),
+        };
+        assert_eq!(diode.potential(0.0), 0.0);
+        for v in [-0.2, 0.2_f64] {
+            let panels = 1000;
+            let h = v / f64::from(2 * panels);
+            let sum: f64 = (0..=2 * panels)
+                .map(|k| {
+                    let ends = k == 0 || k == 2 * panels;
+                    let weight = if ends {
+                        1.0
+                    } else if k % 2 == 1 {
+                        4.0
+                    } else {
+                        2.0
+                    };
+                    weight * diode.current(f64::from(k) * h)
+                })
+                .sum();
+            let integral = sum * h / 3.0;
+            let found = diode.potential(v);
+            assert!((found / integral - 1.0).abs() < 1e-10, "{found} {integral}");
+        }
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig { cases: 512, failure_persistence: Some(Box::new(proptest::test_runner::FileFailurePersistence::WithSource("regressions"))), ..Default::default() })]
 

@@ -67,6 +67,7 @@ fn an_unreached_pattern_must_reach_no_state() {
     assert!(witness.verify(&seen(0.0)));
     assert_eq!(decide(&seen(0.0), None).answer(), Some(false));
     assert!(!witness.verify(&seen(1.0)));
+    assert!(!witness.verify(&seen(-1.0)));
     assert_eq!(decide(&seen(1.0), None).answer(), Some(true));
     // Nor is a pattern with losses one, nor one that sees nothing.
     let lossy = System {
