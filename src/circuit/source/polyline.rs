@@ -199,3 +199,21 @@ impl<'a> Polyline<'a> {
         lap
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Late on the axis of time a corner shortly before the end of its lap may round to beyond it.
+    #[test]
+    fn no_corner_stands_beyond_the_next_lap() {
+        let lap = Lap {
+            begin: 1.0,
+            next: 1.5,
+            whole: 0.5 + 2.0 * f64::EPSILON,
+        };
+        assert_eq!(lap.time(&(0.25, 0.0)), 1.25);
+        assert_eq!(lap.time(&(0.5 + f64::EPSILON, 0.0)), 1.5);
+        assert_eq!(lap.time(&(lap.whole, 0.0)), 1.5);
+    }
+}

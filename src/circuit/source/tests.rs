@@ -55,6 +55,44 @@ fn sources() -> Vec<Source> {
 }
 
 #[test]
+fn the_derivatives_of_what_grows_are_largest_at_its_end_whatever_its_sign() {
+    for amplitude in [1.0, -1.0] {
+        let growing = piece::Oscillation::exponential(amplitude, -3.0);
+        let (first, second) = growing.derivative_bounds(0.0, 1.0);
+        let ends = [growing.derivative(1.0), growing.second_derivative(1.0)];
+        for (bound, end) in [first, second].into_iter().zip(ends) {
+            assert!((end.abs() / bound - 1.0).abs() < 1e-15, "{end} {bound}");
+        }
+    }
+}
+
+/// A sin(m sin ωt) has f'' = A m ω² at its steepest turn, where m is small far more than what the rate alone, A (m ω)², allows.
+#[test]
+fn the_second_derivative_of_a_swept_tone_stays_within_its_bound() {
+    let tone = piece::Tone {
+        offset: 0.0,
+        amplitude: 2.0,
+        carrier: (0.0, 0.0),
+        index: 0.1,
+        signal: (1.0, 0.0),
+    };
+    let (first, second) = tone.derivative_bounds();
+    let h = 1e-3;
+    let times = || (0..6284).map(|k| f64::from(k) * h);
+    let steepest = times().fold(0.0, |m: f64, t| m.max(tone.derivative(t).abs()));
+    let turns = times().map(|t| (tone.derivative(t + h) - tone.derivative(t - h)) / (2.0 * h));
+    let sharpest = turns.fold(0.0, |m: f64, turn| m.max(turn.abs()));
+    assert!(
+        0.99 * first < steepest && steepest <= first,
+        "{steepest} {first}"
+    );
+    assert!(
+        0.9 * second < sharpest && sharpest <= second,
+        "{sharpest} {second}"
+    );
+}
+
+#[test]
 fn values_are_those_of_ngspice() {
     let text = include_str!("../../../tests/reference/sources.csv");
     let rows = text.lines().filter(|line| !line.starts_with('#')).skip(1);
