@@ -80,6 +80,18 @@ fn close(value: f64, expected: f64, within: f64) {
 
 const IDEAL: &str = ".model di d(ron=0 vfwd=0 n=0.01)";
 
+/// Windings with k = 1 share one magnetising current, i_1 + √(L_2/L_1) i_2 = 1 A + 2 · 0.5 A at first, of which each has its part where it
+/// can flow: through 1 Ω ∥ 4 Ω/2² it makes −1 V.
+#[test]
+fn initial_currents_of_windings_without_leakage_add_up() {
+    let run = simulate(
+        "l1 a 0 1m ic=1\nl2 b 0 4m ic=0.5\nk1 l1 l2 1\nr1 a 0 1\nr2 b 0 4\n.tran 1u 10u uic",
+        SimOptions::default(),
+    );
+    assert!((column(&run, "v(a)")[0] + 1.0).abs() < 1e-12);
+    assert!((column(&run, "v(b)")[0] + 2.0).abs() < 1e-12);
+}
+
 #[test]
 fn rc_charging_meets_its_closed_form() {
     let run = simulate("v1 1 0 1\nr1 1 2 1k\nc1 2 0 1u\n.tran 10u 5m uic", theta());

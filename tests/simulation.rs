@@ -188,6 +188,26 @@ fn whatever_waveform_a_source_had_it_can_be_set() {
     assert!((out - expected).abs() < 1e-9, "{out} {expected}");
 }
 
+/// Two sources are set one after the other before a switch closes for the first time: three resistors of 1 kΩ then have (2 V + 4 V)/3.
+#[test]
+fn sources_that_are_set_stay_so_in_every_position_of_the_switches() {
+    let cards = "v1 a 0 0\nv2 b 0 0\nr1 a out 1k\nr2 b out 1k\nc1 out 0 1u\nr3 out x 1k\ns1 x 0 g 0 sw\n\
+        vg g 0 pulse(0 1 5m 0 0 1 2)\n.model sw sw(ideal vt=0.5)\n.tran 1m 20m uic\n";
+    for method in [Method::Exact, Method::Theta] {
+        let options = SimulationOptions {
+            method,
+            ..SimulationOptions::default()
+        };
+        let mut driven = simulation(cards, options);
+        driven.advance_to(1e-3).unwrap();
+        driven.set_source("v1", 2.0).unwrap();
+        driven.set_source("v2", 4.0).unwrap();
+        driven.advance_to(20e-3).unwrap();
+        let out = driven.value("v(out)").unwrap();
+        assert!((out - 2.0).abs() < 1e-9, "{method:?}: {out}");
+    }
+}
+
 #[test]
 fn a_switch_that_is_set_moves_like_one_that_is_controlled() {
     let run = whole(BUCK, Method::Auto);

@@ -252,3 +252,30 @@ fn amplitude(wave: &Wave) -> f64 {
         Wave::Pwl { points, .. } => points.iter().fold(0.0, |a, p| a.max(p.1.abs())),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A·(o + sin ω_m t)·sin ω_c t reaches A(|o| + 1) where both sines turn.
+    #[test]
+    fn a_modulated_source_stays_within_its_amplitude_and_reaches_it() {
+        let source = Source {
+            dc: 0.0,
+            wave: Wave::Am {
+                amplitude: 2.0,
+                offset: 0.5,
+                modulation: 1.0,
+                carrier: 101.0,
+                delay: 0.0,
+            },
+        };
+        let bound = amplitude(&source.wave);
+        let values = (0..100_000).map(|k| source.value(1e-5 * f64::from(k)).abs());
+        let largest = values.fold(0.0, f64::max);
+        assert!(
+            0.999 * bound < largest && largest <= bound,
+            "{largest} {bound}"
+        );
+    }
+}

@@ -357,6 +357,30 @@ mod tests {
         );
     }
 
+    /// A diode from 1 µF to two large capacitors in series against each other: y = −v_1 + v_2 − v_3. A difference of 10 V and its neighbour
+    /// among the doubles moves nothing, though it is all that v_1 = 0 would have.
+    #[test]
+    fn what_only_rounding_forbids_is_no_jump() {
+        let lcs = fixtures::system(
+            &[("v(c1)", "V"), ("v(c2)", "V"), ("v(c3)", "V")],
+            &[("d1", Role::Current)],
+            [
+                DMatrix::zeros(3, 3),
+                dmatrix![-1e6; 0.0; 0.0],
+                dmatrix![-1.0, 1.0, -1.0],
+                dmatrix![0.0],
+            ],
+            &[1e-6, 1e3, 1e3],
+        );
+        let mut jumps = JumpProblem::new(&lcs, 1e-9).unwrap();
+        let mut after = |v3: f64| {
+            let jump = jumps.solve(&lcs, &dvector![0.0, 10.0, v3], &DVector::zeros(0));
+            jump.unwrap().map(|jump| jump.x[0])
+        };
+        assert_eq!(after(10.0_f64.next_up()), None);
+        assert!((after(10.5).unwrap() + 0.5).abs() < 1e-15);
+    }
+
     /// An inductor of 1 mH whose current comes out of the anodes of devices in parallel: λ is the current of the first and the voltage of
     /// the last.
     fn inductor_into(laws: [Law; 2]) -> Lcs {

@@ -348,4 +348,25 @@ mod tests {
         assert_eq!((jumps.all, jumps.destroying), ((1, 1e-3), (1, 1e-3)));
         assert_eq!(jumps.destroyer.map(|jump| jump.loss), Some(1e-3));
     }
+
+    #[test]
+    fn the_counts_of_two_parts_add_up_one_by_one() {
+        let counts = |n: u64| Stats {
+            steps: n,
+            rejected: 2 * n,
+            events: 3 * n,
+            jumps: 4 * n,
+            modes: 5 * n,
+            positions: 6 * n,
+            systems: 7 * n,
+            impulsive: 8 * n,
+            lcp_solves: 9 * n,
+            pivotings: 10 * n,
+            factorisations: 11 * n,
+            cpu_seconds: 12.0 * n as f64,
+        };
+        let mut sum = counts(1);
+        sum.add(&counts(10));
+        assert_eq!(sum, counts(11));
+    }
 }

@@ -186,3 +186,44 @@ impl Segments {
         grow(&mut self.reached, row);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Steps of a second from 0 s, 1 s and 2 s.
+    fn three() -> Segments {
+        let segment = |k: usize| Segment {
+            start: Start {
+                t: k as f64,
+                ..Start::default()
+            },
+            end: (k + 1) as f64,
+            system: k,
+            ..Segment::default()
+        };
+        Segments {
+            kept: (0..3).map(segment).collect(),
+            used: 3,
+            ..Segments::default()
+        }
+    }
+
+    #[test]
+    fn a_step_from_the_time_that_is_gone_back_to_is_forgotten() {
+        for (t, left) in [(0.0, 0), (1.0, 1), (1.5, 2), (3.0, 3)] {
+            let mut segments = three();
+            segments.back_to(t);
+            assert_eq!(segments.used, left, "{t}");
+        }
+    }
+
+    #[test]
+    fn a_step_that_ends_at_a_time_stays_for_its_row() {
+        for (t, first) in [(0.5, Some(0)), (1.0, Some(0)), (1.5, Some(1)), (3.5, None)] {
+            let mut segments = three();
+            segments.forget_before(t);
+            assert_eq!(segments.system(), first, "{t}");
+        }
+    }
+}

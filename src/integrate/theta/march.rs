@@ -425,3 +425,17 @@ fn passage(before: &[f64], beyond: &[f64]) -> f64 {
         .map(|(a, b)| -a.min(0.0) / (b - a.min(0.0)));
     parts.fold(1.0, f64::min)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_several_passages_the_first_is_where_its_line_is_zero() {
+        assert_eq!(passage(&[-1.0], &[1.0]), 0.5);
+        assert_eq!(passage(&[-1.0, -1.0, -3.0], &[1.0, 3.0, -1.0]), 0.25);
+        // What is positive at once passed where the bracket begins; what is not, passes nowhere in it.
+        assert_eq!(passage(&[2.0], &[1.0]), 0.0);
+        assert_eq!(passage(&[-2.0], &[0.0]), 1.0);
+    }
+}

@@ -215,13 +215,16 @@ fn slides_on_its_threshold(terminals: &str, sign: f64) {
     assert!((at(&run, 9e-3, "v(1,2)") - 4.5).abs() < 1e-12);
     assert!((at(&run, 10.2e-3, "v(out)") - 5.6).abs() < 1e-12);
     assert!((at(&run, 20e-3, "v(out)") - 8.0).abs() < 1e-12);
-    assert!(
-        run.notes
-            .iter()
-            .any(|n| n.text.starts_with("s1 slides") && n.text.contains("2 times")),
-        "{:?}",
-        run.notes
-    );
+    let told = run.notes.iter().find(|n| n.text.starts_with("s1 slides"));
+    let text = &told.expect("a note").text;
+    assert!(text.contains("2 times"), "{text}");
+    let sum = text
+        .rsplit(", ")
+        .next()
+        .and_then(|end| end.split(' ').next());
+    let seconds: f64 = sum.expect("a sum").parse().unwrap();
+    let expected = (leave - reach) + (20e-3 - again);
+    assert!((seconds - expected).abs() < 1e-12, "{text} {expected}");
 }
 
 /// Three inverters in a ring without any delay: only the point at which all are half on is consistent. In the start position
