@@ -135,6 +135,25 @@ c1 out 0 1u ic=0
     assert!(harmonics["thd"].as_f64().unwrap() < 1e-9);
 }
 
+/// A capacitor that is charged at 1 V/s, seen from the time at which rows begin.
+#[test]
+fn measurements_begin_where_the_rows_do() {
+    let (found, _) = sim("\
+a ramp
+i1 0 out 1u
+c1 out 0 1u ic=0
+.tran 10m 2 1 uic
+.save v(out)
+.meas tran mean avg v(out)
+.meas tran least min v(out)
+.meas tran area integ v(out)
+.end
+");
+    for (name, expected) in [("mean", 1.5), ("least", 1.0), ("area", 1.5)] {
+        assert!((value(&found, name) - expected).abs() < 1e-12, "{found}");
+    }
+}
+
 #[test]
 fn what_cannot_be_measured_is_said() {
     let (found, text) = sim("\

@@ -357,3 +357,11 @@ fn mistakes_are_told_before_anything_is_written() {
         "{err}"
     );
 }
+
+#[test]
+fn a_sweep_that_measures_nothing_is_a_mistake() {
+    let place = place("nothing\nv1 a 0 10\nr1 a 0 100 tol=5\n.tran 1m 10m\n.end\n");
+    let (status, out, err) = circ(place.path(), "sweep a.cir --mc 2", "1");
+    assert_eq!((status, out.as_str()), (2, ""), "{err}");
+    assert!(err.contains("the netlist measures nothing"), "{err}");
+}

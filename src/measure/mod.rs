@@ -194,6 +194,16 @@ mod tests {
         assert!((when(Edge::Rise, 1).unwrap() - 1.0).abs() < 1e-9);
         assert!((when(Edge::Fall, 1).unwrap() - 3.0).abs() < 1e-9);
         assert!(when(Edge::Rise, 2).is_err() && when(Edge::Cross, 3).is_err());
+        // A row that stands on the level is on the side it came from.
+        let row = Trace::lines(&[0.0, 1.0, 2.0], vec![-1.0, 0.0, 1.0]);
+        assert_eq!(
+            row.crossing(0.0, Edge::Rise, Which::Number(1), ALL),
+            Ok(1.0)
+        );
+        assert!(
+            row.crossing(0.0, Edge::Cross, Which::Number(2), ALL)
+                .is_err()
+        );
         // Touching is no crossing; passing along the level is one.
         let touch = Trace::lines(&[0.0, 1.0, 2.0, 3.0, 4.0], vec![1.0, 0.0, 1.0, 0.0, -1.0]);
         assert_eq!(

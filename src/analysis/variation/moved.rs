@@ -148,3 +148,29 @@ impl Moved {
         moved
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A piece of 1 s whose end moves by so much with ln p, of a constant signal.
+    fn small(end: f64) -> f64 {
+        let constant = || Sample {
+            y: DVector::from_element(1, 1.0),
+            dy: DVector::zeros(1),
+            rate: DVector::zeros(1),
+        };
+        let samples: Vec<Sample> = (0..VALUES).map(|_| constant()).collect();
+        let mut moved = Moved::of(1);
+        moved.push(0, (0.0, 1.0), (0.0, 1.0), &samples);
+        moved.stretch(&[1.0], &[0.0, end]);
+        moved.small()
+    }
+
+    #[test]
+    fn a_piece_that_shrinks_is_moved_as_far_as_one_that_grows() {
+        assert_eq!(small(0.1), MOVED);
+        assert_eq!(small(10.0), MOVED / 10.0);
+        assert_eq!(small(-10.0), MOVED / 10.0);
+    }
+}

@@ -25,6 +25,20 @@ fn equal_curves_on_different_grids_differ_by_nothing() {
     assert_eq!((s.max, s.rms, s.shifted, s.amplitude), (0.0, 0.0, 0.0, 2.0));
 }
 
+/// Where the first has an edge of its own it is compared on both of its sides; where it has none, on the nearer one.
+#[test]
+fn edges_of_both_are_compared_on_both_sides() {
+    let at = [0.0, 1.0, 1.0, 2.0];
+    let small = waves("v(a)", &at, &[0.0, 0.0, 1.0, 0.0]);
+    let large = waves("v(a)", &at, &[0.0, 0.0, 3.0, 0.0]);
+    let straight = waves("v(a)", &[0.0, 1.0, 2.0], &[0.0; 3]);
+    let worst = |first, reference, at| compare(first, reference, at, 0.0).unwrap().signals[0].max;
+    for kind in [At::AllRows, At::FirstRows, At::ReferenceRows] {
+        assert!(worst(&small, &large, kind) > 0.0, "{kind:?}");
+    }
+    assert_eq!(worst(&straight, &large, At::FirstRows), 0.0);
+}
+
 #[test]
 fn a_late_edge_is_a_large_error_that_a_shift_forgives() {
     let reference = waves("v(a)", &[0.0, 1.0, 1.0, 3.0], &[0.0, 0.0, 4.0, 4.0]);
