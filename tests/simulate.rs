@@ -80,6 +80,30 @@ fn close(value: f64, expected: f64, within: f64) {
 
 const IDEAL: &str = ".model di d(ron=0 vfwd=0 n=0.01)";
 
+/// 1 µF at 10 V is joined to 1 µF at 0 V through a source of k times the voltage of the second: v_1 = (1 + k) v_2 and v_1 + v_2 = 10 V. The
+/// charge q falls through 10 V at first and nothing at last, and meets k v_2/2 in the source on average.
+#[test]
+fn a_jump_through_a_controlled_source_balances_its_energy() {
+    for k in [0.5, -0.5] {
+        let text = format!(
+            "c1 a 0 1u ic=10\ne1 a b c 0 {k}\nd1 b c dm\nc2 c 0 1u ic=0\nr1 c 0 1k\n.model dm d(ideal)\n.tran 10u 1m uic"
+        );
+        let charge = 1e-6 * 10.0 / (2.0 + k);
+        for method in [Method::Exact, Method::Theta, Method::Euler] {
+            let options = SimOptions {
+                method,
+                ..SimOptions::default()
+            };
+            let energy = simulate(&text, options).energy;
+            assert!(
+                (energy.jumps / (5.0 * charge) - 1.0).abs() < 1e-12,
+                "{method:?} {energy:?}"
+            );
+            assert!(energy.residual_relative < 1e-11, "{method:?} {energy:?}");
+        }
+    }
+}
+
 /// Windings with k = 1 share one magnetising current, i_1 + √(L_2/L_1) i_2 = 1 A + 2 · 0.5 A at first, of which each has its part where it
 /// can flow: through 1 Ω ∥ 4 Ω/2² it makes −1 V.
 #[test]

@@ -38,6 +38,7 @@ use crate::diagnostic::Internal;
 use crate::integrate::{Note, energy};
 use crate::lcs::{Lcs, Role};
 use crate::settings::tolerances::jumps::{FORWARD, NO_JUMP, RIVAL};
+use crate::settings::tolerances::ranks::RANK;
 use crate::solve::lcp::Scaling;
 use crate::solve::{Driver, Status};
 
@@ -54,6 +55,8 @@ pub struct JumpProblem {
     /// Whether D + Dᵀ and the jump matrix NᵀCBN are positive semidefinite, as for every passive network. If not, the jump is
     /// not given by this problem.
     pub monotone: bool,
+    /// Whether MBN = CᵀN with the energy M of the state, as between passive elements: then a jump is a projection in the metric M.
+    pub projects: bool,
     /// m: Dλ⁻ − y⁻.
     bounds: DVector<f64>,
     /// m: the units of the equilibrated λ.
@@ -147,12 +150,14 @@ impl JumpProblem {
         matrix.view_mut((k, 0), (rows, k)).copy_from(&v);
         let driver = Driver::new(matrix, tolerance);
         let monotone = semidefinite && driver.is_monotone();
+        let projects = monotone && is_reciprocal(lcs, &basis);
         Some(Self {
             basis,
             sigma,
             driver,
             coupling,
             monotone,
+            projects,
             bounds: bounds(lcs, &ends),
             units: scaling.d,
         })
@@ -288,6 +293,21 @@ impl Ends {
             },
         }
     }
+}
+
+/// Whether the impulses of a basis push the state where its ports see it: MBN = CᵀN, up to the rounding of their entries. A source that
+/// is controlled by the state breaks it.
+fn is_reciprocal(lcs: &Lcs, basis: &DMatrix<f64>) -> bool {
+    if lcs.energy.nrows() != lcs.n() {
+        return true;
+    }
+    let pushed = &lcs.energy * &lcs.b * basis;
+    let seen = lcs.c.tr_mul(basis);
+    let sizes = lcs.energy.abs() * lcs.b.abs() * basis.abs() + lcs.c.abs().tr_mul(&basis.abs());
+    (pushed - seen)
+        .iter()
+        .zip(sizes.iter())
+        .all(|(off, size)| off.abs() <= RANK * size)
 }
 
 /// Dλ⁻ − y⁻.

@@ -81,7 +81,7 @@ impl Free {
 
     /// Whether jumps are projections in the metric of stored energy: where no device can carry an impulse too.
     pub(crate) fn is_projected(&self) -> bool {
-        self.jump.as_ref().is_none_or(|jump| jump.monotone)
+        self.jump.as_ref().is_none_or(|jump| jump.projects)
     }
 
     /// The impulse of the devices at state x, if one is needed. Active networks have no energy to project in; their jump

@@ -80,7 +80,7 @@ impl Theta {
         let x = DVector::from_column_slice(&self.now.x);
         let u = DVector::from_column_slice(&self.now.u);
         let System { lcs, jump, .. } = &mut self.plant.systems[self.now.system].1;
-        let passive = jump.as_ref().is_none_or(|problem| problem.monotone);
+        let passive = jump.as_ref().is_none_or(|problem| problem.projects);
         let found = match jump {
             Some(problem) if problem.monotone => {
                 let found = problem.solve(lcs, &x, &u).map_err(|e| {
