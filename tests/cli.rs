@@ -613,11 +613,12 @@ fn probes_may_name_what_an_element_carries() {
     let ran = run("sim divider.cir --probe R1");
     assert_eq!(ran.status, 2, "{ran}");
     assert!(ran.err.contains("write `i(r1)` for its current"), "{ran}");
-    let mos = "vd d 0 10\nvh h 0 10\nrd d a 9\nm1 a h 0 0 mn\n.model mn nmos(ron=1 vto=2)";
+    let mos = "vh h 0 10\nm1 a h 0 0 mn\n.model mn nmos(ron=1 vto=2)";
     let (names, values) = last_row(mos, "--probe v(a)*Id(M1) --probe i(m1) -q");
     assert_eq!(names.len(), 2, "{names:?}");
-    assert!((values[0] - 1.0).abs() < 1e-9, "{values:?}");
-    assert!((values[1] - 1.0).abs() < 1e-9, "{values:?}");
+    // The source of HALVES drives it: 6 V across 1 Ω.
+    assert!((values[0] - 36.0).abs() < 1e-9, "{values:?}");
+    assert!((values[1] - 6.0).abs() < 1e-9, "{values:?}");
 }
 
 /// A current that a switch interrupts meets its `Roff` in a row at the event alone: rows that are written as they come are looked at too.
