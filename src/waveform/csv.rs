@@ -125,16 +125,12 @@ pub(super) fn plot(from: impl Read) -> Result<Plot, WaveformError> {
     }
 }
 
+/// Whether a column is time in seconds, perhaps with its unit, as oscilloscopes write it.
 fn is_time(axis: &str) -> bool {
-    // With its unit, as oscilloscopes write it: `Time (s)`, `time[s]`.
     let lower = axis.to_ascii_lowercase();
-    let name = lower
-        .trim_end_matches(|c: char| matches!(c, ')' | ']' | 's'))
-        .trim_end();
-    let name = name
-        .strip_suffix(['(', '['])
-        .map_or(lower.as_str(), str::trim_end);
-    matches!(name, "time" | "t")
+    let unit = |unit: &&str| lower.strip_suffix(*unit);
+    let name = ["(s)", "[s]"].iter().find_map(unit);
+    matches!(name.unwrap_or(&lower).trim_end(), "time" | "t")
 }
 
 fn malformed(reason: impl Into<String>) -> WaveformError {
@@ -274,6 +270,21 @@ mod tests {
                 .unwrap()
                 .starts_with("time,\"v(a,b)\",i(v1)\n0.0000000000000000e0,")
         );
+    }
+
+    #[test]
+    fn time_may_have_its_unit() {
+        for header in ["time", "Time (s)", "t[s]"] {
+            let text = format!("{header},CH1\n0,1\n1e-3,2\n");
+            let read = read(text.as_bytes());
+            assert_eq!(
+                read.map(|waves| waves.time).ok(),
+                Some(vec![0.0, 1e-3]),
+                "{header}"
+            );
+        }
+        // In milliseconds it would be another file.
+        assert!(read(&b"time (ms),CH1\n0,1\n1,2\n"[..]).is_err());
     }
 
     #[test]

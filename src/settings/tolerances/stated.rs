@@ -48,7 +48,7 @@ pub(crate) const EXACT: f64 = 1e-9;
 pub(crate) const TOLERANCES: [f64; 3] = [1e-4, 1e-5, 1e-6];
 
 /// Steps of a verifying run at most. Larger: a check that takes minutes for a run of milliseconds; smaller: long runs are not checked.
-pub(crate) const MOST_STEPS: u64 = 2_000_000;
+pub(crate) const MOST_STEPS: u64 = 300_000;
 
 /// An error of the verifying steps, relative to amplitudes, below which they know enough. Larger: a verdict that says little; smaller: dearer.
 pub(crate) const ENOUGH: f64 = 3e-3;
