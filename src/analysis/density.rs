@@ -1,6 +1,5 @@
 //! Rows on a grid that is finer than the one that is shown: whether they are close enough, and which of them are kept.
 
-use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use crate::integrate::{Block, Grid, RowKind};
@@ -62,42 +61,43 @@ pub(super) fn bent(waves: &Waveforms, kinds: &[RowKind], columns: usize) -> f64 
 /// What rows at events and corners have that those of the grid do not show.
 #[derive(Debug, Default)]
 pub(super) struct Spikes {
-    /// The largest value of rows of the grid, by unit.
-    usual: BTreeMap<&'static str, f64>,
+    /// The largest |value| of rows of the grid, by column.
+    usual: Vec<f64>,
     /// The largest value of the other rows and its time, s, by column.
     largest: Vec<(f64, f64)>,
 }
 
 impl Spikes {
-    /// Looks at rows whose columns have these units.
-    pub(super) fn see(&mut self, units: &[&'static str], block: Block<'_>) {
-        self.largest.resize(units.len(), (0.0, 0.0));
+    /// Looks at rows of so many columns.
+    pub(super) fn see(&mut self, columns: usize, block: Block<'_>) {
+        self.usual.resize(columns, 0.0);
+        self.largest.resize(columns, (0.0, 0.0));
         for (t, values, kind) in block.rows() {
-            for (j, (value, unit)) in values.iter().zip(units).enumerate() {
-                if kind.is_grid() {
-                    let most = self.usual.entry(unit).or_default();
+            if kind.is_grid() {
+                for (most, value) in self.usual.iter_mut().zip(values) {
                     *most = most.max(value.abs());
-                } else if value.abs() > self.largest[j].0.abs() {
-                    self.largest[j] = (*value, t);
+                }
+                continue;
+            }
+            for (most, value) in self.largest.iter_mut().zip(values) {
+                if value.abs() > most.0.abs() {
+                    *most = (*value, t);
                 }
             }
         }
     }
 
     /// Signal, value and time of the row at an event or corner that is [`SPIKE`] times as large as all rows of the grid in its unit: the largest.
-    pub(super) fn found(&self, units: &[&'static str]) -> Option<(usize, f64, f64)> {
+    /// `units` by column.
+    pub(super) fn found(&self, units: &[&str]) -> Option<(usize, f64, f64)> {
         let stands_out = |(j, (value, t)): (usize, &(f64, f64))| {
-            let usual = self.usual.get(units[j]).copied().unwrap_or(f64::INFINITY);
+            let same = self.usual.iter().zip(units);
+            let same = same.filter(|(_, unit)| **unit == units[j]);
+            let usual = same.fold(0.0, |m: f64, (most, _)| m.max(*most));
             (usual > 0.0 && value.abs() > SPIKE * usual).then_some((j, *value, *t))
         };
         let all = self.largest.iter().enumerate().filter_map(stands_out);
-        all.reduce(|one, other| {
-            if other.1.abs() > one.1.abs() {
-                other
-            } else {
-                one
-            }
-        })
+        all.max_by(|one, other| one.1.abs().total_cmp(&other.1.abs()))
     }
 }
 

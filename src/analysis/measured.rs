@@ -117,7 +117,8 @@ fn shown_of(measuring: Measuring<'_>, model: &Model, options: SimOptions<'_>) ->
             run.notes.extend(measuring.too_coarse(run, found));
         }
         let mut spikes = Spikes::default();
-        spikes.see(&run.waveforms.units, Block::of(&run.waveforms, &run.kinds));
+        let columns = run.waveforms.units.len();
+        spikes.see(columns, Block::of(&run.waveforms, &run.kinds));
         let note = spike(&spikes, &run.waveforms, measuring.by_rows());
         run.notes.extend(note);
         (run.waveforms, run.kinds) = measuring.cut(run);
@@ -149,13 +150,11 @@ fn spike(spikes: &Spikes, waves: &Waveforms, by_rows: bool) -> Option<Note> {
 
 /// The transient of a circuit without measurements, whose rows are looked at as they pass.
 fn unmeasured(model: &Model, mut options: SimOptions<'_>) -> Finished {
-    let multiport = model.multiport();
-    let probes = multiport.observed[..multiport.probes].iter();
-    let units: Vec<&str> = probes.map(|probe| probe.unit).collect();
+    let columns = model.multiport().probes;
     let mut spikes = Spikes::default();
     let mut sink = options.rows.take();
     let mut take = |block: Block<'_>| {
-        spikes.see(&units, block);
+        spikes.see(columns, block);
         sink.as_mut()
             .map_or(ControlFlow::Continue(()), |sink| sink(block))
     };
