@@ -485,6 +485,7 @@ python3 tests/mutants.py --seed {arguments.seed} --count {arguments.count}
 wrote, with its explanations from `tests/mutants.toml`. A mutant is *killed* where a test fails, fails again, or hangs ({HANGS[0]} times its time
 and {HANGS[1]:g} s). It is *equivalent* where nothing that the code promises can change, for the reason given; this is judged by hand. Else it
 *survived*: the tests that reach it passed, as many of them as a run has time for, the short ones first. *Not reached*: no test comes by.
+Places move with the code: the page tells of the state that it was made of.
 
 {len(random_ones)} mutants drawn: {total["killed"]} killed, {total["equivalent"]} equivalent, {total["survived"]} survived ({share:.1f} %).
 {len(tests) - len(failing)} tests were used; {len(failing)} are left out, as they fail in the copy, whose source differs.

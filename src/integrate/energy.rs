@@ -68,6 +68,16 @@ impl<'a> Stock<'a> {
     }
 }
 
+/// ½ ΔᵀMΔ of a change of the storage, J; 0 where its energy is not known.
+pub(crate) fn of_change(lcs: &Lcs, change: &DVector<f64>) -> f64 {
+    let stock = Stock::of(lcs);
+    if stock.metric.nrows() == change.len() {
+        stock.of_change(change)
+    } else {
+        0.0
+    }
+}
+
 /// ([X U], k, M) of the storage vector s = X x + U u + k and of its metric.
 pub(crate) fn storage_map(lcs: &Lcs) -> (DMatrix<f64>, DVector<f64>, &DMatrix<f64>) {
     let stock = Stock::of(lcs);

@@ -149,17 +149,20 @@ pub struct StateJump {
     /// Whether a current lost its path or charges of different voltages were joined: energy that no device took up in time.
     #[serde(skip)]
     pub destroys: bool,
+    /// ½ ΔᵀMΔ of the change Δ of the storage, with its energy ½ sᵀMs, J.
+    #[serde(skip)]
+    pub(crate) change: f64,
 }
 
 impl StateJump {
-    /// The jump at `t` of the storage elements `moved`, which lost `loss`, J, where `energy`, J, is at hand. At an edge of a source
+    /// The jump at `t` of the storage elements `moved`, which lost `loss`, J, by a change of ½ ΔᵀMΔ = `change`, J, where `energy`, J, is at hand. At an edge of a source
     /// capacitors take up their charge through devices that a resistance, however small, would have warmed in their place: no charge
     /// is destroyed.
     pub(crate) fn new(
         t: f64,
         storage: (&[String], &[&str]),
         moved: &[usize],
-        (loss, energy): (f64, f64),
+        (loss, change, energy): (f64, f64, f64),
         reason: JumpReason,
     ) -> Self {
         let (elements, units) = storage;
@@ -170,6 +173,7 @@ impl StateJump {
             loss,
             destroys: loss > DESTROYED * energy && (current || reason != JumpReason::SourceEdge),
             reason,
+            change,
         }
     }
 }
@@ -226,11 +230,12 @@ impl StateJumps {
         self.first.truncate(Self::KEPT);
     }
 
-    /// Takes back the jump at the start that is rounding beside the energy of the whole run, J: there nothing is known of sizes yet. Whether there was
-    /// one.
+    /// Takes back the jump at the start whose change is rounding beside the energy of the whole run, J: there nothing is known of sizes yet. What it lost says
+    /// nothing of its size in an active network, and without an energy there is none. Whether there was one.
     pub(crate) fn forget_rounding(&mut self, energy: f64) -> bool {
         let is = |jump: &StateJump| {
-            jump.reason == JumpReason::Start && jump.loss <= NO_JUMP * NO_JUMP * energy
+            let rounding = NO_JUMP * NO_JUMP * energy;
+            jump.reason == JumpReason::Start && jump.change > 0.0 && jump.change <= rounding
         };
         let Some(at) = self.first.iter().position(is) else {
             return false;
@@ -333,7 +338,7 @@ mod tests {
 
     fn jump(loss: f64, reason: JumpReason) -> StateJump {
         let storage = (&["l1".to_owned()][..], &["A"][..]);
-        StateJump::new(0.0, storage, &[0], (loss, loss), reason)
+        StateJump::new(0.0, storage, &[0], (loss, loss, loss), reason)
     }
 
     /// At the start a current of rounding is the largest there has been; beside the energy of the run it is nothing.
@@ -347,6 +352,15 @@ mod tests {
         assert!(jumps.forget_rounding(1.0));
         assert_eq!((jumps.all, jumps.destroying), ((1, 1e-3), (1, 1e-3)));
         assert_eq!(jumps.destroyer.map(|jump| jump.loss), Some(1e-3));
+        // A source may give what the jump takes, and a system may have no energy.
+        for (loss, change) in [(0.0, 1e-3), (-1e-3, 1e-3), (0.0, 0.0)] {
+            let mut jumps = StateJumps::default();
+            jumps.add(StateJump {
+                change,
+                ..jump(loss, JumpReason::Start)
+            });
+            assert!(!jumps.forget_rounding(1.0), "{loss} {change}");
+        }
     }
 
     #[test]

@@ -150,6 +150,7 @@ mod tests {
             loss: 0.25,
             reason: JumpReason::Switch("s1".into()),
             destroys: true,
+            change: 0.0,
         });
         let run = Run {
             method: "exact".into(),

@@ -340,6 +340,7 @@ mod tests {
             loss: 1e-3,
             reason: JumpReason::Switch("s1".into()),
             destroys: true,
+            change: 0.0,
         };
         let run = Run {
             state_jumps: StateJumps {

@@ -70,6 +70,7 @@ pub(crate) fn unit(longest: f64) -> f64 {
     longest.log2().ceil().exp2()
 }
 
+/// The flow of a mode cannot be computed.
 pub(super) fn beyond_doubles() -> Error {
     let what = "the exponential of a mode does not exist in doubles";
     Error::before(Reason::NotSmooth(what.into()))

@@ -171,7 +171,8 @@ impl Storage {
         let jumped: Vec<usize> = (0..before.len()).filter(|&k| moved(k)).collect();
         if !jumped.is_empty() {
             let storage = (&*self.elements, &*self.units);
-            let sizes = (loss, self.capacity);
+            let change: Vec<f64> = self.values.iter().zip(before).map(|(a, b)| a - b).collect();
+            let sizes = (loss, self.stored(&change), self.capacity);
             log.state_jump(StateJump::new(t, storage, &jumped, sizes, reason));
         }
     }

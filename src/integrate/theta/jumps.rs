@@ -150,7 +150,13 @@ impl Theta {
             .collect();
         if !jumped.is_empty() {
             let balance = &self.now.balance;
-            let sizes = (balance.lost_in_jumps() - lost, balance.largest());
+            let change = DVector::from_fn(after.len(), |k, _| after[k] - before[k]);
+            let loss = balance.lost_in_jumps() - lost;
+            let sizes = (
+                loss,
+                energy::of_change(&system.lcs, &change),
+                balance.largest(),
+            );
             let storage = (&*storage.elements, &*storage.units);
             log.state_jump(StateJump::new(self.now.t, storage, &jumped, sizes, reason));
         }
@@ -178,7 +184,8 @@ impl Theta {
             .map(|j| lcs.ports[j].device.as_str())
             .collect();
         let reason = JumpReason::Device(devices.join(", "));
-        let sizes = (loss, self.now.balance.largest());
+        let change = energy::of_change(lcs, &moved);
+        let sizes = (loss, change, self.now.balance.largest());
         let storage = (&*storage.elements, &*storage.units);
         log.state_jump(StateJump::new(t, storage, &jumped, sizes, reason));
         self.now.balance.reattribute_to_jump(loss);
@@ -331,7 +338,7 @@ impl Theta {
             &u,
         )?;
         let change = end - &start;
-        let square = 0.5 * change.dot(&(&entered.storage.metric * &change));
+        let square = energy::of_change(entered, &change);
         self.now.balance.take_part(&balance, part, square);
         Some((start + change * part, first))
     }
