@@ -100,7 +100,7 @@ impl Theta {
         first
     }
 
-    fn solve_with(&mut self, scheme: Scheme, h: f64, t1: f64) -> Result<(), Error> {
+    pub(super) fn solve_with(&mut self, scheme: Scheme, h: f64, t1: f64) -> Result<(), Error> {
         let tolerance = self.settings.lcp_residual;
         let now = &self.now;
         let system = &mut self.plant.systems[now.system].1;

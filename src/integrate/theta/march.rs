@@ -298,6 +298,7 @@ impl Theta {
         self.attempt(h, t1)?;
         let n = self.now.x.len();
         self.coarse.copy_from_slice(&self.out[..n]);
+        let hidden = self.hidden(h)?;
         let whole = std::mem::take(&mut self.attempt.unseen);
         let middle = self.now.t + 0.5 * (t1 - self.now.t);
         self.attempt(0.5 * h, middle)?;
@@ -318,7 +319,7 @@ impl Theta {
         let error = self
             .amplitudes
             .error(&self.system().lcs, &self.coarse, &self.now.x);
-        let unseen = self.size_of(&self.now.unseen);
+        let unseen = self.size_of(&self.now.unseen).max(self.size_of(&hidden));
         let verdict = match &self.control {
             Some(control) => control.judge(h, error, unseen),
             None => Verdict {

@@ -70,6 +70,60 @@ impl Theta {
         self.looks = Looks { t, slopes };
     }
 
+    /// What a step of length h that was tried from a breakpoint may hide where an ideal device changes within it: a capacitor that is
+    /// discharged until a diode takes over ends at the diode's voltage after any step, and after its halves, with no area below it.
+    ///
+    /// Implicit Euler steps of δ = h/[`CLOSER`]ᵏ have the devices as they are now from some k on, with slope s; where they change, as much as
+    /// [`CLOSER`] δ (s − s₋) is hidden, s₋ the slope of the step before. What the devices forget by the end of the step is no error.
+    pub(super) fn hidden(&mut self, h: f64) -> Result<Vec<f64>, Error> {
+        let active = self.now.active.clone();
+        let changes = |theta: &Self| match &theta.attempt.solved {
+            Some((basis, _)) => *basis != active,
+            None => false,
+        };
+        if self.control.is_none() || !self.now.settle || self.system().curved || !changes(self) {
+            return Ok(Vec::new());
+        }
+        let tried = self.attempt.clone();
+        let (n, t) = (self.now.x.len(), self.now.t);
+        let slope = |theta: &Self, distance: f64| -> DVector<f64> {
+            let moved = theta.out[..n].iter().zip(&theta.now.x);
+            DVector::from_iterator(n, moved.map(|(next, x)| (next - x) / distance))
+        };
+        let (mut distance, mut before) = (h, slope(self, h));
+        let mut change = DVector::zeros(n);
+        while distance > CLOSEST * Self::slack(t) {
+            let closer = distance / CLOSER;
+            self.inputs.left(t + closer, &mut self.u_next);
+            self.stats.lcp_solves += 1;
+            let system = &self.plant.systems[self.now.system].1;
+            system
+                .columns
+                .fill(&self.now.x, &self.u_next, &self.now.u, &mut self.z);
+            if self.solve_with(Scheme::MOREAU, closer, t + closer).is_err() {
+                break;
+            }
+            let now = slope(self, closer);
+            if !changes(self) {
+                change = (now - before) * distance;
+                break;
+            }
+            (distance, before) = (closer, now);
+        }
+        self.attempt.h = f64::NAN;
+        self.attempt.solved = None;
+        let Some((basis, _)) = tried.solved else {
+            return Ok(Vec::new());
+        };
+        let system = &mut self.plant.systems[self.now.system].1;
+        let (mode, _) = system.mode(tried.step, &basis);
+        self.z.fill(0.0);
+        self.z[..n].copy_from_slice(change.as_slice());
+        let fused = system.step(tried.step).fused(mode);
+        fused.step(&self.z, n, &mut self.out, |_| 0.0);
+        Ok(self.out[..n].to_vec())
+    }
+
     /// What the stages of a step of length h by their h f(X_j) do not see of its start, with what was not seen before it.
     pub(super) fn unseen(
         &self,
