@@ -104,6 +104,50 @@ fn a_jump_through_a_controlled_source_balances_its_energy() {
     }
 }
 
+/// Two capacitors that an edge leaves at −1.12 V and 5 mΩ discharge within nanoseconds, until a diode holds them at 0 V: the area below that
+/// voltage is in the inductor's current for good, and no step that ends behind it sees it, nor do its halves.
+#[test]
+fn steps_see_what_ends_at_a_diode_within_them() {
+    let text = "v1 n 0 pulse(4 -3 1u 0 0 10u 20u)\nl1 n a 10u ic=5\nc0 n a 54.4n ic=4\nc1 a 0 285.6n\nd1 a 0 dm\nr1 a 0 5m
+.model dm d(ideal)\n.tran 0.5u 3u uic";
+    let exact = at(&simulate(text, SimOptions::default()), "i(l1)", 3e-6);
+    for (method, tol) in [
+        (Method::Theta, 1e-5),
+        (Method::Theta, 1e-7),
+        (Method::Euler, 1e-5),
+    ] {
+        let options = SimOptions {
+            method,
+            settings: Settings {
+                tol,
+                ..Settings::default()
+            },
+            ..SimOptions::default()
+        };
+        let found = at(&simulate(text, options), "i(l1)", 3e-6);
+        close(found, exact, tol * 5.4);
+    }
+}
+
+/// Capacitors of 1 V and 0 V that a loop with sources of −3 V and 1 V joins, the second one controlled by a third capacitor: 5 V are too much
+/// around the loop, and a charge of 0.5 µF times them passes both sources.
+#[test]
+fn capacitors_joined_through_a_controlled_source_balance_their_energy() {
+    let text = "v1 n 0 -3\nc1 a 0 1u ic=1\ne1 m a b 0 -1\nc2 m n 1u ic=0\nc3 b 0 1 ic=-1\nr1 a 0 1k\n.tran 10u 1m uic";
+    for method in [Method::Exact, Method::Theta, Method::Euler] {
+        let options = SimOptions {
+            method,
+            ..SimOptions::default()
+        };
+        let run = simulate(text, options);
+        let (energy, first) = (&run.energy, &run.state_jumps.first[0]);
+        close(first.loss, 0.5 * 0.5e-6 * 25.0, 1e-15);
+        // c1 ends at 1 V − 2.5 V.
+        close(at(&run, "v(a)", 0.0), -1.5, 1e-12);
+        assert!(energy.residual_relative < 1e-12, "{method:?} {energy:?}");
+    }
+}
+
 /// Windings with k = 1 share one magnetising current, i_1 + √(L_2/L_1) i_2 = 1 A + 2 · 0.5 A at first, of which each has its part where it
 /// can flow: through 1 Ω ∥ 4 Ω/2² it makes −1 V.
 #[test]

@@ -24,6 +24,7 @@ use self::forms::pairs;
 pub(crate) use self::forms::{PowerForms, StageLoss, of_solved};
 use crate::integrate::reading::{self, Point};
 use crate::lcs::{Lcs, PowerKind};
+use crate::settings::tolerances::ranks::RANK;
 
 /// The storage vector s = X x + U u + k behind a system, and the metric M of its energy ½ sᵀMs: the elements', or the states
 /// themselves where the system does not name them.
@@ -206,6 +207,9 @@ pub fn source_work_of_jump(
 /// (from sources, lost), J, where storage elements s become s⁺ = X x + U u + k because a switch joins them to one another or to sources:
 /// the impulses in the loops (cut-sets) move s⁺ to where it is closest to s in the metric M of stored energy, so that ½ ΔᵀM Δ is lost,
 /// Δ = s⁺ − s. The charges MΔ pass the sources, whose voltages are U u + k in the loops; charge and flux are conserved, XᵀMΔ = 0.
+///
+/// A controlled source in a loop has a voltage of the state besides, and XᵀMΔ is what passes it; it counts with the voltage that it ends
+/// with. What is conserved is then x = R s alone, R the map that injects s, and a part X R Δ of the change is none of the jump.
 pub(crate) fn taking_over(
     lcs: &Lcs,
     s: &[f64],
@@ -216,7 +220,23 @@ pub(crate) fn taking_over(
     let step = after - DVector::from_column_slice(s);
     let charge = &storage.metric * &step;
     let brought = (after - &storage.x * x).dot(&charge);
-    (brought, 0.5 * step.dot(&charge))
+    (
+        brought + controlled_work(lcs, x, &step),
+        0.5 * step.dot(&charge),
+    )
+}
+
+/// xᵀXᵀM(Δ − X R Δ): the work of controlled sources where Δ joins storage elements; nothing between passive ones, up to rounding.
+fn controlled_work(lcs: &Lcs, x: &DVector<f64>, step: &DVector<f64>) -> f64 {
+    let storage = &lcs.storage;
+    let size = storage.x.abs().tr_mul(&(storage.metric.abs() * step.abs()));
+    let own = step - &storage.x * (&storage.inject * step);
+    let passed = storage.x.tr_mul(&(&storage.metric * own));
+    let parts = passed.iter().zip(&size).zip(x);
+    parts
+        .filter(|((passed, size), _)| passed.abs() > RANK * **size)
+        .map(|((passed, _), x)| passed * x)
+        .sum()
 }
 
 /// Stored energy, J: ½ sᵀ M s of all storage elements, or ½ xᵀ P x where the system does not name them.

@@ -2,6 +2,7 @@
 
 use super::{si, table};
 use crate::integrate::{Aliased, Method, Note, Orbit, OrbitKind, Places, Run, StateJump, Stats};
+use crate::settings::tolerances::stated::UNBALANCED;
 use crate::waveform::compare::{Comparison, SignalError};
 
 /// Impulses and jumps listed before the rest is only counted.
@@ -209,12 +210,23 @@ pub fn warnings(run: &Run, places: Places<'_>) -> Vec<String> {
     warnings.map(|warning| places.of(&warning)).collect()
 }
 
-/// Energies beyond doubles: what grows so far is unstable, or wrong.
+/// Energies beyond doubles: what grows so far is unstable, or wrong. Energies that do not add up: something is wrong, if only an energy.
 fn unbalanced(run: &Run) -> Option<Note> {
-    let text = "the energies of this run are beyond the range of numbers, so that nothing checks it; unless the circuit is \
-                unstable, its values are wrong (--verify runs it a second time)";
-    let known = !run.balanced || run.energy.residual.is_finite();
-    (!known).then(|| Note::of(<[String; 0]>::default(), text))
+    let residual = run.energy.residual_relative;
+    let text = match run.balanced.then_some(run.energy.residual.is_finite()) {
+        Some(false) => {
+            "the energies of this run are beyond the range of numbers, so that nothing checks it; unless the circuit is \
+             unstable, its values are wrong (--verify runs it a second time)"
+                .into()
+        }
+        Some(true) if residual > UNBALANCED => format!(
+            "the energies of this run do not add up: {} of the largest is too much or missing; where a controlled source carries the impulse of \
+             a jump it may be the energy alone that is wrong (--verify runs it a second time)",
+            si::plain(residual, 2)
+        ),
+        _ => return None,
+    };
+    Some(Note::of(<[String; 0]>::default(), text))
 }
 
 /// That a circuit rings faster than rows show.

@@ -632,6 +632,21 @@ fn a_system_without_a_circuit_reports_no_energies() {
     assert!(words.contains("no powers to balance"), "{words}");
 }
 
+/// A jump whose impulse passes a source that other devices move has no energy that is known: that the energies do not add up is said.
+#[test]
+fn energies_that_do_not_add_up_are_a_warning() {
+    let folder = place(&[]);
+    let text = "a source across two diodes\nv1 n0 0 pulse(-3 4 0 0 0 0.25m 0.5m)\nr1 n1 n0 628.5\nr2 n2 n0 55.63\nr3 n3 n0 56.68
+r4 n4 n3 391.2\nr5 n5 0 412.9\nc1 0 n2 0.44u ic=0\nc2 n1 n3 0.28u ic=1\nd0 n4 n5 di\nd1 n3 n2 di\ne0 m0 n3 n2 n4 1\nde0 m0 n1 di
+rm0 m0 0 6554\n.model di d(ideal)\n.tran 5u 2m uic\n.end\n";
+    fs::write(folder.path().join("a.cir"), text).expect("a netlist");
+    let words = said(&ends(folder.path(), "sim a.cir -o a.csv"));
+    assert!(
+        words.contains("the energies of this run do not add up"),
+        "{words}"
+    );
+}
+
 /// A solution that grows so far is unstable, or wrong: nothing checks it.
 #[test]
 fn energies_beyond_doubles_are_a_warning() {

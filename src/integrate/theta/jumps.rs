@@ -15,7 +15,13 @@ impl Theta {
         let before = std::mem::replace(&mut self.now.u, u);
         self.jump(&before, log)?;
         let start = std::mem::take(&mut self.start);
-        self.note_jump(&start, 0.0, JumpReason::Start, log);
+        // Steps that take over at an instant begin with what it brings.
+        let reason = if self.now.t > 0.0 && before != self.now.u {
+            JumpReason::SourceEdge
+        } else {
+            JumpReason::Start
+        };
+        self.note_jump(&start, 0.0, reason, log);
         self.note_energy();
         self.find_mode()?;
         self.started = true;

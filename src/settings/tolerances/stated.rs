@@ -1,5 +1,9 @@
 //! What a run says of its own error, and the second run that verifies it.
 
+/// The part of the largest energy that may be missing before a run warns of it. Where all is right it is rounding, and up to 4e-5 where steps
+/// follow waves on lines. Larger: a wrong jump may pass; smaller: long steps beside lines would be called wrong.
+pub(crate) const UNBALANCED: f64 = 1e-3;
+
 /// Prescribed steps of companions, over those of the run. Larger: the distance says less of the run's own error; smaller: dearer.
 pub(crate) const COARSER: [f64; 2] = [2.0, 4.0];
 
