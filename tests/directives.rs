@@ -241,3 +241,55 @@ C1 N002 0 4.7µ V=25 Irms=0 Rser=5m Lser=1n mfg=\"KEMET\" type=\"X7R\"\nR§Load 
     simulate(&circuit, &behaviour, SimOptions::default()).unwrap();
     assert!(circuit.probe("I(R§Load)").is_some());
 }
+
+/// LTspice takes expressions without braces as the values of passive elements.
+#[test]
+fn values_without_braces() {
+    let of = |value: &str| {
+        let text = format!("V1 a 0 5\n.param x=3 load=7\nR1 a 0 {value}\n.tran 1u 1m");
+        circuit(&text).value("r1")
+    };
+    for (value, ohms) in [
+        ("R=100*x", 300.0),
+        ("R=x*100 tc1=1m", 300.0),
+        ("R = 1k/(2 + x) tol=5", 200.0),
+        ("R=if(x>2, 1, 1Meg)", 1.0),
+        ("R=100 + x", 103.0),
+        ("R=-(x) noiseless", -3.0),
+        // As they ever were.
+        ("R=load", 7.0),
+        ("R=4k7", 4700.0),
+        ("R={100*x} m=2", 150.0),
+    ] {
+        assert_eq!(of(value), Some(ohms), "{value}");
+    }
+    let (none, messages) = read("V1 a 0 5\nR1 a 0 R=100*y\n.tran 1u 1m");
+    assert!(
+        none.is_none() && messages[0].contains("unknown parameter `y`"),
+        "{messages:?}"
+    );
+    let capacitor = circuit("V1 a 0 5\nC1 a 0 C=2*1u\n.tran 1u 1m");
+    assert_eq!(capacitor.value("c1"), Some(2e-6));
+}
+
+/// Runs of `.step` that are all the same are not made without a word.
+#[test]
+fn a_step_of_what_nothing_uses() {
+    let warned = |text: &str| {
+        let (circuit, messages) = read(text);
+        assert!(circuit.is_some(), "{messages:?}");
+        let idle = messages.iter().filter(|m| m.contains("changes nothing"));
+        idle.count()
+    };
+    let with = |card: &str, value: &str| {
+        format!("V1 a 0 5\nR1 a 0 {value}\n{card}\n.step param x 1 3 1\n.tran 1u 1m")
+    };
+    assert_eq!(warned(&with(".param x=2", "1k")), 1);
+    assert_eq!(warned(&with("* nothing", "1k")), 1);
+    assert_eq!(warned(&with(".param x=2", "{x}")), 0);
+    assert_eq!(warned(&with("* nothing", "{x}")), 0);
+    assert_eq!(warned(&with(".param x=2 y={2*x}", "{y}")), 0);
+    // A measurement may be all that depends on it.
+    let measured = ".param x=2\n.meas tran top param 2*x";
+    assert_eq!(warned(&with(measured, "1k")), 0);
+}

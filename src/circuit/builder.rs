@@ -62,6 +62,8 @@ pub(super) struct Builder<'n, 'o> {
     pub(super) measurements: Vec<(ScopeId, &'n ast::Meas)>,
     pub(super) fours: Vec<(ScopeId, &'n ast::Four)>,
     pub(super) step_cards: Vec<&'n ast::Sweep>,
+    /// The parameters that they step.
+    pub(super) stepped: Vec<&'n Name>,
     pub(super) dc_cards: Option<&'n [ast::Sweep]>,
     pub(super) ac_card: Option<&'n ast::Frequencies>,
     pub(super) pss_card: Option<&'n ast::Pss>,
@@ -109,6 +111,7 @@ impl<'n, 'o> Builder<'n, 'o> {
             measurements: Vec::new(),
             fours: Vec::new(),
             step_cards: Vec::new(),
+            stepped: Vec::new(),
             dc_cards: None,
             ac_card: None,
             pss_card: None,
@@ -158,6 +161,7 @@ impl<'n, 'o> Builder<'n, 'o> {
         }
         self.resolve();
         self.report_unused(&netlist.body);
+        self.warn_of_idle_steps();
         if !self.circuit.elements.is_empty() && read && !self.failed() {
             self.check_ground(netlist.end);
             self.note_oddities();

@@ -1,7 +1,7 @@
 //! `.step` and `.dc`: quantities and the values they take.
 
 use super::builder::Builder;
-use super::scope::ScopeId;
+use super::scope::{Param, ScopeId};
 use crate::algebra::Value;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::netlist::ast::{self, Alter, Name, Points, Target};
@@ -136,11 +136,14 @@ impl<'n> Builder<'n, '_> {
                     self.declare(&card.target);
                     continue;
                 }
-                if self.scopes.param(ScopeId::ROOT, name).is_none() {
-                    let first = sweep.values.first().copied().map(Value::binary);
-                    self.scopes.fix(ScopeId::ROOT, name, first);
+                if self.scopes.param(ScopeId::ROOT, name).is_none()
+                    && let Some(first) = card.points.first()
+                {
+                    self.scopes
+                        .set(ScopeId::ROOT, name, Param::Unevaluated(first));
                 }
                 self.declare(&card.target);
+                self.stepped.extend(card.target.name());
             }
             self.circuit.steps.push(sweep);
         }
@@ -163,9 +166,28 @@ impl<'n> Builder<'n, '_> {
     }
 
     fn declare(&mut self, target: &'n Target) {
-        if let Target::Param(name) | Target::Element(name) = target {
+        if let Some(name) = target.name() {
             let root = self.scopes.get_mut(ScopeId::ROOT);
             root.declared.insert(&name.text);
+        }
+    }
+
+    /// A run for each value of a parameter that nothing asked for is the same run many times.
+    pub(super) fn warn_of_idle_steps(&mut self) {
+        for name in std::mem::take(&mut self.stepped) {
+            let param = self.scopes.param(ScopeId::ROOT, &name.text);
+            if !matches!(param, Some((_, Param::Unevaluated(_)))) {
+                continue;
+            }
+            let message = format!("`.step` of `{}` changes nothing", name.text);
+            self.tell(
+                Diagnostic::warning("idle-step", name.span, message)
+                    .label("no value that the runs need depends on it")
+                    .help(format!(
+                        "write `{{{}}}` where its value is meant",
+                        name.text
+                    )),
+            );
         }
     }
 

@@ -52,6 +52,8 @@ struct Figures {
     threshold: f64,
     series: f64,
     beta: Option<f64>,
+    /// Whether β is that of a transistor of which nothing is known.
+    assumed: bool,
     roff: Option<Value>,
     /// Series resistance of the body diode, Ω.
     body: Value,
@@ -175,6 +177,7 @@ impl<'n> Builder<'n, '_> {
             sort,
             series: figures.series,
             beta: figures.beta,
+            assumed: figures.assumed,
         }));
     }
 
@@ -275,6 +278,8 @@ impl<'n> Builder<'n, '_> {
             Family::Igbt => number(&["kp"], 0.38)?,
         };
         let electrical = ["rd", "rs", "kp", "beta", "tox"];
+        let assumed = sort.family == Family::Mos
+            && !["kp", "tox", "ron"].iter().any(|p| params.get(p).is_some());
         let only_ron = is_given && electrical.iter().all(|p| params.get(p).is_none());
         if sort.family == Family::Mos && level > 3.0 && !is_given {
             let message = format!(
@@ -326,6 +331,7 @@ impl<'n> Builder<'n, '_> {
             },
             series,
             beta,
+            assumed,
             roff: rds.is_finite().then(|| Value::binary(rds / times)),
             body: if body > 0.0 {
                 Value::binary(body / times)

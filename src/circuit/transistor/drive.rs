@@ -25,6 +25,8 @@ pub(in crate::circuit) struct Channel {
     pub(super) series: f64,
     /// Transconductance, A/V²; `None` where Ron is given.
     pub(super) beta: Option<f64>,
+    /// Whether β is that of a transistor of which nothing is known.
+    pub(super) assumed: bool,
 }
 
 impl Builder<'_, '_> {
@@ -87,10 +89,14 @@ impl Builder<'_, '_> {
                 "`{}` is simulated as a switch: {text}saturation, charge and speed of model `{}` are left out",
                 channel.device, channel.model
             );
-            self.tell(
-                Diagnostic::warning("transistor-as-switch", channel.span, message)
-                    .label("approximated"),
-            );
+            let warning = Diagnostic::warning("transistor-as-switch", channel.span, message)
+                .label("approximated");
+            self.tell(if channel.assumed {
+                let help = "without KP a transistor has 2e-5 A/V², as everywhere in SPICE: give the model of a power transistor `Ron`, or its `KP` (1 to 100)";
+                warning.help(help)
+            } else {
+                warning
+            });
         }
     }
 

@@ -141,6 +141,14 @@ fn every_model_is_told_once_and_what_is_no_switch_is_refused() {
         codes("M1 b g 0 m\nM2 b h 0 m\nRg g h 1\n.model m VDMOS(Vto=3)"),
         [("transistor-as-switch", true)]
     );
+    let helps = |model: &str| {
+        let (_, findings) = read(&format!("M1 b g 0 0 m\n.model m NMOS{model}"));
+        let helps = findings.iter().filter(|d| d.code == "transistor-as-switch");
+        helps.map(|d| d.help.is_some()).collect::<Vec<_>>()
+    };
+    assert_eq!(helps(""), [true]);
+    assert_eq!(helps("(Ron=1)"), [false]);
+    assert_eq!(helps("(KP=5)"), [false]);
     assert_eq!(
         codes("M1 b b 0 m\n.model m VDMOS(Vto=3)"),
         [("not-a-switch", false)]

@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 24] = [
+pub(super) const CODES: [Explanation; 25] = [
     Explanation::of(
         "circular",
         "Something is defined by itself.",
@@ -52,6 +52,13 @@ pub(super) const CODES: [Explanation; 24] = [
         "Take the others out, or begin them with `*`.",
     )
     .shown("twice .tran\nv1 a 0 1\nr1 a 0 1k\n.tran 1m 5m\n.tran 1m 9m\n"),
+    Explanation::of(
+        "idle-step",
+        "`.step` goes through the values of a parameter that nothing uses: all runs are the same.",
+        "The value is written as a number where the parameter is meant, or the name is misspelt.",
+        "Write `{name}` in the card whose value is to change.",
+    )
+    .shown("the same twice\nv1 a 0 1\nr1 a 0 1k\n.param load=1k\n.step param load list 1k 2k\n.tran 1m 5m\n"),
     Explanation::of(
         "not-a-switch",
         "A transistor whose gate is tied to its drain is a diode, and circ simulates transistors as switches.",

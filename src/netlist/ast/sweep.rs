@@ -27,6 +27,29 @@ pub enum Target {
     Temperature(Span),
 }
 
+impl Target {
+    /// The name of a parameter, or of an element.
+    pub(crate) fn name(&self) -> Option<&Name> {
+        match self {
+            Self::Param(name) | Self::Element(name) => Some(name),
+            Self::Model(..) | Self::Temperature(_) => None,
+        }
+    }
+}
+
+impl Points {
+    /// The first value.
+    pub(crate) fn first(&self) -> Option<&Expr> {
+        match self {
+            Self::Linear([first, ..])
+            | Self::Logarithmic {
+                range: [first, ..], ..
+            } => Some(first),
+            Self::List(list) => list.first(),
+        }
+    }
+}
+
 /// The values of a sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Points {

@@ -4,9 +4,11 @@ use nom::Input as _;
 
 use super::{Body, assignment_follows, assigns, keyword, nodes};
 use crate::diagnostic::Diagnostic;
-use crate::netlist::ast::{Device, Expr, ExprKind, Name};
+use crate::netlist::ast::{Assign, Device, Expr, ExprKind, Name};
+use crate::netlist::expr::expr;
 use crate::netlist::lex::{
-    Input, Parsed, ahead, at_end, ends_word, missing, next_word, refuse, separator, tell,
+    Input, Parsed, ahead, at_end, blank, ends_word, missing, next_word, refuse, separator, symbol,
+    tell, word,
 };
 use crate::netlist::operand;
 
@@ -42,8 +44,32 @@ pub(super) fn passive<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
             )),
         ));
     }
-    let (at, args) = assigns(at)?;
+    let (at, own) = own_expression(at);
+    let (at, others) = assigns(at)?;
+    let args = own.into_iter().chain(others).collect();
     Ok((at, (nodes, Device::Passive { values, args })))
+}
+
+/// `R=100*x`, `C=…`, `L=…`, `Q=…`: an expression without braces, which LTspice takes there. What is a plain value is left.
+fn own_expression(i: Input<'_>) -> (Input<'_>, Option<Assign>) {
+    const OPERATORS: &[char] = &[
+        '+', '-', '*', '/', '^', '<', '>', '?', '!', '&', '|', '%', '(',
+    ];
+    let found = || {
+        let (rest, name) = word(separator(i)).ok()?;
+        let open = symbol(rest, '=').filter(|_| matches!(&*name.text, "r" | "c" | "l" | "q"))?;
+        let is_plain = operand::value(open).is_ok_and(|(after, value)| {
+            let name = match &value.kind {
+                ExprKind::Name(name) => name,
+                _ => "",
+            };
+            !name.contains(OPERATORS) && !blank(after).fragment().starts_with(OPERATORS)
+        });
+        let (rest, value) = expr(open).ok().filter(|_| !is_plain)?;
+        let value = Some(value);
+        Some((rest, Assign { name, value }))
+    };
+    found().map_or((i, None), |(rest, own)| (rest, Some(own)))
 }
 
 /// Suffixes that SPICE reads otherwise than people do: 1M Ω is 1 mΩ, 1F is 1 fF, 1a is 1.
