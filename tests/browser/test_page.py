@@ -94,6 +94,33 @@ def test_two_cursors_and_their_difference(buck, show):
     assert state in ("conducts", "blocks")
 
 
+def test_mean_and_rms_between_two_cursors(buck, show):
+    table = rows(buck / "out.csv")
+    page = show(buck / "out.html")
+    assert cell(page, "i(l1)", "mean").inner_text() == ""
+    # The earlier one may be either; both stand on rows, some at jumps of the switch node.
+    for first_at, second_at in ((0.75, 0.2), (0.2, 0.7)):
+        page.mouse.click(*middle(page, first_at))
+        page.keyboard.down("Shift")
+        page.mouse.click(*middle(page, second_at))
+        page.keyboard.up("Shift")
+        a, b = sorted(float(cursor(page, at)) for at in "ab")
+        for name in ("v(sw)", "i(l1)"):
+            inside = [k for k, t in enumerate(table["time"]) if a <= t <= b]
+            # The last row at a and the first at b.
+            start = max(k for k in inside if table["time"][k] == a)
+            end = min(k for k in inside if table["time"][k] == b)
+            mean = square = 0.0
+            for k in range(start, end):
+                dt, y, z = table["time"][k + 1] - table["time"][k], table[name][k], table[name][k + 1]
+                mean += dt * (y + z) / 2 / (b - a)
+                square += dt * (y * y + y * z + z * z) / 3 / (b - a)
+            assert float(reading(page, name, "mean")) == pytest.approx(mean, rel=1e-9)
+            assert float(reading(page, name, "rms")) == pytest.approx(math.sqrt(square), rel=1e-9)
+    page.keyboard.press("Escape")
+    assert cell(page, "i(l1)", "rms").inner_text() == ""
+
+
 def test_states_between_events(buck, show):
     page = show(buck / "out.html")
     table = rows(buck / "out.csv")
@@ -315,9 +342,9 @@ def test_the_spectrum_has_axes_of_its_own(buck, show):
     page = show(buck / "out.html")
     page.get_by_role("button", name="spectrum").click()
     bar = page.get_by_role("toolbar", name="axes of the spectrum")
-    bar.get_by_role("button", name="log x").click()
-    bar.get_by_role("button", name="log y").click()
     pressed = lambda: [b.get_attribute("aria-pressed") for b in bar.get_by_role("button").all()]
+    assert pressed() == ["true", "false"]
+    bar.get_by_role("button", name="log y").click()
     assert pressed() == ["true", "true"]
     labels = lambda: page.get_by_role("region", name="spectrum").locator(".panel").count()
     assert labels() == 3

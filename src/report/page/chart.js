@@ -75,7 +75,7 @@ function chart(root, content, announce) {
   const dash = (curve) => DASHES[curve.look[1] % 4];
   const isFirst = document.querySelector(".panels") === null;
   const area = element("div", { class: "panels" });
-  const stripCanvas = element("canvas", { class: "strip", role: "img" });
+  const stripCanvas = element("canvas", { class: "strip", role: "img", title: "a bar while it conducts or is on; pale where changes are too close to tell apart, grey while nothing is known" });
   const readings = readingsTable();
   root.append(area, element("div", { class: "readings" }, readings.table));
 
@@ -498,14 +498,16 @@ function chart(root, content, announce) {
     }
   }
 
-  /** The legend, which is a table of readings: at the pointer, at both cursors, and their difference. */
+  /** The legend, which is a table of readings: at the pointer, at both cursors, their difference, and over time mean and rms between them. */
   function readingsTable() {
-    const columns = ["pointer", "a", "b"];
-    const head = Object.fromEntries([...columns, "delta"].map((name) => [name, element("th", { scope: "col", "data-at": name })]));
+    const columns = ["pointer", "a", "b"], averages = axis.unit === "s" ? ["mean", "rms"] : [];
+    const all = [...columns, "delta", ...averages];
+    const head = Object.fromEntries(all.map((name) => [name, element("th", { scope: "col", "data-at": name })]));
     const cells = new Map(), boxes = new Map();
+    let spanned = null;
     const body = element("tbody");
     const row = (key, label) => {
-      const own = Object.fromEntries([...columns, "delta"].map((name) => [name, element("td", { "data-at": name })]));
+      const own = Object.fromEntries(all.map((name) => [name, element("td", { "data-at": name })]));
       cells.set(key, own);
       body.append(element("tr", { "data-signal": key.name }, element("th", { scope: "row" }, label), ...Object.values(own)));
     };
@@ -517,7 +519,7 @@ function chart(root, content, announce) {
         groups.push([box, curves]);
         return element("label", {}, box, words);
       });
-      body.append(element("tr", { class: "group" }, element("th", { scope: "rowgroup", colspan: columns.length + 2 }, ...labels)));
+      body.append(element("tr", { class: "group" }, element("th", { scope: "rowgroup", colspan: all.length + 1 }, ...labels)));
     };
     if (runs.length > 1) heading(...runs.map((run) => [run, curves.filter((curve) => curve.run === run)]));
     for (const panel of panels) {
@@ -557,6 +559,9 @@ function chart(root, content, announce) {
       }
       const inverse = axis.unit === "s" && both && a !== b ? ` (${quantity(1 / Math.abs(b - a), "Hz")})` : "";
       put(head.delta, both ? b - a : null, both ? `B − A ${quantity(b - a, axis.unit, 9)}${inverse}` : "B − A");
+      for (const name of averages) put(head[name], null, `${name} A…B`);
+      const isNew = spanned !== `${a} ${b}`;
+      spanned = `${a} ${b}`;
       for (const [key, own] of cells) {
         if (key instanceof HTMLElement) {
           key.style.background = swatch(colour(own), dash(own));
@@ -572,6 +577,12 @@ function chart(root, content, announce) {
         const values = columns.map((name) => (times[name] === null ? null : valueAt(key, times[name])));
         columns.forEach((name, k) => put(own[name], values[k], values[k] === null ? "" : quantity(values[k], unitOf(key))));
         put(own.delta, both ? values[2] - values[1] : null, both ? quantity(values[2] - values[1], unitOf(key)) : "");
+        // These look at all rows between: not whenever the pointer moves.
+        if (averages.length > 0 && (isNew || key.partial !== own.partial)) {
+          const found = both && a !== b ? averagesOf(key, Math.min(a, b), Math.max(a, b)) : null;
+          averages.forEach((name, k) => put(own[name], found && found[k], found ? quantity(found[k], unitOf(key)) : ""));
+          own.partial = key.partial;
+        }
       }
     }
     function tick() {

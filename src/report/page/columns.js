@@ -99,6 +99,23 @@ function boundsIn(curve, from, to) {
   return [low, high];
 }
 
+/** Mean and root mean square of the curve from a to b > a, straight between rows; NaN where rows are missing. */
+function averagesOf(curve, a, b) {
+  const { x, y } = curve;
+  if (curve.partial || !(a >= x[0] && b <= x[x.length - 1])) return [NaN, NaN];
+  let t = a, from = valueAt(curve, a), sum = 0, squares = 0;
+  const on = (end, to) => {
+    sum += ((end - t) * (from + to)) / 2;
+    squares += ((end - t) * (from * from + from * to + to * to)) / 3;
+    [t, from] = [end, to];
+  };
+  const last = rowAt(x, b);
+  for (let k = rowAfter(x, a); k < last; k++) on(x[k], y[k]);
+  // At b what comes before a jump there.
+  on(b, x[last] === b || last === 0 ? y[last] : from + ((b - t) / (x[last] - t)) * (y[last] - from));
+  return [sum / (b - a), Math.sqrt(squares / (b - a))];
+}
+
 /** The rows of what is seen of the curve, with one more on either side: from the first up to but not at the second. */
 const rowsIn = (curve, [from, to]) => [Math.max(0, rowAt(curve.x, from) - 1), Math.min(curve.x.length, rowAfter(curve.x, to) + 1)];
 

@@ -171,7 +171,7 @@ function circPage(root, data) {
     toggle("log x", "x", (chart) => chart.logarithmicAcross, "logarithmic axis across");
     toggle("log y", "y", (chart) => chart.logarithmic, "logarithmic axis of absolute values");
   }
-  const spectrumLooks = { x: false, y: false };
+  const spectrumLooks = { x: true, y: false };
   const spectrumWords = element("p", { class: "about" });
   /** Straight lines between rows that are far apart make lines of their own, below half the rate of rows too. */
   function spectrumNote() {
