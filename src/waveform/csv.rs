@@ -1,6 +1,7 @@
 //! Comma-separated values: `time,v(out),…` with 17 significant digits.
 
 use std::io::{BufRead, BufReader, Read, Write};
+use std::num::ParseFloatError;
 
 use nalgebra::Complex;
 
@@ -137,14 +138,20 @@ fn malformed(reason: impl Into<String>) -> WaveformError {
     WaveformError::malformed(FORMAT, reason)
 }
 
-/// What stands between cells: a tab where the line of names has one, as LTspice exports (`V(a,b)` is a name there), else a comma or a semicolon.
+/// What stands between cells: a tab where the line of names has one, as LTspice exports, else a semicolon or a comma; a comma of a name
+/// like `V(a,b)` is none.
 fn delimiter(start: &[u8]) -> u8 {
     let mut lines = start.split(|&b| b == b'\n');
     let header = lines
         .find(|line| !line.starts_with(b"#"))
         .unwrap_or_default();
     let has = |b: &u8| header.contains(b);
-    [b'\t', b',', b';'].into_iter().find(has).unwrap_or(b',')
+    [b'\t', b';', b','].into_iter().find(has).unwrap_or(b',')
+}
+
+/// A number, with a decimal comma too: where cells stand between commas none has one.
+fn number(cell: &str) -> Result<f64, ParseFloatError> {
+    cell.parse().or_else(|_| cell.replacen(',', ".", 1).parse())
 }
 
 /// Finite numbers under a header.
@@ -183,7 +190,7 @@ impl Table {
                 )));
             }
             for (cell, column) in record.iter().zip(&mut columns) {
-                match cell.parse::<f64>() {
+                match number(cell) {
                     Ok(value) if value.is_finite() => column.push(value),
                     _ => {
                         return Err(malformed(format!(
@@ -243,10 +250,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_tab_or_a_semicolon_stands_between_cells() {
+    fn a_tab_or_a_semicolon_stands_between_cells_and_a_comma_before_decimals() {
         for text in [
             "time\tV(a,b)\tI(L1)\n0\t1\t2\n1e-3\t3\t4\n",
             "time;v(a);i(l1)\n0;1;2\n1e-3;3;4\n",
+            "Time;V(a,b);I(L1)\n0;1,0;2\n0,001;3,0E0;4\n",
         ] {
             let table = Table::read(text.as_bytes()).unwrap();
             assert_eq!(table.columns, [[0.0, 1e-3], [1.0, 3.0], [2.0, 4.0]]);
