@@ -456,3 +456,20 @@ fn measurements_of_an_orbit_see_the_carrier_of_a_modulator() {
     );
     assert!((rows / exact - 1.0).abs() < 5e-4, "{rows} of {exact}");
 }
+
+/// A capacitor is charged by 1 mA and discharged by 2 mA between ±1 V, about. What follows it through 10 kΩ and 2 µF forgets by e^{−T/τ} from one
+/// return to the next: the derivative of a return that ends with an event has more digits than differences of returns, 1e-8.
+#[test]
+fn the_multiplier_of_what_follows_an_oscillator_is_its_decay() {
+    let text = "* t\nv1 1 0 10\nv2 4 0 -30\nr1 1 2 10k\nc1 2 0 1u ic=0\ns1 2 3 2 0 sw\nr2 3 4 10k\ne1 5 0 2 0 1\nr3 5 6 10k\nc2 6 0 2u ic=0\n\
+                .model sw sw(vt=0 vh=1 ron=0 ideal=1)\n.tran 1u 50m uic\n.end\n";
+    let (orbit, _) = orbit_of(text);
+    let expected = (-orbit.period / 20e-3).exp();
+    let [found] = orbit.multipliers[..] else {
+        panic!("{orbit:?}");
+    };
+    assert!(
+        (found[0] / expected - 1.0).abs() < 1e-12,
+        "{found:?} {expected}"
+    );
+}

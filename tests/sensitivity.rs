@@ -155,3 +155,26 @@ fn the_range_of_a_divider() {
     near(&found, "out", "r2", 4e3, 12.0 * 1e3 * 2e3 / 9e6, 2e-6);
     near(&found, "out", "r", 4e3, 12.0 * 1e3 * 2e3 / 9e6, 2e-6);
 }
+
+/// The steady state depends on its period otherwise than on a value: by default such a parameter is left out, and asked for it is refused.
+#[test]
+fn what_changes_the_period_of_a_steady_state_is_left_out() {
+    let text = "filter\nv1 1 0 pulse(0 {a} 0 0 0 {t/2} {t})\nr1 1 2 1k\nc1 2 0 1u\n.param t=1m a=2\n.tran 1u 1m\n.meas tran out avg v(2)\n.end\n";
+    let found = found(text, true);
+    assert!(found.exact && found.at.iter().all(|(name, _)| name != "t"));
+    assert!(
+        found
+            .notes
+            .iter()
+            .any(|note| note.text.contains("`t` is left out"))
+    );
+    near(&found, "out", "a", 2.0, 1.0, 1e-9);
+    let model = Model::parse(text, "t.cir").expect("a circuit");
+    let options = SensitivityOptions {
+        to: vec!["t".into()],
+        steady: true,
+        ..SensitivityOptions::default()
+    };
+    let error = sensitivity(&model, &options).expect_err("a period that moves");
+    assert!(error.to_string().contains("changes the period"), "{error}");
+}

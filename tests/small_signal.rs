@@ -317,3 +317,18 @@ fn a_transient_starts_at_the_orbit_and_a_step_follows() {
     }
     assert!(last[1] > first[1] + 0.5, "{last:?} {first:?}");
 }
+
+/// A switch that is on while the current of a capacitor across a sine, C A ω cos ωt, is positive: its edges at u' = 0 move by δu'/(A ω²) towards
+/// each other or apart, twice a period T, and the pulses of V by 2 V δu'/(A ω² T) in the mean.
+#[test]
+fn a_switch_that_follows_the_slope_of_a_source_acts_on_its_filter() {
+    let text = "slope\nvin c 0 sin(0 2 1k) ac 1\nc1 c 0 1u\nh1 h 0 vin 1k\nv1 1 0 10\ns1 1 2 0 h sw\ns2 2 0 h 0 sw\nr1 2 3 1k\nc2 3 0 1u\n\
+        .model sw sw(vt=0 vh=0 ron=0 ideal=1)\n.ac dec 3 10 3k\n.save v(3)\n.end\n";
+    let response = response_of(text, &SmallSignalOptions::default());
+    assert_eq!(response.about, About::Orbit);
+    let out = column(&response, "v(3)");
+    let pulses = |f: f64| 2.0 * 10.0 * 1e3 / (2.0 * (TAU * 1e3).powi(2)) * J * TAU * f;
+    let truth = |f: f64| pulses(f) / (1.0 + J * TAU * f * 1e-3);
+    let error = apart(&out, truth, &response.phasors.frequency);
+    assert!(error < 1e-9, "{error:e}");
+}

@@ -558,3 +558,27 @@ impl<'a> Measuring<'a> {
         cut.of(&run.waveforms, &run.kinds)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Model;
+
+    /// Twenty times as many rows would have two at every event.
+    #[test]
+    fn rows_are_as_close_as_events_want_them_and_memory_allows() {
+        let text = "rc\nr1 1 0 1\nc1 1 0 1 ic=1\n.tran 1 1 uic\n.end\n";
+        let model = Model::parse(text, "rc.cir").expect("a circuit");
+        let mut run = model.transient(SimOptions::default()).expect("a run");
+        run.kinds = [vec![RowKind::Grid], vec![RowKind::Event; 10]].concat();
+        let mut closer = |values: usize| {
+            run.waveforms.values = vec![0.0; values];
+            let measuring = Measuring::of(model.circuit(), true);
+            measuring.closer(&run, &Measurements::default())
+        };
+        assert_eq!(closer(0), Some(20));
+        assert_eq!(closer(MOST_VALUES / 20), Some(20));
+        assert_eq!(closer(MOST_VALUES / 3), Some(3));
+        assert_eq!(closer(MOST_VALUES), None);
+    }
+}

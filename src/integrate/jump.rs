@@ -509,4 +509,26 @@ mod tests {
         assert_eq!(jumps.verify(&lcs, &dvector![0.0, 1e-3]), Ok(()));
         assert_eq!(jumps.verify(&lcs, &dvector![1.0, 0.0]), Ok(()));
     }
+
+    /// D + Dᵀ and the jump matrix CB must both be semidefinite for a jump to be the solution of a monotone problem.
+    #[test]
+    fn a_jump_problem_is_monotone_where_both_of_its_matrices_are() {
+        let is_monotone = |c: DMatrix<f64>, d: DMatrix<f64>| {
+            let lcs = fixtures::system(
+                &[("v(c1)", "V"), ("v(c2)", "V")],
+                &[("d1", Role::Current), ("d2", Role::Current)],
+                [DMatrix::zeros(2, 2), -DMatrix::identity(2, 2), c, d],
+                &[1.0, 1.0],
+            );
+            JumpProblem::new(&lcs, 1e-9).unwrap().monotone
+        };
+        let (passive, turned) = (
+            dmatrix![-1.0, 0.0; 0.0, -1.0],
+            dmatrix![-1.0, 0.0; 0.0, 1.0],
+        );
+        let (none, indefinite) = (DMatrix::zeros(2, 2), dmatrix![0.0, -1.0; 0.0, 0.0]);
+        assert!(is_monotone(passive.clone(), none.clone()));
+        assert!(!is_monotone(passive, indefinite));
+        assert!(!is_monotone(turned, none));
+    }
 }

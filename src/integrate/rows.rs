@@ -441,4 +441,41 @@ mod tests {
             }
         }
     }
+
+    fn sheet<'a>(from: f64, most: Option<usize>, sink: Option<Sink<'a>>) -> Sheet<'a> {
+        let asked = Asked {
+            events: true,
+            most,
+            sink,
+            ..Asked::default()
+        };
+        Sheet::new(1, from, asked)
+    }
+
+    #[test]
+    fn a_row_at_the_time_that_rows_begin_at_is_the_first() {
+        let mut sheet = sheet(1.0, None, None);
+        for t in [0.5, 1.0, 1.5] {
+            sheet.between(t, &[t], RowKind::Event);
+        }
+        assert_eq!(sheet.collected().0, [1.0, 1.5]);
+    }
+
+    #[test]
+    fn an_attempt_that_was_full_may_be_made_again_and_one_that_was_stopped_may_not() {
+        let mut full = sheet(0.0, Some(2), None);
+        for t in [0.0, 1.0] {
+            full.between(t, &[t], RowKind::Event);
+        }
+        assert!(full.go_on(1.0).is_err());
+        assert_eq!(full.again(), None);
+        assert!(full.go_on(0.0).is_ok());
+
+        let mut stop = |_: Block<'_>| ControlFlow::Break(());
+        let mut stopped = sheet(0.0, None, Some(&mut stop));
+        stopped.between(0.0, &[0.0], RowKind::Event);
+        stopped.end();
+        stopped.again();
+        assert!(stopped.go_on(0.0).is_err());
+    }
 }

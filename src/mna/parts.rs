@@ -256,3 +256,58 @@ impl<'a> Columns<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, dmatrix};
+
+    use crate::integrate::fixtures;
+    use crate::lcs::Role;
+    use crate::mna::fixture::circuit;
+    use crate::mna::{StaticMultiport, behaviour};
+
+    /// Given as matrices: a device looks at the second state and drives the first one, x₁' = −x₁ + λ and y = x₂.
+    #[test]
+    fn what_a_device_looks_at_and_what_it_drives_are_one_part() {
+        let lcs = fixtures::system(
+            &[("v(c1)", "V"), ("v(c2)", "V"), ("v(c3)", "V")],
+            &[("d1", Role::Current)],
+            [
+                -DMatrix::identity(3, 3),
+                dmatrix![1.0; 0.0; 0.0],
+                dmatrix![0.0, 1.0, 0.0],
+                dmatrix![0.0],
+            ],
+            &[1.0, 1.0, 1.0],
+        );
+        let parts = StaticMultiport::from_lcs(&lcs).standard().parts();
+        let storage: Vec<&[usize]> = parts.iter().map(|part| &part.storage[..]).collect();
+        assert_eq!(storage, [&[0, 1][..], &[2]]);
+    }
+
+    /// The current of the source that stands on another one is that of what hangs on it, and adds to that of the other.
+    #[test]
+    fn sources_in_series_join_nothing() {
+        let circuit = circuit(
+            "v1 1 0 1\nv2 2 1 1\nr1 1 a 1\nc1 a 0 1\nr2 2 b 1\nc2 b 0 1\nr3 2 c 1\nc3 c 0 1",
+        );
+        assert_eq!(behaviour(&circuit).unwrap().standard().parts().len(), 3);
+    }
+
+    #[test]
+    fn a_capacitor_across_a_source_is_a_part_that_has_its_voltage() {
+        let circuit = circuit("v1 1 0 1\nc1 1 0 1\nr2 1 b 1\nc2 b 0 1");
+        let whole = behaviour(&circuit).unwrap().standard();
+        let parts = whole.parts();
+        assert_eq!(parts.len(), 2);
+        for part in parts {
+            for (own, &k) in part.multiport.storage.iter().zip(&part.storage) {
+                let name = |own: usize, of: usize| {
+                    assert_eq!(part.multiport.columns[own], whole.columns[of]);
+                };
+                name(own.state, whole.storage[k].state);
+                name(own.flow, whole.storage[k].flow);
+            }
+        }
+    }
+}

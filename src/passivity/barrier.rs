@@ -213,9 +213,6 @@ fn centre(blocks: &[Block; 3], z: &mut DVector<f64>, t: &mut f64, mu: f64) -> bo
             return false;
         };
         let decrement = (-gradient.dot(&step)).max(0.0).sqrt();
-        if !decrement.is_finite() {
-            return false;
-        }
         let mut length = if decrement > 0.25 {
             1.0 / (1.0 + decrement)
         } else {

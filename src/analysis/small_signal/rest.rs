@@ -122,3 +122,36 @@ fn tangents(lcs: &Lcs, points: &[(f64, f64)]) -> Option<[DMatrix<f64>; 2]> {
     };
     Some([scaled(c)?, scaled(g)?])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::fixtures;
+    use crate::law::{Exponential, Law};
+    use nalgebra::dmatrix;
+
+    /// g = (i + Is)/a at 1 µA, though the voltage is off by 1 nV, as one that is the difference of large potentials: of that error the
+    /// tangent has 1/(1 + v g/i), not all of δv/a = 4e-8.
+    #[test]
+    fn a_tangent_weighs_the_voltage_and_the_current_of_its_point_alike() {
+        let (is, slope, i) = (1e-30_f64, 0.025, 1e-6);
+        let lcs = fixtures::system(
+            &[("v(c1)", "V")],
+            &[("d1", Role::Current)],
+            [dmatrix![0.0], dmatrix![-1.0], dmatrix![-1.0], dmatrix![0.0]],
+            &[1.0],
+        );
+        let lcs = lcs.changed(|parts| {
+            parts.ports[0].law = Law::Exponential(Exponential {
+                is,
+                slope,
+                rs: 0.0,
+                breakdown: None,
+            });
+        });
+        let v = slope * (i / is).ln_1p();
+        let [found, _] = tangents(&lcs.unwrap(), &[(v + 1e-9, i)]).unwrap();
+        let off = found[(0, 0)] / ((i + is) / slope) - 1.0;
+        assert!(off.abs() < 1e-9, "{off:e}");
+    }
+}

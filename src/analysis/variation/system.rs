@@ -222,3 +222,28 @@ impl System {
         DVector::from_fn(rows.one.len(), |k, _| reading::value(rows, k, point))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::dvector;
+
+    #[test]
+    fn a_sum_of_guards_has_the_sum_of_their_values() {
+        let row = |x: f64, u: f64, du: f64, one: f64| Row {
+            x: dvector![x],
+            u: dvector![u],
+            du: dvector![du],
+            one,
+        };
+        let (a, b) = (row(1.0, 2.0, 3.0, 4.0), row(0.5, -1.0, 7.0, 16.0));
+        let inputs = Inputs {
+            u: dvector![0.5],
+            du: dvector![2.0],
+            ddu: dvector![0.0],
+        };
+        let value = |row: &Row| row.value(&dvector![3.0], &inputs).0;
+        assert_eq!((value(&a), value(&b)), (14.0, 31.0));
+        assert_eq!(value(&a.plus(-2.0, &b)), 14.0 - 2.0 * 31.0);
+    }
+}

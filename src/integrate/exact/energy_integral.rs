@@ -540,4 +540,18 @@ mod tests {
         );
         // The explicit form over w would be off by gain²·ε·1e-3 s ≫ v²/fast.
     }
+
+    /// x₂' = x₁ at rest so far, of which nothing but rounding has been seen: x₂ = t, ∫ x₂² dt = t³/3.
+    #[test]
+    fn an_amplitude_that_was_next_to_nothing_spoils_no_energy() {
+        let a = DMatrix::from_row_slice(2, 2, &[0.0, 0.0, 1.0, 0.0]);
+        for amplitude in [1.0, 1e-150, 1e-200, 1e-310] {
+            let terms = vec![term(&[0.0, 1.0], &[0.0, 1.0], false)];
+            let mut work = EnergyIntegral::new(terms, &[], 1.0, 5).unwrap();
+            let amplitudes = [1.0, amplitude];
+            let mut integrals = work.integrals(&a, sizes(&amplitudes));
+            let [_, found] = integrals.over(5, &[1.0, 0.0]);
+            assert!((3.0 * found - 1.0).abs() < 1e-14, "{amplitude:e}: {found}");
+        }
+    }
 }

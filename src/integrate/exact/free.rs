@@ -209,3 +209,35 @@ impl Free {
         self.steps.iter().map(|s| s.driver.factorisations).sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::fixtures;
+    use nalgebra::{dmatrix, dvector};
+
+    /// A diode across 1 F at 3 V, and a voltage of `gain` times its current across another one, with a resistor.
+    fn impulse(gain: f64) -> Option<DVector<f64>> {
+        let lcs = fixtures::system(
+            &[("v(c1)", "V")],
+            &[("d1", Role::Current), ("d2", Role::Current)],
+            [
+                dmatrix![0.0],
+                dmatrix![-1.0, 0.0],
+                dmatrix![-1.0; 0.0],
+                dmatrix![0.0, 0.0; gain, 1.0],
+            ],
+            &[1.0],
+        );
+        Free::new(lcs, 1e-9).impulse_between(&dvector![3.0], &dvector![0.0], &[true, false])
+    }
+
+    #[test]
+    fn an_impulse_of_voltage_may_be_nothing_but_not_forward() {
+        for gain in [1.0, 0.0] {
+            let p = impulse(gain).expect("an impulse");
+            assert!((p - dvector![3.0, 0.0]).amax() < 1e-15);
+        }
+        assert_eq!(impulse(-1.0), None);
+    }
+}

@@ -285,3 +285,99 @@ impl Inspector {
         first.map_or_else(|| mode.is_off_at_rest(i), |value| value < 0.0)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::circuit::Source;
+    use crate::integrate::exact::Assembler;
+    use crate::integrate::exact::key::Key;
+    use crate::integrate::exact::mode::SwitchFacts;
+    use crate::integrate::exact::tests::circuit;
+    use crate::lcs::Hold;
+    use crate::mna;
+
+    /// The mode of a circuit without switches in which its devices do this, and its sources.
+    fn mode(text: &str, closed: &[bool]) -> (Mode, Exosystem) {
+        let behaviour = mna::behaviour(&circuit(text)).expect("a sound circuit");
+        let hold = |closed: &bool| if *closed { Hold::Closed } else { Hold::Open };
+        let holds: Vec<Hold> = closed.iter().map(hold).collect();
+        let mut assembler = Assembler::new(Arc::new(behaviour.standard()));
+        let lcs = assembler.assemble(&holds, &[], &[]).expect("a system");
+        let sources: Vec<Source> = lcs.inputs.iter().map(|i| i.source.clone()).collect();
+        let silent = vec![false; sources.len()];
+        let mut exosystem = Exosystem::of(&sources, silent, (0.0, 1.0), false).expect("lines");
+        for (i, source) in sources.iter().enumerate() {
+            exosystem.set_piece(i, source.piece(0.0).expect("a piece"));
+        }
+        let key = Key {
+            closed: closed.to_vec(),
+            ..Key::default()
+        };
+        let facts = SwitchFacts {
+            thresholds: &[],
+            limits: &[],
+            clocks: &[],
+        };
+        let mode = Mode::new(key, &lcs, &exosystem, &facts, 1e-3, false).expect("a mode");
+        (mode, exosystem)
+    }
+
+    /// What an inspection at storage s and time t finds.
+    fn inspected(
+        inspector: &mut Inspector,
+        (mode, exosystem): &mut (Mode, Exosystem),
+        t: f64,
+        s: f64,
+    ) -> Finding {
+        let mut z = vec![0.0; exosystem.dim()];
+        exosystem.write(t, &mut z);
+        inspector.inspect(mode, (exosystem, t, &z), &[s], (&[1.0], &[1.0]))
+    }
+
+    /// A diode that conducts across a source of another voltage than 0, of either sign.
+    #[test]
+    fn a_constraint_that_is_broken_on_either_side_forbids_a_mode() {
+        for volts in [-1.0, 1.0] {
+            let text = format!(
+                "v1 1 0 {volts}\nd1 1 0 d\nr1 1 2 1\nc1 2 0 1 ic=1\n.model d d(ideal)\n.tran 1 1 uic"
+            );
+            let mut parts = mode(&text, &[true]);
+            let found = inspected(&mut Inspector::default(), &mut parts, 0.0, 1.0);
+            assert_eq!(found, Finding::Inconsistent, "{volts} V");
+        }
+    }
+
+    /// A diode blocks the voltage of a capacitor that decays. What is small, but falls as fast as to have passed zero within the resolution of
+    /// the time, is decided by its slope.
+    #[test]
+    fn a_guard_that_passes_zero_at_this_instant_is_decided_by_its_slope() {
+        let text = "c1 1 0 1 ic=1\nr1 1 0 1\nd1 0 1 d\n.model d d(ideal)\n.tran 1 1 uic";
+        let (mut parts, mut inspector) = (mode(text, &[false]), Inspector::default());
+        let holds = Finding::Holds(vec![]);
+        assert_eq!(inspected(&mut inspector, &mut parts, 1.0, 1.0), holds);
+        assert_eq!(inspected(&mut inspector, &mut parts, 1.0, 1e-9), holds);
+        inspector.note_slip(Owner::Device(0), 1.0, 1e8);
+        let refused = Finding::Refused(0);
+        assert_eq!(inspected(&mut inspector, &mut parts, 1.0, 1e-9), refused);
+    }
+
+    /// A guard that is a difference of 10⁶ V: what its slope makes of it before the curvature turns it around, g'²/2|g''|, may be rounding.
+    #[test]
+    fn a_slope_that_the_curvature_turns_around_within_rounding_decides_nothing() {
+        let text = "c1 1 0 1 ic=1\nr1 1 0 1\nd1 0 1 d\n.model d d(ideal)\n.tran 1 1 uic";
+        let (mode, _) = mode(text, &[false]);
+        let leaves = |slope: f64, curvature: f64| {
+            let inspector = Inspector {
+                jets: vec![0.0, slope, curvature, 0.0],
+                jet_sizes: vec![1e6, slope.abs(), curvature.abs(), 0.0],
+                ..Inspector::default()
+            };
+            inspector.leaves(&mode, 0, 0.0)
+        };
+        assert!(leaves(1e-5, -1.0) && !leaves(-1e-5, 1.0));
+        assert!(!leaves(1e-2, -1.0) && leaves(-1e-2, 1.0));
+    }
+}

@@ -118,7 +118,7 @@ impl Theta {
             let jumps = self.system().jump.as_ref();
             if smallest && jumps.is_some_and(|jump| !jump.monotone) {
                 self.attempt(h, t1)?;
-                *impulse = self.impulsive(h)?;
+                *impulse = self.impulse(h)?.is_some();
                 self.forget_start();
                 self.commit(t1)?;
                 return Ok(verdict);

@@ -70,11 +70,10 @@ impl Theta {
         Ok(())
     }
 
-    /// The motion goes on from here with another slope.
+    /// The motion goes on from here with another slope. Where a curved step starts from is told by [`Self::find_mode`], which follows.
     fn forget_slope(&mut self) {
         self.now.slope.clear();
         self.looks.forget();
-        self.forget_start();
     }
 
     /// The jump from inputs `old` to the present ones at the present time.

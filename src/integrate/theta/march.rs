@@ -38,7 +38,7 @@ impl Theta {
             if simple {
                 let h = self.fixed_step(h, t1)?;
                 let changed = self.attempt.solved.is_some();
-                let impulse = changed && self.impulsive(h)?;
+                let impulse = if changed { self.impulse(h)? } else { None };
                 self.finish_step(t1, impulse, log)?;
             } else {
                 self.divided_step(h, t1, log)?;
@@ -82,14 +82,14 @@ impl Theta {
     pub(super) fn finish_step(
         &mut self,
         t1: f64,
-        impulse: bool,
+        impulse: Option<Vec<f64>>,
         log: &mut Log,
     ) -> Result<(), Error> {
-        if impulse {
-            self.log_spontaneous(t1, log);
+        if let Some(p) = &impulse {
+            self.log_spontaneous(t1, p, log);
         }
         self.commit(t1)?;
-        if impulse {
+        if impulse.is_some() {
             self.now.settle = true;
         }
         if !self.pending.is_empty() {
@@ -308,7 +308,7 @@ impl Theta {
         self.now.settle = self.damped || self.now.turned_off;
         self.attempt(0.5 * h, t1)?;
         if last_chance && self.attempt.solved.is_some() {
-            *impulse = self.impulsive(0.5 * h)?;
+            *impulse = self.impulse(0.5 * h)?.is_some();
         }
         self.commit(t1)?;
         for (k, coarse) in self.coarse.iter_mut().enumerate() {
@@ -376,27 +376,28 @@ impl Theta {
         row
     }
 
-    /// Whether the attempted step of a network that may jump by itself contains an impulse: p = hλ is compared with that
-    /// of half the step from the same state. Passive networks jump only where sources or switches do.
-    pub(super) fn impulsive(&mut self, h: f64) -> Result<bool, Error> {
+    /// The impulse in the attempted step of a network that may jump by itself, if there is one: p = hλ is compared with that of half the
+    /// step from the same state, port by port. A finite λ has half as much there and no part in it; what is left is taken to h = 0.
+    /// Passive networks jump only where sources or switches do.
+    pub(super) fn impulse(&mut self, h: f64) -> Result<Option<Vec<f64>>, Error> {
         let may = self
             .system()
             .jump
             .as_ref()
             .is_some_and(|jump| !jump.monotone);
         if !may {
-            return Ok(false);
+            return Ok(None);
         }
         let whole: Vec<f64> = self.lambda.iter().map(|l| l * h).collect();
         let (out, lambda, attempt) = (self.out.clone(), self.lambda.clone(), self.attempt.clone());
         let middle = self.now.t + 0.5 * h;
         let half = self.attempt(0.5 * h, middle);
         let solved = self.attempt.solved.is_some();
-        let size = |p: &[f64]| p.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-        let part = if solved {
-            0.5 * h * size(&self.lambda)
+        let part = self.lambda.iter().map(|l| 0.5 * h * l);
+        let part: Vec<f64> = if solved {
+            part.collect()
         } else {
-            0.0
+            vec![0.0; whole.len()]
         };
         self.out = out;
         self.lambda = lambda;
@@ -406,15 +407,25 @@ impl Theta {
         system
             .columns
             .fill(&self.now.x, &self.u_next, &self.now.u, &mut self.z);
-        Ok(half.is_ok() && part > IMPULSE_RATIO * size(&whole))
+        let size = |p: &[f64]| p.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+        if half.is_err() || size(&part) <= IMPULSE_RATIO * size(&whole) {
+            return Ok(None);
+        }
+        let limit = |(part, whole): (&f64, &f64)| {
+            if part.abs() > IMPULSE_RATIO * whole.abs() {
+                2.0 * part - whole
+            } else {
+                0.0
+            }
+        };
+        Ok(Some(part.iter().zip(&whole).map(limit).collect()))
     }
 
-    pub(super) fn log_spontaneous(&mut self, t: f64, log: &mut Log) {
+    fn log_spontaneous(&mut self, t: f64, p: &[f64], log: &mut Log) {
         self.stats.jumps += 1;
-        let p: Vec<f64> = self.lambda.iter().map(|l| l * self.attempt.h).collect();
         let still = vec![0.0; self.now.u.len()];
-        self.log_impulses(t, &p, &still, log);
-        self.note_impulse(t, &p, log);
+        self.log_impulses(t, p, &still, log);
+        self.note_impulse(t, p, log);
     }
 }
 

@@ -150,12 +150,11 @@ impl<F: Field> Flow<F> {
         }
     }
 
-    /// x' of the shifted state.
+    /// x' of the shifted state; what stands at u' is the rate of its shift and no part of it.
     pub(super) fn rates(&self, frame: &Frame) -> Vec<SparseRow<F>> {
         let mut rates = Vec::with_capacity(self.states.len());
         for row in &self.states {
             let mut row = part(row, 0..frame.base).to_vec();
-            row.retain(|(c, _)| !frame.du().contains(c));
             self.shift_states(frame, &mut row);
             rates.push(row);
         }

@@ -232,3 +232,40 @@ fn the_kernel_of_a_rounded_matrix_is_followed_the_right_way() {
     check(&network, &found);
     assert!((found.y[1] - 1.507e-8).abs() < 1e-11, "{found:?}");
 }
+
+/// At a breakdown of 100 V the current is small, but known to the rounding of w = v + i alone: a residual elsewhere counts relative to that.
+#[test]
+fn a_residual_counts_relative_to_what_the_rounding_of_a_port_makes_of_it() {
+    let law = diode(1e-14, 0.025, 0.0, Some(100.0));
+    let at = law.resolvent(1.0, -100.0);
+    let ports = vec![
+        PortLaw { law, current: true },
+        PortLaw {
+            law: Law::ideal_diode(),
+            current: true,
+        },
+    ];
+    let m = dmatrix![1.0, 0.0; 1.0, 1.0];
+    let scaling = Scaling {
+        d: dvector![1.0, 1.0],
+    };
+    let lawful = Lawful::new(&m, &scaling, ports, TOLERANCE);
+    // The first equation holds; the second lacks i.
+    let q = dvector![-at.v - at.i, 0.0];
+    let found = lawful.at(dvector![-100.0, 0.0], &q);
+    let truth = at.i.abs() / (100.0 * at.di);
+    assert!(
+        truth < 0.1 && (found.size / truth - 1.0).abs() < 1e-12,
+        "{} {truth}",
+        found.size
+    );
+}
+
+/// With M ⪰ 0 a small resistance everywhere leaves xᵀMx ≥ 0: what nothing determines goes where it is pushed.
+#[test]
+fn a_direction_that_nothing_determines_is_followed_and_not_reversed() {
+    let matrix = dmatrix![1.0, 0.0; 0.0, 0.0];
+    let right = dvector![1.0, 1e-12];
+    let x = solved(matrix, &right).expect("a solution");
+    assert!((x[0] - 1.0).abs() < 1e-9 && x[1] > 0.0, "{x}");
+}

@@ -21,6 +21,7 @@ mod passive;
 mod relays;
 mod stiff;
 mod switches;
+mod travel;
 
 pub(in crate::integrate) fn circuit(text: &str) -> Circuit {
     let mut sources = SourceMap::default();

@@ -1,6 +1,6 @@
 //! Switches and jumps.
 
-use super::{at, circuit, simulate, times_after_start, times_of};
+use super::{at, circuit, simulate, times_after_start, times_of, try_simulate};
 use crate::integrate::{self, Method, SimOptions};
 use crate::mna;
 
@@ -266,4 +266,19 @@ fn six_controllers_slide_together() {
         .filter(|n| n.text.contains("slides on its threshold"));
     assert_eq!(sliding.count(), 6, "{:?}", run.notes);
     assert!(run.events.len() <= 2, "{:?}", run.events);
+}
+
+/// 5 V join 1 V through a diode, and a source that copies the second onto a capacitor at 0 V: that its storage contradicts the start is no matter
+/// of switches, and one diode competes with nobody.
+#[test]
+fn a_start_that_contradicts_itself_is_no_rival_of_a_diode() {
+    let text = "C1 1 0 1 IC=1\nE1 2 0 1 0 1\nC2 2 0 1 IC=0\nD1 3 1 d\nC3 3 0 1 IC=5\n.model d D(ideal)\n.tran 1 1 uic\n.save v(1) v(2)";
+    let run = try_simulate(text).expect("a run");
+    assert!((at(&run, 0.0, "v(1)") - 3.0).abs() < 1e-14);
+    assert!((at(&run, 0.0, "v(2)") - 3.0).abs() < 1e-14);
+    let notes: Vec<&str> = run.notes.iter().map(|note| &note.text[..]).collect();
+    assert!(
+        notes.iter().all(|text| !text.contains("compete")),
+        "{notes:?}"
+    );
 }
