@@ -248,7 +248,11 @@ fn values_of_sweeps() {
         ),
         (".step oct v1 1 8 1", v1(), vec![1.0, 2.0, 4.0, 8.0]),
         (".step param x dec 100 1 1", x(), vec![100.0, 10.0, 1.0]),
-        (".step param y list 4", Swept::Param("y".into()), vec![4.0]),
+        (
+            ".step param y list 4\nr2 a 0 {y}",
+            Swept::Param("y".into()),
+            vec![4.0],
+        ),
     ] {
         let (sweeps, findings) = steps(card);
         assert_eq!(findings, Vec::<String>::new(), "{card}");

@@ -132,6 +132,23 @@ impl<'a> Log<'a> {
     /// Forgets an attempt that failed, for another one from the start. Rows that were handed on stay: returns the time of the last, s.
     pub(crate) fn again(&mut self) -> Option<f64> {
         self.back_to(0, 0);
+        self.state_jumps = StateJumps::default();
         self.rows.again()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_attempt_that_failed_leaves_nothing_in_the_log() {
+        let mut log = Log::new(1, 0.0, true);
+        log.event(0.0, Vec::new().into(), true);
+        log.impulse(0.0, "i(d1)", 1.0);
+        log.state_jumps.all = (1, 2.0);
+        assert_eq!(log.again(), None);
+        assert!(log.events.is_empty() && log.impulses.is_empty());
+        assert_eq!(log.state_jumps, StateJumps::default());
     }
 }

@@ -7,6 +7,7 @@ use crate::integrate::orbit::Orbit;
 use crate::integrate::rows::RowKind;
 use crate::integrate::verify::Verified;
 use crate::settings::tolerances::jumps::{DESTROYED, NO_JUMP};
+use crate::settings::tolerances::stated::UNBALANCED;
 use crate::waveform::Waveforms;
 
 /// Counters of one run; deterministic except `cpu_seconds`.
@@ -88,6 +89,11 @@ pub struct Energy {
 }
 
 impl Energy {
+    /// Whether the residual is no more than rounding and what steps beside lines leave.
+    pub(crate) fn adds_up(&self) -> bool {
+        self.residual.is_finite() && self.residual_relative <= UNBALANCED
+    }
+
     /// What was at hand in the course of the run, J.
     pub(crate) fn at_hand(&self) -> f64 {
         self.source.abs() + self.dissipated.abs() + self.stored.abs()

@@ -2,7 +2,6 @@
 
 use super::{si, table};
 use crate::integrate::{Aliased, Method, Note, Orbit, OrbitKind, Places, Run, StateJump, Stats};
-use crate::settings::tolerances::stated::UNBALANCED;
 use crate::waveform::compare::{Comparison, SignalError};
 
 /// Impulses and jumps listed before the rest is only counted.
@@ -212,19 +211,19 @@ pub fn warnings(run: &Run, places: Places<'_>) -> Vec<String> {
 
 /// Energies beyond doubles: what grows so far is unstable, or wrong. Energies that do not add up: something is wrong, if only an energy.
 fn unbalanced(run: &Run) -> Option<Note> {
-    let residual = run.energy.residual_relative;
-    let text = match run.balanced.then_some(run.energy.residual.is_finite()) {
-        Some(false) => {
-            "the energies of this run are beyond the range of numbers, so that nothing checks it; unless the circuit is \
-             unstable, its values are wrong (--verify runs it a second time)"
-                .into()
-        }
-        Some(true) if residual > UNBALANCED => format!(
+    if !run.balanced || run.energy.adds_up() {
+        return None;
+    }
+    let text = if run.energy.residual.is_finite() {
+        format!(
             "the energies of this run do not add up: {} of the largest is too much or missing; where a controlled source carries the impulse of \
              a jump it may be the energy alone that is wrong (--verify runs it a second time)",
-            si::plain(residual, 2)
-        ),
-        _ => return None,
+            si::plain(run.energy.residual_relative, 2)
+        )
+    } else {
+        "the energies of this run are beyond the range of numbers, so that nothing checks it; unless the circuit is \
+         unstable, its values are wrong (--verify runs it a second time)"
+            .into()
     };
     Some(Note::of(<[String; 0]>::default(), text))
 }
