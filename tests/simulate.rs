@@ -129,6 +129,23 @@ fn steps_see_what_ends_at_a_diode_within_them() {
     }
 }
 
+/// A source that begins to rise by 5 V/µs, into 42.81 nF behind which a diode leads 114.3 nF to ground: their current begins at once, and that
+/// through 11.2 Ω and a diode beside the first one grows from nothing within microseconds.
+#[test]
+fn a_current_at_an_edge_is_that_of_the_instant() {
+    let text = "v1 n 0 pulse(0 5 0.1m 1u 1u 0.2m 0.5m)\nr1 m n 11.2\nc1 n a 42.81n ic=0\nc2 a b 114.3n ic=0\nd1 m a dm\nd2 b 0 dm\nr2 b 0 27
+.model dm d(ideal)\n.tran 5u 0.15m uic";
+    let series = 1.0 / (1.0 / 42.81e-9 + 1.0 / 114.3e-9);
+    for method in [Method::Exact, Method::Theta, Method::Euler] {
+        let options = SimOptions {
+            method,
+            ..SimOptions::default()
+        };
+        let run = simulate(text, options);
+        close(at(&run, "i(v1)", 1e-4), -5e6 * series, 2e-6 * 0.16);
+    }
+}
+
 /// Capacitors of 1 V and 0 V that a loop with sources of −3 V and 1 V joins, the second one controlled by a third capacitor: 5 V are too much
 /// around the loop, and a charge of 0.5 µF times them passes both sources.
 #[test]

@@ -3,6 +3,7 @@
 use super::attempt::unsolved;
 use super::*;
 use crate::settings::tolerances::stated::READING;
+use crate::settings::tolerances::steps::NEARER;
 use crate::settings::tolerances::steps::SHORT;
 use crate::settings::tolerances::steps::SHORT_ON_LINES;
 
@@ -102,9 +103,9 @@ impl Theta {
         Ok(solution)
     }
 
-    /// λ at the right limit of now, by one implicit step much shorter than the last.
+    /// λ at the right limit of now, by one implicit step much shorter than the last. After an edge what moves may be faster than that: λ of a
+    /// step of δ is off by δ λ' to first order, which another one of δ/[`NEARER`] tells.
     pub(super) fn read_lambda(&mut self) -> Result<(), Error> {
-        let m = self.lambda.len();
         if self.smooth.front.known {
             // The end of a step is on the laws.
             self.inputs.slopes(self.now.t, &mut self.du);
@@ -112,8 +113,30 @@ impl Theta {
             self.y.copy_from_slice(&self.smooth.front.y);
             return Ok(());
         }
-        let step = self.prepare_short(self.reading_step())?;
-        if m == 0 {
+        let step = self.reading_step();
+        self.read_after(step)?;
+        // What lines carry is read by a step so short that a shorter one would be rounding.
+        let is_known = self.lambda.is_empty() || self.system().curved || !self.ports.is_empty();
+        if !self.now.settle || is_known {
+            return Ok(());
+        }
+        let first = self.lambda.clone();
+        if self.read_after(step / NEARER).is_err() {
+            self.lambda = first;
+            return Ok(());
+        }
+        for (near, far) in self.lambda.iter_mut().zip(first) {
+            if *near > 0.0 && far > 0.0 {
+                *near = (*near + (*near - far) / (NEARER - 1.0)).max(0.0);
+            }
+        }
+        Ok(())
+    }
+
+    /// λ after a step of so many seconds, as far as may be taken back to now.
+    fn read_after(&mut self, h: f64) -> Result<(), Error> {
+        let step = self.prepare_short(h)?;
+        if self.lambda.is_empty() {
             return Ok(());
         }
         let Self {
@@ -127,7 +150,7 @@ impl Theta {
         } = self;
         let system = &mut plant.systems[now.system].1;
         if system.curved {
-            let solution = self.right_limit()?;
+            let solution = self.solve_short(step)?;
             self.lambda.copy_from_slice(solution.lambda.as_slice());
             self.y.copy_from_slice(solution.y.as_slice());
             return Ok(());
@@ -141,7 +164,7 @@ impl Theta {
             system.take_back(step, &now.active, z, lambda);
             return Ok(());
         }
-        let solution = self.right_limit()?;
+        let solution = self.solve_short(step)?;
         self.lambda.copy_from_slice(solution.lambda.as_slice());
         let system = &mut self.plant.systems[self.now.system].1;
         system.take_back(step, &solution.basis, &self.z, &mut self.lambda);

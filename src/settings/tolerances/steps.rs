@@ -70,6 +70,10 @@ pub(crate) const SHORT: f64 = 1.0 / 4096.0;
 /// part, where the rounding of the state grows to 2¹⁸ ε.
 pub(crate) const SHORT_ON_LINES: f64 = 1.0 / 64.0;
 
+/// The ratio of the two short steps by which λ is read after an edge. Larger: rounding in the shorter one, which grows with it; smaller: what is
+/// left is larger, (δ/τ)² over this for a motion of time constant τ.
+pub(crate) const NEARER: f64 = 16.0;
+
 /// A λ that is a derivative is made of magnitudes 1/[`SHORT`] times as large in a short step as in a whole one, another one of the same: what
 /// lies between these belongs to the latter up to here.
 pub(crate) const DIRECT: f64 = 16.0;
