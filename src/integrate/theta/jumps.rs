@@ -39,6 +39,7 @@ impl Theta {
     pub(super) fn edge(&mut self, t: f64, log: &mut Log) -> Result<(), Error> {
         let mut u = self.now.u.clone();
         self.inputs.right(t, &mut u);
+        self.edge = self.now.t;
         // Where the inputs go on with another slope alone, x' does not jump.
         self.smooth.front.reach = 0.0;
         if !self.is_smooth() {

@@ -136,6 +136,8 @@ pub struct Theta {
     stock: Vec<f64>,
     control: Option<Control>,
     looks: Looks,
+    /// The last breakpoint that acted, s.
+    edge: f64,
     /// Steps chosen by an embedded error, where laws are curved.
     smooth: Smooth,
     stats: Stats,
@@ -335,6 +337,7 @@ impl Theta {
             stock: Vec::new(),
             control,
             looks: Looks::default(),
+            edge: t,
             smooth: Smooth::default(),
             stats: Stats::default(),
             modes: BTreeSet::new(),

@@ -117,7 +117,8 @@ impl Theta {
         self.read_after(step)?;
         // What lines carry is read by a step so short that a shorter one would be rounding.
         let is_known = self.lambda.is_empty() || self.system().curved || !self.ports.is_empty();
-        if !self.now.settle || is_known {
+        let is_after = self.now.settle || self.now.t == self.edge;
+        if !is_after || is_known {
             return Ok(());
         }
         let first = self.lambda.clone();
