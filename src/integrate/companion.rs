@@ -159,8 +159,8 @@ impl<'a> Accompanied<'a> {
         }
     }
 
-    /// The error of the run; `own`: how far it knows itself that its events are off.
-    fn stated(&mut self, own: StatedError) -> StatedError {
+    /// The error of the run; `own`: how far it knows itself that its events are off; `common`: what companions do not see.
+    fn stated(&mut self, own: StatedError, common: f64) -> StatedError {
         let scales = scales(&self.amplitude, self.units);
         let (mut max, mut rms, mut time) = (0.0_f64, 0.0_f64, own.event_time.unwrap_or(0.0));
         let mut unsettled = self.unsettled(&scales);
@@ -187,8 +187,8 @@ impl<'a> Accompanied<'a> {
         // Neither is it known where a value is no number.
         let known = |error: f64| error.is_finite().then_some(error);
         StatedError {
-            max: known(max),
-            rms: known(rms),
+            max: known(max + common),
+            rms: known(rms + common),
             event_time: Some(time),
         }
     }
@@ -278,7 +278,7 @@ impl Stepper for Accompanied<'_> {
     fn finish(&mut self) -> Outcome {
         let mut outcome = self.run.finish();
         if self.run.has_stepped() && !self.companions.is_empty() {
-            outcome.error = self.stated(outcome.error);
+            outcome.error = self.stated(outcome.error, outcome.common);
         }
         outcome
     }

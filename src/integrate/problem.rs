@@ -124,7 +124,7 @@ pub(super) struct Problem {
 }
 
 /// The scout gives up after this many steps (trains of many pulses); what it has seen by then is used.
-const SCOUT_LIMIT: u64 = 20_000;
+const SCOUT_LIMIT: u64 = 4096;
 
 impl Problem {
     /// The transient of a circuit, from its initial conditions if `uic`, else from its operating point.
@@ -390,6 +390,7 @@ impl Problem {
                 &settings,
             )
             .ok()?;
+        theta.locate_roughly();
         let mut log = Log::new(0, f64::INFINITY, false);
         for k in 1..=SCOUT_STEPS as u32 {
             // A failure here will be met, and reported, by the run itself.

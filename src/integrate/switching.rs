@@ -165,8 +165,6 @@ pub(crate) struct Switches {
     driven: Vec<bool>,
     /// Whether that is so since the present system was entered.
     newly_driven: Vec<bool>,
-    /// Whether some control has depended on more than sources so far.
-    state_driven: bool,
     /// By switch: the port of a latch's valve in the present system, and whether it conducts where it is in the active set.
     valves: Vec<Option<(usize, bool)>>,
     needs_lambda: bool,
@@ -181,7 +179,6 @@ impl Switches {
             thresholds,
             driven: vec![],
             newly_driven: vec![],
-            state_driven: false,
             valves: vec![],
             needs_lambda: false,
             in_this_step: 0,
@@ -213,7 +210,6 @@ impl Switches {
             .map(|(now, before)| *now && !before)
             .collect();
         self.driven = driven;
-        self.state_driven |= self.driven.contains(&false);
         let port = |t: &Threshold| {
             let valve = t.valve()?;
             let at = lcs.ports.iter().position(|port| port.device == valve)?;
@@ -237,11 +233,6 @@ impl Switches {
             !self.driven[i] && (t.latch.is_none() || t.holds(self.position[i], &self.position))
         };
         self.thresholds.iter().enumerate().any(watched)
-    }
-
-    /// Whether some control has depended on more than sources so far.
-    pub(crate) fn are_state_driven(&self) -> bool {
-        self.state_driven
     }
 
     pub(crate) fn needs_lambda(&self) -> bool {
@@ -379,8 +370,8 @@ impl Switches {
     }
 
     /// How far each control that depends on the state is beyond its threshold, positive where the switch is to move at the passage;
-    /// far below where a switch waits for nothing.
-    pub(crate) fn excess(&self, lcs: &Lcs, at: Point<'_>, active: &[bool]) -> Vec<f64> {
+    /// far below where a switch waits for nothing. They go to the end of `excess`.
+    pub(crate) fn excess(&self, lcs: &Lcs, at: Point<'_>, active: &[bool], excess: &mut Vec<f64>) {
         let waits = |i: usize, threshold: &Threshold| {
             !self.driven[i]
                 && match threshold.latch {
@@ -393,14 +384,13 @@ impl Switches {
                 }
         };
         let thresholds = self.thresholds.iter().enumerate();
-        let excess = thresholds.map(|(i, threshold)| {
+        excess.extend(thresholds.map(|(i, threshold)| {
             if waits(i, threshold) {
                 threshold.excess(self.position[i], reading::value(&lcs.controls, i, at))
             } else {
                 f64::MIN
             }
-        });
-        excess.collect()
+        }));
     }
 
     fn different(&self, before: &[bool]) -> impl Iterator<Item = (usize, &Threshold)> {

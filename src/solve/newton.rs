@@ -19,8 +19,8 @@ const SMALL: usize = 6;
 /// A port as its resolvent is evaluated, in equilibrated variables.
 #[derive(Debug, Clone)]
 enum Port {
-    /// λ' = max(w, 0).
-    Ideal,
+    /// λ' = max(w, 0); λ' = w where it is held on its conducting side, λ' = 0 where on the other.
+    Ideal { held: Option<bool> },
     /// A junction: λ' = i/d where `current`, else y' = d i.
     Junction {
         junction: Junction,
@@ -61,7 +61,7 @@ impl Newton {
         let size = m.nrows();
         let d: Vec<f64> = Scaling::of(m).d.iter().copied().collect();
         let port = |(law, d): (&PortLaw, &f64)| match law.law {
-            _ if law.law.is_ideal_diode() => Port::Ideal,
+            _ if law.law.is_ideal_diode() => Port::Ideal { held: None },
             Law::Exponential(exponential) => {
                 let rho = if law.current { 1.0 / (d * d) } else { d * d };
                 match exponential.behind(rho) {
@@ -94,6 +94,17 @@ impl Newton {
             factored: false,
             factorisations: 0,
             d,
+        }
+    }
+
+    /// Holds every ideal port on the side that it has in an active set, whatever sign that gives λ and y there; `None` holds none.
+    pub(crate) fn hold(&mut self, active: Option<&[bool]>) {
+        for (j, port) in self.ports.iter_mut().enumerate() {
+            if let Port::Ideal { held } = port {
+                let wanted = active.map(|active| active[j]);
+                self.factored &= *held == wanted;
+                *held = wanted;
+            }
         }
     }
 
@@ -176,7 +187,13 @@ impl Newton {
         for j in 0..self.size {
             let (w, d) = (self.w[j], self.d[j]);
             let (lambda, y, slope) = match &mut self.ports[j] {
-                Port::Ideal => (w.max(0.0), (-w).max(0.0), if w > 0.0 { 1.0 } else { 0.0 }),
+                Port::Ideal { held } => {
+                    if held.unwrap_or(w > 0.0) {
+                        (w, 0.0, 1.0)
+                    } else {
+                        (0.0, -w, 0.0)
+                    }
+                }
                 Port::Junction {
                     junction,
                     rho,
@@ -301,6 +318,27 @@ impl PortLaw {
 mod tests {
     use super::*;
     use crate::law::{Breakdown, Exponential};
+
+    /// y = λ − 1 has λ = 1 on the laws; held on the blocking side it has y = −1, and where both ports are held on sides that contradict
+    /// the signs, what these make of it.
+    #[test]
+    fn a_held_port_stays_on_its_side_whatever_the_signs() {
+        let laws =
+            [Law::ideal_diode(), Law::ideal_diode()].map(|law| PortLaw { law, current: true });
+        let mut newton = Newton::new(&DMatrix::identity(2, 2), &laws);
+        let mut solved = |held: Option<&[bool]>| {
+            newton.hold(held);
+            let (mut lambda, mut y) = ([0.5, 0.5], [0.0, 0.0]);
+            assert!(newton.solve(&[-1.0, 1.0], &mut lambda, &mut y, 1e-14));
+            (
+                lambda.map(|l| (l * 1e12).round() / 1e12),
+                y.map(|y| (y * 1e12).round() / 1e12),
+            )
+        };
+        assert_eq!(solved(None), ([1.0, 0.0], [0.0, 1.0]));
+        assert_eq!(solved(Some(&[false, true])), ([0.0, -1.0], [-1.0, 0.0]));
+        assert_eq!(solved(None), ([1.0, 0.0], [0.0, 1.0]));
+    }
 
     /// λ' − y' = w on the curve i(v), where λ' = λ/d and y' = d y are (i/d, −d v), or (−v/d, d i); and the slope is a difference.
     #[test]

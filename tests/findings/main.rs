@@ -10,6 +10,7 @@ mod decades;
 mod energy;
 mod entered;
 mod front;
+mod guards;
 mod jumps;
 mod leaks;
 mod notes;

@@ -16,6 +16,8 @@ struct Segment {
     start: Start,
     end: f64,
     system: usize,
+    /// The sides on which its ideal ports were held, where they were.
+    held: Option<Vec<bool>>,
     x: Vec<f64>,
     slope: Vec<f64>,
     /// By stage: λ.
@@ -43,13 +45,18 @@ pub(crate) struct Segments {
 pub(crate) enum Within<'a> {
     /// The polynomials.
     Polynomials,
-    /// A step of the method from here takes their place.
-    Step(&'a Start),
+    /// A step of the method from here takes their place, with ideal ports held on these sides.
+    Step(&'a Start, Option<&'a [bool]>),
 }
 
 impl Segments {
-    /// Keeps the step that a trial has made.
-    pub(crate) fn keep(&mut self, start: &Start, system: usize, trial: &Trial) {
+    /// Keeps the step that a trial has made in a system, with its ideal ports on the sides `held`.
+    pub(crate) fn keep(
+        &mut self,
+        start: &Start,
+        (system, held): (usize, Option<&[bool]>),
+        trial: &Trial,
+    ) {
         if self.used == self.kept.len() {
             self.kept.push(Segment::default());
         }
@@ -58,6 +65,10 @@ impl Segments {
         segment.start.copy_from(start);
         segment.end = start.t + trial.h;
         segment.system = system;
+        match (&mut segment.held, held) {
+            (Some(kept), Some(held)) if kept.len() == held.len() => kept.copy_from_slice(held),
+            (kept, held) => *kept = held.map(<[bool]>::to_vec),
+        }
         segment.x.clone_from(&trial.x);
         segment.slope.clear();
         segment.slope.extend_from_slice(trial.end_slope());
@@ -71,12 +82,6 @@ impl Segments {
         let past = past.count();
         self.kept[..self.used].rotate_left(past);
         self.used -= past;
-    }
-
-    /// Forgets the steps from `t` on, which were taken back.
-    pub(crate) fn back_to(&mut self, t: f64) {
-        let valid = self.kept[..self.used].iter().take_while(|s| s.start.t < t);
-        self.used = valid.count();
     }
 
     /// The system in which the first step kept was made.
@@ -110,7 +115,7 @@ impl Segments {
         if trusted {
             Within::Polynomials
         } else {
-            Within::Step(&segment.start)
+            Within::Step(&segment.start, segment.held.as_deref())
         }
     }
 
@@ -206,15 +211,6 @@ mod tests {
             kept: (0..3).map(segment).collect(),
             used: 3,
             ..Segments::default()
-        }
-    }
-
-    #[test]
-    fn a_step_from_the_time_that_is_gone_back_to_is_forgotten() {
-        for (t, left) in [(0.0, 0), (1.0, 1), (1.5, 2), (3.0, 3)] {
-            let mut segments = three();
-            segments.back_to(t);
-            assert_eq!(segments.used, left, "{t}");
         }
     }
 

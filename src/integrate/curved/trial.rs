@@ -137,12 +137,18 @@ impl Trial {
         }
     }
 
+    /// λ and y at a stage.
+    pub(crate) fn at_stage(&self, stage: usize) -> (&[f64], &[f64]) {
+        let ports = stage * self.m..(stage + 1) * self.m;
+        (&self.lambdas[ports.clone()], &self.ys[ports])
+    }
+
     /// x' at the end of the step.
     pub(crate) fn end_slope(&self) -> &[f64] {
         &self.slopes[(STAGES - 1) * self.n..]
     }
 
-    /// Makes the stages of a step from `start` to t1; stages are solved to `tolerance`.
+    /// Makes the stages of a step from `start` to t1; stages are solved to `tolerance`, the ideal ports on the side that they have in `held`.
     ///
     /// # Errors
     /// Those of `robust`; [`Reason::Singular`], [`Reason::Overflow`].
@@ -151,7 +157,7 @@ impl Trial {
         curved: &mut Curved,
         inputs: &Inputs,
         start: &Start,
-        t1: f64,
+        (t1, held): (f64, Option<&[bool]>),
         (slack, tolerance): (f64, f64),
         robust: Robust<'_>,
     ) -> Result<(), Error> {
@@ -161,6 +167,7 @@ impl Trial {
         let fail = |reason| Error::at(start.t, reason);
         let (at, new) = curved.matrices(GAMMA * h, slack).map_err(fail)?;
         self.matrices = at;
+        curved.newton(at).hold(held);
         self.factorisations += u64::from(new);
         let (n, m) = (self.n, self.m);
         self.slopes[..n].copy_from_slice(&start.slope);

@@ -128,9 +128,12 @@ impl Theta {
         let now = self.now.t;
         let rest = stop - now;
         let h = self.preferred.min(self.longest_step());
+        self.smooth.cut = false;
         if rest <= h * (1.0 + WHOLE) {
             // A coarser run makes it whole.
-            if self.whole || rest < CUT * h || self.smooth.halved == stop {
+            let cut = !self.whole && rest < CUT * h && self.smooth.uncut != stop;
+            self.smooth.cut = cut;
+            if self.whole || cut || self.smooth.halved == stop {
                 return (rest, stop);
             }
             self.smooth.halved = stop;
@@ -144,13 +147,8 @@ impl Theta {
 
     /// A step that is accepted, up to `stop` at most, with all its consequences; whether a switch moved at its end.
     fn chosen_step(&mut self, stop: f64, log: &mut Log) -> Result<bool, Error> {
-        let watch = self.switches.watch();
-        let steps = self.stats.steps;
         let mut impulse = false;
         let (mut h, mut t1) = self.next_step(stop);
-        if watch {
-            self.keep_place();
-        }
         loop {
             let smallest = self.control.as_ref().map_or(0.0, Control::smallest);
             let last_chance = h <= smallest.max(Self::slack(t1));
@@ -163,16 +161,9 @@ impl Theta {
             self.stats.rejected += 1;
             (h, t1) = self.next_step(stop);
         }
-        let change = if watch { self.crossed()? } else { Demand::None };
-        if change != Demand::None {
-            let finest = (h / 2_f64.powi(LOCATE)).max(Self::slack(t1));
-            let may_locate = h > finest && !self.switches.chattering(CHATTER);
-            if change == Demand::Passage && may_locate {
-                let preferred = self.preferred;
-                self.locate(finest, steps, &mut impulse, log)?;
-                self.preferred = preferred;
-            }
-            self.report(log);
+        self.report(log);
+        let switches = self.asked()?;
+        if switches {
             self.switch(&[], log)?;
         } else {
             self.switches.forget_chatter();
@@ -181,6 +172,6 @@ impl Theta {
             self.now.settle = true;
         }
         self.report(log);
-        Ok(change != Demand::None)
+        Ok(switches)
     }
 }

@@ -5,21 +5,22 @@
 
 use super::ahead::Ahead;
 use super::attempt::unsolved;
+use super::passage::Guards;
 use super::*;
 use crate::integrate::control::Verdict;
 use crate::integrate::curved::tableau::GAMMA;
 use crate::integrate::curved::{Curved, Segments, Start as From, Trial, Within};
 use crate::integrate::grow;
-use crate::settings::tolerances::steps::{FAINT, GRANT_EMBEDDED, IDEAL_SOLVED, STAGE_SOLVED};
+use crate::settings::tolerances::steps::{CUT, FAINT, GRANT_EMBEDDED, IDEAL_SOLVED, STAGE_SOLVED};
 use crate::settings::tolerances::times::SPAN_PARTS;
 
 /// What steps of chosen lengths need besides the rest.
 #[derive(Debug, Default)]
 pub(super) struct Smooth {
-    /// Where the next step starts, and where the present one did.
+    /// Where the next step starts.
     pub(super) front: From,
-    pub(super) kept: From,
-    trial: Trial,
+    pub(super) trial: Trial,
+    pub(super) guards: Guards,
     /// The step to a row.
     reader: Trial,
     segments: Segments,
@@ -30,10 +31,19 @@ pub(super) struct Smooth {
     /// The time of the last row, s.
     pub(super) at: f64,
     /// Largest |λ| and |y| so far, by port of a system.
-    sizes: [Vec<f64>; 2],
+    pub(super) sizes: [Vec<f64>; 2],
     sizes_of: Option<usize>,
     /// The stop before which a step was halved, so that coarser runs make another one, s.
     pub(super) halved: f64,
+    /// Whether the step is not halved, as a stop cuts it to a small part of the length that the steps before had room for; and the stop, s,
+    /// before which its error turned out to be larger than that lets expect.
+    pub(super) cut: bool,
+    pub(super) uncut: f64,
+    /// What the steps say of their own errors, relative to the amplitudes: of the present one, all cut ones together, and the largest, which bounds
+    /// what polynomials between its ends are off.
+    tells: f64,
+    pub(super) common: f64,
+    pub(super) largest: f64,
     pub(super) ahead: Ahead,
 }
 
@@ -48,14 +58,12 @@ impl Theta {
         self.smooth.by_hand = true;
     }
 
-    /// Whether the steps are those of this module. Controls that depend on the state keep the steps in halves, whose solver knows them
-    /// closely enough to say when they pass.
+    /// Whether the steps are those of this module.
     pub(crate) fn is_smooth(&self) -> bool {
         self.control.is_some()
             && !self.smooth.by_hand
             && self.scheme != Scheme::MOREAU
             && self.ports.is_empty()
-            && !self.switches.are_state_driven()
             && self.system().curved
     }
 
@@ -70,27 +78,8 @@ impl Theta {
         self.smooth.until.is_some() && self.is_smooth() && t - self.now.t <= Self::slack(t)
     }
 
-    /// Keeps the present place for [`Self::back`].
-    pub(super) fn keep_place(&mut self) {
-        self.kept.copy_from(&self.now);
-        let Smooth { front, kept, .. } = &mut self.smooth;
-        kept.copy_from(front);
-    }
-
-    /// Goes back to the place kept.
-    pub(super) fn back_to_kept(&mut self) {
-        let Smooth {
-            front,
-            kept,
-            segments,
-            ..
-        } = &mut self.smooth;
-        front.copy_from(kept);
-        segments.back_to(self.kept.t);
-    }
-
-    /// A step to t1, committed where its error allows it or it is to be `taken` all the same; [`Verdict::accept`] says which. The smallest
-    /// one may contain an impulse, where the network may jump by itself.
+    /// A step to t1, or to where a guard passes before, committed where its error allows it or it is to be `taken` all the same;
+    /// [`Verdict::accept`] says which. The smallest one may contain an impulse, where the network may jump by itself.
     pub(super) fn embedded(
         &mut self,
         t1: f64,
@@ -99,7 +88,13 @@ impl Theta {
     ) -> Result<Verdict, Error> {
         self.start_here()?;
         let h = t1 - self.now.t;
-        let mut verdict = match self.try_step(t1) {
+        let mut tried = self.try_step(t1);
+        if self.smooth.guards.hold && (taken || tried.is_err() || self.barely_passes(t1)) {
+            // Where ports cannot stay as they are, the step itself finds where they go.
+            self.smooth.guards.hold = false;
+            tried = self.try_step(t1);
+        }
+        let mut verdict = match tried {
             Ok(()) => self.judge(h),
             Err(error) if taken => return Err(error),
             Err(_) => Verdict {
@@ -107,6 +102,11 @@ impl Theta {
                 next: 0.25 * h,
             },
         };
+        if self.smooth.cut && verdict.accept && CUT * verdict.next < h {
+            self.smooth.uncut = t1;
+            verdict.accept = taken;
+            verdict.next = self.preferred;
+        }
         // A step that a stop cut short says nothing against a longer one.
         self.preferred = if verdict.accept && h < self.preferred {
             verdict.next.max(self.preferred)
@@ -125,7 +125,24 @@ impl Theta {
             }
         }
         if verdict.accept {
-            self.commit_trial(t1)?;
+            let Smooth {
+                cut,
+                tells,
+                common,
+                largest,
+                ..
+            } = &mut self.smooth;
+            *largest = largest.max(*tells);
+            if *cut {
+                *common += *tells;
+            }
+            let end = self.stop_at_passage(t1)?;
+            if end.t < t1 {
+                // The rest up to the stop is another step.
+                self.smooth.halved = f64::NEG_INFINITY;
+            }
+            self.commit_trial(end.t)?;
+            self.pass(end)?;
         }
         Ok(verdict)
     }
@@ -192,14 +209,20 @@ impl Theta {
     }
 
     /// The stages of a step to t1.
-    fn try_step(&mut self, t1: f64) -> Result<(), Error> {
-        let Smooth { front, trial, .. } = &mut self.smooth;
+    pub(super) fn try_step(&mut self, t1: f64) -> Result<(), Error> {
+        let Smooth {
+            front,
+            trial,
+            guards,
+            ..
+        } = &mut self.smooth;
         let system = &mut self.plant.systems[self.now.system].1;
         let known = (trial.solves, trial.factorisations);
+        let held = guards.hold.then_some(&self.now.active[..]);
         let made = Self::make(
             (system, &self.now.active, &self.settings),
             &self.inputs,
-            (front, t1),
+            (front, t1, held),
             trial,
         );
         self.stats.lcp_solves += trial.solves - known.0;
@@ -207,11 +230,11 @@ impl Theta {
         made
     }
 
-    /// The stages of a step to t1 in a system.
+    /// The stages of a step to t1 in a system, with its ideal ports on the sides `held`.
     fn make(
         (system, active, settings): (&mut System, &[bool], &Settings),
         inputs: &Inputs,
-        (start, t1): (&From, f64),
+        (start, t1, held): (&From, f64, Option<&[bool]>),
         trial: &mut Trial,
     ) -> Result<(), Error> {
         let Some(mut curved) = system.smooth.take() else {
@@ -225,6 +248,9 @@ impl Theta {
             tolerance = tolerance.min(IDEAL_SOLVED);
         }
         let mut robust = |q: &[f64], lambda: &mut [f64], y: &mut [f64]| {
+            if held.is_some() {
+                return Err(Error::at(start.t, Reason::Singular { h: g }));
+            }
             let accepted = settings.lcp_residual;
             let (step, _) = system
                 .matrices(g, slack, Scheme::MOREAU, accepted)
@@ -244,7 +270,7 @@ impl Theta {
             &mut curved,
             inputs,
             start,
-            t1,
+            (t1, held),
             (slack, tolerance),
             &mut robust,
         );
@@ -281,16 +307,19 @@ impl Theta {
             moved.clear();
             moved.extend(trial.x.iter().zip(&trial.error).map(|(x, e)| x + e));
             let error = (self.amplitudes).error(&system.lcs, moved, &trial.x);
-            control.judge_embedded(h, error.max(of_devices))
+            let error = error.max(of_devices);
+            (error, control.judge_embedded(h, error))
         };
         let first = verdict(trial, &mut self.coarse);
-        match &system.smooth {
-            Some(curved) if !first.accept => {
+        let (error, verdict) = match &system.smooth {
+            Some(curved) if !first.1.accept => {
                 trial.forgive_rounding(curved);
                 verdict(trial, &mut self.coarse)
             }
             _ => first,
-        }
+        };
+        self.smooth.tells = error;
+        verdict
     }
 
     /// Makes the trial step the present.
@@ -308,10 +337,12 @@ impl Theta {
             segments,
             sizes,
             until,
+            guards,
             ..
         } = &mut self.smooth;
         if until.is_some() {
-            segments.keep(front, self.now.system, trial);
+            let held = guards.hold.then_some(&self.now.active[..]);
+            segments.keep(front, (self.now.system, held), trial);
         }
         front.take_end(t1, trial);
         grow(&mut sizes[0], &front.lambda);
@@ -328,6 +359,10 @@ impl Theta {
         self.last_h = trial.h;
         let system = &self.plant.systems[self.now.system].1;
         self.amplitudes.see(&system.lcs, &self.now.x);
+        if guards.hold {
+            return Ok(());
+        }
+        guards.hold = true;
         let ideal = system
             .smooth
             .as_ref()
@@ -364,11 +399,11 @@ impl Theta {
         let Some(curved) = &system.smooth else {
             return;
         };
-        if let Within::Step(start) = segments.within(curved, self.settings.tol) {
+        if let Within::Step(start, held) = segments.within(curved, self.settings.tol) {
             let made = Self::make(
                 (system, &self.now.active, &self.settings),
                 &self.inputs,
-                (start, t),
+                (start, t, held),
                 reader,
             );
             if let (Ok(()), Some(curved)) = (made, &system.smooth) {

@@ -249,7 +249,9 @@ impl Theta {
         }
         let lcs = &self.plant.systems[self.now.system].1.lcs;
         let at = self.now.point(&self.lambda, &self.du);
-        Ok(self.switches.excess(lcs, at, &self.now.active))
+        let mut excess = Vec::new();
+        (self.switches).excess(lcs, at, &self.now.active, &mut excess);
+        Ok(excess)
     }
 
     /// Flips the switches `moving`, then those whose controls ask for it until none does, with the jumps this causes.

@@ -100,7 +100,7 @@ impl Theta {
 
     /// A base step with halving: for the error and to locate state-driven switchings, after which the rest is a base step of its own.
     pub(super) fn divided_step(&mut self, base: f64, end: f64, log: &mut Log) -> Result<(), Error> {
-        let finest = (base / 2_f64.powi(LOCATE)).max(Self::slack(end));
+        let finest = (base / 2_f64.powi(self.locate)).max(Self::slack(end));
         let mut base = base;
         while !self.halved_step(base, end, finest, log)? {
             base = end - self.now.t;
@@ -218,9 +218,6 @@ impl Theta {
         last_chance: bool,
         impulse: &mut bool,
     ) -> Result<bool, Error> {
-        if self.is_smooth() {
-            return Ok(self.embedded(t1, (true, false), impulse)?.accept);
-        }
         if self.control.is_none() {
             self.preferred = f64::INFINITY;
             self.fixed_step(h, t1)?;
@@ -242,7 +239,7 @@ impl Theta {
     /// Goes back before a step in which switches passed their thresholds, and again to `finest` after the first of them did. The time is
     /// that of a straight line between the controls' distances at both ends of a bracket, aimed at a little behind the passage
     /// and a little before it in turn; every third time it is the middle.
-    pub(super) fn locate(
+    fn locate(
         &mut self,
         finest: f64,
         steps: u64,
@@ -265,7 +262,7 @@ impl Theta {
                 };
                 t0 + (part * width + 0.5 * aside).clamp(finest, width - finest)
             };
-            self.keep_place();
+            self.kept.copy_from(&self.now);
             let steps = self.stats.steps;
             self.advance(t1 - t0, t1, false, impulse)?;
             let excess = self.excess()?;
@@ -338,7 +335,6 @@ impl Theta {
 
     pub(super) fn back(&mut self, steps: u64) {
         self.now.copy_from(&self.kept);
-        self.back_to_kept();
         self.inputs.lines_mut().back_to(self.now.t);
         self.stats.steps = steps;
         self.pending.clear();

@@ -11,6 +11,7 @@ mod embedded;
 mod jumps;
 mod lines;
 mod march;
+mod passage;
 mod right_limit;
 mod stages;
 #[cfg(test)]
@@ -95,6 +96,8 @@ const FINEST: u32 = 40;
 /// State-driven switching times are located to 2^−LOCATE of a base step: a transient that the switch starts is off by what that is of its time
 /// constant. Controls that a solver decides are not known much better.
 const LOCATE: i32 = 32;
+/// The same where amplitudes alone are wanted.
+const LOCATE_ROUGHLY: i32 = 8;
 /// Switchings in one base step after which they are no longer located but taken at the ends of whole base steps
 /// (chattering: the base step then decides how fast a sliding switch switches).
 const CHATTER: u32 = 32;
@@ -117,6 +120,8 @@ pub struct Theta {
     damped: bool,
     /// See [`Self::keep_whole_steps`].
     whole: bool,
+    /// [`LOCATE`], or [`LOCATE_ROUGHLY`].
+    locate: i32,
     preferred: f64,
     /// See [`Self::read_coarsely`].
     reads_coarsely: bool,
@@ -324,6 +329,7 @@ impl Theta {
             start: storage.clone(),
             damped: false,
             whole: false,
+            locate: LOCATE,
             preferred,
             reads_coarsely: false,
             last_h: 0.0,
@@ -370,6 +376,11 @@ impl Theta {
     /// prescribed and cut short: the same steps with a larger error.
     pub(crate) fn keep_whole_steps(&mut self) {
         self.whole = true;
+    }
+
+    /// Has switchings located to a part of a step that is enough for amplitudes.
+    pub(crate) fn locate_roughly(&mut self) {
+        self.locate = LOCATE_ROUGHLY;
     }
 
     /// Has λ of curved laws at an instant read by a longer step, see [`READING`](crate::settings::tolerances::stated::READING), whose error is larger.
@@ -585,6 +596,7 @@ impl Stepper for Theta {
                 event_time: Some(self.now.event_step),
                 ..StatedError::default()
             },
+            common: self.smooth.common + self.smooth.largest,
             stats: self.stats.clone(),
             energy: self.now.balance.energy(),
             notes,

@@ -123,3 +123,7 @@ pub(crate) const ROWS: f64 = 0.01;
 /// Switches that sources alone drive are asked so many steps ahead when they move next. Larger: passages far ahead are found again after every
 /// switching; smaller: they are asked at every step.
 pub(crate) const ASKED_AHEAD: f64 = 16.0;
+
+/// A port that leaves its side of the corner within a step by less than this part of the largest λ or y it had there is worth no event of its own: the step is made
+/// with ports that go where they like. Larger: events are missed by what that takes; smaller: rounding at rest is located.
+pub(crate) const PASSED: f64 = 1e-11;

@@ -1,0 +1,176 @@
+//! Comparators and ideal diodes beside curved laws: where their guards pass, and what the steps say of their errors.
+
+use circ::Model;
+use circ::integrate::{Change, Run, SimOptions};
+use circ::settings::Settings;
+
+use super::runs::column;
+
+fn transient(text: &str, tol: f64) -> Run {
+    let settings = Settings {
+        tol,
+        ..Settings::default()
+    };
+    let options = SimOptions {
+        settings,
+        ..SimOptions::default()
+    };
+    let model = Model::parse(text, "guards.cir").unwrap();
+    model.transient(options).unwrap()
+}
+
+/// The largest difference of a column of two runs with the same rows, relative to its amplitude; rows between two events that are
+/// one in both but for their time are left out by `aside`, s from a switch of the second.
+fn difference(run: &Run, reference: &Run, probe: &str, aside: f64) -> f64 {
+    let (a, b) = (column(run, probe), column(reference, probe));
+    let size = b.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let times = &reference.waveforms.time;
+    assert_eq!(times.len(), a.len());
+    let near = |t: f64| {
+        let mut events = reference.events.iter();
+        events.any(|event| (event.t - t).abs() <= aside)
+    };
+    let rows = (0..a.len()).filter(|&k| !near(times[k]));
+    rows.map(|k| (a[k] - b[k]).abs() / size).fold(0.0, f64::max)
+}
+
+fn switched(run: &Run, switch: &str) -> Vec<f64> {
+    let moves =
+        |change: &Change| matches!(change, Change::Switch { name, .. } if **name == *switch);
+    let events = run.events.iter();
+    let events = events.filter(|event| event.changes.iter().any(moves));
+    events.map(|event| event.t).collect()
+}
+
+/// A buck whose comparator reads a saw-tooth, by a diode with a law of its own.
+const MODULATED: &str = "buck
+v1 in 0 12
+vc c 0 0.42
+vs saw 0 pulse(0 1 0 9.8u 0.1u 0.1u 10u)
+bc g 0 v= v(c) > v(saw) ? 5 : 0
+s1 in a g 0 sw1
+d1 0 a dx
+l1 a o 47u
+c1 o 0 100u
+r1 o 0 5
+.model dx d(is=1e-8 n=1.05 rs=20m)
+.model sw1 sw(ron=50m roff=1meg vt=2.5 vh=0)
+.tran 0.1u 1m uic
+.save v(o) i(l1) v(g)
+.end
+";
+
+/// The saw-tooth passes 0.42 V after 4.116 µs of each period, and on its way back.
+#[test]
+fn a_comparator_moves_when_its_saw_tooth_passes() {
+    let run = transient(MODULATED, 1e-4);
+    let found = switched(&run, "s1");
+    assert!(found.len() >= 199, "{}", found.len());
+    let (up, down) = (4.116e-6, 9.9e-6 + 0.058e-6);
+    for (k, t) in found.iter().filter(|t| **t > 0.0).enumerate() {
+        let expected = 10e-6 * (k / 2) as f64 + if k % 2 == 0 { up } else { down };
+        assert!((t - expected).abs() < 1e-14, "{t} for {expected}");
+    }
+    // From event to event and from corner to corner, in one or two steps each.
+    let periods = 100;
+    assert!(run.stats.steps < 15 * periods, "{}", run.stats.steps);
+    assert!(
+        run.stats.lcp_solves < 150 * periods,
+        "{}",
+        run.stats.lcp_solves
+    );
+}
+
+/// With steps that end wherever the error ended them this converter came out 1.2e-4 off at 1e-10, and worse than at 1e-6.
+#[test]
+fn a_smaller_tolerance_errs_less_beside_a_comparator() {
+    let text = "buck
+v1 in 0 8.924
+vc c 0 0.3755
+vs saw 0 pulse(0 1 0 7.976e-06 4.431e-07 1.772e-07 8.862e-06)
+bc g 0 v= v(c) > v(saw) ? 5 : 0
+s1 in a g 0 sw1
+d1 0 a dx
+l1 a o 1.106e-05
+c1 o 0 6.757e-05
+r1 o 0 1.888
+.model dx d(is=5.404e-14 n=1.361 rs=0.002179)
+.model sw1 sw(ron=1m roff=1meg vt=2.5 vh=0)
+.tran 2.5e-7 1.2e-4 uic
+.save v(o) i(l1)
+.end
+";
+    let reference = transient(text, 1e-10);
+    for (tol, allowed) in [(1e-4, 5e-5), (1e-6, 5e-7), (1e-8, 5e-9)] {
+        let run = transient(text, tol);
+        for probe in ["v(o)", "i(l1)"] {
+            let off = difference(&run, &reference, probe, 0.0);
+            assert!(off < allowed, "{tol}: {probe} is off by {off:e}");
+        }
+    }
+}
+
+/// Steps from event to event are the same at every tolerance: a run in coarser steps does not tell their error, they do.
+#[test]
+fn steps_that_events_choose_tell_their_error() {
+    let text = "buck
+v1 in 0 6.385
+vc c 0 0.1622
+vs saw 0 pulse(0 1 0 4.583e-05 2.546e-06 1.019e-06 5.093e-05)
+bc g 0 v= v(c) > v(saw) ? 5 : 0
+s1 in a g 0 sw1
+d1 0 a dx
+l1 a o 0.0009138
+c1 o 0 0.0001611
+r1 o 0 9.295
+.model dx d(is=3.447e-11 n=1.024 rs=0.005237)
+.model sw1 sw(ron=1m roff=inf vt=2.5 vh=0)
+.tran 1.528e-06 0.0007639 uic
+.save v(a) v(o) i(l1)
+.end
+";
+    let (run, reference) = (transient(text, 1e-4), transient(text, 1e-8));
+    let stated = run.error.max.unwrap();
+    for probe in ["v(a)", "v(o)", "i(l1)"] {
+        let off = difference(&run, &reference, probe, 1e-9);
+        assert!(off <= stated, "{probe}: {off:e} of {stated:e}");
+        assert!(stated < 1e-4, "{stated:e}");
+    }
+}
+
+/// An ideal diode in series with an inductor: its current never turns back, however small the leakage of the diode behind it is beside
+/// the currents before.
+#[test]
+fn an_ideal_diode_carries_no_leakage() {
+    let text = "rectifier
+v1 in 0 sin(0 22.93 562.5)
+vb b 0 7.642
+d1 in x dx
+l1 x y 5.32e-05
+d2 y o di
+c1 o 0 0.0003095
+r1 o 0 1.391
+d3 o b di
+d4 0 x dx
+.model dx d(is=2.058e-11 n=1.303 rs=0.005386)
+.model di d(ron=0 roff=inf)
+.tran 1.422e-05 0.00711 uic
+.save v(x) i(l1)
+.end
+";
+    let run = transient(text, 1e-6);
+    let (i, v) = (column(&run, "i(l1)"), column(&run, "v(x)"));
+    assert!(i.iter().fold(0.0_f64, |m, i| m.max(*i)) > 100.0);
+    let least = i.iter().fold(0.0_f64, |m, i| m.min(*i));
+    assert!(least > -1e-13, "{least:e} A");
+    // Between the two exponential diodes, each with its IS: n·Vt·ln 2 below ground while the source is far below.
+    let vt = 1.380_649e-23 / 1.602_176_634e-19 * 300.15;
+    let expected = -1.303 * vt * 2_f64.ln();
+    let resting: Vec<f64> = (i.iter().zip(&v))
+        .filter(|(i, v)| i.abs() < 1e-12 && **v < -0.02 && **v > -0.03)
+        .map(|(_, v)| *v)
+        .collect();
+    assert!(resting.len() > 20, "{}", resting.len());
+    let flat = resting.iter().filter(|v| (**v - expected).abs() < 1e-6);
+    assert!(flat.count() > 20, "{resting:?}, {expected}");
+}
