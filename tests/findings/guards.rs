@@ -174,3 +174,39 @@ d4 0 x dx
     let flat = resting.iter().filter(|v| (**v - expected).abs() < 1e-6);
     assert!(flat.count() > 20, "{resting:?}, {expected}");
 }
+
+/// The error amplifier's capacitor and the saw-tooth begin at 0 V together; the capacitor rises first, by 571 V/s.
+#[test]
+fn a_comparator_that_starts_on_its_threshold_goes_where_its_input_goes() {
+    for saw in [
+        "0 1 0 1.345e-05 7.474e-07 2.99e-07 1.495e-05",
+        "0 1 1u 1.345e-05 7.474e-07 2.99e-07 1.495e-05",
+    ] {
+        let text = format!(
+            "regulated buck
+v1 in 0 21.38
+vs saw 0 pulse({saw})
+be e 0 v= 0.05371*(10.7-v(o))+0.4
+rf e c 1k
+cf c 0 1.301e-08
+bc g 0 v= v(c) > v(saw) ? 5 : 0
+s1 in a g 0 sw1
+d1 0 a dx
+l1 a o 0.0001133
+c1 o 0 1.902e-05
+r1 o 0 3.023
+.model dx d(is=3.037e-07 n=1.665 rs=0.03116)
+.model sw1 sw(ron=1m roff=1e9 vt=2.5 vh=0)
+.tran 2.691e-07 0.0001345 uic
+.save v(g) v(o) i(l1)
+.end
+"
+        );
+        let (run, close) = (transient(&text, 1e-4), transient(&text, 1e-8));
+        assert_eq!(column(&run, "v(g)")[0], 5.0);
+        for probe in ["v(o)", "i(l1)"] {
+            let off = difference(&run, &close, probe, 0.0);
+            assert!(off < 1e-4, "{probe} is off by {off:e}");
+        }
+    }
+}

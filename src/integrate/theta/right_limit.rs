@@ -68,7 +68,21 @@ impl Theta {
     /// The complementarity problem of the right limit of now, solved.
     pub(super) fn right_limit(&mut self) -> Result<Solution, Error> {
         let step = self.prepare_short(self.reading_step())?;
-        self.solve_short(step)
+        let solution = self.solve_short(step)?;
+        if !(self.system().curved && self.switches.needs_lambda()) {
+            return Ok(solution);
+        }
+        // A comparator whose input starts on its threshold has any output in so short a step: a whole one tells which way it goes.
+        let step = self.prepare_short(self.read_step() / SHORT)?;
+        match self.solve_short(step) {
+            Ok(whole) if whole.basis != solution.basis => {
+                self.lambda.copy_from_slice(whole.lambda.as_slice());
+                self.y.copy_from_slice(whole.y.as_slice());
+                let step = self.prepare_short(self.reading_step())?;
+                self.solve_short(step)
+            }
+            _ => Ok(solution),
+        }
     }
 
     /// The step prepared by [`Self::prepare_short`], with the least-norm λ.
