@@ -42,28 +42,44 @@ fn switched(run: &Run, switch: &str) -> Vec<f64> {
     events.map(|event| event.t).collect()
 }
 
-/// A buck whose comparator reads a saw-tooth, by a diode with a law of its own.
-const MODULATED: &str = "buck
-v1 in 0 12
-vc c 0 0.42
-vs saw 0 pulse(0 1 0 9.8u 0.1u 0.1u 10u)
+/// A buck whose comparator reads a saw-tooth, by a diode with a law of its own: supply and level, saw-tooth, L, C and R, the models of the diode
+/// and of the switch, and `.tran`.
+fn modulated(
+    [supply, level, saw]: [&str; 3],
+    [l, c, r]: [&str; 3],
+    [diode, switch]: [&str; 2],
+    tran: &str,
+) -> String {
+    format!(
+        "buck
+v1 in 0 {supply}
+vc c 0 {level}
+vs saw 0 pulse({saw})
 bc g 0 v= v(c) > v(saw) ? 5 : 0
 s1 in a g 0 sw1
 d1 0 a dx
-l1 a o 47u
-c1 o 0 100u
-r1 o 0 5
-.model dx d(is=1e-8 n=1.05 rs=20m)
-.model sw1 sw(ron=50m roff=1meg vt=2.5 vh=0)
-.tran 0.1u 1m uic
-.save v(o) i(l1) v(g)
+l1 a o {l}
+c1 o 0 {c}
+r1 o 0 {r}
+.model dx d({diode})
+.model sw1 sw({switch} vt=2.5 vh=0)
+.tran {tran} uic
+.save v(a) v(o) i(l1)
 .end
-";
+"
+    )
+}
 
 /// The saw-tooth passes 0.42 V after 4.116 µs of each period, and on its way back.
 #[test]
 fn a_comparator_moves_when_its_saw_tooth_passes() {
-    let run = transient(MODULATED, 1e-4);
+    let text = modulated(
+        ["12", "0.42", "0 1 0 9.8u 0.1u 0.1u 10u"],
+        ["47u", "100u", "5"],
+        ["is=1e-8 n=1.05 rs=20m", "ron=50m roff=1meg"],
+        "0.1u 1m",
+    );
+    let run = transient(&text, 1e-4);
     let found = switched(&run, "s1");
     assert!(found.len() >= 199, "{}", found.len());
     let (up, down) = (4.116e-6, 9.9e-6 + 0.058e-6);
@@ -84,25 +100,19 @@ fn a_comparator_moves_when_its_saw_tooth_passes() {
 /// With steps that end wherever the error ended them this converter came out 1.2e-4 off at 1e-10, and worse than at 1e-6.
 #[test]
 fn a_smaller_tolerance_errs_less_beside_a_comparator() {
-    let text = "buck
-v1 in 0 8.924
-vc c 0 0.3755
-vs saw 0 pulse(0 1 0 7.976e-06 4.431e-07 1.772e-07 8.862e-06)
-bc g 0 v= v(c) > v(saw) ? 5 : 0
-s1 in a g 0 sw1
-d1 0 a dx
-l1 a o 1.106e-05
-c1 o 0 6.757e-05
-r1 o 0 1.888
-.model dx d(is=5.404e-14 n=1.361 rs=0.002179)
-.model sw1 sw(ron=1m roff=1meg vt=2.5 vh=0)
-.tran 2.5e-7 1.2e-4 uic
-.save v(o) i(l1)
-.end
-";
-    let reference = transient(text, 1e-10);
+    let text = modulated(
+        [
+            "8.924",
+            "0.3755",
+            "0 1 0 7.976e-06 4.431e-07 1.772e-07 8.862e-06",
+        ],
+        ["1.106e-05", "6.757e-05", "1.888"],
+        ["is=5.404e-14 n=1.361 rs=0.002179", "ron=1m roff=1meg"],
+        "2.5e-7 1.2e-4",
+    );
+    let reference = transient(&text, 1e-10);
     for (tol, allowed) in [(1e-4, 5e-5), (1e-6, 5e-7), (1e-8, 5e-9)] {
-        let run = transient(text, tol);
+        let run = transient(&text, tol);
         for probe in ["v(o)", "i(l1)"] {
             let off = difference(&run, &reference, probe, 0.0);
             assert!(off < allowed, "{tol}: {probe} is off by {off:e}");
@@ -113,23 +123,17 @@ r1 o 0 1.888
 /// Steps from event to event are the same at every tolerance: a run in coarser steps does not tell their error, they do.
 #[test]
 fn steps_that_events_choose_tell_their_error() {
-    let text = "buck
-v1 in 0 6.385
-vc c 0 0.1622
-vs saw 0 pulse(0 1 0 4.583e-05 2.546e-06 1.019e-06 5.093e-05)
-bc g 0 v= v(c) > v(saw) ? 5 : 0
-s1 in a g 0 sw1
-d1 0 a dx
-l1 a o 0.0009138
-c1 o 0 0.0001611
-r1 o 0 9.295
-.model dx d(is=3.447e-11 n=1.024 rs=0.005237)
-.model sw1 sw(ron=1m roff=inf vt=2.5 vh=0)
-.tran 1.528e-06 0.0007639 uic
-.save v(a) v(o) i(l1)
-.end
-";
-    let (run, reference) = (transient(text, 1e-4), transient(text, 1e-8));
+    let text = modulated(
+        [
+            "6.385",
+            "0.1622",
+            "0 1 0 4.583e-05 2.546e-06 1.019e-06 5.093e-05",
+        ],
+        ["0.0009138", "0.0001611", "9.295"],
+        ["is=3.447e-11 n=1.024 rs=0.005237", "ron=1m roff=inf"],
+        "1.528e-06 0.0007639",
+    );
+    let (run, reference) = (transient(&text, 1e-4), transient(&text, 1e-8));
     let stated = run.error.max.unwrap();
     for probe in ["v(a)", "v(o)", "i(l1)"] {
         let off = difference(&run, &reference, probe, 1e-9);
