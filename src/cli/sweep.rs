@@ -17,6 +17,7 @@ use crate::circuit::Sweep;
 use crate::integrate::Error;
 use crate::model::Model;
 use crate::settings::Settings;
+use crate::waveform::csv::Cell;
 use crate::waveform::npz;
 
 /// Most runs of one sweep.
@@ -308,9 +309,11 @@ impl Output {
     fn entry(&mut self, table: &Table, entry: &Entry) -> Result<(), Failure> {
         let line = match self.form {
             Form::Csv => {
-                let mut line = String::new();
+                let (mut line, mut cell) = (String::new(), Cell::default());
                 for value in &entry.values {
-                    line += &value.map_or(String::new(), |value| format!("{value:.16e}"));
+                    if let Some(value) = value {
+                        line += &String::from_utf8_lossy(cell.of(*value));
+                    }
                     line.push(',');
                 }
                 if !entry.error.is_empty() {

@@ -63,11 +63,75 @@ pub fn header(to: &mut impl Write, axis: &str, names: &[String]) -> std::io::Res
 /// # Errors
 /// Those of `to`.
 pub fn row(to: &mut impl Write, time: f64, values: &[f64]) -> std::io::Result<()> {
-    write!(to, "{time:.16e}")?;
-    for value in values {
-        write!(to, ",{value:.16e}")?;
+    let mut cell = Cell::default();
+    to.write_all(cell.of(time))?;
+    for &value in values {
+        to.write_all(b",")?;
+        to.write_all(cell.of(value))?;
     }
     to.write_all(b"\n")
+}
+
+/// Significant digits of a cell.
+const DIGITS: usize = 17;
+
+/// A number as a cell: the fewest digits that read back to the same double, and zeros up to [`DIGITS`] of them.
+#[derive(Default)]
+pub(crate) struct Cell {
+    text: Vec<u8>,
+}
+
+impl Cell {
+    /// `-1.2500000000000000e-3`.
+    pub(crate) fn of(&mut self, value: f64) -> &[u8] {
+        let text = &mut self.text;
+        text.clear();
+        let mut buffer = zmij::Buffer::new();
+        let written = buffer.format(value).as_bytes();
+        if !value.is_finite() {
+            text.extend(written);
+            return text;
+        }
+        let mut digits = [b'0'; DIGITS];
+        // Digits but for zeros in front, and how many of all stand before the point, but for these.
+        let (mut count, mut power) = (0, -1);
+        let (mut before, mut after_e) = (true, None);
+        for (k, &byte) in written.iter().enumerate() {
+            match byte {
+                b'-' => text.push(b'-'),
+                b'.' => before = false,
+                b'e' => {
+                    after_e = std::str::from_utf8(&written[k + 1..]).ok();
+                    break;
+                }
+                _ => {
+                    let is_zero_in_front = count == 0 && byte == b'0';
+                    if !is_zero_in_front {
+                        if let Some(digit) = digits.get_mut(count) {
+                            *digit = byte;
+                        }
+                        count += 1;
+                    }
+                    power += i32::from(before) - i32::from(is_zero_in_front);
+                }
+            }
+        }
+        let shift = after_e.and_then(|e| e.parse().ok()).unwrap_or(0);
+        let power = if count == 0 { 0 } else { power + shift };
+        text.extend([digits[0], b'.']);
+        text.extend_from_slice(&digits[1..]);
+        text.push(b'e');
+        if power < 0 {
+            text.push(b'-');
+        }
+        let power = power.unsigned_abs();
+        for place in [100, 10, 1] {
+            if power >= place || place == 1 {
+                text.push(b'0' + (power / place % 10) as u8);
+            }
+        }
+        text
+    }
 }
 
 /// Writes all rows.
@@ -81,7 +145,7 @@ pub fn row(to: &mut impl Write, time: f64, values: &[f64]) -> std::io::Result<()
 /// let waves = Waveforms { names: vec!["v(a)".into()], units: vec!["V"], time: vec![0.5], values: vec![0.1], ..Default::default() };
 /// let mut text = Vec::new();
 /// csv::write(&mut text, &waves).unwrap();
-/// assert_eq!(String::from_utf8(text).unwrap(), "time,v(a)\n5.0000000000000000e-1,1.0000000000000001e-1\n");
+/// assert_eq!(String::from_utf8(text).unwrap(), "time,v(a)\n5.0000000000000000e-1,1.0000000000000000e-1\n");
 /// ```
 pub fn write(to: impl Write, waves: &Waveforms) -> std::io::Result<()> {
     let mut writer = Writer::new(to, &waves.names)?;
@@ -278,6 +342,41 @@ mod tests {
                 .unwrap()
                 .starts_with("time,\"v(a,b)\",i(v1)\n0.0000000000000000e0,")
         );
+    }
+
+    #[test]
+    fn cells_have_seventeen_digits_that_read_back() {
+        let mut cell = Cell::default();
+        let mut of = |value: f64| String::from_utf8(cell.of(value).to_vec()).unwrap();
+        for (value, text) in [
+            (0.0, "0.0000000000000000e0"),
+            (-0.0, "-0.0000000000000000e0"),
+            (0.1, "1.0000000000000000e-1"),
+            (-12.5, "-1.2500000000000000e1"),
+            (1e-7, "1.0000000000000000e-7"),
+            (1e22, "1.0000000000000000e22"),
+            (123_456_789_012_345_680_000.0, "1.2345678901234568e20"),
+            (0.000_123_4, "1.2340000000000000e-4"),
+            (f64::MAX, "1.7976931348623157e308"),
+            (f64::from_bits(1), "5.0000000000000000e-324"),
+        ] {
+            assert_eq!(of(value), text);
+            assert_eq!(text.parse::<f64>().unwrap().to_bits(), value.to_bits());
+        }
+        assert!(of(f64::NAN).parse::<f64>().unwrap().is_nan());
+        assert_eq!(of(f64::NEG_INFINITY), "-inf");
+        // Bits without a pattern.
+        let mut bits = 0x0123_4567_89ab_cdef_u64;
+        for _ in 0..10_000 {
+            bits = bits.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            let value = f64::from_bits(bits);
+            if value.is_finite() {
+                let text = of(value);
+                assert_eq!(text.parse::<f64>().unwrap().to_bits(), bits, "{text}");
+                let digits = text.split('e').next().unwrap().bytes();
+                assert_eq!(digits.filter(u8::is_ascii_digit).count(), DIGITS, "{text}");
+            }
+        }
     }
 
     #[test]
