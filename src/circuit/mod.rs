@@ -8,6 +8,7 @@ mod behaviour;
 mod bipolar;
 mod build;
 mod builder;
+mod compared;
 mod controlled;
 mod define;
 mod diode;
@@ -356,6 +357,15 @@ impl Circuit {
             .iter()
             .position(|e| e.name == name)
             .map(|i| ElementId(i as u32))
+    }
+
+    /// Whether a law does not consist of straight pieces.
+    #[must_use]
+    pub(crate) fn is_curved(&self) -> bool {
+        self.elements.iter().any(|element| match &element.kind {
+            Kind::Device(law) | Kind::Function { law, .. } => !law.is_piecewise_linear(),
+            _ => false,
+        })
     }
 
     /// Whether an expression took what this source does as known, so that it cannot be changed by itself.

@@ -7,7 +7,9 @@
 use crate::integrate::inputs::Inputs;
 use crate::lcs::Lcs;
 use crate::settings::Settings;
-use crate::settings::tolerances::steps::{FAINT, LONGER, ROOM, SHORTEN, SHORTER, STATE_ROUNDING};
+use crate::settings::tolerances::steps::{
+    FAINT, LONGER, NO_LONGER, ROOM, SHORTEN, SHORTER, STATE_ROUNDING,
+};
 
 /// Accepts or halves steps.
 #[derive(Debug, Clone)]
@@ -74,12 +76,15 @@ impl Control {
 
     /// Judges a step of length h by what it says of its own error, relative to the amplitude. Lengths are 2^(−k/2) of the span, so that few
     /// of them occur.
-    pub(crate) fn judge_embedded(&self, h: f64, error: f64) -> Verdict {
+    ///
+    /// The next step is longer by up to [`LONGER`] times, or, after one that was `refused`, no longer: where steps are made in vain the error
+    /// grows faster than its order says.
+    pub(crate) fn judge_embedded(&self, h: f64, error: f64, refused: bool) -> Verdict {
         let allowed = self.tol * (h / self.span).max(self.grant);
         let accept = error <= allowed;
         let factor = SHORTER * (allowed / error).powf(1.0 / f64::from(self.order + 1));
         let factor = if accept {
-            factor.clamp(0.5, LONGER)
+            factor.clamp(0.5, if refused { NO_LONGER } else { LONGER })
         } else {
             factor.clamp(1.0 / SHORTEN, 0.5)
         };

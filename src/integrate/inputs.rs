@@ -12,6 +12,8 @@ use crate::settings::tolerances::times::SAME_TIME;
 pub struct Inputs {
     sources: Vec<Source>,
     varying: Vec<usize>,
+    /// Inputs that vary and act through controls of switches alone, whose corners are no breakpoints.
+    silent: Vec<usize>,
     /// By input: the line and the port at which it arrives.
     arriving: Vec<Option<(usize, usize)>>,
     lines: Lines,
@@ -45,6 +47,20 @@ impl Inputs {
             lines: Lines::default(),
             sources,
             varying,
+            silent: Vec::new(),
+        }
+    }
+
+    /// Has corners of these inputs be no breakpoints: they act through controls of switches alone, whose passages are looked for by themselves.
+    pub(crate) fn silence(&mut self, silent: &[bool]) {
+        let is_silent = |j: &usize| silent.get(*j) == Some(&true);
+        self.silent = self.varying.iter().copied().filter(is_silent).collect();
+    }
+
+    /// Writes right limits of the inputs whose corners are no breakpoints.
+    pub(crate) fn right_of_silent(&self, t: f64, u: &mut [f64]) {
+        for &j in &self.silent {
+            u[j] = self.value(j, t);
         }
     }
 
@@ -145,6 +161,7 @@ impl Inputs {
     pub fn next_breakpoint(&self, t: f64) -> f64 {
         self.varying
             .iter()
+            .filter(|j| !self.silent.contains(j))
             .filter_map(|&j| self.sources[j].next_breakpoint(t))
             .fold(self.lines.next_breakpoint(t), f64::min)
     }

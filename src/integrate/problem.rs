@@ -121,6 +121,10 @@ pub(super) struct Problem {
     pub(super) free_sources: bool,
     /// The start is a right limit: edges of sources there have acted.
     pub(super) after_edges: bool,
+    /// Comparators that were made to sources of edges.
+    pub(super) made: usize,
+    /// Rows are asked for at corners of the sources that are recorded.
+    pub(super) rows_at_corners: bool,
 }
 
 /// The scout gives up after this many steps (trains of many pulses); what it has seen by then is used.
@@ -154,6 +158,8 @@ impl Problem {
             systems: Systems::of(standard),
             free_sources: false,
             after_edges: false,
+            made: 0,
+            rows_at_corners: true,
         })
     }
 
@@ -181,6 +187,8 @@ impl Problem {
             systems: Systems::of(behaviour),
             free_sources: false,
             after_edges: false,
+            made: 0,
+            rows_at_corners: true,
         }
     }
 
@@ -273,6 +281,15 @@ impl Problem {
             settings: settings.clone(),
         })?;
         theta.attach(&self.lines);
+        if !self.free_sources {
+            let multiport = &self.systems.multiport;
+            let silent = if self.rows_at_corners {
+                multiport.source_controls().0
+            } else {
+                multiport.acting_by_switches()
+            };
+            theta.pass_silent_corners(&silent);
+        }
         theta.expect(&self.conducting);
         Ok(theta)
     }

@@ -115,7 +115,18 @@ pub fn simulate(
     let mut options = options;
     let start = options.start.take();
     let uic = tran.uic || start.is_some();
+    // Steps of curved laws pass comparators as events that they have to find; a start tells what pairs there are.
+    let plain = options.method == Method::Auto && start.is_none() && circuit.is_curved();
+    let known = plain.then(|| circuit.with_comparisons_made()).flatten();
+    let known = known.and_then(|(c, count)| Some((crate::mna::behaviour(&c).ok()?, c, count)));
+    let (circuit, behaviour) = match &known {
+        Some((behaviour, circuit, _)) => (circuit, behaviour),
+        None => (circuit, behaviour),
+    };
     let mut problem = Problem::of_circuit(circuit, behaviour, uic, &options.settings)?;
+    if let Some((_, _, count)) = known {
+        problem.made = count;
+    }
     if let Some(standing) = start {
         let place = Place {
             t: standing.t,
@@ -200,12 +211,19 @@ fn dispatch(
     elsewhere: Rc<Cell<f64>>,
 ) -> Result<Run, Error> {
     check(&tran, &options)?;
+    problem.rows_at_corners = options.corners || options.events || !tran.prints;
     let circuit = ready(&mut problem, &tran, &options)?;
     let Plan {
         method,
         scheme,
-        words,
+        mut words,
     } = circuit.plan(&options);
+    if problem.made > 0 {
+        words.push(format!(
+            "{} comparators have sources alone for inputs: their edges are computed before the run",
+            problem.made
+        ));
+    }
     if let (Method::Exact, Some(obstacle)) = (options.method, circuit.not_exact()) {
         return Err(Error::before(Reason::Unsupported(format!(
             "no exact integration: {obstacle}"

@@ -86,10 +86,15 @@ impl Exponential {
         }
     }
 
-    /// The junction behind its own and another resistance ρ > 0, Ω; `None` where it breaks down.
-    pub(crate) fn behind(&self, rho: f64) -> Option<Behind> {
-        let sound = self.breakdown.is_none() && (self.rs + rho).is_finite();
-        sound.then(|| Behind::new(self.is, self.slope, self.rs + rho))
+    /// The junction behind its own and another resistance ρ > 0, Ω, and the z = v + ρ i, V, from which on that is the law: below, its
+    /// breakdown carries more than the rounding of Is. `None` where that begins above 0 V.
+    pub(crate) fn behind(&self, rho: f64) -> Option<(Behind, f64)> {
+        // Where the current is negative v is no smaller than z.
+        let from = self.breakdown.map_or(f64::NEG_INFINITY, |b| {
+            b.slope * (b.ibv / (f64::EPSILON * self.is)).ln() - b.bv
+        });
+        let sound = from < 0.0 && (self.rs + rho).is_finite();
+        sound.then(|| (Behind::new(self.is, self.slope, self.rs + rho), from))
     }
 
     /// The point (v, i) with v + ρ i = z, for ρ > 0 in Ω, and the slopes there.

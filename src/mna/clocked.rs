@@ -18,6 +18,16 @@ pub(crate) struct SourceControl {
 impl StaticMultiport {
     /// The controls of switches that are straight sources alone, and by source whether it acts through such controls and nowhere else.
     pub(crate) fn source_controls(&self) -> (Vec<bool>, Vec<SourceControl>) {
+        self.source_controls_beside(self.probes)
+    }
+
+    /// By source whether it acts through such controls and nowhere else but in probes.
+    pub(crate) fn acting_by_switches(&self) -> Vec<bool> {
+        self.source_controls_beside(0).0
+    }
+
+    /// See [`Self::source_controls`]; the first `probes` readings are reasons to keep a source.
+    fn source_controls_beside(&self, probes: usize) -> (Vec<bool>, Vec<SourceControl>) {
         let reduced = self.ball();
         let equations = &reduced.equations;
         let place = |c: Column| reduced.place[c];
@@ -46,8 +56,8 @@ impl StaticMultiport {
         }
         // A reading is no reason to keep a source in the flow: a factor of a product that vanishes, the control of a switch.
         let idle = |k: usize| {
-            let read = !controls[k].is_empty() || !factors[k].is_empty();
-            k >= self.probes && read && factors[k].iter().all(|&other| vanishes(other))
+            let read = !controls[k].is_empty() || !factors[k].is_empty() || k < self.probes;
+            k >= probes && read && factors[k].iter().all(|&other| vanishes(other))
         };
         let is_straight =
             |wave: &Wave| matches!(wave, Wave::Dc(_) | Wave::Pulse { .. } | Wave::Pwl { .. });
@@ -102,7 +112,7 @@ impl StaticMultiport {
 
 #[cfg(test)]
 mod tests {
-    use super::SourceControl;
+    use super::{SourceControl, StaticMultiport};
     use crate::circuit::{Kind, Quantity};
     use crate::mna::behaviour;
     use crate::mna::fixture::{circuit, value};
@@ -111,6 +121,10 @@ mod tests {
 
     /// The source controls when s1 and s2 read these nodes with these factors.
     fn found(reads: [&[(&str, &str)]; 2], probe: Option<&str>) -> (Vec<bool>, Vec<SourceControl>) {
+        multiport(reads, probe).source_controls()
+    }
+
+    fn multiport(reads: [&[(&str, &str)]; 2], probe: Option<&str>) -> StaticMultiport {
         let mut circuit = circuit(CIRCUIT);
         for (name, reads) in ["s1", "s2"].into_iter().zip(reads) {
             let terms = reads
@@ -127,7 +141,7 @@ mod tests {
         }
         let probes = ["v(a)"].into_iter().chain(probe);
         circuit.probes = probes.map(|p| circuit.probe(p).unwrap()).collect();
-        behaviour(&circuit).unwrap().source_controls()
+        behaviour(&circuit).unwrap()
     }
 
     #[test]
@@ -155,6 +169,13 @@ mod tests {
         // By a probe.
         let probed = found([&[("g", "1")], &[("a", "1")]], Some("v(g)"));
         assert_eq!(probed, (vec![false, false], vec![gate]));
+        let acting = |reads| multiport(reads, Some("v(g)")).acting_by_switches();
+        assert_eq!(acting([&[("g", "1")], &[("a", "1")]]), [true, false]);
+        // vd has a load, and a control that reads a state besides is none of sources.
+        assert_eq!(
+            acting([&[("d", "1")], &[("g", "1"), ("a", "1")]]),
+            [false, false]
+        );
         // Not where a control adds it to a loaded source.
         let sum = found([&[("g", "1"), ("d", "1")], &[("a", "1")]], None);
         assert_eq!(

@@ -26,11 +26,13 @@ use nalgebra::{DMatrix, DVector};
 
 use super::driver::Driver;
 use super::lcp::{Answered, Scaling, Solution, Status};
+use super::newton::Newton;
 use crate::law::{Law, Resolvent};
 use crate::settings::tolerances::complementarity::{
     BLOCKED, CONTINUED, CONTINUED_RATIO, DECREASE, MONOTONE, NEWTON_ENDS, PROXIMAL, SMALL_PORT,
     UNDETERMINED,
 };
+use crate::settings::tolerances::steps::SOLVED;
 
 /// The law of a port and which of its quantities is λ.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,6 +53,8 @@ pub(super) struct Lawful {
     /// Ports with 0 ≤ λ ⟂ y ≥ 0, and the others.
     ideal: Vec<usize>,
     curved: Vec<usize>,
+    /// Newton's method alone.
+    plain: Newton,
     /// w of the last solution.
     w: DVector<f64>,
     /// (I + M')⁻¹.
@@ -108,12 +112,14 @@ impl Lawful {
             if port.current { volts * d } else { volts / d }
         });
         let bend = bends.fold(0.0, f64::max);
+        let plain = Newton::new(m, &ports);
         let m = DMatrix::from_fn(size, size, |i, j| d[i] * m[(i, j)] * d[j]);
         let identity = || DMatrix::identity(size, size);
         // I + M' is regular for every monotone M'; for others the splitting has no meaning, and any measure serves.
         let averaged = (identity() + &m).try_inverse().unwrap_or_else(identity);
         let (ideal, curved) = (0..size).partition(is_ideal);
         Self {
+            plain,
             m,
             scaling: scaling.clone(),
             ports,
@@ -136,7 +142,11 @@ impl Lawful {
     /// Solves for one q.
     pub(super) fn solve(&mut self, q: &DVector<f64>) -> Solution {
         let q = q.component_mul(&self.scaling.d);
-        let mut found = self.descend(self.at(self.w.clone(), &q), &q);
+        // Most problems are near the last one, and the plain steps find them without allocation.
+        let mut start = self.w.clone();
+        self.plain
+            .refine(q.as_slice(), start.as_mut_slice(), (SOLVED, self.tolerance));
+        let mut found = self.descend(self.at(start, &q), &q);
         let mut by = Answered::Newton;
         let mut split = self.at(DVector::zeros(q.len()), &q);
         for round in 0..ROUNDS {

@@ -9,7 +9,9 @@ use nalgebra::DMatrix;
 use super::lawful::PortLaw;
 use super::lcp::Scaling;
 use crate::law::{Junction, Law, Resolvent};
-use crate::settings::tolerances::complementarity::{CONTRACTS, CONTRACTS_NO_MORE, MONOTONE};
+use crate::settings::tolerances::complementarity::{
+    CONTRACTS, CONTRACTS_NO_MORE, MONOTONE, ROUNDING_STEPS,
+};
 
 /// Steps from one start; those that need more are better started elsewhere.
 const STEPS: u32 = 25;
@@ -27,6 +29,9 @@ enum Port {
         /// ρ, Ω.
         rho: f64,
         current: bool,
+        /// The least v + ρ i, V, and what holds below.
+        from: f64,
+        law: Box<PortLaw>,
     },
     /// Any other law.
     Other(Box<PortLaw>),
@@ -65,10 +70,12 @@ impl Newton {
             Law::Exponential(exponential) => {
                 let rho = if law.current { 1.0 / (d * d) } else { d * d };
                 match exponential.behind(rho) {
-                    Some(junction) => Port::Junction {
+                    Some((junction, from)) => Port::Junction {
                         junction,
                         rho,
                         current: law.current,
+                        from,
+                        law: Box::new(law.clone()),
                     },
                     None => Port::Other(Box::new(law.clone())),
                 }
@@ -108,25 +115,36 @@ impl Newton {
         }
     }
 
-    /// Solves for one q from a guess of (λ, y), which the solution replaces; the last step is below `tolerance` of the largest w.
-    /// `false`: the steps do not contract, and what is there is no solution.
+    /// Solves for one q from a guess of (λ, y), which the solution replaces; the last step is below the part `wanted` of the largest w, or
+    /// below `granted` where rounding lets steps shrink no further. `false`: the steps do not contract, and what is there is no solution.
     pub(crate) fn solve(
         &mut self,
         q: &[f64],
         lambda: &mut [f64],
         y: &mut [f64],
-        tolerance: f64,
+        parts: (f64, f64),
     ) -> bool {
         for j in 0..self.size {
             self.q[j] = q[j] * self.d[j];
             self.w[j] = lambda[j] / self.d[j] - y[j] * self.d[j];
         }
-        let found = self.descend(tolerance);
+        let found = self.descend(parts);
         if found {
             for j in 0..self.size {
                 lambda[j] = self.lambda[j] * self.d[j];
                 y[j] = self.y[j] / self.d[j];
             }
+        }
+        found
+    }
+
+    /// The same for q' from a guess of w', both equilibrated; where it is `false` the guess is as it was.
+    pub(crate) fn refine(&mut self, q: &[f64], w: &mut [f64], parts: (f64, f64)) -> bool {
+        self.q.copy_from_slice(q);
+        self.w.copy_from_slice(w);
+        let found = self.descend(parts);
+        if found {
+            w.copy_from_slice(&self.w);
         }
         found
     }
@@ -149,7 +167,7 @@ impl Newton {
         }
     }
 
-    fn descend(&mut self, tolerance: f64) -> bool {
+    fn descend(&mut self, (wanted, granted): (f64, f64)) -> bool {
         let largest = |values: &[f64]| values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         self.evaluate();
         let mut before = f64::INFINITY;
@@ -168,10 +186,13 @@ impl Newton {
                 *w += step;
             }
             self.evaluate();
-            let size = tolerance * largest(&self.w).max(largest(&self.q));
-            let rate = norm / before;
+            let scale = largest(&self.w).max(largest(&self.q));
+            let (size, rate) = (wanted * scale, norm / before);
             // What is left after this step is a geometric series at most.
             if norm <= size || k > 0 && rate < CONTRACTS && norm * rate / (1.0 - rate) <= size {
+                return true;
+            }
+            if rate > ROUNDING_STEPS && norm <= granted * scale {
                 return true;
             }
             if rate > CONTRACTS_NO_MORE && !fresh {
@@ -195,9 +216,13 @@ impl Newton {
                     }
                 }
                 Port::Junction {
+                    current, from, law, ..
+                } if (if *current { w / d } else { -w * d }) < *from => law.at(d, w),
+                Port::Junction {
                     junction,
                     rho,
                     current: true,
+                    ..
                 } => {
                     // λ' = i/d, −y' = d v, so w/d = v + ρ i.
                     let (i, di) = junction.at(w / d);
@@ -207,6 +232,7 @@ impl Newton {
                     junction,
                     rho,
                     current: false,
+                    ..
                 } => {
                     // λ' = −v/d, −y' = −d i, so −d w = v + ρ i.
                     let (i, di) = junction.at(-w * d);
@@ -329,7 +355,7 @@ mod tests {
         let mut solved = |held: Option<&[bool]>| {
             newton.hold(held);
             let (mut lambda, mut y) = ([0.5, 0.5], [0.0, 0.0]);
-            assert!(newton.solve(&[-1.0, 1.0], &mut lambda, &mut y, 1e-14));
+            assert!(newton.solve(&[-1.0, 1.0], &mut lambda, &mut y, (1e-14, 1e-14)));
             (
                 lambda.map(|l| (l * 1e12).round() / 1e12),
                 y.map(|y| (y * 1e12).round() / 1e12),

@@ -43,7 +43,7 @@ fn switched(run: &Run, switch: &str) -> Vec<f64> {
 }
 
 /// A buck whose comparator reads a saw-tooth, by a diode with a law of its own: supply and level, saw-tooth, L, C and R, the models of the diode
-/// and of the switch, and `.tran`.
+/// and of the switch, and `.tran`. The level comes by a resistor, so that the network decides when the comparator passes.
 fn modulated(
     [supply, level, saw]: [&str; 3],
     [l, c, r]: [&str; 3],
@@ -53,7 +53,8 @@ fn modulated(
     format!(
         "buck
 v1 in 0 {supply}
-vc c 0 {level}
+vc l 0 {level}
+rc l c 1
 vs saw 0 pulse({saw})
 bc g 0 v= v(c) > v(saw) ? 5 : 0
 s1 in a g 0 sw1
@@ -95,6 +96,104 @@ fn a_comparator_moves_when_its_saw_tooth_passes() {
         "{}",
         run.stats.lcp_solves
     );
+}
+
+/// Where the level is a source the comparator is one too: at the same instants, to rounding and without an error of its own; and the corners of
+/// a saw-tooth that nothing else reads end no steps.
+#[test]
+fn a_comparator_of_sources_is_known_before_the_run() {
+    let text = modulated(
+        ["12", "0.42", "0 1 0 9.8u 0.1u 0.1u 10u"],
+        ["47u", "100u", "5"],
+        ["is=1e-8 n=1.05 rs=20m", "ron=50m roff=1meg"],
+        "0.1u 1m",
+    );
+    let found = transient(&text, 1e-6);
+    let direct = text.replace("vc l 0", "vc c 0").replace("rc l c 1\n", "");
+    let known = transient(&direct, 1e-6);
+    assert_eq!(known.error.event_time, Some(0.0));
+    let moved = |run: &Run| -> Vec<f64> {
+        let all = switched(run, "s1").into_iter();
+        all.filter(|t| *t > 0.0).collect()
+    };
+    let (a, b) = (moved(&found), moved(&known));
+    assert!(
+        a.len() == b.len() && a.len() >= 199,
+        "{} {}",
+        a.len(),
+        b.len()
+    );
+    for (k, (a, b)) in a.iter().zip(&b).enumerate() {
+        let rounding = 4.0 * f64::EPSILON * 1e-3;
+        assert!((a - b).abs() < 1e-14, "{k}: {a} {b}");
+        let up = 10e-6 * (k / 2) as f64 + 4.116e-6;
+        let expected = if k % 2 == 0 { up } else { up + 5.842e-6 };
+        assert!((b - expected).abs() < rounding, "{k}: {b} {expected}");
+    }
+    for probe in ["v(a)", "v(o)", "i(l1)"] {
+        let off = difference(&known, &found, probe, 1e-12);
+        assert!(off < 1e-6, "{probe}: {off:e}");
+    }
+    // As many steps as where the pulse is written as one.
+    let pulse = "vg g 0 pulse(5 0 4.116u 0 0 5.842u 10u)";
+    let written = direct.replace("bc g 0 v= v(c) > v(saw) ? 5 : 0", pulse);
+    let (default, written) = (transient(&direct, 1e-4), transient(&written, 1e-4));
+    assert!(default.stats.steps.abs_diff(written.stats.steps) < 50);
+    assert!(default.stats.steps < transient(&text, 1e-4).stats.steps);
+}
+
+/// The gate has four corners a period and passes the threshold on two of its edges; below the threshold none of them matters.
+#[test]
+fn corners_of_a_gate_end_no_steps() {
+    let text = |high: f64| {
+        format!(
+            "buck
+v1 in 0 12
+vg g 0 pulse(0 {high} 0 10n 10n 0.5u 1u)
+s1 in a g 0 sw1
+d1 0 a dx
+l1 a o 100u
+c1 o 0 100u
+r1 o 0 10
+.model dx d(is=1n rs=0.1)
+.model sw1 sw(ron=0.1 roff=100meg vt=5 vh=0.5)
+.tran 1u 0.5m
+.save v(o) i(l1)
+.end
+"
+        )
+    };
+    let rest = transient(&text(5.4), 1e-4);
+    assert!(rest.stats.steps < 100, "{}", rest.stats.steps);
+    // On above 5.5 V, off below 4.5 V.
+    let run = transient(&text(6.0), 1e-4);
+    let moved = switched(&run, "s1");
+    assert_eq!(moved.len(), 1000);
+    for (k, t) in moved.iter().enumerate() {
+        let within = if k % 2 == 0 {
+            5.5 / 6.0 * 10e-9
+        } else {
+            0.51e-6 + 0.25 * 10e-9
+        };
+        let expected = 1e-6 * (k / 2) as f64 + within;
+        assert!((t - expected).abs() < 1e-17, "{k}: {t} {expected}");
+    }
+    let at_corners = SimOptions {
+        corners: true,
+        ..SimOptions::default()
+    };
+    let model = Model::parse(&text(6.0).replace(".save", ".save v(g)"), "gate.cir").unwrap();
+    let stopping = model.transient(at_corners).unwrap().stats.steps;
+    assert!(
+        5 * run.stats.steps < 4 * stopping,
+        "{} of {stopping}",
+        run.stats.steps
+    );
+    let (seen, reference) = (transient(&text(6.0), 1e-8), transient(&text(6.0), 1e-10));
+    for probe in ["v(o)", "i(l1)"] {
+        assert!(difference(&seen, &reference, probe, 0.0) < 1e-8);
+        assert!(difference(&run, &reference, probe, 0.0) < 1e-4);
+    }
 }
 
 /// With steps that end wherever the error ended them this converter came out 1.2e-4 off at 1e-10, and worse than at 1e-6.

@@ -14,6 +14,7 @@ use crate::integrate::error::Reason;
 use crate::integrate::lawful;
 use crate::integrate::step::Columns;
 use crate::lcs::{Lcs, Role};
+use crate::settings::tolerances::steps::{SOLVED, STAGE_ROUNDING};
 use crate::solve::PortLaw;
 use crate::solve::active::equilibrated_inverse;
 use crate::solve::newton::Newton;
@@ -45,6 +46,9 @@ pub(crate) struct Curved {
     pub(super) readings: Readings,
     steps: Vec<Implicit>,
     clock: u64,
+    /// At one instant, M = D.
+    instant: Newton,
+    q: Vec<f64>,
 }
 
 /// Matrices of stages with one g, row by row.
@@ -88,6 +92,8 @@ impl Curved {
             readings: Readings::of(lcs, columns),
             steps: Vec::new(),
             clock: 0,
+            instant: Newton::new(&lcs.d, &lawful::laws(lcs)),
+            q: vec![0.0; lcs.m()],
         }
     }
 
@@ -129,10 +135,28 @@ impl Curved {
             *x = dot(&w[i * n..(i + 1) * n], right);
         }
         for (j, q) in q.iter_mut().enumerate() {
-            *q = dot(&self.c[j * n..(j + 1) * n], x)
-                + dot(&self.g[j * p..(j + 1) * p], u)
-                + self.offset[j];
+            *q = self.free(j, x, u);
         }
+    }
+
+    /// y of port j for λ = 0: C x + G u + F.
+    fn free(&self, j: usize, x: &[f64], u: &[f64]) -> f64 {
+        let (n, p) = (self.n, self.p);
+        dot(&self.c[j * n..(j + 1) * n], x) + dot(&self.g[j * p..(j + 1) * p], u) + self.offset[j]
+    }
+
+    /// λ and y on the laws at one instant, from a guess that they replace; `false` where Newton's method does not find them.
+    pub(super) fn at_once(
+        &mut self,
+        x: &[f64],
+        u: &[f64],
+        (lambda, y): (&mut [f64], &mut [f64]),
+    ) -> bool {
+        for j in 0..self.m {
+            self.q[j] = self.free(j, x, u);
+        }
+        self.instant
+            .solve(&self.q, lambda, y, (SOLVED, STAGE_ROUNDING))
     }
 
     /// λ and y on the laws, from a guess.

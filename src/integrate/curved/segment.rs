@@ -1,10 +1,12 @@
 //! Dense output: the quantities at any time within a step that was made.
 //!
 //! The state follows Hermite's cubic through both ends and their slopes, whose error is of fourth order as the step's own; λ follows the
-//! cubic through four of the stages. The other two stages test it: where λ bends (a diode that turns on) the polynomial is not trusted, and a
-//! step of the method from the start of the segment to the row takes its place. Sources are evaluated at the time itself.
+//! cubic through four of the stages. The other two stages test it: where λ bends (a diode that turns on) the polynomial is not trusted, and
+//! λ is found on the laws, from the polynomials of the state: y = C x + D λ + G u + F. Where that does not meet the stages either (a large current
+//! that a small error of the state decides), a step of the method from the start of the segment to the row takes its place. Sources are
+//! evaluated at the time itself.
 
-use super::tableau::{NODES, STAGES, THROUGH, interpolation};
+use super::tableau::{NODES, STAGES, THROUGH, between_stages, interpolation};
 use super::{Curved, Start, Trial};
 use crate::integrate::grow;
 use crate::integrate::inputs::{Inputs, Pieces};
@@ -20,10 +22,26 @@ struct Segment {
     held: Option<Vec<bool>>,
     x: Vec<f64>,
     slope: Vec<f64>,
-    /// By stage: λ.
+    /// By stage: λ and y.
     lambdas: Vec<f64>,
-    /// Whether λ may be interpolated; not asked yet where `None`.
-    trusted: Option<bool>,
+    ys: Vec<f64>,
+    /// What a row is read from; not asked yet where `None`.
+    read_from: Option<Within>,
+}
+
+impl Segment {
+    /// Hermite's cubic at a part of the step.
+    fn state_at(&self, part: f64, state: &mut [f64]) {
+        let (s, r, h) = (part, 1.0 - part, self.end - self.start.t);
+        let (from, out) = (r * r * (1.0 + 2.0 * s), h * s * r * r);
+        let (to, into) = (s * s * (3.0 - 2.0 * s), -h * s * s * r);
+        for (k, state) in state.iter_mut().enumerate() {
+            *state = from * self.start.x[k]
+                + out * self.start.slope[k]
+                + to * self.x[k]
+                + into * self.slope[k];
+        }
+    }
 }
 
 /// The steps from the one that the present row lies in up to the last.
@@ -36,17 +54,22 @@ pub(crate) struct Segments {
     w: Vec<f64>,
     pieces: Pieces,
     du: Vec<f64>,
+    /// λ and y on the laws.
+    found: (Vec<f64>, Vec<f64>),
     /// What λ is off, over [x | λ | u | u' | 1], and the largest |value| of every row so far.
     off: Vec<f64>,
     reached: Vec<f64>,
 }
 
 /// What a row within a step is read from.
-pub(crate) enum Within<'a> {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Within {
     /// The polynomials.
     Polynomials,
-    /// A step of the method from here takes their place, with ideal ports held on these sides.
-    Step(&'a Start, Option<&'a [bool]>),
+    /// Those of the state, with λ on the laws.
+    Laws,
+    /// A step of the method from [`Segments::first`].
+    Step,
 }
 
 impl Segments {
@@ -73,7 +96,8 @@ impl Segments {
         segment.slope.clear();
         segment.slope.extend_from_slice(trial.end_slope());
         segment.lambdas.clone_from(&trial.lambdas);
-        segment.trusted = None;
+        segment.ys.clone_from(&trial.ys);
+        segment.read_from = None;
     }
 
     /// Forgets the steps that end before `t`, whose rows have been read.
@@ -89,34 +113,114 @@ impl Segments {
         self.kept[..self.used].first().map(|segment| segment.system)
     }
 
-    /// Asks whether a row of the first step is read from its polynomials: what λ is off there makes of every row, relative to what that has
-    /// reached.
-    pub(crate) fn within(&mut self, curved: &Curved, tolerance: f64) -> Within<'_> {
+    /// Where the first step started, and the sides on which its ideal ports were held.
+    pub(crate) fn first(&self) -> (&Start, Option<&[bool]>) {
+        (&self.kept[0].start, self.kept[0].held.as_deref())
+    }
+
+    /// Asks what a row of the first step is read from: what λ is off at the stages makes of every row, relative to what that has reached.
+    pub(crate) fn within(
+        &mut self,
+        curved: &mut Curved,
+        inputs: &Inputs,
+        tolerance: f64,
+    ) -> Within {
+        self.reached.resize(curved.readings.units.len(), 0.0);
+        if let Some(known) = self.kept[0].read_from {
+            return known;
+        }
+        let within = ROWS * tolerance;
+        let found = if self.meet_stages(curved, within) {
+            Within::Polynomials
+        } else if self.laws_meet_stages(curved, inputs, within) {
+            Within::Laws
+        } else {
+            Within::Step
+        };
+        self.kept[0].read_from = Some(found);
+        found
+    }
+
+    /// Whether the polynomials of λ meet the stages that they do not go through.
+    fn meet_stages(&mut self, curved: &Curved, within: f64) -> bool {
         let Self {
             kept, off, reached, ..
         } = self;
-        let segment = &mut kept[0];
+        let segment = &kept[0];
         let (n, m) = (curved.n, curved.m);
-        reached.resize(curved.readings.units.len(), 0.0);
-        let trusted = *segment.trusted.get_or_insert_with(|| {
-            [1, 4].into_iter().all(|tested| {
-                let weights = interpolation(NODES[tested]);
-                off.clear();
-                off.resize(curved.forms.width(), 0.0);
-                for &j in &curved.readings.ports {
-                    let polynomial: f64 = (weights.iter().zip(THROUGH))
-                        .map(|(w, k)| w * segment.lambdas[k * m + j])
-                        .sum();
-                    off[n + j] = polynomial - segment.lambdas[tested * m + j];
+        [1, 4].into_iter().all(|tested| {
+            let weights = interpolation(NODES[tested]);
+            off.clear();
+            off.resize(curved.forms.width(), 0.0);
+            for &j in &curved.readings.ports {
+                let polynomial: f64 = (weights.iter().zip(THROUGH))
+                    .map(|(w, k)| w * segment.lambdas[k * m + j])
+                    .sum();
+                off[n + j] = polynomial - segment.lambdas[tested * m + j];
+            }
+            curved.readings.are_within(off, reached, within)
+        })
+    }
+
+    /// Whether λ on the laws, from the polynomials of the state, meets the stages between both ends. Ideal ports are not asked: on a corner
+    /// the state alone does not tell their λ.
+    fn laws_meet_stages(&mut self, curved: &mut Curved, inputs: &Inputs, within: f64) -> bool {
+        let (n, m) = (curved.n, curved.m);
+        curved.ideal.is_empty()
+            && (1..STAGES - 1).all(|tested| {
+                if !self.find_on_laws(curved, inputs, NODES[tested]) {
+                    return false;
                 }
-                curved.readings.are_within(off, reached, ROWS * tolerance)
+                self.off.clear();
+                self.off.resize(curved.forms.width(), 0.0);
+                for j in 0..m {
+                    self.off[n + j] = self.found.0[j] - self.kept[0].lambdas[tested * m + j];
+                }
+                curved.readings.are_within(&self.off, &self.reached, within)
             })
-        });
-        if trusted {
-            Within::Polynomials
-        } else {
-            Within::Step(&segment.start, segment.held.as_deref())
+    }
+
+    /// x and u at a part of the first step into `w`, and λ on the laws there; `false` where Newton's method does not find them.
+    fn find_on_laws(&mut self, curved: &mut Curved, inputs: &Inputs, part: f64) -> bool {
+        let (n, m) = (curved.n, curved.m);
+        let segment = &self.kept[0];
+        self.w.resize(curved.forms.width(), 0.0);
+        segment.state_at(part, &mut self.w[..n]);
+        let t = segment.start.t + part * (segment.end - segment.start.t);
+        let u = &mut self.w[n + m..n + m + curved.p];
+        inputs.varying_at(t, &mut self.pieces, u);
+        // From between the stages on both sides, which λ and y do not leave where they rise or fall.
+        let (a, b, weight) = between_stages(part);
+        for (all, found) in [
+            (&segment.lambdas, &mut self.found.0),
+            (&segment.ys, &mut self.found.1),
+        ] {
+            found.clear();
+            found.extend((0..m).map(|j| (1.0 - weight) * all[a * m + j] + weight * all[b * m + j]));
         }
+        let (x, u) = (&self.w[..n], &self.w[n + m..n + m + curved.p]);
+        let (lambda, y) = &mut self.found;
+        if !curved.at_once(x, u, (lambda, y)) {
+            return false;
+        }
+        self.w[n..n + m].copy_from_slice(&self.found.0);
+        true
+    }
+
+    /// Reads the rows of the first step at `t` from λ on the laws; `false` where they are not found.
+    pub(crate) fn on_laws(
+        &mut self,
+        curved: &mut Curved,
+        inputs: &Inputs,
+        t: f64,
+        row: &mut [f64],
+    ) -> bool {
+        let Segment { start, end, .. } = &self.kept[0];
+        let found = self.find_on_laws(curved, inputs, (t - start.t) / (end - start.t));
+        if found {
+            self.read(curved, inputs, t, row);
+        }
+        found
     }
 
     /// Reads the rows of the first step at `t` from its polynomials.
@@ -127,29 +231,15 @@ impl Segments {
         t: f64,
         row: &mut [f64],
     ) {
-        let Segment {
-            start,
-            end,
-            x,
-            slope,
-            lambdas,
-            ..
-        } = &self.kept[0];
+        let segment = &self.kept[0];
         let (n, m) = (curved.n, curved.m);
-        let h = end - start.t;
-        let s = (t - start.t) / h;
-        let r = 1.0 - s;
-        // Hermite's basis.
-        let (from, out) = (r * r * (1.0 + 2.0 * s), h * s * r * r);
-        let (to, into) = (s * s * (3.0 - 2.0 * s), -h * s * s * r);
+        let s = (t - segment.start.t) / (segment.end - segment.start.t);
         self.w.resize(curved.forms.width(), 0.0);
-        for k in 0..n {
-            self.w[k] = from * start.x[k] + out * start.slope[k] + to * x[k] + into * slope[k];
-        }
+        segment.state_at(s, &mut self.w[..n]);
         let weights = interpolation(s);
         for &j in &curved.readings.ports {
             self.w[n + j] = (weights.iter().zip(THROUGH))
-                .map(|(w, k)| w * lambdas[k * m + j])
+                .map(|(w, k)| w * segment.lambdas[k * m + j])
                 .sum();
         }
         let u = &mut self.w[n + m..n + m + curved.p];

@@ -94,6 +94,16 @@ pub(crate) fn interpolation(part: f64) -> [f64; 4] {
     })
 }
 
+/// The stages in the order of their times.
+const IN_TIME: [usize; STAGES] = [0, 2, 1, 3, 4, 5];
+
+/// The stages before and after a part of the step, and the weight of the second one on the straight line between them.
+pub(crate) fn between_stages(part: f64) -> (usize, usize, f64) {
+    let at = IN_TIME[1..STAGES - 1].partition_point(|&k| NODES[k] <= part);
+    let (a, b) = (IN_TIME[at], IN_TIME[at + 1]);
+    (a, b, (part - NODES[a]) / (NODES[b] - NODES[a]))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -155,6 +165,20 @@ mod tests {
             assert!(left.abs() < 1e-14, "{left}");
         }
         assert!((dot(&EMBEDDED, &cubes) - 0.25).abs() > 1e-3);
+    }
+
+    #[test]
+    fn stages_enclose_every_part_of_a_step() {
+        assert_eq!(between_stages(0.0), (0, 2, 0.0));
+        assert_eq!(between_stages(1.0), (4, 5, 1.0));
+        assert_eq!(between_stages(0.5), (1, 3, 0.0));
+        for k in 0..=100 {
+            let part = f64::from(k) / 100.0;
+            let (a, b, weight) = between_stages(part);
+            assert!((0.0..=1.0).contains(&weight), "{part}");
+            let there = NODES[a] + weight * (NODES[b] - NODES[a]);
+            assert!((there - part).abs() < 1e-15, "{part}");
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::Curved;
 use super::tableau::{ERROR, GAMMA, LOWER, NODES, STAGES, WEIGHTS, extrapolation};
 use crate::integrate::error::{Error, Reason};
 use crate::integrate::inputs::{Inputs, Pieces};
-use crate::settings::tolerances::steps::{AHEAD, STAGE_ROUNDING};
+use crate::settings::tolerances::steps::{AHEAD, SOLVED, STAGE_ROUNDING};
 
 /// Where a step starts.
 #[derive(Debug, Default)]
@@ -74,7 +74,7 @@ pub(crate) struct Trial {
     /// By stage: slopes, λ and y.
     pub(super) slopes: Vec<f64>,
     pub(super) lambdas: Vec<f64>,
-    ys: Vec<f64>,
+    pub(super) ys: Vec<f64>,
     base: Vec<f64>,
     /// What the last stage's state is made of, see [`Curved::prepare`].
     right: Vec<f64>,
@@ -148,7 +148,8 @@ impl Trial {
         &self.slopes[(STAGES - 1) * self.n..]
     }
 
-    /// Makes the stages of a step from `start` to t1; stages are solved to `tolerance`, the ideal ports on the side that they have in `held`.
+    /// Makes the stages of a step from `start` to t1; stages are solved to [`SOLVED`], to `granted` at least, with the ideal ports on the side
+    /// that they have in `held`.
     ///
     /// # Errors
     /// Those of `robust`; [`Reason::Singular`], [`Reason::Overflow`].
@@ -158,7 +159,7 @@ impl Trial {
         inputs: &Inputs,
         start: &Start,
         (t1, held): (f64, Option<&[bool]>),
-        (slack, tolerance): (f64, f64),
+        (slack, granted): (f64, f64),
         robust: Robust<'_>,
     ) -> Result<(), Error> {
         self.resize(curved);
@@ -186,7 +187,7 @@ impl Trial {
         self.u.copy_from_slice(&start.u);
         self.account(curved, 0);
         for stage in 1..STAGES {
-            self.stage(curved, inputs, start, stage, tolerance, robust)?;
+            self.stage(curved, inputs, start, stage, granted, robust)?;
             self.account(curved, stage);
         }
         self.lose(curved, start);
@@ -200,7 +201,7 @@ impl Trial {
         inputs: &Inputs,
         start: &Start,
         stage: usize,
-        tolerance: f64,
+        granted: f64,
         robust: Robust<'_>,
     ) -> Result<(), Error> {
         let (n, m, h) = (self.n, self.m, self.h);
@@ -233,7 +234,7 @@ impl Trial {
         self.solves += 1;
         let newton = curved.newton(at);
         let known = newton.factorisations;
-        let found = newton.solve(&self.q, lambda, y, tolerance);
+        let found = newton.solve(&self.q, lambda, y, (SOLVED.min(granted), granted));
         self.factorisations += newton.factorisations - known;
         if !found {
             lambda.copy_from_slice(&self.guess.0);

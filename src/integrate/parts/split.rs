@@ -85,6 +85,8 @@ impl Problem {
             systems: Systems::of(multiport),
             free_sources: self.free_sources,
             after_edges: self.after_edges,
+            made: self.made,
+            rows_at_corners: self.rows_at_corners,
         }
     }
 }

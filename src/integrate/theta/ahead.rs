@@ -77,6 +77,10 @@ impl Theta {
         if at_breakpoint {
             self.edge(breakpoint.max(stop), log)?;
         }
+        if !moving.is_empty() {
+            self.inputs
+                .right_of_silent(passage.max(stop), &mut self.now.u);
+        }
         if !moving.is_empty() || at_breakpoint && self.asked()? {
             self.switch(&moving, log)?;
             self.smooth.ahead.known = false;
@@ -109,7 +113,11 @@ impl Theta {
     }
 
     fn longest_step(&self) -> f64 {
-        let mut longest = self.longest.min(SINE_EMBEDDED * self.inputs.largest_step());
+        let mut longest = SINE_EMBEDDED * self.inputs.largest_step();
+        if self.smooth.until.is_none() {
+            // Where rows are read from dense output a longest step is a question of rows.
+            longest = longest.min(self.longest);
+        }
         if self.whole {
             // A coarser run whose steps the sources limit as those of the run would see no error.
             longest *= COARSER[0];

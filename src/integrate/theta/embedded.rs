@@ -11,7 +11,7 @@ use crate::integrate::control::Verdict;
 use crate::integrate::curved::tableau::GAMMA;
 use crate::integrate::curved::{Curved, Segments, Start as From, Trial, Within};
 use crate::integrate::grow;
-use crate::settings::tolerances::steps::{CUT, FAINT, GRANT_EMBEDDED, IDEAL_SOLVED, STAGE_SOLVED};
+use crate::settings::tolerances::steps::{CUT, FAINT, GRANT_EMBEDDED, SOLVED, STAGE_SOLVED};
 use crate::settings::tolerances::times::SPAN_PARTS;
 
 /// What steps of chosen lengths need besides the rest.
@@ -42,6 +42,8 @@ pub(super) struct Smooth {
     /// What the steps say of their own errors, relative to the amplitudes: of the present one, all cut ones together, and the largest, which bounds
     /// what polynomials between its ends are off.
     tells: f64,
+    /// Whether the last trial erred too much.
+    refused: bool,
     pub(super) common: f64,
     pub(super) largest: f64,
     pub(super) ahead: Ahead,
@@ -56,6 +58,14 @@ impl Theta {
     /// Has a run that is stopped, set and taken up again go on in steps and halves.
     pub(crate) fn move_by_hand(&mut self) {
         self.smooth.by_hand = true;
+        self.inputs.silence(&[]);
+    }
+
+    /// Has steps of curved laws go over corners of sources that act through controls of switches alone.
+    pub(crate) fn pass_silent_corners(&mut self, silent: &[bool]) {
+        if self.system().curved {
+            self.inputs.silence(silent);
+        }
     }
 
     /// Whether the steps are those of this module.
@@ -243,9 +253,9 @@ impl Theta {
         };
         let slack = Self::slack(t1);
         let g = GAMMA * (t1 - start.t);
-        let mut tolerance = STAGE_SOLVED * GRANT_EMBEDDED * settings.tol;
+        let mut granted = STAGE_SOLVED * GRANT_EMBEDDED * settings.tol;
         if !curved.ideal.is_empty() {
-            tolerance = tolerance.min(IDEAL_SOLVED);
+            granted = granted.min(SOLVED);
         }
         let mut robust = |q: &[f64], lambda: &mut [f64], y: &mut [f64]| {
             if held.is_some() {
@@ -271,7 +281,7 @@ impl Theta {
             inputs,
             start,
             (t1, held),
-            (slack, tolerance),
+            (slack, granted),
             &mut robust,
         );
         system.smooth = Some(curved);
@@ -289,7 +299,13 @@ impl Theta {
         };
         let moment = span / SPAN_PARTS;
         let system = &self.plant.systems[self.now.system].1;
-        let Smooth { trial, sizes, .. } = &mut self.smooth;
+        let Smooth {
+            trial,
+            sizes,
+            refused,
+            ..
+        } = &mut self.smooth;
+        let refused = *refused;
         let devices = match &system.smooth {
             Some(curved) => &curved.devices[..],
             None => &[],
@@ -308,7 +324,7 @@ impl Theta {
             moved.extend(trial.x.iter().zip(&trial.error).map(|(x, e)| x + e));
             let error = (self.amplitudes).error(&system.lcs, moved, &trial.x);
             let error = error.max(of_devices);
-            (error, control.judge_embedded(h, error))
+            (error, control.judge_embedded(h, error, refused))
         };
         let first = verdict(trial, &mut self.coarse);
         let (error, verdict) = match &system.smooth {
@@ -319,6 +335,7 @@ impl Theta {
             _ => first,
         };
         self.smooth.tells = error;
+        self.smooth.refused = !verdict.accept;
         verdict
     }
 
@@ -396,10 +413,15 @@ impl Theta {
             return;
         };
         let system = &mut self.plant.systems[index].1;
-        let Some(curved) = &system.smooth else {
+        let Some(curved) = &mut system.smooth else {
             return;
         };
-        if let Within::Step(start, held) = segments.within(curved, self.settings.tol) {
+        let from = segments.within(curved, &self.inputs, self.settings.tol);
+        if from == Within::Laws && segments.on_laws(curved, &self.inputs, t, row) {
+            return;
+        }
+        if from != Within::Polynomials {
+            let (start, held) = segments.first();
             let made = Self::make(
                 (system, &self.now.active, &self.settings),
                 &self.inputs,

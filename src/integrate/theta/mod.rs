@@ -557,6 +557,10 @@ impl Stepper for Theta {
             if at_breakpoint {
                 self.edge(breakpoint.max(stop), log)?;
             }
+            if !moving.is_empty() {
+                self.inputs
+                    .right_of_silent(known.max(stop), &mut self.now.u);
+            }
             if !moving.is_empty() || at_breakpoint && self.asked()? {
                 self.switch(&moving, log)?;
             }

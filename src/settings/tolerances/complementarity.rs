@@ -54,3 +54,7 @@ pub(crate) const CONTRACTS: f64 = 0.5;
 /// A contraction with which R' is factored anew: simplified steps have become slower than a factorisation is dear. Larger: more steps; smaller:
 /// more factorisations.
 pub(crate) const CONTRACTS_NO_MORE: f64 = 0.1;
+
+/// Steps of Newton's method that shrink by no more than this factor are rounding, if they are as small as granted. Larger, up to 1: iterations in vain;
+/// smaller: steps that still contract are taken for rounding.
+pub(crate) const ROUNDING_STEPS: f64 = 0.5;

@@ -100,6 +100,9 @@ pub(crate) const SHORTER: f64 = 0.9;
 /// A step is at most so many times as long as the one before. Larger: steps in vain; smaller: more steps until they are long.
 pub(crate) const LONGER: f64 = 8.0;
 
+/// Lengths that differ by no more than this factor are one of the ladder 2^(−k/2). Larger, up to √2: the next one up; smaller, down to 1: rounding takes one down.
+pub(crate) const NO_LONGER: f64 = 1.2;
+
 /// The rate at the end of a step tells the first stage of the next one where to look up to so many times that step's length. Larger: it starts
 /// far off; smaller: it starts from what was.
 pub(crate) const AHEAD: f64 = 3.0;
@@ -108,9 +111,10 @@ pub(crate) const AHEAD: f64 = 3.0;
 /// smaller: one solve more a stage.
 pub(crate) const STAGE_SOLVED: f64 = 1e-3;
 
-/// The same, relative to the largest quantity, where ports are ideal: on which side of its corner one is decides when switches move. Larger: a switch
-/// moves that a moment later does not; smaller: more solves.
-pub(crate) const IDEAL_SOLVED: f64 = 1e-13;
+/// That last step is wanted at this part of the largest quantity, where rounding allows it: differences of stages tell the error of states that are much
+/// smaller, and where ports are ideal the side of a corner that one is on decides when switches move. Larger: noise chooses the steps, a switch moves that a
+/// moment later does not; smaller: more solves.
+pub(crate) const SOLVED: f64 = 1e-13;
 
 /// A stop that cuts a step so much is no reason to halve it for a coarser run to compare with: its error is that of a whole step times the
 /// fourth power of it. Larger: coarser runs make the same steps; smaller: more steps.
