@@ -1426,3 +1426,52 @@ fn tables_derivatives_and_ranges_are_told() {
     assert_eq!(worst["contributions"][1][0], "r1");
     assert_eq!(run(&format!("sens {file} --to nothing")).status, 2);
 }
+
+/// A table for each run, under its values; the last row of each is the element's power there.
+#[test]
+fn every_run_of_a_sweep_has_a_table() {
+    let folder = place();
+    let text = "divider\nv1 a 0 10\nr1 a b {r}\nr2 b 0 {s}\n.param r=1 s=4\n.step param r list 1 6\n.step param s list 4 9\n.tran 1u 10u\n.save v(b)\n.end\n";
+    fs::write(folder.path().join("steps.cir"), text).unwrap();
+    let ran = run_in(folder.path(), "-q sim steps.cir --table -o a.csv");
+    assert_eq!(ran.status, 0, "{ran}");
+    let labels = ["s=4 r=1", "s=4 r=6", "s=9 r=1", "s=9 r=6"];
+    let places = labels.map(|label| {
+        let swapped: Vec<&str> = label.split(' ').rev().collect();
+        let swapped = swapped.join(" ");
+        let found = ran
+            .err
+            .lines()
+            .position(|line| line == label || line == swapped);
+        found.unwrap_or_else(|| panic!("no {label}: {ran}"))
+    });
+    assert_eq!(ran.err.matches("power: input").count(), 4, "{ran}");
+    let lines: Vec<&str> = ran.err.lines().collect();
+    assert!(
+        places.iter().all(|at| lines[at + 1].contains("0 s to ")),
+        "{ran}"
+    );
+    let ran = run_in(
+        folder.path(),
+        "sim steps.cir --table -o a.csv --summary json",
+    );
+    let json: serde_json::Value = serde_json::from_str(ran.err.trim()).expect("JSON");
+    let runs = json["runs"].as_array().expect("runs");
+    assert_eq!(runs.len(), 4);
+    for run in runs {
+        let [r, s] = ["r", "s"].map(|name| run["values"][name].as_f64().expect("a value"));
+        let power = run["table"]["r2"]["power"].as_f64().expect("a power");
+        let truth = 100.0 * s / (r + s).powi(2);
+        assert!((power - truth).abs() < 1e-12 * truth, "{run}");
+    }
+    // What is no transient has none.
+    let ac = text
+        .replace(".tran 1u 10u", ".ac dec 5 1 1k")
+        .replace("10\n", "10 ac 1\n");
+    fs::write(folder.path().join("ac.cir"), ac).unwrap();
+    let ran = run_in(folder.path(), "sim ac.cir --table");
+    assert!(
+        ran.status == 2 && ran.err.contains("`--table` takes a transient"),
+        "{ran}"
+    );
+}
