@@ -68,6 +68,12 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
                 "`.ac` is left out, as there is a `.tran`; `circ ac {file}` carries it out"
             ));
         }
+        if let (true, Some(told)) = (transient, left_out(circuit)) {
+            streams.note(format!(
+                "{told}; `circ ac {}` measures that",
+                args.input.file.display()
+            ));
+        }
         if !transient && !circuit.dc.is_empty() {
             only_one_way(args)?;
             return dc::sim(args, model, &formats, streams);
@@ -223,6 +229,22 @@ fn bounds(
             }
         }
     }
+}
+
+/// The measurements that a transient leaves out.
+fn left_out(circuit: &Circuit) -> Option<String> {
+    let names: Vec<&str> = circuit.responses.iter().map(|m| &m.name[..]).collect();
+    let card = if circuit.ac.is_empty() {
+        ", with an `.ac` card"
+    } else {
+        ""
+    };
+    (!names.is_empty()).then(|| {
+        format!(
+            "`.meas ac` ({}) is left out, as a transient has no response to small sines{card}",
+            names.join(", ")
+        )
+    })
 }
 
 /// # Errors
