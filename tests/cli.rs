@@ -624,7 +624,7 @@ fn probes_may_name_what_an_element_carries() {
 /// LTspice's names of currents into pins; what cannot be had says what to use.
 #[test]
 fn probes_may_be_currents_into_pins() {
-    let mos = "vh h 0 10\nm1 a h 0 0 mn\n.model mn nmos(ron=1 vto=2)\nr9 a g 1k\nx2 a g half2\n.subckt half2 p n\nrh p n 2\n.ends";
+    let mos = "vh h 0 10\nm1 a h 0 0 mn\n.model mn nmos(ron=1 vto=2)\nr9 a g 1k\nx2 a g half2\n.subckt half2 p n\nrh p n 2\n.ends\nx3 a 0 half2";
     // 6 V across 1 Ω, and across 1 kΩ beside 2 Ω.
     for (probe, name, value) in [
         ("Is(M1)", "is(m1)", -6.0),
@@ -659,7 +659,7 @@ fn probes_may_be_currents_into_pins() {
         ("Ix(x2:q)", "`x2` has no pin `q`; its pins are n, p"),
         ("Ix(x2)", "write `Ix(x1:pin)`"),
         ("I(x2:p)", "write `ix(x2:p)` for the current into a pin"),
-        ("Ix(x1:out)", "put a source of 0 V into the lead"),
+        ("Ix(x3:n)", "put a source of 0 V into the lead"),
     ] {
         let ran = run_in(directory.path(), &format!("sim pins.cir --probe {probe}"));
         assert_eq!(ran.status, 2, "{ran}");
