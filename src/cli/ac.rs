@@ -15,7 +15,7 @@ use crate::analysis::{
 };
 use crate::model::Model;
 use crate::report::html::Page;
-use crate::report::{bode, svg, text};
+use crate::report::{bode, log, svg, text};
 use crate::waveform::Phasors;
 
 /// Finds the small-signal response and writes it.
@@ -86,13 +86,13 @@ pub(super) fn sim(
     Ok(Exit::Done)
 }
 
-/// The response of all signals, and what `.meas ac` finds on it, in words; notes are told.
+/// The response of all signals, and what `.meas ac` finds on it; notes are told.
 fn phasors(
     input: &Input,
     model: &Model,
     options: &SmallSignalOptions<'_>,
     streams: &Streams,
-) -> Result<(Phasors, String), Failure> {
+) -> Result<(Phasors, Measurements), Failure> {
     if !model.circuit().steps.is_empty() {
         streams.note("`.step` is left out: this is the response of the values as they stand");
     }
@@ -115,7 +115,7 @@ fn phasors(
         measured,
         ..Measurements::default()
     };
-    Ok((response.phasors, found.words()))
+    Ok((response.phasors, found))
 }
 
 /// The margins of ratios without a unit, in words.
@@ -132,7 +132,7 @@ fn tell_margins(phasors: &Phasors, streams: &Streams) {
 
 /// Writes the files, or without any CSV to standard output, and tells the margins and measurements.
 fn write(
-    (phasors, measured): (&Phasors, &str),
+    (phasors, measured): (&Phasors, &Measurements),
     model: &Model,
     (outputs, formats): (&[PathBuf], &[Format]),
     streams: &Streams,
@@ -140,7 +140,10 @@ fn write(
     tell_margins(phasors, streams);
     // Results, which `-q` does not hide.
     if !measured.is_empty() {
-        streams.error(measured);
+        match streams.log {
+            Some(_) => streams.error(log::run(measured)),
+            None => streams.error(measured.words()),
+        }
     }
     if outputs.is_empty() {
         let mut out = streams.out();
@@ -160,7 +163,7 @@ fn write(
                 continue;
             }
             Format::Html => {
-                let page = Page::of_response(&bode::figure(phasors), measured.to_owned())
+                let page = Page::of_response(&bode::figure(phasors), measured.words())
                     .with_circuit(Some(model))
                     .html()?;
                 bytes.get_mut().extend_from_slice(page.as_bytes());
