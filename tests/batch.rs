@@ -56,6 +56,24 @@ fn a_batch_line_writes_rows_and_a_log() {
     assert_eq!(read("rows"), read("same.raw"));
 }
 
+/// Measurements of a response have the log's form, too.
+#[test]
+fn a_response_is_measured_in_the_log() {
+    let place = place(
+        "rc\nv1 in 0 ac 1\nr1 in out 1k\nc1 out 0 1u\n.ac dec 10 1 100k\n.meas ac gain find vdb(out) at=1\n.meas ac never when vdb(out)=3\n.end\n",
+    );
+    assert_eq!(circ(place.path(), "-b rc.cir -r rc.raw -o rc.log").0, 0);
+    let log = fs::read_to_string(place.path().join("rc.log")).unwrap();
+    let gain = log.lines().find_map(|line| line.strip_prefix("gain="));
+    let value: f64 = gain.unwrap().split(' ').next().unwrap().parse().unwrap();
+    let truth = -10.0 * (1.0 + (std::f64::consts::TAU * 1e-3).powi(2)).log10();
+    assert!((value - truth).abs() < 1e-12, "{log}");
+    assert!(
+        log.contains("Measurement \"never\" FAIL'ed: the value 3 is not crossed"),
+        "{log}"
+    );
+}
+
 #[test]
 fn steps_are_a_table_for_each_measurement() {
     let place = place(&NETLIST.replace(".tran", ".step param r list 1k 2k 1meg\n.tran"));

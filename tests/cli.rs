@@ -621,6 +621,53 @@ fn probes_may_name_what_an_element_carries() {
     assert!((values[1] - 6.0).abs() < 1e-9, "{values:?}");
 }
 
+/// LTspice's names of currents into pins; what cannot be had says what to use.
+#[test]
+fn probes_may_be_currents_into_pins() {
+    let mos = "vh h 0 10\nm1 a h 0 0 mn\n.model mn nmos(ron=1 vto=2)\nr9 a g 1k\nx2 a g half2\n.subckt half2 p n\nrh p n 2\n.ends\nx3 a 0 half2";
+    // 6 V across 1 Ω, and across 1 kΩ beside 2 Ω.
+    for (probe, name, value) in [
+        ("Is(M1)", "is(m1)", -6.0),
+        ("Ig(M1)", "ig(m1)", 0.0),
+        ("Id(M1)", "i(m1)", 6.0),
+        ("2*Is(m1)", "2*is(m1)", -12.0),
+        ("Ix(x2:p)", "ix(x2:p)", 0.0),
+        ("Ix(x1:in)", "ix(x1:in)", 3e-3),
+    ] {
+        for (cards, arguments) in [
+            (mos.to_owned(), format!("--probe {probe} -q")),
+            (format!("{mos}\n.save {probe}"), "-q".to_owned()),
+        ] {
+            let (names, values) = last_row(&cards, &arguments);
+            assert_eq!(names, [name]);
+            assert!((values[0] - value).abs() < 1e-9, "{name} {values:?}");
+        }
+    }
+    let directory = place();
+    fs::write(
+        directory.path().join("pins.cir"),
+        format!("{HALVES}{mos}\n.end\n"),
+    )
+    .unwrap();
+    for (probe, words) in [
+        ("Is(M2)", "there is no transistor `m2`; there are m1"),
+        (
+            "Is(r9)",
+            "there is no transistor `r9`; `i(r9)` is the current through it",
+        ),
+        ("Ib(m1)", "`m1` has no pin `b`; its pins are d, g, s"),
+        ("Ix(x2:q)", "`x2` has no pin `q`; its pins are n, p"),
+        ("Ix(x2)", "write `Ix(x1:pin)`"),
+        ("I(x2:p)", "write `ix(x2:p)` for the current into a pin"),
+        ("Ix(x3:n)", "put a source of 0 V into the lead"),
+    ] {
+        let ran = run_in(directory.path(), &format!("sim pins.cir --probe {probe}"));
+        assert_eq!(ran.status, 2, "{ran}");
+        assert!(ran.err.contains(&format!("--probe {probe}: ")), "{ran}");
+        assert!(ran.err.contains(words), "{ran}");
+    }
+}
+
 /// A current that a switch interrupts meets its `Roff` in a row at the event alone: rows that are written as they come are looked at too.
 #[test]
 fn a_spike_is_told_of_in_rows_that_pass_by() {
@@ -1425,4 +1472,87 @@ fn tables_derivatives_and_ranges_are_told() {
     assert!(least.as_f64() < nominal.as_f64() && nominal.as_f64() < greatest.as_f64());
     assert_eq!(worst["contributions"][1][0], "r1");
     assert_eq!(run(&format!("sens {file} --to nothing")).status, 2);
+}
+
+/// A table for each run, under its values; the last row of each is the element's power there.
+#[test]
+fn every_run_of_a_sweep_has_a_table() {
+    let folder = place();
+    let text = "divider\nv1 a 0 10\nr1 a b {r}\nr2 b 0 {s}\n.param r=1 s=4\n.step param r list 1 6\n.step param s list 4 9\n.tran 1u 10u\n.save v(b)\n.end\n";
+    fs::write(folder.path().join("steps.cir"), text).unwrap();
+    let ran = run_in(folder.path(), "-q sim steps.cir --table -o a.csv");
+    assert_eq!(ran.status, 0, "{ran}");
+    let labels = ["s=4 r=1", "s=4 r=6", "s=9 r=1", "s=9 r=6"];
+    let places = labels.map(|label| {
+        let swapped: Vec<&str> = label.split(' ').rev().collect();
+        let swapped = swapped.join(" ");
+        let found = ran
+            .err
+            .lines()
+            .position(|line| line == label || line == swapped);
+        found.unwrap_or_else(|| panic!("no {label}: {ran}"))
+    });
+    assert_eq!(ran.err.matches("power: input").count(), 4, "{ran}");
+    let lines: Vec<&str> = ran.err.lines().collect();
+    assert!(
+        places.iter().all(|at| lines[at + 1].contains("0 s to ")),
+        "{ran}"
+    );
+    let ran = run_in(
+        folder.path(),
+        "sim steps.cir --table -o a.csv --summary json",
+    );
+    let json: serde_json::Value = serde_json::from_str(ran.err.trim()).expect("JSON");
+    let runs = json["runs"].as_array().expect("runs");
+    assert_eq!(runs.len(), 4);
+    for run in runs {
+        let [r, s] = ["r", "s"].map(|name| run["values"][name].as_f64().expect("a value"));
+        let power = run["table"]["r2"]["power"].as_f64().expect("a power");
+        let truth = 100.0 * s / (r + s).powi(2);
+        assert!((power - truth).abs() < 1e-12 * truth, "{run}");
+    }
+    // What is no transient has none.
+    let ac = text
+        .replace(".tran 1u 10u", ".ac dec 5 1 1k")
+        .replace("10\n", "10 ac 1\n");
+    fs::write(folder.path().join("ac.cir"), ac).unwrap();
+    let ran = run_in(folder.path(), "sim ac.cir --table");
+    assert!(
+        ran.status == 2 && ran.err.contains("`--table` takes a transient"),
+        "{ran}"
+    );
+}
+
+/// Measurements of a response are told by `ac`, also under `-q`, and a transient says where they are.
+#[test]
+fn a_response_is_measured_where_it_is_found() {
+    let folder = place();
+    let text = "rc\nv1 in 0 ac 1\nr1 in out 1k\nc1 out 0 1u\n.ac dec 10 1 100k\n.meas ac corner when vdb(out)=-3\n.end\n";
+    let file = folder.path().join("rc.cir");
+    fs::write(&file, text).unwrap();
+    for command in ["-q ac rc.cir -o a.csv", "-q sim rc.cir -o a.html"] {
+        let ran = run_in(folder.path(), command);
+        assert!(
+            ran.status == 0 && ran.err.starts_with("corner              =  1.5"),
+            "{ran}"
+        );
+    }
+    let page = fs::read_to_string(folder.path().join("a.html")).unwrap();
+    assert!(page.contains("Measurements") && page.contains("corner   "));
+    fs::write(&file, text.replace(".end", ".tran 1u 1m")).unwrap();
+    let ran = run_in(folder.path(), "sim rc.cir -o a.csv");
+    assert_eq!(ran.status, 0, "{ran}");
+    let note = "note: `.meas ac` (corner) is left out, as a transient has no response to small sines; `circ ac rc.cir` measures that";
+    assert!(
+        ran.err.contains(note) && !ran.err.contains("skipped"),
+        "{ran}"
+    );
+    let ran = run_in(folder.path(), "ac rc.cir -o a.csv");
+    assert!(ran.err.contains("corner   "), "{ran}");
+    fs::write(&file, text.replace(".ac dec 10 1 100k", ".tran 1u 1m")).unwrap();
+    let ran = run_in(folder.path(), "sim rc.cir -o a.csv");
+    assert!(
+        ran.status == 0 && ran.err.contains("with an `.ac` card"),
+        "{ran}"
+    );
 }

@@ -175,6 +175,48 @@ fn between_two_inputs_a_schmitt_trigger_compares() {
     );
 }
 
+/// LTspice's symbols with two inputs, as cards by their names and on a sheet, with both outputs.
+#[test]
+fn differential_schmitt_triggers_have_both_outputs() {
+    let (a, on) = (
+        [0.0, 3.0, 2.2, 1.9, 1.7, 2.2, 2.4],
+        [0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0],
+    );
+    let off = on.map(|on| 5.0 - 5.0 * on);
+    for name in ["DIFFSCHMITT", "diffschmtbuf", "DIFFSCHMTINV", "SCHMITT"] {
+        let cards = levels("va", "a", &a)
+            + &format!("vb b 0 2\na1 a b 0 0 0 n q 0 {name} Vt=0.05 Vh=0.25 Vhigh=5\n.tran 0.5 7");
+        let waves = run(&cards);
+        assert_eq!(halves(&waves, "v(q)"), on.map(|on| 5.0 * on), "{name}");
+        assert_eq!(halves(&waves, "v(n)"), off, "{name}");
+    }
+    // Pins of LTspice's symbols: + and − at the left, Q, its inverse, and the common.
+    for (symbol, pins) in [
+        ("diffschmitt", &["64 48 q", "64 80 n"][..]),
+        ("diffschmtbuf", &["64 64 q"]),
+        ("diffschmtinv", &["64 64 n"]),
+    ] {
+        let flags: String = pins.iter().map(|pin| format!("FLAG {pin}\n")).collect();
+        let sheet = format!(
+            "Version 4\nSHEET 1 880 680\n{flags}FLAG 0 48 a\nFLAG 0 80 b\nFLAG 0 96 0\nSYMBOL Digital\\\\{symbol} 0 0 R0\n\
+             SYMATTR InstName A1\nSYMATTR Value Vt=0.05 Vh=0.25 Vhigh=5\nTEXT 0 300 Left 2 !{}\n",
+            format!("{}vb b 0 2\n.tran 0.5 7", levels("va", "a", &a)).replace('\n', "\\n")
+        );
+        let model = circ::Model::parse(&sheet, "a.asc").expect("a sheet");
+        let waves = model
+            .transient(SimOptions::default())
+            .expect("a run")
+            .waveforms;
+        for pin in pins {
+            let (node, truth) = match pin.ends_with('q') {
+                true => ("v(q)", on.map(|on| 5.0 * on)),
+                false => ("v(n)", off),
+            };
+            assert_eq!(halves(&waves, node), truth, "{symbol}");
+        }
+    }
+}
+
 #[test]
 fn what_is_not_simulated_is_refused() {
     let inputs = "v1 a 0 1\nr1 q 0 1\n";

@@ -3,6 +3,7 @@
 
 use circ::analysis::{
     About, PeriodicOptions, Response, SmallSignalOptions, orbit_start, periodic, small_signal,
+    small_signal_measured,
 };
 use circ::integrate::Reason;
 use circ::{Model, SimOptions};
@@ -331,4 +332,88 @@ fn a_switch_that_follows_the_slope_of_a_source_acts_on_its_filter() {
     let truth = |f: f64| pulses(f) / (1.0 + J * TAU * f * 1e-3);
     let error = apart(&out, truth, &response.phasors.frequency);
     assert!(error < 1e-9, "{error:e}");
+}
+
+/// What `.meas ac` cards find.
+fn measured(text: &str) -> Vec<(String, Result<f64, String>)> {
+    let model = Model::parse(text, "t.cir").expect("a circuit");
+    let (response, found) =
+        small_signal_measured(&model, &SmallSignalOptions::default()).expect("a response");
+    assert_eq!(response.phasors.names.len(), model.circuit().probes().len());
+    assert_eq!(response.phasors.frequency, model.circuit().ac);
+    let found = found.into_iter().map(|m| {
+        let value = m.result.map(|found| found.value);
+        (m.name, value.map_err(|why| why.to_string()))
+    });
+    found.collect()
+}
+
+/// A resonance and a band-pass in closed form, as LTspice's and ngspice's users write their cards; rows are a tenth of a decade apart.
+#[test]
+fn responses_are_measured_between_their_rows() {
+    let text = "band\nv1 in 0 ac 1\nr1 in out 1k\nl1 out 0 1m\nc1 out 0 1u\n.ac dec 10 100 1meg\n.save v(in)\n\
+        .meas AC top MAX mag(V(out))\n.meas ac peak max_at vm(out)\n\
+        .meas AC bw TRIG mag(V(out))=top/sqrt(2) RISE=1 TARG mag(V(out))=top/sqrt(2) FALL=LAST\n\
+        .meas ac band trig vdb(out) val=-3.0102999566398120 rise=1 targ vdb(out) val=-3.0102999566398120 fall=1\n\
+        .meas ac low when vp(out)=45\n.meas AC gain FIND V(out) AT=1k\n.meas ac db find vdb(out,in) at=1k\n\
+        .meas ac turn find ph(V(out)) at=100k\n.meas ac amps find im(l1) at=1k\n.meas ac real find re(V(out)) when frequency=1k\n\
+        .meas ac q param peak/bw\n.meas ac none when vdb(out)=3\n.meas ac far max vdb(out) from=2meg\n.meas ac sum pp re(v(out))\n.end\n";
+    let (r, l, c) = (1e3_f64, 1e-3_f64, 1e-6_f64);
+    let out = |f: f64| {
+        let s = J * (TAU * f);
+        1.0 / (1.0 + r * (s * c + 1.0 / (s * l)))
+    };
+    let resonance = 1.0 / (TAU * (l * c).sqrt());
+    let width = 1.0 / (TAU * r * c);
+    let lower = (resonance.powi(2) + 0.25 * width * width).sqrt() - 0.5 * width;
+    let at = out(1e3);
+    let found = measured(text);
+    let value = |name: &str| {
+        let own = found.iter().find(|(own, _)| own == name).expect(name);
+        own.1.clone()
+    };
+    for (name, truth, tolerance) in [
+        ("top", 1.0, 1e-9),
+        ("peak", resonance, 1e-4),
+        ("bw", width, 1e-6),
+        ("band", width, 1e-6),
+        ("low", lower, 1e-6),
+        ("gain", at.norm(), 1e-12),
+        (
+            "db",
+            20.0 * (at / (1.0 + 0.0 * J) - 1.0).norm().log10(),
+            1e-12,
+        ),
+        ("turn", out(1e5).arg().to_degrees(), 1e-12),
+        ("amps", (at / (J * TAU * 1e3 * l)).norm(), 1e-12),
+        ("real", at.re, 1e-9),
+        ("q", resonance / width, 1e-4),
+        // 1 at the resonance, and nearly 0 at the ends.
+        ("sum", 1.0 - out(1e6).re, 1e-6),
+    ] {
+        let found = value(name).expect(name);
+        assert!(
+            (found - truth).abs() <= tolerance * truth.abs(),
+            "{name}: {found:e} is not {truth:e}"
+        );
+    }
+    assert_eq!(value("none"), Err("the value 3 is not crossed".into()));
+    let far = "no part of the response lies between 2000000 Hz and 1000000 Hz";
+    assert_eq!(value("far"), Err(far.into()));
+}
+
+/// Beyond −180° the phase goes on, as it does in a Bode plot; a card without an analysis is of the one that the netlist asks for.
+#[test]
+fn phases_are_measured_without_jumps() {
+    let text = "three\nv1 1 0 ac 1\ne1 a 0 1 0 1\nr1 a b 1k\nc1 b 0 1u\ne2 c 0 b 0 1\nr2 c d 1k\nc2 d 0 1u\ne3 e 0 d 0 1\nr3 e f 1k\nc3 f 0 1u\n\
+        .ac dec 20 1 10k\n.meas beyond when vp(f)=-225\n.meas margin find 180+ph(v(f)) when vdb(f)=-60\n.end\n";
+    let found = measured(text);
+    let corner = 1.0 / (TAU * 1e-3);
+    let tangent = 75f64.to_radians().tan();
+    let beyond = found[0].1.clone().expect("a frequency");
+    assert!((beyond / (corner * tangent) - 1.0).abs() < 1e-6, "{beyond}");
+    // Each of three stages at −20 dB: 1 + x² = 100.
+    let margin = found[1].1.clone().expect("a phase");
+    let truth = 180.0 - 3.0 * 99f64.sqrt().atan().to_degrees();
+    assert!((margin - truth).abs() < 1e-5, "{margin} {truth}");
 }

@@ -40,7 +40,7 @@ pub use sensitivity::{Gradient, Sensitivity, SensitivityOptions, sensitivity};
 pub use shown::{shown, shown_values};
 pub use small_signal::{
     About, Left, Margin, Ratio, Response, SmallSignalOptions, margins, ratios, small_signal,
-    unwrapped,
+    small_signal_measured, unwrapped,
 };
 pub use sweep::{
     Row, SweepOptions, Variant, drawn_names, each, measured_names, samples, steps, sweep, variants,

@@ -1,6 +1,6 @@
 //! The walk over the cards: definitions first, then elements in file order, then what refers to them.
 
-use std::collections::{HashMap, HashSet, VecDeque};
+use std::collections::{HashSet, VecDeque};
 
 use super::draw::{self, Draw};
 use super::elaborate::ElaborateOptions;
@@ -85,8 +85,6 @@ pub(super) struct Builder<'n, 'o> {
     pub(super) auxiliary_nodes: Vec<Option<NodeId>>,
     /// The node whose voltage is the time, if there is one.
     pub(super) clock: Option<NodeId>,
-    /// The nodes of transistors by what their pins are called: d, g, s or c, b, e.
-    pub(super) pins: HashMap<String, Vec<(char, NodeId)>>,
 }
 
 impl<'n, 'o> Builder<'n, 'o> {
@@ -125,7 +123,6 @@ impl<'n, 'o> Builder<'n, 'o> {
             told_models: Vec::new(),
             auxiliary_nodes: Vec::new(),
             clock: None,
-            pins: HashMap::new(),
         }
     }
 
@@ -461,6 +458,7 @@ impl<'n, 'o> Builder<'n, 'o> {
         } else {
             std::mem::take(&mut self.dc_saves)
         };
+        self.name_ports();
         // Expressions that are shown take what has a value by now.
         self.circuit.params = self.scopes.evaluated(ScopeId::ROOT);
         for (scope, list) in saves {

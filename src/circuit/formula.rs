@@ -3,7 +3,7 @@
 use super::builder::Builder;
 use super::functions::{self, CallError, truth};
 use super::scope::ScopeId;
-use super::{NodeId, Probe, Probed, pin};
+use super::{NodeId, Probe, Probed, pin, response};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::measure::Use;
 use crate::netlist::ast::{Binary, Expr, ExprKind, Name, Signal, Unary};
@@ -19,11 +19,11 @@ const MAX_DEPTH: usize = 64;
 pub enum Formula {
     /// A number.
     Number(f64),
-    /// The time, s.
+    /// The time, s; of `.meas ac` the frequency, Hz.
     Time,
-    /// A signal, as an index into [`super::Circuit::measured`].
+    /// A signal, as an index into [`super::Circuit::measured`], of `.meas ac` into [`super::Circuit::responded`].
     Signal(usize),
-    /// The result of a measurement, as an index into [`super::Circuit::measurements`].
+    /// The result of a measurement, as an index into [`super::Circuit::measurements`], of `.meas ac` into [`super::Circuit::responses`].
     Result(usize),
     /// −x.
     Minus(Box<Formula>),
@@ -106,11 +106,13 @@ impl Formula {
 }
 
 /// A formula being read.
-struct Reading<'r> {
-    scope: ScopeId,
+pub(super) struct Reading<'r> {
+    pub(super) scope: ScopeId,
     used: Use,
     /// Names of all measurements, in order.
     measurements: &'r [String],
+    /// Of the response to small sines, whose signals are complex numbers over frequency.
+    of_response: bool,
     parts: usize,
     depth: usize,
 }
@@ -122,12 +124,13 @@ impl<'n> Builder<'n, '_> {
         expr: &'n Expr,
         used: Use,
         scope: ScopeId,
-        measurements: &[String],
+        (measurements, of_response): (&[String], bool),
     ) -> Option<Formula> {
         let mut reading = Reading {
             scope,
             used,
             measurements,
+            of_response,
             parts: 0,
             depth: 0,
         };
@@ -140,6 +143,7 @@ impl<'n> Builder<'n, '_> {
             scope,
             used: Use::Trace,
             measurements: &[],
+            of_response: false,
             parts: 0,
             depth: 0,
         };
@@ -198,10 +202,15 @@ impl<'n> Builder<'n, '_> {
             return Some(Formula::Result(index));
         }
         if self.scopes.param(reading.scope, name).is_none() {
-            let probe = (name != "time").then(|| self.circuit.probe(name)).flatten();
+            let axis = if reading.of_response {
+                matches!(name, "frequency" | "freq")
+            } else {
+                name == "time"
+            };
+            let probe = (!axis).then(|| self.circuit.probe(name)).flatten();
             match probe {
                 Some(probe) => return self.measured(probe, expr.span, reading),
-                None if name == "time" && reading.used == Use::Trace => return Some(Formula::Time),
+                None if axis && reading.used == Use::Trace => return Some(Formula::Time),
                 None => {}
             }
         }
@@ -209,7 +218,11 @@ impl<'n> Builder<'n, '_> {
         Some(Formula::Number(value.f64))
     }
 
-    fn formula_signal(&mut self, signal: &'n Signal, reading: &Reading<'_>) -> Option<Formula> {
+    pub(super) fn formula_signal(
+        &mut self,
+        signal: &Signal,
+        reading: &Reading<'_>,
+    ) -> Option<Formula> {
         let what = match signal {
             Signal::Voltage(a, b) => {
                 let a = self.expect_node(a, reading.scope)?;
@@ -230,8 +243,13 @@ impl<'n> Builder<'n, '_> {
     /// A signal of a formula; refused where a number is needed.
     fn measured(&mut self, probe: Probe, span: Span, reading: &Reading<'_>) -> Option<Formula> {
         if reading.used == Use::Number {
+            let axis = if reading.of_response {
+                "frequency"
+            } else {
+                "time"
+            };
             let message = format!(
-                "`{}` changes with time; a number is needed here",
+                "`{}` changes with {axis}; a number is needed here",
                 probe.name
             );
             let fault = Diagnostic::error("bad-meas", span, message);
@@ -240,7 +258,11 @@ impl<'n> Builder<'n, '_> {
             ));
             return None;
         }
-        let all = &mut self.circuit.measured;
+        let all = if reading.of_response {
+            &mut self.circuit.responded
+        } else {
+            &mut self.circuit.measured
+        };
         let index = all.iter().position(|own| *own == probe);
         Some(Formula::Signal(index.unwrap_or_else(|| {
             all.push(probe);
@@ -280,6 +302,12 @@ impl<'n> Builder<'n, '_> {
             }
             None => {}
         }
+        if reading.of_response
+            && !is_function
+            && let Some(part) = self.part_of_signal(name, args, reading)
+        {
+            return part;
+        }
         let mut values = Vec::with_capacity(args.len());
         for arg in args {
             values.push(self.formula_part(arg, reading, locals)?);
@@ -303,6 +331,11 @@ impl<'n> Builder<'n, '_> {
         if name.text == "par" && values.len() == 1 {
             return values.pop();
         }
+        if let (true, Some(part), [_]) =
+            (reading.of_response, response::part(&name.text), &values[..])
+        {
+            return Some(Formula::Call(part.to_owned(), values));
+        }
         // Only whether there is such a function of so many arguments.
         let fault = match functions::call(&name.text, &vec![1.0; values.len()]) {
             Ok(_) | Err(CallError::Domain) => {
@@ -316,7 +349,13 @@ impl<'n> Builder<'n, '_> {
                 let message = format!("unknown function `{}`", name.text);
                 let fault = Diagnostic::error("unknown-function", name.span, message)
                     .label("not a function");
-                match nearest(&name.text, functions::NAMES) {
+                let known = functions::NAMES.into_iter();
+                let parts = response::names().filter(|_| reading.of_response);
+                match nearest(&name.text, known.chain(parts)) {
+                    _ if !reading.of_response && response::part(&name.text).is_some() => {
+                        let help = "it is of a response to small sines: `.meas ac`, which `circ ac` carries out";
+                        fault.help(help)
+                    }
                     Some(near) => fault.help(format!("did you mean `{near}`?")),
                     None => fault,
                 }

@@ -7,8 +7,8 @@ use super::formula::Formula;
 use super::scope::ScopeId;
 use super::{Circuit, Probe, Tran};
 use crate::diagnostic::Diagnostic;
-use crate::measure::{Found, MeasureError, Measurement, Scene, Signals, Spectrum, fourier};
-use crate::netlist::ast::{Four, Meas};
+use crate::measure::{Found, MeasureError, Measurement, Scene, Signals, Spectrum, Trace, fourier};
+use crate::netlist::ast::{Four, Meas, MeasAnalysis};
 use crate::settings::tolerances::times::SAME_TIME;
 
 /// Harmonics of `.four` where it names no number.
@@ -59,6 +59,19 @@ pub struct Harmonics {
 impl<'n> Builder<'n, '_> {
     /// Takes in the measurements; what they refer to must exist.
     pub(super) fn measure(&mut self, cards: &[(ScopeId, &'n Meas)]) {
+        // A card that names no analysis is of the one that the netlist asks for.
+        let of_response = self.circuit.tran.is_none() && !self.circuit.ac.is_empty();
+        let by_analysis = cards.iter().partition(|(_, card)| match card.analysis {
+            Some(analysis) => analysis == MeasAnalysis::Ac,
+            None => of_response,
+        });
+        let (responses, transient): (Vec<_>, Vec<_>) = by_analysis;
+        self.measure_in(&transient, false);
+        self.measure_in(&responses, true);
+    }
+
+    /// Takes in those of a transient, or those of the response to small sines.
+    fn measure_in(&mut self, cards: &[&(ScopeId, &'n Meas)], of_response: bool) {
         let names: Vec<String> = cards
             .iter()
             .map(|(scope, card)| self.full_name(&card.name, *scope))
@@ -74,12 +87,17 @@ impl<'n> Builder<'n, '_> {
             let before = self.scopes.findings.len();
             let what = card
                 .what
-                .map(&mut |expr, used| self.formula(expr, used, *scope, &names));
+                .map(&mut |expr, used| self.formula(expr, used, *scope, (&names, of_response)));
             // A run is worth having without one of its measurements.
             self.scopes
                 .findings
                 .soften(before, "; this measurement is left out");
-            self.circuit.measurements.push(NamedMeasurement {
+            let all = if of_response {
+                &mut self.circuit.responses
+            } else {
+                &mut self.circuit.measurements
+            };
+            all.push(NamedMeasurement {
                 name: names[k].clone(),
                 what,
             });
@@ -171,78 +189,7 @@ impl Circuit {
     /// Carries out the measurements on the signals of [`Self::measured`].
     #[must_use]
     pub fn measure(&self, signals: &Signals<'_>) -> Vec<Measured> {
-        let count = self.measurements.len();
-        let mut results: Vec<Option<Result<Found, MeasureError>>> = vec![None; count];
-        // A measurement may use one that stands below it: go round until nothing new is found.
-        loop {
-            let mut progress = false;
-            for (k, NamedMeasurement { what, .. }) in self.measurements.iter().enumerate() {
-                if results[k].is_some() {
-                    continue;
-                }
-                let Some(what) = what else {
-                    results[k] = Some(Err(MeasureError::Unread));
-                    progress = true;
-                    continue;
-                };
-                let values: Vec<f64> = results.iter().map(number).collect();
-                let pending = RefCell::new(false);
-                let known = |formula: &Formula| {
-                    let mut needed = Vec::new();
-                    formula.needs(&mut needed);
-                    for other in needed {
-                        match &results[other] {
-                            None => *pending.borrow_mut() = true,
-                            Some(Ok(_)) => continue,
-                            Some(Err(_)) => {}
-                        }
-                        return Err(MeasureError::Needs(self.measurements[other].name.clone()));
-                    }
-                    Ok(())
-                };
-                let trace = |formula: &Formula, less: Option<&Formula>| {
-                    known(formula)?;
-                    less.map_or(Ok(()), known)?;
-                    if let (Formula::Signal(index), None) = (formula, less) {
-                        return signals.signal(*index);
-                    }
-                    let value = |t: f64, row: &[f64]| {
-                        let less = less.map_or(0.0, |less| less.value(t, row, &values));
-                        formula.value(t, row, &values) - less
-                    };
-                    let affine = formula.is_affine() && less.is_none_or(Formula::is_affine);
-                    signals.trace(&value, affine)
-                };
-                let single = |formula: &Formula| {
-                    known(formula)?;
-                    Ok(formula.value(f64::NAN, &[], &values))
-                };
-                let scene = Scene {
-                    span: signals.span(),
-                    trace: &trace,
-                    number: &single,
-                };
-                let found = scene.measure(what);
-                if !*pending.borrow() {
-                    results[k] = Some(found);
-                    progress = true;
-                }
-            }
-            if !progress {
-                break;
-            }
-        }
-        let outcomes = results
-            .into_iter()
-            .map(|r| r.unwrap_or(Err(MeasureError::Circular)));
-        self.measurements
-            .iter()
-            .zip(outcomes)
-            .map(|(m, result)| Measured {
-                name: m.name.clone(),
-                result,
-            })
-            .collect()
+        carried_out(&self.measurements, signals)
     }
 
     /// Carries out the Fourier analyses, as [`Self::measure`] does the measurements.
@@ -261,6 +208,115 @@ impl Circuit {
         }
         all
     }
+}
+
+/// What measurements are carried out on.
+pub(crate) trait Seen {
+    /// Where it begins and ends.
+    fn span(&self) -> (f64, f64);
+
+    /// A formula as a waveform, less another one, where measurements have these results.
+    fn trace(
+        &self,
+        formula: &Formula,
+        less: Option<&Formula>,
+        results: &[f64],
+    ) -> Result<Trace<'_>, MeasureError>;
+
+    /// A formula without signals.
+    fn number(&self, formula: &Formula, results: &[f64]) -> f64;
+}
+
+impl Seen for Signals<'_> {
+    fn span(&self) -> (f64, f64) {
+        self.span()
+    }
+
+    fn trace(
+        &self,
+        formula: &Formula,
+        less: Option<&Formula>,
+        results: &[f64],
+    ) -> Result<Trace<'_>, MeasureError> {
+        if let (Formula::Signal(index), None) = (formula, less) {
+            return self.signal(*index);
+        }
+        let value = |t: f64, row: &[f64]| {
+            let less = less.map_or(0.0, |less| less.value(t, row, results));
+            formula.value(t, row, results) - less
+        };
+        let affine = formula.is_affine() && less.is_none_or(Formula::is_affine);
+        self.trace(&value, affine)
+    }
+
+    fn number(&self, formula: &Formula, results: &[f64]) -> f64 {
+        formula.value(f64::NAN, &[], results)
+    }
+}
+
+/// Carries out measurements, each of which may use the others.
+pub(crate) fn carried_out(all: &[NamedMeasurement], seen: &impl Seen) -> Vec<Measured> {
+    let mut results: Vec<Option<Result<Found, MeasureError>>> = vec![None; all.len()];
+    // A measurement may use one that stands below it: go round until nothing new is found.
+    loop {
+        let mut progress = false;
+        for (k, NamedMeasurement { what, .. }) in all.iter().enumerate() {
+            if results[k].is_some() {
+                continue;
+            }
+            let Some(what) = what else {
+                results[k] = Some(Err(MeasureError::Unread));
+                progress = true;
+                continue;
+            };
+            let values: Vec<f64> = results.iter().map(number).collect();
+            let pending = RefCell::new(false);
+            let known = |formula: &Formula| {
+                let mut needed = Vec::new();
+                formula.needs(&mut needed);
+                for other in needed {
+                    match &results[other] {
+                        None => *pending.borrow_mut() = true,
+                        Some(Ok(_)) => continue,
+                        Some(Err(_)) => {}
+                    }
+                    return Err(MeasureError::Needs(all[other].name.clone()));
+                }
+                Ok(())
+            };
+            let trace = |formula: &Formula, less: Option<&Formula>| {
+                known(formula)?;
+                less.map_or(Ok(()), known)?;
+                seen.trace(formula, less, &values)
+            };
+            let single = |formula: &Formula| {
+                known(formula)?;
+                Ok(seen.number(formula, &values))
+            };
+            let scene = Scene {
+                span: seen.span(),
+                trace: &trace,
+                number: &single,
+            };
+            let found = scene.measure(what);
+            if !*pending.borrow() {
+                results[k] = Some(found);
+                progress = true;
+            }
+        }
+        if !progress {
+            break;
+        }
+    }
+    let outcomes = results
+        .into_iter()
+        .map(|r| r.unwrap_or(Err(MeasureError::Circular)));
+    let both = all.iter().zip(outcomes);
+    both.map(|(m, result)| Measured {
+        name: m.name.clone(),
+        result,
+    })
+    .collect()
 }
 
 fn number(result: &Option<Result<Found, MeasureError>>) -> f64 {

@@ -33,6 +33,7 @@ mod piecewise;
 mod pin;
 mod place;
 mod probe;
+mod response;
 mod saturable;
 mod scope;
 mod shown;
@@ -51,11 +52,14 @@ use std::collections::BTreeSet;
 use crate::algebra::Value;
 use crate::diagnostic::Span;
 use crate::law::Law;
+pub use crate::netlist::ast::Binary;
 pub use draw::{Spread, Tolerance};
 pub use elaborate::{Diodes, ElaborateOptions, elaborate};
 pub use formula::Formula;
 pub use held::{held_at, holder};
 pub use measurement::{FourierAnalysis, Harmonics, Measured, NamedMeasurement};
+pub(crate) use measurement::{Seen, carried_out};
+pub use pin::Pins;
 pub use shown::Column;
 pub use source::Source;
 pub use sweep::{Sweep, Swept, combinations};
@@ -130,12 +134,18 @@ pub struct Circuit {
     pub tolerances: Vec<(String, f64)>,
     /// Whether a value is drawn from a distribution by a random function, such as `mc` or `gauss`.
     pub random: bool,
+    /// Transistors and subcircuits with the nodes of their pins.
+    pub pins: Vec<Pins>,
     /// `.meas tran`, in file order.
     pub measurements: Vec<NamedMeasurement>,
     /// `.four`, in file order.
     pub fourier: Vec<FourierAnalysis>,
     /// The signals that measurements need.
     pub measured: Vec<Probe>,
+    /// `.meas ac`, in file order.
+    pub responses: Vec<NamedMeasurement>,
+    /// The signals that those need.
+    pub responded: Vec<Probe>,
 }
 
 /// One branch of the circuit (or a controlled output), from node `p` to node `n`.

@@ -2,7 +2,7 @@
 
 use super::formula::Formula;
 use super::functions::{self, CallError};
-use super::{Circuit, Probe, is_inside};
+use super::{Circuit, Probe, is_inside, pin};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Binary, Expr, ExprKind, Unary};
 use crate::netlist::expression;
@@ -82,7 +82,18 @@ impl Circuit {
             return Ok(());
         }
         let formula = match expression(&text) {
-            Ok(expr) if !is_name(&expr) => self.shown_formula(&expr)?,
+            Ok(expr) if !is_name(&expr) => {
+                let formula = self.shown_formula(&expr)?;
+                if pin::shown(self, &expr).is_some() {
+                    self.add_column(text, "A", formula);
+                    return Ok(());
+                }
+                formula
+            }
+            _ if self.is_pin(&text) => {
+                let help = format!("write `ix{}` for the current into a pin", &text[1..]);
+                return Err(Box::new(self.unknown(&text).help(help)));
+            }
             Err(fault) if text.contains(['*', '/', '+', '-']) => return Err(fault),
             _ => return Err(Box::new(self.unknown(&text))),
         };
@@ -92,7 +103,10 @@ impl Circuit {
 
     /// Where what is shown are the probes as they are, there is no more to say of it.
     pub(super) fn settle_columns(&mut self) {
-        let plain = |(k, column): (usize, &Column)| column.formula == Formula::Signal(k);
+        // One under another name, as a current into a pin, is not.
+        let plain = |(k, column): (usize, &Column)| {
+            column.formula == Formula::Signal(k) && column.name == self.probes[k].name
+        };
         if self.columns.len() == self.probes.len() && self.columns.iter().enumerate().all(plain) {
             self.columns.clear();
         }
@@ -100,6 +114,10 @@ impl Circuit {
 
     fn print_column(&mut self, name: String, formula: Formula) {
         let unit = self.unit(&formula);
+        self.add_column(name, unit, formula);
+    }
+
+    fn add_column(&mut self, name: String, unit: &'static str, formula: Formula) {
         let column = Column {
             name,
             unit,
@@ -150,6 +168,13 @@ impl Circuit {
         })
     }
 
+    /// Whether it is `i(x1:pin)`, which is meant to be the current into a pin.
+    fn is_pin(&self, text: &str) -> bool {
+        let inside = text.strip_prefix("i(").and_then(|t| t.strip_suffix(')'));
+        let pin = inside.and_then(|inside| self.pin_current("ix", inside, ""));
+        pin.is_some_and(|found| found.is_ok())
+    }
+
     fn unknown(&self, text: &str) -> Diagnostic {
         if self.element(text).is_some() {
             let message = format!("`{text}` is an element, and no node");
@@ -196,6 +221,13 @@ impl Circuit {
                     && let Some(probe) = self.probe(&format!("{}({own})", name.text))
                 {
                     return Ok(self.signal(probe));
+                }
+                if let Some(terms) = pin::shown(self, expr) {
+                    let terms = terms?.into_iter();
+                    let signals: Vec<_> = terms
+                        .map(|(probe, positive)| (self.signal(probe), positive))
+                        .collect();
+                    return Ok(pin::sum(signals.into_iter()));
                 }
                 check_call(&name.text, args.len())?;
                 let values = args.iter().map(|arg| self.shown_formula(arg));

@@ -10,10 +10,12 @@ use super::input;
 use super::output::{self, Format};
 use super::signals::Signals;
 use super::streams::Streams;
-use crate::analysis::{self, Ratio, SmallSignalOptions, margins, ratios, small_signal};
+use crate::analysis::{
+    self, Measurements, Ratio, SmallSignalOptions, margins, ratios, small_signal_measured,
+};
 use crate::model::Model;
 use crate::report::html::Page;
-use crate::report::{bode, svg, text};
+use crate::report::{bode, log, svg, text};
 use crate::waveform::Phasors;
 
 /// Finds the small-signal response and writes it.
@@ -53,13 +55,18 @@ pub(super) fn ac(args: &AcArgs, streams: &Streams) -> Result<Exit, Failure> {
         cancel: Some(watch.flag()),
         ..SmallSignalOptions::default()
     };
-    let phasors = phasors(&args.input, model, &options, streams)?;
+    let (phasors, measured) = phasors(&args.input, model, &options, streams)?;
     let phasors = if asked.is_empty() {
         phasors
     } else {
         ratios(&phasors, &asked).unwrap_or(phasors)
     };
-    write(&phasors, model, (&args.outputs, &formats), streams)?;
+    write(
+        (&phasors, &measured),
+        model,
+        (&args.outputs, &formats),
+        streams,
+    )?;
     Ok(Exit::Done)
 }
 
@@ -73,26 +80,27 @@ pub(super) fn sim(
     formats: &[Format],
     streams: &Streams,
 ) -> Result<Exit, Failure> {
-    let phasors = phasors(&args.input, model, &SmallSignalOptions::default(), streams)?;
-    write(&phasors, model, (&args.results.outputs, formats), streams)?;
+    let (phasors, measured) = phasors(&args.input, model, &SmallSignalOptions::default(), streams)?;
+    let outputs = (&args.results.outputs[..], formats);
+    write((&phasors, &measured), model, outputs, streams)?;
     Ok(Exit::Done)
 }
 
-/// The response of all signals; notes are told.
+/// The response of all signals, and what `.meas ac` finds on it; notes are told.
 fn phasors(
     input: &Input,
     model: &Model,
     options: &SmallSignalOptions<'_>,
     streams: &Streams,
-) -> Result<Phasors, Failure> {
+) -> Result<(Phasors, Measurements), Failure> {
     if !model.circuit().steps.is_empty() {
         streams.note("`.step` is left out: this is the response of the values as they stand");
     }
     input::tell_expressions(model, streams);
     let busy = streams.busy("finding the response");
-    let found = small_signal(model, options);
+    let found = small_signal_measured(model, options);
     drop(busy);
-    let response =
+    let (response, measured) =
         found.map_err(|error| input::broke_off(input, &error, model.places(), streams))?;
     for note in model.places().all(&response.notes) {
         streams.note(note);
@@ -103,7 +111,11 @@ fn phasors(
             None => "about the operating point".into(),
         });
     }
-    Ok(response.phasors)
+    let found = Measurements {
+        measured,
+        ..Measurements::default()
+    };
+    Ok((response.phasors, found))
 }
 
 /// The margins of ratios without a unit, in words.
@@ -118,14 +130,21 @@ fn tell_margins(phasors: &Phasors, streams: &Streams) {
     }
 }
 
-/// Writes the files, or without any CSV to standard output, and tells the margins.
+/// Writes the files, or without any CSV to standard output, and tells the margins and measurements.
 fn write(
-    phasors: &Phasors,
+    (phasors, measured): (&Phasors, &Measurements),
     model: &Model,
     (outputs, formats): (&[PathBuf], &[Format]),
     streams: &Streams,
 ) -> Result<(), Failure> {
     tell_margins(phasors, streams);
+    // Results, which `-q` does not hide.
+    if !measured.is_empty() {
+        match streams.log {
+            Some(_) => streams.error(log::run(measured)),
+            None => streams.error(measured.words()),
+        }
+    }
     if outputs.is_empty() {
         let mut out = streams.out();
         phasors.write_csv(&mut out)?;
@@ -144,7 +163,7 @@ fn write(
                 continue;
             }
             Format::Html => {
-                let page = Page::of_figure(&bode::figure(phasors))
+                let page = Page::of_response(&bode::figure(phasors), measured.words())
                     .with_circuit(Some(model))
                     .html()?;
                 bytes.get_mut().extend_from_slice(page.as_bytes());

@@ -31,6 +31,7 @@ pub mod sim;
 mod steps;
 pub mod streams;
 mod sweep;
+mod tabulate;
 mod view;
 mod watch;
 

@@ -17,8 +17,9 @@ use super::rows::Columns;
 use super::signals::Signals;
 use super::steps::Stepping;
 use super::streams::Streams;
+use super::tabulate;
 use crate::analysis::{
-    self, Finished, PeriodicOptions, TableOptions, WorstOptions, is_measured, shown, shown_values,
+    self, Finished, PeriodicOptions, WorstOptions, is_measured, shown, shown_values,
 };
 use crate::check;
 use crate::circuit::source::Wave;
@@ -67,6 +68,12 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
                 "`.ac` is left out, as there is a `.tran`; `circ ac {file}` carries it out"
             ));
         }
+        if let (true, Some(told)) = (transient, left_out(circuit)) {
+            streams.note(format!(
+                "{told}; `circ ac {}` measures that",
+                args.input.file.display()
+            ));
+        }
         if !transient && !circuit.dc.is_empty() {
             only_one_way(args)?;
             return dc::sim(args, model, &formats, streams);
@@ -96,7 +103,7 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
             return Err(Failure::Message(format!("{file}: {message}")));
         }
         if !circuit.steps.is_empty() {
-            only_one_way(args)?;
+            only_once(args)?;
             let stepping = Stepping {
                 args,
                 model,
@@ -149,8 +156,16 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
     let mut finished = measured_run(&subject, &request, route, streams);
     let more = args.table.table || args.verify || !args.worst.is_empty();
     let busy = more.then(|| streams.busy("looking at the run again"));
-    if let (true, None) = (args.table.table, &finished.error) {
-        tabulate(args, &subject, &request, &mut finished, signals.flag());
+    if let (true, Subject::Circuit(model), Some((_, found)), None) = (
+        args.table.table,
+        &subject,
+        &mut finished.run,
+        &finished.error,
+    ) {
+        match tabulate::table(args, model, &request, signals.flag()) {
+            Ok(table) => found.table = Some(table),
+            Err(error) => finished.error = Some(error),
+        }
     }
     if finished.error.is_none() {
         bounds(args, &subject, &request, &mut finished, signals.flag());
@@ -189,45 +204,6 @@ impl SimArgs {
     }
 }
 
-/// Adds the means of all elements.
-fn tabulate(
-    args: &SimArgs,
-    subject: &Subject,
-    request: &Request,
-    finished: &mut Finished,
-    cancel: &AtomicBool,
-) {
-    let (Subject::Circuit(model), Some((_, found))) = (subject, &mut finished.run) else {
-        return;
-    };
-    let start = args.from_pss.then(|| {
-        let asked = PeriodicOptions {
-            cancel: Some(cancel),
-            settings: request.settings(),
-            ..PeriodicOptions::default()
-        };
-        analysis::orbit_start(model, &asked).map(|(_, start)| start)
-    });
-    let table = start.transpose().and_then(|start| {
-        let options = TableOptions {
-            inputs: args.table.inputs.clone(),
-            outputs: args.table.outputs.clone(),
-            start,
-            method: request.method,
-            theta: request.theta,
-            gamma: request.gamma,
-            step: request.step,
-            cancel: Some(cancel),
-            settings: request.settings(),
-        };
-        analysis::table(model, &options)
-    });
-    match table {
-        Ok(table) => found.table = Some(table),
-        Err(error) => finished.error = Some(error),
-    }
-}
-
 /// Adds the ranges of measurements.
 fn bounds(
     args: &SimArgs,
@@ -255,25 +231,46 @@ fn bounds(
     }
 }
 
+/// The measurements that a transient leaves out.
+fn left_out(circuit: &Circuit) -> Option<String> {
+    let names: Vec<&str> = circuit.responses.iter().map(|m| &m.name[..]).collect();
+    let card = if circuit.ac.is_empty() {
+        ", with an `.ac` card"
+    } else {
+        ""
+    };
+    (!names.is_empty()).then(|| {
+        format!(
+            "`.meas ac` ({}) is left out, as a transient has no response to small sines{card}",
+            names.join(", ")
+        )
+    })
+}
+
 /// # Errors
-/// [`Failure::Message`] where a second run or a table is asked for of what is no single transient run.
+/// [`Failure::Message`] where a second run or a table is asked for of what is no transient.
 fn only_one_way(args: &SimArgs) -> Result<(), Failure> {
-    if !args.worst.is_empty() {
-        let file = args.input.file.display();
-        let message = "`--worst` takes one transient run of a circuit, without `.step`";
-        return Err(Failure::Message(format!("{file}: {message}")));
-    }
+    only_once(args)?;
     if args.table.table {
         let file = args.input.file.display();
-        let message = "`--table` takes one transient run of a circuit, without `.step`";
-        return Err(Failure::Message(format!("{file}: {message}")));
-    }
-    if args.verify {
-        let file = args.input.file.display();
-        let message = "`--verify` takes one transient run of a circuit or system, without `.step`";
+        let message = "`--table` takes a transient of a circuit (`.tran`)";
         return Err(Failure::Message(format!("{file}: {message}")));
     }
     Ok(())
+}
+
+/// # Errors
+/// [`Failure::Message`] where a second run is asked for of what is no single transient run.
+fn only_once(args: &SimArgs) -> Result<(), Failure> {
+    let message = if !args.worst.is_empty() {
+        "`--worst` takes one transient run of a circuit, without `.step`"
+    } else if args.verify {
+        "`--verify` takes one transient run of a circuit or system, without `.step`"
+    } else {
+        return Ok(());
+    };
+    let file = args.input.file.display();
+    Err(Failure::Message(format!("{file}: {message}")))
 }
 
 /// Makes a run a second time.
@@ -430,7 +427,7 @@ pub struct Request {
 
 impl Request {
     /// The tolerances.
-    fn settings(&self) -> Settings {
+    pub(super) fn settings(&self) -> Settings {
         let mut settings = Settings::default();
         if let Some(tol) = self.tol {
             settings.tol = tol;

@@ -9,6 +9,7 @@ use super::rows::Columns;
 use super::signals::Signals;
 use super::sim::{self, Request, Route};
 use super::streams::Streams;
+use super::tabulate;
 use crate::analysis::{self, Finished, Variant, each, shown};
 use crate::integrate::{Block, Error, Grid, Reason};
 use crate::model::Model;
@@ -134,7 +135,13 @@ impl Stepping<'_> {
             from_orbit: self.args.from_pss,
             ..Route::default()
         };
-        let Finished { run, error } = sim::transient(&model, &self.request, route, &quiet);
+        let Finished { mut run, mut error } = sim::transient(&model, &self.request, route, &quiet);
+        if let (true, Some((_, found)), None) = (self.args.table.table, &mut run, &error) {
+            match tabulate::table(self.args, &model, &self.request, self.signals.flag()) {
+                Ok(table) => found.table = Some(table),
+                Err(failed) => error = Some(failed),
+            }
+        }
         let step = run.map(|(run, found)| Step {
             values: variant.named(),
             run: shown(model.circuit(), run),
@@ -177,6 +184,9 @@ impl Stepping<'_> {
             }
         }
         if !matches!(self.args.results.summary, Some(Summary::Json)) {
+            for note in places.all(&steps::table_notes(done)) {
+                streams.note(note);
+            }
             match streams.log {
                 Some(_) => streams.say(log::steps(done)),
                 // Results, which `-q` does not hide.

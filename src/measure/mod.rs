@@ -29,6 +29,14 @@ pub enum MeasureError {
         /// Its end, s.
         to: f64,
     },
+    /// The band from … to … holds no part of the response.
+    #[error("no part of the response lies between {} Hz and {} Hz", short(*.from), short(*.to))]
+    Band {
+        /// Its start, Hz.
+        from: f64,
+        /// Its end, Hz.
+        to: f64,
+    },
     /// The run is shorter than a period.
     #[error("a period of {} Hz takes {} s, and the run no more than {} s", short(*.frequency), short(.frequency.recip()), short(*.seconds))]
     Period {

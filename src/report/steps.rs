@@ -4,7 +4,7 @@ use serde_json::{Map, Value};
 
 use super::{json, si, table};
 use crate::analysis::Measurements;
-use crate::integrate::{Energy, Places, Run, StatedError};
+use crate::integrate::{Energy, Note, Places, Run, StatedError};
 use crate::waveform::Waveforms;
 
 /// One of the runs.
@@ -104,10 +104,23 @@ pub fn total(steps: &[Step]) -> Run {
     total
 }
 
-/// The results of `.meas` with a line per run, and those of `.four` below each other.
+/// What the tables of the runs note, each once.
+#[must_use]
+pub fn table_notes(steps: &[Step]) -> Vec<Note> {
+    let mut notes = Vec::new();
+    let tables = steps.iter().filter_map(|step| step.found.table.as_ref());
+    for note in tables.flat_map(|table| &table.notes) {
+        if !notes.contains(note) {
+            notes.push(note.clone());
+        }
+    }
+    notes
+}
+
+/// The results of `.meas` with a line per run, and those of `.four` and tables of elements below each other, each under the values of its run.
 #[must_use]
 pub fn measured(steps: &[Step]) -> String {
-    let Some(first) = steps.first().filter(|step| !step.found.is_empty()) else {
+    let Some(first) = steps.first() else {
         return String::new();
     };
     let mut text = String::new();
@@ -140,14 +153,12 @@ pub fn measured(steps: &[Step]) -> String {
         }
     }
     for step in steps {
-        let harmonics = Measurements {
+        let rest = Measurements {
             measured: Vec::new(),
-            harmonics: step.found.harmonics.clone(),
-            table: None,
-            worst: vec![],
+            ..step.found.clone()
         };
-        if !harmonics.is_empty() {
-            text.push_str(&format!("{}\n{}", step.label(), harmonics.words()));
+        if !rest.is_empty() {
+            text.push_str(&format!("{}\n{}", step.label(), rest.words()));
         }
     }
     text

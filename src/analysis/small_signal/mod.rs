@@ -1,6 +1,8 @@
 //! The small-signal response: what a small sine on the sources with an `AC` value makes of the signals, about the operating point or about the
 //! periodic steady state.
 
+mod formula;
+mod measured;
 mod orbit;
 mod ratio;
 mod rest;
@@ -9,6 +11,7 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Complex, DMatrix, DVector, Dyn, LU};
 
+pub use measured::small_signal_measured;
 pub use ratio::{Left, Margin, Ratio, margins, ratios, unwrapped};
 
 use super::periodic::{PeriodicOptions, Steady, steady};

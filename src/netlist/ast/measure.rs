@@ -4,9 +4,20 @@ use super::{Expr, Name, Signal};
 use crate::diagnostic::Span;
 use crate::measure::Measurement;
 
-/// `.meas tran name …`.
+/// The analysis that a measurement is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MeasAnalysis {
+    /// `.meas tran`.
+    Tran,
+    /// `.meas ac`.
+    Ac,
+}
+
+/// `.meas tran name …`, `.meas ac name …`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Meas {
+    /// What it is of; where it is not written, of what the netlist asks for.
+    pub analysis: Option<MeasAnalysis>,
     /// Its name, under which others may use it.
     pub name: Name,
     /// What is measured.

@@ -8,7 +8,7 @@ use crate::algebra::Value;
 use std::fmt;
 
 pub use expr::{Binary, Expr, ExprKind, Unary};
-pub use measure::{Four, Meas};
+pub use measure::{Four, Meas, MeasAnalysis};
 pub use sweep::{Frequencies, Points, Spacing, Sweep, Target};
 
 use crate::diagnostic::{Diagnostic, Span};

@@ -11,6 +11,14 @@ use crate::netlist::ast::{Assign, Element, Name, PinGroup};
 
 /// What is simulated.
 pub(super) const KNOWN: [&str; 7] = ["buf", "and", "or", "xor", "schmitt", "srflop", "dflop"];
+/// Symbols of LTspice's that are a device of another name: terminals tell which outputs and how many inputs they have.
+const SAME: [(&str, &str); 5] = [
+    ("schmtbuf", "schmitt"),
+    ("schmtinv", "schmitt"),
+    ("diffschmitt", "schmitt"),
+    ("diffschmtbuf", "schmitt"),
+    ("diffschmtinv", "schmitt"),
+];
 /// What is known by name and refused.
 const REFUSED: [(&str, &str); 8] = [
     ("inv", "write BUF: terminal 6 is its inverted output"),
@@ -37,7 +45,13 @@ const LEFT_OUT: [&str; 5] = ["td", "trise", "tfall", "tau", "cout"];
 const HINTS: [&str; 2] = ["tripdt", "tripdv"];
 
 pub(super) fn is_known(name: &str) -> bool {
-    KNOWN.contains(&name) || REFUSED.iter().any(|(refused, _)| *refused == name)
+    KNOWN.contains(&device(name)) || REFUSED.iter().any(|(refused, _)| *refused == name)
+}
+
+/// The device that a name means.
+fn device(name: &str) -> &str {
+    let same = SAME.iter().find(|(own, _)| *own == name);
+    same.map_or(name, |(_, device)| device)
 }
 
 /// The subcircuit of a card.
@@ -48,7 +62,7 @@ pub(super) fn build(
     args: &[Assign],
 ) -> Result<Built, Refused> {
     let name = &card.name.text;
-    let kind = function.text.as_str();
+    let kind = device(&function.text);
     if let Some((_, instead)) = REFUSED.iter().find(|(refused, _)| *refused == kind) {
         let message = format!("`{name}` is a {kind}, which is not simulated");
         let fault = refused(function, message, "not supported");

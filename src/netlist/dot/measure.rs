@@ -1,19 +1,19 @@
-//! `.meas tran`, `.four`.
+//! `.meas tran`, `.meas ac`, `.four`.
 
 use super::{Dot, signal, skip};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::measure::{Edge, Instant, Measurement, Over, Window};
-use crate::netlist::ast::{Expr, ExprKind, Four, Meas, Name, Statement};
+use crate::netlist::ast::{Expr, ExprKind, Four, Meas, MeasAnalysis, Name, Statement};
 use crate::netlist::expr;
 use crate::netlist::lex::{
     Input, Parsed, at_end, between, end, expect_word, missing, refuse, separator, symbol, word,
 };
 use crate::netlist::operand;
 
-/// Analyses whose measurements are not of a transient.
-const OTHER_ANALYSES: [&str; 5] = ["ac", "dc", "op", "noise", "sp"];
+/// Analyses of which nothing is measured.
+const OTHER_ANALYSES: [&str; 4] = ["dc", "op", "noise", "sp"];
 
-/// `.meas [tran] name …`, and the command without its dot.
+/// `.meas [tran|ac] name …`, and the command without its dot.
 pub(in crate::netlist) fn meas<'a>(
     start: Input<'a>,
     i: Input<'a>,
@@ -23,12 +23,18 @@ pub(in crate::netlist) fn meas<'a>(
     if OTHER_ANALYSES.contains(&name.text.as_str()) && !at_end(rest) {
         return Ok((skip(rest), Dot::Skipped));
     }
-    if name.text == "tran" {
+    let analysis = match name.text.as_str() {
+        "tran" => Some(MeasAnalysis::Tran),
+        "ac" => Some(MeasAnalysis::Ac),
+        _ => None,
+    };
+    if analysis.is_some() {
         (rest, name) = expect_word(rest, "the name of the measurement")?;
     }
     let (rest, what) = kind(rest)?;
     let (rest, ()) = end(rest)?;
     let meas = Meas {
+        analysis,
         name,
         what,
         command,

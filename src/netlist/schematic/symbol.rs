@@ -230,6 +230,24 @@ const BUILT_IN: &[Known] = &[
     (&["schmtbuf"], 'a', "SCHMITT", BUFFER1),
     (&["schmtinv"], 'a', "SCHMITT", INVERTER),
     (
+        &["diffschmitt"],
+        'a',
+        "SCHMITT",
+        &[(1, 0, 48), (2, 0, 80), (6, 64, 80), (7, 64, 48), (8, 0, 96)],
+    ),
+    (
+        &["diffschmtbuf"],
+        'a',
+        "SCHMITT",
+        &[(1, 0, 48), (2, 0, 80), (7, 64, 64), (8, 0, 96)],
+    ),
+    (
+        &["diffschmtinv"],
+        'a',
+        "SCHMITT",
+        &[(1, 0, 48), (2, 0, 80), (6, 64, 64), (8, 0, 96)],
+    ),
+    (
         &["dflop"],
         'a',
         "DFLOP",

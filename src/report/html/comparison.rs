@@ -9,7 +9,7 @@ impl Page {
     /// The curves of both sides with their difference, the verdict, and how far every signal is off.
     #[must_use]
     pub fn of_comparison(figure: &Figure, found: &Comparison, verdict: &str) -> Self {
-        let mut page = Self::of_figure(figure);
+        let mut page = Self::of_panels(figure);
         let header = [
             "signal",
             "amplitude",

@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 
+use super::scales::{self, Extent};
 use super::{Axis, Curve, Page, Panel, axis};
 use crate::report::figure::{self, Figure, Series};
 
@@ -25,10 +26,33 @@ struct Gate {
 /// Rows below which nothing is taken for a gate.
 const FEWEST: usize = 8;
 
+/// Curves with the series that they show.
+type Named<'a> = Vec<(&'a Series, Curve)>;
+
 impl Page {
-    /// The curves of a figure.
+    /// The curves of a figure, of a unit in several panels where one would flatten another.
     #[must_use]
     pub fn of_figure(figure: &Figure) -> Self {
+        match figure.axis {
+            figure::Axis::Time => Self::with_panels(figure, by_scale),
+            figure::Axis::Frequency => Self::of_panels(figure),
+        }
+    }
+
+    /// A response over frequency, with measurements in words.
+    #[must_use]
+    pub fn of_response(figure: &Figure, measured: String) -> Self {
+        let mut page = Self::of_panels(figure);
+        page.say("Measurements", measured);
+        page
+    }
+
+    /// The curves of a figure whose panels are as they are to be.
+    pub(super) fn of_panels(figure: &Figure) -> Self {
+        Self::with_panels(figure, |curves| vec![curves])
+    }
+
+    fn with_panels(figure: &Figure, apart: for<'a> fn(Named<'a>) -> Vec<Named<'a>>) -> Self {
         let (axis, place): (Axis, fn(f64) -> f64) = match figure.axis {
             figure::Axis::Time => (axis("time", "s", false), |t| t),
             figure::Axis::Frequency => (axis("frequency", "Hz", true), |x| 10f64.powf(x)),
@@ -72,12 +96,19 @@ impl Page {
                 true => &panel.quantity,
                 false => "voltage at two levels",
             };
-            for (quantity, curves) in [(panel.quantity.as_str(), rest), (quantity, gates)] {
+            let rest = apart(rest)
+                .into_iter()
+                .enumerate()
+                .map(|(k, curves)| match k {
+                    0 => (panel.quantity.clone(), curves),
+                    _ => (format!("{} {}", panel.quantity, k + 1), curves),
+                });
+            for (quantity, curves) in rest.chain([(quantity.to_owned(), gates)]) {
                 if curves.is_empty() {
                     continue;
                 }
                 page.panels.push(Panel {
-                    quantity: quantity.to_owned(),
+                    quantity,
                     unit: panel.unit,
                     curves: curves.into_iter().map(|(_, curve)| curve).collect(),
                     dots: false,
@@ -86,6 +117,32 @@ impl Page {
         }
         page
     }
+}
+
+/// Curves of panels of their own where one would flatten another; of several runs all of a signal share one.
+fn by_scale(curves: Named<'_>) -> Vec<Named<'_>> {
+    let mut signals: Vec<&str> = curves.iter().map(|(series, _)| signal(series)).collect();
+    let mut seen = HashSet::new();
+    signals.retain(|name| seen.insert(*name));
+    let extent = |name: &&str| {
+        let own = curves.iter().filter(|(series, _)| signal(series) == *name);
+        Extent::of(own.flat_map(|(series, _)| series.points.iter().map(|p| p.1)))
+    };
+    let extents: Vec<Extent> = signals.iter().map(extent).collect();
+    let panels = scales::panels(&extents);
+    let place = |series: &Series| {
+        let named = signals.iter().position(|name| *name == signal(series));
+        panels
+            .iter()
+            .position(|own| named.is_some_and(|k| own.contains(&k)))
+    };
+    let mut apart: Vec<Vec<_>> = panels.iter().map(|_| Vec::new()).collect();
+    for (series, curve) in curves {
+        if let Some(place) = place(series) {
+            apart[place].push((series, curve));
+        }
+    }
+    apart
 }
 
 /// The signal that a curve is of, without its run.
@@ -155,6 +212,43 @@ mod tests {
             edges.points.splice(k..k, [(t, before), (t, 0.5)]);
         }
         assert!(is_gate(&edges));
+    }
+
+    #[test]
+    fn a_small_voltage_has_a_panel_of_its_own() {
+        let page = |of: fn(&Figure) -> Page| {
+            let ripple = |t: f64| 12.0 + 0.02 * (100.0 * t).sin();
+            let run = |label: &str| Series {
+                run: label.into(),
+                ..named(&format!("v(out) {label}"), ripple)
+            };
+            let panel = figure::Panel {
+                quantity: "voltage".into(),
+                unit: "V",
+                series: vec![named("v(in)", |_| 400.0), run("r=1"), run("r=2")],
+            };
+            let page = of(&Figure {
+                title: String::new(),
+                axis: figure::Axis::Time,
+                panels: vec![panel],
+            });
+            let panels = page.panels.into_iter();
+            panels
+                .map(|p| (p.quantity, p.curves.into_iter().map(|c| c.name).collect()))
+                .collect::<Vec<(String, Vec<String>)>>()
+        };
+        let name = |name: &str| name.to_owned();
+        assert_eq!(
+            page(Page::of_figure),
+            [
+                (
+                    name("voltage"),
+                    vec![name("v(out) r=1"), name("v(out) r=2")]
+                ),
+                (name("voltage 2"), vec![name("v(in)")])
+            ]
+        );
+        assert_eq!(page(Page::of_panels).len(), 1);
     }
 
     #[test]

@@ -9,6 +9,7 @@ mod check;
 mod comparison;
 mod curves;
 mod run;
+mod scales;
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -23,11 +24,15 @@ const STYLES: [&str; 2] = [
     include_str!("../page/uplot/uPlot.min.css"),
     include_str!("../page/page.css"),
 ];
-const SCRIPTS: [&str; 5] = [
+const SCRIPTS: [&str; 9] = [
     include_str!("../page/uplot/uPlot.iife.min.js"),
     include_str!("../page/columns.js"),
     include_str!("../page/spectrum.js"),
+    include_str!("../page/look.js"),
+    include_str!("../page/strips.js"),
+    include_str!("../page/readings.js"),
     include_str!("../page/chart.js"),
+    include_str!("../page/drawing.js"),
     include_str!("../page/page.js"),
 ];
 

@@ -1,58 +1,22 @@
-// Panels over one axis: curves by uPlot, a strip of who conducts when, two cursors and the readings at them.
+// Panels over one axis: curves by uPlot, lanes of who conducts when, two cursors and the readings at them.
 
-/** Colours that stay apart for colour-blind readers (Okabe and Ito 2008), for light and dark paper. */
-const COLOURS = {
-  light: ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#5a5a5a", "#8c564b"],
-  dark: ["#4aa8e8", "#ff8a3d", "#2fc79b", "#e79bc5", "#9ad4f7", "#ffc24d", "#b4b4b4", "#c99a8c"],
-};
-const DASHES = [[], [7, 3], [2, 2.5], [9, 3, 2, 3]];
 /** Steps of an axis of decibels, of degrees; others have 1, 2, 2.5 and 5 times powers of ten. */
 const STEPS = { dB: [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 40, 100, 200, 500, 1000], "°": [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 5, 15, 45, 90, 180, 360, 720, 1440, 3600] };
 /** Of errors: a zero stands at this on a logarithmic axis. */
 const LEAST = 1e-17;
 /** CSS pixels. */
-const SIZES = { axis: 76, label: 18, tick: 22, panel: 220, across: 110, up: 30, row: 16, right: 26, line: 1.5, dot: 3, pixelsToDrag: 4, box: 40, fine: 4 };
+const SIZES = { axis: 76, label: 18, tick: 22, panel: 220, across: 110, up: 30, right: 26, line: 1.5, dot: 3, pixelsToDrag: 4, box: 40 };
 /** How opaque the inside of an envelope is: what lies behind it is seen. */
 const PALE = 0.35;
-
-/** An element with attributes and children; text is never markup. */
-function element(tag, attributes = {}, ...children) {
-  const made = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) {
-    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
-    else if (value === true) made.setAttribute(name, "");
-    else if (value !== false && value != null) made.setAttribute(name, value);
-  }
-  made.append(...children);
-  return made;
-}
-
-/** What the style sheet says of a colour. */
-const themed = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-
-/** Whether the paper is dark. */
-const isDark = () => themed("--dark") === "1";
-
-/** A stretch of a line as a background: its colour, and its dashes in pixels. */
-function swatch(colour, dash) {
-  let at = 0;
-  const parts = dash.map((length, k) => `${k % 2 ? "transparent" : colour} ${at}px ${(at += length)}px`);
-  return parts.length === 0 ? colour : `repeating-linear-gradient(90deg, ${parts.join(", ")})`;
-}
-
-/** State of a strip's device at t: true, false, or null before anything is known. */
-function stateAt(strip, t) {
-  const changes = rowAfter(strip.times, t);
-  return changes === 0 ? strip.start : strip.states[changes - 1];
-}
 
 /** The name of a curve's signal, without the run that it is of. */
 const signalOf = ({ name, run }) => (run && name.endsWith(` ${run}`) ? name.slice(0, -run.length - 1) : name);
 
 /**
  * A chart in `root` of { axis: { name, unit, log }, panels: [{ quantity, unit, curves }], strips }. `announce` gets a sentence when a cursor is
- * placed. Colours tell runs where there are several, and dashes signals. Otherwise colours tell signals, and each panel begins anew where all
- * curves together are more than there are colours. A curve that has a `look` (its colour and dashes, by number) keeps it.
+ * placed. Colours tell runs where there are several (of more than there are colours by a scale, in their order), and dashes signals. Otherwise colours
+ * tell signals, and each panel begins anew where all curves together are more than there are colours. A curve that has a `look` keeps it: its colour
+ * and dashes by number, and its part of the scale.
  */
 function chart(root, content, announce) {
   const { panels, strips } = content;
@@ -60,24 +24,35 @@ function chart(root, content, announce) {
   const curves = panels.flatMap((panel) => panel.curves);
   const isDotted = panels.some((panel) => panel.dots);
   let whole = wholeSpan(curves, axis.log, isDotted);
-  const state = { view: whole, cursors: { a: null, b: null }, pointer: null, plots: [], room: SIZES.axis, logs: new Set(panels.filter((panel) => panel.dots)), heights: new Map() };
+  const state = { view: whole, cursors: { a: null, b: null }, pointer: null, under: null, plots: [], room: SIZES.axis, logs: new Set(panels.filter((panel) => panel.dots)), heights: new Map(), fits: new Map() };
   const namesOf = (all) => [...new Set(all.map((curve) => curve.name))];
   const few = namesOf(curves).length <= COLOURS.light.length;
   const runs = [...new Set(curves.map((curve) => curve.run))];
+  const isMany = runs.length > COLOURS.light.length;
   const lookOf = (panel, curve) => {
     const at = namesOf(few ? curves : panel.curves).indexOf(curve.name);
     if (!curve.run || runs.length === 1) return [at, Math.floor(at / 8)];
-    const run = runs.indexOf(curve.run), signals = [...new Set(panel.curves.map(signalOf))];
-    return [run, signals.indexOf(signalOf(curve)) + signals.length * Math.floor(run / 8)];
+    const run = runs.indexOf(curve.run), signals = [...new Set(panel.curves.map(signalOf))], signal = signals.indexOf(signalOf(curve));
+    return isMany ? [run, signal, run / (runs.length - 1)] : [run, signal];
   };
   for (const panel of panels) for (const curve of panel.curves) curve.look ??= lookOf(panel, curve);
-  const colour = (curve, paper = isDark() ? "dark" : "light") => COLOURS[paper][curve.look[0] % 8];
+  const colour = (curve, paper = isDark() ? "dark" : "light") => (curve.look[2] === undefined ? COLOURS[paper][curve.look[0] % 8] : along(SCALES[paper], curve.look[2]));
   const dash = (curve) => DASHES[curve.look[1] % 4];
+  /** What has one name on a panel: a curve, or of many runs all those of a signal. */
+  const entriesOf = (panel) => {
+    if (!isMany) return panel.curves.map((curve) => ({ name: curve.name, curves: [curve] }));
+    const signals = [...new Set(panel.curves.map(signalOf))];
+    return signals.map((name) => ({ name, curves: panel.curves.filter((curve) => signalOf(curve) === name) }));
+  };
   const isFirst = document.querySelector(".panels") === null;
   const area = element("div", { class: "panels" });
-  const stripCanvas = element("canvas", { class: "strip", role: "img", title: "a bar while it conducts or is on; pale where changes are too close to tell apart, grey while nothing is known" });
-  const readings = readingsTable();
-  root.append(area, element("div", { class: "readings" }, readings.table));
+  const stripCanvas = element("canvas", { class: "strip", role: "img" });
+  const tip = element("div", { class: "tip", hidden: true });
+  const lanes = element("div", { class: "lanes" }, stripCanvas, tip);
+  const shown = { axis, panels, curves, strips, runs, isMany, state, colour, dash, toggle, isolate, briefs, unitOf: (curve) => unitOf(curve), shareAt };
+  const readings = readingsTable(shown);
+  const legend = isMany ? runsLegend(shown) : null;
+  root.append(...(legend ? [legend.legend] : []), area, element("div", { class: isMany ? "readings scroll" : "readings" }, readings.table));
 
   const edgeOf = ([from, to], pixels) =>
     axis.log ? (k) => from * (to / from) ** ((k + 1) / pixels) : (k) => from + ((to - from) * (k + 1)) / pixels;
@@ -87,7 +62,8 @@ function chart(root, content, announce) {
     const chosen = state.heights.get(panel);
     if (chosen) return chosen;
     let [low, high] = [Infinity, -Infinity];
-    for (const curve of panel.curves.filter((curve) => curve.shown)) {
+    const visible = panel.curves.filter((curve) => curve.shown), fitted = visible.filter((curve) => state.fits.get(panel)?.includes(curve));
+    for (const curve of fitted.length > 0 ? fitted : visible) {
       const [a, b] = boundsIn(curve, ...state.view);
       [low, high] = [Math.min(low, a), Math.max(high, b)];
     }
@@ -182,10 +158,8 @@ function chart(root, content, announce) {
       paths: (plot) => path(plot, curve, panel),
     }));
     const holder = element("div", { class: "panel", tabindex: 0, role: "group", "aria-label": `${panel.quantity}: ${panel.curves.map((c) => c.name).join(", ")}` });
-    // Who is who stands on the panel, and shows and hides it, with what it is at the pointer or the cursors; the table below tells all values.
-    const turn = (curve) => () => { toggle([curve], !curve.shown); readings.tick(); };
-    const nameOf = (curve) => element("button", { type: "button", title: "show or hide", onclick: turn(curve) }, element("span", { class: "swatch", "aria-hidden": "true" }), curve.name);
-    const names = element("p", { class: "names" }, ...panel.curves.map((curve) => element("span", {}, nameOf(curve), element("span", { class: "value", "aria-hidden": "true" }))));
+    const entries = entriesOf(panel).map((entry, _, all) => namedOn(panel, entry, all.length));
+    const names = element("p", { class: "names" }, ...entries.map((entry) => entry.holder));
     holder.append(names);
     area.append(holder);
     const options = {
@@ -221,8 +195,8 @@ function chart(root, content, announce) {
       },
     };
     const plot = new uPlot(options, [whole, ...panel.curves.map(() => [null, null])], holder);
-    Object.assign(plot, { panel, names });
-    bind(plot);
+    Object.assign(plot, { panel, entries });
+    bind(plot.over, (event) => plot.posToVal(event.clientX - plot.over.getBoundingClientRect().left, "x"));
     holder.addEventListener("keydown", pressed);
     return plot;
   }
@@ -254,8 +228,8 @@ function chart(root, content, announce) {
     area.replaceChildren();
     state.plots = panels.map((panel, k) => plotOf(panel, k + 1 === panels.length));
     if (strips.length > 0) {
-      stripCanvas.setAttribute("aria-label", `who conducts when: ${strips.map((strip) => strip.name).join(", ")}; states at the cursors stand in the table`);
-      area.append(stripCanvas);
+      stripCanvas.setAttribute("aria-label", `who conducts when: ${strips.map((strip) => strip.name).join(", ")}; states at the cursors and shares of time between them stand in the table`);
+      area.append(lanes);
     }
     show(state.view);
     readings.update();
@@ -270,11 +244,7 @@ function chart(root, content, announce) {
     state.room = SIZES.axis;
     for (const curve of curves) curve.bars = null;
     for (const plot of state.plots) {
-      plot.panel.curves.forEach((curve, k) => {
-        const name = plot.names.children[k].firstChild;
-        name.setAttribute("aria-pressed", String(curve.shown));
-        name.firstChild.style.background = swatch(colour(curve), dash(curve));
-      });
+      plot.entries.forEach((entry) => entry.update());
       const [low, high] = boundsOf(plot.panel);
       plot.batch(() => {
         // First: it asks for the span that was seen before.
@@ -287,12 +257,14 @@ function chart(root, content, announce) {
     for (const plot of state.plots) if (plot.axes[1]._size < state.room) plot.batch(() => plot.redraw(true, true));
     area.style.setProperty("--left", `${SIZES.label + state.room}px`);
     drawStrips();
+    legend?.update();
     root.dispatchEvent(new CustomEvent("view", { detail: state.view }));
   }
 
   /** Shows the whole span of all panels. */
   function full() {
     state.heights.clear();
+    state.fits.clear();
     show(whole);
   }
 
@@ -362,26 +334,26 @@ function chart(root, content, announce) {
 
   const unitOf = (curve) => panels.find((panel) => panel.curves.includes(curve)).unit;
 
-  function bind(plot) {
+  /** The mouse over what shows the view: `at(event)` is where it points to. */
+  function bind(over, at) {
     let dragged = null;
-    const at = (event) => plot.posToVal(event.clientX - plot.over.getBoundingClientRect().left, "x");
-    plot.over.addEventListener("wheel", (event) => {
+    over.addEventListener("wheel", (event) => {
       event.preventDefault();
       if (event.shiftKey) pan(Math.sign(event.deltaY || event.deltaX) * 0.1);
       else zoom(event.deltaY > 0 ? 1.25 : 0.8, at(event));
     }, { passive: false });
     // Shift and drag moves the view; a press that does not move places a cursor.
-    plot.over.addEventListener("mousedown", (event) => {
+    over.addEventListener("mousedown", (event) => {
       dragged = { x: event.clientX, from: event.clientX, top: event.clientY, shift: event.shiftKey };
       if (event.shiftKey) event.stopImmediatePropagation();
     }, true);
-    plot.over.addEventListener("mousemove", (event) => {
+    over.addEventListener("mousemove", (event) => {
       if (dragged?.shift && event.buttons & 1) {
-        pan((dragged.x - event.clientX) / plot.over.clientWidth);
+        pan((dragged.x - event.clientX) / state.plots[0].over.clientWidth);
         dragged.x = event.clientX;
       }
     });
-    plot.over.addEventListener("click", (event) => {
+    over.addEventListener("click", (event) => {
       const moved = dragged && Math.max(Math.abs(event.clientX - dragged.from), Math.abs(event.clientY - dragged.top));
       if (dragged && moved <= SIZES.pixelsToDrag) place(event.shiftKey ? "b" : "a", at(event));
       dragged = null;
@@ -410,12 +382,16 @@ function chart(root, content, announce) {
   }
 
   function point(plot) {
-    const left = plot.cursor.left;
-    const x = left >= 0 ? plot.posToVal(left, "x") : null;
-    if (x === state.pointer) return;
-    state.pointer = x;
+    const { left, top } = plot.cursor;
+    pointTo(left >= 0 ? plot.posToVal(left, "x") : null, plot, top);
+  }
+
+  /** The pointer is at x, over a plot or none. */
+  function pointTo(x, plot, top) {
+    if (x === state.pointer && (!isMany || (state.under?.plot === plot && state.under?.top === top))) return;
+    [state.pointer, state.under] = [x, x === null || !plot ? null : { plot, top }];
     for (const other of state.plots) {
-      if (other !== plot) other.setCursor({ left: x === null ? -10 : left, top: 0 }, false);
+      if (other !== plot) other.setCursor({ left: x === null ? -10 : other.valToPos(x, "x"), top: 0 }, false);
     }
     readings.update();
   }
@@ -444,156 +420,83 @@ function chart(root, content, announce) {
     ctx.restore();
   }
 
-  /** A bar for each device while it conducts or is on; grey while nothing is known; paler where changes are too close to be told apart. */
-  function drawStrips() {
-    if (strips.length === 0) return;
-    const width = widthOf(), height = strips.length * SIZES.row + 6, ratio = devicePixelRatio || 1;
-    Object.assign(stripCanvas, { width: width * ratio, height: height * ratio });
-    Object.assign(stripCanvas.style, { width: `${width}px`, height: `${height}px` });
-    const ctx = stripCanvas.getContext("2d");
-    ctx.scale(ratio, ratio);
-    ctx.font = "11px system-ui, sans-serif";
-    ctx.textBaseline = "middle";
-    const [from, to] = state.view, left = SIZES.label + state.room, room = width - left - SIZES.right;
+  /** Where times stand beside the lanes, which are as wide as the panels. */
+  function across() {
+    const [from, to] = state.view, width = widthOf(), left = SIZES.label + state.room, room = width - left - SIZES.right;
     const position = (t) => left + room * (axis.log ? Math.log(t / from) / Math.log(to / from) : (t - from) / (to - from));
-    strips.forEach((strip, k) => {
-      const middle = k * SIZES.row + SIZES.row / 2 + 2;
-      ctx.fillStyle = themed("--ink");
-      ctx.textAlign = "right";
-      ctx.fillText(strip.name, left - 6, middle, left - 8);
-      ctx.fillStyle = themed("--grid");
-      ctx.fillRect(left, middle - 0.5, room, 1);
-      let begin = from, on = stateAt(strip, from);
-      const last = rowAt(strip.times, to);
-      const inks = { true: themed("--bar"), false: "transparent", null: themed("--grid") };
-      const fill = (start, end, state) => {
-        ctx.fillStyle = inks[state];
-        ctx.fillRect(start, middle - 5, Math.max(end - start, 0.5), 10);
-      };
-      let fine = [];
-      const flush = () => {
-        ctx.globalAlpha = fine.length > 3 ? PALE : 1;
-        if (fine.length > 3) fill(fine[0][0], fine[fine.length - 1][1], true);
-        else fine.forEach((piece) => fill(...piece));
-        ctx.globalAlpha = 1;
-        fine = [];
-      };
-      const bar = (end) => {
-        const piece = [position(begin), position(end), on];
-        if (piece[1] - piece[0] < SIZES.fine && on !== null) return fine.push(piece);
-        flush();
-        fill(...piece);
-      };
-      for (let j = rowAfter(strip.times, from); j < last; j++) {
-        bar(strip.times[j]);
-        [begin, on] = [strip.times[j], strip.states[j]];
-      }
-      bar(to);
-      flush();
-    });
-    for (const [name, t] of Object.entries(state.cursors)) {
-      if (t === null || t < from || t > to) continue;
-      ctx.fillStyle = themed(name === "a" ? "--cursor-a" : "--cursor-b");
-      ctx.fillRect(Math.round(position(t)), 0, 1, height);
-    }
+    const timeAt = (x) => (axis.log ? from * (to / from) ** ((x - left) / room) : from + ((to - from) * (x - left)) / room);
+    const isClose = (a, b) => position(b) - position(a) < LANES.period;
+    return { view: state.view, width, left, room, position, timeAt, isClose };
   }
 
-  /** The legend, which is a table of readings: at the pointer, at both cursors, their difference, and over time mean and rms between them. */
-  function readingsTable() {
-    const columns = ["pointer", "a", "b"], averages = axis.unit === "s" ? ["mean", "rms"] : [];
-    const all = [...columns, "delta", ...averages];
-    const head = Object.fromEntries(all.map((name) => [name, element("th", { scope: "col", "data-at": name })]));
-    const cells = new Map(), boxes = new Map();
-    let spanned = null;
-    const body = element("tbody");
-    const row = (key, label) => {
-      const own = Object.fromEntries(all.map((name) => [name, element("td", { "data-at": name })]));
-      cells.set(key, own);
-      body.append(element("tr", { "data-signal": key.name }, element("th", { scope: "row" }, label), ...Object.values(own)));
+  function drawStrips() {
+    if (strips.length === 0) return;
+    const seen = Object.entries(state.cursors).filter(([, t]) => t !== null && t >= state.view[0] && t <= state.view[1]);
+    drawLanes(stripCanvas, strips, { ...across(), marks: seen.map(([name, t]) => [t, themed(name === "a" ? "--cursor-a" : "--cursor-b")]) });
+  }
+
+  /** The share of time on about t, null where changes can be told apart. */
+  function shareAt(strip, t) {
+    const { view, position, timeAt, isClose } = across(), x = position(t);
+    const piece = pieceAt(strip, t, view, isClose);
+    return piece?.changes ? shareAbout(strip, timeAt(x - 0.5), timeAt(x + 0.5), piece.changes) : null;
+  }
+
+  /** What the lane under the pointer shows there, in words. */
+  function tell(event) {
+    const box = stripCanvas.getBoundingClientRect(), x = event.clientX - box.left, { view, left, room, timeAt, isClose } = across();
+    const strip = strips[Math.floor((event.clientY - box.top - 2) / LANES.row)];
+    tip.hidden = !strip || x < left || x > left + room;
+    pointTo(tip.hidden ? null : timeAt(x));
+    if (tip.hidden) return;
+    const t = timeAt(x);
+    tip.textContent = words(strip, t, [timeAt(x - 0.5), timeAt(x + 0.5)], pieceAt(strip, t, view, isClose));
+    const isRight = x > left + room / 2;
+    Object.assign(tip.style, { top: `${event.clientY - box.top + 14}px`, left: isRight ? "auto" : `${x}px`, right: isRight ? `${box.width - x}px` : "auto" });
+  }
+
+  /** A name on a panel: it shows and hides its curves, tells their value at the pointer or the cursors, and fits the axis to them. */
+  function namedOn(panel, { name, curves: own }, howMany) {
+    const act = (event) => {
+      const visible = new Set(curves.filter((curve) => curve.shown).map((curve) => curve.run));
+      const meant = own.filter((curve) => visible.has(curve.run) || visible.size === 0);
+      if (event.shiftKey || event.type === "dblclick") isolate(meant, panel.curves);
+      else toggle(meant.length > 0 ? meant : own, !own.some((curve) => curve.shown));
     };
-    const groups = [];
-    // Several curves at once: those of a run, those of a panel.
-    const heading = (...all) => {
-      const labels = all.map(([words, curves]) => {
-        const box = element("input", { type: "checkbox", checked: true, onchange: () => { toggle(curves, box.checked); tick(); } });
-        groups.push([box, curves]);
-        return element("label", {}, box, words);
-      });
-      body.append(element("tr", { class: "group" }, element("th", { scope: "rowgroup", colspan: all.length + 1 }, ...labels)));
+    const line = element("span", { class: "swatch", "aria-hidden": "true" });
+    const button = element("button", { type: "button", title: "show or hide; double click, or shift and click: this alone", onclick: act, ondblclick: act }, line, name);
+    const value = element("span", { class: "value", "aria-hidden": "true" });
+    const fit = element("button", { type: "button", class: "fit", "aria-label": `fit the axis to ${name}`, title: `fit the axis of values to ${name}; once more: to all`, onclick: () => {
+      if (state.fits.get(panel) === own) state.fits.delete(panel);
+      else state.fits.set(panel, own);
+      state.heights.delete(panel);
+      show(state.view);
+    } }, "⇕");
+    const update = () => {
+      button.setAttribute("aria-pressed", String(own.some((curve) => curve.shown)));
+      fit.setAttribute("aria-pressed", String(state.fits.get(panel) === own));
+      line.style.background = own.length === 1 ? swatch(colour(own[0]), dash(own[0])) : swatch(themed("--ink"), dash(own[0]));
     };
-    if (runs.length > 1) heading(...runs.map((run) => [run, curves.filter((curve) => curve.run === run)]));
-    for (const panel of panels) {
-      if (panels.length > 1) heading([panel.quantity, panel.curves]);
-      for (const curve of panel.curves) {
-        const box = element("input", { type: "checkbox", checked: true, onchange: () => { toggle([curve], box.checked); tick(); } });
-        boxes.set(curve, box);
-        const swatch = element("span", { class: "swatch", "aria-hidden": "true" });
-        cells.set(swatch, curve);
-        row(curve, element("label", {}, box, swatch, curve.name));
+    return { curves: own, value, update, holder: element("span", {}, button, ...(howMany > 1 ? [fit] : []), value) };
+  }
+
+  /** What stands beside names: values at the pointer, without one the difference of both cursors or the values at the only one. */
+  function briefs({ pointer, a, b }, both) {
+    for (const plot of state.plots) for (const { curves: own, value } of plot.entries) value.textContent = brief(plot, own.filter((curve) => curve.shown || own.length === 1));
+    function brief(plot, own) {
+      const told = (t, curve) => quantity(valueAt(curve, t), plot.panel.unit);
+      if (own.length !== 1) {
+        // Of many runs the one that is nearest to the pointer.
+        if (state.under?.plot !== plot || own.length === 0) return "";
+        const away = (curve) => { const y = valueAt(curve, pointer); return Number.isNaN(y) ? Infinity : Math.abs(plot.valToPos(y, "y") - state.under.top); };
+        const near = own.map((curve) => [away(curve), curve]).reduce((one, other) => (other[0] < one[0] ? other : one))[1];
+        return `${near.run}: ${told(pointer, near)}`;
       }
+      const [curve] = own;
+      if (pointer !== null) return told(pointer, curve);
+      if (both) return `B − A ${quantity(valueAt(curve, b) - valueAt(curve, a), plot.panel.unit)}`;
+      return a !== null ? `A ${told(a, curve)}` : b !== null ? `B ${told(b, curve)}` : "";
     }
-    for (const strip of strips) row(strip, strip.name);
-    const table = element("table", {},
-      element("caption", {}, "Readings"),
-      element("thead", {}, element("tr", {}, element("th", { scope: "col" }, "signal"), ...Object.values(head))), body);
-    const put = (cell, value, words) => {
-      cell.textContent = words;
-      if (value === null) cell.removeAttribute("data-value");
-      else cell.dataset.value = value;
-    };
-    /** What stands beside a name: the value at the pointer, without one the difference of both cursors or the value at the only one. */
-    function brief(curve, { pointer, a, b }, both) {
-      const told = (t) => quantity(valueAt(curve, t), unitOf(curve));
-      if (pointer !== null) return told(pointer);
-      if (both) return `B − A ${quantity(valueAt(curve, b) - valueAt(curve, a), unitOf(curve))}`;
-      return a !== null ? `A ${told(a)}` : b !== null ? `B ${told(b)}` : "";
-    }
-    function update() {
-      const { a, b } = state.cursors;
-      const times = { pointer: state.pointer, a, b };
-      const both = a !== null && b !== null;
-      state.plots.forEach((plot) => plot.panel.curves.forEach((curve, k) => { plot.names.children[k].lastChild.textContent = brief(curve, times, both); }));
-      for (const name of columns) {
-        const label = name === "pointer" ? axis.name : name.toUpperCase();
-        put(head[name], times[name], times[name] === null ? label : `${label} ${quantity(times[name], axis.unit, 9)}`);
-      }
-      const inverse = axis.unit === "s" && both && a !== b ? ` (${quantity(1 / Math.abs(b - a), "Hz")})` : "";
-      put(head.delta, both ? b - a : null, both ? `B − A ${quantity(b - a, axis.unit, 9)}${inverse}` : "B − A");
-      for (const name of averages) put(head[name], null, `${name} A…B`);
-      const isNew = spanned !== `${a} ${b}`;
-      spanned = `${a} ${b}`;
-      for (const [key, own] of cells) {
-        if (key instanceof HTMLElement) {
-          key.style.background = swatch(colour(own), dash(own));
-          continue;
-        }
-        if (key.states) {
-          for (const name of columns) {
-            const on = times[name] === null ? null : stateAt(key, times[name]);
-            put(own[name], null, times[name] === null ? "" : on === null ? "not known" : on ? key.on : key.off);
-          }
-          continue;
-        }
-        const values = columns.map((name) => (times[name] === null ? null : valueAt(key, times[name])));
-        columns.forEach((name, k) => put(own[name], values[k], values[k] === null ? "" : quantity(values[k], unitOf(key))));
-        put(own.delta, both ? values[2] - values[1] : null, both ? quantity(values[2] - values[1], unitOf(key)) : "");
-        // These look at all rows between: not whenever the pointer moves.
-        if (averages.length > 0 && (isNew || key.partial !== own.partial)) {
-          const found = both && a !== b ? averagesOf(key, Math.min(a, b), Math.max(a, b)) : null;
-          averages.forEach((name, k) => put(own[name], found && found[k], found ? quantity(found[k], unitOf(key)) : ""));
-          own.partial = key.partial;
-        }
-      }
-    }
-    function tick() {
-      boxes.forEach((box, curve) => { box.checked = curve.shown; });
-      for (const [box, some] of groups) {
-        const shown = some.filter((curve) => curve.shown).length;
-        box.checked = shown > 0;
-        box.indeterminate = shown > 0 && shown < some.length;
-      }
-    }
-    return { table, update, tick };
   }
 
   function toggle(some, shown) {
@@ -604,7 +507,15 @@ function chart(root, content, announce) {
         if (k >= 0) plot.setSeries(k + 1, { show: shown });
       }
     }
+    readings.tick();
     show(state.view);
+  }
+
+  /** Shows some of these curves alone; where they are alone, all. */
+  function isolate(some, of) {
+    const isAlone = of.every((curve) => curve.shown === some.includes(curve));
+    toggle(of.filter((curve) => !isAlone && !some.includes(curve)), false);
+    toggle(isAlone ? of : some, true);
   }
 
   /** Logarithmic or linear axes of values. */
@@ -629,12 +540,16 @@ function chart(root, content, announce) {
     heights: panels.map((panel) => state.heights.get(panel) ?? null),
     cursors: state.cursors,
     hidden: curves.filter((curve) => !curve.shown).map((curve) => curve.name),
+    fits: panels.map((panel) => (state.fits.get(panel) ?? []).map((curve) => curve.name)),
   });
 
   /** Shows that again. */
-  function restore({ view, heights, cursors, hidden }) {
+  function restore({ view, heights, cursors, hidden, fits }) {
+    for (const { panel, entries } of state.plots) {
+      const fitted = entries.find(({ curves }) => (fits ?? []).some((names) => names.includes(curves[0].name)));
+      if (fitted) state.fits.set(panel, fitted.curves);
+    }
     toggle(curves.filter((curve) => hidden.includes(curve.name)), false);
-    readings.tick();
     state.cursors = cursors;
     heights.forEach((bounds, k) => { if (bounds && panels[k]) state.heights.set(panels[k], bounds); });
     show(view ?? state.view);
@@ -647,6 +562,11 @@ function chart(root, content, announce) {
       show(state.view);
     }
   });
+  if (strips.length > 0) {
+    bind(stripCanvas, (event) => across().timeAt(event.clientX - stripCanvas.getBoundingClientRect().left));
+    stripCanvas.addEventListener("mousemove", tell);
+    stripCanvas.addEventListener("mouseleave", () => { tip.hidden = true; pointTo(null); });
+  }
   build();
   resized.observe(root);
   document.addEventListener("keydown", pressedOnPage);
@@ -654,7 +574,7 @@ function chart(root, content, announce) {
   const repaint = () => { show(state.view); readings.update(); };
   paper.addEventListener("change", repaint);
   return {
-    state, panels, strips, show, complete, keep, restore, zoom, pan, place, logarithmic, logarithmicAcross, colour, dash, boundsOf, edgeOf, axis,
+    state, panels, strips, runs, isMany, entriesOf, show, complete, keep, restore, zoom, pan, place, logarithmic, logarithmicAcross, colour, dash, boundsOf, edgeOf, axis,
     full,
     repaint,
     remove: () => { resized.disconnect(); document.removeEventListener("keydown", pressedOnPage); paper.removeEventListener("change", repaint); state.plots.forEach((plot) => plot.destroy()); root.replaceChildren(); },

@@ -1,7 +1,8 @@
 //! A circuit picture on its sheet.
 
-use super::super::sheet::{Anchor, INK, Sheet, escaped, short, width_of};
+use super::super::sheet::{Anchor, INK, escaped, short, width_of};
 use super::super::svg::titled;
+use super::canvas::{Area, Canvas, Place};
 use super::grid::{self, COLUMN, GROUND, Grid, LEVEL, Plan, Pose, Rise, Run};
 use super::part::{Part, Parts, brief};
 use super::words::{
@@ -91,7 +92,7 @@ impl<'a> Drawing<'a> {
 
     pub(super) fn draw(&self, title: &str) -> String {
         let room = (width_of(title, 15.0) + MARGIN).min(1200.0);
-        let mut sheet = titled(self.size.0.max(room), self.size.1, title);
+        let mut sheet = Canvas::on(titled(self.size.0.max(room), self.size.1, title));
         self.wires(&mut sheet);
         for k in 0..self.parts.parts.len() {
             self.part(&mut sheet, k);
@@ -101,7 +102,7 @@ impl<'a> Drawing<'a> {
         sheet.finish()
     }
 
-    fn wires(&self, sheet: &mut Sheet) {
+    fn wires(&self, sheet: &mut Canvas) {
         for run in self
             .grid
             .runs
@@ -126,7 +127,7 @@ impl<'a> Drawing<'a> {
                 .into_iter()
                 .filter(|&x| self.branches(net, run, x) > 2)
             {
-                sheet.dot(self.at(x, LEVEL * run.level), 3.2, INK);
+                sheet.sheet.dot(self.at(x, LEVEL * run.level), 3.2, INK);
             }
         }
         if let Some(&x) = self.grid.pins[GROUND].first() {
@@ -144,7 +145,7 @@ impl<'a> Drawing<'a> {
         ways + pins + usize::from(is_grounded)
     }
 
-    fn part(&self, sheet: &mut Sheet, k: usize) {
+    fn part(&self, sheet: &mut Canvas, k: usize) {
         let part = &self.parts.parts[k];
         let x = COLUMN * self.plan.columns[k];
         match self.grid.poses[k] {
@@ -158,7 +159,9 @@ impl<'a> Drawing<'a> {
                 if part.nets.len() > 2 {
                     let gate = &self.parts.nets[part.nets[2]];
                     let at = (at.0 + gate_x(part, reversed), at.1 + symbol::GATE + 8.0);
-                    named(sheet, gate, at, Anchor::Middle);
+                    let lower = (at.0, at.1 + 13.0);
+                    let places = [at, lower].map(|at| (at, Anchor::Middle));
+                    named(sheet, gate, places.to_vec());
                 }
             }
             Pose::Upright { slot, reversed } => {
@@ -191,7 +194,9 @@ impl<'a> Drawing<'a> {
                 if part.nets.len() > 2 && !grid::is_wired(part) {
                     let gate = &self.parts.nets[part.nets[2]];
                     let y = cy + gate_x(part, reversed);
-                    named(sheet, gate, (cx - symbol::GATE - 3.0, y), Anchor::End);
+                    let x = cx - symbol::GATE - 3.0;
+                    let places = [0.0, -8.0, 8.0].map(|down| ((x, y + down), Anchor::End));
+                    named(sheet, gate, places.to_vec());
                 }
             }
         }
@@ -213,7 +218,7 @@ impl<'a> Drawing<'a> {
         columns == 1 && cost::same_slot(self.grid.poses[a], self.grid.poses[b])
     }
 
-    fn boxed(&self, sheet: &mut Sheet, k: usize, slot: i32, columns: i32) {
+    fn boxed(&self, sheet: &mut Canvas, k: usize, slot: i32, columns: i32) {
         let part = &self.parts.parts[k];
         let left = COLUMN * self.plan.columns[k] - COLUMN / 2;
         let inset = (8.0, 22.0);
@@ -223,7 +228,7 @@ impl<'a> Drawing<'a> {
         sheet.boxed(inner.0, inner.1);
         let middle = (f64::midpoint(x0, x1), f64::midpoint(y0, y1));
         let words = format!("{} {}", part.name, brief(&part.value, ABOVE));
-        sheet.text(&words, middle, TEXT, Anchor::Middle);
+        sheet.sheet.text(&words, middle, TEXT, Anchor::Middle);
         for pin in self.grid.box_pins.iter().filter(|pin| pin.part == k) {
             let (x, _) = self.at(pin.x, 0);
             let (edge, end, inside) = if pin.is_top {
@@ -244,7 +249,7 @@ impl<'a> Drawing<'a> {
     }
 
     /// Cores between coupled inductors that stand side by side; the others' couplings in words.
-    fn couplings(&self, sheet: &mut Sheet) {
+    fn couplings(&self, sheet: &mut Canvas) {
         let mut words = Vec::new();
         for (a, b, name) in &self.parts.couplings {
             let (first, second) = (&self.parts.parts[*a], &self.parts.parts[*b]);
@@ -264,11 +269,13 @@ impl<'a> Drawing<'a> {
             written(sheet, name, (x, y - 30.0), (SMALL, FAINT), Anchor::Middle);
         }
         let at = (MARGIN, self.size.1 - 8.0);
-        sheet.text(&words.join("   "), at, SMALL, Anchor::Start);
+        sheet
+            .sheet
+            .text(&words.join("   "), at, SMALL, Anchor::Start);
     }
 
-    /// Names of the nets, each above the widest gap of its trunk between what meets or crosses it.
-    fn nets(&self, sheet: &mut Sheet) {
+    /// Names of the nets, each above the widest gap of its trunk between what meets or crosses it, or where else there is room.
+    fn nets(&self, sheet: &mut Canvas) {
         for run in &self.grid.runs {
             let Some(net) = run.net.filter(|net| *net != GROUND) else {
                 continue;
@@ -282,24 +289,32 @@ impl<'a> Drawing<'a> {
                 .chain(self.grid.pins[net].iter().copied())
                 .collect();
             stops.sort_unstable();
-            let widest = stops
-                .windows(2)
-                .max_by_key(|gap| (gap[1] - gap[0], -gap[0]));
-            let (x, anchor, aside) = match widest {
-                Some(gap) if gap[1] > gap[0] => (gap, Anchor::Middle, 0.0),
-                _ => (&[run.x.0, run.x.0][..], Anchor::Start, 5.0),
-            };
-            let (a, y) = self.at(x[0], LEVEL * run.level);
-            let (b, _) = self.at(x[1], LEVEL * run.level);
-            let at = (f64::midpoint(a, b) + aside, y - 8.0);
-            named(sheet, &self.parts.nets[net], at, anchor);
+            let mut gaps: Vec<[i32; 2]> = stops.windows(2).map(|gap| [gap[0], gap[1]]).collect();
+            gaps.retain(|gap| gap[1] > gap[0]);
+            gaps.sort_by_key(|gap| (gap[0] - gap[1], gap[0]));
+            let point = |x: i32| self.at(x, LEVEL * run.level);
+            let mut places: Vec<Place> = Vec::new();
+            for down in [-8.0, 9.0] {
+                places.extend(gaps.iter().map(|gap| {
+                    let ((a, y), (b, _)) = (point(gap[0]), point(gap[1]));
+                    ((f64::midpoint(a, b), y + down), Anchor::Middle)
+                }));
+                // Beside what ends there, or goes up from there.
+                for (end, aside, anchor) in
+                    [(run.x.0, 5.0, Anchor::Start), (run.x.1, -5.0, Anchor::End)]
+                {
+                    let (x, y) = point(end);
+                    places.push(((x + aside, y + down), anchor));
+                }
+            }
+            named(sheet, &self.parts.nets[net], places);
         }
     }
 }
 
 /// A part's symbol, turned and placed, with leads to `ends` on its axis.
 pub(super) fn drawn_symbol(
-    sheet: &mut Sheet,
+    sheet: &mut Canvas,
     states: States<'_>,
     part: &Part,
     (turn, at): (&str, (f64, f64)),
@@ -328,6 +343,17 @@ pub(super) fn drawn_symbol(
         ));
     }
     let glyph = symbol::glyph(part.symbol);
+    // Its body, and the leads on its axis.
+    let (half, across) = (20.0, symbol::beside(part.symbol) - 5.0);
+    let is_upright = turn.starts_with('0');
+    let spot = |x: f64, y: f64| {
+        let (x, y) = if is_upright { (y, x) } else { (x, y) };
+        (at.0 + x, at.1 + y)
+    };
+    sheet.takes(Area::between(spot(-half, -across), spot(half, across)));
+    let reach = ends.0.abs().max(ends.1.abs());
+    sheet.takes(Area::between(spot(-reach, 0.0), spot(reach, 0.0)));
+    let sheet = &mut sheet.sheet;
     sheet.raw(&format!("<g transform=\"matrix({turn} {place})\" stroke-width=\"1.4\" stroke-linejoin=\"round\">{body}</g>"));
     if !glyph.is_empty() {
         sheet.raw(&format!("<path transform=\"translate({place})\" d=\"{glyph}\" fill=\"none\" stroke=\"{INK}\" stroke-width=\"1.4\"/>"));

@@ -3,6 +3,7 @@
 //! `part` says what is drawn, `cards` finds it in a netlist; `search` says where, by `cost` and by the wires that `grid` finds it takes; `drawing` puts it on a
 //! sheet with `symbol` and `words`. A schematic has places of its own, which `placed` keeps.
 
+mod canvas;
 mod cards;
 mod cost;
 mod drawing;

@@ -1,12 +1,15 @@
 //! A schematic as its own sheet has it: wires, symbols and labels where they were drawn.
 
-use super::super::sheet::{Anchor, INK, Sheet, width_of};
+use super::super::sheet::{Anchor, INK, width_of};
 use super::super::svg::titled;
+use super::canvas::Canvas;
 use super::cards::pin_of;
 use super::drawing::{States, drawn_symbol};
 use super::part::{Part, Parts, Symbol};
 use super::symbol::{self, GATE, beside};
-use super::words::{FAINT, SMALL, TEXT, WIRE, ground, lying_words, named, upright_words, written};
+use super::words::{
+    FAINT, SMALL, TEXT, WIRE, ground, headed, lying_words, named, upright_words, written,
+};
 use crate::netlist::ast::{self, Spot};
 
 /// px for a unit of a sheet: words of neighbours 96 units apart have room.
@@ -31,12 +34,12 @@ pub(super) fn draw(all: &Parts, sheet: &ast::Sheet, states: States<'_>, title: &
         .collect();
     let view = View::of(sheet, &placed);
     let room = (width_of(title, 15.0) + MARGIN).min(1200.0);
-    let mut drawing = titled(view.size.0.max(room), view.size.1, title);
+    let mut drawing = Canvas::on(titled(view.size.0.max(room), view.size.1, title));
     for (from, to) in &sheet.wires {
         drawing.line(view.at(*from), view.at(*to), WIRE);
     }
     for joint in joints(sheet, &placed) {
-        drawing.dot(view.at(joint), 3.2, INK);
+        drawing.sheet.dot(view.at(joint), 3.2, INK);
     }
     for own in &placed {
         view.part(&mut drawing, own, states);
@@ -45,11 +48,20 @@ pub(super) fn draw(all: &Parts, sheet: &ast::Sheet, states: States<'_>, title: &
         let (x, y) = view.at(*at);
         match name.as_str() {
             "0" | "gnd" => ground(&mut drawing, (x, y)),
-            // Beside a wire that goes up from there, not on it.
-            name if goes_up(sheet, *at) => {
-                named(&mut drawing, name, (x + 4.0, y - 7.0), Anchor::Start);
+            name => {
+                let beside = |down: f64| {
+                    [
+                        ((x + 4.0, y + down), Anchor::Start),
+                        ((x - 4.0, y + down), Anchor::End),
+                    ]
+                };
+                // Beside a wire that goes up from there, not on it.
+                let middle = ((x, y - 7.0), Anchor::Middle);
+                let mut places = beside(-7.0).to_vec();
+                places.insert(if goes_up(sheet, *at) { 2 } else { 0 }, middle);
+                places.extend(beside(9.0));
+                named(&mut drawing, name, places);
             }
-            name => named(&mut drawing, name, (x, y - 7.0), Anchor::Middle),
         }
     }
     let coupled = all
@@ -65,7 +77,9 @@ pub(super) fn draw(all: &Parts, sheet: &ast::Sheet, states: States<'_>, title: &
         });
     let below: Vec<String> = coupled.chain(elsewhere).collect();
     let at = (MARGIN, view.size.1 - 10.0);
-    drawing.text(&below.join("   "), at, SMALL, Anchor::Start);
+    drawing
+        .sheet
+        .text(&below.join("   "), at, SMALL, Anchor::Start);
     drawing.finish()
 }
 
@@ -134,7 +148,7 @@ impl View {
         )
     }
 
-    fn part(&self, drawing: &mut Sheet, (part, own): &PlacedPart<'_>, states: States<'_>) {
+    fn part(&self, drawing: &mut Canvas, (part, own): &PlacedPart<'_>, states: States<'_>) {
         let has_gate = matches!(
             part.symbol,
             Symbol::Transistor(_) | Symbol::Thyristor | Symbol::Triac
@@ -156,7 +170,7 @@ impl View {
     /// A symbol on the line between its two main pins, with leads to the pins beside it: a gate, or what controls it.
     fn along(
         &self,
-        drawing: &mut Sheet,
+        drawing: &mut Canvas,
         part: &Part,
         (first, second): (Spot, Spot),
         others: &[Spot],
@@ -214,7 +228,7 @@ impl View {
     }
 
     /// A box with a lead to each pin.
-    fn boxed(&self, drawing: &mut Sheet, part: &Part, own: &ast::PlacedSymbol) {
+    fn boxed(&self, drawing: &mut Canvas, part: &Part, own: &ast::PlacedSymbol) {
         let pins: Vec<Spot> = spots(own).collect();
         let frame = Frame::of(&pins);
         let (x0, y0) = self.at(frame.low);
@@ -239,15 +253,16 @@ impl View {
             };
             written(drawing, &name, to, (8.0, FAINT), anchor);
         }
-        let above = (f64::midpoint(x0, x1), y0 - 6.0);
+        let middle = f64::midpoint(x0, x1);
         let words = format!("{} {}", part.name, part.value);
-        written(
-            drawing,
-            words.trim_end(),
-            above,
-            (TEXT, INK),
-            Anchor::Middle,
-        );
+        let places = [
+            ((middle, y0 - 6.0), Anchor::Middle),
+            ((x1, y0 - 6.0), Anchor::End),
+            ((x0, y0 - 6.0), Anchor::Start),
+            ((middle, y1 + 7.0), Anchor::Middle),
+            ((middle, f64::midpoint(y0, y1)), Anchor::Middle),
+        ];
+        headed(drawing, words.trim_end(), places.to_vec());
     }
 }
 
