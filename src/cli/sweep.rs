@@ -17,8 +17,7 @@ use crate::circuit::Sweep;
 use crate::integrate::Error;
 use crate::model::Model;
 use crate::settings::Settings;
-use crate::waveform::csv::Cell;
-use crate::waveform::npz;
+use crate::waveform::{csv, npz};
 
 /// Most runs of one sweep.
 const MOST: usize = 10_000_000;
@@ -309,13 +308,14 @@ impl Output {
     fn entry(&mut self, table: &Table, entry: &Entry) -> Result<(), Failure> {
         let line = match self.form {
             Form::Csv => {
-                let (mut line, mut cell) = (String::new(), Cell::default());
+                let mut cells = Vec::new();
                 for value in &entry.values {
                     if let Some(value) = value {
-                        line += &String::from_utf8_lossy(cell.of(*value));
+                        csv::cell(*value, &mut cells);
                     }
-                    line.push(',');
+                    cells.push(b',');
                 }
+                let mut line = String::from_utf8_lossy(&cells).into_owned();
                 if !entry.error.is_empty() {
                     line += &format!("\"{}\"", entry.error.replace('"', "\"\""));
                 }

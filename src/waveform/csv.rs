@@ -63,74 +63,66 @@ pub fn header(to: &mut impl Write, axis: &str, names: &[String]) -> std::io::Res
 /// # Errors
 /// Those of `to`.
 pub fn row(to: &mut impl Write, time: f64, values: &[f64]) -> std::io::Result<()> {
-    let mut cell = Cell::default();
-    to.write_all(cell.of(time))?;
+    let mut line = Vec::with_capacity((values.len() + 1) * LONGEST);
+    cell(time, &mut line);
     for &value in values {
-        to.write_all(b",")?;
-        to.write_all(cell.of(value))?;
+        line.push(b',');
+        cell(value, &mut line);
     }
-    to.write_all(b"\n")
+    line.push(b'\n');
+    to.write_all(&line)
 }
 
 /// Significant digits of a cell.
 const DIGITS: usize = 17;
+/// Bytes of the longest cell and what follows it: a sign, digits with their point, and an exponent of three digits with its sign.
+const LONGEST: usize = DIGITS + 8;
 
-/// A number as a cell: the fewest digits that read back to the same double, and zeros up to [`DIGITS`] of them.
-#[derive(Default)]
-pub(crate) struct Cell {
-    text: Vec<u8>,
-}
-
-impl Cell {
-    /// `-1.2500000000000000e-3`.
-    pub(crate) fn of(&mut self, value: f64) -> &[u8] {
-        let text = &mut self.text;
-        text.clear();
-        let mut buffer = zmij::Buffer::new();
-        let written = buffer.format(value).as_bytes();
-        if !value.is_finite() {
-            text.extend(written);
-            return text;
+/// Appends a number as a cell, `-1.2500000000000000e-3`: the fewest digits that read back to the same double, and zeros up to [`DIGITS`] of
+/// them.
+pub(crate) fn cell(value: f64, text: &mut Vec<u8>) {
+    let mut buffer = zmij::Buffer::new();
+    let mut number = buffer.format(value).as_bytes();
+    if !value.is_finite() {
+        return text.extend_from_slice(number);
+    }
+    if let [b'-', rest @ ..] = number {
+        text.push(b'-');
+        number = rest;
+    }
+    // 12.5, 0.00125 or 1.25e-7; an exponent has three digits and a sign at most.
+    let tail = number.len().saturating_sub(5);
+    let e = number[tail..].iter().position(|byte| *byte == b'e');
+    let (mantissa, exponent) = number.split_at(e.map_or(number.len(), |e| tail + e));
+    let point = mantissa.iter().position(|byte| *byte == b'.');
+    let (whole, part) = mantissa.split_at(point.unwrap_or(mantissa.len()));
+    let part = part.get(1..).unwrap_or_default();
+    let zeros = part.iter().take_while(|byte| **byte == b'0').count();
+    let (first, rest, power) = match whole {
+        [b'0', ..] if zeros == part.len() => (&whole[..1], part, 0),
+        [b'0', ..] => {
+            let (first, rest) = part[zeros..].split_at(1);
+            (first, rest, -(zeros as i32) - 1)
         }
-        let mut digits = [b'0'; DIGITS];
-        // Digits but for zeros in front, and how many of all stand before the point, but for these.
-        let (mut count, mut power) = (0, -1);
-        let (mut before, mut after_e) = (true, None);
-        for (k, &byte) in written.iter().enumerate() {
-            match byte {
-                b'-' => text.push(b'-'),
-                b'.' => before = false,
-                b'e' => {
-                    after_e = std::str::from_utf8(&written[k + 1..]).ok();
-                    break;
-                }
-                _ => {
-                    let is_zero_in_front = count == 0 && byte == b'0';
-                    if !is_zero_in_front {
-                        if let Some(digit) = digits.get_mut(count) {
-                            *digit = byte;
-                        }
-                        count += 1;
-                    }
-                    power += i32::from(before) - i32::from(is_zero_in_front);
-                }
-            }
+        _ => (whole, part, whole.len() as i32 - 1),
+    };
+    let from = text.len();
+    text.push(first[0]);
+    text.push(b'.');
+    text.extend_from_slice(&first[1..]);
+    text.extend_from_slice(rest);
+    text.resize(from + DIGITS + 1, b'0');
+    let written = std::str::from_utf8(exponent.get(1..).unwrap_or_default());
+    let power = power + written.ok().and_then(|e| e.parse().ok()).unwrap_or(0);
+    text.push(b'e');
+    if power < 0 {
+        text.push(b'-');
+    }
+    let power = power.unsigned_abs();
+    for place in [100, 10, 1] {
+        if power >= place || place == 1 {
+            text.push(b'0' + (power / place % 10) as u8);
         }
-        let shift = after_e.and_then(|e| e.parse().ok()).unwrap_or(0);
-        let power = if count == 0 { 0 } else { power + shift };
-        text.extend([digits[0], b'.']);
-        text.extend_from_slice(&digits[1..]);
-        text.push(b'e');
-        if power < 0 {
-            text.push(b'-');
-        }
-        let power = power.unsigned_abs();
-        for place in [100, 10, 1] {
-            if power >= place || place == 1 {
-                text.push(b'0' + (power / place % 10) as u8);
-            }
-        }
-        text
     }
 }
 
@@ -346,8 +338,11 @@ mod tests {
 
     #[test]
     fn cells_have_seventeen_digits_that_read_back() {
-        let mut cell = Cell::default();
-        let mut of = |value: f64| String::from_utf8(cell.of(value).to_vec()).unwrap();
+        let of = |value: f64| {
+            let mut text = Vec::new();
+            cell(value, &mut text);
+            String::from_utf8(text).unwrap()
+        };
         for (value, text) in [
             (0.0, "0.0000000000000000e0"),
             (-0.0, "-0.0000000000000000e0"),

@@ -184,11 +184,9 @@ r1 o 0 10
     };
     let model = Model::parse(&text(6.0).replace(".save", ".save v(g)"), "gate.cir").unwrap();
     let stopping = model.transient(at_corners).unwrap().stats.steps;
-    assert!(
-        5 * run.stats.steps < 4 * stopping,
-        "{} of {stopping}",
-        run.stats.steps
-    );
+    // One step a period less, at least.
+    let steps = run.stats.steps;
+    assert!(steps + 500 < stopping, "{steps} of {stopping}");
     let (seen, reference) = (transient(&text(6.0), 1e-8), transient(&text(6.0), 1e-10));
     for probe in ["v(o)", "i(l1)"] {
         assert!(difference(&seen, &reference, probe, 0.0) < 1e-8);
