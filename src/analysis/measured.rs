@@ -225,6 +225,9 @@ fn observed<'a>(
     model: &Model,
     mut options: SimOptions<'_>,
 ) -> (Measuring<'a>, Finished) {
+    if let Err(error) = measuring.room(options.settings.max_held) {
+        return (measuring, Finished::of(Err(error)));
+    }
     let note = measuring.draw(model, &mut options);
     let mut finished = measuring.run(model, &mut options);
     // First as many as events ask for, then as curves do.
@@ -337,6 +340,16 @@ impl<'a> Measuring<'a> {
     /// Whether measurements see rows.
     fn by_rows(&self) -> bool {
         is_measured(self.circuit) && self.curves.is_none()
+    }
+
+    /// Whether so many bytes hold the rows that are shown: refused before anything is computed.
+    ///
+    /// # Errors
+    /// As [`Grid::check`].
+    fn room(&self, held: usize) -> Result<(), Error> {
+        let most = held / ((self.shown + 1) * size_of::<f64>());
+        self.tran
+            .map_or(Ok(()), |tran| Grid::of(&tran).check(self.shown, Some(most)))
     }
 
     /// Takes in what happens between events, where the run is exact throughout; and has the run begin where the model says, of which a note may tell.

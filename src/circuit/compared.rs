@@ -127,7 +127,9 @@ fn edges(held: &HashMap<NodeId, (f64, &Kind)>, kind: &Kind, until: f64) -> Optio
     };
     let (at_rest, first) = (total(&|s| s.dc), total(&|s| s.value(0.0)));
     let found = crossings(&terms, (constant, level), Rest::IsNeither, 0.0, until);
-    if at_rest == level || found.len() > MOST_EDGES {
+    // What jumps at the start has another value at the operating point.
+    let jumps = terms.iter().any(|(_, s)| s.is_edge(0.0));
+    if at_rest == level || jumps || found.len() > MOST_EDGES {
         return None;
     }
     let start = match found.first() {
@@ -302,6 +304,10 @@ mod tests {
         // Rest on the threshold, at the operating point or without end.
         assert_eq!(made("vs s 0 0\nb1 b 0 v=u(v(s))"), None);
         assert_eq!(made("vs s 0 sin(0 1 1k)\nb1 b 0 v=u(v(s))"), None);
+        // An edge at the start.
+        let edge = "vs s 0 pulse(-1 1 0 0 1u 0.5m 1m)\nb1 b 0 v=u(v(s))";
+        assert_eq!(made(edge), None);
+        assert!(made(&edge.replace("-1 1 0 0", "-1 1 1u 0")).is_some());
         // More than two levels, and a saturation.
         assert_eq!(
             made("vs s 0 sin(0.1 1 1k)\nb1 b 0 v=sgn(v(s))+u(v(s)-0.5)"),
