@@ -347,9 +347,9 @@ impl<'a> Measuring<'a> {
     /// # Errors
     /// As [`Grid::check`].
     fn room(&self, held: usize) -> Result<(), Error> {
-        let most = held / ((self.shown + 1) * size_of::<f64>());
+        let most = Some(Grid::most(self.shown, held));
         self.tran
-            .map_or(Ok(()), |tran| Grid::of(&tran).check(self.shown, Some(most)))
+            .map_or(Ok(()), |tran| Grid::of(&tran).check(self.shown, most))
     }
 
     /// Takes in what happens between events, where the run is exact throughout; and has the run begin where the model says, of which a note may tell.

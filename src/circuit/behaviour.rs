@@ -264,11 +264,7 @@ impl Scopes<'_> {
         let Auxiliary::Curve(_, curve) = &self.auxiliaries[index] else {
             return None;
         };
-        let flat = curve.first.1.f64 == 0.0 && curve.last.1.f64 == 0.0;
-        match curve.vertices[..] {
-            [(v0, low), (v1, high)] if flat && v0.f64 == v1.f64 => Some((low.f64, high.f64)),
-            _ => None,
-        }
+        curve.step().map(|(_, low, high)| (low, high))
     }
 
     /// The form as a function of one sum: as it stands, with rails as numbers, or with auxiliary voltages.

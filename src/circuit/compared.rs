@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::source::{Rest, Source, Wave, crossings};
 use super::{Affine, Circuit, Element, Kind, NodeId, Output, Probed, Quantity};
-use crate::law::{Curve, Law};
+use crate::law::Law;
 
 /// Most edges of one comparator; one with more is left to the run.
 const MOST_EDGES: usize = 1 << 19;
@@ -12,7 +12,6 @@ const MOST_EDGES: usize = 1 << 19;
 const MOST_LEVELS: u32 = 8;
 
 /// A sum of sources.
-#[derive(Debug, Clone, Default)]
 struct Sum<'a> {
     constant: f64,
     terms: Vec<(f64, &'a Source)>,
@@ -119,7 +118,7 @@ fn edges(held: &HashMap<NodeId, (f64, &Kind)>, kind: &Kind, until: f64) -> Optio
     else {
         return None;
     };
-    let (level, low, high) = step(curve)?;
+    let (level, low, high) = curve.step()?;
     let Sum { constant, terms } = sum_of(held, input, MOST_LEVELS)?;
     let side = |value: f64| if value > level { high } else { low };
     let total = |of: &dyn Fn(&Source) -> f64| -> f64 {
@@ -165,15 +164,6 @@ fn edges(held: &HashMap<NodeId, (f64, &Kind)>, kind: &Kind, until: f64) -> Optio
         Output::Voltage => Kind::VoltageSource(source),
         Output::Current => Kind::CurrentSource(source),
     })
-}
-
-/// Threshold, lower and upper level of a curve that is a single step.
-fn step(curve: &Curve) -> Option<(f64, f64, f64)> {
-    let flat = curve.first.1.f64 == 0.0 && curve.last.1.f64 == 0.0;
-    match curve.vertices[..] {
-        [(a, low), (b, high)] if flat && a.f64 == b.f64 => Some((a.f64, low.f64, high.f64)),
-        _ => None,
-    }
 }
 
 /// What a sum of voltages is made of.

@@ -44,6 +44,11 @@ impl Grid {
         (span / self.tstep - LAST_ROW).ceil().max(1.0) + 1.0
     }
 
+    /// How many rows of so many columns besides time so many bytes hold.
+    pub(crate) fn most(columns: usize, held: usize) -> usize {
+        held / ((columns + 1) * size_of::<f64>())
+    }
+
     /// # Errors
     /// [`Reason::RowsTooDense`] for output times that doubles do not tell apart; [`Reason::TooManyRows`] for more than `most` rows, of
     /// so many columns besides time.

@@ -122,7 +122,7 @@ pub(super) struct Problem {
     /// The start is a right limit: edges of sources there have acted.
     pub(super) after_edges: bool,
     /// Comparators that were made to sources of edges.
-    pub(super) made: usize,
+    pub(super) known_comparators: usize,
     /// Rows are asked for at corners of the sources that are recorded.
     pub(super) rows_at_corners: bool,
 }
@@ -158,7 +158,7 @@ impl Problem {
             systems: Systems::of(standard),
             free_sources: false,
             after_edges: false,
-            made: 0,
+            known_comparators: 0,
             rows_at_corners: true,
         })
     }
@@ -187,7 +187,7 @@ impl Problem {
             systems: Systems::of(behaviour),
             free_sources: false,
             after_edges: false,
-            made: 0,
+            known_comparators: 0,
             rows_at_corners: true,
         }
     }

@@ -125,7 +125,7 @@ pub fn simulate(
     };
     let mut problem = Problem::of_circuit(circuit, behaviour, uic, &options.settings)?;
     if let Some((_, _, count)) = known {
-        problem.made = count;
+        problem.known_comparators = count;
     }
     if let Some(standing) = start {
         let place = Place {
@@ -218,10 +218,10 @@ fn dispatch(
         scheme,
         mut words,
     } = circuit.plan(&options);
-    if problem.made > 0 {
+    if problem.known_comparators > 0 {
         words.push(format!(
-            "{} comparators have sources alone for inputs: their edges are computed before the run",
-            problem.made
+            "comparators whose inputs are sources alone: {}, whose edges are computed before the run",
+            problem.known_comparators
         ));
     }
     if let (Method::Exact, Some(obstacle)) = (options.method, circuit.not_exact()) {
@@ -236,8 +236,7 @@ fn dispatch(
         units,
     } = Columns::of(&problem);
     let columns = names.len();
-    let most =
-        (!options.discard).then(|| options.settings.max_held / ((columns + 1) * size_of::<f64>()));
+    let most = (!options.discard).then(|| Grid::most(columns, options.settings.max_held));
     grid.check(columns, most)?;
     let endless = problem
         .too_short(&tran, &options.settings)

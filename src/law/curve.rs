@@ -27,6 +27,16 @@ struct Piece {
 }
 
 impl Curve {
+    /// The threshold and both levels of a curve that is one step, as a comparator's is.
+    #[must_use]
+    pub(crate) fn step(&self) -> Option<(f64, f64, f64)> {
+        let flat = self.first.1.f64 == 0.0 && self.last.1.f64 == 0.0;
+        match self.vertices[..] {
+            [(a, low), (b, high)] if flat && a.f64 == b.f64 => Some((a.f64, low.f64, high.f64)),
+            _ => None,
+        }
+    }
+
     /// Whether the points and directions are a maximal monotone curve.
     ///
     /// # Errors

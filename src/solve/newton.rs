@@ -366,6 +366,47 @@ mod tests {
         assert_eq!(solved(None), ([1.0, 0.0], [0.0, 1.0]));
     }
 
+    /// A diode that breaks down at 5 V, forward, leaking and broken down, is on its law: the junction alone serves down to where the other
+    /// exponential is rounding.
+    #[test]
+    fn a_junction_with_a_breakdown_is_on_its_law_on_both_sides_of_where_that_begins() {
+        let law = Law::Exponential(Exponential {
+            is: 1e-12,
+            slope: 0.03,
+            rs: 0.1,
+            breakdown: Some(Breakdown {
+                bv: 5.0,
+                ibv: 1e-3,
+                slope: 0.03,
+            }),
+        });
+        let ohms = 10.0;
+        let port = PortLaw {
+            law: law.clone(),
+            current: true,
+        };
+        let mut newton = Newton::new(&DMatrix::from_element(1, 1, ohms), &[port]);
+        for volts in [-20.0, -5.2, -4.9, -3.6, -3.4, -1.0, -1e-3, 0.5, 2.0, 20.0] {
+            // y = R i − V and y = −v: the diode behind a source of V.
+            let (mut i, mut y) = ([0.0], [-volts]);
+            assert!(
+                newton.solve(&[-volts], &mut i, &mut y, (1e-14, 1e-12)),
+                "{volts}"
+            );
+            let Resolvent { v, i: expected, .. } = law.resolvent(ohms, volts);
+            assert!(
+                (i[0] - expected).abs() <= 1e-11 * expected.abs() + 1e-26,
+                "{volts}: {} {expected}",
+                i[0]
+            );
+            assert!(
+                (y[0] + v).abs() <= 1e-11 * volts.abs(),
+                "{volts}: {} {v}",
+                -y[0]
+            );
+        }
+    }
+
     /// λ' − y' = w on the curve i(v), where λ' = λ/d and y' = d y are (i/d, −d v), or (−v/d, d i); and the slope is a difference.
     #[test]
     fn a_port_is_on_its_curve_whichever_quantity_is_lambda() {

@@ -52,6 +52,13 @@ def run(*arguments, **options):
     return done
 
 
+def page_of(folder, netlist):
+    """The page that the program makes of a netlist."""
+    (folder / "a.cir").write_text(netlist)
+    run("sim", folder / "a.cir", "-q", "-o", folder / "a.html")
+    return folder / "a.html"
+
+
 def rows(path):
     """A CSV file by column."""
     with open(path, newline="") as file:

@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from conftest import run
+from conftest import page_of
 from test_page import cell, colours, first, middle
 
 PWM = """one leg with a sine for its duty
@@ -25,10 +25,7 @@ r1 out 0 20
 @pytest.fixture(scope="module")
 def leg(tmp_path_factory):
     """800 periods of a duty that goes from 10 to 90 %, 0.75 of one a pixel."""
-    folder = tmp_path_factory.mktemp("leg")
-    (folder / "leg.cir").write_text(PWM)
-    run("sim", folder / "leg.cir", "-q", "-o", folder / "leg.html")
-    return folder / "leg.html"
+    return page_of(tmp_path_factory.mktemp("leg"), PWM)
 
 
 def lane(page, t, k=0):
@@ -99,10 +96,7 @@ def test_a_lane_takes_cursors_and_tells_the_share_between_them(leg, show):
 
 
 def test_bursts_keep_their_gaps(tmp_path, show):
-    netlist = tmp_path / "burst.cir"
-    netlist.write_text("bursts\nv1 a 0 1\nvg g 0 pulse(0 1 0 1n 1n 2u 5u)\nve e 0 pulse(0 1 0 1n 1n 2m 5m)\ns1 a b g 0 sw\ns2 b c e 0 sw\nr1 c 0 1k\nbq q 0 v=(v(g)>0.5)*(v(e)>0.5)\ns3 a d q 0 sw\nr3 d 0 1k\n.model sw sw(ron=1 roff=1meg vt=0.5)\n.tran 10u 20m\n.probe v(d)\n.end\n")
-    run("sim", netlist, "-q", "-o", tmp_path / "burst.html")
-    page = show(tmp_path / "burst.html")
+    page = show(page_of(tmp_path, "bursts\nv1 a 0 1\nvg g 0 pulse(0 1 0 1n 1n 2u 5u)\nve e 0 pulse(0 1 0 1n 1n 2m 5m)\ns1 a b g 0 sw\ns2 b c e 0 sw\nr1 c 0 1k\nbq q 0 v=(v(g)>0.5)*(v(e)>0.5)\ns3 a d q 0 sw\nr3 d 0 1k\n.model sw sw(ron=1 roff=1meg vt=0.5)\n.tran 10u 20m\n.probe v(d)\n.end\n"))
     for t, told in ((1e-3, "s3: on 40"), (3e-3, "s3: off from "), (6e-3, "s3: on 40")):
         page.mouse.move(*lane(page, t, page.evaluate("window.circ.strips.findIndex((s) => s.name === 's3')")))
         assert page.locator(".tip").inner_text().startswith(told)

@@ -4,7 +4,7 @@ import math
 import subprocess
 
 import pytest
-from conftest import CIRC, ROOT, rows, run
+from conftest import CIRC, ROOT, page_of, rows, run
 
 SINE = "a sine\nv1 in 0 sin(0 3 1k)\nr1 in out 1k\nc1 out 0 1n\n.tran 1u 10m\n.meas tran top max v(in)\n.end\n"
 BUCK = ROOT / "netlists/buck.cir"
@@ -557,10 +557,7 @@ r1 a 0 1k
 @pytest.fixture(scope="module")
 def switched(tmp_path_factory):
     """A current that is switched about every second pixel, and a sine in its midst, in one panel."""
-    folder = tmp_path_factory.mktemp("switched")
-    (folder / "a.cir").write_text(SWITCHED)
-    run("sim", folder / "a.cir", "-q", "-o", folder / "a.html")
-    return folder / "a.html"
+    return page_of(tmp_path_factory.mktemp("switched"), SWITCHED)
 
 
 def colours(canvas, y, box="0, c.width"):

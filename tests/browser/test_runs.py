@@ -1,7 +1,7 @@
 """Pages of many runs, and of signals of different sizes."""
 
 import pytest
-from conftest import run
+from conftest import page_of
 from test_page import middle, saved
 
 STEPS = "steps\n.param r=1k\nv1 a 0 sin(0 1 1k)\nr1 a b {r}\nc1 b 0 1u\n.step param r 0.5k 4k 0.1k\n.tran 10u 2m\n.probe v(a) v(b) i(r1)\n.end\n"
@@ -9,10 +9,7 @@ STEPS = "steps\n.param r=1k\nv1 a 0 sin(0 1 1k)\nr1 a b {r}\nc1 b 0 1u\n.step pa
 
 @pytest.fixture(scope="module")
 def many(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("many")
-    (folder / "steps.cir").write_text(STEPS)
-    run("sim", folder / "steps.cir", "-q", "-o", folder / "steps.html")
-    return folder / "steps.html"
+    return page_of(tmp_path_factory.mktemp("many"), STEPS)
 
 
 def test_many_runs_have_a_legend_that_scrolls_and_folds(many, show):
@@ -91,9 +88,7 @@ r3 mid 0 30k
 
 
 def test_a_small_ripple_is_seen_without_a_click(tmp_path, show):
-    (tmp_path / "a.cir").write_text(CONVERTER)
-    run("sim", tmp_path / "a.cir", "-q", "-o", tmp_path / "a.html")
-    page = show(tmp_path / "a.html")
+    page = show(page_of(tmp_path, CONVERTER))
     names = page.evaluate("window.circ.panels.map((p) => [p.quantity, p.curves.map((c) => c.name)])")
     assert names == [["voltage", ["v(out)"]], ["voltage 2", ["v(in)", "v(mid)"]], ["current", ["i(r1)"]]]
     low, high = page.evaluate("(() => { const y = window.circ.state.plots[0].scales.y; return [y.min, y.max]; })()")
@@ -101,10 +96,7 @@ def test_a_small_ripple_is_seen_without_a_click(tmp_path, show):
 
 
 def test_an_axis_is_fitted_to_one_signal(tmp_path, show):
-    netlist = tmp_path / "two.cir"
-    netlist.write_text("two\nv1 a 0 sin(0 10 1k)\nr1 a b 9k\nr2 b 0 1k\n.tran 10u 2m\n.end\n")
-    run("sim", netlist, "-q", "-o", tmp_path / "two.html")
-    page = show(tmp_path / "two.html")
+    page = show(page_of(tmp_path, "two\nv1 a 0 sin(0 10 1k)\nr1 a b 9k\nr2 b 0 1k\n.tran 10u 2m\n.end\n"))
     highest = lambda: page.evaluate("window.circ.state.plots[0].scales.y.max")
     assert page.evaluate("window.circ.panels[0].curves.map((c) => c.name)") == ["v(a)", "v(b)"] and highest() > 10
     fit = page.get_by_role("button", name="fit the axis to v(b)")
@@ -124,10 +116,7 @@ def test_an_axis_is_fitted_to_one_signal(tmp_path, show):
 
 
 def test_a_double_click_shows_a_curve_alone_in_its_panel(tmp_path, show):
-    netlist = tmp_path / "two.cir"
-    netlist.write_text("two\nv1 a 0 sin(0 10 1k)\nr1 a b 9k\nr2 b 0 1k\n.tran 10u 2m\n.probe v(a) v(b) i(r1)\n.end\n")
-    run("sim", netlist, "-q", "-o", tmp_path / "two.html")
-    page = show(tmp_path / "two.html")
+    page = show(page_of(tmp_path, "two\nv1 a 0 sin(0 10 1k)\nr1 a b 9k\nr2 b 0 1k\n.tran 10u 2m\n.probe v(a) v(b) i(r1)\n.end\n"))
     shown = lambda: page.evaluate("window.circ.panels.flatMap((p) => p.curves).filter((c) => c.shown).map((c) => c.name)")
     name = page.locator(".panel .names").first.get_by_role("button", name="v(b)", exact=True)
     name.dblclick()

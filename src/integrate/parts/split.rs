@@ -85,7 +85,7 @@ impl Problem {
             systems: Systems::of(multiport),
             free_sources: self.free_sources,
             after_edges: self.after_edges,
-            made: self.made,
+            known_comparators: self.known_comparators,
             rows_at_corners: self.rows_at_corners,
         }
     }

@@ -1,6 +1,7 @@
 //! Steps of circuits with curved laws whose lengths follow the error alone; the method stands in [`curved`](crate::integrate::curved).
 //!
-//! They go from corner to corner of the sources and from switching to switching, over any rows between: these are read from dense output.
+//! They go from corner to corner of the sources and from switching to switching, over corners of sources that act by switches alone and over any
+//! rows between: these are read from dense output.
 //! Where a caller stands still at any time it likes, steps end there.
 
 use super::ahead::Ahead;
