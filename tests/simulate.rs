@@ -129,6 +129,27 @@ fn steps_see_what_ends_at_a_diode_within_them() {
     }
 }
 
+/// A source falls by 5 V/µs, and the 46 A that it drives through two diodes end within 0.9 µs, in the second half of a step: the first diode
+/// would keep its 0 V until the end of that step, and of the step's second half, at any tolerance.
+#[test]
+fn steps_see_a_current_that_ends_behind_its_mean() {
+    let text = "v1 n 0 pulse(5 0 1u 1u 1u 1 2)\nc1 n a 122.2n ic=5\nc0 a 0 342.2n\nc2 a b 792.2n\nd0 b 0 di\nd1 n b dr\nr3 a 0 253\nr4 b 0 582
+.model di d(ideal)\n.model dr d(ron=0.1 roff=1meg vfwd=0.4)\n.tran 0.5u 5u uic";
+    let exact = at(&simulate(text, SimOptions::default()), "v(b)", 5e-6);
+    for tol in [1e-4, 1e-5, 1e-7] {
+        let options = SimOptions {
+            method: Method::Theta,
+            settings: Settings {
+                tol,
+                ..Settings::default()
+            },
+            ..SimOptions::default()
+        };
+        let found = at(&simulate(text, options), "v(b)", 5e-6);
+        close(found, exact, tol * 5.0);
+    }
+}
+
 /// A source that begins to rise by 5 V/µs, into 42.81 nF behind which a diode leads 114.3 nF to ground: their current begins at once, and that
 /// through 11.2 Ω and a diode beside the first one grows from nothing within microseconds.
 #[test]

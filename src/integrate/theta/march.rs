@@ -299,11 +299,13 @@ impl Theta {
         let whole = std::mem::take(&mut self.attempt.unseen);
         let middle = self.now.t + 0.5 * (t1 - self.now.t);
         self.attempt(0.5 * h, middle)?;
+        self.keep_first_half();
         self.commit(middle)?;
         unseen::without_smooth(&whole, &mut self.now.unseen);
         self.now.turned_off |= turned_off;
         self.now.settle = self.damped || self.now.turned_off;
         self.attempt(0.5 * h, t1)?;
+        let past = self.past_zero(0.5 * h);
         if last_chance && self.attempt.solved.is_some() {
             *impulse = self.impulse(0.5 * h)?.is_some();
         }
@@ -316,7 +318,8 @@ impl Theta {
         let error = self
             .amplitudes
             .error(&self.system().lcs, &self.coarse, &self.now.x);
-        let unseen = self.size_of(&self.now.unseen).max(self.size_of(&hidden));
+        let [unseen, hidden, past] = [&self.now.unseen, &hidden, &past].map(|e| self.size_of(e));
+        let unseen = unseen.max(hidden).max(past);
         let verdict = match &self.control {
             Some(control) => control.judge(h, error, unseen),
             None => Verdict {

@@ -12,6 +12,7 @@ mod jumps;
 mod lines;
 mod march;
 mod passage;
+mod past_zero;
 mod right_limit;
 mod stages;
 #[cfg(test)]
@@ -43,6 +44,7 @@ use crate::settings::tolerances::steps::{CORNER, FIRST, GRANT, GRANT_EMBEDDED};
 use crate::settings::tolerances::times::SPAN_PARTS;
 use crate::solve::{Solution, Status};
 use embedded::Smooth;
+use past_zero::FirstHalf;
 use stages::Tableau;
 use unseen::Looks;
 
@@ -135,6 +137,7 @@ pub struct Theta {
     y: Vec<f64>,
     attempt: Attempt,
     coarse: Vec<f64>,
+    first_half: FirstHalf,
     /// What differences of states are rounding, where a law is curved.
     rounding: Vec<f64>,
     /// Buffer for s.
@@ -339,6 +342,7 @@ impl Theta {
             y: Vec::new(),
             attempt: Attempt::default(),
             coarse: Vec::new(),
+            first_half: FirstHalf::default(),
             rounding: Vec::new(),
             stock: Vec::new(),
             control,
