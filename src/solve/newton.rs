@@ -366,6 +366,28 @@ mod tests {
         assert_eq!(solved(None), ([1.0, 0.0], [0.0, 1.0]));
     }
 
+    /// Steps never come to 1e-30 of the solution: those that shrink no more are rounding, and end where that is granted.
+    #[test]
+    fn rounding_ends_the_steps_where_it_is_granted() {
+        let law = Law::Exponential(Exponential {
+            is: 1e-14,
+            slope: 0.026,
+            rs: 0.0,
+            breakdown: None,
+        });
+        let port = || PortLaw {
+            law: law.clone(),
+            current: true,
+        };
+        let m = DMatrix::from_row_slice(3, 3, &[3.1, 0.7, 0.2, 0.7, 2.3, 0.9, 0.2, 0.9, 1.7]);
+        let mut newton = Newton::new(&m, &[port(), port(), port()]);
+        let mut solves = |granted: f64| {
+            let (mut lambda, mut y) = ([0.0; 3], [5.3, 7.1, -1.9]);
+            newton.solve(&[-5.3, -7.1, 1.9], &mut lambda, &mut y, (1e-30, granted))
+        };
+        assert!(solves(1e-9) && !solves(1e-30));
+    }
+
     /// A diode that breaks down at 5 V, forward, leaking and broken down, is on its law: the junction alone serves down to where the other
     /// exponential is rounding.
     #[test]

@@ -322,3 +322,32 @@ r1 o 0 3.023
         }
     }
 }
+
+/// A gate with edges of no width, which acts by the switch alone: a run that shows it, and so ends its steps at them, finds the same.
+#[test]
+fn true_edges_of_a_gate_act_whether_it_is_shown_or_not() {
+    let text = "buck
+v1 in 0 12
+s1 in a g 0 sm
+d1 0 a dx
+l1 a o 47u
+c1 o 0 100u
+r1 o 0 5
+vg g 0 pulse(0 6 1u 0 0 3.7u 10u)
+.model dx d(is=1e-8 n=1.05 rs=20m)
+.model sm sw(ron=50m roff=1meg vt=2.5 vh=0)
+.tran 1u 300u uic
+.save v(o) i(l1)
+.end
+";
+    let (run, shown) = (
+        transient(text, 1e-6),
+        transient(&text.replace(".save v(o)", ".save v(g) v(o)"), 1e-6),
+    );
+    assert_eq!(switched(&run, "s1"), switched(&shown, "s1"));
+    let last = |run: &Run| column(run, "v(o)").last().copied().unwrap();
+    assert!((last(&run) - last(&shown)).abs() < 1e-5 * last(&shown));
+    for probe in ["v(o)", "i(l1)"] {
+        assert!(difference(&run, &shown, probe, 0.0) < 1e-5, "{probe}");
+    }
+}
