@@ -436,3 +436,169 @@ fn a_run_in_steps_says_so() {
         }
     }
 }
+
+/// 10 A change between a switch and a diode at 400 V, 100 kHz: E = 1 mJ at 400 V and 10 A and 25 °C, half as much again at 125 °C.
+const COMMUTATION: &str = "commutation\nv1 a 0 400\ns1 a b g 0 sm\nd1 0 b dm\ni1 b 0 10\nvg g 0 pulse(0 5 0 0 0 4u 10u)\n\
+    .model sm sw(ideal vt=2.5 rthjc=[0.1 0.1]\n+ vloss=[0 800] iloss=[0 20] tloss=[25 125] eon=[0 0 0 4u 0 0 0 6u] eoff=[0 0 0 8u 0 0 0 12u])\n\
+    .model dm d(ideal vloss=400 iloss=10 err=2u)\n.tran 1u 1m\n.save v(b)\n";
+
+/// What a device loses: counts and energies of turning on and off and of recovering.
+fn lost(table: &Table, name: &str) -> [Option<(usize, f64)>; 3] {
+    let losses = table.element(name).and_then(|e| e.losses.clone());
+    let losses = losses.expect("losses");
+    [losses.on, losses.off, losses.recovery].map(|l| l.map(|l| (l.count, l.energy)))
+}
+
+#[test]
+fn a_switch_and_a_diode_lose_what_their_tables_say() {
+    let text = COMMUTATION.replace(" rthjc=[0.1 0.1]", "");
+    let table = table_of(&text);
+    let [on, off, recovery] = lost(&table, "s1");
+    let ((ons, on), (offs, off)) = (on.expect("on"), off.expect("off"));
+    // From 0⁺ on, the edge of the end included. `.temp` is 27 °C.
+    assert_eq!((ons, offs, recovery), (100, 100, None));
+    near(on, 100.0 * 1e-6 * 1.01, 1e-6);
+    near(off, 100.0 * 2e-6 * 1.01, 1e-6);
+    let [none, neither, recovery] = lost(&table, "d1");
+    assert_eq!((none, neither), (None, None));
+    let (count, energy) = recovery.expect("recoveries");
+    assert_eq!(count, 100);
+    near(energy, 100.0 * 2e-6, 1e-6);
+    let power = &table.power;
+    near(power.switching.expect("tables"), 0.303 + 0.2, 1.0);
+    // The edge at tstart is no part of what comes after it, the one at tstop is.
+    let late = table_of(&text.replace(".tran 1u 1m", ".tran 1u 1m 0.5m"));
+    assert_eq!(
+        lost(&late, "s1").map(|l| l.map(|l| l.0)),
+        [Some(50), Some(50), None]
+    );
+}
+
+/// A current of 10 A that comes out of the load: the upper switch blocks 400 V and then leads it backwards, and so without loss.
+#[test]
+fn a_current_against_the_voltage_costs_nothing() {
+    let text = "leg\nv1 a 0 400\ns1 a b g 0 sm\ns2 b 0 h 0 sm\ni1 0 b 10\nvg g 0 pulse(0 5 1u 0 0 4u 10u)\nvh h 0 pulse(5 0 1u 0 0 4u 10u)\n\
+        .model sm sw(ron=1u roff=1g vt=2.5 vloss=400 iloss=10 eon=1u eoff=2u)\n.tran 1u 1m\n.save v(b)\n";
+    let table = orbit_of(text, (&[], &[]));
+    let energies = |name: &str| {
+        lost(&table, name).map(|l| l.map(|(count, energy)| (count, (energy * 1e9).round())))
+    };
+    assert_eq!(energies("s1"), [Some((1, 0.0)), Some((1, 0.0)), None]);
+    assert_eq!(energies("s2"), [Some((1, 1e3)), Some((1, 2e3)), None]);
+}
+
+/// A period of what switches at its ends has each change once: by a clock with a diode of an exponential law, and by hysteresis, whose orbit begins at an
+/// event.
+#[test]
+fn what_changes_where_a_period_ends_changes_once() {
+    let stepped = COMMUTATION
+        .replace(" rthjc=[0.1 0.1]", "")
+        .replace("d(ideal vloss", "d(is=1e-12 n=1 vloss")
+        .replace("sw(ideal", "sw(ron=1m");
+    let hysteresis = "hysteresis\nv1 a 0 12\ns1 a b 0 o sm\nd1 0 b dm\nl1 b o 100u\nc1 o 0 10u\nr1 o 0 5\n\
+        .model sm sw(ron=1m vt=-5 vh=0.1 vloss=12 iloss=1 eon=1u eoff=1u)\n.model dm d(ideal err=1u)\n.tran 1u 5m\n.save v(o)\n";
+    let regulators = (0..12).map(|k| {
+        let henries = format!("l1 b o {}u", 100.0 + 7.3 * f64::from(k));
+        (hysteresis.replace("l1 b o 100u", &henries), true)
+    });
+    for (text, exact) in regulators.chain([(stepped, false)]) {
+        let table = orbit_of(&text, (&[], &[]));
+        assert_eq!(table.exact, exact);
+        let counts = |name: &str| lost(&table, name).map(|l| l.map(|(count, _)| count));
+        assert_eq!(counts("s1"), [Some(1), Some(1), None], "{text}");
+        assert_eq!(counts("d1"), [None, None, Some(1)], "{text}");
+    }
+}
+
+/// T = 40 + 0.7 P_s + 0.5 P_d with P_s = 0.3 (1 + 0.005 (T_s − 25)) and P_d = 0.2.
+#[test]
+fn losses_and_temperatures_agree() {
+    let sink = ".thermal hs s1 d1\nrh hs amb 0.5\nch hs 0 10\nvamb amb 0 40\n";
+    let table = orbit_of(&format!("{COMMUTATION}{sink}"), (&[], &[]));
+    assert!(table.exact, "{:?}", table.notes);
+    let [on, off, _] = lost(&table, "s1");
+    let [_, _, recovery] = lost(&table, "d1");
+    let counts = [on, off, recovery].map(|l| l.expect("losses").0);
+    assert_eq!(counts, [1, 1, 1]);
+    let of = |name: &str| table.element(name).and_then(|e| e.losses.clone());
+    let (s, d) = (of("s1").expect("s1"), of("d1").expect("d1"));
+    let warm = (40.0 + 0.7 * 0.3 * (1.0 - 0.125) + 0.5 * 0.2) / (1.0 - 0.7 * 0.0015);
+    near(s.temperature.expect("warm"), warm, 1.0);
+    let power = 0.3 * (1.0 + 0.005 * (warm - 25.0));
+    near(s.switching, power, 1.0);
+    near(s.total, power, 1.0);
+    let sink = 40.0 + 0.5 * (power + 0.2);
+    near(d.temperature.expect("warm"), sink, 1.0);
+    assert_eq!(table.temperatures[0].0, "hs");
+    near(table.temperatures[0].1, sink, 1.0);
+    // 2 MW/K is more than leaves.
+    let steep = COMMUTATION.replace("0 0 0 6u]", "0 0 0 6]");
+    let table = orbit_of(&steep, (&[], &[]));
+    assert!(
+        table
+            .notes
+            .iter()
+            .any(|n| n.text.contains("thermal runaway"))
+    );
+    assert_eq!(
+        table
+            .element("s1")
+            .and_then(|e| e.losses.clone())
+            .expect("s1")
+            .temperature,
+        None
+    );
+}
+
+/// A half bridge of MOSFETs with a dead time: the current of the load, 10 A out of it, flows through the body of the lower one in it, which recovers
+/// when the upper one turns on; the lower one turns on and off without voltage.
+#[test]
+fn a_body_diode_recovers_and_its_channel_switches_softly() {
+    let tables = "ron=0 rthjc=1 vloss=400 iloss=10 eon=1u eoff=2u err=4u";
+    let text = format!(
+        "leg\nv1 a 0 400\nm1 a g b b fet\nm2 b h 0 0 fet\ni1 b 0 10\nvg g b pulse(0 9 1u 0 0 4u 10u)\nvh h 0 pulse(9 0 0 0 0 6u 10u)\n\
+         .model fet vdmos(vto=3 {tables})\n.tran 1u 1m\n.save v(b)\n"
+    );
+    for exact in [true, false] {
+        let table = if exact {
+            orbit_of(&text, (&[], &[]))
+        } else {
+            let options = TableOptions {
+                method: Method::Theta,
+                ..TableOptions::default()
+            };
+            let text = text.replace(".tran 1u 1m", ".tran 0.1u 10.5u");
+            table(&parsed(&text), &options).expect("a table")
+        };
+        assert_eq!(table.exact, exact);
+        let upper = lost(&table, "m1").map(|l| l.expect("tables"));
+        let lower = lost(&table, "m2").map(|l| l.expect("tables"));
+        assert_eq!(upper.map(|(count, _)| count), [1, 1, 0]);
+        assert_eq!(lower.map(|(count, _)| count), [1, 1, 1]);
+        for (energy, truth) in [upper[0].1, upper[1].1, lower[0].1, lower[1].1, lower[2].1]
+            .into_iter()
+            .zip([1e-6, 2e-6, 0.0, 0.0, 4e-6])
+        {
+            assert!((energy - truth).abs() < 1e-12, "{energy} {truth} {exact}");
+        }
+    }
+}
+
+/// Two diodes in parallel take 5 A each, where the table has a knee, and half the resistance to the case.
+#[test]
+fn devices_in_parallel_share_current_and_heat() {
+    let one = "d1 0 b dm\n";
+    let text = COMMUTATION.replace(
+        "vloss=400 iloss=10 err=2u",
+        "vloss=400 iloss=[0 5 20] err=[0 1u 10u] rthjc=8",
+    );
+    for (card, energy, kelvin) in [(one, 4e-6, 0.4 * 8.0), ("d1 0 b dm 2\n", 2e-6, 0.2 * 4.0)] {
+        let table = orbit_of(&text.replace(one, card), (&[], &[]));
+        let losses = table
+            .element("d1")
+            .and_then(|e| e.losses.clone())
+            .expect("d1");
+        near(losses.recovery.expect("a recovery").energy, energy, 1e-6);
+        near(losses.temperature.expect("warm"), 27.0 + kelvin, 1.0);
+    }
+}

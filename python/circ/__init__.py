@@ -140,7 +140,10 @@ class Model:
         return json.loads(self._core.sensitivity(list(of), list(to), steady))
 
     def table(self, *, steady: bool = False, inputs: Sequence[str] = (), outputs: Sequence[str] = ()) -> dict[str, Any]:
-        """Per element mean, rms, extrema of current and voltage, mean power; efficiency, of the transient or the steady state."""
+        """Per element mean, rms, extrema of current and voltage, mean power and losses; efficiency, of the transient or the steady state.
+
+        `["d1"]["losses"]` where the model has loss tables or `.thermal` names the device: W, J and °C; what to know is in `["part"]["notes"]`.
+        """
         return json.loads(self._core.table(steady, list(inputs), list(outputs)))
 
     def op(self) -> dict[str, Any]:

@@ -146,6 +146,28 @@ def test_op_check_table_and_sensitivity():
     assert to["r1"] == pytest.approx(-5 * math.exp(-5) / 1e3, rel=1e-5)
 
 
+def test_a_table_has_losses_and_tells_of_a_runaway():
+    text = """commutation
+v1 a 0 400
+s1 a b g 0 sm
+d1 0 b dm
+i1 b 0 10
+vg g 0 pulse(0 5 0 0 0 4u 10u)
+.model sm sw(ideal vt=2.5 rthjc=0.2 vloss=400 iloss=10 tloss=[25 125] eon=[1u {hot}])
+.model dm d(ideal vloss=400 iloss=10 err=2u)
+.tran 1u 1m
+.save v(b)
+"""
+    table = circ.parse(text.replace("{hot}", "1.5u")).table(steady=True)
+    losses = table["s1"]["losses"]
+    warm = 27 + 0.2 * 0.1 * (1 + 0.005 * 2) / (1 - 0.2 * 0.0005)
+    assert losses["on"]["count"] == 1 and abs(losses["temperature"] - warm) < 1e-9
+    assert abs(table["power"]["switching"] - losses["switching"] - 0.2) < 1e-12
+    table = circ.parse(text.replace("{hot}", "1")).table(steady=True)
+    assert table["s1"]["losses"]["temperature"] is None
+    assert any("thermal runaway" in note for note in table["part"]["notes"])
+
+
 def test_steady_state():
     p = circ.parse(BUCK).pss()
     assert p.pss["stable"] and p.pss["period"] == pytest.approx(10e-6)

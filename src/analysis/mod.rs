@@ -46,6 +46,7 @@ pub use sweep::{
     Row, SweepOptions, Variant, drawn_names, each, measured_names, samples, steps, sweep, variants,
 };
 pub use table::{
-    ElementMeans, Mean, SignalMeans, Span, Table, TableOptions, Throughput, periodic_table, table,
+    DeviceLosses, ElementMeans, Mean, SignalMeans, Span, Switching, Table, TableOptions,
+    Throughput, periodic_table, table,
 };
 pub use worst::{Bound, Worst, WorstOptions, worst};

@@ -67,6 +67,12 @@ pub(super) struct Builder<'n, 'o> {
     pub(super) dc_cards: Option<&'n [ast::Sweep]>,
     pub(super) ac_card: Option<&'n ast::Frequencies>,
     pub(super) pss_card: Option<&'n ast::Pss>,
+    /// `.thermal`.
+    pub(super) thermals: Vec<&'n ast::Thermal>,
+    /// Their nodes, in the network.
+    pub(super) thermal_nodes: Vec<NodeId>,
+    /// Names of the cards of the network.
+    pub(super) thermal_names: HashSet<&'n str>,
     /// Values that `alter` sets, by element; the last one counts.
     pub(super) altered: Vec<(&'n Name, Value)>,
     /// Names of the elements of the top level.
@@ -113,6 +119,9 @@ impl<'n, 'o> Builder<'n, 'o> {
             dc_cards: None,
             ac_card: None,
             pss_card: None,
+            thermals: Vec::new(),
+            thermal_nodes: Vec::new(),
+            thermal_names: HashSet::new(),
             altered: Vec::new(),
             root_elements: HashSet::new(),
             choices: VecDeque::new(),
@@ -149,6 +158,7 @@ impl<'n, 'o> Builder<'n, 'o> {
         self.steady();
         self.dc_sweeps();
         self.frequencies();
+        self.thermal_network(&netlist.body);
         self.elements(&netlist.body, ScopeId::ROOT);
         if self.circuit.elements.is_empty() && read && !self.failed() {
             self.tell(
@@ -198,6 +208,9 @@ impl<'n, 'o> Builder<'n, 'o> {
     fn elements(&mut self, block: &'n Block, scope: ScopeId) {
         for statement in &block.statements {
             match statement {
+                Statement::Element(element)
+                    if scope == ScopeId::ROOT
+                        && self.thermal_names.contains(element.name.text.as_str()) => {}
                 Statement::Element(element) => self.element(element, scope),
                 Statement::If(branches) => {
                     if let Some(branch) = self
@@ -447,6 +460,7 @@ impl<'n, 'o> Builder<'n, 'o> {
             }
         }
         self.couple();
+        self.cases();
         for (scope, list) in std::mem::take(&mut self.ics) {
             self.initial(list, scope);
         }

@@ -90,6 +90,13 @@ impl<'n> Builder<'n, '_> {
             Statement::Ic(list) => self.ics.push((scope, list)),
             Statement::Nodeset(list) => self.nodesets.push((scope, list)),
             Statement::Temperature(value) => self.temperature = Some(value),
+            Statement::Thermal(card) if scope == ScopeId::ROOT => self.thermals.push(card),
+            Statement::Thermal(card) => {
+                let message = "`.thermal` inside a subcircuit is not supported yet";
+                let fault = Diagnostic::error("unsupported", card.node.span, message);
+                let help = "write it at the top level, with full names of devices (`x1.m1`)";
+                self.tell(fault.label("recognised only").help(help));
+            }
             Statement::Save(list) => {
                 self.saves.push((scope, list));
                 self.dc_saves.push((scope, list));

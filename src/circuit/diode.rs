@@ -2,6 +2,7 @@
 
 use super::builder::Builder;
 use super::elaborate::Diodes;
+use super::losses::Changing;
 use super::model::{ONE, Parameters, ZERO};
 use super::passive::Args;
 use super::scope::ScopeId;
@@ -66,6 +67,12 @@ impl<'n> Builder<'n, '_> {
                 let factor = self.factor(area.or(args.get(&["area"])), args, scope)?;
                 let params = Parameters::new(&chain);
                 self.misspelt(name, &params, &PIECEWISE);
+                let device = self.full_name(&card.name, scope);
+                let changing = Changing {
+                    switch: None,
+                    diode: Some(device.clone()),
+                };
+                self.losses((&device, name), &params, changing, factor, scope);
                 self.diode_law(card, name, &params, args, scope)
                     .map(|law| scaled(law, factor))
             })

@@ -25,6 +25,7 @@ mod functions;
 mod held;
 mod line;
 pub(crate) mod load;
+mod losses;
 mod measurement;
 mod model;
 mod names;
@@ -42,6 +43,7 @@ mod smooth;
 pub mod source;
 mod sweep;
 mod switch;
+mod thermal;
 mod threshold;
 mod thyristor;
 mod tones;
@@ -57,12 +59,14 @@ pub use draw::{Spread, Tolerance};
 pub use elaborate::{Diodes, ElaborateOptions, elaborate};
 pub use formula::Formula;
 pub use held::{held_at, holder};
+pub use losses::{EnergyTable, Losses};
 pub use measurement::{FourierAnalysis, Harmonics, Measured, NamedMeasurement};
 pub(crate) use measurement::{Seen, carried_out};
 pub use pin::Pins;
 pub use shown::Column;
 pub use source::Source;
 pub use sweep::{Sweep, Swept, combinations};
+pub use thermal::Thermal;
 
 /// A node; 0 is ground.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -146,6 +150,10 @@ pub struct Circuit {
     pub responses: Vec<NamedMeasurement>,
     /// The signals that those need.
     pub responded: Vec<Probe>,
+    /// Devices whose models have tables of losses, or a way of their heat to the case.
+    pub losses: Vec<Losses>,
+    /// Where their heat goes.
+    pub thermal: Thermal,
 }
 
 /// One branch of the circuit (or a controlled output), from node `p` to node `n`.

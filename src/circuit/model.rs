@@ -14,9 +14,9 @@ pub(super) const ZERO: Value = Value::decimal(0.0, 0, 0);
 pub(super) const ONE: Value = Value::decimal(1.0, 1, 0);
 
 /// Parameters of diodes and switches in SPICE's dialects that may look like others.
-const OF_MODELS: [&str; 18] = [
+const OF_MODELS: [&str; 23] = [
     "ibv", "nbv", "isr", "ikr", "ikf", "rth0", "trs1", "trs2", "tbv1", "tbv2", "vser", "lser",
-    "vpk", "ipk", "irms", "iave", "ideal", "cjo",
+    "vpk", "ipk", "irms", "iave", "ideal", "cjo", "eon", "eoff", "err", "vloss", "iloss",
 ];
 
 /// What levels are called, by the letter of their elements.
@@ -84,7 +84,10 @@ impl<'n> Builder<'n, '_> {
             chain.push(model);
             match &model.base {
                 Some(base) => wanted = base.clone(),
-                None => return Some(chain),
+                None => {
+                    self.idle_losses(card, name, &chain);
+                    return Some(chain);
+                }
             }
         }
     }

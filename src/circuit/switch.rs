@@ -1,6 +1,7 @@
 //! S and W: models to switches.
 
 use super::builder::{Builder, Pending};
+use super::losses::Changing;
 use super::model::{ONE, Parameters, ZERO};
 use super::scope::ScopeId;
 use super::{Affine, Element, Kind, NodeId, Switch, smooth};
@@ -52,6 +53,14 @@ impl<'n> Builder<'n, '_> {
             let law = Law::Curve(smooth::law(levels, ohms, smooth.len()));
             self.add(part(full, p, Kind::Device(law)));
             return;
+        }
+        if let Some(chain) = self.model(card, name, scope) {
+            let changing = Changing {
+                switch: smooth.is_empty().then(|| full.clone()),
+                diode: None,
+            };
+            let params = Parameters::new(&chain);
+            self.losses((&full, name), &params, changing, 1.0, scope);
         }
         let mut switches = Vec::new();
         if smooth.is_empty() {

@@ -13,6 +13,7 @@
 mod drive;
 
 use super::builder::Builder;
+use super::losses::Changing;
 use super::model::{Parameters, ZERO};
 use super::passive::Args;
 use super::scope::ScopeId;
@@ -57,6 +58,8 @@ struct Figures {
     roff: Option<Value>,
     /// Series resistance of the body diode, Ω.
     body: Value,
+    /// m times the area factor.
+    times: f64,
 }
 
 impl<'n> Builder<'n, '_> {
@@ -157,16 +160,22 @@ impl<'n> Builder<'n, '_> {
             let (p, n) = if sort.mirrored { (n, p) } else { (p, n) };
             part(suffix, p, n, resistance(figures.body, ZERO));
         };
+        let mos = matches!(sort.family, Family::Mos | Family::Vdmos);
+        let with_body = mos && (bulk == source || bulk == drain);
         match sort.family {
-            Family::Mos | Family::Vdmos if bulk == source || bulk == drain => {
-                diode(".body", source, inner)
-            }
+            _ if with_body => diode(".body", source, inner),
             Family::Mos | Family::Vdmos => {
                 diode(".bd", bulk, inner);
                 diode(".bs", bulk, source);
             }
             Family::Jfet | Family::Igbt => {}
         }
+        let changing = Changing {
+            switch: Some(format!("{full}.channel")),
+            diode: with_body.then(|| format!("{full}.body")),
+        };
+        let (names, params) = ((full.as_str(), name), Parameters::new(&chain));
+        self.losses(names, &params, changing, figures.times, scope);
         self.channels.extend(switch.map(|switch| Channel {
             switch,
             device: full,
@@ -338,6 +347,7 @@ impl<'n> Builder<'n, '_> {
             } else {
                 ZERO
             },
+            times,
         })
     }
 }

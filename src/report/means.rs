@@ -1,7 +1,7 @@
 //! The table of means, extrema and powers in words.
 
 use super::{si, table};
-use crate::analysis::{Mean, SignalMeans, Table, Throughput};
+use crate::analysis::{DeviceLosses, Mean, SignalMeans, Switching, Table, Throughput};
 
 /// Digits shown.
 const DIGITS: usize = 4;
@@ -77,12 +77,15 @@ impl Table {
         });
         let header = ["signal", "mean", "rms", "min", "max", "ripple", &thd];
         text.push_str(&table::aligned(&header, &rows));
+        text.push_str(&self.losses());
         let Throughput {
             input,
             output,
             efficiency,
             inputs,
             outputs,
+            switching,
+            efficiency_with_switching,
         } = &self.power;
         let of = |names: &[String]| match names {
             [] => String::new(),
@@ -103,7 +106,69 @@ impl Table {
         } else if outputs.is_empty() {
             text.push_str("; `--out` with the names of loads adds output and efficiency");
         }
+        if let Some(switching) = switching {
+            let switching = si::quantity(*switching, "W", DIGITS);
+            text.push_str(&format!("; switching {switching}"));
+        }
+        if let Some(efficiency) = efficiency_with_switching {
+            let percent = si::plain(100.0 * efficiency, DIGITS);
+            text.push_str(&format!(", efficiency with it {percent} %"));
+        }
         text.push('\n');
+        text
+    }
+
+    /// A table of the devices with losses of their own or a way of their heat, and one of the temperatures of the network.
+    fn losses(&self) -> String {
+        let devices = self.elements.iter();
+        let devices: Vec<(&str, &DeviceLosses)> = devices
+            .filter_map(|element| Some((element.name.as_str(), element.losses.as_ref()?)))
+            .collect();
+        if devices.is_empty() {
+            return String::new();
+        }
+        let changes = |changes: &Option<Switching>| match changes {
+            Some(Switching { count, energy }) => {
+                format!(
+                    "{count} · {}",
+                    si::quantity(*energy / (*count).max(1) as f64, "J", DIGITS)
+                )
+            }
+            None => "-".into(),
+        };
+        let watts = |power: f64| si::quantity(power, "W", DIGITS);
+        let celsius = |t: f64| format!("{} °C", si::plain(t, DIGITS));
+        let rows = devices.iter().map(|(name, losses)| {
+            vec![
+                (*name).to_owned(),
+                changes(&losses.on),
+                changes(&losses.off),
+                changes(&losses.recovery),
+                watts(losses.conduction),
+                watts(losses.switching),
+                watts(losses.total),
+                losses.temperature.map_or("-".into(), celsius),
+            ]
+        });
+        let rows: Vec<Vec<String>> = rows.collect();
+        let header = [
+            "device",
+            "turns on",
+            "turns off",
+            "recovers",
+            "conduction",
+            "switching",
+            "losses",
+            "junction",
+        ];
+        let mut text = table::aligned(&header, &rows);
+        if !self.temperatures.is_empty() {
+            let nodes = self.temperatures.iter();
+            let nodes: Vec<String> = nodes
+                .map(|(node, t)| format!("{node} {}", celsius(*t)))
+                .collect();
+            text.push_str(&format!("thermal network: {}\n", nodes.join(", ")));
+        }
         text
     }
 }

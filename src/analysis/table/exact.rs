@@ -4,11 +4,13 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DVector};
 
+use super::commutation::{Commutations, Costs};
 use super::extrema::Extrema;
 use super::{Columns, Span, Sums, distortion, integrals};
 use crate::analysis::variation::{Course, Leap, Linear};
 use crate::circuit::Kind;
 use crate::integrate::Error;
+use crate::settings::tolerances::times::SAME_TIME;
 
 /// Sums over the whole span, and from some time on.
 struct Account {
@@ -31,7 +33,7 @@ pub(super) fn sums(
     columns: &Columns<'_>,
     course: &Course,
     span: Span,
-    period: Option<f64>,
+    (period, closes): (Option<f64>, bool),
 ) -> Result<Sums, Error> {
     let (count, elements) = (columns.probes.len(), columns.elements.len());
     // The last period: in those before it a circuit may still settle.
@@ -108,6 +110,13 @@ pub(super) fn sums(
             }
         }
     }
+    let costs = costs(
+        columns,
+        course,
+        (span.from, closes),
+        (&first, &last),
+        &extrema,
+    );
     let seconds = whole.map_or(0.0, |whole| span.to - whole);
     let distortions = columns.shown.iter().map(|&c| {
         period?;
@@ -121,7 +130,36 @@ pub(super) fn sums(
         work: all.work,
         least: extrema.least,
         greatest: extrema.greatest,
+        costs,
     })
+}
+
+/// Of changes of state after a time; where the course closes, its end and its start are an instant too.
+fn costs(
+    columns: &Columns<'_>,
+    course: &Course,
+    (from, closes): (f64, bool),
+    (first, last): (&[Option<DVector<f64>>], &[Option<DVector<f64>>]),
+    extrema: &Extrema,
+) -> Vec<Costs> {
+    let mut commutations = Commutations::of(columns, (&extrema.least, &extrema.greatest));
+    let stretches = &course.stretches;
+    let same = SAME_TIME * stretches.last().map_or(0.0, |last| last.to.abs());
+    let following = (1..stretches.len()).map(|k| (k - 1, k));
+    let following = following.filter(|(_, k)| stretches[*k].from > from + same);
+    let closing = closes.then(|| (stretches.len().saturating_sub(1), 0));
+    for (a, b) in following.chain(closing) {
+        let positions = [a, b].map(|k| &course.systems[stretches[k].system].key.switches);
+        let moved = |name: &str| {
+            let at = columns.switches.iter().position(|own| own == name)?;
+            let [was, is] = positions.map(|switches| switches.get(at).copied());
+            is.filter(|_| was != is)
+        };
+        if let (Some(before), Some(after)) = (&last[a], &first[b]) {
+            commutations.see(moved, (before.as_slice(), after.as_slice()));
+        }
+    }
+    commutations.costs
 }
 
 /// Work into sources and storage in a leap, J: the area of one factor's impulse times the other factor. That moves linearly with the charge

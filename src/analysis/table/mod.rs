@@ -1,8 +1,11 @@
 //! Means, root mean squares, extrema and powers of all elements, in closed form between events.
 
+mod commutation;
 mod exact;
 mod extrema;
+mod heat;
 mod integrals;
+mod losses;
 mod rows;
 
 use std::collections::BTreeMap;
@@ -19,6 +22,8 @@ use crate::integrate::{Error, Method, Note, Reason, Run, SimOptions, Standing};
 use crate::model::Model;
 use crate::settings::Settings;
 use crate::settings::tolerances::periodic::{FUNDAMENTAL, STORED};
+use commutation::Costs;
+pub use losses::{DeviceLosses, Switching};
 
 /// Rows of a run in steps at least: a coarser print step is divided.
 const ROWS: usize = 2000;
@@ -48,6 +53,9 @@ pub struct ElementMeans {
     pub v: Mean,
     /// Mean power into it and its parts (`m1.body`, `l1.rser`), W.
     pub power: f64,
+    /// Where its model has loss tables, or its heat a way out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub losses: Option<DeviceLosses>,
 }
 
 /// A signal over a span of time.
@@ -78,6 +86,12 @@ pub struct Throughput {
     pub output: f64,
     /// output/input; none without outputs or input.
     pub efficiency: Option<f64>,
+    /// Mean power of changes of state by loss tables, which is no part of the input, W; none without tables.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub switching: Option<f64>,
+    /// output/(input + switching); none without one of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub efficiency_with_switching: Option<f64>,
     /// Elements from which power comes.
     pub inputs: Vec<String>,
     /// Elements that take it.
@@ -108,6 +122,8 @@ pub struct Table {
     pub power: Throughput,
     /// The frequency of [`SignalMeans::thd`], Hz.
     pub fundamental: Option<f64>,
+    /// Of the nodes of the thermal network, at rest, °C.
+    pub temperatures: Vec<(String, f64)>,
     /// Things the user should know.
     pub notes: Vec<Note>,
 }
@@ -136,11 +152,15 @@ impl Serialize for Table {
             }
         }
         #[derive(Serialize)]
-        struct Part {
+        struct Part<'a> {
             #[serde(flatten)]
             span: Span,
             exact: bool,
             fundamental: Option<f64>,
+            #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+            temperatures: BTreeMap<&'a str, f64>,
+            #[serde(skip_serializing_if = "Vec::is_empty")]
+            notes: Vec<&'a str>,
         }
         let mut map = serializer.serialize_map(Some(self.elements.len() + 3))?;
         for element in &self.elements {
@@ -152,6 +172,12 @@ impl Serialize for Table {
             span: self.span,
             exact: self.exact,
             fundamental: self.fundamental,
+            temperatures: self
+                .temperatures
+                .iter()
+                .map(|(n, t)| (n.as_str(), *t))
+                .collect(),
+            notes: self.notes.iter().map(|note| note.text.as_str()).collect(),
         };
         map.serialize_entry("part", &part)?;
         map.end()
@@ -218,7 +244,7 @@ pub fn table(model: &Model, options: &TableOptions<'_>) -> Result<Table, Error> 
     };
     let period = common_period(model.circuit()).filter(|period| *period <= span.to - span.from);
     if let Some(course) = course(&probing, options.method, start.as_ref(), tran.tstop, asked)? {
-        return columns.exact(&course, span, period);
+        return columns.exact(&course, span, (period, false));
     }
     let rows = |tran: Tran| {
         if options.step.is_none() {
@@ -243,7 +269,7 @@ pub fn table(model: &Model, options: &TableOptions<'_>) -> Result<Table, Error> 
         unestimated: true,
         ..SimOptions::default()
     })?;
-    Ok(columns.of_rows(&run, span, period))
+    Ok(columns.of_rows(&run, span, (period, false)))
 }
 
 /// The means of all elements over a period of the steady state of [`periodic`](super::periodic()).
@@ -265,7 +291,7 @@ pub fn periodic_table(
             from,
             to: from + orbit.period,
         };
-        let mut table = columns.exact(&course, span, fundamental)?;
+        let mut table = columns.exact(&course, span, (fundamental, true))?;
         table.span = Span {
             from: 0.0,
             to: orbit.period,
@@ -281,7 +307,7 @@ pub fn periodic_table(
         from: 0.0,
         to: orbit.period,
     };
-    Ok(columns.of_rows(&run, span, fundamental))
+    Ok(columns.of_rows(&run, span, (fundamental, true)))
 }
 
 /// With so many rows at least.
@@ -301,6 +327,8 @@ struct Columns<'a> {
     elements: Vec<(usize, usize)>,
     /// The signals that the circuit shows.
     shown: Vec<usize>,
+    /// The switches, in the order of their positions.
+    switches: Vec<String>,
     inputs: Vec<usize>,
     outputs: Vec<usize>,
 }
@@ -317,6 +345,8 @@ struct Sums {
     work: Vec<f64>,
     /// Over the last period, by signal shown.
     distortion: Vec<Option<f64>>,
+    /// Of changes of state, by device with loss tables.
+    costs: Vec<Costs>,
 }
 
 impl<'a> Columns<'a> {
@@ -368,11 +398,14 @@ impl<'a> Columns<'a> {
             [] => sources().filter(|k| !outputs.contains(k)).collect(),
             named => named.iter().map(find).collect::<Result<_, _>>()?,
         };
+        let is_switch = |e: &&Element| matches!(e.kind, Kind::Switch(_));
+        let switches = circuit.elements.iter().filter(is_switch);
         Ok(Self {
             circuit,
             probes,
             elements,
             shown,
+            switches: switches.map(|e| e.name.clone()).collect(),
             inputs,
             outputs,
         })
@@ -399,13 +432,19 @@ impl<'a> Columns<'a> {
         })
     }
 
-    fn exact(&self, course: &Course, span: Span, period: Option<f64>) -> Result<Table, Error> {
-        let sums = exact::sums(self, course, span, period)?;
+    /// With the period of the sources, and whether the span is one after which all begins anew.
+    fn exact(
+        &self,
+        course: &Course,
+        span: Span,
+        (period, closes): (Option<f64>, bool),
+    ) -> Result<Table, Error> {
+        let sums = exact::sums(self, course, span, (period, closes))?;
         Ok(self.table(&sums, span, period, true))
     }
 
-    fn of_rows(&self, run: &Run, span: Span, period: Option<f64>) -> Table {
-        let sums = rows::sums(self, run, span, period);
+    fn of_rows(&self, run: &Run, span: Span, (period, closes): (Option<f64>, bool)) -> Table {
+        let sums = rows::sums(self, run, span, (period, closes));
         let mut table = self.table(&sums, span, period, false);
         let text = "the table is that of straight lines between steps, and not exact";
         table.notes.push(text.to_string().into());
@@ -442,8 +481,10 @@ impl<'a> Columns<'a> {
                 i: mean(*i),
                 v: mean(across),
                 power: work / seconds,
+                losses: None,
             }
         });
+        let mut elements: Vec<ElementMeans> = elements.collect();
         let signals = self.shown.iter().zip(&sums.distortion).map(|(k, thd)| {
             let value = mean(*k);
             let name = self.probes[*k].name.clone();
@@ -465,6 +506,12 @@ impl<'a> Columns<'a> {
         };
         let storage: Vec<usize> = (0..self.circuit.elements.len()).filter(stores).collect();
         let stored = power(&storage, 1.0) / input;
+        let lost = losses::lost(self, &elements, &sums.costs, seconds);
+        let own = lost.losses.iter().flatten().map(|device| device.switching);
+        let switching = (!self.circuit.losses.is_empty()).then(|| own.sum::<f64>());
+        for (element, losses) in elements.iter_mut().zip(lost.losses) {
+            element.losses = losses;
+        }
         let notes = (known && stored.abs() > STORED).then(|| {
             let (share, verb) = (100.0 * stored.abs(), if stored > 0.0 { "went into" } else { "came out of" });
             Note::from(format!(
@@ -474,17 +521,22 @@ impl<'a> Columns<'a> {
         Table {
             span,
             exact,
-            elements: elements.collect(),
+            elements,
             signals: signals.collect(),
             power: Throughput {
                 input: input / seconds,
                 output: output / seconds,
                 efficiency: known.then(|| output / input),
+                switching,
+                efficiency_with_switching: switching
+                    .filter(|_| known)
+                    .map(|more| output / (input + more * seconds)),
                 inputs: names(&self.inputs),
                 outputs: names(&self.outputs),
             },
             fundamental: period.map(f64::recip),
-            notes: notes.into_iter().collect(),
+            temperatures: lost.temperatures,
+            notes: lost.notes.into_iter().chain(notes).collect(),
         }
     }
 }

@@ -4,10 +4,17 @@ use std::f64::consts::TAU;
 
 use nalgebra::Complex;
 
+use super::commutation::{Commutations, Costs};
 use super::{Columns, Span, Sums, distortion};
 use crate::integrate::Run;
+use crate::settings::tolerances::times::SAME_TIME;
 
-pub(super) fn sums(columns: &Columns<'_>, run: &Run, span: Span, period: Option<f64>) -> Sums {
+pub(super) fn sums(
+    columns: &Columns<'_>,
+    run: &Run,
+    span: Span,
+    (period, closes): (Option<f64>, bool),
+) -> Sums {
     let waves = &run.waveforms;
     let count = columns.probes.len();
     let mut sums = Sums {
@@ -17,6 +24,7 @@ pub(super) fn sums(columns: &Columns<'_>, run: &Run, span: Span, period: Option<
         greatest: vec![f64::NEG_INFINITY; count],
         work: vec![0.0; columns.elements.len()],
         distortion: vec![None; columns.shown.len()],
+        costs: Vec::new(),
     };
     let seconds = period.unwrap_or(0.0);
     let whole = (span.to - seconds).max(span.from);
@@ -59,5 +67,43 @@ pub(super) fn sums(columns: &Columns<'_>, run: &Run, span: Span, period: Option<
             *found = distortion(square, mean, harmonic.norm(), seconds);
         }
     }
+    let extremes = (&sums.least[..], &sums.greatest[..]);
+    sums.costs = costs(columns, run, (span.from, closes), extremes);
     sums
+}
+
+/// Of changes of state after a time, from the first and the last row of each event; where the run closes, a switch that ends it elsewhere than it began moves
+/// between its end and its start.
+fn costs(
+    columns: &Columns<'_>,
+    run: &Run,
+    (from, closes): (f64, bool),
+    extremes: (&[f64], &[f64]),
+) -> Vec<Costs> {
+    let mut commutations = Commutations::of(columns, extremes);
+    let (waves, count) = (&run.waveforms, columns.probes.len());
+    let row = |k: usize| &waves.values[k * count..(k + 1) * count];
+    let Some(last) = waves.time.len().checked_sub(1) else {
+        return commutations.costs;
+    };
+    let same = SAME_TIME * waves.time[last].abs();
+    for event in run.events.iter().filter(|event| event.t > from + same) {
+        let before = waves.time.partition_point(|t| *t < event.t - same);
+        let after = waves.time.partition_point(|t| *t <= event.t + same);
+        let sides = (row(before.min(last)), row(after.saturating_sub(1)));
+        let moved = |name: &str| {
+            let to = |on: bool| event.turns(name, on).then_some(on);
+            to(true).or_else(|| to(false))
+        };
+        commutations.see(moved, sides);
+    }
+    if closes {
+        let moved = |name: &str| {
+            let turns = |on: bool| run.events.iter().filter(|e| e.turns(name, on)).count();
+            let (ons, offs) = (turns(true), turns(false));
+            (ons != offs).then_some(ons < offs)
+        };
+        commutations.see(moved, (row(last), row(0)));
+    }
+    commutations.costs
 }

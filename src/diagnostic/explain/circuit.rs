@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 17] = [
+pub(super) const CODES: [Explanation; 18] = [
     Explanation::of(
         "capacitor-loop",
         "Capacitors and voltage sources form a loop: their voltages are not independent of each other.",
@@ -110,6 +110,13 @@ pub(super) const CODES: [Explanation; 17] = [
         "A source with edges of no width across a capacitor whose current controls something.",
         "A small resistance in series with the source, or edges with a width.",
     ),
+    Explanation::of(
+        "thermal-network",
+        "A node of `.thermal` is joined to something that leads no heat.",
+        "The heat sink and the circuit share a node other than 0, or an element of the circuit is meant to be a thermal resistance.",
+        "Give the network nodes of its own, and only R (K/W), C (J/K), constant V (°C) and I (W) between them.",
+    )
+    .shown("a heat sink at the output\nv1 a 0 10\nd1 a b dx\nr1 b 0 5\n.model dx d(ideal rthjc=1)\nrh b amb 2\nvamb amb 0 25\n.thermal b d1\n.tran 1m 5m\n"),
     Explanation::of(
         "voltage-loop",
         "Voltage sources form a loop and contradict each other, or a source is shorted.",

@@ -98,6 +98,8 @@ pub enum Statement {
     Nodeset(Vec<(Signal, Expr)>),
     /// `.temp t`, `.options temp=t`, °C.
     Temperature(Expr),
+    /// `.thermal`.
+    Thermal(Thermal),
     /// `.save`, `.print`, `.probe`, `.plot` of every analysis.
     Save(Vec<Wanted>),
     /// `.print tran`, `.plot tran`.
@@ -120,6 +122,15 @@ pub enum Statement {
     Pss(Pss),
     /// `alter` inside `.control`, before the run.
     Alter(Alter),
+}
+
+/// `.thermal node device …`: where the heat of devices goes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Thermal {
+    /// A node whose voltage is a temperature, V for °C.
+    pub node: Name,
+    /// The devices whose cases stand there.
+    pub devices: Vec<Name>,
 }
 
 /// `alter r1 = 100`, `alter @v1[dc] = 5`.

@@ -10,7 +10,9 @@ use nom::Input as _;
 use define::{func, model, params, subckt};
 
 use crate::diagnostic::{Diagnostic, Span};
-use crate::netlist::ast::{Assign, Expr, Name, Points, Signal, Statement, Sweep, Target, Tran};
+use crate::netlist::ast::{
+    Assign, Expr, Name, Points, Signal, Statement, Sweep, Target, Thermal, Tran,
+};
 use crate::netlist::lex::{
     Fault, Input, Parsed, ahead, at_end, between, blank, end, missing, node, refuse, separator,
     symbol, tell, word,
@@ -73,7 +75,7 @@ pub(in crate::netlist) struct Path {
 }
 
 /// All directives, for "did you mean".
-pub(in crate::netlist) const DIRECTIVES: [&str; 27] = [
+pub(in crate::netlist) const DIRECTIVES: [&str; 28] = [
     ".ac",
     ".backanno",
     ".control",
@@ -100,6 +102,7 @@ pub(in crate::netlist) const DIRECTIVES: [&str; 27] = [
     ".step",
     ".subckt",
     ".temp",
+    ".thermal",
     ".tran",
 ];
 
@@ -130,6 +133,7 @@ pub(in crate::netlist) fn card(i: Input<'_>) -> Parsed<'_, Dot> {
         ".ic" => initial(rest, Statement::Ic),
         ".nodeset" => initial(rest, Statement::Nodeset),
         ".temp" => temperature(rest),
+        ".thermal" => thermal(rest),
         ".option" | ".options" | ".opt" => Ok((skip(rest), options(rest))),
         ".global" => global(rest),
         ".save" | ".probe" => save(rest),
@@ -393,6 +397,27 @@ fn options(i: Input<'_>) -> Dot {
         }
     }
     Dot::Options(temperature, others || !at_end(at))
+}
+
+/// `.thermal node device …`.
+fn thermal(i: Input<'_>) -> Parsed<'_, Dot> {
+    let Ok((mut at, node_name)) = node(separator(i)) else {
+        return Err(missing(i, "a node and the devices whose heat goes there"));
+    };
+    let mut devices = Vec::new();
+    while let Ok((rest, name)) = word(separator(at)) {
+        devices.push(name);
+        at = rest;
+    }
+    if devices.is_empty() {
+        return Err(missing(at, "the devices whose heat goes there"));
+    }
+    let (at, ()) = end(at)?;
+    let statement = Statement::Thermal(Thermal {
+        node: node_name,
+        devices,
+    });
+    Ok((at, Dot::statement(statement)))
 }
 
 fn global(i: Input<'_>) -> Parsed<'_, Dot> {

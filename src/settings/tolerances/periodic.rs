@@ -54,6 +54,14 @@ pub(crate) const LOST: f64 = 1e-6;
 /// searches among rounding.
 pub(crate) const EXTREMUM: f64 = 1e-14;
 
+/// Temperatures that Newton's method moves no further than this are those at rest, K. Larger: energies of tables that rise steeply with temperature lose digits;
+/// smaller: rounding of hundreds of degrees.
+pub(crate) const WARM: f64 = 1e-9;
+
+/// No more steps of Newton's method from piece to piece of loss tables. Larger: time where heat runs away; smaller: tables of many temperatures are
+/// taken for runaway.
+pub(crate) const HEATINGS: usize = 200;
+
 /// A fundamental below this part of a signal's root mean square is none, and the signal has no distortion. Larger: small fundamentals are
 /// denied; smaller: the rounding of a constant gets a distortion.
 pub(crate) const FUNDAMENTAL: f64 = 1e-9;
