@@ -134,12 +134,15 @@ pub(super) fn sums(
     })
 }
 
+/// The outputs at one end of each stretch.
+type Ends<'a> = &'a [Option<DVector<f64>>];
+
 /// Of changes of state after a time; where the course closes, its end and its start are an instant too.
 fn costs(
     columns: &Columns<'_>,
     course: &Course,
     (from, closes): (f64, bool),
-    (first, last): (&[Option<DVector<f64>>], &[Option<DVector<f64>>]),
+    (first, last): (Ends<'_>, Ends<'_>),
     extrema: &Extrema,
 ) -> Vec<Costs> {
     let mut commutations = Commutations::of(columns, (&extrema.least, &extrema.greatest));
