@@ -108,6 +108,10 @@ impl<'n> Builder<'n, '_> {
         let nodes = mem::take(&mut self.thermal_nodes);
         for (card, node) in mem::take(&mut self.thermals).into_iter().zip(nodes) {
             for device in &card.devices {
+                // What is joined to the network was refused.
+                if self.thermal_names.contains(device.text.as_str()) {
+                    continue;
+                }
                 let Some(id) = self.expect_element(device, ScopeId::ROOT, "device") else {
                     continue;
                 };

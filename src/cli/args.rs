@@ -261,8 +261,8 @@ pub struct ResultArgs {
 pub struct TableArgs {
     /// Print mean, rms, least and greatest current and voltage and the mean power of every element, exact where the run is
     ///
-    /// From tstart to tstop, or over the period. With the powers of sources and loads, efficiency, and ripple and distortion of the signals
-    /// shown; in `--summary json` as `table`.
+    /// From tstart to tstop, or over the period. With the powers of sources and loads, efficiency, ripple and distortion of the signals
+    /// shown, and losses of switching and temperatures where models have tables of them; in `--summary json` as `table`.
     #[arg(help_heading = "Analysis", long)]
     pub table: bool,
     /// An element whose power is input (repeatable) [default: all sources]
