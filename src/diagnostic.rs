@@ -97,6 +97,16 @@ impl SourceMap {
         text.get(start..end).unwrap_or("")
     }
 
+    /// `file:line:column: message`.
+    fn placed(&self, finding: &Diagnostic) -> String {
+        let Some(span) = finding.span else {
+            return finding.message.clone();
+        };
+        let (line, column) = self.line_column(span);
+        let path = &self.files[span.file.0 as usize].path;
+        format!("{path}:{line}:{column}: {}", finding.message)
+    }
+
     /// The 1-based line and column (in characters) where a span starts.
     #[must_use]
     pub fn line_column(&self, span: Span) -> (usize, usize) {
@@ -201,6 +211,13 @@ impl Diagnostic {
         Self::new(code, Severity::Note, span, message)
     }
 
+    /// In a line: `file:line:column: message (help)`.
+    pub(crate) fn line(&self, sources: &SourceMap) -> String {
+        let help = self.help.as_ref();
+        let help = help.map_or_else(String::new, |help| format!(" ({help})"));
+        sources.placed(self) + &help
+    }
+
     /// Adds the words under the underlined text.
     #[must_use]
     pub fn label(mut self, label: impl Into<String>) -> Self {
@@ -272,15 +289,7 @@ impl Display for Faults {
             if k > 0 {
                 writeln!(f)?;
             }
-            if let Some(span) = finding.span {
-                let (line, column) = self.sources.line_column(span);
-                write!(
-                    f,
-                    "{}:{line}:{column}: ",
-                    self.sources.files[span.file.0 as usize].path
-                )?;
-            }
-            write!(f, "{}", finding.message)?;
+            f.write_str(&self.sources.placed(finding))?;
         }
         Ok(())
     }

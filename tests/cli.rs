@@ -683,6 +683,117 @@ fn a_spike_is_told_of_in_rows_that_pass_by() {
     );
 }
 
+/// Where the switch opens on an output time and the current is gone before the next, rows of the grid alone show megavolts; a voltage that another edge ends, and
+/// one that lasts, are none.
+#[test]
+fn a_spike_on_an_output_time_is_told_of() {
+    let place = place();
+    let told = |cards: &str| {
+        let text = format!(
+            "switched\nvin in 0 12\n{cards}\nvg g 0 pulse(0 1 0 0 0 5u 10u)\n.model sm sw(ron=10m roff=1meg vt=.5)\n.end\n"
+        );
+        fs::write(place.path().join("switched.cir"), text).unwrap();
+        let mut told = ["csv", "html"].map(|ending| {
+            let ran = run_in(place.path(), &format!("sim switched.cir -o rows.{ending}"));
+            assert_eq!(ran.status, 0, "{ran}");
+            ran.err.contains("has fallen before the next row")
+        });
+        told.sort_unstable();
+        assert_eq!(told[0], told[1], "{cards}");
+        told[0]
+    };
+    let coil = "l1 in sw 47u\ns1 sw 0 g 0 sm\n.save v(sw) v(in) i(l1)";
+    assert!(told(&format!("{coil}\n.tran 1u 50u")));
+    assert!(told(&format!("{coil}\n.tran 50u")));
+    // Rows of one instant may be an ulp apart.
+    let coil_of_relay =
+        "vh h 0 pulse(0 1 0 0 0 5m 10m)\nsh in sx h 0 sm\nlx sx 0 10m rser=10\n.save v(sx) v(in)";
+    assert!(told(&format!("{coil_of_relay}\n.tran 50m")));
+    // A clamp takes the current.
+    assert!(!told(&format!(
+        "{coil}\nd1 sw cl dm\nvcl cl 0 24\n.model dm d(n=0.001)\n.tran 1u 50u"
+    )));
+    // A chopped voltage, a row at each edge.
+    let chopper = "s1 in sw g 0 sm\nr1 sw 0 1k\n.save v(sw)";
+    assert!(!told(&format!("{chopper}\n.tran 5u 100u")));
+    assert!(!told(&format!("{chopper}\n.tran 2.5u 100u")));
+}
+
+/// An operating point is printed where nothing else is asked for, and left out with a note where there is a transient.
+#[test]
+fn a_netlist_may_ask_for_its_operating_point() {
+    let place = place();
+    let text = DIVIDER.replace(".tran", ".op\n*.tran");
+    fs::write(place.path().join("op.cir"), &text).unwrap();
+    let ran = run_in(place.path(), "op.cir");
+    let asked = run_in(place.path(), "op op.cir");
+    assert_eq!((ran.status, &ran.out), (0, &asked.out), "{ran}");
+    assert!(ran.out.contains("v(out)"), "{ran}");
+    let ran = run_in(place.path(), "op.cir -o a.csv");
+    assert!(
+        ran.status == 2 && ran.err.contains("circ op op.cir --json"),
+        "{ran}"
+    );
+    let both = DIVIDER.replace(".tran", ".op\n.dc v1 0 1 1\n.tran");
+    fs::write(place.path().join("both.cir"), both).unwrap();
+    let ran = run_in(place.path(), "both.cir -o a.csv");
+    assert!(
+        ran.status == 0
+            && ran.err.contains("`.op` is left out")
+            && ran.err.contains("`.dc` is left out"),
+        "{ran}"
+    );
+}
+
+/// A characteristic is a picture over what is swept innermost, with a curve for each value of the other.
+#[test]
+fn a_sweep_of_operating_points_is_drawn() {
+    let place = place();
+    let text = "diode\nv1 a 0 1\nr1 a b 1k\nd1 b 0 dm\n.model dm d(ron=1 vfwd=0.7)\n.dc v1 2 -2 -0.1 r1 1k 2k 1k\n.save v(b) i(d1)\n.end\n";
+    fs::write(place.path().join("dc.cir"), text).unwrap();
+    let ran = run_in(
+        place.path(),
+        "dc.cir -o dc.svg -o dc.png -o dc.html -o dc.csv",
+    );
+    assert_eq!((ran.status, ran.err.as_str()), (0, ""), "{ran}");
+    let read = |name: &str| fs::read_to_string(place.path().join(name)).unwrap();
+    let svg = read("dc.svg");
+    assert!(svg.contains("v1 (V)") || svg.contains("v1 / V"), "{svg}");
+    assert_eq!(svg.matches("r1=2000").count(), 2, "{svg}");
+    let html = read("dc.html");
+    assert!(html.contains(r#""axis":{"name":"v1","unit":"V","log":false}"#));
+    assert_eq!(read("dc.csv").lines().count(), 83);
+    let ran = run_in(place.path(), "dc.cir -o dc.raw");
+    assert!(
+        ran.status == 2 && ran.err.contains("csv, svg, png or html"),
+        "{ran}"
+    );
+}
+
+/// 1/0 and the logarithm of what is not positive are told, with the number of rows, wherever rows go.
+#[test]
+fn expressions_without_a_value_are_told_of() {
+    let place = place();
+    for ending in ["csv", "svg", "npz"] {
+        let ran = run_in(
+            place.path(),
+            &format!(
+                "rectifier.cir --probe v(out)/0 --probe v(in) --probe ln(v(in)) -o a.{ending}"
+            ),
+        );
+        assert!(
+            ran.status == 0 && ran.err.contains("no number everywhere"),
+            "{ran}"
+        );
+        assert!(
+            ran.err.contains("v(out)/0 (")
+                && ran.err.contains("ln(v(in)) (")
+                && !ran.err.contains(" v(in) ("),
+            "{ran}"
+        );
+    }
+}
+
 /// What is measured is a result, which `-q` does not hide, of several runs as of one.
 #[test]
 fn quiet_runs_tell_what_they_measured() {

@@ -24,6 +24,55 @@ fn refused(text: &str) -> Error {
     }
 }
 
+/// A source that repeats every 20 µs has no orbit of 7 or 30 µs; of two tones without a common period one may be asked for, and a note says how far they are off.
+#[test]
+fn a_period_that_was_asked_for_is_one_of_the_sources() {
+    let model =
+        parsed("t\nv1 a 0 pulse(0 1 0 0 0 5u 20u)\nr1 a b 1k\nc1 b 0 1n\n.tran 1u 100u\n.end\n");
+    let asked = |model: &Model, period| {
+        let options = PeriodicOptions {
+            period: Some(period),
+            ..PeriodicOptions::default()
+        };
+        periodic(model, &options)
+    };
+    for period in [7e-6, 10e-6, 30e-6] {
+        let error = asked(&model, period).expect_err("no period").to_string();
+        assert!(error.contains("v1 repeats every 2e-5 s"), "{error}");
+    }
+    for period in [20e-6, 40e-6] {
+        let (orbit, run) = asked(&model, period).expect("an orbit");
+        assert!(
+            orbit.period == period && run.notes.is_empty(),
+            "{:?}",
+            run.notes
+        );
+    }
+    let tones = parsed(
+        "t\nv1 a 0 sin(0 1 50)\nr1 a b 1k\nv2 b 0 sin(0 1 50.0001)\nc1 b a 1n\n.tran 1m 40m\n.end\n",
+    );
+    let (_, run) = asked(&tones, 20e-3).expect("an orbit");
+    assert!(
+        run.notes
+            .iter()
+            .any(|note| note.text.starts_with("v2 is 2e-6 of its period")),
+        "{:?}",
+        run.notes
+    );
+}
+
+/// Supplies of LTspice's `startup` have risen in the steady state.
+#[test]
+fn supplies_that_ramp_up_at_the_start_have_risen() {
+    let text = "t\nv1 a 0 5\nv2 g 0 pulse(0 1 0 0 0 5u 20u)\nr2 g 0 1\nr1 a b 1k\nc1 b 0 1n\n.tran 0 100u 0 1u startup\n.save v(b)\n.end\n";
+    let (_, run) = orbit_of(text);
+    assert!(
+        (row(&run, 3)[0] - 5.0).abs() < 1e-12 && run.notes.is_empty(),
+        "{:?}",
+        run.notes
+    );
+}
+
 fn size([re, im]: [f64; 2]) -> f64 {
     re.hypot(im)
 }

@@ -106,7 +106,10 @@ fn carried_out(model: &Model, netlist: &str) -> Ran {
     };
     let figure = Figure::of_waveforms(&run.waveforms, usize::MAX);
     Ran {
-        page: Some(Page::of_run(&figure, &run, found.words(), model.places())),
+        page: Some(
+            Page::of_run(&figure, &run, found.words(), model.places())
+                .with_conduction(&found.conduction),
+        ),
         findings,
     }
 }

@@ -1,10 +1,62 @@
 //! Which devices and switches carry a current at an instant.
 
-use crate::circuit::{Circuit, Kind, Tran};
+use crate::circuit::{Circuit, Element, Kind, Probe, Probed, Tran};
 use crate::integrate::{Error, Reason, SimOptions};
 use crate::model::Model;
 use crate::settings::tolerances::events::LEAKING;
 use crate::settings::tolerances::times::SPAN_PARTS;
+use crate::waveform::Waveforms;
+
+/// When a device of a curved law conducts, which no event tells: its current is then not small against the largest that it carries.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Conduction {
+    /// The device.
+    pub device: String,
+    /// Whether it does in the first row.
+    pub at_start: bool,
+    /// When it begins to and ends, s.
+    pub changes: Vec<(f64, bool)>,
+}
+
+/// The currents of devices of curved laws.
+pub(super) fn curved_currents(circuit: &Circuit) -> Vec<Probe> {
+    let curved = circuit
+        .elements
+        .iter()
+        .filter(|element| match &element.kind {
+            Kind::Device(law) => !law.is_piecewise_linear(),
+            _ => false,
+        });
+    let probe = |element: &Element| {
+        Some(Probe {
+            name: format!("i({})", element.name),
+            what: Probed::Current(circuit.element(&element.name)?),
+        })
+    };
+    curved.filter_map(probe).collect()
+}
+
+/// When the devices of these currents conduct, by straight lines between rows; one that never changes is left out.
+pub(super) fn conduction(waves: &Waveforms, currents: &[Probe]) -> Vec<Conduction> {
+    let of = |probe: &Probe| {
+        let at = waves.names.iter().position(|name| *name == probe.name)?;
+        let sizes: Vec<f64> = waves.column(at).map(f64::abs).collect();
+        let level = LEAKING * sizes.iter().fold(0.0, |m: f64, i| m.max(*i));
+        let rows = waves.time.windows(2).zip(sizes.windows(2));
+        let changes = rows.filter_map(|(t, i)| {
+            let conducts = i[1] > level;
+            let part = (level - i[0]) / (i[1] - i[0]);
+            ((i[0] > level) != conducts).then(|| (t[0] + part * (t[1] - t[0]), conducts))
+        });
+        let changes: Vec<(f64, bool)> = changes.collect();
+        (!changes.is_empty()).then(|| Conduction {
+            device: probe.name[2..probe.name.len() - 1].to_owned(),
+            at_start: sizes[0] > level,
+            changes,
+        })
+    };
+    currents.iter().filter_map(of).collect()
+}
 
 /// The names of what conducts at time t of the transient, s: diodes, switches, thyristors and transistors whose current is then not small against the largest that
 /// they carried until then.

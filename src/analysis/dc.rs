@@ -1,7 +1,7 @@
 //! `.dc`: the operating point at every value of the sweeps.
 
 use super::sweep::{Variant, each, variants};
-use crate::circuit::{Circuit, Probed};
+use crate::circuit::{Circuit, Kind, Probed, Swept};
 use crate::integrate::{Error, OperatingPoint, Values, operating_point};
 use crate::model::Model;
 use crate::settings::Settings;
@@ -9,8 +9,14 @@ use crate::settings::Settings;
 /// Operating points over swept quantities.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Characteristic {
+    /// The netlist's title.
+    pub title: String,
+    /// How many quantities are swept.
+    pub swept: usize,
     /// What is swept, the innermost first, then the probes.
     pub names: Vec<String>,
+    /// Of each column its unit: V, A, Ω, °C; none of a parameter.
+    pub units: Vec<&'static str>,
     /// A row for every combination of values.
     pub rows: Vec<Vec<f64>>,
 }
@@ -34,12 +40,41 @@ pub struct Unsolved {
 pub fn dc(model: &Model) -> Result<Characteristic, Unsolved> {
     let sweeps = &model.circuit().dc;
     let rows: Vec<_> = each(&variants(model, sweeps), point);
-    let swept = sweeps.iter().map(|sweep| sweep.what.name().to_string());
-    let probes = model.circuit().probes().into_iter().map(|probe| probe.name);
+    let circuit = model.circuit();
+    let swept = sweeps.iter().map(|sweep| {
+        let unit = unit(circuit, &sweep.what);
+        (sweep.what.name().to_string(), unit)
+    });
+    let probes = circuit.probes().into_iter().map(|probe| {
+        let unit = match probe.what {
+            Probed::Voltage(..) => "V",
+            Probed::Current(_) => "A",
+        };
+        (probe.name, unit)
+    });
+    let (names, units) = swept.chain(probes).unzip();
     Ok(Characteristic {
-        names: swept.chain(probes).collect(),
+        title: circuit.title.clone(),
+        swept: sweeps.len(),
+        names,
+        units,
         rows: rows.into_iter().collect::<Result<_, _>>()?,
     })
+}
+
+/// The unit of what is swept; none of a parameter.
+fn unit(circuit: &Circuit, what: &Swept) -> &'static str {
+    let element = |name: &str| circuit.element(name);
+    match what {
+        Swept::Param(_) => "",
+        Swept::Temperature => "°C",
+        Swept::Element(name) => match element(name).map(|id| &circuit.elements[id.index()].kind) {
+            Some(Kind::VoltageSource(_)) => "V",
+            Some(Kind::CurrentSource(_)) => "A",
+            Some(Kind::Resistor(_)) => "Ω",
+            _ => "",
+        },
+    }
 }
 
 fn point(variant: &Variant<'_>) -> Result<Vec<f64>, Unsolved> {

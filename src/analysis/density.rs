@@ -58,43 +58,57 @@ pub(super) fn bent(waves: &Waveforms, kinds: &[RowKind], columns: usize) -> f64 
     (0..columns).map(of_signal).fold(0.0, f64::max)
 }
 
-/// What rows at events and corners have that those of the grid do not show.
+/// Values that fall by themselves before the next row.
 #[derive(Debug, Default)]
 pub(super) struct Spikes {
-    /// The largest |value| of rows of the grid, by column.
-    usual: Vec<f64>,
-    /// The largest value of the other rows and its time, s, by column.
-    largest: Vec<(f64, f64)>,
+    /// Whether rows tell what is right before an event, too.
+    tells_left: bool,
+    /// The row before, and its time, s.
+    before: Option<(f64, Vec<f64>)>,
+    /// The largest |value| that two rows in a row have, by column.
+    sustained: Vec<f64>,
+    /// The largest value of which the next row has less than a part in [`SPIKE`], and the times of both, s, by column.
+    largest: Vec<(f64, [f64; 2])>,
 }
 
 impl Spikes {
     /// Looks at rows of so many columns.
     pub(super) fn see(&mut self, columns: usize, block: Block<'_>) {
-        self.usual.resize(columns, 0.0);
-        self.largest.resize(columns, (0.0, 0.0));
-        for (t, values, kind) in block.rows() {
-            if kind.is_grid() {
-                for (most, value) in self.usual.iter_mut().zip(values) {
-                    *most = most.max(value.abs());
+        self.tells_left = !block.kinds.is_empty();
+        self.sustained.resize(columns, 0.0);
+        self.largest.resize(columns, (0.0, [0.0; 2]));
+        for (t, values, _) in block.rows() {
+            let (at, before) = self.before.get_or_insert_with(|| (t, values.to_vec()));
+            if t > *at + SAME_TIME * t.abs() {
+                for (j, (was, is)) in before.iter().zip(values).enumerate() {
+                    self.sustained[j] = self.sustained[j].max(was.abs().min(is.abs()));
+                    if was.abs() > SPIKE * is.abs() && was.abs() > self.largest[j].0.abs() {
+                        self.largest[j] = (*was, [*at, t]);
+                    }
                 }
-                continue;
             }
-            for (most, value) in self.largest.iter_mut().zip(values) {
-                if value.abs() > most.0.abs() {
-                    *most = (*value, t);
-                }
-            }
+            *at = t;
+            before.copy_from_slice(values);
         }
     }
 
-    /// Signal, value and time of the row at an event or corner that is [`SPIKE`] times as large as all rows of the grid in its unit: the largest.
-    /// `units` by column.
-    pub(super) fn found(&self, units: &[&str]) -> Option<(usize, f64, f64)> {
-        let stands_out = |(j, (value, t)): (usize, &(f64, f64))| {
-            let same = self.usual.iter().zip(units);
+    /// Signal, value and time of the largest value that an event makes, that is [`SPIKE`] times as large as all that lasts in its unit, and that falls with no
+    /// other event. `units` by column, times of `events` in order, s.
+    pub(super) fn found(&self, units: &[&str], events: &[f64]) -> Option<(usize, f64, f64)> {
+        let stands_out = |(j, (value, [t, next])): (usize, &(f64, [f64; 2]))| {
+            let same = self.sustained.iter().zip(units);
             let same = same.filter(|(_, unit)| **unit == units[j]);
-            let usual = same.fold(0.0, |m: f64, (most, _)| m.max(*most));
-            (usual > 0.0 && value.abs() > SPIKE * usual).then_some((j, *value, *t))
+            let lasts = same.fold(0.0, |m: f64, (most, _)| m.max(*most));
+            let before = |t: f64| events.partition_point(|e| *e < t - SAME_TIME * t.abs());
+            let until = |t: f64| events.partition_point(|e| *e <= t + SAME_TIME * t.abs());
+            let began = before(*t) < until(*t);
+            let last = if self.tells_left {
+                before(*next)
+            } else {
+                until(*next)
+            };
+            let spikes = lasts > 0.0 && value.abs() > SPIKE * lasts;
+            (spikes && began && last <= until(*t)).then_some((j, *value, *t))
         };
         let all = self.largest.iter().enumerate().filter_map(stands_out);
         all.max_by(|one, other| one.1.abs().total_cmp(&other.1.abs()))

@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use super::conducting::{Conduction, conduction, curved_currents};
 use super::curves::{MOST_VALUES, laps, orbit_curves, shortest_period, transient_curves};
 use super::density::{Cut, Spikes, bent, crowd};
 use super::periodic::{PeriodicOptions, periodic, steady};
@@ -34,6 +35,8 @@ pub struct Measurements {
     pub table: Option<Table>,
     /// The ranges of measurements within tolerances, where they were asked for.
     pub worst: Vec<Worst>,
+    /// Of a run for pictures when devices of curved laws conduct, which none of its events tells.
+    pub conduction: Vec<Conduction>,
 }
 
 impl Measurements {
@@ -119,16 +122,19 @@ fn shown_of(measuring: Measuring<'_>, model: &Model, options: SimOptions<'_>) ->
         let mut spikes = Spikes::default();
         let columns = run.waveforms.units.len();
         spikes.see(columns, Block::of(&run.waveforms, &run.kinds));
-        let note = spike(&spikes, &run.waveforms, measuring.by_rows());
+        let note = spike(&spikes, run, measuring.by_rows());
         run.notes.extend(note);
+        found.conduction = conduction(&run.waveforms, &measuring.curved);
         (run.waveforms, run.kinds) = measuring.cut(run);
     }
     finished
 }
 
-/// Tells of a spike in rows with these columns; `by_rows`: measurements see them.
-fn spike(spikes: &Spikes, waves: &Waveforms, by_rows: bool) -> Option<Note> {
-    let (j, value, t) = spikes.found(&waves.units)?;
+/// Tells of a spike in the rows of a run; `by_rows`: measurements see them.
+fn spike(spikes: &Spikes, run: &Run, by_rows: bool) -> Option<Note> {
+    let events: Vec<f64> = run.events.iter().map(|event| event.t).collect();
+    let waves = &run.waveforms;
+    let (j, value, t) = spikes.found(&waves.units, &events)?;
     let (name, unit) = (&waves.names[j], waves.units[j]);
     let cause = match unit {
         "A" => {
@@ -164,7 +170,7 @@ fn unmeasured(model: &Model, mut options: SimOptions<'_>) -> Finished {
     };
     let mut finished = begun(model, model, asked);
     if let Some((run, _)) = &mut finished.run {
-        let note = spike(&spikes, &run.waveforms, false);
+        let note = spike(&spikes, run, false);
         run.notes.extend(note);
     }
     finished
@@ -319,6 +325,8 @@ struct Measuring<'a> {
     shown: usize,
     /// Values that a picture has room for, where the rows between are shown, too.
     pictured: Option<usize>,
+    /// Currents that a picture looks at besides: of devices that no event tells of.
+    curved: Vec<Probe>,
     /// What the measurements see instead of rows, where the run is exact throughout.
     curves: Option<Curves>,
 }
@@ -333,6 +341,7 @@ impl<'a> Measuring<'a> {
             divisions: if fixed_step { 1 } else { ROWS.div_ceil(rows) },
             shown: circuit.probes().len(),
             pictured: None,
+            curved: vec![],
             curves: None,
         }
     }
@@ -384,6 +393,7 @@ impl<'a> Measuring<'a> {
             self.divisions = (wanted.ceil() as usize).min(most).max(1);
         }
         self.pictured = Some(room);
+        self.curved = curved_currents(self.circuit);
     }
 
     /// A run on the finer grid, with the signals of the measurements after those that are shown.
@@ -408,7 +418,7 @@ impl<'a> Measuring<'a> {
     fn probing(&self, model: &Model, tran: Option<Tran>) -> Result<Model, Error> {
         let mut probes = self.circuit.probes();
         let measured = self.circuit.measured.iter().filter(|_| self.by_rows());
-        for probe in measured {
+        for probe in measured.chain(&self.curved) {
             if !probes.contains(probe) {
                 probes.push(probe.clone());
             }
@@ -464,8 +474,7 @@ impl<'a> Measuring<'a> {
         Measurements {
             measured: self.circuit.measure(signals),
             harmonics: self.circuit.harmonics(signals),
-            table: None,
-            worst: vec![],
+            ..Measurements::default()
         }
     }
 

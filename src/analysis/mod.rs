@@ -31,13 +31,13 @@ mod variation;
 mod worst;
 
 pub use crate::integrate::{Orbit, OrbitKind};
-pub use conducting::conducting;
+pub use conducting::{Conduction, conducting};
 pub use dc::{Characteristic, Unsolved, dc};
 pub use density::ringing;
 pub use measured::{Finished, Measurements, is_measured, periodic_measured, pictured, transient};
 pub use periodic::{PeriodicOptions, orbit_start, periodic};
 pub use sensitivity::{Gradient, Sensitivity, SensitivityOptions, sensitivity};
-pub use shown::{shown, shown_values};
+pub use shown::{Undefined, shown, shown_values};
 pub use small_signal::{
     About, Left, Margin, Ratio, Response, SmallSignalOptions, margins, ratios, small_signal,
     small_signal_measured, unwrapped,

@@ -86,7 +86,10 @@ impl<'n> Builder<'n, '_> {
                 .globals
                 .extend(names.iter().map(|n| n.text.as_str())),
             Statement::Tran(tran) => self.trans.push(tran),
-            Statement::Analysis(_) => self.other_analysis = true,
+            Statement::Analysis(_) => {
+                self.other_analysis = true;
+                self.circuit.op = true;
+            }
             Statement::Ic(list) => self.ics.push((scope, list)),
             Statement::Nodeset(list) => self.nodesets.push((scope, list)),
             Statement::Temperature(value) => self.temperature = Some(value),

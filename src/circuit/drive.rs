@@ -15,6 +15,26 @@ mod tests;
 /// LTspice's `startup`: supplies reach their value after this time, s.
 const STARTUP: f64 = 20e-6;
 
+impl Wave {
+    /// A supply of LTspice's `startup`.
+    fn ramp(value: f64) -> Self {
+        Self::Pwl {
+            points: vec![(0.0, 0.0), (STARTUP, value)],
+            repeat: None,
+            delay: 0.0,
+        }
+    }
+
+    /// The value that a supply of LTspice's `startup` ramps up to.
+    pub(crate) fn risen(&self) -> Option<f64> {
+        let Self::Pwl { points, .. } = self else {
+            return None;
+        };
+        let value = points.last()?.1;
+        (*self == Self::ramp(value)).then_some(value)
+    }
+}
+
 /// Most points of a PWL that repeats so many times.
 const MAX_POINTS: usize = 1_000_000;
 
@@ -114,11 +134,7 @@ impl<'n> Builder<'n, '_> {
     /// A DC source, which ramps up under LTspice's `startup`.
     fn constant(&self, value: f64) -> Wave {
         if self.startup() && value != 0.0 {
-            Wave::Pwl {
-                points: vec![(0.0, 0.0), (STARTUP, value)],
-                repeat: None,
-                delay: 0.0,
-            }
+            Wave::ramp(value)
         } else {
             Wave::Dc(value)
         }

@@ -126,6 +126,8 @@ pub struct Circuit {
     pub steps: Vec<Sweep>,
     /// `.dc`, the first sweep innermost.
     pub dc: Vec<Sweep>,
+    /// Whether `.op` asks for the operating point.
+    pub op: bool,
     /// `.ac`: frequencies, Hz; none without the card.
     pub ac: Vec<f64>,
     /// The sources with an `AC` value, in file order.

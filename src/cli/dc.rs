@@ -4,15 +4,17 @@ use super::args::SimArgs;
 use super::exit::{Exit, Failure};
 use super::files;
 use super::input;
-use super::output::Format;
+use super::output::{self, Format};
 use super::streams::Streams;
 use crate::analysis::{self, Unsolved};
 use crate::integrate::Places;
 use crate::model::Model;
-use crate::report::steps;
+use crate::report::figure::Figure;
+use crate::report::html::Page;
+use crate::report::{steps, svg};
 use crate::waveform::csv;
 
-/// Writes the operating points as CSV with a column per swept quantity, the innermost first, then the probes.
+/// Writes the operating points as CSV with a column per swept quantity, the innermost first, then the probes, or as a picture over the innermost.
 ///
 /// # Errors
 /// See [`Failure`].
@@ -23,8 +25,9 @@ pub(super) fn sim(
     streams: &Streams,
 ) -> Result<Exit, Failure> {
     for (path, format) in args.results.outputs.iter().zip(formats) {
-        if *format != Format::Csv {
-            let message = format!("{}: a `.dc` sweep is written as csv", path.display());
+        if !format.is_picture() && *format != Format::Csv {
+            let path = path.display();
+            let message = format!("{path}: a `.dc` sweep is written as csv, svg, png or html");
             return Err(Failure::Message(message));
         }
     }
@@ -49,8 +52,19 @@ pub(super) fn sim(
             }
         }
     }
-    for path in &args.results.outputs {
-        files::write(path, &text)?;
+    let figure = || Figure::of_characteristic(&found);
+    for (path, format) in args.results.outputs.iter().zip(formats) {
+        match format {
+            Format::Html => {
+                let page = Page::of_figure(&figure()).with_circuit(Some(model));
+                files::write(path, page.html()?.as_bytes())?;
+            }
+            Format::Svg | Format::Png => {
+                let drawing = svg::draw(&figure())?;
+                output::picture_to_file(path, *format == Format::Png, &drawing)?;
+            }
+            _ => files::write(path, &text)?,
+        }
     }
     if args.results.outputs.is_empty() {
         streams.data(text)?;

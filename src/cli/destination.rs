@@ -122,6 +122,7 @@ impl<'a> Destination<'a> {
         let told = Told {
             run: &run,
             measured: &measured,
+            conduction: &found.conduction,
             model: self.model,
         };
         let written = outputs.finish(told, &figure, incomplete.as_deref());

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::args::OpArgs;
+use super::args::{Input, OpArgs};
 use super::exit::{Exit, Failure};
 use super::input;
 use super::streams::Streams;
@@ -19,27 +19,40 @@ use crate::report::{json, si, steps, table};
 pub(super) fn op(args: &OpArgs, streams: &Streams) -> Result<Exit, Failure> {
     let subject = input::open(&args.input, &[], &[], streams)?;
     let model = input::model_of(&args.input, &subject)?;
+    of_model(&args.input, model, args.json, streams)
+}
+
+/// The same of a netlist that was read.
+///
+/// # Errors
+/// See [`Failure`].
+pub(super) fn of_model(
+    input: &Input,
+    model: &Model,
+    in_json: bool,
+    streams: &Streams,
+) -> Result<Exit, Failure> {
     let solved = |model: &Model| {
         let places = model.places();
         let point = model
             .operating_point()
-            .map_err(|error| input::broke_off(&args.input, &error, places, streams))?;
+            .map_err(|error| input::broke_off(input, &error, places, streams))?;
         let notes = places.all(&point.notes);
         Ok::<_, Failure>((point, notes))
     };
     let sweeps = &model.circuit().steps;
     if sweeps.is_empty() {
-        return one(args, &solved(model)?, streams);
+        return one(in_json, &solved(model)?, streams);
     }
     let (mut points, mut failures) = (Vec::new(), Vec::new());
     for variant in runs(model) {
         let values = variant.named();
-        match solved(&input::variant(&args.input, &variant, streams)?) {
+        match solved(&input::variant(input, &variant, streams)?) {
             Ok((point, notes)) => points.push((values, point, notes)),
             Err(failure) => failures.push(format!("{failure} at {}", steps::label(&values))),
         }
     }
-    if args.json {
+    if in_json {
         // The point with the values as they stand, as of a netlist without `.step`.
         let (own, notes) = solved(model)?;
         let steps = points.iter().map(|(values, point, notes)| StepDocument {
@@ -71,11 +84,11 @@ pub(super) fn op(args: &OpArgs, streams: &Streams) -> Result<Exit, Failure> {
 }
 
 fn one(
-    args: &OpArgs,
+    in_json: bool,
     (point, notes): &(OperatingPoint, Vec<String>),
     streams: &Streams,
 ) -> Result<Exit, Failure> {
-    if args.json {
+    if in_json {
         streams.data(json::line(&Document::of(point, notes)) + "\n")?;
         return Ok(Exit::Done);
     }

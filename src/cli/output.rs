@@ -10,6 +10,7 @@ use super::exit::Failure;
 use super::files::{self, STDOUT, Written};
 use super::rows::{Columns, Form, Shown, Stream};
 use super::streams::Streams;
+use crate::analysis::Conduction;
 use crate::integrate::{Block, Places, Run};
 use crate::model::Model;
 use crate::report::figure::{Figure, PANEL_COLUMNS};
@@ -127,6 +128,7 @@ pub(super) struct Told<'a> {
     pub(super) run: &'a Run,
     /// In words.
     pub(super) measured: &'a str,
+    pub(super) conduction: &'a [Conduction],
     pub(super) model: Option<&'a Model>,
 }
 
@@ -267,6 +269,7 @@ fn write(
                 told.measured.to_owned(),
                 places,
             )
+            .with_conduction(told.conduction)
             .with_circuit(told.model);
             file.append(page.html()?.as_bytes())
         }

@@ -11,6 +11,7 @@ use super::exit::{Exit, Failure};
 use super::files;
 use super::forms;
 use super::input::{self, Subject};
+use super::op;
 use super::output::Format;
 use super::pss;
 use super::rows::Columns;
@@ -19,7 +20,7 @@ use super::steps::Stepping;
 use super::streams::Streams;
 use super::tabulate;
 use crate::analysis::{
-    self, Finished, PeriodicOptions, WorstOptions, is_measured, shown, shown_values,
+    self, Finished, PeriodicOptions, Undefined, WorstOptions, is_measured, shown, shown_values,
 };
 use crate::check;
 use crate::circuit::source::Wave;
@@ -78,8 +79,27 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
             only_one_way(args)?;
             return dc::sim(args, model, &formats, streams);
         }
+        let file = args.input.file.display();
+        if circuit.tran.is_none() && circuit.op {
+            only_one_way(args)?;
+            if let Some(path) = args.results.outputs.first() {
+                let message = format!(
+                    "{}: an operating point is printed, `circ op {file} --json` for other programs",
+                    path.display()
+                );
+                return Err(Failure::Message(message));
+            }
+            return op::of_model(&args.input, model, false, streams);
+        }
+        if !circuit.dc.is_empty() {
+            streams.note("`.dc` is left out, as there is a `.tran`");
+        }
+        if circuit.op {
+            streams.note(format!(
+                "`.op` is left out, as there is a `.tran`; `circ op {file}` carries it out"
+            ));
+        }
         if circuit.tran.is_none() {
-            let file = args.input.file.display();
             let message = "nothing to simulate: the netlist asks for no .tran analysis";
             return Err(Failure::Message(format!("{file}: {message}")));
         }
@@ -136,11 +156,15 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
     // Then rows are chosen at the end.
     let feeds = circuit.is_some_and(|circuit| pictures || is_measured(circuit));
     let collects = outputs.hold() || destination.plots || feeds || args.verify;
+    let mut undefined = Undefined::default();
     let mut take = |block: Block<'_>| match circuit.and_then(|c| shown_values(c, block)) {
-        Some(values) => outputs.take(Block {
-            values: &values,
-            ..block
-        }),
+        Some(values) => {
+            undefined.see(block.time, &values);
+            outputs.take(Block {
+                values: &values,
+                ..block
+            })
+        }
         None => outputs.take(block),
     };
     let route = Route {
@@ -186,8 +210,11 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
     }
     drop(busy);
     if let Some(circuit) = circuit
-        && let Some((run, found)) = finished.run.take()
+        && let Some((mut run, found)) = finished.run.take()
     {
+        if !collects {
+            run.notes.extend(undefined.note(circuit));
+        }
         finished.run = Some((shown(circuit, run), found));
     }
     destination.finish(outputs, finished, feeds, signals.received())

@@ -169,6 +169,7 @@ impl Stepping<'_> {
         let told = Told {
             run: &total,
             measured: &measured,
+            conduction: &[],
             model: destination.model,
         };
         let written = outputs.finish(told, &figure, incomplete);

@@ -1,5 +1,7 @@
 //! What is to be seen in a picture of waveforms, before anyone draws it.
 
+use super::steps;
+use crate::analysis::Characteristic;
 use crate::waveform::Waveforms;
 
 /// Width of a panel's plotting area in a drawing, px.
@@ -9,13 +11,20 @@ pub const PANEL_WIDTH: usize = 700;
 pub const PANEL_COLUMNS: usize = 2 * PANEL_WIDTH;
 
 /// What stands on the common axis of a figure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Axis {
     /// Seconds.
     #[default]
     Time,
     /// The decimal logarithm of a frequency in Hz.
     Frequency,
+    /// What `.dc` sweeps.
+    Swept {
+        /// Its name.
+        name: String,
+        /// Its unit, where it has one.
+        unit: &'static str,
+    },
 }
 
 /// Panels over one axis, top to bottom.
@@ -101,6 +110,49 @@ impl Figure {
             title: runs.first().map_or(String::new(), |(_, w)| w.title.clone()),
             axis: Axis::Time,
             panels: panels.filter(|p| !p.series.is_empty()).collect(),
+        }
+    }
+
+    /// The probes of a `.dc` sweep over what is swept innermost, a run for each combination of the others.
+    #[must_use]
+    pub fn of_characteristic(of: &Characteristic) -> Self {
+        let outer = |row: &[f64]| -> Vec<(String, f64)> {
+            let others = of.names.iter().cloned().zip(row.iter().copied());
+            others.take(of.swept).skip(1).collect()
+        };
+        let runs = of.rows.chunk_by(|a, b| a[1..of.swept] == b[1..of.swept]);
+        let runs: Vec<(String, &[Vec<f64>])> = runs
+            .map(|rows| (steps::label(&outer(&rows[0])), rows))
+            .collect();
+        let curve = |j: usize, (label, rows): &(String, &[Vec<f64>])| {
+            let mut points: Vec<(f64, f64)> = rows.iter().map(|row| (row[0], row[j])).collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            Series {
+                name: format!("{} {label}", of.names[j]).trim_end().into(),
+                run: label.clone(),
+                points,
+            }
+        };
+        let panel = |unit: &'static str| Panel {
+            quantity: quantity(unit).into(),
+            unit,
+            series: (of.swept..of.names.len())
+                .filter(|&j| of.units[j] == unit)
+                .flat_map(|j| runs.iter().map(move |run| (j, run)))
+                .map(|(j, run)| curve(j, run))
+                .collect(),
+        };
+        Self {
+            title: of.title.clone(),
+            axis: Axis::Swept {
+                name: of.names.first().cloned().unwrap_or_default(),
+                unit: of.units.first().copied().unwrap_or_default(),
+            },
+            panels: ["V", "A"]
+                .map(panel)
+                .into_iter()
+                .filter(|panel| !panel.series.is_empty())
+                .collect(),
         }
     }
 

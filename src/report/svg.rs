@@ -40,10 +40,13 @@ pub fn draw(figure: &Figure) -> Result<String, PictureError> {
     };
     let left = MARGIN + LABELS;
     let right = left + PANEL_WIDTH as f64;
-    let across = match figure.axis {
+    let across = match &figure.axis {
         figure::Axis::Time => Axis::linear((start, end), (left, right), 80.0, ("time", "s")),
         figure::Axis::Frequency => {
             Axis::logarithmic((start, end), (left, right), ("frequency", "Hz"))
+        }
+        figure::Axis::Swept { name, unit } => {
+            Axis::linear((start, end), (left, right), 80.0, (name, unit))
         }
     };
     let runs = figure.runs();

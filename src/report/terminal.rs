@@ -111,7 +111,15 @@ fn chart(
     };
     let (low, high) = (low - half, high + half);
     let mut canvas = Canvas::new(width, rows);
-    for (k, curve) in curves.iter().enumerate() {
+    // What is dense would leave nothing to what is not: the shortest path comes first.
+    let climb = |curve: &[(f64, f64)]| -> f64 {
+        let steps = curve.windows(2);
+        steps.map(|pair| (pair[1].1 - pair[0].1).abs()).sum()
+    };
+    let mut order: Vec<usize> = (0..curves.len()).collect();
+    order.sort_by(|&a, &b| climb(&curves[a]).total_cmp(&climb(&curves[b])));
+    for k in order {
+        let curve = &curves[k];
         let span = if end > start { end - start } else { 1.0 };
         let at = |&(t, y): &(f64, f64)| {
             let x = (t - start) / span * (width * DOTS.0 - 1) as f64;
@@ -259,6 +267,22 @@ mod tests {
             assert!(coloured.contains(&name), "{coloured}");
         }
         assert!(!coloured.contains("not shown"));
+    }
+
+    #[test]
+    fn what_is_dense_hides_nothing() {
+        let time: Vec<f64> = (0..2000).map(f64::from).collect();
+        let values = (0..2000).flat_map(|k| [12.0 * f64::from(k % 2), 5.0]);
+        let waves = Waveforms {
+            names: vec!["v(sw)".into(), "v(out)".into()],
+            units: vec!["V"; 2],
+            values: values.collect(),
+            time,
+            ..Waveforms::default()
+        };
+        let text = plot(&waves, 60, 16, true);
+        let out = text.lines().skip(1).any(|line| line.contains(COLOURS[1]));
+        assert!(out, "{text}");
     }
 
     #[test]

@@ -109,7 +109,7 @@ def test_many_lanes_are_drawn_within_a_frame_or_two(leg, show):
         const times = Array.from({ length: 20000 }, (_, k) => 40e-3 * k / 20000), states = times.map((_, k) => k % 2);
         const strips = stripsOf(Array.from({ length: 40 }, (_, k) => ({ name: `s${k}`, on: "on", off: "off", start: false, times, states })));
         const canvas = document.createElement("canvas"), view = [0, 40e-3], position = (t) => 100 + 1000 * t / 40e-3;
-        const draw = () => drawLanes(canvas, strips, { view, width: 1100, left: 100, room: 1000, position, timeAt: (x) => (x - 100) * 40e-6, isClose: (a, b) => position(b) - position(a) < LANES.period, marks: [] });
+        const draw = () => drawLanes(canvas, strips, { view, width: 1100, left: 100, room: 1000, position, timeAt: (x) => (x - 100) * 40e-6, isClose: (a, b) => position(b) - position(a) < LANES.period }, []);
         draw();
         const start = performance.now();
         for (let k = 0; k < 5; k++) draw();

@@ -1,6 +1,7 @@
 """The page of a result: what it shows is what was computed, and its controls do what they say."""
 
 import math
+import re
 import subprocess
 
 import pytest
@@ -308,6 +309,34 @@ def test_a_logarithmic_axis_shows_what_is_asked_for(tmp_path, show):
     assert page.evaluate(scale) == view(page)
 
 
+@pytest.mark.parametrize("netlist", sorted((ROOT / "netlists/small-signal").glob("*.cir")), ids=lambda path: path.stem)
+def test_signals_without_a_response_leave_room_for_others(netlist, tmp_path, show):
+    run("ac" if re.search(r"^\.ac", netlist.read_text(), re.MULTILINE) else "sim", netlist, "-o", tmp_path / "a.html")
+    page = show(tmp_path / "a.html")
+    rows_of = page.evaluate("window.circ.panels.map((p) => p.curves.map((c) => c.y.length))")
+    drawn = page.evaluate("window.circ.state.plots.map((plot) => plot.axes.every((axis) => axis._values.length > 1))")
+    assert all(any(panel) for panel in rows_of) and drawn == [True] * len(rows_of)
+    assert "NaN" not in saved(page)
+    # Cursors stand on rows of a signal that has some.
+    first(page)
+    page.keyboard.press("a")
+    assert view(page)[0] <= float(cursor(page, "a")) <= view(page)[1]
+
+
+@pytest.mark.parametrize("lines", ["", "0,0\n", "0,0\n0,0\n0,0\n", "0,0\n1,0\n2,0\n"])
+def test_files_of_no_rows_or_of_zeros_have_pages(lines, tmp_path, show):
+    (tmp_path / "a.csv").write_text("time,v(a)\n" + lines)
+    run("view", tmp_path / "a.csv", "-o", tmp_path / "a.html")
+    page = show(tmp_path / "a.html")
+    for name in ("log y", "log x", "log y", "spectrum"):
+        page.get_by_role("button", name=name).click()
+        first(page)
+        for key in ("a", ".", "+", "Home"):
+            page.keyboard.press(key)
+        assert all(page.evaluate("window.circ.state.plots[0].axes.map((axis) => axis._values.some((label) => label))"))
+    assert page.evaluate("window.circ.panels[0].curves[0].y.length") == lines.count("\n")
+
+
 def test_text_of_a_netlist_is_never_markup(tmp_path, show):
     netlist = tmp_path / "odd.cir"
     evil = "</script><!--<script>alert(1)</script>"
@@ -392,6 +421,24 @@ def test_what_is_seen_is_saved_as_a_drawing(buck, show):
         page.get_by_role("button", name="save SVG").click()
     drawing = waiting.value.path().read_text()
     assert drawing.startswith("<svg") and drawing.count("data-signal=") == 3 and "NaN" not in drawing
+
+
+def test_a_drawing_shows_who_conducts_when(buck, show):
+    page = show(buck / "out.html")
+    for keys in ("", "+++++"):
+        first(page)
+        for key in keys:
+            page.keyboard.press(key)
+        drawing, [begin, end] = saved(page), view(page)
+        lanes = {name: path for path, name in re.findall(r'<path d="([^"]*)" fill="#7fb3d5" data-strip="([^"]*)"', drawing)}
+        strips = {strip["name"]: strip for strip in page.evaluate("window.circ.strips.map(({ name, times, states }) => ({ name, times: [...times], states }))")}
+        assert list(lanes) == list(strips) == ["s1", "d1"] and all(f">{name}</text>" in drawing for name in lanes)
+        for name, path in lanes.items():
+            changes = [(t, on) for t, on in zip(strips[name]["times"], strips[name]["states"])] + [(end, False)]
+            on = sum(max(0, min(b, end) - max(a, begin)) for (a, state), (b, _) in zip(changes, changes[1:]) if state)
+            area = sum(float(high) * float(wide) for high, wide in re.findall(r"v-([\d.]+)h([\d.]+)V", path))
+            room = float(re.search(r'<path d="M[\d.]+ [\d.]+h([\d.]+)" stroke="#ddd"/>', drawing)[1])
+            assert area / (14 * room) == pytest.approx(on / (end - begin), abs=5e-3), (name, begin, end)
 
 
 def test_a_million_rows_of_ten_signals_open(tmp_path, show):
@@ -679,6 +726,64 @@ def test_long_labels_of_an_axis_have_room(buck, show):
     assert page.evaluate(lefts) == before
 
 
+def test_what_is_tiny_has_an_axis(tmp_path, show):
+    lines = "".join(f"{k}e-3,5,{5 + k % 2 * 8.9e-16!r},{(k % 3 - 1) * 1e-19!r},{k * 1e-26!r}\n" for k in range(10))
+    (tmp_path / "a.csv").write_text("time,v(a),v(b),i(v1),i(v2)\n" + lines)
+    run("view", tmp_path / "a.csv", "-o", tmp_path / "a.html")
+    page = show(tmp_path / "a.html")
+    labels = lambda: page.evaluate("Object.fromEntries(window.circ.state.plots.map((plot) => [plot.panel.curves[0].name, plot.axes[1]._values]))")
+    lefts = "window.circ.state.plots.map((plot) => plot.bbox.left)"
+    seen = labels()
+    assert "-1e-19 A" in seen["i(v1)"] and "0 A" in seen["i(v1)"] and "1e-19 A" in seen["i(v1)"]
+    assert "4e-26 A" in seen["i(v2)"] and len(set(seen["i(v2)"])) > 3
+    assert len(set(page.evaluate(lefts))) == 1
+    # What differs by rounding alone is a straight line.
+    assert bounds(page, 0) == pytest.approx([4.5, 5.5]) and len(set(seen["v(a)"])) > 3
+    page.mouse.move(*middle(page, 2.05 / 9))
+    page.keyboard.press("a")
+    assert cell(page, "i(v1)", "a").inner_text() == "1e-19 A"
+    page.get_by_role("button", name="log y").click()
+    assert "1e-19 A" in labels()["i(v1)"] and len(set(page.evaluate(lefts))) == 1
+    # A height is dragged down to what can be told apart.
+    page.get_by_role("button", name="log y").click()
+    for _ in range(30):
+        box = page.locator(".panel .u-over").first.bounding_box()
+        x, y = box["x"] + 0.5 * box["width"], box["y"]
+        drag(page, (x, y + 0.45 * box["height"]), (x, y + 0.6 * box["height"]))
+    low, high = bounds(page, 0)
+    assert 1e-13 < high - low < 1e-10 and len(labels()["v(a)"]) > 2
+
+
+@pytest.mark.parametrize(("series", "height"), [(1e-15, 0.2), (1e-3, 9.7e-5)])
+def test_a_flat_response_has_an_axis(series, height, tmp_path, show):
+    (tmp_path / "a.cir").write_text(f"flat\nv1 in 0 dc 0 ac 1\nr1 in out {series}\nr2 out mid 100\nc1 mid 0 1u\n.ac dec 10 10 100k\n.end\n")
+    run("ac", tmp_path / "a.cir", "-o", tmp_path / "a.html", "--probe", "v(out)")
+    page = show(tmp_path / "a.html")
+    low, high = bounds(page, 0)
+    assert high - low == pytest.approx(height, rel=0.1)
+    assert all(len(set(labels)) > 2 for labels in page.evaluate("window.circ.state.plots.map((plot) => plot.axes[1]._values)"))
+
+
+def test_a_cursor_says_who_conducts_and_the_circuit_has_a_name(buck, show):
+    page = show(buck / "out.html")
+    page.mouse.click(*middle(page, 0.31))
+    told = page.locator("output[aria-live]").inner_text()
+    assert all(f"{name} {cell(page, name, 'a').inner_text()}" in told for name in ("s1", "d1"))
+    picture = page.get_by_role("img", name="circuit diagram of Buck converter, 12 V to 5 V, 50 kHz")
+    assert picture.count() == 1 and picture.evaluate("(picture) => picture.localName") == "svg"
+
+
+def test_only_time_has_means_and_frequencies(tmp_path, show):
+    (tmp_path / "sine.cir").write_text(SINE)
+    run("bench", tmp_path / "sine.cir", "--methods", "exact,theta", "-o", tmp_path / "bench.html")
+    page = show(tmp_path / "bench.html")
+    for name, part in (("a", 0), ("b", 1)):
+        page.evaluate(f"window.circ.place('{name}', window.circ.state.view[{part}])")
+    delta = page.locator(".readings thead [data-at=delta]").inner_text()
+    assert delta.startswith("B − A ") and delta.endswith("s") and "Hz" not in delta
+    assert page.locator(".readings [data-at=mean], .readings [data-at=rms]").count() == 0
+
+
 def saved(page):
     with page.expect_download() as waiting:
         page.get_by_role("button", name="save SVG").click()
@@ -715,6 +820,31 @@ def test_long_tables_have_a_scroll_of_their_own(buck, show):
     assert events.locator("th").first.bounding_box()["y"] == pytest.approx(events.bounding_box()["y"], abs=1)
     page.emulate_media(media="print")
     assert height() > 1000
+
+
+def test_paper_has_all_of_a_chart(buck, show):
+    page = show(buck / "out.html", color_scheme="dark")
+    page.set_viewport_size({"width": 1600, "height": 900})
+    widths = "[...document.querySelectorAll('.uplot canvas, canvas.strip')].map((canvas) => canvas.width)"
+    page.wait_for_function(f"{widths}.every((width) => width > 1500)")
+    before = page.evaluate(widths)
+    page.evaluate(f"addEventListener('beforeprint', () => {{ window.printed = {widths}; }})")
+    # A4 has 794 pixels, less its margins; what was drawn for a much wider one would have letters too small to read.
+    page.pdf(format="A4", margin={side: "1cm" for side in ("left", "right", "top", "bottom")})
+    printed = page.evaluate("window.printed")
+    assert len(printed) == 4 and all(600 < width < 720 for width in printed)
+    assert page.evaluate(widths) == before
+    # On a smaller sheet they are shrunk, and on a wider one there are no gaps.
+    page.emulate_media(media="print")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    for sheet in (450, 720, 880):
+        page.evaluate(f"document.body.style.width = '{sheet}px'")
+        boxes = [canvas.bounding_box() for canvas in page.locator(".uplot canvas, canvas.strip").all()]
+        assert all(box["width"] == pytest.approx(sheet, abs=1) for box in boxes)
+        assert all(high["y"] + high["height"] <= low["y"] for high, low in zip(boxes, boxes[1:]))
+        left, edge = page.evaluate("(() => { const plot = window.circ.state.plots[0]; return [plot.bbox.left / plot.width, document.querySelector('.names > span').getBoundingClientRect().left - plot.root.getBoundingClientRect().left]; })()")
+        assert edge == pytest.approx(left * sheet, abs=2)
+    assert page.locator(".swatch").first.evaluate("(swatch) => getComputedStyle(swatch).printColorAdjust") == "exact"
 
 
 @pytest.mark.parametrize(("a", "b"), [(0, 0), (1, 0), (0, 1), (1, 1)])

@@ -17,7 +17,9 @@ use crate::integrate::{
 use crate::mna::{StaticMultiport, behaviour};
 use crate::model::Model;
 use crate::settings::Settings;
-use crate::settings::tolerances::periodic::{LONGEST_SEARCH, PARTS_OF_PERIOD, TABLE_STEPS};
+use crate::settings::tolerances::periodic::{
+    CLOSED, LONGEST_SEARCH, PARTS_OF_PERIOD, PERIOD_OFF, TABLE_STEPS,
+};
 use crate::settings::tolerances::times::SPAN_PARTS;
 
 use search::{Found, Search};
@@ -89,6 +91,8 @@ pub(super) struct Steady {
     multiport: StaticMultiport,
     /// Sources that do not repeat.
     pub(super) held: Vec<String>,
+    /// What is to be told of the period.
+    said: Vec<Note>,
     pub(super) simulation: Simulation,
     found: Found,
     /// How far orbits of longer and shorter steps are apart, relative to the amplitudes.
@@ -112,6 +116,7 @@ impl Steady {
             circuit,
             multiport,
             held,
+            said,
             simulation,
             found,
             apart,
@@ -129,6 +134,7 @@ impl Steady {
                 *error = error.zip(apart).map(|(error, apart)| error.max(apart));
             }
         }
+        run.notes.extend(said);
         run.notes.extend(notes(&orbit, &found.fixed, names, &held));
         Ok((orbit, run))
     }
@@ -223,9 +229,24 @@ pub(super) fn steady(model: &Model, options: &PeriodicOptions<'_>) -> Result<Ste
         Some(_) => Ok(period::Period::default()),
         None => Err(none(what)),
     })?;
+    let mut said = Vec::new();
     if let Some(asked) = options.period {
         if !(asked > 0.0 && asked.is_finite()) {
             return Err(none(format!("{asked} s is no period")));
+        }
+        if let Some((name, own, part)) = period::off(&circuit, asked) {
+            if part > PERIOD_OFF {
+                let what = format!(
+                    "{name} repeats every {own:e} s, of which the period asked for, {asked:e} s, is no multiple"
+                );
+                return Err(none(what).device(name));
+            }
+            if part > CLOSED {
+                let text = format!(
+                    "{name} is {part:.0e} of its period away from where it began after the period asked for: the orbit is closed as if it were there"
+                );
+                said.push(Note::of([name], text));
+            }
         }
         period = period.of(asked);
     }
@@ -251,6 +272,7 @@ pub(super) fn steady(model: &Model, options: &PeriodicOptions<'_>) -> Result<Ste
         circuit,
         multiport,
         held,
+        said,
         simulation,
         found,
         apart,

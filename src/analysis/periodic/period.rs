@@ -36,7 +36,7 @@ impl Period {
     }
 }
 
-/// A circuit whose sources that do not repeat stay at their values at 0⁻; the names of these.
+/// A circuit whose sources that do not repeat stay at their values at 0⁻, and the names of these; supplies that ramp up at the start have done so.
 pub(super) fn repeating(circuit: &Circuit) -> (Circuit, Vec<String>) {
     let (mut held, mut names) = (circuit.clone(), Vec::new());
     let span = circuit.tran.map_or(f64::INFINITY, |tran| tran.tstop);
@@ -44,7 +44,9 @@ pub(super) fn repeating(circuit: &Circuit) -> (Circuit, Vec<String>) {
         let (Kind::VoltageSource(source) | Kind::CurrentSource(source)) = &mut element.kind else {
             continue;
         };
-        if is_once(&source.wave, span) {
+        if let Some(value) = source.wave.risen() {
+            source.wave = Wave::Dc(value);
+        } else if is_once(&source.wave, span) {
             *source = Source {
                 dc: source.dc,
                 wave: Wave::Dc(source.wave.value_left(0.0)),
@@ -76,6 +78,24 @@ fn is_once(wave: &Wave, span: f64) -> bool {
             ref points, repeat, ..
         } => points.len() > 1 && (repeat.is_none() || wave.period().is_none()),
     }
+}
+
+/// The source that repeats least well after so many seconds, and which part of its own period it is off by then.
+pub(super) fn off(circuit: &Circuit, seconds: f64) -> Option<(&str, f64, f64)> {
+    let sources = circuit.elements.iter().filter_map(|element| {
+        let (Kind::VoltageSource(source) | Kind::CurrentSource(source)) = &element.kind else {
+            return None;
+        };
+        Some((element.name.as_str(), periods(&source.wave).0))
+    });
+    let all = sources.flat_map(|(name, own)| {
+        let own = own.into_iter().filter_map(|period| period.to_f64());
+        own.map(move |period| {
+            let laps = seconds / period;
+            (name, period, (laps - laps.round().max(1.0)).abs())
+        })
+    });
+    all.max_by(|one, other| one.2.total_cmp(&other.2))
 }
 
 /// The common period of the sources that vary.

@@ -9,7 +9,7 @@ impl Page {
     #[must_use]
     pub fn of_measurements(title: &str, measurements: &[Measurement]) -> Self {
         let axis = Axis {
-            name: "CPU of the solve",
+            name: "CPU of the solve".into(),
             unit: "s",
             log: true,
         };

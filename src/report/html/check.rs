@@ -8,7 +8,7 @@ impl Page {
     #[must_use]
     pub fn of_report(report: &Report) -> Self {
         let axis = Axis {
-            name: "time",
+            name: "time".into(),
             unit: "s",
             log: false,
         };

@@ -35,7 +35,7 @@ impl Page {
     pub fn of_figure(figure: &Figure) -> Self {
         match figure.axis {
             figure::Axis::Time => Self::with_panels(figure, by_scale),
-            figure::Axis::Frequency => Self::of_panels(figure),
+            figure::Axis::Frequency | figure::Axis::Swept { .. } => Self::of_panels(figure),
         }
     }
 
@@ -53,9 +53,10 @@ impl Page {
     }
 
     fn with_panels(figure: &Figure, apart: for<'a> fn(Named<'a>) -> Vec<Named<'a>>) -> Self {
-        let (axis, place): (Axis, fn(f64) -> f64) = match figure.axis {
+        let (axis, place): (Axis, fn(f64) -> f64) = match &figure.axis {
             figure::Axis::Time => (axis("time", "s", false), |t| t),
             figure::Axis::Frequency => (axis("frequency", "Hz", true), |x| 10f64.powf(x)),
+            figure::Axis::Swept { name, unit } => (axis(name, unit, false), |x| x),
         };
         let mut page = Self::new(&figure.title, axis);
         // Curves of one run have one column of times.

@@ -61,9 +61,9 @@ pub struct Page {
 }
 
 /// The common axis of all panels.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 struct Axis {
-    name: &'static str,
+    name: String,
     unit: &'static str,
     log: bool,
 }
@@ -174,13 +174,16 @@ impl Page {
         self.columns.len() - 1
     }
 
-    /// The same with a picture of the circuit, where it can be drawn.
+    /// The same with a picture of the circuit, where it can be drawn, and what was found in its netlist.
     #[must_use]
-    pub fn with_circuit(self, model: Option<&Model>) -> Self {
-        Self {
-            circuit: model.and_then(|model| schematic::with_both_states(model).ok()),
-            ..self
+    pub fn with_circuit(mut self, model: Option<&Model>) -> Self {
+        if let Some(model) = model {
+            self.circuit = schematic::with_both_states(model).ok();
+            let found = model.findings().iter();
+            let lines: Vec<String> = found.map(|f| f.line(model.sources())).collect();
+            self.say("Netlist", lines.join("\n"));
         }
+        self
     }
 
     /// The page with overviews of its long curves, and their columns for behind it: a browser draws the one while it reads the other.
@@ -188,7 +191,7 @@ impl Page {
         let mut head = Self {
             title: self.title.clone(),
             about: self.about.clone(),
-            axis: self.axis,
+            axis: self.axis.clone(),
             columns: Vec::new(),
             panels: self.panels.clone(),
             strips: self.strips.clone(),
@@ -269,7 +272,8 @@ pub fn with_messages(page: Option<String>, (role, messages): (&str, &str), scrip
     page.replacen("<main", &format!("{above}<main"), 1) + &format!("<script>{script}</script>\n")
 }
 
-const fn axis(name: &'static str, unit: &'static str, log: bool) -> Axis {
+fn axis(name: &str, unit: &'static str, log: bool) -> Axis {
+    let name = name.to_owned();
     Axis { name, unit, log }
 }
 

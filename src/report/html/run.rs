@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use super::super::figure::Figure;
 use super::super::{si, text};
 use super::{Page, Strip, Table};
+use crate::analysis::Conduction;
 use crate::integrate::{Change, Event, Places, Run};
 
 /// Devices of a strip, those that change first.
@@ -43,6 +44,24 @@ impl Page {
             );
         }
         page
+    }
+}
+
+impl Page {
+    /// The same with strips for devices that no event tells of.
+    #[must_use]
+    pub fn with_conduction(mut self, all: &[Conduction]) -> Self {
+        let room = MOST_STRIPS.saturating_sub(self.strips.len());
+        let strips = all.iter().take(room).map(|own| Strip {
+            name: own.device.clone(),
+            on: "conducts",
+            off: "blocks",
+            start: Some(own.at_start),
+            times: own.changes.iter().map(|change| change.0).collect(),
+            states: own.changes.iter().map(|change| change.1.into()).collect(),
+        });
+        self.strips.extend(strips);
+        self
     }
 }
 

@@ -6,6 +6,8 @@ const STEPS = { dB: [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 40, 100, 
 const LEAST = 1e-17;
 /** CSS pixels. */
 const SIZES = { axis: 76, label: 18, tick: 22, panel: 220, across: 110, up: 30, right: 26, line: 1.5, dot: 3, pixelsToDrag: 4, box: 40 };
+/** The least height of a linear axis over its greatest value: what varies less does so by rounding, and is shown as a straight line. */
+const LEAST_HEIGHT = 1e-13;
 /** How opaque the inside of an envelope is: what lies behind it is seen. */
 const PALE = 0.35;
 
@@ -24,7 +26,7 @@ function chart(root, content, announce) {
   const curves = panels.flatMap((panel) => panel.curves);
   const isDotted = panels.some((panel) => panel.dots);
   let whole = wholeSpan(curves, axis.log, isDotted);
-  const state = { view: whole, cursors: { a: null, b: null }, pointer: null, under: null, plots: [], room: SIZES.axis, logs: new Set(panels.filter((panel) => panel.dots)), heights: new Map(), fits: new Map() };
+  const state = { view: whole, cursors: { a: null, b: null }, pointer: null, under: null, paper: null, plots: [], room: SIZES.axis, logs: new Set(panels.filter((panel) => panel.dots)), heights: new Map(), fits: new Map() };
   const namesOf = (all) => [...new Set(all.map((curve) => curve.name))];
   const few = namesOf(curves).length <= COLOURS.light.length;
   const runs = [...new Set(curves.map((curve) => curve.run))];
@@ -76,9 +78,13 @@ function chart(root, content, announce) {
       high = Math.max(high, -low) || 1;
       return [high * 1e-6, high * 1.5];
     }
-    const room = high > low ? 0.06 * (high - low) : Math.abs(high) * 0.1 || 1;
+    const room = isHigh(panel, low, high) ? 0.06 * (high - low) : 0.1 * sizeOf(panel, low, high) || 1;
     return [low - room, high + room];
   }
+
+  /** The greatest value; a decibel and a degree at least, as these are of ratios. */
+  const sizeOf = ({ unit }, low, high) => Math.max(-low, high, STEPS[unit] ? 1 : 0);
+  const isHigh = (panel, low, high) => high - low > LEAST_HEIGHT * sizeOf(panel, low, high);
 
   const pixelsOf = (plot) => Math.max(1, Math.round(plot.bbox.width));
 
@@ -168,9 +174,9 @@ function chart(root, content, announce) {
       padding: [8, SIZES.right, 0, 0],
       legend: { show: false },
       scales: {
-        // What is asked for, not rounded to whole decades.
-        x: { time: false, auto: false, distr: axis.log ? 3 : 1, range: (_, low, high) => [low, high] },
-        y: { auto: false, distr: state.logs.has(panel) ? 3 : 1, range: (_, low, high) => [low, high] },
+        // What is seen, not rounded to whole decades.
+        x: { time: false, auto: false, distr: axis.log ? 3 : 1, range: () => state.view },
+        y: { auto: false, distr: state.logs.has(panel) ? 3 : 1, range: () => boundsOf(panel) },
       },
       axes: [
         { ...lines, ...marks(axis.unit, axis.log, SIZES.across), size: last ? 34 : 24 },
@@ -182,9 +188,10 @@ function chart(root, content, announce) {
         setSelect: [
           (plot) => {
             const { left, width, top, height } = plot.select;
-            const [isWide, isHigh] = [width < plot.over.clientWidth, height < plot.over.clientHeight];
-            const isDrag = Math.max(isWide ? width : 0, isHigh ? height : 0) > SIZES.pixelsToDrag;
-            if (isDrag && isHigh) state.heights.set(panel, [plot.posToVal(top + height, "y"), plot.posToVal(top, "y")]);
+            const [isWide, isUpright] = [width < plot.over.clientWidth, height < plot.over.clientHeight];
+            const isDrag = Math.max(isWide ? width : 0, isUpright ? height : 0) > SIZES.pixelsToDrag;
+            const bounds = [plot.posToVal(top + height, "y"), plot.posToVal(top, "y")];
+            if (isDrag && isUpright && isHigh(panel, ...bounds)) state.heights.set(panel, bounds);
             if (isDrag) show(isWide ? [plot.posToVal(left, "x"), plot.posToVal(left + width, "x")] : state.view);
             if (width > 0) plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
           },
@@ -203,8 +210,9 @@ function chart(root, content, announce) {
 
   /** Where an axis has lines and labels, at least `space` pixels apart. */
   function marks(unit, log, space) {
-    if (!log) return { space, values: (_, splits) => ticks(splits, unit), ...(STEPS[unit] ? { incrs: STEPS[unit] } : {}) };
     const room = (plot) => (space === SIZES.across ? plot.bbox.width : plot.bbox.height) / (devicePixelRatio || 1);
+    // uPlot's own steps are no less than 1e-17.
+    if (!log) return { splits: (plot, _, low, high) => evenSplits(low, high, ((high - low) * space) / room(plot), STEPS[unit]), values: (_, splits) => ticks(splits, unit) };
     return {
       splits: (plot, _, low, high) => logSplits(low, high, room(plot) / space),
       filter: (plot, splits) => logLabels(splits, room(plot) / space),
@@ -221,7 +229,8 @@ function chart(root, content, announce) {
     return (state.room = Math.max(state.room, Math.ceil(Math.max(0, ...widths)) + SIZES.tick));
   }
 
-  const widthOf = () => Math.max(280, root.clientWidth);
+  /** The window says nothing of how wide paper is. */
+  const widthOf = () => state.paper ?? Math.max(280, root.clientWidth);
 
   function build() {
     state.plots.forEach((plot) => plot.destroy());
@@ -245,17 +254,15 @@ function chart(root, content, announce) {
     for (const curve of curves) curve.bars = null;
     for (const plot of state.plots) {
       plot.entries.forEach((entry) => entry.update());
-      const [low, high] = boundsOf(plot.panel);
       plot.batch(() => {
-        // First: it asks for the span that was seen before.
         plot.redraw(true, true);
-        plot.setScale("x", { min: state.view[0], max: state.view[1] });
-        plot.setScale("y", { min: low, max: high });
+        // Asks for the ranges of scales: spans that are handed over are left out where they are below 1e-16.
+        for (const scale of ["x", "y"]) plot.setScale(scale, { min: null, max: null });
       });
     }
     // A later panel may have longer labels than one before.
     for (const plot of state.plots) if (plot.axes[1]._size < state.room) plot.batch(() => plot.redraw(true, true));
-    area.style.setProperty("--left", `${SIZES.label + state.room}px`);
+    area.style.setProperty("--left", `${(100 * (SIZES.label + state.room)) / widthOf()}%`);
     drawStrips();
     legend?.update();
     root.dispatchEvent(new CustomEvent("view", { detail: state.view }));
@@ -288,18 +295,24 @@ function chart(root, content, announce) {
   }
 
   const centre = () => (axis.log ? Math.sqrt(state.view[0] * state.view[1]) : (state.view[0] + state.view[1]) / 2);
-  const guide = () => curves.find((curve) => curve.shown) ?? curves[0];
+  /** Where the rows are that cursors stand on: of a curve that is seen, where one has any. */
+  function guide() {
+    const some = curves.filter((curve) => curve.x.length > 0);
+    return (some.find((curve) => curve.shown) ?? some[0])?.x;
+  }
 
   /** Puts a cursor on the row nearest to x. */
   function place(name, x) {
-    const { x: rows } = guide();
+    const rows = guide();
+    if (!rows) return;
     state.cursors[name] = rows[nearestRow(rows, x)];
     retell(name);
   }
 
   /** Moves a cursor by a row. */
   function step(name, by) {
-    const { x: rows } = guide();
+    const rows = guide();
+    if (!rows) return;
     const t = state.cursors[name] ?? centre();
     const next = by > 0 ? rowAfter(rows, t) : rowAt(rows, t) - 1;
     state.cursors[name] = rows[Math.min(Math.max(next, 0), rows.length - 1)];
@@ -329,6 +342,7 @@ function chart(root, content, announce) {
     retold();
     const t = state.cursors[name];
     const told = curves.filter((curve) => curve.shown).map((curve) => `${curve.name} ${quantity(valueAt(curve, t), unitOf(curve))}`);
+    told.push(...strips.map((strip) => `${strip.name} ${stateWords(strip, stateAt(strip, t))}`));
     announce(`Cursor ${name.toUpperCase()} at ${quantity(t, axis.unit, 9)}: ${told.join(", ")}`);
   }
 
@@ -432,7 +446,7 @@ function chart(root, content, announce) {
   function drawStrips() {
     if (strips.length === 0) return;
     const seen = Object.entries(state.cursors).filter(([, t]) => t !== null && t >= state.view[0] && t <= state.view[1]);
-    drawLanes(stripCanvas, strips, { ...across(), marks: seen.map(([name, t]) => [t, themed(name === "a" ? "--cursor-a" : "--cursor-b")]) });
+    drawLanes(stripCanvas, strips, across(), seen.map(([name, t]) => [t, themed(name === "a" ? "--cursor-a" : "--cursor-b")]));
   }
 
   /** The share of time on about t, null where changes can be told apart. */
@@ -556,12 +570,17 @@ function chart(root, content, announce) {
     retold();
   }
 
-  const resized = new ResizeObserver(() => {
-    if (state.plots.some((plot) => plot.width !== widthOf())) {
-      state.plots.forEach((plot) => plot.setSize({ width: widthOf(), height: SIZES.panel }));
-      show(state.view);
-    }
-  });
+  const isFit = (plot) => plot.width === widthOf();
+
+  /** Draws all anew, for paper of so many pixels or else the window. */
+  function repaint(paper = null) {
+    state.paper = paper;
+    for (const plot of state.plots) if (!isFit(plot)) plot.setSize({ width: widthOf(), height: SIZES.panel });
+    show(state.view);
+    readings.update();
+  }
+
+  const resized = new ResizeObserver(() => { if (!state.plots.every(isFit)) repaint(state.paper); });
   if (strips.length > 0) {
     bind(stripCanvas, (event) => across().timeAt(event.clientX - stripCanvas.getBoundingClientRect().left));
     stripCanvas.addEventListener("mousemove", tell);
@@ -570,14 +589,13 @@ function chart(root, content, announce) {
   build();
   resized.observe(root);
   document.addEventListener("keydown", pressedOnPage);
-  const paper = matchMedia("(prefers-color-scheme: dark)");
-  const repaint = () => { show(state.view); readings.update(); };
-  paper.addEventListener("change", repaint);
+  const paper = matchMedia("(prefers-color-scheme: dark)"), recolour = () => repaint(state.paper);
+  paper.addEventListener("change", recolour);
   return {
     state, panels, strips, runs, isMany, entriesOf, show, complete, keep, restore, zoom, pan, place, logarithmic, logarithmicAcross, colour, dash, boundsOf, edgeOf, axis,
     full,
     repaint,
-    remove: () => { resized.disconnect(); document.removeEventListener("keydown", pressedOnPage); paper.removeEventListener("change", repaint); state.plots.forEach((plot) => plot.destroy()); root.replaceChildren(); },
+    remove: () => { resized.disconnect(); document.removeEventListener("keydown", pressedOnPage); paper.removeEventListener("change", recolour); state.plots.forEach((plot) => plot.destroy()); root.replaceChildren(); },
   };
 }
 

@@ -226,10 +226,10 @@ function trace(curve, view, point) {
 
 const PREFIXES = ["f", "p", "n", "µ", "m", "", "k", "M", "G", "T"];
 
-/** The power of a thousand for a size, from −5 to 4. */
+/** The power of a thousand for a size, from −5 to 4; 0 of what is less, which has an exponent. */
 function thousands(size) {
-  if (!(size > 0) || !Number.isFinite(size)) return 0;
-  return Math.max(-5, Math.min(4, Math.floor(Math.log10(size * (1 + 1e-12)) / 3)));
+  if (!(size >= 1e-15) || !Number.isFinite(size)) return 0;
+  return Math.min(4, Math.floor(Math.log10(size * (1 + 1e-12)) / 3));
 }
 
 /** A quantity with an SI prefix, to so many digits. */
@@ -246,23 +246,27 @@ function ticks(splits, unit) {
   const known = splits.filter((value) => value != null);
   const size = Math.max(...known.map(Math.abs));
   const power = unit === "dB" || unit === "°" ? 0 : thousands(size);
-  const scale = 1000 ** power;
+  const exponent = size > 0 && size < 1e-15 ? Math.floor(Math.log10(size)) : 0;
+  const scale = 1000 ** power * 10 ** exponent;
   const step = known.length > 1 ? Math.abs(known[1] - known[0]) / scale : 1;
   let decimals = 0;
   while (decimals < 12 && Math.abs(step * 10 ** decimals - Math.round(step * 10 ** decimals)) > 1e-6) decimals++;
-  const label = (value) => Number((value / scale).toFixed(decimals)).toString() + " " + PREFIXES[power + 5] + unit;
+  const label = (value) => `${Number((value / scale).toFixed(decimals))}${exponent && value ? `e${exponent}` : ""} ${PREFIXES[power + 5]}${unit}`;
   return splits.map((value) => (value == null ? null : label(value).trim()));
+}
+
+/** From low to high the multiples of a step, which is not less than `least`: one of those given, beyond them 1, 2, 2.5 or 5 times a power of ten. */
+function evenSplits(low, high, least, steps = []) {
+  const power = 10 ** Math.floor(Math.log10(least));
+  const step = [...(least < steps[0] ? [] : steps), power, 2 * power, 2.5 * power, 5 * power, 10 * power].find((step) => step >= least);
+  const first = Math.ceil(low / step), last = Math.floor(high / step);
+  return Array.from({ length: last - first + 1 }, (_, k) => Number(((first + k) * step).toPrecision(15)));
 }
 
 /** Where a logarithmic axis with room for so many labels has lines: at powers of ten, 2 to 9 times them if that is not too much, or in even steps within one. */
 function logSplits(low, high, room) {
   const decades = Math.log10(high / low);
-  if (decades < 1) {
-    const raw = (high - low) / 6, size = 10 ** Math.floor(Math.log10(raw));
-    const step = size * [1, 2, 5, 10].find((times) => times * size >= raw);
-    const first = Math.ceil(low / step), last = Math.floor(high / step);
-    return Array.from({ length: last - first + 1 }, (_, k) => Number(((first + k) * step).toPrecision(12)));
-  }
+  if (decades < 1) return evenSplits(low, high, (high - low) / 6);
   const all = [];
   for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power++) {
     for (const times of room < 1.5 * decades ? [1] : [1, 2, 3, 4, 5, 6, 7, 8, 9]) {

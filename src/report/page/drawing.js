@@ -1,8 +1,9 @@
 // What charts show as a drawing in SVG.
 
-/** What charts show, each under its heading, as a drawing in SVG. */
+/** What charts show, each under its heading, as a drawing in SVG: panels, and below them who conducts when. */
 function drawing(charts) {
-  const longest = Math.max(...charts.flatMap(([shown]) => shown.state.plots.flatMap((plot) => plot.axes[1]._values.map((label) => label?.length ?? 0))));
+  const labels = ([shown]) => [...shown.state.plots.flatMap((plot) => plot.axes[1]._values), ...shown.strips.map((strip) => strip.name)];
+  const longest = Math.max(...charts.flatMap(labels).map((label) => label?.length ?? 0));
   const width = 900, left = Math.max(90, 7 * longest + 14), right = 20, inner = width - left - right, room = 190;
   const clean = (text) => text.replace(/[&<>"]/g, (c) => `&#${c.charCodeAt(0)};`);
   const parts = [];
@@ -67,6 +68,22 @@ function drawing(charts) {
       parts.push(`<clipPath id="${clip}"><rect x="${left}" y="${top}" width="${inner}" height="${room}"/></clipPath><g clip-path="url(#${clip})">${layers.inside}${layers.outline}${layers.line}</g>`);
       base += room + 50;
     });
+    const timeAt = (x) => (axis.log ? from * (to / from) ** ((x - left) / inner) : from + ((to - from) * (x - left)) / inner);
+    const isClose = (a, b) => across(b) - across(a) < LANES.period;
+    for (const strip of shown.strips) {
+      const foot = base - 10;
+      let known = "", pale = "", unknown = "";
+      for (const { x, width: wide, height: high, isKnown, isPale } of laneBars(strip, { view: state.view, left, room: inner, position: across, timeAt, isClose }, 1)) {
+        const bar = `M${x.toFixed(2)} ${foot}v${(-high).toFixed(2)}h${wide.toFixed(2)}V${foot}z`;
+        if (!isKnown) unknown += bar;
+        else if (isPale) pale += bar;
+        else known += bar;
+      }
+      parts.push(`<text x="${left - 6}" y="${foot - 3}" text-anchor="end">${clean(strip.name)}</text><path d="M${left} ${foot}h${inner}" stroke="#ddd"/>`);
+      parts.push(`<path d="${unknown}" fill="#ddd"/><path d="${pale}" fill="#7fb3d5" fill-opacity="${PALE}"/><path d="${known}" fill="#7fb3d5" data-strip="${clean(strip.name)}"/>`);
+      base += LANES.row;
+    }
+    if (shown.strips.length > 0) base += 20;
   }
   return `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${base}" viewBox="0 0 ${width} ${base}" font-family="sans-serif" font-size="12">` +
     `<rect width="${width}" height="${base}" fill="#fff"/>${parts.join("")}</svg>`;

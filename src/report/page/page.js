@@ -2,10 +2,12 @@
 
 /** Rows of a table that are written at once; the rest on request. */
 const ROWS = 500;
+/** CSS pixels that charts are wide when they are printed, about a sheet of A4 or Letter within its margins; the style sheet fits them to others. */
+const PAPER = 700;
 
 /** Panels of curves over the columns of the data; curves whose columns follow later are drawn by their overviews until then. */
 function panelsOf(data) {
-  const columns = data.columns.map((column) => column && numbers(column));
+  const columns = data.columns.map((column) => (column == null ? null : numbers(column)));
   const of = (curve) => {
     const { name, run } = curve;
     if (columns[curve.x] && columns[curve.y]) return { ...curveOf(name, columns[curve.x], columns[curve.y]), run };
@@ -47,6 +49,8 @@ function circuitOf(svg, shown, area) {
   const section = element("details", { open: true, class: "circuit" }, element("summary", {}, "Circuit"), when, document.importNode(picture, true));
   // A large one is not shrunk until nobody can read it: it can be moved.
   const drawn = section.querySelector("svg");
+  drawn.setAttribute("role", "img");
+  drawn.setAttribute("aria-label", `circuit diagram of ${drawn.querySelector("title")?.textContent ?? "the netlist"}`);
   drawn.style.minWidth = `${0.7 * (Number.parseFloat(drawn.getAttribute("width")) || 0)}px`;
   const states = section.querySelectorAll(".device");
   const update = () => {
@@ -169,15 +173,15 @@ function circPage(root, data) {
   for (const { heading, text } of data.texts ?? []) {
     root.append(element("details", { open: true }, element("summary", {}, heading), element("pre", {}, text)));
   }
-  // On paper it is light.
+  // On paper it is light, and charts are as wide as a sheet.
   let theme = null;
-  const themeOf = (name) => {
+  const repainted = (name, width) => {
     if (name === undefined) delete document.documentElement.dataset.theme;
     else document.documentElement.dataset.theme = name;
-    shown?.repaint();
-    spectrum?.repaint();
+    shown?.repaint(width);
+    spectrum?.repaint(width);
   };
-  addEventListener("beforeprint", () => { theme = document.documentElement.dataset.theme; themeOf("light"); });
-  addEventListener("afterprint", () => themeOf(theme));
+  addEventListener("beforeprint", () => { theme = document.documentElement.dataset.theme; repainted("light", PAPER); });
+  addEventListener("afterprint", () => repainted(theme));
   return shown;
 }

@@ -6,7 +6,7 @@
  */
 function readingsTable(shown) {
   const { axis, panels, curves, strips, runs, state } = shown;
-  const columns = ["pointer", "a", "b"], averages = axis.unit === "s" ? ["mean", "rms"] : [];
+  const columns = ["pointer", "a", "b"], isTime = axis.name === "time", averages = isTime ? ["mean", "rms"] : [];
   const all = [...columns, "delta", ...averages];
   const head = Object.fromEntries(all.map((name) => [name, element("th", { scope: "col", "data-at": name })]));
   const cells = new Map(), boxes = new Map();
@@ -52,7 +52,7 @@ function readingsTable(shown) {
       const t = times[name], on = t === null ? null : stateAt(strip, t);
       // Where periods are too close to be told apart the state at the pointer would say nothing.
       const share = name === "pointer" && t !== null ? shown.shareAt(strip, t) : null;
-      put(own[name], null, t === null ? "" : share !== null ? `${strip.on} ${percent(share)}` : on === null ? "not known" : on ? strip.on : strip.off);
+      put(own[name], null, t === null ? "" : share !== null ? `${strip.on} ${percent(share)}` : stateWords(strip, on));
     }
     if (averages.length === 0 || !isNew) return;
     const { a, b } = times, share = a !== null && b !== null && a !== b ? shareOn(strip, Math.min(a, b), Math.max(a, b)) : null;
@@ -67,7 +67,7 @@ function readingsTable(shown) {
       const label = name === "pointer" ? axis.name : name.toUpperCase();
       put(head[name], times[name], times[name] === null ? label : `${label} ${quantity(times[name], axis.unit, 9)}`);
     }
-    const inverse = axis.unit === "s" && both && a !== b ? ` (${quantity(1 / Math.abs(b - a), "Hz")})` : "";
+    const inverse = isTime && both && a !== b ? ` (${quantity(1 / Math.abs(b - a), "Hz")})` : "";
     put(head.delta, both ? b - a : null, both ? `B − A ${quantity(b - a, axis.unit, 9)}${inverse}` : "B − A");
     for (const name of averages) put(head[name], null, `${name} A…B`);
     const isNew = spanned !== `${a} ${b}`;

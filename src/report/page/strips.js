@@ -20,6 +20,8 @@ function stateAt(strip, t) {
   return changes === 0 ? strip.start : strip.states[changes - 1];
 }
 
+const stateWords = (strip, on) => (on === null ? "not known" : on ? strip.on : strip.off);
+
 /** Time on from the first change to t, negative before it; NaN where nothing is known. */
 function onUntil({ times, states, sums, start }, t) {
   const changes = rowAfter(times, t);
@@ -84,8 +86,29 @@ function words(strip, t, [a, b], piece) {
   return `${strip.name}: ${piece.on ? strip.on : strip.off} from ${quantity(piece.from, "s", 9)} for ${quantity(piece.to - piece.from, "s", 6)}`;
 }
 
-/** Draws lanes on a canvas: `left` to `left + room` is the view, `position(t)` where t stands, `timeAt(x)` the reverse. */
-function drawLanes(canvas, strips, { view, width, left, room, position, timeAt, isClose, marks }) {
+/**
+ * The bars of a lane as { x, width, height, isKnown, isPale }, their feet on one line: `left` to `left + room` is the view, `position(t)` where t
+ * stands, `timeAt(x)` the reverse. A share of time goes from one `pixel` to the next, as seams would be seen between parts of one.
+ */
+function* laneBars(strip, { view, left, room, position, timeAt, isClose }, pixel) {
+  const within = (x) => Math.min(Math.max(x, left), left + room);
+  for (const piece of pieces(strip, view, isClose)) {
+    const x = within(position(piece.from)), end = within(position(piece.to));
+    if (!piece.changes) {
+      if (piece.on !== false) yield { x, width: Math.max(end - x, 0.5), height: LANES.bar, isKnown: piece.on !== null };
+      continue;
+    }
+    yield { x, width: end - x, height: LANES.bar, isKnown: true, isPale: true };
+    for (let k = Math.round(x / pixel); k * pixel < end; k++) {
+      const share = shareAbout(strip, timeAt(k * pixel), timeAt((k + 1) * pixel), piece.changes);
+      yield { x: k * pixel, width: pixel, height: LANES.bar * share, isKnown: true };
+    }
+  }
+}
+
+/** Draws lanes on a canvas, `across` as in `laneBars`, and marks over all of them. */
+function drawLanes(canvas, strips, across, marks) {
+  const { width, left, room, position } = across;
   const height = strips.length * LANES.row + 6, ratio = devicePixelRatio || 1;
   Object.assign(canvas, { width: width * ratio, height: height * ratio });
   Object.assign(canvas.style, { width: `${width}px`, height: `${height}px` });
@@ -94,29 +117,18 @@ function drawLanes(canvas, strips, { view, width, left, room, position, timeAt, 
   ctx.font = "11px system-ui, sans-serif";
   ctx.textBaseline = "middle";
   ctx.textAlign = "right";
-  const within = (x) => Math.min(Math.max(x, left), left + room);
   strips.forEach((strip, k) => {
-    const top = k * LANES.row + 5;
+    const foot = k * LANES.row + 5 + LANES.bar;
     ctx.fillStyle = ink;
-    ctx.fillText(strip.name, left - 6, top + LANES.bar / 2, left - 8);
+    ctx.fillText(strip.name, left - 6, foot - LANES.bar / 2, left - 8);
     ctx.fillStyle = grid;
-    ctx.fillRect(left, top + LANES.bar - 1, room, 1);
-    for (const piece of pieces(strip, view, isClose)) {
-      const start = within(position(piece.from)), end = within(position(piece.to));
-      ctx.fillStyle = piece.on === null ? grid : bar;
-      if (!piece.changes) {
-        if (piece.on !== false) ctx.fillRect(start, top, Math.max(end - start, 0.5), LANES.bar);
-        continue;
-      }
-      ctx.globalAlpha = PALE;
-      ctx.fillRect(start, top, end - start, LANES.bar);
-      ctx.globalAlpha = 1;
-      // From a pixel of the screen to the next, as seams would be seen between parts of one.
-      for (let x = Math.round(start * ratio); x < end * ratio; x++) {
-        const high = LANES.bar * shareAbout(strip, timeAt(x / ratio), timeAt((x + 1) / ratio), piece.changes);
-        ctx.fillRect(x / ratio, top + LANES.bar - high, 1 / ratio, high);
-      }
+    ctx.fillRect(left, foot - 1, room, 1);
+    for (const { x, width: wide, height: high, isKnown, isPale } of laneBars(strip, across, 1 / ratio)) {
+      ctx.fillStyle = isKnown ? bar : grid;
+      ctx.globalAlpha = isPale ? PALE : 1;
+      ctx.fillRect(x, foot - high, wide, high);
     }
+    ctx.globalAlpha = 1;
   });
   for (const [t, colour] of marks) {
     ctx.fillStyle = colour;

@@ -40,6 +40,10 @@ pub(crate) const PARTS_OF_PERIOD: f64 = 1000.0;
 /// Table steps of exact integration in a period. Larger: more of them on the way through a calm mode; smaller: deeper tables.
 pub(crate) const TABLE_STEPS: f64 = 64.0;
 
+/// A source is taken to repeat after a period that was asked for if it is off its own by no more than this part then. Larger: orbits of sources that are cut in
+/// their midst; smaller: tones without a common period cannot be given one.
+pub(crate) const PERIOD_OFF: f64 = 1e-2;
+
 /// No search is longer than so many periods, or spans where no source varies.
 pub(crate) const LONGEST_SEARCH: f64 = 1e6;
 

@@ -54,8 +54,8 @@ pub(crate) const CURVE_CLOSE: f64 = 1e-10;
 /// rounding of an event on its level is several.
 pub(crate) const NO_STEP: f64 = 1e-9;
 
-/// How often as large as all rows of the grid of its unit a row at an event is before a note says that rows do not show its course. Larger: spikes of kilovolts
-/// without a word; smaller: notes on the peaks of converters.
+/// How often as large as the next row, and as all that lasts from one row to the next in its unit, a value at an event is before a note says that rows do not
+/// show its course. Larger: spikes of kilovolts without a word; smaller: notes on the peaks of converters.
 pub(crate) const SPIKE: f64 = 100.0;
 
 /// Radians by which an oscillation turns while it decays by e from which on it is said that rows do not show it. Larger: ringing of parasitics without a word;
