@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use crate::integrate::{Block, Grid, RowKind};
 use crate::linalg::eigenvalues::eigenvalues;
 use crate::model::Model;
-use crate::settings::tolerances::times::{NOTHING, RINGS, SAME_TIME, SPIKE};
+use crate::settings::tolerances::times::{BRIEF, NOTHING, RINGS, SAME_TIME, SPIKE};
 use crate::waveform::Waveforms;
 
 /// Twice the rows at events and corners over those of the grid.
@@ -61,6 +61,8 @@ pub(super) fn bent(waves: &Waveforms, kinds: &[RowKind], columns: usize) -> f64 
 /// Values that fall by themselves before the next row.
 #[derive(Debug, Default)]
 pub(super) struct Spikes {
+    /// Rows that are no further apart are of one instant, s.
+    instant: f64,
     /// Whether rows tell what is right before an event, too.
     tells_left: bool,
     /// The row before, and its time, s.
@@ -72,6 +74,14 @@ pub(super) struct Spikes {
 }
 
 impl Spikes {
+    /// Of a run with such a print step, s.
+    pub(super) fn of(step: f64) -> Self {
+        Self {
+            instant: BRIEF * step,
+            ..Self::default()
+        }
+    }
+
     /// Looks at rows of so many columns.
     pub(super) fn see(&mut self, columns: usize, block: Block<'_>) {
         self.tells_left = !block.kinds.is_empty();
@@ -79,7 +89,7 @@ impl Spikes {
         self.largest.resize(columns, (0.0, [0.0; 2]));
         for (t, values, _) in block.rows() {
             let (at, before) = self.before.get_or_insert_with(|| (t, values.to_vec()));
-            if t > *at + SAME_TIME * t.abs() {
+            if t - *at > self.instant {
                 for (j, (was, is)) in before.iter().zip(values).enumerate() {
                     self.sustained[j] = self.sustained[j].max(was.abs().min(is.abs()));
                     if was.abs() > SPIKE * is.abs() && was.abs() > self.largest[j].0.abs() {
@@ -99,16 +109,16 @@ impl Spikes {
             let same = self.sustained.iter().zip(units);
             let same = same.filter(|(_, unit)| **unit == units[j]);
             let lasts = same.fold(0.0, |m: f64, (most, _)| m.max(*most));
-            let before = |t: f64| events.partition_point(|e| *e < t - SAME_TIME * t.abs());
-            let until = |t: f64| events.partition_point(|e| *e <= t + SAME_TIME * t.abs());
-            let began = before(*t) < until(*t);
+            let before = |t: f64| events.partition_point(|e| *e < t);
+            let rounding = SAME_TIME * next.abs();
+            let began = before(t - self.instant) < before(t + rounding);
             let last = if self.tells_left {
-                before(*next)
+                before(next - rounding)
             } else {
-                until(*next)
+                before(next + rounding)
             };
             let spikes = lasts > 0.0 && value.abs() > SPIKE * lasts;
-            (spikes && began && last <= until(*t)).then_some((j, *value, *t))
+            (spikes && began && last <= before(t + rounding)).then_some((j, *value, *t))
         };
         let all = self.largest.iter().enumerate().filter_map(stands_out);
         all.max_by(|one, other| one.1.abs().total_cmp(&other.1.abs()))

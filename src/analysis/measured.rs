@@ -119,7 +119,7 @@ fn shown_of(measuring: Measuring<'_>, model: &Model, options: SimOptions<'_>) ->
         if measuring.by_rows() {
             run.notes.extend(measuring.too_coarse(run, found));
         }
-        let mut spikes = Spikes::default();
+        let mut spikes = Spikes::of(step_of(measuring.fine()));
         let columns = run.waveforms.units.len();
         spikes.see(columns, Block::of(&run.waveforms, &run.kinds));
         let note = spike(&spikes, run, measuring.by_rows());
@@ -128,6 +128,10 @@ fn shown_of(measuring: Measuring<'_>, model: &Model, options: SimOptions<'_>) ->
         (run.waveforms, run.kinds) = measuring.cut(run);
     }
     finished
+}
+
+fn step_of(tran: Option<Tran>) -> f64 {
+    tran.map_or(0.0, |tran| tran.tstep)
 }
 
 /// Tells of a spike in the rows of a run; `by_rows`: measurements see them.
@@ -157,7 +161,7 @@ fn spike(spikes: &Spikes, run: &Run, by_rows: bool) -> Option<Note> {
 /// The transient of a circuit without measurements, whose rows are looked at as they pass.
 fn unmeasured(model: &Model, mut options: SimOptions<'_>) -> Finished {
     let columns = model.multiport().probes;
-    let mut spikes = Spikes::default();
+    let mut spikes = Spikes::of(step_of(model.circuit().tran));
     let mut sink = options.rows.take();
     let mut take = |block: Block<'_>| {
         spikes.see(columns, block);

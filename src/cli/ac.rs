@@ -15,7 +15,7 @@ use crate::analysis::{
 };
 use crate::model::Model;
 use crate::report::html::Page;
-use crate::report::{bode, log, svg, text};
+use crate::report::{bode, log, svg, terminal, text};
 use crate::waveform::Phasors;
 
 /// Finds the small-signal response and writes it.
@@ -144,6 +144,17 @@ fn write(
             Some(_) => streams.error(log::run(measured)),
             None => streams.error(measured.words()),
         }
+    }
+    if outputs.is_empty() && streams.out_is_terminal() {
+        let (lines, columns) = streams.size();
+        let plot = terminal::response(
+            &bode::figure(phasors),
+            columns,
+            lines,
+            streams.out_colours(),
+        );
+        streams.data(plot)?;
+        return Ok(());
     }
     if outputs.is_empty() {
         let mut out = streams.out();

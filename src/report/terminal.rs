@@ -1,5 +1,6 @@
 //! Character plots, sized to a terminal.
 
+use super::figure::{Figure, Panel};
 use super::si;
 use crate::waveform::Waveforms;
 
@@ -21,25 +22,114 @@ const COLOURS: [&str; 6] = [
 ];
 const RESET: &str = "\x1b[0m";
 
+/// The common axis of all charts: where it begins and ends, as a number and in words.
+struct Across {
+    range: (f64, f64),
+    ends: [String; 2],
+}
+
+/// Curves that share a chart, by their names.
+struct Chart {
+    unit: &'static str,
+    curves: Vec<(String, Vec<(f64, f64)>)>,
+}
+
 /// As many charts as fit into `lines` lines of `columns` characters; a last line counts the signals that have none.
 ///
 /// With `colours`, signals of one unit share a chart, six at most. Without, each has its own, and the units take turns, so that a current is seen
 /// below the first voltage. Empty when there is no row.
 #[must_use]
 pub fn plot(waves: &Waveforms, columns: usize, lines: usize, colours: bool) -> String {
-    if waves.time.is_empty() || waves.width() == 0 {
+    let (Some(start), Some(end)) = (waves.time.first(), waves.time.last()) else {
+        return String::new();
+    };
+    let dots = width(columns) * DOTS.0;
+    let chart = |signals: Vec<usize>| Chart {
+        unit: waves.units[signals[0]],
+        curves: (signals.into_iter())
+            .map(|j| (waves.names[j].clone(), waves.thinned(j, dots)))
+            .collect(),
+    };
+    let charts = charts(waves, if colours { COLOURS.len() } else { 1 });
+    let charts: Vec<Chart> = charts.into_iter().map(chart).collect();
+    let (factor, prefix) = si::prefix(start.abs().max(end.abs()));
+    let across = Across {
+        range: (*start, *end),
+        ends: [start, end].map(|t| format!("{} {prefix}s", si::plain(t / factor, 5))),
+    };
+    drawn(&charts, &across, (columns, lines), colours)
+}
+
+/// The same of a response: gains above, phases below, over the logarithm of the frequency.
+#[must_use]
+pub fn response(figure: &Figure, columns: usize, lines: usize, colours: bool) -> String {
+    let Some((start, end)) = figure.span() else {
+        return String::new();
+    };
+    let together = if colours { COLOURS.len() } else { 1 };
+    let of_panel = |panel: &Panel| -> Vec<Chart> {
+        let curves = panel.series.iter().filter(|s| s.points.len() > 2);
+        let curves: Vec<_> = curves.map(|s| (s.name.clone(), s.points.clone())).collect();
+        let chart = |curves: &[_]| Chart {
+            unit: panel.unit,
+            curves: curves.to_vec(),
+        };
+        curves.chunks(together).map(chart).collect()
+    };
+    let panels: Vec<Vec<Chart>> = figure.panels.iter().map(of_panel).collect();
+    let charts: Vec<Chart> = in_turns(panels);
+    let across = Across {
+        range: (start, end),
+        ends: [start, end].map(|x| si::quantity(10_f64.powf(x), "Hz", 4)),
+    };
+    drawn(&charts, &across, (columns, lines), colours)
+}
+
+/// A value with its unit; decibels and degrees have no prefixes.
+fn quantity(value: f64, unit: &str) -> String {
+    match unit {
+        "dB" | "°" => format!("{} {unit}", si::plain(value, 4)),
+        _ => si::quantity(value, unit, 4),
+    }
+}
+
+/// Characters across a chart.
+fn width(columns: usize) -> usize {
+    columns.saturating_sub(LABEL_WIDTH).max(MIN_WIDTH)
+}
+
+/// The first of each stack, then the second of each, …
+fn in_turns<T>(stacks: Vec<Vec<T>>) -> Vec<T> {
+    let most = stacks.iter().map(Vec::len).max().unwrap_or(0);
+    let mut stacks: Vec<_> = stacks.into_iter().map(Vec::into_iter).collect();
+    (0..most)
+        .flat_map(|_| {
+            stacks
+                .iter_mut()
+                .filter_map(Iterator::next)
+                .collect::<Vec<_>>()
+        })
+        .collect()
+}
+
+/// The charts that fit.
+fn drawn(
+    charts: &[Chart],
+    across: &Across,
+    (columns, lines): (usize, usize),
+    colours: bool,
+) -> String {
+    if charts.is_empty() {
         return String::new();
     }
-    let charts = charts(waves, if colours { COLOURS.len() } else { 1 });
     let shown = (lines / (CHART_LINES.0 + FRAME_LINES)).clamp(1, charts.len());
     let rows = (lines / shown)
         .saturating_sub(FRAME_LINES)
         .clamp(CHART_LINES.0, CHART_LINES.1);
-    let width = columns.saturating_sub(LABEL_WIDTH).max(MIN_WIDTH);
+    let width = width(columns);
     let mut text = String::new();
-    for signals in &charts[..shown] {
-        let names = signals.iter().enumerate().map(|(k, &j)| {
-            let name = &waves.names[j];
+    for of in &charts[..shown] {
+        let names = of.curves.iter().enumerate().map(|(k, (name, _))| {
             if colours {
                 format!("{}{name}{RESET}", COLOURS[k])
             } else {
@@ -48,14 +138,11 @@ pub fn plot(waves: &Waveforms, columns: usize, lines: usize, colours: bool) -> S
         });
         text.push_str(&names.collect::<Vec<_>>().join(" "));
         text.push('\n');
-        text.push_str(&chart(waves, signals, (width, rows), colours));
+        text.push_str(&chart(of, across, (width, rows), colours));
         text.push('\n');
     }
-    let rest: Vec<&str> = charts[shown..]
-        .iter()
-        .flatten()
-        .map(|&j| waves.names[j].as_str())
-        .collect();
+    let rest = charts[shown..].iter().flat_map(|chart| &chart.curves);
+    let rest: Vec<&str> = rest.map(|(name, _)| name.as_str()).collect();
     if !rest.is_empty() {
         text.push_str(&format!("not shown: {}\n", rest.join(" ")));
     }
@@ -76,30 +163,17 @@ fn charts(waves: &Waveforms, together: usize) -> Vec<Vec<usize>> {
             .collect();
         own.chunks(together).map(<[usize]>::to_vec).collect()
     };
-    let stacks: Vec<Vec<Vec<usize>>> = units.into_iter().map(of).collect();
-    let most = stacks.iter().map(Vec::len).max().unwrap_or(0);
-    (0..most)
-        .flat_map(|k| stacks.iter().filter_map(move |s| s.get(k).cloned()))
-        .collect()
+    in_turns(units.into_iter().map(of).collect())
 }
 
-/// Curves over the time axis, with the lowest and the highest value beside them.
-fn chart(
-    waves: &Waveforms,
-    signals: &[usize],
-    (width, rows): (usize, usize),
-    colours: bool,
-) -> String {
-    let (start, end) = (waves.time[0], waves.time[waves.time.len() - 1]);
-    let curves: Vec<Vec<(f64, f64)>> = signals
-        .iter()
-        .map(|&j| {
-            let points = waves.thinned(j, width * DOTS.0).into_iter();
-            points
-                .map(|(t, y)| (t, y.clamp(-LARGEST, LARGEST)))
-                .collect()
-        })
+/// Curves over their common axis, with the lowest and the highest value beside them.
+fn chart(of: &Chart, across: &Across, (width, rows): (usize, usize), colours: bool) -> String {
+    let within = |&(x, y): &(f64, f64)| (x, y.clamp(-LARGEST, LARGEST));
+    let curves = of.curves.iter();
+    let curves: Vec<Vec<(f64, f64)>> = curves
+        .map(|(_, points)| points.iter().map(within).collect())
         .collect();
+    let (start, end) = across.range;
     let values = || curves.iter().flatten().map(|p| p.1);
     let low = values().fold(f64::INFINITY, f64::min);
     let high = values().fold(f64::NEG_INFINITY, f64::max);
@@ -134,16 +208,15 @@ fn chart(
             last = to;
         }
     }
-    let unit = waves.units[signals[0]];
+    let unit = of.unit;
     let label = |row: usize| match row {
-        0 => format!(" {}", si::quantity(high, unit, 4)),
-        row if row + 1 == rows => format!(" {}", si::quantity(low, unit, 4)),
+        0 => format!(" {}", quantity(high, unit)),
+        row if row + 1 == rows => format!(" {}", quantity(low, unit)),
         _ => String::new(),
     };
     let drawn = (0..rows).map(|row| canvas.row(row, colours) + &label(row) + "\n");
     let mut text: String = drawn.collect();
-    let (factor, prefix) = si::prefix(start.abs().max(end.abs()));
-    let [first, last] = [start, end].map(|t| format!("{} {prefix}s", si::plain(t / factor, 5)));
+    let [first, last] = &across.ends;
     let room = width.saturating_sub(first.chars().count());
     text.push_str(&format!("{first}{last:>room$}\n"));
     text
@@ -208,6 +281,7 @@ impl Canvas {
 
 #[cfg(test)]
 mod tests {
+    use super::super::figure::{Axis, Series};
     use super::*;
 
     fn waves(n_signals: usize) -> Waveforms {
@@ -267,6 +341,52 @@ mod tests {
             assert!(coloured.contains(&name), "{coloured}");
         }
         assert!(!coloured.contains("not shown"));
+    }
+
+    /// A pole at 1 kHz: −20 dB a decade behind it, and 90° over all.
+    #[test]
+    fn a_response_has_gain_above_and_phase_below() {
+        let response = |k: i32| {
+            let frequency = 10_f64.powf(1.0 + 0.1 * f64::from(k));
+            (frequency.log10(), 1e3 / frequency)
+        };
+        let points = |value: fn(f64) -> f64| (0..=40).map(response).map(|(x, r)| (x, value(r)));
+        let series = |points: Vec<(f64, f64)>| Series {
+            name: "v(out)".into(),
+            run: String::new(),
+            points,
+        };
+        let panel = |unit, points| Panel {
+            quantity: String::new(),
+            unit,
+            series: vec![series(points)],
+        };
+        let gain = |r: f64| -10.0 * (1.0 + r.powi(-2)).log10();
+        let phase = |r: f64| -(1.0 / r).atan().to_degrees();
+        let figure = Figure {
+            title: String::new(),
+            axis: Axis::Frequency,
+            panels: vec![
+                panel("dB", points(gain).collect()),
+                panel("°", points(phase).collect()),
+            ],
+        };
+        let text = response_of(&figure);
+        let rows: Vec<&str> = text.lines().collect();
+        assert_eq!(text.matches("v(out)").count(), 2, "{text}");
+        assert!(
+            text.contains("-40 dB") && text.contains("-89.43 °"),
+            "{text}"
+        );
+        assert!(
+            rows.iter()
+                .any(|row| row.starts_with("10 Hz") && row.ends_with("100 kHz")),
+            "{text}"
+        );
+    }
+
+    fn response_of(figure: &Figure) -> String {
+        super::response(figure, 60, 24, false)
     }
 
     #[test]

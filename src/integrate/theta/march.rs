@@ -295,6 +295,8 @@ impl Theta {
         self.attempt(h, t1)?;
         let n = self.now.x.len();
         self.coarse.copy_from_slice(&self.out[..n]);
+        let changed = self.changes_on_the_way();
+        let changed = changed.then(|| (self.attempt.clone(), self.out.clone()));
         let hidden = self.hidden(h)?;
         let whole = std::mem::take(&mut self.attempt.unseen);
         let middle = self.now.t + 0.5 * (t1 - self.now.t);
@@ -320,13 +322,18 @@ impl Theta {
             .error(&self.system().lcs, &self.coarse, &self.now.x);
         let [unseen, hidden, past] = [&self.now.unseen, &hidden, &past].map(|e| self.size_of(e));
         let unseen = unseen.max(hidden).max(past);
-        let verdict = match &self.control {
+        let judge = |theta: &Self, unseen: f64| match &theta.control {
             Some(control) => control.judge(h, error, unseen),
             None => Verdict {
                 accept: true,
                 next: h,
             },
         };
+        let mut verdict = judge(self, unseen);
+        if let (true, Some((tried, out))) = (verdict.accept && !last_chance, changed) {
+            let hidden = self.hidden_on_the_way(h, (tried, &out))?;
+            verdict = judge(self, unseen.max(self.size_of(&hidden)));
+        }
         self.preferred = verdict.next;
         if self.whole && (verdict.accept || last_chance) {
             self.back(steps);

@@ -70,20 +70,53 @@ impl Theta {
         self.looks = Looks { t, slopes };
     }
 
+    /// Whether the attempt has other devices active than those at its start.
+    fn changes(&self) -> bool {
+        match &self.attempt.solved {
+            Some((basis, _)) => *basis != self.now.active,
+            None => false,
+        }
+    }
+
+    /// Whether devices change in a step that was tried with straight laws, but not from a breakpoint, where [`Self::hidden`] looks anyway.
+    pub(super) fn changes_on_the_way(&self) -> bool {
+        self.control.is_some() && !self.now.settle && !self.system().curved && self.changes()
+    }
+
     /// What a step of length h that was tried from a breakpoint may hide where an ideal device changes within it: a capacitor that is
     /// discharged until a diode takes over ends at the diode's voltage after any step, and after its halves, with no area below it.
     ///
     /// Implicit Euler steps of δ = h/[`CLOSER`]ᵏ have the devices as they are now from some k on, with slope s; where they change, as much as
     /// [`CLOSER`] δ (s − s₋) is hidden, s₋ the slope of the step before. What the devices forget by the end of the step is no error.
     pub(super) fn hidden(&mut self, h: f64) -> Result<Vec<f64>, Error> {
-        let active = self.now.active.clone();
-        let changes = |theta: &Self| match &theta.attempt.solved {
-            Some((basis, _)) => *basis != active,
-            None => false,
-        };
-        if self.control.is_none() || !self.now.settle || self.system().curved || !changes(self) {
+        if self.control.is_none() || !self.now.settle || self.system().curved || !self.changes() {
             return Ok(Vec::new());
         }
+        self.looked_for(h)
+    }
+
+    /// The same of a step that went on to its end, with `tried` and `out` as they were for the whole of it: where devices change before its middle, it and both its halves
+    /// have them changed from the start (γ = 1). Half of that is hidden, as what they carry falls to nothing.
+    pub(super) fn hidden_on_the_way(
+        &mut self,
+        h: f64,
+        (tried, out): (Attempt, &[f64]),
+    ) -> Result<Vec<f64>, Error> {
+        let end = (self.attempt.clone(), self.out.clone(), self.lambda.clone());
+        let (z, u_next) = (self.z.clone(), self.u_next.clone());
+        std::mem::swap(&mut self.now, &mut self.kept);
+        self.attempt = tried;
+        self.out.copy_from_slice(out);
+        let found = self.looked_for(h);
+        std::mem::swap(&mut self.now, &mut self.kept);
+        (self.attempt, self.out, self.lambda) = end;
+        (self.z, self.u_next) = (z, u_next);
+        let mut found = found?;
+        found.iter_mut().for_each(|change| *change *= 0.5);
+        Ok(found)
+    }
+
+    fn looked_for(&mut self, h: f64) -> Result<Vec<f64>, Error> {
         let tried = self.attempt.clone();
         let (n, t) = (self.now.x.len(), self.now.t);
         let slope = |theta: &Self, distance: f64| -> DVector<f64> {
@@ -104,7 +137,7 @@ impl Theta {
                 break;
             }
             let now = slope(self, closer);
-            if !changes(self) {
+            if !self.changes() {
                 change = (now - before) * distance;
                 break;
             }

@@ -54,6 +54,10 @@ pub(crate) const CURVE_CLOSE: f64 = 1e-10;
 /// rounding of an event on its level is several.
 pub(crate) const NO_STEP: f64 = 1e-9;
 
+/// The part of a print step that is an instant where spikes are looked for. Larger: rows that show a fall are taken for one; smaller: a spike of two rows, at both ends of an
+/// edge, seems to last.
+pub(crate) const BRIEF: f64 = 1e-2;
+
 /// How often as large as the next row, and as all that lasts from one row to the next in its unit, a value at an event is before a note says that rows do not
 /// show its course. Larger: spikes of kilovolts without a word; smaller: notes on the peaks of converters.
 pub(crate) const SPIKE: f64 = 100.0;
