@@ -358,6 +358,63 @@ fn usage_errors_end_with_2() {
 }
 
 #[test]
+fn values_that_cannot_be_are_named() {
+    for (arguments, words) in [
+        ("divider.cir --step -1", "'--step <H>': must be positive"),
+        (
+            "divider.cir --theta -1",
+            "'--theta <X>': must be in [0.5, 1]",
+        ),
+        (
+            "compare divider.cir --tol -1",
+            "'--tol <R>': must be positive",
+        ),
+        (
+            "graph divider.cir --at -1m",
+            "'--at <TIME>': must be positive",
+        ),
+        (
+            "divider.cir --probe=",
+            "'--probe <NAME>': a name is missing",
+        ),
+        (
+            "divider.cir --worst nope",
+            "no measurement `nope`: the netlist has no `.meas`",
+        ),
+        (
+            "view w.csv --format csv",
+            "[possible values: html, svg, png]",
+        ),
+    ] {
+        let ran = run(arguments);
+        assert_eq!((ran.status, ran.out.as_str()), (2, ""), "{ran}");
+        assert!(ran.err.contains(words), "{ran}");
+    }
+    // Of measurements, before tolerances are missed.
+    let directory = place();
+    let measured = DIVIDER.replace(".end", ".meas tran top avg v(out)\n.end");
+    fs::write(directory.path().join("measured.cir"), measured).unwrap();
+    for (arguments, words) in [
+        (
+            "measured.cir --worst tpo",
+            "no measurement `tpo`: did you mean `top`?",
+        ),
+        (
+            "measured.cir --worst nope",
+            "no measurement `nope`: there are top",
+        ),
+        (
+            "sens measured.cir --of nope",
+            "no measurement `nope`: there are top",
+        ),
+        ("measured.cir --worst top", "no value has a tolerance"),
+    ] {
+        let ran = run_in(directory.path(), arguments);
+        assert!(ran.status == 2 && ran.err.contains(words), "{ran}");
+    }
+}
+
+#[test]
 fn sim_into_a_pipe_is_csv() {
     assert_snapshot!(run("sim divider.cir"));
 }
@@ -481,6 +538,21 @@ fn findings_are_lines_or_objects_where_that_is_asked_for() {
     let failure: serde_json::Value =
         serde_json::from_str(missing.err.lines().next().unwrap()).unwrap();
     assert_eq!((missing.status, &failure["severity"]), (2, &"error".into()));
+    // Faults of the command line, whatever the place of the option.
+    for arguments in [
+        "missing.cir --message-format json",
+        "--message-format=json missing.cir",
+        "divider.cir --step 0 --message-format json",
+        "sim --message-format json",
+    ] {
+        let ran = run(arguments);
+        let failure: serde_json::Value = serde_json::from_str(&ran.err).unwrap();
+        assert_eq!((ran.status, &failure["code"]), (2, &"failure".into()));
+    }
+    assert_eq!(
+        run("divider.cir --step 0 --message-format short").err,
+        "error[failure]: invalid value '0' for '--step <H>': must be positive\n"
+    );
 }
 
 #[test]
@@ -1030,8 +1102,17 @@ fn check_lists_faults_with_status_1_and_certificates_with_0() {
         words.out.contains("passive") && words.status == 0,
         "{words}"
     );
-    // A position without a system is a fault at its element, for every command.
     let directory = place();
+    // A loop that both the topology and the start find is one fault.
+    let twice = "two sources\nv1 a 0 10\nv2 a 0 12\nr1 a 0 1k\n.tran 1u 1m\n";
+    fs::write(directory.path().join("twice.cir"), twice).unwrap();
+    let ran = run_in(directory.path(), "check twice.cir");
+    assert_eq!(ran.out.matches("form a loop").count(), 1, "{ran}");
+    assert!(
+        ran.status == 1 && ran.out.contains("1 error above"),
+        "{ran}"
+    );
+    // A position without a system is a fault at its element, for every command.
     let loops = "two sources\nv1 a 0 5\nv2 b 0 6\ns1 a b c 0 sw\nvc c 0 1\n.model sw sw(ideal vt=0.5)\n.tran 1u 1m\n";
     fs::write(directory.path().join("loop.cir"), loops).unwrap();
     let ran = run_in(directory.path(), "check loop.cir --json");
@@ -1170,6 +1251,13 @@ fn graph_writes_graphviz_and_pictures() {
         "the diodes of a half-wave conduct: {svg}"
     );
     assert_eq!(at("-1").status, 2);
+    let still = RECTIFIER.replace(".tran 1m 40m\n", ".op\n");
+    fs::write(directory.path().join("still.cir"), still).unwrap();
+    let ran = run_in(directory.path(), "graph still.cir --at 1m -o at.svg");
+    assert!(
+        ran.status == 2 && ran.err.contains("asks for no .tran analysis"),
+        "{ran}"
+    );
     assert_eq!(
         run_in(directory.path(), "graph rectifier.cir -o g.dot -o h.svg").status,
         0

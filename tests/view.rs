@@ -110,6 +110,7 @@ fn what_cannot_be_viewed_is_said() {
     let folder = folder();
     let at = folder.path();
     fs::write(at.join("x.csv"), "a,b\n1,2\n").expect("a file");
+    fs::write(at.join("w.csv"), "time,v(in),v(out)\n0,1,2\n1,1,2\n").expect("a file");
     for (arguments, words) in [
         (
             &["view", "x.csv"][..],
@@ -119,6 +120,18 @@ fn what_cannot_be_viewed_is_said() {
         (
             &["view", "a.cir", "-o", "a.csv"],
             "a.csv: the ending chooses the format and must be svg, png or html",
+        ),
+        (
+            &["view", "w.csv", "-o", "-"],
+            "must be svg, png or html, as in `--format html`",
+        ),
+        (
+            &["view", "w.csv", "--probe", "V(oot)", "-o", "w.svg"],
+            "--probe V(oot): the file has no `V(oot)`; did you mean `v(out)`?",
+        ),
+        (
+            &["view", "w.csv", "--probe", "x", "-o", "w.svg"],
+            "--probe x: the file has v(in) v(out)",
         ),
         (
             &["watch", "check", "a.cir"],

@@ -136,14 +136,9 @@ pub fn sensitivity(model: &Model, options: &SensitivityOptions<'_>) -> Result<Se
         ..options.clone()
     };
     let to = values(model, &options.to)?;
-    let known = |name: &&String| {
-        !circuit
-            .measurements
-            .iter()
-            .any(|m| m.name == name.to_lowercase())
-    };
-    if let Some(name) = options.of.iter().find(known) {
-        return Err(unsupported(format!("no measurement `{name}`")));
+    let unknown = options.of.iter().find_map(|of| circuit.no_measurement(of));
+    if let Some(what) = unknown {
+        return Err(unsupported(what));
     }
     if circuit.measurements.is_empty() {
         return Err(unsupported(

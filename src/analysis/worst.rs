@@ -72,6 +72,9 @@ pub struct Worst {
 /// ```
 pub fn worst(model: &Model, of: &str, options: &WorstOptions<'_>) -> Result<Worst, Error> {
     let of = of.to_lowercase();
+    if let Some(what) = model.circuit().no_measurement(&of) {
+        return Err(Error::before(Reason::Unsupported(what)));
+    }
     let mut tolerances = options.tolerances.clone();
     let named = |name: &String| options.tolerances.iter().any(|(own, _)| own == name);
     let cards = model.circuit().tolerances.iter();

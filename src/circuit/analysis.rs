@@ -189,7 +189,7 @@ impl<'n> Builder<'n, '_> {
             Signal::Current(name) => {
                 let id = self
                     .names
-                    .expect_element(name, &self.scopes, scope, "inductor")?;
+                    .expect_element(name, &self.scopes, scope, "inductor", &[])?;
                 let element = &mut self.circuit.elements[id.index()];
                 if !matches!(element.kind, Kind::Inductor(_)) {
                     let message = format!("`{}` is not an inductor", name.text);

@@ -440,7 +440,9 @@ impl<'n, 'o> Builder<'n, 'o> {
         scope: ScopeId,
         what: &str,
     ) -> Option<ElementId> {
-        let found = self.names.expect_element(name, &self.scopes, scope, what);
+        let found = self
+            .names
+            .expect_element(name, &self.scopes, scope, what, &[]);
         found.map_err(|fault| self.tell(*fault)).ok()
     }
 

@@ -207,20 +207,27 @@ impl<'n> Builder<'n, '_> {
             }
             let mut ids = Vec::with_capacity(card.inductors.len());
             for name in card.inductors {
-                match self.expect_element(name, card.scope, "inductor") {
-                    Some(id)
+                let found = self.names.expect_element(
+                    name,
+                    &self.scopes,
+                    card.scope,
+                    "inductor",
+                    card.inductors,
+                );
+                match found {
+                    Ok(id)
                         if matches!(self.circuit.elements[id.index()].kind, Kind::Inductor(_)) =>
                     {
                         ids.push(id)
                     }
-                    Some(_) => {
+                    Ok(_) => {
                         let message = format!("`{}` is not an inductor", name.text);
                         self.tell(
                             Diagnostic::error("coupling", name.span, message)
                                 .label("only inductors can be coupled"),
                         );
                     }
-                    None => {}
+                    Err(fault) => self.tell(*fault),
                 }
             }
             let negative = ids.iter().find(|id| {

@@ -144,7 +144,18 @@ impl<'n> Builder<'n, '_> {
         let (vfwd, ron, roff) = if piecewise {
             let vfwd = self.parameter(params, "vfwd", scope)?.unwrap_or(ZERO);
             let ron = self.parameter(params, "ron", scope)?.unwrap_or(ONE);
-            (vfwd, ron, self.off_resistance(params, scope)?)
+            let roff = self.off_resistance(params, scope)?;
+            if vfwd.f64 < 0.0 {
+                let message = format!("diode model `{}` has a negative Vfwd", name.text);
+                let written = params.get("vfwd").map(|expr| expr.span);
+                self.tell(
+                    Diagnostic::warning("negative-value", written, message)
+                        .label(format!("it conducts from {} V on", vfwd.f64))
+                        .help("Vfwd is the voltage that it drops, 0.7 of silicon: below 0 it delivers power"),
+                );
+            }
+            self.exchanged(name, params, ron, roff);
+            (vfwd, ron, roff)
         } else {
             (ZERO, series, None)
         };

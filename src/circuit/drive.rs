@@ -7,6 +7,7 @@ use super::source::{Form, Source, Wave};
 use super::{Element, Kind};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{self, Assign, Expr, WaveCall};
+use crate::settings::tolerances::netlists::STANDS_STILL;
 use crate::settings::tolerances::times::SAME_TIME;
 
 #[cfg(test)]
@@ -168,7 +169,10 @@ impl<'n> Builder<'n, '_> {
             return None;
         }
         match call.name.text.as_str() {
-            "sin" | "sine" => Some(self.sine(&x)),
+            "sin" | "sine" => {
+                self.warn_of_millihertz(call, 2, &x);
+                Some(self.sine(&x))
+            }
             "pulse" => self.pulse(call, &x),
             "exp" => Some(self.exponential(&x)),
             "pwl" => self.pwl(call, &x, args, scope),
@@ -195,6 +199,27 @@ impl<'n> Builder<'n, '_> {
     /// Print step and stop time, from which ngspice takes defaults.
     fn defaults(&self) -> (f64, f64) {
         self.circuit.tran.map_or((0.0, 1.0), |t| (t.tstep, t.tstop))
+    }
+
+    /// Warns of a frequency, the k-th value, in mHz of which the run sees next to nothing: `10M` was probably meant as 10 MHz.
+    fn warn_of_millihertz(&mut self, call: &WaveCall, k: usize, x: &[f64]) {
+        let (Some(tran), Some(written), Some(&frequency)) =
+            (self.circuit.tran, call.args.get(k), x.get(k))
+        else {
+            return;
+        };
+        if !(1e-3..1.0).contains(&frequency) || frequency * tran.tstop > STANDS_STILL {
+            return;
+        }
+        let milli = (1e6 * frequency).round() * 1e-3;
+        let name = call.name.text.to_uppercase();
+        let message =
+            format!("{name} has a frequency of {milli} mHz, of which the run sees next to nothing");
+        self.tell(
+            Diagnostic::warning("suffix-m", written.value.span, message)
+                .label("`m` and `M` are milli")
+                .help(format!("write `{milli}Meg` for {milli} MHz")),
+        );
     }
 
     fn sine(&self, x: &[f64]) -> Wave {
@@ -236,7 +261,8 @@ impl<'n> Builder<'n, '_> {
             let message = "rise time, width and fall time add up to more than the period";
             self.tell(
                 Diagnostic::warning("pulse-overfull", call.name.span, message)
-                    .label("cut off by the next period"),
+                    .label("cut off by the next period")
+                    .help("shorten the width, so that TR + PW + TF ≤ PER, or lengthen the period"),
             );
         }
         if x.get(5) == Some(&0.0) && at(0) != at(1) {
@@ -263,7 +289,12 @@ impl<'n> Builder<'n, '_> {
     /// SFFM and AM; AM's phases must be zero.
     fn modulated(&mut self, call: &WaveCall, mut x: Vec<f64>) -> Option<Wave> {
         let (tstep, tstop) = self.defaults();
-        let plain = if call.name.text == "am" { 5 } else { 7 };
+        let (plain, carrier) = if call.name.text == "am" {
+            (5, 3)
+        } else {
+            (7, 2)
+        };
+        self.warn_of_millihertz(call, carrier, &x);
         if x.iter().skip(plain).all(|phase| *phase == 0.0) {
             x.truncate(plain);
         }

@@ -8,7 +8,7 @@ use super::scope::{Param, ScopeId, Scopes};
 use crate::algebra::Value;
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Binary, Expr, ExprKind, Name, Signal, Unary};
-use crate::netlist::suggest::nearest;
+use crate::netlist::suggest::is_unit;
 
 /// Deepest nesting of one evaluation, through parameters and functions.
 const MAX_DEPTH: usize = 128;
@@ -238,12 +238,16 @@ impl<'n> Scopes<'n> {
             Binary::Mul if y.is_constant() => return self.checked(expr, x.scaled(y.constant)),
             Binary::Div if y.is_constant() => {
                 if y.constant.f64 == 0.0 {
-                    return self.fault(
-                        "bad-value",
-                        expr,
-                        format!("`{expr}` divides by zero"),
-                        "division by zero",
-                    );
+                    let message = format!("`{expr}` divides by zero");
+                    let fault = Diagnostic::error("bad-value", expr.span, message);
+                    self.findings
+                        .tell(fault.label("division by zero").help(match &expr.kind {
+                            ExprKind::Binary(_, _, divisor) => {
+                                format!("`{divisor}` is 0 here: give it another value")
+                            }
+                            _ => "give the divisor a value other than 0".into(),
+                        }));
+                    return None;
                 }
                 if y.constant.f64 == 1.0 {
                     return Some(x);
@@ -376,14 +380,22 @@ impl<'n> Scopes<'n> {
                     format!("unknown function `{}`", name.text),
                 )
                 .label("not a function");
-                self.findings
-                    .tell(match nearest(&name.text, functions::NAMES) {
-                        Some(near) => fault.help(format!("did you mean `{near}`?")),
-                        None => fault,
-                    });
+                self.findings.tell(match functions::meant(&name.text) {
+                    Some(help) => fault.help(help),
+                    None => fault,
+                });
                 None
             }
         }
+    }
+
+    /// Whether a word is made of parameters or numbers by operators, as `duty*t` is.
+    fn is_expression(&self, word: &str, scope: ScopeId) -> bool {
+        let parts: Vec<&str> = word.split(['+', '-', '*', '/', '^']).collect();
+        let is_known = |part: &&str| {
+            self.param(scope, part).is_some() || part.starts_with(|c: char| c.is_ascii_digit())
+        };
+        parts.len() > 1 && parts.iter().all(|part| !part.is_empty()) && parts.iter().any(is_known)
     }
 
     /// The value of a parameter or constant.
@@ -430,6 +442,15 @@ impl<'n> Scopes<'n> {
                     "functions of `time` are not supported yet".into(),
                     "recognised only",
                 ),
+                _ if self.is_expression(name, scope) => {
+                    let message = format!("`{name}` is an expression without braces");
+                    self.findings.tell(
+                        Diagnostic::error("bad-expression", expr.span, message)
+                            .label("read as one name")
+                            .help(format!("put an expression into braces: `{{{name}}}`")),
+                    );
+                    None
+                }
                 _ => {
                     let fault = Diagnostic::error(
                         "unknown-parameter",
@@ -440,6 +461,10 @@ impl<'n> Scopes<'n> {
                     let near = self.near_param(scope, name);
                     self.findings.tell(match near {
                         Some(near) => fault.help(format!("did you mean `{near}`?")),
+                        // A single letter is a parameter as well as a unit.
+                        None if name.chars().nth(1).is_some() && is_unit(name) => fault.help(format!(
+                            "a unit stands directly after its number, `1{name}`; a parameter is defined with `.param {name}=…`"
+                        )),
                         None => fault.help(format!("define it with `.param {name}=…`")),
                     });
                     None

@@ -356,6 +356,9 @@ impl<'n> Builder<'n, '_> {
                         let help = "it is of a response to small sines: `.meas ac`, which `circ ac` carries out";
                         fault.help(help)
                     }
+                    _ if matches!(&*name.text, "idt" | "sdt") => {
+                        fault.help("`.meas … INTEG` measures an integral")
+                    }
                     Some(near) => fault.help(format!("did you mean `{near}`?")),
                     None => fault,
                 }

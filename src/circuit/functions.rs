@@ -2,6 +2,7 @@
 
 use super::draw::Spread;
 use crate::netlist::ast::Binary;
+use crate::netlist::suggest::nearest;
 
 /// Why a call has no value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,6 +28,19 @@ pub(super) const NAMES: [&str; 51] = [
     "pwl", "pwr", "pwrs", "round", "sgn", "sign", "sin", "sinh", "sqrt", "table", "tan", "tanh",
     "u", "unif", "uramp", "ustep",
 ];
+
+/// What to do about a name that is no function: the one that was probably meant, or how a circuit has what it asks for.
+pub(super) fn meant(name: &str) -> Option<String> {
+    match name {
+        "idt" | "sdt" | "idtmod" => Some(
+            "integrals are no expressions: `B1 0 x I=…` into `C1 x 0 1` has the integral as `V(x)`".into(),
+        ),
+        "ddt" => Some(
+            "derivatives are no expressions: `E1 x 0 VALUE={…}` across `C1 x 0 1` has the derivative as `I(C1)`".into(),
+        ),
+        _ => nearest(name, NAMES).map(|near| format!("did you mean `{near}`?")),
+    }
+}
 
 /// The distribution, mean and width of a random function: those of LTspice and ngspice, `gauss` of both.
 pub(super) fn spread(name: &str, args: &[f64]) -> Option<Result<(Spread, f64, f64), CallError>> {

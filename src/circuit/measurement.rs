@@ -9,6 +9,7 @@ use super::{Circuit, Probe, Tran};
 use crate::diagnostic::Diagnostic;
 use crate::measure::{Found, MeasureError, Measurement, Scene, Signals, Spectrum, Trace, fourier};
 use crate::netlist::ast::{Four, Meas, MeasAnalysis};
+use crate::netlist::suggest::nearest;
 use crate::settings::tolerances::times::SAME_TIME;
 
 /// Harmonics of `.four` where it names no number.
@@ -153,6 +154,21 @@ impl<'n> Builder<'n, '_> {
 }
 
 impl Circuit {
+    /// That there is no such measurement, and which there are; `None` where it is there.
+    pub(crate) fn no_measurement(&self, of: &str) -> Option<String> {
+        let name = of.to_lowercase();
+        let known: Vec<&str> = self.measurements.iter().map(|m| &m.name[..]).collect();
+        if known.contains(&name.as_str()) {
+            return None;
+        }
+        let near = nearest(&name, known.iter().copied());
+        Some(match (near, &known[..]) {
+            (Some(near), _) => format!("no measurement `{of}`: did you mean `{near}`?"),
+            (None, []) => format!("no measurement `{of}`: the netlist has no `.meas`"),
+            (None, _) => format!("no measurement `{of}`: there are {}", known.join(", ")),
+        })
+    }
+
     /// The rows of a run as [`Self::measure`] sees them: times in s, nondecreasing, and as many values of each signal of [`Self::measured`] from
     /// `column`.
     #[must_use]

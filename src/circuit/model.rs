@@ -195,6 +195,29 @@ impl<'n> Builder<'n, '_> {
         }
     }
 
+    /// Warns of a model that conducts better off than on.
+    pub(super) fn exchanged(
+        &mut self,
+        model: &Name,
+        params: &Parameters<'n>,
+        ron: Value,
+        roff: Option<Value>,
+    ) {
+        let Some(roff) = roff.filter(|roff| ron.f64 > roff.f64) else {
+            return;
+        };
+        let written = params.get("ron").or(params.get("roff"));
+        let message = format!(
+            "model `{}` has Ron = {:e} above Roff = {:e}",
+            model.text, ron.f64, roff.f64
+        );
+        self.tell(
+            Diagnostic::warning("ron-above-roff", written.map(|expr| expr.span), message)
+                .label("conducts better off than on")
+                .help("exchange the two, unless that is meant"),
+        );
+    }
+
     /// A parameter of a model as a finite number; `Some(None)` if it is not given.
     #[expect(clippy::option_option, reason = "absent and faulty are different")]
     pub(super) fn parameter(

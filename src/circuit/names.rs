@@ -72,23 +72,23 @@ impl<'n> Names<'n> {
                 )
                 .label("no element is connected to it");
                 let prefix = scopes.get(scope).prefix.as_str();
-                match nearest(
-                    text,
-                    self.nodes.keys().filter_map(|n| n.strip_prefix(prefix)),
-                ) {
+                let known = || self.nodes.keys().filter_map(|n| n.strip_prefix(prefix));
+                match nearest(text, known()).or_else(|| longer_by_one(text, known())) {
                     Some(near) => Box::new(fault.help(format!("did you mean `{near}`?"))),
                     None => Box::new(fault),
                 }
             })
     }
 
-    /// The element a reference means: of this instance, else by its full name (`x1.d1`, also ngspice's `d.x1.d1`).
+    /// The element a reference means: of this instance, else by its full name (`x1.d1`, also ngspice's `d.x1.d1`). None of `others`, which stand
+    /// beside it, was meant.
     pub(super) fn expect_element(
         &self,
         name: &Name,
         scopes: &Scopes<'n>,
         scope: ScopeId,
         what: &str,
+        others: &[Name],
     ) -> Result<ElementId, Box<Diagnostic>> {
         let text = name.text.as_str();
         let prefix = scopes.get(scope).prefix.as_str();
@@ -106,10 +106,9 @@ impl<'n> Names<'n> {
                     format!("there is no {what} `{text}`"),
                 )
                 .label("not in the circuit");
-                match nearest(
-                    text,
-                    self.elements.keys().filter_map(|n| n.strip_prefix(prefix)),
-                ) {
+                let known = self.elements.keys().filter_map(|n| n.strip_prefix(prefix));
+                let meant = |n: &&str| others.iter().all(|other| other.text != *n);
+                match nearest(text, known.filter(meant)) {
                     Some(near) => Box::new(fault.help(format!("did you mean `{near}`?"))),
                     None => Box::new(fault),
                 }
@@ -131,11 +130,28 @@ impl<'n> Names<'n> {
                     .map_or(Ok(NodeId::GROUND), |b| self.expect_node(b, scopes, scope))?;
                 Ok(difference(a, b))
             }
-            Signal::Current(name) => Ok(current(
-                self.expect_element(name, scopes, scope, "element")?,
-            )),
+            Signal::Current(name) => Ok(current(self.expect_element(
+                name,
+                scopes,
+                scope,
+                "element",
+                &[],
+            )?)),
         }
     }
+}
+
+/// The first name of one letter that is another one with a letter typed twice or beside it: `b` for `bb`.
+fn longer_by_one<'a>(text: &str, known: impl Iterator<Item = &'a str>) -> Option<String> {
+    let mut typed = text.chars();
+    let (first, second) = (typed.next()?, typed.next()?);
+    let is_meant = |name: &&str| {
+        let mut letters = name.chars();
+        let own = letters.next();
+        letters.next().is_none() && (own == Some(first) || own == Some(second))
+    };
+    let found = known.filter(is_meant).min().map(str::to_owned);
+    found.filter(|_| typed.next().is_none())
 }
 
 /// `x1.d1` of ngspice's `d.x1.d1`, whose first letter repeats the one of the element.

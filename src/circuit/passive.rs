@@ -142,6 +142,18 @@ impl<'n> Builder<'n, '_> {
         } else {
             Value::binary(value.f64 / multiplier)
         };
+        if value.f64 < 0.0 && letter != 'r' {
+            let what = match letter {
+                'c' => "capacitance",
+                _ => "inductance",
+            };
+            let message = format!("`{}` has a negative {what}", card.name.text);
+            self.tell(
+                Diagnostic::warning("negative-value", card.span, message)
+                    .label(format!("it is {:e}", value.f64))
+                    .help("what it stores is below nothing, and a circuit around it may run away: take the sign out if it is not meant"),
+            );
+        }
         let Some(ic) = self.arg(args, &["ic"], scope) else {
             return;
         };

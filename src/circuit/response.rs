@@ -68,7 +68,7 @@ impl Builder<'_, '_> {
     fn is_element(&self, name: &Name, reading: &Reading<'_>) -> bool {
         let found = self
             .names
-            .expect_element(name, &self.scopes, reading.scope, "element");
+            .expect_element(name, &self.scopes, reading.scope, "element", &[]);
         found.is_ok()
     }
 }

@@ -6,7 +6,7 @@ use super::{Circuit, Probe, is_inside, pin};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Binary, Expr, ExprKind, Unary};
 use crate::netlist::expression;
-use crate::netlist::suggest::{is_of_pattern, nearest};
+use crate::netlist::suggest::is_of_pattern;
 
 /// A column of results.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,6 +42,9 @@ impl Circuit {
             ..self.clone()
         };
         for text in wanted {
+            if text.trim().is_empty() {
+                return Err("'': a name is missing".into());
+            }
             shown.print_text(text).map_err(|fault| {
                 let help = fault
                     .help
@@ -289,8 +292,8 @@ fn check_call(name: &str, arguments: usize) -> Read<()> {
         Err(CallError::Unknown) => {
             let message = format!("unknown function `{name}`");
             let fault = Diagnostic::error("unknown-function", None, message);
-            match nearest(name, functions::NAMES) {
-                Some(near) => fault.help(format!("did you mean `{near}`?")),
+            match functions::meant(name) {
+                Some(help) => fault.help(help),
                 None => fault,
             }
         }

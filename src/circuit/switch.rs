@@ -166,6 +166,7 @@ impl<'n> Builder<'n, '_> {
                 return None;
             }
         }
+        self.exchanged(name, &params, ron, roff);
         if kind == fits[1] || (with_levels && params.get(&t).is_none()) {
             if kind != fits[1] {
                 let message = format!(

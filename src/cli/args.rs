@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use clap::builder::ArgPredicate;
+use clap::builder::{ArgPredicate, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::examples;
@@ -240,6 +240,7 @@ pub struct ResultArgs {
         display_order = 2,
         long = "probe",
         value_name = "NAME",
+        value_parser = named,
         help = "Show exactly this: v(a), v(a,b), i(d1), @d1[i], v1#branch, patterns v(x1.*), all, expressions v(a)*i(r1) (repeatable)"
     )]
     pub probes: Vec<String>,
@@ -358,6 +359,7 @@ pub struct AcArgs {
         display_order = 2,
         long = "probe",
         value_name = "NAME",
+        value_parser = named,
         allow_hyphen_values = true,
         help = "Show exactly these signals and ratios: v(a), i(l1), v(a)/v(b), -v(y)/v(x) (repeatable)"
     )]
@@ -639,10 +641,10 @@ pub struct ViewArgs {
     )]
     pub outputs: Vec<PathBuf>,
     /// Format of standard output: html, svg or png
-    #[arg(long, value_enum, value_name = "FORMAT")]
+    #[arg(long, value_name = "FORMAT", value_parser = PossibleValuesParser::new(["html", "svg", "png"]).try_map(|name| Format::from_str(&name, false)))]
     pub format: Option<Format>,
     /// Show this signal, or those of a pattern, v(x1.*) (repeatable)
-    #[arg(long = "probe", value_name = "NAME")]
+    #[arg(long = "probe", value_name = "NAME", value_parser = named)]
     pub probes: Vec<String>,
     /// Which of several plots in a raw file
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
@@ -695,6 +697,14 @@ fn number(text: &str) -> Result<f64, String> {
     crate::netlist::value::parse(text)
         .map(|v| v.f64)
         .map_err(|e| e.to_string())
+}
+
+/// A name, of a signal or a pattern.
+fn named(text: &str) -> Result<String, String> {
+    if text.trim().is_empty() {
+        return Err("a name is missing".into());
+    }
+    Ok(text.to_owned())
 }
 
 fn positive(text: &str) -> Result<f64, String> {
@@ -826,6 +836,7 @@ mod tests {
         for refused in ["0", "-1u", "x", ""] {
             assert!(positive(refused).is_err(), "{refused}");
         }
+        assert!(named(" ").is_err() && named("v(a)").is_ok());
         assert!(implicitness("0.4").is_err() && implicitness("1").is_ok());
         assert!(assignment("r").is_err() && position("s1=half").is_err());
     }

@@ -87,7 +87,8 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Known, Failure> {
     let sources = model.sources().clone();
     let mut diagnostics = model.findings().to_vec();
     diagnostics.extend(model.multiport().notes.iter().cloned());
-    diagnostics.extend(mna::topology::findings(model.circuit()));
+    let topology = mna::topology::findings(model.circuit());
+    diagnostics.extend(topology.iter().cloned());
     input::positions(model.multiport(), &args.switches)?;
     let subject = Subject::Circuit(Box::new(model));
     let judged = match &subject {
@@ -115,10 +116,13 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Known, Failure> {
             report
         }
         Err(failure) => {
-            diagnostics.push(match (failure, &subject) {
+            let failed = match (failure, &subject) {
                 (Failure::Run(error), Subject::Circuit(model)) => error.diagnostic(model.circuit()),
                 (failure, _) => Diagnostic::error("no-system", None, failure.to_string()),
-            });
+            };
+            if !topology.iter().any(|found| is_same(found, &failed)) {
+                diagnostics.push(failed);
+            }
             faulty(&title, &diagnostics, &sources)
         }
     };
@@ -127,6 +131,22 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Known, Failure> {
         Subject::System(_) => None,
     };
     Ok((report, model))
+}
+
+/// Whether two errors are of the same loop or cut: of one code, and of the same elements in words.
+fn is_same(one: &Diagnostic, other: &Diagnostic) -> bool {
+    let elements = |d: &Diagnostic| {
+        let ends = [
+            " form a loop",
+            " are a cut-set",
+            " is shorted",
+            " has no way back",
+        ];
+        let end = ends.iter().find_map(|end| d.message.find(end));
+        end.map(|end| d.message[..end].to_owned())
+    };
+    (one.code, one.severity) == (other.code, other.severity)
+        && elements(one).is_some_and(|names| elements(other) == Some(names))
 }
 
 fn faulty(title: &str, diagnostics: &[Diagnostic], sources: &SourceMap) -> Report {

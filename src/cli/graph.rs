@@ -27,6 +27,12 @@ pub(super) fn graph(args: &GraphArgs, streams: &Streams) -> Result<Exit, Failure
     let paths: Vec<&Path> = args.outputs.iter().map(PathBuf::as_path).collect();
     let subject = input::open_as_it_stands(&args.input, &paths, streams)?;
     let model = input::model_of(&args.input, &subject)?;
+    if args.at.is_some() && model.circuit().tran.is_none() {
+        let file = args.input.file.display();
+        return Err(Failure::Message(format!(
+            "{file}: --at takes an instant of a run, and the netlist asks for no .tran analysis"
+        )));
+    }
     let live = match args.at {
         Some(t) => conducting(model, t)
             .map_err(|e| input::broke_off(&args.input, &e, model.places(), streams))?,

@@ -58,7 +58,7 @@ pub fn main() -> Exit {
     let mut logged = None;
     let parsed = batch::expanded(std::env::args_os().collect()).and_then(|(args, log)| {
         logged = log;
-        let args = with_command(args, &command);
+        let args = joined(with_command(args, &command));
         let matches = command.try_get_matches_from_mut(args);
         let matches = matches.map_err(|error| no_such_input(error, &mut command))?;
         Cli::from_arg_matches(&one_value_each(matches, &mut command)?)
@@ -67,6 +67,13 @@ pub fn main() -> Exit {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version go to standard output, usage errors to standard error.
+            let form = form_of_messages(std::env::args_os());
+            let is_fault = error.use_stderr()
+                && error.kind() != ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand;
+            if let (true, Some(form)) = (is_fault, form) {
+                told_otherwise(&error, form);
+                return Exit::Failed;
+            }
             let printed = error.print();
             let asked = matches!(
                 error.kind(),
@@ -121,6 +128,67 @@ pub fn main() -> Exit {
             Exit::Failed
         }
     }
+}
+
+/// A negative number behind an option is its value, `--step -1`: it is for the option to say what it thinks of it.
+fn joined(args: Vec<OsString>) -> Vec<OsString> {
+    let mut all: Vec<OsString> = Vec::with_capacity(args.len());
+    for arg in args {
+        let is_number = arg.to_str().is_some_and(|text| {
+            let digits = text
+                .strip_prefix('-')
+                .map(|text| text.trim_start_matches('.'));
+            digits.is_some_and(|text| text.starts_with(|c: char| c.is_ascii_digit()))
+        });
+        let is_option = |before: &&mut OsString| {
+            let text = before.to_str().unwrap_or_default();
+            text.len() > 2 && text.starts_with("--") && !text.contains('=')
+        };
+        match all
+            .last_mut()
+            .filter(|before| is_number && is_option(before))
+        {
+            Some(option) => {
+                option.push("=");
+                option.push(arg);
+            }
+            None => all.push(arg),
+        }
+    }
+    all
+}
+
+/// The form of messages that a command line asks for which could not be read, where it is not that of persons.
+fn form_of_messages(args: impl Iterator<Item = OsString>) -> Option<MessageFormat> {
+    const OPTION: &str = "--message-format";
+    let args: Vec<String> = args.filter_map(|arg| arg.into_string().ok()).collect();
+    let behind = args.iter().zip(args.iter().skip(1));
+    let behind = behind.filter_map(|(option, form)| (option == OPTION).then_some(form.as_str()));
+    let within = args
+        .iter()
+        .filter_map(|arg| arg.strip_prefix(OPTION)?.strip_prefix('='));
+    match within.chain(behind).last()? {
+        "json" => Some(MessageFormat::Json),
+        "short" => Some(MessageFormat::Short),
+        _ => None,
+    }
+}
+
+/// Says of a command line what is wrong with it as findings are said.
+fn told_otherwise(error: &clap::Error, form: MessageFormat) {
+    let text = error.to_string();
+    let is_said = |line: &&str| !line.starts_with("Usage:") && !line.starts_with("For more");
+    let lines = text.lines().map(str::trim).take_while(is_said);
+    let lines: Vec<&str> = lines.filter(|line| !line.is_empty()).collect();
+    let message = lines.join("; ").replace(":; ", ": ");
+    let message = message.strip_prefix("error: ").unwrap_or(&message);
+    let streams = Streams {
+        quiet: false,
+        verbose: false,
+        messages: form,
+        log: None,
+    };
+    streams.error(render::failure(message, form));
 }
 
 /// `circ FILE` is `circ sim FILE`: where no argument is a command and one is a file or `-`; a first word that is neither is meant as a command.
@@ -266,5 +334,29 @@ fn run(command: &Command, streams: &Streams) -> Result<Exit, Failure> {
         Command::Explain(args) => explain::explain(args, streams),
         Command::Completions(args) => shell::completions(args, streams),
         Command::Man(args) => shell::man(args, streams),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn negative_numbers_are_values_of_options() {
+        let read = |text: &str| {
+            let args = text.split(' ').map(OsString::from).collect();
+            let all = joined(args)
+                .into_iter()
+                .map(|arg| arg.into_string().expect("text"));
+            all.collect::<Vec<_>>().join(" ")
+        };
+        for (typed, expected) in [
+            ("circ a.cir --step -1", "circ a.cir --step=-1"),
+            ("circ a.cir --step -.5m -q", "circ a.cir --step=-.5m -q"),
+            ("circ - --step=1 -1 -- -1", "circ - --step=1 -1 -- -1"),
+            ("circ ac a --probe -v(y)", "circ ac a --probe -v(y)"),
+        ] {
+            assert_eq!(read(typed), expected);
+        }
     }
 }

@@ -122,6 +122,14 @@ pub(super) fn unknown_ending(path: &Path, known: &str) -> Failure {
     ))
 }
 
+/// The failure that standard output has none of these formats.
+pub(super) fn unknown_format(known: &str) -> Failure {
+    let example = known.rsplit(' ').next().unwrap_or_default();
+    Failure::Message(format!(
+        "`-o -`: `--format` chooses the format of standard output and must be {known}, as in `--format {example}`"
+    ))
+}
+
 /// A run, what was measured in it, and its model.
 #[derive(Clone, Copy)]
 pub(super) struct Told<'a> {

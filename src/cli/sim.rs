@@ -117,6 +117,10 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
             };
             return pss::orbit(&asked, &subject, &formats, &signals, streams);
         }
+        let unknown = args.worst.iter().find_map(|of| circuit.no_measurement(of));
+        if let Some(what) = unknown {
+            return Err(Failure::Message(format!("--worst: {what}")));
+        }
         if circuit.steady == Some(SteadyState::Start) && args.verify {
             let file = args.input.file.display();
             let message = "`--verify` takes a run from its usual start, without `steady`";

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use super::args::{STDIN, ViewArgs};
 use super::browser;
 use super::exit::{Exit, Failure};
-use super::files;
+use super::files::{self, STDOUT};
 use super::output::{self, Format};
 use super::streams::Streams;
-use crate::netlist::suggest::is_of_pattern;
+use crate::netlist::suggest::{is_of_pattern, nearest};
 use crate::report::figure::{Figure, PANEL_COLUMNS};
 use crate::report::html::Page;
 use crate::report::{bode, svg};
@@ -28,7 +28,11 @@ pub(super) fn view(args: &ViewArgs, streams: &Streams) -> Result<Exit, Failure> 
         .zip(&formats)
         .find(|o| !o.1.is_picture())
     {
-        return Err(output::unknown_ending(path, "svg, png or html"));
+        let known = "svg, png or html";
+        return Err(match path.as_path() == Path::new(STDOUT) {
+            true => output::unknown_format(known),
+            false => output::unknown_ending(path, known),
+        });
     }
     let paths: Vec<&Path> = args.outputs.iter().map(PathBuf::as_path).collect();
     files::spare(&paths, [args.file.as_path()])?;
@@ -111,8 +115,14 @@ fn chosen(args: &ViewArgs, streams: &Streams) -> Result<Plot, Failure> {
     }
     let mut plot = all.swap_remove(number - 1);
     let unknown = |probe: &str, names: &[String]| {
-        let known = names.join(" ");
-        Failure::Message(format!("--probe {probe}: the file has {known}"))
+        let own: Vec<String> = names.iter().map(|name| canonical_name(name)).collect();
+        let near = nearest(&canonical_name(probe), own.iter().map(String::as_str));
+        Failure::Message(match near {
+            Some(near) => {
+                format!("--probe {probe}: the file has no `{probe}`; did you mean `{near}`?")
+            }
+            None => format!("--probe {probe}: the file has {}", names.join(" ")),
+        })
     };
     match &mut plot {
         Plot::Time(runs) => {

@@ -204,9 +204,11 @@ fn primary(i: Input<'_>) -> Parsed<'_, Expr> {
 
 /// "`(` is never closed", or what stands in the way of its closing.
 fn unclosed(open: Input<'_>, rest: Input<'_>) -> nom::Err<Fault> {
-    refuse(if at_end(rest) {
+    let ends = at_end(rest) || blank(rest).fragment().starts_with(['}', '\'']);
+    refuse(if ends {
         Diagnostic::error("unbalanced", ahead(open, 1), "`(` is never closed")
             .label("no `)` follows")
+            .help("put a `)` where the bracket is to end")
     } else {
         Diagnostic::error(
             "bad-expression",
@@ -214,6 +216,7 @@ fn unclosed(open: Input<'_>, rest: Input<'_>) -> nom::Err<Fault> {
             "this does not continue the expression",
         )
         .label("expected an operator or `)` here")
+        .help("join what stands side by side by an operator, `+ - * / ^`, or close the `(`")
     })
 }
 

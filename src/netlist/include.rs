@@ -166,7 +166,8 @@ impl Reader<'_> {
         if self.files.contains(&path) {
             self.tell(
                 Diagnostic::error("include-loop", span, format!("`{written}` includes itself"))
-                    .label("already being read"),
+                    .label("already being read")
+                    .help("take this card out: what the file defines is there once"),
             );
             return;
         }

@@ -39,6 +39,7 @@ pub(super) fn braced(i: Input<'_>) -> Parsed<'_, Expr> {
                 "this does not continue the expression",
             )
             .label("expected an operator here")
+            .help("join what stands side by side by an operator: `+ - * / ^`")
         };
         return Err(refuse(fault));
     };
@@ -69,8 +70,18 @@ pub(super) fn without_comma(start: Input<'_>, rest: Input<'_>) -> Result<(), nom
     Err(refuse(
         Diagnostic::error("decimal-comma", span, message)
             .label("not a number")
-            .help(format!("write `{}`", text.replace(',', "."))),
+            .help(format!("write `{}`", with_a_point(text))),
     ))
+}
+
+/// The number with its last separator as the decimal point, and without those before it, which part its thousands.
+fn with_a_point(text: &str) -> String {
+    let point = text.rfind(['.', ',']);
+    let digit = |(at, c): (usize, char)| match c {
+        '.' | ',' => (point == Some(at)).then_some('.'),
+        _ => Some(c),
+    };
+    text.char_indices().filter_map(digit).collect()
 }
 
 /// The same in a list, where a comma separates.

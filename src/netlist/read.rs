@@ -198,6 +198,7 @@ impl Reader<'_> {
                 control = Some(line.span());
             }
             if !self.line(line, path) {
+                self.note_after_end(&lines[index + 1..]);
                 return;
             }
         }
@@ -207,6 +208,25 @@ impl Reader<'_> {
                     .label("no `.endc` follows"),
             );
         }
+    }
+
+    /// Notes cards that stand after `.end`.
+    fn note_after_end(&mut self, lines: &[Line]) {
+        let Some(first) = lines.first() else {
+            return;
+        };
+        let (message, label) = match lines.len() {
+            1 => ("a card after `.end` is not read".to_owned(), "left out"),
+            count => (
+                format!("{count} cards after `.end` are not read"),
+                "the first of them",
+            ),
+        };
+        self.tell(
+            Diagnostic::note("after-end", first.span(), message)
+                .label(label)
+                .help("move `.end` behind what belongs to the circuit"),
+        );
     }
 
     /// Reads one card; false at `.end`.

@@ -2,7 +2,14 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 35] = [
+pub(super) const CODES: [Explanation; 36] = [
+    Explanation::of(
+        "after-end",
+        "Cards stand after `.end`, which ends the netlist: they are not read.",
+        "Cards were added at the end of a file, below its last line.",
+        "Move `.end` behind them, or take it out: the end of the file ends the netlist as well.",
+    )
+    .shown("below the end\nv1 a 0 1\nr1 a 0 1k\n.tran 1m 5m\n.end\nr2 a 0 1\n"),
     Explanation::of(
         "bad-card",
         "A line is neither an element nor a directive.",
@@ -163,7 +170,7 @@ pub(super) const CODES: [Explanation; 35] = [
     .shown("farad\nv1 a 0 1\nc1 a 0 1F\n.tran 1m 5m\n"),
     Explanation::of(
         "suffix-m",
-        "The `M` behind a resistance is the prefix milli, not mega.",
+        "The `M` behind a resistance or a frequency is the prefix milli, not mega.",
         "SPICE does not tell capitals from small letters; mega is `Meg`.",
         "Write `1Meg` for a million ohms, `1m` for a thousandth of one.",
     )

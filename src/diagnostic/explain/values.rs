@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 28] = [
+pub(super) const CODES: [Explanation; 30] = [
     Explanation::of(
         "bad-ac",
         "The frequencies of `.ac`, or an AC value of a source, make no analysis.",
@@ -95,6 +95,13 @@ pub(super) const CODES: [Explanation; 28] = [
     )
     .shown("ic\nv1 a 0 1\nr1 a b 1k\nc1 b 0 1u ic=5\n.tran 1m 5m\n"),
     Explanation::of(
+        "negative-value",
+        "A capacitance, an inductance or the forward voltage of a diode is negative.",
+        "A sign that does not belong there. What such an element stores or drops is below nothing: a circuit around it may run away.",
+        "Take the sign out, unless the element is one of an equivalent circuit that needs it.",
+    )
+    .shown("below nothing\nv1 a 0 1\nr1 a b 1k\nc1 b 0 -1u\n.tran 10u 1m\n"),
+    Explanation::of(
         "no-value",
         "A source has no value, and is 0.",
         "An ammeter, which is a voltage source of 0, or a forgotten value.",
@@ -150,6 +157,13 @@ pub(super) const CODES: [Explanation; 28] = [
         "`circ sweep FILE --mc 1000` draws 1000 samples, `--sample 3` one of them; every run of a `.step` draws anew.",
     )
     .shown("a spread of 5 %\nv1 a 0 1\nr1 a 0 {mc(1k, 0.05)}\n.tran 1m 5m\n"),
+    Explanation::of(
+        "ron-above-roff",
+        "A switch or diode of this model conducts better off than on.",
+        "Ron and Roff are exchanged, or one of them has the wrong suffix: `1M` is a thousandth.",
+        "Exchange the two. A switch that opens when its control rises is better made by a negated control.",
+    )
+    .shown("exchanged\nv1 a 0 1\nvg g 0 pulse(0 1 0 1u 1u 5u 10u)\ns1 a b g 0 m\nr1 b 0 1k\n.model m sw(ron=1meg roff=1m vt=0.5)\n.tran 1u 50u\n"),
     Explanation::of(
         "smooth-switch",
         "A negative Vh is LTspice's switch with a smooth transition; here its conductance changes in steps.",

@@ -156,23 +156,25 @@ pub(super) fn assign(i: Input<'_>) -> Parsed<'_, Assign> {
         return Ok((rest, Assign { name, value }));
     }
     let list = name.text.starts_with("tc");
-    let (mut next, value) =
-        if let ("tol", Some((next, value))) = (name.text.as_str(), percent(rest)) {
-            Ok((next, value))
-        } else if matches!(name.text.as_str(), "flux" | "q") {
-            expr::expr(rest)
-        } else if list {
-            operand::item(rest)
+    let (mut next, value) = if let ("tol", Some((next, value))) =
+        (name.text.as_str(), percent(rest))
+    {
+        Ok((next, value))
+    } else if matches!(name.text.as_str(), "flux" | "q") {
+        expr::expr(rest)
+    } else if list {
+        operand::item(rest)
+    } else {
+        operand::lenient(rest)
+    }
+    .map_err(|e| {
+        if e == nom::Err::Error(Fault::Mismatch) {
+            missing(rest, &format!("the value of `{}`", name.text))
+                .map(|fault| fault.helped(&format!("write `{}=VALUE`, or take it out", name.text)))
         } else {
-            operand::lenient(rest)
+            e
         }
-        .map_err(|e| {
-            if e == nom::Err::Error(Fault::Mismatch) {
-                missing(rest, "a value")
-            } else {
-                e
-            }
-        })?;
+    })?;
     while list && let Some(comma) = symbol(next, ',') {
         rest = comma;
         next = operand::item(rest)?.0;

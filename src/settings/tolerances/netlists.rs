@@ -21,3 +21,7 @@ pub(crate) const TANGENTS: [f64; 3] = [0.63, 1.11, 1.79];
 /// Below this angle the series to θ⁴ of Filon's weights is exact to rounding. Larger: the series
 /// loses digits; smaller: the closed form cancels them.
 pub(crate) const SMALL_ANGLE: f64 = 1e-2;
+
+/// A sine of whose period a run sees at most this part stands still in it, and its frequency is in the wrong unit. Larger: slow sines are warned of that
+/// are meant; smaller: `10M` for 10 MHz passes in long runs.
+pub(crate) const STANDS_STILL: f64 = 1e-3;
