@@ -176,7 +176,7 @@ mod tests {
                 }),
             }],
             table: None,
-            worst: vec![],
+            ..Measurements::default()
         }
     }
 

@@ -350,7 +350,8 @@ mod tests {
             let frequency = 10_f64.powf(1.0 + 0.1 * f64::from(k));
             (frequency.log10(), 1e3 / frequency)
         };
-        let points = |value: fn(f64) -> f64| (0..=40).map(response).map(|(x, r)| (x, value(r)));
+        let points =
+            |value: fn(f64) -> f64| (0..=40).map(response).map(move |(x, r)| (x, value(r)));
         let series = |points: Vec<(f64, f64)>| Series {
             name: "v(out)".into(),
             run: String::new(),
