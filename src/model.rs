@@ -346,6 +346,12 @@ impl Model {
         &self.findings
     }
 
+    /// The same with what was found before.
+    #[cfg(feature = "cli")]
+    pub(crate) fn having_found(self, findings: Vec<Diagnostic>) -> Self {
+        Self { findings, ..self }
+    }
+
     /// The files it was read from.
     #[must_use]
     pub fn sources(&self) -> &SourceMap {

@@ -817,6 +817,21 @@ fn a_netlist_may_ask_for_its_operating_point() {
     );
 }
 
+/// Whoever gets a page is told what was found in its netlist.
+#[test]
+fn pages_have_the_findings_of_the_netlist() {
+    let place = place();
+    let text = "a transistor\nv1 a 0 5\nm1 a g b b nm\nr1 b 0 1k\nvg g 0 10\n.model nm nmos(vto=2 kp=1)\n.tran 1u 1m\n.end\n";
+    fs::write(place.path().join("m.cir"), text).unwrap();
+    let ran = run_in(place.path(), "m.cir -o m.html");
+    assert_eq!(ran.status, 0, "{ran}");
+    let html = fs::read_to_string(place.path().join("m.html")).unwrap();
+    assert!(
+        html.contains(r#"{"heading":"Netlist","text":"m.cir:3:1: "#)
+            && html.contains("simulated as a switch")
+    );
+}
+
 /// A characteristic is a picture over what is swept innermost, with a curve for each value of the other.
 #[test]
 fn a_sweep_of_operating_points_is_drawn() {

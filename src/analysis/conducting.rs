@@ -128,6 +128,29 @@ mod tests {
     const BUCK: &str = "buck\nvin in 0 12\ns1 in sw gate 0 g\nd1 0 sw d\nl1 sw out 100u ic=0\nc1 out 0 47u ic=0\nr1 out 0 5\n\
         vg gate 0 pulse(0 1 0 10n 10n 8u 20u)\n.model g sw(vt=0.5 ron=10m roff=1meg)\n.model d d(ideal)\n.tran 1u 2m uic\n.end\n";
 
+    /// A rectifier without a capacitor: the diode conducts while the source is above the knee, 0.54 V across the diode and 9 mV across the resistor at a thousandth of 9.3 mA.
+    #[test]
+    fn devices_of_curved_laws_conduct_where_their_currents_say_so() {
+        let text = "rectifier\nv1 a 0 sin(0 10 50)\nd1 a b dm\nr1 b 0 1k\n.model dm d(is=1e-14)\n.tran 0.1m 40m\n.end\n";
+        let model = Model::parse(text, "t.cir").expect("a circuit");
+        let run = crate::analysis::pictured(&model, SimOptions::default()).run;
+        let (run, found) = run.expect("a run");
+        assert!(run.events.is_empty() && !run.waveforms.names.contains(&"i(d1)".into()));
+        let [d1] = &found.conduction[..] else {
+            panic!("{:?}", found.conduction)
+        };
+        assert!(d1.device == "d1" && !d1.at_start);
+        let since = 0.055_f64.asin() / (100.0 * std::f64::consts::PI);
+        let expected = [since, 0.01 - since, 0.02 + since, 0.03 - since];
+        assert_eq!(d1.changes.len(), 4);
+        for ((t, conducts), (k, at)) in d1.changes.iter().zip(expected.iter().enumerate()) {
+            assert!(
+                (t - at).abs() < 1e-4 && *conducts == (k % 2 == 0),
+                "{t} {at}"
+            );
+        }
+    }
+
     #[test]
     fn the_switch_and_then_the_diode_of_a_buck() {
         let model = Model::parse(BUCK, "buck.cir").unwrap();

@@ -64,16 +64,18 @@ pub fn dc(model: &Model) -> Result<Characteristic, Unsolved> {
 
 /// The unit of what is swept; none of a parameter.
 fn unit(circuit: &Circuit, what: &Swept) -> &'static str {
-    let element = |name: &str| circuit.element(name);
-    match what {
-        Swept::Param(_) => "",
-        Swept::Temperature => "°C",
-        Swept::Element(name) => match element(name).map(|id| &circuit.elements[id.index()].kind) {
-            Some(Kind::VoltageSource(_)) => "V",
-            Some(Kind::CurrentSource(_)) => "A",
-            Some(Kind::Resistor(_)) => "Ω",
+    let Swept::Element(name) = what else {
+        return match what {
+            Swept::Temperature => "°C",
             _ => "",
-        },
+        };
+    };
+    let id = circuit.element(name);
+    match id.map(|id| &circuit.elements[id.index()].kind) {
+        Some(Kind::VoltageSource(_)) => "V",
+        Some(Kind::CurrentSource(_)) => "A",
+        Some(Kind::Resistor(_)) => "Ω",
+        _ => "",
     }
 }
 

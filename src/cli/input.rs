@@ -196,7 +196,7 @@ pub fn open(
     let _busy = streams.busy("reducing");
     let model = Model::of(netlist, sources, choices(input), circuit, Vec::new())
         .map_err(|faults| refused(input, &faults.into(), streams))?;
-    Ok(Subject::Circuit(Box::new(model)))
+    Ok(Subject::Circuit(Box::new(model.having_found(diagnostics))))
 }
 
 /// The model of one of the runs of `.step`.

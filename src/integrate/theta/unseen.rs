@@ -116,6 +116,7 @@ impl Theta {
         Ok(found)
     }
 
+    /// What an attempt of length h from the present hides, at its end: see [`Self::hidden`]. The attempt is gone.
     fn looked_for(&mut self, h: f64) -> Result<Vec<f64>, Error> {
         let tried = self.attempt.clone();
         let (n, t) = (self.now.x.len(), self.now.t);
