@@ -78,9 +78,11 @@ impl Theta {
         }
     }
 
-    /// Whether devices change in a step that was tried with straight laws, but not from a breakpoint, where [`Self::hidden`] looks anyway.
+    /// Whether devices change in a step that was tried with straight laws, but not from a breakpoint, where [`Self::hidden`] looks anyway. Not beside switches that are
+    /// watched: steps as short as those in which their thresholds are located would follow each other.
     pub(super) fn changes_on_the_way(&self) -> bool {
-        self.control.is_some() && !self.now.settle && !self.system().curved && self.changes()
+        let may = self.control.is_some() && !self.now.settle && !self.switches.watch();
+        may && !self.system().curved && self.changes()
     }
 
     /// What a step of length h that was tried from a breakpoint may hide where an ideal device changes within it: a capacitor that is
@@ -102,14 +104,14 @@ impl Theta {
         h: f64,
         (tried, out): (Attempt, &[f64]),
     ) -> Result<Vec<f64>, Error> {
-        let end = (self.attempt.clone(), self.out.clone(), self.lambda.clone());
+        let end = (self.out.clone(), self.lambda.clone());
         let (z, u_next) = (self.z.clone(), self.u_next.clone());
         std::mem::swap(&mut self.now, &mut self.kept);
         self.attempt = tried;
         self.out.copy_from_slice(out);
         let found = self.looked_for(h);
         std::mem::swap(&mut self.now, &mut self.kept);
-        (self.attempt, self.out, self.lambda) = end;
+        (self.out, self.lambda) = end;
         (self.z, self.u_next) = (z, u_next);
         let mut found = found?;
         found.iter_mut().for_each(|change| *change *= 0.5);
