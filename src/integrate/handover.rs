@@ -45,9 +45,9 @@ struct Stepping {
 
 /// See the [module](self).
 pub(crate) struct Handover {
-    exact: Exact,
+    exact: Box<Exact>,
     takeover: Takeover,
-    stepping: Option<Stepping>,
+    stepping: Option<Box<Stepping>>,
     /// The steps, s.
     step: f64,
     /// Shortest interval of steps, s.
@@ -66,7 +66,7 @@ impl Handover {
     /// Exact integration that leaves what it cannot do to steps of `step` seconds, for `shortest` seconds at least.
     pub(crate) fn new(exact: Exact, takeover: Takeover, step: f64, shortest: f64) -> Self {
         Self {
-            exact,
+            exact: Box::new(exact),
             takeover,
             step,
             stepping: None,
@@ -98,11 +98,11 @@ impl Handover {
         };
         self.interrupt(error, place.t);
         let theta = (self.takeover)(&place)?;
-        self.stepping = Some(Stepping {
+        self.stepping = Some(Box::new(Stepping {
             theta,
             since: place.t,
             until: place.t + self.interval,
-        });
+        }));
         Ok(())
     }
 

@@ -125,6 +125,8 @@ pub(super) struct Problem {
     pub(super) known_comparators: usize,
     /// Rows are asked for at corners of the sources that are recorded.
     pub(super) rows_at_corners: bool,
+    /// The exact integration keeps the energy balance.
+    pub(super) balanced: bool,
 }
 
 /// The scout gives up after this many steps (trains of many pulses); what it has seen by then is used.
@@ -160,6 +162,7 @@ impl Problem {
             after_edges: false,
             known_comparators: 0,
             rows_at_corners: true,
+            balanced: true,
         })
     }
 
@@ -189,6 +192,7 @@ impl Problem {
             after_edges: false,
             known_comparators: 0,
             rows_at_corners: true,
+            balanced: true,
         }
     }
 
@@ -196,6 +200,14 @@ impl Problem {
     pub(super) fn with_free_sources(self) -> Self {
         Self {
             free_sources: true,
+            ..self
+        }
+    }
+
+    /// The same without an energy balance.
+    pub(super) fn unbalanced(self) -> Self {
+        Self {
+            balanced: false,
             ..self
         }
     }
@@ -249,7 +261,7 @@ impl Problem {
             until: tran.tstop,
             start: self.start.storage.clone(),
             h: tran.tstep,
-            energy: true,
+            energy: self.balanced,
             free: self.free_sources,
             settings: settings.clone(),
         })?;

@@ -75,7 +75,8 @@ impl Simulation {
         Self::start(circuit, multiport, options, Problem::with_free_sources)
     }
 
-    /// The same of a circuit whose sources keep their waveforms: those that only move switches are then no part of the state.
+    /// The same of a circuit whose sources keep their waveforms: those that only move switches are then no part of the state. It keeps no energy
+    /// balance where it is exact.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -84,7 +85,7 @@ impl Simulation {
         multiport: &StaticMultiport,
         options: SimulationOptions,
     ) -> Result<Self, Error> {
-        Self::start(circuit, multiport, options, |problem| problem)
+        Self::start(circuit, multiport, options, Problem::unbalanced)
     }
 
     fn start(

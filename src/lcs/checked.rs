@@ -1,6 +1,7 @@
 //! A complementarity system whose parts fit.
 
 use std::ops::Deref;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -11,9 +12,9 @@ use crate::settings::tolerances::ranks::SYMMETRIC;
 /// x' = A x + B λ + E u + e,  y = C x + D λ + G u + F,  −λ_j ∈ ∂φ_j(y_j), with [parts](LcsParts) that fit: shapes, symmetric energies, entries
 /// that are finite.
 ///
-/// Parts are read as fields (`lcs.a`); they are changed by [`Lcs::changed`], which checks again.
+/// Parts are read as fields (`lcs.a`); they are changed by [`Lcs::changed`], which checks again. A clone shares them.
 #[derive(Debug, Clone, Default)]
-pub struct Lcs(LcsParts);
+pub struct Lcs(Arc<LcsParts>);
 
 /// Why parts make no system.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -62,7 +63,7 @@ impl Lcs {
     /// Shapes that do not fit, energies that are not symmetric, entries that are not finite.
     pub fn new(parts: LcsParts) -> Result<Self, LcsError> {
         check(&parts)?;
-        Ok(Self(parts))
+        Ok(Self(Arc::new(parts)))
     }
 
     /// The same system with other parts.
@@ -70,7 +71,7 @@ impl Lcs {
     /// # Errors
     /// As [`Lcs::new`].
     pub fn changed(self, change: impl FnOnce(&mut LcsParts)) -> Result<Self, LcsError> {
-        let mut parts = self.0;
+        let mut parts = self.into_parts();
         change(&mut parts);
         Self::new(parts)
     }
@@ -78,11 +79,11 @@ impl Lcs {
     /// The same system with other waveforms at the inputs with these numbers.
     #[must_use]
     pub(crate) fn with_sources(&self, replaced: &[(usize, Source)]) -> Self {
-        let mut parts = self.0.clone();
+        let mut other = self.clone();
         for (input, source) in replaced {
-            parts.inputs[*input].source = source.clone();
+            Arc::make_mut(&mut other.0).inputs[*input].source = source.clone();
         }
-        Self(parts)
+        other
     }
 
     /// Bytes that its matrices take, about.
@@ -105,7 +106,7 @@ impl Lcs {
     /// What it is made of.
     #[must_use]
     pub fn into_parts(self) -> LcsParts {
-        self.0
+        Arc::unwrap_or_clone(self.0)
     }
 }
 

@@ -86,10 +86,7 @@ impl Kernel {
             blocks = rest;
         }
         if !tail.is_empty() {
-            let sums = product(blocks, w);
-            for (out, sum) in tail.iter_mut().zip(sums) {
-                *out = sum;
-            }
+            put(product(blocks, w), tail);
         }
     }
 }
@@ -147,7 +144,7 @@ impl SparseKernel {
         if !tail.is_empty() {
             let begin = full.len().checked_sub(1).map_or(0, |k| self.ends[k]);
             let sums = sparse_product(&self.blocks[begin..self.ends[full.len()]], w);
-            tail.iter_mut().zip(sums).for_each(|(y, sum)| *y = sum);
+            put(sums, tail);
         }
     }
 
@@ -159,6 +156,17 @@ impl SparseKernel {
             *y = sparse_product(&self.blocks[begin..end], w);
             begin = end;
         }
+    }
+}
+
+/// The first sums, fewer than four: copied in a loop they would be put into memory and fetched again by a call.
+#[inline]
+fn put([a, b, c, _]: Block, to: &mut [f64]) {
+    match to {
+        [x] => *x = a,
+        [x, y] => (*x, *y) = (a, b),
+        [x, y, z] => (*x, *y, *z) = (a, b, c),
+        _ => {}
     }
 }
 

@@ -12,5 +12,6 @@ pub(crate) mod levelled;
 pub(crate) mod polynomial;
 pub(crate) mod quadratic;
 pub(crate) mod rays;
+pub(crate) mod refill;
 pub(crate) mod series;
 pub(crate) mod shifted;

@@ -9,7 +9,7 @@ use crate::settings::tolerances::periodic::{
 use std::sync::atomic::Ordering;
 
 /// Periods of transient before each attempt.
-const TRANSIENTS: [usize; 5] = [8, 24, 96, 384, 1536];
+const TRANSIENTS: [usize; 5] = [4, 24, 96, 384, 1536];
 
 /// The largest order that is looked for.
 const MOST_ORDER: usize = 32;
@@ -118,6 +118,7 @@ impl<'a, 'o> Search<'a, 'o> {
             order: 1,
             amplitudes: Vec::new(),
             corrections: self.corrections,
+            systems: Default::default(),
         }
     }
 

@@ -11,10 +11,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::analysis::variation::Trajectory;
+use crate::analysis::variation::{System, Trajectory};
+use crate::integrate::exact::Passage;
 use crate::integrate::{Change, Error, Reason, Simulation};
 use crate::settings::tolerances::periodic::{
-    DIFFERENCE, EVENT_AGAIN, LEAST_AMPLITUDE, NEUTRAL, REUSED, STEPPED_DIFFERENCE, TAKES_PART,
+    DIFFERENCE, EVENT_AGAIN, LEAST_AMPLITUDE, NEUTRAL, REUSED, ROUNDING_OF_RETURN,
+    STEPPED_DIFFERENCE, TAKES_PART,
 };
 
 /// Corrections of one attempt.
@@ -61,13 +63,15 @@ pub(super) struct Fixed {
 }
 
 /// What a return made of a place.
-struct Closing {
+pub(super) struct Closing {
     /// (F(s) − s) in parts of the amplitudes.
     residual: DVector<f64>,
     /// F(s).
-    after: Stand,
+    pub(super) after: Stand,
     /// How long it took, s.
     seconds: f64,
+    /// The changes of mode on the way, where they are known.
+    passages: Option<Vec<Passage>>,
 }
 
 impl Closing {
@@ -87,6 +91,8 @@ pub(super) struct Shooting<'a> {
     pub(super) amplitudes: Vec<f64>,
     /// Corrections so far.
     pub(super) corrections: u32,
+    /// The systems that its derivatives went through so far, of returns that take `.0` seconds.
+    pub(super) systems: (f64, Vec<System>),
 }
 
 impl Shooting<'_> {
@@ -106,11 +112,14 @@ impl Shooting<'_> {
                 }
             }
         }
-        let stand = Stand {
+        Ok((self.stand(), seconds))
+    }
+
+    fn stand(&mut self) -> Stand {
+        Stand {
             state: self.simulation.state(),
             switches: self.simulation.positions(),
-        };
-        Ok((stand, seconds))
+        }
     }
 
     /// Goes on to the next event of this kind; its time, s.
@@ -185,14 +194,27 @@ impl Shooting<'_> {
         Ok(extremes)
     }
 
-    fn close(&mut self, stand: &Stand) -> Result<Closing, Error> {
-        let (after, seconds) = self.shoot(stand)?;
+    pub(super) fn close(&mut self, stand: &Stand) -> Result<Closing, Error> {
+        let (after, seconds, passages) = match self.returns {
+            Return::After(period) if self.simulation.is_exact() => {
+                let seconds = period * self.order as f64;
+                let place = (self.from, &stand.state[..], &stand.switches[..]);
+                let until = self.from + seconds;
+                let passages = self.simulation.passages(place, until, None)?;
+                (self.stand(), seconds, passages)
+            }
+            _ => {
+                let (after, seconds) = self.shoot(stand)?;
+                (after, seconds, None)
+            }
+        };
         let parts = after.state.iter().zip(&stand.state).zip(&self.amplitudes);
         let parts = parts.map(|((after, before), amplitude)| (after - before) / amplitude);
         Ok(Closing {
             residual: DVector::from_iterator(stand.state.len(), parts),
             after,
             seconds,
+            passages,
         })
     }
 
@@ -206,7 +228,7 @@ impl Shooting<'_> {
     /// flow has no derivative or is made of steps.
     fn derivative(&mut self, stand: &Stand, closing: &Closing) -> Result<DMatrix<f64>, Error> {
         if self.simulation.is_exact() {
-            match self.variation(stand, closing.seconds) {
+            match self.variation(stand, closing) {
                 Ok(Some(derivative)) => return Ok(derivative),
                 Ok(None) => {}
                 Err(error) if matches!(error.reason, Reason::NotSmooth(_)) => {}
@@ -220,15 +242,27 @@ impl Shooting<'_> {
     pub(super) fn variation(
         &mut self,
         stand: &Stand,
-        seconds: f64,
+        closing: &Closing,
     ) -> Result<Option<DMatrix<f64>>, Error> {
-        let place = (self.from, &stand.state[..], &stand.switches[..]);
-        let mut until = self.from + seconds;
-        if matches!(self.returns, Return::At(..)) {
-            // The event that closes the orbit happens in this run too, an ulp later or not.
-            until += EVENT_AGAIN * until.abs();
-        }
-        let trajectory = Trajectory::of(self.simulation, place, until)?;
+        let seconds = closing.seconds;
+        let until = self.from + seconds;
+        let mut trajectory = match &closing.passages {
+            Some(passages) => {
+                let known = std::mem::take(&mut self.systems);
+                let systems = if known.0 == seconds { known.1 } else { vec![] };
+                let (span, end) = ((self.from, until), &closing.after.state);
+                Trajectory::through(self.simulation, passages, span, end, systems)?
+            }
+            None => {
+                let place = (self.from, &stand.state[..], &stand.switches[..]);
+                // The event that closes the orbit happens in this run too, an ulp later or not.
+                let later = match self.returns {
+                    Return::After(_) => 0.0,
+                    Return::At(..) => EVENT_AGAIN * until.abs(),
+                };
+                Trajectory::of(self.simulation, place, until + later)?
+            }
+        };
         let mut derivative = match self.returns {
             Return::After(_) if !trajectory.closes() => return Ok(None),
             Return::After(_) => trajectory.monodromy(),
@@ -240,6 +274,7 @@ impl Shooting<'_> {
                 *value *= self.amplitudes[j] / amplitude;
             }
         }
+        self.systems = (seconds, std::mem::take(&mut trajectory.systems));
         Ok(Some(derivative))
     }
 
@@ -333,7 +368,12 @@ impl Shooting<'_> {
         // Directions that a return leaves as they are stay.
         let correction = svd.solve(residual, NEUTRAL).ok()?;
         let mut part = 1.0;
-        for _ in 0..HALVINGS {
+        let tries = if residual.amax() > ROUNDING_OF_RETURN {
+            HALVINGS
+        } else {
+            1
+        };
+        for _ in 0..tries {
             let mut next = stand.clone();
             for (j, value) in next.state.iter_mut().enumerate() {
                 *value += part * correction[j] * self.amplitudes[j];

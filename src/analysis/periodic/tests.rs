@@ -51,11 +51,13 @@ fn the_variational_equation_agrees_with_differences() {
         let mut shooting = search.shooting(found.from, Return::After(seconds));
         shooting.amplitudes.clone_from(&found.amplitudes);
         let stand = &found.fixed.stand;
-        let by_equation = shooting.variation(stand, seconds);
+        let closing = shooting.close(stand).expect("a period");
+        let by_equation = shooting.variation(stand, &closing);
         let by_equation = by_equation.unwrap_or_else(|error| panic!("{name}: {error}"));
         let by_equation = by_equation.expect("a derivative");
-        let (after, _) = shooting.shoot(stand).expect("a period");
-        let by_differences = shooting.differences(stand, &after).expect("differences");
+        let by_differences = shooting
+            .differences(stand, &closing.after)
+            .expect("differences");
         let apart = (&by_equation - &by_differences).amax();
         assert!(
             apart < 1e-5,

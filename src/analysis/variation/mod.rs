@@ -110,15 +110,24 @@ impl Trajectory {
             not_smooth(from, what)
         })?;
         let end = simulation.state();
-        let assembler = simulation.assembler(until - from);
-        let maker = Maker {
-            thresholds: assembler.thresholds(),
-            assembler,
-            systems: Vec::new(),
-            by_chance,
-            same: SAME_TIME * from.abs().max(until.abs()),
-        };
-        maker.make(&passages, (until, &end))
+        let maker = Maker::of(simulation, (from, until));
+        Maker { by_chance, ..maker }.make(&passages, (until, &end))
+    }
+
+    /// The run through these changes of mode, from one time to another, at which the storage is `end`. `systems` are those of a run as long
+    /// that are known.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub(crate) fn through(
+        simulation: &Simulation,
+        passages: &[Passage],
+        span: (f64, f64),
+        end: &[f64],
+        systems: Vec<System>,
+    ) -> Result<Self, Error> {
+        let maker = Maker::of(simulation, span);
+        Maker { systems, ..maker }.make(passages, (span.1, end))
     }
 
     /// M = ∂s(t₁)/∂s(t₀), q×q, at the times t₀ and t₁.
@@ -197,6 +206,17 @@ impl Trajectory {
 }
 
 impl Maker {
+    fn of(simulation: &Simulation, (from, until): (f64, f64)) -> Self {
+        let assembler = simulation.assembler(until - from);
+        Self {
+            thresholds: assembler.thresholds(),
+            assembler,
+            systems: Vec::new(),
+            by_chance: false,
+            same: SAME_TIME * from.abs().max(until.abs()),
+        }
+    }
+
     /// The place of a mode's system.
     fn system(&mut self, key: &Key) -> Result<usize, Error> {
         if let Some(known) = self.systems.iter().position(|system| system.key == *key) {

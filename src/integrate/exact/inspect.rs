@@ -6,6 +6,7 @@ use super::magnitudes::ORDERS;
 use super::mode::Mode;
 use super::rounding::resolution;
 use super::slaved::Manifold;
+use crate::linalg::refill::refill;
 use crate::settings::tolerances::events::{GROUP, NOISE};
 use crate::settings::tolerances::jumps::CONSISTENT;
 
@@ -80,11 +81,11 @@ impl Inspector {
         if !mode.keeps {
             mode.storage.values(&self.w, &mut self.s);
             if mode.driven {
-                self.later.clone_from(&self.w);
+                refill(&mut self.later, &self.w);
                 exosystem.write(t + time, &mut self.later[mode.n..]);
                 mode.storage.values(&self.later, &mut self.s_later);
             } else {
-                self.s_later.clone_from(&self.s);
+                refill(&mut self.s_later, &self.s);
             }
             mode.sizes_from(s, z, &mut self.sizes, &mut self.work);
             mode.storage.largest(&self.sizes, &mut self.s_sizes);
@@ -189,8 +190,7 @@ impl Inspector {
 
     /// Reads the guards of the mode in which the run stands at state x and time t, with the sources at z, for [`Self::leaves`].
     pub(crate) fn look(&mut self, mode: &mut Mode, x: &[f64], (t, z): (f64, &[f64])) {
-        self.w.clear();
-        self.w.extend_from_slice(x);
+        refill(&mut self.w, x);
         self.w.extend_from_slice(z);
         self.sizes.clear();
         self.sizes.extend(self.w.iter().map(|w| w.abs()));

@@ -2,6 +2,7 @@
 
 use super::flow::Flow;
 use super::slaved::{Follower, Manifold, followers};
+use crate::linalg::refill::refill;
 use crate::settings::tolerances::events::SIMULTANEOUS;
 use crate::settings::tolerances::exponentials::LEVEL;
 
@@ -43,8 +44,7 @@ impl Magnitudes {
             return;
         }
         for known in [&mut self.taken, &mut self.sizes] {
-            known.clear();
-            known.extend_from_slice(sizes);
+            refill(known, sizes);
         }
         waves(&mut self.sizes[flow.states()..]);
         flow.noise(&self.sizes, &mut self.noise);

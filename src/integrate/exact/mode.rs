@@ -15,6 +15,7 @@ use crate::lcs::{Lcs, PowerKind, Rows};
 use crate::linalg::decouple::decoupled;
 use crate::linalg::kernel::Kernel;
 use crate::linalg::rays;
+use crate::linalg::refill::refill;
 use crate::settings::tolerances::exponentials::{EQUAL, FAST_ENTRY};
 
 /// Successors of a mode that are remembered; the oldest goes first.
@@ -346,8 +347,7 @@ impl Mode {
     /// Takes w = [x; z] to the basis of the flow.
     pub(crate) fn settle(&self, w: &mut [f64], work: &mut Vec<f64>) {
         if let Some(settled) = &self.settled {
-            work.clear();
-            work.extend_from_slice(w);
+            refill(work, w);
             settled.apply(work, w);
         }
     }
@@ -369,8 +369,7 @@ impl Mode {
         }
         sizes.extend(z.iter().map(|v| v.abs()));
         if let Some(settled) = &self.settled_sizes {
-            work.clear();
-            work.extend_from_slice(sizes);
+            refill(work, sizes);
             settled.apply(work, sizes);
         }
     }
@@ -378,8 +377,7 @@ impl Mode {
     /// The storage at w.
     pub(crate) fn storage_at(&self, w: &[f64], s: &mut Vec<f64>) {
         if self.keeps {
-            s.clear();
-            s.extend_from_slice(&w[..self.n]);
+            refill(s, &w[..self.n]);
         } else {
             self.storage.values(w, s);
         }
@@ -388,8 +386,7 @@ impl Mode {
     /// How large the storage can be where w has these sizes.
     pub(crate) fn sizes_of_storage(&self, sizes: &[f64], largest: &mut Vec<f64>) {
         if self.keeps {
-            largest.clear();
-            largest.extend_from_slice(&sizes[..self.n]);
+            refill(largest, &sizes[..self.n]);
         } else {
             self.storage.largest(sizes, largest);
         }
@@ -398,8 +395,7 @@ impl Mode {
     /// How large x can be where the storage has these sizes, but for what does not follow from it.
     pub(crate) fn sizes_of_state(&self, storage: &[f64], sizes: &mut Vec<f64>) {
         if self.keeps {
-            sizes.clear();
-            sizes.extend_from_slice(storage);
+            refill(sizes, storage);
         } else {
             self.inject.largest(storage, sizes);
         }
@@ -420,8 +416,7 @@ impl Mode {
         work: &mut Vec<f64>,
     ) {
         if self.keeps {
-            rates.clear();
-            rates.extend_from_slice(storage);
+            refill(rates, storage);
         } else {
             self.inject.values(storage, rates);
         }
@@ -432,9 +427,7 @@ impl Mode {
     /// The state that conserves charge and flux from storage s.
     pub(crate) fn state_from(&self, s: &[f64], x: &mut Vec<f64>) {
         if self.keeps {
-            x.clear();
-            x.extend_from_slice(s);
-            return;
+            return refill(x, s);
         }
         self.inject.values(s, x);
         for (x, one) in x.iter_mut().zip(self.inject_one.iter()) {

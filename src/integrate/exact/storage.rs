@@ -8,6 +8,7 @@ use crate::integrate::energy::Balance;
 use crate::integrate::log::Log;
 use crate::integrate::stats::{JumpReason, StateJump};
 use crate::lcs::Lcs;
+use crate::linalg::refill::refill;
 use crate::settings::tolerances::exponentials::SLAVED;
 use crate::settings::tolerances::jumps::NO_JUMP;
 
@@ -101,7 +102,7 @@ impl Storage {
         if raised {
             self.capacity = stored(&self.metric, &self.scale);
         }
-        self.known.clone_from(&self.scale);
+        refill(&mut self.known, &self.scale);
     }
 
     /// Reads s and the energy spent where the run stands in this mode.

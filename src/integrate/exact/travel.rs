@@ -7,6 +7,7 @@ use super::magnitudes::Magnitudes;
 use super::rounding::resolution;
 use super::slaved::Follower;
 use crate::linalg::polynomial;
+use crate::linalg::refill::refill;
 use crate::linalg::series::Series;
 use crate::settings::tolerances::events::CLEAR_OF_ZERO;
 use crate::settings::tolerances::events::SIMULTANEOUS;
@@ -126,13 +127,11 @@ impl Travel {
         let dim = flow.dim();
         self.t = t;
         self.age = 0.0;
-        self.now.clear();
-        self.now.extend_from_slice(w);
+        refill(&mut self.now, w);
         self.next.resize(w.len(), 0.0);
         self.steady = flow.guards() == 0 && flow.step_limit(0.0) >= flow.step(LONG);
         self.barrier = f64::INFINITY;
-        self.amplitude.clear();
-        self.amplitude.extend_from_slice(&magnitudes.sizes);
+        refill(&mut self.amplitude, &magnitudes.sizes);
         self.peak.clear();
         self.peak.extend(w[..flow.states()].iter().map(|v| v.abs()));
         let guards = &w[dim..dim + flow.guards()];
@@ -141,8 +140,7 @@ impl Travel {
         self.followers.clone_from(&magnitudes.followers);
         self.following = 0;
         self.note_next_follower();
-        self.floors.clear();
-        self.floors.extend_from_slice(&magnitudes.noise);
+        refill(&mut self.floors, &magnitudes.noise);
         self.add_slack();
     }
 
@@ -184,7 +182,7 @@ impl Travel {
             flow.noise(&self.amplitude, &mut self.floors);
         } else {
             let mut sizes = std::mem::take(&mut self.sizes);
-            sizes.clone_from(&self.amplitude);
+            refill(&mut sizes, &self.amplitude);
             self.take_followers(&mut sizes);
             flow.noise(&sizes, &mut self.floors);
             self.sizes = sizes;
@@ -226,7 +224,7 @@ impl Travel {
 
     /// How large w can have been on the way here.
     pub(crate) fn reach(&self, reach: &mut Vec<f64>) {
-        reach.clone_from(&self.amplitude);
+        refill(reach, &self.amplitude);
         reach[..self.peak.len()].copy_from_slice(&self.peak);
     }
 
@@ -236,7 +234,7 @@ impl Travel {
         if self.following == 0 {
             return false;
         }
-        known.clone_from(&self.amplitude);
+        refill(known, &self.amplitude);
         self.take_followers(known);
         true
     }

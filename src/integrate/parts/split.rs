@@ -87,6 +87,7 @@ impl Problem {
             after_edges: self.after_edges,
             known_comparators: self.known_comparators,
             rows_at_corners: self.rows_at_corners,
+            balanced: self.balanced,
         }
     }
 }

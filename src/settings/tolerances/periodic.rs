@@ -20,6 +20,10 @@ pub(crate) const STEPPED_CLOSED: f64 = 1e-6;
 /// A correction that leaves less than this part of the residual was good enough for its derivative to be used again.
 pub(crate) const REUSED: f64 = 1e-2;
 
+/// A residual below this part of the amplitudes may be rounding of the way around: a correction that does not make it smaller is not halved. Larger:
+/// orbits a little further from closed; smaller: ways around in vain.
+pub(crate) const ROUNDING_OF_RETURN: f64 = 1e-13;
+
 /// A multiplier within this of 1 is 1, and beyond 1 by this one is unstable: what differences leave of it. Larger: slow drifts pass for
 /// families of orbits; smaller: rounding makes orbits unstable.
 pub(crate) const NEUTRAL: f64 = 1e-6;
