@@ -14,6 +14,7 @@ use super::ngspice::{self, deck};
 use super::output;
 use super::sim::{self, Request};
 use super::streams::Streams;
+use super::view;
 use crate::analysis::steps;
 use crate::circuit::Tran;
 use crate::integrate::Method;
@@ -301,6 +302,10 @@ fn from_file(path: &Path) -> Result<Theirs, Failure> {
             count => format!("{file}: holds {count} runs; a comparison takes one"),
         })
     })?;
+    if let Some(gaps) = view::gaps([&waveforms]) {
+        let (file, help) = (path.display(), "a comparison takes a file without gaps");
+        return Err(Failure::Message(format!("{file}: {gaps}; {help}")));
+    }
     Ok(Theirs {
         name: path.display().to_string(),
         waveforms,

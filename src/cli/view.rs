@@ -38,6 +38,12 @@ pub(super) fn view(args: &ViewArgs, streams: &Streams) -> Result<Exit, Failure> 
     files::spare(&paths, [args.file.as_path()])?;
     files::writable(&paths)?;
     let plot = chosen(args, streams)?;
+    if let Plot::Time(runs) = &plot
+        && let Some(gaps) = gaps(runs.iter().map(|(_, run)| run))
+    {
+        let file = args.file.display();
+        streams.note(format!("{file}: {gaps}; curves have gaps there"));
+    }
     let figure = |pixels| {
         let mut figure = match &plot {
             Plot::Time(runs) => {
@@ -65,6 +71,22 @@ pub(super) fn view(args: &ViewArgs, streams: &Streams) -> Result<Exit, Failure> 
         browser::show(&browser::keep(page()?.as_bytes())?, streams)?;
     }
     Ok(Exit::Done)
+}
+
+/// How many values of runs are no numbers and where the first is, in words.
+pub(super) fn gaps<'w>(runs: impl IntoIterator<Item = &'w Waveforms>) -> Option<String> {
+    let (mut count, mut first) = (0, None);
+    for run in runs {
+        if let Some((more, row, column)) = run.gaps() {
+            count += more;
+            first = first.or(Some((&run.names[column], run.time[row])));
+        }
+    }
+    let (name, t) = first?;
+    let values = if count == 1 { "value is" } else { "values are" };
+    Some(format!(
+        "{count} {values} missing or not finite, the first in `{name}` at t = {t:e} s"
+    ))
 }
 
 /// Whether a text has an analysis of a netlist.

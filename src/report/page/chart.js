@@ -92,9 +92,19 @@ function chart(root, content, announce) {
   function path(plot, curve, panel) {
     if (isDense(curve, state.view, pixelsOf(plot))) return null;
     const drawn = new Path2D();
-    let pen = false;
+    let pen = false, alone = null;
     const log = state.logs.has(panel), least = panel.dots ? LEAST : Number.MIN_VALUE;
-    const dot = SIZES.dot * (devicePixelRatio || 1), dots = new Path2D();
+    const ratio = devicePixelRatio || 1, dots = new Path2D();
+    const mark = (at, radius) => {
+      dots.moveTo(at[0] + radius, at[1]);
+      dots.arc(...at, radius, 0, 2 * Math.PI);
+    };
+    // A row between two gaps has no line.
+    const gap = () => {
+      if (alone) mark(alone, SIZES.line * ratio * 0.5);
+      pen = false;
+      alone = null;
+    };
     trace(curve, state.view, (t, value) => {
       const y = log ? Math.max(Math.abs(value), least) : value;
       if (Number.isNaN(y)) {
@@ -104,12 +114,11 @@ function chart(root, content, announce) {
       const at = [plot.valToPos(t, "x", true), plot.valToPos(y, "y", true)];
       if (pen) drawn.lineTo(...at);
       else drawn.moveTo(...at);
+      alone = pen ? null : at;
       pen = true;
-      if (panel.dots) {
-        dots.moveTo(at[0] + dot, at[1]);
-        dots.arc(...at, dot, 0, 2 * Math.PI);
-      }
+      if (panel.dots) mark(at, SIZES.dot * ratio);
     });
+    gap();
     drawn.addPath(dots);
     return { stroke: drawn };
   }
