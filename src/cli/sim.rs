@@ -59,6 +59,11 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
     if let Subject::Circuit(model) = &subject {
         let circuit = model.circuit();
         let transient = circuit.tran.is_some() && circuit.steady != Some(SteadyState::Orbit);
+        // What is carried out, where there is more than one analysis.
+        let done = match circuit.steady {
+            Some(SteadyState::Orbit) => "`.pss`",
+            _ => "`.tran`",
+        };
         if !transient && !circuit.ac.is_empty() {
             only_one_way(args)?;
             return ac::sim(args, model, &formats, streams);
@@ -66,7 +71,7 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         if !circuit.ac.is_empty() {
             let file = args.input.file.display();
             streams.note(format!(
-                "`.ac` is left out, as there is a `.tran`; `circ ac {file}` carries it out"
+                "`.ac` is left out, as there is a {done}; `circ ac {file}` carries it out"
             ));
         }
         if let (true, Some(told)) = (transient, left_out(circuit)) {
@@ -77,6 +82,12 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         }
         if !transient && !circuit.dc.is_empty() {
             only_one_way(args)?;
+            if circuit.steady == Some(SteadyState::Orbit) {
+                let file = args.input.file.display();
+                streams.note(format!(
+                    "`.pss` is left out, as there is a `.dc`; `circ pss {file}` carries it out"
+                ));
+            }
             return dc::sim(args, model, &formats, streams);
         }
         let file = args.input.file.display();
@@ -92,11 +103,11 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
             return op::of_model(&args.input, model, false, streams);
         }
         if !circuit.dc.is_empty() {
-            streams.note("`.dc` is left out, as there is a `.tran`");
+            streams.note(format!("`.dc` is left out, as there is a {done}"));
         }
         if circuit.op {
             streams.note(format!(
-                "`.op` is left out, as there is a `.tran`; `circ op {file}` carries it out"
+                "`.op` is left out, as there is a {done}; `circ op {file}` carries it out"
             ));
         }
         if circuit.tran.is_none() {
