@@ -123,6 +123,7 @@ impl<'a> Destination<'a> {
             run: &run,
             measured: &measured,
             conduction: &found.conduction,
+            steps: &[],
             model: self.model,
         };
         let written = outputs.finish(told, &figure, incomplete.as_deref());

@@ -15,6 +15,7 @@ use crate::integrate::{Block, Places, Run};
 use crate::model::Model;
 use crate::report::figure::{Figure, PANEL_COLUMNS};
 use crate::report::html::Page;
+use crate::report::steps::Step;
 use crate::report::{PictureError, png, svg};
 use crate::waveform::{csv, json, npz, raw};
 
@@ -137,6 +138,8 @@ pub(super) struct Told<'a> {
     /// In words.
     pub(super) measured: &'a str,
     pub(super) conduction: &'a [Conduction],
+    /// Those of `.step` that it stands for.
+    pub(super) steps: &'a [Step],
     pub(super) model: Option<&'a Model>,
 }
 
@@ -278,6 +281,7 @@ fn write(
                 places,
             )
             .with_conduction(told.conduction)
+            .with_steps(told.steps)
             .with_circuit(told.model);
             file.append(page.html()?.as_bytes())
         }

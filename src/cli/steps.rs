@@ -170,6 +170,7 @@ impl Stepping<'_> {
             run: &total,
             measured: &measured,
             conduction: &[],
+            steps: done,
             model: destination.model,
         };
         let written = outputs.finish(told, &figure, incomplete);

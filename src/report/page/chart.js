@@ -26,7 +26,7 @@ function chart(root, content, announce) {
   const curves = panels.flatMap((panel) => panel.curves);
   const isDotted = panels.some((panel) => panel.dots);
   let whole = wholeSpan(curves, axis.log, isDotted);
-  const state = { view: whole, cursors: { a: null, b: null }, pointer: null, under: null, paper: null, plots: [], room: SIZES.axis, logs: new Set(panels.filter((panel) => panel.dots)), heights: new Map(), fits: new Map() };
+  const state = { view: whole, cursors: { a: null, b: null }, pointer: null, under: null, paper: null, plots: [], run: null, room: SIZES.axis, logs: new Set(panels.filter((panel) => panel.dots)), heights: new Map(), fits: new Map() };
   const namesOf = (all) => [...new Set(all.map((curve) => curve.name))];
   const few = namesOf(curves).length <= COLOURS.light.length;
   const runs = [...new Set(curves.map((curve) => curve.run))];
@@ -108,7 +108,7 @@ function chart(root, content, announce) {
     trace(curve, state.view, (t, value) => {
       const y = log ? Math.max(Math.abs(value), least) : value;
       if (Number.isNaN(y)) {
-        pen = false;
+        gap();
         return;
       }
       const at = [plot.valToPos(t, "x", true), plot.valToPos(y, "y", true)];
@@ -246,11 +246,22 @@ function chart(root, content, announce) {
     area.replaceChildren();
     state.plots = panels.map((panel, k) => plotOf(panel, k + 1 === panels.length));
     if (strips.length > 0) {
-      stripCanvas.setAttribute("aria-label", `who conducts when: ${strips.map((strip) => strip.name).join(", ")}; states at the cursors and shares of time between them stand in the table`);
+      labelLanes();
       area.append(lanes);
     }
     show(state.view);
     readings.update();
+  }
+
+  const labelLanes = () =>
+    stripCanvas.setAttribute("aria-label", `who conducts when${state.run ? ` in the run ${state.run}` : ""}: ${strips.map((strip) => strip.name).join(", ")}; states at the cursors and shares of time between them stand in the table`);
+
+  /** Draws lanes and their readings anew, whose strips are those of another run now. */
+  function anew(run) {
+    state.run = run;
+    labelLanes();
+    readings.renew();
+    retold();
   }
 
   /** Shows a span of the axis in all panels. */
@@ -601,7 +612,7 @@ function chart(root, content, announce) {
   const paper = matchMedia("(prefers-color-scheme: dark)"), recolour = () => repaint(state.paper);
   paper.addEventListener("change", recolour);
   return {
-    state, panels, strips, runs, isMany, entriesOf, show, complete, keep, restore, zoom, pan, place, logarithmic, logarithmicAcross, colour, dash, boundsOf, edgeOf, axis,
+    state, panels, strips, runs, isMany, entriesOf, show, complete, anew, keep, restore, zoom, pan, place, logarithmic, logarithmicAcross, colour, dash, boundsOf, edgeOf, axis,
     full,
     repaint,
     remove: () => { resized.disconnect(); document.removeEventListener("keydown", pressedOnPage); paper.removeEventListener("change", recolour); state.plots.forEach((plot) => plot.destroy()); root.replaceChildren(); },

@@ -70,6 +70,10 @@ function drawing(charts) {
     });
     const timeAt = (x) => (axis.log ? from * (to / from) ** ((x - left) / inner) : from + ((to - from) * (x - left)) / inner);
     const isClose = (a, b) => across(b) - across(a) < LANES.period;
+    if (shown.strips.length > 0 && state.run) {
+      parts.push(`<text x="${left}" y="${base - 10}">${clean(state.run)}</text>`);
+      base += LANES.row;
+    }
     for (const strip of shown.strips) {
       const foot = base - 10;
       let known = "", pale = "", unknown = "";
