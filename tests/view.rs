@@ -89,7 +89,7 @@ fn what_is_no_number_in_a_file_is_a_gap_of_its_curve_and_is_counted() {
     assert!(output.status.success(), "{}", said(&output));
     assert_eq!(
         said(&output),
-        "note: gaps.csv: 3 values are missing or not finite, the first in `v(a)` at t = 1e0 s; curves have gaps there\n"
+        "note[gaps]: gaps.csv: 3 values are missing or not finite, the first in `v(a)` at t = 1e0 s; curves have gaps there\n"
     );
     let svg = fs::read_to_string(folder.path().join("a.svg")).expect("a picture");
     assert!(!svg.contains("NaN"), "{svg}");

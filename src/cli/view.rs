@@ -42,7 +42,7 @@ pub(super) fn view(args: &ViewArgs, streams: &Streams) -> Result<Exit, Failure> 
         && let Some(gaps) = gaps(runs.iter().map(|(_, run)| run))
     {
         let file = args.file.display();
-        streams.note(format!("{file}: {gaps}; curves have gaps there"));
+        streams.note("gaps", format!("{file}: {gaps}; curves have gaps there"));
     }
     let figure = |pixels| {
         let mut figure = match &plot {
@@ -112,7 +112,7 @@ fn chosen(args: &ViewArgs, streams: &Streams) -> Result<Plot, Failure> {
     let mut all = plots(&bytes).map_err(|error| match is_netlist(&bytes) {
         true => {
             let file = args.file.display();
-            Failure::Message(format!(
+            Failure::told("waveforms", format!(
                 "{file}: a netlist, not a file of waveforms; `circ {file} -o out.html` runs it and makes a page"
             ))
         }
@@ -127,24 +127,26 @@ fn chosen(args: &ViewArgs, streams: &Streams) -> Result<Plot, Failure> {
             0 => format!("{file}: holds nothing over time or frequency"),
             count => format!("{file}: holds {count} plots over time or frequency"),
         };
-        return Err(Failure::Message(message));
+        return Err(Failure::told("no-such-plot", message));
     }
     if all.len() > 1 {
         let count = all.len();
-        streams.note(format!(
-            "{file}: plot {number} of {count}; `--plot N` takes another"
-        ));
+        let text = format!("{file}: plot {number} of {count}; `--plot N` takes another");
+        streams.note("several-plots", text);
     }
     let mut plot = all.swap_remove(number - 1);
     let unknown = |probe: &str, names: &[String]| {
         let own: Vec<String> = names.iter().map(|name| canonical_name(name)).collect();
         let near = nearest(&canonical_name(probe), own.iter().map(String::as_str));
-        Failure::Message(match near {
-            Some(near) => {
-                format!("--probe {probe}: the file has no `{probe}`; did you mean `{near}`?")
-            }
-            None => format!("--probe {probe}: the file has {}", names.join(" ")),
-        })
+        Failure::told(
+            "unknown-signal",
+            match near {
+                Some(near) => {
+                    format!("--probe {probe}: the file has no `{probe}`; did you mean `{near}`?")
+                }
+                None => format!("--probe {probe}: the file has {}", names.join(" ")),
+            },
+        )
     };
     match &mut plot {
         Plot::Time(runs) => {
