@@ -339,16 +339,18 @@ function chart(root, content, announce) {
     retell(name);
   }
 
-  /** Gives curves that are drawn by some of their rows all of them, from columns by number. */
-  function complete(columns) {
-    for (const curve of curves.filter((curve) => curve.partial)) {
+  /** The steps that give curves which are drawn by some of their rows all of them, from columns by number: one a curve, then what is seen of them. */
+  const completing = (columns) => [
+    ...curves.filter((curve) => curve.partial).map((curve) => () => {
       const [x, y] = curve.later.map((k) => columns.get(k));
       Object.assign(curve, curveOf(curve.name, x, y), { shown: curve.shown });
-    }
-    show(state.view);
-    readings.update();
-    root.dispatchEvent(new CustomEvent("complete"));
-  }
+    }),
+    () => {
+      show(state.view);
+      readings.update();
+      root.dispatchEvent(new CustomEvent("complete"));
+    },
+  ];
 
   /** Draws the cursors and their readings anew. */
   function retold() {
@@ -612,7 +614,7 @@ function chart(root, content, announce) {
   const paper = matchMedia("(prefers-color-scheme: dark)"), recolour = () => repaint(state.paper);
   paper.addEventListener("change", recolour);
   return {
-    state, panels, strips, runs, isMany, entriesOf, show, complete, anew, keep, restore, zoom, pan, place, logarithmic, logarithmicAcross, colour, dash, boundsOf, edgeOf, axis,
+    state, panels, strips, runs, isMany, entriesOf, show, completing, anew, keep, restore, zoom, pan, place, logarithmic, logarithmicAcross, colour, dash, boundsOf, edgeOf, axis,
     full,
     repaint,
     remove: () => { resized.disconnect(); document.removeEventListener("keydown", pressedOnPage); paper.removeEventListener("change", recolour); state.plots.forEach((plot) => plot.destroy()); root.replaceChildren(); },

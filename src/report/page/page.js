@@ -17,14 +17,21 @@ function panelsOf(data) {
   return data.panels.map((panel) => ({ ...panel, curves: panel.curves.map(of) }));
 }
 
-/** The columns that stand behind the page are there: its curves get all their rows. */
+/** The columns that stand behind the page are there: its curves get all their rows, one after the other, so that the page can be zoomed meanwhile. */
 function circRest(shown) {
-  const columns = new Map();
-  for (const script of document.querySelectorAll("script[data-column]")) {
-    columns.set(Number(script.dataset.column), numbers(script.textContent));
-    script.remove();
-  }
-  shown.complete(columns);
+  const columns = new Map(), scripts = [...document.querySelectorAll("script[data-column]")];
+  const steps = [
+    ...scripts.map((script) => () => {
+      columns.set(Number(script.dataset.column), numbers(script.textContent));
+      script.remove();
+    }),
+    ...shown.completing(columns),
+  ];
+  const go = () => {
+    steps.shift()?.();
+    if (steps.length > 0) setTimeout(go);
+  };
+  setTimeout(go);
 }
 
 /** A table of words; long ones show their first rows and a button for the rest. */
