@@ -62,7 +62,7 @@ pub(super) fn source<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
             if symbol(rest, '(').is_some() {
                 const KNOWN: [&str; 6] = ["sin", "pulse", "pwl", "exp", "sffm", "am"];
                 let (_, name) = word(at)?;
-                let meant = nearest(&name.text, KNOWN.into_iter());
+                let meant = nearest(&name.text, KNOWN);
                 let meant = meant.map(|near| format!("did you mean {}? ", near.to_uppercase()));
                 let all = KNOWN.map(str::to_uppercase).join(", ");
                 let help = meant.unwrap_or_default() + "waveforms are " + &all;
