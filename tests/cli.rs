@@ -514,24 +514,41 @@ fn findings_are_lines_or_objects_where_that_is_asked_for() {
     );
     let lines: Vec<&str> = ran.err.lines().collect();
     assert!(
-        lines[0].starts_with("note[run]: --step is of no use"),
+        lines[0].starts_with("note[unused-option]: --step is of no use"),
         "{ran}"
     );
     assert!(
-        lines[1].starts_with("slow.cir:2:1: warning[run]: the print step"),
+        lines[1].starts_with("slow.cir:2:1: warning[rows-apart]: the print step")
+            && lines[1].ends_with("as in `.tran 10n 1m`)"),
         "{ran}"
+    );
+    let person = run_in(directory.path(), "sim slow.cir -o slow.csv");
+    assert!(
+        person
+            .err
+            .starts_with("warning[rows-apart]: slow.cir:2:1: ")
+            && person.err.contains("\n  help: take a print step of"),
+        "{person}"
     );
     let ran = run_in(directory.path(), "sim slow.cir --message-format json");
     let warning: serde_json::Value = serde_json::from_str(&ran.err).unwrap();
     assert_eq!(
         (&warning["code"], &warning["severity"], &warning["line"]),
-        (&"run".into(), &"warning".into(), &2.into())
+        (&"rows-apart".into(), &"warning".into(), &2.into())
+    );
+    assert!(
+        warning["help"]
+            .as_str()
+            .unwrap()
+            .starts_with("take a print step")
     );
     let quiet = run_in(directory.path(), "sim slow.cir --message-format json -q");
     assert_eq!((quiet.status, quiet.err.as_str()), (0, ""));
     let missing = run("sim divider.cir --probe v(x) --message-format short");
     assert!(
-        missing.err.starts_with("error[failure]: --probe v(x): "),
+        missing
+            .err
+            .starts_with("error[unknown-signal]: --probe v(x): "),
         "{missing}"
     );
     let missing = run("sim missing.cir --message-format json");
@@ -539,19 +556,51 @@ fn findings_are_lines_or_objects_where_that_is_asked_for() {
         serde_json::from_str(missing.err.lines().next().unwrap()).unwrap();
     assert_eq!((missing.status, &failure["severity"]), (2, &"error".into()));
     // Faults of the command line, whatever the place of the option.
-    for arguments in [
-        "missing.cir --message-format json",
-        "--message-format=json missing.cir",
-        "divider.cir --step 0 --message-format json",
-        "sim --message-format json",
+    for (arguments, code) in [
+        ("missing.cir --message-format json", "unknown-command"),
+        ("--message-format=json missing.cir", "unknown-command"),
+        ("divider.cir --step 0 --message-format json", "bad-option"),
+        ("sim --message-format json", "missing-argument"),
+        (
+            "sim divider.cir --stepp 1 --message-format json",
+            "unknown-option",
+        ),
+        (
+            "sim divider.cir --verify --worst m --message-format json",
+            "unknown-measurement",
+        ),
+        (
+            "sim divider.cir -o divider.cir --message-format json",
+            "output-format",
+        ),
+        (
+            "lcs divider.cir -o divider.cir --message-format json",
+            "overwritten",
+        ),
     ] {
         let ran = run(arguments);
         let failure: serde_json::Value = serde_json::from_str(&ran.err).unwrap();
-        assert_eq!((ran.status, &failure["code"]), (2, &"failure".into()));
+        assert_eq!(
+            (ran.status, &failure["code"]),
+            (2, &code.into()),
+            "{arguments}"
+        );
+        assert!(
+            failure["help"].as_str().is_some_and(|help| help.len() > 9),
+            "{arguments}"
+        );
     }
-    assert_eq!(
-        run("divider.cir --step 0 --message-format short").err,
-        "error[failure]: invalid value '0' for '--step <H>': must be positive\n"
+    assert!(
+        run("divider.cir --step 0 --message-format short")
+            .err
+            .starts_with(
+                "error[bad-option]: invalid value '0' for '--step <H>': must be positive ("
+            )
+    );
+    assert!(
+        run("divider.cir --step 0")
+            .err
+            .starts_with("error[bad-option]: invalid value '0' for '--step <H>'")
     );
 }
 
@@ -564,7 +613,8 @@ fn parameters_and_probes_are_replaced() {
     status 2
     --- out
     --- err
-    error: --probe v(nowhere): there is no node or element `v(nowhere)`; there are v(in), v(out)
+    error[unknown-signal]: --probe v(nowhere): there is no node or element `v(nowhere)`; there are v(in), v(out)
+      help: name one that the message lists, or leave `--probe` out, which shows all
     ");
 }
 
@@ -671,7 +721,8 @@ fn an_unknown_probe_says_what_was_probably_meant() {
     fs::write(directory.path().join("swept.cir"), swept).unwrap();
     let ran = run_in(directory.path(), "sim swept.cir");
     assert!(
-        ran.err.contains("note: `v(in)*2` is an expression"),
+        ran.err
+            .contains("note[expression]: `v(in)*2` is an expression"),
         "{ran}"
     );
     assert_eq!(ran.out.lines().next(), Some("v1,v(in)"));
@@ -811,8 +862,35 @@ fn a_netlist_may_ask_for_its_operating_point() {
     let ran = run_in(place.path(), "both.cir -o a.csv");
     assert!(
         ran.status == 0
-            && ran.err.contains("`.op` is left out")
-            && ran.err.contains("`.dc` is left out"),
+            && ran.err.contains("`.op` is left out, as there is a `.tran`")
+            && ran
+                .err
+                .matches("`.dc` is left out, as there is a `.tran`")
+                .count()
+                == 1,
+        "{ran}"
+    );
+    // Where `.pss` is carried out it is the one that is named.
+    let text = "rc\nv1 a 0 sin(0 1 1k) ac 1\nr1 a b 1k\nc1 b 0 1u\n.pss 1k 1m b 10 5\n.op\n.dc v1 0 1 1\n.end\n";
+    fs::write(place.path().join("pss.cir"), text).unwrap();
+    let ran = run_in(place.path(), "pss.cir -o a.csv");
+    assert!(
+        ran.status == 0
+            && ran.err.contains("`.op` is left out, as there is a `.pss`")
+            && ran.err.contains("`.dc` is left out, as there is a `.pss`")
+            && !ran.err.contains("`.tran`"),
+        "{ran}"
+    );
+    let rows = fs::read_to_string(place.path().join("a.csv")).unwrap();
+    assert_eq!((rows.lines().count(), &rows[..5]), (12, "time,"));
+    fs::write(
+        place.path().join("pss.cir"),
+        text.replace(".op", ".ac lin 1 1 1"),
+    )
+    .unwrap();
+    let ran = run_in(place.path(), "pss.cir -o b.csv");
+    assert!(
+        ran.status == 0 && ran.err.contains("`.pss` is left out, as there is an `.ac`"),
         "{ran}"
     );
 }
@@ -957,13 +1035,15 @@ fn files_that_cannot_be_written_are_named_before_or_after_the_run() {
     status 2
     --- out
     --- err
-    error: out.xls: the ending chooses the format and must be csv, raw, npz, json, svg, png or html
+    error[output-format]: out.xls: the ending chooses the format and must be csv, raw, npz, json, svg, png or html
+      help: give the file one of the endings that the message lists, or name it with `--format`
     ");
     assert_snapshot!(run("sim divider.cir -o nowhere/out.csv"), @r"
     status 2
     --- out
     --- err
-    error: nowhere/out.csv: No such file or directory (os error 2); there is no folder `nowhere`
+    error[file]: nowhere/out.csv: No such file or directory (os error 2); there is no folder `nowhere`
+      help: check the path and the rights; the message has what the system says
     ");
 }
 
@@ -1033,7 +1113,8 @@ fn contradicting_methods_are_refused() {
     status 2
     --- out
     --- err
-    error: --theta and --gamma belong to `--method theta`
+    error[option-conflict]: --theta and --gamma belong to `--method theta`
+      help: leave one of the two out
     ");
 }
 
@@ -1232,7 +1313,8 @@ fn lcs_takes_switches_in_the_position_asked_for() {
     status 2
     --- out
     --- err
-    error: --switch s9: the circuit has s1
+    error[unknown-switch]: --switch s9: the circuit has s1
+      help: name one that the message lists
     ");
 }
 
@@ -1358,9 +1440,11 @@ fn compare_says_plainly_that_ngspice_is_missing() {
         .unwrap();
     assert_eq!(output.status.code(), Some(2));
     let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(
-        said,
-        "error: ngspice is not installed (no program `ngspice` on the search path)\n"
+    assert!(
+        said.starts_with(
+            "error[ngspice]: ngspice is not installed (no program `ngspice` on the search path)\n  help: install ngspice"
+        ),
+        "{said}"
     );
 }
 
@@ -1445,8 +1529,9 @@ fn what_works_on_matrices_says_so_of_a_nonlinear_form() {
         let ran = run_in(directory.path(), &format!("{command} cubic.json"));
         assert_eq!(ran.status, 2, "{ran}");
         assert!(
-            ran.err
-                .starts_with("error: cubic.json: a nonlinear form, sound at its start"),
+            ran.err.starts_with(
+                "error[not-for-system]: cubic.json: a nonlinear form, sound at its start"
+            ),
             "{ran}"
         );
     }
@@ -1756,7 +1841,7 @@ fn a_response_is_measured_where_it_is_found() {
     fs::write(&file, text.replace(".end", ".tran 1u 1m")).unwrap();
     let ran = run_in(folder.path(), "sim rc.cir -o a.csv");
     assert_eq!(ran.status, 0, "{ran}");
-    let note = "note: `.meas ac` (corner) is left out, as a transient has no response to small sines; `circ ac rc.cir` measures that";
+    let note = "note[left-out]: `.meas ac` (corner) is left out, as a transient has no response to small sines; `circ ac rc.cir` measures that";
     assert!(
         ran.err.contains(note) && !ran.err.contains("skipped"),
         "{ran}"

@@ -6,16 +6,58 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// Pages whose commands are run: those of blocks marked `sh` that begin with `circ`; netlists marked `title=NAME` stand in the folder.
-const PAGES: [&str; 7] = [
-    "README.md",
-    "docs/running.md",
-    "docs/netlist.md",
-    "docs/from-ltspice.md",
-    "docs/from-plecs.md",
-    "docs/for-researchers.md",
-    "docs/periodic.md",
-];
+/// What a command that no test runs says of itself, before the reason.
+const MARK: &str = "not in the tests: ";
+
+/// The pages of the project, from its root.
+fn pages(root: &Path) -> Vec<String> {
+    let mut pages = vec!["README.md".to_owned(), "CONTRIBUTING.md".to_owned()];
+    for folder in ["docs", "docs/decisions", "python"] {
+        let entries = fs::read_dir(root.join(folder)).expect("a folder");
+        let names = entries.map(|entry| entry.expect("an entry").file_name());
+        let names = names.map(|name| format!("{folder}/{}", name.to_string_lossy()));
+        pages.extend(names.filter(|name| name.ends_with(".md")));
+    }
+    pages.sort();
+    pages
+}
+
+/// The commands of a block, those of several lines as one.
+fn commands(text: &str) -> Vec<String> {
+    let joined = text.replace("\\\n", " ");
+    let lines = joined.lines().map(str::trim);
+    let lines = lines.filter(|line| !line.is_empty() && !line.starts_with('#'));
+    lines.map(str::to_owned).collect()
+}
+
+/// What a command that no test runs names and does not exist: tests and benches of cargo, scripts and their options.
+fn missing(root: &Path, command: &str) -> Vec<String> {
+    let command = command.split('#').next().unwrap_or_default();
+    let words: Vec<&str> = command.split_whitespace().collect();
+    let manifest = fs::read_to_string(root.join("Cargo.toml")).expect("a manifest");
+    let (mut missing, mut script) = (Vec::new(), None);
+    for (k, word) in words.iter().enumerate() {
+        let next = words.get(k + 1).copied().unwrap_or_default();
+        let is_there = match *word {
+            "--test" => [format!("tests/{next}.rs"), format!("tests/{next}/main.rs")]
+                .iter()
+                .any(|file| root.join(file).is_file()),
+            "--bench" => manifest.contains(&format!("name = \"{next}\"")),
+            _ if word.ends_with(".py") => {
+                script = fs::read_to_string(root.join(word)).ok();
+                script.is_some()
+            }
+            _ if word.starts_with("--") && word.len() > 2 => script
+                .as_ref()
+                .is_none_or(|text| text.contains(&format!("\"{word}\""))),
+            _ => true,
+        };
+        if !is_there {
+            missing.push(format!("{word} {next}"));
+        }
+    }
+    missing
+}
 
 /// The fenced blocks of a page: what they are marked, and their text.
 fn blocks(page: &str) -> Vec<(&str, String)> {
@@ -33,8 +75,10 @@ fn blocks(page: &str) -> Vec<(&str, String)> {
     blocks
 }
 
+/// Commands of blocks marked `sh` run, those that begin with `circ`; netlists marked `title=NAME` stand in the folder. All others say that they are not run and why, and
+/// what they name is there.
 #[test]
-fn every_command_runs() {
+fn every_command_runs_or_says_why_not() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let program = Path::new(env!("CARGO_BIN_EXE_circ"))
         .parent()
@@ -44,9 +88,9 @@ fn every_command_runs() {
         program.display(),
         std::env::var("PATH").unwrap_or_default()
     );
-    let mut faults = Vec::new();
-    for page in PAGES {
-        let text = fs::read_to_string(root.join(page)).expect("a page");
+    let (mut faults, mut left_out, mut ran) = (Vec::new(), Vec::new(), Vec::new());
+    for page in pages(root) {
+        let text = fs::read_to_string(root.join(&page)).expect("a page");
         let folder = tempfile::tempdir().expect("a folder");
         std::os::unix::fs::symlink(root.join("netlists"), folder.path().join("netlists"))
             .expect("a link");
@@ -54,25 +98,71 @@ fn every_command_runs() {
         for (mark, text) in blocks(&text) {
             if let Some((_, name)) = mark.split_once("title=") {
                 fs::write(folder.path().join(name), text).expect("a netlist");
-            } else if mark == "sh" {
-                for command in text.lines().filter(|line| line.starts_with("circ ")) {
-                    count += 1;
-                    let ran = Command::new("sh")
-                        .args(["-c", command])
-                        .current_dir(folder.path())
-                        .env("PATH", &path)
-                        .output()
-                        .expect("sh");
-                    if !ran.status.success() {
-                        let said = String::from_utf8_lossy(&ran.stderr).into_owned();
-                        faults.push(format!("{page}: {command}: {}\n{said}", ran.status));
+                continue;
+            }
+            if mark != "sh" {
+                continue;
+            }
+            for command in commands(&text) {
+                if !command.starts_with("circ ") {
+                    match command.split_once(MARK) {
+                        Some((_, why)) => left_out.push(format!("{page}: {why}")),
+                        None => faults.push(format!(
+                            "{page}: {command}: is not run, and does not say `# {MARK}…`"
+                        )),
                     }
+                    let missing = missing(root, &command);
+                    faults.extend(
+                        missing
+                            .iter()
+                            .map(|what| format!("{page}: {command}: there is no {what}")),
+                    );
+                    continue;
+                }
+                count += 1;
+                let ran = Command::new("sh")
+                    .args(["-c", &command])
+                    .current_dir(folder.path())
+                    .env("PATH", &path)
+                    .output()
+                    .expect("sh");
+                if !ran.status.success() {
+                    let said = String::from_utf8_lossy(&ran.stderr).into_owned();
+                    faults.push(format!("{page}: {command}: {}\n{said}", ran.status));
                 }
             }
         }
-        assert!(count > 0, "{page} has commands");
+        if count > 0 {
+            ran.push(page);
+        }
     }
     assert!(faults.is_empty(), "{}", faults.join("\n"));
+    insta::assert_snapshot!(
+        "commands",
+        format!(
+            "run:\n{}\n\nleft out:\n{}",
+            ran.join("\n"),
+            left_out.join("\n")
+        )
+    );
+}
+
+#[test]
+fn commands_are_read_and_what_they_name_is_looked_for() {
+    let text =
+        "# a word\nA=1 \\\n    cargo test --test documents   # not in the tests: b\ncirc c\n";
+    let found = commands(text);
+    assert_eq!(found.len(), 2, "{found:?}");
+    assert!(found[0].starts_with("A=1 ") && found[0].ends_with("not in the tests: b"));
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let all = |command: &str| missing(root, command).len();
+    assert_eq!(all(&found[0]), 0);
+    assert_eq!(all("cargo test --test nowhere"), 1);
+    assert_eq!(all("cargo bench --bench large"), 0);
+    assert_eq!(all("cargo bench --bench larger"), 1);
+    assert_eq!(all("python3 tests/reference/corpus.py F --circ c"), 0);
+    assert_eq!(all("python3 tests/reference/corpus.py F --cirq c"), 1);
+    assert_eq!(all("tests/reference/nowhere.py"), 1);
 }
 
 #[test]

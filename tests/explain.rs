@@ -13,9 +13,10 @@ use syn::visit::{self, Visit};
 /// Functions that make a finding of the code that is their first argument.
 const MAKERS: [&str; 7] = ["error", "fault", "new", "note", "plain", "told", "warning"];
 /// The calls that take a code from such a function, a structure or a tuple: by file, how many.
-const PASSED_ON: [(&str, usize); 4] = [
+const PASSED_ON: [(&str, usize); 5] = [
     ("circuit/eval.rs", 1),
     ("circuit/pin.rs", 1),
+    ("cli/render.rs", 1),
     ("integrate/located.rs", 1),
     ("netlist/card/passive.rs", 1),
 ];
@@ -25,6 +26,8 @@ const PASSED_ON: [(&str, usize); 4] = [
 struct Codes {
     codes: BTreeSet<String>,
     passed_on: usize,
+    /// Within a function that gives codes.
+    is_code: bool,
 }
 
 fn literal(expr: &syn::Expr) -> Option<String> {
@@ -60,7 +63,12 @@ impl<'s> Visit<'s> for Codes {
             let name = names.last().map_or("", String::as_str);
             let of_diagnostic = names.len() == 2 && names[0] == "Diagnostic";
             let own = names.len() == 1 && ["plain", "told"].contains(&name);
-            if (of_diagnostic || own) && MAKERS.contains(&name) {
+            let of = |kind, makers: &[&str]| {
+                names.len() == 2 && names[0] == kind && makers.contains(&name)
+            };
+            let other =
+                of("Failure", &["told"]) || of("Note", &["of", "run"]) || of("Self", &["of"]);
+            if other || (of_diagnostic || own) && MAKERS.contains(&name) {
                 match call.args.first().and_then(literal) {
                     Some(code) => drop(self.codes.insert(code)),
                     None if of_diagnostic => self.passed_on += 1,
@@ -72,10 +80,25 @@ impl<'s> Visit<'s> for Codes {
     }
 
     fn visit_expr_method_call(&mut self, call: &'s syn::ExprMethodCall) {
-        if call.method == "fault" {
+        let of_streams =
+            call.args.len() == 2 && (call.method == "note" || call.method == "warning");
+        if call.method == "fault" || of_streams {
             self.codes.extend(call.args.first().and_then(literal));
         }
         visit::visit_expr_method_call(self, call);
+    }
+
+    /// `fn code(…) -> &'static str { match … { … => "file" } }`.
+    fn visit_signature(&mut self, signature: &'s syn::Signature) {
+        self.is_code = signature.ident == "code";
+        visit::visit_signature(self, signature);
+    }
+
+    fn visit_arm(&mut self, arm: &'s syn::Arm) {
+        if self.is_code {
+            self.codes.extend(literal(&arm.body));
+        }
+        visit::visit_arm(self, arm);
     }
 
     /// `vec![Diagnostic::error("set", …)]`.
@@ -196,14 +219,25 @@ fn codes_are_collected_from_every_form() {
             let c = Told { code: "four", help: "…" };
             let d = plain("five", None);
             let e = vec![Diagnostic::note("seven", None, "…")];
+            let f = Note::run("eight", "…");
+            let g = Failure::told("nine", text);
+            streams.note("ten", "…");
+        }
+        fn code(kind: Kind) -> &'static str {
+            match kind { _ => "eleven" }
+        }
+        fn other(kind: Kind) -> &'static str {
+            match kind { _ => "no-code" }
         }
         #[cfg(test)]
         mod tests { fn f() { Diagnostic::error("six", None, "…"); } }
         "#,
     );
-    let expected: BTreeSet<String> = ["five", "four", "one", "seven", "three", "two"]
-        .map(str::to_owned)
-        .into();
+    let expected: BTreeSet<String> = [
+        "eight", "eleven", "five", "four", "nine", "one", "seven", "ten", "three", "two",
+    ]
+    .map(str::to_owned)
+    .into();
     assert_eq!((found.codes, found.passed_on), (expected, 1));
 }
 
@@ -275,11 +309,14 @@ fn the_command_lists_explains_and_suggests() {
     assert_eq!(status, 2);
     assert_eq!(
         text,
-        "error: there is no code `unknown-modle`: did you mean `unknown-model`?\n"
+        "error[unknown-code]: there is no code `unknown-modle`: did you mean `unknown-model`?\n  help: `circ explain` lists all\n"
     );
     let (status, text) = circ(folder.path(), "explain x");
     assert_eq!(
         (status, text.as_str()),
-        (2, "error: there is no code `x`: `circ explain` lists all\n")
+        (
+            2,
+            "error[unknown-code]: there is no code `x`\n  help: `circ explain` lists all\n"
+        )
     );
 }

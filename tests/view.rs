@@ -78,6 +78,41 @@ fn until<T>(mut look: impl FnMut() -> Option<T>) -> T {
 }
 
 #[test]
+fn what_is_no_number_in_a_file_is_a_gap_of_its_curve_and_is_counted() {
+    let folder = folder();
+    let text = "time,v(a),v(b)\n0,1,2\n1,nan,3\n2,2,\n3,1,inf\n4,2,4\n";
+    fs::write(folder.path().join("gaps.csv"), text).expect("a file");
+    let output = ran(
+        folder.path(),
+        &["view", "gaps.csv", "-o", "a.html", "-o", "a.svg"],
+    );
+    assert!(output.status.success(), "{}", said(&output));
+    assert_eq!(
+        said(&output),
+        "note[gaps]: gaps.csv: 3 values are missing or not finite, the first in `v(a)` at t = 1e0 s; curves have gaps there\n"
+    );
+    let svg = fs::read_to_string(folder.path().join("a.svg")).expect("a picture");
+    assert!(!svg.contains("NaN"), "{svg}");
+    // Of each curve a line of two rows and a row alone.
+    assert_eq!(
+        svg.matches("<path fill=\"none\" stroke-linejoin").count(),
+        2
+    );
+    assert_eq!(svg.matches("<circle").count(), 2);
+    // What a comparison would pass over in silence it refuses.
+    let output = ran(
+        folder.path(),
+        &["compare", "a.cir", "--against", "gaps.csv"],
+    );
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        said(&output).contains("3 values are missing"),
+        "{}",
+        said(&output)
+    );
+}
+
+#[test]
 fn waveforms_of_every_format_are_the_same_page() {
     let folder = folder();
     let at = folder.path();

@@ -83,8 +83,10 @@ pub(super) fn laps(
     let laps = (until / period - LAST_ROW).ceil().max(2.0) as usize;
     let kept = laps.min((MOST_VALUES / values.max(1)).max(2));
     let note = (kept < laps).then(|| {
-        format!("measurements see the last {kept} of the {laps} periods until the end of `.tran`")
-            .into()
+        let text = format!(
+            "measurements see the last {kept} of the {laps} periods until the end of `.tran`"
+        );
+        Note::run("last-periods", text)
     });
     ((laps - kept, laps), note)
 }

@@ -153,9 +153,12 @@ fn spike(spikes: &Spikes, run: &Run, by_rows: bool) -> Option<Note> {
     } else {
         "Means of rows would be wrong by that; `.meas` and `--table` have exact ones"
     };
-    Some(Note::from(format!(
-        "{name} is {value:.3e} {unit} at t = {t:e} s, and has fallen before the next row: as a rule {cause}. {means}"
-    )))
+    Some(Note::run(
+        "spike",
+        format!(
+            "{name} is {value:.3e} {unit} at t = {t:e} s, and has fallen before the next row: as a rule {cause}. {means}"
+        ),
+    ))
 }
 
 /// The transient of a circuit without measurements, whose rows are looked at as they pass.
@@ -561,10 +564,10 @@ impl<'a> Measuring<'a> {
         let off: Vec<String> = off.collect();
         if off.is_empty() && crowd(&run.kinds) > CROWDED {
             let few = "measurements see fewer rows than half of those at events: between them curves count as straight lines; a shorter run, or fewer signals, has more";
-            return Some(Note::from(few.to_owned()));
+            return Some(Note::run("rows-apart", few));
         }
         (!off.is_empty()).then(|| {
-            Note::from(format!(
+            Note::run("rows-apart", format!(
                 "rows may be too far apart for {}: between them curves count as straight lines. A shorter print step, as in `.tran 10n 1m`, or a shorter \
                  largest step, `.tran 0 1m 0 10n`, tells",
                 off.join(", ")

@@ -351,7 +351,7 @@ impl Beside<'_> {
                 let text = format!(
                     "`{name}` is left out: it changes the period, on which the steady state depends otherwise"
                 );
-                notes.push(text.into());
+                notes.push(Note::run("left-out", text));
                 left_out.push(name.clone());
                 continue;
             };
@@ -445,7 +445,7 @@ impl Beside<'_> {
             of: gradients,
             at: to.to_vec(),
             exact: false,
-            notes: vec![text.to_string().into()],
+            notes: vec![Note::run("not-exact", text)],
         })
     }
 }

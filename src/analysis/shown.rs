@@ -42,7 +42,7 @@ impl Undefined {
                 "no number everywhere, by a division by 0 or the like: {}",
                 words.join(", ")
             );
-            Note::from(text)
+            Note::run("no-number", text)
         })
     }
 }

@@ -30,12 +30,12 @@ pub(super) fn beginning(
     match orbit_start(model, &asked) {
         Ok((_, standing)) => {
             let text = "`steady` of `.tran`: the run begins at its periodic steady state";
-            Ok((Some(standing), Some(text.to_string().into())))
+            Ok((Some(standing), Some(Note::run("steady-start", text))))
         }
         Err(error) if matches!(error.reason, Reason::Interrupted) => Err(error),
         Err(error) => {
             let text = format!("`steady` of `.tran` is left out: {error}");
-            Ok((None, Some(Note::of(error.elements, text))))
+            Ok((None, Some(Note::of("steady-start", error.elements, text))))
         }
     }
 }

@@ -125,7 +125,7 @@ pub fn worst(model: &Model, of: &str, options: &WorstOptions<'_>) -> Result<Wors
         let text = format!(
             "`{of}` is no straight function of the values within their tolerances: another corner, or a place between, may be worse"
         );
-        notes.push(text.into());
+        notes.push(Note::run("not-straight", text));
     }
     Ok(Worst {
         measurement: of.clone(),

@@ -47,7 +47,8 @@ impl<'n> Builder<'n, '_> {
             let message = "the print step of `.tran` is longer than the run";
             self.tell(
                 Diagnostic::warning("bad-tran", tran.span, message)
-                    .label("only the first and last point will be written"),
+                    .label("only the first and last point will be written")
+                    .help("the print step comes first, then the end of the run: `.tran 1u 5m`"),
             );
         }
         let tmax = times.get(3).copied().filter(|t| *t > 0.0);

@@ -158,7 +158,11 @@ impl<'n> Builder<'n, '_> {
         let sweeps: Option<Vec<Sweep>> = cards.iter().map(|card| self.sweep(card)).collect();
         self.circuit.dc = sweeps.unwrap_or_default();
         if let (Some(_), Some(first)) = (self.circuit.tran, cards.first()) {
-            let message = "`.dc` is left out, as there is a `.tran`";
+            let done = match self.pss_card {
+                Some(_) if self.trans.is_empty() => "`.pss`",
+                _ => "`.tran`",
+            };
+            let message = format!("`.dc` is left out, as there is a {done}");
             let note = Diagnostic::note("skipped", first.span, message);
             self.tell(note.label("carried out by `circ sim` where it stands alone"));
         }

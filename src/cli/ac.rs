@@ -42,7 +42,7 @@ pub(super) fn ac(args: &AcArgs, streams: &Streams) -> Result<Exit, Failure> {
             "--probe {}: the response is of signals and ratios of two",
             column.name
         );
-        return Err(Failure::Message(message));
+        return Err(Failure::told("unknown-signal", message));
     }
     let watch = Signals::watch()?;
     let options = SmallSignalOptions {
@@ -94,7 +94,10 @@ fn phasors(
     streams: &Streams,
 ) -> Result<(Phasors, Measurements), Failure> {
     if !model.circuit().steps.is_empty() {
-        streams.note("`.step` is left out: this is the response of the values as they stand");
+        streams.note(
+            "left-out",
+            "`.step` is left out: this is the response of the values as they stand",
+        );
     }
     input::tell_expressions(model, streams);
     let busy = streams.busy("finding the response");
@@ -102,9 +105,7 @@ fn phasors(
     drop(busy);
     let (response, measured) =
         found.map_err(|error| input::broke_off(input, &error, model.places(), streams))?;
-    for note in model.places().all(&response.notes) {
-        streams.note(note);
-    }
+    streams.notes(model.places(), &response.notes);
     if streams.verbose {
         streams.say(match &response.orbit {
             Some(orbit) => text::orbit(orbit),

@@ -317,7 +317,7 @@ pub struct PssArgs {
     #[command(flatten)]
     #[expect(missing_docs, reason = "documented where it is defined")]
     pub results: ResultArgs,
-    /// The period, s, in place of the common one of the sources; suffixes as in netlists (`10u`)
+    /// The period, s, in place of the common one of the sources: a multiple of the period of each; suffixes as in netlists (`10u`)
     #[arg(help_heading = "Analysis", long, value_name = "T", value_parser = positive)]
     pub period: Option<f64>,
     /// The orbit that closes after N periods of the sources [default: 1, or that of the stable one]
@@ -370,7 +370,7 @@ pub struct AcArgs {
     /// Where the circuit is made linear [default: about the periodic steady state if it switches periodically, else the operating point]
     #[arg(long, value_enum)]
     pub about: Option<About>,
-    /// The period, s, in place of the common one of the sources; suffixes as in netlists (`10u`)
+    /// The period, s, in place of the common one of the sources: a multiple of the period of each; suffixes as in netlists (`10u`)
     #[arg(long, value_name = "T", value_parser = positive)]
     pub period: Option<f64>,
 }
@@ -390,7 +390,7 @@ pub struct SensArgs {
     /// Of the periodic steady state instead of the transient
     #[arg(long)]
     pub pss: bool,
-    /// The period, s, in place of the common one of the sources; suffixes as in netlists (`10u`)
+    /// The period, s, in place of the common one of the sources: a multiple of the period of each; suffixes as in netlists (`10u`)
     #[arg(long, value_name = "T", value_parser = positive, requires = "pss")]
     pub period: Option<f64>,
     /// Print JSON

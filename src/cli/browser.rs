@@ -32,13 +32,14 @@ pub(super) fn keep(page: &[u8]) -> Result<PathBuf, Failure> {
 /// Shows a page.
 ///
 /// # Errors
-/// [`Failure::Message`] where there is no browser; it says where the page is.
+/// [`Failure::Told`] where there is no browser; it says where the page is.
 pub(super) fn show(path: &Path, streams: &Streams) -> Result<(), Failure> {
     let place = path.display();
     open::that_detached(path).map_err(|error| {
-        Failure::Message(format!(
-            "no browser could be opened ({error}); the page is {place}"
-        ))
+        Failure::told(
+            "browser",
+            format!("no browser could be opened ({error}); the page is {place}"),
+        )
     })?;
     streams.say(format!("the page is {place}"));
     Ok(())

@@ -67,7 +67,7 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Known, Failure> {
     if let Some(unreadable) = diagnostics.iter().find(|d| d.code == "unreadable") {
         let what = &unreadable.message;
         let help = unreadable.help.as_deref().unwrap_or_default();
-        return Err(Failure::Message(format!("{what}; {help}")));
+        return Err(Failure::told("unreadable", format!("{what}; {help}")));
     }
     if !args.json {
         input::show(&diagnostics, &sources, streams);

@@ -14,6 +14,7 @@ use super::ngspice::{self, deck};
 use super::output;
 use super::sim::{self, Request};
 use super::streams::Streams;
+use super::view;
 use crate::analysis::steps;
 use crate::circuit::Tran;
 use crate::integrate::Method;
@@ -64,7 +65,10 @@ pub(super) fn compare(args: &CompareArgs, streams: &Streams) -> Result<Exit, Fai
         if with_ngspice(args) {
             return every(args, model, streams);
         }
-        streams.note("`.step` is left out: the file is compared with the values as they stand");
+        streams.note(
+            "left-out",
+            "`.step` is left out: the file is compared with the values as they stand",
+        );
     }
     let found = Found::of(args, &subject, streams)?;
     for path in &args.outputs {
@@ -92,10 +96,10 @@ const fn exit(within: bool) -> Exit {
 fn every(args: &CompareArgs, model: &Model, streams: &Streams) -> Result<Exit, Failure> {
     if !args.outputs.is_empty() || args.keep.is_some() {
         let message = "`-o` and `--keep` take one run, and `.step` asks for several";
-        return Err(Failure::Message(format!(
-            "{}: {message}",
-            args.input.file.display()
-        )));
+        return Err(Failure::told(
+            "option-conflict",
+            format!("{}: {message}", args.input.file.display()),
+        ));
     }
     let (mut done, mut failures) = (Vec::new(), Vec::new());
     for variant in steps(model) {
@@ -138,7 +142,7 @@ fn every(args: &CompareArgs, model: &Model, streams: &Streams) -> Result<Exit, F
     if failures.is_empty() {
         Ok(exit(within))
     } else {
-        Err(Failure::Message(failures.join("\nerror: ")))
+        Err(Failure::told("failed-runs", failures.join("\nerror: ")))
     }
 }
 
@@ -153,10 +157,13 @@ struct Found {
 impl Found {
     fn of(args: &CompareArgs, subject: &Subject, streams: &Streams) -> Result<Self, Failure> {
         let tran = subject.tran().ok_or_else(|| {
-            Failure::Message(format!(
-                "{}: there is no `.tran` to compare",
-                args.input.file.display()
-            ))
+            Failure::told(
+                "no-analysis",
+                format!(
+                    "{}: there is no `.tran` to compare",
+                    args.input.file.display()
+                ),
+            )
         })?;
         let theirs = if with_ngspice(args) {
             from_ngspice(args, subject, tran, streams)?
@@ -195,7 +202,7 @@ impl Found {
 
     fn tell_notes(&self, streams: &Streams) {
         for note in &self.theirs.notes {
-            streams.note(note);
+            streams.note("ngspice", note);
         }
     }
 }
@@ -240,12 +247,12 @@ fn from_ngspice(
 ) -> Result<Theirs, Failure> {
     let Subject::Circuit(model) = subject else {
         let message = "a system without a circuit has no ngspice deck; compare it with a file";
-        return Err(Failure::Message(format!(
-            "{}: {message}",
-            args.input.file.display()
-        )));
+        return Err(Failure::told(
+            "not-for-system",
+            format!("{}: {message}", args.input.file.display()),
+        ));
     };
-    let failed = |e: ngspice::NgspiceError| Failure::Message(e.to_string());
+    let failed = |e: ngspice::NgspiceError| Failure::told("ngspice", e.to_string());
     let version = ngspice::version().map_err(failed)?;
     let bar = streams.progress(SETTINGS.len() as u64, &version);
     let mut first_failure = None;
@@ -256,8 +263,8 @@ fn from_ngspice(
             method,
             realisation: args.realisation,
         };
-        let deck =
-            deck::deck(model.circuit(), &options).map_err(|e| Failure::Message(e.to_string()))?;
+        let deck = deck::deck(model.circuit(), &options)
+            .map_err(|e| Failure::told("ngspice", e.to_string()))?;
         if let Some(path) = &args.keep {
             files::write(path, deck.text.as_bytes())?;
         }
@@ -281,7 +288,10 @@ fn from_ngspice(
         }
         bar.inc(1);
     }
-    Err(first_failure.map_or_else(|| Failure::Message("ngspice was not run".into()), failed))
+    Err(first_failure.map_or_else(
+        || Failure::told("ngspice", "ngspice was not run".into()),
+        failed,
+    ))
 }
 
 fn from_file(path: &Path) -> Result<Theirs, Failure> {
@@ -296,11 +306,21 @@ fn from_file(path: &Path) -> Result<Theirs, Failure> {
     });
     let [(_, waveforms)] = <[_; 1]>::try_from(runs.unwrap_or_default()).map_err(|runs| {
         let file = path.display();
-        Failure::Message(match runs.len() {
-            0 => format!("{file}: holds nothing over time"),
-            count => format!("{file}: holds {count} runs; a comparison takes one"),
-        })
+        Failure::told(
+            "waveforms",
+            match runs.len() {
+                0 => format!("{file}: holds nothing over time"),
+                count => format!("{file}: holds {count} runs; a comparison takes one"),
+            },
+        )
     })?;
+    if let Some(gaps) = view::gaps([&waveforms]) {
+        let (file, help) = (path.display(), "a comparison takes a file without gaps");
+        return Err(Failure::told(
+            "waveforms",
+            format!("{file}: {gaps}; {help}"),
+        ));
+    }
     Ok(Theirs {
         name: path.display().to_string(),
         waveforms,
@@ -337,9 +357,7 @@ fn simulated(
         .max(1.0);
     let run = sim::run(subject, &request, Some(tran.tstep / divisions), streams)
         .map_err(|error| input::broke_off(&args.input, &error, subject.places(), streams))?;
-    for note in subject.places().all(&run.notes) {
-        streams.note(note);
-    }
+    streams.notes(subject.places(), &run.notes);
     Ok(run.waveforms)
 }
 

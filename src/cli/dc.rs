@@ -28,11 +28,14 @@ pub(super) fn sim(
         if !format.is_picture() && *format != Format::Csv {
             let path = path.display();
             let message = format!("{path}: a `.dc` sweep is written as csv, svg, png or html");
-            return Err(Failure::Message(message));
+            return Err(Failure::told("output-format", message));
         }
     }
     if !model.circuit().steps.is_empty() {
-        streams.note("`.step` is left out: `.dc` is computed with the values as they stand");
+        streams.note(
+            "left-out",
+            "`.step` is left out: `.dc` is computed with the values as they stand",
+        );
     }
     input::tell_expressions(model, streams);
     let found = analysis::dc(model).map_err(|Unsolved { at, circuit, error }| {

@@ -106,8 +106,10 @@ impl<'a> Destination<'a> {
             return error.map_or(Ok(Exit::Done), |error| Err(self.failure(&error)));
         };
         if self.wanted.fixed_step && run.method == Method::Exact.name() {
-            self.streams
-                .note("--step is of no use to exact integration, which has no steps");
+            self.streams.note(
+                "unused-option",
+                "--step is of no use to exact integration, which has no steps",
+            );
         }
         if feeds {
             // A failure is told by `finish`.
@@ -123,6 +125,7 @@ impl<'a> Destination<'a> {
             run: &run,
             measured: &measured,
             conduction: &found.conduction,
+            steps: &[],
             model: self.model,
         };
         let written = outputs.finish(told, &figure, incomplete.as_deref());
@@ -135,7 +138,7 @@ impl<'a> Destination<'a> {
         if let Err(failure) = written {
             if let (false, Some(t)) = (failure.is_closed_pipe() || files.is_empty(), last) {
                 self.streams
-                    .note(format!("rows were written until {t:e} s"));
+                    .note("incomplete", format!("rows were written until {t:e} s"));
             }
             return Err(failure);
         }
@@ -155,7 +158,15 @@ impl<'a> Destination<'a> {
             }
             _ => match self.failure(&error) {
                 Failure::Faults(message) => Err(Failure::Faults(message + &kept)),
-                Failure::Message(message) => Err(Failure::Message(message + &kept)),
+                Failure::Told {
+                    code,
+                    message,
+                    help,
+                } => Err(Failure::Told {
+                    code,
+                    message: message + &kept,
+                    help,
+                }),
                 other => Err(other),
             },
         }
@@ -185,9 +196,10 @@ impl<'a> Destination<'a> {
                         .error(format!("{file}: the second run was interrupted by {name}"));
                     Ok(Exit::Signal(signal))
                 }
-                None => Err(Failure::Message(format!(
-                    "{file}: the second run failed; the rows are those of the first"
-                ))),
+                None => Err(Failure::told(
+                    "not-verified",
+                    format!("{file}: the second run failed; the rows are those of the first"),
+                )),
             },
             _ => Ok(Exit::Done),
         }
@@ -206,9 +218,7 @@ impl<'a> Destination<'a> {
                 && (streams.verbose || streams.err_is_terminal())
                 && streams.messages == MessageFormat::Human;
         if !in_words {
-            for warning in text::warnings(run, places) {
-                streams.warning(warning);
-            }
+            streams.warnings(places, &text::warnings(run));
         }
         match summary {
             Some(Summary::Json) => return streams.error(json::summary(run, found, places)),
@@ -216,18 +226,11 @@ impl<'a> Destination<'a> {
             None if in_words => {
                 streams.say(text::summary(run, places, streams.verbose));
             }
-            None => {
-                for note in places.all(&run.notes) {
-                    streams.note(note);
-                }
-            }
+            None => streams.notes(places, &run.notes),
         }
         let notes = found.table.iter().map(|table| &table.notes);
-        let notes = notes
-            .chain(found.worst.iter().map(|worst| &worst.notes))
-            .flatten();
-        for note in notes {
-            streams.note(places.of(note));
+        for notes in notes.chain(found.worst.iter().map(|worst| &worst.notes)) {
+            streams.notes(places, notes);
         }
         // Asked for, as a summary is.
         if !found.is_empty() {

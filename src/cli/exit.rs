@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use super::signals::Signals;
+use crate::diagnostic::Diagnostic;
+use crate::diagnostic::explain::{Explanation, explain};
 use crate::integrate::Error;
 use crate::report::PictureError;
 use crate::waveform::WaveformError;
@@ -69,8 +71,15 @@ pub enum Failure {
     #[error(transparent)]
     Run(#[from] Box<Error>),
     /// Anything else that the user should read.
-    #[error("{0}")]
-    Message(String),
+    #[error("{message}")]
+    Told {
+        /// A code that `circ explain` knows.
+        code: &'static str,
+        /// What is wrong.
+        message: String,
+        /// What to do, where more is known than what stands behind the code.
+        help: Option<String>,
+    },
 }
 
 /// Says where a folder is missing.
@@ -83,6 +92,45 @@ fn folder(path: &Path, error: &io::Error) -> String {
 }
 
 impl Failure {
+    /// What the user should read, under a code that `circ explain` knows.
+    pub fn told(code: &'static str, message: String) -> Self {
+        Self::Told {
+            code,
+            message,
+            help: None,
+        }
+    }
+
+    /// A run that could not be made, where no circuit is at hand to show its place in.
+    pub fn of_run(before: &str, error: &Error) -> Self {
+        let Diagnostic { code, help, .. } = error.finding();
+        Self::Told {
+            code,
+            message: format!("{before}{error}"),
+            help,
+        }
+    }
+
+    /// Its code and what to do.
+    #[must_use]
+    pub fn code(&self) -> (&'static str, Option<String>) {
+        let code = match self {
+            Self::Stream(_) => "stream",
+            Self::File { .. } => "file",
+            Self::Waveforms { .. } => "waveforms",
+            Self::Faults(_) => "netlist",
+            Self::Picture(_) => "no-picture",
+            Self::Compare(_) => "nothing-in-common",
+            Self::Run(error) => {
+                let Diagnostic { code, help, .. } = error.finding();
+                return (code, help);
+            }
+            Self::Told { code, help, .. } if help.is_some() => return (code, help.clone()),
+            Self::Told { code, .. } => code,
+        };
+        (code, explain(code).map(Explanation::help))
+    }
+
     /// A failure of this file.
     pub fn file(path: &Path, error: io::Error) -> Self {
         Self::File {

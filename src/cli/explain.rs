@@ -11,7 +11,7 @@ use crate::netlist::suggest::nearest;
 /// Tells what a code means, or what codes there are.
 ///
 /// # Errors
-/// [`Failure::Message`] for a code that there is not; those of standard output.
+/// [`Failure::Told`] for a code that there is not; those of standard output.
 pub(super) fn explain(args: &ExplainArgs, streams: &Streams) -> Result<Exit, Failure> {
     let text = match &args.code {
         None => list(),
@@ -29,10 +29,13 @@ pub(super) fn explain(args: &ExplainArgs, streams: &Streams) -> Result<Exit, Fai
 fn unknown(code: &str) -> Failure {
     let codes = AREAS.iter().flat_map(|area| area.codes);
     let near = nearest(code, codes.map(|known| known.code));
-    Failure::Message(match near {
-        Some(near) => format!("there is no code `{code}`: did you mean `{near}`?"),
-        None => format!("there is no code `{code}`: `circ explain` lists all"),
-    })
+    Failure::told(
+        "unknown-code",
+        match near {
+            Some(near) => format!("there is no code `{code}`: did you mean `{near}`?"),
+            None => format!("there is no code `{code}`"),
+        },
+    )
 }
 
 /// All codes, a line each.

@@ -232,7 +232,7 @@ pub(super) fn writable(outputs: &[&Path]) -> Result<(), Failure> {
 /// That none of these files is one of those that were read, under whatever name.
 ///
 /// # Errors
-/// [`Failure::Message`] with both names.
+/// [`Failure::Told`] with both names.
 pub(super) fn spare<'a>(
     outputs: &[&Path],
     read: impl IntoIterator<Item = &'a Path>,
@@ -248,10 +248,13 @@ pub(super) fn spare<'a>(
             } else {
                 format!(", which is {}", input.display())
             };
-            return Err(Failure::Message(format!(
-                "{}{also}: is read for this very run and would be overwritten; choose another name",
-                output.display()
-            )));
+            return Err(Failure::told(
+                "overwritten",
+                format!(
+                    "{}{also}: is read for this very run and would be overwritten; choose another name",
+                    output.display()
+                ),
+            ));
         }
     }
     Ok(())

@@ -4,14 +4,14 @@ use super::args::{Input, Method, SimArgs};
 use super::exit::Failure;
 use super::input;
 use crate::forms::json::nonlinear::{self, NonlinearFile};
-use crate::integrate::Run;
+use crate::integrate::{Note, Run};
 use crate::settings::Settings;
 use crate::waveform::Waveforms;
 
 /// Reads a nonlinear form; `None` for every other file, unreadable ones included.
 ///
 /// # Errors
-/// [`Failure::Message`] when it is one with a fault.
+/// [`Failure::Told`] when it is one with a fault.
 pub(super) fn open(input: &Input) -> Result<Option<NonlinearFile>, Failure> {
     let Ok(bytes) = input::bytes(input) else {
         return Ok(None);
@@ -20,18 +20,20 @@ pub(super) fn open(input: &Input) -> Result<Option<NonlinearFile>, Failure> {
     if !text.trim_start().starts_with('{') {
         return Ok(None);
     }
-    nonlinear::read(&text).map_err(|e| Failure::Message(format!("{}: {e}", input.file.display())))
+    nonlinear::read(&text)
+        .map_err(|e| Failure::told("broken-system", format!("{}: {e}", input.file.display())))
 }
 
 /// Runs it by Moreau's scheme, the only one that these forms have.
 ///
 /// # Errors
-/// [`Failure::Message`] for another method, an unknown probe, or a step without solution.
+/// [`Failure::Told`] for another method, an unknown probe, or a step without solution.
 pub(super) fn run(form: &NonlinearFile, args: &SimArgs) -> Result<Run, Failure> {
-    let fail =
-        |reason: String| Failure::Message(format!("{}: {reason}", args.input.file.display()));
+    let file = args.input.file.display();
+    let fail = |code, reason: String| Failure::told(code, format!("{file}: {reason}"));
     if !matches!(args.method.method, Method::Auto | Method::Euler) {
         return Err(fail(
+            "option-conflict",
             "nonlinear forms are stepped by `--method euler`".into(),
         ));
     }
@@ -43,7 +45,10 @@ pub(super) fn run(form: &NonlinearFile, args: &SimArgs) -> Result<Run, Failure> 
         (0..names.len()).collect()
     } else {
         let find = |probe: &String| {
-            let unknown = || fail(format!("--probe {probe}: the form has {}", names.join(" ")));
+            let unknown = || {
+                let known = format!("--probe {probe}: the form has {}", names.join(" "));
+                fail("unknown-signal", known)
+            };
             let wanted = probe.to_lowercase();
             names.iter().position(|n| *n == wanted).ok_or_else(unknown)
         };
@@ -56,7 +61,7 @@ pub(super) fn run(form: &NonlinearFile, args: &SimArgs) -> Result<Run, Failure> 
     let tol = args.method.tol.unwrap_or(Settings::default().tol);
     let found = form
         .run(args.method.step, tol)
-        .map_err(|e| fail(e.to_string()))?;
+        .map_err(|e| fail("form", e.to_string()))?;
     let mut values = Vec::with_capacity(columns.len() * found.trajectory.t.len());
     for k in 0..found.trajectory.t.len() {
         let [x, lambda, y] = [
@@ -83,15 +88,14 @@ pub(super) fn run(form: &NonlinearFile, args: &SimArgs) -> Result<Run, Failure> 
         ..Run::default()
     };
     run.stats.steps = found.steps as u64;
-    run.notes = vec![
-        "a form has no sources and no losses to balance: the energies are not computed"
-            .to_string()
-            .into(),
-    ];
+    run.notes = vec![Note::run(
+        "not-balanced",
+        "a form has no sources and no losses to balance: the energies are not computed",
+    )];
     if let Some(error) = found.error {
         let text =
             format!("the last halving of the step changed the states by {error:.1e} of their size");
-        run.notes.push(text.into());
+        run.notes.push(Note::run("form", text));
     }
     Ok(run)
 }

@@ -29,9 +29,12 @@ pub(super) fn graph(args: &GraphArgs, streams: &Streams) -> Result<Exit, Failure
     let model = input::model_of(&args.input, &subject)?;
     if args.at.is_some() && model.circuit().tran.is_none() {
         let file = args.input.file.display();
-        return Err(Failure::Message(format!(
-            "{file}: --at takes an instant of a run, and the netlist asks for no .tran analysis"
-        )));
+        return Err(Failure::told(
+            "no-analysis",
+            format!(
+                "{file}: --at takes an instant of a run, and the netlist asks for no .tran analysis"
+            ),
+        ));
     }
     let live = match args.at {
         Some(t) => conducting(model, t)
@@ -62,7 +65,7 @@ fn ending(path: &Path, args: &GraphArgs) -> Result<String, Failure> {
     }
     if args.at.is_some() && matches!(ending.as_str(), "dot" | "gv") {
         let message = "--at colours a picture: svg or png, by -o or --format";
-        return Err(Failure::Message(message.into()));
+        return Err(Failure::told("output-format", message.into()));
     }
     Ok(ending)
 }

@@ -61,7 +61,7 @@ impl Subject {
 /// Reads a file whose first character is `{` as a system; `None` for everything else.
 ///
 /// # Errors
-/// [`Failure::Message`] when it is JSON but no system, with the failed hypothesis of a nonlinear form.
+/// [`Failure::Told`] when it is JSON but no system, with the failed hypothesis of a nonlinear form.
 pub fn system(input: &Input) -> Result<Option<SystemFile>, Failure> {
     let Ok(bytes) = bytes(input) else {
         return Ok(None);
@@ -71,13 +71,16 @@ pub fn system(input: &Input) -> Result<Option<SystemFile>, Failure> {
         return Ok(None);
     }
     if forms::open(input)?.is_some() {
-        return Err(Failure::Message(format!(
-            "{}: a nonlinear form, sound at its start; it has no matrices to work on, and is for `circ sim` alone",
-            input.file.display()
-        )));
+        return Err(Failure::told(
+            "not-for-system",
+            format!(
+                "{}: a nonlinear form, sound at its start; it has no matrices to work on, and is for `circ sim` alone",
+                input.file.display()
+            ),
+        ));
     }
     let system = json::read(&text)
-        .map_err(|e| Failure::Message(format!("{}: {e}", input.file.display())))?;
+        .map_err(|e| Failure::told("broken-system", format!("{}: {e}", input.file.display())))?;
     Ok(Some(system))
 }
 
@@ -158,7 +161,10 @@ pub fn open_as_it_stands(
     if let Subject::Circuit(model) = &subject
         && !model.circuit().steps.is_empty()
     {
-        streams.note("`.step` is left out: these are the values as they stand");
+        streams.note(
+            "left-out",
+            "`.step` is left out: these are the values as they stand",
+        );
     }
     Ok(subject)
 }
@@ -167,7 +173,7 @@ pub fn open_as_it_stands(
 /// files that were read, and all must be writable.
 ///
 /// # Errors
-/// [`Failure::Faults`] when the circuit cannot be built, [`Failure::Message`] for an unknown probe and for such an output.
+/// [`Failure::Faults`] when the circuit cannot be built, [`Failure::Told`] for an unknown probe and for such an output.
 pub fn open(
     input: &Input,
     probes: &[String],
@@ -221,45 +227,44 @@ pub(super) fn refused(input: &Input, error: &Error, streams: &Streams) -> Failur
             show(&faults.findings, &faults.sources, streams);
             self::faults(input, &faults.findings)
         }
-        _ => Failure::Message(error.to_string()),
+        _ => Failure::of_run("", error),
     }
 }
 
 /// Leaves exactly the probes named on the command line, if there are any.
 ///
 /// # Errors
-/// [`Failure::Message`] for an unknown one.
+/// [`Failure::Told`] for an unknown one.
 fn keep_probes(circuit: &mut Circuit, probes: &[String]) -> Result<(), Failure> {
     if probes.is_empty() {
         return Ok(());
     }
     let shown = circuit.show(probes);
-    shown.map_err(|why| Failure::Message(format!("--probe {why}")))
+    shown.map_err(|why| Failure::told("unknown-signal", format!("--probe {why}")))
 }
 
 /// A note where expressions are asked for of an analysis that shows signals alone.
 pub(super) fn tell_expressions(model: &Model, streams: &Streams) {
     if let Some(column) = model.circuit().columns.iter().find(|c| !c.is_signal()) {
         let name = &column.name;
-        streams.note(format!(
-            "`{name}` is an expression: shown are the signals in it"
-        ));
+        let text = format!("`{name}` is an expression: shown are the signals in it");
+        streams.note("expression", text);
     }
 }
 
 /// The model of a subject.
 ///
 /// # Errors
-/// [`Failure::Message`]: a system has no circuit.
+/// [`Failure::Told`]: a system has no circuit.
 pub fn model_of<'s>(input: &Input, subject: &'s Subject) -> Result<&'s Model, Failure> {
     match subject {
         Subject::Circuit(model) => Ok(model),
         Subject::System(_) => {
             let message = "is a system without a circuit; this command needs a netlist";
-            Err(Failure::Message(format!(
-                "{} {message}",
-                input.file.display()
-            )))
+            Err(Failure::told(
+                "not-for-system",
+                format!("{} {message}", input.file.display()),
+            ))
         }
     }
 }
@@ -268,7 +273,7 @@ pub fn model_of<'s>(input: &Input, subject: &'s Subject) -> Result<&'s Model, Fa
 /// why the initial conditions had to take the place of its operating point, if they had to.
 ///
 /// # Errors
-/// [`Failure::Message`] for an unknown switch, [`Failure::Run`] for a circuit that is no system.
+/// [`Failure::Told`] for an unknown switch, [`Failure::Run`] for a circuit that is no system.
 pub fn start_system(
     subject: &Subject,
     wanted: &[(String, bool)],
@@ -280,7 +285,8 @@ pub fn start_system(
             return Ok(((**system).clone(), None));
         }
         Subject::System(_) => {
-            return Err(Failure::Message(
+            return Err(Failure::told(
+                "not-for-system",
                 "--switch: a system file holds one position of its switches".into(),
             ));
         }
@@ -294,9 +300,7 @@ pub fn start_system(
             (initial.map_err(Box::new)?, Some(error))
         }
     };
-    for note in subject.places().all(&initial.notes) {
-        streams.note(note);
-    }
+    streams.notes(subject.places(), &initial.notes);
     let mut switches = initial.switches;
     for (k, on) in positions(behaviour, wanted)? {
         switches[k] = on;
@@ -327,7 +331,10 @@ pub fn sparse_system(
     streams: &Streams,
 ) -> Result<(SparseLcs, Vec<f64>), Failure> {
     let Subject::Circuit(model) = subject else {
-        return Err(Failure::Message("a system file is not reduced".into()));
+        return Err(Failure::told(
+            "not-for-system",
+            "a system file is not reduced".into(),
+        ));
     };
     let (circuit, behaviour) = (model.circuit(), model.multiport());
     let uic = circuit.tran.is_some_and(|t| t.uic);
@@ -335,15 +342,12 @@ pub fn sparse_system(
     let initial = match initial {
         Ok(initial) => initial,
         Err(error) => {
-            streams.note(format!(
-                "{error}; the start state is the initial conditions"
-            ));
+            let text = format!("{error}; the start state is the initial conditions");
+            streams.note("no-operating-point", text);
             start::initial(circuit, behaviour, true, &Settings::default()).map_err(Box::new)?
         }
     };
-    for note in subject.places().all(&initial.notes) {
-        streams.note(note);
-    }
+    streams.notes(subject.places(), &initial.notes);
     let mut switches = initial.switches;
     for (k, on) in positions(behaviour, wanted)? {
         switches[k] = on;
@@ -352,9 +356,10 @@ pub fn sparse_system(
         .map_err(|error| Box::new(Error::before(error.into())))?;
     if system.imprecise > 0 {
         let count = system.imprecise;
-        streams.note(format!(
+        let text = format!(
             "{count} entries are small differences of large numbers and not known to be within 1e-14 of the exact ones"
-        ));
+        );
+        streams.note("rounding", text);
     }
     let x0 = system.state_from(initial.storage.as_slice());
     Ok((system, x0))
@@ -363,7 +368,7 @@ pub fn sparse_system(
 /// Indices and positions of the switches named on the command line.
 ///
 /// # Errors
-/// [`Failure::Message`] for an unknown switch.
+/// [`Failure::Told`] for an unknown switch.
 pub fn positions(
     behaviour: &StaticMultiport,
     wanted: &[(String, bool)],
@@ -371,11 +376,14 @@ pub fn positions(
     let known: Vec<&str> = behaviour.switches.iter().map(|s| s.name.as_str()).collect();
     let found = wanted.iter().map(|(name, on)| {
         let unknown = || match known[..] {
-            [] => Failure::Message(format!("--switch {name}: the circuit has no switch")),
-            _ => Failure::Message(format!(
-                "--switch {name}: the circuit has {}",
-                known.join(" ")
-            )),
+            [] => Failure::told(
+                "unknown-switch",
+                format!("--switch {name}: the circuit has no switch"),
+            ),
+            _ => Failure::told(
+                "unknown-switch",
+                format!("--switch {name}: the circuit has {}", known.join(" ")),
+            ),
         };
         Ok((
             known.iter().position(|n| n == name).ok_or_else(unknown)?,
@@ -428,7 +436,7 @@ pub(super) fn broke_off(
 ) -> Failure {
     let file = input.file.display();
     let Some((circuit, sources)) = places.0 else {
-        return Failure::Message(format!("{file}: {error}"));
+        return Failure::of_run(&format!("{file}: "), error);
     };
     show(&[error.diagnostic(circuit)], sources, streams);
     Failure::Faults(match error.t {
@@ -460,10 +468,10 @@ fn keep_outputs(lcs: Lcs, probes: &[String]) -> Result<Lcs, Failure> {
         .iter()
         .map(|name| {
             let known = || {
-                Failure::Message(format!(
-                    "--probe {name}: the system has {}",
-                    names.join(" ")
-                ))
+                Failure::told(
+                    "unknown-signal",
+                    format!("--probe {name}: the system has {}", names.join(" ")),
+                )
             };
             names
                 .iter()
@@ -472,5 +480,5 @@ fn keep_outputs(lcs: Lcs, probes: &[String]) -> Result<Lcs, Failure> {
         })
         .collect::<Result<Vec<usize>, _>>()?;
     let changed = lcs.changed(|parts| parts.outputs.keep(&kept));
-    changed.map_err(|error| Failure::Message(error.to_string()))
+    changed.map_err(|error| Failure::told("broken-system", error.to_string()))
 }

@@ -31,9 +31,8 @@ pub(super) fn lcs(args: &LcsArgs, streams: &Streams) -> Result<Exit, Failure> {
         failure => failure,
     })?;
     if let Some(error) = without {
-        streams.note(format!(
-            "{error}; the start state is the initial conditions"
-        ));
+        let text = format!("{error}; the start state is the initial conditions");
+        streams.note("no-operating-point", text);
     }
     let text = match args.format {
         SystemFormat::Json => json::write(&system.lcs, &system.x0, system.tran),
@@ -44,11 +43,13 @@ pub(super) fn lcs(args: &LcsArgs, streams: &Streams) -> Result<Exit, Failure> {
         SystemFormat::Siconos => {
             let script = siconos(&system.lcs, &system.x0, system.tran);
             let file = args.input.file.display();
-            script.map_err(|why| Failure::Message(format!("{file}: --format siconos: {why}")))?
+            script.map_err(|why| {
+                Failure::told("output-format", format!("{file}: --format siconos: {why}"))
+            })?
         }
         SystemFormat::Mtx => {
             let what = "--format mtx: takes a netlist; scipy.io.mmwrite writes the matrices of a system file";
-            return Err(Failure::Message(what.into()));
+            return Err(Failure::told("output-format", what.into()));
         }
     };
     let text = if text.ends_with('\n') {
@@ -82,9 +83,10 @@ fn sparse(args: &LcsArgs, subject: &Subject, streams: &Streams) -> Result<Exit, 
         SystemFormat::Latex | SystemFormat::Siconos => {
             let n = system.states.len();
             let what = "--format latex and siconos take small systems";
-            return Err(Failure::Message(format!(
-                "{what}, not one of {n} states; use json, numpy, matlab or mtx"
-            )));
+            return Err(Failure::told(
+                "output-format",
+                format!("{what}, not one of {n} states; use json, numpy, matlab or mtx"),
+            ));
         }
         SystemFormat::Mtx => {
             let matrices = sparse_format::matrix_market(&system);

@@ -48,6 +48,7 @@ use exit::{Exit, Failure};
 use streams::Streams;
 
 use crate::circuit::load::near_file;
+use crate::diagnostic::explain::{Explanation, explain};
 
 pub use render::render;
 
@@ -73,6 +74,9 @@ pub fn main() -> Exit {
             if let (true, Some(form)) = (is_fault, form) {
                 told_otherwise(&error, form);
                 return Exit::Failed;
+            }
+            if is_fault {
+                return usage(&error);
             }
             let printed = error.print();
             let asked = matches!(
@@ -102,7 +106,7 @@ pub fn main() -> Exit {
     }));
     let outcome = outcome.unwrap_or_else(|_| {
         let message = "a fault in circ itself (see above); please report it with the netlist";
-        Err(Failure::Message(message.into()))
+        Err(Failure::told("internal", message.into()))
     });
     match outcome {
         Ok(exit) => exit,
@@ -112,8 +116,8 @@ pub fn main() -> Exit {
             let told = matches!(failure, Failure::Faults(_));
             let tell = |streams: &Streams| match cli.message_format {
                 MessageFormat::Json if told => {}
-                MessageFormat::Short if told => streams.error(format!("error: {failure}")),
-                form => streams.error(render::failure(&failure.to_string(), form)),
+                _ if told => streams.error(format!("error: {failure}")),
+                form => streams.error(render::failure(&failure.to_string(), failure.code(), form)),
             };
             tell(&streams);
             if streams.log.is_some() {
@@ -174,6 +178,35 @@ fn form_of_messages(args: impl Iterator<Item = OsString>) -> Option<MessageForma
     }
 }
 
+/// The code of what is wrong with a command line.
+const fn code(kind: ErrorKind) -> &'static str {
+    match kind {
+        ErrorKind::UnknownArgument => "unknown-option",
+        ErrorKind::InvalidSubcommand => "unknown-command",
+        ErrorKind::ArgumentConflict => "option-conflict",
+        ErrorKind::MissingRequiredArgument | ErrorKind::MissingSubcommand => "missing-argument",
+        _ => "bad-option",
+    }
+}
+
+/// Says to a person what is wrong with a command line, under its code.
+fn usage(error: &clap::Error) -> Exit {
+    let streams = Streams {
+        quiet: false,
+        verbose: false,
+        messages: MessageFormat::Human,
+        log: None,
+    };
+    let rendered = error.render();
+    let text = match streams.colours() {
+        true => rendered.ansi().to_string(),
+        false => rendered.to_string(),
+    };
+    let code = code(error.kind());
+    streams.error(text.replacen("error:", &format!("error[{code}]:"), 1));
+    Exit::Failed
+}
+
 /// Says of a command line what is wrong with it as findings are said.
 fn told_otherwise(error: &clap::Error, form: MessageFormat) {
     let text = error.to_string();
@@ -188,7 +221,9 @@ fn told_otherwise(error: &clap::Error, form: MessageFormat) {
         messages: form,
         log: None,
     };
-    streams.error(render::failure(message, form));
+    let code = code(error.kind());
+    let help = explain(code).map(Explanation::help);
+    streams.error(render::failure(message, (code, help), form));
 }
 
 /// `circ FILE` is `circ sim FILE`: where no argument is a command and one is a file or `-`; a first word that is neither is meant as a command.

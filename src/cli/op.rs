@@ -70,8 +70,8 @@ pub(super) fn of_model(
     } else {
         for (values, point, notes) in &points {
             let label = steps::label(values);
-            for note in notes {
-                streams.note(format!("{label}: {note}"));
+            for (note, text) in point.notes.iter().zip(notes) {
+                streams.note(note.code, format!("{label}: {text}"));
             }
             streams.data(format!("{label}\n{}\n", words(point)))?;
         }
@@ -79,7 +79,7 @@ pub(super) fn of_model(
     if failures.is_empty() {
         Ok(Exit::Done)
     } else {
-        Err(Failure::Message(failures.join("\nerror: ")))
+        Err(Failure::told("failed-runs", failures.join("\nerror: ")))
     }
 }
 
@@ -92,8 +92,8 @@ fn one(
         streams.data(json::line(&Document::of(point, notes)) + "\n")?;
         return Ok(Exit::Done);
     }
-    for note in notes {
-        streams.note(note);
+    for (note, text) in point.notes.iter().zip(notes) {
+        streams.note(note.code, text);
     }
     streams.data(words(point))?;
     Ok(Exit::Done)

@@ -15,6 +15,7 @@ use crate::integrate::{Block, Places, Run};
 use crate::model::Model;
 use crate::report::figure::{Figure, PANEL_COLUMNS};
 use crate::report::html::Page;
+use crate::report::steps::Step;
 use crate::report::{PictureError, png, svg};
 use crate::waveform::{csv, json, npz, raw};
 
@@ -49,7 +50,8 @@ impl Format {
     ) -> Result<Vec<Self>, Failure> {
         let to_out = |path: &&PathBuf| path.as_path() == Path::new(STDOUT);
         if paths.iter().filter(to_out).count() > 1 {
-            return Err(Failure::Message(
+            return Err(Failure::told(
+                "output-format",
                 "`-o -` is given twice: there is one standard output".into(),
             ));
         }
@@ -57,10 +59,13 @@ impl Format {
             asked,
             paths.iter().all(|path| Self::of_ending(path).is_ok()),
         ) {
-            return Err(Failure::Message(format!(
-                "--format {}: the endings of all outputs name another; it is for `-o -`",
-                asked.name()
-            )));
+            return Err(Failure::told(
+                "output-format",
+                format!(
+                    "--format {}: the endings of all outputs name another; it is for `-o -`",
+                    asked.name()
+                ),
+            ));
         }
         let format = |path: &PathBuf| {
             if !to_out(&path) {
@@ -68,10 +73,13 @@ impl Format {
             }
             let format = asked.unwrap_or(Self::Csv);
             if streams.out_is_terminal() && matches!(format, Self::Raw | Self::Npz | Self::Png) {
-                return Err(Failure::Message(format!(
-                    "`-o -`: {} is no text for a terminal; send it to a file or a pipe",
-                    format.name()
-                )));
+                return Err(Failure::told(
+                    "output-format",
+                    format!(
+                        "`-o -`: {} is no text for a terminal; send it to a file or a pipe",
+                        format.name()
+                    ),
+                ));
             }
             Ok(format)
         };
@@ -116,18 +124,24 @@ impl Format {
 
 /// The failure that a file's ending chooses none of these formats.
 pub(super) fn unknown_ending(path: &Path, known: &str) -> Failure {
-    Failure::Message(format!(
-        "{}: the ending chooses the format and must be {known}",
-        path.display()
-    ))
+    Failure::told(
+        "output-format",
+        format!(
+            "{}: the ending chooses the format and must be {known}",
+            path.display()
+        ),
+    )
 }
 
 /// The failure that standard output has none of these formats.
 pub(super) fn unknown_format(known: &str) -> Failure {
     let example = known.rsplit(' ').next().unwrap_or_default();
-    Failure::Message(format!(
-        "`-o -`: `--format` chooses the format of standard output and must be {known}, as in `--format {example}`"
-    ))
+    Failure::told(
+        "output-format",
+        format!(
+            "`-o -`: `--format` chooses the format of standard output and must be {known}, as in `--format {example}`"
+        ),
+    )
 }
 
 /// A run, what was measured in it, and its model.
@@ -137,6 +151,8 @@ pub(super) struct Told<'a> {
     /// In words.
     pub(super) measured: &'a str,
     pub(super) conduction: &'a [Conduction],
+    /// Those of `.step` that it stands for.
+    pub(super) steps: &'a [Step],
     pub(super) model: Option<&'a Model>,
 }
 
@@ -278,6 +294,7 @@ fn write(
                 places,
             )
             .with_conduction(told.conduction)
+            .with_steps(told.steps)
             .with_circuit(told.model);
             file.append(page.html()?.as_bytes())
         }

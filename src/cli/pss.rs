@@ -38,7 +38,10 @@ pub(super) fn orbit(
 ) -> Result<Exit, Failure> {
     let model = input::model_of(&args.input, subject)?;
     if !model.circuit().steps.is_empty() {
-        streams.note("`.step` is left out: this is the orbit of the values as they stand");
+        streams.note(
+            "left-out",
+            "`.step` is left out: this is the orbit of the values as they stand",
+        );
     }
     let wanted = Wanted {
         input: &args.input,

@@ -9,6 +9,7 @@ use miette::{
 
 use super::args::MessageFormat;
 use crate::check::Fault;
+use crate::diagnostic::explain::{Explanation, explain};
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 use crate::report;
 
@@ -72,34 +73,57 @@ pub(super) fn json(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
     lines(diagnostics.iter().map(line))
 }
 
-/// A failure without a place, as a line.
-pub(super) fn failure(message: &str, form: MessageFormat) -> String {
-    let failure = [Diagnostic::error("failure", None, message)];
+/// A failure without a place, with what to do.
+pub(super) fn failure(
+    message: &str,
+    (code, help): (&'static str, Option<String>),
+    form: MessageFormat,
+) -> String {
+    let failure = [Diagnostic {
+        help: help.clone(),
+        ..Diagnostic::error(code, None, message)
+    }];
     match form {
-        MessageFormat::Human => format!("error: {message}"),
+        MessageFormat::Human => headed(&format!("error[{code}]: {message}"), help.as_deref()),
         MessageFormat::Short => short(&failure, &SourceMap::default()),
         MessageFormat::Json => json(&failure, &SourceMap::default()),
     }
 }
 
-/// What there is to say of a run, which may begin with its place, `file:line:col: `, as a line.
-pub(super) fn remark(severity: Severity, text: &str, form: MessageFormat) -> String {
-    let word = word(severity);
+/// A line, with what to do on the next.
+pub(super) fn headed(line: &str, help: Option<&str>) -> String {
+    help.map_or_else(|| line.to_owned(), |help| format!("{line}\n  help: {help}"))
+}
+
+/// What there is to say of a run, which may begin with its place, `file:line:col: `, as a line; with what to do, of notes for programs alone.
+pub(super) fn remark(
+    (severity, code): (Severity, &'static str),
+    text: &str,
+    form: MessageFormat,
+) -> String {
+    let help = explain(code).map(Explanation::help);
+    let kind = format!("{}[{code}]", word(severity));
     let (place, message) = placed(text);
-    match (form, place) {
-        (MessageFormat::Human, _) => format!("{word}: {text}"),
-        (MessageFormat::Short, None) => format!("{word}[run]: {text}"),
-        (MessageFormat::Short, Some((file, line, column))) => {
-            format!("{file}:{line}:{column}: {word}[run]: {message}")
+    match form {
+        MessageFormat::Human => {
+            let help = help.filter(|_| severity != Severity::Note);
+            headed(&format!("{kind}: {text}"), help.as_deref())
         }
-        (MessageFormat::Json, place) => report::json::line(&Fault {
-            code: "run",
+        MessageFormat::Short => {
+            let help = help.map_or_else(String::new, |help| format!(" ({help})"));
+            let place = place.map_or_else(String::new, |(file, line, column)| {
+                format!("{file}:{line}:{column}: ")
+            });
+            format!("{place}{kind}: {message}{help}")
+        }
+        MessageFormat::Json => report::json::line(&Fault {
+            code,
             severity,
             message: message.to_owned(),
             file: place.map(|(file, ..)| file.to_owned()),
             line: place.map(|(_, line, _)| line),
             column: place.map(|(.., column)| column),
-            help: None,
+            help,
         }),
     }
 }

@@ -16,7 +16,10 @@ pub(super) fn sens(args: &SensArgs, streams: &Streams) -> Result<Exit, Failure> 
     let subject = input::open(&args.input, &[], &[], streams)?;
     let model = input::model_of(&args.input, &subject)?;
     if !model.circuit().steps.is_empty() {
-        streams.note("`.step` is left out: these are the derivatives at the values as they stand");
+        streams.note(
+            "left-out",
+            "`.step` is left out: these are the derivatives at the values as they stand",
+        );
     }
     let signals = Signals::watch()?;
     let options = SensitivityOptions {
@@ -30,9 +33,7 @@ pub(super) fn sens(args: &SensArgs, streams: &Streams) -> Result<Exit, Failure> 
     let places = subject.places();
     let found = sensitivity(model, &options)
         .map_err(|error| input::broke_off(&args.input, &error, places, streams))?;
-    for note in places.all(&found.notes) {
-        streams.note(note);
-    }
+    streams.notes(places, &found.notes);
     if args.json {
         streams.data(json::line(&found) + "\n")?;
     } else {

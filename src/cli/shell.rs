@@ -14,7 +14,7 @@ use super::streams::Streams;
 pub(super) fn completions(args: &CompletionsArgs, streams: &Streams) -> Result<Exit, Failure> {
     let Some(shell) = args.shell.or_else(clap_complete::Shell::from_env) else {
         let message = "name a shell, as in `circ completions bash`: SHELL does not say which it is";
-        return Err(Failure::Message(message.into()));
+        return Err(Failure::told("no-shell", message.into()));
     };
     let mut command = Cli::command();
     // `circ FILE` takes what `circ sim FILE` does.

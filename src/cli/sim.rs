@@ -59,23 +59,40 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
     if let Subject::Circuit(model) = &subject {
         let circuit = model.circuit();
         let transient = circuit.tran.is_some() && circuit.steady != Some(SteadyState::Orbit);
+        // What is carried out, where there is more than one analysis.
+        let done = match circuit.steady {
+            Some(SteadyState::Orbit) => "`.pss`",
+            _ => "`.tran`",
+        };
         if !transient && !circuit.ac.is_empty() {
             only_one_way(args)?;
+            if circuit.tran.is_some() {
+                let file = args.input.file.display();
+                let text = "`.pss` is left out, as there is an `.ac`";
+                streams.note(
+                    "left-out",
+                    format!("{text}; `circ pss {file}` carries it out"),
+                );
+            }
             return ac::sim(args, model, &formats, streams);
         }
         if !circuit.ac.is_empty() {
             let file = args.input.file.display();
-            streams.note(format!(
-                "`.ac` is left out, as there is a `.tran`; `circ ac {file}` carries it out"
-            ));
+            streams.note(
+                "left-out",
+                format!("`.ac` is left out, as there is a {done}; `circ ac {file}` carries it out"),
+            );
         }
         if let (true, Some(told)) = (transient, left_out(circuit)) {
-            streams.note(format!(
-                "{told}; `circ ac {}` measures that",
-                args.input.file.display()
-            ));
+            streams.note(
+                "left-out",
+                format!(
+                    "{told}; `circ ac {}` measures that",
+                    args.input.file.display()
+                ),
+            );
         }
-        if !transient && !circuit.dc.is_empty() {
+        if circuit.tran.is_none() && !circuit.dc.is_empty() {
             only_one_way(args)?;
             return dc::sim(args, model, &formats, streams);
         }
@@ -87,21 +104,19 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
                     "{}: an operating point is printed, `circ op {file} --json` for other programs",
                     path.display()
                 );
-                return Err(Failure::Message(message));
+                return Err(Failure::told("output-format", message));
             }
             return op::of_model(&args.input, model, false, streams);
         }
-        if !circuit.dc.is_empty() {
-            streams.note("`.dc` is left out, as there is a `.tran`");
-        }
         if circuit.op {
-            streams.note(format!(
-                "`.op` is left out, as there is a `.tran`; `circ op {file}` carries it out"
-            ));
+            streams.note(
+                "left-out",
+                format!("`.op` is left out, as there is a {done}; `circ op {file}` carries it out"),
+            );
         }
         if circuit.tran.is_none() {
             let message = "nothing to simulate: the netlist asks for no .tran analysis";
-            return Err(Failure::Message(format!("{file}: {message}")));
+            return Err(Failure::told("no-analysis", format!("{file}: {message}")));
         }
         if circuit.steady == Some(SteadyState::Orbit) {
             if !args.worst.is_empty() || args.verify {
@@ -119,12 +134,18 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         }
         let unknown = args.worst.iter().find_map(|of| circuit.no_measurement(of));
         if let Some(what) = unknown {
-            return Err(Failure::Message(format!("--worst: {what}")));
+            return Err(Failure::told(
+                "unknown-measurement",
+                format!("--worst: {what}"),
+            ));
         }
         if circuit.steady == Some(SteadyState::Start) && args.verify {
             let file = args.input.file.display();
             let message = "`--verify` takes a run from its usual start, without `steady`";
-            return Err(Failure::Message(format!("{file}: {message}")));
+            return Err(Failure::told(
+                "option-conflict",
+                format!("{file}: {message}"),
+            ));
         }
         if !circuit.steps.is_empty() {
             only_once(args)?;
@@ -140,12 +161,12 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
     if let (true, Subject::System(_)) = (args.from_pss, &subject) {
         let file = args.input.file.display();
         let message = format!("{file}: `--from-pss` takes a netlist, not a system");
-        return Err(Failure::Message(message));
+        return Err(Failure::told("not-for-system", message));
     }
     if let (true, Subject::System(_)) = (args.table.table, &subject) {
         let file = args.input.file.display();
         let message = format!("{file}: `--table` takes a netlist, not a system");
-        return Err(Failure::Message(message));
+        return Err(Failure::told("not-for-system", message));
     }
     let destination = Destination::of(
         args.wanted(),
@@ -208,7 +229,8 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
             // The rows are whole.
             Err(error) => {
                 let text = format!("not verified: {error}");
-                run.notes.push(Note::of(error.elements, text));
+                run.notes
+                    .push(Note::of("not-verified", error.elements, text));
             }
         }
     }
@@ -279,19 +301,22 @@ fn left_out(circuit: &Circuit) -> Option<String> {
 }
 
 /// # Errors
-/// [`Failure::Message`] where a second run or a table is asked for of what is no transient.
+/// [`Failure::Told`] where a second run or a table is asked for of what is no transient.
 fn only_one_way(args: &SimArgs) -> Result<(), Failure> {
     only_once(args)?;
     if args.table.table {
         let file = args.input.file.display();
         let message = "`--table` takes a transient of a circuit (`.tran`)";
-        return Err(Failure::Message(format!("{file}: {message}")));
+        return Err(Failure::told(
+            "option-conflict",
+            format!("{file}: {message}"),
+        ));
     }
     Ok(())
 }
 
 /// # Errors
-/// [`Failure::Message`] where a second run is asked for of what is no single transient run.
+/// [`Failure::Told`] where a second run is asked for of what is no single transient run.
 fn only_once(args: &SimArgs) -> Result<(), Failure> {
     let message = if !args.worst.is_empty() {
         "`--worst` takes one transient run of a circuit, without `.step`"
@@ -301,7 +326,10 @@ fn only_once(args: &SimArgs) -> Result<(), Failure> {
         return Ok(());
     };
     let file = args.input.file.display();
-    Err(Failure::Message(format!("{file}: {message}")))
+    Err(Failure::told(
+        "option-conflict",
+        format!("{file}: {message}"),
+    ))
 }
 
 /// Makes a run a second time.
@@ -469,7 +497,7 @@ impl Request {
     /// What the flags ask for; θ or γ without a method ask for `theta`.
     ///
     /// # Errors
-    /// [`Failure::Message`] when θ or γ are given to another method.
+    /// [`Failure::Told`] when θ or γ are given to another method.
     pub fn of(args: &MethodArgs, events: bool) -> Result<Self, Failure> {
         let shaped = args.theta.is_some() || args.gamma.is_some();
         let method = match args.method {
@@ -480,7 +508,8 @@ impl Request {
             args::Method::Theta => Method::Theta,
         };
         if shaped && method != Method::Theta {
-            return Err(Failure::Message(
+            return Err(Failure::told(
+                "option-conflict",
                 "--theta and --gamma belong to `--method theta`".into(),
             ));
         }

@@ -44,7 +44,7 @@ impl Stepping<'_> {
             let most = held / ((columns.names.len() + 1) * size_of::<f64>());
             let refused = |error: Error| {
                 let (file, runs) = (self.args.input.file.display(), variants.len());
-                Failure::Message(format!("{file}: each of {runs} runs of `.step`: {error}"))
+                Failure::of_run(&format!("{file}: each of {runs} runs of `.step`: "), &error)
             };
             Grid::of(&tran)
                 .check(columns.names.len(), Some(most))
@@ -94,7 +94,7 @@ impl Stepping<'_> {
         if failures.is_empty() {
             Ok(Exit::Done)
         } else {
-            Err(Failure::Message(failures.join("\nerror: ")))
+            Err(Failure::told("failed-runs", failures.join("\nerror: ")))
         }
     }
 
@@ -170,6 +170,7 @@ impl Stepping<'_> {
             run: &total,
             measured: &measured,
             conduction: &[],
+            steps: done,
             model: destination.model,
         };
         let written = outputs.finish(told, &figure, incomplete);
@@ -179,15 +180,11 @@ impl Stepping<'_> {
             Some(Summary::Text) => streams.error(text::summary(&total, places, streams.verbose)),
             None if wordy => streams.say(text::summary(&total, places, streams.verbose)),
             None => {
-                for note in places.all(&total.notes) {
-                    streams.note(note);
-                }
+                streams.notes(places, &total.notes);
             }
         }
         if !matches!(self.args.results.summary, Some(Summary::Json)) {
-            for note in places.all(&steps::table_notes(done)) {
-                streams.note(note);
-            }
+            streams.notes(places, &steps::table_notes(done));
             match streams.log {
                 Some(_) => streams.say(log::steps(done)),
                 // Results, which `-q` does not hide.

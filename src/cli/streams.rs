@@ -12,6 +12,7 @@ use super::args::MessageFormat;
 use super::batch::Log;
 use super::render;
 use crate::diagnostic::Severity;
+use crate::integrate::{Note, Places};
 
 /// How often a progress bar moves by itself: what takes long is still alive.
 const TICK: Duration = Duration::from_millis(120);
@@ -104,21 +105,30 @@ impl Streams {
     }
 
     /// Says something that is worth knowing of a run, which may begin with its place, in the form of findings.
-    pub fn note(&self, text: impl Display) {
-        self.say(render::remark(
-            Severity::Note,
-            &text.to_string(),
-            self.messages,
-        ));
+    pub fn note(&self, code: &'static str, text: impl Display) {
+        let text = text.to_string();
+        self.say(render::remark((Severity::Note, code), &text, self.messages));
     }
 
     /// Says something of a run that is probably not what was meant, in the form of findings.
-    pub fn warning(&self, text: impl Display) {
-        self.say(render::remark(
-            Severity::Warning,
-            &text.to_string(),
-            self.messages,
-        ));
+    pub fn warning(&self, code: &'static str, text: impl Display) {
+        let text = text.to_string();
+        let warning = (Severity::Warning, code);
+        self.say(render::remark(warning, &text, self.messages));
+    }
+
+    /// Says the notes of a run.
+    pub fn notes(&self, places: Places<'_>, notes: &[Note]) {
+        for note in notes {
+            self.note(note.code, places.of(note));
+        }
+    }
+
+    /// Says the warnings of a run.
+    pub fn warnings(&self, places: Places<'_>, warnings: &[Note]) {
+        for warning in warnings {
+            self.warning(warning.code, places.of(warning));
+        }
     }
 
     /// Says something even when quiet.

@@ -41,22 +41,23 @@ pub(super) fn sweep(args: &SweepArgs, streams: &Streams) -> Result<Exit, Failure
     let subject = input::open(&base, &[], &paths, streams)?;
     let model = input::model_of(&base, &subject)?;
     let fail = |error: Error| match error.reason {
-        _ if model.netlist().is_none() => Failure::Message(error.to_string()),
-        _ => Failure::Message(format!("{}: {error}", args.input.file.display())),
+        _ if model.netlist().is_none() => Failure::of_run("", &error),
+        _ => Failure::of_run(&format!("{}: ", args.input.file.display()), &error),
     };
     let sweeps =
         sweeps(args, model).map_err(|error| input::refused(&args.input, &error, streams))?;
     let runs = sweeps.iter().map(|sweep| sweep.values.len());
     let runs = runs.chain(args.mc.map(|n| usize::try_from(n).unwrap_or(usize::MAX)));
     if runs.fold(1, usize::saturating_mul) > MOST {
-        return Err(Failure::Message(format!(
-            "more than {MOST} runs; take fewer values or samples"
-        )));
+        return Err(Failure::told(
+            "too-many-runs",
+            format!("more than {MOST} runs; take fewer values or samples"),
+        ));
     }
     let mut all = variants(model, &sweeps);
     if let Some(count) = args.mc {
         if !model.circuit().random && drawn_names(model).is_empty() {
-            return Err(Failure::Message("--mc: nothing is random: name a tolerance by `tol=5` on a card, --tol-of or --sigma-of, or write `{mc(1k, 0.05)}`".into()));
+            return Err(Failure::told("nothing-random", "--mc: nothing is random: name a tolerance by `tol=5` on a card, --tol-of or --sigma-of, or write `{mc(1k, 0.05)}`".into()));
         }
         all = samples(&all, count);
     }
@@ -147,7 +148,7 @@ pub(super) fn sweep(args: &SweepArgs, streams: &Streams) -> Result<Exit, Failure
             "{} of {} runs failed: the column `error` says why",
             table.failed, table.rows
         );
-        streams.warning(text);
+        streams.warning("failed-runs", text);
     }
     Ok(Exit::Done)
 }
@@ -274,18 +275,21 @@ impl Output {
             "jsonl" => Form::JsonLines,
             "npz" => Form::Npz,
             _ => {
-                return Err(Failure::Message(format!(
-                    "{}: rows of a sweep are written as csv, jsonl or npz",
-                    path.display()
-                )));
+                return Err(Failure::told(
+                    "output-format",
+                    format!(
+                        "{}: rows of a sweep are written as csv, jsonl or npz",
+                        path.display()
+                    ),
+                ));
             }
         };
         let file = Written::create(path)?;
         if form == Form::Npz && !file.can_seek() {
-            return Err(Failure::Message(format!(
-                "{}: npz is written to files alone",
-                path.display()
-            )));
+            return Err(Failure::told(
+                "output-format",
+                format!("{}: npz is written to files alone", path.display()),
+            ));
         }
         Ok(Self { file, form })
     }

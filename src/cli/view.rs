@@ -38,6 +38,12 @@ pub(super) fn view(args: &ViewArgs, streams: &Streams) -> Result<Exit, Failure> 
     files::spare(&paths, [args.file.as_path()])?;
     files::writable(&paths)?;
     let plot = chosen(args, streams)?;
+    if let Plot::Time(runs) = &plot
+        && let Some(gaps) = gaps(runs.iter().map(|(_, run)| run))
+    {
+        let file = args.file.display();
+        streams.note("gaps", format!("{file}: {gaps}; curves have gaps there"));
+    }
     let figure = |pixels| {
         let mut figure = match &plot {
             Plot::Time(runs) => {
@@ -67,6 +73,22 @@ pub(super) fn view(args: &ViewArgs, streams: &Streams) -> Result<Exit, Failure> 
     Ok(Exit::Done)
 }
 
+/// How many values of runs are no numbers and where the first is, in words.
+pub(super) fn gaps<'w>(runs: impl IntoIterator<Item = &'w Waveforms>) -> Option<String> {
+    let (mut count, mut first) = (0, None);
+    for run in runs {
+        if let Some((more, row, column)) = run.gaps() {
+            count += more;
+            first = first.or(Some((&run.names[column], run.time[row])));
+        }
+    }
+    let (name, t) = first?;
+    let values = if count == 1 { "value is" } else { "values are" };
+    Some(format!(
+        "{count} {values} missing or not finite, the first in `{name}` at t = {t:e} s"
+    ))
+}
+
 /// Whether a text has an analysis of a netlist.
 fn is_netlist(bytes: &[u8]) -> bool {
     let text = String::from_utf8_lossy(bytes).to_lowercase();
@@ -90,7 +112,7 @@ fn chosen(args: &ViewArgs, streams: &Streams) -> Result<Plot, Failure> {
     let mut all = plots(&bytes).map_err(|error| match is_netlist(&bytes) {
         true => {
             let file = args.file.display();
-            Failure::Message(format!(
+            Failure::told("waveforms", format!(
                 "{file}: a netlist, not a file of waveforms; `circ {file} -o out.html` runs it and makes a page"
             ))
         }
@@ -105,24 +127,26 @@ fn chosen(args: &ViewArgs, streams: &Streams) -> Result<Plot, Failure> {
             0 => format!("{file}: holds nothing over time or frequency"),
             count => format!("{file}: holds {count} plots over time or frequency"),
         };
-        return Err(Failure::Message(message));
+        return Err(Failure::told("no-such-plot", message));
     }
     if all.len() > 1 {
         let count = all.len();
-        streams.note(format!(
-            "{file}: plot {number} of {count}; `--plot N` takes another"
-        ));
+        let text = format!("{file}: plot {number} of {count}; `--plot N` takes another");
+        streams.note("several-plots", text);
     }
     let mut plot = all.swap_remove(number - 1);
     let unknown = |probe: &str, names: &[String]| {
         let own: Vec<String> = names.iter().map(|name| canonical_name(name)).collect();
         let near = nearest(&canonical_name(probe), own.iter().map(String::as_str));
-        Failure::Message(match near {
-            Some(near) => {
-                format!("--probe {probe}: the file has no `{probe}`; did you mean `{near}`?")
-            }
-            None => format!("--probe {probe}: the file has {}", names.join(" ")),
-        })
+        Failure::told(
+            "unknown-signal",
+            match near {
+                Some(near) => {
+                    format!("--probe {probe}: the file has no `{probe}`; did you mean `{near}`?")
+                }
+                None => format!("--probe {probe}: the file has {}", names.join(" ")),
+            },
+        )
     };
     match &mut plot {
         Plot::Time(runs) => {

@@ -188,7 +188,7 @@ impl Handover {
                 "between t = {from:e} s and t = {to:e} s Moreau's steps of {:e} s took the place of exact integration{again}: {device}{}",
                 self.step, i.reason
             );
-            Note::of(&i.elements, text)
+            Note::of("steps-instead", &i.elements, text)
         });
         let mut notes: Vec<Note> = told.collect();
         if let Some(rest) = self
@@ -200,7 +200,7 @@ impl Handover {
             let text = format!(
                 "Moreau's steps took the place of exact integration {times} times for other reasons"
             );
-            notes.push(text.into());
+            notes.push(Note::run("steps-instead", text));
         }
         notes
     }

@@ -96,7 +96,7 @@ pub(crate) fn rivals_note(names: &[&str], t: f64) -> Note {
          model leaves out; the state that least energy separates from the one before is shown",
         names.join(", ")
     );
-    Note::of(names.iter().copied(), text)
+    Note::of("rival-impulses", names.iter().copied(), text)
 }
 
 impl JumpProblem {

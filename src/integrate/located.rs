@@ -3,6 +3,7 @@
 use super::error::{Error, NoRest, Reason, at};
 use crate::circuit::{Circuit, Element, Kind};
 use crate::diagnostic::Diagnostic;
+use crate::diagnostic::explain::explain;
 use crate::law::Law;
 use crate::lcs::ReduceError;
 
@@ -20,17 +21,27 @@ impl Error {
                 elements.push(element);
             }
         }
+        self.found(&elements)
+    }
+
+    /// The finding where there is no circuit to show its place in.
+    #[must_use]
+    pub fn finding(&self) -> Diagnostic {
+        self.found(&[])
+    }
+
+    fn found(&self, elements: &[&Element]) -> Diagnostic {
         let Told {
             code,
             message,
             label,
             help,
-        } = told(self, &elements);
+        } = told(self, elements);
         let place = elements.iter().find_map(|e| e.span);
-        let diagnostic = Diagnostic::error(code, place, at(self.t) + &message).label(label);
-        match help {
-            Some(help) => diagnostic.help(help),
-            None => diagnostic,
+        let help = help.or_else(|| Some(explain(code)?.help()));
+        Diagnostic {
+            help,
+            ..Diagnostic::error(code, place, at(self.t) + &message).label(label)
         }
     }
 }

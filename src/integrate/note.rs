@@ -3,10 +3,13 @@
 use super::located::whole;
 use crate::circuit::Circuit;
 use crate::diagnostic::SourceMap;
+use crate::diagnostic::explain::{Explanation, explain};
 
 /// Something worth knowing about a run.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Note {
+    /// A stable kebab-case name, e.g. `steps-instead`, which [`explain`](crate::diagnostic::explain::explain()) knows.
+    pub code: &'static str,
     /// What.
     pub text: String,
     /// The elements concerned, or parts of them (`d3.1`); the first is where it shows.
@@ -16,10 +19,12 @@ pub struct Note {
 impl Note {
     /// Something about these elements.
     pub fn of(
+        code: &'static str,
         elements: impl IntoIterator<Item = impl Into<String>>,
         text: impl Into<String>,
     ) -> Self {
         Self {
+            code,
             text: text.into(),
             elements: elements.into_iter().map(Into::into).collect(),
         }
@@ -27,13 +32,24 @@ impl Note {
 }
 
 impl Note {
+    /// Something about the run as a whole.
+    pub fn run(code: &'static str, text: impl Into<String>) -> Self {
+        Self::of(code, [""; 0], text)
+    }
+
+    /// What to do.
+    #[must_use]
+    pub fn help(&self) -> Option<String> {
+        explain(self.code).map(Explanation::help)
+    }
+
     /// These devices share a current or a voltage in a proportion that the ideal model leaves open.
     pub(crate) fn shared(devices: &[String]) -> Self {
         let text = format!(
             "voltages or currents of {} are not determined by the ideal model; the least-norm choice is shown",
             devices.join(", ")
         );
-        Self::of(devices, text)
+        Self::of("not-determined", devices, text)
     }
 }
 
@@ -42,16 +58,6 @@ pub(super) fn append(notes: &mut Vec<Note>, more: Vec<Note>) {
     for note in more {
         if !notes.contains(&note) {
             notes.push(note);
-        }
-    }
-}
-
-/// Something about the run as a whole.
-impl From<String> for Note {
-    fn from(text: String) -> Self {
-        Self {
-            text,
-            elements: Vec::new(),
         }
     }
 }

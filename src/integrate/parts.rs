@@ -18,7 +18,7 @@ use crate::integrate::exact::{Exact, Modes, row_jumps};
 use crate::integrate::grid::Times;
 use crate::integrate::handover::Handover;
 use crate::integrate::log::Log;
-use crate::integrate::note;
+use crate::integrate::note::{self, Note};
 use crate::integrate::rows::{Asked, RowKind};
 use crate::integrate::run::{Outcome, Stepper};
 use crate::integrate::stats::StatedError;
@@ -447,7 +447,7 @@ impl<S: Modal> Stepper for Parts<S> {
                 "{} more parts of the circuit have notes like these",
                 noted - MOST_NOTED
             );
-            whole.notes.push(text.into());
+            whole.notes.push(Note::run("more", text));
         }
         whole.energy = balance.energy();
         whole

@@ -142,8 +142,9 @@ impl Problem {
     ) -> Result<Self, Error> {
         let standard = behaviour.standard();
         let initial = start::initial(circuit, &standard, uic, settings)?;
-        let of_circuit = behaviour.notes.iter().map(|note| note.message.clone());
-        let mut notes: Vec<Note> = of_circuit.map(Note::from).collect();
+        let of_circuit = behaviour.notes.iter();
+        let of_circuit = of_circuit.map(|note| Note::run(note.code, note.message.clone()));
+        let mut notes: Vec<Note> = of_circuit.collect();
         notes.extend(initial.notes);
         let switches = standard.switches.iter();
         Ok(Self {
@@ -181,11 +182,10 @@ impl Problem {
             },
             conducting: vec![],
             settle: vec![],
-            notes: vec![
-                "a system without a circuit has no powers to balance: the energies are not computed"
-                    .to_string()
-                    .into(),
-            ],
+            notes: vec![Note::run(
+                "not-balanced",
+                "a system without a circuit has no powers to balance: the energies are not computed",
+            )],
             steps: exact::steps_of(&original),
             systems: Systems::of(behaviour),
             free_sources: false,

@@ -127,7 +127,8 @@ pub(crate) fn attempt(
     let mut all_notes = notes;
     note::append(&mut all_notes, outcome.notes);
     if log.events.len() == Log::LISTED {
-        all_notes.push(format!("the first {} events are listed", Log::LISTED).into());
+        let text = format!("the first {} events are listed", Log::LISTED);
+        all_notes.push(Note::run("more", text));
     }
     let failure = match failure {
         Some(error) if !last && !is_final(&error) => return Err(error),

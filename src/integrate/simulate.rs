@@ -298,7 +298,7 @@ fn dispatch(
                         "exact integration ended, and the whole run was made in steps instead; rows until {t:e} s are exact: {error}"
                     ),
                 };
-                notes.push(Note::of(error.elements, text));
+                notes.push(Note::of("steps-instead", error.elements, text));
             }
         }
         method = Method::Theta;

@@ -136,7 +136,9 @@ pub fn operating_point(
             let text = format!(
                 "currents of `.ic` are not held, as there is no operating point with them: {error}"
             );
-            point.notes.push(Note::of(&error.elements, text));
+            point
+                .notes
+                .push(Note::of("ic-not-held", &error.elements, text));
             Ok(point)
         }
         result => result,
@@ -461,7 +463,7 @@ pub fn initial(
     let ignored = behaviour.storage.iter().filter(|s| s.initial.is_some());
     for s in ignored.filter(|s| !held.contains(&&s.element[..])) {
         let text = format!("IC= of {} is ignored without uic", s.element);
-        notes.push(Note::of([&s.element], text));
+        notes.push(Note::of("ic-without-uic", [&s.element], text));
     }
     Ok(Initial {
         storage: DVector::from_vec(point.storage),

@@ -19,6 +19,7 @@ mod operand;
 mod read;
 mod schematic;
 mod stepped;
+mod suffix;
 pub(crate) mod suggest;
 pub mod value;
 

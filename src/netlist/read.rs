@@ -9,7 +9,7 @@ use super::control::Script;
 use super::dot::{self, Dot};
 use super::include::{Files, lexical, library_sections};
 use super::lex::{Fault, Line, Parsed, State, at_end, input, logical, next_word, title};
-use super::{card, code, decode, schematic, stepped};
+use super::{card, code, decode, schematic, stepped, suffix};
 use crate::diagnostic::{Diagnostic, FileId, Severity, SourceMap, Span};
 
 /// Reads a netlist: text to cards, includes in place. Never stops at the first fault.
@@ -101,6 +101,8 @@ pub fn parse_among(
     netlist.body = reader.open.pop().map(|o| o.block).unwrap_or_default();
     stepped::free(&mut netlist.body);
     code::expand(&mut netlist.body, reader.sources);
+    let milli = suffix::of_parameters(&netlist, reader.sources);
+    netlist.body.faults.extend(milli);
     let findings = netlist.body.faults.clone();
     (netlist, findings)
 }

@@ -97,7 +97,7 @@ impl<'a> Summary<'a> {
                 count: run.state_jumps.all.0,
                 loss: run.state_jumps.all.1,
             },
-            warnings: text::warnings(run, places),
+            warnings: places.all(&text::warnings(run)),
             verified: run.verified.as_ref(),
             pss: run.orbit.as_ref(),
             measurements,

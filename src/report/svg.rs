@@ -78,8 +78,18 @@ pub fn draw(figure: &Figure) -> Result<String, PictureError> {
         // What fills an area lies beneath what is a line.
         curves.sort_by(|one, other| other.0.total_cmp(&one.0));
         for (filling, points, stroke) in curves {
-            let pale = filling > FILLS;
-            sheet.curve(points.into_iter(), Stroke { pale, ..stroke });
+            let stroke = Stroke {
+                pale: filling > FILLS,
+                ..stroke
+            };
+            // Where values are no numbers a curve is broken; between two breaks it may be a point.
+            for part in points.split(|(_, y)| y.is_nan()) {
+                match part {
+                    [] => {}
+                    [alone] => sheet.dot(*alone, stroke.width, stroke.colour),
+                    _ => sheet.curve(part.iter().copied(), stroke),
+                }
+            }
         }
         legend.draw(&mut sheet, (right + MARGIN, top));
         top += PANEL.0 + PANEL.1;
@@ -103,7 +113,8 @@ fn strokes(panel: &Panel, runs: &[&str]) -> Vec<Stroke> {
 /// How far a curve goes up and down, px for each pixel of the panel's width: a line has little of it, what switches fast fills an area.
 fn filling(points: &[(f64, f64)]) -> f64 {
     let steps = points.iter().zip(points.iter().skip(1));
-    steps.map(|(a, b)| (b.1 - a.1).abs()).sum::<f64>() / PANEL_WIDTH as f64
+    let ways = steps.map(|(a, b)| (b.1 - a.1).abs());
+    ways.filter(|way| !way.is_nan()).sum::<f64>() / PANEL_WIDTH as f64
 }
 
 /// A sheet with a headline.
@@ -193,7 +204,7 @@ fn y_range(series: &[Series]) -> (f64, f64) {
     let low = values().fold(f64::INFINITY, f64::min);
     let high = values().fold(f64::NEG_INFINITY, f64::max);
     let size = low.abs().max(high.abs());
-    if size < 1.0 / LARGEST {
+    if low > high || size < 1.0 / LARGEST {
         return (-1.0, 1.0);
     }
     let air = if high - low > NARROWEST * size {
@@ -258,6 +269,17 @@ mod tests {
         for name in &waves.names {
             assert!(svg.contains(&format!(">{name}<")), "{name}");
         }
+    }
+
+    #[test]
+    fn a_curve_is_broken_where_values_are_no_numbers() {
+        let rows = [0.0, 1.0, f64::NAN, 1.0, f64::NAN, f64::NAN, 0.0, 1.0];
+        let figure = Figure::of_waveforms(&waves(&rows), PANEL_WIDTH);
+        let svg = draw(&figure).unwrap();
+        assert_eq!(svg.matches("stroke-linejoin").count(), 2, "{svg}");
+        assert_eq!(svg.matches("<circle").count(), 1, "{svg}");
+        let nothing = Figure::of_waveforms(&waves(&[f64::NAN; 2]), PANEL_WIDTH);
+        assert!(!draw(&nothing).unwrap().contains("NaN"));
     }
 
     #[test]

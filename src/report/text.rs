@@ -96,17 +96,16 @@ pub fn summary(run: &Run, places: Places<'_>, verbose: bool) -> String {
                 .map(|event| format!("event: {} {event}", si::quantity(event.t, "s", 9))),
         );
     }
-    lines.extend(
-        warnings(run, places)
-            .iter()
-            .map(|text| format!("warning: {text}")),
-    );
-    lines.extend(
-        places
-            .all(&run.notes)
-            .iter()
-            .map(|note| format!("note: {note}")),
-    );
+    for warning in warnings(run) {
+        lines.push(format!(
+            "warning[{}]: {}",
+            warning.code,
+            places.of(&warning)
+        ));
+        lines.extend(warning.help().map(|help| format!("  help: {help}")));
+    }
+    let notes = run.notes.iter();
+    lines.extend(notes.map(|note| format!("note[{}]: {}", note.code, places.of(note))));
     lines.join("\n") + "\n"
 }
 
@@ -203,10 +202,9 @@ fn stated_error(run: &Run) -> Option<String> {
 
 /// What a user must be told by default: that a current or charge was destroyed, that rows do not show what happens between them.
 #[must_use]
-pub fn warnings(run: &Run, places: Places<'_>) -> Vec<String> {
+pub fn warnings(run: &Run) -> Vec<Note> {
     let warnings = destroyed(run).into_iter().chain(unbalanced(run));
-    let warnings = warnings.chain(run.aliased.as_ref().map(aliasing));
-    warnings.map(|warning| places.of(&warning)).collect()
+    warnings.chain(run.aliased.as_ref().map(aliasing)).collect()
 }
 
 /// Energies beyond doubles: what grows so far is unstable, or wrong. Energies that do not add up: something is wrong, if only an energy.
@@ -225,19 +223,19 @@ fn unbalanced(run: &Run) -> Option<Note> {
          unstable, its values are wrong (--verify runs it a second time)"
             .into()
     };
-    Some(Note::of(<[String; 0]>::default(), text))
+    Some(Note::run("energy", text))
 }
 
 /// That a circuit rings faster than rows show.
 #[must_use]
 pub fn ringing(frequency: f64, tstep: f64) -> Note {
-    format!(
+    let text = format!(
         "with its switches where they start, the circuit rings at {}: rows that are {} apart do not show what rings down between them; a print step of {} does",
         si::quantity(frequency, "Hz", 3),
         si::quantity(tstep, "s", 3),
         si::quantity(0.1 / frequency, "s", 1),
-    )
-    .into()
+    );
+    Note::run("rows-apart", text)
 }
 
 /// That rows do not show what happens between them.
@@ -275,7 +273,7 @@ pub fn aliasing(aliased: &Aliased) -> Note {
         si::quantity(0.1 * period, "s", 2),
     );
     // Events of several devices at once are named together.
-    Note::of(name.split(", "), text)
+    Note::of("rows-apart", name.split(", "), text)
 }
 
 fn destroyed(run: &Run) -> Option<Note> {
@@ -303,7 +301,7 @@ fn destroyed(run: &Run) -> Option<Note> {
         si::quantity(*t, "s", 6),
         si::quantity(*loss, "J", 3),
     );
-    Some(Note::of(elements, text))
+    Some(Note::of("destroyed", elements, text))
 }
 
 /// One line per signal: amplitude and its errors relative to it, with the instants of the worst points.
@@ -387,7 +385,7 @@ mod tests {
                 9
             ],
             events: vec![conducts("d1", 1e-3)],
-            notes: vec!["v(x) is relative to node a".to_string().into()],
+            notes: vec![Note::run("island", "v(x) is relative to node a")],
             ..Run::default()
         };
         insta::assert_snapshot!(summary(&run, Places::default(), true), @r"

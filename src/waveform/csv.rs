@@ -153,7 +153,7 @@ pub fn write(to: impl Write, waves: &Waveforms) -> std::io::Result<()> {
 /// [`WaveformError::Malformed`] with the line of the first cell that is not a finite number, of a row of another length, or
 /// of a time that runs backwards.
 pub fn read(from: impl Read) -> Result<Waveforms, WaveformError> {
-    let table = Table::read(from)?;
+    let table = Table::read(from)?.whole()?;
     let (axis, time) = (&table.names[0], &table.columns[0]);
     if !is_time(axis) {
         return Err(malformed(format!(
@@ -170,12 +170,15 @@ pub fn read(from: impl Read) -> Result<Waveforms, WaveformError> {
 /// Reads the same, and files whose first column is frequency (Hz) before `re(…)` and `im(…)` of each signal.
 ///
 /// # Errors
-/// [`WaveformError::Malformed`] as in [`read`]; a time that runs backwards begins another run.
+/// [`WaveformError::Malformed`] as in [`read`]; but a time that runs backwards begins another run, and a cell over time that is empty, NaN or
+/// infinite is a gap, NaN.
 pub(super) fn plot(from: impl Read) -> Result<Plot, WaveformError> {
     let table = Table::read(from)?;
     match &table.names[0] {
         axis if is_time(axis) => Ok(Plot::Time(runs(&table.waveforms()))),
-        axis if axis.eq_ignore_ascii_case("frequency") => table.phasors().map(Plot::Frequency),
+        axis if axis.eq_ignore_ascii_case("frequency") => {
+            table.whole()?.phasors().map(Plot::Frequency)
+        }
         axis => Err(malformed(format!(
             "the first column must be `time` or `frequency`, found `{axis}`"
         ))),
@@ -210,12 +213,23 @@ fn number(cell: &str) -> Result<f64, ParseFloatError> {
     cell.parse().or_else(|_| cell.replacen(',', ".", 1).parse())
 }
 
-/// Finite numbers under a header.
+/// What a cell holds: a number, or nothing that can be drawn, as other programs write it; `None` for anything else.
+fn value(cell: &str) -> Option<f64> {
+    let value = match cell {
+        "" => f64::NAN,
+        _ => number(cell).ok()?,
+    };
+    Some(if value.is_finite() { value } else { f64::NAN })
+}
+
+/// Numbers under a header, those of the first column finite.
 struct Table {
     names: Vec<String>,
     columns: Vec<Vec<f64>>,
     /// Of each row.
     lines: Vec<u64>,
+    /// The first cell that is empty or not finite, with its line.
+    gap: Option<(u64, String)>,
 }
 
 impl Table {
@@ -234,7 +248,7 @@ impl Table {
             names.push(String::new());
         }
         let mut columns = vec![Vec::new(); names.len()];
-        let mut lines = Vec::new();
+        let (mut lines, mut gap) = (Vec::new(), None);
         for record in reader.records() {
             let record = record.map_err(unreadable)?;
             let line = record.position().map_or(0, csv::Position::line);
@@ -245,15 +259,13 @@ impl Table {
                     names.len()
                 )));
             }
-            for (cell, column) in record.iter().zip(&mut columns) {
-                match number(cell) {
-                    Ok(value) if value.is_finite() => column.push(value),
-                    _ => {
-                        return Err(malformed(format!(
-                            "line {line}: `{cell}` is not a finite number"
-                        )));
-                    }
+            for (j, (cell, column)) in record.iter().zip(&mut columns).enumerate() {
+                let value = value(cell).filter(|value| j > 0 || value.is_finite());
+                let value = value.ok_or_else(|| not_finite(line, cell))?;
+                if value.is_nan() && gap.is_none() {
+                    gap = Some((line, cell.to_owned()));
                 }
+                column.push(value);
             }
             lines.push(line);
         }
@@ -261,7 +273,19 @@ impl Table {
             names,
             columns,
             lines,
+            gap,
         })
+    }
+
+    /// Itself, without gaps.
+    ///
+    /// # Errors
+    /// [`WaveformError::Malformed`] with the line of the first one.
+    fn whole(self) -> Result<Self, WaveformError> {
+        match &self.gap {
+            Some((line, cell)) => Err(not_finite(*line, cell)),
+            None => Ok(self),
+        }
     }
 
     fn waveforms(mut self) -> Waveforms {
@@ -294,6 +318,10 @@ impl Table {
             values,
         })
     }
+}
+
+fn not_finite(line: u64, cell: &str) -> WaveformError {
+    malformed(format!("line {line}: `{cell}` is not a finite number"))
 }
 
 fn unreadable(error: csv::Error) -> WaveformError {
@@ -390,6 +418,27 @@ mod tests {
     }
 
     #[test]
+    fn what_is_no_number_is_a_gap_of_a_plot_but_not_of_its_axis() {
+        let text = "time,v(a),v(b)\n0,nan,1\n1,2,\n2,-Inf,3\n";
+        let Ok(Plot::Time(runs)) = plot(text.as_bytes()) else {
+            panic!("a plot over time")
+        };
+        let (_, waves) = &runs[0];
+        let column = |j| waves.column(j).map(|v| v.to_string()).collect::<Vec<_>>();
+        assert_eq!(column(0), ["NaN", "2", "NaN"]);
+        assert_eq!(column(1), ["1", "NaN", "3"]);
+        assert_eq!(waves.gaps(), Some((3, 0, 0)));
+        for text in [
+            "time,v(a)\n,1\n",
+            "time,v(a)\nnan,1\n",
+            "time,v(a)\n0,none\n",
+            "frequency,re(v(a)),im(v(a))\n1,1,\n",
+        ] {
+            assert!(plot(text.as_bytes()).is_err(), "{text}");
+        }
+    }
+
+    #[test]
     fn faults_are_named_with_their_line() {
         for (text, reason) in [
             (
@@ -402,6 +451,7 @@ mod tests {
                 "line 4: `1v` is not a finite number",
             ),
             ("time,v(a)\n0,nan\n", "line 2: `nan` is not a finite number"),
+            ("time,v(a)\n0,\n", "line 2: `` is not a finite number"),
             (
                 "time,v(a)\n0,1,2\n",
                 "line 2: 3 cells where the header has 2",

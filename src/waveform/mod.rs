@@ -87,6 +87,14 @@ impl Waveforms {
         (0..self.len()).map(move |k| self.values[k * width + j])
     }
 
+    /// How many values are no numbers (NaN), as in a file of another program, and row and column of the first; `None` where all are numbers.
+    #[must_use]
+    pub fn gaps(&self) -> Option<(usize, usize, usize)> {
+        let first = self.values.iter().position(|v| v.is_nan())?;
+        let count = self.values[first..].iter().filter(|v| v.is_nan()).count();
+        Some((count, first / self.width(), first % self.width()))
+    }
+
     /// The column with this name, however it is spelt (see [`canonical_name`]).
     #[must_use]
     pub fn find(&self, name: &str) -> Option<usize> {

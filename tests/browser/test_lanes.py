@@ -4,7 +4,7 @@ import re
 
 import pytest
 from conftest import page_of
-from test_page import cell, colours, first, middle
+from test_page import cell, colours, first, middle, saved
 
 PWM = """one leg with a sine for its duty
 vr ref 0 sin(0 0.8 50)
@@ -116,3 +116,60 @@ def test_many_lanes_are_drawn_within_a_frame_or_two(leg, show):
         return (performance.now() - start) / 5;
     }""")
     assert took < 250, took
+
+
+STEPS = """a buck with three duties
+.param d=0.3
+vin in 0 24
+vg g 0 pulse(0 1 0 1n 1n {d*10u} 10u)
+s1 in sw g 0 sm
+d1 0 sw di
+l1 sw out 100u
+c1 out 0 10u
+r1 out 0 5
+.model sm sw(vt=0.5 ron=10m)
+.model di d(ideal)
+.step param d list 0.3 0.5 0.7
+.tran 1u 0.2m
+.probe v(out) i(l1)
+.end
+"""
+
+
+def test_runs_of_step_have_lanes_circuit_and_events_of_the_chosen_one(tmp_path, show):
+    page = show(page_of(tmp_path, STEPS))
+    choice = page.locator(".which select")
+    assert choice.locator("option").all_inner_texts() == ["d=0.3", "d=0.5", "d=0.7"] and choice.input_value() == "d=0.3"
+    page.evaluate("window.circ.show([0.1e-3, 0.12e-3])")
+    first(page)
+    page.mouse.click(*lane(page, 0.104e-3))
+    device = lambda name: page.locator(f".circuit .device[data-device={name}][data-on='1']").get_attribute("display")
+    events = lambda: page.locator("details[data-run]:visible > summary").all_inner_texts()
+    bars = lambda: page.evaluate("(() => { const c = document.querySelector('canvas.strip'); return c.toDataURL(); })()")
+    before = bars()
+    assert (cell(page, "s1", "a").inner_text(), device("s1"), device("d1")) == ("off", "none", "inline")
+    assert len(events()) == 1 and events()[0].startswith("Events of d=0.3 (")
+    choice.select_option("d=0.5")
+    assert (cell(page, "s1", "a").inner_text(), device("s1"), device("d1")) == ("on", "inline", "none")
+    assert bars() != before and len(events()) == 1 and events()[0].startswith("Events of d=0.5 (")
+    assert "d=0.5" in page.locator("canvas.strip").get_attribute("aria-label")
+    # Shares of time between the cursors are those of the chosen run, and the drawing says of which.
+    page.keyboard.down("Shift")
+    page.mouse.click(*lane(page, 0.114e-3))
+    page.keyboard.up("Shift")
+    a, b = (float(page.locator(f"th[data-at={name}]").get_attribute("data-value")) for name in "ab")
+    assert b > a
+    share = lambda: float(re.search(r"on ([\d.]+) %", cell(page, "s1", "mean").inner_text())[1])
+    half = share()
+    choice.select_option("d=0.7")
+    assert share() > half + 5
+    drawing = saved(page)
+    assert ">d=0.7</text>" in drawing and 'data-strip="s1"' in drawing
+    kept = page.evaluate("JSON.stringify(window.circ.keep())")
+    choice.select_option("d=0.3")
+    page.evaluate(f"window.circ.restore({kept})")
+    assert choice.input_value() == "d=0.7" and cell(page, "s1", "a").inner_text() == "on"
+
+
+def test_a_page_of_one_run_has_no_choice(leg, show):
+    assert show(leg).locator(".which").count() == 0

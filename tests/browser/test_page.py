@@ -447,6 +447,7 @@ def test_a_million_rows_of_ten_signals_open(tmp_path, show):
     netlist.write_text(f"large\nv1 in 0 sin(0 1 1k)\n{nodes}.tran 1u 1\n.save v(in) {' '.join(f'v(n{k})' for k in range(1, 10))}\n.end\n")
     run("sim", netlist, "-q", "-o", tmp_path / "large.html")
     page = show(tmp_path / "large.html")
+    page.wait_for_function("!document.querySelector('p.about').innerText.includes('reading all rows')")
     assert page.evaluate("window.circ.panels.flatMap((p) => p.curves).map((c) => c.y.length)") == [1000001] * 10
     first(page)
     for _ in range(12):
@@ -470,6 +471,23 @@ def test_a_million_rows_of_ten_signals_open(tmp_path, show):
     page.keyboard.press("a")
     t = float(cursor(page, "a"))
     assert float(reading(page, "v(in)", "a")) == pytest.approx(math.sin(2000 * math.pi * t), abs=1e-9)
+
+
+def test_a_page_can_be_zoomed_while_its_rows_are_read(tmp_path, browser):
+    nodes = "".join(f"r{k} in n{k} {k}k\nc{k} n{k} 0 1n\n" for k in range(1, 6))
+    netlist = tmp_path / "long.cir"
+    netlist.write_text(f"long\nv1 in 0 sin(0 1 1k)\n{nodes}.tran 1u 0.1\n.end\n")
+    run("sim", netlist, "-q", "-o", tmp_path / "long.html")
+    page = browser.new_page(viewport={"width": 1200, "height": 900})
+    partial = "window.circ.panels.flatMap((p) => p.curves).filter((c) => c.partial).length"
+    # What was still to be read when the page stood.
+    page.add_init_script(f"addEventListener('DOMContentLoaded', () => {{ window.left = {partial}; window.circ.show([0.01, 0.02]); }})")
+    page.goto((tmp_path / "long.html").as_uri())
+    assert page.evaluate("window.left") > 5
+    page.wait_for_function(f"{partial} === 0 && !document.querySelector('p.about').innerText.includes('reading')")
+    assert view(page) == pytest.approx([0.01, 0.02])
+    assert set(page.evaluate("window.circ.panels.flatMap((p) => p.curves).map((c) => c.y.length)")) == {100001}
+    page.close()
 
 
 def test_the_page_is_usable_by_keyboard_alone(buck, show):

@@ -245,7 +245,7 @@ pub(crate) const CIRCUIT: [Case; 8] = [
     ),
 ];
 
-pub(crate) const RUN: [Case; 7] = [
+pub(crate) const RUN: [Case; 8] = [
     case(
         "No analysis",
         ("rc.cir", "low-pass\nv1 in 0 1\nr1 in 0 1k\n"),
@@ -296,6 +296,15 @@ pub(crate) const RUN: [Case; 7] = [
         ),
         ("rc.cir -o out.csv", 0),
         "add `uic` to `.tran`",
+    ),
+    case(
+        "A current that is interrupted",
+        (
+            "coil.cir",
+            "coil without a freewheeling diode\nv1 in 0 12\nl1 in a 1m\nr1 a b 10\ns1 b 0 g 0 sw1\nvg g 0 pulse(5 0 1m 0 0 1m 2m)\n.model sw1 sw(ideal vt=2.5)\n.tran 0.1m 4m\n",
+        ),
+        ("coil.cir -o out.csv", 0),
+        "a freewheeling diode",
     ),
     case(
         "A print step longer than a period",

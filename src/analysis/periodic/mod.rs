@@ -245,7 +245,7 @@ pub(super) fn steady(model: &Model, options: &PeriodicOptions<'_>) -> Result<Ste
                 let text = format!(
                     "{name} is {part:.0e} of its period away from where it began after the period asked for: the orbit is closed as if it were there"
                 );
-                said.push(Note::of([name], text));
+                said.push(Note::of("period-off", [name], text));
             }
         }
         period = period.of(asked);
@@ -412,14 +412,13 @@ fn notes(orbit: &Orbit, fixed: &Fixed, names: &[String], held: &[String]) -> Vec
             "{}: held at the value at 0-, as it does not repeat (a pulse with a period longer than the run of `.tran` is a step)",
             held.join(", ")
         );
-        notes.push(Note::of(held, text));
+        notes.push(Note::of("held-source", held, text));
     }
     if !orbit.stable {
         let [re, im] = orbit.multipliers[0];
-        notes.push(
-            format!("the orbit is unstable: a multiplier is {re:.6}{im:+.6}i; transients leave it")
-                .into(),
-        );
+        let text =
+            format!("the orbit is unstable: a multiplier is {re:.6}{im:+.6}i; transients leave it");
+        notes.push(Note::run("unstable-orbit", text));
     }
     if orbit.kind != OrbitKind::Autonomous {
         let directions = neutral(&fixed.derivative);
@@ -435,7 +434,7 @@ fn notes(orbit: &Orbit, fixed: &Fixed, names: &[String], held: &[String]) -> Vec
                 directions.len(),
                 if directions.len() == 1 { "" } else { "s" },
             );
-            notes.push(text.into());
+            notes.push(Note::run("orbit-not-unique", text));
         }
     }
     notes

@@ -170,11 +170,8 @@ pub fn small_signal(model: &Model, options: &SmallSignalOptions<'_>) -> Result<R
             return Ok(response);
         }
         if options.about.is_some() {
-            response.notes.push(
-                "the circuit comes to rest: this is the response about its operating point"
-                    .to_string()
-                    .into(),
-            );
+            let text = "the circuit comes to rest: this is the response about its operating point";
+            response.notes.push(Note::run("at-rest", text));
         }
         response.about = About::Rest;
     }
@@ -220,7 +217,7 @@ fn about_orbit(
     phasors.units = phasors.units.repeat(bands.len());
     if !orbit.stable {
         let what = "the orbit is unstable: this is the response about it, which no transient shows";
-        response.notes.push(what.to_string().into());
+        response.notes.push(Note::run("unstable-orbit", what));
     }
     response.orbit = Some(orbit);
     Ok(())
@@ -334,10 +331,10 @@ impl<'a> Resolvent<'a> {
 /// A response in which rounding may leave too little, at a frequency.
 fn lost(loss: f64, omega: f64) -> Note {
     let f = omega / std::f64::consts::TAU;
-    format!(
+    let text = format!(
         "at {f:e} Hz rounding may change the response by {loss:.0e}: the frequency is decades below the rates of the circuit, or at a resonance"
-    )
-    .into()
+    );
+    Note::run("rounding", text)
 }
 
 /// A frequency at which nothing finite responds.

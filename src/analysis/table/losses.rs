@@ -147,7 +147,11 @@ pub(super) fn lost(
                 "thermal runaway: the heat of the devices rises faster with their temperature than it leaves; their losses are those at {} °C",
                 thermal.ambient
             );
-            notes.push(Note::of(names(&mut devices.iter()), text));
+            notes.push(Note::of(
+                "thermal-runaway",
+                names(&mut devices.iter()),
+                text,
+            ));
             None
         }
         Err(error) => {
@@ -155,7 +159,11 @@ pub(super) fn lost(
                 "no temperatures, and losses at {} °C: the thermal network has no state of rest: {error}",
                 thermal.ambient
             );
-            notes.push(Note::of(names(&mut devices.iter()), text));
+            notes.push(Note::of(
+                "no-temperatures",
+                names(&mut devices.iter()),
+                text,
+            ));
             None
         }
     };
@@ -188,7 +196,7 @@ pub(super) fn lost(
             let text = format!(
                 "`{name}` changes state at up to {v:.4} V and {i:.4} A, beyond its loss tables, which are continued"
             );
-            notes.push(Note::of([name], text));
+            notes.push(Note::of("beyond-tables", [name], text));
         }
         if let Some((t, hottest)) = junction(j)
             .zip(device.hottest())
@@ -197,7 +205,7 @@ pub(super) fn lost(
             let text = format!(
                 "the junction of `{name}` comes to {t:.1} °C, and its loss tables end at {hottest} °C and are continued"
             );
-            notes.push(Note::of([name], text));
+            notes.push(Note::of("beyond-tables", [name], text));
         }
     }
     Lost {

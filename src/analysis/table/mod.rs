@@ -447,7 +447,7 @@ impl<'a> Columns<'a> {
         let sums = rows::sums(self, run, span, (period, closes));
         let mut table = self.table(&sums, span, period, false);
         let text = "the table is that of straight lines between steps, and not exact";
-        table.notes.push(text.to_string().into());
+        table.notes.push(Note::run("not-exact", text));
         table
     }
 
@@ -514,7 +514,7 @@ impl<'a> Columns<'a> {
         }
         let notes = (known && stored.abs() > STORED).then(|| {
             let (share, verb) = (100.0 * stored.abs(), if stored > 0.0 { "went into" } else { "came out of" });
-            Note::from(format!(
+            Note::run("stored-energy", format!(
                 "{share:.1} % of the input {verb} capacitors and inductors: the efficiency is that of this span; `circ pss --table` has that of the steady state"
             ))
         });

@@ -32,11 +32,12 @@ impl Bench<'_> {
     /// ngspice over its settings and its realisations of the diodes.
     pub(super) fn ngspice(&self) -> Result<Vec<Measurement>, Failure> {
         let Subject::Circuit(model) = self.subject else {
-            return Err(Failure::Message(
+            return Err(Failure::told(
+                "not-for-system",
                 "a system without a circuit has no ngspice deck".into(),
             ));
         };
-        let failed = |e: NgspiceError| Failure::Message(e.to_string());
+        let failed = |e: NgspiceError| Failure::told("ngspice", e.to_string());
         let start_up = ngspice::start_up().map_err(failed)?;
         let divisions = (ROWS * self.tran.tstep / (self.tran.tstop - self.tran.tstart))
             .ceil()
@@ -104,7 +105,8 @@ impl Bench<'_> {
         reference: &Reference,
         start_up: f64,
     ) -> Result<Measurement, Failure> {
-        let deck = deck::deck(circuit, options).map_err(|e| Failure::Message(e.to_string()))?;
+        let deck =
+            deck::deck(circuit, options).map_err(|e| Failure::told("ngspice", e.to_string()))?;
         let diodes = options.realisation.name();
         let mut measurement = Measurement {
             circuit: self.circuit.clone(),
@@ -129,7 +131,7 @@ impl Bench<'_> {
                 failure: Some(words),
                 ..measurement
             }),
-            Err(error) => Err(Failure::Message(error.to_string())),
+            Err(error) => Err(Failure::told("ngspice", error.to_string())),
         }
     }
 }

@@ -52,10 +52,10 @@ pub(super) fn bench(args: &BenchArgs, streams: &Streams) -> Result<Exit, Failure
     let subject = input::open_as_it_stands(&args.input, &outputs, streams)?;
     let file = &args.input.file;
     let tran = subject.tran().ok_or_else(|| {
-        Failure::Message(format!(
-            "{}: there is no `.tran` to measure",
-            file.display()
-        ))
+        Failure::told(
+            "no-analysis",
+            format!("{}: there is no `.tran` to measure", file.display()),
+        )
     })?;
     let circuit = file
         .file_stem()
@@ -129,7 +129,7 @@ impl Bench<'_> {
             ..request
         };
         let run = sim::run(self.subject, &request, tstep, &self.silent)
-            .map_err(|e| Failure::Message(format!("there is no reference: {e}")))?;
+            .map_err(|e| Failure::told("no-reference", format!("there is no reference: {e}")))?;
         Ok(Reference {
             name: format!("theta tol={REFERENCE_TOL:e}"),
             waveforms: run.waveforms,

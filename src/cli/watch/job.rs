@@ -49,24 +49,24 @@ impl Job {
     /// The command that is typed after `circ watch`.
     ///
     /// # Errors
-    /// [`Failure::Message`] for a command that cannot be carried out or has no page.
+    /// [`Failure::Told`] for a command that cannot be carried out or has no page.
     pub(super) fn of(typed: &[OsString]) -> Result<Self, Failure> {
         let typed = [OsString::from("circ")].into_iter().chain(typed.to_vec());
         let arguments = with_command(typed.collect(), &Cli::command());
         let cli = Cli::try_parse_from(&arguments);
-        let cli = cli.map_err(|error| Failure::Message(error.to_string()))?;
+        let cli = cli.map_err(|error| Failure::told("bad-option", error.to_string()))?;
         let input = match cli.command {
             Command::Sim(args) => args.input,
             Command::Pss(args) => args.input,
             Command::Ac(args) => args.input,
             _ => {
                 let message = "`circ watch` takes sim, pss or ac and their options";
-                return Err(Failure::Message(message.into()));
+                return Err(Failure::told("not-watched", message.into()));
             }
         };
         if input.file.as_os_str() == STDIN {
             let message = "`circ watch` takes a file; standard input does not change";
-            return Err(Failure::Message(message.into()));
+            return Err(Failure::told("not-watched", message.into()));
         }
         Ok(Self {
             arguments: arguments[1..].to_vec(),

@@ -39,7 +39,10 @@ pub(super) fn watch(args: &WatchArgs, streams: &Streams) -> Result<Exit, Failure
     let signals = Signals::watch()?;
     streams.data(format!("{}\n", server.address()))?;
     if !no_open && open::that_detached(server.address()).is_err() {
-        streams.note("no browser could be opened; the page is at the address above");
+        streams.note(
+            "browser",
+            "no browser could be opened; the page is at the address above",
+        );
     }
     let mut latest = None;
     loop {

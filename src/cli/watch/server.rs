@@ -28,10 +28,10 @@ impl Server {
     /// Listens on this port, or on one that is free.
     ///
     /// # Errors
-    /// [`Failure::Message`] where the port is taken.
+    /// [`Failure::Told`] where the port is taken.
     pub(super) fn start(port: Option<u16>) -> Result<Self, Failure> {
         let wanted = SocketAddr::from((Ipv4Addr::LOCALHOST, port.unwrap_or(0)));
-        let refused = |why: String| Failure::Message(format!("{wanted}: {why}"));
+        let refused = |why: String| Failure::told("no-address", format!("{wanted}: {why}"));
         let server = tiny_http::Server::http(wanted).map_err(|e| refused(e.to_string()))?;
         let address = server.server_addr().to_ip();
         let address = address.ok_or_else(|| refused("no address".into()))?;

@@ -1,6 +1,7 @@
 //! What every code of a finding means, what usually causes it, and what to do: one table.
 
 mod circuit;
+mod command;
 mod names;
 mod run;
 mod text;
@@ -31,6 +32,19 @@ pub struct Example {
 }
 
 impl Explanation {
+    /// What to do, as a help of a finding says it: in lower case, without a full stop.
+    #[must_use]
+    pub fn help(&self) -> String {
+        let text = self.remedy.trim_end_matches('.');
+        let mut letters = text.chars();
+        match (letters.next(), letters.clone().next()) {
+            (Some(first), Some(second)) if second.is_lowercase() || second == ' ' => {
+                first.to_lowercase().chain(letters).collect()
+            }
+            _ => text.to_owned(),
+        }
+    }
+
     const fn of(
         code: &'static str,
         meaning: &'static str,
@@ -66,7 +80,7 @@ pub struct Area {
 }
 
 /// All codes, by what they concern.
-pub const AREAS: [Area; 5] = [
+pub const AREAS: [Area; 6] = [
     Area {
         title: "text",
         codes: &text::CODES,
@@ -86,6 +100,10 @@ pub const AREAS: [Area; 5] = [
     Area {
         title: "run",
         codes: &run::CODES,
+    },
+    Area {
+        title: "command line",
+        codes: &command::CODES,
     },
 ];
 

@@ -72,7 +72,7 @@ impl Report {
             changes = table.label(from, at, |table| label(table, from, at));
             self.events += 1;
             let ended = self.accumulation.event(t);
-            self.notes.extend(ended.map(Note::from));
+            self.notes.extend(ended.map(accumulated));
         }
         if !table.modes[at].shared.is_empty() && !self.noted_shared {
             self.noted_shared = true;
@@ -135,7 +135,7 @@ impl Report {
                  hides: the values may be wrong by as much, and a Roff a thousand times smaller tells",
                 -g
             );
-            self.notes.push(Note::of([device], text));
+            self.notes.push(Note::of("wrong-sign", [device], text));
         }
     }
 
@@ -195,7 +195,7 @@ impl Report {
 
     /// Notes about the run as a whole.
     fn note_end(&mut self, table: &ModeTable, t: f64, duration: f64) {
-        self.notes.extend(self.accumulation.end().map(Note::from));
+        self.notes.extend(self.accumulation.end().map(accumulated));
         let thresholds = &table.thresholds;
         for (&i, slides) in &self.slides {
             let seconds = slides.seconds + slides.since.map_or(0.0, |since| t - since);
@@ -220,7 +220,7 @@ impl Report {
                 "{name} {what} ({} times, first at t = {:e} s, {seconds:e} s in all)",
                 slides.count, slides.first
             );
-            self.notes.push(Note::of([name], text));
+            self.notes.push(Note::of("slides", [name], text));
         }
         let loss = table.modes.iter().map(|m| m.flow.loss).fold(0.0, f64::max);
         let rates = table.modes.iter().filter_map(|mode| mode.fast_sum());
@@ -231,15 +231,20 @@ impl Report {
                  changes slowly in them may have lost its digits, and the values be wrong: `--verify` or a Roff a thousand times \
                  smaller tells"
             );
-            self.notes.push(text.into());
+            self.notes.push(Note::run("rounding", text));
         }
         if loss > LOSS {
             let text = format!(
                 "the circuit is stiff without being graded: the matrix exponential is accurate to about {loss:.0e} a step"
             );
-            self.notes.push(text.into());
+            self.notes.push(Note::run("rounding", text));
         }
     }
+}
+
+/// That events accumulated, in words.
+fn accumulated(text: String) -> Note {
+    Note::run("events-accumulate", text)
 }
 
 /// What differs between two modes.

@@ -70,6 +70,7 @@ fn steps_take_over_where_no_mode_is_found_and_give_back() {
     assert_eq!(
         outcome.notes,
         [Note::of(
+            "steps-instead",
             ["df1"],
             "between t = 1e-3 s and t = 1.02e-3 s Moreau's steps of 1e-7 s took the place of exact integration: df1: the \
              one-step complementarity problem has no solution (no state of the devices satisfies the circuit equations)"

@@ -49,7 +49,7 @@ impl Way {
                 Err(error) if *method == Method::Exact => return Err(error),
                 Err(error) => {
                     let text = format!("steps are made in place of exact integration: {error}");
-                    notes.push(text.into());
+                    notes.push(Note::run("steps-instead", text));
                 }
             }
             *log = Log::default();

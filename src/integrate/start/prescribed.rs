@@ -117,6 +117,7 @@ impl Guess {
         let node = &circuit.nodes[self.node.index()];
         let here = |e: &&Element| [e.p, e.n].contains(&self.node);
         Note::of(
+            "ic-not-held",
             circuit.elements.iter().find(here).map(|e| &e.name),
             format!(
                 "a source drives v({node}), which starts at {} V; the {} V prescribed for it are a guess",

@@ -97,6 +97,7 @@ pub(super) fn tie_floating(
             statics.elements.push(tie);
             let here = |e: &&Element| [e.p, e.n].iter().any(|n| n.index() == i);
             notes.push(Note::of(
+                "floating-start",
                 circuit.elements.iter().find(here).map(|e| &e.name),
                 format!("node {name} is held by capacitors alone and starts at 0 V"),
             ));

@@ -6,6 +6,7 @@ use crate::netlist::ast::{Assign, Device, Expr, Name, WaveArg, WaveCall};
 use crate::netlist::lex::{
     Input, Parsed, ahead, at_end, missing, next_word, refuse, separator, symbol, tell, word,
 };
+use crate::netlist::suggest::nearest;
 use crate::netlist::{expr, operand};
 
 /// Waveforms, supported or only recognised.
@@ -59,14 +60,15 @@ pub(super) fn source<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
         } else if dc.is_none() {
             let (rest, value) = dc_value(at, "a value or waveform")?;
             if symbol(rest, '(').is_some() {
-                let known = "SIN, PULSE, PWL, EXP, SFFM, AM";
+                const KNOWN: [&str; 6] = ["sin", "pulse", "pwl", "exp", "sffm", "am"];
+                let (_, name) = word(at)?;
+                let meant = nearest(&name.text, KNOWN);
+                let meant = meant.map(|near| format!("did you mean {}? ", near.to_uppercase()));
+                let all = KNOWN.map(str::to_uppercase).join(", ");
+                let help = meant.unwrap_or_default() + "waveforms are " + &all;
                 let fault =
                     Diagnostic::error("unknown-waveform", next_word(at), "unknown waveform");
-                return Err(refuse(
-                    fault
-                        .label("not a waveform")
-                        .help(format!("waveforms are {known}")),
-                ));
+                return Err(refuse(fault.label("not a waveform").help(help)));
             }
             (at, dc) = (rest, Some(value));
         } else {

@@ -194,5 +194,15 @@ pub(super) fn pss<'a>(start: Input<'a>, i: Input<'a>) -> (Input<'a>, Dot) {
         };
         Some((separator(at), Dot::statement(Statement::Pss(card))))
     };
-    card().unwrap_or_else(|| (skip(i), Dot::Skipped))
+    card().unwrap_or_else(|| {
+        let rest = skip(i);
+        let message = "`.pss` is not read, as a value is missing";
+        let warning = Diagnostic::warning("ignored", between(start, rest), message);
+        let warning = warning.label("frequency, time to settle, node and points are needed");
+        tell(
+            start,
+            warning.help("write `.pss 1k 10m out 100 10`: frequency, time to settle, node, points, harmonics"),
+        );
+        (rest, Dot::Skipped)
+    })
 }

@@ -170,6 +170,9 @@ fn is_gate(series: &Series) -> bool {
     let mut times = [0.0; 3];
     // The first rows tell mostly.
     let stays = series.points.windows(2).all(|pair| {
+        if pair.iter().any(|p| p.1.is_nan()) {
+            return true;
+        }
         let half = 0.5 * (pair[1].0 - pair[0].0);
         for (_, v) in pair {
             let at = usize::from(*v > low + near) + usize::from(*v >= high - near);

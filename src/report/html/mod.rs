@@ -120,6 +120,9 @@ struct Curve {
 #[derive(Debug, Clone, Serialize)]
 struct Strip {
     name: String,
+    /// The run that it is of, where there are several.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    run: String,
     on: &'static str,
     off: &'static str,
     /// Before the first change.
@@ -132,6 +135,9 @@ struct Strip {
 #[derive(Debug, Clone, Serialize)]
 struct Table {
     heading: String,
+    /// The run that it is of, where there are several.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    run: String,
     header: Vec<&'static str>,
     rows: Vec<Vec<String>>,
     /// How many there are, where not all are here.
@@ -287,6 +293,7 @@ impl Table {
         let all = rows.len();
         Self {
             heading: heading.to_owned(),
+            run: String::new(),
             header: header.to_vec(),
             all,
             rows: rows.take(MOST_ROWS).collect(),

@@ -1,8 +1,9 @@
-//! What a run did.
+//! What a run did, and what those of `.step` did.
 
 use std::collections::HashMap;
 
 use super::super::figure::Figure;
+use super::super::steps::Step;
 use super::super::{si, text};
 use super::{Page, Strip, Table};
 use crate::analysis::Conduction;
@@ -10,6 +11,8 @@ use crate::integrate::{Change, Event, Places, Run};
 
 /// Devices of a strip, those that change first.
 const MOST_STRIPS: usize = 40;
+/// Changes in the strips of all runs of `.step`, about 20 bytes of a page each.
+const MOST_CHANGES: usize = 1_000_000;
 
 impl Page {
     /// The curves of a figure with what the run did: events, impulses, measurements in words, energies and notes.
@@ -19,21 +22,7 @@ impl Page {
         page.about = format!("{} · {}", page.about, run.method);
         let (strips, left) = strips(&run.events);
         page.strips = strips;
-        let events = run.events.iter();
-        let events = events.map(|event| vec![time(event.t), event.to_string()]);
-        let impulses = run.impulses.iter().map(|impulse| {
-            let unit = if impulse.name.starts_with("i(") {
-                "A·s"
-            } else {
-                "V·s"
-            };
-            let area = si::quantity(impulse.area, unit, 5);
-            vec![time(impulse.t), format!("{} {area}", impulse.name)]
-        });
-        page.tables = vec![
-            Table::new("Events", &["time", "what"], events),
-            Table::new("Impulses", &["time", "area"], impulses),
-        ];
+        page.tables = tables(run).into();
         page.say("Measurements", measured);
         page.say("Run", text::summary(run, places, false));
         page.say("Plan", run.plan.join("\n"));
@@ -51,18 +40,74 @@ impl Page {
     /// The same with strips for devices that no event tells of.
     #[must_use]
     pub fn with_conduction(mut self, all: &[Conduction]) -> Self {
-        let room = MOST_STRIPS.saturating_sub(self.strips.len());
-        let strips = all.iter().take(room).map(|own| Strip {
-            name: own.device.clone(),
-            on: "conducts",
-            off: "blocks",
-            start: Some(own.at_start),
-            times: own.changes.iter().map(|change| change.0).collect(),
-            states: own.changes.iter().map(|change| change.1.into()).collect(),
-        });
-        self.strips.extend(strips);
+        conducting(&mut self.strips, all);
         self
     }
+
+    /// The same with strips, events and impulses of each of the runs of `.step`, of which a reader chooses one.
+    #[must_use]
+    pub fn with_steps(mut self, steps: &[Step]) -> Self {
+        let (mut room, mut without) = (MOST_CHANGES, 0);
+        for step in steps {
+            let mut own = strips(&step.run.events).0;
+            conducting(&mut own, &step.found.conduction);
+            let changes: usize = own.iter().map(|strip| strip.times.len()).sum();
+            if changes > room {
+                without += 1;
+                continue;
+            }
+            room -= changes;
+            let run = step.label();
+            self.strips.extend(own.into_iter().map(|strip| Strip {
+                run: run.clone(),
+                ..strip
+            }));
+            self.tables.extend(tables(&step.run).map(|table| Table {
+                run: run.clone(),
+                ..table
+            }));
+        }
+        if without > 0 {
+            self.say(
+                "Left out",
+                format!("who conducts when, and the events, of {without} of {} runs: a page lists {MOST_CHANGES} changes", steps.len()),
+            );
+        }
+        self
+    }
+}
+
+/// Adds strips for devices of curved laws.
+fn conducting(strips: &mut Vec<Strip>, all: &[Conduction]) {
+    let room = MOST_STRIPS.saturating_sub(strips.len());
+    strips.extend(all.iter().take(room).map(|own| Strip {
+        name: own.device.clone(),
+        run: String::new(),
+        on: "conducts",
+        off: "blocks",
+        start: Some(own.at_start),
+        times: own.changes.iter().map(|change| change.0).collect(),
+        states: own.changes.iter().map(|change| change.1.into()).collect(),
+    }));
+}
+
+/// Events and impulses of a run.
+fn tables(run: &Run) -> [Table; 2] {
+    let events = run.events.iter();
+    let events = events.map(|event| vec![time(event.t), event.to_string()]);
+    let impulses = run.impulses.iter().map(|impulse| {
+        let unit = if impulse.name.starts_with("i(") {
+            "A·s"
+        } else {
+            "V·s"
+        };
+        let area = si::quantity(impulse.area, unit, 5);
+        vec![time(impulse.t), format!("{} {area}", impulse.name)]
+    });
+    [
+        Table::new("Events", &["time", "what"], events),
+        Table::new("Impulses", &["time", "area"], impulses),
+    ]
 }
 
 fn time(t: f64) -> String {
@@ -88,6 +133,7 @@ fn strips(events: &[Event]) -> (Vec<Strip>, usize) {
             let place = *places.entry(change.name()).or_insert_with(|| {
                 strips.push(Strip {
                     name: change.name().to_owned(),
+                    run: String::new(),
                     on: words[0],
                     off: words[1],
                     start: Some(!on),
@@ -161,6 +207,24 @@ mod tests {
         let (doubles, _) = bytes.as_chunks::<8>();
         let numbers: Vec<f64> = doubles.iter().map(|b| f64::from_le_bytes(*b)).collect();
         assert_eq!(numbers, [0.3, 0.6]);
+    }
+
+    #[test]
+    fn strips_and_events_of_runs_say_which() {
+        let step = |r: f64| Step {
+            values: vec![("r".into(), r)],
+            run: Run {
+                events: vec![conducts("d1", 0.01 * r)],
+                ..Run::default()
+            },
+            found: crate::analysis::Measurements::default(),
+        };
+        let page = page("x").with_steps(&[step(1.0), step(2.0)]);
+        let strips = page.strips[1..].iter();
+        let strips = strips.map(|s| (s.run.as_str(), s.name.as_str(), &s.times[..]));
+        assert!(strips.eq([("r=1", "d1", &[0.01][..]), ("r=2", "d1", &[0.02])]));
+        let tables = page.tables.iter().filter(|table| table.run == "r=2");
+        assert_eq!(tables.map(|t| t.rows.len()).collect::<Vec<_>>(), [1, 0]);
     }
 
     #[test]

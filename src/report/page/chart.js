@@ -26,7 +26,7 @@ function chart(root, content, announce) {
   const curves = panels.flatMap((panel) => panel.curves);
   const isDotted = panels.some((panel) => panel.dots);
   let whole = wholeSpan(curves, axis.log, isDotted);
-  const state = { view: whole, cursors: { a: null, b: null }, pointer: null, under: null, paper: null, plots: [], room: SIZES.axis, logs: new Set(panels.filter((panel) => panel.dots)), heights: new Map(), fits: new Map() };
+  const state = { view: whole, cursors: { a: null, b: null }, pointer: null, under: null, paper: null, plots: [], run: null, room: SIZES.axis, logs: new Set(panels.filter((panel) => panel.dots)), heights: new Map(), fits: new Map() };
   const namesOf = (all) => [...new Set(all.map((curve) => curve.name))];
   const few = namesOf(curves).length <= COLOURS.light.length;
   const runs = [...new Set(curves.map((curve) => curve.run))];
@@ -92,24 +92,33 @@ function chart(root, content, announce) {
   function path(plot, curve, panel) {
     if (isDense(curve, state.view, pixelsOf(plot))) return null;
     const drawn = new Path2D();
-    let pen = false;
+    let pen = false, alone = null;
     const log = state.logs.has(panel), least = panel.dots ? LEAST : Number.MIN_VALUE;
-    const dot = SIZES.dot * (devicePixelRatio || 1), dots = new Path2D();
+    const ratio = devicePixelRatio || 1, dots = new Path2D();
+    const mark = (at, radius) => {
+      dots.moveTo(at[0] + radius, at[1]);
+      dots.arc(...at, radius, 0, 2 * Math.PI);
+    };
+    // A row between two gaps has no line.
+    const gap = () => {
+      if (alone) mark(alone, SIZES.line * ratio * 0.5);
+      pen = false;
+      alone = null;
+    };
     trace(curve, state.view, (t, value) => {
       const y = log ? Math.max(Math.abs(value), least) : value;
       if (Number.isNaN(y)) {
-        pen = false;
+        gap();
         return;
       }
       const at = [plot.valToPos(t, "x", true), plot.valToPos(y, "y", true)];
       if (pen) drawn.lineTo(...at);
       else drawn.moveTo(...at);
+      alone = pen ? null : at;
       pen = true;
-      if (panel.dots) {
-        dots.moveTo(at[0] + dot, at[1]);
-        dots.arc(...at, dot, 0, 2 * Math.PI);
-      }
+      if (panel.dots) mark(at, SIZES.dot * ratio);
     });
+    gap();
     drawn.addPath(dots);
     return { stroke: drawn };
   }
@@ -237,11 +246,22 @@ function chart(root, content, announce) {
     area.replaceChildren();
     state.plots = panels.map((panel, k) => plotOf(panel, k + 1 === panels.length));
     if (strips.length > 0) {
-      stripCanvas.setAttribute("aria-label", `who conducts when: ${strips.map((strip) => strip.name).join(", ")}; states at the cursors and shares of time between them stand in the table`);
+      labelLanes();
       area.append(lanes);
     }
     show(state.view);
     readings.update();
+  }
+
+  const labelLanes = () =>
+    stripCanvas.setAttribute("aria-label", `who conducts when${state.run ? ` in the run ${state.run}` : ""}: ${strips.map((strip) => strip.name).join(", ")}; states at the cursors and shares of time between them stand in the table`);
+
+  /** Draws lanes and their readings anew, whose strips are those of another run now. */
+  function anew(run) {
+    state.run = run;
+    labelLanes();
+    readings.renew();
+    retold();
   }
 
   /** Shows a span of the axis in all panels. */
@@ -319,16 +339,18 @@ function chart(root, content, announce) {
     retell(name);
   }
 
-  /** Gives curves that are drawn by some of their rows all of them, from columns by number. */
-  function complete(columns) {
-    for (const curve of curves.filter((curve) => curve.partial)) {
+  /** The steps that give curves which are drawn by some of their rows all of them, from columns by number: one a curve, then what is seen of them. */
+  const completing = (columns) => [
+    ...curves.filter((curve) => curve.partial).map((curve) => () => {
       const [x, y] = curve.later.map((k) => columns.get(k));
       Object.assign(curve, curveOf(curve.name, x, y), { shown: curve.shown });
-    }
-    show(state.view);
-    readings.update();
-    root.dispatchEvent(new CustomEvent("complete"));
-  }
+    }),
+    () => {
+      show(state.view);
+      readings.update();
+      root.dispatchEvent(new CustomEvent("complete"));
+    },
+  ];
 
   /** Draws the cursors and their readings anew. */
   function retold() {
@@ -592,7 +614,7 @@ function chart(root, content, announce) {
   const paper = matchMedia("(prefers-color-scheme: dark)"), recolour = () => repaint(state.paper);
   paper.addEventListener("change", recolour);
   return {
-    state, panels, strips, runs, isMany, entriesOf, show, complete, keep, restore, zoom, pan, place, logarithmic, logarithmicAcross, colour, dash, boundsOf, edgeOf, axis,
+    state, panels, strips, runs, isMany, entriesOf, show, completing, anew, keep, restore, zoom, pan, place, logarithmic, logarithmicAcross, colour, dash, boundsOf, edgeOf, axis,
     full,
     repaint,
     remove: () => { resized.disconnect(); document.removeEventListener("keydown", pressedOnPage); paper.removeEventListener("change", recolour); state.plots.forEach((plot) => plot.destroy()); root.replaceChildren(); },

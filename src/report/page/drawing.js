@@ -60,16 +60,20 @@ function drawing(charts) {
         }
         let path = "", pen = "M";
         trace(curve, state.view, (x, y) => {
-          if (Number.isNaN(y)) pen = "M";
+          if (Number.isNaN(y)) { path += pen === "L" ? "h0" : ""; pen = "M"; }
           else { path += `${pen}${across(x).toFixed(2)} ${up(y).toFixed(2)}`; pen = "L"; }
         });
-        layers.line += `<path d="${path}" fill="none" stroke="${colour}" stroke-width="1.5" stroke-dasharray="${dash.join(" ")}" data-signal="${clean(curve.name)}"/>`;
+        layers.line += `<path d="${path}" fill="none" stroke="${colour}" stroke-width="1.5" stroke-linecap="round" stroke-dasharray="${dash.join(" ")}" data-signal="${clean(curve.name)}"/>`;
       }
       parts.push(`<clipPath id="${clip}"><rect x="${left}" y="${top}" width="${inner}" height="${room}"/></clipPath><g clip-path="url(#${clip})">${layers.inside}${layers.outline}${layers.line}</g>`);
       base += room + 50;
     });
     const timeAt = (x) => (axis.log ? from * (to / from) ** ((x - left) / inner) : from + ((to - from) * (x - left)) / inner);
     const isClose = (a, b) => across(b) - across(a) < LANES.period;
+    if (shown.strips.length > 0 && state.run) {
+      parts.push(`<text x="${left}" y="${base - 10}">${clean(state.run)}</text>`);
+      base += LANES.row;
+    }
     for (const strip of shown.strips) {
       const foot = base - 10;
       let known = "", pale = "", unknown = "";

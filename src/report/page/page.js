@@ -17,24 +17,32 @@ function panelsOf(data) {
   return data.panels.map((panel) => ({ ...panel, curves: panel.curves.map(of) }));
 }
 
-/** The columns that stand behind the page are there: its curves get all their rows. */
+/** The columns that stand behind the page are there: its curves get all their rows, one after the other, so that the page can be zoomed meanwhile. */
 function circRest(shown) {
-  const columns = new Map();
-  for (const script of document.querySelectorAll("script[data-column]")) {
-    columns.set(Number(script.dataset.column), numbers(script.textContent));
-    script.remove();
-  }
-  shown.complete(columns);
+  const columns = new Map(), scripts = [...document.querySelectorAll("script[data-column]")];
+  const steps = [
+    ...scripts.map((script) => () => {
+      columns.set(Number(script.dataset.column), numbers(script.textContent));
+      script.remove();
+    }),
+    ...shown.completing(columns),
+  ];
+  const go = () => {
+    steps.shift()?.();
+    if (steps.length > 0) setTimeout(go);
+  };
+  setTimeout(go);
 }
 
 /** A table of words; long ones show their first rows and a button for the rest. */
-function wordTable({ heading, header, rows, all }) {
+function wordTable({ heading, run, header, rows, all }) {
   const body = element("tbody");
   const line = (cells) => element("tr", {}, ...cells.map((cell) => element("td", {}, cell)));
   body.append(...rows.slice(0, ROWS).map(line));
   const table = element("table", { class: "words" }, element("thead", {}, element("tr", {}, ...header.map((name) => element("th", { scope: "col" }, name)))), body);
   const scroll = element("div", { class: "scroll", role: "region", tabindex: 0, "aria-label": heading }, table);
-  const section = element("details", { open: rows.length <= 40 }, element("summary", {}, `${heading} (${all > rows.length ? `the first ${rows.length} of ${all}` : rows.length})`), scroll);
+  const section = element("details", { open: rows.length <= 40 }, element("summary", {}, `${heading}${run ? ` of ${run}` : ""} (${all > rows.length ? `the first ${rows.length} of ${all}` : rows.length})`), scroll);
+  if (run) section.dataset.run = run;
   if (rows.length > ROWS) {
     const more = element("button", { type: "button", onclick: () => { body.append(...rows.slice(ROWS).map(line)); more.remove(); } }, `${rows.length} rows`);
     section.append(more);
@@ -70,6 +78,24 @@ function circuitOf(svg, shown, area) {
   return section;
 }
 
+/** A choice, above the lanes, of the run whose lanes, circuit and events are shown; `act` shows those of one. Returns what shows those of the chosen one. */
+function chooser(shown, area, runs, act) {
+  const select = element("select", { onchange: () => chosen() }, ...runs.map((run) => element("option", { value: run }, run)));
+  const chosen = () => {
+    act(select.value);
+    shown.anew(select.value);
+  };
+  area.querySelector(".panels").after(element("p", { class: "which" }, element("label", {}, "who conducts when, circuit and events: run ", select)));
+  const { keep, restore } = shown;
+  shown.keep = () => ({ ...keep(), run: select.value });
+  shown.restore = (kept) => {
+    restore(kept);
+    if (runs.includes(kept.run)) select.value = kept.run;
+    chosen();
+  };
+  return chosen;
+}
+
 /** Hands a text to the reader as a file. */
 function save(name, type, text) {
   const link = element("a", { download: name, href: URL.createObjectURL(new Blob([text], { type })) });
@@ -86,7 +112,7 @@ function circPage(root, data) {
   const spectrumArea = element("section", { "aria-label": "spectrum", hidden: true });
   const controls = element("div", { class: "controls", role: "toolbar", "aria-label": "view" });
   root.replaceChildren(element("h1", {}, data.title), element("p", { class: "about" }, data.about ?? ""), controls, area, live, spectrumArea);
-  let shown = null, spectrum = null;
+  let shown = null, spectrum = null, choose = null;
   const button = (words, action, title) => {
     const made = element("button", { type: "button", title, onclick: () => action(made) }, words);
     controls.append(made);
@@ -162,7 +188,14 @@ function circPage(root, data) {
   }, "colours of the page");
   const middle = () => { const [from, to] = shown.state.view; return shown.axis.log ? Math.sqrt(from * to) : (from + to) / 2; };
   if (panels.some((panel) => panel.curves.length > 0)) {
-    shown = chart(area, { axis: data.axis, panels, strips: stripsOf(data.strips) }, announce);
+    const lanes = lanesOf(stripsOf(data.strips));
+    shown = chart(area, { axis: data.axis, panels, strips: lanes.strips }, announce);
+    // Of several runs one has its lanes, circuit and events shown.
+    const runs = [...new Set([...lanes.runs, ...(data.tables ?? []).filter((table) => table.rows.length > 0).map((table) => table.run ?? "")])].filter((run) => run !== "");
+    if (runs.length > 0) choose = chooser(shown, area, runs, (run) => {
+      lanes.show(run);
+      for (const table of root.querySelectorAll("details[data-run]")) table.hidden = table.dataset.run !== run;
+    });
     area.addEventListener("view", () => { if (spectrum && !spectrumArea.hidden) transformed(); });
     root.append(element("details", {}, element("summary", {}, "Keys and mouse"), element("p", {},
       "Drag: zoom to a span, a box or a height. Wheel: zoom at the pointer; with shift, move. Shift and drag: move. Double click or Home: all. Click: cursor A; shift and click: cursor B; a click on a name shows or hides its curve. " +
@@ -170,6 +203,7 @@ function circPage(root, data) {
   }
   if (data.circuit) root.append(circuitOf(data.circuit, shown, area));
   for (const table of data.tables ?? []) if (table.rows.length > 0) root.append(wordTable(table));
+  choose?.();
   for (const { heading, text } of data.texts ?? []) {
     root.append(element("details", { open: true }, element("summary", {}, heading), element("pre", {}, text)));
   }

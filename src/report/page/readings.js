@@ -100,7 +100,9 @@ function readingsTable(shown) {
       box.indeterminate = visible > 0 && visible < some.length;
     }
   }
-  return { table, update, tick };
+  /** What was found between the cursors is found anew with the next update. */
+  const renew = () => { spanned = null; };
+  return { table, update, tick, renew };
 }
 
 /** Of many runs a list that scrolls and folds: a box shows and hides one, its name shows it alone, and all again. */

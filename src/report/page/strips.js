@@ -14,6 +14,20 @@ function stripsOf(strips) {
   });
 }
 
+/**
+ * The lanes of strips of one run or of several: a strip for each name, `runs` (one without a name where there is but one), and `show(run)`, which
+ * makes the strips those of a run; a device that does not change in it is not known.
+ */
+function lanesOf(all) {
+  const runs = [...new Set(all.map((strip) => strip.run ?? ""))];
+  const strips = [...new Map(all.map((strip) => [strip.name, { ...strip }])).values()];
+  const unknown = { start: null, times: new Float64Array(0), states: [], sums: new Float64Array(0) };
+  const show = (run) => {
+    for (const strip of strips) Object.assign(strip, unknown, all.find((own) => own.name === strip.name && (own.run ?? "") === run));
+  };
+  return { runs, strips, show };
+}
+
 /** State of a strip's device at t: true, false, or null before anything is known. */
 function stateAt(strip, t) {
   const changes = rowAfter(strip.times, t);

@@ -249,6 +249,7 @@ impl<'a> Reader<'a> {
         let symbol = match card.name.text.chars().next() {
             Some('q') => Transistor::Bipolar { p },
             Some('m') => Transistor::Mos { p },
+            _ if model.is_some_and(|m| self.kind(&m.text) == "nigbt") => Transistor::Igbt,
             _ => Transistor::Junction { p },
         };
         let name = model.map_or(String::new(), |m| m.text.clone());

@@ -35,6 +35,7 @@ pub(super) enum Shape {
 pub(super) enum Transistor {
     Bipolar { p: bool },
     Mos { p: bool },
+    Igbt,
     Junction { p: bool },
 }
 
@@ -43,6 +44,7 @@ impl Transistor {
     pub(super) const fn is_p(self) -> bool {
         match self {
             Self::Bipolar { p } | Self::Mos { p } | Self::Junction { p } => p,
+            Self::Igbt => false,
         }
     }
 }

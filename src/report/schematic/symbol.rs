@@ -83,7 +83,7 @@ const fn gate(symbol: Symbol) -> &'static str {
     match symbol {
         Symbol::Thyristor => "10 0L18 10",
         Symbol::Triac => "12 0L18 10",
-        Symbol::Transistor(Transistor::Mos { .. }) => "0 14",
+        Symbol::Transistor(Transistor::Mos { .. } | Transistor::Igbt) => "0 14",
         _ => "0 9",
     }
 }
@@ -130,6 +130,8 @@ fn outline(symbol: Symbol, conducts: bool) -> String {
         Symbol::Transistor(Transistor::Mos { .. }) => {
             "M-20 0H-12V9M20 0H12V9M-16 9H-7M-4.5 9H4.5M7 9H16M-13 14H13"
         }
+        // A bipolar transistor's, with an insulated gate in place of the base.
+        Symbol::Transistor(Transistor::Igbt) => "M-13 9H13M-20 0L-7 9M20 0L7 9M-13 14H13",
         Symbol::Transistor(Transistor::Junction { .. }) => "M-20 0H-10V9M20 0H10V9M-14 9H14",
         Symbol::Resistor | Symbol::Box => "",
     };
@@ -142,7 +144,9 @@ const fn arrow(symbol: Symbol) -> &'static str {
         Symbol::Switch => {
             "M-17.5 0a2.5 2.5 0 1 1 5 0a2.5 2.5 0 1 1 -5 0M12.5 0a2.5 2.5 0 1 1 5 0a2.5 2.5 0 1 1 -5 0"
         }
-        Symbol::Transistor(Transistor::Bipolar { p: false }) => "M19 0.7L14.4 7.6L10.4 1.9Z",
+        Symbol::Transistor(Transistor::Bipolar { p: false } | Transistor::Igbt) => {
+            "M19 0.7L14.4 7.6L10.4 1.9Z"
+        }
         Symbol::Transistor(Transistor::Bipolar { p: true }) => "M8 8.3L16.6 6.1L12.6 0.4Z",
         Symbol::Transistor(Transistor::Mos { p: false }) => "M12 9L8.5 2H15.5Z",
         Symbol::Transistor(Transistor::Mos { p: true }) => "M12 0L8.5 7H15.5Z",

@@ -2,8 +2,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::grid::{Grid, LEVEL, Plan};
-use super::part::{Parts, Symbol};
-use super::{cards, search};
+use super::part::{Parts, Symbol, Transistor};
+use super::{cards, search, symbol};
 use crate::model::Model;
 
 fn model(name: &str) -> Model {
@@ -64,6 +64,24 @@ fn crossings(grid: &Grid) -> usize {
         }
     }
     crossings
+}
+
+#[test]
+fn an_igbt_has_an_insulated_gate_beside_a_bipolar_transistors_lines() {
+    let text = "z\nv1 c 0 400\nr1 c d 10\nvg g 0 15\nz1 d g 0 NI\nj1 d g 0 NJ\n\
+                .model NI NIGBT\n.model NJ NJF\n.tran 1u 1m\n";
+    let model = Model::parse(text, "z.cir").unwrap();
+    let all = parts(&model).parts;
+    let of = |name: &str| all.iter().find(|part| part.name == name).unwrap().symbol;
+    let drawn = |symbol| symbol::drawn(symbol, (-30.0, 30.0), false, true);
+    let igbt = Symbol::Transistor(Transistor::Igbt);
+    assert_eq!(of("z1"), igbt);
+    assert_ne!(drawn(of("z1")), drawn(of("j1")));
+    let bipolar = drawn(Symbol::Transistor(Transistor::Bipolar { p: false }));
+    let lines = "M-13 9H13M-20 0L-7 9M20 0L7 9";
+    assert!(bipolar.contains(&format!("{lines}M0 9V28")), "{bipolar}");
+    // The lead of the gate ends at its own line.
+    assert!(drawn(igbt).contains(&format!("{lines}M-13 14H13M0 14V28")));
 }
 
 #[test]
