@@ -3,8 +3,8 @@
 //! A value that is drawn depends on the seed, the number of the sample and the place in the netlist where it stands, and on nothing else: not
 //! on the order of evaluation, on threads, or on what else is drawn.
 
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
+use chacha20::ChaCha8Rng;
+use chacha20::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 
 use super::elaborate::ElaborateOptions;
