@@ -28,12 +28,15 @@ struct Traced<'a> {
     less: Option<&'a Formula>,
 }
 
+/// Where a piece begins, how long it is, s, which part of that belongs to it, and by signal its values.
+type Piece<'a> = ((f64, f64, f64), &'a [[f64; VALUES]]);
+
 /// What measurements saw and found.
 struct Scene<'a> {
     curves: &'a Curves,
     span: (f64, f64),
     /// By piece.
-    pieces: Vec<((f64, f64, f64), &'a [[f64; VALUES]])>,
+    pieces: Vec<Piece<'a>>,
     /// Of all measurements; NaN where one has none.
     results: Vec<f64>,
 }

@@ -1,6 +1,8 @@
 //! Derivatives of measurements to the values of elements and parameters.
 
+mod base;
 mod exact;
+mod survey;
 
 use std::sync::atomic::AtomicBool;
 

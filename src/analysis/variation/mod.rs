@@ -9,6 +9,7 @@
 //! is a product of exponentials and saltations, without differences.
 
 mod adjoint;
+mod carried;
 mod change;
 mod costate;
 mod course;
@@ -35,7 +36,8 @@ use crate::settings::tolerances::events::{AT_LEVEL, GRAZING, SAME_TIMING};
 use crate::settings::tolerances::jumps::FOLLOWS_JUMP;
 use crate::settings::tolerances::times::SAME_TIME;
 
-pub(crate) use adjoint::{Adjoint, Carried};
+pub(crate) use adjoint::Adjoint;
+pub(crate) use carried::Carried;
 pub(crate) use change::Changes;
 pub(crate) use course::{Course, Leap};
 pub(crate) use drawing::{Drawing, Lines, Sight, Weighted};
