@@ -14,7 +14,7 @@ use crate::lcs::{Input, PowerKind};
 pub(crate) struct Perturbation {
     /// Equation, column and the coefficient in each.
     pub(crate) coefficients: Vec<(usize, Column, [f64; 4])>,
-    /// Row and column of the metric, row ≤ column, and the value in each.
+    /// Row and column of the metric, which is listed whole, and the value in each.
     pub(crate) metric: Vec<(usize, usize, [f64; 4])>,
 }
 
@@ -69,8 +69,7 @@ impl StandardMultiport {
             }
             let values = others.map(|other| number(other.2));
             if values.iter().any(|value| *value != values[0]) {
-                let (row, column) = (*row.min(column), *row.max(column));
-                found.metric.push((row, column, values));
+                found.metric.push((*row, *column, values));
             }
         }
         Some(found)

@@ -12,8 +12,8 @@ use crate::topologies::{Style, plain_case};
 /// Derivatives agree to this part of the measurement or of its change with ln p, whichever is larger.
 const TOLERANCE: f64 = 1e-6;
 
-/// Backward and forward along the run they agree to this part of the largest p ∂J/∂p of a measurement.
-const BOTH_WAYS: f64 = 1e-12;
+/// Backward and forward along the run they agree to this part of the largest p ∂J/∂p of a measurement or of what it measures: what rounding leaves of hundreds of events.
+const BOTH_WAYS: f64 = 1e-11;
 
 /// Differences of two sizes that are this far apart tell nothing: an event changes its order, or rounding shows.
 const KNOWN: f64 = 2e-7;
@@ -85,7 +85,8 @@ fn both_ways((seed, model): (u64, &Model), elements: &[(&str, f64)], tally: &mut
         let pairs = a.to.iter().zip(&b.to).zip(elements);
         let scaled = pairs.filter_map(|((a, b), (_, value))| Some((value * a.1?, value * b.1?)));
         let scaled: Vec<(f64, f64)> = scaled.collect();
-        let largest = scaled.iter().fold(0.0, |m: f64, pair| m.max(pair.0.abs()));
+        let size = a.value.as_ref().map_or(0.0, |value| value.abs());
+        let largest = scaled.iter().fold(size, |m: f64, pair| m.max(pair.0.abs()));
         for ((own, other), (name, _)) in scaled.iter().zip(elements) {
             tally.both += 1;
             if (own - other).abs() > BOTH_WAYS * largest {

@@ -23,15 +23,8 @@ pub(super) struct Outer {
     levels: Vec<Vec<DMatrix<f64>>>,
     /// By costate: ∫ φ wᵀ dt of what is whole.
     whole: Vec<DMatrix<f64>>,
-}
-
-/// Adds Σ_c φ_c wᵀ to a matrix each.
-fn add(sums: &mut [DMatrix<f64>], phi: &DMatrix<f64>, w: &DVector<f64>) {
-    for (sum, phi) in sums.iter_mut().zip(phi.column_iter()) {
-        if phi.iter().any(|value| *value != 0.0) {
-            sum.ger(1.0, &phi, w, 1.0);
-        }
-    }
+    /// What is still to be added to the sums of one halving: φ₁ and w₀.
+    waiting: (u32, Vec<(DMatrix<f64>, DVector<f64>)>),
 }
 
 impl Outer {
@@ -40,6 +33,7 @@ impl Outer {
         Self {
             levels: Vec::new(),
             whole: vec![DMatrix::zeros(dim, dim); costates],
+            waiting: (0, Vec::new()),
         }
     }
 
@@ -55,6 +49,32 @@ impl Outer {
         &mut self.levels[at]
     }
 
+    /// Adds Σ_c φ_c wᵀ to the sums of a halving, several at a time: a product of matrices takes less than as many of vectors.
+    fn wait(&mut self, level: u32, phi: &DMatrix<f64>, w: &DVector<f64>) {
+        /// Products that wait for each other.
+        const AT_ONCE: usize = 16;
+        if self.waiting.0 != level || self.waiting.1.len() == AT_ONCE {
+            self.add_waiting();
+        }
+        self.waiting.0 = level;
+        self.waiting.1.push((phi.clone(), w.clone()));
+    }
+
+    fn add_waiting(&mut self) {
+        let (level, waiting) = (self.waiting.0, std::mem::take(&mut self.waiting.1));
+        let Some((_, first)) = waiting.first() else {
+            return;
+        };
+        let (dim, count) = (first.len(), waiting.len());
+        let before = DMatrix::from_fn(count, dim, |k, i| waiting[k].1[i]);
+        for (c, sum) in self.level(level).iter_mut().enumerate() {
+            let after = DMatrix::from_fn(dim, count, |i, k| waiting[k].0[(i, c)]);
+            if after.iter().any(|value| *value != 0.0) {
+                sum.gemm(1.0, &after, &before, 1.0);
+            }
+        }
+    }
+
     /// Takes costates back over a halving of the unit from the w before it.
     pub(super) fn back(
         &mut self,
@@ -66,7 +86,7 @@ impl Outer {
         if phi.iter().all(|value| *value == 0.0) {
             return Ok(());
         }
-        add(self.level(level), phi, w);
+        self.wait(level, phi, w);
         let step = motion.step(level)?.tr_mul(&*phi);
         *phi += step;
         Ok(())
@@ -133,6 +153,7 @@ impl Outer {
     /// # Errors
     /// An exponential does not exist in doubles.
     pub(super) fn settle(&mut self, motion: &mut Motion<'_>) -> Result<(), Error> {
+        self.add_waiting();
         let levels = std::mem::take(&mut self.levels);
         let last = (motion.bottom as usize + 1).max(levels.len());
         let whole = self.whole.iter();

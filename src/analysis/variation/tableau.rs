@@ -336,11 +336,7 @@ impl Tableau {
 fn change_of_metric(perturbation: &Perturbation, q: usize) -> DMatrix<f64> {
     let mut change = DMatrix::zeros(q, q);
     for (row, column, values) in &perturbation.metric {
-        let by = difference(*values);
-        change[(*row, *column)] += by;
-        if row != column {
-            change[(*column, *row)] += by;
-        }
+        change[(*row, *column)] += difference(*values);
     }
     change
 }
