@@ -338,7 +338,7 @@ mod tests {
             until,
             values: std::array::from_fn(|j| {
                 let s = j as f64 / 8.0;
-                let own = (2.5 * s + k as f64).sin() + 0.4 * k as f64 - 0.3;
+                let own = (2.5 * s + k as f64).sin() - 1.4 * k as f64 - 0.3;
                 own + h * along.values[j]
             }),
         });
