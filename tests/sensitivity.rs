@@ -284,8 +284,8 @@ fn coupled_inductors() {
             "coupled\nv1 1 0 5\nr1 1 2 10\nl1 2 3 1m\nl2 3 0 4m\nk1 l1 l2 {k}\n.tran 1u 1m uic\n.meas tran i find i(r1) at=0.5m\n.end\n"
         );
         let found = found(&text, false);
-        let l = 5e-3 + 4e-3 * k;
-        let of_l = 0.5 * (-5e-3 / l).exp() * -5e-3 / l;
+        let l: f64 = 5e-3 + 4e-3 * k;
+        let of_l = -0.5 * (-5e-3 / l).exp() * 5e-3 / l;
         near(&found, "i", "l1", 1e-3, of_l * (1e-3 + 2e-3 * k) / l, 1e-9);
         near(&found, "i", "l2", 4e-3, of_l * (4e-3 + 2e-3 * k) / l, 1e-9);
         both_ways(&text, false);
