@@ -16,6 +16,9 @@ use super::linear::Motion;
 use crate::integrate::Error;
 use crate::linalg::gauss::{NODES, WEIGHTS};
 
+/// Costates φ₁, and w₀.
+type Factors = (DMatrix<f64>, DVector<f64>);
+
 /// Sums of an equation of dimension N, for several costates.
 #[derive(Debug, Default)]
 pub(super) struct Outer {
@@ -24,7 +27,7 @@ pub(super) struct Outer {
     /// By costate: ∫ φ wᵀ dt of what is whole.
     whole: Vec<DMatrix<f64>>,
     /// What is still to be added to the sums of one halving: φ₁ and w₀.
-    waiting: (u32, Vec<(DMatrix<f64>, DVector<f64>)>),
+    waiting: (u32, Vec<Factors>),
 }
 
 impl Outer {
