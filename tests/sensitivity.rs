@@ -2,7 +2,7 @@
 #![allow(missing_docs, reason = "tests")]
 
 use circ::analysis::{
-    Sensitivity, SensitivityOptions, WorstOptions, sensitivity, transient, worst,
+    Sensitivity, SensitivityMethod, SensitivityOptions, WorstOptions, sensitivity, transient, worst,
 };
 use circ::{Model, SimOptions};
 
@@ -13,6 +13,44 @@ fn found(text: &str, steady: bool) -> Sensitivity {
         ..SensitivityOptions::default()
     };
     sensitivity(&model, &options).expect("derivatives")
+}
+
+fn by(text: &str, steady: bool, method: SensitivityMethod) -> Sensitivity {
+    let model = Model::parse(text, "t.cir").expect("a circuit");
+    let options = SensitivityOptions {
+        steady,
+        method,
+        ..SensitivityOptions::default()
+    };
+    sensitivity(&model, &options).expect("derivatives")
+}
+
+/// Forward and backward along the run the derivatives are the same to 1e-12 of the largest p ∂J/∂p of each measurement. (A slope is a difference of values over a piece of the curve: it
+/// has what rounding leaves of them.)
+fn both_ways(text: &str, steady: bool) -> Sensitivity {
+    let forward = by(text, steady, SensitivityMethod::Forward);
+    let backward = by(text, steady, SensitivityMethod::Adjoint);
+    assert!(forward.exact && backward.exact);
+    assert_eq!(forward.passes.forward, forward.at.len());
+    assert_eq!(forward.passes.backward, 0);
+    assert_eq!(backward.passes.forward, 0, "{:?}", backward.passes);
+    assert!(backward.passes.backward > 0 && backward.of.len() == forward.of.len());
+    for (a, b) in forward.of.iter().zip(&backward.of) {
+        assert!(a.value.is_ok(), "{a:?}");
+        let scaled = |k: usize| forward.at[k].1 * a.to[k].1.expect("a derivative");
+        let largest = (0..a.to.len()).fold(0.0, |m: f64, k| m.max(scaled(k).abs()));
+        for (k, (name, own)) in b.to.iter().enumerate() {
+            let own = forward.at[k].1 * own.expect("a derivative");
+            let close = if a.name == "slope" { 1e-9 } else { 1e-12 };
+            assert!(
+                (own - scaled(k)).abs() <= close * largest,
+                "{} to {name}: {own:e} {:e} of {largest:e}",
+                a.name,
+                scaled(k)
+            );
+        }
+    }
+    backward
 }
 
 fn near(found: &Sensitivity, of: &str, to: &str, value: f64, truth: f64, tolerance: f64) {
@@ -177,4 +215,132 @@ fn what_changes_the_period_of_a_steady_state_is_left_out() {
     };
     let error = sensitivity(&model, &options).expect_err("a period that moves");
     assert!(error.to_string().contains("changes the period"), "{error}");
+}
+
+/// All kinds of measurements on v(out) and i(l1), the first crossing of a level among them.
+fn measurements(from: &str, at: &str, level: &str) -> String {
+    let window = format!("from={from}");
+    format!(
+        ".meas tran mean avg v(out) {window}\n.meas tran charge integ i(l1) {window}\n.meas tran power rms i(l1) {window}\n\
+        .meas tran given avg v(out)*i(l1)\n.meas tran last find v(out) at={at}\n.meas tran slope deriv v(out) at={at}\n\
+        .meas tran least min v(out) {window}\n.meas tran most max i(l1) {window}\n.meas tran ripple pp i(l1) {window}\n\
+        .meas tran when when v(out)={level} cross=1\n.meas tran then find i(l1) when v(out)={level} cross=1\n\
+        .meas tran ratio param='mean/last+when*1e4'\n.meas tran lag trig v(out) val={level} cross=1 targ at={at}\n\
+        .meas tran part avg v(out) trig v(out) val={level} cross=1 targ at={at}\n"
+    )
+}
+
+/// A boost converter whose diode turns off with its current and by its clock, of ideal devices and of finite ones with a snubber.
+#[test]
+fn back_along_a_boost_converter() {
+    let ideal = ".model sw sw(vt=0.5 vh=0 ron=0 ideal=1)\n.model d d(ideal)\n";
+    let finite = "cs 3 s 1n\nrs s 0 50\n.model sw sw(vt=0.5 vh=0 ron=20m roff=1meg)\n.model d d(ron=30m roff=1meg vfwd=0.5)\n";
+    for (devices, levels) in [(ideal, ["7.2", "7.6"]), (finite, ["7.1", "7.2"])] {
+        let head = format!(
+            "boost\nv1 1 0 5\nl1 1 2 100u\nrl 2 3 0.1\ns1 3 0 g 0 sw\nvg g 0 pulse(0 1 0 0 0 4u 20u)\nd1 3 out d\n\
+            c1 out 4 2u ic=6\nrc 4 0 20m\nr1 out 0 200\n{devices}"
+        );
+        let transient = measurements("150u", "233u", levels[0]);
+        let found = both_ways(
+            &format!("{head}.tran 1u 300u uic\n{transient}.end\n"),
+            false,
+        );
+        assert!(found.at.len() >= 6);
+        let steady = measurements("0", "13u", levels[1]);
+        both_ways(&format!("{head}.tran 1u 20u\n{steady}.end\n"), true);
+    }
+}
+
+/// A converter whose switch follows its output, from its operating point on.
+#[test]
+fn back_along_a_converter_with_a_comparator() {
+    let text = format!(
+        "hysteretic\nv1 1 0 {{vin}}\ns1 1 2 ref out sw\nd1 0 2 d\nl1 2 3 100u\nrl 3 out 0.2\nc1 out 4 20u\nrc 4 0 50m\nr1 out 0 5\nvr ref 0 5\n\
+        .model sw sw(vt=0 vh=20m ron=10m roff=1meg)\n.model d d(ron=10m roff=1meg vfwd=0.4)\n.param vin=12\n.tran 1u 400u uic\n{}.end\n",
+        measurements("300u", "333u", "4.9")
+    );
+    let found = both_ways(&text, false);
+    assert!(found.derivative("when", "vin").is_some_and(|d| d < 0.0));
+}
+
+/// Charge that is shared when an ideal switch joins two capacitors: the state jumps, by an amount that their values decide.
+#[test]
+fn back_along_jumps() {
+    let text = format!(
+        "share\nv1 1 0 {{vin}}\nr1 1 out 1k\nc1 out 0 1u ic=1\nc2 2 0 {{2*c}} ic=0\nr2 2 0 5k\ns1 out 2 g 0 sw\nl1 2 3 10m\nr3 3 0 1k\n\
+        vg g 0 pulse(0 1 200u 0 0 300u 1m)\n.model sw sw(vt=0.5 vh=0 ron=0 ideal=1)\n.param vin=4 c=250n\n.tran 1u 1.6m uic\n{}.end\n",
+        measurements("100u", "1.35m", "1.2")
+    );
+    let found = both_ways(&text, false);
+    // At 200 us v(out) = (v₁ C₁ + v₂ C₂)/(C₁ + C₂).
+    assert!(found.derivative("last", "c").is_some());
+}
+
+/// Two windings in series have L = L₁ + L₂ + 2 M with M = k √(L₁ L₂), and i = V/R (1 − e^{−R t/L}).
+#[test]
+fn coupled_inductors() {
+    for k in [0.6, 1.0] {
+        let text = format!(
+            "coupled\nv1 1 0 5\nr1 1 2 10\nl1 2 3 1m\nl2 3 0 4m\nk1 l1 l2 {k}\n.tran 1u 1m uic\n.meas tran i find i(r1) at=0.5m\n.end\n"
+        );
+        let found = found(&text, false);
+        let l: f64 = 5e-3 + 4e-3 * k;
+        let of_l = -0.5 * (-5e-3 / l).exp() * 5e-3 / l;
+        near(&found, "i", "l1", 1e-3, of_l * (1e-3 + 2e-3 * k) / l, 1e-9);
+        near(&found, "i", "l2", 4e-3, of_l * (4e-3 + 2e-3 * k) / l, 1e-9);
+        both_ways(&text, false);
+    }
+}
+
+/// Parameters of a duty cycle move edges, one of ramps moves waveforms: that one goes forward.
+#[test]
+fn edges_go_backward_and_ramps_forward() {
+    let text = |gate: &str| {
+        format!(
+            "buck\nv1 1 0 {{vin}}\ns1 1 2 g 0 sw\ns2 2 0 0 g sn\nvg g 0 pulse(0 1 0 {gate} 10u)\nl1 2 out 100u\nc1 out 0 10u\nr1 out 0 5\n\
+            .model sw sw(vt=0.5 vh=0 ron=10m roff=1meg)\n.model sn sw(vt=-0.5 vh=0 ron=10m roff=1meg)\n.param vin=10 d=0.4\n\
+            .tran 0.1u 20u\n{}.end\n",
+            measurements("0", "13u", "4")
+        )
+    };
+    both_ways(&text("0 0 {d*10u}"), true);
+    let found = by(
+        &text("10n 10n {d*10u-10n}"),
+        true,
+        SensitivityMethod::Adjoint,
+    );
+    assert_eq!(found.passes.forward, 1);
+}
+
+/// By default values that are more than the measurements cost one pass for each of these, however many values there are.
+#[test]
+fn passes_are_as_many_as_measurements_or_values() {
+    let ladder = |cells: usize| {
+        let cell = |k: usize| {
+            format!(
+                "l{k} n{k} m{k} {}u\nr{k} m{k} n{} 0.3\nc{k} n{} 0 {}u\n",
+                10 + k,
+                k + 1,
+                k + 1,
+                1 + k
+            )
+        };
+        let cells: String = (0..cells).map(cell).collect();
+        format!(
+            "ladder\nv1 n0 0 pulse(0 1 0 0 0 20u 50u)\n{cells}.tran 1u 200u uic\n.meas tran a avg v(n1)\n.meas tran b find v(n1) at=130u\n.end\n"
+        )
+    };
+    for cells in [1, 2, 5] {
+        let found = by(&ladder(cells), false, SensitivityMethod::Automatic);
+        assert_eq!(found.at.len(), 3 * cells);
+        assert_eq!((found.passes.forward, found.passes.backward), (0, 2));
+    }
+    let model = Model::parse(&ladder(5), "t.cir").expect("a circuit");
+    let options = SensitivityOptions {
+        to: vec!["l1".into(), "c1".into()],
+        ..SensitivityOptions::default()
+    };
+    let found = sensitivity(&model, &options).expect("derivatives");
+    assert_eq!((found.passes.forward, found.passes.backward), (2, 0));
+    both_ways(&ladder(3), false);
 }

@@ -36,7 +36,9 @@ pub use dc::{Characteristic, Unsolved, dc};
 pub use density::ringing;
 pub use measured::{Finished, Measurements, is_measured, periodic_measured, pictured, transient};
 pub use periodic::{PeriodicOptions, orbit_start, periodic};
-pub use sensitivity::{Gradient, Sensitivity, SensitivityOptions, sensitivity};
+pub use sensitivity::{
+    Gradient, Passes, Sensitivity, SensitivityMethod, SensitivityOptions, sensitivity,
+};
 pub use shown::{Undefined, shown, shown_values};
 pub use small_signal::{
     About, Left, Margin, Ratio, Response, SmallSignalOptions, margins, ratios, small_signal,

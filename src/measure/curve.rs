@@ -44,6 +44,39 @@ pub(crate) fn interpolated(values: &[f64; VALUES], s: f64) -> f64 {
     values[0] + above / below
 }
 
+/// l_j(s), j = 0 … 8: Σ l_j(s) y_j is the polynomial's value.
+pub(crate) fn basis(s: f64) -> [f64; VALUES] {
+    let x = s * INTERVALS as f64;
+    if x.fract() == 0.0 && (0.0..=INTERVALS as f64).contains(&x) {
+        return std::array::from_fn(|j| f64::from(u8::from(x == j as f64)));
+    }
+    let parts: [f64; VALUES] = std::array::from_fn(|j| BARYCENTRIC[j] / (x - j as f64));
+    let sum: f64 = parts.iter().sum();
+    parts.map(|part| part / sum)
+}
+
+/// The first, second … derivatives of l_j at s.
+pub(super) fn basis_slopes(s: f64, order: usize) -> [f64; VALUES] {
+    let mut own = basis(s);
+    for _ in 0..order {
+        let mut slopes = [0.0; VALUES];
+        for (i, value) in own.iter().enumerate() {
+            for (j, slope) in slopes.iter_mut().enumerate().filter(|(j, _)| *j != i) {
+                let off = i as f64 - j as f64;
+                let part = INTERVALS as f64 * BARYCENTRIC[j] / BARYCENTRIC[i] / off * value;
+                *slope += part;
+            }
+            let own: f64 = (0..VALUES)
+                .filter(|j| *j != i)
+                .map(|j| BARYCENTRIC[j] / BARYCENTRIC[i] / (i as f64 - j as f64))
+                .sum();
+            slopes[i] -= INTERVALS as f64 * own * value;
+        }
+        own = slopes;
+    }
+    own
+}
+
 impl Curve {
     /// Where it ends as a part of the waveform, s.
     #[must_use]

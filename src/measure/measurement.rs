@@ -212,7 +212,7 @@ impl<E> Scene<'_, E> {
         }
     }
 
-    fn when(&self, instant: &Instant<E>) -> Result<f64, MeasureError> {
+    pub(crate) fn when(&self, instant: &Instant<E>) -> Result<f64, MeasureError> {
         match instant {
             Instant::At(t) => (self.number)(t),
             Instant::Crossing {

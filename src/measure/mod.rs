@@ -7,15 +7,17 @@ mod curve;
 mod fourier;
 mod measurement;
 mod signals;
+mod slopes;
 mod trace;
 
 use thiserror::Error;
 
 pub use curve::Curve;
-pub(crate) use curve::{INTERVALS, VALUES};
+pub(crate) use curve::{INTERVALS, VALUES, basis, interpolated};
 pub use fourier::{Harmonic, Spectrum, fourier};
 pub use measurement::{Found, Instant, Measurement, Scene, Use, Window};
 pub use signals::{Curves, Signals};
+pub(crate) use slopes::TraceSlopes;
 pub use trace::Trace;
 
 /// Why a measurement has no value.

@@ -108,7 +108,23 @@ impl Curves {
         }
     }
 
-    fn all(&self) -> impl Iterator<Item = ((f64, f64, f64), &[[f64; VALUES]])> {
+    /// A function of the time and the signals, and of which piece each of its own is a part, where that begins on it, and how much of it that is; none where it has an edge
+    /// that is none of the signals.
+    ///
+    /// # Errors
+    /// [`MeasureError::NotFinite`].
+    #[expect(clippy::type_complexity, reason = "a waveform with its places")]
+    pub(crate) fn drawn(
+        &self,
+        f: &dyn Fn(f64, &[f64]) -> f64,
+        affine: bool,
+    ) -> Result<Option<(Trace<'static>, Vec<(usize, f64, f64)>)>, MeasureError> {
+        let drawn = Drawn::of(self, f, affine)?;
+        let (trace, places) = (Trace::curves(drawn.curves, vec![]), drawn.places);
+        Ok((!drawn.has_edge).then_some((trace, places)))
+    }
+
+    pub(crate) fn all(&self) -> impl Iterator<Item = ((f64, f64, f64), &[[f64; VALUES]])> {
         let values = self.values.chunks_exact(self.columns.max(1));
         self.pieces.iter().copied().zip(values)
     }
@@ -183,24 +199,7 @@ impl<'a> Signals<'a> {
                 Ok(Trace::lines(time, all))
             }
             Self::Curves(curves) => {
-                let mut drawn = Drawn {
-                    f,
-                    largest: 0.0,
-                    curves: Vec::with_capacity(curves.len()),
-                };
-                let all = curves.all();
-                let own =
-                    all.map(|(piece, signals)| Ok((piece, signals, drawn.values(piece, signals)?)));
-                let own: Vec<_> = own.collect::<Result<_, _>>()?;
-                let values = own.iter().flat_map(|(.., values)| values);
-                drawn.largest = values.fold(0.0, |m: f64, y| m.max(y.abs()));
-                for (piece, signals, values) in own {
-                    if affine {
-                        drawn.push(piece, values);
-                    } else {
-                        drawn.follow(piece, signals, values, HALVINGS)?;
-                    }
-                }
+                let drawn = Drawn::of(curves, f, affine)?;
                 let still = vec![0.0; curves.columns];
                 let impulses = curves.impulses.iter().filter(|_| affine);
                 let impulses = impulses.map(|(t, areas)| {
@@ -221,14 +220,47 @@ fn finite(value: f64) -> Result<f64, MeasureError> {
 }
 
 /// A function of time and signals as smooth pieces.
-struct Drawn<'f> {
+pub(super) struct Drawn<'f> {
     f: &'f dyn Fn(f64, &[f64]) -> f64,
     /// Its largest value.
     largest: f64,
-    curves: Vec<Curve>,
+    pub(super) curves: Vec<Curve>,
+    /// By curve: the piece of the signals that it is a part of, where on it that part begins, and how much of it that is.
+    pub(super) places: Vec<(usize, f64, f64)>,
+    /// Whether an edge that is none of the signals is in it.
+    pub(super) has_edge: bool,
 }
 
-impl Drawn<'_> {
+impl<'f> Drawn<'f> {
+    /// Of all pieces.
+    pub(super) fn of(
+        curves: &Curves,
+        f: &'f dyn Fn(f64, &[f64]) -> f64,
+        affine: bool,
+    ) -> Result<Self, MeasureError> {
+        let mut drawn = Self {
+            f,
+            largest: 0.0,
+            curves: Vec::with_capacity(curves.len()),
+            places: Vec::with_capacity(curves.len()),
+            has_edge: false,
+        };
+        let all = curves.all();
+        let own = all.map(|(piece, signals)| Ok((piece, signals, drawn.values(piece, signals)?)));
+        let own: Vec<_> = own.collect::<Result<_, _>>()?;
+        let values = own.iter().flat_map(|(.., values)| values);
+        drawn.largest = values.fold(0.0, |m: f64, y| m.max(y.abs()));
+        for (k, (piece, signals, values)) in own.into_iter().enumerate() {
+            let place = (k, 0.0, 1.0);
+            if affine {
+                drawn.push(piece, place, values);
+            } else {
+                drawn.follow(piece, place, signals, values, HALVINGS)?;
+            }
+        }
+        Ok(drawn)
+    }
+
     /// Its values where the signals have theirs.
     fn values(
         &self,
@@ -247,7 +279,13 @@ impl Drawn<'_> {
         Ok(values)
     }
 
-    fn push(&mut self, (begin, length, until): (f64, f64, f64), values: [f64; VALUES]) {
+    fn push(
+        &mut self,
+        (begin, length, until): (f64, f64, f64),
+        place: (usize, f64, f64),
+        values: [f64; VALUES],
+    ) {
+        self.places.push(place);
         self.curves.push(Curve {
             begin,
             length,
@@ -260,11 +298,13 @@ impl Drawn<'_> {
     fn follow(
         &mut self,
         piece: (f64, f64, f64),
+        place: (usize, f64, f64),
         signals: &[[f64; VALUES]],
         values: [f64; VALUES],
         halvings: u32,
     ) -> Result<(), MeasureError> {
         let (begin, length, until) = piece;
+        let (whole, from, part) = place;
         let halves: Vec<_> = signals.iter().map(Curve::halved).collect();
         let half = [0, 1].map(|k| halves.iter().map(|pair| pair[k]).collect::<Vec<_>>());
         let pieces = [
@@ -281,17 +321,22 @@ impl Drawn<'_> {
         };
         let most = (1..2 * INTERVALS).step_by(2).map(off).fold(0.0, f64::max);
         if most <= CURVE_CLOSE * self.largest {
-            self.push(piece, values);
+            self.push(piece, place, values);
             return Ok(());
         }
         if halvings == 0 {
+            self.has_edge = true;
             let rise = (values[INTERVALS] - values[0]) / INTERVALS as f64;
-            self.push(piece, std::array::from_fn(|k| values[0] + rise * k as f64));
+            let line = std::array::from_fn(|k| values[0] + rise * k as f64);
+            self.push(piece, place, line);
             return Ok(());
         }
-        for ((piece, signals), values) in pieces.into_iter().zip(&half).zip(closer) {
+        let places = [0.0, 0.5].map(|begins| (whole, from + begins * part, 0.5 * part));
+        for (((piece, place), signals), values) in
+            pieces.into_iter().zip(places).zip(&half).zip(closer)
+        {
             if piece.2 > 0.0 {
-                self.follow(piece, signals, values, halvings - 1)?;
+                self.follow(piece, place, signals, values, halvings - 1)?;
             }
         }
         Ok(())

@@ -11,6 +11,7 @@ mod couple;
 pub(crate) mod fixture;
 mod graph;
 mod parts;
+mod perturbed;
 mod readings;
 mod sliding;
 mod standard;
@@ -26,6 +27,7 @@ use crate::lcs::{Input, Port, PowerKind, Role};
 pub use assemble::behaviour;
 pub(crate) use clocked::SourceControl;
 pub(crate) use parts::Part;
+pub(crate) use perturbed::Perturbation;
 pub use standard::StandardMultiport;
 
 /// An exact coefficient of an equation.
@@ -245,6 +247,8 @@ pub struct StaticMultiport {
     pub graph: Vec<topology::Edge>,
     /// The coefficients are measured doubles: what cancels to less than their rounding counts as 0.
     pub inexact: bool,
+    /// Fewer digits do: rationals do not stand in for balls that are wide.
+    pub(crate) rough: bool,
     ball: OnceLock<Reduced<Ball>>,
     rational: OnceLock<Reduced<Rational>>,
 }

@@ -1,8 +1,8 @@
-//! Derivatives of measurements of random converters against extrapolated differences of exact runs.
+//! Derivatives of measurements of random converters against extrapolated differences of exact runs, and backward against forward along the run.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use circ::analysis::{SensitivityOptions, sensitivity, transient};
+use circ::analysis::{SensitivityMethod, SensitivityOptions, sensitivity, transient};
 use circ::{Method, Model, SimOptions};
 
 use crate::circuit::{Part, states};
@@ -11,6 +11,9 @@ use crate::topologies::{Style, plain_case};
 
 /// Derivatives agree to this part of the measurement or of its change with ln p, whichever is larger.
 const TOLERANCE: f64 = 1e-6;
+
+/// Backward and forward along the run they agree to this part of the largest p ∂J/∂p of a measurement or of what it measures: what rounding leaves of hundreds of events.
+const BOTH_WAYS: f64 = 1e-11;
 
 /// Differences of two sizes that are this far apart tell nothing: an event changes its order, or rounding shows.
 const KNOWN: f64 = 2e-7;
@@ -23,6 +26,8 @@ const STEPS: [f64; 2] = [4e-5, 1e-5];
 pub(crate) struct Tally {
     pub(crate) compared: usize,
     pub(crate) circuits: usize,
+    /// Derivatives that were computed both ways.
+    pub(crate) both: usize,
     /// Where differences tell nothing.
     pub(crate) unknown: usize,
     /// Circuits without a derivative, and why.
@@ -51,6 +56,48 @@ fn difference(model: &Model, name: &str, value: f64, h: f64) -> Option<Vec<Optio
     let [a, b, c, d] = [at(-2.0)?, at(-1.0)?, at(1.0)?, at(2.0)?];
     let of = |k: usize| Some((8.0 * (c[k]? - b[k]?) - (d[k]? - a[k]?)) / (12.0 * h));
     Some((0..a.len()).map(of).collect())
+}
+
+/// Compares the derivatives to these elements backward and forward along the run.
+fn both_ways((seed, model): (u64, &Model), elements: &[(&str, f64)], tally: &mut Tally) {
+    let by = |method| {
+        let options = SensitivityOptions {
+            to: elements
+                .iter()
+                .map(|(name, _)| (*name).to_string())
+                .collect(),
+            method,
+            ..SensitivityOptions::default()
+        };
+        sensitivity(model, &options)
+    };
+    let found = (
+        by(SensitivityMethod::Forward),
+        by(SensitivityMethod::Adjoint),
+    );
+    let (Ok(forward), Ok(backward)) = found else {
+        return;
+    };
+    if backward.passes.backward == 0 {
+        return;
+    }
+    for (a, b) in forward.of.iter().zip(&backward.of) {
+        let pairs = a.to.iter().zip(&b.to).zip(elements);
+        let scaled = pairs.filter_map(|((a, b), (_, value))| Some((value * a.1?, value * b.1?)));
+        let scaled: Vec<(f64, f64)> = scaled.collect();
+        let size = a.value.as_ref().map_or(0.0, |value| value.abs());
+        let largest = scaled.iter().fold(size, |m: f64, pair| m.max(pair.0.abs()));
+        for ((own, other), (name, _)) in scaled.iter().zip(elements) {
+            tally.both += 1;
+            if (own - other).abs() > BOTH_WAYS * largest {
+                let apart = (own - other).abs() / largest;
+                tally.wrong.push(format!(
+                    "{seed}: {} to {name}: {own:e} forward, {other:e} backward, {apart:e} apart",
+                    a.name
+                ));
+            }
+        }
+    }
 }
 
 /// Compares the derivatives of one circuit to some of its elements.
@@ -90,6 +137,7 @@ pub(crate) fn compare(seed: u64, tally: &mut Tally) {
         })
         .collect();
     random.shuffle(&mut elements);
+    let all = elements.clone();
     elements.truncate(2);
     let options = SensitivityOptions {
         to: elements
@@ -105,6 +153,7 @@ pub(crate) fn compare(seed: u64, tally: &mut Tally) {
         Err(_) => return tally.wrong.push(format!("{seed} panicked\n{text}")),
     };
     tally.circuits += 1;
+    both_ways((seed, &model), &all, tally);
     for (name, value) in elements {
         let [coarse, fine] = STEPS.map(|h| difference(&model, name, value, h));
         let (Some(coarse), Some(fine)) = (coarse, fine) else {

@@ -193,14 +193,11 @@ pub(super) fn common_period(circuit: &Circuit) -> Option<f64> {
     period::common(&circuit).ok()?.seconds
 }
 
-/// A simulation of a circuit near one whose steady state is known, with the period of its sources.
+/// The circuit with sources that do not repeat at rest, and the period of the others.
 ///
 /// # Errors
-/// As [`periodic`].
-pub(super) fn beside(
-    model: &Model,
-    options: &PeriodicOptions<'_>,
-) -> Result<(Option<f64>, Simulation), Error> {
+/// It is none.
+pub(super) fn repeating(model: &Model) -> Result<(Option<f64>, Circuit, StaticMultiport), Error> {
     let (circuit, _) = period::repeating(model.circuit());
     let seconds = period::common(&circuit)
         .ok()
@@ -209,8 +206,16 @@ pub(super) fn beside(
         let what = "a circuit with sources at rest is none";
         Error::before(Reason::internal("analysis::periodic", what))
     })?;
-    let simulation = simulation((&circuit, &multiport), seconds, 1.0, options)?;
-    Ok((options.period.or(seconds), simulation))
+    Ok((seconds, circuit, multiport))
+}
+
+/// A simulation of a circuit near one whose steady state is known.
+///
+/// # Errors
+/// As [`periodic`].
+pub(super) fn beside(model: &Model, options: &PeriodicOptions<'_>) -> Result<Simulation, Error> {
+    let (seconds, circuit, multiport) = repeating(model)?;
+    simulation((&circuit, &multiport), seconds, 1.0, options)
 }
 
 /// Finds the periodic steady state.

@@ -5,9 +5,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::linear::beyond_doubles;
-use super::moved::Sample;
 use crate::integrate::Error;
-use crate::integrate::exact::Spectrum;
 use crate::linalg::expm::Ladders;
 use crate::settings::tolerances::exponentials::SQUARED;
 
@@ -28,9 +26,8 @@ pub(super) struct Flow {
     system: usize,
     sources: Sources,
     generator: DMatrix<f64>,
-    /// y and δy over w.
-    rows: [DMatrix<f64>; 2],
-    pub(super) spectrum: Spectrum,
+    /// δy over w.
+    rows: DMatrix<f64>,
     /// exp(𝒢 t) − 1 by t, s; the oldest first.
     steps: Vec<(f64, DMatrix<f64>)>,
 }
@@ -50,7 +47,7 @@ impl Flows {
         &mut self,
         system: usize,
         sources: Sources,
-        equation: impl FnOnce(&Sources) -> (DMatrix<f64>, [DMatrix<f64>; 2], Spectrum),
+        equation: impl FnOnce(&Sources) -> (DMatrix<f64>, DMatrix<f64>),
     ) -> usize {
         let known = |flow: &Flow| flow.system == system && flow.sources == sources;
         if let Some(at) = self.0.iter().position(known) {
@@ -59,13 +56,12 @@ impl Flows {
         if self.0.len() == Self::MOST {
             self.0.remove(0);
         }
-        let (generator, rows, spectrum) = equation(&sources);
+        let (generator, rows) = equation(&sources);
         self.0.push(Flow {
             system,
             sources,
             generator,
             rows,
-            spectrum,
             steps: Vec::new(),
         });
         self.0.len() - 1
@@ -111,13 +107,13 @@ impl Flow {
         Ok(DMatrix::from_fn(dim, dim, |i, j| increment.column(j)[i]))
     }
 
-    /// What is seen at w.
-    pub(super) fn sample(&self, w: &DVector<f64>) -> Sample {
-        let [y, dy] = self.rows.each_ref().map(|rows| rows * w);
-        Sample {
-            y,
-            dy,
-            rate: &self.rows[0] * (&self.generator * w),
-        }
+    /// δy at w.
+    pub(super) fn sample(&self, w: &DVector<f64>) -> DVector<f64> {
+        &self.rows * w
+    }
+
+    /// How many outputs there are.
+    pub(super) fn outputs(&self) -> usize {
+        self.rows.nrows()
     }
 }

@@ -14,11 +14,11 @@ use crate::settings::tolerances::exponentials::{CURVED, SERIES, SQUARED};
 #[derive(Debug, Clone)]
 pub(crate) struct Linear {
     /// The system, and the sources' S and H that it was made for.
-    system: usize,
-    sources: [DMatrix<f64>; 2],
+    pub(super) system: usize,
+    pub(super) sources: [DMatrix<f64>; 2],
     /// 𝒜.
     pub(crate) generator: DMatrix<f64>,
-    basis: Option<Decoupled>,
+    pub(super) basis: Option<Decoupled>,
     fast: Vec<usize>,
     /// The outputs, their rates and the rates of these over w.
     pub(crate) rows: [DMatrix<f64>; 3],
@@ -194,11 +194,25 @@ impl Motion<'_> {
 
     /// Taylor's coefficients of w over so many seconds, at most the bottom's: w(s t) = Σ s^k w_k.
     pub(crate) fn series(&self, w: &DVector<f64>, seconds: f64) -> Vec<DVector<f64>> {
+        let along = |w: &DVector<f64>| &self.linear.generator * w;
+        Self::terms(w, seconds, along)
+    }
+
+    /// The same of a costate on its way back, φ' = −𝒜ᵀ φ.
+    pub(super) fn series_back(&self, phi: &DVector<f64>, seconds: f64) -> Vec<DVector<f64>> {
+        Self::terms(phi, seconds, |phi| self.linear.generator.tr_mul(phi))
+    }
+
+    fn terms(
+        w: &DVector<f64>,
+        seconds: f64,
+        along: impl Fn(&DVector<f64>) -> DVector<f64>,
+    ) -> Vec<DVector<f64>> {
         /// Terms beyond which nothing is left where ‖𝒜‖ t ≤ ⅛.
         const TERMS: usize = 16;
         let mut terms = vec![w.clone()];
         for k in 1..TERMS {
-            terms.push(&self.linear.generator * &terms[k - 1] * (seconds / k as f64));
+            terms.push(along(&terms[k - 1]) * (seconds / k as f64));
         }
         terms
     }

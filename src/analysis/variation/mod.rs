@@ -8,14 +8,24 @@
 //!
 //! is a product of exponentials and saltations, without differences.
 
+mod adjoint;
+mod carried;
+mod change;
+mod costate;
 mod course;
+mod drawing;
 mod flow;
+mod forms;
 mod instant;
 mod linear;
 mod moved;
+mod near;
 mod parameter;
 mod saltation;
 mod system;
+mod tableau;
+
+use std::sync::atomic::AtomicBool;
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 
@@ -26,14 +36,22 @@ use crate::settings::tolerances::events::{AT_LEVEL, GRAZING, SAME_TIMING};
 use crate::settings::tolerances::jumps::FOLLOWS_JUMP;
 use crate::settings::tolerances::times::SAME_TIME;
 
+pub(crate) use adjoint::Adjoint;
+pub(crate) use carried::Carried;
+pub(crate) use change::Changes;
 pub(crate) use course::{Course, Leap};
+pub(crate) use drawing::{Drawing, Lines, Sight, Weighted};
+pub(crate) use forms::Forms;
 use instant::Inputs;
 pub(crate) use linear::{Linear, Motion, parts, unit};
-pub(crate) use moved::Sight;
-pub(crate) use parameter::{Near, Parameter, STEPS};
+pub(crate) use moved::Moved;
+pub(crate) use near::{Near, STEPS, difference};
+pub(crate) use parameter::Parameter;
 use saltation::Side;
 pub(crate) use saltation::{Saltation, Timing, times};
+use system::Row;
 pub(crate) use system::{System, shaped};
+pub(crate) use tableau::{Rest, Tableau};
 
 /// A stretch of a run in one mode.
 #[derive(Debug, Clone)]
@@ -45,12 +63,21 @@ pub(crate) struct Segment {
     pub(crate) to: f64,
     /// x where it begins.
     pub(crate) start: DVector<f64>,
-    /// e^{A (to − from)}.
+    /// e^{A (to − from)}; empty where events that coincide by chance are kept, as nothing takes it there.
     pub(crate) propagator: DMatrix<f64>,
     /// x where it ends.
     pub(crate) end: DVector<f64>,
     /// Guards of devices that are zero there and stay so, where events that coincide by chance are kept.
-    resting: Vec<(Owner, usize)>,
+    resting: Vec<Resting>,
+}
+
+/// A guard that is zero at the end of a segment and stays so.
+#[derive(Debug, Clone)]
+struct Resting {
+    /// Whose it is, and which of that one's.
+    owner: (Owner, usize),
+    row: Row,
+    name: String,
 }
 
 /// A run from one time to another, with what its derivative is made of.
@@ -90,28 +117,39 @@ impl Trajectory {
         place: (f64, &[f64], &[bool]),
         until: f64,
     ) -> Result<Self, Error> {
-        Self::with(simulation, place, until, false)
+        Self::made(simulation, place, until, (false, None))?.ok_or_else(|| {
+            let what = "steps are made in it, and their derivative is not known";
+            not_smooth(place.0, what)
+        })
     }
 
-    /// The same; events that coincide `by_chance` are kept with all their guards, for a variation that tells whether they part.
+    /// The same; events that coincide by chance are kept with all their guards, for a variation that tells whether they part. `None` where steps are made.
     ///
     /// # Errors
     /// As [`Self::of`].
-    pub(crate) fn with(
+    pub(crate) fn by_chance(
         simulation: &mut Simulation,
         place: (f64, &[f64], &[bool]),
         until: f64,
-        by_chance: bool,
-    ) -> Result<Self, Error> {
+        cancel: Option<&AtomicBool>,
+    ) -> Result<Option<Self>, Error> {
+        Self::made(simulation, place, until, (true, cancel))
+    }
+
+    fn made(
+        simulation: &mut Simulation,
+        place: (f64, &[f64], &[bool]),
+        until: f64,
+        (by_chance, cancel): (bool, Option<&AtomicBool>),
+    ) -> Result<Option<Self>, Error> {
         let from = place.0;
-        let passages = simulation.passages(place, until, None)?;
-        let passages = passages.ok_or_else(|| {
-            let what = "steps are made in it, and their derivative is not known";
-            not_smooth(from, what)
-        })?;
+        let Some(passages) = simulation.passages(place, until, cancel)? else {
+            return Ok(None);
+        };
         let end = simulation.state();
         let maker = Maker::of(simulation, (from, until));
-        Maker { by_chance, ..maker }.make(&passages, (until, &end))
+        let made = Maker { by_chance, ..maker }.make(&passages, (until, &end));
+        made.map(Some)
     }
 
     /// The run through these changes of mode, from one time to another, at which the storage is `end`. `systems` are those of a run as long
@@ -261,7 +299,11 @@ impl Maker {
         (to, end): (f64, &[f64]),
     ) -> Result<Segment, Error> {
         let of = &self.systems[system];
-        let propagator = of.propagator(to - from);
+        let propagator = if self.by_chance {
+            Some(DMatrix::default())
+        } else {
+            of.propagator(to - from)
+        };
         let end = of.state(end);
         Ok(Segment {
             resting: self.resting(of, to, &end),
@@ -277,7 +319,7 @@ impl Maker {
     }
 
     /// Guards of devices that are zero in a mode and stay so: a change of a value may move them off to one side alone.
-    fn resting(&self, system: &System, t: f64, x: &DVector<f64>) -> Vec<(Owner, usize)> {
+    fn resting(&self, system: &System, t: f64, x: &DVector<f64>) -> Vec<Resting> {
         let inputs = Inputs::before(&system.lcs.inputs, t, self.same);
         let Some(inputs) = inputs.filter(|_| self.by_chance) else {
             return Vec::new();
@@ -287,12 +329,16 @@ impl Maker {
         for owner in (0..system.key.closed.len()).map(Owner::Device) {
             let limits = |i| self.assembler.limits(i);
             let guards = system.guards(owner, (&self.thresholds, limits));
-            for (k, guard) in guards.iter().enumerate() {
+            for (k, row) in guards.into_iter().enumerate() {
                 let ((value, size), (slope, slopes)) =
-                    (guard.value(x, &inputs), guard.rate(&rate, &inputs));
+                    (row.value(x, &inputs), row.rate(&rate, &inputs));
                 let rests = value.abs() <= GRAZING * size && slope.abs() <= GRAZING * slopes;
                 if rests && slopes > 0.0 {
-                    found.push((owner, k));
+                    found.push(Resting {
+                        owner: (owner, k),
+                        row,
+                        name: self.name(owner),
+                    });
                 }
             }
         }

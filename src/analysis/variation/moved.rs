@@ -1,149 +1,103 @@
-//! The outputs of a run and how they move with ln p, as the smooth pieces that measurements see.
+//! The outputs of a run as they are where ln p is a little larger or smaller, for measurements whose derivative is a difference.
 
-use nalgebra::DVector;
-
+use super::drawing::{Drawing, Weighted};
 use crate::measure::{Curves, VALUES};
 use crate::settings::tolerances::periodic::{MEASURE_STEP, MOVED};
 
-/// Where a piece is, s.
-#[derive(Debug, Clone, Copy)]
-struct Piece {
-    segment: usize,
-    /// Since the segment began.
-    age: f64,
-    begin: f64,
-    length: f64,
-    until: f64,
-    /// Derivatives with ln p.
-    begins_later: f64,
-    longer: f64,
-}
-
-/// Which part of a run is seen, and in which steps.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Sight {
-    /// Segments that end later, s.
-    pub(crate) from: f64,
-    /// Steps are halvings of it, s.
-    pub(crate) unit: f64,
-    /// Values at most.
-    pub(crate) most: usize,
-}
-
-/// Outputs, their derivatives with ln p at a time that stays, and their rates.
-pub(super) struct Sample {
-    pub(super) y: DVector<f64>,
-    pub(super) dy: DVector<f64>,
-    pub(super) rate: DVector<f64>,
-}
-
-/// See the [module](self).
-#[derive(Debug, Clone, Default)]
+/// How a run moves with ln p.
+#[derive(Debug, Clone)]
 pub(crate) struct Moved {
-    columns: usize,
-    pieces: Vec<Piece>,
-    /// By piece and output.
-    values: Vec<[f64; VALUES]>,
-    /// Their derivatives with ln p, first at times that stay.
+    /// By piece of the drawing and output: the derivatives of its values at times that stay.
+    pub(super) changes: Vec<[f64; VALUES]>,
+    /// Of where segments begin, and of the last one's end.
+    pub(super) ends: Vec<f64>,
+}
+
+/// A run whose segments move with their ends: by piece where it begins later and how much longer it is, and by piece and output the derivatives of its values.
+pub(crate) struct Stretched<'a> {
+    drawing: &'a Drawing,
+    pieces: Vec<(f64, f64)>,
     changes: Vec<[f64; VALUES]>,
-    rates: Vec<[f64; VALUES]>,
 }
 
 impl Moved {
-    pub(super) fn of(columns: usize) -> Self {
-        Self {
-            columns,
-            ..Self::default()
-        }
+    /// dJ with ln p of what a measurement weighs.
+    pub(crate) fn weighed(&self, weighted: &Weighted) -> f64 {
+        let pairs = weighted.nodes.iter().zip(&self.changes);
+        let dot = |(a, b): (&[f64; VALUES], &[f64; VALUES])| -> f64 {
+            a.iter().zip(b).map(|(a, b)| a * b).sum()
+        };
+        let nodes: f64 = pairs.map(dot).sum();
+        let ends = weighted.shifts.iter().zip(&self.ends);
+        nodes + ends.map(|(a, b)| a * b).sum::<f64>()
     }
 
-    pub(super) fn values(&self) -> usize {
-        self.values.len() * VALUES
-    }
-
-    /// Adds a piece of a segment of so many seconds from t.
-    pub(super) fn push(
-        &mut self,
-        segment: usize,
-        (t, seconds): (f64, f64),
-        (age, step): (f64, f64),
-        samples: &[Sample],
-    ) {
-        self.pieces.push(Piece {
-            segment,
-            age,
-            begin: t + age,
-            length: step,
-            until: ((seconds - age) / step).min(1.0),
-            begins_later: 0.0,
-            longer: 0.0,
-        });
-        for c in 0..self.columns {
-            self.values.push(std::array::from_fn(|k| samples[k].y[c]));
-            self.changes.push(std::array::from_fn(|k| samples[k].dy[c]));
-            self.rates.push(std::array::from_fn(|k| samples[k].rate[c]));
-        }
-    }
-
-    /// Has what is in each segment move with its ends, which move by so much with ln p; `seconds` by segment, and one more of `ends` than these. An event stays where
-    /// it is beside another one that it would pass.
-    pub(super) fn stretch(&mut self, seconds: &[f64], ends: &[f64]) {
+    /// Has what is in each segment move with its ends. An event stays where it is beside another one that it would pass.
+    pub(crate) fn stretched<'a>(&self, drawing: &'a Drawing) -> Stretched<'a> {
         /// Moves for which there is room.
         const ROOM: f64 = 4.0;
-        let mut moves = ends.to_vec();
-        for (k, seconds) in seconds.iter().enumerate() {
-            if ROOM * MEASURE_STEP * (ends[k + 1] - ends[k]).abs() > *seconds {
+        let mut moves = self.ends.clone();
+        for (k, seconds) in drawing.seconds.iter().enumerate() {
+            if ROOM * MEASURE_STEP * (self.ends[k + 1] - self.ends[k]).abs() > *seconds {
                 moves[k..=k + 1].fill(0.0);
             }
         }
-        let rates = std::mem::take(&mut self.rates);
-        let changes = self.changes.chunks_exact_mut(self.columns.max(1));
-        let rates = rates.chunks_exact(self.columns.max(1));
-        for ((piece, changes), rates) in self.pieces.iter_mut().zip(changes).zip(rates) {
+        let columns = drawing.columns.max(1);
+        let mut changes = self.changes.clone();
+        let mut pieces = Vec::with_capacity(drawing.pieces.len());
+        let all = changes.chunks_exact_mut(columns);
+        let all = all.zip(drawing.rates.chunks_exact(columns));
+        for (piece, (changes, rates)) in drawing.pieces.iter().zip(all) {
             let [from, to] = [piece.segment, piece.segment + 1].map(|k| moves[k]);
-            let strain = (to - from) / seconds[piece.segment];
-            piece.begins_later = from + strain * piece.age;
-            piece.longer = strain * piece.length;
+            let strain = (to - from) / drawing.seconds[piece.segment];
+            let (later, longer) = (from + strain * piece.age, strain * piece.length);
+            pieces.push((later, longer));
             for (change, rate) in changes.iter_mut().zip(rates) {
                 for (k, (change, rate)) in change.iter_mut().zip(rate).enumerate() {
                     let part = k as f64 / (VALUES - 1) as f64;
-                    *change += rate * (piece.begins_later + part * piece.longer);
+                    *change += rate * (later + part * longer);
                 }
             }
         }
+        Stretched {
+            drawing,
+            pieces,
+            changes,
+        }
     }
+}
 
+impl Stretched<'_> {
     /// A change of ln p that moves times and values by small parts of themselves.
     pub(crate) fn small(&self) -> f64 {
-        let pieces = self.pieces.iter();
-        let strain = pieces.fold(0.0, |m: f64, piece| {
-            m.max((piece.longer / piece.length).abs())
+        let pieces = self.drawing.pieces.iter().zip(&self.pieces);
+        let strain = pieces.fold(0.0, |m: f64, (piece, (_, longer))| {
+            m.max((longer / piece.length).abs())
         });
+        let columns = self.drawing.columns;
         let largest = |all: &[[f64; VALUES]], c: usize| {
-            let own = all.iter().skip(c).step_by(self.columns);
+            let own = all.iter().skip(c).step_by(columns);
             own.flatten().fold(0.0, |m: f64, v| m.max(v.abs()))
         };
-        let change = |c: usize| largest(&self.changes, c) / largest(&self.values, c);
-        let changes = (0..self.columns)
-            .map(change)
-            .filter(|change| change.is_finite());
+        let change = |c: usize| largest(&self.changes, c) / largest(&self.drawing.values, c);
+        let changes = (0..columns).map(change).filter(|change| change.is_finite());
         (MOVED / changes.fold(strain, f64::max)).clamp(MEASURE_STEP, MOVED)
     }
 
     /// The outputs where ln p is larger by h.
     pub(crate) fn at(&self, h: f64) -> Curves {
-        let mut moved = Curves::of(self.columns);
-        let values = self.values.chunks_exact(self.columns.max(1));
-        let changes = self.changes.chunks_exact(self.columns.max(1));
-        for ((piece, values), changes) in self.pieces.iter().zip(values).zip(changes) {
-            let length = piece.length + h * piece.longer;
+        let columns = self.drawing.columns;
+        let mut moved = Curves::of(columns);
+        let values = self.drawing.values.chunks_exact(columns.max(1));
+        let changes = self.changes.chunks_exact(columns.max(1));
+        let pieces = self.drawing.pieces.iter().zip(&self.pieces);
+        for ((piece, values), changes) in pieces.zip(values).zip(changes) {
+            let (piece, (later, longer)) = piece;
+            let length = piece.length + h * longer;
             let all = values.iter().zip(changes);
             let all = all.map(|(y, dy)| std::array::from_fn(|k| y[k] + h * dy[k]));
             let all: Vec<[f64; VALUES]> = all.collect();
-            moved.push(
-                (piece.begin + h * piece.begins_later, length, piece.until),
-                &all,
-            );
+            moved.push((piece.begin + h * later, length, piece.until), &all);
         }
         moved
     }
@@ -151,20 +105,30 @@ impl Moved {
 
 #[cfg(test)]
 mod tests {
+    use super::super::drawing::Piece;
     use super::*;
 
     /// A piece of 1 s whose end moves by so much with ln p, of a constant signal.
     fn small(end: f64) -> f64 {
-        let constant = || Sample {
-            y: DVector::from_element(1, 1.0),
-            dy: DVector::zeros(1),
-            rate: DVector::zeros(1),
+        let drawing = Drawing {
+            columns: 1,
+            pieces: vec![Piece {
+                segment: 0,
+                age: 0.0,
+                begin: 0.0,
+                level: 0,
+                length: 1.0,
+                until: 1.0,
+            }],
+            values: vec![[1.0; VALUES]],
+            rates: vec![[0.0; VALUES]],
+            seconds: vec![1.0],
         };
-        let samples: Vec<Sample> = (0..VALUES).map(|_| constant()).collect();
-        let mut moved = Moved::of(1);
-        moved.push(0, (0.0, 1.0), (0.0, 1.0), &samples);
-        moved.stretch(&[1.0], &[0.0, end]);
-        moved.small()
+        let moved = Moved {
+            changes: vec![[0.0; VALUES]],
+            ends: vec![0.0, end],
+        };
+        moved.stretched(&drawing).small()
     }
 
     #[test]

@@ -5,228 +5,117 @@
 //! δx⁺ = J⁺ (X⁻ (δx⁻ + f⁻ δt) + U⁻ (δu + u' δt)) − f⁺ δt + ∂_p [J⁺ (X⁻ x⁻ + U⁻ u + k⁻) + j⁺]
 //! ```
 //!
-//! at the time at which the event was without the change; an edge of a source has the δt of that source. Matrices, guards and sources are
-//! differentiated by extrapolated differences of the circuits with p (1 ± h) and p (1 ± 2h), which are reduced for the same modes: they are rational
-//! functions of p, so that nothing of a run's events is in the differences.
+//! at the time at which the event was without the change; an edge of a source has the δt of that source.
 
 use nalgebra::{DMatrix, DVector};
 
+use super::change::{Changes, Guard, columns, over, short_columns};
+use super::drawing::{Drawing, Piece};
 use super::flow::{Flow, Flows, Sources};
+use super::forms::{Forms, edge};
 use super::instant::Inputs;
-use super::linear::parts;
-use super::moved::{Moved, Sight};
+use super::moved::Moved;
+use super::near::WEIGHTS;
 use super::saltation::{Side, Timing};
-use super::{Saltation, System, Trajectory, not_smooth, shaped};
-use crate::circuit::Source;
-use crate::circuit::source::Piece;
-use crate::integrate::exact::{Assembler, Exosystem, Owner, Shape, Spectrum};
-use crate::integrate::switching::Threshold;
-use crate::integrate::{Error, Simulation};
-use crate::measure::INTERVALS;
+use super::{Saltation, System, Trajectory, not_smooth};
+use crate::circuit::source;
+use crate::integrate::Error;
+use crate::integrate::exact::{Exosystem, Shape};
+use crate::measure::{INTERVALS, VALUES};
 use crate::settings::tolerances::events::SAME_TIMING;
 use crate::settings::tolerances::periodic::VALUE_STEP;
 use crate::settings::tolerances::times::SAME_LENGTH;
 
-/// The circuits that are compared, in steps of p h.
-pub(crate) const STEPS: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
-
-/// (8 (f(h) − f(−h)) − (f(2h) − f(−2h)))/12h
-const WEIGHTS: [f64; 4] = [1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0];
-
-/// The circuit with p a little aside, in the modes of a trajectory.
-pub(crate) struct Near {
-    systems: Vec<System>,
-    thresholds: Vec<Threshold>,
-    assembler: Assembler,
-    /// Where its transient begins.
-    pub(crate) state: Vec<f64>,
-}
-
-impl Near {
-    /// Of its simulation.
-    pub(crate) fn of(simulation: &mut Simulation, trajectory: &Trajectory) -> Result<Self, Error> {
-        let ends = trajectory.segments.first().zip(trajectory.segments.last());
-        let span = ends.map_or(1.0, |(first, last)| last.to - first.from);
-        let state = simulation.state();
-        let mut assembler = simulation.assembler(span);
-        let mut systems = Vec::new();
-        for system in &trajectory.systems {
-            let near = System::of(&system.key, &mut assembler)?;
-            let same = near.lcs.states == system.lcs.states && near.lcs.fast == system.lcs.fast;
-            if !same {
-                return Err(not_smooth(0.0, "another value makes other states"));
-            }
-            systems.push(near);
-        }
-        Ok(Self {
-            thresholds: assembler.thresholds(),
-            systems,
-            assembler,
-            state,
-        })
-    }
-}
-
-/// Σ weights · f over the circuits, over h: the derivative with ln p.
-fn weighted(parts: [DVector<f64>; 4]) -> DVector<f64> {
-    let [a, b, c, d] = parts;
-    let sum = a * WEIGHTS[0] + b * WEIGHTS[1] + c * WEIGHTS[2] + d * WEIGHTS[3];
-    sum / VALUE_STEP
-}
-
-/// The same of matrices.
-fn weighted_matrix(parts: [DMatrix<f64>; 4]) -> DMatrix<f64> {
-    let [a, b, c, d] = parts;
-    let sum = a * WEIGHTS[0] + b * WEIGHTS[1] + c * WEIGHTS[2] + d * WEIGHTS[3];
-    sum / VALUE_STEP
-}
-
-/// The sources on a segment: their closed forms, and those of the circuits that are compared.
-struct Forms {
-    own: Vec<Piece>,
-    near: [Vec<Piece>; 4],
-}
-
-/// The sources on their way from t = 0. Those of the circuits that are compared stand on the pieces of the same number, wherever their edges have
-/// moved to.
-struct Walk<'a> {
-    sources: Vec<[&'a Source; 5]>,
-    own: Vec<Piece>,
-    near: [Vec<Piece>; 4],
-}
-
-impl<'a> Walk<'a> {
-    fn of(trajectory: &'a Trajectory, near: &'a [Near; 4]) -> Result<Self, Error> {
-        let own = trajectory.systems.first().map(|system| &system.lcs.inputs);
-        let near = near.each_ref().map(|near| near.systems.first());
-        let sources = (0..own.map_or(0, Vec::len)).filter_map(|i| {
-            let [a, b, c, d] = near.map(|system| Some(&system?.lcs.inputs[i].source));
-            Some([&own?[i].source, a?, b?, c?, d?])
-        });
-        let sources: Vec<[&Source; 5]> = sources.collect();
-        let at_start = |m: usize| -> Result<Vec<Piece>, Error> {
-            let pieces = sources.iter().map(|source| piece(source[m], 0.0));
-            pieces.collect()
-        };
-        Ok(Self {
-            own: at_start(0)?,
-            near: [at_start(1)?, at_start(2)?, at_start(3)?, at_start(4)?],
-            sources,
-        })
-    }
-
-    /// To the pieces at t, no earlier than the time before.
-    fn advance(&mut self, t: f64) -> Result<(), Error> {
-        for (i, sources) in self.sources.iter().enumerate() {
-            while self.own[i].end <= t {
-                let [a, b, c, d] = &mut self.near;
-                let pieces = [&mut self.own[i], &mut a[i], &mut b[i], &mut c[i], &mut d[i]];
-                for (source, standing) in sources.iter().zip(pieces) {
-                    *standing = following(source, standing)?;
-                }
-            }
-        }
-        Ok(())
-    }
-}
-
-fn piece(source: &Source, t: f64) -> Result<Piece, Error> {
-    let piece = source.piece(t);
-    piece.ok_or_else(|| not_smooth(t, "a source has no closed form"))
-}
-
-/// The piece after one: the last is followed by itself.
-fn following(source: &Source, standing: &Piece) -> Result<Piece, Error> {
-    let mut t = standing.end;
-    while t.is_finite() {
-        let next = piece(source, t)?;
-        if next.end > standing.end {
-            return Ok(next);
-        }
-        t = t.next_up();
-    }
-    Ok(*standing)
-}
-
-/// A trajectory and the circuits beside it.
+/// A trajectory and what changes along it.
 pub(crate) struct Parameter<'a> {
     pub(crate) trajectory: &'a Trajectory,
-    pub(crate) near: &'a [Near; 4],
-    /// By segment.
-    forms: Vec<Forms>,
+    pub(crate) forms: &'a Forms,
+    pub(crate) changes: &'a Changes,
 }
 
-/// Sees a segment from w on; whether that is all of it.
-fn see(
-    flow: &mut Flow,
-    (begin, seconds): (f64, f64),
-    w: &DVector<f64>,
-    sight: Sight,
-    (segment, moved): (usize, &mut Moved),
-) -> Result<bool, Error> {
-    let (mut w, spectrum) = (w.clone(), flow.spectrum.clone());
-    for part in parts(&spectrum, sight.unit, (0.0, seconds)) {
-        if moved.values() > sight.most {
-            return Ok(false);
-        }
-        let mut samples = vec![flow.sample(&w)];
-        for _ in 0..INTERVALS {
-            flow.advance(&mut w, part.length / INTERVALS as f64, 0.0)?;
-            samples.push(flow.sample(&w));
-        }
-        moved.push(segment, (begin, seconds), (part.age, part.length), &samples);
-    }
-    Ok(true)
+/// What the storage jumps by at an event, besides its time.
+pub(super) struct Jump<'a> {
+    /// The system that is left, the one in whose directions the storage jumps, and the one that follows.
+    pub(super) from: &'a System,
+    pub(super) through: Option<&'a System>,
+    pub(super) to: &'a System,
+    /// [x | u | 1] and s before.
+    pub(super) left: DVector<f64>,
+    pub(super) storage: DVector<f64>,
+    /// [x | u | 1] and s in the directions of the jump.
+    pub(super) between: Option<(DVector<f64>, DVector<f64>)>,
+    /// u afterwards.
+    pub(super) after: DVector<f64>,
+    /// What δt is times in δx⁺.
+    pub(super) drift: DVector<f64>,
 }
 
-impl<'a> Parameter<'a> {
-    pub(crate) fn of(trajectory: &'a Trajectory, near: &'a [Near; 4]) -> Result<Self, Error> {
-        let mut walk = Walk::of(trajectory, near)?;
-        let forms = trajectory.segments.iter().map(|segment| {
-            walk.advance(0.5 * (segment.from + segment.to))?;
-            Ok(Forms {
-                own: walk.own.clone(),
-                near: walk.near.clone(),
-            })
-        });
-        Ok(Self {
-            forms: forms.collect::<Result<_, Error>>()?,
-            trajectory,
-            near,
-        })
-    }
-
-    /// ∂s/∂ln p of where the transients of these circuits begin.
-    pub(crate) fn weighted_states(near: &[Near; 4]) -> DVector<f64> {
-        weighted(
-            near.each_ref()
-                .map(|near| DVector::from_column_slice(&near.state)),
-        )
-    }
-
-    /// u and its rates at t, as segment k has them.
-    fn inputs(pieces: &[Piece], t: f64) -> Inputs {
-        let values = |value: fn(&Piece, f64) -> f64| {
-            DVector::from_iterator(pieces.len(), pieces.iter().map(|piece| value(piece, t)))
+impl<'a> Jump<'a> {
+    /// Of the event after segment k.
+    pub(super) fn of(trajectory: &'a Trajectory, forms: &Forms, k: usize) -> Self {
+        let (segments, systems) = (&trajectory.segments, &trajectory.systems);
+        let saltation = &trajectory.saltations[k];
+        let t = saltation.t;
+        let side = |k: usize, x: &DVector<f64>| Side {
+            system: &systems[segments[k].system],
+            x: x.clone(),
+            inputs: forms.inputs(k, t),
         };
-        Inputs {
-            u: values(Piece::value),
-            du: values(Piece::derivative),
-            ddu: values(Piece::second_derivative),
+        let before = side(k, &segments[k].end);
+        let after = side(k + 1, &segments[k + 1].start);
+        let through = saltation.through.map(|at| &systems[at]);
+        let mut inject = after.system.lcs.storage.inject.clone();
+        let mut drift = DVector::zeros(inject.nrows());
+        let storage = before.system.storage(&before.x, &before.inputs.u);
+        let mut between = None;
+        if let Some(jump) = through {
+            drift += &inject * (&jump.storage_inputs * &after.inputs.du);
+            inject = inject * &jump.lcs.storage.x * &jump.lcs.storage.inject;
+            let x = jump.state(storage.as_slice());
+            let then = jump.storage(&x, &after.inputs.u);
+            between = Some((short_columns(&x, &after.inputs.u), then));
         }
+        drift += &inject * before.storage_rate() - after.rate();
+        Self {
+            from: before.system,
+            through,
+            to: after.system,
+            left: short_columns(&before.x, &before.inputs.u),
+            storage,
+            between,
+            after: after.inputs.u,
+            drift,
+        }
+    }
+}
+
+impl Parameter<'_> {
+    /// δu at t, as segment k has it.
+    fn du(&self, k: usize, t: f64) -> DVector<f64> {
+        self.source_change(k, t, source::Piece::value)
+    }
+
+    fn source_change(
+        &self,
+        k: usize,
+        t: f64,
+        value: fn(&source::Piece, f64) -> f64,
+    ) -> DVector<f64> {
+        let mut du = DVector::zeros(self.forms.on(k).len());
+        for moving in self.changes.moving.iter().filter(|moving| !moving.is_told) {
+            du[moving.input] = moving.change(k, t, value);
+        }
+        du
     }
 
     /// δx at the start of the first segment, where δs is that of the storage.
     fn start(&self, ds: &DVector<f64>) -> DVector<f64> {
         let first = &self.trajectory.segments[0];
         let system = &self.trajectory.systems[first.system];
-        let inputs = Self::inputs(&self.forms[0].own, first.from);
-        let storage = system.storage(&first.start, &inputs.u);
-        let moved = self
-            .near
-            .each_ref()
-            .map(|near| near.systems[first.system].state(storage.as_slice()));
-        weighted(moved) + &system.lcs.storage.inject * ds
+        let u = self.forms.inputs(0, first.from).u;
+        let storage = system.storage(&first.start, &u);
+        let changes = &self.changes.systems[first.system].inject;
+        changes * short_columns(&storage, &u) + &system.lcs.storage.inject * ds
     }
 
     /// δs where δx is that of the state at the end.
@@ -234,35 +123,35 @@ impl<'a> Parameter<'a> {
         let k = self.trajectory.segments.len() - 1;
         let last = &self.trajectory.segments[k];
         let system = &self.trajectory.systems[last.system];
-        let parts = std::array::from_fn(|m| {
-            let inputs = Self::inputs(&self.forms[k].near[m], last.to);
-            self.near[m].systems[last.system].storage(&last.end, &inputs.u)
-        });
-        weighted(parts) + &system.lcs.storage.x * dx
+        let u = self.forms.inputs(k, last.to).u;
+        let changes = &self.changes.systems[last.system].storage;
+        changes * short_columns(&last.end, &u)
+            + &system.lcs.storage.x * dx
+            + &system.storage_inputs * self.du(k, last.to)
     }
 
     /// The equation of segment k among those that are known, and w where it begins.
     fn enter(&self, flows: &mut Flows, k: usize, dx: &DVector<f64>) -> (usize, DVector<f64>) {
         let segment = &self.trajectory.segments[k];
-        let forms = &self.forms[k];
-        let (n, p) = (dx.len(), forms.own.len());
+        let own = self.forms.on(k);
+        let (n, p) = (dx.len(), own.len());
         // The sources that move have their closed forms beside them.
-        let moving: Vec<usize> = (0..p)
-            .filter(|&i| forms.near.iter().any(|near| near[i] != forms.own[i]))
+        let moving = self.changes.moving.iter();
+        let moving: Vec<_> = moving
+            .filter(|moving| !moving.is_told)
+            .filter(|moving| moving.near[k].iter().any(|near| *near != own[moving.input]))
             .collect();
-        let beside = moving
-            .iter()
-            .flat_map(|&i| forms.near.iter().map(move |near| near[i]));
-        let pieces: Vec<Piece> = forms.own.iter().copied().chain(beside).collect();
+        let beside = moving.iter().flat_map(|moving| moving.near[k]);
+        let pieces: Vec<source::Piece> = own.iter().copied().chain(beside).collect();
         let shapes: Vec<Shape> = pieces.iter().map(|piece| Shape::of([piece])).collect();
         let exosystem = Exosystem::new(&shapes, pieces);
         let dz = exosystem.dim();
         let own = exosystem.output().rows(0, p).into_owned();
         let mut change = DMatrix::zeros(p, dz);
-        for (j, &i) in moving.iter().enumerate() {
+        for (j, moving) in moving.iter().enumerate() {
             for (m, weight) in WEIGHTS.iter().enumerate() {
                 let row = exosystem.output().row(p + 4 * j + m) * (weight / VALUE_STEP);
-                let mut sum = change.row_mut(i);
+                let mut sum = change.row_mut(moving.input);
                 sum += row;
             }
         }
@@ -272,9 +161,7 @@ impl<'a> Parameter<'a> {
             generator: exosystem.generator().clone(),
         };
         let at = flows.place(segment.system, sources, |sources| {
-            let (generator, rows) = self.equation(segment.system, sources);
-            let a = &self.trajectory.systems[segment.system].lcs.a;
-            (generator, rows, Spectrum::new(a, exosystem.rates()))
+            self.equation(segment.system, sources)
         });
         let mut w = DVector::zeros(2 * n + dz);
         w.rows_mut(0, n).copy_from(&segment.start);
@@ -283,125 +170,103 @@ impl<'a> Parameter<'a> {
         (at, w)
     }
 
-    /// 𝒢, and y and δy over w, in a mode with these sources.
-    fn equation(&self, at: usize, sources: &Sources) -> (DMatrix<f64>, [DMatrix<f64>; 2]) {
-        let system = &self.trajectory.systems[at];
+    /// 𝒢, and δy over w, in a mode with these sources.
+    fn equation(&self, at: usize, sources: &Sources) -> (DMatrix<f64>, DMatrix<f64>) {
+        let (system, changes) = (&self.trajectory.systems[at], &self.changes.systems[at]);
         let (n, p) = (system.lcs.n(), sources.own.nrows());
-        let (own, change, dz) = (&sources.own, &sources.change, sources.own.ncols());
-        let of_near = |f: &dyn Fn(&System) -> DMatrix<f64>| {
-            weighted_matrix(self.near.each_ref().map(|near| f(&near.systems[at])))
-        };
-        let constant = |system: &System| DMatrix::from_column_slice(n, 1, system.lcs.e0.as_slice());
-        let dim = 2 * n + dz;
+        let dz = sources.own.ncols();
+        let outputs = over(&system.lcs.outputs.rows, (n, p));
+        let (count, dim) = (outputs.nrows(), 2 * n + dz);
+        // [x | u | u' | 1] over [x | z], and what of that the sources' change makes.
+        let own = read(n, &sources.own, &sources.generator, true);
+        let change = read(n, &sources.change, &sources.generator, false);
+        let plain = DMatrix::from_fn(n, n + 2 * p + 1, |i, j| {
+            if j < n {
+                system.lcs.a[(i, j)]
+            } else if j < n + p {
+                system.inputs[(i, j - n)]
+            } else if j < n + 2 * p {
+                0.0
+            } else {
+                system.lcs.e0[i]
+            }
+        });
         let mut generator = DMatrix::zeros(dim, dim);
         let mut put = |i: usize, j: usize, block: &DMatrix<f64>| {
             let mut view = generator.view_mut((i, j), block.shape());
             view += block;
         };
-        put(0, 0, &system.lcs.a);
-        put(0, n, &(&system.inputs * own));
-        put(0, n, &constant(system));
+        put(0, 0, &(&plain * &own));
         put(n, n, &sources.generator);
-        put(n + dz, 0, &of_near(&|s| s.lcs.a.clone()));
-        put(n + dz, n, &(of_near(&|s| s.inputs.clone()) * own));
-        put(n + dz, n, &(&system.inputs * change));
-        put(n + dz, n, &of_near(&constant));
+        put(n + dz, 0, &(&changes.rate * &own + &plain * &change));
         put(n + dz, n + dz, &system.lcs.a);
-        let outputs = &system.lcs.outputs.rows;
-        let count = outputs.one.len();
-        let over = |rows: &crate::lcs::Rows, h: &DMatrix<f64>, one: bool| {
-            let mut out = DMatrix::zeros(count, n + dz);
-            out.columns_mut(0, n).copy_from(&shaped(&rows.x, count, n));
-            let slopes = shaped(&rows.du, count, p) * (h * &sources.generator);
-            let mut z = out.columns_mut(n, dz);
-            z += shaped(&rows.u, count, p) * h + slopes;
-            if one {
-                let mut ones = out.column_mut(n);
-                ones += &rows.one;
-            }
-            out
-        };
-        let plain = over(outputs, own, true);
-        let moved = weighted_matrix(
-            self.near
-                .each_ref()
-                .map(|near| over(&near.systems[at].lcs.outputs.rows, own, true)),
-        );
-        let by_sources = over(outputs, change, false).columns(n, dz).into_owned();
-        let mut rows = [DMatrix::zeros(count, dim), DMatrix::zeros(count, dim)];
-        rows[0].columns_mut(0, n + dz).copy_from(&plain);
-        rows[1].columns_mut(0, n + dz).copy_from(&moved);
-        let mut z = rows[1].columns_mut(n, dz);
-        z += by_sources;
-        rows[1]
-            .columns_mut(n + dz, n)
-            .copy_from(&plain.columns(0, n));
+        let mut rows = DMatrix::zeros(count, dim);
+        rows.columns_mut(0, n + dz)
+            .copy_from(&(&changes.outputs * &own + &outputs * &change));
+        rows.columns_mut(n + dz, n)
+            .copy_from(&outputs.columns(0, n));
         (generator, rows)
     }
 
-    /// Goes along the trajectory from δs: what is seen of it, and δs at the end. Nothing where that takes too many values.
+    /// Goes along the trajectory from δs: how what is drawn of it moves, and δs at the end.
     ///
     /// # Errors
     /// The derivative does not exist.
     pub(crate) fn along(
         &self,
         ds: &DVector<f64>,
-        sight: Option<Sight>,
-    ) -> Result<Option<(Moved, DVector<f64>)>, Error> {
+        drawing: Option<&Drawing>,
+    ) -> Result<(Moved, DVector<f64>), Error> {
         let segments = &self.trajectory.segments;
-        let outputs = self.trajectory.systems.first();
-        let mut moved = Moved::of(outputs.map_or(0, |system| system.lcs.outputs.names.len()));
+        let mut moved = Moved {
+            changes: Vec::new(),
+            ends: vec![0.0],
+        };
         let mut dx = self.start(ds);
-        let (mut lengths, mut ends) = (Vec::new(), vec![0.0]);
         let mut flows = Flows::default();
+        let pieces = drawing.map_or(&[][..], |drawing| &drawing.pieces);
+        let mut by_segment = pieces.chunk_by(|a, b| a.segment == b.segment).peekable();
         for (k, segment) in segments.iter().enumerate() {
             let (at, mut w) = self.enter(&mut flows, k, &dx);
             let flow = flows.at(at);
             let seconds = segment.to - segment.from;
-            lengths.push(seconds);
-            if let Some(sight) = sight.filter(|sight| segment.to > sight.from)
-                && !see(flow, (segment.from, seconds), &w, sight, (k, &mut moved))?
-            {
-                return Ok(None);
+            if let Some(pieces) = by_segment.next_if(|pieces| pieces[0].segment == k) {
+                see(flow, &w, pieces, &mut moved.changes)?;
             }
             flow.advance(&mut w, seconds, SAME_LENGTH * segment.to.abs())?;
             dx = w.rows(w.len() - dx.len(), dx.len()).into_owned();
-            if sight.is_some() {
+            if drawing.is_some() {
                 self.stays(k, &dx)?;
             }
             let Some(saltation) = self.trajectory.saltations.get(k) else {
-                ends.push(0.0);
+                moved.ends.push(0.0);
                 dx = self.end(&dx);
                 break;
             };
             let dt = self.shift(k, saltation, &dx)?;
-            ends.push(dt);
-            dx = self.passed(k, saltation, &dx, dt);
+            moved.ends.push(dt);
+            dx = self.passed(k, &dx, dt);
         }
-        moved.stretch(&lengths, &ends);
-        Ok(Some((moved, dx)))
+        Ok((moved, dx))
     }
 
     /// Whether what rests at its threshold in segment k stays there, so that both signs of a change have the same derivative.
     fn stays(&self, k: usize, dx: &DVector<f64>) -> Result<(), Error> {
         let segment = &self.trajectory.segments[k];
-        let near = &self.near[0];
-        for (owner, which) in &segment.resting {
-            let system = &self.trajectory.systems[segment.system];
-            let guards = system.guards(*owner, (&near.thresholds, |i| near.assembler.limits(i)));
-            let Some(guard) = guards.get(*which) else {
-                continue;
+        for resting in &segment.resting {
+            let inputs = self.forms.inputs(k, segment.to);
+            let row = &resting.row;
+            let size = row.value(&segment.end, &inputs).1;
+            let guard = Guard {
+                system: segment.system,
+                owner: resting.owner,
             };
-            let inputs = Self::inputs(&self.forms[k].own, segment.to);
-            let size = guard.value(&segment.end, &inputs).1;
-            let change = self.guard_change(k, (*owner, *which), segment.to)? + guard.x.dot(dx);
+            let of_sources = self.guard_sources(k, (&row.u, &row.du), segment.to);
+            let change = self.guard_change(k, guard, &inputs)? + of_sources + row.x.dot(dx);
             if change.abs() > SAME_TIMING * size {
-                let name = match owner {
-                    Owner::Device(pair) => near.assembler.device(*pair).unwrap_or_default(),
-                    Owner::Switch(i) | Owner::Slide(i, _) => &near.thresholds[*i].name,
-                };
                 let what = format!(
-                    "{name} rests at its threshold, which it leaves on one side of this value alone"
+                    "{} rests at its threshold, which it leaves on one side of this value alone",
+                    resting.name
                 );
                 return Err(not_smooth(segment.to, what));
             }
@@ -412,18 +277,18 @@ impl<'a> Parameter<'a> {
     /// δt of the event after segment k.
     fn shift(&self, k: usize, saltation: &Saltation, dx: &DVector<f64>) -> Result<f64, Error> {
         let (segment, t) = (&self.trajectory.segments[k], saltation.t);
-        if let Some(timing) = &saltation.timing {
-            let own = self.shift_of(k, (timing, t), dx)?;
-            for other in &saltation.others {
-                let apart = (self.shift_of(k, (other, t), dx)? - own).abs();
-                if apart > SAME_TIMING * own.abs().max(segment.to - segment.from) {
-                    let what = "two events coincide that part when the value is another";
-                    return Err(not_smooth(t, what));
-                }
+        let Some(timing) = &saltation.timing else {
+            return edge(self.trajectory, (self.forms, &self.changes.moving), k);
+        };
+        let own = self.shift_of(k, (timing, t), dx)?;
+        for other in &saltation.others {
+            let apart = (self.shift_of(k, (other, t), dx)? - own).abs();
+            if apart > SAME_TIMING * own.abs().max(segment.to - segment.from) {
+                let what = "two events coincide that part when the value is another";
+                return Err(not_smooth(t, what));
             }
-            return Ok(own);
         }
-        self.edge(k, t)
+        Ok(own)
     }
 
     /// The same by one of its guards.
@@ -433,99 +298,91 @@ impl<'a> Parameter<'a> {
         (timing, t): (&Timing, f64),
         dx: &DVector<f64>,
     ) -> Result<f64, Error> {
-        let change = self.guard_change(k, timing.guard, t)?;
-        Ok((&timing.x * dx)[0] - change / timing.slope)
-    }
-
-    /// Derivative of a guard with ln p where the state stays as it is at the end of segment k.
-    fn guard_change(&self, k: usize, (owner, which): (Owner, usize), t: f64) -> Result<f64, Error> {
-        let segment = &self.trajectory.segments[k];
-        let mut values = [0.0; 4];
-        for (m, value) in values.iter_mut().enumerate() {
-            let near = &self.near[m];
-            let limits = |i| near.assembler.limits(i);
-            let guards = near.systems[segment.system].guards(owner, (&near.thresholds, limits));
-            let guard = guards
-                .get(which)
-                .ok_or_else(|| not_smooth(t, "an event has no guard where the value is another"))?;
-            *value = guard
-                .value(&segment.end, &Self::inputs(&self.forms[k].near[m], t))
-                .0;
-        }
-        let change: f64 = values
-            .iter()
-            .zip(WEIGHTS)
-            .map(|(value, weight)| value * weight)
-            .sum();
-        Ok(change / VALUE_STEP)
-    }
-
-    /// δt of the sources that jump after segment k.
-    fn edge(&self, k: usize, t: f64) -> Result<f64, Error> {
-        let segment = &self.trajectory.segments[k];
-        let (own, after) = (&self.forms[k].own, &self.forms[k + 1].own);
-        let jumps = |i: &usize| {
-            let (left, right) = (own[*i].value(t), after[*i].value(t));
-            (left - right).abs() > 64.0 * f64::EPSILON * left.abs().max(right.abs())
+        let guard = Guard {
+            system: self.trajectory.segments[k].system,
+            owner: timing.guard,
         };
-        let mut found: Option<f64> = None;
-        for i in (0..own.len()).filter(jumps) {
-            let ends = self.forms[k].near.each_ref().map(|pieces| pieces[i].end);
-            let change: f64 = ends
-                .iter()
-                .zip(WEIGHTS)
-                .map(|(end, weight)| end * weight)
-                .sum();
-            let change = if change.is_finite() {
-                change / VALUE_STEP
-            } else {
-                0.0
-            };
-            let length = segment.to - segment.from;
-            match found {
-                Some(other)
-                    if (other - change).abs()
-                        > SAME_TIMING * other.abs().max(change.abs()).max(SAME_TIMING * length) =>
-                {
-                    return Err(not_smooth(
-                        t,
-                        "edges of sources coincide that part when the value is another",
-                    ));
-                }
-                _ => found = Some(change),
-            }
-        }
-        Ok(found.unwrap_or(0.0))
+        let change = self.guard_change(k, guard, &self.forms.inputs(k, t))?;
+        let rows = [&timing.u, &timing.du].map(|row| row.transpose());
+        let of_sources = self.guard_sources(k, (&rows[0], &rows[1]), t);
+        Ok((&timing.x * dx)[0] + of_sources - change / timing.slope)
+    }
+
+    /// Derivative of a guard with ln p where state and sources stay as they are at the end of segment k.
+    fn guard_change(&self, k: usize, guard: Guard, inputs: &Inputs) -> Result<f64, Error> {
+        let segment = &self.trajectory.segments[k];
+        let row = self.changes.guard(guard).ok_or_else(|| {
+            let what = "an event has no guard where the value is another";
+            not_smooth(segment.to, what)
+        })?;
+        Ok((row * columns(&segment.end, &inputs.u, &inputs.du))[0])
+    }
+
+    /// What the sources' change at t makes of rows over u and u'.
+    fn guard_sources(&self, k: usize, (u, du): (&DVector<f64>, &DVector<f64>), t: f64) -> f64 {
+        u.dot(&self.du(k, t)) + du.dot(&self.source_change(k, t, source::Piece::derivative))
     }
 
     /// δx after the event that follows segment k.
-    fn passed(&self, k: usize, saltation: &Saltation, dx: &DVector<f64>, dt: f64) -> DVector<f64> {
-        let segments = &self.trajectory.segments;
-        let (from, to) = (segments[k].system, segments[k + 1].system);
-        let (systems, t) = (&self.trajectory.systems, saltation.t);
-        let side = |at: usize, x: &DVector<f64>, pieces: &[Piece]| Side {
-            system: &systems[at],
-            x: x.clone(),
-            inputs: Self::inputs(pieces, t),
-        };
-        let before = side(from, &segments[k].end, &self.forms[k].own);
-        let after = side(to, &segments[k + 1].start, &self.forms[k + 1].own);
-        let parts = std::array::from_fn(|m| {
-            let near = &self.near[m].systems;
-            let [left, right] = [k, k + 1].map(|k| Self::inputs(&self.forms[k].near[m], t));
-            let mut storage = near[from].storage(&segments[k].end, &left.u);
-            if let Some(jump) = saltation.through {
-                storage = near[jump].storage(&near[jump].state(storage.as_slice()), &right.u);
-            }
-            near[to].state(storage.as_slice())
-        });
-        let mut inject = systems[to].lcs.storage.inject.clone();
-        let mut drift = DVector::zeros(inject.nrows());
-        if let Some(jump) = saltation.through.map(|at| &systems[at]) {
-            drift += &inject * (&jump.storage_inputs * &after.inputs.du);
-            inject = inject * &jump.lcs.storage.x * &jump.lcs.storage.inject;
+    fn passed(&self, k: usize, dx: &DVector<f64>, dt: f64) -> DVector<f64> {
+        let jump = Jump::of(self.trajectory, self.forms, k);
+        let (segments, t) = (&self.trajectory.segments, self.trajectory.saltations[k].t);
+        let changes = |at: usize| &self.changes.systems[at];
+        let after = self.du(k + 1, t);
+        let mut storage = &jump.storage;
+        let mut ds = &changes(segments[k].system).storage * &jump.left
+            + &jump.from.lcs.storage.x * dx
+            + &jump.from.storage_inputs * self.du(k, t);
+        let through = self.trajectory.saltations[k].through;
+        if let Some(((at, system), (left, then))) =
+            through.zip(jump.through).zip(jump.between.as_ref())
+        {
+            let dx = &changes(at).inject * short_columns(storage, &jump.after)
+                + &system.lcs.storage.inject * ds;
+            ds = &changes(at).storage * left
+                + &system.lcs.storage.x * dx
+                + &system.storage_inputs * &after;
+            storage = then;
         }
-        drift += &inject * before.storage_rate() - after.rate();
-        weighted(parts) + &inject * (&systems[from].lcs.storage.x * dx) + drift * dt
+        &changes(segments[k + 1].system).inject * short_columns(storage, &jump.after)
+            + &jump.to.lcs.storage.inject * ds
+            + jump.drift * dt
     }
+}
+
+/// [x | u | u' | 1] over [x | z], where u = H z and z' = S z; without x and 1 where `whole` is false.
+pub(super) fn read(n: usize, h: &DMatrix<f64>, s: &DMatrix<f64>, whole: bool) -> DMatrix<f64> {
+    let (p, dz) = h.shape();
+    let mut all = DMatrix::zeros(n + 2 * p + 1, n + dz);
+    all.view_mut((n, n), (p, dz)).copy_from(h);
+    all.view_mut((n + p, n), (p, dz)).copy_from(&(h * s));
+    if whole {
+        (0..n).for_each(|i| all[(i, i)] = 1.0);
+        all[(n + 2 * p, n)] = 1.0;
+    }
+    all
+}
+
+/// How the pieces of a segment move at times that stay, from w on.
+fn see(
+    flow: &mut Flow,
+    w: &DVector<f64>,
+    pieces: &[Piece],
+    changes: &mut Vec<[f64; VALUES]>,
+) -> Result<(), Error> {
+    let mut w = w.clone();
+    for piece in pieces {
+        let begun = changes.len();
+        changes.resize(begun + flow.outputs(), [0.0; VALUES]);
+        for j in 0..VALUES {
+            if j > 0 {
+                flow.advance(&mut w, piece.length / INTERVALS as f64, 0.0)?;
+            }
+            let row = flow.sample(&w);
+            for (changes, value) in changes[begun..].iter_mut().zip(row.iter()) {
+                changes[j] = *value;
+            }
+        }
+    }
+    Ok(())
 }

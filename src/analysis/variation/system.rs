@@ -61,6 +61,13 @@ impl Row {
         self
     }
 
+    /// All of it.
+    pub(super) fn columns(&self) -> DVector<f64> {
+        let parts = self.x.iter().chain(&self.u).chain(&self.du).copied();
+        let all: Vec<f64> = parts.chain([self.one]).collect();
+        DVector::from_vec(all)
+    }
+
     /// The value, and the sum of the magnitudes of its terms.
     pub(super) fn value(&self, x: &DVector<f64>, inputs: &Inputs) -> (f64, f64) {
         let parts = [(&self.x, x), (&self.u, &inputs.u), (&self.du, &inputs.du)];

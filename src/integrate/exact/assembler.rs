@@ -101,6 +101,11 @@ impl Assembler {
         devices(&self.steps) == devices(&other.steps) && self.multiport.is_alike(&other.multiport)
     }
 
+    /// What it reduces.
+    pub(crate) fn multiport(&self) -> &StandardMultiport {
+        &self.multiport
+    }
+
     /// Number of device pairs.
     pub(crate) fn pairs(&self) -> usize {
         self.multiport.pairs.len()

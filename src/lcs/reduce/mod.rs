@@ -201,7 +201,7 @@ fn reduce_in(
 ) -> Result<Lcs, ReduceError> {
     check(behaviour, position)?;
     let (parts, precise) = published(behaviour, behaviour.ball(), position, apart)?;
-    let parts = if precise || behaviour.inexact {
+    let parts = if precise || behaviour.inexact || behaviour.rough {
         parts
     } else {
         published(behaviour, behaviour.rational(), position, apart)?.0

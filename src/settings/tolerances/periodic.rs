@@ -103,3 +103,15 @@ pub(crate) const EVENT_AGAIN: f64 = 32.0 * f64::EPSILON;
 /// The part of a table's input that is stored from which on a note says so beside the efficiency. Larger: efficiencies of transients that are taken for those of the steady
 /// state; smaller: notes on what no digit shows.
 pub(crate) const STORED: f64 = 1e-2;
+
+/// The difference of an argument, relative to it, by which functions without a derivative in closed form are differentiated in expressions over measured signals. Larger:
+/// corners of tables count from further away; smaller: rounding.
+pub(crate) const ARGUMENT_STEP: f64 = 1e-6;
+
+/// Reductions of a circuit with sources for the changes of values are of the same mode where matrices agree to this part of their largest entries. Larger: other bases of fast states pass
+/// for the same; smaller: rounding of reductions in fewer digits costs one for each value.
+pub(crate) const SAME_REDUCTION: f64 = 1e-8;
+
+/// A switch whose control is within this part of its terms from its threshold where a run begins may begin on its other side where a value is another by twice [`VALUE_STEP`]. Larger:
+/// reductions of its own for each value where none are needed; smaller: a start on the other side is not told.
+pub(crate) const NEAR_THRESHOLD: f64 = 1e-2;

@@ -1,21 +1,44 @@
 //! Derivatives of measurements to the values of elements and parameters.
 
+mod base;
+mod exact;
+mod survey;
+
 use std::sync::atomic::AtomicBool;
 
-use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
-use super::curves::{MOST_VALUES, laps};
 use super::measured::{measured, periodic_measured};
-use super::periodic::{PeriodicOptions, beside, steady};
-use super::variation::{Near, Parameter, STEPS, Sight, Trajectory, unit};
-use crate::circuit::{Circuit, Kind, Measured, SteadyState, Tran, source::Wave};
-use crate::integrate::{Error, Note, OrbitKind, Reason, SimOptions, Simulation, SimulationOptions};
-use crate::measure::{Curves, Signals};
+use super::periodic::PeriodicOptions;
+use super::variation::STEPS;
+use crate::circuit::{Circuit, Kind, Measured, SteadyState, source::Wave};
+use crate::integrate::{Error, Note, Reason, SimOptions, Simulation, SimulationOptions};
 use crate::model::Model;
 use crate::settings::Settings;
-use crate::settings::tolerances::periodic::{PERIOD_MOVES, RUN_STEP, VALUE_STEP};
+use crate::settings::tolerances::periodic::RUN_STEP;
+
+/// Which way the derivatives of an exact run are computed: both have the same result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SensitivityMethod {
+    /// Backward where there are more values than measurements, else forward.
+    #[default]
+    Automatic,
+    /// Each value's change is carried along the run.
+    Forward,
+    /// What each measurement weighs is carried back along the run, once for all values. Values that move waveforms of sources otherwise than by a constant
+    /// or with their edges, measurements of expressions that jump by themselves, and runs in which events coincide by chance still go forward.
+    Adjoint,
+}
+
+/// How often derivatives have gone along the run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Passes {
+    /// Values whose change was carried along it.
+    pub forward: usize,
+    /// Measurements that were carried back along it.
+    pub backward: usize,
+}
 
 /// What derivatives may be asked for.
 #[derive(Debug, Clone, Default)]
@@ -29,10 +52,19 @@ pub struct SensitivityOptions<'a> {
     pub steady: bool,
     /// The period of it, s, in place of the common one of the sources.
     pub period: Option<f64>,
+    /// Which way they are computed.
+    pub method: SensitivityMethod,
     /// Ends the runs when set.
     pub cancel: Option<&'a AtomicBool>,
     /// Tolerances.
     pub settings: Settings,
+}
+
+impl SensitivityOptions<'_> {
+    fn asks_for(&self, measurement: &str) -> bool {
+        let mut of = self.of.iter();
+        self.of.is_empty() || of.any(|name| name.to_lowercase() == measurement)
+    }
 }
 
 /// The derivatives of one measurement.
@@ -55,6 +87,8 @@ pub struct Sensitivity {
     pub at: Vec<(String, f64)>,
     /// Whether they are those of the variational equation; otherwise they are differences of runs.
     pub exact: bool,
+    /// How often they went along the run; not at all where they are differences.
+    pub passes: Passes,
     /// Things the user should know.
     pub notes: Vec<Note>,
 }
@@ -108,10 +142,11 @@ impl Serialize for Sensitivity {
 
 /// The derivatives of what `.meas` finds to the values of elements and to parameters.
 ///
-/// What happens between events moves with a value p as the variational equation says: its values by ∂y/∂p, its ends in time too. What `.meas` finds where it is
-/// moved by ± a little differs by its derivative. In the steady state
-/// ∂s₀/∂p = (I − M)⁻¹ φ_p with the monodromy M and what a period makes of the change alone. Where steps are made, differences of runs
-/// with p (1 ± h) and p (1 ± 2h) stand for it, and a note says so; they do as well where impulses are measured.
+/// What happens between events moves with a value p as the variational equation says: its values by ∂y/∂p, its ends in time too. What `.meas` finds weighs these
+/// changes: dJ = Σ ∂J/∂y δy + ∂J/∂t δt over the values of the smooth pieces that it sees and their ends. In the steady state
+/// ∂s₀/∂p = (I − M)⁻¹ φ_p with the monodromy M and what a period makes of the change alone. With few values each change is carried along the run; with more values than
+/// measurements what each measurement weighs is carried back along it instead, which costs the same for any number of values ([`SensitivityMethod`]). Where steps are made,
+/// differences of runs with p (1 ± h) and p (1 ± 2h) stand for it, and a note says so; they do as well where impulses are measured.
 ///
 /// # Errors
 /// A name that is not there; [`Reason::NotSmooth`] where the derivative does not exist; the errors of the run.
@@ -150,14 +185,7 @@ pub fn sensitivity(model: &Model, options: &SensitivityOptions<'_>) -> Result<Se
         Some(found) => found,
         None => beside.differences(&to)?,
     };
-    let asked = |gradient: &Gradient| {
-        options.of.is_empty()
-            || options
-                .of
-                .iter()
-                .any(|name| name.to_lowercase() == gradient.name)
-    };
-    found.of.retain(asked);
+    found.of.retain(|gradient| options.asks_for(&gradient.name));
     Ok(found)
 }
 
@@ -220,27 +248,6 @@ struct Beside<'a> {
     options: &'a SensitivityOptions<'a>,
 }
 
-/// A run that is differentiated, and which part of it measurements see.
-struct Base {
-    trajectory: Trajectory,
-    /// Where it begins.
-    positions: Vec<bool>,
-    sight: Sight,
-    /// s.
-    span: (f64, f64),
-    orbit: Option<Repeated>,
-}
-
-/// An orbit as measurements see it: repeated until the end of `.tran`.
-struct Repeated {
-    monodromy: DMatrix<f64>,
-    /// s.
-    period: f64,
-    /// From when on it counts, s.
-    from: f64,
-    tran: Option<Tran>,
-}
-
 impl Beside<'_> {
     fn periodic(&self) -> PeriodicOptions<'_> {
         PeriodicOptions {
@@ -271,129 +278,6 @@ impl Beside<'_> {
             ..SimulationOptions::default()
         };
         Simulation::closed(model.circuit(), model.multiport(), options)
-    }
-
-    /// The run, where it is exact throughout and nothing that is measured has an impulse.
-    fn base(&self, model: &Model) -> Result<Option<Base>, Error> {
-        let circuit = model.circuit();
-        if !self.options.steady {
-            let Some(tran) = circuit.tran else {
-                return Err(unsupported("the netlist asks for no .tran analysis".into()));
-            };
-            let mut simulation = self.simulation(model)?;
-            let (state, positions) = (simulation.state(), simulation.positions());
-            let place = (0.0, &state[..], &positions[..]);
-            let cancel = self.options.cancel;
-            if !simulation.is_exact() || simulation.passages(place, tran.tstop, cancel)?.is_none() {
-                return Ok(None);
-            }
-            let trajectory = Trajectory::with(&mut simulation, place, tran.tstop, true)?;
-            let span = (circuit.measured_from(&tran), tran.tstop);
-            return Ok(Base::of(trajectory, positions, span, None));
-        }
-        let mut found = steady(model, &self.periodic())?;
-        let orbit = found.orbit();
-        let driven = orbit.kind == OrbitKind::Driven;
-        if !driven || !found.simulation.is_exact() || found.course()?.is_none() {
-            return Ok(None);
-        }
-        let (trajectory, from) = found.trajectory()?;
-        let orbit = Repeated {
-            monodromy: trajectory.monodromy(),
-            period: orbit.period,
-            from,
-            tran: circuit.tran,
-        };
-        let always = (f64::NEG_INFINITY, f64::INFINITY);
-        Ok(Base::of(trajectory, vec![], always, Some(orbit)))
-    }
-
-    /// By the variational equation; `None` where steps are made.
-    fn exact(&self, to: &[(String, f64)]) -> Result<Option<Sensitivity>, Error> {
-        let own = self.with(None)?;
-        let mut notes = Vec::new();
-        let Some(base) = self.base(&own)? else {
-            return Ok(None);
-        };
-        let mut gradients = started(&self.measured(None)?);
-        let mut left_out: Vec<String> = Vec::new();
-        for (name, value) in to {
-            self.go_on()?;
-            let near = |step: f64| {
-                let model = self.with(Some((name, value * (1.0 + step * VALUE_STEP))))?;
-                let mut simulation = if self.options.steady {
-                    let (period, simulation) = beside(&model, &self.periodic())?;
-                    let moves = base.orbit.as_ref().zip(period).is_some_and(|(own, other)| {
-                        let laps = (own.period / other).round() * other;
-                        (laps - own.period).abs() > PERIOD_MOVES * VALUE_STEP * own.period
-                    });
-                    if moves && self.options.to.is_empty() {
-                        return Ok(None);
-                    }
-                    if moves {
-                        let what = format!(
-                            "`{name}` changes the period, on which the steady state depends otherwise"
-                        );
-                        return Err(Error::before(Reason::NotSmooth(what)));
-                    }
-                    simulation
-                } else {
-                    self.simulation(&model)?
-                };
-                if !self.options.steady && simulation.positions() != base.positions {
-                    let what = format!("a switch starts on another side where `{name}` is another");
-                    return Err(Error::before(Reason::NotSmooth(what)));
-                }
-                Near::of(&mut simulation, &base.trajectory).map(Some)
-            };
-            let [a, b, c, d] = STEPS.map(near);
-            let (Some(a), Some(b), Some(c), Some(d)) = (a?, b?, c?, d?) else {
-                let text = format!(
-                    "`{name}` is left out: it changes the period, on which the steady state depends otherwise"
-                );
-                notes.push(Note::run("left-out", text));
-                left_out.push(name.clone());
-                continue;
-            };
-            let near = [a, b, c, d];
-            let parameter = Parameter::of(&base.trajectory, &near)?;
-            let start = match &base.orbit {
-                None => Parameter::weighted_states(&near),
-                Some(Repeated { monodromy: m, .. }) => {
-                    let still = DVector::zeros(m.nrows());
-                    let forced = parameter.along(&still, None)?.map(|(_, end)| end);
-                    let closed = DMatrix::identity(m.nrows(), m.nrows()) - m;
-                    let found = forced.and_then(|forced| closed.lu().solve(&forced));
-                    found.ok_or_else(|| {
-                        let what = "the orbit is one of a family: where it moves is not determined";
-                        Error::before(Reason::NotSmooth(what.into()))
-                    })?
-                }
-            };
-            let Some((seen, _)) = parameter.along(&start, Some(base.sight))? else {
-                return Ok(None);
-            };
-            let h = seen.small();
-            let moved = |h: f64| {
-                let model = self.with(Some((name, value * (1.0 + h))))?;
-                let curves = base.seen(seen.at(h));
-                Ok::<_, Error>(model.circuit().measure(&Signals::Curves(&curves)))
-            };
-            let (low, high) = (moved(-h)?, moved(h)?);
-            for (gradient, (low, high)) in gradients.iter_mut().zip(low.iter().zip(&high)) {
-                let both = low.result.as_ref().ok().zip(high.result.as_ref().ok());
-                let derivative =
-                    both.map(|(low, high)| (high.value - low.value) / (2.0 * h * value));
-                gradient.to.push((name.clone(), derivative));
-            }
-        }
-        let at = to.iter().filter(|(name, _)| !left_out.contains(name));
-        Ok(Some(Sensitivity {
-            of: gradients,
-            at: at.cloned().collect(),
-            exact: true,
-            notes,
-        }))
     }
 
     fn go_on(&self) -> Result<(), Error> {
@@ -445,6 +329,7 @@ impl Beside<'_> {
             of: gradients,
             at: to.to_vec(),
             exact: false,
+            passes: Passes::default(),
             notes: vec![Note::run("not-exact", text)],
         })
     }
@@ -461,58 +346,4 @@ fn started(measured: &[Measured]) -> Vec<Gradient> {
         to: vec![],
     };
     measured.iter().map(of).collect()
-}
-
-impl Base {
-    /// `None` where an output has an impulse: of that the variation is not carried along.
-    fn of(
-        trajectory: Trajectory,
-        positions: Vec<bool>,
-        span: (f64, f64),
-        orbit: Option<Repeated>,
-    ) -> Option<Self> {
-        let impulses = trajectory
-            .saltations
-            .iter()
-            .filter_map(|s| s.impulse.as_ref());
-        let mut areas = impulses.flat_map(|impulse| impulse.areas.iter());
-        if areas.any(|area| *area != 0.0) {
-            return None;
-        }
-        let lengths = trajectory
-            .segments
-            .iter()
-            .map(|segment| segment.to - segment.from);
-        // The segment before moves into what is seen.
-        let first = trajectory
-            .segments
-            .iter()
-            .rev()
-            .find(|segment| segment.to < span.0);
-        let sight = Sight {
-            from: first.map_or(f64::NEG_INFINITY, |segment| segment.from),
-            unit: unit(lengths.fold(0.0, f64::max)),
-            most: MOST_VALUES,
-        };
-        Some(Self {
-            trajectory,
-            positions,
-            sight,
-            span,
-            orbit,
-        })
-    }
-
-    /// A run as measurements see it: an orbit again and again, from its beginning, which is not that of the trajectory.
-    fn seen(&self, curves: Curves) -> Curves {
-        let Some(orbit) = &self.orbit else {
-            return curves.within(self.span);
-        };
-        let (period, from) = (orbit.period, orbit.from);
-        // What is left out of many laps is told where they are measured.
-        let (laps, _) = laps(orbit.tran, period, curves.values());
-        let [begin, end] = [laps.0, laps.1].map(|lap| lap as f64 * period);
-        let all = curves.repeated((0, laps.1 - laps.0 + 1), period, from + period - begin);
-        all.within((begin, end))
-    }
 }

@@ -1,0 +1,196 @@
+//! A run that is exact throughout, to be differentiated.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::{Beside, unsupported};
+use crate::analysis::curves::{MOST_VALUES, laps};
+use crate::analysis::periodic::steady;
+use crate::analysis::variation::{
+    Adjoint, Carried, Changes, Drawing, Forms, Lines, Parameter, Sight, Trajectory, Weighted, unit,
+};
+use crate::circuit::Tran;
+use crate::integrate::{Error, OrbitKind, Reason, Simulation};
+use crate::measure::Curves;
+use crate::mna::StandardMultiport;
+use crate::model::Model;
+
+/// A run that is differentiated, and which part of it measurements see.
+pub(super) struct Base {
+    pub(super) trajectory: Trajectory,
+    pub(super) forms: Forms,
+    pub(super) multiport: StandardMultiport,
+    /// Where it begins.
+    pub(super) positions: Vec<bool>,
+    /// The storage there, and whether it is what `IC=` says.
+    pub(super) state: Vec<f64>,
+    pub(super) by_initial: bool,
+    pub(super) sight: Sight,
+    /// s.
+    span: (f64, f64),
+    pub(super) orbit: Option<Repeated>,
+}
+
+/// An orbit as measurements see it: repeated until the end of `.tran`.
+pub(super) struct Repeated {
+    monodromy: DMatrix<f64>,
+    /// s.
+    pub(super) period: f64,
+    /// From when on it counts, s.
+    from: f64,
+    tran: Option<Tran>,
+}
+
+/// Where a transient begins: whether with what `IC=` says, its storage, and its switches.
+type Beginning = (bool, Vec<f64>, Vec<bool>);
+
+pub(super) fn not_smooth(what: String) -> Error {
+    Error::before(Reason::NotSmooth(what))
+}
+
+impl Base {
+    /// `None` where an output has an impulse: of that the variation is not carried along.
+    fn of(
+        trajectory: Trajectory,
+        (simulation, beginning): (&Simulation, Option<Beginning>),
+        span: (f64, f64),
+        orbit: Option<Repeated>,
+    ) -> Result<Option<Self>, Error> {
+        let impulses = trajectory
+            .saltations
+            .iter()
+            .filter_map(|s| s.impulse.as_ref());
+        let mut areas = impulses.flat_map(|impulse| impulse.areas.iter());
+        if areas.any(|area| *area != 0.0) {
+            return Ok(None);
+        }
+        let lengths = trajectory
+            .segments
+            .iter()
+            .map(|segment| segment.to - segment.from);
+        // The segment before moves into what is seen.
+        let first = trajectory
+            .segments
+            .iter()
+            .rev()
+            .find(|segment| segment.to < span.0);
+        let sight = Sight {
+            from: first.map_or(f64::NEG_INFINITY, |segment| segment.from),
+            unit: unit(lengths.fold(0.0, f64::max)),
+            most: MOST_VALUES,
+        };
+        let multiport = simulation.assembler(1.0).multiport().clone();
+        let (uic, state, positions) = beginning.unwrap_or_default();
+        let initial = multiport.storage.iter().map(|s| s.initial.unwrap_or(0.0));
+        Ok(Some(Self {
+            forms: Forms::of(&trajectory)?,
+            by_initial: uic && initial.eq(state.iter().copied()),
+            state,
+            multiport,
+            trajectory,
+            positions,
+            sight,
+            span,
+            orbit,
+        }))
+    }
+
+    /// A run as measurements see it: an orbit again and again, from its beginning, which is not that of the trajectory.
+    pub(super) fn seen(&self, curves: Curves) -> Curves {
+        let Some(orbit) = &self.orbit else {
+            return curves.within(self.span);
+        };
+        let (period, from) = (orbit.period, orbit.from);
+        // What is left out of many laps is told where they are measured.
+        let (laps, _) = laps(orbit.tran, period, curves.values());
+        let [begin, end] = [laps.0, laps.1].map(|lap| lap as f64 * period);
+        let all = curves.repeated((0, laps.1 - laps.0 + 1), period, from + period - begin);
+        all.within((begin, end))
+    }
+
+    /// δs where the run begins, forward: of an orbit (I − M) δs₀ = φ.
+    pub(super) fn start(
+        &self,
+        changes: &Changes,
+        parameter: &Parameter<'_>,
+    ) -> Result<DVector<f64>, Error> {
+        let Some(Repeated { monodromy: m, .. }) = &self.orbit else {
+            return Ok(changes.start().clone());
+        };
+        let forced = parameter.along(&DVector::zeros(m.nrows()), None)?.1;
+        let closed = DMatrix::identity(m.nrows(), m.nrows()) - m;
+        closed.lu().solve(&forced).ok_or_else(family)
+    }
+
+    /// Back along the run with what these weigh; of an orbit once more with λ = (I − Mᵀ)⁻¹ ψ₀.
+    pub(super) fn back(
+        &self,
+        lines: &Lines,
+        drawing: &Drawing,
+        weighted: &[Weighted],
+    ) -> Result<Carried, Error> {
+        let adjoint = Adjoint {
+            trajectory: &self.trajectory,
+            forms: &self.forms,
+            lines,
+            drawing,
+        };
+        let mut motions = lines.motions(self.sight.unit);
+        let carried = adjoint.back(&mut motions, Some(weighted), None)?;
+        let Some(Repeated { monodromy: m, .. }) = &self.orbit else {
+            return Ok(carried);
+        };
+        let closed = DMatrix::identity(m.nrows(), m.nrows()) - m.transpose();
+        let last = closed.lu().solve(&carried.start).ok_or_else(family)?;
+        let again = adjoint.back(&mut motions, None, Some(&last))?;
+        Ok(carried.plus(&again))
+    }
+}
+
+fn family() -> Error {
+    not_smooth("the orbit is one of a family: where it moves is not determined".into())
+}
+
+impl Beside<'_> {
+    /// The run, where it is exact throughout and nothing that is measured has an impulse.
+    pub(super) fn base(&self, model: &Model) -> Result<Option<Base>, Error> {
+        let circuit = model.circuit();
+        if !self.options.steady {
+            let Some(tran) = circuit.tran else {
+                return Err(unsupported("the netlist asks for no .tran analysis".into()));
+            };
+            let mut simulation = self.simulation(model)?;
+            let (state, positions) = (simulation.state(), simulation.positions());
+            let place = (0.0, &state[..], &positions[..]);
+            let cancel = self.options.cancel;
+            if !simulation.is_exact() {
+                return Ok(None);
+            }
+            let trajectory = Trajectory::by_chance(&mut simulation, place, tran.tstop, cancel)?;
+            let Some(trajectory) = trajectory else {
+                return Ok(None);
+            };
+            let span = (circuit.measured_from(&tran), tran.tstop);
+            return Base::of(
+                trajectory,
+                (&simulation, Some((tran.uic, state, positions))),
+                span,
+                None,
+            );
+        }
+        let mut found = steady(model, &self.periodic())?;
+        let orbit = found.orbit();
+        let driven = orbit.kind == OrbitKind::Driven;
+        if !driven || !found.simulation.is_exact() || found.course()?.is_none() {
+            return Ok(None);
+        }
+        let (trajectory, from) = found.trajectory()?;
+        let orbit = Repeated {
+            monodromy: trajectory.monodromy(),
+            period: orbit.period,
+            from,
+            tran: circuit.tran,
+        };
+        let always = (f64::NEG_INFINITY, f64::INFINITY);
+        Base::of(trajectory, (&found.simulation, None), always, Some(orbit))
+    }
+}

@@ -1,0 +1,217 @@
+//! Derivatives of a run that is exact throughout, forward or backward along it.
+
+use super::base::Base;
+use super::survey::Survey;
+use super::{Beside, Sensitivity, SensitivityMethod, started};
+use crate::analysis::variation::{Carried, Drawing, Lines, Moved, Parameter, Tableau, Weighted};
+use crate::circuit::{Circuit, Measured, Weights, weights};
+use crate::integrate::{Error, Note};
+use crate::measure::{Curves, Signals};
+use crate::mna::Perturbation;
+
+/// What measurements find in a run, and what they weigh of it.
+struct Weighing {
+    found: Vec<Measured>,
+    /// Those that are asked for, or used by these.
+    needed: Vec<bool>,
+    weights: Vec<Option<Weights>>,
+    weighted: Vec<Option<Weighted>>,
+}
+
+impl Weighing {
+    /// Of the measurements of a circuit that are asked for.
+    fn of(
+        circuit: &Circuit,
+        (drawing, curves): (&Drawing, &Curves),
+        asked: impl Fn(&str) -> bool,
+    ) -> Self {
+        let found = circuit.measure(&Signals::Curves(curves));
+        let weights = weights(&circuit.measurements, curves, &found);
+        let mut needed: Vec<bool> = found.iter().map(|found| asked(&found.name)).collect();
+        for _ in 0..found.len() {
+            for (k, weights) in weights
+                .iter()
+                .enumerate()
+                .filter(|(k, _)| needed[*k])
+                .collect::<Vec<_>>()
+            {
+                let used = weights
+                    .iter()
+                    .flat_map(|weights| weights.results.iter().enumerate());
+                let used: Vec<usize> = used.filter(|(_, w)| **w != 0.0).map(|(j, _)| j).collect();
+                used.into_iter().chain([k]).for_each(|j| needed[j] = true);
+            }
+        }
+        let of = |(needed, weights): (&bool, &Option<Weights>)| {
+            Some(drawing.weighted(weights.as_ref().filter(|_| *needed)?))
+        };
+        Self {
+            weighted: needed.iter().zip(&weights).map(of).collect(),
+            weights,
+            needed,
+            found,
+        }
+    }
+
+    /// Whether some derivative is a difference of what is measured on a run that is moved.
+    fn needs_moves(&self) -> bool {
+        let all = self.found.iter().zip(&self.weights).zip(&self.needed);
+        let mut all =
+            all.map(|((found, weights), needed)| (found.result.is_ok() && *needed, weights));
+        all.any(|(needed, weights)| needed && weights.is_none())
+    }
+
+    /// Derivatives with ln p by measurement, from those of what each weighs: those that use others follow them.
+    fn chained(&self, own: &[Option<f64>]) -> Vec<Option<f64>> {
+        let count = own.len();
+        let mut found: Vec<Option<f64>> = vec![None; count];
+        for _ in 0..count {
+            for k in 0..count {
+                let (None, Some(direct), Some(weights)) = (found[k], own[k], &self.weights[k])
+                else {
+                    continue;
+                };
+                let used = weights.results.iter().enumerate();
+                let used = used.filter(|(_, weight)| **weight != 0.0);
+                let terms = used.map(|(j, weight)| Some(weight * found[j]?));
+                found[k] = terms.sum::<Option<f64>>().map(|sum| direct + sum);
+            }
+        }
+        found
+    }
+}
+
+impl Beside<'_> {
+    /// By the variational equation; `None` where steps are made.
+    pub(super) fn exact(&self, to: &[(String, f64)]) -> Result<Option<Sensitivity>, Error> {
+        let own = self.with(None)?;
+        let Some(base) = self.base(&own)? else {
+            return Ok(None);
+        };
+        let lines = Lines::of(&base.trajectory, &base.forms);
+        let mut motions = lines.motions(base.sight.unit);
+        let drawing = Drawing::of(&base.trajectory, (&lines, &mut motions), base.sight)?;
+        let Some(drawing) = drawing else {
+            return Ok(None);
+        };
+        let curves = base.seen(drawing.curves());
+        let asked = |name: &str| self.options.asks_for(name);
+        let weighing = Weighing::of(own.circuit(), (&drawing, &curves), asked);
+        let weighted: Vec<Weighted> = weighing.weighted.iter().flatten().cloned().collect();
+        let back = match self.options.method {
+            SensitivityMethod::Forward => false,
+            SensitivityMethod::Adjoint => true,
+            SensitivityMethod::Automatic => to.len() > weighted.len(),
+        };
+        let back = back && !weighted.is_empty() && !base.trajectory.has_chances();
+        let mut sensitivity = Sensitivity {
+            of: started(&weighing.found),
+            exact: true,
+            ..Sensitivity::default()
+        };
+        let mut surveys = Vec::with_capacity(to.len());
+        for (name, value) in to {
+            match self.survey(&base, (name, *value), (&own, &curves))? {
+                Some(survey) => surveys.push(survey),
+                None => {
+                    let text = format!(
+                        "`{name}` is left out: it changes the period, on which the steady state depends otherwise"
+                    );
+                    sensitivity.notes.push(Note::run("left-out", text));
+                }
+            }
+        }
+        let perturbations = surveys
+            .iter()
+            .filter_map(|survey| survey.perturbation.as_ref());
+        let perturbations: Vec<&Perturbation> = perturbations.collect();
+        let tableau = Tableau::of(&base.multiport, &perturbations, &base.trajectory)
+            .filter(|tableau| tableau.starts_apart(&base.trajectory, &base.forms));
+        let rest = tableau
+            .as_ref()
+            .filter(|_| base.orbit.is_none() && !base.by_initial);
+        let rest = rest.and_then(|tableau| tableau.at_rest(&base.trajectory, &base.state));
+        let tableau = tableau.as_ref().map(|tableau| (tableau, rest.as_ref()));
+        let mut carried: Option<Carried> = None;
+        for survey in &surveys {
+            let (name, value) = (survey.name, survey.value);
+            self.go_on()?;
+            let changes = self.changes(&base, tableau, (&own, survey))?;
+            let changes = changes.with_constants(&base.trajectory, &base.forms);
+            let plain = back && changes.is_plain();
+            if plain && carried.is_none() {
+                carried = Some(base.back(&lines, &drawing, &weighted)?);
+                sensitivity.passes.backward = weighted.len();
+            }
+            let forward = !plain || weighing.needs_moves();
+            let moved = if forward {
+                let parameter = Parameter {
+                    trajectory: &base.trajectory,
+                    forms: &base.forms,
+                    changes: &changes,
+                };
+                let start = base.start(&changes, &parameter)?;
+                sensitivity.passes.forward += 1;
+                Some(parameter.along(&start, Some(&drawing))?.0)
+            } else {
+                None
+            };
+            let direct: Vec<Option<f64>> = match carried.as_ref().filter(|_| plain) {
+                Some(carried) => {
+                    let start = base.orbit.is_none().then(|| changes.start());
+                    let place = (&base.trajectory, &base.forms);
+                    let mut all = carried.with(place, &changes, start)?.into_iter();
+                    let all = weighing
+                        .weighted
+                        .iter()
+                        .map(|w| w.as_ref().and_then(|_| all.next()));
+                    all.collect()
+                }
+                None => {
+                    let of = |weighted: &Option<Weighted>| {
+                        Some(moved.as_ref()?.weighed(weighted.as_ref()?))
+                    };
+                    weighing.weighted.iter().map(of).collect()
+                }
+            };
+            let mut derivatives = weighing.chained(&direct);
+            for (derivative, own) in derivatives.iter_mut().zip(&survey.own) {
+                *derivative = derivative.zip(*own).map(|(a, b)| a + b);
+            }
+            if let Some(moved) = moved.as_ref().filter(|_| derivatives.contains(&None)) {
+                let found = self.by_moves(&base, (&drawing, moved), survey)?;
+                for (derivative, found) in derivatives.iter_mut().zip(found) {
+                    *derivative = derivative.or(found);
+                }
+            }
+            for (gradient, derivative) in sensitivity.of.iter_mut().zip(derivatives) {
+                let derivative = derivative.map(|derivative| derivative / value);
+                gradient.to.push((name.to_owned(), derivative));
+            }
+            sensitivity.at.push((name.to_owned(), value));
+        }
+        Ok(Some(sensitivity))
+    }
+
+    /// Derivatives with ln p by differences of what is measured where the run is moved by ± a little.
+    fn by_moves(
+        &self,
+        base: &Base,
+        (drawing, moved): (&Drawing, &Moved),
+        survey: &Survey<'_>,
+    ) -> Result<Vec<Option<f64>>, Error> {
+        let stretched = moved.stretched(drawing);
+        let h = stretched.small();
+        let at = |h: f64| {
+            let model = self.with(Some((survey.name, survey.value * (1.0 + h))))?;
+            let curves = base.seen(stretched.at(h));
+            Ok::<_, Error>(model.circuit().measure(&Signals::Curves(&curves)))
+        };
+        let (low, high) = (at(-h)?, at(h)?);
+        let of = |(low, high): (&Measured, &Measured)| {
+            let both = low.result.as_ref().ok().zip(high.result.as_ref().ok());
+            both.map(|(low, high)| (high.value - low.value) / (2.0 * h))
+        };
+        Ok(low.iter().zip(&high).map(of).collect())
+    }
+}

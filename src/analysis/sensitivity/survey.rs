@@ -1,0 +1,159 @@
+//! What differs where a value is another, and how a run changes with it.
+
+use nalgebra::DVector;
+
+use super::Beside;
+use super::base::{Base, not_smooth};
+use crate::analysis::periodic::{beside, repeating};
+use crate::analysis::variation::{Changes, Near, Rest, STEPS, Tableau, difference};
+use crate::circuit::Source;
+use crate::integrate::{Error, Reason};
+use crate::measure::{Curves, Signals};
+use crate::mna::{Perturbation, StandardMultiport};
+use crate::model::Model;
+use crate::settings::tolerances::periodic::{PERIOD_MOVES, VALUE_STEP};
+
+/// A value, and what differs where it is another.
+pub(super) struct Survey<'a> {
+    pub(super) name: &'a str,
+    pub(super) value: f64,
+    /// By storage element: of its `IC=`.
+    pub(super) initial: DVector<f64>,
+    pub(super) sources: [Vec<Source>; 4],
+    /// What else differs, where that is numbers of the equations.
+    pub(super) perturbation: Option<Perturbation>,
+    /// By measurement: what its own numbers make, in the run as it is.
+    pub(super) own: Vec<Option<f64>>,
+}
+
+impl Beside<'_> {
+    /// What differs where a value is another; `None` where it changes the period.
+    pub(super) fn survey<'n>(
+        &self,
+        base: &Base,
+        (name, value): (&'n str, f64),
+        (own, curves): (&Model, &Curves),
+    ) -> Result<Option<Survey<'n>>, Error> {
+        self.go_on()?;
+        let at = |step: f64| {
+            let mut model = own.clone();
+            model.set(name, value * (1.0 + step * VALUE_STEP))?;
+            Ok::<_, Error>(model)
+        };
+        let [a, b, c, d] = STEPS.map(at);
+        let models = [a?, b?, c?, d?];
+        let mut multiports = Vec::with_capacity(models.len());
+        for model in &models {
+            let multiport = if self.options.steady {
+                let (period, _, multiport) = repeating(model)?;
+                if self.moves(base, name, self.options.period.or(period))? {
+                    return Ok(None);
+                }
+                multiport
+            } else {
+                model.multiport().clone()
+            };
+            multiports.push(multiport.standard());
+        }
+        let near: [StandardMultiport; 4] = multiports.try_into().map_err(|_| {
+            Error::before(Reason::internal("analysis::sensitivity", "four circuits"))
+        })?;
+        let count = own.circuit().measurements.len();
+        let mut explicit = vec![Some(0.0); count];
+        let differs = |model: &Model| model.circuit().measurements != own.circuit().measurements;
+        if models.iter().any(differs) {
+            let found = models
+                .each_ref()
+                .map(|model| model.circuit().measure(&Signals::Curves(curves)));
+            let value = |m: usize, k: usize| found[m][k].result.as_ref().ok().map(|f| f.value);
+            let of = |k: usize| {
+                Some(difference([
+                    value(0, k)?,
+                    value(1, k)?,
+                    value(2, k)?,
+                    value(3, k)?,
+                ]))
+            };
+            explicit = (0..count).map(of).collect();
+        }
+        let storage = 0..base.multiport.storage.len();
+        let initial = storage.map(|i| {
+            let of = |near: &StandardMultiport| near.storage.get(i).and_then(|s| s.initial);
+            difference(near.each_ref().map(|near| of(near).unwrap_or(0.0)))
+        });
+        let sources = |near: &StandardMultiport| {
+            let all = near.sources.iter();
+            all.map(|source| source.input.source.clone()).collect()
+        };
+        Ok(Some(Survey {
+            name,
+            value,
+            initial: DVector::from_vec(initial.collect()),
+            sources: near.each_ref().map(sources),
+            perturbation: base.multiport.perturbation(near.each_ref()),
+            own: explicit,
+        }))
+    }
+
+    /// Whether this is another period than that of the orbit, which is refused if that was asked for.
+    fn moves(&self, base: &Base, name: &str, period: Option<f64>) -> Result<bool, Error> {
+        let moves = base.orbit.as_ref().zip(period).is_some_and(|(own, other)| {
+            let laps = (own.period / other).round() * other;
+            (laps - own.period).abs() > PERIOD_MOVES * VALUE_STEP * own.period
+        });
+        if moves && !self.options.to.is_empty() {
+            let what =
+                format!("`{name}` changes the period, on which the steady state depends otherwise");
+            return Err(not_smooth(what));
+        }
+        Ok(moves)
+    }
+
+    /// How all changes with a value: by the reductions that all values have in common, or by those of the circuits beside.
+    pub(super) fn changes(
+        &self,
+        base: &Base,
+        tableau: Option<(&Tableau, Option<&Rest>)>,
+        (own, survey): (&Model, &Survey<'_>),
+    ) -> Result<Changes, Error> {
+        let at = |step: f64| {
+            let mut model = own.clone();
+            model.set(survey.name, survey.value * (1.0 + step * VALUE_STEP))?;
+            let simulation = if self.options.steady {
+                beside(&model, &self.periodic())?
+            } else {
+                self.simulation(&model)?
+            };
+            Ok::<_, Error>(simulation)
+        };
+        if let Some(((tableau, rest), perturbation)) = tableau.zip(survey.perturbation.as_ref()) {
+            let change = |rest| tableau.rest_change(rest, perturbation, &survey.sources);
+            let start = if base.orbit.is_some() || base.by_initial {
+                survey.initial.clone()
+            } else if let Some(change) = rest.and_then(change) {
+                change
+            } else {
+                let [a, b, c, d] = STEPS.map(|step| Ok::<_, Error>(at(step)?.state()));
+                let states = [a?, b?, c?, d?];
+                let of = |i: usize| difference(states.each_ref().map(|state| state[i]));
+                DVector::from_fn(survey.initial.len(), |i, _| of(i))
+            };
+            let beside = (survey.sources.clone(), start);
+            let changes = tableau.changes(&base.trajectory, perturbation, beside)?;
+            if let Some(changes) = changes {
+                return Ok(changes);
+            }
+        }
+        let near = |step: f64| {
+            let mut simulation = at(step)?;
+            if !self.options.steady && simulation.positions() != base.positions {
+                let name = survey.name;
+                let what = format!("a switch starts on another side where `{name}` is another");
+                return Err(not_smooth(what));
+            }
+            Near::of(&mut simulation, &base.trajectory)
+        };
+        let [a, b, c, d] = STEPS.map(near);
+        Changes::of(&base.trajectory, &[a?, b?, c?, d?])
+    }
+}

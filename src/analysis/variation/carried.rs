@@ -1,0 +1,123 @@
+//! What measurements make of all that may change along a run, before there is a value that changes it.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::change::{Change, Changes, Guard};
+use super::forms::{Forms, edge};
+use super::{System, Trajectory};
+use crate::integrate::Error;
+
+/// What measurements make of changes, by measurement.
+#[derive(Debug, Clone)]
+pub(crate) struct Carried {
+    /// By system what its [`Change`] is times.
+    pub(super) systems: Vec<Vec<Change>>,
+    /// What a guard's change over [x | u | u' | 1] is times.
+    pub(super) guards: Vec<(Guard, Vec<DVector<f64>>)>,
+    /// By event what δt is times where sources decide it.
+    pub(super) edges: Vec<DVector<f64>>,
+    /// What δs at the start is times, q×measurements.
+    pub(crate) start: DMatrix<f64>,
+}
+
+/// ⟨a, b⟩
+fn dot(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
+    a.iter().zip(b.iter()).map(|(a, b)| a * b).sum()
+}
+
+impl Carried {
+    pub(super) fn none(trajectory: &Trajectory, costates: usize) -> Self {
+        let of = |system: &System| {
+            let lcs = &system.lcs;
+            let (n, p, q) = (lcs.n(), lcs.p(), lcs.storage.names.len());
+            let none = Change {
+                rate: DMatrix::zeros(n, n + 2 * p + 1),
+                outputs: DMatrix::zeros(lcs.outputs.names.len(), n + 2 * p + 1),
+                storage: DMatrix::zeros(q, n + p + 1),
+                inject: DMatrix::zeros(n, q + p + 1),
+            };
+            vec![none; costates]
+        };
+        Self {
+            systems: trajectory.systems.iter().map(of).collect(),
+            guards: Vec::new(),
+            edges: vec![DVector::zeros(costates); trajectory.saltations.len()],
+            start: DMatrix::zeros(0, costates),
+        }
+    }
+
+    /// What both make, at the start of the first one.
+    pub(crate) fn plus(mut self, other: &Self) -> Self {
+        for (own, other) in self
+            .systems
+            .iter_mut()
+            .flatten()
+            .zip(other.systems.iter().flatten())
+        {
+            own.rate += &other.rate;
+            own.outputs += &other.outputs;
+            own.storage += &other.storage;
+            own.inject += &other.inject;
+        }
+        for (guard, rows) in &other.guards {
+            self.add_guard(*guard, rows);
+        }
+        for (own, other) in self.edges.iter_mut().zip(&other.edges) {
+            *own += other;
+        }
+        self
+    }
+
+    pub(super) fn add_guard(&mut self, guard: Guard, rows: &[DVector<f64>]) {
+        match self.guards.iter_mut().find(|(own, _)| *own == guard) {
+            Some((_, own)) => own.iter_mut().zip(rows).for_each(|(own, row)| *own += row),
+            None => self.guards.push((guard, rows.to_vec())),
+        }
+    }
+
+    /// dJ with ln p by measurement, where the storage at the start changes as `start` has it, if it does.
+    ///
+    /// # Errors
+    /// The derivative does not exist.
+    pub(crate) fn with(
+        &self,
+        (trajectory, forms): (&Trajectory, &Forms),
+        changes: &Changes,
+        start: Option<&DVector<f64>>,
+    ) -> Result<Vec<f64>, Error> {
+        let costates = self.start.ncols();
+        let mut found = vec![0.0; costates];
+        for (change, sums) in changes.systems.iter().zip(&self.systems) {
+            for (found, sums) in found.iter_mut().zip(sums) {
+                *found += dot(&change.rate, &sums.rate)
+                    + dot(&change.outputs, &sums.outputs)
+                    + dot(&change.storage, &sums.storage)
+                    + dot(&change.inject, &sums.inject);
+            }
+        }
+        for (guard, rows) in &self.guards {
+            if let Some(change) = changes.guard(*guard) {
+                for (found, row) in found.iter_mut().zip(rows) {
+                    *found += (change * row)[0];
+                }
+            }
+        }
+        for (k, weights) in self.edges.iter().enumerate() {
+            if weights.iter().any(|weight| *weight != 0.0) {
+                let dt = edge(trajectory, (forms, &changes.moving), k)?;
+                found
+                    .iter_mut()
+                    .zip(weights)
+                    .for_each(|(found, weight)| *found += weight * dt);
+            }
+        }
+        if let Some(start) = start {
+            let own = self.start.tr_mul(start);
+            found
+                .iter_mut()
+                .zip(own.iter())
+                .for_each(|(found, own)| *found += own);
+        }
+        Ok(found)
+    }
+}

@@ -1,0 +1,198 @@
+//! The outputs of a run as the smooth pieces that measurements see, and what measurements weigh of how they move.
+
+use nalgebra::DVector;
+
+use super::course::Stretch;
+use super::forms::Forms;
+use super::linear::{Linear, Motion, parts};
+use super::{System, Trajectory};
+use crate::circuit::Weights;
+use crate::integrate::Error;
+use crate::measure::{Curves, INTERVALS, VALUES};
+
+/// Halvings of a piece that lead from one of its values to the next.
+pub(super) const LEVELS: u32 = INTERVALS.ilog2();
+
+/// Which part of a run is seen, and in which steps.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sight {
+    /// Segments that end later, s.
+    pub(crate) from: f64,
+    /// Steps are halvings of it, s.
+    pub(crate) unit: f64,
+    /// Values at most.
+    pub(crate) most: usize,
+}
+
+/// The segments of a run as w' = 𝒜 w: the equations, and by segment which one it is and w where it begins.
+pub(crate) struct Lines {
+    known: Vec<Linear>,
+    pub(super) starts: Vec<(usize, DVector<f64>)>,
+}
+
+/// A piece of a segment.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Piece {
+    pub(super) segment: usize,
+    /// Since the segment began, s.
+    pub(super) age: f64,
+    /// When it begins, s.
+    pub(super) begin: f64,
+    /// Halvings of the unit that make its length.
+    pub(super) level: u32,
+    /// s.
+    pub(super) length: f64,
+    /// The part of it that belongs to the segment.
+    pub(super) until: f64,
+}
+
+/// See the [module](self).
+pub(crate) struct Drawing {
+    pub(super) columns: usize,
+    pub(super) pieces: Vec<Piece>,
+    /// By piece and output.
+    pub(super) values: Vec<[f64; VALUES]>,
+    /// Their rates.
+    pub(super) rates: Vec<[f64; VALUES]>,
+    /// By segment, s.
+    pub(super) seconds: Vec<f64>,
+}
+
+/// What a measurement weighs: dJ = Σ nodes · δy at times that stay + Σ shifts · δt of the events.
+#[derive(Debug, Clone)]
+pub(crate) struct Weighted {
+    /// By piece and output.
+    pub(super) nodes: Vec<[f64; VALUES]>,
+    /// By segment of the time at which it begins, and of the last one's end.
+    pub(super) shifts: Vec<f64>,
+}
+
+impl Lines {
+    /// Of all segments.
+    pub(crate) fn of(trajectory: &Trajectory, forms: &Forms) -> Self {
+        let systems: &[System] = &trajectory.systems;
+        let (mut known, mut starts) = (Vec::new(), Vec::new());
+        for (k, segment) in trajectory.segments.iter().enumerate() {
+            let stretch = Stretch {
+                system: segment.system,
+                from: segment.from,
+                to: segment.to,
+                start: segment.start.clone(),
+                pieces: forms.on(k).to_vec(),
+            };
+            starts.push(Linear::of(&mut known, systems, &stretch));
+        }
+        Self { known, starts }
+    }
+
+    /// Their motions over halvings of so many seconds.
+    pub(crate) fn motions(&self, unit: f64) -> Vec<Motion<'_>> {
+        self.known.iter().map(|linear| linear.over(unit)).collect()
+    }
+}
+
+impl Drawing {
+    /// The outputs in these segments; nothing where they take too many values.
+    ///
+    /// # Errors
+    /// An exponential does not exist in doubles.
+    pub(crate) fn of(
+        trajectory: &Trajectory,
+        (lines, motions): (&Lines, &mut [Motion<'_>]),
+        sight: Sight,
+    ) -> Result<Option<Self>, Error> {
+        let system = trajectory.systems.first();
+        let segments = trajectory.segments.iter();
+        let mut drawing = Self {
+            columns: system.map_or(0, |system| system.lcs.outputs.names.len()),
+            pieces: Vec::new(),
+            values: Vec::new(),
+            rates: Vec::new(),
+            seconds: segments.map(|segment| segment.to - segment.from).collect(),
+        };
+        for (k, segment) in trajectory.segments.iter().enumerate() {
+            if segment.to <= sight.from {
+                continue;
+            }
+            let (at, mut w) = (lines.starts[k].0, lines.starts[k].1.clone());
+            let (seconds, motion) = (drawing.seconds[k], &mut motions[at]);
+            for part in parts(&motion.linear.spectrum, sight.unit, (0.0, seconds)) {
+                if drawing.values.len() * VALUES > sight.most {
+                    return Ok(None);
+                }
+                let mut own = vec![[[0.0; VALUES]; 2]; drawing.columns];
+                for j in 0..=INTERVALS {
+                    if j > 0 {
+                        w = motion.after(part.level + LEVELS, &w)?;
+                    }
+                    for (which, rows) in motion.linear.rows.iter().take(2).enumerate() {
+                        let row = rows * &w;
+                        for (own, value) in own.iter_mut().zip(row.iter()) {
+                            own[which][j] = *value;
+                        }
+                    }
+                }
+                drawing.pieces.push(Piece {
+                    segment: k,
+                    age: part.age,
+                    begin: segment.from + part.age,
+                    level: part.level,
+                    length: part.length,
+                    until: ((seconds - part.age) / part.length).min(1.0),
+                });
+                for [values, rates] in own {
+                    drawing.values.push(values);
+                    drawing.rates.push(rates);
+                }
+            }
+        }
+        Ok(Some(drawing))
+    }
+
+    /// As measurements see them.
+    pub(crate) fn curves(&self) -> Curves {
+        let mut curves = Curves::of(self.columns);
+        let values = self.values.chunks_exact(self.columns.max(1));
+        for (piece, values) in self.pieces.iter().zip(values) {
+            curves.push((piece.begin, piece.length, piece.until), values);
+        }
+        curves
+    }
+
+    /// What derivatives to the pieces, which may repeat, are ones to: their ends move with the events, and what is between with its age.
+    pub(crate) fn weighted(&self, weights: &Weights) -> Weighted {
+        let mut nodes = vec![[0.0; VALUES]; self.values.len()];
+        let mut shifts = vec![0.0; self.seconds.len() + 1];
+        let count = self.pieces.len();
+        let all = weights.values.chunks_exact(self.columns.max(1));
+        for (k, own) in all.enumerate() {
+            let k = k % count;
+            let piece = &self.pieces[k];
+            let rows = k * self.columns..(k + 1) * self.columns;
+            let (mut begin, mut length) = (0.0, 0.0);
+            for ((own, nodes), rates) in own
+                .iter()
+                .zip(&mut nodes[rows.clone()])
+                .zip(&self.rates[rows])
+            {
+                for (j, ((own, node), rate)) in own.iter().zip(nodes).zip(rates).enumerate() {
+                    *node += own;
+                    begin += own * rate;
+                    length += own * rate * j as f64 / INTERVALS as f64;
+                }
+            }
+            self.add_shifts(piece, (begin, length), &mut shifts);
+        }
+        for (k, ends) in weights.begins.iter().zip(&weights.lengths).enumerate() {
+            self.add_shifts(&self.pieces[k % count], (*ends.0, *ends.1), &mut shifts);
+        }
+        Weighted { nodes, shifts }
+    }
+
+    /// Where a piece begins moves by δt₀ + strain · age, and it is longer by strain · length, with the strain (δt₁ − δt₀)/seconds of its segment.
+    fn add_shifts(&self, piece: &Piece, (begin, length): (f64, f64), shifts: &mut [f64]) {
+        let strain = (begin * piece.age + length * piece.length) / self.seconds[piece.segment];
+        shifts[piece.segment] += begin - strain;
+        shifts[piece.segment + 1] += strain;
+    }
+}

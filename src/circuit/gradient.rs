@@ -1,0 +1,213 @@
+//! How what measurements find moves with the pieces of the signals that they see.
+
+use super::formula::Formula;
+use super::measurement::{Measured, NamedMeasurement};
+use crate::measure::{
+    Curves, Found, INTERVALS, Instant, Measurement, Signals, Trace, TraceSlopes, VALUES, basis,
+    interpolated,
+};
+
+/// dJ = Σ (values · δvalues) + begins · δbegins + lengths · δlengths + Σ results · δresults of one measurement J.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Weights {
+    /// By piece and signal.
+    pub(crate) values: Vec<[f64; VALUES]>,
+    /// By piece, 1/s.
+    pub(crate) begins: Vec<f64>,
+    /// By piece, 1/s.
+    pub(crate) lengths: Vec<f64>,
+    /// By measurement: what is used of it.
+    pub(crate) results: Vec<f64>,
+}
+
+/// A waveform, and of which pieces of the signals its own are parts: number, where on it, and how much of it.
+struct Traced<'a> {
+    trace: Trace<'a>,
+    places: Vec<(usize, f64, f64)>,
+    formula: &'a Formula,
+    less: Option<&'a Formula>,
+}
+
+/// Where a piece begins, how long it is, s, which part of that belongs to it, and by signal its values.
+type Piece<'a> = ((f64, f64, f64), &'a [[f64; VALUES]]);
+
+/// What measurements saw and found.
+struct Scene<'a> {
+    curves: &'a Curves,
+    span: (f64, f64),
+    /// By piece.
+    pieces: Vec<Piece<'a>>,
+    /// Of all measurements; NaN where one has none.
+    results: Vec<f64>,
+}
+
+/// The derivatives of measurements that found something; none where they are not known, as where an expression jumps by itself.
+pub(crate) fn weights(
+    all: &[NamedMeasurement],
+    curves: &Curves,
+    found: &[Measured],
+) -> Vec<Option<Weights>> {
+    let value = |measured: &Measured| measured.result.as_ref().map_or(f64::NAN, |f| f.value);
+    let scene = Scene {
+        span: Signals::Curves(curves).span(),
+        pieces: curves.all().collect(),
+        curves,
+        results: found.iter().map(value).collect(),
+    };
+    let of = |(named, measured): (&NamedMeasurement, &Measured)| {
+        scene.weights(named.what.as_ref()?, measured.result.as_ref().ok()?)
+    };
+    all.iter().zip(found).map(of).collect()
+}
+
+impl<'a> Scene<'a> {
+    fn weights(&self, what: &'a Measurement<Formula>, found: &Found) -> Option<Weights> {
+        let columns = self.pieces.first().map_or(0, |(_, values)| values.len());
+        let mut into = Weights {
+            values: vec![[0.0; VALUES]; columns * self.pieces.len()],
+            begins: vec![0.0; self.pieces.len()],
+            lengths: vec![0.0; self.pieces.len()],
+            results: vec![0.0; self.results.len()],
+        };
+        let time = |name: &str| found.at.iter().find(|(own, _)| *own == name);
+        let time = |name: &str| time(name).map(|(_, t)| *t);
+        match what {
+            Measurement::Over(over, of, window) => {
+                let (from, to) = (time("from")?, time("to")?);
+                let traced = self.traced(of, None)?;
+                let slopes = traced.trace.over_slopes(*over, (from, to)).ok()??;
+                self.add(&traced, &slopes, 1.0, &mut into);
+                let ends = [
+                    (&window.from, from, slopes.from),
+                    (&window.to, to, slopes.to),
+                ];
+                for (instant, t, slope) in ends {
+                    // What the run ends stays where it is.
+                    let inside = t > self.span.0 && t < self.span.1;
+                    if let Some(instant) = instant.as_ref().filter(|_| inside) {
+                        self.instant(instant, t, slope, &mut into)?;
+                    }
+                }
+            }
+            Measurement::Find { of, slope, when } => {
+                let t = time("at")?;
+                let traced = self.traced(of, None)?;
+                let slopes = traced.trace.at_slopes(t, *slope)?;
+                self.add(&traced, &slopes, 1.0, &mut into);
+                self.instant(when, t, slopes.from, &mut into)?;
+            }
+            Measurement::When(when) => self.instant(when, found.value, 1.0, &mut into)?,
+            Measurement::Delay(trig, targ) => {
+                self.instant(trig, time("trig")?, -1.0, &mut into)?;
+                self.instant(targ, time("targ")?, 1.0, &mut into)?;
+            }
+            Measurement::Param(of) => self.number(of, 1.0, &mut into),
+        }
+        let all = into.values.iter().flatten();
+        let all = all.chain(&into.begins).chain(&into.lengths);
+        let finite = all.chain(&into.results).all(|weight| weight.is_finite());
+        finite.then_some(into)
+    }
+
+    /// Adds what an expression of results moves with.
+    fn number(&self, of: &Formula, factor: f64, into: &mut Weights) {
+        let slopes = of.slopes(f64::NAN, &[], &self.results);
+        for (own, slope) in into.results.iter_mut().zip(slopes.results) {
+            *own += factor * slope;
+        }
+    }
+
+    /// Adds what an instant moves with.
+    fn instant(
+        &self,
+        instant: &'a Instant<Formula>,
+        t: f64,
+        factor: f64,
+        into: &mut Weights,
+    ) -> Option<()> {
+        match instant {
+            Instant::At(at) => self.number(at, factor, into),
+            Instant::Crossing { left, right, .. } => {
+                let traced = self.traced(left, Some(right))?;
+                let slopes = traced.trace.crossing_slopes(t)?;
+                self.add(&traced, &slopes, factor, into);
+            }
+        }
+        Some(())
+    }
+
+    fn traced(&self, formula: &'a Formula, less: Option<&'a Formula>) -> Option<Traced<'a>> {
+        let whole = |k: usize| (k, 0.0, 1.0);
+        let (trace, places) = match (formula, less) {
+            (Formula::Signal(index), None) => {
+                let pieces = self.pieces.iter();
+                let own = pieces.map(|((begin, length, until), values)| crate::measure::Curve {
+                    begin: *begin,
+                    length: *length,
+                    until: *until,
+                    values: values[*index],
+                });
+                let places = (0..self.pieces.len()).map(whole);
+                (Trace::curves(own.collect(), vec![]), places.collect())
+            }
+            _ => {
+                let value = |t: f64, row: &[f64]| {
+                    let less = less.map_or(0.0, |less| less.value(t, row, &self.results));
+                    formula.value(t, row, &self.results) - less
+                };
+                let affine = formula.is_affine() && less.is_none_or(Formula::is_affine);
+                self.curves.drawn(&value, affine).ok()??
+            }
+        };
+        Some(Traced {
+            trace,
+            places,
+            formula,
+            less,
+        })
+    }
+
+    /// Adds derivatives to the pieces of a waveform, times a factor.
+    fn add(&self, traced: &Traced<'a>, slopes: &TraceSlopes, factor: f64, into: &mut Weights) {
+        for (k, own) in &slopes.pieces {
+            let (whole, from, part) = traced.places[*k];
+            let ((begin, length, _), signals) = &self.pieces[whole];
+            let columns = signals.len();
+            into.begins[whole] += factor * own.begin;
+            into.lengths[whole] += factor * (from * own.begin + part * own.length);
+            let values = &mut into.values[columns * whole..columns * (whole + 1)];
+            for (j, weight) in own.values.iter().enumerate() {
+                let weight = factor * weight;
+                if weight == 0.0 {
+                    continue;
+                }
+                if let (Formula::Signal(index), None) = (traced.formula, traced.less) {
+                    values[*index][j] += weight;
+                    continue;
+                }
+                let s = from + part * j as f64 / INTERVALS as f64;
+                let t = begin + s * length;
+                let row: Vec<f64> = signals.iter().map(|y| interpolated(y, s)).collect();
+                let basis = basis(s);
+                let mut along = |formula: &Formula, weight: f64| {
+                    let slopes = formula.slopes(t, &row, &self.results);
+                    into.begins[whole] += weight * slopes.time;
+                    into.lengths[whole] += weight * slopes.time * s;
+                    for (own, slope) in into.results.iter_mut().zip(slopes.results) {
+                        *own += weight * slope;
+                    }
+                    for (values, slope) in values.iter_mut().zip(slopes.signals) {
+                        if slope != 0.0 {
+                            let both = values.iter_mut().zip(basis);
+                            both.for_each(|(own, basis)| *own += weight * slope * basis);
+                        }
+                    }
+                };
+                along(traced.formula, weight);
+                if let Some(less) = traced.less {
+                    along(less, -weight);
+                }
+            }
+        }
+    }
+}
