@@ -207,7 +207,7 @@ const NO_TOLERANCES: [(&str, &[&str], &str); 23] = [
         "the room that moves have",
     ),
     (
-        "analysis/variation/parameter.rs",
+        "analysis/variation/near.rs",
         &["STEPS", "WEIGHTS"],
         "a formula of differences",
     ),

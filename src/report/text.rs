@@ -404,8 +404,9 @@ mod tests {
         impulse: i(d1) at 1 ms, area 2 µA·s
         impulse: 1 more
         event: 1 ms d1 conducts
-        warning: l1 jumps at 1 ms (switch s1): a current or charge is destroyed, and 1 mJ with it; 1 more jumps like it, 2 mJ in all
-        note: v(x) is relative to node a
+        warning[destroyed]: l1 jumps at 1 ms (switch s1): a current or charge is destroyed, and 1 mJ with it; 1 more jumps like it, 2 mJ in all
+          help: give the current a path (a freewheeling diode, a snubber, `Roff` of the switch), or the charge a resistance (`Ron`), unless the ideal jump is what is meant
+        note[island]: v(x) is relative to node a
         ");
         assert!(!summary(&run, Places::default(), false).contains("plan:"));
     }

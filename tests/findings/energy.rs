@@ -1,7 +1,7 @@
 //! Energy, stated errors and verification.
 
 use super::*;
-use circ::integrate::{JumpReason, Places};
+use circ::integrate::JumpReason;
 use circ::report::text;
 
 const STEPPED: [Method; 2] = [Method::Theta, Method::Euler];
@@ -126,14 +126,19 @@ fn a_dead_time_without_a_path_destroys_the_current_and_says_so() {
         let lost: f64 = jumps.first.iter().map(|jump| jump.loss).sum();
         assert!((run.energy.jumps - lost).abs() < 1e-15 && jumps.all.1 == lost);
         assert!(run.energy.residual_relative < 1e-9, "{:?}", run.energy);
-        let [warning] = &text::warnings(&run, Places::default())[..] else {
+        let [warning] = &text::warnings(&run)[..] else {
             panic!("one warning");
         };
         assert!(
-            warning.starts_with("l1 jumps at 40 µs (switch s1)"),
-            "{warning}"
+            warning.text.starts_with("l1 jumps at 40 µs (switch s1)"),
+            "{}",
+            warning.text
         );
-        assert!(warning.contains("2 more jumps like it"), "{warning}");
+        assert!(
+            warning.text.contains("2 more jumps like it"),
+            "{}",
+            warning.text
+        );
     }
 }
 

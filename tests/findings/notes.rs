@@ -22,7 +22,7 @@ fn told(command: &str, text: &str) -> String {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     let lines = said
         .lines()
-        .filter(|line| line.starts_with("note: ") || line.starts_with("warning: "));
+        .filter(|line| line.starts_with("note[") || line.starts_with("warning["));
     let number = |word: &&str| word.parse::<f64>().is_ok_and(|x| x.to_string().len() > 3);
     let plain = |line: &str| {
         let words = line.split(' ');

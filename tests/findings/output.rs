@@ -453,7 +453,7 @@ fn a_print_step_that_shows_nothing_is_a_warning() {
     let found = warned("print_step", &rectifier).expect("a warning");
     assert!(
         found.starts_with(
-            "warning: net.cir:4:1: the print step, 10 ms, is half or more of the period of v1, 20 ms"
+            "warning[rows-apart]: net.cir:4:1: the print step, 10 ms, is half or more of the period of v1, 20 ms"
         ),
         "{found}"
     );
@@ -464,7 +464,7 @@ fn a_print_step_that_shows_nothing_is_a_warning() {
     let buck = text("aliased_rows");
     let found = warned("its own rows", &buck).expect("a warning");
     assert!(
-        found.starts_with("note: ") && found.contains("also where they ripple"),
+        found.starts_with("note[") && found.contains("also where they ripple"),
         "{found}"
     );
     let found = warned("coarse", &buck.replace(".tran 5m", ".tran 7u 5m")).expect("a warning");

@@ -160,8 +160,10 @@ impl<'a, 'o> Search<'a, 'o> {
         let asked = self.options.order;
         let (mut last, mut seen) = (None, vec![0.0; stand.state.len()]);
         grow(&mut seen, &stand.state);
+        let mut since_start = (from / period).round() as usize;
         for periods in TRANSIENTS {
             let passed = self.pass(&mut stand, (period, from), periods)?;
+            since_start += periods;
             passed
                 .iter()
                 .for_each(|stand| grow(&mut seen, &stand.state));
@@ -192,9 +194,14 @@ impl<'a, 'o> Search<'a, 'o> {
             // Where the transient has settled on an orbit of another order, no other one need exist.
             if let (None, Some(order)) = (asked, order_of(&passed, &amplitudes))
                 && order > 1
-                && let Some(found) = self.of_order(order, &stand, (period, from), &amplitudes)?
             {
-                return Ok(found);
+                // In the phase of the transient.
+                let more = since_start.next_multiple_of(order) - since_start;
+                let mut begin = stand.clone();
+                self.pass(&mut begin, (period, from), more)?;
+                if let Some(found) = self.of_order(order, &begin, (period, from), &amplitudes)? {
+                    return Ok(found);
+                }
             }
         }
         let periods: usize = TRANSIENTS.iter().sum();
