@@ -43,9 +43,8 @@ impl Magnitudes {
         if self.taken == sizes {
             return;
         }
-        for known in [&mut self.taken, &mut self.sizes] {
-            refill(known, sizes);
-        }
+        refill(&mut self.taken, sizes);
+        refill(&mut self.sizes, sizes);
         waves(&mut self.sizes[flow.states()..]);
         flow.noise(&self.sizes, &mut self.noise);
         self.find_followers(flow);
