@@ -604,6 +604,18 @@ fn findings_are_lines_or_objects_where_that_is_asked_for() {
     );
 }
 
+/// Of a value on the command line it is not known what it is for.
+#[test]
+fn a_capital_m_of_a_parameter_is_told_to_be_milli() {
+    let said = |arguments: &str| run(arguments).err.contains("`2M` is milli");
+    assert!(said("sim divider.cir --param top=2M"));
+    assert!(said("sweep divider.cir --param top=1,2M"));
+    for value in ["2m", "2Meg", "2k", "2"] {
+        let ran = run(&format!("sim divider.cir --param top={value}"));
+        assert!(!ran.err.contains("milli"), "{}", ran.err);
+    }
+}
+
 #[test]
 fn parameters_and_probes_are_replaced() {
     assert_snapshot!(run(

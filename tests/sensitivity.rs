@@ -344,3 +344,21 @@ fn passes_are_as_many_as_measurements_or_values() {
     assert_eq!((found.passes.forward, found.passes.backward), (2, 0));
     both_ways(&ladder(3), false);
 }
+
+/// Thirteen capacitors: `circ sim` has rows for so many states, 1 ms apart here, and straight lines between them.
+#[test]
+fn what_rows_would_have_found_otherwise_is_told() {
+    let ladder = |count: usize| {
+        let stage = |k: usize| format!("r{k} n{} n{k} 1k\nc{k} n{k} 0 1u\n", k - 1);
+        let stages: String = (1..=count).map(stage).collect();
+        format!(
+            "ladder\nv1 n0 0 1\n{stages}.tran 1m 50m uic\n.meas tran v integ v(n{count})\n.end\n"
+        )
+    };
+    let said = |text: &str| {
+        let notes = found(text, false).notes;
+        let mut codes = notes.iter().map(|note| note.code);
+        codes.any(|code| code == "measured-between-events")
+    };
+    assert!(said(&ladder(13)) && !said(&ladder(12)));
+}

@@ -1,8 +1,10 @@
 //! Small-signal responses against closed forms.
 #![allow(missing_docs, reason = "tests")]
 
+use std::path::Path;
+
 use circ::analysis::{
-    About, PeriodicOptions, Response, SmallSignalOptions, orbit_start, periodic, small_signal,
+    About, PeriodicOptions, Response, SmallSignalOptions, orbit_start, small_signal,
     small_signal_measured,
 };
 use circ::integrate::Reason;
@@ -105,53 +107,6 @@ fn the_input_of_a_buck_acts_in_sidebands() {
         let error = apart(&out, truth, &response.phasors.frequency);
         assert!(error < 1e-9, "{k}: {error:e}");
     }
-}
-
-/// A buck whose diode ends the current in each period.
-fn discontinuous(control: &str, last: &str) -> String {
-    format!(
-        "buck\nv1 1 0 12\ns1 1 2 vc saw sw\nd1 0 2 d\nl1 2 3 4.7u\nrc 3 b 0.03\nc1 b 0 10u\nr1 3 0 50\nvc vc 0 {control}\n\
-         vsaw saw 0 pulse(0 2 0 10u 0 0 10u)\n.model sw sw(vt=0 vh=0 ron=10m roff=1meg)\n.model d d(ron=10m roff=1meg vfwd=0.4)\n\
-         .save v(3)\n{last}\n.end\n"
-    )
-}
-
-/// What a sine of ±1e-4 V makes of an orbit of four switching periods: half the difference of the two, at its frequency.
-#[test]
-fn a_buck_in_discontinuous_conduction_responds_as_orbits_with_a_small_sine() {
-    let (f, size, periods) = (75e3, 1e-4, 4.0);
-    let response = response_of(
-        &discontinuous("0.8 ac 1", &format!(".ac list {f}")),
-        &SmallSignalOptions::default(),
-    );
-    let found = column(&response, "v(3)")[0];
-    let part = |sign: f64| {
-        let sine = format!("sin(0.8 {} {f} 0 0 0)", sign * size);
-        let model =
-            Model::parse(&discontinuous(&sine, ".tran 2.5n 1m"), "t.cir").expect("a circuit");
-        let options = PeriodicOptions {
-            events: true,
-            ..PeriodicOptions::default()
-        };
-        let (orbit, run) = periodic(&model, &options).expect("an orbit");
-        assert!(
-            (orbit.period / (periods * 1e-5) - 1.0).abs() < 1e-12,
-            "{orbit:?}"
-        );
-        let rows: Vec<(f64, Complex<f64>)> = (run.waveforms.time.iter())
-            .zip(run.waveforms.column(0))
-            .map(|(t, v)| (*t, v * (-J * TAU * f * *t).exp()))
-            .collect();
-        let trapezoids = rows
-            .windows(2)
-            .map(|w| (w[0].1 + w[1].1) * (0.5 * (w[1].0 - w[0].0)));
-        trapezoids.sum::<Complex<f64>>() / orbit.period
-    };
-    let truth = (part(1.0) - part(-1.0)) * J / size;
-    assert!(
-        (found - truth).norm() < 1e-5 * truth.norm(),
-        "{found} {truth}"
-    );
 }
 
 /// An exponential diode is its tangent: R in series with r = nV_T/(I + IS) at the current I of the operating point.
@@ -416,4 +371,45 @@ fn phases_are_measured_without_jumps() {
     let margin = found[1].1.clone().expect("a phase");
     let truth = 180.0 - 3.0 * 99f64.sqrt().atan().to_degrees();
     assert!((margin - truth).abs() < 1e-5, "{margin} {truth}");
+}
+
+/// Diodes and transistors at their operating points: `tests/reference/small-signal/`, made by `tests/reference/small_signal.py`.
+#[test]
+fn curved_laws_respond_as_in_ngspice() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/small-signal");
+    let of = |name: &str, ending: &str| {
+        let path = folder.join(format!("{name}.{ending}"));
+        std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+    };
+    for name in [
+        "bridge",
+        "common-emitter",
+        "current-biased",
+        "diode",
+        "long-tailed-pair",
+    ] {
+        let response = response_of(&of(name, "cir"), &SmallSignalOptions::default());
+        assert_eq!(response.about, About::Rest, "{name}");
+        let signals: Vec<_> = (response.phasors.names.iter())
+            .map(|name| (name, column(&response, name)))
+            .collect();
+        let reference = of(name, "csv");
+        let lines = reference.lines().filter(|line| !line.starts_with('#'));
+        let mut count = 0;
+        for (line, (row, (signal, found))) in lines.skip(1).zip(
+            (0..response.phasors.frequency.len())
+                .flat_map(|row| signals.iter().map(move |signal| (row, signal))),
+        ) {
+            let words: Vec<&str> = line.split(',').collect();
+            let number = |k: usize| words[k].parse::<f64>().expect("a number");
+            let truth = Complex::new(number(2), number(3));
+            assert_eq!(words[1], signal.as_str(), "{name}");
+            let apart = (number(0) / response.phasors.frequency[row] - 1.0).abs();
+            assert!(apart < 1e-12, "{name}: {line}");
+            let error = (found[row] - truth).norm() / truth.norm();
+            assert!(error < 1e-6, "{name}: {line}: {}, {error:e}", found[row]);
+            count += 1;
+        }
+        assert_eq!(count, response.phasors.frequency.len() * signals.len());
+    }
 }

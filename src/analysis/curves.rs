@@ -34,6 +34,9 @@ pub(super) fn transient_curves(
         return Ok(None);
     };
     let measured = &circuit.measured;
+    if measured.is_empty() {
+        return Ok(None);
+    }
     let probing = model.with_circuit(Circuit {
         probes: measured.clone(),
         columns: vec![],
@@ -99,9 +102,8 @@ pub(super) fn shortest_period(model: &Model) -> f64 {
 }
 
 /// Whether rows cost less than the exponentials of every mode and all changes of mode.
-fn is_large(model: &Model, tran: &Tran) -> bool {
-    model.circuit().measured.is_empty()
-        || model.multiport().storage.len() > MOST_STATES
+pub(super) fn is_large(model: &Model, tran: &Tran) -> bool {
+    model.multiport().storage.len() > MOST_STATES
         || tran.tstop / shortest_period(model) > MOST_PERIODS
 }
 

@@ -146,6 +146,8 @@ pub struct Assigned {
     pub name: String,
     /// At least one.
     pub values: Vec<f64>,
+    /// The first of them that ends in a capital `M`, as it was written.
+    pub milli: Option<String>,
 }
 
 /// What is drawn from distributions.
@@ -764,8 +766,17 @@ fn assignment(text: &str) -> Result<Assigned, String> {
         }
         _ => return Err("expected a value, or several as `1k,2k`, `lin:FIRST:LAST:COUNT` or `log:FIRST:LAST:COUNT`".into()),
     };
+    let milli = parts.iter().flat_map(|part| part.split(',')).map(str::trim);
+    let milli = milli.filter_map(|part| Some((part, part.strip_suffix('M')?)));
+    let mut milli =
+        milli.filter(|(_, digits)| digits.ends_with(|c: char| c.is_ascii_digit() || c == '.'));
+    let milli = milli.next().map(|(part, _)| part.to_owned());
     let name = name.trim().to_lowercase();
-    Ok(Assigned { name, values })
+    Ok(Assigned {
+        name,
+        values,
+        milli,
+    })
 }
 
 /// Most values of one name in a sweep.

@@ -195,6 +195,15 @@ pub fn open(
     } = load(input);
     drop(busy);
     show(&diagnostics, &sources, streams);
+    for given in &input.params {
+        if let Some(written) = &given.milli {
+            let text = format!(
+                "`{}`: `{written}` is milli, as SPICE suffixes know no capitals; mega is `Meg`",
+                given.name
+            );
+            streams.warning("suffix-m", text);
+        }
+    }
     files::spare(outputs, sources.files.iter().map(|f| Path::new(&f.path)))?;
     files::writable(outputs)?;
     let mut circuit = circuit.ok_or_else(|| faults(input, &diagnostics))?;

@@ -3,11 +3,14 @@
 use super::base::Base;
 use super::survey::Survey;
 use super::{Beside, Sensitivity, SensitivityMethod, started};
+use crate::analysis::curves::is_large;
 use crate::analysis::variation::{Carried, Drawing, Lines, Moved, Parameter, Tableau, Weighted};
 use crate::circuit::{Circuit, Measured, Weights, weights};
 use crate::integrate::{Error, Note};
 use crate::measure::{Curves, Signals};
 use crate::mna::Perturbation;
+use crate::model::Model;
+use crate::settings::tolerances::times::{MOST_PERIODS, MOST_STATES};
 
 /// What measurements find in a run, and what they weigh of it.
 struct Weighing {
@@ -107,6 +110,7 @@ impl Beside<'_> {
         let mut sensitivity = Sensitivity {
             of: started(&weighing.found),
             exact: true,
+            notes: self.seen_elsewhere(&own),
             ..Sensitivity::default()
         };
         let mut surveys = Vec::with_capacity(to.len());
@@ -191,6 +195,20 @@ impl Beside<'_> {
             sensitivity.at.push((name.to_owned(), value));
         }
         Ok(Some(sensitivity))
+    }
+
+    /// Tells where a transient measures the same run on its rows.
+    fn seen_elsewhere(&self, own: &Model) -> Vec<Note> {
+        let mut tran = own
+            .circuit()
+            .tran
+            .filter(|_| !self.options.steady)
+            .into_iter();
+        let large = tran.any(|tran| is_large(own, &tran));
+        let text = format!(
+            "measured between events; `circ sim` measures a run of more than {MOST_STATES} states or {MOST_PERIODS:e} periods on its rows, and finds what straight lines between them have"
+        );
+        Vec::from_iter(large.then(|| Note::run("measured-between-events", text)))
     }
 
     /// Derivatives with ln p by differences of what is measured where the run is moved by ± a little.

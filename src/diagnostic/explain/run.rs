@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 49] = [
+pub(super) const CODES: [Explanation; 50] = [
     Explanation::of(
         "at-rest",
         "The circuit does not switch periodically: the response is that about its operating point.",
@@ -98,6 +98,12 @@ pub(super) const CODES: [Explanation; 49] = [
         "Run the command that the message names, or take the card out.",
     )
     .shown("both\nv1 a 0 dc 1 ac 1\nr1 a 0 1k\n.tran 1m 5m\n.op\n"),
+    Explanation::of(
+        "measured-between-events",
+        "Derivatives and values are of what happens between events, where `circ sim` measures the same run on its rows.",
+        "A run of many states or very many periods, whose rows cost less than what lies between them.",
+        "Nothing; a smaller print step brings the rows of `circ sim` closer to these values.",
+    ),
     Explanation::of(
         "more",
         "There are more findings than are shown.",
