@@ -53,6 +53,7 @@ pub use note::{Note, Places};
 pub use orbit::{Orbit, OrbitKind};
 pub use rows::{Asked, Block, RowKind, Sink};
 pub use run::{Frame, Outcome, Stepper};
+pub(crate) use simulate::simulate_beside;
 pub use simulate::{Method, SimOptions, Standing, simulate, simulate_system};
 pub use simulation::{Checkpoint, Simulation, SimulationOptions, Stop, StopReason};
 pub use start::{OperatingPoint, Values, operating_point};

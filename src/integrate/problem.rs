@@ -42,6 +42,8 @@ pub(super) struct Systems {
     /// All laws as ideal pairs.
     pub(super) multiport: Arc<StandardMultiport>,
     known: Arc<Mutex<Known>>,
+    /// Those of modes too.
+    pub(super) reduced: Arc<exact::Reduced>,
 }
 
 #[derive(Debug, Default)]
@@ -63,6 +65,7 @@ impl Systems {
         Self {
             multiport: Arc::new(multiport),
             known: Arc::default(),
+            reduced: Arc::default(),
         }
     }
 
@@ -212,6 +215,14 @@ impl Problem {
         }
     }
 
+    /// The same with the systems of a simulation of this circuit, of which some are known.
+    pub(super) fn sharing(self, other: &Self) -> Self {
+        Self {
+            systems: other.systems.clone(),
+            ..self
+        }
+    }
+
     /// The same circuit from another place on; `conducting` as in [`start::Initial`].
     pub(super) fn standing_at(self, start: Place, conducting: Vec<bool>) -> Self {
         Self {
@@ -255,6 +266,7 @@ impl Problem {
         let mut exact = Exact::new(exact::Setup {
             assembler: exact::Assembler::new(Arc::clone(&self.systems.multiport))
                 .with_steps(self.steps.clone())
+                .sharing(&self.systems.reduced)
                 .knowing(&self.start.switches, lcs),
             position: self.start.switches.clone(),
             t: self.start.t,

@@ -20,7 +20,7 @@ use crate::integrate::ready::ready;
 use crate::integrate::rows::{Asked, Sink};
 use crate::integrate::run::{Frame, attempt, run};
 use crate::integrate::theta::Stepping;
-use crate::integrate::{Note, Run};
+use crate::integrate::{Note, Run, Simulation};
 use crate::lcs::Lcs;
 use crate::mna::StaticMultiport;
 use crate::plan::Plan;
@@ -111,8 +111,20 @@ pub fn simulate(
     behaviour: &StaticMultiport,
     options: SimOptions<'_>,
 ) -> Result<Run, Error> {
+    simulate_beside(None, circuit, behaviour, options)
+}
+
+/// The same with the systems that a simulation of the same circuit has come through.
+///
+/// # Errors
+/// As [`simulate`].
+pub(crate) fn simulate_beside(
+    other: Option<&Simulation>,
+    circuit: &Circuit,
+    behaviour: &StaticMultiport,
+    mut options: SimOptions<'_>,
+) -> Result<Run, Error> {
     let tran = circuit.tran.ok_or_else(no_transient)?;
-    let mut options = options;
     let start = options.start.take();
     let uic = tran.uic || start.is_some();
     // Steps of curved laws pass comparators as events that they have to find; a start tells what pairs there are.
@@ -124,6 +136,9 @@ pub fn simulate(
         None => (circuit, behaviour),
     };
     let mut problem = Problem::of_circuit(circuit, behaviour, uic, &options.settings)?;
+    if let Some(other) = other {
+        problem = problem.sharing(other.problem());
+    }
     if let Some((_, _, count)) = known {
         problem.known_comparators = count;
     }

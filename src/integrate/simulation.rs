@@ -116,6 +116,10 @@ impl Simulation {
         })
     }
 
+    pub(super) const fn problem(&self) -> &Problem {
+        &self.problem
+    }
+
     /// The present time, s.
     #[must_use]
     pub fn time(&mut self) -> f64 {

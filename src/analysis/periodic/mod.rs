@@ -12,7 +12,7 @@ use super::variation::{Course, Trajectory};
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{
     Error, Note, Orbit, OrbitKind, Reason, Run, SimOptions, Simulation, SimulationOptions,
-    Standing, simulate,
+    Standing, simulate_beside,
 };
 use crate::mna::{StaticMultiport, behaviour};
 use crate::model::Model;
@@ -123,7 +123,7 @@ impl Steady {
         } = self;
         let (names, orbit) = (simulation.state_names(), found.orbit());
         let mut run = rows(
-            (&circuit, &multiport),
+            (&circuit, &multiport, &simulation),
             standing,
             orbit.period,
             options,
@@ -356,7 +356,7 @@ const fn has_no_rest(error: &Error) -> bool {
 
 /// One period of waveforms, from 0 on.
 fn rows(
-    (circuit, multiport): (&Circuit, &StaticMultiport),
+    (circuit, multiport, simulation): (&Circuit, &StaticMultiport, &Simulation),
     standing: Standing,
     period: f64,
     options: &PeriodicOptions<'_>,
@@ -377,7 +377,8 @@ fn rows(
         })),
         ..circuit.clone()
     };
-    let mut run = simulate(
+    let mut run = simulate_beside(
+        Some(simulation),
         &circuit,
         multiport,
         SimOptions {

@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::{Resolvent, resonance};
-use crate::analysis::variation::{Saltation, Segment, System, Trajectory, shaped, times};
+use crate::analysis::variation::{Saltation, System, Trajectory, shaped, times};
 use crate::integrate::Error;
 
 /// The orbit, its period, s, and its monodromy.
@@ -24,9 +24,11 @@ pub(super) struct Linear<'a> {
     outputs: Vec<[DMatrix<f64>; 3]>,
 }
 
-/// What a segment's solution is made of at one frequency.
+/// What the solutions in a mode are made of at one frequency.
 struct Forced<'a> {
     resolvent: Resolvent<'a>,
+    /// What rounding may leave of its solutions.
+    loss: f64,
     /// p.
     state: DVector<Complex<f64>>,
 }
@@ -73,7 +75,7 @@ impl<'a> Linear<'a> {
     ) -> Result<(Vec<Complex<f64>>, f64), Error> {
         let forced = self.forced(omega, drive)?;
         let still = DVector::zeros(self.monodromy.nrows());
-        let after = self.pass(omega, drive, &forced, &still, |_, _, _| Ok(()))?;
+        let after = self.pass(omega, drive, &forced, &still, |_, _, _, _| Ok(()))?;
         let start = if still.is_empty() {
             still
         } else {
@@ -82,18 +84,17 @@ impl<'a> Linear<'a> {
         let width = self.outputs.first().map_or(0, |[x, ..]| x.nrows());
         let mut sums = vec![DVector::<Complex<f64>>::zeros(width); bands.len()];
         let mut loss = 0.0_f64;
-        self.pass(omega, drive, &forced, &start, |k, before, after| {
+        self.pass(omega, drive, &forced, &start, |k, before, end, after| {
             // A forced part that is larger than what is left of it leaves its rounding.
-            let Forced { resolvent, state } = &forced[k];
+            let forced = &forced[self.trajectory.segments[k].system];
             let size = |x: &DVector<Complex<f64>>| x.iter().fold(0.0, |m: f64, v| m.max(v.norm()));
-            let part = size(state) / size(before).max(f64::MIN_POSITIVE);
-            loss = loss.max(resolvent.loss() * part.max(1.0));
+            let part = size(&forced.state) / size(before).max(f64::MIN_POSITIVE);
+            loss = loss.max(forced.loss * part.max(1.0));
             for (sum, band) in sums.iter_mut().zip(bands) {
                 let sideband = omega + f64::from(*band) * TAU / self.period;
-                *sum += self.over_segment(k, (omega, sideband), drive, &forced[k], before)?;
+                *sum += self.over_segment(k, (omega, sideband), drive, forced, before)?;
                 if let (Some(saltation), Some(after)) = (self.trajectory.saltations.get(k), after) {
-                    let end = self.end(k, omega, &forced[k], before);
-                    *sum += self.at_event(saltation, (omega, sideband), drive, (&end, after));
+                    *sum += self.at_event(saltation, (omega, sideband), drive, (end, after));
                 }
             }
             Ok(())
@@ -115,24 +116,26 @@ impl<'a> Linear<'a> {
         start.iter().all(|v| v.is_finite()).then_some(start)
     }
 
-    /// By segment.
+    /// By system.
     fn forced(&self, omega: f64, drive: &DVector<Complex<f64>>) -> Result<Vec<Forced<'_>>, Error> {
-        let of = |segment: &Segment| {
-            let system = &self.trajectory.systems[segment.system];
+        let of = |system: &'a System| {
             let resolvent = Resolvent::of(&system.lcs.a, system.basis.as_ref(), omega);
             let state = resolvent.solve(times(&system.inputs, drive));
-            let state = state.ok_or_else(|| resonance(omega))?;
-            Ok(Forced { resolvent, state })
+            Ok(Forced {
+                loss: resolvent.loss(),
+                state: state.ok_or_else(|| resonance(omega))?,
+                resolvent,
+            })
         };
-        self.trajectory.segments.iter().map(of).collect()
+        self.trajectory.systems.iter().map(of).collect()
     }
 
     fn time(&self, t: f64) -> f64 {
         t - self.origin
     }
 
-    /// Goes round from δs at the start to δs a period later, δu included; `visit` gets each segment with its δx at the beginning, and the δx
-    /// at the beginning of the next.
+    /// Goes round from δs at the start to δs a period later, δu included; `visit` gets each segment with its δx at the beginning and at the
+    /// end, and the δx at the beginning of the next.
     fn pass(
         &self,
         omega: f64,
@@ -141,6 +144,7 @@ impl<'a> Linear<'a> {
         start: &DVector<Complex<f64>>,
         mut visit: impl FnMut(
             usize,
+            &DVector<Complex<f64>>,
             &DVector<Complex<f64>>,
             Option<&DVector<Complex<f64>>>,
         ) -> Result<(), Error>,
@@ -156,9 +160,9 @@ impl<'a> Linear<'a> {
         };
         let mut x = times(&systems[first.system].lcs.storage.inject, start);
         for (k, segment) in segments.iter().enumerate() {
-            let end = self.end(k, omega, &forced[k], &x);
+            let end = self.end(k, omega, &forced[segment.system], &x);
             let Some(saltation) = saltations.get(k) else {
-                visit(k, &x, None)?;
+                visit(k, &x, &end, None)?;
                 let system = &systems[segment.system];
                 let now = drive * turn(omega, self.time(segment.to));
                 return Ok(times(&system.lcs.storage.x, &end) + times(&system.storage_inputs, &now));
@@ -168,7 +172,7 @@ impl<'a> Linear<'a> {
             let next = times(&saltation.x, &end)
                 + times(&saltation.u, &now)
                 + times(&saltation.du, &rates);
-            visit(k, &x, Some(&next))?;
+            visit(k, &x, &end, Some(&next))?;
             x = next;
         }
         Ok(start.clone())

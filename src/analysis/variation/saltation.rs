@@ -177,6 +177,10 @@ pub(crate) fn times(
     matrix: &DMatrix<f64>,
     vector: &DVector<Complex<f64>>,
 ) -> DVector<Complex<f64>> {
-    let parts = [vector.map(|v| v.re), vector.map(|v| v.im)].map(|part| matrix * part);
-    parts[0].zip_map(&parts[1], Complex::new)
+    let row = |i: usize, _| {
+        let terms = matrix.row(i);
+        let terms = terms.iter().zip(vector.iter());
+        terms.map(|(entry, value)| value * *entry).sum()
+    };
+    DVector::from_fn(matrix.nrows(), row)
 }

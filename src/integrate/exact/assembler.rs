@@ -1,6 +1,6 @@
 //! The circuit reduced for a mode, switches on their thresholds included.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::integrate::error::{Error, Reason};
 use crate::integrate::switching::Threshold;
@@ -39,6 +39,32 @@ pub(crate) fn steps_of(original: &StaticMultiport) -> Vec<Step> {
     steps
 }
 
+/// Bytes of systems that are shared: small circuits have all of theirs.
+const MOST_SHARED: usize = 1 << 20;
+
+/// The systems of one multiport that were reduced, by position, for all who reduce it: the first ones, as many as [`MOST_SHARED`] bytes hold.
+#[derive(Debug, Default)]
+pub(crate) struct Reduced(Mutex<Vec<(Position, Lcs)>>);
+
+impl Reduced {
+    /// The system of a position if it is known, and none of its states are to stand apart in steps of up to `span`, s.
+    fn find(&self, position: &Position, span: f64) -> Option<Lcs> {
+        let known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = known.iter().find(|(other, _)| other == position);
+        let lcs = found.map(|(_, lcs)| lcs)?;
+        (!is_coupled(lcs, span)).then(|| lcs.clone())
+    }
+
+    /// Takes in a system, unless some of its states stand apart.
+    fn keep(&self, position: Position, lcs: &Lcs) {
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let held: usize = known.iter().map(|(_, lcs)| lcs.bytes()).sum();
+        if lcs.fast.is_empty() && held + lcs.bytes() <= MOST_SHARED {
+            known.push((position, lcs.clone()));
+        }
+    }
+}
+
 /// Reduces one multiport for its modes.
 #[derive(Debug)]
 pub struct Assembler {
@@ -50,6 +76,8 @@ pub struct Assembler {
     span: f64,
     /// The system of one position of the switches, all devices free.
     known: Option<(Vec<bool>, Lcs)>,
+    /// Those of all positions so far, where others reduce the multiport too.
+    reduced: Option<Arc<Reduced>>,
 }
 
 impl Assembler {
@@ -62,7 +90,14 @@ impl Assembler {
             steps: Vec::new(),
             span: f64::INFINITY,
             known: None,
+            reduced: None,
         }
+    }
+
+    /// Has it share what it reduces with others that reduce the same multiport.
+    pub(crate) fn sharing(mut self, reduced: &Arc<Reduced>) -> Self {
+        self.reduced = Some(Arc::clone(reduced));
+        self
     }
 
     /// Spares it the reduction of this position with all devices free.
@@ -148,8 +183,16 @@ impl Assembler {
                 switches: switches.to_vec(),
                 storage: StorageHold::Dynamic,
             };
-            return reduce_apart(&self.multiport, &position, self.span)
-                .map_err(|e| Error::before(e.into()));
+            let shared = self.reduced.as_ref();
+            if let Some(known) = shared.and_then(|shared| shared.find(&position, self.span)) {
+                return Ok(known);
+            }
+            let lcs = reduce_apart(&self.multiport, &position, self.span);
+            let lcs = lcs.map_err(|e| Error::before(e.into()))?;
+            if let Some(shared) = shared {
+                shared.keep(position, &lcs);
+            }
+            return Ok(lcs);
         }
         let at = match self.sliding.iter().position(|(s, _)| s == sliding) {
             Some(at) => at,

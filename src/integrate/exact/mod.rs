@@ -34,7 +34,7 @@ mod travel;
 pub(super) mod tests;
 
 pub use assembler::Assembler;
-pub(crate) use assembler::{Step, steps_of};
+pub(crate) use assembler::{Reduced, Step, steps_of};
 pub(crate) use exosystem::{Exosystem, Shape};
 pub(crate) use key::{Key, Owner};
 pub(crate) use mode::over_w;

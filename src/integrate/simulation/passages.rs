@@ -45,6 +45,9 @@ impl Simulation {
 
     /// Reduces the circuit for its modes, where no step is longer than `span`, s.
     pub(crate) fn assembler(&self, span: f64) -> Assembler {
-        Assembler::new(Arc::clone(&self.problem.systems.multiport)).with_span(span)
+        let systems = &self.problem.systems;
+        Assembler::new(Arc::clone(&systems.multiport))
+            .with_span(span)
+            .sharing(&systems.reduced)
     }
 }

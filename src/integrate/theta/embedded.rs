@@ -147,7 +147,20 @@ impl Theta {
             if *cut {
                 *common += *tells;
             }
-            let end = self.stop_at_passage(t1)?;
+            let end = match self.stop_at_passage(t1) {
+                Err(_) if self.smooth.guards.hold => {
+                    // Where ports have no solution on their sides up to the passage (a junction that can carry no more in reverse), they are free too.
+                    self.smooth.guards.hold = false;
+                    self.try_step(t1)?;
+                    let again = self.judge(h);
+                    if !again.accept && !taken {
+                        self.preferred = again.next;
+                        return Ok(again);
+                    }
+                    self.stop_at_passage(t1)?
+                }
+                end => end?,
+            };
             if end.t < t1 {
                 // The rest up to the stop is another step.
                 self.smooth.halved = f64::NEG_INFINITY;
