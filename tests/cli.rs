@@ -385,6 +385,14 @@ fn values_that_cannot_be_are_named() {
             "view w.csv --format csv",
             "[possible values: html, svg, png]",
         ),
+        (
+            "graph divider.cir --at 1 --format svg",
+            "--at 1e0: the run of .tran ends at",
+        ),
+        (
+            "watch divider.cir --no-open --port many",
+            "`--port many`: expected a number from 0 to 65535",
+        ),
     ] {
         let ran = run(arguments);
         assert_eq!((ran.status, ran.out.as_str()), (2, ""), "{ran}");
@@ -602,6 +610,18 @@ fn findings_are_lines_or_objects_where_that_is_asked_for() {
             .err
             .starts_with("error[bad-option]: invalid value '0' for '--step <H>'")
     );
+}
+
+/// As users of LTspice ask for the current out of a source.
+#[test]
+fn a_probe_may_begin_with_a_minus() {
+    let last = |probe: &str| {
+        let (names, row) = last_row("", &format!("--probe {probe}"));
+        assert_eq!(names.len(), 1, "{names:?}");
+        row[0]
+    };
+    assert_eq!(last("-v(a)"), -last("v(a)"));
+    assert_ne!(last("v(a)"), 0.0);
 }
 
 /// Of a value on the command line it is not known what it is for.

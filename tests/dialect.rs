@@ -378,3 +378,17 @@ fn a_slip_in_the_name_of_a_parameter_is_a_warning() {
     assert_eq!(switch("sw(ron=1 vonn=0.5 vt=0.5)"), slip);
     assert_eq!(switch("sw(ron=1 vt=0.5 vh=0.1)"), []);
 }
+
+#[test]
+fn what_two_cards_step_is_a_fault() {
+    let stepped = |cards: &str| {
+        said(&format!(
+            "v1 a 0 1\nr1 a 0 {{r}}\n.param r=1 q=1\n{cards}\n.tran 1u 1m"
+        ))
+    };
+    assert_eq!(
+        stepped(".step param r list 1 2\n.step param r list 3 4"),
+        [("bad-sweep", Severity::Error)]
+    );
+    assert_eq!(stepped(".step param r list 1 2\n.step v1 1 2 1"), []);
+}

@@ -125,6 +125,13 @@ impl<'n> Builder<'n, '_> {
             let Some(sweep) = self.sweep(card) else {
                 continue;
             };
+            if (self.circuit.steps.iter()).any(|other| other.what == sweep.what) {
+                let message = format!("`{}` is stepped by another card already", sweep.what.name());
+                let fault = Diagnostic::error("bad-sweep", card.span, message);
+                let help = "take one of the cards out, or write all values into one: `list 1 2 5`";
+                self.tell(fault.label("the same once more").help(help));
+                continue;
+            }
             if let Swept::Param(name) = &sweep.what {
                 if self
                     .options

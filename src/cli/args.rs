@@ -243,6 +243,7 @@ pub struct ResultArgs {
         long = "probe",
         value_name = "NAME",
         value_parser = named,
+        allow_hyphen_values = true,
         help = "Show exactly this: v(a), v(a,b), i(d1), @d1[i], v1#branch, patterns v(x1.*), all, expressions v(a)*i(r1) (repeatable)"
     )]
     pub probes: Vec<String>,

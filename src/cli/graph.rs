@@ -36,6 +36,11 @@ pub(super) fn graph(args: &GraphArgs, streams: &Streams) -> Result<Exit, Failure
             ),
         ));
     }
+    let stop = model.circuit().tran.map_or(0.0, |tran| tran.tstop);
+    if let Some(t) = args.at.filter(|t| *t > stop) {
+        let text = format!("--at {t:e}: the run of .tran ends at {stop:e} s");
+        return Err(Failure::told("bad-option", text));
+    }
     let live = match args.at {
         Some(t) => conducting(model, t)
             .map_err(|e| input::broke_off(&args.input, &e, model.places(), streams))?,

@@ -605,6 +605,24 @@ def test_dense_curves_have_no_gaps(tmp_path, show):
     assert gaps and all(0 <= gap <= 2 for gap in gaps)
 
 
+def test_dense_switching_looks_alike_all_along(tmp_path, show):
+    netlist = tmp_path / "gate.cir"
+    netlist.write_text("gate\nv1 a 0 pulse(0 10 0 20n 20n 2.18u 10u)\nr1 a 0 1k\n.tran 0 5m 0 100n\n.save v(a)\n.end\n")
+    run("sim", netlist, "-q", "-o", tmp_path / "gate.html")
+    page = show(tmp_path / "gate.html")
+    # Of pixels with an edge and pixels without one a pattern would be seen, which is none of the signal.
+    heights = """() => {
+        const { plots } = window.circ.state, { bars } = plots[0].panel.curves[0];
+        return bars.slice(8, -8).map(([, top, bottom]) => Math.round(bottom - top));
+    }"""
+    pixels = page.evaluate("Math.round(window.circ.state.plots[0].bbox.width)")
+    for periods in (pixels / 3.5, pixels / 3.4, pixels / 3.1):
+        page.evaluate(f"window.circ.show([0.5e-3, {0.5e-3 + periods * 10e-6}])")
+        page.wait_for_function("window.circ.state.plots[0].panel.curves[0].bars?.length > 0")
+        found = page.evaluate(heights)
+        assert found and len(set(found)) == 1, (periods, sorted(set(found)))
+
+
 SWITCHED = """switched, and a sine
 v1 in 0 5
 vg g 0 pulse(0 1 0 1n 1n 10u 34u)

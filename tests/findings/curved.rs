@@ -203,3 +203,43 @@ fn rows_do_not_depend_on_the_print_step() {
         assert!(many < 2 * few, "{path}: {few} and {many} steps");
     }
 }
+
+/// An inductor between an exponential diode and the ideal body diode of a transistor: no current below the leak of the first one is on the law as long as the
+/// second one blocks, so that steps with ports on their sides end there. And rows within a step behind whose start a current stops: its slope there is no part of the
+/// curve, and the cubic through it was up to 1.5 A off.
+#[test]
+fn a_current_that_a_junction_stops_is_followed() {
+    for name in [
+        "buck_with_a_body_diode",
+        "flyback_with_a_body_diode",
+        "buck_without_load",
+        "flyback_commutates",
+    ] {
+        let circuit = super::circuit(name);
+        let behaviour = circ::mna::behaviour(&circuit).expect("a behaviour");
+        let with = |tol: f64| {
+            let settings = Settings {
+                tol,
+                ..Settings::default()
+            };
+            let options = SimOptions {
+                settings,
+                unestimated: true,
+                ..SimOptions::default()
+            };
+            circ::integrate::simulate(&circuit, &behaviour, options)
+                .unwrap_or_else(|e| panic!("{name}: {e}"))
+        };
+        let (usual, exact) = (with(1e-4), with(1e-7));
+        assert_eq!(usual.method, "theta", "{name}");
+        for column in 0..usual.waveforms.names.len() {
+            let rows = |run: &Run| run.waveforms.column(column).collect::<Vec<f64>>();
+            let (usual, exact) = (rows(&usual), rows(&exact));
+            let size = exact.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+            for (k, (a, b)) in usual.iter().zip(&exact).enumerate() {
+                let off = (a - b).abs();
+                assert!(off < 5e-5 * size, "{name} row {k}: {a} for {b}");
+            }
+        }
+    }
+}

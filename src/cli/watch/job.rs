@@ -54,7 +54,11 @@ impl Job {
         let typed = [OsString::from("circ")].into_iter().chain(typed.to_vec());
         let arguments = with_command(typed.collect(), &Cli::command());
         let cli = Cli::try_parse_from(&arguments);
-        let cli = cli.map_err(|error| Failure::told("bad-option", error.to_string()))?;
+        let cli = cli.map_err(|error| {
+            let text = error.to_string();
+            let text = text.strip_prefix("error: ").unwrap_or(&text);
+            Failure::told("bad-option", text.to_owned())
+        })?;
         let input = match cli.command {
             Command::Sim(args) => args.input,
             Command::Pss(args) => args.input,

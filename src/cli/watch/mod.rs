@@ -25,17 +25,13 @@ const LOOK: Duration = Duration::from_millis(100);
 /// # Errors
 /// See [`Failure`].
 pub(super) fn watch(args: &WatchArgs, streams: &Streams) -> Result<Exit, Failure> {
-    // As one types it: `circ watch FILE --no-open`.
-    let is_ours = |word: &&OsString| word.as_os_str() == "--no-open";
-    let no_open = args.no_open || args.command.iter().any(|word| is_ours(&word));
-    let command: Vec<OsString> = args
-        .command
-        .iter()
-        .filter(|word| !is_ours(word))
-        .cloned()
-        .collect();
+    let Own {
+        port,
+        no_open,
+        command,
+    } = Own::of(args)?;
     let job = Job::of(&command)?;
-    let server = Server::start(args.port)?;
+    let server = Server::start(port)?;
     let signals = Signals::watch()?;
     streams.data(format!("{}\n", server.address()))?;
     if !no_open && open::that_detached(server.address()).is_err() {
@@ -71,4 +67,43 @@ pub(super) fn watch(args: &WatchArgs, streams: &Streams) -> Result<Exit, Failure
         // An editor may write a file in several steps.
         thread::sleep(LOOK);
     }
+}
+
+/// The options of `watch` itself, wherever they stand, as one types them (`circ watch FILE --no-open`), and the command without them.
+struct Own {
+    port: Option<u16>,
+    no_open: bool,
+    command: Vec<OsString>,
+}
+
+impl Own {
+    fn of(args: &WatchArgs) -> Result<Self, Failure> {
+        let mut own = Self {
+            port: args.port,
+            no_open: args.no_open,
+            command: Vec::new(),
+        };
+        let mut words = args.command.iter();
+        while let Some(word) = words.next() {
+            let text = word.to_string_lossy();
+            if text == "--no-open" {
+                own.no_open = true;
+            } else if text == "--port" {
+                own.port = Some(port(
+                    &words.next().map_or("".into(), |n| n.to_string_lossy()),
+                )?);
+            } else if let Some(number) = text.strip_prefix("--port=") {
+                own.port = Some(port(number)?);
+            } else {
+                own.command.push(word.clone());
+            }
+        }
+        Ok(own)
+    }
+}
+
+fn port(text: &str) -> Result<u16, Failure> {
+    let what = || format!("`--port {text}`: expected a number from 0 to 65535");
+    text.parse()
+        .map_err(|_| Failure::told("bad-option", what()))
 }

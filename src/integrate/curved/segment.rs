@@ -1,12 +1,13 @@
 //! Dense output: the quantities at any time within a step that was made.
 //!
-//! The state follows Hermite's cubic through both ends and their slopes, whose error is of fourth order as the step's own; λ follows the
+//! The state follows Hermite's cubic through both ends and their slopes, whose error is of fourth order as the step's own, where its mean over the step
+//! is that of the stages (a slope that ends right behind the start, as of a current that a junction stops, makes another cubic); λ follows the
 //! cubic through four of the stages. The other two stages test it: where λ bends (a diode that turns on) the polynomial is not trusted, and
 //! λ is found on the laws, from the polynomials of the state: y = C x + D λ + G u + F. Where that does not meet the stages either (a large current
 //! that a small error of the state decides), a step of the method from the start of the segment to the row takes its place. Sources are
 //! evaluated at the time itself.
 
-use super::tableau::{NODES, STAGES, THROUGH, between_stages, interpolation};
+use super::tableau::{NODES, STAGES, STRAY, THROUGH, between_stages, interpolation};
 use super::{Curved, Start, Trial};
 use crate::integrate::grow;
 use crate::integrate::inputs::{Inputs, Pieces};
@@ -22,6 +23,8 @@ struct Segment {
     held: Option<Vec<bool>>,
     x: Vec<f64>,
     slope: Vec<f64>,
+    /// By state: what the mean of the cubic is off.
+    stray: Vec<f64>,
     /// By stage: λ and y.
     lambdas: Vec<f64>,
     ys: Vec<f64>,
@@ -95,6 +98,13 @@ impl Segments {
         segment.x.clone_from(&trial.x);
         segment.slope.clear();
         segment.slope.extend_from_slice(trial.end_slope());
+        segment.stray.clear();
+        segment.stray.resize(trial.x.len(), 0.0);
+        for (weight, slopes) in STRAY.iter().zip(trial.slopes()) {
+            for (stray, slope) in segment.stray.iter_mut().zip(slopes) {
+                *stray += trial.h * weight * slope;
+            }
+        }
         segment.lambdas.clone_from(&trial.lambdas);
         segment.ys.clone_from(&trial.ys);
         segment.read_from = None;
@@ -130,7 +140,9 @@ impl Segments {
             return known;
         }
         let within = ROWS * tolerance;
-        let found = if self.meet_stages(curved, within) {
+        let found = if !self.state_is_a_cubic(curved, within) {
+            Within::Step
+        } else if self.meet_stages(curved, within) {
             Within::Polynomials
         } else if self.laws_meet_stages(curved, inputs, within) {
             Within::Laws
@@ -139,6 +151,14 @@ impl Segments {
         };
         self.kept[0].read_from = Some(found);
         found
+    }
+
+    /// Whether the state's polynomials have the mean of the stages.
+    fn state_is_a_cubic(&mut self, curved: &Curved, within: f64) -> bool {
+        self.off.clear();
+        self.off.extend_from_slice(&self.kept[0].stray);
+        self.off.resize(curved.forms.width(), 0.0);
+        curved.readings.are_within(&self.off, &self.reached, within)
     }
 
     /// Whether the polynomials of λ meet the stages that they do not go through.

@@ -66,6 +66,28 @@ pub(crate) const ERROR: [f64; STAGES] = [
     WEIGHTS[5] - EMBEDDED[5],
 ];
 
+/// What Hermite's cubic through both ends and their slopes has as its mean over a step more than Σ b_j X_j, the mean of the stages, in slopes of the
+/// stages times h: zero for the slopes of cubics.
+pub(crate) const STRAY: [f64; STAGES] = stray();
+
+const fn stray() -> [f64; STAGES] {
+    let mut all = [0.0; STAGES];
+    let mut k = 0;
+    while k < STAGES {
+        let mut of_stages = if k > 0 { WEIGHTS[k] * GAMMA } else { 0.0 };
+        let mut j = k + 1;
+        while j < STAGES {
+            of_stages += WEIGHTS[j] * LOWER[j][k];
+            j += 1;
+        }
+        all[k] = 0.5 * WEIGHTS[k] - of_stages;
+        k += 1;
+    }
+    all[0] += 1.0 / 12.0;
+    all[STAGES - 1] -= 1.0 / 12.0;
+    all
+}
+
 /// The stages that λ at a stage is extrapolated from: their indices. The first implicit stage has none before it.
 const FROM: [&[usize]; STAGES] = [&[], &[0], &[0, 1], &[0, 1, 2], &[0, 2, 3], &[0, 1, 4]];
 
@@ -125,6 +147,16 @@ mod tests {
 
     fn dot(a: &[f64; STAGES], b: &[f64; STAGES]) -> f64 {
         a.iter().zip(b).map(|(a, b)| a * b).sum()
+    }
+
+    #[test]
+    fn cubics_have_the_mean_of_their_stages() {
+        for (power, expected) in [(0, 0.0), (1, 0.0), (2, 0.0), (3, -0.005_288_333)] {
+            let sum: f64 = (STRAY.iter().zip(NODES))
+                .map(|(weight, node)| weight * node.powi(power))
+                .sum();
+            assert!((sum - expected).abs() < 1e-9, "{power}: {sum}");
+        }
     }
 
     #[test]

@@ -143,6 +143,11 @@ impl Trial {
         (&self.lambdas[ports.clone()], &self.ys[ports])
     }
 
+    /// x' of the stages; without states none.
+    pub(crate) fn slopes(&self) -> impl Iterator<Item = &[f64]> {
+        self.slopes.chunks_exact(self.n.max(1))
+    }
+
     /// x' at the end of the step.
     pub(crate) fn end_slope(&self) -> &[f64] {
         &self.slopes[(STAGES - 1) * self.n..]

@@ -185,7 +185,8 @@ function closed(heights, reach) {
  * The envelope of what is seen of a dense curve: of each pixel that has a part of it [pixel, top, bottom, inner top, inner bottom, straight], where
  * what lies a line's width inside is inner; without any the last two heights are equal. `edge(k)` is the x at which pixel k of `pixels` ends,
  * `ends` gives the heights of two values, which grow downwards. Where edges are so close that some pixels have one and some have none (about two
- * in five pixels), gaps between them are part of it: they would make a pattern that is not there.
+ * in five pixels), gaps between them are part of it: they would make a pattern that is not there. Whether they are is asked of a wide stretch, over
+ * which the places of edges in their pixels go round: else it would be now one, now the other.
  */
 function envelope(curve, view, pixels, edge, ends, line) {
   let tops = new Float64Array(pixels).fill(NaN), floors = tops.slice();
@@ -194,8 +195,9 @@ function envelope(curve, view, pixels, edge, ends, line) {
     tops[pixel] = top - room;
     floors[pixel] = -bottom - room;
   });
-  const far = Math.round(8 * line), turns = turnsIn(tops, floors, far, line);
-  const filled = (heights) => closed(heights, Math.round(1.5 * line)).map((height, k) => (turns[k] > 1.2 * far ? height : heights[k]));
+  const [near, far] = [8, 64].map((reach) => Math.round(reach * line));
+  const turns = turnsIn(tops, floors, near, line), many = turnsIn(tops, floors, far, line);
+  const filled = (heights) => closed(heights, Math.round(1.5 * line)).map((height, k) => (many[k] > 1.2 * far ? height : heights[k]));
   [tops, floors] = [filled(tops), filled(floors)];
   const [innerTops, innerFloors] = [tops, floors].map((heights) => negated(least(negated(heights), Math.round(line / 2))));
   const all = [];
