@@ -1,5 +1,6 @@
-//! Derivatives of thirteen circuits of docs/performance.md against differences in 270 digits: `tests/reference/gradients.csv`, made by `gradients.py` from the
-//! cards alone. The fourteenth, `cockcroft-walton`, has none: with equal capacitors diodes rest at their thresholds.
+//! Derivatives of twelve circuits of docs/performance.md against differences in 270 digits: `tests/reference/gradients.csv`, made by `gradients.py` from the
+//! cards alone. `cockcroft-walton` has none, as with equal capacitors diodes rest at their thresholds;
+//! `peak-detector`, whose diode begins to conduct as its capacitor has just been emptied, is refused.
 #![allow(missing_docs, reason = "tests")]
 
 use std::collections::BTreeMap;
@@ -106,12 +107,11 @@ fn meets(circuit: &str, count: usize, method: SensitivityMethod) {
     assert_eq!(met, count, "{circuit}");
 }
 
-const COUNTS: [(&str, usize); 13] = [
+const COUNTS: [(&str, usize); 12] = [
     ("bridge-capacitor-filter", 48),
     ("bridge-resistor", 24),
     ("clamp", 8),
     ("isolated-rectifier", 72),
-    ("peak-detector", 8),
     ("rectifier", 8),
     ("rlcd", 24),
     ("three-phase-rectifier", 96),
