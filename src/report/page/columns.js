@@ -186,7 +186,7 @@ function closed(heights, reach) {
  * what lies a line's width inside is inner; without any the last two heights are equal. `edge(k)` is the x at which pixel k of `pixels` ends,
  * `ends` gives the heights of two values, which grow downwards. Where edges are so close that some pixels have one and some have none (about two
  * in five pixels), gaps between them are part of it: they would make a pattern that is not there. Whether they are is asked of a wide stretch, over
- * which the places of edges in their pixels go round: else it would be now one, now the other.
+ * which the places of edges in their pixels go round, and answered as before where it is close: else it would be now one, now the other.
  */
 function envelope(curve, view, pixels, edge, ends, line) {
   let tops = new Float64Array(pixels).fill(NaN), floors = tops.slice();
@@ -196,8 +196,10 @@ function envelope(curve, view, pixels, edge, ends, line) {
     floors[pixel] = -bottom - room;
   });
   const [near, far] = [8, 64].map((reach) => Math.round(reach * line));
-  const turns = turnsIn(tops, floors, near, line), many = turnsIn(tops, floors, far, line);
-  const filled = (heights) => closed(heights, Math.round(1.5 * line)).map((height, k) => (many[k] > 1.2 * far ? height : heights[k]));
+  const turns = turnsIn(tops, floors, near, line);
+  let isFull = false;
+  const full = turnsIn(tops, floors, far, line).map((many) => (isFull = many > (isFull ? 1.1 : 1.25) * far));
+  const filled = (heights) => closed(heights, Math.round(1.5 * line)).map((height, k) => (full[k] ? height : heights[k]));
   [tops, floors] = [filled(tops), filled(floors)];
   const [innerTops, innerFloors] = [tops, floors].map((heights) => negated(least(negated(heights), Math.round(line / 2))));
   const all = [];
