@@ -109,7 +109,7 @@ fn told(error: &Error, elements: &[&Element]) -> Told {
         Reason::Circuit(error) => no_system(error, elements),
         Reason::Residual { .. } => plain(
             "not-solved",
-            Some(or("a resistance in series with the device (`RS`, `Ron` in its model) or across it eases the problem")),
+            Some(or("a current needs another path than a diode that blocks; a resistance in series with the device (`RS`, `Ron` in its model) or across it eases the problem")),
         ),
         Reason::Singular { .. } => plain(
             "singular",

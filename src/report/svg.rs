@@ -75,13 +75,16 @@ pub fn draw(figure: &Figure) -> Result<String, PictureError> {
                 (filling(&points), points, *stroke)
             })
             .collect();
+        // A signal is pale in all runs or in none.
+        let places = places(panel);
+        let filled = (places.iter().zip(&curves)).filter(|(_, curve)| curve.0 > FILLS);
+        let filled: Vec<usize> = filled.map(|(place, _)| *place).collect();
+        for (place, (_, _, stroke)) in places.iter().zip(&mut curves) {
+            stroke.pale = filled.contains(place);
+        }
         // What fills an area lies beneath what is a line.
         curves.sort_by(|one, other| other.0.total_cmp(&one.0));
-        for (filling, points, stroke) in curves {
-            let stroke = Stroke {
-                pale: filling > FILLS,
-                ..stroke
-            };
+        for (_, points, stroke) in curves {
             // Where values are no numbers a curve is broken; between two breaks it may be a point.
             for part in points.split(|(_, y)| y.is_nan()) {
                 match part {
@@ -95,6 +98,16 @@ pub fn draw(figure: &Figure) -> Result<String, PictureError> {
         top += PANEL.0 + PANEL.1;
     }
     Ok(sheet.finish())
+}
+
+/// By curve of a panel: its place among those of its run.
+fn places(panel: &Panel) -> Vec<usize> {
+    let before = |k: usize| {
+        let run = &panel.series[k].run;
+        let same = panel.series[..k].iter().filter(|other| other.run == *run);
+        same.count()
+    };
+    (0..panel.series.len()).map(before).collect()
 }
 
 /// How the curves of a panel are drawn: by run where there are several.
@@ -301,6 +314,30 @@ mod tests {
         assert!(is_pale(curves[0]) && !is_pale(curves[1]));
         // In the legend all are as they are named.
         assert_eq!(svg.matches("stroke-opacity").count(), 1);
+    }
+
+    #[test]
+    fn a_signal_is_pale_in_all_runs_or_in_none() {
+        let series = |run: &str, height: f64, rows: u32| Series {
+            name: format!("v(sw) {run}"),
+            run: run.into(),
+            points: (0..rows)
+                .map(|k| (f64::from(k), height * f64::from(k % 2)))
+                .collect(),
+        };
+        let waves = Waveforms {
+            names: vec!["v(sw)".into()],
+            units: vec!["V"],
+            time: vec![0.0, 1.0],
+            values: vec![0.0, 1.0],
+            ..Waveforms::default()
+        };
+        let mut figure = Figure::of_waveforms(&waves, PANEL_WIDTH);
+        let pale = |figure: &Figure| draw(figure).unwrap().matches("stroke-opacity").count();
+        figure.panels[0].series = vec![series("r=1", 10.0, 2), series("r=2", 1.0, 2)];
+        assert_eq!(pale(&figure), 0);
+        figure.panels[0].series = vec![series("r=1", 10.0, 20_000), series("r=2", 1.0, 2)];
+        assert_eq!(pale(&figure), 2);
     }
 
     #[test]

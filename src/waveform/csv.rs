@@ -190,7 +190,8 @@ fn is_time(axis: &str) -> bool {
     let lower = axis.to_ascii_lowercase();
     let unit = |unit: &&str| lower.strip_suffix(*unit);
     let name = ["(s)", "[s]"].iter().find_map(unit);
-    matches!(name.unwrap_or(&lower).trim_end(), "time" | "t")
+    let name = name.unwrap_or(&lower).trim_end();
+    matches!(name, "time" | "t" | "second" | "seconds")
 }
 
 fn malformed(reason: impl Into<String>) -> WaveformError {
@@ -321,11 +322,26 @@ impl Table {
 }
 
 fn not_finite(line: u64, cell: &str) -> WaveformError {
-    malformed(format!("line {line}: `{cell}` is not a finite number"))
+    let hint = if cell.contains("dB") {
+        "; of decibels and degrees export real and imaginary parts instead, or view the .raw file"
+    } else {
+        ""
+    };
+    malformed(format!(
+        "line {line}: `{cell}` is not a finite number{hint}"
+    ))
 }
 
 fn unreadable(error: csv::Error) -> WaveformError {
-    malformed(error.to_string())
+    match error.kind() {
+        csv::ErrorKind::Utf8 { pos, .. } => {
+            let line = pos.as_ref().map_or(0, csv::Position::line);
+            malformed(format!(
+                "line {line}: a character that is not UTF-8; where it is the `°` of decibels and degrees export real and imaginary parts instead, or view the .raw file"
+            ))
+        }
+        _ => malformed(error.to_string()),
+    }
 }
 
 #[cfg(test)]
@@ -404,7 +420,7 @@ mod tests {
 
     #[test]
     fn time_may_have_its_unit() {
-        for header in ["time", "Time (s)", "t[s]"] {
+        for header in ["time", "Time (s)", "t[s]", "Second"] {
             let text = format!("{header},CH1\n0,1\n1e-3,2\n");
             let read = read(text.as_bytes());
             assert_eq!(
@@ -439,6 +455,16 @@ mod tests {
     }
 
     #[test]
+    fn an_export_with_degrees_in_another_encoding_is_told() {
+        let text = b"Freq.\tV(a)\n1\t(-1dB,-2\xb0)\n";
+        let error = plot(&text[..]).expect_err("no numbers").to_string();
+        assert!(
+            error.contains("line 2: a character that is not UTF-8"),
+            "{error}"
+        );
+    }
+
+    #[test]
     fn faults_are_named_with_their_line() {
         for (text, reason) in [
             (
@@ -452,6 +478,10 @@ mod tests {
             ),
             ("time,v(a)\n0,nan\n", "line 2: `nan` is not a finite number"),
             ("time,v(a)\n0,\n", "line 2: `` is not a finite number"),
+            (
+                "time\tV(a)\n0\t(-1dB,-2°)\n",
+                "line 2: `(-1dB,-2°)` is not a finite number; of decibels and degrees export real and imaginary parts instead, or view the .raw file",
+            ),
             (
                 "time,v(a)\n0,1,2\n",
                 "line 2: 3 cells where the header has 2",

@@ -177,7 +177,7 @@ pub fn sensitivity(model: &Model, options: &SensitivityOptions<'_>) -> Result<Se
     }
     if circuit.measurements.is_empty() {
         return Err(unsupported(
-            "the netlist has no `.meas` to differentiate".into(),
+            "the netlist has no `.meas` to differentiate: `.meas tran vout avg v(out)`".into(),
         ));
     }
     let beside = Beside { model, options };

@@ -197,7 +197,7 @@ pub(super) const CODES: [Explanation; 50] = [
         "not-verified",
         "The second run that `--verify` asks for could not be made; the rows are those of the first.",
         "The other method does not come through the circuit.",
-        "Compare with `--method theta --tol 1e-8` of your own.",
+        "Compare with `--method theta --tol 1e-8` of your own, or verify a shorter `.tran`.",
     ),
     Explanation::of(
         "orbit-not-unique",
