@@ -112,13 +112,12 @@ fn places(panel: &Panel) -> Vec<usize> {
 
 /// How the curves of a panel are drawn: by run where there are several.
 fn strokes(panel: &Panel, runs: &[&str]) -> Vec<Stroke> {
-    let mut known = vec![0; runs.len()];
+    let places = places(panel);
     let strokes = panel.series.iter().enumerate().map(|(k, series)| {
         let Some(run) = runs.iter().position(|run| *run == series.run) else {
             return Stroke::curve(k);
         };
-        known[run] += 1;
-        Stroke::of_run(run, known[run] - 1)
+        Stroke::of_run(run, places[k])
     });
     strokes.collect()
 }

@@ -5,8 +5,8 @@
     tests/reference/gradients.py [NETLIST ...] > tests/reference/gradients.csv
 
 The runs are those of fourteen.py, which share nothing with circ, with one value at a time PART larger and smaller; what the difference of the two
-leaves is PART² of the derivative. `cockcroft-walton` has no
-derivatives, as with equal capacitors diodes rest at their thresholds; circ knows none of `peak-detector`. Lines are `circuit,element,quantity,time,derivative`, at four times of each run.
+leaves is PART² of the derivative. `cockcroft-walton` has no derivatives, as with equal capacitors diodes rest at their thresholds; circ knows none of
+`peak-detector`. Lines are `circuit,element,quantity,time,derivative`, at four times of each run.
 """
 
 import re
