@@ -99,12 +99,25 @@ impl SourceMap {
 
     /// `file:line:column: message`.
     fn placed(&self, finding: &Diagnostic) -> String {
+        let message = self.message(finding);
         let Some(span) = finding.span else {
-            return finding.message.clone();
+            return message;
         };
         let (line, column) = self.line_column(span);
         let path = &self.files[span.file.0 as usize].path;
-        format!("{path}:{line}:{column}: {}", finding.message)
+        format!("{path}:{line}:{column}: {message}")
+    }
+
+    /// The headline, with where the same thing stands for the first time.
+    pub(crate) fn message(&self, finding: &Diagnostic) -> String {
+        let Some(first) = finding.first else {
+            return finding.message.clone();
+        };
+        let line = self.line_column(first).0;
+        let here = finding.span.is_some_and(|span| span.file == first.file);
+        let file = self.files.get(first.file.0 as usize).filter(|_| !here);
+        let file = file.map_or_else(String::new, |file| format!(" of {}", file.path));
+        format!("{}; first in line {line}{file}", finding.message)
     }
 
     /// The 1-based line and column (in characters) where a span starts.
@@ -138,6 +151,8 @@ pub struct Diagnostic {
     pub span: Option<Span>,
     /// A few words under the underlined text.
     pub label: String,
+    /// Where the same thing stands for the first time.
+    pub first: Option<Span>,
     /// What would be right, or what to do.
     pub help: Option<String>,
 }
@@ -180,6 +195,7 @@ impl Diagnostic {
             message: message.into(),
             span: span.into(),
             label: String::new(),
+            first: None,
             help: None,
         }
     }
@@ -222,6 +238,13 @@ impl Diagnostic {
     #[must_use]
     pub fn label(mut self, label: impl Into<String>) -> Self {
         self.label = label.into();
+        self
+    }
+
+    /// Adds where the same thing stands for the first time.
+    #[must_use]
+    pub fn first_at(mut self, span: impl Into<Option<Span>>) -> Self {
+        self.first = span.into();
         self
     }
 

@@ -325,7 +325,10 @@ impl Model {
         circuit.tran = tran.or(circuit.tran);
         if !probes.is_empty() {
             let found = circuit.show(probes);
-            found.map_err(|why| Error::before(Reason::Unknown(why)))?;
+            found.map_err(|fault| {
+                let help = fault.help.map(|help| format!("; {help}"));
+                Error::before(Reason::Unknown(fault.message + &help.unwrap_or_default()))
+            })?;
         }
         self.with_circuit(circuit)
     }

@@ -190,7 +190,7 @@ const CONFINED: [(&str, &[&str], &str); 6] = [
 ];
 
 /// Constants of type f64 that decide nothing, outside `settings/tolerances/`: (file, names, why).
-const NO_TOLERANCES: [(&str, &[&str], &str); 23] = [
+const NO_TOLERANCES: [(&str, &[&str], &str); 24] = [
     (
         "algebra/ball.rs",
         &["EXACT_INTEGERS", "UP"],
@@ -214,6 +214,7 @@ const NO_TOLERANCES: [(&str, &[&str], &str); 23] = [
     ("circuit/bipolar.rs", &["NOMINAL", "RATED"], DEFAULT),
     ("circuit/drive.rs", &["STARTUP"], DEFAULT),
     ("circuit/exponential.rs", &["NOMINAL"], DEFAULT),
+    ("circuit/passive.rs", &["NOMINAL"], DEFAULT),
     (
         "circuit/held.rs",
         &["BETWEEN", "OFF", "ON"],

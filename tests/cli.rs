@@ -645,8 +645,8 @@ fn parameters_and_probes_are_replaced() {
     status 2
     --- out
     --- err
-    error[unknown-signal]: --probe v(nowhere): there is no node or element `v(nowhere)`; there are v(in), v(out)
-      help: name one that the message lists, or leave `--probe` out, which shows all
+    error[unknown-signal]: --probe v(nowhere): there is no node or element `v(nowhere)`
+      help: there are v(in), v(out)
     ");
 }
 
@@ -740,7 +740,9 @@ fn an_unknown_probe_says_what_was_probably_meant() {
         ("i(r3)", "did you mean `i(r1)`?"),
         ("2*v(ot)", "did you mean `v(out)`?"),
         ("v(z*)", "there are v(in), v(out)"),
-        ("sqr(v(in))", "unknown function `sqr`; did you mean `sqrt`?"),
+        ("sqr(v(in))", "help: did you mean `sqrt`?"),
+        ("rms(v(in))", "`.meas tran NAME RMS V(out)` measures it"),
+        ("v(in)*i(", "help: put a `)` where"),
         ("v(in)*", "a value is missing"),
     ] {
         let ran = run(&format!("sim divider.cir --probe {probe}"));
@@ -805,13 +807,19 @@ fn probes_may_be_currents_into_pins() {
     )
     .unwrap();
     for (probe, words) in [
-        ("Is(M2)", "there is no transistor `m2`; there are m1"),
+        (
+            "Is(M2)",
+            "there is no transistor `m2`\n  help: there are m1",
+        ),
         (
             "Is(r9)",
-            "there is no transistor `r9`; `i(r9)` is the current through it",
+            "there is no transistor `r9`\n  help: `i(r9)` is the current through it",
         ),
-        ("Ib(m1)", "`m1` has no pin `b`; its pins are d, g, s"),
-        ("Ix(x2:q)", "`x2` has no pin `q`; its pins are n, p"),
+        (
+            "Ib(m1)",
+            "`m1` has no pin `b`\n  help: its pins are d, g, s",
+        ),
+        ("Ix(x2:q)", "`x2` has no pin `q`\n  help: its pins are n, p"),
         ("Ix(x2)", "write `Ix(x1:pin)`"),
         ("I(x2:p)", "write `ix(x2:p)` for the current into a pin"),
         ("Ix(x3:n)", "put a source of 0 V into the lead"),
@@ -1296,6 +1304,82 @@ fn a_flood_of_findings_is_cut() {
         (ran.status, report["faults"].as_array().unwrap().len()),
         (1, 101)
     );
+}
+
+/// The ending of the output says the form, where no option does.
+#[test]
+fn a_system_is_written_in_the_form_of_its_ending() {
+    for (output, begins) in [
+        ("q.json", "{"),
+        ("q.m", "%"),
+        ("q.py", "#"),
+        ("q.txt", "divider"),
+    ] {
+        let directory = place();
+        let ran = run_in(directory.path(), &format!("lcs divider.cir -o {output}"));
+        assert_eq!(ran.status, 0, "{ran}");
+        let text = fs::read_to_string(directory.path().join(output)).unwrap();
+        assert!(text.to_lowercase().starts_with(begins), "{output}: {text}");
+    }
+    let ran = run("lcs divider.cir -o q.foo");
+    assert!(
+        ran.status == 2 && ran.err.contains("the ending chooses the format"),
+        "{ran}"
+    );
+    // A part of one or more is meant in per cent.
+    let ran = run("sim divider.cir --worst m --tol-of r1=5");
+    assert!(
+        ran.status == 2 && ran.err.contains("write `5%` for 5 %"),
+        "{ran}"
+    );
+}
+
+/// Sweeps that are probably not meant: from 1 kHz down to a millihertz, and without the spacing; suffixes behind which a unit stands.
+#[test]
+fn what_is_read_otherwise_than_meant_is_told() {
+    for (card, words) in [
+        (
+            ".ac dec 10 1k 1M",
+            "`.ac` goes down, from 1e3 Hz to 1e-3 Hz",
+        ),
+        (".ac 10 1k 1meg", "does not say how its points are spaced"),
+        ("r9 a 0 1MOhm", "`1MOhm` is 1 milli"),
+        ("c9 a 0 1Farad", "`1Farad` is 1 femto"),
+    ] {
+        let directory = place();
+        let text = format!("meant\nv1 a 0 dc 1 ac 1\nr1 a 0 1k\n{card}\n.tran 1m 5m\n.end\n");
+        fs::write(directory.path().join("a.cir"), text).unwrap();
+        let ran = run_in(directory.path(), "sim a.cir -o a.csv");
+        assert!(ran.status == 0 && ran.err.contains(words), "{card}: {ran}");
+    }
+    // Energies that are rounding of what a capacitor swings through are no fault.
+    let directory = place();
+    fs::write(
+        directory.path().join("a.cir"),
+        "lossless\nv1 a 0 sin(0 5 1k) ac 1\nc1 a 0 1u\n.tran 1m\n",
+    )
+    .unwrap();
+    let ran = run_in(directory.path(), "sim a.cir -o a.csv");
+    assert_eq!((ran.status, ran.err.as_str()), (0, ""), "{ran}");
+}
+
+/// Once, where the report says what follows from them; apart from it for programs that read them.
+#[test]
+fn check_shows_a_finding_in_its_line_and_once() {
+    let directory = place();
+    let twice = "twice\nv1 a 0 1\nr1 a 0 1k\n.model d1 d(n=1)\n.model d1 d(n=2)\n.tran 1u 1m\n";
+    fs::write(directory.path().join("twice.cir"), twice).unwrap();
+    let ran = run_in(directory.path(), "check twice.cir");
+    assert_eq!(ran.out.matches("is defined again").count(), 1, "{ran}");
+    assert!(
+        ran.out.contains("first here") && ran.err.is_empty(),
+        "{ran}"
+    );
+    let ran = run_in(directory.path(), "check twice.cir --message-format short");
+    let line =
+        "twice.cir:5:8: warning[duplicate-model]: model `d1` is defined again; first in line 4\n";
+    assert_eq!(ran.err, line, "{ran}");
+    assert!(!ran.out.contains("defined again"), "{ran}");
 }
 
 #[test]

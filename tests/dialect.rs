@@ -379,6 +379,94 @@ fn a_slip_in_the_name_of_a_parameter_is_a_warning() {
     assert_eq!(switch("sw(ron=1 vt=0.5 vh=0.1)"), []);
 }
 
+/// What no dialect has would be read as if it were not there, near to another name or not.
+#[test]
+fn what_no_model_has_is_a_warning_with_what_was_meant() {
+    let helps = |cards: &str| -> Vec<String> {
+        let model = model(&format!("v1 a 0 1\nr1 b 0 1\n.tran 1u 1m\n{cards}")).expect("a circuit");
+        let slips = model
+            .findings()
+            .iter()
+            .filter(|d| d.code == "unknown-parameter");
+        slips.map(|d| d.help.clone().expect("a help")).collect()
+    };
+    for (cards, meant) in [
+        ("s1 a b a 0 m\n.model m sw(ron=1 vthreshold=0.5)", "`vt`"),
+        ("s1 a b a 0 m\n.model m sw(ron=1 vth=0.5)", "`vt`"),
+        ("d1 a b m\n.model m d(ron=1m vf=0.6)", "`vfwd`"),
+        ("m1 a a2 b m\nr2 a2 0 1\n.model m vdmos(vth=2)", "`vto`"),
+        ("q1 a a2 b m\nr2 a2 a 1k\n.model m npn(hfe=200)", "`bf`"),
+        ("d1 a b m\n.model m d(is=1n foo=3)", "those that count"),
+        (
+            "x1 a b p rtpo=3k\n.subckt p i o params: rtop=1k\nr1 i o {rtop}\n.ends",
+            "`rtop`",
+        ),
+    ] {
+        let found = helps(cards);
+        assert!(
+            found.len() == 1 && found[0].contains(meant),
+            "{cards}: {found:?}"
+        );
+    }
+    // What a subcircuit asks for needs no default, and what it defines may be replaced.
+    for cards in [
+        "x1 a b p r=3k\n.subckt p i o\nr1 i o {r}\n.ends",
+        "x1 a b p s=3k\n.subckt p i o\n.param s=1k\nr1 i o {s}\n.ends",
+        "q1 a a2 b m\nr2 a2 a 1k\n.model m npn(bf=200 vceo=40 trb1=1m mfg=x)",
+    ] {
+        assert_eq!(helps(cards), Vec::<String>::new(), "{cards}");
+    }
+}
+
+/// 10 A through a body diode of 0.7 V beside a channel of 50 mΩ that is on: all of it in the channel.
+#[test]
+fn a_body_diode_has_the_drop_of_its_model() {
+    let drop = |vfwd: &str| {
+        let text = format!(
+            "i1 0 a 10\nm1 0 g a a md\nvg g 0 10\n.model md vdmos(vto=2 kp=1k rd=50m {vfwd})\n.tran 1u 1m\n.save v(a)"
+        );
+        let run = model(&text)
+            .expect("a circuit")
+            .transient(SimOptions::default());
+        *run.expect("a run").waveforms.values.last().expect("rows")
+    };
+    assert!(drop("").abs() < 1e-9);
+    assert!(
+        (drop("vfwd=0.7") - 0.5).abs() < 0.01,
+        "{}",
+        drop("vfwd=0.7")
+    );
+    assert!((drop("vfwd=0.3") - 0.3).abs() < 1e-9);
+}
+
+/// R(T) = R (1 + TC1 ΔT + TC2 ΔT²) with ΔT from 27 °C on, as ngspice's `op` has it: 1.6667 V in the first case.
+#[test]
+fn resistances_follow_their_temperature() {
+    let ohms = |card: &str, more: &str| {
+        let text = format!("v1 a 0 1\n{card}\n.tran 1u 1m\n{more}");
+        let model = model(&text).expect("a circuit");
+        let circuit = model.circuit();
+        match circuit.elements[circuit.element("r1").expect("r1").index()].kind {
+            circ::circuit::Kind::Resistor(ohms) => ohms.f64,
+            ref other => panic!("{other:?}"),
+        }
+    };
+    for (card, more, expected) in [
+        ("r1 a 0 1k tc=0.01", ".temp 127", 2e3),
+        ("r1 a 0 1k tc1=1m tc2=1u", ".temp 127", 1.11e3),
+        ("r1 a 0 1k tc1=1m temp=77", "", 1.05e3),
+        ("r1 a 0 1k tc1=1m dtemp=10", "", 1.01e3),
+        ("r1 a 0 rm 1k", ".model rm r(tc1=0.01)\n.temp 37", 1.1e3),
+        ("r1 a 0 1k tc1=1m", "", 1e3),
+    ] {
+        let found = ohms(card, more);
+        assert!(
+            (found - expected).abs() < 1e-9 * expected,
+            "{card} {more}: {found}"
+        );
+    }
+}
+
 #[test]
 fn what_two_cards_step_is_a_fault() {
     let stepped = |cards: &str| {

@@ -19,6 +19,8 @@ pub use excitation::Excitation;
 pub use feedthrough::Feedthrough;
 pub use jumps::Jumps;
 pub use stiffness::{Conditioning, Stiffness};
+
+pub(crate) use text::Judgement;
 pub use theorems::Theorem;
 
 use nalgebra::DMatrix;
@@ -113,7 +115,7 @@ impl Fault {
         Self {
             code: diagnostic.code,
             severity: diagnostic.severity,
-            message: diagnostic.message.clone(),
+            message: sources.message(diagnostic),
             file: diagnostic
                 .span
                 .and_then(|s| sources.files.get(s.file.0 as usize))

@@ -79,6 +79,21 @@ impl fmt::Display for Report {
             };
             writeln!(f, "{place}{:?}: {}", fault.severity, fault.message)?;
         }
+        self.write_judgement(f)
+    }
+}
+
+/// A report without its title and its faults.
+pub(crate) struct Judgement<'a>(pub(crate) &'a Report);
+
+impl fmt::Display for Judgement<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.write_judgement(f)
+    }
+}
+
+impl Report {
+    fn write_judgement(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "verdict       {}", self.verdict())?;
         let Some(class) = &self.feedthrough else {
             return Ok(());

@@ -19,6 +19,10 @@ use crate::diagnostic::Diagnostic;
 use crate::law::{Exponential, Law};
 use crate::netlist::ast::{self, Assign, Expr, Name};
 
+/// What counts of a model.
+const COUNTS: [&str; 12] = [
+    "is", "bf", "br", "nf", "nr", "rb", "rc", "re", "eg", "xti", "xtb", "tnom",
+];
 /// Temperature at which parameters were measured where TNOM does not say, °C.
 const NOMINAL: f64 = 27.0;
 /// The current at which an ideal junction has its drop, A.
@@ -189,6 +193,7 @@ impl<'n> Builder<'n, '_> {
         let params = Parameters::new(&chain);
         // Level 2 was a name of level 1 with a substrate.
         self.level(card, name, &params, &[1.0, 2.0], scope)?;
+        self.misspelt(('q', name), &params, &COUNTS);
         let thermal = Exponential::thermal_voltage(self.scopes.temperature.f64);
         let mut number = |name: &str, otherwise: f64| -> Option<f64> {
             Some(

@@ -1,6 +1,6 @@
 //! The walk over the cards: definitions first, then elements in file order, then what refers to them.
 
-use std::collections::{HashSet, VecDeque};
+use std::collections::{BTreeSet, HashSet, VecDeque};
 
 use super::draw::{self, Draw};
 use super::elaborate::ElaborateOptions;
@@ -10,11 +10,11 @@ use super::transistor::Channel;
 use super::{Circuit, Element, ElementId, NodeId};
 use crate::algebra::Value;
 use crate::diagnostic::{Diagnostic, Severity, Span};
-use crate::netlist::Netlist;
 use crate::netlist::ast::{
     self, Assign, Block, Control, Device, Expr, Name, Signal, Statement, Subckt, Wanted,
 };
-use crate::netlist::suggest::directive;
+use crate::netlist::suggest::{directive, nearest};
+use crate::netlist::{BUILT_IN, Netlist};
 
 /// Most elements of a circuit.
 const MAX_ELEMENTS: usize = 1_000_000;
@@ -237,7 +237,8 @@ impl<'n, 'o> Builder<'n, 'o> {
         match &card.device {
             Device::Passive { values, args } => self.passive(card, values, args, scope),
             Device::Source { dc, wave, ac, args } => {
-                self.source(card, dc.as_ref(), wave.as_ref(), args, scope);
+                let driven = (wave.as_ref(), ac.is_some());
+                self.source(card, dc.as_ref(), driven, args, scope);
                 self.stimulus(card, ac.as_deref(), scope);
             }
             Device::Coupling { inductors, k } => self.couplings.push(PendingCoupling {
@@ -389,8 +390,39 @@ impl<'n, 'o> Builder<'n, 'o> {
         self.tell_all(&subckt.body.faults);
         self.define(&subckt.body, inner);
         self.elements(&subckt.body, inner);
+        let is_ours = subckt.name.text.starts_with(BUILT_IN);
+        if self.choices.is_empty() && !is_ours {
+            self.unknown_arguments(subckt, args, inner);
+        }
         self.choices = waiting;
         self.nesting.pop();
+    }
+
+    /// Warns of arguments that a subcircuit neither declares nor asks for.
+    fn unknown_arguments(&mut self, subckt: &'n ast::Subckt, args: &'n [Assign], inner: ScopeId) {
+        let own = subckt.params.iter().map(|p| p.name.text.as_str());
+        let declared = self.scopes.get(inner).declared.iter().copied();
+        let known: BTreeSet<&str> = own.chain(declared).collect();
+        for Assign { name, .. } in args {
+            let text = name.text.as_str();
+            if text == "m" || known.contains(text) || self.scopes.is_asked(inner, text) {
+                continue;
+            }
+            let message = format!(
+                "subcircuit `{}` has no parameter `{text}`",
+                subckt.name.text
+            );
+            let fault = Diagnostic::warning("unknown-parameter", name.span, message);
+            let help = match nearest(text, known.iter().copied()) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None if known.is_empty() => "it has none: take this one out".into(),
+                None => {
+                    let known: Vec<&str> = known.iter().copied().collect();
+                    format!("it has {}", known.join(", "))
+                }
+            };
+            self.tell(fault.label("without effect").help(help));
+        }
     }
 
     /// The canonical name of an element.
@@ -419,11 +451,13 @@ impl<'n, 'o> Builder<'n, 'o> {
     /// Adds an element; a second one with the same name is an error.
     pub(super) fn add(&mut self, element: Element) -> Option<ElementId> {
         let id = ElementId(u32::try_from(self.circuit.elements.len()).unwrap_or(u32::MAX));
-        if self.names.elements.contains_key(&element.name) {
+        if let Some(first) = self.names.elements.get(&element.name) {
             let message = format!("element `{}` is defined again", element.name);
+            let first = self.circuit.elements[first.0 as usize].span;
             self.tell(
                 Diagnostic::error("duplicate-element", element.span, message)
                     .label("the name is taken already")
+                    .first_at(first)
                     .help("rename one of the two; capital letters make no difference"),
             );
             return None;

@@ -59,10 +59,14 @@ impl<'n> Builder<'n, '_> {
             }
             Statement::Model(model) => {
                 let models = &mut self.scopes.get_mut(scope).models;
-                if models.contains_key(model.name.text.as_str()) {
+                if let Some(first) = models
+                    .get(model.name.text.as_str())
+                    .map(|first| first.name.span)
+                {
                     let message = format!("model `{}` is defined again", model.name.text);
                     self.tell(
                         Diagnostic::warning("duplicate-model", model.name.span, message)
+                            .first_at(first)
                             .label("ignored: the first one counts"),
                     );
                 } else {
@@ -71,10 +75,14 @@ impl<'n> Builder<'n, '_> {
             }
             Statement::Subckt(subckt) => {
                 let subckts = &mut self.scopes.get_mut(scope).subckts;
-                if subckts.contains_key(subckt.name.text.as_str()) {
+                if let Some(first) = subckts
+                    .get(subckt.name.text.as_str())
+                    .map(|first| first.name.span)
+                {
                     let message = format!("subcircuit `{}` is defined again", subckt.name.text);
                     self.tell(
                         Diagnostic::warning("duplicate-subcircuit", subckt.name.span, message)
+                            .first_at(first)
                             .label("ignored: the first one counts"),
                     );
                 } else {

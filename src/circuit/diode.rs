@@ -66,7 +66,8 @@ impl<'n> Builder<'n, '_> {
                 }
                 let factor = self.factor(area.or(args.get(&["area"])), args, scope)?;
                 let params = Parameters::new(&chain);
-                self.misspelt(name, &params, &PIECEWISE);
+                let counts = [&PIECEWISE[..], &["is", "n", "rs", "bv", "ibv"]].concat();
+                self.misspelt(('d', name), &params, &counts);
                 let device = self.full_name(&card.name, scope);
                 let changing = Changing {
                     switch: None,

@@ -44,7 +44,7 @@ impl<'n> Builder<'n, '_> {
         &mut self,
         card: &'n ast::Element,
         dc: Option<&'n Expr>,
-        wave: Option<&'n WaveCall>,
+        (wave, small): (Option<&'n WaveCall>, bool),
         args: &'n [Assign],
         scope: ScopeId,
     ) {
@@ -93,7 +93,7 @@ impl<'n> Builder<'n, '_> {
                 None => return,
             },
             None => {
-                if dc_value.is_none() {
+                if dc_value.is_none() && !small {
                     let message = format!("`{}` has no value: 0 is assumed", card.name.text);
                     self.tell(
                         Diagnostic::note("no-value", card.span, message)

@@ -38,6 +38,10 @@ pub(super) fn meant(name: &str) -> Option<String> {
         "ddt" => Some(
             "derivatives are no expressions: `E1 x 0 VALUE={…}` across `C1 x 0 1` has the derivative as `I(C1)`".into(),
         ),
+        "rms" | "avg" | "mean" | "pp" | "integ" => Some(format!(
+            "it is of a whole run: `.meas tran NAME {}` measures it, `--table` shows means, rms and extrema of every element",
+            if name == "mean" { "AVG V(out)".into() } else { format!("{} V(out)", name.to_uppercase()) }
+        )),
         _ => nearest(name, NAMES).map(|near| format!("did you mean `{near}`?")),
     }
 }

@@ -78,10 +78,11 @@ impl<'n> Builder<'n, '_> {
             .map(|(scope, card)| self.full_name(&card.name, *scope))
             .collect();
         for (k, (scope, card)) in cards.iter().enumerate() {
-            if names[..k].contains(&names[k]) {
+            if let Some(first) = names[..k].iter().position(|name| *name == names[k]) {
                 let message = format!("measurement `{}` is defined again", names[k]);
                 self.tell(
                     Diagnostic::warning("duplicate-measurement", card.name.span, message)
+                        .first_at(cards[first].1.name.span)
                         .label("both are carried out; the name means the first one"),
                 );
             }

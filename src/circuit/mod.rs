@@ -30,6 +30,7 @@ mod losses;
 mod measurement;
 mod model;
 mod names;
+mod parameters;
 mod passive;
 mod piecewise;
 mod pin;

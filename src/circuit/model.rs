@@ -1,6 +1,7 @@
 //! `.model` cards: looking them up, and their parameters.
 
 use super::builder::Builder;
+use super::parameters::is_known;
 use super::scope::{ScopeId, Scopes};
 use crate::algebra::Value;
 use crate::diagnostic::Diagnostic;
@@ -13,10 +14,24 @@ pub(super) const ZERO: Value = Value::decimal(0.0, 0, 0);
 /// One, exactly.
 pub(super) const ONE: Value = Value::decimal(1.0, 1, 0);
 
-/// Parameters of diodes and switches in SPICE's dialects that may look like others.
-const OF_MODELS: [&str; 23] = [
-    "ibv", "nbv", "isr", "ikr", "ikf", "rth0", "trs1", "trs2", "tbv1", "tbv2", "vser", "lser",
-    "vpk", "ipk", "irms", "iave", "ideal", "cjo", "eon", "eoff", "err", "vloss", "iloss",
+/// What other programs and data sheets call parameters, and what they are here.
+const MEANT: [(&str, &str); 16] = [
+    ("vth", "vt"),
+    ("vth", "vto"),
+    ("vthresh", "vt"),
+    ("threshold", "vt"),
+    ("vthreshold", "vt"),
+    ("vthreshold", "vto"),
+    ("vgsth", "vto"),
+    ("vf", "vfwd"),
+    ("vd", "vfwd"),
+    ("vdrop", "vfwd"),
+    ("vforward", "vfwd"),
+    ("vbr", "vrev"),
+    ("rdson", "ron"),
+    ("rds_on", "ron"),
+    ("hfe", "bf"),
+    ("beta", "bf"),
 ];
 
 /// What levels are called, by the letter of their elements.
@@ -169,29 +184,37 @@ impl<'n> Builder<'n, '_> {
         }
     }
 
-    /// Warns of a parameter that is nearly the name of one that `counts`: it would be read as if it were not there. Names of two letters are near to
-    /// too many.
-    pub(super) fn misspelt(&mut self, model: &Name, params: &Parameters<'n>, counts: &[&str]) {
+    /// Warns of a parameter that no dialect has: it would be read as if it were not there. Those that `counts` may be meant.
+    pub(super) fn misspelt(
+        &mut self,
+        (letter, model): (char, &Name),
+        params: &Parameters<'n>,
+        counts: &[&str],
+    ) {
         for Assign { name, .. } in &params.0 {
             let text = name.text.as_str();
-            if text.len() < 3 || counts.contains(&text) || OF_MODELS.contains(&text) {
+            if counts.contains(&text) || is_known(letter, text) {
                 continue;
             }
             let told = format!("{} {text}", model.text);
-            let Some(near) = nearest(text, counts.iter().copied()) else {
-                continue;
-            };
+            let meant = |(slip, meant): &&(&str, &str)| *slip == text && counts.contains(meant);
+            let near = MEANT
+                .iter()
+                .find(meant)
+                .map(|(_, meant)| (*meant).to_owned());
+            let like = || nearest(text, counts.iter().copied()).filter(|_| text.len() > 2);
+            let near = near.or_else(like);
             if self.told_models.contains(&told) {
                 continue;
             }
             self.told_models.push(told);
             let message = format!("model `{}` has no parameter `{text}`", model.text);
-            let fault = Diagnostic::warning("unknown-parameter", name.span, message);
-            self.tell(
-                fault
-                    .label("without effect")
-                    .help(format!("did you mean `{near}`?")),
-            );
+            let fault = Diagnostic::warning("unknown-parameter", name.span, message)
+                .label("without effect");
+            self.tell(match near {
+                Some(near) => fault.help(format!("did you mean `{near}`?")),
+                None => fault.help(format!("those that count are {}", counts.join(" "))),
+            });
         }
     }
 

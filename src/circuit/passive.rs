@@ -8,8 +8,11 @@ use crate::diagnostic::{Diagnostic, Span};
 use crate::netlist::ast::{self, Assign, Expr, ExprKind};
 use crate::netlist::suggest::is_unit;
 
-/// Ratings and temperature coefficients: they change nothing at the nominal temperature.
-const WITHOUT_EFFECT: [&str; 27] = [
+/// The temperature at which values are as written, °C.
+const NOMINAL: f64 = 27.0;
+
+/// Ratings, and the temperature of devices.
+const WITHOUT_EFFECT: [&str; 22] = [
     "v",
     "irms",
     "vrms",
@@ -19,12 +22,7 @@ const WITHOUT_EFFECT: [&str; 27] = [
     "pn",
     "tol",
     "pwr",
-    "tc",
-    "tc1",
-    "tc2",
     "tce",
-    "temp",
-    "dtemp",
     "trise",
     "noisy",
     "noiseless",
@@ -38,6 +36,9 @@ const WITHOUT_EFFECT: [&str; 27] = [
     "iave",
     "rating",
 ];
+
+/// The temperature and the coefficients of R, C and L: SPICE's TC1 and TC2.
+const THERMAL: [&str; 5] = ["tc", "tc1", "tc2", "temp", "dtemp"];
 
 /// Parts that LTspice adds to an element: in series and across.
 pub(super) const PARASITICS: [&str; 5] = ["rser", "lser", "rpar", "cpar", "rlshunt"];
@@ -108,6 +109,7 @@ impl<'n> Builder<'n, '_> {
         }
         let own = letter.to_string();
         let mut known = vec![own.as_str(), "value", "m", "scale", "ic"];
+        known.extend(THERMAL);
         if letter != 'r' {
             known.extend(PARASITICS);
         }
@@ -117,7 +119,9 @@ impl<'n> Builder<'n, '_> {
         let Some(value) = self.passive_value(card, values, args, letter, scope) else {
             return;
         };
-        let mut value = value;
+        let Some(mut value) = self.at_temperature(value, values, args, scope) else {
+            return;
+        };
         if scope == ScopeId::ROOT {
             let percent = args.get(&["tol"]);
             let percent = percent.and_then(|percent| self.scopes.finite(percent, scope));
@@ -223,9 +227,15 @@ impl<'n> Builder<'n, '_> {
                 }
                 _ if value.is_some() => {
                     let message = format!("`{}` has a second value", card.name.text);
-                    self.tell(
-                        Diagnostic::error("unexpected", given.span, message).label("unexpected"),
-                    );
+                    let fault =
+                        Diagnostic::error("unexpected", given.span, message).label("unexpected");
+                    let help = match value.map(|value| &value.kind) {
+                        Some(ExprKind::Name(name)) => {
+                            format!("it has two nodes: `{name}` was read as its value")
+                        }
+                        _ => "leave one of the two".into(),
+                    };
+                    self.tell(fault.help(help));
                     return None;
                 }
                 _ => value = Some(given),
@@ -283,6 +293,43 @@ impl<'n> Builder<'n, '_> {
                 None
             }
         }
+    }
+
+    /// The value at the temperature of the element, value (1 + TC1 ΔT + TC2 ΔT²) with ΔT from 27 °C on, of the card's own coefficients or its
+    /// model's.
+    fn at_temperature(
+        &mut self,
+        value: Value,
+        values: &'n [Expr],
+        args: Args<'n>,
+        scope: ScopeId,
+    ) -> Option<Value> {
+        let mut models = values.iter().filter_map(|given| match &given.kind {
+            ExprKind::Name(name) if self.scopes.param(scope, name).is_none() => {
+                self.scopes.model(scope, name)
+            }
+            _ => None,
+        });
+        let model = models.next().map(|model| Args(&model.params));
+        let mut number = |own: &[&str], otherwise: f64| -> Option<f64> {
+            let found = args.get(own).or_else(|| model?.get(own));
+            let value = found.map(|expr| self.scopes.finite(expr, scope));
+            Some(value.map_or(Some(otherwise), |value| value.map(|v| v.f64))?)
+        };
+        let (tc1, tc2) = (number(&["tc1", "tc"], 0.0)?, number(&["tc2"], 0.0)?);
+        if tc1 == 0.0 && tc2 == 0.0 {
+            return Some(value);
+        }
+        let (own, nominal) = (number(&["temp"], f64::NAN)?, number(&["tnom"], NOMINAL)?);
+        let warmer = number(&["dtemp"], 0.0)?;
+        let ambient = self.scopes.temperature.f64 + warmer;
+        let above = if own.is_nan() { ambient } else { own } - nominal;
+        let factor = 1.0 + above * (tc1 + above * tc2);
+        Some(if factor == 1.0 {
+            value
+        } else {
+            Value::binary(value.f64 * factor)
+        })
     }
 
     /// Adds an element with LTspice's `Rser Lser` in series and `Rpar Cpar` across the whole.

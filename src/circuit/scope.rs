@@ -2,6 +2,7 @@
 //!
 //! A subcircuit instance sees its own definitions, then those of the instance that calls it, up to the top level.
 
+use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use super::NodeId;
@@ -104,8 +105,8 @@ pub(super) struct Scope<'n> {
     /// Nodes of the caller by the names they have here.
     pub(super) ports: HashMap<&'n str, NodeId>,
     params: HashMap<String, Param<'n>>,
-    /// Parameters that definitions here may not replace: `--param` and those of a call.
-    fixed: HashSet<String>,
+    /// Parameters that definitions here may not replace: `--param` and those of a call; and whether something asked for them.
+    fixed: HashMap<String, Cell<bool>>,
     /// Parameters that `.param` or `.subckt` define here.
     pub(super) declared: HashSet<&'n str>,
     pub(super) funcs: HashMap<&'n str, &'n Func>,
@@ -200,7 +201,7 @@ impl<'n> Scopes<'n> {
     /// Gives a parameter a value that definitions in the scope do not replace.
     pub(super) fn fix(&mut self, id: ScopeId, name: &str, value: Option<Value>) {
         let scope = self.get_mut(id);
-        scope.fixed.insert(name.to_string());
+        scope.fixed.insert(name.to_string(), Cell::default());
         scope
             .params
             .insert(name.to_string(), value.map_or(Param::Failed, Param::Known));
@@ -209,7 +210,7 @@ impl<'n> Scopes<'n> {
     /// Defines a parameter here; false if this scope had a definition of its own already.
     pub(super) fn define(&mut self, id: ScopeId, name: &'n Name, value: &'n Expr) -> bool {
         let scope = self.get_mut(id);
-        if !scope.fixed.contains(&name.text) {
+        if !scope.fixed.contains_key(&name.text) {
             scope
                 .params
                 .insert(name.text.clone(), Param::Unevaluated(value));
@@ -234,8 +235,18 @@ impl<'n> Scopes<'n> {
 
     /// The parameter a name means, and where it is defined.
     pub(super) fn param(&self, id: ScopeId, name: &str) -> Option<(ScopeId, Param<'n>)> {
-        self.chain(id)
-            .find_map(|(id, scope)| scope.params.get(name).map(|p| (id, *p)))
+        let (id, scope, found) = self
+            .chain(id)
+            .find_map(|(id, scope)| scope.params.get(name).map(|p| (id, scope, *p)))?;
+        if let Some(asked) = scope.fixed.get(name) {
+            asked.set(true);
+        }
+        Some((id, found))
+    }
+
+    /// Whether something asked for a fixed parameter of a scope.
+    pub(super) fn is_asked(&self, id: ScopeId, name: &str) -> bool {
+        self.get(id).fixed.get(name).is_some_and(Cell::get)
     }
 
     pub(super) fn func(&self, id: ScopeId, name: &str) -> Option<&'n Func> {

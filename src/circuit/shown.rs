@@ -35,7 +35,7 @@ impl Circuit {
     ///
     /// # Errors
     /// What is wrong with one of them, and what was probably meant.
-    pub fn show(&mut self, wanted: &[String]) -> Result<(), String> {
+    pub fn show(&mut self, wanted: &[String]) -> Result<(), Box<Diagnostic>> {
         let mut shown = Self {
             probes: Vec::new(),
             columns: Vec::new(),
@@ -43,13 +43,12 @@ impl Circuit {
         };
         for text in wanted {
             if text.trim().is_empty() {
-                return Err("'': a name is missing".into());
+                let missing = Diagnostic::error("unknown-probe", None, "'': a name is missing");
+                return Err(Box::new(missing));
             }
-            shown.print_text(text).map_err(|fault| {
-                let help = fault
-                    .help
-                    .map_or_else(String::new, |help| format!("; {help}"));
-                format!("{text}: {}{help}", fault.message)
+            shown.print_text(text).map_err(|mut fault| {
+                fault.message = format!("{text}: {}", fault.message);
+                fault
             })?;
         }
         shown.settle_columns();

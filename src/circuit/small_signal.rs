@@ -58,6 +58,18 @@ impl<'n> Builder<'n, '_> {
                 None => return,
             }
         }
+        if let (Spacing::Linear | Spacing::Logarithmic(_), &[_, first, last]) =
+            (card.spacing, &values[..])
+            && last < first
+        {
+            let message = format!("`.ac` goes down, from {first:e} Hz to {last:e} Hz");
+            let fault = Diagnostic::warning("bad-ac", card.values[2].span, message);
+            self.tell(
+                fault
+                    .label("below the first frequency")
+                    .help("`M` is milli as `m` is: write `1Meg` for 1e6"),
+            );
+        }
         let found = match (card.spacing, &values[..]) {
             (Spacing::List, _) => Ok(values),
             (Spacing::Linear, &[count, first, last]) => linear(count, first, last),

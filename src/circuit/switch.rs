@@ -134,7 +134,7 @@ impl<'n> Builder<'n, '_> {
         let counts = [
             "ron", "roff", "vt", "vh", "von", "voff", "it", "ih", "ion", "ioff",
         ];
-        self.misspelt(name, &params, &counts);
+        self.misspelt(('s', name), &params, &counts);
         for ignored in ["lser", "vser", "ilimit"] {
             if params.get(ignored).is_some() {
                 self.unused(format!("{ignored} of {}", name.text), name);

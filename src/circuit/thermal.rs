@@ -95,7 +95,7 @@ impl<'n> Builder<'n, '_> {
                 wave: None,
                 args,
                 ..
-            } => self.source(card, dc.as_ref(), None, args, ScopeId::ROOT),
+            } => self.source(card, dc.as_ref(), (None, false), args, ScopeId::ROOT),
             _ => self.tell(unfit(
                 card.span,
                 &format!("`{}` is no part of one", card.name.text),

@@ -31,6 +31,11 @@ const OXIDE: f64 = 3.9 * 8.854_214_871e-12;
 /// Channel width and length where neither card nor model tells them, m.
 const SIDE: f64 = 1e-4;
 
+/// What counts of a model.
+const COUNTS: [&str; 13] = [
+    "vto", "kp", "rd", "rs", "ron", "roff", "rds", "rb", "vfwd", "w", "l", "beta", "mtriode",
+];
+
 /// The sort of a transistor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Sort {
@@ -56,8 +61,8 @@ struct Figures {
     /// Whether β is that of a transistor of which nothing is known.
     assumed: bool,
     roff: Option<Value>,
-    /// Series resistance of the body diode, Ω.
-    body: Value,
+    /// Series resistance of the body diode, Ω, and its drop, V.
+    body: (Value, Value),
     /// m times the area factor.
     times: f64,
 }
@@ -158,7 +163,7 @@ impl<'n> Builder<'n, '_> {
         );
         let mut diode = |suffix: &str, p: NodeId, n: NodeId| {
             let (p, n) = if sort.mirrored { (n, p) } else { (p, n) };
-            part(suffix, p, n, resistance(figures.body, ZERO));
+            part(suffix, p, n, resistance(figures.body.0, figures.body.1));
         };
         let mos = matches!(sort.family, Family::Mos | Family::Vdmos);
         let with_body = mos && (bulk == source || bulk == drain);
@@ -247,6 +252,10 @@ impl<'n> Builder<'n, '_> {
                 .parameter(&params, "level", scope)?
                 .map_or(1.0, |v| v.f64),
         };
+        // Models of higher levels have hundreds of parameters, none of which counts.
+        if level <= 3.0 {
+            self.misspelt(('m', name), &params, &COUNTS);
+        }
         let mut number = |names: &[&str], otherwise: f64| -> Option<f64> {
             for one in names {
                 if let Some(value) = self.parameter(&params, one, scope)? {
@@ -265,7 +274,7 @@ impl<'n> Builder<'n, '_> {
         let given = number(&["ron"], f64::NAN)?;
         let is_given = given >= 0.0;
         let rds = number(&["rds"], f64::INFINITY)?;
-        let body = number(&["rb"], 0.0)?;
+        let (body, drop) = (number(&["rb"], 0.0)?, number(&["vfwd"], 0.0)?.max(0.0));
         let mobility = 1e-4 * number(&["uo", "u0"], 600.0)?;
         let oxide = number(&["tox"], f64::NAN)?;
         let from_oxide = mobility * OXIDE / oxide;
@@ -342,11 +351,14 @@ impl<'n> Builder<'n, '_> {
             beta,
             assumed,
             roff: rds.is_finite().then(|| Value::binary(rds / times)),
-            body: if body > 0.0 {
-                Value::binary(body / times)
-            } else {
-                ZERO
-            },
+            body: (
+                if body > 0.0 {
+                    Value::binary(body / times)
+                } else {
+                    ZERO
+                },
+                Value::binary(drop),
+            ),
             times,
         })
     }

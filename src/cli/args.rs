@@ -449,9 +449,9 @@ pub struct LcsArgs {
     #[command(flatten)]
     #[expect(missing_docs, reason = "documented where it is defined")]
     pub input: Input,
-    /// Form of the system
-    #[arg(long, value_enum, default_value_t = SystemFormat::Text)]
-    pub format: SystemFormat,
+    /// Form of the system; else the ending of the output says it: json, py, m, tex or mtx, and txt is text
+    #[arg(long, value_enum)]
+    pub format: Option<SystemFormat>,
     /// Take a switch in this position (repeatable)
     #[arg(long = "switch", value_name = "NAME=on|off", value_parser = position)]
     pub switches: Vec<(String, bool)>,
@@ -745,7 +745,15 @@ fn tolerance(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=5%")?;
     let value = match value.trim().strip_suffix('%') {
         Some(percent) => 0.01 * not_negative(percent)?,
-        None => not_negative(value.trim())?,
+        None => match not_negative(value.trim())? {
+            part if part < 1.0 => part,
+            part => {
+                return Err(format!(
+                    "{part} is {} %: write `{part}%` for {part} %, or a part below 1",
+                    100.0 * part
+                ));
+            }
+        },
     };
     Ok((name.trim().to_lowercase(), value))
 }

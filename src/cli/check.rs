@@ -3,13 +3,14 @@
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-use super::args::CheckArgs;
+use super::args::{CheckArgs, MessageFormat};
 use super::exit::{Exit, Failure};
 use super::files;
 use super::input::{self, Subject};
 use super::output;
+use super::render;
 use super::streams::Streams;
-use crate::check::{self, Fault, Report};
+use crate::check::{self, Fault, Judgement, Report};
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 use crate::mna;
 use crate::model::Model;
@@ -31,7 +32,12 @@ pub(super) fn check(args: &CheckArgs, streams: &Streams) -> Result<Exit, Failure
     }
     files::spare(&paths, [args.input.file.as_path()])?;
     files::writable(&paths)?;
-    let (report, model) = report(args, streams)?;
+    let Checked {
+        report,
+        model,
+        findings,
+        sources,
+    } = checked(args, streams)?;
     let in_json = || json::line(&report) + "\n";
     for path in paths {
         let text = match path.extension().and_then(OsStr::to_str) {
@@ -43,20 +49,55 @@ pub(super) fn check(args: &CheckArgs, streams: &Streams) -> Result<Exit, Failure
         };
         files::write(path, text.as_bytes())?;
     }
-    streams.data(if args.json {
-        in_json()
+    if args.json {
+        streams.data(in_json())?;
     } else {
-        report.to_string()
-    })?;
+        let mut text = String::new();
+        if !report.title.is_empty() {
+            text = report.title.clone() + "\n";
+        }
+        // Programs read findings from standard error, a person those of the report.
+        if streams.messages == MessageFormat::Human {
+            text += &render::render(&findings, &sources, streams.out_colours());
+        } else {
+            input::show(&findings, &sources, streams);
+        }
+        streams.data(text + &Judgement(&report).to_string())?;
+    }
     Ok(if report.ok { Exit::Done } else { Exit::No })
 }
 
-/// The report, and the model where there is one.
-type Known = (Report, Option<Box<Model>>);
+/// The report with the findings it is of, and the model where there is one.
+struct Checked {
+    report: Report,
+    model: Option<Box<Model>>,
+    findings: Vec<Diagnostic>,
+    sources: SourceMap,
+}
 
-fn report(args: &CheckArgs, streams: &Streams) -> Result<Known, Failure> {
+impl Checked {
+    /// What cannot run.
+    fn faulty(title: &str, findings: Vec<Diagnostic>, sources: SourceMap) -> Self {
+        debug_assert!(findings.iter().any(|d| d.severity == Severity::Error));
+        let findings = input::most(findings);
+        let faults = findings.iter().map(|d| Fault::of(d, &sources)).collect();
+        Self {
+            report: check::faulty(title, faults),
+            model: None,
+            findings,
+            sources,
+        }
+    }
+}
+
+fn checked(args: &CheckArgs, streams: &Streams) -> Result<Checked, Failure> {
     if let Some(system) = input::system(&args.input)? {
-        return Ok((check::system(&system.lcs), None));
+        return Ok(Checked {
+            report: check::system(&system.lcs),
+            model: None,
+            findings: vec![],
+            sources: SourceMap::default(),
+        });
     }
     let Loaded {
         sources,
@@ -69,19 +110,15 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Known, Failure> {
         let help = unreadable.help.as_deref().unwrap_or_default();
         return Err(Failure::told("unreadable", format!("{what}; {help}")));
     }
-    if !args.json {
-        input::show(&diagnostics, &sources, streams);
-    }
     let Some(circuit) = circuit else {
-        return Ok((faulty("", &diagnostics, &sources), None));
+        return Ok(Checked::faulty("", diagnostics, sources));
     };
     let title = circuit.title.clone();
     let choices = input::choices(&args.input);
     let model = match Model::of(netlist, sources, choices, circuit, diagnostics) {
         Ok(model) => model,
         Err(faults) => {
-            let report = faulty(&title, &faults.findings, &faults.sources);
-            return Ok((report, None));
+            return Ok(Checked::faulty(&title, faults.findings, faults.sources));
         }
     };
     let sources = model.sources().clone();
@@ -107,13 +144,18 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Known, Failure> {
         }
         Subject::System(system) => Ok(check::system(&system.lcs)),
     };
-    let report = match judged {
+    let mut checked = match judged {
         Ok(mut report) => {
             report.ok = diagnostics.iter().all(|d| d.severity < Severity::Error);
-            let shown = input::most(diagnostics);
-            let shown = shown.iter().map(|d| Fault::of(d, &sources));
-            report.faults.splice(0..0, shown);
-            report
+            let findings = input::most(diagnostics);
+            let faults = findings.iter().map(|d| Fault::of(d, &sources));
+            report.faults.splice(0..0, faults);
+            Checked {
+                report,
+                model: None,
+                findings,
+                sources,
+            }
         }
         Err(failure) => {
             let failed = match (failure, &subject) {
@@ -123,14 +165,13 @@ fn report(args: &CheckArgs, streams: &Streams) -> Result<Known, Failure> {
             if !topology.iter().any(|found| is_same(found, &failed)) {
                 diagnostics.push(failed);
             }
-            faulty(&title, &diagnostics, &sources)
+            Checked::faulty(&title, diagnostics, sources)
         }
     };
-    let model = match subject {
-        Subject::Circuit(model) => Some(model),
-        Subject::System(_) => None,
-    };
-    Ok((report, model))
+    if let Subject::Circuit(model) = subject {
+        checked.model = Some(model);
+    }
+    Ok(checked)
 }
 
 /// Whether two errors are of the same loop or cut: of one code, and of the same elements in words.
@@ -147,10 +188,4 @@ fn is_same(one: &Diagnostic, other: &Diagnostic) -> bool {
     };
     (one.code, one.severity) == (other.code, other.severity)
         && elements(one).is_some_and(|names| elements(other) == Some(names))
-}
-
-fn faulty(title: &str, diagnostics: &[Diagnostic], sources: &SourceMap) -> Report {
-    debug_assert!(diagnostics.iter().any(|d| d.severity == Severity::Error));
-    let shown = input::most(diagnostics.to_vec());
-    check::faulty(title, shown.iter().map(|d| Fault::of(d, sources)).collect())
 }

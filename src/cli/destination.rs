@@ -183,6 +183,7 @@ impl<'a> Destination<'a> {
                     tolerance,
                     signal,
                     time,
+                    until: _,
                 } = verified;
                 self.streams.error(format!(
                     "{file}: not verified: {signal} differs by {max_difference:.1e} of its amplitude from a second run ({method}) at \

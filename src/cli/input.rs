@@ -11,6 +11,7 @@ use super::render;
 use super::streams::Streams;
 use crate::analysis::Variant;
 use crate::circuit::{self, Circuit, ElaborateOptions, Spread, Tolerance, Tran, load};
+use crate::diagnostic::explain::{Explanation, explain};
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 use crate::forms::json;
 use crate::integrate::{Error, Places, Reason, start};
@@ -249,7 +250,13 @@ fn keep_probes(circuit: &mut Circuit, probes: &[String]) -> Result<(), Failure> 
         return Ok(());
     }
     let shown = circuit.show(probes);
-    shown.map_err(|why| Failure::told("unknown-signal", format!("--probe {why}")))
+    shown.map_err(|fault| Failure::Told {
+        code: "unknown-signal",
+        message: format!("--probe {}", fault.message),
+        help: fault
+            .help
+            .or_else(|| explain(fault.code).map(Explanation::help)),
+    })
 }
 
 /// A note where expressions are asked for of an analysis that shows signals alone.

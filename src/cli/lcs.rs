@@ -1,11 +1,13 @@
 //! `circ lcs`.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use super::args::{LcsArgs, SystemFormat};
 use super::exit::{Exit, Failure};
 use super::files::{self, STDOUT};
 use super::input::{self, Subject};
+use super::output;
 use super::streams::Streams;
 use crate::lcs::format::{Format, format};
 use crate::lcs::siconos::siconos;
@@ -18,10 +20,11 @@ use crate::lcs::{json, sparse_format};
 pub(super) fn lcs(args: &LcsArgs, streams: &Streams) -> Result<Exit, Failure> {
     let outputs: Vec<&Path> = args.output.iter().map(PathBuf::as_path).collect();
     let subject = input::open_as_it_stands(&args.input, &outputs, streams)?;
+    let asked = asked(args)?;
     if let Subject::Circuit(model) = &subject
-        && (args.format == SystemFormat::Mtx || input::is_large(model.multiport()))
+        && (asked == SystemFormat::Mtx || input::is_large(model.multiport()))
     {
-        return sparse(args, &subject, streams);
+        return sparse(args, asked, &subject, streams);
     }
     let system = input::start_system(&subject, &args.switches, streams);
     let (system, without) = system.map_err(|failure| match failure {
@@ -34,7 +37,7 @@ pub(super) fn lcs(args: &LcsArgs, streams: &Streams) -> Result<Exit, Failure> {
         let text = format!("{error}; the start state is the initial conditions");
         streams.note("no-operating-point", text);
     }
-    let text = match args.format {
+    let text = match asked {
         SystemFormat::Json => json::write(&system.lcs, &system.x0, system.tran),
         SystemFormat::Text => format(&system.lcs, Format::Text),
         SystemFormat::Numpy => format(&system.lcs, Format::Numpy),
@@ -60,6 +63,29 @@ pub(super) fn lcs(args: &LcsArgs, streams: &Streams) -> Result<Exit, Failure> {
     put(args, text, streams)
 }
 
+/// The form that `--format` or the ending of the output asks for.
+fn asked(args: &LcsArgs) -> Result<SystemFormat, Failure> {
+    let path = match (args.format, &args.output) {
+        (Some(format), _) => return Ok(format),
+        (None, None) => return Ok(SystemFormat::Text),
+        (None, Some(path)) => path,
+    };
+    let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default();
+    match ending.to_lowercase().as_str() {
+        _ if path == Path::new(STDOUT) => Ok(SystemFormat::Text),
+        "txt" => Ok(SystemFormat::Text),
+        "json" => Ok(SystemFormat::Json),
+        "py" => Ok(SystemFormat::Numpy),
+        "m" => Ok(SystemFormat::Matlab),
+        "tex" => Ok(SystemFormat::Latex),
+        "mtx" => Ok(SystemFormat::Mtx),
+        _ => Err(output::unknown_ending(
+            path,
+            "txt, json, py, m, tex or mtx without `--format`",
+        )),
+    }
+}
+
 fn put(args: &LcsArgs, text: String, streams: &Streams) -> Result<Exit, Failure> {
     match &args.output {
         Some(path) => files::write(path, text.as_bytes())?,
@@ -69,13 +95,18 @@ fn put(args: &LcsArgs, text: String, streams: &Streams) -> Result<Exit, Failure>
 }
 
 /// The system without its zeros.
-fn sparse(args: &LcsArgs, subject: &Subject, streams: &Streams) -> Result<Exit, Failure> {
+fn sparse(
+    args: &LcsArgs,
+    asked: SystemFormat,
+    subject: &Subject,
+    streams: &Streams,
+) -> Result<Exit, Failure> {
     let (system, x0) = input::sparse_system(subject, &args.switches, streams)?;
     let tran = match subject {
         Subject::Circuit(model) => model.circuit().tran,
         Subject::System(_) => None,
     };
-    let text = match args.format {
+    let text = match asked {
         SystemFormat::Json => json::write_sparse(&system, &x0, tran),
         SystemFormat::Text => sparse_format::summary(&system),
         SystemFormat::Numpy => sparse_format::numpy(&system),

@@ -10,7 +10,7 @@ use miette::{
 use super::args::MessageFormat;
 use crate::check::Fault;
 use crate::diagnostic::explain::{Explanation, explain};
-use crate::diagnostic::{Diagnostic, Severity, SourceMap};
+use crate::diagnostic::{Diagnostic, Severity, SourceMap, Span};
 use crate::report;
 
 /// Width of messages in columns.
@@ -208,12 +208,17 @@ impl miette::Diagnostic for Shown<'_> {
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
         let span = self.diagnostic.span.filter(|_| self.source.is_some())?;
-        let label = (!self.diagnostic.label.is_empty()).then(|| self.diagnostic.label.clone());
         let text = &self.source.as_ref()?.text;
-        let length = boundary(text, span.end.min(span.start + SHOWN)) - span.start;
-        Some(Box::new(std::iter::once(LabeledSpan::new(
-            label, span.start, length,
-        ))))
+        let part = |span: Span| {
+            let end = boundary(text, span.end.min(span.start + SHOWN));
+            SourceSpan::from((span.start, end - span.start))
+        };
+        let first = self.diagnostic.first.filter(|at| at.file == span.file);
+        let first = first.map(|at| LabeledSpan::new_with_span(Some("first here".into()), part(at)));
+        let label = &self.diagnostic.label;
+        let label = (!label.is_empty()).then(|| label.clone());
+        let here = LabeledSpan::new_primary_with_span(label, part(span));
+        Some(Box::new(first.into_iter().chain([here])))
     }
 }
 

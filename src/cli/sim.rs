@@ -225,7 +225,15 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
             cancel: Some(signals.flag()),
         };
         match second(&subject, run, &options) {
-            Ok(verified) => run.verified = Some(verified),
+            Ok(verified) => {
+                if let Some(until) = verified.until {
+                    let text = format!(
+                        "verified until t = {until:e} s alone: the rest asks for more steps than a second run takes"
+                    );
+                    run.notes.push(Note::run("verified-in-part", text));
+                }
+                run.verified = Some(verified);
+            }
             // The rows are whole.
             Err(error) => {
                 let text = format!("not verified: {error}");

@@ -135,6 +135,14 @@ fn chosen(args: &ViewArgs, streams: &Streams) -> Result<Plot, Failure> {
         streams.note("several-plots", text);
     }
     let mut plot = all.swap_remove(number - 1);
+    let is_empty = match &plot {
+        Plot::Time(runs) => runs.iter().all(|(_, run)| run.is_empty()),
+        Plot::Frequency(phasors) => phasors.frequency.is_empty(),
+    };
+    if is_empty {
+        let message = format!("{file}: has names of signals, and no rows");
+        return Err(Failure::told("waveforms", message));
+    }
     let unknown = |probe: &str, names: &[String]| {
         let own: Vec<String> = names.iter().map(|name| canonical_name(name)).collect();
         let near = nearest(&canonical_name(probe), own.iter().map(String::as_str));

@@ -159,7 +159,11 @@ fn told(error: &Error, elements: &[&Element]) -> Told {
         ),
         Reason::Overflow => plain(
             "overflow",
-            Some("a negative resistance, or a loop with gain of the wrong sign, makes a circuit grow without bound".into()),
+            Some(
+                "a negative resistance, or a loop with gain of the wrong sign, makes a circuit grow without bound; where an edge of rise time 0 \
+                 drives capacitors through exponential diodes without `RS`, give the edge a rise time or the diodes an `RS`"
+                    .into(),
+            ),
         ),
         Reason::TooManyRows { .. } => plain(
             "too-many-rows",

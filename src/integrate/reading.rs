@@ -1,6 +1,6 @@
 //! Rows over [x | λ | u | u' | 1] evaluated without allocation.
 
-use crate::lcs::Rows;
+use crate::lcs::{Lcs, Rows};
 
 /// Where the quantities of a circuit stand at one instant.
 #[derive(Debug, Clone, Copy)]
@@ -61,6 +61,23 @@ fn sum(rows: &Rows, i: usize, at: Point<'_>, part: impl Fn(f64) -> f64) -> f64 {
         }
     }
     sum
+}
+
+/// y_j = C x + D λ + G u + F of port j; `None` where λ is not known.
+pub(crate) fn output(lcs: &Lcs, j: usize, at: Point<'_>) -> Option<f64> {
+    if at.lambda.len() < lcs.m() {
+        return None;
+    }
+    let mut sum = lcs.f[j];
+    for (block, values) in [(&lcs.c, at.x), (&lcs.d, at.lambda), (&lcs.g, at.u)] {
+        sum += block
+            .row(j)
+            .iter()
+            .zip(values)
+            .map(|(a, b)| a * b)
+            .sum::<f64>();
+    }
+    Some(sum)
 }
 
 /// The impulse (area) of row `i` for port impulses p and steps Δu of the inputs.

@@ -75,6 +75,14 @@ impl Threshold {
         }
     }
 
+    /// The gates that fire it, where it is a thyristor's latch.
+    fn hold_gates(&self) -> Option<&[usize]> {
+        match &self.latch {
+            Some(LatchPort::Hold { gates, .. }) => Some(gates),
+            _ => None,
+        }
+    }
+
     /// Whether a gate holds it on; `position` is that of all switches.
     #[must_use]
     pub fn gated(&self, position: &[bool]) -> bool {
@@ -167,6 +175,8 @@ pub(crate) struct Switches {
     newly_driven: Vec<bool>,
     /// By switch: the port of a latch's valve in the present system, and whether it conducts where it is in the active set.
     valves: Vec<Option<(usize, bool)>>,
+    /// By switch: the other half of a triac, which the same gates fire.
+    twins: Vec<Option<usize>>,
     needs_lambda: bool,
     in_this_step: u32,
 }
@@ -180,6 +190,7 @@ impl Switches {
             driven: vec![],
             newly_driven: vec![],
             valves: vec![],
+            twins: vec![],
             needs_lambda: false,
             in_this_step: 0,
         };
@@ -216,7 +227,14 @@ impl Switches {
             Some((at, lcs.ports[at].role != Role::Voltage))
         };
         self.valves = self.thresholds.iter().map(port).collect();
-        self.needs_lambda = (0..self.thresholds.len()).any(|i| !zero(&rows.lambda, i));
+        let twin = |(i, t): (usize, &Threshold)| {
+            let gates = t.hold_gates()?;
+            let is_other = |(j, u): (usize, &Threshold)| j != i && u.hold_gates() == Some(gates);
+            self.thresholds.iter().enumerate().position(is_other)
+        };
+        self.twins = thresholds().map(twin).collect();
+        let both = |i: usize| self.twins[i].is_some();
+        self.needs_lambda = (0..self.thresholds.len()).any(|i| both(i) || !zero(&rows.lambda, i));
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -304,9 +322,25 @@ impl Switches {
     }
 
     /// Whether the valve in series with a latch conducts, by the active set: a current far below the tolerance of the steps holds
-    /// the latch, too.
-    fn carries(&self, i: usize, active: &[bool]) -> bool {
-        self.valves[i].is_some_and(|(port, conducts)| active[port] == conducts)
+    /// the latch, too. Of the halves of a triac that both conduct, which short each other, it is the one with the larger current: what
+    /// goes round in the two is no current of the triac.
+    fn carries(&self, i: usize, lcs: &Lcs, at: Point<'_>, active: &[bool]) -> bool {
+        let current = |i: usize| {
+            let (port, is_current) = self.valves[i]?;
+            // A port whose λ is a voltage has y for a current.
+            let y = || reading::output(lcs, port, at);
+            let conducts = active[port] == is_current;
+            conducts.then(|| {
+                if is_current {
+                    at.lambda.get(port).copied()
+                } else {
+                    y()
+                }
+            })
+        };
+        let Some(own) = current(i) else { return false };
+        let other = self.twins[i].and_then(current);
+        !matches!((own, other), (Some(own), Some(Some(other))) if own < other)
     }
 
     /// What controls that depend on the state ask for with this active set. Switches that sources alone drive
@@ -340,7 +374,7 @@ impl Switches {
         match threshold.latch {
             None if threshold.position(on, control()) != on => Demand::Passage,
             Some(_) if threshold.holds(on, &self.position) => {
-                if !self.carries(i, active) {
+                if !self.carries(i, lcs, at, active) {
                     Demand::Release
                 } else if threshold.off_below > 0.0 && control() <= threshold.off_below {
                     Demand::Passage
@@ -379,7 +413,7 @@ impl Switches {
                     Some(_) => {
                         threshold.holds(self.position[i], &self.position)
                             && threshold.off_below > 0.0
-                            && self.carries(i, active)
+                            && self.carries(i, lcs, at, active)
                     }
                 }
         };

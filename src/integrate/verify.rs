@@ -20,7 +20,7 @@ use crate::lcs::Lcs;
 use crate::mna::StaticMultiport;
 use crate::settings::Settings;
 use crate::settings::tolerances::stated::{
-    ASIDE, ENOUGH, EXACT, MOST_LEFT_OUT, MOST_STEPS, SAFETY, TOLERANCES,
+    ASIDE, ENOUGH, EXACT, MOST_LEFT_OUT, MOST_STEPS, ROWS_LEFT, SAFETY, SHORTENED, TOLERANCES,
 };
 
 /// What the second run found.
@@ -37,6 +37,9 @@ pub struct Verified {
     pub signal: String,
     /// Where its difference is largest, s.
     pub time: f64,
+    /// How far the run was made a second time, s, where its end asks for more steps than a verifying run may take.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub until: Option<f64>,
 }
 
 impl Verified {
@@ -67,9 +70,16 @@ pub fn verify(
     run: &Run,
     options: &VerifyOptions<'_>,
 ) -> Result<Verified, Error> {
-    let step = circuit.tran.map_or(0.0, |tran| tran.tstep);
-    second(run, step, options, &|options| {
-        simulate(circuit, behaviour, options)
+    let Some(tran) = circuit.tran else {
+        return Err(Error::before(Reason::internal(
+            "integrate::verify",
+            "a run without `.tran`",
+        )));
+    };
+    let mut part = circuit.clone();
+    second(run, tran, options, &mut |tran, options| {
+        part.tran = Some(tran);
+        simulate(&part, behaviour, options)
     })
 }
 
@@ -83,19 +93,49 @@ pub fn verify_system(
     run: &Run,
     options: &VerifyOptions<'_>,
 ) -> Result<Verified, Error> {
-    second(run, tran.tstep, options, &|options| {
+    second(run, tran, options, &mut |tran, options| {
         simulate_system(lcs, x, tran, options)
     })
 }
 
+/// Makes a run of a transient.
+type Simulate<'a> = dyn FnMut(Tran, SimOptions<'_>) -> Result<Run, Error> + 'a;
+
+/// Verifies the whole run, or of one that asks for too many steps as much as they reach.
 fn second(
     run: &Run,
-    step: f64,
+    tran: Tran,
     options: &VerifyOptions<'_>,
-    simulate: &dyn Fn(SimOptions<'_>) -> Result<Run, Error>,
+    simulate: &mut Simulate<'_>,
 ) -> Result<Verified, Error> {
-    let again = |method, tol: f64| {
-        simulate(SimOptions {
+    let error = match part(run, tran, options, simulate) {
+        Err(error) if matches!(error.reason, Reason::TooManySteps { .. }) => error,
+        found => return found,
+    };
+    // What the first of the tolerances reached, the second and third do not.
+    let reached = error.t.unwrap_or(0.0) / SHORTENED;
+    let tstop = grid(run).take_while(|t| *t <= reached).last();
+    let long_enough = |t: &f64| *t >= tran.tstart + ROWS_LEFT * tran.tstep;
+    let Some(tstop) = tstop.filter(long_enough) else {
+        return Err(error);
+    };
+    let verified = part(run, Tran { tstop, ..tran }, options, simulate)?;
+    Ok(Verified {
+        until: Some(tstop),
+        ..verified
+    })
+}
+
+/// Verifies a run up to the end of this transient.
+fn part(
+    run: &Run,
+    tran: Tran,
+    options: &VerifyOptions<'_>,
+    simulate: &mut Simulate<'_>,
+) -> Result<Verified, Error> {
+    let (step, until) = (tran.tstep, tran.tstop);
+    let mut again = |method, tol: f64| {
+        let options = SimOptions {
             method,
             corners: true,
             unestimated: true,
@@ -106,7 +146,8 @@ fn second(
             },
             cancel: options.cancel,
             ..SimOptions::default()
-        })
+        };
+        simulate(tran, options)
     };
     let is_exact = run.method == Method::Exact.name();
     let stated = match run.error.max {
@@ -118,8 +159,8 @@ fn second(
     if !is_exact {
         match again(Method::Exact, options.settings.tol) {
             Ok(exact) => {
-                let aside = known.max(apart(run, &exact).min(ASIDE * step));
-                let times = quiet_times(run, &[run, &exact], ASIDE * step);
+                let aside = known.max(apart(run, &exact, until).min(ASIDE * step));
+                let times = quiet_times(run, &[run, &exact], ASIDE * step, until);
                 let found = compared(run, &exact, &times, aside);
                 let judged = found.into_iter().map(|signal| (signal, stated + EXACT));
                 return Ok(worst(Method::Exact.name().into(), judged));
@@ -145,9 +186,12 @@ fn second(
                 _ => return Err(error),
             },
         };
-        let itself = SAFETY * apart(&coarse, &fine);
-        let aside = itself.max(known).max(apart(run, &fine).min(ASIDE * step));
-        let times = quiet_times(run, &[run, &coarse, &fine], itself.max(ASIDE * step));
+        let itself = SAFETY * apart(&coarse, &fine, until);
+        let aside = itself
+            .max(known)
+            .max(apart(run, &fine, until).min(ASIDE * step));
+        let runs = [run, &coarse, &fine];
+        let times = quiet_times(run, &runs, itself.max(ASIDE * step), until);
         let own = compared(&coarse, &fine, &times, itself);
         let own: BTreeMap<&str, f64> = own.iter().map(|s| (s.name, s.distance)).collect();
         let judged = compared(run, &fine, &times, aside);
@@ -249,17 +293,14 @@ fn worst<'a>(method: String, judged: impl Iterator<Item = (Signal<'a>, f64)>) ->
         tolerance,
         signal: signal.name.into(),
         time: signal.time,
+        until: None,
     }
 }
 
-/// The times of the grid's rows that no event of these runs is near, nor the start and the end (beyond which none is seen); all of them if those were too few.
-fn quiet_times(run: &Run, runs: &[&Run], near: f64) -> Vec<f64> {
-    let kind = |k: usize| run.kinds.get(k).copied().unwrap_or(RowKind::Grid);
-    let times = run.waveforms.time.iter().enumerate();
-    let all: Vec<f64> = times
-        .filter(|(k, _)| kind(*k).is_grid())
-        .map(|(_, t)| *t)
-        .collect();
+/// The times of the grid's rows up to `until`, s, that no event of these runs is near, nor the start and the end (beyond which none is seen);
+/// all of them if those were too few.
+fn quiet_times(run: &Run, runs: &[&Run], near: f64, until: f64) -> Vec<f64> {
+    let all: Vec<f64> = grid(run).take_while(|t| *t <= until).collect();
     let events = runs.iter().flat_map(|run| run.events.iter().map(|e| e.t));
     let end = all.last().copied().unwrap_or(0.0);
     let mut events: Vec<f64> = events.chain([0.0, end]).collect();
@@ -275,11 +316,20 @@ fn quiet_times(run: &Run, runs: &[&Run], near: f64) -> Vec<f64> {
     quiet
 }
 
-/// How far events of the same name are apart, s: the largest distance among names that both runs have equally often.
-fn apart(a: &Run, b: &Run) -> f64 {
+/// The times of the grid's rows.
+fn grid(run: &Run) -> impl Iterator<Item = f64> {
+    let kind = |k: usize| run.kinds.get(k).copied().unwrap_or(RowKind::Grid);
+    let times = run.waveforms.time.iter().enumerate();
+    times
+        .filter(move |(k, _)| kind(*k).is_grid())
+        .map(|(_, t)| *t)
+}
+
+/// How far events of the same name up to `until`, s, are apart, s: the largest distance among names that both runs have equally often.
+fn apart(a: &Run, b: &Run, until: f64) -> f64 {
     let by_name = |run: &'_ Run| {
         let mut times: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-        for event in &run.events {
+        for event in run.events.iter().filter(|event| event.t <= until) {
             times.entry(event.to_string()).or_default().push(event.t);
         }
         times

@@ -1,10 +1,12 @@
-//! Dense matrices of the sizes of circuits. Products of general-purpose libraries spend more on packing such matrices than on
-//! multiplying them.
+//! Dense matrices of the sizes of circuits. Products of general-purpose libraries spend more on packing small ones than on multiplying
+//! them; large ones are left to nalgebra.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, Dyn};
 
 /// Rows computed together: four independent accumulators keep the adders of any x86-64 or ARM64 core busy.
 pub(crate) const BLOCK: usize = 4;
+/// Blocks in a column from which on packing pays: 80 rows take 0.6 of the time, 200 a third.
+const LARGE: usize = 16;
 /// Rows computed together.
 pub(crate) type Block = [f64; BLOCK];
 
@@ -75,6 +77,16 @@ impl Dense {
             2 => self.set_product_in::<2>(a, b),
             3 => self.set_product_in::<3>(a, b),
             4 => self.set_product_in::<4>(a, b),
+            blocks if blocks >= LARGE && b.is_full() => {
+                let (rows, columns, stride) = (self.rows, self.columns, blocks * BLOCK);
+                let out = self.data.as_flattened_mut();
+                DMatrixViewMut::from_slice_with_strides_mut(out, rows, columns, 1, stride).gemm(
+                    1.0,
+                    &a.view(),
+                    &b.view(),
+                    0.0,
+                );
+            }
             blocks => {
                 self.data.fill([0.0; BLOCK]);
                 for (j, out) in self.data.chunks_exact_mut(blocks).enumerate() {
@@ -90,6 +102,17 @@ impl Dense {
                 }
             }
         }
+    }
+
+    /// Whether few entries are zero: those of large systems are at first.
+    fn is_full(&self) -> bool {
+        let zeros = self.entries().iter().filter(|v| **v == 0.0).count();
+        4 * zeros < self.entries().len()
+    }
+
+    fn view(&self) -> DMatrixView<'_, f64, Dyn, Dyn> {
+        let stride = self.blocks * BLOCK;
+        DMatrixView::from_slice_with_strides(self.entries(), self.rows, self.columns, 1, stride)
     }
 
     /// The product where a column has `B` blocks: its sums stay in registers.
@@ -191,7 +214,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: Some(Box::new(proptest::test_runner::FileFailurePersistence::WithSource("regressions"))), ..ProptestConfig::default() })]
         #[test]
-        fn products_are_those_of_matrices(m in 0_usize..20, k in 0_usize..10, n in 0_usize..10, seed in any::<u32>()) {
+        fn products_are_those_of_matrices(m in prop_oneof![0_usize..20, 60_usize..70], k in 0_usize..10, n in 0_usize..10, seed in any::<u32>()) {
             let (a, b) = (random(m, k, seed), random(k, n, seed ^ 77));
             let mut product = Dense::zeros(m, n);
             product.set_product(&Dense::of(&a), &Dense::of(&b));

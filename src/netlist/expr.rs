@@ -351,7 +351,8 @@ pub(super) fn signal_arguments<'a>(open: Input<'a>, function: &Name) -> Parsed<'
                     function.span,
                     format!("`{}(` is never closed", function.text),
                 )
-                .label("no `)` follows"),
+                .label("no `)` follows")
+                .help("put a `)` where the bracket is to end"),
             ));
         };
         let text = start.fragment()[..length].trim_end();

@@ -24,7 +24,12 @@ pub fn figure(of: &Phasors) -> Figure {
         let seen: Vec<bool> = of.column(j).map(|value| value.norm() > lowest).collect();
         let phase = unwrapped(of.column(j));
         let curve = |values: &[f64]| Series {
-            name: name.clone(),
+            // A curve that is missing is told by its name.
+            name: if seen.contains(&true) {
+                name.clone()
+            } else {
+                format!("{name} = 0")
+            },
             run: String::new(),
             points: rows
                 .iter()
@@ -105,6 +110,7 @@ mod tests {
             values: [10.0, 0.0, 1.0, 1e-14].map(real).into(),
         };
         let panels = figure(&phasors).panels;
+        assert_eq!(panels[1].series[1].name, "v(b) = 0");
         assert_eq!(panels[0].series[0].points, [(0.0, 20.0), (1.0, 0.0)]);
         assert!(panels.iter().all(|p| p.series[1].points.is_empty()));
     }

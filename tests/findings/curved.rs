@@ -5,7 +5,8 @@ use circ::integrate::{Method, Run, SimOptions};
 use circ::measure::{Over, Trace};
 use circ::settings::Settings;
 
-use super::run;
+use super::runs::column;
+use super::{changed, run};
 
 fn average(run: &Run, probe: &str, from: f64, to: f64) -> f64 {
     let values: Vec<f64> = super::runs::column(run, probe);
@@ -241,5 +242,58 @@ fn a_current_that_a_junction_stops_is_followed() {
                 assert!(off < 5e-5 * size, "{name} row {k}: {a} for {b}");
             }
         }
+    }
+}
+
+/// A triac with both halves fired at once, beside an exponential diode: the half whose current is the larger holds, and the other does not run
+/// through the next half cycle (313 V where 249 V are the peak).
+#[test]
+fn a_triac_does_not_hold_itself_by_what_goes_round_in_it() {
+    let name = "triac_keeps_one_half";
+    for delay in ["5350u", "7600u"] {
+        let ideal = changed(
+            name,
+            &[("5350u", delay), ("D(Is=3.2u N=1.5)", "D(ideal)")],
+            Method::Exact,
+        );
+        let run = changed(name, &[("5350u", delay)], Method::Auto);
+        let largest = |run: &Run| {
+            let values = column(run, "v(out)");
+            values.iter().fold(0.0_f64, |m, v| m.max(v.abs()))
+        };
+        let (expected, found) = (largest(&ideal), largest(&run));
+        assert!(
+            (found - expected).abs() < 0.02 * expected,
+            "{delay}: {found} for {expected}"
+        );
+    }
+}
+
+/// Where v(a) is positive both diodes carry its current, through r2 and past it, else neither and v(out) is v(a). The amplifier's limits are laws
+/// of ideal pairs in a loop of gain, where Newton finds no stages and the solvers of the other steps do.
+#[test]
+fn an_op_amp_with_limits_rectifies() {
+    let (r, is, n_vt) = (1e4, 1e-9, 1.8 * 0.025_864_9);
+    let junction = |v: f64| is * (v / n_vt).exp_m1();
+    let zero_of = |f: &dyn Fn(f64) -> f64, (mut low, mut high): (f64, f64)| {
+        for _ in 0..80 {
+            let middle = f64::midpoint(low, high);
+            *(if f(middle) > 0.0 { &mut low } else { &mut high }) = middle;
+        }
+        low
+    };
+    // From v(o): v(out), where what r2 brings flows through d1.
+    let out = |o: f64| zero_of(&|out| -out / r - junction(out - o), (o - 1.0, 0.0));
+    let run = changed("rectifier_with_op_amp", &[], Method::Auto);
+    let (time, values) = (&run.waveforms.time, column(&run, "v(out)"));
+    for (t, v) in time.iter().zip(&values) {
+        let a = (2.0 * std::f64::consts::PI * 1e5 * t).sin();
+        let expected = if a > 0.0 {
+            let o = zero_of(&|o| -out(o) / r + junction(-o) - a / r, (-2.0, 0.0));
+            out(o)
+        } else {
+            a
+        };
+        assert!((v - expected).abs() < 2e-4, "{t:e}: {v} for {expected}");
     }
 }

@@ -314,3 +314,24 @@ fn an_edge_on_the_last_row_moves_source_and_switch() {
         );
     }
 }
+
+/// An edge of a source behind a diode that clamps: what a switch and a gate see of it is what the diode lets through, by every method, and not
+/// what the source would be without it.
+#[test]
+fn a_control_on_a_clamped_node_does_not_see_the_edge_before_the_clamp() {
+    let name = "clamp_before_a_switch";
+    for method in [Method::Exact, Method::Theta, Method::Euler] {
+        let run = changed(name, &[], method);
+        // (12/5 + 0.4/0.1) / (1/5 + 1/0.1) V; 12 V over 1 kΩ and 1 MΩ.
+        for (probe, expected) in [("v(b)", 6.4 / 10.2), ("v(x)", 12.0 / 1.001), ("v(y)", 10.0)] {
+            let found = at(&run, probe, 3e-6);
+            assert!(
+                (found - expected).abs() < 1e-6,
+                "{method:?} {probe}: {found}"
+            );
+        }
+    }
+    // Without the clamp both see 12 V.
+    let run = changed(name, &[("d5 b 0 db", "r5 b 0 1meg")], Method::Exact);
+    assert!(at(&run, "v(x)", 3e-6) < 2e-3 && at(&run, "v(y)", 3e-6) < 1e-9);
+}

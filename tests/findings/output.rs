@@ -536,10 +536,12 @@ fn a_second_run_verifies_the_first() {
         ..SimOptions::default()
     };
     let run = simulate(&circuit, &behaviour, options).expect("a run");
-    let judged = |run: &Run| {
-        verify(&circuit, &behaviour, run, &VerifyOptions::default()).expect("a second run")
+    let judged_by = |run: &Run, options: &VerifyOptions<'_>| {
+        verify(&circuit, &behaviour, run, options).expect("a second run")
     };
-    assert!(judged(&run).holds());
+    let judged = |run: &Run| judged_by(run, &VerifyOptions::default());
+    let whole = judged(&run);
+    assert!(whole.holds() && whole.until.is_none(), "{whole:?}");
     let column = |name: &str| run.waveforms.find(name).expect("a signal");
     let width = run.waveforms.width();
     let at = |t: f64| {
@@ -552,6 +554,21 @@ fn a_second_run_verifies_the_first() {
     let found = judged(&wrong);
     assert!(!found.holds() && found.signal == "v(c)", "{found:?}");
     assert!((found.time - 150e-6).abs() < 1e-12, "{found:?}");
+    // With fewer steps than that asks for the beginning is verified, and how far is said.
+    let mut few = VerifyOptions::default();
+    few.settings.max_steps = 1000;
+    let found = judged_by(&wrong, &few);
+    let until = found.until.expect("an end");
+    assert!(
+        found.holds() && (20e-6..149e-6).contains(&until),
+        "{found:?}"
+    );
+    wrong.waveforms.values[at(15e-6) * width + column("v(c)")] *= 1.001;
+    let found = judged_by(&wrong, &few);
+    assert!(
+        !found.holds() && (found.time - 15e-6).abs() < 1e-12,
+        "{found:?}"
+    );
     // The pulse from 203.3 to 208 us left out: in rows, and in events.
     let mut wrong = run.clone();
     for (k, t) in run.waveforms.time.iter().enumerate() {

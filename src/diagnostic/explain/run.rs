@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 50] = [
+pub(super) const CODES: [Explanation; 51] = [
     Explanation::of(
         "at-rest",
         "The circuit does not switch periodically: the response is that about its operating point.",
@@ -312,6 +312,12 @@ pub(super) const CODES: [Explanation; 50] = [
         "The periodic steady state that is shown is unstable: transients leave it.",
         "A controller past its stability limit, such as peak-current control above half duty without a slope.",
         "`circ sim` shows where it goes; `--order 2` looks for the doubled period; a compensating slope or less gain mends it.",
+    ),
+    Explanation::of(
+        "verified-in-part",
+        "The second run that `--verify` asks for was made of the beginning alone.",
+        "Oscillations that are short beside the run, which its steps follow one by one.",
+        "Verify a shorter `.tran` that begins where it matters (`--from-pss`), or compare with `--method theta --tol 1e-6` of your own.",
     ),
     Explanation::of(
         "wrong-sign",

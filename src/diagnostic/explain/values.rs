@@ -189,7 +189,7 @@ pub(super) const CODES: [Explanation; 30] = [
         "transistor-as-switch",
         "A MOSFET, JFET or IGBT is simulated as a switch with an on-resistance and its body diode.",
         "circ simulates switching circuits: saturation, charge and speed of the transistor are left out.",
-        "Nothing for converters whose transistors are on or off; elsewhere another simulator is the right one.",
+        "Nothing for converters whose transistors are on or off, but for their losses: reverse current flows in the body diode, without drop unless the model says `Vfwd=0.7`. Elsewhere another simulator is the right one.",
     )
     .shown("switch\nv1 d 0 10\nv2 g 0 5\nr1 d a 10\nm1 a g 0 0 nm\n.model nm nmos(vto=1 kp=1)\n.tran 1m 5m\n"),
     Explanation::of(

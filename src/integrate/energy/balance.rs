@@ -107,6 +107,11 @@ impl Balance {
             .max(self.jumps.abs());
     }
 
+    /// Energies that are rounding of one of this size, J, are no measure for a residual.
+    pub(crate) fn note_rounding(&mut self, of: f64) {
+        self.largest = self.largest.max(f64::EPSILON.sqrt() * of);
+    }
+
     /// The result.
     #[must_use]
     pub fn energy(&self) -> Energy {

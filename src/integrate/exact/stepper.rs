@@ -195,7 +195,8 @@ impl Exact {
         let (corner, known) = self.sources.due(near);
         self.inspector.forget_slips();
         self.corner = corner;
-        let mut discontinuous = corner && self.sources.take_pieces(t, near)?;
+        let edge = corner && self.sources.take_pieces(t, near)?;
+        let mut discontinuous = edge;
         self.sources.stand(t);
         let mut key = std::mem::take(&mut self.key);
         if known {
@@ -204,7 +205,7 @@ impl Exact {
         if discontinuous {
             key.sliding.clear();
         }
-        discontinuous |= self.move_guarded(&mut key, fired, self.corner);
+        discontinuous |= self.move_guarded(&mut key, fired, (self.corner, edge));
         fire(&self.table.thresholds, &mut key.switches);
         let trigger = fired.map_or(Trigger::Sources, Trigger::Guard);
         self.change(key, discontinuous, trigger, log)
@@ -228,8 +229,14 @@ impl Exact {
     }
 
     /// Moves the switches whose guards end the mode now: the one that `fired` and all that pass their thresholds with it, in the
-    /// present mode with the sources as they go on after a `corner`. Whether one moved.
-    fn move_guarded(&mut self, key: &mut Key, fired: Option<usize>, corner: bool) -> bool {
+    /// present mode with the sources as they go on after a `corner`. Behind an `edge` the devices need not stand as they do in the present
+    /// mode, and controls are asked when it is known how they do. Whether one moved.
+    fn move_guarded(
+        &mut self,
+        key: &mut Key,
+        fired: Option<usize>,
+        (corner, edge): (bool, bool),
+    ) -> bool {
         let Some(at) = self.mode else { return false };
         let mut moved = false;
         let owner = fired.map(|guard| self.table.modes[at].owner(guard));
@@ -258,7 +265,7 @@ impl Exact {
         let first = mode.device_guards.len();
         let may_pass = |k: usize| {
             let decided = !corner && fired == Some(first + k);
-            let sources_turn = corner && mode.controlled_by_sources[k];
+            let sources_turn = corner && !edge && mode.controlled_by_sources[k];
             !decided && (sources_turn || self.travel.is_at_zero(&mode.flow, first + k))
         };
         let candidates: Vec<usize> = (0..mode.guarded_switches.len())
@@ -606,6 +613,7 @@ impl Stepper for Exact {
         let (t, duration) = (self.travel.t, self.duration);
         let mut outcome = self.report.finish(&self.table, t, duration);
         outcome.stats.steps = self.travel.steps;
+        self.storage.note_capacity();
         outcome.energy = self.storage.balance.energy();
         outcome
     }

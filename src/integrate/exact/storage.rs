@@ -147,6 +147,12 @@ impl Storage {
         }
     }
 
+    /// Notes what the storage could hold at its amplitudes, of which energies that cancel over a run leave rounding.
+    pub(super) fn note_capacity(&mut self) {
+        let of = self.stored(&self.scale);
+        self.balance.note_rounding(of);
+    }
+
     /// The power that energies of a run of `duration` seconds are measured by, W; 0 where no balance is asked for.
     pub(super) fn power(&self, duration: f64) -> f64 {
         if self.balanced {

@@ -107,7 +107,18 @@ impl Theta {
         }
         let mut verdict = match tried {
             Ok(()) => self.judge(h),
-            Err(error) if taken => return Err(error),
+            Err(error) if taken && error.reason == Reason::Overflow => return Err(error),
+            // Stages that Newton does not find have the solvers of the other steps.
+            Err(_) if taken => {
+                self.attempt(h, t1)?;
+                *impulse = self.impulse(h)?.is_some();
+                self.forget_start();
+                self.commit(t1)?;
+                return Ok(Verdict {
+                    accept: true,
+                    next: h,
+                });
+            }
             Err(_) => Verdict {
                 accept: false,
                 next: 0.25 * h,

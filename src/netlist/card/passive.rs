@@ -80,11 +80,20 @@ pub(super) fn warn_of_suffix(at: Input<'_>, name: &Name, value: &Expr) {
     };
     let written = at.fragment();
     let written = &written[..written.find(ends_word).unwrap_or(written.len())];
-    let Some(last) = written.chars().next_back() else {
+    // `1MOhm` means to be no more than `1M`.
+    let end = written.trim_end_matches(|c: char| !c.is_ascii_digit() && c != '.');
+    let unit = &written[end.len()..];
+    let Some(last) = unit.chars().next() else {
         return;
     };
-    let digits = &written[..written.len() - last.len_utf8()];
-    if number.f64 == 0.0 || !digits.ends_with(|c: char| c.is_ascii_digit() || c == '.') {
+    let rest = unit[last.len_utf8()..].to_lowercase();
+    let own = match last {
+        'M' => ["", "ohm", "ohms", "ω", "r"].contains(&rest.as_str()),
+        'F' => ["", "arad", "arads"].contains(&rest.as_str()),
+        _ => rest.is_empty(),
+    };
+    let digits = end;
+    if number.f64 == 0.0 || !own || digits.is_empty() {
         return;
     }
     let capital = "SPICE suffixes know no capitals";

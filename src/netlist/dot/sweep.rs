@@ -54,6 +54,16 @@ pub(super) fn ac<'a>(start: Input<'a>, i: Input<'a>) -> (Input<'a>, Dot) {
         _ => card.values.len() == 3,
     };
     if whole && enough {
+        if let ([points, ..], true) = (&card.values[..], rest.fragment() == i.fragment()) {
+            let fault = Diagnostic::warning(
+                "bad-ac",
+                points.span,
+                "this `.ac` does not say how its points are spaced",
+            )
+            .label("taken as `lin`")
+            .help("write `dec`, `oct` or `lin` before the number of points");
+            tell(start, fault);
+        }
         return (separator(at), Dot::statement(Statement::Ac(card)));
     }
     let fault = Diagnostic::warning("bad-ac", card.span, "this `.ac` is left out")

@@ -212,7 +212,7 @@ impl View {
                 let inner = beside(part.symbol).min(y);
                 drawing.line(place((x, y)), place((x, inner)), WIRE);
                 let sign = if k == 0 { "+" } else { "−" };
-                let (cx, cy) = place((x, inner - 4.0));
+                let (cx, cy) = place((x, inner - 8.0));
                 written(drawing, sign, (cx, cy + 4.0), (TEXT, INK), Anchor::Middle);
             } else if k == 0 {
                 let from = (symbol::gate_along(part.symbol), GATE);

@@ -54,6 +54,13 @@ pub(crate) const TOLERANCES: [f64; 3] = [1e-4, 1e-5, 1e-6];
 /// Steps of a verifying run at most. Larger: a check that takes minutes for a run of milliseconds; smaller: long runs are not checked.
 pub(crate) const MOST_STEPS: u64 = 300_000;
 
+/// Where those do not suffice, the part of the run is verified that they reached, over this. Larger: less of it; smaller: the tighter ones of
+/// [`TOLERANCES`] do not reach its end (steps of order 2 are √10 times as many from one to the next).
+pub(crate) const SHORTENED: f64 = 4.0;
+
+/// Print steps of that part at least. Smaller: a start is taken for a run; larger: less is verified.
+pub(crate) const ROWS_LEFT: f64 = 10.0;
+
 /// An error of the verifying steps, relative to amplitudes, below which they know enough. Larger: a verdict that says little; smaller: dearer.
 pub(crate) const ENOUGH: f64 = 3e-3;
 

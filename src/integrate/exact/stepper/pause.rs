@@ -95,7 +95,7 @@ impl Exact {
         self.sources.position(thresholds, &mut key.switches, t);
         key.sliding.clear();
         self.corner = true;
-        self.move_guarded(&mut key, None, true);
+        self.move_guarded(&mut key, None, (true, true));
         fire(&self.table.thresholds, &mut key.switches);
         self.change(key, true, Trigger::Sources, log)
     }
