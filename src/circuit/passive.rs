@@ -314,7 +314,7 @@ impl<'n> Builder<'n, '_> {
         let mut number = |own: &[&str], otherwise: f64| -> Option<f64> {
             let found = args.get(own).or_else(|| model?.get(own));
             let value = found.map(|expr| self.scopes.finite(expr, scope));
-            Some(value.map_or(Some(otherwise), |value| value.map(|v| v.f64))?)
+            value.map_or(Some(otherwise), |value| value.map(|v| v.f64))
         };
         let (tc1, tc2) = (number(&["tc1", "tc"], 0.0)?, number(&["tc2"], 0.0)?);
         if tc1 == 0.0 && tc2 == 0.0 {

@@ -209,6 +209,33 @@ fn delimiter(start: &[u8]) -> u8 {
     [b'\t', b';', b','].into_iter().find(has).unwrap_or(b',')
 }
 
+/// Lines above the names, in which oscilloscopes tell of themselves: those before the last line that is no numbers, where numbers follow. None
+/// where the first line has a time or frequency for its first name, or no line of the beginning is of numbers.
+fn above(start: &[u8]) -> u64 {
+    let text = String::from_utf8_lossy(start);
+    let lines: Vec<&str> = text.lines().collect();
+    let cells = |line: &str| line.split(['\t', ';', ',']).count();
+    let is_numbers = |line: &str| {
+        let mut cells = line.split(['\t', ';', ',']).map(str::trim);
+        cells.all(|cell| cell.parse::<f64>().is_ok())
+    };
+    let first = lines.iter().position(|line| !line.starts_with('#'));
+    let is_named = first.is_some_and(|k| {
+        let name = lines[k].split(['\t', ';', ',']).next().unwrap_or_default();
+        is_time(name.trim()) || name.trim().eq_ignore_ascii_case("frequency")
+    });
+    let numbers = |pair: &[&str]| {
+        !is_numbers(pair[0])
+            && is_numbers(pair[1])
+            && cells(pair[1]) > 1
+            && cells(pair[0]) == cells(pair[1])
+    };
+    match lines.windows(2).position(numbers) {
+        Some(k) if !is_named && first.is_some_and(|first| first < k) => k as u64,
+        _ => 0,
+    }
+}
+
 /// A number, with a decimal comma too: where cells stand between commas none has one.
 fn number(cell: &str) -> Result<f64, ParseFloatError> {
     cell.parse().or_else(|_| cell.replacen(',', ".", 1).parse())
@@ -236,6 +263,10 @@ struct Table {
 impl Table {
     fn read(from: impl Read) -> Result<Self, WaveformError> {
         let mut from = BufReader::new(from);
+        let above = above(from.fill_buf().map_err(WaveformError::from)?);
+        for _ in 0..above {
+            from.skip_until(b'\n').map_err(WaveformError::from)?;
+        }
         let start = from.fill_buf().map_err(WaveformError::from)?;
         let mut reader = csv::ReaderBuilder::new()
             .delimiter(delimiter(start))
@@ -252,7 +283,7 @@ impl Table {
         let (mut lines, mut gap) = (Vec::new(), None);
         for record in reader.records() {
             let record = record.map_err(unreadable)?;
-            let line = record.position().map_or(0, csv::Position::line);
+            let line = above + record.position().map_or(0, csv::Position::line);
             if record.len() != names.len() {
                 return Err(malformed(format!(
                     "line {line}: {} cells where the header has {}",
@@ -431,6 +462,28 @@ mod tests {
         }
         // In milliseconds it would be another file.
         assert!(read(&b"time (ms),CH1\n0,1\n1,2\n"[..]).is_err());
+    }
+
+    /// As Tektronix and Siglent write them; with their lines, and units that are none of seconds refused.
+    #[test]
+    fn what_oscilloscopes_tell_above_the_names_is_passed_over() {
+        let above = "Model,MDO34\nSample Interval,1e-3\nRecord Length,2\n,\n";
+        let waves = read(format!("{above}TIME,CH1\n0,1\n1e-3,2\n").as_bytes()).expect("waveforms");
+        assert_eq!(
+            (waves.names, waves.time),
+            (vec!["CH1".to_owned()], vec![0.0, 1e-3])
+        );
+        let wrong = read(format!("{above}TIME,CH1\n0,1\n1e-3,x\n").as_bytes());
+        assert!(
+            wrong.unwrap_err().to_string().contains("line 7"),
+            "its own line"
+        );
+        for header in ["(ms),(V)", "Time (ms),CH1"] {
+            assert!(
+                read(format!("{above}{header}\n0,1\n1,2\n").as_bytes()).is_err(),
+                "{header}"
+            );
+        }
     }
 
     #[test]
