@@ -418,6 +418,28 @@ fn what_no_model_has_is_a_warning_with_what_was_meant() {
     }
 }
 
+/// A table behind the controlling nodes, as LTspice writes it, is that of their voltage.
+#[test]
+fn a_table_of_the_controlling_nodes() {
+    let table = |form: &str| {
+        let text = format!(
+            "v1 a 0 sin(0 2 1k)\nr1 a 0 1k\ne1 b 0 {form}\nr2 b 0 1k\n.tran 10u 1m\n.save v(b)"
+        );
+        let run = model(&text)
+            .expect("a circuit")
+            .transient(SimOptions::default());
+        run.expect("a run").waveforms.values
+    };
+    let plain = table("table {v(a)} = (-1,-1) (0,0) (1,3)");
+    for form in [
+        "a 0 table=(-1 -1, 0 0, 1 3)",
+        "a 0 table(-1,-1,0,0,1,3)",
+        "a 0 TABLE = (-1,-1) (0,0) (1,3)",
+    ] {
+        assert_eq!(table(form), plain, "{form}");
+    }
+}
+
 /// 10 A through a body diode of 0.7 V beside a channel of 50 mΩ that is on: all of it in the channel.
 #[test]
 fn a_body_diode_has_the_drop_of_its_model() {

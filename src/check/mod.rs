@@ -20,7 +20,6 @@ pub use feedthrough::Feedthrough;
 pub use jumps::Jumps;
 pub use stiffness::{Conditioning, Stiffness};
 
-pub(crate) use text::Judgement;
 pub use theorems::Theorem;
 
 use nalgebra::DMatrix;

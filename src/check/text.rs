@@ -83,8 +83,8 @@ impl fmt::Display for Report {
     }
 }
 
-/// A report without its title and its faults.
-pub(crate) struct Judgement<'a>(pub(crate) &'a Report);
+/// See [`Report::judgement`].
+struct Judgement<'a>(&'a Report);
 
 impl fmt::Display for Judgement<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -93,6 +93,12 @@ impl fmt::Display for Judgement<'_> {
 }
 
 impl Report {
+    /// The report without its title and its faults.
+    #[must_use]
+    pub fn judgement(&self) -> impl fmt::Display + '_ {
+        Judgement(self)
+    }
+
     fn write_judgement(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "verdict       {}", self.verdict())?;
         let Some(class) = &self.feedthrough else {

@@ -10,7 +10,7 @@ use super::input::{self, Subject};
 use super::output;
 use super::render;
 use super::streams::Streams;
-use crate::check::{self, Fault, Judgement, Report};
+use crate::check::{self, Fault, Report};
 use crate::diagnostic::{Diagnostic, Severity, SourceMap};
 use crate::mna;
 use crate::model::Model;
@@ -62,7 +62,7 @@ pub(super) fn check(args: &CheckArgs, streams: &Streams) -> Result<Exit, Failure
         } else {
             input::show(&findings, &sources, streams);
         }
-        streams.data(text + &Judgement(&report).to_string())?;
+        streams.data(text + &report.judgement().to_string())?;
     }
     Ok(if report.ok { Exit::Done } else { Exit::No })
 }

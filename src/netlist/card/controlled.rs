@@ -2,9 +2,9 @@
 
 use nom::Input as _;
 
-use super::{Body, assigns, expect_value, nodes, numbers};
+use super::{Body, assigns, expect_value, keyword, nodes, numbers};
 use crate::diagnostic::Diagnostic;
-use crate::netlist::ast::{Control, Device, Expr, ExprKind, Name};
+use crate::netlist::ast::{Control, Device, Expr, ExprKind, Name, Signal};
 use crate::netlist::expr;
 use crate::netlist::lex::{
     Input, Parsed, between, expect_word, missing, refuse, separator, symbol, word,
@@ -21,12 +21,23 @@ pub(super) fn by_voltage<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
         (at, Some(control)) => (at, control),
         (at, None) => {
             let (at, pair) = nodes(at, 2, "controlling node")?;
+            let pair = pairs(pair);
+            if let (Some(points), [across]) = (keyword(separator(at), "table"), &pair[..]) {
+                // LTspice's: of the voltage between the controlling nodes.
+                let (rest, points) = table(symbol(points, '=').unwrap_or(points))?;
+                return finish(
+                    rest,
+                    own,
+                    voltage,
+                    Control::Table(voltage_of(across.clone()), points),
+                );
+            }
             match special(at, true)? {
                 // `LAPLACE=` stands behind the nodes.
                 (rest, Some(other @ Control::Other(_))) => (rest, other),
                 _ => {
                     let (at, gain) = expect_value(separator(at), "the gain")?;
-                    (at, Control::Nodes(pairs(pair), linear(gain)))
+                    (at, Control::Nodes(pair, linear(gain)))
                 }
             }
         }
@@ -117,20 +128,7 @@ fn special(i: Input<'_>, by_voltage: bool) -> Parsed<'_, Option<Control>> {
         }
         "table" => {
             let (rest, input) = expr::expr(symbol(rest, '=').unwrap_or(rest))?;
-            let start = symbol(rest, '=').unwrap_or(rest);
-            let (rest, list) = numbers(start, "a pair of numbers")?;
-            if list.len() < 2 || list.len() % 2 == 1 {
-                let message = format!(
-                    "a table needs pairs of numbers, this one has {}",
-                    list.len()
-                );
-                return Err(refuse(
-                    Diagnostic::error("bad-table", between(start, rest), message)
-                        .label("(x,y) (x,y) …"),
-                ));
-            }
-            let mut list = list.into_iter();
-            let points = std::iter::from_fn(|| Some((list.next()?, list.next()?))).collect();
+            let (rest, points) = table(symbol(rest, '=').unwrap_or(rest))?;
             Ok((rest, Some(Control::Table(input, points))))
         }
         "laplace" | "freq" | "chebyshev" | "opamp" | "transformer" | "delay" | "pwl" | "vcvs"
@@ -139,6 +137,31 @@ fn special(i: Input<'_>, by_voltage: bool) -> Parsed<'_, Option<Control>> {
             Ok((rest.take_from(length), Some(Control::Other(name))))
         }
         _ => Ok((i, None)),
+    }
+}
+
+/// The points of a table, `(x,y) (x,y) …` or `(x y, x y, …)`.
+fn table(start: Input<'_>) -> Parsed<'_, Vec<(Expr, Expr)>> {
+    let (rest, list) = numbers(start, "a pair of numbers")?;
+    if list.len() < 2 || list.len() % 2 == 1 {
+        let message = format!(
+            "a table needs pairs of numbers, this one has {}",
+            list.len()
+        );
+        let fault = Diagnostic::error("bad-table", between(start, rest), message);
+        return Err(refuse(fault.label("(x,y) (x,y) …")));
+    }
+    let mut list = list.into_iter();
+    let points = std::iter::from_fn(|| Some((list.next()?, list.next()?))).collect();
+    Ok((rest, points))
+}
+
+/// v(a,b).
+fn voltage_of((a, b): (Name, Name)) -> Expr {
+    let signal = Signal::Voltage(a, Some(b));
+    Expr {
+        span: signal.span(),
+        kind: ExprKind::Signal(signal),
     }
 }
 
