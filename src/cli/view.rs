@@ -140,8 +140,8 @@ fn chosen(args: &ViewArgs, streams: &Streams) -> Result<Plot, Failure> {
         Plot::Frequency(phasors) => phasors.frequency.is_empty(),
     };
     if is_empty {
-        let message = format!("{file}: has names of signals, and no rows");
-        return Err(Failure::told("waveforms", message));
+        let text = format!("{file}: has names of signals, and no rows");
+        streams.note("waveforms", text);
     }
     let unknown = |probe: &str, names: &[String]| {
         let own: Vec<String> = names.iter().map(|name| canonical_name(name)).collect();
