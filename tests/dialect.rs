@@ -476,6 +476,15 @@ fn resistances_follow_their_temperature() {
     for (card, more, expected) in [
         ("r1 a 0 1k tc=0.01", ".temp 127", 2e3),
         ("r1 a 0 1k tc1=1m tc2=1u", ".temp 127", 1.11e3),
+        ("r1 a 0 1k tc=0.01,0.001", ".temp 37", 1.2e3),
+        ("r1 a 0 1k tc = 0.01 , 0.001 temp=37", "", 1.2e3),
+        ("r1 a 0 1k tc1=0.01,tc2=0.001", ".temp 37", 1.2e3),
+        ("r1 a 0 1k tce=2", ".temp 77", 1e3 * 1.01_f64.powi(100)),
+        (
+            "r1 a 0 rm 1k",
+            ".model rm r(tc=0.01,0.001)\n.temp 37",
+            1.2e3,
+        ),
         ("r1 a 0 1k tc1=1m temp=77", "", 1.05e3),
         ("r1 a 0 1k tc1=1m dtemp=10", "", 1.01e3),
         ("r1 a 0 rm 1k", ".model rm r(tc1=0.01)\n.temp 37", 1.1e3),

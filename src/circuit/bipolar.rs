@@ -12,7 +12,7 @@ use super::builder::Builder;
 use super::elaborate::Diodes;
 use super::model::{Parameters, ZERO};
 use super::passive::Args;
-use super::scope::ScopeId;
+use super::scope::{NOMINAL, ScopeId};
 use super::{Affine, Element, ElementId, Kind, NodeId, Output, Quantity};
 use crate::algebra::Value;
 use crate::diagnostic::Diagnostic;
@@ -23,8 +23,6 @@ use crate::netlist::ast::{self, Assign, Expr, Name};
 const COUNTS: [&str; 12] = [
     "is", "bf", "br", "nf", "nr", "rb", "rc", "re", "eg", "xti", "xtb", "tnom",
 ];
-/// Temperature at which parameters were measured where TNOM does not say, °C.
-const NOMINAL: f64 = 27.0;
 /// The current at which an ideal junction has its drop, A.
 const RATED: f64 = 1e-3;
 

@@ -3,7 +3,8 @@
 use super::builder::{Builder, Pending};
 use super::form::Form;
 use super::names::{current, difference};
-use super::scope::ScopeId;
+use super::passive::Args;
+use super::scope::{NOMINAL, ScopeId};
 use super::{Affine, Coupling, Element, ElementId, Kind, Output};
 use crate::algebra::Value;
 use crate::diagnostic::Diagnostic;
@@ -28,9 +29,12 @@ impl<'n> Builder<'n, '_> {
             );
             return;
         }
+        let warm =
+            self.scopes.temperature.f64 != NOMINAL || Args(args).get(&["temp", "dtemp"]).is_some();
         for arg in args {
             match arg.name.text.as_str() {
-                "tc" | "tc1" | "tc2" | "temp" | "dtemp" | "noiseless" => {}
+                "noiseless" => {}
+                "tc" | "tc1" | "tc2" | "temp" | "dtemp" if !warm => {}
                 name => {
                     let message = format!("`{name}` of `{}` is not supported", card.name.text);
                     self.tell(

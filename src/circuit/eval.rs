@@ -42,6 +42,16 @@ impl<'n> Scopes<'n> {
         )
     }
 
+    /// `[1 2 3]`, `1,2,3` where a list is known, or one number.
+    pub(super) fn numbers(&mut self, expr: &'n Expr, scope: ScopeId) -> Option<Vec<f64>> {
+        let list = match &expr.kind {
+            ExprKind::Call(name, list) if name.text == "[]" => list.as_slice(),
+            _ => std::slice::from_ref(expr),
+        };
+        let numbers = list.iter().map(|expr| Some(self.finite(expr, scope)?.f64));
+        numbers.collect()
+    }
+
     /// The form an expression stands for; `None` after a reported fault.
     pub(super) fn form(
         &mut self,

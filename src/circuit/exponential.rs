@@ -3,13 +3,11 @@
 use super::builder::Builder;
 use super::model::Parameters;
 use super::passive::Args;
-use super::scope::ScopeId;
+use super::scope::{NOMINAL, ScopeId};
 use crate::diagnostic::Diagnostic;
 use crate::law::{Breakdown, Exponential, Law};
 use crate::netlist::ast::{self, Name};
 
-/// Temperature at which parameters were measured where TNOM does not say, °C.
-const NOMINAL: f64 = 27.0;
 /// Parameters of charge and of noise.
 const LEFT_OUT: [&str; 13] = [
     "cjo", "cj0", "cj", "tt", "vj", "pb", "m", "fc", "kf", "af", "nr", "cjsw", "cjp",

@@ -4,7 +4,7 @@ use super::builder::Builder;
 use super::model::Parameters;
 use super::scope::ScopeId;
 use crate::diagnostic::{Diagnostic, Span};
-use crate::netlist::ast::{self, Expr, ExprKind, Model, Name};
+use crate::netlist::ast::{self, Model, Name};
 
 /// Parameters of tables: their axes, and what they tell.
 const TABLES: [&str; 6] = ["vloss", "iloss", "tloss", "eon", "eoff", "err"];
@@ -132,7 +132,7 @@ impl<'n> Builder<'n, '_> {
                 self.unused(format!("{name} of {}", model.text), model);
                 return Some(None);
             }
-            let joules = self.numbers(value, scope)?;
+            let joules = self.scopes.numbers(value, scope)?;
             let [v, i, t] = [&volts, &amperes, &celsius].map(|axis| axis.len().max(1));
             if joules.len() != v * i * t || joules.iter().any(|e| *e < 0.0) {
                 let message = format!(
@@ -158,7 +158,7 @@ impl<'n> Builder<'n, '_> {
         );
         let recovery = table("err", diode.is_some());
         let resistances = match params.get("rthjc") {
-            Some(value) => self.numbers(value, scope),
+            Some(value) => self.scopes.numbers(value, scope),
             None => Some(Vec::new()),
         };
         let (Some(on), Some(off), Some(recovery), Some(resistances)) =
@@ -207,7 +207,7 @@ impl<'n> Builder<'n, '_> {
         let Some(value) = params.get(name) else {
             return Some(Vec::new());
         };
-        let axis = self.numbers(value, scope)?;
+        let axis = self.scopes.numbers(value, scope)?;
         let rises = axis.windows(2).all(|pair| pair[0] < pair[1]);
         let signed = name == "tloss" || axis.first().is_some_and(|first| *first >= 0.0);
         let proportional = name == "tloss" || axis != [0.0];
@@ -217,18 +217,6 @@ impl<'n> Builder<'n, '_> {
             return None;
         }
         Some(axis)
-    }
-
-    /// `[1 2 3]`, or one number.
-    fn numbers(&mut self, value: &'n Expr, scope: ScopeId) -> Option<Vec<f64>> {
-        let list = match &value.kind {
-            ExprKind::Call(name, list) if name.text == "[]" => list.as_slice(),
-            _ => std::slice::from_ref(value),
-        };
-        let numbers = list
-            .iter()
-            .map(|expr| Some(self.scopes.finite(expr, scope)?.f64));
-        numbers.collect()
     }
 }
 

@@ -1,18 +1,15 @@
 //! R, C and L with LTspice's parasitics, and the `name=value` arguments of all elements.
 
 use super::builder::Builder;
-use super::scope::ScopeId;
+use super::scope::{NOMINAL, ScopeId};
 use super::{Affine, Element, Kind, NodeId, Output};
 use crate::algebra::Value;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::netlist::ast::{self, Assign, Expr, ExprKind};
 use crate::netlist::suggest::is_unit;
 
-/// The temperature at which values are as written, °C.
-const NOMINAL: f64 = 27.0;
-
 /// Ratings, and the temperature of devices.
-const WITHOUT_EFFECT: [&str; 22] = [
+const WITHOUT_EFFECT: [&str; 21] = [
     "v",
     "irms",
     "vrms",
@@ -22,7 +19,6 @@ const WITHOUT_EFFECT: [&str; 22] = [
     "pn",
     "tol",
     "pwr",
-    "tce",
     "trise",
     "noisy",
     "noiseless",
@@ -38,7 +34,9 @@ const WITHOUT_EFFECT: [&str; 22] = [
 ];
 
 /// The temperature and the coefficients of R, C and L: SPICE's TC1 and TC2.
-const THERMAL: [&str; 5] = ["tc", "tc1", "tc2", "temp", "dtemp"];
+const THERMAL: [&str; 6] = ["tc", "tc1", "tc2", "tce", "temp", "dtemp"];
+/// The base of `tce`, in percent for each kelvin.
+const PERCENT: f64 = 1.01;
 
 /// Parts that LTspice adds to an element: in series and across.
 pub(super) const PARASITICS: [&str; 5] = ["rser", "lser", "rpar", "cpar", "rlshunt"];
@@ -311,20 +309,29 @@ impl<'n> Builder<'n, '_> {
             _ => None,
         });
         let model = models.next().map(|model| Args(&model.params));
+        let both = args.get(&["tc"]).or_else(|| model?.get(&["tc"]));
+        let both = both.map_or(Some(Vec::new()), |both| self.scopes.numbers(both, scope))?;
         let mut number = |own: &[&str], otherwise: f64| -> Option<f64> {
             let found = args.get(own).or_else(|| model?.get(own));
             let value = found.map(|expr| self.scopes.finite(expr, scope));
             value.map_or(Some(otherwise), |value| value.map(|v| v.f64))
         };
-        let (tc1, tc2) = (number(&["tc1", "tc"], 0.0)?, number(&["tc2"], 0.0)?);
-        if tc1 == 0.0 && tc2 == 0.0 {
+        let coefficient = |k: usize| both.get(k).copied().unwrap_or(0.0);
+        let tc1 = number(&["tc1"], coefficient(0))?;
+        let tc2 = number(&["tc2"], coefficient(1))?;
+        let tce = number(&["tce"], 0.0)?;
+        if tc1 == 0.0 && tc2 == 0.0 && tce == 0.0 {
             return Some(value);
         }
         let (own, nominal) = (number(&["temp"], f64::NAN)?, number(&["tnom"], NOMINAL)?);
         let warmer = number(&["dtemp"], 0.0)?;
         let ambient = self.scopes.temperature.f64 + warmer;
         let above = if own.is_nan() { ambient } else { own } - nominal;
-        let factor = 1.0 + above * (tc1 + above * tc2);
+        let factor = if tce == 0.0 {
+            1.0 + above * (tc1 + above * tc2)
+        } else {
+            PERCENT.powf(tce * above)
+        };
         Some(if factor == 1.0 {
             value
         } else {

@@ -14,6 +14,9 @@ use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Expr, Func, Model, Name, Subckt};
 use crate::netlist::suggest::nearest;
 
+/// The temperature of circuits without `.temp`, and that at which values and models hold where TNOM does not say, °C.
+pub(super) const NOMINAL: f64 = 27.0;
+
 /// Everything found so far, each finding once.
 #[derive(Debug, Default)]
 pub(super) struct Findings {
@@ -163,7 +166,7 @@ impl<'n> Scopes<'n> {
             tones: HashMap::new(),
             rails_read: BTreeSet::new(),
             tstop: 1.0,
-            temperature: Value::decimal(27.0, 27, 0),
+            temperature: Value::decimal(NOMINAL, 27, 0),
             draw: None,
             tolerances: Vec::new(),
             place: 0,

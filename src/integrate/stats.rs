@@ -7,7 +7,7 @@ use crate::integrate::orbit::Orbit;
 use crate::integrate::rows::RowKind;
 use crate::integrate::verify::Verified;
 use crate::settings::tolerances::jumps::{DESTROYED, NO_JUMP};
-use crate::settings::tolerances::stated::UNBALANCED;
+use crate::settings::tolerances::stated::{IMPRECISE, UNBALANCED};
 use crate::waveform::Waveforms;
 
 /// Counters of one run; deterministic except `cpu_seconds`.
@@ -289,6 +289,11 @@ pub struct StatedError {
 }
 
 impl StatedError {
+    /// Whether the worst value, if it is known, is good for more than its order of magnitude.
+    pub(crate) fn is_small(&self) -> bool {
+        self.max.is_none_or(|max| max <= IMPRECISE)
+    }
+
     /// That of two runs together: known where both are.
     #[must_use]
     pub fn worse(self, other: Self) -> Self {

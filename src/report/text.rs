@@ -203,8 +203,23 @@ fn stated_error(run: &Run) -> Option<String> {
 /// What a user must be told by default: that a current or charge was destroyed, that rows do not show what happens between them.
 #[must_use]
 pub fn warnings(run: &Run) -> Vec<Note> {
-    let warnings = destroyed(run).into_iter().chain(unbalanced(run));
-    warnings.chain(run.aliased.as_ref().map(aliasing)).collect()
+    let warnings = [
+        destroyed(run),
+        unbalanced(run),
+        imprecise(run),
+        run.aliased.as_ref().map(aliasing),
+    ];
+    warnings.into_iter().flatten().collect()
+}
+
+/// A stated error that is a good part of what is shown.
+fn imprecise(run: &Run) -> Option<Note> {
+    let error = run.error.max.filter(|_| !run.error.is_small())?;
+    let text = format!(
+        "the error of this run may be {} of the amplitudes: its values are not to be relied on",
+        si::plain(error, 2)
+    );
+    Some(Note::run("imprecise", text))
 }
 
 /// Energies beyond doubles: what grows so far is unstable, or wrong. Energies that do not add up: something is wrong, if only an energy.
@@ -339,7 +354,7 @@ pub(super) fn difference(s: &SignalError) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::integrate::event::conducts;
-    use crate::integrate::{Energy, Impulse, JumpReason, StateJumps, Stats};
+    use crate::integrate::{Energy, Impulse, JumpReason, StateJumps, StatedError, Stats};
 
     #[test]
     fn a_run_in_words() {
@@ -409,6 +424,22 @@ mod tests {
         note[island]: v(x) is relative to node a
         ");
         assert!(!summary(&run, Places::default(), false).contains("plan:"));
+    }
+
+    #[test]
+    fn a_large_stated_error_is_a_warning() {
+        let stating = |max| Run {
+            error: StatedError {
+                max,
+                ..StatedError::default()
+            },
+            ..Run::default()
+        };
+        for (max, warned) in [(None, false), (Some(0.05), false), (Some(0.4), true)] {
+            let warnings = warnings(&stating(max));
+            let found = warnings.iter().any(|note| note.code == "imprecise");
+            assert_eq!(found, warned, "{max:?}");
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 51] = [
+pub(super) const CODES: [Explanation; 52] = [
     Explanation::of(
         "at-rest",
         "The circuit does not switch periodically: the response is that about its operating point.",
@@ -67,6 +67,12 @@ pub(super) const CODES: [Explanation; 51] = [
         "Take the value out, or start from initial conditions alone with `uic` on `.tran`.",
     )
     .shown("a source decides\nv1 a 0 5\nr1 a b 1k\nc1 b 0 1u\n.ic v(a)=3\n.tran 10u 1m\n"),
+    Explanation::of(
+        "imprecise",
+        "The error that the run states for itself is a good part of the amplitudes.",
+        "Steps that are too long (`--step`, or a large `--tol`), or a transient that no step follows, such as a transistor that interrupts the current of an inductor.",
+        "A smaller `--step` or `--tol`, and `--verify`; where that changes nothing, a path for the current (a freewheeling diode, a capacitance).",
+    ),
     Explanation::of(
         "incomplete",
         "The files hold the rows until the run ended early.",

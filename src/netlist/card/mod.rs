@@ -13,7 +13,7 @@ use super::lex::{
 };
 use super::suggest::directive;
 use super::{expr, operand, value};
-use crate::diagnostic::Diagnostic;
+use crate::diagnostic::{Diagnostic, Span};
 
 /// What an element letter stands for, as `a resistor`.
 pub(crate) const fn describe(letter: char) -> &'static str {
@@ -147,7 +147,7 @@ pub(super) fn assignment_follows(i: Input<'_>) -> bool {
 /// `name=value`, or a flag alone.
 pub(super) fn assign(i: Input<'_>) -> Parsed<'_, Assign> {
     let (rest, name) = word(i)?;
-    let Some(mut rest) = symbol(rest, '=') else {
+    let Some(rest) = symbol(rest, '=') else {
         return Ok((rest, Assign { name, value: None }));
     };
     if let Some(open) = symbol(rest, '[') {
@@ -155,7 +155,7 @@ pub(super) fn assign(i: Input<'_>) -> Parsed<'_, Assign> {
         let value = Some(value);
         return Ok((rest, Assign { name, value }));
     }
-    let list = name.text.starts_with("tc");
+    let list = name.text == "tc";
     let (mut next, value) = if let ("tol", Some((next, value))) =
         (name.text.as_str(), percent(rest))
     {
@@ -175,17 +175,20 @@ pub(super) fn assign(i: Input<'_>) -> Parsed<'_, Assign> {
             e
         }
     })?;
+    let mut values = vec![value];
     while list && let Some(comma) = symbol(next, ',') {
-        rest = comma;
-        next = operand::item(rest)?.0;
+        let (after, value) = operand::item(comma)?;
+        values.push(value);
+        next = after;
     }
-    Ok((
-        next,
-        Assign {
-            name,
-            value: Some(value),
-        },
-    ))
+    let value = if values.len() == 1 {
+        values.pop()
+    } else {
+        let start = blank(rest);
+        let length = start.fragment().len() - next.fragment().len();
+        Some(bracketed(values, ahead(start, length)))
+    };
+    Ok((next, Assign { name, value }))
 }
 
 /// A number with a percent sign, as LTspice writes tolerances.
@@ -215,13 +218,14 @@ fn vector(open: Input<'_>) -> Parsed<'_, Expr> {
         list.push(value);
         at = separator(rest);
     }
-    let span = ahead(open, length);
-    let name = Name {
-        text: "[]".into(),
-        span,
-    };
-    let kind = ExprKind::Call(name, list);
-    Ok((open.take_from(length + 1), Expr { kind, span }))
+    let value = bracketed(list, ahead(open, length));
+    Ok((open.take_from(length + 1), value))
+}
+
+fn bracketed(list: Vec<Expr>, span: Span) -> Expr {
+    let text = "[]".into();
+    let kind = ExprKind::Call(Name { text, span }, list);
+    Expr { kind, span }
 }
 
 /// All that is left of a card as `name=value` and flags, blanks or commas between.

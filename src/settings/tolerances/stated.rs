@@ -4,6 +4,10 @@
 /// follow waves on lines. Larger: a wrong jump may pass; smaller: long steps beside lines would be called wrong.
 pub(crate) const UNBALANCED: f64 = 1e-3;
 
+/// The stated error, relative to the amplitudes, from which on a run warns of it: values that are off by more look wrong to the eye. Larger: what is
+/// of no use passes as a result; smaller: runs in few long steps, which are made to be looked at, are warned of.
+pub(crate) const IMPRECISE: f64 = 0.1;
+
 /// Prescribed steps of companions, over those of the run. Larger: the distance says less of the run's own error; smaller: dearer.
 pub(crate) const COARSER: [f64; 2] = [2.0, 4.0];
 
