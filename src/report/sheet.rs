@@ -1,6 +1,6 @@
 //! A sheet of SVG: lines, curves and text at coordinates in CSS pixels, x to the right and y down.
 
-use std::fmt::Write;
+use std::fmt::{self, Display, Formatter, Write};
 
 /// Parts of a pixel in which curves are written, as whole numbers under one scale: small files, and no visible steps.
 const FINE: f64 = 10.0;
@@ -19,10 +19,48 @@ const COLOURS: [&str; 8] = [
 /// Dashes, px: a round of colours each.
 const DASHES: [&[f64]; 4] = [&[], &[7.0, 3.0], &[2.0, 2.5], &[9.0, 3.0, 2.0, 3.0]];
 
+/// Stops of a scale for more runs in their order than there are colours, from Matplotlib's plasma (van der Walt and Smith 2015) as far as it is seen
+/// on white: red, green, blue.
+const SCALE: [[u8; 3]; 6] = [
+    [0x0d, 0x08, 0x87],
+    [0x54, 0x02, 0xa3],
+    [0x8b, 0x0a, 0xa5],
+    [0xb9, 0x32, 0x89],
+    [0xdb, 0x5c, 0x68],
+    [0xf4, 0x88, 0x49],
+];
+
+/// The colour of a line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Colour {
+    /// As SVG writes it.
+    Fixed(&'static str),
+    /// The k-th of several places along [`SCALE`], the last at its end.
+    Along(usize, usize),
+}
+
+impl Display for Colour {
+    fn fmt(&self, to: &mut Formatter<'_>) -> fmt::Result {
+        let (k, last) = match *self {
+            Self::Fixed(colour) => return to.write_str(colour),
+            Self::Along(k, count) => (k, count.saturating_sub(1).max(1)),
+        };
+        let stretches = SCALE.len() - 1;
+        let stop = (k * stretches / last).min(stretches - 1);
+        let part = (k * stretches) as f64 / last as f64 - stop as f64;
+        let ends = SCALE[stop].iter().zip(SCALE[stop + 1]);
+        let mix =
+            |(one, other): (&u8, u8)| f64::from(*one) + part * (f64::from(other) - f64::from(*one));
+        to.write_str("#")?;
+        ends.map(mix)
+            .try_for_each(|mixed| write!(to, "{:02x}", mixed.round() as u8))
+    }
+}
+
 /// How a line is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Stroke {
-    pub(super) colour: &'static str,
+    pub(super) colour: Colour,
     /// px.
     pub(super) width: f64,
     /// Lengths of strokes and gaps, px.
@@ -35,7 +73,7 @@ impl Stroke {
     /// An unbroken line.
     pub(super) const fn plain(colour: &'static str, width: f64) -> Self {
         Self {
-            colour,
+            colour: Colour::Fixed(colour),
             width,
             dash: &[],
             pale: false,
@@ -44,13 +82,18 @@ impl Stroke {
 
     /// The k-th of several curves: 32 are told apart by colour and dash.
     pub(super) const fn curve(k: usize) -> Self {
-        Self::of_run(k, k / COLOURS.len())
+        let colours = COLOURS.len();
+        Self::of_run((k % colours, colours), k / colours)
     }
 
-    /// The k-th curve of a run: runs are told apart by colour, their curves by dash.
-    pub(super) const fn of_run(run: usize, k: usize) -> Self {
+    /// The k-th curve of one of so many runs: runs are told apart by colour, more than there are colours along a scale; their curves by dash.
+    pub(super) const fn of_run((run, runs): (usize, usize), k: usize) -> Self {
         Self {
-            colour: COLOURS[run % COLOURS.len()],
+            colour: if runs > COLOURS.len() {
+                Colour::Along(run, runs)
+            } else {
+                Colour::Fixed(COLOURS[run])
+            },
             width: 1.5,
             dash: DASHES[k % DASHES.len()],
             pale: false,
@@ -154,7 +197,7 @@ impl Sheet {
     }
 
     /// A disc.
-    pub(super) fn dot(&mut self, at: (f64, f64), radius: f64, colour: &str) {
+    pub(super) fn dot(&mut self, at: (f64, f64), radius: f64, colour: impl Display) {
         self.raw(&format!(
             "<circle cx=\"{}\" cy=\"{}\" r=\"{}\" fill=\"{colour}\"/>",
             short(at.0),

@@ -117,7 +117,7 @@ fn strokes(panel: &Panel, runs: &[&str]) -> Vec<Stroke> {
         let Some(run) = runs.iter().position(|run| *run == series.run) else {
             return Stroke::curve(k);
         };
-        Stroke::of_run(run, places[k])
+        Stroke::of_run((run, runs.len()), places[k])
     });
     strokes.collect()
 }
@@ -352,11 +352,31 @@ mod tests {
         let figure = Figure::of_runs(&runs, figure::PANEL_COLUMNS);
         let runs = figure.runs();
         let of = |panel: usize| strokes(&figure.panels[panel], &runs);
-        assert_eq!(of(1), [Stroke::of_run(0, 0), Stroke::of_run(1, 0)]);
+        assert_eq!(
+            of(1),
+            [Stroke::of_run((0, 2), 0), Stroke::of_run((1, 2), 0)]
+        );
         let volts = of(0);
         assert_eq!(volts[0].colour, volts[1].colour);
         assert_ne!(volts[0].dash, volts[1].dash);
         assert_eq!(volts[2], of(1)[1]);
+    }
+
+    #[test]
+    fn many_runs_have_a_colour_each() {
+        let waves = waves(&[0.0, 1.0]);
+        let label = |k: usize| (format!("r={k}"), &waves);
+        let runs: Vec<_> = (0..20).map(label).collect();
+        let svg = draw(&Figure::of_runs(&runs, PANEL_WIDTH)).unwrap();
+        let of_curve = |curve: &str| curve.split("stroke=\"").nth(1).unwrap()[..7].to_owned();
+        let mut colours: Vec<String> = svg.split("stroke-linejoin").skip(1).map(of_curve).collect();
+        assert_eq!(
+            (colours.len(), &colours[0][..], &colours[19][..]),
+            (20, "#0d0887", "#f48849")
+        );
+        colours.sort();
+        colours.dedup();
+        assert_eq!(colours.len(), 20);
     }
 
     #[test]
