@@ -1,9 +1,12 @@
 //! Comma-separated values: `time,v(out),…` with 17 significant digits.
 
+mod head;
+
 use std::io::{BufRead, BufReader, Read, Write};
-use std::num::ParseFloatError;
 
 use nalgebra::Complex;
+
+use head::{above, delimiter, is_time, number, step, units};
 
 use super::plot::runs;
 use super::{Phasors, Plot, WaveformError, Waveforms, phasors};
@@ -170,12 +173,13 @@ pub fn read(from: impl Read) -> Result<Waveforms, WaveformError> {
 /// Reads the same, and files whose first column is frequency (Hz) before `re(…)` and `im(…)` of each signal.
 ///
 /// # Errors
-/// [`WaveformError::Malformed`] as in [`read`]; but a time that runs backwards begins another run, and a cell over time that is empty, NaN or
+/// [`WaveformError::Malformed`] as in [`read`]; but a time that runs backwards, or LTspice's line `Step Information: …`, begins another run, and a cell over time that is empty, NaN or
 /// infinite is a gap, NaN.
 pub(super) fn plot(from: impl Read) -> Result<Plot, WaveformError> {
     let table = Table::read(from)?;
     match &table.names[0] {
-        axis if is_time(axis) => Ok(Plot::Time(runs(&table.waveforms()))),
+        axis if is_time(axis) && table.steps.is_empty() => Ok(Plot::Time(runs(&table.waveforms()))),
+        axis if is_time(axis) => Ok(Plot::Time(table.stepped())),
         axis if axis.eq_ignore_ascii_case("frequency") => {
             table.whole()?.phasors().map(Plot::Frequency)
         }
@@ -185,60 +189,8 @@ pub(super) fn plot(from: impl Read) -> Result<Plot, WaveformError> {
     }
 }
 
-/// Whether a column is time in seconds, perhaps with its unit, as oscilloscopes write it.
-fn is_time(axis: &str) -> bool {
-    let lower = axis.to_ascii_lowercase();
-    let unit = |unit: &&str| lower.strip_suffix(*unit);
-    let name = ["(s)", "[s]"].iter().find_map(unit);
-    let name = name.unwrap_or(&lower).trim_end();
-    matches!(name, "time" | "t" | "second" | "seconds")
-}
-
 fn malformed(reason: impl Into<String>) -> WaveformError {
     WaveformError::malformed(FORMAT, reason)
-}
-
-/// What stands between cells: a tab where the line of names has one, as LTspice exports, else a semicolon or a comma; a comma of a name
-/// like `V(a,b)` is none.
-fn delimiter(start: &[u8]) -> u8 {
-    let mut lines = start.split(|&b| b == b'\n');
-    let header = lines
-        .find(|line| !line.starts_with(b"#"))
-        .unwrap_or_default();
-    let has = |b: &u8| header.contains(b);
-    [b'\t', b';', b','].into_iter().find(has).unwrap_or(b',')
-}
-
-/// Lines above the names, in which oscilloscopes tell of themselves: those before the last line that is no numbers, where numbers follow. None
-/// where the first line has a time or frequency for its first name, or no line of the beginning is of numbers.
-fn above(start: &[u8]) -> u64 {
-    let text = String::from_utf8_lossy(start);
-    let lines: Vec<&str> = text.lines().collect();
-    let cells = |line: &str| line.split(['\t', ';', ',']).count();
-    let is_numbers = |line: &str| {
-        let mut cells = line.split(['\t', ';', ',']).map(str::trim);
-        cells.all(|cell| cell.parse::<f64>().is_ok())
-    };
-    let first = lines.iter().position(|line| !line.starts_with('#'));
-    let is_named = first.is_some_and(|k| {
-        let name = lines[k].split(['\t', ';', ',']).next().unwrap_or_default();
-        is_time(name.trim()) || name.trim().eq_ignore_ascii_case("frequency")
-    });
-    let numbers = |pair: &[&str]| {
-        !is_numbers(pair[0])
-            && is_numbers(pair[1])
-            && cells(pair[1]) > 1
-            && cells(pair[0]) == cells(pair[1])
-    };
-    match lines.windows(2).position(numbers) {
-        Some(k) if !is_named && first.is_some_and(|first| first < k) => k as u64,
-        _ => 0,
-    }
-}
-
-/// A number, with a decimal comma too: where cells stand between commas none has one.
-fn number(cell: &str) -> Result<f64, ParseFloatError> {
-    cell.parse().or_else(|_| cell.replacen(',', ".", 1).parse())
 }
 
 /// What a cell holds: a number, or nothing that can be drawn, as other programs write it; `None` for anything else.
@@ -258,6 +210,8 @@ struct Table {
     lines: Vec<u64>,
     /// The first cell that is empty or not finite, with its line.
     gap: Option<(u64, String)>,
+    /// The rows at which runs of `.step` begin where lines say so, and what tells them apart.
+    steps: Vec<(usize, String)>,
 }
 
 impl Table {
@@ -280,10 +234,21 @@ impl Table {
             names.push(String::new());
         }
         let mut columns = vec![Vec::new(); names.len()];
-        let (mut lines, mut gap) = (Vec::new(), None);
+        let (mut lines, mut gap, mut steps) = (Vec::new(), None, Vec::new());
+        let mut scale: Option<Vec<f64>> = None;
         for record in reader.records() {
             let record = record.map_err(unreadable)?;
             let line = above + record.position().map_or(0, csv::Position::line);
+            if let Some(label) = record.get(0).and_then(step) {
+                steps.push((lines.len(), label.to_owned()));
+                continue;
+            }
+            if lines.is_empty() && scale.is_none() && record.len() == names.len() {
+                scale = units(record.iter());
+                if scale.is_some() {
+                    continue;
+                }
+            }
             if record.len() != names.len() {
                 return Err(malformed(format!(
                     "line {line}: {} cells where the header has {}",
@@ -297,7 +262,8 @@ impl Table {
                 if value.is_nan() && gap.is_none() {
                     gap = Some((line, cell.to_owned()));
                 }
-                column.push(value);
+                let factor = scale.as_ref().map_or(1.0, |scale| scale[j]);
+                column.push(factor * value);
             }
             lines.push(line);
         }
@@ -306,6 +272,7 @@ impl Table {
             columns,
             lines,
             gap,
+            steps,
         })
     }
 
@@ -324,6 +291,25 @@ impl Table {
         let time = self.columns.remove(0);
         self.names.remove(0);
         Waveforms::from_columns(String::new(), self.names, time, &self.columns)
+    }
+
+    /// The runs that lines of [`Self::steps`] begin.
+    fn stepped(self) -> Vec<(String, Waveforms)> {
+        let steps = self.steps.clone();
+        let all = self.waveforms();
+        let ends = steps.iter().skip(1).map(|(row, _)| *row);
+        let ends = ends.chain([all.len()]);
+        let run = |((first, label), end): (&(usize, String), usize)| {
+            let own = Waveforms {
+                title: all.title.clone(),
+                names: all.names.clone(),
+                units: all.units.clone(),
+                time: all.time[*first..end].to_vec(),
+                values: (*first..end).flat_map(|k| all.row(k).to_vec()).collect(),
+            };
+            (label.clone(), own)
+        };
+        steps.iter().zip(ends).map(run).collect()
     }
 
     fn phasors(mut self) -> Result<Phasors, WaveformError> {
@@ -484,6 +470,41 @@ mod tests {
                 "{header}"
             );
         }
+    }
+
+    #[test]
+    fn a_line_of_units_below_the_names_scales_the_columns() {
+        for text in [
+            "time,v(a),i(l1)\nms,mV,A\n0,1,2\n1,3,4\n",
+            "Time;v(a);i(l1)\n(ms);(mV);(A)\n\n0;1;2\n1,0;3;4\n",
+            "Model,5444B\nBits,12\nTime,v(a),i(l1)\n[ms],[mV],[A]\n0,1,2\n1,3,4\n",
+        ] {
+            let table = Table::read(text.as_bytes()).expect("a table");
+            assert_eq!(table.names[1..], ["v(a)", "i(l1)"]);
+            assert_eq!(
+                table.columns,
+                [[0.0, 1e-3], [1e-3, 3e-3], [2.0, 4.0]],
+                "{text}"
+            );
+        }
+        assert!(read(&b"time,v(a)\nminutes,V\n0,1\n"[..]).is_err());
+    }
+
+    #[test]
+    fn lines_of_ltspice_begin_the_runs_of_a_step() {
+        let text = "time\tV(out)\nStep Information: R=1K  (Run: 1/2)\n0\t1\n1e-3\t2\nStep Information: R=2K  (Run: 2/2)\n0\t3\n2e-3\t4\n";
+        let Ok(Plot::Time(runs)) = plot(text.as_bytes()) else {
+            panic!("a plot over time")
+        };
+        let of =
+            |(label, w): &(String, Waveforms)| (label.clone(), w.time.clone(), w.values.clone());
+        assert_eq!(
+            runs.iter().map(of).collect::<Vec<_>>(),
+            [
+                ("R=1K".to_owned(), vec![0.0, 1e-3], vec![1.0, 2.0]),
+                ("R=2K".to_owned(), vec![0.0, 2e-3], vec![3.0, 4.0]),
+            ]
+        );
     }
 
     #[test]
