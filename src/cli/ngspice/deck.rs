@@ -103,6 +103,7 @@ pub fn deck(circuit: &Circuit, options: &Options) -> Result<Deck, DeckError> {
         // A card that couples several windings is as many here.
         writer.line(format!("k{number}_{} {a} {b} {:e}", k.name, k.k.f64));
     }
+    writer.notes.extend(transistors(circuit));
     let probes: Vec<_> = circuit
         .probes()
         .iter()
@@ -114,6 +115,23 @@ pub fn deck(circuit: &Circuit, options: &Options) -> Result<Deck, DeckError> {
         text,
         probes,
         notes: notes.into_iter().collect(),
+    })
+}
+
+/// What is said of transistors: ngspice gets what they are here, and none of the rest of their models is compared.
+fn transistors(circuit: &Circuit) -> Option<String> {
+    /// More would not be read.
+    const MOST: usize = 6;
+    let transistors = circuit.pins.iter().filter(|pins| !pins.is_subcircuit);
+    let names: Vec<&str> = transistors.map(|pins| &pins.device[..]).collect();
+    let more = names.len().saturating_sub(MOST);
+    let listed = names[..names.len() - more].join(", ");
+    let listed = match more {
+        0 => listed,
+        _ => format!("{listed} and {more} more"),
+    };
+    (!names.is_empty()).then(|| {
+        format!("ngspice simulates the transistors ({listed}) as circ does, as switches, diodes and sources, not by their models")
     })
 }
 

@@ -114,3 +114,16 @@ fn three_windings_on_one_card_are_three_cards_with_names_of_their_own() {
     let names: BTreeSet<&str> = cards.iter().map(|card| card[0]).collect();
     assert_eq!(names.len(), 3, "{names:?}");
 }
+
+#[test]
+fn transistors_are_what_they_are_here_and_a_note_says_so() {
+    let circuit = circuit(
+        "t\nv1 a 0 1\nm1 a g 0 0 n w=1 l=1\nvg g 0 5\n.model n nmos(vto=1 kp=1)\n.tran 1u 1m\n.end\n",
+    );
+    let deck = deck(&circuit, &options(Realisation::N001)).unwrap();
+    let told = deck
+        .notes
+        .iter()
+        .filter(|note| note.contains("transistors (m1)"));
+    assert_eq!(told.count(), 1, "{:?}", deck.notes);
+}
