@@ -47,8 +47,12 @@ pub use small_signal::{
 pub use sweep::{
     Row, SweepOptions, Variant, drawn_names, each, measured_names, samples, steps, sweep, variants,
 };
+#[cfg(feature = "cli")]
+pub(crate) use table::table_names;
 pub use table::{
     DeviceLosses, ElementMeans, Mean, SignalMeans, Span, Switching, Table, TableOptions,
     Throughput, periodic_table, table,
 };
+#[cfg(feature = "cli")]
+pub(crate) use worst::toleranced;
 pub use worst::{Bound, Worst, WorstOptions, worst};

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use serde::Serialize;
 
 use super::measured::measured;
-use super::sensitivity::{SensitivityOptions, sensitivity};
+use super::sensitivity::{SensitivityOptions, sensitivity, values};
 use crate::integrate::{Error, Note, Reason, SimOptions};
 use crate::model::Model;
 use crate::settings::Settings;
@@ -51,6 +51,31 @@ pub struct Worst {
     pub notes: Vec<Note>,
 }
 
+/// The values with a tolerance, each of which can be varied, for a measurement that there is: all that [`worst`] can know before its runs.
+///
+/// # Errors
+/// No such measurement, no tolerances, a value that is not there or cannot be varied.
+pub(crate) fn toleranced(
+    model: &Model,
+    of: &str,
+    options: &WorstOptions<'_>,
+) -> Result<Vec<(String, f64)>, Error> {
+    if let Some(what) = model.circuit().no_measurement(of) {
+        return Err(Error::before(Reason::Unsupported(what)));
+    }
+    let mut tolerances = options.tolerances.clone();
+    let named = |name: &String| options.tolerances.iter().any(|(own, _)| own == name);
+    let cards = model.circuit().tolerances.iter();
+    tolerances.extend(cards.filter(|(name, _)| !named(name)).cloned());
+    if tolerances.is_empty() {
+        let what = "no value has a tolerance: `tol=5` on a card, or `--tol-of r1=5%`";
+        return Err(Error::before(Reason::Unsupported(what.into())));
+    }
+    let names: Vec<String> = tolerances.iter().map(|(name, _)| name.clone()).collect();
+    values(model, &names)?;
+    Ok(tolerances)
+}
+
 /// The range of what a `.meas` finds while values vary within their tolerances: each value goes to the end to which the derivative points, and a run
 /// with all of them there finds the value. Where the runs differ from the derivatives by more than a tenth of the range, another corner may be worse, and
 /// a note says so.
@@ -72,17 +97,7 @@ pub struct Worst {
 /// ```
 pub fn worst(model: &Model, of: &str, options: &WorstOptions<'_>) -> Result<Worst, Error> {
     let of = of.to_lowercase();
-    if let Some(what) = model.circuit().no_measurement(&of) {
-        return Err(Error::before(Reason::Unsupported(what)));
-    }
-    let mut tolerances = options.tolerances.clone();
-    let named = |name: &String| options.tolerances.iter().any(|(own, _)| own == name);
-    let cards = model.circuit().tolerances.iter();
-    tolerances.extend(cards.filter(|(name, _)| !named(name)).cloned());
-    if tolerances.is_empty() {
-        let what = "no value has a tolerance: `tol=5` on a card, or `--tol-of r1=5%`";
-        return Err(Error::before(Reason::Unsupported(what.into())));
-    }
+    let tolerances = toleranced(model, &of, options)?;
     let asked = SensitivityOptions {
         of: vec![of.clone()],
         to: tolerances.iter().map(|(name, _)| name.clone()).collect(),

@@ -13,9 +13,10 @@ use super::streams::Streams;
 use crate::analysis::{
     self, Measurements, Ratio, SmallSignalOptions, margins, ratios, small_signal_measured,
 };
+use crate::circuit::Measured;
 use crate::model::Model;
 use crate::report::html::Page;
-use crate::report::{bode, log, svg, terminal, text};
+use crate::report::{bode, log, steps, svg, terminal, text};
 use crate::waveform::Phasors;
 
 /// Finds the small-signal response and writes it.
@@ -55,12 +56,7 @@ pub(super) fn ac(args: &AcArgs, streams: &Streams) -> Result<Exit, Failure> {
         cancel: Some(watch.flag()),
         ..SmallSignalOptions::default()
     };
-    let (phasors, measured) = phasors(&args.input, model, &options, streams)?;
-    let phasors = if asked.is_empty() {
-        phasors
-    } else {
-        ratios(&phasors, &asked).unwrap_or(phasors)
-    };
+    let (phasors, measured) = phasors(&args.input, model, (&options, &asked), streams)?;
     write(
         (&phasors, &measured),
         model,
@@ -80,26 +76,55 @@ pub(super) fn sim(
     formats: &[Format],
     streams: &Streams,
 ) -> Result<Exit, Failure> {
-    let (phasors, measured) = phasors(&args.input, model, &SmallSignalOptions::default(), streams)?;
+    let options = SmallSignalOptions::default();
+    let (phasors, measured) = phasors(&args.input, model, (&options, &[]), streams)?;
     let outputs = (&args.results.outputs[..], formats);
     write((&phasors, &measured), model, outputs, streams)?;
     Ok(Exit::Done)
 }
 
-/// The response of all signals, and what `.meas ac` finds on it; notes are told.
+/// The response of all signals or of the ratios asked for, with `.step` that of every combination of its values beside each other, and what `.meas ac`
+/// finds on it; notes are told.
 fn phasors(
     input: &Input,
     model: &Model,
-    options: &SmallSignalOptions<'_>,
+    asked: (&SmallSignalOptions<'_>, &[Ratio]),
     streams: &Streams,
 ) -> Result<(Phasors, Measurements), Failure> {
-    if !model.circuit().steps.is_empty() {
-        streams.note(
-            "left-out",
-            "`.step` is left out: this is the response of the values as they stand",
-        );
-    }
     input::tell_expressions(model, streams);
+    if model.circuit().steps.is_empty() {
+        return one(input, model, asked, streams);
+    }
+    let (mut runs, mut all) = (Vec::new(), Measurements::default());
+    for variant in analysis::steps(model) {
+        let label = steps::label(&variant.named());
+        let own = input::variant(input, &variant, streams)?;
+        let (phasors, found) = one(input, &own, asked, streams)
+            .map_err(|failure| Failure::Faults(format!("{failure} at {label}")))?;
+        all.measured
+            .extend(found.measured.into_iter().map(|one| Measured {
+                name: format!("{} {label}", one.name),
+                ..one
+            }));
+        runs.push((label, phasors));
+    }
+    let beside = Phasors::beside(&runs).ok_or_else(|| {
+        let file = input.file.display();
+        let message = format!(
+            "{file}: the frequencies of `.ac` change with `.step`; take the parameter out of `.ac`"
+        );
+        Failure::told("option-conflict", message)
+    })?;
+    Ok((beside, all))
+}
+
+/// The same of one model.
+fn one(
+    input: &Input,
+    model: &Model,
+    (options, asked): (&SmallSignalOptions<'_>, &[Ratio]),
+    streams: &Streams,
+) -> Result<(Phasors, Measurements), Failure> {
     let busy = streams.busy("finding the response");
     let found = small_signal_measured(model, options);
     drop(busy);
@@ -116,7 +141,11 @@ fn phasors(
         measured,
         ..Measurements::default()
     };
-    Ok((response.phasors, found))
+    let phasors = match asked {
+        [] => response.phasors,
+        _ => ratios(&response.phasors, asked).unwrap_or(response.phasors),
+    };
+    Ok((phasors, found))
 }
 
 /// The margins of ratios without a unit, in words.

@@ -140,6 +140,10 @@ impl To {
         if path == Path::new(STDOUT) {
             return Ok((path.to_owned(), Self::Out(io::stdout())));
         }
+        // `out/` is a folder, whether it is there or not.
+        if path.as_os_str().as_encoded_bytes().ends_with(b"/") {
+            return Err(io::ErrorKind::IsADirectory.into());
+        }
         let target = target(path)?;
         let to = Self::at(&target)?;
         Ok((target, to))

@@ -1,16 +1,21 @@
 //! `circ op`.
 
+use std::path::PathBuf;
+
 use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::args::{Input, OpArgs};
 use super::exit::{Exit, Failure};
+use super::files;
 use super::input;
+use super::output::Format;
 use super::streams::Streams;
 use crate::analysis::steps as runs;
 use crate::integrate::OperatingPoint;
 use crate::model::Model;
 use crate::report::{json, si, steps, table};
+use crate::waveform::csv;
 
 /// Prints the operating point with the sources' DC values, with `.step` that of every combination of its values.
 ///
@@ -32,29 +37,14 @@ pub(super) fn of_model(
     in_json: bool,
     streams: &Streams,
 ) -> Result<Exit, Failure> {
-    let solved = |model: &Model| {
-        let places = model.places();
-        let point = model
-            .operating_point()
-            .map_err(|error| input::broke_off(input, &error, places, streams))?;
-        let notes = places.all(&point.notes);
-        Ok::<_, Failure>((point, notes))
-    };
     let sweeps = &model.circuit().steps;
     if sweeps.is_empty() {
-        return one(in_json, &solved(model)?, streams);
+        return one(in_json, &solved(input, model, streams)?, streams);
     }
-    let (mut points, mut failures) = (Vec::new(), Vec::new());
-    for variant in runs(model) {
-        let values = variant.named();
-        match solved(&input::variant(input, &variant, streams)?) {
-            Ok((point, notes)) => points.push((values, point, notes)),
-            Err(failure) => failures.push(format!("{failure} at {}", steps::label(&values))),
-        }
-    }
+    let (points, failures) = stepped(input, model, streams)?;
     if in_json {
         // The point with the values as they stand, as of a netlist without `.step`.
-        let (own, notes) = solved(model)?;
+        let (own, notes) = solved(input, model, streams)?;
         let steps = points.iter().map(|(values, point, notes)| StepDocument {
             values: values
                 .iter()
@@ -70,12 +60,111 @@ pub(super) fn of_model(
     } else {
         for (values, point, notes) in &points {
             let label = steps::label(values);
-            for (note, text) in point.notes.iter().zip(notes) {
-                streams.note(note.code, format!("{label}: {text}"));
-            }
+            tell(&label, point, notes, streams);
             streams.data(format!("{label}\n{}\n", words(point)))?;
         }
     }
+    ended(&failures)
+}
+
+/// Writes the points of `.step` as rows of CSV: what is stepped, the innermost first, then voltages, currents and switches (1 on, 0 off).
+///
+/// # Errors
+/// See [`Failure`]; a netlist without `.step` has one point, which is printed.
+pub(super) fn to_files(
+    input: &Input,
+    model: &Model,
+    (outputs, formats): (&[PathBuf], &[Format]),
+    streams: &Streams,
+) -> Result<Exit, Failure> {
+    let other = |(_, format): &(&PathBuf, &Format)| **format != Format::Csv;
+    let file = input.file.display();
+    let refused = match model.circuit().steps.is_empty() {
+        true => outputs
+            .first()
+            .map(|path| (path, "an operating point is printed")),
+        false => outputs
+            .iter()
+            .zip(formats)
+            .find(other)
+            .map(|(path, _)| (path, "the operating points of `.step` are written as csv")),
+    };
+    if let Some((path, what)) = refused {
+        let message = format!(
+            "{}: {what}, `circ op {file} --json` for other programs",
+            path.display()
+        );
+        return Err(Failure::told("output-format", message));
+    }
+    let (points, failures) = stepped(input, model, streams)?;
+    let mut text = Vec::new();
+    for (k, (values, point, notes)) in points.iter().enumerate() {
+        let on = |on: bool| f64::from(u8::from(on));
+        let nodes = point.nodes.iter().map(|(n, v)| (format!("v({n})"), *v));
+        let currents = point.currents.iter().map(|(n, i)| (format!("i({n})"), *i));
+        let switches = point.switches.iter().map(|(n, s)| (n.clone(), on(*s)));
+        let all = values
+            .iter()
+            .cloned()
+            .chain(nodes)
+            .chain(currents)
+            .chain(switches);
+        let (names, row): (Vec<String>, Vec<f64>) = all.unzip();
+        let ([axis, names @ ..], [first, row @ ..]) = (&names[..], &row[..]) else {
+            continue;
+        };
+        tell(&steps::label(values), point, notes, streams);
+        if k == 0 {
+            csv::header(&mut text, axis, names)?;
+        }
+        csv::row(&mut text, *first, row)?;
+    }
+    for path in outputs {
+        files::write(path, &text)?;
+    }
+    ended(&failures)
+}
+
+/// A point and its notes in words.
+type Solved = (OperatingPoint, Vec<String>);
+
+fn solved(input: &Input, model: &Model, streams: &Streams) -> Result<Solved, Failure> {
+    let places = model.places();
+    let point = model
+        .operating_point()
+        .map_err(|error| input::broke_off(input, &error, places, streams))?;
+    let notes = places.all(&point.notes);
+    Ok((point, notes))
+}
+
+/// A point under its values, with its notes in words.
+type Stepped = (Vec<(String, f64)>, OperatingPoint, Vec<String>);
+
+/// The points of `.step`, and why there are not more.
+fn stepped(
+    input: &Input,
+    model: &Model,
+    streams: &Streams,
+) -> Result<(Vec<Stepped>, Vec<String>), Failure> {
+    let (mut points, mut failures) = (Vec::new(), Vec::new());
+    for variant in runs(model) {
+        let values = variant.named();
+        match solved(input, &input::variant(input, &variant, streams)?, streams) {
+            Ok((point, notes)) => points.push((values, point, notes)),
+            Err(failure) => failures.push(format!("{failure} at {}", steps::label(&values))),
+        }
+    }
+    Ok((points, failures))
+}
+
+/// Tells the notes of a run.
+fn tell(label: &str, point: &OperatingPoint, notes: &[String], streams: &Streams) {
+    for (note, text) in point.notes.iter().zip(notes) {
+        streams.note(note.code, format!("{label}: {text}"));
+    }
+}
+
+fn ended(failures: &[String]) -> Result<Exit, Failure> {
     if failures.is_empty() {
         Ok(Exit::Done)
     } else {
@@ -83,11 +172,7 @@ pub(super) fn of_model(
     }
 }
 
-fn one(
-    in_json: bool,
-    (point, notes): &(OperatingPoint, Vec<String>),
-    streams: &Streams,
-) -> Result<Exit, Failure> {
+fn one(in_json: bool, (point, notes): &Solved, streams: &Streams) -> Result<Exit, Failure> {
     if in_json {
         streams.data(json::line(&Document::of(point, notes)) + "\n")?;
         return Ok(Exit::Done);

@@ -10,6 +10,7 @@ use super::output::Format;
 use super::rows::Columns;
 use super::signals::Signals;
 use super::streams::Streams;
+use super::tabulate;
 use crate::analysis::{Finished, PeriodicOptions, periodic_measured, periodic_table, shown};
 use crate::integrate::Run;
 
@@ -37,6 +38,7 @@ pub(super) fn orbit(
     streams: &Streams,
 ) -> Result<Exit, Failure> {
     let model = input::model_of(&args.input, subject)?;
+    tabulate::known(&args.table, &args.input, model)?;
     if !model.circuit().steps.is_empty() {
         streams.note(
             "left-out",

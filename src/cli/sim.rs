@@ -99,12 +99,9 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         let file = args.input.file.display();
         if circuit.tran.is_none() && circuit.op {
             only_one_way(args)?;
-            if let Some(path) = args.results.outputs.first() {
-                let message = format!(
-                    "{}: an operating point is printed, `circ op {file} --json` for other programs",
-                    path.display()
-                );
-                return Err(Failure::told("output-format", message));
+            let outputs = &args.results.outputs[..];
+            if !outputs.is_empty() {
+                return op::to_files(&args.input, model, (outputs, &formats), streams);
             }
             return op::of_model(&args.input, model, false, streams);
         }
@@ -139,6 +136,7 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
                 format!("--worst: {what}"),
             ));
         }
+        tabulate::known(&args.table, &args.input, model)?;
         if circuit.steady == Some(SteadyState::Start) && args.verify {
             let file = args.input.file.display();
             let message = "`--verify` takes a run from its usual start, without `steady`";
@@ -156,6 +154,11 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
                 signals: &signals,
             };
             return stepping.sim(&formats, streams);
+        }
+        for of in &args.worst {
+            let options = worst_options(args, &request, signals.flag());
+            analysis::toleranced(model, &of.to_lowercase(), &options)
+                .map_err(|error| Failure::of_run("--worst: ", &error))?;
         }
     }
     if let (true, Subject::System(_)) = (args.from_pss, &subject) {
@@ -265,6 +268,18 @@ impl SimArgs {
     }
 }
 
+fn worst_options<'a>(
+    args: &SimArgs,
+    request: &Request,
+    cancel: &'a AtomicBool,
+) -> WorstOptions<'a> {
+    WorstOptions {
+        tolerances: args.input.random.tolerances.clone(),
+        cancel: Some(cancel),
+        settings: request.settings(),
+    }
+}
+
 /// Adds the ranges of measurements.
 fn bounds(
     args: &SimArgs,
@@ -276,11 +291,7 @@ fn bounds(
     let (Subject::Circuit(model), Some((_, found))) = (subject, &mut finished.run) else {
         return;
     };
-    let options = WorstOptions {
-        tolerances: args.input.random.tolerances.clone(),
-        cancel: Some(cancel),
-        settings: request.settings(),
-    };
+    let options = worst_options(args, request, cancel);
     for of in &args.worst {
         match analysis::worst(model, of, &options) {
             Ok(worst) => found.worst.push(worst),

@@ -2,11 +2,24 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::args::SimArgs;
+use super::args::{Input, SimArgs, TableArgs};
+use super::exit::Failure;
 use super::sim::Request;
 use crate::analysis::{self, PeriodicOptions, Table, TableOptions};
 use crate::integrate::Error;
 use crate::model::Model;
+
+/// That the model has the inputs and outputs of a table that is asked for, before anything runs.
+///
+/// # Errors
+/// The first one that is not there.
+pub(super) fn known(args: &TableArgs, input: &Input, model: &Model) -> Result<(), Failure> {
+    let found = match args.table {
+        true => analysis::table_names(model.circuit(), &args.inputs, &args.outputs),
+        false => Ok(()),
+    };
+    found.map_err(|error| Failure::of_run(&format!("{}: ", input.file.display()), &error))
+}
 
 /// The table of a model's transient, which begins where its rows do.
 ///

@@ -30,7 +30,11 @@ pub fn figure(of: &Phasors) -> Figure {
             } else {
                 format!("{name} = 0")
             },
-            run: String::new(),
+            // Of `.step`, as `v(out)[r=1000]`.
+            run: name
+                .strip_suffix(']')
+                .and_then(|name| name.split_once('['))
+                .map_or_else(String::new, |(_, run)| run.to_owned()),
             points: rows
                 .iter()
                 .filter(|&&k| seen[k])

@@ -55,6 +55,37 @@ impl Phasors {
         self.names.iter().position(|own| own == name)
     }
 
+    /// The responses of several runs over the same frequencies beside each other, `v(out)[r=1000]` of the one whose label is `r=1000`; `None` where the
+    /// frequencies differ.
+    #[cfg(feature = "cli")]
+    #[must_use]
+    pub(crate) fn beside(runs: &[(String, Self)]) -> Option<Self> {
+        let (_, first) = runs.first()?;
+        if runs.iter().any(|(_, run)| run.frequency != first.frequency) {
+            return None;
+        }
+        let of = |run: &(String, Self)| {
+            let label = run.0.replace(' ', ",");
+            let names = run.1.names.iter();
+            names
+                .map(|name| format!("{name}[{label}]"))
+                .collect::<Vec<_>>()
+        };
+        let row = |k: usize| {
+            runs.iter().flat_map(move |(_, run)| {
+                let width = run.names.len();
+                run.values[k * width..(k + 1) * width].iter().copied()
+            })
+        };
+        Some(Self {
+            title: first.title.clone(),
+            names: runs.iter().flat_map(of).collect(),
+            units: runs.iter().flat_map(|(_, run)| run.units.clone()).collect(),
+            frequency: first.frequency.clone(),
+            values: (0..first.frequency.len()).flat_map(row).collect(),
+        })
+    }
+
     /// Writes `frequency,re(v(out)),im(v(out)),…` with 17 significant digits.
     ///
     /// # Errors

@@ -194,7 +194,7 @@ fn unsupported(what: String) -> Error {
 }
 
 /// What is asked for, with its value.
-fn values(model: &Model, asked: &[String]) -> Result<Vec<(String, f64)>, Error> {
+pub(super) fn values(model: &Model, asked: &[String]) -> Result<Vec<(String, f64)>, Error> {
     let circuit = model.circuit();
     let elements = circuit.elements.iter().filter(|e| !e.name.contains('.'));
     let elements = elements.filter_map(|e| Some((e.name.clone(), value_of(&e.kind)?)));

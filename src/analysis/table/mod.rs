@@ -272,6 +272,19 @@ pub fn table(model: &Model, options: &TableOptions<'_>) -> Result<Table, Error> 
     Ok(columns.of_rows(&run, span, (period, false)))
 }
 
+/// That a circuit has these inputs and outputs of a table.
+///
+/// # Errors
+/// The first one that is not there.
+#[cfg(feature = "cli")]
+pub(crate) fn table_names(
+    circuit: &Circuit,
+    inputs: &[String],
+    outputs: &[String],
+) -> Result<(), Error> {
+    Columns::of(circuit, inputs, outputs).map(drop)
+}
+
 /// The means of all elements over a period of the steady state of [`periodic`](super::periodic()).
 ///
 /// # Errors
@@ -383,7 +396,7 @@ impl<'a> Columns<'a> {
                 .map(|id| id.index())
                 .ok_or_else(|| {
                     let what = format!("no element `{name}`, which is to be an input or output");
-                    Error::before(Reason::Unsupported(what))
+                    Error::before(Reason::Unknown(what))
                 })
         };
         let is_source =

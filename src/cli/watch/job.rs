@@ -13,7 +13,7 @@ use tempfile::TempDir;
 
 use super::super::args::{Cli, Command, Input, STDIN};
 use super::super::exit::Failure;
-use super::super::{input, with_command};
+use super::super::{code, input, no_such_input, with_command};
 use super::LOOK;
 
 /// What each file was when it was looked at; `None` where there is none.
@@ -52,12 +52,15 @@ impl Job {
     /// [`Failure::Told`] for a command that cannot be carried out or has no page.
     pub(super) fn of(typed: &[OsString]) -> Result<Self, Failure> {
         let typed = [OsString::from("circ")].into_iter().chain(typed.to_vec());
-        let arguments = with_command(typed.collect(), &Cli::command());
+        let mut command = Cli::command();
+        let arguments = with_command(typed.collect(), &command);
         let cli = Cli::try_parse_from(&arguments);
         let cli = cli.map_err(|error| {
+            let error = no_such_input(error, &mut command);
             let text = error.to_string();
             let text = text.strip_prefix("error: ").unwrap_or(&text);
-            Failure::told("bad-option", text.to_owned())
+            let said = text.split("\n\nUsage:").next().unwrap_or(text);
+            Failure::told(code(error.kind()), said.to_owned())
         })?;
         let input = match cli.command {
             Command::Sim(args) => args.input,
