@@ -309,6 +309,15 @@ fn outputs_that_cannot_be_are_refused_before_the_run() {
     for (arguments, words) in [
         ("sim long.cir -o none/a.csv", "none/a.csv: No such file"),
         ("sim long.cir -o a.xls", "the ending chooses the format"),
+        ("sim long.cir -o a.csv/", "a.csv/: is a directory"),
+        (
+            "sim long.cir --table --in r3",
+            "no element `r3`, which is to be an input or output",
+        ),
+        (
+            "pss long.cir --table --out r3",
+            "no element `r3`, which is to be an input or output",
+        ),
         ("sim long.cir -o - -o -", "given twice"),
         (
             "sim long.cir -o a.csv --format raw",
@@ -390,6 +399,10 @@ fn values_that_cannot_be_are_named() {
             "--at 1e0: the run of .tran ends at",
         ),
         (
+            "watch nope.cir --no-open",
+            "`nope.cir` is neither a file nor a command",
+        ),
+        (
             "watch divider.cir --no-open --port many",
             "`--port many`: expected a number from 0 to 65535",
         ),
@@ -416,9 +429,14 @@ fn values_that_cannot_be_are_named() {
             "no measurement `nope`: there are top",
         ),
         ("measured.cir --worst top", "no value has a tolerance"),
+        (
+            "measured.cir --worst top --tol-of r3=5%",
+            "`r3` is no resistance",
+        ),
     ] {
         let ran = run_in(directory.path(), arguments);
         assert!(ran.status == 2 && ran.err.contains(words), "{ran}");
+        assert_eq!(ran.out, "", "before the run: {ran}");
     }
 }
 
@@ -737,7 +755,9 @@ fn an_unknown_probe_says_what_was_probably_meant() {
     for (probe, words) in [
         ("v(ot)", "did you mean `v(out)`?"),
         ("ot", "did you mean `v(out)`?"),
-        ("i(r3)", "did you mean `i(r1)`?"),
+        ("i(r3)", "there are i(v1), i(r1), i(r2)"),
+        ("i(r11)", "did you mean `i(r1)`?"),
+        ("v(r1)", "the voltage across it is `v(in,out)`"),
         ("2*v(ot)", "did you mean `v(out)`?"),
         ("v(z*)", "there are v(in), v(out)"),
         ("sqr(v(in))", "help: did you mean `sqrt`?"),

@@ -511,3 +511,71 @@ fn what_two_cards_step_is_a_fault() {
     );
     assert_eq!(stepped(".step param r list 1 2\n.step v1 1 2 1"), []);
 }
+
+/// The card of a flip-flop or gate stands for its parts.
+#[test]
+fn findings_about_a_gate_name_its_card() {
+    let text = "title\nv1 in 0 1\na1 in 0 0 0 0 0 q 0 buf rout=0\nv2 q 0 0.3\n.tran 1u 1m\n.end\n";
+    let model = Model::parse(text, "a.cir").expect("a circuit");
+    let error = model.transient(SimOptions::default()).expect_err("a loop");
+    let finding = error.diagnostic(model.circuit());
+    assert_eq!(finding.message, "v2 is shorted by a1");
+    let line = finding.span.map(|span| model.sources().line_column(span).0);
+    assert_eq!(line, Some(3));
+}
+
+/// What can be written where a value is to follow a voltage, and a model of another program, which cannot be read.
+#[test]
+fn what_is_not_read_has_a_remedy() {
+    let error = model("v1 a 0 1\nr1 a 0 R=1k*(1+V(a)/10)\n.tran 1u 1m").expect_err("no number");
+    let help = error.findings()[0].help.clone().unwrap_or_default();
+    assert!(help.contains("TABLE {V(a,b)}"), "{help}");
+    // As the help has it: 4 mA at 2 V.
+    let cards =
+        "v1 a 0 2\ng1 a 0 TABLE {V(a)} = (0,0) (1,1m) (2,4m)\n.tran 1u 1m\n.meas tran i avg i(v1)";
+    assert_eq!(measured(cards), [("i".to_owned(), -4e-3)]);
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("buck.plecs");
+    std::fs::write(&path, "Plecs {\n}\n").expect("a file");
+    let loaded = circ::netlist::load(&path, &ElaborateOptions::default());
+    let help = loaded.diagnostics[0].help.clone().unwrap_or_default();
+    assert!(help.contains("docs/from-plecs.md"), "{help}");
+}
+
+#[test]
+fn an_initial_condition_without_uic_is_told_once() {
+    let text = "title\nv1 a 0 1\nr1 a b 1k\nc1 b 0 1u ic=5\nr2 b c 1k\nc2 c 0 1u ic=4\n.tran 1u 1m\n.end\n";
+    let model = Model::parse(text, "a.cir").expect("a circuit");
+    let findings = model
+        .findings()
+        .iter()
+        .filter(|d| d.code == "ic-without-uic");
+    let told: Vec<&str> = findings.map(|d| &d.message[..]).collect();
+    assert_eq!(
+        told,
+        ["`IC=` of `c1` and `c2` has no effect: the run starts from the operating point"]
+    );
+    let run = model.transient(SimOptions::default()).expect("a run");
+    assert_eq!(run.notes, []);
+}
+
+/// Probes as LTspice and PSpice write them, by pins and with colons.
+#[test]
+fn signals_inside_and_at_pins_of_subcircuits() {
+    let cards = "v1 a 0 4\nx1 a b half\nr2 b 0 1\n.subckt half p out\nr1 p out 1\n.ends\n.tran 1u 1m\n\
+        .meas tran x avg V(X1:out)\n.meas tran y avg I(X1:R1)";
+    assert_eq!(
+        measured(cards),
+        [("x".to_owned(), 2.0), ("y".to_owned(), 2.0)]
+    );
+    let model = model(cards).expect("a circuit");
+    let named = |text: &str| model.circuit().probe(text).map(|probe| probe.name);
+    for (text, name) in [
+        ("V(X1:out)", "v(b)"),
+        ("V(R2:1)", "v(b)"),
+        ("I(X1:R1)", "i(x1.r1)"),
+    ] {
+        assert_eq!(named(text).as_deref(), Some(name), "{text}");
+    }
+    assert_eq!(named("V(X1:in)"), None);
+}

@@ -175,7 +175,7 @@ r1 out 0 1k
 ");
     for (name, reason) in [
         ("never", "the value 6 is not crossed"),
-        ("late", "no part of the run lies between 0.03 s and 0.02 s"),
+        ("late", "the run ends at 0.02 s, before 0.03 s"),
         ("typo", "it refers to what the circuit does not have"),
         ("from_none", "`never` has no value"),
         ("round", "its own result is needed first"),

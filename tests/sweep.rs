@@ -300,6 +300,18 @@ fn nothing_to_sweep_is_one_combination() {
     assert_eq!(combinations(&[]), [Vec::<f64>::new()]);
 }
 
+#[test]
+fn a_slip_in_the_spacing_of_values_is_named() {
+    for card in ["r lst 1", "r lst 1 2", "r lst 1 2 3"] {
+        let folder = place(&DIVIDERS.replace("r list 1k 3k", card));
+        let (status, _, err) = circ(folder.path(), "a.cir");
+        assert!(
+            status == 2 && err.contains("did you mean `list`?"),
+            "{card}: {err}"
+        );
+    }
+}
+
 /// The temperature is the name `temp` of expressions; a resistance and a source are set by their names.
 #[test]
 fn what_is_swept_is_set() {
@@ -366,6 +378,47 @@ fn the_operating_point_of_every_step() {
         found["nodes"]["out"] == 8.0 && found.get("steps").is_none(),
         "{out}"
     );
+}
+
+/// A row for each value; of one point, which is printed, there is no file.
+#[test]
+fn the_operating_points_of_all_steps_are_rows_of_a_file() {
+    let netlist = DIVIDERS.replace(".tran 1m 3m\n", ".op\n");
+    let folder = place(&netlist);
+    let (status, out, err) = circ(folder.path(), "a.cir -o a.csv");
+    assert_eq!((status, out.as_str(), err.as_str()), (0, "", ""));
+    let csv = fs::read_to_string(folder.path().join("a.csv")).unwrap();
+    let (names, rows) = table(&csv);
+    assert_eq!(names[..3], ["r", "v(in)", "v(out)"]);
+    let points: Vec<_> = rows.iter().map(|row| (row[0], row[2])).collect();
+    assert_eq!(points, [(1e3, 5.0), (3e3, 7.5)]);
+    let (status, _, err) = circ(folder.path(), "a.cir -o a.npz");
+    assert!(status == 2 && err.contains("are written as csv"), "{err}");
+}
+
+/// 1/|1 + jωRC| at every value, R of a low-pass and its `.meas ac`.
+#[test]
+fn every_step_has_its_response() {
+    let folder = place(
+        "low-pass\n.param r=1k\nv1 a 0 ac 1\nr1 a b {r}\nc1 b 0 1u\n.step param r list 1k 3k\n.ac list 100\n.meas ac top max mag(v(b))\n.end\n",
+    );
+    let (status, out, err) = circ(folder.path(), "ac a.cir --probe v(b)/v(a)");
+    assert_eq!(status, 0, "{err}");
+    let (names, rows) = table(&out);
+    assert_eq!(names[1], "re(v(b)/v(a)[r=1000])");
+    assert_eq!(names[3], "re(v(b)/v(a)[r=3000])");
+    for (k, r) in [(1, 1e3), (3, 3e3)] {
+        let gain = (1.0 + (200.0 * std::f64::consts::PI * r * 1e-6).powi(2))
+            .sqrt()
+            .recip();
+        assert!((rows[0][k].hypot(rows[0][k + 1]) - gain).abs() < 1e-12);
+    }
+    assert!(
+        err.contains("top r=1000") && err.contains("top r=3000"),
+        "{err}"
+    );
+    let (status, plain, err) = circ(folder.path(), "sim a.cir");
+    assert!(status == 0 && plain.contains("re(v(b)[r=3000])"), "{err}");
 }
 
 /// A diode carries 1 A one way and no current the other.

@@ -130,15 +130,21 @@ impl<'n> Builder<'n, '_> {
             currents.any(|(id, _)| id.index() == k)
         };
         let elements = self.circuit.elements.iter().enumerate();
-        let mut ignored = elements.filter(|(_, e)| e.ic.is_some_and(|ic| ic != 0.0));
-        let ignored = ignored.find(|(k, _)| !held(*k)).map(|(_, element)| element);
-        if let (false, Some(_), Some(element)) = (uic, self.circuit.tran, ignored) {
+        let ignored = elements.filter(|(_, e)| e.ic.is_some_and(|ic| ic != 0.0));
+        let ignored = ignored.filter(|(k, _)| !held(*k));
+        let ignored: Vec<&Element> = ignored.map(|(_, element)| element).collect();
+        if let (false, Some(_), [first, more @ ..]) = (uic, self.circuit.tran, &ignored[..]) {
+            let others = match more.len() {
+                0 => String::new(),
+                1 => format!(" and `{}`", more[0].name),
+                count => format!(" and {count} more"),
+            };
             let message = format!(
-                "`IC=` of `{}` has no effect: the run starts from the operating point",
-                element.name
+                "`IC=` of `{}`{others} has no effect: the run starts from the operating point",
+                first.name
             );
             notes.push(
-                Diagnostic::warning("ic-without-uic", element.span, message)
+                Diagnostic::warning("ic-without-uic", first.span, message)
                     .label("ignored without `uic`")
                     .help("add `uic` to `.tran`, or set node voltages and inductor currents with `.ic`"),
             );

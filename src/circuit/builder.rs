@@ -81,6 +81,8 @@ pub(super) struct Builder<'n, 'o> {
     pub(super) choices: VecDeque<Option<usize>>,
     /// The subcircuits being expanded, from the outside in.
     nesting: Vec<&'n Subckt>,
+    /// The `A` card being expanded: its parts have no cards that anyone wrote.
+    code_card: Option<Span>,
     pub(super) used: HashSet<Span>,
     instances: usize,
     /// Model parameters that had no effect, by model.
@@ -126,6 +128,7 @@ impl<'n, 'o> Builder<'n, 'o> {
             root_elements: HashSet::new(),
             choices: VecDeque::new(),
             nesting: Vec::new(),
+            code_card: None,
             used: HashSet::new(),
             instances: 0,
             unused_parameters: Vec::new(),
@@ -387,10 +390,15 @@ impl<'n, 'o> Builder<'n, 'o> {
         self.nesting.push(subckt);
         // The choices of this instance come before those that wait outside it.
         let waiting = std::mem::take(&mut self.choices);
+        let is_ours = subckt.name.text.starts_with(BUILT_IN);
+        let outer = self.code_card;
+        if is_ours {
+            self.code_card = Some(card.span);
+        }
         self.tell_all(&subckt.body.faults);
         self.define(&subckt.body, inner);
         self.elements(&subckt.body, inner);
-        let is_ours = subckt.name.text.starts_with(BUILT_IN);
+        self.code_card = outer;
         if self.choices.is_empty() && !is_ours {
             self.unknown_arguments(subckt, args, inner);
         }
@@ -449,7 +457,8 @@ impl<'n, 'o> Builder<'n, 'o> {
     }
 
     /// Adds an element; a second one with the same name is an error.
-    pub(super) fn add(&mut self, element: Element) -> Option<ElementId> {
+    pub(super) fn add(&mut self, mut element: Element) -> Option<ElementId> {
+        element.span = self.code_card.or(element.span);
         let id = ElementId(u32::try_from(self.circuit.elements.len()).unwrap_or(u32::MAX));
         if let Some(first) = self.names.elements.get(&element.name) {
             let message = format!("element `{}` is defined again", element.name);

@@ -138,12 +138,15 @@ impl<'n> Scopes<'n> {
                     self.findings.tell(*fault);
                     None
                 }
-                None => self.fault(
-                    "bad-expression",
-                    expr,
-                    format!("`{signal}` is not known here"),
-                    "a number is needed",
-                ),
+                None => {
+                    let message = format!("`{signal}` is not known here");
+                    let fault = Diagnostic::error("bad-expression", expr.span, message);
+                    let help = "a value is one number all through a run: a current that follows its own voltage is `G1 a b TABLE {V(a,b)} = (0,0) (1,1m) (2,4m)`, \
+                                one that follows others `B1 a b I=…`, and `.step` makes a run for each of several values";
+                    self.findings
+                        .tell(fault.label("a number is needed").help(help));
+                    None
+                }
             },
             ExprKind::Unary(Unary::Minus, x) => {
                 Some(self.evaluate(x, scope, resolve, locals)?.negated())

@@ -71,7 +71,15 @@ pub(crate) fn names(folder: &Path) -> Vec<String> {
 pub(crate) fn near_file(path: &Path) -> Option<PathBuf> {
     let known = names(path.parent().unwrap_or(Path::new("")));
     let name = path.file_name()?.to_string_lossy();
-    let near = nearest(&name, known.iter().map(String::as_str));
+    // Of files with one ending the rest is the name.
+    let ending = path
+        .extension()
+        .map(|ending| format!(".{}", ending.to_string_lossy()));
+    let ending = ending.unwrap_or_default();
+    let stems = known.iter().filter_map(|known| known.strip_suffix(&ending));
+    let of_stem = nearest(name.strip_suffix(&ending)?, stems).map(|stem| stem + &ending);
+    let others = known.iter().filter(|known| !known.ends_with(&ending));
+    let near = of_stem.or_else(|| nearest(&name, others.map(String::as_str)));
     let near = near.map(|near| path.with_file_name(near));
     near.or_else(|| in_near_folder(path))
 }
@@ -113,6 +121,23 @@ pub fn load_read(path: &Path, bytes: io::Result<Vec<u8>>, options: &ElaborateOpt
             };
         }
     };
+    if path
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("plecs"))
+    {
+        let message = format!(
+            "`{}` is a model of PLECS, which circ does not read",
+            path.display()
+        );
+        let foreign = Diagnostic::error("unreadable", None, message)
+            .help("write the circuit as a netlist: docs/from-plecs.md has the parts of PLECS with the cards that take their place");
+        return Loaded {
+            sources,
+            netlist: None,
+            circuit: None,
+            diagnostics: vec![foreign],
+        };
+    }
     let root = sources.add(path.to_string_lossy(), netlist::decode(&bytes));
     let search = Files {
         read: &read,

@@ -66,6 +66,7 @@ pub use held::{held_at, holder};
 pub use losses::{EnergyTable, Losses};
 pub use measurement::{FourierAnalysis, Harmonics, Measured, NamedMeasurement};
 pub(crate) use measurement::{Seen, carried_out};
+pub(crate) use names::written;
 pub use pin::Pins;
 pub use shown::Column;
 pub use source::Source;

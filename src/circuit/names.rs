@@ -10,6 +10,9 @@ use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Name, Signal};
 use crate::netlist::suggest::nearest;
 
+/// Names that are listed where one is unknown; more are no help.
+const MOST: usize = 8;
+
 /// All nodes and elements by canonical name.
 #[derive(Debug)]
 pub(super) struct Names<'n> {
@@ -51,7 +54,7 @@ impl<'n> Names<'n> {
         }
     }
 
-    /// The node a reference means: of this instance, else by its full name (`x1.n`, also `x1:n`).
+    /// The node a reference means: of this instance, else by its full name (`x1.n`, also `x1:n`), else at a pin of a subcircuit (`x1:out`).
     pub(super) fn expect_node(
         &self,
         name: &Name,
@@ -64,6 +67,7 @@ impl<'n> Names<'n> {
             .or_else(|| self.nodes.get(text).copied());
         found
             .or_else(|| self.nodes.get(&text.replace(':', ".")).copied())
+            .or_else(|| scopes.port(text))
             .ok_or_else(|| {
                 let fault = Diagnostic::error(
                     "unknown-node",
@@ -80,7 +84,7 @@ impl<'n> Names<'n> {
             })
     }
 
-    /// The element a reference means: of this instance, else by its full name (`x1.d1`, also ngspice's `d.x1.d1`). None of `others`, which stand
+    /// The element a reference means: of this instance, else by its full name (`x1.d1`, also `x1:d1` and ngspice's `d.x1.d1`). None of `others`, which stand
     /// beside it, was meant.
     pub(super) fn expect_element(
         &self,
@@ -98,6 +102,7 @@ impl<'n> Names<'n> {
             .or_else(|| self.elements.get(text));
         found
             .or_else(|| self.elements.get(&without_letter(text)?))
+            .or_else(|| self.elements.get(&text.replace(':', ".")))
             .copied()
             .ok_or_else(|| {
                 let fault = Diagnostic::error(
@@ -108,10 +113,18 @@ impl<'n> Names<'n> {
                 .label("not in the circuit");
                 let known = self.elements.keys().filter_map(|n| n.strip_prefix(prefix));
                 let meant = |n: &&str| others.iter().all(|other| other.text != *n);
-                match nearest(text, known.filter(meant)) {
-                    Some(near) => Box::new(fault.help(format!("did you mean `{near}`?"))),
-                    None => Box::new(fault),
+                let known: Vec<&str> = known.filter(meant).collect();
+                if let Some(near) = nearest(text, known.iter().copied()) {
+                    return Box::new(fault.help(format!("did you mean `{near}`?")));
                 }
+                let is_alike = |known: &&str| known.get(..1) == text.get(..1);
+                let mut alike: Vec<&str> = known.into_iter().filter(is_alike).collect();
+                alike.sort_unstable();
+                Box::new(match alike.len() {
+                    1 => fault.help(format!("there is `{}`", alike[0])),
+                    2..=MOST => fault.help(format!("there are {}", alike.join(", "))),
+                    _ => fault,
+                })
             })
     }
 
@@ -159,6 +172,19 @@ pub(super) fn without_letter(name: &str) -> Option<String> {
     let rest = name.get(2..).filter(|_| name.get(1..2) == Some("."))?;
     let last = rest.rsplit('.').next()?;
     (last.get(..1) == name.get(..1) && rest.contains('.')).then(|| rest.to_string())
+}
+
+/// The name of the device that was written: `x1.a1` of `x1.a1.sm`, a part of a gate or flip-flop that its `A` card does not name.
+pub(crate) fn written(name: &str) -> &str {
+    let mut end = 0;
+    for part in name.split('.') {
+        end += part.len();
+        if part.starts_with('a') {
+            break;
+        }
+        end += 1;
+    }
+    name.get(..end).unwrap_or(name)
 }
 
 /// v(a) − v(b) as a form.

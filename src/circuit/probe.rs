@@ -68,7 +68,7 @@ impl<'n> Builder<'n, '_> {
 impl Circuit {
     /// The probe a user's name means: `v(a)`, `v(a,b)`, `i(d1)`, `@d1[i]`, `v1#branch`, or a bare node.
     ///
-    /// Names are compared without case; `x1:n` is `x1.n` and ngspice's `d.x1.d1` is `x1.d1`. `None` if there is no such
+    /// Names are compared without case; `x1:n` is `x1.n`, or the node at the pin `n` of `x1`, and ngspice's `d.x1.d1` is `x1.d1`. `None` if there is no such
     /// node or element.
     #[must_use]
     pub fn probe(&self, text: &str) -> Option<Probe> {
@@ -122,6 +122,7 @@ impl Circuit {
         }
         self.node(name)
             .or_else(|| self.node(&name.replace(':', ".")))
+            .or_else(|| self.at_pin(name))
     }
 
     fn element_like(&self, name: &str) -> Option<ElementId> {
@@ -130,26 +131,53 @@ impl Circuit {
             .or_else(|| self.element(&name.replace(':', ".")))
     }
 
+    /// The node that other programs name by a pin: `x1:out` of a subcircuit, `m1:d` of a transistor, `r1:2` of an element.
+    fn at_pin(&self, name: &str) -> Option<NodeId> {
+        let (device, pin) = name.rsplit_once(':')?;
+        let device = device.replace(':', ".");
+        if let Some(pins) = self.pins.iter().find(|pins| pins.device == device) {
+            let found = pins.nodes.iter().find(|(known, _)| known == pin);
+            return found.map(|(_, node)| *node);
+        }
+        let element = &self.elements[self.element(&device)?.index()];
+        match pin {
+            "1" => Some(element.p),
+            "2" => Some(element.n),
+            _ => None,
+        }
+    }
+
     /// The signal that was probably meant, or else the first ones of its kind.
     pub(super) fn what_there_is(&self, text: &str) -> String {
         /// More names are no help.
         const MOST: usize = 8;
+        let text = text.to_lowercase();
         let current = text.starts_with("i(") || text.starts_with('@');
-        let written = if text.contains('(') {
-            text.to_owned()
-        } else {
-            format!("v({text})")
+        let name = match text.strip_prefix('@') {
+            Some(rest) => rest.split('[').next(),
+            None => text
+                .rsplit('(')
+                .next()
+                .map(|rest| rest.trim_end_matches(')')),
         };
-        let known: Vec<String> = if current {
-            let elements = self.elements.iter();
-            elements.map(|e| format!("i({})", e.name)).collect()
-        } else {
-            let nodes = self.nodes.iter().skip(1);
-            nodes.map(|n| format!("v({n})")).collect()
-        };
-        if let Some(near) = nearest(&written, known.iter().map(String::as_str)) {
-            return format!("did you mean `{near}`?");
+        let name = name.unwrap_or_default();
+        if let (false, Some(id)) = (current, self.element_like(name)) {
+            let element = &self.elements[id.index()];
+            let across = self.voltage(element.p, element.n).name;
+            return format!(
+                "`{}` is an element: the voltage across it is `{across}`",
+                element.name
+            );
         }
+        let names: Vec<&str> = match current {
+            true => self.elements.iter().map(|e| &e.name[..]).collect(),
+            false => self.nodes.iter().skip(1).map(|n| &n[..]).collect(),
+        };
+        let signal = |name: &str| format!("{}({name})", if current { 'i' } else { 'v' });
+        if let Some(near) = nearest(&name.replace(':', "."), names.iter().copied()) {
+            return format!("did you mean `{}`?", signal(&near));
+        }
+        let known: Vec<String> = names.into_iter().map(signal).collect();
         let more = known.len().saturating_sub(MOST);
         let first = known[..known.len() - more].join(", ");
         match more {

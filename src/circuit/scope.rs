@@ -196,6 +196,14 @@ impl<'n> Scopes<'n> {
         self.list.iter()
     }
 
+    /// The node at a pin of a subcircuit: `x1:out`.
+    pub(super) fn port(&self, text: &str) -> Option<NodeId> {
+        let (device, pin) = text.rsplit_once(':')?;
+        let prefix = format!("{}.", device.replace(':', "."));
+        let scope = self.list.iter().find(|scope| scope.prefix == prefix)?;
+        scope.ports.get(pin).copied()
+    }
+
     /// A scope and those around it.
     pub(super) fn chain(&self, id: ScopeId) -> impl Iterator<Item = (ScopeId, &Scope<'n>)> {
         std::iter::successors(Some(id), |id| self.get(*id).parent).map(|id| (id, self.get(id)))

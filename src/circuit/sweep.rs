@@ -4,7 +4,8 @@ use super::builder::Builder;
 use super::scope::{Param, ScopeId};
 use crate::algebra::Value;
 use crate::diagnostic::{Diagnostic, Span};
-use crate::netlist::ast::{self, Alter, Name, Points, Target};
+use crate::netlist::ast::{self, Alter, ExprKind, Name, Points, Target};
+use crate::netlist::suggest::spacing_meant;
 use crate::settings::tolerances::times::WHOLE;
 
 /// Most runs or operating points of all sweeps together.
@@ -216,6 +217,16 @@ impl<'n> Builder<'n, '_> {
     }
 
     fn sweep(&mut self, card: &'n ast::Sweep) -> Option<Sweep> {
+        if let Points::Linear([first, ..]) = &card.points
+            && let ExprKind::Name(name) = &first.kind
+            && self.scopes.param(ScopeId::ROOT, name).is_none()
+            && let Some(meant) = spacing_meant(first)
+        {
+            let message = format!("`{name}` is neither a value nor a spacing of values");
+            let fault = Diagnostic::error("bad-sweep", first.span, message).label("not known here");
+            self.tell(fault.help(format!("did you mean `{meant}`?")));
+            return None;
+        }
         let values = self.sweep_values(&card.points, card.span)?;
         let what = match &card.target {
             Target::Temperature(_) => Swept::Temperature,

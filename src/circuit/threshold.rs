@@ -1,6 +1,7 @@
 //! Switches whose control comes to rest exactly on their threshold, or never passes it.
 
 use super::builder::Builder;
+use super::names::written;
 use super::source::Wave;
 use super::{Circuit, Element, Kind, NodeId, Output, Quantity, Switch};
 use crate::diagnostic::Diagnostic;
@@ -63,7 +64,7 @@ fn on_threshold(circuit: &Circuit, element: &Element, switch: &Switch) -> Option
     }
     let message = format!(
         "`{}` rests exactly on its threshold while {when}",
-        element.name
+        written(&element.name)
     );
     Some(
         Diagnostic::warning("on-threshold", element.span, message)
@@ -141,7 +142,7 @@ fn stays(element: &Element, switch: &Switch, (low, high): (f64, f64)) -> Option<
     };
     let message = format!(
         "`{}` never turns {never}: its control is between {low} and {high}",
-        element.name
+        written(&element.name)
     );
     Some(
         Diagnostic::warning("never-switches", element.span, message)

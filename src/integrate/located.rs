@@ -1,7 +1,7 @@
 //! Why a run ended, as a finding at the element where it shows, with the cause in the circuit's words and what to do.
 
 use super::error::{Error, NoRest, Reason, at};
-use crate::circuit::{Circuit, Element, Kind};
+use crate::circuit::{Circuit, Element, Kind, written};
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::explain::explain;
 use crate::law::Law;
@@ -15,13 +15,17 @@ impl Error {
         if names.is_empty() {
             names = of_reason(&self.reason);
         }
-        let mut elements: Vec<&Element> = Vec::new();
+        let mut elements: Vec<Element> = Vec::new();
         for element in names.iter().filter_map(|name| whole(circuit, name)) {
-            if !elements.iter().any(|known| known.name == element.name) {
-                elements.push(element);
+            let name = written(&element.name);
+            if !elements.iter().any(|known| known.name == name) {
+                elements.push(Element {
+                    name: name.into(),
+                    ..element.clone()
+                });
             }
         }
-        self.found(&elements)
+        self.found(&elements.iter().collect::<Vec<_>>())
     }
 
     /// The finding where there is no circuit to show its place in.

@@ -460,7 +460,18 @@ pub fn initial(
         .iter()
         .map(|(id, _)| &circuit.elements[id.index()].name[..])
         .collect();
+    // Where the card stands in a netlist with `.tran`, a finding there tells of a value other than 0.
+    let told = |name: &str| {
+        if circuit.tran.is_none() {
+            return false;
+        }
+        let element = circuit
+            .element(name)
+            .map(|id| &circuit.elements[id.index()]);
+        element.is_some_and(|e| e.span.is_some() && e.ic.is_some_and(|ic| ic != 0.0))
+    };
     let ignored = behaviour.storage.iter().filter(|s| s.initial.is_some());
+    let ignored = ignored.filter(|s| !told(&s.element));
     for s in ignored.filter(|s| !held.contains(&&s.element[..])) {
         let text = format!("IC= of {} is ignored without uic", s.element);
         notes.push(Note::of("ic-without-uic", [&s.element], text));

@@ -24,12 +24,14 @@ pub use trace::Trace;
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum MeasureError {
     /// The window from … to … holds no piece of the waveform.
-    #[error("no part of the run lies between {} s and {} s", short(*.from), short(*.to))]
+    #[error("{}", outside(*.from, *.to, *.span))]
     Window {
         /// Its start, s.
         from: f64,
         /// Its end, s.
         to: f64,
+        /// Where the waveform begins and ends, s.
+        span: (f64, f64),
     },
     /// The band from … to … holds no part of the response.
     #[error("no part of the response lies between {} Hz and {} Hz", short(*.from), short(*.to))]
@@ -75,6 +77,29 @@ pub enum MeasureError {
 /// A number without the last digits, which rounding makes.
 fn short(value: f64) -> f64 {
     format!("{value:.12e}").parse().unwrap_or(value)
+}
+
+/// Where nothing is seen: after the run, before its first row, or between its ends.
+fn outside(from: f64, to: f64, (first, last): (f64, f64)) -> String {
+    if from > last {
+        format!(
+            "the run ends at {} s, before {} s",
+            short(last),
+            short(from)
+        )
+    } else if to < first {
+        format!(
+            "the rows of the run begin at {} s, after {} s",
+            short(first),
+            short(to)
+        )
+    } else {
+        format!(
+            "no part of the run lies between {} s and {} s",
+            short(from),
+            short(to)
+        )
+    }
 }
 
 fn crossings(level: f64, found: usize) -> String {
@@ -154,7 +179,14 @@ mod tests {
         assert_eq!(over(Over::WhenMaximum, 0.0, 3.0), 1.0);
         assert_eq!(over(Over::WhenMinimum, 1.5, 3.0), 1.5);
         let fault = trace().over(Over::Average, 4.0, 5.0);
-        assert_eq!(fault, Err(MeasureError::Window { from: 4.0, to: 5.0 }));
+        assert_eq!(
+            fault,
+            Err(MeasureError::Window {
+                from: 4.0,
+                to: 5.0,
+                span: (0.0, 3.0)
+            })
+        );
     }
 
     #[test]

@@ -237,7 +237,7 @@ impl<'a> Trace<'a> {
         };
         let length = sum(&|piece| piece.length());
         if length.is_nan() || length <= 0.0 {
-            return Err(MeasureError::Window { from, to });
+            return Err(self.outside(from, to));
         }
         let integral = || {
             let inside = self
@@ -269,12 +269,18 @@ impl<'a> Trace<'a> {
         })
     }
 
+    /// The fault that a window holds no piece of the waveform.
+    fn outside(&self, from: f64, to: f64) -> MeasureError {
+        let span = self.span().unwrap_or((f64::NAN, f64::NAN));
+        MeasureError::Window { from, to, span }
+    }
+
     /// The value at `t`; at an edge the value after it.
     ///
     /// # Errors
     /// [`MeasureError::Window`] outside the run.
     pub fn at(&self, t: f64) -> Result<f64, MeasureError> {
-        let missing = MeasureError::Window { from: t, to: t };
+        let missing = self.outside(t, t);
         match &self.shape {
             Shape::Lines { time, values } => {
                 let after = time.partition_point(|&own| own <= t);
@@ -314,7 +320,7 @@ impl<'a> Trace<'a> {
     /// # Errors
     /// [`MeasureError::Window`] outside the run.
     pub fn slope(&self, t: f64) -> Result<f64, MeasureError> {
-        let missing = MeasureError::Window { from: t, to: t };
+        let missing = self.outside(t, t);
         if let Shape::Curves(_) = &self.shape {
             let curve = self.curve_at(t).ok_or(missing)?;
             return Ok(curve.slope(curve.place(t)));

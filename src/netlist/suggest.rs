@@ -1,5 +1,7 @@
 //! "Did you mean": the nearest known name.
 
+use super::ast::{Expr, ExprKind};
+
 /// The candidate nearest to a name by edit distance, if it is near enough to be a slip of the pen.
 pub(crate) fn nearest<'a>(
     name: &str,
@@ -13,8 +15,33 @@ pub(crate) fn nearest<'a>(
         .take(MOST)
         .map(|candidate| (strsim::damerau_levenshtein(name, candidate), candidate))
         .filter(|&(distance, candidate)| distance > 0 && distance <= limit && candidate.len() > 1)
+        .filter(|&(_, candidate)| !is_another(name, candidate))
         .min()
         .map(|(_, candidate)| candidate.to_string())
+}
+
+/// Whether two names of one length are told apart by the letters that differ: by digits alone (`r1`, `r2`), or, of two letters, by one of them
+/// (`in`, `on`). Letters that changed places are a slip of the pen.
+fn is_another(name: &str, candidate: &str) -> bool {
+    let (own, other): (Vec<char>, Vec<char>) =
+        (name.chars().collect(), candidate.chars().collect());
+    let sorted = |letters: &[char]| {
+        let mut letters = letters.to_vec();
+        letters.sort_unstable();
+        letters
+    };
+    let mut differing = own.iter().zip(&other).filter(|(a, b)| a != b);
+    own.len() == other.len()
+        && sorted(&own) != sorted(&other)
+        && (own.len() < 3 || differing.all(|(a, b)| a.is_ascii_digit() && b.is_ascii_digit()))
+}
+
+/// The word for the spacing of a sweep (`list`) that a first value in its place (`lst`) was probably meant as.
+pub(crate) fn spacing_meant(value: &Expr) -> Option<String> {
+    match &value.kind {
+        ExprKind::Name(name) => nearest(name, ["lin", "dec", "oct", "list"]),
+        _ => None,
+    }
 }
 
 /// The directive that a word is without its dot: `.meas` for `meas`.
@@ -85,6 +112,14 @@ mod tests {
         );
         assert_eq!(nearest("zz", ["resistance", "gain"]), None);
         assert_eq!(nearest("a", ["a"]), None);
+        // Other names, and slips of the pen.
+        for other in ["r2", "q1", "n12"] {
+            assert_eq!(nearest("r1", [other]), None, "{other}");
+        }
+        assert_eq!(nearest("n001", ["n003"]), None);
+        assert_eq!(nearest("r", ["r1"]).as_deref(), Some("r1"));
+        assert_eq!(nearest("1n4184", ["1n4148"]).as_deref(), Some("1n4148"));
+        assert_eq!(nearest("ou", ["out", "uo"]).as_deref(), Some("out"));
     }
 
     #[test]

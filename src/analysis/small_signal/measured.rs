@@ -78,7 +78,7 @@ pub fn small_signal_measured(
 fn measure(circuit: &Circuit, seen: &Phasors) -> Vec<Measured> {
     let found = carried_out(&circuit.responses, &Rows::of(circuit, seen));
     let in_hertz = |why| match why {
-        MeasureError::Window { from, to } => MeasureError::Band { from, to },
+        MeasureError::Window { from, to, .. } => MeasureError::Band { from, to },
         why => why,
     };
     let found = found.into_iter().map(|measured| Measured {

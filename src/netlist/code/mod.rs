@@ -1,7 +1,7 @@
 //! `A` devices: XSPICE's code models and LTspice's special functions, written as subcircuits of switches, sources and storage.
 //!
 //! Every sort of device is a subcircuit in the language of netlists, made once for each number of pins; an `A` card becomes a call of
-//! it. What it consists of is `a1.…` in results, and findings inside it name `built-in …` as their file.
+//! it. What it consists of is `a1.…` in results; findings about its parts are shown at the card.
 
 mod ltspice;
 mod xspice;

@@ -4,15 +4,19 @@ use super::{Dot, skip};
 use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Expr, Frequencies, Points, Pss, Spacing, Statement, Sweep, Target};
 use crate::netlist::lex::{
-    Input, Parsed, at_end, between, blank, end, expect_word, missing, next_word, refuse, separator,
-    symbol, tell, word,
+    Fault, Input, Parsed, at_end, between, blank, end, expect_word, missing, next_word, refuse,
+    separator, symbol, tell, word,
 };
 use crate::netlist::operand;
+use crate::netlist::suggest::spacing_meant;
 
 /// `.step [lin | dec | oct] [param] name start stop n`, `.step [param] name list a b c`.
 pub(super) fn step(i: Input<'_>) -> Parsed<'_, Dot> {
     let (rest, sweep) = sweep(i)?;
-    let (rest, ()) = end(rest)?;
+    let (rest, ()) = end(rest).map_err(|fault| match &sweep.points {
+        Points::Linear([first, ..]) => spelled(fault, first),
+        _ => fault,
+    })?;
     Ok((rest, Dot::statement(Statement::Step(sweep))))
 }
 
@@ -71,6 +75,14 @@ pub(super) fn ac<'a>(start: Input<'a>, i: Input<'a>) -> (Input<'a>, Dot) {
         .help("write `.ac dec 20 10 1meg`");
     tell(start, fault);
     (skip(i), Dot::Nothing)
+}
+
+/// A fault of a sweep whose first value is a word: with the hint that it was to say how the values are spaced.
+fn spelled(fault: nom::Err<Fault>, first: &Expr) -> nom::Err<Fault> {
+    match spacing_meant(first) {
+        Some(meant) => fault.map(|fault| fault.helped(&format!("did you mean `{meant}`?"))),
+        None => fault,
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -148,12 +160,16 @@ fn sweep(i: Input<'_>) -> Parsed<'_, Sweep> {
                     (_, Scale::Linear) => "the increment",
                     _ => "the number of values per decade or octave",
                 };
-                if at_end(at) {
+                let fault = if at_end(at) {
                     missing(at, what)
                 } else {
                     let fault =
                         Diagnostic::error("missing", next_word(at), format!("expected {what}"));
                     refuse(fault.label("expected a value"))
+                };
+                match values.first() {
+                    Some(first) => spelled(fault, first),
+                    None => fault,
                 }
             })?;
             match scale {
