@@ -1298,7 +1298,13 @@ fn check_lists_faults_with_status_1_and_certificates_with_0() {
     let unknown = run("check chopper.cir --switch s9=on");
     assert_eq!(unknown.status, 2, "{unknown}");
     assert!(unknown.err.contains("the circuit has s1"), "{unknown}");
-    assert_eq!(run("check missing.cir").status, 2);
+    let missing = run("check missing.cir");
+    assert_eq!(missing.status, 2);
+    assert_eq!(
+        missing.err.matches("check its name").count(),
+        1,
+        "{missing}"
+    );
 }
 
 /// A hundred of them, errors first, and how many more there are.

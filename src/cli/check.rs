@@ -106,9 +106,11 @@ fn checked(args: &CheckArgs, streams: &Streams) -> Result<Checked, Failure> {
         diagnostics,
     } = input::load(&args.input);
     if let Some(unreadable) = diagnostics.iter().find(|d| d.code == "unreadable") {
-        let what = &unreadable.message;
-        let help = unreadable.help.as_deref().unwrap_or_default();
-        return Err(Failure::told("unreadable", format!("{what}; {help}")));
+        return Err(Failure::Told {
+            code: "unreadable",
+            message: unreadable.message.clone(),
+            help: unreadable.help.clone(),
+        });
     }
     let Some(circuit) = circuit else {
         return Ok(Checked::faulty("", diagnostics, sources));
