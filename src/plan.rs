@@ -47,31 +47,17 @@ pub fn plan(lcs: &Lcs, options: &SimOptions) -> Plan {
         }
         (method, _) => method,
     };
-    let scheme = match method {
-        Method::Euler => Scheme::MOREAU,
-        _ => Scheme {
-            theta: options.theta.unwrap_or(Scheme::MIDPOINT.theta),
-            gamma: options.gamma.unwrap_or(Scheme::MIDPOINT.gamma),
-        },
-    };
+    let scheme = scheme(options);
     if matches!(method, Method::Euler | Method::Theta) {
         let curved = lcs.ports.iter().any(|p| !p.law.is_piecewise_linear());
         let rule = match options.step {
             Some(_) if curved && scheme != Scheme::MOREAU => {
                 "three implicit stages of order 3".to_string()
             }
-            None if curved && scheme != Scheme::MOREAU => {
-                "five implicit stages of order 4".to_string()
-            }
+            None if curved && scheme != Scheme::MOREAU => FIVE_STAGES.to_string(),
             _ => format!("θ = {}, γ = {}", scheme.theta, scheme.gamma),
         };
-        words.push(match options.step {
-            Some(h) => format!("{rule}, fixed step {h:e} s"),
-            None => format!(
-                "{rule}, steps chosen for a tolerance of {:e}",
-                options.settings.tol
-            ),
-        });
+        words.push(steps_of(&rule, options));
     }
     if m == 0 {
         words.push(format!(
@@ -85,6 +71,54 @@ pub fn plan(lcs: &Lcs, options: &SimOptions) -> Plan {
     if lcs.switches.is_empty() {
         words.push("no switches: one system for the whole run".into());
     }
+    Plan {
+        method,
+        scheme,
+        words,
+    }
+}
+
+const FIVE_STAGES: &str = "five implicit stages of order 4";
+
+/// θ and γ that are asked for.
+pub(crate) fn scheme(options: &SimOptions) -> Scheme {
+    match options.method {
+        Method::Euler => Scheme::MOREAU,
+        _ => Scheme {
+            theta: options.theta.unwrap_or(Scheme::MIDPOINT.theta),
+            gamma: options.gamma.unwrap_or(Scheme::MIDPOINT.gamma),
+        },
+    }
+}
+
+fn steps_of(rule: &str, options: &SimOptions) -> String {
+    match options.step {
+        Some(h) => format!("{rule}, fixed step {h:e} s"),
+        None => format!(
+            "{rule}, steps chosen for a tolerance of {:e}",
+            options.settings.tol
+        ),
+    }
+}
+
+/// Decides for a circuit of so many storage elements and ideal pairs that its matrices are kept without their zeros.
+pub(crate) fn plan_of_large((storage, pairs): (usize, usize), options: &SimOptions) -> Plan {
+    let scheme = scheme(options);
+    let rule = match options.step {
+        None if scheme == Scheme::MIDPOINT => FIVE_STAGES.to_string(),
+        _ => format!("θ = γ = {}", scheme.theta),
+    };
+    let method = match options.method {
+        Method::Euler => Method::Euler,
+        _ => Method::Theta,
+    };
+    let words = vec![
+        format!(
+            "{storage} capacitors and inductors, {pairs} complementarity pairs: steps on matrices without their zeros; dense matrices of exact integration would cost \
+             the third power of that (--method exact)"
+        ),
+        steps_of(&rule, options),
+    ];
     Plan {
         method,
         scheme,

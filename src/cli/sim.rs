@@ -399,6 +399,7 @@ fn measured_run(
         Subject::Circuit(model) => {
             let mut finished = transient(model, request, route, streams);
             if streams.verbose
+                && !input::is_large(model.multiport())
                 && let (Some((run, _)), Ok(lcs)) = (&mut finished.run, model.lcs())
             {
                 run.plan.push(format!(

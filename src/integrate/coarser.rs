@@ -39,12 +39,12 @@ pub(super) fn coarser_handover<'a>(
 }
 
 impl Problem {
-    /// Beside a run in steps of h, s.
+    /// Beside a run in steps of h, s; `large`: sparse ones.
     pub(super) fn coarser_fixed<'a>(
         &'a self,
         tran: &Tran,
         scheme: Scheme,
-        h: f64,
+        (h, large): (f64, bool),
         settings: &'a Settings,
     ) -> Vec<Coarser<'a>> {
         // Rows are stops.
@@ -68,6 +68,10 @@ impl Problem {
             Coarser {
                 make: Box::new(move || {
                     let (start, stepping) = (self.start.clone(), Stepping::Fixed(longer));
+                    if large {
+                        let sparse = self.sparse(&tran, scheme, stepping, settings)?;
+                        return Ok(Box::new(sparse) as Box<dyn Stepper>);
+                    }
                     let mut theta = self.stepper(start, &tran, scheme, stepping, settings)?;
                     theta.keep_whole_steps();
                     theta.read_coarsely();
@@ -118,6 +122,35 @@ impl Problem {
             stride: if many { FEWER } else { 1 },
             start: FIRST * tran.tstep,
             share: Share::always(share),
+            steps: None,
+        }]
+    }
+
+    /// Beside a run in sparse steps whose lengths are chosen. It stops at some rows only: rows are stops, and would make its steps those of the run.
+    pub(super) fn coarser_large<'a>(
+        &'a self,
+        tran: &Tran,
+        scheme: Scheme,
+        settings: &Settings,
+    ) -> Vec<Coarser<'a>> {
+        let tran = *tran;
+        let settings = Settings {
+            tol: LOOSER_EMBEDDED * settings.tol,
+            ..settings.clone()
+        };
+        let stride = if Grid::of(&tran).count() > FEWER as f64 {
+            FEWER
+        } else {
+            1
+        };
+        vec![Coarser {
+            make: Box::new(move || {
+                let stepper = self.sparse(&tran, scheme, controlled(&tran), &settings)?;
+                Ok(Box::new(stepper))
+            }),
+            stride,
+            start: FIRST * tran.tstep,
+            share: Share::always(LOOSER_EMBEDDED_SHARE),
             steps: None,
         }]
     }

@@ -35,6 +35,7 @@ pub mod run;
 mod settle;
 pub mod simulate;
 pub mod simulation;
+mod sparse;
 pub mod start;
 pub mod stats;
 pub mod step;

@@ -248,6 +248,12 @@ impl Problem {
         Ok(lcs)
     }
 
+    /// Storage elements and ideal pairs.
+    pub(super) fn size(&self) -> (usize, usize) {
+        let multiport = &self.systems.multiport;
+        (multiport.storage.len(), multiport.pairs.len())
+    }
+
     fn switches(&self) -> &[SwitchPort] {
         &self.systems.multiport.switches
     }
@@ -397,24 +403,6 @@ impl Problem {
         Some(Error::before(Reason::Unsupported(what)).device(line.sources[0].clone()))
     }
 
-    /// The error of a source with more edges and kinks than a run may take steps.
-    pub(super) fn too_many_edges(
-        &self,
-        lcs: &Lcs,
-        tran: &Tran,
-        settings: &Settings,
-    ) -> Option<Error> {
-        let limit = settings.max_steps;
-        let corners = |input: &Input| input.source.wave.corners(tran.tstop);
-        let input = lcs.inputs.iter().find(|i| corners(i) > limit as f64)?;
-        let what = format!(
-            "it has {:.1e} edges and kinks until {:e} s, where a run may take {limit} steps",
-            corners(input),
-            tran.tstop
-        );
-        Some(Error::before(Reason::Unsupported(what)).device(input.name.clone()))
-    }
-
     /// Amplitudes from a coarse run.
     pub(super) fn scout(&self, tran: &Tran, settings: &Settings) -> Option<Amplitudes> {
         let settings = Settings {
@@ -445,6 +433,19 @@ impl Problem {
         }
         Some(theta.amplitudes().clone())
     }
+}
+
+/// The error of a source with more edges and kinks than a run may take steps.
+pub(super) fn too_many_edges(inputs: &[Input], tran: &Tran, settings: &Settings) -> Option<Error> {
+    let limit = settings.max_steps;
+    let corners = |input: &Input| input.source.wave.corners(tran.tstop);
+    let input = inputs.iter().find(|i| corners(i) > limit as f64)?;
+    let what = format!(
+        "it has {:.1e} edges and kinks until {:e} s, where a run may take {limit} steps",
+        corners(input),
+        tran.tstop
+    );
+    Some(Error::before(Reason::Unsupported(what)).device(input.name.clone()))
 }
 
 impl Problem {

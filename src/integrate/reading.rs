@@ -1,5 +1,6 @@
 //! Rows over [x | λ | u | u' | 1] evaluated without allocation.
 
+use crate::lcs::sparse::SparseRows;
 use crate::lcs::{Lcs, Rows};
 
 /// Where the quantities of a circuit stand at one instant.
@@ -58,6 +59,31 @@ fn sum(rows: &Rows, i: usize, at: Point<'_>, part: impl Fn(f64) -> f64) -> f64 {
                     sum += part(weight * v);
                 }
             }
+        }
+    }
+    sum
+}
+
+/// [`value`] of rows without their zeros.
+pub(crate) fn sparse_value(rows: &SparseRows, i: usize, at: Point<'_>) -> f64 {
+    sparse_sum(rows, i, at, |term| term)
+}
+
+/// [`magnitude`] of rows without their zeros.
+pub(crate) fn sparse_magnitude(rows: &SparseRows, i: usize, at: Point<'_>) -> f64 {
+    sparse_sum(rows, i, at, f64::abs)
+}
+
+fn sparse_sum(rows: &SparseRows, i: usize, at: Point<'_>, part: impl Fn(f64) -> f64) -> f64 {
+    let mut sum = part(rows.one[i]);
+    for (block, values) in [
+        (&rows.x, at.x),
+        (&rows.lambda, at.lambda),
+        (&rows.u, at.u),
+        (&rows.du, at.du),
+    ] {
+        if !values.is_empty() {
+            sum += block.row(i).map(|(j, w)| part(w * values[j])).sum::<f64>();
         }
     }
     sum

@@ -1,13 +1,14 @@
 //! A problem whose start is known, whole or in parts: what plans and runs are made from.
 
 use crate::circuit::Tran;
-use crate::integrate::error::Error;
+use crate::diagnostic::Internal;
+use crate::integrate::error::{Error, Reason};
 use crate::integrate::parts::Cut;
-use crate::integrate::problem::Problem;
+use crate::integrate::problem::{Problem, too_many_edges};
 use crate::integrate::run::Stepper;
 use crate::integrate::{Method, SimOptions};
-use crate::lcs::Lcs;
-use crate::plan::{Plan, not_exact, plan, plan_of_parts};
+use crate::lcs::{Input, Lcs};
+use crate::plan::{Plan, not_exact, plan, plan_of_large, plan_of_parts, scheme};
 use crate::settings::Settings;
 
 /// See the [module](self).
@@ -16,6 +17,8 @@ pub(super) enum Ready {
     Whole(Box<Lcs>),
     /// In parts, each of which has an exact integration.
     Parts(Cut),
+    /// By steps on matrices without their zeros; these are its sources.
+    Large(Vec<Input>),
 }
 
 /// Decides whether a problem is solved whole or in parts.
@@ -38,6 +41,12 @@ pub(super) fn ready(
             return Ok(Ready::Parts(cut));
         }
     }
+    if options.method != Method::Exact
+        && problem.is_large(scheme(options), &options.settings)
+        && let Some(inputs) = problem.prepare_large(&options.settings)?
+    {
+        return Ok(Ready::Large(inputs));
+    }
     let lcs = problem.prepare(tran, &options.settings)?;
     Ok(Ready::Whole(Box::new(lcs)))
 }
@@ -48,11 +57,17 @@ impl Ready {
         matches!(self, Self::Parts(_))
     }
 
+    /// Whether it is integrated in sparse steps.
+    pub(super) const fn is_large(&self) -> bool {
+        matches!(self, Self::Large(_))
+    }
+
     /// See [`plan`].
-    pub(super) fn plan(&self, options: &SimOptions<'_>) -> Plan {
+    pub(super) fn plan(&self, problem: &Problem, options: &SimOptions<'_>) -> Plan {
         match self {
             Self::Whole(lcs) => plan(lcs, options),
             Self::Parts(cut) => plan_of_parts(cut.systems(), options),
+            Self::Large(_) => plan_of_large(problem.size(), options),
         }
     }
 
@@ -60,22 +75,18 @@ impl Ready {
     pub(super) fn not_exact(&self) -> Option<String> {
         match self {
             Self::Whole(lcs) => not_exact(lcs),
-            Self::Parts(_) => None,
+            Self::Parts(_) | Self::Large(_) => None,
         }
     }
 
-    /// See [`Problem::too_many_edges`].
-    pub(super) fn too_many_edges(
-        &self,
-        problem: &Problem,
-        tran: &Tran,
-        settings: &Settings,
-    ) -> Option<Error> {
+    /// See [`too_many_edges`].
+    pub(super) fn too_many_edges(&self, tran: &Tran, settings: &Settings) -> Option<Error> {
         match self {
-            Self::Whole(lcs) => problem.too_many_edges(lcs, tran, settings),
+            Self::Whole(lcs) => too_many_edges(&lcs.inputs, tran, settings),
+            Self::Large(inputs) => too_many_edges(inputs, tran, settings),
             Self::Parts(cut) => {
                 let mut systems = cut.systems();
-                systems.find_map(|lcs| problem.too_many_edges(lcs, tran, settings))
+                systems.find_map(|lcs| too_many_edges(&lcs.inputs, tran, settings))
             }
         }
     }
@@ -93,6 +104,7 @@ impl Ready {
         Ok(match self {
             Self::Whole(lcs) => Box::new(problem.exact(tran, lcs, settings)?),
             Self::Parts(cut) => Box::new(cut.exact()?),
+            Self::Large(_) => return Err(no_exact_integration()),
         })
     }
 
@@ -110,6 +122,13 @@ impl Ready {
         Ok(match self {
             Self::Whole(lcs) => Box::new(problem.handover(tran, lcs, settings, steps)?),
             Self::Parts(cut) => Box::new(cut.handover(steps)?),
+            Self::Large(_) => return Err(no_exact_integration()),
         })
     }
+}
+
+/// Large circuits are planned in steps.
+fn no_exact_integration() -> Error {
+    let what = "exact integration of a circuit that is planned in sparse steps";
+    Error::before(Reason::Internal(Internal::new("integrate::ready", what)))
 }

@@ -5,6 +5,7 @@ use std::rc::Rc;
 use std::sync::atomic::AtomicBool;
 
 use crate::integrate::cpu::ThreadTime;
+use crate::settings::tolerances::sparse::MOST_DENSE_STATES;
 use crate::settings::tolerances::steps::{FIRST, HANDOVER_STEPS};
 use nalgebra::DVector;
 
@@ -232,7 +233,7 @@ fn dispatch(
         method,
         scheme,
         mut words,
-    } = circuit.plan(&options);
+    } = circuit.plan(&problem, &options);
     if problem.known_comparators > 0 {
         words.push(format!(
             "comparators whose inputs are sources alone: {}, whose edges are computed before the run",
@@ -255,7 +256,7 @@ fn dispatch(
     grid.check(columns, most)?;
     let endless = problem
         .too_short(&tran, &options.settings)
-        .or_else(|| circuit.too_many_edges(&problem, &tran, &options.settings));
+        .or_else(|| circuit.too_many_edges(&tran, &options.settings));
     if let Some(error) = endless {
         return Err(error);
     }
@@ -322,6 +323,38 @@ fn dispatch(
         }
     }
     let stepping = options.step.map_or(controlled(&tran), Stepping::Fixed);
+    if circuit.is_large() {
+        let coarser = match options.step {
+            _ if options.unestimated => vec![],
+            Some(h) => problem.coarser_fixed(&tran, scheme, (h, true), settings),
+            None => problem.coarser_large(&tran, scheme, settings),
+        };
+        let frame = Frame {
+            progress: progress.as_mut().map(|p| &mut **p as &mut dyn FnMut(f64)),
+            ..frame(method, notes.clone())
+        };
+        let attempted = problem
+            .sparse(&tran, scheme, stepping, settings)
+            .and_then(|mut sparse| {
+                let mut all =
+                    Accompanied::new(&mut sparse, coarser, &units, tran.tstop, options.cancel);
+                attempt(&mut all, frame, &mut log, false)
+            });
+        let (storage, pairs) = problem.size();
+        match attempted {
+            Ok(run) => return Ok(run),
+            Err(error) if is_final(&error) || storage + pairs > MOST_DENSE_STATES => {
+                return Err(error);
+            }
+            Err(error) => {
+                log.again();
+                let text =
+                    format!("steps on dense matrices were made instead of sparse ones: {error}");
+                notes.push(Note::of("steps-instead", error.elements, text));
+            }
+        }
+        problem.prepare(&tran, settings)?;
+    }
     let mut theta = problem.stepper(problem.start.clone(), &tran, scheme, stepping, settings)?;
     let amplitudes = match options.step {
         Some(_) => None,
@@ -335,7 +368,7 @@ fn dispatch(
     let frame = frame(method, notes);
     let coarser = match options.step {
         _ if options.unestimated => vec![],
-        Some(h) => problem.coarser_fixed(&tran, scheme, h, settings),
+        Some(h) => problem.coarser_fixed(&tran, scheme, (h, false), settings),
         None => problem.coarser_controlled(&tran, scheme, amplitudes.as_ref(), settings, embedded),
     };
     let mut all = Accompanied::new(&mut theta, coarser, &units, tran.tstop, options.cancel);

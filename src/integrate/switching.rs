@@ -10,7 +10,7 @@ use crate::integrate::event::Change;
 use crate::integrate::inputs::{Inputs, Passage};
 use crate::integrate::reading::{self, Point};
 use crate::integrate::settle::settle;
-use crate::lcs::{Lcs, Role};
+use crate::lcs::{Input, Lcs, Port, Role, Rows};
 use crate::mna::{LatchPort, SwitchPort};
 use crate::settings::tolerances::events::CONTROL_ROUNDINGS;
 use crate::settings::tolerances::events::DECISIVE;
@@ -146,6 +146,60 @@ impl Threshold {
     }
 }
 
+/// What switches see of the system they stand in.
+pub(crate) trait Watched {
+    /// The sources.
+    fn inputs(&self) -> &[Input];
+    /// The pairs (λ, y).
+    fn ports(&self) -> &[Port];
+    /// The control of switch i, and the sum of the magnitudes that it is computed from.
+    fn control(&self, i: usize, at: Point<'_>) -> (f64, f64);
+    /// What u, by source, has in it, and its constant.
+    fn control_of_sources(&self, i: usize) -> (Vec<f64>, f64);
+    /// Whether this has no part in it.
+    fn control_is_free_of(&self, i: usize, of: Part) -> bool;
+}
+
+/// What a control may consist of besides sources.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// x.
+    States,
+    /// λ.
+    Devices,
+    /// u'.
+    Slopes,
+}
+
+impl Watched for Lcs {
+    fn inputs(&self) -> &[Input] {
+        &self.inputs
+    }
+
+    fn ports(&self) -> &[Port] {
+        &self.ports
+    }
+
+    fn control(&self, i: usize, at: Point<'_>) -> (f64, f64) {
+        let (value, size) = (reading::value, reading::magnitude);
+        (value(&self.controls, i, at), size(&self.controls, i, at))
+    }
+
+    fn control_of_sources(&self, i: usize) -> (Vec<f64>, f64) {
+        let Rows { u, one, .. } = &self.controls;
+        (u.row(i).iter().copied().collect(), one[i])
+    }
+
+    fn control_is_free_of(&self, i: usize, of: Part) -> bool {
+        let block = match of {
+            Part::States => &self.controls.x,
+            Part::Devices => &self.controls.lambda,
+            Part::Slopes => &self.controls.du,
+        };
+        i >= block.nrows() || block.row(i).iter().all(|v| *v == 0.0)
+    }
+}
+
 /// A value with the bound of its rounding.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Known {
@@ -182,7 +236,11 @@ pub(crate) struct Switches {
 }
 
 impl Switches {
-    pub(crate) fn new(mut position: Vec<bool>, thresholds: Vec<Threshold>, lcs: &Lcs) -> Self {
+    pub(crate) fn new(
+        mut position: Vec<bool>,
+        thresholds: Vec<Threshold>,
+        lcs: &impl Watched,
+    ) -> Self {
         fire(&thresholds, &mut position);
         let mut switches = Self {
             position,
@@ -199,17 +257,20 @@ impl Switches {
     }
 
     /// Classifies the controls of a system.
-    pub(crate) fn rebuild(&mut self, lcs: &Lcs) {
-        let zero = |block: &nalgebra::DMatrix<f64>, i: usize| {
-            i >= block.nrows() || block.row(i).iter().all(|v| *v == 0.0)
+    pub(crate) fn rebuild(&mut self, lcs: &impl Watched) {
+        let state_free = |i: usize| {
+            let mut parts = [Part::States, Part::Devices, Part::Slopes].into_iter();
+            parts.all(|part| lcs.control_is_free_of(i, part))
         };
-        let rows = &lcs.controls;
-        let state_free = |i: usize| zero(&rows.x, i) && zero(&rows.lambda, i) && zero(&rows.du, i);
         // What arrives on a line is no more known beforehand than a state is.
+        let arrives = |input: &Input| input.source.wave.is_arriving();
+        let lines = lcs.inputs().iter().any(arrives);
         let known = |i: usize| {
-            let mut inputs = lcs.inputs.iter().enumerate();
-            !inputs.any(|(j, input)| input.source.wave.is_arriving() && rows.u[(i, j)] != 0.0)
+            let (gains, _) = lcs.control_of_sources(i);
+            let mut parts = lcs.inputs().iter().zip(gains);
+            !parts.any(|(input, gain)| gain != 0.0 && arrives(input))
         };
+        let known = |i: usize| !lines || known(i);
         let thresholds = || self.thresholds.iter().enumerate();
         let driven: Vec<bool> = thresholds()
             .map(|(i, t)| state_free(i) && known(i) && t.latch.is_none())
@@ -223,8 +284,8 @@ impl Switches {
         self.driven = driven;
         let port = |t: &Threshold| {
             let valve = t.valve()?;
-            let at = lcs.ports.iter().position(|port| port.device == valve)?;
-            Some((at, lcs.ports[at].role != Role::Voltage))
+            let at = lcs.ports().iter().position(|port| port.device == valve)?;
+            Some((at, lcs.ports()[at].role != Role::Voltage))
         };
         self.valves = self.thresholds.iter().map(port).collect();
         let twin = |(i, t): (usize, &Threshold)| {
@@ -234,7 +295,8 @@ impl Switches {
         };
         self.twins = thresholds().map(twin).collect();
         let both = |i: usize| self.twins[i].is_some();
-        self.needs_lambda = (0..self.thresholds.len()).any(|i| both(i) || !zero(&rows.lambda, i));
+        self.needs_lambda = (0..self.thresholds.len())
+            .any(|i| both(i) || !lcs.control_is_free_of(i, Part::Devices));
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -267,7 +329,7 @@ impl Switches {
 
     /// Switches driven by sources alone whose controls ask for another position right after the start, where the inputs have these
     /// values and slopes.
-    pub(crate) fn misplaced(&self, lcs: &Lcs, u: &[f64], slopes: &[f64]) -> Vec<usize> {
+    pub(crate) fn misplaced(&self, lcs: &impl Watched, u: &[f64], slopes: &[f64]) -> Vec<usize> {
         let at = Point {
             x: &[],
             lambda: &[],
@@ -279,9 +341,8 @@ impl Switches {
             noise: CONTROL_ROUNDINGS * f64::EPSILON * size,
         };
         let wrong = |&i: &usize| {
-            let value = reading::value(&lcs.controls, i, at);
-            let size = reading::magnitude(&lcs.controls, i, at);
-            let gains = lcs.controls.u.row(i);
+            let (value, size) = lcs.control(i, at);
+            let (gains, _) = lcs.control_of_sources(i);
             let drifts = || gains.iter().zip(slopes).map(|(gain, du)| gain * du);
             let (slope, steepness) = (drifts().sum(), drifts().map(f64::abs).sum());
             self.thresholds[i].leaves(
@@ -453,7 +514,7 @@ impl Switches {
     /// infinite time and none where nothing happens.
     pub(crate) fn next_known(
         &self,
-        lcs: &Lcs,
+        lcs: &impl Watched,
         inputs: &Inputs,
         t: f64,
         limit: f64,
@@ -468,14 +529,14 @@ impl Switches {
             } else {
                 threshold.on_above
             };
-            let gains: Vec<f64> = lcs.controls.u.row(i).iter().copied().collect();
+            let (gains, constant) = lcs.control_of_sources(i);
             let until = (first + slack).min(limit);
             let side = match (on, threshold.is_sharp()) {
                 (false, _) => Passage::Rising,
                 (true, false) => Passage::Falling,
                 (true, true) => Passage::FallingOrRest,
             };
-            let passage = inputs.passage(&gains, lcs.controls.one[i], level, side, t, until);
+            let passage = inputs.passage(&gains, constant, level, side, t, until);
             let Some(time) = passage else { continue };
             first = first.min(time);
             passages.push((time, i));

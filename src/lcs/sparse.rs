@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Input, Port, Position, ReduceError, State, reduce};
+use super::{Input, Port, Position, PowerKind, ReduceError, State, reduce};
 use crate::mna::StaticMultiport;
 
 /// States and ports from which on a system is written without its zeros.
@@ -62,6 +62,19 @@ impl Csr {
             && self.indices.iter().all(|&j| j < columns)
     }
 
+    /// The entries (column, value) of row i.
+    pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, f64)> {
+        let ends = self.indptr[i]..self.indptr[i + 1];
+        ends.map(|k| (self.indices[k], self.data[k]))
+    }
+
+    /// y + factor M x, in y.
+    pub(crate) fn add_times(&self, factor: f64, x: &[f64], y: &mut [f64]) {
+        for (i, y) in y.iter_mut().enumerate() {
+            *y += factor * self.row(i).map(|(j, value)| value * x[j]).sum::<f64>();
+        }
+    }
+
     /// M x.
     ///
     /// # Panics
@@ -75,6 +88,40 @@ impl Csr {
         }
         y
     }
+}
+
+/// Rows over [x | λ | u | u' | 1], as [`Rows`](super::Rows) without their zeros.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SparseRows {
+    /// Over x.
+    pub x: Csr,
+    /// Over λ.
+    pub lambda: Csr,
+    /// Over u.
+    pub u: Csr,
+    /// Over u'.
+    pub du: Csr,
+    /// Constants.
+    pub one: Vec<f64>,
+}
+
+/// What a run reads of a system besides [`SparseLcs`].
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Readings {
+    /// Of each state the storage element.
+    pub(crate) storage_of: Vec<usize>,
+    /// Control of each switch.
+    pub(crate) controls: SparseRows,
+    /// See [`Outputs::power`](super::Outputs::power).
+    pub(crate) power: Vec<PowerKind>,
+    /// See [`Outputs::power_v`](super::Outputs::power_v).
+    pub(crate) power_v: SparseRows,
+    /// The other factor.
+    pub(crate) power_i: SparseRows,
+    /// s = X x + U u + k, all storage quantities: no λ, no u'.
+    pub(crate) storage: SparseRows,
+    /// Stored energy is ½ sᵀ M s.
+    pub(crate) metric: Csr,
 }
 
 /// x' = A x + B λ + E u + e, y = C x + D λ + G u + F with −λ_j ∈ ∂φ_j(y_j), of one position of the switches; what its parts are
@@ -115,16 +162,8 @@ pub struct SparseLcs {
     pub inject_one: Vec<f64>,
     /// Names and units of the probes.
     pub outputs: Vec<(String, &'static str)>,
-    /// Their rows over x.
-    pub output_x: Csr,
-    /// Over λ.
-    pub output_lambda: Csr,
-    /// Over u.
-    pub output_u: Csr,
-    /// Over u'.
-    pub output_du: Csr,
-    /// Their constants.
-    pub output_one: Vec<f64>,
+    /// Their rows.
+    pub output_rows: SparseRows,
     /// Switch names and the position the system was assembled for.
     pub switches: Vec<(String, bool)>,
     /// Least-norm choices.
@@ -142,6 +181,17 @@ impl SparseLcs {
     /// # Errors
     /// [`ReduceError`], naming elements, where the position has no such system.
     pub fn of(behaviour: &StaticMultiport, position: &Position) -> Result<Self, ReduceError> {
+        Ok(Self::with_readings(behaviour, position)?.0)
+    }
+
+    /// The same with what a run reads besides.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub(crate) fn with_readings(
+        behaviour: &StaticMultiport,
+        position: &Position,
+    ) -> Result<(Self, Readings), ReduceError> {
         reduce::reduce_sparse(behaviour, position)
     }
 
@@ -202,8 +252,8 @@ mod tests {
             assert_eq!(whole(&sparse.energy), dense.energy);
             assert_eq!(whole(&sparse.shift), dense.shift);
             assert_eq!(whole(&sparse.inject), dense.storage.inject);
-            assert_eq!(whole(&sparse.output_x), dense.outputs.rows.x);
-            assert_eq!(whole(&sparse.output_du), dense.outputs.rows.du);
+            assert_eq!(whole(&sparse.output_rows.x), dense.outputs.rows.x);
+            assert_eq!(whole(&sparse.output_rows.du), dense.outputs.rows.du);
             assert_eq!(sparse.e0, dense.e0.as_slice());
             assert_eq!(sparse.f, dense.f.as_slice());
             assert_eq!(sparse.imprecise, 0);

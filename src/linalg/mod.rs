@@ -1,5 +1,5 @@
 //! Dense linear algebra of the sizes of circuits: what the exact integrator needs and general-purpose libraries do not have, each a
-//! function of matrices that knows nothing of circuits.
+//! function of matrices that knows nothing of circuits; and sparse factors for the steps of large ones.
 
 pub(crate) mod blocks;
 pub(crate) mod decouple;
@@ -15,3 +15,4 @@ pub(crate) mod rays;
 pub(crate) mod refill;
 pub(crate) mod series;
 pub(crate) mod shifted;
+pub(crate) mod sparse_lu;

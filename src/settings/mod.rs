@@ -25,6 +25,10 @@ pub struct Settings {
     /// So many capacitors, inductors, ideal pairs and switches together make a circuit one that is solved in parts, where it falls into parts
     /// that share nothing but ground and sources (default 64).
     pub apart: usize,
+    /// So many capacitors, inductors and ideal pairs together make a circuit one that is integrated in steps on matrices without their zeros, unless exact
+    /// integration is asked for (default 600). Larger: dense matrices, whose cost grows with the third power; smaller: steps for circuits that exact integration
+    /// masters as fast, and exactly.
+    pub large: usize,
 }
 
 impl Default for Settings {
@@ -37,6 +41,7 @@ impl Default for Settings {
             max_held: 1 << 30,
             max_kept: 1 << 28,
             apart: 64,
+            large: 600,
         }
     }
 }

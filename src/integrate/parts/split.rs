@@ -10,6 +10,7 @@ use crate::integrate::error::Error;
 use crate::integrate::exact::{Exact, Place, Step};
 use crate::integrate::handover::Handover;
 use crate::integrate::problem::{Problem, Systems};
+use crate::integrate::step::Scheme;
 use crate::lcs::Lcs;
 use crate::mna::Part;
 use crate::plan::not_exact;
@@ -36,6 +37,9 @@ impl Problem {
         let ready = parts.into_iter().map(|part| {
             let columns = part.probes.clone();
             let mut problem = self.part(part);
+            if problem.is_large(Scheme::MIDPOINT, settings) {
+                return None;
+            }
             // What keeps a part from running is told of the whole.
             let lcs = problem.prepare(tran, settings).ok()?;
             not_exact(&lcs).is_none().then_some(Ready {

@@ -186,11 +186,11 @@ pub fn write_sparse(lcs: &SparseLcs, x0: &[f64], tran: Option<Tran>) -> String {
             units: (lcs.outputs.iter())
                 .map(|(_, unit)| (*unit).to_owned())
                 .collect(),
-            x: compressed(&lcs.output_x),
-            lambda: compressed(&lcs.output_lambda),
-            u: compressed(&lcs.output_u),
-            du: compressed(&lcs.output_du),
-            one: numbers(&lcs.output_one),
+            x: compressed(&lcs.output_rows.x),
+            lambda: compressed(&lcs.output_rows.lambda),
+            u: compressed(&lcs.output_rows.u),
+            du: compressed(&lcs.output_rows.du),
+            one: numbers(&lcs.output_rows.one),
         },
         tran: tran.map(tran_document),
         switches: positions(&lcs.switches),

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::publish::{port, state};
 use super::{Position, Reduction};
 use crate::algebra::{Field, SparseRow, entry, part};
-use crate::lcs::sparse::{Csr, SparseLcs};
+use crate::lcs::sparse::{Csr, Readings, SparseLcs, SparseRows};
 use crate::mna::StaticMultiport;
 
 /// Counts the numbers that are not known well enough.
@@ -42,17 +42,53 @@ impl Rounding {
     }
 }
 
-/// The system as doubles.
+/// The columns of [x | λ | u | u' | 1].
+struct Layout {
+    x: Range<usize>,
+    lambda: Range<usize>,
+    u: Range<usize>,
+    du: Range<usize>,
+    one: usize,
+}
+
+impl Rounding {
+    fn rows<'r, F: Field + 'r>(
+        &mut self,
+        rows: &[&'r SparseRow<F>],
+        columns: &Layout,
+    ) -> SparseRows {
+        let mut block = |columns: &Range<usize>| self.matrix(rows.iter().copied(), columns.clone());
+        SparseRows {
+            x: block(&columns.x),
+            lambda: block(&columns.lambda),
+            u: block(&columns.u),
+            du: block(&columns.du),
+            one: self.vector(rows.iter().copied(), columns.one),
+        }
+    }
+}
+
+/// The system as doubles, and what a run reads besides.
 pub(super) fn publish<F: Field>(
     behaviour: &StaticMultiport,
     position: &Position,
     r: &Reduction<F>,
-) -> SparseLcs {
+) -> (SparseLcs, Readings) {
     let (n, m, p) = (r.states.len(), r.pairs.len(), behaviour.sources.len());
     let (lambda, u) = (n..n + m, n + m..n + m + p);
     let (du, one) = (u.end..u.end + p, u.end + p);
+    let columns = Layout {
+        x: 0..n,
+        lambda: lambda.clone(),
+        u: u.clone(),
+        du,
+        one,
+    };
     let probes = &behaviour.observed[..behaviour.probes];
-    let readings = || r.readings[..probes.len()].iter().map(|(row, _)| row);
+    let reading = |k: usize| &r.readings[k].0;
+    let some = |which: &mut dyn Iterator<Item = usize>| -> Vec<&SparseRow<F>> {
+        which.map(reading).collect()
+    };
     let q = behaviour.storage.len();
     let mut round = Rounding { imprecise: 0 };
     let mut system = SparseLcs {
@@ -77,11 +113,7 @@ pub(super) fn publish<F: Field>(
         outputs: (probes.iter())
             .map(|probe| (probe.name.clone(), probe.unit))
             .collect(),
-        output_x: round.matrix(readings(), 0..n),
-        output_lambda: round.matrix(readings(), lambda),
-        output_u: round.matrix(readings(), u),
-        output_du: round.matrix(readings(), du),
-        output_one: round.vector(readings(), one),
+        output_rows: round.rows(&some(&mut (0..probes.len())), &columns),
         switches: (behaviour.switches.iter())
             .zip(&position.switches)
             .map(|(switch, on)| (switch.name.clone(), *on))
@@ -90,5 +122,26 @@ pub(super) fn publish<F: Field>(
         imprecise: 0,
     };
     system.imprecise = round.imprecise;
-    system
+    let power = behaviour.power.iter();
+    let mut metric = vec![SparseRow::new(); q];
+    for (a, b, x) in &r.metric {
+        metric[*a].push((*b, x.clone()));
+    }
+    metric
+        .iter_mut()
+        .for_each(|row| row.sort_by_key(|(b, _)| *b));
+    let s: Vec<&SparseRow<F>> = r.s.iter().collect();
+    let readings = Readings {
+        storage_of: r.states.clone(),
+        controls: round.rows(
+            &some(&mut behaviour.switches.iter().map(|s| s.control)),
+            &columns,
+        ),
+        power: power.clone().map(|w| w.kind).collect(),
+        power_v: round.rows(&some(&mut power.clone().map(|w| w.v)), &columns),
+        power_i: round.rows(&some(&mut power.map(|w| w.i)), &columns),
+        storage: round.rows(&s, &columns),
+        metric: round.matrix(&metric, 0..q),
+    };
+    (system, readings)
 }

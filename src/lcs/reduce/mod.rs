@@ -28,6 +28,7 @@ use crate::algebra::{Field, SparseRow};
 use crate::diagnostic::Internal;
 use crate::mna::{Reduced, StaticMultiport};
 
+use super::sparse::Readings;
 use super::{Hold, Lcs, LcsError, LcsParts, Role, SparseLcs};
 use eliminated::Eliminated;
 use publish::publish;
@@ -188,7 +189,7 @@ pub(crate) fn reduce_apart(
 pub(in crate::lcs) fn reduce_sparse(
     behaviour: &StaticMultiport,
     position: &Position,
-) -> Result<SparseLcs, ReduceError> {
+) -> Result<(SparseLcs, Readings), ReduceError> {
     check(behaviour, position)?;
     let reduction = reduction(behaviour, behaviour.ball(), position)?;
     Ok(compressed::publish(behaviour, position, &reduction))

@@ -28,6 +28,7 @@ pub(crate) mod netlists;
 pub(crate) mod passivity;
 pub(crate) mod periodic;
 pub(crate) mod ranks;
+pub(crate) mod sparse;
 pub(crate) mod stated;
 pub(crate) mod steps;
 pub(crate) mod theorems;

@@ -24,6 +24,10 @@ pub(crate) const ENTRY: f64 = 1e-12;
 /// decay are not seen; smaller: rounding gets a sign.
 pub(crate) const EIGENVALUE: f64 = 1e-12;
 
+/// A diagonal entry of a sparse matrix is taken as pivot where it is at least this part of the largest candidate of its column: the order of elimination was
+/// chosen for diagonals. Larger: more fill; smaller: factors grow and digits are lost.
+pub(crate) const DIAGONAL: f64 = 0.05;
+
 /// A pivot of exact elimination must be at least this fraction of the largest candidate, relative to its row; among those the shortest row
 /// wins. Larger: more fill; smaller: radii grow.
 pub(crate) const PIVOT_CHOICE: f64 = 1e-2;

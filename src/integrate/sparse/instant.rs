@@ -1,0 +1,243 @@
+//! What happens in no time: the start, edges of sources, switches.
+
+use super::Sparse;
+use super::system::System;
+use crate::integrate::error::{Error, Reason};
+use crate::integrate::log::Log;
+use crate::integrate::reading::Point;
+use crate::integrate::stats::{JumpReason, StateJump};
+use crate::settings::tolerances::events::DECISIVE;
+use crate::settings::tolerances::jumps::NO_JUMP;
+use crate::settings::tolerances::sparse::{AFTER, INSTANT, INSTANTS, RESTS};
+
+/// (from sources, lost), J, where storage elements s become those of x because a switch joins them to one another or to sources, see
+/// [`taking_over`](crate::integrate::energy).
+pub(super) fn taking_over(system: &System, s: &[f64], x: &[f64], u: &[f64]) -> (f64, f64) {
+    let after = system.storage(x, u);
+    let step: Vec<f64> = after.iter().zip(s).map(|(a, b)| a - b).collect();
+    let of_sources = system.storage(&vec![0.0; x.len()], u);
+    (
+        system.product(&of_sources, &step),
+        0.5 * system.product(&step, &step),
+    )
+}
+
+impl Sparse {
+    /// The start: edges of the sources there, inconsistent initial values, switches that are asked to move at once.
+    pub(super) fn begin(&mut self, log: &mut Log) -> Result<(), Error> {
+        let before = self.now.u.clone();
+        self.now.u = self.inputs.all(self.now.t);
+        self.jump(&before)?;
+        let start = std::mem::take(&mut self.start);
+        self.note_jump(&start, 0.0, JumpReason::Start, log);
+        self.note_energy();
+        self.started = true;
+        self.see();
+        let mut du = vec![0.0; self.now.u.len()];
+        self.inputs.slopes(self.now.t, &mut du);
+        let moving = self.switches.misplaced(self.system(), &self.now.u, &du);
+        if !moving.is_empty() {
+            self.switch(&moving, log)?;
+        }
+        Ok(())
+    }
+
+    /// At a breakpoint: inputs take their right limits, the state jumps if it must.
+    pub(super) fn edge(&mut self, t: f64, log: &mut Log) -> Result<(), Error> {
+        let mut u = self.now.u.clone();
+        self.inputs.right(t, &mut u);
+        if u == self.now.u {
+            if log.wants_corners() {
+                let row = self.row();
+                log.corner(self.now.t, &row);
+            }
+            return Ok(());
+        }
+        let rows = log.wants_rows();
+        if rows {
+            self.log_row(log);
+        }
+        let storage = self.system().storage(&self.now.x, &self.now.u);
+        let lost = self.now.balance.lost_in_jumps();
+        let before = std::mem::replace(&mut self.now.u, u);
+        self.jump(&before)?;
+        self.note_jump(&storage, lost, JumpReason::SourceEdge, log);
+        for (t, what) in std::mem::take(&mut self.pending) {
+            self.stats.events += 1;
+            log.event(t, what, false);
+        }
+        if rows {
+            self.log_row(log);
+        }
+        Ok(())
+    }
+
+    /// The jump where inputs step from `before` to the present ones, and λ, x' behind it: implicit steps of next to no length, the first of which take up
+    /// the jump, the last of which tells x' for the way back to the instant.
+    pub(super) fn jump(&mut self, before: &[f64]) -> Result<(), Error> {
+        let h = INSTANT * self.span;
+        let t = self.now.t;
+        let mut du = vec![0.0; self.now.u.len()];
+        self.inputs.slopes(t, &mut du);
+        self.step.x.clone_from(&self.now.x);
+        self.step.active.clone_from(&self.now.active);
+        self.step.lambda.clear();
+        self.step.lambda.resize(self.now.active.len(), 0.0);
+        let mut first = self.now.x.clone();
+        let mut impulse = vec![0.0; self.now.active.len()];
+        let mut u = self.now.u.clone();
+        let mut made = 0;
+        let second = loop {
+            for (u, du) in u.iter_mut().zip(&du) {
+                *u += h * du;
+            }
+            let system = &mut self.systems[self.now.system].1;
+            system.implicit((t, h, Self::slack(h)), &u, &mut self.step)?;
+            made += 1;
+            let rests = made > 1 && system.are_within(RESTS, &first, &self.step.x);
+            if rests || made == INSTANTS {
+                break self.step.x.clone();
+            }
+            first.clone_from(&self.step.x);
+            let add = impulse.iter_mut().zip(&self.step.lambda);
+            add.for_each(|(p, lambda)| *p += h * lambda);
+        };
+        let steps = f64::from(made - 1);
+        let lasting = impulse.iter_mut().zip(&self.step.lambda);
+        lasting.for_each(|(p, lambda)| *p -= steps * h * lambda);
+        let slope: Vec<f64> = (second.iter().zip(&first))
+            .map(|(b, a)| (b - a) / h)
+            .collect();
+        let after = first.iter().zip(&slope).map(|(x, k)| x - steps * h * k);
+        let after: Vec<f64> = after.collect();
+        self.account_for_jump(before, after, &impulse);
+        self.now.slope = slope;
+        self.now.lambda.clone_from(&self.step.lambda);
+        self.now.lambda_known = true;
+        self.now.settle = true;
+        self.preferred = AFTER * h;
+        self.refused = false;
+        let active = self.step.active.clone();
+        self.take_active(active);
+        self.see();
+        Ok(())
+    }
+
+    /// Moves the state to `after`, by impulses of the ports and a step of the inputs, with the energies; a move that is rounding is none.
+    fn account_for_jump(&mut self, before: &[f64], after: Vec<f64>, impulse: &[f64]) {
+        let system = &self.systems[self.now.system].1;
+        let now = &mut self.now;
+        let moved = !system.are_within(DECISIVE, &now.x, &after);
+        let no_lambda = [];
+        let at = |x, u| Point {
+            x,
+            lambda: &no_lambda,
+            u,
+            du: &[],
+        };
+        let step: Vec<f64> = now.u.iter().zip(before).map(|(a, b)| a - b).collect();
+        let still = vec![0.0; impulse.len()];
+        let source =
+            system.work_of_sources(at(&now.x, before), at(&now.x, &now.u), (&still, &step));
+        now.balance.add_jump((source, 0.0));
+        if !moved {
+            return;
+        }
+        let still = vec![0.0; step.len()];
+        let source =
+            system.work_of_sources(at(&now.x, &now.u), at(&after, &now.u), (impulse, &still));
+        let change: Vec<f64> = after.iter().zip(&now.x).map(|(a, b)| a - b).collect();
+        let change = system.storage_rate(&change, &still);
+        let taken = system.taken_by_drops(at(&after, &now.u), impulse);
+        let loss = 0.5 * system.product(&change, &change) + taken;
+        now.balance.add_jump((source, loss));
+        now.x = after;
+    }
+
+    /// Writes down that the storage jumped here from `before`, if it did by more than rounding; until then jumps had lost `lost`, J.
+    fn note_jump(&mut self, before: &[f64], lost: f64, reason: JumpReason, log: &mut Log) {
+        let system = &self.systems[self.now.system].1;
+        let after = system.storage(&self.now.x, &self.now.u);
+        let storage = &self.multiport.storage;
+        let kind = |capacitor: bool| {
+            let same = (0..after.len()).filter(|&k| storage[k].capacitor == capacitor);
+            same.map(|k| before[k].abs().max(after[k].abs()))
+                .fold(0.0, f64::max)
+        };
+        let sizes = [kind(false), kind(true)];
+        let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
+        let jumped: Vec<usize> = (0..after.len())
+            .filter(|&k| change[k].abs() > NO_JUMP * sizes[usize::from(storage[k].capacitor)])
+            .collect();
+        if jumped.is_empty() {
+            return;
+        }
+        self.stats.jumps += 1;
+        log.event(self.now.t, std::sync::Arc::default(), true);
+        let elements: Vec<String> = storage.iter().map(|s| s.element.clone()).collect();
+        let units: Vec<&str> = storage
+            .iter()
+            .map(|s| if s.capacitor { "V" } else { "A" })
+            .collect();
+        let balance = &self.now.balance;
+        let sizes = (
+            balance.lost_in_jumps() - lost,
+            0.5 * system.product(&change, &change),
+            balance.largest(),
+        );
+        log.state_jump(StateJump::new(
+            self.now.t,
+            (&elements, &units),
+            &jumped,
+            sizes,
+            reason,
+        ));
+    }
+
+    /// Flips the switches `moving`, with the jump this causes.
+    pub(super) fn switch(&mut self, moving: &[usize], log: &mut Log) -> Result<(), Error> {
+        if log.wants_rows() {
+            self.log_row(log);
+        }
+        self.known = None;
+        let storage = self.system().storage(&self.now.x, &self.now.u);
+        let lost = self.now.balance.lost_in_jumps();
+        let before = self.switches.position().to_vec();
+        self.switches.toggle(moving);
+        self.stats.events += 1;
+        log.event(self.now.t, self.switches.flipped(&before), false);
+        self.take_position(&storage)?;
+        let moved = self.switches.moved(&before).join(", ");
+        self.note_jump(&storage, lost, JumpReason::Switch(moved), log);
+        if log.wants_rows() {
+            self.log_row(log);
+        }
+        Ok(())
+    }
+
+    /// Takes storage s over into the system of the present switch position.
+    fn take_position(&mut self, s: &[f64]) -> Result<(), Error> {
+        let position = self.switches.position().to_vec();
+        self.now.system = self.system_of(&position)?;
+        let system = &self.systems[self.now.system].1;
+        let x = system.lcs.state_from(s);
+        let account = taking_over(system, s, &x, &self.now.u);
+        self.now.balance.add_jump(account);
+        self.now.x = x;
+        let m = system.m();
+        if self.now.active.len() != m {
+            self.now.active = vec![false; m];
+        }
+        self.now.lambda.clear();
+        self.now.lambda.resize(m, 0.0);
+        self.switches.rebuild(system);
+        if self.switches.watch() {
+            let what = "a switch whose control follows the state beside so many others";
+            return Err(Error::at(self.now.t, Reason::Unsupported(what.into())));
+        }
+        let u = self.now.u.clone();
+        self.jump(&u)?;
+        self.pending.clear();
+        Ok(())
+    }
+}

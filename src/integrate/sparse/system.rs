@@ -1,0 +1,227 @@
+//! A system without its zeros, with what a run reads of it and its implicit steps.
+
+use super::kernel::{Kernel, Step};
+use crate::integrate::error::{Error, Reason};
+use crate::integrate::reading::{Point, sparse_magnitude, sparse_value};
+use crate::integrate::switching::{Part, Watched};
+use crate::lcs::sparse::{Readings, SparseRows};
+use crate::lcs::{Input, Port, Position, PowerKind, SparseLcs};
+use crate::mna::StaticMultiport;
+use crate::settings::Settings;
+
+/// See the [module](self).
+#[derive(Debug)]
+pub(super) struct System {
+    pub(super) lcs: SparseLcs,
+    readings: Readings,
+    pub(super) kernel: Kernel,
+}
+
+impl System {
+    /// The system of a position of the switches, all devices free.
+    ///
+    /// # Errors
+    /// The reduction's.
+    pub(super) fn new(
+        multiport: &StaticMultiport,
+        position: &[bool],
+        settings: &Settings,
+    ) -> Result<Self, Error> {
+        let position = Position::free(multiport, position.to_vec());
+        let (lcs, readings) =
+            SparseLcs::with_readings(multiport, &position).map_err(|e| Error::before(e.into()))?;
+        Ok(Self {
+            kernel: Kernel::new(&lcs, settings),
+            lcs,
+            readings,
+        })
+    }
+
+    pub(super) fn m(&self) -> usize {
+        self.lcs.ports.len()
+    }
+
+    /// Of each state the storage element.
+    pub(super) fn storage_of(&self) -> &[usize] {
+        &self.readings.storage_of
+    }
+
+    /// Makes the implicit step of h from `step.x` with inputs u at its end; see [`Kernel::step`].
+    ///
+    /// # Errors
+    /// The kernel's, at `t`.
+    pub(super) fn implicit(
+        &mut self,
+        (t, h, slack): (f64, f64, f64),
+        u: &[f64],
+        step: &mut Step,
+    ) -> Result<(), Error> {
+        let lcs = &self.lcs;
+        lcs.e.add_times(h, u, &mut step.x);
+        for (x, e0) in step.x.iter_mut().zip(&lcs.e0) {
+            *x += h * e0;
+        }
+        step.q.clone_from(&lcs.f);
+        lcs.g.add_times(1.0, u, &mut step.q);
+        let made = self.kernel.step(lcs, (h, slack), step);
+        let made = made.and_then(|()| {
+            let finite = step.x.iter().all(|x| x.is_finite());
+            finite.then_some(()).ok_or((Reason::Overflow, None))
+        });
+        made.map_err(|(reason, port)| {
+            let error = Error::at(t, reason);
+            match port {
+                Some(port) => error.device(lcs.ports[port].device.clone()),
+                None => error,
+            }
+        })
+    }
+
+    /// Whether two states are closer than this part of the largest value of each unit.
+    pub(super) fn are_within(&self, part: f64, a: &[f64], b: &[f64]) -> bool {
+        let (mut volts, mut amperes) = (0.0_f64, 0.0_f64);
+        let states = || self.lcs.states.iter().zip(a.iter().zip(b));
+        for (state, (a, b)) in states() {
+            let side = if state.unit == "V" {
+                &mut volts
+            } else {
+                &mut amperes
+            };
+            *side = side.max(a.abs()).max(b.abs());
+        }
+        states().all(|(state, (a, b))| {
+            let size = if state.unit == "V" { volts } else { amperes };
+            (a - b).abs() <= part * size
+        })
+    }
+
+    /// Probe values at a point.
+    pub(super) fn read(&self, at: Point<'_>, row: &mut [f64]) {
+        for (i, value) in row.iter_mut().enumerate() {
+            *value = sparse_value(&self.lcs.output_rows, i, at);
+        }
+    }
+
+    /// s = X x + U u + k, all capacitor voltages and inductor currents.
+    pub(super) fn storage(&self, x: &[f64], u: &[f64]) -> Vec<f64> {
+        let rows = &self.readings.storage;
+        let mut s = rows.one.clone();
+        rows.x.add_times(1.0, x, &mut s);
+        rows.u.add_times(1.0, u, &mut s);
+        s
+    }
+
+    /// s' = X x' + U u'.
+    pub(super) fn storage_rate(&self, slope: &[f64], du: &[f64]) -> Vec<f64> {
+        let rows = &self.readings.storage;
+        let mut s = vec![0.0; rows.one.len()];
+        rows.x.add_times(1.0, slope, &mut s);
+        rows.u.add_times(1.0, du, &mut s);
+        s
+    }
+
+    /// aᵀ M b with the metric M of stored energy.
+    pub(super) fn product(&self, a: &[f64], b: &[f64]) -> f64 {
+        let entries = self.readings.metric.entries();
+        entries.map(|(i, j, value)| a[i] * value * b[j]).sum()
+    }
+
+    /// (from sources, dissipated) at a point, W.
+    pub(super) fn power(&self, at: Point<'_>) -> (f64, f64) {
+        let Readings {
+            power,
+            power_v,
+            power_i,
+            ..
+        } = &self.readings;
+        let (mut source, mut dissipated) = (0.0, 0.0);
+        for (i, kind) in power.iter().enumerate() {
+            let product = sparse_value(power_v, i, at) * sparse_value(power_i, i, at);
+            match kind {
+                PowerKind::Source => source -= product,
+                PowerKind::Dissipated => dissipated += product,
+                PowerKind::Line => {}
+            }
+        }
+        (source, dissipated)
+    }
+
+    /// The work out of the sources, J, in a jump by impulses p of the ports and a step of the inputs: the impulse of one factor times the mean of the other.
+    pub(super) fn work_of_sources(
+        &self,
+        before: Point<'_>,
+        after: Point<'_>,
+        impulse: (&[f64], &[f64]),
+    ) -> f64 {
+        let mean =
+            |kind| 0.5 * (self.work(kind, before, impulse) + self.work(kind, after, impulse));
+        -mean(PowerKind::Source)
+    }
+
+    /// What forward drops take up of impulses p that end at a point, J: the work into devices less −(v − v_drop) i of ideal pairs, which is their part of pᵀy.
+    pub(super) fn taken_by_drops(&self, after: Point<'_>, p: &[f64]) -> f64 {
+        let still = vec![0.0; after.u.len()];
+        let taken = self.work(PowerKind::Dissipated, after, (p, &still));
+        let lcs = &self.lcs;
+        let mut y = lcs.f.clone();
+        lcs.c.add_times(1.0, after.x, &mut y);
+        lcs.g.add_times(1.0, after.u, &mut y);
+        taken + y.iter().zip(p).map(|(y, p)| y * p).sum::<f64>()
+    }
+
+    /// The work into the elements of a kind, J, by impulses where the other factor is that of a point.
+    fn work(&self, kind: PowerKind, at: Point<'_>, (p, step): (&[f64], &[f64])) -> f64 {
+        let Readings {
+            power,
+            power_v,
+            power_i,
+            ..
+        } = &self.readings;
+        let impulse = |rows: &SparseRows, i: usize| -> f64 {
+            let of_ports = rows.lambda.row(i).map(|(j, w)| w * p[j]);
+            let of_step = rows.du.row(i).map(|(j, w)| w * step[j]);
+            of_ports.chain(of_step).sum()
+        };
+        let elements = (0..power.len()).filter(|&i| power[i] == kind);
+        let work = elements.map(|i| {
+            impulse(power_i, i) * sparse_value(power_v, i, at)
+                + impulse(power_v, i) * sparse_value(power_i, i, at)
+        });
+        work.sum()
+    }
+}
+
+impl Watched for System {
+    fn inputs(&self) -> &[Input] {
+        &self.lcs.inputs
+    }
+
+    fn ports(&self) -> &[Port] {
+        &self.lcs.ports
+    }
+
+    fn control(&self, i: usize, at: Point<'_>) -> (f64, f64) {
+        let controls = &self.readings.controls;
+        (
+            sparse_value(controls, i, at),
+            sparse_magnitude(controls, i, at),
+        )
+    }
+
+    fn control_of_sources(&self, i: usize) -> (Vec<f64>, f64) {
+        let SparseRows { u, one, .. } = &self.readings.controls;
+        let mut gains = vec![0.0; u.shape[1]];
+        u.row(i).for_each(|(j, gain)| gains[j] = gain);
+        (gains, one[i])
+    }
+
+    fn control_is_free_of(&self, i: usize, of: Part) -> bool {
+        let controls = &self.readings.controls;
+        let block = match of {
+            Part::States => &controls.x,
+            Part::Devices => &controls.lambda,
+            Part::Slopes => &controls.du,
+        };
+        block.row(i).next().is_none()
+    }
+}

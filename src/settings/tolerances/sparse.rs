@@ -1,0 +1,38 @@
+//! Steps of large circuits.
+
+/// Factors kept. Larger: memory; smaller: those of an active set or step length that comes again are made again.
+pub(crate) const KEPT: usize = 96;
+
+/// So often all ports that disagree change sides at once though they grow no fewer, before it is one at a time. Larger: rounds in vain; smaller: rounds of one port.
+pub(crate) const PATIENCE: usize = 10;
+
+/// Rounds by port before the dense problem is tried. Larger: rounds in vain; smaller: a dense matrix in their place.
+pub(crate) const LONE: usize = 2;
+
+/// Most entries of a dense response of states to ports. Larger: hundreds of megabytes; smaller: degenerate circuits of this size are refused.
+pub(crate) const MOST_DENSE: usize = 1 << 25;
+
+/// The step that takes up a jump, as a part of the span. Larger: fast motions behind an edge are cut; smaller: slopes of rounding.
+pub(crate) const INSTANT: f64 = 1.0 / (1_u64 << 34) as f64;
+
+/// The first step behind a jump, in units of [`INSTANT`]. Larger: steps in vain; smaller: more steps until they are long.
+pub(crate) const AFTER: f64 = 64.0;
+
+/// Where in a step the slopes of sources at its end are taken, as they may turn there. Larger: rounding takes it beyond; smaller: the slope of a sine some way before.
+pub(crate) const INSIDE: f64 = 1.0 - 1e-9;
+
+/// Such steps at most. Larger: more of them where something is as fast as they are; smaller: a jump in several parts is cut.
+pub(crate) const INSTANTS: u32 = 8;
+
+/// A jump is over where the next of these steps moves the state by less than this part. Larger: the end of a jump is taken for a slope; smaller: fast motions for a jump.
+pub(crate) const RESTS: f64 = 1e-6;
+
+/// Storage elements and ideal pairs up to which dense matrices take over where sparse steps cannot go on. Larger: runs that take hours instead of an error; smaller: errors
+/// for circuits that dense matrices master.
+pub(crate) const MOST_DENSE_STATES: usize = 2000;
+
+/// So many steps have to come further than [`PROGRESS`]. Larger: a run that is stuck is noticed late; smaller: runs of many events end that would come to their end.
+pub(crate) const PROGRESS_STEPS: u64 = 20_000;
+
+/// A part of the span, see [`PROGRESS_STEPS`].
+pub(crate) const PROGRESS: f64 = 1e-4;
