@@ -215,10 +215,33 @@ impl Sparse {
         Ok(())
     }
 
+    /// Gives up factors of the positions that were left longest ago where all together are more than may be kept.
+    fn bound_factors(&mut self) {
+        let here = self.now.system;
+        self.systems[here].1.entered = self.stats.events;
+        let systems = || self.systems.iter().enumerate();
+        let mut total: usize = systems().map(|(_, (_, s))| s.kernel.bytes()).sum();
+        if total <= self.settings.max_kept {
+            return;
+        }
+        let mut oldest: Vec<(u64, usize)> = systems().map(|(at, (_, s))| (s.entered, at)).collect();
+        oldest.sort_unstable();
+        for (_, at) in oldest.into_iter().filter(|(_, at)| *at != here) {
+            // Half of it, so that this is not asked at each change.
+            if 2 * total <= self.settings.max_kept {
+                return;
+            }
+            let kernel = &mut self.systems[at].1.kernel;
+            total -= kernel.bytes();
+            kernel.forget();
+        }
+    }
+
     /// Takes storage s over into the system of the present switch position.
     fn take_position(&mut self, s: &[f64]) -> Result<(), Error> {
         let position = self.switches.position().to_vec();
         self.now.system = self.system_of(&position)?;
+        self.bound_factors();
         let system = &self.systems[self.now.system].1;
         let x = system.lcs.state_from(s);
         let account = taking_over(system, s, &x, &self.now.u);

@@ -152,6 +152,17 @@ impl Kernel {
         }
     }
 
+    /// Bytes of the factors kept.
+    pub(super) fn bytes(&self) -> usize {
+        self.kept.iter().map(|kept| kept.factors.bytes()).sum()
+    }
+
+    /// Gives up what can be made again.
+    pub(super) fn forget(&mut self) {
+        self.kept = Vec::new();
+        self.dense = None;
+    }
+
     /// √P_ii of every state.
     pub(super) fn state_scale(&self) -> &[f64] {
         &self.state_scale

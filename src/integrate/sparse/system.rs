@@ -15,6 +15,8 @@ pub(super) struct System {
     pub(super) lcs: SparseLcs,
     readings: Readings,
     pub(super) kernel: Kernel,
+    /// The number of events when it was entered last.
+    pub(super) entered: u64,
 }
 
 impl System {
@@ -34,6 +36,7 @@ impl System {
             kernel: Kernel::new(&lcs, settings),
             lcs,
             readings,
+            entered: 0,
         })
     }
 
