@@ -333,19 +333,18 @@ fn dispatch(
             progress: progress.as_mut().map(|p| &mut **p as &mut dyn FnMut(f64)),
             ..frame(method, notes.clone())
         };
+        let (storage, pairs) = problem.size();
+        let last = storage + pairs > MOST_DENSE_STATES;
         let attempted = problem
             .sparse(&tran, scheme, stepping, settings)
             .and_then(|mut sparse| {
                 let mut all =
                     Accompanied::new(&mut sparse, coarser, &units, tran.tstop, options.cancel);
-                attempt(&mut all, frame, &mut log, false)
+                attempt(&mut all, frame, &mut log, last)
             });
-        let (storage, pairs) = problem.size();
         match attempted {
             Ok(run) => return Ok(run),
-            Err(error) if is_final(&error) || storage + pairs > MOST_DENSE_STATES => {
-                return Err(error);
-            }
+            Err(error) if last || is_final(&error) => return Err(error),
             Err(error) => {
                 log.again();
                 let text =
