@@ -160,7 +160,7 @@ fn meets_exact(path: &str) {
     );
 }
 
-/// Prescribed steps are those of the dense steppers: the midpoint rule with the same damped start, and Moreau's.
+/// Errors fall with h for Moreau's scheme and with h² for the midpoint rule, whose first step is one of Moreau's.
 #[test]
 fn prescribed_steps_converge_in_their_order() {
     let path = runs::root().join("netlists/rlc.cir");

@@ -3,6 +3,8 @@
 use std::fmt::{Display, Formatter, Result};
 use std::sync::Arc;
 
+use crate::lcs::Port;
+
 /// A switch or device that changed its state.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Change {
@@ -32,6 +34,22 @@ impl Change {
             Self::Switch { name, .. } | Self::Slides(name) | Self::Device { name, .. } => name,
         }
     }
+}
+
+/// The devices one of whose ports began or ceased to conduct, each once; a device conducts where one of its ports does.
+pub(crate) fn changes_of_devices(ports: &[Port], before: &[bool], after: &[bool]) -> Vec<Change> {
+    let mut changes: Vec<Change> = Vec::new();
+    for (j, port) in ports.iter().enumerate() {
+        let known = || changes.iter().any(|change| change.name() == port.device);
+        if after[j] != before[j] && !known() {
+            let own = |k: &usize| ports[*k].device == port.device;
+            changes.push(Change::Device {
+                name: port.device.as_str().into(),
+                conducts: (0..ports.len()).filter(own).any(|k| after[k]),
+            });
+        }
+    }
+    changes
 }
 
 impl Display for Change {

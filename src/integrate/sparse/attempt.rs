@@ -3,7 +3,7 @@
 use super::{Now, Rule, Sparse};
 use crate::integrate::curved::tableau::{ERROR, GAMMA, LOWER, NODES, STAGES, WEIGHTS};
 use crate::integrate::error::{Error, Reason};
-use crate::integrate::event::Change;
+use crate::integrate::event::changes_of_devices;
 use crate::integrate::reading::Point;
 use crate::lcs::Role;
 use crate::settings::tolerances::sparse::INSIDE;
@@ -44,7 +44,7 @@ impl Sparse {
         self.trial.loss = 0.0;
         let rule = match self.rule {
             // After an edge or a jump a step of the midpoint rule would swing around what is faster than the step (Rannacher 1984).
-            Rule::Theta(_) if self.now.settle => Rule::Theta(1.0),
+            Rule::Theta(theta) if theta == 0.5 && self.now.settle => Rule::Theta(1.0),
             rule => rule,
         };
         match rule {
@@ -225,23 +225,17 @@ impl Sparse {
     pub(super) fn take_active(&mut self, active: Vec<bool>) {
         let ports = &self.systems[self.now.system].1.lcs.ports;
         if active != self.now.active && self.started {
-            let conducts = |set: &[bool], j: usize| set[j] == (ports[j].role != Role::Voltage);
-            let changed = (0..active.len()).filter(|&j| active[j] != self.now.active[j]);
-            let mut changes: Vec<Change> = Vec::new();
-            for j in changed {
-                let name = ports[j].device.as_str();
-                if changes.iter().all(|change| change.name() != name) {
-                    changes.push(Change::Device {
-                        name: name.into(),
-                        conducts: conducts(&active, j),
-                    });
-                }
-            }
+            let conducting = |set: &[bool]| -> Vec<bool> {
+                let sides = set.iter().zip(ports);
+                sides
+                    .map(|(on, port)| *on == (port.role != Role::Voltage))
+                    .collect()
+            };
+            let [before, after] = [&self.now.active, &active].map(|set| conducting(set));
+            let changes = changes_of_devices(ports, &before, &after);
             self.pending.push((self.now.t, changes.into()));
         }
-        if !self.modes.contains(&(self.now.system, active.clone())) {
-            self.modes.insert((self.now.system, active.clone()));
-        }
+        self.modes.insert((self.now.system, active.clone()));
         self.now.active = active;
     }
 

@@ -1,6 +1,7 @@
 //! One step: tried with the present active set, else solved, then committed.
 
 use super::*;
+use crate::integrate::event::changes_of_devices;
 use crate::settings::tolerances::times::SAME_TIME;
 
 impl Theta {
@@ -225,17 +226,7 @@ impl Theta {
             |(&lambda, port): (&Option<bool>, &Port)| lambda == Some(port.role != Role::Voltage);
         let pattern: Vec<bool> = seen.iter().zip(ports).map(on).collect();
         if pattern != *before && self.started {
-            let mut changes: Vec<Change> = Vec::new();
-            for (j, port) in ports.iter().enumerate() {
-                let known = || changes.iter().any(|change| change.name() == port.device);
-                if pattern[j] != before[j] && !known() {
-                    let own = |k: &usize| ports[*k].device == port.device;
-                    changes.push(Change::Device {
-                        name: port.device.as_str().into(),
-                        conducts: (0..ports.len()).filter(own).any(|k| pattern[k]),
-                    });
-                }
-            }
+            let changes = changes_of_devices(ports, before, &pattern);
             self.pending.push((t, changes.into()));
         }
         self.modes.insert((self.now.system, pattern.clone()));
