@@ -29,7 +29,9 @@ fn sparse(model: &Model, tol: f64, step: Option<f64>) -> Run {
     };
     let run = run(model, Method::Theta, step, settings);
     assert!(is_sparse(&run), "{:?}", run.plan);
-    assert!(run.notes.iter().all(|note| note.code != "steps-instead"));
+    let title = &run.waveforms.title;
+    let fell_back = run.notes.iter().find(|note| note.code == "steps-instead");
+    assert!(fell_back.is_none(), "{title}: {fell_back:?}");
     run
 }
 
@@ -117,7 +119,7 @@ fn steps_without_zeros_meet_exact_integration() {
         "three-phase-rectifier",
         "voltage-doubler",
     ] {
-        meets_exact(&format!("netlists/{name}.cir"));
+        meets_exact(&format!("netlists/{name}.cir"), 1e-8);
     }
     for name in [
         "bridge_leaks",
@@ -135,11 +137,20 @@ fn steps_without_zeros_meet_exact_integration() {
         "windings_share",
         "zener_impulse",
     ] {
-        meets_exact(&format!("tests/findings/{name}.cir"));
+        meets_exact(&format!("tests/findings/{name}.cir"), 1e-8);
     }
 }
 
-fn meets_exact(path: &str) {
+/// Resistances of one circuit that lie 18 decades apart: a reverse current is none beside what another port blocks (2.9e-3 and 1.5e-2 off where it was taken for one, with 2e-6
+/// and 1e-5 stated). The power in 1 nΩ is a product with the rounding of its voltage.
+#[test]
+fn decades_between_resistances_hide_no_current() {
+    for name in ["decades_in_a_bridge", "decades_in_a_cuk"] {
+        meets_exact(&format!("tests/findings/{name}.cir"), 1e-5);
+    }
+}
+
+fn meets_exact(path: &str, unexplained: f64) {
     let path = runs::root().join(path);
     let model = Model::load(&path, ElaborateOptions::default()).expect("a circuit");
     let exact = run(&model, Method::Exact, None, Settings::default());
@@ -147,7 +158,7 @@ fn meets_exact(path: &str) {
     let apart = distance(&exact, &steps);
     assert!(apart < 3e-6, "{path:?}: {apart:e}");
     let residual = steps.energy.residual_relative;
-    assert!(residual < 1e-8, "{path:?}: {:?}", steps.energy);
+    assert!(residual < unexplained, "{path:?}: {:?}", steps.energy);
     let lost = (steps.energy.jumps - exact.energy.jumps).abs();
     assert!(
         lost <= 1e-5

@@ -22,6 +22,7 @@ use crate::integrate::error::Reason;
 use crate::lcs::SparseLcs;
 use crate::linalg::sparse_lu::{Pattern, SparseLu};
 use crate::settings::Settings;
+use crate::settings::tolerances::events::STEP_GUARD;
 use crate::settings::tolerances::sparse::{KEPT, LONE, MOST_DENSE, PATIENCE};
 use crate::solve::{Driver, Status};
 
@@ -285,23 +286,28 @@ impl Kernel {
         }
     }
 
-    /// The ports whose λ or y is below zero by more than a solution may be off.
+    /// The ports whose λ or y is below zero by more than it is known. The terms of its own row are known to rounding, and so is λ_j, as the diagonal is one: what others carry says
+    /// nothing of it, as decades of resistance may lie between them. Ports without resistance share what keeps the states on their constraints: of these λ is known to the
+    /// residual of a solution beside the largest.
     fn disagreeing(&self, lcs: &SparseLcs, step: &Step, asking: &mut Vec<usize>) {
         asking.clear();
         let (states, lambda) = self.solution.split_at(self.n);
-        let most = lambda.iter().fold(0.0_f64, |most, l| most.max(l.abs()));
+        let resists = |j: usize| self.diagonals[j].0 > 0.0;
+        let bare = (0..lambda.len()).filter(|&j| !resists(j));
+        let most = bare.fold(0.0_f64, |most, j| most.max(lambda[j].abs()));
         for (j, &own) in lambda.iter().enumerate() {
-            let (value, size) = if step.active[j] {
-                (own, most)
-            } else {
-                let scale = self.port_scale[j];
-                let x = (lcs.c.row(j)).map(|(k, c)| c * states[k] / self.state_scale[k] * scale);
-                let ports = (lcs.d.row(j)).map(|(k, d)| d * lambda[k] * self.port_scale[k] * scale);
-                let constant = step.q[j] * scale;
-                let sum = |(sum, size): (f64, f64), term: f64| (sum + term, size + term.abs());
-                x.chain(ports).fold((constant, constant.abs()), sum)
+            let scale = self.port_scale[j];
+            let x = (lcs.c.row(j)).map(|(k, c)| c * states[k] / self.state_scale[k] * scale);
+            let ports = (lcs.d.row(j)).map(|(k, d)| d * lambda[k] * self.port_scale[k] * scale);
+            let constant = step.q[j] * scale;
+            let sum = |(sum, size): (f64, f64), term: f64| (sum + term, size + term.abs());
+            let (y, size) = x.chain(ports).fold((constant, constant.abs()), sum);
+            let (value, noise) = match (step.active[j], resists(j)) {
+                (true, false) => (own, self.tolerance * most),
+                (true, true) => (own, STEP_GUARD * size),
+                (false, _) => (y, STEP_GUARD * size),
             };
-            if value < -self.tolerance * size {
+            if value < -noise {
                 asking.push(j);
             }
         }
