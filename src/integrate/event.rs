@@ -113,3 +113,25 @@ pub(crate) fn conducts(device: &str, t: f64) -> Event {
         jump: false,
     }
 }
+
+#[cfg(test)]
+mod device_tests {
+    use super::*;
+    use crate::law::Law;
+    use crate::lcs::Role;
+
+    #[test]
+    fn a_device_conducts_where_one_of_its_ports_does() {
+        let port = |device: &str| Port {
+            device: device.into(),
+            role: Role::Current,
+            lambda: String::new(),
+            y: String::new(),
+            law: Law::ideal_diode(),
+        };
+        let ports = [port("z1"), port("d1"), port("z1")];
+        let changes = changes_of_devices(&ports, &[true, false, true], &[false, true, true]);
+        let told: Vec<String> = changes.iter().map(ToString::to_string).collect();
+        assert_eq!(told, ["z1 conducts", "d1 conducts"]);
+    }
+}

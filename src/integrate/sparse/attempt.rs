@@ -1,5 +1,6 @@
 //! One step that is not made yet, and the step made.
 
+use super::system::Largest;
 use super::{Now, Rule, Sparse};
 use crate::integrate::curved::tableau::{ERROR, GAMMA, LOWER, NODES, STAGES, WEIGHTS};
 use crate::integrate::error::{Error, Reason};
@@ -164,18 +165,11 @@ impl Sparse {
     /// The largest of what the trial's states may be off by, relative to their amplitudes.
     pub(super) fn error(&self) -> f64 {
         let system = self.system();
-        let units = |k: usize| system.lcs.states[k].unit == "V";
-        let (mut volts, mut amperes) = self.sources;
-        for (seen, storage) in self.seen.iter().zip(&self.multiport.storage) {
-            let side = if storage.capacitor {
-                &mut volts
-            } else {
-                &mut amperes
-            };
-            *side = side.max(*seen);
-        }
+        let seen = self.storage_units.iter().copied();
+        let seen = Largest::of(seen.zip(self.seen.iter().copied()));
         let scales = |k: usize| {
-            let floor = FAINT * if units(k) { volts } else { amperes };
+            let unit = system.lcs.states[k].unit;
+            let floor = FAINT * self.sources.among(unit).max(seen.among(unit));
             let seen = self.seen[system.storage_of()[k]];
             seen.max(self.trial.x[k].abs()).max(floor)
         };

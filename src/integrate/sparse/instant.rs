@@ -1,7 +1,7 @@
 //! What happens in no time: the start, edges of sources, switches.
 
 use super::Sparse;
-use super::system::System;
+use super::system::{Largest, System};
 use crate::integrate::error::{Error, Reason};
 use crate::integrate::log::Log;
 use crate::integrate::reading::Point;
@@ -158,27 +158,20 @@ impl Sparse {
     fn note_jump(&mut self, before: &[f64], lost: f64, reason: JumpReason, log: &mut Log) {
         let system = &self.systems[self.now.system].1;
         let after = system.storage(&self.now.x, &self.now.u);
-        let storage = &self.multiport.storage;
-        let kind = |capacitor: bool| {
-            let same = (0..after.len()).filter(|&k| storage[k].capacitor == capacitor);
-            same.map(|k| before[k].abs().max(after[k].abs()))
-                .fold(0.0, f64::max)
-        };
-        let sizes = [kind(false), kind(true)];
+        let units = &self.storage_units[..];
+        let sizes = before.iter().zip(&after).map(|(b, a)| b.abs().max(a.abs()));
+        let largest = Largest::of(units.iter().copied().zip(sizes));
         let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
         let jumped: Vec<usize> = (0..after.len())
-            .filter(|&k| change[k].abs() > NO_JUMP * sizes[usize::from(storage[k].capacitor)])
+            .filter(|&k| change[k].abs() > NO_JUMP * largest.among(units[k]))
             .collect();
         if jumped.is_empty() {
             return;
         }
         self.stats.jumps += 1;
         log.event(self.now.t, std::sync::Arc::default(), true);
-        let elements: Vec<String> = storage.iter().map(|s| s.element.clone()).collect();
-        let units: Vec<&str> = storage
-            .iter()
-            .map(|s| if s.capacitor { "V" } else { "A" })
-            .collect();
+        let elements = self.multiport.storage.iter().map(|s| s.element.clone());
+        let elements: Vec<String> = elements.collect();
         let balance = &self.now.balance;
         let sizes = (
             balance.lost_in_jumps() - lost,
@@ -187,7 +180,7 @@ impl Sparse {
         );
         log.state_jump(StateJump::new(
             self.now.t,
-            (&elements, &units),
+            (&elements, units),
             &jumped,
             sizes,
             reason,

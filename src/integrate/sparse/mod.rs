@@ -34,7 +34,7 @@ use crate::settings::tolerances::steps::GRANT_EMBEDDED;
 use crate::settings::tolerances::times::SAME_TIME;
 use attempt::Trial;
 use kernel::Step;
-use system::System;
+use system::{Largest, System};
 
 /// How a step is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,8 +93,10 @@ pub(crate) struct Sparse {
     step: Step,
     /// By storage element: largest |value| so far.
     seen: Vec<f64>,
-    /// The largest source, by unit: (V, A).
-    sources: (f64, f64),
+    /// Its unit, by storage element.
+    storage_units: Vec<&'static str>,
+    /// The largest sources.
+    sources: Largest,
     /// When switches that sources drive move next, as far as that was asked, and which: (asked until, when, which).
     known: Option<(f64, f64, Vec<usize>)>,
     pending: Vec<(f64, Arc<[Change]>)>,
@@ -143,15 +145,11 @@ impl Sparse {
         } = setup;
         let system = System::new(&multiport, &position, &settings)?;
         let inputs = Inputs::new(&system.lcs.inputs);
-        let mut sources = (0.0_f64, 0.0_f64);
-        for (input, value) in system.lcs.inputs.iter().zip(inputs.amplitudes()) {
-            let side = if input.unit == "V" {
-                &mut sources.0
-            } else {
-                &mut sources.1
-            };
-            *side = side.max(value);
-        }
+        let units = system.lcs.inputs.iter().map(|input| input.unit);
+        let sources = Largest::of(units.zip(inputs.amplitudes()));
+        let storage_units = multiport.storage.iter();
+        let storage_units = storage_units.map(|s| if s.capacitor { "V" } else { "A" });
+        let storage_units = storage_units.collect();
         let thresholds: Vec<Threshold> = multiport.switches.iter().map(Threshold::of).collect();
         let switches = Switches::new(position.clone(), thresholds, &system);
         let u = inputs.all_before(t);
@@ -200,6 +198,7 @@ impl Sparse {
             started: false,
             trial: Trial::default(),
             step: Step::default(),
+            storage_units,
             sources,
             known: None,
             pending: Vec::new(),

@@ -9,6 +9,36 @@ use crate::lcs::{Input, Port, Position, PowerKind, SparseLcs};
 use crate::mna::StaticMultiport;
 use crate::settings::Settings;
 
+/// The largest values of each unit.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Largest {
+    volts: f64,
+    amperes: f64,
+}
+
+impl Largest {
+    /// Of values with their units, none of them negative.
+    pub(super) fn of<'a>(values: impl IntoIterator<Item = (&'a str, f64)>) -> Self {
+        let mut largest = Self::default();
+        for (unit, value) in values {
+            let side = match unit {
+                "V" => &mut largest.volts,
+                _ => &mut largest.amperes,
+            };
+            *side = side.max(value);
+        }
+        largest
+    }
+
+    /// The largest one of a unit.
+    pub(super) fn among(&self, unit: &str) -> f64 {
+        match unit {
+            "V" => self.volts,
+            _ => self.amperes,
+        }
+    }
+}
+
 /// See the [module](self).
 #[derive(Debug)]
 pub(super) struct System {
@@ -82,20 +112,10 @@ impl System {
 
     /// Whether two states are closer than this part of the largest value of each unit.
     pub(super) fn are_within(&self, part: f64, a: &[f64], b: &[f64]) -> bool {
-        let (mut volts, mut amperes) = (0.0_f64, 0.0_f64);
         let states = || self.lcs.states.iter().zip(a.iter().zip(b));
-        for (state, (a, b)) in states() {
-            let side = if state.unit == "V" {
-                &mut volts
-            } else {
-                &mut amperes
-            };
-            *side = side.max(a.abs()).max(b.abs());
-        }
-        states().all(|(state, (a, b))| {
-            let size = if state.unit == "V" { volts } else { amperes };
-            (a - b).abs() <= part * size
-        })
+        let sizes = states().map(|(state, (a, b))| (state.unit, a.abs().max(b.abs())));
+        let largest = Largest::of(sizes);
+        states().all(|(state, (a, b))| (a - b).abs() <= part * largest.among(state.unit))
     }
 
     /// Probe values at a point.
