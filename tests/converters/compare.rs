@@ -78,6 +78,8 @@ fn attempt(text: &str, method: Method, tol: f64) -> Result<Run, String> {
             settings: Settings {
                 tol,
                 max_steps: MOST_STEPS,
+                large: super::number("CIRC_CONVERTERS_LARGE")
+                    .map_or(Settings::default().large, |large| large as usize),
                 ..Settings::default()
             },
             ..SimOptions::default()

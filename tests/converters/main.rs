@@ -2,7 +2,8 @@
 //! ngspice, and after every change that must not matter.
 //!
 //! `CIRC_CONVERTERS=N cargo test --release --test converters -- --nocapture` runs N cases; `CIRC_CONVERTERS_SEED` is the first
-//! seed (else the clock's), `CIRC_CONVERTERS_FOLDER` takes the netlists of failures.
+//! seed (else the clock's), `CIRC_CONVERTERS_FOLDER` takes the netlists of failures. With
+//! `CIRC_CONVERTERS_LARGE=0` their steps are those of large circuits.
 #![allow(missing_docs, reason = "tests")]
 
 mod bench;
