@@ -9,6 +9,7 @@ mod piece;
 mod polyline;
 mod spice;
 
+pub(crate) use crossings::first_crossing;
 pub use crossings::{Crossing, Rest, crossings};
 pub use piece::{Oscillation, Piece};
 pub use spice::{Form, WaveError};

@@ -1,7 +1,7 @@
 //! The sources of a system, evaluated together.
 
 use crate::circuit::Source;
-use crate::circuit::source::{Piece, Rest, Wave, crossings};
+use crate::circuit::source::{Crossing, Piece, Rest, Wave, first_crossing};
 use crate::integrate::line::{Line, Lines};
 use crate::lcs::Input;
 use crate::settings::tolerances::steps::STEPS_PER_PERIOD;
@@ -201,11 +201,8 @@ impl Inputs {
         } else {
             Rest::IsNeither
         };
-        let passages = crossings(&terms, (constant, level), rest, from, to);
-        passages
-            .into_iter()
-            .find(|c| c.rising == (direction == Passage::Rising))
-            .map(|c| c.time)
+        let wanted = |c: Crossing| c.rising == (direction == Passage::Rising);
+        first_crossing(&terms, (constant, level), rest, (from, to), wanted).map(|c| c.time)
     }
 
     /// The largest value each input takes (a bound, for sinusoids), in the order of u.

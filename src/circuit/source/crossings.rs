@@ -28,38 +28,53 @@ pub enum Rest {
 #[must_use]
 pub fn crossings(
     terms: &[(f64, &Source)],
-    (constant, level): (f64, f64),
+    levels: (f64, f64),
     rest: Rest,
     from: f64,
     to: f64,
 ) -> Vec<Crossing> {
+    let mut found = Vec::new();
+    let all = |crossing| {
+        found.push(crossing);
+        false
+    };
+    first_crossing(terms, levels, rest, (from, to), all);
+    found
+}
+
+/// The first passage that is `wanted`, among those of [`crossings`]; what comes after it is not looked at.
+pub(crate) fn first_crossing(
+    terms: &[(f64, &Source)],
+    (constant, level): (f64, f64),
+    rest: Rest,
+    (from, to): (f64, f64),
+    mut wanted: impl FnMut(Crossing) -> bool,
+) -> Option<Crossing> {
     let combination = Combination {
         terms,
         constant: constant - level,
     };
-    let mut found = Vec::new();
     let side = |value: f64| match (sign(value), rest) {
         (0, Rest::IsBelow) => -1,
         (sign, _) => sign,
     };
-    let mut above = side(combination.just_after(from));
+    let mut passages = Passages {
+        side: side(combination.just_after(from)),
+        wanted: &mut wanted,
+        found: None,
+    };
     let mut start = from;
-    while start < to {
+    while start < to && passages.found.is_none() {
         let end = terms
             .iter()
             .filter_map(|(_, source)| source.next_breakpoint(start))
             .fold(to, f64::min);
-        let mut passages = Passages {
-            side: above,
-            found: &mut found,
-        };
         passages.enter(start, side(combination.just_after(start)));
         combination.search(start, end, &mut passages);
         passages.enter(end, side(combination.just_after(end)));
-        above = passages.side;
         start = end;
     }
-    found
+    passages.found
 }
 
 fn sign(value: f64) -> i8 {
@@ -72,22 +87,23 @@ fn sign(value: f64) -> i8 {
     }
 }
 
-/// The last side of the level that was not the level itself, and the passages found.
+/// The last side of the level that was not the level itself, and the first passage that is wanted.
 struct Passages<'a> {
     side: i8,
-    found: &'a mut Vec<Crossing>,
+    wanted: &'a mut dyn FnMut(Crossing) -> bool,
+    found: Option<Crossing>,
 }
 
 impl Passages<'_> {
     /// Right after `time` the combination is on this side of the level.
     fn enter(&mut self, time: f64, side: i8) {
-        if side != 0 && side != self.side {
-            self.found.push(Crossing {
-                time,
-                rising: side > 0,
-            });
-            self.side = side;
+        if side == 0 || side == self.side || self.found.is_some() {
+            return;
         }
+        self.side = side;
+        let rising = side > 0;
+        let crossing = Crossing { time, rising };
+        self.found = (self.wanted)(crossing).then_some(crossing);
     }
 }
 
@@ -213,7 +229,9 @@ impl Smooth {
     /// Halves [a, b] until on each part f keeps its sign or is monotone, then bisects. Parts come in order of time.
     fn search(&self, start: f64, end: f64, passages: &mut Passages<'_>) {
         let mut parts = vec![(start, end)];
-        while let Some((a, b)) = parts.pop() {
+        while let Some((a, b)) = parts.pop()
+            && passages.found.is_none()
+        {
             let (middle, half) = (a + 0.5 * (b - a), 0.5 * (b - a));
             let (first, second) = self.derivative_bounds(a, b);
             if self.value(middle).abs() > first * half {

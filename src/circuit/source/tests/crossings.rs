@@ -115,3 +115,26 @@ fn crossings_of_a_modulated_tone() {
             .all(|crossing| wave.value(crossing.time).abs() < 1e-11)
     );
 }
+
+/// A clock of a thousand million periods is not followed to its end.
+#[test]
+fn the_first_crossing_that_is_wanted_ends_the_search() {
+    let clock = source("pulse", &[0.0, 1.0, 0.0, 0.25e-6, 0.25e-6, 0.25e-6, 1e-6]);
+    let mut seen = Vec::new();
+    let terms = [(1.0, &clock)];
+    let found = first_crossing(
+        &terms,
+        (0.0, 0.5),
+        Rest::IsNeither,
+        (0.0, 1e3),
+        |crossing| {
+            seen.push(crossing);
+            !crossing.rising
+        },
+    );
+    assert_eq!(seen.len(), 2);
+    assert!(
+        found.is_some_and(|c| (c.time - 0.625e-6).abs() < 1e-20),
+        "{found:?}"
+    );
+}
