@@ -193,20 +193,22 @@ impl Transition<'_> {
             .balance
             .add_jump(energy::taking_over(lcs, &self.storage.values, x, &joined));
         let step = &u - &self.sources.before;
-        for (name, area) in impulses::of_jump(lcs, p, step.as_slice()) {
-            log.impulse(t, name, area);
+        if after != x || [p, &step].iter().any(|all| all.iter().any(|v| *v != 0.0)) {
+            for (name, area) in impulses::of_jump(lcs, p, step.as_slice()) {
+                log.impulse(t, name, area);
+            }
+            let source = energy::source_work_of_jump(
+                lcs,
+                x.as_slice(),
+                after.as_slice(),
+                self.sources.before.as_slice(),
+                u.as_slice(),
+                p.as_slice(),
+            );
+            let loss = energy::loss_of_jump(lcs, x, after, &u, p, free.is_projected());
+            self.storage.balance.add_jump((source, loss));
         }
-        let source = energy::source_work_of_jump(
-            lcs,
-            x.as_slice(),
-            after.as_slice(),
-            self.sources.before.as_slice(),
-            u.as_slice(),
-            p.as_slice(),
-        );
-        let loss = energy::loss_of_jump(lcs, x, after, &u, p, free.is_projected());
         self.sources.before = u;
-        self.storage.balance.add_jump((source, loss));
         let moved = s
             .iter()
             .zip(&self.storage.values)
