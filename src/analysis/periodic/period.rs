@@ -3,7 +3,7 @@
 use num_bigint::BigInt;
 use num_integer::Integer;
 use num_rational::BigRational;
-use num_traits::{Signed, ToPrimitive, Zero};
+use num_traits::{One, Signed, ToPrimitive, Zero};
 
 use crate::algebra::rational;
 use crate::circuit::source::Wave;
@@ -192,19 +192,26 @@ fn periods(wave: &Wave) -> (Vec<BigRational>, f64) {
 
 /// The simplest fraction that a positive double may stand for: 1e-5 is 1/100000, and so is what 1/(100 kHz) rounds to.
 fn simplest(x: f64) -> BigRational {
-    let exact = rational(x.abs());
-    let slack = &exact * rational(SAME_PERIOD);
-    between(&exact - &slack, &exact + slack)
+    let (exact, slack) = (rational(x.abs()), rational(SAME_PERIOD));
+    let whole = exact.denom() * slack.denom();
+    let low = exact.numer() * (slack.denom() - slack.numer());
+    let high = exact.numer() * (slack.denom() + slack.numer());
+    let (numerator, denominator) = between((&low, &whole), (&high, &whole));
+    BigRational::new(numerator, denominator)
 }
 
-/// The fraction of the least denominator in an interval of positive numbers, by continued fractions.
-fn between(low: BigRational, high: BigRational) -> BigRational {
-    let whole = low.ceil();
-    if whole <= high {
-        return whole;
+/// The fraction of the least denominator in an interval of positive fractions, by continued fractions.
+fn between(low: (&BigInt, &BigInt), high: (&BigInt, &BigInt)) -> (BigInt, BigInt) {
+    let (floor, rest) = low.0.div_rem(low.1);
+    if rest.is_zero() {
+        return (floor, BigInt::one());
     }
-    let floor = low.floor();
-    &floor + between((high - &floor).recip(), (low - &floor).recip()).recip()
+    if (&floor + 1_u8) * high.1 <= *high.0 {
+        return (floor + 1_u8, BigInt::one());
+    }
+    let beyond = high.0 - &floor * high.1;
+    let (numerator, denominator) = between((high.1, &beyond), (low.1, &rest));
+    (floor * &numerator + denominator, numerator)
 }
 
 /// The least common multiple of two positive numbers.
