@@ -129,12 +129,15 @@ impl<'a, 'o> Search<'a, 'o> {
         (period, from): (f64, f64),
         periods: usize,
     ) -> Result<Vec<Stand>, Error> {
-        let one = |_| {
+        self.simulation
+            .stand_at(from, &stand.state, &stand.switches)?;
+        let one = |k| {
             self.go_on()?;
-            *stand = self.shooting(from, Return::After(period)).shoot(stand)?.0;
+            self.simulation.advance_to(from + k as f64 * period)?;
+            *stand = Stand::of(self.simulation);
             Ok(stand.clone())
         };
-        (0..periods).map(one).collect()
+        (1..=periods).map(one).collect()
     }
 
     /// The orbit of this simulation that is near one of another, if there is one.
@@ -153,23 +156,21 @@ impl<'a, 'o> Search<'a, 'o> {
         if from > 0.0 {
             self.simulation.advance_to(from)?;
         }
-        let mut stand = Stand {
-            state: self.simulation.state(),
-            switches: self.simulation.positions(),
-        };
+        let mut stand = Stand::of(self.simulation);
         let asked = self.options.order;
         let (mut last, mut seen) = (None, vec![0.0; stand.state.len()]);
         grow(&mut seen, &stand.state);
         let mut since_start = (from / period).round() as usize;
         for periods in TRANSIENTS {
-            let passed = self.pass(&mut stand, (period, from), periods)?;
+            let mut passed = self.pass(&mut stand, (period, from), periods - 1)?;
             since_start += periods;
             passed
                 .iter()
                 .for_each(|stand| grow(&mut seen, &stand.state));
             let mut shooting = self.shooting(from, Return::After(period));
             shooting.order = asked.unwrap_or(1);
-            shooting.observe(&stand, period, &seen)?;
+            stand = shooting.observe(&stand, period, &seen)?;
+            passed.push(stand.clone());
             let found = shooting.solve(stand.clone(), closed);
             let amplitudes = shooting.amplitudes.clone();
             self.corrections = shooting.corrections;
@@ -284,10 +285,7 @@ impl<'a, 'o> Search<'a, 'o> {
             let still = still.fold(0.0_f64, |m, ((a, b), size)| {
                 m.max((a - b).abs() / size.max(f64::MIN_POSITIVE))
             });
-            let stand = Stand {
-                state: now.clone(),
-                switches: self.simulation.positions(),
-            };
+            let stand = Stand::of(self.simulation);
             before = now;
             let quiet = stop.events.is_empty();
             events.extend(stop.events);

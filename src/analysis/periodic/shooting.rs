@@ -49,6 +49,16 @@ pub(super) struct Stand {
     pub(super) switches: Vec<bool>,
 }
 
+impl Stand {
+    /// Where a simulation stands.
+    pub(super) fn of(simulation: &mut Simulation) -> Self {
+        Self {
+            state: simulation.state(),
+            switches: simulation.positions(),
+        }
+    }
+}
+
 /// A fixed point.
 #[derive(Debug, Clone)]
 pub(super) struct Fixed {
@@ -112,14 +122,7 @@ impl Shooting<'_> {
                 }
             }
         }
-        Ok((self.stand(), seconds))
-    }
-
-    fn stand(&mut self) -> Stand {
-        Stand {
-            state: self.simulation.state(),
-            switches: self.simulation.positions(),
-        }
+        Ok((Stand::of(self.simulation), seconds))
     }
 
     /// Goes on to the next event of this kind; its time, s.
@@ -139,13 +142,14 @@ impl Shooting<'_> {
         Err(Error::at(begin, Reason::NoOrbit(what)))
     }
 
-    /// Takes the amplitudes of the next `seconds` from here, each at least [`LEAST_AMPLITUDE`] of the largest of its unit that was `seen` so far.
+    /// Takes the amplitudes of the next `seconds` from here, each at least [`LEAST_AMPLITUDE`] of the largest of its unit that was `seen` so far;
+    /// where they end.
     pub(super) fn observe(
         &mut self,
         stand: &Stand,
         seconds: f64,
         seen: &[f64],
-    ) -> Result<(), Error> {
+    ) -> Result<Stand, Error> {
         let extremes = self.extremes(stand, seconds)?;
         self.amplitudes.clear();
         self.amplitudes
@@ -163,7 +167,7 @@ impl Shooting<'_> {
             let least = if least > 0.0 { least } else { any.max(1.0) };
             *amplitude = amplitude.max(LEAST_AMPLITUDE * least);
         }
-        Ok(())
+        Ok(Stand::of(self.simulation))
     }
 
     /// Whether states move by more than [`LEAST_AMPLITUDE`] of what was `seen` of them in the next `seconds` from here.
@@ -201,7 +205,7 @@ impl Shooting<'_> {
                 let place = (self.from, &stand.state[..], &stand.switches[..]);
                 let until = self.from + seconds;
                 let passages = self.simulation.passages(place, until, None)?;
-                (self.stand(), seconds, passages)
+                (Stand::of(self.simulation), seconds, passages)
             }
             _ => {
                 let (after, seconds) = self.shoot(stand)?;
