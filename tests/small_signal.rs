@@ -224,11 +224,29 @@ fn what_has_no_response_is_refused_with_a_reason() {
         "t\ni1 0 1 0 ac 1\nl1 1 0 0.15915494309189535\nc1 1 0 0.15915494309189535\n.ac list 1\n.end\n",
     );
     assert!(matches!(tank.reason, Reason::NotSmooth(_)), "{tank}");
-    // Steps have no derivative here.
-    let curved = refused(
-        "t\nv1 1 0 sin(0 5 1k)\nv2 2 1 0 ac 1\nd1 2 3 d\nr1 3 0 1k\nc1 3 0 1u\n.model d d(is=1e-14)\n.ac dec 1 1 10\n.tran 1u 5m\n.end\n",
+}
+
+/// An exponential rectifier has a response about its operating point, where its diode blocks, unless that about its orbit is asked for.
+#[test]
+fn what_is_smooth_is_made_linear_at_rest() {
+    let text = "t\nv1 1 0 sin(0 5 1k)\nv2 2 1 0 ac 1\nd1 2 3 d\nr1 3 0 1k\nc1 3 0 1u\n.model d d(is=1e-14)\n.ac list 10\n.tran 1u 5m\n.save v(3)\n.end\n";
+    let codes = |response: &Response| -> Vec<&str> {
+        let notes = response.notes.iter();
+        notes.map(|note| note.code).collect()
+    };
+    let rest = response_of(text, &SmallSignalOptions::default());
+    assert_eq!(
+        (rest.about, &codes(&rest)[..]),
+        (About::Rest, &["about-rest"][..])
     );
-    assert!(matches!(curved.reason, Reason::NotSmooth(_)), "{curved}");
+    assert!(column(&rest, "v(3)")[0].norm() < 1e-8);
+    let options = SmallSignalOptions {
+        about: Some(About::Orbit),
+        ..SmallSignalOptions::default()
+    };
+    let orbit = response_of(text, &options);
+    assert_eq!(codes(&orbit), ["tangents"]);
+    assert!((column(&orbit, "v(3)")[0].norm() - 0.8).abs() < 0.2);
 }
 
 /// What is wrong with `.ac` and `AC` does not stop a transient.

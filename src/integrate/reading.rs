@@ -1,7 +1,9 @@
 //! Rows over [x | λ | u | u' | 1] evaluated without allocation.
 
+use nalgebra::DVector;
+
 use crate::lcs::sparse::SparseRows;
-use crate::lcs::{Lcs, Rows};
+use crate::lcs::{Lcs, Port, Role, Rows};
 
 /// Where the quantities of a circuit stand at one instant.
 #[derive(Debug, Clone, Copy)]
@@ -118,6 +120,16 @@ pub fn impulse(rows: &Rows, i: usize, p: &[f64], step_of_u: &[f64]) -> f64 {
         }
     }
     sum
+}
+
+/// Voltage and current of each port from λ and y; of a function its input and output.
+pub(crate) fn points(lcs: &Lcs, lambda: &DVector<f64>, y: &DVector<f64>) -> Vec<(f64, f64)> {
+    let values = lcs.ports.iter().zip(lambda.iter().zip(y));
+    let point = |(port, (&lambda, &y)): (&Port, (&f64, &f64))| match port.role {
+        Role::Voltage => (-lambda, y),
+        Role::Current | Role::Function => (-y, lambda),
+    };
+    values.map(point).collect()
 }
 
 #[cfg(test)]

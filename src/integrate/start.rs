@@ -347,14 +347,8 @@ fn static_solution(
     }
     let y = &lcs.d * &lambda + &q;
     let ports = lcs.ports.iter().zip(active);
-    let values = lcs.ports.iter().zip(lambda.iter().zip(&y));
     Ok(Static {
-        points: values
-            .map(|(port, (&lambda, &y))| match port.role {
-                Role::Voltage => (-lambda, y),
-                Role::Current | Role::Function => (-y, lambda),
-            })
-            .collect(),
+        points: reading::points(&lcs, &lambda, &y),
         conducting: ports
             .map(|(port, active)| active == Some(port.role != Role::Voltage))
             .collect(),

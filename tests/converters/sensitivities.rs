@@ -181,7 +181,7 @@ pub(crate) fn compare(seed: u64, tally: &mut Tally) {
             let apart = (own - a).abs() / size;
             if apart > TOLERANCE {
                 tally.wrong.push(format!(
-                    "{seed} {}: {} to {name}: {own:e}, but {a:e} and {b:e} by differences",
+                    "{seed} {}: {} to {name}: {own:e}, but {a:e} and {b:e} by differences\n{text}",
                     case.stage, gradient.name
                 ));
             }

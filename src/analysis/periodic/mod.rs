@@ -8,7 +8,7 @@ mod tests;
 
 use std::sync::atomic::AtomicBool;
 
-use super::variation::{Course, Trajectory};
+use super::variation::{Course, Linearised, Trajectory};
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{
     Error, Note, Orbit, OrbitKind, Reason, Run, SimOptions, Simulation, SimulationOptions,
@@ -96,7 +96,7 @@ pub(super) struct Steady {
     pub(super) simulation: Simulation,
     found: Found,
     /// How far orbits of longer and shorter steps are apart, relative to the amplitudes.
-    apart: Option<f64>,
+    pub(super) apart: Option<f64>,
 }
 
 impl Steady {
@@ -184,6 +184,21 @@ impl Steady {
         let place = (begin, &state[..], &switches[..]);
         let trajectory = Trajectory::of(&mut self.simulation, place, begin + period)?;
         Ok((trajectory, from))
+    }
+
+    /// The same of an orbit that is made of steps; `None` of an exact one.
+    ///
+    /// # Errors
+    /// As [`Trajectory::of_steps`].
+    pub(super) fn linearised(&mut self) -> Result<Option<(Linearised, f64)>, Error> {
+        if self.simulation.is_exact() {
+            return Ok(None);
+        }
+        let (stand, from) = (&self.found.fixed.stand, self.found.from);
+        let place = (from, &stand.state[..], &stand.switches[..]);
+        let until = from + self.found.orbit().period;
+        let found = Trajectory::of_steps(&mut self.simulation, place, until)?;
+        Ok(Some((found, from)))
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::search::Search;
 use super::shooting::Return;
-use super::{PeriodicOptions, period, simulation};
+use super::{PeriodicOptions, period, simulation, steady};
 use crate::circuit::ElaborateOptions;
 use crate::mna::behaviour;
 use crate::model::Model;
@@ -62,6 +62,46 @@ fn the_variational_equation_agrees_with_differences() {
         assert!(
             apart < 1e-5,
             "{name}: {apart:e}, {by_equation}{by_differences}"
+        );
+    }
+}
+
+/// Exponential diodes: a snubber, inductors that are interrupted, a bridge, switches that the state moves.
+const CURVED: [&str; 4] = [
+    "v1 in 0 12\nl1 in sw 47u\ns1 sw 0 c saw m\nd1 sw out d\ncs sw x 1n\nrs x 0 20\nc1 out 1 10u\nrc 1 0 5m\nrload out 0 10\nvc c 0 0.8\n\
+     vsaw saw 0 pulse(0 2 0 9.9u 0 0.1u 10u)",
+    "v1 in 0 12\ns1 in sw c saw m\nd1 0 sw d\nl1 sw out 4.7u\nc1 out 0 10u\nrload out 0 50\nvc c 0 0.8\nvsaw saw 0 pulse(0 2 0 9.9u 0 0.1u 10u)",
+    "v1 a b sin(0 30 50)\nd1 a p d\nd2 b p d\nd3 n a d\nd4 n b d\nrg n 0 1m\nl1 p q 5m\nc1 q 0 470u\nrload q 0 30",
+    "vin vin 0 10\nl1 vin sw 1m\ns1 sw 0 g 0 g\nd1 sw out d\nc1 out 0 12u\nrl out 0 20\nvclk clk 0 pulse(0 1 0 0 0 1u 100u)\n\
+     bsense sense 0 v=i(l1)\nvpeak peak 0 1\na1 sense peak 0 0 0 0 over 0 schmitt vt=0 vh=1u\na2 clk over 0 0 0 0 g 0 srflop vhigh=10 ref=0.5",
+];
+
+#[test]
+fn tangents_along_an_orbit_in_steps_agree_with_differences() {
+    for cards in CURVED {
+        let text = format!(
+            "t\n{cards}\n.model d d(is=1e-12 n=1.2 rs=10m)\n.model m sw(vt=0 vh=0 ron=10m roff=1meg)\n.model g sw(vt=5 vh=0 ron=10m roff=1meg)\n\
+             .tran 1u 1m\n.end\n"
+        );
+        let model = Model::parse(&text, "t.cir").expect("a circuit");
+        let found = steady(&model, &PeriodicOptions::default());
+        let mut found = found.unwrap_or_else(|error| panic!("{cards}: {error}"));
+        let made = found.linearised();
+        let made = made.unwrap_or_else(|error| panic!("{cards}: {error}"));
+        let (run, _) = made.expect("an orbit in steps");
+        let amplitudes = &found.found.amplitudes;
+        let [halves, _] = run.trajectories;
+        let mut by_tangents = halves.monodromy();
+        for (j, mut column) in by_tangents.column_iter_mut().enumerate() {
+            for (value, amplitude) in column.iter_mut().zip(amplitudes) {
+                *value *= amplitudes[j] / amplitude;
+            }
+        }
+        let by_differences = &found.found.fixed.derivative;
+        let apart = (&by_tangents - by_differences).amax();
+        assert!(
+            apart < 1e-3,
+            "{cards}: {apart:e}, {by_tangents}{by_differences}"
         );
     }
 }

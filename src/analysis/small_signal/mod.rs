@@ -85,6 +85,32 @@ impl Response {
         }
         Ok(())
     }
+
+    /// The same by a method of order 2 in halves of parts and in whole ones, extrapolated; a note says how far the two are apart, and at least
+    /// `unknown`, and how well the orbit is known.
+    fn extrapolate(
+        &mut self,
+        omegas: &[f64],
+        (unknown, orbit): (f64, Option<f64>),
+        respond: impl Fn(usize, f64) -> Result<(Vec<Complex<f64>>, f64), Error>,
+    ) -> Result<(), Error> {
+        let mut worst = (unknown, omegas.first().copied().unwrap_or_default());
+        for &omega in omegas {
+            let ((halves, _), (whole, _)) = (respond(0, omega)?, respond(1, omega)?);
+            let size = halves
+                .iter()
+                .fold(f64::MIN_POSITIVE, |m, v| m.max(v.norm()));
+            for (half, whole) in halves.iter().zip(whole) {
+                let correction = (half - whole) / 3.0;
+                self.phasors.values.push(half + correction);
+                if correction.norm() > worst.0 * size {
+                    worst = (correction.norm() / size, omega);
+                }
+            }
+        }
+        self.notes.push(in_parts(worst, orbit));
+        Ok(())
+    }
 }
 
 /// The small-signal response of a circuit.
@@ -140,7 +166,7 @@ pub fn small_signal(model: &Model, options: &SmallSignalOptions<'_>) -> Result<R
     }
     let about = match options.about {
         Some(about) => about,
-        None if may_switch(circuit) => About::Orbit,
+        None if may_switch(circuit, has_sides) => About::Orbit,
         None => About::Rest,
     };
     let omegas: Vec<f64> = asked.iter().map(|f| f * std::f64::consts::TAU).collect();
@@ -157,6 +183,11 @@ pub fn small_signal(model: &Model, options: &SmallSignalOptions<'_>) -> Result<R
         orbit: None,
         notes: Vec::new(),
     };
+    let is_device = |kind: &Kind| matches!(kind, Kind::Device(_));
+    if options.about.is_none() && about == About::Rest && may_switch(circuit, is_device) {
+        let text = "no switch moves and laws are smooth: this is the response about the operating point; `--about pss` has the one about the periodic steady state";
+        response.notes.push(Note::run("about-rest", text));
+    }
     if about == About::Orbit {
         let asked = PeriodicOptions {
             period: options.period,
@@ -193,15 +224,27 @@ fn about_orbit(
     response: &mut Response,
 ) -> Result<(), Error> {
     let orbit = found.orbit();
-    let (trajectory, origin) = found.trajectory()?;
-    let inputs = trajectory
-        .systems
-        .first()
-        .map_or(&[][..], |system| &system.lcs.inputs);
-    let drive = drive(&found.circuit, inputs);
-    let linear = orbit::Linear::of(&trajectory, orbit.period, origin);
+    let (trajectories, unknown, origin) = match found.linearised()? {
+        Some((run, origin)) => (Vec::from(run.trajectories), run.unknown, origin),
+        None => {
+            let (trajectory, origin) = found.trajectory()?;
+            (vec![trajectory], 0.0, origin)
+        }
+    };
+    let systems = trajectories.iter().flat_map(|all| &all.systems);
+    let inputs = systems.map(|system| &system.lcs.inputs[..]).next();
+    let drive = drive(&found.circuit, inputs.unwrap_or_default());
+    let linear = |trajectory| orbit::Linear::of(trajectory, orbit.period, origin);
+    let linear: Vec<orbit::Linear<'_>> = trajectories.iter().map(linear).collect();
     let bands: Vec<i32> = (-i32::from(sidebands)..=i32::from(sidebands)).collect();
-    response.sweep(omegas, |omega| linear.response(omega, &drive, &bands))?;
+    match &linear[..] {
+        [exact] => response.sweep(omegas, |omega| exact.response(omega, &drive, &bands))?,
+        all => {
+            let respond = |k: usize, omega| all[k].response(omega, &drive, &bands);
+            let known = (unknown / orbit.period, found.apart);
+            response.extrapolate(omegas, known, respond)?;
+        }
+    }
     let phasors = &mut response.phasors;
     let of_band = |name: &String, k: i32| {
         if k == 0 {
@@ -223,15 +266,9 @@ fn about_orbit(
     Ok(())
 }
 
-/// Whether the circuit may switch periodically: it has what changes sides, and a source that repeats; or a state that moves a switch, in a
-/// transient that shows whether it does so for good.
-fn may_switch(circuit: &Circuit) -> bool {
-    let changes = |kind: &Kind| {
-        matches!(
-            kind,
-            Kind::Switch(_) | Kind::Device(_) | Kind::Function { .. }
-        )
-    };
+/// Whether the circuit has what changes sides, and a source that repeats; or a state that moves a switch, in a transient that shows whether it does so
+/// for good.
+fn may_switch(circuit: &Circuit, changes: impl Fn(&Kind) -> bool) -> bool {
     let varies = |kind: &Kind| match kind {
         Kind::VoltageSource(source) | Kind::CurrentSource(source) => source.wave.period().is_some(),
         _ => false,
@@ -243,6 +280,15 @@ fn may_switch(circuit: &Circuit) -> bool {
         switched |= matches!(element.kind, Kind::Switch(_) | Kind::Function { .. });
     }
     changing && (varying || (switched && circuit.tran.is_some()))
+}
+
+/// Whether an element conducts or blocks, and not a little more or less: what curved laws do is smooth, and an amplifier does not switch.
+fn has_sides(kind: &Kind) -> bool {
+    match kind {
+        Kind::Switch(_) => true,
+        Kind::Device(law) | Kind::Function { law, .. } => law.is_piecewise_linear(),
+        _ => false,
+    }
 }
 
 fn unsupported(what: &str) -> Error {
@@ -335,6 +381,19 @@ fn lost(loss: f64, omega: f64) -> Note {
         "at {f:e} Hz rounding may change the response by {loss:.0e}: the frequency is decades below the rates of the circuit, or at a resonance"
     );
     Note::run("rounding", text)
+}
+
+/// A response about an orbit made of steps, with its error at a frequency, and that of the orbit.
+fn in_parts((error, omega): (f64, f64), orbit: Option<f64>) -> Note {
+    let f = omega / std::f64::consts::TAU;
+    let known = match orbit {
+        Some(apart) => format!("which are known to {apart:.0e} of the amplitudes"),
+        None => "whose error is not known".into(),
+    };
+    let text = format!(
+        "the orbit is made of steps, {known}; curved laws are taken for their tangents, which changes the response by {error:.0e} of its size at {f:e} Hz, and by less elsewhere"
+    );
+    Note::run("tangents", text)
 }
 
 /// A frequency at which nothing finite responds.

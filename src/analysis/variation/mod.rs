@@ -22,8 +22,10 @@ mod moved;
 mod near;
 mod parameter;
 mod saltation;
+mod steps;
 mod system;
 mod tableau;
+mod tangent;
 
 use std::sync::atomic::AtomicBool;
 
@@ -49,9 +51,11 @@ pub(crate) use near::{Near, STEPS, difference};
 pub(crate) use parameter::Parameter;
 use saltation::Side;
 pub(crate) use saltation::{Saltation, Timing, times};
+pub(crate) use steps::Linearised;
 use system::Row;
 pub(crate) use system::{System, shaped};
 pub(crate) use tableau::{Rest, Tableau};
+pub(crate) use tangent::tangents;
 
 /// A stretch of a run in one mode.
 #[derive(Debug, Clone)]

@@ -94,6 +94,22 @@ impl Timing {
 }
 
 impl Saltation {
+    /// Nothing happens, in the states of a system.
+    pub(super) fn none(t: f64, system: &System) -> Self {
+        let (n, p) = (system.lcs.n(), system.lcs.p());
+        Self {
+            t,
+            x: DMatrix::identity(n, n),
+            u: DMatrix::zeros(n, p),
+            du: DMatrix::zeros(n, p),
+            timing: None,
+            others: Vec::new(),
+            through: None,
+            step: DVector::zeros(system.lcs.outputs.rows.one.len()),
+            impulse: None,
+        }
+    }
+
     /// The event between two sides, where the storage jumps as J⁺ s if `through` is none, else first as in that mode.
     pub(super) fn of(
         t: f64,

@@ -2,7 +2,13 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 52] = [
+pub(super) const CODES: [Explanation; 54] = [
+    Explanation::of(
+        "about-rest",
+        "The response is that about the operating point, as laws are smooth and no switch moves.",
+        "A source that repeats, such as a sine, beside exponential diodes or transistors.",
+        "Nothing for an amplifier; `--about pss` for a rectifier, whose diodes conduct in turn.",
+    ),
     Explanation::of(
         "at-rest",
         "The circuit does not switch periodically: the response is that about its operating point.",
@@ -294,6 +300,12 @@ pub(super) const CODES: [Explanation; 52] = [
         "`uic` on `.tran` starts from initial values; hysteresis (`Vh` in the model), or a resistor and a capacitor in front of the control, lets a switch settle.",
     )
     .shown("takes away its control\nv1 in 0 1\ns1 in out 0 out sm\nr1 out 0 1k\n.model sm sw(vt=-0.5)\n.tran 1u 1m\n"),
+    Explanation::of(
+        "tangents",
+        "The response is one about an orbit that is made of steps, along which curved laws are taken for their tangents: it is accurate, not exact.",
+        "Exponential diodes or transistors in a circuit that switches periodically.",
+        "Nothing, if the error told will do; diodes with `Ron` and `Vfwd` in place of `Is` and `N` have responses that are exact.",
+    ),
     Explanation::of(
         "thermal-runaway",
         "The losses rise faster with temperature than heat flows away: no temperature is a steady one.",

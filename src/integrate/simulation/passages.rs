@@ -8,6 +8,8 @@ use super::way::Way;
 use crate::integrate::error::Error;
 use crate::integrate::exact::{Assembler, Passage};
 use crate::integrate::stats::Impulse;
+use crate::integrate::switching::Threshold;
+use crate::integrate::theta::Instant;
 
 impl Simulation {
     /// The changes of mode on the way from a place, as for [`Self::stand_at`], to time `until`, s: the first is the one into the mode there.
@@ -36,6 +38,22 @@ impl Simulation {
             from.next() == Some(false) && from.all(|known| known)
         };
         Ok(passages.filter(whole))
+    }
+
+    /// Where a run in steps stands; `None` of one that is exact.
+    ///
+    /// # Errors
+    /// λ cannot be found there.
+    pub(crate) fn instant(&mut self) -> Result<Option<Instant>, Error> {
+        match &mut self.way {
+            Way::Exact(_) => Ok(None),
+            Way::Steps(theta) => theta.instant().map(Some),
+        }
+    }
+
+    /// The thresholds of the switches.
+    pub(crate) fn thresholds(&self) -> Vec<Threshold> {
+        self.assembler(0.0).thresholds()
     }
 
     /// The impulses of devices and sources so far.

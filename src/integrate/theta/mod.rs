@@ -162,6 +162,16 @@ pub struct Theta {
     amplitudes: Amplitudes,
 }
 
+/// A point of a run in steps.
+#[derive(Debug, Clone)]
+pub(crate) struct Instant {
+    /// The system in the position of the switches there, with all devices as ports.
+    pub(crate) lcs: Lcs,
+    pub(crate) x: DVector<f64>,
+    pub(crate) u: DVector<f64>,
+    pub(crate) lambda: DVector<f64>,
+}
+
 /// Everything a rejected step has to give back.
 #[derive(Debug, Clone, Default)]
 struct Now {
@@ -447,6 +457,18 @@ impl Theta {
             storage: self.system().storage(&self.now.x, &self.now.u),
             switches: self.switches.position().to_vec(),
         }
+    }
+
+    /// Where the run stands at the right limit, and its system.
+    ///
+    /// # Errors
+    /// λ cannot be found there.
+    pub(crate) fn instant(&mut self) -> Result<Instant, Error> {
+        self.read_lambda()?;
+        let lcs = self.system().lcs.clone();
+        let [x, u, lambda] = [&self.now.x, &self.now.u, &self.lambda]
+            .map(|values| DVector::from_column_slice(values));
+        Ok(Instant { lcs, x, u, lambda })
     }
 
     /// Has another balance from here on.

@@ -29,3 +29,6 @@ pub(crate) const DESTROYED: f64 = 1e-9;
 /// A jump is the one into a mode where the two lead to storages that differ by no more than this part of the largest value. Larger: jumps in
 /// several parts pass for one; smaller: rounding of a jump refuses its derivative.
 pub(crate) const FOLLOWS_JUMP: f64 = 1e-9;
+
+/// The same in runs in steps, whose states are known to the residual of their solver and are read a little before the event.
+pub(crate) const FOLLOWS_JUMP_IN_STEPS: f64 = 1e-6;

@@ -44,6 +44,28 @@ pub(crate) const PARTS_OF_PERIOD: f64 = 1000.0;
 /// Table steps of exact integration in a period. Larger: more of them on the way through a calm mode; smaller: deeper tables.
 pub(crate) const TABLE_STEPS: f64 = 64.0;
 
+/// Parts of a run in steps, over each of which and over half of which its tangents stay as they are in the middle, at least. Larger: time and memory for
+/// each frequency; smaller: parts that are divided, and tangents that change within one.
+pub(crate) const LINEAR_PARTS: f64 = 256.0;
+
+/// A part is divided where from one quarter of it to the next its tangents change what the state becomes by more than this part. Larger: responses that are less
+/// accurate than they say; smaller: time.
+pub(crate) const TANGENT_CHANGE: f64 = 1e-3;
+
+/// No part is divided that is shorter than this part of the longest: a diode turns off as if it were ideal. Larger: responses are off by what it conducts in
+/// a part; smaller: time, and rounding of times.
+pub(crate) const SHORTEST_PART: f64 = 1e-5;
+
+/// What a device that blocks takes away of a current (of a voltage, one that conducts) is gone within this part of the shortest part. Larger: currents that
+/// flow on; smaller: rounding of exponentials.
+pub(crate) const QUICKEST: f64 = 0.1;
+
+/// What a switch is about to pass its threshold with is read this part of a quarter of a part before it. Larger: extrapolation; smaller: rounding.
+pub(crate) const BEFORE_EVENT: f64 = 1e-3;
+
+/// A run is taken up again this part of a quarter of a part behind a switching. Larger: what the state moves by in it; smaller: rounding of controls.
+pub(crate) const BEHIND_EVENT: f64 = 1e-6;
+
 /// A source is taken to repeat after a period that was asked for if it is off its own by no more than this part then. Larger: orbits of sources that are cut in
 /// their midst; smaller: tones without a common period cannot be given one.
 pub(crate) const PERIOD_OFF: f64 = 1e-2;

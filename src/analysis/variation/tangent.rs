@@ -1,0 +1,163 @@
+//! Systems made linear at a point: laws are their tangents there.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::system::{System, shaped};
+use crate::integrate::exact::Key;
+use crate::integrate::reading;
+use crate::integrate::theta::Instant;
+use crate::lcs::{Lcs, LcsParts, Role, Rows};
+use crate::linalg::decouple::decoupled;
+
+impl System {
+    /// The linear system x' = A' x + E' u + e' that touches the one of a point there: δλ = L_x δx + L_u δu by its laws' tangents, with time constants of
+    /// `quickest` seconds at least where a device takes a state away. `None` where these leave λ open.
+    pub(super) fn touching(at: &Instant, switches: &[bool], quickest: f64) -> Option<Self> {
+        let lcs = &at.lcs;
+        let (n, m, p, q) = (lcs.n(), lcs.m(), lcs.p(), lcs.storage.names.len());
+        let y = shaped(&lcs.c, m, n) * &at.x
+            + shaped(&lcs.d, m, m) * &at.lambda
+            + shaped(&lcs.g, m, p) * &at.u
+            + &lcs.f;
+        let [x, u] = tangents(lcs, &reading::points(lcs, &at.lambda, &y), quickest)?;
+        let one = &at.lambda - &x * &at.x - &u * &at.u;
+        let follows = Follows { x, u, one };
+        let lcs = lcs.clone().changed(|parts| follows.take(parts)).ok()?;
+        let basis = (!lcs.fast.is_empty()).then(|| decoupled(&lcs.a, &lcs.fast));
+        Some(Self {
+            key: Key {
+                closed: Vec::new(),
+                switches: switches.to_vec(),
+                sliding: Vec::new(),
+            },
+            storage_inputs: shaped(&lcs.storage.u, q, p),
+            inputs: shaped(&lcs.e, n, p),
+            basis: basis.flatten(),
+            lcs,
+        })
+    }
+}
+
+/// λ = L_x x + L_u u + l.
+struct Follows {
+    x: DMatrix<f64>,
+    u: DMatrix<f64>,
+    one: DVector<f64>,
+}
+
+impl Follows {
+    /// Puts λ into all that depends on it; no port is left.
+    fn take(&self, parts: &mut LcsParts) {
+        let (n, m, p, q) = (parts.n(), parts.m(), parts.p(), parts.storage.names.len());
+        let b = shaped(&parts.b, n, m);
+        parts.a += &b * &self.x;
+        parts.e = shaped(&parts.e, n, p) + &b * &self.u;
+        parts.e0 += &b * &self.one;
+        parts.b = DMatrix::zeros(n, 0);
+        parts.c = DMatrix::zeros(0, n);
+        parts.d = DMatrix::zeros(0, 0);
+        parts.g = DMatrix::zeros(0, p);
+        parts.f = DVector::zeros(0);
+        parts.ports.clear();
+        parts.storage.lambda = DMatrix::zeros(q, 0);
+        let outputs = &mut parts.outputs;
+        let all = [
+            &mut outputs.rows,
+            &mut outputs.power_v,
+            &mut outputs.power_i,
+            &mut parts.controls,
+        ];
+        for rows in all {
+            self.take_rows(rows, (n, m, p));
+        }
+    }
+
+    fn take_rows(&self, rows: &mut Rows, (n, m, p): (usize, usize, usize)) {
+        let k = rows.one.len();
+        let lambda = shaped(&rows.lambda, k, m);
+        rows.x = shaped(&rows.x, k, n) + &lambda * &self.x;
+        rows.u = shaped(&rows.u, k, p) + &lambda * &self.u;
+        rows.one += &lambda * &self.one;
+        rows.lambda = DMatrix::zeros(k, 0);
+    }
+}
+
+/// δλ = L_x δx + L_u δu of ports with laws whose points (v, i) are these. A port that resists infinitely, or not at all, does so within `quickest` seconds: it
+/// takes a state away in no less.
+pub(crate) fn tangents(
+    lcs: &Lcs,
+    points: &[(f64, f64)],
+    quickest: f64,
+) -> Option<[DMatrix<f64>; 2]> {
+    let (n, m, p) = (lcs.n(), lcs.m(), lcs.p());
+    let b = shaped(&lcs.b, n, m);
+    let (c, d, g) = (
+        shaped(&lcs.c, m, n),
+        shaped(&lcs.d, m, m),
+        shaped(&lcs.g, m, p),
+    );
+    if m == 0 {
+        return Some([DMatrix::zeros(0, n), DMatrix::zeros(0, p)]);
+    }
+    let (mut matrix, mut beta) = (d, DVector::zeros(m));
+    for (j, (port, &(v, i))) in lcs.ports.iter().zip(points).enumerate() {
+        // A resistance of the size of the point's own weighs voltage and current alike.
+        let rho = if v != 0.0 && i != 0.0 {
+            (v / i).abs()
+        } else {
+            1.0
+        };
+        let tangent = port.law.resolvent(rho, v + rho * i);
+        let (alpha, own) = match port.role {
+            Role::Voltage => (tangent.di, tangent.dv),
+            Role::Current | Role::Function => (tangent.dv, tangent.di),
+        };
+        let rate = b.column(j).amax() * c.row(j).amax();
+        let alpha = alpha.max(quickest * rate * own);
+        beta[j] = own;
+        let mut row = matrix.row_mut(j);
+        row *= own;
+        matrix[(j, j)] += alpha;
+    }
+    let factors = matrix.lu();
+    let scaled = |mut block: DMatrix<f64>| {
+        for (mut row, beta) in block.row_iter_mut().zip(&beta) {
+            row *= -beta;
+        }
+        factors.solve(&block)
+    };
+    Some([scaled(c)?, scaled(g)?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::fixtures;
+    use crate::law::{Exponential, Law};
+    use nalgebra::dmatrix;
+
+    /// g = (i + Is)/a at 1 µA, though the voltage is off by 1 nV, as one that is the difference of large potentials: of that error the
+    /// tangent has 1/(1 + v g/i), not all of δv/a = 4e-8.
+    #[test]
+    fn a_tangent_weighs_the_voltage_and_the_current_of_its_point_alike() {
+        let (is, slope, i) = (1e-30_f64, 0.025, 1e-6);
+        let lcs = fixtures::system(
+            &[("v(c1)", "V")],
+            &[("d1", Role::Current)],
+            [dmatrix![0.0], dmatrix![-1.0], dmatrix![-1.0], dmatrix![0.0]],
+            &[1.0],
+        );
+        let lcs = lcs.changed(|parts| {
+            parts.ports[0].law = Law::Exponential(Exponential {
+                is,
+                slope,
+                rs: 0.0,
+                breakdown: None,
+            });
+        });
+        let v = slope * (i / is).ln_1p();
+        let [found, _] = tangents(&lcs.unwrap(), &[(v + 1e-9, i)], 0.0).unwrap();
+        let off = found[(0, 0)] / ((i + is) / slope) - 1.0;
+        assert!(off.abs() < 1e-9, "{off:e}");
+    }
+}
