@@ -11,12 +11,12 @@ impl Error {
     /// The finding for the user of `circuit`: the place is the card of the first element concerned.
     #[must_use]
     pub fn diagnostic(&self, circuit: &Circuit) -> Diagnostic {
-        let mut names: Vec<&str> = self.elements.iter().map(String::as_str).collect();
-        if names.is_empty() {
-            names = of_reason(&self.reason);
-        }
         let mut elements: Vec<Element> = Vec::new();
-        for element in names.iter().filter_map(|name| whole(circuit, name)) {
+        for element in self
+            .concerned()
+            .iter()
+            .filter_map(|name| whole(circuit, name))
+        {
             let name = written(&element.name);
             if !elements.iter().any(|known| known.name == name) {
                 elements.push(Element {
@@ -26,6 +26,14 @@ impl Error {
             }
         }
         self.found(&elements.iter().collect::<Vec<_>>())
+    }
+
+    /// The elements where it shows: its own, else those that its reason names.
+    pub(super) fn concerned(&self) -> Vec<&str> {
+        match &self.elements[..] {
+            [] => of_reason(&self.reason),
+            own => own.iter().map(String::as_str).collect(),
+        }
     }
 
     /// The finding where there is no circuit to show its place in.

@@ -314,7 +314,7 @@ fn dispatch(
                         "exact integration ended, and the whole run was made in steps instead; rows until {t:e} s are exact: {error}"
                     ),
                 };
-                notes.push(Note::of("steps-instead", error.elements, text));
+                notes.push(Note::of("steps-instead", error.concerned(), text));
             }
         }
         method = Method::Theta;
@@ -349,7 +349,7 @@ fn dispatch(
                 log.again();
                 let text =
                     format!("steps on dense matrices were made instead of sparse ones: {error}");
-                notes.push(Note::of("steps-instead", error.elements, text));
+                notes.push(Note::of("steps-instead", error.concerned(), text));
             }
         }
         problem.prepare(&tran, settings)?;
