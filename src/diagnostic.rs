@@ -254,6 +254,13 @@ impl Diagnostic {
         self.help = Some(help.into());
         self
     }
+
+    /// What to do: its own help, else that of its code.
+    #[must_use]
+    pub fn remedy(&self) -> Option<String> {
+        let of_code = || explain::explain(self.code).map(explain::Explanation::help);
+        self.help.clone().or_else(of_code)
+    }
 }
 
 /// A broken invariant of this program: its own fault, never the circuit's, and never a result.

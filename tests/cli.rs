@@ -1402,8 +1402,7 @@ fn check_shows_a_finding_in_its_line_and_once() {
         "{ran}"
     );
     let ran = run_in(directory.path(), "check twice.cir --message-format short");
-    let line =
-        "twice.cir:5:8: warning[duplicate-model]: model `d1` is defined again; first in line 4\n";
+    let line = "twice.cir:5:8: warning[duplicate-model]: model `d1` is defined again; first in line 4 (take one of them out)\n";
     assert_eq!(ran.err, line, "{ran}");
     assert!(!ran.out.contains("defined again"), "{ran}");
 }

@@ -101,6 +101,30 @@ fn the_page_shows_what_is_said() {
     );
 }
 
+/// Warnings and errors say what to do, where not of themselves by their code.
+#[test]
+fn every_finding_has_a_remedy() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = "ends\nv1 a 0 1\nr1 a 0 1k\n.ends\n.tran 1m 5m\n.end\n";
+    fs::write(folder.path().join("ends.cir"), text).expect("a file");
+    for (form, words) in [
+        ("human", "\n  help: take it out"),
+        (
+            "short",
+            "ends.cir:4:1: error[unexpected]: `.ends` without `.subckt` (take it out",
+        ),
+        ("json", "\"help\":\"take it out"),
+    ] {
+        let ran = Command::new(env!("CARGO_BIN_EXE_circ"))
+            .current_dir(folder.path())
+            .args(["ends.cir", "--message-format", form])
+            .output()
+            .expect("circ");
+        let said = String::from_utf8(ran.stderr).expect("text");
+        assert!(said.contains(words), "{form}: {said}");
+    }
+}
+
 #[test]
 fn there_are_thirty_one() {
     assert_eq!((NETLIST.len(), CIRCUIT.len(), RUN.len()), (15, 8, 8));

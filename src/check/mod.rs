@@ -121,7 +121,7 @@ impl Fault {
                 .map(|f| f.path.clone()),
             line: place.map(|p| p.0),
             column: place.map(|p| p.1),
-            help: diagnostic.help.clone(),
+            help: diagnostic.remedy(),
         }
     }
 }

@@ -228,7 +228,8 @@ impl<'n> Scopes<'n> {
                     .label("recognised, but cannot be simulated")
                     .help(
                         "sums with constant factors, max min abs limit if u uramp sgn table pwl are supported, and \
-                         products of comparisons or of the sines of sources at ground",
+                         products of comparisons or of the sines of sources at ground; what is only looked at needs no \
+                         element: `--probe 'v(a)*i(r1)'` and `.meas` take any expression",
                     )
             }
             Unfit::TooLarge => {
@@ -477,6 +478,9 @@ impl<'n> Scopes<'n> {
                         // A single letter is a parameter as well as a unit.
                         None if name.chars().nth(1).is_some() && is_unit(name) => fault.help(format!(
                             "a unit stands directly after its number, `1{name}`; a parameter is defined with `.param {name}=…`"
+                        )),
+                        None if is_unit(name) => fault.help(format!(
+                            "define it with `.param {name}=…`; a prefix or unit stands directly after its number, `1{name}`"
                         )),
                         None => fault.help(format!("define it with `.param {name}=…`")),
                     });

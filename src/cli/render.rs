@@ -196,10 +196,12 @@ impl miette::Diagnostic for Shown<'_> {
     }
 
     fn help<'b>(&'b self) -> Option<Box<dyn fmt::Display + 'b>> {
-        self.diagnostic
-            .help
-            .as_ref()
-            .map(|help| Box::new(help) as Box<dyn fmt::Display>)
+        let help = match self.diagnostic.severity {
+            // Nothing has to be done: what a note does not say itself is for programs alone.
+            Severity::Note => self.diagnostic.help.clone(),
+            Severity::Warning | Severity::Error => self.diagnostic.remedy(),
+        };
+        help.map(|help| Box::new(help) as Box<dyn fmt::Display>)
     }
 
     fn source_code(&self) -> Option<&dyn SourceCode> {

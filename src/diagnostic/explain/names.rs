@@ -116,7 +116,7 @@ pub(super) const CODES: [Explanation; 25] = [
         "unknown-node",
         "A card names a node to which nothing is connected.",
         "A slip of the pen, or a node inside a subcircuit (`x1.out`).",
-        "Correct the name.",
+        "Correct the name, or connect something to the node.",
     )
     .shown("no node b\nv1 a 0 1\nr1 a 0 1k\n.ic v(b)=1\n.tran 1m 5m\n"),
     Explanation::of(
@@ -151,7 +151,7 @@ pub(super) const CODES: [Explanation; 25] = [
         "unsupported",
         "Something is recognised and cannot be simulated, or cannot be done with this circuit.",
         "A waveform, multiplier or option that circ does not have.",
-        "The message says what would be accepted in its place.",
+        "Take what the message names in its place; docs/netlist.md lists what there is.",
     )
     .shown("noise\nv1 a 0 trnoise(1m 1u 0 0)\nr1 a 0 1k\n.tran 1m 5m\n"),
     Explanation::of(

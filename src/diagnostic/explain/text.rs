@@ -212,7 +212,7 @@ pub(super) const CODES: [Explanation; 36] = [
         "unexpected",
         "Something stands where nothing should.",
         "A unit apart from its number (`10 ohm`), a second value, or `.ends` and `.endif` of nothing.",
-        "Take it out, or write the unit directly behind the number.",
+        "Take it out.",
     )
     .shown("a unit apart\nv1 a 0 1\nr1 a 0 10 ohm\n.tran 1m 5m\n"),
     Explanation::of(
