@@ -988,6 +988,24 @@ fn a_sweep_of_operating_points_is_drawn() {
     let html = read("dc.html");
     assert!(html.contains(r#""axis":{"name":"v1","unit":"V","log":false}"#));
     assert_eq!(read("dc.csv").lines().count(), 83);
+    // Its rows are shown as it is.
+    let ran = run_in(place.path(), "view dc.csv -o again.svg");
+    assert_eq!((ran.status, ran.err.as_str()), (0, ""), "{ran}");
+    let again = read("again.svg");
+    assert!(
+        again.contains(">v1<") && again.matches("r1=2000").count() == 2,
+        "{again}"
+    );
+    let curves = |svg: &str| {
+        let paths = svg
+            .split(" d=\"")
+            .skip(1)
+            .map(|path| path.split('"').next().unwrap().to_owned());
+        let mut paths: Vec<String> = paths.filter(|path| path.len() > 60).collect();
+        paths.sort();
+        paths
+    };
+    assert_eq!(curves(&again), curves(&svg));
     let ran = run_in(place.path(), "dc.cir -o dc.raw");
     assert!(
         ran.status == 2 && ran.err.contains("csv, svg, png or html"),

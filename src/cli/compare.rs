@@ -302,7 +302,7 @@ fn from_file(path: &Path) -> Result<Theirs, Failure> {
     })?;
     let runs = plots.into_iter().find_map(|plot| match plot {
         Plot::Time(runs) => Some(runs),
-        Plot::Frequency(_) => None,
+        Plot::Frequency(_) | Plot::Swept(..) => None,
     });
     let [(_, waveforms)] = <[_; 1]>::try_from(runs.unwrap_or_default()).map_err(|runs| {
         let file = path.display();

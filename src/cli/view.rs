@@ -11,7 +11,7 @@ use super::files::{self, STDOUT};
 use super::output::{self, Format};
 use super::streams::Streams;
 use crate::netlist::suggest::{is_of_pattern, nearest};
-use crate::report::figure::{Figure, PANEL_COLUMNS};
+use crate::report::figure::{Axis, Figure, PANEL_COLUMNS};
 use crate::report::html::Page;
 use crate::report::{bode, svg};
 use crate::waveform::{Phasors, Plot, Waveforms, canonical_name, plots};
@@ -45,11 +45,19 @@ pub(super) fn view(args: &ViewArgs, streams: &Streams) -> Result<Exit, Failure> 
         streams.note("gaps", format!("{file}: {gaps}; curves have gaps there"));
     }
     let figure = |pixels| {
+        let of_runs = |runs: &[(String, Waveforms)]| {
+            let runs: Vec<_> = runs.iter().map(|(label, w)| (label.clone(), w)).collect();
+            Figure::of_runs(&runs, pixels)
+        };
         let mut figure = match &plot {
-            Plot::Time(runs) => {
-                let runs: Vec<_> = runs.iter().map(|(label, w)| (label.clone(), w)).collect();
-                Figure::of_runs(&runs, pixels)
-            }
+            Plot::Time(runs) => of_runs(runs),
+            Plot::Swept(name, runs) => Figure {
+                axis: Axis::Swept {
+                    name: name.clone(),
+                    unit: "",
+                },
+                ..of_runs(runs)
+            },
             Plot::Frequency(phasors) => bode::figure(phasors),
         };
         if figure.title.is_empty() {
@@ -93,7 +101,7 @@ pub(super) fn gaps<'w>(runs: impl IntoIterator<Item = &'w Waveforms>) -> Option<
 fn is_netlist(bytes: &[u8]) -> bool {
     let text = String::from_utf8_lossy(bytes).to_lowercase();
     let is_analysis = |line: &str| {
-        [".tran", ".ac", ".op", ".end"]
+        [".tran", ".ac", ".dc", ".op", ".end"]
             .iter()
             .any(|card| line.starts_with(card))
     };
@@ -123,11 +131,13 @@ fn chosen(args: &ViewArgs, streams: &Streams) -> Result<Plot, Failure> {
     })?;
     let (number, file) = (usize::from(args.plot), args.file.display());
     if number > all.len() {
-        let message = match all.len() {
-            0 => format!("{file}: holds nothing over time or frequency"),
-            count => format!("{file}: holds {count} plots over time or frequency"),
-        };
-        return Err(Failure::told("no-such-plot", message));
+        return Err(match all.len() {
+            0 => Failure::told(
+                "waveforms",
+                format!("{file}: holds nothing over time, frequency or what was swept"),
+            ),
+            count => Failure::told("no-such-plot", format!("{file}: holds {count} plots")),
+        });
     }
     if all.len() > 1 {
         let count = all.len();
@@ -136,7 +146,7 @@ fn chosen(args: &ViewArgs, streams: &Streams) -> Result<Plot, Failure> {
     }
     let mut plot = all.swap_remove(number - 1);
     let is_empty = match &plot {
-        Plot::Time(runs) => runs.iter().all(|(_, run)| run.is_empty()),
+        Plot::Time(runs) | Plot::Swept(_, runs) => runs.iter().all(|(_, run)| run.is_empty()),
         Plot::Frequency(phasors) => phasors.frequency.is_empty(),
     };
     if is_empty {
@@ -157,7 +167,7 @@ fn chosen(args: &ViewArgs, streams: &Streams) -> Result<Plot, Failure> {
         )
     };
     match &mut plot {
-        Plot::Time(runs) => {
+        Plot::Time(runs) | Plot::Swept(_, runs) => {
             for (_, run) in runs {
                 let kept = kept(&run.names, &args.probes);
                 *run = columns(run, &kept.map_err(|probe| unknown(probe, &run.names))?);

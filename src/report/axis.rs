@@ -52,7 +52,10 @@ impl Axis {
             from: place.0,
             to: place.1,
             ticks: ticks.collect(),
-            title: format!("{name} ({prefix}{unit})"),
+            title: match unit {
+                "" => name.to_owned(),
+                unit => format!("{name} ({prefix}{unit})"),
+            },
         }
     }
 

@@ -8,7 +8,7 @@ use nalgebra::Complex;
 
 use head::{above, delimiter, is_time, number, step, units};
 
-use super::plot::runs;
+use super::plot::{runs, sweeps};
 use super::{Phasors, Plot, WaveformError, Waveforms, phasors};
 
 const FORMAT: &str = "csv";
@@ -170,7 +170,7 @@ pub fn read(from: impl Read) -> Result<Waveforms, WaveformError> {
     Ok(table.waveforms())
 }
 
-/// Reads the same, and files whose first column is frequency (Hz) before `re(…)` and `im(…)` of each signal.
+/// Reads the same, and files whose first column is frequency (Hz) before `re(…)` and `im(…)` of each signal, or what `.dc` swept before signals `v(…)`, `i(…)`.
 ///
 /// # Errors
 /// [`WaveformError::Malformed`] as in [`read`]; but a time that runs backwards, or LTspice's line `Step Information: …`, begins another run, and a cell over time that is empty, NaN or
@@ -183,10 +183,20 @@ pub(super) fn plot(from: impl Read) -> Result<Plot, WaveformError> {
         axis if axis.eq_ignore_ascii_case("frequency") => {
             table.whole()?.phasors().map(Plot::Frequency)
         }
+        axis if is_swept(axis, &table.names[1..]) => {
+            let axis = axis.clone();
+            Ok(Plot::Swept(axis, sweeps(&table.whole()?.waveforms())))
+        }
         axis => Err(malformed(format!(
             "the first column must be `time` or `frequency`, found `{axis}`"
         ))),
     }
+}
+
+/// Whether the first column is what the signals of the others are over: a name without parentheses, as no signal has it.
+fn is_swept(axis: &str, others: &[String]) -> bool {
+    let is_signal = |name: &str| name.ends_with(')');
+    !axis.is_empty() && !is_signal(axis) && others.iter().any(|name| is_signal(name))
 }
 
 fn malformed(reason: impl Into<String>) -> WaveformError {

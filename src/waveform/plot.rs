@@ -1,4 +1,4 @@
-//! Files of waveforms whatever they are: over time or over frequency, of one run or of several.
+//! Files of waveforms whatever they are: over time, over frequency or over what was swept, of one run or of several.
 
 use std::io::Cursor;
 
@@ -11,9 +11,11 @@ pub enum Plot {
     Time(Vec<(String, Waveforms)>),
     /// Over frequency.
     Frequency(Phasors),
+    /// Over what `.dc` swept, by its name: as over time, with its values in the place of times.
+    Swept(String, Vec<(String, Waveforms)>),
 }
 
-/// Reads everything over time or frequency that a file holds; what the file begins with says whether it is NPZ, JSON, raw or CSV.
+/// Reads everything over time, frequency or what was swept that a file holds; what the file begins with says whether it is NPZ, JSON, raw or CSV.
 ///
 /// # Errors
 /// [`WaveformError::Malformed`] where the file is none of them or is damaged.
@@ -77,6 +79,23 @@ pub(super) fn runs(waves: &Waveforms) -> Vec<(String, Waveforms)> {
         (label, own)
     };
     parts.iter().enumerate().map(run).collect()
+}
+
+/// The same of a sweep, whose values may fall.
+pub(super) fn sweeps(waves: &Waveforms) -> Vec<(String, Waveforms)> {
+    match waves.time[..] {
+        [first, second, ..] if second < first => runs(&backwards(waves)),
+        _ => runs(waves),
+    }
+}
+
+fn backwards(waves: &Waveforms) -> Waveforms {
+    let rows = (0..waves.len()).rev();
+    Waveforms {
+        time: waves.time.iter().rev().copied().collect(),
+        values: rows.flat_map(|k| waves.row(k).to_vec()).collect(),
+        ..waves.clone()
+    }
 }
 
 #[cfg(test)]
@@ -176,6 +195,47 @@ mod tests {
                 ("r1=20", &names[..], &[3.0, 4.0][..])
             ]
         );
+    }
+
+    #[test]
+    fn sweeps_are_told_by_the_values_of_others_and_may_fall() {
+        let rising = "v1,v(a),r1\n0,1,10\n2,2,10\n0,3,20\n2,4,20\n";
+        let falling = "v1,v(a),r1\n2,4,20\n0,3,20\n2,2,10\n0,1,10\n";
+        let raw = |rows: &str| {
+            format!(
+                "Title: t\nPlotname: DC transfer characteristic\nFlags: real\nNo. Variables: 2\nNo. Points: 2\nVariables:\n\
+                 \t0\tv(v-sweep)\tvoltage\n\t1\tv(a)\tvoltage\nValues:\n{rows}"
+            )
+        };
+        let shown = |text: &str| {
+            let Plot::Swept(axis, runs) = plots(text.as_bytes()).unwrap().remove(0) else {
+                panic!("{text}")
+            };
+            let runs = runs
+                .into_iter()
+                .map(|(label, w)| (label, w.names, w.time, w.values));
+            (axis, runs.collect::<Vec<_>>())
+        };
+        let run = |label: &str, values: [f64; 2]| {
+            (
+                label.to_owned(),
+                vec!["v(a)".to_owned()],
+                vec![0.0, 2.0],
+                values.to_vec(),
+            )
+        };
+        let expected = [run("r1=10", [1.0, 2.0]), run("r1=20", [3.0, 4.0])];
+        for text in [rising, falling] {
+            assert_eq!(shown(text), ("v1".into(), expected.to_vec()));
+        }
+        for rows in ["0 0\n1\n1 2\n2\n", "0 2\n2\n1 0\n1\n"] {
+            let expected = vec![run("", [1.0, 2.0])];
+            assert_eq!(shown(&raw(rows)), ("v(v-sweep)".into(), expected));
+        }
+        // An operating point is no sweep.
+        let point =
+            raw("0 0\n1\n1 2\n2\n").replace("DC transfer characteristic", "Operating Point");
+        assert_eq!(plots(point.as_bytes()).unwrap(), []);
     }
 
     #[test]

@@ -81,7 +81,7 @@ pub(super) const CODES: [Explanation; 31] = [
     Explanation::of(
         "no-such-plot",
         "The file has no plot of that number.",
-        "`--plot N` beyond the plots of the file, or a file that holds none over time or frequency.",
+        "`--plot N` beyond the plots of the file.",
         "Take a smaller N.",
     ),
     Explanation::of(

@@ -1,7 +1,7 @@
 //! ngspice's raw files: a text header, then doubles in binary (little endian) or as text.
 //!
 //! What [`write()`] writes loads in ngspice (`load run.raw`) and in the Python package `spicelib`. The header carries no date,
-//! so equal runs are equal bytes. [`read()`] takes the first transient of a file; [`super::plots`] takes everything over time or frequency, and LTspice's files
+//! so equal runs are equal bytes. [`read()`] takes the first transient of a file; [`super::plots`] takes everything over time, frequency or what was swept, and LTspice's files
 //! too.
 
 mod read;

@@ -9,7 +9,7 @@ use std::io::Read;
 
 use nalgebra::Complex;
 
-use super::super::plot::runs;
+use super::super::plot::{runs, sweeps};
 use super::super::{Phasors, Plot, WaveformError, Waveforms, phasors};
 
 const FORMAT: &str = "raw";
@@ -21,7 +21,7 @@ const FORMAT: &str = "raw";
 pub fn read(from: impl Read) -> Result<Waveforms, WaveformError> {
     let runs = plots(from)?.into_iter().find_map(|plot| match plot {
         Plot::Time(runs) => Some(runs),
-        Plot::Frequency(_) => None,
+        Plot::Frequency(_) | Plot::Swept(..) => None,
     });
     let runs = runs.ok_or_else(|| malformed("no plot has `time` as its first variable"))?;
     match <[_; 1]>::try_from(runs) {
@@ -30,7 +30,7 @@ pub fn read(from: impl Read) -> Result<Waveforms, WaveformError> {
     }
 }
 
-/// Reads the plots over time and over frequency; others (operating points, sweeps) are passed over.
+/// Reads the plots over time, over frequency and over what `.dc` swept; others (operating points) are passed over.
 ///
 /// # Errors
 /// [`WaveformError::Malformed`] when a header lacks a field, or values are missing or not finite.
@@ -101,6 +101,8 @@ struct Header {
     single: bool,
     /// Column after column.
     by_column: bool,
+    /// Of `.dc`: the first variable is what was swept.
+    swept: bool,
 }
 
 impl Header {
@@ -126,6 +128,7 @@ impl Header {
             };
             match key.trim().to_ascii_lowercase().as_str() {
                 "title" => header.title = value.to_owned(),
+                "plotname" => header.swept = value.to_ascii_lowercase().starts_with("dc transfer"),
                 "command" => {
                     ltspice |= value.contains("LTspice") || value.contains("Linear Technology")
                 }
@@ -242,7 +245,7 @@ impl Header {
         Ok(values)
     }
 
-    /// What is over time or frequency.
+    /// What is over time, frequency or what was swept.
     fn plot(self, mut values: Vec<f64>) -> Result<Option<Plot>, WaveformError> {
         let (width, parts) = (self.variables.len(), self.parts());
         if let Some(k) = values.iter().position(|v| !v.is_finite()) {
@@ -258,6 +261,10 @@ impl Header {
                     values.iter_mut().step_by(width).for_each(|t| *t = t.abs());
                 }
                 Ok(Some(Plot::Time(runs(&self.waveforms(&values)))))
+            }
+            _ if self.swept && !self.complex => {
+                let axis = self.variables[0].clone();
+                Ok(Some(Plot::Swept(axis, sweeps(&self.waveforms(&values)))))
             }
             _ => Ok(None),
         }
