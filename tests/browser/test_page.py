@@ -383,6 +383,27 @@ def test_the_spectrum_has_axes_of_its_own(buck, show):
     assert pressed() == ["true", "true"] and labels() == 3
 
 
+def test_a_spectrum_is_seen_where_it_is_asked_for(buck, show):
+    page = show(buck / "out.html")
+    for _ in range(2):
+        page.evaluate("scrollTo(0, 0)")
+        page.get_by_role("button", name="spectrum").click()
+        first_panel = page.get_by_role("region", name="spectrum").locator(".panel").first
+        top, bottom, height = first_panel.evaluate("(e) => [e.getBoundingClientRect().top, e.getBoundingClientRect().bottom, innerHeight]")
+        assert 0 <= top and bottom <= height
+        page.get_by_role("button", name="spectrum").click()
+
+
+def test_labels_across_are_whole(tmp_path, show):
+    netlist = tmp_path / "rc.cir"
+    netlist.write_text("rc\nv1 in 0 sin(0 1 1meg)\nr1 in out 1k\nc1 out 0 1n\n.tran 10n 5u\n.end\n")
+    run("sim", netlist, "-q", "-o", tmp_path / "rc.html")
+    page = show(tmp_path / "rc.html")
+    # The letter µ goes below the line: nothing of it may be cut off at the edge.
+    ink = "(k) => { const c = document.querySelectorAll('.uplot canvas')[k]; return c.getContext('2d').getImageData(0, c.height - 1, c.width, 1).data.filter((v, i) => i % 4 === 3 && v > 0).length; }"
+    assert [page.evaluate(ink, k) for k in range(page.locator(".uplot canvas").count())] == [0, 0]
+
+
 def test_a_schematic_has_its_own_picture_on_the_page(tmp_path, show):
     run("sim", ROOT / "netlists/schematics/buck.asc", "-o", tmp_path / "buck.html")
     page = show(tmp_path / "buck.html")

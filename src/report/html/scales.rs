@@ -6,6 +6,8 @@ const FLAT: f64 = 0.02;
 const BESIDE_STILL: f64 = 0.1;
 /// What varies by less of its size stands still: a source with its rounding.
 const STILL: f64 = 1e-6;
+/// What varies by less of the largest value in the unit stands still too: the rounding of a difference.
+const ROUNDING: f64 = 1e-12;
 /// Panels of a unit at most; beyond them a curve goes where it is seen best.
 const MOST: usize = 6;
 
@@ -40,9 +42,26 @@ impl Extent {
         (self.high - self.low).max(0.0)
     }
 
+    /// The largest value.
+    fn size(self) -> f64 {
+        self.low.abs().max(self.high.abs())
+    }
+
+    /// Its middle alone where it is no higher than this, itself else.
+    fn above(self, rounding: f64) -> Self {
+        if self.height() > rounding || self.low > self.high {
+            return self;
+        }
+        let middle = self.low.midpoint(self.high);
+        Self {
+            low: middle,
+            high: middle,
+        }
+    }
+
     /// Neither seen nor in the way: it stands still, or has no values.
     fn is_still(self) -> bool {
-        self.height() <= STILL * self.low.abs().max(self.high.abs())
+        self.height() <= STILL * self.size()
     }
 }
 
@@ -73,13 +92,21 @@ impl Group {
 /// Panels of signals, each in order: the larger ones first take those beside which both are seen, what stands still goes where it flattens nothing.
 /// Panels stand in the order of their first signals, those of what stands still last.
 pub(super) fn panels(extents: &[Extent]) -> Vec<Vec<usize>> {
+    let sizes = extents.iter().map(|extent| extent.size());
+    let rounding = ROUNDING * sizes.filter(|size| size.is_finite()).fold(0.0, f64::max);
+    let extents: Vec<Extent> = extents
+        .iter()
+        .map(|extent| extent.above(rounding))
+        .collect();
     let (still, mut varying): (Vec<usize>, Vec<usize>) =
         (0..extents.len()).partition(|&k| extents[k].is_still());
     varying.sort_by(|&a, &b| extents[b].height().total_cmp(&extents[a].height()));
     let mut groups: Vec<Group> = Vec::new();
     let place = |groups: &mut Vec<Group>, k: usize, least: f64| {
         let extent = extents[k];
-        let parts = groups.iter().map(|group| group.least_part(extents, extent));
+        let parts = groups
+            .iter()
+            .map(|group| group.least_part(&extents, extent));
         let best = parts.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
         let full = groups.len() >= MOST;
         match best.filter(|(_, part)| full || *part >= least) {
@@ -132,6 +159,8 @@ mod tests {
         }
         // The source that stands still comes last.
         assert_eq!(panels_of(&[(400.0, 400.0), (0.0, 12.0)]), [[1], [0]]);
+        // A control that has settled, to rounding, beside an output.
+        assert_eq!(panels_of(&[(0.0, 12.0), (-2.7e-15, 2.7e-15)]).len(), 1);
         // Two outputs at levels of their own have panels of their own.
         assert_eq!(panels_of(&[(11.98, 12.02), (4.99, 5.01)]), [[0], [1]]);
     }

@@ -5,7 +5,7 @@ const STEPS = { dB: [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 40, 100, 
 /** Of errors: a zero stands at this on a logarithmic axis. */
 const LEAST = 1e-17;
 /** CSS pixels. */
-const SIZES = { axis: 76, label: 18, tick: 22, panel: 220, across: 110, up: 30, right: 26, line: 1.5, dot: 3, pixelsToDrag: 4, box: 40 };
+const SIZES = { axis: 76, label: 18, tick: 22, panel: 224, across: 110, up: 30, right: 26, line: 1.5, dot: 3, pixelsToDrag: 4, box: 40 };
 /** The least height of a linear axis over its greatest value: what varies less does so by rounding, and is shown as a straight line. */
 const LEAST_HEIGHT = 1e-13;
 /** How opaque the inside of an envelope is: what lies behind it is seen. */
@@ -188,7 +188,7 @@ function chart(root, content, announce) {
         y: { auto: false, distr: state.logs.has(panel) ? 3 : 1, range: () => boundsOf(panel) },
       },
       axes: [
-        { ...lines, ...marks(axis.unit, axis.log, SIZES.across), size: last ? 34 : 24 },
+        { ...lines, ...marks(axis.unit, axis.log, SIZES.across), size: last ? 34 : 28 },
         { ...lines, ...marks(panel.unit, state.logs.has(panel), SIZES.up), label: panel.quantity, labelSize: SIZES.label, labelFont: "12px system-ui, sans-serif", size: roomOf },
       ],
       series: [{}, ...series],

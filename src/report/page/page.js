@@ -149,15 +149,16 @@ function circPage(root, data) {
       ...panel,
       curves: panel.curves.filter((curve) => curve.shown).map((curve) => ({ ...spectrumOf(curve, ...shown.state.view), run: curve.run, look: curve.look })),
     })).filter((panel) => panel.curves.length > 0);
+    const wasHidden = spectrumArea.hidden;
     spectrumArea.hidden = false;
     if (spectrumArea.childElementCount === 0) {
       const bar = element("div", { class: "controls", role: "toolbar", "aria-label": "axes of the spectrum" });
       axes(bar, () => spectrum, spectrumLooks);
       spectrumArea.append(element("h2", {}, "Spectrum of what is seen"), spectrumWords, bar, element("div"));
-      spectrumArea.scrollIntoView({ block: "nearest" });
     }
     spectrum = chart(spectrumArea.lastChild, { axis: { name: "frequency", unit: "Hz", log: spectrumLooks.x }, panels: of, strips: [] }, announce);
     if (spectrumLooks.y) spectrum.logarithmic(true);
+    if (wasHidden) spectrumArea.scrollIntoView({ block: "nearest" });
   }
   if (panels.some((panel) => panel.curves.length > 0)) {
     button("−", () => shown.zoom(2, middle()), "zoom out (key −)");
