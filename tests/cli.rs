@@ -134,6 +134,7 @@ fn a_word_that_is_neither_a_file_nor_a_command_is_told_so() {
         assert!(said(arguments).contains(&expected), "{arguments}");
     }
     // A misspelt command is none of a file's, with a file behind it too.
+    assert!(said("smi divider.cir").contains("did you mean `sim`?"));
     for arguments in ["chek", "chek divider.cir"] {
         let err = said(arguments);
         assert!(err.contains("'chek'") && err.contains("'check'"), "{err}");
@@ -902,6 +903,56 @@ fn a_spike_on_an_output_time_is_told_of() {
     assert!(!told(&format!("{chopper}\n.tran 2.5u 100u")));
 }
 
+/// Nobody wrote the parts of a gate: they are not among what is listed.
+#[test]
+fn lists_of_elements_have_no_parts_of_gates() {
+    let place = place();
+    let text = "gate\nvref ref 0 1\nvs s 0 pulse(0 2 0 1m 1m 0 2m)\na1 s ref 0 0 0 0 q 0 schmitt vt=0 vh=10m\nr1 q 0 1k\n.tran 10u 4m\n.end\n";
+    fs::write(place.path().join("gate.cir"), text).unwrap();
+    for command in [
+        "op",
+        "check",
+        "sim --table -o a.csv",
+        "pss --table -o a.csv",
+    ] {
+        let ran = run_in(place.path(), &format!("{command} gate.cir"));
+        assert_eq!(ran.status, 0, "{ran}");
+        let said = ran.out.clone() + &ran.err;
+        assert!(said.contains("r1") && !said.contains("a1."), "{ran}");
+    }
+    let ran = run_in(place.path(), "sim gate.cir --table -o a.csv");
+    assert!(ran.err.contains("input 0 W (vref, vs)"), "{ran}");
+    let ran = run_in(place.path(), "op gate.cir -o a.csv");
+    let rows = fs::read_to_string(place.path().join("a.csv")).unwrap();
+    assert!(ran.status == 0 && !rows.contains("a1."), "{ran}{rows}");
+}
+
+/// What an `.ac` is asked for is the same by `circ sim` as by `circ ac`.
+#[test]
+fn ratios_are_shown_by_either_command() {
+    let place = place();
+    let text = "rc\nv1 in 0 ac 2\nr1 in out 1k\nc1 out 0 1u\n.ac dec 2 10 1k\n.end\n";
+    fs::write(place.path().join("ac.cir"), text).unwrap();
+    for probes in [
+        "--probe v(out)/v(in)",
+        "--probe -V(out)/I(R1) --probe v(in)",
+    ] {
+        let [sim, ac] =
+            ["sim", "ac"].map(|c| run_in(place.path(), &format!("{c} ac.cir {probes}")));
+        assert!(
+            sim.status == 0 && sim.err.is_empty() && sim.out.contains('/'),
+            "{sim}"
+        );
+        assert_eq!(sim.out, ac.out);
+    }
+    // Of other expressions the signals are shown, with a note.
+    let ran = run_in(place.path(), "sim ac.cir --probe v(out)*v(in)");
+    assert!(
+        ran.status == 0 && ran.err.contains("is an expression"),
+        "{ran}"
+    );
+}
+
 /// An operating point is printed where nothing else is asked for, and left out with a note where there is a transient.
 #[test]
 fn a_netlist_may_ask_for_its_operating_point() {
@@ -912,11 +963,30 @@ fn a_netlist_may_ask_for_its_operating_point() {
     let asked = run_in(place.path(), "op op.cir");
     assert_eq!((ran.status, &ran.out), (0, &asked.out), "{ran}");
     assert!(ran.out.contains("v(out)"), "{ran}");
-    let ran = run_in(place.path(), "op.cir -o a.csv");
-    assert!(
-        ran.status == 2 && ran.err.contains("circ op op.cir --json"),
-        "{ran}"
-    );
+    let in_json = run_in(place.path(), "op op.cir --json");
+    for command in ["op.cir", "op op.cir"] {
+        let ran = run_in(place.path(), &format!("{command} -o a.csv -o a.json"));
+        assert_eq!(
+            (ran.status, ran.out.as_str(), ran.err.as_str()),
+            (0, "", ""),
+            "{ran}"
+        );
+        let read = |name: &str| fs::read_to_string(place.path().join(name)).unwrap();
+        let rows = read("a.csv");
+        let (names, values) = rows.trim_end().split_once('\n').unwrap();
+        assert_eq!(names, "v(in),v(out),i(v1),i(r1),i(r2)");
+        let values: Vec<f64> = values
+            .split(',')
+            .map(|cell| cell.parse().unwrap())
+            .collect();
+        assert_eq!(values, [10.0, 5.0, -5e-3, 5e-3, 5e-3]);
+        assert_eq!(read("a.json"), in_json.out);
+        let ran = run_in(place.path(), &format!("{command} -o a.svg"));
+        assert!(
+            ran.status == 2 && ran.err.contains("written as csv or json"),
+            "{ran}"
+        );
+    }
     let both = DIVIDER.replace(".tran", ".op\n.dc v1 0 1 1\n.tran");
     fs::write(place.path().join("both.cir"), both).unwrap();
     let ran = run_in(place.path(), "both.cir -o a.csv");

@@ -393,7 +393,14 @@ fn the_operating_points_of_all_steps_are_rows_of_a_file() {
     let points: Vec<_> = rows.iter().map(|row| (row[0], row[2])).collect();
     assert_eq!(points, [(1e3, 5.0), (3e3, 7.5)]);
     let (status, _, err) = circ(folder.path(), "a.cir -o a.npz");
-    assert!(status == 2 && err.contains("are written as csv"), "{err}");
+    assert!(
+        status == 2 && err.contains("is written as csv or json"),
+        "{err}"
+    );
+    let (_, in_json, _) = circ(folder.path(), "op a.cir --json");
+    let (status, _, err) = circ(folder.path(), "a.cir -o a.json");
+    let written = fs::read_to_string(folder.path().join("a.json")).unwrap();
+    assert!(status == 0 && written == in_json, "{err}{written}");
 }
 
 /// 1/|1 + jωRC| at every value, R of a low-pass and its `.meas ac`.

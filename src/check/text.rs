@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::{Convergence, Report};
+use crate::circuit::is_inside;
 use crate::diagnostic::Severity;
 
 fn answer(value: Option<bool>) -> &'static str {
@@ -109,12 +110,13 @@ impl Report {
             "size          {} states, {} ports, {} inputs",
             self.size.n, self.size.m, self.size.p
         )?;
-        if !self.switches.is_empty() {
-            let positions: Vec<String> = self
-                .switches
-                .iter()
-                .map(|(name, on)| format!("{name} {}", if *on { "on" } else { "off" }))
-                .collect();
+        let positions: Vec<String> = self
+            .switches
+            .iter()
+            .filter(|(name, _)| !is_inside(name))
+            .map(|(name, on)| format!("{name} {}", if *on { "on" } else { "off" }))
+            .collect();
+        if !positions.is_empty() {
             writeln!(
                 f,
                 "position      {} (what follows is said for it)",
@@ -130,8 +132,15 @@ impl Report {
             )?;
         }
         if !self.normal_tree.tree.is_empty() {
-            writeln!(f, "normal tree   {}", self.normal_tree.tree.join(" "))?;
-            writeln!(f, "links         {}", self.normal_tree.links.join(" "))?;
+            let written = |names: &[String]| {
+                let written = names
+                    .iter()
+                    .map(String::as_str)
+                    .filter(|name| !is_inside(name));
+                written.collect::<Vec<_>>().join(" ")
+            };
+            writeln!(f, "normal tree   {}", written(&self.normal_tree.tree))?;
+            writeln!(f, "links         {}", written(&self.normal_tree.links))?;
         }
         let kind = if class.zero {
             "zero"

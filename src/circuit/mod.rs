@@ -459,7 +459,7 @@ pub(crate) fn wholes(name: &str) -> impl Iterator<Item = &str> {
 }
 
 /// Whether a node or an element is a part of an `A` device: `a1.q`, `x1.a1.q`.
-fn is_inside(name: &str) -> bool {
+pub(crate) fn is_inside(name: &str) -> bool {
     let mut parts = name.split('.');
     parts.next_back();
     parts.any(|part| part.starts_with('a'))

@@ -77,7 +77,18 @@ pub(super) fn sim(
     streams: &Streams,
 ) -> Result<Exit, Failure> {
     let options = SmallSignalOptions::default();
-    let (phasors, measured) = phasors(&args.input, model, (&options, &[]), streams)?;
+    let probes = &model.circuit().probes;
+    let is_shown = |signal: &String| probes.iter().any(|probe| probe.name == *signal);
+    let asked: Vec<Ratio> = args
+        .results
+        .probes
+        .iter()
+        .map(|text| Ratio::parse(text))
+        .collect();
+    // Other expressions than ratios have no response: the signals in them are shown.
+    let are_ratios = asked.iter().flat_map(Ratio::signals).all(is_shown);
+    let asked = if are_ratios { &asked[..] } else { &[] };
+    let (phasors, measured) = phasors(&args.input, model, (&options, asked), streams)?;
     let outputs = (&args.results.outputs[..], formats);
     write((&phasors, &measured), model, outputs, streams)?;
     Ok(Exit::Done)
@@ -91,7 +102,9 @@ fn phasors(
     asked: (&SmallSignalOptions<'_>, &[Ratio]),
     streams: &Streams,
 ) -> Result<(Phasors, Measurements), Failure> {
-    input::tell_expressions(model, streams);
+    if asked.1.is_empty() {
+        input::tell_expressions(model, streams);
+    }
     if model.circuit().steps.is_empty() {
         return one(input, model, asked, streams);
     }

@@ -502,6 +502,9 @@ pub struct OpArgs {
     #[command(flatten)]
     #[expect(missing_docs, reason = "documented where it is defined")]
     pub input: Input,
+    /// Write it to this file, or `-`, standard output (repeatable); the ending chooses csv or json
+    #[arg(short, long = "output", value_name = "OUT")]
+    pub outputs: Vec<PathBuf>,
     /// Print JSON
     #[arg(long)]
     pub json: bool,

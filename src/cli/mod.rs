@@ -49,6 +49,7 @@ use streams::Streams;
 
 use crate::circuit::load::near_file;
 use crate::diagnostic::explain::{Explanation, explain};
+use crate::netlist::suggest::nearest;
 
 pub use render::render;
 
@@ -267,9 +268,12 @@ fn no_such_input(error: clap::Error, command: &mut clap::Command) -> clap::Error
     } else if is_like_one && !word.contains(['.', '/']) {
         return error;
     } else {
-        let near = near_file(Path::new(word));
-        let near = near.map(|near| format!(": did you mean `{}`?", near.display()));
-        let near = near.unwrap_or_default();
+        let commands = command.get_subcommands().map(clap::Command::get_name);
+        let near = near_file(Path::new(word)).map(|near| near.display().to_string());
+        let near = near.or_else(|| nearest(word, commands));
+        let near = near
+            .map(|near| format!(": did you mean `{near}`?"))
+            .unwrap_or_default();
         format!("`{word}` is neither a file nor a command{near}")
     };
     command.error(ErrorKind::InvalidSubcommand, message)

@@ -99,11 +99,8 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         let file = args.input.file.display();
         if circuit.tran.is_none() && circuit.op {
             only_one_way(args)?;
-            let outputs = &args.results.outputs[..];
-            if !outputs.is_empty() {
-                return op::to_files(&args.input, model, (outputs, &formats), streams);
-            }
-            return op::of_model(&args.input, model, false, streams);
+            let outputs = (&args.results.outputs[..], &formats[..]);
+            return op::of_model(&args.input, model, outputs, false, streams);
         }
         if circuit.op {
             streams.note(

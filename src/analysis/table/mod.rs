@@ -17,7 +17,7 @@ use serde::ser::{SerializeMap, Serializer};
 use super::periodic::{PeriodicOptions, common_period, steady};
 use super::start::{beginning, course};
 use super::variation::Course;
-use crate::circuit::{Circuit, Element, Kind, NodeId, Probe, Probed, Tran, wholes};
+use crate::circuit::{Circuit, Element, Kind, NodeId, Probe, Probed, Tran, is_inside, wholes};
 use crate::integrate::{Error, Method, Note, Reason, Run, SimOptions, Standing};
 use crate::model::Model;
 use crate::settings::Settings;
@@ -114,7 +114,7 @@ pub struct Table {
     pub span: Span,
     /// Whether all is in closed form; otherwise it is that of straight lines between steps.
     pub exact: bool,
-    /// In file order.
+    /// In file order, without parts of `A` devices.
     pub elements: Vec<ElementMeans>,
     /// The signals that the circuit shows.
     pub signals: Vec<SignalMeans>,
@@ -399,8 +399,10 @@ impl<'a> Columns<'a> {
                     Error::before(Reason::Unknown(what))
                 })
         };
-        let is_source =
-            |e: &Element| matches!(e.kind, Kind::VoltageSource(_) | Kind::CurrentSource(_));
+        // The sources that a gate is made of stand for no power.
+        let is_source = |e: &Element| {
+            matches!(e.kind, Kind::VoltageSource(_) | Kind::CurrentSource(_)) && !is_inside(&e.name)
+        };
         let sources = || (0..circuit.elements.len()).filter(|k| is_source(&circuit.elements[*k]));
         let outputs: Vec<usize> = match outputs {
             [] => loads(circuit),
@@ -525,6 +527,7 @@ impl<'a> Columns<'a> {
         for (element, losses) in elements.iter_mut().zip(lost.losses) {
             element.losses = losses;
         }
+        elements.retain(|element| !is_inside(&element.name));
         let notes = (known && stored.abs() > STORED).then(|| {
             let (share, verb) = (100.0 * stored.abs(), if stored > 0.0 { "went into" } else { "came out of" });
             Note::run("stored-energy", format!(
