@@ -6,6 +6,7 @@ use super::trace::{Line, Piece};
 use super::{MeasureError, Trace};
 use crate::linalg::gauss::POINTS;
 use crate::settings::tolerances::netlists::SMALL_ANGLE;
+use crate::settings::tolerances::periodic::FUNDAMENTAL;
 
 /// One harmonic, magnitude·sin(2π k f t + phase) with t from the start of the period, as in SPICE.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,10 +77,12 @@ pub fn fourier(trace: &Trace<'_>, frequency: f64, count: usize) -> Result<Spectr
     let distortion = harmonics.iter().skip(1).map(|h| h.magnitude * h.magnitude);
     let distortion = distortion.sum::<f64>().sqrt();
     let fundamental = harmonics.first().map_or(0.0, |h| h.magnitude);
+    let magnitudes = harmonics.iter().map(|h| h.magnitude);
+    let largest = magnitudes.fold(mean.abs(), f64::max);
     Ok(Spectrum {
         mean,
         harmonics,
-        thd: (fundamental > 0.0).then(|| distortion / fundamental),
+        thd: (fundamental > FUNDAMENTAL * largest).then(|| distortion / fundamental),
     })
 }
 
@@ -196,6 +199,13 @@ fn spherical_bessel(theta: f64, count: usize) -> [f64; POINTS] {
 mod tests {
     use super::*;
     use crate::measure::Curve;
+
+    #[test]
+    fn what_is_constant_to_rounding_has_no_fundamental() {
+        let values = vec![12.0, 12.0 + 2e-15, 12.0 - 2e-15, 12.0];
+        let constant = Trace::lines(&[0.0, 0.5, 1.5, 2.0], values);
+        assert_eq!(fourier(&constant, 0.5, 9).unwrap().thd, None);
+    }
 
     #[test]
     fn a_square_wave() {

@@ -92,7 +92,7 @@ pub(crate) const WARM: f64 = 1e-9;
 /// taken for runaway.
 pub(crate) const HEATINGS: usize = 200;
 
-/// A fundamental below this part of a signal's root mean square is none, and the signal has no distortion. Larger: small fundamentals are
+/// A fundamental below this part of a signal's root mean square, or of its mean and harmonics, is none, and the signal has no distortion. Larger: small fundamentals are
 /// denied; smaller: the rounding of a constant gets a distortion.
 pub(crate) const FUNDAMENTAL: f64 = 1e-9;
 
