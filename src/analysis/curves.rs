@@ -95,7 +95,7 @@ pub(super) fn laps(
 }
 
 /// The shortest period of its sources, s; ∞ where none repeats.
-pub(super) fn shortest_period(model: &Model) -> f64 {
+pub(crate) fn shortest_period(model: &Model) -> f64 {
     let sources = model.multiport().sources.iter();
     let periods = sources.filter_map(|source| source.input.source.wave.period());
     periods.fold(f64::INFINITY, f64::min)

@@ -32,6 +32,8 @@ mod worst;
 
 pub use crate::integrate::{Orbit, OrbitKind};
 pub use conducting::{Conduction, conducting};
+#[cfg(feature = "cli")]
+pub(crate) use curves::shortest_period;
 pub use dc::{Characteristic, Unsolved, dc};
 pub use density::ringing;
 pub use measured::{Finished, Measurements, is_measured, periodic_measured, pictured, transient};

@@ -15,7 +15,7 @@ use super::output;
 use super::sim::{self, Request};
 use super::streams::Streams;
 use super::view;
-use crate::analysis::steps;
+use crate::analysis::{shortest_period, steps};
 use crate::circuit::Tran;
 use crate::integrate::Method;
 use crate::model::Model;
@@ -36,6 +36,8 @@ const SETTINGS: [(f64, &str); 5] = [
     (1e-3, "gear"),
     (1e-3, "trap"),
 ];
+/// Steps of ngspice in each period of the fastest source at least.
+const STEPS_A_PERIOD: f64 = 64.0;
 /// Tolerance of our steppers where the exact integrator does not run, for the same reason.
 const TOL: f64 = 1e-6;
 /// Print steps by which edges may be shifted against ngspice (at least one of our rows: between rows we are straight lines).
@@ -259,7 +261,7 @@ fn from_ngspice(
     for (reltol, method) in SETTINGS {
         let options = deck::Options {
             reltol,
-            max_step: tran.tmax.unwrap_or(f64::INFINITY).min(tran.tstep),
+            max_step: longest_step(model, tran),
             method,
             realisation: args.realisation,
         };
@@ -292,6 +294,12 @@ fn from_ngspice(
         || Failure::told("ngspice", "ngspice was not run".into()),
         failed,
     ))
+}
+
+/// The longest step of ngspice, which looks for no events: it steps over what switches within a period.
+fn longest_step(model: &Model, tran: Tran) -> f64 {
+    let asked = tran.tmax.unwrap_or(f64::INFINITY).min(tran.tstep);
+    asked.min(shortest_period(model) / STEPS_A_PERIOD)
 }
 
 fn from_file(path: &Path) -> Result<Theirs, Failure> {
@@ -382,4 +390,23 @@ fn draw(path: &Path, found: &Found, verdict: &str) -> Result<(), Failure> {
 fn has_ending(path: &Path, known: &[&str]) -> bool {
     let ending = path.extension().unwrap_or_default();
     known.iter().any(|known| ending.eq_ignore_ascii_case(known))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_of_ngspice_resolve_the_fastest_source() {
+        let step = |source: &str, tran: &str| {
+            let text = format!("steps\nv1 a 0 {source}\nr1 a 0 1k\n.tran {tran}\n.end\n");
+            let model = Model::parse(&text, "steps.cir").unwrap();
+            longest_step(&model, model.circuit().tran.unwrap())
+        };
+        // A print step of a period, as 1,000 rows may have, and ones that are short enough.
+        let saw = "pulse(0 1 0 9.8u 0.1u 0.1u 10u)";
+        assert!((step(saw, "10u 20m") - 10e-6 / 64.0).abs() < 1e-18);
+        assert_eq!(step(saw, "10u 20m 0 100n"), 100e-9);
+        assert_eq!(step("5", "10u 20m"), 10e-6);
+    }
 }
