@@ -1,7 +1,7 @@
 //! `A` devices: truth tables, flip-flops, thresholds and what is refused.
 
 use circ::diagnostic::Severity;
-use circ::{Error, Model, SimOptions, Waveforms};
+use circ::{Error, Method, Model, SimOptions, Waveforms};
 
 fn model(cards: &str) -> Result<Model, Error> {
     Model::parse(&format!("title\n{cards}\n.end\n"), "a.cir")
@@ -292,4 +292,25 @@ fn a_converter_is_controlled_by_its_peak_current() {
         (mean - 6.0 * (2.001 - 0.5 * ripple)).abs() < 1e-2 * mean,
         "{mean}"
     );
+}
+
+/// 4 V over 300 and 100 ohms for a second are 40 mJ; what the gate is made of takes none. A flip-flop that drives nothing gives none.
+#[test]
+fn gates_have_no_power_but_that_of_their_outputs() {
+    let gate = "v1 a 0 3\na1 a 0 0 0 0 0 q 0 BUF Vhigh=4 Rout=300\nr1 q 0 100\n";
+    let clock =
+        "vd d 0 1\nvc c 0 PULSE(0 1 0.25 0 0 0.25 0.5)\na2 d 0 c 0 0 qb q2 0 DFLOP Rout=1k\n";
+    for method in [Method::Exact, Method::Theta] {
+        for (cards, expected) in [(gate.to_owned(), 0.04), (format!("{gate}{clock}"), 0.04)] {
+            let options = SimOptions {
+                method,
+                ..SimOptions::default()
+            };
+            let run = model(&format!("{cards}.tran 0.5 1")).expect("a circuit");
+            let run = run.transient(options).expect("a run");
+            let energy = [run.energy.source, run.energy.dissipated];
+            let off = energy.map(|of| (of - expected).abs());
+            assert!(off.iter().all(|off| *off < 1e-9), "{method:?}: {energy:?}");
+        }
+    }
 }

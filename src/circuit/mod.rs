@@ -26,6 +26,7 @@ mod gradient;
 mod held;
 mod line;
 pub(crate) mod load;
+mod logic;
 mod losses;
 mod measurement;
 mod model;

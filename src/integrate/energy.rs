@@ -104,7 +104,7 @@ pub fn power(lcs: &Lcs, at: Point<'_>) -> (f64, f64) {
         match term.kind {
             PowerKind::Source => source -= product,
             PowerKind::Dissipated => dissipated += product,
-            PowerKind::Line => {}
+            PowerKind::Line | PowerKind::Logic => {}
         }
     }
     (source, dissipated)

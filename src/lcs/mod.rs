@@ -189,6 +189,8 @@ pub enum PowerKind {
     Dissipated,
     /// The ports of transmission lines, which store what enters them until it leaves.
     Line,
+    /// Parts of gates and flip-flops whose volts and amperes are numbers: no power.
+    Logic,
 }
 
 /// One element of the energy balance.

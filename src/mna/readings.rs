@@ -136,10 +136,12 @@ impl Assembly<'_> {
         let of_lines: Vec<usize> = ports
             .flat_map(|port| [port.impedance.index(), port.wave.index()])
             .collect();
+        let logic = circuit.logic();
         for (k, element) in circuit.elements.iter().enumerate() {
             let kind = match &element.kind {
-                _ if of_lines.contains(&k) => PowerKind::Line,
                 Kind::Capacitor(_) | Kind::Inductor(_) => continue,
+                _ if logic[k] => PowerKind::Logic,
+                _ if of_lines.contains(&k) => PowerKind::Line,
                 Kind::VoltageSource(_)
                 | Kind::CurrentSource(_)
                 | Kind::Controlled { .. }

@@ -462,6 +462,7 @@ fn work(lcs: &Lcs, v: &DMatrix<f64>, i: &DMatrix<f64>) -> Vec<Term> {
     };
     let terms = lcs.outputs.power.iter().enumerate();
     terms
+        .filter(|(_, term)| matches!(term.kind, PowerKind::Source | PowerKind::Dissipated))
         .map(|(k, term)| Term {
             v: row(v, k),
             i: row(i, k),

@@ -163,7 +163,7 @@ impl System {
             match kind {
                 PowerKind::Source => source -= product,
                 PowerKind::Dissipated => dissipated += product,
-                PowerKind::Line => {}
+                PowerKind::Line | PowerKind::Logic => {}
             }
         }
         (source, dissipated)

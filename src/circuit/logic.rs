@@ -1,0 +1,27 @@
+//! Parts of gates and flip-flops whose volts and amperes are numbers.
+
+use petgraph::unionfind::UnionFind;
+
+use super::{Circuit, Element, NodeId, is_inside};
+
+impl Circuit {
+    /// By element: a part of an `A` device from which no current flows to a pin. It stands for what is true or false, not for power.
+    pub(crate) fn logic(&self) -> Vec<bool> {
+        let mut joined = UnionFind::<usize>::new(self.nodes.len());
+        let inside: Vec<bool> = self.elements.iter().map(|e| is_inside(&e.name)).collect();
+        let parts = self.elements.iter().zip(&inside);
+        for (element, _) in parts.filter(|(_, inside)| **inside) {
+            if element.p != NodeId::GROUND && element.n != NodeId::GROUND {
+                joined.union(element.p.index(), element.n.index());
+            }
+        }
+        let mut has_pin = vec![false; self.nodes.len()];
+        for (k, name) in self.nodes.iter().enumerate().skip(1) {
+            has_pin[joined.find(k)] |= !is_inside(name);
+        }
+        let reaches = |node: NodeId| node != NodeId::GROUND && has_pin[joined.find(node.index())];
+        let parts = self.elements.iter().zip(inside);
+        let is_logic = |e: &Element| !reaches(e.p) && !reaches(e.n);
+        parts.map(|(e, inside)| inside && is_logic(e)).collect()
+    }
+}
