@@ -8,6 +8,8 @@ mod tests;
 
 use std::sync::atomic::AtomicBool;
 
+use nalgebra::DMatrix;
+
 use super::variation::{Course, Linearised, Trajectory};
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{
@@ -18,7 +20,7 @@ use crate::mna::{StaticMultiport, behaviour};
 use crate::model::Model;
 use crate::settings::Settings;
 use crate::settings::tolerances::periodic::{
-    CLOSED, LONGEST_SEARCH, PARTS_OF_PERIOD, PERIOD_OFF, TABLE_STEPS,
+    CLOSED, LONGEST_SEARCH, NEUTRAL, PARTS_OF_PERIOD, PERIOD_OFF, TABLE_STEPS, TANGENTS_DISAGREE,
 };
 use crate::settings::tolerances::times::SPAN_PARTS;
 
@@ -186,6 +188,29 @@ impl Steady {
         Ok((trajectory, from))
     }
 
+    /// By how much a slow response changes, relative to itself, from the derivative of the orbit by tangents to that by differences.
+    ///
+    /// # Errors
+    /// [`Reason::NotSmooth`] where it is more than [`TANGENTS_DISAGREE`].
+    fn disagreement(&self, run: &Linearised) -> Result<f64, Error> {
+        let (own, amplitudes) = (run.trajectories[0].monodromy(), &self.found.amplitudes);
+        let other = &self.found.fixed.derivative;
+        let n = own.nrows();
+        if other.shape() != own.shape() || n == 0 {
+            return Ok(0.0);
+        }
+        let scaled = own.map_with_location(|i, j, v| v * amplitudes[j] / amplitudes[i]);
+        let values = (DMatrix::identity(n, n) - other).singular_values();
+        let change = (scaled - other).amax() / values.min().max(NEUTRAL);
+        if change > TANGENTS_DISAGREE {
+            let what = format!(
+                "the derivative of the orbit by tangents and that by differences of steps leave {change:.0e} of the response open"
+            );
+            return Err(Error::at(self.found.from, Reason::NotSmooth(what)));
+        }
+        Ok(change)
+    }
+
     /// The same of an orbit that is made of steps; `None` of an exact one.
     ///
     /// # Errors
@@ -197,7 +222,10 @@ impl Steady {
         let (stand, from) = (&self.found.fixed.stand, self.found.from);
         let place = (from, &stand.state[..], &stand.switches[..]);
         let until = from + self.found.orbit().period;
-        let found = Trajectory::of_steps(&mut self.simulation, place, until)?;
+        let mut found = Trajectory::of_steps(&mut self.simulation, place, until)?;
+        found.unknown = found
+            .unknown
+            .max(self.disagreement(&found)? * (until - from));
         Ok(Some((found, from)))
     }
 }

@@ -52,6 +52,10 @@ pub(crate) const LINEAR_PARTS: f64 = 256.0;
 /// accurate than they say; smaller: time.
 pub(crate) const TANGENT_CHANGE: f64 = 1e-3;
 
+/// A response about an orbit in steps is refused where derivatives of the orbit by tangents and by differences change a slow one by more than this part.
+/// Larger: wrong responses; smaller: slow converters, whose differences carry less.
+pub(crate) const TANGENTS_DISAGREE: f64 = 3e-2;
+
 /// No part is divided that is shorter than this part of the longest: a diode turns off as if it were ideal. Larger: responses are off by what it conducts in
 /// a part; smaller: time, and rounding of times.
 pub(crate) const SHORTEST_PART: f64 = 1e-5;
