@@ -266,3 +266,78 @@ fn responses_about_orbits_in_steps_are_those_of_orbits_with_a_sine() {
         assert!(apart < tolerance, "{name}: {response} {limit} {apart:e}");
     }
 }
+
+/// Where all devices together interrupt a current, and what they let through is rounding beside their voltages; a transformer, and resistances that are
+/// decades apart.
+const INTERRUPTED: [Case<'_>; 4] = [
+    Case {
+        name: "flyback with a clamp, whose transistor has a body diode",
+        cards: "vin in 0 @12@\nl1 in sw 47u\nl2 0 s 11.75u\nk1 l1 l2 1\nm1 sw g 0 0 mm\nd1 s out d\nc1 out 0 4.7u\n\
+                vgg g 0 pulse(0 12 0 50n 50n 15u 50u)\nrload out 0 100\ndz sw cl d\nrc cl in 2k\ncc cl in 10n\n\
+                .model mm vdmos(rg=3 vto=3.5 rd=15m rs=5m rb=7m kp=35 cgs=.3n cjo=.4n is=4p)\n.model d d(is=1e-12 n=1.3 rs=10m)",
+        out: "v(out)",
+        period: 50e-6,
+        ..CASES[0]
+    },
+    Case {
+        name: "Cuk converter with a large resistance of its switch",
+        cards: "v1 in 0 @12@\nl1 in a 100u\ns1 a 0 g 0 sw\nc1 a b 10u\nd1 b 0 d\nl2 b out 100u\nc2 out 0 100u\nr1 out 0 100\n\
+                vg g 0 pulse(0 1 0 0 0 2u 10u)\n.model sw sw(vt=0.5 vh=0 ron=1m roff=1e15)\n.model d d(is=1e-12 n=1.3 rs=10m)",
+        out: "v(out)",
+        period: 10e-6,
+        ..CASES[0]
+    },
+    Case {
+        name: "forward converter with hardly any load",
+        cards: "v1 6 0 @400@\nl1 6 1 1.1\nl2 2 6 1.1\nl3 3 0 4.4\nk1 l1 l2 0.98\nk2 l1 l3 0.98\nk3 l2 l3 0.98\nm1 1 8 0 m0\n\
+                v3 8 0 pulse(0 5 0 0 0 0.45m 1m)\nr1 1 9 28\nc1 9 0 33n\nd1 0 2 d\nd2 3 4 d\nd3 0 4 d\nl4 4 10 180m\nr2 10 out 0.92\n\
+                c2 out 0 170u\nr3 out 0 92\n.model m0 nmos(vto=2.5 ron=10m rds=1meg)\n.model d d(is=1e-12 n=1.3 rs=10m)",
+        out: "v(out)",
+        period: 1e-3,
+        ..CASES[0]
+    },
+    Case {
+        name: "Cuk converter whose switch lies 18 decades apart from itself",
+        cards: "v1 4 0 @5@\nl1 4 6 350u\nr1 6 1 50m\nm1 1 7 0 m0\nv3 7 0 pulse(0 15 10u 0 0 2u 20u)\nr2 1 8 1.5\nc1 8 0 12n\nc2 1 2 16u\n\
+                d1 2 0 d\nl2 3 2 34u\nc3 3 0 470u\nr3 3 0 5\n.model m0 nmos(vto=7.5 ron=1n rds=1e9)\n.model d d(is=1e-12 n=1.3 rs=10m)",
+        out: "v(3)",
+        period: 20e-6,
+        ..CASES[0]
+    },
+];
+
+/// At a frequency that is next to none the response is what another value of the source makes of the mean over a period.
+#[test]
+fn static_responses_about_orbits_in_steps_are_differences_of_means() {
+    for case in INTERRUPTED {
+        let mean = |part: f64| {
+            let four = format!(
+                ".tran 1u 1m\n.four {:e} 1 {}",
+                case.period.recip(),
+                case.out
+            );
+            let model = case.model(|value| format!("{:e}", value * (1.0 + part)), &four);
+            let found = periodic_measured(&model, &PeriodicOptions::default());
+            let (.., found) = found.unwrap_or_else(|e| panic!("{}: {e}", case.name));
+            found.harmonics[0].result.as_ref().expect("a spectrum").mean
+        };
+        let slope = |part: f64| {
+            let value: f64 = case
+                .cards
+                .split('@')
+                .nth(1)
+                .and_then(|v| v.parse().ok())
+                .expect("a value");
+            (mean(part) - mean(-part)) / (2.0 * part * value)
+        };
+        let found = slope(1e-3);
+        let slow = Case {
+            cycles: 1,
+            periods: 1_000_000,
+            ..case
+        };
+        let response = slow.response().re;
+        let apart = (response / found - 1.0).abs();
+        assert!(apart < 2e-4, "{}: {response} {found} {apart:e}", case.name);
+    }
+}

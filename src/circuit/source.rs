@@ -142,6 +142,22 @@ impl Source {
         }
     }
 
+    /// Adds a constant; whether the waveform has a parameter for that.
+    pub(crate) fn raise(&mut self, by: f64) -> bool {
+        self.dc += by;
+        match &mut self.wave {
+            Wave::Dc(value) => *value += by,
+            Wave::Sin { offset, .. } | Wave::Sffm { offset, .. } => *offset += by,
+            Wave::Pulse { v1, v2, .. } | Wave::Exp { v1, v2, .. } => {
+                *v1 += by;
+                *v2 += by;
+            }
+            Wave::Pwl { points, .. } => points.iter_mut().for_each(|(_, value)| *value += by),
+            Wave::Am { .. } | Wave::Arriving { .. } => return false,
+        }
+        true
+    }
+
     /// The value at `t`, V or A; at an edge the value after it. See [`Wave::value`].
     #[must_use]
     pub fn value(&self, t: f64) -> f64 {

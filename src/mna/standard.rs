@@ -21,6 +21,18 @@ impl Deref for StandardMultiport {
     }
 }
 
+impl StandardMultiport {
+    /// The same with ideal diodes in place of curved laws, so that these can be held open.
+    pub(crate) fn with_ideal_diodes(&self) -> Self {
+        let mut other = self.0.clone();
+        let curved = other.pairs.iter_mut();
+        for pair in curved.filter(|pair| !pair.port.law.is_piecewise_linear()) {
+            pair.port.law = Law::ideal_diode();
+        }
+        Self(other)
+    }
+}
+
 impl StaticMultiport {
     /// The same multiport with every piecewise-linear law replaced by ideal pairs 0 ≤ p ⟂ q ≥ 0; other laws stay as they are.
     ///

@@ -8,10 +8,8 @@ mod tests;
 
 use std::sync::atomic::AtomicBool;
 
-use nalgebra::DMatrix;
-
 use super::variation::{Course, Linearised, Trajectory};
-use crate::circuit::{Circuit, Tran};
+use crate::circuit::{Circuit, Kind, Tran};
 use crate::integrate::{
     Error, Note, Orbit, OrbitKind, Reason, Run, SimOptions, Simulation, SimulationOptions,
     Standing, simulate_beside,
@@ -20,7 +18,7 @@ use crate::mna::{StaticMultiport, behaviour};
 use crate::model::Model;
 use crate::settings::Settings;
 use crate::settings::tolerances::periodic::{
-    CLOSED, LONGEST_SEARCH, NEUTRAL, PARTS_OF_PERIOD, PERIOD_OFF, TABLE_STEPS, TANGENTS_DISAGREE,
+    CLOSED, FINER, LONGEST_SEARCH, PARTS_OF_PERIOD, PERIOD_OFF, TABLE_STEPS,
 };
 use crate::settings::tolerances::times::SPAN_PARTS;
 
@@ -188,27 +186,47 @@ impl Steady {
         Ok((trajectory, from))
     }
 
-    /// By how much a slow response changes, relative to itself, from the derivative of the orbit by tangents to that by differences.
-    ///
-    /// # Errors
-    /// [`Reason::NotSmooth`] where it is more than [`TANGENTS_DISAGREE`].
-    fn disagreement(&self, run: &Linearised) -> Result<f64, Error> {
-        let (own, amplitudes) = (run.trajectories[0].monodromy(), &self.found.amplitudes);
-        let other = &self.found.fixed.derivative;
-        let n = own.nrows();
-        if other.shape() != own.shape() || n == 0 {
-            return Ok(0.0);
+    /// When the orbit begins, s.
+    pub(super) const fn from(&self) -> f64 {
+        self.found.from
+    }
+
+    /// By state: the largest amplitude on the orbit of one of its unit.
+    pub(super) fn sizes(&self) -> Vec<f64> {
+        let units = self.simulation.state_units();
+        let all = units.iter().zip(&self.found.amplitudes);
+        let of = |unit| {
+            let same = all.clone().filter(|(other, _)| **other == unit);
+            same.fold(0.0_f64, |m, (_, size)| m.max(*size))
+        };
+        units.iter().map(|unit| of(*unit)).collect()
+    }
+
+    /// Where the orbit begins if sources are higher by as much as these; `None` where it is not found beside this one, or a source cannot be.
+    pub(super) fn beside(
+        &self,
+        shifts: &[(&str, f64)],
+        options: &PeriodicOptions<'_>,
+    ) -> Result<Option<Vec<f64>>, Error> {
+        let mut circuit = self.circuit.clone();
+        for (name, by) in shifts.iter().filter(|(_, by)| *by != 0.0) {
+            let id = circuit.element(name);
+            let kind = id.map(|id| &mut circuit.elements[id.index()].kind);
+            let (Some(Kind::VoltageSource(source)) | Some(Kind::CurrentSource(source))) = kind
+            else {
+                return Ok(None);
+            };
+            if !source.raise(*by) {
+                return Ok(None);
+            }
         }
-        let scaled = own.map_with_location(|i, j, v| v * amplitudes[j] / amplitudes[i]);
-        let values = (DMatrix::identity(n, n) - other).singular_values();
-        let change = (scaled - other).amax() / values.min().max(NEUTRAL);
-        if change > TANGENTS_DISAGREE {
-            let what = format!(
-                "the derivative of the orbit by tangents and that by differences of steps leave {change:.0e} of the response open"
-            );
-            return Err(Error::at(self.found.from, Reason::NotSmooth(what)));
-        }
-        Ok(change)
+        let Ok(multiport) = behaviour(&circuit) else {
+            return Ok(None);
+        };
+        let seconds = self.orbit().period / self.orbit().order as f64;
+        let mut simulation = simulation((&circuit, &multiport), Some(seconds), FINER, options)?;
+        let fixed = Search::of(&mut simulation, options).again(&self.found)?;
+        Ok(fixed.map(|fixed| fixed.stand.state))
     }
 
     /// The same of an orbit that is made of steps; `None` of an exact one.
@@ -222,10 +240,7 @@ impl Steady {
         let (stand, from) = (&self.found.fixed.stand, self.found.from);
         let place = (from, &stand.state[..], &stand.switches[..]);
         let until = from + self.found.orbit().period;
-        let mut found = Trajectory::of_steps(&mut self.simulation, place, until)?;
-        found.unknown = found
-            .unknown
-            .max(self.disagreement(&found)? * (until - from));
+        let found = Trajectory::of_steps(&mut self.simulation, place, until)?;
         Ok(Some((found, from)))
     }
 }
@@ -335,7 +350,7 @@ fn refined(
     period: Option<f64>,
     options: &PeriodicOptions<'_>,
 ) -> Result<Option<f64>, Error> {
-    let mut finer = simulation(parts, period, 0.5, options)?;
+    let mut finer = simulation(parts, period, FINER, options)?;
     let Some(fixed) = Search::of(&mut finer, options).again(found)? else {
         return Ok(None);
     };

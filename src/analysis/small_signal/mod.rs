@@ -1,6 +1,7 @@
 //! The small-signal response: what a small sine on the sources with an `AC` value makes of the signals, about the operating point or about the
 //! periodic steady state.
 
+mod beside;
 mod formula;
 mod measured;
 mod orbit;
@@ -197,7 +198,7 @@ pub fn small_signal(model: &Model, options: &SmallSignalOptions<'_>) -> Result<R
         };
         let found = steady(model, &asked)?;
         if found.orbit().kind != OrbitKind::Equilibrium {
-            about_orbit(found, &omegas, options.sidebands, &mut response)?;
+            about_orbit(found, &asked, (&omegas, options.sidebands), &mut response)?;
             return Ok(response);
         }
         if options.about.is_some() {
@@ -219,8 +220,8 @@ pub fn small_signal(model: &Model, options: &SmallSignalOptions<'_>) -> Result<R
 
 fn about_orbit(
     mut found: Steady,
-    omegas: &[f64],
-    sidebands: u16,
+    asked: &PeriodicOptions<'_>,
+    (omegas, sidebands): (&[f64], u16),
     response: &mut Response,
 ) -> Result<(), Error> {
     let orbit = found.orbit();
@@ -233,15 +234,18 @@ fn about_orbit(
     };
     let systems = trajectories.iter().flat_map(|all| &all.systems);
     let inputs = systems.map(|system| &system.lcs.inputs[..]).next();
-    let drive = drive(&found.circuit, inputs.unwrap_or_default());
+    let inputs = inputs.unwrap_or_default();
+    let drive = drive(&found.circuit, inputs);
     let linear = |trajectory| orbit::Linear::of(trajectory, orbit.period, origin);
     let linear: Vec<orbit::Linear<'_>> = trajectories.iter().map(linear).collect();
     let bands: Vec<i32> = (-i32::from(sidebands)..=i32::from(sidebands)).collect();
     match &linear[..] {
         [exact] => response.sweep(omegas, |omega| exact.response(omega, &drive, &bands))?,
         all => {
+            let confirmed = beside::confirmed(&found, &all[0], (inputs, &drive), asked)?;
             let respond = |k: usize, omega| all[k].response(omega, &drive, &bands);
-            let known = (unknown / orbit.period, found.apart);
+            let unknown = (unknown / orbit.period).max(confirmed.unwrap_or(0.0));
+            let known = (unknown, found.apart);
             response.extrapolate(omegas, known, respond)?;
         }
     }

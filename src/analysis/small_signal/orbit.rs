@@ -74,13 +74,7 @@ impl<'a> Linear<'a> {
         bands: &[i32],
     ) -> Result<(Vec<Complex<f64>>, f64), Error> {
         let forced = self.forced(omega, drive)?;
-        let still = DVector::zeros(self.monodromy.nrows());
-        let after = self.pass(omega, drive, &forced, &still, |_, _, _, _| Ok(()))?;
-        let start = if still.is_empty() {
-            still
-        } else {
-            self.closed(omega, &after).ok_or_else(|| resonance(omega))?
-        };
+        let start = self.start_of(omega, drive, &forced)?;
         let width = self.outputs.first().map_or(0, |[x, ..]| x.nrows());
         let mut sums = vec![DVector::<Complex<f64>>::zeros(width); bands.len()];
         let mut loss = 0.0_f64;
@@ -103,6 +97,29 @@ impl<'a> Linear<'a> {
             .iter()
             .flat_map(|sum| sum.iter().map(|v| v / self.period));
         Ok((values.collect(), loss))
+    }
+
+    /// δs₀ of the solution that repeats but for the factor e^{jωT}.
+    pub(super) fn start(
+        &self,
+        omega: f64,
+        drive: &DVector<Complex<f64>>,
+    ) -> Result<DVector<Complex<f64>>, Error> {
+        self.start_of(omega, drive, &self.forced(omega, drive)?)
+    }
+
+    fn start_of(
+        &self,
+        omega: f64,
+        drive: &DVector<Complex<f64>>,
+        forced: &[Forced<'_>],
+    ) -> Result<DVector<Complex<f64>>, Error> {
+        let still = DVector::zeros(self.monodromy.nrows());
+        let after = self.pass(omega, drive, forced, &still, |_, _, _, _| Ok(()))?;
+        if still.is_empty() {
+            return Ok(still);
+        }
+        self.closed(omega, &after).ok_or_else(|| resonance(omega))
     }
 
     /// δs₀ = (e^{jωT} − M)⁻¹ Γ û.

@@ -3,7 +3,7 @@
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::{Resolvent, resonance};
-use crate::analysis::variation::{shaped, tangents, times};
+use crate::analysis::variation::{own_resistance, shaped, tangents, times};
 use crate::circuit::Circuit;
 use crate::integrate::{Error, Note, Values, operating_point};
 use crate::lcs::{Hold, Input, Position, StorageHold, reduce};
@@ -67,7 +67,7 @@ pub(super) fn linear(
     let curved = curved
         .filter(|(hold, _)| **hold == Hold::Free)
         .map(|(_, at)| *at);
-    let follows = tangents(&lcs, &curved.collect::<Vec<_>>(), 0.0);
+    let follows = tangents(&lcs, &curved.collect::<Vec<_>>(), own_resistance);
     let Some([follows_x, follows_u]) = follows else {
         return Err(resonance(0.0));
     };

@@ -55,7 +55,7 @@ pub(crate) use steps::Linearised;
 use system::Row;
 pub(crate) use system::{System, shaped};
 pub(crate) use tableau::{Rest, Tableau};
-pub(crate) use tangent::tangents;
+pub(crate) use tangent::{own_resistance, tangents};
 
 /// A stretch of a run in one mode.
 #[derive(Debug, Clone)]

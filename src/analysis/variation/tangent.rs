@@ -6,30 +6,65 @@ use super::system::{System, shaped};
 use crate::integrate::exact::Key;
 use crate::integrate::reading;
 use crate::integrate::theta::Instant;
-use crate::lcs::{Lcs, LcsParts, Role, Rows};
+use crate::lcs::{Hold, Lcs, LcsParts, Port, Role, Rows};
 use crate::linalg::decouple::decoupled;
+use crate::settings::tolerances::periodic::CARRIES;
+
+/// Voltage and current of each port at a point.
+pub(super) fn points(at: &Instant) -> Vec<(f64, f64)> {
+    let lcs = &at.lcs;
+    let (n, m, p) = (lcs.n(), lcs.m(), lcs.p());
+    let y = shaped(&lcs.c, m, n) * &at.x
+        + shaped(&lcs.d, m, m) * &at.lambda
+        + shaped(&lcs.g, m, p) * &at.u
+        + &lcs.f;
+    reading::points(lcs, &at.lambda, &y)
+}
+
+/// Devices that carry nothing at their points are open, as what they resist is no part of the circuit: a current that they interrupt is gone; ideal ones are
+/// closed where they conduct. Pairs of functions, and laws of straight pieces that resist, stay as they are.
+pub(super) fn holds(lcs: &Lcs, points: &[(f64, f64)], resistance: f64) -> Vec<Hold> {
+    let hold = |(port, (v, i)): (&Port, &(f64, f64))| {
+        let law = &port.law;
+        let tangent = law.resolvent(resistance, v + resistance * i);
+        let (voltage, current) = (tangent.dv, tangent.di * resistance);
+        let may_open = law.is_ideal_diode() || !law.is_piecewise_linear();
+        match port.role {
+            Role::Function => Hold::Free,
+            _ if may_open && current <= CARRIES * voltage => Hold::Open,
+            _ if law.is_ideal_diode() => Hold::Closed,
+            _ => Hold::Free,
+        }
+    };
+    lcs.ports.iter().zip(points).map(hold).collect()
+}
 
 impl System {
-    /// The linear system x' = A' x + E' u + e' that touches the one of a point there: δλ = L_x δx + L_u δu by its laws' tangents, with time constants of
-    /// `quickest` seconds at least where a device takes a state away. `None` where these leave λ open.
-    pub(super) fn touching(at: &Instant, switches: &[bool], quickest: f64) -> Option<Self> {
-        let lcs = &at.lcs;
-        let (n, m, p, q) = (lcs.n(), lcs.m(), lcs.p(), lcs.storage.names.len());
-        let y = shaped(&lcs.c, m, n) * &at.x
-            + shaped(&lcs.d, m, m) * &at.lambda
-            + shaped(&lcs.g, m, p) * &at.u
-            + &lcs.f;
-        let [x, u] = tangents(lcs, &reading::points(lcs, &at.lambda, &y), quickest)?;
-        let one = &at.lambda - &x * &at.x - &u * &at.u;
-        let follows = Follows { x, u, one };
+    /// The linear system x' = A' x + E' u + e' that touches a system at a point, where ports have these voltages and currents: δλ = L_x δx + L_u δu by its
+    /// laws' tangents, with voltages and currents weighed by a `resistance`, Ω. `None` where these leave λ open.
+    pub(super) fn touching(
+        lcs: &Lcs,
+        key: Key,
+        (x, u): (&DVector<f64>, &DVector<f64>),
+        (points, resistance): (&[(f64, f64)], f64),
+    ) -> Option<Self> {
+        let (n, p, q) = (lcs.n(), lcs.p(), lcs.storage.names.len());
+        let [follows_x, follows_u] = tangents(lcs, points, |_| resistance)?;
+        let ports = lcs.ports.iter().zip(points);
+        let lambda = ports.map(|(port, &(v, i))| match port.role {
+            Role::Voltage => -v,
+            Role::Current | Role::Function => i,
+        });
+        let lambda = DVector::from_iterator(points.len(), lambda);
+        let follows = Follows {
+            one: lambda - &follows_x * x - &follows_u * u,
+            x: follows_x,
+            u: follows_u,
+        };
         let lcs = lcs.clone().changed(|parts| follows.take(parts)).ok()?;
         let basis = (!lcs.fast.is_empty()).then(|| decoupled(&lcs.a, &lcs.fast));
         Some(Self {
-            key: Key {
-                closed: Vec::new(),
-                switches: switches.to_vec(),
-                sliding: Vec::new(),
-            },
+            key,
             storage_inputs: shaped(&lcs.storage.u, q, p),
             inputs: shaped(&lcs.e, n, p),
             basis: basis.flatten(),
@@ -60,8 +95,10 @@ impl Follows {
         parts.f = DVector::zeros(0);
         parts.ports.clear();
         parts.storage.lambda = DMatrix::zeros(q, 0);
-        let outputs = &mut parts.outputs;
+        let (outputs, held) = (&mut parts.outputs, &mut parts.held);
         let all = [
+            &mut held.guard,
+            &mut held.constraints,
             &mut outputs.rows,
             &mut outputs.power_v,
             &mut outputs.power_i,
@@ -82,15 +119,22 @@ impl Follows {
     }
 }
 
-/// δλ = L_x δx + L_u δu of ports with laws whose points (v, i) are these. A port that resists infinitely, or not at all, does so within `quickest` seconds: it
-/// takes a state away in no less.
+/// A resistance of the size of a point's own, which weighs its voltage and current alike, Ω.
+pub(crate) fn own_resistance((v, i): (f64, f64)) -> f64 {
+    if v != 0.0 && i != 0.0 {
+        (v / i).abs()
+    } else {
+        1.0
+    }
+}
+
+/// δλ = L_x δx + L_u δu of ports with laws near whose points (v, i) these are: on the law v + ρ i is what it is here, with a resistance ρ for each.
 pub(crate) fn tangents(
     lcs: &Lcs,
     points: &[(f64, f64)],
-    quickest: f64,
+    resistance: impl Fn((f64, f64)) -> f64,
 ) -> Option<[DMatrix<f64>; 2]> {
     let (n, m, p) = (lcs.n(), lcs.m(), lcs.p());
-    let b = shaped(&lcs.b, n, m);
     let (c, d, g) = (
         shaped(&lcs.c, m, n),
         shaped(&lcs.d, m, m),
@@ -101,19 +145,12 @@ pub(crate) fn tangents(
     }
     let (mut matrix, mut beta) = (d, DVector::zeros(m));
     for (j, (port, &(v, i))) in lcs.ports.iter().zip(points).enumerate() {
-        // A resistance of the size of the point's own weighs voltage and current alike.
-        let rho = if v != 0.0 && i != 0.0 {
-            (v / i).abs()
-        } else {
-            1.0
-        };
+        let rho = resistance((v, i));
         let tangent = port.law.resolvent(rho, v + rho * i);
         let (alpha, own) = match port.role {
             Role::Voltage => (tangent.di, tangent.dv),
             Role::Current | Role::Function => (tangent.dv, tangent.di),
         };
-        let rate = b.column(j).amax() * c.row(j).amax();
-        let alpha = alpha.max(quickest * rate * own);
         beta[j] = own;
         let mut row = matrix.row_mut(j);
         row *= own;
@@ -156,7 +193,7 @@ mod tests {
             });
         });
         let v = slope * (i / is).ln_1p();
-        let [found, _] = tangents(&lcs.unwrap(), &[(v + 1e-9, i)], 0.0).unwrap();
+        let [found, _] = tangents(&lcs.unwrap(), &[(v + 1e-9, i)], own_resistance).unwrap();
         let off = found[(0, 0)] / ((i + is) / slope) - 1.0;
         assert!(off.abs() < 1e-9, "{off:e}");
     }

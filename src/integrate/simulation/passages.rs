@@ -8,7 +8,6 @@ use super::way::Way;
 use crate::integrate::error::Error;
 use crate::integrate::exact::{Assembler, Passage};
 use crate::integrate::stats::Impulse;
-use crate::integrate::switching::Threshold;
 use crate::integrate::theta::Instant;
 
 impl Simulation {
@@ -51,9 +50,10 @@ impl Simulation {
         }
     }
 
-    /// The thresholds of the switches.
-    pub(crate) fn thresholds(&self) -> Vec<Threshold> {
-        self.assembler(0.0).thresholds()
+    /// Reduces the circuit with devices that are open for a run as long as `span`, s; the laws of others are to be put back.
+    pub(crate) fn opener(&self, span: f64) -> Assembler {
+        let multiport = &self.problem.systems.multiport;
+        Assembler::new(Arc::new(multiport.with_ideal_diodes())).with_span(span)
     }
 
     /// The impulses of devices and sources so far.

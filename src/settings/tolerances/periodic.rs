@@ -52,17 +52,38 @@ pub(crate) const LINEAR_PARTS: f64 = 256.0;
 /// accurate than they say; smaller: time.
 pub(crate) const TANGENT_CHANGE: f64 = 1e-3;
 
-/// A response about an orbit in steps is refused where derivatives of the orbit by tangents and by differences change a slow one by more than this part.
-/// Larger: wrong responses; smaller: slow converters, whose differences carry less.
-pub(crate) const TANGENTS_DISAGREE: f64 = 3e-2;
+/// Steps of the orbit that is kept, in parts of those of the first, which tell its error. Larger: less is known of it; smaller: time.
+pub(crate) const FINER: f64 = 0.5;
+
+/// A response about an orbit in steps is refused where orbits with other sources move the state otherwise than tangents say by more than this part. Larger:
+/// wrong responses; smaller: circuits that are curved within [`SHIFTED`].
+pub(crate) const SHIFTED_OTHERWISE: f64 = 3e-2;
+
+/// Sources are moved by what moves the state by this part of its amplitudes. Larger: the curvature of laws; smaller: what steps leave open.
+pub(crate) const SHIFTED: f64 = 1e-3;
+
+/// They are moved by at most this part of the largest of them. Larger: other modes; smaller: states that owe little to them are not looked at.
+pub(crate) const SHIFTED_SOURCES: f64 = 1e-2;
+
+/// A state that is moved by less than this part of its amplitudes is not looked at: steps leave [`STEPPED_CLOSED`] open.
+pub(crate) const LEAST_SHIFTED: f64 = 1e-4;
+
+/// What is static repeats but for this part of a turn a period. Larger: the response has a phase; smaller: rounding of modes without a resistance.
+pub(crate) const STATIC: f64 = 1e-6;
+
+/// A multiplier that is nearer to 1 leaves no static response. Larger: slow circuits are not looked at; smaller: [`STATIC`] is too fast.
+pub(crate) const TOO_SLOW: f64 = 1e-4;
 
 /// No part is divided that is shorter than this part of the longest: a diode turns off as if it were ideal. Larger: responses are off by what it conducts in
 /// a part; smaller: time, and rounding of times.
 pub(crate) const SHORTEST_PART: f64 = 1e-5;
 
-/// What a device that blocks takes away of a current (of a voltage, one that conducts) is gone within this part of the shortest part. Larger: currents that
-/// flow on; smaller: rounding of exponentials.
-pub(crate) const QUICKEST: f64 = 0.1;
+/// Parts of a stretch beyond which none is divided: tangents that change everywhere are not found by dividing. Larger: time; smaller: errors, which are stated.
+pub(crate) const MOST_DIVIDED: usize = 2_000;
+
+/// A device carries no current where its conductance is below this part of the largest current over the largest voltage of all devices. Larger: leakage is left
+/// out; smaller: exponentials of resistances that are decades apart.
+pub(crate) const CARRIES: f64 = 1e-9;
 
 /// What a switch is about to pass its threshold with is read this part of a quarter of a part before it. Larger: extrapolation; smaller: rounding.
 pub(crate) const BEFORE_EVENT: f64 = 1e-3;

@@ -11,12 +11,13 @@ use self::parts::Touch;
 use super::instant::Inputs;
 use super::saltation::Side;
 use super::system::System;
+use super::tangent::{own_resistance, points};
 use super::{Saltation, Segment, Timing, Trajectory, not_smooth, same_timing};
-use crate::integrate::exact::Owner;
+use crate::integrate::exact::{Assembler, Owner};
 use crate::integrate::switching::{Threshold, fire};
 use crate::integrate::theta::Instant;
 use crate::integrate::{Change, Error, Event, Simulation};
-use crate::lcs::Input;
+use crate::lcs::{Hold, Input, Lcs};
 use crate::settings::tolerances::events::{AT_LEVEL, GRAZING};
 use crate::settings::tolerances::jumps::FOLLOWS_JUMP_IN_STEPS;
 use crate::settings::tolerances::periodic::{BEFORE_EVENT, BEHIND_EVENT, LINEAR_PARTS};
@@ -26,10 +27,15 @@ use crate::settings::tolerances::times::SAME_TIME;
 struct Way<'a> {
     simulation: &'a mut Simulation,
     thresholds: Vec<Threshold>,
+    assembler: Assembler,
+    /// Systems in which devices are open, in positions of the switches.
+    opened: Vec<(Vec<Hold>, Vec<bool>, Lcs)>,
     /// The length of a part, s, times within which are one, and where the run ends.
     part: f64,
     same: f64,
     until: f64,
+    /// See [`Self::resistance`].
+    resistance: f64,
     /// See [`Linearised`].
     unknown: f64,
 }
@@ -39,6 +45,13 @@ struct Way<'a> {
 struct Stop {
     t: f64,
     moves: bool,
+}
+
+/// An instant at which switches move or sources have corners, and what touches the run on its two sides.
+struct Passed {
+    before: Touch,
+    saltation: Saltation,
+    after: Touch,
 }
 
 /// What is made of the parts: of each as a whole, or of its halves.
@@ -67,14 +80,20 @@ impl Trajectory {
         (from, state, switches): (f64, &[f64], &[bool]),
         until: f64,
     ) -> Result<Linearised, Error> {
+        let assembler = simulation.opener(until - from);
         let mut way = Way {
-            thresholds: simulation.thresholds(),
+            thresholds: assembler.thresholds(),
+            assembler,
+            opened: Vec::new(),
             part: (until - from) / LINEAR_PARTS,
             same: SAME_TIME * from.abs().max(until.abs()),
+            resistance: 1.0,
             unknown: 0.0,
             simulation,
             until,
         };
+        way.simulation.stand_at(from, state, switches)?;
+        way.resistance = way.resistance()?;
         way.simulation.stand_at(from, state, switches)?;
         let stops = way.stops()?;
         way.simulation.stand_at(from, state, switches)?;
@@ -101,6 +120,18 @@ impl Way<'_> {
         let t = self.simulation.time();
         let found = self.simulation.instant()?;
         found.ok_or_else(|| not_smooth(t, "it is exact in part"))
+    }
+
+    /// The largest voltage of the devices on the way from here over their largest current, Ω.
+    fn resistance(&mut self) -> Result<f64, Error> {
+        let (from, mut sizes) = (self.simulation.time(), (0.0_f64, 0.0_f64));
+        for k in 1..LINEAR_PARTS as usize {
+            self.simulation.advance_to(from + k as f64 * self.part)?;
+            for (v, i) in points(&self.instant()?) {
+                sizes = (sizes.0.max(v.abs()), sizes.1.max(i.abs()));
+            }
+        }
+        Ok(own_resistance(sizes))
     }
 
     /// All stops from here on, the end included.
@@ -149,7 +180,7 @@ impl Way<'_> {
         let Some(last) = parts.last() else {
             return Ok(());
         };
-        let saltation = if stop.t >= self.until {
+        let passed = if stop.t >= self.until {
             None
         } else if stop.moves {
             let quarter = 0.25 * (last.to - last.from);
@@ -157,12 +188,12 @@ impl Way<'_> {
         } else {
             Some(self.corner(stop.t, &last.touches[2])?)
         };
-        let end = match saltation {
+        let end = match passed {
             Some(_) => self.simulation.time(),
             None => stop.t,
         };
         let (state, after) = (self.simulation.state(), self.simulation.positions());
-        if self.refine(&mut parts, &switches)? && saltation.is_some() {
+        if self.refine(&mut parts, &switches)? && passed.is_some() {
             self.simulation.stand_at(end, &state, &after)?;
         }
         if let Some(last) = parts.last_mut() {
@@ -172,40 +203,38 @@ impl Way<'_> {
         for part in parts {
             let [first, middle, last] = part.touches;
             let half = middle.t;
-            halves.part(first, (part.from, half))?;
-            halves.part(last, (half, part.to))?;
-            whole.part(middle, (part.from, part.to))?;
+            halves.part(first, (part.from, half), self.same)?;
+            halves.part(last, (half, part.to), self.same)?;
+            whole.part(middle, (part.from, part.to), self.same)?;
         }
-        if let Some(saltation) = saltation {
+        if let Some(passed) = passed {
             for made in both {
-                made.saltations.push(saltation.clone());
+                made.part(passed.before.clone(), (end, end), self.same)?;
+                made.saltations.push(passed.saltation.clone());
+                made.part(passed.after.clone(), (end, end), self.same)?;
             }
         }
         Ok(())
     }
 
     /// Goes on to a corner of sources behind a part.
-    fn corner(&mut self, t: f64, last: &Touch) -> Result<Saltation, Error> {
+    fn corner(&mut self, t: f64, last: &Touch) -> Result<Passed, Error> {
         self.simulation.advance_to(t)?;
         let next = self.touch(&last.system.key.switches)?;
         let [left, right] = self.limits(t, &last.system)?;
-        let before = Side {
-            system: &last.system,
-            x: last.x.clone(),
-            inputs: left,
-        };
-        let after = Side {
-            system: &next.system,
-            x: next.x,
-            inputs: right,
-        };
-        Ok(Saltation::of(t, (&before, &after), None, None))
+        let (before, after) = (last.side(left), next.side(right));
+        let saltation = Saltation::of(t, (&before, &after), None, None);
+        Ok(Passed {
+            before: last.clone(),
+            saltation,
+            after: next,
+        })
     }
 
     /// Goes on to where switches move, at about `t`, a quarter of a part after the last place.
-    fn switching(&mut self, (t, quarter): (f64, f64), left: &[bool]) -> Result<Saltation, Error> {
+    fn switching(&mut self, (t, quarter): (f64, f64), left: &[bool]) -> Result<Passed, Error> {
         self.simulation.advance_to(t - BEFORE_EVENT * quarter)?;
-        let near = self.touch(left)?;
+        let mut near = self.touch(left)?;
         let events = loop {
             let stop = self.simulation.advance_to_event(t + quarter)?;
             if stop.events.iter().any(is_switching) {
@@ -219,22 +248,15 @@ impl Way<'_> {
         let (t, switches) = self.moved(&events, left);
         let [inputs, right] = self.limits(t, &near.system)?;
         let rate = near.system.rate(&near.x, &inputs.u);
-        let before = Side {
-            x: near.x + rate * (t - near.t),
-            system: &near.system,
-            inputs,
-        };
+        near.x += rate * (t - near.t);
+        let before = near.side(inputs);
         // The step in which it happened ends later; at the instant itself rounding may have a control on its other side.
         let storage = before.system.storage(&before.x, &before.inputs.u);
         let behind = t + BEHIND_EVENT * quarter;
         self.simulation
             .stand_at(behind, storage.as_slice(), &switches)?;
         let next = self.touch(&switches)?;
-        let after = Side {
-            system: &next.system,
-            x: next.x,
-            inputs: right,
-        };
+        let after = next.side(right);
         let led = after.system.state(storage.as_slice());
         let size = led.amax().max(after.x.amax());
         if (&led - &after.x).amax() > FOLLOWS_JUMP_IN_STEPS * size {
@@ -243,7 +265,12 @@ impl Way<'_> {
         }
         let moved = (0..left.len()).filter(|&i| left[i] != switches[i]);
         let timing = self.timing((t, quarter), &before, moved)?;
-        Ok(Saltation::of(t, (&before, &after), timing, None))
+        let saltation = Saltation::of(t, (&before, &after), timing, None);
+        Ok(Passed {
+            before: near,
+            saltation,
+            after: next,
+        })
     }
 
     /// When the first switches move, s, and how all stand then: the step in which they do so may see more.
@@ -320,15 +347,30 @@ impl Way<'_> {
 }
 
 impl Made {
-    /// Adds a part from one time to another.
-    fn part(&mut self, touch: Touch, (from, to): (f64, f64)) -> Result<(), Error> {
-        let Touch { system, x, .. } = touch;
-        let propagator = system.propagator(to - from).ok_or_else(|| {
+    /// Adds a part from one time to another; between two in which other devices carry a current what is interrupted is gone.
+    fn part(&mut self, touch: Touch, (from, to): (f64, f64), same: f64) -> Result<(), Error> {
+        let propagator = touch.system.propagator(to - from).ok_or_else(|| {
             not_smooth(from, "the exponential of a mode does not exist in doubles")
         })?;
-        if self.segments.len() > self.saltations.len() {
-            self.saltations.push(Saltation::none(from, &system));
+        if self.segments.len() > self.saltations.len()
+            && let (Some(last), Some(segment)) = (self.systems.last(), self.segments.last())
+        {
+            let between = if last.key == touch.system.key {
+                Saltation::none(from, &touch.system)
+            } else {
+                let inputs = Inputs::after(&touch.system.lcs.inputs, from, same);
+                let inputs =
+                    inputs.ok_or_else(|| not_smooth(from, "a source has no closed form"))?;
+                let before = Side {
+                    system: last,
+                    x: segment.end.clone(),
+                    inputs: inputs.clone(),
+                };
+                Saltation::of(from, (&before, &touch.side(inputs)), None, None)
+            };
+            self.saltations.push(between);
         }
+        let Touch { system, x, .. } = touch;
         self.segments.push(Segment {
             system: self.systems.len(),
             from,

@@ -3,19 +3,36 @@
 use nalgebra::DVector;
 
 use super::Way;
+use crate::analysis::variation::instant::Inputs;
 use crate::analysis::variation::not_smooth;
+use crate::analysis::variation::saltation::Side;
 use crate::analysis::variation::system::System;
+use crate::analysis::variation::tangent::{holds, points};
 use crate::integrate::Error;
-use crate::settings::tolerances::periodic::{QUICKEST, SHORTEST_PART, TANGENT_CHANGE};
+use crate::integrate::exact::Key;
+use crate::integrate::theta::Instant;
+use crate::lcs::{Hold, Lcs, LcsParts};
+use crate::settings::tolerances::periodic::{MOST_DIVIDED, SHORTEST_PART, TANGENT_CHANGE};
 
 /// Parts into which one is divided.
 const DIVIDED: usize = 8;
 
 /// A system that touches the run at a time, s.
+#[derive(Clone)]
 pub(super) struct Touch {
     pub(super) t: f64,
     pub(super) system: System,
     pub(super) x: DVector<f64>,
+}
+
+impl Touch {
+    pub(super) fn side(&self, inputs: Inputs) -> Side<'_> {
+        Side {
+            system: &self.system,
+            x: self.x.clone(),
+            inputs,
+        }
+    }
 }
 
 /// A part from one time to another, s: the storage where it begins, and what touches it after one, two and three quarters.
@@ -30,12 +47,48 @@ impl Way<'_> {
     /// What touches the run here.
     pub(super) fn touch(&mut self, switches: &[bool]) -> Result<Touch, Error> {
         let (t, at) = (self.simulation.time(), self.instant()?);
-        let quickest = QUICKEST * SHORTEST_PART * self.part;
-        let system = System::touching(&at, switches, quickest).ok_or_else(|| {
-            not_smooth(t, "the tangents of the devices leave their currents open")
-        })?;
-        let x = at.x;
+        let points = points(&at);
+        let holds = holds(&at.lcs, &points, self.resistance);
+        let lcs = self.system(&at, &holds, switches)?;
+        let storage = DVector::from_vec(self.simulation.state());
+        let x = &lcs.storage.inject * storage + &lcs.storage.inject_one;
+        let free = points.into_iter().zip(&holds);
+        let free = free.filter(|(_, hold)| **hold == Hold::Free);
+        let free: Vec<(f64, f64)> = free.map(|(point, _)| point).collect();
+        let key = Key {
+            closed: holds.iter().map(|hold| *hold != Hold::Open).collect(),
+            switches: switches.to_vec(),
+            sliding: Vec::new(),
+        };
+        let system = System::touching(&lcs, key, (&x, &at.u), (&free, self.resistance));
+        let what = "the tangents of the devices leave their currents open";
+        let system = system.ok_or_else(|| not_smooth(t, what))?;
         Ok(Touch { t, system, x })
+    }
+
+    /// The system in a position of the switches with some of the devices open.
+    fn system(&mut self, at: &Instant, holds: &[Hold], switches: &[bool]) -> Result<Lcs, Error> {
+        if holds.iter().all(|hold| *hold == Hold::Free) {
+            return Ok(at.lcs.clone());
+        }
+        let is_own = |own: &&(Vec<Hold>, Vec<bool>, Lcs)| own.0 == holds && own.1 == switches;
+        if let Some((.., lcs)) = self.opened.iter().find(is_own) {
+            return Ok(lcs.clone());
+        }
+        let lcs = self.assembler.assemble(holds, switches, &[])?;
+        let all = at.lcs.ports.iter().zip(holds);
+        let free = all.filter(|(_, hold)| **hold == Hold::Free);
+        let laws: Vec<_> = free.map(|(port, _)| port.law.clone()).collect();
+        let put_back = |parts: &mut LcsParts| {
+            for (port, law) in parts.ports.iter_mut().zip(laws) {
+                port.law = law;
+            }
+        };
+        let lcs = lcs.changed(put_back);
+        let lcs = lcs.map_err(|error| not_smooth(self.simulation.time(), error.to_string()))?;
+        self.opened
+            .push((holds.to_vec(), switches.to_vec(), lcs.clone()));
+        Ok(lcs)
     }
 
     /// So many parts from here to a time, short of what happens there.
@@ -85,7 +138,9 @@ impl Way<'_> {
             let shortest = SHORTEST_PART * self.part;
             let divides =
                 |(part, apart): (&Part, &f64)| *apart > 0.0 && part.to - part.from > shortest;
-            if !parts.iter().zip(&changing).any(divides) {
+            let divided = parts.iter().zip(&changing).filter(|part| divides(*part));
+            let divided = divided.count();
+            if divided == 0 || parts.len() + DIVIDED * divided > MOST_DIVIDED {
                 self.unknown += changing.iter().sum::<f64>();
                 return Ok(any);
             }
@@ -123,21 +178,25 @@ fn changing(parts: &[Part]) -> Vec<f64> {
     seconds
 }
 
-/// How far apart the propagators of two systems from one to the other are, in coordinates of equal energy.
+/// How far apart what two systems make of the storage from one to the other is, in coordinates of equal energy.
 fn apart(a: &Touch, b: &Touch) -> f64 {
-    if a.system.lcs.a == b.system.lcs.a {
+    if a.system.key == b.system.key && a.system.lcs.a == b.system.lcs.a {
         return 0.0;
     }
-    let both = [a, b].map(|touch| touch.system.propagator(b.t - a.t));
-    let [Some(one), Some(other)] = both else {
+    let map = |touch: &Touch| {
+        let storage = &touch.system.lcs.storage;
+        let propagator = touch.system.propagator(b.t - a.t)?;
+        Some(&storage.x * propagator * &storage.inject)
+    };
+    let (Some(one), Some(other)) = (map(a), map(b)) else {
         return f64::INFINITY;
     };
-    let energy = &a.system.lcs.energy;
+    let metric = &a.system.lcs.storage.metric;
     let size = |k: usize| {
-        if energy.is_empty() {
+        if metric.is_empty() {
             1.0
         } else {
-            energy[(k, k)].abs().sqrt()
+            metric[(k, k)].abs().sqrt()
         }
     };
     let scaled = (one - other).map_with_location(|i, j, v| v.abs() * size(i) / size(j));
