@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use super::conducting::{Conduction, conduction, curved_currents};
 use super::curves::{MOST_VALUES, laps, orbit_curves, shortest_period, transient_curves};
 use super::density::{Cut, Spikes, bent, crowd};
-use super::periodic::{PeriodicOptions, periodic, steady};
+use super::periodic::{PeriodicOptions, periodic, settled};
 use super::start::beginning;
 use super::table::Table;
 use super::worst::Worst;
@@ -292,8 +292,8 @@ pub fn periodic_measured(
         corners: true,
         ..options.clone()
     };
-    let mut found = steady(&probing, &options)?;
-    let drawn = orbit_curves(circuit, &mut found);
+    let mut found = settled(&probing, &options)?;
+    let drawn = (found.whole()).and_then(|steady| orbit_curves(circuit, steady));
     let (curves, note) = drawn.map_or((None, None), |(curves, note)| (Some(curves), note));
     measuring.curves = curves;
     let by_rows = measuring.by_rows();

@@ -6,6 +6,7 @@ use crate::integrate::error::{Error, Reason};
 use crate::integrate::parts::Cut;
 use crate::integrate::problem::{Problem, too_many_edges};
 use crate::integrate::run::Stepper;
+use crate::integrate::step::Scheme;
 use crate::integrate::{Method, SimOptions};
 use crate::lcs::{Input, Lcs};
 use crate::plan::{Plan, not_exact, plan, plan_of_large, plan_of_parts, scheme};
@@ -42,13 +43,27 @@ pub(super) fn ready(
         }
     }
     if options.method != Method::Exact
-        && problem.is_large(scheme(options), &options.settings)
-        && let Some(inputs) = problem.prepare_large(&options.settings)?
+        && let Some(inputs) = sources_of_large(problem, scheme(options), &options.settings)?
     {
         return Ok(Ready::Large(inputs));
     }
     let lcs = problem.prepare(tran, &options.settings)?;
     Ok(Ready::Whole(Box::new(lcs)))
+}
+
+/// The sources of a problem that is solved in sparse steps, whose start is then known; nothing of another.
+///
+/// # Errors
+/// The reduction's for the start position.
+pub(super) fn sources_of_large(
+    problem: &mut Problem,
+    scheme: Scheme,
+    settings: &Settings,
+) -> Result<Option<Vec<Input>>, Error> {
+    if !problem.is_large(scheme, settings) {
+        return Ok(None);
+    }
+    problem.prepare_large(settings)
 }
 
 impl Ready {

@@ -8,6 +8,7 @@ pub(crate) mod eigenvalues;
 pub(crate) mod expm;
 pub(crate) mod gauss;
 pub(crate) mod kernel;
+pub(crate) mod krylov;
 pub(crate) mod levelled;
 pub(crate) mod polynomial;
 pub(crate) mod quadratic;

@@ -55,26 +55,54 @@ impl Pattern {
             unz: 4 * entries + self.matrix.n,
             ..Symb::new()
         };
-        let mut numeric = rsparse::lu(&self.matrix, &mut symbolic, DIAGONAL).ok()?;
+        let numeric = rsparse::lu(&self.matrix, &mut symbolic, DIAGONAL).ok()?;
         let finite = numeric.u.x.iter().all(|v| v.is_finite());
-        for factor in [&mut numeric.l, &mut numeric.u] {
-            factor.i.shrink_to_fit();
-            factor.x.shrink_to_fit();
-        }
+        let diagonal = (0..self.matrix.n).map(|j| numeric.u.x[(numeric.u.p[j + 1] - 1) as usize]);
+        let diagonal: Vec<f64> = diagonal.collect();
         finite.then_some(SparseLu {
-            lower: numeric.l,
-            upper: numeric.u,
+            // The diagonal of L, which is one, stands first in its columns, that of U last.
+            lower: Columns::of(&numeric.l, 1, 0),
+            upper: Columns::of(&numeric.u, 0, 1),
+            inverse: diagonal.iter().map(|d| d.recip()).collect(),
+            diagonal,
             rows: numeric.pinv?,
             columns: self.order.clone(),
         })
     }
 }
 
+/// The columns of a triangular factor but for its diagonal.
+#[derive(Debug, Clone)]
+struct Columns {
+    ends: Vec<u32>,
+    entries: Vec<(u32, f64)>,
+}
+
+impl Columns {
+    /// Of a factor without so many entries at the beginning and the end of each column.
+    fn of(factor: &Sprs<f64>, first: usize, last: usize) -> Self {
+        let (mut ends, mut entries) = (vec![0], Vec::with_capacity(factor.x.len()));
+        for column in factor.p.windows(2) {
+            let within = column[0] as usize + first..column[1] as usize - last;
+            entries.extend(within.map(|k| (factor.i[k] as u32, factor.x[k])));
+            ends.push(entries.len() as u32);
+        }
+        Self { ends, entries }
+    }
+
+    fn column(&self, j: usize) -> &[(u32, f64)] {
+        &self.entries[self.ends[j] as usize..self.ends[j + 1] as usize]
+    }
+}
+
 /// The factors of a matrix.
 #[derive(Debug, Clone)]
 pub(crate) struct SparseLu {
-    lower: Sprs<f64>,
-    upper: Sprs<f64>,
+    lower: Columns,
+    upper: Columns,
+    /// Of U, and its reciprocals.
+    diagonal: Vec<f64>,
+    inverse: Vec<f64>,
     rows: Vec<isize>,
     columns: Vec<isize>,
 }
@@ -82,12 +110,32 @@ pub(crate) struct SparseLu {
 impl SparseLu {
     /// Solves for `b`, in place; `work` is a buffer.
     pub(crate) fn solve(&self, b: &mut [f64], work: &mut Vec<f64>) {
+        self.eliminate(b, work, |x, j| x / self.diagonal[j]);
+    }
+
+    /// The same in two thirds of the time, with an ulp more of rounding in each row: a product in place of each quotient.
+    pub(crate) fn solve_quickly(&self, b: &mut [f64], work: &mut Vec<f64>) {
+        self.eliminate(b, work, |x, j| x * self.inverse[j]);
+    }
+
+    fn eliminate(&self, b: &mut [f64], work: &mut Vec<f64>, pivot: impl Fn(f64, usize) -> f64) {
         work.resize(b.len(), 0.0);
         for (value, &row) in b.iter().zip(&self.rows) {
             work[row as usize] = *value;
         }
-        rsparse::lsolve(&self.lower, work);
-        rsparse::usolve(&self.upper, work);
+        for j in 0..work.len() {
+            let x = work[j];
+            for &(i, l) in self.lower.column(j) {
+                work[i as usize] -= l * x;
+            }
+        }
+        for j in (0..work.len()).rev() {
+            let x = pivot(work[j], j);
+            work[j] = x;
+            for &(i, u) in self.upper.column(j) {
+                work[i as usize] -= u * x;
+            }
+        }
         for (value, &column) in work.iter().zip(&self.columns) {
             b[column as usize] = *value;
         }
@@ -95,7 +143,7 @@ impl SparseLu {
 
     /// Bytes that it takes.
     pub(crate) fn bytes(&self) -> usize {
-        16 * (self.lower.x.len() + self.upper.x.len()) + 32 * self.rows.len()
+        16 * (self.lower.entries.len() + self.upper.entries.len()) + 40 * self.rows.len()
     }
 }
 
@@ -127,7 +175,12 @@ mod tests {
         let x = DVector::from_column_slice(&[1.0, -2.0, 0.5, 3.0]);
         let mut b = (&dense * &x).as_slice().to_vec();
         let factors = pattern.factors().expect("regular");
+        let mut quickly = b.clone();
+        factors.solve_quickly(&mut quickly, &mut Vec::new());
         factors.solve(&mut b, &mut Vec::new());
+        for (a, b) in b.iter().zip(&quickly) {
+            assert!((a - b).abs() < 1e-14);
+        }
         for (found, expected) in b.iter().zip(&x) {
             assert!((found - expected).abs() < 1e-14, "{b:?}");
         }

@@ -1,7 +1,10 @@
 //! The periodic steady state: the orbit that transients go to, without waiting for it.
 
+mod large;
 mod period;
+mod rows;
 mod search;
+mod settled;
 mod shooting;
 #[cfg(test)]
 mod tests;
@@ -10,20 +13,17 @@ use std::sync::atomic::AtomicBool;
 
 use super::variation::{Course, Linearised, Trajectory};
 use crate::circuit::{Circuit, Kind, Tran};
-use crate::integrate::{
-    Error, Note, Orbit, OrbitKind, Reason, Run, SimOptions, Simulation, SimulationOptions,
-    Standing, simulate_beside,
-};
+use crate::integrate::{Error, Note, Orbit, Reason, Run, Simulation, SimulationOptions, Standing};
 use crate::mna::{StaticMultiport, behaviour};
 use crate::model::Model;
 use crate::settings::Settings;
 use crate::settings::tolerances::periodic::{
     CLOSED, FINER, LONGEST_SEARCH, PARTS_OF_PERIOD, PERIOD_OFF, TABLE_STEPS,
 };
-use crate::settings::tolerances::times::SPAN_PARTS;
 
+use rows::{notes, rows, state_error};
 use search::{Found, Search};
-use shooting::{Fixed, neutral};
+pub(super) use settled::settled;
 
 /// What a periodic steady state may be asked for.
 #[derive(Debug, Clone, Default)]
@@ -68,7 +68,7 @@ pub struct PeriodicOptions<'a> {
 /// # Ok::<(), circ::Error>(())
 /// ```
 pub fn periodic(model: &Model, options: &PeriodicOptions<'_>) -> Result<(Orbit, Run), Error> {
-    steady(model, options)?.on_grid(options, |tran| tran)
+    settled(model, options)?.on_grid(options, |tran| tran)
 }
 
 /// The orbit of [`periodic`], and where a transient begins that starts on it at t = 0, with sources that do not repeat running from there on.
@@ -79,10 +79,10 @@ pub fn orbit_start(
     model: &Model,
     options: &PeriodicOptions<'_>,
 ) -> Result<(Orbit, Standing), Error> {
-    let mut steady = steady(model, options)?;
-    let standing = steady.standing()?;
+    let mut settled = settled(model, options)?;
+    let standing = settled.standing()?;
     let begins = Standing { t: 0.0, ..standing };
-    Ok((steady.orbit(), begins))
+    Ok((settled.orbit(), begins))
 }
 
 /// A circuit in its periodic steady state.
@@ -123,16 +123,14 @@ impl Steady {
         } = self;
         let (names, orbit) = (simulation.state_names(), found.orbit());
         let mut run = rows(
-            (&circuit, &multiport, &simulation),
+            (&circuit, &multiport, Some(&simulation)),
             standing,
             orbit.period,
             options,
             grid,
         )?;
         if !simulation.is_exact() {
-            for error in [&mut run.error.max, &mut run.error.rms] {
-                *error = error.zip(apart).map(|(error, apart)| error.max(apart));
-            }
+            state_error(&mut run, apart);
         }
         run.notes.extend(said);
         run.notes.extend(notes(&orbit, &found.fixed, names, &held));
@@ -276,13 +274,27 @@ pub(super) fn beside(model: &Model, options: &PeriodicOptions<'_>) -> Result<Sim
     simulation((&circuit, &multiport), seconds, 1.0, options)
 }
 
-/// Finds the periodic steady state.
+/// What a search begins with.
+struct Asked {
+    circuit: Circuit,
+    multiport: StaticMultiport,
+    period: period::Period,
+    /// Sources that do not repeat.
+    held: Vec<String>,
+    /// What is to be told of the period.
+    said: Vec<Note>,
+}
+
+fn none(what: String) -> Error {
+    Error::before(Reason::NoOrbit(what))
+}
+
+/// The circuit that is to repeat, and its period.
 ///
 /// # Errors
-/// As [`periodic`].
-pub(super) fn steady(model: &Model, options: &PeriodicOptions<'_>) -> Result<Steady, Error> {
+/// There is no such period; what is on lines is no part of the state.
+fn asked(model: &Model, options: &PeriodicOptions<'_>) -> Result<Asked, Error> {
     let (circuit, held) = period::repeating(model.circuit());
-    let none = |what: String| Error::before(Reason::NoOrbit(what));
     if let Some(line) = circuit.lines.first() {
         let name = &circuit.elements[line.ports[0].wave.index()].name;
         let what = "what travels on a transmission line is no part of the state that is to repeat";
@@ -317,6 +329,31 @@ pub(super) fn steady(model: &Model, options: &PeriodicOptions<'_>) -> Result<Ste
         let what = "a circuit with sources at rest is none";
         Error::before(Reason::internal("analysis::periodic", what))
     })?;
+    Ok(Asked {
+        circuit,
+        multiport,
+        period,
+        held,
+        said,
+    })
+}
+
+/// Finds the periodic steady state with dense matrices, as those need it that ask for its derivative.
+///
+/// # Errors
+/// As [`periodic`].
+pub(super) fn steady(model: &Model, options: &PeriodicOptions<'_>) -> Result<Steady, Error> {
+    whole(asked(model, options)?, options)
+}
+
+fn whole(asked: Asked, options: &PeriodicOptions<'_>) -> Result<Steady, Error> {
+    let Asked {
+        circuit,
+        multiport,
+        period,
+        held,
+        said,
+    } = asked;
     let span = circuit.tran.map(|tran| tran.tstop);
     let mut simulation = simulation((&circuit, &multiport), period.seconds, 1.0, options)?;
     let mut search = Search::of(&mut simulation, options);
@@ -410,96 +447,4 @@ const fn has_no_rest(error: &Error) -> bool {
         error.reason,
         Reason::NoOperatingPoint(_) | Reason::SwitchesDoNotSettle
     )
-}
-
-/// One period of waveforms, from 0 on.
-fn rows(
-    (circuit, multiport, simulation): (&Circuit, &StaticMultiport, &Simulation),
-    standing: Standing,
-    period: f64,
-    options: &PeriodicOptions<'_>,
-    grid: impl FnOnce(Tran) -> Tran,
-) -> Result<Run, Error> {
-    let from = standing.t;
-    let asked = circuit
-        .tran
-        .filter(|tran| tran.prints && tran.tstep < period);
-    let circuit = Circuit {
-        tran: Some(grid(Tran {
-            tstep: asked.map_or(period / SPAN_PARTS, |tran| tran.tstep),
-            prints: asked.is_some(),
-            tstop: from + period,
-            tstart: from,
-            tmax: circuit.tran.and_then(|tran| tran.tmax),
-            uic: true,
-        })),
-        ..circuit.clone()
-    };
-    let mut run = simulate_beside(
-        Some(simulation),
-        &circuit,
-        multiport,
-        SimOptions {
-            start: Some(standing),
-            events: options.events,
-            corners: options.corners,
-            cancel: options.cancel,
-            settings: options.settings.clone(),
-            ..SimOptions::default()
-        },
-    )?;
-    shift(&mut run, from);
-    Ok(run)
-}
-
-/// Has a run begin at 0.
-fn shift(run: &mut Run, from: f64) {
-    if from == 0.0 {
-        return;
-    }
-    run.waveforms.time.iter_mut().for_each(|t| *t -= from);
-    run.events.iter_mut().for_each(|event| event.t -= from);
-    run.impulses
-        .iter_mut()
-        .for_each(|impulse| impulse.t -= from);
-    run.state_jumps
-        .first
-        .iter_mut()
-        .for_each(|jump| jump.t -= from);
-}
-
-/// What the user should know of an orbit.
-fn notes(orbit: &Orbit, fixed: &Fixed, names: &[String], held: &[String]) -> Vec<Note> {
-    let mut notes = Vec::new();
-    if !held.is_empty() {
-        let text = format!(
-            "{}: held at the value at 0-, as it does not repeat (a pulse with a period longer than the run of `.tran` is a step)",
-            held.join(", ")
-        );
-        notes.push(Note::of("held-source", held, text));
-    }
-    if !orbit.stable {
-        let [re, im] = orbit.multipliers[0];
-        let text =
-            format!("the orbit is unstable: a multiplier is {re:.6}{im:+.6}i; transients leave it");
-        notes.push(Note::run("unstable-orbit", text));
-    }
-    if orbit.kind != OrbitKind::Autonomous {
-        let directions = neutral(&fixed.derivative);
-        let taking_part = |j: &usize| directions.iter().any(|direction| direction.contains(j));
-        let states: Vec<&str> = (0..names.len())
-            .filter(taking_part)
-            .map(|j| names[j].as_str())
-            .collect();
-        if !states.is_empty() {
-            let text = format!(
-                "the orbit is not unique: {} may be another, as a period leaves them as they are in {} direction{}",
-                states.join(", "),
-                directions.len(),
-                if directions.len() == 1 { "" } else { "s" },
-            );
-            notes.push(Note::run("orbit-not-unique", text));
-        }
-    }
-    notes
 }

@@ -14,7 +14,7 @@ use std::sync::atomic::AtomicBool;
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
-use super::periodic::{PeriodicOptions, common_period, steady};
+use super::periodic::{PeriodicOptions, Steady, common_period, settled};
 use super::start::{beginning, course};
 use super::variation::Course;
 use crate::circuit::{Circuit, Element, Kind, NodeId, Probe, Probed, Tran, is_inside, wholes};
@@ -296,10 +296,11 @@ pub fn periodic_table(
 ) -> Result<Table, Error> {
     let columns = Columns::of(model.circuit(), inputs, outputs)?;
     let probing = columns.probing(model)?;
-    let mut found = steady(&probing, options)?;
+    let mut found = settled(&probing, options)?;
     let orbit = found.orbit();
     let fundamental = Some(orbit.period / orbit.order as f64);
-    if let Some((course, from)) = found.course()? {
+    let course = found.whole().map_or(Ok(None), Steady::course)?;
+    if let Some((course, from)) = course {
         let span = Span {
             from,
             to: from + orbit.period,

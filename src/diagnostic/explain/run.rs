@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 54] = [
+pub(super) const CODES: [Explanation; 55] = [
     Explanation::of(
         "about-rest",
         "The response is that about the operating point, as laws are smooth and no switch moves.",
@@ -110,6 +110,12 @@ pub(super) const CODES: [Explanation; 54] = [
         "Run the command that the message names, or take the card out.",
     )
     .shown("both\nv1 a 0 dc 1 ac 1\nr1 a 0 1k\n.tran 1m 5m\n.op\n"),
+    Explanation::of(
+        "leading-multipliers",
+        "Of the multipliers of the orbit the leading ones alone are given, which decide whether it is stable.",
+        "The circuit is large: its orbit is found by products with the derivative of a period, which is never written down.",
+        "Nothing; a circuit of fewer than 600 capacitors, inductors and ideal pairs has all of them.",
+    ),
     Explanation::of(
         "measured-between-events",
         "Derivatives and values are of what happens between events, where `circ sim` measures the same run on its rows.",

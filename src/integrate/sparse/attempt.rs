@@ -1,6 +1,7 @@
 //! One step that is not made yet, and the step made.
 
 use super::system::Largest;
+use super::tape::Set;
 use super::{Now, Rule, Sparse};
 use crate::integrate::curved::tableau::{ERROR, GAMMA, LOWER, NODES, STAGES, WEIGHTS};
 use crate::integrate::error::{Error, Reason};
@@ -30,6 +31,8 @@ pub(super) struct Trial {
     loss: f64,
     /// x' of every stage.
     slopes: [Vec<f64>; STAGES],
+    /// The active sets of the implicit ones, where they are asked for.
+    sets: Vec<Set>,
 }
 
 impl Sparse {
@@ -62,6 +65,9 @@ impl Sparse {
         let system = &systems[now.system].1;
         trial.lambda.clone_from(&step.lambda);
         trial.active.clone_from(&step.active);
+        if !self.balanced {
+            return Ok(());
+        }
         let [before, after] = [(&now.x, &now.u), (&trial.x, &trial.u)].map(|(x, u)| {
             let s = system.storage(x, u);
             0.5 * system.product(&s, &s)
@@ -96,7 +102,10 @@ impl Sparse {
 
     fn attempt_stages(&mut self, h: f64) -> Result<(), Error> {
         let (t0, t1) = (self.now.t, self.trial.t1);
-        self.know_lambda()?;
+        if self.balanced {
+            self.know_lambda()?;
+        }
+        self.trial.sets.clear();
         let mut u = self.now.u.clone();
         let mut du = vec![0.0; u.len()];
         self.inputs.slopes(t0, &mut du);
@@ -126,6 +135,9 @@ impl Sparse {
             self.systems[self.now.system]
                 .1
                 .implicit(times, &u, &mut self.step)?;
+            if let Some(tape) = &mut self.tape {
+                self.trial.sets.push(tape.set(&self.step.active));
+            }
             let moved = self.step.x.iter().zip(&base);
             let slope: Vec<f64> = moved.map(|(x, old)| (x - old) / (GAMMA * h)).collect();
             if WEIGHTS[stage] != 0.0 {
@@ -153,6 +165,9 @@ impl Sparse {
 
     /// Adds the energies of a part of the step, s, at the state, λ and slope of a stage.
     fn add_stage(&mut self, part: f64, slope: &[f64], (u, du): (&[f64], &[f64])) {
+        if !self.balanced {
+            return;
+        }
         let system = &self.systems[self.now.system].1;
         let (x, lambda) = (&self.step.x, &self.step.lambda);
         let (source, dissipated) = system.power(Point { x, lambda, u, du });
@@ -196,6 +211,9 @@ impl Sparse {
         }
         let trial = &mut self.trial;
         let now = &mut self.now;
+        if let Some(tape) = &mut self.tape {
+            tape.step(now.system, (trial.h, Self::slack(trial.t1)), &trial.sets);
+        }
         now.balance.add(trial.work);
         now.balance.add_numerical(trial.loss);
         now.t = trial.t1;

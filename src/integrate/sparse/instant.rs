@@ -87,6 +87,7 @@ impl Sparse {
         let mut impulse = vec![0.0; self.now.active.len()];
         let mut u = self.now.u.clone();
         let mut made = 0;
+        let mut sets = Vec::new();
         let second = loop {
             for (u, du) in u.iter_mut().zip(&du) {
                 *u += h * du;
@@ -94,6 +95,9 @@ impl Sparse {
             let system = &mut self.systems[self.now.system].1;
             system.implicit((t, h, Self::slack(h)), &u, &mut self.step)?;
             made += 1;
+            if let Some(tape) = &mut self.tape {
+                sets.push(tape.set(&self.step.active));
+            }
             let rests = made > 1 && system.are_within(RESTS, &first, &self.step.x);
             if rests || made == INSTANTS {
                 break self.step.x.clone();
@@ -102,12 +106,20 @@ impl Sparse {
             let add = impulse.iter_mut().zip(&self.step.lambda);
             add.for_each(|(p, lambda)| *p += h * lambda);
         };
+        if let Some(tape) = &mut self.tape {
+            tape.jump(self.now.system, (h, Self::slack(h)), sets);
+        }
         let steps = f64::from(made - 1);
         let lasting = impulse.iter_mut().zip(&self.step.lambda);
         lasting.for_each(|(p, lambda)| *p -= steps * h * lambda);
-        let slope: Vec<f64> = (second.iter().zip(&first))
-            .map(|(b, a)| (b - a) / h)
-            .collect();
+        let slope: Vec<f64> = if self.balanced {
+            let ends = second.iter().zip(&first);
+            ends.map(|(b, a)| (b - a) / h).collect()
+        } else {
+            // The same without the rounding of a difference over h: the step behind may be long.
+            let system = &self.systems[self.now.system].1;
+            system.rate(&second, &self.step.lambda, &u)
+        };
         let after = first.iter().zip(&slope).map(|(x, k)| x - steps * h * k);
         let after: Vec<f64> = after.collect();
         self.account_for_jump(before, after, &impulse);
@@ -233,7 +245,11 @@ impl Sparse {
     /// Takes storage s over into the system of the present switch position.
     fn take_position(&mut self, s: &[f64]) -> Result<(), Error> {
         let position = self.switches.position().to_vec();
+        let from = self.now.system;
         self.now.system = self.system_of(&position)?;
+        if let Some(tape) = &mut self.tape {
+            tape.position(from, self.now.system);
+        }
         self.bound_factors();
         let system = &self.systems[self.now.system].1;
         let x = system.lcs.state_from(s);

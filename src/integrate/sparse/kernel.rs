@@ -61,6 +61,7 @@ pub(super) struct Kernel {
     clock: u64,
     slack: f64,
     most_kept: usize,
+    room: usize,
     tolerance: f64,
     solution: Vec<f64>,
     work: Vec<f64>,
@@ -144,6 +145,7 @@ impl Kernel {
             clock: 0,
             slack: 0.0,
             most_kept: settings.max_kept,
+            room: KEPT,
             tolerance: settings.lcp_residual,
             solution: vec![0.0; n + m],
             work: Vec::new(),
@@ -164,6 +166,11 @@ impl Kernel {
         self.dense = None;
     }
 
+    /// Keeps so many factors, if there is memory for them.
+    pub(super) fn keep(&mut self, room: usize) {
+        self.room = room;
+    }
+
     /// √P_ii of every state.
     pub(super) fn state_scale(&self) -> &[f64] {
         &self.state_scale
@@ -179,11 +186,7 @@ impl Kernel {
         (h, slack): (f64, f64),
         step: &mut Step,
     ) -> Result<(), (Reason, Option<usize>)> {
-        self.slack = slack;
-        for (scale, (d, cb)) in self.port_scale.iter_mut().zip(&self.diagonals) {
-            let size = d + h * cb;
-            *scale = if size > 0.0 { size.sqrt().recip() } else { 1.0 };
-        }
+        self.measure(h, slack);
         let (mut fewest, mut patience) = (usize::MAX, PATIENCE);
         let mut asking = Vec::new();
         for round in 0..LONE * (1 + step.active.len()) {
@@ -220,6 +223,43 @@ impl Kernel {
         self.densely(lcs, h, step)
     }
 
+    /// What a change of r makes of x where the active set stays as it is, in place; whether that is known.
+    pub(super) fn change(
+        &mut self,
+        (h, slack): (f64, f64),
+        active: &[bool],
+        x: &mut [f64],
+    ) -> bool {
+        self.measure(h, slack);
+        let Some(at) = self.factored(h, active) else {
+            return false;
+        };
+        let (states, ports) = self.solution.split_at_mut(self.n);
+        for (value, (x, scale)) in states.iter_mut().zip(x.iter().zip(&self.state_scale)) {
+            *value = x * scale;
+        }
+        ports.fill(0.0);
+        self.kept[at]
+            .factors
+            .solve_quickly(&mut self.solution, &mut self.work);
+        for (x, (value, scale)) in x
+            .iter_mut()
+            .zip(self.solution.iter().zip(&self.state_scale))
+        {
+            *x = value / scale;
+        }
+        x.iter().all(|v| v.is_finite())
+    }
+
+    /// Units of the ports for a step length, which factors for others by no more than `slack` serve.
+    fn measure(&mut self, h: f64, slack: f64) {
+        self.slack = slack;
+        for (scale, (d, cb)) in self.port_scale.iter_mut().zip(&self.diagonals) {
+            let size = d + h * cb;
+            *scale = if size > 0.0 { size.sqrt().recip() } else { 1.0 };
+        }
+    }
+
     /// The solution of the linear system of an active set in the kernel's units; whether it is regular.
     fn solve(&mut self, h: f64, step: &Step) -> bool {
         let Some(at) = self.factored(h, &step.active) else {
@@ -254,7 +294,7 @@ impl Kernel {
         self.fill(h, active);
         self.factorisations += 1;
         let factors = self.pattern.factors()?;
-        let most = (self.most_kept / factors.bytes().max(1)).clamp(1, KEPT);
+        let most = (self.most_kept / factors.bytes().max(1)).clamp(1, self.room);
         while self.kept.len() >= most {
             let oldest = (0..self.kept.len()).min_by_key(|&k| self.kept[k].used);
             self.kept.swap_remove(oldest.unwrap_or(0));

@@ -11,6 +11,9 @@ use crate::settings::tolerances::times::WHOLE;
 impl Sparse {
     /// Advances to `stop`, which no breakpoint lies before.
     pub(super) fn interval(&mut self, stop: f64, log: &mut Log) -> Result<(), Error> {
+        if self.script.is_some() {
+            return self.scripted(stop, log);
+        }
         while self.now.t < stop {
             log.go_on(self.now.t)?;
             let left = stop - self.now.t;
@@ -36,7 +39,7 @@ impl Sparse {
 
     /// # Errors
     /// [`Reason::NoProgress`] where [`PROGRESS_STEPS`] steps come no further than [`PROGRESS`] of the span.
-    fn watch_progress(&mut self) -> Result<(), Error> {
+    pub(super) fn watch_progress(&mut self) -> Result<(), Error> {
         let (steps, since) = self.progress;
         if self.stats.steps < steps + PROGRESS_STEPS {
             return Ok(());
@@ -51,7 +54,7 @@ impl Sparse {
     }
 
     /// Whether the step of h, which is then the trial, is accurate enough, or as short as steps may be.
-    fn accepted(&mut self, h: f64, t1: f64) -> Result<bool, Error> {
+    pub(super) fn accepted(&mut self, h: f64, t1: f64) -> Result<bool, Error> {
         self.attempt(h, t1)?;
         let Some(control) = &self.control else {
             return Ok(true);

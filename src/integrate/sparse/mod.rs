@@ -8,8 +8,11 @@ mod attempt;
 mod instant;
 mod kernel;
 mod march;
+mod returns;
+mod script;
 mod start;
 mod system;
+mod tape;
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -29,12 +32,15 @@ use crate::integrate::theta::Stepping;
 use crate::lcs::Role;
 use crate::mna::StandardMultiport;
 use crate::settings::Settings;
-use crate::settings::tolerances::sparse::{AFTER, INSTANT};
+use crate::settings::tolerances::sparse::{AFTER, INSTANT, KEPT};
 use crate::settings::tolerances::steps::GRANT_EMBEDDED;
 use crate::settings::tolerances::times::SAME_TIME;
 use attempt::Trial;
 use kernel::Step;
+pub(crate) use returns::{Lengths, Passed, Returns};
+use script::Script;
 use system::{Largest, System};
+pub(crate) use tape::Tape;
 
 /// How a step is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -102,6 +108,16 @@ pub(crate) struct Sparse {
     pending: Vec<(f64, Arc<[Change]>)>,
     stats: Stats,
     modes: BTreeSet<(usize, Vec<bool>)>,
+    /// Whether energies are added up.
+    balanced: bool,
+    /// How long steps are where a run is made again.
+    script: Option<Script>,
+    /// What the derivative of a run is made of, where it is asked for.
+    tape: Option<Tape>,
+    /// By storage element: largest |state| since the run was taken up.
+    peaks: Vec<f64>,
+    /// Factors that a system keeps.
+    room: usize,
 }
 
 /// Where the run stands.
@@ -194,6 +210,7 @@ impl Sparse {
             refused: false,
             progress: (0, t),
             now,
+            peaks: vec![0.0; storage.len()],
             start: storage,
             started: false,
             trial: Trial::default(),
@@ -204,6 +221,10 @@ impl Sparse {
             pending: Vec::new(),
             stats: Stats::default(),
             modes: BTreeSet::new(),
+            balanced: true,
+            script: None,
+            tape: None,
+            room: KEPT,
             multiport,
         })
     }
@@ -222,10 +243,11 @@ impl Sparse {
             return Ok(at);
         }
         let new = System::new(&self.multiport, position, &self.settings);
-        let new = new.map_err(|mut error| {
+        let mut new = new.map_err(|mut error| {
             error.t = Some(self.now.t);
             error
         })?;
+        new.kernel.keep(self.room);
         self.systems.push((position.to_vec(), new));
         Ok(self.systems.len() - 1)
     }
@@ -233,11 +255,16 @@ impl Sparse {
     /// Takes note of the sizes of all storage elements.
     fn see(&mut self) {
         let Self {
-            systems, now, seen, ..
+            systems,
+            now,
+            seen,
+            peaks,
+            ..
         } = self;
         let storage_of = systems[now.system].1.storage_of();
         for (x, &at) in now.x.iter().zip(storage_of) {
             seen[at] = seen[at].max(x.abs());
+            peaks[at] = peaks[at].max(x.abs());
         }
     }
 

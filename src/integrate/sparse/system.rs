@@ -125,6 +125,16 @@ impl System {
         }
     }
 
+    /// x' = A x + B λ + E u + e.
+    pub(super) fn rate(&self, x: &[f64], lambda: &[f64], u: &[f64]) -> Vec<f64> {
+        let lcs = &self.lcs;
+        let mut rate = lcs.e0.clone();
+        lcs.a.add_times(1.0, x, &mut rate);
+        lcs.b.add_times(1.0, lambda, &mut rate);
+        lcs.e.add_times(1.0, u, &mut rate);
+        rate
+    }
+
     /// s = X x + U u + k, all capacitor voltages and inductor currents.
     pub(super) fn storage(&self, x: &[f64], u: &[f64]) -> Vec<f64> {
         let rows = &self.readings.storage;
@@ -141,6 +151,22 @@ impl System {
         rows.x.add_times(1.0, slope, &mut s);
         rows.u.add_times(1.0, du, &mut s);
         s
+    }
+
+    /// The states of storage quantities that change by s.
+    pub(super) fn change_of_storage(&self, s: &[f64]) -> Vec<f64> {
+        self.lcs.inject.times(s)
+    }
+
+    /// √M_ii of every storage quantity, with the metric M of stored energy; zero where there is none.
+    pub(super) fn storage_scale(&self) -> Vec<f64> {
+        let mut scale = vec![0.0; self.readings.storage.one.len()];
+        for (i, j, value) in self.readings.metric.entries() {
+            if i == j && value > 0.0 {
+                scale[i] = value.sqrt();
+            }
+        }
+        scale
     }
 
     /// aᵀ M b with the metric M of stored energy.

@@ -12,6 +12,7 @@
 //! | does a method for complementarity problems go on | `complementarity` |
 //! | is a system passive | `passivity` |
 //! | is an orbit closed, is it stable | `periodic` |
+//! | is an eigenvalue known that products alone tell | `krylov` |
 //! | does a hypothesis of a theorem hold | `theorems` |
 //! | are two numbers of a netlist meant to be one | `netlists` |
 //!
@@ -24,6 +25,7 @@ pub(crate) mod complementarity;
 pub(crate) mod events;
 pub(crate) mod exponentials;
 pub(crate) mod jumps;
+pub(crate) mod krylov;
 pub(crate) mod netlists;
 pub(crate) mod passivity;
 pub(crate) mod periodic;

@@ -162,3 +162,32 @@ pub(crate) const SAME_REDUCTION: f64 = 1e-8;
 /// A switch whose control is within this part of its terms from its threshold where a run begins may begin on its other side where a value is another by twice [`VALUE_STEP`]. Larger:
 /// reductions of its own for each value where none are needed; smaller: a start on the other side is not told.
 pub(crate) const NEAR_THRESHOLD: f64 = 1e-2;
+
+/// The orbit of a large circuit, which is made of steps on matrices without their zeros, is computed to this part of the tolerance of runs, and its rows are. Larger: multipliers of fewer digits; smaller:
+/// time.
+pub(crate) const FINER_ORBIT: f64 = 1e-1;
+
+/// No finer than this. Smaller: steps that are made of rounding; larger: less than what is asked for.
+pub(crate) const FINEST_ORBIT: f64 = 1e-10;
+
+/// A correction by products leaves this part of the residual, where the return goes on as it did. Larger: corrections, a return each; smaller: products for a direction that the next
+/// correction leaves.
+pub(crate) const LEFT_OF_RESIDUAL: f64 = 1e-3;
+
+/// An orbit by products is closed far enough here, and where its largest multiplier is μ at 1 − μ of this: what it is off by is then no more than this. Larger: slow orbits are less exact; smaller:
+/// returns in vain.
+pub(crate) const CLOSED_ENOUGH: f64 = 1e-9;
+
+/// Rounding of the steps of a return leaves no less than this of its residual. Larger: slow orbits are less exact; smaller: returns in vain.
+pub(crate) const CLOSED_AT_BEST: f64 = 1e-12;
+
+/// Below [`STEPPED_CLOSED`] a correction that leaves more than this part of the residual is the last one. Larger: returns in vain; smaller: orbits less exact than they could be.
+pub(crate) const GOES_ON: f64 = 0.5;
+
+/// Steps are chosen anew where a correction moves the state by more than this part of its amplitudes. Larger: events leave the steps that are short for their sake; smaller: returns that are no smooth
+/// function of where they begin.
+pub(crate) const STEPS_ANEW: f64 = 1e-3;
+
+/// A quantity counts in products by the root of its energy, and by this part of the largest of all at least. Larger: products are no contraction any more where the circuit is passive; smaller: what
+/// stores little is closed late.
+pub(crate) const LEAST_WEIGHT: f64 = 1e-3;

@@ -36,3 +36,11 @@ pub(crate) const PROGRESS_STEPS: u64 = 20_000;
 
 /// A part of the span, see [`PROGRESS_STEPS`].
 pub(crate) const PROGRESS: f64 = 1e-4;
+
+/// Factors kept where a period is gone through again and again, each step of which comes again. Larger: memory, up to [`Settings::max_kept`](crate::settings::Settings::max_kept) bytes; smaller: all of them are made again
+/// in each period.
+pub(crate) const KEPT_OF_RETURNS: usize = 1 << 14;
+
+/// The part of the time between two instants that the first step behind an instant is tried with, where steps are chosen to be made again. Larger: steps in vain, once; smaller: many short
+/// steps in each return.
+pub(crate) const FIRST_TRIED: f64 = 1.0 / 64.0;

@@ -1,0 +1,121 @@
+//! The rows of an orbit, and what is to be told with them.
+
+use super::PeriodicOptions;
+use super::shooting::{Fixed, neutral};
+use crate::circuit::{Circuit, Tran};
+use crate::integrate::{
+    Error, Note, Orbit, OrbitKind, Run, SimOptions, Simulation, Standing, simulate_beside,
+};
+use crate::mna::StaticMultiport;
+use crate::settings::tolerances::times::SPAN_PARTS;
+
+/// One period of waveforms, from 0 on.
+pub(super) fn rows(
+    (circuit, multiport, simulation): (&Circuit, &StaticMultiport, Option<&Simulation>),
+    standing: Standing,
+    period: f64,
+    options: &PeriodicOptions<'_>,
+    grid: impl FnOnce(Tran) -> Tran,
+) -> Result<Run, Error> {
+    let from = standing.t;
+    let asked = circuit
+        .tran
+        .filter(|tran| tran.prints && tran.tstep < period);
+    let circuit = Circuit {
+        tran: Some(grid(Tran {
+            tstep: asked.map_or(period / SPAN_PARTS, |tran| tran.tstep),
+            prints: asked.is_some(),
+            tstop: from + period,
+            tstart: from,
+            tmax: circuit.tran.and_then(|tran| tran.tmax),
+            uic: true,
+        })),
+        ..circuit.clone()
+    };
+    let mut run = simulate_beside(
+        simulation,
+        &circuit,
+        multiport,
+        SimOptions {
+            start: Some(standing),
+            events: options.events,
+            corners: options.corners,
+            cancel: options.cancel,
+            settings: options.settings.clone(),
+            ..SimOptions::default()
+        },
+    )?;
+    shift(&mut run, from);
+    Ok(run)
+}
+
+/// Has a run begin at 0.
+fn shift(run: &mut Run, from: f64) {
+    if from == 0.0 {
+        return;
+    }
+    run.waveforms.time.iter_mut().for_each(|t| *t -= from);
+    run.events.iter_mut().for_each(|event| event.t -= from);
+    run.impulses
+        .iter_mut()
+        .for_each(|impulse| impulse.t -= from);
+    run.state_jumps
+        .first
+        .iter_mut()
+        .for_each(|jump| jump.t -= from);
+}
+
+/// The rows of an orbit in steps are off by no less than orbits of longer and shorter steps are apart, and it is not known by what where that is not.
+pub(super) fn state_error(run: &mut Run, apart: Option<f64>) {
+    for error in [&mut run.error.max, &mut run.error.rms] {
+        *error = error.zip(apart).map(|(error, apart)| error.max(apart));
+    }
+}
+
+/// Sources that do not repeat.
+pub(super) fn held_sources(held: &[String]) -> Option<Note> {
+    if held.is_empty() {
+        return None;
+    }
+    let text = format!(
+        "{}: held at the value at 0-, as it does not repeat (a pulse with a period longer than the run of `.tran` is a step)",
+        held.join(", ")
+    );
+    Some(Note::of("held-source", held, text))
+}
+
+/// What is to be told of an orbit that is not stable.
+pub(super) fn unstable(orbit: &Orbit) -> Option<Note> {
+    if orbit.stable {
+        return None;
+    }
+    let [re, im] = orbit.multipliers[0];
+    let text =
+        format!("the orbit is unstable: a multiplier is {re:.6}{im:+.6}i; transients leave it");
+    Some(Note::run("unstable-orbit", text))
+}
+
+/// What the user should know of an orbit.
+pub(super) fn notes(orbit: &Orbit, fixed: &Fixed, names: &[String], held: &[String]) -> Vec<Note> {
+    let mut notes = Vec::new();
+    notes.extend(held_sources(held));
+    notes.extend(unstable(orbit));
+    if orbit.kind != OrbitKind::Autonomous {
+        let directions = neutral(&fixed.derivative);
+        let taking_part = |j: &usize| directions.iter().any(|direction| direction.contains(j));
+        let states: Vec<&str> = (0..names.len())
+            .filter(taking_part)
+            .map(|j| names[j].as_str())
+            .collect();
+        if !states.is_empty() {
+            let text = format!(
+                "the orbit is not unique: {} may be another, as a period leaves them as they are in {} direction{}",
+                states.join(", "),
+                directions.len(),
+                if directions.len() == 1 { "" } else { "s" },
+            );
+            notes.push(Note::run("orbit-not-unique", text));
+        }
+    }
+    notes
+}

@@ -1,0 +1,143 @@
+//! What a run in sparse steps was made of, and what it makes of small changes of where it began.
+//!
+//! Along the active sets of its stages and instants a run is an affine map of its start, and its derivative is the product of these:
+//!
+//! ```text
+//! stage      (I − γh Â) δx_i = δx + h Σ_{j<i} a_ij δk_j,      δk_i = (δx_i − δx − h Σ a_ij δk_j)/(γh),
+//! ```
+//!
+//! with Â = A on the active set, so that each stage is one solution with the factors of the run; instants are implicit steps as well, and a switch takes the storage into
+//! its new system. No step of the run is made again for it.
+
+use std::sync::Arc;
+
+use super::system::System;
+use crate::integrate::curved::tableau::{GAMMA, LOWER, STAGES};
+
+/// An active set.
+pub(super) type Set = Arc<[bool]>;
+
+/// A part of a run.
+#[derive(Debug)]
+enum Move {
+    /// Switches have moved.
+    Position { from: usize, to: usize },
+    /// An instant: so many steps of next to no length.
+    Jump {
+        system: usize,
+        h: (f64, f64),
+        sets: Vec<Set>,
+    },
+    /// A step, with the active sets of its implicit stages.
+    Step {
+        system: usize,
+        h: (f64, f64),
+        sets: [Option<Set>; STAGES - 1],
+    },
+}
+
+/// See the [module](self).
+#[derive(Debug, Default)]
+pub(crate) struct Tape {
+    moves: Vec<Move>,
+    last: Option<Set>,
+    /// The system of its start.
+    first: usize,
+}
+
+impl Tape {
+    /// Of a run that begins in this system.
+    pub(super) fn of(first: usize) -> Self {
+        Self {
+            first,
+            ..Self::default()
+        }
+    }
+
+    /// An active set, kept once where it stays.
+    pub(super) fn set(&mut self, active: &[bool]) -> Set {
+        match &self.last {
+            Some(last) if **last == *active => Arc::clone(last),
+            _ => Arc::clone(self.last.insert(active.into())),
+        }
+    }
+
+    pub(super) fn position(&mut self, from: usize, to: usize) {
+        self.moves.push(Move::Position { from, to });
+    }
+
+    /// h and what it may be off by.
+    pub(super) fn jump(&mut self, system: usize, h: (f64, f64), sets: Vec<Set>) {
+        self.moves.push(Move::Jump { system, h, sets });
+    }
+
+    pub(super) fn step(&mut self, system: usize, h: (f64, f64), stages: &[Set]) {
+        let mut sets = [const { None }; STAGES - 1];
+        for (to, set) in sets.iter_mut().zip(stages) {
+            *to = Some(Arc::clone(set));
+        }
+        self.moves.push(Move::Step { system, h, sets });
+    }
+
+    /// What the run makes of a change of all storage quantities; `None` where an active set leaves it open.
+    pub(super) fn product(
+        &self,
+        systems: &mut [(Vec<bool>, System)],
+        change: &[f64],
+    ) -> Option<Vec<f64>> {
+        let mut system = self.first;
+        let mut x = systems[system].1.change_of_storage(change);
+        let mut slopes: [Vec<f64>; STAGES] = Default::default();
+        let mut base = Vec::new();
+        for part in &self.moves {
+            match part {
+                &Move::Position { from, to } => {
+                    let still = vec![0.0; systems[from].1.lcs.inputs.len()];
+                    let storage = systems[from].1.storage_rate(&x, &still);
+                    x = systems[to].1.change_of_storage(&storage);
+                    system = to;
+                }
+                Move::Jump { system, h, sets } => {
+                    let kernel = &mut systems[*system].1.kernel;
+                    base.clone_from(&x);
+                    for set in sets {
+                        base.clone_from(&x);
+                        if !kernel.change(*h, set, &mut x) {
+                            return None;
+                        }
+                    }
+                    // Back to the instant, as the run goes.
+                    let (h, back) = (h.0, sets.len().saturating_sub(1) as f64);
+                    let slope = x.iter().zip(&base).map(|(b, a)| (b - a) / h);
+                    slopes[STAGES - 1] = slope.collect();
+                    let ends = base.iter().zip(&slopes[STAGES - 1]);
+                    x = ends.map(|(a, k)| a - back * h * k).collect();
+                }
+                Move::Step { system, h, sets } => {
+                    let kernel = &mut systems[*system].1.kernel;
+                    let (h, slack) = *h;
+                    slopes.swap(0, STAGES - 1);
+                    let start = x.clone();
+                    for (stage, set) in (1..STAGES).zip(sets) {
+                        base.clone_from(&start);
+                        for (slope, weight) in slopes.iter().zip(LOWER[stage]) {
+                            let add = base.iter_mut().zip(slope);
+                            add.for_each(|(x, k)| *x += h * weight * k);
+                        }
+                        x.clone_from(&base);
+                        if !kernel.change((GAMMA * h, slack), set.as_ref()?, &mut x) {
+                            return None;
+                        }
+                        let moved = x.iter().zip(&base);
+                        let slope = &mut slopes[stage];
+                        slope.clear();
+                        slope.extend(moved.map(|(x, old)| (x - old) / (GAMMA * h)));
+                    }
+                }
+            }
+        }
+        let system = &systems[system].1;
+        let still = vec![0.0; system.lcs.inputs.len()];
+        Some(system.storage_rate(&x, &still))
+    }
+}

@@ -1,0 +1,325 @@
+//! Periodic steady states by products in sparse steps: against those by dense matrices on circuits that both master, and what is said where there is none.
+#![allow(missing_docs, reason = "tests")]
+
+use std::fmt::Write as _;
+
+use circ::Model;
+use circ::analysis::{PeriodicOptions, orbit_start, periodic, periodic_measured, periodic_table};
+use circ::integrate::{Orbit, Reason, Run, SimOptions, Standing};
+use circ::settings::Settings;
+
+fn model(text: &str) -> Model {
+    Model::parse(text, "orbit.cir").unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+/// Sparse steps whatever the size.
+fn options() -> PeriodicOptions<'static> {
+    let settings = Settings {
+        large: 0,
+        ..Settings::default()
+    };
+    PeriodicOptions {
+        settings,
+        ..PeriodicOptions::default()
+    }
+}
+
+/// What was made: returns, steps of each of them, products; nothing where matrices were dense.
+fn work(run: &Run) -> Option<[u64; 3]> {
+    let word = run
+        .plan
+        .iter()
+        .find(|word| word.starts_with("orbit by products"))?;
+    let digits = |c: char| !c.is_ascii_digit();
+    let numbers = word.split(digits).filter_map(|part| part.parse().ok());
+    Some(
+        numbers
+            .collect::<Vec<u64>>()
+            .try_into()
+            .expect("three counts"),
+    )
+}
+
+fn found(text: &str, options: &PeriodicOptions<'_>) -> (Orbit, Run, Standing) {
+    let model = model(text);
+    let (orbit, run) = periodic(&model, options).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let (_, standing) = orbit_start(&model, options).expect("the same orbit");
+    (orbit, run, standing)
+}
+
+/// Sparse and dense orbits of a circuit agree: rows and states to what the sparse one states, multipliers to 1e-4; at most so many products are made.
+fn agree(text: &str, products: u64) -> (Orbit, Run) {
+    let (exact, dense, place) = found(text, &PeriodicOptions::default());
+    let (orbit, run, standing) = found(text, &options());
+    assert_eq!(work(&dense), None);
+    let [returns, steps, made] = work(&run).expect("an orbit by products");
+    let stated = run.error.max.expect("a stated error");
+    assert!(stated < 1e-4, "{stated:e}\n{text}");
+    let units: Vec<bool> = model(text)
+        .multiport()
+        .storage
+        .iter()
+        .map(|s| s.capacitor)
+        .collect();
+    for unit in [true, false] {
+        let states = place.state.iter().zip(&standing.state).zip(&units);
+        let states = states.filter(|(_, u)| **u == unit).map(|(pair, _)| pair);
+        let size = states.clone().fold(1e-12_f64, |m, (a, _)| m.max(a.abs()));
+        let apart = states.fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+        assert!(
+            apart <= stated * size,
+            "{apart:e} of {size:e}, {stated:e} stated\n{text}"
+        );
+    }
+    let apart = distance(&dense, &run);
+    assert!(
+        apart <= stated,
+        "rows: {apart:e}, {stated:e} stated\n{text}"
+    );
+    let [first, other] = [&exact, &orbit].map(|orbit| orbit.multipliers[0]);
+    let apart = (first[0] - other[0]).hypot(first[1].abs() - other[1].abs());
+    assert!(apart < 1e-4, "{first:?} {other:?}\n{text}");
+    assert_eq!(
+        (exact.stable, exact.period, exact.order),
+        (orbit.stable, orbit.period, orbit.order)
+    );
+    assert!(orbit.residual < 1e-9, "{orbit:?}");
+    println!("{returns} returns of {steps} steps, {made} products, {stated:e} stated, {apart:e}");
+    assert!(
+        made <= products,
+        "{returns} returns of {steps} steps, {made} products\n{text}"
+    );
+    (orbit, run)
+}
+
+/// The largest distance of rows of the grid, over the largest value of each unit, but for those at edges, where one may be a left and the other a right limit.
+fn distance(a: &Run, b: &Run) -> f64 {
+    let (a, b) = (&a.waveforms, &b.waveforms);
+    assert_eq!(a.time.len(), b.time.len());
+    let columns = a.names.len();
+    let size = |unit: &str| {
+        let all = a.values.iter().enumerate();
+        let own = all.filter(|(k, _)| a.units[k % columns] == unit);
+        own.fold(1e-12_f64, |m, (_, v)| m.max(v.abs()))
+    };
+    let sizes = [size("V"), size("A")];
+    let pairs = a.values.iter().zip(&b.values).enumerate();
+    pairs.fold(0.0, |worst, (k, (x, y))| {
+        let size = sizes[usize::from(a.units[k % columns] != "V")];
+        worst.max((x - y).abs() / size)
+    })
+}
+
+fn ladder(sections: usize, head: &str) -> String {
+    let mut text = format!("ladder\n{head}\n");
+    let farads = 1e-5 / sections as f64;
+    for k in 0..sections {
+        let next = k + 1;
+        let _ = writeln!(
+            text,
+            "r{next} n{k} n{next} 10\nc{next} n{next} 0 {farads:e}"
+        );
+    }
+    let _ = write!(
+        text,
+        "rend n{sections} 0 1k\n.tran 17u 2m\n.save v(n{}) v(n{sections})\n.end\n",
+        sections / 2
+    );
+    text
+}
+
+/// Clocked bucks on one bus, each with values of its own.
+fn bucks(count: usize, load: f64, diode: &str) -> String {
+    let mut text = format!(
+        "bucks\nvs src 0 48\nls src bus 1u\ncs bus 0 47u\nvc c 0 pulse(0 1 0 0 0 4u 10u)\n.model sw sw(vt=0.5 vh=0 ron=10m roff=1meg)\n.model dm d({diode})\n"
+    );
+    for k in 0..count {
+        let f = 1.0 + 0.1 * k as f64;
+        let _ = writeln!(
+            text,
+            "s{k} bus x{k} c 0 sw\nd{k} 0 x{k} dm\nl{k} x{k} o{k} {:e}\nc{k} o{k} 0 {:e}\nr{k} o{k} 0 {:e}",
+            20e-6 * f,
+            10e-6 / f,
+            load * f
+        );
+    }
+    text += ".tran 0.17u 100u\n.save v(bus) v(o0) i(l1)\n.end\n";
+    text
+}
+
+#[test]
+fn ladders_have_the_orbit_of_dense_matrices() {
+    agree(&ladder(40, "v1 n0 0 pulse(0 10 0 1u 1u 0.4m 1m)"), 80);
+    let rectifier = "v1 in 0 sin(0 10 1k)\nd1 in n0 dm\n.model dm d(ideal)\nrl n0 0 10k";
+    agree(&ladder(40, rectifier), 80);
+    // The edge of a source is a jump of charge in a capacitor at its end.
+    agree(
+        &ladder(30, "v1 n0 0 pulse(0 10 0 0 0 0.4m 1m)\ncin n0 0 1n"),
+        80,
+    );
+}
+
+/// In continuous and discontinuous conduction, and with forward drops: corrections change active sets.
+#[test]
+fn bucks_on_one_bus_have_the_orbit_of_dense_matrices() {
+    agree(&bucks(6, 5.0, "ideal"), 250);
+    agree(&bucks(6, 100.0, "ideal"), 250);
+    agree(&bucks(4, 30.0, "ron=20m roff=1meg vfwd=0.7"), 250);
+}
+
+fn boost(load: &str) -> String {
+    format!(
+        "boost\nvin in 0 12\nl1 in x 100u\ns1 x 0 c 0 sw\nd1 x out dm\nc1 out 0 1000u\n{load}\nvc c 0 pulse(0 1 0 0 0 4u 10u)\n\
+         .model sw sw(vt=0.5 vh=0 ron=20m roff=1meg)\n.model dm d(ideal)\n.tran 0.17u 100u uic\n.save v(out) i(l1)\n.end\n"
+    )
+}
+
+/// A filter that forgets 2e-4 a period: thousands of periods of transient, a few products.
+#[test]
+fn a_slow_orbit_is_found_in_few_products() {
+    let (orbit, _) = agree(&boost("r1 out 0 50"), 60);
+    assert!(orbit.multipliers[0][0] > 0.999, "{orbit:?}");
+    let (_, run) = agree(
+        &bucks(3, 8.0, "ideal").replace("ls src", "rs src y 1\nl9 y"),
+        250,
+    );
+    assert!(run.notes.iter().all(|note| note.code != "unstable-orbit"));
+}
+
+/// What closes after one period closes after two, with the squares of the multipliers.
+#[test]
+fn an_order_that_is_asked_for_is_the_orbit_of_so_many_periods() {
+    let text = bucks(3, 5.0, "ideal");
+    let (one, ..) = found(&text, &options());
+    let two = PeriodicOptions {
+        order: Some(2),
+        ..options()
+    };
+    let (two, run, _) = found(&text, &two);
+    assert!(work(&run).is_some());
+    assert_eq!((two.order, two.period), (2, 2.0 * one.period));
+    let [re, im] = one.multipliers[0];
+    let squared = [re * re - im * im, 2.0 * re * im.abs()];
+    let apart =
+        (squared[0] - two.multipliers[0][0]).hypot(squared[1] - two.multipliers[0][1].abs());
+    assert!(apart < 1e-5, "{one:?} {two:?}");
+}
+
+/// An RC with a negative conductance across C: v grows by e^{T/RC} a period around an orbit.
+#[test]
+fn an_unstable_orbit_is_told() {
+    let text = "unstable\ni1 0 a sin(0 1m 1k)\nc1 a 0 1u\ng1 0 a a 0 0.2m\n.tran 17u 2m\n.end\n";
+    let (orbit, run, _) = found(text, &options());
+    assert!(work(&run).is_some() && !orbit.stable, "{orbit:?}");
+    assert!(
+        (orbit.multipliers[0][0] - 0.2_f64.exp()).abs() < 1e-6,
+        "{orbit:?}"
+    );
+    assert!(run.notes.iter().any(|note| note.code == "unstable-orbit"));
+}
+
+/// The charge between two capacitors in series stays what it is.
+#[test]
+fn an_orbit_that_is_one_of_many_is_told() {
+    let text = "shared\nv1 a 0 sin(0 1 1k)\nr1 a b 1k\nc1 b m 1u ic=2\nc2 m 0 1u\nr2 b 0 1k\nr3 b q 1k\nc3 q 0 1u\n.tran 17u 2m uic\n.end\n";
+    let (orbit, run, _) = found(text, &options());
+    assert!((orbit.multipliers[0][0] - 1.0).abs() < 1e-6, "{orbit:?}");
+    let note = run
+        .notes
+        .iter()
+        .find(|note| note.code == "orbit-not-unique");
+    let note = note.unwrap_or_else(|| panic!("{:?}", run.notes));
+    assert!(
+        note.text.contains("v(c1), v(c2)") && !note.text.contains("c3"),
+        "{}",
+        note.text
+    );
+}
+
+/// A capacitor that is charged in each period for good has no orbit: the search ends, and says what it saw.
+#[test]
+fn a_circuit_without_an_orbit_is_refused() {
+    let text = "drift\ni1 0 a pulse(0 1m 0 0 0 0.5m 1m)\nc1 a 0 1u\nr1 a b 1k\nc2 b 0 1u\n.tran 17u 2m uic\n.end\n";
+    let error = periodic(&model(text), &options()).expect_err("no orbit");
+    assert!(matches!(error.reason, Reason::NoOrbit(_)), "{error}");
+    let said = error.to_string();
+    assert!(
+        said.contains("by products") && said.contains("asked for"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_period_that_is_none_is_refused() {
+    let text = ladder(10, "v1 n0 0 pulse(0 10 0 1u 1u 0.4m 1m)");
+    for (period, says) in [(1.5e-3, "no multiple"), (-1.0, "no period")] {
+        let asked = PeriodicOptions {
+            period: Some(period),
+            ..options()
+        };
+        let error = periodic(&model(&text), &asked).expect_err("no period");
+        assert!(error.to_string().contains(says), "{error}");
+    }
+}
+
+/// Rows, tables, measurements and transients from the orbit on are those of other orbits in steps.
+#[test]
+fn what_follows_from_an_orbit_follows_from_this_one() {
+    let rectifier = "v1 in 0 sin(0 10 1k)\nd1 in n0 dm\n.model dm d(ideal)\nrl n0 0 10k\n.meas tran top max v(n10)";
+    let text = ladder(10, rectifier);
+    let circuit = model(&text);
+    let exact = PeriodicOptions::default();
+    let (_, run) = periodic(&circuit, &options()).expect("an orbit");
+    let columns = run.waveforms.names.len();
+    let (first, last) = (
+        &run.waveforms.values[..columns],
+        &run.waveforms.values[run.waveforms.values.len() - columns..],
+    );
+    for (a, b) in first.iter().zip(last) {
+        assert!((a - b).abs() < 1e-5, "{first:?} {last:?}");
+    }
+    assert_eq!(
+        (
+            run.waveforms.time[0],
+            *run.waveforms.time.last().expect("rows")
+        ),
+        (0.0, 1e-3)
+    );
+    let [by_products, dense] = [&options(), &exact].map(|options| {
+        let (_, _, found) = periodic_measured(&circuit, options).expect("an orbit");
+        found.measured[0].result.as_ref().expect("a value").value
+    });
+    assert!(
+        (by_products - dense).abs() < 1e-4 * dense.abs(),
+        "{by_products} {dense}"
+    );
+    let table = |options| periodic_table(&circuit, (&[], &[]), options).expect("a table");
+    let [by_products, dense] = [&options(), &exact].map(table);
+    assert!(!by_products.exact && dense.exact);
+    let [one, other] =
+        [&by_products, &dense].map(|table| table.element("rend").expect("rend").power);
+    assert!((one - other).abs() < 1e-4 * other, "{one} {other}");
+    let (_, start) = orbit_start(&circuit, &options()).expect("an orbit");
+    let run = circuit.transient(SimOptions {
+        start: Some(start),
+        settings: options().settings,
+        ..SimOptions::default()
+    });
+    let run = run.expect("a transient");
+    let rows: Vec<&[f64]> = run.waveforms.values.chunks_exact(columns).collect();
+    let whole = rows.last().expect("rows");
+    for (a, b) in rows[0].iter().zip(*whole) {
+        assert!((a - b).abs() < 1e-3, "{a} {b}");
+    }
+}
+
+/// A switch that follows the state is left to dense matrices, and so is a circuit below the limit: to the last bit.
+#[test]
+fn other_circuits_have_their_orbits_as_before() {
+    let follows = "hysteresis\nv1 in 0 sin(0 10 1k)\nr1 in a 1k\nc1 a 0 0.1u\ns1 a b a 0 sw\nr2 b 0 1k\n.model sw sw(vt=2 vh=0.5 ron=1 roff=1meg)\n.tran 17u 2m\n.end\n";
+    let model = model(follows);
+    let [one, other] = [&options(), &PeriodicOptions::default()]
+        .map(|options| periodic(&model, options).expect("an orbit").1);
+    assert_eq!(work(&one), None);
+    assert_eq!(one.waveforms.values, other.waveforms.values);
+}
