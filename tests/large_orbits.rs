@@ -323,3 +323,54 @@ fn other_circuits_have_their_orbits_as_before() {
     assert_eq!(work(&one), None);
     assert_eq!(one.waveforms.values, other.waveforms.values);
 }
+
+/// `CIRC_ORBITS='a.cir b.cir' cargo test --test large_orbits -- --ignored --nocapture`: orbits of files at two tolerances, and after transients from there on.
+#[test]
+#[ignore = "files from elsewhere, which may take long"]
+fn orbits_of_files() {
+    for path in std::env::var("CIRC_ORBITS")
+        .unwrap_or_default()
+        .split_whitespace()
+    {
+        let model =
+            Model::load(path, circ::circuit::ElaborateOptions::default()).expect("a circuit");
+        let names: Vec<String> = model
+            .multiport()
+            .storage
+            .iter()
+            .map(|s| s.element.clone())
+            .collect();
+        let mut known: Option<Standing> = None;
+        for tol in [1e-4, 1e-5, 1e-6, 1e-7] {
+            let mut options = options();
+            options.settings.tol = tol;
+            let (orbit, run) = match periodic(&model, &options) {
+                Ok(found) => found,
+                Err(error) => {
+                    println!("{path} {tol:e}: {error}");
+                    break;
+                }
+            };
+            let (_, standing) = orbit_start(&model, &options).expect("the same");
+            let apart = known.as_ref().map(|known| {
+                let both = known.state.iter().zip(&standing.state).zip(&names);
+                both.map(|((a, b), name)| ((a - b).abs(), *b, name.clone()))
+                    .fold(
+                        (0.0, 0.0, String::new()),
+                        |m, x| if x.0 > m.0 { x } else { m },
+                    )
+            });
+            println!(
+                "{path} {tol:e}: {:?} closed to {:.0e}, {:?}, stated {:?}, from the one before {apart:?}",
+                work(&run),
+                orbit.residual,
+                &orbit.multipliers[..orbit.multipliers.len().min(3)],
+                run.error.max
+            );
+            run.notes
+                .iter()
+                .for_each(|note| println!("  {}: {}", note.code, note.text));
+            known = Some(standing);
+        }
+    }
+}

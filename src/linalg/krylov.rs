@@ -64,7 +64,7 @@ impl Basis {
 }
 
 /// The x of the least ‖b − A x‖ in a basis of at most `most` vectors, or the first one that leaves less than the part `reduction` of ‖b‖; without what A shrinks to less than the part
-/// `neutral` of its size.
+/// `neutral` of itself.
 ///
 /// # Errors
 /// Those of the products.
@@ -106,8 +106,7 @@ pub(crate) fn gmres<E>(
     });
     let mut right = DVector::zeros(m + 1);
     right[0] = size;
-    let least = neutral * matrix.norm();
-    let y = matrix.svd(true, true).solve(&right, least);
+    let y = matrix.svd(true, true).solve(&right, neutral);
     Ok(y.map_or_else(|_| DVector::zeros(b.len()), |y| basis.combine(&y)))
 }
 

@@ -174,6 +174,10 @@ pub(crate) const FINEST_ORBIT: f64 = 1e-10;
 /// correction leaves.
 pub(crate) const LEFT_OF_RESIDUAL: f64 = 1e-3;
 
+/// A correction that leaves no more than this many times what products let expect came to a return of the same active sets: the next one is computed to the end. Larger: products that the next
+/// change of an active set makes vain; smaller: spaces of products that are begun again.
+pub(crate) const KEPT_ITS_WORD: f64 = 30.0;
+
 /// An orbit by products is closed far enough here, and where its largest multiplier is μ at 1 − μ of this: what it is off by is then no more than this. Larger: slow orbits are less exact; smaller:
 /// returns in vain.
 pub(crate) const CLOSED_ENOUGH: f64 = 1e-9;

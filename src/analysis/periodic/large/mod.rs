@@ -10,7 +10,7 @@ use crate::linalg::krylov::Ritz;
 use crate::mna::StaticMultiport;
 use crate::settings::Settings;
 use crate::settings::tolerances::periodic::{
-    FINER_ORBIT, FINEST_ORBIT, NEUTRAL, STEPPED_CLOSED, TABLE_STEPS, TAKES_PART,
+    FINER_ORBIT, FINEST_ORBIT, NEUTRAL, ROUNDING_OF_RETURN, STEPPED_CLOSED, TABLE_STEPS, TAKES_PART,
 };
 use newton::{Shooting, Shot};
 
@@ -47,7 +47,7 @@ impl Large {
         let Some(returns) = returns(asked, period, &settings)? else {
             return Ok(None);
         };
-        let order = options.order.unwrap_or(1);
+        let order = options.order.unwrap_or(1).max(1);
         let closed = options.tol.unwrap_or(STEPPED_CLOSED);
         let from = asked.period.from;
         let seconds = order as f64 * period;
@@ -64,8 +64,9 @@ impl Large {
             let both = fine.stand.state.iter().zip(&coarse.stand.state);
             let apart = both.zip(&shooting.amplitudes);
             let apart = apart.fold(0.0_f64, |m, ((a, b), size)| m.max((a - b).abs() / size));
-            // What is not closed counts so much more on the orbit.
-            apart.max(fine.size / (1.0 - largest).abs().max(NEUTRAL))
+            // What is not closed, by rounding at least, counts so much more on the orbit.
+            let open = fine.size.max(ROUNDING_OF_RETURN);
+            apart.max(open / (1.0 - largest).abs().max(NEUTRAL))
         });
         let shown = fine.unwrap_or(coarse);
         let place = (from, &shown.stand.state[..], &shown.stand.switches[..]);

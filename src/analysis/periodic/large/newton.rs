@@ -15,8 +15,8 @@ use super::super::shooting::Stand;
 use crate::integrate::{Error, Lengths, Passed, Reason, Returns, grow};
 use crate::linalg::krylov::{Ritz, gmres, leading};
 use crate::settings::tolerances::periodic::{
-    CLOSED_AT_BEST, CLOSED_ENOUGH, GOES_ON, LEAST_AMPLITUDE, LEAST_WEIGHT, LEFT_OF_RESIDUAL,
-    NEUTRAL, STEPPED_DIFFERENCE, STEPS_ANEW,
+    CLOSED_AT_BEST, CLOSED_ENOUGH, GOES_ON, KEPT_ITS_WORD, LEAST_AMPLITUDE, LEAST_WEIGHT,
+    LEFT_OF_RESIDUAL, NEUTRAL, STEPPED_DIFFERENCE, STEPS_ANEW,
 };
 
 /// Corrections of one attempt.
@@ -157,16 +157,25 @@ impl<'a> Shooting<'a> {
         let place = (self.from, &stand.state[..], &stand.switches[..]);
         let passed = self.returns.pass(place, self.until, lengths, self.cancel)?;
         self.made += 1;
-        let moved = passed.state.iter().zip(&stand.state).map(|(a, b)| a - b);
-        let parts = moved.clone().zip(&self.amplitudes);
-        let size = parts.fold(0.0_f64, |most, (d, a)| most.max((d / a).abs()));
-        let residual = moved.zip(&self.weights).map(|(d, w)| d * w);
-        Ok(Shot {
-            residual: DVector::from_iterator(stand.state.len(), residual),
+        let mut shot = Shot {
+            residual: DVector::zeros(stand.state.len()),
             stand,
             passed,
-            size,
-        })
+            size: 0.0,
+        };
+        self.measure(&mut shot);
+        Ok(shot)
+    }
+
+    /// How far a return is from closed, in present amplitudes and weights.
+    fn measure(&self, shot: &mut Shot) {
+        let both = shot.passed.state.iter().zip(&shot.stand.state);
+        let moved = both.map(|(a, b)| a - b);
+        let parts = moved.clone().zip(&self.amplitudes);
+        shot.size = parts.fold(0.0_f64, |most, (d, a)| most.max((d / a).abs()));
+        for (residual, (d, w)) in shot.residual.iter_mut().zip(moved.zip(&self.weights)) {
+            *residual = d * w;
+        }
     }
 
     /// W M W⁻¹ v at a place: along the active sets of its return, and where these leave it open by the difference of two returns.
@@ -203,14 +212,14 @@ impl<'a> Shooting<'a> {
     }
 
     /// δ in units of the storage, by the derivative at `base`.
-    fn correction(&mut self, base: &Shot, residual: &DVector<f64>) -> Result<Vec<f64>, Error> {
+    fn correction(
+        &mut self,
+        base: &Shot,
+        residual: &DVector<f64>,
+        reduction: f64,
+    ) -> Result<Vec<f64>, Error> {
         let mut product = |v: &DVector<f64>| Ok::<_, Error>(v - self.product(base, v)?);
-        let found = gmres(
-            &mut product,
-            residual,
-            (LEFT_OF_RESIDUAL, NEUTRAL),
-            MOST_VECTORS,
-        )?;
+        let found = gmres(&mut product, residual, (reduction, NEUTRAL), MOST_VECTORS)?;
         Ok(found
             .iter()
             .zip(&self.weights)
@@ -219,8 +228,13 @@ impl<'a> Shooting<'a> {
     }
 
     /// The place that a correction leads to, or the longest half of it that makes the residual smaller.
-    fn corrected(&mut self, shot: &Shot, base: &Shot, halves: bool) -> Result<Option<Shot>, Error> {
-        let correction = self.correction(base, &shot.residual)?;
+    fn corrected(
+        &mut self,
+        (shot, base): (&Shot, &Shot),
+        halves: bool,
+        reduction: f64,
+    ) -> Result<Option<Shot>, Error> {
+        let correction = self.correction(base, &shot.residual, reduction)?;
         let parts = correction.iter().zip(&self.amplitudes);
         let moves = parts.fold(0.0_f64, |most, (d, a)| most.max((d / a).abs()));
         let mut part = 1.0;
@@ -256,7 +270,7 @@ impl<'a> Shooting<'a> {
     pub(super) fn solve(&mut self, stand: Stand, closed: f64) -> Result<Option<Shot>, Error> {
         let mut shot = self.shoot(stand, Steps::Anew)?;
         self.take_steps(&mut shot);
-        let mut relaxed = 0;
+        let (mut relaxed, mut reduction) = (0, LEFT_OF_RESIDUAL);
         for _ in 0..MOST_CORRECTIONS {
             self.least = self.least.min(shot.size);
             if shot.size <= self.enough {
@@ -264,9 +278,13 @@ impl<'a> Shooting<'a> {
             }
             self.corrections += 1;
             let before = shot.size;
-            if let Some(next) = self.corrected(&shot, &shot, false)? {
+            if let Some(next) = self.corrected((&shot, &shot), false, reduction)? {
                 shot = next;
                 self.take_steps(&mut shot);
+                // Where the return went on as it did all that is left can be corrected at once.
+                let kept = shot.size < KEPT_ITS_WORD * reduction * before;
+                let all = (0.5 * self.enough / shot.size).min(LEFT_OF_RESIDUAL);
+                reduction = if kept { all } else { LEFT_OF_RESIDUAL };
                 if shot.closes(closed) && shot.size > GOES_ON * before {
                     break;
                 }
@@ -291,12 +309,17 @@ impl<'a> Shooting<'a> {
         self.steps.len()
     }
 
+    /// Takes over the steps of a return, and its amplitudes.
     fn take_steps(&mut self, shot: &mut Shot) {
         if shot.passed.steps.is_empty() {
             return;
         }
         std::mem::swap(&mut self.steps, &mut shot.passed.steps);
         shot.passed.steps.clear();
+        // What a transient has not come to yet is larger here.
+        let peaks = std::mem::take(&mut shot.passed.peaks);
+        self.observe(&peaks);
+        self.measure(shot);
     }
 
     /// The orbit of steps half as long near one whose largest multiplier is `largest`, by the derivative of that one; `None` where it is not found.
@@ -322,7 +345,7 @@ impl<'a> Shooting<'a> {
                 break;
             }
             self.corrections += 1;
-            match self.corrected(&fine, shot, true)? {
+            match self.corrected((&fine, shot), true, LEFT_OF_RESIDUAL)? {
                 Some(next) => fine = next,
                 None => break,
             }
