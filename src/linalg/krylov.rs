@@ -12,6 +12,9 @@ use crate::settings::tolerances::krylov::{BREAKDOWN, CLEAR_OF_EIGENVALUE, FAINT_
 /// So many more vectors before eigenvalues are looked at again.
 const LOOK: usize = 4;
 
+/// A v.
+pub(crate) type Product<'a, E> = dyn FnMut(&DVector<f64>) -> Result<DVector<f64>, E> + 'a;
+
 /// A V_m = V_{m+1} H̄.
 struct Basis {
     vectors: Vec<DVector<f64>>,
@@ -69,7 +72,7 @@ impl Basis {
 /// # Errors
 /// Those of the products.
 pub(crate) fn gmres<E>(
-    product: &mut dyn FnMut(&DVector<f64>) -> Result<DVector<f64>, E>,
+    product: &mut Product<'_, E>,
     b: &DVector<f64>,
     (reduction, neutral): (f64, f64),
     most: usize,
@@ -133,7 +136,7 @@ impl Ritz {
 /// # Errors
 /// Those of the products.
 pub(crate) fn leading<E>(
-    product: &mut dyn FnMut(&DVector<f64>) -> Result<DVector<f64>, E>,
+    product: &mut Product<'_, E>,
     n: usize,
     (wanted, most): (usize, usize),
 ) -> Result<Option<Vec<Ritz>>, E> {

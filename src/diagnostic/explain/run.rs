@@ -104,18 +104,18 @@ pub(super) const CODES: [Explanation; 55] = [
         "Nothing: all periods of the steady state are the same; or a shorter `.tran`.",
     ),
     Explanation::of(
+        "leading-multipliers",
+        "Of the multipliers of the orbit the leading ones alone are given, which decide whether it is stable.",
+        "The circuit is large: its orbit is found by products with the derivative of a period, which is never written down.",
+        "Nothing; a circuit of fewer than 600 capacitors, inductors and ideal pairs has all of them.",
+    ),
+    Explanation::of(
         "left-out",
         "An analysis, a `.step` or a value was left out.",
         "A netlist asks for more than one command carries out.",
         "Run the command that the message names, or take the card out.",
     )
     .shown("both\nv1 a 0 dc 1 ac 1\nr1 a 0 1k\n.tran 1m 5m\n.op\n"),
-    Explanation::of(
-        "leading-multipliers",
-        "Of the multipliers of the orbit the leading ones alone are given, which decide whether it is stable.",
-        "The circuit is large: its orbit is found by products with the derivative of a period, which is never written down.",
-        "Nothing; a circuit of fewer than 600 capacitors, inductors and ideal pairs has all of them.",
-    ),
     Explanation::of(
         "measured-between-events",
         "Derivatives and values are of what happens between events, where `circ sim` measures the same run on its rows.",
