@@ -23,7 +23,8 @@ pub struct Orbit {
     pub residual: f64,
     /// Newton corrections.
     pub iterations: u32,
-    /// Eigenvalues (real and imaginary part) of ∂s(T)/∂s(0), the largest first; of an autonomous orbit without the one that is trivial.
+    /// Eigenvalues (real and imaginary part) of ∂s(T)/∂s(0), the largest first; of an autonomous orbit without the one that is trivial, of a
+    /// large circuit the leading ones alone.
     pub multipliers: Vec<[f64; 2]>,
     /// Whether no multiplier is larger than 1.
     pub stable: bool,

@@ -51,6 +51,9 @@ pub struct PeriodicOptions<'a> {
 /// is at rest. Sources that do not repeat stay at their values at 0⁻. A stable orbit is preferred: where the one of one period is not, the
 /// order of the one that the transient goes to.
 ///
+/// Where sources drive a circuit of [`Settings::large`] capacitors, inductors and ideal pairs or more, with devices that are ideal pairs and switches that follow sources alone, the orbit is found in steps on
+/// matrices without their zeros, by Newton's method with GMRES (docs/decisions/0015-orbits-by-products.md): of the multipliers the leading ones are given, and no order but the one asked for is looked for.
+///
 /// # Errors
 /// [`Reason::NoOrbit`] where none was found, with what was seen; else as [`Model::transient`].
 ///
