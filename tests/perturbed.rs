@@ -268,8 +268,8 @@ fn responses_about_orbits_in_steps_are_those_of_orbits_with_a_sine() {
 }
 
 /// Where all devices together interrupt a current, and what they let through is rounding beside their voltages; a transformer, and resistances that are
-/// decades apart.
-const INTERRUPTED: [Case<'_>; 4] = [
+/// decades apart; a switch that passes its threshold so slowly that steps as long as rounding of the time do not move its control.
+const INTERRUPTED: [Case<'_>; 5] = [
     Case {
         name: "flyback with a clamp, whose transistor has a body diode",
         cards: "vin in 0 @12@\nl1 in sw 47u\nl2 0 s 11.75u\nk1 l1 l2 1\nm1 sw g 0 0 mm\nd1 s out d\nc1 out 0 4.7u\n\
@@ -302,6 +302,15 @@ const INTERRUPTED: [Case<'_>; 4] = [
                 d1 2 0 d\nl2 3 2 34u\nc3 3 0 470u\nr3 3 0 5\n.model m0 nmos(vto=7.5 ron=1n rds=1e9)\n.model d d(is=1e-12 n=1.3 rs=10m)",
         out: "v(3)",
         period: 20e-6,
+        ..CASES[0]
+    },
+    Case {
+        name: "boost with peak-current control, input",
+        cards: "vin vin 0 @10@\nl1 vin sw 1m ic=0.5\ns1 sw 0 g 0 m\nd1 sw out d\nc1 out 0 12u ic=15\nrl out 0 20\n\
+                vclk clk 0 pulse(0 1 0 0 0 1u 100u)\nbsense sense 0 v=i(l1)\nvpeak peak 0 1\na1 sense peak 0 0 0 0 over 0 schmitt vt=0 vh=1u\n\
+                a2 clk over 0 0 0 0 g 0 srflop vhigh=10 ref=0.5\n.model m sw(ideal vt=5)\n.model d d(is=1e-12 n=1.3 rs=10m)",
+        out: "v(out)",
+        period: 100e-6,
         ..CASES[0]
     },
 ];

@@ -249,9 +249,9 @@ impl Theta {
         let (mut end, mut beyond) = (self.now.t, self.excess()?);
         self.back(steps);
         let mut before = self.excess()?;
-        let mut aside = finest;
+        let (mut low, mut aside) = (self.now.t, finest);
         for count in 0_u32.. {
-            let (t0, width) = (self.now.t, end - self.now.t);
+            let (t0, width) = (self.now.t, end - low);
             let t1 = if width <= 2.0 * finest {
                 end
             } else {
@@ -260,7 +260,7 @@ impl Theta {
                 } else {
                     passage(&before, &beyond)
                 };
-                t0 + (part * width + 0.5 * aside).clamp(finest, width - finest)
+                low + (part * width + 0.5 * aside).clamp(finest, width - finest)
             };
             self.kept.copy_from(&self.now);
             let steps = self.stats.steps;
@@ -272,8 +272,12 @@ impl Theta {
             if excess.iter().any(|e| *e > 0.0) {
                 (end, beyond, aside) = (t1, excess, -finest);
                 self.back(steps);
+            } else if excess == before {
+                // What moves the controls less than rounding would be lost step by step.
+                (low, aside) = (t1, finest);
+                self.back(steps);
             } else {
-                (before, aside) = (excess, finest);
+                (low, before, aside) = (t1, excess, finest);
                 self.report(log);
             }
         }
