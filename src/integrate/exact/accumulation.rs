@@ -7,6 +7,9 @@ use std::collections::VecDeque;
 /// Shrinking intervals in a row that count as an accumulation where they shrink to [`ACCUMULATES`].
 const EVENTS: u32 = 12;
 
+/// So many of them lead into a mode that one of them led into before: events of one device after the other, in a circuit of many, accumulate nowhere.
+const AGAIN: u32 = EVENTS / 2;
+
 /// So many events within [`BURST`] of an output step are a burst that does not end by itself.
 const EVENTS_OF_BURST: usize = 1024;
 
@@ -18,6 +21,10 @@ pub(crate) struct Accumulation {
     first_interval: f64,
     interval: f64,
     count: u32,
+    /// The modes that the first of them led into.
+    modes: Vec<usize>,
+    /// How many led into one of these again.
+    again: u32,
     /// Times of the latest events.
     latest: VecDeque<f64>,
 }
@@ -31,6 +38,8 @@ impl Accumulation {
             first_interval: f64::INFINITY,
             interval: f64::INFINITY,
             count: 0,
+            modes: Vec::new(),
+            again: 0,
             latest: VecDeque::new(),
         }
     }
@@ -48,8 +57,8 @@ impl Accumulation {
         None
     }
 
-    /// An event at t; returns the note of an accumulation that it ends.
-    pub(crate) fn event(&mut self, t: f64) -> Option<String> {
+    /// An event at t that leads into a mode; returns the note of an accumulation that it ends.
+    pub(crate) fn event(&mut self, t: f64, mode: usize) -> Option<String> {
         let interval = t - self.last;
         if interval <= 0.0 {
             return None;
@@ -63,6 +72,11 @@ impl Accumulation {
             self.first_interval = interval;
             self.count = 1;
         }
+        if self.modes.contains(&mode) {
+            self.again += 1;
+        } else if self.modes.len() < EVENTS as usize {
+            self.modes.push(mode);
+        }
         self.interval = interval;
         self.last = t;
         note
@@ -70,7 +84,9 @@ impl Accumulation {
 
     /// The note of an accumulation in progress, which ends.
     pub(crate) fn end(&mut self) -> Option<String> {
-        let found = self.count >= EVENTS && self.interval < ACCUMULATES * self.first_interval;
+        let found = self.count >= EVENTS
+            && self.again >= AGAIN
+            && self.interval < ACCUMULATES * self.first_interval;
         let note = found.then(|| {
             format!(
                 "events accumulate between t = {:e} s and t = {:e} s ({} events in shrinking intervals); the solution goes on \
@@ -78,7 +94,8 @@ impl Accumulation {
                 self.since, self.last, self.count
             )
         });
-        self.count = 0;
+        (self.count, self.again) = (0, 0);
+        self.modes.clear();
         note
     }
 }
@@ -104,18 +121,30 @@ mod tests {
     fn a_geometric_series_is_noted_and_a_clock_is_not() {
         let mut watch = Accumulation::new(0.0);
         let (mut t, mut dt) = (0.0, 1.0);
-        for _ in 0..20 {
+        for k in 0..20 {
             t += dt;
             dt /= 2.0;
-            assert_eq!(watch.event(t), None);
+            assert_eq!(watch.event(t, k % 2), None);
         }
         assert!(
             watch
-                .event(5.0)
+                .event(5.0, 0)
                 .is_some_and(|note| note.contains("20 events"))
         );
         for k in 0..50 {
-            assert_eq!(watch.event(6.0 + f64::from(k)), None);
+            assert_eq!(watch.event(6.0 + k as f64, k % 2), None);
+        }
+        assert_eq!(watch.end(), None);
+    }
+
+    #[test]
+    fn devices_that_change_one_after_the_other_do_not_accumulate() {
+        let mut watch = Accumulation::new(0.0);
+        let (mut t, mut dt) = (0.0, 1.0);
+        for mode in 0..40 {
+            t += dt;
+            dt /= 2.0;
+            assert_eq!(watch.event(t, mode), None);
         }
         assert_eq!(watch.end(), None);
     }

@@ -71,7 +71,7 @@ impl Report {
         if let Some(from) = from.filter(|from| *from != at) {
             changes = table.label(from, at, |table| label(table, from, at));
             self.events += 1;
-            let ended = self.accumulation.event(t);
+            let ended = self.accumulation.event(t, at);
             self.notes.extend(ended.map(accumulated));
         }
         if !table.modes[at].shared.is_empty() && !self.noted_shared {
