@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use circ::analysis::{
-    About, PeriodicOptions, Response, SmallSignalOptions, orbit_start, small_signal,
+    About, PeriodicOptions, Response, SmallSignalOptions, orbit_start, periodic, small_signal,
     small_signal_measured,
 };
 use circ::integrate::Reason;
@@ -60,6 +60,42 @@ fn a_linear_circuit_is_its_transfer_function() {
     let out = column(&response, "v(3)");
     let error = apart(&out, |f| drive * filter(f), &response.phasors.frequency);
     assert!(error < 1e-12, "{error:e}");
+}
+
+/// `tests/reference/periodic_digits.py`: the orbit of a buck, its multiplier and its response up to ten times the switching frequency from 40 digits.
+#[test]
+fn the_orbit_of_a_buck_and_its_response_are_those_of_forty_digits() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(root.join("netlists/buck-open-loop.cir")).expect("a buck");
+    let text = text
+        .replace("rload out 0 20", "rload out 0 5")
+        .replace("vin in 0 24", "vin in 0 dc 24 ac 1");
+    let digits = std::fs::read_to_string(root.join("tests/reference/periodic.csv"));
+    let digits = digits.expect("digits");
+    let rows = digits.lines().skip(1).map(|line| {
+        let (what, numbers) = line.split_once(',').expect("a row");
+        let numbers: Vec<f64> = numbers.split(',').map(|n| n.parse().expect(n)).collect();
+        (what, numbers[0], Complex::new(numbers[1], numbers[2]))
+    });
+    let (response, rest): (Vec<_>, Vec<_>) = rows.partition(|(what, ..)| *what == "y");
+    let options = SmallSignalOptions {
+        frequencies: response.iter().map(|row| row.1).collect(),
+        ..SmallSignalOptions::default()
+    };
+    let found = column(&response_of(&text, &options), "v(out)");
+    let model = Model::parse(&text, "t.cir").expect("a circuit");
+    let (orbit, run) = periodic(&model, &PeriodicOptions::default()).expect("an orbit");
+    let start = |name: &str| {
+        let at = run.waveforms.names.iter().position(|n| n == name);
+        Complex::from(run.waveforms.values[at.expect("a column")])
+    };
+    let [re, im] = orbit.multipliers[0];
+    let all = [start("i(l1)"), start("v(out)"), Complex::new(re, im.abs())];
+    assert_eq!((rest.len(), response.len()), (3, 10));
+    for (own, (what, f, truth)) in all.iter().chain(&found).zip(rest.iter().chain(&response)) {
+        let error = (own - truth).norm() / truth.norm();
+        assert!(error < 1e-12, "{what} {f}: {own} {truth} {error:e}");
+    }
 }
 
 /// Natural sampling moves the edge at t_k by T δd(t_k): pulses of area V T δd, whose baseband is V δd whatever the frequency.
