@@ -18,6 +18,18 @@ pub(crate) struct Weights {
     pub(crate) lengths: Vec<f64>,
     /// By measurement: what is used of it.
     pub(crate) results: Vec<f64>,
+    /// What it would be if an extremum that is reached several times were another one of these.
+    pub(crate) rivals: Vec<Tie>,
+}
+
+/// Another time at which an extremum is reached with the same value.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Tie {
+    /// When it is reached and counts, and when again, s.
+    pub(crate) times: (f64, f64),
+    /// What the values span.
+    pub(crate) span: f64,
+    pub(crate) weights: Weights,
 }
 
 /// A waveform, and of which pieces of the signals its own are parts: number, where on it, and how much of it.
@@ -68,6 +80,7 @@ impl<'a> Scene<'a> {
             begins: vec![0.0; self.pieces.len()],
             lengths: vec![0.0; self.pieces.len()],
             results: vec![0.0; self.results.len()],
+            rivals: vec![],
         };
         let time = |name: &str| found.at.iter().find(|(own, _)| *own == name);
         let time = |name: &str| time(name).map(|(_, t)| *t);
@@ -76,18 +89,35 @@ impl<'a> Scene<'a> {
                 let (from, to) = (time("from")?, time("to")?);
                 let traced = self.traced(of, None)?;
                 let slopes = traced.trace.over_slopes(*over, (from, to)).ok()??;
-                self.add(&traced, &slopes, 1.0, &mut into);
-                let ends = [
-                    (&window.from, from, slopes.from),
-                    (&window.to, to, slopes.to),
-                ];
-                for (instant, t, slope) in ends {
-                    // What the run ends stays where it is.
-                    let inside = t > self.span.0 && t < self.span.1;
-                    if let Some(instant) = instant.as_ref().filter(|_| inside) {
-                        self.instant(instant, t, slope, &mut into)?;
+                let place = |slopes: &TraceSlopes, into: &mut Weights| {
+                    self.add(&traced, slopes, 1.0, into);
+                    let ends = [
+                        (&window.from, from, slopes.from),
+                        (&window.to, to, slopes.to),
+                    ];
+                    for (instant, t, slope) in ends {
+                        // What the run ends stays where it is.
+                        let inside = t > self.span.0 && t < self.span.1;
+                        if let Some(instant) = instant.as_ref().filter(|_| inside) {
+                            self.instant(instant, t, slope, into)?;
+                        }
                     }
-                }
+                    Some(())
+                };
+                let rivals = traced.trace.rivals(*over, (from, to)).into_iter();
+                let ties = rivals.map(|rival| {
+                    let mut weights = into.clone();
+                    place(&rival.slopes, &mut weights)?;
+                    let times = (rival.beside, rival.at);
+                    Some(Tie {
+                        times,
+                        span: rival.span,
+                        weights,
+                    })
+                });
+                let ties = ties.collect::<Option<Vec<_>>>()?;
+                place(&slopes, &mut into)?;
+                into.rivals = ties;
             }
             Measurement::Find { of, slope, when } => {
                 let t = time("at")?;

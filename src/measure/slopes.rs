@@ -14,7 +14,24 @@ use super::curve::{Curve, VALUES, basis, basis_slopes};
 use super::trace::{Shape, Trace};
 use super::{MeasureError, Over};
 use crate::linalg::gauss::{NODES, WEIGHTS};
+use crate::settings::tolerances::periodic::SAME_EXTREMUM;
 use crate::settings::tolerances::times::SAME_TIME;
+
+/// Another time at which an extremum is reached with the same value.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Rival {
+    /// When that is, s.
+    pub(crate) at: f64,
+    /// The time that counts, s.
+    pub(crate) beside: f64,
+    /// What the values span.
+    pub(crate) span: f64,
+    /// The derivatives of the measure if this one counted.
+    pub(crate) slopes: TraceSlopes,
+}
+
+/// Where an extremum is reached: the piece, and where on it.
+type Reached = (usize, f64);
 
 /// Derivatives of a number to one piece.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -168,18 +185,85 @@ impl Trace<'_> {
         })
     }
 
-    /// Of the extreme value, or of when it is reached.
-    fn extreme_slopes(&self, sign: f64, window: (f64, f64), when: bool) -> Option<TraceSlopes> {
-        let mut found: Option<(usize, f64)> = None;
-        let mut most = f64::NEG_INFINITY;
+    /// What the derivatives of an extreme value are at the other times, with lower values between, at which it is reached to a part of all that the values span.
+    pub(crate) fn rivals(&self, what: Over, window: (f64, f64)) -> Vec<Rival> {
+        let of = |sign: f64| {
+            let (all, span) = self.reached(sign, window);
+            let time = |(k, s): Reached| self.own()[k].time(s);
+            let slopes = |at| self.extreme_slopes_at(at, window, false);
+            let first = all.first().copied();
+            let rest = all.into_iter().skip(1).filter_map(move |at| {
+                Some(Rival {
+                    at: time(at),
+                    beside: time(first?),
+                    span,
+                    slopes: slopes(at)?,
+                })
+            });
+            rest.collect::<Vec<_>>()
+        };
+        let together = |sign: f64| {
+            let other = self.extreme_slopes(-sign, window, false);
+            let with = |rival: Rival| {
+                let slopes = combined((sign, rival.slopes), (-sign, other.as_ref()?));
+                Some(Rival { slopes, ..rival })
+            };
+            of(sign).into_iter().filter_map(with).collect::<Vec<_>>()
+        };
+        match what {
+            Over::Minimum => of(-1.0),
+            Over::Maximum => of(1.0),
+            Over::PeakToPeak => [together(1.0), together(-1.0)].concat(),
+            _ => vec![],
+        }
+    }
+
+    /// Where the extreme value is reached, then the other such places with lower values between; and what the values span.
+    fn reached(&self, sign: f64, window: (f64, f64)) -> (Vec<Reached>, f64) {
+        let (mut first, mut most, mut least) = (None, f64::NEG_INFINITY, f64::INFINITY);
         for (k, curve, part) in self.parts(window) {
             curve.corners(part, |s, y| {
+                least = (sign * y).min(least);
                 if sign * y > most {
-                    (found, most) = (Some((k, s)), sign * y);
+                    (first, most) = (Some((k, s)), sign * y);
                 }
             });
         }
-        let (k, s) = found?;
+        let Some(first) = first else {
+            return (vec![], 0.0);
+        };
+        let level = most - SAME_EXTREMUM * (most - least);
+        let mut tops: Vec<(Reached, f64)> = vec![];
+        let mut above = false;
+        for (k, curve, part) in self.parts(window) {
+            curve.corners(part, |s, y| {
+                let y = sign * y;
+                let begins = y > level && !above;
+                above = y > level;
+                match tops.last_mut() {
+                    _ if begins => tops.push(((k, s), y)),
+                    Some(top) if above && y > top.1 => *top = ((k, s), y),
+                    _ => {}
+                }
+            });
+        }
+        let others = tops.into_iter().map(|(at, _)| at).filter(|at| *at != first);
+        let all = [first].into_iter().chain(others).collect();
+        (all, most - least)
+    }
+
+    /// Of the extreme value, or of when it is reached.
+    fn extreme_slopes(&self, sign: f64, window: (f64, f64), when: bool) -> Option<TraceSlopes> {
+        let at = self.reached(sign, window).0.first().copied()?;
+        self.extreme_slopes_at(at, window, when)
+    }
+
+    fn extreme_slopes_at(
+        &self,
+        (k, s): Reached,
+        window: (f64, f64),
+        when: bool,
+    ) -> Option<TraceSlopes> {
         let curve = &self.own()[k];
         let (low, high) = (curve.place(window.0), curve.place(window.1));
         let mut slopes = TraceSlopes::default();

@@ -1,5 +1,7 @@
 //! Derivatives of a run that is exact throughout, forward or backward along it.
 
+use std::collections::BTreeSet;
+
 use super::base::Base;
 use super::survey::Survey;
 use super::{Beside, Sensitivity, SensitivityMethod, started};
@@ -10,6 +12,7 @@ use crate::integrate::{Error, Note};
 use crate::measure::{Curves, Signals};
 use crate::mna::Perturbation;
 use crate::model::Model;
+use crate::settings::tolerances::periodic::{MOST_RIVALS, SAME_DERIVATIVE};
 use crate::settings::tolerances::times::{MOST_PERIODS, MOST_STATES};
 
 /// What measurements find in a run, and what they weigh of it.
@@ -19,6 +22,21 @@ struct Weighing {
     needed: Vec<bool>,
     weights: Vec<Option<Weights>>,
     weighted: Vec<Option<Weighted>>,
+    rivals: Vec<Rivalry>,
+}
+
+/// An extremum that is reached a second time with the same value.
+struct Rivalry {
+    /// Of which measurement.
+    of: usize,
+    /// The time that counts, and the other one, s.
+    times: (f64, f64),
+    /// What the signal spans.
+    span: f64,
+    /// What it weighs if the other one counts.
+    weighted: Weighted,
+    /// Values to which the derivative is another one there.
+    parted: Vec<String>,
 }
 
 impl Weighing {
@@ -48,8 +66,10 @@ impl Weighing {
         let of = |(needed, weights): (&bool, &Option<Weights>)| {
             Some(drawing.weighted(weights.as_ref().filter(|_| *needed)?))
         };
+        let weighted: Vec<Option<Weighted>> = needed.iter().zip(&weights).map(of).collect();
         Self {
-            weighted: needed.iter().zip(&weights).map(of).collect(),
+            rivals: rivals(drawing, &weights, &weighted),
+            weighted,
             weights,
             needed,
             found,
@@ -84,6 +104,75 @@ impl Weighing {
     }
 }
 
+/// The extrema that are reached again elsewhere: where the same piece is seen again, as in each lap of an orbit, they move together.
+fn rivals(
+    drawing: &Drawing,
+    weights: &[Option<Weights>],
+    weighted: &[Option<Weighted>],
+) -> Vec<Rivalry> {
+    let mut all = Vec::new();
+    for (of, (weights, own)) in weights.iter().zip(weighted).enumerate() {
+        let (Some(weights), Some(own)) = (weights, own) else {
+            continue;
+        };
+        let mut known = vec![own.clone()];
+        for tie in &weights.rivals {
+            let weighted = drawing.weighted(&tie.weights);
+            let again = known.iter().any(|k| k.is_like(&weighted, SAME_DERIVATIVE));
+            if again || known.len() > MOST_RIVALS {
+                continue;
+            }
+            known.push(weighted.clone());
+            all.push(Rivalry {
+                of,
+                times: tie.times,
+                span: tie.span,
+                weighted,
+                parted: vec![],
+            });
+        }
+    }
+    all
+}
+
+impl Rivalry {
+    /// Compares derivatives with the logarithm of a value.
+    fn see(&mut self, name: &str, own: f64, other: f64) {
+        let size = own.abs().max(other.abs()).max(self.span);
+        if (own - other).abs() > SAME_DERIVATIVE * size {
+            self.parted.push(name.to_owned());
+        }
+    }
+}
+
+impl Weighing {
+    /// Compares derivatives with ln p of what extrema weigh where they are reached first and elsewhere.
+    fn compare(&mut self, name: &str, own: &[Option<f64>], others: &[f64]) {
+        for (rivalry, other) in self.rivals.iter_mut().zip(others) {
+            if let Some(own) = own[rivalry.of] {
+                rivalry.see(name, own, *other);
+            }
+        }
+    }
+
+    /// Tells which derivatives are those to one side.
+    fn one_sided(&self) -> Vec<Note> {
+        let of = |k: usize| {
+            let mut parted = self.rivals.iter().filter(|r| r.of == k);
+            let all = parted.clone().flat_map(|r| &r.parted);
+            let names: BTreeSet<&str> = all.map(String::as_str).collect();
+            let (first, again) = parted.find(|r| !r.parted.is_empty())?.times;
+            let text = format!(
+                "an extremum of `{}` is reached at {first:.6e} s and, with the same value, at {again:.6e} s, where it moves otherwise with {}: there is no derivative; the number is that at {first:.6e} s, and holds to one side at most",
+                self.found[k].name,
+                names.into_iter().collect::<Vec<_>>().join(", ")
+            );
+            Some(Note::run("one-sided", text))
+        };
+        (0..self.found.len()).filter_map(of).collect()
+    }
+}
+
 impl Beside<'_> {
     /// By the variational equation; `None` where steps are made.
     pub(super) fn exact(&self, to: &[(String, f64)]) -> Result<Option<Sensitivity>, Error> {
@@ -99,7 +188,7 @@ impl Beside<'_> {
         };
         let curves = base.seen(drawing.curves());
         let asked = |name: &str| self.options.asks_for(name);
-        let weighing = Weighing::of(own.circuit(), (&drawing, &curves), asked);
+        let mut weighing = Weighing::of(own.circuit(), (&drawing, &curves), asked);
         let weighted: Vec<Weighted> = weighing.weighted.iter().flatten().cloned().collect();
         let back = match self.options.method {
             SensitivityMethod::Forward => false,
@@ -144,6 +233,8 @@ impl Beside<'_> {
             let changes = changes.with_constants(&base.trajectory, &base.forms);
             let plain = back && changes.is_plain();
             if plain && carried.is_none() {
+                let rivals = weighing.rivals.iter().map(|r| r.weighted.clone());
+                let weighted: Vec<Weighted> = weighted.iter().cloned().chain(rivals).collect();
                 carried = Some(base.back(&lines, &drawing, &weighted)?);
                 sensitivity.passes.backward = weighted.len();
             }
@@ -160,24 +251,28 @@ impl Beside<'_> {
             } else {
                 None
             };
-            let direct: Vec<Option<f64>> = match carried.as_ref().filter(|_| plain) {
-                Some(carried) => {
-                    let start = base.orbit.is_none().then(|| changes.start());
-                    let place = (&base.trajectory, &base.forms);
-                    let mut all = carried.with(place, &changes, start)?.into_iter();
-                    let all = weighing
-                        .weighted
-                        .iter()
-                        .map(|w| w.as_ref().and_then(|_| all.next()));
-                    all.collect()
-                }
-                None => {
-                    let of = |weighted: &Option<Weighted>| {
-                        Some(moved.as_ref()?.weighed(weighted.as_ref()?))
-                    };
-                    weighing.weighted.iter().map(of).collect()
-                }
-            };
+            let (direct, others): (Vec<Option<f64>>, Vec<f64>) =
+                match carried.as_ref().filter(|_| plain) {
+                    Some(carried) => {
+                        let start = base.orbit.is_none().then(|| changes.start());
+                        let place = (&base.trajectory, &base.forms);
+                        let mut all = carried.with(place, &changes, start)?.into_iter();
+                        let own = weighing.weighted.iter();
+                        let own = own.map(|w| w.as_ref().and_then(|_| all.next()));
+                        (own.collect(), all.collect())
+                    }
+                    None => {
+                        let of = |weighted: &Option<Weighted>| {
+                            Some(moved.as_ref()?.weighed(weighted.as_ref()?))
+                        };
+                        let own = weighing.weighted.iter().map(of).collect();
+                        let rivals = weighing.rivals.iter();
+                        let others =
+                            rivals.filter_map(|r| Some(moved.as_ref()?.weighed(&r.weighted)));
+                        (own, others.collect())
+                    }
+                };
+            weighing.compare(name, &direct, &others);
             let mut derivatives = weighing.chained(&direct);
             for (derivative, own) in derivatives.iter_mut().zip(&survey.own) {
                 *derivative = derivative.zip(*own).map(|(a, b)| a + b);
@@ -194,6 +289,7 @@ impl Beside<'_> {
             }
             sensitivity.at.push((name.to_owned(), value));
         }
+        sensitivity.notes.extend(weighing.one_sided());
         Ok(Some(sensitivity))
     }
 

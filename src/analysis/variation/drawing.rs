@@ -67,6 +67,16 @@ pub(crate) struct Weighted {
     pub(super) shifts: Vec<f64>,
 }
 
+impl Weighted {
+    /// Whether it weighs the same to a part of the largest weight of values.
+    pub(crate) fn is_like(&self, other: &Self, part: f64) -> bool {
+        let all = self.nodes.iter().flatten();
+        let largest = all.clone().fold(0.0, |m: f64, a| m.max(a.abs()));
+        let mut all = all.zip(other.nodes.iter().flatten());
+        all.all(|(a, b)| (a - b).abs() <= part * largest)
+    }
+}
+
 impl Lines {
     /// Of all segments.
     pub(crate) fn of(trajectory: &Trajectory, forms: &Forms) -> Self {

@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 55] = [
+pub(super) const CODES: [Explanation; 56] = [
     Explanation::of(
         "about-rest",
         "The response is that about the operating point, as laws are smooth and no switch moves.",
@@ -216,6 +216,12 @@ pub(super) const CODES: [Explanation; 55] = [
         "The second run that `--verify` asks for could not be made; the rows are those of the first.",
         "The other method does not come through the circuit.",
         "Compare with `--method theta --tol 1e-8` of your own, or verify a shorter `.tran`.",
+    ),
+    Explanation::of(
+        "one-sided",
+        "An extremum is reached at two times with the same value, and moves otherwise with a value at each: it has no derivative to that value, only one to either side.",
+        "Symmetry, such as the peaks of a three-phase rectifier with equal phases.",
+        "Measure each peak with `from=` and `to=`; the larger of their derivatives holds upwards, the smaller one downwards.",
     ),
     Explanation::of(
         "orbit-not-unique",

@@ -195,3 +195,14 @@ pub(crate) const STEPS_ANEW: f64 = 1e-3;
 /// A quantity counts in products by the root of its energy, and by this part of the largest of all at least. Larger: products are no contraction any more where the circuit is passive; smaller: what
 /// stores little is closed late.
 pub(crate) const LEAST_WEIGHT: f64 = 1e-3;
+
+/// Where an extremum is reached again to this part of what the values span, its derivatives there are looked at too. Larger: derivatives that hold are told to be one-sided; smaller: ties
+/// that rounding parts are not told.
+pub(crate) const SAME_EXTREMUM: f64 = 1e-9;
+
+/// So many other times at which an extremum is reached are looked at. Larger: runs back for each; smaller: a tie is not told where these have the derivatives of the first one.
+pub(crate) const MOST_RIVALS: usize = 6;
+
+/// Derivatives to the logarithm of a value at two times at which an extremum is reached are the same if they are to this part of the larger one, or of what the signal spans. Larger: ties are not told;
+/// smaller: rounding is.
+pub(crate) const SAME_DERIVATIVE: f64 = 1e-9;
