@@ -4,7 +4,10 @@
 use std::fmt::Write as _;
 
 use circ::Model;
-use circ::analysis::{PeriodicOptions, orbit_start, periodic, periodic_measured, periodic_table};
+use circ::analysis::{
+    PeriodicOptions, SensitivityOptions, SmallSignalOptions, orbit_start, periodic,
+    periodic_measured, periodic_table, sensitivity, small_signal,
+};
 use circ::circuit::ElaborateOptions;
 use circ::integrate::{Orbit, Reason, Run, SimOptions, Standing};
 use circ::settings::Settings;
@@ -350,5 +353,30 @@ fn orbits_of_files_are_those_of_a_tighter_tolerance() {
                 "{path}: {apart:e} of {size:e}, {stated:e}"
             );
         }
+    }
+}
+
+/// What needs the derivative of an orbit has dense matrices, which are too large beyond some size.
+#[test]
+fn a_response_about_the_orbit_of_too_many_elements_is_refused_at_once() {
+    let stage = |k: usize| format!("r{k} n{} n{k} 1\nc{k} n{k} 0 10n\n", k - 1);
+    let stages: String = (1..=1300).map(stage).collect();
+    let text = format!(
+        "ladder behind a rectifier\nv1 in 0 dc 0 ac 1 sin(0 10 1k)\nd1 in n0 ideal\n.model ideal d(n=0.001)\nr0 n0 0 1k\n{stages}.tran 1u 10m\n.ac list 100\n.meas tran m avg v(n9)\n.end\n"
+    );
+    let model = Model::parse(&text, "t.cir").expect("a circuit");
+    let response = small_signal(&model, &SmallSignalOptions::default());
+    let options = SensitivityOptions {
+        steady: true,
+        ..SensitivityOptions::default()
+    };
+    let derivatives = sensitivity(&model, &options);
+    let errors = [response.err(), derivatives.err()];
+    for error in errors {
+        let error = error.expect("a refusal").to_string();
+        assert!(
+            error.contains("1200 capacitors, inductors and ideal pairs at most"),
+            "{error}"
+        );
     }
 }

@@ -18,7 +18,7 @@ use crate::mna::{StaticMultiport, behaviour};
 use crate::model::Model;
 use crate::settings::Settings;
 use crate::settings::tolerances::periodic::{
-    CLOSED, FINER, LONGEST_SEARCH, PARTS_OF_PERIOD, PERIOD_OFF, TABLE_STEPS,
+    CLOSED, FINER, LONGEST_SEARCH, MOST_LINEARISED, PARTS_OF_PERIOD, PERIOD_OFF, TABLE_STEPS,
 };
 
 use rows::{notes, rows, state_error};
@@ -346,7 +346,16 @@ fn asked(model: &Model, options: &PeriodicOptions<'_>) -> Result<Asked, Error> {
 /// # Errors
 /// As [`periodic`].
 pub(super) fn steady(model: &Model, options: &PeriodicOptions<'_>) -> Result<Steady, Error> {
-    whole(asked(model, options)?, options)
+    let asked = asked(model, options)?;
+    let size = asked.multiport.storage.len() + asked.multiport.standard().pairs.len();
+    if size > MOST_LINEARISED {
+        let text = format!(
+            "what follows from the derivative of an orbit is found with dense matrices, of {MOST_LINEARISED} capacitors, inductors and ideal pairs at most, and the circuit has {size}: \
+             leave out or join what the answer does not depend on, or compare runs of `circ pss` with values a little aside"
+        );
+        return Err(Error::before(Reason::Unsupported(text)));
+    }
+    whole(asked, options)
 }
 
 fn whole(asked: Asked, options: &PeriodicOptions<'_>) -> Result<Steady, Error> {

@@ -206,3 +206,7 @@ pub(crate) const MOST_RIVALS: usize = 6;
 /// Derivatives to the logarithm of a value at two times at which an extremum is reached are the same if they are to this part of the larger one, or of what the signal spans. Larger: ties are not told;
 /// smaller: rounding is.
 pub(crate) const SAME_DERIVATIVE: f64 = 1e-9;
+
+/// Capacitors, inductors and ideal pairs up to which an orbit is made linear, for small signals and derivatives: dense matrices in some minutes. Larger: commands that take hours
+/// instead of an error; smaller: errors for circuits that they master.
+pub(crate) const MOST_LINEARISED: usize = 1200;
