@@ -324,7 +324,7 @@ impl Beside<'_> {
                 gradient.to.push((name.clone(), derivative));
             }
         }
-        let text = "the derivatives are differences of runs with values 1 and 2 % aside, as the run is not exact throughout or signals have impulses";
+        let text = "the derivatives are differences of runs with values 1 and 2 % aside, as the run is not exact throughout, or too long for all that is between its events to be kept, or signals have impulses";
         Ok(Sensitivity {
             of: gradients,
             at: to.to_vec(),
