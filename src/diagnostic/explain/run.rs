@@ -221,7 +221,7 @@ pub(super) const CODES: [Explanation; 56] = [
         "one-sided",
         "An extremum is reached at two times with the same value, and moves otherwise with a value at each: it has no derivative to that value, only one to either side.",
         "Symmetry, such as the peaks of a three-phase rectifier with equal phases.",
-        "Measure each peak with `from=` and `to=`; the larger of their derivatives holds upwards, the smaller one downwards.",
+        "Measure each peak with `from=` and `to=`; of a maximum the larger of their derivatives holds upwards and the smaller one downwards, of a minimum the other way round.",
     ),
     Explanation::of(
         "orbit-not-unique",
