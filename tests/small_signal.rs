@@ -467,3 +467,13 @@ fn curved_laws_respond_as_in_ngspice() {
         assert_eq!(count, response.phasors.frequency.len() * signals.len());
     }
 }
+
+/// About an orbit in steps too, where no source can be moved to confirm it.
+#[test]
+fn an_amplitude_of_zero_has_no_response() {
+    let text = "buck\nvin in 0 dc 12 ac 0\ns1 in sw g 0 m\nd1 0 sw d\nl1 sw out 22u\nc1 out 0 100u\nrload out 0 3\nvg g 0 pulse(0 5 0 20n 20n 3u 10u)\n\
+                .model m sw(vt=2.5 ron=20m roff=1meg)\n.model d d(is=1e-9 n=1.05 rs=10m)\n.save v(out)\n.ac list 1k\n.end\n";
+    let model = Model::parse(text, "t.cir").expect("a circuit");
+    let found = small_signal(&model, &SmallSignalOptions::default()).expect("a response");
+    assert!(found.phasors.values.iter().all(|v| v.norm() == 0.0));
+}

@@ -10,6 +10,9 @@ use crate::settings::tolerances::periodic::{
     LEAST_SHIFTED, SHIFTED, SHIFTED_OTHERWISE, SHIFTED_SOURCES, STATIC, TOO_SLOW,
 };
 
+/// Instants of a period at which the largest source is looked for.
+const INSTANTS: u16 = 16;
+
 /// By how much orbits beside this one move its state otherwise than its variational equation says, relative to that. `None` where that is not
 /// known: nothing drives the orbit, a multiplier is 1 but for [`TOO_SLOW`], sources hardly move the state, or there is no orbit beside.
 ///
@@ -34,10 +37,13 @@ pub(super) fn confirmed(
         let parts = state.iter().zip(&sizes);
         parts.fold(0.0_f64, |m, (v, size)| m.max(v.abs() / size))
     };
-    let values = inputs.iter().map(|input| input.source.value(0.0).abs());
+    let times =
+        (0..INSTANTS).map(|k| found.from() + orbit.period * f64::from(k) / f64::from(INSTANTS));
+    let values = times.flat_map(|t| inputs.iter().map(move |input| input.source.value(t).abs()));
     let sources = SHIFTED_SOURCES * values.fold(0.0, f64::max) / drive.camax();
     let by = sources.min(SHIFTED / size(&own));
-    if by * size(&own) < LEAST_SHIFTED {
+    let moves = by * size(&own);
+    if moves.is_nan() || moves < LEAST_SHIFTED {
         return Ok(None);
     }
     let beside = |by: f64| {
