@@ -417,40 +417,47 @@ fn simulation(
     part: f64,
     options: &PeriodicOptions<'_>,
 ) -> Result<Simulation, Error> {
-    let tran = circuit.tran;
-    let span = period.or(tran.map(|t| t.tstop)).unwrap_or(1.0);
-    let mut circuit = Circuit {
-        tran: Some(Tran {
-            tstep: span / TABLE_STEPS,
-            prints: true,
-            tstop: span * LONGEST_SEARCH,
-            tstart: 0.0,
-            tmax: tran.and_then(|t| t.tmax),
-            uic: tran.is_some_and(|t| t.uic),
-        }),
-        ..circuit.clone()
+    let span = period.or(circuit.tran.map(|t| t.tstop)).unwrap_or(1.0);
+    let of = |step: Option<f64>| {
+        from_rest(searching(circuit.tran, span, LONGEST_SEARCH), |tran| {
+            let circuit = Circuit {
+                tran: Some(tran),
+                ..circuit.clone()
+            };
+            let options = SimulationOptions {
+                step,
+                settings: options.settings.clone(),
+                ..SimulationOptions::default()
+            };
+            Simulation::closed(&circuit, multiport, options)
+        })
     };
-    let of = |circuit: &Circuit, step: Option<f64>| {
-        let options = SimulationOptions {
-            step,
-            settings: options.settings.clone(),
-            ..SimulationOptions::default()
-        };
-        Simulation::closed(circuit, multiport, options)
-    };
-    let simulation = match of(&circuit, None) {
-        Err(error) if has_no_rest(&error) => {
-            // The orbit does not depend on where the search for it starts.
-            circuit.tran = circuit.tran.map(|tran| Tran { uic: true, ..tran });
-            of(&circuit, None)?
-        }
-        simulation => simulation?,
-    };
+    let simulation = of(None)?;
     if simulation.is_exact() {
         return Ok(simulation);
     }
     // Steps that an error control chooses differ from return to return, and with them what they return to.
-    of(&circuit, Some(part * span / PARTS_OF_PERIOD))
+    of(Some(part * span / PARTS_OF_PERIOD))
+}
+
+/// What is asked of runs that look for an orbit, in place of what the circuit asks for itself: they may take `most` spans, s.
+fn searching(own: Option<Tran>, span: f64, most: f64) -> Tran {
+    Tran {
+        tstep: span / TABLE_STEPS,
+        prints: true,
+        tstop: span * most,
+        tstart: 0.0,
+        tmax: own.and_then(|tran| tran.tmax),
+        uic: own.is_some_and(|tran| tran.uic),
+    }
+}
+
+/// What is made from the operating point, or without one where there is none: the orbit does not depend on where the search for it starts.
+fn from_rest<T>(tran: Tran, make: impl Fn(Tran) -> Result<T, Error>) -> Result<T, Error> {
+    match make(tran) {
+        Err(error) if has_no_rest(&error) => make(Tran { uic: true, ..tran }),
+        made => made,
+    }
 }
 
 /// Whether a simulation did not start for want of an operating point.

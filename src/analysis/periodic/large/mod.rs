@@ -3,14 +3,14 @@
 mod newton;
 
 use super::shooting::Stand;
-use super::{Asked, PeriodicOptions, has_no_rest, none, rows};
+use super::{Asked, PeriodicOptions, from_rest, none, rows, searching};
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{Error, Note, Orbit, OrbitKind, Reason, Returns, Run, Standing};
 use crate::linalg::krylov::Ritz;
 use crate::mna::StaticMultiport;
 use crate::settings::Settings;
 use crate::settings::tolerances::periodic::{
-    FINER_ORBIT, FINEST_ORBIT, NEUTRAL, ROUNDING_OF_RETURN, STEPPED_CLOSED, TABLE_STEPS, TAKES_PART,
+    FINER_ORBIT, FINEST_ORBIT, NEUTRAL, ROUNDING_OF_RETURN, STEPPED_CLOSED, TAKES_PART,
 };
 use newton::{Shooting, Shot};
 
@@ -145,21 +145,9 @@ impl Large {
 
 /// The circuit as one that goes through its period again and again.
 fn returns(asked: &Asked, period: f64, settings: &Settings) -> Result<Option<Returns>, Error> {
-    let tran = asked.circuit.tran;
-    let tran = Tran {
-        tstep: period / TABLE_STEPS,
-        prints: true,
-        tstop: period,
-        tstart: 0.0,
-        tmax: tran.and_then(|t| t.tmax),
-        uic: tran.is_some_and(|t| t.uic),
-    };
-    let of = |tran: &Tran| Returns::of(&asked.circuit, &asked.multiport, tran, settings);
-    match of(&tran) {
-        // The orbit does not depend on where the search for it starts.
-        Err(error) if has_no_rest(&error) => of(&Tran { uic: true, ..tran }),
-        made => made,
-    }
+    from_rest(searching(asked.circuit.tran, period, 1.0), |tran| {
+        Returns::of(&asked.circuit, &asked.multiport, &tran, settings)
+    })
 }
 
 /// Finds the orbit: some returns of transient, then corrections, and more of both where these do not close it.
