@@ -208,6 +208,23 @@ fn sources_that_are_set_stay_so_in_every_position_of_the_switches() {
     }
 }
 
+/// A source is set before a switch is taken over, where 1 µΩ between two capacitors makes a state of a picosecond that stands apart: five time
+/// constants of 2 ms later the other one is at 1 − e⁻⁵ of what was set, and 1 MΩ beside 1 kΩ takes a thousandth.
+#[test]
+fn sources_that_are_set_stay_so_where_fast_states_stand_apart() {
+    let cards = "v1 in 0 5\nr1 in a 1k\nc1 a 0 1u\nr2 a b 1u\nc2 b 0 1u\ns1 b x g 0 sw\nr3 x 0 1meg\nvg g 0 0\n\
+        .model sw sw(vt=0.5 vh=0 ron=1 roff=1g)\n.tran 10u 10m uic\n";
+    let mut driven = simulation(cards, SimulationOptions::default());
+    driven.set_source("v1", 10.0).unwrap();
+    driven.set_switch("s1", true).unwrap();
+    driven.advance_to(10e-3).unwrap();
+    let out = driven.value("v(b)").unwrap();
+    assert!(
+        (out - 10.0 * (1.0 - (-5.0_f64).exp())).abs() < 2e-2,
+        "{out}"
+    );
+}
+
 #[test]
 fn a_switch_that_is_set_moves_like_one_that_is_controlled() {
     let run = whole(BUCK, Method::Auto);

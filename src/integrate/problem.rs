@@ -275,6 +275,7 @@ impl Problem {
                 .sharing(&self.systems.reduced)
                 .knowing(&self.start.switches, lcs),
             position: self.start.switches.clone(),
+            inputs: lcs.inputs.iter().map(|i| i.source.clone()).collect(),
             t: self.start.t,
             until: tran.tstop,
             start: self.start.storage.clone(),

@@ -19,6 +19,7 @@ use super::sources::Sources;
 use super::storage::Storage;
 use super::transition::{Memory, PATIENCE, Transition};
 use super::travel::{Arrival, Travel};
+use crate::circuit::Source;
 use crate::integrate::error::{Error, Reason};
 use crate::integrate::grid::Times;
 use crate::integrate::log::Log;
@@ -42,6 +43,8 @@ pub struct Setup {
     pub assembler: Assembler,
     /// Positions of the switches at the start.
     pub position: Vec<bool>,
+    /// The waveforms of its inputs.
+    pub inputs: Vec<Source>,
     /// Start, s.
     pub t: f64,
     /// End, s.
@@ -96,6 +99,7 @@ impl Exact {
         let Setup {
             assembler,
             position,
+            inputs,
             t,
             until,
             start,
@@ -112,8 +116,7 @@ impl Exact {
         };
         let controls = table.controls();
         let lcs = &table.free(&key)?.lcs;
-        let all = lcs.inputs.iter().map(|i| i.source.clone()).collect();
-        let mut sources = Sources::new(all, controls, (t, until), free)?;
+        let mut sources = Sources::new(inputs, controls, (t, until), free)?;
         let storage = Storage::new(lcs, start.as_slice(), energy);
         let row = vec![0.0; lcs.outputs.names.len()];
         let row_is_volts = lcs.outputs.units.iter().map(|u| *u == "V").collect();

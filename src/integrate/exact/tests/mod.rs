@@ -51,6 +51,7 @@ pub(in crate::integrate) fn prepare_circuit(circuit: &Circuit, energy: bool) -> 
     let exact = Exact::new(Setup {
         assembler: Assembler::new(Arc::new(behaviour)),
         position,
+        inputs: lcs.inputs.iter().map(|i| i.source.clone()).collect(),
         t: 0.0,
         until: tran.tstop,
         start: DVector::from_column_slice(lcs.storage.initial.as_slice()),
