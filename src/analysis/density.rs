@@ -87,18 +87,40 @@ impl Spikes {
         self.tells_left = !block.kinds.is_empty();
         self.sustained.resize(columns, 0.0);
         self.largest.resize(columns, (0.0, [0.0; 2]));
+        let kept = self.before.take();
+        let mut before = kept.as_ref().map(|(t, values)| (*t, values.as_slice()));
         for (t, values, _) in block.rows() {
-            let (at, before) = self.before.get_or_insert_with(|| (t, values.to_vec()));
-            if t - *at > self.instant {
-                for (j, (was, is)) in before.iter().zip(values).enumerate() {
-                    self.sustained[j] = self.sustained[j].max(was.abs().min(is.abs()));
-                    if was.abs() > SPIKE * is.abs() && was.abs() > self.largest[j].0.abs() {
-                        self.largest[j] = (*was, [*at, t]);
-                    }
+            if let Some((at, was)) = before
+                && t - at > self.instant
+            {
+                self.compare((at, was), (t, values));
+            }
+            before = Some((t, values));
+        }
+        self.before = before.map(|(t, values)| (t, values.to_vec()));
+    }
+
+    /// Looks at two rows in a row. Few values fall: they are looked for where any does.
+    fn compare(&mut self, (at, before): (f64, &[f64]), (t, values): (f64, &[f64])) {
+        let mut falls = false;
+        let both = before.iter().zip(values);
+        for ((was, is), sustained) in both.zip(&mut self.sustained) {
+            let (was, is) = (was.abs(), is.abs());
+            let lower = if was < is { was } else { is };
+            *sustained = if lower > *sustained {
+                lower
+            } else {
+                *sustained
+            };
+            falls |= was > SPIKE * is;
+        }
+        if falls {
+            let both = before.iter().zip(values);
+            for ((was, is), largest) in both.zip(&mut self.largest) {
+                if was.abs() > SPIKE * is.abs() && was.abs() > largest.0.abs() {
+                    *largest = (*was, [at, t]);
                 }
             }
-            *at = t;
-            before.copy_from_slice(values);
         }
     }
 
