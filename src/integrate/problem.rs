@@ -79,6 +79,7 @@ impl Systems {
         let position = Position::free(&self.multiport, switches.to_vec());
         let lcs = reduce(&self.multiport, &position).map_err(|e| Error::before(e.into()))?;
         let adapted = known.adapted(&lcs);
+        self.reduced.keep(position, &lcs);
         known.systems.push((switches.to_vec(), lcs));
         Ok(adapted)
     }

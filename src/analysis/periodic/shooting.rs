@@ -15,7 +15,7 @@ use crate::analysis::variation::{System, Trajectory};
 use crate::integrate::exact::Passage;
 use crate::integrate::{Change, Error, Reason, Simulation};
 use crate::settings::tolerances::periodic::{
-    DIFFERENCE, EVENT_AGAIN, LEAST_AMPLITUDE, NEUTRAL, REUSED, ROUNDING_OF_RETURN,
+    AT_ROUNDING, DIFFERENCE, EVENT_AGAIN, LEAST_AMPLITUDE, NEUTRAL, REUSED, ROUNDING_OF_RETURN,
     STEPPED_DIFFERENCE, TAKES_PART,
 };
 
@@ -26,7 +26,7 @@ const MOST_CORRECTIONS: u32 = 24;
 const HALVINGS: u32 = 8;
 
 /// Points of a return at which amplitudes are read.
-const SAMPLES: u32 = 32;
+const SAMPLES: u32 = 16;
 
 /// Events after which a return is given up.
 const MOST_EVENTS: u32 = 100_000;
@@ -314,9 +314,9 @@ impl Shooting<'_> {
         }
         let mut closing = self.close(&stand)?;
         let mut derivative = self.derivative(&stand, &closing)?;
-        let mut made_at = closing.size();
+        let (mut made_at, mut course) = (closing.size(), closing.passages.take());
         let mut corrections = 0;
-        while corrections < MOST_CORRECTIONS && closing.size() > f64::EPSILON {
+        while corrections < MOST_CORRECTIONS && closing.size() > AT_ROUNDING {
             corrections += 1;
             let before = closing.size();
             match self.corrected(&stand, &closing.residual, &derivative) {
@@ -328,14 +328,14 @@ impl Shooting<'_> {
             let slow = closing.size() > REUSED * before && closing.size() > closed;
             if slow || made_at == f64::INFINITY {
                 derivative = self.derivative(&stand, &closing)?;
-                made_at = closing.size();
+                (made_at, course) = (closing.size(), closing.passages.take());
             }
         }
         self.corrections += corrections;
         if closing.size() > closed || closing.after.switches != stand.switches {
             return Ok(None);
         }
-        if made_at > NEUTRAL {
+        if made_at > NEUTRAL && !same_derivative(&course, &closing.passages) {
             derivative = self.derivative(&stand, &closing)?;
         }
         Ok(Some(Fixed {
@@ -392,6 +392,17 @@ impl Shooting<'_> {
         }
         None
     }
+}
+
+/// Whether returns through these changes of mode have one derivative: sources alone make both, at the same times, and nothing jumps.
+fn same_derivative(one: &Option<Vec<Passage>>, other: &Option<Vec<Passage>>) -> bool {
+    let (Some(one), Some(other)) = (one, other) else {
+        return false;
+    };
+    let same = |(a, b): (&Passage, &Passage)| {
+        a.t == b.t && (&a.from, &a.to) == (&b.from, &b.to) && a.is_clocked() && b.is_clocked()
+    };
+    one.len() == other.len() && one.iter().zip(other).all(same)
 }
 
 /// Eigenvalues of M, the largest first; `None` where they are not found.

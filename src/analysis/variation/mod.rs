@@ -358,6 +358,9 @@ impl Maker {
     ) -> Result<Saltation, Error> {
         let (first, last) = (&instant[0], &instant[instant.len() - 1]);
         let t = first.t;
+        if !self.by_chance && first.before == last.after && instant.iter().all(Passage::is_corner) {
+            return Ok(Saltation::none(t, &self.systems[from]));
+        }
         let through = self.through(instant, to)?;
         let inputs = &self.systems[from].lcs.inputs;
         let limits = [

@@ -56,7 +56,7 @@ impl Reduced {
     }
 
     /// Takes in a system, unless some of its states stand apart.
-    fn keep(&self, position: Position, lcs: &Lcs) {
+    pub(crate) fn keep(&self, position: Position, lcs: &Lcs) {
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let held: usize = known.iter().map(|(_, lcs)| lcs.bytes()).sum();
         if lcs.fast.is_empty() && held + lcs.bytes() <= MOST_SHARED {

@@ -1,6 +1,7 @@
 //! A change of mode, as the derivative of the flow needs it.
 
 use super::key::{Key, Owner};
+use crate::settings::tolerances::jumps::FOLLOWS_JUMP;
 
 /// From one mode to the next at one instant. Changes of mode at equal times follow each other; a corner of a source leads from a mode to
 /// itself.
@@ -18,4 +19,25 @@ pub(crate) struct Passage {
     pub(crate) before: Vec<f64>,
     /// The same after.
     pub(crate) after: Vec<f64>,
+}
+
+impl Passage {
+    /// Whether it is a corner of a source, at which the mode stays.
+    pub(crate) fn is_corner(&self) -> bool {
+        self.cause.is_none() && self.from.as_ref() == Some(&self.to)
+    }
+
+    /// How far the storage jumps, as a part of its largest value.
+    fn jump(&self) -> f64 {
+        let both = self.before.iter().zip(&self.after);
+        let (apart, size) = both.fold((0.0_f64, 0.0_f64), |(apart, size), (a, b)| {
+            (apart.max((a - b).abs()), size.max(a.abs()).max(b.abs()))
+        });
+        if apart > 0.0 { apart / size } else { 0.0 }
+    }
+
+    /// Whether sources alone make it, and the storage does not jump.
+    pub(crate) fn is_clocked(&self) -> bool {
+        self.cause.is_none() && self.jump() <= FOLLOWS_JUMP
+    }
 }

@@ -24,6 +24,10 @@ pub(crate) const REUSED: f64 = 1e-2;
 /// orbits a little further from closed; smaller: ways around in vain.
 pub(crate) const ROUNDING_OF_RETURN: f64 = 1e-13;
 
+/// A residual below this part of the amplitudes is rounding of the way around, and none that is worth a correction. Larger: digits of orbits whose
+/// multipliers are near 1; smaller: ways around in vain.
+pub(crate) const AT_ROUNDING: f64 = 16.0 * f64::EPSILON;
+
 /// A multiplier within this of 1 is 1, and beyond 1 by this one is unstable: what differences leave of it. Larger: slow drifts pass for
 /// families of orbits; smaller: rounding makes orbits unstable.
 pub(crate) const NEUTRAL: f64 = 1e-6;
