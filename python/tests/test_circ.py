@@ -239,6 +239,20 @@ def test_sweeps_are_datasets_with_failures_as_entries():
         circ.sweep(m, {"r1": [3.0]}, measures=["vout"], engine="cloud")
 
 
+@pytest.mark.skipif(not os.path.exists("/proc/self/task") or len(os.sched_getaffinity(0)) < 2, reason="counts the threads of Linux that worked")
+def test_sweeps_use_more_than_one_thread():
+    pytest.importorskip("xarray")
+
+    def worked():
+        """By thread: its time in the user's code, in ticks of 10 ms."""
+        return {task: int(open(f"/proc/self/task/{task}/stat").read().rpartition(")")[2].split()[11]) for task in os.listdir("/proc/self/task")}
+
+    before = worked()
+    circ.sweep(circ.parse(BUCK), {"r1": np.linspace(3, 6, 1000)}, measures=["vout"])
+    long = [task for task, ticks in worked().items() if ticks > before.get(task, 0) + 5]
+    assert len([task for task in long if int(task) != os.getpid()]) >= 2
+
+
 def test_samples_depend_on_seed_and_number_alone():
     pytest.importorskip("xarray")
     m = circ.parse(FILTER)
