@@ -324,8 +324,10 @@ impl Maker {
 
     /// Guards of devices that are zero in a mode and stay so: a change of a value may move them off to one side alone.
     fn resting(&self, system: &System, t: f64, x: &DVector<f64>) -> Vec<Resting> {
-        let inputs = Inputs::before(&system.lcs.inputs, t, self.same);
-        let Some(inputs) = inputs.filter(|_| self.by_chance) else {
+        if !self.by_chance {
+            return Vec::new();
+        }
+        let Some(inputs) = Inputs::before(&system.lcs.inputs, t, self.same) else {
             return Vec::new();
         };
         let rate = system.rate(x, &inputs.u);
