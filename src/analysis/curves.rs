@@ -27,14 +27,11 @@ pub(super) fn transient_curves(
 ) -> Result<Option<Curves>, Error> {
     let circuit = model.circuit();
     let own_steps = options.step.is_some() || options.theta.is_some() || options.gamma.is_some();
-    let Some(tran) = circuit
-        .tran
-        .filter(|tran| !own_steps && !is_large(model, tran))
-    else {
+    let measured = &circuit.measured;
+    let Some(tran) = circuit.tran.filter(|_| !own_steps && !measured.is_empty()) else {
         return Ok(None);
     };
-    let measured = &circuit.measured;
-    if measured.is_empty() {
+    if is_large(model, &tran) {
         return Ok(None);
     }
     let probing = model.with_circuit(Circuit {
@@ -44,7 +41,9 @@ pub(super) fn transient_curves(
     })?;
     let asked = (options.cancel, &options.settings);
     let start = options.start.as_ref();
-    let Some(course) = course(&probing, options.method, start, tran.tstop, asked)? else {
+    let first = circuit.measured_from(&tran).max(tran.tstart);
+    let span = (first, tran.tstop);
+    let Some(course) = course(&probing, options.method, start, span, asked)? else {
         return Ok(None);
     };
     let outputs: Vec<usize> = (0..measured.len()).collect();
@@ -52,8 +51,7 @@ pub(super) fn transient_curves(
     let mut stretches = course.stretches.iter().rev();
     let last = stretches.find(|stretch| stretch.from < stretch.to);
     let last = last.map_or(tran.tstart, |stretch| stretch.from);
-    let from = circuit.measured_from(&tran).min(last).max(tran.tstart);
-    curves(&course, &outputs, from)
+    curves(&course, &outputs, first.min(last).max(tran.tstart))
 }
 
 /// What the measurements of an orbit see, repeated until the end of `.tran`, and a note where that is not all of it.
@@ -101,10 +99,10 @@ pub(crate) fn shortest_period(model: &Model) -> f64 {
     periods.fold(f64::INFINITY, f64::min)
 }
 
-/// Whether rows cost less than the exponentials of every mode and all changes of mode.
+/// Whether rows cost less than the exponentials of every mode and all changes of mode that measurements see.
 pub(super) fn is_large(model: &Model, tran: &Tran) -> bool {
-    model.multiport().storage.len() > MOST_STATES
-        || tran.tstop / shortest_period(model) > MOST_PERIODS
+    let seconds = tran.tstop - model.circuit().measured_from(tran);
+    model.multiport().storage.len() > MOST_STATES || seconds / shortest_period(model) > MOST_PERIODS
 }
 
 /// Pieces of these outputs from a time on; `None` where they are too many. Few exponentials of a mode are needed whatever happens in it.

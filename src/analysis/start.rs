@@ -8,6 +8,7 @@ use crate::circuit::SteadyState;
 use crate::integrate::{Error, Method, Note, Reason, Simulation, SimulationOptions, Standing};
 use crate::model::Model;
 use crate::settings::Settings;
+use crate::settings::tolerances::times::LEAD;
 
 /// Where a transient begins: where it is `given`, else on the orbit that `.tran … steady` asks for, else (`None`) at its initial conditions or
 /// operating point. A note tells of the card; an orbit that is not found is no error.
@@ -40,7 +41,8 @@ pub(super) fn beginning(
     }
 }
 
-/// The transient of a model until a time, s, from where it begins; `None` where steps are made in it, or another method is asked for.
+/// The transient of a model from a little before a time on, or from where it begins, until another, s; `None` where steps are made before that, or another
+/// method is asked for.
 ///
 /// # Errors
 /// The simulation's.
@@ -48,7 +50,7 @@ pub(super) fn course(
     model: &Model,
     method: Method,
     start: Option<&Standing>,
-    until: f64,
+    (from, until): (f64, f64),
     (cancel, settings): (Option<&AtomicBool>, &Settings),
 ) -> Result<Option<Course>, Error> {
     if !matches!(method, Method::Auto | Method::Exact) {
@@ -63,9 +65,51 @@ pub(super) fn course(
     if !simulation.is_exact() {
         return Ok(None);
     }
-    let (t, state, switches) = match start {
+    let (mut t, mut state, mut switches) = match start {
         Some(start) => (start.t, start.state.clone(), start.switches.clone()),
         None => (0.0, simulation.state(), simulation.positions()),
     };
+    let begin = from - LEAD * until;
+    if begin > t {
+        if !simulation.pass((t, &state, &switches), begin, cancel)? {
+            return Ok(None);
+        }
+        (t, state, switches) = (begin, simulation.state(), simulation.positions());
+    }
     Course::of(&mut simulation, (t, &state, &switches), until, cancel)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A buck converter whose current is interrupted: edges, and diodes that turn off on their own.
+    #[test]
+    fn a_course_that_begins_late_is_the_end_of_the_whole_one() {
+        let text = "buck\nvin in 0 24\ns1 in sw g 0 sw\nd1 0 sw d\nl1 sw out 47u\nc1 out 0 22u\nr1 out 0 50\n\
+            vg g 0 pulse(0 1 3.3u 10n 10n 2u 10u)\n.model sw sw(vt=0.5 ron=10m roff=10meg)\n.model d d(ideal)\n.tran 1u 1m uic\n.end\n";
+        let model = Model::parse(text, "buck.cir").expect("a circuit");
+        let settings = Settings::default();
+        let over = |from| {
+            let found = course(&model, Method::Auto, None, (from, 1e-3), (None, &settings));
+            found.expect("a run").expect("an exact one")
+        };
+        let (whole, late) = (over(0.0), over(0.9e-3));
+        let count = late.stretches.len();
+        assert!(7 * count < whole.stretches.len(), "{count}");
+        // The first one begins on the way.
+        let both = whole
+            .stretches
+            .iter()
+            .rev()
+            .zip(late.stretches.iter().rev());
+        for (one, other) in both.take(count - 1) {
+            assert!((one.from - other.from).abs() < 1e-15 && (one.to - other.to).abs() < 1e-15);
+            assert!((&one.start - &other.start).amax() < 1e-12 * one.start.amax());
+            assert_eq!(
+                whole.systems[one.system].key,
+                late.systems[other.system].key
+            );
+        }
+    }
 }

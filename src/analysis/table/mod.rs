@@ -243,7 +243,8 @@ pub fn table(model: &Model, options: &TableOptions<'_>) -> Result<Table, Error> 
         to: tran.tstop,
     };
     let period = common_period(model.circuit()).filter(|period| *period <= span.to - span.from);
-    if let Some(course) = course(&probing, options.method, start.as_ref(), tran.tstop, asked)? {
+    let whole = (span.from, span.to);
+    if let Some(course) = course(&probing, options.method, start.as_ref(), whole, asked)? {
         return columns.exact(&course, span, (period, false));
     }
     let rows = |tran: Tran| {

@@ -39,6 +39,21 @@ impl Simulation {
         Ok(passages.filter(whole))
     }
 
+    /// Goes from a place, as for [`Self::stand_at`], to time `until`, s: whether the way is exact throughout. It ends when `cancel` is set.
+    ///
+    /// # Errors
+    /// As [`Self::advance_to`].
+    pub(crate) fn pass(
+        &mut self,
+        (t, state, switches): (f64, &[f64], &[bool]),
+        until: f64,
+        cancel: Option<&AtomicBool>,
+    ) -> Result<bool, Error> {
+        self.stand_at(t, state, switches)?;
+        self.advance(until, false, cancel)?;
+        Ok(self.is_exact() && !self.way.stepper().has_stepped())
+    }
+
     /// Where a run in steps stands; `None` of one that is exact.
     ///
     /// # Errors

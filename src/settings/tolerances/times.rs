@@ -43,6 +43,10 @@ pub(crate) const ROWS_CLOSE: f64 = 1e-3;
 /// Larger: measurements that take longer than the run; smaller: more measurements on straight lines.
 pub(crate) const MOST_STATES: usize = 12;
 
+/// Changes of mode are kept from this part of a run before what is measured on. It is no simple fraction: none is to happen just there.
+/// Larger: memory and time; smaller: none that is measured.
+pub(crate) const LEAD: f64 = 6.18e-3;
+
 /// Periods of the fastest source up to which they do: a kilobyte each for its changes of mode. Larger: more memory; smaller: long runs are measured on rows.
 pub(crate) const MOST_PERIODS: f64 = 1e5;
 
