@@ -231,8 +231,8 @@ impl Handover {
     }
 
     /// See [`Exact::keep_passages`].
-    pub(crate) fn keep_passages(&mut self) {
-        self.exact.keep_passages();
+    pub(crate) fn keep_passages(&mut self, all: bool) {
+        self.exact.keep_passages(all);
     }
 
     /// The changes of mode since [`Self::keep_passages`], and where the run stood when it was exact throughout; `None` where there are too many or steps were made

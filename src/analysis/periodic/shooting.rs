@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::analysis::variation::{System, Trajectory};
 use crate::integrate::exact::Passage;
-use crate::integrate::{Change, Error, Reason, Simulation};
+use crate::integrate::{Change, Corners, Error, Reason, Simulation};
 use crate::settings::tolerances::periodic::{
     AT_ROUNDING, DIFFERENCE, EVENT_AGAIN, LEAST_AMPLITUDE, NEUTRAL, REUSED, ROUNDING_OF_RETURN,
     STEPPED_DIFFERENCE, TAKES_PART,
@@ -204,7 +204,9 @@ impl Shooting<'_> {
                 let seconds = period * self.order as f64;
                 let place = (self.from, &stand.state[..], &stand.switches[..]);
                 let until = self.from + seconds;
-                let passages = self.simulation.passages(place, until, None)?;
+                let passages = self
+                    .simulation
+                    .passages(place, until, Corners::Seen, None)?;
                 (Stand::of(self.simulation), seconds, passages)
             }
             _ => {

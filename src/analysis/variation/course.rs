@@ -8,7 +8,7 @@ use super::instant::Inputs;
 use super::{System, not_smooth, shaped};
 use crate::circuit::source::Piece;
 use crate::integrate::exact::{Assembler, Key, Passage};
-use crate::integrate::{Error, Impulse, Reason, Simulation};
+use crate::integrate::{Corners, Error, Impulse, Reason, Simulation};
 use crate::lcs::Hold;
 use crate::settings::tolerances::times::SAME_TIME;
 
@@ -59,7 +59,7 @@ impl Course {
         cancel: Option<&AtomicBool>,
     ) -> Result<Option<Self>, Error> {
         let (from, told) = (place.0, simulation.impulses().len());
-        let Some(passages) = simulation.passages(place, until, cancel)? else {
+        let Some(passages) = simulation.passages(place, until, Corners::Seen, cancel)? else {
             return Ok(None);
         };
         let mut course = Self::default();

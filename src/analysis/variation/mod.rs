@@ -33,7 +33,7 @@ use nalgebra::{DMatrix, DVector, RowDVector};
 
 use crate::integrate::exact::{Assembler, Key, Owner, Passage};
 use crate::integrate::switching::Threshold;
-use crate::integrate::{Error, Reason, Simulation};
+use crate::integrate::{Corners, Error, Reason, Simulation};
 use crate::settings::tolerances::events::{AT_LEVEL, GRAZING, SAME_TIMING};
 use crate::settings::tolerances::jumps::FOLLOWS_JUMP;
 use crate::settings::tolerances::times::SAME_TIME;
@@ -147,7 +147,7 @@ impl Trajectory {
         (by_chance, cancel): (bool, Option<&AtomicBool>),
     ) -> Result<Option<Self>, Error> {
         let from = place.0;
-        let Some(passages) = simulation.passages(place, until, cancel)? else {
+        let Some(passages) = simulation.passages(place, until, Corners::All, cancel)? else {
             return Ok(None);
         };
         let end = simulation.state();

@@ -10,6 +10,15 @@ use crate::integrate::exact::{Assembler, Passage};
 use crate::integrate::stats::Impulse;
 use crate::integrate::theta::Instant;
 
+/// At which corners of sources a stretch of a run ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Corners {
+    /// Those of sources that the state or a probe sees.
+    Seen,
+    /// Those of sources that act through controls alone, too: values may move them.
+    All,
+}
+
 impl Simulation {
     /// The changes of mode on the way from a place, as for [`Self::stand_at`], to time `until`, s: the first is the one into the mode there.
     /// `None` where the way is not exact throughout. It ends when `cancel` is set.
@@ -20,12 +29,13 @@ impl Simulation {
         &mut self,
         (t, state, switches): (f64, &[f64], &[bool]),
         until: f64,
+        corners: Corners,
         cancel: Option<&AtomicBool>,
     ) -> Result<Option<Vec<Passage>>, Error> {
         let Way::Exact(exact) = &mut self.way else {
             return Ok(None);
         };
-        exact.keep_passages();
+        exact.keep_passages(corners == Corners::All);
         self.stand_at(t, state, switches)?;
         self.advance(until, false, cancel)?;
         let passages = match &mut self.way {

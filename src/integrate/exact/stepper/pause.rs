@@ -42,10 +42,11 @@ impl Exact {
         &self.key.closed
     }
 
-    /// Keeps changes of mode and corners of sources from here on, [`MOST_PASSAGES`] at most.
-    pub(crate) fn keep_passages(&mut self) {
+    /// Keeps changes of mode and corners of sources from here on, [`MOST_PASSAGES`] at most; those of sources that act through controls alone where
+    /// `all` are asked for.
+    pub(crate) fn keep_passages(&mut self, all: bool) {
         self.passages = Some(Vec::new());
-        self.sources.at_all_corners = true;
+        self.sources.at_all_corners = all;
     }
 
     /// The changes of mode and corners since [`Self::keep_passages`], unless there are too many to keep; none are kept from here on.
