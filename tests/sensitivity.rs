@@ -292,6 +292,27 @@ fn coupled_inductors() {
     }
 }
 
+/// A half-wave rectifier whose diodes leave time constants of L/Roff beside those of its filter: differences in 120 digits (tests/reference/digits.py with
+/// one value 1e-25 larger and smaller) have these p ∂/∂p at 2.37 ms.
+#[test]
+fn a_rectifier_with_decaying_leaks() {
+    let text = "half wave\nv1 1 0 sin(0 24 1k 0 0 30)\nl1 1 2 36u ic=0\nd1 2 3 m0\nd2 0 3 m0\nl2 3 4 2.3m ic=8.6\nc1 4 0 16m ic=0\nr1 4 0 1.8\n\
+        .model m0 d(ron=1.8m vfwd=0 roff=1.8meg)\n.save i(l1) v(4)\n.tran 150u 3m uic\n\
+        .meas tran i find i(l1) at=2.37m\n.meas tran v find v(4) at=2.37m\n.meas tran mean avg v(4)\n.end\n";
+    let truths = [
+        ("i", "l2", 2.3e-3, -7.625704349735634),
+        ("i", "c1", 16e-3, 0.8232116487295259),
+        ("v", "l2", 2.3e-3, -0.5789060547559229),
+        ("v", "c1", 16e-3, -1.7194831981914543),
+    ];
+    for method in [SensitivityMethod::Forward, SensitivityMethod::Adjoint] {
+        let found = by(text, false, method);
+        for (of, to, value, truth) in truths {
+            near(&found, of, to, value, truth, 5e-13);
+        }
+    }
+}
+
 /// Parameters of a duty cycle move edges, one of ramps moves waveforms: that one goes forward.
 #[test]
 fn edges_go_backward_and_ramps_forward() {

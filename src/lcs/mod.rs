@@ -12,7 +12,7 @@ mod tests;
 
 pub use checked::{Lcs, LcsError};
 pub use reduce::{Position, ReduceError, StorageHold, reduce};
-pub(crate) use reduce::{is_coupled, reduce_apart};
+pub(crate) use reduce::{fast_states, is_coupled, reduce_apart};
 pub use sparse::{Csr, SparseLcs};
 
 use nalgebra::{DMatrix, DVector};

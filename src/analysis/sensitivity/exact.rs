@@ -284,7 +284,7 @@ impl Beside<'_> {
                 }
             }
             for (gradient, derivative) in sensitivity.of.iter_mut().zip(derivatives) {
-                let derivative = derivative.map(|derivative| derivative / value);
+                let derivative = derivative.map(|derivative| derivative / survey.unit());
                 gradient.to.push((name.to_owned(), derivative));
             }
             sensitivity.at.push((name.to_owned(), value));

@@ -17,6 +17,8 @@ use crate::settings::tolerances::periodic::{PERIOD_MOVES, VALUE_STEP};
 pub(super) struct Survey<'a> {
     pub(super) name: &'a str,
     pub(super) value: f64,
+    /// What h p is in doubles: p with it and without are exact, which their rounding over h is not.
+    step: f64,
     /// By storage element: of its `IC=`.
     pub(super) initial: DVector<f64>,
     pub(super) sources: [Vec<Source>; 4],
@@ -24,6 +26,13 @@ pub(super) struct Survey<'a> {
     pub(super) perturbation: Option<Perturbation>,
     /// By measurement: what its own numbers make, in the run as it is.
     pub(super) own: Vec<Option<f64>>,
+}
+
+impl Survey<'_> {
+    /// What a derivative with ln p is divided by for that with p.
+    pub(super) const fn unit(&self) -> f64 {
+        self.step / VALUE_STEP
+    }
 }
 
 impl Beside<'_> {
@@ -35,9 +44,10 @@ impl Beside<'_> {
         (own, curves): (&Model, &Curves),
     ) -> Result<Option<Survey<'n>>, Error> {
         self.go_on()?;
-        let at = |step: f64| {
+        let step = value * (1.0 + VALUE_STEP) - value;
+        let at = |steps: f64| {
             let mut model = own.clone();
-            model.set(name, value * (1.0 + step * VALUE_STEP))?;
+            model.set(name, value + steps * step)?;
             Ok::<_, Error>(model)
         };
         let [a, b, c, d] = STEPS.map(at);
@@ -88,6 +98,7 @@ impl Beside<'_> {
         Ok(Some(Survey {
             name,
             value,
+            step,
             initial: DVector::from_vec(initial.collect()),
             sources: near.each_ref().map(sources),
             perturbation: base.multiport.perturbation(near.each_ref()),
@@ -116,9 +127,9 @@ impl Beside<'_> {
         tableau: Option<(&Tableau, Option<&Rest>)>,
         (own, survey): (&Model, &Survey<'_>),
     ) -> Result<Changes, Error> {
-        let at = |step: f64| {
+        let at = |steps: f64| {
             let mut model = own.clone();
-            model.set(survey.name, survey.value * (1.0 + step * VALUE_STEP))?;
+            model.set(survey.name, survey.value + steps * survey.step)?;
             let simulation = if self.options.steady {
                 beside(&model, &self.periodic())?
             } else {

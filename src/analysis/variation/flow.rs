@@ -4,8 +4,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::System;
 use super::linear::beyond_doubles;
+use super::system::apart;
 use crate::integrate::Error;
+use crate::linalg::decouple::Decoupled;
 use crate::linalg::expm::Ladders;
 use crate::settings::tolerances::exponentials::SQUARED;
 
@@ -20,12 +23,14 @@ pub(super) struct Sources {
     pub(super) generator: DMatrix<f64>,
 }
 
-/// An equation and the exponentials that were made of it.
+/// An equation, in the basis in which fast states owe nothing to the others, and the exponentials that were made of it.
 #[derive(Debug)]
 pub(super) struct Flow {
     system: usize,
     sources: Sources,
     generator: DMatrix<f64>,
+    basis: Option<Decoupled>,
+    fast: Vec<usize>,
     /// δy over w.
     rows: DMatrix<f64>,
     /// exp(𝒢 t) − 1 by t, s; the oldest first.
@@ -42,25 +47,38 @@ impl Flows {
     /// Equations that are kept.
     const MOST: usize = 64;
 
-    /// The place of the equation of a system with these sources, which is made where it is not known.
+    /// The place of the equation of a system, by its number, with these sources, which is made where it is not known.
     pub(super) fn place(
         &mut self,
-        system: usize,
+        (number, system): (usize, &System),
         sources: Sources,
         equation: impl FnOnce(&Sources) -> (DMatrix<f64>, DMatrix<f64>),
     ) -> usize {
-        let known = |flow: &Flow| flow.system == system && flow.sources == sources;
+        let known = |flow: &Flow| flow.system == number && flow.sources == sources;
         if let Some(at) = self.0.iter().position(known) {
             return at;
         }
         if self.0.len() == Self::MOST {
             self.0.remove(0);
         }
-        let (generator, rows) = equation(&sources);
+        let (mut generator, mut rows) = equation(&sources);
+        // Of x and of δx.
+        let second = generator.nrows() - system.lcs.n();
+        let both = |fast: &[usize]| {
+            let again = fast.iter().map(|k| second + k);
+            fast.iter().copied().chain(again).collect()
+        };
+        let (basis, fast) = apart(&generator, [both(&system.fast), both(&system.lcs.fast)]);
+        if let Some(basis) = &basis {
+            generator.copy_from(&basis.generator);
+            rows *= &basis.to;
+        }
         self.0.push(Flow {
-            system,
+            system: number,
             sources,
             generator,
+            basis,
+            fast,
             rows,
             steps: Vec::new(),
         });
@@ -73,6 +91,23 @@ impl Flows {
 }
 
 impl Flow {
+    /// [x | z | δx] in the basis of the equation.
+    pub(super) fn entered(&self, w: DVector<f64>) -> DVector<f64> {
+        match &self.basis {
+            Some(basis) => &basis.from * w,
+            None => w,
+        }
+    }
+
+    /// The last n components of [x | z | δx].
+    pub(super) fn left(&self, w: &DVector<f64>, n: usize) -> DVector<f64> {
+        let first = w.len() - n;
+        match &self.basis {
+            Some(basis) => basis.to.rows(first, n) * w,
+            None => w.rows(first, n).into_owned(),
+        }
+    }
+
     /// Takes w so many seconds further, with what is known for a time that differs by no more than `same`, s.
     ///
     /// # Errors
@@ -102,7 +137,7 @@ impl Flow {
     /// exp(𝒢 t) − 1.
     fn step(&self, seconds: f64) -> Result<DMatrix<f64>, Error> {
         let dim = self.generator.nrows();
-        let increment = Ladders::new(&self.generator, &[], seconds, SQUARED, 0).increment(0);
+        let increment = Ladders::new(&self.generator, &self.fast, seconds, SQUARED, 0).increment(0);
         let increment = increment.ok_or_else(beyond_doubles)?;
         Ok(DMatrix::from_fn(dim, dim, |i, j| increment.column(j)[i]))
     }

@@ -4,9 +4,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::System;
 use super::course::Stretch;
+use super::system::apart;
 use crate::integrate::exact::{Exosystem, Shape, Spectrum, over_w};
 use crate::integrate::{Error, Reason};
-use crate::linalg::decouple::{Decoupled, decoupled};
+use crate::linalg::decouple::Decoupled;
 use crate::linalg::expm::Ladders;
 use crate::settings::tolerances::exponentials::{CURVED, SERIES, SQUARED};
 
@@ -124,9 +125,7 @@ impl Linear {
         generator
             .view_mut((n, n), (dz, dz))
             .copy_from(exosystem.generator());
-        let basis = (!lcs.fast.is_empty())
-            .then(|| decoupled(&generator, &lcs.fast))
-            .flatten();
+        let (basis, fast) = apart(&generator, [system.fast.clone(), lcs.fast.clone()]);
         let mut rows = over_w(&lcs.outputs.rows, n, exosystem);
         if let Some(basis) = &basis {
             generator.copy_from(&basis.generator);
@@ -138,11 +137,7 @@ impl Linear {
         Self {
             system: at,
             sources: [exosystem.generator().clone(), exosystem.output().clone()],
-            fast: if basis.is_some() {
-                lcs.fast.clone()
-            } else {
-                vec![]
-            },
+            fast,
             basis,
             rows: [rows, rates, second],
             spectrum: Spectrum::new(&moves, exosystem.rates()),

@@ -160,14 +160,15 @@ impl Parameter<'_> {
             change,
             generator: exosystem.generator().clone(),
         };
-        let at = flows.place(segment.system, sources, |sources| {
+        let system = &self.trajectory.systems[segment.system];
+        let at = flows.place((segment.system, system), sources, |sources| {
             self.equation(segment.system, sources)
         });
         let mut w = DVector::zeros(2 * n + dz);
         w.rows_mut(0, n).copy_from(&segment.start);
         exosystem.write(segment.from, &mut w.as_mut_slice()[n..n + dz]);
         w.rows_mut(n + dz, n).copy_from(dx);
-        (at, w)
+        (at, flows.at(at).entered(w))
     }
 
     /// 𝒢, and δy over w, in a mode with these sources.
@@ -234,7 +235,7 @@ impl Parameter<'_> {
                 see(flow, &w, pieces, &mut moved.changes)?;
             }
             flow.advance(&mut w, seconds, SAME_LENGTH * segment.to.abs())?;
-            dx = w.rows(w.len() - dx.len(), dx.len()).into_owned();
+            dx = flow.left(&w, dx.len());
             if drawing.is_some() {
                 self.stays(k, &dx)?;
             }

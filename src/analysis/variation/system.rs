@@ -6,7 +6,7 @@ use super::instant::Inputs;
 use crate::integrate::exact::{Assembler, Key, Owner};
 use crate::integrate::switching::Threshold;
 use crate::integrate::{Error, reading};
-use crate::lcs::{Hold, Lcs, Rows};
+use crate::lcs::{Hold, Lcs, Rows, fast_states};
 use crate::linalg::decouple::{Decoupled, decoupled};
 use crate::linalg::expm::Ladders;
 use crate::linalg::rays;
@@ -21,8 +21,9 @@ pub(crate) struct System {
     pub(crate) storage_inputs: DMatrix<f64>,
     /// E, n×p.
     pub(crate) inputs: DMatrix<f64>,
-    /// The basis in which fast states owe nothing to the others, where there are any.
+    /// The basis in which fast states owe nothing to the others, where there are any, and these.
     pub(crate) basis: Option<Decoupled>,
+    pub(super) fast: Vec<usize>,
 }
 
 /// A row over [x | u | u' | 1].
@@ -104,19 +105,31 @@ pub(crate) fn shaped(block: &DMatrix<f64>, rows: usize, columns: usize) -> DMatr
     }
 }
 
+/// The basis in which the fast states of a generator owe nothing to the others, for the first of these sets for which there is one; and that set.
+pub(super) fn apart<const N: usize>(
+    generator: &DMatrix<f64>,
+    sets: [Vec<usize>; N],
+) -> (Option<Decoupled>, Vec<usize>) {
+    let sets = sets.into_iter().filter(|fast| !fast.is_empty());
+    let mut bases = sets.filter_map(|fast| Some((Some(decoupled(generator, &fast)?), fast)));
+    bases.next().unwrap_or_default()
+}
+
 impl System {
     pub(super) fn of(key: &Key, assembler: &mut Assembler) -> Result<Self, Error> {
         let hold = |&closed: &bool| if closed { Hold::Closed } else { Hold::Open };
         let holds: Vec<Hold> = key.closed.iter().map(hold).collect();
         let lcs = assembler.assemble(&holds, &key.switches, &key.sliding_switches())?;
         let (n, p, q) = (lcs.n(), lcs.p(), lcs.storage.names.len());
+        // Those that are coupled by little are no loss to the run, whose steps are few; derivatives go through many.
+        let fast = fast_states(&lcs, assembler.span());
+        let (basis, fast) = apart(&lcs.a, [fast, lcs.fast.clone()]);
         Ok(Self {
             key: key.clone(),
             storage_inputs: shaped(&lcs.storage.u, q, p),
             inputs: shaped(&lcs.e, n, p),
-            basis: (!lcs.fast.is_empty())
-                .then(|| decoupled(&lcs.a, &lcs.fast))
-                .flatten(),
+            basis,
+            fast,
             lcs,
         })
     }
@@ -151,9 +164,7 @@ impl System {
             return Some(DMatrix::identity(n, n));
         }
         match &self.basis {
-            Some(basis) => {
-                Some(&basis.to * increment(&basis.generator, &self.lcs.fast)? * &basis.from)
-            }
+            Some(basis) => Some(&basis.to * increment(&basis.generator, &self.fast)? * &basis.from),
             None => increment(&self.lcs.a, &[]),
         }
     }

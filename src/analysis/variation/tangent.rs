@@ -2,12 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::system::{System, shaped};
+use super::system::{System, apart, shaped};
 use crate::integrate::exact::Key;
 use crate::integrate::reading;
 use crate::integrate::theta::Instant;
 use crate::lcs::{Hold, Lcs, LcsParts, Port, Role, Rows};
-use crate::linalg::decouple::decoupled;
 use crate::settings::tolerances::periodic::CARRIES;
 
 /// Voltage and current of each port at a point.
@@ -62,12 +61,13 @@ impl System {
             u: follows_u,
         };
         let lcs = lcs.clone().changed(|parts| follows.take(parts)).ok()?;
-        let basis = (!lcs.fast.is_empty()).then(|| decoupled(&lcs.a, &lcs.fast));
+        let (basis, fast) = apart(&lcs.a, [lcs.fast.clone()]);
         Some(Self {
             key,
             storage_inputs: shaped(&lcs.storage.u, q, p),
             inputs: shaped(&lcs.e, n, p),
-            basis: basis.flatten(),
+            basis,
+            fast,
             lcs,
         })
     }

@@ -113,6 +113,11 @@ impl Assembler {
         self
     }
 
+    /// How long the longest step is, s.
+    pub(crate) const fn span(&self) -> f64 {
+        self.span
+    }
+
     /// Has it known where function blocks jump, so that a run can tell when they slide.
     #[must_use]
     pub(crate) fn with_steps(mut self, steps: Vec<Step>) -> Self {

@@ -32,7 +32,7 @@ use super::sparse::Readings;
 use super::{Hold, Lcs, LcsError, LcsParts, Role, SparseLcs};
 use eliminated::Eliminated;
 use publish::publish;
-pub(crate) use separate::is_coupled;
+pub(crate) use separate::{fast_states, is_coupled};
 
 /// What each device and switch is held as.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -29,16 +29,26 @@ use super::Reduction;
 /// Whether a system, as it was reduced in the basis of its names, has fast states to be taken apart from slow ones.
 pub(crate) fn is_coupled(lcs: &Lcs, span: f64) -> bool {
     let states: Vec<usize> = (0..lcs.n()).collect();
-    !fast_among(&states, &lcs.a, &lcs.energy, 1.0 / span).is_empty()
+    !fast_among(&states, &lcs.a, &lcs.energy, 1.0 / span, true).is_empty()
+}
+
+/// The states of a system that are faster than all the others and than what moves within `span` seconds by [`APART`], those among them that it was reduced with and
+/// those that are coupled with the others by little.
+pub(crate) fn fast_states(lcs: &Lcs, span: f64) -> Vec<usize> {
+    let others = (0..lcs.n()).filter(|k| !lcs.fast.contains(k));
+    let others: Vec<usize> = others.collect();
+    let more = fast_among(&others, &lcs.a, &lcs.energy, 1.0 / span, false);
+    lcs.fast.iter().copied().chain(more).collect()
 }
 
 /// Of these states of x' = A x those that are faster than all the others and than `slowest`, 1/s, by [`APART`], in the order of
-/// elimination, if their coupling with the others is, too.
+/// elimination; if their coupling with the others is, too, where `coupled` asks for it.
 fn fast_among(
     states: &[usize],
     a: &DMatrix<f64>,
     energy: &DMatrix<f64>,
     slowest: f64,
+    coupled: bool,
 ) -> Vec<usize> {
     let n = states.len();
     // In units of √energy the coupling of a passive circuit is as large in one direction as in the other.
@@ -78,7 +88,12 @@ fn fast_among(
         }
         let left = largest(&slow, &slow, &rest).max(slowest);
         let coupling = largest(&slow, &fast, &whole).max(largest(&fast, &slow, &whole));
-        if fastest.min(coupling) > APART * left {
+        let rate = if coupled {
+            fastest.min(coupling)
+        } else {
+            fastest
+        };
+        if rate > APART * left {
             apart = fast.len();
         }
     }
@@ -102,7 +117,7 @@ impl<F: Field> Reduction<F> {
                 }
                 matrix
             };
-            let fast = fast_among(&slow, &of(&self.rates), &of(&self.energy), 1.0 / span);
+            let fast = fast_among(&slow, &of(&self.rates), &of(&self.energy), 1.0 / span, true);
             if fast.is_empty() {
                 return;
             }
