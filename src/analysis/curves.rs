@@ -1,5 +1,7 @@
 //! The outputs of a run that is exact throughout, as smooth pieces that measurements see.
 
+use std::sync::atomic::AtomicBool;
+
 use nalgebra::DVector;
 
 use super::periodic::Steady;
@@ -58,6 +60,7 @@ pub(super) fn transient_curves(
 pub(super) fn orbit_curves(
     circuit: &Circuit,
     steady: &mut Steady,
+    cancel: Option<&AtomicBool>,
 ) -> Option<(Curves, Option<Note>)> {
     let period = steady.orbit().period;
     let outputs = circuit.measured.iter().map(|probe| {
@@ -68,7 +71,7 @@ pub(super) fn orbit_curves(
     if outputs.is_empty() {
         return None;
     }
-    let (course, from) = steady.course().ok()??;
+    let (course, from) = steady.course(cancel).ok()??;
     let curves = curves(&course, &outputs, from).ok()??;
     let (laps, note) = laps(circuit.tran, period, curves.values());
     Some((curves.repeated(laps, period, from), note))

@@ -293,7 +293,7 @@ pub fn periodic_measured(
         ..options.clone()
     };
     let mut found = settled(&probing, &options)?;
-    let drawn = (found.whole()).and_then(|steady| orbit_curves(circuit, steady));
+    let drawn = (found.whole()).and_then(|steady| orbit_curves(circuit, steady, options.cancel));
     let (curves, note) = drawn.map_or((None, None), |(curves, note)| (Some(curves), note));
     measuring.curves = curves;
     let by_rows = measuring.by_rows();

@@ -103,7 +103,7 @@ impl<'a> Destination<'a> {
         signal: Option<(i32, &str)>,
     ) -> Result<Exit, Failure> {
         let Some((run, found)) = run else {
-            return error.map_or(Ok(Exit::Done), |error| Err(self.failure(&error)));
+            return error.map_or(Ok(Exit::Done), |error| self.ended(&error, signal, ""));
         };
         if self.wanted.fixed_step && run.method == Method::Exact.name() {
             self.streams.note(
@@ -149,6 +149,16 @@ impl<'a> Destination<'a> {
             (false, Some(t)) => format!("; the rows until {t:e} s are in {files}"),
             _ => String::new(),
         };
+        self.ended(&error, signal, &kept)
+    }
+
+    /// Says why a run ended early, and what of it is `kept`.
+    fn ended(
+        &self,
+        error: &Error,
+        signal: Option<(i32, &str)>,
+        kept: &str,
+    ) -> Result<Exit, Failure> {
         match signal {
             Some((signal, name)) if error.reason == Reason::Interrupted => {
                 let file = self.wanted.input.file.display();
@@ -156,15 +166,15 @@ impl<'a> Destination<'a> {
                     .error(format!("{file}: {error} by {name}{kept}"));
                 Ok(Exit::Signal(signal))
             }
-            _ => match self.failure(&error) {
-                Failure::Faults(message) => Err(Failure::Faults(message + &kept)),
+            _ => match self.failure(error) {
+                Failure::Faults(message) => Err(Failure::Faults(message + kept)),
                 Failure::Told {
                     code,
                     message,
                     help,
                 } => Err(Failure::Told {
                     code,
-                    message: message + &kept,
+                    message: message + kept,
                     help,
                 }),
                 other => Err(other),

@@ -217,6 +217,11 @@ impl Error {
         }
     }
 
+    /// Whether it was asked to end, and has not failed.
+    pub(crate) const fn is_interruption(&self) -> bool {
+        matches!(self.reason, Reason::Interrupted)
+    }
+
     /// A failure before the run.
     #[must_use]
     pub fn before(reason: Reason) -> Self {

@@ -145,7 +145,16 @@ impl Simulation {
         self.advance(t, true, cancel.as_deref())
     }
 
-    fn advance(&mut self, t: f64, pause: bool, cancel: Option<&AtomicBool>) -> Result<Stop, Error> {
+    /// Advances to this time, or where `pause` asks for it to the next event before; it ends when `cancel` is set.
+    ///
+    /// # Errors
+    /// As [`Self::advance_to`].
+    pub(crate) fn advance(
+        &mut self,
+        t: f64,
+        pause: bool,
+        cancel: Option<&AtomicBool>,
+    ) -> Result<Stop, Error> {
         let (now, end) = (self.time(), self.tran.tstop);
         if !(t >= now && t <= end) {
             let what = format!(

@@ -158,6 +158,31 @@ fn rows_that_do_not_fit_are_refused_with_their_number() {
     );
 }
 
+/// SIGTERM within the first return of a search for an orbit, which takes minutes.
+#[test]
+#[cfg(unix)]
+fn a_search_for_an_orbit_ends_within_a_return() {
+    let folder = place(&[]);
+    let path = folder.path();
+    let slow = "one long period\nv1 a 0 sin(0 1 1k)\nl1 a b 1m\nd1 b c dd\nr1 c 0 1\n.model dd d(ideal)\n.tran 1m 1\n.end\n";
+    fs::write(path.join("slow.cir"), slow).expect("a netlist");
+    let mut command = circ(path);
+    command.args("pss slow.cir --period 20000 -o orbit.csv".split_whitespace());
+    let child = command.stderr(Stdio::piped()).spawn().expect("circ runs");
+    std::thread::sleep(Duration::from_millis(400));
+    let begun = std::time::Instant::now();
+    kill(&child, "TERM");
+    let output = child.wait_with_output().expect("an end");
+    assert!(begun.elapsed() < Duration::from_secs(10));
+    assert_eq!(output.status.code(), Some(143), "{}", said(&output));
+    assert!(
+        said(&output).contains("interrupted by SIGTERM"),
+        "{}",
+        said(&output)
+    );
+    assert_eq!(names(path), ["slow.cir"]);
+}
+
 /// SIGTERM in the middle of one print step of very many steps; the rows before are in the pipe and in each file.
 #[test]
 #[cfg(unix)]

@@ -157,11 +157,14 @@ impl Steady {
     ///
     /// # Errors
     /// As [`Course::of`].
-    pub(super) fn course(&mut self) -> Result<Option<(Course, f64)>, Error> {
+    pub(super) fn course(
+        &mut self,
+        cancel: Option<&AtomicBool>,
+    ) -> Result<Option<(Course, f64)>, Error> {
         let (stand, from) = (&self.found.fixed.stand, self.found.from);
         let place = (from, &stand.state[..], &stand.switches[..]);
         let until = from + self.found.orbit().period;
-        let course = Course::of(&mut self.simulation, place, until, None)?;
+        let course = Course::of(&mut self.simulation, place, until, cancel)?;
         Ok(course.map(|course| (course, from)))
     }
 
@@ -170,20 +173,23 @@ impl Steady {
     ///
     /// # Errors
     /// As [`Trajectory::of`].
-    pub(super) fn trajectory(&mut self) -> Result<(Trajectory, f64), Error> {
+    pub(super) fn trajectory(
+        &mut self,
+        cancel: Option<&AtomicBool>,
+    ) -> Result<(Trajectory, f64), Error> {
         let (stand, from) = (&self.found.fixed.stand, self.found.from);
         let place = (from, &stand.state[..], &stand.switches[..]);
         let period = self.found.orbit().period;
-        let whole = Trajectory::of(&mut self.simulation, place, from + period)?;
+        let whole = Trajectory::of(&mut self.simulation, place, from + period, cancel)?;
         let Some(begin) = whole.calmest() else {
             return Ok((whole, from));
         };
         self.simulation
             .stand_at(from, &stand.state, &stand.switches)?;
-        self.simulation.advance_to(begin)?;
+        self.simulation.advance(begin, false, cancel)?;
         let (state, switches) = (self.simulation.state(), self.simulation.positions());
         let place = (begin, &state[..], &switches[..]);
-        let trajectory = Trajectory::of(&mut self.simulation, place, begin + period)?;
+        let trajectory = Trajectory::of(&mut self.simulation, place, begin + period, cancel)?;
         Ok((trajectory, from))
     }
 
@@ -234,14 +240,17 @@ impl Steady {
     ///
     /// # Errors
     /// As [`Trajectory::of_steps`].
-    pub(super) fn linearised(&mut self) -> Result<Option<(Linearised, f64)>, Error> {
+    pub(super) fn linearised(
+        &mut self,
+        cancel: Option<&AtomicBool>,
+    ) -> Result<Option<(Linearised, f64)>, Error> {
         if self.simulation.is_exact() {
             return Ok(None);
         }
         let (stand, from) = (&self.found.fixed.stand, self.found.from);
         let place = (from, &stand.state[..], &stand.switches[..]);
         let until = from + self.found.orbit().period;
-        let found = Trajectory::of_steps(&mut self.simulation, place, until)?;
+        let found = Trajectory::of_steps(&mut self.simulation, place, until, cancel)?;
         Ok(Some((found, from)))
     }
 }

@@ -6,7 +6,6 @@ use crate::integrate::{Change, Error, Event, Orbit, OrbitKind, Reason, Simulatio
 use crate::settings::tolerances::periodic::{
     AT_REST, CLOSED, NEUTRAL, NUDGE, RETURNS, STEPPED_CLOSED,
 };
-use std::sync::atomic::Ordering;
 
 /// Periods of transient before each attempt.
 const TRANSIENTS: [usize; 5] = [4, 24, 96, 384, 1536];
@@ -101,15 +100,6 @@ impl<'a, 'o> Search<'a, 'o> {
         self.options.tol.unwrap_or(usual)
     }
 
-    fn go_on(&self) -> Result<(), Error> {
-        match self.options.cancel {
-            Some(cancel) if cancel.load(Ordering::Relaxed) => {
-                Err(Error::before(Reason::Interrupted))
-            }
-            _ => Ok(()),
-        }
-    }
-
     pub(super) fn shooting(&mut self, from: f64, returns: Return) -> Shooting<'_> {
         Shooting {
             simulation: self.simulation,
@@ -119,6 +109,7 @@ impl<'a, 'o> Search<'a, 'o> {
             amplitudes: Vec::new(),
             corrections: self.corrections,
             systems: Default::default(),
+            cancel: self.options.cancel,
         }
     }
 
@@ -132,8 +123,8 @@ impl<'a, 'o> Search<'a, 'o> {
         self.simulation
             .stand_at(from, &stand.state, &stand.switches)?;
         let one = |k| {
-            self.go_on()?;
-            self.simulation.advance_to(from + k as f64 * period)?;
+            let t = from + k as f64 * period;
+            self.simulation.advance(t, false, self.options.cancel)?;
             *stand = Stand::of(self.simulation);
             Ok(stand.clone())
         };
@@ -154,7 +145,7 @@ impl<'a, 'o> Search<'a, 'o> {
     pub(super) fn driven(&mut self, period: f64, from: f64) -> Result<Found, Error> {
         let closed = self.closed();
         if from > 0.0 {
-            self.simulation.advance_to(from)?;
+            self.simulation.advance(from, false, self.options.cancel)?;
         }
         let mut stand = Stand::of(self.simulation);
         let asked = self.options.order;
@@ -190,6 +181,7 @@ impl<'a, 'o> Search<'a, 'o> {
                     );
                 }
                 Ok(None) => {}
+                Err(error) if error.is_interruption() => return Err(error),
                 Err(error) => last = Some(error),
             }
             // Where the transient has settled on an orbit of another order, no other one need exist.
@@ -249,8 +241,10 @@ impl<'a, 'o> Search<'a, 'o> {
         let mut shooting = self.shooting(from, Return::After(period));
         shooting.order = order;
         shooting.amplitudes = amplitudes.to_vec();
-        let Ok(Some(mut fixed)) = shooting.solve(stand.clone(), closed) else {
-            return Ok(None);
+        let mut fixed = match shooting.solve(stand.clone(), closed) {
+            Ok(Some(fixed)) => fixed,
+            Err(error) if error.is_interruption() => return Err(error),
+            Ok(None) | Err(_) => return Ok(None),
         };
         // What closes after two periods closes after four.
         for part in (1..order).filter(|part| order.is_multiple_of(*part)) {
@@ -276,9 +270,9 @@ impl<'a, 'o> Search<'a, 'o> {
         grow(&mut amplitudes, &before);
         let mut events = Vec::new();
         for k in 1..=PROLONGED * PARTS {
-            self.go_on()?;
             let begin = self.simulation.time();
-            let stop = self.simulation.advance_to(begin + part)?;
+            let cancel = self.options.cancel;
+            let stop = self.simulation.advance(begin + part, false, cancel)?;
             let now = self.simulation.state();
             grow(&mut amplitudes, &now);
             let still = now.iter().zip(&before).zip(&amplitudes);
@@ -302,6 +296,7 @@ impl<'a, 'o> Search<'a, 'o> {
             match tried {
                 Ok(Some(found)) => return Ok(found),
                 Ok(None) => {}
+                Err(error) if error.is_interruption() => return Err(error),
                 Err(error) => last = Some(error),
             }
             // The attempts moved the simulation.

@@ -9,6 +9,8 @@
 //! in parts of the amplitudes. Columns of M are differences of F, a return each. M's eigenvalues at the orbit are its Floquet multipliers.
 //! (T. J. Aprille, T. N. Trick, Proceedings of the IEEE 60 (1972); for piecewise flows R. I. Leine, H. Nijmeijer 2004, section 8.)
 
+use std::sync::atomic::AtomicBool;
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::analysis::variation::{System, Trajectory};
@@ -103,6 +105,8 @@ pub(super) struct Shooting<'a> {
     pub(super) corrections: u32,
     /// The systems that its derivatives went through so far, of returns that take `.0` seconds.
     pub(super) systems: (f64, Vec<System>),
+    /// Ends a return when set.
+    pub(super) cancel: Option<&'a AtomicBool>,
 }
 
 impl Shooting<'_> {
@@ -114,7 +118,8 @@ impl Shooting<'_> {
         match self.returns.clone() {
             Return::After(period) => {
                 seconds = period * self.order as f64;
-                self.simulation.advance_to(self.from + seconds)?;
+                let until = self.from + seconds;
+                self.simulation.advance(until, false, self.cancel)?;
             }
             Return::At(section, limit) => {
                 for _ in 0..self.order {
@@ -129,7 +134,7 @@ impl Shooting<'_> {
     fn reach(&mut self, section: &Change, limit: f64) -> Result<f64, Error> {
         let begin = self.simulation.time();
         for _ in 0..MOST_EVENTS {
-            let stop = self.simulation.advance_to_event(begin + limit)?;
+            let stop = self.simulation.advance(begin + limit, true, self.cancel)?;
             let here = |change: &Change| change == section;
             if stop.events.iter().any(|e| e.changes.iter().any(here)) {
                 return Ok(stop.time);
@@ -189,7 +194,8 @@ impl Shooting<'_> {
         let mut extremes: Vec<[f64; 2]> = stand.state.iter().map(|v| [*v, *v]).collect();
         for k in 0..=SAMPLES {
             let part = f64::from(k) / f64::from(SAMPLES);
-            self.simulation.advance_to(self.from + seconds * part)?;
+            let t = self.from + seconds * part;
+            self.simulation.advance(t, false, self.cancel)?;
             for ([low, high], value) in extremes.iter_mut().zip(self.simulation.state()) {
                 *low = low.min(value);
                 *high = high.max(value);
@@ -204,9 +210,9 @@ impl Shooting<'_> {
                 let seconds = period * self.order as f64;
                 let place = (self.from, &stand.state[..], &stand.switches[..]);
                 let until = self.from + seconds;
-                let passages = self
-                    .simulation
-                    .passages(place, until, Corners::Seen, None)?;
+                let passages =
+                    self.simulation
+                        .passages(place, until, Corners::Seen, self.cancel)?;
                 (Stand::of(self.simulation), seconds, passages)
             }
             _ => {
@@ -266,7 +272,7 @@ impl Shooting<'_> {
                     Return::After(_) => 0.0,
                     Return::At(..) => EVENT_AGAIN * until.abs(),
                 };
-                Trajectory::of(self.simulation, place, until + later)?
+                Trajectory::of(self.simulation, place, until + later, self.cancel)?
             }
         };
         let mut derivative = match self.returns {
@@ -321,7 +327,7 @@ impl Shooting<'_> {
         while corrections < MOST_CORRECTIONS && closing.size() > AT_ROUNDING {
             corrections += 1;
             let before = closing.size();
-            match self.corrected(&stand, &closing.residual, &derivative) {
+            match self.corrected(&stand, &closing.residual, &derivative)? {
                 Some(better) => (stand, closing) = better,
                 None if made_at == before => break,
                 // An old derivative may be the reason.
@@ -363,16 +369,21 @@ impl Shooting<'_> {
     }
 
     /// The place that the correction leads to, or the longest half of it that makes the residual smaller.
+    ///
+    /// # Errors
+    /// It was interrupted.
     fn corrected(
         &mut self,
         stand: &Stand,
         residual: &DVector<f64>,
         derivative: &DMatrix<f64>,
-    ) -> Option<(Stand, Closing)> {
+    ) -> Result<Option<(Stand, Closing)>, Error> {
         let n = residual.len();
         let svd = (DMatrix::identity(n, n) - derivative).svd(true, true);
         // Directions that a return leaves as they are stay.
-        let correction = svd.solve(residual, NEUTRAL).ok()?;
+        let Ok(correction) = svd.solve(residual, NEUTRAL) else {
+            return Ok(None);
+        };
         let mut part = 1.0;
         let tries = if residual.amax() > ROUNDING_OF_RETURN {
             HALVINGS
@@ -384,15 +395,14 @@ impl Shooting<'_> {
             for (j, value) in next.state.iter_mut().enumerate() {
                 *value += part * correction[j] * self.amplitudes[j];
             }
-            // Where no circuit is the correction was too long.
-            if let Ok(found) = self.close(&next)
-                && found.size() < residual.amax()
-            {
-                return Some((next, found));
+            match self.close(&next) {
+                Ok(found) if found.size() < residual.amax() => return Ok(Some((next, found))),
+                Err(error) if error.is_interruption() => return Err(error),
+                // Where no circuit is the correction was too long.
+                Ok(_) | Err(_) => part *= 0.5,
             }
-            part *= 0.5;
         }
-        None
+        Ok(None)
     }
 }
 

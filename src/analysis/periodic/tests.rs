@@ -86,7 +86,7 @@ fn tangents_along_an_orbit_in_steps_agree_with_differences() {
         let model = Model::parse(&text, "t.cir").expect("a circuit");
         let found = steady(&model, &PeriodicOptions::default());
         let mut found = found.unwrap_or_else(|error| panic!("{cards}: {error}"));
-        let made = found.linearised();
+        let made = found.linearised(None);
         let made = made.unwrap_or_else(|error| panic!("{cards}: {error}"));
         let (run, _) = made.expect("an orbit in steps");
         let amplitudes = &found.found.amplitudes;

@@ -180,10 +180,10 @@ impl Beside<'_> {
         let mut found = steady(model, &self.periodic())?;
         let orbit = found.orbit();
         let driven = orbit.kind == OrbitKind::Driven;
-        if !driven || !found.simulation.is_exact() || found.course()?.is_none() {
+        if !driven || !found.simulation.is_exact() || found.course(self.options.cancel)?.is_none() {
             return Ok(None);
         }
-        let (trajectory, from) = found.trajectory()?;
+        let (trajectory, from) = found.trajectory(self.options.cancel)?;
         let orbit = Repeated {
             monodromy: trajectory.monodromy(),
             period: orbit.period,

@@ -225,10 +225,10 @@ fn about_orbit(
     response: &mut Response,
 ) -> Result<(), Error> {
     let orbit = found.orbit();
-    let (trajectories, unknown, origin) = match found.linearised()? {
+    let (trajectories, unknown, origin) = match found.linearised(asked.cancel)? {
         Some((run, origin)) => (Vec::from(run.trajectories), run.unknown, origin),
         None => {
-            let (trajectory, origin) = found.trajectory()?;
+            let (trajectory, origin) = found.trajectory(asked.cancel)?;
             (vec![trajectory], 0.0, origin)
         }
     };

@@ -14,7 +14,7 @@ use std::sync::atomic::AtomicBool;
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
-use super::periodic::{PeriodicOptions, Steady, common_period, settled};
+use super::periodic::{PeriodicOptions, common_period, settled};
 use super::start::{beginning, course};
 use super::variation::Course;
 use crate::circuit::{Circuit, Element, Kind, NodeId, Probe, Probed, Tran, is_inside, wholes};
@@ -300,7 +300,9 @@ pub fn periodic_table(
     let mut found = settled(&probing, options)?;
     let orbit = found.orbit();
     let fundamental = Some(orbit.period / orbit.order as f64);
-    let course = found.whole().map_or(Ok(None), Steady::course)?;
+    let course = found
+        .whole()
+        .map_or(Ok(None), |steady| steady.course(options.cancel))?;
     if let Some((course, from)) = course {
         let span = Span {
             from,

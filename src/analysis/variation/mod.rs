@@ -112,7 +112,7 @@ struct Maker {
 }
 
 impl Trajectory {
-    /// The run of a simulation from a place, as for [`Simulation::stand_at`], until a time.
+    /// The run of a simulation from a place, as for [`Simulation::stand_at`], until a time or until `cancel` is set.
     ///
     /// # Errors
     /// [`Reason::NotSmooth`] where the derivative of the flow does not exist or is not known; else the simulation's.
@@ -120,8 +120,9 @@ impl Trajectory {
         simulation: &mut Simulation,
         place: (f64, &[f64], &[bool]),
         until: f64,
+        cancel: Option<&AtomicBool>,
     ) -> Result<Self, Error> {
-        Self::made(simulation, place, until, (false, None))?.ok_or_else(|| {
+        Self::made(simulation, place, until, (false, cancel))?.ok_or_else(|| {
             let what = "steps are made in it, and their derivative is not known";
             not_smooth(place.0, what)
         })

@@ -7,6 +7,8 @@
 
 mod parts;
 
+use std::sync::atomic::AtomicBool;
+
 use self::parts::Touch;
 use super::instant::Inputs;
 use super::saltation::Side;
@@ -26,6 +28,8 @@ use crate::settings::tolerances::times::SAME_TIME;
 /// A run in steps, from instant to instant.
 struct Way<'a> {
     simulation: &'a mut Simulation,
+    /// Ends the run when set.
+    cancel: Option<&'a AtomicBool>,
     thresholds: Vec<Threshold>,
     assembler: Assembler,
     /// Systems in which devices are open, in positions of the switches.
@@ -71,7 +75,7 @@ pub(crate) struct Linearised {
 }
 
 impl Trajectory {
-    /// The run of a simulation in steps from a place, as for [`Simulation::stand_at`], until a time: in [`LINEAR_PARTS`] parts or more.
+    /// The run of a simulation in steps from a place, as for [`Simulation::stand_at`], until a time or until `cancel` is set: in [`LINEAR_PARTS`] parts or more.
     ///
     /// # Errors
     /// [`Reason::NotSmooth`](crate::integrate::Reason::NotSmooth) where the state jumps, or an event has no derivative; else the simulation's.
@@ -79,6 +83,7 @@ impl Trajectory {
         simulation: &mut Simulation,
         (from, state, switches): (f64, &[f64], &[bool]),
         until: f64,
+        cancel: Option<&AtomicBool>,
     ) -> Result<Linearised, Error> {
         let assembler = simulation.opener(until - from);
         let mut way = Way {
@@ -90,6 +95,7 @@ impl Trajectory {
             resistance: 1.0,
             unknown: 0.0,
             simulation,
+            cancel,
             until,
         };
         way.simulation.stand_at(from, state, switches)?;
@@ -116,6 +122,10 @@ impl Trajectory {
 }
 
 impl Way<'_> {
+    fn go_to(&mut self, t: f64) -> Result<(), Error> {
+        self.simulation.advance(t, false, self.cancel).map(drop)
+    }
+
     fn instant(&mut self) -> Result<Instant, Error> {
         let t = self.simulation.time();
         let found = self.simulation.instant()?;
@@ -126,7 +136,7 @@ impl Way<'_> {
     fn resistance(&mut self) -> Result<f64, Error> {
         let (from, mut sizes) = (self.simulation.time(), (0.0_f64, 0.0_f64));
         for k in 1..LINEAR_PARTS as usize {
-            self.simulation.advance_to(from + k as f64 * self.part)?;
+            self.go_to(from + k as f64 * self.part)?;
             for (v, i) in points(&self.instant()?) {
                 sizes = (sizes.0.max(v.abs()), sizes.1.max(i.abs()));
             }
@@ -145,7 +155,7 @@ impl Way<'_> {
             stops.extend(corners.map(|t| Stop { t, moves: false }));
         }
         loop {
-            let stop = self.simulation.advance_to_event(self.until)?;
+            let stop = self.simulation.advance(self.until, true, self.cancel)?;
             let moves = stop.events.iter().filter(|event| is_switching(event));
             let moves = moves.map(|event| Stop {
                 t: event.t,
@@ -219,7 +229,7 @@ impl Way<'_> {
 
     /// Goes on to a corner of sources behind a part.
     fn corner(&mut self, t: f64, last: &Touch) -> Result<Passed, Error> {
-        self.simulation.advance_to(t)?;
+        self.go_to(t)?;
         let next = self.touch(&last.system.key.switches)?;
         let [left, right] = self.limits(t, &last.system)?;
         let (before, after) = (last.side(left), next.side(right));
@@ -233,10 +243,10 @@ impl Way<'_> {
 
     /// Goes on to where switches move, at about `t`, a quarter of a part after the last place.
     fn switching(&mut self, (t, quarter): (f64, f64), left: &[bool]) -> Result<Passed, Error> {
-        self.simulation.advance_to(t - BEFORE_EVENT * quarter)?;
+        self.go_to(t - BEFORE_EVENT * quarter)?;
         let mut near = self.touch(left)?;
         let events = loop {
-            let stop = self.simulation.advance_to_event(t + quarter)?;
+            let stop = self.simulation.advance(t + quarter, true, self.cancel)?;
             if stop.events.iter().any(is_switching) {
                 break stop.events;
             }

@@ -109,11 +109,11 @@ impl Way<'_> {
         let mut parts = Vec::with_capacity(count);
         for first in (0..count).map(|k| 4 * k) {
             if first > 0 {
-                self.simulation.advance_to(at(first))?;
+                self.go_to(at(first))?;
             }
             let state = self.simulation.state();
             let mut touch = |k: usize| {
-                self.simulation.advance_to(at(first + k))?;
+                self.go_to(at(first + k))?;
                 self.touch(switches)
             };
             parts.push(Part {
