@@ -384,6 +384,35 @@ fn what_rows_would_have_found_otherwise_is_told() {
     assert!(said(&ladder(13)) && !said(&ladder(12)));
 }
 
+/// The same by differences of runs, where differences to both sides are not the same; of one that both peaks have in common, or where one peak is lower, they are.
+#[test]
+fn differences_of_runs_tell_an_extremum_that_is_reached_twice() {
+    let phases = |last: &str| {
+        format!(
+            "two phases\nva a 0 sin(0 10 50 0 0 0)\nvb b 0 sin(0 10 50 0 0 180)\nra a a1 {{r}}\nrb b b1 {last}\nd1 a1 p d\nd2 b1 p d\nrl p 0 10\n\
+            .param r=1 vt=1\nvt t 0 {{vt}}\nrt t 0 1\n.model d d(is=1e-12)\n.tran 10u 20m\n.meas tran top max v(p)\n.meas tran at max_at v(p)\n.meas tran rip pp v(p)\n\
+            .meas tran mean avg v(p)\n.end\n"
+        )
+    };
+    let said = |text: &str| {
+        let found = found(text, false);
+        assert!(!found.exact);
+        let notes = found.notes.into_iter();
+        let notes = notes.filter(|note| note.code == "one-sided");
+        notes.map(|note| note.text).collect::<Vec<_>>()
+    };
+    let notes = said(&phases("1"));
+    assert_eq!(notes.len(), 3, "{notes:?}");
+    for (note, name) in notes.iter().zip(["`top`", "`at`", "`rip`"]) {
+        let begin = format!("{name} moves otherwise with ra, rb, ");
+        assert!(note.starts_with(&begin), "{note}");
+    }
+    assert!(notes[0].contains("rb, r upward"), "{notes:?}");
+    let together = said(&phases("{r}"));
+    assert!(together[0].contains("ra, rb upward"), "{together:?}");
+    assert_eq!(said(&phases("2")), Vec::<String>::new());
+}
+
 /// The peaks of a three-phase rectifier are equal, and each moves with the resistances of its own phases: no derivative. A peak that an orbit repeats in every lap is one; so is a plateau.
 #[test]
 fn an_extremum_that_is_reached_twice_is_told_to_have_no_derivative() {

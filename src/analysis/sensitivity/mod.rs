@@ -12,11 +12,12 @@ use serde::ser::{SerializeMap, Serializer};
 use super::measured::{measured, periodic_measured};
 use super::periodic::PeriodicOptions;
 use super::variation::STEPS;
-use crate::circuit::{Circuit, Kind, Measured, SteadyState, source::Wave};
+use crate::circuit::{Circuit, Kind, Measured, NamedMeasurement, SteadyState, source::Wave};
 use crate::integrate::{Error, Note, Reason, SimOptions, Simulation, SimulationOptions};
+use crate::measure::{Measurement, Over};
 use crate::model::Model;
 use crate::settings::Settings;
-use crate::settings::tolerances::periodic::RUN_STEP;
+use crate::settings::tolerances::periodic::{RUN_STEP, SIDES_APART};
 
 /// Which way the derivatives of an exact run are computed: both have the same result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -306,7 +307,11 @@ impl Beside<'_> {
 
     /// By extrapolated differences of runs.
     fn differences(&self, to: &[(String, f64)]) -> Result<Sensitivity, Error> {
-        let mut gradients = started(&self.measured(None)?);
+        let own = self.measured(None)?;
+        let mut gradients = started(&own);
+        let extremal = self.model.circuit().measurements.iter().map(is_extremal);
+        let extremal: Vec<bool> = extremal.collect();
+        let mut parted: Vec<Vec<&str>> = vec![vec![]; gradients.len()];
         for (name, value) in to {
             self.go_on()?;
             let run = |step: f64| self.measured(Some((name, value * (1.0 + step * RUN_STEP))));
@@ -315,6 +320,12 @@ impl Beside<'_> {
             for (k, gradient) in gradients.iter_mut().enumerate() {
                 let value_of = |m: usize| runs[m].get(k)?.result.as_ref().ok().map(|f| f.value);
                 let all = [value_of(0), value_of(1), value_of(2), value_of(3)];
+                if let (Ok(own), [Some(a), Some(b), Some(c), Some(d)]) = (&gradient.value, all)
+                    && extremal[k]
+                    && part(*own, [a, b, c, d])
+                {
+                    parted[k].push(name);
+                }
                 let derivative = match all {
                     [Some(a), Some(b), Some(c), Some(d)] => {
                         Some((8.0 * (c - b) - (d - a)) / (12.0 * RUN_STEP * value))
@@ -325,14 +336,40 @@ impl Beside<'_> {
             }
         }
         let text = "the derivatives are differences of runs with values 1 and 2 % aside, as the run is not exact throughout, or too long for all that is between its events to be kept, or signals have impulses";
+        let mut notes = vec![Note::run("not-exact", text)];
+        for (gradient, names) in gradients.iter().zip(parted) {
+            if !names.is_empty() && self.options.asks_for(&gradient.name) {
+                let text = format!(
+                    "`{}` moves otherwise with {} upward than downward, as an extremum does that is reached at two times with the same value: there is no derivative; the number is between those to both sides",
+                    gradient.name,
+                    names.join(", ")
+                );
+                notes.push(Note::run("one-sided", text));
+            }
+        }
         Ok(Sensitivity {
             of: gradients,
             at: to.to_vec(),
             exact: false,
             passes: Passes::default(),
-            notes: vec![Note::run("not-exact", text)],
+            notes,
         })
     }
+}
+
+/// Whether a measurement is an extreme value, or when it is reached.
+fn is_extremal(of: &NamedMeasurement) -> bool {
+    let Some(Measurement::Over(over, ..)) = of.what else {
+        return false;
+    };
+    !matches!(over, Over::Average | Over::Rms | Over::Integral)
+}
+
+/// Whether derivatives with ln p to both sides, from the value and from those two steps down, one down, one up and two up, are not the same.
+fn part(own: f64, [a, b, c, d]: [f64; 4]) -> bool {
+    let (down, up) = (3.0 * own - 4.0 * b + a, 4.0 * c - d - 3.0 * own);
+    let [down, up] = [down, up].map(|twice| twice / (2.0 * RUN_STEP));
+    (up - down).abs() > SIDES_APART * own.abs().max(down.abs()).max(up.abs())
 }
 
 /// Gradients without derivatives yet.

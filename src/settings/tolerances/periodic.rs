@@ -132,6 +132,10 @@ pub(crate) const VALUE_STEP: f64 = 1e-4;
 /// The same of whole runs in steps, whose errors change from one to the other. Larger: curvature; smaller: the steps' errors.
 pub(crate) const RUN_STEP: f64 = 1e-2;
 
+/// Derivatives of an extremum with the logarithm of a value by differences to both sides of it are not the same if they are this part of the largest of them and of the extremum apart.
+/// Larger: ties of two extrema are not told; smaller: curvature over two steps, 4e-4 where the extremum falls with the value, and errors of the runs are.
+pub(crate) const SIDES_APART: f64 = 1e-2;
+
 /// Where runs at the ends of tolerances are further from what derivatives let expect than this part of the range, another corner may be worse. Larger:
 /// worse corners unsaid; smaller: notes on slight curvature.
 pub(crate) const NOT_STRAIGHT: f64 = 0.1;
