@@ -45,6 +45,7 @@ fn run(text: &str, energy: bool) -> (f64, f64, Stats, usize) {
     let mut exact = Exact::new(Setup {
         assembler: Assembler::new(Arc::new(behaviour)),
         position,
+        inputs: lcs.inputs.iter().map(|i| i.source.clone()).collect(),
         t: 0.0,
         until: tran.tstop,
         start: DVector::from_column_slice(lcs.storage.initial.as_slice()),
