@@ -12,7 +12,7 @@ mod tests;
 use std::sync::atomic::AtomicBool;
 
 use super::variation::{Course, Linearised, Trajectory};
-use crate::circuit::{Circuit, Kind, Tran};
+use crate::circuit::{Circuit, Element, Kind, Source, Tran};
 use crate::integrate::{Error, Note, Orbit, Reason, Run, Simulation, SimulationOptions, Standing};
 use crate::mna::{StaticMultiport, behaviour};
 use crate::model::Model;
@@ -270,11 +270,27 @@ pub(super) fn repeating(model: &Model) -> Result<(Option<f64>, Circuit, StaticMu
     let seconds = period::common(&circuit)
         .ok()
         .and_then(|period| period.seconds);
-    let multiport = behaviour(&circuit).map_err(|_| {
+    let multiport = ports(model, &circuit)?;
+    Ok((seconds, circuit, multiport))
+}
+
+/// The ports of the circuit of a model with sources at rest: its own where none differs.
+fn ports(model: &Model, circuit: &Circuit) -> Result<StaticMultiport, Error> {
+    let own = model.circuit().elements.iter().map(source);
+    if own.eq(circuit.elements.iter().map(source)) {
+        return Ok(model.multiport().clone());
+    }
+    behaviour(circuit).map_err(|_| {
         let what = "a circuit with sources at rest is none";
         Error::before(Reason::internal("analysis::periodic", what))
-    })?;
-    Ok((seconds, circuit, multiport))
+    })
+}
+
+const fn source(element: &Element) -> Option<&Source> {
+    match &element.kind {
+        Kind::VoltageSource(source) | Kind::CurrentSource(source) => Some(source),
+        _ => None,
+    }
 }
 
 /// A simulation of a circuit near one whose steady state is known.
@@ -337,10 +353,7 @@ fn asked(model: &Model, options: &PeriodicOptions<'_>) -> Result<Asked, Error> {
         }
         period = period.of(asked);
     }
-    let multiport = behaviour(&circuit).map_err(|_| {
-        let what = "a circuit with sources at rest is none";
-        Error::before(Reason::internal("analysis::periodic", what))
-    })?;
+    let multiport = ports(model, &circuit)?;
     Ok(Asked {
         circuit,
         multiport,
