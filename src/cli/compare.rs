@@ -12,7 +12,7 @@ use super::files;
 use super::input::{self, Subject};
 use super::ngspice::{self, deck};
 use super::output;
-use super::sim::{self, Request};
+use super::request::{self, Request};
 use super::streams::Streams;
 use super::view;
 use crate::analysis::{shortest_period, steps};
@@ -363,7 +363,7 @@ fn simulated(
     let divisions = (ROWS * tran.tstep / (tran.tstop - tran.tstart))
         .ceil()
         .max(1.0);
-    let run = sim::run(subject, &request, Some(tran.tstep / divisions), streams)
+    let run = request::run(subject, &request, Some(tran.tstep / divisions), streams)
         .map_err(|error| input::broke_off(&args.input, &error, subject.places(), streams))?;
     streams.notes(subject.places(), &run.notes);
     Ok(run.waveforms)

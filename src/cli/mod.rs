@@ -23,6 +23,7 @@ mod op;
 pub mod output;
 mod pss;
 mod render;
+mod request;
 mod rows;
 mod sens;
 mod shell;

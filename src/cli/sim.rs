@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use super::ac;
-use super::args::{self, MethodArgs, PssArgs, SimArgs};
+use super::args::{PssArgs, SimArgs};
 use super::dc;
 use super::destination::{Destination, Wanted};
 use super::exit::{Exit, Failure};
@@ -14,6 +14,7 @@ use super::input::{self, Subject};
 use super::op;
 use super::output::Format;
 use super::pss;
+use super::request::{Request, Route, no_tran, run_to, with_options};
 use super::rows::Columns;
 use super::signals::Signals;
 use super::steps::Stepping;
@@ -24,18 +25,14 @@ use crate::analysis::{
 };
 use crate::check;
 use crate::circuit::source::Wave;
-use crate::circuit::{Circuit, SteadyState, Tran};
+use crate::circuit::{Circuit, SteadyState};
 use crate::integrate::{
-    Aliased, Block, Error, Method, Note, Reason, Run, SimOptions, Sink, Verified, VerifyOptions,
-    aliased, simulate, simulate_system, verify, verify_system,
+    Aliased, Block, Error, Note, Run, SimOptions, Verified, VerifyOptions, aliased, verify,
+    verify_system,
 };
 use crate::lcs::Input;
 use crate::model::Model;
-use crate::report::{self, si::quantity, text};
-use crate::settings::Settings;
-
-/// Divisions of the progress bar.
-const PROGRESS: f64 = 1000.0;
+use crate::report::{self, text};
 
 /// Simulates and writes what was asked for; a run that broke off or was interrupted is written as far as it came.
 ///
@@ -56,107 +53,9 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
     }
     let subject = input::open(&args.input, &args.results.probes, &paths, streams)?;
     let signals = Signals::watch()?;
-    if let Subject::Circuit(model) = &subject {
-        let circuit = model.circuit();
-        let transient = circuit.tran.is_some() && circuit.steady != Some(SteadyState::Orbit);
-        // What is carried out, where there is more than one analysis.
-        let done = match circuit.steady {
-            Some(SteadyState::Orbit) => "`.pss`",
-            _ => "`.tran`",
-        };
-        if !transient && !circuit.ac.is_empty() {
-            only_one_way(args)?;
-            if circuit.tran.is_some() {
-                let file = args.input.file.display();
-                let text = "`.pss` is left out, as there is an `.ac`";
-                streams.note(
-                    "left-out",
-                    format!("{text}; `circ pss {file}` carries it out"),
-                );
-            }
-            return ac::sim(args, model, &formats, streams);
-        }
-        if !circuit.ac.is_empty() {
-            let file = args.input.file.display();
-            streams.note(
-                "left-out",
-                format!("`.ac` is left out, as there is a {done}; `circ ac {file}` carries it out"),
-            );
-        }
-        if let (true, Some(told)) = (transient, left_out(circuit)) {
-            streams.note(
-                "left-out",
-                format!(
-                    "{told}; `circ ac {}` measures that",
-                    args.input.file.display()
-                ),
-            );
-        }
-        if circuit.tran.is_none() && !circuit.dc.is_empty() {
-            only_one_way(args)?;
-            return dc::sim(args, model, &formats, streams);
-        }
-        let file = args.input.file.display();
-        if circuit.tran.is_none() && circuit.op {
-            only_one_way(args)?;
-            let outputs = (&args.results.outputs[..], &formats[..]);
-            return op::of_model(&args.input, model, outputs, false, streams);
-        }
-        if circuit.op {
-            streams.note(
-                "left-out",
-                format!("`.op` is left out, as there is a {done}; `circ op {file}` carries it out"),
-            );
-        }
-        if circuit.tran.is_none() {
-            let message = "nothing to simulate: the netlist asks for no .tran analysis";
-            return Err(Failure::told("no-analysis", format!("{file}: {message}")));
-        }
-        if circuit.steady == Some(SteadyState::Orbit) {
-            if !args.worst.is_empty() || args.verify {
-                only_one_way(args)?;
-            }
-            let asked = PssArgs {
-                input: args.input.clone(),
-                results: args.results.clone(),
-                period: None,
-                order: None,
-                tol: None,
-                table: args.table.clone(),
-            };
-            return pss::orbit(&asked, &subject, &formats, &signals, streams);
-        }
-        let unknown = args.worst.iter().find_map(|of| circuit.no_measurement(of));
-        if let Some(what) = unknown {
-            return Err(Failure::told(
-                "unknown-measurement",
-                format!("--worst: {what}"),
-            ));
-        }
-        tabulate::known(&args.table, &args.input, model)?;
-        if circuit.steady == Some(SteadyState::Start) && args.verify {
-            let file = args.input.file.display();
-            let message = "`--verify` takes a run from its usual start, without `steady`";
-            return Err(Failure::told(
-                "option-conflict",
-                format!("{file}: {message}"),
-            ));
-        }
-        if !circuit.steps.is_empty() {
-            only_once(args)?;
-            let stepping = Stepping {
-                args,
-                model,
-                request,
-                signals: &signals,
-            };
-            return stepping.sim(&formats, streams);
-        }
-        for of in &args.worst {
-            let options = worst_options(args, &request, signals.flag());
-            analysis::toleranced(model, &of.to_lowercase(), &options)
-                .map_err(|error| Failure::of_run("--worst: ", &error))?;
-        }
+    let asked = (&subject, &request);
+    if let Some(exit) = other_than_one_transient(args, asked, &formats, &signals, streams)? {
+        return Ok(exit);
     }
     if let (true, Subject::System(_)) = (args.from_pss, &subject) {
         let file = args.input.file.display();
@@ -252,6 +151,123 @@ pub fn sim(args: &SimArgs, streams: &Streams) -> Result<Exit, Failure> {
         finished.run = Some((shown(circuit, run), found));
     }
     destination.finish(outputs, finished, feeds, signals.received())
+}
+
+/// Carries out what the cards of a circuit ask for if that is no single transient, and tells what is left out for one; then nothing is returned.
+///
+/// # Errors
+/// See [`Failure`].
+fn other_than_one_transient(
+    args: &SimArgs,
+    (subject, request): (&Subject, &Request),
+    formats: &[Format],
+    signals: &Signals,
+    streams: &Streams,
+) -> Result<Option<Exit>, Failure> {
+    let Subject::Circuit(model) = subject else {
+        return Ok(None);
+    };
+    let circuit = model.circuit();
+    let transient = circuit.tran.is_some() && circuit.steady != Some(SteadyState::Orbit);
+    // What is carried out, where there is more than one analysis.
+    let done = match circuit.steady {
+        Some(SteadyState::Orbit) => "`.pss`",
+        _ => "`.tran`",
+    };
+    if !transient && !circuit.ac.is_empty() {
+        only_one_way(args)?;
+        if circuit.tran.is_some() {
+            let file = args.input.file.display();
+            let text = "`.pss` is left out, as there is an `.ac`";
+            streams.note(
+                "left-out",
+                format!("{text}; `circ pss {file}` carries it out"),
+            );
+        }
+        return ac::sim(args, model, formats, streams).map(Some);
+    }
+    if !circuit.ac.is_empty() {
+        let file = args.input.file.display();
+        streams.note(
+            "left-out",
+            format!("`.ac` is left out, as there is a {done}; `circ ac {file}` carries it out"),
+        );
+    }
+    if let (true, Some(told)) = (transient, left_out(circuit)) {
+        streams.note(
+            "left-out",
+            format!(
+                "{told}; `circ ac {}` measures that",
+                args.input.file.display()
+            ),
+        );
+    }
+    if circuit.tran.is_none() && !circuit.dc.is_empty() {
+        only_one_way(args)?;
+        return dc::sim(args, model, formats, streams).map(Some);
+    }
+    let file = args.input.file.display();
+    if circuit.tran.is_none() && circuit.op {
+        only_one_way(args)?;
+        let outputs = (&args.results.outputs[..], formats);
+        return op::of_model(&args.input, model, outputs, false, streams).map(Some);
+    }
+    if circuit.op {
+        streams.note(
+            "left-out",
+            format!("`.op` is left out, as there is a {done}; `circ op {file}` carries it out"),
+        );
+    }
+    if circuit.tran.is_none() {
+        let message = "nothing to simulate: the netlist asks for no .tran analysis";
+        return Err(Failure::told("no-analysis", format!("{file}: {message}")));
+    }
+    if circuit.steady == Some(SteadyState::Orbit) {
+        if !args.worst.is_empty() || args.verify {
+            only_one_way(args)?;
+        }
+        let asked = PssArgs {
+            input: args.input.clone(),
+            results: args.results.clone(),
+            period: None,
+            order: None,
+            tol: None,
+            table: args.table.clone(),
+        };
+        return pss::orbit(&asked, subject, formats, signals, streams).map(Some);
+    }
+    let unknown = args.worst.iter().find_map(|of| circuit.no_measurement(of));
+    if let Some(what) = unknown {
+        return Err(Failure::told(
+            "unknown-measurement",
+            format!("--worst: {what}"),
+        ));
+    }
+    tabulate::known(&args.table, &args.input, model)?;
+    if circuit.steady == Some(SteadyState::Start) && args.verify {
+        let file = args.input.file.display();
+        let message = "`--verify` takes a run from its usual start, without `steady`";
+        return Err(Failure::told(
+            "option-conflict",
+            format!("{file}: {message}"),
+        ));
+    }
+    if !circuit.steps.is_empty() {
+        only_once(args)?;
+        let stepping = Stepping {
+            args,
+            model,
+            request: request.clone(),
+            signals,
+        };
+        return stepping.sim(formats, streams).map(Some);
+    }
+    for of in &args.worst {
+        let options = worst_options(args, request, signals.flag());
+        analysis::toleranced(model, &of.to_lowercase(), &options)
+            .map_err(|error| Failure::of_run("--worst: ", &error))?;
+    }
+    Ok(None)
 }
 
 impl SimArgs {
@@ -359,32 +375,6 @@ fn second(subject: &Subject, run: &Run, options: &VerifyOptions<'_>) -> Result<V
     }
 }
 
-fn no_tran() -> Error {
-    let reason = "the system has no \"tran\": {\"tstep\", \"tstop\"}";
-    Error::before(Reason::Unsupported(reason.into()))
-}
-
-/// Where the rows of a run go.
-#[derive(Default)]
-pub(super) struct Route<'a> {
-    /// Rows at events and corners.
-    pub corners: bool,
-    /// Rows between those, which pictures want.
-    pub pictures: bool,
-    /// Rows are read as numbers.
-    pub numbers: bool,
-    /// Takes rows as they come.
-    pub sink: Option<Sink<'a>>,
-    /// Rows are for the sink alone.
-    pub discard: bool,
-    /// Ends the run.
-    pub cancel: Option<&'a AtomicBool>,
-    /// Bytes for rows at most, if not the usual.
-    pub held: Option<usize>,
-    /// Begins at the periodic steady state.
-    pub from_orbit: bool,
-}
-
 /// Simulates, and measures where the circuit asks for it; then [`Route::sink`] gets no rows.
 fn measured_run(
     subject: &Subject,
@@ -480,161 +470,4 @@ fn waves<'a>(
 ) -> impl Iterator<Item = (&'a str, &'a Wave)> {
     let named = |input: &'a Input| (input.name.as_str(), &input.source.wave);
     inputs.into_iter().map(named)
-}
-
-/// How a subject is to be integrated.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Request {
-    /// The method.
-    pub method: Method,
-    /// θ.
-    pub theta: Option<f64>,
-    /// γ.
-    pub gamma: Option<f64>,
-    /// Fixed step, s.
-    pub step: Option<f64>,
-    /// Relative tolerance.
-    pub tol: Option<f64>,
-    /// Rows at events.
-    pub events: bool,
-    /// No coarser runs beside one in steps, whose error is then not known.
-    pub unestimated: bool,
-}
-
-impl Request {
-    /// The tolerances.
-    pub(super) fn settings(&self) -> Settings {
-        let mut settings = Settings::default();
-        if let Some(tol) = self.tol {
-            settings.tol = tol;
-        }
-        settings
-    }
-
-    /// What the flags ask for; θ or γ without a method ask for `theta`.
-    ///
-    /// # Errors
-    /// [`Failure::Told`] when θ or γ are given to another method.
-    pub fn of(args: &MethodArgs, events: bool) -> Result<Self, Failure> {
-        let shaped = args.theta.is_some() || args.gamma.is_some();
-        let method = match args.method {
-            args::Method::Auto if shaped => Method::Theta,
-            args::Method::Auto => Method::Auto,
-            args::Method::Exact => Method::Exact,
-            args::Method::Euler => Method::Euler,
-            args::Method::Theta => Method::Theta,
-        };
-        if shaped && method != Method::Theta {
-            return Err(Failure::told(
-                "option-conflict",
-                "--theta and --gamma belong to `--method theta`".into(),
-            ));
-        }
-        let MethodArgs {
-            theta,
-            gamma,
-            step,
-            tol,
-            ..
-        } = *args;
-        Ok(Self {
-            method,
-            theta,
-            gamma,
-            step,
-            tol,
-            events,
-            unestimated: args.no_estimate,
-        })
-    }
-}
-
-/// Simulates over the subject's `.tran`, with `tstep` in place of its print step if given.
-///
-/// # Errors
-/// See [`Error`].
-pub fn run(
-    subject: &Subject,
-    request: &Request,
-    tstep: Option<f64>,
-    streams: &Streams,
-) -> Result<Run, Error> {
-    run_to(subject, request, tstep, Route::default(), streams)
-}
-
-/// The same with rows on their way.
-fn run_to(
-    subject: &Subject,
-    request: &Request,
-    tstep: Option<f64>,
-    route: Route<'_>,
-    streams: &Streams,
-) -> Result<Run, Error> {
-    let tran = subject.tran().map(|t| Tran {
-        tstep: tstep.unwrap_or(t.tstep),
-        ..t
-    });
-    with_options(tran, request, route, streams, |options| {
-        match (subject, tran) {
-            (Subject::Circuit(model), _) => {
-                let circuit = Circuit {
-                    tran,
-                    ..model.circuit().clone()
-                };
-                simulate(&circuit, model.multiport(), options)
-            }
-            (Subject::System(system), Some(tran)) => {
-                simulate_system(&system.lcs, &system.x0, tran, options)
-            }
-            (Subject::System(_), None) => Err(no_tran()),
-        }
-    })
-}
-
-/// Runs what takes options, with a progress bar over the span of `tran`.
-fn with_options<R>(
-    tran: Option<Tran>,
-    request: &Request,
-    route: Route<'_>,
-    streams: &Streams,
-    run: impl FnOnce(SimOptions<'_>) -> R,
-) -> R {
-    let mut sink = route.sink;
-    let sink = sink.as_mut().map(|s| &mut **s as Sink<'_>);
-    let bar = streams.progress(PROGRESS as u64, "setting up");
-    let span = tran.map_or(1.0, |t| t.tstop);
-    let mut shown = 0;
-    let mut report = |t: f64| {
-        let position = (t / span * PROGRESS) as u64;
-        if position != shown {
-            shown = position;
-            bar.set_position(position);
-            bar.set_message(format!(
-                "simulating {} of {}",
-                quantity(t, "s", 3),
-                quantity(span, "s", 3)
-            ));
-        }
-    };
-    let mut settings = request.settings();
-    if let Some(held) = route.held {
-        settings.max_held = held;
-    }
-    let result = run(SimOptions {
-        method: request.method,
-        theta: request.theta,
-        gamma: request.gamma,
-        step: request.step,
-        events: request.events,
-        corners: route.corners,
-        rows: sink,
-        discard: route.discard,
-        cancel: route.cancel,
-        settings,
-        unestimated: request.unestimated,
-        start: None,
-        progress: (!bar.is_hidden()).then_some(&mut report),
-    });
-    bar.finish_and_clear();
-    result
 }

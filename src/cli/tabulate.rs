@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::args::{Input, SimArgs, TableArgs};
 use super::exit::Failure;
-use super::sim::Request;
+use super::request::Request;
 use crate::analysis::{self, PeriodicOptions, Table, TableOptions};
 use crate::integrate::Error;
 use crate::model::Model;

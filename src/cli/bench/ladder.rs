@@ -1,7 +1,7 @@
 //! The ladders of our own methods: steps and tolerances.
 
 use crate::circuit::Tran;
-use crate::cli::sim::Request;
+use crate::cli::request::Request;
 use crate::integrate::Method;
 
 /// Halvings of the print step on the ladder of steps.

@@ -15,7 +15,7 @@ use super::exit::{Exit, Failure};
 use super::files::{self, STDOUT};
 use super::input::{self, Subject};
 use super::output;
-use super::sim::{self, Request};
+use super::request::{self, Request};
 use super::streams::Streams;
 use crate::circuit::Tran;
 use crate::integrate::{Method, Run};
@@ -117,7 +117,7 @@ impl Bench<'_> {
             events: true,
             unestimated: true,
         };
-        if let Ok(run) = sim::run(self.subject, &request, tstep, &self.silent) {
+        if let Ok(run) = request::run(self.subject, &request, tstep, &self.silent) {
             return Ok(Reference {
                 name: "exact".into(),
                 waveforms: run.waveforms,
@@ -128,7 +128,7 @@ impl Bench<'_> {
             tol: Some(REFERENCE_TOL),
             ..request
         };
-        let run = sim::run(self.subject, &request, tstep, &self.silent)
+        let run = request::run(self.subject, &request, tstep, &self.silent)
             .map_err(|e| Failure::told("no-reference", format!("there is no reference: {e}")))?;
         Ok(Reference {
             name: format!("theta tol={REFERENCE_TOL:e}"),
@@ -148,7 +148,7 @@ impl Bench<'_> {
         let mut best: Option<Run> = None;
         let mut spent = 0.0;
         for _ in 0..REPETITIONS.0 {
-            match sim::run(self.subject, &rung.request, rung.rows, &self.silent) {
+            match request::run(self.subject, &rung.request, rung.rows, &self.silent) {
                 Ok(run) => {
                     spent += run.stats.cpu_seconds;
                     if best
