@@ -3,7 +3,7 @@
 //! A switch that turns on costs E_on(v⁻, i⁺), one that turns off E_off(v⁺, i⁻), and a diode whose forward current is interrupted E_rr(−v⁺, i⁻): voltages and
 //! currents stand in the tables by magnitude, and a current that flows against the voltage counts as 0.
 
-use super::Columns;
+use super::columns::Columns;
 use crate::circuit::{EnergyTable, Losses};
 use crate::settings::tolerances::events::LEAKING;
 

@@ -4,9 +4,11 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DVector};
 
+use super::columns::{Columns, Sums, distortion};
 use super::commutation::{Commutations, Costs};
 use super::extrema::Extrema;
-use super::{Columns, Span, Sums, distortion, integrals};
+use super::integrals;
+use super::means::Span;
 use crate::analysis::variation::{Course, Leap, Linear};
 use crate::circuit::Kind;
 use crate::integrate::Error;

@@ -1,43 +1,11 @@
 //! What devices lose besides what their voltages and currents make, and how warm they become.
 
-use serde::Serialize;
-
+use super::columns::Columns;
 use super::commutation::{Cost, Costs};
 use super::heat::{Heated, Warm, at_rest};
-use super::{Columns, ElementMeans};
+use super::means::{DeviceLosses, ElementMeans, Switching};
 use crate::circuit::{Element, EnergyTable, Losses, NodeId};
 use crate::integrate::Note;
-
-/// Changes of state that cost energy.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct Switching {
-    /// How many.
-    pub count: usize,
-    /// Of all together, J.
-    pub energy: f64,
-}
-
-/// Losses of a device over a span of time, by the tables of its model.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct DeviceLosses {
-    /// Of a switch that turns on: E_on(v⁻, i⁺).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub on: Option<Switching>,
-    /// Of a switch that turns off: E_off(v⁺, i⁻).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub off: Option<Switching>,
-    /// Of a diode whose forward current is interrupted: E_rr(−v⁺, i⁻).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub recovery: Option<Switching>,
-    /// [`ElementMeans::power`], W.
-    pub conduction: f64,
-    /// Mean power of the changes of state, W.
-    pub switching: f64,
-    /// Both, W.
-    pub total: f64,
-    /// Of the junction at rest, °C: where the heat of the devices leaves as fast as it comes; `None` where nothing is said of it, or it runs away.
-    pub temperature: Option<f64>,
-}
 
 /// What there is to lose.
 #[derive(Default)]

@@ -4,8 +4,9 @@ use std::f64::consts::TAU;
 
 use nalgebra::Complex;
 
+use super::columns::{Columns, Sums, distortion};
 use super::commutation::{Commutations, Costs};
-use super::{Columns, Span, Sums, distortion};
+use super::means::Span;
 use crate::integrate::Run;
 use crate::settings::tolerances::times::SAME_TIME;
 
