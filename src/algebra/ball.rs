@@ -1,7 +1,7 @@
 //! Numbers with an exact zero test and an error bound: a residue, a double-double and a radius.
 
 use num_bigint::BigInt;
-use num_traits::{Signed, ToPrimitive};
+use num_traits::{Float, Signed, ToPrimitive};
 
 use super::double::ROUNDING;
 use super::{Double, Field, Rational, Value, rational};
@@ -81,7 +81,7 @@ impl Ball {
         /// Integers from here on may be rounded.
         const EXACT_INTEGERS: f64 = 9_007_199_254_740_992.0;
         if x.fract() == 0.0 && x.abs() < EXACT_INTEGERS {
-            return Self::from_rational(&rational(x));
+            return Self::exactly(x);
         }
         let value = Double { hi: x, lo: 0.0 };
         Self {
@@ -105,9 +105,14 @@ impl Ball {
         .settle()
     }
 
-    /// The ball around an integer of at most 53 bits.
-    fn integer(x: f64) -> Self {
-        let residue = x.abs() as u64;
+    /// The ball around a double m 2^e, and 0 where it is not finite: modulo p, 2^61 is 1.
+    fn exactly(x: f64) -> Self {
+        if x == 0.0 || !x.is_finite() {
+            return Self::ZERO;
+        }
+        let (mantissa, exponent, _) = x.integer_decode();
+        let power = 1 << i32::from(exponent).rem_euclid(61);
+        let residue = mul_mod(mantissa, power);
         Self {
             residue: if x < 0.0 { neg_mod(residue) } else { residue },
             value: Double { hi: x, lo: 0.0 },
@@ -123,12 +128,12 @@ impl Ball {
         if mantissa.unsigned_abs() >= 1 << 53 || size > POWERS {
             return None;
         }
-        let mut power = Self::integer(1.0);
+        let mut power = Self::one();
         for _ in 0..size {
             power.residue = mul_mod(power.residue, 10);
             power.value.hi *= 10.0;
         }
-        let mantissa = Self::integer(mantissa as f64);
+        let mantissa = Self::exactly(mantissa as f64);
         Some(if exponent < 0 {
             mantissa.div(&power)
         } else {
@@ -189,8 +194,12 @@ impl Field for Ball {
     }
 
     fn value(value: Value) -> Self {
-        let short = value.decimal.and_then(|(m, e)| Self::decimal(m, e));
-        short.unwrap_or_else(|| Self::from_rational(&value.exact()))
+        match value.decimal {
+            Some((m, e)) => {
+                Self::decimal(m, e).unwrap_or_else(|| Self::from_rational(&value.exact()))
+            }
+            None => Self::exactly(value.f64),
+        }
     }
 
     fn is_zero(&self) -> bool {
@@ -332,6 +341,12 @@ mod tests {
             prop_assert_eq!((ball.residue, ball.value.hi), (slow.residue, slow.value.hi));
             prop_assert!(contains(&ball, &exact));
             prop_assert!(ball.radius <= 1e-29 * ball.value.hi.abs());
+        }
+
+        #[test]
+        fn a_double_is_the_rational(x in prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL | prop::num::f64::ZERO) {
+            let (ball, slow) = (<Ball as Field>::value(x.into()), Ball::from_rational(&rational(x)));
+            prop_assert_eq!((ball.residue, ball.value, ball.radius), (slow.residue, slow.value, slow.radius));
         }
 
         #[test]

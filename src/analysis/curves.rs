@@ -36,16 +36,22 @@ pub(super) fn transient_curves(
     if is_large(model, &tran) {
         return Ok(None);
     }
-    let probing = model.with_circuit(Circuit {
-        probes: measured.clone(),
-        columns: vec![],
-        ..circuit.clone()
-    })?;
+    // A sweep has it show what is measured alone.
+    let probing = if circuit.probes == *measured && circuit.columns.is_empty() {
+        None
+    } else {
+        Some(model.with_circuit(Circuit {
+            probes: measured.clone(),
+            columns: vec![],
+            ..circuit.clone()
+        })?)
+    };
+    let probing = probing.as_ref().unwrap_or(model);
     let asked = (options.cancel, &options.settings);
     let start = options.start.as_ref();
     let first = circuit.measured_from(&tran).max(tran.tstart);
     let span = (first, tran.tstop);
-    let Some(course) = course(&probing, options.method, start, span, asked)? else {
+    let Some(course) = course(probing, options.method, start, span, asked)? else {
         return Ok(None);
     };
     let outputs: Vec<usize> = (0..measured.len()).collect();
