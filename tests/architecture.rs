@@ -190,7 +190,7 @@ const CONFINED: [(&str, &[&str], &str); 6] = [
 ];
 
 /// Constants of type f64 that decide nothing, outside `settings/tolerances/`: (file, names, why).
-const NO_TOLERANCES: [(&str, &[&str], &str); 24] = [
+const NO_TOLERANCES: [(&str, &[&str], &str); 25] = [
     (
         "algebra/ball.rs",
         &["EXACT_INTEGERS", "UP"],
@@ -200,6 +200,11 @@ const NO_TOLERANCES: [(&str, &[&str], &str); 24] = [
         "algebra/double.rs",
         &["ROUNDING", "SPLITTER"],
         "bounds of the arithmetic of doubles",
+    ),
+    (
+        "algebra/long.rs",
+        &["ROUNDING"],
+        "a bound of the arithmetic of its numbers",
     ),
     (
         "analysis/variation/moved.rs",

@@ -1,5 +1,7 @@
 //! Double-double arithmetic: an unevaluated sum of two doubles, 106 bits.
 
+use super::{Digits, Field, Rational, rational};
+
 /// `hi + lo` with |lo| ≤ ½ ulp(hi).
 ///
 /// # References
@@ -14,7 +16,7 @@ pub struct Double {
 }
 
 /// Relative error bound of one operation here (the references prove 2⁻¹⁰², 3·2⁻¹⁰⁶ and 10·2⁻¹⁰⁶).
-pub(super) const ROUNDING: f64 = 7.888_609_052_210_118e-31; // 2^-100
+const ROUNDING: f64 = 7.888_609_052_210_118e-31; // 2^-100
 
 /// a + b and its rounding error.
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
@@ -110,6 +112,49 @@ impl Double {
             r = r.plus(residual.times(r.recip()).times(half));
         }
         r
+    }
+}
+
+impl Digits for Double {
+    const ROUNDING: f64 = ROUNDING;
+
+    fn double(x: f64) -> Self {
+        Self { hi: x, lo: 0.0 }
+    }
+
+    fn nearest(exact: &Rational) -> (Self, f64) {
+        let hi = Field::to_f64(exact);
+        let lo = Field::to_f64(&(exact - rational(hi)));
+        (Self::sum(hi, lo), lo.abs() * f64::EPSILON)
+    }
+
+    fn plus(&self, other: &Self) -> Self {
+        Self::plus(*self, *other)
+    }
+
+    fn times(&self, other: &Self) -> Self {
+        Self::times(*self, *other)
+    }
+
+    fn negated(&self) -> Self {
+        Self::negated(*self)
+    }
+
+    fn recip(&self) -> Self {
+        Self::recip(*self)
+    }
+
+    fn is_unit(&self) -> bool {
+        self.hi.abs() == 1.0 && self.lo == 0.0
+    }
+
+    fn to_f64(&self) -> f64 {
+        self.hi
+    }
+
+    #[cfg(test)]
+    fn exact(&self) -> Rational {
+        rational(self.hi) + rational(self.lo)
     }
 }
 

@@ -1,6 +1,6 @@
 //! The arithmetic an elimination needs.
 
-use super::Value;
+use super::{Rational, Value};
 
 /// Numbers over which an [`Elimination`](super::Elimination) runs: zero tests are exact.
 pub trait Field: Clone + std::fmt::Debug {
@@ -32,4 +32,29 @@ pub trait Field: Clone + std::fmt::Debug {
     fn is_precise(&self) -> bool;
     /// Bound on what the computation may have lost of the number, besides the rounding to the nearest double.
     fn radius(&self) -> f64;
+}
+
+/// The approximate numbers that intervals are around.
+pub trait Digits: Clone + std::fmt::Debug {
+    /// Relative error bound of one operation.
+    const ROUNDING: f64;
+    /// A double, exactly.
+    fn double(x: f64) -> Self;
+    /// What is nearest to an exact number, and how far it may be from it.
+    fn nearest(exact: &Rational) -> (Self, f64);
+    /// `self + other`.
+    fn plus(&self, other: &Self) -> Self;
+    /// `self · other`.
+    fn times(&self, other: &Self) -> Self;
+    /// `−self`.
+    fn negated(&self) -> Self;
+    /// `1/self`.
+    fn recip(&self) -> Self;
+    /// Whether it is 1 or −1.
+    fn is_unit(&self) -> bool;
+    /// The nearest double.
+    fn to_f64(&self) -> f64;
+    /// As an exact number.
+    #[cfg(test)]
+    fn exact(&self) -> Rational;
 }

@@ -215,6 +215,22 @@ fn rectifiers_that_commutate_at_one_instant_find_their_mode() {
     assert!((left - 1.0).abs() < 1e-9, "{left}");
 }
 
+/// Over longer spans more of what the rectifiers share decays at once, in fractions of thousands of digits: what runs see is the same, in as
+/// few modes.
+#[test]
+fn rectifiers_have_the_same_course_whatever_the_print_step() {
+    let fine = run("rect4", Method::Exact);
+    let coarse = changed("rect4", &[(".tran 20u", ".tran 150u")], Method::Exact);
+    assert_exact(&coarse, 2000);
+    for probe in ["v(p0,n0)", "v(ba)"] {
+        for k in 1..=10 {
+            let t = 0.6e-3 * f64::from(k);
+            let [a, b] = [&fine, &coarse].map(|run| crate::runs::at(run, probe, t));
+            assert!((a - b).abs() < 1e-9, "{probe} at {t}: {a} {b}");
+        }
+    }
+}
+
 /// The largest difference of all columns of two runs in the rows that both have, relative to the amplitude of each.
 fn apart(a: &Run, b: &Run) -> f64 {
     let row = |run: &Run, t: f64| {

@@ -24,7 +24,7 @@ mod roles;
 mod separate;
 mod system;
 
-use crate::algebra::{Field, SparseRow};
+use crate::algebra::{Field, LongBall, SparseRow};
 use crate::diagnostic::Internal;
 use crate::mna::{Reduced, StaticMultiport};
 
@@ -205,9 +205,28 @@ fn reduce_in(
     let parts = if precise || behaviour.inexact || behaviour.rough {
         parts
     } else {
-        published(behaviour, behaviour.rational(), position, apart)?.0
+        exact(behaviour, position, apart)?
     };
     Ok(Lcs::new(parts)?)
+}
+
+/// The system reduced over rationals. Fractions double their length with each fast state that is taken apart, so that this is done to 75 digits;
+/// where they are too few nothing is taken apart.
+fn exact(
+    behaviour: &StaticMultiport,
+    position: &Position,
+    apart: Option<f64>,
+) -> Result<LcsParts, ReduceError> {
+    let exact = reduction(behaviour, behaviour.rational(), position)?;
+    if let Some(span) = apart {
+        let mut long = exact.over(LongBall::from_rational);
+        long.separate(span);
+        let (parts, precise) = publish(behaviour, position, &long, apart);
+        if precise {
+            return Ok(parts);
+        }
+    }
+    Ok(publish(behaviour, position, &exact, None).0)
 }
 
 fn published<F: Field>(
@@ -345,6 +364,40 @@ struct Reduction<F> {
     notes: Vec<String>,
 }
 
+impl<F> Reduction<F> {
+    /// The same with other numbers.
+    fn over<G>(&self, number: impl Fn(&F) -> G) -> Reduction<G> {
+        let row = |row: &SparseRow<F>| -> SparseRow<G> {
+            row.iter().map(|(column, x)| (*column, number(x))).collect()
+        };
+        let rows = |rows: &[SparseRow<F>]| rows.iter().map(row).collect();
+        let pairs = |pairs: &[(SparseRow<F>, SparseRow<F>)]| {
+            pairs.iter().map(|(a, b)| (row(a), row(b))).collect()
+        };
+        let constraint = |(a, elements): &Constraint<F>| (row(a), elements.clone());
+        Reduction {
+            states: self.states.clone(),
+            fast: self.fast.clone(),
+            pairs: self.pairs.clone(),
+            rates: rows(&self.rates),
+            y: rows(&self.y),
+            s: rows(&self.s),
+            readings: pairs(&self.readings),
+            guards: pairs(&self.guards),
+            kernel: rows(&self.kernel),
+            undetermined: self.undetermined,
+            constraints: self.constraints.iter().map(constraint).collect(),
+            shift: rows(&self.shift),
+            inject: rows(&self.inject),
+            energy: rows(&self.energy),
+            metric: (self.metric.iter())
+                .map(|(a, b, x)| (*a, *b, number(x)))
+                .collect(),
+            notes: self.notes.clone(),
+        }
+    }
+}
+
 #[cfg(test)]
 pub(super) mod oracle {
     use super::*;
@@ -373,5 +426,71 @@ pub(super) mod oracle {
         Eliminated::new(behaviour, behaviour.ball(), position, order)
             .and_then(Eliminated::system)
             .is_ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::mna::behaviour;
+    use crate::mna::fixture::circuit;
+
+    use nalgebra::DMatrix;
+
+    use super::*;
+
+    /// Two rectifiers on one supply, whose inductors share the current through 1 MΩ; which of their diodes conduct.
+    fn rectifiers(which: &str, ground: &str) -> (StaticMultiport, Position) {
+        let mut netlist =
+            "va a 0 1\n vb b 0 2\n vc c 0 3\n la a sa 0.1m\n lb b sb 0.1m\n lc c sc 0.1m\n"
+                .to_string();
+        for k in 0..2 {
+            for phase in ["a", "b", "c"] {
+                netlist += &format!(
+                    "l{phase}{k} s{phase} m{phase}{k} 1.0{k}m\n r{phase}{k} m{phase}{k} x{phase}{k} 50m\n \
+                     du{phase}{k} x{phase}{k} p{k}\n dd{phase}{k} n{k} x{phase}{k}\n"
+                );
+            }
+            netlist +=
+                &format!("c{k} p{k} n{k} 1m\n r{k} p{k} n{k} 3{k}\n rg{k} n{k} 0 {ground}\n");
+        }
+        let behaviour = behaviour(&circuit(&netlist)).unwrap();
+        let hold = |c| if c == '#' { Hold::Closed } else { Hold::Open };
+        let position = Position {
+            devices: which.chars().map(hold).collect(),
+            switches: Vec::new(),
+            storage: StorageHold::Dynamic,
+        };
+        (behaviour, position)
+    }
+
+    #[test]
+    fn states_taken_apart_to_75_digits_are_those_of_fractions() {
+        for which in ["#..##.#..##.", "#..#..#..##.", "#..#..#..#.."] {
+            let (behaviour, position) = rectifiers(which, "1meg");
+            let span = 2e-3;
+            let found = exact(&behaviour, &position, Some(span)).unwrap();
+            let mut fractions = reduction(&behaviour, behaviour.rational(), &position).unwrap();
+            fractions.separate(span);
+            let (known, _) = publish(&behaviour, &position, &fractions, Some(span));
+            assert!(found.fast.len() >= 2, "{which}: {:?}", found.fast);
+            let same = |a: &DMatrix<f64>, b: &DMatrix<f64>| {
+                assert_eq!(a.shape(), b.shape());
+                let close = |(a, b): (&f64, &f64)| (a - b).abs() <= f64::EPSILON * b.abs();
+                a.iter().zip(b.iter()).all(close)
+            };
+            assert!(same(&found.a, &known.a), "{which}: {} {}", found.a, known.a);
+            assert!(same(&found.e, &known.e), "{which}: {} {}", found.e, known.e);
+            assert!(same(&found.storage.x, &known.storage.x));
+            assert!(same(&found.held.guard.x, &known.held.guard.x));
+        }
+    }
+
+    #[test]
+    fn what_75_digits_do_not_know_is_not_taken_apart() {
+        let (behaviour, position) = rectifiers("#..##.#..##.", "1e80");
+        let found = exact(&behaviour, &position, Some(2e-3)).unwrap();
+        let known = exact(&behaviour, &position, None).unwrap();
+        assert!(found.fast.is_empty());
+        assert_eq!(found.a, known.a);
     }
 }
