@@ -5,7 +5,7 @@ use num_traits::{One, ToPrimitive};
 
 use super::{Digits, Rational, rational};
 
-/// `mantissa · 2^exponent` with a mantissa of at most [`BITS`] digits.
+/// `mantissa · 2^exponent` with a mantissa of at most 256 digits.
 #[derive(Debug, Clone)]
 pub struct Long {
     mantissa: BigInt,

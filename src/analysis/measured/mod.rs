@@ -19,7 +19,7 @@ use crate::settings::tolerances::times::ROWS_A_PERIOD;
 
 /// The transient that `.tran` asks for, with what `.meas` and `.four` ask of it.
 ///
-/// Of a run that is exact throughout they see what happens between events ([`Curves`]), else the rows, those at events and at corners of sources too, and at least
+/// Of a run that is exact throughout they see what happens between events ([`Curves`](crate::measure::Curves)), else the rows, those at events and at corners of sources too, and at least
 /// 2000 of the grid unless the step is fixed. Where there are any, [`SimOptions::rows`] and [`SimOptions::discard`] are not heeded: the rows are those of the run. `.tran … steady` begins at the
 /// periodic steady state unless [`SimOptions::start`] says where.
 ///
@@ -34,7 +34,7 @@ pub fn transient(model: &Model, options: SimOptions<'_>) -> Finished {
     shown_of(measuring, model, options)
 }
 
-/// The same for pictures, which follow curves between output times: with rows of the kind [`RowKind::Between`] where events, sources or the
+/// The same for pictures, which follow curves between output times: with rows of the kind [`RowKind::Between`](crate::integrate::RowKind::Between) where events, sources or the
 /// curves themselves are faster than the grid.
 ///
 /// There are 16 rows for each period of the fastest source, and the run is made again with closer rows where fewer than twice as many as at events turn out to be

@@ -56,7 +56,7 @@ impl Finished {
     }
 }
 
-/// Whether a circuit asks for measurements; then [`transient`] holds its rows until the end.
+/// Whether a circuit asks for measurements; then [`transient`](super::transient) holds its rows until the end.
 #[must_use]
 pub fn is_measured(circuit: &Circuit) -> bool {
     !circuit.measured.is_empty() || !circuit.measurements.is_empty()
