@@ -10,7 +10,7 @@ use super::lawful::PortLaw;
 use super::lcp::Scaling;
 use crate::law::{Junction, Law, Resolvent};
 use crate::settings::tolerances::complementarity::{
-    CONTRACTS, CONTRACTS_NO_MORE, MONOTONE, ROUNDING_STEPS,
+    CONTRACTS, CONTRACTS_NO_MORE, MONOTONE, ROUNDING_STEPS, RUNAWAY,
 };
 
 /// Steps from one start; those that need more are better started elsewhere.
@@ -170,6 +170,7 @@ impl Newton {
     fn descend(&mut self, (wanted, granted): (f64, f64)) -> bool {
         let largest = |values: &[f64]| values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         self.evaluate();
+        let start = largest(&self.w).max(largest(&self.q));
         let mut before = f64::INFINITY;
         for k in 0..STEPS {
             let fresh = !self.factored || self.size <= SMALL;
@@ -187,6 +188,10 @@ impl Newton {
             }
             self.evaluate();
             let scale = largest(&self.w).max(largest(&self.q));
+            // Far out the voltages of junctions are rounding of their currents, and every step is small.
+            if scale > RUNAWAY * start {
+                return false;
+            }
             let (size, rate) = (wanted * scale, norm / before);
             // What is left after this step is a geometric series at most.
             if norm <= size || k > 0 && rate < CONTRACTS && norm * rate / (1.0 - rate) <= size {

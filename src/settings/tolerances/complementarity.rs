@@ -55,6 +55,10 @@ pub(crate) const CONTRACTS: f64 = 0.5;
 /// more factorisations.
 pub(crate) const CONTRACTS_NO_MORE: f64 = 0.1;
 
+/// Newton's iterates that have grown by this factor, beside start and right-hand side, are no solution. Larger: rounding of the voltages of junctions
+/// passes for a solution with enormous currents; smaller: ports that are driven through much smaller resistances go to slower methods.
+pub(crate) const RUNAWAY: f64 = 1e8;
+
 /// Steps of Newton's method that shrink by no more than this factor are rounding, if they are as small as granted. Larger, up to 1: iterations in vain;
 /// smaller: steps that still contract are taken for rounding.
 pub(crate) const ROUNDING_STEPS: f64 = 0.5;
