@@ -10,7 +10,7 @@ use crate::circuit::Source;
 use crate::integrate::Note;
 use crate::integrate::energy::Balance;
 use crate::integrate::error::{Error, Reason, is_final, named};
-use crate::integrate::exact::{Exact, Passage, Place};
+use crate::integrate::exact::{Corners, Exact, Passage, Place};
 use crate::integrate::grid::Times;
 use crate::integrate::log::Log;
 use crate::integrate::run::{Outcome, Stepper};
@@ -231,8 +231,8 @@ impl Handover {
     }
 
     /// See [`Exact::keep_passages`].
-    pub(crate) fn keep_passages(&mut self, all: bool) {
-        self.exact.keep_passages(all);
+    pub(crate) fn keep_passages(&mut self, corners: Corners) {
+        self.exact.keep_passages(corners);
     }
 
     /// The changes of mode since [`Self::keep_passages`], and where the run stood when it was exact throughout; `None` where there are too many or steps were made

@@ -56,7 +56,6 @@ pub use rows::{Asked, Block, RowKind, Sink};
 pub use run::{Frame, Outcome, Stepper};
 pub(crate) use simulate::simulate_beside;
 pub use simulate::{Method, SimOptions, Standing, simulate, simulate_system};
-pub(crate) use simulation::Corners;
 pub use simulation::{Checkpoint, Simulation, SimulationOptions, Stop, StopReason};
 pub(crate) use sparse::{Lengths, Passed, Returns};
 pub use start::{OperatingPoint, Values, operating_point};

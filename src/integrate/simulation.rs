@@ -12,7 +12,6 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::DVector;
 
-pub(crate) use self::passages::Corners;
 pub use self::stop::{Checkpoint, SimulationOptions, Stop, StopReason};
 use self::way::Way;
 

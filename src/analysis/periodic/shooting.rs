@@ -14,8 +14,8 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::{DMatrix, DVector};
 
 use crate::analysis::variation::{System, Trajectory};
-use crate::integrate::exact::Passage;
-use crate::integrate::{Change, Corners, Error, Reason, Simulation};
+use crate::integrate::exact::{Corners, Passage};
+use crate::integrate::{Change, Error, Reason, Simulation};
 use crate::settings::tolerances::periodic::{
     AT_ROUNDING, DIFFERENCE, EVENT_AGAIN, LEAST_AMPLITUDE, NEUTRAL, REUSED, ROUNDING_OF_RETURN,
     STEPPED_DIFFERENCE, TAKES_PART,

@@ -7,8 +7,8 @@ use nalgebra::DVector;
 use super::instant::Inputs;
 use super::{System, not_smooth, shaped};
 use crate::circuit::source::Piece;
-use crate::integrate::exact::{Assembler, Key, Passage};
-use crate::integrate::{Corners, Error, Impulse, Reason, Simulation};
+use crate::integrate::exact::{Assembler, Corners, Key, Passage};
+use crate::integrate::{Error, Impulse, Reason, Simulation};
 use crate::lcs::Hold;
 use crate::settings::tolerances::times::SAME_TIME;
 

@@ -31,9 +31,9 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 
-use crate::integrate::exact::{Assembler, Key, Owner, Passage};
+use crate::integrate::exact::{Assembler, Corners, Key, Owner, Passage};
 use crate::integrate::switching::Threshold;
-use crate::integrate::{Corners, Error, Reason, Simulation};
+use crate::integrate::{Error, Reason, Simulation};
 use crate::settings::tolerances::events::{AT_LEVEL, GRAZING, SAME_TIMING};
 use crate::settings::tolerances::jumps::FOLLOWS_JUMP;
 use crate::settings::tolerances::times::SAME_TIME;

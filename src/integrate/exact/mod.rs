@@ -39,7 +39,7 @@ pub(crate) use exosystem::{Exosystem, Shape};
 pub(crate) use key::{Key, Owner};
 pub(crate) use mode::over_w;
 pub(crate) use modes::Modes;
-pub(crate) use passage::Passage;
+pub(crate) use passage::{Corners, Passage};
 pub(crate) use report::row_jumps;
 pub(crate) use spectrum::Spectrum;
 pub(crate) use stepper::Place;

@@ -3,6 +3,15 @@
 use super::key::{Key, Owner};
 use crate::settings::tolerances::jumps::FOLLOWS_JUMP;
 
+/// At which corners of sources a stretch of a run ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Corners {
+    /// Those of sources that the state or a probe sees.
+    Seen,
+    /// Those of sources that act through controls alone, too: values may move them.
+    All,
+}
+
 /// From one mode to the next at one instant. Changes of mode at equal times follow each other; a corner of a source leads from a mode to
 /// itself.
 #[derive(Debug, Clone)]

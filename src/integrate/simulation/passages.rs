@@ -6,18 +6,9 @@ use std::sync::atomic::AtomicBool;
 use super::Simulation;
 use super::way::Way;
 use crate::integrate::error::Error;
-use crate::integrate::exact::{Assembler, Passage};
+use crate::integrate::exact::{Assembler, Corners, Passage};
 use crate::integrate::stats::Impulse;
 use crate::integrate::theta::Instant;
-
-/// At which corners of sources a stretch of a run ends.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Corners {
-    /// Those of sources that the state or a probe sees.
-    Seen,
-    /// Those of sources that act through controls alone, too: values may move them.
-    All,
-}
 
 impl Simulation {
     /// The changes of mode on the way from a place, as for [`Self::stand_at`], to time `until`, s: the first is the one into the mode there.
@@ -35,7 +26,7 @@ impl Simulation {
         let Way::Exact(exact) = &mut self.way else {
             return Ok(None);
         };
-        exact.keep_passages(corners == Corners::All);
+        exact.keep_passages(corners);
         self.stand_at(t, state, switches)?;
         self.advance(until, false, cancel)?;
         let passages = match &mut self.way {

@@ -10,7 +10,7 @@ use crate::integrate::energy::Balance;
 use crate::integrate::error::Error;
 use crate::integrate::exact::accumulation::Accumulation;
 use crate::integrate::exact::key::{Key, Trigger};
-use crate::integrate::exact::passage::Passage;
+use crate::integrate::exact::passage::{Corners, Passage};
 use crate::integrate::log::Log;
 use crate::integrate::switching::fire;
 
@@ -42,11 +42,10 @@ impl Exact {
         &self.key.closed
     }
 
-    /// Keeps changes of mode and corners of sources from here on, [`MOST_PASSAGES`] at most; those of sources that act through controls alone where
-    /// `all` are asked for.
-    pub(crate) fn keep_passages(&mut self, all: bool) {
+    /// Keeps changes of mode and these corners of sources from here on, [`MOST_PASSAGES`] at most.
+    pub(crate) fn keep_passages(&mut self, corners: Corners) {
         self.passages = Some(Vec::new());
-        self.sources.at_all_corners = all;
+        self.sources.at_all_corners = corners == Corners::All;
     }
 
     /// The changes of mode and corners since [`Self::keep_passages`], unless there are too many to keep; none are kept from here on.
