@@ -4,7 +4,7 @@
 
 use circ::circuit::{ElaborateOptions, elaborate};
 use circ::diagnostic::SourceMap;
-use circ::integrate::{Error, Method, Run, SimOptions, simulate};
+use circ::integrate::{Error, Method, Reason, Run, SimOptions, simulate};
 use circ::mna::behaviour;
 use circ::netlist::parse;
 use circ::settings::Settings;
@@ -318,6 +318,11 @@ fn run(text: &str, options: SimOptions<'_>) -> Result<Run, Error> {
     simulate(&circuit, &behaviour(&circuit).unwrap(), options)
 }
 
+/// Whether a run was refused as currents leave nothing of the voltages between them.
+fn drowned(found: &Result<Run, Error>) -> bool {
+    matches!(found, Err(error) if matches!(error.reason, Reason::Cancellation { .. }))
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 8, max_shrink_iters: 20, failure_persistence: None, ..Default::default() })]
 
@@ -330,6 +335,9 @@ proptest! {
 
         let settings = Settings { tol: 1e-6, ..Settings::default() };
         let found = run(&text, SimOptions { method: Method::Theta, settings, ..SimOptions::default() });
+        if drowned(&found) {
+            return Ok(());
+        }
         let found = found.map_err(|e| TestCaseError::fail(format!("{e}\n{text}")))?;
 
         let times: Vec<f64> = found.waveforms.time[1..].to_vec();
@@ -358,6 +366,33 @@ proptest! {
         let text = network.text(10.0 * step, 30.0 * step);
         let method = if euler { Method::Euler } else { Method::Theta };
         let found = run(&text, SimOptions { method, step: Some(step), ..SimOptions::default() });
-        prop_assert!(found.is_ok(), "{}\n{text}", found.unwrap_err());
+        prop_assert!(found.is_ok() || drowned(&found), "{}\n{text}", found.unwrap_err());
+    }
+}
+
+/// By their laws two diodes without a resistance carry 10⁷⁰ A at these voltages, beside which the charge between them is rounding. Prescribed
+/// steps and chosen ones say so, also where no coarser runs are made beside them; with a resistance of 1 mΩ they run.
+#[test]
+fn currents_that_drown_the_charge_between_them_are_refused() {
+    let text = |rs: &str| {
+        format!(
+            "drowned\nv1 1 0 sin(0 16.6 8.9k)\nd0 1 2 ma\nd2 2 0 mb\nc3 1 2 12.6n\nr4 2 0 43k\n\
+             .model ma d(is=5.3u n=1.78{rs})\n.model mb d(is=5.4p n=1.18{rs})\n.tran 3.4u 170u uic\n.end\n"
+        )
+    };
+    for step in [Some(1e-6), None] {
+        let options = || SimOptions {
+            method: Method::Theta,
+            step,
+            unestimated: true,
+            ..SimOptions::default()
+        };
+        let error = run(&text(""), options()).unwrap_err();
+        assert!(
+            matches!(error.reason, Reason::Cancellation { .. }),
+            "{step:?}: {error}"
+        );
+        assert_eq!(error.elements, ["d0", "d2"], "{step:?}");
+        assert!(run(&text(" rs=1m"), options()).is_ok(), "{step:?}");
     }
 }

@@ -167,6 +167,11 @@ impl Amplitudes {
     /// max_k |a_k − b_k| / amplitude_k.
     #[must_use]
     pub fn error(&self, lcs: &Lcs, a: &[f64], b: &[f64]) -> f64 {
+        self.part(lcs, b, |k| a[k] - b[k])
+    }
+
+    /// max_k |change_k| / amplitude_k at a state x.
+    pub(crate) fn part(&self, lcs: &Lcs, x: &[f64], change: impl Fn(usize) -> f64) -> f64 {
         let largest = |unit: &str| {
             let seen = self
                 .values
@@ -187,8 +192,8 @@ impl Amplitudes {
                 .position(k, &state.name)
                 .map_or(0.0, |at| self.values[at]);
             let floor = FAINT * if state.unit == "V" { volts } else { amperes };
-            let scale = seen.max(floor).max(b[k].abs());
-            let difference = (a[k] - b[k]).abs();
+            let scale = seen.max(floor).max(x[k].abs());
+            let difference = change(k).abs();
             if difference > 0.0 {
                 worst = worst.max(difference / scale);
             }

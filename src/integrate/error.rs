@@ -51,6 +51,14 @@ pub enum Reason {
         /// Required.
         tolerance: f64,
     },
+    /// Currents of curved laws leave nothing of what they charge.
+    #[error(
+        "currents of {current:.0e} A are subtracted from each other: their rounding alone is more than the voltages that they leave"
+    )]
+    Cancellation {
+        /// The largest, A.
+        current: f64,
+    },
     /// I − hθA or a mode's system is singular.
     #[error("the step matrix is singular for h = {h:e} s")]
     Singular {

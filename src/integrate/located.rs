@@ -123,6 +123,10 @@ fn told(error: &Error, elements: &[&Element]) -> Told {
             "not-solved",
             Some(or("a current needs another path than a diode that blocks; a resistance in series with the device (`RS`, `Ron` in its model) or across it eases the problem")),
         ),
+        Reason::Cancellation { .. } => plain(
+            "cancellation",
+            Some(or("by their laws these devices carry currents that no circuit has; a resistance in series (`RS` in the model, or that of the source and of its leads) limits them")),
+        ),
         Reason::Singular { .. } => plain(
             "singular",
             Some("another `--step` or another method may pass; a negative resistance or a gain near 1 in a loop causes this".into()),

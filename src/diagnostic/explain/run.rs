@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 56] = [
+pub(super) const CODES: [Explanation; 57] = [
     Explanation::of(
         "about-rest",
         "The response is that about the operating point, as laws are smooth and no switch moves.",
@@ -21,6 +21,13 @@ pub(super) const CODES: [Explanation; 56] = [
         "A voltage, current or temperature beyond those that the data sheet lists.",
         "Add the missing points to the tables of its `.model`, or read its losses as an estimate.",
     ),
+    Explanation::of(
+        "cancellation",
+        "Currents of diodes are subtracted from each other that are so large that nothing is left of their difference.",
+        "Diodes without a resistance in series across a source: by their laws they carry currents that no circuit has.",
+        "A series resistance: `RS` in the model of the diodes, or that of the source and of its leads.",
+    )
+    .shown("two diodes across a source\nv1 a 0 sin(0 16 10k)\nd1 a b dm\nd2 b 0 dm\nc1 a b 10n\n.model dm d(is=1n)\n.tran 1u 100u uic\n"),
     Explanation::of(
         "destroyed",
         "A current or charge jumped to another value, and its energy was lost at once.",

@@ -97,14 +97,17 @@ pub(crate) struct Trial {
     /// By port: what the mean of λ over the step may err, and λ and y at its end because of the state's error.
     pub(crate) mean_error: Vec<f64>,
     pub(crate) end_error: (Vec<f64>, Vec<f64>),
+    /// The largest residual that a stage was solved to, relative to the terms it is a sum of.
+    pub(crate) residual: f64,
     matrices: usize,
     /// Stages solved and factorisations so far.
     pub(crate) solves: u64,
     pub(crate) factorisations: u64,
 }
 
-/// Solves a stage that Newton's method does not: q to (λ, y), which hold a guess.
-pub(crate) type Robust<'a> = &'a mut dyn FnMut(&[f64], &mut [f64], &mut [f64]) -> Result<(), Error>;
+/// Solves a stage that Newton's method does not: q to (λ, y), which hold a guess; its residual.
+pub(crate) type Robust<'a> =
+    &'a mut dyn FnMut(&[f64], &mut [f64], &mut [f64]) -> Result<f64, Error>;
 
 impl Trial {
     fn resize(&mut self, curved: &Curved) {
@@ -135,6 +138,11 @@ impl Trial {
             buffer.clear();
             buffer.resize(len, 0.0);
         }
+    }
+
+    /// λ and y at the end.
+    pub(crate) fn at_end(&self) -> (&[f64], &[f64]) {
+        self.at_stage(STAGES - 1)
     }
 
     /// λ and y at a stage.
@@ -187,7 +195,7 @@ impl Trial {
         for (du, (a, b)) in self.du.iter_mut().zip(self.u.iter().zip(&start.u)) {
             *du = (a - b) / h;
         }
-        (self.work, self.loss) = ((0.0, 0.0), 0.0);
+        (self.work, self.loss, self.residual) = ((0.0, 0.0), 0.0, f64::EPSILON);
         self.x.copy_from_slice(&start.x);
         self.u.copy_from_slice(&start.u);
         self.account(curved, 0);
@@ -244,7 +252,7 @@ impl Trial {
         if !found {
             lambda.copy_from_slice(&self.guess.0);
             y.copy_from_slice(&self.guess.1);
-            robust(&self.q, lambda, y)?;
+            self.residual = robust(&self.q, lambda, y)?.max(self.residual);
         }
         curved.respond(at, lambda, &mut self.x);
         if self.x.iter().any(|x| !x.is_finite()) {
@@ -337,13 +345,18 @@ impl Trial {
         }
     }
 
-    /// Takes what is rounding from the error: a small difference of large terms is not known better than these.
-    #[cold]
-    pub(crate) fn forgive_rounding(&mut self, curved: &Curved) {
+    /// What differences of states are rounding: small differences of large terms are not known better than these.
+    pub(crate) fn rounding(&self, curved: &Curved, rounding: &mut [f64]) {
         let lambda = &self.lambdas[(STAGES - 1) * self.m..];
-        for (k, error) in self.error.iter_mut().enumerate() {
-            let size = curved.size(self.matrices, &self.right, lambda, k);
-            if error.abs() <= STAGE_ROUNDING * size {
+        for (k, rounding) in rounding.iter_mut().enumerate() {
+            *rounding = STAGE_ROUNDING * curved.size(self.matrices, &self.right, lambda, k);
+        }
+    }
+
+    /// Takes what is rounding from the error.
+    pub(crate) fn forgive(&mut self, rounding: &[f64]) {
+        for (error, rounding) in self.error.iter_mut().zip(rounding) {
+            if error.abs() <= *rounding {
                 *error = 0.0;
             }
         }

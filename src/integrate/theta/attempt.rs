@@ -158,6 +158,10 @@ impl Theta {
             };
             return Err(Error::at(self.now.t, reason));
         }
+        if self.attempt.work.is_some() {
+            let ports = (&self.lambda[..], &self.y[..]);
+            self.refuse_cancellation(&self.out[..n], ports, self.attempt.residual)?;
+        }
         if let Some((basis, pattern)) = self.attempt.solved.take() {
             self.commit_solved(basis, pattern, t1);
         } else {

@@ -299,7 +299,7 @@ impl Theta {
             }
             lambda.copy_from_slice(solution.lambda.as_slice());
             y.copy_from_slice(solution.y.as_slice());
-            Ok(())
+            Ok(solution.residual)
         };
         let made = trial.make(
             &mut curved,
@@ -352,12 +352,14 @@ impl Theta {
             (error, control.judge_embedded(h, error, refused))
         };
         let first = verdict(trial, &mut self.coarse);
-        let (error, verdict) = match &system.smooth {
-            Some(curved) if !first.1.accept => {
-                trial.forgive_rounding(curved);
-                verdict(trial, &mut self.coarse)
-            }
-            _ => first,
+        if let Some(curved) = &system.smooth {
+            trial.rounding(curved, &mut self.rounding);
+        }
+        let (error, verdict) = if first.1.accept {
+            first
+        } else {
+            trial.forgive(&self.rounding);
+            verdict(trial, &mut self.coarse)
         };
         self.smooth.tells = error;
         self.smooth.refused = !verdict.accept;
@@ -373,6 +375,8 @@ impl Theta {
             };
             return Err(Error::at(self.now.t, reason));
         }
+        let trial = &self.smooth.trial;
+        self.refuse_cancellation(&trial.x, trial.at_end(), trial.residual)?;
         let Smooth {
             front,
             trial,

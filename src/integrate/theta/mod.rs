@@ -7,6 +7,7 @@
 
 mod ahead;
 mod attempt;
+mod cancellation;
 mod embedded;
 mod jumps;
 mod lines;
@@ -237,6 +238,8 @@ struct Attempt {
     turned_off: bool,
     /// Basis and pattern after the step, where the solvers ran.
     solved: Option<(Vec<bool>, Vec<Option<bool>>)>,
+    /// The largest residual that a stage was solved to, relative to the terms it is a sum of.
+    residual: f64,
     /// Energy from sources, into resistors and devices, and lost by the method, J, where the stages tell it.
     work: Option<((f64, f64), f64)>,
     /// x' at the end, where the method has stages.

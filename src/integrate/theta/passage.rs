@@ -218,7 +218,7 @@ impl Theta {
         self.inputs.left(t, &mut self.u_next);
         let mut values = std::mem::take(&mut self.smooth.guards.values);
         let trial = &self.smooth.trial;
-        let (lambda, y) = trial.at_stage(STAGES - 1);
+        let (lambda, y) = trial.at_end();
         let at = Point {
             x: &trial.x,
             lambda,

@@ -128,7 +128,7 @@ impl Theta {
         // (X_k − B_k)/γ = h f(X_k).
         let mut slopes: Vec<DVector<f64>> = Vec::with_capacity(count);
         let (mut work, mut loss) = ((0.0, 0.0), StageLoss::default());
-        let mut last = None;
+        let (mut last, mut residual) = (None, f64::EPSILON);
         let last_row = tableau.lower[count - 1];
         for (j, row) in tableau.lower.iter().enumerate() {
             let mut base = DVector::from_column_slice(&self.now.x);
@@ -159,6 +159,7 @@ impl Theta {
             self.lambda.copy_from_slice(solution.lambda.as_slice());
             self.y.copy_from_slice(solution.y.as_slice());
             self.worst_residual = self.worst_residual.max(solution.residual);
+            residual = solution.residual.max(residual);
             if at_end {
                 let sizes = system.step(step).x_sizes(&self.z, &solution.lambda);
                 self.rounding
@@ -211,6 +212,7 @@ impl Theta {
             settle: false,
             solved: Some((solution.basis, solution.active)),
             turned_off: false,
+            residual,
             work: Some((work, loss)),
             slope: slope.unwrap_or_default(),
             unseen,
