@@ -91,7 +91,11 @@ impl Digits for Long {
 
     fn to_f64(&self) -> f64 {
         let half = self.exponent / 2;
-        let power = |exponent: i64| 2_f64.powi(exponent.clamp(-9999, 9999) as i32);
+        let power = |exponent: i64| match exponent {
+            // The exponent of a normal double stands above the 52 digits of its mantissa.
+            -1022..=1023 => f64::from_bits(((exponent + 1023) as u64) << 52),
+            _ => 2_f64.powi(exponent.clamp(-9999, 9999) as i32),
+        };
         self.mantissa.to_f64().unwrap_or(f64::NAN) * power(half) * power(self.exponent - half)
     }
 

@@ -20,5 +20,6 @@ pub use eliminate::{Elimination, Table};
 pub use field::{Digits, Field};
 pub use long::Long;
 pub use rational::{Rational, rational};
+pub(crate) use sparse::add_term;
 pub use sparse::{SparseRow, add_scaled, eliminate_sparse, entry, part, sparse, subtract, summed};
 pub use value::Value;

@@ -93,6 +93,19 @@ pub fn add_scaled<F: Field>(target: &mut SparseRow<F>, scale: &F, row: &[(usize,
     }
 }
 
+/// row ← row + scale · x in one column.
+pub(crate) fn add_term<F: Field>(row: &mut SparseRow<F>, column: usize, scale: &F, x: &F) {
+    match row.binary_search_by_key(&column, |(c, _)| *c) {
+        Ok(k) => {
+            row[k].1.sub_mul(&scale.neg(), x);
+            if row[k].1.is_zero() {
+                row.remove(k);
+            }
+        }
+        Err(k) => row.insert(k, (column, x.mul(scale))),
+    }
+}
+
 /// Eliminates the columns below `columns` from all rows and removes the rows that held the pivots.
 ///
 /// Only the first `equations` rows can hold pivots; the others (readings) are rewritten. Returns the number of equations

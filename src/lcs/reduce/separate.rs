@@ -20,7 +20,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::algebra::{Field, SparseRow, add_scaled, entry, part};
+use crate::algebra::{Field, SparseRow, add_scaled, add_term, entry, part};
 use crate::lcs::Lcs;
 use crate::settings::tolerances::exponentials::APART;
 
@@ -169,7 +169,7 @@ impl<F: Field> Reduction<F> {
             .chain(self.constraints.iter_mut().map(|c| &mut c.0));
         for row in rows {
             if let Some(x) = entry(row, to).cloned() {
-                add_scaled(row, &minus, &[(from, x)]);
+                add_term(row, from, &minus, &x);
             }
         }
     }
