@@ -176,36 +176,7 @@ impl Model {
     /// # Errors
     /// There is no such element or parameter, or the circuit is none with that value; the model stays as it was.
     pub fn set(&mut self, name: &str, value: f64) -> Result<(), Error> {
-        let name = name.to_lowercase();
-        if !value.is_finite() {
-            return Err(self.faults(vec![no_number(&name, value)]));
-        }
-        let mut options = self.options.clone();
-        options.set(&self.swept(&name)?, value);
-        let circuit = match &self.netlist {
-            Some(netlist) => {
-                let (circuit, findings) = elaborate(netlist, &options);
-                let Some(mut circuit) = circuit else {
-                    return Err(self.faults(findings));
-                };
-                if self.circuit.columns.is_empty() {
-                    circuit.probes.clone_from(&self.circuit.probes);
-                    circuit.columns.clear();
-                } else {
-                    self.show_in(&mut circuit);
-                }
-                circuit
-            }
-            None => {
-                let mut circuit = self.circuit.clone();
-                let Some(id) = circuit.element(&name) else {
-                    let message = format!("the circuit has no element `{name}`");
-                    return Err(self.faults(vec![Diagnostic::error("set", None, message)]));
-                };
-                circuit.elements[id.index()].kind.set_value(value);
-                circuit
-            }
-        };
+        let (circuit, options) = self.circuit_with(&[(name.to_lowercase(), value)])?;
         match mna::behaviour(&circuit) {
             Ok(multiport) => {
                 (self.circuit, self.multiport, self.options) = (circuit, multiport, options);
@@ -213,6 +184,45 @@ impl Model {
             }
             Err(findings) => Err(self.faults(findings)),
         }
+    }
+
+    /// The circuit with these values, as [`Self::set`] gives them, and the choices that lead to it.
+    ///
+    /// # Errors
+    /// As [`Self::set`], but for faults of the circuit's equations.
+    pub(crate) fn circuit_with(
+        &self,
+        values: &[(String, f64)],
+    ) -> Result<(Circuit, ElaborateOptions), Error> {
+        let mut options = self.options.clone();
+        for (name, value) in values {
+            if !value.is_finite() {
+                return Err(self.faults(vec![no_number(name, *value)]));
+            }
+            options.set(&self.swept(name)?, *value);
+        }
+        let Some(netlist) = &self.netlist else {
+            let mut circuit = self.circuit.clone();
+            for (name, value) in values {
+                let Some(id) = circuit.element(name) else {
+                    let message = format!("the circuit has no element `{name}`");
+                    return Err(self.faults(vec![Diagnostic::error("set", None, message)]));
+                };
+                circuit.elements[id.index()].kind.set_value(*value);
+            }
+            return Ok((circuit, options));
+        };
+        let (circuit, findings) = elaborate(netlist, &options);
+        let Some(mut circuit) = circuit else {
+            return Err(self.faults(findings));
+        };
+        if self.circuit.columns.is_empty() {
+            circuit.probes.clone_from(&self.circuit.probes);
+            circuit.columns.clear();
+        } else {
+            self.show_in(&mut circuit);
+        }
+        Ok((circuit, options))
     }
 
     /// The model whose samples are drawn from this seed, with these tolerances and those of its cards.

@@ -4,8 +4,10 @@
 //! sources e = δP s' beside them (Tellegen's theorem is the usual way to see it: S. W. Director, R. A. Rohrer, "The generalized adjoint network and network sensitivities", IEEE
 //! Trans. Circuit Theory, 1969). So derivatives of all that is reduced from a multiport, to any value, follow from one that is reduced with these sources.
 
-use super::{Coefficient, Column, Observed, Power, SourcePort, StandardMultiport, StaticMultiport};
-use crate::algebra::{Ball, Field};
+use super::{
+    Coefficient, Column, Equation, Observed, Power, SourcePort, StandardMultiport, StaticMultiport,
+};
+use crate::algebra::{Ball, Field, Value};
 use crate::circuit::{Source, source::Wave};
 use crate::lcs::{Input, PowerKind};
 
@@ -22,9 +24,40 @@ fn number(x: Coefficient) -> f64 {
     x.in_field::<Ball>().to_f64()
 }
 
+/// The number that a coefficient is with these values in place of its own, if it is this value, its inverse or the negative of one of them.
+fn with_values(x: Coefficient, own: f64, values: [f64; 4]) -> Option<[f64; 4]> {
+    let (value, of): (Value, fn(f64) -> f64) = match x {
+        Coefficient::Plus(value) => (value, |value| value),
+        Coefficient::Minus(value) => (value, |value| -value),
+        Coefficient::Inverse(value) => (value, f64::recip),
+        Coefficient::MinusInverse(value) => (value, |value| -value.recip()),
+        Coefficient::Ratio(..) | Coefficient::Pair(..) => return None,
+    };
+    (value.f64 == own).then(|| values.map(of))
+}
+
 impl StandardMultiport {
     /// Where these differ; `None` where that is not by coefficients, metric and waveforms of sources alone.
     pub(crate) fn perturbation(&self, near: [&Self; 4]) -> Option<Perturbation> {
+        self.differing(near, |all| Some(all.map(number)))
+    }
+
+    /// The same from one of them, which has `own` for a value, where the others have these; `None` too where a coefficient that differs is not that value or its
+    /// inverse.
+    pub(crate) fn perturbation_by(
+        &self,
+        near: &Self,
+        own: f64,
+        values: [f64; 4],
+    ) -> Option<Perturbation> {
+        self.differing([near], |[x]| with_values(x, own, values))
+    }
+
+    fn differing<const N: usize>(
+        &self,
+        near: [&Self; N],
+        values: impl Fn([Coefficient; N]) -> Option<[f64; 4]>,
+    ) -> Option<Perturbation> {
         let mut found = Perturbation::default();
         for other in near {
             let same = self.columns == other.columns
@@ -40,36 +73,35 @@ impl StandardMultiport {
                 return None;
             }
         }
+        let differ =
+            |own: Coefficient, others: &[Coefficient; N]| others.iter().any(|other| *other != own);
         for (k, equation) in self.equations.iter().enumerate() {
             let others = near.map(|near| &near.equations[k]);
             if others.iter().all(|other| *other == equation) {
                 continue;
             }
-            for (at, (_, column)) in equation.iter().enumerate() {
-                let terms = others.map(|other| other.get(at).filter(|term| term.1 == *column));
-                let [Some(a), Some(b), Some(c), Some(d)] = terms else {
-                    return None;
-                };
-                let values = [a, b, c, d].map(|term| number(term.0));
-                if values.iter().any(|value| *value != values[0]) {
-                    found.coefficients.push((k, *column, values));
+            let same = |other: &&Equation| {
+                other.len() == equation.len() && other.iter().zip(equation).all(|(a, b)| a.1 == b.1)
+            };
+            if !others.iter().all(same) {
+                return None;
+            }
+            for (at, (own, column)) in equation.iter().enumerate() {
+                let all = others.map(|other| other[at].0);
+                if differ(*own, &all) {
+                    found.coefficients.push((k, *column, values(all)?));
                 }
             }
-            if others.iter().any(|other| other.len() != equation.len()) {
-                return None;
-            }
         }
-        for (k, (row, column, _)) in self.metric.iter().enumerate() {
+        for (k, (row, column, own)) in self.metric.iter().enumerate() {
             let others = near.map(|near| &near.metric[k]);
-            if others
-                .iter()
-                .any(|other| (other.0, other.1) != (*row, *column))
-            {
+            let place = |other: &(usize, usize, Coefficient)| (other.0, other.1);
+            if others.iter().any(|other| place(other) != (*row, *column)) {
                 return None;
             }
-            let values = others.map(|other| number(other.2));
-            if values.iter().any(|value| *value != values[0]) {
-                found.metric.push((*row, *column, values));
+            let all = others.map(|other| other.2);
+            if differ(*own, &all) {
+                found.metric.push((*row, *column, values(all)?));
             }
         }
         Some(found)

@@ -274,6 +274,11 @@ pub(super) fn repeating(model: &Model) -> Result<(Option<f64>, Circuit, StaticMu
     Ok((seconds, circuit, multiport))
 }
 
+/// A circuit with its sources as [`repeating`] has them.
+pub(super) fn at_rest(circuit: &Circuit) -> Circuit {
+    period::repeating(circuit).0
+}
+
 /// The ports of the circuit of a model with sources at rest: its own where none differs.
 fn ports(model: &Model, circuit: &Circuit) -> Result<StaticMultiport, Error> {
     let own = model.circuit().elements.iter().map(source);

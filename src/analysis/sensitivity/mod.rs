@@ -200,20 +200,9 @@ pub(super) fn values(model: &Model, asked: &[String]) -> Result<Vec<(String, f64
     let elements = circuit.elements.iter().filter(|e| !e.name.contains('.'));
     let elements = elements.filter_map(|e| Some((e.name.clone(), value_of(&e.kind)?)));
     let all: Vec<(String, f64)> = elements.chain(circuit.params.iter().cloned()).collect();
-    // A card's value may be multiplied (`m=2`).
-    let written = |(name, value): (String, f64)| {
-        let mut set = model.clone();
-        let Some(id) = circuit.element(&name) else {
-            return Some((name, value));
-        };
-        set.set(&name, value).ok()?;
-        let kind = &set.circuit().elements.get(id.index())?.kind;
-        let factor = value_of(kind)? / value;
-        Some((name, value / factor))
-    };
     if asked.is_empty() {
         let some = all.into_iter().filter(|(_, value)| *value != 0.0);
-        return Ok(some.filter_map(written).collect());
+        return as_written(model, some.collect());
     }
     let find = |name: &String| {
         let own = all.iter().find(|(own, _)| *own == name.to_lowercase());
@@ -226,9 +215,23 @@ pub(super) fn values(model: &Model, asked: &[String]) -> Result<Vec<(String, f64
                 "`{name}` is 0: a small part of it is no change"
             )));
         }
-        written(own).ok_or_else(|| unsupported(format!("`{name}` cannot be set")))
+        model.swept(name).map(|_| own)
     };
-    asked.iter().map(find).collect()
+    as_written(model, asked.iter().map(find).collect::<Result<_, _>>()?)
+}
+
+/// These values as their cards have them: a card's value may be multiplied (`m=2`).
+fn as_written(model: &Model, mut all: Vec<(String, f64)>) -> Result<Vec<(String, f64)>, Error> {
+    let elements = all
+        .iter()
+        .filter(|(name, _)| model.circuit().element(name).is_some());
+    let (set, _) = model.circuit_with(&elements.cloned().collect::<Vec<_>>())?;
+    for (name, value) in &mut all {
+        let id = set.element(name);
+        let again = id.and_then(|id| value_of(&set.elements[id.index()].kind));
+        *value /= again.map_or(1.0, |again| again / *value);
+    }
+    Ok(all)
 }
 
 /// The value that a card gives to an element.

@@ -2,14 +2,14 @@
 
 use nalgebra::DVector;
 
-use super::Beside;
 use super::base::{Base, not_smooth};
-use crate::analysis::periodic::{beside, repeating};
+use super::{Beside, value_of};
+use crate::analysis::periodic::{at_rest, beside, repeating};
 use crate::analysis::variation::{Changes, Near, Rest, STEPS, Tableau, difference};
-use crate::circuit::Source;
+use crate::circuit::{Kind, Source};
 use crate::integrate::{Error, Reason};
 use crate::measure::{Curves, Signals};
-use crate::mna::{Perturbation, StandardMultiport};
+use crate::mna::{Perturbation, StandardMultiport, behaviour};
 use crate::model::Model;
 use crate::settings::tolerances::periodic::{PERIOD_MOVES, VALUE_STEP};
 
@@ -45,12 +45,30 @@ impl Beside<'_> {
     ) -> Result<Option<Survey<'n>>, Error> {
         self.go_on()?;
         let step = value * (1.0 + VALUE_STEP) - value;
-        let at = |steps: f64| {
+        let values = STEPS.map(|steps| value + steps * step);
+        let sources = |near: &StandardMultiport| -> Vec<Source> {
+            let all = near.sources.iter();
+            all.map(|source| source.input.source.clone()).collect()
+        };
+        let count = own.circuit().measurements.len();
+        let mut explicit = vec![Some(0.0); count];
+        if let Some(perturbation) = self.of_card(base, (name, value), values, own) {
+            return Ok(Some(Survey {
+                name,
+                value,
+                step,
+                initial: DVector::zeros(base.multiport.storage.len()),
+                sources: [&base.multiport; 4].map(sources),
+                perturbation: Some(perturbation),
+                own: explicit,
+            }));
+        }
+        let at = |value: f64| {
             let mut model = own.clone();
-            model.set(name, value + steps * step)?;
+            model.set(name, value)?;
             Ok::<_, Error>(model)
         };
-        let [a, b, c, d] = STEPS.map(at);
+        let [a, b, c, d] = values.map(at);
         let models = [a?, b?, c?, d?];
         let mut multiports = Vec::with_capacity(models.len());
         for model in &models {
@@ -68,8 +86,6 @@ impl Beside<'_> {
         let near: [StandardMultiport; 4] = multiports.try_into().map_err(|_| {
             Error::before(Reason::internal("analysis::sensitivity", "four circuits"))
         })?;
-        let count = own.circuit().measurements.len();
-        let mut explicit = vec![Some(0.0); count];
         let differs = |model: &Model| model.circuit().measurements != own.circuit().measurements;
         if models.iter().any(differs) {
             let found = models
@@ -91,10 +107,6 @@ impl Beside<'_> {
             let of = |near: &StandardMultiport| near.storage.get(i).and_then(|s| s.initial);
             difference(near.each_ref().map(|near| of(near).unwrap_or(0.0)))
         });
-        let sources = |near: &StandardMultiport| {
-            let all = near.sources.iter();
-            all.map(|source| source.input.source.clone()).collect()
-        };
         Ok(Some(Survey {
             name,
             value,
@@ -104,6 +116,38 @@ impl Beside<'_> {
             perturbation: base.multiport.perturbation(near.each_ref()),
             own: explicit,
         }))
+    }
+
+    /// What differs where a resistance, capacitance or inductance of a card has these values in place of its own: coefficients that are its value or the inverse of that. `None`
+    /// where the name is another, or something else follows its value, as the metric of coupled inductors does.
+    fn of_card(
+        &self,
+        base: &Base,
+        (name, value): (&str, f64),
+        values: [f64; 4],
+        own: &Model,
+    ) -> Option<Perturbation> {
+        let mut circuit = own.circuit().clone();
+        let id = circuit.element(name)?;
+        let kind = &mut circuit.elements[id.index()].kind;
+        let letter = match kind {
+            Kind::Resistor(_) => 'r',
+            Kind::Capacitor(_) => 'c',
+            Kind::Inductor(_) => 'l',
+            _ => return None,
+        };
+        if !name.starts_with(letter) {
+            return None;
+        }
+        // The card's value may be multiplied.
+        let factor = value_of(kind)? / value;
+        let values = values.map(|value| value * factor);
+        kind.set_value(values[0]);
+        if self.options.steady {
+            circuit = at_rest(&circuit);
+        }
+        let near = behaviour(&circuit).ok()?.standard();
+        base.multiport.perturbation_by(&near, values[0], values)
     }
 
     /// Whether this is another period than that of the orbit, which is refused if that was asked for.
