@@ -413,12 +413,22 @@ fn differences_of_runs_tell_an_extremum_that_is_reached_twice() {
     assert_eq!(said(&phases("2")), Vec::<String>::new());
 }
 
+/// v = V R₂/(R₁ + R₂), and nothing that an orbit could return to.
+#[test]
+fn the_steady_state_of_resistances_alone_has_derivatives() {
+    let text = "divider\nv1 a 0 pulse(0 1 0 25u 25u 25u 100u)\nr1 a b 1k\nr2 b 0 3k\n.tran 1u 200u\n.meas tran top max v(b)\n.end\n";
+    for method in [SensitivityMethod::Forward, SensitivityMethod::Adjoint] {
+        let found = by(text, true, method);
+        near(&found, "top", "r1", 1e3, -3.0 / 16.0, 1e-11);
+    }
+}
+
 /// The peaks of a three-phase rectifier are equal, and each moves with the resistances of its own phases: no derivative. A peak that an orbit repeats in every lap is one; so is a plateau.
 #[test]
 fn an_extremum_that_is_reached_twice_is_told_to_have_no_derivative() {
     let phases = |last: &str| {
         format!(
-            "three phases\nva a 0 sin(0 100 50 0 0 0)\nvb b 0 sin(0 100 50 0 0 -120)\nvc c 0 sin(0 100 50 0 0 120)\nra a a1 1\nrb b b1 1\nrc c c1 {last}\nd1 a1 p ideal\nd2 b1 p ideal\nd3 c1 p ideal\nrl p 0 10\ncl p 0 100u\n.model ideal d(n=0.001)\n.tran 10u 60m\n.meas tran top max v(p) from=20m to=60m\n.meas tran rip pp v(p) from=20m to=60m\n.meas tran m avg v(p) from=20m to=60m\n.end\n"
+            "three phases\nva a 0 sin(0 100 50 0 0 0)\nvb b 0 sin(0 100 50 0 0 -120)\nvc c 0 sin(0 100 50 0 0 120)\nra a a1 1\nrb b b1 1\nrc c c1 {last}\nd1 a1 p ideal\nd2 b1 p ideal\nd3 c1 p ideal\nrl p 0 10\ncl p 0 100u\n.model ideal d(n=0.001)\n.tran 10u 60m\n.meas tran top max v(p) from=20m to=60m\n.meas tran rip pp v(p) from=20m to=60m\n.meas tran at max_at v(p) from=20m to=60m\n.meas tran m avg v(p) from=20m to=60m\n.end\n"
         )
     };
     let pulse = "plateau\nv1 a 0 pulse(0 1 0 25n 25n 25n 100n)\nr1 a b 1k\nr2 b 0 1k\nr3 a c 1k\nc3 c 0 1p\n.tran 1n 200n\n.meas tran top max v(b)\n.meas tran low min v(b)\n.end\n";
@@ -430,8 +440,8 @@ fn an_extremum_that_is_reached_twice_is_told_to_have_no_derivative() {
         };
         for steady in [false, true] {
             let notes = said(&phases("1"), steady);
-            assert_eq!(notes.len(), 2, "{notes:?}");
-            for (note, name) in notes.iter().zip(["`top`", "`rip`"]) {
+            assert_eq!(notes.len(), 3, "{notes:?}");
+            for (note, name) in notes.iter().zip(["`top`", "`rip`", "`at`"]) {
                 assert!(
                     note.contains(name) && note.contains("with ra, rb, rc:"),
                     "{note}"

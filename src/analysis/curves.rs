@@ -6,7 +6,7 @@ use nalgebra::DVector;
 
 use super::periodic::Steady;
 use super::start::course;
-use super::variation::{Course, Linear, Motion, parts, unit};
+use super::variation::{Course, LEVELS, Linear, Motion, parts, unit};
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{Error, Note, SimOptions};
 use crate::measure::{Curves, INTERVALS};
@@ -15,9 +15,6 @@ use crate::settings::tolerances::times::{LAST_ROW, MOST_PERIODS, MOST_STATES};
 
 /// Values that measurements see of a run at most.
 pub(super) const MOST_VALUES: usize = 4_000_000;
-
-/// Halvings of a piece that lead from one of its values to the next.
-const LEVELS: u32 = INTERVALS.ilog2();
 
 /// What the measurements of a transient see, which begins where the options say. `None` where it is not exact throughout, or rows cost less.
 ///

@@ -29,7 +29,10 @@ pub(crate) struct Tie {
     pub(crate) times: (f64, f64),
     /// What the values span.
     pub(crate) span: f64,
+    /// Of the measurement if this one counted; of the value there, for when it is reached.
     pub(crate) weights: Weights,
+    /// Those of the value that counts, for when it is reached.
+    pub(crate) value: Option<Weights>,
 }
 
 /// A waveform, and of which pieces of the signals its own are parts: number, where on it, and how much of it.
@@ -88,7 +91,7 @@ impl<'a> Scene<'a> {
             Measurement::Over(over, of, window) => {
                 let (from, to) = (time("from")?, time("to")?);
                 let traced = self.traced(of, None)?;
-                let slopes = traced.trace.over_slopes(*over, (from, to)).ok()??;
+                let (slopes, rivals) = traced.trace.over_slopes(*over, (from, to)).ok()??;
                 let place = |slopes: &TraceSlopes, into: &mut Weights| {
                     self.add(&traced, slopes, 1.0, into);
                     let ends = [
@@ -104,15 +107,21 @@ impl<'a> Scene<'a> {
                     }
                     Some(())
                 };
-                let rivals = traced.trace.rivals(*over, (from, to)).into_iter();
-                let ties = rivals.map(|rival| {
+                let placed = |slopes: &TraceSlopes| {
                     let mut weights = into.clone();
-                    place(&rival.slopes, &mut weights)?;
+                    place(slopes, &mut weights)?;
+                    Some(weights)
+                };
+                let ties = rivals.into_iter().map(|rival| {
                     let times = (rival.beside, rival.at);
                     Some(Tie {
                         times,
                         span: rival.span,
-                        weights,
+                        weights: placed(&rival.slopes)?,
+                        value: match &rival.value {
+                            Some(slopes) => Some(placed(slopes)?),
+                            None => None,
+                        },
                     })
                 });
                 let ties = ties.collect::<Option<Vec<_>>>()?;

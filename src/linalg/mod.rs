@@ -11,6 +11,7 @@ pub(crate) mod kernel;
 pub(crate) mod krylov;
 pub(crate) mod levelled;
 pub(crate) mod polynomial;
+pub(crate) mod product;
 pub(crate) mod quadratic;
 pub(crate) mod rays;
 pub(crate) mod refill;

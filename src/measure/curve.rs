@@ -9,11 +9,29 @@ pub(crate) const INTERVALS: usize = 8;
 pub(crate) const VALUES: usize = INTERVALS + 1;
 /// Of the polynomial through values at x = 0 … 8 in its barycentric form: (−1)^j 8!/(j! (8 − j)!).
 const BARYCENTRIC: [f64; VALUES] = [1.0, -8.0, 28.0, -56.0, 70.0, -56.0, 28.0, -8.0, 1.0];
+/// What the slope at x = i has of y_j − y_i, in parts of the length of an interval.
+const SLOPES: [[f64; VALUES]; VALUES] = slopes();
 /// ∫ over its length by Newton and Cotes, exact up to degree 9.
 const COTES: [f64; VALUES] = [
     989.0, 5888.0, -928.0, 10496.0, -4540.0, 10496.0, -928.0, 5888.0, 989.0,
 ];
 const COTES_SUM: f64 = 28350.0;
+
+const fn slopes() -> [[f64; VALUES]; VALUES] {
+    let mut all = [[0.0; VALUES]; VALUES];
+    let mut i = 0;
+    while i < VALUES {
+        let mut j = 0;
+        while j < VALUES {
+            if j != i {
+                all[i][j] = BARYCENTRIC[j] / BARYCENTRIC[i] / (i as f64 - j as f64);
+            }
+            j += 1;
+        }
+        i += 1;
+    }
+    all
+}
 
 /// A smooth piece of a waveform: the polynomial of degree 8 through its values at begin + s length, s = 0, 1/8 … 1, up to s = `until`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,12 +119,9 @@ impl Curve {
     /// dy/ds at the instants of its values.
     fn slopes(&self) -> [f64; VALUES] {
         std::array::from_fn(|i| {
-            let of = |j: usize| {
-                let off = i as f64 - j as f64;
-                BARYCENTRIC[j] / BARYCENTRIC[i] / off * (self.values[j] - self.values[i])
-            };
-            let others = (0..VALUES).filter(|j| *j != i);
-            INTERVALS as f64 * others.map(of).sum::<f64>()
+            let parts = SLOPES[i].iter().zip(self.values);
+            let parts = parts.map(|(part, y)| part * (y - self.values[i]));
+            INTERVALS as f64 * parts.sum::<f64>()
         })
     }
 

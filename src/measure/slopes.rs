@@ -26,8 +26,10 @@ pub(crate) struct Rival {
     pub(crate) beside: f64,
     /// What the values span.
     pub(crate) span: f64,
-    /// The derivatives of the measure if this one counted.
+    /// The derivatives of the measure if this one counted; for when an extreme value is reached, of the value there.
     pub(crate) slopes: TraceSlopes,
+    /// Those of the value that counts, for when it is reached: that time jumps where the two part.
+    pub(crate) value: Option<TraceSlopes>,
 }
 
 /// Where an extremum is reached: the piece, and where on it.
@@ -105,25 +107,31 @@ impl Trace<'_> {
     fn integral_slopes(&self, of: Integrand, window: (f64, f64)) -> (f64, TraceSlopes) {
         let mut found = TraceSlopes::default();
         let mut sum = 0.0;
+        let value = |y: f64| match of {
+            Integrand::One => 1.0,
+            Integrand::Value => y,
+            Integrand::Square => y * y,
+        };
+        let whole = NODES.map(basis);
         for (k, curve, (low, high)) in self.parts(window) {
             let length = curve.length;
             let mut own = PieceSlopes::default();
-            let value = |y: f64| match of {
-                Integrand::One => 1.0,
-                Integrand::Value => y,
-                Integrand::Square => y * y,
-            };
             let mut mean = 0.0;
-            for (x, weight) in NODES.iter().zip(WEIGHTS) {
-                let s = low + (high - low) * x;
-                let (y, part) = (curve.at(s), (high - low) * weight);
+            let bases = match (low, high) {
+                (0.0, 1.0) => whole,
+                _ => NODES.map(|x| basis(low + (high - low) * x)),
+            };
+            for (basis, weight) in bases.iter().zip(WEIGHTS) {
+                let part = (high - low) * weight;
+                if of == Integrand::One {
+                    mean += part;
+                    continue;
+                }
+                let both = basis.iter().zip(curve.values);
+                let y = both.map(|(basis, y)| basis * y).sum();
                 mean += part * value(y);
-                let slope = match of {
-                    Integrand::One => continue,
-                    Integrand::Value => 1.0,
-                    Integrand::Square => 2.0 * y,
-                };
-                for (own, basis) in own.values.iter_mut().zip(basis(s)) {
+                let slope = if of == Integrand::Value { 1.0 } else { 2.0 * y };
+                for (own, basis) in own.values.iter_mut().zip(basis) {
                     *own += length * part * slope * basis;
                 }
             }
@@ -146,7 +154,8 @@ impl Trace<'_> {
         (sum, found)
     }
 
-    /// The derivatives of a measure over from ≤ t ≤ to; `None` where they are not known.
+    /// The derivatives of a measure over from ≤ t ≤ to, and what those of an extreme value are at the other times, with lower values between, at which it is reached to a part of
+    /// all that the values span; `None` where they are not known.
     ///
     /// # Errors
     /// [`MeasureError::Window`] where the run has no piece of positive length there.
@@ -154,7 +163,7 @@ impl Trace<'_> {
         &self,
         what: Over,
         window: (f64, f64),
-    ) -> Result<Option<TraceSlopes>, MeasureError> {
+    ) -> Result<Option<(TraceSlopes, Vec<Rival>)>, MeasureError> {
         let mean = |of: Integrand| {
             let (length, lengths) = self.integral_slopes(Integrand::One, window);
             let (sum, found) = self.integral_slopes(of, window);
@@ -164,70 +173,56 @@ impl Trace<'_> {
                 combined((1.0 / length, found), (part, &lengths)),
             )
         };
+        let alone = |slopes: TraceSlopes| (slopes, vec![]);
         Ok(match what {
-            Over::Integral => Some(self.integral_slopes(Integrand::Value, window).1),
-            Over::Average => Some(mean(Integrand::Value).1),
+            Over::Integral => Some(alone(self.integral_slopes(Integrand::Value, window).1)),
+            Over::Average => Some(alone(mean(Integrand::Value).1)),
             Over::Rms => {
                 let (square, found) = mean(Integrand::Square);
                 let none = TraceSlopes::default();
-                (square > 0.0).then(|| combined((0.5 / square.sqrt(), found), (0.0, &none)))
+                let root = || combined((0.5 / square.sqrt(), found), (0.0, &none));
+                (square > 0.0).then(root).map(alone)
             }
             Over::Minimum => self.extreme_slopes(-1.0, window, false),
             Over::Maximum => self.extreme_slopes(1.0, window, false),
             Over::PeakToPeak => {
                 let most = self.extreme_slopes(1.0, window, false);
-                let least = self.extreme_slopes(-1.0, window, false);
-                let both = most.zip(least);
-                both.map(|(most, least)| combined((1.0, most), (-1.0, &least)))
+                let both = most.zip(self.extreme_slopes(-1.0, window, false));
+                both.map(|((most, above), (least, below))| {
+                    let difference = |most: TraceSlopes, least: &TraceSlopes| {
+                        combined((1.0, most), (-1.0, least))
+                    };
+                    let above = above.into_iter().map(|rival| Rival {
+                        slopes: difference(rival.slopes, &least),
+                        ..rival
+                    });
+                    let below = below.into_iter().map(|rival| Rival {
+                        slopes: difference(most.clone(), &rival.slopes),
+                        ..rival
+                    });
+                    let rivals = above.chain(below).collect();
+                    (difference(most.clone(), &least), rivals)
+                })
             }
             Over::WhenMinimum => self.extreme_slopes(-1.0, window, true),
             Over::WhenMaximum => self.extreme_slopes(1.0, window, true),
         })
     }
 
-    /// What the derivatives of an extreme value are at the other times, with lower values between, at which it is reached to a part of all that the values span.
-    pub(crate) fn rivals(&self, what: Over, window: (f64, f64)) -> Vec<Rival> {
-        let of = |sign: f64| {
-            let (all, span) = self.reached(sign, window);
-            let time = |(k, s): Reached| self.own()[k].time(s);
-            let slopes = |at| self.extreme_slopes_at(at, window, false);
-            let first = all.first().copied();
-            let rest = all.into_iter().skip(1).filter_map(move |at| {
-                Some(Rival {
-                    at: time(at),
-                    beside: time(first?),
-                    span,
-                    slopes: slopes(at)?,
-                })
-            });
-            rest.collect::<Vec<_>>()
-        };
-        let together = |sign: f64| {
-            let other = self.extreme_slopes(-sign, window, false);
-            let with = |rival: Rival| {
-                let slopes = combined((sign, rival.slopes), (-sign, other.as_ref()?));
-                Some(Rival { slopes, ..rival })
-            };
-            of(sign).into_iter().filter_map(with).collect::<Vec<_>>()
-        };
-        match what {
-            Over::Minimum => of(-1.0),
-            Over::Maximum => of(1.0),
-            Over::PeakToPeak => [together(1.0), together(-1.0)].concat(),
-            _ => vec![],
-        }
-    }
-
     /// Where the extreme value is reached, then the other such places with lower values between; and what the values span.
     fn reached(&self, sign: f64, window: (f64, f64)) -> (Vec<Reached>, f64) {
         let (mut first, mut most, mut least) = (None, f64::NEG_INFINITY, f64::INFINITY);
+        let mut largest = Vec::new();
         for (k, curve, part) in self.parts(window) {
+            let mut own = f64::NEG_INFINITY;
             curve.corners(part, |s, y| {
+                own = (sign * y).max(own);
                 least = (sign * y).min(least);
                 if sign * y > most {
                     (first, most) = (Some((k, s)), sign * y);
                 }
             });
+            largest.push(own);
         }
         let Some(first) = first else {
             return (vec![], 0.0);
@@ -235,7 +230,11 @@ impl Trace<'_> {
         let level = most - SAME_EXTREMUM * (most - least);
         let mut tops: Vec<(Reached, f64)> = vec![];
         let mut above = false;
-        for (k, curve, part) in self.parts(window) {
+        for ((k, curve, part), largest) in self.parts(window).zip(largest) {
+            if largest <= level {
+                above = false;
+                continue;
+            }
             curve.corners(part, |s, y| {
                 let y = sign * y;
                 let begins = y > level && !above;
@@ -252,10 +251,31 @@ impl Trace<'_> {
         (all, most - least)
     }
 
-    /// Of the extreme value, or of when it is reached.
-    fn extreme_slopes(&self, sign: f64, window: (f64, f64), when: bool) -> Option<TraceSlopes> {
-        let at = self.reached(sign, window).0.first().copied()?;
-        self.extreme_slopes_at(at, window, when)
+    /// Of the extreme value, or of when it is reached, and those of the value where it is reached again.
+    fn extreme_slopes(
+        &self,
+        sign: f64,
+        window: (f64, f64),
+        when: bool,
+    ) -> Option<(TraceSlopes, Vec<Rival>)> {
+        let (all, span) = self.reached(sign, window);
+        let time = |(k, s): Reached| self.own()[k].time(s);
+        let (first, rest) = all.split_first()?;
+        let value = self.extreme_slopes_at(*first, window, false)?;
+        let rivals = rest.iter().filter_map(|at| {
+            Some(Rival {
+                at: time(*at),
+                beside: time(*first),
+                span,
+                slopes: self.extreme_slopes_at(*at, window, false)?,
+                value: when.then(|| value.clone()),
+            })
+        });
+        let rivals = rivals.collect();
+        if when {
+            return Some((self.extreme_slopes_at(*first, window, true)?, rivals));
+        }
+        Some((value, rivals))
     }
 
     fn extreme_slopes_at(
@@ -471,7 +491,7 @@ mod tests {
             Over::WhenMinimum,
             Over::WhenMaximum,
         ] {
-            let slopes = own.over_slopes(what, WINDOW).unwrap().unwrap();
+            let (slopes, _) = own.over_slopes(what, WINDOW).unwrap().unwrap();
             close(&format!("{what:?}"), &slopes, |trace, (from, to)| {
                 trace.over(what, from, to).unwrap()
             });

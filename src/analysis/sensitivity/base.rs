@@ -1,6 +1,7 @@
 //! A run that is exact throughout, to be differentiated.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::allocator::Allocator;
+use nalgebra::{DMatrix, DVector, DefaultAllocator, Dim, Dyn, OMatrix};
 
 use super::{Beside, unsupported};
 use crate::analysis::curves::{MOST_VALUES, laps};
@@ -117,8 +118,7 @@ impl Base {
             return Ok(changes.start().clone());
         };
         let forced = parameter.along(&DVector::zeros(m.nrows()), None)?.1;
-        let closed = DMatrix::identity(m.nrows(), m.nrows()) - m;
-        closed.lu().solve(&forced).ok_or_else(family)
+        solved(m.clone(), &forced)
     }
 
     /// Back along the run with what these weigh; of an orbit once more with λ = (I − Mᵀ)⁻¹ ψ₀.
@@ -126,7 +126,7 @@ impl Base {
         &self,
         lines: &Lines,
         drawing: &Drawing,
-        weighted: &[Weighted],
+        weighted: &[&Weighted],
     ) -> Result<Carried, Error> {
         let adjoint = Adjoint {
             trajectory: &self.trajectory,
@@ -135,19 +135,28 @@ impl Base {
             drawing,
         };
         let mut motions = lines.motions(self.sight.unit);
-        let carried = adjoint.back(&mut motions, Some(weighted), None)?;
+        let carried = adjoint.back(&mut motions, weighted, None)?;
         let Some(Repeated { monodromy: m, .. }) = &self.orbit else {
             return Ok(carried);
         };
-        let closed = DMatrix::identity(m.nrows(), m.nrows()) - m.transpose();
-        let last = closed.lu().solve(&carried.start).ok_or_else(family)?;
-        let again = adjoint.back(&mut motions, None, Some(&last))?;
+        let last = solved(m.transpose(), &carried.start)?;
+        let again = adjoint.back(&mut motions, &[], Some(&last))?;
         Ok(carried.plus(&again))
     }
 }
 
-fn family() -> Error {
-    not_smooth("the orbit is one of a family: where it moves is not determined".into())
+/// (I − M)⁻¹ b.
+fn solved<C: Dim>(m: DMatrix<f64>, b: &OMatrix<f64, Dyn, C>) -> Result<OMatrix<f64, Dyn, C>, Error>
+where
+    DefaultAllocator: Allocator<Dyn, C>,
+{
+    if m.is_empty() {
+        return Ok(b.clone());
+    }
+    let closed = DMatrix::identity(m.nrows(), m.nrows()) - m;
+    closed.lu().solve(b).ok_or_else(|| {
+        not_smooth("the orbit is one of a family: where it moves is not determined".into())
+    })
 }
 
 impl Beside<'_> {

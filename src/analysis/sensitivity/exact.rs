@@ -25,7 +25,7 @@ struct Weighing {
     rivals: Vec<Rivalry>,
 }
 
-/// An extremum that is reached a second time with the same value.
+/// An extremum that is reached a second time with the same value, or when it is.
 struct Rivalry {
     /// Of which measurement.
     of: usize,
@@ -33,8 +33,9 @@ struct Rivalry {
     times: (f64, f64),
     /// What the signal spans.
     span: f64,
-    /// What it weighs if the other one counts.
+    /// What it weighs if the other one counts; for when it is reached, what the difference of the values there weighs.
     weighted: Weighted,
+    is_time: bool,
     /// Values to which the derivative is another one there.
     parted: Vec<String>,
 }
@@ -117,6 +118,10 @@ fn rivals(
         };
         let mut known = vec![own.clone()];
         for tie in &weights.rivals {
+            let value = tie.value.as_ref().map(|value| drawing.weighted(value));
+            if let Some(value) = &value {
+                known[0] = value.clone();
+            }
             let weighted = drawing.weighted(&tie.weights);
             let again = known.iter().any(|k| k.is_like(&weighted, SAME_DERIVATIVE));
             if again || known.len() > MOST_RIVALS {
@@ -127,7 +132,11 @@ fn rivals(
                 of,
                 times: tie.times,
                 span: tie.span,
-                weighted,
+                is_time: value.is_some(),
+                weighted: match &value {
+                    Some(value) => weighted.minus(value),
+                    None => weighted,
+                },
                 parted: vec![],
             });
         }
@@ -150,6 +159,7 @@ impl Weighing {
     fn compare(&mut self, name: &str, own: &[Option<f64>], others: &[f64]) {
         for (rivalry, other) in self.rivals.iter_mut().zip(others) {
             if let Some(own) = own[rivalry.of] {
+                let own = if rivalry.is_time { 0.0 } else { own };
                 rivalry.see(name, own, *other);
             }
         }
@@ -189,13 +199,13 @@ impl Beside<'_> {
         let curves = base.seen(drawing.curves());
         let asked = |name: &str| self.options.asks_for(name);
         let mut weighing = Weighing::of(own.circuit(), (&drawing, &curves), asked);
-        let weighted: Vec<Weighted> = weighing.weighted.iter().flatten().cloned().collect();
+        let measured = weighing.weighted.iter().flatten().count();
         let back = match self.options.method {
             SensitivityMethod::Forward => false,
             SensitivityMethod::Adjoint => true,
-            SensitivityMethod::Automatic => to.len() > weighted.len(),
+            SensitivityMethod::Automatic => to.len() > measured,
         };
-        let back = back && !weighted.is_empty() && !base.trajectory.has_chances();
+        let back = back && measured > 0 && !base.trajectory.has_chances();
         let mut sensitivity = Sensitivity {
             of: started(&weighing.found),
             exact: true,
@@ -233,8 +243,9 @@ impl Beside<'_> {
             let changes = changes.with_constants(&base.trajectory, &base.forms);
             let plain = back && changes.is_plain();
             if plain && carried.is_none() {
-                let rivals = weighing.rivals.iter().map(|r| r.weighted.clone());
-                let weighted: Vec<Weighted> = weighted.iter().cloned().chain(rivals).collect();
+                let rivals = weighing.rivals.iter().map(|rivalry| &rivalry.weighted);
+                let weighted = weighing.weighted.iter().flatten();
+                let weighted: Vec<&Weighted> = weighted.chain(rivals).collect();
                 carried = Some(base.back(&lines, &drawing, &weighted)?);
                 sensitivity.passes.backward = weighted.len();
             }

@@ -11,18 +11,23 @@
 //! "Trajectory sensitivity analysis of hybrid systems", 2000, for the events). The sums are taken mode by mode, before there is any p: a value costs products of two matrices
 //! per mode, however often the run changes mode. In the steady state what weighs the state that returns, λ = (I − Mᵀ)⁻¹ ψ₀, goes around once more.
 
-use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use super::Trajectory;
 use super::carried::Carried;
 use super::change::{Change, Guard, columns, short_columns};
 use super::costate::Outer;
-use super::drawing::{Drawing, LEVELS, Lines, Weighted};
+use super::drawing::{Drawing, Lines, Piece, Weighted};
 use super::forms::Forms;
+use super::length::Length;
 use super::linear::Motion;
 use super::parameter::{Jump, read};
 use crate::integrate::Error;
-use crate::measure::INTERVALS;
+use crate::linalg::product::add_outer;
+use crate::measure::VALUES;
+use crate::settings::tolerances::times::SAME_LENGTH;
 
 /// Values of sums that are kept at most before they are carried to their integrals.
 const MOST_SUMS: usize = 1 << 24;
@@ -35,6 +40,18 @@ pub(crate) struct Adjoint<'a> {
     pub(crate) drawing: &'a Drawing,
 }
 
+/// What measurements see of a segment.
+struct View {
+    /// Its first piece in the drawing.
+    first: usize,
+    /// How many of its pieces lead to the last one that is weighed.
+    weighed: usize,
+    /// How many of these end before it does.
+    whole: usize,
+    /// What it takes beyond these: beyond what is weighed, and where nothing is, the rest is one stretch, and so is what it has of a piece that ends later.
+    rest: Length,
+}
+
 /// Adds Σ_c ψ_c rowᵀ to one block of each.
 fn add(
     into: &mut [Change],
@@ -43,7 +60,7 @@ fn add(
     block: fn(&mut Change) -> &mut DMatrix<f64>,
 ) {
     for (into, psi) in into.iter_mut().zip(psi.column_iter()) {
-        block(into).ger(1.0, &psi, row, 1.0);
+        add_outer(block(into), psi.as_slice(), row.as_slice());
     }
 }
 
@@ -70,15 +87,16 @@ impl Adjoint<'_> {
     pub(crate) fn back(
         &self,
         motions: &mut [Motion<'_>],
-        weighted: Option<&[Weighted]>,
+        weighted: &[&Weighted],
         last: Option<&DMatrix<f64>>,
     ) -> Result<Carried, Error> {
-        let costates = last.map_or_else(|| weighted.map_or(0, <[_]>::len), DMatrix::ncols);
+        let costates = last.map_or(weighted.len(), DMatrix::ncols);
+        let views = self.views(motions, weighted);
         let trajectory = self.trajectory;
         let mut carried = Carried::none(trajectory, costates);
         let mut outer: Vec<Outer> = motions
             .iter()
-            .map(|motion| Outer::of(motion.linear.generator.nrows(), costates))
+            .map(|motion| Outer::of(motion.linear, costates))
             .collect();
         let k = trajectory.segments.len() - 1;
         let end = &trajectory.segments[k];
@@ -99,8 +117,7 @@ impl Adjoint<'_> {
             psi = self.segment(
                 k,
                 (&mut motions[at], &mut outer[at]),
-                (&psi, weighted),
-                &mut carried,
+                (&psi, weighted, &views[k]),
             )?;
             if outer.iter().map(Outer::values).sum::<usize>() > MOST_SUMS {
                 for (motion, outer) in motions.iter_mut().zip(&mut outer) {
@@ -117,17 +134,20 @@ impl Adjoint<'_> {
         });
         carried.start = system.lcs.storage.inject.tr_mul(&psi);
         for (motion, outer) in motions.iter_mut().zip(outer) {
-            let whole = outer.whole(motion)?;
             let system = motion.linear.system;
             let n = trajectory.systems[system].lcs.n();
-            for (sums, whole) in carried.systems[system].iter_mut().zip(whole) {
-                let [generator, output] = &motion.linear.sources;
-                let whole = match &motion.linear.basis {
-                    Some(basis) => basis.from.tr_mul(&whole) * basis.to.transpose(),
-                    None => whole,
-                };
-                let read = read(n, output, generator, true);
-                sums.rate += whole.rows(0, n) * read.transpose();
+            let [generator, output] = &motion.linear.sources;
+            let read = read(n, output, generator, true).transpose();
+            let basis = motion.linear.basis.as_ref();
+            let all = carried.systems[system].iter_mut();
+            for (sums, (mut whole, mut outputs)) in all.zip(outer.whole(motion)?) {
+                if let Some(basis) = basis {
+                    let to = basis.to.transpose();
+                    whole = basis.from.tr_mul(&whole) * &to;
+                    outputs *= to;
+                }
+                sums.rate += whole.rows(0, n) * &read;
+                sums.outputs += outputs * &read;
             }
         }
         Ok(carried)
@@ -138,7 +158,7 @@ impl Adjoint<'_> {
         &self,
         k: usize,
         psi: &DMatrix<f64>,
-        weighted: Option<&[Weighted]>,
+        weighted: &[&Weighted],
         carried: &mut Carried,
     ) -> DMatrix<f64> {
         let trajectory = self.trajectory;
@@ -149,7 +169,7 @@ impl Adjoint<'_> {
             trajectory.segments[k + 1].system,
         );
         let mut theta = psi.tr_mul(&jump.drift);
-        for (theta, weighted) in theta.iter_mut().zip(weighted.unwrap_or_default()) {
+        for (theta, weighted) in theta.iter_mut().zip(weighted) {
             *theta += weighted.shifts[k + 1];
         }
         let entering = jump
@@ -194,121 +214,112 @@ impl Adjoint<'_> {
         before
     }
 
+    /// How measurements see the segments.
+    fn views(&self, motions: &[Motion<'_>], weighted: &[&Weighted]) -> Vec<View> {
+        let drawing = self.drawing;
+        let mut first = 0;
+        let mut views = Vec::with_capacity(drawing.seconds.len());
+        for (k, seconds) in drawing.seconds.iter().enumerate() {
+            first += drawing.pieces[first..].partition_point(|piece| piece.segment < k);
+            let pieces = drawing.pieces[first..].iter();
+            let pieces = pieces.take_while(|piece| piece.segment == k).count();
+            let pieces = &drawing.pieces[first..first + pieces];
+            let weighed = (0..pieces.len()).rev();
+            let mut weighed = weighed.skip_while(|j| !self.is_weighed(first + j, weighted));
+            let weighed = weighed.next().map_or(0, |j| j + 1);
+            let ends = |piece: &Piece| piece.age + piece.length;
+            let whole = pieces[..weighed].partition_point(|piece| ends(piece) <= *seconds);
+            let age = pieces[..whole].last().map_or(0.0, ends);
+            let rest = Length {
+                seconds: seconds - age,
+                recurs: false,
+            };
+            views.push(View {
+                first,
+                weighed,
+                whole,
+                rest,
+            });
+        }
+        let stretches = views.iter().zip(&self.lines.starts);
+        let stretches = stretches.map(|(view, (at, _))| (*at, view.rest.seconds));
+        let dims = motions.iter().map(|motion| motion.linear.generator.nrows());
+        let until = self.trajectory.segments.last().map_or(0.0, |last| last.to);
+        let lengths = Length::of(
+            &stretches.collect::<Vec<_>>(),
+            &dims.collect::<Vec<_>>(),
+            SAME_LENGTH * until.abs(),
+        );
+        for (view, rest) in views.iter_mut().zip(lengths) {
+            view.rest = rest;
+        }
+        views
+    }
+
+    /// Whether outputs are weighed in a piece of the drawing.
+    fn is_weighed(&self, piece: usize, weighted: &[&Weighted]) -> bool {
+        let rows = self.rows(piece..piece + 1);
+        weighted.iter().any(|weighted| {
+            let nodes = weighted.nodes[rows.clone()].as_flattened();
+            nodes.iter().any(|weight| *weight != 0.0)
+        })
+    }
+
+    /// Where the outputs of pieces stand.
+    fn rows(&self, pieces: Range<usize>) -> Range<usize> {
+        pieces.start * self.drawing.columns..pieces.end * self.drawing.columns
+    }
+
     /// ψ at the start of segment k, from ψ at its end.
     fn segment(
         &self,
         k: usize,
-        (motion, outer): (&mut Motion<'_>, &mut Outer),
-        (psi, weighted): (&DMatrix<f64>, Option<&[Weighted]>),
-        carried: &mut Carried,
+        (motion, outer): (&mut Motion<'_>, &mut Outer<'_>),
+        (psi, weighted, view): (&DMatrix<f64>, &[&Weighted], &View),
     ) -> Result<DMatrix<f64>, Error> {
-        let linear = motion.linear;
+        let basis = motion.linear.basis.as_ref();
         let n = psi.nrows();
-        let seconds = self.drawing.seconds[k];
         let start = &self.lines.starts[k].1;
         // Of w in its own basis.
-        let mut last = DMatrix::zeros(start.len(), psi.ncols());
-        match &linear.basis {
-            Some(basis) => last.copy_from(&basis.to.rows(0, n).tr_mul(psi)),
-            None => last.rows_mut(0, n).copy_from(psi),
+        let mut phi = DMatrix::zeros(start.len(), psi.ncols());
+        match basis {
+            Some(basis) => phi.copy_from(&basis.to.rows(0, n).tr_mul(psi)),
+            None => phi.rows_mut(0, n).copy_from(psi),
         }
-        let mut phi = match weighted {
-            Some(weighted) => self.seen(k, (motion, outer), (last, weighted), carried)?,
-            None => {
-                outer.back_over(motion, seconds, &mut last, start)?;
-                last
+        let pieces = &self.drawing.pieces[view.first..view.first + view.weighed];
+        let mut starts = DMatrix::zeros(start.len(), view.whole + 1);
+        let mut w = start.clone();
+        for (j, piece) in pieces[..view.whole].iter().enumerate() {
+            starts.set_column(j, &w);
+            w = motion.after(piece.level, &w)?;
+        }
+        starts.set_column(view.whole, &w);
+        outer.back_over(motion, view.rest, &mut phi, &w)?;
+        let mut end = pieces.len();
+        for alike in pieces.chunk_by(|a, b| a.level == b.level).rev() {
+            let (level, from) = (alike[0].level, end - alike.len());
+            let rows = self.rows(view.first + from..view.first + end);
+            let weights = weighted.iter().map(|weighted| {
+                let nodes = weighted.nodes[rows.clone()].as_flattened();
+                DMatrixView::from_slice(nodes, self.drawing.columns * VALUES, alike.len())
+            });
+            let weights: Vec<_> = weights.collect();
+            let w = starts.columns(from, alike.len());
+            let seen = outer.weigh(motion, level, &weights, w.as_view())?;
+            for j in (from..end).rev() {
+                if j < view.whole {
+                    let w = starts.column(j);
+                    outer.back(motion, level, &mut phi, w.as_slice())?;
+                }
+                for (mut phi, seen) in phi.column_iter_mut().zip(&seen) {
+                    phi += seen.column(j - from);
+                }
             }
-        };
-        if let Some(basis) = &linear.basis {
+            end = from;
+        }
+        if let Some(basis) = basis {
             phi = basis.from.tr_mul(&phi);
         }
         Ok(phi.rows(0, n).into_owned())
-    }
-
-    /// φ at the start of segment k with what is weighed in it.
-    fn seen(
-        &self,
-        k: usize,
-        (motion, outer): (&mut Motion<'_>, &mut Outer),
-        (mut last, weighted): (DMatrix<f64>, &[Weighted]),
-        carried: &mut Carried,
-    ) -> Result<DMatrix<f64>, Error> {
-        let (drawing, linear) = (self.drawing, motion.linear);
-        let seconds = drawing.seconds[k];
-        let mut w = self.lines.starts[k].1.clone();
-        let first = drawing.pieces.partition_point(|piece| piece.segment < k);
-        let pieces = drawing.pieces[first..].iter();
-        let pieces: Vec<_> = pieces.take_while(|piece| piece.segment == k).collect();
-        let rows = |j: usize| (first + j) * drawing.columns..(first + j + 1) * drawing.columns;
-        let is_weighed = |j: usize| {
-            let mut all = weighted
-                .iter()
-                .flat_map(|weighted| &weighted.nodes[rows(j)]);
-            all.any(|nodes| nodes.iter().any(|weight| *weight != 0.0))
-        };
-        // Beyond what is weighed, and where nothing is, the rest is one stretch.
-        let count = (0..pieces.len())
-            .rev()
-            .find(|j| is_weighed(*j))
-            .map_or(0, |j| j + 1);
-        let mut nodes = Vec::with_capacity(count * INTERVALS);
-        for piece in &pieces[..count] {
-            for j in 0..INTERVALS {
-                let age = piece.age + piece.length * j as f64 / INTERVALS as f64;
-                let next = motion.after(piece.level + LEVELS, &w)?;
-                nodes.push((age, std::mem::replace(&mut w, next)));
-            }
-        }
-        if count == 0 {
-            outer.back_over(motion, seconds, &mut last, &w)?;
-            return Ok(last);
-        }
-        let end = pieces[count - 1].age + pieces[count - 1].length;
-        // Where the segment ends on the way: before the end of the last piece or after it.
-        let mut rest = Some(last);
-        let mut phi = DMatrix::zeros(w.len(), weighted.len());
-        if end <= seconds
-            && let Some(mut rest) = rest.take()
-        {
-            outer.back_over(motion, seconds - end, &mut rest, &w)?;
-            phi += rest;
-        }
-        let system = &mut carried.systems[linear.system];
-        let [generator, output] = &linear.sources;
-        let n = linear.generator.nrows() - generator.nrows();
-        let read = read(n, output, generator, true);
-        let mut weigh = |j: usize, node: usize, w: &DVector<f64>, phi: &mut DMatrix<f64>| {
-            let mut columns = None;
-            for (c, weighted) in weighted.iter().enumerate() {
-                let own = weighted.nodes[rows(j)].iter().map(|nodes| nodes[node]);
-                let own = DVector::from_iterator(drawing.columns, own);
-                if own.iter().all(|weight| *weight == 0.0) {
-                    continue;
-                }
-                let mut column = phi.column_mut(c);
-                column += linear.rows[0].tr_mul(&own);
-                let columns = columns.get_or_insert_with(|| match &linear.basis {
-                    Some(basis) => &read * (&basis.to * w),
-                    None => &read * w,
-                });
-                system[c].outputs.ger(1.0, &own, columns, 1.0);
-            }
-        };
-        weigh(count - 1, INTERVALS, &w, &mut phi);
-        for (at, (age, w)) in nodes.iter().enumerate().rev() {
-            let (j, node) = (at / INTERVALS, at % INTERVALS);
-            outer.back(motion, pieces[j].level + LEVELS, &mut phi, w)?;
-            if *age <= seconds
-                && let Some(mut rest) = rest.take()
-            {
-                outer.back_over(motion, seconds - age, &mut rest, w)?;
-                phi += rest;
-            }
-            weigh(j, node, w, &mut phi);
-            if node == 0 && j > 0 {
-                weigh(j - 1, INTERVALS, w, &mut phi);
-            }
-        }
-        Ok(phi)
     }
 }

@@ -22,7 +22,8 @@ pub(crate) struct Carried {
 
 /// ⟨a, b⟩
 fn dot(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
-    a.iter().zip(b.iter()).map(|(a, b)| a * b).sum()
+    let both = a.as_slice().iter().zip(b.as_slice());
+    both.map(|(a, b)| a * b).sum()
 }
 
 impl Carried {
@@ -102,7 +103,8 @@ impl Carried {
                 }
             }
         }
-        for (k, weights) in self.edges.iter().enumerate() {
+        let moves = !changes.moving.is_empty();
+        for (k, weights) in self.edges.iter().enumerate().filter(|_| moves) {
             if weights.iter().any(|weight| *weight != 0.0) {
                 let dt = edge(trajectory, (forms, &changes.moving), k)?;
                 found

@@ -1,17 +1,14 @@
 //! The outputs of a run as the smooth pieces that measurements see, and what measurements weigh of how they move.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::course::Stretch;
 use super::forms::Forms;
-use super::linear::{Linear, Motion, parts};
+use super::linear::{Linear, Motion, Part, parts};
 use super::{System, Trajectory};
 use crate::circuit::Weights;
 use crate::integrate::Error;
 use crate::measure::{Curves, INTERVALS, VALUES};
-
-/// Halvings of a piece that lead from one of its values to the next.
-pub(super) const LEVELS: u32 = INTERVALS.ilog2();
 
 /// Which part of a run is seen, and in which steps.
 #[derive(Debug, Clone, Copy)]
@@ -68,6 +65,17 @@ pub(crate) struct Weighted {
 }
 
 impl Weighted {
+    /// What the difference of both weighs.
+    pub(crate) fn minus(mut self, other: &Self) -> Self {
+        let nodes = other.nodes.as_flattened();
+        let all = self.nodes.as_flattened_mut().iter_mut();
+        let all = all
+            .zip(nodes)
+            .chain(self.shifts.iter_mut().zip(&other.shifts));
+        all.for_each(|(own, other)| *own -= other);
+        self
+    }
+
     /// Whether it weighs the same to a part of the largest weight of values.
     pub(crate) fn is_like(&self, other: &Self, part: f64) -> bool {
         let all = self.nodes.iter().flatten();
@@ -120,39 +128,38 @@ impl Drawing {
             rates: Vec::new(),
             seconds: segments.map(|segment| segment.to - segment.from).collect(),
         };
+        let most = sight.most / (drawing.columns * VALUES).max(1);
         for (k, segment) in trajectory.segments.iter().enumerate() {
             if segment.to <= sight.from {
                 continue;
             }
             let (at, mut w) = (lines.starts[k].0, lines.starts[k].1.clone());
             let (seconds, motion) = (drawing.seconds[k], &mut motions[at]);
-            for part in parts(&motion.linear.spectrum, sight.unit, (0.0, seconds)) {
-                if drawing.values.len() * VALUES > sight.most {
-                    return Ok(None);
+            let whole = (0.0, seconds);
+            let parts: Vec<Part> = parts(&motion.linear.spectrum, sight.unit, whole)
+                .take(most + 1)
+                .collect();
+            if drawing.pieces.len() + parts.len() > most {
+                return Ok(None);
+            }
+            for parts in parts.chunk_by(|a, b| a.level == b.level) {
+                let mut starts = DMatrix::zeros(w.len(), parts.len());
+                for (mut start, part) in starts.column_iter_mut().zip(parts) {
+                    start.copy_from(&w);
+                    w = motion.after(part.level, &w)?;
+                    drawing.pieces.push(Piece {
+                        segment: k,
+                        age: part.age,
+                        begin: segment.from + part.age,
+                        level: part.level,
+                        length: part.length,
+                        until: ((seconds - part.age) / part.length).min(1.0),
+                    });
                 }
-                let mut own = vec![[[0.0; VALUES]; 2]; drawing.columns];
-                for j in 0..=INTERVALS {
-                    if j > 0 {
-                        w = motion.after(part.level + LEVELS, &w)?;
-                    }
-                    for (which, rows) in motion.linear.rows.iter().take(2).enumerate() {
-                        let row = rows * &w;
-                        for (own, value) in own.iter_mut().zip(row.iter()) {
-                            own[which][j] = *value;
-                        }
-                    }
-                }
-                drawing.pieces.push(Piece {
-                    segment: k,
-                    age: part.age,
-                    begin: segment.from + part.age,
-                    level: part.level,
-                    length: part.length,
-                    until: ((seconds - part.age) / part.length).min(1.0),
-                });
-                for [values, rates] in own {
-                    drawing.values.push(values);
-                    drawing.rates.push(rates);
+                let [values, rates] = motion.seen(parts[0].level)?;
+                let seen = [(&mut drawing.values, values), (&mut drawing.rates, rates)];
+                for (all, rows) in seen {
+                    all.extend((rows * &starts).as_slice().as_chunks().0);
                 }
             }
         }
@@ -176,6 +183,9 @@ impl Drawing {
         let count = self.pieces.len();
         let all = weights.values.chunks_exact(self.columns.max(1));
         for (k, own) in all.enumerate() {
+            if own.as_flattened().iter().all(|weight| *weight == 0.0) {
+                continue;
+            }
             let k = k % count;
             let piece = &self.pieces[k];
             let rows = k * self.columns..(k + 1) * self.columns;

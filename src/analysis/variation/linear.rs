@@ -9,6 +9,8 @@ use crate::integrate::exact::{Exosystem, Shape, Spectrum, over_w};
 use crate::integrate::{Error, Reason};
 use crate::linalg::decouple::Decoupled;
 use crate::linalg::expm::Ladders;
+use crate::linalg::product::add_product;
+use crate::measure::{INTERVALS, VALUES};
 use crate::settings::tolerances::exponentials::{CURVED, SERIES, SQUARED};
 
 /// w' = 𝒜 w, in the basis in which fast states owe nothing to the others.
@@ -26,15 +28,29 @@ pub(crate) struct Linear {
     pub(crate) spectrum: Spectrum,
 }
 
+/// Halvings of a piece that lead from one of its values to the next.
+pub(crate) const LEVELS: u32 = INTERVALS.ilog2();
+
 /// Motion over a span of time, halved again and again.
 pub(crate) struct Motion<'a> {
     pub(crate) linear: &'a Linear,
     /// s.
     pub(crate) seconds: f64,
     ladders: Ladders,
-    steps: Vec<Option<DMatrix<f64>>>,
+    /// By halving: exp(𝒜 t/2^k) − I and its transpose.
+    steps: Vec<Option<[DMatrix<f64>; 2]>>,
+    /// By halving: the outputs and their rates at the nodes of a piece.
+    readings: Vec<Option<Readings>>,
     /// Halvings after which Taylor's series holds.
     pub(crate) bottom: u32,
+}
+
+/// Outputs and their rates at the nodes of a piece over w where it begins, and the transpose of the outputs'.
+#[derive(Default)]
+struct Readings {
+    values: DMatrix<f64>,
+    rates: DMatrix<f64>,
+    back: DMatrix<f64>,
 }
 
 /// A piece of a stretch in one mode that outputs are seen in.
@@ -145,6 +161,24 @@ impl Linear {
         }
     }
 
+    /// Of a generator alone, with the outputs, their rates and the rates of these.
+    #[cfg(test)]
+    pub(super) fn of_generator(
+        generator: DMatrix<f64>,
+        rows: [DMatrix<f64>; 3],
+        spectrum: Spectrum,
+    ) -> Self {
+        Self {
+            system: 0,
+            sources: [DMatrix::default(), DMatrix::default()],
+            fast: Vec::new(),
+            basis: None,
+            rows,
+            spectrum,
+            generator,
+        }
+    }
+
     /// Motion over so many seconds.
     pub(crate) fn over(&self, seconds: f64) -> Motion<'_> {
         let ladders = Ladders::new(&self.generator, &self.fast, seconds, SQUARED, 0);
@@ -153,18 +187,33 @@ impl Linear {
             linear: self,
             seconds,
             steps: Vec::new(),
+            readings: Vec::new(),
             bottom: halvings.clamp(0.0, 1e3) as u32,
             ladders,
         }
     }
 }
 
+/// The transposes of rows over w at the nodes of a piece over w where it begins, N×(rows·[`VALUES`]), by row and node, where `step_back` leads from one node to the one
+/// before.
+fn at_nodes(rows: &DMatrix<f64>, step_back: &DMatrix<f64>) -> DMatrix<f64> {
+    let dim = rows.ncols();
+    let mut all = DMatrix::zeros(dim, rows.nrows() * VALUES);
+    for (row, nodes) in rows
+        .row_iter()
+        .zip(all.as_mut_slice().chunks_mut((dim * VALUES).max(1)))
+    {
+        let mut own = row.transpose();
+        for node in nodes.chunks_exact_mut(dim) {
+            node.copy_from_slice(own.as_slice());
+            add_product(own.as_mut_slice(), step_back, node);
+        }
+    }
+    all
+}
+
 impl Motion<'_> {
-    /// exp(𝒜 t/2^k) − I.
-    ///
-    /// # Errors
-    /// It does not exist in doubles.
-    pub(crate) fn step(&mut self, k: u32) -> Result<&DMatrix<f64>, Error> {
+    fn both(&mut self, k: u32) -> Result<&[DMatrix<f64>; 2], Error> {
         let at = k as usize;
         if self.steps.len() <= at {
             self.steps.resize(at + 1, None);
@@ -172,14 +221,69 @@ impl Motion<'_> {
         if self.steps[at].is_none() {
             let increment = self.ladders.increment(k).ok_or_else(beyond_doubles)?;
             let dim = self.linear.generator.nrows();
-            self.steps[at] = Some(DMatrix::from_fn(dim, dim, |i, j| increment.column(j)[i]));
+            let step = DMatrix::from_fn(dim, dim, |i, j| increment.column(j)[i]);
+            let transposed = step.transpose();
+            self.steps[at] = Some([step, transposed]);
         }
-        Ok(self.steps[at].get_or_insert_with(DMatrix::default))
+        Ok(self.steps[at].get_or_insert_default())
+    }
+
+    /// exp(𝒜 t/2^k) − I.
+    ///
+    /// # Errors
+    /// It does not exist in doubles.
+    pub(crate) fn step(&mut self, k: u32) -> Result<&DMatrix<f64>, Error> {
+        Ok(&self.both(k)?[0])
+    }
+
+    /// Its transpose, which takes costates back.
+    ///
+    /// # Errors
+    /// It does not exist in doubles.
+    pub(super) fn step_back(&mut self, k: u32) -> Result<&DMatrix<f64>, Error> {
+        Ok(&self.both(k)?[1])
+    }
+
+    fn readings(&mut self, k: u32) -> Result<&Readings, Error> {
+        let at = k as usize;
+        if self.readings.len() <= at {
+            self.readings.resize_with(at + 1, || None);
+        }
+        if self.readings[at].is_none() {
+            let [values, rates, _] = &self.linear.rows;
+            let step = self.step_back(k + LEVELS)?;
+            let [back, rates] = [values, rates].map(|rows| at_nodes(rows, step));
+            self.readings[at] = Some(Readings {
+                values: back.transpose(),
+                rates: rates.transpose(),
+                back,
+            });
+        }
+        Ok(self.readings[at].get_or_insert_default())
+    }
+
+    /// The m outputs, and their rates, at the nodes of a piece of t/2^k seconds over w where it begins: by output and node, m·[`VALUES`]×N.
+    ///
+    /// # Errors
+    /// The exponential does not exist in doubles.
+    pub(super) fn seen(&mut self, k: u32) -> Result<[&DMatrix<f64>; 2], Error> {
+        let Readings { values, rates, .. } = self.readings(k)?;
+        Ok([values, rates])
+    }
+
+    /// The transpose of the outputs' there, which takes what weighs them to costates.
+    ///
+    /// # Errors
+    /// The exponential does not exist in doubles.
+    pub(super) fn seen_back(&mut self, k: u32) -> Result<&DMatrix<f64>, Error> {
+        Ok(&self.readings(k)?.back)
     }
 
     /// w after t/2^k seconds.
     pub(crate) fn after(&mut self, k: u32, w: &DVector<f64>) -> Result<DVector<f64>, Error> {
-        Ok(w + self.step(k)? * w)
+        let mut after = w.clone();
+        add_product(after.as_mut_slice(), self.step(k)?, w.as_slice());
+        Ok(after)
     }
 
     /// s at halving k.
@@ -189,26 +293,23 @@ impl Motion<'_> {
 
     /// Taylor's coefficients of w over so many seconds, at most the bottom's: w(s t) = Σ s^k w_k.
     pub(crate) fn series(&self, w: &DVector<f64>, seconds: f64) -> Vec<DVector<f64>> {
-        let along = |w: &DVector<f64>| &self.linear.generator * w;
-        Self::terms(w, seconds, along)
+        series(&self.linear.generator, w, seconds)
     }
+}
 
-    /// The same of a costate on its way back, φ' = −𝒜ᵀ φ.
-    pub(super) fn series_back(&self, phi: &DVector<f64>, seconds: f64) -> Vec<DVector<f64>> {
-        Self::terms(phi, seconds, |phi| self.linear.generator.tr_mul(phi))
+/// The same of w' = 𝒜 w.
+pub(super) fn series(
+    generator: &DMatrix<f64>,
+    w: &DVector<f64>,
+    seconds: f64,
+) -> Vec<DVector<f64>> {
+    /// Terms beyond which nothing is left where ‖𝒜‖ t ≤ ⅛.
+    const TERMS: usize = 16;
+    let mut terms = vec![w.clone()];
+    for k in 1..TERMS {
+        let mut term = DVector::zeros(w.len());
+        add_product(term.as_mut_slice(), generator, terms[k - 1].as_slice());
+        terms.push(term * (seconds / k as f64));
     }
-
-    fn terms(
-        w: &DVector<f64>,
-        seconds: f64,
-        along: impl Fn(&DVector<f64>) -> DVector<f64>,
-    ) -> Vec<DVector<f64>> {
-        /// Terms beyond which nothing is left where ‖𝒜‖ t ≤ ⅛.
-        const TERMS: usize = 16;
-        let mut terms = vec![w.clone()];
-        for k in 1..TERMS {
-            terms.push(along(&terms[k - 1]) * (seconds / k as f64));
-        }
-        terms
-    }
+    terms
 }

@@ -17,12 +17,14 @@ mod drawing;
 mod flow;
 mod forms;
 mod instant;
+mod length;
 mod linear;
 mod moved;
 mod near;
 mod parameter;
 mod saltation;
 mod steps;
+mod sums;
 mod system;
 mod tableau;
 mod tangent;
@@ -45,7 +47,7 @@ pub(crate) use course::{Course, Leap};
 pub(crate) use drawing::{Drawing, Lines, Sight, Weighted};
 pub(crate) use forms::Forms;
 use instant::Inputs;
-pub(crate) use linear::{Linear, Motion, parts, unit};
+pub(crate) use linear::{LEVELS, Linear, Motion, parts, unit};
 pub(crate) use moved::Moved;
 pub(crate) use near::{Near, STEPS, difference};
 pub(crate) use parameter::Parameter;
@@ -385,11 +387,18 @@ impl Maker {
             inputs: right,
         };
         let (timing, others) = self.timing(instant, &before, seconds)?;
+        if self.by_chance {
+            let happens = Saltation::happens(t, (&before, &after), timing);
+            return Ok(Saltation {
+                through,
+                others,
+                ..happens
+            });
+        }
         let jump = through.map(|at| &systems[at]);
         let saltation = Saltation::of(t, (&before, &after), timing, jump);
         Ok(Saltation {
             through,
-            others,
             ..saltation
         })
     }

@@ -21,6 +21,7 @@ use super::{Saltation, System, Trajectory, not_smooth};
 use crate::circuit::source;
 use crate::integrate::Error;
 use crate::integrate::exact::{Exosystem, Shape};
+use crate::linalg::product::{add_product, product};
 use crate::measure::{INTERVALS, VALUES};
 use crate::settings::tolerances::events::SAME_TIMING;
 use crate::settings::tolerances::periodic::VALUE_STEP;
@@ -64,18 +65,22 @@ impl<'a> Jump<'a> {
         let before = side(k, &segments[k].end);
         let after = side(k + 1, &segments[k + 1].start);
         let through = saltation.through.map(|at| &systems[at]);
-        let mut inject = after.system.lcs.storage.inject.clone();
-        let mut drift = DVector::zeros(inject.nrows());
+        let inject = &after.system.lcs.storage.inject;
+        let mut drift = -after.rate();
+        let mut rate = before.storage_rate();
         let storage = before.system.storage(&before.x, &before.inputs.u);
         let mut between = None;
         if let Some(jump) = through {
-            drift += &inject * (&jump.storage_inputs * &after.inputs.du);
-            inject = inject * &jump.lcs.storage.x * &jump.lcs.storage.inject;
+            rate = product(
+                &jump.lcs.storage.x,
+                &product(&jump.lcs.storage.inject, &rate),
+            );
+            rate += product(&jump.storage_inputs, &after.inputs.du);
             let x = jump.state(storage.as_slice());
             let then = jump.storage(&x, &after.inputs.u);
             between = Some((short_columns(&x, &after.inputs.u), then));
         }
-        drift += &inject * before.storage_rate() - after.rate();
+        add_product(drift.as_mut_slice(), inject, rate.as_slice());
         Self {
             from: before.system,
             through,

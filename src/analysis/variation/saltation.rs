@@ -15,6 +15,7 @@ use nalgebra::{Complex, DMatrix, DVector, RowDVector};
 use super::instant::Inputs;
 use super::system::{Row, System};
 use crate::integrate::exact::Owner;
+use crate::linalg::product::{add_product, product};
 
 /// When an event happens: δt = x δx⁻ + u δu + u' δu'.
 #[derive(Debug, Clone)]
@@ -32,7 +33,7 @@ pub(crate) struct Timing {
 pub(crate) struct Saltation {
     /// Time, s.
     pub(crate) t: f64,
-    /// n⁺×n⁻.
+    /// n⁺×n⁻; this, what follows sources and the step of the outputs are empty where events that coincide by chance are kept, as nothing takes them there.
     pub(crate) x: DMatrix<f64>,
     /// n⁺×p.
     pub(crate) u: DMatrix<f64>,
@@ -76,7 +77,14 @@ impl Side<'_> {
 
     /// ṡ.
     pub(super) fn storage_rate(&self) -> DVector<f64> {
-        &self.system.lcs.storage.x * self.rate() + &self.system.storage_inputs * &self.inputs.du
+        let mut rate = product(&self.system.storage_inputs, &self.inputs.du);
+        let x = self.rate();
+        add_product(
+            rate.as_mut_slice(),
+            &self.system.lcs.storage.x,
+            x.as_slice(),
+        );
+        rate
     }
 }
 
@@ -110,6 +118,25 @@ impl Saltation {
         }
     }
 
+    /// When the event between two sides happens, and its impulse.
+    pub(super) fn happens(
+        t: f64,
+        (before, after): (&Side<'_>, &Side<'_>),
+        timing: Option<Timing>,
+    ) -> Self {
+        Self {
+            t,
+            x: DMatrix::default(),
+            u: DMatrix::default(),
+            du: DMatrix::default(),
+            timing,
+            others: Vec::new(),
+            through: None,
+            step: DVector::default(),
+            impulse: Impulse::of(before, after),
+        }
+    }
+
     /// The event between two sides, where the storage jumps as J⁺ s if `through` is none, else first as in that mode.
     pub(super) fn of(
         t: f64,
@@ -136,15 +163,11 @@ impl Saltation {
         }
         let outputs = |side: &Side<'_>| side.system.outputs(&side.x, &side.inputs);
         Self {
-            t,
             x,
             u,
             du,
-            timing,
-            others: Vec::new(),
-            through: None,
             step: outputs(before) - outputs(after),
-            impulse: Impulse::of(before, after),
+            ..Self::happens(t, (before, after), timing)
         }
     }
 }
@@ -153,8 +176,11 @@ impl Impulse {
     fn of(before: &Side<'_>, after: &Side<'_>) -> Option<Self> {
         let rows = &after.system.lcs.outputs.impulse;
         let storage = |side: &Side<'_>| side.system.storage(&side.x, &side.inputs.u);
+        if rows.is_empty() {
+            return None;
+        }
         let jump = storage(before) - storage(after);
-        if rows.is_empty() || rows.ncols() != jump.len() || jump.iter().all(|d| *d == 0.0) {
+        if rows.ncols() != jump.len() || jump.iter().all(|d| *d == 0.0) {
             return None;
         }
         let areas = rows * &jump;

@@ -9,6 +9,7 @@ use crate::integrate::{Error, reading};
 use crate::lcs::{Hold, Lcs, Rows, fast_states};
 use crate::linalg::decouple::{Decoupled, decoupled};
 use crate::linalg::expm::Ladders;
+use crate::linalg::product::add_product;
 use crate::linalg::rays;
 use crate::settings::tolerances::exponentials::SQUARED;
 
@@ -136,18 +137,25 @@ impl System {
 
     /// x = J s + j.
     pub(super) fn state(&self, storage: &[f64]) -> DVector<f64> {
-        let storage = DVector::from_column_slice(storage);
-        &self.lcs.storage.inject * storage + &self.lcs.storage.inject_one
+        let mut x = self.lcs.storage.inject_one.clone();
+        add_product(x.as_mut_slice(), &self.lcs.storage.inject, storage);
+        x
     }
 
     /// s = X x + U u + k.
     pub(super) fn storage(&self, x: &DVector<f64>, u: &DVector<f64>) -> DVector<f64> {
-        &self.lcs.storage.x * x + &self.storage_inputs * u + &self.lcs.storage.one
+        let mut s = self.lcs.storage.one.clone();
+        add_product(s.as_mut_slice(), &self.lcs.storage.x, x.as_slice());
+        add_product(s.as_mut_slice(), &self.storage_inputs, u.as_slice());
+        s
     }
 
     /// x' at x.
     pub(super) fn rate(&self, x: &DVector<f64>, u: &DVector<f64>) -> DVector<f64> {
-        &self.lcs.a * x + &self.inputs * u + &self.lcs.e0
+        let mut rate = self.lcs.e0.clone();
+        add_product(rate.as_mut_slice(), &self.lcs.a, x.as_slice());
+        add_product(rate.as_mut_slice(), &self.inputs, u.as_slice());
+        rate
     }
 
     /// e^{A τ}; `None` where it does not exist in doubles.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 
-use super::change::{Change, Changes};
+use super::change::{Change, Changes, Guard};
 use super::forms::{Forms, Moving};
 use super::instant::Inputs;
 use super::near::difference;
@@ -18,6 +18,7 @@ use crate::integrate::Error;
 use crate::integrate::exact::{Assembler, Owner};
 use crate::integrate::switching::Threshold;
 use crate::lcs::{Hold, Lcs, Position, Rows, StorageHold, reduce};
+use crate::linalg::product::add_outer;
 use crate::mna::{Perturbation, StandardMultiport};
 use crate::settings::tolerances::periodic::{NEAR_THRESHOLD, SAME_REDUCTION};
 
@@ -30,6 +31,8 @@ pub(crate) struct Tableau {
     /// The columns of flows of all storage.
     flows: Vec<usize>,
     systems: Vec<System>,
+    /// The guards of the trajectory.
+    guards: Vec<Guard>,
     /// P⁻¹.
     inverse: Option<DMatrix<f64>>,
     thresholds: Vec<Threshold>,
@@ -99,6 +102,7 @@ impl Tableau {
             read,
             flows,
             systems,
+            guards: trajectory.guards(),
             inverse: metric.and_then(|system| system.lcs.storage.metric.clone().try_inverse()),
             thresholds: assembler.thresholds(),
             assembler,
@@ -174,7 +178,7 @@ impl Tableau {
             drives.push(own);
         }
         let mut guards = Vec::new();
-        for guard in trajectory.guards() {
+        for &guard in &self.guards {
             let system = &trajectory.systems[guard.system];
             let (n, p) = (system.lcs.n(), system.lcs.p());
             let Some(row) = self.guard(guard.system, guard.owner) else {
@@ -309,8 +313,9 @@ impl Tableau {
             if !still(&of_du) || !still(&own.storage_inputs) {
                 return None;
             }
-            change.rate += own.inputs.column(column) * drive;
-            change.outputs += of_u.column(column) * drive;
+            let [inputs, of_u] = [&own.inputs, &of_u].map(|block| block.column(column));
+            add_outer(&mut change.rate, inputs.as_slice(), drive.as_slice());
+            add_outer(&mut change.outputs, of_u.as_slice(), drive.as_slice());
         }
         if !perturbation.metric.is_empty() {
             let storage = &system.lcs.storage;
@@ -326,7 +331,8 @@ impl Tableau {
             for (j, storage) in self.storage.iter().enumerate() {
                 let area = metric.row(*storage) * &jump;
                 let column = p + self.equations.len() + j;
-                change.inject += own.inputs.column(column) * area;
+                let inputs = own.inputs.column(column);
+                add_outer(&mut change.inject, inputs.as_slice(), area.as_slice());
             }
         }
         Some(change)
