@@ -92,6 +92,9 @@ impl<'a> Outer<'a> {
 
     /// What weighs the outputs at the nodes of pieces of one length, by costate m·[`VALUES`]×pieces, has of costates where the pieces begin, by costate N×pieces. The
     /// equation is at w there, N×pieces.
+    ///
+    /// # Errors
+    /// An exponential does not exist in doubles.
     pub(super) fn weigh(
         &mut self,
         motion: &mut Motion<'_>,
