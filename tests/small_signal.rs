@@ -62,6 +62,24 @@ fn a_linear_circuit_is_its_transfer_function() {
     assert!(error < 1e-12, "{error:e}");
 }
 
+/// A chain of n equal sections has v_n/v_0 = cosh(φ/2)/cosh((n + ½) φ) with cosh φ = 1 + jωRC/2.
+#[test]
+fn a_long_ladder_is_its_chain() {
+    let n = 4000;
+    let stage = |k: usize| format!("r{k} n{} n{k} 1\nc{k} n{k} 0 1n\n", k - 1);
+    let stages: String = (1..=n).map(stage).collect();
+    let text = format!("ladder\nv1 n0 0 0 ac 1\n{stages}.ac dec 4 1 10k\n.save v(n{n})\n.end\n");
+    let response = response_of(&text, &SmallSignalOptions::default());
+    let truth = |f: f64| {
+        let phi = (1.0 + J * (TAU * f * 0.5e-9)).acosh();
+        (0.5 * phi).cosh() / ((n as f64 + 0.5) * phi).cosh()
+    };
+    let out = column(&response, &format!("v(n{n})"));
+    let error = apart(&out, truth, &response.phasors.frequency);
+    assert!(error < 1e-8, "{error:e}");
+    assert!(response.notes.is_empty(), "{:?}", response.notes);
+}
+
 /// `tests/reference/periodic_digits.py`: the orbit of a buck, its multiplier and its response up to ten times the switching frequency from 40 digits.
 #[test]
 fn the_orbit_of_a_buck_and_its_response_are_those_of_forty_digits() {

@@ -57,7 +57,7 @@ pub use run::{Frame, Outcome, Stepper};
 pub(crate) use simulate::simulate_beside;
 pub use simulate::{Method, SimOptions, Standing, simulate, simulate_system};
 pub use simulation::{Checkpoint, Simulation, SimulationOptions, Stop, StopReason};
-pub(crate) use sparse::{Lengths, Passed, Returns};
+pub(crate) use sparse::{Lengths, Passed, Returns, Sine, Tape};
 pub use start::{OperatingPoint, Values, operating_point};
 pub use stats::{Energy, Impulse, JumpReason, Run, StateJump, StateJumps, StatedError, Stats};
 pub use verify::{Verified, VerifyOptions, verify, verify_system};

@@ -32,6 +32,20 @@ impl Csr {
         }
     }
 
+    /// A matrix without its zeros.
+    pub(crate) fn of(matrix: &nalgebra::DMatrix<f64>) -> Self {
+        let mut own = Self::new(matrix.ncols());
+        for row in matrix.row_iter() {
+            let entries = row.iter().copied().enumerate();
+            own.push(
+                entries
+                    .filter(|(_, value)| *value != 0.0)
+                    .collect::<Vec<_>>(),
+            );
+        }
+        own
+    }
+
     /// Appends a row of entries (column, value), columns increasing.
     pub fn push(&mut self, row: impl IntoIterator<Item = (usize, f64)>) {
         for (column, value) in row {

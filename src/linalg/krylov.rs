@@ -113,6 +113,125 @@ pub(crate) fn gmres<E>(
     Ok(y.map_or_else(|_| DVector::zeros(b.len()), |y| basis.combine(&y)))
 }
 
+/// Solutions of (e − A) x = b for one number e of size 1 after the other: what was multiplied for one of them serves all.
+///
+/// In a basis V with its images W = A V the y of the least ‖b − (e V − W) y‖ is that of the normal equations, improved by what it leaves; as long as that is too much, both parts of it are
+/// further vectors, as in GMRES.
+pub(crate) struct Recycled {
+    vectors: Vec<DVector<f64>>,
+    images: Vec<DVector<f64>>,
+    /// Vᵀ W and Wᵀ W.
+    along: DMatrix<f64>,
+    sizes: DMatrix<f64>,
+}
+
+impl Recycled {
+    /// Without a vector yet.
+    pub(crate) fn new() -> Self {
+        Self {
+            vectors: Vec::new(),
+            images: Vec::new(),
+            along: DMatrix::zeros(0, 0),
+            sizes: DMatrix::zeros(0, 0),
+        }
+    }
+
+    /// The first x found that leaves less than the part `reduction` of b; `None` where `most` vectors do not.
+    ///
+    /// # Errors
+    /// Those of the products.
+    pub(crate) fn solve<E>(
+        &mut self,
+        product: &mut Product<'_, E>,
+        (e, b): (Complex<f64>, &DVector<Complex<f64>>),
+        (reduction, most): (f64, usize),
+    ) -> Result<Option<DVector<Complex<f64>>>, E> {
+        let size = b.norm();
+        loop {
+            let (x, left) = self.best(e, b);
+            if left.norm() <= reduction * size {
+                return Ok(Some(x));
+            }
+            let before = self.vectors.len();
+            for part in [left.map(|v| v.re), left.map(|v| v.im)] {
+                self.grow(product, part)?;
+            }
+            let still = self.vectors.len() == before;
+            if still || self.vectors.len() > most || !left.norm().is_finite() {
+                return Ok(None);
+            }
+        }
+    }
+
+    /// The x of the least ‖b − (e − A) x‖ that the basis knows, and what it leaves of b.
+    fn best(
+        &self,
+        e: Complex<f64>,
+        b: &DVector<Complex<f64>>,
+    ) -> (DVector<Complex<f64>>, DVector<Complex<f64>>) {
+        let k = self.vectors.len();
+        if k == 0 {
+            return (DVector::zeros(b.len()), b.clone());
+        }
+        let normal = DMatrix::from_fn(k, k, |i, j| {
+            let own = f64::from(u8::from(i == j)) * e.norm_sqr();
+            let cross = e.conj() * self.along[(i, j)] + e * self.along[(j, i)];
+            Complex::from(own + self.sizes[(i, j)]) - cross
+        });
+        let factors = normal.lu();
+        let (mut x, mut left) = (DVector::zeros(b.len()), b.clone());
+        for _ in 0..3 {
+            let dot = |v: &DVector<f64>| -> Complex<f64> {
+                v.iter().zip(&left).map(|(v, left)| left * *v).sum()
+            };
+            let pairs = self.vectors.iter().zip(&self.images);
+            let right = pairs.map(|(v, w)| e.conj() * dot(v) - dot(w));
+            let right = DVector::from_iterator(k, right);
+            let Some(y) = factors.solve(&right) else {
+                break;
+            };
+            for ((v, w), y) in self.vectors.iter().zip(&self.images).zip(&y) {
+                for (k, (v, w)) in v.iter().zip(w).enumerate() {
+                    x[k] += y * *v;
+                    left[k] -= y * (e * *v - *w);
+                }
+            }
+        }
+        (x, left)
+    }
+
+    /// Takes in a direction, if it is another one.
+    fn grow<E>(&mut self, product: &mut Product<'_, E>, mut v: DVector<f64>) -> Result<(), E> {
+        let size = v.norm();
+        for _ in 0..2 {
+            for own in &self.vectors {
+                let along = own.dot(&v);
+                v.axpy(-along, own, 1.0);
+            }
+        }
+        let rest = v.norm();
+        if rest.is_nan() || rest <= BREAKDOWN * size {
+            return Ok(());
+        }
+        let v = v / rest;
+        let w = product(&v)?;
+        self.vectors.push(v);
+        self.images.push(w);
+        let k = self.vectors.len();
+        let (vectors, images) = (&self.vectors, &self.images);
+        let extended = |known: &DMatrix<f64>, left: &[DVector<f64>]| {
+            DMatrix::from_fn(k, k, |i, j| {
+                let known = known.get((i, j)).filter(|_| i + 1 < k && j + 1 < k);
+                known.copied().unwrap_or_else(|| left[i].dot(&images[j]))
+            })
+        };
+        let along = extended(&self.along, vectors);
+        let sizes = extended(&self.sizes, images);
+        (self.along, self.sizes) = (along, sizes);
+        Ok(())
+    }
+}
+
 /// An eigenvalue that a basis tells.
 #[derive(Debug, Clone)]
 pub(crate) struct Ritz {
@@ -256,6 +375,30 @@ mod tests {
         assert!((&a * &short - &b).norm() < b.norm());
         let none = gmres(&mut product, &DVector::zeros(40), (1e-12, 1e-9), 5).expect("zero");
         assert_eq!(none.norm(), 0.0);
+    }
+
+    #[test]
+    fn shifted_systems_share_their_products() {
+        let a = matrix(40);
+        let b = DVector::from_fn(40, |i, _| Complex::new((i as f64).sin(), (i as f64).cos()));
+        let (mut recycled, mut products) = (Recycled::new(), 0);
+        for k in 0..50 {
+            let e = Complex::from_polar(1.0, 0.1 * f64::from(k));
+            let mut product = |v: &DVector<f64>| {
+                products += 1;
+                Ok::<_, ()>(&a * v)
+            };
+            let x = recycled
+                .solve(&mut product, (e, &b), (1e-11, 60))
+                .expect("products");
+            let x = x.expect("a solution");
+            let left = &x * e - a.map(Complex::from) * &x - &b;
+            assert!(left.norm() < 1e-10 * b.norm(), "{k}: {:e}", left.norm());
+        }
+        assert!(products <= 40, "{products}");
+        let mut product = |v: &DVector<f64>| Ok::<_, ()>(&a * v);
+        let none = Recycled::new().solve(&mut product, (Complex::from(1.0), &b), (1e-11, 5));
+        assert!(none.expect("products").is_none());
     }
 
     /// Where nothing solves the equation, what does not can be left is left, and the vector does not grow out of rounding.

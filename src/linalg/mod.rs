@@ -10,6 +10,7 @@ pub(crate) mod gauss;
 pub(crate) mod kernel;
 pub(crate) mod krylov;
 pub(crate) mod levelled;
+pub(crate) mod pencil;
 pub(crate) mod polynomial;
 pub(crate) mod product;
 pub(crate) mod quadratic;

@@ -21,9 +21,10 @@ use crate::settings::tolerances::periodic::{
     CLOSED, FINER, LONGEST_SEARCH, MOST_LINEARISED, PARTS_OF_PERIOD, PERIOD_OFF, TABLE_STEPS,
 };
 
+pub(super) use large::Large;
 use rows::{notes, rows, state_error};
 use search::{Found, Search};
-pub(super) use settled::settled;
+pub(super) use settled::{Settled, settled, settled_linear};
 
 /// What a periodic steady state may be asked for.
 #[derive(Debug, Clone, Default)]
@@ -373,8 +374,21 @@ fn asked(model: &Model, options: &PeriodicOptions<'_>) -> Result<Asked, Error> {
 /// # Errors
 /// As [`periodic`].
 pub(super) fn steady(model: &Model, options: &PeriodicOptions<'_>) -> Result<Steady, Error> {
-    let asked = asked(model, options)?;
-    let size = asked.multiport.storage.len() + asked.multiport.standard().pairs.len();
+    linearised(asked(model, options)?, options)
+}
+
+/// Whether an orbit is too large for dense matrices that make it linear.
+pub(super) fn beyond_dense(model: &Model) -> bool {
+    size(model.multiport()) > MOST_LINEARISED
+}
+
+/// Capacitors, inductors and ideal pairs.
+fn size(multiport: &StaticMultiport) -> usize {
+    multiport.storage.len() + multiport.standard().pairs.len()
+}
+
+fn linearised(asked: Asked, options: &PeriodicOptions<'_>) -> Result<Steady, Error> {
+    let size = size(&asked.multiport);
     if size > MOST_LINEARISED {
         let text = format!(
             "what follows from the derivative of an orbit is found with dense matrices, of {MOST_LINEARISED} capacitors, inductors and ideal pairs at most, and the circuit has {size}: \

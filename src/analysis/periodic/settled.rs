@@ -1,10 +1,11 @@
 //! A periodic steady state however it was found: with dense matrices, or of a large circuit by products.
 
 use super::large::Large;
-use super::{PeriodicOptions, Steady, asked, whole};
+use super::{Asked, PeriodicOptions, Steady, asked, linearised, size, whole};
 use crate::circuit::Tran;
 use crate::integrate::{Error, Note, Orbit, Reason, Run, Standing};
 use crate::model::Model;
+use crate::settings::tolerances::periodic::MOST_LINEARISED;
 use crate::settings::tolerances::sparse::MOST_DENSE_STATES;
 
 /// A circuit in its periodic steady state, as it was found.
@@ -53,6 +54,23 @@ impl Settled {
     }
 }
 
+/// The same for what follows from the derivative of an orbit: of a driven circuit of many elements by products, else with dense matrices, of not too many elements.
+///
+/// # Errors
+/// As [`periodic`](super::periodic()).
+pub(in crate::analysis) fn settled_linear(
+    model: &Model,
+    options: &PeriodicOptions<'_>,
+) -> Result<Settled, Error> {
+    let asked = asked(model, options)?;
+    match Large::of(&asked, options) {
+        Ok(Some(large)) => return Ok(Settled::Large(Box::new(large), asked.held, asked.said)),
+        Err(error) if is_final(&error, &asked, MOST_LINEARISED) => return Err(error),
+        Ok(None) | Err(_) => {}
+    }
+    Ok(Settled::Whole(Box::new(linearised(asked, options)?)))
+}
+
 /// Finds the periodic steady state, of a large driven circuit by products.
 ///
 /// # Errors
@@ -68,9 +86,7 @@ pub(in crate::analysis) fn settled(
         }
         Ok(None) => {}
         Err(error) => {
-            let size = asked.multiport.storage.len() + asked.multiport.standard().pairs.len();
-            let other = matches!(error.reason, Reason::NoOrbit(_) | Reason::Interrupted);
-            if other || size > MOST_DENSE_STATES {
+            if is_final(&error, &asked, MOST_DENSE_STATES) {
                 return Err(error);
             }
             let text = format!(
@@ -81,4 +97,10 @@ pub(in crate::analysis) fn settled(
         }
     }
     Ok(Settled::Whole(Box::new(whole(asked, options)?)))
+}
+
+/// Whether dense matrices, of `most` elements, have no other answer.
+fn is_final(error: &Error, asked: &Asked, most: usize) -> bool {
+    size(&asked.multiport) > most
+        || matches!(error.reason, Reason::NoOrbit(_) | Reason::Interrupted)
 }

@@ -10,14 +10,14 @@ use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
 use super::measured::{measured, periodic_measured};
-use super::periodic::PeriodicOptions;
+use super::periodic::{PeriodicOptions, beyond_dense};
 use super::variation::STEPS;
 use crate::circuit::{Circuit, Kind, Measured, NamedMeasurement, SteadyState, source::Wave};
 use crate::integrate::{Error, Note, Reason, SimOptions, Simulation, SimulationOptions};
 use crate::measure::{Measurement, Over};
 use crate::model::Model;
 use crate::settings::Settings;
-use crate::settings::tolerances::periodic::{RUN_STEP, SIDES_APART};
+use crate::settings::tolerances::periodic::{MOST_BESIDE, RUN_STEP, SIDES_APART};
 
 /// Which way the derivatives of an exact run are computed: both have the same result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -182,7 +182,19 @@ pub fn sensitivity(model: &Model, options: &SensitivityOptions<'_>) -> Result<Se
         ));
     }
     let beside = Beside { model, options };
-    let mut found = match beside.exact(&to)? {
+    let exact = if options.steady && beyond_dense(model) {
+        if to.len() > MOST_BESIDE {
+            let what = format!(
+                "derivatives of the orbit of so many elements are differences of four orbits for each of {} values: name up to {MOST_BESIDE} of them (`--to`)",
+                to.len()
+            );
+            return Err(unsupported(what));
+        }
+        None
+    } else {
+        beside.exact(&to)?
+    };
+    let mut found = match exact {
         Some(found) => found,
         None => beside.differences(&to)?,
     };

@@ -3,6 +3,7 @@
 
 mod beside;
 mod formula;
+mod large;
 mod measured;
 mod orbit;
 mod ratio;
@@ -15,7 +16,9 @@ use nalgebra::{Complex, DMatrix, DVector, Dyn, LU};
 pub use measured::small_signal_measured;
 pub use ratio::{Left, Margin, Ratio, margins, ratios, unwrapped};
 
-use super::periodic::{PeriodicOptions, Steady, steady};
+use super::periodic::{
+    Large, PeriodicOptions, Settled, Steady, beyond_dense, settled_linear, steady,
+};
 use super::variation::times;
 use crate::circuit::{Circuit, Kind};
 use crate::integrate::{Error, Note, Orbit, OrbitKind, Reason};
@@ -23,7 +26,7 @@ use crate::lcs::Input;
 use crate::linalg::decouple::Decoupled;
 use crate::model::Model;
 use crate::settings::Settings;
-use crate::settings::tolerances::periodic::LOST;
+use crate::settings::tolerances::periodic::{LOST, RADIANS_OF_STEP};
 use crate::waveform::{Phasors, unit_of};
 
 /// Where a circuit is made linear.
@@ -71,7 +74,7 @@ impl Response {
     fn sweep(
         &mut self,
         omegas: &[f64],
-        respond: impl Fn(f64) -> Result<(Vec<Complex<f64>>, f64), Error>,
+        mut respond: impl FnMut(f64) -> Result<(Vec<Complex<f64>>, f64), Error>,
     ) -> Result<(), Error> {
         let mut worst = (0.0, 0.0);
         for &omega in omegas {
@@ -85,6 +88,30 @@ impl Response {
             self.notes.push(lost(worst.0, worst.1));
         }
         Ok(())
+    }
+
+    /// Names columns by sideband, and says about which orbit they are.
+    fn about_bands(&mut self, orbit: Orbit, sidebands: u16) {
+        let bands = bands(sidebands);
+        let phasors = &mut self.phasors;
+        let of_band = |name: &String, k: i32| {
+            if k == 0 {
+                name.clone()
+            } else {
+                format!("{name}@{k}")
+            }
+        };
+        let names = bands
+            .iter()
+            .flat_map(|k| phasors.names.iter().map(|name| of_band(name, *k)));
+        phasors.names = names.collect();
+        phasors.units = phasors.units.repeat(bands.len());
+        if !orbit.stable {
+            let what =
+                "the orbit is unstable: this is the response about it, which no transient shows";
+            self.notes.push(Note::run("unstable-orbit", what));
+        }
+        self.orbit = Some(orbit);
     }
 
     /// The same by a method of order 2 in halves of parts and in whole ones, extrapolated; a note says how far the two are apart, and at least
@@ -109,7 +136,8 @@ impl Response {
                 }
             }
         }
-        self.notes.push(in_parts(worst, orbit));
+        let what = "curved laws are taken for their tangents, which changes";
+        self.notes.push(in_parts(worst, orbit, what));
         Ok(())
     }
 }
@@ -196,9 +224,28 @@ pub fn small_signal(model: &Model, options: &SmallSignalOptions<'_>) -> Result<R
             settings: options.settings.clone(),
             ..PeriodicOptions::default()
         };
-        let found = steady(model, &asked)?;
-        if found.orbit().kind != OrbitKind::Equilibrium {
-            about_orbit(found, &asked, (&omegas, options.sidebands), &mut response)?;
+        let found = settled_linear(model, &asked)?;
+        let orbit = found.orbit();
+        if orbit.kind != OrbitKind::Equilibrium {
+            let asked_of = (&omegas[..], options.sidebands);
+            match found {
+                Settled::Whole(steady) => about_orbit(*steady, &asked, asked_of, &mut response)?,
+                Settled::Large(large, ..) => {
+                    match about_large(*large, &asked, asked_of, &mut response) {
+                        // Dense matrices tell what their steps leave open.
+                        Err(Error {
+                            reason: Reason::NotSmooth(_),
+                            ..
+                        }) if !beyond_dense(model) => {
+                            response.phasors.values.clear();
+                            let steady = steady(model, &asked)?;
+                            about_orbit(steady, &asked, asked_of, &mut response)?;
+                        }
+                        made => made?,
+                    }
+                }
+            }
+            response.about_bands(orbit, options.sidebands);
             return Ok(response);
         }
         if options.about.is_some() {
@@ -207,7 +254,7 @@ pub fn small_signal(model: &Model, options: &SmallSignalOptions<'_>) -> Result<R
         }
         response.about = About::Rest;
     }
-    let linear = rest::linear(
+    let mut linear = rest::linear(
         circuit,
         model.multiport(),
         &options.settings,
@@ -238,7 +285,7 @@ fn about_orbit(
     let drive = drive(&found.circuit, inputs);
     let linear = |trajectory| orbit::Linear::of(trajectory, orbit.period, origin);
     let linear: Vec<orbit::Linear<'_>> = trajectories.iter().map(linear).collect();
-    let bands: Vec<i32> = (-i32::from(sidebands)..=i32::from(sidebands)).collect();
+    let bands = bands(sidebands);
     match &linear[..] {
         [exact] => response.sweep(omegas, |omega| exact.response(omega, &drive, &bands))?,
         all => {
@@ -249,25 +296,48 @@ fn about_orbit(
             response.extrapolate(omegas, known, respond)?;
         }
     }
-    let phasors = &mut response.phasors;
-    let of_band = |name: &String, k: i32| {
-        if k == 0 {
-            name.clone()
-        } else {
-            format!("{name}@{k}")
-        }
-    };
-    let names = bands
-        .iter()
-        .flat_map(|k| phasors.names.iter().map(|name| of_band(name, *k)));
-    phasors.names = names.collect();
-    phasors.units = phasors.units.repeat(bands.len());
-    if !orbit.stable {
-        let what = "the orbit is unstable: this is the response about it, which no transient shows";
-        response.notes.push(Note::run("unstable-orbit", what));
-    }
-    response.orbit = Some(orbit);
     Ok(())
+}
+
+/// The same in the steps of a large orbit, with what halves of them change.
+fn about_large(
+    mut found: Large,
+    asked: &PeriodicOptions<'_>,
+    (omegas, sidebands): (&[f64], u16),
+    response: &mut Response,
+) -> Result<(), Error> {
+    let (period, apart) = (found.orbit().period, found.apart());
+    let from = found.from();
+    let highest = omegas.iter().fold(0.0_f64, |m, omega| m.max(*omega));
+    let highest = highest + f64::from(sidebands) * std::f64::consts::TAU / period;
+    let circuit = found.circuit().clone();
+    let (returns, tapes) = found.in_steps(RADIANS_OF_STEP / highest, asked.cancel)?;
+    let drive = drive(&circuit, returns.inputs());
+    let bands = bands(sidebands);
+    let mut both = tapes.map(|tape| large::Stepped::of(returns, tape, (period, from)));
+    let mut worst = (0.0, omegas.first().copied().unwrap_or_default());
+    for &omega in omegas {
+        let [whole, halves] = both
+            .each_mut()
+            .map(|stepped| stepped.response(returns, omega, (drive.as_slice(), &bands)));
+        let (whole, halves) = (whole?, halves?);
+        let size = halves
+            .iter()
+            .fold(f64::MIN_POSITIVE, |m, v| m.max(v.norm()));
+        let apart = whole.iter().zip(&halves);
+        let apart = apart.fold(0.0_f64, |m, (a, b)| m.max((a - b).norm()));
+        if apart > worst.0 * size {
+            worst = (apart / size, omega);
+        }
+        response.phasors.values.extend(halves);
+    }
+    let what = "halves of them change";
+    response.notes.push(in_parts(worst, apart, what));
+    Ok(())
+}
+
+fn bands(sidebands: u16) -> Vec<i32> {
+    (-i32::from(sidebands)..=i32::from(sidebands)).collect()
 }
 
 /// Whether the circuit has what changes sides, and a source that repeats; or a state that moves a switch, in a transient that shows whether it does so
@@ -388,14 +458,14 @@ fn lost(loss: f64, omega: f64) -> Note {
 }
 
 /// A response about an orbit made of steps, with its error at a frequency, and that of the orbit.
-fn in_parts((error, omega): (f64, f64), orbit: Option<f64>) -> Note {
+fn in_parts((error, omega): (f64, f64), orbit: Option<f64>, what: &str) -> Note {
     let f = omega / std::f64::consts::TAU;
     let known = match orbit {
         Some(apart) => format!("which are known to {apart:.0e} of the amplitudes"),
         None => "whose error is not known".into(),
     };
     let text = format!(
-        "the orbit is made of steps, {known}; curved laws are taken for their tangents, which changes the response by {error:.0e} of its size at {f:e} Hz, and by less elsewhere"
+        "the orbit is made of steps, {known}; {what} the response by {error:.0e} of its size at {f:e} Hz, and by less elsewhere"
     );
     Note::run("tangents", text)
 }

@@ -57,7 +57,7 @@ pub(crate) use steps::Linearised;
 use system::Row;
 pub(crate) use system::{System, shaped};
 pub(crate) use tableau::{Rest, Tableau};
-pub(crate) use tangent::{own_resistance, tangents};
+pub(crate) use tangent::{own_resistance, tangent};
 
 /// A stretch of a run in one mode.
 #[derive(Debug, Clone)]

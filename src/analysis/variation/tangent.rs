@@ -128,6 +128,15 @@ pub(crate) fn own_resistance((v, i): (f64, f64)) -> f64 {
     }
 }
 
+/// (α, β) with α δλ + β δy = 0 along the law of a port near whose point (v, i) this is: on the law v + ρ i is what it is here.
+pub(crate) fn tangent(port: &Port, (v, i): (f64, f64), rho: f64) -> (f64, f64) {
+    let tangent = port.law.resolvent(rho, v + rho * i);
+    match port.role {
+        Role::Voltage => (tangent.di, tangent.dv),
+        Role::Current | Role::Function => (tangent.dv, tangent.di),
+    }
+}
+
 /// δλ = L_x δx + L_u δu of ports with laws near whose points (v, i) these are: on the law v + ρ i is what it is here, with a resistance ρ for each.
 pub(crate) fn tangents(
     lcs: &Lcs,
@@ -145,12 +154,7 @@ pub(crate) fn tangents(
     }
     let (mut matrix, mut beta) = (d, DVector::zeros(m));
     for (j, (port, &(v, i))) in lcs.ports.iter().zip(points).enumerate() {
-        let rho = resistance((v, i));
-        let tangent = port.law.resolvent(rho, v + rho * i);
-        let (alpha, own) = match port.role {
-            Role::Voltage => (tangent.di, tangent.dv),
-            Role::Current | Role::Function => (tangent.dv, tangent.di),
-        };
+        let (alpha, own) = tangent(port, (v, i), resistance((v, i)));
         beta[j] = own;
         let mut row = matrix.row_mut(j);
         row *= own;

@@ -322,7 +322,7 @@ pub(super) const CODES: [Explanation; 57] = [
     Explanation::of(
         "tangents",
         "The response is one about an orbit that is made of steps, along which curved laws are taken for their tangents: it is accurate, not exact.",
-        "Exponential diodes or transistors in a circuit that switches periodically.",
+        "Exponential diodes or transistors in a circuit that switches periodically, or one of 600 capacitors, inductors and ideal pairs and more.",
         "Nothing, if the error told will do; diodes with `Ron` and `Vfwd` in place of `Is` and `N` have responses that are exact.",
     ),
     Explanation::of(

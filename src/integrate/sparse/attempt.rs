@@ -212,7 +212,8 @@ impl Sparse {
         let trial = &mut self.trial;
         let now = &mut self.now;
         if let Some(tape) = &mut self.tape {
-            tape.step(now.system, (trial.h, Self::slack(trial.t1)), &trial.sets);
+            let h = (trial.h, Self::slack(trial.t1));
+            tape.step(trial.t1, now.system, h, &trial.sets);
         }
         now.balance.add(trial.work);
         now.balance.add_numerical(trial.loss);

@@ -107,7 +107,7 @@ impl Sparse {
             add.for_each(|(p, lambda)| *p += h * lambda);
         };
         if let Some(tape) = &mut self.tape {
-            tape.jump(self.now.system, (h, Self::slack(h)), sets);
+            tape.jump(t, self.now.system, (h, Self::slack(h)), sets);
         }
         let steps = f64::from(made - 1);
         let lasting = impulse.iter_mut().zip(&self.step.lambda);
@@ -208,10 +208,14 @@ impl Sparse {
         let storage = self.system().storage(&self.now.x, &self.now.u);
         let lost = self.now.balance.lost_in_jumps();
         let before = self.switches.position().to_vec();
+        let shift = self.shift_of(moving);
         self.switches.toggle(moving);
         self.stats.events += 1;
         log.event(self.now.t, self.switches.flipped(&before), false);
         self.take_position(&storage)?;
+        if let Some(shift) = shift {
+            self.shifted(shift, &storage);
+        }
         let moved = self.switches.moved(&before).join(", ");
         self.note_jump(&storage, lost, JumpReason::Switch(moved), log);
         if log.wants_rows() {

@@ -224,11 +224,17 @@ impl Kernel {
     }
 
     /// What a change of r makes of x where the active set stays as it is, in place; whether that is known.
-    pub(super) fn change(
+    pub(super) fn change(&mut self, h: (f64, f64), active: &[bool], x: &mut [f64]) -> bool {
+        self.change_with(h, active, x, (&[], &mut Vec::new()))
+    }
+
+    /// The same with a change of q, where there is one, and what becomes of λ.
+    pub(super) fn change_with(
         &mut self,
         (h, slack): (f64, f64),
         active: &[bool],
         x: &mut [f64],
+        (q, lambda): (&[f64], &mut Vec<f64>),
     ) -> bool {
         self.measure(h, slack);
         let Some(at) = self.factored(h, active) else {
@@ -239,9 +245,16 @@ impl Kernel {
             *value = x * scale;
         }
         ports.fill(0.0);
+        let driven = q.iter().zip(active).zip(&self.port_scale);
+        for (value, ((q, active), scale)) in ports.iter_mut().zip(driven) {
+            *value = if *active { -q * scale } else { 0.0 };
+        }
         self.kept[at]
             .factors
             .solve_quickly(&mut self.solution, &mut self.work);
+        let ports = self.solution[self.n..].iter().zip(&self.port_scale);
+        lambda.clear();
+        lambda.extend(ports.map(|(value, scale)| value * scale));
         for (x, (value, scale)) in x
             .iter_mut()
             .zip(self.solution.iter().zip(&self.state_scale))

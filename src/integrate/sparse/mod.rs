@@ -5,11 +5,13 @@
 //! no time (edges, switches, inconsistent starts) is an implicit step of next to no length, which takes the state to where charge and flux are conserved and the constraints hold.
 
 mod attempt;
+mod driven;
 mod instant;
 mod kernel;
 mod march;
 mod returns;
 mod script;
+mod shift;
 mod start;
 mod system;
 mod tape;
@@ -36,6 +38,7 @@ use crate::settings::tolerances::sparse::{AFTER, INSTANT, KEPT};
 use crate::settings::tolerances::steps::GRANT_EMBEDDED;
 use crate::settings::tolerances::times::SAME_TIME;
 use attempt::Trial;
+pub(crate) use driven::Sine;
 use kernel::Step;
 pub(crate) use returns::{Lengths, Passed, Returns};
 use script::Script;

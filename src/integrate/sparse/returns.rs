@@ -49,10 +49,12 @@ pub(crate) struct Passed {
 /// A large circuit that is taken through the same span of time from one start after the other. It keeps the factors of all of them, which is what makes runs and
 /// products cheap.
 pub(crate) struct Returns {
-    sparse: Sparse,
+    pub(super) sparse: Sparse,
     names: Vec<String>,
     start: Standing,
     notes: Vec<crate::integrate::Note>,
+    /// Whether tapes know what shifts switches.
+    pub(super) with_shifts: bool,
 }
 
 impl Returns {
@@ -96,6 +98,7 @@ impl Returns {
                 conducting: problem.conducting.clone(),
             },
             notes: problem.notes.clone(),
+            with_shifts: false,
             sparse,
         }))
     }
@@ -148,9 +151,13 @@ impl Returns {
         let mut log = Log::of(0, 0.0, asked);
         let sparse = &mut self.sparse;
         sparse.script = Some(Script { steps, next });
-        let passed = sparse
-            .stand_at(from, state, switches)
-            .and_then(|()| sparse.advance(until, &mut log));
+        let with_shifts = self.with_shifts;
+        let passed = sparse.stand_at(from, state, switches).and_then(|()| {
+            if let Some(tape) = &mut sparse.tape {
+                tape.with_shifts = with_shifts;
+            }
+            sparse.advance(until, &mut log)
+        });
         let script = sparse.script.take().unwrap_or_default();
         let tape = sparse.tape.take().unwrap_or_default();
         passed?;

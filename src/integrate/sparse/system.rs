@@ -127,12 +127,36 @@ impl System {
 
     /// x' = A x + B λ + E u + e.
     pub(super) fn rate(&self, x: &[f64], lambda: &[f64], u: &[f64]) -> Vec<f64> {
+        self.rate_from(self.lcs.e0.clone(), (x, lambda, u))
+    }
+
+    /// δx' = A δx + B δλ + E δu.
+    pub(super) fn rate_of_change(&self, x: &[f64], lambda: &[f64], u: &[f64]) -> Vec<f64> {
+        self.rate_from(vec![0.0; x.len()], (x, lambda, u))
+    }
+
+    fn rate_from(&self, mut rate: Vec<f64>, (x, lambda, u): (&[f64], &[f64], &[f64])) -> Vec<f64> {
         let lcs = &self.lcs;
-        let mut rate = lcs.e0.clone();
         lcs.a.add_times(1.0, x, &mut rate);
         lcs.b.add_times(1.0, lambda, &mut rate);
         lcs.e.add_times(1.0, u, &mut rate);
         rate
+    }
+
+    /// δy of the outputs.
+    pub(super) fn output_change(&self, at: Point<'_>) -> Vec<f64> {
+        let rows = &self.lcs.output_rows;
+        let mut y = vec![0.0; rows.one.len()];
+        let parts = [
+            (&rows.x, at.x),
+            (&rows.lambda, at.lambda),
+            (&rows.u, at.u),
+            (&rows.du, at.du),
+        ];
+        for (matrix, values) in parts {
+            matrix.add_times(1.0, values, &mut y);
+        }
+        y
     }
 
     /// s = X x + U u + k, all capacitor voltages and inductor currents.

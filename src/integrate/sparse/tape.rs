@@ -11,6 +11,7 @@
 
 use std::sync::Arc;
 
+use super::shift::Shift;
 use super::system::System;
 use crate::integrate::curved::tableau::{GAMMA, LOWER, STAGES};
 
@@ -19,17 +20,24 @@ pub(super) type Set = Arc<[bool]>;
 
 /// A part of a run.
 #[derive(Debug)]
-enum Move {
+pub(super) enum Move {
     /// Switches have moved.
-    Position { from: usize, to: usize },
-    /// An instant: so many steps of next to no length.
+    Position {
+        from: usize,
+        to: usize,
+        shift: Option<Box<Shift>>,
+    },
+    /// An instant, s: so many steps of next to no length.
     Jump {
+        t: f64,
         system: usize,
         h: (f64, f64),
         sets: Vec<Set>,
     },
     /// A step, with the active sets of its implicit stages.
     Step {
+        /// Its end, s.
+        end: f64,
         system: usize,
         h: (f64, f64),
         sets: [Option<Set>; STAGES - 1],
@@ -39,10 +47,12 @@ enum Move {
 /// See the [module](self).
 #[derive(Debug, Default)]
 pub(crate) struct Tape {
-    moves: Vec<Move>,
+    pub(super) moves: Vec<Move>,
     last: Option<Set>,
     /// The system of its start.
-    first: usize,
+    pub(super) first: usize,
+    /// Whether it is to know what shifts switches.
+    pub(super) with_shifts: bool,
 }
 
 impl Tape {
@@ -63,20 +73,38 @@ impl Tape {
     }
 
     pub(super) fn position(&mut self, from: usize, to: usize) {
-        self.moves.push(Move::Position { from, to });
+        let shift = None;
+        self.moves.push(Move::Position { from, to, shift });
+    }
+
+    /// What shifts the last change of position.
+    pub(super) fn shifted(&mut self, by: Shift) {
+        let mut back = self.moves.iter_mut().rev();
+        let last = back.find_map(|part| match part {
+            Move::Position { shift, .. } => Some(shift),
+            _ => None,
+        });
+        if let Some(shift) = last {
+            *shift = Some(Box::new(by));
+        }
     }
 
     /// h and what it may be off by.
-    pub(super) fn jump(&mut self, system: usize, h: (f64, f64), sets: Vec<Set>) {
-        self.moves.push(Move::Jump { system, h, sets });
+    pub(super) fn jump(&mut self, t: f64, system: usize, h: (f64, f64), sets: Vec<Set>) {
+        self.moves.push(Move::Jump { t, system, h, sets });
     }
 
-    pub(super) fn step(&mut self, system: usize, h: (f64, f64), stages: &[Set]) {
+    pub(super) fn step(&mut self, end: f64, system: usize, h: (f64, f64), stages: &[Set]) {
         let mut sets = [const { None }; STAGES - 1];
         for (to, set) in sets.iter_mut().zip(stages) {
             *to = Some(Arc::clone(set));
         }
-        self.moves.push(Move::Step { system, h, sets });
+        self.moves.push(Move::Step {
+            end,
+            system,
+            h,
+            sets,
+        });
     }
 
     /// What the run makes of a change of all storage quantities; `None` where an active set leaves it open.
@@ -91,13 +119,15 @@ impl Tape {
         let mut base = Vec::new();
         for part in &self.moves {
             match part {
-                &Move::Position { from, to } => {
+                &Move::Position { from, to, .. } => {
                     let still = vec![0.0; systems[from].1.lcs.inputs.len()];
                     let storage = systems[from].1.storage_rate(&x, &still);
                     x = systems[to].1.change_of_storage(&storage);
                     system = to;
                 }
-                Move::Jump { system, h, sets } => {
+                Move::Jump {
+                    system, h, sets, ..
+                } => {
                     let kernel = &mut systems[*system].1.kernel;
                     base.clone_from(&x);
                     for set in sets {
@@ -113,7 +143,9 @@ impl Tape {
                     let ends = base.iter().zip(&slopes[STAGES - 1]);
                     x = ends.map(|(a, k)| a - back * h * k).collect();
                 }
-                Move::Step { system, h, sets } => {
+                Move::Step {
+                    system, h, sets, ..
+                } => {
                     let kernel = &mut systems[*system].1.kernel;
                     let (h, slack) = *h;
                     slopes.swap(0, STAGES - 1);

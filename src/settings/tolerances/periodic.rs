@@ -218,3 +218,15 @@ pub(crate) const SAME_DERIVATIVE: f64 = 1e-9;
 /// Capacitors, inductors and ideal pairs up to which an orbit is made linear, for small signals and derivatives: dense matrices in some minutes. Larger: commands that take hours
 /// instead of an error; smaller: errors for circuits that they master.
 pub(crate) const MOST_LINEARISED: usize = 1200;
+
+/// The part of a radian of the highest frequency that a step of a large circuit takes at most, where its response to small sines is asked for. Larger: errors, which are stated; smaller: more steps.
+pub(crate) const RADIANS_OF_STEP: f64 = 0.25;
+
+/// The state that repeats in a response of a large circuit is found by products to this part of what sources make of a period. Larger: an error that counts beside that of the steps; smaller: products.
+pub(crate) const RESPONSE_CLOSED: f64 = 1e-10;
+
+/// Products with the derivative of an orbit that the responses at all frequencies may take. Larger: memory and time for each frequency; smaller: circuits of many slow modes have none.
+pub(crate) const MOST_RECYCLED: usize = 400;
+
+/// Values to which the derivatives of a large orbit are differences of orbits. Larger: hours of orbits that nobody meant to ask for; smaller: values have to be named in several runs.
+pub(crate) const MOST_BESIDE: usize = 50;

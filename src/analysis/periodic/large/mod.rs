@@ -2,10 +2,14 @@
 
 mod newton;
 
+use std::sync::atomic::AtomicBool;
+
 use super::shooting::Stand;
 use super::{Asked, PeriodicOptions, from_rest, none, rows, searching};
 use crate::circuit::{Circuit, Tran};
-use crate::integrate::{Error, Note, Orbit, OrbitKind, Reason, Returns, Run, Standing};
+use crate::integrate::{
+    Error, Lengths, Note, Orbit, OrbitKind, Reason, Returns, Run, Standing, Tape,
+};
 use crate::linalg::krylov::Ritz;
 use crate::mna::StaticMultiport;
 use crate::settings::Settings;
@@ -22,6 +26,7 @@ pub(in crate::analysis) struct Large {
     circuit: Circuit,
     multiport: StaticMultiport,
     standing: Standing,
+    returns: Returns,
     orbit: Orbit,
     /// How far orbits of longer and shorter steps are apart, relative to the amplitudes.
     apart: Option<f64>,
@@ -101,6 +106,7 @@ impl Large {
                 shooting.steps(),
                 shooting.products
             ),
+            returns: shooting.returns,
             settings,
         }))
     }
@@ -108,6 +114,41 @@ impl Large {
     /// The orbit.
     pub(in crate::analysis) const fn orbit(&self) -> &Orbit {
         &self.orbit
+    }
+
+    /// How far orbits of longer and shorter steps are apart, relative to the amplitudes.
+    pub(in crate::analysis) const fn apart(&self) -> Option<f64> {
+        self.apart
+    }
+
+    /// The orbit in steps of at most `longest`, s, and in halves of these, as what the circuit makes of small changes.
+    ///
+    /// # Errors
+    /// See [`Reason`].
+    pub(in crate::analysis) fn in_steps(
+        &mut self,
+        longest: f64,
+        cancel: Option<&AtomicBool>,
+    ) -> Result<(&mut Returns, [Tape; 2]), Error> {
+        let Standing {
+            t, state, switches, ..
+        } = &self.standing;
+        let (place, until) = ((*t, &state[..], &switches[..]), t + self.orbit.period);
+        self.returns.resolve(longest);
+        let whole = self.returns.pass(place, until, Lengths::Free, cancel)?;
+        let halves = Lengths::Halves(&whole.steps);
+        let halves = self.returns.pass(place, until, halves, cancel)?;
+        Ok((&mut self.returns, [whole.tape, halves.tape]))
+    }
+
+    /// The circuit, its sources that do not repeat at rest.
+    pub(in crate::analysis) const fn circuit(&self) -> &Circuit {
+        &self.circuit
+    }
+
+    /// When it begins, s.
+    pub(in crate::analysis) const fn from(&self) -> f64 {
+        self.standing.t
     }
 
     /// Where it begins.
