@@ -82,7 +82,7 @@ impl<'n> Builder<'n, '_> {
         };
         if !diode.is_sound() {
             let no_breakdown = |x: f64| x == f64::INFINITY;
-            let (what, value) = [("IS", is), ("N", n), ("BV", bv), ("IBV", ibv), ("NBV", nbv)]
+            let (what, value) = [("N", n), ("IS", is), ("BV", bv), ("IBV", ibv), ("NBV", nbv)]
                 .into_iter()
                 .find(|(what, x)| {
                     !(*x > 0.0 && (x.is_finite() || *what == "BV" && no_breakdown(*x)))

@@ -214,6 +214,26 @@ fn a_driven_node_keeps_its_voltage() {
 }
 
 /// 2 A and 10 A into 1 kΩ, as ngspice 39 reads them.
+/// The saturation current follows from N at another temperature, and is no number where N is 0: that is what is wrong.
+#[test]
+fn a_diode_of_emission_coefficient_0_is_told_so() {
+    let text =
+        "t\nv1 a 0 1\nr1 a b 1\nd1 b 0 di\n.model di d(is=1e-14 n=0 rs=1)\n.tran 1u 1m\n.end\n";
+    let options = ElaborateOptions {
+        diodes: circ::circuit::Diodes::Exp,
+        ..ElaborateOptions::default()
+    };
+    let mut sources = SourceMap::default();
+    let root = sources.add("t.cir", text.to_owned());
+    let (netlist, _) = circ::netlist::parse(&mut sources, root, &|_| unreachable!());
+    let (_, findings) = elaborate(&netlist, &options);
+    let told: Vec<&str> = findings
+        .iter()
+        .map(|found| found.message.as_str())
+        .collect();
+    assert!(told.iter().any(|told| told.ends_with("N is 0")), "{told:?}");
+}
+
 #[test]
 fn a_is_the_unit_ampere() {
     assert_eq!(value(&run("ampere", Method::Exact), "v(a)", 5e-6), 2e3);
