@@ -281,6 +281,11 @@ impl Handover {
         self.exact.resume(place, &Energy::default()).is_ok()
     }
 
+    /// Steps of exact integration so far.
+    pub(crate) const fn exact_steps(&self) -> u64 {
+        self.exact.steps()
+    }
+
     /// A source has another waveform from here on, which the takeover knows already: an edge now.
     ///
     /// # Errors

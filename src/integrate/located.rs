@@ -197,7 +197,7 @@ fn told(error: &Error, elements: &[&Element]) -> Told {
         ),
         Reason::NoOrbit(_) => plain(
             "no-orbit",
-            Some("`circ sim` shows where the transient goes; `--period` names the period".into()),
+            Some("`circ sim` shows where the transient goes".into()),
         ),
         Reason::Netlist(_) => plain("netlist", None),
         Reason::Unknown(_) => plain("unknown-name", None),

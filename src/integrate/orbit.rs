@@ -24,9 +24,9 @@ pub struct Orbit {
     /// Newton corrections.
     pub iterations: u32,
     /// Eigenvalues (real and imaginary part) of ∂s(T)/∂s(0), the largest first; of an autonomous orbit without the one that is trivial, of a
-    /// large circuit the leading ones alone.
+    /// large circuit the leading ones alone. None where there is no derivative.
     pub multipliers: Vec<[f64; 2]>,
-    /// Whether no multiplier is larger than 1.
+    /// Whether no multiplier is larger than 1; not so where there is no derivative.
     pub stable: bool,
     /// What repeats it.
     pub kind: OrbitKind,

@@ -116,6 +116,11 @@ impl Simulation {
         })
     }
 
+    /// The circuit whose transient it is.
+    pub(crate) fn circuit(&self) -> &Circuit {
+        &self.circuit
+    }
+
     pub(super) const fn problem(&self) -> &Problem {
         &self.problem
     }
@@ -232,6 +237,11 @@ impl Simulation {
     /// Whether modes are integrated exactly, with steps at most where that is not possible.
     pub(crate) const fn is_exact(&self) -> bool {
         matches!(self.way, Way::Exact(_))
+    }
+
+    /// Steps of exact integration so far.
+    pub(crate) fn exact_steps(&self) -> u64 {
+        self.way.exact_steps()
     }
 
     /// Which ideal pairs conduct; empty where not known.

@@ -171,11 +171,16 @@ pub fn orbit(orbit: &Orbit) -> String {
             None => "autonomous".to_string(),
         },
     };
+    let stability = match (orbit.stable, orbit.multipliers.is_empty()) {
+        (true, _) => "stable",
+        (false, false) => "unstable",
+        (false, true) => "of unknown stability",
+    };
     format!(
         "orbit: period {}, {kind}, order {}, {}, closed to {} after {} corrections, multipliers {}{more}",
         si::quantity(orbit.period, "s", 6),
         orbit.order,
-        if orbit.stable { "stable" } else { "unstable" },
+        stability,
         si::plain(orbit.residual, 2),
         orbit.iterations,
         first.collect::<Vec<_>>().join(", "),

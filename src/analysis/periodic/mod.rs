@@ -1,7 +1,10 @@
 //! The periodic steady state: the orbit that transients go to, without waiting for it.
 
+mod attempt;
 mod large;
+mod multipliers;
 mod period;
+mod rest;
 mod rows;
 mod search;
 mod settled;
@@ -13,16 +16,17 @@ use std::sync::atomic::AtomicBool;
 
 use super::variation::{Course, Linearised, Trajectory};
 use crate::circuit::{Circuit, Element, Kind, Source, Tran};
-use crate::integrate::{Error, Note, Orbit, Reason, Run, Simulation, SimulationOptions, Standing};
+use crate::integrate::{Error, Method, Note, Orbit, OrbitKind, Reason, Run, Simulation, Standing};
 use crate::mna::{StaticMultiport, behaviour};
 use crate::model::Model;
 use crate::settings::Settings;
 use crate::settings::tolerances::periodic::{
-    CLOSED, FINER, LONGEST_SEARCH, MOST_LINEARISED, PARTS_OF_PERIOD, PERIOD_OFF, TABLE_STEPS,
+    CLOSED, FINER, MOST_LINEARISED, PARTS_OF_PERIOD, PERIOD_OFF,
 };
 
+use attempt::{refined, searched, simulation};
 pub(super) use large::Large;
-use rows::{notes, rows, state_error};
+use rows::{Steps, next_to_nothing, notes, rows, state_error};
 use search::{Found, Search};
 pub(super) use settled::{Settled, settled, settled_linear};
 
@@ -98,6 +102,8 @@ pub(super) struct Steady {
     /// What is to be told of the period.
     said: Vec<Note>,
     pub(super) simulation: Simulation,
+    /// By which method it was found.
+    method: Method,
     found: Found,
     /// How far orbits of longer and shorter steps are apart, relative to the amplitudes.
     pub(super) apart: Option<f64>,
@@ -122,19 +128,31 @@ impl Steady {
             held,
             said,
             simulation,
+            method,
             found,
             apart,
         } = self;
         let (names, orbit) = (simulation.state_names(), found.orbit());
+        // Nothing moves, or what leakage and rounding leave does: an error control would look for its digits.
+        let still = found.rests || orbit.kind == OrbitKind::Equilibrium && !simulation.is_exact();
+        let steps = Steps {
+            method,
+            step: still.then_some(FINER * orbit.period / PARTS_OF_PERIOD),
+            unestimated: found.rests,
+        };
         let mut run = rows(
             (&circuit, &multiport, Some(&simulation)),
             standing,
-            orbit.period,
+            (orbit.period, steps),
             options,
             grid,
         )?;
         if !simulation.is_exact() {
             state_error(&mut run, apart);
+            if found.rests {
+                run.balanced = false;
+                run.notes.push(next_to_nothing());
+            }
         }
         run.notes.extend(said);
         run.notes.extend(notes(&orbit, &found.fixed, names, &held));
@@ -232,7 +250,12 @@ impl Steady {
             return Ok(None);
         };
         let seconds = self.orbit().period / self.orbit().order as f64;
-        let mut simulation = simulation((&circuit, &multiport), Some(seconds), FINER, options)?;
+        let mut simulation = simulation(
+            (&circuit, &multiport),
+            Some(seconds),
+            (FINER, self.method),
+            options,
+        )?;
         let fixed = Search::of(&mut simulation, options).again(&self.found)?;
         Ok(fixed.map(|fixed| fixed.stand.state))
     }
@@ -305,7 +328,12 @@ const fn source(element: &Element) -> Option<&Source> {
 /// As [`periodic`].
 pub(super) fn beside(model: &Model, options: &PeriodicOptions<'_>) -> Result<Simulation, Error> {
     let (seconds, circuit, multiport) = repeating(model)?;
-    simulation((&circuit, &multiport), seconds, 1.0, options)
+    simulation(
+        (&circuit, &multiport),
+        seconds,
+        (1.0, Method::Auto),
+        options,
+    )
 }
 
 /// What a search begins with.
@@ -331,7 +359,7 @@ fn asked(model: &Model, options: &PeriodicOptions<'_>) -> Result<Asked, Error> {
     let (circuit, held) = period::repeating(model.circuit());
     if let Some(line) = circuit.lines.first() {
         let name = &circuit.elements[line.ports[0].wave.index()].name;
-        let what = "what travels on a transmission line is no part of the state that is to repeat";
+        let what = "what travels on a transmission line is no part of the state that is to repeat; a transient that is long enough ends in it";
         return Err(none(what.into()).device(name));
     }
     let mut period = period::common(&circuit).or_else(|what| match options.period {
@@ -407,19 +435,29 @@ fn whole(asked: Asked, options: &PeriodicOptions<'_>) -> Result<Steady, Error> {
         held,
         said,
     } = asked;
-    let span = circuit.tran.map(|tran| tran.tstop);
-    let mut simulation = simulation((&circuit, &multiport), period.seconds, 1.0, options)?;
-    let mut search = Search::of(&mut simulation, options);
-    let mut found = match period.seconds {
-        Some(seconds) => search.driven(seconds, period.from)?,
-        None => search.autonomous(span.ok_or_else(|| {
-            none("no source repeats, and there is no `.tran` that says how long to look".into())
-        })?)?,
-    };
+    let parts = (&circuit, &multiport);
+    let mut said = said;
+    let (mut method, mut made) = (
+        Method::Auto,
+        searched(parts, &period, Method::Auto, options),
+    );
+    if let Err(error) = &made
+        && matches!(error.reason, Reason::TooManySteps { .. })
+        && !circuit.is_curved()
+        && let Ok(other) = searched(parts, &period, Method::Theta, options)
+    {
+        let text = format!(
+            "the orbit was found in {PARTS_OF_PERIOD} equal steps a period instead of by exact integration; they damp what swings faster, so that there are no multipliers: {error}"
+        );
+        said.push(Note::run("steps-instead", text));
+        (method, made) = (Method::Theta, Ok(other));
+    }
+    let (simulation, mut found) = made?;
+    found.damped = method != Method::Auto;
     let apart = if simulation.is_exact() {
         Some(0.0)
     } else {
-        refined((&circuit, &multiport), &mut found, period.seconds, options)?
+        refined(parts, &mut found, period.seconds, method, options)?
     };
     Ok(Steady {
         circuit,
@@ -427,84 +465,8 @@ fn whole(asked: Asked, options: &PeriodicOptions<'_>) -> Result<Steady, Error> {
         held,
         said,
         simulation,
+        method,
         found,
         apart,
     })
-}
-
-/// Where laws are curved: the orbit of steps half as long in place of `found`, and how far the two are apart relative to the amplitudes;
-/// nothing where it is not found.
-fn refined(
-    parts: (&Circuit, &StaticMultiport),
-    found: &mut Found,
-    period: Option<f64>,
-    options: &PeriodicOptions<'_>,
-) -> Result<Option<f64>, Error> {
-    let mut finer = simulation(parts, period, FINER, options)?;
-    let Some(fixed) = Search::of(&mut finer, options).again(found)? else {
-        return Ok(None);
-    };
-    let both = fixed.stand.state.iter().zip(&found.fixed.stand.state);
-    let apart = both.zip(&found.amplitudes);
-    let apart = apart.fold(0.0_f64, |m, ((a, b), size)| m.max((a - b).abs() / size));
-    found.fixed = fixed;
-    Ok(Some(apart))
-}
-
-/// A simulation that shoots: no rows, an end that is never reached, and where laws are curved steps of `part` of the usual ones.
-fn simulation(
-    (circuit, multiport): (&Circuit, &StaticMultiport),
-    period: Option<f64>,
-    part: f64,
-    options: &PeriodicOptions<'_>,
-) -> Result<Simulation, Error> {
-    let span = period.or(circuit.tran.map(|t| t.tstop)).unwrap_or(1.0);
-    let of = |step: Option<f64>| {
-        from_rest(searching(circuit.tran, span, LONGEST_SEARCH), |tran| {
-            let circuit = Circuit {
-                tran: Some(tran),
-                ..circuit.clone()
-            };
-            let options = SimulationOptions {
-                step,
-                settings: options.settings.clone(),
-                ..SimulationOptions::default()
-            };
-            Simulation::closed(&circuit, multiport, options)
-        })
-    };
-    let simulation = of(None)?;
-    if simulation.is_exact() {
-        return Ok(simulation);
-    }
-    // Steps that an error control chooses differ from return to return, and with them what they return to.
-    of(Some(part * span / PARTS_OF_PERIOD))
-}
-
-/// What is asked of runs that look for an orbit, in place of what the circuit asks for itself: they may take `most` spans, s.
-fn searching(own: Option<Tran>, span: f64, most: f64) -> Tran {
-    Tran {
-        tstep: span / TABLE_STEPS,
-        prints: true,
-        tstop: span * most,
-        tstart: 0.0,
-        tmax: own.and_then(|tran| tran.tmax),
-        uic: own.is_some_and(|tran| tran.uic),
-    }
-}
-
-/// What is made from the operating point, or without one where there is none: the orbit does not depend on where the search for it starts.
-fn from_rest<T>(tran: Tran, make: impl Fn(Tran) -> Result<T, Error>) -> Result<T, Error> {
-    match make(tran) {
-        Err(error) if has_no_rest(&error) => make(Tran { uic: true, ..tran }),
-        made => made,
-    }
-}
-
-/// Whether a simulation did not start for want of an operating point.
-const fn has_no_rest(error: &Error) -> bool {
-    matches!(
-        error.reason,
-        Reason::NoOperatingPoint(_) | Reason::SwitchesDoNotSettle
-    )
 }

@@ -1,19 +1,31 @@
 //! The rows of an orbit, and what is to be told with them.
 
 use super::PeriodicOptions;
-use super::shooting::{Fixed, neutral};
+use super::multipliers::neutral;
+use super::shooting::Fixed;
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{
-    Error, Note, Orbit, OrbitKind, Run, SimOptions, Simulation, Standing, simulate_beside,
+    Error, Method, Note, Orbit, OrbitKind, Run, SimOptions, Simulation, Standing, simulate_beside,
 };
 use crate::mna::StaticMultiport;
+use crate::settings::tolerances::periodic::NEXT_TO_SOURCES;
 use crate::settings::tolerances::times::SPAN_PARTS;
+
+/// How the rows of an orbit are made.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Steps {
+    pub(super) method: Method,
+    /// Steps of this length, s, in place of an error control.
+    pub(super) step: Option<f64>,
+    /// No error is stated.
+    pub(super) unestimated: bool,
+}
 
 /// One period of waveforms, from 0 on.
 pub(super) fn rows(
     (circuit, multiport, simulation): (&Circuit, &StaticMultiport, Option<&Simulation>),
     standing: Standing,
-    period: f64,
+    (period, steps): (f64, Steps),
     options: &PeriodicOptions<'_>,
     grid: impl FnOnce(Tran) -> Tran,
 ) -> Result<Run, Error> {
@@ -40,6 +52,9 @@ pub(super) fn rows(
             start: Some(standing),
             events: options.events,
             corners: options.corners,
+            method: steps.method,
+            step: steps.step,
+            unestimated: steps.unestimated,
             cancel: options.cancel,
             settings: options.settings.clone(),
             ..SimOptions::default()
@@ -72,6 +87,14 @@ pub(super) fn state_error(run: &mut Run, apart: Option<f64>) {
     }
 }
 
+/// That rows show nothing of a circuit at rest.
+pub(super) fn next_to_nothing() -> Note {
+    let text = format!(
+        "the circuit rests: all its capacitors and inductors stay below {NEXT_TO_SOURCES:e} of its sources, rows show what leakage and rounding leave, and the residual is one in parts of the sources"
+    );
+    Note::run("next-to-nothing", text)
+}
+
 /// Sources that do not repeat.
 pub(super) fn held_sources(held: &[String]) -> Option<Note> {
     if held.is_empty() {
@@ -86,10 +109,7 @@ pub(super) fn held_sources(held: &[String]) -> Option<Note> {
 
 /// What is to be told of an orbit that is not stable.
 pub(super) fn unstable(orbit: &Orbit) -> Option<Note> {
-    if orbit.stable {
-        return None;
-    }
-    let [re, im] = orbit.multipliers[0];
+    let [re, im] = *orbit.multipliers.first().filter(|_| !orbit.stable)?;
     let text =
         format!("the orbit is unstable: a multiplier is {re:.6}{im:+.6}i; transients leave it");
     Some(Note::run("unstable-orbit", text))
@@ -100,7 +120,10 @@ pub(super) fn notes(orbit: &Orbit, fixed: &Fixed, names: &[String], held: &[Stri
     let mut notes = Vec::new();
     notes.extend(held_sources(held));
     notes.extend(unstable(orbit));
-    if orbit.kind != OrbitKind::Autonomous {
+    if fixed.one_sided {
+        let text = "the circuit rests with a switch or a device on its threshold: what becomes of small disturbances depends on their sign, and there are no multipliers";
+        notes.push(Note::run("rests-on-threshold", text));
+    } else if orbit.kind != OrbitKind::Autonomous {
         let directions = neutral(&fixed.derivative);
         let taking_part = |j: &usize| directions.iter().any(|direction| direction.contains(j));
         let states: Vec<&str> = (0..names.len())

@@ -1,10 +1,11 @@
 //! Where Newton's method starts, and which orbit it is to find.
 
 use super::PeriodicOptions;
-use super::shooting::{Fixed, Return, Shooting, Stand, multipliers};
+use super::multipliers::multipliers;
+use super::shooting::{Fixed, Return, Shooting, Stand};
 use crate::integrate::{Change, Error, Event, Orbit, OrbitKind, Reason, Simulation, grow};
 use crate::settings::tolerances::periodic::{
-    AT_REST, CLOSED, NEUTRAL, NUDGE, RETURNS, STEPPED_CLOSED,
+    AT_REST, CLOSED, NEUTRAL, NUDGE, PARTS_FORESEEN, RETURNS, STEPPED_CLOSED,
 };
 
 /// Periods of transient before each attempt.
@@ -22,6 +23,8 @@ pub(super) struct Search<'a, 'o> {
     simulation: &'a mut Simulation,
     options: &'a PeriodicOptions<'o>,
     corrections: u32,
+    /// States were seen to be next to nothing beside the sources.
+    rests: bool,
 }
 
 /// An orbit that was found.
@@ -33,11 +36,17 @@ pub(super) struct Found {
     order: usize,
     returns: Return,
     pub(super) amplitudes: Vec<f64>,
+    /// States are next to nothing beside the sources.
+    pub(super) rests: bool,
+    /// It was made in steps that damp what swings faster: its derivative is theirs.
+    pub(super) damped: bool,
 }
 
 impl Found {
     pub(super) fn orbit(&self) -> Orbit {
-        let mut multipliers = multipliers(&self.fixed.derivative).unwrap_or_default();
+        let known = !self.fixed.one_sided && !self.damped;
+        let known = known.then_some(&self.fixed.derivative);
+        let mut multipliers = known.and_then(multipliers).unwrap_or_default();
         // A return to the section takes away what moves along the orbit.
         if self.kind == OrbitKind::Autonomous {
             multipliers.pop();
@@ -46,7 +55,7 @@ impl Found {
             period: self.fixed.seconds,
             residual: self.fixed.residual,
             iterations: self.fixed.corrections,
-            stable: is_stable(&self.fixed),
+            stable: !self.damped && is_stable(&self.fixed),
             multipliers,
             kind: self.kind,
             order: self.order,
@@ -58,19 +67,11 @@ impl Found {
     }
 }
 
-/// An orbit that sources drive.
-fn driven(fixed: Fixed, (period, from): (f64, f64), order: usize, amplitudes: &[f64]) -> Found {
-    Found {
-        fixed,
-        from,
-        kind: OrbitKind::Driven,
-        order,
-        returns: Return::After(period),
-        amplitudes: amplitudes.to_vec(),
-    }
-}
-
+/// Whether disturbances of an orbit are known to die out.
 fn is_stable(fixed: &Fixed) -> bool {
+    if fixed.one_sided {
+        return false;
+    }
     let largest = multipliers(&fixed.derivative).and_then(|all| all.first().copied());
     largest.is_none_or(|[re, im]| re.hypot(im) < 1.0 + NEUTRAL)
 }
@@ -88,6 +89,27 @@ impl<'a, 'o> Search<'a, 'o> {
             simulation,
             options,
             corrections: 0,
+            rests: false,
+        }
+    }
+
+    /// An orbit that sources drive.
+    fn of_sources(
+        &self,
+        fixed: Fixed,
+        (period, from): (f64, f64),
+        order: usize,
+        amplitudes: &[f64],
+    ) -> Found {
+        Found {
+            fixed,
+            from,
+            kind: OrbitKind::Driven,
+            order,
+            returns: Return::After(period),
+            amplitudes: amplitudes.to_vec(),
+            rests: self.rests,
+            damped: false,
         }
     }
 
@@ -107,6 +129,7 @@ impl<'a, 'o> Search<'a, 'o> {
             returns,
             order: 1,
             amplitudes: Vec::new(),
+            rests: self.rests,
             corrections: self.corrections,
             systems: Default::default(),
             cancel: self.options.cancel,
@@ -137,8 +160,31 @@ impl<'a, 'o> Search<'a, 'o> {
         let mut shooting = self.shooting(found.from, found.returns.clone());
         shooting.order = found.order;
         shooting.amplitudes.clone_from(&found.amplitudes);
+        shooting.rests = found.rests;
         shooting.corrections = found.fixed.corrections;
         shooting.solve(found.fixed.stand.clone(), closed)
+    }
+
+    /// Goes a little way from here.
+    ///
+    /// # Errors
+    /// So many steps of exact integration were made on it that a period would take more than are made.
+    fn foresee(&mut self, from: f64, period: f64) -> Result<(), Error> {
+        let limit = self.options.settings.max_steps;
+        for part in PARTS_FORESEEN {
+            let before = self.simulation.exact_steps();
+            let begin = self.simulation.time();
+            self.simulation
+                .advance(begin.max(from + period / part), false, self.options.cancel)?;
+            let made = self.simulation.exact_steps() - before;
+            if made as f64 * part <= limit as f64 {
+                return Ok(());
+            }
+        }
+        Err(Error::at(
+            self.simulation.time(),
+            Reason::TooManySteps { limit },
+        ))
     }
 
     /// The orbit of a circuit whose sources repeat after `period` seconds from `from` on.
@@ -148,6 +194,7 @@ impl<'a, 'o> Search<'a, 'o> {
             self.simulation.advance(from, false, self.options.cancel)?;
         }
         let mut stand = Stand::of(self.simulation);
+        self.foresee(from, period)?;
         let asked = self.options.order;
         let (mut last, mut seen) = (None, vec![0.0; stand.state.len()]);
         grow(&mut seen, &stand.state);
@@ -164,10 +211,10 @@ impl<'a, 'o> Search<'a, 'o> {
             passed.push(stand.clone());
             let found = shooting.solve(stand.clone(), closed);
             let amplitudes = shooting.amplitudes.clone();
-            self.corrections = shooting.corrections;
+            (self.corrections, self.rests) = (shooting.corrections, shooting.rests);
             match found {
-                Ok(Some(fixed)) if asked.is_some() || is_stable(&fixed) => {
-                    return Ok(driven(
+                Ok(Some(fixed)) if asked.is_some() || fixed.one_sided || is_stable(&fixed) => {
+                    return Ok(self.of_sources(
                         fixed,
                         (period, from),
                         asked.unwrap_or(1),
@@ -176,9 +223,9 @@ impl<'a, 'o> Search<'a, 'o> {
                 }
                 Ok(Some(fixed)) => {
                     let other = self.beyond(&fixed, (period, from), &amplitudes)?;
-                    return Ok(
-                        other.unwrap_or_else(|| driven(fixed, (period, from), 1, &amplitudes))
-                    );
+                    return Ok(other.unwrap_or_else(|| {
+                        self.of_sources(fixed, (period, from), 1, &amplitudes)
+                    }));
                 }
                 Ok(None) => {}
                 Err(error) if error.is_interruption() => return Err(error),
@@ -259,13 +306,17 @@ impl<'a, 'o> Search<'a, 'o> {
         }
         let order = shooting.order;
         self.corrections = shooting.corrections;
-        Ok(is_stable(&fixed).then(|| driven(fixed, (period, from), order, amplitudes)))
+        Ok(is_stable(&fixed).then(|| self.of_sources(fixed, (period, from), order, amplitudes)))
     }
 
     /// The orbit of a circuit in which no source varies, or its rest, after a transient of `span` seconds.
     pub(super) fn autonomous(&mut self, span: f64) -> Result<Found, Error> {
         let part = span / PARTS as f64;
         let mut before = self.simulation.state();
+        let begin = Stand::of(self.simulation);
+        self.foresee(0.0, span)?;
+        self.simulation
+            .stand_at(0.0, &begin.state, &begin.switches)?;
         let (mut amplitudes, mut last) = (vec![0.0; before.len()], None);
         grow(&mut amplitudes, &before);
         let mut events = Vec::new();
@@ -305,10 +356,26 @@ impl<'a, 'o> Search<'a, 'o> {
         }
         Err(last.unwrap_or_else(|| {
             none(format!(
-                "no source varies, and within {:e} s the circuit neither comes to rest nor repeats an event regularly",
+                "no source varies, and within {:e} s the circuit neither comes to rest nor repeats an event regularly; `--period` names the period of what swings without events",
                 span * PROLONGED as f64
             ))
         }))
+    }
+
+    /// The stable equilibrium near the place where the simulation stands, of transients of `span` seconds.
+    pub(super) fn rest_from_here(&mut self, span: f64) -> Result<Option<Found>, Error> {
+        let stand = Stand::of(self.simulation);
+        let mut seen = vec![0.0; stand.state.len()];
+        grow(&mut seen, &stand.state);
+        let found = match self.at_rest(&stand, span / PARTS as f64, &seen) {
+            Err(error) if !error.is_interruption() => return Ok(None),
+            found => found?,
+        };
+        let dies_out = |found: &Found| {
+            let largest = found.orbit().multipliers.first().copied();
+            largest.is_none_or(|[re, im]| re.hypot(im) < 1.0 - NEUTRAL)
+        };
+        Ok(found.filter(|found| !found.fixed.one_sided && dies_out(found)))
     }
 
     /// The equilibrium near a place.
@@ -323,7 +390,8 @@ impl<'a, 'o> Search<'a, 'o> {
         shooting.observe(stand, seconds, seen)?;
         let fixed = shooting.solve(stand.clone(), closed)?;
         let (returns, amplitudes) = (shooting.returns.clone(), shooting.amplitudes.clone());
-        self.corrections = shooting.corrections;
+        (self.corrections, self.rests) = (shooting.corrections, shooting.rests);
+        let rests = self.rests;
         Ok(fixed.map(|fixed| Found {
             fixed,
             from: 0.0,
@@ -331,6 +399,8 @@ impl<'a, 'o> Search<'a, 'o> {
             order: 1,
             returns,
             amplitudes,
+            rests,
+            damped: false,
         }))
     }
 
@@ -378,6 +448,8 @@ impl<'a, 'o> Search<'a, 'o> {
                     order,
                     returns,
                     amplitudes,
+                    rests: false,
+                    damped: false,
                 }));
             }
         }

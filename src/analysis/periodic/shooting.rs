@@ -13,12 +13,14 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::multipliers::neutral_multipliers;
+use super::rest::Sources;
 use crate::analysis::variation::{System, Trajectory};
 use crate::integrate::exact::{Corners, Passage};
 use crate::integrate::{Change, Error, Reason, Simulation};
 use crate::settings::tolerances::periodic::{
-    AT_ROUNDING, DIFFERENCE, EVENT_AGAIN, LEAST_AMPLITUDE, NEUTRAL, REUSED, ROUNDING_OF_RETURN,
-    STEPPED_DIFFERENCE, TAKES_PART,
+    AT_ROUNDING, DIFFERENCE, DIFFERENCE_AT_REST, EVENT_AGAIN, LEAST_AMPLITUDE, NEUTRAL, REUSED,
+    ROUNDING_OF_RETURN, SIDES_OF_REST, STEPPED_DIFFERENCE,
 };
 
 /// Corrections of one attempt.
@@ -70,6 +72,8 @@ pub(super) struct Fixed {
     pub(super) corrections: u32,
     /// M in parts of the amplitudes.
     pub(super) derivative: DMatrix<f64>,
+    /// M is another one to the other side of the place, and none that says what becomes of disturbances.
+    pub(super) one_sided: bool,
     /// From one return to the next, s.
     pub(super) seconds: f64,
 }
@@ -101,6 +105,8 @@ pub(super) struct Shooting<'a> {
     /// So many returns are one.
     pub(super) order: usize,
     pub(super) amplitudes: Vec<f64>,
+    /// States are next to nothing beside the sources, which are their amplitudes.
+    pub(super) rests: bool,
     /// Corrections so far.
     pub(super) corrections: u32,
     /// The systems that its derivatives went through so far, of returns that take `.0` seconds.
@@ -147,8 +153,8 @@ impl Shooting<'_> {
         Err(Error::at(begin, Reason::NoOrbit(what)))
     }
 
-    /// Takes the amplitudes of the next `seconds` from here, each at least [`LEAST_AMPLITUDE`] of the largest of its unit that was `seen` so far;
-    /// where they end.
+    /// Takes the amplitudes of the next `seconds` from here, each at least [`LEAST_AMPLITUDE`] of the largest of its unit that was `seen` so far,
+    /// or those of the sources where states are next to nothing beside them; where they end.
     pub(super) fn observe(
         &mut self,
         stand: &Stand,
@@ -171,6 +177,15 @@ impl Shooting<'_> {
             // Of a unit of which nothing was seen any amount is as good as another.
             let least = if least > 0.0 { least } else { any.max(1.0) };
             *amplitude = amplitude.max(LEAST_AMPLITUDE * least);
+        }
+        let sources = Sources::of(self.simulation.circuit(), self.from, seconds);
+        let units = self.simulation.state_units();
+        let sources = sources.or_seen(seen, units);
+        let sizes = extremes.iter().map(|[low, high]| high.max(-low));
+        let beside = sources.beside(&sizes.collect::<Vec<_>>(), units);
+        self.rests = beside.is_some();
+        if let Some(beside) = beside {
+            self.amplitudes = beside;
         }
         Ok(Stand::of(self.simulation))
     }
@@ -295,12 +310,22 @@ impl Shooting<'_> {
         stand: &Stand,
         after: &Stand,
     ) -> Result<DMatrix<f64>, Error> {
-        let n = stand.state.len();
-        let part = if self.simulation.is_exact() {
-            DIFFERENCE
-        } else {
-            STEPPED_DIFFERENCE
+        let part = match (self.simulation.is_exact(), self.rests) {
+            (true, _) => DIFFERENCE,
+            (false, true) => DIFFERENCE_AT_REST,
+            (false, false) => STEPPED_DIFFERENCE,
         };
+        self.differences_of(part, stand, after)
+    }
+
+    /// Columns of M by differences of this part of the amplitudes.
+    fn differences_of(
+        &mut self,
+        part: f64,
+        stand: &Stand,
+        after: &Stand,
+    ) -> Result<DMatrix<f64>, Error> {
+        let n = stand.state.len();
         let mut derivative = DMatrix::zeros(n, n);
         for j in 0..n {
             let mut moved = stand.clone();
@@ -346,13 +371,41 @@ impl Shooting<'_> {
         if made_at > NEUTRAL && !same_derivative(&course, &closing.passages) {
             derivative = self.derivative(&stand, &closing)?;
         }
+        let mut one_sided = false;
+        let sources = Sources::of(self.simulation.circuit(), self.from, closing.seconds);
+        // What comes to rest without sources does so from its own side.
+        if self.rests && !sources.are_none() {
+            match self.of_both_sides(&stand)? {
+                // Without the curvature that one side leaves.
+                Some(mean) if !self.simulation.is_exact() => derivative = mean,
+                Some(_) => {}
+                None => one_sided = true,
+            }
+        }
         Ok(Some(Fixed {
             stand,
             residual: closing.size(),
             corrections: self.corrections,
             derivative,
+            one_sided,
             seconds: closing.seconds,
         }))
+    }
+
+    /// M by differences to both sides of a place where the circuit rests; `None` where it is another one to either side, as a switch or a device stands
+    /// on its threshold.
+    fn of_both_sides(&mut self, stand: &Stand) -> Result<Option<DMatrix<f64>>, Error> {
+        let (after, _) = self.shoot(stand)?;
+        let above = self.differences_of(DIFFERENCE_AT_REST, stand, &after)?;
+        let below = self.differences_of(-DIFFERENCE_AT_REST, stand, &after)?;
+        let same = |j: usize| {
+            let (one, other) = (above.column(j), below.column(j));
+            let largest = one.amax().max(other.amax()).max(1.0);
+            (one - other).amax() <= SIDES_OF_REST * largest
+        };
+        Ok((0..above.ncols())
+            .all(same)
+            .then(|| (&above + &below) * 0.5))
     }
 
     /// A circuit that stores nothing is what its sources and switches are.
@@ -364,6 +417,7 @@ impl Shooting<'_> {
             residual: 0.0,
             corrections: self.corrections,
             derivative: DMatrix::zeros(0, 0),
+            one_sided: false,
             seconds,
         }))
     }
@@ -381,7 +435,9 @@ impl Shooting<'_> {
         let n = residual.len();
         let svd = (DMatrix::identity(n, n) - derivative).svd(true, true);
         // Directions that a return leaves as they are stay.
-        let Ok(correction) = svd.solve(residual, NEUTRAL) else {
+        let still = svd.singular_values.min() <= NEUTRAL && neutral_multipliers(derivative) > 0;
+        let least = if still { NEUTRAL } else { f64::EPSILON };
+        let Ok(correction) = svd.solve(residual, least) else {
             return Ok(None);
         };
         let mut part = 1.0;
@@ -415,43 +471,4 @@ fn same_derivative(one: &Option<Vec<Passage>>, other: &Option<Vec<Passage>>) -> 
         a.t == b.t && (&a.from, &a.to) == (&b.from, &b.to) && a.is_clocked() && b.is_clocked()
     };
     one.len() == other.len() && one.iter().zip(other).all(same)
-}
-
-/// Eigenvalues of M, the largest first; `None` where they are not found.
-pub(super) fn multipliers(derivative: &DMatrix<f64>) -> Option<Vec<[f64; 2]>> {
-    if derivative.is_empty() {
-        return Some(vec![]);
-    }
-    let found = crate::linalg::eigenvalues::eigenvalues(derivative)?;
-    let mut found: Vec<[f64; 2]> = found.iter().map(|v| [v.re, v.im]).collect();
-    let size = |v: &[f64; 2]| v[0].hypot(v[1]);
-    found.sort_by(|a, b| {
-        size(b)
-            .total_cmp(&size(a))
-            .then(b[0].total_cmp(&a[0]))
-            .then(b[1].total_cmp(&a[1]))
-    });
-    Some(found)
-}
-
-/// The states that a return leaves as they are together: by direction with multiplier 1, those that take part in it.
-pub(super) fn neutral(derivative: &DMatrix<f64>) -> Vec<Vec<usize>> {
-    let n = derivative.nrows();
-    if n == 0 {
-        return vec![];
-    }
-    let svd = (DMatrix::identity(n, n) - derivative).svd(false, true);
-    let Some(directions) = svd.v_t else {
-        return vec![];
-    };
-    let still = svd.singular_values.iter().enumerate();
-    let still = still.filter(|(_, value)| **value <= NEUTRAL);
-    let taking_part = |k: usize| {
-        let row = directions.row(k);
-        let row = row.iter().enumerate();
-        row.filter(|(_, v)| v.abs() > TAKES_PART)
-            .map(|(j, _)| j)
-            .collect()
-    };
-    still.map(|(k, _)| taking_part(k)).collect()
 }

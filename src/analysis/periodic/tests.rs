@@ -6,6 +6,7 @@ use super::search::Search;
 use super::shooting::Return;
 use super::{PeriodicOptions, period, simulation, steady};
 use crate::circuit::ElaborateOptions;
+use crate::integrate::Method;
 use crate::mna::behaviour;
 use crate::model::Model;
 
@@ -45,7 +46,7 @@ fn the_variational_equation_agrees_with_differences() {
         let seconds = period.seconds.expect("a driven circuit");
         let parts = (&circuit, &multiport);
         let mut simulation =
-            simulation(parts, period.seconds, 1.0, &options).expect("a simulation");
+            simulation(parts, period.seconds, (1.0, Method::Auto), &options).expect("a simulation");
         let mut search = Search::of(&mut simulation, &options);
         let found = search.driven(seconds, period.from).expect("an orbit");
         let mut shooting = search.shooting(found.from, Return::After(seconds));

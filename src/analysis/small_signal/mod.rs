@@ -106,7 +106,7 @@ impl Response {
             .flat_map(|k| phasors.names.iter().map(|name| of_band(name, *k)));
         phasors.names = names.collect();
         phasors.units = phasors.units.repeat(bands.len());
-        if !orbit.stable {
+        if !orbit.stable && !orbit.multipliers.is_empty() {
             let what =
                 "the orbit is unstable: this is the response about it, which no transient shows";
             self.notes.push(Note::run("unstable-orbit", what));
@@ -317,6 +317,10 @@ fn about_large(
     let mut both = tapes.map(|tape| large::Stepped::of(returns, tape, (period, from)));
     let mut worst = (0.0, omegas.first().copied().unwrap_or_default());
     for &omega in omegas {
+        let set = |cancel: &AtomicBool| cancel.load(std::sync::atomic::Ordering::Relaxed);
+        if asked.cancel.is_some_and(set) {
+            return Err(Error::before(Reason::Interrupted));
+        }
         let [whole, halves] = both
             .each_mut()
             .map(|stepped| stepped.response(returns, omega, (drive.as_slice(), &bands)));

@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 57] = [
+pub(super) const CODES: [Explanation; 59] = [
     Explanation::of(
         "about-rest",
         "The response is that about the operating point, as laws are smooth and no switch moves.",
@@ -142,6 +142,12 @@ pub(super) const CODES: [Explanation; 57] = [
         "The findings above say where.",
     ),
     Explanation::of(
+        "next-to-nothing",
+        "The steady state is rest but for leakage and rounding, of which no error is stated.",
+        "A reference that is held at 0, the value it has before it steps; a circuit whose energy has gone.",
+        "Nothing if the rest is meant; for the steady state in operation the reference needs the value that it has there from the start.",
+    ),
+    Explanation::of(
         "no-derivative",
         "A measurement has no derivative at these values.",
         "Two events happen at one instant, or a diode just touches conduction: to either side the derivative is another one.",
@@ -165,7 +171,7 @@ pub(super) const CODES: [Explanation; 57] = [
         "no-orbit",
         "No periodic steady state was found.",
         "The circuit has none (something is charged further every period), or takes too many periods to come to it.",
-        "`circ sim` shows where the transient goes; `--period` names the period if the sources do not tell it.",
+        "`circ sim` shows where the transient goes; `--period` names the period if the sources do not tell it; `circ op` solves for rest.",
     )
     .shown_by("pss", "a charge that grows\ni1 0 b sin(1 1 1k)\nc1 b 0 1u\n.tran 1u 1m uic\n"),
     Explanation::of(
@@ -248,6 +254,12 @@ pub(super) const CODES: [Explanation; 57] = [
         "The period asked for is not quite a multiple of the period of a source.",
         "A period with too few digits, such as `--period 16.67m` for 60 Hz.",
         "Write the period as the source has it, `{1/60}`, or leave `--period` out.",
+    ),
+    Explanation::of(
+        "rests-on-threshold",
+        "The steady state is rest, and a switch or a device stands on its threshold in it: a disturbance of one sign is another thing than one of the other sign, and no multiplier says what becomes of both.",
+        "A reference that is held at 0, the value it has before it steps, so that a comparator compares equal voltages.",
+        "For the steady state in operation the reference needs the value that it has there from the start; of a rest that is meant nothing more is known.",
     ),
     Explanation::of(
         "rival-impulses",

@@ -157,6 +157,11 @@ impl Exact {
         self.sources.before = self.sources.inputs(self.travel.t);
     }
 
+    /// Steps so far.
+    pub(crate) const fn steps(&self) -> u64 {
+        self.travel.steps
+    }
+
     fn ulps(&self) -> f64 {
         SAME_TIME * self.travel.t.abs()
     }

@@ -88,6 +88,14 @@ impl Way {
         }
     }
 
+    /// Steps of exact integration so far.
+    pub(super) fn exact_steps(&self) -> u64 {
+        match self {
+            Self::Exact(exact) => exact.exact_steps(),
+            Self::Steps(_) => 0,
+        }
+    }
+
     /// Goes on with the energy balance of another stepper that came to where this one starts, its first jump included.
     pub(super) fn carry_on(&mut self, mut balance: Balance) {
         balance.add_part(&self.balance().energy());

@@ -10,6 +10,18 @@ pub(crate) const STEPPED_DIFFERENCE: f64 = 1e-5;
 /// A state counts as at least this part of the largest of its unit: a current that is always zero is moved by a part of the others.
 pub(crate) const LEAST_AMPLITUDE: f64 = 1e-6;
 
+/// A circuit whose states are all below this part of its sources is at rest but for leakage and rounding, and they count as what the sources do. Larger: small
+/// signals are known to fewer digits; smaller: digits of rounding are looked for.
+pub(crate) const NEXT_TO_SOURCES: f64 = 1e-9;
+
+/// The same as [`STEPPED_DIFFERENCE`], relative to the sources, where the circuit rests. Larger: a loop of large gain moves a switch that is not on its threshold; smaller: what
+/// solvers leave.
+pub(crate) const DIFFERENCE_AT_REST: f64 = 1e-6;
+
+/// Differences to either side of a rest, relative to the largest of a column or to 1, are those of one derivative up to here. Larger: a switch on its threshold is
+/// not seen; smaller: curvature and what solvers leave are taken for one.
+pub(crate) const SIDES_OF_REST: f64 = 1e-2;
+
 /// An orbit of exact integration is closed to this part of its amplitudes, one of steps to [`STEPPED_CLOSED`]. Larger: an orbit that still drifts
 /// passes; smaller: rounding of many events refuses one.
 pub(crate) const CLOSED: f64 = 1e-9;
@@ -44,6 +56,10 @@ pub(crate) const NUDGE: f64 = 1e-4;
 /// Steps of a period where laws are curved; the orbit that is shown has twice as many, and the difference of the two is its error. Larger: time;
 /// smaller: orbits that differ by more than what is asked of a run.
 pub(crate) const PARTS_OF_PERIOD: f64 = 1000.0;
+
+/// The steps of exact integration in a period over these tell those of a whole one, the second where the first are too many. Larger: many events together pass for a period full of them;
+/// smaller: time before a circuit that is too fast is known to be.
+pub(crate) const PARTS_FORESEEN: [f64; 2] = [1024.0, 64.0];
 
 /// Table steps of exact integration in a period. Larger: more of them on the way through a calm mode; smaller: deeper tables.
 pub(crate) const TABLE_STEPS: f64 = 64.0;

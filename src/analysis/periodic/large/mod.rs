@@ -4,8 +4,9 @@ mod newton;
 
 use std::sync::atomic::AtomicBool;
 
+use super::attempt::{from_rest, searching};
 use super::shooting::Stand;
-use super::{Asked, PeriodicOptions, from_rest, none, rows, searching};
+use super::{Asked, PeriodicOptions, none, rows};
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{
     Error, Lengths, Note, Orbit, OrbitKind, Reason, Returns, Run, Standing, Tape,
@@ -169,7 +170,13 @@ impl Large {
         };
         let parts = (&self.circuit, &self.multiport, None);
         let period = self.orbit.period;
-        let mut run = rows::rows(parts, self.standing, period, &options, grid)?;
+        let mut run = rows::rows(
+            parts,
+            self.standing,
+            (period, rows::Steps::default()),
+            &options,
+            grid,
+        )?;
         rows::state_error(&mut run, self.apart);
         run.plan.push(self.words);
         run.notes.extend(said);
