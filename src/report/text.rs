@@ -176,14 +176,16 @@ pub fn orbit(orbit: &Orbit) -> String {
         (false, false) => "unstable",
         (false, true) => "of unknown stability",
     };
+    let multipliers = match first.collect::<Vec<_>>().join(", ") {
+        none if none.is_empty() => "no multipliers".into(),
+        some => format!("multipliers {some}{more}"),
+    };
     format!(
-        "orbit: period {}, {kind}, order {}, {}, closed to {} after {} corrections, multipliers {}{more}",
+        "orbit: period {}, {kind}, order {}, {stability}, closed to {} after {} corrections, {multipliers}",
         si::quantity(orbit.period, "s", 6),
         orbit.order,
-        stability,
         si::plain(orbit.residual, 2),
         orbit.iterations,
-        first.collect::<Vec<_>>().join(", "),
     )
 }
 

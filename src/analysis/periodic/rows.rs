@@ -90,7 +90,7 @@ pub(super) fn state_error(run: &mut Run, apart: Option<f64>) {
 /// That rows show nothing of a circuit at rest.
 pub(super) fn next_to_nothing() -> Note {
     let text = format!(
-        "the circuit rests: all its capacitors and inductors stay below {NEXT_TO_SOURCES:e} of its sources, rows show what leakage and rounding leave, and the residual is one in parts of the sources"
+        "the circuit rests: all its capacitors and inductors stay below {NEXT_TO_SOURCES:e} of its sources (without any, of what they began with); rows show what leakage and rounding leave, and the residual is one in parts of these"
     );
     Note::run("next-to-nothing", text)
 }

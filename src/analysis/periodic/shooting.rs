@@ -178,9 +178,12 @@ impl Shooting<'_> {
             let least = if least > 0.0 { least } else { any.max(1.0) };
             *amplitude = amplitude.max(LEAST_AMPLITUDE * least);
         }
-        let sources = Sources::of(self.simulation.circuit(), self.from, seconds);
+        let mut sources = Sources::of(self.simulation.circuit(), self.from, seconds);
         let units = self.simulation.state_units();
-        let sources = sources.or_seen(seen, units);
+        // Steps know what has died out to a part of what it was; exact integration to one of what it is.
+        if !self.simulation.is_exact() {
+            sources = sources.or_seen(seen, units);
+        }
         let sizes = extremes.iter().map(|[low, high]| high.max(-low));
         let beside = sources.beside(&sizes.collect::<Vec<_>>(), units);
         self.rests = beside.is_some();
