@@ -9,6 +9,7 @@ mod orbit;
 mod ratio;
 mod rest;
 
+use std::f64::consts::TAU;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Complex, DMatrix, DVector, Dyn, LU};
@@ -21,12 +22,12 @@ use super::periodic::{
 };
 use super::variation::times;
 use crate::circuit::{Circuit, Kind};
-use crate::integrate::{Error, Note, Orbit, OrbitKind, Reason};
+use crate::integrate::{Error, Note, Orbit, OrbitKind, Reason, Tape};
 use crate::lcs::Input;
 use crate::linalg::decouple::Decoupled;
 use crate::model::Model;
 use crate::settings::Settings;
-use crate::settings::tolerances::periodic::{LOST, RADIANS_OF_STEP};
+use crate::settings::tolerances::periodic::{BETWEEN_COMPARED, COMPARED, LOST, RADIANS_OF_STEP};
 use crate::waveform::{Phasors, unit_of};
 
 /// Where a circuit is made linear.
@@ -299,44 +300,62 @@ fn about_orbit(
     Ok(())
 }
 
-/// The same in the steps of a large orbit, with what halves of them change.
+/// The same in the steps of a large orbit, which are no longer than each frequency allows, with what halves of them change at some of the frequencies.
 fn about_large(
     mut found: Large,
     asked: &PeriodicOptions<'_>,
     (omegas, sidebands): (&[f64], u16),
     response: &mut Response,
 ) -> Result<(), Error> {
-    let (period, apart) = (found.orbit().period, found.apart());
-    let from = found.from();
-    let highest = omegas.iter().fold(0.0_f64, |m, omega| m.max(*omega));
-    let highest = highest + f64::from(sidebands) * std::f64::consts::TAU / period;
-    let circuit = found.circuit().clone();
-    let (returns, tapes) = found.in_steps(RADIANS_OF_STEP / highest, asked.cancel)?;
-    let drive = drive(&circuit, returns.inputs());
-    let bands = bands(sidebands);
-    let mut both = tapes.map(|tape| large::Stepped::of(returns, tape, (period, from)));
+    let (period, apart, from) = (found.orbit().period, found.apart(), found.from());
+    let drive = drive(&found.circuit().clone(), found.returns().inputs());
+    let (bands, beyond) = (bands(sidebands), f64::from(sidebands) * TAU / period);
+    let (own, longest) = found.in_steps(f64::INFINITY, false, asked.cancel)?;
+    let mut stepped = large::Stepped::of(found.returns(), &own, (period, from));
+    let mut finer: Option<(f64, Tape)> = None;
+    let every = omegas.len().div_ceil(COMPARED);
     let mut worst = (0.0, omegas.first().copied().unwrap_or_default());
-    for &omega in omegas {
+    for (k, &omega) in omegas.iter().enumerate() {
         let set = |cancel: &AtomicBool| cancel.load(std::sync::atomic::Ordering::Relaxed);
         if asked.cancel.is_some_and(set) {
             return Err(Error::before(Reason::Interrupted));
         }
-        let [whole, halves] = both
-            .each_mut()
-            .map(|stepped| stepped.response(returns, omega, (drive.as_slice(), &bands)));
-        let (whole, halves) = (whole?, halves?);
-        let size = halves
-            .iter()
-            .fold(f64::MIN_POSITIVE, |m, v| m.max(v.norm()));
-        let apart = whole.iter().zip(&halves);
-        let apart = apart.fold(0.0_f64, |m, (a, b)| m.max((a - b).norm()));
-        if apart > worst.0 * size {
-            worst = (apart / size, omega);
+        let most = RADIANS_OF_STEP / (omega + beyond);
+        // Steps serve frequencies up to an octave above the one that they were made for.
+        let serve = |(of, _): &(f64, Tape)| *of <= most && 8.0 * of > most;
+        if longest > most && !finer.as_ref().is_some_and(serve) {
+            let of = 0.5 * most;
+            finer = Some((of, found.in_steps(of, false, asked.cancel)?.0));
         }
-        response.phasors.values.extend(halves);
+        let (of, tape) = match &finer {
+            Some((of, tape)) if longest > most => (*of, tape),
+            _ => (f64::INFINITY, &own),
+        };
+        let drive = (drive.as_slice(), &bands[..]);
+        let values = stepped.response(found.returns(), (tape, omega), drive)?;
+        if (k + 1) % every == 0 || k + 1 == omegas.len() {
+            let (halves, _) = found.in_steps(of, true, asked.cancel)?;
+            let halves = stepped.response(found.returns(), (&halves, omega), drive)?;
+            let size = halves
+                .iter()
+                .fold(f64::MIN_POSITIVE, |m, v| m.max(v.norm()));
+            let apart = values.iter().zip(&halves);
+            let apart = apart.fold(0.0_f64, |m, (a, b)| m.max((a - b).norm()));
+            if apart > worst.0 * size {
+                worst = (apart / size, omega);
+            }
+        }
+        response.phasors.values.extend(values);
     }
-    let what = "halves of them change";
-    response.notes.push(in_parts(worst, apart, what));
+    let mut what = "halves of them change".to_string();
+    if every > 1 {
+        let compared = omegas.len().div_ceil(every);
+        what = format!(
+            "these, compared with halves of them at {compared} of the frequencies, may change"
+        );
+        worst.0 *= BETWEEN_COMPARED;
+    }
+    response.notes.push(in_parts(worst, apart, &what));
     Ok(())
 }
 

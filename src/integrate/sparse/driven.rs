@@ -274,9 +274,9 @@ impl Returns {
         &self.sparse.system().lcs.inputs
     }
 
-    /// No step is longer than this from now on, s; what shifts switches is written down.
+    /// No step is longer than this from now on, s, nor than asked for; what shifts switches is written down.
     pub(crate) fn resolve(&mut self, longest: f64) {
-        self.sparse.longest = self.sparse.longest.min(longest);
+        self.sparse.longest = self.longest.min(longest);
         self.with_shifts = true;
     }
 

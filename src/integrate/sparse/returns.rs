@@ -55,6 +55,8 @@ pub(crate) struct Returns {
     notes: Vec<crate::integrate::Note>,
     /// Whether tapes know what shifts switches.
     pub(super) with_shifts: bool,
+    /// No step is longer than asked for, s.
+    pub(super) longest: f64,
 }
 
 impl Returns {
@@ -99,6 +101,7 @@ impl Returns {
             },
             notes: problem.notes.clone(),
             with_shifts: false,
+            longest: sparse.longest,
             sparse,
         }))
     }

@@ -238,8 +238,17 @@ pub(crate) const MOST_LINEARISED: usize = 1200;
 /// The part of a radian of the highest frequency that a step of a large circuit takes at most, where its response to small sines is asked for. Larger: errors, which are stated; smaller: more steps.
 pub(crate) const RADIANS_OF_STEP: f64 = 0.25;
 
-/// The state that repeats in a response of a large circuit is found by products to this part of what sources make of a period. Larger: an error that counts beside that of the steps; smaller: products.
-pub(crate) const RESPONSE_CLOSED: f64 = 1e-10;
+/// The state that repeats in a response of a large circuit is found to this part of what sources make of a period. Larger: an error that counts beside that of the steps; smaller: corrections of rounding.
+pub(crate) const RESPONSE_CLOSED: f64 = 1e-9;
+
+/// The part of a residual that one correction of that state leaves. Larger: more corrections; smaller: more products.
+pub(crate) const LEFT_OF_RESPONSE: f64 = 1e-10;
+
+/// Frequencies at which a response of a large circuit is compared with that of halved steps, at most. Larger: time; smaller: an error that is largest between them is stated too small.
+pub(crate) const COMPARED: usize = 8;
+
+/// So many times the largest difference at these is what the others may be off by, as steps are those of the highest frequency of two octaves. Larger: errors that are stated too large; smaller: too small.
+pub(crate) const BETWEEN_COMPARED: f64 = 4.0;
 
 /// Products with the derivative of an orbit that the responses at all frequencies may take. Larger: memory and time for each frequency; smaller: circuits of many slow modes have none.
 pub(crate) const MOST_RECYCLED: usize = 400;

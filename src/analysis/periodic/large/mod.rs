@@ -122,24 +122,33 @@ impl Large {
         self.apart
     }
 
-    /// The orbit in steps of at most `longest`, s, and in halves of these, as what the circuit makes of small changes.
+    /// The orbit in steps of at most `longest`, s, and in halves of these where that is asked, as what the circuit makes of small changes; and the longest step.
     ///
     /// # Errors
     /// See [`Reason`].
     pub(in crate::analysis) fn in_steps(
         &mut self,
         longest: f64,
+        halved: bool,
         cancel: Option<&AtomicBool>,
-    ) -> Result<(&mut Returns, [Tape; 2]), Error> {
+    ) -> Result<(Tape, f64), Error> {
         let Standing {
             t, state, switches, ..
         } = &self.standing;
         let (place, until) = ((*t, &state[..], &switches[..]), t + self.orbit.period);
         self.returns.resolve(longest);
-        let whole = self.returns.pass(place, until, Lengths::Free, cancel)?;
-        let halves = Lengths::Halves(&whole.steps);
-        let halves = self.returns.pass(place, until, halves, cancel)?;
-        Ok((&mut self.returns, [whole.tape, halves.tape]))
+        let mut made = self.returns.pass(place, until, Lengths::Free, cancel)?;
+        let most = made.steps.iter().fold(0.0_f64, |m, (h, _)| m.max(*h));
+        if halved {
+            let halves = Lengths::Halves(&made.steps);
+            made = self.returns.pass(place, until, halves, cancel)?;
+        }
+        Ok((made.tape, most))
+    }
+
+    /// What makes its returns.
+    pub(in crate::analysis) const fn returns(&mut self) -> &mut Returns {
+        &mut self.returns
     }
 
     /// The circuit, its sources that do not repeat at rest.
