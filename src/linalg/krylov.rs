@@ -136,7 +136,7 @@ impl Recycled {
         }
     }
 
-    /// The first x found that leaves less than the part `reduction` of b; `None` where `most` vectors do not.
+    /// The first x found that leaves less than the part `reduction` of b; `None` where `most` vectors do not. A basis that others have filled begins anew.
     ///
     /// # Errors
     /// Those of the products.
@@ -147,6 +147,7 @@ impl Recycled {
         (reduction, most): (f64, usize),
     ) -> Result<Option<DVector<Complex<f64>>>, E> {
         let size = b.norm();
+        let mut own = self.vectors.is_empty();
         loop {
             let (x, left) = self.best(e, b);
             if left.norm() <= reduction * size {
@@ -156,9 +157,13 @@ impl Recycled {
             for part in [left.map(|v| v.re), left.map(|v| v.im)] {
                 self.grow(product, part)?;
             }
-            let still = self.vectors.len() == before;
-            if still || self.vectors.len() > most || !left.norm().is_finite() {
+            let ends = self.vectors.len() == before || self.vectors.len() > most;
+            if !left.norm().is_finite() || (ends && own) {
                 return Ok(None);
+            }
+            if ends {
+                *self = Self::new();
+                own = true;
             }
         }
     }
@@ -397,8 +402,18 @@ mod tests {
         }
         assert!(products <= 40, "{products}");
         let mut product = |v: &DVector<f64>| Ok::<_, ()>(&a * v);
-        let none = Recycled::new().solve(&mut product, (Complex::from(1.0), &b), (1e-11, 5));
-        assert!(none.expect("products").is_none());
+        let mut solve = |recycled: &mut Recycled, b: &_, most| {
+            let found = recycled.solve(&mut product, (Complex::from(1.0), b), (1e-11, most));
+            found.expect("products").is_some()
+        };
+        assert!(!solve(&mut Recycled::new(), &b, 5));
+        // A basis that is full of what another one needed.
+        let [mut full, mut alone] = [Recycled::new(), Recycled::new()];
+        let one = DVector::from_fn(40, |i, _| Complex::from(f64::from(u8::from(i == 39))));
+        let other = DVector::from_fn(40, |i, _| Complex::from(f64::from(u8::from(i < 3))));
+        assert!(solve(&mut full, &one, 40) && solve(&mut alone, &other, 40));
+        let most = full.vectors.len().max(alone.vectors.len());
+        assert!(solve(&mut full, &other, most), "{most}");
     }
 
     /// Where nothing solves the equation, what does not can be left is left, and the vector does not grow out of rounding.

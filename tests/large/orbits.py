@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Times `circ pss` of circuits that grow: `tests/large/orbits.py [CIRC]`; user time and memory of one process each, with parsing and output."""
+"""Times `circ pss` of circuits that grow, or `circ ac` about their orbits: `tests/large/orbits.py [CIRC] [--ac]`; user time and memory of one process each, with parsing and output."""
 
 import re
 import resource
@@ -9,8 +9,8 @@ import tempfile
 from pathlib import Path
 
 HEADS = {
-    "pulse": ["v1 n0 0 pulse(0 10 0 1u 1u 0.4m 1m)"],
-    "rectifier": ["v1 in 0 sin(0 10 1k)", "d1 in n0 dm", ".model dm d(ideal)", "rl n0 0 10k"],
+    "pulse": ["v1 n0 0 dc 0 ac 1 pulse(0 10 0 1u 1u 0.4m 1m)"],
+    "rectifier": ["v1 in 0 dc 0 ac 1 sin(0 10 1k)", "d1 in n0 dm", ".model dm d(ideal)", "rl n0 0 10k"],
 }
 
 
@@ -22,7 +22,7 @@ def ladder(sections, head):
 
 
 def bucks(count, load, spread=0.0, phases=False):
-    lines = [f"bucks {count}", "vs src 0 48", "ls src bus 1u", "cs bus 0 100u", "vc c 0 pulse(0 1 0 10n 10n 4u 10u)"]
+    lines = [f"bucks {count}", "vs src 0 dc 48 ac 1", "ls src bus 1u", "cs bus 0 100u", "vc c 0 pulse(0 1 0 10n 10n 4u 10u)"]
     lines += [".model sw sw(vt=0.5 vh=0 ron=10m roff=1meg)", ".model dm d(ideal)"]
     for k in range(count):
         clock, f = "c", 1 + spread * (k / (count - 1) - 0.5)
@@ -47,20 +47,44 @@ CIRCUITS = {
 }
 
 
+# Events at hundreds of instants of their own, and as many steps in each product.
+WITHOUT_RESPONSE = ("the same, 200 different filters, each current ends by itself", "200 bucks, 200 phases of the clock")
+
+
+def timed(asked):
+    """What a command says, and its user time, s."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    run = subprocess.run(asked, capture_output=True, text=True, check=True)
+    return run.stdout + run.stderr, resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+
+
+def orbit(circ, file, lines):
+    file.write_text("\n".join(lines) + "\n")
+    said, spent = timed([circ, "pss", file, "-o", file.with_suffix(".csv"), "--summary", "text", "-v"])
+    work = re.search(r"orbit by products: (\d+) returns of (\d+) steps, (\d+) products", said)
+    error = re.search(r"stated error: (\S+) of", said)
+    return [*work.groups(), error[1], f"{spent:.2f}"]
+
+
+def response(circ, file, lines):
+    file.write_text("\n".join([*lines[:-1], ".ac dec 20 100 10k", ".end"]) + "\n")
+    said, spent = timed([circ, "ac", file, "-o", file.with_suffix(".csv"), "--about", "pss"])
+    return [re.search(r"the response by (\S+) of", said)[1], f"{spent:.2f}"]
+
+
 def main():
-    circ = sys.argv[1] if len(sys.argv) > 1 else "target/quick/circ"
+    paths = [path for path in sys.argv[1:] if path != "--ac"]
+    circ = paths[0] if paths else "target/quick/circ"
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "orbit.cir"
         for name, lines in CIRCUITS.items():
-            file.write_text("\n".join(lines) + "\n")
-            before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-            asked = [circ, "pss", file, "-o", Path(folder) / "orbit.csv", "--summary", "text", "-v"]
-            run = subprocess.run(asked, capture_output=True, text=True, check=True)
-            spent = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
-            said = run.stdout + run.stderr
-            work = re.search(r"orbit by products: (\d+) returns of (\d+) steps, (\d+) products", said)
-            error = re.search(r"stated error: (\S+) of", said)
-            print(f"| {name} | {' | '.join(work.groups())} | {error[1]} | {spent:.2f} |", flush=True)
+            if "--ac" not in sys.argv:
+                cells = orbit(circ, file, lines)
+            elif name in WITHOUT_RESPONSE:
+                continue
+            else:
+                cells = response(circ, file, lines)
+            print(f"| {name} | {' | '.join(cells)} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -250,8 +250,9 @@ pub(crate) const COMPARED: usize = 8;
 /// So many times the largest difference at these is what the others may be off by, as steps are those of the highest frequency of two octaves. Larger: errors that are stated too large; smaller: too small.
 pub(crate) const BETWEEN_COMPARED: f64 = 4.0;
 
-/// Products with the derivative of an orbit that the responses at all frequencies may take. Larger: memory and time for each frequency; smaller: circuits of many slow modes have none.
-pub(crate) const MOST_RECYCLED: usize = 400;
+/// Products with the derivative of an orbit that the response at one frequency may take, and that are kept for the next ones. Larger: memory and time for each frequency; smaller: circuits of many slow modes
+/// have no response.
+pub(crate) const MOST_RECYCLED: usize = 240;
 
 /// Values to which the derivatives of a large orbit are differences of orbits. Larger: hours of orbits that nobody meant to ask for; smaller: values have to be named in several runs.
 pub(crate) const MOST_BESIDE: usize = 50;
