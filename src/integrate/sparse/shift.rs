@@ -1,6 +1,7 @@
 //! Switches that sources drive: by what these move them, and what that does to what follows.
 
 use super::Sparse;
+use super::system::Largest;
 use crate::integrate::error::{Error, Reason};
 use crate::integrate::switching::Watched as _;
 use crate::lcs::Input;
@@ -31,7 +32,7 @@ impl Shift {
     /// δt.
     pub(super) fn by(&self, u: &[f64], inputs: &[Input]) -> Result<f64, Error> {
         let mut all = self.controls.iter().map(|(gains, rate)| {
-            let change: f64 = gains.iter().zip(u).map(|(gain, u)| gain * u).sum();
+            let change = dot(gains, u);
             let size = gains
                 .iter()
                 .zip(u)
@@ -69,6 +70,11 @@ impl Shift {
     }
 }
 
+fn dot(gains: &[f64], values: &[f64]) -> f64 {
+    let terms = gains.iter().zip(values);
+    terms.map(|(gain, value)| gain * value).sum()
+}
+
 impl Sparse {
     /// What shifts switches that are about to move, where that is asked; the side behind is not known yet.
     pub(super) fn shift_of(&mut self, moving: &[usize]) -> Option<Shift> {
@@ -81,22 +87,15 @@ impl Sparse {
         self.inputs.left(t, &mut left);
         let mut controls = Vec::new();
         let mut held = false;
-        let sum = |gains: &[f64], values: &[f64]| -> f64 {
-            gains
-                .iter()
-                .zip(values)
-                .map(|(gain, value)| gain * value)
-                .sum()
-        };
         let system = self.system();
         for &i in moving {
             let (gains, _) = system.control_of_sources(i);
             let size: f64 = gains.iter().zip(&left).map(|(g, u)| (g * u).abs()).sum();
-            let jump = sum(&gains, &self.now.u) - sum(&gains, &left);
+            let jump = dot(&gains, &self.now.u) - dot(&gains, &left);
             if jump.abs() > DECISIVE * size {
                 held = true;
             } else {
-                let rate = sum(&gains, &du);
+                let rate = dot(&gains, &du);
                 controls.push((gains, rate));
             }
         }
@@ -119,16 +118,10 @@ impl Sparse {
         let step = shift.step.iter_mut().zip(behind);
         step.for_each(|(y, behind)| *y -= behind);
         let after = self.system().storage(&self.now.x, &self.now.u);
-        let largest = |unit: &str| {
-            let sizes = self.seen.iter().zip(&self.storage_units);
-            let own = sizes.filter(|(_, other)| **other == unit);
-            own.fold(0.0_f64, |m, (size, _)| m.max(*size))
-        };
-        let (volts, amperes) = (largest("V"), largest("A"));
-        let mut moved = before.iter().zip(&after).zip(&self.storage_units);
-        shift.jumps = moved.any(|((a, b), unit)| {
-            (a - b).abs() > NO_JUMP * if *unit == "V" { volts } else { amperes }
-        });
+        let units = self.storage_units.iter().copied();
+        let largest = Largest::of(units.clone().zip(self.seen.iter().copied()));
+        let mut moved = before.iter().zip(&after).zip(units);
+        shift.jumps = moved.any(|((a, b), unit)| (a - b).abs() > NO_JUMP * largest.among(unit));
         if let Some(tape) = &mut self.tape {
             tape.shifted(shift);
         }
