@@ -66,6 +66,8 @@ pub fn main() -> Exit {
         let matches = matches.map_err(|error| no_such_input(error, &mut command))?;
         Cli::from_arg_matches(&one_value_each(matches, &mut command)?)
     });
+    // The run takes over its memory.
+    drop(command);
     let mut cli = match parsed {
         Ok(cli) => cli,
         Err(error) => {
