@@ -213,12 +213,11 @@ impl Inspector {
         if !(0..m).any(asks) {
             return;
         }
-        mode.magnitudes.find_manifolds(flow);
-        let manifolds = &mode.magnitudes.manifolds;
         let holds = |m: &Manifold| m.holds(w, &self.sizes, GROUP * f64::EPSILON, &self.rates);
-        self.settled = manifolds.iter().rposition(holds);
+        self.settled = mode.magnitudes.settle(flow, holds);
         if let Some(at) = self.settled {
-            manifolds[at].jets(w, &self.sizes, &mut self.slow, &mut self.slow_sizes);
+            let manifold = &mode.magnitudes.manifolds[at];
+            manifold.jets(w, &self.sizes, &mut self.slow, &mut self.slow_sizes);
         }
     }
 
@@ -245,8 +244,8 @@ impl Inspector {
         let g = self.jets[i];
         // What of a guard is a transient that is rounding decides nothing.
         let manifold = self.settled.map(|at| &mode.magnitudes.manifolds[at]);
-        let slow =
-            manifold.is_some_and(|manifold| manifold.is_seen_by(i)) && self.may_be_zero(i, m, t);
+        let slow = manifold.is_some_and(|manifold| manifold.is_seen_by(mode.flow.guard_row(i)))
+            && self.may_be_zero(i, m, t);
         let (jets, sizes) = if slow {
             (&self.slow, &self.slow_sizes)
         } else {

@@ -82,23 +82,42 @@ impl Magnitudes {
         self.followers.iter().any(|f| row[f.component] != 0.0)
     }
 
+    /// Which of the manifolds w is on, as far as this `holds`: that of the most states that follow. Its jets are known then.
+    pub(super) fn settle(
+        &mut self,
+        flow: &Flow,
+        holds: impl Fn(&Manifold) -> bool,
+    ) -> Option<usize> {
+        self.find_manifolds(flow);
+        let mut most_first = self.manifolds.iter_mut().enumerate().rev();
+        most_first.find_map(|(at, manifold)| {
+            let met = holds(manifold)
+                && (manifold.has_jets() || {
+                    let guards = (&flow.guard_matrix(), flow.sizes());
+                    manifold.find_jets(flow.generator(), guards, ORDERS)
+                });
+            met.then_some(at)
+        })
+    }
+
     /// Finds the manifolds of the states that follow others.
-    pub(super) fn find_manifolds(&mut self, flow: &Flow) {
-        let faster = |k: usize| &self.followers[..k];
-        let ages = self.followers.windows(2).enumerate();
+    fn find_manifolds(&mut self, flow: &Flow) {
+        let followers = &self.followers;
+        let ages = followers.windows(2).enumerate();
         let apart = ages.filter(|(_, pair)| pair[1].age > LEVEL * pair[0].age);
-        let mut levels: Vec<usize> = apart.map(|(k, _)| k + 1).collect();
-        levels.extend((!self.followers.is_empty()).then_some(self.followers.len()));
-        let mut known = self.manifolds.iter().zip(&levels);
-        if self.manifolds.len() == levels.len() && known.all(|(m, &k)| m.is_of(faster(k))) {
+        let last = (!followers.is_empty()).then_some(followers.len());
+        let levels = apart.map(|(k, _)| k + 1).chain(last);
+        let mut known = self.manifolds.iter().zip(levels.clone());
+        if self.manifolds.len() == levels.clone().count()
+            && known.all(|(m, k)| m.is_of(&followers[..k]))
+        {
             return;
         }
-        let guards = flow.guard_matrix();
-        let manifold = |&k: &usize| {
-            let components: Vec<usize> = faster(k).iter().map(|f| f.component).collect();
-            let guards = (&guards, flow.sizes());
-            Manifold::new(flow.generator(), guards, &components, ORDERS)
+        let manifold = |k: usize| {
+            let faster = followers[..k].iter();
+            let components: Vec<usize> = faster.map(|f| f.component).collect();
+            Manifold::new(flow.generator(), &components)
         };
-        self.manifolds = levels.iter().filter_map(manifold).collect();
+        self.manifolds = levels.filter_map(manifold).collect();
     }
 }

@@ -188,20 +188,13 @@ pub(crate) struct Manifold {
     drift: DMatrix<f64>,
     /// |𝒜_FF|, by row in the same units.
     own: DMatrix<f64>,
-    /// By guard: whether it sees F.
-    sees: Vec<bool>,
-    /// Guards over w_S and below them their derivatives, as many as there are orders.
-    jets: Map,
+    /// Guards over w_S and below them their derivatives, as many as there are orders, once w was on it.
+    jets: Option<Map>,
 }
 
 impl Manifold {
-    /// That of these components, with as many orders of the guards; `None` where they do not follow (𝒜_FF is singular).
-    pub(crate) fn new(
-        generator: &DMatrix<f64>,
-        (guards, sizes): (&DMatrix<f64>, &Sizes),
-        followers: &[usize],
-        orders: usize,
-    ) -> Option<Self> {
+    /// That of these components; `None` where they do not follow (𝒜_FF is singular).
+    pub(crate) fn new(generator: &DMatrix<f64>, followers: &[usize]) -> Option<Self> {
         let dim = generator.nrows();
         let follows: Vec<bool> = (0..dim).map(|j| followers.contains(&j)).collect();
         let mut fast = generator.select_rows(followers);
@@ -209,26 +202,37 @@ impl Manifold {
         for &j in followers {
             fast.column_mut(j).fill(0.0);
         }
-        let restricted = |rows: &DMatrix<f64>, slaves: &DMatrix<f64>| {
-            let mut slow = rows + rows.select_columns(followers) * slaves;
-            for &j in followers {
-                slow.column_mut(j).fill(0.0);
-            }
-            slow
-        };
         let inverse = Levelled::new(&own);
         let mut slaves = -inverse.solve(fast.clone())?;
         for _ in 0..INVARIANT {
-            let moves = &slaves * restricted(generator, &slaves);
+            let moves = &slaves * restricted(generator, followers, &slaves);
             slaves = inverse.solve(moves - &fast)?;
         }
-        let slow = |rows: &DMatrix<f64>| restricted(rows, &slaves);
         let mut drift = generator.select_rows(followers) - &slaves * generator;
         let mut own = own.abs();
         for (k, &j) in followers.iter().enumerate() {
             drift.row_mut(k).unscale_mut(-generator[(j, j)]);
             own.row_mut(k).unscale_mut(-generator[(j, j)]);
         }
+        Some(Self {
+            followers: followers.to_vec(),
+            follows,
+            slaves,
+            drift,
+            own,
+            jets: None,
+        })
+    }
+
+    /// Finds the guards on it and their derivatives, as many as there are orders; whether they are finite. Most manifolds are never met: one
+    /// that w is on alone needs them.
+    pub(crate) fn find_jets(
+        &mut self,
+        generator: &DMatrix<f64>,
+        (guards, sizes): (&DMatrix<f64>, &Sizes),
+        orders: usize,
+    ) -> bool {
+        let (followers, slaves) = (&self.followers, &self.slaves);
         let magnitudes = slaves.abs();
         let added = |rows: &DMatrix<f64>, sizes: &DMatrix<f64>| {
             let mut added = sizes + rows.select_columns(followers).abs() * &magnitudes;
@@ -237,23 +241,20 @@ impl Manifold {
             }
             added
         };
+        let slow = |rows: &DMatrix<f64>| restricted(rows, followers, slaves);
         let sizes = Sizes {
             guards: added(guards, &sizes.guards),
             summed: added(generator, &sizes.summed),
         };
         let (jets, whole) = sizes.jets(&slow(guards), &slow(generator), orders);
-        let sees = guards
-            .row_iter()
-            .map(|row| followers.iter().any(|&j| row[j] != 0.0));
-        jets.iter().all(|v| v.is_finite()).then(|| Self {
-            sees: sees.collect(),
-            followers: followers.to_vec(),
-            follows,
-            slaves,
-            drift,
-            own,
-            jets: Map::with_sizes(&jets, &whole),
-        })
+        let finite = jets.iter().all(|v| v.is_finite());
+        self.jets = finite.then(|| Map::with_sizes(&jets, &whole));
+        finite
+    }
+
+    /// Whether [`Self::find_jets`] has found them.
+    pub(crate) fn has_jets(&self) -> bool {
+        self.jets.is_some()
     }
 
     /// Whether it is that of these components.
@@ -270,13 +271,17 @@ impl Manifold {
             let size = row.fold(sizes[j], |whole, (s, size)| whole + (s * size).abs());
             rounding * size + known.get(j).map_or(0.0, |known| known.abs())
         };
-        let near: Vec<f64> = self.followers.iter().enumerate().map(near).collect();
         let over =
             |row: &DMatrix<f64>, k| row.row(k).iter().zip(w).map(|(a, w)| a * w).sum::<f64>();
-        self.followers.iter().enumerate().all(|(k, &j)| {
+        let mut followers = self.followers.iter().enumerate();
+        if !followers.all(|(k, &j)| (w[j] - over(&self.slaves, k)).abs() <= near((k, &j))) {
+            return false;
+        }
+        let near: Vec<f64> = self.followers.iter().enumerate().map(near).collect();
+        (0..near.len()).all(|k| {
             // Those that are off push each other.
             let pushed: f64 = self.own.row(k).iter().zip(&near).map(|(a, n)| a * n).sum();
-            (w[j] - over(&self.slaves, k)).abs() <= near[k] && over(&self.drift, k).abs() <= pushed
+            over(&self.drift, k).abs() <= pushed
         })
     }
 
@@ -285,9 +290,9 @@ impl Manifold {
         self.followers.len()
     }
 
-    /// Whether a guard sees a component that follows.
-    pub(crate) fn is_seen_by(&self, guard: usize) -> bool {
-        self.sees[guard]
+    /// Whether a guard with these entries over w sees a component that follows.
+    pub(crate) fn is_seen_by(&self, guard: &[f64]) -> bool {
+        self.followers.iter().any(|&j| guard[j] != 0.0)
     }
 
     /// The guards and their derivatives on it at w, and the sums of the magnitudes they come from.
@@ -298,9 +303,20 @@ impl Manifold {
         values: &mut Vec<f64>,
         whole: &mut Vec<f64>,
     ) {
-        self.jets.values(w, values);
-        self.jets.largest(sizes, whole);
+        if let Some(jets) = &self.jets {
+            jets.values(w, values);
+            jets.largest(sizes, whole);
+        }
     }
+}
+
+/// Rows over w on the manifold w_F = K w_S, over w_S.
+fn restricted(rows: &DMatrix<f64>, followers: &[usize], slaves: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut slow = rows + rows.select_columns(followers) * slaves;
+    for &j in followers {
+        slow.column_mut(j).fill(0.0);
+    }
+    slow
 }
 
 #[cfg(test)]
@@ -313,6 +329,18 @@ mod tests {
             guards: guards.abs(),
             summed: DMatrix::zeros(guards.ncols(), guards.ncols()),
         }
+    }
+
+    /// The manifold of these components with the jets of a guard.
+    fn met(
+        generator: &DMatrix<f64>,
+        guard: &DMatrix<f64>,
+        of: &[usize],
+        orders: usize,
+    ) -> Manifold {
+        let mut manifold = Manifold::new(generator, of).unwrap();
+        assert!(manifold.find_jets(generator, (guard, &sizes(guard)), orders));
+        manifold
     }
 
     fn of(generator: &DMatrix<f64>, n: usize, sizes: &[f64]) -> Vec<Follower> {
@@ -357,7 +385,7 @@ mod tests {
         a[(1, 2)] = 314.0;
         a[(2, 1)] = -314.0;
         let guard = DMatrix::from_row_slice(1, 3, &[roff, 0.0, 0.0]);
-        let manifold = Manifold::new(&a, (&guard, &sizes(&guard)), &[0], 3).unwrap();
+        let manifold = met(&a, &guard, &[0], 3);
         let (w, sizes) = ([1e-17, 1e-20, 5.0], [10.0, 5.0, 5.0]);
         assert!(manifold.holds(&w, &sizes, 1e-14, &[]));
         assert!(!manifold.holds(&[1e-12, 0.0, 5.0], &sizes, 1e-14, &[]));
@@ -369,7 +397,7 @@ mod tests {
         for (found, expected) in values.iter().zip(expected) {
             assert!((found / expected - 1.0).abs() < 1e-12, "{found} {expected}");
         }
-        assert!((whole[0] / 5.0 - 1.0).abs() < 1e-12 && manifold.is_seen_by(0));
+        assert!((whole[0] / 5.0 - 1.0).abs() < 1e-12 && manifold.is_seen_by(&[roff, 0.0, 0.0]));
     }
 
     /// A capacitor behind a small resistance follows a voltage that falls: what it gives back passes the resistance.
@@ -378,7 +406,7 @@ mod tests {
         let (fast, slow) = (1e12, 1e5);
         let a = DMatrix::from_row_slice(2, 2, &[-fast, fast, 0.0, -slow]);
         let guard = DMatrix::from_row_slice(1, 2, &[1.0, -1.0]);
-        let manifold = Manifold::new(&a, (&guard, &sizes(&guard)), &[0], 2).unwrap();
+        let manifold = met(&a, &guard, &[0], 2);
         let (mut values, mut whole) = (Vec::new(), Vec::new());
         manifold.jets(&[5.0, 5.0], &[5.0, 5.0], &mut values, &mut whole);
         let expected = 5.0 * slow / (fast - slow);
@@ -394,7 +422,7 @@ mod tests {
     fn what_passes_through_the_manifold_is_not_on_it() {
         let a = DMatrix::from_row_slice(2, 2, &[-33.0, -33.0, -33.0, -66.0]);
         let guard = DMatrix::from_row_slice(1, 2, &[-10.0, -20.0]);
-        let manifold = Manifold::new(&a, (&guard, &sizes(&guard)), &[1], 3).unwrap();
+        let manifold = met(&a, &guard, &[1], 3);
         assert!(!manifold.holds(&[-0.24, 0.12], &[0.53, 0.53], 1e-14, &[]));
     }
 
