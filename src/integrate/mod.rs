@@ -45,6 +45,7 @@ pub mod theta;
 pub mod verify;
 
 pub use aliasing::{Aliased, aliased};
+pub(crate) use curved::tableau::STAGES;
 pub(crate) use difference::grow;
 pub use error::{Error, NoRest, Reason};
 pub use event::{Change, Event};
@@ -57,7 +58,10 @@ pub use run::{Frame, Outcome, Stepper};
 pub(crate) use simulate::simulate_beside;
 pub use simulate::{Method, SimOptions, Standing, simulate, simulate_system};
 pub use simulation::{Checkpoint, Simulation, SimulationOptions, Stop, StopReason};
-pub(crate) use sparse::{Lengths, Passed, Returns, Sine, Tape};
+pub(crate) use sparse::{
+    Bend, Drive, Lengths, Passed, Reads, Returned, Returns, Sine, Stepped, Tape, Weighed,
+    through_stages,
+};
 pub use start::{OperatingPoint, Values, operating_point};
 pub use stats::{Energy, Impulse, JumpReason, Run, StateJump, StateJumps, StatedError, Stats};
 pub use verify::{Verified, VerifyOptions, verify, verify_system};

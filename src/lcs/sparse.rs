@@ -89,6 +89,16 @@ impl Csr {
         }
     }
 
+    /// y + factor Mᵀ x, in y.
+    pub(crate) fn add_transposed(&self, factor: f64, x: &[f64], y: &mut [f64]) {
+        for (i, x) in x.iter().enumerate() {
+            if *x != 0.0 {
+                self.row(i)
+                    .for_each(|(j, value)| y[j] += factor * value * x);
+            }
+        }
+    }
+
     /// M x.
     ///
     /// # Panics

@@ -141,6 +141,27 @@ impl SparseLu {
         }
     }
 
+    /// Solves Mᵀ x = b, in place; `work` is a buffer.
+    pub(crate) fn solve_transposed(&self, b: &mut [f64], work: &mut Vec<f64>) {
+        work.resize(b.len(), 0.0);
+        for (value, &column) in work.iter_mut().zip(&self.columns) {
+            *value = b[column as usize];
+        }
+        for j in 0..work.len() {
+            let above = self.upper.column(j).iter();
+            let sum: f64 = above.map(|&(i, u)| u * work[i as usize]).sum();
+            work[j] = (work[j] - sum) / self.diagonal[j];
+        }
+        for j in (0..work.len()).rev() {
+            let below = self.lower.column(j).iter();
+            let sum: f64 = below.map(|&(i, l)| l * work[i as usize]).sum();
+            work[j] -= sum;
+        }
+        for (value, &row) in b.iter_mut().zip(&self.rows) {
+            *value = work[row as usize];
+        }
+    }
+
     /// Bytes that it takes.
     pub(crate) fn bytes(&self) -> usize {
         16 * (self.lower.entries.len() + self.upper.entries.len()) + 40 * self.rows.len()
@@ -181,8 +202,11 @@ mod tests {
         for (a, b) in b.iter().zip(&quickly) {
             assert!((a - b).abs() < 1e-14);
         }
-        for (found, expected) in b.iter().zip(&x) {
+        let mut transposed = (dense.transpose() * &x).as_slice().to_vec();
+        factors.solve_transposed(&mut transposed, &mut Vec::new());
+        for ((found, expected), transposed) in b.iter().zip(&x).zip(&transposed) {
             assert!((found - expected).abs() < 1e-14, "{b:?}");
+            assert!((transposed - expected).abs() < 1e-14, "{transposed:?}");
         }
         pattern.values().fill(0.0);
         assert!(pattern.factors().is_none());

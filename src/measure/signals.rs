@@ -81,6 +81,12 @@ impl Curves {
         self.values.len() * VALUES
     }
 
+    /// The largest |value|.
+    pub(crate) fn largest(&self) -> f64 {
+        let all = self.values.as_flattened().iter();
+        all.fold(0.0, |largest, value| largest.max(value.abs()))
+    }
+
     /// Whether there is none.
     #[must_use]
     pub fn is_empty(&self) -> bool {

@@ -4,6 +4,8 @@
 //! sources e = δP s' beside them (Tellegen's theorem is the usual way to see it: S. W. Director, R. A. Rohrer, "The generalized adjoint network and network sensitivities", IEEE
 //! Trans. Circuit Theory, 1969). So derivatives of all that is reduced from a multiport, to any value, follow from one that is reduced with these sources.
 
+use std::collections::HashMap;
+
 use super::{
     Coefficient, Column, Equation, Observed, Power, SourcePort, StandardMultiport, StaticMultiport,
 };
@@ -24,41 +26,78 @@ fn number(x: Coefficient) -> f64 {
     x.in_field::<Ball>().to_f64()
 }
 
-/// The number that a coefficient is with these values in place of its own, if it is this value, its inverse or the negative of one of them.
-fn with_values(x: Coefficient, own: f64, values: [f64; 4]) -> Option<[f64; 4]> {
-    let (value, of): (Value, fn(f64) -> f64) = match x {
+/// A place that differs.
+#[derive(Debug, Clone, Copy)]
+enum Place {
+    Coefficient(usize, Column),
+    Metric(usize, usize),
+}
+
+impl Perturbation {
+    fn push(&mut self, place: Place, values: [f64; 4]) {
+        match place {
+            Place::Coefficient(equation, column) => {
+                self.coefficients.push((equation, column, values));
+            }
+            Place::Metric(row, column) => self.metric.push((row, column, values)),
+        }
+    }
+}
+
+/// What a value is in a coefficient.
+type Of = fn(f64) -> f64;
+
+/// The value that a coefficient is, or is the inverse of, or the negative of one of them; and which of these.
+fn one_value(x: Coefficient) -> Option<(f64, Of)> {
+    let (value, of): (Value, Of) = match x {
         Coefficient::Plus(value) => (value, |value| value),
         Coefficient::Minus(value) => (value, |value| -value),
         Coefficient::Inverse(value) => (value, f64::recip),
         Coefficient::MinusInverse(value) => (value, |value| -value.recip()),
         Coefficient::Ratio(..) | Coefficient::Pair(..) => return None,
     };
-    (value.f64 == own).then(|| values.map(of))
+    Some((value.f64, of))
 }
 
 impl StandardMultiport {
     /// Where these differ; `None` where that is not by coefficients, metric and waveforms of sources alone.
     pub(crate) fn perturbation(&self, near: [&Self; 4]) -> Option<Perturbation> {
-        self.differing(near, |all| Some(all.map(number)))
+        let mut found = Perturbation::default();
+        self.differing(near, |place, all| {
+            found.push(place, all.map(number));
+            Some(())
+        })?;
+        Some(found)
     }
 
-    /// The same from one of them, which has `own` for a value, where the others have these; `None` too where a coefficient that differs is not that value or its
-    /// inverse.
-    pub(crate) fn perturbation_by(
+    /// By card the same, from one in which each of them has its mark for a value, where the others have these values; `None` too where a coefficient that differs is not one of the marks or
+    /// its inverse, or a mark is there twice.
+    pub(crate) fn perturbations_by(
         &self,
         near: &Self,
-        own: f64,
-        values: [f64; 4],
-    ) -> Option<Perturbation> {
-        self.differing([near], |[x]| with_values(x, own, values))
+        cards: &[(f64, [f64; 4])],
+    ) -> Option<Vec<Perturbation>> {
+        let marks = cards.iter().enumerate();
+        let marks: HashMap<u64, usize> = marks.map(|(k, (mark, _))| (mark.to_bits(), k)).collect();
+        if marks.len() < cards.len() {
+            return None;
+        }
+        let mut found = vec![Perturbation::default(); cards.len()];
+        self.differing([near], |place, [x]| {
+            let (mark, of) = one_value(x)?;
+            let card = *marks.get(&mark.to_bits())?;
+            found[card].push(place, cards[card].1.map(of));
+            Some(())
+        })?;
+        Some(found)
     }
 
+    /// Looks at each number that differs; `None` where something else does.
     fn differing<const N: usize>(
         &self,
         near: [&Self; N],
-        values: impl Fn([Coefficient; N]) -> Option<[f64; 4]>,
-    ) -> Option<Perturbation> {
-        let mut found = Perturbation::default();
+        mut see: impl FnMut(Place, [Coefficient; N]) -> Option<()>,
+    ) -> Option<()> {
         for other in near {
             let same = self.columns == other.columns
                 && self.internal == other.internal
@@ -89,7 +128,7 @@ impl StandardMultiport {
             for (at, (own, column)) in equation.iter().enumerate() {
                 let all = others.map(|other| other[at].0);
                 if differ(*own, &all) {
-                    found.coefficients.push((k, *column, values(all)?));
+                    see(Place::Coefficient(k, *column), all)?;
                 }
             }
         }
@@ -101,10 +140,10 @@ impl StandardMultiport {
             }
             let all = others.map(|other| other.2);
             if differ(*own, &all) {
-                found.metric.push((*row, *column, values(all)?));
+                see(Place::Metric(*row, *column), all)?;
             }
         }
-        Some(found)
+        Some(())
     }
 
     /// With a source of value 0 in each of these equations, then one beside the flow of each of these storage elements, after those that there are, and with readings of these

@@ -133,12 +133,15 @@ fn derivatives_are_differences_of_exact_runs() {
         sensitivities::compare(seed, &mut tally);
     }
     tell(&format!(
-        "{} derivatives of {} circuits compared, {} without known differences, {} circuits refused:\n{}",
+        "{} derivatives of {} circuits compared, {} without known differences, {} circuits refused:\n{}\nthose of {} along sparse steps, of {} not:\n{}",
         tally.compared,
         tally.circuits,
         tally.unknown,
         tally.refused.len(),
-        tally.refused.join("\n")
+        tally.refused.join("\n"),
+        tally.in_steps,
+        tally.without_steps.len(),
+        tally.without_steps.join("\n"),
     ));
     assert!(tally.wrong.is_empty(), "{}", tally.wrong.join("\n"));
     assert!(2 * tally.circuits as u64 >= count, "{:?}", tally.refused);

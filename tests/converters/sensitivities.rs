@@ -3,6 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use circ::analysis::{Gradient, SensitivityMethod, SensitivityOptions, sensitivity, transient};
+use circ::settings::Settings;
 use circ::{Method, Model, SimOptions};
 
 use crate::circuit::{Part, states};
@@ -29,6 +30,9 @@ pub(crate) struct Tally {
     pub(crate) circuits: usize,
     /// Derivatives that were computed both ways.
     pub(crate) both: usize,
+    /// Circuits whose derivatives along sparse steps were compared, and where there are none.
+    pub(crate) in_steps: usize,
+    pub(crate) without_steps: Vec<String>,
     /// Where differences tell nothing.
     pub(crate) unknown: usize,
     /// Circuits without a derivative, and why.
@@ -104,6 +108,71 @@ fn both_ways((seed, model): (u64, &Model), elements: &[(&str, f64)], tally: &mut
     }
 }
 
+/// Besides what they state derivatives along sparse steps may be off by this part of the largest p ∂J/∂p of a measurement, of what it measures, or of what others measure of the same signal.
+const IN_STEPS: f64 = 1e-5;
+
+/// Compares the derivatives to all of these elements with those along sparse steps, where these are told.
+fn in_steps((seed, model): (u64, &Model), elements: &[(&str, f64)], tally: &mut Tally) {
+    let with = |large| {
+        let own = Settings::default();
+        let options = SensitivityOptions {
+            to: elements
+                .iter()
+                .map(|(name, _)| (*name).to_string())
+                .collect(),
+            settings: Settings {
+                large: if large { 0 } else { own.large },
+                ..own
+            },
+            ..SensitivityOptions::default()
+        };
+        catch_unwind(AssertUnwindSafe(|| sensitivity(model, &options)))
+    };
+    let (exact, stepped) = match (with(false), with(true)) {
+        (Ok(Ok(exact)), Ok(Ok(stepped))) => (exact, stepped),
+        (_, Err(_)) => return tally.wrong.push(format!("{seed} panicked in steps")),
+        (_, Ok(Err(error))) => return tally.without_steps.push(format!("{seed}: {error}")),
+        _ => return,
+    };
+    let stated = stepped.notes.iter().filter(|note| note.code == "tangents");
+    let mut stated = stated.filter_map(|note| {
+        let (_, number) = note.text.split_once("be off by ")?;
+        number.split(' ').next()?.parse::<f64>().ok()
+    });
+    let Some(stated) = stated.next_back().filter(|_| stepped.passes.backward > 0) else {
+        return tally.without_steps.push(format!("{seed}: otherwise"));
+    };
+    tally.in_steps += 1;
+    for (a, b) in exact.of.iter().zip(&stepped.of) {
+        let named = format!("`{}`", a.name);
+        let mut notes = exact.notes.iter().chain(&stepped.notes);
+        if notes.any(|note| note.code == "one-sided" && note.text.contains(&named)) {
+            continue;
+        }
+        let pairs = a.to.iter().zip(&b.to).zip(elements);
+        let scaled = pairs.filter_map(|((a, b), (_, value))| Some((value * a.1?, value * b.1?)));
+        let scaled: Vec<(f64, f64)> = scaled.collect();
+        let size = |a: &Gradient| a.value.as_ref().map_or(0.0, |value| value.abs());
+        let of_signal = exact.of.iter().filter(|b| b.name[1..] == a.name[1..]);
+        let span = of_signal.fold(0.0, |m: f64, b| m.max(size(b)));
+        let largest = scaled.iter().fold(size(a), |m, pair| m.max(pair.0.abs()));
+        // Of what does not move at all nothing but rounding is left.
+        if largest.max(span) == 0.0 {
+            continue;
+        }
+        let allowed = stated * largest + IN_STEPS * largest.max(span);
+        for ((own, other), (name, _)) in scaled.iter().zip(elements) {
+            if (own - other).abs() > allowed {
+                tally.wrong.push(format!(
+                    "{seed}: {} to {name}: {own:e} exact, {other:e} in steps, {:.1e} of {largest:e} apart, {stated:e} stated",
+                    a.name,
+                    (own - other).abs() / largest,
+                ));
+            }
+        }
+    }
+}
+
 /// Compares the derivatives of one circuit to some of its elements.
 pub(crate) fn compare(seed: u64, tally: &mut Tally) {
     let mut random = Random::new(seed ^ 0x5e45);
@@ -158,6 +227,7 @@ pub(crate) fn compare(seed: u64, tally: &mut Tally) {
     };
     tally.circuits += 1;
     both_ways((seed, &model), &all, tally);
+    in_steps((seed, &model), &all, tally);
     for (name, value) in elements {
         let [coarse, fine] = STEPS.map(|h| difference(&model, name, value, h));
         let (Some(coarse), Some(fine)) = (coarse, fine) else {

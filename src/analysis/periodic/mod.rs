@@ -28,7 +28,7 @@ use attempt::{refined, searched, simulation};
 pub(super) use large::Large;
 use rows::{Steps, next_to_nothing, notes, rows, state_error};
 use search::{Found, Search};
-pub(super) use settled::{Settled, settled, settled_linear};
+pub(super) use settled::{Settled, settled, settled_large, settled_linear};
 
 /// What a periodic steady state may be asked for.
 #[derive(Debug, Clone, Default)]

@@ -71,6 +71,20 @@ pub(in crate::analysis) fn settled_linear(
     Ok(Settled::Whole(Box::new(linearised(asked, options)?)))
 }
 
+/// The orbit of a driven circuit of many elements, in steps on matrices without their zeros; nothing of another, or where they do not find it.
+///
+/// # Errors
+/// It was interrupted.
+pub(in crate::analysis) fn settled_large(
+    model: &Model,
+    options: &PeriodicOptions<'_>,
+) -> Result<Option<Large>, Error> {
+    match Large::of(&asked(model, options)?, options) {
+        Err(error) if error.reason != Reason::Interrupted => Ok(None),
+        found => found,
+    }
+}
+
 /// Finds the periodic steady state, of a large driven circuit by products.
 ///
 /// # Errors

@@ -3,6 +3,7 @@
 use nalgebra::allocator::Allocator;
 use nalgebra::{DMatrix, DVector, DefaultAllocator, Dim, Dyn, OMatrix};
 
+use super::survey::Grounds;
 use super::{Beside, unsupported};
 use crate::analysis::curves::{MOST_VALUES, laps};
 use crate::analysis::periodic::steady;
@@ -95,17 +96,19 @@ impl Base {
         }))
     }
 
-    /// A run as measurements see it: an orbit again and again, from its beginning, which is not that of the trajectory.
+    /// What values are looked at beside.
+    pub(super) fn grounds(&self) -> Grounds<'_> {
+        Grounds {
+            multiport: &self.multiport,
+            period: self.orbit.as_ref().map(|orbit| orbit.period),
+        }
+    }
+
+    /// The run as measurements see it.
     pub(super) fn seen(&self, curves: Curves) -> Curves {
-        let Some(orbit) = &self.orbit else {
-            return curves.within(self.span);
-        };
-        let (period, from) = (orbit.period, orbit.from);
-        // What is left out of many laps is told where they are measured.
-        let (laps, _) = laps(orbit.tran, period, curves.values());
-        let [begin, end] = [laps.0, laps.1].map(|lap| lap as f64 * period);
-        let all = curves.repeated((0, laps.1 - laps.0 + 1), period, from + period - begin);
-        all.within((begin, end))
+        let orbit = self.orbit.as_ref();
+        let orbit = orbit.map(|orbit| (orbit.period, orbit.from, orbit.tran));
+        seen(curves, self.span, orbit)
     }
 
     /// δs where the run begins, forward: of an orbit (I − M) δs₀ = φ.
@@ -143,6 +146,22 @@ impl Base {
         let again = adjoint.back(&mut motions, &[], Some(&last))?;
         Ok(carried.plus(&again))
     }
+}
+
+/// A run as measurements see it: an orbit (its period, when it counts from, s, and what `.tran` asks for) again and again, from its beginning, which is not that of the curves.
+pub(super) fn seen(
+    curves: Curves,
+    span: (f64, f64),
+    orbit: Option<(f64, f64, Option<Tran>)>,
+) -> Curves {
+    let Some((period, from, tran)) = orbit else {
+        return curves.within(span);
+    };
+    // What is left out of many laps is told where they are measured.
+    let (laps, _) = laps(tran, period, curves.values());
+    let [begin, end] = [laps.0, laps.1].map(|lap| lap as f64 * period);
+    let all = curves.repeated((0, laps.1 - laps.0 + 1), period, from + period - begin);
+    all.within((begin, end))
 }
 
 /// (I − M)⁻¹ b.

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::base::Base;
 use super::survey::Survey;
-use super::{Beside, Sensitivity, SensitivityMethod, started};
+use super::{Beside, Sensitivity, SensitivityMethod, left_out, started};
 use crate::analysis::curves::is_large;
 use crate::analysis::variation::{Carried, Drawing, Lines, Moved, Parameter, Tableau, Weighted};
 use crate::circuit::{Circuit, Measured, Weights, weights};
@@ -16,14 +16,17 @@ use crate::settings::tolerances::periodic::{MOST_RIVALS, SAME_DERIVATIVE};
 use crate::settings::tolerances::times::{MOST_PERIODS, MOST_STATES};
 
 /// What measurements find in a run, and what they weigh of it.
-struct Weighing {
-    found: Vec<Measured>,
+pub(super) struct Weighing {
+    pub(super) found: Vec<Measured>,
     /// Those that are asked for, or used by these.
     needed: Vec<bool>,
     weights: Vec<Option<Weights>>,
-    weighted: Vec<Option<Weighted>>,
+    pub(super) weighted: Vec<Option<Weighted>>,
     rivals: Vec<Rivalry>,
 }
+
+/// What derivatives to the pieces of curves are ones to.
+type Weigh<'a> = dyn Fn(&Weights) -> Weighted + 'a;
 
 /// An extremum that is reached a second time with the same value, or when it is.
 struct Rivalry {
@@ -42,9 +45,9 @@ struct Rivalry {
 
 impl Weighing {
     /// Of the measurements of a circuit that are asked for.
-    fn of(
+    pub(super) fn of(
         circuit: &Circuit,
-        (drawing, curves): (&Drawing, &Curves),
+        (weigh, curves): (&Weigh<'_>, &Curves),
         asked: impl Fn(&str) -> bool,
     ) -> Self {
         let found = circuit.measure(&Signals::Curves(curves));
@@ -65,11 +68,11 @@ impl Weighing {
             }
         }
         let of = |(needed, weights): (&bool, &Option<Weights>)| {
-            Some(drawing.weighted(weights.as_ref().filter(|_| *needed)?))
+            Some(weigh(weights.as_ref().filter(|_| *needed)?))
         };
         let weighted: Vec<Option<Weighted>> = needed.iter().zip(&weights).map(of).collect();
         Self {
-            rivals: rivals(drawing, &weights, &weighted),
+            rivals: rivals(weigh, &weights, &weighted),
             weighted,
             weights,
             needed,
@@ -77,8 +80,21 @@ impl Weighing {
         }
     }
 
+    /// What they weigh, then what rivals do.
+    pub(super) fn all(&self) -> impl Iterator<Item = &Weighted> {
+        let rivals = self.rivals.iter().map(|rivalry| &rivalry.weighted);
+        self.weighted.iter().flatten().chain(rivals)
+    }
+
+    /// Takes in what was compared for other values.
+    pub(super) fn join(&mut self, other: Self) {
+        for (own, other) in self.rivals.iter_mut().zip(other.rivals) {
+            own.parted.extend(other.parted);
+        }
+    }
+
     /// Whether some derivative is a difference of what is measured on a run that is moved.
-    fn needs_moves(&self) -> bool {
+    pub(super) fn needs_moves(&self) -> bool {
         let all = self.found.iter().zip(&self.weights).zip(&self.needed);
         let mut all =
             all.map(|((found, weights), needed)| (found.result.is_ok() && *needed, weights));
@@ -86,7 +102,7 @@ impl Weighing {
     }
 
     /// Derivatives with ln p by measurement, from those of what each weighs: those that use others follow them.
-    fn chained(&self, own: &[Option<f64>]) -> Vec<Option<f64>> {
+    pub(super) fn chained(&self, own: &[Option<f64>]) -> Vec<Option<f64>> {
         let count = own.len();
         let mut found: Vec<Option<f64>> = vec![None; count];
         for _ in 0..count {
@@ -107,7 +123,7 @@ impl Weighing {
 
 /// The extrema that are reached again elsewhere: where the same piece is seen again, as in each lap of an orbit, they move together.
 fn rivals(
-    drawing: &Drawing,
+    weigh: &Weigh<'_>,
     weights: &[Option<Weights>],
     weighted: &[Option<Weighted>],
 ) -> Vec<Rivalry> {
@@ -118,11 +134,11 @@ fn rivals(
         };
         let mut known = vec![own.clone()];
         for tie in &weights.rivals {
-            let value = tie.value.as_ref().map(|value| drawing.weighted(value));
+            let value = tie.value.as_ref().map(weigh);
             if let Some(value) = &value {
                 known[0] = value.clone();
             }
-            let weighted = drawing.weighted(&tie.weights);
+            let weighted = weigh(&tie.weights);
             let again = known.iter().any(|k| k.is_like(&weighted, SAME_DERIVATIVE));
             if again || known.len() > MOST_RIVALS {
                 continue;
@@ -156,7 +172,7 @@ impl Rivalry {
 
 impl Weighing {
     /// Compares derivatives with ln p of what extrema weigh where they are reached first and elsewhere.
-    fn compare(&mut self, name: &str, own: &[Option<f64>], others: &[f64]) {
+    pub(super) fn compare(&mut self, name: &str, own: &[Option<f64>], others: &[f64]) {
         for (rivalry, other) in self.rivals.iter_mut().zip(others) {
             if let Some(own) = own[rivalry.of] {
                 let own = if rivalry.is_time { 0.0 } else { own };
@@ -166,7 +182,7 @@ impl Weighing {
     }
 
     /// Tells which derivatives are those to one side.
-    fn one_sided(&self) -> Vec<Note> {
+    pub(super) fn one_sided(&self) -> Vec<Note> {
         let of = |k: usize| {
             let mut parted = self.rivals.iter().filter(|r| r.of == k);
             let all = parted.clone().flat_map(|r| &r.parted);
@@ -198,7 +214,8 @@ impl Beside<'_> {
         };
         let curves = base.seen(drawing.curves());
         let asked = |name: &str| self.options.asks_for(name);
-        let mut weighing = Weighing::of(own.circuit(), (&drawing, &curves), asked);
+        let weigh = |weights: &Weights| drawing.weighted(weights);
+        let mut weighing = Weighing::of(own.circuit(), (&weigh, &curves), asked);
         let measured = weighing.weighted.iter().flatten().count();
         let back = match self.options.method {
             SensitivityMethod::Forward => false,
@@ -213,15 +230,13 @@ impl Beside<'_> {
             ..Sensitivity::default()
         };
         let mut surveys = Vec::with_capacity(to.len());
+        let mut cards = self.cards(base.grounds(), to, &own);
         for (name, value) in to {
-            match self.survey(&base, (name, *value), (&own, &curves))? {
+            let survey =
+                self.survey(base.grounds(), (name, *value), &mut cards, (&own, &curves))?;
+            match survey {
                 Some(survey) => surveys.push(survey),
-                None => {
-                    let text = format!(
-                        "`{name}` is left out: it changes the period, on which the steady state depends otherwise"
-                    );
-                    sensitivity.notes.push(Note::run("left-out", text));
-                }
+                None => sensitivity.notes.push(left_out(name)),
             }
         }
         let perturbations = surveys
@@ -243,9 +258,7 @@ impl Beside<'_> {
             let changes = changes.with_constants(&base.trajectory, &base.forms);
             let plain = back && changes.is_plain();
             if plain && carried.is_none() {
-                let rivals = weighing.rivals.iter().map(|rivalry| &rivalry.weighted);
-                let weighted = weighing.weighted.iter().flatten();
-                let weighted: Vec<&Weighted> = weighted.chain(rivals).collect();
+                let weighted: Vec<&Weighted> = weighing.all().collect();
                 carried = Some(base.back(&lines, &drawing, &weighted)?);
                 sensitivity.passes.backward = weighted.len();
             }
@@ -305,7 +318,7 @@ impl Beside<'_> {
     }
 
     /// Tells where a transient measures the same run on its rows.
-    fn seen_elsewhere(&self, own: &Model) -> Vec<Note> {
+    pub(super) fn seen_elsewhere(&self, own: &Model) -> Vec<Note> {
         let mut tran = own
             .circuit()
             .tran

@@ -1,7 +1,9 @@
 //! Derivatives of measurements to the values of elements and parameters.
 
 mod base;
+mod course;
 mod exact;
+mod stepped;
 mod survey;
 
 use std::sync::atomic::AtomicBool;
@@ -17,7 +19,7 @@ use crate::integrate::{Error, Note, Reason, SimOptions, Simulation, SimulationOp
 use crate::measure::{Measurement, Over};
 use crate::model::Model;
 use crate::settings::Settings;
-use crate::settings::tolerances::periodic::{MOST_BESIDE, RUN_STEP, SIDES_APART};
+use crate::settings::tolerances::periodic::{RUN_STEP, SIDES_APART};
 
 /// Which way the derivatives of an exact run are computed: both have the same result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -103,6 +105,30 @@ impl Sensitivity {
     }
 }
 
+impl Sensitivity {
+    /// Takes in derivatives of the same measurements to other values.
+    fn join(&mut self, other: Self) {
+        for (own, other) in self.of.iter_mut().zip(other.of) {
+            own.to.extend(other.to);
+        }
+        self.notes.extend(other.notes);
+    }
+
+    /// Puts values into this order.
+    fn sort(&mut self, order: &[(String, f64)]) {
+        let place = |name: &String| order.iter().position(|(own, _)| own == name);
+        for gradient in &mut self.of {
+            gradient.to.sort_by_cached_key(|(name, _)| place(name));
+        }
+        let known = |name: &String| self.of.iter().any(|g| g.to.iter().any(|(n, _)| n == name));
+        self.at = order
+            .iter()
+            .filter(|(name, _)| known(name))
+            .cloned()
+            .collect();
+    }
+}
+
 /// `{"of":{"vout":{"value":…,"to":{"l1":…}}},"exact":…,"notes":[…]}`.
 impl Serialize for Sensitivity {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -182,19 +208,12 @@ pub fn sensitivity(model: &Model, options: &SensitivityOptions<'_>) -> Result<Se
         ));
     }
     let beside = Beside { model, options };
-    let exact = if options.steady && beyond_dense(model) {
-        if to.len() > MOST_BESIDE {
-            let what = format!(
-                "derivatives of the orbit of so many elements are differences of four orbits for each of {} values: name up to {MOST_BESIDE} of them (`--to`)",
-                to.len()
-            );
-            return Err(unsupported(what));
-        }
-        None
-    } else {
-        beside.exact(&to)?
+    let found = match beside.stepped(&to)? {
+        None if options.steady && beyond_dense(model) => Some(beside.few_differences(&to)?),
+        None => beside.exact(&to)?,
+        found => found,
     };
-    let mut found = match exact {
+    let mut found = match found {
         Some(found) => found,
         None => beside.differences(&to)?,
     };
@@ -204,6 +223,13 @@ pub fn sensitivity(model: &Model, options: &SensitivityOptions<'_>) -> Result<Se
 
 fn unsupported(what: String) -> Error {
     Error::before(Reason::Unsupported(what))
+}
+
+fn left_out(name: &str) -> Note {
+    let text = format!(
+        "`{name}` is left out: it changes the period, on which the steady state depends otherwise"
+    );
+    Note::run("left-out", text)
 }
 
 /// What is asked for, with its value.

@@ -1,5 +1,7 @@
 //! What differs where a value is another, and how a run changes with it.
 
+use std::collections::HashMap;
+
 use nalgebra::DVector;
 
 use super::base::{Base, not_smooth};
@@ -11,7 +13,7 @@ use crate::integrate::{Error, Reason};
 use crate::measure::{Curves, Signals};
 use crate::mna::{Perturbation, StandardMultiport, behaviour};
 use crate::model::Model;
-use crate::settings::tolerances::periodic::{PERIOD_MOVES, VALUE_STEP};
+use crate::settings::tolerances::periodic::{MARK, PERIOD_MOVES, VALUE_STEP};
 
 /// A value, and what differs where it is another.
 pub(super) struct Survey<'a> {
@@ -28,6 +30,13 @@ pub(super) struct Survey<'a> {
     pub(super) own: Vec<Option<f64>>,
 }
 
+/// What a value is looked at beside: the circuit, and the period of its orbit, s.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Grounds<'a> {
+    pub(super) multiport: &'a StandardMultiport,
+    pub(super) period: Option<f64>,
+}
+
 impl Survey<'_> {
     /// What a derivative with ln p is divided by for that with p.
     pub(super) const fn unit(&self) -> f64 {
@@ -35,30 +44,36 @@ impl Survey<'_> {
     }
 }
 
+/// Values two steps and one below it, one and two above it, and what a step is in doubles.
+fn beside_value(value: f64) -> ([f64; 4], f64) {
+    let step = value * (1.0 + VALUE_STEP) - value;
+    (STEPS.map(|steps| value + steps * step), step)
+}
+
 impl Beside<'_> {
     /// What differs where a value is another; `None` where it changes the period.
     pub(super) fn survey<'n>(
         &self,
-        base: &Base,
+        base: Grounds<'_>,
         (name, value): (&'n str, f64),
+        cards: &mut HashMap<String, Perturbation>,
         (own, curves): (&Model, &Curves),
     ) -> Result<Option<Survey<'n>>, Error> {
         self.go_on()?;
-        let step = value * (1.0 + VALUE_STEP) - value;
-        let values = STEPS.map(|steps| value + steps * step);
+        let (values, step) = beside_value(value);
         let sources = |near: &StandardMultiport| -> Vec<Source> {
             let all = near.sources.iter();
             all.map(|source| source.input.source.clone()).collect()
         };
         let count = own.circuit().measurements.len();
         let mut explicit = vec![Some(0.0); count];
-        if let Some(perturbation) = self.of_card(base, (name, value), values, own) {
+        if let Some(perturbation) = cards.remove(name) {
             return Ok(Some(Survey {
                 name,
                 value,
                 step,
                 initial: DVector::zeros(base.multiport.storage.len()),
-                sources: [&base.multiport; 4].map(sources),
+                sources: [base.multiport; 4].map(sources),
                 perturbation: Some(perturbation),
                 own: explicit,
             }));
@@ -118,43 +133,59 @@ impl Beside<'_> {
         }))
     }
 
-    /// What differs where a resistance, capacitance or inductance of a card has these values in place of its own: coefficients that are its value or the inverse of that. `None`
-    /// where the name is another, or something else follows its value, as the metric of coupled inductors does.
-    fn of_card(
+    /// By name what differs where a resistance, capacitance or inductance of a card has another value: coefficients that are its value or the inverse of that. Names of other values
+    /// are left out, and where something else follows a value, as the metric of coupled inductors does.
+    pub(super) fn cards(
         &self,
-        base: &Base,
-        (name, value): (&str, f64),
-        values: [f64; 4],
+        base: Grounds<'_>,
+        to: &[(String, f64)],
         own: &Model,
-    ) -> Option<Perturbation> {
+    ) -> HashMap<String, Perturbation> {
         let mut circuit = own.circuit().clone();
-        let id = circuit.element(name)?;
-        let kind = &mut circuit.elements[id.index()].kind;
-        let letter = match kind {
-            Kind::Resistor(_) => 'r',
-            Kind::Capacitor(_) => 'c',
-            Kind::Inductor(_) => 'l',
-            _ => return None,
-        };
-        if !name.starts_with(letter) {
-            return None;
+        let (mut names, mut cards) = (Vec::new(), Vec::new());
+        for (name, value) in to {
+            let Some(id) = circuit.element(name) else {
+                continue;
+            };
+            let kind = &mut circuit.elements[id.index()].kind;
+            let letter = match kind {
+                Kind::Resistor(_) => 'r',
+                Kind::Capacitor(_) => 'c',
+                Kind::Inductor(_) => 'l',
+                _ => continue,
+            };
+            let Some(whole) = value_of(kind).filter(|_| name.starts_with(letter)) else {
+                continue;
+            };
+            // The card's value may be multiplied.
+            let factor = whole / value;
+            let (values, _) = beside_value(*value);
+            // A number that no other card has.
+            let mark = whole * (1.0 + (cards.len() + 1) as f64 * MARK);
+            kind.set_value(mark);
+            names.push(name.clone());
+            cards.push((mark, values.map(|value| value * factor)));
         }
-        // The card's value may be multiplied.
-        let factor = value_of(kind)? / value;
-        let values = values.map(|value| value * factor);
-        kind.set_value(values[0]);
         if self.options.steady {
             circuit = at_rest(&circuit);
         }
-        let near = behaviour(&circuit).ok()?.standard();
-        base.multiport.perturbation_by(&near, values[0], values)
+        let near = behaviour(&circuit).ok().map(|near| near.standard());
+        let found = near.and_then(|near| base.multiport.perturbations_by(&near, &cards));
+        match found {
+            Some(found) => names.into_iter().zip(found).collect(),
+            None if names.len() > 1 => {
+                let each = to.iter().map(std::slice::from_ref);
+                each.flat_map(|one| self.cards(base, one, own)).collect()
+            }
+            None => HashMap::new(),
+        }
     }
 
     /// Whether this is another period than that of the orbit, which is refused if that was asked for.
-    fn moves(&self, base: &Base, name: &str, period: Option<f64>) -> Result<bool, Error> {
-        let moves = base.orbit.as_ref().zip(period).is_some_and(|(own, other)| {
-            let laps = (own.period / other).round() * other;
-            (laps - own.period).abs() > PERIOD_MOVES * VALUE_STEP * own.period
+    fn moves(&self, base: Grounds<'_>, name: &str, period: Option<f64>) -> Result<bool, Error> {
+        let moves = base.period.zip(period).is_some_and(|(own, other)| {
+            let laps = (own / other).round() * other;
+            (laps - own).abs() > PERIOD_MOVES * VALUE_STEP * own
         });
         if moves && !self.options.to.is_empty() {
             let what =

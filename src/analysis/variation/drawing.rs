@@ -65,6 +65,21 @@ pub(crate) struct Weighted {
 }
 
 impl Weighted {
+    /// Of values by piece and output, and of times.
+    pub(crate) const fn of_values(nodes: Vec<[f64; VALUES]>, shifts: Vec<f64>) -> Self {
+        Self { nodes, shifts }
+    }
+
+    /// What times weigh.
+    pub(crate) fn shifts(&self) -> &[f64] {
+        &self.shifts
+    }
+
+    /// What values weigh, by piece and output.
+    pub(crate) fn nodes(&self) -> &[[f64; VALUES]] {
+        &self.nodes
+    }
+
     /// What the difference of both weighs.
     pub(crate) fn minus(mut self, other: &Self) -> Self {
         let nodes = other.nodes.as_flattened();

@@ -14,14 +14,14 @@ use crate::settings::tolerances::steps::{FAINT, SHORT, STAGE_ROUNDING};
 /// A step that is not made yet.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Trial {
-    t1: f64,
-    h: f64,
+    pub(super) t1: f64,
+    pub(super) h: f64,
     x: Vec<f64>,
     u: Vec<f64>,
     lambda: Vec<f64>,
     /// Whether λ is that of its end.
     lambda_known: bool,
-    active: Vec<bool>,
+    pub(super) active: Vec<bool>,
     slope: Vec<f64>,
     /// What the states may be off by.
     difference: Vec<f64>,
@@ -32,7 +32,9 @@ pub(super) struct Trial {
     /// x' of every stage.
     slopes: [Vec<f64>; STAGES],
     /// The active sets of the implicit ones, where they are asked for.
-    sets: Vec<Set>,
+    pub(super) sets: Vec<Set>,
+    /// What is read at all stages, where that is asked for.
+    pub(super) rows: Vec<f64>,
 }
 
 impl Sparse {
@@ -106,6 +108,7 @@ impl Sparse {
             self.know_lambda()?;
         }
         self.trial.sets.clear();
+        self.trial.rows.clear();
         let mut u = self.now.u.clone();
         let mut du = vec![0.0; u.len()];
         self.inputs.slopes(t0, &mut du);
@@ -113,6 +116,7 @@ impl Sparse {
         let first = self.now.slope.clone();
         self.step.lambda.clone_from(&self.now.lambda);
         self.add_stage(h * WEIGHTS[0], &first, (&u, &du));
+        self.write_stage(&first, (&u, &du));
         self.trial.slopes[0] = first;
         let mut base = Vec::with_capacity(self.now.x.len());
         for stage in 1..STAGES {
@@ -143,6 +147,7 @@ impl Sparse {
             if WEIGHTS[stage] != 0.0 {
                 self.add_stage(h * WEIGHTS[stage], &slope, (&u, &du));
             }
+            self.write_stage(&slope, (&u, &du));
             self.trial.slopes[stage] = slope;
         }
         let trial = &mut self.trial;
@@ -177,6 +182,18 @@ impl Sparse {
         self.trial.loss += part * system.product(&s, &rate);
     }
 
+    /// Writes down what is read at a stage.
+    fn write_stage(&mut self, slope: &[f64], (u, du): (&[f64], &[f64])) {
+        let Some(reads) = &self.reads else {
+            return;
+        };
+        let (x, lambda) = (&self.step.x, &self.step.lambda);
+        let at = Point { x, lambda, u, du };
+        self.systems[self.now.system]
+            .1
+            .write(reads, (at, slope), &mut self.trial.rows);
+    }
+
     /// The largest of what the trial's states may be off by, relative to their amplitudes.
     pub(super) fn error(&self) -> f64 {
         let system = self.system();
@@ -209,12 +226,9 @@ impl Sparse {
             let limit = self.settings.max_steps;
             return Err(Error::at(self.now.t, Reason::TooManySteps { limit }));
         }
+        self.tape_step();
         let trial = &mut self.trial;
         let now = &mut self.now;
-        if let Some(tape) = &mut self.tape {
-            let h = (trial.h, Self::slack(trial.t1));
-            tape.step(trial.t1, now.system, h, &trial.sets);
-        }
         now.balance.add(trial.work);
         now.balance.add_numerical(trial.loss);
         now.t = trial.t1;

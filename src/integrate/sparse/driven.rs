@@ -14,6 +14,7 @@
 use nalgebra::Complex;
 
 use super::Returns;
+use super::bend::Bend;
 use super::shift::Shift;
 use super::system::System;
 use super::tape::{Move, Set, Tape};
@@ -87,6 +88,9 @@ impl Tape {
         change: &[Complex<f64>],
         (sine, bands): (Sine<'_>, &[f64]),
     ) -> Result<Option<Driven>, Error> {
+        if self.open {
+            return Ok(None);
+        }
         let [re, im] = [false, true].map(|imaginary| {
             let change = change.iter();
             let change = change.map(|change| if imaginary { change.im } else { change.re });
@@ -122,6 +126,10 @@ impl Tape {
             let made = match part {
                 Move::Position { to, shift, .. } => {
                     now.moves(*to, t, shift.as_deref())?;
+                    Some(())
+                }
+                Move::Bend(bend) => {
+                    now.bends(bend);
                     Some(())
                 }
                 Move::Jump { t, h, sets, .. } => now.jumps(*t, *h, sets),
@@ -187,6 +195,19 @@ impl Now<'_> {
         self.x = self.systems[to].1.change_of_storage(&storage);
         self.system = to;
         Ok(())
+    }
+
+    fn bends(&mut self, bend: &Bend) {
+        let [u, _] = self.part.at(bend.t);
+        let by = bend.by(&self.x, &u);
+        let moved = self.x.iter_mut().zip(&bend.rate);
+        moved.for_each(|(x, rate)| *x += rate * by);
+        for (band, sums) in self.bands.iter().zip(&mut self.integrals) {
+            let turn = Complex::from_polar(by, -band * (bend.t - self.part.sine.origin));
+            let sides = bend.before.iter().zip(&bend.behind);
+            let steps = sums.iter_mut().zip(sides);
+            steps.for_each(|(sum, (before, behind))| *sum += turn * (before - behind));
+        }
     }
 
     fn jumps(&mut self, t: f64, h: (f64, f64), sets: &[Set]) -> Option<()> {

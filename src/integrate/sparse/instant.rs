@@ -1,6 +1,7 @@
 //! What happens in no time: the start, edges of sources, switches.
 
 use super::Sparse;
+use super::kernel::Step;
 use super::system::{Largest, System};
 use crate::integrate::error::{Error, Reason};
 use crate::integrate::log::Log;
@@ -87,14 +88,22 @@ impl Sparse {
         let mut impulse = vec![0.0; self.now.active.len()];
         let mut u = self.now.u.clone();
         let mut made = 0;
-        let mut sets = Vec::new();
+        let (mut sets, mut rows) = (Vec::new(), Vec::new());
         let second = loop {
             for (u, du) in u.iter_mut().zip(&du) {
                 *u += h * du;
             }
+            let before = self.reads.as_ref().map(|_| self.step.x.clone());
             let system = &mut self.systems[self.now.system].1;
             system.implicit((t, h, Self::slack(h)), &u, &mut self.step)?;
             made += 1;
+            if let Some((reads, before)) = self.reads.as_ref().zip(before) {
+                let Step { x, lambda, .. } = &self.step;
+                let moved = x.iter().zip(before);
+                let slope: Vec<f64> = moved.map(|(x, before)| (x - before) / h).collect();
+                let (u, du) = (&u[..], &du[..]);
+                system.write(reads, (Point { x, lambda, u, du }, &slope), &mut rows);
+            }
             if let Some(tape) = &mut self.tape {
                 sets.push(tape.set(&self.step.active));
             }
@@ -107,7 +116,8 @@ impl Sparse {
             add.for_each(|(p, lambda)| *p += h * lambda);
         };
         if let Some(tape) = &mut self.tape {
-            tape.jump(t, self.now.system, (h, Self::slack(h)), sets);
+            let times = (t, self.now.system, (h, Self::slack(h)));
+            tape.jump(times, (sets, rows));
         }
         let steps = f64::from(made - 1);
         let lasting = impulse.iter_mut().zip(&self.step.lambda);
@@ -246,17 +256,29 @@ impl Sparse {
         }
     }
 
+    /// Writes a change of position down, with what the storage s jumps by as states x.
+    pub(super) fn tape_position(&mut self, (from, to): (usize, usize), s: &[f64], x: &[f64]) {
+        let Some(tape) = &mut self.tape else {
+            return;
+        };
+        let jumped = self.reads.as_ref().map(|reads| {
+            let after = self.systems[to].1.storage(x, &self.now.u);
+            let rates = reads.rates.iter();
+            rates.map(|&k| after[k] - s[k]).collect()
+        });
+        tape.position(from, to, jumped.unwrap_or_default());
+    }
+
     /// Takes storage s over into the system of the present switch position.
     fn take_position(&mut self, s: &[f64]) -> Result<(), Error> {
         let position = self.switches.position().to_vec();
         let from = self.now.system;
         self.now.system = self.system_of(&position)?;
-        if let Some(tape) = &mut self.tape {
-            tape.position(from, self.now.system);
-        }
         self.bound_factors();
         let system = &self.systems[self.now.system].1;
         let x = system.lcs.state_from(s);
+        self.tape_position((from, self.now.system), s, &x);
+        let system = &self.systems[self.now.system].1;
         let account = taking_over(system, s, &x, &self.now.u);
         self.now.balance.add_jump(account);
         self.now.x = x;

@@ -171,6 +171,24 @@ impl Kernel {
         self.room = room;
     }
 
+    /// √(Σ P_ii x_i²).
+    pub(super) fn size(&self, x: &[f64]) -> f64 {
+        let parts = x.iter().zip(&self.state_scale);
+        parts
+            .map(|(x, scale)| (x * scale).powi(2))
+            .sum::<f64>()
+            .sqrt()
+    }
+
+    /// The same of what is linear in states.
+    pub(super) fn size_of_form(&self, g: &[f64]) -> f64 {
+        let parts = g.iter().zip(&self.state_scale);
+        parts
+            .map(|(g, scale)| (g / scale).powi(2))
+            .sum::<f64>()
+            .sqrt()
+    }
+
     /// √P_ii of every state.
     pub(super) fn state_scale(&self) -> &[f64] {
         &self.state_scale
@@ -260,6 +278,39 @@ impl Kernel {
             .zip(self.solution.iter().zip(&self.state_scale))
         {
             *x = value / scale;
+        }
+        x.iter().all(|v| v.is_finite())
+    }
+
+    /// The transpose of [`Self::change_with`]: from what x and λ weigh, in place what r weighs, and what q does; whether that is known.
+    pub(super) fn back(
+        &mut self,
+        (h, slack): (f64, f64),
+        active: &[bool],
+        x: &mut [f64],
+        lambda: &mut [f64],
+    ) -> bool {
+        self.measure(h, slack);
+        let Some(at) = self.factored(h, active) else {
+            return false;
+        };
+        let (states, ports) = self.solution.split_at_mut(self.n);
+        for (value, (x, scale)) in states.iter_mut().zip(x.iter().zip(&self.state_scale)) {
+            *value = x / scale;
+        }
+        for (value, (of, scale)) in ports.iter_mut().zip(lambda.iter().zip(&self.port_scale)) {
+            *value = of * scale;
+        }
+        self.kept[at]
+            .factors
+            .solve_transposed(&mut self.solution, &mut self.work);
+        let (states, ports) = self.solution.split_at(self.n);
+        for (x, (value, scale)) in x.iter_mut().zip(states.iter().zip(&self.state_scale)) {
+            *x = value * scale;
+        }
+        let ports = ports.iter().zip(&self.port_scale).zip(active);
+        for (of, ((value, scale), active)) in lambda.iter_mut().zip(ports) {
+            *of = if *active { -value * scale } else { 0.0 };
         }
         x.iter().all(|v| v.is_finite())
     }

@@ -5,6 +5,8 @@
 //! no time (edges, switches, inconsistent starts) is an implicit step of next to no length, which takes the state to where charge and flux are conserved and the constraints hold.
 
 mod attempt;
+mod back;
+mod bend;
 mod driven;
 mod instant;
 mod kernel;
@@ -38,12 +40,14 @@ use crate::settings::tolerances::sparse::{AFTER, INSTANT, KEPT};
 use crate::settings::tolerances::steps::GRANT_EMBEDDED;
 use crate::settings::tolerances::times::SAME_TIME;
 use attempt::Trial;
+pub(crate) use back::{Drive, Returned, Weighed};
+pub(crate) use bend::Bend;
 pub(crate) use driven::Sine;
 use kernel::Step;
 pub(crate) use returns::{Lengths, Passed, Returns};
 use script::Script;
 use system::{Largest, System};
-pub(crate) use tape::Tape;
+pub(crate) use tape::{Reads, Stepped, Tape, through_stages};
 
 /// How a step is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -117,6 +121,8 @@ pub(crate) struct Sparse {
     script: Option<Script>,
     /// What the derivative of a run is made of, where it is asked for.
     tape: Option<Tape>,
+    /// What is written into it of the run besides.
+    reads: Option<Reads>,
     /// By storage element: largest |state| since the run was taken up.
     peaks: Vec<f64>,
     /// Factors that a system keeps.
@@ -227,6 +233,7 @@ impl Sparse {
             balanced: true,
             script: None,
             tape: None,
+            reads: None,
             room: KEPT,
             multiport,
         })

@@ -3,19 +3,19 @@
 use std::sync::atomic::AtomicBool;
 
 use super::script::Script;
-use super::tape::Tape;
+use super::tape::{Reads, Tape};
 use super::{Now, Sparse};
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::error::{Error, Reason};
 use crate::integrate::log::Log;
-use crate::integrate::problem::Problem;
+use crate::integrate::problem::{Problem, Systems};
 use crate::integrate::ready::sources_of_large;
 use crate::integrate::rows::Asked;
 use crate::integrate::run::Stepper as _;
 use crate::integrate::simulate::{SimOptions, Standing, controlled};
 use crate::integrate::switching::{Switches, Threshold};
 use crate::lcs::Role;
-use crate::mna::StaticMultiport;
+use crate::mna::{StandardMultiport, StaticMultiport};
 use crate::plan::scheme;
 use crate::settings::Settings;
 use crate::settings::tolerances::sparse::KEPT_OF_RETURNS;
@@ -60,21 +60,24 @@ pub(crate) struct Returns {
 }
 
 impl Returns {
-    /// Of a circuit whose transients are made in sparse steps, which must repeat after `tran.tstop`; nothing of another.
+    /// Of a circuit whose transients are made in sparse steps, with its multiport as it is or [perturbed](StandardMultiport::perturbed); nothing of another.
     ///
     /// # Errors
     /// As [`simulate`](crate::integrate::simulate()) before its first row.
     pub(crate) fn of(
         circuit: &Circuit,
         multiport: &StaticMultiport,
-        tran: &Tran,
-        settings: &Settings,
+        perturbed: Option<StandardMultiport>,
+        (tran, settings): (&Tran, &Settings),
     ) -> Result<Option<Self>, Error> {
         // No operating point is looked for in vain.
         if multiport.storage.len() + multiport.standard().pairs.len() < settings.large {
             return Ok(None);
         }
         let mut problem = Problem::of_circuit(circuit, multiport, tran.uic, settings)?;
+        if let Some(perturbed) = perturbed {
+            problem.systems = Systems::of(perturbed);
+        }
         let asked = SimOptions::default();
         let scheme = scheme(&asked);
         if sources_of_large(&mut problem, scheme, settings)?.is_none() {
@@ -83,6 +86,7 @@ impl Returns {
         let mut sparse = problem.sparse(tran, scheme, controlled(tran), settings)?;
         sparse.balanced = false;
         sparse.room = KEPT_OF_RETURNS;
+        sparse.reads = Some(Reads::default());
         for (_, system) in &mut sparse.systems {
             system.kernel.keep(KEPT_OF_RETURNS);
         }
@@ -236,6 +240,10 @@ impl Sparse {
         self.peaks.clear();
         self.peaks.resize(storage.len(), 0.0);
         self.tape = Some(Tape::of(at));
+        if self.reads.is_some() {
+            let x = self.now.x.clone();
+            self.tape_position((at, at), storage, &x);
+        }
         let u = self.now.u.clone();
         self.jump(&u)
     }

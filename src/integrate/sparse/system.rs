@@ -1,6 +1,7 @@
 //! A system without its zeros, with what a run reads of it and its implicit steps.
 
 use super::kernel::{Kernel, Step};
+use super::tape::Reads;
 use crate::integrate::error::{Error, Reason};
 use crate::integrate::reading::{Point, sparse_magnitude, sparse_value};
 use crate::integrate::switching::{Part, Watched};
@@ -43,7 +44,7 @@ impl Largest {
 #[derive(Debug)]
 pub(super) struct System {
     pub(super) lcs: SparseLcs,
-    readings: Readings,
+    pub(super) readings: Readings,
     pub(super) kernel: Kernel,
     /// The number of events when it was entered last.
     pub(super) entered: u64,
@@ -123,6 +124,23 @@ impl System {
         for (i, value) in row.iter_mut().enumerate() {
             *value = sparse_value(&self.lcs.output_rows, i, at);
         }
+    }
+
+    /// Appends what is read at a point and a slope of the states.
+    pub(super) fn write(
+        &self,
+        reads: &Reads,
+        (at, slope): (Point<'_>, &[f64]),
+        rows: &mut Vec<f64>,
+    ) {
+        let outputs = &self.lcs.output_rows;
+        rows.extend((0..outputs.one.len()).map(|i| sparse_value(outputs, i, at)));
+        let powers = &self.readings.power_v;
+        let count = powers.one.len();
+        rows.extend((count - reads.last..count).map(|i| sparse_value(powers, i, at)));
+        let rates = self.storage_rate(slope, at.du);
+        rows.extend(reads.rates.iter().map(|&k| rates[k]));
+        rows.push(1.0);
     }
 
     /// x' = A x + B λ + E u + e.

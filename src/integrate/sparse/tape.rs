@@ -11,9 +11,39 @@
 
 use std::sync::Arc;
 
+use super::bend::Bend;
 use super::shift::Shift;
 use super::system::System;
-use crate::integrate::curved::tableau::{GAMMA, LOWER, STAGES};
+use crate::integrate::curved::tableau::{GAMMA, LOWER, NODES, STAGES};
+
+/// A step of a run that was read.
+#[derive(Debug, Clone)]
+pub(crate) struct Stepped<'a> {
+    /// s.
+    pub(crate) begin: f64,
+    /// How long it is, s.
+    pub(crate) h: f64,
+    /// By stage what was read.
+    pub(crate) rows: &'a [f64],
+    /// Whether a device changes within it.
+    pub(crate) bends: bool,
+    /// Where rates or outputs jump by that.
+    pub(crate) at: Vec<&'a Bend>,
+}
+
+/// Weights of the stages at a part of a step: the cubic through four of them, whose values are of order 3; or the line between its ends, as cubics overshoot where a device changes.
+pub(crate) fn through_stages(part: f64, bends: bool) -> [f64; STAGES] {
+    const SMOOTH: &[usize] = &[0, 2, 3, 5];
+    const BENT: &[usize] = &[0, 5];
+    let through = if bends { BENT } else { SMOOTH };
+    let mut weights = [0.0; STAGES];
+    for &own in through {
+        let others = through.iter().filter(|&&other| other != own);
+        let factors = others.map(|&other| (part - NODES[other]) / (NODES[own] - NODES[other]));
+        weights[own] = factors.product();
+    }
+    weights
+}
 
 /// An active set.
 pub(super) type Set = Arc<[bool]>;
@@ -26,13 +56,19 @@ pub(super) enum Move {
         from: usize,
         to: usize,
         shift: Option<Box<Shift>>,
+        /// What the storage jumped by as states of `to`, of what is [read](Reads).
+        jumped: Vec<f64>,
     },
+    /// A device changes within the next step, whose sets are those behind it.
+    Bend(Box<Bend>),
     /// An instant, s: so many steps of next to no length.
     Jump {
         t: f64,
         system: usize,
         h: (f64, f64),
         sets: Vec<Set>,
+        /// A row for each, see [`Reads`].
+        rows: Vec<f64>,
     },
     /// A step, with the active sets of its implicit stages.
     Step {
@@ -41,7 +77,26 @@ pub(super) enum Move {
         system: usize,
         h: (f64, f64),
         sets: [Option<Set>; STAGES - 1],
+        /// A row for each stage, see [`Reads`].
+        rows: Vec<f64>,
     },
+}
+
+/// What is written down of a run: rows of all outputs, then of readings, rates of storage quantities, and 1.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Reads {
+    /// The last ones of what makes the powers.
+    pub(crate) last: usize,
+    /// Storage quantities whose rates are read.
+    pub(crate) rates: Vec<usize>,
+}
+
+impl Reads {
+    /// Where readings begin in a row of so many outputs, rates do, and its length.
+    pub(super) fn places(&self, outputs: usize) -> [usize; 3] {
+        let rates = outputs + self.last;
+        [outputs, rates, rates + self.rates.len() + 1]
+    }
 }
 
 /// See the [module](self).
@@ -53,6 +108,10 @@ pub(crate) struct Tape {
     pub(super) first: usize,
     /// Whether it is to know what shifts switches.
     pub(super) with_shifts: bool,
+    /// Devices change in a way that is not written down.
+    pub(super) open: bool,
+    /// By output: the largest |value| so far.
+    pub(super) largest: Vec<f64>,
 }
 
 impl Tape {
@@ -64,6 +123,16 @@ impl Tape {
         }
     }
 
+    /// Takes note of the sizes of so many outputs.
+    pub(super) fn see(&mut self, rows: &[f64], outputs: usize) {
+        self.largest.resize(outputs, 0.0);
+        let stages = rows.chunks((rows.len() / STAGES).max(1));
+        for row in stages {
+            let both = self.largest.iter_mut().zip(row);
+            both.for_each(|(largest, value)| *largest = largest.max(value.abs()));
+        }
+    }
+
     /// An active set, kept once where it stays.
     pub(super) fn set(&mut self, active: &[bool]) -> Set {
         match &self.last {
@@ -72,9 +141,13 @@ impl Tape {
         }
     }
 
-    pub(super) fn position(&mut self, from: usize, to: usize) {
-        let shift = None;
-        self.moves.push(Move::Position { from, to, shift });
+    pub(super) fn position(&mut self, from: usize, to: usize, jumped: Vec<f64>) {
+        self.moves.push(Move::Position {
+            from,
+            to,
+            shift: None,
+            jumped,
+        });
     }
 
     /// What shifts the last change of position.
@@ -90,11 +163,25 @@ impl Tape {
     }
 
     /// h and what it may be off by.
-    pub(super) fn jump(&mut self, t: f64, system: usize, h: (f64, f64), sets: Vec<Set>) {
-        self.moves.push(Move::Jump { t, system, h, sets });
+    pub(super) fn jump(
+        &mut self,
+        (t, system, h): (f64, usize, (f64, f64)),
+        (sets, rows): (Vec<Set>, Vec<f64>),
+    ) {
+        self.moves.push(Move::Jump {
+            t,
+            system,
+            h,
+            sets,
+            rows,
+        });
     }
 
-    pub(super) fn step(&mut self, end: f64, system: usize, h: (f64, f64), stages: &[Set]) {
+    pub(super) fn step(
+        &mut self,
+        (end, system, h): (f64, usize, (f64, f64)),
+        (stages, rows): (&[Set], Vec<f64>),
+    ) {
         let mut sets = [const { None }; STAGES - 1];
         for (to, set) in sets.iter_mut().zip(stages) {
             *to = Some(Arc::clone(set));
@@ -104,7 +191,45 @@ impl Tape {
             system,
             h,
             sets,
+            rows,
         });
+    }
+
+    /// The steps of a run that was read.
+    pub(crate) fn steps(&self) -> impl Iterator<Item = Stepped<'_>> {
+        let (mut last, mut at): (Option<&Set>, Vec<&Bend>) = (None, Vec::new());
+        self.moves.iter().filter_map(move |part| match part {
+            Move::Position { .. } => None,
+            Move::Bend(bend) => {
+                at.push(bend);
+                None
+            }
+            Move::Jump { sets, .. } => {
+                last = sets.last();
+                None
+            }
+            Move::Step {
+                end,
+                h: (h, _),
+                sets,
+                rows,
+                ..
+            } => {
+                let all = sets.iter().flatten();
+                let bends = last
+                    .into_iter()
+                    .chain(all.clone())
+                    .any(|set| Some(set) != all.clone().last());
+                last = all.last();
+                Some(Stepped {
+                    begin: end - h,
+                    h: *h,
+                    rows,
+                    bends,
+                    at: std::mem::take(&mut at),
+                })
+            }
+        })
     }
 
     /// What the run makes of a change of all storage quantities; `None` where an active set leaves it open.
@@ -124,6 +249,10 @@ impl Tape {
                     let storage = systems[from].1.storage_rate(&x, &still);
                     x = systems[to].1.change_of_storage(&storage);
                     system = to;
+                }
+                Move::Bend(bend) => {
+                    let by = bend.by(&x, &[]);
+                    x.iter_mut().zip(&bend.rate).for_each(|(x, k)| *x += k * by);
                 }
                 Move::Jump {
                     system, h, sets, ..

@@ -145,6 +145,14 @@ pub(crate) const FUNDAMENTAL: f64 = 1e-9;
 /// rounding over it. Larger: frequencies many periods long are differentiated wrongly; smaller: rounding.
 pub(crate) const VALUE_STEP: f64 = 1e-4;
 
+/// Cards whose values are changed together are told by numbers that are this part of theirs apart. Larger: other circuits; smaller: two of many are the same number, and each card is
+/// looked at alone.
+pub(crate) const MARK: f64 = 1e-9;
+
+/// Capacitors, inductors and ideal pairs from which on derivatives are those along sparse steps, where these can be made: exact ones take matrices of that size for each mode, and as
+/// many modes as devices change alone. Larger: minutes and gigabytes; smaller: derivatives known to the steps' error instead of rounding.
+pub(crate) const STEPPED_DERIVATIVES: usize = 120;
+
 /// The same of whole runs in steps, whose errors change from one to the other. Larger: curvature; smaller: the steps' errors.
 pub(crate) const RUN_STEP: f64 = 1e-2;
 
@@ -256,3 +264,10 @@ pub(crate) const MOST_RECYCLED: usize = 240;
 
 /// Values to which the derivatives of a large orbit are differences of orbits. Larger: hours of orbits that nobody meant to ask for; smaller: values have to be named in several runs.
 pub(crate) const MOST_BESIDE: usize = 50;
+
+/// Derivatives along sparse steps are stated to be off by so many times what steps of twice the length are. Larger: errors that are stated too large; smaller: too small.
+pub(crate) const TIMES_APART: f64 = 8.0;
+
+/// And by this part at least where a device changes within a step: its instant is that of a line, also where currents end within nanoseconds, in long and short steps alike. Larger: errors
+/// that are stated too large; smaller: too small (docs/validation.md).
+pub(crate) const LEAST_BENT: f64 = 1e-3;

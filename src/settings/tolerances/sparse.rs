@@ -44,3 +44,16 @@ pub(crate) const KEPT_OF_RETURNS: usize = 1 << 14;
 /// The part of the time between two instants that the first step behind an instant is tried with, where steps are chosen to be made again. Larger: steps in vain, once; smaller: many short
 /// steps in each return.
 pub(crate) const FIRST_TRIED: f64 = 1.0 / 64.0;
+
+/// Rates of states, in energy, and outputs jump where a device changes within a step if they do by more than this part of themselves, and of the amplitude of the output. Larger: derivatives lack what the instant moves;
+/// smaller: what changes in the course of the step counts as a jump.
+pub(crate) const LEAPS: f64 = 1e-4;
+
+/// A device is the one that changes first if it is due within its step, or this part of it beside, as lines have it. Larger: those that follow it count as well; smaller: the first one is missed.
+pub(crate) const PRIMARY: f64 = 0.5;
+
+/// Devices change together where the times at which they are due follow the states alike to this part. Larger: two of them count as one; smaller: one counts as two.
+pub(crate) const ALIKE: f64 = 1e-3;
+
+/// So much of a step behind the instant at which a device is due it is told which devices conduct then. Larger: those that change a little later count as well; smaller: rounding tells.
+pub(crate) const PUSH: f64 = 1e-3;

@@ -161,8 +161,19 @@ impl Large {
         self.standing.t
     }
 
+    /// Its multiport.
+    pub(in crate::analysis) const fn multiport(&self) -> &StaticMultiport {
+        &self.multiport
+    }
+
+    /// The transient that it was looked for in.
+    pub(in crate::analysis) fn searched(&self) -> Tran {
+        let tran = searching(self.circuit.tran, self.orbit.period, 1.0);
+        Tran { uic: true, ..tran }
+    }
+
     /// Where it begins.
-    pub(super) fn standing(&self) -> Standing {
+    pub(in crate::analysis) fn standing(&self) -> Standing {
         self.standing.clone()
     }
 
@@ -203,7 +214,7 @@ impl Large {
 /// The circuit as one that goes through its period again and again.
 fn returns(asked: &Asked, period: f64, settings: &Settings) -> Result<Option<Returns>, Error> {
     from_rest(searching(asked.circuit.tran, period, 1.0), |tran| {
-        Returns::of(&asked.circuit, &asked.multiport, &tran, settings)
+        Returns::of(&asked.circuit, &asked.multiport, None, (&tran, settings))
     })
 }
 
