@@ -112,6 +112,18 @@ fn values_that_move_switches() {
         let largest = exact.derivative("vo", "d").expect("a derivative") * 0.4;
         assert!((a - b).abs() < 1e-3 * largest, "{name}: {a:e} {b:e}");
     }
+    let sawtooth = buck("3", "uic")
+        .replace(
+            "vg g 0 pulse(0 1 0 50n 50n 4u 10u)",
+            "vr ref 0 0.4\nvs saw 0 pulse(0 1 0 9.8u 0.1u 0.1u 10u)",
+        )
+        .replace("s1 p x g 0 sw", "s1 p x ref saw sw")
+        .replace("vt=0.5 vh=0", "vt=0 vh=0");
+    let [a, b] = [false, true].map(|large| {
+        let found = found(&sawtooth, false, large);
+        0.4 * found.derivative("vo", "vr").expect("a derivative")
+    });
+    assert!((a - b).abs() < 1e-3 * a, "{a:e} {b:e}");
 }
 
 /// Diodes that take a current over from one another while it passes zero: its slope jumps, and what is found later depends on when that was; so does a mean of a voltage that jumps, and a
@@ -124,6 +136,10 @@ fn a_current_that_changes_over() {
     let bridge = "bridge\nv1 1 0 sin(0 5 100k 0 0 90)\nr1 1 3 0.49\nl1 3 2 9.8u ic=0\nd1 2 4 m0\nd2 0 4 m0\nd3 5 2 m0\nd4 5 0 m0\nl2 4 6 930u ic=0.1\nc1 6 5 4.9u ic=0\nr4 6 5 49\n\
         .model m0 d(ron=4.9 roff=49meg)\n.tran 1u 20u uic\n.meas tran p pp i(l2)\n.end\n";
     agree(bridge, false, 1e-3);
+    // Neither diode conducts for the 1e-11 s that leaks take to charge the node between them.
+    let leaks = "doubler\nv1 1 0 sin(0 400 1k)\nr1 1 3 0.78\nl1 3 2 1.6m ic=0\nc1 2 5 160u ic=0\nd1 0 5 m0\nd2 5 4 m0\nc2 4 0 180u ic=0\nr2 4 0 78\ni1 4 0 pulse(0 2.6 1m 2u 2u 1m 2m)\n\
+        .model m0 d(ron=78m vfwd=0.7 roff=78meg)\n.tran 0.16m 3m uic\n.meas tran im avg i(l1)\n.meas tran ir rms i(l1)\n.end\n";
+    agree(leaks, false, 1e-3);
 }
 
 /// Memory for what a few values multiply has them one after the other, and less than that of one is refused.

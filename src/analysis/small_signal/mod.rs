@@ -482,13 +482,15 @@ fn lost(loss: f64, omega: f64) -> Note {
 
 /// A response about an orbit made of steps, with its error at a frequency, and that of the orbit.
 fn in_parts((error, omega): (f64, f64), orbit: Option<f64>, what: &str) -> Note {
+    // As it was asked for, without what 2π rounds off.
     let f = omega / std::f64::consts::TAU;
+    let f: f64 = format!("{f:.12e}").parse().unwrap_or(f);
     let known = match orbit {
         Some(apart) => format!("which are known to {apart:.0e} of the amplitudes"),
         None => "whose error is not known".into(),
     };
     let text = format!(
-        "the orbit is made of steps, {known}; {what} the response by {error:.0e} of its size at {f:e} Hz, and by less elsewhere"
+        "the orbit is made of steps, {known}; {what} the response by {error:.0e} of its size, most at {f:e} Hz"
     );
     Note::run("tangents", text)
 }

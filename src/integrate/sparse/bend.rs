@@ -156,7 +156,7 @@ impl Sparse {
                     return None;
                 }
                 let part = |v: &[f64]| v.iter().map(|v| v / first.rate).collect();
-                let rate = at.rate.iter().zip(&behind.rate);
+                let rate = behind.left.iter().zip(&behind.rate);
                 let bend = Bend {
                     states: part(&first.states),
                     inputs: part(&first.inputs),
@@ -201,6 +201,8 @@ struct Now {
 
 /// What another set makes of the same place.
 struct Behind {
+    /// Rates before and behind.
+    left: Vec<f64>,
     rate: Vec<f64>,
     lambda: Vec<f64>,
     /// Outputs before and behind.
@@ -293,6 +295,7 @@ impl Now {
         let mut outputs = shown.iter().zip(&behind).zip(largest);
         let leaps = outputs.any(|((a, b), largest)| (a - b).abs() > LEAPS * largest);
         Some(Behind {
+            left: before,
             rate,
             lambda,
             shown,
