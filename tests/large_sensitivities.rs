@@ -93,6 +93,21 @@ fn coupled_windings_and_shared_charge() {
     agree(shared, true, 1e-5);
 }
 
+/// A sine and a triangle begin together: the switch stands on its threshold, and goes where they go.
+#[test]
+fn a_control_that_starts_on_its_threshold() {
+    let text = "leg\nv1 1 0 200\nv3 6 0 sin(0 0.8 4k)\nv4 7 0 pulse(0 1 0 24.95u 25u 50n 50u)\ns1 1 4 6 7 m0\ns2 4 0 7 6 m0\nl1 4 9 8.6m ic=0\nr1 9 10 1.1\nv6 10 0 60\n\
+        .model m0 sw(ron=1.1 roff=11k vt=0 vh=0)\n.tran 5u 100u uic\n.meas tran im avg i(l1)\n.meas tran last find i(l1) at=79u\n.end\n";
+    let stepped = agree(text, false, 1e-5);
+    let exact = found(text, false, false);
+    for (a, b) in exact.of.iter().zip(&stepped.of) {
+        let (Ok(a), Ok(b)) = (&a.value, &b.value) else {
+            panic!("no values");
+        };
+        assert!((a - b).abs() < 1e-5 * a.abs(), "{a:e} {b:e}");
+    }
+}
+
 /// What moves a switch, or a waveform, has differences of runs, and a note says so; a threshold is no coefficient.
 #[test]
 fn values_that_move_switches() {

@@ -100,7 +100,7 @@ impl Returns {
             start: Standing {
                 t: 0.0,
                 state: problem.start.storage.as_slice().to_vec(),
-                switches: problem.start.switches.clone(),
+                switches: sparse.at_first(&problem.start.switches),
                 conducting: problem.conducting.clone(),
             },
             notes: problem.notes.clone(),
@@ -210,6 +210,18 @@ impl Returns {
 }
 
 impl Sparse {
+    /// Positions at the start, from these, where the sources are and go: a control may start on its threshold.
+    fn at_first(&self, position: &[bool]) -> Vec<bool> {
+        let (t, mut du) = (self.now.t, vec![0.0; self.now.u.len()]);
+        self.inputs.slopes(t, &mut du);
+        let misplaced = self
+            .switches
+            .misplaced(self.system(), &self.inputs.all(t), &du);
+        let mut position = position.to_vec();
+        misplaced.iter().for_each(|&i| position[i] = !position[i]);
+        position
+    }
+
     /// Goes to another time and state; edges of sources at that time have acted. What was seen of amplitudes, and all factors, stay.
     fn stand_at(&mut self, t: f64, storage: &[f64], position: &[bool]) -> Result<(), Error> {
         let at = self.system_of(position)?;
