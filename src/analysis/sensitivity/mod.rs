@@ -88,7 +88,7 @@ pub struct Sensitivity {
     pub of: Vec<Gradient>,
     /// What they are derivatives to, and its value.
     pub at: Vec<(String, f64)>,
-    /// Whether they are those of the variational equation; otherwise they are differences of runs.
+    /// Whether they are those of the variational equation of a run that is exact throughout; otherwise they are those of its steps, or differences of runs, of which notes tell.
     pub exact: bool,
     /// How often they went along the run; not at all where they are differences.
     pub passes: Passes,
@@ -172,7 +172,8 @@ impl Serialize for Sensitivity {
 /// What happens between events moves with a value p as the variational equation says: its values by ∂y/∂p, its ends in time too. What `.meas` finds weighs these
 /// changes: dJ = Σ ∂J/∂y δy + ∂J/∂t δt over the values of the smooth pieces that it sees and their ends. In the steady state
 /// ∂s₀/∂p = (I − M)⁻¹ φ_p with the monodromy M and what a period makes of the change alone. With few values each change is carried along the run; with more values than
-/// measurements what each measurement weighs is carried back along it instead, which costs the same for any number of values ([`SensitivityMethod`]). Where steps are made,
+/// measurements what each measurement weighs is carried back along it instead, which costs the same for any number of values ([`SensitivityMethod`]). Large circuits, whose runs
+/// are made in sparse steps, have the derivatives of these in the same way, and a note states what they may be off by. Where other steps are made,
 /// differences of runs with p (1 ± h) and p (1 ± 2h) stand for it, and a note says so; they do as well where impulses are measured.
 ///
 /// # Errors
