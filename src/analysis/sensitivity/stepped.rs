@@ -26,8 +26,7 @@ use crate::measure::Curves;
 use crate::mna::StandardMultiport;
 use crate::model::Model;
 use crate::settings::tolerances::periodic::{
-    LEAST_BENT, LEAST_WEIGHT, LEFT_OF_RESPONSE, MOST_BESIDE, MOST_RECYCLED, RESPONSE_CLOSED,
-    TIMES_APART,
+    LEAST_BENT, LEFT_OF_RESPONSE, MOST_BESIDE, MOST_RECYCLED, RESPONSE_CLOSED, TIMES_APART,
 };
 
 /// Sources for the changes of all values.
@@ -380,10 +379,7 @@ impl Beside<'_> {
         tape: &Tape,
         returned: &[Returned],
     ) -> Result<Vec<Weighed>, Error> {
-        let roots = DVector::from_vec(returns.scale());
-        let most = roots.amax();
-        let least = if most > 0.0 { LEAST_WEIGHT * most } else { 1.0 };
-        let roots = roots.map(|root| root.max(least));
+        let roots = returns.weights();
         let mut recycled = Recycled::new();
         let mut found = Vec::with_capacity(returned.len());
         for own in returned {

@@ -13,9 +13,7 @@ use nalgebra::{Complex, DVector};
 use super::{Error, Reason};
 use crate::integrate::{Returns, Sine, Tape};
 use crate::linalg::krylov::Recycled;
-use crate::settings::tolerances::periodic::{
-    LEAST_WEIGHT, LEFT_OF_RESPONSE, MOST_RECYCLED, RESPONSE_CLOSED,
-};
+use crate::settings::tolerances::periodic::{LEFT_OF_RESPONSE, MOST_RECYCLED, RESPONSE_CLOSED};
 
 /// Corrections of the state that repeats, with the products of longer steps.
 const CORRECTIONS: usize = 8;
@@ -33,15 +31,12 @@ pub(super) struct Stepped<'a> {
 impl<'a> Stepped<'a> {
     /// Of an orbit that begins at `from`, s.
     pub(super) fn of(returns: &Returns, tape: &'a Tape, (period, from): (f64, f64)) -> Self {
-        let weights = DVector::from_vec(returns.scale());
-        let most = weights.amax();
-        let least = if most > 0.0 { LEAST_WEIGHT * most } else { 1.0 };
         Self {
             tape,
             period,
             from,
             recycled: Recycled::new(),
-            weights: weights.map(|weight| weight.max(least)),
+            weights: returns.weights(),
         }
     }
 

@@ -2,6 +2,8 @@
 
 use std::sync::atomic::AtomicBool;
 
+use nalgebra::DVector;
+
 use super::script::Script;
 use super::tape::{Reads, Tape};
 use super::{Now, Sparse};
@@ -18,6 +20,7 @@ use crate::lcs::Role;
 use crate::mna::{StandardMultiport, StaticMultiport};
 use crate::plan::scheme;
 use crate::settings::Settings;
+use crate::settings::tolerances::periodic::LEAST_WEIGHT;
 use crate::settings::tolerances::sparse::KEPT_OF_RETURNS;
 
 /// How long the steps of a return are.
@@ -123,6 +126,14 @@ impl Returns {
     /// √C and √L: what makes √(2 energy) of a storage quantity; zero where it has none.
     pub(crate) fn scale(&self) -> Vec<f64> {
         self.sparse.system().storage_scale()
+    }
+
+    /// The same, none of them less than a part of the largest.
+    pub(crate) fn weights(&self) -> DVector<f64> {
+        let roots = DVector::from_vec(self.scale());
+        let most = roots.amax();
+        let least = if most > 0.0 { LEAST_WEIGHT * most } else { 1.0 };
+        roots.map(|root| root.max(least))
     }
 
     /// Where a transient starts.

@@ -262,7 +262,7 @@ pub(crate) const BETWEEN_COMPARED: f64 = 4.0;
 /// have no response.
 pub(crate) const MOST_RECYCLED: usize = 240;
 
-/// Values to which the derivatives of a large orbit are differences of orbits. Larger: hours of orbits that nobody meant to ask for; smaller: values have to be named in several runs.
+/// Values to which derivatives of a large circuit are differences of runs, where its steps do not tell them. Larger: hours of runs that nobody meant to ask for; smaller: values have to be named in several runs.
 pub(crate) const MOST_BESIDE: usize = 50;
 
 /// Derivatives along sparse steps are stated to be off by so many times what steps of twice the length are. Larger: errors that are stated too large; smaller: too small.
