@@ -108,6 +108,17 @@ fn a_control_that_starts_on_its_threshold() {
     }
 }
 
+/// Two sources of one voltage charge a capacitor; the switch that lets the second one in stands on its threshold, open, and goes on with the sources: at rest only the first one counts.
+#[test]
+fn a_rest_with_a_control_on_its_threshold() {
+    let text = "pair\nv1 1 0 10\nv2 2 0 10\nr1 1 3 100\nr2 2 4 100\nvc c 0 pulse(0.5 1 0 1u 1u 1 2)\ns1 4 3 c 0 m0\nc1 3 0 1u\nr3 3 5 1\nc2 5 0 1n\n\
+        .model m0 sw(ron=1 roff=1g vt=0.5 vh=0)\n.tran 1u 20u\n.meas tran last find v(3) at=15u\n.end\n";
+    let stepped = agree(text, false, 1e-5);
+    let by = stepped.derivative("last", "v2").expect("a derivative");
+    // From rest at v1 towards (v1 + 1.01 v2/1.01…)/2 with a time constant of about 50 µs.
+    assert!((by - 0.13).abs() < 0.01, "{by}");
+}
+
 /// What moves a switch, or a waveform, has differences of runs, and a note says so; a threshold is no coefficient.
 #[test]
 fn values_that_move_switches() {

@@ -29,6 +29,8 @@ pub(super) struct Course {
     behaviour: StaticMultiport,
     pub(super) multiport: StandardMultiport,
     pub(super) standing: Standing,
+    /// By switch, at the operating point that a transient begins with: on.
+    rest: Vec<bool>,
     /// The end of the run, s, and of a transient what is asked for.
     until: f64,
     tran: Tran,
@@ -74,6 +76,7 @@ impl Course {
                 behaviour: found.multiport().clone(),
                 circuit: found.circuit().clone(),
                 standing,
+                rest: Vec::new(),
                 settings,
                 through,
             }));
@@ -87,6 +90,7 @@ impl Course {
         };
         Ok(Some(Self {
             standing: returns.start().clone(),
+            rest: returns.rest().to_vec(),
             until: tran.tstop,
             span: (circuit.measured_from(&tran), tran.tstop),
             tran,
@@ -231,7 +235,7 @@ impl Course {
         let hold = |conducts: &bool| if *conducts { Hold::Closed } else { Hold::Open };
         let position = Position {
             devices: self.standing.conducting.iter().map(hold).collect(),
-            switches: self.standing.switches.clone(),
+            switches: self.rest.clone(),
             storage: StorageHold::Static,
         };
         if position.devices.len() != self.multiport.pairs.len() {

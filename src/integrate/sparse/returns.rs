@@ -55,6 +55,8 @@ pub(crate) struct Returns {
     pub(super) sparse: Sparse,
     names: Vec<String>,
     start: Standing,
+    /// By switch, where a transient starts, before the sources go anywhere: on.
+    rest: Vec<bool>,
     notes: Vec<crate::integrate::Note>,
     /// Whether tapes know what shifts switches.
     pub(super) with_shifts: bool,
@@ -106,6 +108,7 @@ impl Returns {
                 switches: sparse.at_first(&problem.start.switches),
                 conducting: problem.conducting.clone(),
             },
+            rest: problem.start.switches.clone(),
             notes: problem.notes.clone(),
             with_shifts: false,
             longest: sparse.longest,
@@ -139,6 +142,11 @@ impl Returns {
     /// Where a transient starts.
     pub(crate) const fn start(&self) -> &Standing {
         &self.start
+    }
+
+    /// The positions of the operating point. Where a control is on its threshold, those of the start are others.
+    pub(crate) fn rest(&self) -> &[bool] {
+        &self.rest
     }
 
     /// What is to be told of the circuit.
