@@ -132,12 +132,23 @@ class Model:
         """The response to the `AC` values of the sources at the frequencies `f`, Hz (by default those of `.ac`)."""
         return Response(*self._core.ac([float(v) for v in f], sidebands, list(probes or [])))
 
-    def sensitivity(self, of: Sequence[str] = (), to: Sequence[str] = (), *, steady: bool = False) -> dict[str, Any]:
+    def sensitivity(
+        self,
+        of: Sequence[str] = (),
+        to: Sequence[str] = (),
+        *,
+        steady: bool = False,
+        table: bool = False,
+        inputs: Sequence[str] = (),
+        outputs: Sequence[str] = (),
+    ) -> dict[str, Any]:
         """Derivatives of `.meas` results to element values and parameters: `{"of": {measure: {"value": …, "to": {name: …}}}}`.
 
-        `steady` takes those of the periodic steady state.
+        `steady` takes those of the periodic steady state, `table` those of the entries of `table()` too, by names like
+        `table.power.efficiency`, `table.l1.i.rms`, `table.probes.v(out).ripple`.
         """
-        return json.loads(self._core.sensitivity(list(of), list(to), steady))
+        ends = (list(inputs), list(outputs)) if table else None
+        return json.loads(self._core.sensitivity(list(of), list(to), steady, ends))
 
     def table(self, *, steady: bool = False, inputs: Sequence[str] = (), outputs: Sequence[str] = ()) -> dict[str, Any]:
         """Per element mean, rms, extrema of current and voltage, mean power and losses; efficiency, of the transient or the steady state.

@@ -447,12 +447,18 @@ impl Core {
         of: Vec<String>,
         to: Vec<String>,
         steady: bool,
+        table: Option<(Vec<String>, Vec<String>)>,
     ) -> PyResult<String> {
+        let with_table = table.is_some();
+        let (inputs, outputs) = table.unwrap_or_default();
         let found = released(py, |cancel| {
             let options = SensitivityOptions {
                 of,
                 to,
                 steady,
+                table: with_table,
+                inputs,
+                outputs,
                 cancel: Some(cancel),
                 ..SensitivityOptions::default()
             };

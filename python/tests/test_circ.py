@@ -144,6 +144,11 @@ def test_op_check_table_and_sensitivity():
     to = g["of"]["last"]["to"]
     assert to["top"] == pytest.approx(1 - math.exp(-5), rel=1e-6)
     assert to["r1"] == pytest.approx(-5 * math.exp(-5) / 1e3, rel=1e-5)
+    # C V²/2T of the resistor does not depend on it once C is charged.
+    g = m.sensitivity(of=["table.r1.power"], to=["c1"], table=True)
+    power = g["of"]["table.r1.power"]
+    assert power["value"] == pytest.approx(table["r1"]["power"], rel=1e-9)
+    assert power["to"]["c1"] * 1e-6 == pytest.approx(power["value"] - 1e-3 * math.exp(-10) , rel=1e-6)
 
 
 def test_a_table_has_losses_and_tells_of_a_runaway():

@@ -105,6 +105,45 @@ impl Formula {
     }
 }
 
+macro_rules! operators {
+    ($($of:ident, $name:ident;)*) => {$(
+        impl std::ops::$of for Formula {
+            type Output = Self;
+
+            fn $name(self, other: Self) -> Self {
+                self.with(Binary::$of, other)
+            }
+        }
+    )*};
+}
+
+operators! {
+    Add, add;
+    Sub, sub;
+    Mul, mul;
+    Div, div;
+}
+
+impl std::ops::Neg for Formula {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        Self::Minus(Box::new(self))
+    }
+}
+
+impl Formula {
+    fn with(self, op: Binary, other: Self) -> Self {
+        Self::Binary(op, Box::new(self), Box::new(other))
+    }
+
+    /// This where one formula is greater than another; else nothing.
+    pub(crate) fn known_where(self, greater: Self, other: Self) -> Self {
+        let condition = greater.with(Binary::Greater, other);
+        Self::If(Box::new([condition, self, Self::Number(f64::NAN)]))
+    }
+}
+
 /// A formula being read.
 pub(super) struct Reading<'r> {
     pub(super) scope: ScopeId,

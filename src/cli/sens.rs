@@ -27,6 +27,9 @@ pub(super) fn sens(args: &SensArgs, streams: &Streams) -> Result<Exit, Failure> 
         to: args.to.clone(),
         steady: args.pss,
         period: args.period,
+        table: args.table,
+        inputs: args.inputs.clone(),
+        outputs: args.outputs.clone(),
         cancel: Some(signals.flag()),
         ..SensitivityOptions::default()
     };

@@ -216,7 +216,7 @@ impl Beside<'_> {
             monodromy: trajectory.monodromy(),
             period: orbit.period,
             from,
-            tran: circuit.tran,
+            tran: self.seen_until(circuit),
         };
         let always = (f64::NEG_INFINITY, f64::INFINITY);
         Base::of(trajectory, (&found.simulation, None), always, Some(orbit))

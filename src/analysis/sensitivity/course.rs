@@ -70,7 +70,7 @@ impl Course {
             return Ok(Some(Self {
                 until: standing.t + period,
                 tran: found.searched(),
-                orbit: Some((period, model.circuit().tran)),
+                orbit: Some((period, beside.seen_until(model.circuit()))),
                 span: (f64::NEG_INFINITY, f64::INFINITY),
                 multiport: found.multiport().standard(),
                 behaviour: found.multiport().clone(),

@@ -1,6 +1,7 @@
 //! Derivatives of measurements to the values of elements and parameters.
 
 mod base;
+mod costs;
 mod course;
 mod exact;
 mod stepped;
@@ -13,8 +14,9 @@ use serde::ser::{SerializeMap, Serializer};
 
 use super::measured::{measured, periodic_measured};
 use super::periodic::{PeriodicOptions, beyond_dense};
+use super::table::{Entries, TABLE, entries};
 use super::variation::STEPS;
-use crate::circuit::{Circuit, Kind, Measured, NamedMeasurement, SteadyState, source::Wave};
+use crate::circuit::{Circuit, Kind, Measured, NamedMeasurement, SteadyState, Tran, source::Wave};
 use crate::integrate::{Error, Note, Reason, SimOptions, Simulation, SimulationOptions};
 use crate::measure::{Measurement, Over};
 use crate::model::Model;
@@ -46,7 +48,7 @@ pub struct Passes {
 /// What derivatives may be asked for.
 #[derive(Debug, Clone, Default)]
 pub struct SensitivityOptions<'a> {
-    /// Names of `.meas`; by default all.
+    /// Names of `.meas`, and of entries of the table; by default all.
     pub of: Vec<String>,
     /// Names of elements and parameters; by default all resistances, capacitances, inductances and constant sources of the top level and all
     /// parameters that something uses, unless they are 0.
@@ -55,6 +57,13 @@ pub struct SensitivityOptions<'a> {
     pub steady: bool,
     /// The period of it, s, in place of the common one of the sources.
     pub period: Option<f64>,
+    /// Of the entries of the [table](super::table()) too, by their names in `--summary json` with dots between: `table.l1.i.rms`, `table.probes.v(out).ripple`,
+    /// `table.power.efficiency`.
+    pub table: bool,
+    /// Elements from which the input power of the table comes, as in [`TableOptions`](super::TableOptions).
+    pub inputs: Vec<String>,
+    /// Elements that take its output power.
+    pub outputs: Vec<String>,
     /// Which way they are computed.
     pub method: SensitivityMethod,
     /// Ends the runs when set.
@@ -66,7 +75,8 @@ pub struct SensitivityOptions<'a> {
 impl SensitivityOptions<'_> {
     fn asks_for(&self, measurement: &str) -> bool {
         let mut of = self.of.iter();
-        self.of.is_empty() || of.any(|name| name.to_lowercase() == measurement)
+        let is_named = of.any(|name| name.to_lowercase() == measurement);
+        is_named || self.of.is_empty() && !measurement.starts_with('.')
     }
 }
 
@@ -112,6 +122,20 @@ impl Sensitivity {
             own.to.extend(other.to);
         }
         self.notes.extend(other.notes);
+    }
+
+    /// Takes in derivatives of other measurements to the same values.
+    fn extend(&mut self, other: Self) {
+        self.of.extend(other.of);
+        self.at = other.at;
+        self.exact &= other.exact;
+        self.passes.forward += other.passes.forward;
+        self.passes.backward += other.passes.backward;
+        for note in other.notes {
+            if !self.notes.contains(&note) {
+                self.notes.push(note);
+            }
+        }
     }
 
     /// Puts values into this order.
@@ -199,26 +223,66 @@ pub fn sensitivity(model: &Model, options: &SensitivityOptions<'_>) -> Result<Se
         ..options.clone()
     };
     let to = values(model, &options.to)?;
-    let unknown = options.of.iter().find_map(|of| circuit.no_measurement(of));
-    if let Some(what) = unknown {
+    let groups = if options.table {
+        let ends = (&options.inputs[..], &options.outputs[..]);
+        entries(circuit, ends, options.steady)?
+    } else {
+        vec![]
+    };
+    let is_entry = |of: &&String| {
+        let mut names = groups.iter().flat_map(Entries::names);
+        names.any(|name| name.to_lowercase() == of.to_lowercase())
+    };
+    let others: Vec<&String> = options.of.iter().filter(|of| !is_entry(of)).collect();
+    let is_cost = |of: &&String| options.table && of.to_lowercase().starts_with(TABLE);
+    let (costs, cards): (Vec<&String>, Vec<&String>) = others.into_iter().partition(is_cost);
+    if let Some(what) = cards.iter().find_map(|of| circuit.no_measurement(of)) {
         return Err(unsupported(what));
     }
-    if circuit.measurements.is_empty() {
+    if circuit.measurements.is_empty() && !options.table {
         return Err(unsupported(
             "the netlist has no `.meas` to differentiate: `.meas tran vout avg v(out)`".into(),
         ));
     }
-    let beside = Beside { model, options };
-    let found = match beside.stepped(&to)? {
-        None if options.steady && beyond_dense(model) => Some(beside.few_differences(&to)?),
-        None => beside.exact(&to)?,
-        found => found,
+    let mut found = Sensitivity {
+        exact: true,
+        ..Sensitivity::default()
     };
-    let mut found = match found {
-        Some(found) => found,
-        None => beside.differences(&to)?,
+    let cards = circuit.measurements.iter().map(|m| m.name.as_str());
+    let all = std::iter::once((None, cards.collect()));
+    let names = groups.iter().enumerate();
+    let names = names.map(|(k, group)| (Some(k), group.names().collect::<Vec<&str>>()));
+    let asked = all.chain(names).filter(|(_, names)| {
+        let mut names = names.iter();
+        names.any(|name| options.asks_for(name))
+    });
+    let beside = |entries: Option<usize>| Beside {
+        model,
+        options,
+        entries,
     };
-    found.of.retain(|gradient| options.asks_for(&gradient.name));
+    for (entries, _) in asked {
+        found.extend(beside(entries).found(&to)?);
+    }
+    if options.table && !circuit.losses.is_empty() && (options.of.is_empty() || !costs.is_empty()) {
+        // Values on which the period depends are left out before.
+        let to = if found.of.is_empty() {
+            to
+        } else {
+            found.at.clone()
+        };
+        let mut more = beside(None).costs(&to)?;
+        more.of.retain(|gradient| options.asks_for(&gradient.name));
+        found.extend(more);
+    }
+    let mut known = found.of.iter().map(|gradient| &gradient.name);
+    if let Some(of) = costs
+        .iter()
+        .find(|of| !known.any(|name| *name == of.to_lowercase()))
+    {
+        let what = "is no entry of the table: `circ sim --table --summary json` has all of them";
+        return Err(unsupported(format!("`{of}` {what}")));
+    }
     Ok(found)
 }
 
@@ -289,9 +353,65 @@ fn value_of(kind: &Kind) -> Option<f64> {
 struct Beside<'a> {
     model: &'a Model,
     options: &'a SensitivityOptions<'a>,
+    /// The entries of the table that are measured in place of `.meas`, by their group.
+    entries: Option<usize>,
 }
 
 impl Beside<'_> {
+    fn found(&self, to: &[(String, f64)]) -> Result<Sensitivity, Error> {
+        let found = match self.stepped(to)? {
+            None if self.options.steady && beyond_dense(self.model) => {
+                Some(self.few_differences(to)?)
+            }
+            None => self.exact(to)?,
+            found => found,
+        };
+        let mut found = match found {
+            Some(found) => found,
+            None => self.differences(to)?,
+        };
+        found.of.retain(|gradient| {
+            let is_there = self.entries.is_none() || gradient.value.is_ok();
+            is_there && self.options.asks_for(&gradient.name)
+        });
+        Ok(found)
+    }
+
+    /// Gives a value to a model that measures what this does.
+    fn set(&self, model: &mut Model, name: &str, value: f64) -> Result<(), Error> {
+        model.set(name, value)?;
+        if self.entries.is_some() {
+            *model = model.with_circuit(self.measuring(model.circuit())?)?;
+        }
+        Ok(())
+    }
+
+    /// A circuit with what is measured.
+    fn measuring(&self, circuit: &Circuit) -> Result<Circuit, Error> {
+        let Some(group) = self.entries else {
+            return Ok(circuit.clone());
+        };
+        let SensitivityOptions {
+            inputs,
+            outputs,
+            steady,
+            ..
+        } = self.options;
+        // What the netlist shows, not what is measured by now.
+        let showing = Circuit {
+            probes: self.model.circuit().probes.clone(),
+            ..circuit.clone()
+        };
+        let all = entries(&showing, (inputs, outputs), *steady)?;
+        let group = all.into_iter().nth(group).unwrap_or_default();
+        Ok(group.measured_in(circuit))
+    }
+
+    /// Until when measurements see an orbit: entries of the table see what repeats.
+    fn seen_until(&self, circuit: &Circuit) -> Option<Tran> {
+        circuit.tran.filter(|_| self.entries.is_none())
+    }
+
     fn periodic(&self) -> PeriodicOptions<'_> {
         PeriodicOptions {
             period: self.options.period,
@@ -307,10 +427,11 @@ impl Beside<'_> {
         if let Some((name, value)) = change {
             model.set(name, value)?;
         }
+        let circuit = self.measuring(model.circuit())?;
         let circuit = Circuit {
-            probes: model.circuit().measured.clone(),
+            probes: circuit.measured.clone(),
             columns: vec![],
-            ..model.circuit().clone()
+            ..circuit
         };
         model.with_circuit(circuit)
     }
@@ -351,7 +472,8 @@ impl Beside<'_> {
     fn differences(&self, to: &[(String, f64)]) -> Result<Sensitivity, Error> {
         let own = self.measured(None)?;
         let mut gradients = started(&own);
-        let extremal = self.model.circuit().measurements.iter().map(is_extremal);
+        let measuring = self.measuring(self.model.circuit())?;
+        let extremal = measuring.measurements.iter().map(is_extremal);
         let extremal: Vec<bool> = extremal.collect();
         let mut parted: Vec<Vec<&str>> = vec![vec![]; gradients.len()];
         for (name, value) in to {

@@ -44,9 +44,9 @@ impl Survey<'_> {
     }
 }
 
-/// Values two steps and one below it, one and two above it, and what a step is in doubles.
-fn beside_value(value: f64) -> ([f64; 4], f64) {
-    let step = value * (1.0 + VALUE_STEP) - value;
+/// With steps of a part of a value: values two steps and one below it, one and two above it, and what a step is in doubles.
+pub(super) fn beside_value(value: f64, part: f64) -> ([f64; 4], f64) {
+    let step = value * (1.0 + part) - value;
     (STEPS.map(|steps| value + steps * step), step)
 }
 
@@ -60,7 +60,7 @@ impl Beside<'_> {
         (own, curves): (&Model, &Curves),
     ) -> Result<Option<Survey<'n>>, Error> {
         self.go_on()?;
-        let (values, step) = beside_value(value);
+        let (values, step) = beside_value(value, VALUE_STEP);
         let sources = |near: &StandardMultiport| -> Vec<Source> {
             let all = near.sources.iter();
             all.map(|source| source.input.source.clone()).collect()
@@ -80,7 +80,7 @@ impl Beside<'_> {
         }
         let at = |value: f64| {
             let mut model = own.clone();
-            model.set(name, value)?;
+            self.set(&mut model, name, value)?;
             Ok::<_, Error>(model)
         };
         let [a, b, c, d] = values.map(at);
@@ -159,7 +159,7 @@ impl Beside<'_> {
             };
             // The card's value may be multiplied.
             let factor = whole / value;
-            let (values, _) = beside_value(*value);
+            let (values, _) = beside_value(*value, VALUE_STEP);
             // A number that no other card has.
             let mark = whole * (1.0 + (cards.len() + 1) as f64 * MARK);
             kind.set_value(mark);

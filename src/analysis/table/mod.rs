@@ -2,6 +2,7 @@
 
 mod columns;
 mod commutation;
+mod entries;
 mod exact;
 mod extrema;
 mod heat;
@@ -13,6 +14,7 @@ mod rows;
 use std::sync::atomic::AtomicBool;
 
 use self::columns::{Columns, Sums};
+pub(super) use self::entries::{Entries, TABLE, entries};
 pub use self::means::{
     DeviceLosses, ElementMeans, Mean, SignalMeans, Span, Switching, Table, Throughput,
 };

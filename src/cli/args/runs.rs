@@ -116,7 +116,7 @@ pub struct SensArgs {
     #[command(flatten)]
     #[expect(missing_docs, reason = "documented where it is defined")]
     pub input: Input,
-    /// Only of this measurement (repeatable) [default: all]
+    /// Only of this measurement, or entry of the table (`table.power.efficiency`, `table.l1.i.rms`; repeatable) [default: all]
     #[arg(long, value_name = "MEAS")]
     pub of: Vec<String>,
     /// Only to this element's value or `.param` (repeatable) [default: all that are not 0]
@@ -128,6 +128,15 @@ pub struct SensArgs {
     /// The period, s, in place of the common one of the sources: a multiple of the period of each; suffixes as in netlists (`10u`)
     #[arg(long, value_name = "T", value_parser = positive, requires = "pss")]
     pub period: Option<f64>,
+    /// Of the entries of `--table` too
+    #[arg(long)]
+    pub table: bool,
+    /// An element whose power is the table's input (repeatable) [default: all sources]
+    #[arg(id = "in", long = "in", value_name = "NAME", num_args = 1.., requires = "table")]
+    pub inputs: Vec<String>,
+    /// An element whose power is the table's output (repeatable) [default: those whose current `.save` names, or resistors across voltages it names]
+    #[arg(id = "out", long = "out", value_name = "NAME", num_args = 1.., requires = "table")]
+    pub outputs: Vec<String>,
     /// Print JSON
     #[arg(long)]
     pub json: bool,
