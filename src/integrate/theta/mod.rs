@@ -12,9 +12,11 @@ mod embedded;
 mod jumps;
 mod lines;
 mod march;
+mod now;
 mod passage;
 mod past_zero;
 mod right_limit;
+mod setup;
 mod stages;
 #[cfg(test)]
 mod tests;
@@ -37,62 +39,17 @@ use crate::integrate::reading::{self, Point};
 use crate::integrate::run::{Outcome, Stepper};
 use crate::integrate::stats::{StatedError, Stats};
 use crate::integrate::step::Scheme;
-use crate::integrate::switching::{Demand, Switches, Threshold};
-use crate::integrate::system::{Plant, Reduce, System};
+use crate::integrate::switching::{Demand, Switches};
+use crate::integrate::system::{Plant, System};
 use crate::lcs::{Lcs, Port, Role};
 use crate::settings::Settings;
-use crate::settings::tolerances::steps::{CORNER, FIRST, GRANT, GRANT_EMBEDDED};
-use crate::settings::tolerances::times::SPAN_PARTS;
 use crate::solve::{Solution, Status};
 use embedded::Smooth;
+use now::{Attempt, Now};
 use past_zero::FirstHalf;
+pub use setup::{Setup, Start, Stepping};
 use stages::Tableau;
 use unseen::Looks;
-
-/// How steps are chosen.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Stepping {
-    /// Steps of this length, s (shortened so that they land on stops).
-    Fixed(f64),
-    /// Steps that keep the error over the span, s, within `Settings::tol`; the first is tried at `first` s.
-    Controlled {
-        /// The simulated span, s.
-        span: f64,
-        /// First step, s.
-        first: f64,
-    },
-}
-
-/// What a run of the stepper starts from.
-pub struct Setup {
-    /// Reduces the circuit for a switch position.
-    pub reduce: Reduce,
-    /// Start position of every switch.
-    pub position: Vec<bool>,
-    /// Thresholds of every switch.
-    pub thresholds: Vec<Threshold>,
-    /// Start time, s.
-    pub t: f64,
-    /// Where the run starts.
-    pub start: Start,
-    /// θ and γ.
-    pub scheme: Scheme,
-    /// Step choice.
-    pub stepping: Stepping,
-    /// No step is longer than this, s.
-    pub longest: f64,
-    /// Tolerances.
-    pub settings: Settings,
-}
-
-/// The state before t = 0+.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Start {
-    /// All capacitor voltages and inductor currents, s⁻.
-    Storage(DVector<f64>),
-    /// The state x of the first system.
-    State(DVector<f64>),
-}
 
 /// Sub-steps of a base step are multiples of 2^−FINEST of it.
 const FINEST: u32 = 40;
@@ -173,209 +130,7 @@ pub(crate) struct Instant {
     pub(crate) lambda: DVector<f64>,
 }
 
-/// Everything a rejected step has to give back.
-#[derive(Debug, Clone, Default)]
-struct Now {
-    t: f64,
-    x: Vec<f64>,
-    /// Right limit of u at t; the left one before the run begins.
-    u: Vec<f64>,
-    /// The index set the next step tries first.
-    active: Vec<bool>,
-    /// Which devices conducted at the last solve.
-    pattern: Vec<bool>,
-    /// The next step must have γ = 1: the constraints may not hold at t.
-    settle: bool,
-    /// A device turned off in the step before: what current it left behind decays through its blocking resistance, faster than any
-    /// step, and the midpoint rule would ring at it.
-    turned_off: bool,
-    system: usize,
-    balance: Balance,
-    /// The longest step in which a device changed, s: it did so somewhere in it.
-    event_step: f64,
-    /// x' at the end of the last step; empty after a breakpoint, and where the method has no stages.
-    slope: Vec<f64>,
-    /// What the last step did not see, see [`unseen`]; empty at the start of a step under error control.
-    unseen: Vec<f64>,
-}
-
-impl Now {
-    /// The present point, with λ and the slopes of the inputs there.
-    fn point<'a>(&'a self, lambda: &'a [f64], du: &'a [f64]) -> Point<'a> {
-        Point {
-            x: &self.x,
-            lambda,
-            u: &self.u,
-            du,
-        }
-    }
-
-    fn copy_from(&mut self, other: &Self) {
-        self.x.clone_from(&other.x);
-        self.u.clone_from(&other.u);
-        self.active.clone_from(&other.active);
-        self.pattern.clone_from(&other.pattern);
-        self.t = other.t;
-        self.settle = other.settle;
-        self.turned_off = other.turned_off;
-        self.system = other.system;
-        self.balance = other.balance;
-        self.slope.clone_from(&other.slope);
-        self.unseen.clone_from(&other.unseen);
-        self.event_step = other.event_step;
-    }
-}
-
-/// How the present attempt was made.
-#[derive(Debug, Clone, Default)]
-struct Attempt {
-    step: usize,
-    mode: usize,
-    h: f64,
-    /// Whether it was made for a settling step.
-    settle: bool,
-    /// Whether a device turned off in a step of the midpoint rule.
-    turned_off: bool,
-    /// Basis and pattern after the step, where the solvers ran.
-    solved: Option<(Vec<bool>, Vec<Option<bool>>)>,
-    /// The largest residual that a stage was solved to, relative to the terms it is a sum of.
-    residual: f64,
-    /// Energy from sources, into resistors and devices, and lost by the method, J, where the stages tell it.
-    work: Option<((f64, f64), f64)>,
-    /// x' at the end, where the method has stages.
-    slope: Vec<f64>,
-    /// What the stages did not see.
-    unseen: Vec<f64>,
-}
-
 impl Theta {
-    /// A stepper at its start, before the jump at t = 0+.
-    ///
-    /// # Errors
-    /// The reduction's for the start position.
-    pub fn new(setup: Setup) -> Result<Self, Error> {
-        let Setup {
-            mut reduce,
-            position,
-            thresholds,
-            t,
-            start,
-            scheme,
-            stepping,
-            longest,
-            settings,
-        } = setup;
-        let first = reduce(&position)?;
-        let inputs = Inputs::new(&first.inputs);
-        let mut plant = Plant::new(reduce, settings.lcp_residual);
-        let at = plant.system(&position, &inputs, t)?;
-        // Edges at the start act when the run begins.
-        let u = inputs.all_before(t);
-        let system = &plant.systems[at].1;
-        let (x, storage) = match start {
-            Start::Storage(s) => (system.state_from(&s), s),
-            Start::State(x) => {
-                let s = system.storage(x.as_slice(), &u);
-                (x, s)
-            }
-        };
-        let metric = &system.lcs.storage.metric;
-        let balance = if metric.nrows() == storage.len() {
-            let mut balance = Balance::new(0.5 * storage.dot(&(metric * &storage)));
-            let joined = system.storage(x.as_slice(), &u);
-            balance.add_jump(energy::taking_over(
-                &system.lcs,
-                storage.as_slice(),
-                &x,
-                &joined,
-            ));
-            balance
-        } else {
-            Balance::new(energy::stored(&system.lcs, x.as_slice(), &u))
-        };
-        let now = Now {
-            t,
-            x: x.as_slice().to_vec(),
-            u: u.clone(),
-            active: vec![false; system.lcs.m()],
-            pattern: vec![false; system.lcs.m()],
-            settle: true,
-            turned_off: false,
-            system: at,
-            balance,
-            event_step: 0.0,
-            slope: Vec::new(),
-            unseen: Vec::new(),
-        };
-        let amplitudes = Amplitudes::new(&system.lcs, &inputs);
-        let switches = Switches::new(position, thresholds, &system.lcs);
-        let tableau = Tableau::of(system, scheme);
-        let order = tableau.map_or(scheme.order(), |t| t.order);
-        let corner = match tableau {
-            Some(_) if scheme != Scheme::MOREAU => GRANT_EMBEDDED,
-            Some(_) => GRANT,
-            None => CORNER,
-        };
-        let (control, preferred) = match stepping {
-            Stepping::Fixed(_) => (None, f64::INFINITY),
-            Stepping::Controlled { span, first } => {
-                // Rows between choose no steps, the first one neither.
-                let embedded = tableau.is_some() && scheme != Scheme::MOREAU;
-                let first = if embedded {
-                    FIRST * span / SPAN_PARTS
-                } else {
-                    first
-                };
-                (Some(Control::new(order, corner, &settings, span)), first)
-            }
-        };
-        let mut theta = Self {
-            plant,
-            u_next: u.clone(),
-            du: vec![0.0; u.len()],
-            inputs,
-            switches,
-            scheme,
-            stepping,
-            longest,
-            settings,
-            kept: now.clone(),
-            now,
-            started: false,
-            start: storage.clone(),
-            damped: false,
-            whole: false,
-            locate: LOCATE,
-            preferred,
-            reads_coarsely: false,
-            last_h: 0.0,
-            z: Vec::new(),
-            out: Vec::new(),
-            lambda: Vec::new(),
-            y: Vec::new(),
-            attempt: Attempt::default(),
-            coarse: Vec::new(),
-            first_half: FirstHalf::default(),
-            rounding: Vec::new(),
-            stock: Vec::new(),
-            control,
-            looks: Looks::default(),
-            edge: t,
-            smooth: Smooth::default(),
-            stats: Stats::default(),
-            modes: BTreeSet::new(),
-            not_unique: BTreeSet::new(),
-            noted_rivals: false,
-            notes: Vec::new(),
-            worst_residual: 0.0,
-            pending: Vec::new(),
-            ports: Vec::new(),
-            amplitudes,
-        };
-        theta.resize();
-        Ok(theta)
-    }
-
     /// Sets the amplitudes known beforehand, by storage element.
     pub fn expect_amplitudes(&mut self, amplitudes: Amplitudes) {
         self.amplitudes = amplitudes;
