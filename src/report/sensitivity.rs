@@ -14,7 +14,10 @@ impl Sensitivity {
     #[must_use]
     pub fn words(&self) -> String {
         let mut text = String::new();
-        for Gradient { name, value, to } in &self.of {
+        for Gradient {
+            name, value, to, ..
+        } in &self.of
+        {
             match value {
                 Ok(value) => text.push_str(&format!("{name} = {}\n", si::plain(*value, DIGITS))),
                 Err(why) => {

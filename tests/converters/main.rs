@@ -147,15 +147,16 @@ fn derivatives_are_differences_of_exact_runs() {
     assert!(2 * tally.circuits as u64 >= count, "{:?}", tally.refused);
 }
 
-/// Rectifiers whose diodes leave a current of L/Roff time constants beside slow ones: exponentials over hundreds of millions of the former lost digits both ways.
+/// Rectifiers whose diodes leave a current of L/Roff time constants beside slow ones: exponentials over hundreds of millions of the former lost digits both ways, and of a derivative
+/// that falls from 2.3 to nothing in a thousand of them 6e-14 were left forward, where what is measured is a hundredth (3149). And windings whose derivative is 1e-3 of terms of 24 (71025).
 #[test]
 fn forward_and_backward_agree_beside_what_decays_at_once() {
     let mut tally = sensitivities::Tally::default();
-    for seed in [5033, 5061] {
+    for seed in [5033, 5061, 3149, 71025] {
         sensitivities::compare(seed, &mut tally);
     }
     assert!(tally.wrong.is_empty(), "{}", tally.wrong.join("\n"));
-    assert_eq!((tally.circuits, tally.both), (2, 12 * 11));
+    assert_eq!((tally.circuits, tally.both), (4, 12 * (11 + 6 + 9)));
 }
 
 /// ngspice's answers; with `CIRC_CONVERTERS` all, else each seventh.

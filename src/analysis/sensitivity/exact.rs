@@ -6,7 +6,9 @@ use super::base::Base;
 use super::survey::Survey;
 use super::{Beside, Sensitivity, SensitivityMethod, left_out, started};
 use crate::analysis::curves::is_large;
-use crate::analysis::variation::{Carried, Drawing, Lines, Moved, Parameter, Tableau, Weighted};
+use crate::analysis::variation::{
+    Carried, Drawing, Lines, Moved, Parameter, Summed, Tableau, Weighted,
+};
 use crate::circuit::{Circuit, Measured, Weights, weights};
 use crate::integrate::{Error, Note};
 use crate::measure::{Curves, Signals};
@@ -275,6 +277,7 @@ impl Beside<'_> {
             } else {
                 None
             };
+            let mut terms = vec![0.0; sensitivity.of.len()];
             let (direct, others): (Vec<Option<f64>>, Vec<f64>) =
                 match carried.as_ref().filter(|_| plain) {
                     Some(carried) => {
@@ -283,7 +286,13 @@ impl Beside<'_> {
                         let mut all = carried.with(place, &changes, start)?.into_iter();
                         let own = weighing.weighted.iter();
                         let own = own.map(|w| w.as_ref().and_then(|_| all.next()));
-                        (own.collect(), all.collect())
+                        let own: Vec<Option<Summed>> = own.collect();
+                        let others = all.map(|other| other.sum).collect();
+                        for (terms, own) in terms.iter_mut().zip(&own) {
+                            *terms = own.map_or(0.0, |own| own.terms);
+                        }
+                        let sum = |own: Option<Summed>| Some(own?.sum);
+                        (own.into_iter().map(sum).collect(), others)
                     }
                     None => {
                         let of = |weighted: &Option<Weighted>| {
@@ -306,6 +315,9 @@ impl Beside<'_> {
                 for (derivative, found) in derivatives.iter_mut().zip(found) {
                     *derivative = derivative.or(found);
                 }
+            }
+            for (gradient, terms) in sensitivity.of.iter_mut().zip(terms) {
+                gradient.terms.push(terms);
             }
             for (gradient, derivative) in sensitivity.of.iter_mut().zip(derivatives) {
                 let derivative = derivative.map(|derivative| derivative / survey.unit());

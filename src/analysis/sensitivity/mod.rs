@@ -89,6 +89,9 @@ pub struct Gradient {
     pub value: Result<f64, String>,
     /// By element or parameter, in SI units; none where the measurement has no value there.
     pub to: Vec<(String, Option<f64>)>,
+    /// By the same, along an exact run: the absolute values of the terms whose sum is p ∂J/∂p, together; rounding is relative to them. 0 where it was carried forward; empty along other
+    /// runs.
+    pub terms: Vec<f64>,
 }
 
 /// The derivatives of measurements.
@@ -545,6 +548,7 @@ fn started(measured: &[Measured]) -> Vec<Gradient> {
             Err(why) => Err(why.to_string()),
         },
         to: vec![],
+        terms: vec![],
     };
     measured.iter().map(of).collect()
 }

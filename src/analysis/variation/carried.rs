@@ -20,10 +20,28 @@ pub(crate) struct Carried {
     pub(crate) start: DMatrix<f64>,
 }
 
-/// ⟨a, b⟩
-fn dot(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
-    let both = a.as_slice().iter().zip(b.as_slice());
-    both.map(|(a, b)| a * b).sum()
+/// A sum, and the absolute values of its terms together: rounding is relative to these.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Summed {
+    pub(crate) sum: f64,
+    pub(crate) terms: f64,
+}
+
+impl Summed {
+    /// Adds ⟨a, b⟩.
+    fn add_dot(&mut self, a: &[f64], b: &[f64]) {
+        let mut own = Self::default();
+        for (a, b) in a.iter().zip(b) {
+            own.add(a * b);
+        }
+        self.sum += own.sum;
+        self.terms += own.terms;
+    }
+
+    fn add(&mut self, term: f64) {
+        self.sum += term;
+        self.terms += term.abs();
+    }
 }
 
 impl Carried {
@@ -85,21 +103,25 @@ impl Carried {
         (trajectory, forms): (&Trajectory, &Forms),
         changes: &Changes,
         start: Option<&DVector<f64>>,
-    ) -> Result<Vec<f64>, Error> {
+    ) -> Result<Vec<Summed>, Error> {
         let costates = self.start.ncols();
-        let mut found = vec![0.0; costates];
+        let mut found = vec![Summed::default(); costates];
         for (change, sums) in changes.systems.iter().zip(&self.systems) {
             for (found, sums) in found.iter_mut().zip(sums) {
-                *found += dot(&change.rate, &sums.rate)
-                    + dot(&change.outputs, &sums.outputs)
-                    + dot(&change.storage, &sums.storage)
-                    + dot(&change.inject, &sums.inject);
+                for (change, sums) in [
+                    (&change.rate, &sums.rate),
+                    (&change.outputs, &sums.outputs),
+                    (&change.storage, &sums.storage),
+                    (&change.inject, &sums.inject),
+                ] {
+                    found.add_dot(change.as_slice(), sums.as_slice());
+                }
             }
         }
         for (guard, rows) in &self.guards {
             if let Some(change) = changes.guard(*guard) {
                 for (found, row) in found.iter_mut().zip(rows) {
-                    *found += (change * row)[0];
+                    found.add_dot(change.as_slice(), row.as_slice());
                 }
             }
         }
@@ -110,15 +132,12 @@ impl Carried {
                 found
                     .iter_mut()
                     .zip(weights)
-                    .for_each(|(found, weight)| *found += weight * dt);
+                    .for_each(|(found, weight)| found.add(weight * dt));
             }
         }
         if let Some(start) = start {
-            let own = self.start.tr_mul(start);
-            found
-                .iter_mut()
-                .zip(own.iter())
-                .for_each(|(found, own)| *found += own);
+            let own = found.iter_mut().zip(self.start.column_iter());
+            own.for_each(|(found, own)| found.add_dot(own.as_slice(), start.as_slice()));
         }
         Ok(found)
     }

@@ -41,7 +41,7 @@ use crate::settings::tolerances::jumps::FOLLOWS_JUMP;
 use crate::settings::tolerances::times::SAME_TIME;
 
 pub(crate) use adjoint::Adjoint;
-pub(crate) use carried::Carried;
+pub(crate) use carried::{Carried, Summed};
 pub(crate) use change::Changes;
 pub(crate) use course::{Course, Leap};
 pub(crate) use drawing::{Drawing, Lines, Sight, Weighted};
