@@ -50,23 +50,28 @@ type Piece<'a> = ((f64, f64, f64), &'a [[f64; VALUES]]);
 struct Scene<'a> {
     curves: &'a Curves,
     span: (f64, f64),
+    /// Part of what values span to which extrema are the same.
+    same: f64,
     /// By piece.
     pieces: Vec<Piece<'a>>,
     /// Of all measurements; NaN where one has none.
     results: Vec<f64>,
 }
 
-/// The derivatives of measurements that found something; none where they are not known, as where an expression jumps by itself.
+/// The derivatives of measurements that found something; none where they are not known, as where an expression jumps by itself. An extremum that is reached again to `same`, a part of what
+/// the values span, has rivals.
 pub(crate) fn weights(
     all: &[NamedMeasurement],
     curves: &Curves,
     found: &[Measured],
+    same: f64,
 ) -> Vec<Option<Weights>> {
     let value = |measured: &Measured| measured.result.as_ref().map_or(f64::NAN, |f| f.value);
     let scene = Scene {
         span: Signals::Curves(curves).span(),
         pieces: curves.all().collect(),
         curves,
+        same,
         results: found.iter().map(value).collect(),
     };
     let of = |(named, measured): (&NamedMeasurement, &Measured)| {
@@ -91,7 +96,8 @@ impl<'a> Scene<'a> {
             Measurement::Over(over, of, window) => {
                 let (from, to) = (time("from")?, time("to")?);
                 let traced = self.traced(of, None)?;
-                let (slopes, rivals) = traced.trace.over_slopes(*over, (from, to)).ok()??;
+                let slopes = traced.trace.over_slopes(*over, (from, to), self.same);
+                let (slopes, rivals) = slopes.ok()??;
                 let place = |slopes: &TraceSlopes, into: &mut Weights| {
                     self.add(&traced, slopes, 1.0, into);
                     let ends = [

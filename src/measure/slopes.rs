@@ -14,7 +14,6 @@ use super::curve::{Curve, VALUES, basis, basis_slopes};
 use super::trace::{Shape, Trace};
 use super::{MeasureError, Over};
 use crate::linalg::gauss::{NODES, WEIGHTS};
-use crate::settings::tolerances::periodic::SAME_EXTREMUM;
 use crate::settings::tolerances::times::SAME_TIME;
 
 /// Another time at which an extremum is reached with the same value.
@@ -154,7 +153,7 @@ impl Trace<'_> {
         (sum, found)
     }
 
-    /// The derivatives of a measure over from ≤ t ≤ to, and what those of an extreme value are at the other times, with lower values between, at which it is reached to a part of
+    /// The derivatives of a measure over from ≤ t ≤ to, and what those of an extreme value are at the other times, with lower values between, at which it is reached to `same`, a part of
     /// all that the values span; `None` where they are not known.
     ///
     /// # Errors
@@ -163,7 +162,9 @@ impl Trace<'_> {
         &self,
         what: Over,
         window: (f64, f64),
+        same: f64,
     ) -> Result<Option<(TraceSlopes, Vec<Rival>)>, MeasureError> {
+        let extreme = |sign, when| self.extreme_slopes((sign, when), window, same);
         let mean = |of: Integrand| {
             let (length, lengths) = self.integral_slopes(Integrand::One, window);
             let (sum, found) = self.integral_slopes(of, window);
@@ -183,11 +184,11 @@ impl Trace<'_> {
                 let root = || combined((0.5 / square.sqrt(), found), (0.0, &none));
                 (square > 0.0).then(root).map(alone)
             }
-            Over::Minimum => self.extreme_slopes(-1.0, window, false),
-            Over::Maximum => self.extreme_slopes(1.0, window, false),
+            Over::Minimum => extreme(-1.0, false),
+            Over::Maximum => extreme(1.0, false),
             Over::PeakToPeak => {
-                let most = self.extreme_slopes(1.0, window, false);
-                let both = most.zip(self.extreme_slopes(-1.0, window, false));
+                let most = extreme(1.0, false);
+                let both = most.zip(extreme(-1.0, false));
                 both.map(|((most, above), (least, below))| {
                     let difference = |most: TraceSlopes, least: &TraceSlopes| {
                         combined((1.0, most), (-1.0, least))
@@ -204,13 +205,13 @@ impl Trace<'_> {
                     (difference(most.clone(), &least), rivals)
                 })
             }
-            Over::WhenMinimum => self.extreme_slopes(-1.0, window, true),
-            Over::WhenMaximum => self.extreme_slopes(1.0, window, true),
+            Over::WhenMinimum => extreme(-1.0, true),
+            Over::WhenMaximum => extreme(1.0, true),
         })
     }
 
-    /// Where the extreme value is reached, then the other such places with lower values between; and what the values span.
-    fn reached(&self, sign: f64, window: (f64, f64)) -> (Vec<Reached>, f64) {
+    /// Where the extreme value is reached, then the other places where it is to this part of what the values span, with lower values between; and what they span.
+    fn reached(&self, sign: f64, window: (f64, f64), same: f64) -> (Vec<Reached>, f64) {
         let (mut first, mut most, mut least) = (None, f64::NEG_INFINITY, f64::INFINITY);
         let mut largest = Vec::new();
         for (k, curve, part) in self.parts(window) {
@@ -227,7 +228,7 @@ impl Trace<'_> {
         let Some(first) = first else {
             return (vec![], 0.0);
         };
-        let level = most - SAME_EXTREMUM * (most - least);
+        let level = most - same * (most - least);
         let mut tops: Vec<(Reached, f64)> = vec![];
         let mut above = false;
         for ((k, curve, part), largest) in self.parts(window).zip(largest) {
@@ -254,11 +255,11 @@ impl Trace<'_> {
     /// Of the extreme value, or of when it is reached, and those of the value where it is reached again.
     fn extreme_slopes(
         &self,
-        sign: f64,
+        (sign, when): (f64, bool),
         window: (f64, f64),
-        when: bool,
+        same: f64,
     ) -> Option<(TraceSlopes, Vec<Rival>)> {
-        let (all, span) = self.reached(sign, window);
+        let (all, span) = self.reached(sign, window, same);
         let time = |(k, s): Reached| self.own()[k].time(s);
         let (first, rest) = all.split_first()?;
         let value = self.extreme_slopes_at(*first, window, false)?;
@@ -491,7 +492,7 @@ mod tests {
             Over::WhenMinimum,
             Over::WhenMaximum,
         ] {
-            let (slopes, _) = own.over_slopes(what, WINDOW).unwrap().unwrap();
+            let (slopes, _) = own.over_slopes(what, WINDOW, 1e-9).unwrap().unwrap();
             close(&format!("{what:?}"), &slopes, |trace, (from, to)| {
                 trace.over(what, from, to).unwrap()
             });

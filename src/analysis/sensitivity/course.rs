@@ -167,6 +167,11 @@ impl Course {
         seen(curves, self.span, orbit)
     }
 
+    /// The part of what signals span to which the steps know them.
+    pub(super) const fn known(&self) -> f64 {
+        self.settings.tol
+    }
+
     const fn through(&self, bends: bool) -> &Through {
         &self.through[bends as usize]
     }

@@ -14,7 +14,7 @@ use crate::integrate::{Error, Note};
 use crate::measure::{Curves, Signals};
 use crate::mna::Perturbation;
 use crate::model::Model;
-use crate::settings::tolerances::periodic::{MOST_RIVALS, SAME_DERIVATIVE};
+use crate::settings::tolerances::periodic::{MOST_RIVALS, SAME_DERIVATIVE, SAME_EXTREMUM};
 use crate::settings::tolerances::times::{MOST_PERIODS, MOST_STATES};
 
 /// What measurements find in a run, and what they weigh of it.
@@ -41,19 +41,19 @@ struct Rivalry {
     /// What it weighs if the other one counts; for when it is reached, what the difference of the values there weighs.
     weighted: Weighted,
     is_time: bool,
-    /// Values to which the derivative is another one there.
-    parted: Vec<String>,
+    /// Values to which the derivative is another one there, and the part of the larger one by which it is.
+    parted: Vec<(String, f64)>,
 }
 
 impl Weighing {
-    /// Of the measurements of a circuit that are asked for.
+    /// Of the measurements of a circuit that are asked for, whose extrema are the same to this part of what their signals span.
     pub(super) fn of(
         circuit: &Circuit,
-        (weigh, curves): (&Weigh<'_>, &Curves),
+        (weigh, curves, same): (&Weigh<'_>, &Curves, f64),
         asked: impl Fn(&str) -> bool,
     ) -> Self {
         let found = circuit.measure(&Signals::Curves(curves));
-        let weights = weights(&circuit.measurements, curves, &found);
+        let weights = weights(&circuit.measurements, curves, &found, same);
         let mut needed: Vec<bool> = found.iter().map(|found| asked(&found.name)).collect();
         for _ in 0..found.len() {
             for (k, weights) in weights
@@ -166,8 +166,9 @@ impl Rivalry {
     /// Compares derivatives with the logarithm of a value.
     fn see(&mut self, name: &str, own: f64, other: f64) {
         let size = own.abs().max(other.abs()).max(self.span);
-        if (own - other).abs() > SAME_DERIVATIVE * size {
-            self.parted.push(name.to_owned());
+        if own != other {
+            self.parted
+                .push((name.to_owned(), (own - other).abs() / size));
         }
     }
 }
@@ -183,15 +184,16 @@ impl Weighing {
         }
     }
 
-    /// Tells which derivatives are those to one side.
-    pub(super) fn one_sided(&self) -> Vec<Note> {
+    /// Tells which derivatives are those to one side, where this is what they may be off by, and how extrema were compared.
+    pub(super) fn one_sided(&self, off: f64, compared: &str) -> Vec<Note> {
         let of = |k: usize| {
-            let mut parted = self.rivals.iter().filter(|r| r.of == k);
-            let all = parted.clone().flat_map(|r| &r.parted);
-            let names: BTreeSet<&str> = all.map(String::as_str).collect();
-            let (first, again) = parted.find(|r| !r.parted.is_empty())?.times;
+            let rivals = self.rivals.iter().filter(|r| r.of == k);
+            let parted = rivals.flat_map(|r| r.parted.iter().map(|parted| (r.times, parted)));
+            let parted: Vec<_> = parted.filter(|(_, (_, apart))| *apart > off).collect();
+            let (first, again) = parted.first()?.0;
+            let names: BTreeSet<&str> = parted.iter().map(|(_, (name, _))| &**name).collect();
             let text = format!(
-                "an extremum of `{}` is reached at {first:.6e} s and, with the same value, at {again:.6e} s, where it moves otherwise with {}: there is no derivative; the number is that at {first:.6e} s, and holds to one side at most",
+                "an extremum of `{}` is reached at {first:.6e} s and, with the same value{compared}, at {again:.6e} s, where it moves otherwise with {}: there is no derivative; the number is that at {first:.6e} s, and holds to one side at most",
                 self.found[k].name,
                 names.into_iter().collect::<Vec<_>>().join(", ")
             );
@@ -217,7 +219,7 @@ impl Beside<'_> {
         let curves = base.seen(drawing.curves());
         let asked = |name: &str| self.options.asks_for(name);
         let weigh = |weights: &Weights| drawing.weighted(weights);
-        let mut weighing = Weighing::of(own.circuit(), (&weigh, &curves), asked);
+        let mut weighing = Weighing::of(own.circuit(), (&weigh, &curves, SAME_EXTREMUM), asked);
         let measured = weighing.weighted.iter().flatten().count();
         let back = match self.options.method {
             SensitivityMethod::Forward => false,
@@ -325,7 +327,9 @@ impl Beside<'_> {
             }
             sensitivity.at.push((name.to_owned(), value));
         }
-        sensitivity.notes.extend(weighing.one_sided());
+        sensitivity
+            .notes
+            .extend(weighing.one_sided(SAME_DERIVATIVE, ""));
         Ok(Some(sensitivity))
     }
 

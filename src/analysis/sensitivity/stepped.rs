@@ -190,7 +190,10 @@ impl Beside<'_> {
         let (tape, steps) = course.pass(&mut returns, Lengths::Free, self.options.cancel)?;
         let curves = course.curves(&tape, own.multiport().probes);
         let bends = tape.steps().any(|step| step.bends || !step.at.is_empty());
-        if self.weighed(&own, (&tape, &curves)).needs_moves() {
+        if self
+            .weighed((&own, &course), (&tape, &curves))
+            .needs_moves()
+        {
             return self.otherwise(to);
         }
         let grounds = Grounds {
@@ -238,8 +241,11 @@ impl Beside<'_> {
                 gradient.to.push((survey.name.to_owned(), derivative));
             }
         }
-        notes.push(in_steps(steps.len(), apart(&coarse, &halved), bends));
-        notes.extend(halved.weighing.one_sided());
+        let apart = apart(&coarse, &halved);
+        let least = if bends { LEAST_BENT } else { 0.0 };
+        let off = (TIMES_APART * apart).max(least);
+        notes.push(in_steps(steps.len(), (apart, off), bends));
+        notes.extend(halved.weighing.one_sided(off, " as far as the steps tell"));
         let mut found = Sensitivity {
             of,
             at: to.to_vec(),
@@ -295,11 +301,15 @@ impl Beside<'_> {
         self.differences(to)
     }
 
-    fn weighed(&self, own: &Model, (tape, curves): (&Tape, &Curves)) -> Weighing {
+    fn weighed(
+        &self,
+        (own, course): (&Model, &Course),
+        (tape, curves): (&Tape, &Curves),
+    ) -> Weighing {
         let columns = own.multiport().probes;
         let asked = |name: &str| self.options.asks_for(name);
         let fold = |weights: &Weights| folded(weights, tape, columns);
-        Weighing::of(own.circuit(), (&fold, curves), asked)
+        Weighing::of(own.circuit(), (&fold, curves, course.known()), asked)
     }
 
     /// The derivatives along a run to some of the values; `None` where an active set leaves them open, or the operating point that it begins at does.
@@ -319,7 +329,7 @@ impl Beside<'_> {
             return Ok(None);
         }
         let curves = course.curves(tape, columns);
-        let mut weighing = self.weighed(own, (tape, &curves));
+        let mut weighing = self.weighed((own, course), (tape, &curves));
         let weighed = weighing.all();
         let weighed = weighed.map(|weighted| course.weighed(tape, weighted, columns));
         let weighed: Vec<Weighed> = weighed.collect();
@@ -439,10 +449,8 @@ fn apart(coarse: &Carried, halved: &Carried) -> f64 {
     found.map(of).fold(0.0, f64::max)
 }
 
-/// What they may be off by: so many times what halved steps change, and where a device changes within a step no less than what is known of that.
-fn in_steps(steps: usize, apart: f64, bends: bool) -> Note {
-    let least = if bends { LEAST_BENT } else { 0.0 };
-    let off = (TIMES_APART * apart).max(least);
+/// Tells what they may be off by: so many times what halved steps change, and where a device changes within a step no less than what is known of that.
+fn in_steps(steps: usize, (apart, off): (f64, f64), bends: bool) -> Note {
     let text = format!(
         "the derivatives are those of a run in {} steps; they may be off by {off:.0e} of the largest p ∂J/∂p of a measurement, or of what it measures, as steps of twice the length are {apart:.0e} off{}",
         2 * steps,

@@ -229,7 +229,7 @@ pub(crate) const STEPS_ANEW: f64 = 1e-3;
 pub(crate) const LEAST_WEIGHT: f64 = 1e-3;
 
 /// Where an extremum is reached again to this part of what the values span, its derivatives there are looked at too. Larger: derivatives that hold are told to be one-sided; smaller: ties
-/// that rounding parts are not told.
+/// that rounding parts are not told. Along sparse steps it is their tolerance.
 pub(crate) const SAME_EXTREMUM: f64 = 1e-9;
 
 /// So many other times at which an extremum is reached are looked at. Larger: runs back for each; smaller: a tie is not told where these have the derivatives of the first one.
