@@ -15,6 +15,7 @@ impl Beside<'_> {
             name,
             value: Ok(value),
             to: vec![],
+            terms: vec![],
         });
         let mut of: Vec<Gradient> = of.collect();
         for (name, value) in to {

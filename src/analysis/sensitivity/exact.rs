@@ -3,8 +3,9 @@
 use std::collections::BTreeSet;
 
 use super::base::Base;
+use super::gradients::started;
 use super::survey::Survey;
-use super::{Beside, Sensitivity, SensitivityMethod, left_out, started};
+use super::{Beside, Sensitivity, SensitivityMethod, left_out};
 use crate::analysis::curves::is_large;
 use crate::analysis::variation::{
     Carried, Drawing, Lines, Moved, Parameter, Summed, Tableau, Weighted,

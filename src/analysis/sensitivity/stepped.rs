@@ -14,8 +14,9 @@ use nalgebra::{Complex, DVector};
 use super::base::not_smooth;
 use super::course::{Course, folded};
 use super::exact::Weighing;
+use super::gradients::started;
 use super::survey::{Grounds, Survey};
-use super::{Beside, Passes, Sensitivity, left_out, started, unsupported};
+use super::{Beside, Passes, Sensitivity, left_out, unsupported};
 use crate::analysis::variation::difference;
 use crate::circuit::{Measured, Weights, source::Wave};
 use crate::integrate::{
