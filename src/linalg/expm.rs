@@ -106,9 +106,11 @@ impl Ladder {
     /// exp(A h/2^k) − I; `None` if an entry is not finite or a factor is singular.
     pub(crate) fn increment(&mut self, k: u32) -> Option<Dense> {
         let mut increment = self.rung(k)?.clone();
-        for j in 0..self.scale.len() {
+        // Powers of two: no product of them rounds.
+        for (j, scale) in self.scale.iter().enumerate() {
+            let inverse = scale.recip();
             let column = increment.column_mut(j).iter_mut().zip(&self.scale);
-            column.for_each(|(value, scale)| *value *= scale / self.scale[j]);
+            column.for_each(|(value, scale)| *value *= scale * inverse);
         }
         increment.is_finite().then_some(increment)
     }

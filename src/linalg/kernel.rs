@@ -17,21 +17,30 @@ impl Kernel {
     pub(crate) fn new(matrix: &DMatrix<f64>) -> Self {
         let mut kernel = Self::zeros(matrix.nrows(), matrix.ncols());
         for (j, column) in matrix.column_iter().enumerate() {
-            kernel.set_column(0, j, column.as_slice());
+            kernel.set_column(j, column.as_slice());
         }
         kernel
     }
 
-    /// These matrices of equally many columns, one below the other.
-    pub(crate) fn stacked(parts: &[&Dense]) -> Self {
-        let columns = parts.first().map_or(0, |part| part.columns());
-        let mut kernel = Self::zeros(parts.iter().map(|part| part.rows()).sum(), columns);
-        let mut first = 0;
-        for part in parts {
-            for j in 0..columns {
-                kernel.set_column(first, j, part.column(j));
-            }
-            first += part.rows();
+    /// Repacks a matrix.
+    pub(crate) fn of(matrix: &Dense) -> Self {
+        let mut kernel = Self::zeros(matrix.rows(), matrix.columns());
+        for j in 0..matrix.columns() {
+            kernel.set_column(j, matrix.column(j));
+        }
+        kernel
+    }
+
+    /// Of so many rows and columns, each filled in by its number.
+    pub(crate) fn of_columns(
+        rows: usize,
+        columns: usize,
+        mut fill: impl FnMut(usize, &mut [f64]),
+    ) -> Self {
+        let (mut kernel, mut column) = (Self::zeros(rows, columns), vec![0.0; rows]);
+        for j in 0..columns {
+            fill(j, &mut column);
+            kernel.set_column(j, &column);
         }
         kernel
     }
@@ -44,24 +53,14 @@ impl Kernel {
         }
     }
 
-    /// The entries of column j from row `first` on.
-    fn set_column(&mut self, first: usize, j: usize, values: &[f64]) {
-        let (mut at, mut lane) = (first / BLOCK * self.columns + j, first % BLOCK);
-        let mut rest = values;
-        if lane == 0 {
-            let (blocks, last) = values.as_chunks::<BLOCK>();
-            for block in blocks {
-                self.blocks[at] = *block;
-                at += self.columns;
-            }
-            rest = last;
+    /// The entries of column j.
+    fn set_column(&mut self, j: usize, values: &[f64]) {
+        let (blocks, last) = values.as_chunks::<BLOCK>();
+        for (k, block) in blocks.iter().enumerate() {
+            self.blocks[k * self.columns + j] = *block;
         }
-        for &value in rest {
-            self.blocks[at][lane] = value;
-            lane += 1;
-            if lane == BLOCK {
-                (at, lane) = (at + self.columns, 0);
-            }
+        if !last.is_empty() {
+            self.blocks[blocks.len() * self.columns + j][..last.len()].copy_from_slice(last);
         }
     }
 
@@ -222,9 +221,10 @@ mod tests {
                 SparseKernel::new(&matrix).apply_first(w.as_slice(), &mut y);
                 prop_assert_eq!(y.as_slice(), &expected.as_slice()[..first]);
             }
-            let parts = matrix.row_iter().map(|row| Dense::of(&row.into_owned().reshape_generic(nalgebra::Dyn(1), nalgebra::Dyn(columns))));
-            let parts: Vec<Dense> = parts.collect();
-            Kernel::stacked(&parts.iter().collect::<Vec<_>>()).apply(w.as_slice(), &mut y);
+            Kernel::of(&Dense::of(&matrix)).apply(w.as_slice(), &mut y);
+            prop_assert_eq!(y.as_slice(), expected.as_slice());
+            let fill = |j: usize, column: &mut [f64]| column.copy_from_slice(matrix.column(j).as_slice());
+            Kernel::of_columns(rows, columns, fill).apply(w.as_slice(), &mut y);
             prop_assert_eq!(y.as_slice(), expected.as_slice());
             SparseKernel::new(&matrix).map(|v| 2.0 * v).apply_first(w.as_slice(), &mut y);
             let twice = 2.0 * expected;

@@ -197,15 +197,17 @@ impl Flow {
             return false;
         };
         self.loss = self.loss.max(loss);
-        // [𝒢; 𝒢𝒜] exp(𝒜h)
-        let mut guards = Dense::zeros(self.rows.rows(), self.dim);
+        // exp(𝒜h) − I and below it [𝒢; 𝒢𝒜] exp(𝒜h)
         let mut column = vec![0.0; self.dim];
-        for j in 0..self.dim {
-            column.copy_from_slice(&increment.column(j)[..self.dim]);
+        let below = |j: usize, stacked: &mut [f64]| {
+            let (own, guards) = stacked.split_at_mut(self.dim);
+            own.copy_from_slice(increment.column(j));
+            column.copy_from_slice(own);
             column[j] += 1.0;
-            self.rows.apply_first(&column, guards.column_mut(j));
-        }
-        self.levels[level as usize] = Some(Kernel::stacked(&[&increment, &guards]));
+            self.rows.apply_first(&column, guards);
+        };
+        let rows = self.dim + self.rows.rows();
+        self.levels[level as usize] = Some(Kernel::of_columns(rows, self.dim, below));
         self.tabulated += 1;
         true
     }
@@ -259,7 +261,7 @@ impl Flow {
             let mut ladder = Ladders::new(generator, fast, time, SQUARED, 0);
             let increment = ladder.increment(0)?;
             *loss = loss.max(ladder.loss(0)?);
-            Some(Kernel::stacked(&[&increment]))
+            Some(Kernel::of(&increment))
         })?;
         increment.apply(w, &mut next[..self.dim]);
         for (next, w) in next[..self.dim].iter_mut().zip(w) {

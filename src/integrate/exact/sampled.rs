@@ -69,5 +69,5 @@ fn followed(outputs: &Kernel, columns: usize, step: &Dense) -> Kernel {
         increment.add(step);
         increment.add(&product);
     }
-    Kernel::stacked(&[&table])
+    Kernel::of(&table)
 }
