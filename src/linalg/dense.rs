@@ -62,6 +62,11 @@ impl Dense {
         &column.as_flattened()[..self.rows]
     }
 
+    /// Rows 4k to 4k + 3 of column j, zeros beyond the last.
+    pub(crate) fn block(&self, k: usize, j: usize) -> &Block {
+        &self.data[j * self.blocks + k]
+    }
+
     pub(crate) fn column_mut(&mut self, j: usize) -> &mut [f64] {
         let column = &mut self.data[j * self.blocks..(j + 1) * self.blocks];
         &mut column.as_flattened_mut()[..self.rows]

@@ -14,17 +14,14 @@ impl Quadratics {
     /// Of two matrices of one size.
     pub(crate) fn of(matrices: &[Dense; 2]) -> Self {
         let dim = matrices[0].columns();
-        let mut blocks = Vec::with_capacity((dim + BLOCK) * dim.div_ceil(BLOCK));
-        for from in (0..dim).step_by(BLOCK) {
-            for j in from..dim {
-                let factor = if j < from + BLOCK { 1.0 } else { 2.0 };
-                let mut both = [[0.0; BLOCK]; 2];
-                for (block, matrix) in both.iter_mut().zip(matrices) {
-                    for (value, entry) in block.iter_mut().zip(&matrix.column(j)[from..]) {
-                        *value = factor * entry;
-                    }
-                }
-                blocks.push(both);
+        let rows = dim.div_ceil(BLOCK);
+        let count = (0..rows).map(|k| dim - k * BLOCK).sum();
+        let mut blocks = Vec::with_capacity(count);
+        for k in 0..rows {
+            for j in k * BLOCK..dim {
+                let factor = if j < (k + 1) * BLOCK { 1.0 } else { 2.0 };
+                let both = matrices.each_ref();
+                blocks.push(both.map(|matrix| matrix.block(k, j).map(|entry| factor * entry)));
             }
         }
         Self { dim, blocks }

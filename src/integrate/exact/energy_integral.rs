@@ -94,15 +94,24 @@ struct Forms {
 /// ∫₀ᵗ exp(𝒜ᵀs) Q exp(𝒜s) ds over y, for t that doubles.
 #[derive(Debug, Clone)]
 struct Doubling {
-    /// exp(𝒜 longest/2^k) − I.
-    ladder: Ladders,
+    longest: f64,
     /// t is the longest over 2^k.
     k: u32,
+    grams: [Dense; 2],
+    /// What it takes to double t, once that is asked for: a short span is done with its series.
+    along: Option<Along>,
+}
+
+/// exp(𝒜t) − I for t that doubles.
+#[derive(Debug, Clone)]
+struct Along {
+    /// exp(𝒜 longest/2^k) − I.
+    ladder: Ladders,
     /// From here on exp(𝒜t) is a square.
     squared: u32,
-    /// exp(𝒜t) − I.
+    /// That of this k.
+    k: u32,
     increment: Dense,
-    grams: [Dense; 2],
     buffers: [Dense; 3],
 }
 
@@ -169,24 +178,19 @@ impl EnergyIntegral {
         let forms = self
             .forms
             .get_or_insert_with(|| Forms::new(terms, fast, generator, sizes, unit, bottom));
-        Integrals { forms, fast }
+        Integrals {
+            forms,
+            fast,
+            bottom,
+        }
     }
 
     /// Σ v·i at w (from sources, dissipated), W.
-    pub(crate) fn power(&mut self, w: &[f64]) -> [f64; 2] {
-        self.at_nodes.clear();
-        self.at_nodes.resize(2 * self.terms.len(), 0.0);
-        let mut begin = 0;
-        for (&j, &end) in self.seen.iter().zip(&self.ends) {
-            for (which, factor) in &self.factors[begin..end] {
-                self.at_nodes[*which] += factor * w[j];
-            }
-            begin = end;
-        }
+    pub(crate) fn power(&self, w: &[f64]) -> [f64; 2] {
         let mut power = [0.0; 2];
-        let (pairs, _) = self.at_nodes.as_chunks::<2>();
-        for (term, [v, i]) in self.terms.iter().zip(pairs) {
-            power[usize::from(!term.source)] += v * i;
+        for term in &self.terms {
+            let along = |row: &[(usize, f64)]| row.iter().fold(0.0, |sum, (j, x)| sum + x * w[*j]);
+            power[usize::from(!term.source)] += along(&term.v) * along(&term.i);
         }
         [-power[0], power[1]]
     }
@@ -223,29 +227,39 @@ impl EnergyIntegral {
 pub(crate) struct Integrals<'a> {
     forms: &'a mut Forms,
     fast: &'a [usize],
+    bottom: u32,
 }
 
 impl Integrals<'_> {
-    /// (from sources, dissipated) over 2^k units from w, J.
+    /// (from sources, dissipated) from w along a stretch, J; a span at a place is `time` seconds long.
     #[inline]
-    pub(crate) fn over(&mut self, k: u32, w: &[f64]) -> [f64; 2] {
+    pub(crate) fn along(
+        &mut self,
+        stretch: Stretch,
+        time: impl Fn(usize) -> f64,
+        w: &[f64],
+    ) -> [f64; 2] {
         let forms = &mut *self.forms;
-        forms.double_to(k);
-        forms.y_of(w);
-        forms.over[k as usize].at(&forms.y)
-    }
-
-    /// (from sources, dissipated) from w over the span at a place, so many seconds long, J.
-    pub(crate) fn over_span(&mut self, place: usize, time: f64, w: &[f64]) -> [f64; 2] {
-        let forms = &mut *self.forms;
-        forms.y_of(w);
-        if forms.spans.len() <= place {
-            forms.spans.resize(place + 1, None);
-        }
-        let form = forms.spans[place].get_or_insert_with(|| {
-            let flow = (&forms.generator, self.fast);
-            Doubling::new(flow, &forms.powers, time, 0).forms()
-        });
+        let form = match stretch {
+            Stretch::Table(level) => {
+                let k = (self.bottom - level) as usize;
+                if forms.over.len() <= k {
+                    forms.double_to(k, self.fast);
+                }
+                &forms.over[k]
+            }
+            Stretch::Span(place) => {
+                if forms.spans.get(place).is_none_or(Option::is_none) {
+                    forms.take_span(place, time(place), self.fast);
+                }
+                match &forms.spans[place] {
+                    Some(form) => form,
+                    None => return [f64::NAN; 2],
+                }
+            }
+        };
+        // In whole blocks: fetched as they were put, and zeros behind the last.
+        forms.to_y.apply_first(forms.y.len(), w, &mut forms.y);
         form.at(&forms.y)
     }
 }
@@ -341,18 +355,23 @@ impl Forms {
         pairs.any(|(then, now)| *now > OUTGROWN * then)
     }
 
-    /// Takes w over into y.
-    #[inline]
-    fn y_of(&mut self, w: &[f64]) {
-        self.to_y.apply(w, &mut self.y[..w.len()]);
-    }
-
     /// Has the integrals up to 2^k units.
-    fn double_to(&mut self, k: u32) {
-        while self.over.len() <= k as usize {
-            self.latest.double();
+    #[cold]
+    fn double_to(&mut self, k: usize, fast: &[usize]) {
+        while self.over.len() <= k {
+            self.latest.double((&self.generator, fast));
             self.over.push(self.latest.forms());
         }
+    }
+
+    /// Has that over the span at a place, so many seconds long.
+    #[cold]
+    fn take_span(&mut self, place: usize, time: f64, fast: &[usize]) {
+        if self.spans.len() <= place {
+            self.spans.resize(place + 1, None);
+        }
+        let span = Doubling::new((&self.generator, fast), &self.powers, time, 0);
+        self.spans[place] = Some(span.forms());
     }
 }
 
@@ -414,39 +433,27 @@ impl Doubling {
             sum
         };
         let grams = powers.each_ref().map(&mut series);
-        let k = k + halvings;
-        let mut ladder = Ladders::new(generator, fast, longest, ENERGY_SQUARED, 0);
-        let stiff = (ladder.norm() / ENERGY_SQUARED).log2();
-        let increment = ladder.increment(k).unwrap_or(Dense::zeros(dim, dim));
         let mut doubling = Self {
-            ladder,
-            increment,
-            k,
-            squared: stiff.ceil().clamp(0.0, 1e3) as u32,
+            longest,
+            k: k + halvings,
             grams,
-            buffers: [buffer.clone(), buffer.clone(), buffer],
+            along: None,
         };
         for _ in 0..halvings {
-            doubling.double();
+            doubling.double((generator, fast));
         }
         doubling
     }
 
-    /// exp(𝒜t) − I from that of half the time; where it is computed anew and beyond doubles, as the flow itself is then, nothing.
-    fn renew(&mut self) {
-        if self.k >= self.squared {
-            let square = &mut self.buffers[0];
-            square.set_product(&self.increment, &self.increment);
-            self.increment.combine(2.0, 1.0, square);
-        } else if let Some(increment) = self.ladder.increment(self.k) {
-            self.increment = increment;
-        }
-    }
-
     /// Φ = I + E: Γ ← Γ + Φᵀ Γ Φ.
-    fn double(&mut self) {
-        let [first, second, transposed] = &mut self.buffers;
-        let e = &self.increment;
+    fn double(&mut self, (generator, fast): (&DMatrix<f64>, &[usize])) {
+        let (k, longest) = (self.k, self.longest);
+        let along = (self.along).get_or_insert_with(|| Along::new(generator, fast, longest, k));
+        while along.k > k {
+            along.go_on();
+        }
+        let [first, second, transposed] = &mut along.buffers;
+        let e = &along.increment;
         transposed.set_transposed(e);
         for gram in &mut self.grams {
             first.set_product(gram, e);
@@ -455,14 +462,39 @@ impl Doubling {
             gram.add(first);
             gram.add(second);
         }
-        if self.k > 0 {
-            self.k -= 1;
-            self.renew();
-        }
+        self.k = k.saturating_sub(1);
     }
 
     fn forms(&self) -> Quadratics {
         Quadratics::of(&self.grams)
+    }
+}
+
+impl Along {
+    fn new(generator: &DMatrix<f64>, fast: &[usize], longest: f64, k: u32) -> Self {
+        let dim = generator.nrows();
+        let mut ladder = Ladders::new(generator, fast, longest, ENERGY_SQUARED, 0);
+        let stiff = (ladder.norm() / ENERGY_SQUARED).log2();
+        let nothing = Dense::zeros(dim, dim);
+        Self {
+            increment: ladder.increment(k).unwrap_or_else(|| nothing.clone()),
+            ladder,
+            squared: stiff.ceil().clamp(0.0, 1e3) as u32,
+            k,
+            buffers: [nothing.clone(), nothing.clone(), nothing],
+        }
+    }
+
+    /// exp(𝒜t) − I from that of half the time; where it is computed anew and beyond doubles, as the flow itself is then, nothing.
+    fn go_on(&mut self) {
+        self.k -= 1;
+        if self.k >= self.squared {
+            let square = &mut self.buffers[0];
+            square.set_product(&self.increment, &self.increment);
+            self.increment.combine(2.0, 1.0, square);
+        } else if let Some(increment) = self.ladder.increment(self.k) {
+            self.increment = increment;
+        }
     }
 }
 
@@ -476,6 +508,10 @@ mod tests {
             amplitude,
             power: 0.0,
         }
+    }
+
+    fn over(integrals: &mut Integrals<'_>, level: u32, w: &[f64]) -> [f64; 2] {
+        integrals.along(Stretch::Table(level), |_| 0.0, w)
     }
 
     fn term(v: &[f64], i: &[f64], source: bool) -> Term {
@@ -501,7 +537,7 @@ mod tests {
         let terms = vec![term(&[1.0], &[1.0], true), term(&[2.0], &[1.0], false)];
         let mut work = EnergyIntegral::new(terms, &[], 32.0 * h, 5).unwrap();
         for k in 0..6 {
-            let [source, dissipated] = work.integrals(&a, sizes(&[3.0])).over(k, &[3.0]);
+            let [source, dissipated] = over(&mut work.integrals(&a, sizes(&[3.0])), 5 - k, &[3.0]);
             let expected = exact(h * f64::from(1 << k));
             assert!((source / expected + 1.0).abs() < 1e-15, "{k}");
             assert!((dissipated / expected - 2.0).abs() < 1e-15, "{k}");
@@ -533,7 +569,7 @@ mod tests {
         // v = x₂ + gain x₁ obeys v' = −fast v exactly: ∫ v² = v₀²/(2 fast).
         let w = [1.0, 1e-3 - gain];
         let v = w[1] + gain;
-        let [_, found] = work.integrals(&a, sizes(&[1.0, gain])).over(20, &w);
+        let [_, found] = over(&mut work.integrals(&a, sizes(&[1.0, gain])), 0, &w);
         assert!(
             (found / (v * v / (2.0 * fast)) - 1.0).abs() < 1e-6,
             "{found}"
@@ -550,7 +586,7 @@ mod tests {
             let mut work = EnergyIntegral::new(terms, &[], 1.0, 5).unwrap();
             let amplitudes = [1.0, amplitude];
             let mut integrals = work.integrals(&a, sizes(&amplitudes));
-            let [_, found] = integrals.over(5, &[1.0, 0.0]);
+            let [_, found] = over(&mut integrals, 0, &[1.0, 0.0]);
             assert!((3.0 * found - 1.0).abs() < 1e-14, "{amplitude:e}: {found}");
         }
     }

@@ -327,17 +327,14 @@ impl Flow {
         };
         let mut integrals = work.integrals(&self.generator, sizes);
         stretches.fold([0.0; 2], |[source, dissipated], (stretch, w)| {
-            let over = match stretch {
-                Stretch::Table(level) => integrals.over(self.bottom - level, w),
-                Stretch::Span(span) => integrals.over_span(span, self.recurring.time(span), w),
-            };
+            let over = integrals.along(stretch, |span| self.recurring.time(span), w);
             [source + over[0], dissipated + over[1]]
         })
     }
 
     /// (from sources, dissipated) at w, W.
-    pub(crate) fn power(&mut self, w: &[f64]) -> [f64; 2] {
-        let work = self.work.as_mut();
+    pub(crate) fn power(&self, w: &[f64]) -> [f64; 2] {
+        let work = self.work.as_ref();
         work.map_or([0.0; 2], |work| work.power(w))
     }
 
