@@ -11,6 +11,7 @@ mod spice;
 
 pub(crate) use crossings::first_crossing;
 pub use crossings::{Crossing, Rest, crossings};
+pub(crate) use piece::Straight;
 pub use piece::{Oscillation, Piece};
 pub use spice::{Form, WaveError};
 
@@ -346,10 +347,56 @@ impl Wave {
         (before.piece.end <= t && before.last != after.first).then_some((before.last, after.first))
     }
 
+    /// As [`Self::piece`], of waveforms that consist of straight lines.
+    pub(crate) fn line(&self, t: f64) -> Option<Straight> {
+        self.straight(t, Side::Right)
+    }
+
+    /// As [`Self::line`], `t` not before this one.
+    pub(crate) fn line_after(&self, line: &Straight, t: f64) -> Option<Straight> {
+        self.straight_by(|corners| corners.go_on(line, t))
+    }
+
+    fn straight(&self, t: f64, side: Side) -> Option<Straight> {
+        self.straight_by(|corners| corners.straight(t, side))
+    }
+
+    /// What is to be found among the corners of a waveform of straight lines.
+    #[inline]
+    fn straight_by(&self, find: impl FnOnce(&Polyline<'_>) -> Straight) -> Option<Straight> {
+        match *self {
+            Self::Dc(value) => {
+                let line = Straight::constant(value, f64::NEG_INFINITY, f64::INFINITY);
+                Some(line)
+            }
+            Self::Pulse {
+                v1,
+                v2,
+                delay,
+                rise,
+                fall,
+                width,
+                period,
+                count,
+            } => {
+                let corners = polyline::pulse_corners(v1, v2, rise, fall, width, period);
+                Some(find(&Polyline::pulse(&corners, delay, period, count)))
+            }
+            Self::Pwl {
+                ref points,
+                repeat,
+                delay,
+            } => Some(find(&Polyline::pwl(points, repeat, delay))),
+            _ => None,
+        }
+    }
+
     /// The segment around `t`; at a breakpoint the one on the given side.
     fn segment(&self, t: f64, side: Side) -> Segment {
+        if let Some(line) = self.straight(t, side) {
+            return line.into();
+        }
         match *self {
-            Self::Dc(value) => Segment::constant(value, f64::NEG_INFINITY, f64::INFINITY),
             Self::Sin {
                 offset,
                 amplitude,
@@ -386,24 +433,6 @@ impl Wave {
                     Segment::constant(start, end, f64::INFINITY)
                 }
             }
-            Self::Pulse {
-                v1,
-                v2,
-                delay,
-                rise,
-                fall,
-                width,
-                period,
-                count,
-            } => {
-                let corners = polyline::pulse_corners(v1, v2, rise, fall, width, period);
-                Polyline::pulse(&corners, delay, period, count).segment(t, side)
-            }
-            Self::Pwl {
-                ref points,
-                repeat,
-                delay,
-            } => Polyline::pwl(points, repeat, delay).segment(t, side),
             Self::Exp {
                 v1,
                 v2,
@@ -421,7 +450,6 @@ impl Wave {
             Self::Arriving { initial, .. } => {
                 Segment::constant(initial, f64::NEG_INFINITY, f64::INFINITY)
             }
-            Self::Sffm { .. } => Segment::constant(f64::NAN, f64::NEG_INFINITY, f64::INFINITY),
             Self::Am {
                 amplitude,
                 offset,
@@ -440,6 +468,10 @@ impl Wave {
                         last: f64::NAN,
                     }
                 }
+            }
+            // A tone has no closed form, and lines are done.
+            Self::Sffm { .. } | Self::Dc(_) | Self::Pulse { .. } | Self::Pwl { .. } => {
+                Segment::constant(f64::NAN, f64::NEG_INFINITY, f64::INFINITY)
             }
         }
     }

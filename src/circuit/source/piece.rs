@@ -156,6 +156,31 @@ pub(super) struct Segment {
 
 impl Segment {
     pub(super) fn constant(value: f64, start: f64, end: f64) -> Self {
+        Straight::constant(value, start, end).into()
+    }
+}
+
+/// A segment without terms: first + slope (t − origin) on [start, end).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Straight {
+    pub(super) start: f64,
+    /// The next breakpoint, or ∞.
+    pub(crate) end: f64,
+    /// Reference time, finite.
+    pub(crate) origin: f64,
+    /// The value there, V or A.
+    pub(crate) first: f64,
+    /// V/s or A/s.
+    pub(crate) slope: f64,
+    /// The limit at the end.
+    pub(super) last: f64,
+    /// Of a line through corner points: its lap, and the point at which it ends.
+    pub(super) lap: f64,
+    pub(super) next: usize,
+}
+
+impl Straight {
+    pub(super) fn constant(value: f64, start: f64, end: f64) -> Self {
         let origin = if start.is_finite() {
             start
         } else if end.is_finite() {
@@ -164,9 +189,24 @@ impl Segment {
             0.0
         };
         Self {
-            piece: Piece::line(start, end, origin, value, 0.0),
+            start,
+            end,
+            origin,
             first: value,
+            slope: 0.0,
             last: value,
+            lap: 0.0,
+            next: 0,
+        }
+    }
+}
+
+impl From<Straight> for Segment {
+    fn from(line: Straight) -> Self {
+        Self {
+            piece: Piece::line(line.start, line.end, line.origin, line.first, line.slope),
+            first: line.first,
+            last: line.last,
         }
     }
 }

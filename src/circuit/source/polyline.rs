@@ -1,7 +1,7 @@
 //! Straight lines through corner points, repeated with a period: `PULSE` and `PWL`.
 
 use super::Side;
-use super::piece::{Piece, Segment};
+use super::piece::{Segment, Straight};
 use crate::settings::tolerances::times::SAME_TIME;
 
 /// Corner points (time, value), shifted, repeated and stopped.
@@ -126,45 +126,70 @@ impl<'a> Polyline<'a> {
     }
 
     /// The segment around `t`.
-    pub(super) fn segment(&self, t: f64, side: Side) -> Segment {
+    pub(super) fn straight(&self, t: f64, side: Side) -> Straight {
         let Some(&(_, initial)) = self.points.first() else {
-            return Segment::constant(0.0, f64::NEG_INFINITY, f64::INFINITY);
+            return Straight::constant(0.0, f64::NEG_INFINITY, f64::INFINITY);
         };
         if !side.before(t, self.stop) {
-            return Segment::constant(initial, self.stop, f64::INFINITY);
+            return Straight::constant(initial, self.stop, f64::INFINITY);
         }
-        let mut segment = self.unstopped(t, side, initial);
-        if segment.piece.end > self.stop {
-            segment.piece.end = self.stop;
-            segment.last = segment.piece.value(self.stop);
-        }
-        segment
+        let (number, lap) = self.lap(t, side);
+        let passed = self.passed(&lap, self.begin(number), t, side);
+        self.between((number, &lap), passed, initial)
     }
 
-    fn unstopped(&self, t: f64, side: Side, initial: f64) -> Segment {
-        let number = self.lap(t, side);
-        let begin = if number > 0.0 {
+    /// The segment right after `t`, which is not before `line`: mostly the next one.
+    pub(super) fn go_on(&self, line: &Straight, t: f64) -> Straight {
+        let (mut number, mut passed) = (line.lap, line.next);
+        let mut lap = self.on_axis(number);
+        if t >= lap.next {
+            number += 1.0;
+            (lap, passed) = (self.on_axis(number), self.begin(number));
+        }
+        let (Some(&(_, initial)), true) = (self.points.first(), t < lap.next && t < self.stop)
+        else {
+            return self.straight(t, Side::Right);
+        };
+        let later = self.points[passed..].iter();
+        passed += later.take_while(|point| t >= lap.time(point)).count();
+        self.between((number, &lap), passed, initial)
+    }
+
+    /// The point where a lap begins.
+    fn begin(&self, lap: f64) -> usize {
+        if lap > 0.0 {
             self.laps.map_or(0, |(from, _)| from)
         } else {
             0
-        };
-        let lap = self.on_axis(number);
-        let passed = self.passed(&lap, begin, t, side);
-        if passed == begin {
-            return Segment::constant(initial, f64::NEG_INFINITY, lap.time(&self.points[begin]));
         }
-        let point = self.points[passed - 1];
-        let (start, (_, first)) = (lap.time(&point), point);
-        let Some(next) = self.points.get(passed) else {
-            return Segment::constant(first, start, f64::INFINITY);
+    }
+
+    /// The segment of a lap that ends at a point.
+    fn between(&self, (number, lap): (f64, &Lap), next: usize, initial: f64) -> Straight {
+        let mut line = if next == self.begin(number) {
+            Straight::constant(initial, f64::NEG_INFINITY, lap.time(&self.points[next]))
+        } else {
+            let point = self.points[next - 1];
+            let (start, (_, first)) = (lap.time(&point), point);
+            match self.points.get(next) {
+                None => Straight::constant(first, start, f64::INFINITY),
+                Some(point) => {
+                    let (end, last) = (lap.time(point), point.1);
+                    Straight {
+                        end,
+                        slope: (last - first) / (end - start),
+                        last,
+                        ..Straight::constant(first, start, end)
+                    }
+                }
+            }
         };
-        let (end, (_, last)) = (lap.time(next), *next);
-        let slope = (last - first) / (end - start);
-        Segment {
-            piece: Piece::line(start, end, start, first, slope),
-            first,
-            last,
+        (line.lap, line.next) = (number, next);
+        if line.end > self.stop {
+            line.end = self.stop;
+            line.last = Segment::from(line).piece.value(self.stop);
         }
+        line
     }
 
     /// Index after the last point of the lap that `t` has passed.
@@ -182,27 +207,56 @@ impl<'a> Polyline<'a> {
         low
     }
 
-    /// The lap `t` falls into, from 0.
-    fn lap(&self, t: f64, side: Side) -> f64 {
+    /// The lap `t` falls into, and its number, from 0.
+    fn lap(&self, t: f64, side: Side) -> (f64, Lap) {
         let Some((from, period)) = self.laps else {
-            return 0.0;
+            return (0.0, self.on_axis(0.0));
         };
         // The quotient may be one off for rounding, never more; beyond 2^53 laps k + 1 = k.
         let guess = ((t - self.offset - self.points[from].0) / period) as i64;
-        let mut lap = guess.saturating_sub(1).max(0) as f64;
+        let mut number = guess.saturating_sub(1).max(0) as f64;
+        let mut lap = self.on_axis(number);
         for _ in 0..3 {
-            if side.before(t, self.on_axis(lap).next) {
+            if side.before(t, lap.next) {
                 break;
             }
-            lap += 1.0;
+            number += 1.0;
+            lap = self.on_axis(number);
         }
-        lap
+        (number, lap)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// From one end to the next, over any number of them, and to times in between.
+    #[test]
+    fn going_on_finds_what_a_search_finds() {
+        let corners = pulse_corners(0.0, 1.0, 1e-8, 1e-8, 5.8e-6, 1e-5);
+        let points = [(0.0, 1.0), (1e-6, 2.0), (1e-6, 0.5), (3e-6, -1.0)];
+        for line in [
+            Polyline::pulse(&corners, 0.0, 1e-5, None),
+            Polyline::pulse(&corners, 3.3e-6, 1e-5, Some(7.0)),
+            Polyline::pulse(&corners, 1.0, 0.0, None),
+            Polyline::pwl(&points, None, 2e-6),
+            Polyline::pwl(&points, Some(1e-6), 2e-6),
+        ] {
+            let mut here = line.straight(0.0, Side::Right);
+            for k in 0..1000 {
+                let end = here.end.min(1e-3);
+                for t in [end, end.next_up(), end + 1e-7, end + 3e-6, end + 3.3e-5] {
+                    assert_eq!(
+                        line.go_on(&here, t),
+                        line.straight(t, Side::Right),
+                        "{k} {t}"
+                    );
+                }
+                here = line.go_on(&here, end);
+            }
+        }
+    }
 
     /// Late on the axis of time a corner shortly before the end of its lap may round to beyond it.
     #[test]

@@ -1,31 +1,11 @@
 //! Switches controlled by straight sources alone: when they move is known before the run, and no guard watches them.
 
 use crate::circuit::Source;
+use crate::circuit::source::Straight;
 use crate::integrate::switching::{Known, Threshold};
 use crate::mna::SourceControl;
 use crate::settings::tolerances::events::CONTROL_ROUNDINGS;
 use crate::settings::tolerances::times::SAME_TIME;
-
-/// constant + slope (t − origin) until `end`: a piece of a straight source.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Line {
-    end: f64,
-    origin: f64,
-    constant: f64,
-    slope: f64,
-}
-
-impl Line {
-    fn of(source: &Source, t: f64) -> Option<Self> {
-        let piece = source.piece(t)?;
-        Some(Self {
-            end: piece.end,
-            origin: piece.origin,
-            constant: piece.constant,
-            slope: piece.slope,
-        })
-    }
-}
 
 /// A control at one time and as it goes on.
 struct Course {
@@ -60,7 +40,7 @@ pub(crate) struct Clock {
     pub(crate) switch: usize,
     constant: f64,
     /// Input, factor, present piece.
-    terms: Vec<(usize, f64, Line)>,
+    terms: Vec<(usize, f64, Straight)>,
     /// When the switch next moves, s.
     pub(crate) next: f64,
     /// The position in which `next` was found.
@@ -77,7 +57,7 @@ impl Clock {
         } = control;
         let terms = terms
             .into_iter()
-            .map(|(input, factor)| Some((input, factor, Line::of(&sources[input], t)?)))
+            .map(|(input, factor)| Some((input, factor, sources[input].wave.line(t)?)))
             .collect::<Option<_>>()?;
         Some(Self {
             switch,
@@ -92,7 +72,7 @@ impl Clock {
     pub(crate) fn stand_at(&mut self, sources: &[Source], t: f64) {
         self.next = f64::NEG_INFINITY;
         for (input, _, line) in &mut self.terms {
-            if let Some(there) = Line::of(&sources[*input], t) {
+            if let Some(there) = sources[*input].wave.line(t) {
                 *line = there;
             }
         }
@@ -109,9 +89,9 @@ impl Clock {
         };
         for (_, factor, line) in &self.terms {
             let (slope, since) = (factor * line.slope, t - line.origin);
-            course.value += factor * (line.constant + line.slope * since);
+            course.value += factor * (line.first + line.slope * since);
             course.slope += slope;
-            course.size += (factor * line.constant).abs() + (slope * since).abs();
+            course.size += (factor * line.first).abs() + (slope * since).abs();
             course.steepness += slope.abs();
             course.end = course.end.min(line.end);
         }
@@ -151,8 +131,13 @@ impl Clock {
         (mut t, until): (f64, f64),
         sources: &[Source],
     ) -> f64 {
-        let mut course = self.course(t);
+        let mut moved = false;
         loop {
+            let course = self.course(t);
+            if moved && course.leaves(threshold, self.on) {
+                return t;
+            }
+            moved = true;
             let Course {
                 end, value, slope, ..
             } = course;
@@ -176,16 +161,12 @@ impl Clock {
             }
             for (input, _, line) in &mut self.terms {
                 if line.end <= t {
-                    match Line::of(&sources[*input], t) {
+                    match sources[*input].wave.line_after(line, t) {
                         Some(next) if next.end > t => *line = next,
                         // A piece too short for the resolution of t.
                         _ => line.end = t.next_up(),
                     }
                 }
-            }
-            course = self.course(t);
-            if course.leaves(threshold, self.on) {
-                return t;
             }
         }
     }
