@@ -270,8 +270,11 @@ impl Stepper for Accompanied<'_> {
         if self.run.has_stepped() {
             return &[];
         }
-        let rows = self.run.rows_ahead(times, k);
-        self.k += rows.len() / self.units.len().max(1);
+        let (rows, columns) = (self.run.rows_ahead(times, k), self.amplitude.len());
+        if let Some(row) = rows.get(..columns) {
+            grow(&mut self.amplitude, row);
+        }
+        self.k += rows.len() / columns.max(1);
         rows
     }
 

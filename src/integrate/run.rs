@@ -19,8 +19,8 @@ pub trait Stepper {
     fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), Error>;
     /// Probe values at the current time (right limit), one per output name.
     fn read(&mut self, row: &mut [f64]);
-    /// Advances over the output times k, k + 1, … of the grid whose rows are known already, and returns these rows, one after the
-    /// other.
+    /// Advances over the output times k + 1, … of the grid whose rows are known already, and returns them behind that of time k, at which
+    /// it stands, one after the other; nothing where that row is to be read.
     fn rows_ahead(&mut self, _times: &Times, _k: usize) -> &[f64] {
         &[]
     }
@@ -100,13 +100,16 @@ pub(crate) fn attempt(
     let mut k = 0;
     while k < times.len {
         let advanced = stepper.advance(times.at(k), log).and_then(|()| {
-            stepper.read(&mut row);
-            log.rows.grid(&times, k..k + 1, &row)?;
-            let ahead = stepper.rows_ahead(&times, k + 1);
-            let after = k + 1 + ahead.len() / row.len().max(1);
-            if after > k + 1 {
-                log.rows.grid(&times, k + 1..after, ahead)?;
-            }
+            let known = stepper.rows_ahead(&times, k);
+            let after = if known.is_empty() {
+                stepper.read(&mut row);
+                log.rows.grid(&times, k..k + 1, &row)?;
+                k + 1
+            } else {
+                let after = k + known.len() / row.len();
+                log.rows.grid(&times, k..after, known)?;
+                after
+            };
             if after < times.len {
                 log.go_on(times.at(after - 1))?;
             }

@@ -55,16 +55,18 @@ impl DenseOutput {
 
     /// See [`Stepper::rows_ahead`](crate::integrate::run::Stepper::rows_ahead), of so many columns, an output step `h` apart.
     pub(super) fn take_all(&mut self, times: &Times, k: usize, columns: usize, h: f64) -> &[f64] {
+        let Some(here) = self.taken.checked_sub(1) else {
+            return &[];
+        };
         // The last output time need not be a step away from the one before.
-        let count = (self.count - self.taken).min(times.len.saturating_sub(k + 1));
-        let before = self.taken;
+        let count = (self.count - self.taken).min(times.len.saturating_sub(k + 2));
         if count > 0 {
             self.taken += count - 1;
-            if !self.take(times.at(k + count - 1), h) {
-                self.taken = before;
+            if !self.take(times.at(k + count), h) {
+                self.taken = here + 1;
             }
         }
-        &self.values[before * columns..self.taken * columns]
+        &self.values[here * columns..self.taken * columns]
     }
 
     /// Has the run stand at the last row that was asked for, or at the end of the step where that is no later than `t`.
