@@ -150,11 +150,20 @@ impl SparseKernel {
     /// y = K w in whole blocks, zeros behind the last row.
     #[inline]
     pub(crate) fn apply(&self, w: &[f64], y: &mut [Block]) {
-        let mut begin = 0;
-        for (&end, y) in self.ends.iter().zip(y) {
-            *y = sparse_product(&self.blocks[begin..end], w);
-            begin = end;
+        for (product, y) in self.products(w).zip(y) {
+            *y = product;
         }
+    }
+
+    /// K w block by block.
+    #[inline]
+    pub(crate) fn products(&self, w: &[f64]) -> impl Iterator<Item = Block> {
+        let mut begin = 0;
+        self.ends.iter().map(move |&end| {
+            let blocks = &self.blocks[begin..end];
+            begin = end;
+            sparse_product(blocks, w)
+        })
     }
 }
 

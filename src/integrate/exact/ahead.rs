@@ -111,9 +111,10 @@ impl DenseOutput {
         let h = mode.flow.step(LONG);
         let negligible = SAME_TIME * (t + MOST as f64 * h).abs();
         let off_row = (t - travel.t - h).abs() > negligible;
-        let between = ((end - t) / h).floor() + 1.0;
         let begins = travel.age == 0.0 && t > travel.t + negligible;
-        let next = next.filter(|_| begins && (1.0..=MOST as f64).contains(&between));
+        let next = next.filter(|_| begins);
+        let between = next.map_or(0.0, |_| ((end - t) / h).floor() + 1.0);
+        let next = next.filter(|_| (1.0..=MOST as f64).contains(&between));
         let count = if next.is_some_and(|next| self.leap_to(travel, mode, (t, next), off_row)) {
             between as usize
         } else {

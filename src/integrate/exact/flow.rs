@@ -166,6 +166,12 @@ impl Flow {
         self.steps[level as usize]
     }
 
+    /// The first level from this one on whose step is at most so long, s, among those longer than the output step.
+    #[inline(never)]
+    pub(crate) fn level_within(&self, from: u32, longest: f64) -> Option<u32> {
+        (from..LONG).find(|&level| self.step(level) <= longest)
+    }
+
     /// See [`Spectrum::step_limit`]; without guards nothing can hide, and only growth counts.
     pub(crate) fn step_limit(&self, age: f64) -> f64 {
         if self.guards == 0 {
@@ -256,6 +262,19 @@ impl Flow {
         w: &[f64],
         next: &mut [f64],
     ) -> Option<f64> {
+        let off = self.go_span(span, time, w, next)?;
+        self.read_guards(next);
+        Some(off)
+    }
+
+    /// The same but for the guards.
+    pub(crate) fn go_span(
+        &mut self,
+        span: usize,
+        time: f64,
+        w: &[f64],
+        next: &mut [f64],
+    ) -> Option<f64> {
         let (generator, fast, loss) = (&self.generator, &self.fast, &mut self.loss);
         let increment = self.recurring.increment(span, |time| {
             let mut ladder = Ladders::new(generator, fast, time, SQUARED, 0);
@@ -276,7 +295,6 @@ impl Flow {
             }
             self.rates = rates;
         }
-        self.read_guards(next);
         Some(off)
     }
 

@@ -6,7 +6,7 @@ use super::magnitudes::ORDERS;
 use super::mode::Mode;
 use super::rounding::resolution;
 use super::slaved::Manifold;
-use crate::linalg::refill::refill;
+use crate::linalg::refill::{raise, refill};
 use crate::settings::tolerances::events::{GROUP, NOISE};
 use crate::settings::tolerances::jumps::CONSISTENT;
 
@@ -101,9 +101,7 @@ impl Inspector {
         mode.flow.read_guards(&mut self.w);
         mode.sizes_of_state(known, &mut self.sizes);
         self.sizes.resize(mode.flow.dim(), 0.0);
-        for (size, w) in self.sizes.iter_mut().zip(&self.w) {
-            *size = size.max(w.abs());
-        }
+        raise(&mut self.sizes, &self.w);
         self.read_rates(mode, (exosystem, z), time);
         let undisturbed = mode.constraints.is_empty() && self.slips.is_empty();
         if undisturbed && mode.magnitudes.cover(&self.sizes) {
@@ -193,10 +191,9 @@ impl Inspector {
         refill(&mut self.w, x);
         self.w.extend_from_slice(z);
         self.sizes.clear();
-        self.sizes.extend(self.w.iter().map(|w| w.abs()));
-        for (size, known) in self.sizes.iter_mut().zip(&mode.magnitudes.sizes) {
-            *size = size.max(*known);
-        }
+        self.sizes.resize(self.w.len(), 0.0);
+        raise(&mut self.sizes, &self.w);
+        raise(&mut self.sizes, &mode.magnitudes.sizes);
         self.rates.clear();
         self.read_jets(mode, t);
     }

@@ -67,12 +67,13 @@ impl Report {
         jumped: bool,
         log: &mut Log,
     ) {
-        let mut changes: Arc<[Change]> = Arc::default();
-        if let Some(from) = from.filter(|from| *from != at) {
-            changes = table.label(from, at, |table| label(table, from, at));
+        let from = from.filter(|from| *from != at);
+        let changes = from.map(|from| table.label(from, at, |table| label(table, from, at)));
+        if changes.is_some() {
             self.events += 1;
-            let ended = self.accumulation.event(t, at);
-            self.notes.extend(ended.map(accumulated));
+            if let Some(text) = self.accumulation.event(t, at) {
+                self.notes.push(accumulated(text));
+            }
         }
         if !table.modes[at].shared.is_empty() && !self.noted_shared {
             self.noted_shared = true;
@@ -83,8 +84,8 @@ impl Report {
             devices.dedup();
             self.notes.push(Note::shared(&devices));
         }
-        if jumped || !changes.is_empty() {
-            log.event(t, changes, jumped);
+        if jumped || changes.as_ref().is_some_and(|changes| !changes.is_empty()) {
+            log.event(t, changes.unwrap_or_default(), jumped);
         }
         self.note_slides(table, at, t);
     }

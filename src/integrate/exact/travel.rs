@@ -7,7 +7,7 @@ use super::magnitudes::Magnitudes;
 use super::rounding::resolution;
 use super::slaved::Follower;
 use crate::linalg::polynomial;
-use crate::linalg::refill::refill;
+use crate::linalg::refill::{raise, refill};
 use crate::linalg::series::Series;
 use crate::settings::tolerances::events::CLEAR_OF_ZERO;
 use crate::settings::tolerances::events::SIMULTANEOUS;
@@ -133,10 +133,13 @@ impl Travel {
         self.barrier = f64::INFINITY;
         refill(&mut self.amplitude, &magnitudes.sizes);
         self.peak.clear();
-        self.peak.extend(w[..flow.states()].iter().map(|v| v.abs()));
+        self.peak.resize(flow.states(), 0.0);
+        self.note_peak();
         let guards = &w[dim..dim + flow.guards()];
         self.slack.clear();
-        self.slack.extend(guards.iter().map(|g| larger(-g, 0.0)));
+        for g in guards {
+            self.slack.push(larger(-g, 0.0));
+        }
         self.followers.clone_from(&magnitudes.followers);
         self.following = 0;
         self.note_next_follower();
@@ -165,16 +168,12 @@ impl Travel {
 
     #[inline]
     fn note_peak(&mut self) {
-        for (peak, v) in self.peak.iter_mut().zip(&self.now) {
-            *peak = larger(*peak, v.abs());
-        }
+        raise(&mut self.peak, &self.now);
     }
 
     fn refresh_noise(&mut self, flow: &Flow) {
         self.note_peak();
-        for (a, v) in self.amplitude.iter_mut().zip(&self.now) {
-            *a = larger(*a, v.abs());
-        }
+        raise(&mut self.amplitude, &self.now);
         if self.age >= self.follows {
             self.follow(flow);
         }
@@ -208,6 +207,7 @@ impl Travel {
         self.follows = next.map_or(f64::INFINITY, |next| next.age);
     }
 
+    #[inline(never)]
     fn add_slack(&mut self) {
         for (floor, slack) in self.floors.iter_mut().zip(&self.slack) {
             *floor += slack;
@@ -271,7 +271,7 @@ impl Travel {
         }
         let limit = flow.step_limit(self.age);
         let longest = limit.min(end.min(self.barrier) - self.t);
-        let mut level = (0..LONG).find(|&level| flow.step(level) <= longest)?;
+        let mut level = flow.level_within(0, longest)?;
         loop {
             if !flow.leap(level, &self.now, &mut self.next) {
                 return None;
@@ -282,7 +282,7 @@ impl Travel {
             }
             let part = self.crossing(flow, step).unwrap_or(0.5);
             self.barrier = self.t + part * step;
-            level = (level + 1..LONG).find(|&level| flow.step(level) <= part * step)?;
+            level = flow.level_within(level + 1, part * step)?;
         }
     }
 
@@ -341,14 +341,14 @@ impl Travel {
         off.map(|off| Leap { span, stop, off })
     }
 
-    /// `[w | g | g']` at `t` on a span that is known to be clear, if the time until then recurs.
+    /// w at `t` on a span that is known to be clear, if the time until then recurs.
     pub(crate) fn look_ahead(&self, flow: &mut Flow, t: f64, w: &mut Vec<f64>) -> bool {
         let time = t - self.t;
         let Some(span) = flow.recurs(time, SAME_TIME * t.abs()) else {
             return false;
         };
-        w.resize(self.now.len(), 0.0);
-        flow.leap_span(span, time, &self.now, w).is_some()
+        w.resize(flow.dim(), 0.0);
+        flow.go_span(span, time, &self.now, w).is_some()
     }
 
     /// Ends [`Self::leap_span`].
