@@ -270,4 +270,4 @@ pub(crate) const TIMES_APART: f64 = 8.0;
 
 /// And by this part at least where a device changes within a step: its instant is that of a line, also where currents end within nanoseconds, in long and short steps alike. Larger: errors
 /// that are stated too large; smaller: too small (docs/validation.md).
-pub(crate) const LEAST_BENT: f64 = 1e-2;
+pub(crate) const LEAST_BENT: f64 = 3e-2;
