@@ -250,8 +250,9 @@ impl Beside<'_> {
             None => self.differences(to)?,
         };
         found.of.retain(|gradient| {
-            let is_there = self.entries.is_none() || gradient.value.is_ok();
-            is_there && self.options.asks_for(&gradient.name)
+            // What a table leaves out is told where it is asked for.
+            let is_told = self.entries.is_none() || !self.options.of.is_empty();
+            (is_told || gradient.value.is_ok()) && self.options.asks_for(&gradient.name)
         });
         Ok(found)
     }
