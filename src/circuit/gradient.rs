@@ -58,13 +58,13 @@ struct Scene<'a> {
     results: Vec<f64>,
 }
 
-/// The derivatives of measurements that found something; none where they are not known, as where an expression jumps by itself. An extremum that is reached again to `same`, a part of what
-/// the values span, has rivals.
+/// The derivatives of measurements that are needed, by themselves or by others, and found something; none where they are not known, as where an expression jumps by itself. An extremum that
+/// is reached again to `same`, a part of what the values span, has rivals.
 pub(crate) fn weights(
     all: &[NamedMeasurement],
-    curves: &Curves,
+    (curves, same): (&Curves, f64),
     found: &[Measured],
-    same: f64,
+    needed: &mut [bool],
 ) -> Vec<Option<Weights>> {
     let value = |measured: &Measured| measured.result.as_ref().map_or(f64::NAN, |f| f.value);
     let scene = Scene {
@@ -74,10 +74,21 @@ pub(crate) fn weights(
         same,
         results: found.iter().map(value).collect(),
     };
-    let of = |(named, measured): (&NamedMeasurement, &Measured)| {
-        scene.weights(named.what.as_ref()?, measured.result.as_ref().ok()?)
-    };
-    all.iter().zip(found).map(of).collect()
+    let of = |k: usize| scene.weights(all[k].what.as_ref()?, found[k].result.as_ref().ok()?);
+    let mut weights: Vec<Option<Weights>> = vec![None; all.len()];
+    let mut left: Vec<usize> = (0..all.len()).filter(|k| needed[*k]).collect();
+    while let Some(k) = left.pop() {
+        weights[k] = of(k);
+        let results = weights[k]
+            .iter()
+            .flat_map(|own| own.results.iter().enumerate());
+        for (used, _) in results.filter(|(_, weight)| **weight != 0.0) {
+            if !std::mem::replace(&mut needed[used], true) {
+                left.push(used);
+            }
+        }
+    }
+    weights
 }
 
 impl<'a> Scene<'a> {

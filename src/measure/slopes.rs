@@ -14,6 +14,7 @@ use super::curve::{Curve, VALUES, basis, basis_slopes};
 use super::trace::{Shape, Trace};
 use super::{MeasureError, Over};
 use crate::linalg::gauss::{NODES, WEIGHTS};
+use crate::settings::tolerances::periodic::MOST_RIVALS;
 use crate::settings::tolerances::times::SAME_TIME;
 
 /// Another time at which an extremum is reached with the same value.
@@ -263,7 +264,7 @@ impl Trace<'_> {
         let time = |(k, s): Reached| self.own()[k].time(s);
         let (first, rest) = all.split_first()?;
         let value = self.extreme_slopes_at(*first, window, false)?;
-        let rivals = rest.iter().filter_map(|at| {
+        let rivals = rest.iter().take(MOST_RIVALS + 1).filter_map(|at| {
             Some(Rival {
                 at: time(*at),
                 beside: time(*first),

@@ -54,26 +54,10 @@ impl Weighing {
         asked: impl Fn(&str) -> bool,
     ) -> Self {
         let found = circuit.measure(&Signals::Curves(curves));
-        let weights = weights(&circuit.measurements, curves, &found, same);
         let mut needed: Vec<bool> = found.iter().map(|found| asked(&found.name)).collect();
-        for _ in 0..found.len() {
-            for (k, weights) in weights
-                .iter()
-                .enumerate()
-                .filter(|(k, _)| needed[*k])
-                .collect::<Vec<_>>()
-            {
-                let used = weights
-                    .iter()
-                    .flat_map(|weights| weights.results.iter().enumerate());
-                let used: Vec<usize> = used.filter(|(_, w)| **w != 0.0).map(|(j, _)| j).collect();
-                used.into_iter().chain([k]).for_each(|j| needed[j] = true);
-            }
-        }
-        let of = |(needed, weights): (&bool, &Option<Weights>)| {
-            Some(weigh(weights.as_ref().filter(|_| *needed)?))
-        };
-        let weighted: Vec<Option<Weighted>> = needed.iter().zip(&weights).map(of).collect();
+        let weights = weights(&circuit.measurements, (curves, same), &found, &mut needed);
+        let weighted = weights.iter().map(|own| own.as_ref().map(weigh));
+        let weighted: Vec<Option<Weighted>> = weighted.collect();
         Self {
             rivals: rivals(weigh, &weights, &weighted),
             weighted,

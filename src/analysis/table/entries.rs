@@ -14,9 +14,6 @@ use crate::integrate::Error;
 use crate::measure::{Instant, Measurement, Over, Window};
 use crate::settings::tolerances::periodic::FUNDAMENTAL;
 
-/// Elements whose entries are measured in one run.
-const TOGETHER: usize = 3;
-
 /// What names of entries begin with.
 pub(in crate::analysis) const TABLE: &str = "table.";
 
@@ -43,15 +40,9 @@ pub(in crate::analysis) fn entries(
     let shown = columns.shown.iter();
     all.extend(shown.map(|column| columns.signal(*column, last.as_ref())));
     let parts = columns.parts();
-    let elements = (0..circuit.elements.len()).filter(|k| !is_inside(&circuit.elements[*k].name));
-    let elements: Vec<usize> = elements.collect();
-    all.extend(elements.chunks(TOGETHER).map(|chunk| {
-        let mut entries = Entries::default();
-        for k in chunk {
-            columns.element(*k, &parts[*k], &mut entries);
-        }
-        entries
-    }));
+    let elements = circuit.elements.iter().enumerate();
+    let shown = elements.filter(|(_, element)| !is_inside(&element.name));
+    all.extend(shown.map(|(k, _)| columns.element(k, &parts[k])));
     Ok(all)
 }
 
@@ -173,7 +164,8 @@ impl Columns<'_> {
         sum.unwrap_or(Formula::Number(0.0))
     }
 
-    fn element(&self, k: usize, parts: &[usize], entries: &mut Entries) {
+    fn element(&self, k: usize, parts: &[usize]) -> Entries {
+        let mut entries = Entries::default();
         let element = &self.circuit.elements[k];
         let name = format!("{TABLE}{}", element.name);
         // A transistor is known by the current into its first pin, a source without voltage.
@@ -186,8 +178,9 @@ impl Columns<'_> {
             entries.mean(&format!("{name}.{quantity}"), &seen);
         }
         let with_parts: Vec<usize> = [k].iter().chain(parts).copied().collect();
-        let work = self.work(&with_parts, entries);
+        let work = self.work(&with_parts, &mut entries);
         entries.over(format!("{name}.power"), Over::Average, work);
+        entries
     }
 
     fn signal(&self, column: usize, last: Option<&Last>) -> Entries {
