@@ -150,20 +150,11 @@ impl SparseKernel {
     /// y = K w in whole blocks, zeros behind the last row.
     #[inline]
     pub(crate) fn apply(&self, w: &[f64], y: &mut [Block]) {
-        for (product, y) in self.products(w).zip(y) {
-            *y = product;
-        }
-    }
-
-    /// K w block by block.
-    #[inline]
-    pub(crate) fn products(&self, w: &[f64]) -> impl Iterator<Item = Block> {
         let mut begin = 0;
-        self.ends.iter().map(move |&end| {
-            let blocks = &self.blocks[begin..end];
+        for (&end, y) in self.ends.iter().zip(y) {
+            *y = sparse_product(&self.blocks[begin..end], w);
             begin = end;
-            sparse_product(blocks, w)
-        })
+        }
     }
 }
 

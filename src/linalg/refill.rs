@@ -17,10 +17,16 @@ pub(crate) fn refill(to: &mut Vec<f64>, from: &[f64]) {
 /// Raises `to` to |`from`|, as far as both go.
 #[inline(never)]
 pub(crate) fn raise(to: &mut [f64], from: &[f64]) {
-    for (to, v) in to.iter_mut().zip(from) {
-        let size = v.abs();
-        // As `f64::max` where neither is NaN, in one instruction.
-        *to = if *to > size { *to } else { size };
+    // As `f64::max` where neither is NaN, in one instruction, for two at a time.
+    let raised = |to: f64, from: f64| if to > from.abs() { to } else { from.abs() };
+    let count = to.len().min(from.len());
+    let (pairs, last) = to[..count].as_chunks_mut::<2>();
+    let (theirs, others) = from[..count].as_chunks::<2>();
+    for ([a, b], [x, y]) in pairs.iter_mut().zip(theirs) {
+        (*a, *b) = (raised(*a, *x), raised(*b, *y));
+    }
+    if let ([to], [from]) = (last, others) {
+        *to = raised(*to, *from);
     }
 }
 

@@ -34,13 +34,9 @@ impl Series {
         let mut nothing_before = false;
         for k in 1..=MAX_DEGREE {
             let (known, rest) = self.terms.split_at_mut(k * blocks);
-            let products = generator.products(known[(k - 1) * blocks..].as_flattened());
-            let (factor, mut beyond) = (dt / k as f64, [0.0; BLOCK]);
-            for (product, (term, largest)) in products.zip(rest.iter_mut().zip(&mut self.largest)) {
-                *term = product.map(|value| value * factor);
-                settle(term, largest, &mut beyond);
-            }
-            let nothing = beyond.iter().all(|by| *by <= 0.0);
+            let term = &mut rest[..blocks];
+            generator.apply(known[(k - 1) * blocks..].as_flattened(), term);
+            let nothing = settle(term, &mut self.largest, dt / k as f64);
             if nothing && nothing_before {
                 self.degree = k;
                 break;
@@ -101,16 +97,21 @@ impl Series {
     }
 }
 
-/// Raises `largest` to a block of a term, and `beyond` to what is not nothing beside what they were.
+/// Scales a term, and raises `largest` to it; returns whether it was nothing beside what they were.
 #[inline]
-fn settle(term: &Block, largest: &mut Block, beyond: &mut Block) {
-    for ((value, largest), beyond) in term.iter().zip(largest).zip(beyond) {
-        let size = value.abs();
-        let by = size - TERM_IS_NOTHING * *largest;
-        // As `f64::max` where neither is NaN, in one instruction.
-        *beyond = if *beyond > by { *beyond } else { by };
-        *largest = if *largest > size { *largest } else { size };
+fn settle(term: &mut [Block], largest: &mut [Block], factor: f64) -> bool {
+    let mut beyond = [0.0_f64; BLOCK];
+    for (term, largest) in term.iter_mut().zip(largest) {
+        for ((value, largest), beyond) in term.iter_mut().zip(largest).zip(&mut beyond) {
+            *value *= factor;
+            let size = value.abs();
+            let by = size - TERM_IS_NOTHING * *largest;
+            // As `f64::max` where neither is NaN, in one instruction.
+            *beyond = if *beyond > by { *beyond } else { by };
+            *largest = if *largest > size { *largest } else { size };
+        }
     }
+    beyond.iter().all(|by| *by <= 0.0)
 }
 
 #[cfg(test)]
@@ -120,15 +121,12 @@ mod tests {
 
     #[test]
     fn a_term_that_grows_smaller_leaves_the_largest() {
-        let mut largest = [2.0; BLOCK];
-        let mut beyond = |size: f64| {
-            let mut beyond = [0.0; BLOCK];
-            settle(&[size; BLOCK], &mut largest, &mut beyond);
-            (beyond[0] > 0.0, largest)
-        };
-        assert_eq!(beyond(0.5), (true, [2.0; BLOCK]));
-        assert_eq!(beyond(3.0), (true, [3.0; BLOCK]));
-        assert_eq!(beyond(0.3 * TERM_IS_NOTHING), (false, [3.0; BLOCK]));
+        let (mut term, mut largest) = ([[1.0; BLOCK]], [[2.0; BLOCK]]);
+        assert!(!settle(&mut term, &mut largest, 0.5));
+        assert_eq!((term, largest), ([[0.5; BLOCK]], [[2.0; BLOCK]]));
+        assert!(!settle(&mut term, &mut largest, 6.0));
+        assert_eq!(largest, [[3.0; BLOCK]]);
+        assert!(settle(&mut term, &mut largest, 0.1 * TERM_IS_NOTHING));
     }
 
     /// Rotations at rates 1, 2, … beside a constant: any number of blocks, the same series.

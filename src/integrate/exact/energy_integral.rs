@@ -189,8 +189,9 @@ impl EnergyIntegral {
     pub(crate) fn power(&self, w: &[f64]) -> [f64; 2] {
         let mut power = [0.0; 2];
         for term in &self.terms {
-            let along = |row: &[(usize, f64)]| row.iter().fold(0.0, |sum, (j, x)| sum + x * w[*j]);
-            power[usize::from(!term.source)] += along(&term.v) * along(&term.i);
+            let [v, i] = [&term.v, &term.i]
+                .map(|row| row.iter().fold(0.0, |sum, (j, factor)| sum + factor * w[*j]));
+            power[usize::from(!term.source)] += v * i;
         }
         [-power[0], power[1]]
     }

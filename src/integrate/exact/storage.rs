@@ -111,8 +111,12 @@ impl Storage {
         self.balance.add((source, dissipated));
         mode.storage_at(&travel.now, &mut self.values);
         // An event often finds a current at zero: its size is what it was on the way.
-        travel.reach(&mut self.reach);
-        mode.sizes_of_storage(&self.reach, &mut self.largest);
+        if mode.keeps {
+            refill(&mut self.largest, travel.peak());
+        } else {
+            travel.reach(&mut self.reach);
+            mode.sizes_of_storage(&self.reach, &mut self.largest);
+        }
         for (scale, largest) in self.scale.iter_mut().zip(&self.largest) {
             *scale = scale.max(*largest);
         }

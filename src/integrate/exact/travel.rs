@@ -222,6 +222,11 @@ impl Travel {
         value <= noise
     }
 
+    /// How large x was on the way here.
+    pub(crate) fn peak(&self) -> &[f64] {
+        &self.peak
+    }
+
     /// How large w can have been on the way here.
     pub(crate) fn reach(&self, reach: &mut Vec<f64>) {
         refill(reach, &self.amplitude);
