@@ -126,6 +126,7 @@ impl<'a> Polyline<'a> {
     }
 
     /// The segment around `t`.
+    #[inline(never)]
     pub(super) fn straight(&self, t: f64, side: Side) -> Straight {
         let Some(&(_, initial)) = self.points.first() else {
             return Straight::constant(0.0, f64::NEG_INFINITY, f64::INFINITY);
@@ -186,10 +187,17 @@ impl<'a> Polyline<'a> {
         };
         (line.lap, line.next) = (number, next);
         if line.end > self.stop {
-            line.end = self.stop;
-            line.last = Segment::from(line).piece.value(self.stop);
+            self.end(&mut line);
         }
         line
+    }
+
+    /// Ends a segment where the lines stop.
+    #[cold]
+    #[inline(never)]
+    fn end(&self, line: &mut Straight) {
+        line.end = self.stop;
+        line.last = Segment::from(*line).piece.value(self.stop);
     }
 
     /// Index after the last point of the lap that `t` has passed.

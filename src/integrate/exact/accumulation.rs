@@ -82,18 +82,22 @@ impl Accumulation {
         note
     }
 
+    #[cold]
+    #[inline(never)]
+    fn note(&self) -> String {
+        format!(
+            "events accumulate between t = {:e} s and t = {:e} s ({} events in shrinking intervals); the solution goes on \
+             beyond",
+            self.since, self.last, self.count
+        )
+    }
+
     /// The note of an accumulation in progress, which ends.
     pub(crate) fn end(&mut self) -> Option<String> {
         let found = self.count >= EVENTS
             && self.again >= AGAIN
             && self.interval < ACCUMULATES * self.first_interval;
-        let note = found.then(|| {
-            format!(
-                "events accumulate between t = {:e} s and t = {:e} s ({} events in shrinking intervals); the solution goes on \
-                 beyond",
-                self.since, self.last, self.count
-            )
-        });
+        let note = found.then(|| self.note());
         (self.count, self.again) = (0, 0);
         self.modes.clear();
         note

@@ -113,10 +113,11 @@ impl DenseOutput {
         let off_row = (t - travel.t - h).abs() > negligible;
         let begins = travel.age == 0.0 && t > travel.t + negligible;
         let next = next.filter(|_| begins);
-        let between = next.map_or(0.0, |_| ((end - t) / h).floor() + 1.0);
-        let next = next.filter(|_| (1.0..=MOST as f64).contains(&between));
+        // Behind the first row.
+        let others = next.map_or(f64::NAN, |_| (end - t) / h);
+        let next = next.filter(|_| (0.0..MOST as f64).contains(&others));
         let count = if next.is_some_and(|next| self.leap_to(travel, mode, (t, next), off_row)) {
-            between as usize
+            others as usize + 1
         } else {
             let (flow, outputs) = (&mut mode.flow, &mode.outputs);
             if !travel.steady || off_row || !mode.rows.ready(flow, outputs) {

@@ -69,6 +69,7 @@ impl Clock {
     }
 
     /// Goes to time t, forwards or backwards.
+    #[inline(never)]
     pub(crate) fn stand_at(&mut self, sources: &[Source], t: f64) {
         self.next = f64::NEG_INFINITY;
         for (input, _, line) in &mut self.terms {

@@ -62,9 +62,15 @@ impl Modes {
         let kept = self.all[at].flow.kept();
         self.kept = self.kept + kept - self.left[at].1;
         self.left[at] = (self.changes, kept);
-        if self.kept <= most {
-            return;
+        if self.kept > most {
+            self.give_up(most);
         }
+    }
+
+    /// Has those that were left longest ago give up what can be made again, until half of `most` is kept.
+    #[cold]
+    #[inline(never)]
+    fn give_up(&mut self, most: usize) {
         let mut oldest: Vec<usize> = (0..self.left.len())
             .filter(|&k| self.left[k].1 > 0)
             .collect();

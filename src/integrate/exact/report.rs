@@ -76,18 +76,28 @@ impl Report {
             }
         }
         if !table.modes[at].shared.is_empty() && !self.noted_shared {
-            self.noted_shared = true;
-            let pairs = table.modes[at].shared.iter();
-            let mut devices: Vec<String> = pairs
-                .filter_map(|&pair| Some(table.device(pair)?.to_string()))
-                .collect();
-            devices.dedup();
-            self.notes.push(Note::shared(&devices));
+            self.note_shared(table, at);
         }
         if jumped || changes.as_ref().is_some_and(|changes| !changes.is_empty()) {
             log.event(t, changes.unwrap_or_default(), jumped);
         }
-        self.note_slides(table, at, t);
+        let slides = !table.modes[at].key.sliding.is_empty() || !self.slides.is_empty();
+        if slides || !table.steps().is_empty() {
+            self.note_slides(table, at, t);
+        }
+    }
+
+    /// Notes that devices of mode `at` share what the ideal model does not determine.
+    #[cold]
+    #[inline(never)]
+    fn note_shared(&mut self, table: &ModeTable, at: usize) {
+        self.noted_shared = true;
+        let pairs = table.modes[at].shared.iter();
+        let mut devices: Vec<String> = pairs
+            .filter_map(|&pair| Some(table.device(pair)?.to_string()))
+            .collect();
+        devices.dedup();
+        self.notes.push(Note::shared(&devices));
     }
 
     /// Notes the first device that stands wrongly at the end of mode `at`, at t: `sides` has pairs and guards, which are negative there. A
@@ -111,12 +121,26 @@ impl Report {
             *largest = largest.max(g.abs());
             negative |= g < 0.0;
         }
-        if !negative {
-            return;
+        if negative {
+            self.note_wrong_sides((table, at), sides, stored(), t);
         }
+    }
+
+    /// Notes the first of them that is negative beyond rounding.
+    #[cold]
+    #[inline(never)]
+    fn note_wrong_sides(
+        &mut self,
+        (table, at): (&ModeTable, usize),
+        sides: impl Iterator<Item = (usize, f64)> + Clone,
+        stored: [f64; 2],
+        t: f64,
+    ) {
+        let closed = &table.modes[at].key.closed;
+        let is = |pair: usize| closed.get(pair).copied().unwrap_or(true);
         for (side, (largest, stored)) in [true, false]
             .into_iter()
-            .zip(self.largest.into_iter().zip(stored()))
+            .zip(self.largest.into_iter().zip(stored))
         {
             let largest = largest.max(stored);
             let guards = sides.clone().filter(|(pair, _)| is(*pair) == side);
@@ -142,11 +166,10 @@ impl Report {
 
     /// Keeps account of what starts or ends to slide on entering mode `at`: switches on their thresholds, function blocks on
     /// their steps.
+    #[cold]
+    #[inline(never)]
     fn note_slides(&mut self, table: &ModeTable, at: usize, t: f64) {
         let key = &table.modes[at].key;
-        if key.sliding.is_empty() && self.slides.is_empty() && table.steps().is_empty() {
-            return;
-        }
         let switches = key.sliding.iter().map(|s| s.0);
         let after = table.thresholds.len();
         let on_step = |pair: usize| key.closed[pair] && !key.closed[pair + 1];

@@ -144,12 +144,19 @@ impl Sources {
             self.next_stop = self.next_stop.min(clock.next);
         }
         if self.at_all_corners {
-            // A corner that rounding puts right behind this instant is taken with it.
-            let near = span.0 + resolution(span.0);
-            let ends = self.all.iter().filter_map(|source| source.piece(near));
-            let ends = ends.map(|piece| piece.end).filter(|end| *end > near);
-            self.next_stop = ends.fold(self.next_stop, f64::min);
+            self.next_stop = self.next_stop.min(self.next_corner(span.0));
         }
+    }
+
+    /// The first corner of all sources after t.
+    #[cold]
+    #[inline(never)]
+    fn next_corner(&self, t: f64) -> f64 {
+        // A corner that rounding puts right behind this instant is taken with it.
+        let near = t + resolution(t);
+        let ends = self.all.iter().filter_map(|source| source.piece(near));
+        let ends = ends.map(|piece| piece.end).filter(|end| *end > near);
+        ends.fold(f64::INFINITY, f64::min)
     }
 
     /// Gives a source another waveform; what that makes happen is left to [`Self::resume`].

@@ -166,6 +166,8 @@ impl Exact {
         SAME_TIME * self.travel.t.abs()
     }
 
+    #[cold]
+    #[inline(never)]
     fn fail(&self, reason: Reason) -> Error {
         Error::at(self.travel.t, reason)
     }
@@ -356,14 +358,29 @@ impl Exact {
         trigger: Trigger,
         log: &mut Log,
     ) -> Result<(), Error> {
-        let asked = self.passages.is_some();
-        let before = asked.then(|| (self.mode, self.storage.values.clone()));
+        if self.passages.is_some() {
+            return self.pass(key, discontinuous, trigger, log);
+        }
+        self.change_to(key, discontinuous, trigger, log)
+    }
+
+    /// As [`Self::change`], and keeps the passage.
+    #[cold]
+    #[inline(never)]
+    fn pass(
+        &mut self,
+        key: Key,
+        discontinuous: bool,
+        trigger: Trigger,
+        log: &mut Log,
+    ) -> Result<(), Error> {
+        let (mode, before) = (self.mode, self.storage.values.clone());
         self.change_to(key, discontinuous, trigger, log)?;
         let room = self
             .passages
             .as_mut()
             .filter(|all| all.len() < MOST_PASSAGES);
-        if let (Some((mode, before)), Some(passages)) = (before, room) {
+        if let Some(passages) = room {
             let from = mode.map(|at| &self.table.modes[at]);
             passages.push(Passage {
                 t: self.travel.t,
@@ -408,6 +425,20 @@ impl Exact {
             self.enter(at, key, false, trigger, left_row, log);
             return Ok(());
         }
+        self.search(key, (discontinuous, trigger), followed, left_row, log)
+    }
+
+    /// Looks for the mode to enter where it is none that is known to follow.
+    #[cold]
+    #[inline(never)]
+    fn search(
+        &mut self,
+        mut key: Key,
+        (discontinuous, trigger): (bool, Trigger),
+        followed: Option<(usize, Vec<usize>)>,
+        left_row: Option<Vec<f64>>,
+        log: &mut Log,
+    ) -> Result<(), Error> {
         let left = self.mode.map(|at| self.table.modes[at].key.clone());
         self.key = left.unwrap_or_else(|| key.clone());
         let (values, scale) = (self.storage.values.clone(), self.storage.scale.clone());
@@ -475,16 +506,24 @@ impl Exact {
             self.report.jumps += 1;
         }
         if let Some(before) = left_row {
-            self.read_row();
-            let jumped = row_jumps(&before, &self.row, &self.row_is_volts);
-            if jumped {
-                log.row(t, &before);
-            }
-            if jumped || !same {
-                log.row(t, &self.row);
-            } else if self.corner {
-                log.corner(t, &self.row);
-            }
+            self.log_rows(&before, same, log);
+        }
+    }
+
+    /// Logs the rows of an event, of which this is the first.
+    #[cold]
+    #[inline(never)]
+    fn log_rows(&mut self, before: &[f64], same: bool, log: &mut Log) {
+        let t = self.travel.t;
+        self.read_row();
+        let jumped = row_jumps(before, &self.row, &self.row_is_volts);
+        if jumped {
+            log.row(t, before);
+        }
+        if jumped || !same {
+            log.row(t, &self.row);
+        } else if self.corner {
+            log.corner(t, &self.row);
         }
     }
 

@@ -368,8 +368,9 @@ impl Travel {
         self.wait_for_energy(flow, Stretch::Span(span));
         let rest = stop - self.t;
         self.age += rest;
-        let steps = (rest / flow.step(LONG)).ceil();
-        self.take_next(flow, exosystem, stop, steps as u32);
+        let steps = rest / flow.step(LONG);
+        let begun = u32::from(f64::from(steps as u32) < steps);
+        self.take_next(flow, exosystem, stop, (steps as u32).saturating_add(begun));
     }
 
     /// Whether steps of the output grid are short enough from here on.
