@@ -3,7 +3,9 @@
 use crate::integrate::step::Scheme;
 use crate::integrate::{Method, SimOptions};
 use crate::lcs::{Input, Lcs};
+use crate::linalg::whole::{scaled, with_transposed};
 use crate::solve::lcp::Scaling;
+use crate::solve::norm;
 
 /// The machinery chosen for a run.
 #[derive(Debug, Clone, PartialEq)]
@@ -180,8 +182,6 @@ pub fn not_exact(lcs: &Lcs) -> Option<String> {
 /// Whether no impulse can flow through the devices because each resists it.
 fn is_positive_definite(lcs: &Lcs) -> bool {
     let scaling = Scaling::of(&lcs.d);
-    let d = nalgebra::DMatrix::from_diagonal(&scaling.d);
-    let scaled = &d * &lcs.d * &d;
-    let symmetric = &scaled + scaled.transpose();
-    crate::solve::norm::kernel(&symmetric).ncols() == 0 && symmetric.cholesky().is_some()
+    let symmetric = with_transposed(&scaled(&lcs.d, &scaling.d));
+    symmetric.clone().cholesky().is_some() && norm::kernel(&symmetric).ncols() == 0
 }

@@ -218,6 +218,9 @@ pub(crate) fn taking_over(
 ) -> (f64, f64) {
     let storage = &lcs.storage;
     let step = after - DVector::from_column_slice(s);
+    if step.iter().all(|step| *step == 0.0) {
+        return (0.0, 0.0);
+    }
     let charge = &storage.metric * &step;
     let brought = (after - &storage.x * x).dot(&charge);
     (

@@ -37,6 +37,7 @@ use self::basis::{is_semidefinite, kernel, levelled, reduced};
 use crate::diagnostic::Internal;
 use crate::integrate::{Note, energy};
 use crate::lcs::{Lcs, Role};
+use crate::linalg::whole::{largest, magnitudes, scaled, transposed, with_transposed};
 use crate::settings::tolerances::jumps::{FORWARD, NO_JUMP, RIVAL};
 use crate::settings::tolerances::ranks::RANK;
 use crate::solve::lcp::Scaling;
@@ -116,13 +117,13 @@ impl JumpProblem {
         let cb = &lcs.c * &lcs.b;
         // Levelled with CB where D is zero, so that ports without feedthrough have a scale too.
         let scaling = Scaling::of(&levelled(&lcs.d, &cb));
-        let d = DMatrix::from_diagonal(&scaling.d);
-        let feedthrough = &d * &lcs.d * &d;
+        let feedthrough = scaled(&lcs.d, &scaling.d);
         let carried = feedthrough.select_rows(&carriers).select_columns(&carriers);
-        let symmetric = &carried + carried.transpose();
+        let symmetric = with_transposed(&carried);
+        let lossless = symmetric.iter().all(|v| *v == 0.0);
         // Q lies in ker(D + Dᵀ) only for D + Dᵀ ⪰ 0; else the problem below is not used (see `monotone`).
-        let semidefinite = is_semidefinite(&symmetric);
-        let kernel = if semidefinite {
+        let semidefinite = lossless || is_semidefinite(&symmetric);
+        let kernel = if semidefinite && !lossless {
             kernel(symmetric)
         } else {
             DMatrix::identity(carriers.len(), carriers.len())
@@ -133,21 +134,19 @@ impl JumpProblem {
         }
         let (n, v) = reduced(n, &feedthrough, &ends);
         let k = n.ncols();
-        let basis = &d * &n;
-        if k == 0 || (&lcs.b * &basis).amax() == 0.0 {
+        let basis = DMatrix::from_fn(m, k, |i, j| scaling.d[i] * n[(i, j)]);
+        if k == 0 || largest((&lcs.b * &basis).as_slice()) == 0.0 {
             return None;
         }
-        let h = basis.transpose() * &cb * &basis;
-        let size = h.amax();
+        let h = transposed(&basis) * &cb * &basis;
+        let size = largest(h.as_slice());
         let sigma = if size > 0.0 { 1.0 / size } else { 1.0 };
         let coupling = h * sigma;
-        let rows = v.nrows();
-        let mut matrix = DMatrix::zeros(k + rows, k + rows);
-        matrix.view_mut((0, 0), (k, k)).copy_from(&coupling);
-        matrix
-            .view_mut((0, k), (k, rows))
-            .copy_from(&-v.transpose());
-        matrix.view_mut((k, 0), (rows, k)).copy_from(&v);
+        let matrix = if v.nrows() > 0 {
+            bordered(&coupling, &v)
+        } else {
+            coupling.clone()
+        };
         let driver = Driver::new(matrix, tolerance);
         let monotone = semidefinite && driver.is_monotone();
         let projects = monotone && is_reciprocal(lcs, &basis);
@@ -174,8 +173,8 @@ impl JumpProblem {
         u: &DVector<f64>,
     ) -> Result<Option<Jump>, Infeasible> {
         let k = self.basis.ncols();
-        let right = self.basis.transpose() * (&lcs.c * x + &lcs.g * u + &lcs.f + &self.bounds);
-        if right.amax() == 0.0 {
+        let right = transposed(&self.basis) * (&lcs.c * x + &lcs.g * u + &lcs.f + &self.bounds);
+        if largest(right.as_slice()) == 0.0 {
             return Ok(None);
         }
         let solution = self
@@ -270,6 +269,19 @@ impl JumpProblem {
     }
 }
 
+/// [H, −Vᵀ; V, 0].
+#[inline(never)]
+fn bordered(h: &DMatrix<f64>, v: &DMatrix<f64>) -> DMatrix<f64> {
+    let (rows, k) = v.shape();
+    let mut matrix = DMatrix::zeros(k + rows, k + rows);
+    matrix.view_mut((0, 0), (k, k)).copy_from(h);
+    matrix
+        .view_mut((0, k), (k, rows))
+        .copy_from(&-v.transpose());
+    matrix.view_mut((k, 0), (rows, k)).copy_from(v);
+    matrix
+}
+
 /// The bounds λ⁻ and y⁻ of a port.
 #[derive(Debug, Clone, Copy)]
 struct Ends {
@@ -303,7 +315,8 @@ fn is_reciprocal(lcs: &Lcs, basis: &DMatrix<f64>) -> bool {
     }
     let pushed = &lcs.energy * &lcs.b * basis;
     let seen = lcs.c.tr_mul(basis);
-    let sizes = lcs.energy.abs() * lcs.b.abs() * basis.abs() + lcs.c.abs().tr_mul(&basis.abs());
+    let [energy, b, c, size] = [&lcs.energy, &lcs.b, &lcs.c, basis].map(magnitudes);
+    let sizes = energy * b * &size + c.tr_mul(&size);
     (pushed - seen)
         .iter()
         .zip(sizes.iter())

@@ -19,3 +19,4 @@ pub(crate) mod refill;
 pub(crate) mod series;
 pub(crate) mod shifted;
 pub(crate) mod sparse_lu;
+pub(crate) mod whole;

@@ -1,5 +1,6 @@
 //! Guards where the ideal model leaves a current or voltage undetermined.
 
+use crate::linalg::whole::largest;
 use crate::settings::tolerances::ranks::ENTRY;
 use nalgebra::{DMatrix, DVector};
 
@@ -16,7 +17,7 @@ pub(crate) fn extreme_rays(kernel: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         .map(|i| DVector::from_fn(m, |j, _| if i == j { 1.0 } else { 0.0 }))
         .collect();
     for column in kernel.column_iter() {
-        let size = column.amax();
+        let size = largest(column.as_slice());
         if size == 0.0 {
             continue;
         }
@@ -35,7 +36,7 @@ pub(crate) fn extreme_rays(kernel: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         for p in (0..rays.len()).filter(|&i| sign(i) > 0.0) {
             for n in (0..rays.len()).filter(|&i| sign(i) < 0.0) {
                 let mut ray = &rays[n] * values[p] - &rays[p] * values[n];
-                ray /= ray.amax();
+                ray /= largest(ray.as_slice());
                 ray.iter_mut()
                     .filter(|v| v.abs() <= ENTRY)
                     .for_each(|v| *v = 0.0);

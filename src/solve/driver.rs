@@ -9,6 +9,7 @@ use super::lemke::{self, Lemke};
 use super::parts::Parts;
 use super::{convex, norm, pivot};
 use crate::linalg::blocks::extreme_eigenvalues;
+use crate::linalg::whole::{entrywise, largest, with_transposed};
 use crate::settings::tolerances::complementarity::{NOTHING_TO_GAIN, SLACK};
 use crate::settings::tolerances::ranks::{EIGENVALUE, RANK};
 
@@ -136,7 +137,7 @@ impl Driver {
         if let Some(lawful) = &mut self.lawful {
             return lawful.solve(q);
         }
-        self.scaled.q = q.component_mul(&self.scaling.d);
+        self.scaled.q = entrywise(q, &self.scaling.d);
         if let Some(parts) = &mut self.parts {
             let found = parts.solve(&self.scaled.q, &self.warm);
             self.factorisations = parts.factorisations();
@@ -146,7 +147,7 @@ impl Driver {
             return self.in_own_units(found);
         }
         let size = self.scaled.size();
-        let slack = SLACK * self.scaled.q.amax();
+        let slack = SLACK * largest(self.scaled.q.as_slice());
         let mut best = self.candidate(DVector::zeros(size), vec![false; size], Answered::Warm);
         // What is no number has no solution, and no pivot.
         if !q.iter().all(|q| q.is_finite()) {
@@ -222,10 +223,10 @@ impl Driver {
         if self.lawful.is_some() {
             return as_it_is(true);
         }
-        self.scaled.q = q.component_mul(&self.scaling.d);
+        self.scaled.q = entrywise(q, &self.scaling.d);
         let scaled = solution.lambda.component_div(&self.scaling.d);
         let y = self.scaled.y(&scaled);
-        let units = units.component_mul(&self.scaling.d);
+        let units = entrywise(units, &self.scaling.d);
         if let Some(parts) = &mut self.parts {
             let solution = Solution {
                 lambda: scaled,
@@ -238,7 +239,7 @@ impl Driver {
                 ..found
             };
         }
-        let scale = scaled.amax().max(self.scaled.q.amax());
+        let scale = largest(scaled.as_slice()).max(largest(self.scaled.q.as_slice()));
         let strict = scaled
             .iter()
             .zip(y.iter())
@@ -392,7 +393,11 @@ impl Driver {
             d: DVector::from_element(size, 1.0),
         };
         let (of_lambda, of_y) = self.uncertain(&basis);
-        let rounding = self.tolerance * scaled.amax().max(self.scaled.q.amax());
+        let (scale, q) = (
+            largest(scaled.as_slice()),
+            largest(self.scaled.q.as_slice()),
+        );
+        let rounding = self.tolerance * scale.max(q);
         let mut clipped = scaled;
         for (j, active) in basis.iter_mut().enumerate() {
             if clipped[j] < 0.0 && clipped[j] >= -rounding.max(of_lambda[j]) {
@@ -416,7 +421,7 @@ impl Driver {
     /// What the uncertainty of q' is in λ'_a = −M_aa⁻¹ q'_a and in y'_ā = q'_ā + M_āa λ'_a.
     fn uncertain(&mut self, basis: &[bool]) -> (DVector<f64>, DVector<f64>) {
         let mut of_lambda = DVector::zeros(basis.len());
-        if self.noise.amax() == 0.0 {
+        if largest(self.noise.as_slice()) == 0.0 {
             return (of_lambda.clone(), of_lambda);
         }
         let mut of_y = self.noise.clone();
@@ -456,11 +461,11 @@ fn definiteness(m: &DMatrix<f64>) -> (bool, bool) {
     if m.is_empty() {
         return (true, true);
     }
-    let [least, most] = extreme_eigenvalues(&(m + m.transpose()));
-    let largest = most.max(-least);
-    let with_q = largest + (m.nrows() as f64).sqrt();
+    let [least, most] = extreme_eigenvalues(&with_transposed(m));
+    let size = most.max(-least);
+    let with_q = size + (m.nrows() as f64).sqrt();
     (
-        least >= -EIGENVALUE * m.amax().max(largest),
+        least >= -EIGENVALUE * largest(m.as_slice()).max(size),
         least > RANK * with_q,
     )
 }

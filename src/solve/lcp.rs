@@ -2,6 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::linalg::whole::{entrywise, largest, scaled};
+
 /// Find λ with 0 ≤ λ ⟂ y = M λ + q ≥ 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lcp {
@@ -162,18 +164,16 @@ impl Scaling {
     /// The problem (d M d, d q) in λ' = λ/d, y' = d y.
     #[must_use]
     pub fn apply(&self, lcp: &Lcp) -> Lcp {
-        let size = lcp.size();
-        let m = DMatrix::from_fn(size, size, |i, j| self.d[i] * lcp.m[(i, j)] * self.d[j]);
         Lcp {
-            m,
-            q: lcp.q.component_mul(&self.d),
+            m: scaled(&lcp.m, &self.d),
+            q: entrywise(&lcp.q, &self.d),
         }
     }
 
     /// λ from λ'.
     #[must_use]
     pub fn unscale(&self, lambda: &DVector<f64>) -> DVector<f64> {
-        lambda.component_mul(&self.d)
+        entrywise(lambda, &self.d)
     }
 
     /// The natural residual ‖min(λ', y')‖∞ relative to max(‖q'‖∞, ‖λ'‖∞): dimensionless, 0 for an exact solution.
@@ -219,8 +219,8 @@ impl Scaling {
         tolerance: f64,
     ) -> Vec<Option<bool>> {
         let l = lambda.component_div(&self.d);
-        let w = y.component_mul(&self.d);
-        let zero = tolerance * l.amax().max(w.amax());
+        let w = entrywise(y, &self.d);
+        let zero = tolerance * largest(l.as_slice()).max(largest(w.as_slice()));
         let state = |l: f64, w: f64| (l.max(w) > zero).then_some(l > w);
         l.iter().zip(w.iter()).map(|(&l, &w)| state(l, w)).collect()
     }

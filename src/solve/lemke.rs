@@ -8,6 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::lcp::Lcp;
+use crate::linalg::whole::largest;
 use crate::settings::tolerances::complementarity::{TABLEAU_NOISE, TIE};
 use crate::settings::tolerances::ranks::INVERSE;
 
@@ -44,7 +45,7 @@ pub fn solve(lcp: &Lcp, cover: &DVector<f64>) -> Lemke {
 
     // z0 enters; the row with the lexicographically smallest (q, I)/cover leaves, which makes the right-hand side
     // nonnegative. For the first pivot only, the order of rows is that of −row/cover.
-    let scale = lcp.q.amax();
+    let scale = largest(lcp.q.as_slice());
     let mut row = 0;
     for i in 1..m {
         let order = (0..=m)
@@ -64,7 +65,7 @@ pub fn solve(lcp: &Lcp, cover: &DVector<f64>) -> Lemke {
     for _ in 0..PIVOTS_PER_PORT * m + 100 {
         let entering = complement(leaving);
         let column = t.column(entering);
-        let limit = INVERSE * column.amax().max(f64::MIN_POSITIVE);
+        let limit = INVERSE * largest(column.as_slice()).max(f64::MIN_POSITIVE);
         let candidates: Vec<usize> = (0..m).filter(|&i| t[(i, entering)] > limit).collect();
         if candidates.is_empty() {
             let mut ray = DVector::zeros(m);
@@ -107,7 +108,7 @@ fn lexicographic_minimum(
     let size = basis.len();
     for k in 0..=size {
         let column = if k == 0 { rhs } else { k - 1 };
-        let noise = TABLEAU_NOISE * t.column(column).amax();
+        let noise = TABLEAU_NOISE * largest(t.column(column).as_slice());
         let ratio = |i: usize| (t[(i, column)] / t[(i, entering)], noise / t[(i, entering)]);
         let (least, blur) = tied
             .iter()

@@ -8,6 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::lcp::Lcp;
+use crate::linalg::whole::{entrywise, largest, magnitudes, transposed};
 use crate::settings::tolerances::ranks::RANK;
 
 /// The least-norm member of a solution set.
@@ -30,29 +31,30 @@ pub(super) fn least(lcp: &Lcp, lambda: &DVector<f64>, units: &DVector<f64>, othe
         unique,
         chosen: Vec::new(),
     };
-    let scale = lambda.amax().max(lcp.q.amax());
+    let scale = largest(lambda.as_slice()).max(largest(lcp.q.as_slice()));
     if scale == 0.0 {
         return as_it_is(true);
     }
     let mut equations = DMatrix::zeros(m + 1, m);
-    equations
-        .rows_mut(0, m)
-        .copy_from(&(&lcp.m + lcp.m.transpose()));
-    equations.set_row(m, &(lcp.q.transpose() / scale));
+    for (j, mut column) in equations.column_iter_mut().enumerate() {
+        for i in 0..m {
+            column[i] = lcp.m[(i, j)] + lcp.m[(j, i)];
+        }
+        column[m] = lcp.q[j] / scale;
+    }
     let z = kernel(&equations);
     if z.ncols() == 0 {
         return as_it_is(true);
     }
     // In units of `scale`: (λ, y) = here + G w, of which nothing may be negative. Entries at rounding level are zeros: as inequalities
     // they may not be contradicted by noise.
-    let mut g = z.clone().resize_vertically(2 * m, 0.0);
-    g.rows_mut(m, m).copy_from(&(&lcp.m * &z));
-    let rounding = g.iter_mut().filter(|v| v.abs() < RANK);
-    rounding.for_each(|v| *v = 0.0);
-    let mut here = lambda.clone().resize_vertically(2 * m, 0.0) / scale;
-    here.rows_mut(m, m).copy_from(&(lcp.y(lambda) / scale));
-    let rounding = here.iter_mut().filter(|v| v.abs() < RANK);
-    rounding.for_each(|v| *v = 0.0);
+    let clear = |v: f64| if v.abs() < RANK { 0.0 } else { v };
+    let (y_of_z, y) = (&lcp.m * &z, lcp.y(lambda));
+    let both = |i: usize, j: usize| if i < m { z[(i, j)] } else { y_of_z[(i - m, j)] };
+    let g = DMatrix::from_fn(2 * m, z.ncols(), |i, j| clear(both(i, j)));
+    let here = DVector::from_fn(2 * m, |i, _| {
+        clear(if i < m { lambda[i] } else { y[i - m] } / scale)
+    });
     // ‖W (here + G w)‖ = ‖R w + c‖ up to what w cannot change, with W G = Q R; v = R w + c.
     let weight = DVector::from_fn(2 * m, |i, _| {
         if i < m {
@@ -61,14 +63,11 @@ pub(super) fn least(lcp: &Lcp, lambda: &DVector<f64>, units: &DVector<f64>, othe
             units[i - m].recip()
         }
     });
-    let mut weighted = g.clone();
-    for mut column in weighted.column_iter_mut() {
-        column.component_mul_assign(&weight);
-    }
+    let weighted = DMatrix::from_fn(2 * m, z.ncols(), |i, j| g[(i, j)] * weight[i]);
     let qr = weighted.qr();
     let (Some(inverse), c) = (
         qr.r().try_inverse(),
-        qr.q().transpose() * here.component_mul(&weight),
+        transposed(&qr.q()) * entrywise(&here, &weight),
     ) else {
         return as_it_is(false);
     };
@@ -80,7 +79,7 @@ pub(super) fn least(lcp: &Lcp, lambda: &DVector<f64>, units: &DVector<f64>, othe
         .map_or(DVector::zeros(c.len()), |v| inverse * (v - c));
     let both = &here + &g * &w;
     // Unique if no direction of the kernel is feasible from the least-norm point (checked by its mirror problem).
-    let unique = w.amax() < RANK && (!others || is_vertex(&g, &-&here, &w));
+    let unique = largest(w.as_slice()) < RANK && (!others || is_vertex(&g, &-&here, &w));
     let varies = |i: usize| both[i] > RANK && g.row(i).amax() > RANK;
     Least {
         lambda: DVector::from_fn(m, |j, _| {
@@ -132,7 +131,7 @@ pub fn kernel(a: &DMatrix<f64>) -> DMatrix<f64> {
     let null: Vec<usize> = (0..n)
         .filter(|&k| svd.singular_values[k] <= limit || limit == 0.0)
         .collect();
-    v.select_rows(&null).transpose()
+    transposed(&v.select_rows(&null))
 }
 
 /// min ‖w‖ subject to G w ≥ h; `None` where no w is feasible (Lawson-Hanson, algorithm LDP).
@@ -145,13 +144,17 @@ pub fn least_distance(g: &DMatrix<f64>, h: &DVector<f64>) -> Option<DVector<f64>
         length => length,
     });
     let far = h.component_div(&lengths);
-    let unit = if far.amax() > 0.0 { far.amax() } else { 1.0 };
-    let mut e = DMatrix::zeros(n + 1, rows);
-    for i in 0..rows {
-        e.view_mut((0, i), (n, 1))
-            .tr_copy_from(&(g.row(i) / lengths[i]));
-        e[(n, i)] = far[i] / unit;
-    }
+    let unit = match largest(far.as_slice()) {
+        farthest if farthest > 0.0 => farthest,
+        _ => 1.0,
+    };
+    let e = DMatrix::from_fn(n + 1, rows, |j, i| {
+        if j < n {
+            g[(i, j)] / lengths[i]
+        } else {
+            far[i] / unit
+        }
+    });
     let mut f = DVector::zeros(n + 1);
     f[n] = 1.0;
     let u = nonnegative_least_squares(&e, &f);
@@ -168,12 +171,13 @@ pub fn nonnegative_least_squares(e: &DMatrix<f64>, f: &DVector<f64>) -> DVector<
     let n = e.ncols();
     let mut passive = vec![false; n];
     let mut u = DVector::zeros(n);
-    let rounding = 1e2 * f64::EPSILON * e.amax().max(1.0);
+    let rounding = 1e2 * f64::EPSILON * largest(e.as_slice()).max(1.0);
     // Columns whose gradient is positive by rounding alone: they entered and were to leave at once.
     let mut refused = vec![false; n];
     for _ in 0..30 * (n + 1) {
-        let gradient = e.transpose() * (f - e * &u);
-        let tolerance = rounding * f.norm().max((e.abs() * &u).amax());
+        let gradient = transposed(e) * (f - e * &u);
+        let sum = magnitudes(e) * &u;
+        let tolerance = rounding * f.norm().max(largest(sum.as_slice()));
         let Some(enter) = (0..n)
             .filter(|&j| !passive[j] && !refused[j] && gradient[j] > tolerance)
             .max_by(|&a, &b| gradient[a].total_cmp(&gradient[b]))

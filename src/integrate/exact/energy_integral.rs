@@ -13,6 +13,7 @@ use crate::linalg::gauss::{NODES, POINTS, WEIGHTS};
 use crate::linalg::kernel::Kernel;
 use crate::linalg::quadratic::Quadratics;
 use crate::linalg::series::Series;
+use crate::linalg::whole::transposed;
 use crate::settings::tolerances::exponentials::SERIES;
 use crate::settings::tolerances::exponentials::{
     ENERGY_SQUARED, HARMLESS_POWER, OUTGROWN, POWER_ROW, SMALLEST_AMPLITUDE,
@@ -189,8 +190,10 @@ impl EnergyIntegral {
     pub(crate) fn power(&self, w: &[f64]) -> [f64; 2] {
         let mut power = [0.0; 2];
         for term in &self.terms {
-            let [v, i] = [&term.v, &term.i]
-                .map(|row| row.iter().fold(0.0, |sum, (j, factor)| sum + factor * w[*j]));
+            let [v, i] = [&term.v, &term.i].map(|row| {
+                row.iter()
+                    .fold(0.0, |sum, (j, factor)| sum + factor * w[*j])
+            });
             power[usize::from(!term.source)] += v * i;
         }
         [-power[0], power[1]]
@@ -266,6 +269,8 @@ impl Integrals<'_> {
 }
 
 impl Forms {
+    #[cold]
+    #[inline(never)]
     fn new(
         terms: &[Term],
         fast: &[usize],
@@ -303,7 +308,8 @@ impl Forms {
             (sizes.power > 0.0).then(|| (HARMLESS_POWER * sizes.power / f64::EPSILON).sqrt());
         let (mut to_y, mut from_y) = (DMatrix::zeros(dim, dim), DMatrix::zeros(dim, dim));
         let slow: Vec<usize> = (0..dim).filter(|j| !fast.contains(j)).collect();
-        for part in [&slow[..], fast] {
+        let parts = [&slow[..], fast].into_iter();
+        for part in parts.filter(|part| !part.is_empty()) {
             let (to, from) = coordinates(&rows.select_columns(part), least);
             for (i, &row) in part.iter().enumerate() {
                 for (j, &column) in part.iter().enumerate() {
@@ -328,8 +334,12 @@ impl Forms {
             let (v, i) = (seen.row(2 * k), seen.row(2 * k + 1));
             let sign = if term.source { -0.5 } else { 0.5 };
             let power = &mut powers[usize::from(!term.source)];
-            power.ger(sign, &v.transpose(), &i.transpose(), 1.0);
-            power.ger(sign, &i.transpose(), &v.transpose(), 1.0);
+            for column in 0..dim {
+                for row in 0..dim {
+                    power[(row, column)] += sign * i[column] * v[row];
+                    power[(row, column)] += sign * v[column] * i[row];
+                }
+            }
         }
         let powers = powers.each_ref().map(Dense::of);
         let latest = Doubling::new(
@@ -383,7 +393,8 @@ fn coordinates(rows: &DMatrix<f64>, least: Option<f64>) -> (DMatrix<f64>, DMatri
     let filled = rows.clone().resize_vertically(rows.nrows().max(dim), 0.0);
     let qr = filled.col_piv_qr();
     let mut triangle = qr.r();
-    let mut order = DMatrix::identity(dim, dim);
+    let one = DMatrix::identity(dim, dim);
+    let mut order = one.clone();
     qr.p().permute_columns(&mut order);
     // What is rounding of a column couples nothing: sizes that were taken at the start of a run may be far from what comes.
     for mut column in triangle.column_iter_mut() {
@@ -402,10 +413,8 @@ fn coordinates(rows: &DMatrix<f64>, least: Option<f64>) -> (DMatrix<f64>, DMatri
             row[j] = 1.0;
         }
     }
-    let back = triangle
-        .solve_upper_triangular(&DMatrix::identity(dim, dim))
-        .unwrap_or_else(|| DMatrix::identity(dim, dim));
-    (&triangle * order.transpose(), order * back)
+    let back = triangle.solve_upper_triangular(&one).unwrap_or(one);
+    (&triangle * transposed(&order), order * back)
 }
 
 impl Doubling {

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::diagnostic::Internal;
 use crate::integrate::jump::{Infeasible, Jump, JumpProblem};
 use crate::lcs::{Lcs, Role};
+use crate::linalg::whole::{magnitudes, sizes};
 use crate::settings::tolerances::events::NOISE;
 use crate::settings::tolerances::jumps::CONSISTENT;
 use crate::solve::{Driver, Status, norm};
@@ -71,7 +72,8 @@ impl Free {
     /// What is rounding in [`Self::storage`], by the magnitudes that it is summed from.
     pub(crate) fn storage_rounding(&self, x: &DVector<f64>, u: &DVector<f64>) -> DVector<f64> {
         let map = &self.lcs.storage;
-        (map.x.abs() * x.abs() + map.u.abs() * u.abs() + map.one.abs()) * (NOISE * f64::EPSILON)
+        (magnitudes(&map.x) * sizes(x) + magnitudes(&map.u) * sizes(u) + sizes(&map.one))
+            * (NOISE * f64::EPSILON)
     }
 
     /// Whether devices may need an impulse.

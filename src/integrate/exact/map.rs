@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use crate::linalg::kernel::SparseKernel;
+use crate::linalg::whole::magnitudes;
 
 /// A map, and how large its values can be.
 #[derive(Debug, Clone)]
@@ -78,7 +79,7 @@ impl Sizes {
                 break;
             }
             let next = &rows * generator;
-            sizes = next.abs().sup(&(rows.abs() * &self.summed));
+            sizes = magnitudes(&next).sup(&(magnitudes(&rows) * &self.summed));
             rows = next;
         }
         (jets, whole)

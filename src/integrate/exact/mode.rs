@@ -16,6 +16,7 @@ use crate::linalg::decouple::decoupled;
 use crate::linalg::kernel::Kernel;
 use crate::linalg::rays;
 use crate::linalg::refill::refill;
+use crate::linalg::whole::{is_identity, magnitudes};
 use crate::settings::tolerances::exponentials::{EQUAL, FAST_ENTRY};
 
 /// Successors of a mode that are remembered; the oldest goes first.
@@ -114,19 +115,25 @@ impl Mode {
         h: f64,
         energy: bool,
     ) -> Option<Self> {
-        let SwitchFacts {
-            thresholds,
-            limits,
-            clocks,
-        } = *switches;
+        let thresholds = switches.thresholds;
         let (n, dz) = (lcs.n(), exosystem.dim());
         let dim = n + dz;
         let mut generator = DMatrix::zeros(dim, dim);
         generator.view_mut((0, 0), (n, n)).copy_from(&lcs.a);
-        let mut input = &lcs.e * exosystem.output();
-        let mut constant = input.column_mut(0);
-        constant += &lcs.e0;
-        generator.view_mut((0, n), (n, dz)).copy_from(&input);
+        // What symmetrical sources add up to nothing is rounding of each of them.
+        let mut summed = DMatrix::zeros(dim, dim);
+        let input = &lcs.e * exosystem.output();
+        let inputs = magnitudes(&lcs.e) * magnitudes(exosystem.output());
+        for j in 0..dz {
+            for i in 0..n {
+                let at = (i, n + j);
+                (generator[at], summed[at]) = (input[(i, j)], inputs[(i, j)]);
+                if j == 0 {
+                    generator[at] += lcs.e0[i];
+                    summed[at] += lcs.e0[i].abs();
+                }
+            }
+        }
         generator
             .view_mut((n, n), (dz, dz))
             .copy_from(exosystem.generator());
@@ -134,85 +141,29 @@ impl Mode {
         // The pairs of sliding switches come last; their currents have either sign.
         let slides = key.sliding_switches();
         let count = lcs.held.kernel.nrows().saturating_sub(slides.len());
-        let held = over_w(&lcs.held.guard, n, exosystem)
-            .rows(0, count)
-            .into_owned();
-        let kernel = &lcs.held.kernel.rows(0, count).into_owned();
-        let in_kernel = |&pair: &usize| kernel.row(pair).iter().any(|v| *v != 0.0);
-        let shared: Vec<usize> = (0..kernel.nrows()).filter(in_kernel).collect();
-        let rays = (kernel.ncols() > 0).then(|| rays::extreme_rays(kernel));
-        let devices = match rays {
-            Some(ref rays) => rays.as_ref()? * held,
-            None => held,
+        let mut held = over_w(&lcs.held.guard, n, exosystem);
+        if held.nrows() != count {
+            held = held.rows(0, count).into_owned();
+        }
+        let (shared, devices, device_guards) = if lcs.held.kernel.ncols() > 0 {
+            guards_of_sums(&lcs.held.kernel.rows(0, count).into_owned(), held)?
+        } else {
+            let kept = distinct(&held);
+            (Vec::new(), held.select_rows(&kept), kept)
         };
-        let kept = distinct(&devices);
-        let devices = devices.select_rows(&kept);
-        let device_guards = match &rays {
-            Some(Some(rays)) => {
-                let first = |&ray: &usize| rays.row(ray).iter().position(|r| *r != 0.0);
-                kept.iter().map(|ray| first(ray).unwrap_or(0)).collect()
+        let Guards {
+            rows: guards,
+            switches: guarded_switches,
+            controlled_by_sources,
+        } = if thresholds.is_empty() {
+            Guards {
+                rows: devices,
+                switches: Vec::new(),
+                controlled_by_sources: Vec::new(),
             }
-            _ => kept,
+        } else {
+            Guards::of_switches(devices, &key, lcs, exosystem, switches)?
         };
-        let published: Vec<usize> = (0..thresholds.len())
-            .filter(|i| !slides.contains(i))
-            .collect();
-        let mut controls = DMatrix::zeros(thresholds.len(), dim);
-        for (k, row) in over_w(&lcs.controls, n, exosystem).row_iter().enumerate() {
-            controls.set_row(published[k], &row);
-        }
-        let clocked = |i: usize| clocks.iter().any(|clock| clock.switch == i);
-        let guarded = |i: &usize| {
-            let threshold = &thresholds[*i];
-            match threshold.latch {
-                None => !clocked(*i),
-                // Without a holding current the valve's guard is that of its current.
-                Some(_) => {
-                    threshold.off_below > 0.0 && threshold.holds(key.switches[*i], &key.switches)
-                }
-            }
-        };
-        let guarded_switches: Vec<usize> = published.iter().copied().filter(guarded).collect();
-        let mut guards = DMatrix::zeros(
-            devices.nrows() + guarded_switches.len() + 2 * slides.len(),
-            dim,
-        );
-        guards.rows_mut(0, devices.nrows()).copy_from(&devices);
-        for (k, &i) in guarded_switches.iter().enumerate() {
-            let (sign, level) = if key.switches[i] {
-                (1.0, thresholds[i].off_below)
-            } else {
-                (-1.0, thresholds[i].on_above)
-            };
-            let mut row = guards.row_mut(devices.nrows() + k);
-            row += controls.row(i) * sign;
-            row[n] -= sign * level;
-        }
-        let after = devices.nrows() + guarded_switches.len();
-        for (k, &(switch, positive)) in key.sliding.iter().enumerate() {
-            // Between on and off: v − Ron i ≥ 0 and i − v/Roff ≥ 0, or both ≤ 0.
-            let term = lcs
-                .outputs
-                .power
-                .iter()
-                .position(|p| p.element == thresholds[switch].name)?;
-            let v = over_w(&lcs.outputs.power_v, n, exosystem)
-                .row(term)
-                .into_owned();
-            let i = over_w(&lcs.outputs.power_i, n, exosystem)
-                .row(term)
-                .into_owned();
-            let sign = if positive { 1.0 } else { -1.0 };
-            let (ron, goff) = limits[k];
-            guards.set_row(after + 2 * k, &((&v - &i * ron) * sign));
-            guards.set_row(after + 2 * k + 1, &((&i - &v * goff) * sign));
-        }
-        // What symmetrical sources add up to nothing is rounding of each of them.
-        let mut summed = DMatrix::zeros(dim, dim);
-        let mut inputs = lcs.e.abs() * exosystem.output().abs();
-        let mut constant = inputs.column_mut(0);
-        constant += lcs.e0.abs();
-        summed.view_mut((0, n), (n, dz)).copy_from(&inputs);
         let decoupled = (!lcs.fast.is_empty())
             .then(|| decoupled(&generator, &lcs.fast))
             .flatten();
@@ -220,7 +171,7 @@ impl Mode {
             Some(decoupled) => rows * &decoupled.to,
             None => rows,
         };
-        let (mut fast, mut guard_sizes): (&[usize], _) = (&[], guards.abs());
+        let (mut fast, mut guard_sizes): (&[usize], _) = (&[], magnitudes(&guards));
         if let Some(decoupled) = &decoupled {
             generator.copy_from(&decoupled.generator);
             summed = summed.sup(&decoupled.sizes);
@@ -241,13 +192,10 @@ impl Mode {
             flow.set_work(work(lcs, &v, &i));
         }
 
-        let c0 = basis(over_w(&lcs.held.constraints, n, exosystem));
-        let c1 = &c0 * flow.generator();
-        let c2 = &c1 * flow.generator();
-        let rows = c0.nrows();
-        let mut constraints = DMatrix::zeros(3 * rows, dim);
-        for (k, c) in [c0, c1, c2].iter().enumerate() {
-            constraints.rows_mut(k * rows, rows).copy_from(c);
+        let mut constraints = basis(over_w(&lcs.held.constraints, n, exosystem));
+        let is_constrained = constraints.nrows() > 0;
+        if is_constrained {
+            constraints = with_derivatives(constraints, flow.generator());
         }
 
         let map = &lcs.storage;
@@ -260,19 +208,15 @@ impl Mode {
         ones += &map.one;
 
         let storage = basis(storage);
-        let driven = rows > 0 || map.u.iter().any(|u| *u != 0.0);
-        let one = |m: &DMatrix<f64>| *m == DMatrix::identity(n, n);
+        let driven = is_constrained || map.u.iter().any(|u| *u != 0.0);
         let shifted = map.one.iter().chain(&map.inject_one).any(|v| *v != 0.0);
-        let keeps = one(&map.x) && one(&map.inject) && !driven && !shifted;
+        let keeps = !driven && !shifted && is_identity(&map.x, n) && is_identity(&map.inject, n);
 
         Some(Self {
             n,
             jets: Map::with_sizes(&jets, &jet_sizes),
             device_guards,
-            controlled_by_sources: guarded_switches
-                .iter()
-                .map(|&i| controls.row(i).columns(0, n).iter().all(|v| *v == 0.0))
-                .collect(),
+            controlled_by_sources,
             off_at_rest: guarded_switches
                 .iter()
                 .map(|&i| key.switches[i] && thresholds[i].is_sharp())
@@ -434,6 +378,121 @@ impl Mode {
             *x += one;
         }
     }
+}
+
+/// The guards of a mode.
+struct Guards {
+    rows: DMatrix<f64>,
+    /// See [`Mode::guarded_switches`].
+    switches: Vec<usize>,
+    controlled_by_sources: Vec<bool>,
+}
+
+impl Guards {
+    /// Those of devices, and below them those of switches.
+    fn of_switches(
+        devices: DMatrix<f64>,
+        key: &Key,
+        lcs: &Lcs,
+        exosystem: &Exosystem,
+        facts: &SwitchFacts<'_>,
+    ) -> Option<Self> {
+        let SwitchFacts {
+            thresholds,
+            limits,
+            clocks,
+        } = *facts;
+        let (n, slides) = (lcs.n(), key.sliding_switches());
+        let dim = n + exosystem.dim();
+        let published: Vec<usize> = (0..thresholds.len())
+            .filter(|i| !slides.contains(i))
+            .collect();
+        let mut controls = DMatrix::zeros(thresholds.len(), dim);
+        for (k, row) in over_w(&lcs.controls, n, exosystem).row_iter().enumerate() {
+            controls.set_row(published[k], &row);
+        }
+        let clocked = |i: usize| clocks.iter().any(|clock| clock.switch == i);
+        let guarded = |i: &usize| {
+            let threshold = &thresholds[*i];
+            match threshold.latch {
+                None => !clocked(*i),
+                // Without a holding current the valve's guard is that of its current.
+                Some(_) => {
+                    threshold.off_below > 0.0 && threshold.holds(key.switches[*i], &key.switches)
+                }
+            }
+        };
+        let guarded_switches: Vec<usize> = published.iter().copied().filter(guarded).collect();
+        let mut guards = DMatrix::zeros(
+            devices.nrows() + guarded_switches.len() + 2 * slides.len(),
+            dim,
+        );
+        guards.rows_mut(0, devices.nrows()).copy_from(&devices);
+        for (k, &i) in guarded_switches.iter().enumerate() {
+            let (sign, level) = if key.switches[i] {
+                (1.0, thresholds[i].off_below)
+            } else {
+                (-1.0, thresholds[i].on_above)
+            };
+            let mut row = guards.row_mut(devices.nrows() + k);
+            row += controls.row(i) * sign;
+            row[n] -= sign * level;
+        }
+        let after = devices.nrows() + guarded_switches.len();
+        for (k, &(switch, positive)) in key.sliding.iter().enumerate() {
+            // Between on and off: v − Ron i ≥ 0 and i − v/Roff ≥ 0, or both ≤ 0.
+            let term = lcs
+                .outputs
+                .power
+                .iter()
+                .position(|p| p.element == thresholds[switch].name)?;
+            let v = over_w(&lcs.outputs.power_v, n, exosystem)
+                .row(term)
+                .into_owned();
+            let i = over_w(&lcs.outputs.power_i, n, exosystem)
+                .row(term)
+                .into_owned();
+            let sign = if positive { 1.0 } else { -1.0 };
+            let (ron, goff) = limits[k];
+            guards.set_row(after + 2 * k, &((&v - &i * ron) * sign));
+            guards.set_row(after + 2 * k + 1, &((&i - &v * goff) * sign));
+        }
+        let by_sources = |&i: &usize| controls.row(i).columns(0, n).iter().all(|v| *v == 0.0);
+        Some(Self {
+            rows: guards,
+            controlled_by_sources: guarded_switches.iter().map(by_sources).collect(),
+            switches: guarded_switches,
+        })
+    }
+}
+
+/// The pairs that share currents or voltages in a proportion that this kernel leaves open, guards for the sums of which the `held` are that are certain, and
+/// the first pair of each.
+fn guards_of_sums(
+    kernel: &DMatrix<f64>,
+    held: DMatrix<f64>,
+) -> Option<(Vec<usize>, DMatrix<f64>, Vec<usize>)> {
+    let in_kernel = |&pair: &usize| kernel.row(pair).iter().any(|v| *v != 0.0);
+    let shared = (0..kernel.nrows()).filter(in_kernel).collect();
+    let rays = rays::extreme_rays(kernel)?;
+    let devices = &rays * held;
+    let kept = distinct(&devices);
+    let first = |&ray: &usize| rays.row(ray).iter().position(|r| *r != 0.0);
+    let first = kept.iter().map(|ray| first(ray).unwrap_or(0)).collect();
+    Some((shared, devices.select_rows(&kept), first))
+}
+
+/// Rows, and their first two derivatives below them.
+#[inline(never)]
+fn with_derivatives(rows: DMatrix<f64>, generator: &DMatrix<f64>) -> DMatrix<f64> {
+    let (count, dim) = rows.shape();
+    let first = &rows * generator;
+    let second = &first * generator;
+    let mut all = DMatrix::zeros(3 * count, dim);
+    for (k, rows) in [rows, first, second].iter().enumerate() {
+        all.rows_mut(k * count, count).copy_from(rows);
+    }
+    all
 }
 
 /// The rows that are no positive multiple of an earlier one: equal guards fall together.
