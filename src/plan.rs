@@ -3,7 +3,6 @@
 use crate::integrate::step::Scheme;
 use crate::integrate::{Method, SimOptions};
 use crate::lcs::{Input, Lcs};
-use crate::linalg::whole::{scaled, with_transposed};
 use crate::solve::lcp::Scaling;
 use crate::solve::norm;
 
@@ -181,7 +180,6 @@ pub fn not_exact(lcs: &Lcs) -> Option<String> {
 
 /// Whether no impulse can flow through the devices because each resists it.
 fn is_positive_definite(lcs: &Lcs) -> bool {
-    let scaling = Scaling::of(&lcs.d);
-    let symmetric = with_transposed(&scaled(&lcs.d, &scaling.d));
+    let symmetric = Scaling::of(&lcs.d).symmetric(&lcs.d);
     symmetric.clone().cholesky().is_some() && norm::kernel(&symmetric).ncols() == 0
 }

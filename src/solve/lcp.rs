@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::linalg::whole::{entrywise, largest, scaled};
+use crate::linalg::whole::{entrywise, largest, scaled, with_transposed};
 
 /// Find λ with 0 ≤ λ ⟂ y = M λ + q ≥ 0.
 #[derive(Debug, Clone, PartialEq)]
@@ -168,6 +168,11 @@ impl Scaling {
             m: scaled(&lcp.m, &self.d),
             q: entrywise(&lcp.q, &self.d),
         }
+    }
+
+    /// d (M + Mᵀ) d.
+    pub(crate) fn symmetric(&self, m: &DMatrix<f64>) -> DMatrix<f64> {
+        with_transposed(&scaled(m, &self.d))
     }
 
     /// λ from λ'.
