@@ -3,6 +3,7 @@
 use super::survey::beside_value;
 use super::{Beside, Gradient, Sensitivity};
 use crate::analysis::table::{Table, TableOptions, periodic_table, table};
+use crate::analysis::variation::difference_by;
 use crate::integrate::{Error, Note};
 use crate::settings::tolerances::periodic::{RUN_STEP, VALUE_STEP};
 
@@ -28,8 +29,7 @@ impl Beside<'_> {
                     let entry = costs.iter().find(|(name, _)| *name == gradient.name);
                     entry.map_or(f64::NAN, |(_, value)| *value)
                 };
-                let [a, b, c, d] = beside.each_ref().map(at);
-                let derivative = (8.0 * (c - b) - (d - a)) / (12.0 * step);
+                let derivative = difference_by(beside.each_ref().map(at), step);
                 let derivative = Some(derivative).filter(|derivative| derivative.is_finite());
                 gradient.to.push((name.clone(), derivative));
             }

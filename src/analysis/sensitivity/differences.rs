@@ -2,7 +2,7 @@
 
 use super::gradients::started;
 use super::{Beside, Passes, Sensitivity};
-use crate::analysis::variation::STEPS;
+use crate::analysis::variation::{STEPS, difference_by};
 use crate::circuit::NamedMeasurement;
 use crate::integrate::{Error, Note};
 use crate::measure::{Measurement, Over};
@@ -33,7 +33,7 @@ impl Beside<'_> {
                 }
                 let derivative = match all {
                     [Some(a), Some(b), Some(c), Some(d)] => {
-                        Some((8.0 * (c - b) - (d - a)) / (12.0 * RUN_STEP * value))
+                        Some(difference_by([a, b, c, d], RUN_STEP * value))
                     }
                     _ => None,
                 };

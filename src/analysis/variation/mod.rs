@@ -49,7 +49,7 @@ pub(crate) use forms::Forms;
 use instant::Inputs;
 pub(crate) use linear::{LEVELS, Linear, Motion, parts, unit};
 pub(crate) use moved::Moved;
-pub(crate) use near::{Near, STEPS, difference};
+pub(crate) use near::{Near, STEPS, difference, difference_by};
 pub(crate) use parameter::Parameter;
 use saltation::Side;
 pub(crate) use saltation::{Saltation, Timing, times};

@@ -20,8 +20,13 @@ pub(crate) const STEPS: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
 pub(super) const WEIGHTS: [f64; 4] = [1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0];
 
 /// Σ weights · f over the circuits, over h: the derivative with ln p; nothing where all are the same.
-pub(crate) fn difference([a, b, c, d]: [f64; 4]) -> f64 {
-    (8.0 * (c - b) - (d - a)) / (12.0 * VALUE_STEP)
+pub(crate) fn difference(near: [f64; 4]) -> f64 {
+    difference_by(near, VALUE_STEP)
+}
+
+/// The same over another step.
+pub(crate) fn difference_by([a, b, c, d]: [f64; 4], step: f64) -> f64 {
+    (8.0 * (c - b) - (d - a)) / (12.0 * step)
 }
 
 /// The same of matrices.
