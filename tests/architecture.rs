@@ -85,7 +85,7 @@ const ROOMS: [(&str, &[&str]); 21] = [
             "waveform",
         ],
     ),
-    ("passivity", &["lcs", "settings"]),
+    ("passivity", &["lcs", "linalg", "settings"]),
     (
         "check",
         &[
@@ -190,7 +190,7 @@ const CONFINED: [(&str, &[&str], &str); 6] = [
 ];
 
 /// Constants of type f64 that decide nothing, outside `settings/tolerances/`: (file, names, why).
-const NO_TOLERANCES: [(&str, &[&str], &str); 25] = [
+const NO_TOLERANCES: [(&str, &[&str], &str); 26] = [
     (
         "algebra/ball.rs",
         &["EXACT_INTEGERS", "UP"],
@@ -258,6 +258,11 @@ const NO_TOLERANCES: [(&str, &[&str], &str); 25] = [
     ),
     ("law/exponential.rs", &["BOLTZMANN"], "physics"),
     ("linalg/eigenvalues.rs", &["SHIFT"], "a known shift"),
+    (
+        "linalg/powers.rs",
+        &["LEVEL"],
+        "a number that is rounded to a power of two",
+    ),
     (
         "linalg/expm.rs",
         &["LAST", "PAIRS"],

@@ -11,8 +11,8 @@ mod spice;
 
 pub(crate) use crossings::first_crossing;
 pub use crossings::{Crossing, Rest, crossings};
-pub(crate) use piece::Straight;
 pub use piece::{Oscillation, Piece};
+pub(crate) use piece::{Straight, decayed};
 pub use spice::{Form, WaveError};
 
 use piece::Segment;

@@ -6,6 +6,7 @@
 use nalgebra::{Complex, DMatrix};
 
 use super::dense::Dense;
+use super::powers::{halved, power_of_two};
 use super::shifted::Shifted;
 use crate::settings::tolerances::exponentials::{MISSING, SERIES};
 
@@ -91,7 +92,7 @@ impl Ladder {
     }
 
     fn norm_at(&self, k: u32) -> f64 {
-        self.norm * (-f64::from(k)).exp2()
+        halved(self.norm, k)
     }
 
     fn stiff(&self, k: u32) -> bool {
@@ -158,7 +159,7 @@ impl Ladder {
             left *= norm / f64::from(terms + 1);
         }
         let mut z = self.whole.clone();
-        z.combine((-f64::from(k)).exp2(), 0.0, &self.whole);
+        z.combine(halved(1.0, k), 0.0, &self.whole);
         let mut sum = z.clone();
         let mut product = Dense::zeros(n, n);
         for j in (2..=terms).rev() {
@@ -286,22 +287,12 @@ pub(crate) fn balance(a: &DMatrix<f64>, h: f64) -> Vec<f64> {
     d
 }
 
-/// The power of two nearest to `x` in the logarithm, 1 where that is not finite.
-fn power_of_two(x: f64) -> f64 {
-    let exponent = x.log2().round();
-    if exponent.is_finite() {
-        exponent.clamp(-900.0, 900.0).exp2()
-    } else {
-        1.0
-    }
-}
-
 /// Padé [7/8] of exp(Z/2^m), Z = A h/2^k, as a product of (Z − z)(Z − p)⁻¹ = I + (p − z)(Z − p)⁻¹ over its zeros and poles,
 /// squared m times.
 fn subdiagonal(whole: &Dense, k: u32, squarings: u32) -> Option<Dense> {
     let n = whole.columns();
     let mut z = whole.clone();
-    z.combine((-f64::from(k + squarings)).exp2(), 0.0, whole);
+    z.combine(halved(1.0, k + squarings), 0.0, whole);
     let mut shifted = Shifted::new(n);
     let (zero, pole) = LAST;
     // (Z − z)(Z − p)⁻¹(Z − p̄)⁻¹ = Im((p − z)(Z − p)⁻¹)/Im p, which is −z/|p|² at Z = 0.
@@ -421,7 +412,7 @@ mod tests {
             assert!((squares - &exact).amax() / exact.amax() < 1e-12);
             for k in 1..20 {
                 let rung = ladder.increment(k).unwrap();
-                let anew = whole(&a, (s + t) * (-f64::from(k)).exp2());
+                let anew = whole(&a, halved(s + t, k));
                 let rung = matrix(&rung) + DMatrix::identity(5, 5);
                 let error = (rung - &anew).amax() / anew.amax();
                 assert!(error < 1e-13, "1e{decades}, rung {k}: {error:e}");

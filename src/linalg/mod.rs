@@ -12,6 +12,7 @@ pub(crate) mod krylov;
 pub(crate) mod levelled;
 pub(crate) mod pencil;
 pub(crate) mod polynomial;
+pub(crate) mod powers;
 pub(crate) mod product;
 pub(crate) mod quadratic;
 pub(crate) mod rays;

@@ -51,21 +51,17 @@ impl StaticMultiport {
     /// number of corners.
     #[must_use]
     pub fn standard(&self) -> StandardMultiport {
-        let mut out = Self {
-            ball: std::sync::OnceLock::new(),
-            rational: std::sync::OnceLock::new(),
-            pairs: Vec::new(),
-            ..self.clone()
-        };
-        for pair in &self.pairs {
+        let mut out = self.clone();
+        (out.ball, out.rational) = Default::default();
+        for pair in std::mem::take(&mut out.pairs) {
             match pair.port.law.curve() {
                 Some(curve) if pair.fixed_role || !pair.port.law.is_ideal_diode() => {
                     match middle(&curve).filter(|_| !pair.fixed_role) {
-                        Some(middle) => branches(&mut out, pair, &curve, middle),
-                        None => expand(&mut out, pair, curve),
+                        Some(middle) => branches(&mut out, &pair, &curve, middle),
+                        None => expand(&mut out, &pair, curve),
                     }
                 }
-                _ => out.pairs.push(pair.clone()),
+                _ => out.pairs.push(pair),
             }
         }
         StandardMultiport(out)

@@ -3,6 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::System;
+pub(crate) use crate::linalg::powers::equilibrate;
+use crate::linalg::powers::power_of_two;
 use crate::settings::tolerances::ranks::RANK;
 
 /// Sweeps of the balancing iterations; each halves the logarithm of what is left to balance.
@@ -19,15 +21,6 @@ pub(crate) struct Balanced {
     pub(crate) ports: DVector<f64>,
     /// ω, 1/s.
     pub(crate) omega: f64,
-}
-
-/// The power of two nearest to x (1 for what has no size).
-fn power_of_two(x: f64) -> f64 {
-    if x.is_finite() && x > 0.0 {
-        x.log2().round().clamp(-1000.0, 1000.0).exp2()
-    } else {
-        1.0
-    }
 }
 
 /// Balances (A, B, C, D): Osborne's iteration on the state indices of [[A, B], [C, D]], then time, then a congruence on
@@ -102,27 +95,6 @@ pub(crate) fn balance(system: &System) -> Balanced {
         ports: ports * omega.sqrt(),
         omega,
     }
-}
-
-/// Powers of two d with max_j d_i M_ij d_j ≈ 1 in every nonzero row of a nonnegative symmetric M.
-pub(crate) fn equilibrate(magnitude: &DMatrix<f64>) -> DVector<f64> {
-    let n = magnitude.nrows();
-    let mut d = DVector::from_element(n, 1.0);
-    for _ in 0..SWEEPS {
-        let rows: Vec<f64> = (0..n)
-            .map(|i| {
-                (0..n)
-                    .map(|j| d[i] * magnitude[(i, j)] * d[j])
-                    .fold(0.0, f64::max)
-            })
-            .collect();
-        for (i, &row) in rows.iter().enumerate() {
-            if row > 0.0 {
-                d[i] /= row.sqrt();
-            }
-        }
-    }
-    d.map(power_of_two)
 }
 
 /// diag(l) M diag(r).

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::lcp::Lcp;
+use crate::linalg::powers::power_of_two;
 use crate::settings::tolerances::ranks::INVERSE;
 
 /// How λ_a depends on q_a for one active set of one matrix M.
@@ -83,10 +84,7 @@ pub fn refined_inverse(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 pub fn equilibrated_inverse(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let (mut scaled, n) = (a.clone(), a.nrows());
     let (mut left, mut right) = (DVector::from_element(n, 1.0), DVector::from_element(n, 1.0));
-    let factor = |largest: f64| match largest {
-        v if v > 0.0 && v.is_finite() => (-0.5 * v.log2()).round().exp2(),
-        _ => 1.0,
-    };
+    let factor = |largest: f64| power_of_two(largest.sqrt()).recip();
     for _ in 0..SWEEPS {
         for i in 0..n {
             let by = factor(scaled.row(i).amax());

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::linalg::powers::equilibrate;
 use crate::linalg::whole::{entrywise, largest, scaled, with_transposed};
 
 /// Find λ with 0 ≤ λ ⟂ y = M λ + q ≥ 0.
@@ -122,42 +123,14 @@ pub struct Scaling {
     pub d: DVector<f64>,
 }
 
-/// Sweeps of the equilibration; each takes the square root of what is left of the imbalance.
-const SWEEPS: usize = 8;
-
 impl Scaling {
     /// Ruiz equilibration in the maximum norm of row and column together, rounded to powers of two.
     #[must_use]
     pub fn of(m: &DMatrix<f64>) -> Self {
         let size = m.nrows();
-        let mut log = vec![0.0_f64; size];
-        // log₂ 0 = −∞ is never the largest.
-        let exponents = DMatrix::from_fn(size, size, |i, j| {
-            if i < j {
-                0.0
-            } else {
-                m[(i, j)].abs().max(m[(j, i)].abs()).log2()
-            }
-        });
-        for _ in 0..SWEEPS {
-            let largest: Vec<f64> = (0..size)
-                .map(|i| {
-                    (0..size)
-                        .map(|j| exponents[(i.max(j), i.min(j))] + log[j])
-                        .fold(f64::NEG_INFINITY, f64::max)
-                        + log[i]
-                })
-                .collect();
-            for (l, big) in log.iter_mut().zip(largest) {
-                if big.is_finite() {
-                    *l -= 0.5 * big;
-                }
-            }
-        }
-        // Exponents are clamped so that d² stays a normal number.
-        let d = log.iter().map(|l| l.round().clamp(-500.0, 500.0).exp2());
+        let sizes = DMatrix::from_fn(size, size, |i, j| m[(i, j)].abs().max(m[(j, i)].abs()));
         Self {
-            d: DVector::from_iterator(size, d),
+            d: equilibrate(&sizes),
         }
     }
 

@@ -118,6 +118,10 @@ fn is_vertex(g: &DMatrix<f64>, h: &DVector<f64>, w: &DVector<f64>) -> bool {
 #[must_use]
 pub fn kernel(a: &DMatrix<f64>) -> DMatrix<f64> {
     let n = a.ncols();
+    if n == 1 {
+        let free = usize::from(a.iter().all(|&entry| entry == 0.0));
+        return DMatrix::from_element(1, free, 1.0);
+    }
     let square = if a.nrows() < n {
         a.clone().resize_vertically(n, 0.0)
     } else {

@@ -16,6 +16,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use crate::analysis::variation::{Motion, times};
 use crate::integrate::Error;
 use crate::linalg::gauss::{NODES, POINTS, WEIGHTS};
+use crate::linalg::powers::halvings;
 use crate::settings::tolerances::exponentials::SERIES;
 
 /// The integrals of w over a stretch.
@@ -35,7 +36,7 @@ pub(super) fn over(
     omega: Option<f64>,
 ) -> Result<Integrals, Error> {
     let turns = omega.map_or(0.0, |omega| omega * motion.seconds / SERIES);
-    let halvings = motion.bottom.max(turns.log2().ceil().max(0.0) as u32);
+    let halvings = motion.bottom.max(halvings(turns));
     let t = motion.part(halvings);
     let series = motion.series(w, t);
     let at = |s: f64| {

@@ -9,6 +9,7 @@ use crate::integrate::exact::{Exosystem, Shape, Spectrum, over_w};
 use crate::integrate::{Error, Reason};
 use crate::linalg::decouple::Decoupled;
 use crate::linalg::expm::Ladders;
+use crate::linalg::powers::halvings;
 use crate::linalg::product::add_product;
 use crate::measure::{INTERVALS, VALUES};
 use crate::settings::tolerances::exponentials::{CURVED, SERIES, SQUARED};
@@ -182,13 +183,12 @@ impl Linear {
     /// Motion over so many seconds.
     pub(crate) fn over(&self, seconds: f64) -> Motion<'_> {
         let ladders = Ladders::new(&self.generator, &self.fast, seconds, SQUARED, 0);
-        let halvings = (ladders.norm() / SERIES).log2().ceil();
         Motion {
             linear: self,
             seconds,
             steps: Vec::new(),
             readings: Vec::new(),
-            bottom: halvings.clamp(0.0, 1e3) as u32,
+            bottom: halvings(ladders.norm() / SERIES),
             ladders,
         }
     }

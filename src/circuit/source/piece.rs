@@ -18,6 +18,15 @@ pub struct Oscillation {
     pub phase: f64,
 }
 
+/// e^{−σs}; of most sources σ is 0.
+pub(crate) fn decayed(sigma: f64, s: f64) -> f64 {
+    if sigma == 0.0 {
+        1.0
+    } else {
+        (-sigma * s).exp()
+    }
+}
+
 impl Oscillation {
     pub(super) const fn exponential(amplitude: f64, decay: f64) -> Self {
         Self {
@@ -29,11 +38,7 @@ impl Oscillation {
     }
 
     fn envelope(&self, s: f64) -> f64 {
-        if self.decay == 0.0 {
-            self.amplitude
-        } else {
-            self.amplitude * (-self.decay * s).exp()
-        }
+        self.amplitude * decayed(self.decay, s)
     }
 
     /// The value at `s` after the origin.

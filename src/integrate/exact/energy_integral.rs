@@ -11,6 +11,7 @@ use crate::linalg::dense::Dense;
 use crate::linalg::expm::{self, Ladders};
 use crate::linalg::gauss::{NODES, POINTS, WEIGHTS};
 use crate::linalg::kernel::Kernel;
+use crate::linalg::powers::{halved, halvings, two_to};
 use crate::linalg::quadratic::Quadratics;
 use crate::linalg::series::Series;
 use crate::linalg::whole::transposed;
@@ -149,7 +150,7 @@ impl EnergyIntegral {
             at_nodes: Vec::new(),
             fast: fast.to_vec(),
             terms,
-            unit: h * (-f64::from(bottom)).exp2(),
+            unit: halved(h, bottom),
             bottom,
             forms: None,
         })
@@ -345,7 +346,7 @@ impl Forms {
         let latest = Doubling::new(
             (&moved, fast),
             &powers,
-            unit * f64::from(bottom).exp2(),
+            unit * two_to(bottom as i32),
             bottom,
         );
         Self {
@@ -426,9 +427,9 @@ impl Doubling {
         k: u32,
     ) -> Self {
         let dim = generator.nrows();
-        let norm = Dense::of(generator).norm_1() * longest * (-f64::from(k)).exp2();
-        let halvings = (norm / SERIES).log2().ceil().clamp(0.0, 1e3) as u32;
-        let t = longest * (-f64::from(k + halvings)).exp2();
+        let norm = halved(Dense::of(generator).norm_1() * longest, k);
+        let halvings = halvings(norm / SERIES);
+        let t = halved(longest, k + halvings);
         let a = Dense::from_fn(dim, dim, |i, j| generator[(i, j)] * t);
         let mut buffer = Dense::zeros(dim, dim);
         let mut series = |power: &Dense| {
@@ -484,12 +485,12 @@ impl Along {
     fn new(generator: &DMatrix<f64>, fast: &[usize], longest: f64, k: u32) -> Self {
         let dim = generator.nrows();
         let mut ladder = Ladders::new(generator, fast, longest, ENERGY_SQUARED, 0);
-        let stiff = (ladder.norm() / ENERGY_SQUARED).log2();
+        let squared = halvings(ladder.norm() / ENERGY_SQUARED);
         let nothing = Dense::zeros(dim, dim);
         Self {
             increment: ladder.increment(k).unwrap_or_else(|| nothing.clone()),
             ladder,
-            squared: stiff.ceil().clamp(0.0, 1e3) as u32,
+            squared,
             k,
             buffers: [nothing.clone(), nothing.clone(), nothing],
         }

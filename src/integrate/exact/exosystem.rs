@@ -4,11 +4,11 @@ use nalgebra::DMatrix;
 
 use super::spectrum::Rate;
 use crate::circuit::Source;
-use crate::circuit::source::{Oscillation, Piece, Wave};
+use crate::circuit::source::{Oscillation, Piece, Wave, decayed};
 
 /// (sine part, cosine part) of a term τ seconds after its origin; for frequency 0 the first alone is the term.
 fn pair(term: &Oscillation, tau: f64) -> (f64, f64) {
-    let envelope = term.amplitude * (-term.decay * tau).exp();
+    let envelope = term.amplitude * decayed(term.decay, tau);
     let (s, c) = (term.frequency * tau + term.phase).sin_cos();
     (envelope * s, envelope * c)
 }
@@ -331,7 +331,7 @@ impl Exosystem {
                     }
                 }
                 Column::Shared { damping, omega } => {
-                    let envelope = (-damping * t).exp();
+                    let envelope = decayed(damping, t);
                     let (s, c) = (omega * t).sin_cos();
                     z[k] = envelope * s;
                     z[k + 1] = envelope * c;

@@ -9,6 +9,7 @@ use super::spectrum::{Rate, Spectrum};
 use crate::linalg::dense::{BLOCK, Dense};
 use crate::linalg::expm::Ladders;
 use crate::linalg::kernel::{Kernel, SparseKernel};
+use crate::linalg::powers::{halved, halvings, two_to};
 use crate::linalg::series::{MAX_DEGREE, Series};
 use crate::settings::tolerances::events::{GROUP, NOISE};
 use crate::settings::tolerances::exponentials::SQUARED;
@@ -18,7 +19,7 @@ pub(crate) const LONG: u32 = 4;
 
 /// 2^[`LONG`] output steps, s.
 pub(crate) fn longest_step(output_step: f64) -> f64 {
-    output_step * f64::from(LONG).exp2()
+    output_step * two_to(LONG as i32)
 }
 
 /// Halvings of the longest step that a table may hold: steps are counted in units of the shortest, in 128 bits, and a run may take 2²⁴ of
@@ -88,7 +89,7 @@ impl Flow {
         rows.rows_mut(m, m).copy_from(&first);
         let rows = SparseKernel::new(&rows);
         let ladder = Ladders::new(&generator, fast, h, SQUARED, LONG);
-        let bottom = (ladder.norm().log2().ceil().max(0.0) as u32).max(LONG);
+        let bottom = halvings(ladder.norm()).max(LONG);
         if bottom > DEEPEST {
             return None;
         }
@@ -106,9 +107,7 @@ impl Flow {
             rows,
             h,
             bottom,
-            steps: (0..=bottom)
-                .map(|level| h * (-f64::from(level)).exp2())
-                .collect(),
+            steps: (0..=bottom).map(|level| halved(h, level)).collect(),
             ladder,
             levels: vec![None; bottom as usize + 1],
             tabulated: 0,
