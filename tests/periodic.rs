@@ -171,6 +171,15 @@ fn an_orbit_is_where_a_long_transient_ends() {
     }
 }
 
+/// Where the current is interrupted the return is curved: without Broyden's changes of an old derivative its corrections were seven.
+#[test]
+fn corrections_learn_from_what_they_left() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("netlists/buck-open-loop.cir");
+    let text = std::fs::read_to_string(path).expect("a netlist");
+    let (orbit, _) = orbit_of(&text);
+    assert!(orbit.iterations <= 6, "{orbit:?}");
+}
+
 /// i rises from i₀ to i₁ = i₀ + V/L·DT at a constant v, and falls through a diode; with an ideal filter v is D·V, and the ripple of i
 /// is V D(1 − D)T/L. Resistances 0: the multipliers are those of the filter alone, e^{AT} with A = [0, −1/L; 1/C, −1/(RC)].
 #[test]

@@ -6,7 +6,8 @@
 //! (I − M) δ = F(s) − s,     M = ∂F/∂s,
 //! ```
 //!
-//! in parts of the amplitudes. Columns of M are differences of F, a return each. M's eigenvalues at the orbit are its Floquet multipliers.
+//! in parts of the amplitudes. M's eigenvalues at the orbit are its Floquet multipliers. Where corrections are good, M is not computed anew: what
+//! a correction left is Broyden's change of it (C. G. Broyden, Mathematics of Computation 19 (1965)).
 //! (T. J. Aprille, T. N. Trick, Proceedings of the IEEE 60 (1972); for piecewise flows R. I. Leine, H. Nijmeijer 2004, section 8.)
 
 use std::sync::atomic::AtomicBool;
@@ -238,14 +239,19 @@ impl Shooting<'_> {
                 (after, seconds, None)
             }
         };
-        let parts = after.state.iter().zip(&stand.state).zip(&self.amplitudes);
-        let parts = parts.map(|((after, before), amplitude)| (after - before) / amplitude);
         Ok(Closing {
-            residual: DVector::from_iterator(stand.state.len(), parts),
+            residual: self.parts(&after, stand),
             after,
             seconds,
             passages,
         })
+    }
+
+    /// The difference of two places in parts of the amplitudes.
+    fn parts(&self, one: &Stand, other: &Stand) -> DVector<f64> {
+        let both = one.state.iter().zip(&other.state).zip(&self.amplitudes);
+        let parts = both.map(|((one, other), amplitude)| (one - other) / amplitude);
+        DVector::from_iterator(one.state.len(), parts)
     }
 
     /// Whether a return from here leads back.
@@ -351,12 +357,19 @@ impl Shooting<'_> {
         let mut closing = self.close(&stand)?;
         let mut derivative = self.derivative(&stand, &closing)?;
         let (mut made_at, mut course) = (closing.size(), closing.passages.take());
+        // M as the last corrections saw it.
+        let mut secant = derivative.clone();
         let mut corrections = 0;
         while corrections < MOST_CORRECTIONS && closing.size() > AT_ROUNDING {
             corrections += 1;
             let before = closing.size();
-            match self.corrected(&stand, &closing.residual, &derivative)? {
-                Some(better) => (stand, closing) = better,
+            match self.corrected(&stand, &closing.residual, &secant)? {
+                Some((next, found)) => {
+                    let by = self.parts(&next, &stand);
+                    let left = &found.residual - &closing.residual + &by - &secant * &by;
+                    secant.ger(by.norm_squared().recip(), &left, &by, 1.0);
+                    (stand, closing) = (next, found);
+                }
                 None if made_at == before => break,
                 // An old derivative may be the reason.
                 None => made_at = f64::INFINITY,
@@ -364,6 +377,7 @@ impl Shooting<'_> {
             let slow = closing.size() > REUSED * before && closing.size() > closed;
             if slow || made_at == f64::INFINITY {
                 derivative = self.derivative(&stand, &closing)?;
+                secant.clone_from(&derivative);
                 (made_at, course) = (closing.size(), closing.passages.take());
             }
         }
