@@ -180,13 +180,13 @@ class Model:
 class Waveforms:
     """Signals over time. `time` in s, shape (rows,); `values`, shape (rows, signals), in the `units` of `names`."""
 
-    def __init__(self, title: str, names: list[str], units: list[str], time: np.ndarray, values: np.ndarray, rest: str):
+    def __init__(self, title: str, names: list[str], units: list[str], time: np.ndarray, values: np.ndarray, summary: str, events: str):
         self.title, self.names, self.units = title, names, units
         self.time, self.values = time, values
         #: What `circ sim --summary json` tells.
-        self.summary: dict[str, Any] = json.loads(rest)
+        self.summary: dict[str, Any] = json.loads(summary)
         #: Events: `t` in s, `changes` in words, `jump`.
-        self.events: list[dict[str, Any]] = self.summary.pop("events", [])
+        self.events: list[dict[str, Any]] = json.loads(events)
 
     def __getitem__(self, name: str) -> np.ndarray:
         """The column of a signal, float64, without a copy."""

@@ -10,7 +10,7 @@ class SimulationError(Exception):
     time: float | None
     device: str | None
 
-_Rows = tuple[list[str], list[str], np.ndarray, np.ndarray, str]
+_Rows = tuple[list[str], list[str], np.ndarray, np.ndarray, str, str]
 
 class Core:
     title: str

@@ -185,17 +185,22 @@ type Swept<'py> = (
     Vec<String>,
 );
 
-fn event(event: &Event) -> Value {
-    let changes: Vec<String> = event.changes.iter().map(ToString::to_string).collect();
-    json!({"t": event.t, "changes": changes, "jump": event.jump})
+/// As JSON.
+fn events(all: &[Event]) -> String {
+    let event = |event: &Event| {
+        let changes: Vec<String> = event.changes.iter().map(ToString::to_string).collect();
+        json!({"t": event.t, "changes": changes, "jump": event.jump})
+    };
+    Value::from_iter(all.iter().map(event)).to_string()
 }
 
-/// (names, units, time, values rows × columns, JSON of the rest)
+/// (names, units, time, values rows × columns, JSON of the summary, JSON of the events)
 type Rows<'py> = (
     Vec<String>,
     Vec<&'static str>,
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray2<f64>>,
+    String,
     String,
 );
 
@@ -207,9 +212,7 @@ fn rows<'py>(
 ) -> PyResult<Rows<'py>> {
     let run = shown(model.circuit(), run);
     let summary = report::json::summary(&run, found, model.places());
-    let mut rest: Value =
-        serde_json::from_str(&summary).map_err(|error| PyValueError::new_err(error.to_string()))?;
-    rest["events"] = run.events.iter().map(event).collect();
+    let events = events(&run.events);
     let waves = run.waveforms;
     let shape = [waves.time.len(), waves.names.len()];
     let values = PyArray1::from_vec(py, waves.values).reshape(shape)?;
@@ -218,7 +221,8 @@ fn rows<'py>(
         waves.units,
         PyArray1::from_vec(py, waves.time),
         values,
-        rest.to_string(),
+        summary,
+        events,
     ))
 }
 
@@ -717,8 +721,7 @@ impl Course {
             StopReason::Time => "time",
             StopReason::Event => "event",
         };
-        let events: Vec<Value> = stop.events.iter().map(event).collect();
-        Ok((stop.time, reason, json!(events).to_string()))
+        Ok((stop.time, reason, events(&stop.events)))
     }
 
     fn value(&mut self, py: Python<'_>, probe: &str) -> PyResult<f64> {
