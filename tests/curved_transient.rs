@@ -370,6 +370,31 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..Default::default() })]
+
+    /// Dense output: of forty rows in place of one those in common are the same but for the errors of both runs, 1e-4 each of what a column reaches.
+    #[test]
+    fn rows_are_what_they_are_among_fewer(network in network()) {
+        const ROWS: usize = 50;
+        const MORE: usize = 40;
+        prop_assume!(network.elements.iter().any(|(kind, ..)| matches!(kind, Kind::Diode(..))));
+        let stop = 1.5 * network.period;
+        let of = |rows: usize| run(&network.text(stop / rows as f64, stop), SimOptions { method: Method::Theta, unestimated: true, ..SimOptions::default() });
+        let (Ok(few), Ok(many)) = (of(ROWS), of(ROWS * MORE)) else {
+            return Ok(());
+        };
+        for (column, name) in few.waveforms.names.iter().enumerate() {
+            let [one, other]: [Vec<f64>; 2] = [&few, &many].map(|run| run.waveforms.column(column).collect());
+            let size = other.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+            // At once after the start a current that charges a capacitor through a diode alone has no value.
+            let both = one.iter().zip(other.iter().step_by(MORE)).skip(1);
+            let off = both.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            prop_assert!(off <= 2e-4 * size, "{name} is off by {off} of {size}\n{}", network.text(stop / ROWS as f64, stop));
+        }
+    }
+}
+
 /// By their laws two diodes without a resistance carry 10⁷⁰ A at these voltages, beside which the charge between them is rounding. Prescribed
 /// steps and chosen ones say so, also where no coarser runs are made beside them; with a resistance of 1 mΩ they run.
 #[test]

@@ -202,6 +202,10 @@ fn rows_do_not_depend_on_the_print_step() {
         // Rows between choose no steps.
         let (few, many) = (coarse.stats.steps, fine.stats.steps);
         assert!(many < 2 * few, "{path}: {few} and {many} steps");
+        // Nor are stages made for them but where a device turns on or off: of a step to each there are five.
+        let [few, many] = [&coarse, &fine].map(|run| run.stats.lcp_solves);
+        let more = (rows(&fine) - rows(&coarse)) as u64;
+        assert!(many - few < more, "{path}: {few} and {many} solves");
     }
 }
 

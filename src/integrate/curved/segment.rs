@@ -4,14 +4,18 @@
 //! is that of the stages (a slope that ends right behind the start, as of a current that a junction stops, makes another cubic); λ follows the
 //! cubic through four of the stages. The other two stages test it: where λ bends (a diode that turns on) the polynomial is not trusted, and
 //! λ is found on the laws, from the polynomials of the state: y = C x + D λ + G u + F. Where that does not meet the stages either (a large current
-//! that a small error of the state decides), a step of the method from the start of the segment to the row takes its place. Sources are
-//! evaluated at the time itself.
+//! that a small error of the state decides), a step of the method to the middle makes the state's polynomial one of degree 5, through the middle
+//! and its slope too; the one of degree 4 that leaves out that slope tests it. Where that does not hold, or the rows are few, a step from the start of
+//! the segment to the row takes its place. Sources are evaluated at the time itself.
 
 use super::tableau::{NODES, STAGES, STRAY, THROUGH, between_stages, interpolation};
 use super::{Curved, Start, Trial};
 use crate::integrate::grow;
 use crate::integrate::inputs::{Inputs, Pieces};
 use crate::settings::tolerances::steps::ROWS;
+
+/// So many rows ahead are worth a step to the middle.
+const FEW: u32 = 2;
 
 /// One step that was made.
 #[derive(Debug, Default)]
@@ -23,6 +27,9 @@ struct Segment {
     held: Option<Vec<bool>>,
     x: Vec<f64>,
     slope: Vec<f64>,
+    /// The state in the middle and its slope, where it was asked for.
+    has_middle: bool,
+    middle: [Vec<f64>; 2],
     /// By state: what the mean of the cubic is off.
     stray: Vec<f64>,
     /// By stage: λ and y.
@@ -32,9 +39,50 @@ struct Segment {
     read_from: Option<Within>,
 }
 
+/// Which polynomial the state follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Degree {
+    /// Hermite's, through both ends.
+    Three,
+    /// Through the middle too, without its slope.
+    Four,
+    /// With it.
+    Five,
+}
+
 impl Segment {
+    fn state_at(&self, part: f64, degree: Degree, state: &mut [f64]) {
+        match degree {
+            Degree::Three => self.cubic(part, state),
+            Degree::Four | Degree::Five => self.through_middle(part, degree, state),
+        }
+    }
+
+    /// Hermite's polynomial over both ends and the middle, in τ from −1 to 1; that of degree 4 differs by a multiple of τ (1 − τ²)².
+    fn through_middle(&self, part: f64, degree: Degree, state: &mut [f64]) {
+        let [x, slope] = &self.middle;
+        let (tau, half) = (2.0 * part - 1.0, 0.5 * (self.end - self.start.t));
+        let square = |v: f64| v * v;
+        let (before, after) = (
+            square(0.5 * tau * (tau - 1.0)),
+            square(0.5 * tau * (tau + 1.0)),
+        );
+        let between = square(1.0 - tau * tau);
+        for (k, state) in state.iter_mut().enumerate() {
+            let (from, to) = (self.start.x[k], self.x[k]);
+            let (out, into) = (half * self.start.slope[k], half * self.slope[k]);
+            let mid = match degree {
+                Degree::Five => half * slope[k],
+                _ => 0.75 * (to - from) - 0.25 * (out + into),
+            };
+            *state = before * (from + (tau + 1.0) * (3.0 * from + out))
+                + between * (x[k] + tau * mid)
+                + after * (to - (tau - 1.0) * (3.0 * to - into));
+        }
+    }
+
     /// Hermite's cubic at a part of the step.
-    fn state_at(&self, part: f64, state: &mut [f64]) {
+    fn cubic(&self, part: f64, state: &mut [f64]) {
         let (s, r, h) = (part, 1.0 - part, self.end - self.start.t);
         let (from, out) = (r * r * (1.0 + 2.0 * s), h * s * r * r);
         let (to, into) = (s * s * (3.0 - 2.0 * s), -h * s * s * r);
@@ -107,6 +155,7 @@ impl Segments {
         }
         segment.lambdas.clone_from(&trial.lambdas);
         segment.ys.clone_from(&trial.ys);
+        segment.has_middle = false;
         segment.read_from = None;
     }
 
@@ -153,6 +202,59 @@ impl Segments {
         found
     }
 
+    /// The time in the middle of the first step, where a step to it serves rows that are `apart` from one at `t` on; `None` where it was made, the
+    /// rows are few, or ports are ideal: on a corner the state alone does not tell their λ.
+    pub(crate) fn middle(&self, curved: &Curved, (t, apart): (f64, f64)) -> Option<f64> {
+        let segment = &self.kept[0];
+        let serves = t + f64::from(FEW) * apart <= segment.end
+            && !segment.has_middle
+            && curved.ideal.is_empty();
+        serves.then(|| 0.5 * (segment.start.t + segment.end))
+    }
+
+    /// Takes the step to the middle, and asks again what a row is read from.
+    pub(crate) fn take_middle(
+        &mut self,
+        curved: &mut Curved,
+        inputs: &Inputs,
+        tolerance: f64,
+        trial: &Trial,
+    ) -> Within {
+        let segment = &mut self.kept[0];
+        segment.has_middle = true;
+        let [x, slope] = &mut segment.middle;
+        x.clone_from(&trial.x);
+        slope.clear();
+        slope.extend_from_slice(trial.end_slope());
+        let found = if self.degrees_agree(curved, inputs, ROWS * tolerance) {
+            Within::Laws
+        } else {
+            Within::Step
+        };
+        self.kept[0].read_from = Some(found);
+        found
+    }
+
+    /// Whether the polynomials of degree 4 and 5 make the same rows where they are farthest apart.
+    fn degrees_agree(&mut self, curved: &mut Curved, inputs: &Inputs, within: f64) -> bool {
+        let (n, m) = (curved.n, curved.m);
+        let farthest = 0.5 / 5_f64.sqrt();
+        [0.5 - farthest, 0.5 + farthest].into_iter().all(|part| {
+            if !self.find_on_laws(curved, inputs, (part, Degree::Four)) {
+                return false;
+            }
+            self.off.clone_from(&self.w);
+            if !self.find_on_laws(curved, inputs, (part, Degree::Five)) {
+                return false;
+            }
+            for (off, w) in self.off[..n + m].iter_mut().zip(&self.w) {
+                *off -= w;
+            }
+            self.off[n + m..].fill(0.0);
+            curved.readings.are_within(&self.off, &self.reached, within)
+        })
+    }
+
     /// Whether the state's polynomials have the mean of the stages.
     fn state_is_a_cubic(&mut self, curved: &Curved, within: f64) -> bool {
         self.off.clear();
@@ -188,7 +290,7 @@ impl Segments {
         let (n, m) = (curved.n, curved.m);
         curved.ideal.is_empty()
             && (1..STAGES - 1).all(|tested| {
-                if !self.find_on_laws(curved, inputs, NODES[tested]) {
+                if !self.find_on_laws(curved, inputs, (NODES[tested], Degree::Three)) {
                     return false;
                 }
                 self.off.clear();
@@ -201,11 +303,16 @@ impl Segments {
     }
 
     /// x and u at a part of the first step into `w`, and λ on the laws there; `false` where Newton's method does not find them.
-    fn find_on_laws(&mut self, curved: &mut Curved, inputs: &Inputs, part: f64) -> bool {
+    fn find_on_laws(
+        &mut self,
+        curved: &mut Curved,
+        inputs: &Inputs,
+        (part, degree): (f64, Degree),
+    ) -> bool {
         let (n, m) = (curved.n, curved.m);
         let segment = &self.kept[0];
         self.w.resize(curved.forms.width(), 0.0);
-        segment.state_at(part, &mut self.w[..n]);
+        segment.state_at(part, degree, &mut self.w[..n]);
         let t = segment.start.t + part * (segment.end - segment.start.t);
         let u = &mut self.w[n + m..n + m + curved.p];
         inputs.varying_at(t, &mut self.pieces, u);
@@ -235,8 +342,19 @@ impl Segments {
         t: f64,
         row: &mut [f64],
     ) -> bool {
-        let Segment { start, end, .. } = &self.kept[0];
-        let found = self.find_on_laws(curved, inputs, (t - start.t) / (end - start.t));
+        let Segment {
+            start,
+            end,
+            has_middle,
+            ..
+        } = &self.kept[0];
+        let part = (t - start.t) / (end - start.t);
+        let degree = if *has_middle {
+            Degree::Five
+        } else {
+            Degree::Three
+        };
+        let found = self.find_on_laws(curved, inputs, (part, degree));
         if found {
             self.read(curved, inputs, t, row);
         }
@@ -255,7 +373,7 @@ impl Segments {
         let (n, m) = (curved.n, curved.m);
         let s = (t - segment.start.t) / (segment.end - segment.start.t);
         self.w.resize(curved.forms.width(), 0.0);
-        segment.state_at(s, &mut self.w[..n]);
+        segment.cubic(s, &mut self.w[..n]);
         let weights = interpolation(s);
         for &j in &curved.readings.ports {
             self.w[n + j] = (weights.iter().zip(THROUGH))
@@ -321,6 +439,52 @@ mod tests {
             kept: (0..3).map(segment).collect(),
             used: 3,
             ..Segments::default()
+        }
+    }
+
+    /// A step of two seconds from −1 s along a polynomial.
+    fn along(polynomial: &[f64]) -> Segment {
+        let at = |t: f64| polynomial.iter().rev().fold(0.0, |sum, c| sum * t + c);
+        let slope = |t: f64| (at(t + 1e-4) - at(t - 1e-4)) / 2e-4;
+        Segment {
+            start: Start {
+                t: -1.0,
+                x: vec![at(-1.0)],
+                slope: vec![slope(-1.0)],
+                ..Start::default()
+            },
+            end: 1.0,
+            x: vec![at(1.0)],
+            slope: vec![slope(1.0)],
+            has_middle: true,
+            middle: [vec![at(0.0)], vec![slope(0.0)]],
+            ..Segment::default()
+        }
+    }
+
+    #[test]
+    fn a_state_is_the_polynomial_that_its_degree_can_be() {
+        let all = [0.3, -1.0, 2.0, 0.7, -0.4, 1.1];
+        let degrees = [(Degree::Three, 3), (Degree::Four, 4), (Degree::Five, 5)];
+        for (degree, highest) in degrees {
+            for terms in 0..=highest {
+                let segment = along(&all[..=terms]);
+                for part in [0.0, 0.2, 0.5, 0.9, 1.0] {
+                    let t: f64 = 2.0 * part - 1.0;
+                    let expected = all[..=terms].iter().rev().fold(0.0, |sum, c| sum * t + c);
+                    let mut state = [0.0];
+                    segment.state_at(part, degree, &mut state);
+                    assert!(
+                        (state[0] - expected).abs() < 1e-6,
+                        "{degree:?} {terms} {part}"
+                    );
+                }
+            }
+            let mut state = [0.0];
+            along(&all).state_at(0.2, degree, &mut state);
+            let expected = all.iter().rev().fold(0.0, |sum, c| sum * -0.6 + c);
+            let met = (state[0] - expected).abs() < 1e-6;
+            assert_eq!(met, degree == Degree::Five, "{degree:?}");
         }
     }
 

@@ -29,8 +29,9 @@ pub(super) struct Smooth {
     pub(super) until: Option<f64>,
     /// A caller moves the run by hand: its steps are those of the halves.
     by_hand: bool,
-    /// The time of the last row, s.
+    /// The time of the last row, and how far that is from the one before, s.
     pub(super) at: f64,
+    pub(super) apart: f64,
     /// Largest |λ| and |y| so far, by port of a system.
     pub(super) sizes: [Vec<f64>; 2],
     sizes_of: Option<usize>,
@@ -252,17 +253,13 @@ impl Theta {
             ..
         } = &mut self.smooth;
         let system = &mut self.plant.systems[self.now.system].1;
-        let known = (trial.solves, trial.factorisations);
         let held = guards.hold.then_some(&self.now.active[..]);
-        let made = Self::make(
+        Self::make(
             (system, &self.now.active, &self.settings),
             &self.inputs,
             (front, t1, held),
-            trial,
-        );
-        self.stats.lcp_solves += trial.solves - known.0;
-        self.stats.factorisations += trial.factorisations - known.1;
-        made
+            (trial, &mut self.stats),
+        )
     }
 
     /// The stages of a step to t1 in a system, with its ideal ports on the sides `held`.
@@ -270,7 +267,7 @@ impl Theta {
         (system, active, settings): (&mut System, &[bool], &Settings),
         inputs: &Inputs,
         (start, t1, held): (&From, f64, Option<&[bool]>),
-        trial: &mut Trial,
+        (trial, stats): (&mut Trial, &mut Stats),
     ) -> Result<(), Error> {
         let Some(mut curved) = system.smooth.take() else {
             let reason = Reason::Singular { h: t1 - start.t };
@@ -301,6 +298,7 @@ impl Theta {
             y.copy_from_slice(solution.y.as_slice());
             Ok(solution.residual)
         };
+        let known = (trial.solves, trial.factorisations);
         let made = trial.make(
             &mut curved,
             inputs,
@@ -309,6 +307,8 @@ impl Theta {
             (slack, granted),
             &mut robust,
         );
+        stats.lcp_solves += trial.solves - known.0;
+        stats.factorisations += trial.factorisations - known.1;
         system.smooth = Some(curved);
         made
     }
@@ -433,10 +433,11 @@ impl Theta {
         let Smooth {
             segments,
             at,
+            apart,
             reader,
             ..
         } = &mut self.smooth;
-        let t = *at;
+        let (t, apart) = (*at, *apart);
         segments.forget_before(t);
         let Some(index) = segments.system() else {
             return;
@@ -445,21 +446,31 @@ impl Theta {
         let Some(curved) = &mut system.smooth else {
             return;
         };
-        let from = segments.within(curved, &self.inputs, self.settings.tol);
-        if from == Within::Laws && segments.on_laws(curved, &self.inputs, t, row) {
+        let (inputs, tol) = (&self.inputs, self.settings.tol);
+        let mut from = segments.within(curved, inputs, tol);
+        let middle = segments.middle(curved, (t, apart));
+        let stats = &mut self.stats;
+        let mut step_to = |segments: &Segments, t: f64, system: &mut System, reader: &mut Trial| {
+            let (start, held) = segments.first();
+            let known = (system, &self.now.active[..], &self.settings);
+            Self::make(known, inputs, (start, t, held), (reader, &mut *stats))
+        };
+        if let (Within::Step, Some(middle)) = (from, middle)
+            && step_to(segments, middle, system, reader).is_ok()
+            && let Some(curved) = &mut system.smooth
+        {
+            from = segments.take_middle(curved, inputs, tol, reader);
+        }
+        if let (Within::Laws, Some(curved)) = (from, &mut system.smooth)
+            && segments.on_laws(curved, inputs, t, row)
+        {
             return;
         }
-        if from != Within::Polynomials {
-            let (start, held) = segments.first();
-            let made = Self::make(
-                (system, &self.now.active, &self.settings),
-                &self.inputs,
-                (start, t, held),
-                reader,
-            );
-            if let (Ok(()), Some(curved)) = (made, &system.smooth) {
-                return segments.at_end(curved, &self.inputs, (t, reader), row);
-            }
+        if from != Within::Polynomials
+            && step_to(segments, t, system, reader).is_ok()
+            && let Some(curved) = &system.smooth
+        {
+            return segments.at_end(curved, inputs, (t, reader), row);
         }
         if let Some(curved) = &system.smooth {
             segments.interpolate(curved, &self.inputs, t, row);

@@ -300,7 +300,7 @@ impl Stepper for Theta {
                 self.switch(&moving, log)?;
             }
         }
-        self.smooth.at = t;
+        (self.smooth.apart, self.smooth.at) = (t - self.smooth.at, t);
         while self.now.t < t && !self.is_at(t) {
             if self.is_smooth() {
                 self.stride(t, log)?;

@@ -81,8 +81,9 @@ pub(crate) const DIRECT: f64 = 16.0;
 /// Moreau's steps in a print step where they take the place of exact integration. Larger: slower; smaller: chattering is coarse.
 pub(crate) const HANDOVER_STEPS: f64 = 128.0;
 
-/// Steps of the run that finds the amplitudes beforehand. Larger: slower; smaller: amplitudes of what happens between are missed.
-pub(crate) const SCOUT_STEPS: f64 = 256.0;
+/// Steps of the run that finds the amplitudes beforehand. Larger: slower; smaller: amplitudes of what happens between are missed, and the first steps are shorter than
+/// their tolerance asks.
+pub(crate) const SCOUT_STEPS: f64 = 64.0;
 
 /// A fastest rate that does less than this in the simulated span leaves the slow ones at least four digits, and devices keep the roles that
 /// the reduction prefers. Larger: slow rates drown in rounding; smaller: roles are looked for in vain.
