@@ -68,6 +68,15 @@ impl StaticMultiport {
     }
 }
 
+impl StaticMultiport {
+    /// How many pairs [`Self::standard`] has at most: one by corner of a piecewise-linear law.
+    pub(crate) fn ideal_pairs(&self) -> usize {
+        let corners = |law: &Law| law.curve().map_or(1, |curve| curve.vertices.len().max(1));
+        let laws = self.pairs.iter().map(|pair| &pair.port.law);
+        laws.map(corners).sum()
+    }
+}
+
 impl StandardMultiport {
     /// The same multiport with the other quantity of every device preferred as λ.
     #[must_use]

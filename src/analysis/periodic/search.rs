@@ -136,7 +136,7 @@ impl<'a, 'o> Search<'a, 'o> {
         }
     }
 
-    /// Lets so many periods pass: where each of them ends.
+    /// Lets so many periods pass from a place on: where each of them ends.
     fn pass(
         &mut self,
         stand: &mut Stand,
@@ -145,6 +145,16 @@ impl<'a, 'o> Search<'a, 'o> {
     ) -> Result<Vec<Stand>, Error> {
         self.simulation
             .stand_at(from, &stand.state, &stand.switches)?;
+        self.go_on(stand, (period, from), periods)
+    }
+
+    /// The same from where the simulation stands, at most a period after `from`.
+    fn go_on(
+        &mut self,
+        stand: &mut Stand,
+        (period, from): (f64, f64),
+        periods: usize,
+    ) -> Result<Vec<Stand>, Error> {
         let one = |k| {
             let t = from + k as f64 * period;
             self.simulation.advance(t, false, self.options.cancel)?;
@@ -199,8 +209,12 @@ impl<'a, 'o> Search<'a, 'o> {
         let (mut last, mut seen) = (None, vec![0.0; stand.state.len()]);
         grow(&mut seen, &stand.state);
         let mut since_start = (from / period).round() as usize;
-        for periods in TRANSIENTS {
-            let mut passed = self.pass(&mut stand, (period, from), periods - 1)?;
+        for (k, periods) in TRANSIENTS.into_iter().enumerate() {
+            let mut passed = if k == 0 {
+                self.go_on(&mut stand, (period, from), periods - 1)?
+            } else {
+                self.pass(&mut stand, (period, from), periods - 1)?
+            };
             since_start += periods;
             passed
                 .iter()

@@ -389,9 +389,9 @@ impl Shooting<'_> {
             derivative = self.derivative(&stand, &closing)?;
         }
         let mut one_sided = false;
-        let sources = Sources::of(self.simulation.circuit(), self.from, closing.seconds);
+        let sources = || Sources::of(self.simulation.circuit(), self.from, closing.seconds);
         // What comes to rest without sources does so from its own side.
-        if self.rests && !sources.are_none() {
+        if self.rests && !sources().are_none() {
             match self.of_both_sides(&stand)? {
                 // Without the curvature that one side leaves.
                 Some(mean) if !self.simulation.is_exact() => derivative = mean,

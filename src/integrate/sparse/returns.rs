@@ -76,7 +76,7 @@ impl Returns {
         (tran, settings): (&Tran, &Settings),
     ) -> Result<Option<Self>, Error> {
         // No operating point is looked for in vain.
-        if multiport.storage.len() + multiport.standard().pairs.len() < settings.large {
+        if multiport.storage.len() + multiport.ideal_pairs() < settings.large {
             return Ok(None);
         }
         let mut problem = Problem::of_circuit(circuit, multiport, tran.uic, settings)?;
