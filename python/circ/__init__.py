@@ -13,6 +13,7 @@ import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -183,10 +184,17 @@ class Waveforms:
     def __init__(self, title: str, names: list[str], units: list[str], time: np.ndarray, values: np.ndarray, summary: str, events: str):
         self.title, self.names, self.units = title, names, units
         self.time, self.values = time, values
-        #: What `circ sim --summary json` tells.
-        self.summary: dict[str, Any] = json.loads(summary)
-        #: Events: `t` in s, `changes` in words, `jump`.
-        self.events: list[dict[str, Any]] = json.loads(events)
+        self._summary, self._events = summary, events
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """What `circ sim --summary json` tells."""
+        return json.loads(self._summary)
+
+    @cached_property
+    def events(self) -> list[dict[str, Any]]:
+        """Events: `t` in s, `changes` in words, `jump`."""
+        return json.loads(self._events)
 
     def __getitem__(self, name: str) -> np.ndarray:
         """The column of a signal, float64, without a copy."""

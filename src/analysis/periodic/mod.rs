@@ -412,7 +412,7 @@ pub(super) fn beyond_dense(model: &Model) -> bool {
 
 /// Capacitors, inductors and ideal pairs.
 fn size(multiport: &StaticMultiport) -> usize {
-    multiport.storage.len() + multiport.standard().pairs.len()
+    multiport.storage.len() + multiport.ideal_pairs()
 }
 
 fn linearised(asked: Asked, options: &PeriodicOptions<'_>) -> Result<Steady, Error> {

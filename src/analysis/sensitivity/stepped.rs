@@ -178,7 +178,7 @@ impl Beside<'_> {
     /// Whether runs of the circuit are made in steps on matrices without their zeros.
     fn is_large(&self) -> bool {
         let multiport = self.model.multiport();
-        let size = multiport.storage.len() + multiport.standard().pairs.len();
+        let size = multiport.storage.len() + multiport.ideal_pairs();
         size >= self.options.settings.large
     }
 
