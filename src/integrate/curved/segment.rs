@@ -209,7 +209,7 @@ impl Segments {
         let serves = t + f64::from(FEW) * apart <= segment.end
             && !segment.has_middle
             && curved.ideal.is_empty();
-        serves.then(|| 0.5 * (segment.start.t + segment.end))
+        serves.then_some(0.5 * (segment.start.t + segment.end))
     }
 
     /// Takes the step to the middle, and asks again what a row is read from.
