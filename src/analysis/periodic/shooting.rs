@@ -367,7 +367,11 @@ impl Shooting<'_> {
                 Some((next, found)) => {
                     let by = self.parts(&next, &stand);
                     let left = &found.residual - &closing.residual + &by - &secant * &by;
-                    secant.ger(by.norm_squared().recip(), &left, &by, 1.0);
+                    // A correction below the rounding of the state teaches nothing.
+                    let square = by.norm_squared();
+                    if square > 0.0 {
+                        secant.ger(square.recip(), &left, &by, 1.0);
+                    }
                     (stand, closing) = (next, found);
                 }
                 None if made_at == before => break,
