@@ -6,7 +6,7 @@ use circ::measure::{Over, Trace};
 use circ::settings::Settings;
 
 use super::runs::column;
-use super::{changed, run};
+use super::{changed, changed_by, run};
 
 fn average(run: &Run, probe: &str, from: f64, to: f64) -> f64 {
     let values: Vec<f64> = super::runs::column(run, probe);
@@ -299,5 +299,30 @@ fn an_op_amp_with_limits_rectifies() {
             a
         };
         assert!((v - expected).abs() < 2e-4, "{t:e}: {v} for {expected}");
+    }
+}
+
+/// At a tolerance and no estimate of the error.
+fn at_tolerance(name: &str, changes: &[(&str, &str)], tol: f64) -> Run {
+    let options = SimOptions {
+        settings: Settings {
+            tol,
+            ..Settings::default()
+        },
+        ..SimOptions::default()
+    };
+    changed_by(name, changes, options)
+}
+
+#[test]
+fn a_current_between_two_junctions_that_block_rests() {
+    // Its slope swung from step to step, and steps of 1e-15 s had no end.
+    let run = at_tolerance("current_between_junctions", &[], 1e-7);
+    assert!(run.stats.steps < 10_000, "{:?}", run.stats);
+    let finer = at_tolerance("current_between_junctions", &[], 1e-9);
+    for probe in ["i(l1)", "i(l2)", "i(l4)", "v(o)", "v(p)"] {
+        let values = column(&run, probe).into_iter().zip(column(&finer, probe));
+        let largest = values.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(largest < 1e-6, "{probe}: {largest}");
     }
 }

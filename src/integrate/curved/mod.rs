@@ -6,6 +6,7 @@
 //! | `tableau` | the coefficients |
 //! | `implicit` | a system's matrices for one step length, and one stage |
 //! | `trial` | the buffers of a step on its way, and what it says of its error |
+//! | `swing` | slopes that swing from step to step at a state that rests |
 //! | `segment` | dense output: what rows within a step are read from |
 //! | `forms` | energies and readings |
 //!
@@ -15,6 +16,7 @@
 mod forms;
 mod implicit;
 mod segment;
+mod swing;
 pub(crate) mod tableau;
 mod trial;
 

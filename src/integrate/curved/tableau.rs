@@ -117,7 +117,7 @@ pub(crate) fn interpolation(part: f64) -> [f64; 4] {
 }
 
 /// The stages in the order of their times.
-const IN_TIME: [usize; STAGES] = [0, 2, 1, 3, 4, 5];
+pub(super) const IN_TIME: [usize; STAGES] = [0, 2, 1, 3, 4, 5];
 
 /// The stages before and after a part of the step, and the weight of the second one on the straight line between them.
 pub(crate) fn between_stages(part: f64) -> (usize, usize, f64) {

@@ -68,7 +68,7 @@ impl Start {
 /// The buffers of a step.
 #[derive(Debug, Default)]
 pub(crate) struct Trial {
-    n: usize,
+    pub(super) n: usize,
     m: usize,
     pub(crate) h: f64,
     /// By stage: slopes, λ and y.
@@ -77,15 +77,15 @@ pub(crate) struct Trial {
     pub(super) ys: Vec<f64>,
     base: Vec<f64>,
     /// What the last stage's state is made of, see [`Curved::prepare`].
-    right: Vec<f64>,
+    pub(super) right: Vec<f64>,
     /// State and inputs that vary of the last stage that was made.
     pub(crate) x: Vec<f64>,
     pub(crate) u: Vec<f64>,
     /// All inputs.
     all: Vec<f64>,
-    pieces: Pieces,
-    q: Vec<f64>,
-    guess: (Vec<f64>, Vec<f64>),
+    pub(super) pieces: Pieces,
+    pub(super) q: Vec<f64>,
+    pub(super) guess: (Vec<f64>, Vec<f64>),
     w: Vec<f64>,
     du: Vec<f64>,
     change: Vec<f64>,
@@ -99,7 +99,7 @@ pub(crate) struct Trial {
     pub(crate) end_error: (Vec<f64>, Vec<f64>),
     /// The largest residual that a stage was solved to, relative to the terms it is a sum of.
     pub(crate) residual: f64,
-    matrices: usize,
+    pub(super) matrices: usize,
     /// Stages solved and factorisations so far.
     pub(crate) solves: u64,
     pub(crate) factorisations: u64,

@@ -178,6 +178,9 @@ impl Theta {
                 self.smooth.halved = f64::NEG_INFINITY;
             }
             self.commit_trial(end.t)?;
+            if verdict.next <= h {
+                self.calm();
+            }
             self.pass(end)?;
         }
         Ok(verdict)
@@ -275,10 +278,7 @@ impl Theta {
         };
         let slack = Self::slack(t1);
         let g = GAMMA * (t1 - start.t);
-        let mut granted = STAGE_SOLVED * GRANT_EMBEDDED * settings.tol;
-        if !curved.ideal.is_empty() {
-            granted = granted.min(SOLVED);
-        }
+        let granted = Self::stage_solved(&curved, settings);
         let mut robust = |q: &[f64], lambda: &mut [f64], y: &mut [f64]| {
             if held.is_some() {
                 return Err(Error::at(start.t, Reason::Singular { h: g }));
@@ -311,6 +311,34 @@ impl Theta {
         stats.factorisations += trial.factorisations - known.1;
         system.smooth = Some(curved);
         made
+    }
+
+    /// What the last step of Newton's method at a stage may be.
+    fn stage_solved(curved: &Curved, settings: &Settings) -> f64 {
+        let granted = STAGE_SOLVED * GRANT_EMBEDDED * settings.tol;
+        if curved.ideal.is_empty() {
+            granted
+        } else {
+            granted.min(SOLVED)
+        }
+    }
+
+    /// Has the next step start without the slopes that swing at the end of the last one.
+    fn calm(&mut self) {
+        let Smooth {
+            front,
+            trial,
+            guards,
+            ..
+        } = &mut self.smooth;
+        let held = guards.hold.then_some(&self.now.active[..]);
+        let system = &mut self.plant.systems[self.now.system].1;
+        if let Some(curved) = &mut system.smooth {
+            let granted = Self::stage_solved(curved, &self.settings);
+            let known = trial.solves;
+            trial.calm(curved, &self.inputs, front, (held, granted));
+            self.stats.lcp_solves += trial.solves - known;
+        }
     }
 
     /// What error control says of the trial step of length h.

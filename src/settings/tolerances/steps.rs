@@ -121,6 +121,9 @@ pub(crate) const SOLVED: f64 = 1e-13;
 /// fourth power of it. Larger: coarser runs make the same steps; smaller: more steps.
 pub(crate) const CUT: f64 = 0.25;
 
+/// A state whose mean slope in a step is below this part of the largest at a stage rests. Larger: slopes of states that move are taken for noise; smaller: those of states that rest are not.
+pub(crate) const GOES_NOWHERE: f64 = 1e-3;
+
 /// What a row's polynomials may be off at the stages that test them, over the tolerance and the row's amplitude: it adds up with nothing. Larger: rows err more than
 /// steps; smaller: more rows are stepped to.
 pub(crate) const ROWS: f64 = 0.01;
