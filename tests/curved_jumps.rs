@@ -31,11 +31,12 @@ fn network() -> impl Strategy<Value = String> {
                 _ => format!("d{k} {a} {b} round\n"),
             };
         }
-        // Leakages large enough to be seen beside currents of some amperes; RS keeps charge from following a logarithm.
+        // Leakages large enough to be seen beside currents of some amperes; RS keeps charge from following a logarithm. These steps see what 1 pS lets through.
         text + ".model di d(ideal)
 .model leaky d(is=0.1 rs=0.1 n=0.5)
 .model zener d(is=0.2 rs=0.1 n=0.5 bv=5 ibv=1m)
 .model round d(ron=0.1 roff=10k vfwd=0.5 epsilon=0.1)
+.options gmin=0
 .tran 1u 1u uic
 .end
 "

@@ -7,6 +7,7 @@ use circ::circuit::source::Wave;
 use circ::circuit::{Circuit, ElaborateOptions, Kind, elaborate};
 use circ::diagnostic::SourceMap;
 use circ::integrate::{SimOptions, Values, operating_point, simulate};
+use circ::law::Law;
 use circ::mna::behaviour;
 use circ::netlist::parse;
 use circ::settings::Settings;
@@ -168,8 +169,11 @@ fn the_temperature_is_a_name_of_expressions() {
     let notes = |options: &str| read(&format!("v1 a 0 1\nr1 a 0 1\n.tran 1 2\n{options}")).1;
     assert_eq!(notes(".options temp=50"), [""; 0]);
     for (options, skipped) in [
-        (".options temp=50 reltol=1e-4", ".options but for temp"),
-        (".OPTIONS noacct TEMP=50", ".options but for temp"),
+        (
+            ".options temp=50 reltol=1e-4",
+            ".options but for temp and gmin",
+        ),
+        (".OPTIONS noacct GMIN=1p", ".options but for temp and gmin"),
         (".options reltol=1e-4", ".options"),
         (".options temp", ".options"),
     ] {
@@ -292,4 +296,51 @@ fn a_step_of_what_nothing_uses() {
     // A measurement may be all that depends on it.
     let measured = ".param x=2\n.meas tran top param 2*x";
     assert_eq!(warned(&with(measured, "1k")), 0);
+}
+
+#[test]
+fn junctions_that_alone_hold_a_part_leak() {
+    let leaks = |text: &str| -> Vec<f64> {
+        let of = |kind: &Kind| match kind {
+            Kind::Device(Law::Exponential(diode)) => Some(diode.leak),
+            _ => None,
+        };
+        let elements = circuit(&format!("{text}\n.model d d\n.tran 1m 1")).elements;
+        elements.iter().filter_map(|e| of(&e.kind)).collect()
+    };
+    let series = "v1 a 0 1\nd1 a b d\nd2 b c d\nr1 c 0 1k\nd3 c 0 d\n";
+    assert_eq!(leaks(series), [1e-12, 1e-12, 0.0]);
+    assert_eq!(
+        leaks(&format!("{series}.options gmin=1n")),
+        [1e-9, 1e-9, 0.0]
+    );
+    assert_eq!(leaks(&format!("{series}.options gmin=0")), [0.0; 3]);
+    for tie in ["c1 b 0 1n", "l1 b 0 1", "s1 b 0 a 0 m\n.model m sw"] {
+        assert_eq!(leaks(&format!("{series}{tie}")), [0.0; 3], "{tie}");
+    }
+    // What lets no current through, or any, holds nothing.
+    for loose in [
+        "i1 b 0 1",
+        "s1 b 0 a 0 m\n.model m sw(roff=inf)",
+        "d4 b 0 d",
+        "g1 b 0 a 0 1",
+    ] {
+        assert!(leaks(&format!("{series}{loose}"))[0] > 0.0, "{loose}");
+    }
+    let (_, messages) = read(&format!(
+        "{series}.model d d\n.tran 1m 1\n.options gmin=-1p"
+    ));
+    assert!(
+        messages
+            .iter()
+            .any(|m| m.contains("gmin is -0.000000000001 S")),
+        "{messages:?}"
+    );
+    let (_, messages) = read(&format!("{series}.model d d\n.tran 1m 1"));
+    assert!(
+        messages
+            .iter()
+            .any(|m| m.contains("beside d1, d2 decide its voltage")),
+        "{messages:?}"
+    );
 }

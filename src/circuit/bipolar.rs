@@ -106,6 +106,7 @@ impl<'n> Builder<'n, '_> {
                     is,
                     slope,
                     rs: 0.0,
+                    leak: 0.0,
                     breakdown: None,
                 })
             })

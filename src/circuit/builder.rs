@@ -56,6 +56,8 @@ pub(super) struct Builder<'n, 'o> {
     pub(super) nodesets: Vec<(ScopeId, &'n [(Signal, Expr)])>,
     /// `.temp`.
     pub(super) temperature: Option<&'n Expr>,
+    /// Of `.options gmin=`.
+    pub(super) gmin: Option<&'n Expr>,
     pub(super) saves: Vec<(ScopeId, &'n [Wanted])>,
     /// What `.print dc` asks for, which counts where there is no `.tran`.
     pub(super) dc_saves: Vec<(ScopeId, &'n [Wanted])>,
@@ -112,6 +114,7 @@ impl<'n, 'o> Builder<'n, 'o> {
             ics: Vec::new(),
             nodesets: Vec::new(),
             temperature: None,
+            gmin: None,
             saves: Vec::new(),
             dc_saves: Vec::new(),
             measurements: Vec::new(),
@@ -170,6 +173,7 @@ impl<'n, 'o> Builder<'n, 'o> {
             );
         }
         self.resolve();
+        self.add_gmin();
         self.report_unused(&netlist.body);
         self.warn_of_idle_steps();
         if !self.circuit.elements.is_empty() && read && !self.failed() {

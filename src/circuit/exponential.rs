@@ -74,6 +74,7 @@ impl<'n> Builder<'n, '_> {
             is,
             slope: n * thermal,
             rs,
+            leak: 0.0,
             breakdown: bv.is_finite().then_some(Breakdown {
                 bv: bv.abs(),
                 ibv: ibv.abs(),
@@ -144,6 +145,7 @@ mod tests {
             is: 2e-12,
             slope: 1.5 * vt,
             rs: 2.0,
+            leak: 0.0,
             breakdown: Some(Breakdown {
                 bv: 50.0,
                 ibv: 2e-6,

@@ -22,6 +22,7 @@ mod fixture;
 mod form;
 mod formula;
 mod functions;
+mod gmin;
 mod gradient;
 mod held;
 mod line;

@@ -452,6 +452,7 @@ mod tests {
             is,
             slope: 0.026,
             rs: 0.0,
+            leak: 0.0,
             breakdown: bv.map(|bv| Breakdown {
                 bv,
                 ibv: 1e-3,

@@ -18,6 +18,8 @@
 //! | rounded corners without leakage | i ≥ 0 | all | in reverse, at i = 0 | none |
 //! | rounded corners with leakage or breakdown | all | all | none | none |
 //!
+//! A conductance beside a junction ([`Exponential::leak`](super::Exponential::leak)) counts as none: an ampere would meet 10¹² V there.
+//!
 //! So an exponential diode takes any forward current of an inductor at once, at a voltage that grows as its logarithm. It carries no
 //! impulse of charge even with RS = 0: capacitors that it joins approach each other as a ln t, and never meet.
 
@@ -67,6 +69,7 @@ mod tests {
                 is: 1e-6,
                 slope: 0.026,
                 rs: 0.0,
+                leak: 0.0,
                 breakdown,
             })
         };

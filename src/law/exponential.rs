@@ -1,7 +1,7 @@
 //! The exponential diode: Shockley's junction with breakdown, in series with a resistance.
 //!
 //! ```text
-//! i = Is (exp(v_d/a) − 1) − Ibv exp(−(v_d + BV)/b),      v = v_d + RS i,      a = N k T/q
+//! i = Is (exp(v_d/a) − 1) + g v_d − Ibv exp(−(v_d + BV)/b),      v = v_d + RS i,      a = N k T/q
 //! ```
 //!
 //! i is a strictly increasing function of v, so the law is maximal monotone and has φ, conjugate and resolvent in closed form
@@ -24,6 +24,8 @@ pub struct Exponential {
     pub slope: f64,
     /// Series resistance RS, Ω.
     pub rs: f64,
+    /// g, a conductance beside the junction, S: 0 but where a part of the circuit hangs on junctions alone.
+    pub leak: f64,
     /// Breakdown; `None` for a diode that blocks any reverse voltage.
     pub breakdown: Option<Breakdown>,
 }
@@ -67,6 +69,8 @@ impl Exponential {
             && positive(self.slope)
             && self.rs.is_finite()
             && self.rs >= 0.0
+            && self.leak.is_finite()
+            && self.leak >= 0.0
             && self
                 .breakdown
                 .is_none_or(|b| positive(b.bv) && positive(b.ibv) && positive(b.slope))
@@ -78,6 +82,7 @@ impl Exponential {
         Self {
             is: self.is * factor,
             rs: self.rs / factor,
+            leak: self.leak * factor,
             breakdown: self.breakdown.map(|b| Breakdown {
                 ibv: b.ibv * factor,
                 ..b
@@ -94,7 +99,8 @@ impl Exponential {
             b.slope * (b.ibv / (f64::EPSILON * self.is)).ln() - b.bv
         });
         let sound = from < 0.0 && (self.rs + rho).is_finite();
-        sound.then(|| (Behind::new(self.is, self.slope, self.rs + rho), from))
+        let behind = || Behind::new(self.is, self.slope, self.rs + rho, self.leak);
+        sound.then(|| (behind(), from))
     }
 
     /// The point (v, i) with v + ρ i = z, for ρ > 0 in Ω, and the slopes there.
@@ -124,7 +130,7 @@ impl Exponential {
         if let Some(Breakdown { bv, ibv, slope }) = self.breakdown {
             sum += ibv * slope * ((-(v + bv) / slope).exp() - (-bv / slope).exp());
         }
-        sum + 0.5 * self.rs * i * i
+        sum + 0.5 * self.leak * v * v + 0.5 * self.rs * i * i
     }
 
     /// φ*(i) = sup v i − φ(v), W; ∞ below the least current. At i the supremum is where i(v) = i (Fenchel's equality).
@@ -136,15 +142,16 @@ impl Exponential {
         }
     }
 
-    /// v at a current, V; `None` at or below −Is where nothing breaks down.
+    /// v at a current, V; `None` at or below −Is where nothing breaks down or leaks.
     #[must_use]
     pub fn voltage(&self, i: f64) -> Option<f64> {
-        if i > -self.is && self.breakdown.is_none() {
-            return Some(self.slope * (i / self.is).ln_1p() + self.rs * i);
+        let unbounded = self.breakdown.is_some() || self.leak > 0.0;
+        if !unbounded {
+            return (i > -self.is).then(|| self.slope * (i / self.is).ln_1p() + self.rs * i);
         }
-        let b = self.breakdown?;
         // v + ρ i = z has v as a nondecreasing function of z, and i as a strictly increasing one: bisect z.
-        let (mut low, mut high) = (-b.bv - b.slope, self.slope);
+        let start = self.breakdown.map_or(self.slope, |b| b.bv + b.slope);
+        let (mut low, mut high) = (-start, self.slope);
         for _ in 0..1100 {
             if self.current(low) < i {
                 break;
@@ -168,8 +175,18 @@ impl Exponential {
         Some(0.5 * (low + high))
     }
 
-    /// v_d with v_d + R i(v_d) = z, for R ≥ 0.
+    /// v_d with v_d + R i(v_d) = z, for R ≥ 0: with g beside it that of R/(1 + R g) and z/(1 + R g) without.
     fn junction(&self, r: f64, z: f64) -> Junction {
+        let part = 1.0 / (1.0 + r * self.leak);
+        let Junction { v, i, g } = self.without_leak(r * part, z * part);
+        Junction {
+            v,
+            i: i + self.leak * v,
+            g: g + self.leak,
+        }
+    }
+
+    fn without_leak(&self, r: f64, z: f64) -> Junction {
         if r == 0.0 {
             let (i, g) = self.direct(z);
             return Junction { v: z, i, g };
@@ -290,12 +307,14 @@ mod tests {
             0.02..0.2f64,
             prop::bool::ANY,
             -4.0..2.0f64,
+            prop::option::of(-13.0..-6.0f64),
             breakdown,
         )
-            .prop_map(|(is, slope, series, rs, breakdown)| Exponential {
+            .prop_map(|(is, slope, series, rs, leak, breakdown)| Exponential {
                 is: 10_f64.powf(is),
                 slope,
                 rs: if series { 10_f64.powf(rs) } else { 0.0 },
+                leak: leak.map_or(0.0, |g| 10_f64.powf(g)),
                 breakdown: breakdown.map(|(bv, ibv, slope)| Breakdown {
                     bv,
                     ibv: 10_f64.powf(ibv),
@@ -316,6 +335,7 @@ mod tests {
             is: 1e-3,
             slope: 0.05,
             rs: 0.0,
+            leak: 1e-3,
             breakdown: Some(near),
         };
         assert_eq!(diode.potential(0.0), 0.0);
@@ -382,7 +402,7 @@ mod tests {
             // Where the resistance takes most of z, the digits of the junction's voltage are those of what it leaves.
             let left = 1e-14 + 1e-15 * z.abs() / junction.abs();
             if diode.breakdown.is_none() {
-                let law = diode.is * (junction / diode.slope).exp_m1();
+                let law = diode.is * (junction / diode.slope).exp_m1() + diode.leak * junction;
                 prop_assert!((law / at.i - 1.0).abs() <= left, "{at:?} {law}");
             }
         }
@@ -417,6 +437,7 @@ mod tests {
             is: 1e-14,
             slope: Exponential::thermal_voltage(27.0),
             rs: 0.0,
+            leak: 0.0,
             breakdown: None,
         };
         assert!((diode.slope - 0.025_864_926).abs() < 1e-8);
@@ -437,6 +458,7 @@ mod tests {
             is: 1e-14,
             slope: 0.026,
             rs: 2.0,
+            leak: 0.0,
             breakdown: Some(Breakdown {
                 bv: 5.1,
                 ibv: 1e-3,
@@ -457,6 +479,7 @@ mod tests {
             is: 1e-16,
             slope: 0.0259,
             rs: 0.0,
+            leak: 0.0,
             breakdown: Some(Breakdown {
                 bv: 100.0,
                 ibv: 1e-3,

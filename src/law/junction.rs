@@ -5,7 +5,8 @@
 //! ```
 //!
 //! with Wright's ω, see [`wright_omega`]. Where x has moved little ω starts from its Taylor polynomial, and one step of the
-//! iteration, whose error is of fourth order, ends it. Where ω is below the rounding of 1 the junction is its blocking line, i = −Is.
+//! iteration, whose error is of fourth order, ends it. Where ω is below the rounding of 1 the junction is its blocking line, i = −Is. With a conductance g
+//! beside it r and z are those over 1 + r g, and i is g v more.
 
 use super::wright_omega;
 use crate::settings::tolerances::exponentials::{BLOCKED_JUNCTION, OMEGA_ENDS, OMEGA_NEAR};
@@ -20,15 +21,25 @@ pub(crate) struct Junction {
     scale: f64,
     /// 1/r, S.
     conductance: f64,
+    /// r, Ω, and g, S.
+    r: f64,
+    leak: f64,
+    /// 1/(1 + r g) with the r that was given.
+    part: f64,
     shift: f64,
     x: f64,
     omega: f64,
 }
 
 impl Junction {
-    /// A junction of saturation current `is`, A, and a = N k T/q, V, behind r > 0, Ω.
-    pub(crate) fn new(is: f64, a: f64, r: f64) -> Self {
+    /// A junction of saturation current `is`, A, and a = N k T/q, V, with a conductance `leak`, S, beside it, behind r > 0, Ω.
+    pub(crate) fn new(is: f64, a: f64, r: f64, leak: f64) -> Self {
+        let part = 1.0 / (1.0 + r * leak);
+        let r = r * part;
         Self {
+            r,
+            leak,
+            part,
             is,
             per_volt: 1.0 / a,
             scale: a / r,
@@ -42,13 +53,17 @@ impl Junction {
     /// i and di/dz where v + r i = z.
     #[inline]
     pub(crate) fn at(&mut self, z: f64) -> (f64, f64) {
+        let z = z * self.part;
         let x = self.shift + z * self.per_volt;
-        if x < -BLOCKED_JUNCTION {
-            return (-self.is, 0.0);
-        }
-        let omega = self.omega_near(x);
-        let i = self.scale * omega - self.is;
-        (i, omega / (1.0 + omega) * self.conductance)
+        let (i, di) = if x < -BLOCKED_JUNCTION {
+            (-self.is, 0.0)
+        } else {
+            let omega = self.omega_near(x);
+            let i = self.scale * omega - self.is;
+            (i, omega / (1.0 + omega) * self.conductance)
+        };
+        let (v, dv) = (z - self.r * i, 1.0 - self.r * di);
+        (i + self.leak * v, (di + self.leak * dv) * self.part)
     }
 
     fn omega_near(&mut self, x: f64) -> f64 {
@@ -87,11 +102,11 @@ mod tests {
         #[test]
         fn a_walk_along_the_curve_stays_on_it(
             is in -16.0..-6.0f64, a in 0.02..0.1f64, r in -6.0..6.0f64,
-            start in -20.0..20.0f64, moves in proptest::collection::vec(-0.5..0.5f64, 1..40),
+            leak in -14.0..-8.0f64, start in -20.0..20.0f64, moves in proptest::collection::vec(-0.5..0.5f64, 1..40),
         ) {
-            let (is, r) = (10_f64.powf(is), 10_f64.powf(r));
-            let diode = Exponential { is, slope: a, rs: 0.0, breakdown: None };
-            let mut junction = Junction::new(is, a, r);
+            let (is, r, leak) = (10_f64.powf(is), 10_f64.powf(r), 10_f64.powf(leak));
+            let diode = Exponential { is, slope: a, rs: 0.0, leak, breakdown: None };
+            let mut junction = Junction::new(is, a, r, leak);
             let mut z = start;
             for step in moves {
                 z += step;

@@ -308,14 +308,18 @@ impl Reader<'_> {
             }
             Dot::Include(file) => self.include(&file.whole, None, file.span, path),
             Dot::Lib(file) => self.lib(&file, path),
-            Dot::Options(temperature, others) => {
-                match &temperature {
-                    Some(_) if others => self.skip_as(".options but for temp", line),
-                    None if others => self.skip(line),
-                    _ => {}
+            Dot::Options(options) => {
+                match (options.others, &options.temperature, &options.gmin) {
+                    (false, ..) => {}
+                    (true, None, None) => self.skip(line),
+                    (true, ..) => self.skip_as(".options but for temp and gmin", line),
                 }
-                if let Some(temperature) = temperature {
-                    self.push(Statement::Temperature(temperature));
+                let read = [
+                    options.temperature.map(Statement::Temperature),
+                    options.gmin.map(Statement::Gmin),
+                ];
+                for statement in read.into_iter().flatten() {
+                    self.push(statement);
                 }
             }
             Dot::EndLib | Dot::Control | Dot::Nothing => {}

@@ -378,6 +378,7 @@ mod tests {
             is: 1e-14,
             slope: 0.026,
             rs: 0.0,
+            leak: 0.0,
             breakdown: None,
         });
         let port = || PortLaw {
@@ -401,6 +402,7 @@ mod tests {
             is: 1e-12,
             slope: 0.03,
             rs: 0.1,
+            leak: 0.0,
             breakdown: Some(Breakdown {
                 bv: 5.0,
                 ibv: 1e-3,
@@ -441,6 +443,7 @@ mod tests {
             is: 1e-3,
             slope: 0.1,
             rs: 0.0,
+            leak: 0.0,
             breakdown: Some(Breakdown {
                 bv: 2.0,
                 ibv: 1e-3,

@@ -193,6 +193,7 @@ mod tests {
                 is,
                 slope,
                 rs: 0.0,
+                leak: 0.0,
                 breakdown: None,
             });
         });

@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 18] = [
+pub(super) const CODES: [Explanation; 19] = [
     Explanation::of(
         "capacitor-loop",
         "Capacitors and voltage sources form a loop: their voltages are not independent of each other.",
@@ -36,6 +36,13 @@ pub(super) const CODES: [Explanation; 18] = [
         "A controlled source that takes the current of a capacitor, or the voltage of an inductor, back into a device.",
         "A small resistance in series with the capacitor, or a large one across the inductor, separates them.",
     ),
+    Explanation::of(
+        "gmin",
+        "A part of the circuit is connected with the rest by exponential junctions alone; these have a small conductance beside them, as in ngspice.",
+        "A bridge behind a floating winding or an inductance, the middle of diodes in series: where all block, rounding would decide the voltage there.",
+        "Nothing, or a resistor from that part to the rest; `.options gmin=` sets the conductance, 0 leaves it out.",
+    )
+    .shown("in series\nv1 a 0 sin(0 1 50)\nd1 a b d\nd2 b c d\nr1 c 0 1k\n.model d d\n.tran 1m 40m\n"),
     Explanation::of(
         "inductor-cutset",
         "Inductors and current sources meet in a node: their currents are not independent of each other.",

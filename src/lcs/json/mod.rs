@@ -194,6 +194,8 @@ struct LawDoc {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     rs: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    leak: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     bv: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     ibv: Option<f64>,

@@ -159,6 +159,7 @@ fn exponential(doc: &LawDoc) -> Option<Law> {
         is: doc.is?,
         slope: doc.slope?,
         rs: doc.rs.unwrap_or(0.0),
+        leak: doc.leak.unwrap_or(0.0),
         breakdown,
     };
     diode.is_sound().then_some(Law::Exponential(diode))

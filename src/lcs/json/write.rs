@@ -91,6 +91,7 @@ fn law_document(law: &Law) -> LawDoc {
             is: Some(diode.is),
             slope: Some(diode.slope),
             rs: (diode.rs != 0.0).then_some(diode.rs),
+            leak: (diode.leak != 0.0).then_some(diode.leak),
             bv: diode.breakdown.map(|b| b.bv),
             ibv: diode.breakdown.map(|b| b.ibv),
             breakdown_slope: diode.breakdown.map(|b| b.slope),

@@ -24,6 +24,8 @@ mod roles;
 mod separate;
 mod system;
 
+use std::collections::BTreeSet;
+
 use crate::algebra::{Field, LongBall, SparseRow};
 use crate::diagnostic::Internal;
 use crate::mna::{Reduced, StaticMultiport};
@@ -247,14 +249,21 @@ fn reduction<F: Field>(
     reduced: &Reduced<F>,
     position: &Position,
 ) -> Result<Reduction<F>, ReduceError> {
-    let reduction = in_some_order(behaviour, reduced, position)?;
-    match roles::lost(&reduction) {
-        Some(lost) => {
-            let other = in_some_order(&roles::exchanged(behaviour, &lost), reduced, position);
-            Ok(other.unwrap_or(reduction))
+    let mut reduction = in_some_order(behaviour, reduced, position)?;
+    let mut exchanged = BTreeSet::new();
+    // Others may follow each other where some have changed roles.
+    while let Some(lost) = roles::lost(behaviour, &reduction) {
+        let known = exchanged.len();
+        exchanged.extend(lost);
+        if exchanged.len() == known {
+            break;
         }
-        None => Ok(reduction),
+        match in_some_order(&roles::exchanged(behaviour, &exchanged), reduced, position) {
+            Ok(other) => reduction = other,
+            Err(_) => break,
+        }
     }
+    Ok(reduction)
 }
 
 fn check(behaviour: &StaticMultiport, position: &Position) -> Result<(), ReduceError> {

@@ -1,23 +1,32 @@
 //! Other quantities of those devices whose D keeps too few digits of what sets them apart.
 //!
+//! Of what a junction leaks nothing is left beside any 1/R, even where D has no other digits.
 //! Two diodes with Ron in parallel, and R in series with both: with λ = −v of both D = 1/(2 Ron) [1, −1; −1, 1] + 1/(4R) [1, 1; 1, 1] for
 //! Ron ≪ R, and of 1/R there is what 1/Ron leaves of the digits of doubles, nothing where these are 16 decades apart. With λ = i of one of
 //! them its row and column are ±1 and D of the other is 1/R.
+
+use std::collections::BTreeSet;
 
 use nalgebra::DMatrix;
 
 use super::Reduction;
 use crate::algebra::{Field, entry, part};
+use crate::law::Law;
 use crate::lcs::Role;
 use crate::mna::StaticMultiport;
 use crate::settings::tolerances::ranks::{COUPLED, RANK};
 
 /// The pairs that others follow in D + Dᵀ but for less than [`RANK`] of themselves, which is not nothing: the independent ones of them, by the
 /// largest pivots of an exact factorisation L Δ Lᵀ. `None` where there are none.
-pub(super) fn lost<F: Field>(reduction: &Reduction<F>) -> Option<Vec<usize>> {
+pub(super) fn lost<F: Field>(
+    behaviour: &StaticMultiport,
+    reduction: &Reduction<F>,
+) -> Option<Vec<usize>> {
     let blocks = blocks(reduction);
     let blocks = blocks.iter().filter(|block| block.len() > 1);
-    let mut lost: Vec<usize> = blocks.flat_map(|block| lost_in(reduction, block)).collect();
+    let mut lost: Vec<usize> = blocks
+        .flat_map(|block| lost_in(behaviour, reduction, block))
+        .collect();
     lost.sort_unstable();
     lost.dedup();
     (!lost.is_empty()).then_some(lost)
@@ -52,7 +61,11 @@ fn blocks<F: Field>(reduction: &Reduction<F>) -> Vec<Vec<usize>> {
 }
 
 /// Those of a block, by their pairs.
-fn lost_in<F: Field>(reduction: &Reduction<F>, block: &[usize]) -> Vec<usize> {
+fn lost_in<F: Field>(
+    behaviour: &StaticMultiport,
+    reduction: &Reduction<F>,
+    block: &[usize],
+) -> Vec<usize> {
     let (n, m) = (reduction.states.len(), block.len());
     let d = |i: usize, j: usize| {
         let d = entry(&reduction.y[block[i]], n + block[j]);
@@ -71,6 +84,10 @@ fn lost_in<F: Field>(reduction: &Reduction<F>, block: &[usize]) -> Vec<usize> {
     if !is_suspect(&scaled) {
         return Vec::new();
     }
+    let leaks = |j: usize| {
+        let (pair, _) = reduction.pairs[block[j]];
+        matches!(behaviour.pairs[pair].port.law, Law::Exponential(diode) if diode.leak > 0.0)
+    };
     // Part of its diagonal that is left of each pair, and pivots with their columns of L in units of the diagonals.
     let mut left: Vec<f64> = unit.iter().map(|u| f64::from(*u > 0.0)).collect();
     let mut pivots: Vec<(usize, Vec<f64>)> = Vec::new();
@@ -90,7 +107,7 @@ fn lost_in<F: Field>(reduction: &Reduction<F>, block: &[usize]) -> Vec<usize> {
         }
         for j in 0..m {
             let before = std::mem::replace(&mut left[j], rest[j][j].to_f64() * unit[j] * unit[j]);
-            if before > RANK && left[j] <= RANK && !rest[j][j].is_zero() {
+            if before > RANK && left[j] <= RANK && (!rest[j][j].is_zero() || leaks(j)) {
                 let followed = pivots.iter().filter(|(_, share)| share[j].abs() > COUPLED);
                 lost.extend(followed.map(|(p, _)| reduction.pairs[block[*p]].0));
             }
@@ -106,7 +123,7 @@ fn is_suspect(scaled: &DMatrix<f64>) -> bool {
 }
 
 /// The behaviour with the other quantity of these devices preferred as λ.
-pub(super) fn exchanged(behaviour: &StaticMultiport, pairs: &[usize]) -> StaticMultiport {
+pub(super) fn exchanged(behaviour: &StaticMultiport, pairs: &BTreeSet<usize>) -> StaticMultiport {
     let mut other = behaviour.clone();
     for &k in pairs {
         let role = &mut other.pairs[k].port.role;

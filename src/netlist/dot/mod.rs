@@ -48,12 +48,20 @@ pub(in crate::netlist) enum Dot {
     End,
     /// `.title text`.
     Title(String),
-    /// `.options`: the temperature it sets, if it does, and whether there are others, which are skipped.
-    Options(Option<Expr>, bool),
+    /// `.options`.
+    Options(Options),
     /// A card that does not change the transient and is skipped with a note.
     Skipped,
     /// A card that asks for nothing (`.backanno`, `.width`).
     Nothing,
+}
+
+/// What `.options` says, and whether there is more, which is skipped.
+#[derive(Debug, Default)]
+pub(super) struct Options {
+    pub(super) temperature: Option<Expr>,
+    pub(super) gmin: Option<Expr>,
+    pub(super) others: bool,
 }
 
 impl Dot {
@@ -375,9 +383,9 @@ const OF_FILES: [&str; 8] = [
     "fastaccess",
 ];
 
-/// The temperature among options, which are names with and without values.
+/// The options that matter among names with and without values.
 fn options(i: Input<'_>) -> Dot {
-    let (mut temperature, mut others) = (None, false);
+    let mut options = Options::default();
     let mut at = separator(i);
     while let Ok((rest, name)) = word(at) {
         at = separator(rest);
@@ -387,16 +395,21 @@ fn options(i: Input<'_>) -> Dot {
                     at = separator(rest);
                     Some(value)
                 }
-                Err(_) => return Dot::Options(temperature, true),
+                Err(_) => {
+                    options.others = true;
+                    return Dot::Options(options);
+                }
             },
             None => None,
         };
         match value {
-            Some(value) if name.text == "temp" => temperature = Some(value),
-            _ => others |= !OF_FILES.contains(&name.text.as_str()),
+            Some(value) if name.text == "temp" => options.temperature = Some(value),
+            Some(value) if name.text == "gmin" => options.gmin = Some(value),
+            _ => options.others |= !OF_FILES.contains(&name.text.as_str()),
         }
     }
-    Dot::Options(temperature, others || !at_end(at))
+    options.others |= !at_end(at);
+    Dot::Options(options)
 }
 
 /// `.thermal node device …`.

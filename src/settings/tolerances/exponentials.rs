@@ -105,6 +105,10 @@ pub(crate) const LEAST_PART: f64 = 1e-6;
 /// The long ones are for stiff circuits: a current that starts without a slope is no more than rounding on the others.
 pub(crate) const PROPOSALS: [f64; 9] = [1e-6, 1e-4, 1e-8, 1e-2, 1e-10, 1.0, 1e2, 1e4, 1e6];
 
+/// The conductance beside a junction that alone connects a part of the circuit with the rest where `.options gmin=` names none, S: that of ngspice and
+/// LTspice. Larger: what blocks leaks; smaller: rounding of currents decides voltages.
+pub(crate) const GMIN: f64 = 1e-12;
+
 /// x below minus this has ω(x) below half the rounding of 1: a junction there is its blocking line. Larger: exponentials of what is rounding;
 /// smaller: leakage loses digits.
 pub(crate) const BLOCKED_JUNCTION: f64 = 37.0;

@@ -11,6 +11,7 @@ fn diode(is: f64, slope: f64, rs: f64, bv: Option<f64>) -> Law {
         is,
         slope,
         rs,
+        leak: 0.0,
         breakdown: bv.map(|bv| Breakdown {
             bv,
             ibv: 1e-3,
