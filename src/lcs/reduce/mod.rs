@@ -34,6 +34,7 @@ use super::sparse::Readings;
 use super::{Hold, Lcs, LcsError, LcsParts, Role, SparseLcs};
 use eliminated::Eliminated;
 use publish::publish;
+use roles::Digits;
 pub(crate) use separate::{fast_states, is_coupled};
 
 /// What each device and switch is held as.
@@ -251,8 +252,9 @@ fn reduction<F: Field>(
 ) -> Result<Reduction<F>, ReduceError> {
     let mut reduction = in_some_order(behaviour, reduced, position)?;
     let mut exchanged = BTreeSet::new();
-    // Others may follow each other where some have changed roles.
-    while let Some(lost) = roles::lost(behaviour, &reduction) {
+    let mut of = Digits::All;
+    while let Some(lost) = roles::lost(behaviour, &reduction, of) {
+        of = Digits::Leaks;
         let known = exchanged.len();
         exchanged.extend(lost);
         if exchanged.len() == known {

@@ -1,9 +1,8 @@
 //! Other quantities of those devices whose D keeps too few digits of what sets them apart.
 //!
-//! Of what a junction leaks nothing is left beside any 1/R, even where D has no other digits.
 //! Two diodes with Ron in parallel, and R in series with both: with λ = −v of both D = 1/(2 Ron) [1, −1; −1, 1] + 1/(4R) [1, 1; 1, 1] for
 //! Ron ≪ R, and of 1/R there is what 1/Ron leaves of the digits of doubles, nothing where these are 16 decades apart. With λ = i of one of
-//! them its row and column are ±1 and D of the other is 1/R.
+//! them its row and column are ±1 and D of the other is 1/R. What a junction leaks counts with D, though it is part of its law.
 
 use std::collections::BTreeSet;
 
@@ -16,16 +15,24 @@ use crate::lcs::Role;
 use crate::mna::StaticMultiport;
 use crate::settings::tolerances::ranks::{COUPLED, RANK};
 
+/// Of what digits are looked for: an exchange may hide leaks that were seen before, and is not to undo others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Digits {
+    All,
+    Leaks,
+}
+
 /// The pairs that others follow in D + Dᵀ but for less than [`RANK`] of themselves, which is not nothing: the independent ones of them, by the
 /// largest pivots of an exact factorisation L Δ Lᵀ. `None` where there are none.
 pub(super) fn lost<F: Field>(
     behaviour: &StaticMultiport,
     reduction: &Reduction<F>,
+    of: Digits,
 ) -> Option<Vec<usize>> {
     let blocks = blocks(reduction);
     let blocks = blocks.iter().filter(|block| block.len() > 1);
     let mut lost: Vec<usize> = blocks
-        .flat_map(|block| lost_in(behaviour, reduction, block))
+        .flat_map(|block| lost_in(behaviour, reduction, block, of))
         .collect();
     lost.sort_unstable();
     lost.dedup();
@@ -65,6 +72,7 @@ fn lost_in<F: Field>(
     behaviour: &StaticMultiport,
     reduction: &Reduction<F>,
     block: &[usize],
+    of: Digits,
 ) -> Vec<usize> {
     let (n, m) = (reduction.states.len(), block.len());
     let d = |i: usize, j: usize| {
@@ -86,7 +94,10 @@ fn lost_in<F: Field>(
     }
     let leaks = |j: usize| {
         let (pair, _) = reduction.pairs[block[j]];
-        matches!(behaviour.pairs[pair].port.law, Law::Exponential(diode) if diode.leak > 0.0)
+        let Law::Exponential(diode) = behaviour.pairs[pair].port.law else {
+            return false;
+        };
+        diode.leak > 0.0 && diode.leak * unit[j] * unit[j] <= RANK
     };
     // Part of its diagonal that is left of each pair, and pivots with their columns of L in units of the diagonals.
     let mut left: Vec<f64> = unit.iter().map(|u| f64::from(*u > 0.0)).collect();
@@ -107,7 +118,8 @@ fn lost_in<F: Field>(
         }
         for j in 0..m {
             let before = std::mem::replace(&mut left[j], rest[j][j].to_f64() * unit[j] * unit[j]);
-            if before > RANK && left[j] <= RANK && (!rest[j][j].is_zero() || leaks(j)) {
+            let is_lost = leaks(j) || of == Digits::All && !rest[j][j].is_zero();
+            if before > RANK && left[j] <= RANK && is_lost {
                 let followed = pivots.iter().filter(|(_, share)| share[j].abs() > COUPLED);
                 lost.extend(followed.map(|(p, _)| reduction.pairs[block[*p]].0));
             }
