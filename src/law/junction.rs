@@ -62,6 +62,9 @@ impl Junction {
             let i = self.scale * omega - self.is;
             (i, omega / (1.0 + omega) * self.conductance)
         };
+        if self.leak == 0.0 {
+            return (i, di);
+        }
         let (v, dv) = (z - self.r * i, 1.0 - self.r * di);
         (i + self.leak * v, (di + self.leak * dv) * self.part)
     }

@@ -9,8 +9,7 @@ use super::slaved::Follower;
 use crate::linalg::polynomial;
 use crate::linalg::refill::{raise, refill};
 use crate::linalg::series::Series;
-use crate::settings::tolerances::events::CLEAR_OF_ZERO;
-use crate::settings::tolerances::events::SIMULTANEOUS;
+use crate::settings::tolerances::events::{CLEAR_OF_ZERO, NEARLY_FALLEN, NO_MOVE, SIMULTANEOUS};
 use crate::settings::tolerances::times::SAME_TIME;
 
 /// Table steps after which the exosystem is set from its closed form again.
@@ -550,16 +549,24 @@ impl Travel {
         }
     }
 
-    /// A guard that falls and is zero to its rounding, where a step of h seconds is none to the time, but not for what may still be a
-    /// transient that began with the mode: such steps move nothing, and could go on without end.
+    /// A guard that falls and is zero to its rounding, where a step of h seconds is none to the time, or none to a guard that has nearly fallen through its
+    /// rounding, but not for what may still be a transient that began with the mode: such steps move nothing, and could go on without end.
     fn fallen(&self, flow: &Flow, h: f64) -> Option<usize> {
         let ulp = f64::EPSILON * self.t.abs();
-        if h > 0.25 * ulp || self.age <= ulp {
+        if self.age <= ulp {
             return None;
         }
+        let none_to_time = h <= 0.25 * ulp;
         let (g, slopes) = self.now[flow.dim()..].split_at(flow.guards());
         let (floors, slope_floors) = self.floors.split_at(flow.guards());
-        let falls = |&i: &usize| g[i] <= floors[i] && slopes[i] < -slope_floors[i];
+        let none_to_guard = |i: usize| {
+            let left = g[i] + floors[i];
+            -slopes[i] * h <= NO_MOVE * floors[i] && left <= NEARLY_FALLEN * floors[i]
+        };
+        let falls = |&i: &usize| {
+            let is_zero = g[i] <= floors[i] && slopes[i] < -slope_floors[i];
+            is_zero && (none_to_time || none_to_guard(i))
+        };
         (0..flow.guards()).find(falls)
     }
 

@@ -55,3 +55,9 @@ pub(crate) const SAME_TIMING: f64 = 1e-6;
 /// A current below this part of the largest that its device carried is no conduction in a picture: what leaks through open switches is less. Larger: the end
 /// of a decay is not seen; smaller: open switches of 1 MΩ in circuits of a few hundred ohms conduct.
 pub(crate) const LEAKING: f64 = 1e-3;
+
+/// A step that moves a guard by less than this part of its rounding moves nothing. Larger: transients are cut short; smaller: steps without end.
+pub(crate) const NO_MOVE: f64 = 1.0 / 64.0;
+
+/// A falling guard that no step moves any further has fallen where this part of its rounding is left. Larger: as above; smaller: it rests above for ever.
+pub(crate) const NEARLY_FALLEN: f64 = 1.0 / 8.0;
