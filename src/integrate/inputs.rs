@@ -120,6 +120,11 @@ impl Inputs {
         }
     }
 
+    /// Writes right limits of the varying inputs behind all edges that are at `t` to the rounding of times, as is [`Self::next_corner`].
+    pub(crate) fn behind(&self, t: f64, u: &mut [f64]) {
+        self.right(self.end_of_instant(t), u);
+    }
+
     /// Writes the varying inputs, one after the other, at a time without breakpoint, by the closed forms found last where they hold there.
     pub(crate) fn varying_at(&self, t: f64, pieces: &mut Pieces, values: &mut [f64]) {
         pieces.0.resize(self.varying.len(), None);
@@ -169,13 +174,18 @@ impl Inputs {
     /// The first edge or kink that lies after `t` by more than the rounding of times; infinite if none.
     #[must_use]
     pub(crate) fn next_corner(&self, t: f64) -> f64 {
-        let mut after = t;
+        self.next_breakpoint(self.end_of_instant(t))
+    }
+
+    /// The last edge or kink that is at `t` to the rounding of times, or `t`.
+    pub(crate) fn end_of_instant(&self, t: f64) -> f64 {
+        let mut end = t;
         loop {
-            let next = self.next_breakpoint(after);
+            let next = self.next_breakpoint(end);
             if next - t > SAME_TIME * next.abs() || !next.is_finite() {
-                return next;
+                return end;
             }
-            after = next;
+            end = next;
         }
     }
 

@@ -28,6 +28,7 @@ impl Sparse {
     pub(super) fn begin(&mut self, log: &mut Log) -> Result<(), Error> {
         let before = self.now.u.clone();
         self.now.u = self.inputs.all(self.now.t);
+        self.inputs.behind(self.now.t, &mut self.now.u);
         self.jump(&before)?;
         let start = std::mem::take(&mut self.start);
         self.note_jump(&start, 0.0, JumpReason::Start, log);
@@ -43,10 +44,23 @@ impl Sparse {
         Ok(())
     }
 
+    /// As [`Theta`](crate::integrate::theta::Theta)'s: the switches that sources move by edges which rounding puts behind the corner here.
+    pub(super) fn add_late(&self, moving: &mut Vec<usize>) {
+        let (now, end) = (self.now.t, self.inputs.end_of_instant(self.now.t));
+        if end > now {
+            let slack = Self::slack(end);
+            let lcs = self.system();
+            let (_, late) = (self.switches).next_known(lcs, &self.inputs, now, end, slack);
+            moving.extend(late);
+            moving.sort_unstable();
+            moving.dedup();
+        }
+    }
+
     /// At a breakpoint: inputs take their right limits, the state jumps if it must.
     pub(super) fn edge(&mut self, t: f64, log: &mut Log) -> Result<(), Error> {
         let mut u = self.now.u.clone();
-        self.inputs.right(t, &mut u);
+        self.inputs.behind(t, &mut u);
         if u == self.now.u {
             if log.wants_corners() {
                 let row = self.row();

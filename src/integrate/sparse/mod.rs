@@ -350,7 +350,7 @@ impl Stepper for Sparse {
             } else {
                 breakpoint.min(t)
             };
-            let (known, moving) = self.next_known(limit);
+            let (known, mut moving) = self.next_known(limit);
             let mut stop = if merged { t } else { limit };
             let early = known < stop - Self::slack(stop);
             if early {
@@ -359,6 +359,7 @@ impl Stepper for Sparse {
             self.interval(stop, log)?;
             if !early && (breakpoint - stop).abs() <= Self::slack(stop) {
                 self.edge(breakpoint.max(stop), log)?;
+                self.add_late(&mut moving);
             }
             if !moving.is_empty() {
                 self.switch(&moving, log)?;

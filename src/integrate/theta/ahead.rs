@@ -76,6 +76,7 @@ impl Theta {
         }
         if at_breakpoint {
             self.edge(breakpoint.max(stop), log)?;
+            self.add_late(&mut moving);
         }
         if !moving.is_empty() {
             self.inputs

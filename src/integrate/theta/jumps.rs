@@ -11,7 +11,8 @@ use crate::settings::tolerances::steps::SHORT;
 impl Theta {
     /// The first jump: from inconsistent initial values, by edges of the sources at the start.
     pub(super) fn begin(&mut self, log: &mut Log) -> Result<(), Error> {
-        let u = self.inputs.all(self.now.t);
+        let mut u = self.inputs.all(self.now.t);
+        self.inputs.behind(self.now.t, &mut u);
         let before = std::mem::replace(&mut self.now.u, u);
         self.jump(&before, log)?;
         let start = std::mem::take(&mut self.start);
@@ -38,7 +39,7 @@ impl Theta {
     /// At a breakpoint: inputs take their right limits, the state jumps if it must.
     pub(super) fn edge(&mut self, t: f64, log: &mut Log) -> Result<(), Error> {
         let mut u = self.now.u.clone();
-        self.inputs.right(t, &mut u);
+        self.inputs.behind(t, &mut u);
         self.edge = self.now.t;
         // Where the inputs go on with another slope alone, x' does not jump.
         self.smooth.front.reach = 0.0;
@@ -69,6 +70,20 @@ impl Theta {
             self.log_row(log);
         }
         Ok(())
+    }
+
+    /// Adds the switches that sources move by edges which rounding puts behind the corner here. A step to them would end at their left limits, and the
+    /// next corner is beyond them.
+    pub(super) fn add_late(&self, moving: &mut Vec<usize>) {
+        let (now, end) = (self.now.t, self.inputs.end_of_instant(self.now.t));
+        if end > now {
+            let slack = Self::slack(end);
+            let lcs = &self.system().lcs;
+            let (_, late) = (self.switches).next_known(lcs, &self.inputs, now, end, slack);
+            moving.extend(late);
+            moving.sort_unstable();
+            moving.dedup();
+        }
     }
 
     /// The motion goes on from here with another slope. Where a curved step starts from is told by [`Self::find_mode`], which follows.

@@ -340,6 +340,7 @@ impl Stepper for Theta {
             let at_breakpoint = !early && (breakpoint - stop).abs() <= Self::slack(stop);
             if at_breakpoint {
                 self.edge(breakpoint.max(stop), log)?;
+                self.add_late(&mut moving);
             }
             if !moving.is_empty() {
                 self.inputs
