@@ -173,7 +173,7 @@ impl<'n, 'o> Builder<'n, 'o> {
             );
         }
         self.resolve();
-        self.add_gmin();
+        self.set_gmin();
         self.report_unused(&netlist.body);
         self.warn_of_idle_steps();
         if !self.circuit.elements.is_empty() && read && !self.failed() {

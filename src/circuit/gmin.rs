@@ -31,7 +31,7 @@ fn connects(kind: &Kind) -> bool {
 
 impl Builder<'_, '_> {
     /// Sets the conductances, of `.options gmin=`, S, or of [`GMIN`]; 0 adds none.
-    pub(super) fn add_gmin(&mut self) {
+    pub(super) fn set_gmin(&mut self) {
         let gmin = match self.gmin {
             None => GMIN,
             Some(expr) => match self.scopes.finite(expr, ScopeId::ROOT) {

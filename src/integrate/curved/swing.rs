@@ -32,8 +32,8 @@ impl Trial {
         mean.abs() < GOES_NOWHERE * largest && changes.count() >= SWINGS
     }
 
-    /// Where slopes swing at the end of this step, which is the `start` of the next one, that starts with slopes, λ and y of Euler's method instead; with
-    /// ideal ports on the sides `held`, stages solved to `granted`.
+    /// Where slopes swing in this step, whose end is `start`, the next one starts with those of Euler's method, and its λ and y; with ideal ports on the
+    /// sides `held`, and the stage solved to `granted`. Where Newton's method does not find it nothing changes.
     pub(crate) fn calm(
         &mut self,
         curved: &mut Curved,
