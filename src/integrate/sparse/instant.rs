@@ -44,19 +44,6 @@ impl Sparse {
         Ok(())
     }
 
-    /// As [`Theta`](crate::integrate::theta::Theta)'s: the switches that sources move by edges which rounding puts behind the corner here.
-    pub(super) fn add_late(&self, moving: &mut Vec<usize>) {
-        let (now, end) = (self.now.t, self.inputs.end_of_instant(self.now.t));
-        if end > now {
-            let slack = Self::slack(end);
-            let lcs = self.system();
-            let (_, late) = (self.switches).next_known(lcs, &self.inputs, now, end, slack);
-            moving.extend(late);
-            moving.sort_unstable();
-            moving.dedup();
-        }
-    }
-
     /// At a breakpoint: inputs take their right limits, the state jumps if it must.
     pub(super) fn edge(&mut self, t: f64, log: &mut Log) -> Result<(), Error> {
         let mut u = self.now.u.clone();

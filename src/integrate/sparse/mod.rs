@@ -359,7 +359,8 @@ impl Stepper for Sparse {
             self.interval(stop, log)?;
             if !early && (breakpoint - stop).abs() <= Self::slack(stop) {
                 self.edge(breakpoint.max(stop), log)?;
-                self.add_late(&mut moving);
+                let here = (self.now.t, Self::slack(self.now.t));
+                (self.switches).add_late(self.system(), &self.inputs, here, &mut moving);
             }
             if !moving.is_empty() {
                 self.switch(&moving, log)?;

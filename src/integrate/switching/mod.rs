@@ -410,4 +410,21 @@ impl Switches {
         passages.retain(|(time, _)| *time <= first + slack);
         (first, passages.into_iter().map(|(_, i)| i).collect())
     }
+
+    /// Adds the switches that sources move by edges which rounding puts behind the corner at `t`. A step to them would end at their left limits, and
+    /// the next corner is beyond them.
+    pub(crate) fn add_late(
+        &self,
+        lcs: &impl Watched,
+        inputs: &Inputs,
+        (t, slack): (f64, f64),
+        moving: &mut Vec<usize>,
+    ) {
+        let end = inputs.end_of_instant(t);
+        if end > t {
+            moving.extend(self.next_known(lcs, inputs, t, end, slack).1);
+            moving.sort_unstable();
+            moving.dedup();
+        }
+    }
 }

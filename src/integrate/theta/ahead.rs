@@ -76,7 +76,9 @@ impl Theta {
         }
         if at_breakpoint {
             self.edge(breakpoint.max(stop), log)?;
-            self.add_late(&mut moving);
+            let here = (self.now.t, Self::slack(self.now.t));
+            let lcs = &self.system().lcs;
+            (self.switches).add_late(lcs, &self.inputs, here, &mut moving);
         }
         if !moving.is_empty() {
             self.inputs

@@ -72,20 +72,6 @@ impl Theta {
         Ok(())
     }
 
-    /// Adds the switches that sources move by edges which rounding puts behind the corner here. A step to them would end at their left limits, and the
-    /// next corner is beyond them.
-    pub(super) fn add_late(&self, moving: &mut Vec<usize>) {
-        let (now, end) = (self.now.t, self.inputs.end_of_instant(self.now.t));
-        if end > now {
-            let slack = Self::slack(end);
-            let lcs = &self.system().lcs;
-            let (_, late) = (self.switches).next_known(lcs, &self.inputs, now, end, slack);
-            moving.extend(late);
-            moving.sort_unstable();
-            moving.dedup();
-        }
-    }
-
     /// The motion goes on from here with another slope. Where a curved step starts from is told by [`Self::find_mode`], which follows.
     fn forget_slope(&mut self) {
         self.now.slope.clear();

@@ -340,7 +340,9 @@ impl Stepper for Theta {
             let at_breakpoint = !early && (breakpoint - stop).abs() <= Self::slack(stop);
             if at_breakpoint {
                 self.edge(breakpoint.max(stop), log)?;
-                self.add_late(&mut moving);
+                let here = (self.now.t, Self::slack(self.now.t));
+                let lcs = &self.system().lcs;
+                (self.switches).add_late(lcs, &self.inputs, here, &mut moving);
             }
             if !moving.is_empty() {
                 self.inputs
