@@ -327,6 +327,22 @@ impl Display for Faults {
 
 impl std::error::Error for Faults {}
 
+/// "d1, d2 and d3"; of many, how many more there are.
+pub(crate) fn listed(names: &[&str]) -> String {
+    /// More would not be read.
+    const MOST: usize = 6;
+    match names {
+        [] => String::new(),
+        [one] => (*one).to_string(),
+        [rest @ .., last] if names.len() <= MOST => format!("{} and {last}", rest.join(", ")),
+        _ => format!(
+            "{} and {} more",
+            names[..MOST].join(", "),
+            names.len() - MOST
+        ),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -9,12 +9,9 @@ use petgraph::unionfind::UnionFind;
 use super::builder::Builder;
 use super::scope::ScopeId;
 use super::{Kind, Output};
-use crate::diagnostic::Diagnostic;
+use crate::diagnostic::{Diagnostic, listed};
 use crate::law::{Exponential, Law};
 use crate::settings::tolerances::exponentials::GMIN;
-
-/// Names that the note lists.
-const SHOWN: usize = 4;
 
 /// Whether an element holds two nodes together whatever it does: not a junction, an open switch or a source of current.
 fn connects(kind: &Kind) -> bool {
@@ -37,7 +34,7 @@ impl Builder<'_, '_> {
             Some(expr) => match self.scopes.finite(expr, ScopeId::ROOT) {
                 Some(gmin) if gmin.f64 >= 0.0 => gmin.f64,
                 Some(gmin) => {
-                    let message = format!("gmin is {} S", gmin.f64);
+                    let message = format!("gmin is {:e} S", gmin.f64);
                     self.tell(
                         Diagnostic::error("bad-value", expr.span, message)
                             .label("negative")
@@ -57,7 +54,7 @@ impl Builder<'_, '_> {
                 parts.union(element.p.index(), element.n.index());
             }
         }
-        let (mut names, mut more, mut first) = (Vec::new(), 0_usize, None);
+        let (mut names, mut first) = (Vec::new(), None);
         for element in &mut self.circuit.elements {
             let apart = !parts.equiv(element.p.index(), element.n.index());
             if let Kind::Device(Law::Exponential(Exponential { leak, .. })) = &mut element.kind
@@ -65,23 +62,15 @@ impl Builder<'_, '_> {
             {
                 *leak = gmin;
                 first = first.or(element.span);
-                if names.len() < SHOWN {
-                    names.push(element.name.as_str());
-                } else {
-                    more += 1;
-                }
+                names.push(element.name.as_str());
             }
         }
         if names.is_empty() {
             return;
         }
-        let more = match more {
-            0 => String::new(),
-            more => format!(" and {more} more"),
-        };
         let message = format!(
-            "a part of the circuit hangs on junctions alone, and where they block on their leakage: {gmin:e} S beside {}{more} decide its voltage",
-            names.join(", ")
+            "a part of the circuit hangs on junctions alone, and where they block on their leakage: {gmin:e} S beside {} decide its voltage",
+            listed(&names)
         );
         self.tell(
             Diagnostic::note("gmin", first, message)

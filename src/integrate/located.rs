@@ -2,8 +2,8 @@
 
 use super::error::{Error, NoRest, Reason, at};
 use crate::circuit::{Circuit, Element, Kind, written};
-use crate::diagnostic::Diagnostic;
 use crate::diagnostic::explain::explain;
+use crate::diagnostic::{Diagnostic, listed};
 use crate::law::Law;
 use crate::lcs::ReduceError;
 
@@ -359,20 +359,4 @@ const fn is_voltage_source(element: &Element) -> bool {
 
 const fn is_current_source(element: &Element) -> bool {
     matches!(element.kind, Kind::CurrentSource(_))
-}
-
-/// "d1, d2 and d3"; of many, how many more there are.
-fn listed(names: &[&str]) -> String {
-    /// More would not be read.
-    const MOST: usize = 6;
-    match names {
-        [] => String::new(),
-        [one] => (*one).to_string(),
-        [rest @ .., last] if names.len() <= MOST => format!("{} and {last}", rest.join(", ")),
-        _ => format!(
-            "{} and {} more",
-            names[..MOST].join(", "),
-            names.len() - MOST
-        ),
-    }
 }
