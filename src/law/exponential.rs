@@ -76,6 +76,11 @@ impl Exponential {
                 .is_none_or(|b| positive(b.bv) && positive(b.ibv) && positive(b.slope))
     }
 
+    /// di/dv of the junction at v = 0 without what leaks beside it, IS/a, S.
+    pub(crate) fn conductance_at_rest(&self) -> f64 {
+        self.is / self.slope
+    }
+
     /// The law of `factor` such diodes in parallel.
     #[must_use]
     pub fn times(self, factor: f64) -> Self {

@@ -6,7 +6,7 @@ use crate::circuit::source::Wave;
 use crate::circuit::{
     Affine, Circuit, Coupling, Element, ElementId, Kind, NodeId, Output, Quantity, Source, Switch,
 };
-use crate::law::{Curve, Law};
+use crate::law::{Curve, Exponential, Law};
 
 /// A decimal with an engineering suffix, exactly.
 pub(crate) fn value(text: &str) -> Value {
@@ -118,6 +118,13 @@ pub(crate) fn circuit(text: &str) -> Circuit {
                 roff: words.get(5).map(|w| value(w)),
             }),
             "d" => Kind::Device(Law::ideal_diode()),
+            "j" => Kind::Device(Law::Exponential(Exponential {
+                is: number(3).f64,
+                slope: 0.025,
+                rs: 0.0,
+                leak: 0.0,
+                breakdown: None,
+            })),
             "z" => Kind::Device(Law::Curve(Curve {
                 kind: "zener",
                 vertices: vec![(number(3), value("0")), (number(4), value("0"))],

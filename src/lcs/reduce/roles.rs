@@ -2,7 +2,8 @@
 //!
 //! Two diodes with Ron in parallel, and R in series with both: with λ = −v of both D = 1/(2 Ron) [1, −1; −1, 1] + 1/(4R) [1, 1; 1, 1] for
 //! Ron ≪ R, and of 1/R there is what 1/Ron leaves of the digits of doubles, nothing where these are 16 decades apart. With λ = i of one of
-//! them its row and column are ±1 and D of the other is 1/R. What a junction leaks counts with D, though it is part of its law.
+//! them its row and column are ±1 and D of the other is 1/R. What a junction leaks counts with D, though it is part of its law, or what it conducts at
+//! rest where it leaks nothing: beside 1 mΩ and 7 V the rounding of D λ is 10⁻¹² A.
 
 use std::collections::BTreeSet;
 
@@ -97,7 +98,12 @@ fn lost_in<F: Field>(
         let Law::Exponential(diode) = behaviour.pairs[pair].port.law else {
             return false;
         };
-        diode.leak > 0.0 && diode.leak * unit[j] * unit[j] <= RANK
+        let siemens = if diode.leak > 0.0 {
+            diode.leak
+        } else {
+            diode.conductance_at_rest()
+        };
+        siemens * unit[j] * unit[j] <= RANK
     };
     // Part of its diagonal that is left of each pair, and pivots with their columns of L in units of the diagonals.
     let mut left: Vec<f64> = unit.iter().map(|u| f64::from(*u > 0.0)).collect();
@@ -119,7 +125,7 @@ fn lost_in<F: Field>(
         for j in 0..m {
             let before = std::mem::replace(&mut left[j], rest[j][j].to_f64() * unit[j] * unit[j]);
             let is_lost = leaks(j) || of == Digits::All && !rest[j][j].is_zero();
-            if before > RANK && left[j] <= RANK && is_lost {
+            if j != p && before > RANK && left[j] <= RANK && is_lost {
                 let followed = pivots.iter().filter(|(_, share)| share[j].abs() > COUPLED);
                 lost.extend(followed.map(|(p, _)| reduction.pairs[block[*p]].0));
             }

@@ -391,3 +391,20 @@ fn a_junction_in_parallel_with_a_diode_changes_roles() {
         ],
     );
 }
+
+#[test]
+fn a_junction_that_no_other_one_hides_keeps_its_role() {
+    // Both are in one loop with two capacitors, so that λ are −v of one and i of the other, whichever is which; 1 MΩ alone is beside them.
+    let s = free("r1 1 0 1meg\n j1 1 2 1e-18\n j2 1 3 1e-18\n c1 2 0 1u\n c2 3 0 1u");
+    let lambdas: Vec<&str> = s.ports.iter().map(|p| p.lambda.as_str()).collect();
+    assert_eq!(lambdas, ["-v(j1)", "i(j2)"]);
+}
+
+#[test]
+fn a_junction_hidden_by_another_one_beside_a_small_resistance_changes_roles() {
+    // With −v of both D = 10³ S [1, 1; 1, 1], beside which neither leaks anything.
+    let s = free("j1 0 1 10f\n j2 1 2 10f\n i1 0 1 1\n r1 2 3 1m\n c1 3 0 1u");
+    let lambdas: Vec<&str> = s.ports.iter().map(|p| p.lambda.as_str()).collect();
+    assert_eq!(lambdas, ["-v(j1)", "i(j2)"]);
+    assert_matrix("D", &s.d, &[&[0.0, 1.0], &[-1.0, 1e-3]]);
+}
