@@ -58,10 +58,6 @@ impl Trial {
             return;
         }
         curved.respond(at, lambda, &mut self.x);
-        start.lambda.copy_from_slice(lambda);
-        start.y.copy_from_slice(y);
-        start.lambda_rate.fill(0.0);
-        start.y_rate.fill(0.0);
         for state in (0..self.n).filter(|&state| self.swings(state)) {
             start.slope[state] = (self.x[state] - start.x[state]) / g;
         }
