@@ -50,6 +50,12 @@ impl System {
         }
     }
 
+    /// Its tables for steps of chosen lengths.
+    pub(crate) fn smooth(&mut self) -> &mut Curved {
+        let (lcs, columns) = (&self.lcs, &self.columns);
+        (self.smooth).get_or_insert_with(|| Box::new(Curved::of(lcs, columns)))
+    }
+
     /// Matrices for a step h; a cached step that differs by no more than `slack` (the rounding of the times it connects)
     /// serves as well. Returns the index and whether it was computed now.
     pub(crate) fn matrices(

@@ -56,6 +56,8 @@ pub(crate) struct Newton {
     lu: Vec<f64>,
     order: Vec<usize>,
     factored: bool,
+    /// The least size that w' counts with.
+    least: f64,
     /// Factorisations of R' so far.
     pub(crate) factorisations: u64,
 }
@@ -63,8 +65,16 @@ pub(crate) struct Newton {
 impl Newton {
     /// Prepares M.
     pub(crate) fn new(m: &DMatrix<f64>, laws: &[PortLaw]) -> Self {
+        Self::near(m, laws, &vec![1.0; m.nrows()], 0.0)
+    }
+
+    /// Prepares M, with ports that it leaves free scaled by powers of two, λ = d λ' and y = y'/d, and steps below a part of the size `least` of w' taken
+    /// for rounding.
+    pub(crate) fn near(m: &DMatrix<f64>, laws: &[PortLaw], scales: &[f64], least: f64) -> Self {
         let size = m.nrows();
-        let d: Vec<f64> = Scaling::of(m).d.iter().copied().collect();
+        let scaled = DMatrix::from_fn(size, size, |i, j| scales[i] * m[(i, j)] * scales[j]);
+        let d = Scaling::of(&scaled).d;
+        let d: Vec<f64> = d.iter().zip(scales).map(|(d, scale)| d * scale).collect();
         let port = |(law, d): (&PortLaw, &f64)| match law.law {
             _ if law.law.is_ideal_diode() => Port::Ideal { held: None },
             Law::Exponential(exponential) => {
@@ -99,6 +109,7 @@ impl Newton {
             lu: vec![0.0; size * size],
             order: (0..size).collect(),
             factored: false,
+            least,
             factorisations: 0,
             d,
         }
@@ -170,7 +181,7 @@ impl Newton {
     fn descend(&mut self, (wanted, granted): (f64, f64)) -> bool {
         let largest = |values: &[f64]| values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         self.evaluate();
-        let start = largest(&self.w).max(largest(&self.q));
+        let start = largest(&self.w).max(largest(&self.q)).max(self.least);
         let mut before = f64::INFINITY;
         for k in 0..STEPS {
             let fresh = !self.factored || self.size <= SMALL;
@@ -187,7 +198,7 @@ impl Newton {
                 *w += step;
             }
             self.evaluate();
-            let scale = largest(&self.w).max(largest(&self.q));
+            let scale = largest(&self.w).max(largest(&self.q)).max(self.least);
             // Far out the voltages of junctions are rounding of their currents, and every step is small.
             if scale > RUNAWAY * start {
                 return false;

@@ -26,8 +26,8 @@ pub(crate) struct Curved {
     pub(super) m: usize,
     pub(super) p: usize,
     /// A, B, C, D.
-    system: [DMatrix<f64>; 4],
-    laws: Vec<PortLaw>,
+    pub(super) system: [DMatrix<f64>; 4],
+    pub(super) laws: Vec<PortLaw>,
     a: Vec<f64>,
     b: Vec<f64>,
     c: Vec<f64>,
@@ -140,7 +140,7 @@ impl Curved {
     }
 
     /// y of port j for λ = 0: C x + G u + F.
-    fn free(&self, j: usize, x: &[f64], u: &[f64]) -> f64 {
+    pub(super) fn free(&self, j: usize, x: &[f64], u: &[f64]) -> f64 {
         let (n, p) = (self.n, self.p);
         dot(&self.c[j * n..(j + 1) * n], x) + dot(&self.g[j * p..(j + 1) * p], u) + self.offset[j]
     }

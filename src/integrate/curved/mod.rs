@@ -5,6 +5,7 @@
 //! |---|---|
 //! | `tableau` | the coefficients |
 //! | `implicit` | a system's matrices for one step length, and one stage |
+//! | `instant` | λ on the laws where the state jumped or a run begins |
 //! | `trial` | the buffers of a step on its way, and what it says of its error |
 //! | `swing` | slopes that swing from step to step at a state that rests |
 //! | `segment` | dense output: what rows within a step are read from |
@@ -15,6 +16,7 @@
 
 mod forms;
 mod implicit;
+mod instant;
 mod segment;
 mod swing;
 pub(crate) mod tableau;

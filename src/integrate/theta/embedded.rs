@@ -214,13 +214,12 @@ impl Theta {
             ..
         } = self;
         let system = &mut plant.systems[now.system].1;
-        let (lcs, columns) = (&system.lcs, &system.columns);
-        let curved = (system.smooth).get_or_insert_with(|| Box::new(Curved::of(lcs, columns)));
+        let curved = system.smooth();
         let front = &mut smooth.front;
         (front.known, front.t, front.reach) = (true, now.t, 0.0);
         front.x.clone_from(&now.x);
         front.u.clear();
-        front.u.extend(columns.varying.iter().map(|&j| now.u[j]));
+        front.u.extend(curved.varying.iter().map(|&j| now.u[j]));
         front.lambda.clone_from(lambda);
         front.y.clone_from(y);
         front.slope.resize(now.x.len(), 0.0);
@@ -241,7 +240,8 @@ impl Theta {
         for (kind, (sizes, values)) in smooth.sizes.iter_mut().zip([lambda, y]).enumerate() {
             if fresh {
                 sizes.clear();
-                sizes.extend(lcs.ports.iter().map(|port| FAINT * of_kind(port)[kind]));
+                let ports = system.lcs.ports.iter();
+                sizes.extend(ports.map(|port| FAINT * of_kind(port)[kind]));
             }
             grow(sizes, values);
         }

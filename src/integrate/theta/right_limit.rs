@@ -191,11 +191,26 @@ impl Theta {
         if self.read_lambda().is_err() {
             self.lambda.fill(0.0);
         }
+        let on_laws = self.on_laws();
         let lcs = &self.plant.systems[self.now.system].1.lcs;
-        let at = self.now.point(&self.lambda, &self.du);
+        let at = (self.now).point(on_laws.as_ref().unwrap_or(&self.lambda), &self.du);
         for (i, value) in row.iter_mut().enumerate() {
             *value = reading::value(&lcs.outputs.rows, i, at);
         }
+    }
+
+    /// λ at the instant itself, from the λ that has been read: a junction behind an inductor without current has no voltage, and after any step
+    /// the logarithm of what came to flow in it. Nothing where a step has ended here, and beside ideal ports, which only a step tells.
+    fn on_laws(&mut self) -> Option<Vec<f64>> {
+        let front = &self.smooth.front;
+        let has_arrived = front.known && front.reach > 0.0;
+        if has_arrived || !self.is_smooth() {
+            return None;
+        }
+        let now = &self.now;
+        let curved = self.plant.systems[now.system].1.smooth();
+        let u: Vec<f64> = curved.varying.iter().map(|&j| now.u[j]).collect();
+        curved.at_instant(&now.x, &u, (&self.lambda, &self.y))
     }
 
     pub(super) fn note_energy(&mut self) {
