@@ -14,7 +14,7 @@ use crate::algebra::{Field, entry, part};
 use crate::law::Law;
 use crate::lcs::Role;
 use crate::mna::StaticMultiport;
-use crate::settings::tolerances::ranks::{COUPLED, RANK};
+use crate::settings::tolerances::ranks::{COUPLED, LEAKAGE, RANK};
 
 /// Of what digits are looked for: an exchange may hide leaks that were seen before, and is not to undo others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -103,7 +103,7 @@ fn lost_in<F: Field>(
         } else {
             diode.conductance_at_rest()
         };
-        siemens * unit[j] * unit[j] <= RANK
+        siemens * unit[j] * unit[j] <= LEAKAGE
     };
     // Part of its diagonal that is left of each pair, and pivots with their columns of L in units of the diagonals.
     let mut left: Vec<f64> = unit.iter().map(|u| f64::from(*u > 0.0)).collect();

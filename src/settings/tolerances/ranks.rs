@@ -12,6 +12,10 @@ pub(crate) const INVERSE: f64 = 1e-11;
 /// than need be change roles.
 pub(crate) const COUPLED: f64 = 0.1;
 
+/// What a junction leaks, or conducts at rest, below this part of the conductance beside it is lost in the rounding of what that carries: ε V/a of it, V over
+/// the voltage a in which the junction bends. Larger: roles are exchanged that lose nothing; smaller: steps follow that rounding.
+pub(crate) const LEAKAGE: f64 = 1e-7;
+
 /// A corner of a law is on the line through zero that its first ray is on where its coordinates, rounded three times, are so by this part.
 /// Larger: a line that passes zero at a distance is moved; smaller: a device that blocks at 0 V leaks the rounding of its corner.
 pub(crate) const ON_RAY: f64 = 4.0 * f64::EPSILON;
