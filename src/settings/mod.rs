@@ -23,7 +23,8 @@ pub struct Settings {
     /// systems with free devices. What was used longest ago is given up first; the answer is the same to rounding.
     pub max_kept: usize,
     /// So many capacitors, inductors, ideal pairs and switches together make a circuit one that is solved in parts, where it falls into parts
-    /// that share nothing but ground and sources (default 64).
+    /// that share nothing but ground and sources (default 32: from there on it is no dearer where all switch together, and where each has its own times the modes of
+    /// the whole are the products of those of the parts).
     pub apart: usize,
     /// So many capacitors, inductors and ideal pairs together make a circuit one that is integrated in steps on matrices without their zeros, unless exact
     /// integration is asked for (default 600). Larger: dense matrices, whose cost grows with the third power; smaller: steps for circuits that exact integration
@@ -40,7 +41,7 @@ impl Default for Settings {
             max_steps: 200_000_000,
             max_held: 1 << 30,
             max_kept: 1 << 28,
-            apart: 64,
+            apart: 32,
             large: 600,
         }
     }
