@@ -13,6 +13,7 @@ use super::forms::{Forms, Readings, dot};
 use crate::integrate::error::Reason;
 use crate::integrate::lawful;
 use crate::integrate::step::Columns;
+use crate::law::Law;
 use crate::lcs::{Lcs, Role};
 use crate::settings::tolerances::steps::{SOLVED, STAGE_ROUNDING};
 use crate::solve::PortLaw;
@@ -40,6 +41,8 @@ pub(crate) struct Curved {
     pub(crate) varying: Vec<usize>,
     /// The ideal ports: λ ⟂ y.
     pub(crate) ideal: Vec<usize>,
+    /// The largest conductance beside a junction, S: currents below what it carries are no signal.
+    pub(crate) leak: f64,
     /// The ports of devices; those of function blocks carry no current.
     pub(crate) devices: Vec<usize>,
     pub(super) forms: Forms,
@@ -72,7 +75,12 @@ impl Curved {
             |wanted: &dyn Fn(usize) -> bool| (0..lcs.m()).filter(|&j| wanted(j)).collect();
         let (e, constant) = split(&lcs.e, &lcs.e0, columns);
         let (g, offset) = split(&lcs.g, &lcs.f, columns);
+        let leaks = lcs.ports.iter().map(|port| match port.law {
+            Law::Exponential(diode) => diode.leak,
+            _ => 0.0,
+        });
         Self {
+            leak: leaks.fold(0.0, f64::max),
             n: lcs.n(),
             m: lcs.m(),
             p: columns.varying.len(),

@@ -339,10 +339,7 @@ impl Trial {
                 *error += weight * self.lambdas[stage * m + j];
             }
         }
-        if n > 0 {
-            let (lambda, y) = &mut self.end_error;
-            curved.shifted(self.matrices, &self.error, &mut self.q, (lambda, y));
-        }
+        self.follow(curved);
     }
 
     /// What differences of states are rounding: small differences of large terms are not known better than these.
@@ -353,12 +350,21 @@ impl Trial {
         }
     }
 
-    /// Takes what is rounding from the error.
-    pub(crate) fn forgive(&mut self, rounding: &[f64]) {
-        for (error, rounding) in self.error.iter_mut().zip(rounding) {
-            if error.abs() <= *rounding {
+    /// Takes what is rounding from the error, and from that of devices what follows it.
+    pub(crate) fn forgive(&mut self, curved: &mut Curved, rounding: impl Fn(usize) -> f64) {
+        for (k, error) in self.error.iter_mut().enumerate() {
+            if error.abs() <= rounding(k) {
                 *error = 0.0;
             }
+        }
+        self.follow(curved);
+    }
+
+    /// How far λ and y at the end are off because of the state's error.
+    fn follow(&mut self, curved: &mut Curved) {
+        if self.n > 0 {
+            let (lambda, y) = &mut self.end_error;
+            curved.shifted(self.matrices, &self.error, &mut self.q, (lambda, y));
         }
     }
 }

@@ -12,7 +12,9 @@ use crate::integrate::control::Verdict;
 use crate::integrate::curved::tableau::GAMMA;
 use crate::integrate::curved::{Curved, Segments, Start as From, Trial, Within};
 use crate::integrate::grow;
-use crate::settings::tolerances::steps::{CUT, FAINT, GRANT_EMBEDDED, SOLVED, STAGE_SOLVED};
+use crate::settings::tolerances::steps::{
+    CREEPS, CUT, FAINT, GRANT_EMBEDDED, SOLVED, STAGE_SOLVED,
+};
 use crate::settings::tolerances::times::SPAN_PARTS;
 
 /// What steps of chosen lengths need besides the rest.
@@ -351,7 +353,8 @@ impl Theta {
             };
         };
         let moment = span / SPAN_PARTS;
-        let system = &self.plant.systems[self.now.system].1;
+        let system = &mut self.plant.systems[self.now.system].1;
+        let lcs = &system.lcs;
         let Smooth {
             trial,
             sizes,
@@ -359,35 +362,44 @@ impl Theta {
             ..
         } = &mut self.smooth;
         let refused = *refused;
-        let devices = match &system.smooth {
-            Some(curved) => &curved.devices[..],
-            None => &[],
+        let Some(curved) = &mut system.smooth else {
+            return Verdict {
+                accept: false,
+                next: h,
+            };
         };
-        let worst = |errors: &[f64], sizes: &[f64]| {
-            let relative = devices.iter().map(|&j| errors[j].abs() / sizes[j]);
-            relative.fold(0.0, f64::max)
-        };
-        // A mean current that is off for a part of the span counts as that part; one that is off for less than a moment as that part of it.
-        let mean = worst(&trial.mean_error, &sizes[0]) * (h / span);
-        let (lambda, y) = &trial.end_error;
-        let end = worst(lambda, &sizes[0]).max(worst(y, &sizes[1])) * (h / moment).min(1.0);
-        let of_devices = mean.max(end * (h / span).max(GRANT_EMBEDDED));
-        let verdict = |trial: &Trial, moved: &mut Vec<f64>| {
+        let verdict = |trial: &Trial, curved: &Curved, moved: &mut Vec<f64>| {
+            let worst = |errors: &[f64], sizes: &[f64]| {
+                let relative = (curved.devices.iter()).map(|&j| errors[j].abs() / sizes[j]);
+                relative.fold(0.0, f64::max)
+            };
+            // A mean current that is off for a part of the span counts as that part; one that is off for less than a moment as that part of it.
+            let mean = worst(&trial.mean_error, &sizes[0]) * (h / span);
+            let (lambda, y) = &trial.end_error;
+            let end = worst(lambda, &sizes[0]).max(worst(y, &sizes[1])) * (h / moment).min(1.0);
+            let of_devices = mean.max(end * (h / span).max(GRANT_EMBEDDED));
             moved.clear();
             moved.extend(trial.x.iter().zip(&trial.error).map(|(x, e)| x + e));
-            let error = (self.amplitudes).error(&system.lcs, moved, &trial.x);
+            let error = (self.amplitudes).error(lcs, moved, &trial.x);
             let error = error.max(of_devices);
             (error, control.judge_embedded(h, error, refused))
         };
-        let first = verdict(trial, &mut self.coarse);
-        if let Some(curved) = &system.smooth {
-            trial.rounding(curved, &mut self.rounding);
-        }
-        let (error, verdict) = if first.1.accept {
+        let first = verdict(trial, curved, &mut self.coarse);
+        trial.rounding(curved, &mut self.rounding);
+        let creeps = curved.leak > 0.0 && h < CREEPS * span && first.1.next <= h;
+        let (error, verdict) = if first.1.accept && !creeps {
             first
         } else {
-            trial.forgive(&self.rounding);
-            verdict(trial, &mut self.coarse)
+            let leakage = if creeps {
+                curved.leak * self.amplitudes.branches().0
+            } else {
+                0.0
+            };
+            trial.forgive(curved, |k| match lcs.states[k].unit {
+                "A" => self.rounding[k].max(leakage),
+                _ => self.rounding[k],
+            });
+            verdict(trial, curved, &mut self.coarse)
         };
         self.smooth.tells = error;
         self.smooth.refused = !verdict.accept;

@@ -121,6 +121,10 @@ pub(crate) const SOLVED: f64 = 1e-13;
 /// fourth power of it. Larger: coarser runs make the same steps; smaller: more steps.
 pub(crate) const CUT: f64 = 0.25;
 
+/// Steps that are shorter than this part of the span and want to grow no longer take currents below what leaks beside junctions (`gmin`) for no signal. Larger:
+/// errors of a leakage add up; smaller: steps that follow a leakage have no end.
+pub(crate) const CREEPS: f64 = 1e-5;
+
 /// A state whose mean slope in a step is below this part of the largest at a stage rests. Larger: slopes of states that move are taken for noise; smaller: those of states that rest are not.
 pub(crate) const GOES_NOWHERE: f64 = 1e-3;
 
