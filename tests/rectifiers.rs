@@ -165,12 +165,16 @@ fn judge(seed: u64) -> Option<String> {
     })
 }
 
+/// Steps of 1e-13 s followed the leakage of a three-phase bridge without an end.
+const FOUND: [u64; 1] = [5364];
+
 #[test]
 fn random_rectifiers_end_and_are_as_right_as_they_say() {
     let number = |name: &str| std::env::var(name).ok()?.parse::<u64>().ok();
     let count = number("CIRC_RECTIFIERS").unwrap_or(40);
     let first = number("CIRC_RECTIFIERS_SEED").unwrap_or(1);
-    let wrong: Vec<String> = (first..first + count).filter_map(judge).collect();
+    let seeds = FOUND.into_iter().chain(first..first + count);
+    let wrong: Vec<String> = seeds.filter_map(judge).collect();
     assert!(
         wrong.is_empty(),
         "{} of {count}:\n{}",

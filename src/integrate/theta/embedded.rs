@@ -399,6 +399,10 @@ impl Theta {
                 "A" => self.rounding[k].max(leakage),
                 _ => self.rounding[k],
             });
+            if creeps && trial.error.iter().all(|error| *error == 0.0) {
+                // What a leakage makes of the voltage between junctions that block is none either, for so short a time.
+                trial.mean_error.fill(0.0);
+            }
             verdict(trial, curved, &mut self.coarse)
         };
         self.smooth.tells = error;
