@@ -32,8 +32,8 @@ impl Trial {
         mean.abs() < GOES_NOWHERE * largest && changes.count() >= SWINGS
     }
 
-    /// Where slopes swing in this step, whose end is `start`, the next one starts with those of Euler's method, and its λ and y; with ideal ports on the
-    /// sides `held`, and the stage solved to `granted`. Where Newton's method does not find it nothing changes.
+    /// Where slopes swing in this step, whose end is `start`, the next one starts with those of Euler's method; λ and y stay those of `start`, to whose
+    /// state they belong. Ideal ports are on the sides `held`, and the stage is solved to `granted`; where Newton's method does not find it nothing changes.
     pub(crate) fn calm(
         &mut self,
         curved: &mut Curved,
