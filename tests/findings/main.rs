@@ -16,6 +16,7 @@ mod leaks;
 mod notes;
 mod numbers;
 mod output;
+mod read;
 mod rest;
 #[path = "../runs/mod.rs"]
 mod runs;

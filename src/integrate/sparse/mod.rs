@@ -307,12 +307,12 @@ impl Sparse {
         }
     }
 
-    /// When controls that depend on sources alone pass their thresholds next in (now, limit], and which do.
+    /// When controls that depend on sources alone pass their thresholds next in (now, limit + slack], and which do.
     fn next_known(&mut self, limit: f64) -> (f64, Vec<usize>) {
-        let now = self.now.t;
+        let (now, slack) = (self.now.t, Self::slack(limit));
         let asked = |known: &Option<(f64, f64, Vec<usize>)>| match known {
             Some((until, first, which)) if *until >= limit || *first <= limit => {
-                Some(if *first <= limit {
+                Some(if *first <= limit + slack {
                     (*first, which.clone())
                 } else {
                     (f64::INFINITY, Vec::new())
@@ -324,7 +324,6 @@ impl Sparse {
             return found;
         }
         let until = limit.max(now + self.span / crate::settings::tolerances::times::SPAN_PARTS);
-        let slack = Self::slack(limit);
         let (first, which) =
             self.switches
                 .next_known(self.system(), &self.inputs, now, until, slack);

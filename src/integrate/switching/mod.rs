@@ -375,9 +375,10 @@ impl Switches {
         self.different(before).map(switch).collect()
     }
 
-    /// The first time in (t, limit] at which controls that depend on sources alone pass the thresholds of their switches, and
+    /// The first time in (t, limit + slack] at which controls that depend on sources alone pass the thresholds of their switches, and
     /// which ones do at that time or no more than `slack` later (edges of several sources that are one but for rounding); an
-    /// infinite time and none where nothing happens.
+    /// infinite time and none where nothing happens. A passage that rounding puts behind `limit` is one at `limit`: asked from there on, a control that
+    /// is on its threshold but for rounding may have passed it.
     pub(crate) fn next_known(
         &self,
         lcs: &impl Watched,
@@ -388,6 +389,7 @@ impl Switches {
     ) -> (f64, Vec<usize>) {
         let mut first = f64::INFINITY;
         let mut passages = Vec::new();
+        let limit = limit + slack;
         for i in (0..self.thresholds.len()).filter(|&i| self.driven[i]) {
             let (on, threshold) = (self.position[i], &self.thresholds[i]);
             let level = if on {
