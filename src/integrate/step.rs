@@ -13,6 +13,7 @@
 //! For one active set everything is affine in z = [x; u⁺; u; 1] (only inputs that vary have columns), so the step and its
 //! sign test are [x⁺; λ_a; y_ā] = K z with a matrix K that is computed once.
 
+mod back;
 mod fused;
 
 use nalgebra::{DMatrix, DVector};
@@ -24,6 +25,7 @@ use crate::settings::tolerances::steps::SHORT;
 use crate::solve::Driver;
 use crate::solve::active::equilibrated_inverse;
 use crate::solve::lcp::{Lcp, Scaling};
+pub(crate) use back::Back;
 pub(crate) use fused::FusedMode;
 
 /// θ for the state, γ for λ.
@@ -96,6 +98,18 @@ impl Columns {
         z[self.n + 2 * p] = 1.0;
     }
 
+    /// Makes z that of a step as long from the end x⁺ of the one from z; sources go on with their slopes.
+    pub(crate) fn go_on(&self, x_next: &[f64], z: &mut [f64]) {
+        let (x, rest) = z.split_at_mut(self.n);
+        x.copy_from_slice(x_next);
+        let (next, now) = rest.split_at_mut(self.varying.len());
+        for (next, u) in next.iter_mut().zip(now) {
+            let change = *next - *u;
+            *u = *next;
+            *next += change;
+        }
+    }
+
     /// z of a step [`SHORT`] times as long from the end of a step, as rows over z at the start of that one, where x⁺ = `x_next` z. The
     /// sources go on with their slopes: a λ that keeps a constraint on the state is made of these.
     fn end_rows(&self, x_next: &DMatrix<f64>) -> DMatrix<f64> {
@@ -161,7 +175,7 @@ pub(crate) struct StepMatrices {
     pub driver: Driver,
     modes: Vec<FusedMode>,
     /// See [`Self::back`], by active set.
-    back: Vec<(Vec<bool>, DMatrix<f64>)>,
+    back: Vec<(Vec<bool>, Back)>,
 }
 
 /// Fused modes kept per step length.
@@ -229,62 +243,6 @@ impl StepMatrices {
         })
     }
 
-    /// What a λ of this implicit step lacks to be that at its start, as rows over z: where λ follows from x and u at every instant,
-    /// D_aa λ + C x + G u + F = 0, the step has moved these by h(C x' + G u'), and a small resistance makes much of it. Where λ is what keeps
-    /// a constraint, it is that of a step. With M = D + E, E = h C W B, the former lacks D⁻¹ h(C x' + G u') = (I − K)⁻¹ M⁻¹ h(C x' + G u')
-    /// with K = M⁻¹ E, and of the latter K = I. The sum I + K + … + K⁷ = (I + K)(I + K²)(I + K⁴) times I − K⁸ is right for both, up to
-    /// 2 K⁸ where K is small.
-    pub(crate) fn back(&mut self, lcs: &Lcs, columns: &Columns, active: &[bool]) -> &DMatrix<f64> {
-        let at = self.back.iter().position(|(known, _)| known == active);
-        let at = at.unwrap_or_else(|| {
-            if self.back.len() == KEPT_MODES {
-                self.back.clear();
-            }
-            let rows = self.back_rows(lcs, columns, active);
-            self.back.push((active.to_vec(), rows));
-            self.back.len() - 1
-        });
-        &self.back[at].1
-    }
-
-    fn back_rows(&self, lcs: &Lcs, columns: &Columns, active: &[bool]) -> DMatrix<f64> {
-        let (lambda, solve) = self.lambda_rows(active);
-        let mut rows = DMatrix::zeros(self.m.nrows(), self.q.ncols());
-        if !solve.regular {
-            return rows;
-        }
-        let scale = DVector::from_iterator(
-            solve.indices.len(),
-            solve.indices.iter().map(|&j| self.scaling.d[j]),
-        );
-        let scale = DMatrix::from_diagonal(&scale);
-        let inverse = &scale * &solve.inverse * &scale;
-        let before = columns.rows(&lcs.c, &lcs.g, 0.0, &lcs.f);
-        let moved = &self.q - before + (&self.m - &lcs.d) * lambda;
-        let moved = moved.select_rows(&solve.indices);
-        let direct = lcs
-            .d
-            .select_rows(&solve.indices)
-            .select_columns(&solve.indices);
-        let first = &inverse * direct;
-        let one = DMatrix::identity(solve.indices.len(), solve.indices.len());
-        let k = &one - &first;
-        let squared = &k * &k;
-        let fourth = &squared * &squared;
-        let eighth = &fourth * &fourth;
-        // A network that is not passive may have a K that grows.
-        let back = if eighth.amax() <= 1.0 {
-            (&one - eighth) * (&one + k) * (&one + squared) * (&one + fourth)
-        } else {
-            first
-        };
-        let back = back * (&inverse * moved);
-        for (row, &j) in back.row_iter().zip(&solve.indices) {
-            rows.set_row(j, &row);
-        }
-        rows
-    }
-
     /// The index of the fused mode of an active set, computed at its first use; and whether it was computed now.
     pub(crate) fn mode(&mut self, lcs: &Lcs, columns: &Columns, active: &[bool]) -> (usize, bool) {
         if let Some(at) = self.modes.iter().position(|mode| mode.active == active) {
@@ -347,41 +305,5 @@ impl StepMatrices {
     /// x⁺ for a given λ.
     pub(crate) fn x_next(&self, z: &[f64], lambda: &DVector<f64>) -> DVector<f64> {
         &self.phi * DVector::from_column_slice(z) + &self.response * lambda
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::integrate::fixtures;
-    use crate::lcs::Role;
-    use nalgebra::dmatrix;
-
-    /// Two diodes share the current of a capacitor through one resistor: how is not known, nor what each of them had at the start of a step.
-    #[test]
-    fn currents_that_only_their_sum_determines_are_not_taken_back() {
-        let lcs = fixtures::system(
-            &[("v(c1)", "V")],
-            &[("d1", Role::Current), ("d2", Role::Current)],
-            [
-                dmatrix![0.0],
-                dmatrix![-1.0, -1.0],
-                dmatrix![-1.0; -1.0],
-                dmatrix![1.0, 1.0; 1.0, 1.0],
-            ],
-            &[1.0],
-        );
-        let columns = Columns {
-            n: 1,
-            varying: vec![],
-            constant: vec![],
-        };
-        let mut step = StepMatrices::new(&lcs, &columns, 0.5, Scheme::MOREAU, 1e-9).unwrap();
-        // Alone i = v: behind a step of h it is v/(1 + h), and lacks v K with K = h/(1 + h), but for 2 K⁸ of it.
-        let alone = step.back(&lcs, &columns, &[true, false])[(0, 0)];
-        let k: f64 = 0.5 / 1.5;
-        let found = k * (1.0 - k.powi(8)).powi(2);
-        assert!((alone - found).abs() < 1e-15, "{alone}");
-        assert_eq!(step.back(&lcs, &columns, &[true, true]).amax(), 0.0);
     }
 }

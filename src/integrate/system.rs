@@ -8,7 +8,7 @@ use crate::integrate::error::{Error, Reason};
 use crate::integrate::inputs::Inputs;
 use crate::integrate::jump::JumpProblem;
 use crate::integrate::lawful;
-use crate::integrate::step::{Columns, Scheme, StepMatrices};
+use crate::integrate::step::{Back, Columns, Scheme, StepMatrices};
 use crate::lcs::Lcs;
 
 /// One system with everything that is computed from it once.
@@ -114,19 +114,9 @@ impl System {
         self.matrices[step].mode(&self.lcs, &self.columns, active)
     }
 
-    /// Takes λ of a short implicit step from z on an active set back to its start, see [`StepMatrices::back`].
-    pub(crate) fn take_back(
-        &mut self,
-        step: usize,
-        active: &[bool],
-        z: &[f64],
-        lambda: &mut [f64],
-    ) {
-        let back = self.matrices[step].back(&self.lcs, &self.columns, active);
-        for (j, l) in lambda.iter_mut().enumerate().filter(|(j, _)| active[*j]) {
-            let change: f64 = back.row(j).iter().zip(z).map(|(a, b)| a * b).sum();
-            *l = (*l + change).max(0.0);
-        }
+    /// What leads from the λ of short steps to that of their start, on an active set.
+    pub(crate) fn back(&mut self, step: usize, active: &[bool]) -> &Back {
+        self.matrices[step].back(&self.lcs, &self.columns, active)
     }
 
     /// The physical storage vector s of a state.

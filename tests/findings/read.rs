@@ -55,3 +55,39 @@ fn a_switch_moves_at_its_threshold_where_the_look_ahead_ends() {
         "{i} {expected}"
     );
 }
+
+/// What a junction leaks is off by what steps err, and its voltage by the law was 13 V off in the row at 3 µs.
+#[test]
+fn a_row_at_a_corner_goes_on_where_a_junction_blocks() {
+    let run = stepped("corner_beside_a_leak", Method::Auto, 1e-8);
+    let rows = run.waveforms.time.iter().zip(column(&run, "v(2)"));
+    let near = rows.filter(|(t, _)| (2.99e-6..3.01e-6).contains(*t));
+    let volts: Vec<f64> = near.map(|(_, v)| v).collect();
+    assert!(volts.len() >= 3);
+    for pair in volts.windows(2) {
+        assert!((pair[0] - pair[1]).abs() < 1e-3, "{volts:?}");
+    }
+}
+
+/// The row at 30 µs had 65 A through a diode that carries 0.66 mA.
+#[test]
+fn a_capacitor_that_steps_left_beside_its_constraint_is_not_led_back_by_a_current() {
+    let exact = stepped("leads_back_a_capacitor", Method::Exact, 1e-4);
+    let stepped = stepped("leads_back_a_capacitor", Method::Theta, 1e-4);
+    for (a, b) in column(&exact, "i(d1)")
+        .into_iter()
+        .zip(column(&stepped, "i(d1)"))
+    {
+        assert!((a - b).abs() < 1e-2, "{a} {b}");
+    }
+}
+
+/// The first row had −11 mA through diodes that block, as λ after a step is no λ of the start.
+#[test]
+fn diodes_that_block_carry_nothing_at_the_start() {
+    let run = stepped("blocked_at_the_start", Method::Theta, 1e-4);
+    for j in 1..=6 {
+        let i = column(&run, &format!("i(d{j})"))[0];
+        assert!(i.abs() < 1e-12, "d{j}: {i} A");
+    }
+}

@@ -124,6 +124,7 @@ impl Theta {
         let size = self.amplitudes.error(lcs, x.as_slice(), after.as_slice());
         self.now.x.copy_from_slice(after.as_slice());
         if size > NO_JUMP {
+            self.jumped = t;
             self.stats.jumps += 1;
             log.event(t, Arc::default(), true);
         }

@@ -104,6 +104,8 @@ pub struct Theta {
     looks: Looks,
     /// The last breakpoint that acted, s.
     edge: f64,
+    /// The start, or the last jump since, s: the state there has no error of a step.
+    jumped: f64,
     /// Steps chosen by an embedded error, where laws are curved.
     smooth: Smooth,
     stats: Stats,

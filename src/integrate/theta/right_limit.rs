@@ -117,8 +117,7 @@ impl Theta {
         Ok(solution)
     }
 
-    /// λ at the right limit of now, by one implicit step much shorter than the last. After an edge what moves may be faster than that: λ of a
-    /// step of δ is off by δ λ' to first order, which another one of δ/[`NEARER`] tells.
+    /// λ at the right limit of now, by implicit steps much shorter than the last: λ after δ is off by δ λ' to first order, which δ/[`NEARER`] tells.
     pub(super) fn read_lambda(&mut self) -> Result<(), Error> {
         if self.smooth.front.known {
             // The end of a step is on the laws.
@@ -127,12 +126,20 @@ impl Theta {
             self.y.copy_from_slice(&self.smooth.front.y);
             return Ok(());
         }
+        let system = self.system();
+        let begins = self.last_h == 0.0 && self.ports.is_empty() && !system.curved;
+        if begins && system.jump.is_none() && !self.lambda.is_empty() {
+            // The one λ of the state itself, as D + Dᵀ > 0: what blocks on a leakage behind an inductor may be faster than any step.
+            let step = self.prepare_short(0.0)?;
+            let solution = self.solve_short(step)?;
+            self.lambda.copy_from_slice(solution.lambda.as_slice());
+            return Ok(());
+        }
         let step = self.reading_step();
         self.read_after(step)?;
         // What lines carry is read by a step so short that a shorter one would be rounding.
         let is_known = self.lambda.is_empty() || self.system().curved || !self.ports.is_empty();
-        let is_after = self.now.settle || self.now.t == self.edge;
-        if !is_after || is_known {
+        if is_known {
             return Ok(());
         }
         let first = self.lambda.clone();
@@ -148,12 +155,48 @@ impl Theta {
         Ok(())
     }
 
-    /// λ after a step of so many seconds, as far as may be taken back to now.
+    /// λ after so many seconds, as far as may be taken back to now.
     fn read_after(&mut self, h: f64) -> Result<(), Error> {
-        let step = self.prepare_short(h)?;
         if self.lambda.is_empty() {
+            self.prepare_short(h)?;
             return Ok(());
         }
+        if self.system().curved {
+            let step = self.prepare_short(h)?;
+            let solution = self.solve_short(step)?;
+            self.lambda.copy_from_slice(solution.lambda.as_slice());
+            self.y.copy_from_slice(solution.y.as_slice());
+            return Ok(());
+        }
+        // What steps err off a constraint on the state is led back by the first half, by whatever λ that takes: the second one tells it.
+        let step = self.prepare_short(0.5 * h)?;
+        let first = self.short_step(step)?;
+        let active = first.as_ref().unwrap_or(&self.now.active);
+        let system = &mut self.plant.systems[self.now.system].1;
+        let back = system.back(step, active);
+        back.take(&self.z, 1, active, &mut self.lambda);
+        if !back.has_constraints() {
+            return Ok(());
+        }
+        let n = self.now.x.len();
+        system.columns.go_on(&self.out[..n], &mut self.z);
+        self.coarse.clear();
+        self.coarse.extend_from_slice(&self.lambda);
+        let second = self.short_step(step);
+        std::mem::swap(&mut self.coarse, &mut self.lambda);
+        if second.is_ok_and(|second| second == first) {
+            let active = first.as_ref().unwrap_or(&self.now.active);
+            let system = &mut self.plant.systems[self.now.system].1;
+            let back = system.back(step, active);
+            back.take(&self.z, 2, active, &mut self.coarse);
+            back.correct(&mut self.lambda, &self.coarse);
+        }
+        self.coarse.resize(n, 0.0);
+        Ok(())
+    }
+
+    /// λ and x⁺ of the short step from z, and its active set where that is not the present one.
+    fn short_step(&mut self, step: usize) -> Result<Option<Vec<bool>>, Error> {
         let Self {
             plant,
             now,
@@ -164,26 +207,20 @@ impl Theta {
             ..
         } = self;
         let system = &mut plant.systems[now.system].1;
-        if system.curved {
-            let solution = self.solve_short(step)?;
-            self.lambda.copy_from_slice(solution.lambda.as_slice());
-            self.y.copy_from_slice(solution.y.as_slice());
-            return Ok(());
-        }
         let (mode, _) = system.mode(step, &now.active);
         let n = now.x.len();
         let fused = system.step(step).fused(mode);
         let noise = |k| amplitudes.rounding(&system.lcs, k);
         if fused.step(z, n, out, noise) && fused.is_strict(z, &out[n..]) {
             fused.lambda(&out[n..], lambda);
-            system.take_back(step, &now.active, z, lambda);
-            return Ok(());
+            return Ok(None);
         }
         let solution = self.solve_short(step)?;
         self.lambda.copy_from_slice(solution.lambda.as_slice());
-        let system = &mut self.plant.systems[self.now.system].1;
-        system.take_back(step, &solution.basis, &self.z, &mut self.lambda);
-        Ok(())
+        let matrices = self.system().step(step);
+        let x = matrices.x_next(&self.z, &solution.lambda);
+        self.out[..n].copy_from_slice(x.as_slice());
+        Ok(Some(solution.basis))
     }
 
     pub(super) fn read_point(&mut self, row: &mut [f64]) {
@@ -200,11 +237,12 @@ impl Theta {
     }
 
     /// λ at the instant itself, from the λ that has been read: a junction behind an inductor without current has no voltage, and after any step
-    /// the logarithm of what came to flow in it. Nothing where a step has ended here, and beside ideal ports, which only a step tells.
+    /// the logarithm of what came to flow in it. Nothing where steps have led here, whose error in what a junction leaks may be any voltage, and
+    /// beside ideal ports, which only a step tells.
     fn on_laws(&mut self) -> Option<Vec<f64>> {
         let front = &self.smooth.front;
         let has_arrived = front.known && front.reach > 0.0;
-        if has_arrived || !self.is_smooth() {
+        if has_arrived || self.jumped != self.now.t || !self.is_smooth() {
             return None;
         }
         let now = &self.now;

@@ -180,6 +180,7 @@ impl Theta {
             control,
             looks: Looks::default(),
             edge: t,
+            jumped: t,
             smooth: Smooth::default(),
             stats: Stats::default(),
             modes: BTreeSet::new(),
