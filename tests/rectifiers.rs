@@ -1,6 +1,5 @@
 //! Random rectifiers of exponential diodes behind inductances, floating or tied, at random tolerances: every run has an end, its energies add up, and the
-//! error that it states bounds what currents are off from those of a run at a hundredth of the tolerance, to a factor of three. A row may stand on the edge of
-//! the voltage across a diode, which moves with the instant at which it ends to conduct: voltages are not compared.
+//! error that it states bounds what voltages and currents are off from those of a run at a hundredth of the tolerance, to a factor of three.
 //!
 //! `CIRC_RECTIFIERS=N` runs so many of them from `CIRC_RECTIFIERS_SEED` on, in place of the fixed ones.
 #![allow(missing_docs, reason = "tests")]
@@ -110,29 +109,33 @@ fn run(text: &str, tol: f64, max_steps: u64) -> Result<Run, String> {
     simulate(&circuit, &behaviour(&circuit).unwrap(), options).map_err(|e| e.to_string())
 }
 
-/// The largest difference of a current, relative to its amplitude or a thousandth of the largest.
+/// The largest difference of a voltage or current, relative to its amplitude or a thousandth of the largest of its unit.
 fn apart(a: &Run, b: &Run) -> f64 {
     let Waveforms { names, units, .. } = &b.waveforms;
     let width = names.len();
-    let currents: Vec<usize> = (0..width).filter(|&k| units[k] == "A").collect();
     let rows = |run: &Run| -> Vec<Vec<f64>> {
         let rows = run.waveforms.values.chunks_exact(width);
-        rows.map(|row| currents.iter().map(|&k| row[k]).collect())
-            .collect()
+        rows.map(<[f64]>::to_vec).collect()
     };
     let (of_a, of_b) = (rows(a), rows(b));
     assert_eq!(of_a.len(), of_b.len());
-    let mut amplitudes = vec![0.0_f64; currents.len()];
+    let mut amplitudes = vec![0.0_f64; width];
     for row in &of_b {
         for (amplitude, value) in amplitudes.iter_mut().zip(row) {
             *amplitude = amplitude.max(value.abs());
         }
     }
-    let floor = 1e-3 * amplitudes.iter().fold(0.0, |most: f64, a| most.max(*a));
+    let largest = |unit: &str| {
+        let same = amplitudes.iter().zip(units).filter(|(_, u)| **u == unit);
+        same.fold(0.0, |most: f64, (a, _)| most.max(*a))
+    };
+    let scales: Vec<f64> = (amplitudes.iter().zip(units))
+        .map(|(amplitude, unit)| amplitude.max(1e-3 * largest(unit)))
+        .collect();
     let mut worst = 0.0_f64;
     for (x, y) in of_a.iter().zip(&of_b) {
-        for ((x, y), amplitude) in x.iter().zip(y).zip(&amplitudes) {
-            worst = worst.max((x - y).abs() / amplitude.max(floor));
+        for ((x, y), scale) in x.iter().zip(y).zip(&scales) {
+            worst = worst.max((x - y).abs() / scale);
         }
     }
     worst

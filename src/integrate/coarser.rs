@@ -119,7 +119,7 @@ impl Problem {
                 theta.read_between_steps(tran.tstop);
                 Ok(Box::new(theta))
             }),
-            stride: if many { FEWER } else { 1 },
+            stride: if many && !embedded { FEWER } else { 1 },
             start: FIRST * tran.tstep,
             share: Share::always(share),
             steps: None,

@@ -33,19 +33,19 @@ pub(crate) const LOOSER: f64 = 4.0;
 /// The error of the run over what that companion differs by: 1/3 or less were the errors smooth. Larger and smaller as [`FIRST_ORDER`].
 pub(crate) const LOOSER_SHARE: f64 = 1.0;
 
-/// The same for steps that tell their error themselves, in proportion to the tolerance: they are 1.7 times as long, and lengths that are powers of √2
-/// of each other are never the same. Larger: a companion that has lost what the run follows; smaller: its steps are those of the run and it
-/// sees no error.
-pub(crate) const LOOSER_EMBEDDED: f64 = 8.0;
+/// The same for steps that tell their error themselves, in proportion to the tolerance: they are √2 times as long, and lengths are powers of √2, so
+/// that they are never the same. Larger: the distance says less of the run's own error; smaller: its steps are those of the run and it sees no error.
+pub(crate) const LOOSER_EMBEDDED: f64 = 5.7;
 
-/// The error of the run over what that companion differs by: 1/7 were the errors smooth and of one sign. Larger and smaller as [`FIRST_ORDER`].
-pub(crate) const LOOSER_EMBEDDED_SHARE: f64 = 1.0;
+/// The error of the run over what that companion differs by: 1/5 were the errors smooth and of one sign; those of a row on the edge of a diode's
+/// voltage are not. Larger and smaller as [`FIRST_ORDER`].
+pub(crate) const LOOSER_EMBEDDED_SHARE: f64 = 1.4;
 
 /// Steps by which companions read what flows at an instant where laws are curved, over those of the run: a diode's voltage is the logarithm of a
 /// current that grows with the time since the instant. Larger: errors stated larger than they are; smaller: that of a reading is not seen.
 pub(crate) const READING: f64 = 64.0;
 
-/// More rows than these would choose the steps of that companion, which stops at some of them only. Larger: its steps are those of the run and
+/// More rows than these would choose the steps of a companion that stops at them: it stops at some only. Larger: its steps are those of the run and
 /// it sees no error; smaller: rows are compared where it has none.
 pub(crate) const MANY_ROWS: f64 = 200.0;
 
