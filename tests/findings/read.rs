@@ -91,3 +91,16 @@ fn diodes_that_block_carry_nothing_at_the_start() {
         assert!(i.abs() < 1e-12, "d{j}: {i} A");
     }
 }
+
+/// The second thyristor held on to a current of nothing when its gate fell, and conducted 0.26 ms later, as the first one ended.
+#[test]
+fn a_thyristor_that_carries_nothing_when_its_gate_falls_blocks() {
+    let name = "fired_while_the_other_conducts";
+    let exact = column(&stepped(name, Method::Exact, 1e-4), "i(l1)");
+    for method in [Method::Theta, Method::Euler] {
+        let run = stepped(name, method, 1e-4);
+        for (a, b) in exact.iter().zip(column(&run, "i(l1)")) {
+            assert!((a - b).abs() < 2e-3, "{method:?}: {a} {b}");
+        }
+    }
+}

@@ -79,7 +79,8 @@ pub(crate) fn netlist(seed: u64, curved: bool) -> String {
             saved.push(format!("i({})", card.name));
         }
     }
-    let rows = Random::new(seed).pick(&[37, 101, 211, 503]);
+    // Some stand at the instants of edges.
+    let rows = Random::new(seed).pick(&[37, 40, 101, 200, 211, 500]);
     circuit.text_saving(&saved, rows)
 }
 

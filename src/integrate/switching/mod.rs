@@ -266,6 +266,10 @@ impl Switches {
             })
         };
         let Some(own) = current(i) else { return false };
+        // A basis may hold a port with neither a current nor, beside another valve that conducts the other way, a voltage of its own.
+        if own == Some(0.0) {
+            return false;
+        }
         let other = self.twins[i].and_then(current);
         !matches!((own, other), (Some(own), Some(Some(other))) if own < other)
     }
