@@ -70,7 +70,7 @@ pub(crate) const SHORT: f64 = 1.0 / 4096.0;
 /// part, where the rounding of the state grows to 2¹⁸ ε.
 pub(crate) const SHORT_ON_LINES: f64 = 1.0 / 64.0;
 
-/// The ratio of the two short steps by which λ is read after an edge. Larger: rounding in the shorter one, which grows with it; smaller: what is
+/// The ratio of the two short steps by which λ is read. Larger: rounding in the shorter one, which grows with it; smaller: what is
 /// left is larger, (δ/τ)² over this for a motion of time constant τ.
 pub(crate) const NEARER: f64 = 16.0;
 
