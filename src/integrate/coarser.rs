@@ -97,7 +97,8 @@ impl Problem {
         embedded: bool,
     ) -> Vec<Coarser<'a>> {
         let tran = *tran;
-        let many = Grid::of(&tran).count() > MANY_ROWS;
+        // Those that tell their error read rows between their steps.
+        let many = !embedded && Grid::of(&tran).count() > MANY_ROWS;
         let (looser, share) = if embedded {
             (LOOSER_EMBEDDED, LOOSER_EMBEDDED_SHARE)
         } else {
@@ -119,7 +120,7 @@ impl Problem {
                 theta.read_between_steps(tran.tstop);
                 Ok(Box::new(theta))
             }),
-            stride: if many && !embedded { FEWER } else { 1 },
+            stride: if many { FEWER } else { 1 },
             start: FIRST * tran.tstep,
             share: Share::always(share),
             steps: None,

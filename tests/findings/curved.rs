@@ -6,7 +6,7 @@ use circ::measure::{Over, Trace};
 use circ::settings::Settings;
 
 use super::runs::column;
-use super::{changed, changed_by, run};
+use super::{changed, changed_at, run};
 
 fn average(run: &Run, probe: &str, from: f64, to: f64) -> f64 {
     let values: Vec<f64> = super::runs::column(run, probe);
@@ -304,14 +304,7 @@ fn an_op_amp_with_limits_rectifies() {
 
 /// By steps of this tolerance.
 fn at_tolerance(name: &str, changes: &[(&str, &str)], tol: f64) -> Run {
-    let options = SimOptions {
-        settings: Settings {
-            tol,
-            ..Settings::default()
-        },
-        ..SimOptions::default()
-    };
-    changed_by(name, changes, options)
+    changed_at(name, changes, Method::Auto, tol)
 }
 
 #[test]

@@ -29,6 +29,7 @@ use circ::diagnostic::SourceMap;
 use circ::integrate::{Error, Method, Run, SimOptions, simulate};
 use circ::mna::behaviour;
 use circ::netlist::load;
+use circ::settings::Settings;
 
 /// The path of `tests/findings/NAME.cir`.
 fn path(name: &str) -> PathBuf {
@@ -64,6 +65,19 @@ fn run(name: &str, method: Method) -> Run {
 fn changed(name: &str, replacements: &[(&str, &str)], method: Method) -> Run {
     let options = SimOptions {
         method,
+        ..SimOptions::default()
+    };
+    changed_by(name, replacements, options)
+}
+
+/// As [`changed`], at a tolerance.
+fn changed_at(name: &str, replacements: &[(&str, &str)], method: Method, tol: f64) -> Run {
+    let options = SimOptions {
+        method,
+        settings: Settings {
+            tol,
+            ..Settings::default()
+        },
         ..SimOptions::default()
     };
     changed_by(name, replacements, options)

@@ -1,22 +1,13 @@
 //! What is read at an instant: at the start, at rows beside thresholds and corners, and where steps have left a constraint.
 
-use circ::integrate::{Method, Run, SimOptions};
-use circ::settings::Settings;
+use circ::integrate::{Method, Run};
 
-use super::changed_by;
+use super::changed_at;
 use super::runs::{at, column};
 
 /// A run at a tolerance, without rows at events.
 fn stepped(name: &str, method: Method, tol: f64) -> Run {
-    let options = SimOptions {
-        method,
-        settings: Settings {
-            tol,
-            ..Settings::default()
-        },
-        ..SimOptions::default()
-    };
-    changed_by(name, &[], options)
+    changed_at(name, &[], method, tol)
 }
 
 /// The passage was a rounding behind the row, and from there the control had passed its threshold: the switch moved at the end of the edge, and the
@@ -37,18 +28,8 @@ fn a_switch_moves_at_its_threshold_where_a_row_is() {
 fn a_switch_moves_at_its_threshold_where_the_look_ahead_ends() {
     let name = "passage_at_the_end_of_a_search";
     let i = at(&stepped(name, Method::Auto, 1e-8), "i(l1)", 2e-4);
-    let other = SimOptions {
-        settings: Settings {
-            tol: 1e-8,
-            ..Settings::default()
-        },
-        ..SimOptions::default()
-    };
-    let other = changed_by(
-        name,
-        &[("3.976143141153082e-7 2e-4", "4e-7 2.004e-4")],
-        other,
-    );
+    let rows = ("3.976143141153082e-7 2e-4", "4e-7 2.004e-4");
+    let other = changed_at(name, &[rows], Method::Auto, 1e-8);
     let expected = at(&other, "i(l1)", 2e-4);
     assert!(
         (i - expected).abs() < 1e-6 * expected.abs(),

@@ -120,6 +120,13 @@ mod tests {
     use crate::integrate::step::Scheme;
     use crate::lcs::Role;
 
+    /// One state and no inputs.
+    const ONE: Columns = Columns {
+        n: 1,
+        varying: vec![],
+        constant: vec![],
+    };
+
     /// Two diodes share the current of a capacitor through one resistor: how is not known, nor what each of them had at the start of a step.
     #[test]
     fn currents_that_only_their_sum_determines_are_not_taken_back() {
@@ -134,18 +141,13 @@ mod tests {
             ],
             &[1.0],
         );
-        let columns = Columns {
-            n: 1,
-            varying: vec![],
-            constant: vec![],
-        };
-        let mut step = StepMatrices::new(&lcs, &columns, 0.5, Scheme::MOREAU, 1e-9).unwrap();
+        let mut step = StepMatrices::new(&lcs, &ONE, 0.5, Scheme::MOREAU, 1e-9).unwrap();
         // Alone i = v: behind a step of h it is v/(1 + h), and lacks v K with K = h/(1 + h), but for 2 K⁸ of it.
-        let alone = step.back(&lcs, &columns, &[true, false]).rows[(0, 0)];
+        let alone = step.back(&lcs, &ONE, &[true, false]).rows[(0, 0)];
         let k: f64 = 0.5 / 1.5;
         let found = k * (1.0 - k.powi(8)).powi(2);
         assert!((alone - found).abs() < 1e-15, "{alone}");
-        assert_eq!(step.back(&lcs, &columns, &[true, true]).rows.amax(), 0.0);
+        assert_eq!(step.back(&lcs, &ONE, &[true, true]).rows.amax(), 0.0);
     }
 
     /// A current that holds a capacitor, without a resistance, is a constraint; through one it is none.
@@ -163,13 +165,8 @@ mod tests {
                 ],
                 &[1.0],
             );
-            let columns = Columns {
-                n: 1,
-                varying: vec![],
-                constant: vec![],
-            };
-            let mut step = StepMatrices::new(&lcs, &columns, 0.5, Scheme::MOREAU, 1e-9).unwrap();
-            let back = step.back(&lcs, &columns, &[true]);
+            let mut step = StepMatrices::new(&lcs, &ONE, 0.5, Scheme::MOREAU, 1e-9).unwrap();
+            let back = step.back(&lcs, &ONE, &[true]);
             assert!((back.keeps[(0, 0)] - expected).abs() < 1e-12, "{back:?}");
             assert_eq!(back.has_constraints(), expected > 0.0);
             let mut lambda = [4.0];

@@ -180,18 +180,15 @@ impl Theta {
         }
         let n = self.now.x.len();
         system.columns.go_on(&self.out[..n], &mut self.z);
-        self.coarse.clear();
-        self.coarse.extend_from_slice(&self.lambda);
-        let second = self.short_step(step);
-        std::mem::swap(&mut self.coarse, &mut self.lambda);
-        if second.is_ok_and(|second| second == first) {
+        let mut told = self.lambda.clone();
+        if self.short_step(step).is_ok_and(|second| second == first) {
             let active = first.as_ref().unwrap_or(&self.now.active);
             let system = &mut self.plant.systems[self.now.system].1;
             let back = system.back(step, active);
-            back.take(&self.z, 2, active, &mut self.coarse);
-            back.correct(&mut self.lambda, &self.coarse);
+            back.take(&self.z, 2, active, &mut self.lambda);
+            back.correct(&mut told, &self.lambda);
         }
-        self.coarse.resize(n, 0.0);
+        self.lambda = told;
         Ok(())
     }
 
