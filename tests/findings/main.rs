@@ -16,6 +16,7 @@ mod leaks;
 mod notes;
 mod numbers;
 mod output;
+mod past_zero;
 mod read;
 mod rest;
 #[path = "../runs/mod.rs"]

@@ -170,11 +170,14 @@ impl FusedMode {
 
     /// Whether λ of this mode is the only one, by strict complementarity: it is regular and no guard is zero up to rounding.
     pub(crate) fn is_strict(&self, z: &[f64], guards: &[f64]) -> bool {
-        let sizes = self.sizes.chunks_exact(self.width);
-        self.regular
-            && guards.iter().zip(sizes).all(|(&guard, size)| {
-                guard > STEP_GUARD * size.iter().zip(z).map(|(a, b)| a * b.abs()).sum::<f64>()
-            })
+        let mut each = guards.iter().enumerate();
+        self.regular && each.all(|(j, &guard)| self.is_strict_at(j, z, guard))
+    }
+
+    /// Whether the guard of port j is not zero up to rounding.
+    pub(crate) fn is_strict_at(&self, j: usize, z: &[f64], guard: f64) -> bool {
+        let size = &self.sizes[j * self.width..][..self.width];
+        guard > STEP_GUARD * size.iter().zip(z).map(|(a, b)| a * b.abs()).sum::<f64>()
     }
 
     /// λ of this mode from the guards of a step.

@@ -227,6 +227,11 @@ impl Switches {
         self.in_this_step += asking.len() as u32;
     }
 
+    /// Counts a passage at whose right limit no control asks: what is shorter than the reading of the right limit is not followed for ever.
+    pub(crate) fn hesitate(&mut self) {
+        self.in_this_step += 1;
+    }
+
     /// See [`settle`](crate::integrate::settle::settle).
     pub(crate) fn settle(
         &mut self,

@@ -17,6 +17,8 @@ impl Theta {
         }
         self.inputs.left(t1, &mut self.u_next);
         self.stats.lcp_solves += u64::from(!self.lambda.is_empty());
+        self.attempt.blocked.clear();
+        self.attempt.beyond.clear();
         let damped = self.starts_damped();
         let settle = self.now.settle && (damped || !self.lambda.is_empty());
         let scheme = if settle && damped {
@@ -63,14 +65,15 @@ impl Theta {
         }
         let tried = attempt.clone();
         self.solve_step(scheme, h, t1)?;
-        self.confirm(tried);
+        self.confirm(tried, h, t1);
         Ok(())
     }
 
-    /// Returns to the tried step where the solvers find its active set: then y ≥ 0 at its end, and what the guards of blocking ports
-    /// refused was the error of their short step or rounding. Currents must be as they are with γ = 1, zero or more.
+    /// Returns to the tried step where the solvers find its active set: then y ≥ 0 where they look for it, and what the guards of blocking
+    /// ports refused was the error of their short step or rounding, or is an error that [`past_zero`] tells. Currents must be as they are with
+    /// γ = 1, zero or more.
     #[cold]
-    fn confirm(&mut self, tried: Attempt) {
+    fn confirm(&mut self, tried: Attempt, h: f64, t1: f64) {
         let found = |(basis, _): &(Vec<bool>, _)| *basis == self.now.active;
         let n = self.now.x.len();
         let system = &self.plant.systems[self.now.system].1;
@@ -84,7 +87,16 @@ impl Theta {
         let carries = |j: usize| self.now.active[j] == (system.lcs.ports[j].role != Role::Voltage);
         let as_far = |j: usize| self.out[n + j] >= 2.0 * solved[n + j].min(0.0);
         if (0..self.now.active.len()).all(|j| !carries(j) || as_far(j)) {
-            self.attempt = tried;
+            let out = self.out.clone();
+            let blocks = |j: usize| if carries(j) { 0.0 } else { out[n + j].min(0.0) };
+            let beyond: Vec<f64> = (0..out.len() - n).map(blocks).collect();
+            let blocked = self.blocked_past_zero((h, t1), &beyond, &solved);
+            self.out = out;
+            self.attempt = Attempt {
+                beyond,
+                blocked,
+                ..tried
+            };
         } else {
             self.out = solved;
         }
@@ -170,9 +182,11 @@ impl Theta {
             self.now.balance.add(fused.power.over_step(&self.z));
             let loss = fused.power.numerical(&self.z, &self.out, n);
             self.now.balance.add_numerical(loss);
+            self.decide(t1);
         }
         self.now.slope.clone_from(&self.attempt.slope);
         self.now.unseen.clone_from(&self.attempt.unseen);
+        self.now.beyond.clone_from(&self.attempt.beyond);
         self.now.turned_off = self.attempt.turned_off;
         self.now.settle = self.now.turned_off;
         self.now.x.copy_from_slice(&self.out[..n]);
@@ -215,6 +229,32 @@ impl Theta {
         self.attempt.h = f64::NAN;
     }
 
+    /// Devices whose λ and y both vanished where the solvers found them, and that carry a current or a voltage at the end of the attempt.
+    fn decide(&mut self, t1: f64) {
+        let Self {
+            plant,
+            now,
+            attempt,
+            ..
+        } = self;
+        let system = &plant.systems[now.system].1;
+        let on = |j: usize| now.active[j] == (system.lcs.ports[j].role != Role::Voltage);
+        let open = |j: &usize| on(*j) != now.pattern[*j];
+        if !(0..now.active.len()).any(|j| open(&j)) {
+            return;
+        }
+        let fused = system.step(attempt.step).fused(attempt.mode);
+        let guards = &self.out[now.x.len()..];
+        let strict = |j: &usize| fused.is_strict_at(*j, &self.z, guards[*j]);
+        let mut pattern = now.pattern.clone();
+        let decided = (0..pattern.len()).filter(open).filter(strict);
+        decided.for_each(|j| pattern[j] = on(j));
+        let (basis, h) = (now.active.clone(), attempt.h);
+        let known = self.pending.len();
+        self.change_pattern(basis, pattern, t1);
+        self.note_event_step(known, h);
+    }
+
     /// A step of h in which a device changed, if there are more than `known` events.
     pub(super) fn note_event_step(&mut self, known: usize, h: f64) {
         if self.pending.len() > known {
@@ -225,10 +265,15 @@ impl Theta {
     /// Takes over what the devices do; a change between conducting (a current flows) and blocking is an event.
     pub(super) fn take_pattern(&mut self, basis: Vec<bool>, seen: &[Option<bool>], t: f64) {
         let ports = &self.system().lcs.ports;
-        let before = &self.now.pattern;
         let on =
             |(&lambda, port): (&Option<bool>, &Port)| lambda == Some(port.role != Role::Voltage);
-        let pattern: Vec<bool> = seen.iter().zip(ports).map(on).collect();
+        let pattern = seen.iter().zip(ports).map(on).collect();
+        self.change_pattern(basis, pattern, t);
+    }
+
+    fn change_pattern(&mut self, basis: Vec<bool>, pattern: Vec<bool>, t: f64) {
+        let ports = &self.system().lcs.ports;
+        let before = &self.now.pattern;
         if pattern != *before && self.started {
             let changes = changes_of_devices(ports, before, &pattern);
             self.pending.push((t, changes.into()));

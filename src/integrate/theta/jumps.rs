@@ -75,6 +75,7 @@ impl Theta {
     /// The motion goes on from here with another slope. Where a curved step starts from is told by [`Self::find_mode`], which follows.
     fn forget_slope(&mut self) {
         self.now.slope.clear();
+        self.now.beyond.clear();
         self.looks.forget();
     }
 
@@ -274,6 +275,9 @@ impl Theta {
             if self.switches.position() == before {
                 let asking = self.asking()?;
                 if asking.is_empty() {
+                    if before == first {
+                        self.switches.hesitate();
+                    }
                     let moved = self.switches.moved(&first).join(", ");
                     self.note_jump(&storage, lost, JumpReason::Switch(moved), log);
                     self.break_waves()?;

@@ -119,12 +119,9 @@ impl Theta {
             active: vec![false; system.lcs.m()],
             pattern: vec![false; system.lcs.m()],
             settle: true,
-            turned_off: false,
             system: at,
             balance,
-            event_step: 0.0,
-            slope: Vec::new(),
-            unseen: Vec::new(),
+            ..Now::default()
         };
         let amplitudes = Amplitudes::new(&system.lcs, &inputs);
         let switches = Switches::new(position, thresholds, &system.lcs);

@@ -207,15 +207,13 @@ impl Theta {
         }
         self.attempt = Attempt {
             step,
-            mode: 0,
             h,
-            settle: false,
             solved: Some((solution.basis, solution.active)),
-            turned_off: false,
             residual,
             work: Some((work, loss)),
             slope: slope.unwrap_or_default(),
             unseen,
+            ..Attempt::default()
         };
         Ok(slopes)
     }

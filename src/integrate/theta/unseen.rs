@@ -71,7 +71,7 @@ impl Theta {
     }
 
     /// Whether the attempt has other devices active than those at its start.
-    fn changes(&self) -> bool {
+    pub(super) fn changes(&self) -> bool {
         match &self.attempt.solved {
             Some((basis, _)) => *basis != self.now.active,
             None => false,
