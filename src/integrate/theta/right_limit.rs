@@ -27,14 +27,9 @@ impl Theta {
     /// The step by which λ is read. A curved law tells its current at the instant itself, so only the ideal ports beside it need a
     /// step, and the sources move less in a shorter one; the rounding of the state grows to 2²⁴ε.
     fn reading_step(&self) -> f64 {
-        let curved = self.system().curved;
-        let longer = if self.reads_coarsely && curved {
-            READING
-        } else {
-            1.0
-        };
+        let longer = if self.reads_coarsely { READING } else { 1.0 };
         let short = self.read_step() * longer;
-        if curved {
+        if self.system().curved {
             // Few lengths, so that their matrices are kept.
             (short * SHORT).log2().floor().exp2()
         } else if !self.ports.is_empty() {
@@ -234,12 +229,12 @@ impl Theta {
     }
 
     /// λ at the instant itself, from the λ that has been read: a junction behind an inductor without current has no voltage, and after any step
-    /// the logarithm of what came to flow in it. Nothing where steps have led here, whose error in what a junction leaks may be any voltage, and
-    /// beside ideal ports, which only a step tells.
+    /// the logarithm of what came to flow in it. Nothing where steps have led here, whose error in what a junction leaks may be any voltage.
     fn on_laws(&mut self) -> Option<Vec<f64>> {
         let front = &self.smooth.front;
         let has_arrived = front.known && front.reach > 0.0;
-        if has_arrived || self.jumped != self.now.t || !self.is_smooth() {
+        let by_law = self.system().curved && self.ports.is_empty();
+        if has_arrived || self.jumped != self.now.t || !by_law {
             return None;
         }
         let now = &self.now;
