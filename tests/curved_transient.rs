@@ -396,7 +396,7 @@ proptest! {
 }
 
 /// By their laws two diodes without a resistance carry 10⁷⁰ A at these voltages, beside which the charge between them is rounding. Prescribed
-/// steps and chosen ones say so, also where no coarser runs are made beside them; with a resistance of 1 mΩ they run.
+/// steps and chosen ones say so, also where no runs are made beside them; with a resistance of 1 mΩ they run.
 #[test]
 fn currents_that_drown_the_charge_between_them_are_refused() {
     let text = |rs: &str| {

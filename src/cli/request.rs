@@ -29,7 +29,7 @@ pub(super) struct Request {
     pub tol: Option<f64>,
     /// Rows at events.
     pub events: bool,
-    /// No coarser runs beside one in steps, whose error is then not known.
+    /// No further runs beside one in steps, whose error is then not known.
     pub unestimated: bool,
 }
 

@@ -1,6 +1,6 @@
-//! A run in steps with coarser ones beside it, which tell its error.
+//! A run in steps with others beside it, which tell its error.
 //!
-//! Companions go through the same circuit with longer steps from output row to output row, and every probe is compared there: voltages of
+//! Companions go through the same circuit in other steps from output row to output row, and every probe is compared there: voltages of
 //! nodes and currents of devices as well as states. What they differ by is the run's own error and more. A companion stops at its own
 //! rows only, so that rows close to each other do not make its steps those of the run.
 //!
@@ -16,13 +16,13 @@ use crate::integrate::log::Log;
 use crate::integrate::rows::Asked;
 use crate::integrate::run::{Outcome, Stepper};
 use crate::integrate::stats::StatedError;
-use crate::settings::tolerances::stated::UNSETTLED;
+use crate::settings::tolerances::stated::EVENTS;
 
 /// A companion begins with steps that double from this part of its first one on: what has ended within the first step of the run is seen.
 const GRADED: i32 = 24;
 
 /// How a companion is made and what it tells.
-pub(crate) struct Coarser<'a> {
+pub(crate) struct Beside<'a> {
     /// Makes it, at its start.
     pub(crate) make: Box<dyn Fn() -> Result<Box<dyn Stepper>, Error> + 'a>,
     /// It stops at one row of so many.
@@ -30,41 +30,12 @@ pub(crate) struct Coarser<'a> {
     /// A time, s, that its first steps divide.
     pub(crate) start: f64,
     /// What the run errs at most, over what the companion differs from it.
-    pub(crate) share: Share,
-    /// Its steps over those of the run, where these are prescribed, and the order of the method.
-    pub(crate) steps: Option<(f64, i32)>,
-}
-
-/// What a run errs at most, over what its companion differs from it.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Share {
-    /// Where no device changes within a step.
-    pub(crate) smooth: f64,
-    /// Where one does.
-    pub(crate) events: f64,
-}
-
-impl Share {
-    /// The same in either case.
-    pub(crate) fn always(share: f64) -> Self {
-        Self {
-            smooth: share,
-            events: share,
-        }
-    }
-
-    /// Both times a factor.
-    pub(crate) fn times(self, factor: f64) -> Self {
-        Self {
-            smooth: factor * self.smooth,
-            events: factor * self.events,
-        }
-    }
+    pub(crate) share: f64,
 }
 
 /// A companion on its way.
 struct Companion<'a> {
-    by: Coarser<'a>,
+    by: Beside<'a>,
     /// None before the run has made steps, and where the companion could not go on.
     stepper: Option<Box<dyn Stepper>>,
     lost: bool,
@@ -125,7 +96,7 @@ impl<'a> Accompanied<'a> {
     /// A run until `until`, s, with companions beside it, for probes of these units.
     pub(crate) fn new(
         run: &'a mut dyn Stepper,
-        coarser: Vec<Coarser<'a>>,
+        beside: Vec<Beside<'a>>,
         units: &'a [&'static str],
         until: f64,
         cancel: Option<&'a AtomicBool>,
@@ -151,7 +122,7 @@ impl<'a> Accompanied<'a> {
         };
         Self {
             run,
-            companions: coarser.into_iter().map(companion).collect(),
+            companions: beside.into_iter().map(companion).collect(),
             units,
             until,
             amplitude: vec![0.0; columns],
@@ -163,26 +134,19 @@ impl<'a> Accompanied<'a> {
     fn stated(&mut self, own: StatedError, common: f64) -> StatedError {
         let scales = scales(&self.amplitude, self.units);
         let (mut max, mut rms, mut time) = (0.0_f64, 0.0_f64, own.event_time.unwrap_or(0.0));
-        let mut unsettled = self.unsettled(&scales);
         for companion in &mut self.companions {
             if companion.lost {
                 return own;
             }
-            let share = match own.event_time {
-                Some(time) if time > 0.0 => companion.by.share.events,
-                _ => companion.by.share.smooth,
-            };
+            let share = companion.by.share;
             let (largest, mean) = companion.difference.over(&scales);
             // Nothing was compared.
             if companion.difference.rows() == 0 {
                 return own;
             }
-            // The first one alone tells the size of an error that no longer grows as the steps do.
-            let share = share.max((share * unsettled).min(UNSETTLED));
-            unsettled = 1.0;
             max = max.max(share * largest);
             rms = rms.max(share * mean);
-            time = time.max(share * companion.difference.shift());
+            time = time.max(share.min(EVENTS) * companion.difference.shift());
         }
         // Neither is it known where a value is no number.
         let known = |error: f64| error.is_finite().then_some(error);
@@ -195,29 +159,6 @@ impl<'a> Accompanied<'a> {
 }
 
 impl Accompanied<'_> {
-    /// How much more the run may err, over what the first of two companions in prescribed steps differs from it, than the order of the
-    /// method says: their distances d grow by the observed order q, d₂/d₁ = (r₂^q − 1)/(r₁^q − 1) with their steps r, and the error is
-    /// d₁/(r₁^q − 1). Steps that are too long for what they follow have q below the method's.
-    fn unsettled(&mut self, scales: &[f64]) -> f64 {
-        let [first, second] = self.companions.as_mut_slice() else {
-            return 1.0;
-        };
-        let (Some((near, order)), Some((far, _))) = (first.by.steps, second.by.steps) else {
-            return 1.0;
-        };
-        let (one, other) = (
-            first.difference.over(scales).0,
-            second.difference.over(scales).0,
-        );
-        if !(one > 0.0 && other.is_finite()) {
-            return 1.0;
-        }
-        let error = |steps: f64| steps.powi(order) - 1.0;
-        // As if the steps were 2 and 4 times as long, where d₂/d₁ = 2^q + 1.
-        let grows = other / one * error(near) / error(far) * error(4.0) / error(2.0);
-        error(2.0) / (grows - 2.0).max(f64::MIN_POSITIVE)
-    }
-
     /// Compares a row of the run with those companions that stand at its time.
     fn compare(&mut self, row: &[f64]) {
         let t = self.run.time();

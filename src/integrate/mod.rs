@@ -1,7 +1,7 @@
 //! From a complementarity system to waveforms.
 
 pub mod aliasing;
-mod coarser;
+mod beside;
 mod companion;
 pub mod control;
 mod cpu;

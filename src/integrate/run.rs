@@ -41,7 +41,7 @@ pub struct Outcome {
     pub energy: Energy,
     /// See [`Run::error`].
     pub error: StatedError,
-    /// What coarser runs beside it cannot tell of the error, as they make the same steps, relative to the amplitudes.
+    /// What runs beside it cannot tell of the error, as they make the same steps, relative to the amplitudes.
     pub common: f64,
     /// Things the user should know.
     pub notes: Vec<Note>,

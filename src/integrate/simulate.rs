@@ -10,7 +10,7 @@ use crate::settings::tolerances::steps::{FIRST, HANDOVER_STEPS};
 use nalgebra::DVector;
 
 use crate::circuit::{Circuit, Tran};
-use crate::integrate::coarser::coarser_handover;
+use crate::integrate::beside::beside_handover;
 use crate::integrate::companion::Accompanied;
 use crate::integrate::error::{Error, Reason, is_final};
 use crate::integrate::exact::Place;
@@ -75,7 +75,7 @@ pub struct SimOptions<'a> {
     pub discard: bool,
     /// Ends the run when set, with [`Reason::Interrupted`] and all rows so far.
     pub cancel: Option<&'a AtomicBool>,
-    /// No coarser runs beside one in steps, which tell its error: the run takes less time, and its error is not known.
+    /// No further runs beside one in steps, which tell its error: the run takes less time, and its error is not known.
     pub unestimated: bool,
     /// Where the run begins, in place of the initial conditions or the operating point.
     pub start: Option<Standing>,
@@ -293,13 +293,13 @@ fn dispatch(
             ..frame(method, notes.clone())
         };
         let make = |steps| circuit.handover(&problem, &tran, settings, steps);
-        let coarser = if options.unestimated {
+        let beside = if options.unestimated {
             vec![]
         } else {
-            coarser_handover(&make)
+            beside_handover(&make)
         };
         let attempted = make(HANDOVER_STEPS).and_then(|mut both| {
-            let mut all = Accompanied::new(&mut *both, coarser, &units, tran.tstop, options.cancel);
+            let mut all = Accompanied::new(&mut *both, beside, &units, tran.tstop, options.cancel);
             attempt(&mut all, frame, &mut log, false)
         });
         match attempted {
@@ -324,10 +324,10 @@ fn dispatch(
     }
     let stepping = options.step.map_or(controlled(&tran), Stepping::Fixed);
     if circuit.is_large() {
-        let coarser = match options.step {
+        let beside = match options.step {
             _ if options.unestimated => vec![],
-            Some(h) => problem.coarser_fixed(&tran, scheme, (h, true), settings),
-            None => problem.coarser_large(&tran, scheme, settings),
+            Some(h) => problem.beside_fixed(&tran, scheme, (h, true), settings),
+            None => problem.beside_large(&tran, scheme, settings),
         };
         let frame = Frame {
             progress: progress.as_mut().map(|p| &mut **p as &mut dyn FnMut(f64)),
@@ -339,7 +339,7 @@ fn dispatch(
             .sparse(&tran, scheme, stepping, settings)
             .and_then(|mut sparse| {
                 let mut all =
-                    Accompanied::new(&mut sparse, coarser, &units, tran.tstop, options.cancel);
+                    Accompanied::new(&mut sparse, beside, &units, tran.tstop, options.cancel);
                 attempt(&mut all, frame, &mut log, last)
             });
         match attempted {
@@ -365,12 +365,12 @@ fn dispatch(
     theta.read_between_steps(tran.tstop);
     let embedded = theta.is_smooth();
     let frame = frame(method, notes);
-    let coarser = match options.step {
+    let beside = match options.step {
         _ if options.unestimated => vec![],
-        Some(h) => problem.coarser_fixed(&tran, scheme, (h, false), settings),
-        None => problem.coarser_controlled(&tran, scheme, amplitudes.as_ref(), settings, embedded),
+        Some(h) => problem.beside_fixed(&tran, scheme, (h, false), settings),
+        None => problem.beside_controlled(&tran, scheme, amplitudes.as_ref(), settings, embedded),
     };
-    let mut all = Accompanied::new(&mut theta, coarser, &units, tran.tstop, options.cancel);
+    let mut all = Accompanied::new(&mut theta, beside, &units, tran.tstop, options.cancel);
     run(&mut all, Frame { progress, ..frame }, log)
 }
 

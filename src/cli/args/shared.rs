@@ -94,7 +94,7 @@ pub struct MethodArgs {
     /// Relative tolerance of the error-controlled step [default: 1e-4]
     #[arg(help_heading = "Integration", long, value_name = "R", value_parser = positive)]
     pub tol: Option<f64>,
-    /// Make no coarser runs beside one in steps: it takes less time, and its error is not known
+    /// Make no further runs beside one in steps: it takes less time, and its error is not known
     #[arg(help_heading = "Integration", long)]
     pub no_estimate: bool,
 }

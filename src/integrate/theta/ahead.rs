@@ -2,7 +2,7 @@
 //! [`embedded`](super::embedded).
 
 use super::*;
-use crate::settings::tolerances::stated::COARSER;
+use crate::settings::tolerances::stated::FINER_AND_COARSER;
 use crate::settings::tolerances::steps::{ASKED_AHEAD, CUT, FIRST, SINE_EMBEDDED};
 use crate::settings::tolerances::times::WHOLE;
 
@@ -123,7 +123,7 @@ impl Theta {
         }
         if self.whole {
             // A coarser run whose steps the sources limit as those of the run would see no error.
-            longest *= COARSER[0];
+            longest *= FINER_AND_COARSER[1];
         }
         match self.stepping {
             // A switch that slides follows at the ends of steps.

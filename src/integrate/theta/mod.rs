@@ -157,7 +157,7 @@ impl Theta {
         self.locate = LOCATE_ROUGHLY;
     }
 
-    /// Has λ of curved laws at an instant read by a longer step, see [`READING`](crate::settings::tolerances::stated::READING), whose error is larger.
+    /// Has λ at an instant read by a longer step, see [`READING`](crate::settings::tolerances::stated::READING), whose error is larger.
     pub(crate) fn read_coarsely(&mut self) {
         self.reads_coarsely = true;
     }

@@ -8,46 +8,39 @@ pub(crate) const UNBALANCED: f64 = 1e-3;
 /// of no use passes as a result; smaller: runs in few long steps, which are made to be looked at, are warned of.
 pub(crate) const IMPRECISE: f64 = 0.1;
 
-/// Prescribed steps of companions, over those of the run. Larger: the distance says less of the run's own error; smaller: dearer.
-pub(crate) const COARSER: [f64; 2] = [2.0, 4.0];
+/// Prescribed steps of the two companions, over those of the run. Halves tell the error of the run even where its steps are too long for what they
+/// follow; where a change of a device stands alike in both, twice as long ones do. Larger: the distances say less of the run's own error; smaller: dearer.
+pub(crate) const FINER_AND_COARSER: [f64; 2] = [0.5, 2.0];
 
-/// The error of a run of first order over what these differ by: 1 and 1/3 were the errors smooth; those of events are not. Larger: errors
+/// The error of a run of first order over what these differ by: 2 and 1 were the errors smooth; those of events are not. Larger: errors
 /// stated larger than they are; smaller: the statement no longer bounds the error (`tests/stated/`).
-pub(crate) const FIRST_ORDER: [f64; 2] = [2.0, 0.5];
+pub(crate) const FIRST_ORDER: [f64; 2] = [4.0, 1.25];
 
-/// The same for methods of order 2 and 3: 1/3 and 1/15 or less were they smooth.
-pub(crate) const HIGHER_ORDER: [f64; 2] = [1.5, 0.125];
+/// The same for methods of order 2 and 3: 4/3 and 1/3 or less were they smooth. A step in which a device changes errs by h² times a part that depends
+/// on where in the step the change is, in each run another one.
+pub(crate) const HIGHER_ORDER: [f64; 2] = [8.0, 1.25];
 
-/// The same where devices change within steps: such a step errs by h² times a part that depends on where in the step the change is, in each
-/// run another one, so that the differences may be smaller by chance. Larger and smaller as [`FIRST_ORDER`].
-pub(crate) const HIGHER_ORDER_EVENTS: [f64; 2] = [2.0, 0.25];
-
-/// The largest error of a run over what the nearer of its companions differs by, where their distances grow less than the order of the method
-/// says: then the steps are too long for what they follow, and the distance no longer tells the error. Larger and smaller as [`FIRST_ORDER`].
-pub(crate) const UNSETTLED: f64 = 4.0;
+/// How far events stand aside at most, over what they do in a companion: 2 beside halves of the steps. Larger and smaller as [`FIRST_ORDER`].
+pub(crate) const EVENTS: f64 = 2.0;
 
 /// Tolerance of the companion of a run whose steps are chosen, over that of the run. It makes its steps whole where the run makes them in
 /// halves, so that they are longer even where rows and edges choose them.
-pub(crate) const LOOSER: f64 = 4.0;
+pub(crate) const LOOSER: f64 = 2.0;
 
 /// The error of the run over what that companion differs by: 1/3 or less were the errors smooth. Larger and smaller as [`FIRST_ORDER`].
-pub(crate) const LOOSER_SHARE: f64 = 1.0;
+pub(crate) const LOOSER_SHARE: f64 = 1.25;
 
-/// The same for steps that tell their error themselves, in proportion to the tolerance: they are √2 times as long, and lengths are powers of √2, so
-/// that they are never the same. Larger: the distance says less of the run's own error; smaller: its steps are those of the run and it sees no error.
-pub(crate) const LOOSER_EMBEDDED: f64 = 5.7;
+/// The same for steps that tell their error themselves, whose lengths are powers of √2: of order 3 they are one power longer. Larger: the distance says less of the run's own error; smaller: its steps are those of the run and it sees no error.
+pub(crate) const LOOSER_EMBEDDED: f64 = 4.0;
 
 /// The error of the run over what that companion differs by: 1/5 were the errors smooth and of one sign; those of a row on the edge of a diode's
 /// voltage are not. Larger and smaller as [`FIRST_ORDER`].
-pub(crate) const LOOSER_EMBEDDED_SHARE: f64 = 1.4;
+pub(crate) const LOOSER_EMBEDDED_SHARE: f64 = 1.7;
 
-/// Steps by which companions read what flows at an instant where laws are curved, over those of the run: a diode's voltage is the logarithm of a
-/// current that grows with the time since the instant. Larger: errors stated larger than they are; smaller: that of a reading is not seen.
+/// Steps by which companions read what flows at an instant, over those of the run: a curved diode's voltage is the logarithm of a current that grows
+/// with the time since the instant, and the current that keeps a capacitor's voltage has its rounding over the step. Larger: errors stated larger than
+/// they are; smaller: that of a reading is not seen.
 pub(crate) const READING: f64 = 64.0;
-
-/// More rows than these would choose the steps of a companion that stops at them: it stops at some only. Larger: its steps are those of the run and
-/// it sees no error; smaller: rows are compared where it has none.
-pub(crate) const MANY_ROWS: f64 = 200.0;
 
 /// The error of exact runs, relative to amplitudes: rounding in stiff circuits. Larger: a wrong run is confirmed; smaller: right ones are not.
 pub(crate) const EXACT: f64 = 1e-9;

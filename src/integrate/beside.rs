@@ -1,7 +1,7 @@
-//! Which coarser runs go beside one in steps.
+//! Which runs go beside one in steps to tell its error.
 
 use crate::circuit::Tran;
-use crate::integrate::companion::{Coarser, Share};
+use crate::integrate::companion::Beside;
 use crate::integrate::control::Amplitudes;
 use crate::integrate::error::Error;
 use crate::integrate::grid::Grid;
@@ -12,8 +12,8 @@ use crate::integrate::step::Scheme;
 use crate::integrate::theta::Stepping;
 use crate::settings::Settings;
 use crate::settings::tolerances::stated::{
-    COARSER, FIRST_ORDER, HIGHER_ORDER, HIGHER_ORDER_EVENTS, LOOSER, LOOSER_EMBEDDED,
-    LOOSER_EMBEDDED_SHARE, LOOSER_SHARE, MANY_ROWS,
+    FINER_AND_COARSER, FIRST_ORDER, HIGHER_ORDER, LOOSER, LOOSER_EMBEDDED, LOOSER_EMBEDDED_SHARE,
+    LOOSER_SHARE,
 };
 use crate::settings::tolerances::steps::{FIRST, HANDOVER_STEPS};
 
@@ -21,17 +21,16 @@ use crate::settings::tolerances::steps::{FIRST, HANDOVER_STEPS};
 const FEWER: usize = 5;
 
 /// Beside an exact run, from where steps take over; `make` makes one with so many steps between rows.
-pub(super) fn coarser_handover<'a>(
+pub(super) fn beside_handover<'a>(
     make: &'a dyn Fn(f64) -> Result<Box<dyn Stepper>, Error>,
-) -> Vec<Coarser<'a>> {
-    let companion = |(coarser, share): (f64, f64)| Coarser {
-        make: Box::new(move || make(HANDOVER_STEPS / coarser)),
+) -> Vec<Beside<'a>> {
+    let companion = |(ratio, share): (f64, f64)| Beside {
+        make: Box::new(move || make(HANDOVER_STEPS / ratio)),
         stride: 1,
         start: 0.0,
-        share: Share::always(share),
-        steps: Some((coarser, 1)),
+        share,
     };
-    COARSER
+    FINER_AND_COARSER
         .into_iter()
         .zip(FIRST_ORDER)
         .map(companion)
@@ -40,13 +39,13 @@ pub(super) fn coarser_handover<'a>(
 
 impl Problem {
     /// Beside a run in steps of h, s; `large`: sparse ones.
-    pub(super) fn coarser_fixed<'a>(
+    pub(super) fn beside_fixed<'a>(
         &'a self,
         tran: &Tran,
         scheme: Scheme,
         (h, large): (f64, bool),
         settings: &'a Settings,
-    ) -> Vec<Coarser<'a>> {
+    ) -> Vec<Beside<'a>> {
         // Rows are stops.
         let h = h.min(tran.tmax.unwrap_or(f64::INFINITY));
         let h = tran.tstep / (tran.tstep / h).ceil().max(1.0);
@@ -54,51 +53,53 @@ impl Problem {
             tmax: None,
             ..*tran
         };
-        let (smooth, events) = match scheme.order() {
-            1 => (FIRST_ORDER, FIRST_ORDER),
-            _ => (HIGHER_ORDER, HIGHER_ORDER_EVENTS),
+        let shares = match scheme.order() {
+            1 => FIRST_ORDER,
+            _ => HIGHER_ORDER,
         };
-        let companion = |(coarser, (smooth, events)): (f64, (f64, f64))| {
+        let companion = |(ratio, share): (f64, f64)| {
             // An even number of rows would see a clock in one phase alone.
-            let stride = (coarser * h / tran.tstep).ceil() as usize | 1;
-            let longer = match stride {
-                1 => coarser * h,
+            let stride = (ratio * h / tran.tstep).ceil() as usize | 1;
+            let length = match stride {
+                1 => ratio * h,
                 _ => stride as f64 * tran.tstep,
             };
-            Coarser {
+            Beside {
                 make: Box::new(move || {
-                    let (start, stepping) = (self.start.clone(), Stepping::Fixed(longer));
+                    let (start, stepping) = (self.start.clone(), Stepping::Fixed(length));
                     if large {
                         let sparse = self.sparse(&tran, scheme, stepping, settings)?;
                         return Ok(Box::new(sparse) as Box<dyn Stepper>);
                     }
                     let mut theta = self.stepper(start, &tran, scheme, stepping, settings)?;
-                    theta.keep_whole_steps();
+                    if ratio > 1.0 {
+                        theta.keep_whole_steps();
+                    }
                     theta.read_coarsely();
                     Ok(Box::new(theta))
                 }),
                 stride,
                 start: h,
-                share: Share { smooth, events }.times(coarser * h / longer),
-                steps: Some((longer / h, scheme.order().min(2))),
+                share: share * (ratio * h / length),
             }
         };
-        let shares = smooth.into_iter().zip(events);
-        COARSER.into_iter().zip(shares).map(companion).collect()
+        FINER_AND_COARSER
+            .into_iter()
+            .zip(shares)
+            .map(companion)
+            .collect()
     }
 
     /// Beside a run whose steps are chosen, by an embedded error or by halves.
-    pub(super) fn coarser_controlled<'a>(
+    pub(super) fn beside_controlled<'a>(
         &'a self,
         tran: &Tran,
         scheme: Scheme,
         amplitudes: Option<&'a Amplitudes>,
         settings: &Settings,
         embedded: bool,
-    ) -> Vec<Coarser<'a>> {
+    ) -> Vec<Beside<'a>> {
         let tran = *tran;
-        // Those that tell their error read rows between their steps.
-        let many = !embedded && Grid::of(&tran).count() > MANY_ROWS;
         let (looser, share) = if embedded {
             (LOOSER_EMBEDDED, LOOSER_EMBEDDED_SHARE)
         } else {
@@ -108,7 +109,7 @@ impl Problem {
             tol: looser * settings.tol,
             ..settings.clone()
         };
-        vec![Coarser {
+        vec![Beside {
             make: Box::new(move || {
                 let start = self.start.clone();
                 let mut theta = self.stepper(start, &tran, scheme, controlled(&tran), &settings)?;
@@ -120,20 +121,19 @@ impl Problem {
                 theta.read_between_steps(tran.tstop);
                 Ok(Box::new(theta))
             }),
-            stride: if many { FEWER } else { 1 },
+            stride: 1,
             start: FIRST * tran.tstep,
-            share: Share::always(share),
-            steps: None,
+            share,
         }]
     }
 
     /// Beside a run in sparse steps whose lengths are chosen. It stops at some rows only: rows are stops, and would make its steps those of the run.
-    pub(super) fn coarser_large<'a>(
+    pub(super) fn beside_large<'a>(
         &'a self,
         tran: &Tran,
         scheme: Scheme,
         settings: &Settings,
-    ) -> Vec<Coarser<'a>> {
+    ) -> Vec<Beside<'a>> {
         let tran = *tran;
         let settings = Settings {
             tol: LOOSER_EMBEDDED * settings.tol,
@@ -144,15 +144,14 @@ impl Problem {
         } else {
             1
         };
-        vec![Coarser {
+        vec![Beside {
             make: Box::new(move || {
                 let stepper = self.sparse(&tran, scheme, controlled(&tran), &settings)?;
                 Ok(Box::new(stepper))
             }),
             stride,
             start: FIRST * tran.tstep,
-            share: Share::always(LOOSER_EMBEDDED_SHARE),
-            steps: None,
+            share: LOOSER_EMBEDDED_SHARE,
         }]
     }
 }
