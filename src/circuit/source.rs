@@ -9,8 +9,8 @@ mod piece;
 mod polyline;
 mod spice;
 
-pub(crate) use crossings::first_crossing;
 pub use crossings::{Crossing, Rest, crossings};
+pub(crate) use crossings::{first_crossing, side_after};
 pub use piece::{Oscillation, Piece};
 pub(crate) use piece::{Straight, decayed};
 pub use spice::{Form, WaveError};

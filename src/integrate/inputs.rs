@@ -1,7 +1,7 @@
 //! The sources of a system, evaluated together.
 
 use crate::circuit::Source;
-use crate::circuit::source::{Crossing, Piece, Rest, Wave, first_crossing};
+use crate::circuit::source::{Crossing, Piece, Rest, Wave, first_crossing, side_after};
 use crate::integrate::line::{Line, Lines};
 use crate::lcs::Input;
 use crate::settings::tolerances::steps::STEPS_PER_PERIOD;
@@ -22,17 +22,6 @@ pub struct Inputs {
 /// The closed forms of the varying inputs around the time at which they were evaluated last.
 #[derive(Debug, Default)]
 pub(crate) struct Pieces(Vec<Option<Piece>>);
-
-/// How a combination of sources passes a level.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Passage {
-    /// Upwards.
-    Rising,
-    /// Downwards.
-    Falling,
-    /// Downwards, or down to rest on the level.
-    FallingOrRest,
-}
 
 impl Inputs {
     /// The inputs of a system.
@@ -161,6 +150,11 @@ impl Inputs {
         }
     }
 
+    /// Writes slopes of all inputs behind all edges that are at `t` to the rounding of times, as [`Self::behind`] does values.
+    pub(crate) fn slopes_behind(&self, t: f64, du: &mut [f64]) {
+        self.slopes(self.end_of_instant(t), du);
+    }
+
     /// The first time after `t` at which an input has an edge or a kink; infinite if none.
     #[must_use]
     pub fn next_breakpoint(&self, t: f64) -> f64 {
@@ -189,30 +183,33 @@ impl Inputs {
         }
     }
 
-    /// The first time in (from, to] at which `constant + gains·u` passes `level` in this direction.
+    /// The first time in (from, to] at which `constant + gains·u` passes `level` upwards (`rising`) or downwards and is not back within `instant`, s.
     #[must_use]
-    pub fn passage(
+    pub(crate) fn passage(
         &self,
-        gains: &[f64],
-        constant: f64,
-        level: f64,
-        direction: Passage,
-        from: f64,
-        to: f64,
+        (gains, constant): (Vec<f64>, f64),
+        (level, rest, rising): (f64, Rest, bool),
+        span: (f64, f64),
+        instant: f64,
     ) -> Option<f64> {
-        let terms: Vec<(f64, &Source)> = gains
-            .iter()
-            .copied()
-            .zip(&self.sources)
-            .filter(|(gain, _)| *gain != 0.0)
-            .collect();
-        let rest = if direction == Passage::FallingOrRest {
-            Rest::IsBelow
-        } else {
-            Rest::IsNeither
-        };
-        let wanted = |c: Crossing| c.rising == (direction == Passage::Rising);
-        first_crossing(&terms, (constant, level), rest, (from, to), wanted).map(|c| c.time)
+        let terms = self.terms(gains);
+        let levels = (constant, level);
+        let wanted = |c: Crossing| c.rising == rising;
+        first_crossing(&terms, (levels, rest), span, instant, wanted).map(|c| c.time)
+    }
+
+    /// Behind all edges that are at `t` to the rounding of times `constant + gains·u` is above `level` (1), below it (−1), or rests on it (0).
+    pub(crate) fn side_behind(&self, (gains, constant): (Vec<f64>, f64), level: f64, t: f64) -> i8 {
+        side_after(
+            &self.terms(gains),
+            (constant, level),
+            self.end_of_instant(t),
+        )
+    }
+
+    fn terms(&self, gains: Vec<f64>) -> Vec<(f64, &Source)> {
+        let terms = gains.into_iter().zip(&self.sources);
+        terms.filter(|(gain, _)| *gain != 0.0).collect()
     }
 
     /// The largest value each input takes (a bound, for sinusoids), in the order of u.

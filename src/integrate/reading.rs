@@ -68,16 +68,7 @@ fn sum(rows: &Rows, i: usize, at: Point<'_>, part: impl Fn(f64) -> f64) -> f64 {
 
 /// [`value`] of rows without their zeros.
 pub(crate) fn sparse_value(rows: &SparseRows, i: usize, at: Point<'_>) -> f64 {
-    sparse_sum(rows, i, at, |term| term)
-}
-
-/// [`magnitude`] of rows without their zeros.
-pub(crate) fn sparse_magnitude(rows: &SparseRows, i: usize, at: Point<'_>) -> f64 {
-    sparse_sum(rows, i, at, f64::abs)
-}
-
-fn sparse_sum(rows: &SparseRows, i: usize, at: Point<'_>, part: impl Fn(f64) -> f64) -> f64 {
-    let mut sum = part(rows.one[i]);
+    let mut sum = rows.one[i];
     for (block, values) in [
         (&rows.x, at.x),
         (&rows.lambda, at.lambda),
@@ -85,7 +76,7 @@ fn sparse_sum(rows: &SparseRows, i: usize, at: Point<'_>, part: impl Fn(f64) -> 
         (&rows.du, at.du),
     ] {
         if !values.is_empty() {
-            sum += block.row(i).map(|(j, w)| part(w * values[j])).sum::<f64>();
+            sum += block.row(i).map(|(j, w)| w * values[j]).sum::<f64>();
         }
     }
     sum

@@ -108,3 +108,25 @@ fn a_junction_beside_an_ideal_switch_has_no_voltage_where_nothing_flows() {
     assert!((first("v(2)") - first("v(3)")).abs() < 1e-9);
     assert!(run.error.max.unwrap() < 1e-3, "{:?}", run.error);
 }
+
+/// The corner is a rounding behind the row, and what flowed there had the slope of the piece before it: 13 mA where nothing flows.
+#[test]
+fn the_row_at_a_corner_has_the_slopes_behind_it() {
+    for method in [Method::Theta, Method::Euler] {
+        let run = stepped("corner_behind_a_row", method, 1e-4);
+        let flows = |probe| column(&run, probe).iter().any(|i| *i > 1e-9);
+        assert!(
+            !["i(d0)", "i(d3)", "i(d5)"].into_iter().any(flows),
+            "{method:?}"
+        );
+    }
+}
+
+/// Rounding put the control above its threshold for some last places of the time, and the way back was before the row at which the switch moved: it stayed on.
+#[test]
+fn a_control_that_touches_its_threshold_moves_no_switch() {
+    for method in [Method::Theta, Method::Euler, Method::Exact] {
+        let run = stepped("touches_its_threshold", method, 1e-4);
+        assert!(at(&run, "v(3)", 4.125e-6) < 1e-5, "{method:?}");
+    }
+}

@@ -1,6 +1,8 @@
 //! When a combination of sources passes a level: the switching times of switches that sources alone control.
 
-use super::{Source, Wave, piece::Tone};
+use super::piece::{Oscillation, Tone, decayed};
+use super::{Source, Wave};
+use crate::settings::tolerances::events::CONTROL_ROUNDINGS;
 
 /// A passage through a level.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,16 +40,16 @@ pub fn crossings(
         found.push(crossing);
         false
     };
-    first_crossing(terms, levels, rest, (from, to), all);
+    first_crossing(terms, (levels, rest), (from, to), 0.0, all);
     found
 }
 
-/// The first passage that is `wanted`, among those of [`crossings`]; what comes after it is not looked at.
+/// The first passage that is `wanted`, among those of [`crossings`] that are not back within `instant`, s; what comes after it is not looked at.
 pub(crate) fn first_crossing(
     terms: &[(f64, &Source)],
-    (constant, level): (f64, f64),
-    rest: Rest,
+    ((constant, level), rest): ((f64, f64), Rest),
     (from, to): (f64, f64),
+    instant: f64,
     mut wanted: impl FnMut(Crossing) -> bool,
 ) -> Option<Crossing> {
     let combination = Combination {
@@ -58,23 +60,38 @@ pub(crate) fn first_crossing(
         (0, Rest::IsBelow) => -1,
         (sign, _) => sign,
     };
+    let mut smooth = Smooth::new(&combination, from);
     let mut passages = Passages {
-        side: side(combination.just_after(from)),
+        from,
+        instant,
+        side: side(combination.just_after(from, &smooth)),
+        last: None,
         wanted: &mut wanted,
         found: None,
     };
     let mut start = from;
-    while start < to && passages.found.is_none() {
+    while start < to && !passages.end_before(start) {
         let end = terms
             .iter()
             .filter_map(|(_, source)| source.next_breakpoint(start))
             .fold(to, f64::min);
-        passages.enter(start, side(combination.just_after(start)));
-        combination.search(start, end, &mut passages);
-        passages.enter(end, side(combination.just_after(end)));
+        passages.enter(start, side(combination.just_after(start, &smooth)));
+        smooth.search(start, end, &mut passages);
+        smooth = Smooth::new(&combination, end);
+        passages.enter(end, side(combination.just_after(end, &smooth)));
         start = end;
     }
+    passages.end_before(f64::INFINITY);
     passages.found
+}
+
+/// Right after `t` the combination is above the level (1), below it (−1), or rests on it (0).
+pub(crate) fn side_after(terms: &[(f64, &Source)], (constant, level): (f64, f64), t: f64) -> i8 {
+    let combination = Combination {
+        terms,
+        constant: constant - level,
+    };
+    sign(combination.just_after(t, &Smooth::new(&combination, t)))
 }
 
 fn sign(value: f64) -> i8 {
@@ -89,7 +106,13 @@ fn sign(value: f64) -> i8 {
 
 /// The last side of the level that was not the level itself, and the first passage that is wanted.
 struct Passages<'a> {
+    /// What passes here has passed before.
+    from: f64,
+    /// A passage that is back within this time, s, is none: what touches the level is beyond it for some roundings.
+    instant: f64,
     side: i8,
+    /// The last passage, as long as it may be back.
+    last: Option<Crossing>,
     wanted: &'a mut dyn FnMut(Crossing) -> bool,
     found: Option<Crossing>,
 }
@@ -97,13 +120,24 @@ struct Passages<'a> {
 impl Passages<'_> {
     /// Right after `time` the combination is on this side of the level.
     fn enter(&mut self, time: f64, side: i8) {
-        if side == 0 || side == self.side || self.found.is_some() {
+        if side == 0 || side == self.side || self.end_before(time) {
             return;
         }
         self.side = side;
         let rising = side > 0;
-        let crossing = Crossing { time, rising };
-        self.found = (self.wanted)(crossing).then_some(crossing);
+        let is_back = self.last.take().is_some();
+        if !is_back && time > self.from {
+            self.last = Some(Crossing { time, rising });
+        }
+    }
+
+    /// Whether a passage is found that is not back before `time`.
+    fn end_before(&mut self, time: f64) -> bool {
+        let lasts = |last: &mut Crossing| time > last.time + self.instant;
+        if let (None, Some(last)) = (self.found, self.last.take_if(lasts)) {
+            self.found = (self.wanted)(last).then_some(last);
+        }
+        self.found.is_some()
     }
 }
 
@@ -113,133 +147,188 @@ struct Combination<'a> {
 }
 
 impl Combination<'_> {
-    /// The value right after `t`: where it vanishes, a value with the sign of what follows.
-    fn just_after(&self, t: f64) -> f64 {
-        let value = self.sum(|source| source.value(t)) + self.constant;
-        let size = self.sum_abs(|source| source.value(t)) + self.constant.abs();
-        if value.abs() > f64::EPSILON * size {
-            value
-        } else {
-            self.sum(|source| source.derivative(t))
-        }
-    }
-
-    fn sum(&self, of: impl Fn(&Source) -> f64) -> f64 {
-        self.terms
+    /// The value right after `t`, where it is `smooth`; where it vanishes, the first of its derivatives that does not.
+    fn just_after(&self, t: f64, smooth: &Smooth) -> f64 {
+        let values = self
+            .terms
             .iter()
-            .map(|&(gain, source)| gain * of(source))
-            .sum()
-    }
-
-    fn sum_abs(&self, of: impl Fn(&Source) -> f64) -> f64 {
-        self.terms
-            .iter()
-            .map(|&(gain, source)| (gain * of(source)).abs())
-            .sum()
-    }
-
-    /// Passages strictly inside (start, end), an interval without breakpoints.
-    fn search(&self, start: f64, end: f64, passages: &mut Passages<'_>) {
-        let smooth = Smooth::new(self, start);
-        if smooth.is_line() {
-            let (value, slope) = (smooth.value(start), smooth.derivative(start));
-            let root = start - value / slope;
-            if root > start && root < end && sign(value) != sign(slope) {
-                passages.enter(root, sign(slope));
-            }
+            .map(|&(gain, source)| gain * source.value(t));
+        let value = values.sum::<f64>() + self.constant;
+        let rounding = |k: usize| CONTROL_ROUNDINGS * f64::EPSILON * smooth.sizes[k];
+        let noise = if smooth.is_constant() {
+            rounding(0)
         } else {
-            smooth.search(start, end, passages);
+            f64::EPSILON * smooth.sizes[0]
+        };
+        if value.abs() > noise {
+            return value;
         }
+        let slope = smooth.derivative(t);
+        if slope.abs() > rounding(1) {
+            return slope;
+        }
+        let curvature = smooth.second_derivative(t);
+        if curvature.abs() > rounding(2) {
+            return curvature;
+        }
+        0.0
     }
 }
 
-/// The combination between two breakpoints, as an analytic function.
+/// The combination between two breakpoints, as an analytic function: constant + slope (t − start) + Σ oscillations + Σ tones. What cancels but for
+/// rounding is left out, so that two equal sines have no difference that passes zero without end.
 struct Smooth {
-    pieces: Vec<(f64, super::Piece)>,
-    tones: Vec<(f64, Tone)>,
+    start: f64,
     constant: f64,
+    slope: f64,
+    oscillations: Vec<Oscillation>,
+    tones: Vec<(f64, Tone)>,
+    /// What it and its first two derivatives are sums of, in absolute values; a phase is known to its last place.
+    sizes: [f64; 3],
 }
 
 impl Smooth {
     fn new(combination: &Combination<'_>, start: f64) -> Self {
         let mut smooth = Self {
-            pieces: Vec::new(),
-            tones: Vec::new(),
+            start,
             constant: combination.constant,
+            slope: 0.0,
+            oscillations: Vec::new(),
+            tones: Vec::new(),
+            sizes: [combination.constant.abs(), 0.0, 0.0],
         };
+        let mut amplitudes = Vec::new();
         for &(gain, source) in combination.terms {
-            match source.wave {
-                Wave::Sffm { .. } => smooth
-                    .tones
-                    .extend(source.wave.tone().map(|tone| (gain, tone))),
-                _ => smooth
-                    .pieces
-                    .extend(source.piece(start).map(|piece| (gain, piece))),
+            if let Wave::Sffm { .. } = source.wave {
+                let tone = source.wave.tone().map(|tone| (gain, tone));
+                smooth.tones.extend(tone);
+                continue;
+            }
+            let Some(piece) = source.piece(start) else {
+                continue;
+            };
+            let s = start - piece.origin;
+            let line = gain * (piece.constant + piece.slope * s);
+            smooth.constant += line;
+            smooth.slope += gain * piece.slope;
+            smooth.sizes[0] += line.abs();
+            smooth.sizes[1] += (gain * piece.slope).abs();
+            for term in piece.terms() {
+                let term = Oscillation {
+                    amplitude: gain * term.amplitude * decayed(term.decay, s),
+                    phase: term.phase + term.frequency * s,
+                    ..*term
+                };
+                let amplitude = term.amplitude.abs() * (1.0 + term.phase.abs());
+                let rate = term.decay.hypot(term.frequency);
+                for (size, power) in smooth.sizes.iter_mut().zip(0..) {
+                    *size += amplitude * rate.powi(power);
+                }
+                let mut others = smooth.oscillations.iter();
+                match others.position(|other| term.goes_with(other)) {
+                    Some(k) => {
+                        smooth.oscillations[k] = smooth.oscillations[k].plus(&term);
+                        amplitudes[k] += amplitude;
+                    }
+                    None => {
+                        smooth.oscillations.push(term);
+                        amplitudes.push(amplitude);
+                    }
+                }
             }
         }
+        let rounding = CONTROL_ROUNDINGS * f64::EPSILON;
+        if smooth.slope.abs() <= rounding * smooth.sizes[1] {
+            smooth.slope = 0.0;
+        }
+        let mut amplitudes = amplitudes.into_iter();
+        let remains =
+            |term: &Oscillation| Some(term.amplitude.abs() / rounding) > amplitudes.next();
+        smooth.oscillations.retain(remains);
         smooth
     }
 
     fn is_line(&self) -> bool {
-        self.tones.is_empty()
-            && self
-                .pieces
-                .iter()
-                .all(|(_, piece)| piece.terms().next().is_none())
+        self.tones.is_empty() && self.oscillations.is_empty()
+    }
+
+    fn is_constant(&self) -> bool {
+        self.is_line() && self.slope == 0.0
     }
 
     fn value(&self, t: f64) -> f64 {
-        let pieces = self
-            .pieces
-            .iter()
-            .map(|(gain, piece)| gain * piece.value(t));
+        let s = t - self.start;
+        let terms = self.oscillations.iter().map(|term| term.value(s));
         let tones = self.tones.iter().map(|(gain, tone)| gain * tone.value(t));
-        pieces.chain(tones).sum::<f64>() + self.constant
+        self.constant + self.slope * s + terms.chain(tones).sum::<f64>()
     }
 
     fn derivative(&self, t: f64) -> f64 {
-        let pieces = self
-            .pieces
-            .iter()
-            .map(|(gain, piece)| gain * piece.derivative(t));
+        let s = t - self.start;
+        let terms = self.oscillations.iter().map(|term| term.derivative(s));
         let tones = self
             .tones
             .iter()
             .map(|(gain, tone)| gain * tone.derivative(t));
-        pieces.chain(tones).sum()
+        self.slope + terms.chain(tones).sum::<f64>()
+    }
+
+    /// Without that of tones.
+    fn second_derivative(&self, t: f64) -> f64 {
+        let s = t - self.start;
+        let terms = self.oscillations.iter();
+        terms.map(|term| term.second_derivative(s)).sum()
     }
 
     /// Bounds of |f'| and |f''| on [a, b].
     fn derivative_bounds(&self, a: f64, b: f64) -> (f64, f64) {
-        let pieces = self
-            .pieces
+        let (a, b) = (a - self.start, b - self.start);
+        let terms = self
+            .oscillations
             .iter()
-            .map(|(gain, piece)| (gain, piece.derivative_bounds(a, b)));
+            .map(|term| (1.0, term.derivative_bounds(a, b)));
         let tones = self
             .tones
             .iter()
-            .map(|(gain, tone)| (gain, tone.derivative_bounds()));
-        pieces
-            .chain(tones)
-            .fold((0.0, 0.0), |(first, second), (gain, (d1, d2))| {
-                (first + gain.abs() * d1, second + gain.abs() * d2)
-            })
+            .map(|(gain, tone)| (gain.abs(), tone.derivative_bounds()));
+        terms.chain(tones).fold(
+            (self.slope.abs(), 0.0),
+            |(first, second), (gain, (d1, d2))| (first + gain * d1, second + gain * d2),
+        )
+    }
+
+    /// Passages strictly inside (start, end), an interval without breakpoints.
+    fn search(&self, start: f64, end: f64, passages: &mut Passages<'_>) {
+        if !self.is_line() {
+            return self.halve(start, end, passages);
+        }
+        let (value, slope) = (self.value(start), self.slope);
+        // It may round to the start.
+        let root = start - value / slope;
+        if root < end && sign(value) != sign(slope) {
+            passages.enter(root, sign(slope));
+        }
     }
 
     /// Halves [a, b] until on each part f keeps its sign or is monotone, then bisects. Parts come in order of time.
-    fn search(&self, start: f64, end: f64, passages: &mut Passages<'_>) {
+    fn halve(&self, start: f64, end: f64, passages: &mut Passages<'_>) {
         let mut parts = vec![(start, end)];
         while let Some((a, b)) = parts.pop()
-            && passages.found.is_none()
+            && !passages.end_before(a)
         {
             let (middle, half) = (a + 0.5 * (b - a), 0.5 * (b - a));
             let (first, second) = self.derivative_bounds(a, b);
-            if self.value(middle).abs() > first * half {
+            let value = self.value(middle);
+            if value.abs() > first * half {
+                // On this side all along, whatever rounding said of its start.
+                passages.enter(a, sign(value));
                 continue;
             }
             if middle <= a || middle >= b || self.derivative(middle).abs() > second * half {
                 let (left, right) = (self.value(a), self.value(b));
-                if sign(right) != 0 && sign(left) != sign(right) && sign(right) != passages.side {
+                if sign(left) == sign(right) {
+                    passages.enter(a, sign(right));
+                } else if sign(right) != 0 && sign(right) != passages.side {
                     passages.enter(self.root(a, b, sign(right)), sign(right));
                 }
             } else {

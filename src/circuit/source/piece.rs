@@ -41,6 +41,25 @@ impl Oscillation {
         self.amplitude * decayed(self.decay, s)
     }
 
+    /// Whether the sum with another one is one.
+    pub(super) fn goes_with(&self, other: &Self) -> bool {
+        (self.frequency, self.decay) == (other.frequency, other.decay)
+    }
+
+    /// The sum with one that goes with it, from the same origin.
+    pub(super) fn plus(&self, other: &Self) -> Self {
+        let parts = |term: &Self| {
+            let (sin, cos) = term.phase.sin_cos();
+            (term.amplitude * cos, term.amplitude * sin)
+        };
+        let ((a, b), (c, d)) = (parts(self), parts(other));
+        Self {
+            amplitude: (a + c).hypot(b + d),
+            phase: (b + d).atan2(a + c),
+            ..*self
+        }
+    }
+
     /// The value at `s` after the origin.
     #[must_use]
     pub fn value(&self, s: f64) -> f64 {
@@ -117,15 +136,6 @@ impl Piece {
     pub fn second_derivative(&self, t: f64) -> f64 {
         let s = t - self.origin;
         self.terms().map(|term| term.second_derivative(s)).sum()
-    }
-
-    /// Bounds of |f'| and |f''| on [a, b].
-    pub(super) fn derivative_bounds(&self, a: f64, b: f64) -> (f64, f64) {
-        self.terms()
-            .fold((self.slope.abs(), 0.0), |(first, second), term| {
-                let (d1, d2) = term.derivative_bounds(a - self.origin, b - self.origin);
-                (first + d1, second + d2)
-            })
     }
 
     pub(super) fn line(start: f64, end: f64, origin: f64, constant: f64, slope: f64) -> Self {

@@ -111,7 +111,7 @@ impl Sparse {
         self.trial.rows.clear();
         let mut u = self.now.u.clone();
         let mut du = vec![0.0; u.len()];
-        self.inputs.slopes(t0, &mut du);
+        self.inputs.slopes_behind(t0, &mut du);
         self.step.x.clone_from(&self.now.x);
         let first = self.now.slope.clone();
         self.step.lambda.clone_from(&self.now.lambda);
@@ -273,7 +273,7 @@ impl Sparse {
         }
         let h = self.now.last_h * SHORT;
         let mut du = vec![0.0; self.now.u.len()];
-        self.inputs.slopes(self.now.t, &mut du);
+        self.inputs.slopes_behind(self.now.t, &mut du);
         let ends = self.now.u.iter().zip(&du);
         let u: Vec<f64> = ends.map(|(u, du)| u + h * du).collect();
         let Now { x, active, .. } = &self.now;

@@ -100,7 +100,7 @@ impl Sparse {
     /// The changes in the step that is about to be taken, with outputs of these amplitudes; nothing where several devices change by themselves.
     fn changes(&mut self, rows: &[f64], largest: &[f64]) -> Option<Changes> {
         let mut du = vec![0.0; self.now.u.len()];
-        self.inputs.slopes(self.now.t, &mut du);
+        self.inputs.slopes_behind(self.now.t, &mut du);
         let Self {
             systems,
             now,

@@ -35,9 +35,7 @@ impl Sparse {
         self.note_energy();
         self.started = true;
         self.see();
-        let mut du = vec![0.0; self.now.u.len()];
-        self.inputs.slopes(self.now.t, &mut du);
-        let moving = self.switches.misplaced(self.system(), &self.now.u, &du);
+        let moving = (self.switches).misplaced(self.system(), &self.inputs, self.now.t);
         if !moving.is_empty() {
             self.switch(&moving, log)?;
         }
@@ -80,7 +78,7 @@ impl Sparse {
         let h = INSTANT * self.span;
         let t = self.now.t;
         let mut du = vec![0.0; self.now.u.len()];
-        self.inputs.slopes(t, &mut du);
+        self.inputs.slopes_behind(t, &mut du);
         self.step.x.clone_from(&self.now.x);
         self.step.active.clone_from(&self.now.active);
         self.step.lambda.clear();

@@ -373,7 +373,7 @@ impl Stepper for Sparse {
         // A λ that cannot be read is that of the step before.
         let _ = self.know_lambda();
         let mut du = vec![0.0; self.now.u.len()];
-        self.inputs.slopes(self.now.t, &mut du);
+        self.inputs.slopes_behind(self.now.t, &mut du);
         let at = Point {
             x: &self.now.x,
             lambda: &self.now.lambda,

@@ -231,11 +231,7 @@ impl Returns {
 impl Sparse {
     /// Positions at the start, from these, where the sources are and go: a control may start on its threshold.
     fn at_first(&self, position: &[bool]) -> Vec<bool> {
-        let (t, mut du) = (self.now.t, vec![0.0; self.now.u.len()]);
-        self.inputs.slopes(t, &mut du);
-        let misplaced = self
-            .switches
-            .misplaced(self.system(), &self.inputs.all(t), &du);
+        let misplaced = (self.switches).misplaced(self.system(), &self.inputs, self.now.t);
         let mut position = position.to_vec();
         misplaced.iter().for_each(|&i| position[i] = !position[i]);
         position

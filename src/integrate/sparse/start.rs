@@ -65,7 +65,7 @@ impl Problem {
             let switches = multiport.switches.iter().zip(&self.start.switches);
             let asked = switches.enumerate().map(|(k, (switch, &on))| {
                 if self.settle[k] {
-                    Threshold::of(switch).position(on, system.control(k, at).0)
+                    Threshold::of(switch).position(on, system.control(k, at))
                 } else {
                     on
                 }

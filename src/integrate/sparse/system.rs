@@ -3,7 +3,7 @@
 use super::kernel::{Kernel, Step};
 use super::tape::Reads;
 use crate::integrate::error::{Error, Reason};
-use crate::integrate::reading::{Point, sparse_magnitude, sparse_value};
+use crate::integrate::reading::{Point, sparse_value};
 use crate::integrate::switching::{Part, Watched};
 use crate::lcs::sparse::{Readings, SparseRows};
 use crate::lcs::{Input, Port, Position, PowerKind, SparseLcs};
@@ -280,6 +280,11 @@ impl System {
         });
         work.sum()
     }
+
+    /// The control of switch i.
+    pub(super) fn control(&self, i: usize, at: Point<'_>) -> f64 {
+        sparse_value(&self.readings.controls, i, at)
+    }
 }
 
 impl Watched for System {
@@ -289,14 +294,6 @@ impl Watched for System {
 
     fn ports(&self) -> &[Port] {
         &self.lcs.ports
-    }
-
-    fn control(&self, i: usize, at: Point<'_>) -> (f64, f64) {
-        let controls = &self.readings.controls;
-        (
-            sparse_value(controls, i, at),
-            sparse_magnitude(controls, i, at),
-        )
     }
 
     fn control_of_sources(&self, i: usize) -> (Vec<f64>, f64) {

@@ -10,13 +10,13 @@ use std::sync::Arc;
 pub use self::threshold::Threshold;
 pub(crate) use self::threshold::{Known, at_start, fire};
 
+use crate::circuit::source::Rest;
 use crate::integrate::error::Error;
 use crate::integrate::event::Change;
-use crate::integrate::inputs::{Inputs, Passage};
+use crate::integrate::inputs::Inputs;
 use crate::integrate::reading::{self, Point};
 use crate::integrate::settle::settle;
 use crate::lcs::{Input, Lcs, Port, Role, Rows};
-use crate::settings::tolerances::events::CONTROL_ROUNDINGS;
 use crate::settings::tolerances::events::DECISIVE;
 
 /// What switches see of the system they stand in.
@@ -25,8 +25,6 @@ pub(crate) trait Watched {
     fn inputs(&self) -> &[Input];
     /// The pairs (λ, y).
     fn ports(&self) -> &[Port];
-    /// The control of switch i, and the sum of the magnitudes that it is computed from.
-    fn control(&self, i: usize, at: Point<'_>) -> (f64, f64);
     /// What u, by source, has in it, and its constant.
     fn control_of_sources(&self, i: usize) -> (Vec<f64>, f64);
     /// Whether this has no part in it.
@@ -51,11 +49,6 @@ impl Watched for Lcs {
 
     fn ports(&self) -> &[Port] {
         &self.ports
-    }
-
-    fn control(&self, i: usize, at: Point<'_>) -> (f64, f64) {
-        let (value, size) = (reading::value, reading::magnitude);
-        (value(&self.controls, i, at), size(&self.controls, i, at))
     }
 
     fn control_of_sources(&self, i: usize) -> (Vec<f64>, f64) {
@@ -181,6 +174,11 @@ impl Switches {
         self.thresholds.iter().enumerate().any(watched)
     }
 
+    /// Whether sources alone drive the control of each switch.
+    pub(crate) fn driven(&self) -> &[bool] {
+        &self.driven
+    }
+
     pub(crate) fn needs_lambda(&self) -> bool {
         self.needs_lambda
     }
@@ -193,29 +191,14 @@ impl Switches {
         self.in_this_step >= limit
     }
 
-    /// Switches driven by sources alone whose controls ask for another position right after the start, where the inputs have these
-    /// values and slopes.
-    pub(crate) fn misplaced(&self, lcs: &impl Watched, u: &[f64], slopes: &[f64]) -> Vec<usize> {
-        let at = Point {
-            x: &[],
-            lambda: &[],
-            u,
-            du: &[],
-        };
-        let known = |value: f64, size: f64| Known {
-            value,
-            noise: CONTROL_ROUNDINGS * f64::EPSILON * size,
-        };
+    /// Switches driven by sources alone whose controls ask for another position right after the start at `t`.
+    pub(crate) fn misplaced(&self, lcs: &impl Watched, inputs: &Inputs, t: f64) -> Vec<usize> {
         let wrong = |&i: &usize| {
-            let (value, size) = lcs.control(i, at);
-            let (gains, _) = lcs.control_of_sources(i);
-            let drifts = || gains.iter().zip(slopes).map(|(gain, du)| gain * du);
-            let (slope, steepness) = (drifts().sum(), drifts().map(f64::abs).sum());
-            self.thresholds[i].leaves(
-                self.position[i],
-                known(value, size),
-                known(slope, steepness),
-            )
+            let (on, threshold) = (self.position[i], &self.thresholds[i]);
+            match inputs.side_behind(lcs.control_of_sources(i), threshold.level(on), t) {
+                0 => on && threshold.is_sharp(),
+                side => on == (side < 0),
+            }
         };
         let driven = (0..self.thresholds.len()).filter(|&i| self.driven[i]);
         driven.filter(wrong).collect()
@@ -401,20 +384,18 @@ impl Switches {
         let limit = limit + slack;
         for i in (0..self.thresholds.len()).filter(|&i| self.driven[i]) {
             let (on, threshold) = (self.position[i], &self.thresholds[i]);
-            let level = if on {
-                threshold.off_below
+            // Without hysteresis a switch whose control rests on the threshold is off.
+            let rest = if threshold.is_sharp() {
+                Rest::IsBelow
             } else {
-                threshold.on_above
+                Rest::IsNeither
             };
-            let (gains, constant) = lcs.control_of_sources(i);
-            let until = (first + slack).min(limit);
-            let side = match (on, threshold.is_sharp()) {
-                (false, _) => Passage::Rising,
-                (true, false) => Passage::Falling,
-                (true, true) => Passage::FallingOrRest,
+            let control = lcs.control_of_sources(i);
+            let span = (t, (first + slack).min(limit));
+            let Some(time) = inputs.passage(control, (threshold.level(on), rest, !on), span, slack)
+            else {
+                continue;
             };
-            let passage = inputs.passage(&gains, constant, level, side, t, until);
-            let Some(time) = passage else { continue };
             first = first.min(time);
             passages.push((time, i));
         }

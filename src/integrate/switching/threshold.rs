@@ -124,6 +124,11 @@ impl Threshold {
         self.latch.is_none() && self.on_above == self.off_below
     }
 
+    /// The level at which a control leaves position `on`.
+    pub(crate) fn level(&self, on: bool) -> f64 {
+        if on { self.off_below } else { self.on_above }
+    }
+
     /// Whether the switch leaves position `on` right after an instant at which its control has this value and slope, each known
     /// up to its noise: beyond the threshold, on the way there, or at rest on a threshold that serves both directions.
     #[must_use]

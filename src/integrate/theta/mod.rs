@@ -295,9 +295,9 @@ impl Stepper for Theta {
     fn advance(&mut self, t: f64, log: &mut Log) -> Result<(), Error> {
         if !self.started {
             self.begin(log)?;
-            self.inputs.slopes(self.now.t, &mut self.du);
+            self.inputs.slopes_behind(self.now.t, &mut self.du);
             let lcs = &self.plant.systems[self.now.system].1.lcs;
-            let moving = self.switches.misplaced(lcs, &self.now.u, &self.du);
+            let moving = self.switches.misplaced(lcs, &self.inputs, self.now.t);
             if !moving.is_empty() || self.asked()? {
                 self.switch(&moving, log)?;
             }

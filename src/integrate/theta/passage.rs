@@ -235,7 +235,7 @@ impl Theta {
     }
 
     fn guards_at_start(&mut self) -> Vec<f64> {
-        self.inputs.slopes(self.now.t, &mut self.du);
+        self.inputs.slopes_behind(self.now.t, &mut self.du);
         let front = &self.smooth.front;
         let at = self.now.point(&front.lambda, &self.du);
         let mut values = Vec::new();

@@ -15,13 +15,9 @@ impl Theta {
             Stepping::Fixed(h) => h.min(self.longest),
             Stepping::Controlled { first, .. } => first,
         };
-        // Within the present piece of every source, as far as the rounding of t tells pieces apart.
-        let piece = self.inputs.next_breakpoint(self.now.t) - self.now.t;
-        if piece > Self::slack(self.now.t) {
-            base.min(piece) * SHORT
-        } else {
-            base * SHORT
-        }
+        // Within the present piece of every source.
+        let piece = self.inputs.next_corner(self.now.t) - self.now.t;
+        base.min(piece) * SHORT
     }
 
     /// The step by which λ is read. A curved law tells its current at the instant itself, so only the ideal ports beside it need a
@@ -41,7 +37,7 @@ impl Theta {
 
     /// z and the matrices of the short implicit step from now; slopes of the inputs go into `du`.
     pub(super) fn prepare_short(&mut self, h: f64) -> Result<usize, Error> {
-        self.inputs.slopes(self.now.t, &mut self.du);
+        self.inputs.slopes_behind(self.now.t, &mut self.du);
         for ((next, u), du) in self.u_next.iter_mut().zip(&self.now.u).zip(&self.du) {
             *next = u + h * du;
         }
@@ -116,7 +112,7 @@ impl Theta {
     pub(super) fn read_lambda(&mut self) -> Result<(), Error> {
         if self.smooth.front.known {
             // The end of a step is on the laws.
-            self.inputs.slopes(self.now.t, &mut self.du);
+            self.inputs.slopes_behind(self.now.t, &mut self.du);
             self.lambda.copy_from_slice(&self.smooth.front.lambda);
             self.y.copy_from_slice(&self.smooth.front.y);
             return Ok(());
