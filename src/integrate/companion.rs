@@ -16,7 +16,7 @@ use crate::integrate::log::Log;
 use crate::integrate::rows::Asked;
 use crate::integrate::run::{Outcome, Stepper};
 use crate::integrate::stats::StatedError;
-use crate::settings::tolerances::stated::EVENTS;
+use crate::settings::tolerances::stated::{EVENTS, IMPRECISE, ROUGHLY};
 
 /// A companion begins with steps that double from this part of its first one on: what has ended within the first step of the run is seen.
 const GRADED: i32 = 24;
@@ -149,7 +149,10 @@ impl<'a> Accompanied<'a> {
             time = time.max(share.min(EVENTS) * companion.difference.shift());
         }
         // Neither is it known where a value is no number.
-        let known = |error: f64| error.is_finite().then_some(error);
+        let known = |error: f64| {
+            let error = error * (1.0 + error / IMPRECISE).min(ROUGHLY);
+            error.is_finite().then_some(error)
+        };
         StatedError {
             max: known(max + common),
             rms: known(rms + common),

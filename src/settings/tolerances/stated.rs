@@ -8,6 +8,10 @@ pub(crate) const UNBALANCED: f64 = 1e-3;
 /// of no use passes as a result; smaller: runs in few long steps, which are made to be looked at, are warned of.
 pub(crate) const IMPRECISE: f64 = 0.1;
 
+/// An error that is no small part of the amplitudes is told but roughly by what runs differ: it is stated larger by the part of [`IMPRECISE`] that it is, at
+/// most so many times. Larger: what is of no use is stated larger than it is; smaller: the statement no longer bounds such errors (`tests/stated/`).
+pub(crate) const ROUGHLY: f64 = 4.0;
+
 /// Prescribed steps of the two companions, over those of the run. Halves tell the error of the run even where its steps are too long for what they
 /// follow; where a change of a device stands alike in both, twice as long ones do. Larger: the distances say less of the run's own error; smaller: dearer.
 pub(crate) const FINER_AND_COARSER: [f64; 2] = [0.5, 2.0];
