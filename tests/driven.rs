@@ -9,7 +9,7 @@
 mod random;
 
 use circ::Model;
-use circ::integrate::{Method, Run, SimOptions, simulate};
+use circ::integrate::{Method, Reason, Run, SimOptions, simulate};
 
 use random::Random;
 
@@ -75,7 +75,8 @@ fn netlist(seed: u64) -> (String, [f64; 2]) {
     (text, [vt - vh, vt + vh])
 }
 
-fn run(text: &str, method: Method, steps: Option<f64>) -> Run {
+/// None where the run is refused because switches do not settle.
+fn run(text: &str, method: Method, steps: Option<f64>) -> Option<Run> {
     let model = Model::parse(text, "driven.cir").unwrap_or_else(|e| panic!("{e}\n{text}"));
     let tran = model.circuit().tran.expect("a transient");
     let options = SimOptions {
@@ -84,8 +85,11 @@ fn run(text: &str, method: Method, steps: Option<f64>) -> Run {
         unestimated: true,
         ..SimOptions::default()
     };
-    simulate(model.circuit(), model.multiport(), options)
-        .unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"))
+    match simulate(model.circuit(), model.multiport(), options) {
+        Ok(run) => Some(run),
+        Err(error) if error.reason == Reason::SwitchesDoNotSettle => None,
+        Err(error) => panic!("{method:?}: {error}\n{text}"),
+    }
 }
 
 /// The first row at which a switch does not stand where its control asks.
@@ -114,8 +118,9 @@ fn misplaced(run: &Run, [low, high]: [f64; 2]) -> Option<String> {
 fn switches_that_sources_move_stand_where_their_controls_ask() {
     let number = |name: &str| std::env::var(name).ok().and_then(|n| n.parse().ok());
     let (count, first) = (number("CIRC_DRIVEN"), number("CIRC_DRIVEN_SEED"));
-    let first = first.unwrap_or(1);
-    for seed in first..first + count.unwrap_or(150) {
+    let (first, count) = (first.unwrap_or(1), count.unwrap_or(150));
+    let mut refused = 0;
+    for seed in first..first + count {
         let (text, levels) = netlist(seed);
         let random = &mut Random::new(!seed);
         let steps = random.even(300.0, 900.0);
@@ -125,9 +130,15 @@ fn switches_that_sources_move_stand_where_their_controls_ask() {
             (Method::Theta, Some(steps)),
             (Method::Euler, Some(steps)),
         ] {
-            if let Some(wrong) = misplaced(&run(&text, method, steps), levels) {
+            let Some(run) = run(&text, method, steps) else {
+                refused += 1;
+                continue;
+            };
+            if let Some(wrong) = misplaced(&run, levels) {
                 panic!("seed {seed}, {method:?} {steps:?}: {wrong}\n{text}");
             }
         }
     }
+    println!("{refused} of {} runs refused", 4 * count);
+    assert!(refused <= count / 500, "{refused}");
 }

@@ -364,12 +364,13 @@ fn prescribed_steps_tell_their_error() {
                 let found = stepped(method, step);
                 let error = error(&found, &reference);
                 let ratio = found.error.max.unwrap() / error;
-                // An eighth of what steps 4 times as long differ by is the error of order 2; of a smooth motion with stages of order 3 it is a
-                // twentieth of that. Where the order that is seen is less than that of the method it counts, up to four times.
+                // Eight times what steps half as long differ by, and 1.25 times what steps twice as long do: of errors of order 2 the second is 3.75 times
+                // the error, of a smooth motion with stages of order 3 nearly 9. Changes of devices move both. What is more than 10 % is stated larger.
                 let most = match method {
                     Method::Euler => 5.0,
                     _ => 40.0,
                 };
+                let most = most * (1.0 + error / 0.1).min(4.0);
                 assert!(
                     (1.0..most).contains(&ratio),
                     "{name} {method:?} {step:e}: {ratio} of {error:e}"
