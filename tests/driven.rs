@@ -120,7 +120,8 @@ fn switches_that_sources_move_stand_where_their_controls_ask() {
     let (count, first) = (number("CIRC_DRIVEN"), number("CIRC_DRIVEN_SEED"));
     let (first, count) = (first.unwrap_or(1), count.unwrap_or(150));
     let mut refused = 0;
-    for seed in first..first + count {
+    // 2681: another switch moves at the instant at which rounding holds a control on its threshold.
+    for seed in (first..first + count).chain([2681]) {
         let (text, levels) = netlist(seed);
         let random = &mut Random::new(!seed);
         let steps = random.even(300.0, 900.0);
@@ -139,6 +140,5 @@ fn switches_that_sources_move_stand_where_their_controls_ask() {
             }
         }
     }
-    println!("{refused} of {} runs refused", 4 * count);
-    assert!(refused <= count / 500, "{refused}");
+    assert!(refused <= count / 500, "{refused} runs refused");
 }

@@ -176,8 +176,8 @@ fn transistors() -> impl Strategy<Value = String> {
     })
 }
 
-// Active networks, for which no theorem promises a solution or a method that finds it: one in some 10,000 fails, so the seed is fixed. Of seed 3 the
-// seventeenth fails: 0.7 mV off its law where 290 A flow (docs/validation.md).
+// Active networks, for which no theorem promises a solution or a method that finds it: one in some 10,000 fails, so the seed is fixed. One that does
+// fail is the test below.
 proptest! {
     #![proptest_config(ProptestConfig {
         cases: 500,
@@ -190,6 +190,19 @@ proptest! {
     fn random_networks_of_transistors_have_an_operating_point(text in transistors()) {
         balanced(&text)?;
     }
+}
+
+/// The seventeenth of seed 3.
+#[test]
+#[ignore = "the operating point is 0.7 mV off the law of d3, where 290 A flow (docs/validation.md)"]
+fn an_operating_point_with_large_currents_is_on_every_law() {
+    let cards = "rt1 1 0 330\nrt2 2 1 660\nrt3 3 2 990\nrt4 4 3 1320\n\
+        v0 s0 0 0\nrc0 s0 0 1k\nrb0 s0 3 100\nq0 0 3 3 nn\nv1 s1 0 -10.994317808943705\nrs1 s1 1 178.097492073077\nd1 s1 1 power\n\
+        v2 s2 0 0\nrc2 s2 3 1k\nrb2 s2 0 100\nq2 3 0 2 nn\nv3 s3 4 5.110486948596441\nrs3 s3 1 610952.6596368612\nd3 s3 1 power\n\
+        q4 0 1 4 nn\nd4 1 4 silicon\nv5 s5 0 12.123259451512093\nrc5 s5 0 1k\nrb5 s5 4 1613.6995261851125\nq5 0 4 0 nn\n\
+        v6 s6 4 -9.12745486006986\nrs6 s6 2 27993.68459427833\nd6 s6 2 power\nq7 1 4 4 nn\nd7 4 4 silicon\nq8 1 0 0 nn\nd8 0 0 silicon\n";
+    let models = ".model nn npn(is=1e-15 bf=120 br=3)\n.model pp pnp(is=3e-15 bf=60 rb=20)\n";
+    balanced(&format!("random\n{cards}{MODELS}{models}.op\n.end\n")).unwrap();
 }
 
 #[test]

@@ -34,7 +34,8 @@ pub(crate) const LOOSER: f64 = 2.0;
 /// The error of the run over what that companion differs by: 1/3 or less were the errors smooth. Larger and smaller as [`FIRST_ORDER`].
 pub(crate) const LOOSER_SHARE: f64 = 1.25;
 
-/// The same for steps that tell their error themselves, whose lengths are powers of √2: of order 3 they are one power longer. Larger: the distance says less of the run's own error; smaller: its steps are those of the run and it sees no error.
+/// The same for steps that tell their error themselves, whose lengths are powers of √2: of order 3 they are one power longer. Larger: the
+/// distance says less of the run's own error; smaller: its steps are those of the run and it sees no error.
 pub(crate) const LOOSER_EMBEDDED: f64 = 4.0;
 
 /// The error of the run over what that companion differs by: 1/5 were the errors smooth and of one sign; those of a row on the edge of a diode's
