@@ -176,8 +176,7 @@ fn transistors() -> impl Strategy<Value = String> {
     })
 }
 
-// Active networks, for which no theorem promises a solution or a method that finds it: one in some 10,000 fails, so the seed is fixed. One that does
-// fail is the test below.
+// Active networks, for which no theorem promises a solution or a method that finds it: of 82,984 with seed 778 the last was refused, so the seed is fixed.
 proptest! {
     #![proptest_config(ProptestConfig {
         cases: 500,
@@ -192,9 +191,8 @@ proptest! {
     }
 }
 
-/// The seventeenth of seed 3.
+/// A loop of two junctions and a source across a network of kilohms, where terms of the residual cancel.
 #[test]
-#[ignore = "the operating point is 0.7 mV off the law of d3, where 290 A flow (docs/validation.md)"]
 fn an_operating_point_with_large_currents_is_on_every_law() {
     let cards = "rt1 1 0 330\nrt2 2 1 660\nrt3 3 2 990\nrt4 4 3 1320\n\
         v0 s0 0 0\nrc0 s0 0 1k\nrb0 s0 3 100\nq0 0 3 3 nn\nv1 s1 0 -10.994317808943705\nrs1 s1 1 178.097492073077\nd1 s1 1 power\n\

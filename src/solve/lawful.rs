@@ -29,8 +29,8 @@ use super::lcp::{Answered, Scaling, Solution, Status};
 use super::newton::Newton;
 use crate::law::{Law, Resolvent};
 use crate::settings::tolerances::complementarity::{
-    BLOCKED, CONTINUED, CONTINUED_RATIO, DECREASE, MONOTONE, NEWTON_ENDS, PROXIMAL, SMALL_PORT,
-    UNDETERMINED,
+    BLOCKED, CONTINUED, CONTINUED_RATIO, DECREASE, MONOTONE, NEWTON_ENDS, NEWTON_SETTLES, PROXIMAL,
+    SMALL_PORT, UNDETERMINED,
 };
 use crate::settings::tolerances::steps::SOLVED;
 
@@ -213,8 +213,9 @@ impl Lawful {
             if now.size <= NEWTON_ENDS {
                 break;
             }
-            // What has been accepted gains by single steps.
-            let chain = if now.size <= self.tolerance { 1 } else { CHAIN };
+            // Near rounding only single steps gain. Above it what would be accepted may still be far from the solution along a direction in which
+            // large terms cancel.
+            let chain = if now.size <= NEWTON_SETTLES { 1 } else { CHAIN };
             let mut next = self.leap(&now, q, chain);
             if next.is_none() && now.size > self.tolerance {
                 next = self.search(&now, self.newton_step(&now), q);

@@ -18,6 +18,10 @@ pub(crate) const TABLEAU_NOISE: f64 = 1e-15;
 /// A residual of Newton's method on resolvents that is rounding: no iteration improves on it.
 pub(crate) const NEWTON_ENDS: f64 = 1e-15;
 
+/// A residual from which on a step of Newton's method that lowers it no more is rounding; above, the steps after it may. Larger: solutions err where
+/// large terms cancel; smaller: steps that change nothing.
+pub(crate) const NEWTON_SETTLES: f64 = 1e-12;
+
 /// What counts as small beside the largest quantity: its tolerated residual is this part of that of the largest. Larger: leakage loses
 /// digits; smaller: it decides when Newton ends.
 pub(crate) const SMALL_PORT: f64 = 1e-5;
