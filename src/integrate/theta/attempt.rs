@@ -17,8 +17,6 @@ impl Theta {
         }
         self.inputs.left(t1, &mut self.u_next);
         self.stats.lcp_solves += u64::from(!self.lambda.is_empty());
-        self.attempt.blocked.clear();
-        self.attempt.beyond.clear();
         let damped = self.starts_damped();
         let settle = self.now.settle && (damped || !self.lambda.is_empty());
         let scheme = if settle && damped {
@@ -65,7 +63,7 @@ impl Theta {
         }
         let tried = attempt.clone();
         self.solve_step(scheme, h, t1)?;
-        self.confirm(tried, h, t1);
+        self.confirm(tried);
         Ok(())
     }
 
@@ -73,7 +71,7 @@ impl Theta {
     /// ports refused was the error of their short step or rounding, or is an error that [`past_zero`] tells. Currents must be as they are with
     /// γ = 1, zero or more.
     #[cold]
-    fn confirm(&mut self, tried: Attempt, h: f64, t1: f64) {
+    fn confirm(&mut self, tried: Attempt) {
         let found = |(basis, _): &(Vec<bool>, _)| *basis == self.now.active;
         let n = self.now.x.len();
         let system = &self.plant.systems[self.now.system].1;
@@ -87,16 +85,7 @@ impl Theta {
         let carries = |j: usize| self.now.active[j] == (system.lcs.ports[j].role != Role::Voltage);
         let as_far = |j: usize| self.out[n + j] >= 2.0 * solved[n + j].min(0.0);
         if (0..self.now.active.len()).all(|j| !carries(j) || as_far(j)) {
-            let out = self.out.clone();
-            let blocks = |j: usize| if carries(j) { 0.0 } else { out[n + j].min(0.0) };
-            let beyond: Vec<f64> = (0..out.len() - n).map(blocks).collect();
-            let blocked = self.blocked_past_zero((h, t1), &beyond, &solved);
-            self.out = out;
-            self.attempt = Attempt {
-                beyond,
-                blocked,
-                ..tried
-            };
+            self.attempt = tried;
         } else {
             self.out = solved;
         }
@@ -186,7 +175,6 @@ impl Theta {
         }
         self.now.slope.clone_from(&self.attempt.slope);
         self.now.unseen.clone_from(&self.attempt.unseen);
-        self.now.beyond.clone_from(&self.attempt.beyond);
         self.now.turned_off = self.attempt.turned_off;
         self.now.settle = self.now.turned_off;
         self.now.x.copy_from_slice(&self.out[..n]);

@@ -76,7 +76,6 @@ impl Theta {
     /// The motion goes on from here with another slope. Where a curved step starts from is told by [`Self::find_mode`], which follows.
     fn forget_slope(&mut self) {
         self.now.slope.clear();
-        self.now.beyond.clear();
         self.looks.forget();
     }
 

@@ -312,10 +312,12 @@ impl Theta {
         self.now.settle = self.damped || self.now.turned_off;
         self.attempt(0.5 * h, t1)?;
         let past = self.past_zero(0.5 * h);
+        let unseen = self.part_unseen(0.5 * h) * 0.5 * h;
         if last_chance && self.attempt.solved.is_some() {
             *impulse = self.impulse(0.5 * h)?.is_some();
         }
         self.commit(t1)?;
+        let behind = self.behind_a_change(0.5 * h, unseen)?;
         for (k, coarse) in self.coarse.iter_mut().enumerate() {
             if (*coarse - self.now.x[k]).abs() <= self.rounding[k] {
                 *coarse = self.now.x[k];
@@ -324,8 +326,8 @@ impl Theta {
         let error = self
             .amplitudes
             .error(&self.system().lcs, &self.coarse, &self.now.x);
-        let [unseen, hidden, past] = [&self.now.unseen, &hidden, &past].map(|e| self.size_of(e));
-        let unseen = unseen.max(hidden).max(past);
+        let hidden = [&self.now.unseen, &hidden, &past, &behind].map(|e| self.size_of(e));
+        let unseen = hidden.into_iter().fold(0.0, f64::max);
         let judge = |theta: &Self, unseen: f64| match &theta.control {
             Some(control) => control.judge(h, error, unseen),
             None => Verdict {

@@ -27,8 +27,6 @@ pub(super) struct Now {
     pub(super) slope: Vec<f64>,
     /// What the last step did not see, see [`unseen`]; empty at the start of a step under error control.
     pub(super) unseen: Vec<f64>,
-    /// See [`Attempt::beyond`], of the last step.
-    pub(super) beyond: Vec<f64>,
 }
 
 impl Now {
@@ -54,7 +52,6 @@ impl Now {
         self.balance = other.balance;
         self.slope.clone_from(&other.slope);
         self.unseen.clone_from(&other.unseen);
-        self.beyond.clone_from(&other.beyond);
         self.event_step = other.event_step;
     }
 }
@@ -79,8 +76,4 @@ pub(super) struct Attempt {
     pub(super) slope: Vec<f64>,
     /// What the stages did not see.
     pub(super) unseen: Vec<f64>,
-    /// Negative voltages at the end of the step of devices that block because the solvers say so; empty where none does.
-    pub(super) beyond: Vec<f64>,
-    /// What devices that block past their zeros would have carried: a change of x, see [`past_zero`](super::past_zero).
-    pub(super) blocked: Vec<f64>,
 }

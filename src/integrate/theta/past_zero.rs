@@ -1,8 +1,7 @@
-//! Devices that go on as they are past a zero in the second half of a step.
+//! Devices that go on as they are past a zero in the second half of a step, which then agrees with its halves at any tolerance.
 //!
 //! **Currents.** With γ < 1 the λ of a step stands for the time t + γ h, and of a step with θ = γ = ½ it is the mean: a device whose λ falls through zero behind
-//! that time conducts to the end. A step and its two halves may do so alike, and their difference is then nothing, at any tolerance. The λ of the
-//! two halves tell where it is at the end, λ₁ < 0, and what the line between them carries the wrong way,
+//! that time conducts to the end. The λ of the two halves tell where it is at the end, λ₁ < 0, and what the line between them carries the wrong way,
 //!
 //! ```text
 //! B_j ∫ min(λ_j, 0) dt = −B_j λ₁²/2|λ'|,
@@ -10,19 +9,22 @@
 //!
 //! is an error of the step.
 //!
-//! **Voltages.** With θ < 1 a step that is solved has the voltage of t + θ h: a device whose voltage falls through zero behind that time blocks to
-//! the end, in the step and in its halves alike. There it is negative. With the devices that the same step of Moreau's scheme finds at its end λ would rise
-//! from nothing at the zero: they move the state by half of what that step does by them, for the part of the step that is left.
+//! **Voltages.** A device whose voltage falls through zero late in a step blocks to the end. From there on ẋ is another, which the right limit of the
+//! end tells; the difference rises from nothing at the zero, so that x moves by half of it in the time that is left.
+//!
+//! **Behind a change.** Where a device changes within a step the λ of others jump with it. A step that is solved has the mean of each (γ = 1), and
+//! one that is positive in the mean but negative behind the change goes on to the end: a diode between two capacitors that another one charges
+//! from then on. Where the two hold the state the step and its halves agree to rounding. Where a half was solved there is no line, and ẋ may have been
+//! that of the right limit for as long as the second half.
 
 use super::*;
+use crate::settings::tolerances::steps::CLOSER;
 
 /// The λ of the first half of a step, and where in it they are.
 #[derive(Debug, Default)]
 pub(super) struct FirstHalf {
     lambda: Vec<f64>,
     gamma: f64,
-    /// What devices that block past their zeros in it would have carried: a change of x.
-    blocked: Vec<f64>,
 }
 
 impl Theta {
@@ -36,10 +38,7 @@ impl Theta {
     /// Keeps what the attempt of the first half tells.
     pub(super) fn keep_first_half(&mut self) {
         let gamma = self.gamma_of_attempt();
-        let FirstHalf {
-            lambda, blocked, ..
-        } = &mut self.first_half;
-        *blocked = std::mem::take(&mut self.attempt.blocked);
+        let FirstHalf { lambda, .. } = &mut self.first_half;
         lambda.clear();
         if let Some(gamma) = gamma {
             lambda.extend_from_slice(&self.out[self.now.x.len()..]);
@@ -47,76 +46,74 @@ impl Theta {
         }
     }
 
-    /// What devices that block past their zeros in the attempted step, as `out` has it, would carry: a change of x, empty where none does. `beyond`
-    /// has their negative voltages at its end, `mean` the voltages at t + θ h. The attempt is gone, and `out` with it.
-    pub(super) fn blocked_past_zero(
-        &mut self,
-        (h, t1): (f64, f64),
-        beyond: &[f64],
-        mean: &[f64],
-    ) -> Vec<f64> {
-        let n = self.now.x.len();
-        // What was negative before is the error of an earlier step.
-        let before = |j: usize| self.now.beyond.get(j).copied().unwrap_or(0.0);
-        let passing = (0..beyond.len()).filter(|&j| beyond[j] < before(j));
-        let parts = passing.map(|j| {
-            let whole = beyond[j] - mean[n + j].max(0.0);
-            (beyond[j] - before(j)) / whole
-        });
-        let left = (1.0 - self.scheme.theta) * parts.fold(0.0, f64::max);
-        if left == 0.0 || self.control.is_none() {
-            return Vec::new();
-        }
-        self.stats.lcp_solves += 1;
-        if self.solve_with(Scheme::MOREAU, h, t1).is_err() || !self.changes() {
-            return Vec::new();
-        }
-        let changed = self.out[..n].to_vec();
-        let system = &mut self.plant.systems[self.now.system].1;
-        let (mode, _) = system.mode(self.attempt.step, &self.now.active);
-        let fused = system.step(self.attempt.step).fused(mode);
-        fused.step(&self.z, n, &mut self.out, |_| 0.0);
-        let moved = changed.iter().zip(&self.out);
-        moved.map(|(a, b)| 0.5 * left * (a - b)).collect()
-    }
-
-    /// What devices carry past their zeros in the attempted second half, of length `half`, and what they do not carry in either half: a change of x,
-    /// empty where none does.
-    pub(super) fn past_zero(&self, half: f64) -> Vec<f64> {
-        let mut change = self.carried_past_zero(half);
-        for blocked in [&self.first_half.blocked, &self.attempt.blocked] {
-            change.resize(change.len().max(blocked.len()), 0.0);
-            for (change, blocked) in change.iter_mut().zip(blocked) {
-                *change += blocked;
-            }
-        }
-        change
-    }
-
-    fn carried_past_zero(&self, half: f64) -> Vec<f64> {
+    /// The lines of λ, or y, through the attempted half, of length `half`, and the one before, which are negative at its end: of each the port, its
+    /// value in this half, at its end, and its slope. `None` where a half was solved.
+    fn falling(&self, half: f64) -> Option<impl Iterator<Item = (usize, [f64; 3])> + '_> {
         let n = self.now.x.len();
         let FirstHalf { lambda, gamma, .. } = &self.first_half;
-        let Some(second) = self.gamma_of_attempt().filter(|_| !lambda.is_empty()) else {
-            return Vec::new();
-        };
+        let second = (self.gamma_of_attempt()).filter(|_| lambda.len() == self.out.len() - n)?;
         let apart = half * (1.0 + second - gamma);
         let left = half * (1.0 - second);
-        let mut change = Vec::new();
-        for (j, before) in lambda
-            .iter()
-            .enumerate()
-            .filter(|(j, _)| self.now.active[*j])
-        {
+        let lines = lambda.iter().enumerate().map(move |(j, before)| {
             let now = self.out[n + j];
             let slope = (now - before) / apart;
-            let end = now + slope * left;
-            if now >= 0.0 && end < 0.0 {
-                change.resize(n, 0.0);
-                let area = 0.5 * end * end / slope;
-                let column = self.system().lcs.b.column(j);
-                for (change, b) in change.iter_mut().zip(column.iter()) {
-                    *change += b * area;
-                }
+            (j, [now, now + slope * left, slope])
+        });
+        Some(lines.filter(|(_, [_, end, _])| *end < 0.0))
+    }
+
+    /// The part of the attempted second half, of length `half`, for which ẋ may have been that of the right limit of its end; half of the time where the
+    /// difference rises from nothing.
+    pub(super) fn part_unseen(&self, half: f64) -> f64 {
+        let Some(falling) = self.falling(half) else {
+            return 1.0;
+        };
+        let blocks = falling.filter(|(j, [now, ..])| !self.now.active[*j] || *now < 0.0);
+        blocks.fold(0.0, |part: f64, (_, [_, end, slope])| {
+            part.max(0.5 * (end / (slope * half)).clamp(0.0, 1.0))
+        })
+    }
+
+    /// What devices that are others at the right limit of now would have changed x by in the time `unseen`, where the last step was one of `half`: empty
+    /// where none are.
+    pub(super) fn behind_a_change(&mut self, half: f64, unseen: f64) -> Result<Vec<f64>, Error> {
+        if unseen == 0.0 || self.control.is_none() || self.system().curved {
+            return Ok(Vec::new());
+        }
+        self.stats.lcp_solves += 1;
+        let short = half / CLOSER;
+        let step = self.prepare_short(short)?;
+        let n = self.now.x.len();
+        let system = &mut self.plant.systems[self.now.system].1;
+        let (mode, _) = system.mode(step, &self.now.active);
+        let fused = system.step(step).fused(mode);
+        let noise = |k| self.amplitudes.rounding(&system.lcs, k);
+        if fused.step(&self.z, n, &mut self.out, noise) {
+            return Ok(Vec::new());
+        }
+        let q = system.prepare(step, &self.z, &self.amplitudes);
+        let matrices = system.step_mut(step);
+        matrices.driver.suggest(&self.now.active);
+        let solution = matrices.driver.solve(&q);
+        if solution.status != Status::Solved || solution.basis == self.now.active {
+            return Ok(Vec::new());
+        }
+        let changed = matrices.x_next(&self.z, &solution.lambda);
+        let moved = changed.iter().zip(&self.out[..n]);
+        Ok(moved.map(|(a, b)| unseen / short * (a - b)).collect())
+    }
+
+    /// What devices carry past their zeros in the attempted second half, of length `half`: a change of x, empty where none does.
+    pub(super) fn past_zero(&self, half: f64) -> Vec<f64> {
+        let mut change = Vec::new();
+        let falling = self.falling(half).into_iter().flatten();
+        let carries = falling.filter(|(j, [now, ..])| self.now.active[*j] && *now >= 0.0);
+        for (j, [_, end, slope]) in carries {
+            change.resize(self.now.x.len(), 0.0);
+            let area = 0.5 * end * end / slope;
+            let column = self.system().lcs.b.column(j);
+            for (change, b) in change.iter_mut().zip(column.iter()) {
+                *change += b * area;
             }
         }
         change

@@ -78,11 +78,16 @@ impl Theta {
         }
     }
 
-    /// Whether devices change in a step that was tried with straight laws, but not from a breakpoint, where [`Self::hidden`] looks anyway. Not beside switches that are
-    /// watched: steps as short as those in which their thresholds are located would follow each other.
+    /// Whether devices that move the state change in a step that was tried with straight laws, but not from a breakpoint, where [`Self::hidden`] looks
+    /// anyway. Those of comparators do not: steps too short to tell on which side of their thresholds they are would follow.
     pub(super) fn changes_on_the_way(&self) -> bool {
-        let may = self.control.is_some() && !self.now.settle && !self.switches.watch();
-        may && !self.system().curved && self.changes()
+        let may = self.control.is_some() && !self.now.settle && !self.system().curved;
+        let (Some((basis, _)), true) = (&self.attempt.solved, may) else {
+            return false;
+        };
+        let b = &self.system().lcs.b;
+        let changed = (0..basis.len()).filter(|&j| basis[j] != self.now.active[j]);
+        changed.map(|j| b.column(j).amax()).any(|b| b > 0.0)
     }
 
     /// What a step of length h that was tried from a breakpoint may hide where an ideal device changes within it: a capacitor that is
