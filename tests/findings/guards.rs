@@ -92,9 +92,9 @@ fn a_comparator_moves_when_its_saw_tooth_passes() {
     // From event to event and from corner to corner, in one or two steps each.
     let periods = 100;
     assert!(run.stats.steps < 15 * periods, "{}", run.stats.steps);
-    // Stages to rows that dense output does not reach among them.
+    // Stages to rows that dense output does not reach among them, of two steps right behind an event.
     assert!(
-        run.stats.lcp_solves < 200 * periods,
+        run.stats.lcp_solves < 220 * periods,
         "{}",
         run.stats.lcp_solves
     );

@@ -24,8 +24,9 @@ pub(super) struct Smooth {
     pub(super) front: From,
     pub(super) trial: Trial,
     pub(super) guards: Guards,
-    /// The step to a row.
+    /// The step to a row, and the middle where its second half starts.
     reader: Trial,
+    halfway: From,
     segments: Segments,
     /// The end of the run, s, where rows are read from dense output.
     pub(super) until: Option<f64>,
@@ -479,6 +480,7 @@ impl Theta {
             at,
             apart,
             reader,
+            halfway,
             ..
         } = &mut self.smooth;
         let (t, apart) = (*at, *apart);
@@ -494,13 +496,14 @@ impl Theta {
         let mut from = segments.within(curved, inputs, tol);
         let middle = segments.middle(curved, (t, apart));
         let stats = &mut self.stats;
-        let mut step_to = |segments: &Segments, t: f64, system: &mut System, reader: &mut Trial| {
-            let (start, held) = segments.first();
-            let known = (system, &self.now.active[..], &self.settings);
-            Self::make(known, inputs, (start, t, held), (reader, &mut *stats))
-        };
+        let active = &self.now.active[..];
+        let mut step =
+            |start: (&From, Option<&[bool]>), t: f64, system: &mut System, reader: &mut Trial| {
+                let known = (system, active, &self.settings);
+                Self::make(known, inputs, (start.0, t, start.1), (reader, &mut *stats))
+            };
         if let (Within::Step, Some(middle)) = (from, middle)
-            && step_to(segments, middle, system, reader).is_ok()
+            && step(segments.first(), middle, system, reader).is_ok()
             && let Some(curved) = &mut system.smooth
         {
             from = segments.take_middle(curved, inputs, tol, reader);
@@ -510,11 +513,21 @@ impl Theta {
         {
             return;
         }
-        if from != Within::Polynomials
-            && step_to(segments, t, system, reader).is_ok()
-            && let Some(curved) = &system.smooth
-        {
-            return segments.at_end(curved, inputs, (t, reader), row);
+        if from != Within::Polynomials {
+            let (start, held) = segments.first();
+            let ends = [0.5 * (start.t + t), t];
+            halfway.copy_from(start);
+            // Behind an event one step leaves part of a motion that has ended. Two leave the square of it; a coarser run, which starts from the same
+            // point, makes one and tells.
+            let in_one = self.whole || start.reach > 0.0;
+            let made = ends[usize::from(in_one)..].iter().all(|&end| {
+                let made = step((halfway, held), end, system, reader).is_ok();
+                halfway.take_end(end, reader);
+                made
+            });
+            if let (true, Some(curved)) = (made, &system.smooth) {
+                return segments.at_end(curved, inputs, (t, reader), row);
+            }
         }
         if let Some(curved) = &system.smooth {
             segments.interpolate(curved, &self.inputs, t, row);
