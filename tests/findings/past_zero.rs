@@ -44,6 +44,15 @@ fn a_diode_that_another_one_blocks_within_a_step_is_seen() {
     }
 }
 
+/// The right limit of the corner itself, where sources stand still, tells nothing of it: 1.7e-3 of the amplitude.
+#[test]
+fn a_diode_that_another_one_blocks_before_a_corner_is_seen() {
+    for tol in [1e-4, 1e-6] {
+        let (error, _) = apart("one_diode_blocks_another_at_a_corner", tol, "v(2)");
+        assert!(error < tol, "{tol}: {error}");
+    }
+}
+
 /// In both halves of the step it did so from the start; watched switches kept it from being looked for. 5e-7 of the amplitude at any tolerance.
 #[test]
 fn a_thyristor_that_follows_another_early_in_a_step_is_seen() {

@@ -15,7 +15,7 @@
 //! **Behind a change.** Where a device changes within a step the λ of others jump with it. A step that is solved has the mean of each (γ = 1), and
 //! one that is positive in the mean but negative behind the change goes on to the end: a diode between two capacitors that another one charges
 //! from then on. Where the two hold the state the step and its halves agree to rounding. Where a half was solved there is no line, and ẋ may have been
-//! that of the right limit for as long as the second half.
+//! that of the right limit for as long as the second half. Sources go on there as they came.
 
 use super::*;
 use crate::settings::tolerances::steps::CLOSER;
@@ -82,7 +82,12 @@ impl Theta {
         }
         self.stats.lcp_solves += 1;
         let short = half / CLOSER;
-        let step = self.prepare_short(short)?;
+        // As the inputs came there: a corner at the end is none of the step.
+        let t = self.now.t;
+        self.inputs.slopes(t - Self::slack(t), &mut self.du);
+        let step = self.prepare_along(short);
+        self.inputs.slopes_behind(t, &mut self.du);
+        let step = step?;
         let n = self.now.x.len();
         let system = &mut self.plant.systems[self.now.system].1;
         let (mode, _) = system.mode(step, &self.now.active);

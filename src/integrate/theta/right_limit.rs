@@ -38,6 +38,11 @@ impl Theta {
     /// z and the matrices of the short implicit step from now; slopes of the inputs go into `du`.
     pub(super) fn prepare_short(&mut self, h: f64) -> Result<usize, Error> {
         self.inputs.slopes_behind(self.now.t, &mut self.du);
+        self.prepare_along(h)
+    }
+
+    /// The same where the inputs go on with the slopes in `du`.
+    pub(super) fn prepare_along(&mut self, h: f64) -> Result<usize, Error> {
         for ((next, u), du) in self.u_next.iter_mut().zip(&self.now.u).zip(&self.du) {
             *next = u + h * du;
         }
