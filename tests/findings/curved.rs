@@ -385,3 +385,27 @@ fn junctions_without_a_current_have_no_voltage_at_the_start() {
         assert!((volts - 13.01).abs() < 1e-12, "{probe}: {volts}");
     }
 }
+
+/// One step to the row leaves 4.5 nA of the current that ended, which are 18 mV on the blocking resistance: 7e-4 of the amplitude.
+#[test]
+fn what_a_leak_decides_right_behind_an_event_is_read() {
+    let circuit = super::circuit("leak_behind_an_event");
+    let behaviour = circ::mna::behaviour(&circuit).expect("a behaviour");
+    let volts = [1e-4, 1e-8].map(|tol| {
+        let settings = Settings {
+            tol,
+            ..Settings::default()
+        };
+        let options = SimOptions {
+            settings,
+            unestimated: true,
+            ..SimOptions::default()
+        };
+        let run = circ::integrate::simulate(&circuit, &behaviour, options).expect("a run");
+        super::runs::column(&run, "v(2)")
+    });
+    assert_eq!(volts[0].len(), volts[1].len());
+    let pairs = volts[0].iter().zip(&volts[1]);
+    let apart = pairs.fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+    assert!(apart < 1e-4 * 24.0, "{apart} V");
+}
