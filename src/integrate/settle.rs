@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::integrate::error::Error;
 use crate::integrate::reading::{self, Point};
-use crate::integrate::switching::{Threshold, fire};
+use crate::integrate::switching::{Part, Threshold, Watched, fire};
 use crate::lcs::Lcs;
 use crate::settings::tolerances::events::DECISIVE;
 
@@ -81,6 +81,14 @@ pub(crate) fn asking(
         decided && thresholds[i].latch.is_none() && excess() > controls.noise(i)
     };
     (0..position.len()).filter(asks).collect()
+}
+
+/// What sources alone make of control i, by source, and its constant; nothing where states, devices or slopes have a part in it. Where that
+/// is the same before and after a change of position the switch moves at times of its own: on a threshold its control is rounding.
+pub(crate) fn of_sources(lcs: &Lcs, i: usize) -> Option<(Vec<f64>, f64)> {
+    let parts = [Part::States, Part::Devices, Part::Slopes];
+    let alone = parts.iter().all(|&part| lcs.control_is_free_of(i, part));
+    alone.then(|| lcs.control_of_sources(i))
 }
 
 /// The part of a jump from storage `before` to `after` at which the first of the switches `leaving` pass their thresholds, and which

@@ -130,3 +130,12 @@ fn a_control_that_touches_its_threshold_moves_no_switch() {
         assert!(at(&run, "v(3)", 4.125e-6) < 1e-5, "{method:?}");
     }
 }
+
+/// Currents through blocking resistances end within 0.4 ps of the gate's edge, faster than any step that reads λ: 8 % of the amplitude, at any tolerance.
+#[test]
+fn a_row_at_a_gate_is_of_that_instant() {
+    let name = "gate_beside_blocking_inductors";
+    let [exact, stepped] =
+        [Method::Exact, Method::Theta].map(|method| at(&stepped(name, method, 1e-6), "v(4)", 2e-5));
+    assert!((exact - stepped).abs() < 1e-6 * 24.0, "{exact} {stepped}");
+}

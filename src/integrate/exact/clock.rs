@@ -7,6 +7,11 @@ use crate::mna::SourceControl;
 use crate::settings::tolerances::events::CONTROL_ROUNDINGS;
 use crate::settings::tolerances::times::SAME_TIME;
 
+/// What rounding leaves of a sum of terms of this size.
+fn rounding_of(size: f64) -> f64 {
+    CONTROL_ROUNDINGS * f64::EPSILON * size
+}
+
 /// A control at one time and as it goes on.
 struct Course {
     /// Where the first of its pieces ends, s.
@@ -23,7 +28,7 @@ impl Course {
     fn leaves(&self, threshold: &Threshold, on: bool) -> bool {
         let known = |value, size| Known {
             value,
-            noise: CONTROL_ROUNDINGS * f64::EPSILON * size,
+            noise: rounding_of(size),
         };
         threshold.leaves(
             on,
@@ -139,14 +144,14 @@ impl Clock {
                 return t;
             }
             moved = true;
-            let Course {
-                end, value, slope, ..
-            } = course;
+            let (end, value, slope) = (course.end, course.value, course.slope);
             if end > t {
+                // Pieces of one slope leave a rounding of it.
+                let flat = rounding_of(course.steepness);
                 let (level, towards) = if self.on {
-                    (threshold.off_below, slope < 0.0)
+                    (threshold.off_below, slope < -flat)
                 } else {
-                    (threshold.on_above, slope > 0.0)
+                    (threshold.on_above, slope > flat)
                 };
                 if towards {
                     let passage = t + ((level - value) / slope).max(0.0);

@@ -178,6 +178,17 @@ impl Transition<'_> {
                 let lcs = &self.table.free(&candidate)?.lcs;
                 let mut asking = settle::asking(lcs, &thresholds, position, &s, &u);
                 asking.retain(|&i| !self.sources.control(i));
+                let now: Vec<_> = asking.iter().map(|&i| settle::of_sources(lcs, i)).collect();
+                if !asking.is_empty()
+                    && self.mode.is_some()
+                    && let Ok(left) = self.table.free(self.key)
+                {
+                    let mut now = now.into_iter();
+                    asking.retain(|&i| {
+                        let now = now.next().flatten();
+                        now.is_none() || now != settle::of_sources(&left.lcs, i)
+                    });
+                }
                 Ok(asking)
             },
         )

@@ -174,11 +174,6 @@ impl Switches {
         self.thresholds.iter().enumerate().any(watched)
     }
 
-    /// Whether sources alone drive the control of each switch.
-    pub(crate) fn driven(&self) -> &[bool] {
-        &self.driven
-    }
-
     pub(crate) fn needs_lambda(&self) -> bool {
         self.needs_lambda
     }

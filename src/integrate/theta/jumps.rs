@@ -5,7 +5,6 @@ use crate::integrate::impulses;
 use crate::integrate::jump::Jump;
 use crate::integrate::settle;
 use crate::integrate::stats::{JumpReason, StateJump};
-use crate::integrate::switching::{Part, Watched};
 use crate::settings::tolerances::jumps::{IMPULSE_RATIO, NO_JUMP};
 use crate::settings::tolerances::steps::SHORT;
 
@@ -364,7 +363,6 @@ impl Theta {
         }
         let u = DVector::from_column_slice(&self.now.u);
         let thresholds = self.switches.thresholds().to_vec();
-        let driven = self.switches.driven().to_vec();
         let Self {
             plant,
             switches,
@@ -376,8 +374,8 @@ impl Theta {
             let at = plant.system(position, inputs, now.t)?;
             let (left, lcs) = (&plant.systems[now.system].1.lcs, &plant.systems[at].1.lcs);
             let mut asking = settle::asking(lcs, &thresholds, position, s, &u);
-            // What sources drive before and after alike moves at its own times: on a threshold its control is rounding.
-            asking.retain(|&i| !(driven[i] && is_driven_alike(i, left, lcs)));
+            let driven = |i| settle::of_sources(left, i);
+            asking.retain(|&i| driven(i).is_none() || driven(i) != settle::of_sources(lcs, i));
             Ok(asking)
         })?;
         Ok(())
@@ -414,13 +412,4 @@ impl Theta {
         self.pending.clear();
         Ok(())
     }
-}
-
-/// Whether sources alone drive switch i in this system as they do in the other.
-fn is_driven_alike(i: usize, left: &Lcs, entered: &Lcs) -> bool {
-    let parts = [Part::States, Part::Devices, Part::Slopes];
-    parts
-        .iter()
-        .all(|&part| entered.control_is_free_of(i, part))
-        && entered.control_of_sources(i) == left.control_of_sources(i)
 }

@@ -122,14 +122,8 @@ impl Theta {
             self.y.copy_from_slice(&self.smooth.front.y);
             return Ok(());
         }
-        let system = self.system();
-        let begins = self.last_h == 0.0 && self.ports.is_empty() && !system.curved;
-        if begins && system.jump.is_none() && !self.lambda.is_empty() {
-            // The one λ of the state itself, as D + Dᵀ > 0: what blocks on a leakage behind an inductor may be faster than any step.
-            let step = self.prepare_short(0.0)?;
-            let solution = self.solve_short(step)?;
-            self.lambda.copy_from_slice(solution.lambda.as_slice());
-            return Ok(());
+        if self.last_h == 0.0 && self.state_tells_lambda() {
+            return self.read_at_once();
         }
         let step = self.reading_step();
         self.read_after(step)?;
@@ -148,6 +142,21 @@ impl Theta {
                 *near = (*near + (*near - far) / (NEARER - 1.0)).max(0.0);
             }
         }
+        Ok(())
+    }
+
+    /// Whether λ is a function of the state and the sources alone, as D + Dᵀ > 0, in closed form.
+    fn state_tells_lambda(&self) -> bool {
+        let system = self.system();
+        let on_lines = self.ports.is_empty() && !system.curved;
+        on_lines && system.jump.is_none() && !self.lambda.is_empty()
+    }
+
+    /// The one λ of the state itself: what blocks on a leakage behind an inductor may be faster than any step.
+    fn read_at_once(&mut self) -> Result<(), Error> {
+        let step = self.prepare_short(0.0)?;
+        let solution = self.solve_short(step)?;
+        self.lambda.copy_from_slice(solution.lambda.as_slice());
         Ok(())
     }
 
@@ -217,8 +226,14 @@ impl Theta {
     }
 
     pub(super) fn read_point(&mut self, row: &mut [f64]) {
+        // A row right behind an edge is that instant's; later ones have the λ of steps, whose error a blocking resistance would make any voltage.
+        let read = if self.now.settle && self.state_tells_lambda() {
+            self.read_at_once()
+        } else {
+            self.read_lambda()
+        };
         // A circuit whose right limit has no solution fails in its next step, with its message; until then the last λ.
-        if self.read_lambda().is_err() {
+        if read.is_err() {
             self.lambda.fill(0.0);
         }
         let on_laws = self.on_laws();
