@@ -102,8 +102,9 @@ impl Theta {
         self.looked_for(h)
     }
 
-    /// The same of a step that went on to its end, with `tried` and `out` as they were for the whole of it: where devices change before its middle, it and both its halves
-    /// have them changed from the start (γ = 1). Half of that is hidden, as what they carry falls to nothing.
+    /// The same of the first half, of length h, of a step that went on to its end, with `tried` and `out` as they were for it: where devices change
+    /// within it, the step and both its halves have them changed from the start (γ = 1). Half of that is hidden, as what they carry falls to nothing.
+    /// The whole step would tell nothing of a motion that it undoes, as that by a sine which passes zero in its middle.
     pub(super) fn hidden_on_the_way(
         &mut self,
         h: f64,
