@@ -7,8 +7,12 @@ use super::runs::column;
 
 /// The largest distance of two columns, over the largest value of the first.
 fn apart(name: &str, tol: f64, probe: &str) -> (f64, [u64; 2]) {
+    apart_by(Method::Theta, name, tol, probe)
+}
+
+fn apart_by(method: Method, name: &str, tol: f64, probe: &str) -> (f64, [u64; 2]) {
     let run = |method| changed_at(name, &[], method, tol);
-    let (exact, stepped) = (run(Method::Exact), run(Method::Theta));
+    let (exact, stepped) = (run(Method::Exact), run(method));
     let columns = [&exact, &stepped].map(|run| column(run, probe));
     let size = columns[0].iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     let pairs = columns[0].iter().zip(&columns[1]);
@@ -75,4 +79,21 @@ fn a_diode_that_turns_on_in_the_middle_of_a_step_is_seen() {
         let (error, _) = apart("sine_passes_zero_in_the_middle_of_a_step", tol, "i(l2)");
         assert!(error < tol, "{tol}: {error}");
     }
+}
+
+/// Its current is the mean slope of a sine, and nothing where that turns in the middle of the half: 2.2e-3 of the amplitude by `euler`, at any tolerance at which
+/// a step is as long.
+#[test]
+fn a_current_that_ends_in_the_middle_of_a_half_is_seen_by_euler() {
+    let name = "current_ends_in_the_middle_of_a_half";
+    let (error, _) = apart_by(Method::Euler, name, 1e-4, "v(2)");
+    assert!(error < 1e-4, "{error}");
+}
+
+/// A voltage that decays within a step passes zero by the midpoint rule, and the diode that it meets there held it at zero in both halves: 3e-3 of the
+/// amplitude at any tolerance.
+#[test]
+fn a_diode_does_not_hide_that_the_midpoint_rule_rings() {
+    let (error, _) = apart("clamped_before_it_rings", 1e-7, "v(3)");
+    assert!(error < 1e-7, "{error}");
 }

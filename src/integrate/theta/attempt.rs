@@ -64,6 +64,10 @@ impl Theta {
         let tried = attempt.clone();
         self.solve_step(scheme, h, t1)?;
         self.confirm(tried);
+        // What ends within the step rings by the midpoint rule, and a device that clamps it hides that from error control.
+        if settle && !damped && self.scheme.order() == 2 && self.changes() {
+            self.solve_step(Scheme::MOREAU, h, t1)?;
+        }
         Ok(())
     }
 

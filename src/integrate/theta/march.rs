@@ -299,12 +299,13 @@ impl Theta {
         self.attempt(h, t1)?;
         let n = self.now.x.len();
         self.coarse.copy_from_slice(&self.out[..n]);
+        let mut changed = Vec::new();
+        changed.extend(self.change_on_the_way(h));
         let hidden = self.hidden(h)?;
         let whole = std::mem::take(&mut self.attempt.unseen);
         let middle = self.now.t + 0.5 * (t1 - self.now.t);
         self.attempt(0.5 * h, middle)?;
-        let changed = self.changes_on_the_way();
-        let changed = changed.then(|| (self.attempt.clone(), self.out.clone()));
+        changed.extend(self.change_on_the_way(0.5 * h));
         self.keep_first_half();
         self.commit(middle)?;
         unseen::without_smooth(&whole, &mut self.now.unseen);
@@ -336,9 +337,11 @@ impl Theta {
             },
         };
         let mut verdict = judge(self, unseen);
-        if let (true, Some((tried, out))) = (verdict.accept && !last_chance, changed) {
-            let hidden = self.hidden_on_the_way(0.5 * h, (tried, &out))?;
-            verdict = judge(self, unseen.max(self.size_of(&hidden)));
+        for (h, tried, out) in changed {
+            if verdict.accept && !last_chance {
+                let hidden = self.hidden_on_the_way(h, (tried, &out))?;
+                verdict = judge(self, unseen.max(self.size_of(&hidden)));
+            }
         }
         self.preferred = verdict.next;
         if self.whole && (verdict.accept || last_chance) {

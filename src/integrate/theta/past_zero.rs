@@ -46,29 +46,42 @@ impl Theta {
         }
     }
 
-    /// The lines of λ, or y, through the attempted half, of length `half`, and the one before, which are negative at its end: of each the port, its
-    /// value in this half, at its end, and its slope. `None` where a half was solved.
-    fn falling(&self, half: f64) -> Option<impl Iterator<Item = (usize, [f64; 3])> + '_> {
-        let n = self.now.x.len();
+    /// The γ of the two halves where neither was solved, the attempted one last.
+    fn gammas(&self) -> Option<[f64; 2]> {
         let FirstHalf { lambda, gamma, .. } = &self.first_half;
-        let second = (self.gamma_of_attempt()).filter(|_| lambda.len() == self.out.len() - n)?;
-        let apart = half * (1.0 + second - gamma);
+        let both = lambda.len() == self.out.len() - self.now.x.len();
+        let second = self.gamma_of_attempt().filter(|_| both)?;
+        Some([*gamma, second])
+    }
+
+    /// The lines of λ, or y, through the attempted half, of length `half`, and the one before, which are negative at its end: of each the port, its
+    /// value in this half, at its end, and its slope. The values stand for these parts of the halves.
+    fn falling(
+        &self,
+        half: f64,
+        [first, second]: [f64; 2],
+    ) -> impl Iterator<Item = (usize, [f64; 3])> + '_ {
+        let n = self.now.x.len();
+        let apart = half * (1.0 + second - first);
         let left = half * (1.0 - second);
-        let lines = lambda.iter().enumerate().map(move |(j, before)| {
+        let lines = self.first_half.lambda.iter().enumerate();
+        let lines = lines.map(move |(j, before)| {
             let now = self.out[n + j];
             let slope = (now - before) / apart;
             (j, [now, now + slope * left, slope])
         });
-        Some(lines.filter(|(_, [_, end, _])| *end < 0.0))
+        lines.filter(|(_, [_, end, _])| *end < 0.0)
     }
 
     /// The part of the attempted second half, of length `half`, for which ẋ may have been that of the right limit of its end; half of the time where the
-    /// difference rises from nothing.
+    /// difference rises from nothing. A λ that holds a state is a mean with γ = 1 too.
     pub(super) fn part_unseen(&self, half: f64) -> f64 {
-        let Some(falling) = self.falling(half) else {
+        let Some(gammas) = self.gammas() else {
             return 1.0;
         };
-        let blocks = falling.filter(|(j, [now, ..])| !self.now.active[*j] || *now < 0.0);
+        let falling = self.falling(half, gammas.map(|gamma| gamma.min(0.5)));
+        let is_mean = gammas[1] == 1.0;
+        let blocks = falling.filter(|(j, [now, ..])| is_mean || !self.now.active[*j] || *now < 0.0);
         blocks.fold(0.0, |part: f64, (_, [_, end, slope])| {
             part.max(0.5 * (end / (slope * half)).clamp(0.0, 1.0))
         })
@@ -111,7 +124,8 @@ impl Theta {
     /// What devices carry past their zeros in the attempted second half, of length `half`: a change of x, empty where none does.
     pub(super) fn past_zero(&self, half: f64) -> Vec<f64> {
         let mut change = Vec::new();
-        let falling = self.falling(half).into_iter().flatten();
+        let gammas = self.gammas().into_iter();
+        let falling = gammas.flat_map(|gammas| self.falling(half, gammas));
         let carries = falling.filter(|(j, [now, ..])| self.now.active[*j] && *now >= 0.0);
         for (j, [_, end, slope]) in carries {
             change.resize(self.now.x.len(), 0.0);

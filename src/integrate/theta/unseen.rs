@@ -78,16 +78,18 @@ impl Theta {
         }
     }
 
-    /// Whether devices that move the state change in a step that was tried with straight laws, but not from a breakpoint, where [`Self::hidden`] looks
-    /// anyway. Those of comparators do not: steps too short to tell on which side of their thresholds they are would follow.
-    pub(super) fn changes_on_the_way(&self) -> bool {
+    /// The attempt of length h, and what it came to, if devices that move the state change in it and it was tried with straight laws, but not from a
+    /// breakpoint, where [`Self::hidden`] looks anyway. Those of comparators do not: steps too short to tell on which side of their thresholds they
+    /// are would follow.
+    pub(super) fn change_on_the_way(&self, h: f64) -> Option<(f64, Attempt, Vec<f64>)> {
         let may = self.control.is_some() && !self.now.settle && !self.system().curved;
         let (Some((basis, _)), true) = (&self.attempt.solved, may) else {
-            return false;
+            return None;
         };
         let b = &self.system().lcs.b;
-        let changed = (0..basis.len()).filter(|&j| basis[j] != self.now.active[j]);
-        changed.map(|j| b.column(j).amax()).any(|b| b > 0.0)
+        let mut changed = (0..basis.len()).filter(|&j| basis[j] != self.now.active[j]);
+        let moves = changed.any(|j| b.column(j).amax() > 0.0);
+        moves.then(|| (h, self.attempt.clone(), self.out.clone()))
     }
 
     /// What a step of length h that was tried from a breakpoint may hide where an ideal device changes within it: a capacitor that is
@@ -102,9 +104,9 @@ impl Theta {
         self.looked_for(h)
     }
 
-    /// The same of the first half, of length h, of a step that went on to its end, with `tried` and `out` as they were for it: where devices change
-    /// within it, the step and both its halves have them changed from the start (γ = 1). Half of that is hidden, as what they carry falls to nothing.
-    /// The whole step would tell nothing of a motion that it undoes, as that by a sine which passes zero in its middle.
+    /// The same of a step that went on to its end, or of its first half, which was tried with length `h`, with `tried` and `out` as they were for it:
+    /// where devices change before its middle, it and both its halves have them changed from the start (γ = 1). Half of that is hidden, as what
+    /// they carry falls to nothing. The whole step tells nothing of a motion that it undoes, as that by a sine which passes zero in its middle.
     pub(super) fn hidden_on_the_way(
         &mut self,
         h: f64,
