@@ -91,6 +91,11 @@ pub(crate) fn of_sources(lcs: &Lcs, i: usize) -> Option<(Vec<f64>, f64)> {
     alone.then(|| lcs.control_of_sources(i))
 }
 
+/// Whether sources alone drive a control, `now` as in the position that was `left`; see [`of_sources`].
+pub(crate) fn is_driven_alike(left: Option<(Vec<f64>, f64)>, now: Option<(Vec<f64>, f64)>) -> bool {
+    now.is_some() && now == left
+}
+
 /// The part of a jump from storage `before` to `after` at which the first of the switches `leaving` pass their thresholds, and which
 /// these are; `None` where none does on the way, or where the storage does not decide their controls. `left` is the system that
 /// the jump leaves, `entered` that of `position`, in which the switches leave once the jump is done.

@@ -185,8 +185,8 @@ impl Transition<'_> {
                 {
                     let mut now = now.into_iter();
                     asking.retain(|&i| {
-                        let now = now.next().flatten();
-                        now.is_none() || now != settle::of_sources(&left.lcs, i)
+                        let left = settle::of_sources(&left.lcs, i);
+                        !settle::is_driven_alike(left, now.next().flatten())
                     });
                 }
                 Ok(asking)

@@ -374,8 +374,8 @@ impl Theta {
             let at = plant.system(position, inputs, now.t)?;
             let (left, lcs) = (&plant.systems[now.system].1.lcs, &plant.systems[at].1.lcs);
             let mut asking = settle::asking(lcs, &thresholds, position, s, &u);
-            let driven = |i| settle::of_sources(left, i);
-            asking.retain(|&i| driven(i).is_none() || driven(i) != settle::of_sources(lcs, i));
+            let [left, now] = [left, lcs].map(|lcs| move |i| settle::of_sources(lcs, i));
+            asking.retain(|&i| !settle::is_driven_alike(left(i), now(i)));
             Ok(asking)
         })?;
         Ok(())

@@ -148,8 +148,8 @@ impl Theta {
     /// Whether λ is a function of the state and the sources alone, as D + Dᵀ > 0, in closed form.
     fn state_tells_lambda(&self) -> bool {
         let system = self.system();
-        let on_lines = self.ports.is_empty() && !system.curved;
-        on_lines && system.jump.is_none() && !self.lambda.is_empty()
+        let beside_lines = !self.ports.is_empty();
+        !beside_lines && !system.curved && system.jump.is_none() && !self.lambda.is_empty()
     }
 
     /// The one λ of the state itself: what blocks on a leakage behind an inductor may be faster than any step.
