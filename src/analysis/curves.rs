@@ -6,10 +6,11 @@ use nalgebra::DVector;
 
 use super::periodic::Steady;
 use super::start::course;
-use super::variation::{Course, LEVELS, Linear, Motion, parts, unit};
+use super::variation::{Course, Linear, Motion, parts, unit};
 use crate::circuit::{Circuit, Tran};
 use crate::integrate::{Error, Note, SimOptions};
-use crate::measure::{Curves, INTERVALS};
+use crate::linalg::product::add_product;
+use crate::measure::{Curves, VALUES};
 use crate::model::Model;
 use crate::settings::tolerances::times::{LAST_ROW, MOST_PERIODS, MOST_STATES};
 
@@ -114,16 +115,18 @@ pub(super) fn is_large(model: &Model, tran: &Tran) -> bool {
 /// Pieces of these outputs from a time on; `None` where they are too many. Few exponentials of a mode are needed whatever happens in it.
 fn curves(course: &Course, outputs: &[usize], from: f64) -> Result<Option<Curves>, Error> {
     let columns = outputs.len();
-    let seen = course.stretches.iter().filter(|stretch| stretch.to > from);
-    let unit = unit(seen.clone().map(|s| s.to - s.from).fold(0.0, f64::max));
+    let stretches = course.stretches.iter().filter(|stretch| stretch.to > from);
+    let unit = unit(stretches.clone().map(|s| s.to - s.from).fold(0.0, f64::max));
     let (mut known, mut starts) = (Vec::new(), Vec::new());
-    for stretch in seen.clone() {
+    for stretch in stretches.clone() {
         starts.push(Linear::of(&mut known, &course.systems, stretch));
     }
     let mut motions: Vec<Motion<'_>> = known.iter().map(|linear| linear.over(unit)).collect();
     let mut found = Curves::of(columns);
-    let room = MOST_VALUES / (columns * (INTERVALS + 1)).max(1);
-    for (stretch, (at, mut w)) in seen.zip(starts) {
+    let room = MOST_VALUES / (columns * VALUES).max(1);
+    let (mut seen, mut next) = (Vec::new(), DVector::default());
+    let mut values = vec![[0.0; VALUES]; columns];
+    for (stretch, (at, mut w)) in stretches.zip(starts) {
         let (seconds, age) = (stretch.to - stretch.from, (from - stretch.from).max(0.0));
         if age > 0.0 {
             w = known[at].over(age).after(0, &w)?;
@@ -133,16 +136,15 @@ fn curves(course: &Course, outputs: &[usize], from: f64) -> Result<Option<Curves
             if found.len() >= room {
                 return Ok(None);
             }
-            let mut values = vec![[0.0; INTERVALS + 1]; columns];
-            for k in 0..=INTERVALS {
-                if k > 0 {
-                    w = motion.after(part.level + LEVELS, &w)?;
-                }
-                let row: DVector<f64> = &motion.linear.rows[0] * &w;
-                for (values, output) in values.iter_mut().zip(outputs) {
-                    values[k] = row[*output];
-                }
+            let [at_nodes, _] = motion.seen(part.level)?;
+            seen.resize(at_nodes.nrows(), 0.0);
+            seen.fill(0.0);
+            add_product(&mut seen, at_nodes, w.as_slice());
+            let (nodes, _) = seen.as_chunks::<VALUES>();
+            for (values, output) in values.iter_mut().zip(outputs) {
+                *values = nodes[*output];
             }
+            motion.go_on(part.level, &mut w, &mut next)?;
             let until = ((seconds - part.age) / part.length).min(1.0);
             found.push((stretch.from + part.age, part.length, until), &values);
         }

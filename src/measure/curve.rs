@@ -11,6 +11,8 @@ pub(crate) const VALUES: usize = INTERVALS + 1;
 const BARYCENTRIC: [f64; VALUES] = [1.0, -8.0, 28.0, -56.0, 70.0, -56.0, 28.0, -8.0, 1.0];
 /// What the slope at x = i has of y_j − y_i, in parts of the length of an interval.
 const SLOPES: [[f64; VALUES]; VALUES] = slopes();
+/// l_j at the nodes of Gauss and Legendre.
+const AT_NODES: [[f64; VALUES]; NODES.len()] = at_nodes();
 /// ∫ over its length by Newton and Cotes, exact up to degree 9.
 const COTES: [f64; VALUES] = [
     989.0, 5888.0, -928.0, 10496.0, -4540.0, 10496.0, -928.0, 5888.0, 989.0,
@@ -33,6 +35,25 @@ const fn slopes() -> [[f64; VALUES]; VALUES] {
     all
 }
 
+const fn at_nodes() -> [[f64; VALUES]; NODES.len()] {
+    let mut all = [[0.0; VALUES]; NODES.len()];
+    let mut i = 0;
+    while i < NODES.len() {
+        let (mut sum, mut j) = (0.0, 0);
+        while j < VALUES {
+            all[i][j] = BARYCENTRIC[j] / (NODES[i] * INTERVALS as f64 - j as f64);
+            sum += all[i][j];
+            j += 1;
+        }
+        while j > 0 {
+            j -= 1;
+            all[i][j] /= sum;
+        }
+        i += 1;
+    }
+    all
+}
+
 /// A smooth piece of a waveform: the polynomial of degree 8 through its values at begin + s length, s = 0, 1/8 … 1, up to s = `until`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Curve {
@@ -49,24 +70,29 @@ pub struct Curve {
 /// Σ_j l_j(s) y_j, l_j the polynomials of Lagrange; of constant values it is that constant.
 pub(crate) fn interpolated(values: &[f64; VALUES], s: f64) -> f64 {
     let x = s * INTERVALS as f64;
+    if let Some(y) = on_a_value(x) {
+        return values[y];
+    }
     let (mut above, mut below) = (0.0, 0.0);
     for (j, (y, b)) in values.iter().zip(BARYCENTRIC).enumerate() {
-        let off = x - j as f64;
-        if off == 0.0 {
-            return *y;
-        }
-        let weight = b / off;
+        let weight = b / (x - j as f64);
         above += weight * (y - values[0]);
         below += weight;
     }
     values[0] + above / below
 }
 
+/// The value at x intervals from the first one, where there is one.
+fn on_a_value(x: f64) -> Option<usize> {
+    let j = x as usize;
+    (x == j as f64 && j < VALUES).then_some(j)
+}
+
 /// l_j(s), j = 0 … 8: Σ l_j(s) y_j is the polynomial's value.
 pub(crate) fn basis(s: f64) -> [f64; VALUES] {
     let x = s * INTERVALS as f64;
-    if x.fract() == 0.0 && (0.0..=INTERVALS as f64).contains(&x) {
-        return std::array::from_fn(|j| f64::from(u8::from(x == j as f64)));
+    if let Some(own) = on_a_value(x) {
+        return std::array::from_fn(|j| f64::from(u8::from(j == own)));
     }
     let parts: [f64; VALUES] = std::array::from_fn(|j| BARYCENTRIC[j] / (x - j as f64));
     let sum: f64 = parts.iter().sum();
@@ -132,9 +158,16 @@ impl Curve {
 
     /// ∫ f(y) ds from `low` to `high` by Gauss and Legendre, exact up to degree 15; f(y, s) with s from −1 to 1.
     pub(super) fn gauss(&self, (low, high): (f64, f64), f: impl Fn(f64, f64) -> f64) -> f64 {
-        let points = NODES.iter().zip(WEIGHTS);
-        let terms = points.map(|(x, weight)| {
-            let y = self.at(low + (high - low) * x);
+        let whole = (low, high) == (0.0, 1.0);
+        let points = NODES.iter().zip(WEIGHTS).zip(&AT_NODES);
+        let terms = points.map(|((x, weight), basis)| {
+            let y = if whole {
+                let terms = basis.iter().zip(&self.values);
+                let terms = terms.map(|(part, y)| part * (y - self.values[0]));
+                self.values[0] + terms.sum::<f64>()
+            } else {
+                self.at(low + (high - low) * x)
+            };
             weight * f(y, 2.0 * x - 1.0)
         });
         (high - low) * terms.sum::<f64>()

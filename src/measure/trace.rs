@@ -246,26 +246,33 @@ impl<'a> Trace<'a> {
                 .filter(|(t, _)| (from..=to).contains(t));
             sum(&|piece| piece.integral()) + inside.map(|(_, area)| area).sum::<f64>()
         };
-        let extreme = |sign: f64| {
-            let (mut when, mut most) = (f64::NAN, f64::NEG_INFINITY);
+        // When and how much.
+        let extremes = || {
+            let (mut least, mut most) = ((f64::NAN, f64::INFINITY), (f64::NAN, f64::NEG_INFINITY));
             self.pieces((from, to), |piece| {
                 piece.corners(|t, y| {
-                    if sign * y > most {
-                        (when, most) = (t, sign * y);
+                    if y < least.1 {
+                        least = (t, y);
+                    }
+                    if y > most.1 {
+                        most = (t, y);
                     }
                 });
             });
-            (when, sign * most)
+            (least, most)
         };
         Ok(match what {
             Over::Average => integral() / length,
             Over::Integral => integral(),
             Over::Rms => (sum(&|piece| piece.square()) / length).sqrt(),
-            Over::Minimum => extreme(-1.0).1,
-            Over::Maximum => extreme(1.0).1,
-            Over::PeakToPeak => extreme(1.0).1 - extreme(-1.0).1,
-            Over::WhenMinimum => extreme(-1.0).0,
-            Over::WhenMaximum => extreme(1.0).0,
+            Over::Minimum => extremes().0.1,
+            Over::Maximum => extremes().1.1,
+            Over::PeakToPeak => {
+                let (least, most) = extremes();
+                most.1 - least.1
+            }
+            Over::WhenMinimum => extremes().0.0,
+            Over::WhenMaximum => extremes().1.0,
         })
     }
 

@@ -12,7 +12,7 @@ use crate::linalg::expm::Ladders;
 use crate::linalg::powers::halvings;
 use crate::linalg::product::add_product;
 use crate::measure::{INTERVALS, VALUES};
-use crate::settings::tolerances::exponentials::{CURVED, SERIES, SQUARED};
+use crate::settings::tolerances::exponentials::{SERIES, SQUARED};
 
 /// w' = 𝒜 w, in the basis in which fast states owe nothing to the others.
 #[derive(Debug, Clone)]
@@ -30,7 +30,7 @@ pub(crate) struct Linear {
 }
 
 /// Halvings of a piece that lead from one of its values to the next.
-pub(crate) const LEVELS: u32 = INTERVALS.ilog2();
+pub(super) const LEVELS: u32 = INTERVALS.ilog2();
 
 /// Motion over a span of time, halved again and again.
 pub(crate) struct Motion<'a> {
@@ -73,7 +73,7 @@ pub(crate) fn parts(
     (from, seconds): (f64, f64),
 ) -> impl Iterator<Item = Part> {
     let at = move |age: f64| {
-        let limit = CURVED * spectrum.step_limit(age);
+        let limit = spectrum.curve_limit(age);
         let level = (unit / limit.min(seconds - age)).log2().floor().max(0.0);
         let beyond = unit * (-level).exp2() > limit;
         let level = level as u32 + u32::from(beyond);
@@ -266,7 +266,7 @@ impl Motion<'_> {
     ///
     /// # Errors
     /// The exponential does not exist in doubles.
-    pub(super) fn seen(&mut self, k: u32) -> Result<[&DMatrix<f64>; 2], Error> {
+    pub(crate) fn seen(&mut self, k: u32) -> Result<[&DMatrix<f64>; 2], Error> {
         let Readings { values, rates, .. } = self.readings(k)?;
         Ok([values, rates])
     }
@@ -284,6 +284,22 @@ impl Motion<'_> {
         let mut after = w.clone();
         add_product(after.as_mut_slice(), self.step(k)?, w.as_slice());
         Ok(after)
+    }
+
+    /// w goes on for t/2^k seconds; `next` is work space.
+    ///
+    /// # Errors
+    /// The exponential does not exist in doubles.
+    pub(crate) fn go_on(
+        &mut self,
+        k: u32,
+        w: &mut DVector<f64>,
+        next: &mut DVector<f64>,
+    ) -> Result<(), Error> {
+        next.clone_from(w);
+        add_product(next.as_mut_slice(), self.step(k)?, w.as_slice());
+        std::mem::swap(w, next);
+        Ok(())
     }
 
     /// s at halving k.

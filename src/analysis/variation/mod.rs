@@ -47,7 +47,7 @@ pub(crate) use course::{Course, Leap};
 pub(crate) use drawing::{Drawing, Lines, Sight, Weighted};
 pub(crate) use forms::Forms;
 use instant::Inputs;
-pub(crate) use linear::{LEVELS, Linear, Motion, parts, unit};
+pub(crate) use linear::{Linear, Motion, parts, unit};
 pub(crate) use moved::Moved;
 pub(crate) use near::{Near, STEPS, difference, difference_by};
 pub(crate) use parameter::Parameter;

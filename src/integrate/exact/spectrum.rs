@@ -4,7 +4,9 @@ use nalgebra::DMatrix;
 
 use crate::linalg::eigenvalues::eigenvalues;
 use crate::linalg::expm;
-use crate::settings::tolerances::exponentials::{EXTINCT, FIRST_LOOK, GROWN, RESOLVED};
+use crate::settings::tolerances::exponentials::{
+    CURVED, EXTINCT, FIRST_LOOK, GROWN, RESOLVED, TURNED,
+};
 use crate::settings::tolerances::ranks::EIGENVALUE;
 
 /// One eigenvalue −decay ± i·frequency.
@@ -101,6 +103,15 @@ impl Spectrum {
             } else {
                 limit.resolved
             }
+        })
+    }
+
+    /// The longest piece over which a polynomial of degree 8 follows the solution to rounding, `age` seconds after the last change of mode.
+    pub(crate) fn curve_limit(&self, age: f64) -> f64 {
+        let living = self.limits.iter().find(|limit| age <= limit.until);
+        living.map_or(self.growth_limit, |limit| {
+            let follows = (TURNED * limit.first).max(CURVED * age);
+            follows.min(TURNED * limit.resolved)
         })
     }
 

@@ -53,9 +53,13 @@ pub(crate) const FORGOTTEN: f64 = 100.0;
 /// between two points is missed; smaller: more steps.
 pub(crate) const RESOLVED: f64 = 0.7;
 
-/// The part of the longest step that hides nothing over which a polynomial of degree 8 follows a mode: a decay, on steps that double, to 1e-13 of what it began with at
-/// most, an oscillation to rounding. Larger: less exact measurements; smaller: more values for them.
+/// The part of the age of a mode over which a polynomial of degree 8 follows a decay, to 5e-15 of what it began with. Larger: less exact measurements;
+/// smaller: more values for them.
 pub(crate) const CURVED: f64 = 0.1;
+
+/// The part of the longest step that resolves an oscillation, or of the first step, over which such a polynomial follows what moves, to 7e-15 of its
+/// amplitude. Larger and smaller as [`CURVED`].
+pub(crate) const TURNED: f64 = 0.5;
 
 /// λh up to which the exponentials follow a solution that grows as e^{λt}: those of long stiff steps are meant for decay and take any e^{λh}
 /// to 0.
