@@ -71,7 +71,8 @@ pub(super) fn course(
     };
     let begin = from - LEAD * until;
     if begin > t {
-        if !simulation.pass((t, &state, &switches), begin, cancel)? {
+        let passed = simulation.pass((t, &state, &switches), begin, cancel)?;
+        if passed.is_none() {
             return Ok(None);
         }
         (t, state, switches) = (begin, simulation.state(), simulation.positions());

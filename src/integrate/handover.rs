@@ -230,6 +230,16 @@ impl Handover {
         self.exact.conducting()
     }
 
+    /// See [`Exact::take_periods`].
+    pub(crate) fn take_periods(&mut self) {
+        self.exact.take_periods();
+    }
+
+    /// See [`Exact::leave_periods`].
+    pub(crate) fn leave_periods(&mut self) -> u64 {
+        self.exact.leave_periods()
+    }
+
     /// See [`Exact::keep_passages`].
     pub(crate) fn keep_passages(&mut self, corners: Corners) {
         self.exact.keep_passages(corners);

@@ -11,6 +11,7 @@ mod changes;
 mod circuit;
 mod compare;
 mod oracle;
+mod periods;
 mod random;
 mod references;
 mod resumed;
@@ -121,6 +122,23 @@ fn converters_are_taken_up_again() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Measurements at the end of long runs; 60 circuits, or as many as `CIRC_CONVERTERS` says.
+#[test]
+fn the_end_of_a_run_is_the_same_whether_its_beginning_is_seen() {
+    let count = number("CIRC_CONVERTERS").unwrap_or(60);
+    let first = number("CIRC_CONVERTERS_SEED").unwrap_or(5000);
+    let mut tally = periods::Tally::default();
+    for seed in first..first + count {
+        periods::compare(seed, &mut tally);
+    }
+    tell(&format!(
+        "{} circuits compared, {} refused",
+        tally.compared, tally.refused
+    ));
+    assert!(tally.wrong.is_empty(), "{}", tally.wrong.join("\n"));
+    assert!(3 * tally.compared as u64 >= 2 * count, "{}", tally.refused);
 }
 
 /// Derivatives of measurements; 40 circuits, or as many as `CIRC_CONVERTERS` says.

@@ -73,6 +73,11 @@ impl Clock {
         })
     }
 
+    /// The inputs that its control follows.
+    pub(crate) fn inputs(&self) -> impl Iterator<Item = usize> {
+        self.terms.iter().map(|(input, ..)| *input)
+    }
+
     /// Goes to time t, forwards or backwards.
     #[inline(never)]
     pub(crate) fn stand_at(&mut self, sources: &[Source], t: f64) {

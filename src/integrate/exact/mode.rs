@@ -370,12 +370,17 @@ impl Mode {
 
     /// The state that conserves charge and flux from storage s.
     pub(crate) fn state_from(&self, s: &[f64], x: &mut Vec<f64>) {
+        self.state_from_part(s, 1.0, x);
+    }
+
+    /// The same where its constant counts so many times.
+    pub(crate) fn state_from_part(&self, s: &[f64], constant: f64, x: &mut Vec<f64>) {
         if self.keeps {
             return refill(x, s);
         }
         self.inject.values(s, x);
         for (x, one) in x.iter_mut().zip(self.inject_one.iter()) {
-            *x += one;
+            *x += constant * one;
         }
     }
 }

@@ -87,6 +87,11 @@ impl Report {
         }
     }
 
+    /// So many changes of mode that are not told.
+    pub(super) fn count_events(&mut self, events: u64) {
+        self.events += events;
+    }
+
     /// Notes that devices of mode `at` share what the ideal model does not determine.
     #[cold]
     #[inline(never)]

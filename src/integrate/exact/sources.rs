@@ -7,9 +7,11 @@ use super::exosystem::Exosystem;
 use super::key::Key;
 use super::rounding::resolution;
 use crate::circuit::Source;
+use crate::circuit::source::Wave;
 use crate::integrate::error::{Error, Reason};
 use crate::integrate::switching::Threshold;
 use crate::mna::SourceControl;
+use crate::settings::tolerances::times::SAME_TIME;
 
 /// All sources, and where they stand.
 pub(super) struct Sources {
@@ -146,6 +148,61 @@ impl Sources {
         if self.at_all_corners {
             self.next_stop = self.next_stop.min(self.next_corner(span.0));
         }
+    }
+
+    /// The period after which the switches that sources alone control move as before, s; `None` where they need not.
+    pub(super) fn period(&self) -> Option<f64> {
+        let inputs = self.clocks.iter().flat_map(Clock::inputs);
+        let waves = inputs.map(|input| &self.all[input].wave);
+        let mut periods = Vec::new();
+        for wave in waves {
+            match wave {
+                Wave::Dc(_) => {}
+                Wave::Pulse { count: None, .. } => periods.extend(wave.period()),
+                // Its first lap is like the others.
+                Wave::Pwl {
+                    points,
+                    repeat: Some(repeat),
+                    ..
+                } if points.first().is_some_and(|first| *repeat <= first.0) => {
+                    periods.extend(wave.period());
+                }
+                _ => return None,
+            }
+        }
+        let longest = periods.iter().copied().reduce(f64::max)?;
+        let divides = |own: &f64| {
+            let count = longest / own;
+            (count - count.round()).abs() <= SAME_TIME * count
+        };
+        periods.iter().all(divides).then_some(longest)
+    }
+
+    /// When the next piece of a source ends that is followed, or a clock first moves its switch at a time that does not recur, s.
+    pub(super) fn next_other(&self, recurs: impl Fn(f64) -> bool) -> f64 {
+        let clocks = self.clocks.iter().map(|clock| clock.next);
+        let others = clocks.filter(|next| !recurs(*next));
+        others.fold(self.next_piece, f64::min)
+    }
+
+    /// All stands at t, so many seconds `ahead` of what is known to happen first; `false`, and nothing is moved, where that is not so.
+    pub(super) fn skip(
+        &mut self,
+        (thresholds, switches): (&[Threshold], &[bool]),
+        (t, ahead): (f64, f64),
+        until: f64,
+    ) -> bool {
+        let before = (self.clocks.clone(), self.next_piece, self.next_stop);
+        let between = t + 0.5 * ahead;
+        for clock in &mut self.clocks {
+            clock.stand_at(&self.all, between);
+        }
+        self.look_ahead(thresholds, switches, (between, until));
+        let found = (self.next_stop - (t + ahead)).abs() <= SAME_TIME * self.next_stop;
+        if !found {
+            (self.clocks, self.next_piece, self.next_stop) = before;
+        }
+        found
     }
 
     /// The first corner of all sources after t.

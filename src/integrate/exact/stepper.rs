@@ -1,6 +1,7 @@
 //! The event-driven stepper: travel in a mode, find the next one, repeat.
 
 mod pause;
+mod periods;
 mod sharing;
 
 use nalgebra::DVector;
@@ -88,6 +89,8 @@ pub struct Exact {
     row_is_volts: Vec<bool>,
     /// Changes of mode, where they are asked for.
     passages: Option<Vec<Passage>>,
+    /// What recurs period by period, where that may be taken together.
+    periods: Option<periods::Periods>,
 }
 
 impl Exact {
@@ -142,6 +145,7 @@ impl Exact {
             row,
             row_is_volts,
             passages: None,
+            periods: None,
         })
     }
 
@@ -610,10 +614,12 @@ impl Stepper for Exact {
                         let what = "sources stop a run at one instant without end";
                         return Err(self.fail(Reason::internal("integrate::exact", what)));
                     }
+                    self.note_change(true, t);
                 }
                 Arrival::Reached => return Ok(()),
                 Arrival::Fired(guard) => {
                     self.instant(Some(guard), log)?;
+                    self.note_change(false, t);
                     let (t, h) = (self.travel.t, self.table.output_step());
                     if let Some((events, span)) = self.report.accumulation.burst(t, h) {
                         let error = self.fail(Reason::EventsAccumulate { events, span });

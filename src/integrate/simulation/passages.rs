@@ -40,7 +40,8 @@ impl Simulation {
         Ok(passages.filter(whole))
     }
 
-    /// Goes from a place, as for [`Self::stand_at`], to time `until`, s: whether the way is exact throughout. It ends when `cancel` is set.
+    /// Goes from a place, as for [`Self::stand_at`], to time `until`, s, where energy is not asked for: how many periods were taken together by
+    /// their map; `None` where the way is not exact throughout. It ends when `cancel` is set.
     ///
     /// # Errors
     /// As [`Self::advance_to`].
@@ -49,10 +50,19 @@ impl Simulation {
         (t, state, switches): (f64, &[f64], &[bool]),
         until: f64,
         cancel: Option<&AtomicBool>,
-    ) -> Result<bool, Error> {
+    ) -> Result<Option<u64>, Error> {
         self.stand_at(t, state, switches)?;
-        self.advance(until, false, cancel)?;
-        Ok(self.is_exact() && !self.way.stepper().has_stepped())
+        let Way::Exact(exact) = &mut self.way else {
+            return Ok(None);
+        };
+        exact.take_periods();
+        let advanced = self.advance(until, false, cancel);
+        let Way::Exact(exact) = &mut self.way else {
+            return Ok(None);
+        };
+        let taken = exact.leave_periods();
+        advanced?;
+        Ok(Some(taken).filter(|_| !self.way.stepper().has_stepped()))
     }
 
     /// Where a run in steps stands; `None` of one that is exact.
@@ -83,5 +93,82 @@ impl Simulation {
         Assembler::new(Arc::clone(&systems.multiport))
             .with_span(span)
             .sharing(&systems.reduced)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::integrate::{Method, Simulation, SimulationOptions};
+    use crate::model::Model;
+
+    /// What `cards` do until a time, in changes of mode one by one and with periods taken together: how far the states are apart, relative to the largest of each, by how
+    /// much the steps differ, and how many periods were taken.
+    fn apart(cards: &str, until: f64) -> (f64, i64, u64) {
+        let text = format!("a clock\n{cards}\n.save v(out) i(l1)\n.tran 1u 10m uic\n.end\n");
+        let model = Model::parse(&text, "clock.cir").expect("a circuit");
+        let options = || SimulationOptions {
+            method: Method::Exact,
+            ..SimulationOptions::default()
+        };
+        let new = || {
+            let made = Simulation::closed(model.circuit(), model.multiport(), options());
+            made.expect("a simulation")
+        };
+        let (mut one, mut other) = (new(), new());
+        let (state, positions) = (one.state(), one.positions());
+        let place = (0.0, &*state, &*positions);
+        one.stand_at(place.0, place.1, place.2).expect("a mode");
+        one.advance(until, false, None).expect("a run");
+        let taken = other.pass(place, until, None).expect("a run");
+        let states = (one.state(), other.state());
+        let apart = states.0.iter().zip(&states.1);
+        let apart = apart.map(|(a, b)| (a - b).abs() / a.abs());
+        let steps = one.exact_steps() as i64 - other.exact_steps() as i64;
+        (
+            apart.fold(0.0, f64::max),
+            steps,
+            taken.expect("an exact one"),
+        )
+    }
+
+    const BUCK: &str = "s1 in sw g 0 sw\nd1 0 sw d\nl1 sw out 50u ic=2\nc1 out 0 100u ic=9.5\nr1 out 0 5\n\
+        .model sw sw(vt=0.5 ron=10m roff=10meg)\n.model d d(ron=10m roff=10meg)";
+    const GATE: &str = "vg g 0 pulse(0 1 0 10n 10n 3.99u 10u)";
+
+    #[test]
+    fn periods_taken_together_lead_where_single_ones_do() {
+        let (apart, steps, taken) = apart(&format!("vin in 0 24\n{GATE}\n{BUCK}"), 9.993e-3);
+        assert!(apart < 1e-11 && taken > 900, "{apart:e} {taken}");
+        assert!(steps.abs() < 10, "{steps}");
+    }
+
+    /// The input swings so that the current ends in some periods and not in others; and sources that are followed are moved, too.
+    #[test]
+    fn periods_in_which_a_diode_blocks_are_not_taken() {
+        let cards = format!("vin in 0 sin(24 12 300)\nib out 0 sin(0 1.2 170)\n{GATE}\n{BUCK}");
+        for until in [2.5e-3, 4.7e-3, 9.993e-3] {
+            let (apart, steps, taken) = apart(&cards, until);
+            assert!(apart < 1e-10, "{until}: {apart:e}");
+            assert!((50..900).contains(&taken), "{until}: {taken}");
+            assert!(steps.abs() < 10, "{steps}");
+        }
+    }
+
+    /// A second switch with twice the period, one with another phase, and one that stops.
+    #[test]
+    fn a_period_is_that_of_all_clocks() {
+        let second = |gate: &str| {
+            let cards =
+                format!("vin in 0 24\n{GATE}\n{BUCK}\ns2 out x h 0 sw\nrx x 0 20\nvh h 0 {gate}");
+            apart(&cards, 9.993e-3)
+        };
+        let (apart, _, taken) = second("pulse(0 1 3u 10n 10n 7u 20u)");
+        assert!(apart < 1e-11 && taken > 400, "{apart:e} {taken}");
+        let (apart, _, taken) = second("pulse(0 1 3u 10n 10n 7u 20u 100)");
+        assert!(apart < 1e-11 && taken == 0, "{apart:e} {taken}");
+        let (apart, _, taken) = second("pulse(0 1 3u 10n 10n 7u 23u)");
+        assert!(apart < 1e-11 && taken == 0, "{apart:e} {taken}");
+        let (apart, _, taken) = second("pulse(0 1 5.003m 10n 10n 1u 20u)");
+        assert!(apart < 1e-11 && taken > 300, "{apart:e} {taken}");
     }
 }

@@ -27,6 +27,10 @@ pub(crate) const STEP_GUARD: f64 = 1e-12;
 /// happens; smaller: an event between two points is missed.
 pub(crate) const CLEAR_OF_ZERO: f64 = 0.02;
 
+/// Required distance of a guard from zero where periods are taken together, over its rounding. Larger: periods are taken leg by leg where nothing
+/// happens; smaller: amplitudes that grow in them have their rounding taken for a sign.
+pub(crate) const CERTAIN: f64 = 1024.0;
+
 /// A device whose voltage (current) has the wrong sign by more than this part of the largest voltage across blocking devices and capacitors
 /// (current of conducting ones and inductors) so far stands wrongly: no rounding of voltages of one size does that. Larger: wrong states
 /// pass unsaid; smaller: notes on rounding.

@@ -13,6 +13,7 @@ impl Exact {
     /// Has other modes from here on, those of a circuit that is alike; gives its own for them.
     pub(crate) fn exchange_modes(&mut self, modes: &mut Modes) {
         std::mem::swap(&mut self.table.modes, modes);
+        self.periods = None;
     }
 
     /// Modes and systems keep so many bytes at most.
