@@ -53,16 +53,22 @@ impl Theta {
 
     /// A step whose length is prescribed, not committed. After an edge or a jump the midpoint rule would swing around what is
     /// faster than the step, undamped; it starts with two halves of Moreau's scheme instead, which are damped and leave it
-    /// its order (Rannacher 1984). Returns the length of the last part.
+    /// its order (Rannacher 1984). So does one that is cut short and in which a device changes, whose error a run of other steps would have alike.
+    /// Returns the length of the last part.
     fn fixed_step(&mut self, h: f64, t1: f64) -> Result<f64, Error> {
-        if !(self.now.settle && self.starts_damped()) || self.whole && self.is_cut(h) {
+        let damped = self.now.settle && self.starts_damped();
+        let whole = self.whole && self.is_cut(h);
+        if !damped || whole {
             self.attempt(h, t1)?;
-            return Ok(h);
+            let may_be_alike = self.scheme.order() == 2 && self.is_cut(h) && self.changes();
+            if whole || !may_be_alike {
+                return Ok(h);
+            }
         }
         let middle = self.now.t + 0.5 * (t1 - self.now.t);
         self.attempt(0.5 * h, middle)?;
         self.commit(middle)?;
-        self.now.settle = true;
+        self.now.settle |= damped;
         self.attempt(0.5 * h, t1)?;
         Ok(0.5 * h)
     }

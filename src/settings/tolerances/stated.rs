@@ -22,7 +22,7 @@ pub(crate) const FIRST_ORDER: [f64; 2] = [4.0, 1.25];
 
 /// The same for methods of order 2 and 3: 4/3 and 1/3 or less were they smooth. A step in which a device changes errs by h² times a part that depends
 /// on where in the step the change is, in each run another one.
-pub(crate) const HIGHER_ORDER: [f64; 2] = [8.0, 1.25];
+pub(crate) const HIGHER_ORDER: [f64; 2] = [6.0, 1.25];
 
 /// How far events stand aside at most, over what they do in a companion: 2 beside halves of the steps. Larger and smaller as [`FIRST_ORDER`].
 pub(crate) const EVENTS: f64 = 2.0;
