@@ -63,14 +63,17 @@ pub(super) struct Periods {
 }
 
 impl PeriodMap {
-    /// That of these changes of mode, of which the last one is the first again. `None` where a leg does not recur, or its exponential
-    /// does not exist in doubles.
+    /// That of these changes of mode, of which the last one is the first again. `None` where a leg does not recur, a mode exists where something
+    /// vanishes, which is asked whenever it is entered, or an exponential does not exist in doubles.
     fn of(table: &mut ModeTable, changes: &[Change]) -> Option<Self> {
         let mut legs = Vec::new();
         let mut spans = Vec::new();
         for pair in changes.windows(2) {
             let (mode, seconds) = (pair[0].mode, pair[1].t - pair[0].t);
             let own = &mut table.modes[mode];
+            if !own.constraints.is_empty() {
+                return None;
+            }
             spans.push(own.flow.recurs(seconds, SAME_TIME * pair[1].t)?);
             let noise = own.magnitudes.noise.clone();
             legs.push(Leg {
