@@ -2,8 +2,6 @@
 
 use std::sync::atomic::AtomicBool;
 
-use nalgebra::DVector;
-
 use super::periodic::Steady;
 use super::start::course;
 use super::variation::{Course, Linear, Motion, parts, unit};
@@ -124,7 +122,7 @@ fn curves(course: &Course, outputs: &[usize], from: f64) -> Result<Option<Curves
     let mut motions: Vec<Motion<'_>> = known.iter().map(|linear| linear.over(unit)).collect();
     let mut found = Curves::of(columns);
     let room = MOST_VALUES / (columns * VALUES).max(1);
-    let (mut seen, mut next) = (Vec::new(), DVector::default());
+    let mut seen = Vec::new();
     let mut values = vec![[0.0; VALUES]; columns];
     for (stretch, (at, mut w)) in stretches.zip(starts) {
         let (seconds, age) = (stretch.to - stretch.from, (from - stretch.from).max(0.0));
@@ -144,7 +142,7 @@ fn curves(course: &Course, outputs: &[usize], from: f64) -> Result<Option<Curves
             for (values, output) in values.iter_mut().zip(outputs) {
                 *values = nodes[*output];
             }
-            motion.go_on(part.level, &mut w, &mut next)?;
+            w = motion.after(part.level, &w)?;
             let until = ((seconds - part.age) / part.length).min(1.0);
             found.push((stretch.from + part.age, part.length, until), &values);
         }

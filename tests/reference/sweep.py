@@ -69,7 +69,7 @@ def by_command(deck, values, command):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "buck.cir")
         path.write_text(deck)
-        lin = f"l=lin:{values[0]!r}:{values[-1]!r}:{len(values)}".replace("np.float64(", "").replace(")", "")
+        lin = f"l=lin:{float(values[0])!r}:{float(values[-1])!r}:{len(values)}"
         rows = subprocess.check_output([command, "sweep", path, "--param", lin, "-o", "-"], text=True).splitlines()
     names = rows[0].split(",")
     columns = [names.index(name) for name in MEASURES]

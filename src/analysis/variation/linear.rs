@@ -286,22 +286,6 @@ impl Motion<'_> {
         Ok(after)
     }
 
-    /// w goes on for t/2^k seconds; `next` is work space.
-    ///
-    /// # Errors
-    /// The exponential does not exist in doubles.
-    pub(crate) fn go_on(
-        &mut self,
-        k: u32,
-        w: &mut DVector<f64>,
-        next: &mut DVector<f64>,
-    ) -> Result<(), Error> {
-        next.clone_from(w);
-        add_product(next.as_mut_slice(), self.step(k)?, w.as_slice());
-        std::mem::swap(w, next);
-        Ok(())
-    }
-
     /// s at halving k.
     pub(crate) fn part(&self, k: u32) -> f64 {
         self.seconds * (-f64::from(k)).exp2()

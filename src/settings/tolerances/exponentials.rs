@@ -58,7 +58,7 @@ pub(crate) const RESOLVED: f64 = 0.7;
 pub(crate) const CURVED: f64 = 0.1;
 
 /// The part of the longest step that resolves an oscillation, or of the first step, over which such a polynomial follows what moves, to 7e-15 of its
-/// amplitude. Larger and smaller as [`CURVED`].
+/// amplitude, and what grows to 2e-13. Larger and smaller as [`CURVED`].
 pub(crate) const TURNED: f64 = 0.5;
 
 /// λh up to which the exponentials follow a solution that grows as e^{λt}: those of long stiff steps are meant for decay and take any e^{λh}
