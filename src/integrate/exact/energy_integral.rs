@@ -13,6 +13,7 @@ use crate::linalg::gauss::{NODES, POINTS, WEIGHTS};
 use crate::linalg::kernel::Kernel;
 use crate::linalg::powers::{halved, halvings, two_to};
 use crate::linalg::quadratic::Quadratics;
+use crate::linalg::refill::raise;
 use crate::linalg::series::Series;
 use crate::linalg::whole::transposed;
 use crate::settings::tolerances::exponentials::SERIES;
@@ -80,7 +81,7 @@ struct Forms {
     to_y: Kernel,
     /// y, with zeros behind it.
     y: Vec<f64>,
-    /// The amplitudes they were made for.
+    /// The amplitudes they were made for, the largest so far.
     amplitude: Vec<f64>,
     /// The integrals of power out of sources and power dissipated over 2^k units.
     over: Vec<Quadratics>,
@@ -175,11 +176,18 @@ impl EnergyIntegral {
     ) -> Integrals<'_> {
         let (terms, fast) = (&self.terms, &self.fast);
         let (unit, bottom) = (self.unit, self.bottom);
-        self.forms
-            .take_if(|forms| forms.are_outgrown(sizes.amplitude));
-        let forms = self
+        let outgrown = self
             .forms
-            .get_or_insert_with(|| Forms::new(terms, fast, generator, sizes, unit, bottom));
+            .take_if(|forms| forms.are_outgrown(sizes.amplitude));
+        let forms = self.forms.get_or_insert_with(|| {
+            // What was large comes back: stretches that take turns share their forms.
+            let mut amplitude = sizes.amplitude.to_vec();
+            if let Some(forms) = outgrown {
+                raise(&mut amplitude, &forms.amplitude);
+            }
+            let power = sizes.power;
+            Forms::new(terms, fast, generator, (amplitude, power), (unit, bottom))
+        });
         Integrals {
             forms,
             fast,
@@ -226,6 +234,11 @@ impl EnergyIntegral {
         }
         [-t * energy[0], t * energy[1]]
     }
+}
+
+/// An amplitude as a unit: one where there was nothing.
+fn sized(amplitude: f64) -> f64 {
+    if amplitude > 0.0 { amplitude } else { 1.0 }
 }
 
 /// See [`EnergyIntegral::integrals`].
@@ -276,18 +289,13 @@ impl Forms {
         terms: &[Term],
         fast: &[usize],
         generator: &DMatrix<f64>,
-        sizes: Sizes<'_>,
-        unit: f64,
-        bottom: u32,
+        (amplitude, power): (Vec<f64>, f64),
+        (unit, bottom): (f64, u32),
     ) -> Self {
         let dim = generator.nrows();
         // At the start of a long chain amplitudes are so small that their products vanish.
-        let least = SMALLEST_AMPLITUDE * sizes.amplitude.iter().fold(0.0, |m: f64, a| m.max(*a));
-        let size: Vec<f64> = sizes
-            .amplitude
-            .iter()
-            .map(|&a| if a > 0.0 { a.max(least) } else { 1.0 })
-            .collect();
+        let least = SMALLEST_AMPLITUDE * amplitude.iter().fold(0.0, |m: f64, a| m.max(*a));
+        let size: Vec<f64> = amplitude.iter().map(|&a| sized(a).max(least)).collect();
         // Voltages and currents in the sizes that w takes, of one magnitude each.
         let count = 2 * terms.len();
         let mut rows = DMatrix::zeros(count, dim);
@@ -305,8 +313,7 @@ impl Forms {
             }
         }
         // Where rounding does no harm the coordinates stay those of w, in which the flow of a graded circuit is accurate.
-        let least =
-            (sizes.power > 0.0).then(|| (HARMLESS_POWER * sizes.power / f64::EPSILON).sqrt());
+        let least = (power > 0.0).then(|| (HARMLESS_POWER * power / f64::EPSILON).sqrt());
         let (mut to_y, mut from_y) = (DMatrix::zeros(dim, dim), DMatrix::zeros(dim, dim));
         let slow: Vec<usize> = (0..dim).filter(|j| !fast.contains(j)).collect();
         let parts = [&slow[..], fast].into_iter();
@@ -352,7 +359,7 @@ impl Forms {
         Self {
             to_y: Kernel::new(&to_y),
             y: vec![0.0; Quadratics::padded(dim)],
-            amplitude: size,
+            amplitude,
             over: vec![latest.forms()],
             spans: Vec::new(),
             generator: moved,
@@ -364,7 +371,7 @@ impl Forms {
     /// Whether they were made for amplitudes at the start of a run that say nothing of what came: T may mix what is apart.
     fn are_outgrown(&self, amplitude: &[f64]) -> bool {
         let mut pairs = self.amplitude.iter().zip(amplitude);
-        pairs.any(|(then, now)| *now > OUTGROWN * then)
+        pairs.any(|(then, now)| *now > OUTGROWN * sized(*then))
     }
 
     /// Has the integrals up to 2^k units.
@@ -566,6 +573,27 @@ mod tests {
             let [source, dissipated] = work.along_series(&series, part, t);
             assert!((source / exact(t) + 1.0).abs() < 1e-14, "{degree}");
             assert!((dissipated / exact(t) - 2.0).abs() < 1e-14, "{degree}");
+        }
+    }
+
+    /// What a source does in its edge is large there and nothing between two edges.
+    #[test]
+    fn stretches_that_take_turns_share_their_forms() {
+        let a = DMatrix::from_row_slice(2, 2, &[-1.0, 1.0, 0.0, -2.0]);
+        let terms = vec![term(&[1.0, 0.0], &[0.0, 1.0], true)];
+        let mut work = EnergyIntegral::new(terms, &[], 1.0, 5).unwrap();
+        let (edge, rest) = ([1e-4, 1e8], [1.0, 0.0]);
+        let found = [&edge, &rest].map(|w| over(&mut work.integrals(&a, sizes(w)), 5, w));
+        let made = [&edge, &rest].map(|w| {
+            let mut integrals = work.integrals(&a, sizes(w));
+            let (made, again) = (integrals.forms.over.len(), over(&mut integrals, 2, w));
+            assert!(again[0].is_finite());
+            made
+        });
+        assert_eq!(made, [1, 4]);
+        let again = [&edge, &rest].map(|w| over(&mut work.integrals(&a, sizes(w)), 5, w));
+        for (found, again) in found.iter().zip(&again) {
+            assert!((found[0] - again[0]).abs() <= 1e-14 * found[0].abs());
         }
     }
 
