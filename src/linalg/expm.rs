@@ -6,9 +6,10 @@
 use nalgebra::{Complex, DMatrix};
 
 use super::dense::Dense;
-use super::powers::{halved, power_of_two};
+use super::eigenvalues::eigenvalues;
+use super::powers::{halved, power_of_two, two_to};
 use super::shifted::Shifted;
-use crate::settings::tolerances::exponentials::{MISSING, SERIES};
+use crate::settings::tolerances::exponentials::{MISSING, SERIES, TURNS};
 
 /// Conjugate pairs (zero, pole) of the sub-diagonal approximant [7/8] of exp.
 const PAIRS: [(Complex<f64>, Complex<f64>); 3] = [
@@ -45,7 +46,8 @@ const FAST_SQUARINGS: u32 = 4;
 ///
 /// Where ‖A h/2^k‖₁ is small after balancing, the series; up to a limit the square of the half step; beyond, for every third rung
 /// the L-stable sub-diagonal approximant [7/8] in product form with 2³ squarings, whose cost does not grow with ‖A h‖ and whose
-/// error is not multiplied by it when A is graded (spread storage elements).
+/// error is not multiplied by it when A is graded (spread storage elements). It damps an oscillation of many turns a step, so that
+/// where there is one the square is taken instead.
 #[derive(Debug, Clone)]
 pub(crate) struct Ladder {
     /// A h in balanced coordinates.
@@ -59,6 +61,8 @@ pub(crate) struct Ladder {
     doubled: u32,
     /// Those of the approximant.
     squarings: u32,
+    /// Complex eigenvalues of A h, with Im > 0; `None` until they are asked for.
+    turning: Option<Vec<Complex<f64>>>,
     rungs: Vec<Option<Dense>>,
 }
 
@@ -77,6 +81,7 @@ impl Ladder {
             limit,
             doubled,
             squarings: SQUARINGS,
+            turning: None,
             rungs: Vec::new(),
         }
     }
@@ -100,8 +105,31 @@ impl Ladder {
     }
 
     /// Whether a rung is neither a series nor a square.
-    fn anew(&self, k: u32) -> bool {
-        self.stiff(k) && ((k - self.doubled).is_multiple_of(ANEW) || !self.stiff(k + 1))
+    fn anew(&mut self, k: u32) -> bool {
+        self.stiff(k)
+            && ((k - self.doubled).is_multiple_of(ANEW) || !self.stiff(k + 1))
+            && self.turned(k) == 0.0
+    }
+
+    /// |λ| h/2^k of the fastest oscillation that the approximant would not follow, 0 where it follows all. Where eigenvalues are not
+    /// found ‖A h‖₁ may be one.
+    fn turned(&mut self, k: u32) -> f64 {
+        let (whole, norm) = (&self.whole, self.norm);
+        let turning = self.turning.get_or_insert_with(|| {
+            let n = whole.columns();
+            let whole = DMatrix::from_fn(n, n, |i, j| whole.column(j)[i]);
+            let mut found = eigenvalues(&whole).unwrap_or_else(|| vec![Complex::new(0.0, norm)]);
+            found.retain(|value| value.im > 0.0);
+            found
+        });
+        let squarings = self.squarings;
+        let lost = turning.iter().filter(|value| {
+            let exact = (*value * halved(1.0, k)).exp();
+            let found = at(*value * halved(1.0, k + squarings)).powu(1 << squarings);
+            let off = (found - exact).norm() / exact.norm().max(1.0);
+            off.is_nan() || off > TURNS
+        });
+        halved(lost.map(|value| value.norm()).fold(0.0, f64::max), k)
     }
 
     /// exp(A h/2^k) − I; `None` if an entry is not finite or a factor is singular.
@@ -116,10 +144,17 @@ impl Ladder {
         increment.is_finite().then_some(increment)
     }
 
-    /// Where exp(A h/2^k) is computed anew max|R(t) − R(t/2)²| relative to max(|R(t)|, 1), in the balanced coordinates; else 0.
+    /// Where exp(A h/2^k) is computed anew max|R(t) − R(t/2)²| relative to max(|R(t)|, 1), in the balanced coordinates; where it is a power
+    /// because of an oscillation what rounding leaves of the angle that this one turns in 2⁻ᵏ h; else 0.
     pub(crate) fn loss(&mut self, k: u32) -> Option<f64> {
         if !self.anew(k) {
-            return Some(0.0);
+            // The fastest of those because of which this rung or one that it is a power of is a square.
+            let (mut fastest, mut rung) = (0.0, k);
+            while self.stiff(rung) && !self.anew(rung) {
+                fastest = self.turned(rung).max(0.5 * fastest);
+                rung += 1;
+            }
+            return Some(f64::EPSILON * fastest * two_to((rung - k) as i32 - 1));
         }
         let mut twice = squared(self.rung(k + 1)?);
         let rung = self.rung(k)?;
@@ -287,6 +322,18 @@ pub(crate) fn balance(a: &DMatrix<f64>, h: f64) -> Vec<f64> {
     d
 }
 
+/// Padé [7/8] of exp(z).
+fn at(z: Complex<f64>) -> Complex<f64> {
+    let one = Complex::new(1.0, 0.0);
+    let (zero, pole) = LAST;
+    let first = (one - z / zero) / ((one - z / pole) * (one - z / pole.conj()));
+    let pairs = PAIRS.iter().map(|&(zero, pole)| {
+        let [zeros, poles] = [zero, pole].map(|x| (one - z / x, one - z / x.conj()));
+        (zeros.0 / poles.0) * (zeros.1 / poles.1)
+    });
+    pairs.fold(first, |product, factor| product * factor)
+}
+
 /// Padé [7/8] of exp(Z/2^m), Z = A h/2^k, as a product of (Z − z)(Z − p)⁻¹ = I + (p − z)(Z − p)⁻¹ over its zeros and poles,
 /// squared m times.
 fn subdiagonal(whole: &Dense, k: u32, squarings: u32) -> Option<Dense> {
@@ -347,6 +394,36 @@ mod tests {
             assert!((r[(0, 0)] - c).abs() < 1e-15 * (4.0 + omega * h), "{h}");
             assert!((r[(0, 1)] + 100.0 * s).abs() < 1e-13 * (4.0 + omega * h));
             assert!((r[(1, 0)] - 0.01 * s).abs() < 1e-17 * (4.0 + omega * h));
+        }
+    }
+
+    /// The approximant would damp these turns to nothing, and its half step would say the same.
+    #[test]
+    fn turns_of_any_number_keep_their_size() {
+        // Beside them something fast that decays, so that the norm says nothing.
+        for (fast, omega) in [(1.0, 1e4), (1e9, 30.0), (1e9, 1e3), (1e12, 1e7)] {
+            let a = DMatrix::from_row_slice(
+                3,
+                3,
+                &[0.0, -omega, 0.0, omega, 0.0, 0.0, 0.5 * fast, 0.0, -fast],
+            );
+            let mut ladder = Ladder::new(&a, 1.0, SQUARED, 0);
+            for k in 0..6 {
+                let angle = halved(omega, k);
+                let increment = matrix(&ladder.increment(k).unwrap());
+                let off = (increment[(0, 0)] + 1.0 - angle.cos()).abs()
+                    + (increment[(1, 0)] - angle.sin()).abs();
+                let loss = ladder.loss(k).unwrap();
+                assert!(
+                    off < 1e-15 * (100.0 + angle),
+                    "{fast}, {omega}, {k}: {off:e}"
+                );
+                assert!(
+                    loss < 1e-12 + 4e-16 * angle,
+                    "{fast}, {omega}, {k}: {loss:e}"
+                );
+                assert!((increment[(2, 2)] + 1.0).abs() < 1e-12 || fast < 1e9);
+            }
         }
     }
 

@@ -4,6 +4,10 @@
 /// Larger: digits are lost; smaller: more rational approximants.
 pub(crate) const SQUARED: f64 = 1e3;
 
+/// Error of the rational approximant at a complex eigenvalue of A h, relative to the larger of 1 and its exponential, beyond which steps are
+/// squared whatever ‖A h‖: it damps what turns. Larger: oscillations lose amplitude; smaller: squares where the approximant would do.
+pub(crate) const TURNS: f64 = 1e-13;
+
 /// ‖A h‖₁ up to which Taylor's series is summed; longer steps begin with a part of this size. Larger: more terms; smaller: more squarings.
 pub(crate) const SERIES: f64 = 0.125;
 
