@@ -136,7 +136,8 @@ impl Adjoint<'_> {
         for (motion, outer) in motions.iter_mut().zip(outer) {
             let system = motion.linear.system;
             let n = trajectory.systems[system].lcs.n();
-            let [generator, output] = &motion.linear.sources;
+            let sources = &motion.linear.exosystem;
+            let (generator, output) = (sources.generator(), sources.output());
             let read = read(n, output, generator, true).transpose();
             let basis = motion.linear.basis.as_ref();
             let all = carried.systems[system].iter_mut();

@@ -17,9 +17,9 @@ use crate::settings::tolerances::exponentials::{SERIES, SQUARED};
 /// w' = 𝒜 w, in the basis in which fast states owe nothing to the others.
 #[derive(Debug, Clone)]
 pub(crate) struct Linear {
-    /// The system, and the sources' S and H that it was made for.
+    /// The system, and the sources that it was made for.
     pub(super) system: usize,
-    pub(super) sources: [DMatrix<f64>; 2],
+    pub(super) exosystem: Exosystem,
     /// 𝒜.
     pub(crate) generator: DMatrix<f64>,
     pub(super) basis: Option<Decoupled>,
@@ -95,29 +95,26 @@ pub(super) fn beyond_doubles() -> Error {
 }
 
 impl Linear {
-    fn exosystem(stretch: &Stretch) -> Exosystem {
-        let shapes: Vec<Shape> = stretch.pieces.iter().map(|p| Shape::of([p])).collect();
-        Exosystem::new(&shapes, stretch.pieces.clone())
-    }
-
     /// Of a stretch, from those that are known; and w where it begins.
     pub(crate) fn of(
         known: &mut Vec<Self>,
         systems: &[System],
         stretch: &Stretch,
     ) -> (usize, DVector<f64>) {
-        let exosystem = Self::exosystem(stretch);
-        let sources = [exosystem.generator(), exosystem.output()];
-        let same =
-            |l: &Self| l.system == stretch.system && [&l.sources[0], &l.sources[1]] == sources;
-        let at = known.iter().position(same).unwrap_or_else(|| {
-            known.push(Self::new(
-                &systems[stretch.system],
-                stretch.system,
-                &exosystem,
-            ));
-            known.len() - 1
+        let own = |l: &&Self| l.system == stretch.system;
+        let held = |l: &Self| own(&l) && l.exosystem.holds(&stretch.pieces);
+        let at = known.iter().position(held).unwrap_or_else(|| {
+            let shapes: Vec<Shape> = stretch.pieces.iter().map(|p| Shape::of([p])).collect();
+            let exosystem = Exosystem::new(&shapes, stretch.pieces.clone());
+            let alike = |l: &Self| own(&l) && l.exosystem.is_alike(&exosystem);
+            known.iter().position(alike).unwrap_or_else(|| {
+                let system = &systems[stretch.system];
+                known.push(Self::new(system, stretch.system, exosystem));
+                known.len() - 1
+            })
         });
+        let exosystem = &mut known[at].exosystem;
+        exosystem.set_pieces(&stretch.pieces);
         let n = stretch.start.len();
         let mut w = stretch
             .start
@@ -130,7 +127,7 @@ impl Linear {
         (at, w)
     }
 
-    fn new(system: &System, at: usize, exosystem: &Exosystem) -> Self {
+    fn new(system: &System, at: usize, exosystem: Exosystem) -> Self {
         let lcs = &system.lcs;
         let (n, dz) = (lcs.n(), exosystem.dim());
         let mut generator = DMatrix::zeros(n + dz, n + dz);
@@ -143,7 +140,7 @@ impl Linear {
             .view_mut((n, n), (dz, dz))
             .copy_from(exosystem.generator());
         let (basis, fast) = apart(&generator, [system.fast.clone(), lcs.fast.clone()]);
-        let mut rows = over_w(&lcs.outputs.rows, n, exosystem);
+        let mut rows = over_w(&lcs.outputs.rows, n, &exosystem);
         if let Some(basis) = &basis {
             generator.copy_from(&basis.generator);
             rows *= &basis.to;
@@ -153,11 +150,11 @@ impl Linear {
         let moves = generator.view((0, 0), (n, n)).into_owned();
         Self {
             system: at,
-            sources: [exosystem.generator().clone(), exosystem.output().clone()],
             fast,
             basis,
             rows: [rows, rates, second],
             spectrum: Spectrum::new(&moves, exosystem.rates()),
+            exosystem,
             generator,
         }
     }
@@ -171,7 +168,7 @@ impl Linear {
     ) -> Self {
         Self {
             system: 0,
-            sources: [DMatrix::default(), DMatrix::default()],
+            exosystem: Exosystem::default(),
             fast: Vec::new(),
             basis: None,
             rows,

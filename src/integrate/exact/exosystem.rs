@@ -223,6 +223,21 @@ impl Exosystem {
             && self.output == other.output
     }
 
+    /// Whether inputs on these pieces have the same S and H: lines that slope where these do, else the same constants.
+    pub(crate) fn holds(&self, pieces: &[Piece]) -> bool {
+        let alike = |(own, other): (&Piece, &Piece)| {
+            let straight = own.terms().next().is_none() && other.terms().next().is_none();
+            let slope = [own, other].map(|piece| piece.slope != 0.0);
+            straight && slope[0] == slope[1] && (slope[0] || own.constant == other.constant)
+        };
+        self.pieces.len() == pieces.len() && self.pieces.iter().zip(pieces).all(alike)
+    }
+
+    /// Inputs go on along these.
+    pub(crate) fn set_pieces(&mut self, pieces: &[Piece]) {
+        self.pieces.clone_from_slice(pieces);
+    }
+
     /// Length of z; z[0] = 1.
     pub(crate) fn dim(&self) -> usize {
         self.columns.len()
