@@ -1734,6 +1734,7 @@ fn bench_measures_ladders_in_the_promised_columns() {
             .unwrap();
     let first = &document["measurements"][0];
     assert_eq!(first["method"], "theta");
+    assert!(first["energy_residual"].as_f64().unwrap() < 1e-9, "{first}");
     let signals = first["signals"].as_array().unwrap();
     let worst = |error: &str| {
         let errors = signals.iter().map(|s| s[error].as_f64().unwrap());
@@ -1745,6 +1746,41 @@ fn bench_measures_ladders_in_the_promised_columns() {
     let lines = fs::read_to_string(directory.path().join("s.csv")).unwrap();
     let runs = document["measurements"].as_array().unwrap().len();
     assert!(signals.len() > 1 && lines.lines().count() == 1 + runs * signals.len());
+    // What a file says of another program stands beside ours, in the table and in the picture.
+    let points = format!(
+        "{header}\ndivider,gnucap:trap,step=1e-6,7,2e-3,1e-5,3e-6,exact\ndivider,gnucap:trap,step=1e-7,0,0e0,,,failed: no end\n"
+    );
+    fs::write(directory.path().join("points.csv"), &points).unwrap();
+    let arguments = "bench divider.cir --methods exact --against points.csv -o c.csv -o c.svg";
+    let ran = run_in(directory.path(), arguments);
+    assert_eq!(ran.status, 0, "{ran}");
+    assert!(ran.err.contains("gnucap:trap step=1e-7: no end"), "{ran}");
+    let read = |name: &str| fs::read_to_string(directory.path().join(name)).unwrap();
+    assert!(read("c.csv").ends_with(points.split_once('\n').unwrap().1));
+    assert!(read("c.svg").contains(">gnucap<"));
+    for (from, to, told) in [
+        (
+            "2e-3",
+            "soon",
+            "points.csv: line 2: `soon` is no cpu_seconds",
+        ),
+        (
+            "steps",
+            "stairs",
+            "points.csv: the columns must be circuit,method",
+        ),
+    ] {
+        fs::write(
+            directory.path().join("points.csv"),
+            points.replace(from, to),
+        )
+        .unwrap();
+        let ran = run_in(directory.path(), arguments);
+        assert_eq!(ran.status, 2, "{ran}");
+        assert!(ran.err.contains(told), "{ran}");
+    }
+    let over = "bench divider.cir --against points.csv -o points.csv";
+    assert_eq!(run_in(directory.path(), over).status, 2);
     assert_eq!(run("bench divider.cir -o b.xls").status, 2);
     assert_eq!(run("bench divider.cir --signals b.json").status, 2);
 }

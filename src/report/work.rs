@@ -26,12 +26,14 @@ pub struct Measurement {
     pub parameter: String,
     /// Accepted steps.
     pub steps: u64,
-    /// User CPU of the solve alone, s.
+    /// User CPU of the solve alone, s; of another program that of its process less its start-up.
     pub cpu_seconds: f64,
     /// Largest error of any signal relative to its amplitude; `None` where the run failed.
     pub max_error: Option<f64>,
     /// Largest RMS error of any signal relative to its amplitude; `None` where the run failed.
     pub rms_error: Option<f64>,
+    /// What the energy balance leaves, relative to the largest energy; `None` for other programs and where the run failed.
+    pub energy_residual: Option<f64>,
     /// Every signal's own; none where the run failed.
     pub signals: Vec<SignalError>,
     /// What the error is measured against.
@@ -163,6 +165,8 @@ pub fn text(measurements: &[Measurement], orders: &[Order]) -> String {
                 si::quantity(m.cpu_seconds, "s", 3),
                 number(m.max_error),
                 number(m.rms_error),
+                m.energy_residual
+                    .map_or_else(String::new, |x| si::plain(x, 2)),
             ]
         })
         .collect();
@@ -174,6 +178,7 @@ pub fn text(measurements: &[Measurement], orders: &[Order]) -> String {
             "cpu",
             "max error",
             "rms error",
+            "energy residual",
         ],
         &rows,
     );
@@ -232,7 +237,7 @@ fn signals_text(measurements: &[Measurement]) -> String {
     format!("\n{}", table::aligned(&header, &rows))
 }
 
-/// The picture: CPU seconds across, largest error up, both logarithmic, one colour per series; the rungs of a ladder are joined, those of
+/// The picture: CPU seconds across, RMS error up, both logarithmic, one colour per series; the rungs of a ladder are joined, those of
 /// another method or setting are not. Failures have no point.
 ///
 /// # Errors
@@ -242,7 +247,7 @@ pub fn draw(measurements: &[Measurement]) -> Result<String, PictureError> {
     let done: Vec<(&Measurement, (f64, f64))> = measurements
         .iter()
         .filter_map(|m| {
-            let error = m.max_error?.max(SMALLEST).log10();
+            let error = m.rms_error?.max(SMALLEST).log10();
             Some((m, (m.cpu_seconds.max(SMALLEST).log10(), error)))
         })
         .collect();
@@ -256,9 +261,12 @@ pub fn draw(measurements: &[Measurement]) -> Result<String, PictureError> {
     let y_range = decades(done.iter().map(|d| d.1.1)).ok_or_else(none)?;
     let (left, top) = CORNER;
     let (right, bottom) = (left + SIZE.0, top + SIZE.1);
-    let across = ("user CPU of the solve (s)", "");
+    let across = (
+        "CPU (s): of circ the solve, of others the process less its start-up",
+        "",
+    );
     let across = Axis::logarithmic(x_range, (left, right), across);
-    let up = ("largest error relative to amplitude", "");
+    let up = ("RMS error relative to amplitude", "");
     let up = Axis::logarithmic(y_range, (bottom, top), up);
     let entries = series.iter().enumerate();
     let entries = entries.map(|(k, name)| (name.clone(), Stroke::curve(k)));
@@ -333,7 +341,7 @@ mod tests {
         ];
         let svg = draw(&all).unwrap();
         assert_eq!(svg.matches("<circle").count(), 3);
-        assert!(svg.contains("user CPU of the solve (s)") && !svg.contains("ngspice"));
+        assert!(svg.contains("CPU (s): of circ the solve") && !svg.contains("ngspice"));
         // A line for the ladder of two rungs, none from one method to the other.
         let lines: Vec<&str> = svg.split(" d=\"").skip(1).collect();
         let curves = lines.iter().filter(|l| l.contains("stroke-width=\"15\""));

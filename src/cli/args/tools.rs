@@ -7,7 +7,7 @@ use clap::builder::ArgPredicate;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 
-use super::values::{folder, named, not_negative, position, positive, readable};
+use super::values::{folder, named, not_negative, position, positive, program_or_points, readable};
 use super::{Input, Method};
 use crate::cli::output::Format;
 
@@ -84,11 +84,11 @@ pub struct BenchArgs {
     #[command(flatten)]
     #[expect(missing_docs, reason = "documented where it is defined")]
     pub input: Input,
-    /// Measure this program too
-    #[arg(long, value_name = "PROGRAM", value_parser = ["ngspice"])]
-    pub against: Option<String>,
-    /// Only these methods: exact, euler, theta, siconos (θ = ½, γ = 1), ngspice
-    #[arg(long, value_name = "A,B,..", value_delimiter = ',', value_parser = ["exact", "euler", "theta", "siconos", "ngspice"])]
+    /// Measure `ngspice` too, or show what a csv file in the columns of this command says of other programs (repeatable)
+    #[arg(long, value_name = "ngspice|POINTS.csv", value_parser = program_or_points)]
+    pub against: Vec<PathBuf>,
+    /// Only these methods: exact, euler, theta, theta:gamma=1 (θ = ½, γ = 1), ngspice
+    #[arg(long, value_name = "A,B,..", value_delimiter = ',', value_parser = ["exact", "euler", "theta", "theta:gamma=1", "ngspice"])]
     pub methods: Vec<String>,
     /// Write measurements to this file, or `-`, standard output (repeatable); the ending chooses csv, json, svg, png or html
     #[arg(

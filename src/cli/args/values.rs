@@ -11,6 +11,18 @@ pub(super) fn number(text: &str) -> Result<f64, String> {
         .map_err(|e| e.to_string())
 }
 
+/// `ngspice`, or a csv file of what was measured of other programs.
+pub(super) fn program_or_points(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    let is_csv = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("csv"));
+    if text == "ngspice" || is_csv {
+        return Ok(path);
+    }
+    Err("must be `ngspice`, or a csv file in the columns of `circ bench`".into())
+}
+
 /// A name, of a signal or a pattern.
 pub(super) fn named(text: &str) -> Result<String, String> {
     if text.trim().is_empty() {

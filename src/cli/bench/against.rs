@@ -1,4 +1,6 @@
-//! ngspice's ladders.
+//! Other programs: ngspice's ladders, and what a file says of any.
+
+use std::path::Path;
 
 use super::{Bench, Reference, errors};
 use crate::circuit::{Circuit, Kind};
@@ -7,7 +9,7 @@ use crate::cli::exit::Failure;
 use crate::cli::input::Subject;
 use crate::cli::ngspice::{self, NgspiceError, deck};
 use crate::law::Law;
-use crate::report::work::Measurement;
+use crate::report::work::{self, Measurement};
 
 /// Values of `reltol`.
 const RELTOL: [f64; 4] = [1e-3, 1e-4, 1e-5, 1e-6];
@@ -27,6 +29,48 @@ const LESS: f64 = 0.8;
 const FAILURES: usize = 4;
 /// Rows of the reference that ngspice's own time points are read against, at least.
 const ROWS: f64 = 50_000.0;
+
+/// What a file in the columns of [`work::csv`] says of other programs: a ladder for each `method`, one colour for all of a program
+/// (what stands before a colon).
+pub(super) fn points(path: &Path) -> Result<Vec<Measurement>, Failure> {
+    let wrong = |why: String| Failure::told("no-points", format!("{}: {why}", path.display()));
+    let mut reader = csv::Reader::from_path(path).map_err(|e| wrong(e.to_string()))?;
+    let columns = reader.headers().map_err(|e| wrong(e.to_string()))?.clone();
+    let expected = work::csv(&[]);
+    if columns.iter().ne(expected.trim_end().split(',')) {
+        return Err(wrong(format!(
+            "the columns must be {}",
+            expected.trim_end()
+        )));
+    }
+    let mut found = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|e| wrong(e.to_string()))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let number = |k: usize| match record[k].parse::<f64>() {
+            _ if record[k].is_empty() => Ok(None),
+            Ok(x) if x.is_finite() && x >= 0.0 => Ok(Some(x)),
+            _ => Err(wrong(format!(
+                "line {line}: `{}` is no {}",
+                &record[k], &columns[k]
+            ))),
+        };
+        found.push(Measurement {
+            circuit: record[0].into(),
+            method: record[1].into(),
+            series: record[1].split(':').next().unwrap_or_default().into(),
+            parameter: record[2].into(),
+            steps: number(3)?.unwrap_or(0.0) as u64,
+            cpu_seconds: number(4)?.unwrap_or(0.0),
+            max_error: number(5)?,
+            rms_error: number(6)?,
+            reference: record[7].into(),
+            failure: record[7].strip_prefix("failed: ").map(str::to_string),
+            ..Measurement::default()
+        });
+    }
+    Ok(found)
+}
 
 impl Bench<'_> {
     /// ngspice over its settings and its realisations of the diodes.

@@ -13,6 +13,9 @@ const TOLERANCES: [f64; 7] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
 /// The error of implicit Euler is of first order: tighter tolerances cost more than they show.
 const EULER_TOLERANCES: usize = 4;
 
+/// θ = ½ and γ = 1: λ is implicit where the rest is the midpoint rule.
+pub(super) const IMPLICIT: &str = "theta:gamma=1";
+
 /// A method with a setting.
 pub(super) struct Rung {
     /// Its name for `--methods`.
@@ -48,7 +51,7 @@ pub(super) fn rungs(tran: Tran) -> Vec<Rung> {
         rows,
     };
     let mut rungs = vec![exact(None), exact(Some(tran.tstep / SPARSE))];
-    let siconos = Request {
+    let implicit = Request {
         theta: Some(0.5),
         gamma: Some(1.0),
         ..request(Method::Theta)
@@ -66,7 +69,7 @@ pub(super) fn rungs(tran: Tran) -> Vec<Rung> {
             request(Method::Theta),
             TOLERANCES.len(),
         ),
-        ("siconos", "siconos-tol", siconos, 0),
+        (IMPLICIT, "", implicit, 0),
     ];
     for (method, controlled, request, n_tolerances) in stepping {
         for k in 0..=HALVINGS {

@@ -43,12 +43,14 @@ pub(super) fn bench(args: &BenchArgs, streams: &Streams) -> Result<Exit, Failure
     {
         return Err(output::unknown_ending(path, "csv"));
     }
+    let kept = args.against.iter().map(PathBuf::as_path);
     let outputs: Vec<&Path> = args
         .outputs
         .iter()
         .chain(&args.signals)
         .map(PathBuf::as_path)
         .collect();
+    files::spare(&outputs, kept)?;
     let subject = input::open_as_it_stands(&args.input, &outputs, streams)?;
     let file = &args.input.file;
     let tran = subject.tran().ok_or_else(|| {
@@ -83,9 +85,14 @@ pub(super) fn bench(args: &BenchArgs, streams: &Streams) -> Result<Exit, Failure
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let against_ngspice = args.against.is_some() || args.methods.iter().any(|m| m == "ngspice");
+    let is_ngspice = |program: &PathBuf| program.as_path() == Path::new("ngspice");
+    let against_ngspice =
+        args.against.iter().any(is_ngspice) || args.methods.iter().any(|m| m == "ngspice");
     if against_ngspice && wanted("ngspice") {
         measurements.extend(bench.ngspice()?);
+    }
+    for path in args.against.iter().filter(|program| !is_ngspice(program)) {
+        measurements.extend(against::points(path)?);
     }
     report(args, &measurements, streams)?;
     Ok(Exit::Done)
@@ -173,6 +180,7 @@ impl Bench<'_> {
         Measurement {
             steps: run.stats.steps,
             cpu_seconds: run.stats.cpu_seconds,
+            energy_residual: Some(run.energy.residual_relative),
             ..blank
         }
         .with(errors(&run.waveforms, reference, 0.0))

@@ -1,5 +1,6 @@
 //! The observed order of a ladder of steps.
 
+use super::ladder::IMPLICIT;
 use crate::report::work::{Measurement, Order};
 
 /// Errors below this are rounding and say nothing about the order.
@@ -7,7 +8,7 @@ const ROUNDING: f64 = 1e-11;
 
 /// The observed orders of the fixed-step ladders.
 pub(super) fn orders(measurements: &[Measurement]) -> Vec<Order> {
-    ["euler", "theta", "siconos"]
+    ["euler", "theta", IMPLICIT]
         .into_iter()
         .filter_map(|series| {
             let rungs = || measurements.iter().filter(move |m| m.series == series);
