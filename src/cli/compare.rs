@@ -359,6 +359,7 @@ fn simulated(
         tol: Some(TOL),
         events: true,
         unestimated: true,
+        most_steps: None,
     };
     let divisions = (ROWS * tran.tstep / (tran.tstop - tran.tstart))
         .ceil()

@@ -31,6 +31,8 @@ pub(super) struct Request {
     pub events: bool,
     /// No further runs beside one in steps, whose error is then not known.
     pub unestimated: bool,
+    /// No run of more steps, where that is not for the settings to say.
+    pub most_steps: Option<u64>,
 }
 
 impl Request {
@@ -39,6 +41,9 @@ impl Request {
         let mut settings = Settings::default();
         if let Some(tol) = self.tol {
             settings.tol = tol;
+        }
+        if let Some(most) = self.most_steps {
+            settings.max_steps = most;
         }
         settings
     }
@@ -77,6 +82,7 @@ impl Request {
             tol,
             events,
             unestimated: args.no_estimate,
+            most_steps: None,
         })
     }
 }

@@ -33,7 +33,7 @@ const ROWS: f64 = 50_000.0;
 /// What a file in the columns of [`work::csv`] says of other programs: a ladder for each `method`, one colour for all of a program
 /// (what stands before a colon).
 pub(super) fn points(path: &Path) -> Result<Vec<Measurement>, Failure> {
-    let wrong = |why: String| Failure::told("no-points", format!("{}: {why}", path.display()));
+    let wrong = |why: String| Failure::told("points", format!("{}: {why}", path.display()));
     let mut reader = csv::Reader::from_path(path).map_err(|e| wrong(e.to_string()))?;
     let columns = reader.headers().map_err(|e| wrong(e.to_string()))?.clone();
     let expected = work::csv(&[]);

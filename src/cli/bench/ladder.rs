@@ -8,6 +8,8 @@ use crate::integrate::Method;
 const HALVINGS: i32 = 10;
 /// No run of more steps.
 const MOST_STEPS: f64 = 2e6;
+/// Nor one of more steps that are chosen: a tolerance that is out of reach ends so, not with the day.
+const MOST_CHOSEN: u64 = 20_000_000;
 /// Tolerances of the error-controlled ladders.
 const TOLERANCES: [f64; 7] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
 /// The error of implicit Euler is of first order: tighter tolerances cost more than they show.
@@ -42,6 +44,7 @@ pub(super) fn rungs(tran: Tran) -> Vec<Rung> {
         tol: None,
         events: false,
         unestimated: true,
+        most_steps: Some(MOST_CHOSEN),
     };
     let exact = |rows: Option<f64>| Rung {
         method: "exact",

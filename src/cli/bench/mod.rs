@@ -123,6 +123,7 @@ impl Bench<'_> {
             tol: None,
             events: true,
             unestimated: true,
+            most_steps: None,
         };
         if let Ok(run) = request::run(self.subject, &request, tstep, &self.silent) {
             return Ok(Reference {

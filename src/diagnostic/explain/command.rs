@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 31] = [
+pub(super) const CODES: [Explanation; 32] = [
     Explanation::of(
         "bad-option",
         "An option has a value that it cannot have.",
@@ -130,6 +130,12 @@ pub(super) const CODES: [Explanation; 31] = [
         "Choose another name.",
     )
     .shown_by("lcs -o example.cir", "r\nv1 a 0 1\nr1 a 0 1k\n.tran 1m 5m\n"),
+    Explanation::of(
+        "points",
+        "The file is not one of measurements.",
+        "`circ bench --against FILE.csv` reads what `circ bench -o FILE.csv` writes: a line for each run of a program, in its columns.",
+        "Write the columns that the message names; a run that failed has no errors, and `failed: ` with its words in place of the reference.",
+    ),
     Explanation::of(
         "several-plots",
         "The file holds several plots, of which one is shown.",
