@@ -194,6 +194,7 @@ cases! {
     picosecond_pulse,
     positive_feedback_in_the_run,
     positive_feedback_without_solution,
+    print_step_of_eighty_periods,
     ringing_after_edges,
     ringing_after_jump,
     source_shorted_by_a_switch,

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Runs every case of tests/stability with circ and with ngspice and writes the table of docs/stability.md.
+"""Makes what docs/stability.md shows: every case of tests/stability with circ and with ngspice, drift (drift.py), damping (damping.py), stiffness (stiffness.py).
 
-    tests/stability/table.py [CIRC]     CIRC is the program, default target/debug/circ
+    pip install matplotlib
+    tests/stability/table.py [CIRC [PART...]]     CIRC is the program, default target/debug/circ; PART cases, drift, damping or stiffness, default all
 
-A case is a netlist; its comments say what is right:
+The reference of the last, stiffness.csv, is made by tests/reference/stiff.py. A case is a netlist; its comments say what is right:
 
     *CHECK PROBE at=T is=VALUE [of=SCALE] exact=R euler=R theta=R    |found - VALUE| <= R * SCALE (default |VALUE|)
     *EITHER PROBE at=T is=VALUE or=OTHER ...                         the same with two right answers
@@ -25,8 +26,6 @@ import csv
 import json
 import pathlib
 import re
-import resource
-import signal
 import subprocess
 import sys
 import tempfile
@@ -34,12 +33,12 @@ import tempfile
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 sys.path.insert(0, str(HERE.parent / "reference"))
+import damping  # noqa: E402
+import drift  # noqa: E402
+import stiffness  # noqa: E402
 from make import column, interpolate, raw, seconds, version  # noqa: E402
+from stiffness import LARGEST, METHODS, PATIENCE, patiently  # noqa: E402
 
-METHODS = ["exact", "euler", "theta"]
-# An error of methods that a case does not name, relative; of ngspice one that a figure would show.
-LARGEST = {"exact": 1e-9, "euler": 1e-3, "theta": 1e-3, "ngspice": 0.05}
-PATIENCE = 60  # s of CPU time
 SLOW = f"**too slow: no answer within {PATIENCE} s**"
 # What ngspice is given for what only exists here: ideal switches, and edges that take no time (it would take a print step).
 SUBSTITUTED = [(r"sw\(ideal", "sw(ron=1u roff=1g"), (r"(pulse\(\S+ \S+ \S+) 0 0 ", r"\1 1n 1n ")]
@@ -80,15 +79,6 @@ def judged(errors, stated=None):
     error, may, what = max(wrong)
     told = "" if stated is None else f"; it states an error of {stated:.0e}"
     return f"**fails: {what if error > 0.05 else f'off by {error:.0e}, {may:.0e} allowed'}**{told}"
-
-
-def patiently(words, **more):
-    """The finished run, or nothing where it took too long."""
-    def limit():
-        resource.setrlimit(resource.RLIMIT_CPU, (PATIENCE, PATIENCE + 1))
-
-    run = subprocess.run(words, capture_output=True, text=True, preexec_fn=limit, **more)
-    return None if run.returncode in (-signal.SIGXCPU, -signal.SIGKILL) else run
 
 
 def circ(program, case, method):
@@ -169,11 +159,23 @@ def table(program):
     return "\n".join(lines) + "\n"
 
 
+def put(part, made):
+    """Into the page, between the marks of the part."""
+    page = ROOT / "docs/stability.md"
+    text, end = page.read_text(), "<!-- end -->\n"
+    start = text.index(f"<!-- tests/stability/{part}.py")
+    stop = text.index(end, start)
+    page.write_text(text[:start] + f"<!-- tests/stability/{part}.py, {version()} -->\n" + made + text[stop:])
+
+
 if __name__ == "__main__":
     program = str(pathlib.Path(sys.argv[1]).resolve()) if len(sys.argv) > 1 else str(ROOT / "target/debug/circ")
-    page = ROOT / "docs/stability.md"
-    marks = f"<!-- tests/stability/table.py, {version()} -->\n", "<!-- end -->\n"
-    made = marks[0] + table(program) + marks[1]
-    text = page.read_text()
-    start, end = text.index("<!-- tests/stability/table.py"), text.index(marks[1]) + len(marks[1])
-    page.write_text(text[:start] + made + text[end:])
+    parts = sys.argv[2:] or ["damping", "stiffness", "drift", "cases"]
+    if "damping" in parts:
+        damping.draw(program)
+    if "stiffness" in parts:
+        put("stiffness", stiffness.table(program))
+    if "drift" in parts:
+        put("drift", drift.table(program))
+    if "cases" in parts:
+        put("table", table(program))
