@@ -129,3 +129,207 @@ fn modes_are_assembled_when_they_are_visited() {
     assert!(rectifier.stats.events > 30);
     assert!(rectifier.stats.modes < 32, "{}", rectifier.stats.modes);
 }
+
+/// A netlist in which elements of these names have other cards, or which has them besides; what is recorded, if not what the netlist says.
+fn changed(name: &str, cards: &[(&str, &str)], probes: &[&str], method: Method) -> Run {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("netlists");
+    let text = std::fs::read_to_string(path.join(name)).expect("a netlist");
+    let mut lines: Vec<&str> = text.lines().collect();
+    for (name, card) in cards {
+        let of = |line: &&str| line.split_whitespace().next() == Some(name);
+        match lines.iter().position(of) {
+            Some(at) => lines[at] = card,
+            None => lines.insert(lines.len() - 1, card),
+        }
+    }
+    let model = circ::Model::parse(&(lines.join("\n") + "\n"), name).expect("a sound netlist");
+    let probes: Vec<String> = probes.iter().map(ToString::to_string).collect();
+    let model = model.asked(None, &probes).expect("signals");
+    let tstep = model.circuit().tran.expect("a .tran card").tstep;
+    let options = SimOptions {
+        method,
+        step: (method == Method::Theta).then_some(tstep),
+        unestimated: true,
+        ..SimOptions::default()
+    };
+    model.transient(options).expect("a run")
+}
+
+/// The largest difference of a signal that both have, relative to its largest value; all rows are those of both.
+fn apart(one: &Run, other: &Run) -> f64 {
+    let (a, b) = (&one.waveforms, &other.waveforms);
+    assert_eq!(a.time, b.time);
+    let column = |run: &Run, name: &str| -> Option<Vec<f64>> {
+        let w = &run.waveforms;
+        let at = w.names.iter().position(|n| n == name)?;
+        let rows = w.values.chunks(w.names.len());
+        Some(rows.map(|row| row[at]).collect())
+    };
+    let both = a.names.iter().filter_map(|name| {
+        let (x, y) = (column(one, name)?, column(other, name)?);
+        let size = x.iter().fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()));
+        let far = x.iter().zip(&y).map(|(x, y)| (x - y).abs());
+        Some(far.fold(0.0, f64::max) / size)
+    });
+    let found: Vec<f64> = both.collect();
+    assert!(!found.is_empty(), "no signal of both");
+    found.into_iter().fold(0.0, f64::max)
+}
+
+const NEVER: &str = "dx 2 3 clamp\n.model clamp d(vfwd=100 ron=10m)";
+
+/// Both have the same answer; a complementarity problem costs one solve in the mode, or one a step, and guards that steps look out for.
+#[test]
+fn a_diode_that_never_conducts_is_what_a_linear_circuit_is_spared() {
+    for (method, tolerance) in [(Method::Exact, 1e-12), (Method::Theta, 1e-8)] {
+        let linear = changed("rlc.cir", &[], &[], method);
+        let diode = changed("rlc.cir", &[("dx", NEVER)], &[], method);
+        let of = |run: &Run| (run.stats.systems, run.stats.impulsive, run.stats.modes);
+        assert_eq!((of(&linear), of(&diode)), ((0, 0, 1), (1, 0, 1)));
+        assert_eq!(linear.stats.lcp_solves, 0);
+        let (few, many) = (linear.stats.steps, diode.stats.steps);
+        match method {
+            Method::Exact => assert!(diode.stats.lcp_solves == 1 && many > 2 * few),
+            _ => assert_eq!((diode.stats.lcp_solves, many), (many, few)),
+        }
+        assert!(apart(&linear, &diode) < tolerance, "{method:?}");
+    }
+}
+
+/// The same diode with a resistance and without: one system each, jump logic in one of them, and the same answer.
+#[test]
+fn a_resistance_in_the_loop_of_a_diode_leaves_out_jump_logic() {
+    let cases = [
+        ("rlc.cir", "dx 2 3 clamp", (1, 0), (1, 1)),
+        ("bridge-resistor.cir", "dx 0 1 clamp", (1, 0), (1, 1)),
+        ("buck.cir", "dx 0 out clamp", (2, 0), (2, 2)),
+    ];
+    for (name, diode, without, with) in cases {
+        let ideal = format!("{diode}\n.model clamp d(vfwd=100 ron=0)");
+        let resistive = format!("{diode}\n.model clamp d(vfwd=100 ron=10m)");
+        let of = |card: &str| changed(name, &[("dx", card)], &[], Method::Exact);
+        let (resistive, ideal) = (of(&resistive), of(&ideal));
+        let built = |run: &Run| (run.stats.systems, run.stats.impulsive);
+        assert_eq!(
+            (built(&resistive), built(&ideal)),
+            (without, with),
+            "{name}"
+        );
+        assert_eq!((resistive.stats.jumps, ideal.stats.jumps), (0, 0), "{name}");
+        assert_eq!(resistive.stats.steps, ideal.stats.steps, "{name}");
+        assert!(apart(&resistive, &ideal) < 1e-12, "{name}");
+    }
+}
+
+/// Switches in place of the diode, and a load that does not interrupt the current: no position has a complementarity problem.
+#[test]
+fn converters_of_switches_alone_are_spared_a_complementarity_problem() {
+    let low = "s2 sw 0 0 gate low\n.model low sw(vt=-0.5 vh=0 ron=5m roff=10meg)";
+    let clocked = [
+        ("d1", low),
+        ("rload", "rload out 0 5"),
+        (".tran", ".tran 1u 200u uic"),
+    ];
+    let low = "S2 0 sw 0 g low\n.model low SW(ideal Vt=-5)";
+    let feedback = [("D1", low), (".tran", ".tran 0.1u 200u uic")];
+    let body = ("d2", "d2 0 sw body\n.model body d(vfwd=100 ron=10m)");
+    for (name, cards) in [
+        ("buck-open-loop.cir", &clocked[..]),
+        ("peak-current.cir", &feedback[..]),
+    ] {
+        for method in [Method::Exact, Method::Theta] {
+            let alone = changed(name, cards, &[], method);
+            let beside = changed(name, &[cards, &[body]].concat(), &[], method);
+            let of = |run: &Run| (run.stats.systems, run.stats.lcp_solves);
+            assert_eq!(of(&alone), (0, 0), "{name}, {method:?}");
+            let (systems, solves) = of(&beside);
+            assert!(
+                systems >= 2 && solves > 0,
+                "{name}, {method:?}: {systems}, {solves}"
+            );
+            assert!(
+                method == Method::Exact || solves >= beside.stats.steps,
+                "{name}"
+            );
+            assert_eq!(
+                alone.stats.events, beside.stats.events,
+                "{name}, {method:?}"
+            );
+            assert!(apart(&alone, &beside) < 1e-9, "{name}, {method:?}");
+        }
+    }
+}
+
+/// A source that controls switches alone is in no flow as long as nobody reads it: its corners are no steps.
+#[test]
+fn a_source_that_nobody_reads_is_not_followed() {
+    let short = (".tran", ".tran 1u 200u uic");
+    let gate = |probes: &[&str]| changed("buck-open-loop.cir", &[short], probes, Method::Exact);
+    let (unread, read) = (gate(&["v(out)"]), gate(&["v(out)", "v(gate)"]));
+    assert_eq!(unread.stats.events, read.stats.events);
+    // Twenty periods; of the four corners of each at least two are at no row.
+    let (few, many) = (unread.stats.steps, read.stats.steps);
+    assert!(many >= few + 40, "{few}, {many}");
+    assert!(apart(&unread, &read) < 1e-9);
+
+    let pulse = ("vx", "vx x 0 pulse(0 1 0 10n 10n 3.99u 10u)");
+    let linear = |probes: &[&str]| changed("rlc.cir", &[pulse], probes, Method::Exact);
+    let (unread, read) = (linear(&["v(3)"]), linear(&["v(3)", "v(x)"]));
+    assert_eq!(
+        unread.stats.steps,
+        changed("rlc.cir", &[], &[], Method::Exact).stats.steps
+    );
+    assert!(read.stats.steps >= unread.stats.steps + 3900);
+    assert!(apart(&unread, &read) < 1e-12);
+}
+
+/// The next edge of a clock is known, and what it leads to: no problem is solved there. A control that feels the output by a part in 10⁹ asks at each edge.
+#[test]
+fn a_clock_is_spared_the_question_where_it_leads() {
+    let at_once = ("vg", "vg gate 0 pulse(0 1 0 0 0 4u 10u)");
+    let short = (".tran", ".tran 1u 500u uic");
+    let felt = (
+        "s1",
+        "eg g 0 vol = {v(gate)+1e-9*v(out)}\ns1 in sw g 0 gated",
+    );
+    let of = |cards: &[(&str, &str)]| changed("buck-open-loop.cir", cards, &[], Method::Exact);
+    let (clock, asked) = (of(&[at_once, short]), of(&[at_once, short, felt]));
+    assert_eq!(clock.stats.events, asked.stats.events);
+    let solves = (clock.stats.lcp_solves, asked.stats.lcp_solves);
+    assert!(solves.0 < 20 && solves.1 > 100, "{solves:?}");
+    assert!(apart(&clock, &asked) < 1e-9);
+}
+
+/// Without the runs beside it the error is not known, and nothing else is different.
+#[test]
+fn steps_that_nobody_asks_for_their_error_make_no_runs_beside() {
+    let of = |unestimated| {
+        let options = SimOptions {
+            method: Method::Theta,
+            unestimated,
+            ..SimOptions::default()
+        };
+        let circuit = netlist("bridge-resistor.cir");
+        let behaviour = behaviour(&circuit).expect("a behaviour");
+        simulate(&circuit, &behaviour, options).expect("a run")
+    };
+    let (alone, beside) = (of(true), of(false));
+    assert!(alone.error.max.is_none() && beside.error.max.is_some());
+    assert_eq!(alone.stats.steps, beside.stats.steps);
+    assert_eq!(apart(&alone, &beside), 0.0);
+}
+
+/// A feedback circuit with seven switches and a diode: exact runs solve where something changes, steps in every step.
+#[test]
+fn exact_runs_solve_where_something_changes() {
+    let short = (".tran", ".tran 0.1u 200u uic");
+    let of = |method| changed("peak-current.cir", &[short], &[], method);
+    let (exact, steps) = (of(Method::Exact), of(Method::Theta));
+    assert!(
+        exact.stats.events > 80 && exact.stats.modes <= 8,
+        "{:?}",
+        exact.stats
+    );
+    assert!(exact.stats.lcp_solves < 20, "{}", exact.stats.lcp_solves);
+    assert!(steps.stats.lcp_solves >= 2000, "{}", steps.stats.lcp_solves);
+}

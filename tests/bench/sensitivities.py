@@ -3,13 +3,18 @@
 
     python3 tests/bench/sensitivities.py target/release/circ
 
-Buck converters with ladders behind them: all derivatives of two measurements. Time is that of the processor, user and system, the least of 15 runs in turn.
+Buck converters with ladders behind them: all derivatives of two measurements. Time is that of the processor, user and system, the least of 15 runs in turn; the table stands
+in docs/performance.md.
 """
 
 import os
 import subprocess
 import sys
 import tempfile
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "reference"))
+from page import write  # noqa: E402
 
 RUNS = 15
 
@@ -68,6 +73,7 @@ def seconds(command):
 
 def main():
     circ = sys.argv[1]
+    lines = ["| circuit | `circ sim` | `circ sens` | ratio |", "|---|---|---|---|"]
     with tempfile.TemporaryDirectory() as folder:
         for name, ladder in CIRCUITS.items():
             netlist = os.path.join(folder, "buck.cir")
@@ -78,8 +84,10 @@ def main():
                 for what in least:
                     least[what] = min(least[what], seconds([circ, what, netlist]))
             ratio = least["sens"] / least["sim"]
-            times = ", ".join(f"{what} {1e3 * least[what]:.1f} ms" for what in least)
-            print(f"{name}: {times}, {ratio:.1f} times")
+            times = " | ".join(f"{1e3 * least[what]:.1f} ms" for what in least)
+            lines.append(f"| {name} | {times} | {ratio:.1f} |")
+            print(lines[-1], flush=True)
+    write("sensitivities.py", lines)
 
 
 if __name__ == "__main__":

@@ -26,9 +26,9 @@ from pathlib import Path
 
 import numpy as np
 
+from page import write
+
 ROOT = Path(__file__).resolve().parent.parent.parent
-PAGE = ROOT / "docs" / "performance.md"
-BEGIN, END = "<!-- curved.py begins -->", "<!-- curved.py ends -->"
 TARGET = 1e-3
 DIVISIONS = 20
 REPEATS = 3
@@ -298,10 +298,7 @@ def main():
     ]
     print(lines[-1])
     if not args.print and not args.only:
-        text = PAGE.read_text()
-        before, rest = text.split(BEGIN)
-        after = rest.split(END)[1]
-        PAGE.write_text(before + BEGIN + "\n" + "\n".join(lines) + "\n" + END + after)
+        write("curved.py", lines)
     return 0
 
 

@@ -6,20 +6,20 @@
 Each netlist is measured by `circ bench FILE --against ngspice`. ngspice's best setting is the cheapest of its ladder (largest
 steps, `reltol`, `gear` and `trap`, four realisations of the diode) with an RMS error of at most 1e-4; where none gets there, its most
 accurate one, marked so. It has a row for each of its steps; where they are ten print steps long circ's exact run has its rows there too. Times are user CPU seconds: of circ the solve with its set-up and energy balance, of ngspice the process
-less its start-up. Runs of milliseconds are too short to time: those netlists are simulated over several times their span. With the PyPI package `pulsim` installed its fixed-step solver runs on two of the circuits too.
+less its start-up. Runs of milliseconds are too short to time: those netlists are simulated over several times their span. Points of other programs are those that peers.py found over the
+same spans (docs/precision/NAME.csv).
 """
 
-import csv
-import importlib.util
 import json
 import math
 import pathlib
 import platform
 import re
-import resource
 import subprocess
 import sys
 import tempfile
+
+from page import write
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 CIRCUITS = """bridge-resistor bridge-capacitor-filter buck rectifier rlcd clamp peak-detector voltage-doubler
@@ -40,7 +40,6 @@ LONGER = {
 TARGET = 1e-4
 # What the mean of repeated runs tells from the start-up, s.
 SHORTEST = 5e-4
-PAGE = ROOT / "docs" / "performance.md"
 
 
 def longer(netlist, times):
@@ -57,7 +56,9 @@ def bench(circ, name):
         picture.parent.mkdir(exist_ok=True)
         netlist = pathlib.Path(folder) / f"{name}.cir"
         netlist.write_text(longer((ROOT / "netlists" / f"{name}.cir").read_text(), LONGER.get(name, 1)))
-        command = [circ, "bench", netlist, "--against", "ngspice", "--quiet", "-o", data, "-o", picture]
+        points = picture.with_suffix(".csv")
+        others = ["--against", points] if points.exists() else []
+        command = [circ, "bench", netlist, "--against", "ngspice", *others, "--quiet", "-o", data, "-o", picture]
         subprocess.run(command, check=True, cwd=ROOT)
         return json.loads(data.read_text())["measurements"]
 
@@ -126,63 +127,6 @@ def row(name, measurements):
     return "| " + " | ".join(cells) + " |", ratio
 
 
-def bridge(ps):
-    """netlists/bridge-resistor.cir."""
-    b = ps.CircuitBuilder()
-    b.add_capacitor("c1", "1", "0", 1e-6, 10.0)
-    b.add_inductor("l1", "1", "0", 1e-2)
-    for name, anode, cathode in [("df1", "1", "2"), ("dr1", "0", "2"), ("dr2", "3", "1"), ("df2", "3", "0")]:
-        b.add_diode(name, anode, cathode, 1e6, 1e-9)
-    b.add_resistor("rload", "2", "3", 1e3)
-    return b, 5e-3, "v(1)", lambda r: r.v("1")
-
-
-def three_phase(ps):
-    """netlists/three-phase-rectifier.cir."""
-    b = ps.CircuitBuilder()
-    for phase, shift in [("a", 0.0), ("b", -120.0), ("c", 120.0)]:
-        b.add_sine_voltage_source(f"v{phase}", phase, "0", 0.0, 325.0, 50.0, math.radians(shift))
-        b.add_inductor(f"l{phase}", phase, f"{phase}1", 1e-3)
-        b.add_diode(f"dp{phase}", f"{phase}1", "p", 1e6, 1e-9)
-        b.add_diode(f"dn{phase}", "n", f"{phase}1", 1e6, 1e-9)
-    b.add_capacitor("cd", "p", "n", 1e-3, 500.0)
-    b.add_resistor("rload", "p", "n", 50.0)
-    b.add_resistor("rg", "n", "0", 1e6)
-    return b, 60e-3, "v(p,n)", lambda r: [p - n for p, n in zip(r.v("p"), r.v("n"))]
-
-
-def pulsim(circ):
-    """Lines of the table of Pulsim's engines: user CPU of the simulation and error of one voltage, relative to its amplitude."""
-    import numpy as np
-    import pulsim as ps
-
-    used = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_utime
-    settings = [{"dt": 1e-6}, {"dt": 1e-7}, {}, {"engine": "trbdf2", "rtol": 1e-6}, {"engine": "trbdf2", "rtol": 1e-8}]
-    for name, build in [("bridge-resistor", bridge), ("three-phase-rectifier", three_phase)]:
-        for setting in settings:
-            builder, stop, probe, read = build(ps)
-            words = ", ".join(f"{k} {v}" for k, v in setting.items()) or "default"
-            try:
-                result = ps.simulate(builder, t_end=stop, **setting)
-                spent, runs = 0.0, 0
-                while spent < 0.2:
-                    again, start = build(ps)[0], used()
-                    ps.simulate(again, t_end=stop, **setting)
-                    spent, runs = spent + used() - start, runs + 1
-                with tempfile.TemporaryDirectory() as folder:
-                    data = pathlib.Path(folder) / "exact.csv"
-                    netlist = ROOT / "netlists" / f"{name}.cir"
-                    command = [circ, "sim", netlist, "--method", "exact", "--quiet", "-o", data]
-                    subprocess.run(command, check=True)
-                    names = data.read_text().split("\n", 1)[0]
-                    exact = np.loadtxt(data, delimiter=",", skiprows=1)
-                column = exact[:, next(csv.reader([names])).index(probe)]
-                error = np.abs(np.interp(exact[:, 0], result.times, read(result)) - column)[1:].max()
-                yield f"| {name} | {words} | {seconds(spent / runs)} | {error / np.abs(column).max():.0e} |"
-            except Exception as failure:  # whatever it says is the result
-                yield f"| {name} | {words} | fails | {str(failure)[:80]} |"
-
-
 def main():
     circ, *names = sys.argv[1:] or [ROOT / "target" / "release" / "circ"]
     lines, ratios = [], []
@@ -204,14 +148,8 @@ def main():
         ]
     )
     pictures = [f"![{name}: error against run time](precision/{name}.svg)" for name in names or CIRCUITS]
-    if importlib.util.find_spec("pulsim"):
-        head = ["", "| netlist | Pulsim 2.0 | CPU | error |", "|---|---|---|---|"]
-        table += "\n".join(["", *head, *pulsim(circ)])
     table += "\n\n" + "\n".join(pictures)
-    begin, end = "<!-- precision.py begins -->", "<!-- precision.py ends -->"
-    text = PAGE.read_text()
-    before, after = text.split(begin)[0], text.split(end)[1]
-    PAGE.write_text(f"{before}{begin}\n{table}\n{end}{after}")
+    write("precision.py", [table])
 
 
 if __name__ == "__main__":

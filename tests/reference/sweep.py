@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Variants of an open-loop buck in one process: what a variant costs by circ, by Pulsim and by ngspice, for the same three measures.
 
-    pip install ./python pulsim spicelib && tests/reference/sweep.py [--circ PATH] [--variants 10000]
+    pip install ./python pulsim spicelib distributed && tests/reference/sweep.py [--circ PATH] [--variants 10000]
 
 A transient of 10 ms at 100 kHz from rest, and of its last millisecond the mean of the output and the peak to peak and RMS values of the inductor's current. circ takes all variants;
 Pulsim (steps of a 200th of a period) and ngspice (through spicelib, steps of a 200th at most), measured by numpy, take FEW of them, one after the other. CPU is that
-of the process and its children, with set-up; the difference is the largest of a measure to circ's, relative to it.
+of the process and its children, with set-up; the difference is the largest of a measure to circ's, relative to it. Below the table stand the same number of periodic steady states
+with the derivatives of all three measures to all elements, by two threads with a model each, and what a second worker process of Dask is worth.
 """
 
 import argparse
@@ -14,11 +15,15 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 
+from page import write
+
 FEW = 5
+THREADS = 2
 PERIOD = 1e-5
 LOAD = {"interrupted": 20.0, "not interrupted": 5.0}
 DECK = """* buck
@@ -123,6 +128,33 @@ def by_ngspice(deck, values):
     return np.array(rows)
 
 
+def steady(deck, values):
+    """Measures at the steady state and their derivatives, a thread and a model to each half."""
+    import circ
+
+    def half(part):
+        model = circ.parse(deck)
+        for henries in part:
+            model.set("l", float(henries))
+            model.sensitivity(of=MEASURES, steady=True)
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        list(pool.map(half, [values[k::THREADS] for k in range(THREADS)]))
+
+
+def by_dask(deck, values, workers):
+    """Wall time on so many worker processes that are there already, s."""
+    import circ
+    from distributed import Client, LocalCluster
+
+    with LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None) as cluster, Client(cluster) as client:
+        model = circ.parse(deck)
+        circ.sweep(model, {"l": values[:100]}, measures=MEASURES, engine="dask", client=client)
+        begun = time.perf_counter()
+        circ.sweep(model, {"l": values}, measures=MEASURES, engine="dask", client=client)
+        return time.perf_counter() - begun
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--circ", help="the program, for `circ sweep`")
@@ -130,7 +162,7 @@ def main():
     asked = parser.parse_args()
     values = inductances(asked.variants)
     few = values[:: max(1, len(values) // FEW)][:FEW]
-    print("| current | by | variants | CPU a variant | wall time | largest difference |\n|---|---|---|---|---|---|")
+    lines = ["| current | by | variants | CPU a variant | wall time | largest difference |", "|---|---|---|---|---|---|"]
     for name, ohms in LOAD.items():
         deck = DECK.replace("LOAD", f"{ohms:g}")
         own = by_circ(deck, few)
@@ -143,7 +175,15 @@ def main():
             spent, wall, found = timed(lambda: call(over))
             at = found[:: max(1, len(values) // FEW)][:FEW] if len(over) > FEW else found
             off = np.max(np.abs(at / own - 1))
-            print(f"| {name} | {by} | {len(over)} | {1e3 * spent / len(over):.3g} ms | {wall:.2f} s | {off:.1g} |", flush=True)
+            lines.append(f"| {name} | {by} | {len(over)} | {1e3 * spent / len(over):.3g} ms | {wall:.2f} s | {off:.1g} |")
+            print(lines[-1], flush=True)
+    deck = DECK.replace("LOAD", f"{LOAD['not interrupted']:g}")
+    spent, wall, _ = timed(lambda: steady(deck, values))
+    lines += ["", f"{len(values)} steady states with derivatives of three measures to all elements (5 Ω): {wall:.2f} s, {1e3 * spent / len(values):.3g} ms of CPU each."]
+    one, two = by_dask(deck, values, 1), by_dask(deck, values, 2)
+    lines.append(f"Dask, one worker process and two: {one:.2f} s and {two:.2f} s, {one / two:.2f} times as fast.")
+    print(*lines[-2:], sep="\n")
+    write("sweep.py", lines)
 
 
 if __name__ == "__main__":
