@@ -39,7 +39,7 @@ from page import write
 from peers_programs import CURVED, HERE, ROOT, Circ, Circuit, Failed, Gnucap, Ngspice, SPARE, Package, Siconos, Smooth
 
 TARGET = 1e-3
-PATIENCE = 20
+PATIENCE = 10
 DENSE = 50_000
 TIGHT = 1e-9
 LEVEL = 0.01
@@ -148,7 +148,7 @@ class Reference:
         return worst, here, there
 
     def exact(self, circ, folder):
-        """Of the exact run against 40 digits: largest errors of states and of times of events, relative, and the number of events."""
+        """Of the exact run against 40 digits: largest error of states, energy norm at their instants, largest error of times of events, relative, and the number of events."""
         states = [(q, t, v) for q, t, v in self.digits if "(" in q]
         events = {t for q, t, _ in self.digits if "(" not in q}
         times = sorted({t for _, t, _ in states})
@@ -157,8 +157,10 @@ class Reference:
         data = exact.read(self.circuit, folder, out, err)[0]
         sizes = {quantity: max(abs(v) for q, _, v in states if q == quantity) for quantity, _, _ in states}
         value = lambda q, t: self.circuit.value(data, q)[np.abs(data["time"] - t).argmin()]
+        off = {(q, t): value(q, t) - v for q, t, v in states}
+        energies = self.energy(np.array([[off[s.replace(",0)", ")"), t] for t in times] for s in self.circuit.states]))
         late = max((np.abs(data["time"] - t).min() / times[-1] for t in events), default=0.0)
-        return max(abs(value(q, t) - v) / sizes[q] for q, t, v in states), late, len(events)
+        return max(abs(e) / sizes[q] for (q, _), e in off.items()), float(np.sqrt(energies.mean() / self.largest)), late, len(events)
 
 
 def ladder(program, circuit, reference, idle):
@@ -215,8 +217,8 @@ def cells(points, exact):
         off, here, there = p["events"]
         late = small(off) if here == there else f"{small(off)} ({there} of {here})"
     if exact:
-        error, off, count = exact
-        norms = [f"{error:.0e}", "", "", "", f"{off:.0e} of {count}"]
+        error, energy, off, count = exact
+        norms = [f"{error:.0e}", "", f"{energy:.0e}", "", f"{off:.0e} of {count}"]
     else:
         norms = [small(p["max"]), small(p["rms"]) if within else f"*{small(p['rms'])}*", small(p["energy"]), small(p["devices"]), late]
     told = p["setting"] + (f" ({failed} of {len(points)} settings fail)" if failed else "")
