@@ -256,11 +256,32 @@ impl Model {
     /// The netlist is no circuit with them, or there is no netlist.
     pub fn at(&self, sweeps: &[Sweep], values: &[f64], sample: Option<u64>) -> Result<Self, Error> {
         let circuit = self.circuit_at(sweeps, values, sample)?;
+        self.of_options(circuit, self.options_at(sweeps, values, sample))
+    }
+
+    /// The same, which shows what is measured alone.
+    ///
+    /// # Errors
+    /// As [`Self::at`].
+    pub(crate) fn measured_at(
+        &self,
+        sweeps: &[Sweep],
+        values: &[f64],
+        sample: Option<u64>,
+    ) -> Result<Self, Error> {
+        let mut circuit = self.circuit_at(sweeps, values, sample)?;
+        circuit.probes.clone_from(&circuit.measured);
+        circuit.columns.clear();
+        self.of_options(circuit, self.options_at(sweeps, values, sample))
+    }
+
+    /// The model of the circuit to which these choices lead.
+    fn of_options(&self, circuit: Circuit, options: ElaborateOptions) -> Result<Self, Error> {
         match mna::behaviour(&circuit) {
             Ok(multiport) => Ok(Self {
                 netlist: self.netlist.clone(),
                 sources: Arc::clone(&self.sources),
-                options: self.options_at(sweeps, values, sample),
+                options,
                 circuit,
                 multiport,
                 findings: self.findings.clone(),

@@ -142,9 +142,11 @@ fn curves(course: &Course, outputs: &[usize], from: f64) -> Result<Option<Curves
             for (values, output) in values.iter_mut().zip(outputs) {
                 *values = nodes[*output];
             }
-            w = motion.after(part.level, &w)?;
             let until = ((seconds - part.age) / part.length).min(1.0);
-            found.push((stretch.from + part.age, part.length, until), &values);
+            if until == 1.0 {
+                w = motion.after(part.level, &w)?;
+            }
+            found.push_cut((stretch.from + part.age, part.length, until), &values);
         }
     }
     for leap in course.leaps.iter().filter(|leap| leap.t >= from) {

@@ -113,6 +113,12 @@ impl<'m> Variant<'m> {
         self.base.at(self.sweeps, &self.values, self.sample)
     }
 
+    /// The same, which shows what is measured alone.
+    fn measured_model(&self) -> Result<Model, Error> {
+        self.base
+            .measured_at(self.sweeps, &self.values, self.sample)
+    }
+
     /// Its circuit alone.
     pub(super) fn circuit(&self) -> Result<Circuit, Error> {
         let (sweeps, values) = (self.sweeps, &self.values);
@@ -261,7 +267,7 @@ impl Wanted<'_> {
             measured: vec![None; self.measured.len()],
             failed: None,
         };
-        let found = variant.model().and_then(|model| {
+        let found = variant.measured_model().and_then(|model| {
             let drawn = self.drawn.iter().map(|name| model.circuit().value(name));
             row.drawn = drawn.collect();
             self.found(&model)
@@ -282,26 +288,19 @@ impl Wanted<'_> {
     /// What the measurements of a model find; a run that breaks off measures nothing.
     fn found(&self, model: &Model) -> Result<Vec<Measured>, Error> {
         let (settings, cancel) = (self.options.settings.clone(), self.options.cancel);
-        let circuit = model.circuit();
-        // None would be all.
-        let model = model.with_circuit(Circuit {
-            probes: circuit.measured.clone(),
-            columns: vec![],
-            ..model.circuit().clone()
-        })?;
         if self.options.steady {
             let options = PeriodicOptions {
                 cancel,
                 settings,
                 ..PeriodicOptions::default()
             };
-            return Ok(periodic_measured(&model, &options)?.2.measured);
+            return Ok(periodic_measured(model, &options)?.2.measured);
         }
         let options = SimOptions {
             cancel,
             settings,
             ..SimOptions::default()
         };
-        measured(&model, options, true)
+        measured(model, options, true)
     }
 }

@@ -9,10 +9,12 @@ pub(crate) const INTERVALS: usize = 8;
 pub(crate) const VALUES: usize = INTERVALS + 1;
 /// Of the polynomial through values at x = 0 … 8 in its barycentric form: (−1)^j 8!/(j! (8 − j)!).
 const BARYCENTRIC: [f64; VALUES] = [1.0, -8.0, 28.0, -56.0, 70.0, -56.0, 28.0, -8.0, 1.0];
-/// What the slope at x = i has of y_j − y_i, in parts of the length of an interval.
+/// 8!: l_j(x) = [`BARYCENTRIC`]_j Π_{i ≠ j} (x − i) / 8!.
+const PRODUCT: f64 = 40320.0;
+/// By j the slopes of l_j at x = i.
 const SLOPES: [[f64; VALUES]; VALUES] = slopes();
-/// l_j at the nodes of Gauss and Legendre.
-const AT_NODES: [[f64; VALUES]; NODES.len()] = at_nodes();
+/// By j what l_j is at the nodes of Gauss and Legendre.
+const AT_NODES: [[f64; NODES.len()]; VALUES] = at_nodes();
 /// ∫ over its length by Newton and Cotes, exact up to degree 9.
 const COTES: [f64; VALUES] = [
     989.0, 5888.0, -928.0, 10496.0, -4540.0, 10496.0, -928.0, 5888.0, 989.0,
@@ -26,7 +28,9 @@ const fn slopes() -> [[f64; VALUES]; VALUES] {
         let mut j = 0;
         while j < VALUES {
             if j != i {
-                all[i][j] = BARYCENTRIC[j] / BARYCENTRIC[i] / (i as f64 - j as f64);
+                let slope = BARYCENTRIC[j] / BARYCENTRIC[i] / (i as f64 - j as f64);
+                all[j][i] = slope;
+                all[i][i] -= slope;
             }
             j += 1;
         }
@@ -35,19 +39,19 @@ const fn slopes() -> [[f64; VALUES]; VALUES] {
     all
 }
 
-const fn at_nodes() -> [[f64; VALUES]; NODES.len()] {
-    let mut all = [[0.0; VALUES]; NODES.len()];
+const fn at_nodes() -> [[f64; NODES.len()]; VALUES] {
+    let mut all = [[0.0; NODES.len()]; VALUES];
     let mut i = 0;
     while i < NODES.len() {
         let (mut sum, mut j) = (0.0, 0);
         while j < VALUES {
-            all[i][j] = BARYCENTRIC[j] / (NODES[i] * INTERVALS as f64 - j as f64);
-            sum += all[i][j];
+            all[j][i] = BARYCENTRIC[j] / (NODES[i] * INTERVALS as f64 - j as f64);
+            sum += all[j][i];
             j += 1;
         }
         while j > 0 {
             j -= 1;
-            all[i][j] /= sum;
+            all[j][i] /= sum;
         }
         i += 1;
     }
@@ -69,17 +73,43 @@ pub struct Curve {
 
 /// Σ_j l_j(s) y_j, l_j the polynomials of Lagrange; of constant values it is that constant.
 pub(crate) fn interpolated(values: &[f64; VALUES], s: f64) -> f64 {
-    let x = s * INTERVALS as f64;
-    if let Some(y) = on_a_value(x) {
+    if let Some(y) = on_a_value(s * INTERVALS as f64) {
         return values[y];
     }
-    let (mut above, mut below) = (0.0, 0.0);
-    for (j, (y, b)) in values.iter().zip(BARYCENTRIC).enumerate() {
-        let weight = b / (x - j as f64);
-        above += weight * (y - values[0]);
-        below += weight;
+    let terms = values.iter().zip(basis(s));
+    values[0] + terms.map(|(y, part)| part * (y - values[0])).sum::<f64>()
+}
+
+/// y_0 + Σ_j (y_j − y_0) row_j.
+pub(super) fn combined<const N: usize>(
+    values: &[f64; VALUES],
+    rows: &[[f64; N]; VALUES],
+) -> [f64; N] {
+    offs(values, rows).map(|off| values[0] + off)
+}
+
+/// Σ_j (y_j − y_0) row_j.
+fn offs<const N: usize>(values: &[f64; VALUES], rows: &[[f64; N]; VALUES]) -> [f64; N] {
+    let mut sums = [0.0; N];
+    for (y, row) in values.iter().zip(rows) {
+        let off = y - values[0];
+        sums.iter_mut()
+            .zip(row)
+            .for_each(|(sum, part)| *sum += part * off);
     }
-    values[0] + above / below
+    sums
+}
+
+/// By j what l_j is at s = 0, `until`/8 … `until`.
+pub(super) fn cut(until: f64) -> [[f64; VALUES]; VALUES] {
+    let mut rows = [[0.0; VALUES]; VALUES];
+    for k in 0..VALUES {
+        let own = basis(until * k as f64 / INTERVALS as f64);
+        rows.iter_mut()
+            .zip(own)
+            .for_each(|(row, part)| row[k] = part);
+    }
+    rows
 }
 
 /// The value at x intervals from the first one, where there is one.
@@ -94,9 +124,19 @@ pub(crate) fn basis(s: f64) -> [f64; VALUES] {
     if let Some(own) = on_a_value(x) {
         return std::array::from_fn(|j| f64::from(u8::from(j == own)));
     }
-    let parts: [f64; VALUES] = std::array::from_fn(|j| BARYCENTRIC[j] / (x - j as f64));
-    let sum: f64 = parts.iter().sum();
-    parts.map(|part| part / sum)
+    // Those before it from the left, then those behind it from the right.
+    let mut product = 1.0;
+    let mut own: [f64; VALUES] = std::array::from_fn(|j| {
+        let before = product;
+        product *= x - j as f64;
+        before
+    });
+    product = 1.0;
+    for (j, own) in own.iter_mut().enumerate().rev() {
+        *own *= product * (BARYCENTRIC[j] / PRODUCT);
+        product *= x - j as f64;
+    }
+    own
 }
 
 /// The first, second … derivatives of l_j at s.
@@ -144,11 +184,7 @@ impl Curve {
 
     /// dy/ds at the instants of its values.
     fn slopes(&self) -> [f64; VALUES] {
-        std::array::from_fn(|i| {
-            let parts = SLOPES[i].iter().zip(self.values);
-            let parts = parts.map(|(part, y)| part * (y - self.values[i]));
-            INTERVALS as f64 * parts.sum::<f64>()
-        })
+        offs(&self.values, &SLOPES).map(|slope| INTERVALS as f64 * slope)
     }
 
     /// dy/dt at s.
@@ -158,18 +194,13 @@ impl Curve {
 
     /// ∫ f(y) ds from `low` to `high` by Gauss and Legendre, exact up to degree 15; f(y, s) with s from −1 to 1.
     pub(super) fn gauss(&self, (low, high): (f64, f64), f: impl Fn(f64, f64) -> f64) -> f64 {
-        let whole = (low, high) == (0.0, 1.0);
-        let points = NODES.iter().zip(WEIGHTS).zip(&AT_NODES);
-        let terms = points.map(|((x, weight), basis)| {
-            let y = if whole {
-                let terms = basis.iter().zip(&self.values);
-                let terms = terms.map(|(part, y)| part * (y - self.values[0]));
-                self.values[0] + terms.sum::<f64>()
-            } else {
-                self.at(low + (high - low) * x)
-            };
-            weight * f(y, 2.0 * x - 1.0)
-        });
+        let values = if (low, high) == (0.0, 1.0) {
+            combined(&self.values, &AT_NODES)
+        } else {
+            NODES.map(|x| self.at(low + (high - low) * x))
+        };
+        let points = NODES.iter().zip(WEIGHTS).zip(values);
+        let terms = points.map(|((x, weight), y)| weight * f(y, 2.0 * x - 1.0));
         (high - low) * terms.sum::<f64>()
     }
 
@@ -284,6 +315,25 @@ mod tests {
         assert!((first[3] - of(3.0 / 16.0)).abs() < 1e-14);
         assert!((second[5] - of(13.0 / 16.0)).abs() < 1e-14);
         assert_eq!(own.end(), 2.45);
+    }
+
+    #[test]
+    fn a_part_is_the_same_polynomial_through_other_values() {
+        let of = |s: f64| 1.0 + s - 3.0 * s.powi(4) + 2.0 * s.powi(8);
+        for until in [1.0, 0.9, 0.37, 1e-3] {
+            let own = curve(of, 1.0);
+            let part = Curve {
+                length: own.length * until,
+                values: combined(&own.values, &cut(until)),
+                ..own
+            };
+            for k in 0..=20 {
+                let s = f64::from(k) / 20.0;
+                assert!((part.at(s) - of(until * s)).abs() < 1e-13, "{until} {s}");
+            }
+            let whole = own.length * own.integral((0.0, until));
+            assert!((part.length * part.integral((0.0, 1.0)) - whole).abs() < 1e-15);
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The signals of a run, and expressions over them as waveforms.
 
-use super::curve::{Curve, INTERVALS, VALUES, interpolated};
+use super::curve::{Curve, INTERVALS, VALUES, combined, cut, interpolated};
 use super::{MeasureError, Trace};
 use crate::settings::tolerances::times::CURVE_CLOSE;
 
@@ -53,6 +53,22 @@ impl Curves {
         assert_eq!(values.len(), self.columns);
         self.pieces.push(piece);
         self.values.extend_from_slice(values);
+    }
+
+    /// The same as a piece that belongs to the waveform as a whole: its polynomial through other values.
+    pub(crate) fn push_cut(
+        &mut self,
+        (begin, length, until): (f64, f64, f64),
+        values: &[[f64; VALUES]],
+    ) {
+        self.push((begin, length * until, 1.0), values);
+        if until < 1.0 {
+            let rows = cut(until);
+            let from = self.values.len() - self.columns;
+            for own in &mut self.values[from..] {
+                *own = combined(own, &rows);
+            }
+        }
     }
 
     /// Adds an impulse: its time, s, and by signal its area.

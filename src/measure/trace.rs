@@ -137,6 +137,15 @@ impl Piece<'_> {
     }
 }
 
+/// The pieces of from ≤ t ≤ to, and which parts of them lie there.
+fn parts(curves: &[Curve], (from, to): (f64, f64)) -> impl Iterator<Item = (&Curve, (f64, f64))> {
+    let first = curves.partition_point(|curve| curve.end() < from);
+    let inside = curves[first..]
+        .iter()
+        .take_while(move |curve| curve.begin <= to);
+    inside.map(move |curve| (curve, (curve.place(from), curve.place(to))))
+}
+
 impl<'a> Trace<'a> {
     /// Straight lines between rows: times in s, nondecreasing, and as many values. Two rows at one time are an edge.
     #[must_use]
@@ -202,13 +211,8 @@ impl<'a> Trace<'a> {
                 }
             }
             Shape::Curves(curves) => {
-                let first = curves.partition_point(|curve| curve.end() < from);
                 let mut before: Option<f64> = None;
-                for curve in &curves[first..] {
-                    if curve.begin > to {
-                        break;
-                    }
-                    let part = (curve.place(from), curve.place(to));
+                for (curve, part) in parts(curves, (from, to)) {
                     let (t, begins) = (curve.time(part.0), curve.at(part.0));
                     if let Some(ends) = before.filter(|ends| *ends != begins) {
                         see(Piece::Line(Line {
@@ -225,6 +229,16 @@ impl<'a> Trace<'a> {
         }
     }
 
+    /// The same without edges, which have no length and no values but those beside them.
+    fn lengths(&self, window: (f64, f64), mut see: impl FnMut(Piece<'_>)) {
+        match &self.shape {
+            Shape::Lines { .. } => self.pieces(window, see),
+            Shape::Curves(curves) => {
+                parts(curves, window).for_each(|(curve, part)| see(Piece::Curve(curve, part)));
+            }
+        }
+    }
+
     /// A measure over from ≤ t ≤ to.
     ///
     /// # Errors
@@ -232,7 +246,7 @@ impl<'a> Trace<'a> {
     pub fn over(&self, what: Over, from: f64, to: f64) -> Result<f64, MeasureError> {
         let sum = |f: &dyn Fn(&Piece<'_>) -> f64| {
             let mut sum = 0.0;
-            self.pieces((from, to), |piece| sum += f(&piece));
+            self.lengths((from, to), |piece| sum += f(&piece));
             sum
         };
         let length = sum(&|piece| piece.length());
@@ -249,7 +263,7 @@ impl<'a> Trace<'a> {
         // When and how much.
         let extremes = || {
             let (mut least, mut most) = ((f64::NAN, f64::INFINITY), (f64::NAN, f64::NEG_INFINITY));
-            self.pieces((from, to), |piece| {
+            self.lengths((from, to), |piece| {
                 piece.corners(|t, y| {
                     if y < least.1 {
                         least = (t, y);

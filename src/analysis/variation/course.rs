@@ -22,7 +22,7 @@ pub(crate) struct Stretch {
     pub(crate) to: f64,
     /// x where it begins.
     pub(crate) start: DVector<f64>,
-    /// By input.
+    /// By input; zero for those that nothing but controls of switches sees.
     pub(crate) pieces: Vec<Piece>,
 }
 
@@ -62,6 +62,7 @@ impl Course {
         let Some(passages) = simulation.passages(place, until, Corners::Seen, cancel)? else {
             return Ok(None);
         };
+        let silent = simulation.silent_sources();
         let mut course = Self::default();
         let mut assembler = simulation.assembler(until - from);
         let same = SAME_TIME * from.abs().max(until.abs());
@@ -70,7 +71,7 @@ impl Course {
         for instant in passages.chunk_by(|a, b| b.t - a.t <= same) {
             let (first, last) = (&instant[0], &instant[instant.len() - 1]);
             if let Some(begun) = begun.take() {
-                course.stretch(begun, first.t, same)?;
+                course.stretch(begun, (first.t, same), &silent)?;
                 course.leap(instant, &mut assembler, impulses, same)?;
             }
             let system = course.system(&last.to, &mut assembler)?;
@@ -81,7 +82,7 @@ impl Course {
             let what = "a run in no mode";
             return Err(Error::before(Reason::internal("analysis::variation", what)));
         };
-        course.stretch(begun, until, same)?;
+        course.stretch(begun, (until, same), &silent)?;
         Ok(Some(course))
     }
 
@@ -96,11 +97,17 @@ impl Course {
     fn stretch(
         &mut self,
         (system, from, start): (usize, f64, DVector<f64>),
-        to: f64,
-        same: f64,
+        (to, same): (f64, f64),
+        silent: &[bool],
     ) -> Result<(), Error> {
-        let inputs = self.systems[system].lcs.inputs.iter();
-        let pieces = inputs.map(|input| input.source.piece(from + same));
+        let inputs = self.systems[system].lcs.inputs.iter().zip(silent);
+        let pieces = inputs.map(|(input, silent)| {
+            if *silent {
+                Some(Piece::zero())
+            } else {
+                input.source.piece(from + same)
+            }
+        });
         let pieces = pieces.collect::<Option<_>>();
         self.stretches.push(Stretch {
             system,

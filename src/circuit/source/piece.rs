@@ -106,6 +106,11 @@ pub struct Piece {
 }
 
 impl Piece {
+    /// Zero at all times.
+    pub(crate) fn zero() -> Self {
+        Self::line(f64::NEG_INFINITY, f64::INFINITY, 0.0, 0.0, 0.0)
+    }
+
     /// The oscillating and decaying terms (at most three).
     pub fn terms(&self) -> impl Iterator<Item = &Oscillation> {
         self.terms.iter().filter(|term| term.amplitude != 0.0)

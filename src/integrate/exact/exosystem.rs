@@ -238,6 +238,11 @@ impl Exosystem {
         self.pieces.clone_from_slice(pieces);
     }
 
+    /// By input whether it is left out.
+    pub(super) fn silent(&self) -> &[bool] {
+        &self.silent
+    }
+
     /// Length of z; z[0] = 1.
     pub(crate) fn dim(&self) -> usize {
         self.columns.len()
@@ -376,6 +381,44 @@ mod tests {
             phase,
             cycles: None,
         })
+    }
+
+    /// Pieces that an exosystem holds are those for which another one would be alike.
+    #[test]
+    fn pieces_are_held_where_another_system_would_be_alike() {
+        let line = |constant: f64, slope: f64| Wave::Pwl {
+            points: vec![(0.0, constant), (1.0, constant + slope)],
+            repeat: None,
+            delay: 0.0,
+        };
+        let piece = |wave: Wave| source(wave).piece(0.5).unwrap();
+        let of = |pieces: &[Piece]| {
+            let shapes: Vec<Shape> = pieces.iter().map(|piece| Shape::of([piece])).collect();
+            Exosystem::new(&shapes, pieces.to_vec())
+        };
+        let all = [
+            [piece(Wave::Dc(4.0)), piece(line(1.0, 2.0))],
+            [piece(Wave::Dc(4.0)), piece(line(3.0, -1.0))],
+            [piece(Wave::Dc(5.0)), piece(line(1.0, 2.0))],
+            [piece(Wave::Dc(4.0)), piece(line(1.0, 0.0))],
+            [
+                sine(2.0, 0.0, 30.0, 0.0).piece(0.5).unwrap(),
+                piece(line(1.0, 2.0)),
+            ],
+        ];
+        for (k, own) in all.iter().enumerate() {
+            for (l, other) in all.iter().enumerate() {
+                let (held, alike) = (of(own).holds(other), of(own).is_alike(&of(other)));
+                // Waves are compared by what they make.
+                assert_eq!(held, alike && k < 4, "{k} {l}");
+            }
+        }
+        let mut moved = of(&all[0]);
+        moved.set_pieces(&all[1]);
+        let (mut z, mut expected) = (vec![0.0; moved.dim()], vec![0.0; moved.dim()]);
+        moved.write(0.75, &mut z);
+        of(&all[1]).write(0.75, &mut expected);
+        assert_eq!(z, expected);
     }
 
     /// H z(t) is the source and H S z(t) its derivative, for every kind of column, across breakpoints.

@@ -1,5 +1,7 @@
 //! A mode: which devices conduct, where the switches stand, and the linear system that holds there.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::clock::Clock;
@@ -37,7 +39,7 @@ pub(crate) struct SwitchFacts<'a> {
 #[derive(Debug, Clone)]
 pub(crate) struct Mode {
     /// Its name.
-    pub(crate) key: Key,
+    pub(crate) key: Arc<Key>,
     /// Number of states.
     pub(crate) n: usize,
     /// Its flow and guards: first those of devices, then those of switches.
@@ -222,7 +224,7 @@ impl Mode {
                 .map(|&i| key.switches[i] && thresholds[i].is_sharp())
                 .collect(),
             guarded_switches,
-            key,
+            key: Arc::new(key),
             constraints,
             driven,
             keeps,

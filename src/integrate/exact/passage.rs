@@ -1,5 +1,7 @@
 //! A change of mode, as the derivative of the flow needs it.
 
+use std::sync::Arc;
+
 use super::key::{Key, Owner};
 use crate::settings::tolerances::jumps::FOLLOWS_JUMP;
 
@@ -19,9 +21,9 @@ pub(crate) struct Passage {
     /// Time, s.
     pub(crate) t: f64,
     /// The mode that was left; none where a run starts.
-    pub(crate) from: Option<Key>,
+    pub(crate) from: Option<Arc<Key>>,
     /// The mode that was entered.
-    pub(crate) to: Key,
+    pub(crate) to: Arc<Key>,
     /// Whose guard fell through zero; none where sources did it.
     pub(crate) cause: Option<Owner>,
     /// All capacitor voltages and inductor currents before, V and A.

@@ -199,7 +199,7 @@ impl ModeTable {
     pub(crate) fn let_go(&self, at: usize) -> impl Iterator<Item = usize> {
         let Key {
             closed, switches, ..
-        } = &self.modes[at].key;
+        } = &*self.modes[at].key;
         let blocks = |i: usize| self.valves[i].is_some_and(|pair| !closed[pair]);
         let thresholds = self.thresholds.iter().enumerate();
         let holding = thresholds.filter(|(i, t)| t.holds(switches[*i], switches));

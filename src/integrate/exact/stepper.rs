@@ -4,6 +4,8 @@ mod pause;
 mod periods;
 mod sharing;
 
+use std::sync::Arc;
+
 use nalgebra::DVector;
 
 use super::ahead::DenseOutput;
@@ -388,8 +390,8 @@ impl Exact {
             let from = mode.map(|at| &self.table.modes[at]);
             passages.push(Passage {
                 t: self.travel.t,
-                from: from.map(|mode| mode.key.clone()),
-                to: self.key.clone(),
+                from: from.map(|mode| Arc::clone(&mode.key)),
+                to: Arc::new(self.key.clone()),
                 cause: match trigger {
                     Trigger::Guard(guard) => from.map(|mode| mode.owner(guard)),
                     Trigger::Sources => None,
@@ -443,7 +445,7 @@ impl Exact {
         left_row: Option<Vec<f64>>,
         log: &mut Log,
     ) -> Result<(), Error> {
-        let left = self.mode.map(|at| self.table.modes[at].key.clone());
+        let left = self.mode.map(|at| Key::clone(&self.table.modes[at].key));
         self.key = left.unwrap_or_else(|| key.clone());
         let (values, scale) = (self.storage.values.clone(), self.storage.scale.clone());
         let known = self.storage.known.clone();

@@ -12,7 +12,7 @@ use crate::integrate::theta::Instant;
 
 impl Simulation {
     /// The changes of mode on the way from a place, as for [`Self::stand_at`], to time `until`, s: the first is the one into the mode there.
-    /// `None` where the way is not exact throughout. It ends when `cancel` is set.
+    /// `None` where the way is not exact throughout. Where corners are those that are seen, periods are taken together by their map. It ends when `cancel` is set.
     ///
     /// # Errors
     /// As [`Self::advance_to`].
@@ -28,11 +28,18 @@ impl Simulation {
         };
         exact.keep_passages(corners);
         self.stand_at(t, state, switches)?;
-        self.advance(until, false, cancel)?;
+        if let (Way::Exact(exact), Corners::Seen) = (&mut self.way, corners) {
+            exact.take_periods();
+        }
+        let advanced = self.advance(until, false, cancel);
         let passages = match &mut self.way {
-            Way::Exact(exact) => exact.take_passages(),
+            Way::Exact(exact) => {
+                exact.leave_periods();
+                exact.take_passages()
+            }
             Way::Steps(_) => None,
         };
+        advanced?;
         let whole = |passages: &Vec<Passage>| {
             let mut from = passages.iter().map(|passage| passage.from.is_some());
             from.next() == Some(false) && from.all(|known| known)
@@ -63,6 +70,14 @@ impl Simulation {
         let taken = exact.leave_periods();
         advanced?;
         Ok(Some(taken).filter(|_| !self.way.stepper().has_stepped()))
+    }
+
+    /// By input whether an exact run leaves it out: nothing but controls of switches sees it.
+    pub(crate) fn silent_sources(&self) -> Vec<bool> {
+        match &self.way {
+            Way::Exact(exact) => exact.integrator().silent_sources().to_vec(),
+            Way::Steps(_) => vec![],
+        }
     }
 
     /// Where a run in steps stands; `None` of one that is exact.
@@ -98,6 +113,7 @@ impl Simulation {
 
 #[cfg(test)]
 mod tests {
+    use crate::integrate::exact::Corners;
     use crate::integrate::{Method, Simulation, SimulationOptions};
     use crate::model::Model;
 
@@ -140,6 +156,49 @@ mod tests {
         let (apart, steps, taken) = apart(&format!("vin in 0 24\n{GATE}\n{BUCK}"), 9.993e-3);
         assert!(apart < 1e-11 && taken > 900, "{apart:e} {taken}");
         assert!(steps.abs() < 10, "{steps}");
+    }
+
+    /// Corners of the gate, which nothing but the switch sees, end no period where they are not asked for; where they are, each change is made.
+    #[test]
+    fn passages_of_periods_taken_together_are_those_of_single_ones() {
+        let ends = "vin in 0 sin(24 12 300)\nib out 0 sin(0 1.2 170)";
+        for (sources, until) in [("vin in 0 24", 0.9e-3), (ends, 4.7e-3)] {
+            let text = format!(
+                "a clock\n{sources}\n{GATE}\n{BUCK}\n.save v(out)\n.tran 1u 10m uic\n.end\n"
+            );
+            let model = Model::parse(&text, "clock.cir").expect("a circuit");
+            let made = Simulation::closed(
+                model.circuit(),
+                model.multiport(),
+                SimulationOptions::default(),
+            );
+            let mut simulation = made.expect("a simulation");
+            let (state, positions) = (simulation.state(), simulation.positions());
+            let mut of = |corners| {
+                let place = (0.0, &*state, &*positions);
+                let found = simulation.passages(place, until, corners, None);
+                let mut passages = found.expect("a run").expect("an exact one");
+                passages.retain(|passage| !passage.is_corner());
+                (passages, simulation.state())
+            };
+            let ((seen, end), (all, other)) = (of(Corners::Seen), of(Corners::All));
+            assert_eq!(seen.len(), all.len());
+            let close = |a: &[f64], b: &[f64]| {
+                let mut both = a.iter().zip(b);
+                assert!(
+                    both.all(|(a, b)| (a - b).abs() <= 1e-10 * b.abs().max(1.0)),
+                    "{a:?} {b:?}"
+                );
+            };
+            for (own, other) in seen.iter().zip(&all) {
+                assert!((own.t - other.t).abs() < 1e-14 * until, "{}", other.t);
+                assert_eq!((&own.from, &own.to), (&other.from, &other.to));
+                assert_eq!(own.cause, other.cause);
+                close(&own.before, &other.before);
+                close(&own.after, &other.after);
+            }
+            close(&end, &other);
+        }
     }
 
     /// The input swings so that the current ends in some periods and not in others; and sources that are followed are moved, too.

@@ -54,6 +54,11 @@ impl Exact {
         self.passages.take().filter(|all| all.len() < MOST_PASSAGES)
     }
 
+    /// By source whether it acts through controls of switches alone.
+    pub(crate) fn silent_sources(&self) -> &[bool] {
+        self.sources.exosystem.silent()
+    }
+
     /// Events seen so far say nothing about those to come.
     pub(crate) fn forget_events(&mut self) {
         self.report.accumulation = Accumulation::new(f64::NEG_INFINITY);

@@ -4,7 +4,10 @@
 //! where legs begin and end are rows over that w, too: a period is taken where they stay clear of zero by more than a step asks for, and what is
 //! less clear is left to steps.
 
-use super::Exact;
+use std::sync::Arc;
+
+use super::{Exact, MOST_PASSAGES};
+use crate::integrate::exact::passage::Passage;
 use crate::integrate::exact::plant::ModeTable;
 use crate::linalg::kernel::Kernel;
 use crate::settings::tolerances::events::{CERTAIN, CLEAR_OF_ZERO};
@@ -14,7 +17,7 @@ use crate::settings::tolerances::times::SAME_TIME;
 /// Legs of a period at most.
 const MOST_LEGS: usize = 64;
 /// Periods that are taken together at most: the next one goes leg by leg, and amplitudes and sources are read anew.
-const TOGETHER: usize = 63;
+const TOGETHER: usize = 127;
 /// Changes of mode to wait for where the first period was not clear.
 const PATIENCE: usize = 64;
 
@@ -40,10 +43,14 @@ struct Leg {
 #[derive(Debug)]
 struct PeriodMap {
     legs: Vec<Leg>,
-    /// w after the period, and below it by leg `[g | g']` where it begins and ends, over w before it.
+    /// w after the period, below it by leg `[g | g']` where it begins and ends, and by leg the storage where it ends, over w before it.
     map: Kernel,
     dim: usize,
     after: Vec<f64>,
+    /// Where the storage begins in these rows.
+    ends: usize,
+    /// The storage where legs end, period by period, of those taken last.
+    passed: Vec<f64>,
 }
 
 /// What a run knows of its periods.
@@ -64,8 +71,8 @@ pub(super) struct Periods {
 
 impl PeriodMap {
     /// That of these changes of mode, of which the last one is the first again. `None` where a leg does not recur, a mode exists where something
-    /// vanishes, which is asked whenever it is entered, or an exponential does not exist in doubles.
-    fn of(table: &mut ModeTable, changes: &[Change]) -> Option<Self> {
+    /// vanishes, which is asked whenever it is entered, or an exponential does not exist in doubles. Of the storage where legs end it keeps so many values.
+    fn of(table: &mut ModeTable, changes: &[Change], kept: usize) -> Option<Self> {
         let mut legs = Vec::new();
         let mut spans = Vec::new();
         for pair in changes.windows(2) {
@@ -83,16 +90,20 @@ impl PeriodMap {
             });
         }
         let dim = table.modes[legs.first()?.mode].flow.dim();
-        let rows = dim + legs.iter().map(|leg| 2 * leg.noise.len()).sum::<usize>();
+        let ends = dim + legs.iter().map(|leg| 2 * leg.noise.len()).sum::<usize>();
+        let rows = ends + legs.len() * kept;
         let mut exists = true;
         let map = Kernel::of_columns(rows, dim, |j, column| {
-            exists &= along(table, &legs, &spans, j, column).is_some();
+            let (own, ends) = column.split_at_mut(ends);
+            exists &= along(table, &legs, &spans, j, (own, ends)).is_some();
         });
         exists.then(|| Self {
             legs,
             map,
             dim,
             after: vec![0.0; rows],
+            ends,
+            passed: Vec::new(),
         })
     }
 
@@ -108,14 +119,36 @@ impl PeriodMap {
 
     /// Takes w along as many periods as are clear, `most` at most: how many.
     fn go(&mut self, w: &mut [f64], most: usize) -> usize {
+        self.passed.clear();
         for taken in 0..most {
             self.map.apply(w, &mut self.after);
             if !self.is_clear() {
                 return taken;
             }
             w.copy_from_slice(&self.after[..self.dim]);
+            self.passed.extend_from_slice(&self.after[self.ends..]);
         }
         most
+    }
+
+    /// The changes of mode in the periods taken last, of which the first one began at `t`; nothing where the storage is not kept.
+    fn passages(&self, table: &ModeTable, t: f64, period: f64) -> impl Iterator<Item = Passage> {
+        let stored = (self.after.len() - self.ends) / self.legs.len();
+        let key = |leg: &Leg| Arc::clone(&table.modes[leg.mode].key);
+        let mut age = 0.0;
+        let storages = self.passed.chunks_exact(stored.max(1)).enumerate();
+        storages.map(move |(passed, storage)| {
+            let (whole, k) = (passed / self.legs.len(), passed % self.legs.len());
+            age = self.legs[k].seconds + if k > 0 { age } else { 0.0 };
+            Passage {
+                t: t + (whole as f64 * period + age),
+                from: Some(key(&self.legs[k])),
+                to: key(&self.legs[(k + 1) % self.legs.len()]),
+                cause: None,
+                before: storage.to_vec(),
+                after: storage.to_vec(),
+            }
+        })
     }
 
     /// Whether all guards stay clear of zero: by the cubics through values and slopes.
@@ -144,11 +177,12 @@ fn along(
     legs: &[Leg],
     spans: &[usize],
     j: usize,
-    column: &mut [f64],
+    (column, mut ends): (&mut [f64], &mut [f64]),
 ) -> Option<()> {
     let first = &table.modes[legs[0].mode].flow;
     let (mut w, mut next) = (vec![0.0; first.dim() + 2 * first.guards()], Vec::new());
     let [mut storage, mut kept, mut work] = [const { Vec::new() }; 3];
+    let stored = ends.len() / legs.len();
     let (own, mut rows) = column.split_at_mut(first.dim());
     w[j] = 1.0;
     for (k, (leg, span)) in legs.iter().zip(spans).enumerate() {
@@ -164,6 +198,9 @@ fn along(
             rows = others;
         }
         mode.storage_at(&next, &mut storage);
+        let (here, others) = ends.split_at_mut(stored);
+        here.copy_from_slice(&storage[..stored]);
+        ends = others;
         let sources = &next[mode.n..dim];
         let to = &table.modes[legs[(k + 1) % legs.len()].mode];
         to.state_from_part(&storage, sources[0], &mut w);
@@ -186,7 +223,7 @@ fn along(
 }
 
 impl Exact {
-    /// Has the run take periods together from here on. What happens in them is counted and not told, and energy is not integrated.
+    /// Has the run take periods together from here on. What happens in them is counted and told as passages alone, and energy is not integrated.
     pub(crate) fn take_periods(&mut self) {
         self.periods = self.sources.period().map(|period| Periods {
             period,
@@ -245,7 +282,8 @@ impl Exact {
             return;
         }
         if !periods.map.as_ref().is_some_and(|map| map.is_of(changes)) {
-            periods.map = PeriodMap::of(&mut self.table, changes);
+            let kept = self.passages.as_ref().map(|_| self.storage.values.len());
+            periods.map = PeriodMap::of(&mut self.table, changes, kept.unwrap_or(0));
         }
         let Some(map) = &mut periods.map else {
             return;
@@ -257,6 +295,10 @@ impl Exact {
         if taken == 0 || !self.skip(mode, w, (later, ahead)) {
             periods.wait = PATIENCE;
             return;
+        }
+        if let Some(passages) = &mut self.passages {
+            let room = MOST_PASSAGES.saturating_sub(passages.len());
+            passages.extend(map.passages(&self.table, t, period).take(room));
         }
         let passed = (taken * legs) as u64;
         self.travel.steps += passed;
