@@ -46,6 +46,7 @@ mod slopes;
 mod small_signal;
 mod smooth;
 pub mod source;
+mod subcircuits;
 mod sweep;
 mod switch;
 mod thermal;

@@ -7,6 +7,7 @@ pub(crate) mod dense;
 pub(crate) mod eigenvalues;
 pub(crate) mod expm;
 pub(crate) mod gauss;
+pub(crate) mod gramian;
 pub(crate) mod kernel;
 pub(crate) mod krylov;
 pub(crate) mod levelled;

@@ -129,5 +129,8 @@ mod tests {
             .filter_map(|r| r.request.step)
             .collect();
         assert_eq!(steps, [1e-6, 5e-7, 2.5e-7, 1.25e-7, 6.25e-8]);
+        // A tolerance that is out of reach ends.
+        let most = |r: &Rung| r.request.settings().max_steps;
+        assert!(rungs.iter().all(|r| most(r) == 20_000_000));
     }
 }

@@ -8,21 +8,18 @@
 use nalgebra::DMatrix;
 
 use crate::linalg::dense::Dense;
-use crate::linalg::expm::{self, Ladders};
+use crate::linalg::expm;
 use crate::linalg::gauss::{NODES, POINTS, WEIGHTS};
+use crate::linalg::gramian::Gramians;
 use crate::linalg::kernel::Kernel;
-use crate::linalg::powers::{halved, halvings, two_to};
+use crate::linalg::powers::{halved, two_to};
 use crate::linalg::quadratic::Quadratics;
 use crate::linalg::refill::raise;
 use crate::linalg::series::Series;
 use crate::linalg::whole::transposed;
-use crate::settings::tolerances::exponentials::SERIES;
 use crate::settings::tolerances::exponentials::{
-    ENERGY_SQUARED, HARMLESS_POWER, OUTGROWN, POWER_ROW, SMALLEST_AMPLITUDE,
+    HARMLESS_POWER, OUTGROWN, POWER_ROW, SMALLEST_AMPLITUDE,
 };
-
-/// Terms of the series over a step with ‖𝒜‖ h ≤ [`SERIES`]; (2·0.125)^k/k! is below rounding beyond, in every entry: their sizes are not comparable.
-const TERMS: usize = 15;
 
 /// Matrices that the forms need besides those over steps.
 const OF_FORMS: usize = 16;
@@ -91,31 +88,7 @@ struct Forms {
     generator: DMatrix<f64>,
     powers: [Dense; 2],
     /// Where `over` ends.
-    latest: Doubling,
-}
-
-/// ∫₀ᵗ exp(𝒜ᵀs) Q exp(𝒜s) ds over y, for t that doubles.
-#[derive(Debug, Clone)]
-struct Doubling {
-    longest: f64,
-    /// t is the longest over 2^k.
-    k: u32,
-    grams: [Dense; 2],
-    /// What it takes to double t, once that is asked for: a short span is done with its series.
-    along: Option<Along>,
-}
-
-/// exp(𝒜t) − I for t that doubles.
-#[derive(Debug, Clone)]
-struct Along {
-    /// exp(𝒜 longest/2^k) − I.
-    ladder: Ladders,
-    /// From here on exp(𝒜t) is a square.
-    squared: u32,
-    /// That of this k.
-    k: u32,
-    increment: Dense,
-    buffers: [Dense; 3],
+    latest: Gramians,
 }
 
 impl EnergyIntegral {
@@ -350,7 +323,7 @@ impl Forms {
             }
         }
         let powers = powers.each_ref().map(Dense::of);
-        let latest = Doubling::new(
+        let latest = Gramians::new(
             (&moved, fast),
             &powers,
             unit * two_to(bottom as i32),
@@ -389,7 +362,7 @@ impl Forms {
         if self.spans.len() <= place {
             self.spans.resize(place + 1, None);
         }
-        let span = Doubling::new((&self.generator, fast), &self.powers, time, 0);
+        let span = Gramians::new((&self.generator, fast), &self.powers, time, 0);
         self.spans[place] = Some(span.forms());
     }
 }
@@ -423,97 +396,6 @@ fn coordinates(rows: &DMatrix<f64>, least: Option<f64>) -> (DMatrix<f64>, DMatri
     }
     let back = triangle.solve_upper_triangular(&one).unwrap_or(one);
     (&triangle * transposed(&order), order * back)
-}
-
-impl Doubling {
-    /// Over 2^−`k` of the longest time, doubled from where ‖𝒜‖ t ≤ [`SERIES`]: Q_{j+1} = (𝒜ᵀ Q_j + Q_j 𝒜) t/(j + 1).
-    fn new(
-        (generator, fast): (&DMatrix<f64>, &[usize]),
-        powers: &[Dense; 2],
-        longest: f64,
-        k: u32,
-    ) -> Self {
-        let dim = generator.nrows();
-        let norm = halved(Dense::of(generator).norm_1() * longest, k);
-        let halvings = halvings(norm / SERIES);
-        let t = halved(longest, k + halvings);
-        let a = Dense::from_fn(dim, dim, |i, j| generator[(i, j)] * t);
-        let mut buffer = Dense::zeros(dim, dim);
-        let mut series = |power: &Dense| {
-            let mut term = power.clone();
-            term.combine(t, 0.0, power);
-            let mut sum = term.clone();
-            for j in 2..TERMS {
-                buffer.set_product(&term, &a);
-                term.set_symmetric(1.0 / j as f64, &buffer);
-                sum.add(&term);
-            }
-            sum
-        };
-        let grams = powers.each_ref().map(&mut series);
-        let mut doubling = Self {
-            longest,
-            k: k + halvings,
-            grams,
-            along: None,
-        };
-        for _ in 0..halvings {
-            doubling.double((generator, fast));
-        }
-        doubling
-    }
-
-    /// Φ = I + E: Γ ← Γ + Φᵀ Γ Φ.
-    fn double(&mut self, (generator, fast): (&DMatrix<f64>, &[usize])) {
-        let (k, longest) = (self.k, self.longest);
-        let along = (self.along).get_or_insert_with(|| Along::new(generator, fast, longest, k));
-        while along.k > k {
-            along.go_on();
-        }
-        let [first, second, transposed] = &mut along.buffers;
-        let e = &along.increment;
-        transposed.set_transposed(e);
-        for gram in &mut self.grams {
-            first.set_product(gram, e);
-            first.add(gram);
-            second.set_product(transposed, first);
-            gram.add(first);
-            gram.add(second);
-        }
-        self.k = k.saturating_sub(1);
-    }
-
-    fn forms(&self) -> Quadratics {
-        Quadratics::of(&self.grams)
-    }
-}
-
-impl Along {
-    fn new(generator: &DMatrix<f64>, fast: &[usize], longest: f64, k: u32) -> Self {
-        let dim = generator.nrows();
-        let mut ladder = Ladders::new(generator, fast, longest, ENERGY_SQUARED, 0);
-        let squared = halvings(ladder.norm() / ENERGY_SQUARED);
-        let nothing = Dense::zeros(dim, dim);
-        Self {
-            increment: ladder.increment(k).unwrap_or_else(|| nothing.clone()),
-            ladder,
-            squared,
-            k,
-            buffers: [nothing.clone(), nothing.clone(), nothing],
-        }
-    }
-
-    /// exp(𝒜t) − I from that of half the time; where it is computed anew and beyond doubles, as the flow itself is then, nothing.
-    fn go_on(&mut self) {
-        self.k -= 1;
-        if self.k >= self.squared {
-            let square = &mut self.buffers[0];
-            square.set_product(&self.increment, &self.increment);
-            self.increment.combine(2.0, 1.0, square);
-        } else if let Some(increment) = self.ladder.increment(self.k) {
-            self.increment = increment;
-        }
-    }
 }
 
 #[cfg(test)]

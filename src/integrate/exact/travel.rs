@@ -1,5 +1,8 @@
 //! Moving along a mode until a time or until a guard falls through zero.
 
+mod amplitudes;
+mod guards;
+
 use super::energy_integral::{Sizes, Stretch};
 use super::exosystem::Exosystem;
 use super::flow::{Flow, LONG};
@@ -7,10 +10,11 @@ use super::magnitudes::Magnitudes;
 use super::rounding::resolution;
 use super::slaved::Follower;
 use crate::linalg::polynomial;
-use crate::linalg::refill::{raise, refill};
+use crate::linalg::refill::refill;
 use crate::linalg::series::Series;
-use crate::settings::tolerances::events::{CLEAR_OF_ZERO, NEARLY_FALLEN, NO_MOVE, SIMULTANEOUS};
+use crate::settings::tolerances::events::SIMULTANEOUS;
 use crate::settings::tolerances::times::SAME_TIME;
+use guards::Verdict;
 
 /// Table steps after which the exosystem is set from its closed form again.
 const REFRESH: u32 = 64;
@@ -48,14 +52,6 @@ pub(crate) enum Arrival {
     Overflow,
     /// On the way, after as many steps as allowed at a time.
     Resting,
-}
-
-/// What the guards say about a step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Verdict {
-    Clear,
-    /// Crossed, or not known without looking closer.
-    Unclear,
 }
 
 /// A step over a span that recurs: its place, where it ends, and how much longer it is than what recurs, s.
@@ -163,92 +159,6 @@ impl Travel {
         self.waiting.clear();
         self.begins.clear();
         energy
-    }
-
-    #[inline]
-    fn note_peak(&mut self) {
-        raise(&mut self.peak, &self.now);
-    }
-
-    fn refresh_noise(&mut self, flow: &Flow) {
-        self.note_peak();
-        raise(&mut self.amplitude, &self.now);
-        if self.age >= self.follows {
-            self.follow(flow);
-        }
-        if self.following == 0 {
-            flow.noise(&self.amplitude, &mut self.floors);
-        } else {
-            let mut sizes = std::mem::take(&mut self.sizes);
-            refill(&mut sizes, &self.amplitude);
-            self.take_followers(&mut sizes);
-            flow.noise(&sizes, &mut self.floors);
-            self.sizes = sizes;
-        }
-        self.add_slack();
-    }
-
-    /// The states that follow others by now. A guard that has risen since needs no slack.
-    fn follow(&mut self, flow: &Flow) {
-        let age = self.age;
-        let later = self.followers[self.following..].iter();
-        self.following += later.take_while(|follower| follower.age <= age).count();
-        self.note_next_follower();
-        let guards = &self.now[flow.dim()..];
-        for (slack, g) in self.slack.iter_mut().zip(guards) {
-            *slack = smaller(*slack, larger(-g, 0.0));
-        }
-    }
-
-    /// The age at which the next state follows the others.
-    fn note_next_follower(&mut self) {
-        let next = self.followers.get(self.following);
-        self.follows = next.map_or(f64::INFINITY, |next| next.age);
-    }
-
-    #[inline(never)]
-    fn add_slack(&mut self) {
-        for (floor, slack) in self.floors.iter_mut().zip(&self.slack) {
-            *floor += slack;
-        }
-        self.since_refresh = 0;
-    }
-
-    /// Whether a guard stands at zero, as far as its rounding and that of the time tell simultaneous events apart.
-    pub(crate) fn is_at_zero(&self, flow: &Flow, guard: usize) -> bool {
-        let [value, slope] = [guard, flow.guards() + guard].map(|at| self.now[flow.dim() + at]);
-        let noise = SIMULTANEOUS * self.floors[guard] + resolution(self.t) * slope.abs();
-        value <= noise
-    }
-
-    /// How large x was on the way here.
-    pub(crate) fn peak(&self) -> &[f64] {
-        &self.peak
-    }
-
-    /// How large w can have been on the way here.
-    pub(crate) fn reach(&self, reach: &mut Vec<f64>) {
-        refill(reach, &self.amplitude);
-        reach[..self.peak.len()].copy_from_slice(&self.peak);
-    }
-
-    /// How large what w was rounded from is by now, where some states follow others: what they were before has decayed, and its rounding
-    /// with it.
-    pub(crate) fn known(&self, known: &mut Vec<f64>) -> bool {
-        if self.following == 0 {
-            return false;
-        }
-        refill(known, &self.amplitude);
-        self.take_followers(known);
-        true
-    }
-
-    /// Takes the states that follow others by now as large as they are.
-    fn take_followers(&self, sizes: &mut [f64]) {
-        for follower in &self.followers[..self.following] {
-            let j = follower.component;
-            sizes[j] = larger(follower.size, self.now[j].abs());
-        }
     }
 
     /// Moves to `stop` or to the first guard that falls through zero before it.
@@ -521,67 +431,6 @@ impl Travel {
         flow.read_guards(&mut self.now);
         self.refresh_noise(flow);
         fired.map_or(Arrival::Reached, Arrival::Fired)
-    }
-
-    /// Whether no guard can have been negative on the step from `now` to `next`: Bernstein coefficients of the cubic through
-    /// values and slopes, with a margin for what the cubic does not follow.
-    #[inline]
-    fn judge(&self, flow: &Flow, h: f64) -> Verdict {
-        let (dim, m) = (flow.dim(), flow.guards());
-        let (g0, s0) = self.now[dim..dim + 2 * m].split_at(m);
-        let (g1, s1) = self.next[dim..dim + 2 * m].split_at(m);
-        let (floor, slope_floor) = self.floors[..2 * m].split_at(m);
-        let third = h / 3.0;
-        let mut clear = true;
-        for i in 0..m {
-            let (b0, b3) = (g0[i], g1[i]);
-            let (b1, b2) = (b0 + third * s0[i], b3 - third * s1[i]);
-            let low = smaller(b1, b2);
-            let high = larger(larger(b1, b2), larger(b0, b3));
-            let spread = high - smaller(low, smaller(b0, b3));
-            let noise = floor[i] + third * slope_floor[i];
-            clear &= b3 >= -floor[i] && low + noise >= CLEAR_OF_ZERO * spread;
-        }
-        if clear {
-            Verdict::Clear
-        } else {
-            Verdict::Unclear
-        }
-    }
-
-    /// A guard that falls and is zero to its rounding, where a step of h seconds is none to the time, or none to a guard that has nearly fallen through its
-    /// rounding, but not for what may still be a transient that began with the mode: such steps move nothing, and could go on without end.
-    fn fallen(&self, flow: &Flow, h: f64) -> Option<usize> {
-        let ulp = f64::EPSILON * self.t.abs();
-        if self.age <= ulp {
-            return None;
-        }
-        let none_to_time = h <= 0.25 * ulp;
-        let (g, slopes) = self.now[flow.dim()..].split_at(flow.guards());
-        let (floors, slope_floors) = self.floors.split_at(flow.guards());
-        let none_to_guard = |i: usize| {
-            let left = g[i] + floors[i];
-            -slopes[i] * h <= NO_MOVE * floors[i] && left <= NEARLY_FALLEN * floors[i]
-        };
-        let falls = |&i: &usize| {
-            let is_zero = g[i] <= floors[i] && slopes[i] < -slope_floors[i];
-            is_zero && (none_to_time || none_to_guard(i))
-        };
-        (0..flow.guards()).find(falls)
-    }
-
-    /// The part of the step from `now` to `next` after which the first guard falls through zero, by the cubics through values and
-    /// slopes; `None` if all end above it.
-    fn crossing(&self, flow: &Flow, h: f64) -> Option<f64> {
-        let (dim, m) = (flow.dim(), flow.guards());
-        let ends = |k: usize| [self.now[k], self.next[k]];
-        let fallen = (0..m).filter(|&i| self.next[dim + i] < -self.floors[i]);
-        fallen
-            .map(|i| {
-                let slopes = ends(dim + m + i).map(|slope| slope * h);
-                polynomial::zero_of_cubic(ends(dim + i), slopes)
-            })
-            .reduce(smaller)
     }
 
     #[inline]
