@@ -75,20 +75,22 @@ pub(super) fn orbit_curves(
     }
     let (course, from) = steady.course(cancel).ok()??;
     let curves = curves(&course, &outputs, from).ok()??;
-    let (laps, note) = laps(circuit.tran, period, curves.values());
+    let (laps, note) = laps(circuit.measured_span(), period, curves.values());
     Some((curves.repeated(laps, period, from), note))
 }
 
-/// The periods of an orbit that measurements see, of so many values each: those until the end of `.tran`, or the last of them, and a note.
+/// The periods of an orbit, of so many values each, that measurements see who see so much of a transient: those until its end, or the last of them, and a note.
 pub(super) fn laps(
-    tran: Option<Tran>,
+    (from, until): (f64, f64),
     period: f64,
     values: usize,
 ) -> ((usize, usize), Option<Note>) {
-    let until = tran.map_or(0.0, |tran| tran.tstop);
     let laps = (until / period - LAST_ROW).ceil().max(2.0) as usize;
-    let kept = laps.min((MOST_VALUES / values.max(1)).max(2));
-    let note = (kept < laps).then(|| {
+    // One more, as rounding may have what is seen begin in the one before; and two at least.
+    let first = (from / period).floor() as usize;
+    let wanted = laps - first.saturating_sub(1).min(laps - 2);
+    let kept = wanted.min((MOST_VALUES / values.max(1)).max(2));
+    let note = (kept < wanted).then(|| {
         let text = format!(
             "measurements see the last {kept} of the {laps} periods until the end of `.tran`"
         );
@@ -153,4 +155,26 @@ fn curves(course: &Course, outputs: &[usize], from: f64) -> Result<Option<Curves
         found.impulse(leap.t, outputs.iter().map(|k| leap.areas[*k]).collect());
     }
     Ok(Some(found))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a thousand periods those from the one before the first that is seen; two at least; and no more than there is room for, of which a note tells.
+    #[test]
+    fn an_orbit_is_repeated_as_far_as_it_is_seen() {
+        let laps = |span, values| {
+            let (laps, note) = laps(span, 1e-5, values);
+            (laps, note.is_some())
+        };
+        assert_eq!(laps((9.005e-3, 10e-3), 100), ((899, 1000), false));
+        assert_eq!(laps((9.995e-3, 10e-3), 100), ((998, 1000), false));
+        assert_eq!(laps((10e-3, 10e-3), 100), ((998, 1000), false));
+        assert_eq!(laps((0.0, 10e-3), 100), ((0, 1000), false));
+        assert_eq!(laps((0.0, 0.0), 100), ((0, 2), false));
+        let (room, each) = (50, MOST_VALUES / 50);
+        assert_eq!(laps((9e-3, 10e-3), each), ((1000 - room, 1000), true));
+        assert_eq!(laps((9.905e-3, 10e-3), each), ((989, 1000), false));
+    }
 }

@@ -3,8 +3,8 @@
 use super::formula::Formula;
 use super::measurement::{Measured, NamedMeasurement};
 use crate::measure::{
-    Curves, Found, INTERVALS, Instant, Measurement, Signals, Trace, TraceSlopes, VALUES, basis,
-    interpolated,
+    Curves, Found, INTERVALS, Instant, Measurement, Rival, Signals, Trace, TraceSlopes, VALUES,
+    basis, interpolated,
 };
 
 /// dJ = Σ (values · δvalues) + begins · δbegins + lengths · δlengths + Σ results · δresults of one measurement J.
@@ -109,6 +109,7 @@ impl<'a> Scene<'a> {
                 let traced = self.traced(of, None)?;
                 let slopes = traced.trace.over_slopes(*over, (from, to), self.same);
                 let (slopes, rivals) = slopes.ok()??;
+                let rivals = self.apart(&traced, &slopes, rivals);
                 let place = |slopes: &TraceSlopes, into: &mut Weights| {
                     self.add(&traced, slopes, 1.0, into);
                     let ends = [
@@ -163,6 +164,34 @@ impl<'a> Scene<'a> {
         let all = all.chain(&into.begins).chain(&into.lengths);
         let finite = all.chain(&into.results).all(|weight| weight.is_finite());
         finite.then_some(into)
+    }
+
+    /// Rivals but those that are one lap or more away from where the extremum counts, or from another one: they move together.
+    fn apart(&self, traced: &Traced<'a>, own: &TraceSlopes, rivals: Vec<Rival>) -> Vec<Rival> {
+        let Some(lap) = self.curves.lap() else {
+            return rivals;
+        };
+        let place = |k: usize| {
+            let (whole, from, part) = traced.places[k];
+            (whole % lap, from, part)
+        };
+        let together = |a: &TraceSlopes, b: &TraceSlopes| {
+            let mut pieces = a.pieces.iter().zip(&b.pieces);
+            (a.from, a.to, a.pieces.len()) == (b.from, b.to, b.pieces.len())
+                && pieces.all(|((k, a), (l, b))| place(*k) == place(*l) && a == b)
+        };
+        let mut apart: Vec<Rival> = Vec::new();
+        for rival in rivals {
+            let counts = rival.value.as_ref().unwrap_or(own);
+            let again = together(&rival.slopes, counts)
+                || apart
+                    .iter()
+                    .any(|other| together(&rival.slopes, &other.slopes));
+            if !again {
+                apart.push(rival);
+            }
+        }
+        apart
     }
 
     /// Adds what an expression of results moves with.

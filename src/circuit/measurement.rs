@@ -203,6 +203,12 @@ impl Circuit {
         first.clamp(tstart, tstop)
     }
 
+    /// From when to when they see the transient that `.tran` asks for, s; nothing where it asks for none.
+    pub(crate) fn measured_span(&self) -> (f64, f64) {
+        let span = |tran: &Tran| (self.measured_from(tran), tran.tstop);
+        self.tran.as_ref().map_or((0.0, 0.0), span)
+    }
+
     /// Carries out the measurements on the signals of [`Self::measured`].
     #[must_use]
     pub fn measure(&self, signals: &Signals<'_>) -> Vec<Measured> {

@@ -17,7 +17,7 @@ pub(crate) use curve::{INTERVALS, VALUES, basis, interpolated};
 pub use fourier::{Harmonic, Spectrum, fourier};
 pub use measurement::{Found, Instant, Measurement, Scene, Use, Window};
 pub use signals::{Curves, Signals};
-pub(crate) use slopes::TraceSlopes;
+pub(crate) use slopes::{Rival, TraceSlopes};
 pub use trace::Trace;
 
 /// Why a measurement has no value.

@@ -33,6 +33,8 @@ pub struct Curves {
     impulses: Vec<(f64, Vec<f64>)>,
     /// The part that is seen, s; all where absent.
     seen: Option<(f64, f64)>,
+    /// Pieces after which they repeat, where they do.
+    lap: Option<usize>,
 }
 
 impl Curves {
@@ -127,7 +129,27 @@ impl Curves {
             values: laps.flat_map(|_| &self.values).copied().collect(),
             impulses: impulses.collect(),
             seen: None,
+            lap: Some(self.pieces.len()),
         }
+    }
+
+    /// Pieces after which they repeat, where they do.
+    pub(crate) const fn lap(&self) -> Option<usize> {
+        self.lap
+    }
+
+    /// The same, of pieces that belong to it as a whole.
+    pub(crate) fn whole(&self) -> Self {
+        let mut whole = Self {
+            impulses: self.impulses.clone(),
+            seen: self.seen,
+            lap: self.lap,
+            ..Self::of(self.columns)
+        };
+        for (piece, values) in self.all() {
+            whole.push_cut(piece, values);
+        }
+        whole
     }
 
     /// A function of the time and the signals, and of which piece each of its own is a part, where that begins on it, and how much of it that is; none where it has an edge

@@ -11,7 +11,7 @@
 //! an extremum is where y'(s) = 0 or stays at the end of a piece, and where y meets a level δt follows from δy(t) = 0.
 
 use super::curve::{Curve, VALUES, basis, basis_slopes};
-use super::trace::{Shape, Trace};
+use super::trace::{Shape, Trace, parts};
 use super::{MeasureError, Over};
 use crate::linalg::gauss::{NODES, WEIGHTS};
 use crate::settings::tolerances::periodic::MOST_RIVALS;
@@ -78,6 +78,25 @@ impl PieceSlopes {
     }
 }
 
+/// By node of Gauss and Legendre on a part of a piece l_j there.
+type AtNodes = [[f64; VALUES]; NODES.len()];
+
+/// Those of a part from s to s, of which the last ones are known: an orbit has the same ones again and again.
+fn at_nodes(known: &mut Vec<((f64, f64), AtNodes)>, (low, high): (f64, f64)) -> &AtNodes {
+    /// So many are kept.
+    const KNOWN: usize = 16;
+    let found = known.iter().position(|(part, _)| *part == (low, high));
+    let at = found.unwrap_or_else(|| {
+        if known.len() == KNOWN {
+            known.remove(0);
+        }
+        let own = NODES.map(|x| basis(low + (high - low) * x));
+        known.push(((low, high), own));
+        known.len() - 1
+    });
+    &known[at].1
+}
+
 /// What is integrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Integrand {
@@ -94,15 +113,6 @@ impl Trace<'_> {
         }
     }
 
-    /// The pieces of from ≤ t ≤ to: their numbers and from where to where.
-    fn parts(&self, (from, to): (f64, f64)) -> impl Iterator<Item = (usize, &Curve, (f64, f64))> {
-        let curves = self.own();
-        let first = curves.partition_point(|curve| curve.end() < from);
-        let inside = curves.iter().enumerate().skip(first);
-        let inside = inside.take_while(move |(_, curve)| curve.begin <= to);
-        inside.map(move |(k, curve)| (k, curve, (curve.place(from), curve.place(to))))
-    }
-
     /// ∫ over a window, and its derivatives.
     fn integral_slopes(&self, of: Integrand, window: (f64, f64)) -> (f64, TraceSlopes) {
         let mut found = TraceSlopes::default();
@@ -112,21 +122,20 @@ impl Trace<'_> {
             Integrand::Value => y,
             Integrand::Square => y * y,
         };
-        let whole = NODES.map(basis);
-        for (k, curve, (low, high)) in self.parts(window) {
+        let mut known = Vec::new();
+        for (k, curve, (low, high)) in parts(self.own(), window) {
             let length = curve.length;
             let mut own = PieceSlopes::default();
             let mut mean = 0.0;
-            let bases = match (low, high) {
-                (0.0, 1.0) => whole,
-                _ => NODES.map(|x| basis(low + (high - low) * x)),
+            let bases = match of {
+                Integrand::One => &[],
+                _ => &at_nodes(&mut known, (low, high))[..],
             };
+            if of == Integrand::One {
+                mean = high - low;
+            }
             for (basis, weight) in bases.iter().zip(WEIGHTS) {
                 let part = (high - low) * weight;
-                if of == Integrand::One {
-                    mean += part;
-                    continue;
-                }
                 let both = basis.iter().zip(curve.values);
                 let y = both.map(|(basis, y)| basis * y).sum();
                 mean += part * value(y);
@@ -215,7 +224,7 @@ impl Trace<'_> {
     fn reached(&self, sign: f64, window: (f64, f64), same: f64) -> (Vec<Reached>, f64) {
         let (mut first, mut most, mut least) = (None, f64::NEG_INFINITY, f64::INFINITY);
         let mut largest = Vec::new();
-        for (k, curve, part) in self.parts(window) {
+        for (k, curve, part) in parts(self.own(), window) {
             let mut own = f64::NEG_INFINITY;
             curve.corners(part, |s, y| {
                 own = (sign * y).max(own);
@@ -232,7 +241,7 @@ impl Trace<'_> {
         let level = most - same * (most - least);
         let mut tops: Vec<(Reached, f64)> = vec![];
         let mut above = false;
-        for ((k, curve, part), largest) in self.parts(window).zip(largest) {
+        for ((k, curve, part), largest) in parts(self.own(), window).zip(largest) {
             if largest <= level {
                 above = false;
                 continue;

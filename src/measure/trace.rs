@@ -137,13 +137,15 @@ impl Piece<'_> {
     }
 }
 
-/// The pieces of from ≤ t ≤ to, and which parts of them lie there.
-fn parts(curves: &[Curve], (from, to): (f64, f64)) -> impl Iterator<Item = (&Curve, (f64, f64))> {
+/// The pieces of from ≤ t ≤ to: their numbers, and from where to where they lie there.
+pub(super) fn parts(
+    curves: &[Curve],
+    (from, to): (f64, f64),
+) -> impl Iterator<Item = (usize, &Curve, (f64, f64))> {
     let first = curves.partition_point(|curve| curve.end() < from);
-    let inside = curves[first..]
-        .iter()
-        .take_while(move |curve| curve.begin <= to);
-    inside.map(move |curve| (curve, (curve.place(from), curve.place(to))))
+    let inside = curves.iter().enumerate().skip(first);
+    let inside = inside.take_while(move |(_, curve)| curve.begin <= to);
+    inside.map(move |(k, curve)| (k, curve, (curve.place(from), curve.place(to))))
 }
 
 impl<'a> Trace<'a> {
@@ -212,7 +214,7 @@ impl<'a> Trace<'a> {
             }
             Shape::Curves(curves) => {
                 let mut before: Option<f64> = None;
-                for (curve, part) in parts(curves, (from, to)) {
+                for (_, curve, part) in parts(curves, (from, to)) {
                     let (t, begins) = (curve.time(part.0), curve.at(part.0));
                     if let Some(ends) = before.filter(|ends| *ends != begins) {
                         see(Piece::Line(Line {
@@ -234,7 +236,7 @@ impl<'a> Trace<'a> {
         match &self.shape {
             Shape::Lines { .. } => self.pieces(window, see),
             Shape::Curves(curves) => {
-                parts(curves, window).for_each(|(curve, part)| see(Piece::Curve(curve, part)));
+                parts(curves, window).for_each(|(_, curve, part)| see(Piece::Curve(curve, part)));
             }
         }
     }

@@ -165,7 +165,8 @@ impl<'a> Measuring<'a> {
     pub(super) fn carry_out_repeated(&self, run: &mut Run, period: f64) -> Measurements {
         let (mut repeated, mut note) = ((0, 1), None);
         if self.by_rows() {
-            (repeated, note) = laps(self.circuit.tran, period, run.waveforms.values.len());
+            let (span, values) = (self.circuit.measured_span(), run.waveforms.values.len());
+            (repeated, note) = laps(span, period, values);
         }
         run.notes.extend(note);
         let found = self.found(&run.waveforms, repeated, period);

@@ -16,6 +16,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::variation::{Course, Linearised, Trajectory};
 use crate::circuit::{Circuit, Element, Kind, Source, Tran};
+use crate::integrate::exact::Corners;
 use crate::integrate::{Error, Method, Note, Orbit, OrbitKind, Reason, Run, Simulation, Standing};
 use crate::mna::{StaticMultiport, behaviour};
 use crate::model::Model;
@@ -172,6 +173,18 @@ impl Steady {
         })
     }
 
+    /// Whether it is exact throughout.
+    ///
+    /// # Errors
+    /// The simulation's.
+    pub(super) fn is_exact(&mut self, cancel: Option<&AtomicBool>) -> Result<bool, Error> {
+        let (stand, from) = (&self.found.fixed.stand, self.found.from);
+        let place = (from, &stand.state[..], &stand.switches[..]);
+        let until = from + self.found.orbit().period;
+        let passages = (self.simulation).passages(place, until, Corners::Seen, cancel)?;
+        Ok(passages.is_some())
+    }
+
     /// One period of the orbit, and the time at which it begins, s; `None` where steps are made in it.
     ///
     /// # Errors
@@ -208,7 +221,7 @@ impl Steady {
         self.simulation.advance(begin, false, cancel)?;
         let (state, switches) = (self.simulation.state(), self.simulation.positions());
         let place = (begin, &state[..], &switches[..]);
-        let trajectory = Trajectory::of(&mut self.simulation, place, begin + period, cancel)?;
+        let trajectory = whole.again(&mut self.simulation, place, begin + period, cancel)?;
         Ok((trajectory, from))
     }
 

@@ -10,7 +10,6 @@ use crate::analysis::periodic::steady;
 use crate::analysis::variation::{
     Adjoint, Carried, Changes, Drawing, Forms, Lines, Parameter, Sight, Trajectory, Weighted, unit,
 };
-use crate::circuit::Tran;
 use crate::integrate::{Error, OrbitKind, Reason, Simulation};
 use crate::measure::Curves;
 use crate::mna::StandardMultiport;
@@ -39,7 +38,8 @@ pub(super) struct Repeated {
     pub(super) period: f64,
     /// From when on it counts, s.
     from: f64,
-    tran: Option<Tran>,
+    /// From when to when measurements see it, s.
+    seen: (f64, f64),
 }
 
 /// Where a transient begins: whether with what `IC=` says, its storage, and its switches.
@@ -107,7 +107,7 @@ impl Base {
     /// The run as measurements see it.
     pub(super) fn seen(&self, curves: Curves) -> Curves {
         let orbit = self.orbit.as_ref();
-        let orbit = orbit.map(|orbit| (orbit.period, orbit.from, orbit.tran));
+        let orbit = orbit.map(|orbit| (orbit.period, orbit.from, orbit.seen));
         seen(curves, self.span, orbit)
     }
 
@@ -148,17 +148,17 @@ impl Base {
     }
 }
 
-/// A run as measurements see it: an orbit (its period, when it counts from, s, and what `.tran` asks for) again and again, from its beginning, which is not that of the curves.
+/// A run as measurements see it: an orbit (its period, when it counts from, and from when to when they see it, s) again and again, from its beginning, which is not that of the curves.
 pub(super) fn seen(
     curves: Curves,
     span: (f64, f64),
-    orbit: Option<(f64, f64, Option<Tran>)>,
+    orbit: Option<(f64, f64, (f64, f64))>,
 ) -> Curves {
-    let Some((period, from, tran)) = orbit else {
+    let Some((period, from, asked)) = orbit else {
         return curves.within(span);
     };
     // What is left out of many laps is told where they are measured.
-    let (laps, _) = laps(tran, period, curves.values());
+    let (laps, _) = laps(asked, period, curves.values());
     let [begin, end] = [laps.0, laps.1].map(|lap| lap as f64 * period);
     let all = curves.repeated((0, laps.1 - laps.0 + 1), period, from + period - begin);
     all.within((begin, end))
@@ -208,7 +208,7 @@ impl Beside<'_> {
         let mut found = steady(model, &self.periodic())?;
         let orbit = found.orbit();
         let driven = orbit.kind == OrbitKind::Driven;
-        if !driven || !found.simulation.is_exact() || found.course(self.options.cancel)?.is_none() {
+        if !driven || !found.is_exact(self.options.cancel)? {
             return Ok(None);
         }
         let (trajectory, from) = found.trajectory(self.options.cancel)?;
@@ -216,7 +216,7 @@ impl Beside<'_> {
             monodromy: trajectory.monodromy(),
             period: orbit.period,
             from,
-            tran: self.seen_until(circuit),
+            seen: self.seen_span(circuit),
         };
         let always = (f64::NEG_INFINITY, f64::INFINITY);
         Base::of(trajectory, (&found.simulation, None), always, Some(orbit))

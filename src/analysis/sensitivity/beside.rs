@@ -6,7 +6,7 @@ use super::SensitivityOptions;
 use crate::analysis::measured::{measured, periodic_measured};
 use crate::analysis::periodic::PeriodicOptions;
 use crate::analysis::table::entries;
-use crate::circuit::{Circuit, Measured, Tran};
+use crate::circuit::{Circuit, Measured};
 use crate::integrate::{Error, Reason, SimOptions, Simulation, SimulationOptions};
 use crate::model::Model;
 
@@ -49,9 +49,12 @@ impl Beside<'_> {
         Ok(group.measured_in(circuit))
     }
 
-    /// Until when measurements see an orbit: entries of the table see what repeats.
-    pub(super) fn seen_until(&self, circuit: &Circuit) -> Option<Tran> {
-        circuit.tran.filter(|_| self.entries.is_none())
+    /// From when to when measurements see an orbit that repeats, s: entries of the table see what repeats.
+    pub(super) fn seen_span(&self, circuit: &Circuit) -> (f64, f64) {
+        match self.entries {
+            None => circuit.measured_span(),
+            Some(_) => (0.0, 0.0),
+        }
     }
 
     pub(super) fn periodic(&self) -> PeriodicOptions<'_> {

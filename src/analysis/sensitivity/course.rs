@@ -34,8 +34,8 @@ pub(super) struct Course {
     /// The end of the run, s, and of a transient what is asked for.
     until: f64,
     tran: Tran,
-    /// Of an orbit (its period, s, and what `.tran` asks for).
-    pub(super) orbit: Option<(f64, Option<Tran>)>,
+    /// Of an orbit its period, and from when to when measurements see it, s.
+    pub(super) orbit: Option<(f64, (f64, f64))>,
     /// What of a transient is seen, s.
     span: (f64, f64),
     settings: Settings,
@@ -70,7 +70,7 @@ impl Course {
             return Ok(Some(Self {
                 until: standing.t + period,
                 tran: found.searched(),
-                orbit: Some((period, beside.seen_until(model.circuit()))),
+                orbit: Some((period, beside.seen_span(model.circuit()))),
                 span: (f64::NEG_INFINITY, f64::INFINITY),
                 multiport: found.multiport().standard(),
                 behaviour: found.multiport().clone(),
@@ -163,7 +163,7 @@ impl Course {
         }
         let orbit = self
             .orbit
-            .map(|(period, tran)| (period, self.standing.t, tran));
+            .map(|(period, asked)| (period, self.standing.t, asked));
         seen(curves, self.span, orbit)
     }
 

@@ -47,13 +47,13 @@ struct Rivalry {
 }
 
 impl Weighing {
-    /// Of the measurements of a circuit that are asked for, whose extrema are the same to this part of what their signals span.
+    /// Of what the measurements of a circuit find in curves, those that are asked for, whose extrema are the same to this part of what their signals span.
     pub(super) fn of(
         circuit: &Circuit,
+        found: Vec<Measured>,
         (weigh, curves, same): (&Weigh<'_>, &Curves, f64),
         asked: impl Fn(&str) -> bool,
     ) -> Self {
-        let found = circuit.measure(&Signals::Curves(curves));
         let mut needed: Vec<bool> = found.iter().map(|found| asked(&found.name)).collect();
         let weights = weights(&circuit.measurements, (curves, same), &found, &mut needed);
         let weighted = weights.iter().map(|own| own.as_ref().map(weigh));
@@ -201,10 +201,17 @@ impl Beside<'_> {
         let Some(drawing) = drawing else {
             return Ok(None);
         };
-        let curves = base.seen(drawing.curves());
+        let drawn = drawing.curves();
+        let (whole, curves) = (base.seen(drawn.whole()), base.seen(drawn));
+        let found = own.circuit().measure(&Signals::Curves(&whole));
         let asked = |name: &str| self.options.asks_for(name);
         let weigh = |weights: &Weights| drawing.weighted(weights);
-        let mut weighing = Weighing::of(own.circuit(), (&weigh, &curves, SAME_EXTREMUM), asked);
+        let mut weighing = Weighing::of(
+            own.circuit(),
+            found,
+            (&weigh, &curves, SAME_EXTREMUM),
+            asked,
+        );
         let measured = weighing.weighted.iter().flatten().count();
         let back = match self.options.method {
             SensitivityMethod::Forward => false,

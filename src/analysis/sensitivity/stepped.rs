@@ -23,7 +23,7 @@ use crate::integrate::{
     Drive, Error, Lengths, Note, Reads, Reason, Returned, Returns, STAGES, Tape, Weighed,
 };
 use crate::linalg::krylov::Recycled;
-use crate::measure::Curves;
+use crate::measure::{Curves, Signals};
 use crate::mna::StandardMultiport;
 use crate::model::Model;
 use crate::settings::tolerances::periodic::{
@@ -310,7 +310,8 @@ impl Beside<'_> {
         let columns = own.multiport().probes;
         let asked = |name: &str| self.options.asks_for(name);
         let fold = |weights: &Weights| folded(weights, tape, columns);
-        Weighing::of(own.circuit(), (&fold, curves, course.known()), asked)
+        let found = own.circuit().measure(&Signals::Curves(curves));
+        Weighing::of(own.circuit(), found, (&fold, curves, course.known()), asked)
     }
 
     /// The derivatives along a run to some of the values; `None` where an active set leaves them open, or the operating point that it begins at does.
