@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""All tables and pictures of docs/performance.md anew, on a machine of two cores that has nothing else to do for an hour and a half.
+"""All tables and pictures of docs/performance.md anew, on a machine of two cores that has nothing else to do for an hour.
 
     apt install ngspice gnucap python3-siconos time
-    pip install numpy scipy pulsim scikit-sundae spicelib distributed ./python
+    pip install pulsim scikit-sundae spicelib './python[all]'
     tests/reference/performance.py [--corpus DIR] [--only SCRIPT]...
 
 DIR is a collection of netlists as corpus.py has it; without one the table of curved laws stands as it is. Each script's head says what it measures. What runs one process after the other has a core

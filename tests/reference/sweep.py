@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """Variants of an open-loop buck in one process: what a variant costs by circ, by Pulsim and by ngspice, for the same three measures.
 
-    pip install ./python pulsim spicelib distributed && tests/reference/sweep.py [--circ PATH] [--variants 10000]
+    pip install './python[all]' pulsim spicelib && tests/reference/sweep.py [--circ PATH] [--variants 10000]
 
 A transient of 10 ms at 100 kHz from rest, and of its last millisecond the mean of the output and the peak to peak and RMS values of the inductor's current. circ takes all variants;
 Pulsim (steps of a 200th of a period) and ngspice (through spicelib, steps of a 200th at most), measured by numpy, take FEW of them, one after the other. CPU is that
 of the process and its children, with set-up; the difference is the largest of a measure to circ's, relative to it. Below the table stand the same number of periodic steady states
-with the derivatives of all three measures to all elements, by two threads with a model each, and what a second worker process of Dask is worth.
+with the derivatives of all three measures to the values of all elements, by two threads with a model each, and what a second worker process of Dask is worth.
 """
 
 import argparse
@@ -44,6 +44,7 @@ rload out 0 LOAD
 .end
 """
 MEASURES = ["mean", "ripple", "current"]
+ELEMENTS = ["vin", "l1", "c1", "rload"]
 
 
 def inductances(count):
@@ -136,7 +137,7 @@ def steady(deck, values):
         model = circ.parse(deck)
         for henries in part:
             model.set("l", float(henries))
-            model.sensitivity(of=MEASURES, steady=True)
+            model.sensitivity(of=MEASURES, to=ELEMENTS, steady=True)
 
     with ThreadPoolExecutor(THREADS) as pool:
         list(pool.map(half, [values[k::THREADS] for k in range(THREADS)]))
@@ -180,8 +181,9 @@ def main():
     deck = DECK.replace("LOAD", f"{LOAD['not interrupted']:g}")
     spent, wall, _ = timed(lambda: steady(deck, values))
     lines += ["", f"{len(values)} steady states with derivatives of three measures to all elements (5 Ω): {wall:.2f} s, {1e3 * spent / len(values):.3g} ms of CPU each."]
+    deck = DECK.replace("LOAD", f"{LOAD['interrupted']:g}")
     one, two = by_dask(deck, values, 1), by_dask(deck, values, 2)
-    lines.append(f"Dask, one worker process and two: {one:.2f} s and {two:.2f} s, {one / two:.2f} times as fast.")
+    lines.append(f"Dask, one worker process and two (20 Ω): {one:.1f} s and {two:.1f} s, {one / two:.2f} times as fast.")
     print(*lines[-2:], sep="\n")
     write("sweep.py", lines)
 
