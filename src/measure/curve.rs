@@ -81,7 +81,7 @@ pub(crate) fn interpolated(values: &[f64; VALUES], s: f64) -> f64 {
 }
 
 /// y_0 + Σ_j (y_j − y_0) row_j.
-pub(super) fn combined<const N: usize>(
+pub(super) fn blended<const N: usize>(
     values: &[f64; VALUES],
     rows: &[[f64; N]; VALUES],
 ) -> [f64; N] {
@@ -195,7 +195,7 @@ impl Curve {
     /// ∫ f(y) ds from `low` to `high` by Gauss and Legendre, exact up to degree 15; f(y, s) with s from −1 to 1.
     pub(super) fn gauss(&self, (low, high): (f64, f64), f: impl Fn(f64, f64) -> f64) -> f64 {
         let values = if (low, high) == (0.0, 1.0) {
-            combined(&self.values, &AT_NODES)
+            blended(&self.values, &AT_NODES)
         } else {
             NODES.map(|x| self.at(low + (high - low) * x))
         };
@@ -324,7 +324,7 @@ mod tests {
             let own = curve(of, 1.0);
             let part = Curve {
                 length: own.length * until,
-                values: combined(&own.values, &cut(until)),
+                values: blended(&own.values, &cut(until)),
                 ..own
             };
             for k in 0..=20 {

@@ -1,6 +1,6 @@
 //! The signals of a run, and expressions over them as waveforms.
 
-use super::curve::{Curve, INTERVALS, VALUES, combined, cut, interpolated};
+use super::curve::{Curve, INTERVALS, VALUES, blended, cut, interpolated};
 use super::{MeasureError, Trace};
 use crate::settings::tolerances::times::CURVE_CLOSE;
 
@@ -57,7 +57,7 @@ impl Curves {
         self.values.extend_from_slice(values);
     }
 
-    /// The same as a piece that belongs to the waveform as a whole: its polynomial through other values.
+    /// Adds what belongs to the waveform of a piece, as a piece of its own: the same polynomial through its values at s = 0, `until`/8 … `until`.
     pub(crate) fn push_cut(
         &mut self,
         (begin, length, until): (f64, f64, f64),
@@ -68,7 +68,7 @@ impl Curves {
             let rows = cut(until);
             let from = self.values.len() - self.columns;
             for own in &mut self.values[from..] {
-                *own = combined(own, &rows);
+                *own = blended(own, &rows);
             }
         }
     }
@@ -138,7 +138,7 @@ impl Curves {
         self.lap
     }
 
-    /// The same, of pieces that belong to it as a whole.
+    /// The same waveforms in pieces that all end with their last value (`until` = 1), as measures are quickest on.
     pub(crate) fn whole(&self) -> Self {
         let mut whole = Self {
             impulses: self.impulses.clone(),

@@ -82,7 +82,7 @@ impl PieceSlopes {
 type AtNodes = [[f64; VALUES]; NODES.len()];
 
 /// Those of a part from s to s, of which the last ones are known: an orbit has the same ones again and again.
-fn at_nodes(known: &mut Vec<((f64, f64), AtNodes)>, (low, high): (f64, f64)) -> &AtNodes {
+fn bases_of(known: &mut Vec<((f64, f64), AtNodes)>, (low, high): (f64, f64)) -> &AtNodes {
     /// So many are kept.
     const KNOWN: usize = 16;
     let found = known.iter().position(|(part, _)| *part == (low, high));
@@ -126,14 +126,10 @@ impl Trace<'_> {
         for (k, curve, (low, high)) in parts(self.own(), window) {
             let length = curve.length;
             let mut own = PieceSlopes::default();
-            let mut mean = 0.0;
-            let bases = match of {
-                Integrand::One => &[],
-                _ => &at_nodes(&mut known, (low, high))[..],
+            let (bases, mut mean) = match of {
+                Integrand::One => (&[][..], high - low),
+                _ => (&bases_of(&mut known, (low, high))[..], 0.0),
             };
-            if of == Integrand::One {
-                mean = high - low;
-            }
             for (basis, weight) in bases.iter().zip(WEIGHTS) {
                 let part = (high - low) * weight;
                 let both = basis.iter().zip(curve.values);

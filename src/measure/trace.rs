@@ -232,7 +232,7 @@ impl<'a> Trace<'a> {
     }
 
     /// The same without edges, which have no length and no values but those beside them.
-    fn lengths(&self, window: (f64, f64), mut see: impl FnMut(Piece<'_>)) {
+    fn without_edges(&self, window: (f64, f64), mut see: impl FnMut(Piece<'_>)) {
         match &self.shape {
             Shape::Lines { .. } => self.pieces(window, see),
             Shape::Curves(curves) => {
@@ -248,7 +248,7 @@ impl<'a> Trace<'a> {
     pub fn over(&self, what: Over, from: f64, to: f64) -> Result<f64, MeasureError> {
         let sum = |f: &dyn Fn(&Piece<'_>) -> f64| {
             let mut sum = 0.0;
-            self.lengths((from, to), |piece| sum += f(&piece));
+            self.without_edges((from, to), |piece| sum += f(&piece));
             sum
         };
         let length = sum(&|piece| piece.length());
@@ -265,7 +265,7 @@ impl<'a> Trace<'a> {
         // When and how much.
         let extremes = || {
             let (mut least, mut most) = ((f64::NAN, f64::INFINITY), (f64::NAN, f64::NEG_INFINITY));
-            self.lengths((from, to), |piece| {
+            self.without_edges((from, to), |piece| {
                 piece.corners(|t, y| {
                     if y < least.1 {
                         least = (t, y);
