@@ -89,6 +89,18 @@ impl Formula {
         }
     }
 
+    /// Whether the time is in it.
+    pub(super) fn is_timed(&self) -> bool {
+        match self {
+            Self::Time => true,
+            Self::Number(_) | Self::Signal(_) | Self::Result(_) => false,
+            Self::Minus(x) | Self::Not(x) => x.is_timed(),
+            Self::Binary(_, x, y) => x.is_timed() || y.is_timed(),
+            Self::If(parts) => parts.iter().any(Self::is_timed),
+            Self::Call(_, args) => args.iter().any(Self::is_timed),
+        }
+    }
+
     /// The measurements it needs.
     pub(super) fn needs(&self, all: &mut Vec<usize>) {
         match self {

@@ -1,7 +1,7 @@
 //! How what measurements find moves with the pieces of the signals that they see.
 
 use super::formula::Formula;
-use super::measurement::{Measured, NamedMeasurement};
+use super::measurement::{Measured, NamedMeasurement, expression};
 use crate::measure::{
     Curves, Found, INTERVALS, Instant, Measurement, Rival, Signals, Trace, TraceSlopes, VALUES,
     basis, interpolated,
@@ -10,11 +10,11 @@ use crate::measure::{
 /// dJ = Σ (values · δvalues) + begins · δbegins + lengths · δlengths + Σ results · δresults of one measurement J.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Weights {
-    /// By piece and signal.
+    /// By piece of a lap and signal.
     pub(crate) values: Vec<[f64; VALUES]>,
-    /// By piece, 1/s.
+    /// By piece of a lap, 1/s.
     pub(crate) begins: Vec<f64>,
-    /// By piece, 1/s.
+    /// By piece of a lap, 1/s.
     pub(crate) lengths: Vec<f64>,
     /// By measurement: what is used of it.
     pub(crate) results: Vec<f64>,
@@ -35,16 +35,20 @@ pub(crate) struct Tie {
     pub(crate) value: Option<Weights>,
 }
 
-/// A waveform, and of which pieces of the signals its own are parts: number, where on it, and how much of it.
+/// A waveform, and of which pieces of the signals its own are parts, of one lap where it repeats: number, where on it, and how much of it.
 struct Traced<'a> {
-    trace: Trace<'a>,
+    trace: Trace<'static>,
     places: Vec<(usize, f64, f64)>,
     formula: &'a Formula,
     less: Option<&'a Formula>,
 }
 
-/// Where a piece begins, how long it is, s, which part of that belongs to it, and by signal its values.
-type Piece<'a> = ((f64, f64, f64), &'a [[f64; VALUES]]);
+impl Traced<'_> {
+    /// Of its k-th piece.
+    fn place(&self, k: usize) -> (usize, f64, f64) {
+        self.places[k % self.places.len()]
+    }
+}
 
 /// What measurements saw and found.
 struct Scene<'a> {
@@ -52,8 +56,6 @@ struct Scene<'a> {
     span: (f64, f64),
     /// Part of what values span to which extrema are the same.
     same: f64,
-    /// By piece.
-    pieces: Vec<Piece<'a>>,
     /// Of all measurements; NaN where one has none.
     results: Vec<f64>,
 }
@@ -69,7 +71,6 @@ pub(crate) fn weights(
     let value = |measured: &Measured| measured.result.as_ref().map_or(f64::NAN, |f| f.value);
     let scene = Scene {
         span: Signals::Curves(curves).span(),
-        pieces: curves.all().collect(),
         curves,
         same,
         results: found.iter().map(value).collect(),
@@ -93,11 +94,11 @@ pub(crate) fn weights(
 
 impl<'a> Scene<'a> {
     fn weights(&self, what: &'a Measurement<Formula>, found: &Found) -> Option<Weights> {
-        let columns = self.pieces.first().map_or(0, |(_, values)| values.len());
+        let (pieces, values) = (self.curves.len(), self.curves.values() / VALUES);
         let mut into = Weights {
-            values: vec![[0.0; VALUES]; columns * self.pieces.len()],
-            begins: vec![0.0; self.pieces.len()],
-            lengths: vec![0.0; self.pieces.len()],
+            values: vec![[0.0; VALUES]; values],
+            begins: vec![0.0; pieces],
+            lengths: vec![0.0; pieces],
             results: vec![0.0; self.results.len()],
             rivals: vec![],
         };
@@ -168,12 +169,12 @@ impl<'a> Scene<'a> {
 
     /// Rivals but those that are one lap or more away from where the extremum counts, or from another one: they move together.
     fn apart(&self, traced: &Traced<'a>, own: &TraceSlopes, rivals: Vec<Rival>) -> Vec<Rival> {
-        let Some(lap) = self.curves.lap() else {
+        if !self.curves.repeat() {
             return rivals;
-        };
+        }
         let place = |k: usize| {
-            let (whole, from, part) = traced.places[k];
-            (whole % lap, from, part)
+            let (whole, from, part) = traced.place(k);
+            (whole % self.curves.len(), from, part)
         };
         let together = |a: &TraceSlopes, b: &TraceSlopes| {
             let mut pieces = a.pieces.iter().zip(&b.pieces);
@@ -222,26 +223,19 @@ impl<'a> Scene<'a> {
     }
 
     fn traced(&self, formula: &'a Formula, less: Option<&'a Formula>) -> Option<Traced<'a>> {
-        let whole = |k: usize| (k, 0.0, 1.0);
         let (trace, places) = match (formula, less) {
             (Formula::Signal(index), None) => {
-                let pieces = self.pieces.iter();
-                let own = pieces.map(|((begin, length, until), values)| crate::measure::Curve {
-                    begin: *begin,
-                    length: *length,
-                    until: *until,
-                    values: values[*index],
-                });
-                let places = (0..self.pieces.len()).map(whole);
-                (Trace::curves(own.collect(), vec![]), places.collect())
+                let places = (0..self.curves.len()).map(|k| (k, 0.0, 1.0));
+                (self.curves.signal(*index), places.collect())
             }
             _ => {
                 let value = |t: f64, row: &[f64]| {
                     let less = less.map_or(0.0, |less| less.value(t, row, &self.results));
                     formula.value(t, row, &self.results) - less
                 };
-                let affine = formula.is_affine() && less.is_none_or(Formula::is_affine);
-                self.curves.drawn(&value, affine).ok()??
+                self.curves
+                    .drawn(&expression(&value, formula, less))
+                    .ok()??
             }
         };
         Some(Traced {
@@ -255,9 +249,9 @@ impl<'a> Scene<'a> {
     /// Adds derivatives to the pieces of a waveform, times a factor.
     fn add(&self, traced: &Traced<'a>, slopes: &TraceSlopes, factor: f64, into: &mut Weights) {
         for (k, own) in &slopes.pieces {
-            let (whole, from, part) = traced.places[*k];
-            let ((begin, length, _), signals) = &self.pieces[whole];
-            let columns = signals.len();
+            let (whole, from, part) = traced.place(*k);
+            let ((begin, length, _), signals) = self.curves.get(whole);
+            let (whole, columns) = (whole % self.curves.len(), signals.len());
             into.begins[whole] += factor * own.begin;
             into.lengths[whole] += factor * (from * own.begin + part * own.length);
             let values = &mut into.values[columns * whole..columns * (whole + 1)];

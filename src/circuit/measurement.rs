@@ -7,7 +7,9 @@ use super::formula::Formula;
 use super::scope::ScopeId;
 use super::{Circuit, Probe, Tran};
 use crate::diagnostic::Diagnostic;
-use crate::measure::{Found, MeasureError, Measurement, Scene, Signals, Spectrum, Trace, fourier};
+use crate::measure::{
+    Expression, Found, MeasureError, Measurement, Scene, Signals, Spectrum, Trace, fourier,
+};
 use crate::netlist::ast::{Four, Meas, MeasAnalysis};
 use crate::netlist::suggest::nearest;
 use crate::settings::tolerances::times::SAME_TIME;
@@ -268,12 +270,24 @@ impl Seen for Signals<'_> {
             let less = less.map_or(0.0, |less| less.value(t, row, results));
             formula.value(t, row, results) - less
         };
-        let affine = formula.is_affine() && less.is_none_or(Formula::is_affine);
-        self.trace(&value, affine)
+        self.trace(&expression(&value, formula, less))
     }
 
     fn number(&self, formula: &Formula, results: &[f64]) -> f64 {
         formula.value(f64::NAN, &[], results)
+    }
+}
+
+/// A formula less another one as an expression of which this is the value.
+pub(super) fn expression<'f>(
+    value: &'f dyn Fn(f64, &[f64]) -> f64,
+    formula: &Formula,
+    less: Option<&Formula>,
+) -> Expression<'f> {
+    Expression {
+        value,
+        is_affine: formula.is_affine() && less.is_none_or(Formula::is_affine),
+        is_timed: formula.is_timed() || less.is_some_and(Formula::is_timed),
     }
 }
 

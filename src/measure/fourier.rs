@@ -96,7 +96,7 @@ struct Part {
 }
 
 impl Part {
-    fn of(piece: &Piece<'_>) -> Self {
+    fn of(piece: &Piece) -> Self {
         let mut terms = [0.0; POINTS];
         let (begin, end) = piece.span();
         let count = match piece {

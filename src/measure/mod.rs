@@ -4,8 +4,10 @@
 //! between events, as polynomials that follow it closely. Every measure is exact for these lines and polynomials.
 
 mod curve;
+mod expression;
 mod fourier;
 mod measurement;
+mod pieces;
 mod signals;
 mod slopes;
 mod trace;
@@ -14,6 +16,7 @@ use thiserror::Error;
 
 pub use curve::Curve;
 pub(crate) use curve::{INTERVALS, VALUES, basis, interpolated};
+pub use expression::Expression;
 pub use fourier::{Harmonic, Spectrum, fourier};
 pub use measurement::{Found, Instant, Measurement, Scene, Use, Window};
 pub use signals::{Curves, Signals};

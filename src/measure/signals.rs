@@ -1,11 +1,9 @@
 //! The signals of a run, and expressions over them as waveforms.
 
-use super::curve::{Curve, INTERVALS, VALUES, blended, cut, interpolated};
+use super::curve::{Curve, VALUES, blended, cut};
+use super::expression::{Drawn, Expression, finite};
+use super::pieces::{Laps, Pieces};
 use super::{MeasureError, Trace};
-use crate::settings::tolerances::times::CURVE_CLOSE;
-
-/// Halvings of a piece after which an expression that no polynomial follows has an edge in it.
-const HALVINGS: u32 = 40;
 
 /// The signals of a run as measurements see them.
 #[derive(Debug, Clone)]
@@ -21,29 +19,32 @@ pub enum Signals<'a> {
     Curves(&'a Curves),
 }
 
-/// All signals as smooth pieces, one after the other.
-#[derive(Debug, Clone, Default)]
+/// All signals as smooth pieces, one after the other, which an orbit repeats lap by lap.
+#[derive(Debug, Clone)]
 pub struct Curves {
     columns: usize,
-    /// Where each piece begins and how long it is, s, and which part of that belongs to it.
+    /// Of one lap: where each piece begins and how long it is, s, and which part of that belongs to it.
     pieces: Vec<(f64, f64, f64)>,
-    /// By piece and signal.
+    /// By piece of a lap and signal.
     values: Vec<[f64; VALUES]>,
-    /// Times, s, and by signal the areas of impulses.
+    /// Of one lap: times, s, and by signal the areas of impulses.
     impulses: Vec<(f64, Vec<f64>)>,
+    pub(super) laps: Laps,
     /// The part that is seen, s; all where absent.
     seen: Option<(f64, f64)>,
-    /// Pieces after which they repeat, where they do.
-    lap: Option<usize>,
 }
 
 impl Curves {
     /// So many signals, without a piece yet.
     #[must_use]
-    pub fn of(columns: usize) -> Self {
+    pub const fn of(columns: usize) -> Self {
         Self {
             columns,
-            ..Self::default()
+            pieces: vec![],
+            values: vec![],
+            impulses: vec![],
+            laps: Laps::ONE,
+            seen: None,
         }
     }
 
@@ -87,15 +88,15 @@ impl Curves {
         }
     }
 
-    /// The pieces so far.
+    /// The pieces so far, of one lap.
     #[must_use]
-    pub fn len(&self) -> usize {
+    pub const fn len(&self) -> usize {
         self.pieces.len()
     }
 
     /// The values of all of them.
     #[must_use]
-    pub fn values(&self) -> usize {
+    pub const fn values(&self) -> usize {
         self.values.len() * VALUES
     }
 
@@ -113,66 +114,98 @@ impl Curves {
 
     /// The same again and again, from one lap to another of so many seconds each; the first one would begin at t = 0 what begins here at `origin`.
     #[must_use]
-    pub fn repeated(&self, (from, to): (usize, usize), period: f64, origin: f64) -> Self {
-        let laps = (from..to).map(|lap| lap as f64 * period - origin);
-        let pieces = laps.clone().flat_map(|shift| {
-            let moved = move |&(begin, length, until)| (begin + shift, length, until);
-            self.pieces.iter().map(moved)
-        });
-        let impulses = laps.clone().flat_map(|shift| {
-            let moved = move |(t, areas): &(f64, Vec<f64>)| (t + shift, areas.clone());
-            self.impulses.iter().map(moved)
-        });
-        Self {
-            columns: self.columns,
-            pieces: pieces.collect(),
-            values: laps.flat_map(|_| &self.values).copied().collect(),
-            impulses: impulses.collect(),
-            seen: None,
-            lap: Some(self.pieces.len()),
-        }
+    pub fn repeated(self, (from, to): (usize, usize), period: f64, origin: f64) -> Self {
+        let laps = Laps {
+            from,
+            count: to.saturating_sub(from),
+            period,
+            origin,
+        };
+        Self { laps, ..self }
     }
 
-    /// Pieces after which they repeat, where they do.
-    pub(crate) const fn lap(&self) -> Option<usize> {
-        self.lap
+    /// Whether the same pieces are there again and again.
+    pub(crate) const fn repeat(&self) -> bool {
+        self.laps.count > 1
     }
 
     /// The same waveforms in pieces that all end with their last value (`until` = 1), as measures are quickest on.
     pub(crate) fn whole(&self) -> Self {
         let mut whole = Self {
             impulses: self.impulses.clone(),
+            laps: self.laps,
             seen: self.seen,
-            lap: self.lap,
             ..Self::of(self.columns)
         };
-        for (piece, values) in self.all() {
+        for (piece, values) in self.once() {
             whole.push_cut(piece, values);
         }
         whole
     }
 
-    /// A function of the time and the signals, and of which piece each of its own is a part, where that begins on it, and how much of it that is; none where it has an edge
-    /// that is none of the signals.
+    /// The pieces of one lap as they were told.
+    pub(super) fn once(&self) -> impl Iterator<Item = Whole<'_>> {
+        self.pieces.iter().copied().zip(self.rows())
+    }
+
+    /// By piece of a lap the values of the signals.
+    fn rows(&self) -> impl Iterator<Item = &[[f64; VALUES]]> {
+        self.values.chunks_exact(self.columns.max(1))
+    }
+
+    /// The k-th piece of all laps.
+    pub(crate) fn get(&self, k: usize) -> Whole<'_> {
+        let (lap, own) = (k / self.pieces.len(), k % self.pieces.len());
+        let (begin, length, until) = self.pieces[own];
+        let values = &self.values[own * self.columns..(own + 1) * self.columns];
+        ((begin + self.laps.shift(lap), length, until), values)
+    }
+
+    /// All pieces, lap after lap.
+    pub(super) fn all(&self) -> impl Iterator<Item = Whole<'_>> {
+        (0..self.pieces.len() * self.laps.count).map(|k| self.get(k))
+    }
+
+    /// One of the signals as a waveform.
+    pub(crate) fn signal(&self, index: usize) -> Trace<'static> {
+        let own = self.once().map(|((begin, length, until), values)| Curve {
+            begin,
+            length,
+            until,
+            values: values[index],
+        });
+        let pieces = Pieces::repeated(own.collect(), self.laps);
+        Trace::pieced(pieces, self.areas(|_, areas| areas[index]))
+    }
+
+    /// The times of impulses, s, and what they have of the areas of the signals.
+    fn areas(&self, of: impl Fn(f64, &[f64]) -> f64) -> Vec<(f64, f64)> {
+        let laps = (0..self.laps.count).map(|lap| self.laps.shift(lap));
+        let all = laps.flat_map(|shift| {
+            let own = self.impulses.iter();
+            own.map(move |(t, areas)| (t + shift, &areas[..]))
+        });
+        all.map(|(t, areas)| (t, of(t, areas))).collect()
+    }
+
+    /// An expression as a waveform, and of which piece, where on it and how much of it each of its own is a part; none where it has an edge that is none of the signals.
     ///
     /// # Errors
     /// [`MeasureError::NotFinite`].
     #[expect(clippy::type_complexity, reason = "a waveform with its places")]
     pub(crate) fn drawn(
         &self,
-        f: &dyn Fn(f64, &[f64]) -> f64,
-        affine: bool,
+        of: &Expression<'_>,
     ) -> Result<Option<(Trace<'static>, Vec<(usize, f64, f64)>)>, MeasureError> {
-        let drawn = Drawn::of(self, f, affine)?;
-        let (trace, places) = (Trace::curves(drawn.curves, vec![]), drawn.places);
-        Ok((!drawn.has_edge).then_some((trace, places)))
-    }
-
-    pub(crate) fn all(&self) -> impl Iterator<Item = ((f64, f64, f64), &[[f64; VALUES]])> {
-        let values = self.values.chunks_exact(self.columns.max(1));
-        self.pieces.iter().copied().zip(values)
+        let drawn = Drawn::of(self, of)?;
+        let pieces = Pieces::repeated(drawn.curves, drawn.laps);
+        let trace = Trace::pieced(pieces, vec![]);
+        Ok((!drawn.has_edge).then_some((trace, drawn.places)))
     }
 }
+
+/// A piece: where it begins, how long it is, s, which part of that belongs to it, and by signal its values.
+pub(super) type Whole<'a> = ((f64, f64, f64), &'a [[f64; VALUES]]);
 
 impl<'a> Signals<'a> {
     /// Where they begin and end, s.
@@ -181,9 +214,11 @@ impl<'a> Signals<'a> {
         let span = match self {
             Self::Lines { time, .. } => time.first().copied().zip(time.last().copied()),
             Self::Curves(curves) => {
-                let (first, last) = (curves.pieces.first(), curves.pieces.last());
-                let end = |&(begin, length, until): &(f64, f64, f64)| begin + until * length;
-                let all = first.map(|first| first.0).zip(last.map(end));
+                let all = curves.pieces.len() * curves.laps.count;
+                let end = |((begin, length, until), _): Whole<'_>| begin + until * length;
+                let all = all
+                    .checked_sub(1)
+                    .map(|last| (curves.get(0).0.0, end(curves.get(last))));
                 curves.seen.or(all)
             }
         };
@@ -203,32 +238,19 @@ impl<'a> Signals<'a> {
                 trace.ok_or(MeasureError::NotFinite)
             }
             Self::Curves(curves) => {
-                let own = |((begin, length, until), values): (_, &[[f64; VALUES]])| Curve {
-                    begin,
-                    length,
-                    until,
-                    values: values[index],
-                };
-                let own: Vec<Curve> = curves.all().map(own).collect();
-                let impulses = curves.impulses.iter();
-                let impulses = impulses.map(|(t, areas)| (*t, areas[index]));
-                let mut values = own.iter().flat_map(|curve| &curve.values);
-                let finite = values.all(|value| value.is_finite());
-                let trace = finite.then(|| Trace::curves(own, impulses.collect()));
+                let mut values = curves.rows().flat_map(|values| values[index]);
+                let finite = values.all(f64::is_finite);
+                let trace = finite.then(|| curves.signal(index));
                 trace.ok_or(MeasureError::NotFinite)
             }
         }
     }
 
-    /// A function of the time and the signals. Of an impulse it has what it has of the areas where it is `affine`, else nothing.
+    /// An expression. Of an impulse it has what it has of the areas where it is affine, else nothing.
     ///
     /// # Errors
     /// [`MeasureError::NotFinite`].
-    pub fn trace(
-        &self,
-        f: &dyn Fn(f64, &[f64]) -> f64,
-        affine: bool,
-    ) -> Result<Trace<'a>, MeasureError> {
+    pub fn trace(&self, of: &Expression<'_>) -> Result<Trace<'a>, MeasureError> {
         match self {
             Self::Lines { time, columns } => {
                 let time: &'a [f64] = time;
@@ -238,152 +260,26 @@ impl<'a> Signals<'a> {
                     for (value, column) in row.iter_mut().zip(columns) {
                         *value = column[k];
                     }
-                    all.push(finite(f(t, &row))?);
+                    all.push(finite((of.value)(t, &row))?);
                 }
                 Ok(Trace::lines(time, all))
             }
             Self::Curves(curves) => {
-                let drawn = Drawn::of(curves, f, affine)?;
+                let drawn = Drawn::of(curves, of)?;
+                let pieces = Pieces::repeated(drawn.curves, drawn.laps);
+                if !of.is_affine {
+                    return Ok(Trace::pieced(pieces, vec![]));
+                }
                 let still = vec![0.0; curves.columns];
-                let impulses = curves.impulses.iter().filter(|_| affine);
-                let impulses = impulses.map(|(t, areas)| {
+                let impulses = curves.areas(|t, areas| {
                     // As large as what else is in the expression: less of it is lost in the difference.
                     let size = areas.iter().fold(f64::MIN_POSITIVE, |m, a| m.max(a.abs()));
                     let scaled: Vec<f64> = areas.iter().map(|area| area / size).collect();
-                    (*t, size * (f(*t, &scaled) - f(*t, &still)))
+                    size * ((of.value)(t, &scaled) - (of.value)(t, &still))
                 });
-                Ok(Trace::curves(drawn.curves, impulses.collect()))
+                Ok(Trace::pieced(pieces, impulses))
             }
         }
-    }
-}
-
-fn finite(value: f64) -> Result<f64, MeasureError> {
-    let value = Some(value).filter(|value| value.is_finite());
-    value.ok_or(MeasureError::NotFinite)
-}
-
-/// A function of time and signals as smooth pieces.
-pub(super) struct Drawn<'f> {
-    f: &'f dyn Fn(f64, &[f64]) -> f64,
-    /// Its largest value.
-    largest: f64,
-    pub(super) curves: Vec<Curve>,
-    /// By curve: the piece of the signals that it is a part of, where on it that part begins, and how much of it that is.
-    pub(super) places: Vec<(usize, f64, f64)>,
-    /// Whether an edge that is none of the signals is in it.
-    pub(super) has_edge: bool,
-}
-
-impl<'f> Drawn<'f> {
-    /// Of all pieces.
-    pub(super) fn of(
-        curves: &Curves,
-        f: &'f dyn Fn(f64, &[f64]) -> f64,
-        affine: bool,
-    ) -> Result<Self, MeasureError> {
-        let mut drawn = Self {
-            f,
-            largest: 0.0,
-            curves: Vec::with_capacity(curves.len()),
-            places: Vec::with_capacity(curves.len()),
-            has_edge: false,
-        };
-        let all = curves.all();
-        let own = all.map(|(piece, signals)| Ok((piece, signals, drawn.values(piece, signals)?)));
-        let own: Vec<_> = own.collect::<Result<_, _>>()?;
-        let values = own.iter().flat_map(|(.., values)| values);
-        drawn.largest = values.fold(0.0, |m: f64, y| m.max(y.abs()));
-        for (k, (piece, signals, values)) in own.into_iter().enumerate() {
-            let place = (k, 0.0, 1.0);
-            if affine {
-                drawn.push(piece, place, values);
-            } else {
-                drawn.follow(piece, place, signals, values, HALVINGS)?;
-            }
-        }
-        Ok(drawn)
-    }
-
-    /// Its values where the signals have theirs.
-    fn values(
-        &self,
-        (begin, length, _): (f64, f64, f64),
-        signals: &[[f64; VALUES]],
-    ) -> Result<[f64; VALUES], MeasureError> {
-        let mut row = vec![0.0; signals.len()];
-        let mut values = [0.0; VALUES];
-        for (k, value) in values.iter_mut().enumerate() {
-            for (own, signal) in row.iter_mut().zip(signals) {
-                *own = signal[k];
-            }
-            let t = begin + length * (k as f64 / INTERVALS as f64);
-            *value = finite((self.f)(t, &row))?;
-        }
-        Ok(values)
-    }
-
-    fn push(
-        &mut self,
-        (begin, length, until): (f64, f64, f64),
-        place: (usize, f64, f64),
-        values: [f64; VALUES],
-    ) {
-        self.places.push(place);
-        self.curves.push(Curve {
-            begin,
-            length,
-            until,
-            values,
-        });
-    }
-
-    /// Adds the pieces of it that make a piece of the signals: halves of it where its polynomial is not close between its values.
-    fn follow(
-        &mut self,
-        piece: (f64, f64, f64),
-        place: (usize, f64, f64),
-        signals: &[[f64; VALUES]],
-        values: [f64; VALUES],
-        halvings: u32,
-    ) -> Result<(), MeasureError> {
-        let (begin, length, until) = piece;
-        let (whole, from, part) = place;
-        let halves: Vec<_> = signals.iter().map(Curve::halved).collect();
-        let half = [0, 1].map(|k| halves.iter().map(|pair| pair[k]).collect::<Vec<_>>());
-        let pieces = [
-            (begin, 0.5 * length, (2.0 * until).min(1.0)),
-            (begin + 0.5 * length, 0.5 * length, 2.0 * until - 1.0),
-        ];
-        let closer = [
-            self.values(pieces[0], &half[0])?,
-            self.values(pieces[1], &half[1])?,
-        ];
-        let off = |k: usize| {
-            let at = closer[k / INTERVALS][k % INTERVALS];
-            (interpolated(&values, k as f64 / (2 * INTERVALS) as f64) - at).abs()
-        };
-        let most = (1..2 * INTERVALS).step_by(2).map(off).fold(0.0, f64::max);
-        if most <= CURVE_CLOSE * self.largest {
-            self.push(piece, place, values);
-            return Ok(());
-        }
-        if halvings == 0 {
-            self.has_edge = true;
-            let rise = (values[INTERVALS] - values[0]) / INTERVALS as f64;
-            let line = std::array::from_fn(|k| values[0] + rise * k as f64);
-            self.push(piece, place, line);
-            return Ok(());
-        }
-        let places = [0.0, 0.5].map(|begins| (whole, from + begins * part, 0.5 * part));
-        for (((piece, place), signals), values) in
-            pieces.into_iter().zip(places).zip(&half).zip(closer)
-        {
-            if piece.2 > 0.0 {
-                self.follow(piece, place, signals, values, halvings - 1)?;
-            }
-        }
-        Ok(())
     }
 }
 
@@ -407,8 +303,13 @@ mod tests {
     fn expressions_that_bend_and_jump() {
         let curves = sine();
         let signals = Signals::Curves(&curves);
-        let over = |f: &dyn Fn(f64, &[f64]) -> f64, what| {
-            let trace = signals.trace(f, false).unwrap();
+        let over = |value: &dyn Fn(f64, &[f64]) -> f64, what| {
+            let of = Expression {
+                value,
+                is_affine: false,
+                is_timed: true,
+            };
+            let trace = signals.trace(&of).unwrap();
             trace.over(what, 0.0, 10.0).unwrap()
         };
         let whole = over(&|_, y| y[0].abs(), Over::Integral);
@@ -446,7 +347,12 @@ mod tests {
         let mut curves = sine();
         curves.impulse(4.0, vec![2.0]);
         let signals = Signals::Curves(&curves);
-        let shifted = signals.trace(&|_, y| 3.0 * y[0] + 1.0, true).unwrap();
+        let shifted = Expression {
+            value: &|_, y| 3.0 * y[0] + 1.0,
+            is_affine: true,
+            is_timed: false,
+        };
+        let shifted = signals.trace(&shifted).unwrap();
         let whole = shifted.over(Over::Integral, 0.0, 10.0).unwrap();
         let exact = 3.0 * (1.0 - 10.0_f64.cos()) + 10.0 + 6.0;
         assert!((whole - exact).abs() < 1e-9);

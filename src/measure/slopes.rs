@@ -11,7 +11,8 @@
 //! an extremum is where y'(s) = 0 or stays at the end of a piece, and where y meets a level δt follows from δy(t) = 0.
 
 use super::curve::{Curve, VALUES, basis, basis_slopes};
-use super::trace::{Shape, Trace, parts};
+use super::pieces::Pieces;
+use super::trace::{Shape, Trace};
 use super::{MeasureError, Over};
 use crate::linalg::gauss::{NODES, WEIGHTS};
 use crate::settings::tolerances::periodic::MOST_RIVALS;
@@ -78,6 +79,9 @@ impl PieceSlopes {
     }
 }
 
+/// A piece: its number, from where to where on it, and how often it is there.
+type Counted = (usize, Curve, (f64, f64), f64);
+
 /// By node of Gauss and Legendre on a part of a piece l_j there.
 type AtNodes = [[f64; VALUES]; NODES.len()];
 
@@ -106,11 +110,18 @@ enum Integrand {
 }
 
 impl Trace<'_> {
-    fn own(&self) -> &[Curve] {
+    fn own(&self) -> Option<&Pieces> {
         match &self.shape {
-            Shape::Curves(curves) => curves,
-            Shape::Lines { .. } => &[],
+            Shape::Curves(pieces) => Some(pieces),
+            Shape::Lines { .. } => None,
         }
+    }
+
+    /// The pieces in a window, and how often each is there.
+    fn counted(&self, window: (f64, f64)) -> impl Iterator<Item = Counted> {
+        self.own()
+            .into_iter()
+            .flat_map(move |pieces| pieces.counted(window))
     }
 
     /// ∫ over a window, and its derivatives.
@@ -123,8 +134,8 @@ impl Trace<'_> {
             Integrand::Square => y * y,
         };
         let mut known = Vec::new();
-        for (k, curve, (low, high)) in parts(self.own(), window) {
-            let length = curve.length;
+        for (k, curve, (low, high), count) in self.counted(window) {
+            let length = count * curve.length;
             let mut own = PieceSlopes::default();
             let (bases, mut mean) = match of {
                 Integrand::One => (&[][..], high - low),
@@ -141,14 +152,14 @@ impl Trace<'_> {
                 }
             }
             sum += length * mean;
-            own.length += mean;
-            if window.0 > curve.begin {
+            own.length += count * mean;
+            if low > 0.0 {
                 let y = value(curve.at(low));
                 own.begin += y;
                 own.length += y * low;
                 found.from -= y;
             }
-            if window.1 < curve.end() {
+            if high < curve.until {
                 let y = value(curve.at(high));
                 own.begin -= y;
                 own.length -= y * high;
@@ -220,7 +231,7 @@ impl Trace<'_> {
     fn reached(&self, sign: f64, window: (f64, f64), same: f64) -> (Vec<Reached>, f64) {
         let (mut first, mut most, mut least) = (None, f64::NEG_INFINITY, f64::INFINITY);
         let mut largest = Vec::new();
-        for (k, curve, part) in parts(self.own(), window) {
+        for (k, curve, part, _) in self.counted(window) {
             let mut own = f64::NEG_INFINITY;
             curve.corners(part, |s, y| {
                 own = (sign * y).max(own);
@@ -237,7 +248,7 @@ impl Trace<'_> {
         let level = most - same * (most - least);
         let mut tops: Vec<(Reached, f64)> = vec![];
         let mut above = false;
-        for ((k, curve, part), largest) in parts(self.own(), window).zip(largest) {
+        for ((k, curve, part, _), largest) in self.counted(window).zip(largest) {
             if largest <= level {
                 above = false;
                 continue;
@@ -266,7 +277,8 @@ impl Trace<'_> {
         same: f64,
     ) -> Option<(TraceSlopes, Vec<Rival>)> {
         let (all, span) = self.reached(sign, window, same);
-        let time = |(k, s): Reached| self.own()[k].time(s);
+        let own = self.own()?;
+        let time = |(k, s): Reached| own.get(k).time(s);
         let (first, rest) = all.split_first()?;
         let value = self.extreme_slopes_at(*first, window, false)?;
         let rivals = rest.iter().take(MOST_RIVALS + 1).filter_map(|at| {
@@ -291,7 +303,7 @@ impl Trace<'_> {
         window: (f64, f64),
         when: bool,
     ) -> Option<TraceSlopes> {
-        let curve = &self.own()[k];
+        let curve = &self.own()?.get(k);
         let (low, high) = (curve.place(window.0), curve.place(window.1));
         let mut slopes = TraceSlopes::default();
         // An end of the window that lies inside of a piece stays at its time.
@@ -339,9 +351,7 @@ impl Trace<'_> {
     /// The derivatives of the value at `t`, or of the slope there; that to t itself is `from`.
     pub(crate) fn at_slopes(&self, t: f64, slope: bool) -> Option<TraceSlopes> {
         let near = SAME_TIME * t.abs();
-        let begun = self.own().partition_point(|curve| curve.begin <= t + near);
-        let k = begun.checked_sub(1)?;
-        let curve = &self.own()[k];
+        let (k, curve) = &self.own()?.begun_by(t + near)?;
         let s = curve.place(t);
         let (own, from) = if slope {
             let bend: f64 = basis_slopes(s, 2)
@@ -360,7 +370,7 @@ impl Trace<'_> {
             PieceSlopes::of_value(curve, s)
         };
         Some(TraceSlopes {
-            pieces: vec![(k, own)],
+            pieces: vec![(*k, own)],
             from,
             to: 0.0,
         })
@@ -368,14 +378,12 @@ impl Trace<'_> {
 
     /// The derivatives of the time t at which it passes zero: within a piece, or where one begins.
     pub(crate) fn crossing_slopes(&self, t: f64) -> Option<TraceSlopes> {
-        let curves = self.own();
+        let pieces = self.own()?;
         let near = SAME_TIME * t.abs();
-        let first = curves.partition_point(|curve| curve.end() < t - near);
-        let reached = curves.partition_point(|curve| curve.begin <= t + near);
-        let largest = curves.iter().flat_map(|curve| curve.values);
-        let largest = largest.fold(0.0, |m: f64, y| m.max(y.abs()));
+        let (first, reached) = pieces.within((t - near, t + near));
+        let largest = pieces.values().fold(0.0, |m: f64, y| m.max(y.abs()));
         let meets = |k: &usize| {
-            let curve = &curves[*k];
+            let curve = pieces.get(*k);
             let s = curve.place(t);
             let slope = curve.slope(s);
             let rounding = largest + slope.abs() * (t.abs() + curve.length);
@@ -384,8 +392,7 @@ impl Trace<'_> {
         let inside = (first..reached).find_map(|k| Some((k, meets(&k)?)));
         let (k, own) = match inside {
             Some((k, s)) => {
-                let curve = &curves[k];
-                let slope = curve.slope(s);
+                let slope = pieces.get(k).slope(s);
                 let own = PieceSlopes {
                     values: basis(s).map(|part| -part / slope),
                     begin: 1.0,
@@ -395,7 +402,7 @@ impl Trace<'_> {
             }
             None => {
                 let k = reached.checked_sub(1)?;
-                if (curves[k].begin - t).abs() > near {
+                if (pieces.get(k).begin - t).abs() > near {
                     return None;
                 }
                 let own = PieceSlopes {

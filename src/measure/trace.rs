@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use super::curve::Curve;
+use super::pieces::Pieces;
 use super::{Edge, MeasureError, Over, Which};
 use crate::settings::tolerances::times::{NO_STEP, SAME_TIME};
 
@@ -22,15 +23,15 @@ pub(super) enum Shape<'a> {
         values: Cow<'a, [f64]>,
     },
     /// Pieces in the order of time; an edge is where one does not begin at the value at which the one before ends.
-    Curves(Vec<Curve>),
+    Curves(Pieces),
 }
 
 /// A part of a waveform.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Piece<'a> {
+pub(super) enum Piece {
     Line(Line),
     /// From s to s.
-    Curve(&'a Curve, (f64, f64)),
+    Curve(Curve, (f64, f64)),
 }
 
 /// One straight piece, (t0, y0) to (t1, y1) with t0 ≤ t1.
@@ -65,7 +66,7 @@ impl Line {
 /// When a monotone part meets a level, s.
 type Meets<'a> = &'a dyn Fn(f64) -> f64;
 
-impl Piece<'_> {
+impl Piece {
     /// s.
     pub(super) fn length(&self) -> f64 {
         match self {
@@ -137,17 +138,6 @@ impl Piece<'_> {
     }
 }
 
-/// The pieces of from ≤ t ≤ to: their numbers, and from where to where they lie there.
-pub(super) fn parts(
-    curves: &[Curve],
-    (from, to): (f64, f64),
-) -> impl Iterator<Item = (usize, &Curve, (f64, f64))> {
-    let first = curves.partition_point(|curve| curve.end() < from);
-    let inside = curves.iter().enumerate().skip(first);
-    let inside = inside.take_while(move |(_, curve)| curve.begin <= to);
-    inside.map(move |(k, curve)| (k, curve, (curve.place(from), curve.place(to))))
-}
-
 impl<'a> Trace<'a> {
     /// Straight lines between rows: times in s, nondecreasing, and as many values. Two rows at one time are an edge.
     #[must_use]
@@ -163,7 +153,15 @@ impl<'a> Trace<'a> {
     #[must_use]
     pub fn curves(curves: Vec<Curve>, impulses: Vec<(f64, f64)>) -> Self {
         Self {
-            shape: Shape::Curves(curves),
+            shape: Shape::Curves(Pieces::once(curves)),
+            impulses,
+        }
+    }
+
+    /// The same of pieces that may repeat.
+    pub(super) const fn pieced(pieces: Pieces, impulses: Vec<(f64, f64)>) -> Self {
+        Self {
+            shape: Shape::Curves(pieces),
             impulses,
         }
     }
@@ -172,7 +170,7 @@ impl<'a> Trace<'a> {
     pub(super) fn span(&self) -> Option<(f64, f64)> {
         match &self.shape {
             Shape::Lines { time, .. } => Some((*time.first()?, *time.last()?)),
-            Shape::Curves(curves) => Some((curves.first()?.begin, curves.last()?.end())),
+            Shape::Curves(pieces) => pieces.span(),
         }
     }
 
@@ -184,16 +182,15 @@ impl<'a> Trace<'a> {
                 let first = values.first().copied();
                 first.filter(|_| values.iter().all(|value| same(*value, first)))
             }
-            Shape::Curves(curves) => {
-                let first = curves.first().map(|curve| curve.values[0]);
-                let mut values = curves.iter().flat_map(|curve| curve.values);
-                first.filter(|_| values.all(|value| same(value, first)))
+            Shape::Curves(pieces) => {
+                let first = pieces.values().next();
+                first.filter(|_| pieces.values().all(|value| same(value, first)))
             }
         }
     }
 
     /// Visits the pieces of from ≤ t ≤ to, those at its ends cut.
-    pub(super) fn pieces(&self, (from, to): (f64, f64), mut see: impl FnMut(Piece<'_>)) {
+    pub(super) fn pieces(&self, (from, to): (f64, f64), mut see: impl FnMut(Piece)) {
         match &self.shape {
             Shape::Lines { time, values } => {
                 let first = time.partition_point(|t| *t < from).saturating_sub(1);
@@ -212,9 +209,9 @@ impl<'a> Trace<'a> {
                         .for_each(|l| see(Piece::Line(l)));
                 }
             }
-            Shape::Curves(curves) => {
+            Shape::Curves(pieces) => {
                 let mut before: Option<f64> = None;
-                for (_, curve, part) in parts(curves, (from, to)) {
+                for (_, curve, part) in pieces.parts((from, to)) {
                     let (t, begins) = (curve.time(part.0), curve.at(part.0));
                     if let Some(ends) = before.filter(|ends| *ends != begins) {
                         see(Piece::Line(Line {
@@ -231,13 +228,13 @@ impl<'a> Trace<'a> {
         }
     }
 
-    /// The same without edges, which have no length and no values but those beside them.
-    fn without_edges(&self, window: (f64, f64), mut see: impl FnMut(Piece<'_>)) {
+    /// The same without edges, which have no length and no values but those beside them, and without laps that are as one that is seen: how many there are of each.
+    fn without_edges(&self, window: (f64, f64), mut see: impl FnMut(Piece, f64)) {
         match &self.shape {
-            Shape::Lines { .. } => self.pieces(window, see),
-            Shape::Curves(curves) => {
-                parts(curves, window).for_each(|(_, curve, part)| see(Piece::Curve(curve, part)));
-            }
+            Shape::Lines { .. } => self.pieces(window, |piece| see(piece, 1.0)),
+            Shape::Curves(pieces) => pieces
+                .counted(window)
+                .for_each(|(_, curve, part, count)| see(Piece::Curve(curve, part), count)),
         }
     }
 
@@ -246,9 +243,9 @@ impl<'a> Trace<'a> {
     /// # Errors
     /// [`MeasureError::Window`] where the run has no piece of positive length there.
     pub fn over(&self, what: Over, from: f64, to: f64) -> Result<f64, MeasureError> {
-        let sum = |f: &dyn Fn(&Piece<'_>) -> f64| {
+        let sum = |f: &dyn Fn(&Piece) -> f64| {
             let mut sum = 0.0;
-            self.without_edges((from, to), |piece| sum += f(&piece));
+            self.without_edges((from, to), |piece, count| sum += count * f(&piece));
             sum
         };
         let length = sum(&|piece| piece.length());
@@ -265,7 +262,7 @@ impl<'a> Trace<'a> {
         // When and how much.
         let extremes = || {
             let (mut least, mut most) = ((f64::NAN, f64::INFINITY), (f64::NAN, f64::NEG_INFINITY));
-            self.without_edges((from, to), |piece| {
+            self.without_edges((from, to), |piece, _| {
                 piece.corners(|t, y| {
                     if y < least.1 {
                         least = (t, y);
@@ -328,13 +325,12 @@ impl<'a> Trace<'a> {
     }
 
     /// The last piece that has begun by `t`.
-    fn curve_at(&self, t: f64) -> Option<&Curve> {
-        let Shape::Curves(curves) = &self.shape else {
+    fn curve_at(&self, t: f64) -> Option<Curve> {
+        let Shape::Curves(pieces) = &self.shape else {
             return None;
         };
         let near = SAME_TIME * t.abs();
-        let begun = curves.partition_point(|curve| curve.begin <= t + near);
-        let curve = curves.get(begun.checked_sub(1)?)?;
+        let (_, curve) = pieces.begun_by(t + near)?;
         (t <= curve.end() + near).then_some(curve)
     }
 
@@ -377,10 +373,7 @@ impl<'a> Trace<'a> {
         let mut side = 0.0;
         let largest = match &self.shape {
             Shape::Lines { values, .. } => values.iter().fold(level.abs(), |m, v| m.max(v.abs())),
-            Shape::Curves(curves) => {
-                let values = curves.iter().flat_map(|curve| &curve.values);
-                values.fold(level.abs(), |m, v| m.max(v.abs()))
-            }
+            Shape::Curves(pieces) => pieces.values().fold(level.abs(), |m, v| m.max(v.abs())),
         };
         self.pieces(within, |piece| {
             piece.sections(&mut |line, meets| {

@@ -342,21 +342,8 @@ fn parts(tape: &Tape) -> Vec<Part<'_>> {
     all
 }
 
-/// What derivatives to the pieces of a tape, which may repeat, are ones to: their values, then where they begin and how long they are.
-pub(super) fn folded(weights: &Weights, tape: &Tape, columns: usize) -> Weighted {
-    let count = parts(tape).len();
-    let mut nodes = vec![[0.0; VALUES]; count * columns];
-    let all = weights.values.chunks_exact(columns.max(1));
-    for (k, own) in all.enumerate() {
-        let from = (k % count) * columns;
-        for (sum, own) in nodes[from..from + columns].iter_mut().zip(own) {
-            sum.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
-        }
-    }
-    let mut shifts = vec![0.0; 2 * count];
-    for (k, (begin, length)) in weights.begins.iter().zip(&weights.lengths).enumerate() {
-        shifts[k % count] += begin;
-        shifts[count + k % count] += length;
-    }
-    Weighted::of_values(nodes, shifts)
+/// What derivatives to the pieces of a tape are ones to: their values, then where they begin and how long they are.
+pub(super) fn laid_out(weights: &Weights) -> Weighted {
+    let shifts = [&weights.begins[..], &weights.lengths].concat();
+    Weighted::of_values(weights.values.clone(), shifts)
 }

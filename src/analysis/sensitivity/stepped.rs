@@ -12,13 +12,13 @@ use std::collections::HashMap;
 use nalgebra::{Complex, DVector};
 
 use super::base::not_smooth;
-use super::course::{Course, folded};
+use super::course::{Course, laid_out};
 use super::exact::Weighing;
 use super::gradients::started;
 use super::survey::{Grounds, Survey};
 use super::{Beside, Passes, Sensitivity, left_out, unsupported};
 use crate::analysis::variation::difference;
-use crate::circuit::{Measured, Weights, source::Wave};
+use crate::circuit::{Measured, source::Wave};
 use crate::integrate::{
     Drive, Error, Lengths, Note, Reads, Reason, Returned, Returns, STAGES, Tape, Weighed,
 };
@@ -191,10 +191,7 @@ impl Beside<'_> {
         let (tape, steps) = course.pass(&mut returns, Lengths::Free, self.options.cancel)?;
         let curves = course.curves(&tape, own.multiport().probes);
         let bends = tape.steps().any(|step| step.bends || !step.at.is_empty());
-        if self
-            .weighed((&own, &course), (&tape, &curves))
-            .needs_moves()
-        {
+        if self.weighed((&own, &course), &curves).needs_moves() {
             return self.otherwise(to);
         }
         let grounds = Grounds {
@@ -302,16 +299,11 @@ impl Beside<'_> {
         self.differences(to)
     }
 
-    fn weighed(
-        &self,
-        (own, course): (&Model, &Course),
-        (tape, curves): (&Tape, &Curves),
-    ) -> Weighing {
-        let columns = own.multiport().probes;
+    fn weighed(&self, (own, course): (&Model, &Course), curves: &Curves) -> Weighing {
         let asked = |name: &str| self.options.asks_for(name);
-        let fold = |weights: &Weights| folded(weights, tape, columns);
         let found = own.circuit().measure(&Signals::Curves(curves));
-        Weighing::of(own.circuit(), found, (&fold, curves, course.known()), asked)
+        let same = course.known();
+        Weighing::of(own.circuit(), found, (&laid_out, curves, same), asked)
     }
 
     /// The derivatives along a run to some of the values; `None` where an active set leaves them open, or the operating point that it begins at does.
@@ -331,7 +323,7 @@ impl Beside<'_> {
             return Ok(None);
         }
         let curves = course.curves(tape, columns);
-        let mut weighing = self.weighed((own, course), (tape, &curves));
+        let mut weighing = self.weighed((own, course), &curves);
         let weighed = weighing.all();
         let weighed = weighed.map(|weighted| course.weighed(tape, weighted, columns));
         let weighed: Vec<Weighed> = weighed.collect();

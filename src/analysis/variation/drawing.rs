@@ -6,7 +6,7 @@ use super::course::Stretch;
 use super::forms::Forms;
 use super::linear::{Linear, Motion, Part, parts};
 use super::{System, Trajectory};
-use crate::circuit::Weights;
+use crate::circuit::{Weights, source};
 use crate::integrate::Error;
 use crate::measure::{Curves, INTERVALS, VALUES};
 
@@ -21,7 +21,7 @@ pub(crate) struct Sight {
     pub(crate) most: usize,
 }
 
-/// The segments of a run as w' = 𝒜 w: the equations, and by segment which one it is and w where it begins.
+/// The segments of a run as w' = 𝒜 w: the equations, and by segment which one it is and w where it begins. Sources that no system sees are zero in them.
 pub(crate) struct Lines {
     known: Vec<Linear>,
     pub(super) starts: Vec<(usize, DVector<f64>)>,
@@ -104,6 +104,12 @@ impl Lines {
     /// Of all segments.
     pub(crate) fn of(trajectory: &Trajectory, forms: &Forms) -> Self {
         let systems: &[System] = &trajectory.systems;
+        let inputs = systems.first().map_or(0, |system| system.lcs.p());
+        let seen = |input: usize| systems.iter().any(|system| system.sees(input));
+        let seen: Vec<bool> = (0..inputs).map(seen).collect();
+        let piece = |(piece, seen): (&source::Piece, &bool)| {
+            if *seen { *piece } else { source::Piece::zero() }
+        };
         let (mut known, mut starts) = (Vec::new(), Vec::new());
         for (k, segment) in trajectory.segments.iter().enumerate() {
             let stretch = Stretch {
@@ -111,7 +117,7 @@ impl Lines {
                 from: segment.from,
                 to: segment.to,
                 start: segment.start.clone(),
-                pieces: forms.on(k).to_vec(),
+                pieces: forms.on(k).iter().zip(&seen).map(piece).collect(),
             };
             starts.push(Linear::of(&mut known, systems, &stretch));
         }
@@ -191,17 +197,15 @@ impl Drawing {
         curves
     }
 
-    /// What derivatives to the pieces, which may repeat, are ones to: their ends move with the events, and what is between with its age.
+    /// What derivatives to the pieces are ones to: their ends move with the events, and what is between with its age.
     pub(crate) fn weighted(&self, weights: &Weights) -> Weighted {
         let mut nodes = vec![[0.0; VALUES]; self.values.len()];
         let mut shifts = vec![0.0; self.seconds.len() + 1];
-        let count = self.pieces.len();
         let all = weights.values.chunks_exact(self.columns.max(1));
         for (k, own) in all.enumerate() {
             if own.as_flattened().iter().all(|weight| *weight == 0.0) {
                 continue;
             }
-            let k = k % count;
             let piece = &self.pieces[k];
             let rows = k * self.columns..(k + 1) * self.columns;
             let (mut begin, mut length) = (0.0, 0.0);
@@ -218,8 +222,9 @@ impl Drawing {
             }
             self.add_shifts(piece, (begin, length), &mut shifts);
         }
-        for (k, ends) in weights.begins.iter().zip(&weights.lengths).enumerate() {
-            self.add_shifts(&self.pieces[k % count], (*ends.0, *ends.1), &mut shifts);
+        let ends = weights.begins.iter().zip(&weights.lengths);
+        for (piece, (begin, length)) in self.pieces.iter().zip(ends) {
+            self.add_shifts(piece, (*begin, *length), &mut shifts);
         }
         Weighted { nodes, shifts }
     }
