@@ -364,3 +364,26 @@ fn the_print_step_does_not_matter() {
     let [a, b] = [&coarse, &fine].map(magnitude);
     assert!((a - b).abs() < 1e-10 * a && a > 0.1, "{a} {b}");
 }
+
+/// Of thirteen capacitors measurements see rows, and a note says how much depends on these; of twelve they see what lies between.
+#[test]
+fn lines_between_rows_are_told() {
+    let ladder = |count: usize| {
+        let stage = |k: usize| format!("r{k} n{} n{k} 1k\nc{k} n{k} 0 1u\n", k - 1);
+        let stages: String = (1..=count).map(stage).collect();
+        let text = format!(
+            "ladder\nv1 n0 0 1\n{stages}rx n1 out 1k\nro out 0 1k\n.save v(out)\n.tran 1m 50m uic\n.meas tran mean avg v(n{count})\n.end\n"
+        );
+        let (summary, said) = sim(&text);
+        let note = said.split_once("straight lines between the rows of this run");
+        let part = note.map(|(_, note)| {
+            let (_, rest) = note.split_once("by up to ").unwrap();
+            rest.split_once(' ').unwrap().0.parse::<f64>().unwrap()
+        });
+        (value(&summary, "mean"), part)
+    };
+    let ((_, none), (_, part)) = (ladder(12), ladder(13));
+    assert_eq!(none, None);
+    let part = part.unwrap();
+    assert!(part > 1e-9 && part < 1e-2, "{part}");
+}

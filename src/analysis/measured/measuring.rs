@@ -276,8 +276,9 @@ impl<'a> Measuring<'a> {
         (factor > 1).then(|| factor * self.divisions)
     }
 
-    /// Names the measurements of which even so [`ROWS_APART`] depends on the rows.
-    pub(super) fn too_coarse(&self, run: &Run, found: &Measurements) -> Option<Note> {
+    /// Names the measurements of which even so [`ROWS_APART`] depends on the rows; and tells of those of an exact run that there are lines between its rows, and how much they depend on
+    /// these.
+    pub(super) fn on_rows(&self, run: &Run, found: &Measurements) -> Option<Note> {
         let thinned = self.thinned(run, found);
         let off = thinned.iter().filter(|(.., off)| *off > ROWS_APART);
         let off = off.map(|(name, [a, b], _)| {
@@ -288,11 +289,21 @@ impl<'a> Measuring<'a> {
             let few = "measurements see fewer rows than half of those at events: between them curves count as straight lines; a shorter run, or fewer signals, has more";
             return Some(Note::run("rows-apart", few));
         }
-        (!off.is_empty()).then(|| {
-            Note::run("rows-apart", format!(
-                "rows may be too far apart for {}: between them curves count as straight lines. A shorter print step, as in `.tran 10n 1m`, or a shorter \
+        if !off.is_empty() {
+            return Some(Note::run(
+                "rows-apart",
+                format!(
+                    "rows may be too far apart for {}: between them curves count as straight lines. A shorter print step, as in `.tran 10n 1m`, or a shorter \
                  largest step, `.tran 0 1m 0 10n`, tells",
-                off.join(", ")
+                    off.join(", ")
+                ),
+            ));
+        }
+        let most = thinned.iter().fold(0.0, |m: f64, (.., off)| m.max(*off));
+        (run.method == Method::Exact.name() && most > 0.0).then(|| {
+            Note::run("measured-on-rows", format!(
+                "measurements see straight lines between the rows of this run, as what lies between its events takes too long to see, or is not known: with a third of the rows they change by up \
+                 to {most:.1e} of their value"
             ))
         })
     }

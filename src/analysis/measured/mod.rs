@@ -54,7 +54,7 @@ fn shown_of(measuring: Measuring<'_>, model: &Model, options: SimOptions<'_>) ->
     let (measuring, mut finished) = observed(measuring, model, options);
     if let Some((run, found)) = &mut finished.run {
         if measuring.by_rows() {
-            run.notes.extend(measuring.too_coarse(run, found));
+            run.notes.extend(measuring.on_rows(run, found));
         }
         let mut spikes = Spikes::of(step_of(measuring.fine()));
         let columns = run.waveforms.units.len();

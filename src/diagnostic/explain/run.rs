@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 59] = [
+pub(super) const CODES: [Explanation; 60] = [
     Explanation::of(
         "about-rest",
         "The response is that about the operating point, as laws are smooth and no switch moves.",
@@ -128,6 +128,12 @@ pub(super) const CODES: [Explanation; 59] = [
         "Derivatives and values are of what happens between events, where `circ sim` measures the same run on its rows.",
         "A run of many states or very many periods, whose rows cost less than what lies between them.",
         "Nothing; a smaller print step brings the rows of `circ sim` closer to these values.",
+    ),
+    Explanation::of(
+        "measured-on-rows",
+        "Measurements see straight lines between the rows of a run that is exact at them.",
+        "Steps in it, very many events or periods, or many states: what is between the events would take too long, or too much room.",
+        "Measure from later on (`FROM=`), or take a smaller print step, where the part that is told is too large.",
     ),
     Explanation::of(
         "more",
