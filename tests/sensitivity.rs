@@ -162,6 +162,22 @@ fn runs_in_steps_are_differentiated_by_differences() {
     assert!((5e-3..7e-3).contains(&slope), "{slope:e}");
 }
 
+/// A constant source of which other things are made: a factor of a product, and the duty of what it is compared with.
+#[test]
+fn a_source_that_stands_in_something_else_too() {
+    let text = "product\nvk k 0 2\nvs s 0 sin(1 1 1k)\nb1 o 0 v=v(k)*v(s)\nro o 0 1k\n.tran 1u 2m\n\
+        .meas tran mean avg v(o) from=0 to=2m\n.meas tran both avg v(o)*v(k) from=0 to=2m\n.end\n";
+    let own = both_ways(text, false);
+    near(&own, "mean", "vk", 2.0, 2.0, 1e-12);
+    near(&own, "both", "vk", 2.0, 8.0, 1e-12);
+    let text = "duty\nvin in 0 10\nvk k 0 0.4\nvt t 0 pulse(0 1 0 10u 0 0 10u)\ns1 in o k t sw\nro o 0 1k\n.model sw sw(vt=0 ron=1m roff=1g)\n\
+        .tran 1u 1m\n.meas tran mean avg v(o) from=0 to=100u\n.end\n";
+    let own = both_ways(text, true);
+    let near = |of, to, value, truth| near(&own, of, to, value, truth, 1e-5);
+    near("mean", "vk", 0.4, 4.0);
+    near("mean", "vin", 10.0, 4.0);
+}
+
 /// A divider: v = V R₂/(R₁ + R₂) is monotone in each of its values, so that its range is that of the corners.
 #[test]
 fn the_range_of_a_divider() {

@@ -124,7 +124,7 @@ impl Base {
         solved(m.clone(), &forced)
     }
 
-    /// Back along the run with what these weigh; of an orbit once more with λ = (I − Mᵀ)⁻¹ ψ₀.
+    /// Back along the run with what these weigh; of an orbit from λ = (I − Mᵀ)⁻¹ ψ₀ on, with ψ₀ from once around.
     pub(super) fn back(
         &self,
         lines: &Lines,
@@ -138,13 +138,14 @@ impl Base {
             drawing,
         };
         let mut motions = lines.motions(self.sight.unit);
-        let carried = adjoint.back(&mut motions, weighted, None)?;
-        let Some(Repeated { monodromy: m, .. }) = &self.orbit else {
-            return Ok(carried);
+        let last = match &self.orbit {
+            Some(Repeated { monodromy: m, .. }) => {
+                let start = adjoint.to_start(&mut motions, weighted)?;
+                Some(solved(m.transpose(), &start)?)
+            }
+            None => None,
         };
-        let last = solved(m.transpose(), &carried.start)?;
-        let again = adjoint.back(&mut motions, &[], Some(&last))?;
-        Ok(carried.plus(&again))
+        adjoint.back(&mut motions, weighted, last.as_ref())
     }
 }
 

@@ -30,6 +30,50 @@ pub(super) struct Survey<'a> {
     pub(super) own: Vec<Option<f64>>,
 }
 
+/// What differs with the value of a card alone.
+pub(super) struct Card {
+    perturbation: Perturbation,
+    sources: [Vec<Source>; 4],
+}
+
+fn sources(multiport: &StandardMultiport) -> Vec<Source> {
+    let all = multiport.sources.iter();
+    all.map(|source| source.input.source.clone()).collect()
+}
+
+impl Card {
+    /// By card, from a circuit in which each has its mark for a value, where the others have these values; `None` where more differs than that.
+    fn all(
+        own: &StandardMultiport,
+        near: &StandardMultiport,
+        cards: &[(f64, [f64; 4])],
+    ) -> Option<Vec<Self>> {
+        let perturbations = own.perturbations_by(near, cards)?;
+        let (own, near) = (sources(own), sources(near));
+        let mut all: Vec<Self> = perturbations
+            .into_iter()
+            .map(|perturbation| Self {
+                perturbation,
+                sources: [(); 4].map(|()| own.clone()),
+            })
+            .collect();
+        for (k, _) in own
+            .iter()
+            .zip(&near)
+            .enumerate()
+            .filter(|(_, (own, near))| own != near)
+        {
+            let card = cards
+                .iter()
+                .position(|(mark, _)| near[k] == Source::constant(*mark))?;
+            for (sources, value) in all[card].sources.iter_mut().zip(cards[card].1) {
+                sources[k] = Source::constant(value);
+            }
+        }
+        Some(all)
+    }
+}
+
 /// What a value is looked at beside: the circuit, and the period of its orbit, s.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Grounds<'a> {
@@ -56,25 +100,21 @@ impl Beside<'_> {
         &self,
         base: Grounds<'_>,
         (name, value): (&'n str, f64),
-        cards: &mut HashMap<String, Perturbation>,
+        cards: &mut HashMap<String, Card>,
         (own, curves): (&Model, &Curves),
     ) -> Result<Option<Survey<'n>>, Error> {
         self.go_on()?;
         let (values, step) = beside_value(value, VALUE_STEP);
-        let sources = |near: &StandardMultiport| -> Vec<Source> {
-            let all = near.sources.iter();
-            all.map(|source| source.input.source.clone()).collect()
-        };
         let count = own.circuit().measurements.len();
         let mut explicit = vec![Some(0.0); count];
-        if let Some(perturbation) = cards.remove(name) {
+        if let Some(card) = cards.remove(name) {
             return Ok(Some(Survey {
                 name,
                 value,
                 step,
                 initial: DVector::zeros(base.multiport.storage.len()),
-                sources: [base.multiport; 4].map(sources),
-                perturbation: Some(perturbation),
+                sources: card.sources,
+                perturbation: Some(card.perturbation),
                 own: explicit,
             }));
         }
@@ -133,25 +173,27 @@ impl Beside<'_> {
         }))
     }
 
-    /// By name what differs where a resistance, capacitance or inductance of a card has another value: coefficients that are its value or the inverse of that. Names of other values
-    /// are left out, and where something else follows a value, as the metric of coupled inductors does.
+    /// By name what differs where a resistance, capacitance, inductance or constant source of a card has another value: coefficients that are its value or the inverse of that, and
+    /// sources that are that. Names of other values are left out, and where something else follows a value, as the metric of coupled inductors does, or a clock a voltage that a
+    /// triangle is compared with.
     pub(super) fn cards(
         &self,
         base: Grounds<'_>,
         to: &[(String, f64)],
         own: &Model,
-    ) -> HashMap<String, Perturbation> {
-        let mut circuit = own.circuit().clone();
-        let (mut names, mut cards) = (Vec::new(), Vec::new());
+    ) -> HashMap<String, Card> {
+        let (mut names, mut cards, mut given) = (Vec::new(), Vec::new(), Vec::new());
         for (name, value) in to {
-            let Some(id) = circuit.element(name) else {
+            let Some(id) = own.circuit().element(name) else {
                 continue;
             };
-            let kind = &mut circuit.elements[id.index()].kind;
+            let kind = &own.circuit().elements[id.index()].kind;
             let letter = match kind {
                 Kind::Resistor(_) => 'r',
                 Kind::Capacitor(_) => 'c',
                 Kind::Inductor(_) => 'l',
+                Kind::VoltageSource(_) => 'v',
+                Kind::CurrentSource(_) => 'i',
                 _ => continue,
             };
             let Some(whole) = value_of(kind).filter(|_| name.starts_with(letter)) else {
@@ -161,18 +203,38 @@ impl Beside<'_> {
             let factor = whole / value;
             let (values, _) = beside_value(*value, VALUE_STEP);
             // A number that no other card has.
-            let mark = whole * (1.0 + (cards.len() + 1) as f64 * MARK);
-            kind.set_value(mark);
-            names.push(name.clone());
-            cards.push((mark, values.map(|value| value * factor)));
+            let part = 1.0 + (cards.len() + 1) as f64 * MARK;
+            // What a source is may stand in anything.
+            if matches!(letter, 'v' | 'i') {
+                given.push((name.clone(), value * part));
+            }
+            names.push((name, id));
+            cards.push((whole * part, values.map(|value| value * factor)));
         }
-        if self.options.steady {
-            circuit = at_rest(&circuit);
+        let circuit = if given.is_empty() {
+            Some(own.circuit().clone())
+        } else {
+            own.circuit_with(&given).ok().map(|(circuit, _)| circuit)
+        };
+        let mut found = None;
+        if let Some(mut circuit) = circuit {
+            for ((_, id), (mark, _)) in names.iter().zip(&cards) {
+                circuit.elements[id.index()].kind.set_value(*mark);
+            }
+            let same = circuit.measurements == own.circuit().measurements;
+            if self.options.steady {
+                circuit = at_rest(&circuit);
+            }
+            let near = behaviour(&circuit).ok().filter(|_| same);
+            let near = near.map(|near| near.standard());
+            found = near.and_then(|near| Card::all(base.multiport, &near, &cards));
         }
-        let near = behaviour(&circuit).ok().map(|near| near.standard());
-        let found = near.and_then(|near| base.multiport.perturbations_by(&near, &cards));
         match found {
-            Some(found) => names.into_iter().zip(found).collect(),
+            Some(found) => names
+                .iter()
+                .map(|(name, _)| (*name).clone())
+                .zip(found)
+                .collect(),
             None if names.len() > 1 => {
                 let each = to.iter().map(std::slice::from_ref);
                 each.flat_map(|one| self.cards(base, one, own)).collect()

@@ -133,7 +133,7 @@ impl Extrema {
         const PARTS: u32 = 4;
         let row = motion.linear.rows[0].row(k).transpose();
         let series = motion.series(w, h);
-        let polynomial: Vec<f64> = series.iter().map(|term| row.dot(term)).collect();
+        let polynomial: Vec<f64> = series.column_iter().map(|term| row.dot(&term)).collect();
         let value = |s: f64| polynomial.iter().rev().fold(0.0, |sum, c| sum * s + c);
         let terms = || polynomial.iter().enumerate().skip(1).rev();
         let rate = |s: f64| terms().fold(0.0, |sum, (k, c)| sum * s + k as f64 * c);

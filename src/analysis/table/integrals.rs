@@ -40,7 +40,7 @@ pub(super) fn over(
     let t = motion.part(halvings);
     let series = motion.series(w, t);
     let at = |s: f64| {
-        let terms = series.iter().rev();
+        let terms = series.column_iter().rev();
         terms.fold(DVector::zeros(w.len()), |sum, term| sum * s + term)
     };
     let mut found = Integrals {

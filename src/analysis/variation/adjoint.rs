@@ -90,11 +90,52 @@ impl Adjoint<'_> {
         weighted: &[&Weighted],
         last: Option<&DMatrix<f64>>,
     ) -> Result<Carried, Error> {
-        let costates = last.map_or(weighted.len(), DMatrix::ncols);
+        let (mut carried, outer) = self.along(motions, weighted, last)?;
+        for (motion, outer) in motions.iter_mut().zip(outer) {
+            let system = motion.linear.system;
+            let n = self.trajectory.systems[system].lcs.n();
+            let sources = &motion.linear.exosystem;
+            let (generator, output) = (sources.generator(), sources.output());
+            let read = read(n, output, generator, true).transpose();
+            let basis = motion.linear.basis.as_ref();
+            let all = carried.systems[system].iter_mut();
+            for (sums, (mut whole, mut outputs)) in all.zip(outer.whole(motion)?) {
+                if let Some(basis) = basis {
+                    let to = basis.to.transpose();
+                    whole = basis.from.tr_mul(&whole) * &to;
+                    outputs *= to;
+                }
+                sums.rate += whole.rows(0, n) * &read;
+                sums.outputs += outputs * &read;
+            }
+        }
+        Ok(carried)
+    }
+
+    /// What weighs the storage at the start, q×measurements, alone: see [`Self::back`].
+    ///
+    /// # Errors
+    /// An exponential does not exist in doubles.
+    pub(crate) fn to_start(
+        &self,
+        motions: &mut [Motion<'_>],
+        weighted: &[&Weighted],
+    ) -> Result<DMatrix<f64>, Error> {
+        Ok(self.along(motions, weighted, None)?.0.start)
+    }
+
+    /// The same as [`Self::back`], where the integrals of the segments are left as sums.
+    fn along<'m>(
+        &self,
+        motions: &mut [Motion<'m>],
+        weighted: &[&Weighted],
+        last: Option<&DMatrix<f64>>,
+    ) -> Result<(Carried, Vec<Outer<'m>>), Error> {
+        let costates = weighted.len();
         let views = self.views(motions, weighted);
         let trajectory = self.trajectory;
         let mut carried = Carried::none(trajectory, costates);
-        let mut outer: Vec<Outer> = motions
+        let mut outer: Vec<Outer<'m>> = motions
             .iter()
             .map(|motion| Outer::of(motion.linear, costates))
             .collect();
@@ -133,25 +174,7 @@ impl Adjoint<'_> {
             &mut c.inject
         });
         carried.start = system.lcs.storage.inject.tr_mul(&psi);
-        for (motion, outer) in motions.iter_mut().zip(outer) {
-            let system = motion.linear.system;
-            let n = trajectory.systems[system].lcs.n();
-            let sources = &motion.linear.exosystem;
-            let (generator, output) = (sources.generator(), sources.output());
-            let read = read(n, output, generator, true).transpose();
-            let basis = motion.linear.basis.as_ref();
-            let all = carried.systems[system].iter_mut();
-            for (sums, (mut whole, mut outputs)) in all.zip(outer.whole(motion)?) {
-                if let Some(basis) = basis {
-                    let to = basis.to.transpose();
-                    whole = basis.from.tr_mul(&whole) * &to;
-                    outputs *= to;
-                }
-                sums.rate += whole.rows(0, n) * &read;
-                sums.outputs += outputs * &read;
-            }
-        }
-        Ok(carried)
+        Ok((carried, outer))
     }
 
     /// ψ before the event after segment k.

@@ -65,28 +65,6 @@ impl Carried {
         }
     }
 
-    /// What both make, at the start of the first one.
-    pub(crate) fn plus(mut self, other: &Self) -> Self {
-        for (own, other) in self
-            .systems
-            .iter_mut()
-            .flatten()
-            .zip(other.systems.iter().flatten())
-        {
-            own.rate += &other.rate;
-            own.outputs += &other.outputs;
-            own.storage += &other.storage;
-            own.inject += &other.inject;
-        }
-        for (guard, rows) in &other.guards {
-            self.add_guard(*guard, rows);
-        }
-        for (own, other) in self.edges.iter_mut().zip(&other.edges) {
-            *own += other;
-        }
-        self
-    }
-
     pub(super) fn add_guard(&mut self, guard: Guard, rows: &[DVector<f64>]) {
         match self.guards.iter_mut().find(|(own, _)| *own == guard) {
             Some((_, own)) => own.iter_mut().zip(rows).for_each(|(own, row)| *own += row),

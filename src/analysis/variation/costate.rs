@@ -14,7 +14,7 @@
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use super::length::Length;
-use super::linear::{LEVELS, Linear, Motion, series};
+use super::linear::{LEVELS, Linear, Motion, TERMS, series};
 use super::sums::{Sums, integrate};
 use crate::integrate::Error;
 use crate::linalg::gauss::{NODES, POINTS, WEIGHTS};
@@ -33,6 +33,32 @@ fn add_products(y: &mut DMatrix<f64>, a: &DMatrix<f64>, x: &DMatrix<f64>) {
     for (mut y, x) in y.column_iter_mut().zip(x.column_iter()) {
         add_product(y.as_mut_slice(), a, x.as_slice());
     }
+}
+
+/// By node its powers.
+const POWERS: [[f64; TERMS]; POINTS] = powers();
+
+const fn powers() -> [[f64; TERMS]; POINTS] {
+    let mut all = [[1.0; TERMS]; POINTS];
+    let mut j = 0;
+    while j < POINTS {
+        let mut k = 1;
+        while k < TERMS {
+            all[j][k] = all[j][k - 1] * NODES[j];
+            k += 1;
+        }
+        j += 1;
+    }
+    all
+}
+
+/// The values of a series at nodes by their number.
+fn at_nodes(series: &DMatrix<f64>, node: fn(usize) -> usize) -> DMatrix<f64> {
+    let mut values = DMatrix::zeros(series.nrows(), POINTS);
+    for (j, mut column) in values.column_iter_mut().enumerate() {
+        add_product(column.as_mut_slice(), series, &POWERS[node(j)]);
+    }
+    values
 }
 
 /// Sums of an equation of dimension N, for several costates.
@@ -173,19 +199,16 @@ impl<'a> Outer<'a> {
     fn back_by_series(&mut self, seconds: f64, phi: &mut DMatrix<f64>, w: &DVector<f64>) {
         let generator = &self.linear.generator;
         let back = generator.transpose();
-        let along = |series: &[DVector<f64>], at: fn(f64) -> f64| {
-            let powers = DMatrix::from_fn(series.len(), POINTS, |k, j| at(NODES[j]).powi(k as i32));
-            DMatrix::from_columns(series) * powers
-        };
-        let mut before = along(&series(generator, w, seconds), |s| s);
+        let mut before = at_nodes(&series(generator, w.as_slice(), seconds), |j| j);
         for (mut column, weight) in before.column_iter_mut().zip(WEIGHTS) {
             column *= seconds * weight;
         }
         let before = before.transpose();
-        for (c, whole) in self.whole.iter_mut().enumerate() {
-            let series = series(&back, &phi.column(c).into(), seconds);
-            *whole += along(&series, |s| 1.0 - s) * &before;
-            phi.set_column(c, &series.iter().sum::<DVector<f64>>());
+        for (whole, mut phi) in self.whole.iter_mut().zip(phi.column_iter_mut()) {
+            let series = series(&back, phi.as_slice(), seconds);
+            // The nodes lie alike from both ends.
+            whole.gemm(1.0, &at_nodes(&series, |j| POINTS - 1 - j), &before, 1.0);
+            phi.copy_from(&series.column_sum());
         }
     }
 

@@ -288,25 +288,31 @@ impl Motion<'_> {
         self.seconds * (-f64::from(k)).exp2()
     }
 
-    /// Taylor's coefficients of w over so many seconds, at most the bottom's: w(s t) = Σ s^k w_k.
-    pub(crate) fn series(&self, w: &DVector<f64>, seconds: f64) -> Vec<DVector<f64>> {
-        series(&self.linear.generator, w, seconds)
+    /// Taylor's coefficients of w over so many seconds, at most the bottom's, as columns: w(s t) = Σ s^k w_k.
+    pub(crate) fn series(&self, w: &DVector<f64>, seconds: f64) -> DMatrix<f64> {
+        series(&self.linear.generator, w.as_slice(), seconds)
     }
 }
 
+/// Terms of a series beyond which nothing is left where ‖𝒜‖ t ≤ ⅛.
+pub(super) const TERMS: usize = 16;
+
 /// The same of w' = 𝒜 w.
-pub(super) fn series(
-    generator: &DMatrix<f64>,
-    w: &DVector<f64>,
-    seconds: f64,
-) -> Vec<DVector<f64>> {
-    /// Terms beyond which nothing is left where ‖𝒜‖ t ≤ ⅛.
-    const TERMS: usize = 16;
-    let mut terms = vec![w.clone()];
-    for k in 1..TERMS {
-        let mut term = DVector::zeros(w.len());
-        add_product(term.as_mut_slice(), generator, terms[k - 1].as_slice());
-        terms.push(term * (seconds / k as f64));
+pub(super) fn series(generator: &DMatrix<f64>, w: &[f64], seconds: f64) -> DMatrix<f64> {
+    let mut terms = DMatrix::zeros(w.len(), TERMS);
+    if w.is_empty() {
+        return terms;
+    }
+    let mut columns = terms.as_mut_slice().chunks_exact_mut(w.len());
+    let mut before: &[f64] = w;
+    if let Some(first) = columns.next() {
+        first.copy_from_slice(w);
+    }
+    for (k, term) in columns.enumerate() {
+        add_product(term, generator, before);
+        term.iter_mut()
+            .for_each(|value| *value *= seconds / (k + 1) as f64);
+        before = term;
     }
     terms
 }

@@ -77,6 +77,7 @@ pub(super) fn integrate(
 ) -> Result<(), Error> {
     let last = (motion.bottom as usize + 1).max(levels.len());
     let mut sums: Vec<DMatrix<f64>> = whole.iter().map(|whole| whole.map(|_| 0.0)).collect();
+    let mut halved = motion.linear.generator.clone();
     for level in 0..last {
         for (sum, own) in sums.iter_mut().zip(levels.get(level).into_iter().flatten()) {
             *sum += own;
@@ -84,10 +85,10 @@ pub(super) fn integrate(
         if level + 1 < last && sums.iter().any(|sum| sum.amax() > 0.0) {
             let step = motion.step_back(level as u32 + 1)?;
             for sum in &mut sums {
-                let mut halved = &*sum * 2.0;
-                halved.gemm(1.0, step, sum, 1.0);
+                halved.copy_from(sum);
+                halved.gemm(1.0, step, sum, 2.0);
                 halved.gemm(1.0, sum, step, 1.0);
-                *sum = halved;
+                std::mem::swap(sum, &mut halved);
             }
         }
     }
@@ -104,13 +105,16 @@ fn short(b: &DMatrix<f64>, x: DMatrix<f64>) -> DMatrix<f64> {
     /// Terms beyond which nothing is left where ‖B‖ ≤ ⅛.
     const TERMS: u32 = 12;
     let mut sum = x.clone();
-    let (mut term, mut right) = (x.clone(), x);
+    let (mut term, mut right, mut next) = (x.clone(), x.clone(), x);
     let mut factor = 1.0;
     for m in 1..TERMS {
-        right *= b;
-        term = b * term + &right;
+        next.gemm(1.0, &right, b, 0.0);
+        std::mem::swap(&mut right, &mut next);
+        next.copy_from(&right);
+        next.gemm(1.0, b, &term, 1.0);
+        std::mem::swap(&mut term, &mut next);
         factor /= f64::from(m + 1);
-        sum += &term * factor;
+        sum.zip_apply(&term, |sum, term| *sum += term * factor);
     }
     sum
 }

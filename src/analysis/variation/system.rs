@@ -135,6 +135,13 @@ impl System {
         })
     }
 
+    /// Whether states or outputs see this input: what nothing but switches sees does not.
+    pub(super) fn sees(&self, input: usize) -> bool {
+        let rows = &self.lcs.outputs.rows;
+        let mut all = [&self.inputs, &rows.u, &rows.du].into_iter();
+        all.any(|part| input < part.ncols() && part.column(input).iter().any(|value| *value != 0.0))
+    }
+
     /// x = J s + j.
     pub(super) fn state(&self, storage: &[f64]) -> DVector<f64> {
         let mut x = self.lcs.storage.inject_one.clone();
