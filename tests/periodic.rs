@@ -4,10 +4,11 @@
 use std::path::Path;
 
 use circ::analysis::{
-    Measurements, Orbit, OrbitKind, PeriodicOptions, periodic, periodic_measured, transient,
+    Measurements, Orbit, OrbitKind, PeriodicOptions, orbit_start, periodic, periodic_measured,
+    transient,
 };
 use circ::integrate::Reason;
-use circ::{Error, Model, Run, SimOptions};
+use circ::{Error, Method, Model, Run, SimOptions};
 
 fn parsed(text: &str) -> Model {
     Model::parse(text, "t.cir").expect("a circuit")
@@ -530,4 +531,46 @@ fn the_multiplier_of_what_follows_an_oscillator_is_its_decay() {
         (found[0] / expected - 1.0).abs() < 1e-12,
         "{found:?} {expected}"
     );
+}
+
+/// The second phase is on beyond the end of its period, and so it is at t = 0, before its delay: the run that starts on the orbit is on it from the first period on, exactly and in steps.
+#[test]
+fn phases_have_begun_before_a_run_that_starts_on_the_orbit() {
+    let text = |steady: &str| {
+        format!(
+            "two phases\nvin in 0 24\nva ga 0 pulse(0 1 0 10n 10n 4u 10u)\nvb gb 0 pulse(0 1 7.5u 10n 10n 4u 10u)\n\
+            s1 in a ga 0 sw\nd1 0 a d\nl1 a out 100u\ns2 in b gb 0 sw\nd2 0 b d\nl2 b out 100u\nc1 out 0 20u\nr1 out 0 2\n\
+            vstep x 0 pwl(0 0 1m 0 1.1m 1)\nrx x 0 1\n.model sw sw(vt=0.5 ron=10m roff=10meg)\n.model d d(ideal)\n.tran 1u 0.1m{steady}\n\
+            .meas tran first avg i(l2) from=0 to=10u\n.meas tran high max i(l2) from=0 to=10u\n.meas tran last avg i(l2) from=90u to=100u\n.meas tran top max i(l2) from=90u to=100u\n.end\n"
+        )
+    };
+    let model = parsed(&text(""));
+    let (_, start) = orbit_start(&model, &PeriodicOptions::default()).expect("an orbit");
+    assert_eq!(start.begun, 1e-5);
+    let (_, _, orbit) = periodic_measured(&model, &PeriodicOptions::default()).expect("an orbit");
+    let card = parsed(&text(" steady"));
+    for (model, method, close) in [
+        (&model, Method::Exact, 1e-10),
+        (&card, Method::Exact, 1e-10),
+        (&model, Method::Theta, 2e-3),
+    ] {
+        let start = (!std::ptr::eq(model, &card)).then(|| start.clone());
+        let options = SimOptions {
+            method,
+            start,
+            ..SimOptions::default()
+        };
+        let finished = transient(model, options);
+        let (_, found) = finished
+            .run
+            .filter(|_| finished.error.is_none())
+            .expect("a run");
+        for (own, exact) in found.measured.iter().zip(&orbit.measured) {
+            let [own, exact] = [own, exact].map(|m| m.result.as_ref().expect(&m.name).value);
+            assert!(
+                (own - exact).abs() <= close * exact,
+                "{method:?}: {own} {exact}"
+            );
+        }
+    }
 }

@@ -61,7 +61,9 @@ pub(super) fn course(
         settings: settings.clone(),
         ..SimulationOptions::default()
     };
-    let mut simulation = Simulation::closed(model.circuit(), model.multiport(), options)?;
+    let begun = start.and_then(|start| start.sources_of(model.multiport(), until));
+    let multiport = begun.as_ref().unwrap_or(model.multiport());
+    let mut simulation = Simulation::closed(model.circuit(), multiport, options)?;
     if !simulation.is_exact() {
         return Ok(None);
     }

@@ -7,6 +7,7 @@
 mod crossings;
 mod piece;
 mod polyline;
+mod repeating;
 mod spice;
 
 pub use crossings::{Crossing, Rest, crossings};

@@ -136,6 +136,9 @@ pub(crate) fn simulate_beside(
         Some((behaviour, circuit, _)) => (circuit, behaviour),
         None => (circuit, behaviour),
     };
+    let begun = start.as_ref();
+    let begun = begun.and_then(|start| start.sources_of(behaviour, tran.tstop));
+    let behaviour = begun.as_ref().unwrap_or(behaviour);
     let mut problem = Problem::of_circuit(circuit, behaviour, uic, &options.settings)?;
     if let Some(other) = other {
         problem = problem.sharing(other.problem());
@@ -165,6 +168,26 @@ pub struct Standing {
     pub switches: Vec<bool>,
     /// By ideal pair: conducts; empty where not known.
     pub conducting: Vec<bool>,
+    /// How long before t = 0 sources that repeat have begun to, s: those of an orbit do so for ever.
+    pub begun: f64,
+}
+
+impl Standing {
+    /// A circuit in a run of so many seconds that begins here, where its sources are others then.
+    pub(crate) fn sources_of(
+        &self,
+        behaviour: &StaticMultiport,
+        span: f64,
+    ) -> Option<StaticMultiport> {
+        if self.begun == 0.0 {
+            return None;
+        }
+        let mut own = behaviour.clone();
+        for port in &mut own.sources {
+            port.input.source.wave.begin_earlier(self.begun, span);
+        }
+        Some(own)
+    }
 }
 
 fn no_transient() -> Error {

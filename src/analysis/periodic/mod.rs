@@ -80,7 +80,7 @@ pub fn periodic(model: &Model, options: &PeriodicOptions<'_>) -> Result<(Orbit, 
     settled(model, options)?.on_grid(options, |tran| tran)
 }
 
-/// The orbit of [`periodic`], and where a transient begins that starts on it at t = 0, with sources that do not repeat running from there on.
+/// The orbit of [`periodic`], and where a transient begins that starts on it at t = 0, with sources that do not repeat running from there on; those that do have done so for ever.
 ///
 /// # Errors
 /// As [`periodic`].
@@ -90,7 +90,11 @@ pub fn orbit_start(
 ) -> Result<(Orbit, Standing), Error> {
     let mut settled = settled(model, options)?;
     let standing = settled.standing()?;
-    let begins = Standing { t: 0.0, ..standing };
+    let begins = Standing {
+        t: 0.0,
+        begun: standing.t,
+        ..standing
+    };
     Ok((settled.orbit(), begins))
 }
 
@@ -170,6 +174,7 @@ impl Steady {
             state: stand.state.clone(),
             switches: stand.switches.clone(),
             conducting: self.simulation.conducting(),
+            begun: 0.0,
         })
     }
 

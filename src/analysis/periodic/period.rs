@@ -46,7 +46,7 @@ pub(super) fn repeating(circuit: &Circuit) -> (Circuit, Vec<String>) {
         };
         if let Some(value) = source.wave.risen() {
             source.wave = Wave::Dc(value);
-        } else if is_once(&source.wave, span) {
+        } else if source.wave.is_once(span) {
             *source = Source {
                 dc: source.dc,
                 wave: Wave::Dc(source.wave.value_left(0.0)),
@@ -55,29 +55,6 @@ pub(super) fn repeating(circuit: &Circuit) -> (Circuit, Vec<String>) {
         }
     }
     (held, names)
-}
-
-/// Whether a waveform that varies does not repeat for good. A pulse whose period is longer than the run, or is the run as SPICE fills it in with
-/// its width, is a step.
-fn is_once(wave: &Wave, span: f64) -> bool {
-    match *wave {
-        Wave::Dc(_) | Wave::Arriving { .. } | Wave::Sffm { .. } | Wave::Am { .. } => false,
-        Wave::Exp { .. } => true,
-        Wave::Sin {
-            damping, cycles, ..
-        } => damping != 0.0 || cycles.is_some(),
-        Wave::Pulse {
-            width,
-            period,
-            count,
-            ..
-        } => {
-            count.is_some() || period <= 0.0 || period > span || (period == span && width >= period)
-        }
-        Wave::Pwl {
-            ref points, repeat, ..
-        } => points.len() > 1 && (repeat.is_none() || wave.period().is_none()),
-    }
 }
 
 /// The source that repeats least well after so many seconds, and which part of its own period it is off by then.

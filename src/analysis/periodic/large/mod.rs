@@ -98,6 +98,7 @@ impl Large {
                 state: shown.stand.state,
                 switches: shown.stand.switches,
                 conducting,
+                begun: 0.0,
             },
             apart,
             notes,
