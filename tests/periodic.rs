@@ -574,3 +574,28 @@ fn phases_have_begun_before_a_run_that_starts_on_the_orbit() {
         }
     }
 }
+
+/// A clock sets a switch that a comparator of its current resets. At the level both contradict each other while the clock is high, and the switch slides; behind the clock's slope it is off, and
+/// the current falls.
+#[test]
+fn a_switch_slides_no_longer_than_its_clock_asks_for_what_its_comparator_undoes() {
+    let text = "latch\nv1 4 0 12\nv2 5 0 pulse(0 1 0 10n 10n 1u 10u)\ne1 8 0 3 2 1\nv3 6 0 0.36\nbq1 7 0 V=2*u(v(8,6))\ns1 4 1 5 7 m0\nd1 0 1 m1\n\
+        l1 1 3 1.8m ic=0.12857142857142856\nr1 3 2 2.8\nc1 2 0 12u ic=7.2\nr2 2 0 56\n.model m0 sw(ron=5.6 roff=5.6e5 vt=0 vh=0.5)\n\
+        .model m1 d(ron=5.6 vfwd=0.7 roff=5.6k)\n.tran 0.1u 10u uic\n\
+        .meas tran held find i(l1) at=0.9u\n.meas tran later find i(l1) at=2.02u\n.meas tran slope deriv i(l1) at=1.1u\n.end\n";
+    let finished = transient(&parsed(text), SimOptions::default());
+    let (_, found) = finished.run.expect("a run");
+    let [held, later, slope] = [0, 1, 2].map(|k| {
+        let found = found.measured[k].result.as_ref();
+        found.expect("a value").value
+    });
+    let level = 0.36 / 2.8;
+    assert!((held - level).abs() < 1e-9 * level, "{held}");
+    // v(1) = −0.7 − 5.6 i.
+    let exact = (-0.7 - (5.6 + 2.8) * level - 7.2) / 1.8e-3;
+    assert!((slope / exact - 1.0).abs() < 1e-2, "{slope} {exact}");
+    assert!(
+        (later - level - 1e-6 * exact).abs() < 1e-2 * 1e-6 * exact.abs(),
+        "{later}"
+    );
+}

@@ -31,6 +31,9 @@ impl Exact {
         if known {
             discontinuous |= self.sources.move_clocked(&mut key, near);
         }
+        // Between thresholds a switch slides as long as closing and opening contradict each other, of which sources may be the cause.
+        let sharp = |(i, _): &(usize, bool)| self.table.thresholds[*i].is_sharp();
+        discontinuous |= corner && !key.sliding.iter().all(sharp);
         if discontinuous {
             key.sliding.clear();
         }
