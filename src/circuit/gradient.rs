@@ -169,7 +169,7 @@ impl<'a> Scene<'a> {
 
     /// Rivals but those that are one lap or more away from where the extremum counts, or from another one: they move together.
     fn apart(&self, traced: &Traced<'a>, own: &TraceSlopes, rivals: Vec<Rival>) -> Vec<Rival> {
-        if !self.curves.repeat() {
+        if !self.curves.repeats() {
             return rivals;
         }
         let place = |k: usize| {

@@ -125,7 +125,7 @@ impl Curves {
     }
 
     /// Whether the same pieces are there again and again.
-    pub(crate) const fn repeat(&self) -> bool {
+    pub(crate) const fn repeats(&self) -> bool {
         self.laps.count > 1
     }
 

@@ -276,8 +276,8 @@ impl<'a> Measuring<'a> {
         (factor > 1).then(|| factor * self.divisions)
     }
 
-    /// Names the measurements of which even so [`ROWS_APART`] depends on the rows; and tells of those of an exact run that there are lines between its rows, and how much they depend on
-    /// these.
+    /// Names the measurements of which even so [`ROWS_APART`] depends on the rows; where there are none, tells of an exact run that lines stand between its rows, and what part of a
+    /// measurement depends on these at most.
     pub(super) fn on_rows(&self, run: &Run, found: &Measurements) -> Option<Note> {
         let thinned = self.thinned(run, found);
         let off = thinned.iter().filter(|(.., off)| *off > ROWS_APART);

@@ -35,7 +35,7 @@ fn add_products(y: &mut DMatrix<f64>, a: &DMatrix<f64>, x: &DMatrix<f64>) {
     }
 }
 
-/// By node its powers.
+/// By node s_j of Gauss and Legendre s_j^k.
 const POWERS: [[f64; TERMS]; POINTS] = powers();
 
 const fn powers() -> [[f64; TERMS]; POINTS] {
@@ -52,8 +52,8 @@ const fn powers() -> [[f64; TERMS]; POINTS] {
     all
 }
 
-/// The values of a series at nodes by their number.
-fn at_nodes(series: &DMatrix<f64>, node: fn(usize) -> usize) -> DMatrix<f64> {
+/// Σ_k s_j^k w_k of a series' columns w_k by node s_j, N×[`POINTS`]; `node` has the number of each.
+fn through_nodes(series: &DMatrix<f64>, node: fn(usize) -> usize) -> DMatrix<f64> {
     let mut values = DMatrix::zeros(series.nrows(), POINTS);
     for (j, mut column) in values.column_iter_mut().enumerate() {
         add_product(column.as_mut_slice(), series, &POWERS[node(j)]);
@@ -199,7 +199,7 @@ impl<'a> Outer<'a> {
     fn back_by_series(&mut self, seconds: f64, phi: &mut DMatrix<f64>, w: &DVector<f64>) {
         let generator = &self.linear.generator;
         let back = generator.transpose();
-        let mut before = at_nodes(&series(generator, w.as_slice(), seconds), |j| j);
+        let mut before = through_nodes(&series(generator, w.as_slice(), seconds), |j| j);
         for (mut column, weight) in before.column_iter_mut().zip(WEIGHTS) {
             column *= seconds * weight;
         }
@@ -207,7 +207,12 @@ impl<'a> Outer<'a> {
         for (whole, mut phi) in self.whole.iter_mut().zip(phi.column_iter_mut()) {
             let series = series(&back, phi.as_slice(), seconds);
             // The nodes lie alike from both ends.
-            whole.gemm(1.0, &at_nodes(&series, |j| POINTS - 1 - j), &before, 1.0);
+            whole.gemm(
+                1.0,
+                &through_nodes(&series, |j| POINTS - 1 - j),
+                &before,
+                1.0,
+            );
             phi.copy_from(&series.column_sum());
         }
     }
