@@ -134,6 +134,20 @@ pub enum Over {
     WhenMaximum,
 }
 
+#[cfg(test)]
+impl Over {
+    pub(crate) const ALL: [Self; 8] = [
+        Self::Average,
+        Self::Rms,
+        Self::Integral,
+        Self::Minimum,
+        Self::Maximum,
+        Self::PeakToPeak,
+        Self::WhenMinimum,
+        Self::WhenMaximum,
+    ];
+}
+
 /// Which crossings of a level count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Edge {

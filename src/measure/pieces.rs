@@ -159,16 +159,6 @@ mod tests {
         period: PERIOD,
         origin: 0.25,
     };
-    const ALL: [Over; 8] = [
-        Over::Average,
-        Over::Rms,
-        Over::Integral,
-        Over::Minimum,
-        Over::Maximum,
-        Over::PeakToPeak,
-        Over::WhenMinimum,
-        Over::WhenMaximum,
-    ];
 
     /// A lap of three pieces, with an edge before the last one.
     fn lap() -> Vec<Curve> {
@@ -203,7 +193,7 @@ mod tests {
         let all = (0..pieces.len()).map(|k| pieces.get(k)).collect();
         let (laps, all) = (Trace::pieced(pieces, vec![]), Trace::curves(all, vec![]));
         for (from, to) in windows() {
-            for what in ALL {
+            for what in Over::ALL {
                 let [own, exact] = [&laps, &all].map(|trace| trace.over(what, from, to).unwrap());
                 let apart = (own - exact).abs();
                 assert!(
@@ -222,7 +212,7 @@ mod tests {
         let all = (0..pieces.len()).map(|k| pieces.get(k)).collect();
         let (laps, all) = (Trace::pieced(pieces, vec![]), Trace::curves(all, vec![]));
         for (from, to) in windows() {
-            for what in ALL {
+            for what in Over::ALL {
                 let of = |trace: &Trace<'_>| {
                     let (slopes, _) = trace.over_slopes(what, (from, to), 1e-9).unwrap().unwrap();
                     let mut sums = vec![0.0; count * (INTERVALS + 3) + 2];

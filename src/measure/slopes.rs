@@ -495,16 +495,7 @@ mod tests {
     #[test]
     fn slopes_are_those_of_the_measures() {
         let own = trace(0.0, &along());
-        for what in [
-            Over::Average,
-            Over::Rms,
-            Over::Integral,
-            Over::Minimum,
-            Over::Maximum,
-            Over::PeakToPeak,
-            Over::WhenMinimum,
-            Over::WhenMaximum,
-        ] {
+        for what in Over::ALL {
             let (slopes, _) = own.over_slopes(what, WINDOW, 1e-9).unwrap().unwrap();
             close(&format!("{what:?}"), &slopes, |trace, (from, to)| {
                 trace.over(what, from, to).unwrap()
