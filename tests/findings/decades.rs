@@ -82,6 +82,17 @@ fn currents_that_are_rounding_move_each_other_by_no_more() {
     meets("six_pulse_leaks", &values);
 }
 
+/// What the thyristor carries when it stops, 1e-14 A, is a difference of transients that are rounding: its guard led the mode back to itself a thousand times, and steps
+/// that took over found no solution.
+#[test]
+fn a_mode_that_its_guard_ends_at_one_instant_again_and_again_is_left() {
+    let values = [
+        ("i(l1)", 5.837_837_837_837_838e-5, -8.467_627_604_611_859e-2),
+        ("v(1,2)", 6e-5, 2.2094951238115935e-2),
+    ];
+    meets("six_pulse_thyristors_leak", &values);
+}
+
 #[test]
 fn a_diode_that_blocks_at_0_v_leaks_nothing() {
     let values = [

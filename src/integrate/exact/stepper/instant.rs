@@ -46,7 +46,10 @@ impl Exact {
     /// Takes note that mode `at` is left by a guard. One that is left at the instant at which it was entered was found by rounding:
     /// after [`PATIENCE`] of them none is entered again at this instant, and an instant without end is an internal error.
     fn leave_here(&mut self, at: usize, guard: usize) -> Result<(), Error> {
-        if self.travel.age > f64::EPSILON * self.table.modes[at].flow.shortest() {
+        // A mode that its own guard led back to itself has gone on where the time has: its transients alone may be rounding.
+        let left = self.memory.left_here.last();
+        let stays = left.is_some_and(|left| left.0 == at) && self.travel.age <= self.ulps();
+        if !stays && self.travel.age > f64::EPSILON * self.table.modes[at].flow.shortest() {
             self.memory.left_here.clear();
         }
         self.memory.left_here.push((at, guard));
