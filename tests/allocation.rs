@@ -1,4 +1,4 @@
-//! A step with a cached active set allocates nothing.
+//! What steps allocate, and what a large netlist holds.
 #![allow(
     missing_docs,
     unsafe_code,
@@ -21,6 +21,8 @@ struct Counting;
 thread_local! {
     /// Of this thread: the test harness has threads of its own.
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+    /// Bytes that this thread asked for and has not given back.
+    static HELD: Cell<usize> = const { Cell::new(0) };
 }
 
 fn allocations() -> u64 {
@@ -31,10 +33,12 @@ fn allocations() -> u64 {
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
+        let _ = HELD.try_with(|held| held.set(held.get().wrapping_add(layout.size())));
         // SAFETY: the caller's contract is the system allocator's.
         unsafe { System.alloc(layout) }
     }
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        let _ = HELD.try_with(|held| held.set(held.get().wrapping_sub(layout.size())));
         // SAFETY: as above.
         unsafe { System.dealloc(pointer, layout) }
     }
@@ -110,4 +114,20 @@ fn steps_of_curved_laws_do_not_allocate() {
         second <= first.max(200),
         "{first} and {second} allocations in {few} and {many} steps"
     );
+}
+
+/// Cards, circuit and equations of a ladder, by element.
+#[test]
+fn an_element_of_a_large_netlist_takes_less_than_two_kilobytes() {
+    let sections = 4000;
+    let mut text = String::from("ladder\nv1 n0 0 sin(0 10 1k)\n");
+    for k in 0..sections {
+        text += &format!("r{k} n{k} n{} 10\nc{k} n{} 0 10n\n", k + 1, k + 1);
+    }
+    text += ".tran 1u 1m\n.save v(n1)\n.end\n";
+    let before = HELD.with(Cell::get);
+    let model = circ::Model::parse(&text, "ladder.cir").expect("a netlist");
+    let held = HELD.with(Cell::get) - before;
+    let elements = model.circuit().elements.len();
+    assert!(held < 1900 * elements, "{} bytes", held / elements);
 }

@@ -200,7 +200,7 @@ impl<V: Digits> Field for Interval<V> {
     }
 
     fn value(value: Value) -> Self {
-        match value.decimal {
+        match value.as_decimal() {
             Some((m, e)) => {
                 Self::decimal(m, e).unwrap_or_else(|| Self::from_rational(&value.exact()))
             }

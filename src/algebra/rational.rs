@@ -21,7 +21,7 @@ impl Value {
     pub fn exact(&self) -> Rational {
         /// Decimal exponents of finite doubles, with room for the digits of the mantissa.
         const EXPONENTS: std::ops::RangeInclusive<i32> = -400..=400;
-        match self.decimal {
+        match self.as_decimal() {
             Some((mantissa, exponent)) if EXPONENTS.contains(&exponent) => {
                 let power = BigInt::from(10).pow(exponent.unsigned_abs());
                 if exponent >= 0 {

@@ -240,7 +240,7 @@ impl<'n, 'o> Builder<'n, 'o> {
         match &card.device {
             Device::Passive { values, args } => self.passive(card, values, args, scope),
             Device::Source { dc, wave, ac, args } => {
-                let driven = (wave.as_ref(), ac.is_some());
+                let driven = (wave.as_deref(), ac.is_some());
                 self.source(card, dc.as_ref(), driven, args, scope);
                 self.stimulus(card, ac.as_deref(), scope);
             }

@@ -163,7 +163,7 @@ pub(super) fn direction(terms: &[(Value, Quantity)]) -> Option<(Direction, f64)>
         } else if *gain == first {
             ONE
         } else if gain.f64 == -first.f64 {
-            negative(ONE)
+            ONE.negated()
         } else {
             Value::binary(gain.f64 / first.f64)
         };
@@ -183,16 +183,9 @@ fn product(a: Value, b: Value) -> Value {
     match (a.f64, b.f64) {
         (1.0, _) => b,
         (_, 1.0) => a,
-        (-1.0, _) => negative(b),
-        (_, -1.0) => negative(a),
+        (-1.0, _) => b.negated(),
+        (_, -1.0) => a.negated(),
         (x, y) => Value::binary(x * y),
-    }
-}
-
-pub(super) fn negative(a: Value) -> Value {
-    Value {
-        f64: -a.f64,
-        decimal: a.decimal.map(|(mantissa, exponent)| (-mantissa, exponent)),
     }
 }
 

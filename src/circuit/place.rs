@@ -2,7 +2,7 @@
 
 use super::behaviour::{Auxiliary, TIME, auxiliary, is_time};
 use super::builder::Builder;
-use super::form::{Form, Ridge, negative};
+use super::form::{Form, Ridge};
 use super::piecewise::Piecewise;
 use super::source::{Source, Wave};
 use super::tones::at_node;
@@ -244,7 +244,7 @@ fn one_curve(ridge: &Ridge) -> Option<(Vec<(Value, Quantity)>, Curve)> {
         return Some((ridge.along.clone(), part.curve));
     }
     let mirrored = Piecewise::line(-1.0, 0.0).then(&ridge.curve)?;
-    let along = ridge.along.iter().map(|&(gain, q)| (negative(gain), q));
+    let along = ridge.along.iter().map(|&(gain, q)| (gain.negated(), q));
     let (_, mut parts) = mirrored.monotone();
     Some((along.collect(), parts.pop()?.curve))
 }

@@ -235,10 +235,7 @@ impl Switch {
         self.control = control;
         if self.on_above < self.off_below {
             for (gain, _) in &mut self.control.terms {
-                *gain = Value {
-                    f64: -gain.f64,
-                    decimal: gain.decimal.map(|(m, e)| (-m, e)),
-                };
+                *gain = gain.negated();
             }
             self.control.constant = -self.control.constant;
             self.on_above = -self.on_above;

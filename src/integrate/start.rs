@@ -192,7 +192,8 @@ fn at_rest(
         let words: Vec<String> = faults.iter().map(|f| f.message.clone()).collect();
         no_rest(NoRest::Network(words.join("; ")))
     })?;
-    let behaviour = behaviour.standard();
+    drop(statics);
+    let behaviour = behaviour.into_standard();
     let mut position = of_cards(&behaviour);
     if let Some(guess) = from_nodesets(circuit, values, settings) {
         for ((position, switch), on) in position.iter_mut().zip(&behaviour.switches).zip(guess) {

@@ -74,8 +74,9 @@ pub fn behaviour(circuit: &Circuit) -> Result<StaticMultiport, Vec<Diagnostic>> 
     }
     assembly.branches(&windings);
     assembly.outputs();
-    for (n, equation) in std::mem::take(&mut assembly.kcl).into_iter().enumerate() {
+    for (n, mut equation) in std::mem::take(&mut assembly.kcl).into_iter().enumerate() {
         if assembly.potential[n].is_some() && !equation.is_empty() {
+            equation.shrink_to_fit();
             assembly.out.equations.push(equation);
         }
     }

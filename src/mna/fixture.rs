@@ -75,15 +75,10 @@ pub(crate) fn circuit(text: &str) -> Circuit {
         };
         let difference = |circuit: &mut Circuit, k: usize, gain: &str| {
             let (a, b) = (node(circuit, words[k]), node(circuit, words[k + 1]));
-            let minus = value(gain);
-            let minus = Value {
-                f64: -minus.f64,
-                decimal: minus.decimal.map(|(m, e)| (-m, e)),
-            };
             Affine {
                 terms: vec![
                     (value(gain), Quantity::Voltage(a)),
-                    (minus, Quantity::Voltage(b)),
+                    (value(gain).negated(), Quantity::Voltage(b)),
                 ],
                 constant: 0.0,
             }

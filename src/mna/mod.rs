@@ -41,8 +41,8 @@ pub enum Coefficient {
     Inverse(Value),
     /// Minus one over the value.
     MinusInverse(Value),
-    /// The first value over the second.
-    Ratio(Value, Value),
+    /// The value over a double.
+    Ratio(Value, f64),
     /// The exact sum of two doubles (square roots of coupled inductances).
     Pair(f64, f64),
 }
@@ -61,7 +61,7 @@ impl Coefficient {
             Self::Minus(v) => F::value(v).neg(),
             Self::Inverse(v) => F::one().div(&F::value(v)),
             Self::MinusInverse(v) => F::one().div(&F::value(v)).neg(),
-            Self::Ratio(a, b) => F::value(a).div(&F::value(b)),
+            Self::Ratio(a, b) => F::value(a).div(&F::value(Value::binary(b))),
             Self::Pair(hi, lo) => F::value(Value::binary(hi)).add(&F::value(Value::binary(lo))),
         }
     }

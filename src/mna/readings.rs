@@ -106,6 +106,7 @@ impl Assembly<'_> {
 
     fn observed(&mut self, name: String, unit: &'static str, mut equation: Equation) -> usize {
         let column = self.out.column(name.clone());
+        equation.reserve_exact(1);
         equation.push((Coefficient::MINUS_ONE, column));
         self.out.equations.push(equation);
         self.out.observed.push(Observed { name, unit, column });

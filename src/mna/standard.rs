@@ -51,7 +51,13 @@ impl StaticMultiport {
     /// number of corners.
     #[must_use]
     pub fn standard(&self) -> StandardMultiport {
-        let mut out = self.clone();
+        self.clone().into_standard()
+    }
+
+    /// As [`Self::standard`], in place.
+    #[must_use]
+    pub fn into_standard(self) -> StandardMultiport {
+        let mut out = self;
         (out.ball, out.rational) = Default::default();
         for pair in std::mem::take(&mut out.pairs) {
             match pair.port.law.curve() {
@@ -100,11 +106,10 @@ type Term = (Coefficient, Coefficient);
 struct Shape {
     corner: Term,
     first: Term,
-    pieces: Vec<(Vec<Term>, Value)>,
+    pieces: Vec<(Vec<Term>, f64)>,
 }
 
 fn shape(curve: Curve) -> Shape {
-    let one = Value::decimal(1.0, 1, 0);
     let Curve {
         vertices,
         first,
@@ -113,27 +118,23 @@ fn shape(curve: Curve) -> Shape {
     } = curve;
     let origin = (Value::decimal(0.0, 0, 0), Value::decimal(0.0, 0, 0));
     let plus =
-        |(v, i): (Value, Value), t: Value| (Coefficient::Ratio(v, t), Coefficient::Ratio(i, t));
+        |(v, i): (Value, Value), t: f64| (Coefficient::Ratio(v, t), Coefficient::Ratio(i, t));
     let minus = |(v, i), t| {
         let (v, i) = plus((v, i), t);
         (v.negated(), i.negated())
     };
     // The first direction has length 1 in its larger coordinate.
-    let unit = Value::binary(first.0.f64.max(first.1.f64));
-    let unit = if unit.f64 > 0.0 { unit } else { one };
-    let mut before = (first.0.f64 / unit.f64, first.1.f64 / unit.f64);
+    let larger = first.0.f64.max(first.1.f64);
+    let unit = if larger > 0.0 { larger } else { 1.0 };
+    let mut before = (first.0.f64 / unit, first.1.f64 / unit);
     let mut pieces = Vec::new();
     let segments = vertices.windows(2).map(|w| (w[1], Some(w[0])));
     for (to, from) in segments.chain(std::iter::once((last, None))) {
         let from_f64 = from.map_or((0.0, 0.0), |(v, i)| (v.f64, i.f64));
         let along = (to.0.f64 - from_f64.0, to.1.f64 - from_f64.1);
         let product = before.0 * along.1 + before.1 * along.0;
-        let length = if product > 0.0 {
-            Value::binary(product)
-        } else {
-            one
-        };
-        before = (along.0 / length.f64, along.1 / length.f64);
+        let length = if product > 0.0 { product } else { 1.0 };
+        before = (along.0 / length, along.1 / length);
         let mut terms = vec![plus(to, length)];
         terms.extend(from.map(|from| minus(from, length)));
         pieces.push((terms, length));
@@ -152,10 +153,10 @@ fn shape(curve: Curve) -> Shape {
 
 /// The part of a ray from zero that reaches to a corner on it: a diode that blocks leaks nothing at 0 V, while the products of rounded
 /// numbers leave a current of their rounding there.
-fn on_ray((v, i): (Value, Value), (dv, di): (Value, Value)) -> Option<Value> {
+fn on_ray((v, i): (Value, Value), (dv, di): (Value, Value)) -> Option<f64> {
     let (along, across) = (v.f64 * di.f64, i.f64 * dv.f64);
     let is_on = along != 0.0 && (along - across).abs() <= ON_RAY * along.abs();
-    is_on.then(|| Value::binary(di.f64 / i.f64))
+    is_on.then(|| di.f64 / i.f64)
 }
 
 /// Conductances of the pieces, infinite where they are vertical.
@@ -288,7 +289,10 @@ fn expand(out: &mut StaticMultiport, pair: &Pair, curve: Curve) {
             out.equations.push(vec![
                 (Coefficient::ONE, slack),
                 (Coefficient::ONE, t),
-                (Coefficient::Minus(length), StaticMultiport::ONE),
+                (
+                    Coefficient::Minus(Value::binary(length)),
+                    StaticMultiport::ONE,
+                ),
             ]);
         }
     }

@@ -275,7 +275,7 @@ fn named(start: Input<'_>) -> Parsed<'_, Expr> {
         return Ok((
             rest,
             Expr {
-                kind: ExprKind::Signal(signal),
+                kind: ExprKind::Signal(Box::new(signal)),
                 span: between(start, rest),
             },
         ));
@@ -304,7 +304,7 @@ fn named(start: Input<'_>) -> Parsed<'_, Expr> {
     Ok((
         at,
         Expr {
-            kind: ExprKind::Call(name, args),
+            kind: ExprKind::Call(Box::new(name), args),
             span: between(start, at),
         },
     ))
@@ -322,7 +322,7 @@ fn pin<'a>(start: Input<'a>, open: Input<'a>, function: Name) -> Parsed<'a, Expr
     };
     let rest = inside.take_from(text.len() + 1);
     let call = Expr {
-        kind: ExprKind::Call(function, vec![argument]),
+        kind: ExprKind::Call(Box::new(function), vec![argument]),
         span: between(start, rest),
     };
     Ok((rest, call))

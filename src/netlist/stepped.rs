@@ -10,7 +10,7 @@ pub(super) fn free(body: &mut Block) {
     for statement in &mut body.statements {
         match statement {
             Statement::Model(model) => models.push(model),
-            Statement::Step(sweep) => sweeps.push(sweep),
+            Statement::Step(sweep) => sweeps.push(&mut **sweep),
             Statement::Dc(list) => sweeps.extend(list),
             _ => {}
         }

@@ -318,7 +318,7 @@ mod tests {
         #[test]
         fn the_decimal_is_the_number(text in r"[-+]?[0-9]{1,12}(\.[0-9]{0,9})?(t|g|meg|k|m|u|n|p|f|a)?(ohm|V|Hz)?") {
             let value = parse(&text).unwrap();
-            let (mantissa, exponent) = value.decimal.unwrap();
+            let (mantissa, exponent) = value.as_decimal().unwrap();
             prop_assert_eq!(format!("{mantissa}e{exponent}").parse::<f64>().unwrap(), value.f64);
         }
 

@@ -11,7 +11,7 @@ use crate::analysis::variation::{Changes, Near, Rest, STEPS, Tableau, difference
 use crate::circuit::{Kind, Source};
 use crate::integrate::{Error, Reason};
 use crate::measure::{Curves, Signals};
-use crate::mna::{Perturbation, StandardMultiport, behaviour};
+use crate::mna::{Perturbation, StandardMultiport, StaticMultiport, behaviour};
 use crate::model::Model;
 use crate::settings::tolerances::periodic::{MARK, PERIOD_MOVES, VALUE_STEP};
 
@@ -136,7 +136,7 @@ impl Beside<'_> {
             } else {
                 model.multiport().clone()
             };
-            multiports.push(multiport.standard());
+            multiports.push(multiport.into_standard());
         }
         let near: [StandardMultiport; 4] = multiports.try_into().map_err(|_| {
             Error::before(Reason::internal("analysis::sensitivity", "four circuits"))
@@ -226,7 +226,7 @@ impl Beside<'_> {
                 circuit = at_rest(&circuit);
             }
             let near = behaviour(&circuit).ok().filter(|_| same);
-            let near = near.map(|near| near.standard());
+            let near = near.map(StaticMultiport::into_standard);
             found = near.and_then(|near| Card::all(base.multiport, &near, &cards));
         }
         match found {

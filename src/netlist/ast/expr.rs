@@ -25,9 +25,9 @@ pub enum ExprKind {
     /// A quoted text or a word that is no number, such as `mfg="KEMET"`.
     Text(String),
     /// A voltage or current of the circuit.
-    Signal(Signal),
+    Signal(Box<Signal>),
     /// A function.
-    Call(Name, Vec<Expr>),
+    Call(Box<Name>, Vec<Expr>),
     /// `-x`, `!x`.
     Unary(Unary, Box<Expr>),
     /// `x + y`, …

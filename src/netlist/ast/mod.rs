@@ -113,15 +113,15 @@ pub enum Statement {
     /// `.meas tran`, or a `meas` command inside `.control`.
     Meas(Box<Meas>),
     /// `.four`.
-    Four(Four),
+    Four(Box<Four>),
     /// `.step`.
-    Step(Sweep),
+    Step(Box<Sweep>),
     /// `.dc`: the first sweep is the innermost.
     Dc(Vec<Sweep>),
     /// `.ac`.
     Ac(Frequencies),
     /// `.pss`.
-    Pss(Pss),
+    Pss(Box<Pss>),
     /// `alter` inside `.control`, before the run.
     Alter(Alter),
 }
@@ -174,7 +174,7 @@ pub enum Device {
         /// The `DC` value.
         dc: Option<Expr>,
         /// `SIN(…)`, `PULSE(…)`, …
-        wave: Option<WaveCall>,
+        wave: Option<Box<WaveCall>>,
         /// `AC magnitude phase`: no, one or two values.
         ac: Option<Vec<Expr>>,
         /// `Rser=`, `Cpar=`, `r=`, `td=`, `load`, …

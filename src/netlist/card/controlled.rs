@@ -161,7 +161,7 @@ fn voltage_of((a, b): (Name, Name)) -> Expr {
     let signal = Signal::Voltage(a, Some(b));
     Expr {
         span: signal.span(),
-        kind: ExprKind::Signal(signal),
+        kind: ExprKind::Signal(Box::new(signal)),
     }
 }
 

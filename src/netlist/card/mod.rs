@@ -224,7 +224,7 @@ fn vector(open: Input<'_>) -> Parsed<'_, Expr> {
 
 fn bracketed(list: Vec<Expr>, span: Span) -> Expr {
     let text = "[]".into();
-    let kind = ExprKind::Call(Name { text, span }, list);
+    let kind = ExprKind::Call(Box::new(Name { text, span }), list);
     Expr { kind, span }
 }
 

@@ -15,7 +15,7 @@ use crate::netlist::operand;
 /// `R1 a b 1k`, `R1 a b R=1k`, `R1 a b {r} model tc1=…`.
 pub(super) fn passive<'a>(i: Input<'a>, name: &Name) -> Parsed<'a, Body> {
     let (mut at, nodes) = nodes(i, 2, "node")?;
-    let mut values: Vec<Expr> = Vec::new();
+    let mut values: Vec<Expr> = Vec::with_capacity(1);
     while values.len() < 2
         && !at_end(at)
         && !assignment_follows(at)

@@ -34,7 +34,7 @@ pub(super) fn source<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
         {
             // `(SIN 0 5 1k)`: the parenthesis in front.
             let (rest, call) = parenthesised(at, word(open)?.0, name, &mut args)?;
-            (at, wave) = (rest, Some(call));
+            (at, wave) = (rest, Some(Box::new(call)));
             continue;
         }
         if let Some(rest) = keyword(at, "dc") {
@@ -52,7 +52,7 @@ pub(super) fn source<'a>(i: Input<'a>, _: &Name) -> Parsed<'a, Body> {
         } else if starts_wave(at) {
             let (rest, name) = word(at)?;
             let (rest, call) = call(rest, name, &mut args)?;
-            (at, wave) = (rest, Some(call));
+            (at, wave) = (rest, Some(Box::new(call)));
         } else if assignment_follows(at) || FLAGS.iter().any(|flag| keyword(at, flag).is_some()) {
             let (rest, one) = assign(at)?;
             args.push(one);

@@ -299,7 +299,7 @@ pub(in crate::netlist) fn four<'a>(start: Input<'a>, i: Input<'a>) -> Parsed<'a,
         signals,
         span: trimmed(start, at),
     };
-    Ok((at, Dot::statement(Statement::Four(four))))
+    Ok((at, Dot::statement(Statement::Four(Box::new(four)))))
 }
 
 /// The place of a card without blanks at its end.

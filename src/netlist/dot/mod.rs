@@ -362,11 +362,11 @@ fn temperature(i: Input<'_>) -> Parsed<'_, Dot> {
     let statement = match values.len() {
         0 => return Err(missing(at, "a temperature")),
         1 => values.pop().map(Statement::Temperature),
-        _ => Some(Statement::Step(Sweep {
+        _ => Some(Statement::Step(Box::new(Sweep {
             target: Target::Temperature(span),
             points: Points::List(values),
             span,
-        })),
+        }))),
     };
     Ok((at, statement.map_or(Dot::Nothing, Dot::statement)))
 }

@@ -17,7 +17,7 @@ pub(super) fn step(i: Input<'_>) -> Parsed<'_, Dot> {
         Points::Linear([first, ..]) => spelled(fault, first),
         _ => fault,
     })?;
-    Ok((rest, Dot::statement(Statement::Step(sweep))))
+    Ok((rest, Dot::statement(Statement::Step(Box::new(sweep)))))
 }
 
 /// `.dc v1 start stop increment [v2 start stop increment …]`.
@@ -218,7 +218,10 @@ pub(super) fn pss<'a>(start: Input<'a>, i: Input<'a>) -> (Input<'a>, Dot) {
             uic,
             span,
         };
-        Some((separator(at), Dot::statement(Statement::Pss(card))))
+        Some((
+            separator(at),
+            Dot::statement(Statement::Pss(Box::new(card))),
+        ))
     };
     card().unwrap_or_else(|| {
         let rest = skip(i);

@@ -163,7 +163,7 @@ impl<'a> Reader<'a> {
                 let value = values.iter().chain(named).next();
                 (symbol, value.map_or(String::new(), |v| self.text(v.span)))
             }
-            Device::Source { dc, wave, .. } => self.source(card, dc.as_ref(), wave.as_ref()),
+            Device::Source { dc, wave, .. } => self.source(card, dc.as_ref(), wave.as_deref()),
             Device::Controlled { voltage, .. } => {
                 let output = if *voltage {
                     Output::Voltage
