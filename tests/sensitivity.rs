@@ -101,6 +101,38 @@ fn the_output_of_a_buck() {
 }
 
 /// A period that changes moves the edges of the hundredth pulse by many times their rise: as sources of a filter and as gates of its switches.
+/// The gates of a synchronous buck are sources of their own, whose edges cross the threshold together. What moves both of them alike, or none, has a derivative: the mean output is
+/// D v1 r1/(r1 + rl).
+#[test]
+fn the_steady_state_behind_gates_that_move_together() {
+    let text = "buck\n.param on=3.99u\nv1 1 0 10\ns1 1 2 g 0 sw\ns2 2 0 h 0 sw\nl1 2 a 100u\nrl a 3 0.05\nc1 3 0 10u\nr1 3 0 5\n\
+        vg g 0 pulse(0 1 0 10n 10n {on} 10u)\nvh h 0 pulse(1 0 0 10n 10n {on} 10u)\n.model sw sw(vt=0.5 vh=0 ron=0 ideal=1)\n\
+        .tran 1u 50u\n.meas tran mean avg v(3) from=0 to=10u\n.end\n";
+    let of = found(text, true);
+    assert!(of.exact);
+    let mean = 4.0 * 5.0 / 5.05;
+    near(&of, "mean", "v1", 10.0, mean, 1e-9);
+    near(&of, "mean", "rl", 0.05, -mean * 0.05 / 5.05, 1e-9);
+    near(&of, "mean", "on", 3.99e-6, mean * 3.99 / 4.0, 1e-9);
+    assert!(of.derivative("mean", "l1").expect("a derivative").abs() * 100e-6 < 1e-9);
+    // What moves one of them alone parts the switches.
+    let one = text.replace(
+        "vh h 0 pulse(1 0 0 10n 10n {on}",
+        "vh h 0 pulse(1 0 0 10n 10n 3.99u",
+    );
+    let model = Model::parse(&one, "t.cir").expect("a circuit");
+    let options = SensitivityOptions {
+        steady: true,
+        to: vec!["on".into()],
+        ..SensitivityOptions::default()
+    };
+    let refused = sensitivity(&model, &options).expect_err("no derivative");
+    assert!(
+        refused.to_string().contains("two events coincide"),
+        "{refused}"
+    );
+}
+
 #[test]
 fn edges_that_move_far() {
     for head in [

@@ -164,6 +164,26 @@ fn the_input_of_a_buck_acts_in_sidebands() {
 }
 
 /// An exponential diode is its tangent: R in series with r = nV_T/(I + IS) at the current I of the operating point.
+/// Each switch has a source of its own, whose edges cross the threshold together: they would part where one of these sources varies, but the input varies alone.
+#[test]
+fn the_input_of_a_buck_acts_through_gates_that_move_together() {
+    let text = "buck\nv1 1 0 10 ac 1\ns1 1 2 g 0 sw\ns2 2 0 h 0 sw\nl1 2 a 100u\nrl a 3 0.05\nrc 3 b 0.02\nc1 b 0 10u\nr1 3 0 5\n\
+        vg g 0 pulse(0 1 0 10n 10n 3.99u 10u)\nvh h 0 pulse(1 0 0 10n 10n 3.99u 10u)\n.model sw sw(vt=0.5 vh=0 ron=0 ideal=1)\n\
+        .ac dec 5 10 100k\n.save v(3)\n.end\n";
+    let response = response_of(text, &SmallSignalOptions::default());
+    assert_eq!(response.about, About::Orbit);
+    let out = column(&response, "v(3)");
+    let off = apart(&out, |f| 0.4 * filter(f), &response.phasors.frequency);
+    assert!(off < 1e-9, "{off:e}");
+    // Where the gate itself varies the switches part.
+    let gate = text
+        .replace("10 ac 1", "10")
+        .replace("vg g 0", "vg g 0 ac 1");
+    let model = Model::parse(&gate, "t.cir").expect("a circuit");
+    let refused = small_signal(&model, &SmallSignalOptions::default()).expect_err("no response");
+    assert!(matches!(refused.reason, Reason::NotSmooth(_)), "{refused}");
+}
+
 #[test]
 fn a_diode_is_its_tangent_at_the_operating_point() {
     let text = "d\nv1 1 0 dc 5 ac 1\nr1 1 2 1k\nd1 2 0 d\nc1 2 0 10n\n.model d d(is=1e-14 n=1.5)\n.ac dec 5 10 10meg\n.save v(2)\n.end\n";

@@ -206,18 +206,21 @@ impl Steady {
     }
 
     /// One period of the orbit with what its derivative is made of, and the time from which on rows of the orbit count, s. It begins in the
-    /// middle of the longest stretch without an event, so that none stands where it ends and begins.
+    /// middle of the longest stretch without an event, so that none stands where it ends and begins. Its events have
+    /// derivatives with these sources.
     ///
     /// # Errors
     /// As [`Trajectory::of`].
     pub(super) fn trajectory(
         &mut self,
+        sources: &[String],
         cancel: Option<&AtomicBool>,
     ) -> Result<(Trajectory, f64), Error> {
         let (stand, from) = (&self.found.fixed.stand, self.found.from);
         let place = (from, &stand.state[..], &stand.switches[..]);
         let period = self.found.orbit().period;
-        let whole = Trajectory::of(&mut self.simulation, place, from + period, cancel)?;
+        let asked = (sources, cancel);
+        let whole = Trajectory::of(&mut self.simulation, place, from + period, asked)?;
         let Some(begin) = whole.calmest() else {
             return Ok((whole, from));
         };
@@ -226,7 +229,7 @@ impl Steady {
         self.simulation.advance(begin, false, cancel)?;
         let (state, switches) = (self.simulation.state(), self.simulation.positions());
         let place = (begin, &state[..], &switches[..]);
-        let trajectory = whole.again(&mut self.simulation, place, begin + period, cancel)?;
+        let trajectory = whole.again(&mut self.simulation, place, begin + period, asked)?;
         Ok((trajectory, from))
     }
 

@@ -296,7 +296,7 @@ impl Shooting<'_> {
                     Return::After(_) => 0.0,
                     Return::At(..) => EVENT_AGAIN * until.abs(),
                 };
-                Trajectory::of(self.simulation, place, until + later, self.cancel)?
+                Trajectory::of(self.simulation, place, until + later, (&[], self.cancel))?
             }
         };
         let mut derivative = match self.returns {

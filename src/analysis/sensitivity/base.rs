@@ -212,7 +212,7 @@ impl Beside<'_> {
         if !driven || !found.is_exact(self.options.cancel)? {
             return Ok(None);
         }
-        let (trajectory, from) = found.trajectory(self.options.cancel)?;
+        let (trajectory, from) = found.trajectory(&[], self.options.cancel)?;
         let orbit = Repeated {
             monodromy: trajectory.monodromy(),
             period: orbit.period,

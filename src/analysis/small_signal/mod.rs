@@ -276,7 +276,10 @@ fn about_orbit(
     let (trajectories, unknown, origin) = match found.linearised(asked.cancel)? {
         Some((run, origin)) => (Vec::from(run.trajectories), run.unknown, origin),
         None => {
-            let (trajectory, origin) = found.trajectory(asked.cancel)?;
+            let stimuli = found.circuit.stimuli.iter();
+            let names = stimuli.map(|s| found.circuit.elements[s.source.index()].name.clone());
+            let names: Vec<String> = names.collect();
+            let (trajectory, origin) = found.trajectory(&names, asked.cancel)?;
             (vec![trajectory], 0.0, origin)
         }
     };

@@ -19,8 +19,9 @@ pub(super) struct Maker {
     pub(super) systems: Vec<System>,
     /// Times within this are one, s.
     same: f64,
-    /// Guards that fall through zero at one instant need not do so whatever varies.
-    pub(super) by_chance: bool,
+    /// The sources with which events have derivatives besides those with the state; `None` where guards that fall through zero at one instant need
+    /// not do so whatever varies.
+    pub(super) sources: Option<Vec<String>>,
 }
 
 impl Maker {
@@ -30,7 +31,7 @@ impl Maker {
             thresholds: assembler.thresholds(),
             assembler,
             systems: Vec::new(),
-            by_chance: false,
+            sources: None,
             same: SAME_TIME * from.abs().max(until.abs()),
         }
     }
@@ -83,7 +84,7 @@ impl Maker {
         (to, end): (f64, &[f64]),
     ) -> Result<Segment, Error> {
         let of = &self.systems[system];
-        let propagator = if self.by_chance {
+        let propagator = if self.sources.is_none() {
             Some(DMatrix::default())
         } else {
             of.propagator(to - from)
@@ -104,7 +105,7 @@ impl Maker {
 
     /// Guards of devices that are zero in a mode and stay so: a change of a value may move them off to one side alone.
     fn resting(&self, system: &System, t: f64, x: &DVector<f64>) -> Vec<Resting> {
-        if !self.by_chance {
+        if self.sources.is_some() {
             return Vec::new();
         }
         let Some(inputs) = Inputs::before(&system.lcs.inputs, t, self.same) else {
@@ -140,7 +141,10 @@ impl Maker {
     ) -> Result<Saltation, Error> {
         let (first, last) = (&instant[0], &instant[instant.len() - 1]);
         let t = first.t;
-        if !self.by_chance && first.before == last.after && instant.iter().all(Passage::is_corner) {
+        if self.sources.is_some()
+            && first.before == last.after
+            && instant.iter().all(Passage::is_corner)
+        {
             return Ok(Saltation::none(t, &self.systems[from]));
         }
         let through = self.through(instant, to)?;
@@ -164,7 +168,7 @@ impl Maker {
             inputs: right,
         };
         let (timing, others) = self.timing(instant, &before, seconds)?;
-        if self.by_chance {
+        if self.sources.is_none() {
             let happens = Saltation::happens(t, (&before, &after), timing);
             return Ok(Saltation {
                 through,
@@ -176,6 +180,7 @@ impl Maker {
         let saltation = Saltation::of(t, (&before, &after), timing, jump);
         Ok(Saltation {
             through,
+            others,
             ..saltation
         })
     }
@@ -232,6 +237,12 @@ impl Maker {
         let t = instant[0].t;
         let mut others = Vec::new();
         let rate = before.system.rate(&before.x, &before.inputs.u);
+        let inputs = &before.system.lcs.inputs;
+        let parts = |sources: &Vec<String>, a: &Timing, b: &Timing| {
+            let [a, b] =
+                [a, b].map(|timing| timing.of_sources(|k| sources.contains(&inputs[k].name)));
+            !same_timing(&a, &b, seconds)
+        };
         let mut found: Option<Timing> = None;
         let mut owners: Vec<Owner> = instant.iter().filter_map(|passage| passage.cause).collect();
         for passage in instant {
@@ -244,7 +255,7 @@ impl Maker {
             );
         }
         let causes = owners.len();
-        if self.by_chance {
+        if self.sources.is_none() {
             // One that falls through zero with them may rest there afterwards, as a diode beside another one of a ladder does.
             owners.extend((0..instant[0].to.closed.len()).map(Owner::Device));
         }
@@ -267,12 +278,13 @@ impl Maker {
                 }
                 let timing = Timing::of((owner, k), &guard, slope);
                 match &found {
-                    Some(other) if self.by_chance && !same_timing(other, &timing, seconds) => {
-                        others.push(timing);
-                    }
                     Some(other) if !same_timing(other, &timing, seconds) => {
-                        let what = format!("{} and another event coincide", self.name(owner));
-                        return Err(not_smooth(t, what));
+                        let sources = self.sources.as_ref();
+                        if sources.is_some_and(|sources| parts(sources, other, &timing)) {
+                            let what = format!("{} and another event coincide", self.name(owner));
+                            return Err(not_smooth(t, what));
+                        }
+                        others.push(timing);
                     }
                     _ => found = Some(timing),
                 }

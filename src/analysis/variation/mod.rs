@@ -105,7 +105,8 @@ fn stepped(t: f64) -> Error {
 }
 
 impl Trajectory {
-    /// The run of a simulation from a place, as for [`Simulation::stand_at`], until a time or until `cancel` is set.
+    /// The run of a simulation from a place, as for [`Simulation::stand_at`], until a time or until `cancel` is set. Its events have derivatives with
+    /// the state and with these sources; of guards that coincide and part where others vary all are kept.
     ///
     /// # Errors
     /// [`Reason::NotSmooth`] where the derivative of the flow does not exist or is not known; else the simulation's.
@@ -113,10 +114,16 @@ impl Trajectory {
         simulation: &mut Simulation,
         place: (f64, &[f64], &[bool]),
         until: f64,
-        cancel: Option<&AtomicBool>,
+        (sources, cancel): (&[String], Option<&AtomicBool>),
     ) -> Result<Self, Error> {
-        Self::made(simulation, place, until, (false, cancel), Vec::new())?
-            .ok_or_else(|| stepped(place.0))
+        Self::made(
+            simulation,
+            place,
+            until,
+            (Some(sources), cancel),
+            Vec::new(),
+        )?
+        .ok_or_else(|| stepped(place.0))
     }
 
     /// That of the same simulation from another place, as long a run whose modes are known.
@@ -128,10 +135,16 @@ impl Trajectory {
         simulation: &mut Simulation,
         place: (f64, &[f64], &[bool]),
         until: f64,
-        cancel: Option<&AtomicBool>,
+        (sources, cancel): (&[String], Option<&AtomicBool>),
     ) -> Result<Self, Error> {
-        Self::made(simulation, place, until, (false, cancel), self.systems)?
-            .ok_or_else(|| stepped(place.0))
+        Self::made(
+            simulation,
+            place,
+            until,
+            (Some(sources), cancel),
+            self.systems,
+        )?
+        .ok_or_else(|| stepped(place.0))
     }
 
     /// The same; events that coincide by chance are kept with all their guards, for a variation that tells whether they part. `None` where steps are made.
@@ -144,14 +157,14 @@ impl Trajectory {
         until: f64,
         cancel: Option<&AtomicBool>,
     ) -> Result<Option<Self>, Error> {
-        Self::made(simulation, place, until, (true, cancel), Vec::new())
+        Self::made(simulation, place, until, (None, cancel), Vec::new())
     }
 
     fn made(
         simulation: &mut Simulation,
         place: (f64, &[f64], &[bool]),
         until: f64,
-        (by_chance, cancel): (bool, Option<&AtomicBool>),
+        (sources, cancel): (Option<&[String]>, Option<&AtomicBool>),
         systems: Vec<System>,
     ) -> Result<Option<Self>, Error> {
         let from = place.0;
@@ -160,13 +173,13 @@ impl Trajectory {
         };
         let end = simulation.state();
         let mut maker = Maker::of(simulation, (from, until));
-        (maker.by_chance, maker.systems) = (by_chance, systems);
+        (maker.sources, maker.systems) = (sources.map(<[String]>::to_vec), systems);
         let made = maker.make(&passages, (until, &end));
         made.map(Some)
     }
 
-    /// The run through these changes of mode, from one time to another, at which the storage is `end`. `systems` are those of a run as long
-    /// that are known.
+    /// The run through these changes of mode, from one time to another, at which the storage is `end`; its events have derivatives with the
+    /// state. `systems` are those of a run as long that are known.
     ///
     /// # Errors
     /// As [`Self::of`].
@@ -178,7 +191,7 @@ impl Trajectory {
         systems: Vec<System>,
     ) -> Result<Self, Error> {
         let mut maker = Maker::of(simulation, span);
-        maker.systems = systems;
+        (maker.sources, maker.systems) = (Some(vec![]), systems);
         maker.make(passages, (span.1, end))
     }
 

@@ -99,6 +99,15 @@ impl Timing {
             du: guard.du.transpose() / -rate,
         }
     }
+
+    /// The same where these sources vary alone.
+    pub(super) fn of_sources(&self, vary: impl Fn(usize) -> bool) -> Self {
+        let mut timing = self.clone();
+        for input in (0..self.u.len()).filter(|&input| !vary(input)) {
+            (timing.u[input], timing.du[input]) = (0.0, 0.0);
+        }
+        timing
+    }
 }
 
 impl Saltation {
