@@ -599,3 +599,23 @@ fn a_switch_slides_no_longer_than_its_clock_asks_for_what_its_comparator_undoes(
         "{later}"
     );
 }
+
+/// The current of a clamping diode that begins to conduct, 1e-5 A, is what two supplies of 5 V leave of 0.03 A each: their rounding was taken for its sign, steps took over
+/// in the search for the orbit, and the rows ended 2e-4 of the amplitude from where they began, of which 3e-7 were stated.
+#[test]
+fn an_orbit_behind_supplies_that_add_up_to_nothing_closes() {
+    let path =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/findings/supplies_add_up_to_nothing.cir");
+    let model = Model::load(path, circ::ElaborateOptions::default()).expect("a circuit");
+    let options = PeriodicOptions {
+        period: Some(3e-5),
+        ..PeriodicOptions::default()
+    };
+    let (orbit, run) = periodic(&model, &options).expect("an orbit");
+    let taken = run.notes.iter().find(|note| note.code == "steps-instead");
+    assert!(orbit.stable && taken.is_none(), "{taken:?}");
+    let last = run.waveforms.time.len() - 1;
+    for (first, last) in row(&run, 0).iter().zip(row(&run, last)) {
+        assert!((last - first).abs() < 1e-12, "{first} {last}");
+    }
+}

@@ -45,6 +45,8 @@ pub struct Outcome {
     pub common: f64,
     /// Things the user should know.
     pub notes: Vec<Note>,
+    /// Capacitor voltages, V, and inductor currents, A, where it ends; empty where they are not told.
+    pub storage: Vec<f64>,
 }
 
 /// What every run needs besides its stepper.
@@ -165,6 +167,7 @@ pub(crate) fn attempt(
         aliased: None,
         verified: None,
         orbit: None,
+        storage: outcome.storage,
     };
     match failure {
         None => Ok(run),

@@ -341,6 +341,8 @@ pub struct Run {
     pub verified: Option<Verified>,
     /// The periodic steady state of which it is one period, if it is one.
     pub orbit: Option<Orbit>,
+    /// Capacitor voltages, V, and inductor currents, A, where it ends; empty where they are not told.
+    pub storage: Vec<f64>,
 }
 
 #[cfg(test)]

@@ -27,7 +27,7 @@ use crate::settings::tolerances::periodic::{
 
 use attempt::{refined, searched, simulation};
 pub(super) use large::Large;
-use rows::{Steps, next_to_nothing, notes, rows, state_error};
+use rows::{Steps, closing_error, next_to_nothing, notes, rows, state_error};
 use search::{Found, Search};
 pub(super) use settled::{Settled, settled, settled_large, settled_linear};
 
@@ -127,6 +127,7 @@ impl Steady {
         grid: impl FnOnce(Tran) -> Tran,
     ) -> Result<(Orbit, Run), Error> {
         let standing = self.standing()?;
+        let begin = standing.state.clone();
         let Self {
             circuit,
             multiport,
@@ -152,7 +153,9 @@ impl Steady {
             options,
             grid,
         )?;
-        if !simulation.is_exact() {
+        if simulation.is_exact() {
+            closing_error(&mut run, &begin, &found.amplitudes);
+        } else {
             state_error(&mut run, apart);
             if found.rests {
                 run.balanced = false;

@@ -8,7 +8,7 @@ use crate::integrate::{
     Error, Method, Note, Orbit, OrbitKind, Run, SimOptions, Simulation, Standing, simulate_beside,
 };
 use crate::mna::StaticMultiport;
-use crate::settings::tolerances::periodic::NEXT_TO_SOURCES;
+use crate::settings::tolerances::periodic::{CLOSED, NEXT_TO_SOURCES};
 use crate::settings::tolerances::times::SPAN_PARTS;
 
 /// How the rows of an orbit are made.
@@ -84,6 +84,18 @@ fn shift(run: &mut Run, from: f64) {
 pub(super) fn state_error(run: &mut Run, apart: Option<f64>) {
     for error in [&mut run.error.max, &mut run.error.rms] {
         *error = error.zip(apart).map(|(error, apart)| error.max(apart));
+    }
+}
+
+/// Rows of exact integration are off by no less than they end from where they begin: where steps took over in the search for the orbit, or in them.
+pub(super) fn closing_error(run: &mut Run, begin: &[f64], amplitudes: &[f64]) {
+    let ends = run.storage.iter().zip(begin).zip(amplitudes);
+    let parts = ends.map(|((end, begin), amplitude)| (end - begin).abs() / amplitude);
+    let open = parts.fold(0.0, f64::max);
+    if open > CLOSED {
+        for error in [&mut run.error.max, &mut run.error.rms] {
+            *error = Some(error.map_or(open, |error| error.max(open)));
+        }
     }
 }
 

@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
+use super::rows::closing_error;
 use super::search::Search;
 use super::shooting::Return;
 use super::{PeriodicOptions, period, simulation, steady};
 use crate::circuit::ElaborateOptions;
-use crate::integrate::Method;
+use crate::integrate::{Method, Run};
 use crate::mna::behaviour;
 use crate::model::Model;
 
@@ -104,5 +105,23 @@ fn tangents_along_an_orbit_in_steps_agree_with_differences() {
             apart < 1e-3,
             "{cards}: {apart:e}, {by_tangents}{by_differences}"
         );
+    }
+}
+
+/// Where steps took over in the search, or in the rows, these end elsewhere.
+#[test]
+fn rows_that_do_not_close_are_off_by_that() {
+    let run = |end: f64| Run {
+        storage: vec![1.0, end],
+        ..Run::default()
+    };
+    for (end, expected) in [(2.0 + 1e-12, None), (2.006, Some(2e-3))] {
+        let mut run = run(end);
+        closing_error(&mut run, &[1.0, 2.0], &[1.0, 3.0]);
+        let close = |max: f64, expected: f64| (max - expected).abs() < 1e-12;
+        match (run.error.max, expected) {
+            (Some(max), Some(expected)) => assert!(close(max, expected), "{max}"),
+            (found, expected) => assert_eq!(found, expected),
+        }
     }
 }

@@ -1,8 +1,13 @@
 //! A mode: which devices conduct, where the switches stand, and the linear system that holds there.
 
+mod guards;
+
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
+
+pub(crate) use guards::over_w;
+use guards::{Guards, distinct, guards_of_sums, sizes_over_w};
 
 use super::clock::Clock;
 use super::energy_integral::Term;
@@ -13,13 +18,12 @@ use super::magnitudes::{Magnitudes, ORDERS};
 use super::map::{Map, Sizes};
 use super::sampled::SampledRows;
 use crate::integrate::switching::Threshold;
-use crate::lcs::{Lcs, PowerKind, Rows};
+use crate::lcs::{Lcs, PowerKind};
 use crate::linalg::decouple::decoupled;
 use crate::linalg::kernel::Kernel;
-use crate::linalg::rays;
 use crate::linalg::refill::refill;
 use crate::linalg::whole::{is_identity, magnitudes};
-use crate::settings::tolerances::exponentials::{EQUAL, FAST_ENTRY};
+use crate::settings::tolerances::exponentials::FAST_ENTRY;
 
 /// Successors of a mode that are remembered; the oldest goes first.
 const MOST_SUCCESSORS: usize = 64;
@@ -84,28 +88,6 @@ pub(crate) struct Mode {
     pub(crate) successors: Vec<(Trigger, usize)>,
 }
 
-/// Rows over [x | u | u' | 1] as rows over w, with u = H z and u' = H S z.
-pub(crate) fn over_w(rows: &Rows, n: usize, exosystem: &Exosystem) -> DMatrix<f64> {
-    let count = rows.one.len();
-    let mut out = DMatrix::zeros(count, n + exosystem.dim());
-    if rows.x.nrows() == count && rows.x.ncols() == n {
-        out.columns_mut(0, n).copy_from(&rows.x);
-    }
-    let mut z = out.columns_mut(n, exosystem.dim());
-    let h = exosystem.output();
-    if rows.u.nrows() == count && rows.u.ncols() == h.nrows() {
-        z += &rows.u * h;
-    }
-    let moves = rows.du.iter().any(|du| *du != 0.0);
-    if moves && rows.du.nrows() == count && rows.du.ncols() == h.nrows() {
-        z += &rows.du * (h * exosystem.generator());
-    }
-    for i in 0..count {
-        out[(i, n)] += rows.one[i];
-    }
-    out
-}
-
 impl Mode {
     /// The mode of a system in which every pair is held. `None` if its numbers are not finite or its guards are too many
     /// to describe.
@@ -147,24 +129,30 @@ impl Mode {
         if held.nrows() != count {
             held = held.rows(0, count).into_owned();
         }
-        let (shared, devices, device_guards) = if lcs.held.kernel.ncols() > 0 {
-            guards_of_sums(&lcs.held.kernel.rows(0, count).into_owned(), held)?
+        let (shared, devices, device_sizes, device_guards) = if lcs.held.kernel.ncols() > 0 {
+            let kernel = lcs.held.kernel.rows(0, count).into_owned();
+            let (shared, devices, first) = guards_of_sums(&kernel, held)?;
+            let sizes = magnitudes(&devices);
+            (shared, devices, sizes, first)
         } else {
             let kept = distinct(&held);
-            (Vec::new(), held.select_rows(&kept), kept)
+            let sizes = sizes_over_w(&lcs.held.guard, n, exosystem).select_rows(&kept);
+            (Vec::new(), held.select_rows(&kept), sizes, kept)
         };
         let Guards {
             rows: guards,
+            sizes: mut guard_sizes,
             switches: guarded_switches,
             controlled_by_sources,
         } = if thresholds.is_empty() {
             Guards {
                 rows: devices,
+                sizes: device_sizes,
                 switches: Vec::new(),
                 controlled_by_sources: Vec::new(),
             }
         } else {
-            Guards::of_switches(devices, &key, lcs, exosystem, switches)?
+            Guards::of_switches((devices, device_sizes), &key, lcs, exosystem, switches)?
         };
         let decoupled = (!lcs.fast.is_empty())
             .then(|| decoupled(&generator, &lcs.fast))
@@ -173,7 +161,7 @@ impl Mode {
             Some(decoupled) => rows * &decoupled.to,
             None => rows,
         };
-        let (mut fast, mut guard_sizes): (&[usize], _) = (&[], magnitudes(&guards));
+        let mut fast: &[usize] = &[];
         if let Some(decoupled) = &decoupled {
             generator.copy_from(&decoupled.generator);
             summed = summed.sup(&decoupled.sizes);
@@ -387,108 +375,6 @@ impl Mode {
     }
 }
 
-/// The guards of a mode.
-struct Guards {
-    rows: DMatrix<f64>,
-    /// See [`Mode::guarded_switches`].
-    switches: Vec<usize>,
-    controlled_by_sources: Vec<bool>,
-}
-
-impl Guards {
-    /// Those of devices, and below them those of switches.
-    fn of_switches(
-        devices: DMatrix<f64>,
-        key: &Key,
-        lcs: &Lcs,
-        exosystem: &Exosystem,
-        facts: &SwitchFacts<'_>,
-    ) -> Option<Self> {
-        let SwitchFacts {
-            thresholds,
-            limits,
-            clocks,
-        } = *facts;
-        let (n, slides) = (lcs.n(), key.sliding_switches());
-        let dim = n + exosystem.dim();
-        let published: Vec<usize> = (0..thresholds.len())
-            .filter(|i| !slides.contains(i))
-            .collect();
-        let mut controls = DMatrix::zeros(thresholds.len(), dim);
-        for (k, row) in over_w(&lcs.controls, n, exosystem).row_iter().enumerate() {
-            controls.set_row(published[k], &row);
-        }
-        let clocked = |i: usize| clocks.iter().any(|clock| clock.switch == i);
-        let guarded = |i: &usize| {
-            let threshold = &thresholds[*i];
-            match threshold.latch {
-                None => !clocked(*i),
-                // Without a holding current the valve's guard is that of its current.
-                Some(_) => {
-                    threshold.off_below > 0.0 && threshold.holds(key.switches[*i], &key.switches)
-                }
-            }
-        };
-        let guarded_switches: Vec<usize> = published.iter().copied().filter(guarded).collect();
-        let mut guards = DMatrix::zeros(
-            devices.nrows() + guarded_switches.len() + 2 * slides.len(),
-            dim,
-        );
-        guards.rows_mut(0, devices.nrows()).copy_from(&devices);
-        for (k, &i) in guarded_switches.iter().enumerate() {
-            let (sign, level) = if key.switches[i] {
-                (1.0, thresholds[i].off_below)
-            } else {
-                (-1.0, thresholds[i].on_above)
-            };
-            let mut row = guards.row_mut(devices.nrows() + k);
-            row += controls.row(i) * sign;
-            row[n] -= sign * level;
-        }
-        let after = devices.nrows() + guarded_switches.len();
-        for (k, &(switch, positive)) in key.sliding.iter().enumerate() {
-            // Between on and off: v − Ron i ≥ 0 and i − v/Roff ≥ 0, or both ≤ 0.
-            let term = lcs
-                .outputs
-                .power
-                .iter()
-                .position(|p| p.element == thresholds[switch].name)?;
-            let v = over_w(&lcs.outputs.power_v, n, exosystem)
-                .row(term)
-                .into_owned();
-            let i = over_w(&lcs.outputs.power_i, n, exosystem)
-                .row(term)
-                .into_owned();
-            let sign = if positive { 1.0 } else { -1.0 };
-            let (ron, goff) = limits[k];
-            guards.set_row(after + 2 * k, &((&v - &i * ron) * sign));
-            guards.set_row(after + 2 * k + 1, &((&i - &v * goff) * sign));
-        }
-        let by_sources = |&i: &usize| controls.row(i).columns(0, n).iter().all(|v| *v == 0.0);
-        Some(Self {
-            rows: guards,
-            controlled_by_sources: guarded_switches.iter().map(by_sources).collect(),
-            switches: guarded_switches,
-        })
-    }
-}
-
-/// The pairs that share currents or voltages in a proportion that this kernel leaves open, guards for the sums of which the `held` are that are certain, and
-/// the first pair of each.
-fn guards_of_sums(
-    kernel: &DMatrix<f64>,
-    held: DMatrix<f64>,
-) -> Option<(Vec<usize>, DMatrix<f64>, Vec<usize>)> {
-    let in_kernel = |&pair: &usize| kernel.row(pair).iter().any(|v| *v != 0.0);
-    let shared = (0..kernel.nrows()).filter(in_kernel).collect();
-    let rays = rays::extreme_rays(kernel)?;
-    let devices = &rays * held;
-    let kept = distinct(&devices);
-    let first = |&ray: &usize| rays.row(ray).iter().position(|r| *r != 0.0);
-    let first = kept.iter().map(|ray| first(ray).unwrap_or(0)).collect();
-    Some((shared, devices.select_rows(&kept), first))
-}
-
 /// Rows, and their first two derivatives below them.
 #[inline(never)]
 fn with_derivatives(rows: DMatrix<f64>, generator: &DMatrix<f64>) -> DMatrix<f64> {
@@ -500,24 +386,6 @@ fn with_derivatives(rows: DMatrix<f64>, generator: &DMatrix<f64>) -> DMatrix<f64
         all.rows_mut(k * count, count).copy_from(rows);
     }
     all
-}
-
-/// The rows that are no positive multiple of an earlier one: equal guards fall together.
-fn distinct(rows: &DMatrix<f64>) -> Vec<usize> {
-    let mut kept: Vec<(usize, f64)> = Vec::new();
-    for i in 0..rows.nrows() {
-        let size = rows.row(i).amax();
-        let same = |&(j, other): &(usize, f64)| {
-            rows.row(i).iter().zip(rows.row(j).iter()).all(|(a, b)| {
-                let (a, b) = (a / size, b / other);
-                (a - b).abs() <= EQUAL * a.abs().max(b.abs())
-            })
-        };
-        if size > 0.0 && !kept.iter().any(same) {
-            kept.push((i, size));
-        }
-    }
-    kept.into_iter().map(|(i, _)| i).collect()
 }
 
 /// What sources deliver and what dissipates, of these rows of voltages and currents over w.

@@ -332,6 +332,7 @@ impl Stepper for Exact {
         outcome.stats.steps = self.travel.steps;
         self.storage.note_capacity();
         outcome.energy = self.storage.balance.energy();
+        outcome.storage.clone_from(&self.storage.values);
         outcome
     }
 }

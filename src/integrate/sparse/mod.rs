@@ -415,6 +415,7 @@ impl Stepper for Sparse {
             stats: self.stats.clone(),
             energy: self.now.balance.energy(),
             notes,
+            storage: Vec::new(),
         }
     }
 }

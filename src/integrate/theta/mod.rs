@@ -393,6 +393,7 @@ impl Stepper for Theta {
             stats: self.stats.clone(),
             energy: self.now.balance.energy(),
             notes,
+            storage: self.place().storage.as_slice().to_vec(),
         }
     }
 }
