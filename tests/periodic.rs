@@ -619,3 +619,17 @@ fn an_orbit_behind_supplies_that_add_up_to_nothing_closes() {
         assert!((last - first).abs() < 1e-12, "{first} {last}");
     }
 }
+
+/// A buck that two comparators with hysteresis switch between 91.5 and 104.5 V takes 141 µs for a cycle: a run of 60 µs tells nothing of its period.
+#[test]
+fn an_orbit_may_be_longer_than_the_run_that_is_asked_for() {
+    let text = "buck\nv1 3 0 325\nv2 4 0 98\ns1 3 1 4 2 m0\ns2 1 0 2 4 m0\nl1 1 2 2.1m\nc1 2 0 2.6u ic=48\nr1 2 0 19\n\
+        .model m0 sw(ron=1.9m roff=190k vt=0 vh=6.5)\n.tran 3u TSTOP uic\n.end\n";
+    let [short, long] = ["60u", "10m"].map(|stop| orbit_of(&text.replace("TSTOP", stop)).0);
+    assert_eq!(short.kind, OrbitKind::Autonomous);
+    assert!(
+        (short.period / long.period - 1.0).abs() < 1e-9,
+        "{short:?} {long:?}"
+    );
+    assert!((1.4e-4..1.42e-4).contains(&short.period));
+}

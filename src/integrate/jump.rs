@@ -73,6 +73,8 @@ pub struct Jump {
     pub p: DVector<f64>,
     /// Ports that compete for the jump, see `JumpProblem::rivals`; empty where the jump is the limit of all resistances.
     pub rivals: Vec<usize>,
+    /// What part of p may only make up for rounding.
+    pub rounding: f64,
 }
 
 impl Jump {
@@ -194,7 +196,8 @@ impl JumpProblem {
         let p = &self.basis * z * self.sigma;
         let change = &lcs.b * &p;
         let moved = |i: usize| change[i].abs() > NO_JUMP * x[i].abs().max(change.amax());
-        if !(0..x.len()).any(moved) || self.is_rounding(lcs, x, u, &p) {
+        let rounding = self.rounding(lcs, x, u, &p);
+        if !(0..x.len()).any(moved) || rounding >= 1.0 {
             return Ok(None);
         }
         let after = x + change;
@@ -209,6 +212,7 @@ impl JumpProblem {
             x: after,
             p,
             rivals: self.rivals(&z, &right),
+            rounding,
         }))
     }
 
@@ -235,7 +239,7 @@ impl JumpProblem {
     ///
     /// # Errors
     /// The device with the largest; the jump is wrong then, whatever the circuit.
-    pub fn verify(&self, lcs: &Lcs, p: &DVector<f64>) -> Result<(), Internal> {
+    pub fn verify(&self, lcs: &Lcs, Jump { p, rounding, .. }: &Jump) -> Result<(), Internal> {
         let through = &lcs.d * p;
         let scaled = |j: usize| (p[j] / self.units[j], through[j] * self.units[j]);
         let largest = (0..p.len()).fold(0.0_f64, |a, j| {
@@ -249,7 +253,7 @@ impl JumpProblem {
         };
         let worst = (0..p.len()).min_by(|&a, &b| reverse(a).0.total_cmp(&reverse(b).0));
         match worst {
-            Some(port) if reverse(port).0 < -FORWARD * largest => {
+            Some(port) if reverse(port).0 < -FORWARD.max(*rounding) * largest => {
                 let (device, area) = (&lcs.ports[port].device, -reverse(port).1);
                 let what = format!("a jump puts a forward impulse of {area:e} V s across {device}");
                 Err(Internal::new("integrate::jump", what))
@@ -258,14 +262,15 @@ impl JumpProblem {
         }
     }
 
-    /// Whether p only makes up for rounding in Cx + Gu + F.
-    fn is_rounding(&self, lcs: &Lcs, x: &DVector<f64>, u: &DVector<f64>, p: &DVector<f64>) -> bool {
+    /// What part of p may only make up for rounding in Cx + Gu + F.
+    fn rounding(&self, lcs: &Lcs, x: &DVector<f64>, u: &DVector<f64>, p: &DVector<f64>) -> f64 {
         let terms = lcs.c.abs() * x.abs() + lcs.g.abs() * u.abs() + lcs.f.abs() + self.bounds.abs();
         let corrected = &lcs.c * (&lcs.b * p);
-        corrected
-            .iter()
-            .zip(terms.iter())
-            .all(|(c, t)| c.abs() <= NO_JUMP * t)
+        let rows = corrected.iter().zip(terms.iter());
+        let parts = rows
+            .filter(|(c, _)| **c != 0.0)
+            .map(|(c, t)| NO_JUMP * t / c.abs());
+        parts.fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -467,7 +472,7 @@ mod tests {
         assert!(jumps.monotone);
         let found = jumps.solve(&lcs, &dvector![i], &DVector::zeros(0)).unwrap();
         if let Some(jump) = &found {
-            assert_eq!(jumps.verify(&lcs, &jump.p), Ok(()));
+            assert_eq!(jumps.verify(&lcs, jump), Ok(()));
         }
         found
     }
@@ -484,6 +489,7 @@ mod tests {
             // In reverse the current is that of the leakages at once, by an impulse of L times the change.
             let leaks: f64 = laws.iter().map(|law| law.least_current().unwrap()).sum();
             let jump = jumped(laws, -1.0).unwrap();
+            assert!((1e-12..1e-11).contains(&jump.rounding), "{jump:?}");
             assert!((jump.x[0] - leaks).abs() < 1e-15, "{jump:?}");
             assert!((jump.p[1] - 1e-3 * (1.0 + leaks)).abs() < 1e-15, "{jump:?}");
         }
@@ -515,13 +521,26 @@ mod tests {
         let lcs = inductor_into([exponential(1e-6, None), Law::ideal_diode()]);
         let jumps = JumpProblem::new(&lcs, 1e-9).unwrap();
         // Opening the ideal diode against the exponential one.
-        let wrong = jumps.verify(&lcs, &dvector![0.0, -1e-3]).unwrap_err();
+        let verify = |p: DVector<f64>, rounding: f64| {
+            let (x, rivals) = (dvector![0.0], vec![]);
+            let jump = Jump {
+                x,
+                p,
+                rivals,
+                rounding,
+            };
+            jumps.verify(&lcs, &jump)
+        };
+        let wrong = verify(dvector![0.0, -1e-3], 0.0).unwrap_err();
         assert!(
             wrong.what.contains("forward impulse of 1e-3 V s"),
             "{wrong}"
         );
-        assert_eq!(jumps.verify(&lcs, &dvector![0.0, 1e-3]), Ok(()));
-        assert_eq!(jumps.verify(&lcs, &dvector![1.0, 0.0]), Ok(()));
+        assert_eq!(verify(dvector![0.0, 1e-3], 0.0), Ok(()));
+        assert_eq!(verify(dvector![1.0, 0.0], 0.0), Ok(()));
+        // What is rounding has no sign.
+        assert!(verify(dvector![1.0, -1e-3], 0.0).is_err());
+        assert_eq!(verify(dvector![1.0, -1e-3], 1e-2), Ok(()));
     }
 
     /// D + Dᵀ and the jump matrix CB must both be semidefinite for a jump to be the solution of a monotone problem.

@@ -333,7 +333,7 @@ impl<'a, 'o> Search<'a, 'o> {
             .stand_at(0.0, &begin.state, &begin.switches)?;
         let (mut amplitudes, mut last) = (vec![0.0; before.len()], None);
         grow(&mut amplitudes, &before);
-        let mut events = Vec::new();
+        let (mut events, mut looked) = (Vec::new(), 0);
         for k in 1..=PROLONGED * PARTS {
             let begin = self.simulation.time();
             let cancel = self.options.cancel;
@@ -354,7 +354,15 @@ impl<'a, 'o> Search<'a, 'o> {
             let tried = if quiet && still <= AT_REST {
                 self.at_rest(&stand, part, &amplitudes)
             } else if k % PARTS == 0 {
-                self.around(&std::mem::take(&mut events), (&stand, &amplitudes), span)
+                // A period may be longer than the span.
+                let often = recurring(&events);
+                if often.is_empty() {
+                    continue;
+                }
+                let seconds = (k - looked) as f64 * part;
+                looked = k;
+                events.clear();
+                self.around(&often, (&stand, &amplitudes), seconds)
             } else {
                 continue;
             };
@@ -418,26 +426,15 @@ impl<'a, 'o> Search<'a, 'o> {
         }))
     }
 
-    /// The orbit that repeats one of these events, the rarest of those that happened often enough, which is the one that closes it.
+    /// The orbit that repeats one of these changes, which is the one that closes it, of those of so many seconds.
     fn around(
         &mut self,
-        events: &[Event],
+        changes: &[Change],
         (stand, seen): (&Stand, &[f64]),
         seconds: f64,
     ) -> Result<Option<Found>, Error> {
-        /// An event that repeats happened so often.
-        const OFTEN: usize = 3;
         let (closed, order) = (self.closed(), self.options.order.unwrap_or(1));
-        let mut kinds: Vec<(usize, &Change)> = Vec::new();
-        for change in events.iter().flat_map(|event| event.changes.iter()) {
-            match kinds.iter_mut().find(|(_, known)| *known == change) {
-                Some((count, _)) => *count += 1,
-                None => kinds.push((1, change)),
-            }
-        }
-        kinds.retain(|(count, _)| *count >= OFTEN);
-        kinds.sort_by_key(|(count, _)| *count);
-        for (_, section) in kinds {
+        for section in changes {
             let mut shooting = self.shooting(0.0, Return::At(section.clone(), 2.0 * seconds));
             let (start, _) = shooting.shoot(stand)?;
             let (_, period) = shooting.shoot(&start)?;
@@ -469,6 +466,25 @@ impl<'a, 'o> Search<'a, 'o> {
         }
         Ok(None)
     }
+}
+
+/// The changes that happened often enough to be those of an orbit, the rarest first.
+fn recurring(events: &[Event]) -> Vec<Change> {
+    /// An event that repeats happened so often.
+    const OFTEN: usize = 3;
+    let mut kinds: Vec<(usize, &Change)> = Vec::new();
+    for change in events.iter().flat_map(|event| event.changes.iter()) {
+        match kinds.iter_mut().find(|(_, known)| *known == change) {
+            Some((count, _)) => *count += 1,
+            None => kinds.push((1, change)),
+        }
+    }
+    kinds.retain(|(count, _)| *count >= OFTEN);
+    kinds.sort_by_key(|(count, _)| *count);
+    kinds
+        .into_iter()
+        .map(|(_, change)| change.clone())
+        .collect()
 }
 
 /// After how many periods the last of these places returns, if it does.

@@ -100,9 +100,9 @@ impl Free {
     }
 
     /// See [`JumpProblem::verify`].
-    pub(crate) fn verify(&self, p: &DVector<f64>) -> Result<(), Internal> {
+    pub(crate) fn verify(&self, jump: &Jump) -> Result<(), Internal> {
         let problem = self.jump.as_ref();
-        problem.map_or(Ok(()), |problem| problem.verify(&self.lcs, p))
+        problem.map_or(Ok(()), |problem| problem.verify(&self.lcs, jump))
     }
 
     /// Which pairs conduct during one implicit step of length `h` from x to inputs `u`: the candidate for the next mode.

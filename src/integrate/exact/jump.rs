@@ -91,7 +91,7 @@ impl Transition<'_> {
         // Where the projection finds nothing admissible, jumps into proposed modes are tried.
         let (after, p) = match free.jump(&x, &u) {
             Ok(Some(jump)) => {
-                let checked = free.verify(&jump.p);
+                let checked = free.verify(&jump);
                 let checked = checked.map_err(|broken| Error::at(t, Reason::Internal(broken)));
                 checked?;
                 if !self.report.noted_rivals

@@ -94,7 +94,7 @@ impl Theta {
                     Error::at(t, Reason::Infeasible).device(lcs.ports[e.port].device.clone())
                 })?;
                 if let Some(jump) = &found {
-                    let checked = problem.verify(lcs, &jump.p);
+                    let checked = problem.verify(lcs, jump);
                     checked.map_err(|broken| Error::at(t, Reason::Internal(broken)))?;
                     if !self.noted_rivals
                         && let Some(note) = jump.note(lcs, t)
@@ -217,6 +217,7 @@ impl Theta {
             x,
             p,
             rivals: vec![],
+            rounding: 0.0,
         }))
     }
 
