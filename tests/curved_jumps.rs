@@ -89,7 +89,7 @@ proptest! {
                 prop_assert!(jump.is_ok(), "{jump:?}\n{text}");
                 let jump = jump.unwrap();
                 if let Some(jump) = &jump {
-                    prop_assert_eq!(problem.verify(&lcs, &jump), Ok(()));
+                    prop_assert_eq!(problem.verify(&lcs, jump), Ok(()));
                 }
                 jump
             }
