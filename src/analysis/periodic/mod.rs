@@ -27,6 +27,7 @@ use crate::settings::tolerances::periodic::{
 
 use attempt::{refined, searched, simulation};
 pub(super) use large::Large;
+use multipliers::{growth, is_dissipative};
 use rows::{Steps, closing_error, next_to_nothing, notes, rows, state_error};
 use search::{Found, Search};
 pub(super) use settled::{Settled, settled, settled_large, settled_linear};
@@ -477,12 +478,23 @@ fn whole(asked: Asked, options: &PeriodicOptions<'_>) -> Result<Steady, Error> {
         (method, made) = (Method::Theta, Ok(other));
     }
     let (simulation, mut found) = made?;
-    found.damped = method != Method::Auto;
+    found.underived = method != Method::Auto;
     let apart = if simulation.is_exact() {
         Some(0.0)
     } else {
         refined(parts, &mut found, period.seconds, method, options)?
     };
+    if !simulation.is_exact()
+        && !found.underived
+        && let Some(growth) = growth(&found.fixed.derivative)
+        && is_dissipative(&circuit)
+    {
+        let text = format!(
+            "disturbances of an orbit of resistances, capacitances, inductances and diodes do not grow; differences of runs in steps say that they do by {growth:.2e} a period, which is their noise: there are no multipliers"
+        );
+        said.push(Note::run("no-multipliers", text));
+        found.underived = true;
+    }
     Ok(Steady {
         circuit,
         multiport,

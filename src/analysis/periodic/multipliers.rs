@@ -2,6 +2,8 @@
 
 use nalgebra::DMatrix;
 
+use crate::algebra::Value;
+use crate::circuit::{Circuit, Kind};
 use crate::settings::tolerances::periodic::{NEUTRAL, TAKES_PART};
 
 /// Eigenvalues of M, the largest first; `None` where they are not found.
@@ -19,6 +21,25 @@ pub(super) fn multipliers(derivative: &DMatrix<f64>) -> Option<Vec<[f64; 2]>> {
             .then(b[1].total_cmp(&a[1]))
     });
     Some(found)
+}
+
+/// The size of the largest multiplier, where disturbances grow by it.
+pub(super) fn growth(derivative: &DMatrix<f64>) -> Option<f64> {
+    let [re, im] = *multipliers(derivative)?.first()?;
+    Some(re.hypot(im)).filter(|size| *size > 1.0 + NEUTRAL)
+}
+
+/// Whether no disturbance grows in a circuit, whatever its sources do: where resistances are positive and laws monotone, ½ δxᵀ M δx of two of its
+/// solutions falls.
+pub(super) fn is_dissipative(circuit: &Circuit) -> bool {
+    let is_positive = |value: &Value| value.f64 >= 0.0;
+    circuit.elements.iter().all(|element| match &element.kind {
+        Kind::Resistor(value) | Kind::Capacitor(value) | Kind::Inductor(value) => {
+            is_positive(value)
+        }
+        Kind::VoltageSource(_) | Kind::CurrentSource(_) | Kind::Device(_) => true,
+        Kind::Controlled { .. } | Kind::Function { .. } | Kind::Switch(_) => false,
+    })
 }
 
 /// How many multipliers are 1. Where large gains make one state of another, I − M shrinks a direction that has none.

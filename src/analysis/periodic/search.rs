@@ -38,13 +38,13 @@ pub(super) struct Found {
     pub(super) amplitudes: Vec<f64>,
     /// States are next to nothing beside the sources.
     pub(super) rests: bool,
-    /// It was made in steps that damp what swings faster: its derivative is theirs.
-    pub(super) damped: bool,
+    /// Its derivative is that of steps which damp what swings faster, or noise of theirs.
+    pub(super) underived: bool,
 }
 
 impl Found {
     pub(super) fn orbit(&self) -> Orbit {
-        let known = !self.fixed.one_sided && !self.damped;
+        let known = !self.fixed.one_sided && !self.underived;
         let known = known.then_some(&self.fixed.derivative);
         let mut multipliers = known.and_then(multipliers).unwrap_or_default();
         // A return to the section takes away what moves along the orbit.
@@ -55,7 +55,7 @@ impl Found {
             period: self.fixed.seconds,
             residual: self.fixed.residual,
             iterations: self.fixed.corrections,
-            stable: !self.damped && is_stable(&self.fixed),
+            stable: !self.underived && is_stable(&self.fixed),
             multipliers,
             kind: self.kind,
             order: self.order,
@@ -109,7 +109,7 @@ impl<'a, 'o> Search<'a, 'o> {
             returns: Return::After(period),
             amplitudes: amplitudes.to_vec(),
             rests: self.rests,
-            damped: false,
+            underived: false,
         }
     }
 
@@ -422,7 +422,7 @@ impl<'a, 'o> Search<'a, 'o> {
             returns,
             amplitudes,
             rests,
-            damped: false,
+            underived: false,
         }))
     }
 
@@ -460,7 +460,7 @@ impl<'a, 'o> Search<'a, 'o> {
                     returns,
                     amplitudes,
                     rests: false,
-                    damped: false,
+                    underived: false,
                 }));
             }
         }

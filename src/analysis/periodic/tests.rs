@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::multipliers::{growth, is_dissipative};
 use super::rows::closing_error;
 use super::search::Search;
 use super::shooting::Return;
@@ -124,4 +125,26 @@ fn rows_that_do_not_close_are_off_by_that() {
             (found, expected) => assert_eq!(found, expected),
         }
     }
+}
+
+/// A resonant converter whose bridge is a source: differences of its steps said that disturbances grow by 1.9 a period.
+#[test]
+fn disturbances_grow_where_something_feeds_them() {
+    let of = |cards: &str| {
+        let text = format!(
+            "llc\nv1 1 0 pulse(-5 5 0 1n 1n 0.5u 1u)\nc1 1 2 1n\nl1 2 3 28u\nl2 3 0 84u\nl3 4 0 21u\nk1 l2 l3 1\nd1 4 5 d\nc2 5 0 59n\nr1 5 0 100\n{cards}\n.model d d(is=1e-14)\n.tran 1u 5u\n.end\n"
+        );
+        let model = Model::parse(&text, "llc.cir").expect("a circuit");
+        is_dissipative(model.circuit())
+    };
+    assert!(of("") && of("i1 5 0 sin(0 1 1k)"));
+    let feeding = [
+        "r2 5 0 -10",
+        "e1 6 0 5 0 2\nr2 6 0 1",
+        "s1 5 0 5 0 s\n.model s sw(vt=1 ron=1)",
+    ];
+    assert!(!feeding.into_iter().any(of));
+    let derivative = |a: f64| nalgebra::dmatrix![a, 1.0; -1.0, a];
+    assert_eq!(growth(&derivative(0.0)), None);
+    assert!(growth(&derivative(1.0)).is_some_and(|size| (size - 2_f64.sqrt()).abs() < 1e-12));
 }

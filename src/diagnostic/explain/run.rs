@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 60] = [
+pub(super) const CODES: [Explanation; 61] = [
     Explanation::of(
         "about-rest",
         "The response is that about the operating point, as laws are smooth and no switch moves.",
@@ -158,6 +158,12 @@ pub(super) const CODES: [Explanation; 60] = [
         "A measurement has no derivative at these values.",
         "Two events happen at one instant, or a diode just touches conduction: to either side the derivative is another one.",
         "Take other values of the elements named, so that the events part.",
+    ),
+    Explanation::of(
+        "no-multipliers",
+        "The multipliers of the orbit are not known.",
+        "The orbit is made of steps, and differences of runs beside it are noise: they say that disturbances grow in a circuit in which none does.",
+        "A smaller `--tol`, or diodes of straight pieces (`ron`, `vfwd`), whose derivatives need no differences.",
     ),
     Explanation::of(
         "no-number",
