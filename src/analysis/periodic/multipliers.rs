@@ -26,7 +26,7 @@ pub(super) fn multipliers(derivative: &DMatrix<f64>) -> Option<Vec<[f64; 2]>> {
 /// The size of the largest multiplier, where disturbances grow by it.
 pub(super) fn growth(derivative: &DMatrix<f64>) -> Option<f64> {
     let [re, im] = *multipliers(derivative)?.first()?;
-    Some(re.hypot(im)).filter(|size| *size > 1.0 + NEUTRAL)
+    Some(re.hypot(im)).filter(|size| *size >= 1.0 + NEUTRAL)
 }
 
 /// Whether no disturbance grows in a circuit, whatever its sources do: where resistances are positive and laws monotone, ½ δxᵀ M δx of two of its

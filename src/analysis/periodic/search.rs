@@ -1,7 +1,7 @@
 //! Where Newton's method starts, and which orbit it is to find.
 
 use super::PeriodicOptions;
-use super::multipliers::multipliers;
+use super::multipliers::{growth, multipliers};
 use super::shooting::{Fixed, Return, Shooting, Stand};
 use crate::integrate::{Change, Error, Event, Orbit, OrbitKind, Reason, Simulation, grow};
 use crate::settings::tolerances::periodic::{
@@ -69,11 +69,7 @@ impl Found {
 
 /// Whether disturbances of an orbit are known to die out.
 fn is_stable(fixed: &Fixed) -> bool {
-    if fixed.one_sided {
-        return false;
-    }
-    let largest = multipliers(&fixed.derivative).and_then(|all| all.first().copied());
-    largest.is_none_or(|[re, im]| re.hypot(im) < 1.0 + NEUTRAL)
+    !fixed.one_sided && growth(&fixed.derivative).is_none()
 }
 
 fn none(what: String) -> Error {
