@@ -8,7 +8,8 @@ use std::collections::BTreeMap;
 use nalgebra::DVector;
 
 use self::prescribed::{
-    Guess, Held, Prescribed, hold_currents, hold_voltages, open_inductors, read_guesses,
+    Guess, Held, Prescribed, hold_currents, hold_voltages, is_of_integrator, open_inductors,
+    read_guesses,
 };
 use self::statics::{feeding, observed_circuit, tie_floating, without_delay};
 use crate::circuit::{Circuit, Element, Kind, Line, LinePort, NodeId};
@@ -112,7 +113,7 @@ fn node_voltages(circuit: &Circuit) -> Vec<Option<f64>> {
 }
 
 /// Solves the operating point: capacitors open, inductors short, devices by their complementarity problem y = Dλ + q with the
-/// least-norm λ, switch positions iterated; with `hold_ic` the `.ic` node voltages and inductor currents are held. Where something drives the node already,
+/// least-norm λ, switch positions iterated; with `hold_ic` the `.ic` node voltages and inductor currents are held, without it the values of integrators alone. Where something drives the node already,
 /// they (and those of `.nodeset`) choose among several solutions, as a latch has.
 ///
 /// # Errors
@@ -274,7 +275,9 @@ fn from_nodesets(circuit: &Circuit, values: Values, settings: &Settings) -> Opti
         return None;
     }
     let mut held = circuit.clone();
-    held.initial_voltages = std::mem::take(&mut held.nodesets);
+    let voltages = &mut held.initial_voltages;
+    voltages.retain(|voltage| is_of_integrator(circuit, voltage));
+    voltages.append(&mut held.nodesets);
     let point = operating_point(&held, values, true, settings).ok()?;
     Some(point.switches.into_iter().map(|(_, on)| on).collect())
 }

@@ -15,6 +15,7 @@ mod jumps;
 mod leaks;
 mod notes;
 mod numbers;
+mod operating;
 mod output;
 mod past_zero;
 mod read;

@@ -1,7 +1,7 @@
 //! What a netlist prescribes for the operating point: voltages held by a source, or guessed where something drives the node, and currents of inductors.
 
 use super::statics::source;
-use crate::circuit::{Circuit, Element, Kind, NodeId, Output, Quantity, Source};
+use crate::circuit::{Circuit, Element, Kind, NodeId, Output, Quantity, Source, is_inside};
 use crate::integrate::Note;
 use crate::integrate::start::OperatingPoint;
 use crate::settings::tolerances::jumps::CONSISTENT;
@@ -33,16 +33,13 @@ pub(super) struct Guess {
 }
 
 impl Prescribed {
-    /// Those of `.ic` if `hold_ic`, and the guesses of `.nodeset`.
+    /// Those of `.ic` if `hold_ic`, else those of integrators alone, and the guesses of `.nodeset`.
     pub(super) fn of(circuit: &Circuit, hold_ic: bool) -> Self {
         let root = driven(circuit);
         let is_driven = |&&(a, b, _): &&Voltage| root[a.index()] == root[b.index()];
-        let asked: &[Voltage] = if hold_ic {
-            &circuit.initial_voltages
-        } else {
-            &[]
-        };
-        let (fixed, held): (Vec<&Voltage>, Vec<&Voltage>) = asked.iter().partition(is_driven);
+        let asked = circuit.initial_voltages.iter();
+        let asked = asked.filter(|held| hold_ic || is_of_integrator(circuit, held));
+        let (fixed, held): (Vec<&Voltage>, Vec<&Voltage>) = asked.partition(is_driven);
         let nodesets = circuit.nodesets.iter().filter(is_driven);
         let mut guesses: Vec<Guess> = Vec::new();
         for &(a, b, volts) in fixed.into_iter().chain(nodesets) {
@@ -69,6 +66,11 @@ impl Prescribed {
             guesses,
         }
     }
+}
+
+/// Whether a voltage is the value of an integrator among the `A` devices, which every operating point holds.
+pub(super) fn is_of_integrator(circuit: &Circuit, &(node, ..): &Voltage) -> bool {
+    is_inside(&circuit.nodes[node.index()])
 }
 
 /// Joins two nodes; whether they were not joined before.

@@ -242,9 +242,10 @@ impl Pins {
                 format!("min(max({scaled},{lower}+lower_delta),{upper}-upper_delta)")
             }
             "int" => {
+                let start = between("out_ic".to_owned());
                 _ = write!(
                     cards,
-                    "bin 0 x I={scaled}\ncx x 0 1\n.ic v(x)={{out_ic}}\n.model clamp D(ideal)\n"
+                    "bin 0 x I={scaled}\ncx x 0 1\n.ic v(x)={{{start}}}\n.model clamp D(ideal)\n"
                 );
                 for (own, clamp) in limits.into_iter().zip([
                     "vlow low 0 {out_lower_limit}\ndlow low x clamp\n",
