@@ -103,10 +103,7 @@ impl<'n> Builder<'n, '_> {
                 self.constant(dc_value.unwrap_or(0.0))
             }
         };
-        let source = Source {
-            dc: dc_value.unwrap_or_else(|| wave.value(0.0)),
-            wave,
-        };
+        let source = Source::new(dc_value, wave);
         let (p, n) = (
             self.node(&card.nodes[0], scope),
             self.node(&card.nodes[1], scope),

@@ -58,10 +58,7 @@ impl<'n> Builder<'n, '_> {
 
     fn kind_of(&mut self, output: Output, form: Form) -> Kind {
         if let Some(wave) = self.waveform(&form) {
-            let source = Source {
-                dc: wave.value(0.0),
-                wave,
-            };
+            let source = Source::new(None, wave);
             return match output {
                 Output::Voltage => Kind::VoltageSource(source),
                 Output::Current => Kind::CurrentSource(source),
@@ -153,10 +150,7 @@ impl<'n> Builder<'n, '_> {
                     },
                     law: Law::Curve(*curve),
                 },
-                Auxiliary::Wave(wave) => Kind::VoltageSource(Source {
-                    dc: wave.value(0.0),
-                    wave,
-                }),
+                Auxiliary::Wave(wave) => Kind::VoltageSource(Source::new(None, wave)),
             };
             let kind = self.with_nodes(owner, kind);
             self.add(Element {

@@ -144,6 +144,15 @@ impl Source {
         }
     }
 
+    /// A source with a `DC` value; without one it has the value before t = 0 in operating points, as where a transient starts.
+    #[must_use]
+    pub fn new(dc: Option<f64>, wave: Wave) -> Self {
+        Self {
+            dc: dc.unwrap_or_else(|| wave.value_left(0.0)),
+            wave,
+        }
+    }
+
     /// Adds a constant; whether the waveform has a parameter for that.
     pub(crate) fn raise(&mut self, by: f64) -> bool {
         self.dc += by;

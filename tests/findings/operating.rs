@@ -23,6 +23,13 @@ fn volts(point: &OperatingPoint, node: &str) -> f64 {
     found.expect("a node").1
 }
 
+fn agree(point: &OperatingPoint, expected: &[(&str, f64)]) {
+    for &(node, expected) in expected {
+        let found = volts(point, node);
+        assert!((found - expected).abs() < 1e-6, "v({node}) = {found}");
+    }
+}
+
 /// It was charged up to its limit, where it has no response, and without limits it had no operating point.
 #[test]
 fn an_integrator_holds_its_initial_value() {
@@ -51,4 +58,30 @@ fn an_integrator_holds_its_initial_value() {
             assert!(y.re.abs() < 1e-12 && (y.im - expected).abs() < 1e-9, "{y}");
         }
     }
+}
+
+/// Without a `DC` value they have the value before t = 0. What rises at once at t = 0 had risen, and the exponential had fallen below where it began, as
+/// nothing is as short as its defaults without `.tran`.
+#[test]
+fn sources_have_the_value_before_zero() {
+    let name = "sources_before_zero";
+    let expected = [
+        ("a", 1.0),
+        ("b", 1.0),
+        ("c", 0.0),
+        ("d", 5.0),
+        ("e", 2.0),
+        ("f", 1.0),
+        ("g", 0.0),
+        ("h", 2.0),
+        ("k", 0.370_559_217_6),
+    ];
+    agree(&point(name, &[]), &expected);
+    agree(&point(name, &[(".end", ".tran 1u 1m\n.end")]), &expected);
+    // A diode of rd = VT/I in series with 1 kΩ.
+    let response = small_signal(&model(name, &[]), &SmallSignalOptions::default());
+    let gain = response.expect("a response").phasors.column(0).next();
+    let expected = 0.370_559_2 / (0.370_559_2 + 0.025_864_9);
+    let gain = gain.expect("a frequency").norm();
+    assert!((gain - expected).abs() < 1e-5, "{gain}");
 }

@@ -75,13 +75,14 @@ fn an_explicit_zero_is_a_true_edge() {
 }
 
 #[test]
-fn the_dc_value_is_the_one_given_or_the_wave_at_zero() {
+fn the_dc_value_is_the_one_given_or_the_wave_before_zero() {
     let at = |card| source(card, ".tran 1u 1m").dc;
     assert_eq!(at("V1 a 0 DC 2 AC 1 SIN(1 5 1k)"), 2.0);
     assert_eq!(at("V1 a 0 SIN(1 5 1k)"), 1.0);
     assert_eq!(at("V1 a 0 SIN(0 5 1k 0 0 90)"), 5.0);
     assert!((at("V1 a 0 SIN(0 5 1k -0.25m)") - 5.0).abs() < 1e-12);
     assert_eq!(at("V1 a 0 PULSE(3 5)"), 3.0);
+    assert_eq!(at("V1 a 0 PULSE(3 5 0 0)"), 3.0);
     assert_eq!(at("V1 a 0 AC 1"), 0.0);
 }
 

@@ -215,14 +215,10 @@ pub fn read(text: &str) -> Result<SystemFile, JsonError> {
                     name: input.name.clone(),
                     source,
                 })?;
-            let source = Source {
-                dc: input.dc.unwrap_or_else(|| wave.value(0.0)),
-                wave,
-            };
             Ok(Input {
                 name: input.name.clone(),
                 unit: unit(&input.unit),
-                source,
+                source: Source::new(input.dc, wave),
             })
         })
         .collect::<Result<Vec<_>, JsonError>>()?;
