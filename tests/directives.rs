@@ -167,13 +167,24 @@ fn the_temperature_is_a_name_of_expressions() {
         50.0
     );
     let notes = |options: &str| read(&format!("v1 a 0 1\nr1 a 0 1\n.tran 1 2\n{options}")).1;
-    assert_eq!(notes(".options temp=50"), [""; 0]);
+    for read in [".options temp=50", ".options tnom=50"] {
+        assert_eq!(notes(read), [""; 0]);
+    }
+    assert_eq!(
+        notes(".options rshunt=1e9"),
+        [
+            "Warning dir/a.cir:rshunt the result is without `rshunt` of `.options`: a resistance from every node to ground"
+        ]
+    );
     for (options, skipped) in [
         (
             ".options temp=50 reltol=1e-4",
-            ".options but for temp and gmin",
+            ".options but for temp, tnom and gmin",
         ),
-        (".OPTIONS noacct GMIN=1p", ".options but for temp and gmin"),
+        (
+            ".OPTIONS noacct GMIN=1p",
+            ".options but for temp, tnom and gmin",
+        ),
         (".options reltol=1e-4", ".options"),
         (".options temp", ".options"),
     ] {

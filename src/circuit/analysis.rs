@@ -116,13 +116,17 @@ impl<'n> Builder<'n, '_> {
         self.trans.iter().any(|t| t.startup)
     }
 
-    /// The temperature of expressions: of a sweep, else of `.temp`.
+    /// The temperature of expressions: of a sweep, else of `.temp`; and the nominal one, of `.options tnom=`.
     pub(super) fn set_temperature(&mut self) {
         let swept = self.options.temperature.map(Value::binary);
         let written = self.temperature.take();
         let written = written.and_then(|e| self.scopes.finite(e, ScopeId::ROOT));
         if let Some(temperature) = swept.or(written) {
             self.scopes.temperature = temperature;
+        }
+        let nominal = self.nominal.take();
+        if let Some(nominal) = nominal.and_then(|e| self.scopes.finite(e, ScopeId::ROOT)) {
+            self.scopes.nominal = nominal.f64;
         }
     }
 

@@ -12,7 +12,7 @@ use super::builder::Builder;
 use super::elaborate::Diodes;
 use super::model::{Parameters, ZERO};
 use super::passive::Args;
-use super::scope::{NOMINAL, ScopeId};
+use super::scope::ScopeId;
 use super::{Affine, Element, ElementId, Kind, NodeId, Output, Quantity};
 use crate::algebra::Value;
 use crate::diagnostic::Diagnostic;
@@ -194,6 +194,7 @@ impl<'n> Builder<'n, '_> {
         self.level(card, name, &params, &[1.0, 2.0], scope)?;
         self.misspelt(('q', name), &params, &COUNTS);
         let thermal = Exponential::thermal_voltage(self.scopes.temperature.f64);
+        let nominal = self.scopes.nominal;
         let mut number = |name: &str, otherwise: f64| -> Option<f64> {
             Some(
                 self.parameter(&params, name, scope)?
@@ -201,7 +202,7 @@ impl<'n> Builder<'n, '_> {
             )
         };
         // IS(T) = IS (T/Tnom)^XTI exp((T/Tnom − 1) EG q/kT), β(T) = β (T/Tnom)^XTB.
-        let ratio = thermal / Exponential::thermal_voltage(number("tnom", NOMINAL)?);
+        let ratio = thermal / Exponential::thermal_voltage(number("tnom", nominal)?);
         let (eg, xti) = (number("eg", 1.11)?, number("xti", 3.0)?);
         let gain = ratio.powf(number("xtb", 0.0)?);
         let is = number("is", 1e-16)? * ratio.powf(xti) * ((ratio - 1.0) * eg / thermal).exp();

@@ -52,6 +52,8 @@ pub(super) struct Builder<'n, 'o> {
     pub(super) nodesets: Vec<(ScopeId, &'n [(Signal, Expr)])>,
     /// `.temp`.
     pub(super) temperature: Option<&'n Expr>,
+    /// Of `.options tnom=`.
+    pub(super) nominal: Option<&'n Expr>,
     /// Of `.options gmin=`.
     pub(super) gmin: Option<&'n Expr>,
     pub(super) saves: Vec<(ScopeId, &'n [Wanted])>,
@@ -110,6 +112,7 @@ impl<'n, 'o> Builder<'n, 'o> {
             ics: Vec::new(),
             nodesets: Vec::new(),
             temperature: None,
+            nominal: None,
             gmin: None,
             saves: Vec::new(),
             dc_saves: Vec::new(),

@@ -4,7 +4,7 @@ use super::builder::{Builder, Pending};
 use super::form::Form;
 use super::names::{current, difference};
 use super::passive::Args;
-use super::scope::{NOMINAL, ScopeId};
+use super::scope::ScopeId;
 use super::{Affine, Coupling, Element, ElementId, Kind, Output};
 use crate::algebra::Value;
 use crate::diagnostic::Diagnostic;
@@ -29,8 +29,8 @@ impl<'n> Builder<'n, '_> {
             );
             return;
         }
-        let warm =
-            self.scopes.temperature.f64 != NOMINAL || Args(args).get(&["temp", "dtemp"]).is_some();
+        let warm = self.scopes.temperature.f64 != self.scopes.nominal
+            || Args(args).get(&["temp", "dtemp"]).is_some();
         for arg in args {
             match arg.name.text.as_str() {
                 "noiseless" => {}

@@ -101,6 +101,7 @@ impl<'n> Builder<'n, '_> {
             Statement::Ic(list) => self.ics.push((scope, list)),
             Statement::Nodeset(list) => self.nodesets.push((scope, list)),
             Statement::Temperature(value) => self.temperature = Some(value),
+            Statement::Nominal(value) => self.nominal = Some(value),
             Statement::Gmin(value) => self.gmin = Some(value),
             Statement::Thermal(card) if scope == ScopeId::ROOT => self.thermals.push(card),
             Statement::Thermal(card) => {

@@ -3,7 +3,7 @@
 use super::builder::Builder;
 use super::model::Parameters;
 use super::passive::Args;
-use super::scope::{NOMINAL, ScopeId};
+use super::scope::ScopeId;
 use crate::diagnostic::Diagnostic;
 use crate::law::{Breakdown, Exponential, Law};
 use crate::netlist::ast::{self, Name};
@@ -35,7 +35,7 @@ impl<'n> Builder<'n, '_> {
                 self.unused(format!("{left_out} of {}", name.text), name);
             }
         }
-        let circuit = self.scopes.temperature.f64;
+        let (circuit, nominal) = (self.scopes.temperature.f64, self.scopes.nominal);
         let mut number = |names: &[&str], otherwise: f64| -> Option<f64> {
             for one in names {
                 if let Some(expr) = params.get(one) {
@@ -59,7 +59,7 @@ impl<'n> Builder<'n, '_> {
         let bv = number(&["bv", "vb"], f64::INFINITY)?;
         let ibv = number(&["ibv"], 1e-3)?;
         let nbv = number(&["nbv"], n)?;
-        let nominal = number(&["tnom", "t_measured"], NOMINAL)?;
+        let nominal = number(&["tnom", "t_measured"], nominal)?;
         let (eg, xti) = (number(&["eg"], 1.11)?, number(&["xti"], 3.0)?);
         let model = number(&["temp", "t_abs"], circuit)?;
         let shift = self.arg(args, &["dtemp"], scope)?.map_or(0.0, |t| t.f64);

@@ -1,7 +1,7 @@
 //! R, C and L with LTspice's parasitics, and the `name=value` arguments of all elements.
 
 use super::builder::Builder;
-use super::scope::{NOMINAL, ScopeId};
+use super::scope::ScopeId;
 use super::{Affine, Element, Kind, NodeId, Output};
 use crate::algebra::Value;
 use crate::diagnostic::{Diagnostic, Span};
@@ -293,7 +293,7 @@ impl<'n> Builder<'n, '_> {
         }
     }
 
-    /// The value at the temperature of the element, value (1 + TC1 ΔT + TC2 ΔT²) with ΔT from 27 °C on, of the card's own coefficients or its
+    /// The value at the temperature of the element, value (1 + TC1 ΔT + TC2 ΔT²) with ΔT from TNOM on, of the card's own coefficients or its
     /// model's.
     fn at_temperature(
         &mut self,
@@ -311,6 +311,7 @@ impl<'n> Builder<'n, '_> {
         let model = models.next().map(|model| Args(&model.params));
         let both = args.get(&["tc"]).or_else(|| model?.get(&["tc"]));
         let both = both.map_or(Some(Vec::new()), |both| self.scopes.numbers(both, scope))?;
+        let otherwise = self.scopes.nominal;
         let mut number = |own: &[&str], otherwise: f64| -> Option<f64> {
             let found = args.get(own).or_else(|| model?.get(own));
             let value = found.map(|expr| self.scopes.finite(expr, scope));
@@ -323,7 +324,7 @@ impl<'n> Builder<'n, '_> {
         if tc1 == 0.0 && tc2 == 0.0 && tce == 0.0 {
             return Some(value);
         }
-        let (own, nominal) = (number(&["temp"], f64::NAN)?, number(&["tnom"], NOMINAL)?);
+        let (own, nominal) = (number(&["temp"], f64::NAN)?, number(&["tnom"], otherwise)?);
         let warmer = number(&["dtemp"], 0.0)?;
         let ambient = self.scopes.temperature.f64 + warmer;
         let above = if own.is_nan() { ambient } else { own } - nominal;

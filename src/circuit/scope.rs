@@ -14,7 +14,7 @@ use crate::diagnostic::Diagnostic;
 use crate::netlist::ast::{Expr, Func, Model, Name, Subckt};
 use crate::netlist::suggest::nearest;
 
-/// The temperature of circuits without `.temp`, and that at which values and models hold where TNOM does not say, °C.
+/// The temperature of circuits without `.temp`, and that at which values and models hold where no TNOM says, °C.
 pub(super) const NOMINAL: f64 = 27.0;
 
 /// Everything found so far, each finding once.
@@ -142,6 +142,8 @@ pub(super) struct Scopes<'n> {
     pub(super) tstop: f64,
     /// °C.
     pub(super) temperature: Value,
+    /// That at which values and models without a TNOM of their own hold, °C.
+    pub(super) nominal: f64,
     /// The sample of random values, where one is drawn.
     pub(super) draw: Option<Draw>,
     /// The tolerances given beside the netlist.
@@ -167,6 +169,7 @@ impl<'n> Scopes<'n> {
             rails_read: BTreeSet::new(),
             tstop: 1.0,
             temperature: Value::decimal(NOMINAL, 27, 0),
+            nominal: NOMINAL,
             draw: None,
             tolerances: Vec::new(),
             place: 0,

@@ -309,16 +309,12 @@ impl Reader<'_> {
             Dot::Include(file) => self.include(&file.whole, None, file.span, path),
             Dot::Lib(file) => self.lib(&file, path),
             Dot::Options(options) => {
-                match (options.others, &options.temperature, &options.gmin) {
-                    (false, ..) => {}
-                    (true, None, None) => self.skip(line),
-                    (true, ..) => self.skip_as(".options but for temp and gmin", line),
+                match (options.others, &options.read[..]) {
+                    (false, _) => {}
+                    (true, []) => self.skip(line),
+                    (true, _) => self.skip_as(".options but for temp, tnom and gmin", line),
                 }
-                let read = [
-                    options.temperature.map(Statement::Temperature),
-                    options.gmin.map(Statement::Gmin),
-                ];
-                for statement in read.into_iter().flatten() {
+                for statement in options.read {
                     self.push(statement);
                 }
             }

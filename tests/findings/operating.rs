@@ -85,3 +85,15 @@ fn sources_have_the_value_before_zero() {
     let gain = gain.expect("a frequency").norm();
     assert!((gain - expected).abs() < 1e-5, "{gain}");
 }
+
+/// The option was skipped, with a note that it changes nothing: v(b) and v(c) were 633 mV.
+#[test]
+fn models_hold_at_the_nominal_temperature_of_options() {
+    let expected = [
+        ("b", 0.717_658_2),
+        ("c", 0.717_914_0),
+        ("d", 0.633_429_2),
+        ("e", 2.529_084_5),
+    ];
+    agree(&point("nominal_temperature", &[]), &expected);
+}

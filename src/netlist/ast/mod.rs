@@ -98,6 +98,8 @@ pub enum Statement {
     Nodeset(Vec<(Signal, Expr)>),
     /// `.temp t`, `.options temp=t`, °C.
     Temperature(Expr),
+    /// `.options tnom=t`, °C.
+    Nominal(Expr),
     /// `.options gmin=g`, S.
     Gmin(Expr),
     /// `.thermal`.

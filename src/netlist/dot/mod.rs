@@ -58,10 +58,9 @@ pub(in crate::netlist) enum Dot {
 
 /// What `.options` says, and whether there is more, which is skipped.
 #[derive(Debug, Default)]
-pub(super) struct Options {
-    pub(super) temperature: Option<Expr>,
-    pub(super) gmin: Option<Expr>,
-    pub(super) others: bool,
+pub(in crate::netlist) struct Options {
+    pub(in crate::netlist) read: Vec<Statement>,
+    pub(in crate::netlist) others: bool,
 }
 
 impl Dot {
@@ -383,6 +382,27 @@ const OF_FILES: [&str; 8] = [
     "fastaccess",
 ];
 
+/// Options that change what ngspice and LTspice give and are not carried out, and what they mean.
+const CHANGING: [(&str, &str); 7] = [
+    ("rshunt", "a resistance from every node to ground"),
+    ("gshunt", "a conductance from every node to ground"),
+    ("cshunt", "a capacitance from every node to ground"),
+    ("scale", "the unit of sizes of transistors"),
+    ("defl", "the length of transistors without `l`"),
+    ("defw", "the width of transistors without `w`"),
+    ("ramptime", "sources that ramp up"),
+];
+
+/// The warning of an option among [`CHANGING`].
+fn left_out(option: &Name) -> Option<Diagnostic> {
+    let (_, meaning) = CHANGING.iter().find(|(name, _)| option.text == *name)?;
+    let message = format!(
+        "the result is without `{}` of `.options`: {meaning}",
+        option.text
+    );
+    Some(Diagnostic::warning("ignored", option.span, message).label("not carried out"))
+}
+
 /// The options that matter among names with and without values.
 fn options(i: Input<'_>) -> Dot {
     let mut options = Options::default();
@@ -402,10 +422,14 @@ fn options(i: Input<'_>) -> Dot {
             },
             None => None,
         };
-        match value {
-            Some(value) if name.text == "temp" => options.temperature = Some(value),
-            Some(value) if name.text == "gmin" => options.gmin = Some(value),
-            _ => options.others |= !OF_FILES.contains(&name.text.as_str()),
+        match (name.text.as_str(), value) {
+            ("temp", Some(value)) => options.read.push(Statement::Temperature(value)),
+            ("tnom", Some(value)) => options.read.push(Statement::Nominal(value)),
+            ("gmin", Some(value)) => options.read.push(Statement::Gmin(value)),
+            (other, _) => match left_out(&name) {
+                Some(warning) => tell(i, warning),
+                None => options.others |= !OF_FILES.contains(&other),
+            },
         }
     }
     options.others |= !at_end(at);
