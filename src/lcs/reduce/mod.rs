@@ -317,22 +317,24 @@ fn in_some_order<F: Field>(
     position: &Position,
 ) -> Result<Reduction<F>, ReduceError> {
     let first = Eliminated::new(behaviour, reduced, position, ClassOrder::Standard)?.system();
-    let Err(error) = first else { return first };
+    let Err(mut error) = first else { return first };
+    let is_port = |error: &ReduceError| matches!(error, ReduceError::Port { .. });
     if matches!(error, ReduceError::Sources { .. }) || position.storage == StorageHold::Static {
         return Err(error);
     }
-    [
+    for order in [
         ClassOrder::OtherRole,
         ClassOrder::DevicesFirst,
         ClassOrder::OtherRoleFirst,
-    ]
-    .into_iter()
-    .find_map(|order| {
-        Eliminated::new(behaviour, reduced, position, order)
-            .and_then(Eliminated::system)
-            .ok()
-    })
-    .ok_or(error)
+    ] {
+        match Eliminated::new(behaviour, reduced, position, order).and_then(Eliminated::system) {
+            // The port was accused as the order was unfortunate.
+            Err(rate @ ReduceError::SourceRate { .. }) if is_port(&error) => error = rate,
+            Err(_) => {}
+            found => return found,
+        }
+    }
+    Err(error)
 }
 
 /// A row over [x | λ | u | u' | 1] that must vanish, and the elements whose loop or cut-set it is.

@@ -232,6 +232,10 @@ fn what_would_need_a_derivative_is_an_error_that_says_so() {
     let text = "v1 1 0 5\n c1 1 0 1u\n h1 2 0 v1 10\n r1 2 0 1k\n rel1 3 0 2 0\n r2 3 0 1";
     let error = at(text, &[], StorageHold::Dynamic).unwrap_err();
     assert_eq!(error.to_string(), "rel1 depends on the derivative of v1");
+    // So does a diode, whose voltage and current are not prescribed.
+    let text = "v1 1 0 5\n c1 1 0 1u\n h1 2 0 v1 -10\n r1 2 3 1k\n d1 3 0";
+    let error = at(text, &[], StorageHold::Dynamic).unwrap_err();
+    assert_eq!(error.to_string(), "d1 depends on the derivative of v1");
     // The comparator's output charges a capacitor without any resistance.
     let text = "v1 1 0 5\n r1 1 0 1\n rel1 2 0 1 0\n c1 2 0 1u";
     let error = at(text, &[], StorageHold::Dynamic).unwrap_err();
