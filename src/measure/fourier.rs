@@ -7,6 +7,7 @@ use super::{MeasureError, Trace};
 use crate::linalg::gauss::POINTS;
 use crate::settings::tolerances::netlists::SMALL_ANGLE;
 use crate::settings::tolerances::periodic::FUNDAMENTAL;
+use crate::settings::tolerances::times::SAME_TIME;
 
 /// One harmonic, magnitude·sin(2π k f t + phase) with t from the start of the period, as in SPICE.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,7 +39,7 @@ pub fn fourier(trace: &Trace<'_>, frequency: f64, count: usize) -> Result<Spectr
     let period = frequency.recip();
     let (first, to) = trace.span().unwrap_or_default();
     let from = to - period;
-    if !(period.is_finite() && period > 0.0) || first - from > f64::EPSILON * to.abs() {
+    if !(period.is_finite() && period > 0.0) || first - from > SAME_TIME * to.abs() {
         return Err(MeasureError::Period {
             frequency,
             seconds: to - first,

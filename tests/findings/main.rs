@@ -22,6 +22,7 @@ mod read;
 mod rest;
 #[path = "../runs/mod.rs"]
 mod runs;
+mod tables;
 mod turn_off;
 
 use std::path::{Path, PathBuf};

@@ -165,10 +165,8 @@ fn loads(circuit: &Circuit) -> Vec<usize> {
     carrying
 }
 
-/// √(Y_ac² − Y₁²)/Y₁ for ∫ y², ∫ y and ∫ y e^{−jωt} over so many seconds; none without a part at ω.
-pub(super) fn distortion(square: f64, mean: f64, harmonic: f64, seconds: f64) -> Option<f64> {
-    let alternating = square / seconds - (mean / seconds).powi(2);
-    let fundamental = 2.0 * (harmonic / seconds).powi(2);
-    let counts = fundamental > FUNDAMENTAL.powi(2) * (square / seconds);
+/// √(Y_ac² − Y₁²)/Y₁ for a mean, the mean square about it and that of the part at ω; none without such a part.
+pub(super) fn distortion(mean: f64, alternating: f64, fundamental: f64) -> Option<f64> {
+    let counts = fundamental > FUNDAMENTAL.powi(2) * (alternating + mean.powi(2));
     counts.then(|| ((alternating - fundamental).max(0.0) / fundamental).sqrt())
 }

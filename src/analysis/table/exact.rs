@@ -122,8 +122,11 @@ pub(super) fn sums(
     let seconds = whole.map_or(0.0, |whole| span.to - whole);
     let distortions = columns.shown.iter().map(|&c| {
         period?;
-        let harmonic = harmonics[c].norm();
-        distortion(periods.square[c], periods.mean[c], harmonic, seconds)
+        let mean = periods.mean[c] / seconds;
+        let alternating = periods.square[c] / seconds - mean.powi(2);
+        let harmonic: f64 = harmonics[c].norm();
+        let fundamental = 2.0 * (harmonic / seconds).powi(2);
+        distortion(mean, alternating, fundamental)
     });
     Ok(Sums {
         distortion: distortions.collect(),

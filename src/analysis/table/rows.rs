@@ -1,14 +1,12 @@
 //! The sums of a table over the straight lines between rows.
 
-use std::f64::consts::TAU;
-
-use nalgebra::Complex;
-
 use super::columns::{Columns, Sums, distortion};
 use super::commutation::{Commutations, Costs};
 use super::means::Span;
 use crate::integrate::Run;
+use crate::measure::{Over, Trace, fourier};
 use crate::settings::tolerances::times::SAME_TIME;
+use crate::waveform::Waveforms;
 
 pub(super) fn sums(
     columns: &Columns<'_>,
@@ -27,9 +25,6 @@ pub(super) fn sums(
         distortion: vec![None; columns.shown.len()],
         costs: Vec::new(),
     };
-    let seconds = period.unwrap_or(0.0);
-    let whole = (span.to - seconds).max(span.from);
-    let mut parts = vec![(0.0, 0.0, Complex::<f64>::default()); count];
     let mut rows = waves.time.iter().zip(waves.values.chunks_exact(count));
     let mut before = rows.next();
     for row in rows {
@@ -48,29 +43,34 @@ pub(super) fn sums(
             sums.square[c] += square;
             sums.least[c] = sums.least[c].min(y0[c]).min(y1[c]);
             sums.greatest[c] = sums.greatest[c].max(y0[c]).max(y1[c]);
-            if let (Some(period), true) = (period, t0 >= whole - 0.5 * h) {
-                let omega = TAU / period;
-                let turn = |t: f64| Complex::from_polar(1.0, -omega * (t - span.from));
-                // ∫ (a + b t) e^{−jωt} by Simpson's rule on the line.
-                let middle = turn(0.5 * (t0 + t1)) * (0.5 * (y0[c] + y1[c]));
-                let part = (turn(t0) * y0[c] + middle * 4.0 + turn(t1) * y1[c]) * (h / 6.0);
-                let (m, s, f) = &mut parts[c];
-                (*m, *s, *f) = (*m + mean, *s + square, *f + part);
-            }
         }
         for (work, (i, v)) in sums.work.iter_mut().zip(&columns.elements) {
             *work += product(*i, *v);
         }
     }
-    if seconds > 0.0 {
+    if let Some(period) = period {
         for (found, &c) in sums.distortion.iter_mut().zip(&columns.shown) {
-            let (mean, square, harmonic) = parts[c];
-            *found = distortion(square, mean, harmonic.norm(), seconds);
+            *found = distorted(waves, c, period);
         }
     }
     let extremes = (&sums.least[..], &sums.greatest[..]);
     sums.costs = costs(columns, run, (span.from, closes), extremes);
     sums
+}
+
+/// The distortion over the last period, of which `.four` has the fundamental.
+fn distorted(waves: &Waveforms, column: usize, period: f64) -> Option<f64> {
+    let to = *waves.time.last()?;
+    let over = |trace: &Trace<'_>, what| trace.over(what, to - period, to).ok();
+    let values: Vec<f64> = waves.column(column).collect();
+    let mean = over(&Trace::lines(&waves.time, &values[..]), Over::Average)?;
+    // About the mean, of which a ripple may be a small part.
+    let ripple: Vec<f64> = values.iter().map(|y| y - mean).collect();
+    let ripple = Trace::lines(&waves.time, ripple);
+    let alternating = over(&ripple, Over::Rms)?.powi(2);
+    let spectrum = fourier(&ripple, period.recip(), 1).ok()?;
+    let fundamental = 0.5 * spectrum.harmonics.first()?.magnitude.powi(2);
+    distortion(mean, alternating, fundamental)
 }
 
 /// Of changes of state after a time, from the first and the last row of each event; where the run closes, a switch that ends it elsewhere than it began moves
