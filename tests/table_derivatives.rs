@@ -146,6 +146,13 @@ fn a_buck_that_repeats() {
     agree(&BUCK.replace("LOAD", "20"), true, &[]);
 }
 
+/// Inputs with parts, and a controlled source among them.
+#[test]
+fn an_amplifier() {
+    let text = "amplifier\nv1 in 0 sin(1 1 1k) rser=10\nr1 in 0 1k\ne1 out 0 in 0 10\nrl out o 10\nl1 o 0 10m\n.tran 1u 2m\n.save i(rl)\n.end\n";
+    agree(text, false, &["r1", "rl"]);
+}
+
 #[test]
 fn a_rectifier_that_starts() {
     let text = "rectifier\nv1 1 0 sin(0 20 1k)\nr1 1 2 0.5\nl1 2 3 100u\nd1 3 4 di\nd2 5 3 di\nd3 0 4 di\nd4 5 0 di\nc1 4 5 100u ic=5\nrl 4 5 10\n.model di d(ron=50m roff=1meg vfwd=0.6)\n\

@@ -23,7 +23,7 @@ const FUNCTIONS: [(&str, &str); 6] = [
 /// The function for pins of subcircuits.
 const OF_SUBCIRCUIT: &str = "ix";
 
-/// A transistor or subcircuit with the nodes that it has outside.
+/// A transistor, another device of parts or a subcircuit with the nodes that it has outside, first and last those between which its current flows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pins {
     /// `m1`, `x1.q2`, `x1`.

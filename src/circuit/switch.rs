@@ -67,6 +67,7 @@ impl<'n> Builder<'n, '_> {
             switches.push(part(full, p, Kind::Switch(switch)));
         } else {
             // The current of the switch is that of its first terminal.
+            self.name_pins(&full, "pn", &[p, n]);
             let inner = self.new_node(format!("{full}.p"));
             self.add(Element {
                 n: inner,

@@ -70,6 +70,7 @@ impl<'n> Builder<'n, '_> {
         };
         let [anode, gate, cathode] = [anode, gate, cathode].map(|n| self.node(n, scope));
         let full = self.full_name(&card.name, scope);
+        self.name_pins(&full, "agk", &[anode, gate, cathode]);
         let inner = self.new_node(format!("{full}.a"));
         let parts = Parts {
             name: full,

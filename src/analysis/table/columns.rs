@@ -1,9 +1,11 @@
 //! What a table reads of a run, and what it makes of its integrals.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::commutation::Costs;
-use crate::circuit::{Circuit, Element, Kind, NodeId, Probe, Probed, is_inside, wholes};
+use crate::circuit::{
+    Circuit, Element, ElementId, Kind, NodeId, Output, Probe, Probed, Quantity, is_inside, wholes,
+};
 use crate::integrate::{Error, Reason};
 use crate::model::Model;
 use crate::settings::tolerances::periodic::FUNDAMENTAL;
@@ -14,11 +16,19 @@ pub(super) struct Columns<'a> {
     pub(super) probes: Vec<Probe>,
     /// By element: its current, and its voltage.
     pub(super) elements: Vec<(usize, usize)>,
+    /// By element: the voltage of a device of parts, between the terminals through which its current flows; of others their own.
+    pub(super) across: Vec<usize>,
+    /// What each element consists of besides itself: `m1.channel` and `m1.body` of `m1`.
+    pub(super) parts: Vec<Vec<usize>>,
+    /// What keeps energy: capacitors and inductors, saturable ones among them.
+    pub(super) storage: Vec<usize>,
     /// The signals that the circuit shows.
     pub(super) shown: Vec<usize>,
     /// The switches, in the order of their positions.
     pub(super) switches: Vec<String>,
     pub(super) inputs: Vec<usize>,
+    /// Controlled sources and negative resistances, which are inputs besides where they deliver more than they take together.
+    pub(super) active: Vec<usize>,
     pub(super) outputs: Vec<usize>,
 }
 
@@ -55,21 +65,44 @@ impl<'a> Columns<'a> {
                 })
         };
         let currents: Vec<Probe> = circuit.currents_of(|_| true).collect();
-        let voltage = |element: &Element| {
+        let voltage = |(p, n): (NodeId, NodeId)| {
             let name = |node: NodeId| &circuit.nodes[node.index()];
             Probe {
-                name: match element.n {
-                    NodeId::GROUND => format!("v({})", name(element.p)),
-                    n => format!("v({},{})", name(element.p), name(n)),
+                name: match n {
+                    NodeId::GROUND => format!("v({})", name(p)),
+                    n => format!("v({},{})", name(p), name(n)),
                 },
-                what: Probed::Voltage(element.p, element.n),
+                what: Probed::Voltage(p, n),
             }
         };
+        let of_parts = circuit.pins.iter().filter(|pins| !pins.is_subcircuit);
+        let terminals: BTreeMap<&str, (NodeId, NodeId)> = of_parts
+            .filter_map(|pins| {
+                let ends = (pins.nodes.first()?.1, pins.nodes.last()?.1);
+                Some((pins.device.as_str(), ends))
+            })
+            .collect();
         let shown = circuit.probes().into_iter().map(&mut column).collect();
         let elements = circuit.elements.iter().zip(currents);
-        let elements =
-            elements.map(|(element, current)| (column(current), column(voltage(element))));
-        let elements = elements.collect();
+        let elements = elements.map(|(element, current)| {
+            let own = column(voltage((element.p, element.n)));
+            let across = terminals.get(element.name.as_str());
+            let across = across.map_or(own, |ends| column(voltage(*ends)));
+            ((column(current), own), across)
+        });
+        let (elements, across) = elements.unzip();
+        let parts = parts(circuit);
+        let storage = storage(circuit, &parts);
+        let ports = circuit.lines.iter().flat_map(|line| line.ports);
+        let ports = ports.flat_map(|port| [port.impedance.index(), port.wave.index()]);
+        let are_parts: BTreeSet<usize> = parts.iter().flatten().copied().chain(ports).collect();
+        // What a gate is made of stands for no power.
+        let counts = |k: &usize| !are_parts.contains(k) && !is_inside(&circuit.elements[*k].name);
+        let all = (0..circuit.elements.len()).filter(counts);
+        let is_source = |k: &usize| {
+            let kind = &circuit.elements[*k].kind;
+            matches!(kind, Kind::VoltageSource(_) | Kind::CurrentSource(_))
+        };
         let find = |name: &String| {
             circuit
                 .element(&name.to_lowercase())
@@ -79,19 +112,40 @@ impl<'a> Columns<'a> {
                     Error::before(Reason::Unknown(what))
                 })
         };
-        // The sources that a gate is made of stand for no power.
-        let is_source = |e: &Element| {
-            matches!(e.kind, Kind::VoltageSource(_) | Kind::CurrentSource(_)) && !is_inside(&e.name)
-        };
-        let sources = || (0..circuit.elements.len()).filter(|k| is_source(&circuit.elements[*k]));
+        let named = |names: &[String]| names.iter().map(find).collect::<Result<Vec<_>, _>>();
         let outputs: Vec<usize> = match outputs {
-            [] => loads(circuit),
-            named => named.iter().map(find).collect::<Result<_, _>>()?,
+            [] => {
+                let is_device = |k: &usize| {
+                    let is_one = |k: &usize| {
+                        let kind = &circuit.elements[*k].kind;
+                        matches!(kind, Kind::Switch(_) | Kind::Device(_))
+                    };
+                    is_one(k) || parts[*k].iter().any(is_one)
+                };
+                let supplies = |k: &usize| match circuit.elements[*k].kind {
+                    Kind::Controlled { output, .. } | Kind::Function { output, .. } => {
+                        output == Output::Voltage
+                    }
+                    _ => is_source(k),
+                };
+                let takes = |k: &usize| !supplies(k) && !storage.contains(k) && !is_device(k);
+                loads(circuit, &all.clone().filter(takes).collect::<Vec<_>>())
+            }
+            outputs => named(outputs)?,
         };
-        let inputs = match inputs {
+        let (inputs, active) = match inputs {
             // A battery that is charged is an output alone.
-            [] => sources().filter(|k| !outputs.contains(k)).collect(),
-            named => named.iter().map(find).collect::<Result<_, _>>()?,
+            [] => {
+                let others = all.filter(|k| !outputs.contains(k) && !storage.contains(k));
+                let (sources, others): (Vec<_>, Vec<_>) = others.partition(is_source);
+                let delivers = |k: &usize| match &circuit.elements[*k].kind {
+                    Kind::Controlled { .. } | Kind::Function { .. } => true,
+                    Kind::Resistor(ohms) => ohms.f64 < 0.0,
+                    _ => false,
+                };
+                (sources, others.into_iter().filter(delivers).collect())
+            }
+            inputs => (named(inputs)?, vec![]),
         };
         let is_switch = |e: &&Element| matches!(e.kind, Kind::Switch(_));
         let switches = circuit.elements.iter().filter(is_switch);
@@ -99,24 +153,20 @@ impl<'a> Columns<'a> {
             circuit,
             probes,
             elements,
+            across,
+            parts,
+            storage,
             shown,
             switches: switches.map(|e| e.name.clone()).collect(),
             inputs,
+            active,
             outputs,
         })
     }
 
-    /// What each element consists of besides itself: `m1.channel` and `m1.body` of `m1`.
-    pub(super) fn parts(&self) -> Vec<Vec<usize>> {
-        let names = self.circuit.elements.iter().map(|e| e.name.as_str());
-        let known: BTreeMap<&str, usize> = names.clone().enumerate().map(|(k, n)| (n, k)).collect();
-        let mut parts = vec![Vec::new(); known.len()];
-        for (part, name) in names.enumerate() {
-            for whole in wholes(name).filter_map(|whole| known.get(whole)) {
-                parts[*whole].push(part);
-            }
-        }
-        parts
+    /// An element and its parts.
+    pub(super) fn whole(&self, k: usize) -> impl Iterator<Item = usize> + '_ {
+        std::iter::once(k).chain(self.parts[k].iter().copied())
     }
 
     /// The same circuit, which shows all that the table reads.
@@ -128,39 +178,48 @@ impl<'a> Columns<'a> {
     }
 }
 
-/// What a circuit shows as its loads: elements, no sources and no storage, whose current it shows by name; else resistors across voltages that
-/// it shows by name.
-fn loads(circuit: &Circuit) -> Vec<usize> {
-    let asked = &circuit.probes;
-    let takes = |e: &Element| {
-        !matches!(
-            e.kind,
-            Kind::VoltageSource(_)
-                | Kind::CurrentSource(_)
-                | Kind::Capacitor(_)
-                | Kind::Inductor(_)
-                | Kind::Switch(_)
-                | Kind::Device(_)
-        )
+fn parts(circuit: &Circuit) -> Vec<Vec<usize>> {
+    let names = circuit.elements.iter().map(|e| e.name.as_str());
+    let known: BTreeMap<&str, usize> = names.clone().enumerate().map(|(k, n)| (n, k)).collect();
+    let mut parts = vec![Vec::new(); known.len()];
+    for (part, name) in names.enumerate() {
+        for whole in wholes(name).filter_map(|whole| known.get(whole)) {
+            parts[*whole].push(part);
+        }
+    }
+    parts
+}
+
+/// Capacitors and inductors, and saturable ones in place of the states of which they are functions, which are parts of them.
+fn storage(circuit: &Circuit, parts: &[Vec<usize>]) -> Vec<usize> {
+    let state = |k: usize| match &circuit.elements[k].kind {
+        Kind::Function { input, .. } => match input.terms[..] {
+            [(_, Quantity::Current(id))] => Some(id.index()).filter(|s| parts[k].contains(s)),
+            _ => None,
+        },
+        _ => None,
     };
-    let carries = |k: &usize| {
-        let wanted = Probed::Current(crate::circuit::ElementId(*k as u32));
-        asked.iter().any(|probe| probe.what == wanted)
+    let all = 0..circuit.elements.len();
+    let states: BTreeSet<usize> = all.clone().filter_map(state).collect();
+    let stores = |k: &usize| match circuit.elements[*k].kind {
+        Kind::Capacitor(_) | Kind::Inductor(_) => !states.contains(k),
+        _ => state(*k).is_some(),
     };
-    let across = |k: &usize| {
-        let Element { p, n, kind, .. } = &circuit.elements[*k];
-        let (there, back) = (Probed::Voltage(*p, *n), Probed::Voltage(*n, *p));
+    all.filter(stores).collect()
+}
+
+/// What a circuit shows as its loads, of elements that may be such: those whose current it shows by name; else resistors across voltages that it shows by name.
+fn loads(circuit: &Circuit, of: &[usize]) -> Vec<usize> {
+    let asked = |what: Probed| circuit.probes.iter().any(|probe| probe.what == what);
+    let carries = |k: &&usize| asked(Probed::Current(ElementId(**k as u32)));
+    let across = |k: &&usize| {
+        let Element { p, n, kind, .. } = &circuit.elements[**k];
         matches!(kind, Kind::Resistor(_))
-            && asked
-                .iter()
-                .any(|probe| probe.what == there || probe.what == back)
+            && (asked(Probed::Voltage(*p, *n)) || asked(Probed::Voltage(*n, *p)))
     };
-    let all = || 0..circuit.elements.len();
-    let carrying: Vec<usize> = all()
-        .filter(|k| takes(&circuit.elements[*k]) && carries(k))
-        .collect();
+    let carrying: Vec<usize> = of.iter().filter(carries).copied().collect();
     if carrying.is_empty() {
-        return all().filter(across).collect();
+        return of.iter().filter(across).copied().collect();
     }
     carrying
 }

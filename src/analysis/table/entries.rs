@@ -8,8 +8,7 @@ use std::f64::consts::TAU;
 use super::columns::Columns;
 use super::means::Table;
 use crate::analysis::periodic::common_period;
-use crate::circuit::source::Wave;
-use crate::circuit::{Circuit, Formula, Kind, NamedMeasurement, Probe, is_inside};
+use crate::circuit::{Circuit, Formula, NamedMeasurement, Probe, is_inside};
 use crate::integrate::Error;
 use crate::measure::{Instant, Measurement, Over, Window};
 use crate::settings::tolerances::periodic::FUNDAMENTAL;
@@ -39,10 +38,9 @@ pub(in crate::analysis) fn entries(
     let last = Last::of(circuit, steady);
     let shown = columns.shown.iter();
     all.extend(shown.map(|column| columns.signal(*column, last.as_ref())));
-    let parts = columns.parts();
     let elements = circuit.elements.iter().enumerate();
     let shown = elements.filter(|(_, element)| !is_inside(&element.name));
-    all.extend(shown.map(|(k, _)| columns.element(k, &parts[k])));
+    all.extend(shown.map(|(k, _)| columns.element(k)));
     Ok(all)
 }
 
@@ -153,10 +151,10 @@ impl Entries {
 }
 
 impl Columns<'_> {
-    /// Σ v i of elements.
+    /// Σ v i of elements and their parts.
     fn work(&self, of: &[usize], entries: &mut Entries) -> Formula {
-        let products = of.iter().map(|k| {
-            let (i, v) = self.elements[*k];
+        let products = of.iter().flat_map(|k| self.whole(*k)).map(|k| {
+            let (i, v) = self.elements[k];
             let [i, v] = [i, v].map(|column| entries.seen(&self.probes[column]));
             v * i
         });
@@ -164,21 +162,14 @@ impl Columns<'_> {
         sum.unwrap_or(Formula::Number(0.0))
     }
 
-    fn element(&self, k: usize, parts: &[usize]) -> Entries {
+    fn element(&self, k: usize) -> Entries {
         let mut entries = Entries::default();
-        let element = &self.circuit.elements[k];
-        let name = format!("{TABLE}{}", element.name);
-        // A transistor is known by the current into its first pin, a source without voltage.
-        let is_pin = matches!(&element.kind, Kind::VoltageSource(source) if matches!(source.wave, Wave::Dc(0.0)));
-        let (i, own) = self.elements[k];
-        let across = parts.first().filter(|_| is_pin);
-        let v = across.map_or(own, |part| self.elements[*part].1);
-        for (quantity, column) in [("i", i), ("v", v)] {
+        let name = format!("{TABLE}{}", self.circuit.elements[k].name);
+        for (quantity, column) in [("i", self.elements[k].0), ("v", self.across[k])] {
             let seen = entries.seen(&self.probes[column]);
             entries.mean(&format!("{name}.{quantity}"), &seen);
         }
-        let with_parts: Vec<usize> = [k].iter().chain(parts).copied().collect();
-        let work = self.work(&with_parts, &mut entries);
+        let work = self.work(&[k], &mut entries);
         entries.over(format!("{name}.power"), Over::Average, work);
         entries
     }
@@ -222,12 +213,20 @@ impl Columns<'_> {
 
     fn powers(&self) -> Entries {
         let mut entries = Entries::default();
-        let [input, output] =
-            [("input", &self.inputs), ("output", &self.outputs)].map(|(name, of)| {
-                let work = self.work(of, &mut entries);
-                let work = if name == "input" { -work } else { work };
-                entries.over(format!("{TABLE}power.{name}"), Over::Average, work)
-            });
+        let mut mean = |name: String, of: &[usize], sign: f64| {
+            let work = Formula::Number(sign) * self.work(of, &mut entries);
+            entries.over(name, Over::Average, work)
+        };
+        let output = mean(format!("{TABLE}power.output"), &self.outputs, 1.0);
+        let name = format!("{TABLE}power.input");
+        let input = if self.active.is_empty() {
+            mean(name, &self.inputs, -1.0)
+        } else {
+            let sources = mean(".sources".into(), &self.inputs, -1.0);
+            let active = mean(".active".into(), &self.active, -1.0);
+            let active = Formula::Call("max".into(), vec![active, Formula::Number(0.0)]);
+            entries.add(name, Measurement::Param(sources + active))
+        };
         if !self.outputs.is_empty() {
             let ratio = (output / input.clone()).known_where(input, Formula::Number(0.0));
             let name = format!("{TABLE}power.efficiency");

@@ -59,7 +59,7 @@ pub struct ElementMeans {
     pub name: String,
     /// The current from its first node through it to the second, A.
     pub i: Mean,
-    /// The voltage from its first node to the second, V; of an inductor or a capacitor without its parasitic parts, of a transistor that of its channel.
+    /// The voltage from its first node to the second, V; of an inductor or a capacitor without its parasitic parts, of a transistor or thyristor that between the terminals of its current.
     pub v: Mean,
     /// Mean power into it and its parts (`m1.body`, `l1.rser`), W.
     pub power: f64,

@@ -21,11 +21,11 @@ pub use self::means::{
 use super::periodic::{PeriodicOptions, common_period, settled};
 use super::start::{beginning, course};
 use super::variation::Course;
-use crate::circuit::{Circuit, Kind, Tran, is_inside};
+use crate::circuit::{Circuit, Tran, is_inside};
 use crate::integrate::{Error, Method, Note, Reason, Run, SimOptions, Standing};
 use crate::model::Model;
 use crate::settings::Settings;
-use crate::settings::tolerances::periodic::STORED;
+use crate::settings::tolerances::periodic::{BALANCED, STORED};
 
 /// Rows of a run in steps at least: a coarser print step is divided.
 const ROWS: usize = 2000;
@@ -33,10 +33,11 @@ const ROWS: usize = 2000;
 /// What a table may be asked for.
 #[derive(Debug, Clone, Default)]
 pub struct TableOptions<'a> {
-    /// Elements from which the input power comes; by default all independent sources.
+    /// Elements from which the input power comes; by default all independent sources, and controlled ones and negative resistances where these deliver more than
+    /// they take together.
     pub inputs: Vec<String>,
-    /// Elements that take the output power; by default those whose current the circuit shows besides sources and storage, else the resistors
-    /// across voltages that it shows.
+    /// Elements that take the output power; by default those whose current the circuit shows besides sources, storage, switches, diodes, transistors and thyristors,
+    /// else the resistors across voltages that it shows.
     pub outputs: Vec<String>,
     /// Where the transient begins, in place of its initial conditions or operating point.
     pub start: Option<Standing>,
@@ -207,24 +208,13 @@ impl Columns<'_> {
                 .collect()
         };
         let elements = self.circuit.elements.iter().zip(&self.elements).enumerate();
-        let parts = self.parts();
-        let elements = elements.map(|(k, (element, (i, v)))| {
-            let parts = &parts[k];
-            // A transistor is known by the current into its first pin, a source without voltage.
-            let across = match parts.first() {
-                Some(&part) if sums.least[*v] == 0.0 && sums.greatest[*v] == 0.0 => {
-                    self.elements[part].1
-                }
-                _ => *v,
-            };
-            let work = sums.work[k] + parts.iter().map(|part| sums.work[*part]).sum::<f64>();
-            ElementMeans {
-                name: element.name.clone(),
-                i: mean(*i),
-                v: mean(across),
-                power: work / seconds,
-                losses: None,
-            }
+        let work = |k: usize| self.whole(k).map(|part| sums.work[part]).sum::<f64>();
+        let elements = elements.map(|(k, (element, (i, _)))| ElementMeans {
+            name: element.name.clone(),
+            i: mean(*i),
+            v: mean(self.across[k]),
+            power: work(k) / seconds,
+            losses: None,
         });
         let mut elements: Vec<ElementMeans> = elements.collect();
         let signals = self.shown.iter().zip(&sums.distortion).map(|(k, thd)| {
@@ -238,16 +228,15 @@ impl Columns<'_> {
                 thd: *thd,
             }
         });
-        let power =
-            |all: &[usize], sign: f64| all.iter().map(|k| sign * sums.work[*k]).sum::<f64>();
-        let (input, output) = (power(&self.inputs, -1.0), power(&self.outputs, 1.0));
+        let sum = |all: &[usize]| all.iter().map(|k| work(*k)).sum::<f64>();
+        let moved: f64 = self.active.iter().map(|k| work(*k).abs()).sum();
+        let mut inputs = self.inputs.clone();
+        if -sum(&self.active) > BALANCED * moved {
+            inputs.extend(&self.active);
+        }
+        let (input, output) = (-sum(&inputs), sum(&self.outputs));
         let known = input > 0.0 && !self.outputs.is_empty();
-        let stores = |k: &usize| {
-            let kind = &self.circuit.elements[*k].kind;
-            matches!(kind, Kind::Capacitor(_) | Kind::Inductor(_))
-        };
-        let storage: Vec<usize> = (0..self.circuit.elements.len()).filter(stores).collect();
-        let stored = power(&storage, 1.0) / input;
+        let stored = self.storage.iter().map(|k| sums.work[*k]).sum::<f64>() / input;
         let lost = losses::lost(self, &elements, &sums.costs, seconds);
         let own = lost.losses.iter().flatten().map(|device| device.switching);
         let switching = (!self.circuit.losses.is_empty()).then(|| own.sum::<f64>());
@@ -274,7 +263,7 @@ impl Columns<'_> {
                 efficiency_with_switching: switching
                     .filter(|_| known)
                     .map(|more| output / (input + more * seconds)),
-                inputs: names(&self.inputs),
+                inputs: names(&inputs),
                 outputs: names(&self.outputs),
             },
             fundamental: period.map(f64::recip),

@@ -179,6 +179,10 @@ pub(crate) const MEASURE_STEP: f64 = 3e-7;
 /// missed, and the derivative of the return is taken by differences; larger: what follows within that time is taken for the orbit's end.
 pub(crate) const EVENT_AGAIN: f64 = 32.0 * f64::EPSILON;
 
+/// The part of what controlled sources take and deliver up to which they are in balance, as the two sides of an ideal transformer, and no input of a table. Larger: an amplifier
+/// beside a large transformer is overlooked; smaller: rounding is an input.
+pub(crate) const BALANCED: f64 = 1e-9;
+
 /// The part of a table's input that is stored from which on a note says so beside the efficiency. Larger: efficiencies of transients that are taken for those of the steady
 /// state; smaller: notes on what no digit shows.
 pub(crate) const STORED: f64 = 1e-2;
