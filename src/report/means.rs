@@ -6,9 +6,6 @@ use crate::analysis::{DeviceLosses, Mean, SignalMeans, Switching, Table, Through
 /// Digits shown.
 const DIGITS: usize = 4;
 
-/// Distortion beyond which a signal has no fundamental to speak of: a voltage that is meant to be constant.
-const NO_FUNDAMENTAL: f64 = 10.0;
-
 /// Of the largest voltage or current of a table, what is shown as 0: the rounding of a difference.
 const INVISIBLE: f64 = 1e-13;
 
@@ -65,8 +62,7 @@ impl Table {
             let mut row = vec![name.clone()];
             row.extend(cells(value, unit));
             row.push(quantity(*ripple, unit));
-            let distorted = thd.filter(|thd| *thd <= NO_FUNDAMENTAL);
-            row.push(distorted.map_or("-".into(), |thd| {
+            row.push(thd.map_or("-".into(), |thd| {
                 format!("{} %", si::plain(100.0 * thd, DIGITS))
             }));
             row

@@ -44,6 +44,8 @@ pub(super) struct Sums {
     pub(super) work: Vec<f64>,
     /// Over the last period, by signal shown.
     pub(super) distortion: Vec<Option<f64>>,
+    /// By signal shown: whether it has impulses in the last period.
+    pub(super) struck: Vec<bool>,
     /// Of changes of state, by device with loss tables.
     pub(super) costs: Vec<Costs>,
 }

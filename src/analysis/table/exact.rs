@@ -12,22 +12,39 @@ use super::means::Span;
 use crate::analysis::variation::{Course, Leap, Linear};
 use crate::circuit::Kind;
 use crate::integrate::Error;
+use crate::settings::tolerances::periodic::FUNDAMENTAL;
 use crate::settings::tolerances::times::SAME_TIME;
 
-/// Sums over the whole span, and from some time on.
-struct Account {
-    mean: Vec<f64>,
-    square: Vec<f64>,
-    work: Vec<f64>,
+/// Integrals of a quantity, without impulses.
+#[derive(Clone, Copy, Default)]
+struct Moments {
+    seconds: f64,
+    /// ∫ y dt.
+    first: f64,
+    /// ∫ (y − ȳ)² dt about the mean ȳ, in which a ripple keeps its digits.
+    second: f64,
 }
 
-impl Account {
-    fn of(columns: usize, elements: usize) -> Self {
-        Self {
-            mean: vec![0.0; columns],
-            square: vec![0.0; columns],
-            work: vec![0.0; elements],
+impl Moments {
+    /// Goes on with a stretch.
+    fn add(&mut self, other: Self) {
+        if self.seconds > 0.0 {
+            let apart = other.mean() - self.mean();
+            let both = self.seconds + other.seconds;
+            self.second += apart * apart * (self.seconds * other.seconds / both);
         }
+        self.seconds += other.seconds;
+        self.first += other.first;
+        self.second += other.second;
+    }
+
+    fn mean(&self) -> f64 {
+        self.first / self.seconds
+    }
+
+    /// ∫ y² dt.
+    fn square(&self) -> f64 {
+        self.second + self.first * self.mean()
     }
 }
 
@@ -41,8 +58,9 @@ pub(super) fn sums(
     // The last period: in those before it a circuit may still settle.
     let whole = period.map(|period| (span.to - period).max(span.from));
     let omega = period.map(|period| TAU / period);
-    let mut all = Account::of(count, elements);
-    let mut periods = Account::of(count, 0);
+    let mut works = vec![0.0; elements];
+    let mut all = vec![Moments::default(); count];
+    let mut periods = all.clone();
     let mut harmonics = vec![Complex::default(); count];
     let mut extrema = Extrema::of(count);
     let mut known = Vec::new();
@@ -65,17 +83,20 @@ pub(super) fn sums(
                 let integrals = integrals::over(&mut motion, &w, omega.filter(|_| counts))?;
                 let mean = &linear.rows[0] * &integrals.mean;
                 let factor = &linear.rows[0] * &integrals.factor;
+                let seconds = to - from;
                 for c in 0..count {
-                    let square = factor.row(c).norm_squared();
-                    all.mean[c] += mean[c];
-                    all.square[c] += square;
+                    let stretch = Moments {
+                        seconds,
+                        first: mean[c],
+                        second: factor.row(c).norm_squared(),
+                    };
+                    all[c].add(stretch);
                     if counts {
-                        periods.mean[c] += mean[c];
-                        periods.square[c] += square;
+                        periods[c].add(stretch);
                     }
                 }
-                for (work, (i, v)) in all.work.iter_mut().zip(&columns.elements) {
-                    *work += factor.row(*i).dot(&factor.row(*v));
+                for (work, (i, v)) in works.iter_mut().zip(&columns.elements) {
+                    *work += factor.row(*i).dot(&factor.row(*v)) + mean[*i] * mean[*v] / seconds;
                 }
                 if let (Some(harmonic), Some(omega)) = (&integrals.harmonic, omega) {
                     let turn = Complex::from_polar(1.0, -omega * (from - span.from));
@@ -93,21 +114,23 @@ pub(super) fn sums(
         }
         last[k] = Some(&linear.rows[0] * &w);
     }
+    // Areas of impulses, and by what the last period has of them.
+    let mut areas = vec![0.0; count];
+    let mut struck = areas.clone();
     for leap in &course.leaps {
         if leap.t < span.from || leap.into == 0 {
             continue;
         }
         let sides = (last[leap.into - 1].as_ref(), first[leap.into].as_ref());
         if let (Some(before), Some(after)) = sides {
-            let areas = &leap.areas;
             for c in 0..count {
-                all.mean[c] += areas[c];
+                areas[c] += leap.areas[c];
                 if whole.is_some_and(|whole| leap.t >= whole) {
-                    periods.mean[c] += areas[c];
+                    struck[c] += leap.areas[c].abs();
                 }
             }
             let sources = work_in(columns, leap, (before, after));
-            for (work, more) in all.work.iter_mut().zip(sources) {
+            for (work, more) in works.iter_mut().zip(sources) {
                 *work += more;
             }
         }
@@ -119,20 +142,33 @@ pub(super) fn sums(
         (&first, &last),
         &extrema,
     );
-    let seconds = whole.map_or(0.0, |whole| span.to - whole);
+    // Areas of a rounding are no impulses.
+    let has_impulses = |c: usize| {
+        let Moments { seconds, .. } = periods[c];
+        struck[c] > FUNDAMENTAL * (periods[c].square() * seconds).sqrt()
+    };
     let distortions = columns.shown.iter().map(|&c| {
-        period?;
-        let mean = periods.mean[c] / seconds;
-        let alternating = periods.square[c] / seconds - mean.powi(2);
+        if period.is_none() || has_impulses(c) {
+            return None;
+        }
+        let Moments {
+            seconds, second, ..
+        } = periods[c];
         let harmonic: f64 = harmonics[c].norm();
         let fundamental = 2.0 * (harmonic / seconds).powi(2);
-        distortion(mean, alternating, fundamental)
+        distortion(periods[c].mean(), second / seconds, fundamental)
     });
+    let struck = columns.shown.iter().map(|&c| has_impulses(c));
     Ok(Sums {
         distortion: distortions.collect(),
-        mean: all.mean,
-        square: all.square,
-        work: all.work,
+        struck: struck.collect(),
+        mean: all
+            .iter()
+            .zip(&areas)
+            .map(|(y, area)| y.first + area)
+            .collect(),
+        square: all.iter().map(Moments::square).collect(),
+        work: works,
         least: extrema.least,
         greatest: extrema.greatest,
         costs,

@@ -3,11 +3,11 @@
 //! With w' = 𝒜 w the integrals of w, of w wᵀ and of w e^{−jωt} over a span follow from those over half of it:
 //!
 //! ```text
-//! m(2t) = m(t) + Φ m(t),   L(2t) L(2t)ᵀ = L Lᵀ + Φ L (Φ L)ᵀ,   F(2t) = F + e^{−jωt} Φ F,   Φ = e^{𝒜 t}.
+//! m(2t) = m(t) + Φ m(t),   L(2t) L(2t)ᵀ = L Lᵀ + Φ L (Φ L)ᵀ + d dᵀ/2t with d = Φ m − m,   F(2t) = F + e^{−jωt} Φ F,   Φ = e^{𝒜 t}.
 //! ```
 //!
-//! The factor L of ∫ w wᵀ is kept instead of that matrix, by a QR factorisation at each doubling: a small difference of large quantities, the
-//! voltage across a small resistance, then loses the digits that it loses at a single instant, and not twice as many.
+//! The factor L of ∫ (w − m/t) (w − m/t)ᵀ is kept instead of ∫ w wᵀ, by a QR factorisation at each doubling: a small difference of large quantities, the
+//! voltage across a small resistance, then loses the digits that it loses at a single instant, and not twice as many; and so does a ripple on a large mean.
 
 use std::f64::consts::TAU;
 
@@ -23,7 +23,7 @@ use crate::settings::tolerances::exponentials::SERIES;
 pub(super) struct Integrals {
     /// ∫ w dt.
     pub(super) mean: DVector<f64>,
-    /// L of ∫ w wᵀ dt = L Lᵀ.
+    /// L of ∫ (w − w̄) (w − w̄)ᵀ dt = L Lᵀ with the mean w̄.
     pub(super) factor: DMatrix<f64>,
     /// ∫ w e^{−jω(t − t₀)} dt, where t₀ is the beginning.
     pub(super) harmonic: Option<DVector<Complex<f64>>>,
@@ -51,17 +51,26 @@ pub(super) fn over(
     for (k, (node, weight)) in NODES.into_iter().zip(WEIGHTS).enumerate() {
         let value = at(node);
         found.mean.axpy(weight * t, &value, 1.0);
-        found.factor.set_column(k, &(&value * (weight * t).sqrt()));
+        found.factor.set_column(k, &value);
         if let (Some(omega), Some(harmonic)) = (omega, &mut found.harmonic) {
             let turn = Complex::from_polar(weight * t, -omega * node * t);
             *harmonic += value.map(|v| turn * v);
         }
     }
+    let mean = &found.mean / t;
+    for (mut column, weight) in found.factor.column_iter_mut().zip(WEIGHTS) {
+        column -= &mean;
+        column *= (weight * t).sqrt();
+    }
     for k in (1..=halvings).rev() {
         let part = motion.part(k);
         let step = motion.step(k)?;
-        found.mean = &found.mean * 2.0 + step * &found.mean;
+        let apart = step * &found.mean;
         let second = &found.factor + step * &found.factor;
+        let count = second.ncols();
+        let mut second = second.insert_column(count, 0.0);
+        second.set_column(count, &(&apart / (2.0 * part).sqrt()));
+        found.mean = &found.mean * 2.0 + apart;
         found.factor = joined(&found.factor, &second);
         if let (Some(omega), Some(harmonic)) = (omega, &mut found.harmonic) {
             let turn = Complex::from_polar(1.0, (-omega * part) % TAU);

@@ -83,7 +83,7 @@ pub struct SignalMeans {
     /// Greatest minus least value.
     pub ripple: f64,
     /// √(Y_rms² − mean² − Y₁²)/Y₁ with Y₁ the root mean square of its part at the frequency at which the circuit repeats, over its last
-    /// period; none where it does not repeat or has no such part.
+    /// period; none where it does not repeat, has no such part, or has impulses.
     pub thd: Option<f64>,
 }
 

@@ -250,6 +250,15 @@ impl Columns<'_> {
                 "{share:.1} % of the input {verb} capacitors and inductors: the efficiency is that of this span; `circ pss --table` has that of the steady state"
             ))
         });
+        let struck = self.shown.iter().zip(&sums.struck);
+        let struck = struck.filter(|(_, struck)| **struck);
+        let struck: Vec<&str> = struck.map(|(k, _)| self.probes[*k].name.as_str()).collect();
+        let impulses = (!struck.is_empty()).then(|| {
+            Note::run("squares-of-impulses", format!(
+                "no distortion of {}, whose impulses have no squares: root mean squares, least and greatest values are those without them",
+                struck.join(", ")
+            ))
+        });
         Table {
             span,
             exact,
@@ -268,7 +277,12 @@ impl Columns<'_> {
             },
             fundamental: period.map(f64::recip),
             temperatures: lost.temperatures,
-            notes: lost.notes.into_iter().chain(notes).collect(),
+            notes: lost
+                .notes
+                .into_iter()
+                .chain(notes)
+                .chain(impulses)
+                .collect(),
         }
     }
 }

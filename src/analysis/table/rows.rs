@@ -23,6 +23,7 @@ pub(super) fn sums(
         greatest: vec![f64::NEG_INFINITY; count],
         work: vec![0.0; columns.elements.len()],
         distortion: vec![None; columns.shown.len()],
+        struck: vec![false; columns.shown.len()],
         costs: Vec::new(),
     };
     let mut rows = waves.time.iter().zip(waves.values.chunks_exact(count));

@@ -2,7 +2,7 @@
 
 use super::Explanation;
 
-pub(super) const CODES: [Explanation; 61] = [
+pub(super) const CODES: [Explanation; 62] = [
     Explanation::of(
         "about-rest",
         "The response is that about the operating point, as laws are smooth and no switch moves.",
@@ -310,6 +310,12 @@ pub(super) const CODES: [Explanation; 61] = [
         "A signal has a peak of next to no duration.",
         "A switch interrupts an inductor's current, or connects a capacitor, and only `Roff` or `Ron` limits it.",
         "Add the diode, clamp or snubber that the real circuit has; measure means with `.meas` or `--table`.",
+    ),
+    Explanation::of(
+        "squares-of-impulses",
+        "A signal of a table has impulses: they are part of its mean, but a root mean square and a distortion of them do not exist.",
+        "A capacitor that an ideal switch connects to a source or another capacitor, or an inductor whose current is interrupted.",
+        "A resistance in the way (`Ron` in the model) makes a pulse of the impulse.",
     ),
     Explanation::of(
         "steady-start",
