@@ -10,7 +10,7 @@ use signal_hook::flag;
 /// What asks a run to end, with its name.
 const SIGNALS: [(i32, &str); 3] = [(SIGINT, "SIGINT"), (SIGTERM, "SIGTERM"), (SIGHUP, "SIGHUP")];
 
-/// Signals that were received; a second one ends the process at once.
+/// Signals that were received. Ctrl-C after any of them ends the process at once; others do not, as `timeout` sends each twice.
 #[derive(Debug, Default)]
 pub(super) struct Signals {
     received: Arc<AtomicBool>,
@@ -25,8 +25,10 @@ impl Signals {
     pub(super) fn watch() -> io::Result<Self> {
         let signals = Self::default();
         for (signal, _) in SIGNALS {
-            let status = Self::status(signal);
-            flag::register_conditional_shutdown(signal, status, signals.received.clone())?;
+            if signal == SIGINT {
+                let status = Self::status(signal);
+                flag::register_conditional_shutdown(signal, status, signals.received.clone())?;
+            }
             flag::register_usize(signal, signals.which.clone(), signal as usize)?;
             flag::register(signal, signals.received.clone())?;
         }

@@ -52,6 +52,15 @@ fn kill(child: &Child, signal: &str) {
     assert!(sent.expect("a shell").success());
 }
 
+/// Asks a program to end more than once within a moment, as `timeout` does.
+fn terminate(child: &Child) {
+    let id = child.id();
+    let command =
+        format!("kill -TERM {id} && for _ in 1 2 3 4 5 6 7 8 9; do kill -TERM {id}; done");
+    let sent = Command::new("sh").args(["-c", &command]).status();
+    sent.expect("a shell");
+}
+
 /// Waits until something holds, a minute at most.
 fn until(what: &str, holds: impl Fn() -> bool) {
     let begin = Instant::now();
@@ -183,7 +192,7 @@ fn a_search_for_an_orbit_ends_within_a_return() {
     assert_eq!(names(path), ["slow.cir"]);
 }
 
-/// SIGTERM in the middle of one print step of very many steps; the rows before are in the pipe and in each file.
+/// SIGTERM, more than once, in the middle of one print step of very many steps; the rows before are in the pipe and in each file.
 #[test]
 #[cfg(unix)]
 fn a_run_ends_at_once_and_keeps_its_rows_in_every_format() {
@@ -203,7 +212,7 @@ fn a_run_ends_at_once_and_keeps_its_rows_in_every_format() {
                 .spawn();
             let child = child.expect("circ runs");
             std::thread::sleep(Duration::from_millis(400));
-            kill(&child, "TERM");
+            terminate(&child);
             let output = child.wait_with_output().expect("an end");
             assert_eq!(output.status.code(), Some(143), "{}", said(&output));
             assert!(said(&output).contains("interrupted by SIGTERM"));
